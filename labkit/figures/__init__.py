@@ -1,0 +1,1 @@
+"""Figures: every function takes `ax`, draws, and returns its artists; no mathematics in here."""

@@ -1,0 +1,1 @@
+"""Figures one can touch; all interaction goes through `Stage`."""
