@@ -43,7 +43,9 @@ class OccupancyGrid:
     def __post_init__(self):
         cells = np.asarray(self.cells)
         if cells.ndim != 2 or 0 in cells.shape or not np.isin(cells, (FREE, OCCUPIED, UNKNOWN)).all():
-            raise ValueError(f"cells must be a (H, W) array of 0 (free), 1 (occupied), 2 (unknown), got shape {cells.shape}")
+            raise ValueError(
+                f"cells must be a (H, W) array of 0 (free), 1 (occupied), 2 (unknown), got shape {cells.shape}"
+            )
         object.__setattr__(self, "cells", cells.astype(np.uint8))
         object.__setattr__(self, "resolution", float(as_positive(self.resolution, "resolution")))
         object.__setattr__(self, "origin", tuple(as_points(self.origin, "origin", dim=2).tolist()))
@@ -422,7 +424,9 @@ class LikelihoodField:
         """Rows 1, r cos b, r sin b of the beams that hit something, in cells, float32."""
         ranges, bearings = as_finite(ranges, "ranges"), as_finite(bearings, "bearings")
         if ranges.ndim != 1 or ranges.shape != bearings.shape:
-            raise ValueError(f"ranges and bearings must have the same shape (B,), got {ranges.shape} and {bearings.shape}")
+            raise ValueError(
+                f"ranges and bearings must have the same shape (B,), got {ranges.shape} and {bearings.shape}"
+            )
         hit = ranges < self.r_max
         r, b = ranges[hit] / self.grid.resolution, bearings[hit]
         return np.stack([np.ones_like(r), r * np.cos(b), r * np.sin(b)]).astype(np.float32)

@@ -181,7 +181,8 @@ def beam_density(ranges, expected, std, r_max, shares, decay=0.5):
     Each part integrates to its share over [0, r_max], so the whole is a density for every expected range.
     """
     hit, short, none, anywhere = (float(share) for share in shares)
-    expected = np.asarray(expected)
+    shape = np.broadcast_shapes(np.shape(ranges), np.shape(expected))
+    expected = np.atleast_1d(expected)
     expected = expected if expected.dtype == np.float32 else expected.astype(float)
     ranges = np.asarray(ranges, dtype=expected.dtype)
     density = (ranges - expected) / std
@@ -189,15 +190,17 @@ def beam_density(ranges, expected, std, r_max, shares, decay=0.5):
     density *= -0.5
     np.exp(density, out=density)
     density *= hit / (std * math.sqrt(2 * math.pi))
-    near_end = np.nonzero((expected < 5 * std) | (expected > r_max - 5 * std))  # elsewhere the whole bell is in range
+    near_end = (expected < 5 * std) | (expected > r_max - 5 * std)  # elsewhere the whole bell is in range
     z = expected[near_end].astype(float)
-    density[near_end] /= np.maximum(ndtr((r_max - z) / std) - ndtr(-z / std), 1e-12)
+    inside = np.ones(expected.shape, dtype=expected.dtype)
+    inside[near_end] = np.maximum(ndtr((r_max - z) / std) - ndtr(-z / std), 1e-12)
+    density /= inside
     density += anywhere / r_max
     if short > 0:
         norm = np.maximum(-np.expm1(-decay * expected), 1e-12)
         density += (ranges < expected) * (short * decay * np.exp(-decay * ranges)) / norm
     lost = none + anywhere / r_max + (expected >= r_max) * hit
-    return np.where(ranges >= r_max, lost, density)
+    return np.where(ranges >= r_max, lost, density).reshape(shape)
 
 
 def weigh_likelihood_field(field, ranges, bearings):
@@ -394,7 +397,9 @@ def recover(w_mean, w_slow, w_fast, alpha_slow=0.02, alpha_fast=0.3):
     Source: beyond the lecture, which names the kidnapped robot problem only (augmented MCL).
     """
     if not 0 <= alpha_slow < alpha_fast <= 1:
-        raise ValueError(f"alpha_slow must be below alpha_fast, both from 0 to 1, got {alpha_slow:g} and {alpha_fast:g}")
+        raise ValueError(
+            f"alpha_slow must be below alpha_fast, both from 0 to 1, got {alpha_slow:g} and {alpha_fast:g}"
+        )
     w_slow = w_slow + alpha_slow * (w_mean - w_slow)
     w_fast = w_fast + alpha_fast * (w_mean - w_fast)
     return (max(0.0, 1.0 - w_fast / w_slow) if w_slow > 0 else 0.0), w_slow, w_fast
@@ -614,7 +619,7 @@ def random_drive(building, n_steps, rng, dt=0.5, start=None):
 def see_landmarks(grid, pose, landmarks, rng, std_range=0.1, std_bearing=0.035, r_max=8.0):
     """Indices and noisy (range, bearing) of the landmarks in sight: nearer than r_max and not behind a wall.
 
-    Landmarks may sit on a wall: the last 0.4 m before one do not count as an obstacle. grid None: nothing hides
+    Landmarks may sit on a wall: the last 0.1 m before one does not count as an obstacle. grid None: nothing hides
     anything.
     """
     pose, landmarks = as_points(pose, "pose"), as_points(landmarks, "landmarks", dim=2)
@@ -622,7 +627,7 @@ def see_landmarks(grid, pose, landmarks, rng, std_range=0.1, std_bearing=0.035, 
     r, phi = np.hypot(*d.T), wrap_angle(np.arctan2(d[:, 1], d[:, 0]) - pose[2])
     seen = r < r_max
     if grid is not None:
-        seen &= cast_rays(grid, pose, phi, r_max + 1.0) > r - 0.4
+        seen &= cast_rays(grid, pose, phi, r_max + 1.0) > r - 0.1
     index = np.flatnonzero(seen)
     noise = rng.standard_normal((len(index), 2)) * [std_range, std_bearing]
     return index, np.column_stack([r[index], phi[index]]) + noise
