@@ -97,6 +97,7 @@ class Bound:
 
     def __init__(self, chapter, item):
         self._chapter, self._item = chapter, item
+        self._hints_seen = 0
 
     def __repr__(self):
         return f"exercise {self._item.id}: check it with `@ex.{self._item.id}`, or ask .hint(), .solution(), .starter(), .reset()"
@@ -149,8 +150,9 @@ class Bound:
         feedback.show(self._start_over())
 
     def _next_hint(self):
-        seen = sum(e["event"] == "hint" for e in progress.of(self._chapter.name, self._item.id))
-        number = seen % 3 + 1
+        remembered = sum(e["event"] == "hint" for e in progress.of(self._chapter.name, self._item.id))
+        number = max(remembered, self._hints_seen) % 3 + 1
+        self._hints_seen = number
         progress.record(self._chapter.name, self._item.id, "hint", number=number)
         return self._hint_panel(number), 3 - number
 
@@ -159,8 +161,11 @@ class Bound:
 
     def _cell(self):
         path = SOLUTIONS / f"{self._chapter.notebook}.py"
+        if not path.exists():
+            return None
         call = re.compile(rf"(^|[^\w.])ex\.{self._item.id}\b")
-        return next((c.text for c in source.read(path) if c.kind == "code" and call.search(c.text) and source.region(c.text)), None)
+        cells = (cell.text for cell in source.read(path) if cell.kind == "code")
+        return next((text for text in cells if call.search(text) and source.region(text)), None)
 
     def _solution(self):
         cell = self._cell()
@@ -177,6 +182,7 @@ class Bound:
 
     def _start_over(self):
         progress.record(self._chapter.name, self._item.id, "reset")
+        self._hints_seen = 0
         return self._starter()
 
 
