@@ -211,6 +211,21 @@ def _is_solved(path, source_path):
     return bare == as_text(solved_notebook(source_path)) and counts == list(range(1, len(counts) + 1))
 
 
+def reset(path, notebooks):
+    """Give the student a fresh blank notebook; a copy that differs from it is kept beside it. Returns what was done."""
+    notebook, fresh = notebooks / f"{path.stem}.ipynb", as_text(blank_notebook(path))
+    if _text(notebook) == fresh:
+        return f"notebooks/{notebook.name} is as in the beginning already"
+    kept = ""
+    if notebook.exists():
+        numbers = (k for k in range(1, 10**6) if not (notebooks / f"{path.stem}.my-copy-{k}.ipynb").exists())
+        copy = notebooks / f"{path.stem}.my-copy-{next(numbers)}.ipynb"
+        os.replace(notebook, copy)
+        kept = f"; yours is kept as notebooks/{copy.name}"
+    _write(notebook, fresh)
+    return f"notebooks/{notebook.name} is as in the beginning{kept}"
+
+
 def orphans(notebooks, solutions):
     """Generated notebooks whose source is gone, one sentence each."""
     known = {path.stem for path in source.sources(solutions)}
@@ -232,10 +247,16 @@ def main(arguments=None, root=source.ROOT):
     parser.add_argument(
         "--execute", action="store_true", help="with --check: execute the solved notebooks again as well"
     )
+    parser.add_argument(
+        "--reset", action="store_true", help="give the student fresh notebooks, keeping the old as copies"
+    )
     options = parser.parse_args(arguments)
     notebooks, solutions = root / "notebooks", root / "solutions"
     try:
         paths = [source.find(chapter, solutions) for chapter in options.chapters] or source.sources(solutions)
+        if options.reset:
+            print("\n".join(reset(path, notebooks) for path in paths))
+            return 0
         if options.check:
             found = stale(paths, notebooks, solutions, options.execute) + orphans(notebooks, solutions)
             numbers = " ".join(sorted({sentence[:2] for sentence in found}))
