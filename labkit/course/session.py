@@ -1,6 +1,7 @@
 """The exercises as the student meets them: `ex = course("01-frames")`, then `@ex.invert`, `ex.distance(value)`, `ex.predict(...)`."""
 
 import difflib
+import html
 import importlib
 import os
 import pkgutil
@@ -281,6 +282,29 @@ def overview():
     """(chapter, number done, number of items) of every chapter."""
     done = progress.solved()
     return [(c, sum((c.name, i.id) in done for i in c.items), len(c.items)) for c in chapters()]
+
+
+class CourseMap:
+    """The chapters as a table with links and what is done; plain text where no HTML is shown."""
+
+    def __repr__(self):
+        return progress_text()
+
+    def _repr_mimebundle_(self, include=None, exclude=None):
+        rows = "".join(
+            f'<tr><td style="text-align:right">{c.name[:2].lstrip("0") or "0"}</td>'
+            f'<td style="text-align:left"><a href="{c.notebook}.ipynb">{html.escape(c.title)}</a></td>'
+            f'<td style="text-align:left"><progress value="{done}" max="{total}" aria-label="{html.escape(c.title)}"></progress></td>'
+            f"<td>{done} of {total}</td></tr>"
+            for c, done, total in overview()
+        )
+        head = "<tr><th></th><th>chapter</th><th>done</th><th></th></tr>"
+        return {"text/plain": repr(self), "text/html": f"<table>{head}{rows}</table>"}
+
+
+def course_map():
+    """The chapters of the course with links and the reader's own progress."""
+    return CourseMap()
 
 
 def progress_text():
