@@ -1,3 +1,4 @@
+# ruff: noqa: NPY002, SIM105, SIM223 (hostile student code, on purpose)
 """The engine survives any student code and says what is wrong with it."""
 
 import json
@@ -58,7 +59,14 @@ def with_scipy(T):
 
 @pytest.mark.parametrize(
     "way",
-    [loops, broadcast, with_scipy, np.linalg.inv, lambda T: np.asmatrix(np.linalg.inv(T)), lambda T: frames.invert(T).astype(np.float32)],
+    [
+        loops,
+        broadcast,
+        with_scipy,
+        np.linalg.inv,
+        lambda T: np.asmatrix(np.linalg.inv(T)),
+        lambda T: frames.invert(T).astype(np.float32),
+    ],
 )
 def test_every_correct_way_is_accepted(way):
     assert INVERT.judge(way).status == CORRECT
@@ -279,7 +287,13 @@ def test_general_layer_on_numbers(change, words):
     assert words in outcome.text.lower(), outcome.text
 
 
-POSE = Exercise("pose", reference=lambda T: T.copy(), draw=lambda rng: (random_pose(rng),), metric=metrics.poses(), hints=("a", "b", "c"))
+POSE = Exercise(
+    "pose",
+    reference=lambda T: T.copy(),
+    draw=lambda rng: (random_pose(rng),),
+    metric=metrics.poses(),
+    hints=("a", "b", "c"),
+)
 
 
 def moved(T, R=None, t=None):
@@ -319,8 +333,14 @@ def test_raised_error_names_line_and_call():
 
 
 def test_wrong_on_some_draws_only_says_so():
-    exercise = Exercise("size", reference=abs, draw=lambda rng: (float(rng.choice([-1, 1]) * rng.uniform(1, 2)),), metric=metrics.numbers(),
-                        hints=("a", "b", "c"), draws=20)
+    exercise = Exercise(
+        "size",
+        reference=abs,
+        draw=lambda rng: (float(rng.choice([-1, 1]) * rng.uniform(1, 2)),),
+        metric=metrics.numbers(),
+        hints=("a", "b", "c"),
+        draws=20,
+    )
     assert "which case is special?" in exercise.judge(lambda v: v, rng=np.random.default_rng(0)).text
 
 
@@ -360,8 +380,13 @@ def test_properties_judge_stochastic_code():
 
 
 def test_several_results_are_named():
-    exercise = Exercise("both", reference=lambda v: (v, -v), draw=lambda rng: (rng.normal(size=3),), hints=("a", "b", "c"),
-                        metric=metrics.several(metrics.numbers(unit="mm"), metrics.numbers(), names=("tip", "pivot")))
+    exercise = Exercise(
+        "both",
+        reference=lambda v: (v, -v),
+        draw=lambda rng: (rng.normal(size=3),),
+        hints=("a", "b", "c"),
+        metric=metrics.several(metrics.numbers(unit="mm"), metrics.numbers(), names=("tip", "pivot")),
+    )
     assert exercise.judge(lambda v: [v, -v]).status == CORRECT
     assert "pivot: your result is right up to its sign" in exercise.judge(lambda v: (v, v)).text.lower()
     assert "expected 2 results (tip, pivot), got 3" in exercise.judge(lambda v: v).text
@@ -370,7 +395,14 @@ def test_several_results_are_named():
 
 # Values and predictions -----------------------------------------------------------------------------------------------
 
-LENGTH = Value("length", reference=lambda: 1234.5, unit="mm", rtol=1e-4, hints=("a", "b", "c"), mistakes=[Mistake(lambda: 1000.0, "rounded")])
+LENGTH = Value(
+    "length",
+    reference=lambda: 1234.5,
+    unit="mm",
+    rtol=1e-4,
+    hints=("a", "b", "c"),
+    mistakes=[Mistake(lambda: 1000.0, "rounded")],
+)
 
 
 @pytest.mark.parametrize(
@@ -535,7 +567,10 @@ def test_progress_survives_broken_lines_and_two_writers():
     progress.record("c", "a", "correct")
     with open(progress.path(), "a", encoding="utf-8") as file:
         file.write('{"chapter": "c", "exer')
-    writers = [threading.Thread(target=lambda k=k: [progress.record("c", f"e{k}_{i}", "correct") for i in range(50)]) for k in range(4)]
+    writers = [
+        threading.Thread(target=lambda k=k: [progress.record("c", f"e{k}_{i}", "correct") for i in range(50)])
+        for k in range(4)
+    ]
     for writer in writers:
         writer.start()
     for writer in writers:

@@ -33,10 +33,19 @@ CHAPTER = Chapter(
                 "return np.array([-p[1], p[0]]).",
             ),
             mistakes=[
-                Mistake(lambda p: np.array([p[1], -p[0]]), "You turn clockwise, by -90 deg. Counterclockwise, (1, 0) goes to (0, 1)."),
-                Mistake(lambda p: p[::-1], "You exchanged x and y. That is a mirror image in the diagonal, not a turn: one sign is missing."),
+                Mistake(
+                    lambda p: np.array([p[1], -p[0]]),
+                    "You turn clockwise, by -90 deg. Counterclockwise, (1, 0) goes to (0, 1).",
+                ),
+                Mistake(
+                    lambda p: p[::-1],
+                    "You exchanged x and y. That is a mirror image in the diagonal, not a turn: one sign is missing.",
+                ),
                 Mistake(lambda p: -p, "You turn by 180 deg. A quarter turn also exchanges the components."),
-                Mistake(lambda p: np.array([-p[0], p[1]]), "You mirrored the point in the y axis. A quarter turn exchanges the components."),
+                Mistake(
+                    lambda p: np.array([-p[0], p[1]]),
+                    "You mirrored the point in the y axis. A quarter turn exchanges the components.",
+                ),
                 Mistake(lambda p: p, "You return the point as it came."),
             ],
         ),

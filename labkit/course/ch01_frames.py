@@ -186,13 +186,21 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(lambda v: v / (v @ v), "You divide by the squared length. The root is missing."),
-                Mistake(lambda v: v / v.sum(), "You divide by the sum of the components. The length is the root of the sum of their squares."),
+                Mistake(
+                    lambda v: v / v.sum(),
+                    "You divide by the sum of the components. The length is the root of the sum of their squares.",
+                ),
                 Mistake(
                     lambda v: v / np.abs(v).sum(),
                     "You divide by the sum of absolute values (the 1-norm). The Euclidean length is the root of the sum of squares.",
                 ),
-                Mistake(lambda v: v / np.abs(v).max(), "You divide by the largest component, so that one becomes 1. The length should become 1."),
-                Mistake(lambda v: v / len(v), "`len(v)` counts the components. The length you need is `np.linalg.norm(v)`."),
+                Mistake(
+                    lambda v: v / np.abs(v).max(),
+                    "You divide by the largest component, so that one becomes 1. The length should become 1.",
+                ),
+                Mistake(
+                    lambda v: v / len(v), "`len(v)` counts the components. The length you need is `np.linalg.norm(v)`."
+                ),
                 Mistake(lambda v: v, "You return v as it came. Its length is not 1 yet."),
             ],
         ),
@@ -218,7 +226,10 @@ CHAPTER = Chapter(
                     lambda a, b: frames.gram_schmidt(a, b).T,
                     "Your axes stand in the rows. As columns they turn coordinates in F into coordinates in W; your matrix is the transpose.",
                 ),
-                Mistake(_not_rejected, "Your x and y are not perpendicular: you normalized b without removing its part along x."),
+                Mistake(
+                    _not_rejected,
+                    "Your x and y are not perpendicular: you normalized b without removing its part along x.",
+                ),
                 Mistake(
                     _unnormalized,
                     "You removed the part along x, but y has not been normalized afterwards (and z inherits its length).",
@@ -227,8 +238,14 @@ CHAPTER = Chapter(
                     _projected_without_square,
                     "The part along a is (b . a)/(a . a) a. You divide by the length of a once, it takes the square (or a normalized a).",
                 ),
-                Mistake(_second_edge_first, "You started with b: your y is exact and x gives way. The sheet trusts the first edge, so start with a."),
-                Mistake(_left_handed, "Your z points the wrong way: x, y, z form a left-handed system. z = x cross y, in this order."),
+                Mistake(
+                    _second_edge_first,
+                    "You started with b: your y is exact and x gives way. The sheet trusts the first edge, so start with a.",
+                ),
+                Mistake(
+                    _left_handed,
+                    "Your z points the wrong way: x, y, z form a left-handed system. z = x cross y, in this order.",
+                ),
                 Mistake(
                     _projection_kept,
                     "You kept the part of b along x and threw the rest away. y is the rest: b minus its projection.",
@@ -246,15 +263,30 @@ CHAPTER = Chapter(
                 "T = np.eye(4); T[:3, :3] = gram_schmidt(x_point - origin, y_point - origin); T[:3, 3] = origin.",
             ),
             mistakes=[
-                Mistake(_axes_in_rows, "Your rotation is the transpose: the axes stand in the rows, so it maps W to F, while the origin is that of T_WF."),
-                Mistake(_inverse_frame, "This is T_FW, the inverse: it maps coordinates in W to the frame. T_WF has the origin itself in its last column."),
+                Mistake(
+                    _axes_in_rows,
+                    "Your rotation is the transpose: the axes stand in the rows, so it maps W to F, while the origin is that of T_WF.",
+                ),
+                Mistake(
+                    _inverse_frame,
+                    "This is T_FW, the inverse: it maps coordinates in W to the frame. T_WF has the origin itself in its last column.",
+                ),
                 Mistake(
                     _points_as_directions,
                     "You used the points themselves as directions. They are positions in W; a direction is the difference of two points.",
                 ),
-                Mistake(_no_translation, "The axes are right, but the frame sits at the origin of W: put `origin` into the last column."),
-                Mistake(_frame(_not_rejected), "Your x and y are not perpendicular: the part of the second arm along x must go first."),
-                Mistake(_frame(_second_edge_first), "You trusted the arm to y_point and bent x. The first edge is the trusted one."),
+                Mistake(
+                    _no_translation,
+                    "The axes are right, but the frame sits at the origin of W: put `origin` into the last column.",
+                ),
+                Mistake(
+                    _frame(_not_rejected),
+                    "Your x and y are not perpendicular: the part of the second arm along x must go first.",
+                ),
+                Mistake(
+                    _frame(_second_edge_first),
+                    "You trusted the arm to y_point and bent x. The first edge is the trusted one.",
+                ),
                 Mistake(_frame(_left_handed), "Your frame is left-handed: z = x cross y, in this order."),
                 Mistake(
                     lambda o, px, py: frames.frame_from_points(o, py, px),
@@ -273,7 +305,10 @@ CHAPTER = Chapter(
                 "X = np.eye(4); X[:3, :3] = R.T; X[:3, 3] = -R.T @ t.",
             ),
             mistakes=[
-                Mistake(lambda T: T.T, "You transposed the whole 4x4 matrix: the translation slipped into the last row. Only the rotation is transposed."),
+                Mistake(
+                    lambda T: T.T,
+                    "You transposed the whole 4x4 matrix: the translation slipped into the last row. Only the rotation is transposed.",
+                ),
                 Mistake(
                     lambda T: _with(T, R=T[:3, :3].T),
                     "You transposed the rotation but left the translation as it was. It becomes -R' t.",
@@ -290,7 +325,10 @@ CHAPTER = Chapter(
                     lambda T: _with(T, R=T[:3, :3].T, t=-T[:3, :3] @ T[:3, 3]),
                     "You rotated the translation by R. On the way back everything turns by R'.",
                 ),
-                Mistake(lambda T: _with(T, t=-T[:3, 3]), "You negated the translation, but the rotation has to be undone as well: use R'."),
+                Mistake(
+                    lambda T: _with(T, t=-T[:3, 3]),
+                    "You negated the translation, but the rotation has to be undone as well: use R'.",
+                ),
                 Mistake(lambda T: T, "This is T itself. The inverse maps the other way."),
             ],
         ),
@@ -305,9 +343,17 @@ CHAPTER = Chapter(
                 "return invert(T_WA) @ T_WB.",
             ),
             mistakes=[
-                Mistake(lambda A, B: A @ frames.invert(B), "The order is reversed: T_WA T_BW puts an A beside a B, where nothing cancels. It is T_AW T_WB."),
-                Mistake(lambda A, B: B @ frames.invert(A), "This is T_WB T_AW: the motion that carries A to B, seen from W. Seen from A it is T_AW T_WB."),
-                Mistake(lambda A, B: frames.relative(B, A), "This is T_BA, the inverse: you inverted T_WB instead of T_WA."),
+                Mistake(
+                    lambda A, B: A @ frames.invert(B),
+                    "The order is reversed: T_WA T_BW puts an A beside a B, where nothing cancels. It is T_AW T_WB.",
+                ),
+                Mistake(
+                    lambda A, B: B @ frames.invert(A),
+                    "This is T_WB T_AW: the motion that carries A to B, seen from W. Seen from A it is T_AW T_WB.",
+                ),
+                Mistake(
+                    lambda A, B: frames.relative(B, A), "This is T_BA, the inverse: you inverted T_WB instead of T_WA."
+                ),
                 Mistake(lambda A, B: A @ B, "You multiplied T_WA by T_WB without inverting: W_A W_B does not cancel."),
                 Mistake(lambda A, B: A.T @ B, "The transpose of a 4x4 pose is not its inverse: use your `invert`."),
                 Mistake(
@@ -327,7 +373,10 @@ CHAPTER = Chapter(
                 "np.rad2deg(np.arccos((np.trace(R) - 1) / 2)), with R the rotation block of K0_T_K1.",
             ),
             mistakes=[
-                Mistake(lambda: 90.0, "90 deg is what the sheet's drawing suggests. The points were moved by 0.01, and the angle shows it: compute it from the matrix."),
+                Mistake(
+                    lambda: 90.0,
+                    "90 deg is what the sheet's drawing suggests. The points were moved by 0.01, and the angle shows it: compute it from the matrix.",
+                ),
                 Mistake(
                     lambda: np.rad2deg(np.arccos(np.clip(np.trace(_K0_T_K1()) / 2 - 0.5, -1, 1))),
                     "You took the trace of the 4x4 matrix; the 1 in its corner is no part of the rotation.",
@@ -349,10 +398,19 @@ CHAPTER = Chapter(
                 "np.linalg.norm(K0_T_K1[:3, 3]).",
             ),
             mistakes=[
-                Mistake(lambda: np.linalg.norm(_K0_T_K1()), "You took the norm of the whole matrix. Only its last column holds lengths."),
-                Mistake(lambda: np.linalg.norm(_K0_T_K1()[:, 3]), "Your column still holds the 1 of the last row: take its first three entries."),
+                Mistake(
+                    lambda: np.linalg.norm(_K0_T_K1()),
+                    "You took the norm of the whole matrix. Only its last column holds lengths.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_K0_T_K1()[:, 3]),
+                    "Your column still holds the 1 of the last row: take its first three entries.",
+                ),
                 Mistake(lambda: _distance() ** 2, "This is the squared distance."),
-                Mistake(lambda: np.abs(_K0_T_K1()[:3, 3]).sum(), "You added the absolute components. The distance is the root of the sum of squares."),
+                Mistake(
+                    lambda: np.abs(_K0_T_K1()[:3, 3]).sum(),
+                    "You added the absolute components. The distance is the root of the sum of squares.",
+                ),
                 Mistake(_flat_distance, "This is the distance of the two x_points. The frames sit at their origins."),
             ],
         ),
@@ -374,7 +432,10 @@ CHAPTER = Chapter(
                 "x, y, z, A, B, C = xyzabc; T[:3, :3] = rot_z(A) @ rot_y(B) @ rot_x(C); T[:3, 3] = x, y, z.",
             ),
             mistakes=[
-                Mistake(_kuka("xyz"), "You multiplied Rx(C) Ry(B) Rz(A). KUKA turns about z first, then about the new y and the new x: Rz(A) Ry(B) Rx(C)."),
+                Mistake(
+                    _kuka("xyz"),
+                    "You multiplied Rx(C) Ry(B) Rz(A). KUKA turns about z first, then about the new y and the new x: Rz(A) Ry(B) Rx(C).",
+                ),
                 Mistake(
                     _kuka("zyx", (5, 4, 3)),
                     "A and C have changed places: A belongs to z, B to y, C to x.",
@@ -384,8 +445,13 @@ CHAPTER = Chapter(
                     "You read A, B, C as turns about x, y, z. At KUKA, A turns about z, B about y, C about x.",
                 ),
                 Mistake(_kuka_in_degrees, "The angles already are radians: you converted them once too often."),
-                Mistake(_kuka_transposed, "Your rotation is the transpose: every elementary turn has its signs reversed."),
-                Mistake(lambda p: _with(frames.matrix_from_kuka(p), t=np.zeros(3)), "The rotation is right; x, y, z are missing from the last column."),
+                Mistake(
+                    _kuka_transposed, "Your rotation is the transpose: every elementary turn has its signs reversed."
+                ),
+                Mistake(
+                    lambda p: _with(frames.matrix_from_kuka(p), t=np.zeros(3)),
+                    "The rotation is right; x, y, z are missing from the last column.",
+                ),
                 Mistake(
                     lambda p: _with(frames.matrix_from_kuka(p), t=frames.matrix_from_kuka(p)[:3, :3] @ p[:3]),
                     "You rotated the position as well. x, y, z are already written in the base frame.",
@@ -410,10 +476,15 @@ CHAPTER = Chapter(
                 "B = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0])), A = np.arctan2(R[1, 0], R[0, 0]), C = np.arctan2(R[2, 1], R[2, 2]).",
             ),
             mistakes=[
-                Mistake(_angles(np.rad2deg), "Your angles are in degrees. Inside the workbook angles are radians; degrees are for people."),
+                Mistake(
+                    _angles(np.rad2deg),
+                    "Your angles are in degrees. Inside the workbook angles are radians; degrees are for people.",
+                ),
                 Mistake(_angles(lambda abc: abc[::-1]), "Your angles come in the order C, B, A."),
                 Mistake(_angles(lambda abc: abc * (1, -1, 1)), "B has the wrong sign: the entry r20 is -sin B."),
-                Mistake(_angles(lambda abc: -abc), "All three angles have the wrong sign: you read the transposed matrix."),
+                Mistake(
+                    _angles(lambda abc: -abc), "All three angles have the wrong sign: you read the transposed matrix."
+                ),
                 Mistake(
                     lambda T: frames.kuka_from_matrix(frames.invert(T)),
                     "This is the pose of the inverse: you read T' instead of T.",

@@ -17,7 +17,13 @@ from . import guard, metrics
 
 TODO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
 TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws
-UNITS = {"mm": ("length", 1e-3), "cm": ("length", 1e-2), "m": ("length", 1.0), "rad": ("angle", 1.0), "deg": ("angle", np.pi / 180)}
+UNITS = {
+    "mm": ("length", 1e-3),
+    "cm": ("length", 1e-2),
+    "m": ("length", 1.0),
+    "rad": ("angle", 1.0),
+    "deg": ("angle", np.pi / 180),
+}
 
 
 @dataclass(frozen=True)
@@ -171,7 +177,9 @@ class _Trial:
         if all(self.exercise.metric.equal(r, e) for r, e in plain):
             noisy, (result, expected) = self.metrics[-1], self.pairs[-1]
             off = [d for d in noisy.deviations(result, expected) if not d.within]
-            return self.outcome(NOT_YET, f"exact on clean data, but on noisy data {off[0]}: it does not weigh the data as it should.")
+            return self.outcome(
+                NOT_YET, f"exact on clean data, but on noisy data {off[0]}: it does not weigh the data as it should."
+            )
         words = metrics.difference_words(self.exercise.metric, plain)
         return self.outcome(NOT_YET, (words + ".") if words else self._deviation(plain))
 
@@ -199,7 +207,11 @@ class _Trial:
             return "right on most draws, but not on all."
         most = max(worst, key=lambda d: d.amount / max(d.tolerance, 1e-300))
         missed = sum(not self.exercise.metric.equal(r, e) for r, e in pairs)
-        scope = "" if missed == len(pairs) else f" It was right on {len(pairs) - missed} of {len(pairs)} draws: which case is special?"
+        scope = (
+            ""
+            if missed == len(pairs)
+            else f" It was right on {len(pairs) - missed} of {len(pairs)} draws: which case is special?"
+        )
         return f"{most}.{scope}"
 
     def _names(self, args):
@@ -214,7 +226,10 @@ class _Trial:
             text = f"your code did not finish within {guard.TIME_LIMIT:.0f} s: is there a loop without an end?"
             return self.outcome(NOT_YET, text)
         if isinstance(error, guard.Forbidden):
-            return self.outcome(NOT_YET, f"your code calls {error}, which a checked function must not do: it gets its data as arguments.")
+            return self.outcome(
+                NOT_YET,
+                f"your code calls {error}, which a checked function must not do: it gets its data as arguments.",
+            )
         if isinstance(error, SystemExit):
             return self.outcome(NOT_YET, "your code calls exit(): a function ends with `return`.")
         if isinstance(error, TypeError) and not run.line:
@@ -257,7 +272,9 @@ def _short(value):
     if isinstance(value, np.ndarray):
         if value.size > 16:
             return f"<array of shape {value.shape}>"
-        return np.array2string(value, precision=3, suppress_small=True, separator=", ", max_line_width=100).replace("\n", "")
+        return np.array2string(value, precision=3, suppress_small=True, separator=", ", max_line_width=100).replace(
+            "\n", ""
+        )
     text = f"{value:.4g}" if isinstance(value, float) else repr(value)
     return text if len(text) <= 60 else f"<{type(value).__name__}>"
 
@@ -310,7 +327,11 @@ class Value(Item):
         if self.metric is not None:
             return self._judge_with(self.metric, self.reference(), answer)
         expected, metric = self.measure()
-        run = guard.run(metric.admit, (answer, expected)) if unit is None else guard.run(self._converted, (answer, unit, expected))
+        run = (
+            guard.run(metric.admit, (answer, expected))
+            if unit is None
+            else guard.run(self._converted, (answer, unit, expected))
+        )
         if isinstance(run.error, metrics.Refused | ValueError):
             return Outcome(NOT_YET, f"{_for_value(run.error)}.")
         if run.error is not None:
@@ -328,7 +349,11 @@ class Value(Item):
     def _judge_with(self, metric, expected, answer):
         run = guard.run(metric.admit, (answer, expected))
         if run.error is not None:
-            text = _for_value(run.error) if isinstance(run.error, metrics.Refused) else f"{type(run.error).__name__}: {_message(run.error)}"
+            text = (
+                _for_value(run.error)
+                if isinstance(run.error, metrics.Refused)
+                else f"{type(run.error).__name__}: {_message(run.error)}"
+            )
             return Outcome(NOT_YET, f"{text}.")
         return self._compare(metric, run.result, expected)
 
@@ -377,7 +402,9 @@ class Prediction(Item):
             try:
                 return float(answer)
             except (TypeError, ValueError):
-                raise ValueError(f"expected a number{' in ' + self.unit if self.unit else ''}, got {answer!r}") from None
+                raise ValueError(
+                    f"expected a number{' in ' + self.unit if self.unit else ''}, got {answer!r}"
+                ) from None
         for choice in self.choices:
             if str(answer).strip().lower() == str(choice).lower():
                 return choice

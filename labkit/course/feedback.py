@@ -8,7 +8,12 @@ from IPython.display import display
 from .engine import CORRECT, NOT_YET, RAISED, TODO
 
 SIGNS = {TODO: "○", NOT_YET: "✗", CORRECT: "✓", RAISED: "!"}
-COLORS = {TODO: "--jp-info-color1", NOT_YET: "--jp-warn-color1", CORRECT: "--jp-success-color1", RAISED: "--jp-error-color1"}
+COLORS = {
+    TODO: "--jp-info-color1",
+    NOT_YET: "--jp-warn-color1",
+    CORRECT: "--jp-success-color1",
+    RAISED: "--jp-error-color1",
+}
 
 
 class Panel:
@@ -24,11 +29,17 @@ class Panel:
     def html(self):
         """The panel as HTML; no ids, no script, colors from the theme's variables with a fallback for other viewers."""
         color = f"var({COLORS[self.status]}, currentColor)" if self.status else "var(--jp-border-color1, currentColor)"
-        sign = f'<span aria-hidden="true" style="color:{color};font-weight:bold">{SIGNS[self.status]}</span> ' if self.status else ""
+        sign = (
+            f'<span aria-hidden="true" style="color:{color};font-weight:bold">{SIGNS[self.status]}</span> '
+            if self.status
+            else ""
+        )
         parts = [f'<div style="font-weight:600">{sign}{html.escape(self.head)}</div>']
         parts += [f'<div style="white-space:pre-wrap">{_marked(p)}</div>' for p in self.paragraphs]
         if self.code:
-            parts.append(f'<pre style="margin:4px 0 0 0;color:inherit;background:transparent">{html.escape(self.code)}</pre>')
+            parts.append(
+                f'<pre style="margin:4px 0 0 0;color:inherit;background:transparent">{html.escape(self.code)}</pre>'
+            )
         return (
             f'<div role="status" style="border-left:4px solid {color};padding:4px 10px;max-width:60em;line-height:1.45;'
             f'color:var(--jp-content-font-color1, inherit)">{"".join(parts)}</div>'
@@ -82,7 +93,9 @@ def button_row(hint, solution, starter):
         hints.description = f"Hint ({left} left)" if left else "Hints again"
 
     hints = button("Hint", next_hint)
-    row = ipywidgets.HBox([hints, button("Solution", lambda: show(solution())), button("Start over", lambda: show(starter()))])
+    row = ipywidgets.HBox(
+        [hints, button("Solution", lambda: show(solution())), button("Start over", lambda: show(starter()))]
+    )
     return Named([row, shown], "[buttons: hint, solution, start over]")
 
 

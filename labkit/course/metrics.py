@@ -70,11 +70,15 @@ def as_array(result, shape):
         if hasattr(result, method) and not isinstance(result, type):
             result = getattr(result, method)()
     if callable(result):
-        raise Refused(f"it returned {getattr(result, '__name__', 'something callable')}, a function: are the parentheses missing?")
+        raise Refused(
+            f"it returned {getattr(result, '__name__', 'something callable')}, a function: are the parentheses missing?"
+        )
     wanted = f"expected {'a number' if shape == () else f'an array of shape {shape}'}"
-    if getattr(result, "size", 0) is not None and np.size(getattr(result, "shape", ())) and np.prod(
-        np.asarray(result.shape, dtype=float)
-    ) > MAX_ENTRIES:
+    if (
+        getattr(result, "size", 0) is not None
+        and np.size(getattr(result, "shape", ()))
+        and np.prod(np.asarray(result.shape, dtype=float)) > MAX_ENTRIES
+    ):
         raise Refused(f"{wanted}, got one of shape {tuple(result.shape)}")
     try:
         array = np.asarray(result)
@@ -380,7 +384,8 @@ def _pose_relation(results, expected, holds):
     if holds(lambda T: _moved(T, t=-T[..., :3, 3])):
         return "the rotation is right, the translation has the opposite sign"
     turn_only = all(
-        np.max(frames.rotation_angle(np.swapaxes(r[..., :3, :3], -1, -2) @ e[..., :3, :3])) < 1e-7 for r, e in zip(results, expected)
+        np.max(frames.rotation_angle(np.swapaxes(r[..., :3, :3], -1, -2) @ e[..., :3, :3])) < 1e-7
+        for r, e in zip(results, expected)
     )
     if turn_only:
         return "the rotation is right, the translation is not"

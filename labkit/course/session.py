@@ -9,8 +9,8 @@ import re
 
 import ipywidgets
 
-from . import engine, feedback, guard, progress, source
 from ..tables import DATA
+from . import engine, feedback, guard, progress, source
 from .engine import CORRECT, NOT_YET, RAISED, TODO, Prediction, Value
 from .feedback import Named, Panel
 
@@ -252,7 +252,9 @@ def _question(chapter, item, reveal):
     """The question with a button for each choice; a click locks it in and puts the figure beneath."""
     text = ipywidgets.HTML(Panel(f"{item.id}: predict first", [item.question], TODO).html())
     answers = ipywidgets.HBox(layout=ipywidgets.Layout(flex_flow="row wrap"))
-    box = Named([text, answers], f"[predict first: {item.question} {' | '.join(map(str, item.choices))}]".replace(" ]", "]"))
+    box = Named(
+        [text, answers], f"[predict first: {item.question} {' | '.join(map(str, item.choices))}]".replace(" ]", "]")
+    )
 
     def lock(choice):
         text.value = _locked_panel(chapter, item, choice, first=True).html()

@@ -22,6 +22,13 @@ def _inside(state, moved):
     return {"p": state["p"] * RADIUS / length} if length > RADIUS else {}
 
 
+def _caption(points):
+    """The three points in words."""
+    told = [f"({x:.1f}, {y:.1f})" for x, y in points]
+    hint = " At the origin there is nothing to turn." if np.allclose(points[0], 0) else ""
+    return f"p = {told[0]}, turned once {told[1]}, twice {told[2]}.{hint}"
+
+
 def quarter_turns():
     """Drag a point and see it turned once and twice; the slider sets the angle, 90 deg at first."""
 
@@ -44,6 +51,5 @@ def quarter_turns():
         controls={"angle": slider(0, 180, 90, step=5, label="angle (deg)")},
         constrain=_inside,
         fail={"p": (0, 0)},
-        describe=lambda r: f"p = ({r[0, 0]:.1f}, {r[0, 1]:.1f}), once ({r[1, 0]:.1f}, {r[1, 1]:.1f}), twice ({r[2, 0]:.1f}, {r[2, 1]:.1f})."
-        + (" At the origin there is nothing to turn." if np.allclose(r[0], 0) else ""),
+        describe=_caption,
     )
