@@ -241,7 +241,7 @@ def ask(chapter, item, answer, reveal):
 
 
 def _locked_panel(chapter, item, choice, first):
-    if first and not is_strict():
+    if first:
         progress.record(chapter.name, item.id, "predicted", answer=choice)
     unit = f" {item.unit}" if item.unit else ""
     verdict = "That is what happens." if item.is_right(choice) else f"What happens: {item.answer}{unit}."
