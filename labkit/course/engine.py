@@ -1,8 +1,9 @@
 """Exercises as the lecturer writes them, and how an answer is judged.
 
-An `Exercise` is a reference function, a random draw of its arguments, a metric, three hints, and a list of `Mistake`s: wrong variants of
-the reference, each with the sentence a student needs who made exactly this mistake. `judge` is pure: it runs an answer and returns an `Outcome`.
-What is displayed, remembered and bound to a name is the business of `session`.
+An `Exercise` is a reference function, a random draw of its arguments, a metric, three hints, and a list of
+`Mistake`s: wrong variants of the reference, each with the sentence a student needs who made exactly this mistake.
+`judge` is pure: it runs an answer and returns an `Outcome`. What is displayed, remembered and bound to a name is the
+business of `session`.
 """
 
 import copy
@@ -28,7 +29,7 @@ UNITS = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """The judgment of one answer: a status, what to say about it, and which mistake it is (its index) if it is a named one."""
+    """The judgment of one answer: status, what to say about it, and the index of the named mistake it is, if any."""
 
     status: str
     text: str = ""
@@ -164,7 +165,7 @@ class _Trial:
         return self.outcome(NOT_YET, str(run.result)) if run.result else None
 
     def verdict(self):
-        """Compare everything that came back with the references, the named mistakes and the general layer, in this order."""
+        """Compare what came back with the references, then the named mistakes, then by the general layer."""
         if all(m is None or m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)) and not self.refusal:
             named = self._named_mistake() if self.exercise.metric is None else None
             return named or self.outcome(CORRECT)
@@ -251,7 +252,7 @@ class _Refusal:
 
 
 def _equal_as_written(metric, result, wrong):
-    """Whether a result equals a mistake's, by the metric, or as bare arrays where the metric would refuse the mistake itself."""
+    """Whether a result equals a mistake's: by the metric, or as bare arrays where it refuses the mistake itself."""
     try:
         metric.admit(wrong, wrong)
     except metrics.Refused:
@@ -380,7 +381,8 @@ def _for_value(refusal):
 class Prediction(Item):
     """A question to be answered before a figure is shown; the first answer is locked in.
 
-    choices: the possible answers, one of them `answer`; empty for a number in `unit`, right within the relative distance `within`.
+    choices: the possible answers, one of them `answer`; empty for a number in `unit`, right within the relative
+             distance `within`.
     why:     one or two sentences that say what the figure will show.
     """
 

@@ -1,4 +1,4 @@
-"""What appears beneath a cell: stable text first, then the same as HTML that follows JupyterLab's theme, then a row of buttons."""
+"""What appears beneath a cell: stable text, the same as HTML that follows JupyterLab's theme, a row of buttons."""
 
 import html
 

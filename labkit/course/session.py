@@ -1,4 +1,4 @@
-"""The exercises as the student meets them: `ex = course("01-frames")`, then `@ex.invert`, `ex.distance(value)`, `ex.predict(...)`."""
+"""The exercises as the student meets them: `ex = course("01-frames")`, then `@ex.invert`, `ex.distance(value)`."""
 
 import difflib
 import html
@@ -80,7 +80,7 @@ class Course:
         return f"exercises of chapter {self._chapter.name}: {', '.join(self._bound)}"
 
     def predict(self, id, answer=None, reveal=None):
-        """Lock in a prediction, then show what `reveal()` returns (a Stage); without an answer, offer the choices as buttons."""
+        """Lock in a prediction, then show what `reveal()` returns; without one, offer the choices as buttons."""
         try:
             item = self._chapter[id]
         except KeyError:
@@ -101,7 +101,7 @@ class Bound:
         self._hints_seen = 0
 
     def __repr__(self):
-        return f"exercise {self._item.id}: check it with `@ex.{self._item.id}`, or ask .hint(), .solution(), .starter(), .reset()"
+        return f"exercise {self._item.id}: @ex.{self._item.id} checks it; ask .hint(), .solution(), .starter(), .reset()"
 
     def __call__(self, answer, unit=None):
         """Check an answer, say what came out, and return what later cells go on with: the answer, or the reference."""
@@ -296,7 +296,7 @@ class CourseMap:
         rows = "".join(
             f'<tr><td style="text-align:right">{c.name[:2].lstrip("0") or "0"}</td>'
             f'<td style="text-align:left"><a href="{c.notebook}.ipynb">{html.escape(c.title)}</a></td>'
-            f'<td style="text-align:left"><progress value="{done}" max="{total}" aria-label="{html.escape(c.title)}"></progress></td>'
+            f'<td><progress value="{done}" max="{total}" aria-label="{html.escape(c.title)}"></progress></td>'
             f"<td>{done} of {total}</td></tr>"
             for c, done, total in overview()
         )
