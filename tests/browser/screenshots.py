@@ -13,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "browser")]
 
-import jupyter  # noqa: E402
+import driver  # noqa: E402
 
 import lab  # noqa: E402
 from labkit import build  # noqa: E402
@@ -48,15 +48,15 @@ def take(notebook, stem, options):
     paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
     name = f"{stem}-{'solved' if options.solved else 'blank'}-{'dark' if options.dark else 'light'}"
     with (
-        jupyter.server(words, settings=lab.OVERRIDES, PYTHONPATH=paths) as address,
-        jupyter.page_of(jupyter.find_browser(), options.dark, options.width) as page,
+        driver.server(words, settings=lab.OVERRIDES, PYTHONPATH=paths) as address,
+        driver.page_of(driver.find_browser(), options.dark, options.width) as page,
     ):
-        jupyter.open_notebook(page, address, notebook)
-        jupyter.set_theme(page, options.dark)
-        jupyter.show_notebook_alone(page)
+        driver.open_notebook(page, address, notebook)
+        driver.set_theme(page, options.dark)
+        driver.show_notebook_alone(page)
         if not options.no_run:
-            jupyter.run_all(page)
-        print("\n".join(jupyter.save_pictures(page, options.folder / name, PAGE)))
+            driver.run_all(page)
+        print("\n".join(driver.save_pictures(page, options.folder / name, PAGE)))
         print("".join(f"console: {complaint}\n" for complaint in page.complaints), end="", file=sys.stderr)
 
 

@@ -13,6 +13,7 @@ import subprocess
 import tempfile
 import time
 from pathlib import Path
+from urllib.parse import urlsplit
 
 ROOT = Path(__file__).resolve().parents[2]
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
@@ -90,7 +91,8 @@ def page_of(browser_path, dark=False, width=1280, height=900, scale=1):
             color_scheme="dark" if dark else "light",
         )
         page.hosts, page.complaints = set(), []
-        page.on("request", lambda request: page.hosts.add(re.sub(r"^\w+://([^/:]*).*", r"\1", request.url, flags=re.S)))
+        page.on("request", lambda request: page.hosts.add(urlsplit(request.url).hostname))
+        page.on("websocket", lambda socket: page.hosts.add(urlsplit(socket.url).hostname))
         page.on("console", lambda m: page.complaints.append(m.text) if m.type == "error" else None)
         page.on("pageerror", lambda error: page.complaints.append(str(error)))
         try:
