@@ -101,7 +101,8 @@ class Bound:
         self._hints_seen = 0
 
     def __repr__(self):
-        return f"exercise {self._item.id}: @ex.{self._item.id} checks it; ask .hint(), .solution(), .starter(), .reset()"
+        name = self._item.id
+        return f"exercise {name}: check with `@ex.{name}`, or ask .hint(), .solution(), .starter(), .reset()"
 
     def __call__(self, answer, unit=None):
         """Check an answer, say what came out, and return what later cells go on with: the answer, or the reference."""
@@ -223,7 +224,8 @@ def ask(chapter, item, answer, reveal):
     locked = [e["answer"] for e in progress.of(chapter.name, item.id) if e["event"] == "predicted" and "answer" in e]
     if is_strict():
         if engine.is_blank(answer) or not item.is_right(item.read(answer)):
-            raise NotCorrect(f"{item.id}: the prediction is {TO_DO if engine.is_blank(answer) else 'not the right one'}")
+            missing = TO_DO if engine.is_blank(answer) else "not the right one"
+            raise NotCorrect(f"{item.id}: the prediction is {missing}")
         locked = []
     given = None
     if not engine.is_blank(answer):
