@@ -32,7 +32,12 @@ def test_counts(output, code, passed, failed, skipped):
 
 def test_the_last_line_is_the_sum(tmp_path, capsys):
     (tmp_path / "test_a.py").write_text("def test_good(): pass\ndef test_bad(): assert not 1\n", encoding="utf-8")
-    assert run.main([str(tmp_path / "test_a.py"), "--rootdir", str(tmp_path), "-p", "no:cacheprovider"]) == 1
+    assert (
+        run.main(
+            [str(tmp_path / "test_a.py"), "--rootdir", str(tmp_path), "-p", "no:nbval", "-p", "no:hypothesispytest"]
+        )
+        == 1
+    )
     printed = capsys.readouterr().out
     assert printed.splitlines()[-1] == "1 passed, 1 failed"
     assert "assert not 1" in printed
