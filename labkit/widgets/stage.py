@@ -245,6 +245,7 @@ class Stage(ipywidgets.VBox):
         self.result, self.status, self.caption = None, "", ""
         self._front, self._sent, self._shown, self._waiting = _Front(), 0, 0, False
         self._attached = self._showing = False
+        self._received = monotonic()
         self._picture = Picture(scene, size)
         self._correct(set(self._state))
         self.initial = dict(self._state)
@@ -425,6 +426,7 @@ class Stage(ipywidgets.VBox):
     def _receive(self, message):
         """One message of the browser: everything that happened since the last one, merged."""
         with DRAWING:
+            self._received = monotonic()
             self._shown = max(self._shown, message.get("shown", 0))
             if "look" in message:
                 self._attached, self._shown = True, self._sent
@@ -482,7 +484,6 @@ class Stage(ipywidgets.VBox):
             return
         self._waiting = False
         self._sent += 1
-        start = monotonic()
         png = self._picture.png()
         front = {
             "picture": self._sent,
@@ -494,7 +495,7 @@ class Stage(ipywidgets.VBox):
             "status": self.status,
             "empty": "drive" if self._keys else "turn" if "view" in self._state else "draw" if self._brush is not None else "",
             "click": self._click is not None,
-            "milliseconds": round(1e3 * (monotonic() - start), 2),
+            "milliseconds": round(1e3 * (monotonic() - self._received), 1),
         }
         self._front.send(front, [png])
 
