@@ -306,7 +306,7 @@ def counting(**options):
 
 def test_memory_follows_ticks_keys_and_clicks():
     stage, sent = wire(counting(play=Play(2.0, 0.1), keys=True, click=True))
-    assert sent[-1][0]["empty"] == "drive"
+    assert sent[-1][0]["keys"] is True
     stage._play_widget.value = 2
     stage._receive({"arrows": ["up", "left"], "serial": "a:2"})
     stage._receive({"click": stage._picture.fraction(stage._picture.fig.axes[0], (1, 1)), "serial": "a:3"})

@@ -98,7 +98,8 @@ function render({ model, el }) {
     picture.style.width = `${message.width}px`;
     canvas.dataset.empty = message.empty;
     canvas.dataset.click = message.click;
-    if (message.empty === "drive" || message.empty === "turn") canvas.tabIndex = 0;
+    canvas.dataset.keys = message.keys;
+    if (message.keys || message.empty === "turn") canvas.tabIndex = 0;
     canvas.setAttribute("aria-label", [message.name, message.caption].filter(Boolean).join(": "));
     if (caption.textContent !== message.caption) {
       caption.textContent = message.caption;
@@ -236,7 +237,7 @@ function render({ model, el }) {
     if (!arrow || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
     event.stopPropagation();
-    if (canvas.dataset.empty === "drive") {
+    if (canvas.dataset.keys === "true") {
       add("arrows", (names = []) => [...names, NAMES[event.key]].slice(-MAX_ARROWS));
     } else if (canvas.dataset.empty === "turn") {
       const size = event.shiftKey ? 60 : 10;

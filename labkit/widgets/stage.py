@@ -153,7 +153,7 @@ class choice:
         return kind(
             options=self._pairs, value=self.value, description=self.label or name,
             style={"description_width": "initial", **({"button_width": "auto"} if len(self._pairs) <= 3 else {})},
-            layout={"width": "auto", "max_width": "100%"},
+            layout={"width": "max-content", "max_width": "100%"},
         )  # fmt: skip
 
 
@@ -444,11 +444,10 @@ class Stage(ipywidgets.VBox):
             changes[key] = self._moved(key, to=fraction)
         for key, steps in message.get("step", {}).items():
             changes[key] = self._moved(key, steps=steps)
-        arrows = message.get("arrows", [])
         if "orbit" in message and "view" in self._state:
             changes["view"] = self._state["view"].turned(*(ORBIT_DEG_PER_PIXEL * np.array(message["orbit"])))
-        elif arrows and self._keys:
-            events += arrows
+        if self._keys:
+            events += message.get("arrows", [])
         if "click" in message and self._click is not None:
             ax = self._picture.fig.axes[self._click]
             if ax.in_axes(_at(self._picture, message["click"])):
@@ -493,7 +492,8 @@ class Stage(ipywidgets.VBox):
             "name": self.name,
             "caption": self.caption,
             "status": self.status,
-            "empty": "drive" if self._keys else "turn" if "view" in self._state else "draw" if self._brush is not None else "",
+            "empty": "turn" if "view" in self._state else "draw" if self._brush is not None else "",
+            "keys": self._keys,
             "click": self._click is not None,
             "milliseconds": round(1e3 * (monotonic() - self._received), 1),
         }
