@@ -2,11 +2,10 @@
 
 The lecture shows one room as a grid, as lines, as points and as a graph; the sensor models need the grid. `cells[i,
 j]` covers the square
-from x = origin[0] + j * resolution and y = origin[1] + i * resolution on: row 0 lies at the *bottom*, as in a coordinate system, and
-pictures and ASCII art are turned over when they are read. Lengths are meters, angles radians, planar poses (..., 3)
-are x, y, theta.
-Source: lecture "Lokalisierung", slides on maps ("Gitterbasierte Karten" to "Punktbasierte Karten"),
-"2D-Laser-Scanner", "Likelihoodfield".
+from x = origin[0] + j * resolution and y = origin[1] + i * resolution on: row 0 lies at the *bottom*, as in a
+coordinate system, and pictures and ASCII art are turned over when they are read. Lengths are meters, angles radians,
+planar poses (..., 3) are x, y, theta. Source: lecture "Lokalisierung", slides on maps ("Gitterbasierte Karten" to
+"Punktbasierte Karten"), "2D-Laser-Scanner", "Likelihoodfield".
 """
 
 import math

@@ -141,8 +141,8 @@ def weigh_beams(world, ranges, bearings, std, r_max, shares=(0.75, 0.1, 0.05, 0.
     decay : float
         Rate of the short readings (1/m).
     step : float, optional
-        Compute the density once a scan at expected ranges every `step` m and look it up: faster for thousands of particles, and
-        harmless while step is far below std.
+        Compute the density once a scan at expected ranges every `step` m and look it up: faster for thousands of
+        particles, and harmless while step is far below std.
 
     Source: lecture, "Strahlenmodell"; the mixture is the usual extension.
     """
@@ -394,8 +394,8 @@ def recover(w_mean, w_slow, w_fast, alpha_slow=0.02, alpha_fast=0.3):
 
     Two exponential averages follow the mean weight of the cloud, a slow and a fast one. When the fast one has
     dropped below the slow
-    one, the measurements have stopped to fit: share = max(0, 1 - w_fast / w_slow). Start both averages with the first mean weight.
-    Source: beyond the lecture, which names the kidnapped robot problem only (augmented MCL).
+    one, the measurements have stopped to fit: share = max(0, 1 - w_fast / w_slow). Start both averages with the first
+    mean weight. Source: beyond the lecture, which names the kidnapped robot problem only (augmented MCL).
     """
     if not 0 <= alpha_slow < alpha_fast <= 1:
         raise ValueError(
@@ -446,7 +446,8 @@ class Step:
     """What one step of the filter did.
 
     n_particles; effective: effective size before resampling; resampled: whether it was; injected: random poses put in;
-    w_mean: mean weight (1 = every particle fits perfectly); all_zero: no particle explained the scan, so it was not used.
+    w_mean: mean weight (1 = every particle fits perfectly); all_zero: no particle explained the scan, so it was not
+    used.
     """
 
     n_particles: int
@@ -617,6 +618,47 @@ def random_drive(building, n_steps, rng, dt=0.5, start=None):
     return Drive(truth, odometry.noisy_controls(controls, dt, **CONTROL_NOISE, rng=rng, runs=1)[:, 0], dt)
 
 
+class Wanderer:
+    """A robot that goes on from place to place of a topological map, from wherever it is put.
+
+    control(pose, dt): the control for the next step; it turns toward the place it is heading for, then drives there.
+    """
+
+    def __init__(self, building, rng):
+        self.building, self.rng, self.at, self.goal = building, rng, None, None
+
+    def start_over(self):
+        """Forget where it was heading: it has been carried away."""
+        self.at = self.goal = None
+
+    def control(self, pose, dt, speed=0.6, turn_rate=0.8):
+        """v and omega, shape (2,)."""
+        if self.goal is None:
+            self.goal = self._in_sight(pose)
+        if self.goal is None:
+            return np.array([0.0, turn_rate / 2])
+        way = np.subtract(self.building.nodes[self.goal], pose[:2])
+        if np.hypot(*way) < 0.02:
+            self.at, self.goal = self.goal, self._next()
+            way = np.subtract(self.building.nodes[self.goal], pose[:2])
+        turn = float(wrap_angle(np.arctan2(way[1], way[0]) - pose[2]))
+        if abs(turn) > 0.02:
+            return np.array([0.0, np.clip(turn / dt, -turn_rate, turn_rate)])
+        return np.array([min(speed, np.hypot(*way) / dt), 0.0])
+
+    def _next(self):
+        neighbors = [b if a == self.goal else a for a, b in self.building.edges if self.goal in (a, b)]
+        onward = [name for name in neighbors if name != self.at] or neighbors
+        return onward[self.rng.integers(len(onward))]
+
+    def _in_sight(self, pose):
+        names = list(self.building.nodes)
+        ways = np.array([self.building.nodes[name] for name in names]) - pose[:2]
+        distance, direction = np.hypot(*ways.T), np.arctan2(ways[:, 1], ways[:, 0])
+        free = self.building.grid.cast((*pose[:2], 0.0), direction, 30.0) > distance
+        return names[int(np.argmin(np.where(free, distance, np.inf)))] if free.any() else None
+
+
 def see_landmarks(grid, pose, landmarks, rng, std_range=0.1, std_bearing=0.035, r_max=8.0):
     """Indices and noisy (range, bearing) of the landmarks in sight: nearer than r_max and not behind a wall.
 
@@ -637,8 +679,8 @@ def see_landmarks(grid, pose, landmarks, rng, std_range=0.1, std_bearing=0.035, 
 class SensorSuite:
     """The three sensor models in one building: measures in the world, hands out weightings made from the robot's map.
 
-    building: a `maps.Building`. scanner: its scans; every `every`-th beam is used. The beam model looks its ranges up in a
-    `RangeTable`, made at the first use.
+    building: a `maps.Building`. scanner: its scans; every `every`-th beam is used. The beam model looks its ranges up
+    in a `RangeTable`, made at the first use.
     """
 
     def __init__(self, building, scanner=Scanner(), every=9, std_field=0.15, std_beam=0.2):  # noqa: B008
@@ -675,7 +717,9 @@ EXPONENTS = {"landmarks": 0.3, "beams": 0.1, "likelihood field": 0.06}
 
 
 def localizer(building, model, n_particles, rng, start=None, recovery=True, **options):
-    """A `MonteCarloLocalizer` with the settings of the success rates; spread over the building, or about a pose `start`."""
+    """A `MonteCarloLocalizer` with the settings of the success rates; spread over the building, or about a pose
+    `start`.
+    """
     if start is None:
         states = uniform_states(building.grid, n_particles, rng)
     else:
@@ -713,7 +757,9 @@ def record(filter_, drive, measure, rng):
 
 
 def global_example(building, n_particles=5000, n_steps=12, seed=5):
-    """The lecture's twelve pictures, "Beispiel (1)" to "(12)", on the workbook's building: global localization, simulated."""
+    """The lecture's twelve pictures, "Beispiel (1)" to "(12)", on the workbook's building: global localization,
+    simulated.
+    """
     rng, suite = np.random.default_rng(seed), SensorSuite(building)
     drive = random_drive(building, n_steps, rng, start="hall")
     filter_ = localizer(building, "likelihood field", n_particles, rng, recovery=False)
@@ -736,17 +782,20 @@ class SoccerRun:
     pictures: list
 
 
-def soccer_run(n_particles=1000, n_steps=120, seed=5, std_range=0.15, std_bearing=0.08):
-    """A robot with a camera drives over a soccer field and recognizes one of six landmarks at a time; the start is known.
+def soccer_run(n_particles=1000, n_steps=120, seed=5, use=("range", "bearing")):
+    """A robot with a camera drives over a soccer field and recognizes one of six landmarks at a time; the start is
+    known.
 
-    The camera looks 28 deg to either side and sees the nearest landmark within. Odometry has four times the lecture's noise, as legs
-    slip more than wheels. Source: lecture, "Beispiel (1)" and "(2)" behind the landmark model; its data were never published.
+    The camera looks 28 deg to either side and sees the nearest landmark within. Odometry has four times the lecture's
+    noise, as legs slip more than wheels. use: which of "range" and "bearing" the filter may use; none leaves it to
+    odometry. Source: lecture, "Beispiel (1)" and "(2)" behind the landmark model; its data were never published.
     """
     rng = np.random.default_rng(seed)
     marks = read_table("monte_carlo/soccer_landmarks.csv")
     landmarks = np.column_stack([marks["x"], marks["y"]])
     corners = [(0.8, 0.6), (3.4, 0.6), (3.4, 2.1), (2.1, 1.35), (0.8, 2.1)] * 3
     dt, start = 0.4, np.array([0.8, 2.1, -math.pi / 2])
+    std_range, std_bearing = 0.15, 0.08
     controls = follow(start, corners, n_steps, dt, speed=0.25, turn_rate=0.6)
     noise = {key: 4 * value for key, value in CONTROL_NOISE.items()}
     noisy = odometry.noisy_controls(controls, dt, **noise, rng=rng, runs=1)[:, 0]
@@ -765,7 +814,10 @@ def soccer_run(n_particles=1000, n_steps=120, seed=5, std_range=0.15, std_bearin
             return None
         nearest = np.flatnonzero(ahead)[np.argmin(z[ahead, 0])]
         seen.append(int(index[nearest]))
-        return weigh_landmarks(z[nearest : nearest + 1], landmarks[seen[-1] : seen[-1] + 1], std_range, std_bearing)
+        stds = {f"std_{name}": std for name, std in (("range", std_range), ("bearing", std_bearing)) if name in use}
+        if not stds:
+            return None
+        return weigh_landmarks(z[nearest : nearest + 1], landmarks[seen[-1] : seen[-1] + 1], **stds)
 
     cloud = start + rng.standard_normal((n_particles, 3)) * [0.1, 0.1, 0.1]
     pictures = record(MonteCarloLocalizer(cloud, motion=motion), drive, measure, rng)

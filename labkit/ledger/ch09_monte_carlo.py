@@ -1,4 +1,6 @@
-"""Lecture, Monte-Carlo localization, its sensors and maps: printed figures, costs, claims, and the algorithm as printed."""
+"""Lecture, Monte-Carlo localization, its sensors and maps: printed figures, costs, claims, and the algorithm as
+printed.
+"""
 
 import numpy as np
 
