@@ -51,12 +51,12 @@ ex.predict("corridor", guess, reveal=stages.corridor)
 #
 # The lecture shows four kinds of map (slides *Gitterbasierte*, *Linienbasierte*, *Punktbasierte Karten*, *topologische Karten*). Here they are of one small building.
 # Its plan is ours: the lecture's maps are pictures only. Move the probe and switch the form. The last two are computed from the grid; you will need them soon.
+#
+# The sensor is the lecture's Sick LMS 100: 18 m, 270°, one beam every 0.5° (slide *2D-Laser-Scanner*). A filter takes every ninth beam, because neighbors
+# say nearly the same.
 
 # %% map-forms
 stages.map_forms()
-
-# %% scanner [markdown]
-# The sensor is the lecture's Sick LMS 100: 18 m, 270°, one beam every 0.5° (slide *2D-Laser-Scanner*). A filter takes every ninth beam, because neighbors say nearly the same.
 
 # %% scan
 scanner = maps.Scanner()
@@ -178,6 +178,8 @@ ex.predict("field", guess, reveal=stages.field_against_beams)
 #
 # *Roulette-Rad*: give each particle an interval as wide as its weight, spin $M$ times, find the interval by bisection: $O(M \log M)$.
 # *Speichenrad*: $M$ spokes at the distance $W/M$, one random turn: $O(M)$. The weights may have any sum. Write both without a Python loop if you can.
+#
+# Then drag the weights and turn the wheel. "2 of 2.2" means: drawn twice, where $M w / W = 2.2$. *Make it fail* shows what roulette does to six equal weights.
 
 # %% resample_roulette
 @ex.resample_roulette
@@ -199,9 +201,6 @@ def resample_systematic(weights, rng):
     return np.minimum(np.searchsorted(ends, spokes), M - 1)
     ### END SOLUTION
 
-
-# %% wheel [markdown]
-# Drag the weights and turn the wheel. "2 of 2.2" means: drawn twice, where $M w / W = 2.2$. *Make it fail* shows what roulette does to six equal weights.
 
 # %% wheel-stage
 stages.wheel()
@@ -251,6 +250,8 @@ stages.twelve_pictures()
 # ## From cloud to pose
 #
 # A pose is wanted, not a cloud. The heading is the first trap: the mean of 179° and −179° is not 0°. Average directions, not numbers.
+#
+# The second trap: while two places are still possible, the mean lies between them. The cell after the exercise puts two clouds into two rooms.
 
 # %% circular_mean
 @ex.circular_mean
@@ -260,9 +261,6 @@ def circular_mean(angles, weights):
     return np.arctan2(np.sum(weights * np.sin(angles)), np.sum(weights * np.cos(angles)))
     ### END SOLUTION
 
-
-# %% two-modes [markdown]
-# The second trap: while two places are still possible, the mean lies between them. Below, two clouds in two rooms.
 
 # %% mean-in-the-wall
 rng = np.random.default_rng(2)
@@ -287,7 +285,8 @@ stages.soccer()
 # ## The kidnapped robot
 #
 # The lecture names the *kidnapped robot problem* and leaves it there. In the arena below you can do it: **drag the robot away**. A stroke elsewhere
-# draws obstacles that the map does not know. Click the picture and drive with the arrow keys, or press play. Switch models and resamplers while it runs.
+# draws obstacles that the map does not know. Click the picture and drive with the arrow keys, or press play. Switch models and resamplers while it runs, and when the robot
+# is lost, choose *spoke wheel + recovery*.
 
 # %% predict-kidnap
 guess = ...  # your code here
@@ -297,8 +296,8 @@ guess = "it stays where it is"
 ex.predict("kidnap", guess, reveal=stages.arena)
 
 # %% recovery [markdown]
-# Why did the arena recover all the same? It compares two running averages of the mean weight, a quick and a slow one. When the quick one drops below the slow one, that share of the
-# particles is replaced by random poses: $\max(0,\, 1 - w_\text{fast} / w_\text{slow})$.
+# How does the recovery know? It compares two running averages of the mean weight, a quick and a slow one. When the quick one drops below the slow one,
+# that share of the particles is replaced by random poses: $\max(0,\, 1 - w_\text{fast} / w_\text{slow})$.
 
 # %% recover
 @ex.recover
@@ -313,22 +312,25 @@ def recover(w_mean, w_slow, w_fast, alpha_slow, alpha_fast):
 
 # %% rates [markdown]
 # How reliable is it? One good run proves little. The table counts 100 seeded runs each, with 5000 particles: found means within 0.3 m and 10° after 60 steps,
-# or within 60 steps of a kidnapping. The interval says what 100 runs cannot tell apart.
+# or within 60 steps of a kidnapping. The interval says what 100 runs cannot tell apart. *Adaptive* is explained below the table.
 
 # %% success
 table = read_table("monte_carlo/success.csv", text=("task", "model"))
-for task, model, good, low, high, steps in zip(*(table[k] for k in ("task", "model", "successes", "low", "high", "median_steps"))):
-    print(f"{task:10} {model:17} {good:3.0f} of 100 found   95 % interval {100 * low:3.0f} to {100 * high:3.0f} %   median {steps:4.1f} steps")
+columns = ("task", "model", "successes", "low", "high", "median_steps")
+for task, model, good, low, high, steps in zip(*(table[name] for name in columns)):
+    interval = f"95 % interval {100 * low:3.0f} to {100 * high:3.0f} %"
+    print(f"{task:10} {model:17} {good:3.0f} of 100 found   {interval}   median {steps:4.1f} steps")
 
 # %% beyond [markdown]
 # ## Beyond the document: fewer particles when fewer will do
 #
 # A converged cloud needs no 5000 particles. KLD sampling counts the bins the cloud occupies and keeps as many particles as a chi-square bound asks for.
+# The price: a cloud that shrinks onto the wrong place too early has nobody left elsewhere. Compare the rows *adaptive* and *global*.
 
 # %% kld
 suite, rng = particles.SensorSuite(building), np.random.default_rng(5)
 drive = particles.random_drive(building, 30, rng, start="hall")
-mcl = particles.localizer(building, "likelihood field", 5000, rng, kld={"n_min": 300})
+mcl = particles.localizer(building, "likelihood field", 5000, rng, kld={"n_min": 500, "epsilon": 0.01})
 run = particles.record(mcl, drive, lambda pose, k: suite.measure("likelihood field", pose, rng), rng)
 error = np.hypot(*(run[-1].estimate - run[-1].truth)[:2])
 print("particles before steps 1, 2, 5, 10, 30:", [len(run[k].states) for k in (0, 1, 4, 9, 29)])

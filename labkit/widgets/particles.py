@@ -476,7 +476,11 @@ def soccer():
 
 # Arena ---------------------------------------------------------------------------------------------------------------
 
-RESAMPLERS = {"spoke wheel": particles.resample_systematic, "roulette": particles.resample_roulette}
+RESAMPLERS = {
+    "spoke wheel": particles.resample_systematic,
+    "roulette": particles.resample_roulette,
+    "spoke wheel + recovery": particles.resample_systematic,
+}
 KEYS = {"up": (0.6, 0.0), "down": (-0.6, 0.0), "left": (0.0, 0.6), "right": (0.0, -0.6)}
 COUNTS = (100, 500, 1000, 2000, 5000, 10_000, 20_000)
 
@@ -485,7 +489,7 @@ def start_arena(state):
     """The memory of the arena: true pose, filter, world, history; global localization begins."""
     rng = np.random.default_rng(11)
     pose = np.array([*building().nodes["hall"], 0.3])
-    filter_ = particles.localizer(building(), state["model"], state["particles"], rng)
+    filter_ = particles.localizer(building(), state["model"], state["particles"], rng, recovery=False)
     return {
         "rng": rng, "pose": pose, "filter": filter_, "wanderer": particles.Wanderer(building(), rng), "world": building().grid,
         "disks": np.empty((0, 3)), "ends": np.empty((0, 2)), "errors": [], "step": None, "stroke": None, "carried": False,
@@ -529,6 +533,10 @@ def _adopt(filter_, state, rng):
     """Carry over what the controls say: model, resampler, number of particles."""
     filter_.exponent = particles.EXPONENTS[state["model"]]
     filter_.resample = RESAMPLERS[state["resampler"]]
+    if "recovery" not in state["resampler"]:
+        filter_.draw, filter_.averages = None, None
+    elif filter_.draw is None:
+        filter_.draw = lambda n, rng: particles.uniform_states(building().grid, n, rng)
     if len(filter_.states) != state["particles"]:
         index = particles.resample_systematic(filter_.weights, rng, state["particles"])
         filter_.states, filter_.log_weights = filter_.states[index], np.zeros(state["particles"])

@@ -3,7 +3,7 @@
     python tests/bench/mcl_success.py [--runs 100] [--write]
 
 Global: 5000 particles spread over the whole building; success when after 60 steps the estimate (the heaviest cluster) lies
-within 0.3 m and 10 deg of the truth. Kidnapped: the robot is tracked for 20 steps and then put into another room; success when
+within 0.3 m and 10 deg of the truth. Adaptive: the same with KLD sampling. Kidnapped: the robot is tracked for 20 steps and then put into another room; success when
 within 60 steps the estimate is right again, and stays so for five steps. The intervals are Clopper and Pearson's, 95 %.
 `--write` stores the table as data/monte_carlo/success.csv.
 """
@@ -52,14 +52,19 @@ def first_stay(right):
     return int(np.argmax(run)) + 1 if run.any() else None
 
 
-def run_global(suite, model, seed):
+def run_global(suite, model, seed, **options):
     """(success, steps until right and staying, last errors) of one global localization."""
     rng = np.random.default_rng([1, seed])
     drive = particles.random_drive(suite.building, N_STEPS, rng)
-    filter_ = particles.localizer(suite.building, model, N_PARTICLES, rng)
+    filter_ = particles.localizer(suite.building, model, N_PARTICLES, rng, **options)
     found = steps_right(suite, model, filter_, drive, rng)
     right = is_right(found)
     return bool(right[-1]), first_stay(right), found[-1]
+
+
+def run_adaptive(suite, model, seed):
+    """The same with a number of particles that adapts, from N_PARTICLES down to 500."""
+    return run_global(suite, model, seed, kld={"n_min": 500, "epsilon": 0.01})
 
 
 def run_kidnapped(suite, model, seed):
@@ -92,7 +97,7 @@ def main():
     args = parser.parse_args()
     suite = particles.SensorSuite(maps.load_building())
     rows = []
-    for task, run in (("global", run_global), ("kidnapped", run_kidnapped)):
+    for task, run in (("global", run_global), ("adaptive", run_adaptive), ("kidnapped", run_kidnapped)):
         for model in particles.SENSORS:
             began = time.perf_counter()
             results = [run(suite, model, seed) for seed in range(args.runs)]
