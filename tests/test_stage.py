@@ -62,7 +62,6 @@ def wire(stage):
     sent = []
     stage._front.send = lambda message, buffers=None: sent.append((message, buffers))
     stage._receive({"look": LOOK, "serial": "a:1"})
-    stage._receive({"shown": 1})
     return stage, sent
 
 

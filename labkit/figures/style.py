@@ -85,8 +85,9 @@ def rc():
 
 
 def look(role, **changes):
-    """Keyword arguments of `ax.plot` for a role: truth, measurement, prediction, estimate, estimates (markers), rejected,
-    guide; `changes` override them.
+    """Keyword arguments of `ax.plot` for a role, with `changes`.
+
+    Roles: truth, measurement, prediction, estimate, estimates (markers instead of a line), rejected, guide.
     """
     if role not in LOOKS:
         raise ValueError(f"role must be one of {', '.join(LOOKS)}, got {role!r}")

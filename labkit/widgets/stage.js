@@ -77,7 +77,7 @@ function render({ model, el }) {
       shown = message.picture;
       root.dataset.python = message.milliseconds;
       root.dataset.picture = message.picture;
-      if (flight === null && Object.keys(pending).length === 0) model.send({ shown });
+      if (message.serial === null && flight === null && Object.keys(pending).length === 0) model.send({ shown });
       flush();
     }
     drawing = false;

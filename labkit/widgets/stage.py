@@ -502,6 +502,8 @@ class Stage(ipywidgets.VBox):
             return
         self._waiting = False
         self._sent += 1
+        if reply is not None:
+            self._shown = self._sent  # the page waits for this one
         png = self._picture.png()
         front = {
             "picture": self._sent,
