@@ -6,7 +6,7 @@ from matplotlib.ticker import MaxNLocator
 from . import style
 
 CIRCLE_DEG = np.arange(0, 361, 6)
-TOPS = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0)  # deg
+TOPS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)  # deg
 
 
 class PlaneFrame:
@@ -19,7 +19,7 @@ class PlaneFrame:
             for color in (style.AXIS_X, style.AXIS_Y)
         ]
         self.letters = [
-            ax.text(0, 0, letter, color=color, ha="center", va="center", zorder=4)
+            ax.text(0, 0, letter, color=color, ha="center", va="center", zorder=4, clip_on=True)
             for letter, color in (("x", style.AXIS_X), ("y", style.AXIS_Y))
         ]
         (self.z,) = ax.plot([], [], color=style.AXIS_Z, linestyle="none", marker="o", markersize=4, zorder=4)
@@ -27,8 +27,9 @@ class PlaneFrame:
             [], [], color=style.AXIS_Z, linestyle="none", marker="o", markersize=10, markerfacecolor="none", zorder=4
         )
         self.name = ax.annotate(
-            name, (0, 0), xytext=(-9, -9), textcoords="offset points", ha="right", va="top", fontweight="bold", zorder=4
-        )
+            name, (0, 0), xytext=(-9, -9), textcoords="offset points", ha="right", va="top", fontweight="bold",
+            zorder=4, annotation_clip=True, clip_on=True,
+        )  # fmt: skip
         self.artists = [*self.axes, *self.letters, self.z, self.rim, self.name]
 
     def set(self, T):
@@ -115,7 +116,7 @@ def error_against_height(ax, heights):
     for letter, color, mark, dash in zip("xyz", style.AXES, marks, dashes):
         bounds += ax.plot([], [], color=color, linestyle=dash, linewidth=1.8)
         found += ax.plot(
-            [], [], color=color, linestyle="none", marker=mark, markersize=8, markeredgecolor=style.INK,
+            [], [], color=color, linestyle="none", marker=mark, markersize=8, markeredgecolor=style.INK, clip_on=False,
             label=f"about {letter}",
         )  # fmt: skip
     (key,) = ax.plot([], [], color=style.MUTED, label="bound")
@@ -154,9 +155,9 @@ def compare_errors(ax):
     Returns [(markers, bars), ...] for Gram-Schmidt and the SVD fit; each has three entries.
     """
     style.axes(ax, "", "error of the frame (deg)", "error found, and its bound")
-    ax.set(xlim=(-0.6, 2.6), ylim=(0, TOPS[0]))
+    ax.set(xlim=(-0.6, 2.6), ylim=(0, TOPS[3]))
     ax.set_xticks(range(3), [f"about {letter}" for letter in "xyz"])
-    ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
+    ax.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     ax.grid(axis="x", visible=False)
     pairs = []
     for label, shift, mark, fill in (

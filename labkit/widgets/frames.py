@@ -170,7 +170,7 @@ def triangle_noise():
         compute=compute_triangle_noise,
         handles={
             "Y": Handle(
-                (30.0, 60.0, 0.0), step=1.0, bounds=((-40, 110), (1, 90), (-200, 200)), label="y point of the triangle",
+                (30.0, 60.0, 0.0), step=1.0, bounds=((-20, 80), (1, 80), (-200, 200)), label="y point of the triangle",
                 color=style.MEASUREMENT,
             )
         },
@@ -200,7 +200,7 @@ def compute_kuka_gimbal(state):
         "axes": axes,
         "zeros": zeros,
         "singular_values": singular_values,
-        "null": Vt[2] * (1 if Vt[2][0] >= 0 else -1),
+        "null": Vt[2] * (1 if Vt[2][0] >= 0 else -1) if singular_values[0] - singular_values[2] > 1e-9 else None,
         "read_back_deg": np.rad2deg(frames.kuka_from_matrix(T)[3:]),
         "B_deg": float(state["B_deg"]),
     }
@@ -246,7 +246,10 @@ def kuka_gimbal():
             space.draw(state["view"])
             rows = (np.rad2deg(result["angles"]), result["read_back_deg"], result["singular_values"], result["null"])
             for text, row, decimals in zip(numbers, rows, (0, 0, 3, 2)):
-                text.set_text(",  ".join(f"{round(float(v), decimals) + 0.0:.{decimals}f}" for v in row))
+                words = (
+                    "all alike" if row is None else ",  ".join(f"{round(v, decimals) + 0.0:.{decimals}f}" for v in row)
+                )
+                text.set_text(words)
 
         return [*space.artists, *numbers], update
 
@@ -325,8 +328,8 @@ def svd_against_gram_schmidt():
         scene=scene,
         compute=compute_svd_against_gram_schmidt,
         handles={
-            "X": Handle((100.0, 0.0), step=1.0, bounds=((10, 130), (0, 0)), label="x point"),
-            "Y": Handle((30.0, 60.0), step=1.0, bounds=((-20, 130), (2, 100)), label="y point"),
+            "X": Handle((100.0, 0.0), step=1.0, bounds=((10, 120), (0, 0)), label="x point"),
+            "Y": Handle((30.0, 60.0), step=1.0, bounds=((-20, 120), (2, 95)), label="y point"),
         },
         controls={"std": slider(0.1, 4.0, 2.0, step=0.1, label="noise a coordinate (mm)")},
         fail={"X": (15.0, 0.0)},

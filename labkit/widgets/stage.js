@@ -99,7 +99,10 @@ function render({ model, el }) {
     canvas.dataset.empty = message.empty;
     canvas.dataset.click = message.click;
     canvas.dataset.keys = message.keys;
-    if (message.keys || message.empty === "turn") canvas.tabIndex = 0;
+    if (message.keys || message.empty === "turn") {
+      canvas.tabIndex = 0;
+      canvas.setAttribute("role", "application"); // a screen reader passes arrow keys on to it
+    }
     canvas.setAttribute("aria-label", [message.name, message.caption].filter(Boolean).join(": "));
     if (caption.textContent !== message.caption) {
       caption.textContent = message.caption;
