@@ -1,10 +1,12 @@
 # %% title [markdown]
 # # 9 · Monte-Carlo localization
 #
-# **What you will do.** Find a robot in a building with a cloud of guesses: move them, weigh them by a laser scan, redraw them. Then carry the robot
+# **What you will do.** Find a robot in a building with a cloud of guesses: move them, weigh them by a laser scan,
+# redraw them. Then carry the robot
 # away, and catch four bugs that published code really had.
 #
-# **What you will learn.** Why weights live in logarithms, why two models of the same scanner disagree, what resampling costs, why a mean can lie in a
+# **What you will learn.** Why weights live in logarithms, why two models of the same scanner disagree, what
+# resampling costs, why a mean can lie in a
 # wall, and how a filter notices that it is lost.
 #
 # **What you need.** Chapter 7 (motion models) and the normal distribution. About 90 minutes.
@@ -35,8 +37,10 @@ grid = building.grid
 # %% the-question [markdown]
 # ## The question
 #
-# A robot wakes up in a building it knows, at a place it does not know. **Where is it?** The Kalman filter of chapter 8 needs one good first guess.
-# The lecture *Lokalisierung* answers with thousands of poor ones (section *Monte-Carlo-Lokalisierung*, German slides): every guess, a *particle*, is moved,
+# A robot wakes up in a building it knows, at a place it does not know. **Where is it?** The Kalman filter of chapter
+# 8 needs one good first guess.
+# The lecture *Lokalisierung* answers with thousands of poor ones (section *Monte-Carlo-Lokalisierung*, German
+# slides): every guess, a *particle*, is moved,
 # weighed, and redrawn in proportion to its weight. The slide *Idee* shows it in one dimension, pictures (a) to (e).
 
 # %% predict-corridor
@@ -49,10 +53,13 @@ ex.predict("corridor", guess, reveal=stages.corridor)
 # %% maps [markdown]
 # ## What the robot knows: maps
 #
-# The lecture shows four kinds of map (slides *Gitterbasierte*, *Linienbasierte*, *Punktbasierte Karten*, *topologische Karten*). Here they are of one small building.
-# Its plan is ours: the lecture's maps are pictures only. Move the probe and switch the form. The last two are computed from the grid; you will need them soon.
+# The lecture shows four kinds of map (slides *Gitterbasierte*, *Linienbasierte*, *Punktbasierte Karten*,
+# *topologische Karten*). Here they are of one small building.
+# Its plan is ours: the lecture's maps are pictures only. Move the probe and switch the form. The last two are
+# computed from the grid; you will need them soon.
 #
-# The sensor is the lecture's Sick LMS 100: 18 m, 270°, one beam every 0.5° (slide *2D-Laser-Scanner*). A filter takes every ninth beam, because neighbors
+# The sensor is the lecture's Sick LMS 100: 18 m, 270°, one beam every 0.5° (slide *2D-Laser-Scanner*). A filter takes
+# every ninth beam, because neighbors
 # say nearly the same.
 
 # %% map-forms
@@ -68,16 +75,21 @@ print(f"nearest obstacle {ranges.min():.2f} m, median {np.median(ranges):.2f} m"
 # %% algorithm [markdown]
 # ## The algorithm, and a slip in it
 #
-# For each particle: `sampleMotionModel` moves it, `measurementModel` gives its weight. Then $M$ particles are drawn with probability proportional to
-# their weights. The slide's first line reads $\chi_k' = \chi_k = \emptyset$. Executed as printed, it empties the *input*: no particle is left to move. It means
-# $\chi'_{k+1} = \chi_{k+1} = \emptyset$. And "with probability $w_i$" needs a division by $W$: densities do not add up to 1.
+# For each particle: `sampleMotionModel` moves it, `measurementModel` gives its weight. Then $M$ particles are drawn
+# with probability proportional to
+# their weights. The slide's first line reads $\chi_k' = \chi_k = \emptyset$. Executed as printed, it empties the
+# *input*: no particle is left to move. It means
+# $\chi'_{k+1} = \chi_{k+1} = \emptyset$. And "with probability $w_i$" needs a division by $W$: densities do not add
+# up to 1.
 #
-# **Moving.** Noise of standard deviation `std_u` is added to the control, then chapter 7's model is applied (slide *Bewegungsmodell*).
+# **Moving.** Noise of standard deviation `std_u` is added to the control, then chapter 7's model is applied (slide
+# *Bewegungsmodell*).
 
 # %% sample_motion
 @ex.sample_motion
 def sample_motion(states, u, dt, std_u, rng):
-    """Return states, shape (M, 3), each moved by its own noisy copy of u = (v, omega). odometry.step(x, u, dt) moves."""
+    """Return states, shape (M, 3), each moved by its own noisy copy of u = (v, omega). odometry.step(x, u, dt)
+    moves."""
     ### BEGIN SOLUTION
     noisy = u + std_u * rng.standard_normal((len(states), 2))
     return odometry.step(states, noisy, dt)
@@ -87,14 +99,17 @@ def sample_motion(states, u, dt, std_u, rng):
 # %% landmarks [markdown]
 # ## Weighing by landmarks
 #
-# A landmark $j$ is measured at range $r_j$ and bearing $\varphi_j$. How probable is that, seen from a particle? Multiply both normal densities over all landmarks
-# (slide *Landmarkbasiertes Verfahren (2)*). Return the **logarithm**. And mind the seam: a bearing of 179° and one of −179° differ by 2°
+# A landmark $j$ is measured at range $r_j$ and bearing $\varphi_j$. How probable is that, seen from a particle?
+# Multiply both normal densities over all landmarks
+# (slide *Landmarkbasiertes Verfahren (2)*). Return the **logarithm**. And mind the seam: a bearing of 179° and one of
+# −179° differ by 2°
 # (`odometry.wrap_angle` helps).
 
 # %% landmark_weight
 @ex.landmark_weight
 def landmark_weight(pose, z, landmarks, std_range, std_bearing):
-    """Return log p of z, shape (m, 2): ranges (m) and bearings (rad) to landmarks, shape (m, 2), seen from pose, shape (3,)."""
+    """Return log p of z, shape (m, 2): ranges (m) and bearings (rad) to landmarks, shape (m, 2), seen from pose,
+    shape (3,)."""
     ### BEGIN SOLUTION
     dx, dy = (landmarks - pose[:2]).T
     error_r = z[:, 0] - np.hypot(dx, dy)
@@ -107,7 +122,8 @@ def landmark_weight(pose, z, landmarks, std_range, std_bearing):
 # %% underflow [markdown]
 # ## Why logarithms
 #
-# The slides write `p = 1; p = p * ...`. Suppose each beam has a probability of 0.01. After how many beams is the product *exactly* zero in float64?
+# The slides write `p = 1; p = p * ...`. Suppose each beam has a probability of 0.01. After how many beams is the
+# product *exactly* zero in float64?
 
 # %% beams_to_zero
 beams_to_zero = ...  # your code here
@@ -119,17 +135,20 @@ while p > 0:
 ex.beams_to_zero(beams_to_zero)
 
 # %% beams [markdown]
-# A scan has 541. With all weights zero there is nothing to draw from. A sum of logarithms never gets there, and subtracting the largest one first makes
+# A scan has 541. With all weights zero there is nothing to draw from. A sum of logarithms never gets there, and
+# subtracting the largest one first makes
 # the best particle weigh $e^0 = 1$ (`particles.normalize`).
 #
 # ## Weighing by beams
 #
-# The beam model (slide *Strahlenmodell*) compares each range with the one the map predicts. So follow a beam through the grid to the first obstacle (*Strahlverfolgung*):
+# The beam model (slide *Strahlenmodell*) compares each range with the one the map predicts. So follow a beam through
+# the grid to the first obstacle (*Strahlverfolgung*):
 
 # %% cast_ray
 @ex.cast_ray
 def cast_ray(grid, pose, bearing, r_max):
-    """Return the distance (m) to the first occupied cell along a beam, r_max if there is none. grid.at([x, y]) asks the map."""
+    """Return the distance (m) to the first occupied cell along a beam, r_max if there is none. grid.at([x, y]) asks
+    the map."""
     ### BEGIN SOLUTION
     angle = pose[2] + bearing
     for r in np.arange(0, r_max, grid.resolution / 2):
@@ -151,13 +170,16 @@ def beam_weight(ranges, expected, std):
 # %% field [markdown]
 # ## Weighing by the likelihood field
 #
-# Following beams is slow. The likelihood field (slides *Likelihoodfield (1), (2)*) asks another question: how far is the *end point* of each beam from the nearest
-# obstacle? That distance can be computed in advance for every cell: `grid.distance`. Put the end points on the map and look them up.
+# Following beams is slow. The likelihood field (slides *Likelihoodfield (1), (2)*) asks another question: how far is
+# the *end point* of each beam from the nearest
+# obstacle? That distance can be computed in advance for every cell: `grid.distance`. Put the end points on the map
+# and look them up.
 
 # %% distance_field_weight
 @ex.distance_field_weight
 def distance_field_weight(grid, pose, ranges, bearings, std):
-    """Return log p: the sum of log N(0, std^2) over the distances of the end points. grid.cell_of(points) gives their cells."""
+    """Return log p: the sum of log N(0, std^2) over the distances of the end points. grid.cell_of(points) gives their
+    cells."""
     ### BEGIN SOLUTION
     x = pose[0] + ranges * np.cos(pose[2] + bearings)
     y = pose[1] + ranges * np.sin(pose[2] + bearings)
@@ -176,10 +198,13 @@ ex.predict("field", guess, reveal=stages.field_against_beams)
 # %% roulette [markdown]
 # ## Resampling
 #
-# *Roulette-Rad*: give each particle an interval as wide as its weight, spin $M$ times, find the interval by bisection: $O(M \log M)$.
-# *Speichenrad*: $M$ spokes at the distance $W/M$, one random turn: $O(M)$. The weights may have any sum. Write both without a Python loop if you can.
+# *Roulette-Rad*: give each particle an interval as wide as its weight, spin $M$ times, find the interval by
+# bisection: $O(M \log M)$.
+# *Speichenrad*: $M$ spokes at the distance $W/M$, one random turn: $O(M)$. The weights may have any sum. Write both
+# without a Python loop if you can.
 #
-# Then drag the weights and turn the wheel. "2 of 2.2" means: drawn twice, where $M w / W = 2.2$. *Make it fail* shows what roulette does to six equal weights.
+# Then drag the weights and turn the wheel. "2 of 2.2" means: drawn twice, where $M w / W = 2.2$. *Make it fail* shows
+# what roulette does to six equal weights.
 
 # %% resample_roulette
 @ex.resample_roulette
@@ -215,9 +240,12 @@ ex.predict("standing", guess, reveal=stages.standing)
 # %% diversity [markdown]
 # ## When to resample
 #
-# The slide *Diversität der Partikelmenge* says the same in words: under roulette a standing robot ends with $M$ copies of one particle, the spoke wheel leaves equal
-# weights alone. It advises to resample only when the weights vary much, and to multiply them up in between. The usual gauge is the effective size
-# $N_\text{eff} = \left(\sum w_i\right)^2 / \sum w_i^2$. For weights of mean 1, $M / N_\text{eff} = 1 + \operatorname{var}(w)$: the slide's advice, as a number.
+# The slide *Diversität der Partikelmenge* says the same in words: under roulette a standing robot ends with $M$
+# copies of one particle, the spoke wheel leaves equal
+# weights alone. It advises to resample only when the weights vary much, and to multiply them up in between. The usual
+# gauge is the effective size
+# $N_\text{eff} = \left(\sum w_i\right)^2 / \sum w_i^2$. For weights of mean 1, $M / N_\text{eff} = 1 +
+# \operatorname{var}(w)$: the slide's advice, as a number.
 
 # %% effective_size
 @ex.effective_size
@@ -240,7 +268,8 @@ def should_resample(weights, threshold):
 # %% together [markdown]
 # ## All together: twelve pictures
 #
-# The lecture shows a global localization in twelve pictures without numbers (slides *Beispiel (1)* to *(12)*). This is its counterpart in our building, simulated:
+# The lecture shows a global localization in twelve pictures without numbers (slides *Beispiel (1)* to *(12)*). This
+# is its counterpart in our building, simulated:
 # the ledger calls it *unpublished*. Play it. Where is the estimate wrong, and which picture corrects it?
 
 # %% twelve
@@ -249,9 +278,11 @@ stages.twelve_pictures()
 # %% mean [markdown]
 # ## From cloud to pose
 #
-# A pose is wanted, not a cloud. The heading is the first trap: the mean of 179° and −179° is not 0°. Average directions, not numbers.
+# A pose is wanted, not a cloud. The heading is the first trap: the mean of 179° and −179° is not 0°. Average
+# directions, not numbers.
 #
-# The second trap: while two places are still possible, the mean lies between them. The cell after the exercise puts two clouds into two rooms.
+# The second trap: while two places are still possible, the mean lies between them. The cell after the exercise puts
+# two clouds into two rooms.
 
 # %% circular_mean
 @ex.circular_mean
@@ -274,8 +305,10 @@ print(f"heaviest cluster     x = {mode[0]:.1f}, y = {mode[1]:.1f}, cell {words[i
 # %% soccer [markdown]
 # ## Against the document: the soccer field
 #
-# The lecture's example (slides *Beispiel (1)*, *(2)* behind the landmark model): an Aibo robot with six landmarks, and three paths, the true one, odometry, and MCL.
-# Its numbers were never published, so this run is simulated, with the path lines as on the slide. Let the camera read only ranges or only bearings,
+# The lecture's example (slides *Beispiel (1)*, *(2)* behind the landmark model): an Aibo robot with six landmarks,
+# and three paths, the true one, odometry, and MCL.
+# Its numbers were never published, so this run is simulated, with the path lines as on the slide. Let the camera read
+# only ranges or only bearings,
 # which the slide says is possible.
 
 # %% soccer-stage
@@ -284,8 +317,10 @@ stages.soccer()
 # %% kidnapping [markdown]
 # ## The kidnapped robot
 #
-# The lecture names the *kidnapped robot problem* and leaves it there. In the arena below you can do it: **drag the robot away**. A stroke elsewhere
-# draws obstacles that the map does not know. Click the picture and drive with the arrow keys, or press play. Switch models and resamplers while it runs, and when the robot
+# The lecture names the *kidnapped robot problem* and leaves it there. In the arena below you can do it: **drag the
+# robot away**. A stroke elsewhere
+# draws obstacles that the map does not know. Click the picture and drive with the arrow keys, or press play. Switch
+# models and resamplers while it runs, and when the robot
 # is lost, choose *spoke wheel + recovery*.
 
 # %% predict-kidnap
@@ -296,13 +331,15 @@ guess = "it stays where it is"
 ex.predict("kidnap", guess, reveal=stages.arena)
 
 # %% recovery [markdown]
-# How does the recovery know? It compares two running averages of the mean weight, a quick and a slow one. When the quick one drops below the slow one,
+# How does the recovery know? It compares two running averages of the mean weight, a quick and a slow one. When the
+# quick one drops below the slow one,
 # that share of the particles is replaced by random poses: $\max(0,\, 1 - w_\text{fast} / w_\text{slow})$.
 
 # %% recover
 @ex.recover
 def recover(w_mean, w_slow, w_fast, alpha_slow, alpha_fast):
-    """Return the share of random particles, and w_slow and w_fast brought up to date (average += alpha * (w_mean - average))."""
+    """Return the share of random particles, and w_slow and w_fast brought up to date (average += alpha * (w_mean -
+    average))."""
     ### BEGIN SOLUTION
     w_slow = w_slow + alpha_slow * (w_mean - w_slow)
     w_fast = w_fast + alpha_fast * (w_mean - w_fast)
@@ -311,8 +348,10 @@ def recover(w_mean, w_slow, w_fast, alpha_slow, alpha_fast):
 
 
 # %% rates [markdown]
-# How reliable is it? One good run proves little. The table counts 100 seeded runs each, with 5000 particles: found means within 0.3 m and 10° after 60 steps,
-# or within 60 steps of a kidnapping. The interval says what 100 runs cannot tell apart. *Adaptive* is explained below the table.
+# How reliable is it? One good run proves little. The table counts 100 seeded runs each, with 5000 particles: found
+# means within 0.3 m and 10° after 60 steps,
+# or within 60 steps of a kidnapping. The interval says what 100 runs cannot tell apart. *Adaptive* is explained below
+# the table.
 
 # %% success
 table = read_table("monte_carlo/success.csv", text=("task", "model"))
@@ -324,8 +363,10 @@ for task, model, good, low, high, steps in zip(*(table[name] for name in columns
 # %% beyond [markdown]
 # ## Beyond the document: fewer particles when fewer will do
 #
-# A converged cloud needs no 5000 particles. KLD sampling counts the bins the cloud occupies and keeps as many particles as a chi-square bound asks for.
-# The price: a cloud that shrinks onto the wrong place too early has nobody left elsewhere. Compare the rows *adaptive* and *global*.
+# A converged cloud needs no 5000 particles. KLD sampling counts the bins the cloud occupies and keeps as many
+# particles as a chi-square bound asks for.
+# The price: a cloud that shrinks onto the wrong place too early has nobody left elsewhere. Compare the rows
+# *adaptive* and *global*.
 
 # %% kld
 suite, rng = particles.SensorSuite(building), np.random.default_rng(5)
@@ -339,8 +380,10 @@ print("found" if error < 0.3 else "lost", "at the end")
 # %% bug-hunt [markdown]
 # ## Bug hunt
 #
-# Everybody makes these mistakes: each specimen below has a defect that published robotics code really had, rewritten, no names. None raises an error on
-# friendly input, and all look fine in a plot. **Write the test that catches it**: a function that returns True for what is correct and False for the specimen.
+# Everybody makes these mistakes: each specimen below has a defect that published robotics code really had, rewritten,
+# no names. None raises an error on
+# friendly input, and all look fine in a plot. **Write the test that catches it**: a function that returns True for
+# what is correct and False for the specimen.
 # Your test is tried on correct resamplers too. It must not reject them.
 
 # %% hunt_1
@@ -404,7 +447,8 @@ def hunt_4(weigh):
 # %% break-it [markdown]
 # ## Break it
 #
-# One beam without an echo makes the plain beam model say: impossible, everywhere. What should a filter do when *all* weights are zero? Some restart in silence, some add a
+# One beam without an echo makes the plain beam model say: impossible, everywhere. What should a filter do when *all*
+# weights are zero? Some restart in silence, some add a
 # tiny constant, some die. Ours keeps the cloud, skips the scan, and says so.
 
 # %% break-it-code
@@ -424,18 +468,22 @@ except ValueError as refusal:
 # %% in-practice [markdown]
 # ## In practice
 #
-# - Temper the weights: 60 beams do not know 60 times as much as one. Our filters multiply log weights by 0.06 to 0.3, found by the success rates above.
+# - Temper the weights: 60 beams do not know 60 times as much as one. Our filters multiply log weights by 0.06 to 0.3,
+# found by the success rates above.
 # - Likelihood field for speed, a mixture beam model where people walk about. Leave out readings at the maximum range.
-# - Resample when $N_\text{eff} < M/2$, never while standing still. Log $N_\text{eff}$ and the mean weight: they tell first when things go wrong.
+# - Resample when $N_\text{eff} < M/2$, never while standing still. Log $N_\text{eff}$ and the mean weight: they tell
+# first when things go wrong.
 # - Give motion generous noise. A cloud that is too narrow cannot be right again.
 # - Test resamplers by counting.
 
 # %% questions [markdown]
 # ## Three questions, to answer in words
 #
-# 1. The likelihood field finds a pose behind a wall acceptable that the beam model excludes. Which information does it throw away?
+# 1. The likelihood field finds a pose behind a wall acceptable that the beam model excludes. Which information does
+# it throw away?
 # 2. Why may the spoke wheel use one random number for $M$ draws, and what is lost compared with independent spins?
-# 3. A crowd surrounds the robot and its mean weight drops, though it is not lost. What does the recovery do, and how would you tell the two cases apart?
+# 3. A crowd surrounds the robot and its mean weight drops, though it is not lost. What does the recovery do, and how
+# would you tell the two cases apart?
 
 # %% progress
 ex.progress()

@@ -22,13 +22,13 @@ def building():
 
 
 def scan_at_a_pose(rng):
-    """grid, pose near the truth, ranges, bearings, std of the likelihood field; all end points lie on the map."""
+    """grid, pose near the truth, ranges, bearings, std; all end points lie on the map, whatever the heading."""
     grid = building().grid
-    pose = particles.uniform_states(grid, 1, rng)[0]
+    pose = np.array([rng.uniform(5, 12), rng.uniform(4.6, 5.3), rng.uniform(-3, 3)])
     bearings = np.linspace(-2.3, 2.3, 12)
     ranges = grid.cast(pose, bearings, R_MAX).astype(float)
     near = pose + rng.normal(0, (0.05, 0.05, 0.03))
-    short = np.maximum(ranges - 0.3, 0.05)
+    short = np.clip(ranges - 0.3, 0.05, 3.5)
     return grid, near, short, bearings, float(rng.uniform(0.15, 0.4))
 
 
@@ -55,8 +55,8 @@ def plain_ray(rng):
     while True:
         pose, bearing = particles.uniform_states(grid, 1, rng)[0], rng.uniform(-2, 2)
         around = [maps.walk_ray(grid, pose, bearing + d, R_MAX) for d in (-0.02, -0.01, 0.0, 0.01, 0.02)]
-        if np.ptp(around) < 0.12 * around[2] and np.ptp(around) < 0.25 and 1.0 < around[2]:
-            return grid, pose, bearing, 3.0 if rng.random() < 0.3 else R_MAX
+        if np.ptp(around) < 0.12 * around[2] and np.ptp(around) < 0.25 and around[2] > 1.0:
+            return grid, pose, bearing, 0.6 * around[2] if rng.random() < 0.5 else R_MAX
 
 
 def motion(rng):
@@ -171,7 +171,7 @@ def _field_world(grid, pose, ranges, bearings, std):
 
 
 def _field_origin(grid, pose, ranges, bearings, std):
-    return _field(grid, _end_points(np.array([0.0, 0.0, pose[2]]), ranges, bearings).clip(0.01, 9.9), std)
+    return _field(grid, _end_points(np.array([0.0, 0.0, pose[2]]), ranges, bearings), std)
 
 
 def _field_cells(grid, pose, ranges, bearings, std):
@@ -271,7 +271,9 @@ def _spins_are_independent(resample, rng):
     counts = np.array([np.bincount(resample(weights.copy(), rng), minlength=10) for _ in range(300)])
     variance = float(counts.var(0).mean())
     if variance < 0.6:
-        return f"the spins are not independent: a count varies by {variance:.2f} instead of 0.9 (variance of a binomial)."
+        return (
+            f"the spins are not independent: a count varies by {variance:.2f} instead of 0.9 (variance of a binomial)."
+        )
     return None
 
 
@@ -405,12 +407,13 @@ def _hunt(id, reference, specimen, hints, good=GOOD, extra=("rng",)):
         properties=_catches(specimen, good, extra),
         hints=hints,
         mistakes=[
-            Mistake(lambda *_: True, "Your test passes the specimen. Ask for something that only a correct function can do."),
+            Mistake(
+                lambda *_: True, "Your test passes the specimen. Ask for something that only a correct function can do."
+            ),
             Mistake(lambda *_: None, "Your test returned None: it has to return True (passed) or False (caught)."),
         ],
         draws=1,
     )
-
 
 
 CHAPTER = Chapter(
@@ -444,7 +447,9 @@ CHAPTER = Chapter(
                     _motion(shared=True),
                     "All particles got the same noise: the cloud moves as one block. Draw a pair for each particle.",
                 ),
-                Mistake(_motion(np.square), "You scaled the noise by the variance. std_u is the standard deviation already."),
+                Mistake(
+                    _motion(np.square), "You scaled the noise by the variance. std_u is the standard deviation already."
+                ),
                 Mistake(_motion(np.sqrt), "You took the root of std_u. It is a standard deviation, not a variance."),
                 Mistake(
                     _motion(on_pose=True),
@@ -468,13 +473,18 @@ CHAPTER = Chapter(
                     _landmarks(wrap=False),
                     "A bearing difference near 360 deg counted as a large error. Wrap the difference to [-pi, pi).",
                 ),
-                Mistake(_landmarks(turn=False), "The heading is missing: a bearing is relative to where the robot looks."),
+                Mistake(
+                    _landmarks(turn=False), "The heading is missing: a bearing is relative to where the robot looks."
+                ),
                 Mistake(_landmarks(swap=True), "atan2 takes the y difference first: np.arctan2(dy, dx)."),
                 Mistake(
                     _landmarks(square=True),
                     "You used the variances as standard deviations: N(0, std^2) divides the error by std.",
                 ),
-                Mistake(_landmarks(log=False), "This is the product itself. Return its logarithm, the sum of the logarithms."),
+                Mistake(
+                    _landmarks(log=False),
+                    "This is the product itself. Return its logarithm, the sum of the logarithms.",
+                ),
                 Mistake(
                     _landmarks(peak=False),
                     "The factor 1 / (std sqrt(2 pi)) of each density is missing. It cancels among particles, but p needs it.",
@@ -508,6 +518,7 @@ CHAPTER = Chapter(
             reference=maps.walk_ray,
             draw=plain_ray,
             metric=metrics.numbers(0.16, "m"),
+            draws=8,
             hints=(
                 "Walk along the ray in steps smaller than a cell, and stop in the first occupied one.",
                 "The direction is theta + bearing. grid.at([x, y]) says what is there; maps.OCCUPIED is an obstacle.",
@@ -517,7 +528,9 @@ CHAPTER = Chapter(
                 Mistake(_ray_in_cells, "You counted in cells. One cell is grid.resolution meters long."),
                 Mistake(_ray_without_heading, "The heading is missing: the beam points to theta + bearing on the map."),
                 Mistake(_ray_without_bearing, "The bearing is missing: you looked straight ahead."),
-                Mistake(_ray_reversed, "Bearings count to the left, like angles: theta + bearing, not theta - bearing."),
+                Mistake(
+                    _ray_reversed, "Bearings count to the left, like angles: theta + bearing, not theta - bearing."
+                ),
                 Mistake(_ray_without_end, "A scanner sees r_max at most: return r_max when nothing is hit before."),
             ],
         ),
@@ -532,8 +545,12 @@ CHAPTER = Chapter(
                 "return np.sum(-0.5 * ((ranges - expected) / std) ** 2 - np.log(std * np.sqrt(2 * np.pi))).",
             ),
             mistakes=[
-                Mistake(lambda r, e, s: math.exp(beam_weight(r, e, s)), "This is the product. Its logarithm is asked for."),
-                Mistake(lambda r, e, s: beam_weight(r, e, s) / len(r), "You took the mean over the beams. They add up."),
+                Mistake(
+                    lambda r, e, s: math.exp(beam_weight(r, e, s)), "This is the product. Its logarithm is asked for."
+                ),
+                Mistake(
+                    lambda r, e, s: beam_weight(r, e, s) / len(r), "You took the mean over the beams. They add up."
+                ),
                 Mistake(
                     lambda r, e, s: beam_weight(r, e, s * s),
                     "You divided by the variance: (error / std) is squared, and std stands in the factor in front.",
@@ -569,11 +586,11 @@ CHAPTER = Chapter(
         ),
         Prediction(
             "field",
-            question="Two models weigh the same scan at every place of a room. Whose picture is the smoother hill?",
+            question="Both models weigh one scan at every place of the building. Which finds more to like in the wrong rooms?",
             choices=("beam model", "likelihood field", "both alike"),
             answer="likelihood field",
-            why="The likelihood field asks how near an end point is to any obstacle, which changes slowly. The beam model's expected range "
-            "jumps at every door post.",
+            why="It asks only whether each end point lies near some obstacle, and does not mind a wall in between. Its good places "
+            "form ridges along parallel walls.",
         ),
         Exercise(
             "resample_roulette",
@@ -610,7 +627,9 @@ CHAPTER = Chapter(
                 "never above M - 1.",
             ),
             mistakes=[
-                Mistake(_largest, "You always took the heaviest particle. It should be met by most spokes, not by all."),
+                Mistake(
+                    _largest, "You always took the heaviest particle. It should be met by most spokes, not by all."
+                ),
                 Mistake(
                     lambda w, rng: np.searchsorted(np.cumsum(w), (rng.random(len(w)) + np.arange(len(w))) / len(w)),
                     "Each spoke got its own random number (that is stratified resampling). One number turns the whole wheel.",
@@ -620,7 +639,8 @@ CHAPTER = Chapter(
                     "The wheel has not been turned: start with one random number.",
                 ),
                 Mistake(
-                    lambda w, rng: np.arange(len(w)), "Every particle came out once: that is right for equal weights only."
+                    lambda w, rng: np.arange(len(w)),
+                    "Every particle came out once: that is right for equal weights only.",
                 ),
             ],
             draws=3,
@@ -644,10 +664,14 @@ CHAPTER = Chapter(
                 "return weights.sum() ** 2 / (weights ** 2).sum().",
             ),
             mistakes=[
-                Mistake(_from_the_sum_of_squares, "Right for weights that add up to 1. These do not: divide by their sum first."),
+                Mistake(
+                    _from_the_sum_of_squares,
+                    "Right for weights that add up to 1. These do not: divide by their sum first.",
+                ),
                 Mistake(lambda w: w.sum() / np.square(w).sum(), "The sum in the numerator is to be squared."),
                 Mistake(
-                    lambda w: np.square(w).sum() / w.sum() ** 2, "This is the reciprocal: it is 1/M for equal weights, not M."
+                    lambda w: np.square(w).sum() / w.sum() ** 2,
+                    "This is the reciprocal: it is 1/M for equal weights, not M.",
                 ),
                 Mistake(lambda w: float(len(w)), "You counted the particles. Count what their weights are worth."),
                 Mistake(lambda w: w.sum() / w.max(), "That is another measure. Here: squared sum over sum of squares."),
@@ -665,13 +689,18 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(
-                    lambda w, t: not particles.should_resample(w, t), "The other way round: resample when the effective size is low."
+                    lambda w, t: not particles.should_resample(w, t),
+                    "The other way round: resample when the effective size is low.",
                 ),
-                Mistake(lambda w, t: particles.effective_size(w) < t, "Compare with threshold * len(weights), not with a share."),
                 Mistake(
-                    lambda w, t: True, "You resample always. With even weights that only loses particles."
+                    lambda w, t: particles.effective_size(w) < t * w.sum(),
+                    "Compare with the share of the *number* of particles, len(weights), not of the sum of the weights.",
                 ),
-                Mistake(lambda w, t: False, "You never resample. The weights would pile up on one particle."),
+                Mistake(lambda w, t: True, "You resample always. With even weights that only loses particles."),
+                Mistake(
+                    lambda w, t: False,
+                    "You never resample. Do you compare with a bare share? The effective size counts particles: threshold * len(weights).",
+                ),
             ],
             draws=14,
         ),
@@ -704,7 +733,11 @@ CHAPTER = Chapter(
         Prediction(
             "kidnap",
             question="The cloud has converged, then the robot is carried into another room. What does the plain filter do?",
-            choices=("it finds the robot within some steps", "it stays where it is", "its weights become zero and it stops"),
+            choices=(
+                "it finds the robot within some steps",
+                "it stays where it is",
+                "its weights become zero and it stops",
+            ),
             answer="it stays where it is",
             why="No particle is near the new place, and resampling cannot invent one. Weights are normalized, so even hopeless particles look fine.",
         ),
@@ -726,7 +759,10 @@ CHAPTER = Chapter(
                     "The share uses the old averages. Bring them up to date first.",
                 ),
                 Mistake(
-                    lambda m, s, f, a, b: (1 - (f + b * (m - f)) / (s + a * (m - s)), *particles.recover(m, s, f, a, b)[1:]),
+                    lambda m, s, f, a, b: (
+                        1 - (f + b * (m - f)) / (s + a * (m - s)),
+                        *particles.recover(m, s, f, a, b)[1:],
+                    ),
                     "The share can fall below zero when things go well: take the larger of it and 0.",
                 ),
                 Mistake(

@@ -14,7 +14,9 @@ def segments(ends):
     """x and y of segments (n, 4), x1 y1 x2 y2, as one broken line for `set_data`."""
     ends = np.asarray(ends, dtype=float).reshape(-1, 4)
     gap = np.full(len(ends), np.nan)
-    return np.column_stack([ends[:, 0], ends[:, 2], gap]).ravel(), np.column_stack([ends[:, 1], ends[:, 3], gap]).ravel()
+    return np.column_stack([ends[:, 0], ends[:, 2], gap]).ravel(), np.column_stack(
+        [ends[:, 1], ends[:, 3], gap]
+    ).ravel()
 
 
 def bars(x, height):
@@ -92,20 +94,24 @@ class Disks:
 
 
 def corridor(fig, length):
-    """Five pictures of a corridor, as on the lecture's slide. Returns (axes, walls, weights, particles, true places).
-    """
+    """Five pictures of a corridor, as on the lecture's slide. Returns (axes, doors, particles, true places)."""
     axes = fig.subplots(5, 1, sharex=True)
     titles = (
-        "(a)  nothing is known", "(b)  it sees a door: weights", "(c)  resampled and moved",
-        "(d)  it looks again: weights", "(e)  resampled and moved",
-    )  # fmt: skip
+        "(a)  nothing is known",
+        "(b)  it sees a door: weights",
+        "(c)  resampled and moved",
+        "(d)  it looks again: weights",
+        "(e)  resampled and moved",
+    )
     sticks, places = [], []
     for ax, title in zip(axes, titles):
         ax.set(xlim=(0, length), ylim=(0, 1.15), yticks=[])
         ax.set_title(title, fontsize=9, pad=2)
         ax.grid(False)
         sticks += ax.plot([], [], color=style.ESTIMATE, linewidth=0.8, alpha=0.7)
-        places += ax.plot([], [], color=style.TRUTH, linestyle="none", marker="v", markersize=9, clip_on=False, zorder=4)
+        places += ax.plot(
+            [], [], color=style.TRUTH, linestyle="none", marker="v", markersize=9, clip_on=False, zorder=4
+        )
     axes[-1].set_xlabel("place along the corridor (m)")
     doors = [ax.plot([], [], color=style.MEASUREMENT, linewidth=5, alpha=0.8, solid_capstyle="butt")[0] for ax in axes]
     return axes, doors, sticks, places
@@ -119,7 +125,9 @@ class Wheel:
         ax.set(xlim=(-1.3, 1.3), ylim=(-1.3, 1.3), aspect="equal")
         self.sectors = [
             ax.add_patch(
-                Wedge((0, 0), 1.0, 0, 1, width=0.3, facecolor=(style.PREDICTION, style.FAINT)[k % 2], edgecolor=style.INK)
+                Wedge(
+                    (0, 0), 1.0, 0, 1, width=0.3, facecolor=(style.PREDICTION, style.FAINT)[k % 2], edgecolor=style.INK
+                )
             )
             for k in range(count)
         ]
@@ -191,14 +199,20 @@ class MapForms:
         (points,) = ax.plot(*building.points.T, **style.look("measurement", markersize=2.5))
         ways = [(*building.nodes[a], *building.nodes[b]) for a, b in building.edges]
         (edges,) = ax.plot(*segments(ways), color=style.PREDICTION, linewidth=2)
-        (nodes,) = ax.plot(*np.transpose(list(building.nodes.values())), **style.look("estimates", marker="o", markersize=7))
+        (nodes,) = ax.plot(
+            *np.transpose(list(building.nodes.values())), **style.look("estimates", marker="o", markersize=7)
+        )
         names = [
             ax.annotate(name, at, xytext=(5, 5), textcoords="offset points", fontsize=8)
             for name, at in building.nodes.items()
             if not name.startswith("door")
         ]
-        self.parts = {**{key: [image] for key, image in self.images.items()}, "lines": [lines], "points": [points],
-                      "graph": [edges, nodes, *names]}  # fmt: skip
+        self.parts = {
+            **{key: [image] for key, image in self.images.items()},
+            "lines": [lines],
+            "points": [points],
+            "graph": [edges, nodes, *names],
+        }
         self.artists = [artist for part in self.parts.values() for artist in part]
 
     def show(self, form):

@@ -22,8 +22,8 @@ def mcl_first_line():
     return Computed(
         "χ'_{k+1} = χ_{k+1} = ∅",
         misprint=left == 0,
-        proof=f"Executed as printed, the first line empties the input: of {len(states)} particles the loop finds {left} to read. "
-        "The sets filled below are χ'_{k+1} and χ_{k+1}.",
+        proof=f"Executed as printed, the first line empties the input: of {len(states)} particles the "
+        f"loop finds {left} to read. The sets filled below are those of step k + 1.",
     )
 
 
@@ -37,8 +37,8 @@ def draw_probability():
     total = np.exp(weigh(near)).sum()
     return Computed(
         "mit Wahrscheinlichkeit w_i / W",
-        proof=f"Densities need not add up to 1: for 1000 particles about a pose in the hall W = {total:.3g}. The roulette slide has it "
-        "right: it spins on [0, w_1 + ... + w_M], which divides by W.",
+        proof=f"Densities need not add up to 1: for 1000 particles about a pose in the hall W = {total:.3g}. "
+        "The roulette slide has it right: it spins on [0, w_1 + ... + w_M], which divides by W.",
     )
 
 
@@ -155,8 +155,9 @@ def twelve_pictures():
     return Computed(
         len(pictures) if error[-1] < 0.3 else 0,
         simulated=True,
-        proof=f"The slides show pictures without numbers. Simulated on our building: the cloud shrinks from {spread[0]:.1f} m to "
-        f"{spread[-1]:.1f} m over {len(pictures)} steps, the estimate's error from {error[0]:.1f} m to {error[-1]:.1f} m.",
+        proof=f"The slides show pictures without numbers. Simulated on our building: the cloud shrinks "
+        f"from {spread[0]:.1f} m to {spread[-1]:.1f} m over {len(pictures)} steps, the estimate's error "
+        f"from {error[0]:.1f} m to {error[-1]:.1f} m.",
     )
 
 
@@ -168,8 +169,8 @@ def soccer_path():
     return Computed(
         "über MCL ermittelter Weg" if mcl < odometry else "über Odometrie gemessener Weg",
         simulated=True,
-        proof=f"The run was never published. Simulated with six landmarks, the path found by MCL is off by {mcl:.2f} m (RMS), "
-        f"the one measured by odometry by {odometry:.2f} m.",
+        proof=f"The run was never published. Simulated with six landmarks, the path found by MCL is off "
+        f"by {mcl:.2f} m (RMS), the one measured by odometry by {odometry:.2f} m.",
     )
 
 
@@ -188,8 +189,9 @@ def idea():
     return Computed(
         "(a) - (e)" if near > 0.4 else "(a)",
         simulated=True,
-        proof=f"The figure has no numbers. Simulated with three doors at 2, 4 and 9 m and moves of 2 m: the positions spread over "
-        f"{spread[0]:.1f} m at (a), and after (e) {100 * near:.0f} % of them lie within 0.5 m of the one place that fits.",
+        proof=f"The figure has no numbers. Simulated with three doors at 2, 4 and 9 m and moves of 2 m: "
+        f"the positions spread over {spread[0]:.1f} m at (a), and after (e) {100 * near:.0f} % of them lie within "
+        "0.5 m of the one place that fits.",
     )
 
 

@@ -1,5 +1,4 @@
-"""Stages of chapter 9: corridor, maps, sensor models over the building, resampling, twelve pictures, soccer, the arena.
-"""
+"""Stages of chapter 9: corridor, maps, sensor models over the building, resampling, recorded runs, the arena."""
 
 import functools
 
@@ -78,8 +77,10 @@ def corridor():
         scene=scene,
         compute=compute_corridor,
         handles={
-            **{f"D{k}": Handle((x, 0.0), step=0.1, bounds=row, label=f"door {k}", color=style.MEASUREMENT)
-               for k, x in ((1, 2.0), (2, 4.0), (3, 9.0))},
+            **{
+                f"D{k}": Handle((x, 0.0), step=0.1, bounds=row, label=f"door {k}", color=style.MEASUREMENT)
+                for k, x in ((1, 2.0), (2, 4.0), (3, 9.0))
+            },
             "robot": Handle((2.0, 1.0), step=0.1, bounds=((0.0, CORRIDOR), (1.0, 1.0)), label="robot at the start"),
         },
         controls={
@@ -88,8 +89,10 @@ def corridor():
         },
         fail={"D3": (6.0, 0.0)},
         size=(7.0, 5.4),
-        describe=lambda result: f"After (e), {100 * result['near']:.0f} % of the particles lie within 0.6 m of the robot.",
-    )  # fmt: skip
+        describe=lambda result: (
+            f"After (e), {100 * result['near']:.0f} % of the particles lie within 0.6 m of the robot."
+        ),
+    )
 
 
 # Maps ----------------------------------------------------------------------------------------------------------------
@@ -101,10 +104,13 @@ def compute_maps(state):
     """What the map says at the probe, and how many numbers this form of the map stores."""
     b, at = building(), state["probe"]
     stored = {
-        "occupancy grid": b.grid.cells.size, "lines": b.lines.size, "points": b.points.size,
-        "graph": 2 * len(b.nodes) + 2 * len(b.edges), "distance field": b.grid.cells.size,
+        "occupancy grid": b.grid.cells.size,
+        "lines": b.lines.size,
+        "points": b.points.size,
+        "graph": 2 * len(b.nodes) + 2 * len(b.edges),
+        "distance field": b.grid.cells.size,
         "likelihood field": b.grid.cells.size,
-    }  # fmt: skip
+    }
     i, j = b.grid.cell_of(at)
     inside = 0 <= i < b.grid.cells.shape[0] and 0 <= j < b.grid.cells.shape[1]
     nearest = min(b.nodes, key=lambda name: np.hypot(*(np.array(b.nodes[name]) - at)))
@@ -163,8 +169,7 @@ def _places(step=0.2):
 
 
 def compute_heat(state):
-    """Log weights of one scan over the building for both models, relative to the best place, and the ranges behind it.
-    """
+    """Log weights of one scan over the building for both models, relative to the best place, and the scan itself."""
     b, sensors = building(), suite()
     pose = np.array([*state["robot"], np.deg2rad(state["heading_deg"])])
     world = b.grid.with_disks([(*(pose[:2] + 0.9 * np.array([np.cos(pose[2]), np.sin(pose[2])])), 0.25)])
@@ -185,8 +190,10 @@ def compute_heat(state):
         picture = np.full(shape, np.nan)
         picture[cells] = np.maximum(log_w - best, HEAT_DEPTH) if np.isfinite(best) else HEAT_DEPTH
         result[name] = picture
-        result[f"{name}_found"] = bool(np.hypot(*(xy[np.argmax(log_w)] - pose[:2])) < 0.4) and bool(np.isfinite(best))
-        result[f"{name}_sharp"] = int((log_w > best - 10).sum()) if np.isfinite(best) else 0
+        result[f"{name}_possible"] = bool(np.isfinite(best))
+        result[f"{name}_found"] = bool(np.isfinite(best) and np.hypot(*(xy[np.argmax(log_w)] - pose[:2])) < 0.4)
+        away = np.hypot(*(xy - pose[:2]).T) > 2.0
+        result[f"{name}_elsewhere"] = float(log_w[away].max() - best) if np.isfinite(best) else -np.inf
     return result
 
 
@@ -199,11 +206,12 @@ def _ends(pose, ranges, bearings):
 def _heat_sentence(result):
     words = []
     for name, long in (("beams", "beam model"), ("field", "likelihood field")):
-        if result[f"{name}_sharp"] == 0:
+        if not result[f"{name}_possible"]:
             words.append(f"{long}: every place has weight zero")
         else:
-            found = "finds the robot" if result[f"{name}_found"] else "is wrong"
-            words.append(f"{long} {found}, {result[f'{name}_sharp']} places within a factor e^10 of the best")
+            found = "right" if result[f"{name}_found"] else "wrong"
+            elsewhere = f"e^{result[f'{name}_elsewhere']:.0f}"
+            words.append(f"{long}: best place is {found}, the best one over 2 m away has {elsewhere} of it")
     return "; ".join(words).capitalize() + "."
 
 
@@ -214,7 +222,8 @@ def field_against_beams():
         axes = fig.subplots(2, 1)
         extent, lines = building().grid.extent, building().lines
         images = [
-            draw.heat(ax, extent, lines, title, HEAT_DEPTH) for ax, title in zip(axes, ("beam model", "likelihood field"))
+            draw.heat(ax, extent, lines, title, HEAT_DEPTH)
+            for ax, title in zip(axes, ("beam model", "likelihood field"))
         ]
         robots, scans = [draw.Robot(ax) for ax in axes], [draw.Beams(ax, size=2) for ax in axes]
 
@@ -267,9 +276,13 @@ def compute_wheel(state):
         "roulette": _counts(shares, SPINS).var(0).sum(),
     }
     return {
-        "weights": weights, "shares": shares, "spokes": spokes, "counts": _counts(shares, spokes),
-        "variances": variances, "effective": particles.effective_size(weights),
-    }  # fmt: skip
+        "weights": weights,
+        "shares": shares,
+        "spokes": spokes,
+        "counts": _counts(shares, spokes),
+        "variances": variances,
+        "effective": particles.effective_size(weights),
+    }
 
 
 def wheel():
@@ -337,10 +350,11 @@ def _first_cloud(n=1000):
 
 
 def compute_standing(state):
-    """Places still occupied after so many rounds, and the number of ancestors left after each round, for both methods.
-    """
+    """Places still occupied after so many rounds, and the ancestors left after each round, for both methods."""
     history = _descendants()
-    left = {name: np.array([len(np.unique(row)) for row in names[: state["rounds"] + 1]]) for name, names in history.items()}
+    left = {
+        name: np.array([len(np.unique(row)) for row in names[: state["rounds"] + 1]]) for name, names in history.items()
+    }
     clouds = {name: _first_cloud()[np.unique(names[state["rounds"]])] for name, names in history.items()}
     return {"rounds": state["rounds"], "left": left, "clouds": clouds}
 
@@ -371,8 +385,8 @@ def standing():
         controls={"rounds": slider(0, 200, 0, step=1, label="rounds of resampling")},
         fail={"rounds": 200},
         describe=lambda result: (
-            f"After {result['rounds']} rounds {result['left']['roulette'][-1]} of 1000 first particles have descendants "
-            f"under roulette, {result['left']['spoke wheel'][-1]} under the spoke wheel."
+            f"After {result['rounds']} rounds {result['left']['roulette'][-1]} of 1000 first particles have "
+            f"descendants under roulette, {result['left']['spoke wheel'][-1]} under the spoke wheel."
         ),
         size=(7.0, 3.2),
     )
@@ -393,7 +407,14 @@ def compute_twelve(state):
     shot = pictures[k]
     error = float(np.hypot(*(shot.estimate - shot.truth)[:2]))
     path = np.array([p.truth[:2] for p in pictures[: k + 1]])
-    return {"number": k + 1, "states": shot.states, "truth": shot.truth, "estimate": shot.estimate, "error": error, "path": path}
+    return {
+        "number": k + 1,
+        "states": shot.states,
+        "truth": shot.truth,
+        "estimate": shot.estimate,
+        "error": error,
+        "path": path,
+    }
 
 
 def twelve_pictures():
@@ -427,7 +448,12 @@ def twelve_pictures():
     )
 
 
-READINGS = {"range and bearing": ("range", "bearing"), "range only": ("range",), "bearing only": ("bearing",), "nothing": ()}
+READINGS = {
+    "range and bearing": ("range", "bearing"),
+    "range only": ("range",),
+    "bearing only": ("bearing",),
+    "nothing": (),
+}
 
 
 @functools.cache
@@ -439,11 +465,18 @@ def compute_soccer(state):
     """The soccer run up to now: paths, cloud, the landmark seen, and the error of both estimates (m)."""
     run = _soccer(READINGS[state["reads"]])
     k = min(int(round(state["t"] / 0.4)), len(run.estimates) - 1)
-    off = [float(np.hypot(*(path[k + d] - run.truth[k + 1])[:2])) for path, d in ((run.estimates, 0), (run.odometry, 1))]
+    off = [
+        float(np.hypot(*(path[k + d] - run.truth[k + 1])[:2])) for path, d in ((run.estimates, 0), (run.odometry, 1))
+    ]
     return {
-        "truth": run.truth[: k + 2], "odometry": run.odometry[: k + 2], "estimates": run.estimates[: k + 1],
-        "states": run.pictures[k].states, "seen": int(run.seen[k]), "errors": off, "landmarks": run.landmarks,
-    }  # fmt: skip
+        "truth": run.truth[: k + 2],
+        "odometry": run.odometry[: k + 2],
+        "estimates": run.estimates[: k + 1],
+        "states": run.pictures[k].states,
+        "seen": int(run.seen[k]),
+        "errors": off,
+        "landmarks": run.landmarks,
+    }
 
 
 def soccer():
@@ -491,9 +524,18 @@ def start_arena(state):
     pose = np.array([*building().nodes["hall"], 0.3])
     filter_ = particles.localizer(building(), state["model"], state["particles"], rng, recovery=False)
     return {
-        "rng": rng, "pose": pose, "filter": filter_, "wanderer": particles.Wanderer(building(), rng), "world": building().grid,
-        "disks": np.empty((0, 3)), "ends": np.empty((0, 2)), "errors": [], "step": None, "stroke": None, "carried": False,
-    }  # fmt: skip
+        "rng": rng,
+        "pose": pose,
+        "filter": filter_,
+        "wanderer": particles.Wanderer(building(), rng),
+        "world": building().grid,
+        "disks": np.empty((0, 3)),
+        "ends": np.empty((0, 2)),
+        "errors": [],
+        "step": None,
+        "stroke": None,
+        "carried": False,
+    }
 
 
 def advance_arena(state, event):
@@ -519,7 +561,9 @@ def _filter_step(state, memory, u):
     noisy = odometry.noisy_controls(u[None], DT, **particles.CONTROL_NOISE, rng=rng, runs=1)[0, 0]
     if state["model"] == "landmarks":
         weigh = suite().measure("landmarks", pose, rng, memory["world"])
-        memory["ends"] = building().landmarks[particles.see_landmarks(memory["world"], pose, building().landmarks, rng)[0]]
+        memory["ends"] = building().landmarks[
+            particles.see_landmarks(memory["world"], pose, building().landmarks, rng)[0]
+        ]
     else:
         ranges, bearings = suite().scanner.scan(memory["world"], pose, rng, every=9)
         weigh = suite().weigh_scan(state["model"], ranges, bearings)
@@ -564,9 +608,14 @@ def compute_arena(state):
     """What the picture shows: cloud, true pose, estimate, scan, obstacles, errors, and the filter's numbers."""
     memory = state["memory"]
     return {
-        "states": memory["filter"].states, "pose": memory["pose"], "estimate": memory.get("estimate", np.full(3, np.nan)),
-        "ends": memory["ends"], "disks": memory["disks"], "errors": np.array(memory["errors"]), "step": memory["step"],
-    }  # fmt: skip
+        "states": memory["filter"].states,
+        "pose": memory["pose"],
+        "estimate": memory.get("estimate", np.full(3, np.nan)),
+        "ends": memory["ends"],
+        "disks": memory["disks"],
+        "errors": np.array(memory["errors"]),
+        "step": memory["step"],
+    }
 
 
 def _arena_sentence(result):

@@ -2,8 +2,10 @@
 
     python tests/bench/mcl_success.py [--runs 100] [--write]
 
-Global: 5000 particles spread over the whole building; success when after 60 steps the estimate (the heaviest cluster) lies
-within 0.3 m and 10 deg of the truth. Adaptive: the same with KLD sampling. Kidnapped: the robot is tracked for 20 steps and then put into another room; success when
+Global: 5000 particles spread over the whole building; success when after 60 steps the estimate (the heaviest cluster)
+lies
+within 0.3 m and 10 deg of the truth. Adaptive: the same with KLD sampling. Kidnapped: the robot is tracked for 20
+steps and then put into another room; success when
 within 60 steps the estimate is right again, and stays so for five steps. The intervals are Clopper and Pearson's, 95 %.
 `--write` stores the table as data/monte_carlo/success.csv.
 """
