@@ -73,7 +73,7 @@ def wheel(rng):
 
 def cloud_weights(rng):
     """Weights of any sum."""
-    return (rng.exponential(size=30) ** rng.uniform(0.2, 3),)
+    return (rng.exponential(size=30) ** rng.uniform(0.2, 3) * 50 ** rng.uniform(-1, 1),)
 
 
 def averages(rng):
