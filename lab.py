@@ -18,6 +18,7 @@ pyproject.toml, constraints.txt, the place of this folder or the version of Pyth
 
 import argparse
 import contextlib
+import errno
 import hashlib
 import json
 import os
@@ -332,18 +333,22 @@ def choose_port(ip, wanted=None):
 
 
 def is_free(ip, port):
-    """Whether a server may listen there; an address this machine does not have is refused."""
-    try:
-        family, kind, protocol, _, address = socket.getaddrinfo(ip, port, type=socket.SOCK_STREAM)[0]
-    except OSError:
-        raise Refusal(f"{ip} is no address of this machine. Leave --ip out to listen on localhost.") from None
-    with socket.socket(family, kind, protocol) as probe:
-        if os.name != "nt":
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(address)
-        except OSError:
-            return False
+    """Whether a server may listen there, at every address a name stands for; refuses one this machine does not have."""
+    own = False
+    with contextlib.suppress(socket.gaierror):
+        for family, kind, protocol, _, address in socket.getaddrinfo(ip, port, type=socket.SOCK_STREAM):
+            try:
+                with socket.socket(family, kind, protocol) as probe:
+                    if os.name != "nt":
+                        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                    probe.bind(address)
+            except OSError as error:
+                if error.errno in (errno.EADDRINUSE, errno.EACCES):
+                    return False
+                continue  # such as ::1 on a machine without IPv6
+            own = True
+    if not own:
+        raise Refusal(f"{ip} is no address of this machine. Leave --ip out to listen on localhost.")
     return True
 
 

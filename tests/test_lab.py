@@ -232,8 +232,16 @@ def test_a_taken_port_is_avoided_or_named(monkeypatch, capsys):
             lab.choose_port("127.0.0.1")
     with pytest.raises(lab.Refusal, match="from 1 to 65535, and 99999 is none"):
         lab.choose_port("localhost", 99999)
-    with pytest.raises(lab.Refusal, match="no address of this machine"):
-        lab.choose_port("no.such.host.invalid")
+    for ip in ("no.such.host.invalid", "192.0.2.1"):
+        with pytest.raises(lab.Refusal, match="no address of this machine"):
+            lab.choose_port(ip)
+
+
+def test_localhost_is_taken_when_any_of_its_addresses_is():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        assert not lab.is_free("localhost", taken.getsockname()[1])
 
 
 def test_signals_and_exit_codes_are_handed_on():
