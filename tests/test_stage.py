@@ -154,6 +154,8 @@ def test_presets():
         ({"start": lambda state: 0}, "come together"),
         ({"view": View(), "brush": True}, "both view and brush"),
         ({"fail": {"zz": 1}}, "has no 'zz'"),
+        ({"handles": {"a": Handle((0, 0), ax=1)}}, "a wants axes 1, but the scene has 1"),
+        ({"click": 2}, "click wants axes 2"),
     ],
 )
 def test_options_are_checked(options, sentence):

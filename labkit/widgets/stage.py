@@ -32,8 +32,12 @@ keep limits fixed, return as artists all that moves, use one artist with many po
 `set_data` and friends rather than new artists, and put changing numbers into `ax.text` returned as an artist, not into
 titles. Artists are drawn in order of their zorder, always above the background.
 
-Colors come from `figures.style`; the dark theme is applied while drawing, nothing is to be done for it. Colormapped
-images stay as they are.
+Looks. Colors come from `figures.style`; the dark theme is applied while drawing, nothing is to be done for it
+(colormapped images stay as they are). The axes are laid out once a size, with what the scene drew at first. Narrow
+cells crowd the picture to 85 % of `size` and then scale it down, so leave words that much room.
+
+Tests need no browser: `stage.set(P=(3, 2))`, then `stage.result`, `stage.caption`, `stage.status`, `stage.png()`;
+`stage.make_it_fail()`, `stage.reset()`, `stage.buttons["name of a preset"].click()`.
 
 What else there is
 ------------------
@@ -262,6 +266,7 @@ class Stage(ipywidgets.VBox):
         self._attached = self._showing = False
         self._received = monotonic()
         self._picture = Picture(scene, size)
+        self._check_axes()
         self._correct(set(self._state))
         self.initial = dict(self._state)
         self._presets = {
@@ -296,6 +301,18 @@ class Stage(ipywidgets.VBox):
             raise ValueError(f"{where}: start and advance come together, got only one of them")
         if view is not None and self._brush is not None:
             raise ValueError(f"{where}: dragging empty space either turns the view or draws, got both view and brush")
+
+    def _check_axes(self):
+        count = len(self._picture.fig.axes)
+        for key, ax in {
+            **{k: h.ax for k, h in self._handles.items()},
+            "click": self._click,
+            "brush": self._brush,
+        }.items():
+            if ax is not None and not 0 <= ax < count:
+                raise ValueError(
+                    f"Stage {self.name!r}: {key} wants axes {ax}, but the scene has {count}, counted from 0"
+                )
 
     # -- state
 
