@@ -166,12 +166,14 @@ class choice:
         return value
 
     def widget(self, name):
-        kind = ipywidgets.ToggleButtons if len(self._pairs) <= 3 else ipywidgets.Dropdown
-        return kind(
-            options=self._pairs, value=self.value, description=self.label or name,
-            style={"description_width": "initial", **({"button_width": "auto"} if len(self._pairs) <= 3 else {})},
-            layout={"width": "max-content", "max_width": "100%"},
-        )  # fmt: skip
+        label, words = self.label or name, [word for word, _ in self._pairs]
+        options = {"options": self._pairs, "value": self.value, "description": label}
+        if len(words) > 3:
+            layout = {"width": f"{6 + 0.55 * (len(label) + max(map(len, words))):.0f}em", "max_width": "100%"}
+            return ipywidgets.Dropdown(style={"description_width": "initial"}, layout=layout, **options)
+        style = {"description_width": "initial", "button_width": "auto"}
+        layout = {"display": "flex", "width": "max-content", "max_width": "100%"}
+        return ipywidgets.ToggleButtons(style=style, layout=layout, **options)
 
 
 @dataclass(frozen=True)
