@@ -579,7 +579,9 @@ def _frozen(array):
 
 
 def _row(children):
-    return ipywidgets.HBox(list(children), layout={"flex_flow": "row wrap", "align_items": "center"})
+    return ipywidgets.HBox(
+        list(children), layout={"flex_flow": "row wrap", "align_items": "center", "grid_gap": "0 10px"}
+    )
 
 
 def _at(picture, fraction):
