@@ -312,6 +312,7 @@ def lab_command(python, ip, port, no_browser):
         f"--ServerApp.port={port}",
         f"--LabApp.default_url=/lab/tree/{FIRST_NOTEBOOK}",
         "--LabApp.extension_manager=readonly",
+        "--ServerApp.kernel_websocket_connection_class=labkit.widgets.connection.PromptConnection",
         *(["--no-browser"] if no_browser else []),
     ]
 
