@@ -155,7 +155,7 @@ def dogleg_step(g, B, radius):
     """Powell's dogleg: down the gradient to the model's minimum there, on toward the Newton point, cut at the radius.
 
     g (..., n), B (..., n, n), radius (...) -> (..., n). Where B is not positive definite, the Newton point is no
-    minimum and the Cauchy point is returned. Source: thesis (2-33)-(2-35); Nocedal, Wright, Numerical Optimization, 4.1.
+    minimum and the Cauchy point is returned. Source: thesis (2-33)-(2-35); Nocedal, Wright, Numerical Optimization 4.1.
     """
     eigenvalues = np.linalg.eigvalsh(B)
     convex = eigenvalues[..., 0] > 1e-14 * np.abs(eigenvalues).max(-1)

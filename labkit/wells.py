@@ -20,29 +20,30 @@ NAMES = ("local minimum", "global minimum", "saddle", "nowhere")
 METHODS = ("newton", "gauss_newton", "levenberg_marquardt", "trust_region")
 
 
-def _parts(x):
-    """Offsets from both centers (..., 2, 2), and q = squared distance + 1, (..., 2)."""
+def _parts(x, width=1.0):
+    """Offsets from both centers (..., 2, 2), q = squared distance + width^2 (..., 2), depths times width^2."""
     d = as_points(x, "x", 2)[..., None, :] - CENTERS
-    return d, (d * d).sum(-1) + 1
+    return d, (d * d).sum(-1) + width**2, DEPTHS * width**2
 
 
-def value(x):
-    """f(x), equation (6-16)."""
-    return -(DEPTHS / _parts(x)[1]).sum(-1)
+def value(x, width=1.0):
+    """f(x), equation (6-16). A `width` other than 1 widens both wells at the same depth."""
+    _, q, w = _parts(x, width)
+    return -(w / q).sum(-1)
 
 
-def gradient(x):
+def gradient(x, width=1.0):
     """Gradient of f, equation (6-17); shape (..., 2)."""
-    d, q = _parts(x)
-    return ((2 * DEPTHS / q**2)[..., None] * d).sum(-2)
+    d, q, w = _parts(x, width)
+    return ((2 * w / q**2)[..., None] * d).sum(-2)
 
 
-def hessian(x):
+def hessian(x, width=1.0):
     """Hessian of f, shape (..., 2, 2); agrees with the code of listing C9, not with the formulas of listing C7."""
-    d, q = _parts(x)
+    d, q, w = _parts(x, width)
     outer = d[..., :, None] * d[..., None, :]
-    bowl = (2 * DEPTHS / q**2).sum(-1)[..., None, None] * np.eye(2)
-    return bowl - ((8 * DEPTHS / q**3)[..., None, None] * outer).sum(-3)
+    bowl = (2 * w / q**2).sum(-1)[..., None, None] * np.eye(2)
+    return bowl - ((8 * w / q**3)[..., None, None] * outer).sum(-3)
 
 
 def residual(x):
@@ -52,21 +53,21 @@ def residual(x):
     sqrt(w / q) (x - center), because w - w / q = w |x - center|^2 / q. The minima and the saddle stay where they are.
     Each term is the Geman-McClure loss of robust estimation: a target that stops pulling once it is far away.
     """
-    d, q = _parts(x)
+    d, q, _ = _parts(x)
     r = np.sqrt(DEPTHS / q)[..., None] * d
     return r.reshape(*r.shape[:-2], 4)
 
 
 def jacobian(x):
     """Derivative of `residual`, shape (..., 4, 2)."""
-    d, q = _parts(x)
+    d, q, _ = _parts(x)
     J = np.sqrt(DEPTHS / q)[..., None, None] * (np.eye(2) - d[..., :, None] * d[..., None, :] / q[..., None, None])
     return J.reshape(*J.shape[:-3], 4, 2)
 
 
 def printed_hessian(x):
     """Hessian as listing C7 prints it: H11 ends in -(-1600 (x1 - 1)^2) / q2^3, and H22 repeats H11."""
-    d, q = _parts(x)
+    d, q, _ = _parts(x)
     square = d[..., 0, 0] ** 2
     diagonal = (2 * DEPTHS / q**2).sum(-1) - 800 * square / q[..., 0] ** 3 + 1600 * square / q[..., 1] ** 3
     H = hessian(x).copy()

@@ -55,6 +55,22 @@ def test_squares_of_the_residual_add_up_to_the_function():
     assert wells.residual(POINTS[:, None]).shape == (30, 1, 4) and wells.jacobian(POINTS[None]).shape == (1, 30, 4, 2)
 
 
+def test_wider_wells_have_the_right_derivatives_and_lead_to_the_global_minimum():
+    for x in POINTS[:6]:
+        numeric = opt.numeric_jacobian(lambda p: wells.value(p, 3.0), x)
+        np.testing.assert_allclose(numeric, wells.gradient(x, 3.0), atol=1e-6)
+        numeric = opt.numeric_jacobian(lambda p: wells.gradient(p, 3.0), x)
+        np.testing.assert_allclose(numeric, wells.hessian(x, 3.0), atol=1e-6)
+        for width in (4.0, 2.0, 1.0):
+            x = opt.trust_region(
+                lambda p, c=width: wells.value(p, c),
+                lambda p, c=width: wells.gradient(p, c),
+                10 * x if width == 4.0 else x,
+                hessian=lambda p, c=width: wells.hessian(p, c),
+            ).solution
+        assert wells.which(x) == 1
+
+
 def test_printed_hessian_is_wrong_on_the_diagonal_only():
     wrong = np.abs(wells.printed_hessian(POINTS) - wells.hessian(POINTS)).max(0)
     assert (wrong > 1).tolist() == [[True, False], [False, True]]

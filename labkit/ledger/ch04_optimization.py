@@ -300,9 +300,8 @@ def iterations_newton():
     return Computed(np.array([run.iterations for run in runs]))
 
 
-def _stand_ins(start):
-    """(end, iterations) of each stand-in from one start; a run counts up to the size of its last gradient falling "
-    "below 1e-6."""
+def stand_ins(start):
+    """{name: (end, iterations)} of each stand-in from one start, stopped at a gradient of 1e-6; `end` indexes `NAMES`."""
     rule = opt.small_gradient(1e-6)
     runs = [wells.run(method, start, stop=rule) for method in wells.METHODS[1:]]
     runs.append(wells.run("trust_region", start, radius=10.0, subproblem=opt.exact_step, stop=rule))
@@ -327,7 +326,7 @@ def _iterations(method):
     "differ from it."""
     value, bound, words = [], [], []
     for name, start in zip(MINIMA, _printed(method)["start"]):
-        ends = _stand_ins(start)
+        ends = stand_ins(start)
         counts = [n for end, n in ends.values() if end == MINIMA[name]]
         value.append(ends["BFGS"][1])
         bound.append(max(abs(n - ends["BFGS"][1]) for n in counts))
