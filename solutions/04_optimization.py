@@ -59,13 +59,13 @@ def gradient(x):
 
 
 # %% one-line [markdown]
-# ## One line is enough for all three
+# ## Everything happens on one line
 #
 # The gradient is a positive number times $x - c_1$ plus another times $x - c_2$. It can vanish only where both pull in opposite directions: **on the
-# straight line between the centers.** So the whole drama can be watched along one line.
+# straight line between the centers.** Both minima (L and G) and the saddle (S) lie on it.
 #
-# Newton's idea: lay a parabola on $f$ where you stand, with the right height, slope and curvature, and go to its vertex. Decide, then drag the start.
-# The triangle at the bottom marks the vertex. *Make it fail* goes to a place where the parabola is nearly a straight line.
+# Newton's idea: lay a parabola on $f$ where you stand, with the right height, slope and curvature, and go to its vertex. Decide, then drag the start
+# (or focus it and press the arrow keys). The triangle at the bottom marks the vertex. *Make it fail* goes to a place where the parabola is nearly straight.
 
 # %% predict-top
 guess = ...  # your code here
@@ -173,7 +173,7 @@ for name, printed, e in zip(wells.NAMES, ((0.979, 0.968), (-0.995, -1.992), (0.1
 # %% saddle-statement [markdown]
 # ## "A saddle must be hit exactly"
 #
-# You have just found a saddle by Newton, from $(0, 0)$. Section 7.1.1 says that no method finds it and that one would have to hit "exactly" the point (*exakt der Punkt*);
+# Rounding to three digits explains slopes up to about 0.3 in the wells and 0.05 at the pass, not 2.5. And you found the saddle with Newton, from $(0, 0)$. Section 7.1.1 says that no method finds it and that one would have to hit "exactly" the point (*exakt der Punkt*);
 # section 2.5.2 of the same thesis says that Newton cannot tell a saddle from a minimum. How large is the neighborhood from which Newton ends in it?
 #
 # In the figure the thin lines are the two directions of curvature, solid where $f$ bends up, dashed where it bends down; the blue angle is the Newton step
@@ -284,25 +284,27 @@ ex.predict("four", guess, reveal=stages.four_paths)
 #
 # Listing C8 stops once $|g_1| + |g_2| \le 10^{-10}$, with the gradient from *before* the last step. With that rule and the printed starts Newton should need 9 and
 # 7 iterations. For the other two methods nothing is published but listing C6, a screenshot of MATLAB's toolbox: *trust region*, derivatives *approximated by solver*. MATLAB's
-# documentation says that `fminunc` then runs a quasi-Newton method instead, for trust region needs a gradient supplied. SciPy's BFGS is such a method.
+# documentation says that `fminunc` then runs a quasi-Newton method instead, because its trust region needs the gradient supplied. SciPy's BFGS is such a method.
+# So: where does each stand-in end, from the thesis's farthest starts?
 
 # %% table-7-1
 for start in ((1.25, 1.25), (-1.25, -2.25)):
     run = wells.run("newton", start, stop=opt.small_gradient_before(1e-10))
     print(f"Newton from {start}: {run.iterations} iterations to {run.solution}")
 print("printed: 9 to (0.9789, 0.9684), 7 to (-0.9948, -1.9922)\n")
-claims = ((4.3, "local, Gauss-Newton"), (35, "global, Gauss-Newton"), (4.5, "local, trust region"), (45, "global, trust region"))
-names = {"GN": "Gauss-Newton", "LM": "Levenberg-M.", "dogleg": "dogleg", "exact": "exact TR", "BFGS": "BFGS"}
+claims = ((4.3, "GN: local"), (35, "GN: global"), (4.5, "TR: local"), (45, "TR: global"))
+names = {"GN": "Gauss-Newton", "LM": "Levenberg-M.", "dogleg": "TR, dogleg", "exact": "TR, exact", "BFGS": "BFGS"}
+print(f"{'start':12}{'thesis':22}", *(f"{name:13}" for name in names.values()))
 for s, claim in claims:
     ends = stand_ins((s, s))
-    words = [f"{names[key]} {wells.NAMES[ends[key][0]].split()[0]}" for key in names]
-    print(f"({s:g}, {s:g}) thesis: {claim:21} |", ", ".join(words))
+    words = [f"{wells.NAMES[ends[key][0]].split()[0]:13}" for key in names]
+    print(f"{f'({s:g}, {s:g})':12}{claim:22}", *words)
 
 # %% table-verdict [markdown]
 # The Newton column comes out to the iteration. Of all stand-ins only BFGS ends where the table says for all four other starts: what the thesis praises as its trust
-# region was probably a quasi-Newton method. The deviations $\mu$ of table 7-1 measure no accuracy either: they are four printed digits minus two.
+# region was probably a quasi-Newton method. The deviations $\mu$ of table 7-1 measure no accuracy either: they are an iterate with four digits minus an "ideal" one with two.
 #
-# And "the farthest start"? Before you rub the next figure free, decide how much of the square leads Newton to a minimum. Then try all four methods, and look along the diagonal.
+# And "the farthest start"? Before you rub the next figure free, decide how much of the square leads Newton to a minimum. Then try all four methods.
 
 # %% predict-share
 guess = ...  # your code here
@@ -311,26 +313,31 @@ guess = "less than 1 %"
 ### END SOLUTION
 ex.predict("share", guess, reveal=stages.basins)
 
+# %% farthest-text [markdown]
+# The ranking of table 7-1 stands. But look along its diagonal: below is one letter for each start $(1, 1), (2, 2), \dots, (60, 60)$, a dash for one that runs away.
+# For the methods that always arrive there *is* no farthest start: L and G take turns to the end. Where a start at 45 lands is chance, not stability.
+
 # %% farthest
 diagonal = np.repeat(np.arange(1, 60.1)[:, None], 2, axis=1)
+square = np.stack(np.meshgrid(*2 * [np.linspace(-6, 6, 61)]), axis=-1)
 for method in wells.METHODS:
     label, _ = wells.destinations(method, diagonal)
-    print(f"{method:20}", "".join("LGS-"[i] for i in label))
+    share = (wells.destinations(method, square)[0] < 2).mean()
+    print(f"{method:20}", "".join("LGS-"[i] for i in label), f"{100 * share:5.1f} % of the square")
 
-# %% farthest-text [markdown]
-# One letter for each start $(1, 1), (2, 2), \dots, (60, 60)$; a dash has run away. For the methods that always arrive there *is* no farthest start: L and G take turns to the end.
-# Whether a start at 45 lands in the global minimum is chance, not stability.
-#
+# %% break-it-text [markdown]
 # ## Break it
 #
-# A stopping rule can lie. Out on the plain the gradient fades, and "the gradient is small" is true and worthless. Always ask for the place and the kind as well.
+# A stopping rule can lie. Out on the plain the gradient fades, and "the gradient is small" is true and worthless. Ask for the place and the kind as well. The
+# last line is another way to fail: two unknowns of which only the sum is seen.
 
 # %% break-it
 run = wells.run("newton", (3.0, 3.0))
 print(f"{run.reason} after {run.iterations} steps: converged = {run.converged}")
-print(f"x = {run.solution}, f = {run.cost[-1]:.1e}, kind: {opt.classify_extremum(gradient(run.solution), hessian(run.solution))}")
-flat = opt.gauss_newton(lambda x: np.array([x.sum(), 1.0]), lambda x: np.array([[1.0, 1], [0, 0]]), [1.0, 2.0])
-print(f"{flat.reason}: converged = {flat.converged}")
+kind = opt.classify_extremum(gradient(run.solution), hessian(run.solution))
+print(f"|x| = {np.linalg.norm(run.solution):.0f}, f = {run.cost[-1]:.1e}, kind: {kind}")
+one_too_many = opt.gauss_newton(lambda x: np.array([x.sum(), 1]), lambda x: np.array([[1, 1], [0, 0]]), [1, 2])
+print(f"{one_too_many.reason}: converged = {one_too_many.converged}")
 
 # %% beyond [markdown]
 # ## Beyond the document: widen the wells
@@ -355,8 +362,7 @@ print({name: ends.count(name) for name in wells.NAMES})
 # - Check derivatives by central differences before you trust any result.
 # - Report start, end, kind, reason for stopping and the number of *rejected* steps. Try several starts.
 # - A good start beats a good optimizer. Chapter 5 computes one without iteration.
-
-# %% questions [markdown]
+#
 # ## Three questions, to answer in words
 #
 # 1. Newton ends in the saddle more often than in both minima together. Why is a root of the gradient with mixed curvature no worse for it than a minimum?

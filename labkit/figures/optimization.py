@@ -1,4 +1,4 @@
-"""Chapter 4: contour maps, paths of iterates, models and their trust regions, basins, the walk along the line of centers."""
+"""Chapter 4: contour maps, paths of iterates, models and their trust regions, basins, the walk along the line."""
 
 import numpy as np
 from matplotlib.colors import to_rgba
@@ -51,7 +51,7 @@ def model(ax):
 
 
 def courses(ax, names, iterations, low, high):
-    """Cost against iteration, one line a method, with a marker for the iteration shown. Returns ({name: line}, marker)."""
+    """Cost against iteration, one line a method, and a marker for the one shown. Returns ({name: line}, marker)."""
     style.axes(ax, "iteration", "$f$")
     ax.set(xlim=(0, iterations), ylim=(low, high))
     for name in names:
@@ -82,7 +82,8 @@ def profile(ax, t, f, points):
     style.axes(ax, "place on the line through both centers: 0 = (1, 1), 1 = (-1, -2)", "$f$")
     ax.plot(t, f, **style.look("truth"))
     for name, at in points.items():
-        ax.annotate(LETTERS[name], at, xytext=(-4, -15 if name != "saddle" else 8), textcoords="offset points", weight="bold")
+        below = -15 if name != "saddle" else 8
+        ax.annotate(LETTERS[name], at, xytext=(-4, below), textcoords="offset points", weight="bold")
     (parabola,) = ax.plot([], [], **style.look("prediction"), zorder=3)
     (iterates,) = ax.plot([], [], **style.look("estimate"), marker="D", markersize=5, zorder=4)
     (vertex,) = ax.plot([], [], color=style.PREDICTION, marker="v", markersize=10, linestyle="none", zorder=5)

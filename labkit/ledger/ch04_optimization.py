@@ -301,7 +301,7 @@ def iterations_newton():
 
 
 def stand_ins(start):
-    """{name: (end, iterations)} of each stand-in from one start, stopped at a gradient of 1e-6; `end` indexes `NAMES`."""
+    """{name: (end, iterations)} of the stand-ins from one start, to a gradient of 1e-6; `end` indexes `wells.NAMES`."""
     rule = opt.small_gradient(1e-6)
     runs = [wells.run(method, start, stop=rule) for method in wells.METHODS[1:]]
     runs.append(wells.run("trust_region", start, radius=10.0, subproblem=opt.exact_step, stop=rule))

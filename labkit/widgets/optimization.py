@@ -217,6 +217,7 @@ def near_saddle(state):
         "shares": np.clip(shares, -20, 20),
         "climb": float(wells.value(run.x[min(1, run.iterations)]) - wells.value(x)),
         "end": _end(run),
+        "distance": float(np.linalg.norm(x - wells.extrema()[2].x)),
     }
 
 
@@ -224,7 +225,8 @@ def _saddle_caption(result):
     low, high = result["eigenvalues"]
     sense = "rises" if result["climb"] > 0 else "falls"
     return (
-        f"Curvatures {low:.0f} and {high:.0f}. In the first step f {sense} by {abs(result['climb']):.1f}. "
+        f"{result['distance']:.2f} from S, curvatures {low:.0f} and {high:.0f}. "
+        f"In the first step f {sense} by {abs(result['climb']):.1f}. "
         f"{draw.PATHS[result['method']]['label']} ends here: {result['end']}, after {result['run'].iterations} steps."
     )
 
