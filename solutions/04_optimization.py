@@ -319,7 +319,7 @@ ex.predict("share", guess, reveal=stages.basins)
 
 # %% farthest
 diagonal = np.repeat(np.arange(1, 60.1)[:, None], 2, axis=1)
-square = np.stack(np.meshgrid(*2 * [np.linspace(-6, 6, 61)]), axis=-1)
+square = np.stack(np.meshgrid(*2 * [np.linspace(-6, 6, 121)]), axis=-1)
 for method in wells.METHODS:
     label, _ = wells.destinations(method, diagonal)
     share = (wells.destinations(method, square)[0] < 2).mean()
@@ -343,7 +343,7 @@ print(f"{one_too_many.reason}: converged = {one_too_many.converged}")
 # ## Beyond the document: widen the wells
 #
 # Each term of $f$ is a *robust loss*: a pull toward a center that fades with distance, as one wants it for outliers. Its width is 1. Make it 8 and the two wells
-# merge into one; follow its minimum while the width shrinks. This is *graduated non-convexity*, and chapter 5 meets the same loss on real data.
+# merge into one; follow its minimum while the width shrinks. This is *graduated non-convexity*, and chapter 5 uses robust losses on real data.
 
 # %% widen
 ends = []

@@ -84,6 +84,8 @@ def test_rubbing_uncovers_what_the_brush_touched_and_nothing_else():
     places = np.linspace(-6, 6, 121)
     assert np.hypot(places[rows], places[columns]).max() <= stages.BRUSH + 1e-9
     assert len(rows) == pytest.approx(np.pi * (stages.BRUSH / 0.1) ** 2, rel=0.1)
+    stroke = {"memory": np.ones((121, 121), dtype=bool), "brush": np.array([[-5.9, 0.0], [5.9, 0.0]])}
+    assert not stages.rub(stroke, "brush")[60].any()
     stage.set(all=True)
     assert not stage.result["covered"].any()
     assert stage.result["shares"][:2].sum() < 0.01 < stage.result["shares"][2]  # the prediction "share"

@@ -164,6 +164,13 @@ CHAPTER = Chapter(
                 Mistake(_gradient(one=0.0), "The 1 in q = |x − c|² + 1 is missing from your denominators."),
             ],
         ),
+        Prediction(
+            "top",
+            question="The parabola that fits f at the start bends downward, the start lies on the slope of the left well. Where does Newton end?",
+            choices=("in the left well", "in the right well", "on top of the pass"),
+            answer="on top of the pass",
+            why="Newton goes to the vertex of the parabola. Where f bends down, that vertex is a maximum.",
+        ),
         Exercise(
             "hessian",
             reference=wells.hessian,
@@ -203,22 +210,6 @@ CHAPTER = Chapter(
                 Mistake(_swapped, "Minimum and maximum are exchanged: at a minimum f bends up, all eigenvalues are positive."),
             ],
         ),
-        Value(
-            "saddle",
-            reference=lambda: wells.extrema()[2].x,
-            metric=metrics.numbers(1e-3),
-            hints=(
-                "Newton goes to the nearest place where the gradient vanishes, whatever its kind. Start it between the wells.",
-                "Start at (0, 0) and repeat x = x + newton_step(gradient(x), hessian(x)) until x stands still.",
-                "Ten rounds of `x = x + newton_step(gradient(x), hessian(x))` from `x = np.zeros(2)` are plenty.",
-            ),
-            mistakes=[
-                Mistake(lambda: np.array([0.105, -0.205]), "That is what the thesis prints. Evaluate your gradient there: it is about 2.5 long."),
-                Mistake(lambda: wells.CENTERS.mean(0), "That is halfway between the centers. The deeper well pulls the pass away from there."),
-                Mistake(lambda: wells.extrema()[0].x, "That is the local minimum: start nearer to the pass between the wells."),
-                Mistake(lambda: wells.extrema()[1].x, "That is the global minimum: start nearer to the pass between the wells."),
-            ],
-        ),
         Exercise(
             "newton_step",
             reference=opt.newton_step,
@@ -235,6 +226,29 @@ CHAPTER = Chapter(
                 Mistake(lambda g, H: -g / np.diag(H), "Dividing by the diagonal ignores the mixed derivatives: solve the system."),
                 Mistake(lambda g, H: -g, "That is steepest descent: H is not used at all."),
             ],
+        ),
+        Value(
+            "saddle",
+            reference=lambda: wells.extrema()[2].x,
+            metric=metrics.numbers(1e-3),
+            hints=(
+                "Newton goes to the nearest place where the gradient vanishes, whatever its kind. Start it between the wells.",
+                "Start at (0, 0) and repeat x = x + newton_step(gradient(x), hessian(x)) until x stands still.",
+                "Ten rounds of `x = x + newton_step(gradient(x), hessian(x))` from `x = np.zeros(2)` are plenty.",
+            ),
+            mistakes=[
+                Mistake(lambda: np.array([0.105, -0.205]), "That is what the thesis prints. Evaluate your gradient there: it is about 2.5 long."),
+                Mistake(lambda: wells.CENTERS.mean(0), "That is halfway between the centers. The deeper well pulls the pass away from there."),
+                Mistake(lambda: wells.extrema()[0].x, "That is the local minimum: start nearer to the pass between the wells."),
+                Mistake(lambda: wells.extrema()[1].x, "That is the global minimum: start nearer to the pass between the wells."),
+            ],
+        ),
+        Prediction(
+            "neighborhood",
+            question="The thesis says a saddle is found only if it is hit exactly. How close must Newton really start?",
+            choices=("exactly at it", "within 0.01 of it", "within 0.7 of it"),
+            answer="within 0.7 of it",
+            why="For Newton the saddle is a root of the gradient like any other, with a whole neighborhood that flows into it.",
         ),
         Exercise(
             "gauss_newton_step",
@@ -306,20 +320,6 @@ CHAPTER = Chapter(
                 Mistake(_always_to_the_rim, "When the Newton point is inside the radius, stop there: the model rises beyond it."),
                 Mistake(_leg_from_zero, "The second leg starts at the corner: add corner to s times the leg."),
             ],
-        ),
-        Prediction(
-            "top",
-            question="The parabola that fits f at the start bends downward, the start lies on the slope of the left well. Where does Newton end?",
-            choices=("in the left well", "in the right well", "on top of the pass"),
-            answer="on top of the pass",
-            why="Newton goes to the vertex of the parabola. Where f bends down, that vertex is a maximum.",
-        ),
-        Prediction(
-            "neighborhood",
-            question="The thesis says a saddle is found only if it is hit exactly. How close must Newton really start?",
-            choices=("exactly at it", "within 0.01 of it", "within 0.7 of it"),
-            answer="within 0.7 of it",
-            why="For Newton the saddle is a root of the gradient like any other, with a whole neighborhood that flows into it.",
         ),
         Prediction(
             "four",

@@ -286,11 +286,14 @@ def covered_at_first(state):
 
 
 def rub(state, event):
-    """Uncover the cells within the brush's width of its last places."""
-    covered, places = state["memory"].copy(), state["brush"][-12:]
+    """Uncover the cells within the brush's radius of its last places and of the straight ways between them."""
+    covered, places = state["memory"].copy(), state["brush"][-60:]
+    ways = [np.linspace(a, b, 2 + int(4 * np.abs(b - a).max() / BRUSH)) for a, b in zip(places, places[1:])]
     cells = np.linspace(*SQUARE, CELLS)
-    for x, y in places:
-        covered &= (cells[None, :] - x) ** 2 + (cells[:, None] - y) ** 2 > BRUSH**2
+    for x, y in np.concatenate([places, *ways]):
+        columns, rows = (slice(*np.searchsorted(cells, (at - BRUSH, at + BRUSH))) for at in (x, y))
+        inside = (cells[None, columns] - x) ** 2 + (cells[rows, None] - y) ** 2 <= BRUSH**2
+        covered[rows, columns] &= ~inside
     return covered
 
 
