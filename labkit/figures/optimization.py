@@ -64,7 +64,7 @@ def courses(ax, names, iterations, low, high):
 
 def basins(ax, extent, shape):
     """An image of where each start ends, empty at first, with its legend beside it. Returns the image."""
-    image = ax.imshow(np.zeros((*shape, 4)), extent=extent, origin="lower", interpolation="nearest", zorder=1)
+    image = ax.imshow(np.zeros((*shape, 4), dtype=np.uint8), extent=extent, origin="lower", interpolation="nearest", zorder=1)
     for name, color in BASINS.items():
         ax.plot([], [], marker="s", markersize=9, linestyle="none", color=color, label=name)
     ax.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), title="ends in", alignment="left")
@@ -72,9 +72,9 @@ def basins(ax, extent, shape):
 
 
 def basin_colors(labels, covered):
-    """RGBA of an array of labels (order of `BASINS`); transparent where covered."""
-    table = np.array([to_rgba(color, 0.75) for color in BASINS.values()])
-    return np.where(covered[..., None], 0.0, table[labels])
+    """RGBA bytes of an array of labels (order of `BASINS`); transparent where covered."""
+    table = np.array([*(to_rgba(color, 0.75) for color in BASINS.values()), (0, 0, 0, 0)])
+    return np.round(255 * table).astype(np.uint8)[np.where(covered, len(BASINS), labels)]
 
 
 def profile(ax, t, f, points):
