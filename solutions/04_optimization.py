@@ -283,7 +283,7 @@ ex.predict("four", guess, reveal=stages.four_paths)
 # ## Against the document: table 7-1
 #
 # Listing C8 stops once $|g_1| + |g_2| \le 10^{-10}$, with the gradient from *before* the last step. With that rule and the printed starts Newton should need 9 and
-# 7 iterations. For the other two methods nothing is published but listing C6, a screenshot of MATLAB's toolbox: *trust region*, derivatives *approximated by solver*. MATLAB's
+# 7 iterations. For the other two methods nothing is published but listing C6, a screenshot of MATLAB's toolbox as set for the robot: *trust region*, derivatives *approximated by solver*. MATLAB's
 # documentation says that `fminunc` then runs a quasi-Newton method instead, because its trust region needs the gradient supplied. SciPy's BFGS is such a method.
 # So: where does each stand-in end, from the thesis's farthest starts?
 
