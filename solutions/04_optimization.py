@@ -270,7 +270,7 @@ for k in range(6):
 # ## Four paths on one map
 #
 # Now all four from the same start. Newton and the trust region (*Trust-Region-Verfahren*) use the true Hessian, Gauss-Newton and Levenberg-Marquardt the sum of squares. Blue lines are
-# the chosen method's model at the chosen iteration, the dashed circle its radius, the black bar its step. Decide first; then drag the start, and walk through the iterations.
+# the chosen method's model at the chosen iteration, the dashed circle its radius, the thick bar its step. Decide first; then drag the start, and walk through the iterations.
 
 # %% predict-four
 guess = ...  # your code here
