@@ -64,7 +64,8 @@ def courses(ax, names, iterations, low, high):
 
 def basins(ax, extent, shape):
     """An image of where each start ends, empty at first, with its legend beside it. Returns the image."""
-    image = ax.imshow(np.zeros((*shape, 4), dtype=np.uint8), extent=extent, origin="lower", interpolation="nearest", zorder=1)
+    empty = np.zeros((*shape, 4), dtype=np.uint8)
+    image = ax.imshow(empty, extent=extent, origin="lower", interpolation="nearest", zorder=1)
     for name, color in BASINS.items():
         ax.plot([], [], marker="s", markersize=9, linestyle="none", color=color, label=name)
     ax.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), title="ends in", alignment="left")
