@@ -2,6 +2,7 @@
 
 import numpy as np
 from matplotlib.colors import to_rgba
+from matplotlib.image import PcolorImage
 
 from . import style
 
@@ -62,14 +63,17 @@ def courses(ax, names, iterations, low, high):
     return lines, here
 
 
-def basins(ax, extent, shape):
-    """An image of where each start ends, empty at first, with its legend beside it. Returns the image."""
-    empty = np.zeros((*shape, 4), dtype=np.uint8)
-    image = ax.imshow(empty, extent=extent, origin="lower", interpolation="nearest", zorder=1)
+def basins(ax, edges):
+    """A square image of where each start ends, empty at first, its legend beside it. Returns (image, fill).
+
+    `edges` are the borders of the cells, alike in both directions. PcolorImage takes half the time of imshow.
+    """
+    image = PcolorImage(ax, edges, edges, np.zeros((len(edges) - 1, len(edges) - 1, 4), dtype=np.uint8), zorder=1)
+    ax.add_image(image)
     for name, color in BASINS.items():
         ax.plot([], [], marker="s", markersize=9, linestyle="none", color=color, label=name)
     ax.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), title="ends in", alignment="left")
-    return image
+    return image, lambda colors: image.set_data(edges, edges, colors)
 
 
 def basin_colors(labels, covered):

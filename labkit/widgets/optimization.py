@@ -12,7 +12,7 @@ from .stage import Handle, Stage, choice, slider, toggle
 
 LEVELS = (-200, -170, -140, -110, -90, -75, -67.58, -60, -50, -40, -30, -22, -16, -12)
 ALONG = wells.CENTERS[1] - wells.CENTERS[0]
-SHOWN = 16  # iterations in the picture; who needs more has left it
+SHOWN = 12  # iterations in the picture; who needs more has left it
 SQUARE = (-6.0, 6.0)
 CELLS = 121
 BRUSH = 0.5
@@ -320,14 +320,13 @@ def basins():
     def scene(fig):
         ax = fig.subplots()
         _map(ax, SQUARE, SQUARE)
-        edge = (SQUARE[1] - SQUARE[0]) / (CELLS - 1) / 2
-        extent = (SQUARE[0] - edge, SQUARE[1] + edge) * 2
-        image = draw.basins(ax, extent, (CELLS, CELLS))
+        half = (SQUARE[1] - SQUARE[0]) / (CELLS - 1) / 2
+        image, fill = draw.basins(ax, np.linspace(SQUARE[0] - half, SQUARE[1] + half, CELLS + 1))
         ax.set(xlim=SQUARE, ylim=SQUARE)
         (path,) = ax.plot([], [], color=draw.style.INK, linewidth=1.4, marker="o", markersize=3.5, zorder=5)
 
         def update(state, result):
-            image.set_data(draw.basin_colors(result["labels"], result["covered"]))
+            fill(draw.basin_colors(result["labels"], result["covered"]))
             path.set_data(*np.clip(result["run"].x, -50, 50).T)
 
         return [image, path], update
