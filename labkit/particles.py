@@ -108,14 +108,17 @@ def weigh_landmarks(z, landmarks, std_range=None, std_bearing=None):
 
     def weigh(states):
         states = as_points(states, "states")
-        x, y, theta = states[..., 0], states[..., 1], states[..., 2]
+        x, y, theta = (np.ascontiguousarray(states[..., k]) for k in range(3))
+        c, s = np.cos(theta), np.sin(theta)
         misfit = np.zeros(x.shape)
         for (r, phi), (mark_x, mark_y) in zip(z, landmarks):
             dx, dy = mark_x - x, mark_y - y
             if stds[0] is not None:
-                misfit += ((r - np.sqrt(dx * dx + dy * dy)) / stds[0]) ** 2
-            if stds[1] is not None:
-                misfit += (wrap_angle(phi + theta - np.arctan2(dy, dx)) / stds[1]) ** 2
+                misfit += np.square((r - np.sqrt(dx * dx + dy * dy)) * (1 / stds[0]))
+            if stds[1] is not None:  # turned into the measured direction, the difference needs no wrapping
+                ahead, left = c * dx + s * dy, c * dy - s * dx
+                cos, sin = math.cos(phi), math.sin(phi)
+                misfit += np.square(np.arctan2(cos * left - sin * ahead, cos * ahead + sin * left) * (1 / stds[1]))
         return best - 0.5 * misfit
 
     return Weighting(weigh, best)
@@ -351,7 +354,7 @@ def estimate(states, weights=None):
     states = as_points(states, "states").reshape(-1, 3)
     weights = np.ones(len(states)) if weights is None else _as_weights(weights)
     w = weights / weights.sum()
-    pose = w @ states
+    pose = (w[:, None] * states).sum(0)
     pose[2] = circular_mean(states[:, 2], w) if _has_direction(states[:, 2], w) else 0.0
     deviation = states - pose
     deviation[:, 2] = wrap_angle(deviation[:, 2])
@@ -359,7 +362,7 @@ def estimate(states, weights=None):
 
 
 def _has_direction(angles, w):
-    return np.hypot(w @ np.cos(angles), w @ np.sin(angles)) > 1e-9
+    return np.hypot((w * np.cos(angles)).sum(), (w * np.sin(angles)).sum()) > 1e-9
 
 
 def estimate_mode(states, weights=None, cell=0.5, turn=_MODE_TURN):
@@ -525,7 +528,7 @@ class MonteCarloLocalizer:
         if weigh is not None:
             log_w = self.exponent * (weigh(self.states) - weigh.best)
             all_zero = bool((self.log_weights + log_w == -np.inf).all())
-            w_mean = float(self.weights @ np.exp(log_w))
+            w_mean = float((self.weights * np.exp(log_w)).sum())
             if not all_zero:
                 self.log_weights = self.log_weights + log_w
                 self.log_weights -= self.log_weights.max()

@@ -520,7 +520,7 @@ COUNTS = (100, 500, 1000, 2000, 5000, 10_000, 20_000)
 
 def start_arena(state):
     """The memory of the arena: true pose, filter, world, history; global localization begins."""
-    rng = np.random.default_rng(11)
+    rng = np.random.default_rng(8)
     pose = np.array([*building().nodes["hall"], 0.3])
     filter_ = particles.localizer(building(), state["model"], state["particles"], rng, recovery=False)
     return {
@@ -657,7 +657,7 @@ def arena():
         scene=scene,
         compute=compute_arena,
         controls={
-            "particles": choice(COUNTS, 2000, label="particles"),
+            "particles": choice(COUNTS, 10_000, label="particles"),
             "model": choice(particles.SENSORS, "likelihood field", label="model"),
             "resampler": choice(tuple(RESAMPLERS), "spoke wheel", label="resampling"),
         },
