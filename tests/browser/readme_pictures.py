@@ -15,24 +15,18 @@ import driver  # noqa: E402
 import test_jupyterlab  # noqa: E402
 
 import lab  # noqa: E402
-from labkit import build  # noqa: E402
-from labkit.course import source  # noqa: E402
 
 
 def main():
-    (ROOT / "build").mkdir(exist_ok=True)
-    path = source.find("01")
-    with tempfile.TemporaryDirectory(dir=ROOT / "build", prefix="readme-") as folder:
-        copy = Path(folder) / f"{path.stem}.ipynb"
-        copy.write_text(build.as_text(build.blank_notebook(path)), encoding="utf-8")
-        words = lab.lab_command(sys.executable, "localhost", lab.choose_port("localhost"), no_browser=True)
-        words += ["--LabApp.expose_app_in_browser=True", "--allow-root"]
-        progress = str(Path(folder) / "progress.jsonl")
+    words = lab.lab_command(sys.executable, "localhost", lab.choose_port("localhost"), no_browser=True)
+    words += ["--LabApp.expose_app_in_browser=True", "--allow-root"]
+    with tempfile.TemporaryDirectory() as folder, driver.notebook_copy("01") as copy:
+        settings = {"PYTHONPATH": str(ROOT), "LABKIT_PROGRESS": str(Path(folder) / "progress.jsonl")}
         with (
-            driver.server(words, settings=lab.OVERRIDES, PYTHONPATH=str(ROOT), LABKIT_PROGRESS=progress) as address,
+            driver.server(words, settings=lab.OVERRIDES, **settings) as address,
             driver.page_of(driver.find_browser(), False, 1000, 1400, scale=2) as page,
         ):
-            driver.open_notebook(page, address, copy.relative_to(ROOT).as_posix())
+            driver.open_notebook(page, address, copy)
             driver.show_notebook_alone(page)
             driver.run_all(page)
             stage(page)
