@@ -69,7 +69,8 @@ stages.map_forms()
 scanner = maps.Scanner()
 pose = np.array([8.4, 2.4, 0.3])
 ranges, bearings = scanner.scan(grid, pose, np.random.default_rng(1), every=9)
-print(f"{len(scanner.bearings)} beams in a scan, {len(ranges)} of them used, {np.sum(ranges == scanner.r_max)} without an echo")
+without_echo = np.sum(ranges == scanner.r_max)
+print(f"{len(scanner.bearings)} beams in a scan, {len(ranges)} of them used, {without_echo} without an echo")
 print(f"nearest obstacle {ranges.min():.2f} m, median {np.median(ranges):.2f} m")
 
 # %% algorithm [markdown]
@@ -88,8 +89,7 @@ print(f"nearest obstacle {ranges.min():.2f} m, median {np.median(ranges):.2f} m"
 # %% sample_motion
 @ex.sample_motion
 def sample_motion(states, u, dt, std_u, rng):
-    """Return states, shape (M, 3), each moved by its own noisy copy of u = (v, omega). odometry.step(x, u, dt)
-    moves."""
+    """Return states, shape (M, 3), moved by odometry.step(x, u, dt), each with its own noisy copy of u."""
     ### BEGIN SOLUTION
     noisy = u + std_u * rng.standard_normal((len(states), 2))
     return odometry.step(states, noisy, dt)
@@ -108,8 +108,7 @@ def sample_motion(states, u, dt, std_u, rng):
 # %% landmark_weight
 @ex.landmark_weight
 def landmark_weight(pose, z, landmarks, std_range, std_bearing):
-    """Return log p of z, shape (m, 2): ranges (m) and bearings (rad) to landmarks, shape (m, 2), seen from pose,
-    shape (3,)."""
+    """Return log p of z, shape (m, 2), ranges (m) and bearings (rad) to landmarks, shape (m, 2), seen from pose."""
     ### BEGIN SOLUTION
     dx, dy = (landmarks - pose[:2]).T
     error_r = z[:, 0] - np.hypot(dx, dy)
@@ -375,7 +374,8 @@ mcl = particles.localizer(building, "likelihood field", 5000, rng, kld={"n_min":
 run = particles.record(mcl, drive, lambda pose, k: suite.measure("likelihood field", pose, rng), rng)
 error = np.hypot(*(run[-1].estimate - run[-1].truth)[:2])
 print("particles before steps 1, 2, 5, 10, 30:", [len(run[k].states) for k in (0, 1, 4, 9, 29)])
-print("found" if error < 0.3 else "lost", "at the end")
+turn = abs(odometry.wrap_angle(run[-1].estimate[2] - run[-1].truth[2]))
+print("found" if error < 0.3 and turn < np.deg2rad(10) else "lost", "at the end")
 
 # %% bug-hunt [markdown]
 # ## Bug hunt

@@ -73,7 +73,7 @@ def half_unit(printed):
 # %% status
 @ex.status
 def status(printed, value, bound, misprint, simulated):
-    """Return the word for a comparison: printed is a string, value and bound are numbers, misprint and simulated True or False."""
+    """Return the word for a printed string, a computed value and its bound; misprint and simulated are True or False."""
     ### BEGIN SOLUTION
     half, off = half_unit(printed) + 1e-9, abs(value - float(printed))
     if simulated:
@@ -125,7 +125,8 @@ rows = [entry.row for entry in found if entry.status == "reproduced" and entry.r
 for row in rows:
     other = replace(row, printed=row.printed[:-1] + str((int(row.printed[-1]) + 5) % 10))
     computed = ledger.compute(row)
-    print(f"{row.id:16} printed {row.printed}: {ledger.judge(row, computed):10}   {other.printed}: {ledger.judge(other, computed)}")
+    words = ledger.judge(row, computed), ledger.judge(other, computed)
+    print(f"{row.id:20} printed {row.printed}: {words[0]}, if it were {other.printed}: {words[1]}")
 
 # %% in-practice [markdown]
 # ## In practice

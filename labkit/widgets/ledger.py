@@ -47,7 +47,8 @@ def _row_html(entry):
     cells = (row.document, row.place, row.quantity, row.printed, entry.value, "" if row.unit == "1" else row.unit)
     text = "".join(f"<td>{html.escape(cell)}</td>" for cell in cells)
     hover = html.escape(entry.proof or row.note, quote=True)
-    return f'<tr title="{hover}">{text}<td style="white-space: nowrap">{SIGNS[entry.status]} {entry.status}</td><td>{link}</td></tr>'
+    status = f'<td style="white-space: nowrap">{SIGNS[entry.status]} {entry.status}</td>'
+    return f'<tr title="{hover}">{text}{status}<td>{link}</td></tr>'
 
 
 class LedgerTable(ipywidgets.VBox):
