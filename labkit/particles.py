@@ -108,7 +108,7 @@ def weigh_landmarks(z, landmarks, std_range=None, std_bearing=None):
 
     def weigh(states):
         states = as_points(states, "states")
-        x, y, theta = (np.ascontiguousarray(states[..., k]) for k in range(3))
+        x, y, theta = (states[..., k].copy() for k in range(3))
         c, s = np.cos(theta), np.sin(theta)
         misfit = np.zeros(x.shape)
         for (r, phi), (mark_x, mark_y) in zip(z, landmarks):

@@ -337,8 +337,7 @@ ex.predict("kidnap", guess, reveal=stages.arena)
 # %% recover
 @ex.recover
 def recover(w_mean, w_slow, w_fast, alpha_slow, alpha_fast):
-    """Return the share of random particles, and w_slow and w_fast brought up to date (average += alpha * (w_mean -
-    average))."""
+    """Return the share of random particles, and both averages brought up to date: w += alpha * (w_mean - w)."""
     ### BEGIN SOLUTION
     w_slow = w_slow + alpha_slow * (w_mean - w_slow)
     w_fast = w_fast + alpha_fast * (w_mean - w_fast)

@@ -73,7 +73,7 @@ def half_unit(printed):
 # %% status
 @ex.status
 def status(printed, value, bound, misprint, simulated):
-    """Return the word for a printed string, a computed value and its bound; misprint and simulated are True or False."""
+    """Return the word for a printed string, a computed value and its bound; the other two are True or False."""
     ### BEGIN SOLUTION
     half, off = half_unit(printed) + 1e-9, abs(value - float(printed))
     if simulated:

@@ -54,6 +54,7 @@ def test_landmark_weight_by_hand():
     states = [[0, 0, 0], [0.5, 0, 0], [0, 0, 0.2], [0, 0, 2 * math.pi]]
     np.testing.assert_allclose(weigh(states), [peak, peak - 0.5, peak - 2.0, peak], atol=1e-12)
     assert weigh.best == pytest.approx(peak)
+    assert np.shape(weigh([0.0, 0, 0])) == ()
 
 
 def test_landmark_weight_is_a_product_of_densities():
