@@ -116,7 +116,9 @@ def compute(row):
     _load_chapters()
     match = _ENTRY.fullmatch(row.id)
     if match["base"] not in _functions:
-        raise KeyError(f"no function computes the ledger id {match['base']!r}; register one in labkit/ledger with @computes")
+        raise KeyError(
+            f"no function computes the ledger id {match['base']!r}; register one in labkit/ledger with @computes"
+        )
     computed = _functions[match["base"]]()
     return computed.at(tuple(map(int, match["index"].split(",")))) if match["index"] else computed
 
