@@ -18,6 +18,7 @@ REACH_FOREARM, REACH_WRIST, REACH_FLANGE = 225.0, 450.0, 515.0
 # Not in the text of the report, whose drawings are lost: taken from the PyPI package robotkinematicscatalogue 1.1.2, which lists the TX40 with
 # the same three link lengths and joint limits.
 SHOULDER_OFFSET, BASE_HEIGHT = 35.0, 320.0
+RAMP = 0.12  # share of a motion's time spent on getting up to speed, and on slowing down
 
 
 @dataclass(frozen=True)
@@ -204,7 +205,7 @@ def smooth_motion(via, duration, rate):
     return time, CubicSpline(np.arange(len(via)), via)(_ramp(time / time[-1]) * (len(via) - 1))
 
 
-def _ramp(s, ends=0.12):
+def _ramp(s, ends=RAMP):
     """Path parameter 0..1 over normalized time 0..1: constant speed, with smooth starts and stops over the share `ends`."""
     u = np.minimum(np.minimum(s, 1 - s) / ends, 1.0)
     eased = ends * (u**4 * (2.5 - 3 * u + u**2))  # integral of the quintic smoothstep 10u^3 - 15u^4 + 6u^5
