@@ -235,20 +235,24 @@ def lab_options(arguments):
 def start_lab(python, options, passed_on):
     """Open JupyterLab on the first notebook and wait until it ends."""
     port = choose_port(options.ip, options.port)
-    words = [
+    words = lab_command(python, options.ip, port, options.no_browser) + passed_on
+    print(f"JupyterLab opens at port {port}; stop it with Ctrl-C in this window.", flush=True)
+    return call(words, JUPYTERLAB_WORKSPACES_DIR=str(ROOT / ".lab" / "workspaces"), JUPYTER_PREFER_ENV_PATH="1")
+
+
+def lab_command(python, ip, port, no_browser):
+    """The command line that opens JupyterLab on the first notebook; the token stays on."""
+    return [
         python,
         "-m",
         "jupyterlab",
         f"--ServerApp.root_dir={ROOT}",
-        f"--ServerApp.ip={options.ip}",
+        f"--ServerApp.ip={ip}",
         f"--ServerApp.port={port}",
         f"--LabApp.default_url=/lab/tree/{FIRST_NOTEBOOK}",
         "--LabApp.extension_manager=readonly",
-        *(["--no-browser"] if options.no_browser else []),
-        *passed_on,
+        *(["--no-browser"] if no_browser else []),
     ]
-    print(f"JupyterLab opens at port {port}; stop it with Ctrl-C in this window.", flush=True)
-    return call(words, JUPYTERLAB_WORKSPACES_DIR=str(ROOT / ".lab" / "workspaces"), JUPYTER_PREFER_ENV_PATH="1")
 
 
 def choose_port(ip, wanted=None):
@@ -285,7 +289,7 @@ def is_free(ip, port):
 
 def call(words, **environment):
     """Run a command in this folder until it ends, handing signals on; returns its exit code."""
-    process = subprocess.Popen(words, cwd=str(ROOT), env={**os.environ, "PYTHONUTF8": "1", **environment})
+    process = subprocess.Popen(words, cwd=str(ROOT), env={"PYTHONUTF8": "1", **environment, **os.environ})
     if hasattr(signal, "SIGTERM"):
         signal.signal(signal.SIGTERM, lambda number, frame: process.terminate())
     while True:

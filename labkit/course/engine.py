@@ -1,8 +1,9 @@
 """Exercises as the lecturer writes them, and how an answer is judged.
 
-An `Exercise` is a reference function, a random draw of its arguments, a metric, three hints, and a list of `Mistake`s: wrong variants of
-the reference, each with the sentence a student needs who made exactly this mistake. `judge` is pure: it runs an answer and returns an `Outcome`.
-What is displayed, remembered and bound to a name is the business of `session`.
+An `Exercise` is a reference function, a random draw of its arguments, a metric, three hints, and a list of
+`Mistake`s: wrong variants of the reference, each with the sentence a student needs who made exactly this mistake.
+`judge` is pure: it runs an answer and returns an `Outcome`. What is displayed, remembered and bound to a name is the
+business of `session`.
 """
 
 import copy
@@ -15,7 +16,7 @@ import numpy as np
 
 from . import guard, metrics
 
-TODO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
+TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
 TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws
 UNITS = {
     "mm": ("length", 1e-3),
@@ -28,7 +29,7 @@ UNITS = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """The judgment of one answer: a status, what to say about it, and which mistake it is (its index) if it is a named one."""
+    """The judgment of one answer: status, what to say about it, and the index of the named mistake it is, if any."""
 
     status: str
     text: str = ""
@@ -95,7 +96,7 @@ class Exercise(Item):
         """Run the student's function on fresh draws and say what came out; never raises, whatever the function does."""
         rng = np.random.default_rng() if rng is None else rng
         if is_blank(function):
-            return Outcome(TODO)
+            return Outcome(TO_DO)
         if not callable(function):
             return Outcome(NOT_YET, f"expected a function, got {metrics._describe(function)}.")
         trial = _Trial(self, function)
@@ -164,7 +165,7 @@ class _Trial:
         return self.outcome(NOT_YET, str(run.result)) if run.result else None
 
     def verdict(self):
-        """Compare everything that came back with the references, the named mistakes and the general layer, in this order."""
+        """Compare what came back with the references, then the named mistakes, then by the general layer."""
         if all(m is None or m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)) and not self.refusal:
             named = self._named_mistake() if self.exercise.metric is None else None
             return named or self.outcome(CORRECT)
@@ -221,7 +222,7 @@ class _Trial:
     def _raised(self, run, args):
         error = run.error
         if isinstance(error, NotImplementedError):
-            return self.outcome(TODO)
+            return self.outcome(TO_DO)
         if isinstance(error, guard.TimeLimit):
             text = f"your code did not finish within {guard.TIME_LIMIT:.0f} s: is there a loop without an end?"
             return self.outcome(NOT_YET, text)
@@ -251,7 +252,7 @@ class _Refusal:
 
 
 def _equal_as_written(metric, result, wrong):
-    """Whether a result equals a mistake's, by the metric, or as bare arrays where the metric would refuse the mistake itself."""
+    """Whether a result equals a mistake's: by the metric, or as bare arrays where it refuses the mistake itself."""
     try:
         metric.admit(wrong, wrong)
     except metrics.Refused:
@@ -323,7 +324,7 @@ class Value(Item):
     def judge(self, answer, unit=None, rng=None):
         """Compare a number with the reference, in any unit of the same kind; never raises."""
         if is_blank(answer):
-            return Outcome(TODO)
+            return Outcome(TO_DO)
         if self.metric is not None:
             return self._judge_with(self.metric, self.reference(), answer)
         expected, metric = self.measure()
@@ -380,7 +381,8 @@ def _for_value(refusal):
 class Prediction(Item):
     """A question to be answered before a figure is shown; the first answer is locked in.
 
-    choices: the possible answers, one of them `answer`; empty for a number in `unit`, right within the relative distance `within`.
+    choices: the possible answers, one of them `answer`; empty for a number in `unit`, right within the relative
+             distance `within`.
     why:     one or two sentences that say what the figure will show.
     """
 

@@ -1,15 +1,15 @@
-"""What appears beneath a cell: stable text first, then the same as HTML that follows JupyterLab's theme, then a row of buttons."""
+"""What appears beneath a cell: stable text, the same as HTML that follows JupyterLab's theme, a row of buttons."""
 
 import html
 
 import ipywidgets
 from IPython.display import display
 
-from .engine import CORRECT, NOT_YET, RAISED, TODO
+from .engine import CORRECT, NOT_YET, RAISED, TO_DO
 
-SIGNS = {TODO: "○", NOT_YET: "✗", CORRECT: "✓", RAISED: "!"}
+SIGNS = {TO_DO: "○", NOT_YET: "✗", CORRECT: "✓", RAISED: "!"}
 COLORS = {
-    TODO: "--jp-info-color1",
+    TO_DO: "--jp-info-color1",
     NOT_YET: "--jp-warn-color1",
     CORRECT: "--jp-success-color1",
     RAISED: "--jp-error-color1",

@@ -1,7 +1,7 @@
 """Running student code so that nothing it does reaches the notebook: time, output, exits, seeds, patches.
 
-Student code is hostile by accident. `run` calls a function on copies of its arguments and reports what happened; whatever the code
-changed in NumPy, in the interpreter or in labkit is put back.
+Student code is hostile by accident. `run` calls a function on copies of its arguments and reports what happened;
+whatever the code changed in NumPy, in the interpreter or in labkit is put back.
 """
 
 import builtins
@@ -96,8 +96,9 @@ PRISTINE = Pristine()
 def time_limit(seconds):
     """Raise `TimeLimit` in this thread after so many seconds, and again and again if the code swallows it.
 
-    Where the platform has interval timers (Linux, macOS) and this is the main thread, a signal does it, which also ends a sleep. Elsewhere a
-    second thread raises it between two lines of Python; a single call into compiled code cannot be stopped there.
+    Where the platform has interval timers (Linux, macOS) and this is the main thread, a signal does it, which also ends
+    a sleep. Elsewhere a second thread raises it between two lines of Python; a single call into compiled code cannot
+    be stopped there.
     """
     if hasattr(signal, "setitimer") and threading.current_thread() is threading.main_thread():
         yield from _limit_by_signal(seconds)
@@ -168,7 +169,8 @@ def _replaced(owner, name, value):
 @contextlib.contextmanager
 def sandbox(capture):
     """Everything student code may touch, put back afterwards."""
-    state, python_state, err = np.random.get_state(), random.getstate(), np.geterr()
+    state, python_state = np.random.get_state(), random.getstate()  # noqa: NPY002 (what students may seed)
+    err = np.geterr()
     options, depth, folder = np.get_printoptions(), sys.getrecursionlimit(), os.getcwd()
     with contextlib.ExitStack() as stack:
         stack.enter_context(warnings.catch_warnings())
@@ -183,7 +185,7 @@ def sandbox(capture):
         try:
             yield
         finally:
-            np.random.set_state(state)
+            np.random.set_state(state)  # noqa: NPY002
             random.setstate(python_state)
             np.seterr(**err)
             np.set_printoptions(**options)

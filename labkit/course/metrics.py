@@ -1,7 +1,7 @@
-"""How a student's result is compared with the reference: in degrees and millimeters, never entry by entry without a unit.
+"""How a student's result is compared with the reference: in degrees and millimeters, never without a unit.
 
-A metric first *admits* a result (converts what is harmless, refuses the rest with one sentence), then measures its deviations from
-the expected value, each with a unit and a tolerance.
+A metric first *admits* a result (converts what is harmless, refuses the rest with one sentence), then measures its
+deviations from the expected value, each with a unit and a tolerance.
 """
 
 import inspect
@@ -302,7 +302,7 @@ class several(Metric):
 
 @dataclass(frozen=True)
 class through(Metric):
-    """Compare after a function: `through(frames.matrix_from_kuka, poses())` lets every set of angles of the same pose pass."""
+    """Compare after a function: through(matrix_from_kuka, poses()) lets every set of angles of the same pose pass."""
 
     function: object
     metric: Metric
@@ -339,7 +339,7 @@ def difference_words(metric, pairs):
 
 
 def _relation(metric, results, expected):
-    if isinstance(metric, exactly) or isinstance(metric, several):
+    if isinstance(metric, exactly | several):
         return None
     if isinstance(metric, through):
         metric = numbers(1e-9)

@@ -1,6 +1,7 @@
-"""What the student has done: one line of JSON an event, only ever appended, in `.lab/progress.jsonl` of the checkout.
+"""What the student has done: one line of JSON an event, only ever appended, in `.lab/progress.jsonl`.
 
-Two kernels may write at once: each event is a single locked append. A broken line (a full disk, an edit by hand) is skipped when reading.
+Two kernels may write at once: each event is a single locked append. A broken line (a full disk, an edit by hand) is
+skipped when reading.
 """
 
 import contextlib
@@ -19,7 +20,7 @@ def path():
 
 
 def record(chapter, exercise, event, **details):
-    """Append one event. A checkout that cannot be written to is no reason to stop a lesson: then nothing is recorded."""
+    """Append one event; a checkout that cannot be written to is no reason to stop a lesson."""
     line = json.dumps({"chapter": chapter, "exercise": exercise, "event": event, **details}) + "\n"
     with contextlib.suppress(OSError):
         file = path()

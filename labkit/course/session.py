@@ -1,4 +1,4 @@
-"""The exercises as the student meets them: `ex = course("01-frames")`, then `@ex.invert`, `ex.distance(value)`, `ex.predict(...)`."""
+"""The exercises as the student meets them: `ex = course("01-frames")`, then `@ex.invert`, `ex.distance(value)`."""
 
 import difflib
 import html
@@ -11,7 +11,7 @@ import ipywidgets
 
 from ..tables import DATA
 from . import engine, feedback, guard, progress, source
-from .engine import CORRECT, NOT_YET, RAISED, TODO, Prediction, Value
+from .engine import CORRECT, NOT_YET, RAISED, TO_DO, Prediction, Value
 from .feedback import Named, Panel
 
 SOLUTIONS = DATA.parent / "solutions"
@@ -80,7 +80,7 @@ class Course:
         return f"exercises of chapter {self._chapter.name}: {', '.join(self._bound)}"
 
     def predict(self, id, answer=None, reveal=None):
-        """Lock in a prediction, then show what `reveal()` returns (a Stage); without an answer, offer the choices as buttons."""
+        """Lock in a prediction, then show what `reveal()` returns; without one, offer the choices as buttons."""
         try:
             item = self._chapter[id]
         except KeyError:
@@ -101,7 +101,8 @@ class Bound:
         self._hints_seen = 0
 
     def __repr__(self):
-        return f"exercise {self._item.id}: check it with `@ex.{self._item.id}`, or ask .hint(), .solution(), .starter(), .reset()"
+        name = self._item.id
+        return f"exercise {name}: check with `@ex.{name}`, or ask .hint(), .solution(), .starter(), .reset()"
 
     def __call__(self, answer, unit=None):
         """Check an answer, say what came out, and return what later cells go on with: the answer, or the reference."""
@@ -223,7 +224,8 @@ def ask(chapter, item, answer, reveal):
     locked = [e["answer"] for e in progress.of(chapter.name, item.id) if e["event"] == "predicted" and "answer" in e]
     if is_strict():
         if engine.is_blank(answer) or not item.is_right(item.read(answer)):
-            raise NotCorrect(f"{item.id}: the prediction is {TODO if engine.is_blank(answer) else 'not the right one'}")
+            missing = TO_DO if engine.is_blank(answer) else "not the right one"
+            raise NotCorrect(f"{item.id}: the prediction is {missing}")
         locked = []
     given = None
     if not engine.is_blank(answer):
@@ -241,7 +243,7 @@ def ask(chapter, item, answer, reveal):
 
 
 def _locked_panel(chapter, item, choice, first):
-    if first and not is_strict():
+    if first:
         progress.record(chapter.name, item.id, "predicted", answer=choice)
     unit = f" {item.unit}" if item.unit else ""
     verdict = "That is what happens." if item.is_right(choice) else f"What happens: {item.answer}{unit}."
@@ -250,7 +252,7 @@ def _locked_panel(chapter, item, choice, first):
 
 def _question(chapter, item, reveal):
     """The question with a button for each choice; a click locks it in and puts the figure beneath."""
-    text = ipywidgets.HTML(Panel(f"{item.id}: predict first", [item.question], TODO).html())
+    text = ipywidgets.HTML(Panel(f"{item.id}: predict first", [item.question], TO_DO).html())
     answers = ipywidgets.HBox(layout=ipywidgets.Layout(flex_flow="row wrap"))
     box = Named(
         [text, answers], f"[predict first: {item.question} {' | '.join(map(str, item.choices))}]".replace(" ]", "]")
@@ -296,7 +298,7 @@ class CourseMap:
         rows = "".join(
             f'<tr><td style="text-align:right">{c.name[:2].lstrip("0") or "0"}</td>'
             f'<td style="text-align:left"><a href="{c.notebook}.ipynb">{html.escape(c.title)}</a></td>'
-            f'<td style="text-align:left"><progress value="{done}" max="{total}" aria-label="{html.escape(c.title)}"></progress></td>'
+            f'<td><progress value="{done}" max="{total}" aria-label="{html.escape(c.title)}"></progress></td>'
             f"<td>{done} of {total}</td></tr>"
             for c, done, total in overview()
         )

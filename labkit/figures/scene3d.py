@@ -52,11 +52,16 @@ class View:
 
 
 class Scene:
-    """Things in space on one axes. `radius` is half the height of what is visible, in the unit of the points."""
+    """Things in space on one axes.
 
-    def __init__(self, ax, radius, title=""):
+    radius : half the height of what is visible, in the unit of the points; half_width : the same across, by default alike.
+    """
+
+    def __init__(self, ax, radius, title="", half_width=None):
         style.bare(ax, title)
-        ax.set(xlim=(-radius, radius), ylim=(-radius, radius))
+        half_width = half_width or radius
+        ax.set(xlim=(-half_width, half_width), ylim=(-radius, radius))
+        ax.set_aspect("equal", adjustable="box")
         self.ax, self.radius, self.items, self.artists = ax, radius, [], []
 
     def _add(self, item):

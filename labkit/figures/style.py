@@ -100,11 +100,10 @@ def axes(ax, xlabel="", ylabel="", title="", equal=False, grid=True):
 
 
 def bare(ax, title=""):
-    """An axes without ticks, frame and grid, both directions to the same scale: for drawings and 3D scenes. Returns ax."""
+    """An axes without ticks, frame and grid: for words, drawings and 3D scenes. Returns ax."""
     ax.set(xticks=[], yticks=[], title=title)
     ax.grid(False)
     ax.set_frame_on(False)
-    ax.set_aspect("equal", adjustable="datalim")
     return ax
 
 

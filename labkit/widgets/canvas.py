@@ -11,14 +11,15 @@ from time import monotonic
 
 import numpy as np
 from matplotlib.backend_bases import GraphicsContextBase
-from matplotlib.backends.backend_agg import FigureCanvasAgg, RendererAgg
+from matplotlib.backends.backend_agg import FigureCanvasAgg, RendererAgg, get_hinting_flag
 from matplotlib.figure import Figure
 
 from ..figures import style
 
 CSS_DPI = 100  # a figure inch is 100 CSS pixels: 10 pt text is as large as the notebook's own
 MAX_RATIO = 2.5  # device pixels per CSS pixel; sharper screens see no difference
-MIN_SCALE = 0.72  # a narrower cell shrinks the whole picture, letters too, instead of crowding it further
+MIN_SCALE = 0.85  # a narrower cell shrinks the whole picture, letters too, instead of crowding it further
+MAX_WORDS = 3000  # bitmaps a figure keeps
 
 DRAWING = threading.RLock()  # widget messages may arrive on another thread than the cells, and matplotlib is not thread-safe
 
@@ -40,13 +41,49 @@ def _dark_rows(colors):
     return colors
 
 
+class _Renderer(RendererAgg):
+    """Agg that keeps the bitmaps of the words it has drawn: laying out and drawing ten letters takes matplotlib 1 ms and more."""
+
+    def __init__(self, *args):
+        super().__init__(*args)
+        self._words = {}
+
+    def _word(self, s, prop):
+        """(bitmap, left, down, width, height, descent) of a word at its own baseline, in pixels."""
+        key = s, hash(prop)
+        if key not in self._words:
+            font = self._prepare_font(prop)
+            font.set_text(s, 0.0, flags=get_hinting_flag())
+            width, height = font.get_width_height()
+            descent = font.get_descent()
+            font.draw_glyphs_to_bitmap(antialiased=True)
+            left, down = font.get_bitmap_offset()
+            if len(self._words) >= MAX_WORDS:
+                self._words.clear()
+            self._words[key] = (
+                np.array(font.get_image()), left / 64, (down + descent) / 64, width / 64, height / 64, descent / 64
+            )  # fmt: skip
+        return self._words[key]
+
+    def draw_text(self, gc, x, y, s, prop, angle, ismath=False, mtext=None):
+        if ismath or angle:
+            return super().draw_text(gc, x, y, s, prop, angle, ismath, mtext)
+        bitmap, left, down = self._word(s, prop)[:3]
+        self._renderer.draw_text_image(bitmap, round(x + left), round(y + down) + 1, 0, gc)
+
+    def get_text_width_height_descent(self, s, prop, ismath):
+        if ismath:
+            return super().get_text_width_height_descent(s, prop, ismath)
+        return self._word(s, prop)[3:]
+
+
 class _DarkContext(GraphicsContextBase):
     def set_foreground(self, fg, isRGBA=False):
         super().set_foreground(fg, isRGBA)
         self._rgb = _dark(self._rgb)
 
 
-class _DarkRenderer(RendererAgg):
+class _DarkRenderer(_Renderer):
     """Agg with every color of `style.DARK` exchanged at the moment of drawing, so that figures stay free of themes."""
 
     def new_gc(self):
@@ -76,7 +113,7 @@ class _Canvas(FigureCanvasAgg):
         width, height = self.get_width_height(physical=True)
         key = width, height, self.figure.dpi, self.dark
         if key != self._lastKey:
-            self.renderer = (_DarkRenderer if self.dark else RendererAgg)(width, height, self.figure.dpi)
+            self.renderer = (_DarkRenderer if self.dark else _Renderer)(width, height, self.figure.dpi)
             self._lastKey = key
         return self.renderer
 

@@ -117,7 +117,7 @@ class slider:
             "value": self.value,
             "description": self.label or name,
             "style": {"description_width": "initial"},
-            "layout": {"width": "22em", "max_width": "100%"},
+            "layout": _wide(self.label or name),
         }
         if self.integer:
             return ipywidgets.IntSlider(min=self.low, max=self.high, step=self.step or 1, **options)
@@ -398,7 +398,7 @@ class Stage(ipywidgets.VBox):
         self._play_widget.observe(lambda change: self._on_time(change["new"] * self._play.dt), "value")
         self._time = ipywidgets.FloatSlider(
             min=0.0, max=self._play.t_max, step=self._play.dt, description="t (s)", readout_format=".2f", disabled=bool(self._advance),
-            style={"description_width": "initial"}, layout={"width": "22em", "max_width": "100%"},
+            style={"description_width": "initial"}, layout=_wide("t (s)"),
         )  # fmt: skip
         self._time.observe(lambda change: self._on_time(change["new"]), "value")
         return _row([self._play_widget, self._time])
@@ -525,6 +525,11 @@ class Stage(ipywidgets.VBox):
     def _repr_mimebundle_(self, **kwargs):
         bundle = super()._repr_mimebundle_(**kwargs)
         return {**bundle, "text/plain": self._text, "image/png": self.png()}
+
+
+def _wide(label):
+    """Room for a label, the track of a slider and its number."""
+    return {"width": f"{18 + 0.55 * len(label):.0f}em", "max_width": "100%"}
 
 
 def _frozen(array):
