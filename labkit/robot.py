@@ -310,3 +310,42 @@ def rotation_only(robot, T_FE, start, axes, angle, duration, rate):
     if not reached.all():
         raise ValueError(f"the motion cannot be reached: {np.count_nonzero(~reached)} of {len(time)} poses, first at {time[~reached][0]:.2f} s")
     return time, q
+
+
+def reach_position(robot, position, start, joints=(0, 1, 2), iterations=40):
+    """Joint angles that bring the flange to a position with some joints alone; the others stay as in `start`.
+
+    Parameters
+    ----------
+    position : array-like, shape (3,), mm, in B
+    start : array-like, shape (n,), rad
+    joints : tuple of three indices
+
+    Returns
+    -------
+    q : array, shape (n,)
+        Inside the joint limits. Out of reach, the flange stops as close as damped least squares brings it.
+    """
+    position, q = as_points(position, "position"), np.array(as_points(start, "start", dim=len(robot.dh)))
+    joints = list(joints)
+    best, best_size = q.copy(), np.inf
+    for _ in range(iterations):
+        frames = link_frames(robot.dh, q)
+        gap = position - frames[-1, :3, 3]
+        size = float(np.linalg.norm(gap))
+        if size < best_size:
+            best, best_size = q.copy(), size
+        if size < 1e-6:
+            break
+        J = _jacobian(frames)[3:, joints]
+        step = np.linalg.solve(J.T @ J + (1e-6 + min(size, 100.0) * 10) * np.eye(len(joints)), J.T @ gap)
+        q[joints] += step * min(1.0, 0.3 / max(np.abs(step).max(), 1e-12))
+        q = np.clip(q, robot.q_min, robot.q_max)
+    return best
+
+
+def arm_points(robot, q):
+    """Where to draw the arm: base, axis 2, shoulder, elbow, wrist, flange; (n,) -> (6, 3), mm."""
+    frames = link_frames(robot.dh, q)
+    shoulder = frames[1, :3, 3] + robot.dh[1, 1] * frames[1, :3, 2]
+    return np.array([frames[0, :3, 3], frames[1, :3, 3], shoulder, frames[2, :3, 3], frames[4, :3, 3], frames[6, :3, 3]])

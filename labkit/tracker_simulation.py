@@ -7,13 +7,14 @@ latency. Everything drawn is drawn from `rng`; the systematic error is the room'
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import count
 
 import numpy as np
 
 from .frames import invert, matrix_from_quaternion, pose
 from .lie import exp_so3
 from .robot import HOME, RAMP, TX40, forward_kinematics, measuring_poses, rotation_only, smooth_motion, tool_pose
-from .tracker import Log, shift_time, speeds
+from .tracker import POSITION, TIME, Log, encode_packet, packet_from_pose, shift_time, speeds
 
 RATE = 250.0  # Hz, wireless (report, section 2)
 STOPS, STOP_TIME, RUNS = 21, 4.0, 6  # report, section 3.1
@@ -125,11 +126,11 @@ def calibration_run(rng, tracker=None, joints=None, rate=5.0, lost_stop=None):
     """
     tracker = tracker or RESTING
     joints = measuring_joints() if joints is None else joints
-    count = int(STOP_TIME * rate)
+    readings = int(STOP_TIME * rate)
     T_BE = tool_pose(TX40, joints, T_FE)
     drift = rng.normal(size=(len(joints), 6)) * np.repeat([tracker.drift_rotation, tracker.drift_position], 3)
-    stop = np.repeat(np.arange(len(joints)), count)
-    time = np.repeat(5.0 * np.arange(len(joints)), count) + np.tile(np.arange(count) / rate, len(joints))
+    stop = np.repeat(np.arange(len(joints)), readings)
+    time = np.repeat(5.0 * np.arange(len(joints)), readings) + np.tile(np.arange(readings) / rate, len(joints))
     T = tracker.read(T_BE[stop], rng, drift[stop])
     reset = T[0].copy()
     T, _ = tracker.spoil(T, rng)
@@ -191,3 +192,26 @@ def motion_speeds(name):
 def flange_poses(joints):
     """T_BF of joint positions (rad)."""
     return forward_kinematics(TX40.dh, joints)
+
+
+def endless_packets(rng, nonsense=lambda: False, tracker=None):
+    """Packets of a tracker that is carried through the slow motion again and again; a generator without an end.
+
+    `nonsense()` is asked at every packet whether bursts of nonsense may begin, so that it can be switched while the stream runs.
+    """
+    tracker = tracker or MOVING
+    time, q = robot_motion("slow")
+    T_BE = tool_pose(TX40, q, T_FE)
+    T_WE = invert(T_BE[0]) @ tracker.read(T_BE, rng)
+    values = packet_from_pose(T_WE[:-1], 0.0)
+    left, shift = 0, np.zeros(3)
+    for k in count():
+        row = values[k % len(values)].copy()
+        row[TIME] = k / RATE
+        if left == 0 and nonsense() and rng.random() < tracker.nonsense:
+            left, direction = int(rng.geometric(1 / tracker.burst)), rng.normal(size=3)
+            shift = tracker.jump * direction / np.linalg.norm(direction) / 1000
+        if left:
+            left -= 1
+            row[POSITION] += shift
+        yield encode_packet(row)

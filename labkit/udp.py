@@ -112,6 +112,14 @@ class Sender:
             self.sent[kind] += 1
         self.finished.set()
 
+    def flush(self, listener, seconds=3.0):
+        """Wait until a listener has seen everything that was sent so far; True when it has."""
+        until = clock.perf_counter() + seconds
+        total = sum(number for kind, number in self.sent.items() if kind not in ("lost", "refused"))
+        while listener.statistics().datagrams < total and clock.perf_counter() < until:
+            clock.sleep(0.005)
+        return listener.statistics().datagrams >= total
+
     def close(self):
         """Stop sending and free the socket."""
         self._stop.set()
