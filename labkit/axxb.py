@@ -1,11 +1,11 @@
 """A X = X B: where a sensor sits on a flange, from motions alone.
 
-`T_BF` is the flange F in the robot's base B, `T_ST` the target T as the sensor S sees it, `T_FS` the mounting looked for; the closed loop says
-T_BF T_FS T_ST = T_BT for every pose. Lengths mm, angles rad.
+`T_BF` is the flange F in the robot's base B, `T_ST` the target T as the sensor S sees it, `T_FS` the mounting looked
+for; the closed loop says T_BF T_FS T_ST = T_BT for every pose. Lengths mm, angles rad.
 
-`solve_ax_xb` is the method of the report (ZCU Plzen 2018, section 3.1, equations 4 to 16), rotation first, then translation. `calibrate_hand_eye` is the
-maximum-likelihood estimate for noise on the sensor's readings. Its cost depends on the N poses through two small matrices only, so an iteration
-takes the same time for 20 poses and for 20000.
+`solve_ax_xb` is the method of the report (ZCU Plzen 2018, section 3.1, equations 4 to 16), rotation first, then
+translation. `calibrate_hand_eye` is the maximum-likelihood estimate for noise on the sensor's readings. Its cost
+depends on the N poses through two small matrices only, so an iteration takes the same time for 20 poses and for 20000.
 """
 
 import numpy as np
@@ -15,9 +15,12 @@ from .frames import pose
 from .handeye_result import HandEye
 from .lie import log_so3, nearest_rotation, skew
 
-RELATIVE_RANK = 1e-6  # second smallest singular value of the Kronecker matrix relative to the largest: below it the axes are parallel
+RELATIVE_RANK = 1e-6  # second smallest singular value of the Kronecker matrix a motion: below it the axes are parallel
 MIN_ANGLE_STD, MIN_LENGTH_STD = 1e-9, 1e-9  # rad, and relative to the lengths: noise-free data must not divide by zero
-MAX_STEPS, STEP_TOLERANCE = 30, 1e-8  # rad; the step is taken before it is judged, and the next one would be 1000 times smaller
+MAX_STEPS, STEP_TOLERANCE = (
+    30,
+    1e-8,
+)  # rad; the step is taken before it is judged, and the next one would be 1000 times smaller
 TUKEY, STARTS = 5.2, 12  # cut-off in robust standard deviations of the 6-vector; loose rounds before it is applied
 
 _GENERATORS = skew(np.eye(3))  # (3, 3, 3): d/dphi_k exp(phi) at 0
@@ -44,13 +47,15 @@ def kronecker_matrix(A, B):
 
 
 def rotation_from_kronecker(M):
-    """Rotation of the null vector of M: smallest singular vector, sign by det > 0, projected to SO(3); equations (10) to (12).
+    """Rotation of the null vector of M: smallest singular vector, sign by det > 0, projected to SO(3); equations (10)
+    to (12).
 
     Returns
     -------
     R : array, shape (3, 3)
     singular_values : array, shape (9,), largest first
-        The last one is 0 for exact data. When the last but one is as small, the rotation axes are parallel and R is arbitrary.
+        The last one is 0 for exact data. When the last but one is as small, the rotation axes are parallel and R is
+        arbitrary.
     """
     _, values, Vt = np.linalg.svd(np.asarray(M).T @ M)
     X = Vt[-1].reshape(3, 3, order="F")
@@ -74,14 +79,16 @@ def translation_from_motions(A, B, R):
 
 
 def solve_ax_xb(A, B):
-    """Mounting from motion pairs by the report's method: Kronecker product and SVD for the rotation, then least squares.
+    """Mounting from motion pairs by the report's method: Kronecker product and SVD for the rotation, then least
+    squares.
 
     Parameters
     ----------
     A : array-like, shape (N, 4, 4)
         Motions of the flange, T_F1F2. The report calls them B (its equation 6).
     B : array-like, shape (N, 4, 4)
-        The same motions as the sensor saw itself move, T_S1S2; the report's A. N >= 2 with rotation axes that are not parallel.
+        The same motions as the sensor saw itself move, T_S1S2; the report's A. N >= 2 with rotation axes that are not
+        parallel.
 
     Returns
     -------
@@ -120,26 +127,32 @@ def calibrate_hand_eye(T_BF, T_ST, std_rot=None, std_trans=None, robust=False):
     std_rot, std_trans : float, optional
         Standard deviation of a reading per axis, rad and mm. What is not given is estimated together with the mounting.
     robust : bool
-        Down-weight and finally ignore readings that fit nothing (Tukey's biweight over the six normalized residuals, scale by the median).
+        Down-weight and finally ignore readings that fit nothing (Tukey's biweight over the six normalized residuals,
+        scale by the median).
 
     Returns
     -------
     HandEye
-        target is T_BT, shape (4, 4). residuals, shape (N, 6): rotation vector (rad) and translation (mm, in S) of the reading against the prediction.
-        covariance, shape (12, 12): T_FS first (rotation vector about the axes of S, translation in F), T_BT after it (axes of T, translation in B).
-        trace, shape (steps, 3): std_rot, std_trans and the size of the step.
+        target is T_BT, shape (4, 4). residuals, shape (N, 6): rotation vector (rad) and translation (mm, in S) of the
+        reading against the prediction. covariance, shape (12, 12): T_FS first (rotation vector about the axes of S,
+        translation in F), T_BT after it (axes of T, translation in B). trace, shape (steps, 3): std_rot, std_trans and
+        the size of the step.
 
     Raises
     ------
     ValueError
         When the stacks differ, N < 3, or the data leave a direction of the mounting undetermined.
 
-    The start is linear: rotations by the singular vectors of one 9 x 9 matrix (Shah 2013), translations by least squares.
+    The start is linear: rotations by the singular vectors of one 9 x 9 matrix (Shah 2013), translations by least
+    squares.
     """
     T_BF, T_ST = as_transforms(T_BF, "T_BF"), as_transforms(T_ST, "T_ST")
     if T_BF.ndim != 3 or T_BF.shape != T_ST.shape or len(T_BF) < 3:
         raise ValueError(f"T_BF and T_ST must both have shape (N, 4, 4) with N >= 3, got {T_BF.shape} and {T_ST.shape}")
-    given = tuple(None if std is None else float(as_positive(std, name)) for std, name in ((std_rot, "std_rot"), (std_trans, "std_trans")))
+    given = tuple(
+        None if std is None else float(as_positive(std, name))
+        for std, name in ((std_rot, "std_rot"), (std_trans, "std_trans"))
+    )
     problem = _Problem(T_BF, T_ST, given)
     weights = np.ones(len(T_BF))
     state = problem.fit(weights, problem.start(weights))
@@ -223,7 +236,8 @@ class _Problem:
         return Rx, Ry, tx, ty
 
     def stds(self, cost_r, cost_t, freedom):
-        """Noise levels: as given, or from the residuals, a quarter of the unknowns charged to each of the four blocks."""
+        """Noise levels: as given, or from the residuals, a quarter of the unknowns charged to each of the four
+        blocks."""
         std_r = self.given[0] or max(max(cost_r, 0.0) / freedom, MIN_ANGLE_STD**2) ** 0.5
         std_t = self.given[1] or max(max(cost_t, 0.0) / freedom, (MIN_LENGTH_STD * self.size) ** 2) ** 0.5
         return std_r, std_t
@@ -238,7 +252,8 @@ class _Problem:
         return turn, (np.swapaxes(RX, 1, 2) @ e[:, :, None])[..., 0]
 
     def information(self, weights, Rx):
-        """Normal matrices of the twelve unknowns for noise of size 1, rotations and translations apart, from sums in closed form."""
+        """Normal matrices of the twelve unknowns for noise of size 1, rotations and translations apart, from sums in
+        closed form."""
         total = weights.sum()
         A_sum, R_sum = (weights @ self.A.reshape(-1, 9)).reshape(3, 3), (weights @ self.R.reshape(-1, 9)).reshape(3, 3)
         aw = self.a * weights[:, None]
@@ -257,7 +272,8 @@ class _Problem:
         return N_r, N_t
 
     def result(self, weights, state):
-        """Residuals, noise levels and covariance at the solution; each noise level pays for the share of the unknowns it determines."""
+        """Residuals, noise levels and covariance at the solution; each noise level pays for the share of the unknowns
+        it determines."""
         turn, e = self.residuals(state)
         cost_r, cost_t = weights @ (turn * turn).sum(1), weights @ (e * e).sum(1)
         N_r, N_t = self.information(weights, state[0])
@@ -278,16 +294,20 @@ class _Problem:
         Rx, Ry, tx, ty = state
         T = np.zeros((2, 4, 4))
         T[0, :3, :3], T[1, :3, :3], T[0, :3, 3], T[1, :3, 3], T[:, 3, 3] = Rx, Ry, tx, ty, 1.0
-        return HandEye(T[0], T[1], np.concatenate([turn, e], 1), covariance, np.sqrt(values[::-1]), weights, np.array(self.trace))
+        return HandEye(
+            T[0], T[1], np.concatenate([turn, e], 1), covariance, np.sqrt(values[::-1]), weights, np.array(self.trace)
+        )
 
 
 _UNDETERMINED = (
-    "T_BF leaves a direction of the mounting undetermined: the rotation axes of all motions are parallel, or the poses do not turn"
+    "T_BF leaves a direction of the mounting undetermined: the rotation axes of all motions are parallel, "
+    "or the poses do not turn"
 )
 
 
 def _turned(R, phi):
-    """R, shape (n, 3, 3), turned by phi, shape (n, 3), about its own axes, by Cayley's map: exactly orthonormal, equal to the exponential up to |phi|^3 / 12."""
+    """R, shape (n, 3, 3), turned by phi, shape (n, 3), about its own axes, by Cayley's map: exactly orthonormal, equal
+    to the exponential up to |phi|^3 / 12."""
     S = (phi @ _GENERATORS.reshape(3, 9)).reshape(R.shape)
     return R @ (_I3 + (S + 0.5 * (S @ S)) / (1.0 + 0.25 * (phi * phi).sum(-1))[:, None, None])
 

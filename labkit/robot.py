@@ -1,22 +1,27 @@
-"""A serial robot in the Denavit-Hartenberg convention: forward kinematics, Jacobian, numeric inverse, smooth motions; the Staubli TX40.
+"""A serial robot in the Denavit-Hartenberg convention: forward kinematics, Jacobian, numeric inverse, smooth motions;
+the Staubli TX40.
 
-Joint angles `q` are radians with shape (..., n), lengths mm. `T_BF` is the pose of the flange F (the report's frame 6) in the base B. Frame i sits at the end
-of link i and turns with joint i; the first factor of link i turns about the z axis of frame i - 1.
-Source: report "Kalibrace a testovani systemu OTUS tracker", ZCU Plzen 2018, appendices B and C; Denavit and Hartenberg (1955), its reference [2].
+Joint angles `q` are radians with shape (..., n), lengths mm. `T_BF` is the pose of the flange F (the report's frame 6)
+in the base B. Frame i sits at the end of link i and turns with joint i; the first factor of link i turns about the z
+axis of frame i - 1.
+Source: report "Kalibrace a testovani systemu OTUS tracker", ZCU Plzen 2018, appendices B and C; Denavit and Hartenberg
+(1955), its reference [2].
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from .checks import as_finite, as_points, as_positive, as_transforms
 from .frames import invert, pose
-from .lie import log_so3
+from .lie import exp_so3, log_so3
 
-# What the data sheet prints (appendix B): reaches in mm. R.b is axis 3 to axis 5, R.M is axis 1 to axis 5, then axis 1 to axis 6.
+# What the data sheet prints (appendix B): reaches in mm. R.b is axis 3 to axis 5, R.M is axis 1 to axis 5, then axis 1
+# to axis 6.
 REACH_FOREARM, REACH_WRIST, REACH_FLANGE = 225.0, 450.0, 515.0
-# Not in the text of the report, whose drawings are lost: taken from the PyPI package robotkinematicscatalogue 1.1.2, which lists the TX40 with
-# the same three link lengths and joint limits.
+# Not in the text of the report, whose drawings are lost: taken from the PyPI package robotkinematicscatalogue 1.1.2,
+# which lists the TX40 with the same three link lengths and joint limits.
 SHOULDER_OFFSET, BASE_HEIGHT = 35.0, 320.0
 RAMP = 0.12  # share of a motion's time spent on getting up to speed, and on slowing down
 
@@ -63,7 +68,8 @@ def dh_matrix(theta, d, a, alpha):
 
 
 def link_frames(dh, q):
-    """Poses of the base and of every link, (..., n) -> (..., n + 1, 4, 4); the first is the identity, the last is the flange."""
+    """Poses of the base and of every link, (..., n) -> (..., n + 1, 4, 4); the first is the identity, the last is the
+    flange."""
     dh, q = _as_dh(dh), as_finite(q, "q")
     if q.ndim < 1 or q.shape[-1] != len(dh):
         raise ValueError(f"q must have shape (..., {len(dh)}), one angle a joint, got {q.shape}")
@@ -95,7 +101,8 @@ def forward_kinematics(dh, q):
 
 
 def jacobian(dh, q):
-    """Geometric Jacobian, shape (..., 6, n): joint rates to angular velocity (rows 0-2) and velocity of the flange (3-5), both in B."""
+    """Geometric Jacobian, shape (..., 6, n): joint rates to angular velocity (rows 0-2) and velocity of the flange
+    (3-5), both in B."""
     return _jacobian(link_frames(dh, q))
 
 
@@ -112,7 +119,8 @@ def inverse_kinematics(robot, T_BF, start, iterations=60, tolerance=1e-9):
     ----------
     T_BF : array-like, shape (..., 4, 4)
     start : array-like, shape (n,) or (..., n)
-        Where the search begins. A start near the solution picks the branch (elbow, wrist); one start for a whole path keeps the path smooth.
+        Where the search begins. A start near the solution picks the branch (elbow, wrist); one start for a whole path
+        keeps the path smooth.
     iterations : int
         At most so many steps. tolerance: stop when every pose is closer than this (rad, and mm per 200 mm of arm).
 
@@ -159,8 +167,9 @@ def within_limits(robot, q):
 def measuring_poses(robot, rng, count=21, center=None, spread=(0.5, 0.35, 0.35, 0.9, 0.7, 0.9), box=None, facing=0.3):
     """Joint angles of reachable measuring poses about a center pose, the first being the center itself.
 
-    Drawn uniformly within `spread` (rad) about `center`; kept when the limits hold, the flange lies in the `box` (two corners in B, mm) and its z axis still
-    points to the base stations overhead (component along z of B at least `facing`).
+    Drawn uniformly within `spread` (rad) about `center`; kept when the limits hold, the flange lies in the `box` (two
+    corners in B, mm) and its z axis still points to the base stations overhead (component along z of B at least
+    `facing`).
     """
     center = HOME if center is None else as_points(center, "center", dim=len(robot.dh))
     box = np.array([[-600.0] * 3, [600.0, 600.0, 1000.0]]) if box is None else as_finite(box, "box")
@@ -192,11 +201,9 @@ def smooth_motion(via, duration, rate):
     time : array, shape (k,), s
     q : array, shape (k, n), rad
 
-    A natural-looking stand-in for "prujezd nekolika body s polynomialnim napojovanim" (report, section 3.2): a cubic spline through the points, run along by a
-    polynomial of degree 5 at both ends.
+    A natural-looking stand-in for "prujezd nekolika body s polynomialnim napojovanim" (report, section 3.2): a cubic
+    spline through the points, run along by a polynomial of degree 5 at both ends.
     """
-    from scipy.interpolate import CubicSpline
-
     via = as_finite(via, "via")
     duration, rate = float(as_positive(duration, "duration")), float(as_positive(rate, "rate"))
     if via.ndim != 2 or len(via) < 2:
@@ -206,7 +213,8 @@ def smooth_motion(via, duration, rate):
 
 
 def _ramp(s, ends=RAMP):
-    """Path parameter 0..1 over normalized time 0..1: constant speed, with smooth starts and stops over the share `ends`."""
+    """Path parameter 0..1 over normalized time 0..1: constant speed, with smooth starts and stops over the share
+    `ends`."""
     u = np.minimum(np.minimum(s, 1 - s) / ends, 1.0)
     eased = ends * (u**4 * (2.5 - 3 * u + u**2))  # integral of the quintic smoothstep 10u^3 - 15u^4 + 6u^5
     flat = np.maximum(np.minimum(s, 1 - s) - ends, 0.0)
@@ -228,12 +236,14 @@ def _as_dh(dh):
 
 
 def _tx40():
-    """The TX40, its lengths derived from the printed reaches: forearm = R.b, upper arm = R.M - R.b, wrist to flange = 515 - R.M.
+    """The TX40, its lengths derived from the printed reaches: forearm = R.b, upper arm = R.M - R.b, wrist to flange =
+    515 - R.M.
 
-    The last one agrees with "d_6 = 0.065" (m) in appendix C. The shoulder offset and the height of axis 2 come from elsewhere (see the top of this module); the
-    height cancels from every difference of poses. The zero position, arm upright, is the manufacturer's. Joint limits: appendix B.
-    Joint speeds: the text of appendix B is garbled at axes 1 to 3 ("EEE", "175", "595" deg/s). All three are held to 175 deg/s here, the smallest reading: a
-    motion that keeps it keeps every plausible one.
+    The last one agrees with "d_6 = 0.065" (m) in appendix C. The shoulder offset and the height of axis 2 come from
+    elsewhere (see the top of this module); the height cancels from every difference of poses. The zero position, arm
+    upright, is the manufacturer's. Joint limits: appendix B.
+    Joint speeds: the text of appendix B is garbled at axes 1 to 3 ("EEE", "175", "595" deg/s). All three are held to
+    175 deg/s here, the smallest reading: a motion that keeps it keeps every plausible one.
     """
     upper, wrist = REACH_WRIST - REACH_FOREARM, REACH_FLANGE - REACH_WRIST
     quarter = np.pi / 2
@@ -254,7 +264,9 @@ def _tx40():
 
 
 TX40 = _tx40()
-HOME = np.deg2rad([0.0, 20.0, 95.0, 0.0, -70.0, 0.0])  # arm bent, flange above the forearm: the pose in which the tracker is referenced
+HOME = np.deg2rad(
+    [0.0, 20.0, 95.0, 0.0, -70.0, 0.0]
+)  # arm bent, flange above the forearm: the pose in which the tracker is referenced
 
 
 def wrist_reach(robot, q):
@@ -263,7 +275,8 @@ def wrist_reach(robot, q):
     Returns
     -------
     in_plane, shoulder, elbow : arrays, shape (...)
-        Horizontal distance from axis 1 measured in the plane of the arm (without the shoulder offset), distance from axis 2, distance from axis 3.
+        Horizontal distance from axis 1 measured in the plane of the arm (without the shoulder offset), distance from
+        axis 2, distance from axis 3.
     """
     frames = link_frames(robot.dh, q)
     wrist, elbow = frames[..., 4, :3, 3], frames[..., 2, :3, 3]
@@ -295,8 +308,6 @@ def rotation_only(robot, T_FE, start, axes, angle, duration, rate):
 
     Raises ValueError when a pose of the motion cannot be reached. Source: report, section 3.2, measurement 4.
     """
-    from .lie import exp_so3
-
     axes = as_points(axes, "axes")
     time = np.arange(round(duration * rate) + 1) / rate
     share = np.minimum(time / duration * len(axes), len(axes) - 1e-9)
@@ -308,7 +319,10 @@ def rotation_only(robot, T_FE, start, axes, angle, duration, rate):
     T_BF = pose(R, np.broadcast_to(T_BE[:3, 3], (len(time), 3))) @ invert(T_FE)
     q, reached = inverse_kinematics(robot, T_BF, start)
     if not reached.all():
-        raise ValueError(f"the motion cannot be reached: {np.count_nonzero(~reached)} of {len(time)} poses, first at {time[~reached][0]:.2f} s")
+        raise ValueError(
+            f"the motion cannot be reached: {np.count_nonzero(~reached)} of {len(time)} poses, first at "
+            f"{time[~reached][0]:.2f} s"
+        )
     return time, q
 
 
@@ -348,4 +362,6 @@ def arm_points(robot, q):
     """Where to draw the arm: base, axis 2, shoulder, elbow, wrist, flange; (n,) -> (6, 3), mm."""
     frames = link_frames(robot.dh, q)
     shoulder = frames[1, :3, 3] + robot.dh[1, 1] * frames[1, :3, 2]
-    return np.array([frames[0, :3, 3], frames[1, :3, 3], shoulder, frames[2, :3, 3], frames[4, :3, 3], frames[6, :3, 3]])
+    return np.array(
+        [frames[0, :3, 3], frames[1, :3, 3], shoulder, frames[2, :3, 3], frames[4, :3, 3], frames[6, :3, 3]]
+    )

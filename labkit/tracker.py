@@ -1,7 +1,8 @@
 """A tracker on a robot flange: its packets, its logs, where it sits on the flange, and how well it follows a motion.
 
-E is the frame of the tracker, W the frame in which it reports (its own pose at the moment its axes were reset), so a reading is `T_WE`. `T_FE` is the mounting on
-the flange F. Packets and logs speak meters, as the report does; everything else here is mm and rad.
+E is the frame of the tracker, W the frame in which it reports (its own pose at the moment its axes were reset), so a
+reading is `T_WE`. `T_FE` is the mounting on the flange F. Packets and logs speak meters, as the report does; everything
+else here is mm and rad.
 Source: report "Kalibrace a testovani systemu OTUS tracker", ZCU Plzen 2018: table 1, sections 3.1 and 3.2, appendix D.
 """
 
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation, Slerp
 
 from .axxb import kronecker_matrix, rotation_from_kronecker, translation_from_motions
 from .checks import as_finite, as_points, as_positive, as_transforms
@@ -21,8 +22,9 @@ from .lie import log_so3
 
 # ---- the packet ------------------------------------------------------------------------------------------------------
 
-# The one assumption about types: table 1 gives 8 bytes a field and nothing else. All 23 are taken as IEEE doubles, little-endian, lengths in meters (appendix D
-# prints meters), time in seconds, angles in radians; identifier and buttons too.
+# The one assumption about types: table 1 gives 8 bytes a field and nothing else. All 23 are taken as IEEE doubles,
+# little-endian, lengths in meters (appendix D prints meters), time in seconds, angles in radians; identifier and
+# buttons too.
 PACKET = struct.Struct("<23d")
 FIELDS = (
     "device", "time", "x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az", "qx", "qy", "qz", "qw",
@@ -55,7 +57,8 @@ def decode_packet(data):
     Raises
     ------
     ValueError
-        When the length is wrong, a number is not finite, the quaternion is not of length 1 or the position is more than 10 m away.
+        When the length is wrong, a number is not finite, the quaternion is not of length 1 or the position is more than
+        10 m away.
 
     Source: report, section 2, table 1.
     """
@@ -66,7 +69,8 @@ def decode_packet(data):
 
 
 def check_packet(data):
-    """(values, "") of a good packet, (None, reason) of a bad one; plain Python, since the receiver calls it for every datagram."""
+    """(values, "") of a good packet, (None, reason) of a bad one; plain Python, since the receiver calls it for every
+    datagram."""
     if len(data) != PACKET.size:
         return None, f"length: expected {PACKET.size} bytes"
     values = PACKET.unpack(data)
@@ -82,7 +86,8 @@ def check_packet(data):
 
 
 def packet_from_pose(T_WE, time, device=1, velocity=(0.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, 0.0)):
-    """The 23 numbers for a pose in mm; velocity in mm/s, angular velocity in rad/s. Broadcasts: (..., 4, 4) -> (..., 23)."""
+    """The 23 numbers for a pose in mm; velocity in mm/s, angular velocity in rad/s. Broadcasts: (..., 4, 4) -> (...,
+    23)."""
     T_WE = as_transforms(T_WE, "T_WE")
     values = np.zeros((*T_WE.shape[:-2], len(FIELDS)))
     values[..., 0], values[..., TIME] = device, time
@@ -111,7 +116,8 @@ def quaternion_from_matrix(R):
 
 @dataclass(frozen=True)
 class Log:
-    """A log of readings: time (k,) s; T_WE (k, 4, 4) in mm; stop (k,), the number of the stop each reading belongs to, or None."""
+    """A log of readings: time (k,) s; T_WE (k, 4, 4) in mm; stop (k,), the number of the stop each reading belongs to,
+    or None."""
 
     time: np.ndarray
     T_WE: np.ndarray
@@ -122,12 +128,21 @@ _LENGTHS = {"m": 1000.0, "mm": 1.0}
 
 
 def write_csv(path, log, unit="m", digits=5):
-    """Write a log. Columns: time [s], stop (where the log has stops), x y z [unit], qx qy qz qw; positions with so many decimals of a meter."""
+    """Write a log. Columns: time [s], stop (where the log has stops), x y z [unit], qx qy qz qw; positions with so many
+    decimals of a meter."""
     if unit not in _LENGTHS:
         raise ValueError(f"unit must be m or mm, got {unit!r}")
     positions = log.T_WE[:, :3, 3] / _LENGTHS[unit]
     places = digits if unit == "m" else max(digits - 3, 0)
-    header = ["time [s]", *(["stop"] if log.stop is not None else []), *(f"{c} [{unit}]" for c in "xyz"), "qx", "qy", "qz", "qw"]
+    header = [
+        "time [s]",
+        *(["stop"] if log.stop is not None else []),
+        *(f"{c} [{unit}]" for c in "xyz"),
+        "qx",
+        "qy",
+        "qz",
+        "qw",
+    ]
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
@@ -146,8 +161,9 @@ def read_csv(path):
     Raises
     ------
     ValueError
-        With the name of the file and the line: a missing or doubled column, columns in different units, a row of another length, text for a number, time that
-        does not increase, a quaternion that is none, a position that jumps by a factor of 1000 (rows in another unit), a last line cut off.
+        With the name of the file and the line: a missing or doubled column, columns in different units, a row of
+        another length, text for a number, time that does not increase, a quaternion that is none, a position that jumps
+        by a factor of 1000 (rows in another unit), a last line cut off.
     """
     path = Path(path)
     text = path.read_text(encoding="utf-8")
@@ -193,12 +209,18 @@ def _columns(header, name):
             found[title] = index
     missing = [title for title in ("time [s]", "x", "y", "z", "qx", "qy", "qz", "qw") if title not in found]
     if missing:
-        raise ValueError(f"{name}, line 1: expected a column {missing[0]!r} (x, y, z with their unit, as in 'x [m]'), got {header}")
+        raise ValueError(
+            f"{name}, line 1: expected a column {missing[0]!r} (x, y, z with their unit, as in 'x [m]'), got {header}"
+        )
     if len(set(units.values())) > 1:
         raise ValueError(f"{name}, line 1: x, y and z must share one unit, got {', '.join(units[c] for c in 'xyz')}")
     if units["x"] not in _LENGTHS:
         raise ValueError(f"{name}, line 1: lengths must be in m or mm, got {units['x']}")
-    columns = {"time": found["time [s]"], "xyz": [found[c] for c in "xyz"], "q": [found[c] for c in ("qx", "qy", "qz", "qw")]}
+    columns = {
+        "time": found["time [s]"],
+        "xyz": [found[c] for c in "xyz"],
+        "q": [found[c] for c in ("qx", "qy", "qz", "qw")],
+    }
     if "stop" in found:
         columns["stop"] = found["stop"]
     return columns, _LENGTHS[units["x"]]
@@ -217,7 +239,10 @@ def _refuse_rows(name, rows, time, p, q):
     apart = np.linalg.norm(after - before, axis=1) > 0.9 * np.maximum(size[:-1], size[1:])
     for factor in (1000.0, 0.001):
         close = np.linalg.norm(factor * after - before, axis=1) < 0.05 * size[:-1]
-        refuse(np.concatenate([[False], apart & close & (np.maximum(size[:-1], size[1:]) > 50)]), "the position jumps by a factor of 1000: another unit?")
+        refuse(
+            np.concatenate([[False], apart & close & (np.maximum(size[:-1], size[1:]) > 50)]),
+            "the position jumps by a factor of 1000: another unit?",
+        )
     refuse(size > 1000 * MAX_POSITION, f"the position is more than {MAX_POSITION:g} m away: another unit?")
 
 
@@ -225,7 +250,8 @@ def _refuse_rows(name, rows, time, p, q):
 
 
 def reject_outliers(values, factor=4.0):
-    """Which values to keep: those within `factor` robust standard deviations (1.4826 times the median absolute deviation) of the median.
+    """Which values to keep: those within `factor` robust standard deviations (1.4826 times the median absolute
+    deviation) of the median.
 
     Parameters
     ----------
@@ -283,7 +309,8 @@ class Mounting:
     """Result of `calibrate_mounting`.
 
     T_FE: array (4, 4). E_rot: equation (13), for a null vector of length 1. E_trans: equation (17), mm.
-    rotation, translation: errors of every pose as in the report's figure 8, shape (N,), rad and mm; nan for excluded poses, 0 for the reference.
+    rotation, translation: errors of every pose as in the report's figure 8, shape (N,), rad and mm; nan for excluded
+    poses, 0 for the reference.
     singular_values: of the Kronecker matrix, largest first. kept: bool array (N,).
     """
 
@@ -297,10 +324,11 @@ class Mounting:
 
 
 def calibrate_mounting(T_BF, T_WE, factor=8.0):
-    """The report's calibration: motions from the first pose, Kronecker system for the rotation, least squares for the translation.
+    """The report's calibration: motions from the first pose, Kronecker system for the rotation, least squares for the
+    translation.
 
-    Poses whose errors are gross are left out by a rule fixed beforehand: calibrate, drop the pose with the largest error if it lies more than `factor` robust
-    standard deviations above the median in translation or rotation, repeat.
+    Poses whose errors are gross are left out by a rule fixed beforehand: calibrate, drop the pose with the largest
+    error if it lies more than `factor` robust standard deviations above the median in translation or rotation, repeat.
 
     Parameters
     ----------
@@ -342,14 +370,16 @@ def _mounting(A, B, moved, kept):
 
 
 def e_rot(M):
-    """Equation (13): |M'M v| / (N - 1) for the smallest right singular vector v of M'M, length 1; N blocks of 9 rows. No unit."""
+    """Equation (13): |M'M v| / (N - 1) for the smallest right singular vector v of M'M, length 1; N blocks of 9 rows.
+    No unit."""
     M = as_finite(M, "M")
     v = np.linalg.svd(M.T @ M)[2][-1]
     return float(np.linalg.norm(M.T @ (M @ v)) / (len(M) / 9 - 1))
 
 
 def e_trans(residuals):
-    """Equation (17): |K1 t - K2| / (N - 1), the norm **not** squared; residuals, shape (N, 3), in the unit of the lengths."""
+    """Equation (17): |K1 t - K2| / (N - 1), the norm **not** squared; residuals, shape (N, 3), in the unit of the
+    lengths."""
     residuals = as_points(residuals, "residuals")
     return float(np.linalg.norm(residuals) / (len(residuals) - 1))
 
@@ -370,7 +400,8 @@ class TrackingErrors:
 def speeds(time, T):
     """Speed (mm/s) and angular speed (rad/s) of a sampled motion by central differences; (k,), (k, 4, 4) -> (k,), (k,).
 
-    Neither depends on the frame the poses are given in, as long as it rests; the angular speed not even on where the frame sits on the body.
+    Neither depends on the frame the poses are given in, as long as it rests; the angular speed not even on where the
+    frame sits on the body.
     """
     time, T = as_finite(time, "time"), as_transforms(T, "T")
     if T.ndim != 3 or len(T) < 3 or time.shape != T.shape[:1]:
@@ -390,7 +421,8 @@ def tracking_errors(time, T_true, T_read, velocities=None):
     T_true, T_read : array-like, shape (k, 4, 4)
         The tracker's frame as the robot carries it and as the tracker reports it, both in the same frame.
     velocities : pair of arrays, optional
-        The speeds (mm/s) and angular speeds (rad/s) the tracker reports; without them they come from differences of its poses.
+        The speeds (mm/s) and angular speeds (rad/s) the tracker reports; without them they come from differences of its
+        poses.
 
     Returns
     -------
@@ -430,11 +462,15 @@ def time_offset(time, reference, delayed, max_offset=0.2):
     Returns
     -------
     offset : float
-        Positive when `delayed` lags. The mean squared difference over the common part is minimized; a parabola through the best three gives the fraction.
+        Positive when `delayed` lags. The mean squared difference over the common part is minimized; a parabola through
+        the best three gives the fraction.
     """
     time, reference, delayed = as_finite(time, "time"), as_finite(reference, "reference"), as_finite(delayed, "delayed")
     if time.ndim != 1 or not time.shape == reference.shape == delayed.shape:
-        raise ValueError(f"time, reference and delayed must have the same length, got {time.shape}, {reference.shape}, {delayed.shape}")
+        raise ValueError(
+            f"time, reference and delayed must have the same length, got {time.shape}, {reference.shape}, "
+            f"{delayed.shape}"
+        )
     step = (time[-1] - time[0]) / (len(time) - 1)
     most = int(round(float(as_positive(max_offset, "max_offset")) / step))
     if most < 1 or len(time) < 3 * most:
@@ -449,18 +485,20 @@ def time_offset(time, reference, delayed, max_offset=0.2):
 
 
 def shift_time(time, T, offset):
-    """Poses as they were `offset` seconds later: positions linear, rotations along the shortest arc; ends are held. (k, 4, 4)."""
-    from scipy.spatial.transform import Slerp
-
+    """Poses as they were `offset` seconds later: positions linear, rotations along the shortest arc; ends are held. (k,
+    4, 4)."""
     time, T = as_finite(time, "time"), as_transforms(T, "T")
     when = np.clip(time + offset, time[0], time[-1])
     k = np.clip(np.searchsorted(time, when, side="right") - 1, 0, len(time) - 2)
     s = ((when - time[k]) / (time[k + 1] - time[k]))[:, None]
-    return pose(Slerp(time, Rotation.from_matrix(T[:, :3, :3]))(when).as_matrix(), (1 - s) * T[k, :3, 3] + s * T[k + 1, :3, 3])
+    return pose(
+        Slerp(time, Rotation.from_matrix(T[:, :3, :3]))(when).as_matrix(), (1 - s) * T[k, :3, 3] + s * T[k + 1, :3, 3]
+    )
 
 
 def filter_positions(time, positions, std_position=3.0, std_acceleration=4000.0, gate=16.27):
-    """Gate, then a Kalman filter with constant velocity: what the report's conclusion asks for, and the bridge to chapter 8.
+    """Gate, then a Kalman filter with constant velocity: what the report's conclusion asks for, and the bridge to
+    chapter 8.
 
     Parameters
     ----------
@@ -471,7 +509,8 @@ def filter_positions(time, positions, std_position=3.0, std_acceleration=4000.0,
     std_acceleration : float, mm/s^2
         What the hand or robot may do to the velocity.
     gate : float
-        A reading whose squared normalized innovation exceeds this is not used; 16.27 lets 99.9 % of good ones pass (chi-square, 3 degrees of freedom).
+        A reading whose squared normalized innovation exceeds this is not used; 16.27 lets 99.9 % of good ones pass
+        (chi-square, 3 degrees of freedom).
 
     Returns
     -------
@@ -481,7 +520,10 @@ def filter_positions(time, positions, std_position=3.0, std_acceleration=4000.0,
     time, positions = as_finite(time, "time"), as_points(positions, "positions")
     if positions.ndim != 2 or time.shape != positions.shape[:1]:
         raise ValueError(f"time and positions must have shapes (k,) and (k, 3), got {time.shape} and {positions.shape}")
-    noise, drive = float(as_positive(std_position, "std_position")) ** 2, float(as_positive(std_acceleration, "std_acceleration")) ** 2
+    noise, drive = (
+        float(as_positive(std_position, "std_position")) ** 2,
+        float(as_positive(std_acceleration, "std_acceleration")) ** 2,
+    )
     x, v = np.median(positions[:5], axis=0), np.zeros(3)
     pp, pv, vv = noise, 0.0, 1e6  # one covariance for all three axes: position, cross, velocity
     filtered, used = np.empty_like(positions), np.zeros(len(time), bool)

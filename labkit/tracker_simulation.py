@@ -1,8 +1,9 @@
 """The measurements of the report, simulated: its logs were never published.
 
-A `Tracker` reads its own pose with four kinds of error that the report describes or its numbers imply: white noise, a systematic error that depends on the
-place (it repeats from run to run, which is why the six runs of appendix D agree so much better than the poses of one run), "nonsense" readings, and
-latency. Everything drawn is drawn from `rng`; the systematic error is the room's and has a seed of its own.
+A `Tracker` reads its own pose with four kinds of error that the report describes or its numbers imply: white noise, a
+systematic error that depends on the place (it repeats from run to run, which is why the six runs of appendix D agree so
+much better than the poses of one run), "nonsense" readings, and latency. Everything drawn is drawn from `rng`; the
+systematic error is the room's and has a seed of its own.
 """
 
 from dataclasses import dataclass
@@ -18,9 +19,12 @@ from .tracker import POSITION, TIME, Log, encode_packet, packet_from_pose, shift
 
 RATE = 250.0  # Hz, wireless (report, section 2)
 STOPS, STOP_TIME, RUNS = 21, 4.0, 6  # report, section 3.1
-T_FE = pose(matrix_from_quaternion([0.004, 0.005, -0.002, -1.0]), [13.55, 1.82, 49.17])  # the report's result is the simulation's truth
+T_FE = pose(
+    matrix_from_quaternion([0.004, 0.005, -0.002, -1.0]), [13.55, 1.82, 49.17]
+)  # the report's result is the simulation's truth
 
-# Joint positions (deg) that the motions of section 3.2 pass, and seconds for the slow one; middle and fast run through the same points in 1/2 and 1/4 of the time.
+# Joint positions (deg) that the motions of section 3.2 pass, and seconds for the slow one; middle and fast run through
+# the same points in 1/2 and 1/4 of the time.
 VIA_DEG = [
     [0, 20, 95, 0, -70, 0],
     [45, 10, 100, -12, -66, -50],
@@ -40,9 +44,11 @@ TURN_SPEED, TURN_ANGLE = 0.2, 0.5  # rad/s and rad, measurement 4; the report gi
 class Tracker:
     """Error model of the tracker. Standard deviations are per axis.
 
-    std_position (mm), std_rotation (rad), std_speed (mm/s), std_gyro (rad/s): white noise of a reading. drift_position, drift_rotation: what a stop of some seconds adds and averaging cannot remove.
-    field_position (mm), field_rotation (rad): rms per axis of the systematic error over the room, with the `wavelength` (mm) of its ups and downs.
-    nonsense: probability that a burst of nonsense begins at a reading; burst: mean number of readings in it; jump (mm), swing (rad): typical size.
+    std_position (mm), std_rotation (rad), std_speed (mm/s), std_gyro (rad/s): white noise of a reading. drift_position,
+    drift_rotation: what a stop of some seconds adds and averaging cannot remove. field_position (mm), field_rotation
+    (rad): rms per axis of the systematic error over the room, with the `wavelength` (mm) of its ups and downs.
+    nonsense: probability that a burst of nonsense begins at a reading; burst: mean number of readings in it; jump (mm),
+    swing (rad): typical size.
     latency: s.
     """
 
@@ -66,24 +72,32 @@ class Tracker:
     def _waves(self):
         rng = np.random.default_rng(self.seed)
         direction = rng.normal(size=(12, 3))
-        waves = direction / np.linalg.norm(direction, axis=1, keepdims=True) * (2 * np.pi / self.wavelength) * rng.uniform(0.6, 1.4, (12, 1))
+        waves = (
+            direction
+            / np.linalg.norm(direction, axis=1, keepdims=True)
+            * (2 * np.pi / self.wavelength)
+            * rng.uniform(0.6, 1.4, (12, 1))
+        )
         return waves, rng.uniform(0, 2 * np.pi, 12), rng.normal(size=(12, 6)) / np.sqrt(6.0)
 
     def systematic(self, positions):
-        """Systematic error at places of the room (mm): rotation vector (rad) and displacement (mm); (..., 3) -> (..., 6)."""
+        """Systematic error at places of the room (mm): rotation vector (rad) and displacement (mm); (..., 3) -> (...,
+        6)."""
         waves, phases, amplitudes = self._waves
         error = np.sin(positions @ waves.T + phases) @ amplitudes
         return error * np.repeat([self.field_rotation, self.field_position], 3)
 
     def read(self, T_BE, rng, drift=None):
-        """Readings of the true poses in the room (here the robot's base), without nonsense and latency; (k, 4, 4) -> (k, 4, 4)."""
+        """Readings of the true poses in the room (here the robot's base), without nonsense and latency; (k, 4, 4) ->
+        (k, 4, 4)."""
         error = self.systematic(T_BE[:, :3, 3]) + (0.0 if drift is None else drift)
         error[:, :3] += self.std_rotation * rng.normal(size=(len(T_BE), 3))
         error[:, 3:] += self.std_position * rng.normal(size=(len(T_BE), 3))
         return pose(T_BE[:, :3, :3] @ exp_so3(error[:, :3]), T_BE[:, :3, 3] + error[:, 3:])
 
     def spoil(self, T, rng, tail=0.15):
-        """Put bursts of nonsense into readings; returns the readings and where they are nonsense. The size of a burst is `jump` on the median."""
+        """Put bursts of nonsense into readings; returns the readings and where they are nonsense. The size of a burst
+        is `jump` on the median."""
         starts = rng.random(len(T)) < self.nonsense
         bad = np.zeros(len(T), bool)
         T = T.copy()
@@ -145,9 +159,10 @@ def calibration_run(rng, tracker=None, joints=None, rate=5.0, lost_stop=None):
 class Motion:
     """A simulated motion, k samples.
 
-    time (k,) s; q (k, 6) joint angles, rad; T_true and T_read (k, 4, 4), the frame E as the robot carries it and as the tracker reports it, both in W;
-    v_read (k,) mm/s and w_read (k,) rad/s, the norms of the velocities it reports; nonsense (k,), True where the optical reading is nonsense.
-    The angular velocity comes from the tracker's gyroscope and stays sound while the optics report nonsense: an assumption of the simulation.
+    time (k,) s; q (k, 6) joint angles, rad; T_true and T_read (k, 4, 4), the frame E as the robot carries it and as the
+    tracker reports it, both in W; v_read (k,) mm/s and w_read (k,) rad/s, the norms of the velocities it reports;
+    nonsense (k,), True where the optical reading is nonsense. The angular velocity comes from the tracker's gyroscope
+    and stays sound while the optics report nonsense: an assumption of the simulation.
     """
 
     time: np.ndarray
@@ -170,14 +185,17 @@ def robot_motion(name, rate=RATE):
 
 
 def simulate_motion(name, rng, tracker=None, rate=RATE):
-    """A motion of section 3.2 as the robot makes it and the tracker sees it. The reference frame W is the true first pose: no error of the reset in it."""
+    """A motion of section 3.2 as the robot makes it and the tracker sees it. The reference frame W is the true first
+    pose: no error of the reset in it."""
     tracker = tracker or MOVING
     time, q = robot_motion(name, rate)
     T_BE = tool_pose(TX40, q, T_FE)
     late = shift_time(time, T_BE, -tracker.latency)
     T_read, bad = tracker.spoil(tracker.read(late, rng), rng)
     v, w = speeds(time, late)
-    v_read = np.abs(v + tracker.std_speed * rng.normal(size=len(v))) + np.where(bad, rng.uniform(0, 10 * tracker.jump, len(v)), 0.0)
+    v_read = np.abs(v + tracker.std_speed * rng.normal(size=len(v))) + np.where(
+        bad, rng.uniform(0, 10 * tracker.jump, len(v)), 0.0
+    )
     w_read = np.abs(w + tracker.std_gyro * rng.normal(size=len(w)))
     to_W = invert(T_BE[0])
     return Motion(time, q, to_W @ T_BE, to_W @ T_read, v_read, w_read, bad)
@@ -197,7 +215,8 @@ def flange_poses(joints):
 def endless_packets(rng, nonsense=lambda: False, tracker=None):
     """Packets of a tracker that is carried through the slow motion again and again; a generator without an end.
 
-    `nonsense()` is asked at every packet whether bursts of nonsense may begin, so that it can be switched while the stream runs.
+    `nonsense()` is asked at every packet whether bursts of nonsense may begin, so that it can be switched while the
+    stream runs.
     """
     tracker = tracker or MOVING
     time, q = robot_motion("slow")

@@ -1,8 +1,9 @@
 """The tracker's stream over UDP on this machine: a sender with faults to switch on, and a receiver that survives them.
 
-Both run in a thread of their own, bind to localhost only, and stop within a tenth of a second. UDP promises nothing: a packet may be lost, come twice, late or
-broken. There is no sequence number and no checksum in the tracker's packet (report, table 1), so the receiver judges by the timestamp and by plausibility;
-a flipped bit that leaves a plausible reading cannot be found.
+Both run in a thread of their own, bind to localhost only, and stop within a tenth of a second. UDP promises nothing: a
+packet may be lost, come twice, late or broken. There is no sequence number and no checksum in the tracker's packet
+(report, table 1), so the receiver judges by the timestamp and by plausibility; a flipped bit that leaves a plausible
+reading cannot be found.
 """
 
 import heapq
@@ -26,7 +27,8 @@ RESTART = 50  # so many readings in a row from before the memory mean that the s
 class Faults:
     """What can happen to a stream, each as a probability a packet; may be changed while the stream runs.
 
-    loss: not sent. duplicate: sent twice. reorder: sent up to 5 packets late. malformed: sent truncated, too long, with a NaN or with a broken quaternion.
+    loss: not sent. duplicate: sent twice. reorder: sent up to 5 packets late. malformed: sent truncated, too long, with
+    a NaN or with a broken quaternion.
     foreign: a stranger's datagram besides. latency: seconds that every packet comes later.
     """
 
@@ -54,15 +56,22 @@ def break_packet(data, rng):
 
 
 def stream(packets, rate, faults, rng):
-    """Turn packets into what goes over the wire: yields (seconds since the start, datagram, kind) in the order of sending.
+    """Turn packets into what goes over the wire: yields (seconds since the start, datagram, kind) in the order of
+    sending.
 
-    packets : iterable of bytes; kinds are "good", "duplicate", "malformed", "foreign". A lost packet is yielded as kind "lost" with no datagram, so that a sender can
-    keep its books.
+    packets : iterable of bytes; kinds are "good", "duplicate", "malformed", "foreign". A lost packet is yielded as kind
+    "lost" with no datagram, so that a sender can keep its books.
     """
     waiting, count = [], 0
     for k, data in enumerate(packets):
         due = k / rate + faults.latency
-        lost, twice, late, broken, stranger = rng.random(5) < (faults.loss, faults.duplicate, faults.reorder, faults.malformed, faults.foreign)
+        lost, twice, late, broken, stranger = rng.random(5) < (
+            faults.loss,
+            faults.duplicate,
+            faults.reorder,
+            faults.malformed,
+            faults.foreign,
+        )
         entries = []
         if stranger:
             entries.append((due, bytes(rng.integers(0, 256, int(rng.integers(1, 300)), dtype=np.uint8)), "foreign"))
@@ -95,7 +104,9 @@ class Sender:
         self.sent, self.finished = Counter(), threading.Event()
         self._stop = threading.Event()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._thread = threading.Thread(target=self._run, args=(stream, (HOST, port), speed), name="tracker sender", daemon=True)
+        self._thread = threading.Thread(
+            target=self._run, args=(stream, (HOST, port), speed), name="tracker sender", daemon=True
+        )
         self._thread.start()
 
     def _run(self, stream, address, speed):
@@ -137,8 +148,10 @@ class Sender:
 class Statistics:
     """What a receiver has seen: datagrams = good + duplicates + stale + all bad ones.
 
-    good: readings, each counted once; late: good ones that came after a younger one; duplicates; stale: too old to tell whether they are duplicates.
-    bad: reason -> count. lost: readings missing between the first and the last timestamp, estimated with `rate`. restarts: times the sender started over.
+    good: readings, each counted once; late: good ones that came after a younger one; duplicates; stale: too old to tell
+    whether they are duplicates.
+    bad: reason -> count. lost: readings missing between the first and the last timestamp, estimated with `rate`.
+    restarts: times the sender started over.
     """
 
     datagrams: int = 0
@@ -181,7 +194,9 @@ class Listener:
             self._socket.bind((HOST, port))
         except (OSError, OverflowError) as error:
             self._socket.close()
-            raise ValueError(f"port {port} of this machine cannot be used ({error}); port=0 takes any free one") from None
+            raise ValueError(
+                f"port {port} of this machine cannot be used ({error}); port=0 takes any free one"
+            ) from None
         self._socket.settimeout(0.1)
         self.port = self._socket.getsockname()[1]
         self._thread = threading.Thread(target=self._run, name="tracker listener", daemon=True)

@@ -14,13 +14,16 @@ T_FS = pose(exp_so3([0.3, -0.5, 1.1]), [30.0, -20.0, 120.0])
 T_BT = pose(exp_so3([2.0, 0.4, -0.3]), [700.0, 80.0, -150.0])
 
 
-def setup(rng, n=20, std_rot=0.0, std_trans=0.0, axes=None, angle=np.deg2rad(60)):
+def setup(rng, n=20, std_rot=0.0, std_trans=0.0, axes=None, angle=np.pi / 3):
     """Robot poses and readings with noise in the axes of the target and of S."""
     turn = rng.normal(size=(n, 3)) if axes is None else axes * rng.normal(size=(n, 1))
     turn *= angle * rng.uniform(0.1, 1, (n, 1)) / np.linalg.norm(turn, axis=1, keepdims=True)
     T_BF = pose(exp_so3(turn), rng.uniform(-200, 200, (n, 3)))
     T_ST = invert(T_FS) @ invert(T_BF) @ T_BT
-    noisy = pose(T_ST[:, :3, :3] @ exp_so3(std_rot * rng.normal(size=(n, 3))), T_ST[:, :3, 3] + std_trans * rng.normal(size=(n, 3)))
+    noisy = pose(
+        T_ST[:, :3, :3] @ exp_so3(std_rot * rng.normal(size=(n, 3))),
+        T_ST[:, :3, 3] + std_trans * rng.normal(size=(n, 3)),
+    )
     return T_BF, noisy
 
 
@@ -39,7 +42,11 @@ def test_kronecker_matrix_is_the_textbook_product():
     expected = np.concatenate([np.kron(np.eye(3), a) - np.kron(b.T, np.eye(3)) for a, b in zip(A, B)])
     np.testing.assert_allclose(axxb.kronecker_matrix(A, B), expected, atol=1e-15)
     X = rng.normal(size=(3, 3))
-    np.testing.assert_allclose(expected @ X.ravel(order="F"), np.concatenate([(a @ X - X @ b).ravel(order="F") for a, b in zip(A, B)]), atol=1e-13)
+    np.testing.assert_allclose(
+        expected @ X.ravel(order="F"),
+        np.concatenate([(a @ X - X @ b).ravel(order="F") for a, b in zip(A, B)]),
+        atol=1e-13,
+    )
 
 
 @pytest.mark.parametrize("n", [3, 20])
@@ -53,7 +60,8 @@ def test_both_methods_are_exact_without_noise(n):
 
 
 def test_singular_values_of_two_motions_in_closed_form():
-    """For one motion by the angle t the values are 0 (three times), 2 sin(t/2) (four) and 2 sin t (two); parallel axes only add up."""
+    """For one motion by the angle t the values are 0 (three times), 2 sin(t/2) (four) and 2 sin t (two); parallel axes
+    only add up."""
     t = 0.7
     R = exp_so3([0, 0, t])
     M = axxb.kronecker_matrix(R[None], R[None])
@@ -84,7 +92,9 @@ def least_squares_fit(T_BF, T_ST, std_rot, std_trans):
         turn = Rotation.from_matrix(np.swapaxes(predicted[:, :3, :3], 1, 2) @ T_ST[:, :3, :3]).as_rotvec()
         return np.concatenate([(turn / std_rot).ravel(), ((T_ST - predicted)[:, :3, 3] / std_trans).ravel()])
 
-    fit = least_squares(residuals, np.zeros(12), method="lm", x_scale=np.tile([1e-3] * 3 + [1.0] * 3, 2), xtol=1e-14, ftol=1e-14)
+    fit = least_squares(
+        residuals, np.zeros(12), method="lm", x_scale=np.tile([1e-3] * 3 + [1.0] * 3, 2), xtol=1e-14, ftol=1e-14
+    )
     return at(fit.x), fit
 
 
@@ -104,7 +114,9 @@ def test_maximum_likelihood_is_scipys(deg, mm):
     angle, distance = pose_distance(ours.target, Y)
     assert angle < 2e-3 * scale[6:9].min() + 1e-7 and distance < 2e-3 * scale[9:].min() + 1e-5
     J = fit.jac
-    information = J.T @ J  # in twists at the solution: to first order the same rotations, translations turned into the axes of F and B
+    information = (
+        J.T @ J
+    )  # in twists at the solution: to first order the same rotations, translations turned into the axes of F and B
     turn = np.zeros((12, 12))
     for k, T in ((0, X), (6, Y)):
         turn[k : k + 3, k : k + 3], turn[k + 3 : k + 6, k + 3 : k + 6] = np.eye(3), T[:3, :3]
@@ -114,9 +126,11 @@ def test_maximum_likelihood_is_scipys(deg, mm):
 
 
 def test_accuracy_reaches_the_bound_and_the_covariance_is_honest():
-    """400 runs of 20 poses for each noise case, noise levels not told: rms error within 5 % of the Cramer-Rao bound; mean NEES 6.
+    """400 runs of 20 poses for each noise case, noise levels not told: rms error within 5 % of the Cramer-Rao bound;
+    mean NEES 6.
 
-    The mean of 400 runs has a standard error of 0.17, so a single case may miss 6 by three of these, all four together by 0.3.
+    The mean of 400 runs has a standard error of 0.17, so a single case may miss 6 by three of these, all four together
+    by 0.3.
     """
     means = []
     for deg, mm in ((0.1, 0.1), (0.1, 1.0), (0.5, 0.1), (0.5, 1.0)):

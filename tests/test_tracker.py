@@ -1,6 +1,6 @@
 """Packets, logs, the mounting by the report's equations, errors in motion, and the synthetic data."""
 
-import subprocess
+import importlib
 import sys
 
 import numpy as np
@@ -101,7 +101,10 @@ def in_millimeters(line):
     [
         (lambda t: "", "the file is empty"),
         (lambda t: t[:-20], "line 31: the file ends in the middle of this line"),
-        (lambda t: spoil_line(t, 1, lambda h: h.replace("y [m]", "y [mm]")), "line 1: x, y and z must share one unit, got m, mm, m"),
+        (
+            lambda t: spoil_line(t, 1, lambda h: h.replace("y [m]", "y [mm]")),
+            "line 1: x, y and z must share one unit, got m, mm, m",
+        ),
         (lambda t: spoil_line(t, 1, lambda h: h.replace("[m]", "[in]")), "line 1: lengths must be in m or mm, got in"),
         (lambda t: spoil_line(t, 1, lambda h: h.replace("qx", "qw")), "line 1: a column name appears twice"),
         (lambda t: spoil_line(t, 1, lambda h: h.replace("qx", "Qx")), "line 1: expected a column 'qx'"),
@@ -110,7 +113,10 @@ def in_millimeters(line):
         (lambda t: spoil_line(t, 5, lambda line: line.replace("0.3", "O.3", 1)), "line 5: expected a number, got 'O.3"),
         (lambda t: spoil_line(t, 6, lambda line: "nan" + line[5:]), "line 6: a number is not finite"),
         (lambda t: spoil_line(t, 8, lambda line: "0.000" + line[5:]), "line 8: time does not increase"),
-        (lambda t: spoil_line(t, 4, lambda line: line.rsplit(",", 1)[0] + ",3"), "line 4: the quaternion is not of length 1"),
+        (
+            lambda t: spoil_line(t, 4, lambda line: line.rsplit(",", 1)[0] + ",3"),
+            "line 4: the quaternion is not of length 1",
+        ),
         (lambda t: spoil_line(t, 12, in_millimeters), "line 12: .*another unit"),
     ],
 )
@@ -145,7 +151,10 @@ def readings(rng, n=21, noise=0.0):
     """Poses of the flange, and what a tracker mounted at T_FE reports in the frame of its first reading."""
     T_BF = pose(exp_so3(0.6 * rng.normal(size=(n, 3))), rng.uniform(-200, 200, (n, 3)))
     T_BE = T_BF @ T_FE
-    T_BE = pose(T_BE[:, :3, :3] @ exp_so3(1e-3 * noise * rng.normal(size=(n, 3))), T_BE[:, :3, 3] + noise * rng.normal(size=(n, 3)))
+    T_BE = pose(
+        T_BE[:, :3, :3] @ exp_so3(1e-3 * noise * rng.normal(size=(n, 3))),
+        T_BE[:, :3, 3] + noise * rng.normal(size=(n, 3)),
+    )
     return T_BF, invert(T_BE[0]) @ T_BE
 
 
@@ -177,7 +186,8 @@ def test_errors_are_what_the_equations_say():
 
 
 def test_small_errors_make_e_rot_two_thirds_of_the_mean_squared_angle():
-    """What the ledger uses to tell the unit of appendix D: E_rot = 2/3 sum(angle^2) / (N - 1) for a null vector of length 1."""
+    """What the ledger uses to tell the unit of appendix D: E_rot = 2/3 sum(angle^2) / (N - 1) for a null vector of
+    length 1."""
     m = tracker.calibrate_mounting(*readings(np.random.default_rng(5), 21, noise=3.0), factor=1e9)
     np.testing.assert_allclose(m.E_rot, 2 / 3 * (m.rotation[1:] ** 2).sum() / 19, rtol=0.01)
 
@@ -216,7 +226,10 @@ def test_stops_are_averaged_without_their_outliers():
 
 def test_speeds_of_a_known_rotation_do_not_depend_on_frames():
     time = np.arange(200) / 100
-    T = pose(exp_so3(np.outer(0.7 * time, [0, 0, 1])), np.column_stack([300 * np.cos(0.7 * time), 300 * np.sin(0.7 * time), 0 * time]))
+    T = pose(
+        exp_so3(np.outer(0.7 * time, [0, 0, 1])),
+        np.column_stack([300 * np.cos(0.7 * time), 300 * np.sin(0.7 * time), 0 * time]),
+    )
     v, w = tracker.speeds(time, T)
     np.testing.assert_allclose(w, 0.7, rtol=1e-6)
     np.testing.assert_allclose(v, 210, rtol=1e-4)
@@ -238,7 +251,11 @@ def test_time_offset_to_a_fraction_of_a_sample(delay):
 
 
 def test_shift_time_undoes_a_latency():
-    motion = tracker_simulation.simulate_motion("slow", np.random.default_rng(1), tracker_simulation.Tracker(0, 0, 0, 0, field_position=0, field_rotation=0, latency=0.05))
+    motion = tracker_simulation.simulate_motion(
+        "slow",
+        np.random.default_rng(1),
+        tracker_simulation.Tracker(0, 0, 0, 0, field_position=0, field_rotation=0, latency=0.05),
+    )
     late = tracker.tracking_errors(motion.time, motion.T_true, motion.T_read)
     mended = tracker.shift_time(motion.time, motion.T_read, 0.05)
     inside = slice(20, -20)
@@ -275,17 +292,23 @@ def test_motions_keep_joint_limits_and_speeds():
 
 
 def test_the_generator_gives_the_stored_files(tmp_path):
-    code = f"import sys; sys.path.insert(0, 'data/tracker'); from pathlib import Path; import make_runs; make_runs.write(Path({str(tmp_path)!r}))"
-    subprocess.run([sys.executable, "-c", code], cwd=DATA.parent, check=True)
+    sys.path.insert(0, str(DATA / "tracker"))
+    try:
+        importlib.import_module("make_runs").write(tmp_path)
+    finally:
+        sys.path.remove(str(DATA / "tracker"))
     for path in sorted(tmp_path.iterdir()):
         new, old = path.read_text().splitlines(), (DATA / "tracker" / path.name).read_text().splitlines()
         assert len(new) == len(old) and new[0] == old[0]
         table = [np.array([line.split(",") for line in lines[1:]], dtype=float) for lines in (new, old)]
-        np.testing.assert_allclose(*table, atol=2.1e-5)  # the last digit may round differently with another linear algebra
+        np.testing.assert_allclose(
+            *table, atol=2.1e-5
+        )  # the last digit may round differently with another linear algebra
 
 
 def test_six_runs_agree_with_each_other_better_than_with_the_truth():
-    """The systematic error repeats, so the spread over the runs says nothing about it; the covariance of one run does."""
+    """The systematic error repeats, so the spread over the runs says nothing about it; the covariance of one run
+    does."""
     mountings = ch06_tracker.synthetic_mountings()
     t = np.array([m.T_FE[:3, 3] for m in mountings])
     off = np.linalg.norm(t.mean(0) - T_FE[:3, 3])

@@ -11,7 +11,9 @@ from labkit import tracker, udp
 
 
 def packets(count, start=0, device=1):
-    values = tracker.packet_from_pose(np.tile(np.eye(4), (count, 1, 1)), (start + np.arange(count)) / 250, device=device)
+    values = tracker.packet_from_pose(
+        np.tile(np.eye(4), (count, 1, 1)), (start + np.arange(count)) / 250, device=device
+    )
     return [tracker.encode_packet(v) for v in values]
 
 
@@ -114,7 +116,10 @@ def test_nothing_blocks_and_everything_closes():
 
 
 def test_a_taken_or_impossible_port_is_named():
-    with udp.listen() as listener, pytest.raises(ValueError, match=f"port {listener.port} of this machine cannot be used"):
+    with (
+        udp.listen() as listener,
+        pytest.raises(ValueError, match=f"port {listener.port} of this machine cannot be used"),
+    ):
         udp.listen(listener.port)
     with pytest.raises(ValueError, match="port 70000"):
         udp.listen(70000)

@@ -24,7 +24,9 @@ def decode_packet(data):
 def packet(rng):
     """A good packet with all fields different."""
     T = pose(exp_so3(rng.normal(size=3)), rng.uniform(-900, 900, 3))
-    values = tracker.packet_from_pose(T, rng.uniform(1, 900), velocity=rng.uniform(50, 300, 3), angular_velocity=rng.uniform(0.1, 1, 3))
+    values = tracker.packet_from_pose(
+        T, rng.uniform(1, 900), velocity=rng.uniform(50, 300, 3), angular_velocity=rng.uniform(0.1, 1, 3)
+    )
     values[8:11], values[18:21] = rng.uniform(0.5, 9, (2, 3))
     return (tracker.encode_packet(values),)
 
@@ -178,7 +180,12 @@ def speed_curves(rng):
     lag = (rng.integers(2, 8) + rng.choice([0.35, 0.42, 0.58, 0.65])) / 100
 
     def curve(t):
-        return 1.2 + 0.6 * np.sin(2.1 * t + phase[0]) + 0.3 * np.sin(3.7 * t + phase[1]) + 0.15 * np.sin(5.9 * t + phase[2])
+        return (
+            1.2
+            + 0.6 * np.sin(2.1 * t + phase[0])
+            + 0.3 * np.sin(3.7 * t + phase[1])
+            + 0.15 * np.sin(5.9 * t + phase[2])
+        )
 
     return time, curve(time), curve(time - lag), 0.2
 
@@ -230,7 +237,10 @@ CHAPTER = Chapter(
             reference=decode_packet,
             draw=packet,
             metric=metrics.several(
-                metrics.numbers(1e-9, "s"), metrics.numbers(1e-9, "mm"), metrics.numbers(1e-9), names=("time", "position", "quaternion")
+                metrics.numbers(1e-9, "s"),
+                metrics.numbers(1e-9, "mm"),
+                metrics.numbers(1e-9),
+                names=("time", "position", "quaternion"),
             ),
             hints=(
                 "Read all 184 bytes as 23 numbers of 8 bytes, then pick by the order of table 1.",
@@ -238,10 +248,22 @@ CHAPTER = Chapter(
                 "v = np.frombuffer(data, '<f8'); return v[1], 1000 * v[2:5], v[11:15].",
             ),
             mistakes=[
-                Mistake(_fields(scale=1.0), "The position is in meters, as the packet carries it. The workbook computes in mm."),
-                Mistake(_fields(time=0, position=1, quaternion=10), "You are one field too early: number 0 is the device, the time stamp comes second."),
-                Mistake(_fields(position=5), "These are the linear velocities (bytes 40 to 63). The position starts at byte 16."),
-                Mistake(_fields(quaternion=15), "These are angular velocities. The quaternion starts at byte 88, which is number 11."),
+                Mistake(
+                    _fields(scale=1.0),
+                    "The position is in meters, as the packet carries it. The workbook computes in mm.",
+                ),
+                Mistake(
+                    _fields(time=0, position=1, quaternion=10),
+                    "You are one field too early: number 0 is the device, the time stamp comes second.",
+                ),
+                Mistake(
+                    _fields(position=5),
+                    "These are the linear velocities (bytes 40 to 63). The position starts at byte 16.",
+                ),
+                Mistake(
+                    _fields(quaternion=15),
+                    "These are angular velocities. The quaternion starts at byte 88, which is number 11.",
+                ),
                 Mistake(_scalar_first, "The packet's quaternion is x, y, z, w: you put w first."),
                 Mistake(
                     _fields(dtype=">f8"),
@@ -279,7 +301,9 @@ CHAPTER = Chapter(
                     _link("DAZX"),
                     "You moved along x before turning about z, so the step a ignores theta. The last column begins with a cos(theta), a sin(theta).",
                 ),
-                Mistake(lambda *p: invert(robot.dh_matrix(*p)), "This is the inverse: it maps from frame i - 1 to frame i."),
+                Mistake(
+                    lambda *p: invert(robot.dh_matrix(*p)), "This is the inverse: it maps from frame i - 1 to frame i."
+                ),
                 Mistake(
                     lambda th, d, a, al: robot.dh_matrix(np.deg2rad(th), d, a, np.deg2rad(al)),
                     "The angles already are radians: you converted them once too often.",
@@ -297,21 +321,40 @@ CHAPTER = Chapter(
                 "T = np.eye(4); for (offset, d, a, alpha), angle in zip(dh, q): T = T @ dh_matrix(offset + angle, d, a, alpha); return T.",
             ),
             mistakes=[
-                Mistake(_without_offsets, "The offsets in the first column of dh are missing: the zero position of the TX40 is upright."),
+                Mistake(
+                    _without_offsets,
+                    "The offsets in the first column of dh are missing: the zero position of the TX40 is upright.",
+                ),
                 Mistake(
                     lambda dh, q: functools.reduce(np.matmul, _links(dh, q)[::-1]),
                     "You multiplied from the flange to the base. A new link goes on the right: T = T @ link.",
                 ),
-                Mistake(lambda dh, q: functools.reduce(np.matmul, _links(dh, q)[:-1]), "The last link is missing: this is the wrist, not the flange."),
-                Mistake(lambda dh, q: functools.reduce(np.matmul, _links(dh, q)[1:]), "The first link is missing: did the loop start at 1?"),
-                Mistake(lambda dh, q: invert(robot.forward_kinematics(dh, q)), "This is the base seen from the flange: the inverse."),
-                Mistake(lambda dh, q: robot.forward_kinematics(dh, -q), "The joint angles enter with the wrong sign: the angle of a link is offset + q."),
+                Mistake(
+                    lambda dh, q: functools.reduce(np.matmul, _links(dh, q)[:-1]),
+                    "The last link is missing: this is the wrist, not the flange.",
+                ),
+                Mistake(
+                    lambda dh, q: functools.reduce(np.matmul, _links(dh, q)[1:]),
+                    "The first link is missing: did the loop start at 1?",
+                ),
+                Mistake(
+                    lambda dh, q: invert(robot.forward_kinematics(dh, q)),
+                    "This is the base seen from the flange: the inverse.",
+                ),
+                Mistake(
+                    lambda dh, q: robot.forward_kinematics(dh, -q),
+                    "The joint angles enter with the wrong sign: the angle of a link is offset + q.",
+                ),
             ],
         ),
         Prediction(
             "axes",
             question="All motions turn about one and the same axis. What do the residuals of the calibration look like?",
-            choices=("large, one sees it at once", "perfect, and the mounting is arbitrary", "perfect, and so is the mounting"),
+            choices=(
+                "large, one sees it at once",
+                "perfect, and the mounting is arbitrary",
+                "perfect, and so is the mounting",
+            ),
             answer="perfect, and the mounting is arbitrary",
             why="Turning the mounting about the common axis changes nothing in A X = X B. Only the singular values tell.",
         ),
@@ -392,7 +435,10 @@ CHAPTER = Chapter(
                 "K1 = np.eye(3) - A[:, :3, :3]; K2 = A[:, :3, 3] - B[:, :3, 3] @ R.T; np.linalg.lstsq(K1.reshape(-1, 3), K2.ravel())[0].",
             ),
             mistakes=[
-                Mistake(_translation(lambda A: -_k1(A), _k2), "The result has the opposite sign: (I - R_A) t = t_A - R t_B, not (R_A - I) t."),
+                Mistake(
+                    _translation(lambda A: -_k1(A), _k2),
+                    "The result has the opposite sign: (I - R_A) t = t_A - R t_B, not (R_A - I) t.",
+                ),
                 Mistake(
                     _translation(_k1, lambda A, B, R: A[:, :3, 3] - B[:, :3, 3]),
                     "R is missing: the tracker's translations are written in its own axes and must be turned into the flange's.",
@@ -422,7 +468,10 @@ CHAPTER = Chapter(
                 "v = np.linalg.svd(M)[2][-1]; return np.linalg.norm(M.T @ (M @ v)) / (len(M) / 9 - 1).",
             ),
             mistakes=[
-                Mistake(lambda M: tracker.e_rot(M) * (len(M) / 9 - 1) / (len(M) / 9), "You divide by N. The report divides by N - 1."),
+                Mistake(
+                    lambda M: tracker.e_rot(M) * (len(M) / 9 - 1) / (len(M) / 9),
+                    "You divide by N. The report divides by N - 1.",
+                ),
                 Mistake(
                     lambda M: np.linalg.norm(M @ _null(M)) / (len(M) / 9 - 1),
                     "This is the norm of M v. The report writes M'M v, which is the smallest singular value once more: its square.",
@@ -431,7 +480,10 @@ CHAPTER = Chapter(
                     lambda M: np.sqrt(3) * tracker.e_rot(M),
                     "Your v has the length of a rotation, sqrt(3). Equation (11) divides by the norm of v: length 1.",
                 ),
-                Mistake(lambda M: tracker.e_rot(M) * (len(M) / 9 - 1) / (len(M) - 1), "N counts motions. M has nine rows for each of them."),
+                Mistake(
+                    lambda M: tracker.e_rot(M) * (len(M) / 9 - 1) / (len(M) - 1),
+                    "N counts motions. M has nine rows for each of them.",
+                ),
                 Mistake(
                     lambda M: np.linalg.norm(M.T @ M @ _null(M, 0)) / (len(M) / 9 - 1),
                     "This is the largest singular vector. The null vector is the last row of Vt.",
@@ -450,9 +502,18 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(lambda r: np.linalg.norm(r) / len(r), "You divide by N. The report divides by N - 1."),
-                Mistake(lambda r: (r**2).sum() / (len(r) - 1), "You squared the norm. The text speaks of squares, equation (17) does not square."),
-                Mistake(lambda r: np.sqrt((r**2).sum() / (len(r) - 1)), "N - 1 stands outside the root in equation (17). Yours would be the better definition."),
-                Mistake(lambda r: np.linalg.norm(r, axis=1).mean(), "This is the mean distance. Equation (17) takes one norm over everything."),
+                Mistake(
+                    lambda r: (r**2).sum() / (len(r) - 1),
+                    "You squared the norm. The text speaks of squares, equation (17) does not square.",
+                ),
+                Mistake(
+                    lambda r: np.sqrt((r**2).sum() / (len(r) - 1)),
+                    "N - 1 stands outside the root in equation (17). Yours would be the better definition.",
+                ),
+                Mistake(
+                    lambda r: np.linalg.norm(r, axis=1).mean(),
+                    "This is the mean distance. Equation (17) takes one norm over everything.",
+                ),
                 Mistake(lambda r: np.linalg.norm(r) / (r.size - 1), "N counts motions, not coordinates."),
             ],
         ),
@@ -471,7 +532,10 @@ CHAPTER = Chapter(
                     _keep(np.mean, np.std),
                     "Mean and standard deviation are moved by the very values you want to find: the nonsense hides itself.",
                 ),
-                Mistake(_keep(np.median, _mad), "The factor 1.4826 is missing: the median distance is only 0.67 standard deviations."),
+                Mistake(
+                    _keep(np.median, _mad),
+                    "The factor 1.4826 is missing: the median distance is only 0.67 standard deviations.",
+                ),
                 Mistake(
                     _keep(np.median, lambda v: np.abs(v - np.median(v)).mean()),
                     "You took the mean of the distances. Gross values blow it up; take their median.",
@@ -494,10 +558,19 @@ CHAPTER = Chapter(
                 "M = np.concatenate([kron_row(a[:3, :3], b[:3, :3]) for a, b in zip(A, B)]), then rotation_from_nullvector and translation_lsq.",
             ),
             mistakes=[
-                Mistake(lambda: _mounting(gate=1e9), "The stop at which the tracker talked nonsense is still in: leave out what `kept` excludes."),
+                Mistake(
+                    lambda: _mounting(gate=1e9),
+                    "The stop at which the tracker talked nonsense is still in: leave out what `kept` excludes.",
+                ),
                 Mistake(lambda: invert(_mounting()), "This is the flange seen from the tracker: the inverse."),
-                Mistake(_against_the_readings, "A and B have changed places: A is what the flange did, B what the tracker saw."),
-                Mistake(lambda: pose(_mounting()[:3, :3], _mounting()[:3, 3] / 1000), "The translation is in meters; wanted are mm."),
+                Mistake(
+                    _against_the_readings,
+                    "A and B have changed places: A is what the flange did, B what the tracker saw.",
+                ),
+                Mistake(
+                    lambda: pose(_mounting()[:3, :3], _mounting()[:3, 3] / 1000),
+                    "The translation is in meters; wanted are mm.",
+                ),
             ],
         ),
         Value(
@@ -511,10 +584,19 @@ CHAPTER = Chapter(
                 "heights = np.array([m.T_FE[2, 3] for m in mountings]); spread = heights.std().",
             ),
             mistakes=[
-                Mistake(lambda: _heights().std(ddof=1), "You divided by 5. For estimating a spread that is the better choice; appendix D divides by 6."),
+                Mistake(
+                    lambda: _heights().std(ddof=1),
+                    "You divided by 5. For estimating a spread that is the better choice; appendix D divides by 6.",
+                ),
                 Mistake(lambda: _heights().var(), "This is the variance, in square millimeters. Its root is wanted."),
-                Mistake(lambda: np.ptp(_heights()), "This is the range from the lowest to the highest. Wanted is the standard deviation."),
-                Mistake(lambda: _heights().std() / np.sqrt(6), "This is the standard error of the mean. Wanted is the spread of single runs."),
+                Mistake(
+                    lambda: np.ptp(_heights()),
+                    "This is the range from the lowest to the highest. Wanted is the standard deviation.",
+                ),
+                Mistake(
+                    lambda: _heights().std() / np.sqrt(6),
+                    "This is the standard error of the mean. Wanted is the spread of single runs.",
+                ),
             ],
         ),
         Prediction(
@@ -550,13 +632,21 @@ CHAPTER = Chapter(
                 "With costs l, m, r left, at and right of the best s: offset = (s + 0.5 * (l - r) / (l - 2 * m + r)) * step.",
             ),
             mistakes=[
-                Mistake(lambda *a: -tracker.time_offset(*a), "The sign is reversed: positive means that the tracker lags behind."),
-                Mistake(_whole_samples, "You stop at whole samples. At 1 m/s half a sample of 10 ms is 5 mm: fit a parabola through the best three."),
+                Mistake(
+                    lambda *a: -tracker.time_offset(*a),
+                    "The sign is reversed: positive means that the tracker lags behind.",
+                ),
+                Mistake(
+                    _whole_samples,
+                    "You stop at whole samples. At 1 m/s half a sample of 10 ms is 5 mm: fit a parabola through the best three.",
+                ),
                 Mistake(
                     lambda t, *a: tracker.time_offset(t, *a) / (t[1] - t[0]),
                     "Your answer counts samples. Multiply by the time between samples.",
                 ),
-                Mistake(lambda *a: 1000 * tracker.time_offset(*a), "Your answer is in milliseconds; wanted are seconds."),
+                Mistake(
+                    lambda *a: 1000 * tracker.time_offset(*a), "Your answer is in milliseconds; wanted are seconds."
+                ),
                 Mistake(
                     lambda t, r, d, m: 2 * _whole_samples(t, r, d, m) - tracker.time_offset(t, r, d, m),
                     "The fraction has the wrong sign: the vertex lies toward the smaller of the two neighbors.",

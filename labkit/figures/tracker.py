@@ -1,4 +1,5 @@
-"""Figures of chapter 6: the live trail, motions and their null space, errors over time, methods beside the bound, repeated calibrations."""
+"""Figures of chapter 6: the live trail, motions and their null space, errors over time, methods beside the bound,
+repeated calibrations."""
 
 import numpy as np
 from matplotlib.ticker import NullFormatter
@@ -21,26 +22,33 @@ class Trail:
     def set(self, positions, used, filtered, T_WE):
         """Positions (k, 3), which of them passed the gate, the filtered positions, the last pose."""
         nothing = np.full((1, 3), np.nan)
-        for item, points in ((self.readings, positions[used]), (self.rejected, positions[~used]), (self.path, filtered)):
+        for item, points in (
+            (self.readings, positions[used]),
+            (self.rejected, positions[~used]),
+            (self.path, filtered),
+        ):
             item.set(points if len(points) else nothing)
         self.tracker.set(T_WE)
 
 
 class RotationAxes:
-    """Two rotation axes as lines through a sphere, and the frames that a noisy calibration finds, seen from their tips."""
+    """Two rotation axes as lines through a sphere, and the frames that a noisy calibration finds, seen from their
+    tips."""
 
     def __init__(self, scene, radius):
         self.radius = radius
         scene.fixed(scene.ellipsoid(**style.look("guide")), np.zeros(3), radius**2 * np.eye(3))
         self.lines = [scene.line(color=style.INK, linewidth=2.0, linestyle=dash) for dash in ("-", (0, (4, 2)))]
         self.clouds = [
-            scene.points(color=color, linestyle="none", marker=".", markersize=6, alpha=0.55, markeredgewidth=0) for color in style.AXES
+            scene.points(color=color, linestyle="none", marker=".", markersize=6, alpha=0.55, markeredgewidth=0)
+            for color in style.AXES
         ]
         self.truth = scene.triad("X", 0.55 * radius)
         self.free = scene.line(**style.look("prediction"))
 
     def set(self, axes, T, found, free):
-        """`axes` (2, 3), the true mounting, the found ones (n, 3, 3), and the path of a point that the data leave free (or nothing)."""
+        """`axes` (2, 3), the true mounting, the found ones (n, 3, 3), and the path of a point that the data leave free
+        (or nothing)."""
         for line, axis in zip(self.lines, axes):
             line.set(np.outer([-1.0, 1.0], axis) * self.radius)
         for k, cloud in enumerate(self.clouds):
@@ -101,18 +109,26 @@ def methods(ax, names):
     ax.minorticks_off()
     ax.axvline(1.0, color=style.INK, linewidth=1.6)
     (rotation,) = ax.plot([], [], **style.look("estimates", markersize=8), label="rotation")
-    (translation,) = ax.plot([], [], **style.look("estimates", marker="o", markersize=8, markerfacecolor="none", markeredgewidth=1.8), label="translation")
+    (translation,) = ax.plot(
+        [],
+        [],
+        **style.look("estimates", marker="o", markersize=8, markerfacecolor="none", markeredgewidth=1.8),
+        label="translation",
+    )
     ax.legend(loc="lower right")
     return rotation, translation
 
 
 class Repeated:
-    """Repeated calibrations in two coordinates: each result, the ellipse of their spread, the ellipse a single run claims, the truth."""
+    """Repeated calibrations in two coordinates: each result, the ellipse of their spread, the ellipse a single run
+    claims, the truth."""
 
     def __init__(self, ax, truth, half_width=3.0):
         style.axes(ax, "y of the mounting (mm)", "z of the mounting (mm)", "six runs, each 21 poses")
         ax.set(xlim=(truth[1] - half_width, truth[1] + half_width), ylim=(truth[2] - half_width, truth[2] + half_width))
-        ax.plot(*truth[1:], color=style.TRUTH, marker="+", markersize=16, markeredgewidth=2, linestyle="none", label="truth")
+        ax.plot(
+            *truth[1:], color=style.TRUTH, marker="+", markersize=16, markeredgewidth=2, linestyle="none", label="truth"
+        )
         (self.runs,) = ax.plot([], [], **style.look("estimates", markersize=5), label="one run each")
         (self.spread,) = ax.plot([], [], **style.look("estimate"), label="spread of the runs, 3 std")
         (self.claim,) = ax.plot([], [], **style.look("prediction"), label="covariance of one run, 3 std")
@@ -130,4 +146,6 @@ def ellipse(center, covariance, sigmas=3.0):
     """Outline of an error ellipse, shape (65, 2)."""
     angle = np.linspace(0, 2 * np.pi, 65)
     values, vectors = np.linalg.eigh(covariance)
-    return center + sigmas * np.column_stack([np.cos(angle), np.sin(angle)]) @ (vectors * np.sqrt(np.maximum(values, 0))).T
+    return (
+        center + sigmas * np.column_stack([np.cos(angle), np.sin(angle)]) @ (vectors * np.sqrt(np.maximum(values, 0))).T
+    )

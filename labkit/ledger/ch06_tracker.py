@@ -1,4 +1,5 @@
-"""Report, sections 2 and 3, conclusion and appendices B and D: packet, data sheet, table D against itself, contradictions, motions."""
+"""Report, sections 2 and 3, conclusion and appendices B and D: packet, data sheet, table D against itself,
+contradictions, motions."""
 
 import numpy as np
 
@@ -13,7 +14,8 @@ UPSIDE_DOWN, COPIED = (2, COLUMNS.index("max_mm")), (3, COLUMNS.index("max_deg")
 
 
 def table_d():
-    """Appendix D as printed: runs (6, 13), means (13,), variances (13,), and half a unit of the last digit of each, shape (8, 13)."""
+    """Appendix D as printed: runs (6, 13), means (13,), variances (13,), and half a unit of the last digit of each,
+    shape (8, 13)."""
     printed = read_table("tracker/table_d.csv", text=("run", *COLUMNS))
     words = np.column_stack([printed[c] for c in COLUMNS])
     values, halves = words.astype(float), np.vectorize(half_unit)(words)
@@ -52,8 +54,10 @@ def entries():
     misprint[UPSIDE_DOWN] = abs(implied[UPSIDE_DOWN] - 9) < 1e-9
     misprint[COPIED] = runs[COPIED] == runs[COPIED[0], COLUMNS.index("mean_deg")] and least[COPIED[0]] > runs[COPIED]
     proof = (
-        f"Six times the average less the five others gives each entry; run 3's largest error comes out as {implied[UPSIDE_DOWN]:.3f} mm, not 6. "
-        f"Run 4's largest angle equals its mean angle, and its E_rot alone demands at least {least[COPIED[0]]:.3f} deg (root mean square of the angles)."
+        f"Six times the average less the five others gives each entry; run 3's largest error comes out as "
+        f"{implied[UPSIDE_DOWN]:.3f} mm, not 6. "
+        f"Run 4's largest angle equals its mean angle, and its E_rot alone demands at least {least[COPIED[0]]:.3f} "
+        f"deg (root mean square of the angles)."
     )
     return Computed(implied, bound, misprint, proof=proof)
 
@@ -61,7 +65,9 @@ def entries():
 @computes("tracker.average")
 def averages():
     halves = table_d()[3]
-    return Computed(corrected_runs().mean(0), halves[:RUNS].mean(0), proof="The averages of the printed entries, run 3 with 9 mm.")
+    return Computed(
+        corrected_runs().mean(0), halves[:RUNS].mean(0), proof="The averages of the printed entries, run 3 with 9 mm."
+    )
 
 
 @computes("tracker.variance")
@@ -69,7 +75,9 @@ def variances():
     """Printed "Rozptyl": divided by 6, not by 5."""
     runs, halves = corrected_runs(), table_d()[3][:RUNS]
     spread = 2 * (np.abs(runs - runs.mean(0)) * halves).mean(0) + (halves**2).mean(0)
-    return Computed(runs.var(0), spread, proof=f"Divided by {RUNS}; the sample variance (by {RUNS - 1}) would be 20 % larger.")
+    return Computed(
+        runs.var(0), spread, proof=f"Divided by {RUNS}; the sample variance (by {RUNS - 1}) would be 20 % larger."
+    )
 
 
 @computes("tracker.block")
@@ -90,12 +98,15 @@ def largest_angle():
     """The average of the largest angles, without the entry that cannot be right."""
     runs = table_d()[0][:, -1]
     kept = np.delete(runs, COPIED[0])
-    proof = f"One of the six averaged maxima, {runs[COPIED[0]]}, is a copy of a mean; the other five average {kept.mean():.3f} deg."
+    proof = (
+        f"One of the averaged maxima, {runs[COPIED[0]]}, copies a mean; the other five average {kept.mean():.3f} deg."
+    )
     return Computed(kept.mean(), misprint=True, proof=proof)
 
 
 def _least_e_trans():
-    """What equation (17) can at least be, in mm, for the printed mean errors: the mean is never above the root mean square."""
+    """What equation (17) can at least be, in mm, for the printed mean errors: the mean is never above the root mean
+    square."""
     mean_mm = table_d()[1][COLUMNS.index("mean_mm")]
     return mean_mm * np.sqrt(POSES) / (POSES - 1)
 
@@ -107,7 +118,8 @@ def unit_of_e_trans():
     return Computed(
         "m" if inside else "mm",
         misprint=inside,
-        proof=f"A mean error of 2.666 mm over {POSES} poses makes equation (17) at least {least:.2f} mm. The printed {printed:.6f} is "
+        proof=f"A mean error of 2.666 mm over {POSES} poses makes equation (17) at least {least:.2f} mm. The printed "
+        f"{printed:.6f} is "
         f"{1000 * printed:.2f} mm when read in m, and 800 times too small in mm.",
     )
 
@@ -115,18 +127,24 @@ def unit_of_e_trans():
 @computes("tracker.block_E_trans")
 def e_trans_in_block():
     printed, least = 1000 * table_d()[1][COLUMNS.index("E_trans")], _least_e_trans()
-    return Computed(printed, misprint=least > 8e-4, proof=f"The same digits in the same wrong unit: at least {least:.2f} mm is needed, {printed:.2f} mm is meant.")
+    return Computed(
+        printed,
+        misprint=least > 8e-4,
+        proof=f"The same digits in the same wrong unit: at least {least:.2f} mm is needed, {printed:.2f} mm is meant.",
+    )
 
 
 @computes("tracker.E_rot_unit")
 def unit_of_e_rot():
-    """Equation (13) has no unit; for a null vector of length 1 it is 2/3 of the sum of squared angles (rad) over N - 1."""
+    """Equation (13) has no unit; for a null vector of length 1 it is 2/3 of the sum of squared angles (rad) over N -
+    1."""
     mean = dict(zip(COLUMNS, table_d()[1]))
     angle = np.rad2deg(np.sqrt(1.5 * mean["E_rot"] * (POSES - 1) / POSES))
     return Computed(
         "1",
         misprint=mean["mean_deg"] < angle < 1.5 * mean["mean_deg"],
-        proof=f"Without a unit, as the block of section 3.1 prints it, {mean['E_rot']:.3e} means an rms angle of {angle:.3f} deg, in "
+        proof=f"Without a unit, as the block of section 3.1 prints it, {mean['E_rot']:.3e} means an rms angle of "
+        f"{angle:.3f} deg, in "
         f"keeping with the printed mean of {mean['mean_deg']:.3f} deg.",
     )
 
@@ -139,7 +157,11 @@ def _mounting_angle_deg():
 @computes("tracker.turned_180")
 def half_turn():
     angle = _mounting_angle_deg()
-    return Computed(angle, proof=f"The printed quaternion turns by {angle:.2f} deg; a half turn about z would read (0, 0, 1, 0). The flange frame may include it already.")
+    return Computed(
+        angle,
+        proof=f"The printed quaternion turns by {angle:.2f} deg; a half turn about z would read (0, 0, 1, 0). The "
+        f"flange frame may include it already.",
+    )
 
 
 @computes("tracker.orientation_negligible")
@@ -150,7 +172,8 @@ def orientation_negligible():
     noise = mean[COLUMNS.index("mean_deg")]
     return Computed(
         "negligible" if angle < noise else "not negligible",
-        proof=f"The identified turn of {angle:.2f} deg is {angle / noise:.1f} times the mean error of a reading and {angle / spread:.0f} times the spread over "
+        proof=f"The identified turn of {angle:.2f} deg is {angle / noise:.1f} times the mean error of a reading and "
+        f"{angle / spread:.0f} times the spread over "
         "the six runs.",
     )
 
@@ -159,7 +182,10 @@ def orientation_negligible():
 def offset_after_half_turn():
     """The mounting seen with x and y reversed, as a half turn about z would, beside the conclusion's offset."""
     x, y, z = 1000 * table_d()[1][:3]
-    proof = f"Appendix D and section 3.1 give {z:.2f} mm; the conclusion's 65.3 mm is {65.3 - z:.1f} mm more, and a half turn about z leaves z alone."
+    proof = (
+        f"Appendix D and section 3.1 give {z:.2f} mm; the conclusion's 65.3 mm is {65.3 - z:.1f} mm more, and a "
+        "half turn about z leaves z alone."
+    )
     return Computed(np.array([-x, -y, z]), 1000 * table_d()[3][RUNS][:3], proof=proof)
 
 
@@ -169,21 +195,29 @@ def unit_of_angular_speed_claim():
     return Computed(
         "deg/s",
         misprint=fastest < 5,
-        proof=f"A mean error of 5 rad/s would exceed the fastest angular speed of all motions, {fastest} rad/s; the conclusion speaks of 3 deg/s.",
+        proof=f"A mean error of 5 rad/s would exceed the fastest angular speed of all motions, {fastest} rad/s; the "
+        f"conclusion speaks of 3 deg/s.",
     )
 
 
 @computes("tracker.speed_claim")
 def angular_speed_claims():
     """Mean error claimed in section 3.2 against the largest one claimed in the conclusion."""
-    return Computed(3.0, proof="A mean of 5 deg/s (section 3.2) cannot exceed the 3 deg/s that the conclusion states as the largest error.")
+    return Computed(
+        3.0,
+        proof="A mean of 5 deg/s (section 3.2) cannot exceed the 3 deg/s that the conclusion states as the largest "
+        "error.",
+    )
 
 
 @computes("tracker.reach")
 def reaches():
     """Data-sheet reaches from the DH model, mm: axis 1 to 6, R.M, R.m1, R.m2, R.b."""
     fold = robot.TX40.q_max[2]
-    folded, stretched = robot.wrist_reach(robot.TX40, [0, 0, fold, 0, 0, 0]), robot.wrist_reach(robot.TX40, [0, np.pi / 2, 0, 0, 0, 0])
+    folded, stretched = (
+        robot.wrist_reach(robot.TX40, [0, 0, fold, 0, 0, 0]),
+        robot.wrist_reach(robot.TX40, [0, np.pi / 2, 0, 0, 0, 0]),
+    )
     flange = robot.forward_kinematics(robot.TX40.dh, [0, np.pi / 2, 0, 0, 0, 0])
     away = np.hypot(stretched[0], robot.SHOULDER_OFFSET)
     half_degree = np.deg2rad(0.5)
@@ -193,7 +227,8 @@ def reaches():
     return Computed(
         values,
         bound,
-        proof=f"The elbow's limit is printed as 138 deg: half a degree of rounding moves this reach by {bound[3]:.1f} mm. All reaches are measured in the plane of "
+        proof=f"The elbow's limit is printed as 138 deg: half a degree of rounding moves this reach by {bound[3]:.1f} "
+        f"mm. All reaches are measured in the plane of "
         f"the arm: with the shoulder offset the wrist gets {away:.1f} mm away from axis 1.",
     )
 
@@ -205,13 +240,19 @@ def wrist_to_flange():
 
 @computes("tracker.motion")
 def motion_speeds():
-    """Speeds of the simulated motions: 20 % and 100 % quantile of the speed (m/s) and the angular speed (rad/s) of the tracker."""
+    """Speeds of the simulated motions: 20 % and 100 % quantile of the speed (m/s) and the angular speed (rad/s) of the
+    tracker."""
     rows = []
     for name in tracker_simulation.MOTIONS:
         v, w = tracker_simulation.motion_speeds(name)
         rows.append([np.quantile(v, 0.2) / 1000, v.max() / 1000, np.quantile(w, 0.2), w.max()])
     rows = np.array(rows)
-    return Computed(rows, 0.35 * rows, simulated=True, proof="Path and timing were not published; a path of seven points, run in 10, 5 and 2.5 s.")
+    return Computed(
+        rows,
+        0.35 * rows,
+        simulated=True,
+        proof="Path and timing were not published; a path of seven points, run in 10, 5 and 2.5 s.",
+    )
 
 
 @computes("tracker.motion_turn")
@@ -230,7 +271,8 @@ def mean_errors_in_motion():
         errors.append([e.translation.mean(), np.rad2deg(e.rotation.mean()), np.median(e.translation)])
     errors = np.array(errors)
     proof = (
-        f"Simulated with {100 * tracker_simulation.MOVING.nonsense * tracker_simulation.MOVING.burst:.0f} % nonsense: the means of slow, middle and fast are "
+        f"Simulated with {100 * tracker_simulation.MOVING.nonsense * tracker_simulation.MOVING.burst:.0f} % nonsense: "
+        f"the means of slow, middle and fast are "
         + ", ".join(f"{mm:.0f} mm / {deg:.1f} deg" for mm, deg, _ in errors)
         + ", the medians "
         + ", ".join(f"{median:.1f} mm" for median in errors[:, 2])
@@ -243,7 +285,14 @@ def mean_errors_in_motion():
 def calibration_errors():
     """Averages over the six synthetic runs, in the order mean mm, mean deg, max mm, E_trans mm, E_rot."""
     rows = [
-        [np.nanmean(m.translation[1:]), np.rad2deg(np.nanmean(m.rotation[1:])), np.nanmax(m.translation), m.E_trans, m.E_rot] for m in synthetic_mountings()
+        [
+            np.nanmean(m.translation[1:]),
+            np.rad2deg(np.nanmean(m.rotation[1:])),
+            np.nanmax(m.translation),
+            m.E_trans,
+            m.E_rot,
+        ]
+        for m in synthetic_mountings()
     ]
     return Computed(
         np.mean(rows, axis=0),

@@ -20,7 +20,8 @@ def joints(state):
 
 
 def compute_tx40(state):
-    """Arm, poses of flange and tracker, and what the first three joints can do at the flange: singular values, mm per rad."""
+    """Arm, poses of flange and tracker, and what the first three joints can do at the flange: singular values, mm per
+    rad."""
     q = joints(state)
     T_BF = robot.forward_kinematics(TX40.dh, q)
     values = np.linalg.svd(robot.jacobian(TX40.dh, q)[3:, :3], compute_uv=False)
@@ -43,7 +44,8 @@ def _sentence(result):
             f"A singular arm: in one direction the flange moves only {result['singular_values'][-1]:.0f} mm per rad. "
             "Stretched out, no joint can push it farther."
         )
-    return f"The tracker E is at ({x:.0f}, {y:.0f}, {z:.0f}) mm in the base, {np.linalg.norm(T_FE[:3, 3]):.0f} mm off the flange F."
+    off = np.linalg.norm(T_FE[:3, 3])
+    return f"The tracker E is at ({x:.0f}, {y:.0f}, {z:.0f}) mm in the base, {off:.0f} mm off the flange F."
 
 
 def tx40():
@@ -74,7 +76,9 @@ def tx40():
         compute=compute_tx40,
         handles={"flange": Handle(tuple(robot.forward_kinematics(TX40.dh, HOME)[:3, 3]), step=10, label="flange")},
         controls={
-            name: slider(float(limits[0, k]), float(limits[1, k]), float(round(start[k])), step=1.0, label=f"joint {k + 1} (deg)")
+            name: slider(
+                float(limits[0, k]), float(limits[1, k]), float(round(start[k])), step=1.0, label=f"joint {k + 1} (deg)"
+            )
             for k, name in enumerate(ARM)
         },
         constrain=follow,

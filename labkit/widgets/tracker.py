@@ -23,7 +23,8 @@ IDLE = 1.5  # s without a look after which the stream ends by itself
 
 
 class Link:
-    """A simulated tracker and a receiver, connected by real UDP packets; both start at the first look and end when nobody looks any more."""
+    """A simulated tracker and a receiver, connected by real UDP packets; both start at the first look and end when
+    nobody looks any more."""
 
     def __init__(self):
         self.faults, self.nonsense = udp.Faults(duplicate=0.01, reorder=0.02, malformed=0.01), False
@@ -56,7 +57,8 @@ class Link:
 
 
 def compute_live(readings, statistics):
-    """What the picture shows of readings (k, 23): positions (mm), which passed the gate, the filtered path, the last pose, the statistics."""
+    """What the picture shows of readings (k, 23): positions (mm), which passed the gate, the filtered path, the last
+    pose, the statistics."""
     if len(readings) < 5:
         readings = tracker.packet_from_pose(np.tile(np.eye(4), (5, 1, 1)), np.arange(5) / tracker_simulation.RATE)
     positions = 1000 * readings[:, tracker.POSITION]
@@ -70,7 +72,8 @@ def _live_words(result):
     bad = "\n".join(f"   {count} {reason}" for reason, count in sorted(s.bad.items())) or "   none"
     return (
         f"datagrams   {s.datagrams}\ngood   {s.good}\nlate   {s.late}\nduplicates   {s.duplicates}\n"
-        f"lost (from time stamps)   {s.lost}\nrefused by the gate, of {len(result['used'])}   {np.count_nonzero(~result['used'])}\nbad\n{bad}"
+        f"lost (from time stamps)   {s.lost}\nrefused by the gate, of {len(result['used'])}   "
+        f"{np.count_nonzero(~result['used'])}\nbad\n{bad}"
     )
 
 
@@ -115,7 +118,8 @@ def live_tracker():
     )
 
 
-# ---- A X = X B with two axes ------------------------------------------------------------------------------------------
+# ---- A X = X B with two axes
+# ------------------------------------------------------------------------------------------
 
 REPEATS = 60
 X_TRUE = pose(exp_so3([0.3, -0.5, 0.4]), [30.0, -20.0, 60.0])
@@ -132,8 +136,9 @@ def _axes_noise():
 def compute_two_axes(state):
     """Two motions about the dragged axes, calibrated from noisy readings again and again by the report's method.
 
-    Returns a dictionary: axes (2, 3), angle_deg between them, singular_values (9,) without noise, found (n, 3, 3), error_deg and error_mm (median),
-    predicted_deg (rms, from the smallest but one singular value), free: path of the tip of X that parallel axes leave undetermined, (m, 3).
+    Returns a dictionary: axes (2, 3), angle_deg between them, singular_values (9,) without noise, found (n, 3, 3),
+    error_deg and error_mm (median), predicted_deg (rms, from the smallest but one singular value), free: path of the
+    tip of X that parallel axes leave undetermined, (m, 3).
     """
     axes = normalize(np.array([state["a"], state["b"]]))
     angle, noise = np.deg2rad(state["angle"]), np.deg2rad(state["noise"])
@@ -150,7 +155,11 @@ def compute_two_axes(state):
     t = (np.linalg.pinv(K1) @ K2)[..., 0]
     turn, off = pose_distance(pose(X, t), X_TRUE)
     apart = np.rad2deg(np.arctan2(np.linalg.norm(np.cross(*axes)), abs(axes[0] @ axes[1])))
-    free = exp_so3(np.linspace(0, 2 * np.pi, 60)[:, None] * axes[0]) @ X_TRUE[:3, 0] if apart < 2 else np.full((1, 3), np.nan)
+    free = (
+        exp_so3(np.linspace(0, 2 * np.pi, 60)[:, None] * axes[0]) @ X_TRUE[:3, 0]
+        if apart < 2
+        else np.full((1, 3), np.nan)
+    )
     return {
         "axes": axes, "angle_deg": apart, "singular_values": values, "found": X, "free": 0.55 * free,
         "error_deg": float(np.rad2deg(np.median(turn))), "error_mm": float(np.median(off)),
@@ -165,10 +174,12 @@ def _on_sphere(state, moved):
 def _axes_sentence(result):
     if result["angle_deg"] < 2:
         return (
-            f"The axes are {result['angle_deg']:.1f} deg apart: the mounting may turn freely about them (dashed circle). "
+            f"The axes are {result['angle_deg']:.1f} deg apart: the mounting may turn freely about them (dashed "
+            f"circle). "
             f"Median error {result['error_deg']:.0f} deg, and the residuals look perfect."
         )
-    return f"Axes {result['angle_deg']:.0f} deg apart: median error {result['error_deg']:.2g} deg and {result['error_mm']:.2g} mm."
+    error = f"{result['error_deg']:.2g} deg and {result['error_mm']:.2g} mm"
+    return f"Axes {result['angle_deg']:.0f} deg apart: median error {error}."
 
 
 def two_axes():
@@ -185,7 +196,10 @@ def two_axes():
             picture.set(result["axes"], pose(X_TRUE[:3, :3], np.zeros(3)), result["found"], result["free"])
             space.draw(state["view"])
             draw.set_singular_values(stems, markers, result["singular_values"])
-            words.set_text(f"error {result['error_deg']:.2g} deg, {result['error_mm']:.2g} mm\npredicted {result['predicted_deg']:.2g} deg")
+            words.set_text(
+                f"error {result['error_deg']:.2g} deg, {result['error_mm']:.2g} mm\npredicted "
+                f"{result['predicted_deg']:.2g} deg"
+            )
 
         return [*space.artists, stems, markers, words], update
 
@@ -241,7 +255,8 @@ def compute_dynamic(state):
     mended = np.linalg.norm(read[:, :3, 3] - tracker.shift_time(time, T, -offset)[:, :3, 3], axis=1)
     keep = tracker.reject_outliers(mended, 6.0)
     return {
-        "share": np.linspace(0, 1, len(time)), "error": error, "bad": bad, "mended": mended, "keep": keep, "offset_ms": 1000 * offset,
+        "share": np.linspace(0, 1, len(time)), "error": error, "bad": bad, "mended": mended, "keep": keep,
+        "offset_ms": 1000 * offset,
         "raw_summary": tracker.summarize(error), "mended_summary": tracker.summarize(mended[keep]),
     }  # fmt: skip
 
@@ -289,7 +304,12 @@ def dynamic_errors():
 
 # ---- methods beside the bound ----------------------------------------------------------------------------------------
 
-CASES = {"0.1 deg, 0.1 mm": (0.1, 0.1), "0.1 deg, 1 mm": (0.1, 1.0), "0.5 deg, 0.1 mm": (0.5, 0.1), "0.5 deg, 1 mm": (0.5, 1.0)}
+CASES = {
+    "0.1 deg, 0.1 mm": (0.1, 0.1),
+    "0.1 deg, 1 mm": (0.1, 1.0),
+    "0.5 deg, 0.1 mm": (0.5, 0.1),
+    "0.5 deg, 1 mm": (0.5, 1.0),
+}
 
 
 @functools.cache
@@ -302,7 +322,11 @@ def compute_methods(state):
     table = _benchmark()
     deg, mm = CASES[state["case"]]
     rows = (table["std_deg"] == deg) & (table["std_mm"] == mm)
-    return {"names": list(table["method"][rows]), "rotation": table["rotation"][rows], "translation": table["translation"][rows]}
+    return {
+        "names": list(table["method"][rows]),
+        "rotation": table["rotation"][rows],
+        "translation": table["translation"][rows],
+    }
 
 
 def methods():
@@ -346,10 +370,13 @@ def _stops():
 
 
 def compute_six_runs(state):
-    """Six calibrations over the same 21 poses, with a systematic error of a size (mm rms an axis) that depends on the place."""
+    """Six calibrations over the same 21 poses, with a systematic error of a size (mm rms an axis) that depends on the
+    place."""
     T_BF, T_BE = _stops()
     field = float(state["field"])
-    tracker_now = Tracker(std_position=0.06, std_rotation=np.deg2rad(0.008), field_position=field, field_rotation=np.deg2rad(0.14) * field)
+    tracker_now = Tracker(
+        std_position=0.06, std_rotation=np.deg2rad(0.008), field_position=field, field_rotation=np.deg2rad(0.14) * field
+    )
     results = []
     for run in range(tracker_simulation.RUNS):
         rng = np.random.default_rng([66, run])
@@ -363,7 +390,8 @@ def compute_six_runs(state):
     return {
         "results": results, "spread": np.cov(results.T, bias=True), "mean": results.mean(0),
         "single": single.target[:3, 3], "claim": single.covariance[9:, 9:],
-        "off": float(np.linalg.norm(results.mean(0) - T_FE[:3, 3])), "std": float(np.sqrt(np.trace(np.cov(results.T, bias=True)))),
+        "off": float(np.linalg.norm(results.mean(0) - T_FE[:3, 3])),
+        "std": float(np.sqrt(results.var(0).sum())),
     }  # fmt: skip
 
 
@@ -377,7 +405,9 @@ def six_runs():
         words = right.text(0.0, 0.9, "", transform=right.transAxes, va="top", linespacing=1.7)
 
         def update(state, result):
-            picture.set(result["results"][:, 1:], result["spread"][1:, 1:], result["single"][1:], result["claim"][1:, 1:])
+            picture.set(
+                result["results"][:, 1:], result["spread"][1:, 1:], result["single"][1:], result["claim"][1:, 1:]
+            )
             words.set_text(
                 f"spread over six runs\n{result['std']:.2f} mm\n\nmean off the truth\n{result['off']:.2f} mm\n\n"
                 f"std that one run claims\n{np.sqrt(np.trace(result['claim'])):.2f} mm"
@@ -392,5 +422,7 @@ def six_runs():
         controls={"field": slider(0.0, 4.0, 2.0, step=0.1, label="systematic error (mm)")},
         fail={"field": 4.0},
         presets={"no systematic error": {"field": 0.0}},
-        describe=lambda r: f"The six runs agree within {r['std']:.2f} mm; their mean is {r['off']:.2f} mm off the truth.",
+        describe=lambda r: (
+            f"The six runs agree within {r['std']:.2f} mm; their mean is {r['off']:.2f} mm off the truth."
+        ),
     )

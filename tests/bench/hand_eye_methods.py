@@ -2,8 +2,9 @@
 
     python tests/bench/hand_eye_methods.py [trials]
 
-Needs "opencv-python-headless<5" and scipy, in an environment of its own. Robot poses exact, turns up to 60 deg about random axes, positions within +-200 mm,
-the target about 700 mm away; noise per axis on the sensor's readings; 20 poses, 400 trials, seeds as below.
+Needs "opencv-python-headless<5" and scipy, in an environment of its own. Robot poses exact, turns up to 60 deg about
+random axes, positions within +-200 mm, the target about 700 mm away; noise per axis on the sensor's readings; 20 poses,
+400 trials, seeds as below.
 """
 
 import csv
@@ -32,13 +33,20 @@ def draw(rng, std_rot, std_trans):
     axes *= np.deg2rad(60) * rng.uniform(0.1, 1, (POSES, 1)) / np.linalg.norm(axes, axis=1, keepdims=True)
     T_BF = pose(exp_so3(axes), rng.uniform(-200, 200, (POSES, 3)))
     exact = invert(T_FS) @ invert(T_BF) @ T_BT
-    noise = pose(exact[:, :3, :3] @ exp_so3(std_rot * rng.normal(size=(POSES, 3))), exact[:, :3, 3] + std_trans * rng.normal(size=(POSES, 3)))
+    noise = pose(
+        exact[:, :3, :3] @ exp_so3(std_rot * rng.normal(size=(POSES, 3))),
+        exact[:, :3, 3] + std_trans * rng.normal(size=(POSES, 3)),
+    )
     return T_BF, exact, noise
 
 
 def opencv(T_BF, T_ST, method):
     R, t = cv2.calibrateHandEye(
-        T_BF[:, :3, :3], T_BF[:, :3, 3], T_ST[:, :3, :3], T_ST[:, :3, 3], method=getattr(cv2, f"CALIB_HAND_EYE_{method}")
+        T_BF[:, :3, :3],
+        T_BF[:, :3, 3],
+        T_ST[:, :3, :3],
+        T_ST[:, :3, 3],
+        method=getattr(cv2, f"CALIB_HAND_EYE_{method}"),
     )
     return pose(R, t.ravel())
 
@@ -57,7 +65,9 @@ def main(trials=400):
             found["report"] = axxb.solve_ax_xb(invert(T_BF[1:]) @ motions[0], T_ST[1:] @ invert(motions[1]))
             found["maximum likelihood"] = axxb.calibrate_hand_eye(T_BF, T_ST).T_FS
             for name, T in found.items():
-                errors.setdefault(name, []).append([rotation_angle(T_FS[:3, :3].T @ T[:3, :3]), np.linalg.norm(T[:3, 3] - T_FS[:3, 3])])
+                errors.setdefault(name, []).append(
+                    [rotation_angle(T_FS[:3, :3].T @ T[:3, :3]), np.linalg.norm(T[:3, 3] - T_FS[:3, 3])]
+                )
         limit = np.sqrt(np.mean(bounds, axis=0))
         for name, e in errors.items():
             ratio = np.sqrt(np.mean(np.square(e), axis=0)) / limit

@@ -2,7 +2,8 @@
 
     python tests/bench/udp_stream.py [seconds] [speed]
 
-Every good packet must be counted once and every bad one reported; prints both sides' books and the memory and time it took.
+Every good packet must be counted once and every bad one reported; prints both sides' books and the memory and time it
+took.
 """
 
 import resource
@@ -14,7 +15,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
 
-from labkit import tracker, udp  # noqa: E402
+from labkit import tracker, udp
 
 
 def main(seconds=60.0, speed=1.0):
@@ -25,11 +26,17 @@ def main(seconds=60.0, speed=1.0):
     T[:, 0, 3] = np.arange(count) % 1000
     packets = [tracker.encode_packet(v) for v in tracker.packet_from_pose(T, np.arange(count) / 250)]
     started, cpu = time.perf_counter(), time.process_time()
-    with udp.listen(keep=count) as listener, udp.Sender(udp.stream(packets, 250.0, faults, rng), listener.port, speed) as sender:
+    with (
+        udp.listen(keep=count) as listener,
+        udp.Sender(udp.stream(packets, 250.0, faults, rng), listener.port, speed) as sender,
+    ):
         sender.finished.wait(seconds / speed + 30)
         time.sleep(0.3)
         statistics, stamps = listener.statistics(), listener.readings()[:, tracker.TIME]
-    print(f"{time.perf_counter() - started:.1f} s, {time.process_time() - cpu:.1f} s of processor time, {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
+    print(
+        f"{time.perf_counter() - started:.1f} s, {time.process_time() - cpu:.1f} s of processor time, "
+        f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB"
+    )
     print("sent    ", dict(sender.sent))
     print("received", statistics)
     sent = sender.sent
