@@ -217,7 +217,7 @@ def e_trans(residuals):
 # %% reject_outliers
 @ex.reject_outliers
 def reject_outliers(values, factor=4.0):
-    """Return a bool array, True where values, shape (n,), lie within factor robust standard deviations of the median."""
+    """Return a bool array, shape (n,): True where values lie within factor robust standard deviations of the median."""
     ### BEGIN SOLUTION
     distance = np.abs(values - np.median(values))
     return distance <= factor * 1.4826 * np.median(distance)
@@ -227,8 +227,8 @@ def reject_outliers(values, factor=4.0):
 # %% the-log [markdown]
 # ## Calibrate
 #
-# `run_1.csv` is a synthetic log of such a run, its true mounting the report's result. The stops are averaged for you, and `kept` says which pose has to go. Put your
-# functions in a row; the result is a matrix, in mm.
+# `run_1.csv` is a synthetic log of such a run, its true mounting the report's result. The stops are averaged for you, `A` and `B` are the motions since pose 0, and `kept`
+# says which pose has to go (pose 0 itself is no motion). Put your functions in a row; the result is a matrix, in mm.
 
 # %% read-the-log
 poses = read_table("tracker/poses.csv")
@@ -236,12 +236,13 @@ joints = np.deg2rad(np.column_stack([poses[f"q{i} [deg]"] for i in range(1, 7)])
 T_BF = np.array([forward_kinematics(robot.TX40.dh, q) for q in joints])
 T_WE, used = tracker.average_stops(tracker.read_csv(DATA / "tracker/run_1.csv"))
 kept = tracker.calibrate_mounting(T_BF, T_WE).kept
+A, B = relative(T_BF[0], T_BF), relative(T_WE[0], T_WE)
 print("share of readings used at a stop:", used.min(), "to", used.max(), "- excluded pose:", np.flatnonzero(~kept))
 
 # %% mounting
 mounting = ...  # your code here
 ### BEGIN SOLUTION
-A, B = relative(T_BF[0], T_BF)[kept][1:], relative(T_WE[0], T_WE)[kept][1:]
+A, B = A[kept][1:], B[kept][1:]
 M = np.concatenate([kron_row(a[:3, :3], b[:3, :3]) for a, b in zip(A, B)])
 mounting = np.eye(4)
 mounting[:3, :3] = rotation_from_nullvector(M)

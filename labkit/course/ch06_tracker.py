@@ -553,8 +553,8 @@ CHAPTER = Chapter(
             unit="mm",
             metric=metrics.poses(0.002, 0.02),
             hints=(
-                "Put your own functions in a row: motions, blocks, rotation, translation. Pose 13 of this run is nonsense and must not take part.",
-                "A = T_BF[0]^-1 T_BF[i], B = T_WE[0]^-1 T_WE[i], for all poses that are kept, without the reference itself.",
+                "Put your own functions in a row: blocks, rotation, translation. Pose 13 of this run is nonsense and must not take part.",
+                "A = A[kept][1:] and B = B[kept][1:] are the motions that take part: kept poses, without the reference itself.",
                 "M = np.concatenate([kron_row(a[:3, :3], b[:3, :3]) for a, b in zip(A, B)]), then rotation_from_nullvector and translation_lsq.",
             ),
             mistakes=[
