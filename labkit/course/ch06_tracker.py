@@ -608,8 +608,8 @@ CHAPTER = Chapter(
         ),
         Prediction(
             "methods",
-            question="The tracker's rotations are noisy (0.5 deg), its translations good (0.1 mm). Whose mounting is best?",
-            choices=("all alike", "rotation first, then translation", "both together, weighed by their noise"),
+            question="Rotations are noisy (0.5 deg), translations good (0.1 mm). What is best?",
+            choices=("all methods alike", "rotation first, then translation", "both together, weighed by their noise"),
             answer="both together, weighed by their noise",
             why="Good translations at a distance know the rotation better than the rotations do. Methods that solve the rotation first throw that away.",
         ),
