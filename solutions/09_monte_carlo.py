@@ -304,11 +304,10 @@ print(f"heaviest cluster     x = {mode[0]:.1f}, y = {mode[1]:.1f}, cell {words[i
 # %% soccer [markdown]
 # ## Against the document: the soccer field
 #
-# The lecture's example (slides *Beispiel (1)*, *(2)* behind the landmark model): an Aibo robot with six landmarks,
-# and three paths, the true one, odometry, and MCL.
-# Its numbers were never published, so this run is simulated, with the path lines as on the slide. Let the camera read
-# only ranges or only bearings,
-# which the slide says is possible.
+# The lecture's example (slides *Beispiel (1)*, *(2)* behind the landmark model): an Aibo robot among six landmarks, and
+# three paths, the true one, odometry, and MCL. The start is known here: *local* localization. Numbers were never
+# published, so this run is simulated, with the three lines as on the slide. Let the camera read only ranges or only
+# bearings, which the slide says is possible.
 
 # %% soccer-stage
 stages.soccer()
