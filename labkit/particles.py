@@ -27,6 +27,7 @@ CONTROL_NOISE = {  # variances per way as the lecture prints them: (5 cm)^2 per 
     "k_drift": math.radians(2.0) ** 2 / 1.0,
 }
 SENSORS = ("landmarks", "beams", "likelihood field")
+MAX_INJECTED = 0.5  # share of the cloud that one step may replace: the rest must be able to hold on to what is right
 _BIN_TURN, _MODE_TURN = math.radians(15), math.radians(30)
 
 
@@ -479,7 +480,7 @@ class MonteCarloLocalizer:
         The log weights are multiplied by it. Neighboring beams share their errors: 60 of them do not know 60 times
         as much as one.
     draw : function (n, rng) -> states, optional
-        Where recovery takes random poses from; without it there is no recovery.
+        Where recovery takes random poses from, for at most half of the cloud a step; without it there is no recovery.
     recovery : (alpha_slow, alpha_fast)
     kld : dict, optional
         Options of `kld_take`, with which each resampling chooses the number of particles, up to the first cloud's.
@@ -537,7 +538,7 @@ class MonteCarloLocalizer:
                 share, *self.averages = recover(w_mean, slow, fast, *self.recovery)
         effective = effective_size(self.weights)
         due = self.count % self.every == 0 and effective < self.threshold * len(self.states)
-        injected = int(round(share * len(self.states)))
+        injected = int(round(min(share, MAX_INJECTED) * len(self.states)))
         if due or injected or self.threshold >= 1 and self.count % self.every == 0:
             self._redraw(injected, rng)
             due = True
