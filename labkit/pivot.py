@@ -333,7 +333,7 @@ class _Weighted:
 def _weighted(X, tip, pivot, values, noise):
     n, problem = X.shape[1], _Weighted(X, noise)
     w = np.ones(n)
-    for _ in range(2):  # the weights know the tip through its length and direction alone: two steps settle them
+    for _ in range(3):  # the weights know the tip through its length and direction alone: three steps settle them
         problem.look(tip, pivot)
         step, N = problem.step(w)
         tip, pivot = tip + step[:3], pivot + step[3:]

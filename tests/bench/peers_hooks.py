@@ -1,0 +1,25 @@
+"""Library functions behind the hooks of the peers' benchmark: {hook name: function with the hook's arguments}."""
+
+import numpy as np
+
+from labkit import chaining, frames, pivot
+
+POSE_NOISE = (np.deg2rad(0.1), 0.2)  # rad and mm, as the benchmark draws them
+
+
+def plain_pivot(T):
+    result = pivot.calibrate_pivot(T)
+    return result.tip, result.pivot
+
+
+def robust_pivot(T):
+    result = pivot.calibrate_pivot(T, *POSE_NOISE, robust=True)
+    return result.tip, result.pivot
+
+
+HOOKS = {
+    "pivot": plain_pivot,
+    "pivot_robust": robust_pivot,
+    "frames": frames.frame_from_points,
+    "chain": lambda A, B, C: chaining.chain((A, B, C)),
+}
