@@ -1,8 +1,8 @@
 """Chained transforms: the product around a loop, its closure error, how it grows, and how to share it out.
 
-A loop of N links T_01, T_12, ... T_(N-1)0 should multiply to the identity; what is left is the closure error. Noise is meant link by
-link: T_k exp(xi_k) with a twist xi_k = (phi, rho) of independent components. Lengths in mm, angles in radians.
-Source: lab sheet "Kalibrierung", Hochschule Darmstadt 2016, section 2.
+A loop of N links T_01, T_12, ... T_(N-1)0 should multiply to the identity; what is left is the closure error. Noise
+is meant link by link: T_k exp(xi_k) with a twist xi_k = (phi, rho) of independent components. Lengths in mm, angles
+in radians. Source: lab sheet "Kalibrierung", Hochschule Darmstadt 2016, section 2.
 """
 
 from dataclasses import dataclass
@@ -129,8 +129,8 @@ def orthonormalize(T):
 def rounding_bound(transforms, half_unit=HALF_DIGIT):
     """How far rounding of the printed links can move each entry of their product, to first order.
 
-    Every entry of every link (the last row is exact) may be off by `half_unit`. An error E in link k arrives in the product as
-    (links before k) E (links after k): the lever. The bound adds the absolute values over all links.
+    Every entry of every link (the last row is exact) may be off by `half_unit`. An error E in link k arrives in the
+    product as (links before k) E (links after k): the lever. The bound adds the absolute values over all links.
 
     Parameters
     ----------
@@ -156,8 +156,9 @@ def rounding_bound(transforms, half_unit=HALF_DIGIT):
 def distribute_closure(transforms, shares=None):
     """Correct the links of a loop so that their product is the identity and each link takes its share of the error.
 
-    The product is exp(xi). The pose after link k is moved by exp(-s_k xi), where s_k is the sum of the shares up to k; so the change of
-    link k, seen from the first frame, is the same screw exp(-share_k xi) for all links, and its angle is share_k times the closure angle.
+    The product is exp(xi). The pose after link k is moved by exp(-s_k xi), where s_k is the sum of the shares up to
+    k; so the change of link k, seen from the first frame, is the same screw exp(-share_k xi) for all links, and its
+    angle is share_k times the closure angle.
 
     Parameters
     ----------
@@ -193,12 +194,14 @@ def distribute_closure(transforms, shares=None):
 def expected_closure(transforms, std_rot, std_trans):
     """Closure error to expect from noisy links, to first order.
 
-    Angles add like random steps; a turn at frame k moves the end of the chain by its lever l_k, the distance from frame k to the end:
+    Angles add like random steps; a turn at frame k moves the end of the chain by its lever l_k, the distance from
+    frame k to the end:
 
         angle^2    = 3 N std_rot^2
         distance^2 = 3 N std_trans^2 + 2 std_rot^2 sum |l_k|^2
 
-    On a straight chain of N equal links the sum grows with N^3, so the distance grows with N^1.5; on a loop of fixed size with N^0.5.
+    On a straight chain of N equal links the sum grows with N^3, so the distance grows with N^1.5; on a loop of fixed
+    size with N^0.5.
 
     Parameters
     ----------
@@ -258,9 +261,9 @@ def straight_chain(n, length):
 class PoseGraph:
     """Poses that fit many measured links at once.
 
-    poses: (n, 4, 4), node 0 is the identity. residuals: (m, 6), log(Z^-1 X_i^-1 X_j), rotation (rad) first. chi2: weighted sum of
-    squares, to be expected near dof. covariance: of the twists of nodes 1..n-1 in their own frames, (6n - 6, 6n - 6).
-    singular_values: of the weighted Jacobian.
+    poses: (n, 4, 4), node 0 is the identity. residuals: (m, 6), log(Z^-1 X_i^-1 X_j), rotation (rad) first. chi2:
+    weighted sum of squares, to be expected near dof. covariance: of the twists of nodes 1..n-1 in their own frames,
+    (6n - 6, 6n - 6). singular_values: of the weighted Jacobian.
     """
 
     poses: np.ndarray

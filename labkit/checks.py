@@ -73,9 +73,9 @@ def _refuse_sheared(R, name):
 def _are_certainly_rigid(T, block=1024):
     """True only when `as_transforms` would find nothing wrong with a stack (..., 4, 4).
 
-    Quick, because it works on contiguous rows of components: with columns x, y, z, the conditions x cross y = z, y cross z = x and |x| = 1 make
-    a rotation. A sum of squares takes the place of many comparisons; it is NaN or infinite where an entry is. An eighth of the
-    tolerance leaves room for what the omitted products can add up to.
+    Quick, because it works on contiguous rows of components: with columns x, y, z, the conditions x cross y = z, y
+    cross z = x and |x| = 1 make a rotation. A sum of squares takes the place of many comparisons; it is NaN or
+    infinite where an entry is. An eighth of the tolerance leaves room for what the omitted products can add up to.
     """
     T = T.reshape(-1, 4, 4)
     for start in range(0, len(T), block):

@@ -4,9 +4,9 @@ The tool frame F moves, T_WF = (R_i, p_i); the tip sits at `tip` in F and always
 
     R_i tip + p_i = pivot,    stacked:  [R_i  -I] [tip; pivot] = -p_i
 
-The pivot is eliminated by taking means: with D_i = R_i - mean R and d_i = p_i - mean p the tip solves D_i tip = -d_i, and the singular values
-of the full system are sqrt(n (1 +- s_k)) with the singular values s_k of mean R. Lengths in mm, angles in radians.
-Source: lab sheet "Kalibrierung", Hochschule Darmstadt 2016, section 3.
+The pivot is eliminated by taking means: with D_i = R_i - mean R and d_i = p_i - mean p the tip solves D_i tip = -d_i,
+and the singular values of the full system are sqrt(n (1 +- s_k)) with the singular values s_k of mean R. Lengths in
+mm, angles in radians. Source: lab sheet "Kalibrierung", Hochschule Darmstadt 2016, section 3.
 """
 
 import math
@@ -32,9 +32,10 @@ POSES = ("x", "y", "z", "a_deg", "b_deg", "c_deg")
 class PivotCalibration:
     """Where the tip is, and how well the poses say so.
 
-    tip: (3,) in the tool frame F. pivot: (3,) in W. residuals: (n, 3), R tip + p - pivot in W. s0: sqrt(r'r / n) as in the lab sheet, a
-    distance in space. std: unbiased standard deviation of one coordinate, sqrt(r'r / (3n - 6)). covariance: (6, 6) of tip and pivot.
-    singular_values: (6,) of the stacked matrix, largest first. weights: (n,), 1 unless robust.
+    tip: (3,) in the tool frame F. pivot: (3,) in W. residuals: (n, 3), R tip + p - pivot in W. s0: sqrt(r'r / n) as
+    in the lab sheet, a distance in space. std: unbiased standard deviation of one coordinate, sqrt(r'r / (3n - 6)).
+    covariance: (6, 6) of tip and pivot. singular_values: (6,) of the stacked matrix, largest first. weights: (n,), 1
+    unless robust.
     """
 
     tip: np.ndarray
@@ -50,12 +51,15 @@ class PivotCalibration:
 def poses_in_listing():
     """Number of poses in the unpublished Kreisel.txt, from the line numbers of the printed output.
 
-    Each "Ptest" block takes five lines: heading, three numbers, blank. The last block must end right before the line of s0.
+    Each "Ptest" block takes five lines: heading, three numbers, blank. The last block must end right before the line
+    of s0.
     """
     table = read_table("quirlen/listing.csv", text=("text",))
     first, last, end = table["line"].astype(int)
     if (last - first) % 5 or last + 5 != end:
-        raise ValueError(f"quirlen/listing.csv: blocks of five lines do not fit between the lines {first}, {last} and {end}")
+        raise ValueError(
+            f"quirlen/listing.csv: blocks of five lines do not fit between the lines {first}, {last} and {end}"
+        )
     return (last - first) // 5 + 1
 
 
@@ -116,7 +120,9 @@ def solve_pivot(A, b):
         raise ValueError(f"A and b must have shapes (m, 6) and (m,), got {A.shape} and {b.shape}")
     x, _, rank, values = np.linalg.lstsq(A, b, rcond=RANK_TOLERANCE)
     if rank < 6:
-        raise ValueError(f"A must have rank 6, but its rank is {rank}: the singular values are {np.round(values, 6).tolist()}")
+        raise ValueError(
+            f"A must have rank 6, but its rank is {rank}: the singular values are {np.round(values, 6).tolist()}"
+        )
     return x
 
 
@@ -191,8 +197,9 @@ def calibrate_pivot(T_WF, std_rot=None, std_trans=None, robust=False, rng=None):
     T_WF : array-like, shape (n, 4, 4)
         Measured poses of the tool frame, n >= 3, turned about at least two axes; n >= 5 when robust.
     std_rot, std_trans : float, optional
-        Standard deviation of each component of a pose's rotation vector (rad) and position (mm). Given together, they weight the
-        residuals: orientation noise shakes the tip across its lever, not along it. Then they also scale the covariance (unless robust).
+        Standard deviation of each component of a pose's rotation vector (rad) and position (mm). Given together, they
+        weight the residuals: orientation noise shakes the tip across its lever, not along it. Then they also scale
+        the covariance (unless robust).
     robust : bool
         Give poses that miss by far no weight (Tukey), starting from the best of many three-pose solutions.
     rng : numpy.random.Generator, optional
@@ -207,7 +214,8 @@ def calibrate_pivot(T_WF, std_rot=None, std_trans=None, robust=False, rng=None):
     ValueError
         When the tip is not determined, with the direction in which it is free, in the tool frame.
 
-    Source: lab sheet, section 3; weights by propagating std_rot through the lever; Tukey's weights as in Huber, "Robust Statistics" (1981).
+    Source: lab sheet, section 3; weights by propagating std_rot through the lever; Tukey's weights as in Huber,
+    "Robust Statistics" (1981).
     """
     T = _poses(T_WF, 5 if robust else 3)
     noise = _noise(std_rot, std_trans)
@@ -239,7 +247,9 @@ def _noise(std_rot, std_trans):
         raise ValueError("std_rot and std_trans must come together: only their ratio tells how to weight")
     std_rot, std_trans = float(as_finite(std_rot, "std_rot")), float(as_finite(std_trans, "std_trans"))
     if std_rot < 0 or std_trans <= 0:
-        raise ValueError(f"std_rot must not be negative and std_trans must be positive, got {std_rot:g} and {std_trans:g}")
+        raise ValueError(
+            f"std_rot must not be negative and std_trans must be positive, got {std_rot:g} and {std_trans:g}"
+        )
     return std_rot, std_trans
 
 
@@ -277,7 +287,9 @@ def _tip(gram, n, tolerance):
     if values[5] <= tolerance * values[0]:
         free = int((values <= tolerance * values[0]).sum())
         v = axes[:, 0] * (1.0 if axes[np.abs(axes[:, 0]).argmax(), 0] > 0 else -1.0)
-        where = f"along ({v[0]:.2f}, {v[1]:.2f}, {v[2]:.2f}) in the tool frame" if free == 1 else f"in {free} directions"
+        where = (
+            f"along ({v[0]:.2f}, {v[1]:.2f}, {v[2]:.2f}) in the tool frame" if free == 1 else f"in {free} directions"
+        )
         raise ValueError(
             f"the poses do not fix the tip, it is free {where}: the smallest singular value is {values[5] / values[0]:.1e} of the largest,"
             f" more than {tolerance:.1e} is needed; turn the tool about {'another axis' if free == 1 else 'two axes'}"
@@ -290,7 +302,8 @@ class _Weighted:
     """Weighted least squares about a current tip and pivot, on components (12, n).
 
     With C = std_trans^2 I + std_rot^2 [tip]x[tip]x' (in F) and u = R tip, R C^-1 R' = (I + g u u') / c, where
-    c = std_trans^2 + (std_rot |tip|)^2 and g = (std_rot / std_trans)^2. Without noise figures C = I, and distances are in mm.
+    c = std_trans^2 + (std_rot |tip|)^2 and g = (std_rot / std_trans)^2. Without noise figures C = I, and distances
+    are in mm.
     """
 
     def __init__(self, X, noise):
@@ -378,7 +391,9 @@ def _best_of_samples(T, rng):
     mean = upper.mean(1)
     D = (upper - mean[:, None]).reshape(-1, 9, 4)
     gram = np.swapaxes(D[..., :3], 1, 2) @ D
-    tips = -np.linalg.solve(gram[..., :3] + 1e-9 * IDENTITY, gram[..., 3:])[..., 0]  # the ridge lets a degenerate triple lose
+    tips = -np.linalg.solve(gram[..., :3] + 1e-9 * IDENTITY, gram[..., 3:])[
+        ..., 0
+    ]  # the ridge lets a degenerate triple lose
     pivots = (mean[..., :3] @ tips[..., None])[..., 0] + mean[..., 3]
     squares = _squared_distances(T[order[:SCORED], :3], tips, pivots)
     half = squares.shape[1] // 2
@@ -387,9 +402,11 @@ def _best_of_samples(T, rng):
 
 
 def _squared_distances(upper, tips, pivots):
-    """|R tip + p - pivot|^2 of every candidate in every pose, as one matrix product; (n, 3, 4), (k, 3), (k, 3) -> (k, n).
+    """|R tip + p - pivot|^2 of every candidate in every pose, as one matrix product; (n, 3, 4), (k, 3), (k, 3) -> (k,
+    n).
 
-    Multiplied out: |tip|^2 + |p - pivot|^2 + 2 tip'R'(p - pivot), with positions counted from their mean to keep the digits.
+    Multiplied out: |tip|^2 + |p - pivot|^2 + 2 tip'R'(p - pivot), with positions counted from their mean to keep the
+    digits.
     """
     n, k, R = len(upper), len(tips), upper[..., :3]
     center = upper[..., 3].mean(0)
@@ -433,7 +450,8 @@ def predicted_covariance(R, tip, std_rot, std_trans):
 
 
 def tilted(directions, spin=0.0):
-    """Rotations that turn the tool's z axis to the given directions by the shortest way, after a spin about it; (..., 3) -> (..., 3, 3).
+    """Rotations that turn the tool's z axis to the given directions by the shortest way, after a spin about it; (...,
+    3) -> (..., 3, 3).
 
     `directions` need not have length 1 but must not be zero; `spin` in radians, shape (...).
     """
@@ -457,14 +475,18 @@ def cone(n, half_angle, turns=1.0):
         raise ValueError(f"a cone must have at least one pose, got {n}")
     phi = 2 * np.pi * np.arange(n) / n
     half_angle = float(as_finite(half_angle, "half_angle"))
-    d = np.column_stack([np.sin(half_angle) * np.cos(phi), np.sin(half_angle) * np.sin(phi), np.full(n, np.cos(half_angle))])
+    d = np.column_stack(
+        [np.sin(half_angle) * np.cos(phi), np.sin(half_angle) * np.sin(phi), np.full(n, np.cos(half_angle))]
+    )
     return tilted(d, spin=turns * phi)
 
 
 def touching_poses(R, tip, pivot, std_rot=0.0, std_trans=0.0, rng=None):
-    """Measured poses T_WF of a tool that touches `pivot` with `tip` in the orientations R; (..., n, 3, 3) -> (..., n, 4, 4).
+    """Measured poses T_WF of a tool that touches `pivot` with `tip` in the orientations R; (..., n, 3, 3) -> (..., n,
+    4, 4).
 
-    Noise: R exp(phi) with components of std_rot (rad), position plus components of std_trans; `rng` is needed when either is not 0.
+    Noise: R exp(phi) with components of std_rot (rad), position plus components of std_trans; `rng` is needed when
+    either is not 0.
     """
     R, tip, pivot = as_rotations(R, "R"), as_points(tip, "tip"), as_points(pivot, "pivot")
     T = np.zeros((*R.shape[:-2], 4, 4))

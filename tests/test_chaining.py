@@ -29,7 +29,9 @@ def test_points_file_is_what_its_script_writes():
     written = [line.split(",") for line in (DATA / "chaining" / "points.csv").read_text().splitlines()]
     made = [line.split(",") for line in module.lines()]
     assert [row[:3] for row in made] == [row[:3] for row in written]
-    np.testing.assert_allclose(np.array([row[3:] for row in made[1:]], float), np.array([row[3:] for row in written[1:]], float), atol=1e-5)
+    np.testing.assert_allclose(
+        np.array([row[3:] for row in made[1:]], float), np.array([row[3:] for row in written[1:]], float), atol=1e-5
+    )
 
 
 def test_synthetic_points_round_to_the_printed_transforms_and_product():
@@ -87,10 +89,14 @@ def test_rounding_bound_holds_and_is_reached():
         worst = np.maximum(worst, np.abs(np.linalg.multi_dot(wrong) - product))
     assert (worst <= bound * 1.001).all()
     assert worst[:3].min() > 0 and (worst[:3] / bound[:3]).min() > 0.4
-    signs = np.sign(links[0] @ links[1] @ links[2])[0, :3]  # the signs that push entry (0, 3) furthest through the last link
+    signs = np.sign(links[0] @ links[1] @ links[2])[
+        0, :3
+    ]  # the signs that push entry (0, 3) furthest through the last link
     last = links.copy()
     last[3, :3, 3] += half * signs
-    assert np.linalg.multi_dot(last)[0, 3] - product[0, 3] == pytest.approx(half * np.abs((links[0] @ links[1] @ links[2])[0, :3]).sum())
+    assert np.linalg.multi_dot(last)[0, 3] - product[0, 3] == pytest.approx(
+        half * np.abs((links[0] @ links[1] @ links[2])[0, :3]).sum()
+    )
 
 
 @pytest.mark.parametrize("n", [2, 3, 5, 12])
@@ -102,7 +108,9 @@ def test_distribution_closes_the_loop_and_gives_each_link_its_share(n):
     for given, expected in ((None, np.full(n, 1 / n)), (shares, shares / shares.sum())):
         corrected = chaining.distribute_closure(links, given)
         np.testing.assert_allclose(chaining.chain(corrected), np.eye(4), atol=1e-10)
-        np.testing.assert_allclose(rotation_angle(relative(links, corrected)), expected * np.linalg.norm(twist[:3]), atol=1e-9)
+        np.testing.assert_allclose(
+            rotation_angle(relative(links, corrected)), expected * np.linalg.norm(twist[:3]), atol=1e-9
+        )
         before, after = chaining.stations(links)[:-1], chaining.stations(corrected)
         seen = before @ corrected @ relative(links, np.eye(4)) @ relative(before, np.eye(4))
         np.testing.assert_allclose(log_se3(seen), -expected[:, None] * twist, atol=1e-8)
@@ -119,7 +127,14 @@ def test_distribution_refuses_what_has_no_answer():
         chaining.distribute_closure([np.eye(4), np.eye(4)], [1, 1, 1])
 
 
-@pytest.mark.parametrize("links", [chaining.straight_chain(6, 300.0), chaining.polygon_loop(9, 800.0), chaining.orthonormalize(chaining.printed_transforms())])
+@pytest.mark.parametrize(
+    "links",
+    [
+        chaining.straight_chain(6, 300.0),
+        chaining.polygon_loop(9, 800.0),
+        chaining.orthonormalize(chaining.printed_transforms()),
+    ],
+)
 def test_expected_closure_agrees_with_simulation(links):
     rng, std_rot, std_trans, runs = np.random.default_rng(4), 1e-3, 0.2, 4000
     product = chaining.chain(chaining.noisy_links(links, std_rot, std_trans, rng, runs))

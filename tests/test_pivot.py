@@ -51,13 +51,20 @@ def test_listing_shows_twelve_poses():
 def test_euler_poses_agree_with_scipy():
     rows = np.random.default_rng(1).uniform(-170, 170, (20, 6))
     T = pivot.poses_from_euler(rows)
-    np.testing.assert_allclose(T[:, :3, :3], Rotation.from_euler("XYZ", rows[:, 3:], degrees=True).as_matrix(), atol=1e-14)
+    np.testing.assert_allclose(
+        T[:, :3, :3], Rotation.from_euler("XYZ", rows[:, 3:], degrees=True).as_matrix(), atol=1e-14
+    )
     np.testing.assert_array_equal(T[:, :3, 3], rows[:, :3])
 
 
 def test_exact_poses_give_the_exact_tip():
     T = pivot.touching_poses(turns(np.random.default_rng(2), 7), TIP, POINT)
-    for options in ({}, {"std_rot": 1e-3, "std_trans": 0.2}, {"robust": True}, {"std_rot": 1e-3, "std_trans": 0.2, "robust": True}):
+    for options in (
+        {},
+        {"std_rot": 1e-3, "std_trans": 0.2},
+        {"robust": True},
+        {"std_rot": 1e-3, "std_trans": 0.2, "robust": True},
+    ):
         result = pivot.calibrate_pivot(T, **options)
         np.testing.assert_allclose(result.tip, TIP, atol=1e-9)
         np.testing.assert_allclose(result.pivot, POINT, atol=1e-9)
@@ -162,7 +169,9 @@ def test_estimates_do_not_depend_on_the_unit_of_length():
     meters = T.copy()
     meters[:, :3, 3] /= 1000
     for options in ({}, {"robust": True}):
-        np.testing.assert_allclose(pivot.calibrate_pivot(meters, **options).tip * 1000, pivot.calibrate_pivot(T, **options).tip, rtol=1e-6)
+        np.testing.assert_allclose(
+            pivot.calibrate_pivot(meters, **options).tip * 1000, pivot.calibrate_pivot(T, **options).tip, rtol=1e-6
+        )
 
 
 def test_tukey_constants_are_those_of_three_normal_components():
@@ -181,7 +190,9 @@ def test_tukey_constants_are_those_of_three_normal_components():
 def test_spinning_about_the_tool_axis_is_refused_with_the_direction():
     spin = Rotation.from_rotvec(np.outer(np.linspace(0, 3, 20), [0, 0, 1])).as_matrix()
     T = pivot.touching_poses(spin, TIP, POINT)
-    with pytest.raises(ValueError, match=r"free along \(0.00, 0.00, 1.00\) in the tool frame.*turn the tool about another axis"):
+    with pytest.raises(
+        ValueError, match=r"free along \(0.00, 0.00, 1.00\) in the tool frame.*turn the tool about another axis"
+    ):
         pivot.calibrate_pivot(T)
     with pytest.raises(ValueError, match="free in 3 directions"):
         pivot.calibrate_pivot(np.tile(T[0], (8, 1, 1)))
@@ -200,7 +211,9 @@ def test_orientation_noise_does_not_hide_a_spin_when_its_size_is_given():
     T = pivot.touching_poses(spin, TIP, POINT, std_rot, 0.1, rng)
     with pytest.raises(ValueError, match="free along"):
         pivot.calibrate_pivot(T, std_rot, 0.1)
-    blind = pivot.calibrate_pivot(T)  # without it the noise passes for a tilt: a small residual, a tip that is off, a large covariance
+    blind = pivot.calibrate_pivot(
+        T
+    )  # without it the noise passes for a tilt: a small residual, a tip that is off, a large covariance
     assert blind.std < 1 and abs(blind.tip[2] - TIP[2]) > 10
 
 
@@ -216,7 +229,10 @@ def test_cone_angle_sets_the_smallest_singular_values():
     for angle in np.deg2rad([1, 5, 20, 45]):
         R = pivot.cone(60, angle, turns=0.0)
         s = pivot.calibrate_pivot(pivot.touching_poses(R, TIP, POINT)).singular_values
-        along, across = np.cos(angle), (1 + np.cos(angle)) / 2  # singular values of the mean rotation, the second one twice
+        along, across = (
+            np.cos(angle),
+            (1 + np.cos(angle)) / 2,
+        )  # singular values of the mean rotation, the second one twice
         expected = np.sqrt(60 * np.array([1 - along, 1 - across, 1 - across]))
         np.testing.assert_allclose(s[3:], expected, rtol=1e-6)
 

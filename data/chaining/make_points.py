@@ -2,10 +2,11 @@
 
     python data/chaining/make_points.py
 
-Station s measures K_s and K_s+1. The stand of the measuring arm and the size of the triangles are invented (seed below). Within the plane of
-a triangle, x_point slides along x and y_point in the plane by noise of 0.2 mm: that leaves the frame alone. The rest of
-the noise is what the printed transforms carry: the second frame is the first times a link inside the rounding of the printed one,
-and the four links are chosen, by linear programming, so that their product rounds to the printed product as well.
+Station s measures K_s and K_s+1. The stand of the measuring arm and the size of the triangles are invented (seed
+below). Within the plane of a triangle, x_point slides along x and y_point in the plane by noise of 0.2 mm: that
+leaves the frame alone. The rest of the noise is what the printed transforms carry: the second frame is the first
+times a link inside the rounding of the printed one, and the four links are chosen, by linear programming, so that
+their product rounds to the printed product as well.
 """
 
 import sys
@@ -29,6 +30,7 @@ def unrounded_links(printed, product):
     """Rigid links T_k whose entries, and the entries of their product, are off the printed ones by as little as possible."""
     links = chaining.orthonormalize(printed)
     for _ in range(3):  # linear in the corrections, which are around 1e-6
+
         def deviations(x):
             moved = links @ exp_se3(np.reshape(x, (4, 6)))
             return np.concatenate([(moved - printed)[:, :3].ravel(), (chaining.chain(moved) - product)[:3].ravel()])
@@ -52,7 +54,9 @@ def lines():
     rng = np.random.default_rng(SEED)
     links = unrounded_links(chaining.printed_transforms(), chaining.printed_product())
     poses = chaining.stations(links)
-    triangles = np.array([[[0, 0, 0], [rng.uniform(80, 120), 0, 0], [*rng.uniform((5, 60), (30, 90)), 0]] for _ in range(4)])
+    triangles = np.array(
+        [[[0, 0, 0], [rng.uniform(80, 120), 0, 0], [*rng.uniform((5, 60), (30, 90)), 0]] for _ in range(4)]
+    )
     center = poses[:4, :3, 3].mean(0)
     yield "station,frame,point,x,y,z"
     for s in range(4):

@@ -2,10 +2,11 @@
 
     python data/quirlen/make_poses.py
 
-Orientations: the tool's z axis on a cone of 15 to 30 deg about the vertical, spun by up to 60 deg (drawn with the seed below). Residuals: drawn
-from a normal distribution, then conditioned on what is printed. They must be perpendicular to the columns of the stacked matrix (only then
-they are residuals of the least-squares solution), the first and the last are the printed P_test, and together they give the printed s0.
-Everything else about the real Kreisel.txt is lost.
+Orientations: the tool's z axis on a cone of 15 to 30 deg about the vertical, spun by up to 60 deg (drawn with the
+seed below). Residuals: drawn from a normal distribution, then conditioned on what is printed. They must be
+perpendicular to the columns of the stacked matrix (only then they are residuals of the least-squares solution), the
+first and the last are the printed P_test, and together they give the printed s0. Everything else about the real
+Kreisel.txt is lost.
 """
 
 import sys

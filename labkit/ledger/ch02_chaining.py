@@ -5,6 +5,7 @@ import numpy as np
 from .. import chaining
 from . import Computed, computes
 
+
 def _measured(station):
     value = chaining.transforms_from_points(chaining.station_points()[station])
     return Computed(

@@ -1,7 +1,9 @@
-"""Tip error beside the Cramer-Rao bound, and failed runs, with and without outliers: python tests/bench/pivot_accuracy.py [runs]
+"""Tip error beside the Cramer-Rao bound, and failed runs, with and without outliers: python
+tests/bench/pivot_accuracy.py [runs]
 
-Poses as in the peers' comparison: turns up to 45 deg about random axes, tip 150 mm, 0.1 deg and 0.2 mm, gross outliers of 20 to 50 mm. The
-bound counts all poses, good and bad. A run has failed when it raises or when its tip is off by more than five times the bound.
+Poses as in the peers' comparison: turns up to 45 deg about random axes, tip 150 mm, 0.1 deg and 0.2 mm, gross
+outliers of 20 to 50 mm. The bound counts all poses, good and bad. A run has failed when it raises or when its tip is
+off by more than five times the bound.
 """
 
 import sys
@@ -11,8 +13,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from labkit import pivot  # noqa: E402
-from labkit.lie import exp_so3  # noqa: E402
+from labkit import pivot
+from labkit.lie import exp_so3
 
 TIP, PIVOT = np.array([12.0, -8.0, 150.0]), np.array([100.0, 50.0, -900.0])
 STD_ROT, STD_TRANS = np.deg2rad(0.1), 0.2
@@ -43,7 +45,12 @@ def main(runs):
     for outliers in (0.0, 0.1, 0.3):
         for n in (20, 100, 1000):
             rng = np.random.default_rng([n, int(100 * outliers)])
-            squares, bound, nees, failed = {m: [] for m in METHODS}, [], {m: [] for m in METHODS}, dict.fromkeys(METHODS, 0)
+            squares, bound, nees, failed = (
+                {m: [] for m in METHODS},
+                [],
+                {m: [] for m in METHODS},
+                dict.fromkeys(METHODS, 0),
+            )
             for _ in range(runs):
                 T, R = poses(rng, n, outliers)
                 bound.append(np.trace(pivot.predicted_covariance(R, TIP, STD_ROT, STD_TRANS)[:3, :3]))
@@ -59,7 +66,10 @@ def main(runs):
                     failed[name] += error @ error > 25 * bound[-1]
             for name in METHODS:
                 ratio = np.sqrt(np.mean(squares[name]) / np.mean(bound))
-                print(f"{outliers:4.0%}  N={n:4}  {name:17} {ratio:8.3f} {np.mean(nees[name]):8.2f} {failed[name]:6}", flush=True)
+                print(
+                    f"{outliers:4.0%}  N={n:4}  {name:17} {ratio:8.3f} {np.mean(nees[name]):8.2f} {failed[name]:6}",
+                    flush=True,
+                )
 
 
 if __name__ == "__main__":
