@@ -110,7 +110,11 @@ def command(verb, python, rest):
 
 
 def set_up(root):
-    """The Python of `.venv`, made ready; does nothing when the stamp says that it is."""
+    """The Python of `.venv`, made ready; does nothing when the stamp says that it is.
+
+    Without any stamp (interrupted, or of another Python) the environment is made anew. When pip gives up, as it does
+    before it changes anything, the environment stays and the next run installs into it.
+    """
     folder = root / ".venv"
     python = venv_python(folder)
     stamp_file = folder / "labkit-stamp.json"
@@ -119,8 +123,13 @@ def set_up(root):
         return str(python)
     if read_stamp(stamp_file).get("python") != version or not works(python, "-m", "pip", "--version"):
         make_venv(folder)
-    stamp_file.unlink() if stamp_file.exists() else None
-    install(python, root)
+    if stamp_file.exists():
+        stamp_file.unlink()
+    try:
+        install(python, root)
+    except Refusal:
+        stamp_file.write_text(json.dumps({"python": version_of(python)}), encoding="utf-8")
+        raise
     settings = folder / "share" / "jupyter" / "lab" / "settings"
     settings.mkdir(parents=True, exist_ok=True)
     (settings / "overrides.json").write_text(json.dumps(OVERRIDES, indent=1) + "\n", encoding="utf-8")
