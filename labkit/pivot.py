@@ -275,6 +275,10 @@ def _moved(X, tip, pivot):
     return r
 
 
+def _share(ratio):
+    return "practically nothing" if ratio < 1e-7 else f"{ratio:.1e}"
+
+
 def _tip(gram, n, tolerance):
     """Singular values of the stacked matrix, (D'D)^-1 and the tip of the plain problem; refuses a direction the poses leave free."""
     squares, axes = np.linalg.eigh(gram[:3, :3])
@@ -291,7 +295,7 @@ def _tip(gram, n, tolerance):
             f"along ({v[0]:.2f}, {v[1]:.2f}, {v[2]:.2f}) in the tool frame" if free == 1 else f"in {free} directions"
         )
         raise ValueError(
-            f"the poses do not fix the tip, it is free {where}: the smallest singular value is {values[5] / values[0]:.1e} of the largest,"
+            f"the poses do not fix the tip, it is free {where}: the smallest singular value is {_share(values[5] / values[0])} of the largest,"
             f" more than {tolerance:.1e} is needed; turn the tool about {'another axis' if free == 1 else 'two axes'}"
         )
     inverse = (axes / squares) @ axes.T
@@ -469,15 +473,17 @@ def tilted(directions, spin=0.0):
     return exp_so3(angle[..., None] * axis) @ exp_so3(turn)
 
 
-def cone(n, half_angle, turns=1.0):
-    """Rotations of a tool led once around a cone: n directions `half_angle` (rad) from z, spun by `turns` full turns on the way; (n, 3, 3)."""
+def cone(n, half_angle, turns=0.0):
+    """Rotations of a tool led once around a cone, its z axis `half_angle` (rad) from the vertical; (n, 3, 3).
+
+    `turns` is how often it spins about its own axis on the way. With exactly one turn the whole motion is a rotation about
+    the vertical, a single axis: then the poses leave the tip free along it.
+    """
     if n < 1:
         raise ValueError(f"a cone must have at least one pose, got {n}")
     phi = 2 * np.pi * np.arange(n) / n
-    half_angle = float(as_finite(half_angle, "half_angle"))
-    d = np.column_stack(
-        [np.sin(half_angle) * np.cos(phi), np.sin(half_angle) * np.sin(phi), np.full(n, np.cos(half_angle))]
-    )
+    sine, cosine = np.sin(as_finite(half_angle, "half_angle")), np.cos(half_angle)
+    d = np.column_stack([sine * np.cos(phi), sine * np.sin(phi), np.full(n, cosine)])
     return tilted(d, spin=turns * phi)
 
 

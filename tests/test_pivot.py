@@ -237,6 +237,13 @@ def test_cone_angle_sets_the_smallest_singular_values():
         np.testing.assert_allclose(s[3:], expected, rtol=1e-6)
 
 
+def test_a_cone_with_one_turn_is_a_single_axis():
+    R = pivot.cone(30, np.deg2rad(25), turns=1.0)
+    np.testing.assert_allclose(R @ R[0].T @ [0, 0, 1], np.tile([0, 0, 1.0], (30, 1)), atol=1e-12)
+    with pytest.raises(ValueError, match="free along"):
+        pivot.calibrate_pivot(pivot.touching_poses(R, TIP, POINT))
+
+
 def test_tilted_points_the_tool_axis():
     d = np.random.default_rng(14).normal(size=(50, 3))
     d = np.vstack([d, [0, 0, 1.0], [0, 0, -2.0], [1e-9, 0, 1]])
