@@ -34,7 +34,7 @@ def _printed(name):
 
 
 def station_points():
-    """The synthetic three-point measurements (mm), shape (4 stations, 2 frames, 3 points, 3): K_s and K_s+1 seen from station s."""
+    """The synthetic measurements (mm), shape (4 stations, 2 frames, 3 points, 3): K_s and K_s+1 seen from station s."""
     table = read_table("chaining/points.csv", text=("frame", "point"))
     return np.column_stack([table[c] for c in "xyz"]).reshape(4, 2, 3, 3)
 
@@ -80,7 +80,7 @@ def chain(transforms):
 
 
 def stations(transforms):
-    """Poses of all frames of the chain seen from the first one: I, T_01, T_01 T_12, ...; N links -> (N + 1, ..., 4, 4)."""
+    """Poses of all frames of a chain, seen from the first: I, T_01, T_01 T_12, ...; N links -> (N + 1, ..., 4, 4)."""
     links = _links(transforms)
     poses = [np.broadcast_to(np.eye(4), links[0].shape)]
     for T in links:
@@ -89,7 +89,7 @@ def stations(transforms):
 
 
 def closure_error(T):
-    """How far a loop's product T is from the identity: (angle in rad, distance in the unit of T), each of shape (...)."""
+    """How far a loop's product T is from the identity: (angle in rad, distance in the unit of T), shapes (...)."""
     T = as_transforms(T, "T")
     return rotation_angle(T), np.linalg.norm(T[..., :3, 3], axis=-1)
 
@@ -200,7 +200,7 @@ def around(links, loop):
 def distribute_in_turn(links, loops):
     """Share out the closure error of several loops one after another; (m, 4, 4) -> (m, 4, 4).
 
-    Each loop closes when its turn comes. A link that two loops share is changed twice, and the earlier loop opens again.
+    Each loop closes when its turn comes. A link that two loops share is changed twice: the earlier loop opens again.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def expected_closure(transforms, std_rot, std_trans):
 
 
 def noisy_links(transforms, std_rot, std_trans, rng, runs=1):
-    """Links with noise, T_k exp(xi_k); N links -> (N, runs, 4, 4). Components of xi_k have std_rot (rad) and std_trans."""
+    """Links with noise, T_k exp(xi_k), components of std_rot (rad) and std_trans; N links -> (N, runs, 4, 4)."""
     std_rot, std_trans = _noise(std_rot, std_trans)
     links = np.array(_links(transforms))
     xi = rng.normal(size=(len(links), runs, 6)) * np.repeat([std_rot, std_trans], 3)
@@ -348,9 +348,7 @@ def solve_pose_graph(edges, measured, std_rot, std_trans):
     )
     J = jacobian(poses(fit.x), zero)
     values = np.linalg.svd(J, compute_uv=False)
-    return PoseGraph(
-        poses(fit.x), residuals(fit.x), 2 * fit.cost, 6 * (len(Z) - n + 1), np.linalg.inv(J.T @ J), values
-    )
+    return PoseGraph(poses(fit.x), residuals(fit.x), 2 * fit.cost, 6 * (len(Z) - n + 1), np.linalg.inv(J.T @ J), values)
 
 
 def _ad(xi):

@@ -20,9 +20,9 @@ from .tables import read_table
 
 RANK_TOLERANCE = 1e-6  # smallest singular value beside the largest: below, the data do not say where the tip is
 NOISE_TOLERANCE = 1.5  # times std_rot: twice what orientation noise alone feigns
-TUKEY = 7.0  # residuals beyond seven standard deviations get no weight; 98.2 % efficient on Gaussian noise in three dimensions
+TUKEY = 7.0  # residuals beyond seven standard deviations get no weight; 98.2 % efficient on Gaussian noise
 SAMPLES, SCORED = 100, 128  # three-pose candidates for a robust start, and poses that judge them
-TUKEY_SHRINK = 0.9170593779364243  # E[w d^2] / (3 E[w]) of three standard normal components: what the weights take away from a variance
+TUKEY_SHRINK = 0.9170593779364243  # E[w d^2] / (3 E[w]): what the weights leave of a Gaussian variance
 MEDIAN_CHI3 = 1.5381722544550522  # median length of a vector of three standard normal components
 IDENTITY = np.eye(3)
 POSES = ("x", "y", "z", "a_deg", "b_deg", "c_deg")
@@ -180,7 +180,7 @@ def _tukey(d, cutoff=TUKEY):
 
 
 def robust_scale(distances):
-    """Standard deviation of one coordinate from the median distance: half the poses may be grossly wrong; (n,) -> float."""
+    """Standard deviation of a coordinate from the median distance: half the poses may be wrong; (n,) -> float."""
     return _scale(as_finite(distances, "distances"))
 
 
@@ -254,12 +254,12 @@ def _noise(std_rot, std_trans):
 
 
 def _components(T):
-    """The entries of [R p] of all poses as contiguous rows, so that work on many poses runs along them; (n, 4, 4) -> (12, n)."""
+    """Entries of [R p] as contiguous rows: work on many poses runs along them; (n, 4, 4) -> (12, n)."""
     return np.ascontiguousarray(T[:, :3].reshape(-1, 12).T)
 
 
 def _gram(X):
-    """Mean of [R p] over the poses, and the products [D d]'[D d] of what deviates from it; (12, n) -> (3, 4), (4, 4)."""
+    """Mean of [R p] over the poses, and [D d]'[D d] of the deviations from it; (12, n) -> (3, 4), (4, 4)."""
     n = X.shape[1]
     mean, products = (X @ np.ones(n) / n).reshape(3, 4), X @ X.T
     return mean, products[:4, :4] + products[4:8, 4:8] + products[8:, 8:] - n * (mean.T @ mean)
@@ -280,7 +280,7 @@ def _share(ratio):
 
 
 def _tip(gram, n, tolerance):
-    """Singular values of the stacked matrix, (D'D)^-1 and the tip of the plain problem; refuses a direction the poses leave free."""
+    """Singular values of the stacked matrix, (D'D)^-1 and the plain tip; refuses a direction the poses leave free."""
     squares, axes = np.linalg.eigh(gram[:3, :3])
     q = np.maximum(squares / n, 0.0)  # 1 - s^2
     s = np.sqrt(np.maximum(1.0 - q, 0.0))
@@ -295,7 +295,8 @@ def _tip(gram, n, tolerance):
             f"along ({v[0]:.2f}, {v[1]:.2f}, {v[2]:.2f}) in the tool frame" if free == 1 else f"in {free} directions"
         )
         raise ValueError(
-            f"the poses do not fix the tip, it is free {where}: the smallest singular value is {_share(values[5] / values[0])} of the largest,"
+            f"the poses do not fix the tip, it is free {where}: the smallest singular value is"
+            f" {_share(values[5] / values[0])} of the largest,"
             f" more than {tolerance:.1e} is needed; turn the tool about {'another axis' if free == 1 else 'two axes'}"
         )
     inverse = (axes / squares) @ axes.T
@@ -476,8 +477,8 @@ def tilted(directions, spin=0.0):
 def cone(n, half_angle, turns=0.0):
     """Rotations of a tool led once around a cone, its z axis `half_angle` (rad) from the vertical; (n, 3, 3).
 
-    `turns` is how often it spins about its own axis on the way. With exactly one turn the whole motion is a rotation about
-    the vertical, a single axis: then the poses leave the tip free along it.
+    `turns` is how often it spins about its own axis on the way. With exactly one turn the whole motion is a
+    rotation about the vertical, a single axis: then the poses leave the tip free along it.
     """
     if n < 1:
         raise ValueError(f"a cone must have at least one pose, got {n}")

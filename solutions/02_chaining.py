@@ -33,7 +33,7 @@ np.set_printoptions(precision=6, suppress=True)
 # %% the-question [markdown]
 # ## The question
 #
-# A measuring arm reaches half a meter, the work piece is larger. So the arm is moved: from stand 1 it measures the frames $K_0$ and $K_1$, from stand 2 $K_1$ and
+# A measuring arm reaches only so far, and the work piece is larger. So the arm is moved: from stand 1 it measures the frames $K_0$ and $K_1$, from stand 2 $K_1$ and
 # $K_2$, and so on, until stand 4 measures $K_3$ and again $K_0$. **Where does the chain end, and what does the gap tell?** This is section 2 of the lab sheet
 # (*Verkettung von Transformationen*). Its eight measured frames were never published; listing 7 prints the four transforms, one a stand, and their product.
 # To have something to measure, `data/chaining` holds eight synthetic frames (labeled so) that round to the printed digits.
@@ -155,7 +155,7 @@ for x in (0, 100, 300, 1000):
 # ## One bad link
 #
 # A turn at the end of link $k$ moves everything that follows, and the end of the chain moves by the turn times its **lever**: the distance from $K_k$ to the end.
-# The figure shows the sheet's loop in plan view. Drag the frames, and choose which link is wrong.
+# The figure shows the sheet's loop in plan view: black as it is, purple as the chain sees it, gray the gap at $K_0$ and at a work piece P. Drag the frames, and choose which link is wrong.
 
 # %% predict-lever
 guess = ...  # your code here
@@ -172,7 +172,7 @@ ex.predict("lever", guess, reveal=stages.open_loop)
 # $$\text{angle}^2 = 3N\sigma_r^2, \qquad \text{distance}^2 = 3N\sigma_t^2 + 2\sigma_r^2 \sum_k |l_k|^2 .$$
 #
 # (A turn about the lever itself moves nothing: two of three components count.) For $N$ links of length $L$ in a row the levers are $0, L, \dots, (N-1)L$, and their squares add up to
-# about $L^2N^3/3$. On a loop of fixed size they stay below its diameter.
+# about $L^2N^3/3$. On a loop of fixed size they stay below its diameter. In the figure, left: where a hundred chains end, seen along the chain; right: the laws, and what was simulated.
 
 # %% predict-growth
 guess = ...  # your code here
@@ -222,7 +222,8 @@ for rounds in range(1, 1001):
 # %% sharing [markdown]
 # ## Sharing out the error
 #
-# The pose after $N$ links should be $I$ but is $P_N = \exp(\xi)$. Nobody knows which link is to blame, so each takes its $N$-th part. Move the pose after $k$ links back by $k$ parts,
+# `log_se3` takes a motion apart into its twist, `exp_se3` puts it together again, and a part of the twist is a part of the motion. The pose after $N$ links should be $I$ but is
+# $P_N = \exp(\xi)$. Nobody knows which link is to blame, so each takes its $N$-th part. Move the pose after $k$ links back by $k$ parts,
 # $P_k' = \exp(-\tfrac{k}{N}\xi)\,P_k$, and read off the corrected links between neighbors. Then $P_N' = \exp(-\xi)\exp(\xi) = I$: the loop closes exactly. And
 # every link changes by the same screw $\exp(-\xi/N)$, seen from $K_0$: by exactly its share of the angle.
 
@@ -284,6 +285,7 @@ print(f"weighted sum of squares {graph.chi2:.1f}, expected about {graph.dof}")
 
 # %% second-loop [markdown]
 # With a second loop the simple way ends. Six frames, seven links, two loops A and B with one link in common. Decide what happens, then step through the measurements.
+# Left: the frames with their errors magnified; right: by how much each loop is still open.
 
 # %% predict-two-loops
 guess = ...  # your code here
@@ -297,7 +299,7 @@ ex.predict("two_loops", guess, reveal=stages.two_loops)
 #
 # - Close the loop whenever you can: it is the only honest check the chain offers. Give the gap as an angle *and* a distance, and in millimeters where the part will be.
 # - Few long links beat many short ones. Large triangles, as in chapter 1, make small turns.
-# - A closed loop proves little: an error common to all links (a wrong scale, a bent tip) closes perfectly.
+# - A closed loop proves little: an error common to all links (a wrong scale) closes perfectly.
 # - Orthonormalize after long products, and check before you share out: a closure far above the expected one is a blunder, not noise.
 
 # %% questions [markdown]

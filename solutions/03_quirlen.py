@@ -143,7 +143,7 @@ print(f"{np.rad2deg(std / np.linalg.norm(x[:3])):.2f} deg turn of the flange tha
 # %% swirl [markdown]
 # ## Small residual, good tip?
 #
-# Now the central question. Imagine the tool held upright on the point, spinning about its own axis like a top, never tilting. Decide, then let the time run and watch three
+# The sheet concludes: "Wie erwartet gilt für jede Messpose $P_\text{test} \approx \vec 0$." Does that make the tip right? Imagine the tool held upright on the point, spinning about its own axis like a top, never tilting. Decide, then let the time run and watch three
 # bars: the residual $s_0$, the true error of the tip (here we know it), and the error that the covariance predicts. *Make it fail* only spins.
 
 # %% predict-spin
@@ -183,7 +183,8 @@ print(f"tip shifted by 50 mm along the axis of the turn: residuals change by les
 # ## Plan before you measure
 #
 # $A$ holds orientations only, and those you choose. Its singular values say how well the poses will fix the tip; the null vector shows the
-# direction in which they will not. With noise of known size, even the covariance of the tip follows in advance: the ellipsoid. Which set is better?
+# direction in which they will not. With noise of known size, even the covariance of the tip follows in advance: the ellipsoid. Which set is better? Decide, then drag the six
+# directions over the sphere; drag beside it to turn the view. *Make it fail* leaves nothing but spin, and the null vector appears.
 
 # %% predict-cone
 guess = ...  # your code here
@@ -252,7 +253,8 @@ for half_angle_deg in (5, 10, 20, 45):
 spin = pivot.cone(40, 0.0, turns=1)
 exact = pivot.touching_poses(spin, tip, np.zeros(3))
 noisy = pivot.touching_poses(spin, tip, np.zeros(3), np.deg2rad(0.2), 0.1, np.random.default_rng(1))
-for words, T, noise in (("exact", exact, {}), ("noisy", noisy, {}), ("noise known", noisy, {"std_rot": np.deg2rad(0.2), "std_trans": 0.1})):
+known = {"std_rot": np.deg2rad(0.2), "std_trans": 0.1}
+for words, T, noise in (("exact", exact, {}), ("noisy", noisy, {}), ("noise known", noisy, known)):
     try:
         result = pivot.calibrate_pivot(T, **noise)
         error = np.linalg.norm(result.tip - tip)

@@ -209,7 +209,10 @@ def test_graph_closes_both_loops_where_sharing_out_one_loop_opens_the_other():
         return [chaining.closure_error(chaining.chain(chaining.around(links, loop)))[1] for loop in loops]
 
     np.testing.assert_allclose(left(links), 0, atol=1e-9)
-    first, second = left(chaining.distribute_in_turn(noisy, loops)), left(chaining.distribute_in_turn(noisy, loops[::-1]))
+    first, second = (
+        left(chaining.distribute_in_turn(noisy, loops)),
+        left(chaining.distribute_in_turn(noisy, loops[::-1])),
+    )
     assert first[0] > 0.1 and first[1] < 1e-9  # the shared link was changed again
     assert second[0] < 1e-9 < second[1]
     graph = chaining.solve_pose_graph(edges, noisy, 2e-3, 0.5)

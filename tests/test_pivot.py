@@ -12,6 +12,7 @@ from labkit import pivot
 from labkit.tables import DATA
 
 TIP, POINT = np.array([12.0, -8.0, 150.0]), np.array([100.0, 50.0, -900.0])
+STD_ROT = np.deg2rad(0.1)
 
 
 def turns(rng, n, largest_deg=45.0):
@@ -20,7 +21,7 @@ def turns(rng, n, largest_deg=45.0):
     return Rotation.from_rotvec(axis).as_matrix()
 
 
-def measured(rng, n, std_rot=np.deg2rad(0.1), std_trans=0.2):
+def measured(rng, n, std_rot=STD_ROT, std_trans=0.2):
     return pivot.touching_poses(turns(rng, n), TIP, POINT, std_rot, std_trans, rng)
 
 

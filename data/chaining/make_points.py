@@ -27,18 +27,17 @@ STD_IN_PLANE = 0.2  # mm
 
 
 def unrounded_links(printed, product):
-    """Rigid links T_k whose entries, and the entries of their product, are off the printed ones by as little as possible."""
+    """Rigid links whose entries, and those of their product, are off the printed ones by as little as possible."""
     links = chaining.orthonormalize(printed)
+
+    def deviations(links, x):
+        moved = links @ exp_se3(np.reshape(x, (4, 6)))
+        return np.concatenate([(moved - printed)[:, :3].ravel(), (chaining.chain(moved) - product)[:3].ravel()])
+
     for _ in range(3):  # linear in the corrections, which are around 1e-6
-
-        def deviations(x):
-            moved = links @ exp_se3(np.reshape(x, (4, 6)))
-            return np.concatenate([(moved - printed)[:, :3].ravel(), (chaining.chain(moved) - product)[:3].ravel()])
-
-        step = 1e-4
-        now = deviations(np.zeros(24))
-        J = np.column_stack([(deviations(step * e) - deviations(-step * e)) / (2 * step) for e in np.eye(24)])
-        ones = np.ones((len(now), 1))
+        step, now = 1e-4, deviations(links, np.zeros(24))
+        J = [(deviations(links, step * e) - deviations(links, -step * e)) / (2 * step) for e in np.eye(24)]
+        J, ones = np.column_stack(J), np.ones((len(now), 1))
         fit = linprog(
             [0.0] * 24 + [1.0],
             A_ub=np.block([[J, -ones], [-J, -ones]]) * 1e6,

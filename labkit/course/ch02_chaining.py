@@ -161,19 +161,19 @@ CHAPTER = Chapter(
     title="Chaining and closing the loop",
     items=[
         Prediction(
-            "operator",
-            question="The sheet writes the sum of the transforms, and prints one result. Which of the two did its program compute?",
-            choices=("the sum", "the product", "neither"),
-            answer="the product",
-            why="A 1 in the last corner settles it: the sum of four transforms has a 4 there. Listing 6 multiplies (`T *= myT`).",
-        ),
-        Prediction(
             "order",
             question="Move A shifts and turns, move B only shifts. Does the order of the two matter?",
             choices=("no, shifts can be exchanged", "yes, one turn is enough", "only if both turn"),
             answer="yes, one turn is enough",
             why="B is made in the frame that A has reached. One turn is enough to send it in another direction (only a shift along "
             "the axis of the turn would not mind).",
+        ),
+        Prediction(
+            "operator",
+            question="The sheet writes the sum of the transforms, and prints one result. Which of the two did its program compute?",
+            choices=("the sum", "the product", "neither"),
+            answer="the product",
+            why="A 1 in the last corner settles it: the sum of four transforms has a 4 there. Listing 6 multiplies (`T *= myT`).",
         ),
         Exercise(
             "chain",

@@ -46,7 +46,7 @@ def names(ax, texts):
 def growth_axes(ax):
     """Closure distance against the number of links, both logarithmic, with the laws and what was found.
 
-    Returns (laws, found, here): one line a layout, one marker series for the layout shown, one marker for the number chosen.
+    Returns (laws, found, here): a line a layout, markers of the layout shown, a ring for the number chosen.
     """
     style.axes(ax, "number of links", "closure distance (mm, rms)", "law and simulation")
     ax.set(xscale="log", yscale="log", xlim=(0.9, 75), ylim=(0.1, 3000))

@@ -1,4 +1,4 @@
-"""Figures of chapter 3: tool directions on a sphere, singular values, the swirling tool, errors side by side, outliers."""
+"""Figures of chapter 3: tool directions on a sphere, singular values, errors side by side, outliers."""
 
 import numpy as np
 
@@ -52,7 +52,7 @@ def _plain_decades(ax, values):
 
 
 def error_bars(ax, names, decades, title):
-    """Axes of a few lengths (mm) as bars on a logarithmic scale over `decades`. Returns one line a name; set with `set_bars`."""
+    """Axes of a few lengths (mm) as bars on a logarithmic scale. Returns one line a name, for `set_bars`."""
     style.axes(ax, "", "mm", title)
     ax.set(yscale="log", xlim=(-0.6, len(names) - 0.4), ylim=(decades[0], decades[-1]))
     ax.set_xticks(range(len(names)), names)

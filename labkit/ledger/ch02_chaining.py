@@ -8,12 +8,12 @@ from . import Computed, computes
 
 def _measured(station):
     value = chaining.transforms_from_points(chaining.station_points()[station])
-    return Computed(
-        value,
-        simulated=True,
-        proof="The measured frames were never published. The synthetic three-point measurements of data/chaining/points.csv give this"
-        f" matrix to within {np.abs(value - chaining.printed_transforms()[station]).max():.1e}.",
+    off = np.abs(value - chaining.printed_transforms()[station]).max()
+    proof = (
+        "The measured frames were never published. The synthetic three-point measurements of data/chaining/points.csv"
+        f" give this matrix to within {off:.1e}."
     )
+    return Computed(value, simulated=True, proof=proof)
 
 
 @computes("chaining.T_12")
@@ -43,14 +43,14 @@ def product():
     lever = np.linalg.norm(chaining.stations(links)[1:, :3, 3] - value[:3, 3], axis=-1).max()
     off = np.abs(value - chaining.printed_product())
     unrounded = chaining.chain(chaining.transforms_from_points(chaining.station_points()))
-    return Computed(
-        value,
-        bound=bound,
-        proof=f"The product of the printed matrices misses the printed product by up to {off[:3, 3].max():.1e} mm and {off[:3, :3].max():.1e};"
-        f" rounding to six decimals can move it by {bound[:3, 3].max():.1e} mm (levers up to {lever:.0f} mm) and {bound[:3, :3].max():.1e}."
-        " Links inside the rounding exist whose product is the printed one:"
-        f" those of points.csv meet it within {np.abs(unrounded - chaining.printed_product()).max():.1e}.",
+    met = np.abs(unrounded - chaining.printed_product()).max()
+    proof = (
+        f"The product of the printed matrices misses the printed product by up to {off[:3, 3].max():.1e} mm and"
+        f" {off[:3, :3].max():.1e}; rounding to six decimals can move it by {bound[:3, 3].max():.1e}"
+        f" mm (levers up to {lever:.0f} mm) and {bound[:3, :3].max():.1e}. Links inside the rounding exist whose"
+        f" product is the printed one: those of points.csv meet it within {met:.1e}."
     )
+    return Computed(value, bound=bound, proof=proof)
 
 
 @computes("chaining.Soll", "chaining.T_Soll")
@@ -65,12 +65,12 @@ def operator():
     total, result = links.sum(0), chaining.chain(links)
     off = {"sum": np.abs(total - np.eye(4)).max(), "product": np.abs(result - np.eye(4)).max()}
     name = min(off, key=off.get)
-    return Computed(
-        name,
-        misprint=name != "sum",
-        proof=f"The printed result has 1 in its last entry; the sum of the four matrices has {total[3, 3]:.0f} there and is not a rigid"
-        f" transform. The product meets the printed result within {np.abs(chaining.rounding_bound(links)).max():.0e} mm, the rounding.",
+    proof = (
+        f"The printed result has 1 in its last entry; the sum of the four matrices has {total[3, 3]:.0f} there and is"
+        f" not a rigid transform. The product meets the printed result within"
+        f" {chaining.rounding_bound(links).max():.0e} mm, which rounding explains."
     )
+    return Computed(name, misprint=name != "sum", proof=proof)
 
 
 @computes("chaining.frames_read")

@@ -1,4 +1,4 @@
-"""Lab sheet, section 3: the pivot calibration, from synthetic poses that carry the printed results, and how many poses are enough."""
+"""Lab sheet, section 3: the pivot calibration from synthetic poses, and how many poses are enough."""
 
 import functools
 
@@ -17,13 +17,13 @@ def _calibration():
 def _simulated(value):
     result = _calibration()
     deviation = np.sqrt(np.diag(result.covariance))
-    return Computed(
-        value,
-        simulated=True,
-        proof=f"Kreisel.txt was never published. The listing's line numbers leave room for {pivot.poses_in_listing()} poses; with as many"
-        f" synthetic ones the calibration gives this value, with a standard deviation of {deviation[:3].max():.2f} mm for the worst"
-        f" component of the tip: noise of {result.std:.3f} mm a coordinate is what s0 means for {3 * len(result.residuals) - 6} degrees of freedom.",
+    proof = (
+        f"Kreisel.txt was never published. The listing's line numbers leave room for {pivot.poses_in_listing()} poses;"
+        f" with as many synthetic ones the calibration gives this value, with a standard deviation of"
+        f" {deviation[:3].max():.2f} mm for the worst component of the tip: s0 means noise of {result.std:.3f} mm"
+        f" a coordinate, with {3 * len(result.residuals) - 6} degrees of freedom."
     )
+    return Computed(value, simulated=True, proof=proof)
 
 
 @computes("pivot.x")
@@ -70,8 +70,9 @@ def least_number():
     values = {n: np.linalg.svd(A[:, : 3 * n], compute_uv=False) for n in (2, 3, 4)}
     ratio = {n: v[:, 5] / v[:, 0] for n, v in values.items()}
     enough = min(n for n, r in ratio.items() if r.max() > pivot.RANK_TOLERANCE)
-    return Computed(
-        enough,
-        proof="Two poses give six equations for the six unknowns, but R_1 - R_2 maps the axis of the turn between them to zero: in 1000 random"
-        f" pairs the smallest singular value never exceeds {ratio[2].max():.0e} of the largest; with three poses the median is {np.median(ratio[3]):.2f}.",
+    proof = (
+        "Two poses give six equations for the six unknowns, but R_1 - R_2 maps the axis of the turn between them to"
+        f" zero: in 1000 random pairs the smallest singular value never exceeds {ratio[2].max():.0e} of the largest;"
+        f" with three poses the median is {np.median(ratio[3]):.2f}."
     )
+    return Computed(enough, proof=proof)

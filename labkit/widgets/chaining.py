@@ -1,4 +1,4 @@
-"""Stages of chapter 2: order of a product, an opening loop, growth with the number of links, two loops that share a link."""
+"""Stages of chapter 2: order of a product, an opening loop, growth with the number of links, two loops."""
 
 import functools
 
@@ -84,7 +84,7 @@ def order_of_product():
         describe=lambda result: (
             f"The two ends lie {result['gap']:.0f} mm apart. Hollow cross: where the other order ends."
             if result["gap"] > 0.5
-            else "Here both orders end at the same place: moves without a turn commute, so this says nothing about the rule."
+            else "Here both orders end at the same place: moves without a turn commute, and show nothing of the rule."
         ),
     )
 
@@ -172,7 +172,8 @@ def open_loop():
         describe=lambda result: (
             f"An error in link {result['link']} turns all that follows about K{result['link'] % 4}, "
             f"{result['lever']:.0f} mm from the end: the loop opens by {result['distance']:.1f} mm, "
-            f"and by {result['at_piece']:.1f} mm at P. The closure angle, {result['angle_deg']:.1f} deg, is the error itself."
+            f"and by {result['at_piece']:.1f} mm at P. "
+            f"The closure angle is the error itself: {result['angle_deg']:.1f} deg."
         ),
     )
 
@@ -199,7 +200,7 @@ def _ends(links, std_rot):
 
 
 def compute_growth(state):
-    """Closure distance (mm, rms) of noisy chains of 1 to 64 links: law of both layouts, simulation of the chosen one."""
+    """Closure distance (mm, rms) of noisy chains of 1 to 64 links: both laws, simulation of the chosen layout."""
     std_rot = np.deg2rad(state["std_rot_deg"])
     numbers = np.unique([*draw.LINKS, state["n"]])
     ends = {n: _ends(_layout(state["layout"], n), std_rot) for n in numbers}
@@ -256,7 +257,7 @@ def growth():
 
 
 def compute_two_loops(state):
-    """Two rectangles that share the link from frame 1 to frame 2: closure left in each (mm) after sharing out and by the graph."""
+    """Two rectangles with a common link: closure left in each (mm) after sharing out, and by the graph."""
     true = np.tile(np.eye(4), (len(CORNERS), 1, 1))
     true[:, :3, 3] = CORNERS
     std_rot = np.deg2rad(state["std_rot_deg"])
@@ -271,7 +272,9 @@ def compute_two_loops(state):
         "graph": relative(graph.poses[EDGES[:, 0]], graph.poses[EDGES[:, 1]]),
     }
     left = {
-        name: np.array([chaining.closure_error(chaining.chain(chaining.around(T, loop)))[1] for loop in (LOOP_A, LOOP_B)])
+        name: np.array(
+            [chaining.closure_error(chaining.chain(chaining.around(T, loop)))[1] for loop in (LOOP_A, LOOP_B)]
+        )
         for name, T in links.items()
     }
     return {"true": true, "graph": graph.poses, "walked": _walk(links["A, then B"]), "left": left}

@@ -25,7 +25,7 @@ def _ring(tilt_deg, n=6):
 
 
 def compute_pose_designer(state):
-    """Singular values, null direction and predicted tip covariance of six planned tool directions, before any measurement."""
+    """Singular values, null direction and predicted tip covariance of six planned tool directions."""
     directions = np.array([state[f"D{k}"] for k in range(1, 7)])
     spin = np.deg2rad(state["spin_deg"]) * np.arange(6)
     R = pivot.tilted(directions, spin)
@@ -169,7 +169,7 @@ def compute_swirl(state):
 
 
 def swirl():
-    """The tool swirls about the fixed point: small residuals from the first poses on, a small error only with a wide cone."""
+    """The tool swirls about the fixed point: the residual is small at once, the error only with a wide cone."""
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.2, 1))
@@ -241,7 +241,7 @@ DRAGGED = {1: (1.0, 3.0), 5: (-4.0, -1.5), 8: (3.0, -4.0)}  # poses one can spoi
 
 
 def compute_outliers(state):
-    """Plain and robust calibration of twelve poses, some of them dragged away: touches in plan view, weights, tip errors (mm)."""
+    """Plain and robust calibration of twelve poses, some dragged away: touches in plan, weights, tip errors (mm)."""
     T = _clean_poses().copy()
     for k in DRAGGED:
         T[k, :2, 3] += state[f"pose {k + 1}"] - _where_tip(k)
@@ -286,7 +286,7 @@ def outliers():
         presets={"All in place": {f"pose {k + 1}": _where_tip(k) for k in DRAGGED}},
         fail={"pose 2": (12.0, 9.0), "pose 6": (13.0, 6.0), "pose 9": (10.0, 11.0)},
         describe=lambda result: (
-            f"Tip error: plain {result['error_plain']:.2f} mm, robust {result['error_robust']:.2f} mm, bound "
-            f"{result['bound']:.2f} mm (rms). {int((result['weights'] == 0).sum())} of {OUTLIER_POSES} poses have no weight."
+            f"Tip error: plain {result['error_plain']:.2f} mm, robust {result['error_robust']:.2f} mm, "
+            f"bound {result['bound']:.2f} mm (rms). Without weight: {np.count_nonzero(result['weights'] == 0)} of {OUTLIER_POSES} poses."
         ),
     )
