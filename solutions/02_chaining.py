@@ -23,7 +23,7 @@ import numpy as np
 
 from labkit import chaining
 from labkit.course import course
-from labkit.frames import invert, relative
+from labkit.frames import relative
 from labkit.lie import exp_se3, log_se3
 from labkit.widgets import chaining as stages
 
@@ -216,14 +216,21 @@ for rounds in range(1, 1001):
     worn = worn @ product
     repaired = orthonormalize(repaired @ product)
     if rounds in (1, 10, 100, 1000):
-        kept = chaining.orthonormality_error(repaired) < 1e-12
-        print(f"{rounds:5} rounds: R'R differs from I by {chaining.orthonormality_error(worn):.1e}; repaired, below 1e-12: {kept}")
+        defect, kept = chaining.orthonormality_error(worn), chaining.orthonormality_error(repaired)
+        print(f"{rounds:5} rounds: R'R differs from I by {defect:.1e}; repaired, below 1e-12: {kept < 1e-12}")
 
 # %% sharing [markdown]
 # ## Sharing out the error
 #
-# `log_se3` takes a motion apart into its twist, `exp_se3` puts it together again, and a part of the twist is a part of the motion. The pose after $N$ links should be $I$ but is
-# $P_N = \exp(\xi)$. Nobody knows which link is to blame, so each takes its $N$-th part. Move the pose after $k$ links back by $k$ parts,
+# `log_se3` takes a motion apart into its twist, `exp_se3` puts it together again, and half a twist is half the motion:
+
+# %% half-a-motion
+half = exp_se3(0.5 * log_se3(measured[0]))
+print("half a link, twice, is the link:", np.allclose(half @ half, measured[0]))
+print("half the shift is not half the way:", half[:3, 3].round(1), "against", (0.5 * measured[0][:3, 3]).round(1), "mm")
+
+# %% sharing-derivation [markdown]
+# The pose after $N$ links should be $I$ but is $P_N = \exp(\xi)$. Nobody knows which link is to blame, so each takes its $N$-th part. Move the pose after $k$ links back by $k$ parts,
 # $P_k' = \exp(-\tfrac{k}{N}\xi)\,P_k$, and read off the corrected links between neighbors. Then $P_N' = \exp(-\xi)\exp(\xi) = I$: the loop closes exactly. And
 # every link changes by the same screw $\exp(-\xi/N)$, seen from $K_0$: by exactly its share of the angle.
 
@@ -238,14 +245,15 @@ def distribute_closure(transforms):
         poses.append(poses[-1] @ link)
     xi = log_se3(poses[-1])
     moved = [exp_se3(-k / N * xi) @ P for k, P in enumerate(poses)]
-    return np.array([invert(A) @ B for A, B in zip(moved, moved[1:])])
+    return np.array([relative(A, B) for A, B in zip(moved, moved[1:])])
     ### END SOLUTION
 
 
 # %% closed
 links = np.array([orthonormalize(T) for T in printed])
 corrected = distribute_closure(links)
-print(f"closure before: {closure_error(chain(links))[1]:.3f} mm, after: below 1e-9 mm:", bool(chaining.closure_error(chain(corrected))[1] < 1e-9))
+gaps = [chaining.closure_error(chain(loop))[1] for loop in (links, corrected)]
+print(f"closure before: {gaps[0]:.3f} mm, after: below 1e-9 mm: {gaps[1] < 1e-9}")
 for k, (before, after) in enumerate(zip(links, corrected)):
     angle, distance = chaining.closure_error(relative(before, after))
     print(f"link {k + 1}: turned by {np.rad2deg(angle):.4f} deg, its end moved by {distance:.3f} mm")

@@ -216,8 +216,8 @@ for half_angle_deg in (0.1, 0.001):
     by_svd = np.linalg.lstsq(A_cone, b_cone, rcond=None)[0]
     worse = np.linalg.norm(by_normal[:3] - tip) / np.linalg.norm(by_svd[:3] - tip)
     left = 16 - np.log10(np.linalg.cond(A_cone)) * np.array([1, 2])
-    print(f"cone {half_angle_deg:5} deg: about {left[0]:2.0f} digits are left by SVD, {left[1]:2.0f} by normal equations;", end=" ")
-    print(f"these are at least 100 times worse: {worse > 100}")
+    print(f"cone {half_angle_deg:5} deg: {left[0]:2.0f} digits left by SVD, {left[1]:2.0f} by normal equations;", end=" ")
+    print(f"at least 100 times worse: {worse > 100}")
 
 # %% covariance [markdown]
 # ## How sure are we?
@@ -241,7 +241,8 @@ print("tip", x[:3].round(2), "+-", np.sqrt(np.diag(cov))[:3].round(2), "mm; the 
 for half_angle_deg in (5, 10, 20, 45):
     R = pivot.cone(12, np.deg2rad(half_angle_deg))
     worst = np.sqrt(np.linalg.eigvalsh(pivot.predicted_covariance(R, x[:3], 0.0, std)[:3, :3]).max())
-    print(f"0.1 mm in the worst direction, cone {half_angle_deg:2} deg: about {int(np.ceil(12 * (worst / 0.1) ** 2)):4} poses")
+    poses_needed = np.ceil(12 * (worst / 0.1) ** 2)
+    print(f"0.1 mm in the worst direction, cone {half_angle_deg:2} deg: about {poses_needed:4.0f} poses")
 
 # %% break-it [markdown]
 # ## Break it

@@ -383,7 +383,7 @@ CHAPTER = Chapter(
             hints=(
                 "The product is exp(xi). Going back by all of xi at the end closes the loop; how far back should the pose after link k go?",
                 "The pose after k links, P_k, becomes exp(-k/N xi) P_k. The corrected links are the relative poses of neighbors.",
-                "moved = [exp_se3(-k / N * xi) @ P for k, P in enumerate(poses)]; return np.array([invert(A) @ B for A, B in zip(moved, moved[1:])]).",
+                "moved = [exp_se3(-k / N * xi) @ P for k, P in enumerate(poses)]; return np.array([relative(A, B) for A, B in zip(moved, moved[1:])]).",
             ),
             mistakes=[
                 Mistake(

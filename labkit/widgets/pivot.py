@@ -287,6 +287,7 @@ def outliers():
         fail={"pose 2": (12.0, 9.0), "pose 6": (13.0, 6.0), "pose 9": (10.0, 11.0)},
         describe=lambda result: (
             f"Tip error: plain {result['error_plain']:.2f} mm, robust {result['error_robust']:.2f} mm, "
-            f"bound {result['bound']:.2f} mm (rms). Without weight: {np.count_nonzero(result['weights'] == 0)} of {OUTLIER_POSES} poses."
+            f"bound {result['bound']:.2f} mm (rms). "
+            f"Without weight: {np.count_nonzero(result['weights'] == 0)} of {OUTLIER_POSES} poses."
         ),
     )
