@@ -52,7 +52,10 @@ def transforms_from_points(points):
 
 
 def _links(transforms, at_least=1):
-    links = [as_transforms(T, f"transforms[{k}]") for k, T in enumerate(transforms)]
+    if isinstance(transforms, np.ndarray) and transforms.ndim > 2:
+        links = list(as_transforms(transforms, "transforms"))  # one check for all
+    else:
+        links = [as_transforms(T, f"transforms[{k}]") for k, T in enumerate(transforms)]
     if len(links) < at_least:
         raise ValueError(f"at least {at_least} transform{'s' * (at_least > 1)} must come, got {len(links)}")
     return links

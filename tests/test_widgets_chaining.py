@@ -56,9 +56,11 @@ def test_open_loop_at_the_work_piece():
 def test_growth_agrees_with_its_law(layout):
     result = w.compute_growth({"n": 20, "std_rot_deg": 0.1, "layout": layout})
     laws = [
-        chaining.expected_closure(w._layout(layout, n), np.deg2rad(0.1), w.STD_TRANS)[1] for n in result["numbers"]
+        chaining.expected_closure(w._layout(layout, int(n))[0], np.deg2rad(0.1), w.STD_TRANS)[1]
+        for n in result["numbers"]
     ]
     np.testing.assert_allclose(result["found"], laws, rtol=0.2)  # a hundred runs
+    assert result["expected"] == pytest.approx(laws[list(result["numbers"]).index(20)])
     assert result["here"] == pytest.approx(result["found"][list(result["numbers"]).index(20)])
 
 

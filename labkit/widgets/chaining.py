@@ -178,8 +178,16 @@ def open_loop():
     )
 
 
+@functools.cache
 def _layout(name, n):
-    return chaining.straight_chain(n, LINK_LENGTH) if name == "row" else chaining.polygon_loop(n, LOOP_SIZE)
+    """Links of a layout, where they should end seen backward, and the closure distance per rad of noise."""
+    links = chaining.straight_chain(n, LINK_LENGTH) if name == "row" else chaining.polygon_loop(n, LOOP_SIZE)
+    return links, relative(chaining.chain(links), np.eye(4)), chaining.expected_closure(links, 1.0, 0.0)[1]
+
+
+def _law(name, n, std_rot):
+    """Closure distance to expect (mm, rms): `chaining.expected_closure` with the sum over the levers remembered."""
+    return np.hypot(np.sqrt(3 * n) * STD_TRANS, _layout(name, n)[2] * std_rot)
 
 
 @functools.cache
@@ -190,24 +198,22 @@ def _unit_twists():
     return noise
 
 
-def _ends(links, std_rot):
-    """Where RUNS noisy chains end, seen from where they should end; (runs, 3)."""
-    noise = exp_se3(_unit_twists()[: len(links)] * np.repeat([std_rot, STD_TRANS], 3))
-    end = np.broadcast_to(np.eye(4), (RUNS, 4, 4))
-    for T, error in zip(links, noise):
-        end = end @ (T @ error)
-    return relative(chaining.chain(links), end)[:, :3, 3]
+def _ends(name, n, errors):
+    """Where noisy chains of a layout end, seen from where they should end; errors (64, runs, 4, 4) -> (runs, 3)."""
+    links, back, _ = _layout(name, n)
+    noisy = links[:, None] @ errors[:n]
+    end = back @ noisy[0]
+    for T in noisy[1:]:
+        end = end @ T
+    return end[:, :3, 3]
 
 
 def compute_growth(state):
     """Closure distance (mm, rms) of noisy chains of 1 to 64 links: both laws, simulation of the chosen layout."""
     std_rot = np.deg2rad(state["std_rot_deg"])
     numbers = np.unique([*draw.LINKS, state["n"]])
-    ends = {n: _ends(_layout(state["layout"], n), std_rot) for n in numbers}
-    laws = {
-        name: np.array([chaining.expected_closure(_layout(name, n), std_rot, STD_TRANS)[1] for n in draw.LINKS])
-        for name in LAYOUTS.values()
-    }
+    errors = exp_se3(_unit_twists() * np.repeat([std_rot, STD_TRANS], 3))
+    ends = {n: _ends(state["layout"], n, errors) for n in numbers.tolist()}
     return {
         "n": state["n"],
         "layout": state["layout"],
@@ -215,8 +221,8 @@ def compute_growth(state):
         "numbers": numbers,
         "found": np.array([np.sqrt((e**2).sum(-1).mean()) for e in ends.values()]),
         "here": float(np.sqrt((ends[state["n"]] ** 2).sum(-1).mean())),
-        "expected": float(chaining.expected_closure(_layout(state["layout"], state["n"]), std_rot, STD_TRANS)[1]),
-        "laws": laws,
+        "expected": float(_law(state["layout"], state["n"], std_rot)),
+        "laws": {name: np.array([_law(name, n, std_rot) for n in draw.LINKS]) for name in LAYOUTS.values()},
     }
 
 
