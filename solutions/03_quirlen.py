@@ -216,8 +216,8 @@ for half_angle_deg in (0.1, 0.001):
     by_svd = np.linalg.lstsq(A_cone, b_cone, rcond=None)[0]
     worse = np.linalg.norm(by_normal[:3] - tip) / np.linalg.norm(by_svd[:3] - tip)
     left = 16 - np.log10(np.linalg.cond(A_cone)) * np.array([1, 2])
-    print(f"cone {half_angle_deg:5} deg: digits left {left[0]:2.0f} by SVD, {left[1]:2.0f} by normal equations,", end=" ")
-    print(f"at least 100 times worse: {worse > 100}")
+    words = f"cone {half_angle_deg:5} deg: {left[0]:2.0f} digits left by SVD, {left[1]:2.0f} by normal equations,"
+    print(words, f"at least 100 times worse: {worse > 100}")
 
 # %% covariance [markdown]
 # ## How sure are we?
