@@ -220,20 +220,20 @@ def calibrate_pivot(T_WF, std_rot=None, std_trans=None, robust=False, rng=None):
     T = _poses(T_WF, 5 if robust else 3)
     noise = _noise(std_rot, std_trans)
     tolerance = RANK_TOLERANCE if noise is None else max(RANK_TOLERANCE, NOISE_TOLERANCE * noise[0])
-    n, X = len(T), _components(T)
-    mean, gram = _gram(X)
+    n = len(T)
+    mean, gram = _gram(T)
     values, inverse, tip = _tip(gram, n, tolerance)
     M = mean[:, :3]
     pivot = M @ tip + mean[:, 3]
     if robust:
-        return _robust(T, X, noise, tolerance, np.random.default_rng(0) if rng is None else rng)
+        return _robust(T, noise, tolerance, np.random.default_rng(0) if rng is None else rng)
     if noise is not None:
-        return _weighted(X, tip, pivot, values, noise)
-    r = _moved(X, tip, pivot)
+        return _weighted(T, tip, pivot, values, noise)
+    r = _moved(T.reshape(n, 16).T, tip, pivot)
     squares = float(np.vdot(r, r))
-    covariance, lower = np.empty((6, 6)), M @ inverse
-    covariance[:3, :3], covariance[3:, :3], covariance[:3, 3:] = inverse, lower, lower.T
-    covariance[3:, 3:] = lower @ M.T + IDENTITY / n
+    both = np.concatenate((IDENTITY, M))  # a shift of the tip moves the pivot along
+    covariance = both @ inverse @ both.T
+    covariance.ravel()[21::7] += 1.0 / n
     covariance *= squares / (3 * n - 6)
     std = math.sqrt(squares / (3 * n - 6))
     return PivotCalibration(tip, pivot, r.T, math.sqrt(squares / n), std, covariance, values, np.ones(n))
@@ -253,26 +253,27 @@ def _noise(std_rot, std_trans):
     return std_rot, std_trans
 
 
-def _components(T):
-    """Entries of [R p] as contiguous rows: work on many poses runs along them; (n, 4, 4) -> (12, n)."""
-    return np.ascontiguousarray(T[:, :3].reshape(-1, 12).T)
+def _gram(T):
+    """Mean of [R p] over the poses, and [D d]'[D d] of the deviations from it; (n, 4, 4) -> (3, 4), (4, 4).
+
+    One product of all entries with each other holds both: the last entry of a pose is 1, so its row holds the sums.
+    """
+    n, entries = len(T), T.reshape(-1, 16)
+    products = entries.T @ entries
+    mean = products[15, :12].reshape(3, 4) / n
+    squares = products[:4, :4] + products[4:8, 4:8]
+    squares += products[8:12, 8:12]
+    squares -= n * (mean.T @ mean)
+    return mean, squares
 
 
-def _gram(X):
-    """Mean of [R p] over the poses, and [D d]'[D d] of the deviations from it; (12, n) -> (3, 4), (4, 4)."""
-    n = X.shape[1]
-    mean, products = (X @ np.ones(n) / n).reshape(3, 4), X @ X.T
-    return mean, products[:4, :4] + products[4:8, 4:8] + products[8:, 8:] - n * (mean.T @ mean)
-
-
-def _moved(X, tip, pivot):
-    """R tip + p - pivot; (12, n) -> (3, n)."""
-    rows = np.zeros((3, 12))
+def _moved(entries, tip, pivot):
+    """R tip + p - pivot from the entries of the poses, row by row; (16, n) -> (3, n)."""
+    rows = np.zeros((3, 16))
     rows[0, :3] = rows[1, 4:7] = rows[2, 8:11] = tip
     rows[0, 3] = rows[1, 7] = rows[2, 11] = 1.0
-    r = rows @ X
-    r -= pivot[:, None]
-    return r
+    rows[:, 15] = -pivot
+    return rows @ entries
 
 
 def _share(ratio):
@@ -282,14 +283,12 @@ def _share(ratio):
 def _tip(gram, n, tolerance):
     """Singular values of the stacked matrix, (D'D)^-1 and the plain tip; refuses a direction the poses leave free."""
     squares, axes = np.linalg.eigh(gram[:3, :3])
-    q = np.maximum(squares / n, 0.0)  # 1 - s^2
-    s = np.sqrt(np.maximum(1.0 - q, 0.0))
-    values = np.empty(6)
-    values[:3] = 1.0 + s
-    values[5:2:-1] = q / values[:3]
-    values = np.sqrt(n * values)
+    q = [max(v / n, 0.0) for v in squares.tolist()]  # 1 - s^2, in plain floats: NumPy is slow on three numbers
+    s = [math.sqrt(max(1.0 - v, 0.0)) for v in q]
+    small = [math.sqrt(n * v / (1.0 + k)) for v, k in zip(q, s)]
+    values = [math.sqrt(n * (1.0 + k)) for k in s] + small[::-1]
     if values[5] <= tolerance * values[0]:
-        free = int((values <= tolerance * values[0]).sum())
+        free = sum(value <= tolerance * values[0] for value in values)
         v = axes[:, 0] * (1.0 if axes[np.abs(axes[:, 0]).argmax(), 0] > 0 else -1.0)
         where = (
             f"along ({v[0]:.2f}, {v[1]:.2f}, {v[2]:.2f}) in the tool frame" if free == 1 else f"in {free} directions"
@@ -300,21 +299,22 @@ def _tip(gram, n, tolerance):
             f" more than {tolerance:.1e} is needed; turn the tool about {'another axis' if free == 1 else 'two axes'}"
         )
     inverse = (axes / squares) @ axes.T
-    return values, inverse, -inverse @ gram[:3, 3]
+    return np.array(values), inverse, -inverse @ gram[:3, 3]
 
 
 class _Weighted:
-    """Weighted least squares about a current tip and pivot, on components (12, n).
+    """Weighted least squares about a current tip and pivot, on the entries of the poses as contiguous rows (16, n).
 
     With C = std_trans^2 I + std_rot^2 [tip]x[tip]x' (in F) and u = R tip, R C^-1 R' = (I + g u u') / c, where
     c = std_trans^2 + (std_rot |tip|)^2 and g = (std_rot / std_trans)^2. Without noise figures C = I, and distances
     are in mm.
     """
 
-    def __init__(self, X, noise):
+    def __init__(self, T, noise):
         std_rot, self.std_trans = (0.0, 1.0) if noise is None else noise
         self.variance_rot, self.g = std_rot**2, (std_rot / self.std_trans) ** 2
-        self.X, self.positions = X, X[3::4]
+        self.X = np.ascontiguousarray(T.reshape(-1, 16).T)
+        self.positions = self.X[3:12:4]
 
     def look(self, tip, pivot):
         """Residuals (3, n) and Mahalanobis distances (n,) at tip and pivot."""
@@ -333,9 +333,9 @@ class _Weighted:
         """Gauss-Newton step (6,) for weights w (n,), and the normal matrix (6, 6)."""
         N, rhs, total = np.empty((6, 6)), np.empty(6), w.sum()
         wr = self.r * w
-        products = (self.X @ wr.T).reshape(3, 4, 3)  # component of [R p], of the residual
+        products = (self.X[:12] @ wr.T).reshape(3, 4, 3)  # component of [R p], of the residual
         N[:3, :3] = N[3:, 3:] = total * IDENTITY
-        N[3:, :3] = -(self.X @ w).reshape(3, 4)[:, :3]
+        N[3:, :3] = -(self.X[:12] @ w).reshape(3, 4)[:, :3]
         rhs[:3], rhs[3:] = np.einsum("iji->j", products)[:3], -wr.sum(1)
         if self.g:
             W = IDENTITY + self.g * np.outer(self.tip, self.tip)
@@ -348,8 +348,8 @@ class _Weighted:
         return -np.linalg.solve(N, rhs), N / self.c
 
 
-def _weighted(X, tip, pivot, values, noise):
-    n, problem = X.shape[1], _Weighted(X, noise)
+def _weighted(T, tip, pivot, values, noise):
+    n, problem = len(T), _Weighted(T, noise)
     w = np.ones(n)
     for _ in range(3):  # the weights know the tip through its length and direction alone: three steps settle them
         problem.look(tip, pivot)
@@ -361,9 +361,9 @@ def _weighted(X, tip, pivot, values, noise):
     return PivotCalibration(tip, pivot, r.T, s0, std, np.linalg.inv(N), values, w)
 
 
-def _robust(T, X, noise, tolerance, rng):
+def _robust(T, noise, tolerance, rng):
     tip, pivot = _best_of_samples(T, rng)
-    problem, n = _Weighted(X, noise), len(T)
+    problem, n = _Weighted(T, noise), len(T)
     for k in range(30):
         r, d = problem.look(tip, pivot)
         if k < 3:  # the scale settles first; afterwards it stays, so that the steps converge
@@ -377,7 +377,7 @@ def _robust(T, X, noise, tolerance, rng):
     count = int(np.count_nonzero(kept))
     if count < 4:
         raise ValueError(f"only {count} of {n} poses agree on a tip; at least 4 must")
-    values, _, _ = _tip(_gram(X[:, kept])[1], count, tolerance)
+    values, _, _ = _tip(_gram(T[kept])[1], count, tolerance)
     total = float(w.sum())
     freedom, squares = max(3 * total - 6, 1.0), float(np.einsum("in,in,n->", r, r, w))
     slope = (w - 4 / 3 * (d / (TUKEY * scale)) ** 2 * np.sqrt(w)).sum() / total
