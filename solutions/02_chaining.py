@@ -125,6 +125,7 @@ def closure_error(T):
 
 
 # %% closure_angle_deg
+# by what angle does the sheet's loop miss itself, in degrees?
 closure_angle_deg = ...  # your code here
 ### BEGIN SOLUTION
 closure_angle_deg = np.rad2deg(closure_error(product)[0])
@@ -132,6 +133,7 @@ closure_angle_deg = np.rad2deg(closure_error(product)[0])
 ex.closure_angle_deg(closure_angle_deg)
 
 # %% closure_distance
+# and by what distance, in mm?
 closure_distance = ...  # your code here
 ### BEGIN SOLUTION
 closure_distance = closure_error(product)[1]

@@ -96,6 +96,7 @@ print("tip  ", x[:3], "mm\npoint", x[3:], "mm")
 print(f"off listing 9 by {np.abs(x - listing_9).max():.1e} mm (half a printed digit is 5.0e-07)")
 
 # %% tip_length
+# how long is the tool, from the flange to the tip, in mm?
 tip_length = ...  # your code here
 ### BEGIN SOLUTION
 tip_length = np.linalg.norm(x[:3])

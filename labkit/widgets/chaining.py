@@ -47,7 +47,7 @@ def order_of_product():
         frames, paths = [], []
         for ax, first, second in zip(panels, "AB", "BA"):
             style.axes(ax, "x (mm)", "y (mm)" if first == "A" else "", f"first {first}, then {second}", equal=True)
-            ax.set(xlim=(-330, 330), ylim=(-330, 330))
+            ax.set(xlim=(-400, 400), ylim=(-400, 400))
             PlaneFrame(ax, "0", 70).set(np.eye(4))
             middle = PlaneFrame(ax, first, 70, linestyle=(0, (4, 1.5)))
             end = PlaneFrame(ax, first + second, 90)
@@ -72,8 +72,8 @@ def order_of_product():
         scene=scene,
         compute=compute_order,
         handles={
-            "A": Handle((150.0, 40.0), step=5.0, bounds=((-160, 160), (-160, 160)), label="origin of A"),
-            "B": Handle((60.0, 130.0), step=5.0, bounds=((-160, 160), (-160, 160)), ax=1, label="origin of B"),
+            "A": Handle((150.0, 40.0), step=5.0, bounds=((-150, 150), (-150, 150)), label="origin of A"),
+            "B": Handle((60.0, 130.0), step=5.0, bounds=((-150, 150), (-150, 150)), ax=1, label="origin of B"),
         },
         controls={
             "A_deg": slider(-180, 180, 60, step=5, label="turn of A (deg)"),
@@ -226,6 +226,10 @@ def compute_growth(state):
     }
 
 
+def _mm(length):
+    return f"{length:.0f} mm" if length >= 100 else f"{length:.2g} mm"
+
+
 def growth():
     """How the closure error grows with the number of links, in a row and on a loop of fixed size."""
 
@@ -257,7 +261,7 @@ def growth():
         fail={"n": 64, "std_rot_deg": 1.0},
         describe=lambda result: (
             f"{result['n']} links {'in a row' if result['layout'] == 'row' else 'on a loop'}: the chain ends "
-            f"{result['here']:.2g} mm off (rms of {RUNS} runs); the law says {result['expected']:.2g} mm."
+            f"{_mm(result['here'])} off (rms of {RUNS} runs); the law says {_mm(result['expected'])}."
         ),
     )
 

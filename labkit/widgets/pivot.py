@@ -101,7 +101,7 @@ def pose_designer():
     def sentence(result):
         if result["undetermined"]:
             v = ", ".join(f"{round(float(c), 2) + 0.0:.2f}" for c in result["null"])
-            return f"The tip is not determined along ({v}) of the tool: s6 = {result['singular_values'][5]:.1e}."
+            return f"The tip is not determined along ({v}) of the tool: s6 = {result['singular_values'][5]:.4f}."
         a, b, c = result["deviations"]
         return (
             f"Predicted tip: standard deviations {a:.2f}, {b:.2f}, {c:.2f} mm along the axes of the ellipsoid "
