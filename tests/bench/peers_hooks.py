@@ -2,9 +2,13 @@
 
 import numpy as np
 
-from labkit import chaining, frames, pivot
+from labkit import axxb, chaining, frames, pivot
 
 POSE_NOISE = (np.deg2rad(0.1), 0.2)  # rad and mm, as the benchmark draws them
+
+
+def handeye(T_BF, T_ST):
+    return axxb.calibrate_hand_eye(T_BF, T_ST).T_FS
 
 
 def plain_pivot(T):
@@ -18,6 +22,7 @@ def robust_pivot(T):
 
 
 HOOKS = {
+    "handeye": handeye,
     "pivot": plain_pivot,
     "pivot_robust": robust_pivot,
     "frames": frames.frame_from_points,
