@@ -75,4 +75,5 @@ def operator():
 
 @computes("chaining.frames_read")
 def frames_read():
-    return Computed(int(np.prod(chaining.station_points().shape[:2])))
+    """Each transform leads from one measured frame to another."""
+    return Computed(2 * len(chaining.printed_transforms()))
