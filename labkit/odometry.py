@@ -130,7 +130,7 @@ def control_covariance(u, dt, k_d, k_theta, k_drift):
     k_theta : variance of the heading per radian turned (rad^2 / rad).
     k_drift : variance of the heading per meter driven (rad^2 / m).
 
-    The variances are k_d |v| / dt and (k_theta |omega| + k_drift |v|) / dt. They grow as dt shrinks, so that the variance
+    The variances k_d |v| / dt and (k_theta |omega| + k_drift |v|) / dt grow as dt shrinks, so that the variance
     of the way after a given time does not depend on dt. Reversing and right turns count with their absolute values.
     Source: lecture, "Fehlermodell fuer Steuerbefehl (1) to (3)".
     """
