@@ -33,8 +33,8 @@ class Lateration:
     """A position by least squares.
 
     position (..., dim) m.    residuals (..., n): measured minus computed distance, m.
-    covariance (..., dim, dim): m^2, infinite where the geometry does not fix the position.    singular_values (..., dim) of the unit vectors to the landmarks.
-    iterations: of the slowest run.    converged (...): whether each run stopped at a minimum.
+    covariance (..., dim, dim): m^2, infinite where the geometry does not fix the position.
+    singular_values (..., dim) of the unit vectors to the landmarks.    iterations: of the slowest run.    converged (...): whether each run stopped at a minimum.
     """
 
     position: np.ndarray
@@ -78,8 +78,8 @@ def square_jacobian(landmarks, position):
 def newton(landmarks, distances, start, steps=50, tolerance=1e-12):
     """Newton's method on the lecture's equations with as many landmarks as coordinates: a `Newton`.
 
-    Two circles meet in two points; the start decides which one is found. On the line through both landmarks the Jacobian
-    loses its rank; the iteration stops there and says so.
+    Two circles meet in two points; the start decides which one is found. On the line through both landmarks the
+    Jacobian loses its rank; the iteration stops there and says so.
     """
     landmarks, distances = _landmarks(landmarks, distances)
     if len(landmarks) != landmarks.shape[1] or distances.ndim != 1:
@@ -158,7 +158,7 @@ def laterate(landmarks, distances, start=None, cost="distance", std=1.0, steps=1
     Parameters
     ----------
     landmarks : (n, dim) m.    distances : (..., n) m.    start : (..., dim) m; None takes `linear_start`.
-    cost : "distance" sums (length - distance)^2, the maximum-likelihood choice for equal Gaussian noise on the distances;
+    cost : "distance" sums (length - distance)^2, maximum likelihood for equal Gaussian noise on the distances;
         "squares" sums the lecture's (length^2 - distance^2)^2, which weighs each landmark with its squared distance.
     std : standard deviation of a distance (m), for the covariance.
 

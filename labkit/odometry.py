@@ -6,11 +6,42 @@ particles or 200 runs. The heading is never wrapped here: a path stays continuou
 Source: lecture "Lokalisierung", section "Koppelnavigation".
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .checks import as_finite, as_points, as_positive
+from .tables import read_table
 
 MODELS = ("euler", "midpoint", "arc")
+
+
+@dataclass(frozen=True)
+class CircleDrive:
+    """The lecture's drive: controls (n, 2), time step dt (s), error constants `noise` (k_d, k_theta, k_drift)."""
+
+    controls: np.ndarray
+    dt: float
+    noise: dict
+
+
+def circle_drive(dt=None):
+    """The lecture's circle drive as a `CircleDrive`; another dt (s) drives the same 14 s in other steps.
+
+    The constants are the squares of the printed standard deviations over their way, degrees turned to radians.
+    Source: lecture, section "Koppelnavigation", page "Simulation"; data/dead_reckoning.
+    """
+    table = read_table("dead_reckoning/circle_drive.csv", text=("name", "unit"))
+    given = dict(zip(table["name"].tolist(), table["value"].tolist()))
+    duration = given["dt"] * given["steps"]
+    dt = given["dt"] if dt is None else float(as_positive(dt, "dt"))
+    noise = {
+        "k_d": given["std_distance_per_meter"] ** 2,
+        "k_theta": np.radians(given["std_heading_per_turn_deg"]) ** 2 / (2 * np.pi),
+        "k_drift": np.radians(given["std_heading_per_meter_deg"]) ** 2,
+    }
+    u = [given["v"], np.radians(given["omega_deg"])]
+    return CircleDrive(np.tile(u, (round(duration / dt), 1)), dt, noise)
 
 
 def wrap_angle(angle):
