@@ -56,7 +56,7 @@ def predicted_state():
     bound = np.array([slack_x, 0.005 + gain[1] * (slack_x + 0.005)])
     model = reconstructed()[0]
     proof = (
-        f"The printed correction (11.90, 4.98) of z = 11.79 needs ({x:.3f} +- {bound[0]:.3f}, {v:.3f} +- {bound[1]:.3f})"
+        f"The printed correction (11.90, 4.98) of 11.79 needs ({x:.3f} +- {bound[0]:.3f}, {v:.3f} +- {bound[1]:.3f})"
         f" before it; 51 predictions from rest give ({model[0]:.2f}, {model[1]:.2f}). 12.5 and 5.0 are a t^2/2 and "
         f"a t at t = 5 s."
     )
