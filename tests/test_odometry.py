@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
-from labkit import odometry
+from labkit import gaussian, odometry
 
 finite = st.floats(-3, 3, allow_nan=False)
 DRIVE = odometry.circle_drive()
@@ -160,3 +161,25 @@ def test_bad_input_is_refused_in_words(call, words):
 def test_wrap_angle():
     wrapped = odometry.wrap_angle([0.0, 3.5, -3.5, np.pi, 7.0])
     np.testing.assert_allclose(wrapped, [0, 3.5 - 2 * np.pi, 2 * np.pi - 3.5, -np.pi, 7 - 2 * np.pi])
+
+
+def test_exponential_coordinates():
+    rng = np.random.default_rng(2)
+    xi = rng.uniform(-2, 2, (50, 3))
+    np.testing.assert_allclose(odometry.log_pose(odometry.exp_pose(xi)), xi, atol=1e-12)
+    arc = odometry.step(np.zeros(3), [0.7, -0.9], 1.0, "arc")
+    np.testing.assert_allclose(odometry.log_pose(arc), [0.7, 0, -0.9], atol=1e-12)
+    x, y = rng.normal(size=(2, 50, 3))
+    np.testing.assert_allclose(odometry.compose_pose(x, odometry.relative_pose(x, y))[:, :2], y[:, :2], atol=1e-12)
+    T = expm(np.array([[0, -xi[0, 2], xi[0, 0]], [xi[0, 2], 0, xi[0, 1]], [0, 0, 0]]))
+    np.testing.assert_allclose(odometry.exp_pose(xi[0])[:2], T[:2, 2], atol=1e-12)
+
+
+def test_ellipse_holds_its_share():
+    rng, cov = np.random.default_rng(3), np.array([[2.0, 0.8], [0.8, 1.0]])
+    outline = gaussian.ellipse([1.0, 2.0], cov, 0.9)
+    d = outline - [1.0, 2.0]
+    np.testing.assert_allclose((d * np.linalg.solve(cov, d.T).T).sum(1), -2 * np.log(0.1))
+    samples = rng.multivariate_normal([1, 2], cov, 20_000)
+    assert abs(gaussian.share_inside(samples, [1.0, 2.0], cov, 0.9) - 0.9) < 0.008
+    assert gaussian.outlines(np.zeros((4, 2)), np.broadcast_to(cov, (4, 2, 2)), points=11).shape == (48, 2)
