@@ -34,7 +34,8 @@ class Lateration:
 
     position (..., dim) m.    residuals (..., n): measured minus computed distance, m.
     covariance (..., dim, dim): m^2, infinite where the geometry does not fix the position.
-    singular_values (..., dim) of the unit vectors to the landmarks.    iterations: of the slowest run.    converged (...): whether each run stopped at a minimum.
+    singular_values (..., dim) of the unit vectors to the landmarks.
+    iterations: of the slowest run.    converged (...): whether each run stopped at a minimum.
     """
 
     position: np.ndarray

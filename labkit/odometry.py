@@ -237,7 +237,7 @@ def relative_pose(x, y):
 def log_pose(x):
     """Exponential coordinates (rho_x, rho_y, phi) of a planar pose: the constant twist that reaches it in one second.
 
-    The inverse of driving an arc, with sideways motion allowed: (v, 0, omega) for a pose that `step` reaches with "arc".
+    The inverse of driving an arc, with sideways motion allowed: (v, 0, omega) for what `step` reaches with "arc".
     """
     x = as_points(x, "x", 3)
     half = wrap_angle(x[..., 2]) / 2
@@ -259,5 +259,5 @@ def compose_pose(x, y):
     """Pose whose coordinates seen from x are y, (..., 3); the inverse of `relative_pose`, the heading not wrapped."""
     x, y = as_points(x, "x", 3), as_points(y, "y", 3)
     c, s = np.cos(x[..., 2]), np.sin(x[..., 2])
-    parts = (x[..., 0] + c * y[..., 0] - s * y[..., 1], x[..., 1] + s * y[..., 0] + c * y[..., 1], x[..., 2] + y[..., 2])
-    return np.stack(np.broadcast_arrays(*parts), axis=-1)
+    there = (x[..., 0] + c * y[..., 0] - s * y[..., 1], x[..., 1] + s * y[..., 0] + c * y[..., 1])
+    return np.stack(np.broadcast_arrays(*there, x[..., 2] + y[..., 2]), axis=-1)
