@@ -132,10 +132,9 @@ def _arc_sign(x, u, dt):
     return np.array([x[0] + r * (np.sin(x[2]) - np.sin(after)), x[1] + r * (np.cos(after) - np.cos(x[2])), after])
 
 
-def _arc_center_right(x, u, dt):
-    """The center of rotation taken to the right of the heading."""
+def _arc_y_sign(x, u, dt):
     r, after = u[0] / u[1], x[2] + u[1] * dt
-    return np.array([x[0] - r * (np.sin(after) - np.sin(x[2])), x[1] + r * (np.cos(after) - np.cos(x[2])), after])
+    return np.array([x[0] + r * (np.sin(after) - np.sin(x[2])), x[1] + r * (np.cos(after) - np.cos(x[2])), after])
 
 
 def _straight_line_works(function, rng):
@@ -300,8 +299,8 @@ CHAPTER = Chapter(
                     "Your Jacobian lacks the factor 2 of the square, so that every step is twice too long.",
                 ),
                 Mistake(
-                    _newton(lambda J, f, d: (J.T, f)),
-                    "Your Jacobian is transposed: one row a landmark, one column a coordinate.",
+                    lambda L, d, s: newton_lateration(L, d, s) - s,
+                    "You return the way from the start to the position. Add the start.",
                 ),
                 Mistake(_mirrored, "This is the mirror image: it also fits, but the given start is nearer to the other one."),
             ],
@@ -420,7 +419,7 @@ CHAPTER = Chapter(
                     "In sin(h) / h, h is half the turn, omega T / 2.",
                 ),
                 Mistake(_arc_sign, "Your circle runs the wrong way round: check the signs at the center of rotation."),
-                Mistake(_arc_center_right, "Your x goes backward along the circle: the center lies to the left of the heading for omega > 0."),
+                Mistake(_arc_y_sign, "x is right, y has the wrong sign: the center lies to the left of the heading for omega > 0."),
             ],
         ),
         Prediction(
