@@ -499,6 +499,47 @@ def simulate_drive(x0, controls, dt, cov_u, landmarks, std_range, std_bearing, r
     return Drive(truth, controls, z)
 
 
+@dataclass(frozen=True)
+class Course:
+    """A drive past landmarks with all its settings; `simulate` drives it, `localize` filters what was measured.
+
+    controls (n, 2), dt (s), cov_u (2, 2), landmarks (m, 2), std_range (m), std_bearing (rad), x0 (3,), cov0 (3, 3).
+    """
+
+    controls: np.ndarray
+    dt: float
+    cov_u: np.ndarray
+    landmarks: np.ndarray
+    std_range: float
+    std_bearing: float
+    x0: np.ndarray
+    cov0: np.ndarray
+
+    def simulate(self, rng, runs, **more):
+        """A `Drive` of many robots, each with its own start drawn from x0 and cov0; options as `simulate_drive`."""
+        start = self.x0 + rng.standard_normal((runs, 3)) @ np.linalg.cholesky(self.cov0).T
+        noise = (self.cov_u, self.landmarks, self.std_range, self.std_bearing)
+        return simulate_drive(start, self.controls, self.dt, *noise, rng, runs, **more)
+
+    def localize(self, drive, **changes):
+        """The `Localization` of a drive by a filter that believes the course, but for the `changes`."""
+        believed = {"cov_u": self.cov_u, "std_range": self.std_range, "std_bearing": self.std_bearing} | changes
+        return ekf_localize(drive.controls, drive.z, self.landmarks, self.x0, self.cov0, self.dt, **believed)
+
+
+def circle_course(marks=4, steps=300):
+    """The lecture's circle of chapter 7 past one to four landmarks, a `Course`; sensor and start are ours.
+
+    The lecture shows such a drive ("Beispielfahrt mit einer Landmarke") without its numbers.
+    """
+    circle = odometry.circle_drive()
+    cov_u = odometry.control_covariance(circle.controls[0], circle.dt, **circle.noise)
+    landmarks = np.array([[5.0, 5.0], [-4.0, 5.5], [-4.5, -1.0], [4.5, -1.5]])[:marks]
+    cov0 = np.diag([0.1**2, 0.1**2, np.radians(3) ** 2])
+    controls = np.tile(circle.controls[0], (steps, 1))
+    return Course(controls, circle.dt, cov_u, landmarks, 0.1, np.radians(1), np.zeros(3), cov0)
+
+
 def ekf_localize(
     u, z, landmarks, x0, cov0, dt, std_range, std_bearing, cov_u=None, cov_v=None, model="euler", wrap=True
 ):
