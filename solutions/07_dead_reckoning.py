@@ -99,7 +99,7 @@ ex.predict("roots", guess, reveal=circle_stages.circles)
 
 # %% two-costs-compared
 landmarks = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
-robot, std = np.array([9.0, 9.0]), 0.5
+robot, std = np.array([8.0, 8.0]), 0.5
 true = np.linalg.norm(landmarks - robot, axis=1)
 measured = true + std * np.random.default_rng(1).standard_normal((20_000, 4))
 bound = np.sqrt(np.trace(std**2 * lateration.dilution(landmarks, robot)))
