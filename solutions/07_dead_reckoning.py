@@ -287,7 +287,7 @@ for dt in (0.5, 0.1, 0.02):
 # %% banana [markdown]
 # ## Where the Gaussian lies
 #
-# The ellipse is a first-order promise. Let 3000 robots with the same commands and their own noise drive, and look where they end.
+# The ellipse is a first-order promise. Let 1500 robots with the same commands and their own noise drive, and look where they end.
 
 # %% predict-banana
 guess = ...  # your code here
@@ -299,8 +299,8 @@ ex.predict("banana", guess, reveal=drive_stages.banana)
 # %% bend [markdown]
 # ## Beyond the document: bend the Gaussian
 #
-# Switch the region to *bent*. The same ends, written as the twist that leads from the computed pose to each of them (the exponential coordinates of chapter 2's rotations, here
-# for the plane), are close to normal; carried back to the floor, their ellipse bends. Nothing about the robot changed, only the coordinates in which we call
+# Switch the region to *bent*. The same ends, written as the constant control that would lead from the computed pose to each of them
+# (their exponential coordinates), are close to normal; carried back to the floor, their ellipse bends. Nothing about the robot changed, only the coordinates in which we call
 # it Gaussian. The check with 10,000 runs of the lecture's noise, 14 m straight on:
 
 # %% bend-code

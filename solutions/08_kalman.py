@@ -102,7 +102,7 @@ fused = fuse_two_sensors(0.0, 20.0, np.array([9.4, 10.6]), np.array([0.5, 1.0]))
 ex.fused(fused)
 
 # %% fused-against [markdown]
-# Printed is 9.6, and the true position is 10. Your 9.5446 rounds to 9.5. Which reading of the page gives 9.6? (It also calls the new variance $\Sigma_0$; it is $\Sigma_1$.)
+# Printed is 9.6, and the true position is 10. Yours rounds to another digit. Which reading of the page gives 9.6? (It also calls the new variance $\Sigma_0$; it is $\Sigma_1$.)
 
 # %% fused-readings
 z, stds = np.array([9.4, 10.6]), np.array([0.5, 1.0])
@@ -333,7 +333,8 @@ for name, step in filters.items():
 # ## Which landmark was that?
 #
 # Real landmarks wear no numbers, and some measurements belong to none. The innovation in units of its covariance, $y^\top S^{-1} y$ (the NIS), decides: nearest in this distance, and only if it
-# lies below the chi-square limit (5.99 for two numbers and 95 %).
+# lies below the chi-square limit (5.99 for two numbers and 95 %). In the example the filter's heading is off by 8°: the nearest landmark *in meters* is then the wrong one, and the gate can
+# only throw the measurement away.
 
 # %% gate
 @ex.gate

@@ -75,7 +75,8 @@ class Search:
         (self.end,) = ax.plot([], [], **style.look("estimates", markersize=8))
         (self.robot,) = ax.plot([], [], color=style.TRUTH, linestyle="none", marker="+", markersize=13, label="robot")
         self.artists = [self.cloud, self.ellipse, self.weak, self.path, self.end, self.robot]
-        ax.legend(loc="upper right", fontsize=8)
+        box = {"frameon": True, "facecolor": style.PAPER, "edgecolor": style.PAPER, "framealpha": 0.85}
+        ax.legend(loc="upper right", fontsize=8, **box)
 
     def set(self, robot, path, cloud, ellipse, weak):
         """Points (2,), (k, 2), (n, 2), (m, 2), (2, 2); empty arrays draw nothing."""

@@ -67,7 +67,7 @@ class Banana:
     def __init__(self, ax):
         (self.path,) = ax.plot([], [], **style.look("guide"))
         look = style.look("truth", linestyle="none", marker=".", markersize=2.5, markeredgewidth=0, alpha=0.5)
-        (self.samples,) = ax.plot([], [], **look, label="3000 true ends")
+        (self.samples,) = ax.plot([], [], **look, label="1500 true ends")
         (self.outline,) = ax.plot([], [], **style.look("prediction"), label="region said to hold 95 %")
         (self.mean,) = ax.plot([], [], **style.look("estimates", markersize=8), label="computed end")
         look = {"linestyle": "none", "marker": "P", "markersize": 10, "markeredgewidth": 1.2}
@@ -75,7 +75,7 @@ class Banana:
             [], [], color=style.MEASUREMENT, markeredgecolor=style.INK, **look, label="mean of the true ends"
         )
         self.artists = [self.path, self.samples, self.outline, self.mean, self.center]
-        ax.legend(loc="lower right", fontsize=8)
+        ax.legend(loc="lower left", fontsize=8)
 
     def set(self, path, ends, outline):
         """`path`: (n, 3); `ends`: (runs, 3); `outline`: (m, 2)."""

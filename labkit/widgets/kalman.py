@@ -19,7 +19,7 @@ DROPOUT = slice(45, 75)
 KEYS = {"up": (1.0, 0.0), "down": (-1.0, 0.0), "left": (0.0, np.pi / 2), "right": (0.0, -np.pi / 2)}
 KEY_STEPS = 4
 RUNS = 200
-ITERATIONS = np.arange(1, 11)
+ITERATIONS = np.arange(1, 7)
 TWO_MARKS = np.array([[3.0, 0.0], [0.0, 4.0]])
 
 
@@ -301,7 +301,7 @@ def _unit_draws():
 
 @functools.lru_cache(maxsize=64)
 def corrections(std_prior, std_range):
-    """One correction of 200 poor priors by two landmarks, for 1 to 10 iterations: (positions, cov, NEES) of each."""
+    """One correction of 200 poor priors by two landmarks, for 1 to 6 iterations: (positions, cov, NEES) of each."""
     cov = np.diag([std_prior**2, std_prior**2, np.radians(10) ** 2])
     std_bearing = std_range / 3.0  # as precise across a landmark 3 m away as along it
     starts, noises = _unit_draws()
@@ -348,7 +348,7 @@ def honesty():
         style.axes(left, "error in x", "error in y", "errors, zoomed to 90 % of them", equal=True)
         left.set(xlim=(-1, 1), ylim=(-1, 1), xticks=[], yticks=[])
         style.axes(right, "iterations", "mean NEES of 200 runs")
-        right.set(xlim=(0.5, 10.5), ylim=(1, 1e6), yscale="log")
+        right.set(xlim=(0.5, 6.5), ylim=(1, 1e6), yscale="log")
         low, high = kalman.mean_band(3, RUNS)
         right.axhspan(low, high, color=style.GRID)
         parts = draw.Honesty(left, right, ITERATIONS)
@@ -367,9 +367,9 @@ def honesty():
         controls={
             "std_prior": slider(0.1, 1.5, 0.3, step=0.1, label="std of the prior (m)"),
             "std_range": slider(0.01, 0.5, 0.1, label="std of the distance (m)", log=True),
-            "iterations": slider(1, 10, 1, label="iterations"),
+            "iterations": slider(1, 6, 1, label="iterations"),
         },
         fail={"std_prior": 1.0, "std_range": 0.01},
-        presets={"Iterate": {"std_prior": 1.0, "std_range": 0.01, "iterations": 10}},
+        presets={"Iterate": {"std_prior": 1.0, "std_range": 0.01, "iterations": 6}},
         describe=_honesty_sentence,
     )
