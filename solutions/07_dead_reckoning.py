@@ -257,7 +257,7 @@ for u in drive.controls:
     cov_u = control_covariance(u, drive.dt, **drive.noise)
     end_pose, end_cov = propagate(end_pose, end_cov, u, drive.dt, cov_u)
 ### END SOLUTION
-ex.end_pose(end_pose)
+end_pose = ex.end_pose(end_pose)
 
 # %% end_cov [markdown]
 # The same loop gives the covariance. Hand it in as well.
@@ -267,7 +267,7 @@ covariance = ...  # your code here
 ### BEGIN SOLUTION
 covariance = end_cov
 ### END SOLUTION
-ex.end_cov(covariance)
+covariance = ex.end_cov(covariance)
 
 # %% what-k-means [markdown]
 # ## What $k_d$ is, and what it is not

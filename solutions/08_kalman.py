@@ -162,7 +162,7 @@ corrected = ...  # your code here
 C, cov_z = np.array([[1.0, 0.0]]), np.array([[0.25]])
 corrected, corrected_cov = update(np.array([12.5, 5.0]), prior_cov, np.array([11.79]), C, cov_z)
 ### END SOLUTION
-ex.corrected(corrected)
+corrected = ex.corrected(corrected)
 
 # %% detective [markdown]
 # The covariance agrees to the last digit, the state does not: printed is (11.90, 4.98). Four digits of a covariance are a good witness. After $n$
@@ -237,10 +237,19 @@ def motion_jacobians(x, u, dt):
 # A Jacobian by hand is checked by differences before it is used, always. And then one step of the whole filter: everything you wrote, in eight lines.
 
 # %% numeric-check-code
-x, landmark, h = np.array([0.5, -1.0, 2.0]), np.array([3.0, 2.0]), 1e-6
-slopes = [(measurement(x + h * e, landmark) - measurement(x - h * e, landmark)) / (2 * h) for e in np.eye(3)]
-difference = np.abs(np.transpose(slopes) - measurement_jacobian(x, landmark)).max()
-print("H agrees with central differences to eight digits:", bool(difference < 1e-8))
+def slopes(function, x, h=1e-6):
+    """Central differences of function(x) by x, one column a coordinate."""
+    return np.column_stack([(function(x + h * e) - function(x - h * e)) / (2 * h) for e in np.eye(len(x))])
+
+
+x, u, landmark = np.array([0.5, -1.0, 2.0]), np.array([1.0, 0.4]), np.array([3.0, 2.0])
+pairs = {
+    "H": (measurement_jacobian(x, landmark), slopes(lambda x: measurement(x, landmark), x)),
+    "G_x": (motion_jacobians(x, u, 0.1)[0], slopes(lambda x: odometry.step(x, u, 0.1, "euler"), x)),
+    "G_u": (motion_jacobians(x, u, 0.1)[1], slopes(lambda u: odometry.step(x, u, 0.1, "euler"), u)),
+}
+for name, (by_hand, numeric) in pairs.items():
+    print(f"{name:3} agrees with central differences to eight digits:", bool(np.abs(by_hand - numeric).max() < 1e-8))
 
 # %% ekf_step
 @ex.ekf_step
@@ -291,7 +300,8 @@ def nees(truth, x, cov):
 # %% two-hundred-runs
 four = kalman.circle_course(marks=4)
 drives = four.simulate(np.random.default_rng(1), runs=200)
-beliefs = {"as it is": {}, "bearing not wrapped": {"wrap": False}, "drive believed 3 times too good": {"cov_u": four.cov_u / 9}}
+beliefs = {"as it is": {}, "bearing not wrapped": {"wrap": False}}
+beliefs["drive believed 3 times too good"] = {"cov_u": four.cov_u / 9}
 beliefs["sensor believed 3 times too good"] = {"std_range": four.std_range / 3, "std_bearing": four.std_bearing / 3}
 low, high = kalman.mean_band(3, 200)
 print(f"mean NEES of 200 runs after 30 s; honest between {low:.2f} and {high:.2f}")
