@@ -6,6 +6,7 @@ measurement is (distance, bearing) to each landmark, z (..., m, 2) in m and rad,
 Source: lecture "Lokalisierung", section "Lokalisierung mit einem Kalman-Filter".
 """
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -227,7 +228,7 @@ def _until_settled_2(z, A, C, cov_v, r, x, cov):
     (p00, p01), (_, p11) = cov.tolist()
     x0, x1 = x.tolist()
     out, k0, k1 = [], math.inf, math.inf
-    for value in z.tolist():
+    for value in itertools.chain.from_iterable(z[k : k + 256].tolist() for k in range(0, len(z), 256)):
         x0, x1 = a * x0 + b * x1, c * x0 + d * x1
         m00, m01, m10, m11 = a * p00 + b * p01, a * p01 + b * p11, c * p00 + d * p01, c * p01 + d * p11
         p00, p01, p11 = m00 * a + m01 * b + q00, m00 * c + m01 * d + q01, m10 * c + m11 * d + q11

@@ -65,7 +65,7 @@ def update(x, cov, z, C, cov_z):
 # %% bells [markdown]
 # ## Three bells
 #
-# Decide, then drag the measurement and the width beside it. The gain follows the two widths alone; where the measurement lies does not matter to it.
+# Decide, then drag the peak of the measurement: sideways moves it, upward makes it sharper. The gain follows the two widths alone; where the measurement lies does not matter to it.
 # *Make it fail* shows what the bells do not tell.
 
 # %% predict-bell

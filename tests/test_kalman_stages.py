@@ -22,18 +22,12 @@ def test_stage_moves_fails_and_comes_back(make):
     assert stage.caption == caption and stage.png() == picture
 
 
-def test_bells_give_the_fusion_of_the_lecture():
-    """A still robot and a flat prior leave the measurement's own bell."""
-    state = {"std0": 3.0, "std_u": 3.0, "z": np.array([9.0, 0.0]), "sigma": np.array([9.1, stages.BASE])}
-    (mean, std) = stages.compute_bells(state)["bells"][2]
-    weights = np.array([1 / 18, 1 / 0.01])
+def test_bells_weigh_by_one_over_variance():
+    state = {"std0": 3.0, "std_u": 3.0, "z": np.array([9.0, 4.0])}
+    _, measured, (mean, std) = stages.compute_bells(state)["bells"]
+    np.testing.assert_allclose(measured, [9.0, 1 / (4 * np.sqrt(2 * np.pi))])
+    weights = np.array([1 / 18, 1 / measured[1] ** 2])
     np.testing.assert_allclose([mean, std], [weights @ [7, 9] / weights.sum(), weights.sum() ** -0.5])
-
-
-def test_sigma_stays_right_of_the_measurement():
-    stage = stages.bells()
-    stage.set(z=(14.0, 0.0))
-    assert stage.state["sigma"][0] >= 14.15
 
 
 def test_vehicle_settles_at_the_riccati_gain_and_loses_sight_in_a_dropout():

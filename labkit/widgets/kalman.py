@@ -12,7 +12,7 @@ from .stage import Handle, Play, Stage, choice, slider, toggle
 
 GRID = np.linspace(0, 20, 401)
 SHIFT = 2.0  # m, the commanded motion of the one-dimensional example
-BASE = 0.06  # height at which the handle of sigma lies
+PEAK = 1 / np.sqrt(2 * np.pi)  # height of the bell of standard deviation 1
 NOISE = {"var_x0": 1.0, "var_v0": 0.01, "var_a": 0.16, "var_z": 0.25}  # the vehicle, as reconstructed
 STEPS, DT = 100, 0.1
 DROPOUT = slice(45, 75)
@@ -28,18 +28,13 @@ TWO_MARKS = np.array([[3.0, 0.0], [0.0, 4.0]])
 
 def compute_bells(state):
     """Prediction and correction of one coordinate: (mean, std) of each bell, the gain and the NIS."""
-    std_z = max(state["sigma"][0] - state["z"][0], 0.1)
+    std_z = PEAK / state["z"][1]
     before = (5.0, state["std0"])
     x, cov = kalman.predict([before[0]], [[before[1] ** 2]], [[1.0]], [[1.0]], [SHIFT], [[state["std_u"] ** 2]])
     corrected = kalman.update(x, cov, [state["z"][0]], [[1.0]], [[std_z**2]])
     bells = [(x[0], np.sqrt(cov[0, 0])), (state["z"][0], std_z), (corrected.x[0], np.sqrt(corrected.cov[0, 0]))]
     score = float(kalman.nis(corrected.innovation, corrected.cov_innovation))
     return {"before": before, "bells": bells, "gain": float(corrected.gain[0, 0]), "nis": score}
-
-
-def _keep_sigma_right(state, moved):
-    """The handle of sigma stays to the right of the measurement."""
-    return {"sigma": (max(state["sigma"][0], state["z"][0] + 0.15), BASE)}
 
 
 def _bells_sentence(result):
@@ -51,7 +46,7 @@ def _bells_sentence(result):
 
 
 def bells():
-    """Prediction, measurement, correction in one dimension: drag the measurement and its sigma."""
+    """Prediction, measurement, correction in one dimension: drag the peak of the measurement, sharper is higher."""
 
     def scene(fig):
         ax = style.axes(fig.subplots(), "position (m)", "density (1/m)")
@@ -71,18 +66,16 @@ def bells():
         scene=scene,
         compute=compute_bells,
         handles={
-            "z": Handle((9.0, 0.0), step=0.1, bounds=((0.5, 19), (0, 0)), label="measurement", color=style.MEASUREMENT),
-            "sigma": Handle(
-                (9.8, BASE), step=0.1, bounds=((0.6, 20), (BASE, BASE)), label="measurement plus sigma",
-                color=style.MEASUREMENT,
-            ),
+            "z": Handle(
+                (9.0, 0.5), step=0.1, bounds=((0.5, 19), (0.1, 1.1)), color=style.MEASUREMENT,
+                label="peak of the measurement: sideways its value, up and down its sigma",
+            )
         },
         controls={
             "std0": slider(0.2, 3.0, 0.6, step=0.1, label="std before (m)"),
             "std_u": slider(0.0, 3.0, 0.8, step=0.1, label="std of the motion (m)"),
         },
-        constrain=_keep_sigma_right,
-        fail={"z": (15.0, 0.0), "sigma": (15.4, BASE)},
+        fail={"z": (15.0, 1.0)},
         describe=_bells_sentence,
     )  # fmt: skip
 
