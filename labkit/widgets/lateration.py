@@ -138,7 +138,7 @@ def circles():
         ax = style.axes(fig.subplots(), "x (m)", "y (m)", equal=True)
         ax.set(xlim=(-1.5, 13.5), ylim=(-3.2, 6.2))
         rings, search = draw.Circles(ax), draw.Search(ax)
-        words = ax.text(0.02, 0.97, "", transform=ax.transAxes, va="top", fontsize=9)
+        words = ax.text(0.02, 0.02, "", transform=ax.transAxes, va="bottom", fontsize=9)
 
         def update(state, result):
             rings.set(result["landmarks"], result["distances"], state["R"])
