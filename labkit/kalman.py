@@ -675,37 +675,42 @@ def _filter_many(u, z, landmarks, x0, cov0, dt, weights, var_u, extra, turn, wra
     u = np.broadcast_to(u if u.ndim == 3 else u[:, None, :], (steps, runs, 2)).transpose(0, 2, 1)
     pose, P = x0.T.copy(), cov0.transpose(1, 2, 0).copy()
     marks, extra, noisy = landmarks.T[:, :, None], extra[:, :, None], extra.any()
-    z = z.transpose(0, 3, 2, 1)  # step, number, landmark, run
-    seen = np.isfinite(z[:, 0])
-    w_r, w_b = weights[0] * seen, weights[1] * seen
+    z = np.ascontiguousarray(z.transpose(0, 3, 2, 1))  # step, number, landmark, run
+    weight = np.isfinite(z) * np.reshape(weights, (2, 1, 1))
     z = np.where(np.isfinite(z), z, 0.0)
     poses, covs, scores = np.empty((steps, 3, runs)), np.empty((steps, 3, 3, runs)), np.empty((steps, runs))
-    W, g, along = np.empty((3, 3, runs)), np.empty((3, runs)), np.empty((2, runs))
-    W[2, 2], total = 0.0, w_b.sum(1)
+    H, y, along = np.empty((3, 2, m, runs)), np.empty((2, m, runs)), np.empty((2, runs))
+    H[2, 0], H[2, 1] = 0.0, -1.0  # the heading: not seen by distances, subtracted from bearings
+    rows, error, weight = H.reshape(3, 2 * m, runs), y.reshape(2 * m, runs), weight.reshape(steps, 2 * m, runs)
+    weighted = np.empty_like(rows)
     for k in range(steps):
         _move_many(pose, P, u[k], dt, var_u[k], turn, along)
         if noisy:
             P += extra
         d = marks - pose[:2, None]
-        q = d[0] * d[0] + d[1] * d[1]
-        r = np.sqrt(q)
-        error_b = z[k, 1] - np.arctan2(d[1], d[0]) + pose[2]
+        minus_q = d[0] * d[0]
+        minus_q += d[1] * d[1]
+        r = np.sqrt(minus_q)
+        np.negative(minus_q, out=minus_q)
+        np.subtract(z[k, 0], r, out=y[0])
+        np.subtract(z[k, 1], np.arctan2(d[1], d[0]), out=y[1])
+        y[1] += pose[2]
         if wrap:
-            error_b -= math.tau * np.rint(error_b * (1 / math.tau))
-        error_r = z[k, 0] - r
-        U, V = d / r, d[::-1] / q
-        V[1] *= -1  # rows of H: (-U, 0) for the distance, (V, -1) for the bearing
-        wU, wV, wb = w_r[k] * U, w_b[k] * V, w_b[k] * error_b
-        W[:2, :2] = (wU[:, None] * U + wV[:, None] * V).sum(2)
-        W[2, :2] = W[:2, 2] = -wV.sum(1)
-        W[2, 2] = total[k]
-        g[:2] = (wV * error_b - wU * error_r).sum(1)
-        g[2] = -wb.sum(0)
-        P = _absorb_many(P, W)
-        change = P[:, 0] * g[0] + P[:, 1] * g[1] + P[:, 2] * g[2]
+            y[1] -= math.tau * np.rint(y[1] * (1 / math.tau))
+        np.negative(r, out=r)
+        np.divide(d, r, out=H[:2, 0])
+        np.divide(d[1], minus_q, out=H[0, 1])
+        np.negative(H[0, 1], out=H[0, 1])
+        np.divide(d[0], minus_q, out=H[1, 1])
+        np.multiply(rows, weight[k], out=weighted)
+        g = np.einsum("ikr,kr->ir", weighted, error)
+        P = _absorb_many(P, np.einsum("ikr,jkr->ijr", weighted, rows))
+        change = np.einsum("ijr,jr->ir", P, g)
         pose += change
         poses[k], covs[k] = pose, P
-        scores[k] = (w_r[k] * error_r * error_r + wb * error_b).sum(0) - (change * g).sum(0)
+        error *= error
+        np.einsum("kr,kr->r", error, weight[k], out=scores[k])
+        scores[k] -= np.einsum("ir,ir->r", change, g)
     return poses.transpose(0, 2, 1), covs.transpose(0, 3, 1, 2), scores
 
 
@@ -734,11 +739,11 @@ def _move_many(pose, P, u, dt, noise, turn, along):
 def _absorb_many(P, W):
     """Covariances after measurements of information W; the cofactors come from the matrix continued cyclically."""
     M = np.empty((5, 5, P.shape[-1]))
-    M[:3, :3] = W[:, 0, None] * P[0] + W[:, 1, None] * P[1] + W[:, 2, None] * P[2]
+    M[:3, :3] = np.einsum("ijr,jkr->ikr", W, P)
     for i in range(3):
         M[i, i] += 1.0
     M[3:, :3] = M[:2, :3]
     M[:, 3:] = M[:, :2]
     C = M[1:4, 1:4] * M[2:, 2:] - M[1:4, 2:] * M[2:, 1:4]
     C /= M[0, 0] * C[0, 0] + M[0, 1] * C[0, 1] + M[0, 2] * C[0, 2]
-    return P[:, 0, None] * C[:, 0] + P[:, 1, None] * C[:, 1] + P[:, 2, None] * C[:, 2]
+    return np.einsum("ijr,kjr->ikr", P, C)
