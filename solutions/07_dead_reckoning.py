@@ -66,7 +66,7 @@ def lateration_residual(landmarks, distances, position):
 # %% newton_lateration
 @ex.newton_lateration
 def newton_lateration(landmarks, distances, start):
-    """Return the position, shape (2,), that Newton's method finds from `start` with two landmarks."""
+    """Return the position, shape (2,), that Newton's method finds from `start` (2,), with landmarks (2, 2)."""
     ### BEGIN SOLUTION
     position = np.array(start, dtype=float)
     for _ in range(20):
@@ -133,7 +133,7 @@ def wheel_to_twist(v_left, v_right, track):
 # %% step_euler
 @ex.step_euler
 def step_euler(x, u, dt):
-    """Return the pose after one step of the simplified model, shape (3,)."""
+    """Return the pose (x, y, theta) after one step of the simplified model; x (3,), u = (v, omega), dt in s."""
     ### BEGIN SOLUTION
     return np.array([x[0] + u[0] * dt * np.cos(x[2]), x[1] + u[0] * dt * np.sin(x[2]), x[2] + u[1] * dt])
     ### END SOLUTION
@@ -142,7 +142,7 @@ def step_euler(x, u, dt):
 # %% step_midpoint
 @ex.step_midpoint
 def step_midpoint(x, u, dt):
-    """Return the pose after one step along the heading of half the turn, shape (3,)."""
+    """Return the pose (x, y, theta) after one step along the heading of half the turn."""
     ### BEGIN SOLUTION
     direction = x[2] + u[1] * dt / 2
     return np.array([x[0] + u[0] * dt * np.cos(direction), x[1] + u[0] * dt * np.sin(direction), x[2] + u[1] * dt])
@@ -152,7 +152,7 @@ def step_midpoint(x, u, dt):
 # %% step_arc
 @ex.step_arc
 def step_arc(x, u, dt):
-    """Return the pose after driving the exact arc, shape (3,); omega may be 0."""
+    """Return the pose (x, y, theta) after driving the exact arc; omega may be 0."""
     ### BEGIN SOLUTION
     half_turn = u[1] * dt / 2
     chord = u[0] * dt * np.sinc(half_turn / np.pi)
@@ -221,7 +221,7 @@ def control_covariance(u, dt, k_d, k_theta, k_drift):
 # %% propagate
 @ex.propagate
 def propagate(x, cov, u, dt, cov_u):
-    """Return pose (3,) and covariance (3, 3) after one step of the simplified model."""
+    """Return pose (3,) and covariance (3, 3) after one step of the simplified model; cov (3, 3), cov_u (2, 2)."""
     ### BEGIN SOLUTION
     F_x, F_u = jacobian_state(x, u, dt), jacobian_control(x, u, dt)
     return step_euler(x, u, dt), F_x @ cov @ F_x.T + F_u @ cov_u @ F_u.T
@@ -245,8 +245,8 @@ ex.predict("spread", guess, reveal=drive_stages.drive)
 # ## The circle in numbers
 #
 # The lecture prints the constants, $k_d = (0.02\,\mathrm{m})^2/1\,\mathrm{m}$, $k_\theta = (5°)^2/360°$ and $k_\mathrm{drift} = (2°)^2/1\,\mathrm{m}$, but not where the drive
-# ends. `odometry.circle_drive()` holds them in radians and meters. Start at the origin with a covariance of zeros. (140 steps turn by 336°: the circle does not
-# quite close.)
+# ends. `odometry.circle_drive()` holds them in radians and meters: `drive.controls` (140, 2), `drive.dt`, and `drive.noise` with the three constants by name, to be passed on as `**drive.noise`.
+# Start at the origin with a covariance of zeros and take all steps. (They turn by 336°: the circle does not quite close.)
 
 # %% end_pose
 drive = odometry.circle_drive()

@@ -40,7 +40,7 @@ np.set_printoptions(precision=4, suppress=True)
 # %% predict_state
 @ex.predict_state
 def predict_state(x, cov, A, B, u, cov_u):
-    """Return state (n,) and covariance (n, n) one time step later."""
+    """Return state (n,) and covariance (n, n) one time step later; u (k,), cov_u (k, k), B (n, k)."""
     ### BEGIN SOLUTION
     return A @ x + B @ u, A @ cov @ A.T + B @ cov_u @ B.T
     ### END SOLUTION
@@ -254,7 +254,10 @@ for name, (by_hand, numeric) in pairs.items():
 # %% ekf_step
 @ex.ekf_step
 def ekf_step(x, cov, u, dt, cov_u, z, landmark, cov_z):
-    """Return pose and covariance after moving with u and measuring z = (distance, bearing) to one landmark."""
+    """Return pose and covariance after moving with u = (v, omega) and measuring z = (distance, bearing).
+
+    x (3,), cov (3, 3), cov_u (2, 2) of the control, landmark (2,), cov_z (2, 2) of z.
+    """
     ### BEGIN SOLUTION
     G_x, G_u = motion_jacobians(x, u, dt)
     x = odometry.step(x, u, dt, "euler")
@@ -289,7 +292,7 @@ ex.predict("wrapping", guess, reveal=stages.arena)
 # %% nees
 @ex.nees
 def nees(truth, x, cov):
-    """Return the normalized estimation error squared of a pose, a number; the heading error is wrapped."""
+    """Return the normalized estimation error squared of a pose x (3,) with cov (3, 3); wrap the heading error."""
     ### BEGIN SOLUTION
     e = truth - x
     e[2] = wrap_angle(e[2])
@@ -349,7 +352,7 @@ for name, step in filters.items():
 # %% gate
 @ex.gate
 def gate(innovation, cov_innovation, limit):
-    """Return True where the innovation, shape (2,), is plausible given its covariance (2, 2)."""
+    """Return True where the innovation (2,) is plausible: its NIS, with the covariance (2, 2), is below the limit."""
     ### BEGIN SOLUTION
     return bool(innovation @ np.linalg.solve(cov_innovation, innovation) <= limit)
     ### END SOLUTION
