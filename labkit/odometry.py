@@ -6,11 +6,42 @@ particles or 200 runs. The heading is never wrapped here: a path stays continuou
 Source: lecture "Lokalisierung", section "Koppelnavigation".
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .checks import as_finite, as_points, as_positive
+from .tables import read_table
 
 MODELS = ("euler", "midpoint", "arc")
+
+
+@dataclass(frozen=True)
+class CircleDrive:
+    """The lecture's drive: controls (n, 2), time step dt (s), error constants `noise` (k_d, k_theta, k_drift)."""
+
+    controls: np.ndarray
+    dt: float
+    noise: dict
+
+
+def circle_drive(dt=None):
+    """The lecture's circle drive as a `CircleDrive`; another dt (s) drives the same 14 s in other steps.
+
+    The constants are the squares of the printed standard deviations over their way, degrees turned to radians.
+    Source: lecture, section "Koppelnavigation", page "Simulation"; data/dead_reckoning.
+    """
+    table = read_table("dead_reckoning/circle_drive.csv", text=("name", "unit"))
+    given = dict(zip(table["name"].tolist(), table["value"].tolist()))
+    duration = given["dt"] * given["steps"]
+    dt = given["dt"] if dt is None else float(as_positive(dt, "dt"))
+    noise = {
+        "k_d": given["std_distance_per_meter"] ** 2,
+        "k_theta": np.radians(given["std_heading_per_turn_deg"]) ** 2 / (2 * np.pi),
+        "k_drift": np.radians(given["std_heading_per_meter_deg"]) ** 2,
+    }
+    u = [given["v"], np.radians(given["omega_deg"])]
+    return CircleDrive(np.tile(u, (round(duration / dt), 1)), dt, noise)
 
 
 def wrap_angle(angle):
@@ -193,3 +224,40 @@ def noisy_controls(controls, dt, k_d, k_theta, k_drift, rng, runs):
 def sample_drives(x0, controls, dt, k_d, k_theta, k_drift, rng, runs, model="midpoint"):
     """Paths of `runs` robots given the same commands, each with its own noise, shape (n + 1, runs, 3)."""
     return drive(x0, noisy_controls(controls, dt, k_d, k_theta, k_drift, rng, runs), dt, model)
+
+
+def relative_pose(x, y):
+    """Pose y seen from pose x, (..., 3), the heading within [-pi, pi)."""
+    x, y = as_points(x, "x", 3), as_points(y, "y", 3)
+    d, c, s = y - x, np.cos(x[..., 2]), np.sin(x[..., 2])
+    parts = (c * d[..., 0] + s * d[..., 1], c * d[..., 1] - s * d[..., 0], wrap_angle(d[..., 2]))
+    return np.stack(parts, axis=-1)
+
+
+def log_pose(x):
+    """Exponential coordinates (rho_x, rho_y, phi) of a planar pose: the constant twist that reaches it in one second.
+
+    The inverse of driving an arc, with sideways motion allowed: (v, 0, omega) for what `step` reaches with "arc".
+    """
+    x = as_points(x, "x", 3)
+    half = wrap_angle(x[..., 2]) / 2
+    scale = 1 / np.sinc(half / np.pi)
+    c, s = scale * np.cos(half), scale * np.sin(half)
+    return np.stack([c * x[..., 0] + s * x[..., 1], c * x[..., 1] - s * x[..., 0], 2 * half], axis=-1)
+
+
+def exp_pose(xi):
+    """Planar pose of exponential coordinates, (..., 3); the inverse of `log_pose`."""
+    xi = as_points(xi, "xi", 3)
+    half = xi[..., 2] / 2
+    scale = np.sinc(half / np.pi)
+    c, s = scale * np.cos(half), scale * np.sin(half)
+    return np.stack([c * xi[..., 0] - s * xi[..., 1], s * xi[..., 0] + c * xi[..., 1], xi[..., 2]], axis=-1)
+
+
+def compose_pose(x, y):
+    """Pose whose coordinates seen from x are y, (..., 3); the inverse of `relative_pose`, the heading not wrapped."""
+    x, y = as_points(x, "x", 3), as_points(y, "y", 3)
+    c, s = np.cos(x[..., 2]), np.sin(x[..., 2])
+    there = (x[..., 0] + c * y[..., 0] - s * y[..., 1], x[..., 1] + s * y[..., 0] + c * y[..., 1])
+    return np.stack(np.broadcast_arrays(*there, x[..., 2] + y[..., 2]), axis=-1)
