@@ -27,6 +27,9 @@ CONTROL_NOISE = {  # variances per way as the lecture prints them: (5 cm)^2 per 
     "k_drift": math.radians(2.0) ** 2 / 1.0,
 }
 SENSORS = ("landmarks", "beams", "likelihood field")
+MIN_INJECTED = (
+    0.02  # with recovery a few random poses always look around: a cloud in the wrong place may fit fairly well
+)
 MAX_INJECTED = 0.5  # share of the cloud that one step may replace: the rest must be able to hold on to what is right
 _BIN_TURN, _MODE_TURN = math.radians(15), math.radians(30)
 
@@ -538,7 +541,8 @@ class MonteCarloLocalizer:
                 share, *self.averages = recover(w_mean, slow, fast, *self.recovery)
         effective = effective_size(self.weights)
         due = self.count % self.every == 0 and effective < self.threshold * len(self.states)
-        injected = int(round(min(share, MAX_INJECTED) * len(self.states)))
+        share = float(np.clip(share, MIN_INJECTED, MAX_INJECTED)) if self.draw is not None else 0.0
+        injected = int(round(share * len(self.states)))
         if due or injected or self.threshold >= 1 and self.count % self.every == 0:
             self._redraw(injected, rng)
             due = True

@@ -160,7 +160,7 @@ def map_forms():
 
 
 @functools.cache
-def _places(step=0.2):
+def _places(step=0.25):
     """Free places of the building, (n, 2), and their cells in a coarse picture: (rows, columns, shape)."""
     left, right, bottom, top = building().grid.extent
     x, y = np.meshgrid(np.arange(left + step / 2, right, step), np.arange(bottom + step / 2, top, step))

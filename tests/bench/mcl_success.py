@@ -84,6 +84,9 @@ def run_kidnapped(suite, model, seed):
     return steps is not None, steps, found[-1]
 
 
+TASKS = {"global": run_global, "adaptive": run_adaptive, "kidnapped": run_kidnapped}
+
+
 def interval(successes, runs, level=0.95):
     """Clopper and Pearson's interval of a share."""
     a = (1 - level) / 2
@@ -96,10 +99,12 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=100)
     parser.add_argument("--write", action="store_true", help="store the table in data/monte_carlo/success.csv")
+    parser.add_argument("--tasks", nargs="+", choices=list(TASKS), default=list(TASKS))
     args = parser.parse_args()
     suite = particles.SensorSuite(maps.load_building())
     rows = []
-    for task, run in (("global", run_global), ("adaptive", run_adaptive), ("kidnapped", run_kidnapped)):
+    for task in args.tasks:
+        run = TASKS[task]
         for model in particles.SENSORS:
             began = time.perf_counter()
             results = [run(suite, model, seed) for seed in range(args.runs)]
