@@ -264,7 +264,7 @@ def _geometric(points, start):
         q, r, J = q + step, r_new, J_new
         if np.abs(step).max() <= 1e-12 * max(np.abs(q).max(), 1.0):
             break
-    return q, -r, J
+    return q, r, J
 
 
 def _uncertainty(J, residuals, std):
