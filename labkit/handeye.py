@@ -525,19 +525,18 @@ def _polar(M):
 
 
 def _descend(S, h, R_FS):
-    """Newton on SO(3) for r'Sr - 2 h'r, Gauss-Newton while far, a step halved until it no longer goes uphill: (R_FS, costs)."""
+    """Newton on SO(3) for r'Sr - 2 h'r, Gauss-Newton where that points uphill, each step halved until it descends: (R_FS, costs)."""
     r = R_FS.ravel()
     gradient = S @ r - h
     costs = [r @ (gradient - h)]
     floor = 1e-15 * (abs(r @ h) + abs(costs[0]))
-    size = 1.0
     for _ in range(MAX_STEPS):
         G = (_GENERATORS @ R_FS).reshape(3, 9)
-        H = G @ S @ G.T
-        if size < 0.1:
-            Z = gradient.reshape(3, 3) @ R_FS.T
-            H = H + 0.5 * (Z + Z.T) - Z.trace() * _EYE
-        step = np.linalg.solve(H, -(G @ gradient))
+        slope, H = G @ gradient, G @ S @ G.T
+        Z = gradient.reshape(3, 3) @ R_FS.T
+        step = -np.linalg.solve(H + 0.5 * (Z + Z.T) - Z.trace() * _EYE, slope)
+        if slope @ step > 0:
+            step = -np.linalg.solve(H, slope)
         size = math.sqrt(step @ step)
         if size > 1.0:
             step, size = step / size, 1.0
