@@ -1,7 +1,7 @@
 """Frames from three measured points, rigid transforms, and the angles of a KUKA controller.
 
-`T_AB` maps coordinates in B to coordinates in A, so neighboring letters cancel: `T_AC = T_AB @ T_BC`. Lengths carry whatever
-unit the points have (mm in this chapter), angles are radians, and all functions broadcast over leading axes.
+`T_AB` maps coordinates in B to coordinates in A, so neighboring letters cancel: `T_AC = T_AB @ T_BC`. Lengths carry
+whatever unit the points have (mm in this chapter), angles are radians, and all functions broadcast over leading axes.
 Source: lab sheet "Kalibrierung", Hochschule Darmstadt 2016, section 1.
 """
 
@@ -93,8 +93,8 @@ def frame_from_points(origin, x_point, y_point):
 def _axes_into(R, a, b):
     """Write the Gram-Schmidt axes of a, b into the first three rows and columns of R, component by component.
 
-    The cross product comes first: |a x b| is the height of the triangle times its base, and y = z x x needs no subtraction of nearly
-    equal vectors, so flat triangles lose no digits.
+    The cross product comes first, y = z x x follows. The axes are perpendicular to about 1e-16 over the sine of the
+    angle between the arms: 1e-11 for the flattest triangle that is let in.
     """
     ax, ay, az = np.moveaxis(a, -1, 0)
     bx, by, bz = np.moveaxis(b, -1, 0)
@@ -185,7 +185,8 @@ def matrix_from_kuka(xyzabc):
     T : array, shape (..., 4, 4)
     """
     xyzabc = as_points(xyzabc, "xyzabc", dim=6)
-    (ca, cb, cc), (sa, sb, sc) = np.moveaxis(np.cos(xyzabc[..., 3:]), -1, 0), np.moveaxis(np.sin(xyzabc[..., 3:]), -1, 0)
+    ca, cb, cc = np.moveaxis(np.cos(xyzabc[..., 3:]), -1, 0)
+    sa, sb, sc = np.moveaxis(np.sin(xyzabc[..., 3:]), -1, 0)
     T = np.zeros((*xyzabc.shape[:-1], 4, 4))
     T[..., 0, 0], T[..., 0, 1], T[..., 0, 2] = ca * cb, ca * sb * sc - sa * cc, ca * sb * cc + sa * sc
     T[..., 1, 0], T[..., 1, 1], T[..., 1, 2] = sa * cb, sa * sb * sc + ca * cc, sa * sb * cc - ca * sc
@@ -198,8 +199,8 @@ def matrix_from_kuka(xyzabc):
 def kuka_from_matrix(T):
     """KUKA pose x, y, z, A, B, C (rad) of a transform; (..., 4, 4) -> (..., 6).
 
-    B lies in [-pi/2, pi/2], A and C in [-pi, pi]. At B = +-pi/2 only A -+ C is determined; there A comes out of what rounding left, or 0,
-    and C takes the rest, so that `matrix_from_kuka` always returns the same T.
+    B lies in [-pi/2, pi/2], A and C in [-pi, pi]. At B = +-pi/2 only A -+ C is determined; there A comes out of what
+    rounding left, or 0, and C takes the rest, so that `matrix_from_kuka` always returns the same T.
     """
     T = as_transforms(T, "T")
     a = np.arctan2(T[..., 1, 0], T[..., 0, 0])
@@ -254,9 +255,8 @@ def fit_frame(points_F, points_W):
     spread = np.swapaxes(p - p_mean[..., None, :], -1, -2) @ (q - q_mean[..., None, :])
     values = np.linalg.svd(spread, compute_uv=False)
     if (values[..., 1] <= 1e-9 * values[..., 0]).any():
-        raise ValueError(
-            f"the points are collinear: the second singular value is {(values[..., 1] / values[..., 0]).min():.1e} of the first"
-        )
+        ratio = (values[..., 1] / values[..., 0]).min()
+        raise ValueError(f"the points are collinear: the second singular value is {ratio:.1e} of the first")
     R = nearest_rotation(np.swapaxes(spread, -1, -2))
     return pose(R, q_mean - (R @ p_mean[..., None])[..., 0])
 
@@ -264,8 +264,8 @@ def fit_frame(points_F, points_W):
 def gram_schmidt_covariance(x_arm, y_along, y_height, std):
     """First-order covariance of the rotation vector (in F) of `frame_from_points`.
 
-    Each of the three points carries isotropic noise of standard deviation `std`. With the origin at 0, x_point at (x_arm, 0, 0) and
-    y_point at (y_along, y_height, 0), the error of the frame about its own axes is
+    Each of the three points carries isotropic noise of standard deviation `std`. With the origin at 0, x_point at
+    (x_arm, 0, 0) and y_point at (y_along, y_height, 0), the error of the frame about its own axes is
 
         about x: (e_y.z - e_o.z - (y_along / x_arm) (e_x.z - e_o.z)) / y_height
         about y: -(e_x.z - e_o.z) / x_arm
@@ -287,7 +287,8 @@ def gram_schmidt_covariance(x_arm, y_along, y_height, std):
 def fit_covariance(points_F, std):
     """Cramer-Rao bound of the rotation vector (in F) from points with isotropic noise; (n, 3) -> (3, 3), rad^2.
 
-    The information is sum (|d|^2 I - d d') / std^2 over the points d about their mean: the tensor of inertia of the triangle.
+    The information is sum (|d|^2 I - d d') / std^2 over the points d about their mean: the tensor of inertia of the
+    triangle.
     """
     d = as_points(points_F, "points_F")
     d = d - d.mean(-2, keepdims=True)

@@ -14,7 +14,7 @@ def read_table(name, text=()):
     Raises
     ------
     ValueError
-        Naming file and line: an empty file, a duplicate or missing column, a row of another length, a number that is none.
+        Naming file and line: an empty file, a duplicate or missing column, a row of another length, no number.
     """
     path = DATA / name
     with open(path, newline="", encoding="utf-8") as file:

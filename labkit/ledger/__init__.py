@@ -1,7 +1,8 @@
 """Every number the documents print, computed afresh and compared with what is printed.
 
-A row of `data/ledger.csv` names one printed number; a function here, registered under the row's id with `computes`, returns the value
-that data and library give today. The status follows from the two by `judge`, and a test demands that it is the one the row states:
+A row of `data/ledger.csv` names one printed number; a function here, registered under the row's id with `computes`,
+returns the value that data and library give today. The status follows from the two by `judge`, and a test demands that
+it is the one the row states:
 
 reproduced   equal to the printed digits
 rounding     off, but by no more than the rounding of the printed inputs allows (the bound is computed)
@@ -47,9 +48,9 @@ class Computed:
     """What data and library say about a printed number.
 
     value: number, array (a row's index picks the entry) or text.
-    bound: how far rounding of the printed inputs can move the value (same shape, or a scalar); None when inputs are exact.
+    bound: how far rounding of the printed inputs can move the value (same shape, or a scalar); None for exact inputs.
            For simulated values: how far the simulation honestly may lie from the printed one.
-    misprint: True where a computed check proves that the printed number cannot be right (scalar, or an array beside `value`).
+    misprint: True where a computed check proves that the printed number cannot be right (scalar, or an array).
     simulated: True where the inputs were never published.
     proof: the argument in one or two sentences, with the computed figures in it.
     """
@@ -89,7 +90,7 @@ def _load_chapters():
 
 
 def rows(path=DATA / "ledger.csv"):
-    """All rows of the ledger; refuses an unknown status or document, a double id, a missing entry, each with the line."""
+    """All rows of the ledger; refuses an unknown status or document, a double id, a missing entry, with the line."""
     found, seen = [], set()
     with open(path, newline="", encoding="utf-8") as file:
         reader = csv.reader(file)
@@ -116,7 +117,9 @@ def compute(row):
     _load_chapters()
     match = _ENTRY.fullmatch(row.id)
     if match["base"] not in _functions:
-        raise KeyError(f"no function computes the ledger id {match['base']!r}; register one in labkit/ledger with @computes")
+        raise KeyError(
+            f"no function computes the ledger id {match['base']!r}; register one in labkit/ledger with @computes"
+        )
     computed = _functions[match["base"]]()
     return computed.at(tuple(map(int, match["index"].split(",")))) if match["index"] else computed
 

@@ -1,0 +1,33 @@
+"""How notebooks are run as tests: `pytest --nbval solutions` (strict) and `pytest --nbval-lax notebooks`."""
+
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent
+
+
+def pytest_configure(config):
+    """Kernels of this very environment, importing this checkout, with a progress file of their own.
+
+    With --nbval every exercise must be solved (strict mode) and every output must come out as stored, except for what
+    `sanitize.cfg` evens out. With --nbval-lax, for the blank notebooks, no cell may fail.
+    """
+    strict = config.getoption("nbval", False)
+    if not (strict or config.getoption("nbval_lax", False)):
+        return
+    from labkit.build import SECONDS_A_CELL, kernel_environment
+
+    scratch = tempfile.mkdtemp(prefix="labkit-")
+    config.add_cleanup(lambda: shutil.rmtree(scratch, ignore_errors=True))
+    os.environ.update(kernel_environment(scratch, strict))
+    config.option.nbval_current_env = True
+    config.option.nbval_cell_timeout = SECONDS_A_CELL
+    config.option.nbval_sanitize_with = str(ROOT / "tests" / "notebooks" / "sanitize.cfg")
+
+
+def pytest_collectstart(collector):
+    """stderr is not compared: the build has refused any, and a first run may say there that it makes a font cache."""
+    if hasattr(collector, "skip_compare"):
+        collector.skip_compare += ("stderr",)

@@ -1,0 +1,503 @@
+"""Chapter 1: frames from three points, rigid transforms, KUKA angles."""
+
+import numpy as np
+
+from .. import frames
+from ..ledger.ch01_frames import points
+from . import metrics
+from .engine import Chapter, Exercise, Mistake, Prediction, Value
+
+
+def random_direction(rng):
+    """A vector of random direction, 20 to 300 long."""
+    return frames.normalize(rng.normal(size=3)) * rng.uniform(20, 300)
+
+
+def random_pose(rng):
+    """A random pose with its origin some hundred millimeters away."""
+    q = rng.normal(size=4)
+    return frames.pose(frames.matrix_from_quaternion(q), rng.uniform(-500, 500, 3))
+
+
+def two_directions(rng):
+    """Two directions at 35 to 145 degrees, of different length."""
+    a = random_direction(rng)
+    across = frames.normalize(np.cross(a, rng.normal(size=3)))
+    angle = np.deg2rad(rng.uniform(35, 80) if rng.random() < 0.5 else rng.uniform(100, 145))
+    return a, rng.uniform(20, 300) * (np.cos(angle) * frames.normalize(a) + np.sin(angle) * across)
+
+
+def three_points(rng):
+    """Three measured points of a frame, in millimeters."""
+    origin = rng.uniform(-500, 500, 3)
+    a, b = two_directions(rng)
+    return origin, origin + a, origin + b
+
+
+def kuka_pose(rng):
+    """A KUKA pose well away from the gimbal lock."""
+    return (np.concatenate([rng.uniform(-800, 800, 3), np.deg2rad(rng.uniform((-170, -80, -170), (170, 80, 170)))]),)
+
+
+# Wrong variants of Gram-Schmidt, of frames and of transforms -----------------------------------------------------------------
+
+
+def _columns(x, y, z):
+    return np.column_stack([x, y, z])
+
+
+def _unnormalized(a, b):
+    x = a / np.linalg.norm(a)
+    y = b - (b @ x) * x
+    return _columns(x, y, np.cross(x, y))
+
+
+def _projected_without_square(a, b):
+    x = a / np.linalg.norm(a)
+    y = b - (b @ a) / np.linalg.norm(a) * a
+    y /= np.linalg.norm(y)
+    return _columns(x, y, np.cross(x, y))
+
+
+def _second_edge_first(a, b):
+    y = b / np.linalg.norm(b)
+    x = a - (a @ y) * y
+    x /= np.linalg.norm(x)
+    return _columns(x, y, np.cross(x, y))
+
+
+def _not_rejected(a, b):
+    x, y = a / np.linalg.norm(a), b / np.linalg.norm(b)
+    return _columns(x, y, np.cross(x, y))
+
+
+def _left_handed(a, b):
+    R = frames.gram_schmidt(a, b)
+    return R * (1, 1, -1)
+
+
+def _projection_kept(a, b):
+    """y along the part of b that should have been removed, signs aside: the classic mix-up of rejection and projection."""
+    R = frames.gram_schmidt(a, b)
+    return _columns(R[:, 0], R[:, 0] * np.sign(a @ b), np.zeros(3))
+
+
+def _frame(axes):
+    def variant(origin, x_point, y_point):
+        T = np.eye(4)
+        T[:3, :3] = axes(x_point - origin, y_point - origin)
+        T[:3, 3] = origin
+        return T
+
+    return variant
+
+
+def _axes_in_rows(origin, x_point, y_point):
+    T = frames.frame_from_points(origin, x_point, y_point)
+    T[:3, :3] = T[:3, :3].T
+    return T
+
+
+def _points_as_directions(origin, x_point, y_point):
+    T = np.eye(4)
+    T[:3, :3] = frames.gram_schmidt(x_point, y_point)
+    T[:3, 3] = origin
+    return T
+
+
+def _no_translation(origin, x_point, y_point):
+    T = frames.frame_from_points(origin, x_point, y_point)
+    T[:3, 3] = 0
+    return T
+
+
+def _inverse_frame(origin, x_point, y_point):
+    return frames.invert(frames.frame_from_points(origin, x_point, y_point))
+
+
+def _with(T, R=None, t=None):
+    T = T.copy()
+    T[:3, :3] = T[:3, :3] if R is None else R
+    T[:3, 3] = T[:3, 3] if t is None else t
+    return T
+
+
+def _kuka(order, angles=(3, 4, 5)):
+    """Rotation by the elementary turns in another order, e.g. "xyz" for Rx Ry Rz, fed with the entries `angles` of the pose."""
+
+    def variant(xyzabc):
+        turns = {"z": xyzabc[angles[0]], "y": xyzabc[angles[1]], "x": xyzabc[angles[2]]}
+        R = np.eye(3)
+        for axis in order:
+            R = R @ _turn(axis, turns[axis])
+        return frames.pose(R, xyzabc[:3])
+
+    return variant
+
+
+def _turn(axis, angle):
+    abc = {"z": (angle, 0, 0), "y": (0, angle, 0), "x": (0, 0, angle)}[axis]
+    return frames.matrix_from_kuka(np.concatenate([np.zeros(3), abc]))[:3, :3]
+
+
+def _kuka_in_degrees(xyzabc):
+    return frames.matrix_from_kuka(np.concatenate([xyzabc[:3], np.deg2rad(xyzabc[3:])]))
+
+
+def _kuka_transposed(xyzabc):
+    T = frames.matrix_from_kuka(xyzabc)
+    return _with(T, R=T[:3, :3].T)
+
+
+def _angles(change):
+    def variant(T):
+        xyzabc = frames.kuka_from_matrix(T)
+        return np.concatenate([xyzabc[:3], change(xyzabc[3:])])
+
+    return variant
+
+
+def _K0_T_K1():
+    K0, K1 = (frames.frame_from_points(*points()[name]) for name in ("K0", "K1"))
+    return frames.relative(K0, K1)
+
+
+def _distance():
+    return np.linalg.norm(_K0_T_K1()[:3, 3])
+
+
+def _flat_distance():
+    return np.linalg.norm(points()["K0"][1] - points()["K1"][1])
+
+
+CHAPTER = Chapter(
+    "01-frames",
+    title="Frames from three points",
+    items=[
+        Exercise(
+            "normalize",
+            reference=frames.normalize,
+            draw=lambda rng: (random_direction(rng),),
+            metric=metrics.numbers(1e-9),
+            hints=(
+                "A direction keeps its direction when it is divided by a positive number.",
+                "The length of v is the root of the sum of its squared components.",
+                "`np.linalg.norm(v)` is that length; return v divided by it.",
+            ),
+            mistakes=[
+                Mistake(lambda v: v / (v @ v), "You divide by the squared length. The root is missing."),
+                Mistake(
+                    lambda v: v / v.sum(),
+                    "You divide by the sum of the components. The length is the root of the sum of their squares.",
+                ),
+                Mistake(
+                    lambda v: v / np.abs(v).sum(),
+                    "You divide by the sum of absolute values (the 1-norm). The Euclidean length is the root of the sum of squares.",
+                ),
+                Mistake(
+                    lambda v: v / np.abs(v).max(),
+                    "You divide by the largest component, so that one becomes 1. The length should become 1.",
+                ),
+                Mistake(
+                    lambda v: v / len(v), "`len(v)` counts the components. The length you need is `np.linalg.norm(v)`."
+                ),
+                Mistake(lambda v: v, "You return v as it came. Its length is not 1 yet."),
+            ],
+        ),
+        Prediction(
+            "edges",
+            question="The three points carry the same noise. Which measured direction does Gram-Schmidt keep exactly?",
+            choices=("origin to x_point", "origin to y_point", "neither, it averages"),
+            answer="origin to x_point",
+            why="x is the first arm, untouched. Of the second arm only the part across x survives, so y_point decides nothing but the plane.",
+        ),
+        Exercise(
+            "gram_schmidt",
+            reference=frames.gram_schmidt,
+            draw=two_directions,
+            metric=metrics.rotations(1e-7),
+            hints=(
+                "x takes the direction of a. y may only use what b has across x.",
+                "Remove from b its part along x: b - (b . x) x, with x of length 1. Then normalize. z follows from the right-hand rule.",
+                "x = normalize(a); y = normalize(b - (b @ x) * x); z = np.cross(x, y); return np.column_stack([x, y, z]).",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda a, b: frames.gram_schmidt(a, b).T,
+                    "Your axes stand in the rows. As columns they turn coordinates in F into coordinates in W; your matrix is the transpose.",
+                ),
+                Mistake(
+                    _not_rejected,
+                    "Your x and y are not perpendicular: you normalized b without removing its part along x.",
+                ),
+                Mistake(
+                    _unnormalized,
+                    "You removed the part along x, but y has not been normalized afterwards (and z inherits its length).",
+                ),
+                Mistake(
+                    _projected_without_square,
+                    "The part along a is (b . a)/(a . a) a. You divide by the length of a once, it takes the square (or a normalized a).",
+                ),
+                Mistake(
+                    _second_edge_first,
+                    "You started with b: your y is exact and x gives way. The sheet trusts the first edge, so start with a.",
+                ),
+                Mistake(
+                    _left_handed,
+                    "Your z points the wrong way: x, y, z form a left-handed system. z = x cross y, in this order.",
+                ),
+                Mistake(
+                    _projection_kept,
+                    "You kept the part of b along x and threw the rest away. y is the rest: b minus its projection.",
+                ),
+            ],
+        ),
+        Exercise(
+            "frame_from_points",
+            reference=frames.frame_from_points,
+            draw=three_points,
+            metric=metrics.poses(1e-6, 1e-6),
+            hints=(
+                "A pose is a rotation (which way the axes point) and a translation (where the origin is).",
+                "The two directions are x_point - origin and y_point - origin; gram_schmidt makes axes of them.",
+                "T = np.eye(4); T[:3, :3] = gram_schmidt(x_point - origin, y_point - origin); T[:3, 3] = origin.",
+            ),
+            mistakes=[
+                Mistake(
+                    _axes_in_rows,
+                    "Your rotation is the transpose: the axes stand in the rows, so it maps W to F, while the origin is that of T_WF.",
+                ),
+                Mistake(
+                    _inverse_frame,
+                    "This is T_FW, the inverse: it maps coordinates in W to the frame. T_WF has the origin itself in its last column.",
+                ),
+                Mistake(
+                    _points_as_directions,
+                    "You used the points themselves as directions. They are positions in W; a direction is the difference of two points.",
+                ),
+                Mistake(
+                    _no_translation,
+                    "The axes are right, but the frame sits at the origin of W: put `origin` into the last column.",
+                ),
+                Mistake(
+                    _frame(_not_rejected),
+                    "Your x and y are not perpendicular: the part of the second arm along x must go first.",
+                ),
+                Mistake(
+                    _frame(_second_edge_first),
+                    "You trusted the arm to y_point and bent x. The first edge is the trusted one.",
+                ),
+                Mistake(_frame(_left_handed), "Your frame is left-handed: z = x cross y, in this order."),
+                Mistake(
+                    lambda o, px, py: frames.frame_from_points(o, py, px),
+                    "x_point and y_point have changed places: your x axis runs toward y_point.",
+                ),
+            ],
+        ),
+        Exercise(
+            "invert",
+            reference=frames.invert,
+            draw=lambda rng: (random_pose(rng),),
+            metric=metrics.poses(1e-6, 1e-6),
+            hints=(
+                "Solve p_W = R p_F + t for p_F.",
+                "p_F = R' (p_W - t) = R' p_W - R' t: the rotation is R', the translation is -R' t.",
+                "X = np.eye(4); X[:3, :3] = R.T; X[:3, 3] = -R.T @ t.",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda T: T.T,
+                    "You transposed the whole 4x4 matrix: the translation slipped into the last row. Only the rotation is transposed.",
+                ),
+                Mistake(
+                    lambda T: _with(T, R=T[:3, :3].T),
+                    "You transposed the rotation but left the translation as it was. It becomes -R' t.",
+                ),
+                Mistake(
+                    lambda T: _with(T, R=T[:3, :3].T, t=-T[:3, 3]),
+                    "You negated the translation but did not rotate it: seen from the frame, W lies at -R' t, not at -t.",
+                ),
+                Mistake(
+                    lambda T: _with(T, R=T[:3, :3].T, t=T[:3, :3].T @ T[:3, 3]),
+                    "You rotated the translation but kept its sign: it is -R' t.",
+                ),
+                Mistake(
+                    lambda T: _with(T, R=T[:3, :3].T, t=-T[:3, :3] @ T[:3, 3]),
+                    "You rotated the translation by R. On the way back everything turns by R'.",
+                ),
+                Mistake(
+                    lambda T: _with(T, t=-T[:3, 3]),
+                    "You negated the translation, but the rotation has to be undone as well: use R'.",
+                ),
+                Mistake(lambda T: T, "This is T itself. The inverse maps the other way."),
+            ],
+        ),
+        Exercise(
+            "relative",
+            reference=frames.relative,
+            draw=lambda rng: (random_pose(rng), random_pose(rng)),
+            metric=metrics.poses(1e-6, 1e-6),
+            hints=(
+                "Neighboring letters cancel: which two transforms give A_T_B when W stands between them?",
+                "T_AB = T_AW T_WB, and T_AW is the inverse of T_WA.",
+                "return invert(T_WA) @ T_WB.",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda A, B: A @ frames.invert(B),
+                    "The order is reversed: T_WA T_BW puts an A beside a B, where nothing cancels. It is T_AW T_WB.",
+                ),
+                Mistake(
+                    lambda A, B: B @ frames.invert(A),
+                    "This is T_WB T_AW: the motion that carries A to B, seen from W. Seen from A it is T_AW T_WB.",
+                ),
+                Mistake(
+                    lambda A, B: frames.relative(B, A), "This is T_BA, the inverse: you inverted T_WB instead of T_WA."
+                ),
+                Mistake(lambda A, B: A @ B, "You multiplied T_WA by T_WB without inverting: W_A W_B does not cancel."),
+                Mistake(lambda A, B: A.T @ B, "The transpose of a 4x4 pose is not its inverse: use your `invert`."),
+                Mistake(
+                    lambda A, B: frames.pose(A[:3, :3].T @ B[:3, :3], B[:3, 3] - A[:3, 3]),
+                    "The rotation is right. The vector from A to B is still written in W: turn it into A with R_WA'.",
+                ),
+            ],
+        ),
+        Value(
+            "angle_deg",
+            reference=lambda: np.rad2deg(frames.rotation_angle(_K0_T_K1())),
+            unit="deg",
+            rtol=1e-4,
+            hints=(
+                "The trace of a rotation matrix knows its angle.",
+                "trace(R) = 1 + 2 cos(angle).",
+                "np.rad2deg(np.arccos((np.trace(R) - 1) / 2)), with R the rotation block of K0_T_K1.",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: 90.0,
+                    "90 deg is what the sheet's drawing suggests. The points were moved by 0.01, and the angle shows it: compute it from the matrix.",
+                ),
+                Mistake(
+                    lambda: np.rad2deg(np.arccos(np.clip(np.trace(_K0_T_K1()) / 2 - 0.5, -1, 1))),
+                    "You took the trace of the 4x4 matrix; the 1 in its corner is no part of the rotation.",
+                ),
+                Mistake(
+                    lambda: np.rad2deg(np.arccos(np.trace(_K0_T_K1()[:3, :3]) - 1)),
+                    "The half is missing: trace(R) = 1 + 2 cos(angle).",
+                ),
+            ],
+        ),
+        Value(
+            "distance",
+            reference=_distance,
+            unit="mm",
+            rtol=1e-5,
+            hints=(
+                "The distance of two origins does not depend on who looks at them.",
+                "It is the length of the translation in K0_T_K1.",
+                "np.linalg.norm(K0_T_K1[:3, 3]).",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: np.linalg.norm(_K0_T_K1()),
+                    "You took the norm of the whole matrix. Only its last column holds lengths.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_K0_T_K1()[:, 3]),
+                    "Your column still holds the 1 of the last row: take its first three entries.",
+                ),
+                Mistake(lambda: _distance() ** 2, "This is the squared distance."),
+                Mistake(
+                    lambda: np.abs(_K0_T_K1()[:3, 3]).sum(),
+                    "You added the absolute components. The distance is the root of the sum of squares.",
+                ),
+                Mistake(_flat_distance, "This is the distance of the two x_points. The frames sit at their origins."),
+            ],
+        ),
+        Prediction(
+            "flat",
+            question="The triangle is 100 mm long and 10 mm high; the noise is 0.05 mm. What helps the rotation about x most?",
+            choices=("a base twice as long", "a height twice as large", "both help alike"),
+            answer="a height twice as large",
+            why="About x, the frame turns by noise over height. A longer base only helps the two other angles.",
+        ),
+        Exercise(
+            "matrix_from_kuka",
+            reference=frames.matrix_from_kuka,
+            draw=kuka_pose,
+            metric=metrics.poses(1e-6, 1e-6),
+            hints=(
+                "Three elementary turns, multiplied in the order the controller names them, and a translation.",
+                "R = Rz(A) Ry(B) Rx(C). The angles arrive in radians, in the order A, B, C.",
+                "x, y, z, A, B, C = xyzabc; T[:3, :3] = rot_z(A) @ rot_y(B) @ rot_x(C); T[:3, 3] = x, y, z.",
+            ),
+            mistakes=[
+                Mistake(
+                    _kuka("xyz"),
+                    "You multiplied Rx(C) Ry(B) Rz(A). KUKA turns about z first, then about the new y and the new x: Rz(A) Ry(B) Rx(C).",
+                ),
+                Mistake(
+                    _kuka("zyx", (5, 4, 3)),
+                    "A and C have changed places: A belongs to z, B to y, C to x.",
+                ),
+                Mistake(
+                    _kuka("xyz", (5, 4, 3)),
+                    "You read A, B, C as turns about x, y, z. At KUKA, A turns about z, B about y, C about x.",
+                ),
+                Mistake(_kuka_in_degrees, "The angles already are radians: you converted them once too often."),
+                Mistake(
+                    _kuka_transposed, "Your rotation is the transpose: every elementary turn has its signs reversed."
+                ),
+                Mistake(
+                    lambda p: _with(frames.matrix_from_kuka(p), t=np.zeros(3)),
+                    "The rotation is right; x, y, z are missing from the last column.",
+                ),
+                Mistake(
+                    lambda p: _with(frames.matrix_from_kuka(p), t=frames.matrix_from_kuka(p)[:3, :3] @ p[:3]),
+                    "You rotated the position as well. x, y, z are already written in the base frame.",
+                ),
+            ],
+        ),
+        Prediction(
+            "pole",
+            question="At B = 90 deg you raise A by 30 deg and C by 30 deg. How does the flange move?",
+            choices=("it does not move", "it turns by 30 deg", "it turns by 60 deg"),
+            answer="it does not move",
+            why="At the pole the axes of A and C coincide in opposite sense: only A - C counts, and it has not changed.",
+        ),
+        Exercise(
+            "kuka_from_matrix",
+            reference=frames.kuka_from_matrix,
+            draw=lambda rng: (frames.matrix_from_kuka(kuka_pose(rng)[0]),),
+            metric=metrics.through(frames.matrix_from_kuka, metrics.poses(1e-6, 1e-6)),
+            hints=(
+                "Compare the entries of Rz(A) Ry(B) Rx(C) that hold few terms: the first column and the last row.",
+                "r20 = -sin B; r10 / r00 = tan A; r21 / r22 = tan C. `np.arctan2` keeps the quadrant.",
+                "B = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0])), A = np.arctan2(R[1, 0], R[0, 0]), C = np.arctan2(R[2, 1], R[2, 2]).",
+            ),
+            mistakes=[
+                Mistake(
+                    _angles(np.rad2deg),
+                    "Your angles are in degrees. Inside the workbook angles are radians; degrees are for people.",
+                ),
+                Mistake(_angles(lambda abc: abc[::-1]), "Your angles come in the order C, B, A."),
+                Mistake(_angles(lambda abc: abc * (1, -1, 1)), "B has the wrong sign: the entry r20 is -sin B."),
+                Mistake(
+                    _angles(lambda abc: -abc), "All three angles have the wrong sign: you read the transposed matrix."
+                ),
+                Mistake(
+                    lambda T: frames.kuka_from_matrix(frames.invert(T)),
+                    "This is the pose of the inverse: you read T' instead of T.",
+                ),
+            ],
+        ),
+        Prediction(
+            "svd",
+            question="The SVD weighs all three points alike. About which axes is its frame better than Gram-Schmidt's?",
+            choices=("about all three", "only about x", "only about z"),
+            answer="only about z",
+            why="Three points lie in one plane whatever method you take, so the turns about x and y agree. Within the plane, "
+            "Gram-Schmidt listens to the first edge alone; the SVD hears the third point too.",
+        ),
+    ],
+)

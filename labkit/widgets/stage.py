@@ -1,0 +1,547 @@
+"""Stage: the one base of all interaction. A live figure with draggable handles, at most three controls, Reset and "Make it fail".
+
+A Stage is four small things: a pure function from state to result, a scene that draws it, handles one can drag, and a way to make it fail:
+
+    from .stage import Handle, Stage, slider
+
+    def compute(state):                                   # pure, at module level, tested without a browser
+        return {"distance": np.hypot(*(state["P"] - state["Q"])) + state["offset"]}
+
+    def distance():
+        def scene(fig):                                   # called once: static things, and the artists that move
+            ax = style.axes(fig.subplots(), "x (mm)", "y (mm)", equal=True)
+            ax.set(xlim=(0, 10), ylim=(0, 6))
+            (line,) = ax.plot([], [], **style.look("estimate"))
+            def update(state, result):                    # sets artists in place; cheap
+                line.set_data(*np.transpose([state["P"], state["Q"]]))
+            return [line], update                         # the moving artists, and their update
+        return Stage("distance", scene=scene, compute=compute,
+                     handles={"P": Handle((1, 2), step=0.1), "Q": Handle((7, 3), step=0.1)},
+                     controls={"offset": slider(0, 5, 0, step=0.1, label="offset (mm)")},
+                     fail={"Q": (1, 2)},                  # what "Make it fail" changes, on top of the initial state
+                     describe=lambda result: f"The points are {result['distance']:.1f} mm apart.")
+
+The state is a dict: handle name -> array([x, y]) in data coordinates, control name -> value, "t" (s) with `play`, "view" with `view`,
+"click" -> array([x, y]) or None, "brush" -> array (n, 2), "memory" with `advance`. Functions get a copy they may not write into.
+
+Speed. The aim is 50 ms from event to picture. Only the artists returned by the scene are drawn in a frame; everything else is background, kept
+until something in it changes (limits, titles, ticks, legend), which costs about 40 ms. So: keep limits fixed, return as artists all that
+moves, use one artist with many points rather than many artists, `set_data` and friends rather than new artists, and put changing numbers into `ax.text`
+returned as an artist, not into titles. Artists are drawn in order of their zorder, always above the background.
+
+Colors come from `figures.style`; the dark theme is applied while drawing, nothing is to be done for it. Colormapped images stay as they are.
+
+What else there is
+------------------
+constrain : handles that must follow a rule beyond `bounds`. `constrain(state, moved)` returns {name: value} to correct, before anything is
+    computed; `moved` is the set of names that changed (all names at the start). The picture's handle goes where it returns.
+Handle((x, y, z)) : a point of a 3D scene; needs `view`. It is drawn where `state["view"].project` puts it in the axes, and dragged in the plane of
+    the screen.
+view=View(azimuth_deg, elevation_deg) : dragging empty space (or arrow keys on the picture) turns `state["view"]`; see `figures.scene3d`.
+play=Play(t_max, dt) : play, pause and a slider of time; `state["t"]` runs from 0 to t_max (s).
+click=True (or the number of the axes) : `state["click"]` is the place clicked last, None at first.
+brush=True (or the number of the axes) : `state["brush"]` is the path of the stroke being drawn in empty space (the last one, once drawn).
+keys=True : arrow keys on the focused picture are events "up", "down", "left", "right" for `advance`.
+start, advance : simulations that go on from what was. `start(state)` returns the memory (at the start, at Reset and at a preset),
+    `advance(state, event)` returns the next one: event is "tick" (each dt of `play`), "up" ... "right", "click" or "brush".
+    Both functions see the memory so far as `state["memory"]` and return a new one, or the old one changed; draw random numbers from an rng in it.
+stage.set(**changes) : the same from Python, from any thread or asyncio task; a few dozen times a second are fine, the newest wins.
+
+Errors. A Stage whose compute, scene or update raises cannot be built. Later, while it is being used, the sentence of a ValueError (or the type and text of
+anything else) appears under the figure and the last good picture stays; with the environment variable LABKIT_STRICT=1 it is raised as well.
+"""
+
+import os
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from time import monotonic
+
+import anywidget
+import ipywidgets
+import numpy as np
+
+from ..checks import as_finite
+from ..figures import style
+from ..figures.scene3d import View
+from .canvas import DRAWING, Picture
+
+__all__ = ["Handle", "Play", "Stage", "View", "choice", "slider", "toggle"]
+
+MAX_CONTROLS = 3
+ORBIT_DEG_PER_PIXEL = 0.5
+MAX_UNSEEN = 2  # pictures on their way to the browser; further ones wait until it has shown them, and then only the newest is drawn
+RESERVED = ("t", "view", "click", "brush", "memory")
+
+
+@dataclass(frozen=True)
+class Handle:
+    """A point to drag. Two coordinates: data coordinates of the axes number `ax`. Three: a point in space, for Stages with a view.
+
+    step : what an arrow key moves it by (ten times with Shift); by default a hundredth of the axes' width.
+    bounds : ((x_low, x_high), (y_low, y_high)[, (z_low, z_high)]); equal ends fix a coordinate. Drags end at the axes' limits anyway.
+    label : what a screen reader calls it (default: its name); color : of its ring, one of `figures.style`.
+    """
+
+    at: tuple
+    step: float | None = None
+    bounds: tuple | None = None
+    ax: int = 0
+    label: str = ""
+    color: str = style.INK
+
+
+@dataclass(frozen=True)
+class slider:
+    """A number between `low` and `high`; integers stay integers. `log` spreads it over the decades."""
+
+    low: float
+    high: float
+    value: float
+    step: float | None = None
+    label: str = ""
+    log: bool = False
+
+    def check(self, name, value):
+        value = float(as_finite(value, name))
+        if not self.low - 1e-9 <= value <= self.high * (1 + 1e-9) + 1e-9:
+            raise ValueError(f"{name} must lie in [{self.low:g}, {self.high:g}], got {value:g}")
+        return round(value) if self.integer else value
+
+    @property
+    def integer(self):
+        return all(isinstance(v, (int, np.integer)) for v in (self.low, self.high, self.value, self.step or 1))
+
+    def widget(self, name):
+        options = {
+            "value": self.value,
+            "description": self.label or name,
+            "style": {"description_width": "initial"},
+            "layout": {"width": "22em", "max_width": "100%"},
+        }
+        if self.integer:
+            return ipywidgets.IntSlider(min=self.low, max=self.high, step=self.step or 1, **options)
+        if self.log:
+            low, high = np.log10([self.low, self.high])
+            return ipywidgets.FloatLogSlider(min=low, max=high, step=(high - low) / 100, readout_format=".2g", **options)
+        step = self.step or (self.high - self.low) / 100
+        decimals = max(0, int(np.ceil(-np.log10(step) - 1e-9)))
+        return ipywidgets.FloatSlider(
+            min=self.low, max=self.high, step=step, readout_format=f".{decimals}f", **options
+        )
+
+
+@dataclass(frozen=True)
+class choice:
+    """One of several words; `options` is a list, or a dict {word: value}."""
+
+    options: object
+    value: object
+    label: str = ""
+
+    @property
+    def _pairs(self):
+        return list(self.options.items()) if isinstance(self.options, dict) else [(str(v), v) for v in self.options]
+
+    def check(self, name, value):
+        if value not in [v for _, v in self._pairs]:
+            raise ValueError(f"{name} must be one of {', '.join(str(v) for _, v in self._pairs)}, got {value!r}")
+        return value
+
+    def widget(self, name):
+        kind = ipywidgets.ToggleButtons if len(self._pairs) <= 3 else ipywidgets.Dropdown
+        return kind(
+            options=self._pairs, value=self.value, description=self.label or name,
+            style={"description_width": "initial", **({"button_width": "auto"} if len(self._pairs) <= 3 else {})},
+            layout={"width": "auto", "max_width": "100%"},
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class toggle:
+    """On or off."""
+
+    value: bool = False
+    label: str = ""
+
+    def check(self, name, value):
+        if not isinstance(value, (bool, np.bool_)):
+            raise ValueError(f"{name} must be True or False, got {value!r}")
+        return bool(value)
+
+    def widget(self, name):
+        return ipywidgets.Checkbox(
+            value=self.value, description=self.label or name, indent=False, layout={"width": "auto"}
+        )
+
+
+@dataclass(frozen=True)
+class Play:
+    """A control of time: `state["t"]` from 0 to t_max in steps of dt (s), `rate` times as fast as real time."""
+
+    t_max: float
+    dt: float = 0.05
+    rate: float = 1.0
+
+
+class _Front(anywidget.AnyWidget):
+    """The picture in the browser, and the handles over it."""
+
+    _esm = Path(__file__).with_name("stage.js")
+    _css = Path(__file__).with_name("stage.css")
+
+
+class Stage(ipywidgets.VBox):
+    """A figure one can touch; the module's docstring tells how to write one.
+
+    Parameters
+    ----------
+    name : str
+        Stable, short: it names the Stage in stored outputs and for screen readers.
+    scene : function(fig) -> (artists, update)
+        Draws once; `update(state, result)` sets the moving artists in place.
+    compute : function(state) -> result
+        Pure.
+    handles, controls : dict
+        {name: Handle}, {name: slider | choice | toggle}; at most three controls.
+    fail : dict
+        What "Make it fail" changes on top of the initial state.
+    presets : dict, optional
+        {button text: changes} for further buttons.
+    describe : function(result) -> str, optional
+        One sentence under the figure, also for screen readers.
+    size : (width, height)
+        In inches of 100 CSS pixels, at most; 7 inches fill JupyterLab's usual cell.
+
+    play, view, constrain, click, brush, keys, start, advance: see the module's docstring.
+
+    Raises
+    ------
+    ValueError
+        For more than three controls, unknown names in presets, names used twice, options that need one another.
+    """
+
+    def __init__(
+        self, name, *, scene, compute, fail, handles=None, controls=None, presets=None, play=None, view=None, size=(7.0, 4.2),
+        describe=None, constrain=None, click=None, brush=None, keys=False, start=None, advance=None,
+    ):  # fmt: skip
+        super().__init__()
+        self.name = name
+        self._handles, self._controls, self._play, self._presets = handles or {}, controls or {}, play, {}
+        self._compute, self._describe, self._constrain = compute, describe, constrain
+        self._start, self._advance, self._keys = start, advance, keys
+        self._click, self._brush = (None if a is None or a is False else int(a is not True and a) for a in (click, brush))
+        self._check_options(view)
+        self._state = {
+            **{key: handle.at for key, handle in self._handles.items()},
+            **{key: control.value for key, control in self._controls.items()},
+            **({"t": 0.0} if play else {}),
+            **({"view": view} if view else {}),
+            **({"click": None} if click is not None else {}),
+            **({"brush": np.empty((0, 2))} if brush is not None else {}),
+            **({"memory": None} if advance else {}),
+        }
+        self._state = {key: self._checked(key, value) for key, value in self._state.items()}
+        self.result, self.status, self.caption = None, "", ""
+        self._front, self._sent, self._shown, self._waiting = _Front(), 0, 0, False
+        self._attached = self._showing = False
+        self._picture = Picture(scene, size)
+        self._correct(set(self._state))
+        self.initial = dict(self._state)
+        self._presets = {
+            key: {k: self._checked(k, v) for k, v in changes.items()}
+            for key, changes in {"Reset": {}, "Make it fail": fail, **(presets or {})}.items()
+        }
+        self._restart()
+        self._recompute()
+        self._picture.draw()
+        self._text = f"[stage: {name}] {self.caption}".rstrip()
+        self._front.on_msg(lambda _, message, buffers: self._receive(message))
+        self._build_controls()
+
+    def _check_options(self, view):
+        where = f"Stage {self.name!r}"
+        if len(self._controls) > MAX_CONTROLS:
+            raise ValueError(f"{where}: at most {MAX_CONTROLS} controls, got {len(self._controls)}: split it into two figures")
+        names = [*self._handles, *self._controls]
+        for key in names:
+            if names.count(key) > 1 or key in RESERVED:
+                raise ValueError(f"{where}: the name {key!r} is used twice or reserved ({', '.join(RESERVED)})")
+        for key, handle in self._handles.items():
+            if len(handle.at) not in (2, 3) or (len(handle.at) == 3 and view is None):
+                raise ValueError(f"{where}: handle {key!r} must have 2 coordinates, or 3 and the Stage a view; got {handle.at}")
+        if self._keys and not self._advance:
+            raise ValueError(f"{where}: keys=True needs advance(state, event), which says what a key does")
+        if (self._start is None) != (self._advance is None):
+            raise ValueError(f"{where}: start and advance come together, got only one of them")
+        if view is not None and self._brush is not None:
+            raise ValueError(f"{where}: dragging empty space either turns the view or draws, got both view and brush")
+
+    # -- state
+
+    @property
+    def state(self):
+        """A copy of the state."""
+        return dict(self._state)
+
+    def set(self, **changes):
+        """Change the state from Python, as if handles and controls had been moved. From any thread; the newest wins.
+
+        Raises ValueError for unknown names and values that do not fit; what compute refuses is shown under the figure.
+        """
+        self._apply({key: self._checked(key, value) for key, value in changes.items()})
+
+    def reset(self):
+        """What the button Reset does."""
+        self._preset("Reset")
+
+    def make_it_fail(self):
+        """What the button "Make it fail" does."""
+        self._preset("Make it fail")
+
+    def _checked(self, key, value):
+        """A value as the state holds it, or a ValueError that names it."""
+        if key in self._controls:
+            return self._controls[key].check(key, value)
+        if key in self._handles:
+            value = np.array(as_finite(value, key))
+            count = len(self._handles[key].at)
+            if value.shape != (count,):
+                raise ValueError(f"{key} must have shape ({count},), got {value.shape}")
+            return _frozen(self._bounded(key, value))
+        if key not in RESERVED or key not in self._state:
+            known = ", ".join(map(repr, self._state)) or "nothing"
+            raise ValueError(f"Stage {self.name!r} has no {key!r} in its state, only {known}")
+        if key == "t":
+            return float(np.clip(as_finite(value, "t"), 0.0, self._play.t_max))
+        if key == "brush" or (key == "click" and value is not None):
+            return _frozen(np.array(as_finite(value, key)))
+        return value
+
+    def _bounded(self, key, value):
+        bounds = self._handles[key].bounds
+        return value if bounds is None else np.clip(value, *np.transpose(as_finite(bounds, f"bounds of {key}")))
+
+    def _apply(self, changes, events=(), restart=False, reply=None):
+        """Change the state, let the rules correct it, advance the memory, compute, update the picture, send it."""
+        with DRAWING:
+            before = self._state.get("t", 0.0)
+            self._state = {**self._state, **changes}
+            try:
+                self._correct(set(changes))
+                after = self._state.get("t", 0.0)
+                if restart or (self._advance and after < before - 1e-9):
+                    self._restart()
+                    before = 0.0
+                if self._advance and self._play:
+                    ticks = round(after / self._play.dt) - round(before / self._play.dt)
+                    events = [*["tick"] * ticks, *events]
+                for event in events:
+                    self._state = {**self._state, "memory": self._advance(self.state, event)}
+                self._recompute()
+            except Exception as error:
+                self.status = str(error) if type(error) is ValueError else f"{type(error).__name__}: {error}"
+                if os.environ.get("LABKIT_STRICT"):
+                    raise
+            finally:
+                self._show_controls()
+                self._show_picture(reply)
+
+    def _correct(self, moved):
+        if self._constrain:
+            corrections = self._constrain(self.state, moved) or {}
+            self._state = {**self._state, **{key: self._checked(key, value) for key, value in corrections.items()}}
+
+    def _restart(self):
+        if self._start:
+            self._state = {**self._state, "memory": None}
+            self._state["memory"] = self._start(self.state)
+
+    def _recompute(self):
+        result = self._compute(self.state)
+        with DRAWING:
+            self._picture.update(self.state, result)
+        self.result, self.status = result, ""
+        self.caption = str(self._describe(result)) if self._describe else ""
+
+    def _preset(self, key):
+        kept = {} if key == "Reset" else {k: v for k, v in self._state.items() if k == "view"}
+        if self._play:
+            self._play_widget.playing = False
+        self._apply({**self.initial, **kept, **self._presets[key]}, restart=True)
+
+    # -- controls: plain ipywidgets
+
+    def _build_controls(self):
+        self._widgets = {key: control.widget(key) for key, control in self._controls.items()}
+        for key, widget in self._widgets.items():
+            widget.observe(partial(self._on_control, key), "value")
+        rows = [self._front]
+        if self._play:
+            rows.append(self._build_play())
+        if self._widgets:
+            rows.append(_row(self._widgets.values()))
+        buttons = []
+        for key in self._presets:
+            button = ipywidgets.Button(description=key, layout={"width": "auto"})
+            button.on_click(lambda _, key=key: self._preset(key))
+            buttons.append(button)
+        self.buttons = dict(zip(self._presets, buttons))
+        rows.append(_row(buttons))
+        self.children = rows
+
+    def _build_play(self):
+        steps = round(self._play.t_max / self._play.dt)
+        interval = max(40, round(1000 * self._play.dt / self._play.rate))
+        stride = max(1, round(interval * self._play.rate / (1000 * self._play.dt)))
+        self._play_widget = ipywidgets.Play(min=0, max=steps, step=stride, interval=interval, show_repeat=False)
+        self._play_widget.observe(lambda change: self._on_time(change["new"] * self._play.dt), "value")
+        self._time = ipywidgets.FloatSlider(
+            min=0.0, max=self._play.t_max, step=self._play.dt, description="t (s)", readout_format=".2f", disabled=bool(self._advance),
+            style={"description_width": "initial"}, layout={"width": "22em", "max_width": "100%"},
+        )  # fmt: skip
+        self._time.observe(lambda change: self._on_time(change["new"]), "value")
+        return _row([self._play_widget, self._time])
+
+    def _on_control(self, key, change):
+        if not self._showing and self._state[key] != change["new"]:
+            self._apply({key: change["new"]})
+
+    def _on_time(self, t):
+        if not self._showing and abs(self._state["t"] - t) > 1e-9:
+            self._apply({"t": self._checked("t", t)})
+
+    def _show_controls(self):
+        self._showing = True  # the controls' own observers stay quiet
+        for key, widget in self._widgets.items():
+            widget.value = self._state[key]
+        if self._play:
+            self._time.value = self._state["t"]
+            self._play_widget.value = round(self._state["t"] / self._play.dt)
+        self._showing = False
+
+    # -- the browser: one message in flight, the newest wins
+
+    def _receive(self, message):
+        """One message of the browser: everything that happened since the last one, merged."""
+        with DRAWING:
+            self._shown = max(self._shown, message.get("shown", 0))
+            if "look" in message:
+                self._attached, self._shown = True, self._sent
+                self._picture.fit(**message["look"])
+            changes, events = self._changes(message)
+            if changes or events:
+                self._apply(changes, events, reply=message.get("serial"))
+            elif "serial" in message or self._waiting:
+                self._show_picture(message.get("serial"))
+
+    def _changes(self, message):
+        """Changes of the state and events for `advance` in a message of the browser."""
+        changes, events = {}, []
+        for key, fraction in message.get("drag", {}).items():
+            changes[key] = self._moved(key, to=fraction)
+        for key, steps in message.get("step", {}).items():
+            changes[key] = self._moved(key, steps=steps)
+        arrows = message.get("arrows", [])
+        if "orbit" in message and "view" in self._state:
+            changes["view"] = self._state["view"].turned(*(ORBIT_DEG_PER_PIXEL * np.array(message["orbit"])))
+        elif arrows and self._keys:
+            events += arrows
+        if "click" in message and self._click is not None:
+            ax = self._picture.fig.axes[self._click]
+            if ax.in_axes(_at(self._picture, message["click"])):
+                changes["click"] = self._picture.data(ax, message["click"])
+                events += ["click"] if self._advance else []
+        if "brush" in message and self._brush is not None:
+            path = self._picture.data(self._picture.fig.axes[self._brush], message["brush"])
+            changes["brush"] = path if message.get("fresh") else np.concatenate([self._state["brush"], path])
+            events += ["brush"] if self._advance else []
+        return changes, events
+
+    def _moved(self, key, to=None, steps=None):
+        """Where a handle goes by a drag to a fraction of the picture, or by steps (right, up), inside its axes and bounds."""
+        handle, at = self._handles[key], self._state[key]
+        ax = self._picture.fig.axes[handle.ax]
+        view = self._state.get("view")
+        here = view.project(at)[:2] if len(at) == 3 else at
+        (left, right), (bottom, top) = np.sort(ax.get_xlim()), np.sort(ax.get_ylim())
+        if to is None:
+            step = handle.step or (right - left) / 100
+            there = here + step * np.array(steps, dtype=float)
+        else:
+            there = self._picture.data(ax, to)
+        there = np.clip(there, (left, bottom), (right, top))
+        return self._bounded(key, there if len(at) == 2 else at + view.unproject(there - here))
+
+    def _show_picture(self, reply=None):
+        """One picture to the browser, unless it has not yet shown the last ones: then it gets the newest as soon as it has."""
+        if not self._attached:
+            return
+        if reply is None and self._sent - self._shown >= MAX_UNSEEN:
+            self._waiting = True
+            return
+        self._waiting = False
+        self._sent += 1
+        start = monotonic()
+        png = self._picture.png()
+        front = {
+            "picture": self._sent,
+            "serial": reply,
+            "width": round(self._picture.width),
+            "handles": self._places(),
+            "name": self.name,
+            "caption": self.caption,
+            "status": self.status,
+            "empty": "drive" if self._keys else "turn" if "view" in self._state else "draw" if self._brush is not None else "",
+            "click": self._click is not None,
+            "milliseconds": round(1e3 * (monotonic() - start), 2),
+        }
+        self._front.send(front, [png])
+
+    def _places(self):
+        """Where the browser puts the handles, and what it says of them."""
+        places = {}
+        for key, handle in self._handles.items():
+            at = self._state[key]
+            here = self._state["view"].project(at)[:2] if len(at) == 3 else at
+            places[key] = {
+                "at": self._picture.fraction(self._picture.fig.axes[handle.ax], here),
+                "label": handle.label or key,
+                "value": ", ".join(f"{letter} {value:.4g}" for letter, value in zip("xyz", at)),
+                "now": float(at[0]),
+                "color": style.themed(handle.color, self._picture.dark),
+            }
+        return places
+
+    # -- without a browser
+
+    def png(self):
+        """The picture as PNG bytes."""
+        return self._picture.png()
+
+    def __repr__(self):
+        return self._text
+
+    def _repr_mimebundle_(self, **kwargs):
+        bundle = super()._repr_mimebundle_(**kwargs)
+        return {**bundle, "text/plain": self._text, "image/png": self.png()}
+
+
+def _frozen(array):
+    array.setflags(write=False)
+    return array
+
+
+def _row(children):
+    return ipywidgets.HBox(list(children), layout={"flex_flow": "row wrap", "align_items": "center"})
+
+
+def _at(picture, fraction):
+    """What `Axes.in_axes` asks for: an event with pixel coordinates."""
+
+    @dataclass
+    class Event:
+        x: float
+        y: float
+
+    return Event(fraction[0] * picture.fig.bbox.width, (1 - fraction[1]) * picture.fig.bbox.height)

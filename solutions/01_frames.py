@@ -1,0 +1,327 @@
+# %% title [markdown]
+# # 1 · Frames from three points
+#
+# **What you will do.** Build coordinate frames from measured points, find how two frames lie to each other, and take a robot pose apart.
+#
+# **What you will learn.** Why the first measured edge is trusted, why the inverse of a pose needs no solver, why a flat triangle makes a bad
+# frame, what happens at B = 90°, and what a wrong convention costs in millimeters.
+#
+# **What you need.** Vectors, matrices, a little NumPy. About 75 minutes.
+
+# %% notation [markdown]
+# | letter | meaning |
+# | --- | --- |
+# | $W$, $F$, $K_0$, $K_1$ | frames: the world, any frame, the two frames of the lab sheet |
+# | $T_{WF}$, in code `T_WF` | 4×4 matrix that maps coordinates in $F$ to coordinates in $W$ |
+# | $R$, $t$ | its rotation (columns = axes of $F$ seen from $W$) and translation (origin of $F$ seen from $W$) |
+# | $T_{AC} = T_{AB}\,T_{BC}$ | neighboring letters cancel |
+# | mm, rad | units inside the code; degrees only in names that end in `_deg` |
+
+# %% setup
+import numpy as np
+
+from labkit import frames
+from labkit.course import course
+from labkit.ledger.ch01_frames import points
+from labkit.widgets import frames as stages
+
+ex = course("01-frames")
+np.set_printoptions(precision=6, suppress=True)
+
+# %% the-question [markdown]
+# ## The question
+#
+# A measuring arm touches three points of a work piece: its origin, a point on the x axis, a point on the side of positive y. Two such triples are given.
+# **How do the two frames lie to each other?** This is section 1 of the lab sheet *Kalibrierung* (Hochschule Darmstadt, 2016). Listing 2 and
+# listing 3 print the points. The sheet never states their unit; its later sections work in millimeters, so we read millimeters.
+
+# %% the-points
+measured = points()
+for name, triple in measured.items():
+    for label, point in zip(("origin", "x_point", "y_point"), triple):
+        print(name, f"{label:8}", point)
+
+# %% directions [markdown]
+# ## A direction has length 1
+#
+# Points say *where*, directions say *which way*. The difference of two points is a direction once it has length 1. This is the first brick.
+# Write the body, run the cell, and read what appears beneath it.
+
+# %% normalize
+@ex.normalize
+def normalize(v):
+    """Return v, shape (3,), scaled to length 1."""
+    ### BEGIN SOLUTION
+    return v / np.linalg.norm(v)
+    ### END SOLUTION
+
+
+# %% first-edge [markdown]
+# ## Three points are too many
+#
+# Three noisy points almost never form a right angle, so no orthonormal frame passes through all of them. The sheet repairs this with Gram-Schmidt
+# (*Schmidtsche Orthonormalisierung*). Before you see it move: decide what it does to the two measured edges.
+#
+# Then drag the six points. The gray stub is the part of the second edge that is thrown away, and the matrix beneath is $T_{K_0K_1}$. Try *Make it fail* too.
+
+# %% predict-edges
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "origin to x_point"
+### END SOLUTION
+ex.predict("edges", guess, reveal=stages.three_points)
+
+# %% gram-schmidt-derivation [markdown]
+# ## Gram-Schmidt
+#
+# Let $a$ be the first edge and $b$ the second. The axis $x$ is $a$ at length 1. From $b$ we remove its shadow on $x$, what is left is perpendicular
+# to $x$, and normalizing it gives $y$:
+#
+# $$x = \frac{a}{|a|}, \qquad r = b - (b \cdot x)\,x, \qquad y = \frac{r}{|r|}, \qquad z = x \times y .$$
+#
+# Check it: $r \cdot x = b \cdot x - (b \cdot x)(x \cdot x) = 0$. The cross product makes $z$ perpendicular to both and the system right-handed.
+
+# %% gram_schmidt
+@ex.gram_schmidt
+def gram_schmidt(a, b):
+    """Return R, shape (3, 3), whose columns are x (along a), y (in the plane of a and b) and z."""
+    ### BEGIN SOLUTION
+    x = normalize(a)
+    y = normalize(b - (b @ x) * x)
+    return np.column_stack([x, y, np.cross(x, y)])
+    ### END SOLUTION
+
+
+# %% pose [markdown]
+# ## From axes to a frame
+#
+# A frame is its axes and its origin. Packed into one matrix, $T_{WF}$ turns coordinates in $F$ into coordinates in $W$:
+# $p_W = R\,p_F + t$. Feed it $p_F = 0$ and you get the origin, feed it $(1, 0, 0)$ and you get the origin plus the x axis.
+
+# %% frame_from_points
+@ex.frame_from_points
+def frame_from_points(origin, x_point, y_point):
+    """Return T_WF, shape (4, 4), of the frame through three measured points (mm)."""
+    ### BEGIN SOLUTION
+    T_WF = np.eye(4)
+    T_WF[:3, :3] = gram_schmidt(x_point - origin, y_point - origin)
+    T_WF[:3, 3] = origin
+    return T_WF
+    ### END SOLUTION
+
+
+# %% inverse [markdown]
+# ## The way back, without `inv`
+#
+# To ask where $W$ lies seen from $F$, solve $p_W = R\,p_F + t$ for $p_F$. The columns of $R$ are orthonormal, so $R^\top R = I$, and nothing needs to be
+# solved by elimination. The sheet calls a pseudo-inverse here (listing 1, line 78).
+
+# %% invert
+@ex.invert
+def invert(T):
+    """Return the inverse of a rigid transform, shape (4, 4), without np.linalg."""
+    ### BEGIN SOLUTION
+    X = np.eye(4)
+    X[:3, :3] = T[:3, :3].T
+    X[:3, 3] = -T[:3, :3].T @ T[:3, 3]
+    return X
+    ### END SOLUTION
+
+
+# %% pseudo-inverse [markdown]
+# What does the pseudo-inverse cost? An iterative SVD of a 4×4 matrix instead of nine copied and nine multiplied numbers. Worse is what it *hides*: it
+# accepts anything. Below, one digit of a matrix is mistyped, and then an axis is missing altogether. `np.linalg.pinv` returns numbers for both; the
+# workbook's `frames.invert` says what is wrong.
+
+# %% pseudo-inverse-hides
+typo = frame_from_points(*measured["K1"])
+typo[0, 1] = -0.909950
+flat = frame_from_points(*measured["K1"])
+flat[:3, 2] = 0
+for name, T in (("mistyped", typo), ("axis missing", flat)):
+    back = np.linalg.pinv(T) @ T
+    print(f"{name}: pinv is silent, pinv(T) T differs from I by {np.abs(back - np.eye(4)).max():.2f}")
+    try:
+        frames.invert(T)
+    except ValueError as refusal:
+        print("   frames.invert:", refusal)
+
+# %% relative-pose [markdown]
+# ## How does $K_1$ lie, seen from $K_0$?
+#
+# Both frames are known in $W$. Put the matrices in an order in which the letters cancel: $T_{K_0K_1} = T_{K_0W}\,T_{WK_1}$.
+
+# %% relative
+@ex.relative
+def relative(T_WA, T_WB):
+    """Return T_AB, shape (4, 4): the pose of B seen from A."""
+    ### BEGIN SOLUTION
+    return invert(T_WA) @ T_WB
+    ### END SOLUTION
+
+
+# %% compare [markdown]
+# ## Against the document
+#
+# Listing 4 prints $T_{K_0K_1}$ with six digits after the point. Compare yours with it, entry by entry.
+
+# %% compare-listing-4
+K0_T_K1 = relative(frame_from_points(*measured["K0"]), frame_from_points(*measured["K1"]))
+listing_4 = np.array([[0.010000, -0.999950, 0, 0.99], [0.999950, 0.010000, 0, -1], [0, 0, 1, 0], [0, 0, 0, 1]])
+print(K0_T_K1 + 0.0)
+print(f"largest difference from listing 4: {np.abs(K0_T_K1 - listing_4).max():.1e} (half a printed digit is 5.0e-07)")
+
+# %% angle [markdown]
+# Now put it in two numbers. By what angle is $K_1$ turned against $K_0$? The drawing says 90°, but the points were moved by 0.01 on purpose.
+
+# %% angle_deg
+angle_deg = ...  # your code here
+### BEGIN SOLUTION
+angle_deg = np.rad2deg(np.arccos((np.trace(K0_T_K1[:3, :3]) - 1) / 2))
+### END SOLUTION
+ex.angle_deg(angle_deg)
+
+# %% distance
+distance = ...  # your code here
+### BEGIN SOLUTION
+distance = np.linalg.norm(K0_T_K1[:3, 3])
+### END SOLUTION
+ex.distance(distance)
+
+# %% noise [markdown]
+# ## How good is a frame?
+#
+# Repeat the measurement a thousand times and you get a cloud of frames. Put the origin at 0, x_point at $(c, 0, 0)$ and y_point at $(u, h, 0)$. To first order, with
+# $e$ the noise of each point:
+#
+# | turn about | error | governed by |
+# | --- | --- | --- |
+# | x | $\left(e_{y,z} - e_{o,z} - \tfrac{u}{c}(e_{x,z} - e_{o,z})\right)/h$ | the height $h$ |
+# | y | $-(e_{x,z} - e_{o,z})/c$ | the base $c$ |
+# | z | $(e_{x,y} - e_{o,y})/c$ | the base $c$ |
+
+# %% predict-flat
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "a height twice as large"
+### END SOLUTION
+ex.predict("flat", guess, reveal=stages.triangle_noise)
+
+# %% kuka [markdown]
+# ## Poses as a robot displays them
+#
+# A KUKA controller shows six numbers: x, y, z in mm and the angles A, B, C in degrees. The rotation is $R = R_z(A)\,R_y(B)\,R_x(C)$:
+# turn about z, then about the *new* y, then about the *newest* x. Inside the workbook the three angles are radians.
+
+# %% matrix_from_kuka
+@ex.matrix_from_kuka
+def matrix_from_kuka(xyzabc):
+    """Return T, shape (4, 4), of a KUKA pose: x, y, z (mm), A, B, C (rad)."""
+    ### BEGIN SOLUTION
+    x, y, z, A, B, C = xyzabc
+    rot_z = np.array([[np.cos(A), -np.sin(A), 0], [np.sin(A), np.cos(A), 0], [0, 0, 1]])
+    rot_y = np.array([[np.cos(B), 0, np.sin(B)], [0, 1, 0], [-np.sin(B), 0, np.cos(B)]])
+    rot_x = np.array([[1, 0, 0], [0, np.cos(C), -np.sin(C)], [0, np.sin(C), np.cos(C)]])
+    T = np.eye(4)
+    T[:3, :3] = rot_z @ rot_y @ rot_x
+    T[:3, 3] = x, y, z
+    return T
+    ### END SOLUTION
+
+
+# %% gimbal [markdown]
+# ## The pole
+#
+# Three rings carry the flange. At B = ±90° the outer and the inner ring lie in one plane and turn about the same line: one degree of freedom is lost
+# (*gimbal lock*). Decide first, then move the sliders, or press *Make it fail* to go to the pole.
+
+# %% predict-pole
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "it does not move"
+### END SOLUTION
+ex.predict("pole", guess, reveal=stages.kuka_gimbal)
+
+# %% back-to-angles [markdown]
+# The way back reads the angles from the entries that hold few terms: $r_{20} = -\sin B$, $r_{10}/r_{00} = \tan A$, $r_{21}/r_{22} = \tan C$. Near the pole
+# all but $r_{20}$ shrink together, so any A with the right difference A − C is a correct answer. The check compares poses, not angles.
+
+# %% kuka_from_matrix
+@ex.kuka_from_matrix
+def kuka_from_matrix(T):
+    """Return x, y, z (mm), A, B, C (rad) of a pose, shape (6,), with B between -pi/2 and pi/2."""
+    ### BEGIN SOLUTION
+    R = T[:3, :3]
+    A = np.arctan2(R[1, 0], R[0, 0])
+    B = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))
+    C = np.arctan2(R[2, 1], R[2, 2])
+    return np.array([*T[:3, 3], A, B, C])
+    ### END SOLUTION
+
+
+# %% conventions [markdown]
+# ## What a wrong convention costs
+#
+# A tool tip sits 200 mm in front of the flange. Read one and the same displayed pose with four conventions and look where the tip ends up. None of the
+# wrong ones raises an error: only the millimeters tell.
+
+# %% wrong-conventions
+displayed = np.array([800.0, 200.0, 500.0, 30.0, -40.0, 65.0])
+x, A, B, C = displayed[:3], *displayed[3:]
+tip_F = np.array([0.0, 0.0, 200.0])
+right = frames.transform(matrix_from_kuka(frames.kuka_from_degrees(displayed)), tip_F)
+readings = {
+    "A, B, C about x, y, z": frames.kuka_from_degrees([*x, C, B, A]),
+    "signs reversed": frames.kuka_from_degrees([*x, -A, -B, -C]),
+    "A and B swapped": frames.kuka_from_degrees([*x, B, A, C]),
+    "degrees taken for radians": displayed,
+}
+for name, pose in readings.items():
+    error = np.linalg.norm(frames.transform(matrix_from_kuka(pose), tip_F) - right)
+    print(f"{name:27} the tip is off by {error:5.0f} mm")
+
+# %% break-it [markdown]
+# ## Break it
+#
+# Three points on a line have no plane, two equal points no direction, and NaN has nothing at all. A good function says so instead of returning a
+# frame. Try your own wrong inputs as well.
+
+# %% break-it-code
+o, px = np.zeros(3), np.array([100.0, 0, 0])
+for y_point in (np.array([50.0, 1e-4, 0]), o, np.array([50.0, np.nan, 0]), np.array([50.0, 10.0])):
+    try:
+        frames.frame_from_points(o, px, y_point)
+    except ValueError as refusal:
+        print(refusal)
+
+# %% beyond [markdown]
+# ## Beyond the document: trust all points alike
+#
+# If the drawing of the part says where the three points *should* be, the best frame minimizes the sum of squared distances. The SVD solves it in one step (Kabsch,
+# `frames.fit_frame`), and the information it has to live with is the tensor of inertia of the triangle: no unbiased method can beat that bound.
+# Gram-Schmidt uses neither the drawing nor the length of the second edge. How much does it lose?
+
+# %% predict-svd
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "only about z"
+### END SOLUTION
+ex.predict("svd", guess, reveal=stages.svd_against_gram_schmidt)
+
+# %% in-practice [markdown]
+# ## In practice
+#
+# - Put the first two points as far apart as the part allows, and the third as far *off their line* as it allows.
+# - Measure more than three points if you can, and fit.
+# - Write frames into names (`T_WF`), never `T` or `T2`. Most calibration bugs are a matrix used in the wrong direction.
+# - Store poses as matrices or quaternions. Compare poses, never angles.
+
+# %% questions [markdown]
+# ## Three questions, to answer in words
+#
+# 1. Two students measure the same part. One exchanges the roles of x_point and y_point and renames the axes afterwards. Why do their frames still differ?
+# 2. Why does a longer base not improve the turn about x, although it makes the triangle larger?
+# 3. A program logs A, B, C once a second while the flange turns evenly through the pole. What does the plot of A look like, and what really happens?
+
+# %% progress
+ex.progress()

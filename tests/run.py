@@ -1,0 +1,118 @@
+"""Every test of the workbook, as `python lab.py test` runs it; named arguments go to one pytest instead.
+
+Unit tests, solved notebooks (strict) and blank notebooks (lax) are dealt out to a few pytest processes, as many at a
+time as there are processors. The last line is the sum, "N passed, N failed"; the exit code is 1 if anything failed.
+
+A blank notebook that a student has worked in is judged by no test: a fresh one from the source is run in its place.
+"""
+
+import contextlib
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+
+from labkit import build
+from labkit.course import source
+
+ROOT = source.ROOT
+SECONDS_A_JOB = 900
+COUNTED = ("passed", "failed", "error", "skipped", "xfailed")
+
+
+def main(arguments):
+    """Run the jobs; returns the exit code."""
+    begun = time.monotonic()
+    with tempfile.TemporaryDirectory(dir=scratch_folder()) as scratch:
+        jobs = {"named": list(arguments)} if arguments else all_jobs(Path(scratch))
+        total = dict.fromkeys(COUNTED, 0)
+        with ThreadPoolExecutor(max(2, os.cpu_count() or 2) if len(jobs) > 1 else 1) as pool:
+            running = {pool.submit(run, words): name for name, words in jobs.items()}
+            for job in as_completed(running):
+                counts, output, seconds = job.result()
+                report(running[job], counts, output, seconds)
+                total = {word: total[word] + counts[word] for word in COUNTED}
+    failed = total["failed"] + total["error"]
+    print(f"{total['skipped']} skipped, {time.monotonic() - begun:.0f} s in all")
+    print(f"{total['passed']} passed, {failed} failed")
+    return 1 if failed else 0
+
+
+def scratch_folder():
+    """A folder git ignores, inside the checkout: there pytest finds the settings of the checkout."""
+    folder = ROOT / "build"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+def all_jobs(scratch):
+    """{name: arguments of pytest}, the longest first."""
+    units = sorted(str(path) for path in (ROOT / "tests").glob("**/test_*.py") if path.parent.name != "browser")
+    solved = sorted(str(path) for path in (ROOT / "solutions").glob("[0-9][0-9]_*.ipynb"))
+    jobs = {
+        "unit tests 1": units[0::2],
+        "unit tests 2": units[1::2],
+        "browser": [str(ROOT / "tests" / "browser")],
+        "solved notebooks 1": ["--nbval", *solved[0::2]],
+        "solved notebooks 2": ["--nbval", *solved[1::2]],
+    }
+    blank = [str(path) for path in blank_notebooks(scratch)]
+    jobs["blank notebooks 1"] = ["--nbval-lax", *blank[0::2]]
+    jobs["blank notebooks 2"] = ["--nbval-lax", *blank[1::2]]
+    return {name: words for name, words in jobs.items() if any(not word.startswith("-") for word in words)}
+
+
+def blank_notebooks(scratch):
+    """The blank notebook of every chapter: that in `notebooks/` where it is fresh, else a fresh one in `scratch`."""
+    for path in source.sources():
+        notebook = ROOT / "notebooks" / f"{path.stem}.ipynb"
+        fresh = build.as_text(build.blank_notebook(path))
+        if not notebook.exists() or notebook.read_text(encoding="utf-8") != fresh:
+            notebook = scratch / notebook.name
+            notebook.write_text(fresh, encoding="utf-8", newline="\n")
+        yield notebook
+
+
+def run(words):
+    """(counts, output, seconds) of one pytest process."""
+    begun = time.monotonic()
+    environment = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **os.environ}
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process = subprocess.run(
+            [sys.executable, "-m", "pytest", "-rs", "--durations=5", "--durations-min=5", *words],
+            cwd=ROOT,
+            env=environment,
+            timeout=SECONDS_A_JOB,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            encoding="utf-8",
+            errors="replace",
+        )
+        return counts_of(process.stdout, process.returncode), process.stdout, time.monotonic() - begun
+    return counts_of("", 1), f"stopped after {SECONDS_A_JOB} s", SECONDS_A_JOB
+
+
+def counts_of(output, returncode):
+    """How many tests passed, failed and so on, from pytest's last lines; a crash counts as one error."""
+    lines = [line for line in output.splitlines() if re.search(r"\d+ \w+.* in [\d.]+s", line)]
+    found = re.findall(r"(\d+) (passed|failed|error|skipped|xfailed)", lines[-1]) if lines else []
+    counts = {**dict.fromkeys(COUNTED, 0), **{word: int(number) for number, word in found}}
+    if returncode not in (0, 5) and not counts["failed"] + counts["error"]:
+        counts["error"] = 1
+    return counts
+
+
+def report(name, counts, output, seconds):
+    """One line a job; all pytest said where something failed, and the reasons of what was skipped."""
+    words = ", ".join(f"{number} {word}" for word, number in counts.items() if number) or "nothing to run"
+    print(f"{name}: {words} ({seconds:.0f} s)", flush=True)
+    shown = output.splitlines() if counts["failed"] + counts["error"] else re.findall(r"^SKIPPED .*$", output, re.M)
+    print("".join(f"  {line}\n" for line in shown), end="", flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,171 @@
+"""What keeps the house in order: notebook files that compare well, imports that run one way, colors from one place."""
+
+import ast
+import json
+import re
+import subprocess
+import sys
+
+import pytest
+
+from labkit import build
+from labkit.course import source
+
+ROOT = source.ROOT
+SOURCES = source.sources()
+FRONT_ENDS = {"matplotlib", "ipywidgets", "anywidget", "IPython"}
+COLOR_ARGUMENTS = re.compile(r"(.*_)?(colors?|c|facecolors?|edgecolors?|fc|ec|mfc|mec)|marker(face|edge)color")
+UNSTABLE = {
+    "an address": r"\b0x[0-9a-f]{6,}",
+    "a path of one machine": r"(?<![\w.])/(home|Users|tmp|root|var|usr|opt)/\w|[A-Z]:\\\w|ipykernel_\d|site-packages",
+    "a time": r"\b20\d\d-\d\d-\d\d[T ]\d\d:\d\d",
+}
+
+
+def notebooks():
+    """{name: (chapter, content)} of the solved notebooks on disk and of the blank ones as the sources give them."""
+    found = {}
+    for path in SOURCES:
+        found[f"notebooks/{path.stem}"] = json.loads(build.as_text(build.blank_notebook(path)))
+        solved = path.with_suffix(".ipynb")
+        if solved.exists():
+            found[f"solutions/{path.stem}"] = json.loads(solved.read_text(encoding="utf-8"))
+    return found
+
+
+NOTEBOOKS = notebooks()
+EACH_NOTEBOOK = pytest.mark.parametrize("name", NOTEBOOKS)
+
+
+def cells(name, kind=None):
+    return [cell for cell in NOTEBOOKS[name]["cells"] if kind in (None, cell["cell_type"])]
+
+
+@EACH_NOTEBOOK
+def test_metadata_names_the_kernel_and_nothing_else(name):
+    notebook = NOTEBOOKS[name]
+    assert notebook["metadata"] == {"kernelspec": build.KERNEL, "language_info": {"name": "python"}}
+    assert all(set(cell["metadata"]) <= {"tags"} for cell in notebook["cells"])
+    ids = [cell["id"] for cell in notebook["cells"]]
+    assert len(set(ids)) == len(ids)
+
+
+@EACH_NOTEBOOK
+def test_code_is_short_plain_and_comparable(name):
+    """No cell over 15 lines; no magics; nothing that nbval cannot compare."""
+    for cell in cells(name, "code"):
+        code = "".join(cell["source"])
+        assert code.count("\n") < 15, f"cell {cell['id']} has {code.count(chr(10)) + 1} lines"
+        bad = re.search(r"^\s*[%!]\w|get_ipython|\bOutput\(|\binteract\w*\(|ipympl|clear_output", code, re.M)
+        assert not bad, f"cell {cell['id']} uses {bad[0]!r}"
+
+
+@EACH_NOTEBOOK
+def test_outputs_are_stored_where_nbval_compares_them_and_hold_text_alone(name):
+    if name.startswith("notebooks"):
+        assert all(not cell["outputs"] and cell["execution_count"] is None for cell in cells(name, "code"))
+        return
+    for number, cell in enumerate(cells(name, "code"), start=1):
+        assert cell["execution_count"] == number, f"cell {cell['id']} was not executed in order"
+        if "nbval-check-output" in cell["metadata"].get("tags", []):
+            assert cell["outputs"], f"cell {cell['id']} has nothing to compare"
+        for output in cell["outputs"]:
+            assert output["output_type"] != "error", f"cell {cell['id']} failed"
+            assert set(output.get("data", {})) <= {"text/plain", "text/html", "text/latex", "text/markdown"}
+            text = json.dumps(output)
+            for what, pattern in UNSTABLE.items():
+                bad = re.search(pattern, text)
+                assert not bad, f"the output of cell {cell['id']} holds {what}: {bad[0]!r}"
+
+
+def layer_of(path):
+    """mathematics, figures, widgets, course, ledger or build."""
+    parts = path.relative_to(ROOT / "labkit").parts
+    return parts[0] if len(parts) > 1 else ("build" if parts[0] == "build.py" else "mathematics")
+
+
+def imported(path):
+    """Absolute names of all modules that a module of labkit imports."""
+    package = path.relative_to(ROOT).with_suffix("").parts[:-1]
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else ()
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            yield from (f"{module}.{alias.name}" for alias in node.names)
+
+
+MAY_IMPORT = {
+    "mathematics": {"mathematics"},
+    "ledger": {"mathematics", "ledger"},
+    "figures": {"mathematics", "figures"},
+    "widgets": {"mathematics", "figures", "widgets"},
+    "course": {"mathematics", "ledger", "course"},
+    "build": {"course"},
+}
+MODULES = sorted((ROOT / "labkit").rglob("*.py"))
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_imports_run_one_way(path):
+    """mathematics <- figures <- widgets; the exercises import mathematics alone, and the ledger belongs to it."""
+    layer = layer_of(path)
+    for name in imported(path):
+        first, *rest = name.split(".")
+        if first == "labkit" and rest:
+            other = rest[0] if rest[0] in MAY_IMPORT else "mathematics"
+            assert other in MAY_IMPORT[layer], f"{layer} must not import {name}"
+        if layer in ("mathematics", "ledger"):
+            assert first not in FRONT_ENDS, f"{layer} must not import {name}"
+
+
+def literal_colors(tree):
+    """(line, color) of each color written as text in the code."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            if re.fullmatch(r"#(?:[0-9a-fA-F]{3}){1,2}", node.value):
+                yield node.lineno, node.value
+        elif isinstance(node, ast.Call):
+            for keyword in node.keywords:
+                value = getattr(keyword.value, "value", None)
+                if COLOR_ARGUMENTS.fullmatch(keyword.arg or "") and isinstance(value, str) and value != "none":
+                    yield node.lineno, value
+            if getattr(node.func, "attr", "") == "plot":
+                for argument in node.args:
+                    value = getattr(argument, "value", None)
+                    if isinstance(value, str) and re.match(r"[-.:o]*[bgrcmykw]|C\d", value):
+                        yield node.lineno, value
+
+
+DRAWING = [p for p in MODULES if layer_of(p) in ("figures", "widgets") and p.name != "style.py"] + SOURCES
+
+
+@pytest.mark.parametrize("path", DRAWING, ids=lambda path: str(path.relative_to(ROOT)))
+def test_colors_come_from_the_style_alone(path):
+    found = list(literal_colors(ast.parse(path.read_text(encoding="utf-8"))))
+    assert not found, f"line {found[0][0]} writes the color {found[0][1]!r}: take it from labkit/figures/style.py"
+
+
+def test_the_color_guard_sees_colors():
+    code = 'ax.plot(x, y, "k--")\nax.scatter(x, y, c="red")\nINK = "#112233"\nax.plot(x, y, "-", color="none")'
+    assert [value for _, value in sorted(literal_colors(ast.parse(code)))] == ["k--", "red", "#112233"]
+
+
+def test_constraints_hold_no_address():
+    text = (ROOT / "constraints.txt").read_text(encoding="utf-8")
+    pins = [line for line in text.splitlines() if line and not line.lstrip().startswith("#")]
+    assert pins and all(re.match(r"[A-Za-z0-9][\w.-]*==[\w.]+( ; .+)?$", pin) for pin in pins)
+    assert "://" not in text and not re.search(r"[\s=](/|[A-Z]:\\|~)", text), (
+        "the header must hold relative paths alone"
+    )
+
+
+def test_ruff_is_content():
+    ruff = subprocess.run(
+        [sys.executable, "-m", "ruff", "check", "--output-format=concise", "."],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
+    assert not ruff.returncode, ruff.stdout + ruff.stderr
