@@ -1,29 +1,34 @@
-"""Hand-eye calibration with a sphere: where a scanner sits on a robot's flange, from the sphere's center seen in many poses.
+"""Hand-eye calibration with a sphere: where a scanner sits on a flange, from the sphere's center seen in many poses.
 
-In every pose i the robot reports T_BF (base <- flange) and the scanner the sphere's center x_S, and all of them describe one point:
+In every pose i the robot reports T_BF (base <- flange) and the scanner the sphere's center x_S, and all of them
+describe one point:
 
     T_BF,i  T_FS  x_S,i  =  target          (thesis, formulas (4-1) to (4-3); there T_A^F T_F^S x_S = T_P^A x_P')
 
-Lengths in mm, angles in rad. Increments are T_FS exp(phi, .): phi is a rotation vector in the scanner frame S, translations are plain
-differences in F, the target lives in B. Covariances and singular values follow that order: phi, translation, target.
-Source: thesis "Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", HAW Hamburg 2019, sections 2.6, 4.4, 6.1, listings C2-C5.
+Lengths in mm, angles in rad. Increments are T_FS exp(phi, .): phi is a rotation vector in the scanner frame S,
+translations are plain differences in F, the target lives in B. Covariances and singular values follow that order: phi,
+translation, target. Source: thesis "Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", HAW Hamburg 2019,
+sections 2.6, 4.4, 6.1, listings C2-C5.
 """
 
 import contextlib
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from .checks import as_finite, as_points, as_positive, as_transforms
 from .frames import invert, matrix_from_kuka, transform
+from .handeye_result import HandEye
 from .lie import exp_so3, nearest_rotation, skew
 
 MIN_TURN = 1e-3  # rad: poses turned by less than this about an axis do not fix the target across it
 MIN_SPREAD = 1e-6  # relative: sphere centers closer to one line of the scanner frame than this fix no rotation
 MAX_STEPS = 50
 STEP_TOLERANCE = 1e-12  # rad
-MEDIAN_CHI3 = 1.5381722544550522  # median length of a 3-vector of unit normal errors: turns a median into a standard deviation
+MEDIAN_CHI3 = (
+    1.5381722544550522  # median length of a 3-vector of unit normal errors: turns a median into a standard deviation
+)
 TUKEY_CUT = 5.0  # residuals beyond this many standard deviations get the weight 0
 SUBSETS = 60  # random pose subsets of the robust start: with a quarter of bad poses one of them is clean with 1 - 1e-5
 _EYE = np.eye(3)
@@ -31,37 +36,29 @@ _GENERATORS = skew(_EYE)  # derivatives of a small rotation about x, y, z
 
 
 @dataclass(frozen=True)
-class HandEye:
-    """Result of a hand-eye calibration.
+class SphereHandEye(HandEye):
+    """A `HandEye` from a sphere: target is its center in B (3,), residuals are (N, 3) in B, all in mm.
 
-    T_FS: scanner in the flange frame. target: sphere center in the base (3,), or the pose T_BT of a target that has one.
-    residuals: (N, 3) in B, or (N, 6). std: noise of one coordinate, estimated from the residuals. covariance: of phi, translation, target.
-    singular_values: of the Jacobian with phi times the mean distance of the sphere, so that all columns are mm per mm.
-    weights: (N,), 1 where nothing is robust. trace: rms distance after the start and after each step.
+    singular_values: of the Jacobian with phi times the root-mean-square distance of the sphere, so that every column is
+    mm per mm. trace: rms distance (mm) at the linear start and after each step. std: noise of one coordinate, from the
+    residuals (mm).
     """
 
-    T_FS: np.ndarray
-    target: np.ndarray
-    residuals: np.ndarray
-    covariance: np.ndarray
-    singular_values: np.ndarray
-    weights: np.ndarray
-    trace: np.ndarray = field(repr=False)
     std: float
 
     @property
     def rms(self):
-        """Root mean square of the residual distances over all poses, rejected ones included."""
-        return rms_distance(self.residuals)
+        """Root mean square of the residual distances over all poses, rejected ones included (mm)."""
+        return float(rms_distance(self.residuals))
 
 
 def rms_distance(residuals):
-    """Root of the mean squared length of residual vectors, (..., N, 3) -> (...): not per axis, where it is sqrt(3) smaller."""
+    """Root of the mean squared length of residual vectors, (..., N, 3) -> (...); per axis it is sqrt(3) smaller."""
     residuals = as_points(residuals, "residuals", dim=np.shape(residuals)[-1] if np.ndim(residuals) else 3)
     return np.sqrt((residuals**2).sum(-1).mean(-1))
 
 
-# --- model -------------------------------------------------------------------------------------------------------------------------
+# --- model -----------------------------------------------------------------------------------------------------------
 
 
 def sphere_residuals(T_BF, x_S, T_FS, target):
@@ -90,11 +87,11 @@ def kuka_jacobian(p2, T_BF, x_S):
 
 
 def rate_matrix(A, B):
-    """E with omega = E (A', B', C'): the rotation vector, in the outer frame, that small changes of the KUKA angles give.
+    """E with omega = E (A', B', C'): the rotation vector, in the outer frame, that changes of the KUKA angles give.
 
-    Its columns are the three axes the angles turn about: z, then y turned by A, then x turned by A and B. det E = cos B: at
-    B = +-90 deg the first and the last axis are one line, A and C become one angle, and no change of the angles tilts the frame
-    about the missing direction. Source: what thesis table 7-3 stumbles over without naming it.
+    Its columns are the three axes the angles turn about: z, then y turned by A, then x turned by A and B. det E = -cos
+    B: at B = +-90 deg the first and the last axis are one line, A and C become one angle, and no change of the angles
+    tilts the frame about the missing direction. Source: what thesis table 7-3 stumbles over without naming it.
     """
     ca, sa, cb, sb = np.cos(A), np.sin(A), np.cos(B), np.sin(B)
     return np.array([[0.0, -sa, ca * cb], [0.0, ca, sa * cb], [1.0, 0.0, -sb]])
@@ -128,26 +125,29 @@ def numeric_jacobian(function, x, step=1e-6, scheme="forward"):
         ahead, behind = x.copy(), x.copy()
         ahead[k] += h
         behind[k] -= h
-        columns.append((function(ahead) - f0) / h if scheme == "forward" else (function(ahead) - function(behind)) / (2 * h))
+        columns.append(
+            (function(ahead) - f0) / h if scheme == "forward" else (function(ahead) - function(behind)) / (2 * h)
+        )
     return np.stack(columns, axis=-1)
 
 
 def joint_jacobian(T_BF, x_S, T_FS, target_free=True):
-    """Derivative of the residuals by phi (rad, in S), translation (mm, in F) and target (mm, in B); (3 N, 9), or (3 N, 6)."""
+    """Derivative of the residuals by phi (rad, in S), translation (in F) and target (in B); (3 N, 9) or (3 N, 6)."""
     T_BF, x_S, T_FS = as_transforms(T_BF, "T_BF"), as_points(x_S, "x_S"), as_transforms(T_FS, "T_FS")
     R = T_BF[:, :3, :3]
     J = np.empty((len(R), 3, 9 if target_free else 6))
     J[..., :3] = -R @ (T_FS[:3, :3] @ skew(x_S))
     J[..., 3:6] = R
-    J[..., 6:] = -np.eye(3)
+    if target_free:
+        J[..., 6:] = -_EYE
     return J.reshape(3 * len(R), -1)
 
 
 def plate_jacobian(T_BF, x_S, p2, p3, x_P):
-    """Derivative of the residuals by both KUKA poses of the thesis's second step, T_FS (p2) and T_BP (p3), shape (3 N, 12).
+    """Derivative of the residuals by both KUKA poses of the thesis's second step, T_FS and T_BP; (3 N, 12).
 
-    p3 enters through the one point T_BP x_P only, so three of its six columns depend on the others whatever the poses: the sphere center
-    is observable, the plate's orientation is not. Source: thesis, table 4-2, step 2.
+    p3 enters through the one point T_BP x_P only, so three of its six columns depend on the others whatever the poses:
+    the sphere center is observable, the plate's orientation is not. Source: thesis, table 4-2, step 2.
     """
     p3, x_P = as_points(p3, "p3", dim=6), as_points(x_P, "x_P")
     arm = matrix_from_kuka(p3)[:3, :3] @ x_P
@@ -155,39 +155,85 @@ def plate_jacobian(T_BF, x_S, p2, p3, x_P):
     return np.concatenate([kuka_jacobian(p2, T_BF, x_S), np.tile(one, (len(x_S), 1))], axis=1)
 
 
-# --- calibration -------------------------------------------------------------------------------------------------------------------
+def listing_cost(residuals):
+    """What listing C3 computes as "mse": (1/(2 n)) (sum of the residual vectors)^2 for each axis, (n, 3) -> (3,).
+
+    The square stands outside the sum. Formula (6-11) asks for half the sum of the squares; this one is n/2 times the
+    square of the *mean* residual, to which errors of opposite sign add nothing. It steers no step, it only ends the
+    iteration.
+    """
+    residuals = as_points(residuals, "residuals")
+    return residuals.sum(-2) ** 2 / (2 * residuals.shape[-2])
+
+
+def listing_gauss_newton(start_deg, T_BF, x_S, target, step=5e-7, tolerance=1e-20, max_steps=250):
+    """Listings C3 to C5 as printed: forward differences, degrees, normal equations, an end by `listing_cost`.
+
+    Where A and C cannot be told apart, at B = +-90 deg, the normal equations are singular; they are solved for the
+    shortest step, and so `listing_gauss_newton` goes on where MATLAB's backslash warns and returns what rounding makes
+    of it.
+
+    Returns
+    -------
+    p2_deg : array, shape (k + 1, 6)
+        Start and iterates, x, y, z in mm, A, B, C in deg.
+    ended : bool
+        Whether the stopping rule was met before `max_steps`.
+    """
+    p = as_points(start_deg, "start_deg", dim=6)
+    unit = np.array([1, 1, 1, *np.deg2rad([1, 1, 1])])
+
+    def residuals(q):
+        return kuka_residuals(q * unit, T_BF, x_S, target)
+
+    iterates, last = [p], np.zeros(3)
+    for _ in range(max_steps):
+        e = residuals(p)
+        J = numeric_jacobian(residuals, p, step)
+        p = p - np.linalg.lstsq(J.T @ J, J.T @ e, rcond=1e-13)[0]
+        iterates.append(p)
+        cost = listing_cost(e.reshape(-1, 3))
+        if (np.abs(cost - last) <= tolerance).all():
+            return np.array(iterates), True
+        last = cost
+    return np.array(iterates), False
+
+
+# --- calibration -----------------------------------------------------------------------------------------------------
 
 
 def calibrate_sphere_target(T_BF, x_S, target=None, robust=False, rng=None):
-    """Pose of a scanner on the flange, and the sphere's center, from the center measured in N robot poses. Needs no start value.
+    """Pose of a scanner on the flange, and the sphere's center, from the center seen in N robot poses, without a start.
 
-    Minimizes the sum of squared residual vectors: the maximum-likelihood estimate for equal, isotropic errors. Translation and target
-    enter linearly and are eliminated once; what remains is a quadratic function of the nine entries of the rotation matrix, solved
-    freely (the linear start) and then on SO(3) by Gauss-Newton steps that no longer depend on N. With a known target even that is
-    one step: the fit of two point sets.
+    Minimizes the sum of squared residual vectors: the maximum-likelihood estimate for equal, isotropic errors.
+    Translation and target enter linearly and are eliminated once; what remains is a quadratic function of the nine
+    entries of the rotation matrix, solved freely (the linear start) and then on SO(3) by Gauss-Newton steps that no
+    longer depend on N. With a known target even that is one step: the fit of two point sets.
 
     Parameters
     ----------
     T_BF : array-like, shape (N, 4, 4)
-        Robot poses, base <- flange. N >= 4, turned about at least two axes (N >= 3 and no turning needed when `target` is given).
+        Robot poses, base <- flange. N >= 4, turned about at least two axes (N >= 3 and no turning needed when `target`
+        is given).
     x_S : array-like, shape (N, 3)
         Sphere centers in the scanner frame (mm).
     target : array-like, shape (3,), optional
         Sphere center in the base, if it is known; its error then goes into the result undiminished.
     robust : bool
-        Least trimmed squares over random subsets, then Tukey weights on each pose's residual length; bears nearly half of bad poses.
+        Least trimmed squares over random subsets, then Tukey weights on each pose's residual length; bears nearly half
+        of bad poses.
     rng : numpy.random.Generator, optional
         Source of the subsets; a fixed one is used without it, so that results repeat.
 
     Returns
     -------
-    HandEye
+    SphereHandEye
 
     Raises
     ------
     ValueError
-        Naming the missing motion: poses that only translate, poses turned about one axis, a sphere that stays at one place or on one line
-        of the scanner frame; and wrong shapes.
+        Naming the missing motion: poses that only translate, poses turned about one axis, a sphere that stays at one
+        place or on one line of the scanner frame; and wrong shapes.
 
     Source: thesis, sections 4.4 and 6.1.5, which iterate from a CAD pose with the target held fixed.
     """
@@ -211,14 +257,14 @@ def calibrate_sphere_target(T_BF, x_S, target=None, robust=False, rng=None):
     T_FS = np.zeros((4, 4))
     T_FS[:3, :3], T_FS[:3, 3], T_FS[3, 3] = R_FS, t_FS, 1.0
     covariance, singular_values, std = _uncertainty(R, x_S, R_FS, residuals, weights, target is None)
-    return HandEye(T_FS, center, residuals, covariance, singular_values, weights, np.array(trace), std)
+    return SphereHandEye(T_FS, center, residuals, covariance, singular_values, weights, np.array(trace), std)
 
 
 def linear_start(T_BF, x_S):
     """T_FS and target from the linear equations in 15 unknowns (R_FS, t_FS, target), R_FS then made a rotation.
 
-    R_FS x_S + t_FS - R_BF' target = -R_BF' t_BF: three equations a pose, linear because nothing says yet that R_FS is a rotation. Needs five
-    poses or more and sphere centers that do not lie in one plane of the scanner frame.
+    R_FS x_S + t_FS - R_BF' target = -R_BF' t_BF: three equations a pose, linear because nothing says yet that R_FS is a
+    rotation. Needs five poses or more and sphere centers that do not lie in one plane of the scanner frame.
     """
     T_BF, x_S = as_transforms(T_BF, "T_BF"), as_points(x_S, "x_S")
     R_t, n = np.swapaxes(T_BF[:, :3, :3], 1, 2), len(T_BF)
@@ -229,8 +275,10 @@ def linear_start(T_BF, x_S):
     F = -(R_t @ T_BF[:, :3, 3, None])[..., 0]
     u, _, rank, s = np.linalg.lstsq(D.reshape(-1, 15), F.ravel(), rcond=1e-12)
     if rank < 15:
-        raise ValueError(f"the linear system needs rank 15, got {rank}: take five poses or more, turned about two axes, "
-                         "with the sphere at different depths and places of the scanner's field")
+        raise ValueError(
+            f"the linear system needs rank 15, got {rank}: take five poses or more, turned about two axes, "
+            "with the sphere at different depths and places of the scanner's field"
+        )
     T_FS = np.eye(4)
     T_FS[:3, :3], T_FS[:3, 3] = nearest_rotation(u[:9].reshape(3, 3)), u[9:12]
     return T_FS, u[12:]
@@ -244,7 +292,8 @@ def gauss_newton_pose(start, T_BF, x_S, target=None, parameters="euler", max_ste
     start : array-like, shape (6,)
         KUKA pose x, y, z, A, B, C of the scanner (mm, rad).
     target : array-like, shape (3,), optional
-        Sphere center in B; freed as three more unknowns (starting from the mean of what the start pose predicts) without it.
+        Sphere center in B; freed as three more unknowns (starting from the mean of what the start pose predicts)
+        without it.
     parameters : {"euler", "se3"}
         "euler" adds the step to A, B, C; "se3" turns the frame by the step's rotation vector, so no pose is special.
     tolerance : float
@@ -302,7 +351,8 @@ def tukey_weights(lengths, std, cut=TUKEY_CUT):
 
 
 def leave_one_out(T_BF, x_S, robust=False):
-    """Residual vectors (N, 3) of each pose under the calibration from all the others: what the result is worth on a new pose."""
+    """Residual vectors (N, 3) of each pose under the calibration from the others: what the result is worth elsewhere.
+    """
     T_BF, x_S = as_transforms(T_BF, "T_BF"), as_points(x_S, "x_S")
     found = []
     for i in range(len(T_BF)):
@@ -311,24 +361,57 @@ def leave_one_out(T_BF, x_S, robust=False):
     return np.array(found)
 
 
+def fit_radius(T_BF, x_S, printed_radius=30.0):
+    """Sphere radius that the poses themselves ask for, all else free as well: (radius, standard deviation), mm.
+
+    Each center was computed from a fitted circle as y = +-sqrt(R^2 - r^2) with R = `printed_radius`; another R moves it
+    along y only, y' = +-sqrt(y^2 + R^2 - printed_radius^2). Residuals linear in y make this a tenth column of the
+    Jacobian; Gauss-Newton steps on R^2, all else solved exactly in between.
+
+    Source: beyond the thesis, which uses three different radii (certificate, listing C16, coordinate machine).
+    """
+    x_S = as_points(x_S, "x_S")
+    side, square = np.sign(x_S[:, 1]), x_S[:, 1] ** 2 - printed_radius**2
+    radius = float(as_positive(printed_radius, "printed_radius"))
+    for _ in range(MAX_STEPS):
+        x = x_S.copy()
+        x[:, 1] = side * np.sqrt(np.maximum(square + radius**2, 1e-12))
+        fit = calibrate_sphere_target(T_BF, x)
+        J = np.concatenate([joint_jacobian(T_BF, x, fit.T_FS), _by_radius(T_BF, x, fit.T_FS, radius)], axis=1)
+        step = np.linalg.lstsq(J, -fit.residuals.ravel(), rcond=None)[0][9]
+        radius += step
+        if abs(step) < 1e-9:
+            break
+    variance = (fit.residuals**2).sum() / (3 * len(x) - 10)
+    return radius, float(np.sqrt(variance * np.linalg.inv(J.T @ J)[9, 9]))
+
+
+def _by_radius(T_BF, x, T_FS, radius):
+    by_R = np.zeros_like(x)
+    by_R[:, 1] = radius / x[:, 1]
+    return (np.asarray(T_BF)[:, :3, :3] @ (T_FS[:3, :3] @ by_R[..., None])).reshape(-1, 1)
+
+
 def predicted_covariance(T_BF, T_FS, target, std):
     """Covariance (9, 9) of phi, translation and target that a set of poses would give, before anything is measured.
 
-    The sphere centers follow from the poses: x_S = T_FS^-1 T_BF^-1 target. This is the Cramer-Rao bound for isotropic noise `std` (mm).
+    The sphere centers follow from the poses: x_S = T_FS^-1 T_BF^-1 target. This is the Cramer-Rao bound for isotropic
+    noise `std` (mm).
     """
     x_S = transform(invert(T_FS), transform(invert(T_BF), target))
     J = joint_jacobian(T_BF, x_S, T_FS)
     return float(as_positive(std, "std")) ** 2 * np.linalg.inv(J.T @ J)
 
 
-# --- the calibrations of the literature ----------------------------------------------------------------------------------------------
+# --- the calibrations of the literature ------------------------------------------------------------------------------
 
 
 def kim_linear(T_BF, points_S, points_W):
     """T_FS by the linear system D U = F of Kim, Cho and Kim, from a body with several marked points.
 
-    Delta_T T_FS = T_FS (X_S,p X_W') (X_S,q X_W')^-1 for two poses p and q: one AX = XB with twelve unknowns for all consecutive pairs,
-    stacked and solved by least squares; the rotation block is then made a rotation. The world frame of the body cancels.
+    Delta_T T_FS = T_FS (X_S,p X_W') (X_S,q X_W')^-1 for two poses p and q: one AX = XB with twelve unknowns for all
+    consecutive pairs, stacked and solved by least squares; the rotation block is then made a rotation. The world frame
+    of the body cancels.
 
     Parameters
     ----------
@@ -341,7 +424,8 @@ def kim_linear(T_BF, points_S, points_W):
     Raises
     ------
     ValueError
-        When the points do not span space: X_S X_W' is then singular. A sphere offers one point, rank 1: the method needs four or more.
+        When the points do not span space: X_S X_W' is then singular. A sphere offers one point, rank 1: the method
+        needs four or more.
 
     Source: thesis, formulas (2-43) to (2-46) and appendix A, after Kim, Cho, Kim (2001).
     """
@@ -349,9 +433,13 @@ def kim_linear(T_BF, points_S, points_W):
     X_S, X_W = (np.concatenate([X, np.ones((*X.shape[:-1], 1))], axis=-1) for X in (X_S, X_W))
     rank = np.linalg.matrix_rank(X_W, tol=1e-9 * np.abs(X_W).max())
     if rank < 4:
-        raise ValueError(f"points_W must hold four points or more that do not lie in one plane: X_S X_W' has rank {rank}, not 4")
+        raise ValueError(
+            f"points_W must hold four points or more that do not lie in one plane: X_S X_W' has rank {rank}, not 4"
+        )
     M = np.swapaxes(X_S, 1, 2) @ X_W
-    blocks = [kim_matrix(invert(p) @ q, Mp @ np.linalg.inv(Mq)) for p, q, Mp, Mq in zip(T_BF[:-1], T_BF[1:], M[:-1], M[1:])]
+    blocks = [
+        kim_matrix(invert(p) @ q, Mp @ np.linalg.inv(Mq)) for p, q, Mp, Mq in zip(T_BF[:-1], T_BF[1:], M[:-1], M[1:])
+    ]
     D, F = np.concatenate([b[0] for b in blocks]), np.concatenate([b[1] for b in blocks])
     u, _, rank, _ = np.linalg.lstsq(D, F, rcond=1e-10)
     if rank < 12:
@@ -374,11 +462,11 @@ def kim_matrix(A, B):
 
 
 def li_two_step(T_BF, x_S, max_turn_deg=0.01):
-    """T_FS and target by the two steps of Li et al.: the rotation from pure translations, then the translation from rotations.
+    """T_FS and target by the two steps of Li et al.: rotation from pure translations, then translation.
 
-    Step 1: two poses of the same orientation see the sphere shifted, R_BF R_FS (x_q - x_p) = t_p - t_q (the thesis prints the right side of
-    (2-41) with the sign reversed); the directions are fitted by SVD. Step 2: with R_FS known, R_BF t_FS - target = -(t_BF + R_BF R_FS x_S)
-    is linear in t_FS and target.
+    Step 1: two poses of the same orientation see the sphere shifted, R_BF R_FS (x_q - x_p) = t_p - t_q (the thesis
+    prints the right side of (2-41) with the sign reversed); the directions are fitted by SVD. Step 2: with R_FS known,
+    R_BF t_FS - target = -(t_BF + R_BF R_FS x_S) is linear in t_FS and target.
 
     Parameters
     ----------
@@ -400,8 +488,10 @@ def li_two_step(T_BF, x_S, max_turn_deg=0.01):
     same = chord <= 2 * np.sqrt(2) * np.sin(np.deg2rad(max_turn_deg) / 2)
     if not same.any():
         least = np.rad2deg(2 * np.arcsin(chord.min() / (2 * np.sqrt(2))))
-        raise ValueError(f"no two poses have the same orientation (the nearest differ by {least:.3g} deg): "
-                         "step 1 needs the robot to translate without turning")
+        raise ValueError(
+            f"no two poses have the same orientation (the nearest differ by {least:.3g} deg): "
+            "step 1 needs the robot to translate without turning"
+        )
     p, q = p[same], q[same]
     seen = x_S[q] - x_S[p]
     moved = (np.swapaxes(R[p], 1, 2) @ (t[p] - t[q])[..., None])[..., 0]
@@ -419,7 +509,7 @@ def li_two_step(T_BF, x_S, max_turn_deg=0.01):
     return T_FS, u[3:]
 
 
-# --- inside --------------------------------------------------------------------------------------------------------------------------
+# --- inside ----------------------------------------------------------------------------------------------------------
 
 
 def _residuals(R, t, x, R_FS, t_FS, center):
@@ -432,7 +522,8 @@ def _rms(residuals):
 
 
 def _reduce(R, t, x, w, target):
-    """The cost with translation and target eliminated: r'Sr - 2 h'r + c in the nine entries r of R_FS, and how to get the two back."""
+    """The cost without translation and target, r'Sr - 2 h'r + c in the entries r of R_FS, and how to get both back.
+    """
     total = w.sum()
     x_mean = w @ x / total
     dx = x - x_mean
@@ -466,20 +557,27 @@ def _reduce(R, t, x, w, target):
 
 
 def _invert_spread(W, total):
-    """Inverse of the spread of the orientations, sum of dR dR'; refuses poses that leave the target free, naming the motion."""
+    """Inverse of the spread of the orientations, sum of dR dR'; refuses poses that leave the target free."""
     with contextlib.suppress(np.linalg.LinAlgError):
         inverse = np.linalg.inv(W)
-        if 0 < np.vdot(inverse, inverse) < (total * MIN_TURN**2) ** -2:  # then no eigenvalue of W is below total MIN_TURN^2
+        if (
+            0 < np.vdot(inverse, inverse) < (total * MIN_TURN**2) ** -2
+        ):  # then no eigenvalue of W is below total MIN_TURN^2
             return inverse
     values, vectors = np.linalg.eigh(W)
     turn = np.sqrt(np.maximum(values, 0.0) / total)  # rad, roughly the rms turn about the axes across each direction
     if turn[0] < MIN_TURN:
         if turn[2] < MIN_TURN:
-            raise ValueError("the poses only translate: scanner and sphere can be shifted together in any direction; "
-                             "add poses that turn the flange about two different axes")
+            raise ValueError(
+                "the poses only translate: scanner and sphere can be shifted together in any direction; "
+                "add poses that turn the flange about two different axes"
+            )
         axis = vectors[:, 0] * np.sign(vectors[np.argmax(np.abs(vectors[:, 0])), 0])
-        raise ValueError(f"all poses turn about one axis, ({axis[0]:.3f}, {axis[1]:.3f}, {axis[2]:.3f}) in the base: scanner and sphere "
-                         "can be shifted together along it; add poses that turn the flange about another axis")
+        raise ValueError(
+            f"all poses turn about one axis, ({axis[0]:.3f}, {axis[1]:.3f}, {axis[2]:.3f}) in the base: scanner and "
+            "sphere "
+            "can be shifted together along it; add poses that turn the flange about another axis"
+        )
     return (vectors / values) @ vectors.T
 
 
@@ -489,8 +587,10 @@ def _refuse_narrow(M, x_mean):
     minors = 0.5 * (size * size - np.vdot(M, M))  # about the product of the two largest eigenvalues
     if minors <= MIN_SPREAD**2 * max(size, x_mean @ x_mean * np.finfo(float).eps) ** 2:
         where = "at one place" if size <= MIN_SPREAD**2 * (x_mean @ x_mean) else "on one line"
-        raise ValueError(f"the sphere stays {where} of the scanner frame, so the scanner's rotation about it is free; "
-                         "change its depth and its place along the scan line between the poses")
+        raise ValueError(
+            f"the sphere stays {where} of the scanner frame, so the scanner's rotation about it is free; "
+            "change its depth and its place along the scan line between the poses"
+        )
 
 
 def _solve(R, t, x, w, target):
@@ -504,7 +604,8 @@ def _solve(R, t, x, w, target):
 
 
 def _rotation_start(S, h):
-    """Rotation next to the unconstrained minimum S^-1 h, or the best of the 24 right-angled ones where that is not determined."""
+    """Rotation next to the unconstrained minimum S^-1 h, or the best of the 24 right-angled ones where S is singular.
+    """
     values, vectors = np.linalg.eigh(S)
     if values[0] > 1e-9 * values[8]:
         return _polar(((vectors / values) @ (h @ vectors)).reshape(3, 3))
@@ -525,7 +626,7 @@ def _polar(M):
 
 
 def _descend(S, h, R_FS):
-    """Newton on SO(3) for r'Sr - 2 h'r, Gauss-Newton where that points uphill, each step halved until it descends: (R_FS, costs)."""
+    """Newton on SO(3) for r'Sr - 2 h'r, Gauss-Newton where that points uphill, steps halved until they descend."""
     r = R_FS.ravel()
     gradient = S @ r - h
     costs = [r @ (gradient - h)]
@@ -559,11 +660,13 @@ def _turn(x, y, z, angle):
     """Rodrigues' formula for one rotation vector of known length, in plain floats: a tenth of the time of `exp_so3`."""
     a = math.sin(angle) / angle if angle > 1e-7 else 1.0
     b = (1 - math.cos(angle)) / angle**2 if angle > 1e-4 else 0.5
-    return np.array([
-        [1 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y],
-        [b * x * y + a * z, 1 - b * (x * x + z * z), b * y * z - a * x],
-        [b * x * z - a * y, b * y * z + a * x, 1 - b * (x * x + y * y)],
-    ])
+    return np.array(
+        [
+            [1 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y],
+            [b * x * y + a * z, 1 - b * (x * x + z * z), b * y * z - a * x],
+            [b * x * z - a * y, b * y * z + a * x, 1 - b * (x * x + y * y)],
+        ]
+    )
 
 
 def _right_angled():
@@ -581,7 +684,7 @@ _RIGHT_ANGLED = _right_angled()
 
 
 def _trimmed_start(R, t, x, target, rng):
-    """Weights 0 or 1 of the half of the poses that agree best, over random subsets refined by two concentration steps."""
+    """Weights 0 or 1 of the half of the poses that agree best, over random subsets refined by two steps."""
     n, size = len(R), min(len(R), 6 if target is None else 4)
     half = max((n + size) // 2 + 1, size) if n > size else n
     best, best_cost = None, np.inf

@@ -1,9 +1,9 @@
 """What a laser line scanner sees of a sphere: triangulation, circle through a scan line, sphere center from the circle.
 
-A scan line lies in the plane y = 0 of the sensor frame S: x along the line, z along the distance, both in mm. The plane cuts a sphere
-of radius R in a circle of radius r, and the center lies sqrt(R^2 - r^2) in front of the plane or behind it: the scan line alone does
-not say on which side. Source: thesis "Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", HAW Hamburg 2019, sections 2.2
-and 6.4.3, listings C15 and C16.
+A scan line lies in the plane y = 0 of the sensor frame S: x along the line, z along the distance, both in mm. The plane
+cuts a sphere of radius R in a circle of radius r, and the center lies sqrt(R^2 - r^2) in front of the plane or behind
+it: the scan line alone does not say on which side. Source: thesis "Optimierung bei der Kalibrierung von
+Sensor-Roboter-Systemen", HAW Hamburg 2019, sections 2.2 and 6.4.3, listings C15 and C16.
 """
 
 from typing import NamedTuple
@@ -17,7 +17,9 @@ MAX_STEPS = 50
 
 
 class Circle(NamedTuple):
-    """Circle through a scan line: center (x, z), radius, signed residuals (n,), covariance (3, 3) of x, z, radius, singular values."""
+    """Circle through a scan line: center (x, z), radius, signed residuals (n,), covariance (3, 3) of x, z, radius,
+    singular values.
+    """
 
     center: np.ndarray
     radius: float
@@ -27,7 +29,9 @@ class Circle(NamedTuple):
 
 
 class Sphere(NamedTuple):
-    """Sphere through points: center (3,), radius, signed residuals (n,), covariance (4, 4) of x, y, z, radius, singular values."""
+    """Sphere through points: center (3,), radius, signed residuals (n,), covariance (4, 4) of x, y, z, radius, singular
+    values.
+    """
 
     center: np.ndarray
     radius: float
@@ -39,7 +43,8 @@ class Sphere(NamedTuple):
 def triangulation_height(base, alpha, beta):
     """Height of a triangle over its base from the angles at both ends (rad), in the unit of `base`; broadcasts.
 
-    H = L tan(a) tan(b) / (tan(a) + tan(b)) = L sin(a) sin(b) / sin(a + b); the second form also holds where an angle is 90 deg.
+    H = L tan(a) tan(b) / (tan(a) + tan(b)) = L sin(a) sin(b) / sin(a + b); the second form also holds where an angle is
+    90 deg.
 
     Raises
     ------
@@ -56,7 +61,8 @@ def triangulation_height(base, alpha, beta):
 
 
 def triangulation_std(base, alpha, beta, std_angle):
-    """Standard deviation of the height for independent errors `std_angle` (rad) of both angles, first order; broadcasts.
+    """Standard deviation of the height for independent errors `std_angle` (rad) of both angles, first order;
+    broadcasts.
 
     dH/da = L sin(b)^2 / sin(a + b)^2: with a fixed base the error grows with the square of the distance.
     """
@@ -69,7 +75,8 @@ def triangulation_std(base, alpha, beta, std_angle):
 def fit_circle_algebraic(x, z):
     """Circle by the linear equations x^2 + z^2 + a1 x + a2 z + a3 = 0.
 
-    Minimizes an algebraic error, the distance weighted by about twice the radius: quick, but on a short arc it comes out too small.
+    Minimizes an algebraic error, the distance weighted by about twice the radius: quick, but on a short arc it comes
+    out too small.
 
     Returns
     -------
@@ -95,7 +102,8 @@ def fit_circle(x, z, std=None):
     x, z : array-like, shape (n,)
         Points of the scan line, n >= 3.
     std : float, optional
-        Standard deviation of a point across the arc; without it the residuals give the scale of the covariance (n >= 4).
+        Standard deviation of a point across the arc; without it the residuals give the scale of the covariance (n >=
+        4).
 
     Returns
     -------
@@ -106,7 +114,8 @@ def fit_circle(x, z, std=None):
     ValueError
         When fewer than three points come, or they are collinear.
 
-    Source: thesis, section 6.4.3, which uses the algebraic circle; the geometric one is the maximum-likelihood estimate.
+    Source: thesis, section 6.4.3, which uses the algebraic circle; the geometric one is the maximum-likelihood
+    estimate.
     """
     center, radius = fit_circle_algebraic(x, z)
     points = _profile(x, z)
@@ -116,7 +125,7 @@ def fit_circle(x, z, std=None):
 
 
 def fit_sphere(points, std=None):
-    """Sphere by geometric least squares from its algebraic start; points (n, 3), n >= 4 and not in one plane -> Sphere."""
+    """Sphere by geometric least squares from its algebraic start; points (n, 3), n >= 4 and not in one plane."""
     points = as_points(points, "points")
     if points.ndim != 2 or len(points) < 4:
         raise ValueError(f"points must have shape (n >= 4, 3), got {points.shape}")
@@ -125,7 +134,10 @@ def fit_sphere(points, std=None):
     p = (points - middle) / scale
     flatness = np.linalg.svd(p, compute_uv=False)
     if flatness[2] <= MIN_SAGITTA * flatness[0]:
-        raise ValueError(f"points must not lie in one plane: the third singular value is {flatness[2] / flatness[0]:.1e} of the first")
+        raise ValueError(
+            f"points must not lie in one plane: the third singular value is {flatness[2] / flatness[0]:.1e} of the "
+            "first"
+        )
     a = np.linalg.lstsq(np.column_stack([p, np.ones(len(p))]), -(p * p).sum(1), rcond=None)[0]
     center = -0.5 * a[:3]
     start = np.append(middle + scale * center, scale * np.sqrt(max(center @ center - a[3], 0.0)))
@@ -135,7 +147,8 @@ def fit_sphere(points, std=None):
 
 
 def center_offset(radius, circle_radius):
-    """Distance of the center of a sphere from a plane that cuts it in a circle of `circle_radius`, sqrt(R^2 - r^2); broadcasts.
+    """Distance of the center of a sphere from a plane that cuts it in a circle of `circle_radius`, sqrt(R^2 - r^2);
+    broadcasts.
 
     Raises
     ------
@@ -146,14 +159,17 @@ def center_offset(radius, circle_radius):
     """
     R, r = as_positive(radius, "radius"), as_positive(circle_radius, "circle_radius")
     if (r > R).any():
-        raise ValueError(f"the circle must not be larger than the sphere: radius {np.min(R):g} mm, circle {np.max(r):.6g} mm")
+        raise ValueError(
+            f"the circle must not be larger than the sphere: radius {np.min(R):g} mm, circle {np.max(r):.6g} mm"
+        )
     return np.sqrt((R - r) * (R + r))
 
 
 def offset_sensitivity(radius, circle_radius):
     """How errors of R and r move the center across the plane: (dd/dR, dd/dr) = (R, -r) / d.
 
-    Both grow without bound as the plane approaches the equator (r -> R): there a circle error of 0.01 mm is one of millimeters.
+    Both grow without bound as the plane approaches the equator (r -> R): there a circle error of 0.01 mm is one of
+    millimeters.
     """
     d = center_offset(radius, circle_radius)
     with np.errstate(divide="ignore"):
@@ -170,7 +186,8 @@ def sphere_center_from_profile(x, z, radius, side):
     radius : float
         Radius of the sphere (mm).
     side : {+1, -1}
-        Sign of the y coordinate of the center. The scan line cannot tell: tilt the scanner and watch whether the arc grows.
+        Sign of the y coordinate of the center. The scan line cannot tell: tilt the scanner and watch whether the arc
+        grows.
 
     Returns
     -------
@@ -190,7 +207,9 @@ def sphere_center_from_profile(x, z, radius, side):
 
 
 def profile_center_covariance(radius, circle, side, std_radius=0.0):
-    """First-order covariance (3, 3) of the center that `sphere_center_from_profile` finds, from a `Circle` and the radius' error."""
+    """First-order covariance (3, 3) of the center that `sphere_center_from_profile` finds, from a `Circle` and the
+    radius' error.
+    """
     by_R, by_r = offset_sensitivity(radius, circle.radius)
     J = np.zeros((3, 4))  # columns: circle x, z, r, sphere radius
     J[0, 0], J[2, 1], J[1, 2], J[1, 3] = 1.0, 1.0, side * by_r, side * by_R
@@ -236,8 +255,10 @@ def _profile(x, z):
     points = np.column_stack([x, z])
     spread = np.linalg.svd(points - points.mean(0), compute_uv=False)
     if spread[1] <= MIN_SAGITTA * spread[0]:
-        raise ValueError("the points are collinear: the second singular value is "
-                         f"{spread[1] / max(spread[0], np.finfo(float).tiny):.1e} of the first, so no circle is fixed")
+        raise ValueError(
+            "the points are collinear: the second singular value is "
+            f"{spread[1] / max(spread[0], np.finfo(float).tiny):.1e} of the first, so no circle is fixed"
+        )
     return points
 
 
@@ -268,7 +289,9 @@ def _geometric(points, start):
 
 
 def _uncertainty(J, residuals, std):
-    """Covariance s0^2 (J'J)^-1 and singular values of J; s0 is `std`, or comes from the residuals where there are enough."""
+    """Covariance s0^2 (J'J)^-1 and singular values of J; s0 is `std`, or comes from the residuals where there are
+    enough.
+    """
     _, s, Vt = np.linalg.svd(J, full_matrices=False)
     dof = J.shape[0] - J.shape[1]
     if std is not None:
