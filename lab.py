@@ -110,7 +110,11 @@ def command(verb, python, rest):
 
 
 def set_up(root):
-    """The Python of `.venv`, made ready; does nothing when the stamp says that it is."""
+    """The Python of `.venv`, made ready; does nothing when the stamp says that it is.
+
+    Without any stamp (interrupted, or of another Python) the environment is made anew. When pip gives up, as it does
+    before it changes anything, the environment stays and the next run installs into it.
+    """
     folder = root / ".venv"
     python = venv_python(folder)
     stamp_file = folder / "labkit-stamp.json"
@@ -119,8 +123,13 @@ def set_up(root):
         return str(python)
     if read_stamp(stamp_file).get("python") != version or not works(python, "-m", "pip", "--version"):
         make_venv(folder)
-    stamp_file.unlink() if stamp_file.exists() else None
-    install(python, root)
+    if stamp_file.exists():
+        stamp_file.unlink()
+    try:
+        install(python, root)
+    except Refusal:
+        stamp_file.write_text(json.dumps({"python": version_of(python)}), encoding="utf-8")
+        raise
     settings = folder / "share" / "jupyter" / "lab" / "settings"
     settings.mkdir(parents=True, exist_ok=True)
     (settings / "overrides.json").write_text(json.dumps(OVERRIDES, indent=1) + "\n", encoding="utf-8")
@@ -235,20 +244,24 @@ def lab_options(arguments):
 def start_lab(python, options, passed_on):
     """Open JupyterLab on the first notebook and wait until it ends."""
     port = choose_port(options.ip, options.port)
-    words = [
+    words = lab_command(python, options.ip, port, options.no_browser) + passed_on
+    print(f"JupyterLab opens at port {port}; stop it with Ctrl-C in this window.", flush=True)
+    return call(words, JUPYTERLAB_WORKSPACES_DIR=str(ROOT / ".lab" / "workspaces"), JUPYTER_PREFER_ENV_PATH="1")
+
+
+def lab_command(python, ip, port, no_browser):
+    """The command line that opens JupyterLab on the first notebook; the token stays on."""
+    return [
         python,
         "-m",
         "jupyterlab",
         f"--ServerApp.root_dir={ROOT}",
-        f"--ServerApp.ip={options.ip}",
+        f"--ServerApp.ip={ip}",
         f"--ServerApp.port={port}",
         f"--LabApp.default_url=/lab/tree/{FIRST_NOTEBOOK}",
         "--LabApp.extension_manager=readonly",
-        *(["--no-browser"] if options.no_browser else []),
-        *passed_on,
+        *(["--no-browser"] if no_browser else []),
     ]
-    print(f"JupyterLab opens at port {port}; stop it with Ctrl-C in this window.", flush=True)
-    return call(words, JUPYTERLAB_WORKSPACES_DIR=str(ROOT / ".lab" / "workspaces"), JUPYTER_PREFER_ENV_PATH="1")
 
 
 def choose_port(ip, wanted=None):
@@ -285,7 +298,7 @@ def is_free(ip, port):
 
 def call(words, **environment):
     """Run a command in this folder until it ends, handing signals on; returns its exit code."""
-    process = subprocess.Popen(words, cwd=str(ROOT), env={**os.environ, "PYTHONUTF8": "1", **environment})
+    process = subprocess.Popen(words, cwd=str(ROOT), env={"PYTHONUTF8": "1", **environment, **os.environ})
     if hasattr(signal, "SIGTERM"):
         signal.signal(signal.SIGTERM, lambda number, frame: process.terminate())
     while True:

@@ -75,6 +75,7 @@ async def execute(notebook, chapter, folder, strict=True):
         timeout=SECONDS_A_CELL,
         record_timing=False,
         coalesce_streams=True,
+        extra_arguments=["--log-level=ERROR"],
         on_cell_start=lambda cell, cell_index: running.append(cell.id),
         resources={"metadata": {"path": str(folder)}},
     )
@@ -105,13 +106,17 @@ def kernel_environment(scratch, strict):
 
 
 def clean(notebook, chapter):
-    """Take from executed cells what changes from run to run or machine to machine; refuse what cannot be taken."""
+    """Take from executed cells what changes from run to run or machine to machine; refuse what cannot be taken.
+
+    Outputs that nbval is told to ignore are not stored at all.
+    """
     notebook.metadata.pop("widgets", None)
     notebook.metadata["language_info"] = {"name": "python"}
     for cell in notebook.cells:
         cell.metadata.pop("execution", None)
         if cell.cell_type == "code":
-            cell.outputs = [output for output in cell.outputs if _keep(output)]
+            ignored = "nbval-ignore-output" in cell.metadata.get("tags", [])
+            cell.outputs = [output for output in cell.outputs if _keep(output) and not ignored]
             for output in cell.outputs:
                 _refuse_unstable(output, f"{chapter}, cell {cell.id!r}")
     return notebook

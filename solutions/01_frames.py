@@ -62,7 +62,8 @@ def normalize(v):
 # Three noisy points almost never form a right angle, so no orthonormal frame passes through all of them. The sheet repairs this with Gram-Schmidt
 # (*Schmidtsche Orthonormalisierung*). Before you see it move: decide what it does to the two measured edges.
 #
-# Then drag the six points. The gray stub is the part of the second edge that is thrown away, and the matrix beneath is $T_{K_0K_1}$. Try *Make it fail* too.
+# Then drag the six points, the y points above all. A hollow cross shows the part of the second edge that is thrown away, the dashed line what is kept, and the matrix beside it
+# is $T_{K_0K_1}$. Try *Make it fail* too.
 
 # %% predict-edges
 guess = ...  # your code here
@@ -129,7 +130,8 @@ def invert(T):
 
 
 # %% pseudo-inverse [markdown]
-# What does the pseudo-inverse cost? An iterative SVD of a 4×4 matrix instead of nine copied and nine multiplied numbers. Worse is what it *hides*: it
+# What does the pseudo-inverse cost? An iterative SVD instead of nine copied and nine multiplied numbers: about nine times the time, measured by
+# `tests/bench/inverse.py`. Worse is what it *hides*: it
 # accepts anything. Below, one digit of a matrix is mistyped, and then an axis is missing altogether. `np.linalg.pinv` returns numbers for both; the
 # workbook's `frames.invert` says what is wrong.
 

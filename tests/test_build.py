@@ -31,7 +31,12 @@ CHAPTER = textwrap.dedent('''\
 
     print("strict:", os.environ["LABKIT_STRICT"], "own progress:", "LABKIT_PROGRESS" in os.environ)
 
-    # %% picture tags=["nbval-ignore-output"]
+    # %% time tags=["nbval-ignore-output"]
+    import time
+
+    print(time.time())
+
+    # %% picture
     from IPython.display import HTML, Image, display
 
     display(Image(data=b"\\x89PNG\\r\\n\\x1a\\n", format="png"), HTML("<b>bold</b>"))
@@ -77,7 +82,7 @@ def test_two_builds_give_the_same_bytes(built):
 
 def test_the_blank_notebook_has_stubs_and_no_outputs(built):
     blank = cells(built[1][0][0])
-    assert list(blank) == ["intro", "double-code", "value", "mode", "picture", "scratch"]
+    assert list(blank) == ["intro", "double-code", "value", "mode", "time", "picture", "scratch"]
     assert "".join(blank["double-code"]["source"]).endswith('"""Twice x."""\n    ...  # your code here')
     assert "".join(blank["value"]["source"]).startswith("answer = ...  # your code here\nprint")
     code = [cell for cell in blank.values() if cell["cell_type"] == "code"]
@@ -86,7 +91,7 @@ def test_the_blank_notebook_has_stubs_and_no_outputs(built):
 
 def test_the_solved_notebook_is_executed_strictly_and_holds_text_only(built):
     solved = cells(built[1][0][1])
-    assert list(solved) == ["intro", "double-code", "value", "mode", "picture", "lecturer"]
+    assert list(solved) == ["intro", "double-code", "value", "mode", "time", "picture", "lecturer"]
     assert solved["value"]["outputs"][0]["text"] == ["the answer is 42\n"]
     assert solved["value"]["outputs"][1]["data"] == {"text/plain": ["42"]}
     assert solved["mode"]["outputs"][0]["text"] == ["strict: 1 own progress: True\n"]
@@ -95,8 +100,8 @@ def test_the_solved_notebook_is_executed_strictly_and_holds_text_only(built):
         ["text/html", "text/plain"],
     ]
     counts = [cell["execution_count"] for cell in solved.values() if cell["cell_type"] == "code"]
-    assert counts == [1, 2, 3, 4]
-    assert solved["picture"]["metadata"] == {"tags": ["nbval-ignore-output"]}
+    assert counts == [1, 2, 3, 4, 5]
+    assert solved["time"]["metadata"] == {"tags": ["nbval-ignore-output"]} and solved["time"]["outputs"] == []
 
 
 def test_metadata_says_python_and_no_version(built):

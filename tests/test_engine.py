@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from labkit import frames
 from labkit.course import guard, metrics, progress, session
 from labkit.course.ch01_frames import CHAPTER, random_pose
-from labkit.course.engine import CORRECT, NOT_YET, RAISED, TODO, Chapter, Exercise, Mistake, Prediction, Value
+from labkit.course.engine import CORRECT, NOT_YET, RAISED, TO_DO, Chapter, Exercise, Mistake, Prediction, Value
 
 INVERT = CHAPTER["invert"]
 
@@ -176,7 +176,7 @@ class Hostile:
         (unprintable, RAISED, "Unprintable"),
         (huge_view, NOT_YET, "got one of shape (100000, 100000, 3)"),
         (mutating, NOT_YET, "changes its argument `v`"),
-        (lambda v: None, TODO, ""),
+        (lambda v: None, TO_DO, ""),
         (lambda v: [] and v, NOT_YET, "expected an array of shape (3,), got shape (0,)"),
         (lambda v: np.full(3, np.nan), NOT_YET, "NaN in 3 of 3"),
         (lambda v: (x for x in v), NOT_YET, "generator"),
@@ -415,8 +415,8 @@ LENGTH = Value(
         (1000, None, NOT_YET, "rounded"),
         (-1234.5, None, NOT_YET, "sign"),
         (5, "deg", NOT_YET, "wanted in mm"),
-        (..., None, TODO, ""),
-        (None, None, TODO, ""),
+        (..., None, TO_DO, ""),
+        (None, None, TO_DO, ""),
         ("long", None, NOT_YET, "expected a number"),
         (np.nan, None, NOT_YET, "NaN"),
         ([1, 2], None, NOT_YET, "expected a number"),

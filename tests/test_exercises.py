@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from labkit.course import metrics, session, source
-from labkit.course.engine import CORRECT, NOT_YET, TODO, Exercise, Prediction, Value
+from labkit.course.engine import CORRECT, NOT_YET, TO_DO, Exercise, Prediction, Value
 
 CHAPTERS = session.chapters()
 ITEMS = [(chapter, item) for chapter in CHAPTERS for item in chapter.items]
@@ -45,7 +45,7 @@ def test_blank_is_to_do(chapter, item):
         """Docstring."""
         ...
 
-    assert item.judge(untouched).status == TODO
+    assert item.judge(untouched).status == TO_DO
 
 
 @mistakes(EXERCISES)
@@ -59,7 +59,7 @@ def test_each_mistake_gets_its_own_text(item, k):
 def test_value_accepts_the_reference_and_refuses_its_neighbors(chapter, item):
     expected = item.reference()
     assert item.judge(expected).status == CORRECT
-    assert item.judge(...).status == TODO
+    assert item.judge(...).status == TO_DO
     if item.metric is None:
         assert item.judge(np.float64(expected) + 3 * max(item.rtol * abs(expected), item.atol)).status == NOT_YET
 

@@ -163,7 +163,8 @@ def test_kuka_angles_are_unique_away_from_the_pole():
 
 
 def test_kuka_from_degrees():
-    np.testing.assert_allclose(frames.kuka_from_degrees([1, 2, 3, 180, 90, -45]), [1, 2, 3, np.pi, np.pi / 2, -np.pi / 4])
+    radians = frames.kuka_from_degrees([1, 2, 3, 180, 90, -45])
+    np.testing.assert_allclose(radians, [1, 2, 3, np.pi, np.pi / 2, -np.pi / 4])
 
 
 def test_quaternion_against_scipy():

@@ -161,6 +161,11 @@ def test_constraints_hold_no_address():
     )
 
 
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.stem)
+def test_the_readme_lists_every_chapter(path):
+    assert f"| {int(path.stem[:2])} | `{path.stem}` |" in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
 def test_ruff_is_content():
     ruff = subprocess.run(
         [sys.executable, "-m", "ruff", "check", "--output-format=concise", "."],

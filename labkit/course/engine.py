@@ -16,7 +16,7 @@ import numpy as np
 
 from . import guard, metrics
 
-TODO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
+TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
 TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws
 UNITS = {
     "mm": ("length", 1e-3),
@@ -96,7 +96,7 @@ class Exercise(Item):
         """Run the student's function on fresh draws and say what came out; never raises, whatever the function does."""
         rng = np.random.default_rng() if rng is None else rng
         if is_blank(function):
-            return Outcome(TODO)
+            return Outcome(TO_DO)
         if not callable(function):
             return Outcome(NOT_YET, f"expected a function, got {metrics._describe(function)}.")
         trial = _Trial(self, function)
@@ -222,7 +222,7 @@ class _Trial:
     def _raised(self, run, args):
         error = run.error
         if isinstance(error, NotImplementedError):
-            return self.outcome(TODO)
+            return self.outcome(TO_DO)
         if isinstance(error, guard.TimeLimit):
             text = f"your code did not finish within {guard.TIME_LIMIT:.0f} s: is there a loop without an end?"
             return self.outcome(NOT_YET, text)
@@ -324,7 +324,7 @@ class Value(Item):
     def judge(self, answer, unit=None, rng=None):
         """Compare a number with the reference, in any unit of the same kind; never raises."""
         if is_blank(answer):
-            return Outcome(TODO)
+            return Outcome(TO_DO)
         if self.metric is not None:
             return self._judge_with(self.metric, self.reference(), answer)
         expected, metric = self.measure()

@@ -5,11 +5,11 @@ import html
 import ipywidgets
 from IPython.display import display
 
-from .engine import CORRECT, NOT_YET, RAISED, TODO
+from .engine import CORRECT, NOT_YET, RAISED, TO_DO
 
-SIGNS = {TODO: "○", NOT_YET: "✗", CORRECT: "✓", RAISED: "!"}
+SIGNS = {TO_DO: "○", NOT_YET: "✗", CORRECT: "✓", RAISED: "!"}
 COLORS = {
-    TODO: "--jp-info-color1",
+    TO_DO: "--jp-info-color1",
     NOT_YET: "--jp-warn-color1",
     CORRECT: "--jp-success-color1",
     RAISED: "--jp-error-color1",

@@ -11,7 +11,7 @@ import ipywidgets
 
 from ..tables import DATA
 from . import engine, feedback, guard, progress, source
-from .engine import CORRECT, NOT_YET, RAISED, TODO, Prediction, Value
+from .engine import CORRECT, NOT_YET, RAISED, TO_DO, Prediction, Value
 from .feedback import Named, Panel
 
 SOLUTIONS = DATA.parent / "solutions"
@@ -101,7 +101,8 @@ class Bound:
         self._hints_seen = 0
 
     def __repr__(self):
-        return f"exercise {self._item.id}: @ex.{self._item.id} checks it; ask .hint(), .solution(), .starter(), .reset()"
+        name = self._item.id
+        return f"exercise {name}: check with `@ex.{name}`, or ask .hint(), .solution(), .starter(), .reset()"
 
     def __call__(self, answer, unit=None):
         """Check an answer, say what came out, and return what later cells go on with: the answer, or the reference."""
@@ -223,7 +224,8 @@ def ask(chapter, item, answer, reveal):
     locked = [e["answer"] for e in progress.of(chapter.name, item.id) if e["event"] == "predicted" and "answer" in e]
     if is_strict():
         if engine.is_blank(answer) or not item.is_right(item.read(answer)):
-            raise NotCorrect(f"{item.id}: the prediction is {TODO if engine.is_blank(answer) else 'not the right one'}")
+            missing = TO_DO if engine.is_blank(answer) else "not the right one"
+            raise NotCorrect(f"{item.id}: the prediction is {missing}")
         locked = []
     given = None
     if not engine.is_blank(answer):
@@ -241,7 +243,7 @@ def ask(chapter, item, answer, reveal):
 
 
 def _locked_panel(chapter, item, choice, first):
-    if first and not is_strict():
+    if first:
         progress.record(chapter.name, item.id, "predicted", answer=choice)
     unit = f" {item.unit}" if item.unit else ""
     verdict = "That is what happens." if item.is_right(choice) else f"What happens: {item.answer}{unit}."
@@ -250,7 +252,7 @@ def _locked_panel(chapter, item, choice, first):
 
 def _question(chapter, item, reveal):
     """The question with a button for each choice; a click locks it in and puts the figure beneath."""
-    text = ipywidgets.HTML(Panel(f"{item.id}: predict first", [item.question], TODO).html())
+    text = ipywidgets.HTML(Panel(f"{item.id}: predict first", [item.question], TO_DO).html())
     answers = ipywidgets.HBox(layout=ipywidgets.Layout(flex_flow="row wrap"))
     box = Named(
         [text, answers], f"[predict first: {item.question} {' | '.join(map(str, item.choices))}]".replace(" ]", "]")

@@ -18,7 +18,7 @@ from ..figures import style
 
 CSS_DPI = 100  # a figure inch is 100 CSS pixels: 10 pt text is as large as the notebook's own
 MAX_RATIO = 2.5  # device pixels per CSS pixel; sharper screens see no difference
-MIN_SCALE = 0.72  # a narrower cell shrinks the whole picture, letters too, instead of crowding it further
+MIN_SCALE = 0.85  # a narrower cell shrinks the whole picture, letters too, instead of crowding it further
 MAX_WORDS = 3000  # bitmaps a figure keeps
 
 DRAWING = threading.RLock()  # widget messages may arrive on another thread than the cells, and matplotlib is not thread-safe

@@ -85,9 +85,8 @@ def three_points():
             words.set_text(
                 f"angle      {result['angle_deg']:.2f} deg\n"
                 f"distance  {result['distance']:.3f}\n"
-                f"noise of {NOISE_OF_A_TAPE} in each coordinate\n"
-                f"turns K0 about x by {_degrees(result['roll_deg'][0])},\n"
-                f"turns K1 about x by {_degrees(result['roll_deg'][1])}"
+                f"noise of {NOISE_OF_A_TAPE} rolls K0 by\n{_degrees(result['roll_deg'][0])} about its x axis,\n"
+                f"K1 by {_degrees(result['roll_deg'][1])}"
             )
 
         moving = [a for item in (*constructions, *triads, matrix) for a in item.artists]
@@ -232,7 +231,7 @@ def kuka_gimbal():
         style.bare(right)
         rows = (
             ("set (A, B, C)", "deg"), ("read back from the pose", "deg"),
-            ("singular values of the rates", ""), ("weakest change (A, B, C)", "moves the pose least"),
+            ("singular values of the rates", ""), ("weakest change of (A, B, C)", ""),
         )  # fmt: skip
         numbers = []
         for k, (heading, unit) in enumerate(rows):
@@ -293,7 +292,7 @@ def svd_against_gram_schmidt():
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.15, 1))
-        style.axes(left, "x (mm)", "y (mm)", "the triangle, measured 400 times", equal=True)
+        style.axes(left, "x (mm)", "y (mm)", "measured 400 times", equal=True)
         left.set(xlim=(-25, 135), ylim=(-20, 105))
         (cloud,) = left.plot([], [], **style.look("measurement", marker=".", markersize=3, markeredgewidth=0, alpha=0.6))
         (edges,) = left.plot([], [], **style.look("truth"))

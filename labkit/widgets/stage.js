@@ -37,12 +37,14 @@ function render({ model, el }) {
   let pending = {};
   let flight = null;
   let timer = 0;
+  let sent = 0;
   let count = 0;
   let shown = 0;
 
   function flush() {
     if (flight !== null || Object.keys(pending).length === 0) return;
     flight = `${view}:${++count}`;
+    sent = performance.now();
     model.send({ ...pending, shown, serial: flight });
     pending = {};
     timer = setTimeout(() => { flight = null; flush(); }, PATIENCE);
@@ -73,8 +75,8 @@ function render({ model, el }) {
         console.error("stage: the picture could not be decoded", error);
       }
       shown = message.picture;
+      root.dataset.python = message.milliseconds;
       root.dataset.picture = message.picture;
-      root.dataset.milliseconds = message.milliseconds;
       if (flight === null && Object.keys(pending).length === 0) model.send({ shown });
       flush();
     }
@@ -86,6 +88,7 @@ function render({ model, el }) {
     if (message.serial !== null && message.serial === flight) {
       flight = null;
       clearTimeout(timer);
+      root.dataset.answer = (performance.now() - sent).toFixed(1); // ms, for the benchmark
     }
     newest = { message, buffer: buffers[0] };
     draw();
@@ -95,7 +98,8 @@ function render({ model, el }) {
     picture.style.width = `${message.width}px`;
     canvas.dataset.empty = message.empty;
     canvas.dataset.click = message.click;
-    if (message.empty === "drive" || message.empty === "turn") canvas.tabIndex = 0;
+    canvas.dataset.keys = message.keys;
+    if (message.keys || message.empty === "turn") canvas.tabIndex = 0;
     canvas.setAttribute("aria-label", [message.name, message.caption].filter(Boolean).join(": "));
     if (caption.textContent !== message.caption) {
       caption.textContent = message.caption;
@@ -233,7 +237,7 @@ function render({ model, el }) {
     if (!arrow || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
     event.stopPropagation();
-    if (canvas.dataset.empty === "drive") {
+    if (canvas.dataset.keys === "true") {
       add("arrows", (names = []) => [...names, NAMES[event.key]].slice(-MAX_ARROWS));
     } else if (canvas.dataset.empty === "turn") {
       const size = event.shiftKey ? 60 : 10;

@@ -117,7 +117,7 @@ class slider:
             "value": self.value,
             "description": self.label or name,
             "style": {"description_width": "initial"},
-            "layout": {"width": "22em", "max_width": "100%"},
+            "layout": _wide(self.label or name),
         }
         if self.integer:
             return ipywidgets.IntSlider(min=self.low, max=self.high, step=self.step or 1, **options)
@@ -153,7 +153,7 @@ class choice:
         return kind(
             options=self._pairs, value=self.value, description=self.label or name,
             style={"description_width": "initial", **({"button_width": "auto"} if len(self._pairs) <= 3 else {})},
-            layout={"width": "auto", "max_width": "100%"},
+            layout={"width": "max-content", "max_width": "100%"},
         )  # fmt: skip
 
 
@@ -245,6 +245,7 @@ class Stage(ipywidgets.VBox):
         self.result, self.status, self.caption = None, "", ""
         self._front, self._sent, self._shown, self._waiting = _Front(), 0, 0, False
         self._attached = self._showing = False
+        self._received = monotonic()
         self._picture = Picture(scene, size)
         self._correct(set(self._state))
         self.initial = dict(self._state)
@@ -398,7 +399,7 @@ class Stage(ipywidgets.VBox):
         self._play_widget.observe(lambda change: self._on_time(change["new"] * self._play.dt), "value")
         self._time = ipywidgets.FloatSlider(
             min=0.0, max=self._play.t_max, step=self._play.dt, description="t (s)", readout_format=".2f", disabled=bool(self._advance),
-            style={"description_width": "initial"}, layout={"width": "22em", "max_width": "100%"},
+            style={"description_width": "initial"}, layout=_wide("t (s)"),
         )  # fmt: skip
         self._time.observe(lambda change: self._on_time(change["new"]), "value")
         return _row([self._play_widget, self._time])
@@ -425,6 +426,7 @@ class Stage(ipywidgets.VBox):
     def _receive(self, message):
         """One message of the browser: everything that happened since the last one, merged."""
         with DRAWING:
+            self._received = monotonic()
             self._shown = max(self._shown, message.get("shown", 0))
             if "look" in message:
                 self._attached, self._shown = True, self._sent
@@ -442,11 +444,10 @@ class Stage(ipywidgets.VBox):
             changes[key] = self._moved(key, to=fraction)
         for key, steps in message.get("step", {}).items():
             changes[key] = self._moved(key, steps=steps)
-        arrows = message.get("arrows", [])
         if "orbit" in message and "view" in self._state:
             changes["view"] = self._state["view"].turned(*(ORBIT_DEG_PER_PIXEL * np.array(message["orbit"])))
-        elif arrows and self._keys:
-            events += arrows
+        if self._keys:
+            events += message.get("arrows", [])
         if "click" in message and self._click is not None:
             ax = self._picture.fig.axes[self._click]
             if ax.in_axes(_at(self._picture, message["click"])):
@@ -482,7 +483,6 @@ class Stage(ipywidgets.VBox):
             return
         self._waiting = False
         self._sent += 1
-        start = monotonic()
         png = self._picture.png()
         front = {
             "picture": self._sent,
@@ -492,9 +492,10 @@ class Stage(ipywidgets.VBox):
             "name": self.name,
             "caption": self.caption,
             "status": self.status,
-            "empty": "drive" if self._keys else "turn" if "view" in self._state else "draw" if self._brush is not None else "",
+            "empty": "turn" if "view" in self._state else "draw" if self._brush is not None else "",
+            "keys": self._keys,
             "click": self._click is not None,
-            "milliseconds": round(1e3 * (monotonic() - start), 2),
+            "milliseconds": round(1e3 * (monotonic() - self._received), 1),
         }
         self._front.send(front, [png])
 
@@ -525,6 +526,11 @@ class Stage(ipywidgets.VBox):
     def _repr_mimebundle_(self, **kwargs):
         bundle = super()._repr_mimebundle_(**kwargs)
         return {**bundle, "text/plain": self._text, "image/png": self.png()}
+
+
+def _wide(label):
+    """Room for a label, the track of a slider and its number."""
+    return {"width": f"{18 + 0.55 * len(label):.0f}em", "max_width": "100%"}
 
 
 def _frozen(array):

@@ -1,0 +1,249 @@
+"""Latency of every Stage in real JupyterLab: from a key press or a drag to the new picture, decoded and drawn, in headless Chromium.
+
+    python tests/bench/stage_latency.py [--only NAME ...] [--events 40] [--shots DIR] [--chromium PATH]
+
+Finds all functions in labkit.widgets.* that return a Stage without arguments, puts them into one generated notebook, starts JupyterLab with
+fresh settings on a free port, runs all cells, moves each Stage (first handle by arrow keys and by mouse; otherwise the first slider, or
+the view), and prints in milliseconds, per Stage and way of moving it: median and 95th percentile of event to picture; medians of message to
+answer in the page and of message to answer in the kernel; and without a browser, compute with update, and drawing with PNG.
+With --shots it also takes a screenshot of each Stage in the light and the dark theme, wide and narrow.
+"""
+
+import argparse
+import importlib
+import inspect
+import json
+import os
+import pkgutil
+import secrets
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+FLAGS = (
+    "--no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking --disable-component-update"
+    " --disable-sync"
+).split()
+TARGET_MS = 50.0
+WARM_UP = 4
+
+# the page notes when an event was sent and when the picture after it was drawn: everything between is the latency
+WATCH = """(root) => {
+    const stage = root.querySelector(".labkit-stage");
+    window.__latencies = []; window.__sent = null;
+    const note = () => { if (window.__sent === null) window.__sent = performance.now(); };
+    for (const type of ["keydown", "pointermove"]) root.addEventListener(type, note, true);
+    new MutationObserver(() => {
+        if (window.__sent !== null) { window.__latencies.push([performance.now() - window.__sent, +stage.dataset.answer, +stage.dataset.python]);
+            window.__sent = null;
+        }
+    }).observe(stage, {attributes: true, attributeFilter: ["data-picture"]});
+}"""
+
+
+def stages():
+    """[(module, function name)] of all functions in labkit.widgets that return a Stage without arguments."""
+    sys.path.insert(0, str(ROOT))
+    import labkit.widgets
+    from labkit.widgets.stage import Stage
+
+    found = []
+    for info in pkgutil.iter_modules(labkit.widgets.__path__):
+        module = importlib.import_module(f"labkit.widgets.{info.name}")
+        for name, function in vars(module).items():
+            if (
+                inspect.isfunction(function) and function.__module__ == module.__name__
+                and not name.startswith(("_", "compute"))
+                and all(p.default is not p.empty for p in inspect.signature(function).parameters.values())
+                and isinstance(function(), Stage)
+            ):  # fmt: skip
+                found.append((info.name, name))
+    return found
+
+
+def python_part(module, name, repetitions=30):
+    """Median milliseconds of (compute and update, picture and PNG), without a browser."""
+    stage = getattr(importlib.import_module(f"labkit.widgets.{module}"), name)()
+    stage._picture.fit(700, 1.0, False)
+    times = []
+    for _ in range(repetitions):
+        start = time.perf_counter()
+        stage.set()
+        middle = time.perf_counter()
+        stage.png()
+        times.append((middle - start, time.perf_counter() - middle))
+    return 1e3 * np.median(times, axis=0)
+
+
+def notebook(chosen):
+    cells = [
+        {"cell_type": "code", "execution_count": None, "id": f"{module}-{name}".replace("_", "-")[:60], "metadata": {},
+         "outputs": [], "source": f"from labkit.widgets import {module}\n{module}.{name}()"}
+        for module, name in chosen
+    ]  # fmt: skip
+    kernel = {"display_name": "Python 3", "language": "python", "name": "python3"}
+    return {"cells": cells, "metadata": {"kernelspec": kernel}, "nbformat": 4, "nbformat_minor": 5}
+
+
+class Lab:
+    """JupyterLab on a free port with fresh settings, in a folder of its own."""
+
+    def __init__(self, folder, content):
+        (folder / "stages.ipynb").write_text(json.dumps(content))
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            port = probe.getsockname()[1]
+        token = secrets.token_hex(16)
+        names = ("CONFIG_DIR", "DATA_DIR", "RUNTIME_DIR")
+        env = {**os.environ, **{f"JUPYTER_{n}": str(folder / n.lower()) for n in names}, "PYTHONPATH": str(ROOT)}
+        env["JUPYTERLAB_SETTINGS_DIR"] = str(folder / "settings")
+        env["JUPYTERLAB_WORKSPACES_DIR"] = str(folder / "workspaces")
+        notification = folder / "settings" / "@jupyterlab" / "apputils-extension"
+        notification.mkdir(parents=True)
+        (notification / "notification.jupyterlab-settings").write_text('{"fetchNews": "false", "checkForUpdates": false}')
+        self.log = open(folder / "lab.log", "w")  # noqa: SIM115
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", f"--port={port}", "--port-retries=0",
+             f"--ServerApp.root_dir={folder}", f"--IdentityProvider.token={token}", "--LabApp.expose_app_in_browser=True"],
+            env=env, cwd=folder, stdout=self.log, stderr=self.log,
+        )  # fmt: skip
+        self.url = f"http://127.0.0.1:{port}/lab/tree/stages.ipynb?token={token}"
+        for _ in range(150):
+            try:
+                urllib.request.urlopen(f"http://127.0.0.1:{port}/api?token={token}", timeout=1).read()
+                return
+            except OSError:
+                time.sleep(0.2)
+        raise RuntimeError(f"JupyterLab did not start: {(folder / 'lab.log').read_text()[-2000:]}")
+
+    def close(self):
+        self.process.terminate()
+        self.process.wait(20)
+        self.log.close()
+
+
+def run_all(page, url, count):
+    """Open the notebook, run all cells, wait until every Stage has its picture."""
+    page.goto(url)
+    page.wait_for_selector(".jp-Notebook .jp-Cell", timeout=60000)
+    page.wait_for_function("document.querySelector('#jp-main-statusbar')?.textContent.includes('| Idle')", timeout=60000)
+    page.wait_for_timeout(1500)
+    page.evaluate("() => { window.jupyterapp.commands.execute('notebook:run-all-cells'); }")
+    for k in range(count):  # cells far below are rendered only when scrolled to
+        page.evaluate(f"() => document.querySelectorAll('.jp-Notebook .jp-Cell')[{k}]?.scrollIntoView()")
+        page.wait_for_timeout(200)
+    page.wait_for_function(
+        f"document.querySelectorAll('.labkit-stage[data-picture]').length >= {count}", timeout=120000
+    )
+
+
+def stage_of(page, k):
+    output = page.locator(".jp-Notebook .jp-Cell").nth(k).locator(".jp-OutputArea")
+    output.locator(".labkit-stage[data-picture]").wait_for(timeout=30000)
+    output.scroll_into_view_if_needed()
+    page.wait_for_timeout(400)
+    return output
+
+
+def latencies(page, output, events):
+    """{way: milliseconds of each event} for one Stage."""
+    output.evaluate(WATCH)
+    handle, found = output.locator(".labkit-stage .handle").first, {}
+
+    def collect(way, act):
+        page.evaluate("() => { window.__latencies = []; window.__sent = null; }")
+        for k in range(events + WARM_UP):
+            act(k)
+            page.wait_for_timeout(90)
+        found[way] = page.evaluate("() => window.__latencies")[WARM_UP:]
+
+    def arrow(k):
+        page.keyboard.press(("ArrowLeft", "ArrowUp", "ArrowRight", "ArrowDown")[k % 4])
+
+    if handle.count():
+        handle.focus()
+        collect("key", arrow)
+        box = handle.bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        page.mouse.move(x, y)
+        page.mouse.down()
+        collect("drag", lambda k: page.mouse.move(x + 3 * (k % 5), y - 2 * (k % 7)))
+        page.mouse.up()
+    slider = output.locator(".noUi-handle").first
+    if slider.count():
+        slider.focus()
+        collect("slider", lambda k: page.keyboard.press(("ArrowLeft", "ArrowRight")[k % 2]))
+    canvas = output.locator(".labkit-stage canvas[tabindex='0']").first
+    if canvas.count():
+        canvas.focus()
+        collect("picture", arrow)
+    return found
+
+
+def shoot(page, chosen, folder):
+    """Screenshots of all Stages: light and dark, wide and narrow."""
+    for theme in ("JupyterLab Light", "JupyterLab Dark"):
+        page.evaluate(f"() => {{ window.jupyterapp.commands.execute('apputils:change-theme', {{theme: '{theme}'}}); }}")
+        page.wait_for_timeout(1500)
+        for width in (1280, 700):
+            page.set_viewport_size({"width": width, "height": 1000})
+            page.wait_for_timeout(800)
+            for k, (module, name) in enumerate(chosen):
+                output = stage_of(page, k)
+                page.wait_for_timeout(300)
+                output.screenshot(path=str(folder / f"{module}-{name}-{theme.split()[1].lower()}-{width}.png"))
+    page.evaluate("() => { window.jupyterapp.commands.execute('apputils:change-theme', {theme: 'JupyterLab Light'}); }")
+    page.set_viewport_size({"width": 1280, "height": 1000})
+    page.wait_for_timeout(1500)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", nargs="*", default=[], help="module or function names")
+    parser.add_argument("--events", type=int, default=40)
+    parser.add_argument("--shots", type=Path)
+    parser.add_argument("--ratio", type=float, default=1.0, help="device pixels per CSS pixel")
+    parser.add_argument("--chromium", default=shutil.which("chromium") or shutil.which("chromium-browser"))
+    options = parser.parse_args()
+    from playwright.sync_api import sync_playwright
+
+    chosen = [(m, n) for m, n in stages() if not options.only or m in options.only or n in options.only]
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as play:
+        lab = Lab(Path(folder), notebook(chosen))
+        browser = play.chromium.launch(executable_path=options.chromium, args=FLAGS)
+        try:
+            page = browser.new_page(viewport={"width": 1280, "height": 1000}, device_scale_factor=options.ratio)
+            page.on("console", lambda m: print("console:", m.text) if m.type == "error" else None)
+            page.on("pageerror", lambda error: print("page error:", error))
+            run_all(page, lab.url, len(chosen))
+            if options.shots:
+                options.shots.mkdir(parents=True, exist_ok=True)
+                shoot(page, chosen, options.shots)
+            print(f"{'Stage':44s} {'way':8s} {'n':>3s} {'median':>7s} {'95 %':>7s} {'answer':>7s} {'kernel':>7s} {'compute':>7s} {'draw':>6s}")
+            slow = 0
+            for k, (module, name) in enumerate(chosen):
+                apply, draw = python_part(module, name)
+                for way, ms in latencies(page, stage_of(page, k), options.events).items():
+                    median, answer, python = np.median(ms, axis=0)
+                    high = np.percentile(np.array(ms)[:, 0], 95)
+                    slow += not high <= TARGET_MS
+                    print(
+                        f"{module + '.' + name:44s} {way:8s} {len(ms):3d} {median:7.1f} {high:7.1f} {answer:7.1f} {python:7.1f}"
+                        f" {apply:7.1f} {draw:6.1f}"
+                    )
+            print(f"{slow} rows above {TARGET_MS:.0f} ms at the 95th percentile" if slow else "all within the target")
+        finally:
+            browser.close()
+            lab.close()
+
+
+if __name__ == "__main__":
+    main()
