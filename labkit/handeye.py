@@ -351,8 +351,7 @@ def tukey_weights(lengths, std, cut=TUKEY_CUT):
 
 
 def leave_one_out(T_BF, x_S, robust=False):
-    """Residual vectors (N, 3) of each pose under the calibration from the others: what the result is worth elsewhere.
-    """
+    """Residual vectors (N, 3) of each pose under the calibration from the others: what it is worth elsewhere."""
     T_BF, x_S = as_transforms(T_BF, "T_BF"), as_points(x_S, "x_S")
     found = []
     for i in range(len(T_BF)):
@@ -522,8 +521,7 @@ def _rms(residuals):
 
 
 def _reduce(R, t, x, w, target):
-    """The cost without translation and target, r'Sr - 2 h'r + c in the entries r of R_FS, and how to get both back.
-    """
+    """The cost without translation and target, r'Sr - 2 h'r + c in the entries r of R_FS, and how to get both back."""
     total = w.sum()
     x_mean = w @ x / total
     dx = x - x_mean
@@ -604,8 +602,7 @@ def _solve(R, t, x, w, target):
 
 
 def _rotation_start(S, h):
-    """Rotation next to the unconstrained minimum S^-1 h, or the best of the 24 right-angled ones where S is singular.
-    """
+    """Rotation next to the unconstrained minimum S^-1 h, or the best of 24 right-angled ones where S is singular."""
     values, vectors = np.linalg.eigh(S)
     if values[0] > 1e-9 * values[8]:
         return _polar(((vectors / values) @ (h @ vectors)).reshape(3, 3))
@@ -684,24 +681,25 @@ _RIGHT_ANGLED = _right_angled()
 
 
 def _trimmed_start(R, t, x, target, rng):
-    """Weights 0 or 1 of the half of the poses that agree best, over random subsets refined by two steps."""
+    """Weights 0 or 1 of the half of the poses that agree best: random subsets, the best five of them concentrated."""
     n, size = len(R), min(len(R), 6 if target is None else 4)
-    half = max((n + size) // 2 + 1, size) if n > size else n
-    best, best_cost = None, np.inf
-    for _ in range(SUBSETS):
-        chosen = rng.choice(n, size, replace=False)
-        for _ in range(3):
-            try:
-                R_FS, t_FS, center, _ = _solve(R[chosen], t[chosen], x[chosen], np.ones(len(chosen)), target)
-            except (ValueError, np.linalg.LinAlgError):
-                break  # a subset without the motions the whole set has
-            squares = (_residuals(R, t, x, R_FS, t_FS, center) ** 2).sum(1)
-            chosen = np.argsort(squares, kind="stable")[:half]
-        else:
-            if squares[chosen].sum() < best_cost:
-                best, best_cost = chosen, squares[chosen].sum()
+    half = min(n, (n + size) // 2 + 1)
+
+    def concentrate(chosen):
+        try:
+            R_FS, t_FS, center, _ = _solve(R[chosen], t[chosen], x[chosen], np.ones(len(chosen)), target)
+        except (ValueError, np.linalg.LinAlgError):
+            return np.inf, None  # a subset without the motions the whole set has
+        squares = (_residuals(R, t, x, R_FS, t_FS, center) ** 2).sum(1)
+        nearest = np.argsort(squares, kind="stable")[:half]
+        return squares[nearest].sum(), nearest
+
+    found = [concentrate(rng.choice(n, size, replace=False)) for _ in range(SUBSETS)]
+    found = sorted((f for f in found if f[1] is not None), key=lambda f: f[0])[:5]
+    for _ in range(3):
+        found = [concentrate(nearest) for _, nearest in found]
     weights = np.zeros(n)
-    weights[slice(None) if best is None else best] = 1.0
+    weights[min(found, key=lambda f: f[0])[1] if found else slice(None)] = 1.0
     return weights
 
 

@@ -73,6 +73,15 @@ def measurements(corrected=False):
     return Measurements(tables["C14"], tables["C17"], poses["axis"], poses["angle_deg"])
 
 
+def measurements_from(entries):
+    """The measurements that a dictionary of entries, as `printed_entries` returns it, stands for."""
+    pattern = measurements()
+    numbers = range(1, len(pattern.line) + 1)
+    kuka_deg = np.array([[float(entries["C14", i, c]) for c in POSE_COLUMNS] for i in numbers])
+    x_S = np.array([[float(entries["C17", i, c]) for c in CENTER_COLUMNS] for i in numbers])
+    return Measurements(kuka_deg, x_S, pattern.line, pattern.angle_deg)
+
+
 def kuka_pose_deg(name):
     """A pose of `frames.csv` as printed: x, y, z in mm, A, B, C in deg."""
     data = read_table("hand_eye/frames.csv", text=("name", "place"))

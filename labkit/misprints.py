@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import frames, handeye, lie
-from .handeye_data import CENTER_COLUMNS, POSE_COLUMNS
+from .handeye_data import CENTER_COLUMNS, POSE_COLUMNS, measurements_from
 
 SLIPS = (
     "sign lost",
@@ -22,6 +22,7 @@ SLIPS = (
     "decimal point moved",
 )
 SUSPICIOUS = 6.0  # residual length in standard deviations of one coordinate: a normal error exceeds it with 1e-7
+TURNED = np.deg2rad(0.3)  # a pose turned farther than this from the middle of its neighbors breaks the pattern
 EXPLAINED = 4.0  # a slip explains a row when what remains is shorter than this
 
 
@@ -39,6 +40,7 @@ class Explanation:
     slip: str
     before: float
     after: float
+    turn: float = np.nan
 
 
 def single_slips(text):
@@ -80,7 +82,10 @@ def single_slips(text):
 
 
 def explanations(entries, pose, T_FS, target, std):
-    """Slips of one row that bring its residual below `EXPLAINED` standard deviations, best first.
+    """Slips of one row that bring its residual below `EXPLAINED` standard deviations, the most credible first.
+
+    First come those that leave the flange turned halfway between its neighbors on the line of motion, then lost signs
+    and swapped digits before rarer slips, then the smaller residual.
 
     Parameters
     ----------
@@ -110,52 +115,51 @@ def explanations(entries, pose, T_FS, target, std):
     trials = np.array(trials)
     T_BF = frames.matrix_from_kuka(frames.kuka_from_degrees(trials[:, :6]))
     lengths = np.linalg.norm(handeye.sphere_residuals(T_BF, trials[:, 6:], T_FS, target), axis=1)
-    found = [
-        Explanation(table, pose, column, printed, corrected, slip, lengths[0], lengths[k])
-        for k, (table, column, printed, corrected, slip) in ((k, labels[k]) for k in np.argsort(lengths) if labels[k])
-        if lengths[k] <= EXPLAINED * std
-    ]
-    return sorted(found, key=lambda e: (SLIPS.index(e.slip) > 1, e.after))
+    halfway = _halfway(measurements_from(entries), pose - 1)
+    found = []
+    for k in np.flatnonzero(lengths <= EXPLAINED * std):
+        if labels[k]:
+            table, column, printed, corrected, slip = labels[k]
+            turn = np.nan if halfway is None else float(frames.rotation_angle(halfway.T @ T_BF[k, :3, :3]))
+            found.append(Explanation(table, pose, column, printed, corrected, slip, lengths[0], lengths[k], turn))
+    return sorted(found, key=lambda e: (e.turn > TURNED, SLIPS.index(e.slip) > 1, e.after))
 
 
-def find(entries, n=31):
-    """Suspicious rows and what would explain each: {pose: list of Explanation}, from a robust joint fit of scanner pose
-    and sphere center.
+def find(entries):
+    """Suspicious rows and what would explain each, {pose: list of Explanation}, from a robust joint fit.
 
     The robust fit gives every suspicious row the weight 0, so that the calibration a row is judged by never saw it.
     """
-    columns = [
-        [float(entries[t, i, c]) for t, cs in (("C14", POSE_COLUMNS), ("C17", CENTER_COLUMNS)) for c in cs]
-        for i in range(1, n + 1)
-    ]
-    rows = np.array(columns)
-    T_BF = frames.matrix_from_kuka(frames.kuka_from_degrees(rows[:, :6]))
-    fit = handeye.calibrate_sphere_target(T_BF, rows[:, 6:], robust=True)
+    measured = measurements_from(entries)
+    fit = handeye.calibrate_sphere_target(measured.T_BF, measured.x_S, robust=True)
     lengths = np.linalg.norm(fit.residuals, axis=1)
     suspects = np.flatnonzero(lengths > SUSPICIOUS * fit.std) + 1
     return {int(i): explanations(entries, int(i), fit.T_FS, fit.target, fit.std) for i in suspects}
 
 
+def _halfway(measured, i):
+    """Orientation halfway between the two neighbors of pose i on its line of motion; None at the ends of a line."""
+    if not 0 < i < len(measured.line) - 1 or not measured.line[i - 1] == measured.line[i] == measured.line[i + 1]:
+        return None
+    before, after = measured.T_BF[[i - 1, i + 1], :3, :3]
+    return before @ lie.exp_so3(lie.log_so3(before.T @ after) / 2)
+
+
 def neighbor_turns(measured):
-    """How far each pose is turned away from the middle of its two neighbors on the same line of motion (rad), NaN at
-    the ends.
+    """How far each pose is turned away from the middle of its neighbors on the line (rad), NaN at the ends; (31,).
 
     The pattern turns by equal steps about one axis, so the middle one of three poses should be halfway; no calibration
     enters.
     """
-    R, turns = measured.T_BF[:, :3, :3], np.full(len(measured.line), np.nan)
-    for i in range(1, len(R) - 1):
-        if measured.line[i - 1] == measured.line[i] == measured.line[i + 1]:
-            step = lie.log_so3(R[i - 1].T @ R[i + 1])
-            turns[i] = frames.rotation_angle((R[i - 1] @ lie.exp_so3(step / 2)).T @ R[i])
-    return turns
+    halfway = [_halfway(measured, i) for i in range(len(measured.line))]
+    R = measured.T_BF[:, :3, :3]
+    return np.array([np.nan if H is None else frames.rotation_angle(H.T @ R[i]) for i, H in enumerate(halfway)])
 
 
 def neighbor_offsets(measured):
     """How far each flange stands off the plane its line of motion turns in, against the median of the line (mm), (31,).
 
-    A line of motion turns about one axis, here the direction about which its first pose turns into its last; along it
-    the flange hardly moves.
+    A line of motion turns about one axis, the median of the turns from pose to pose; along it the flange hardly moves.
     """
     T, offsets = measured.T_BF, np.empty(len(measured.line))
     for line in np.unique(measured.line):

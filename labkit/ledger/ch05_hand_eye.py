@@ -459,7 +459,7 @@ def fixed_target_fit(*fixed):
 
 
 def _nearest_subset():
-    """Of all sets of the seven corrections the one whose minimum is nearest to the printed end pose: (poses, rad, mm)."""
+    """Of all sets of the seven corrections the one whose minimum is nearest the printed end pose: (poses, rad, mm)."""
     poses, end = [row["pose"] for row in handeye_data.corrections()], handeye_data.frame("scanner_end")
     sets = (subset for size in range(8) for subset in itertools.combinations(poses, size) if 2 in subset)
     found = [(subset, *frames.pose_distance(fixed_target_fit(*subset).T_FS, end)) for subset in sets]
