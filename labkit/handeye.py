@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .checks import as_finite, as_points, as_positive, as_transforms
-from .frames import invert, matrix_from_kuka, transform
+from .checks import as_finite, as_points, as_positive, as_rotations, as_transforms
+from .frames import invert, matrix_from_kuka, pose, transform
 from .handeye_result import HandEye
 from .lie import exp_so3, nearest_rotation, skew
 
@@ -31,6 +31,8 @@ MEDIAN_CHI3 = (
 )
 TUKEY_CUT = 5.0  # residuals beyond this many standard deviations get the weight 0
 SUBSETS = 60  # random pose subsets of the robust start: with a quarter of bad poses one of them is clean with 1 - 1e-5
+FIELD = ((-25.0, 25.0), (3.0, 25.0), (190.0, 290.0))  # mm: x, |y| and z of a sphere center whose arc the scanner sees well
+_IRRATIONAL = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0]) % 1.0
 _EYE = np.eye(3)
 _GENERATORS = skew(_EYE)  # derivatives of a small rotation about x, y, z
 
@@ -402,6 +404,61 @@ def predicted_covariance(T_BF, T_FS, target, std):
     return float(as_positive(std, "std")) ** 2 * np.linalg.inv(J.T @ J)
 
 
+def poses_that_see(T_FS, target, R_BF, x_S):
+    """Robot poses with given orientations in which the scanner sees the sphere at given places.
+
+    From target = R_BF (R_FS x_S + t_FS) + t_BF; (4, 4), (3,), (..., 3, 3), (..., 3) -> T_BF (..., 4, 4).
+    """
+    R_BF, arms = as_rotations(R_BF, "R_BF"), transform(T_FS, x_S)
+    return pose(R_BF, as_points(target, "target") - (R_BF @ arms[..., None])[..., 0])
+
+
+def pattern(T_FS, target, tilt, spread, n=31):
+    """Robot poses spread evenly: the sphere all over a part of the scanner's field, the scanner tilted all around.
+
+    Parameters
+    ----------
+    T_FS, target : array, shape (4, 4) and (3,)
+        Where the scanner and the sphere roughly are.
+    tilt : float
+        Largest angle between the scanner's line of sight and straight down (rad).
+    spread : array-like, shape (3,)
+        Half the width of the part of the field that is used, in x, y and z of S, about the field's middle (mm); the
+        sphere's center stays off the scan plane by at least 3 mm, on either side.
+    n : int
+        Number of poses.
+
+    Returns
+    -------
+    T_BF : array, shape (n, 4, 4)
+    """
+    k = np.arange(n)
+    u = (0.5 + np.outer(k, _IRRATIONAL)) % 1.0  # evenly spread over a cube, without chance
+    (x_low, x_high), (y_low, y_high), (z_low, z_high) = FIELD
+    across = y_low + u[:, 1] * np.clip(spread[1] - y_low, 0.0, y_high - y_low)
+    x_S = np.column_stack([
+        0.5 * (x_low + x_high) + spread[0] * (2 * u[:, 0] - 1),
+        across * np.where(k % 2, 1.0, -1.0),
+        0.5 * (z_low + z_high) + spread[2] * (2 * u[:, 2] - 1),
+    ])  # fmt: skip
+    around, yaw = 2 * np.pi * u[:, 3], 2 * np.pi * u[:, 4] * min(1.0, tilt / 0.2)
+    tilted = tilt * np.sqrt(u[:, 5])[:, None] * np.column_stack([np.cos(around), np.sin(around), np.zeros(n)])
+    down = np.diag([1.0, -1.0, -1.0])
+    turned = exp_so3(np.column_stack([np.zeros((n, 2)), yaw]))
+    return poses_that_see(T_FS, target, exp_so3(tilted) @ turned @ down @ np.asarray(T_FS)[:3, :3].T, x_S)
+
+
+def field_problem(x_S):
+    """What keeps the scanner from seeing a sphere at these places, as a sentence; None where all lie in its field."""
+    x_S = as_points(x_S, "x_S")
+    for axis, (low, high), values in zip("xyz", FIELD, (x_S[..., 0], np.abs(x_S[..., 1]), x_S[..., 2])):
+        bad = (values < low - 1e-9) | (values > high + 1e-9)
+        if bad.any():
+            name = "|y|" if axis == "y" else axis
+            return f"in {bad.sum()} poses the sphere lies at {name} = {values[bad].ravel()[0]:.1f} mm, outside {low:g} to {high:g}."
+    return None
+
+
 # --- the calibrations of the literature ------------------------------------------------------------------------------
 
 
@@ -591,13 +648,13 @@ def _refuse_narrow(M, x_mean):
         )
 
 
-def _solve(R, t, x, w, target):
+def _solve(R, t, x, w, target, steps=MAX_STEPS):
     """Least squares with given weights: R_FS, t_FS, target, and the rms distance of the iterates."""
     S, h, c, recover = _reduce(R, t, x, w, target)
     if target is not None:
         R_FS = nearest_rotation(h)
         return R_FS, *recover(R_FS), []
-    R_FS, costs = _descend(S, h, _rotation_start(S, h))
+    R_FS, costs = _descend(S, h, _rotation_start(S, h), steps)
     return R_FS, *recover(R_FS), [math.sqrt(max(cost + c, 0.0) / w.sum()) for cost in costs]
 
 
@@ -622,13 +679,13 @@ def _polar(M):
     return nearest_rotation(M)
 
 
-def _descend(S, h, R_FS):
+def _descend(S, h, R_FS, steps=MAX_STEPS):
     """Newton on SO(3) for r'Sr - 2 h'r, Gauss-Newton where that points uphill, steps halved until they descend."""
     r = R_FS.ravel()
     gradient = S @ r - h
     costs = [r @ (gradient - h)]
     floor = 1e-15 * (abs(r @ h) + abs(costs[0]))
-    for _ in range(MAX_STEPS):
+    for _ in range(steps):
         G = (_GENERATORS @ R_FS).reshape(3, 9)
         slope, H = G @ gradient, G @ S @ G.T
         Z = gradient.reshape(3, 3) @ R_FS.T
@@ -687,7 +744,7 @@ def _trimmed_start(R, t, x, target, rng):
 
     def concentrate(chosen):
         try:
-            R_FS, t_FS, center, _ = _solve(R[chosen], t[chosen], x[chosen], np.ones(len(chosen)), target)
+            R_FS, t_FS, center, _ = _solve(R[chosen], t[chosen], x[chosen], np.ones(len(chosen)), target, steps=4)
         except (ValueError, np.linalg.LinAlgError):
             return np.inf, None  # a subset without the motions the whole set has
         squares = (_residuals(R, t, x, R_FS, t_FS, center) ** 2).sum(1)
