@@ -1,8 +1,9 @@
 """Rotations and rigid motions as vectors: the exponential and the logarithm of SO(3) and SE(3).
 
 A twist is written rotation first, xi = (phi, rho): phi is the rotation vector (rad), rho the translation part (in the
-unit of the lengths). All functions broadcast over leading axes. The rotation of a twist is phi itself; the translation of exp(xi)
-is V(phi) rho. Source: Sola, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics" (2018), appendix.
+unit of the lengths). All functions broadcast over leading axes. The rotation of a twist is phi itself; the translation
+of exp(xi) is V(phi) rho. Source: Sola, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics" (2018),
+appendix.
 """
 
 import numpy as np

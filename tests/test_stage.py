@@ -62,7 +62,6 @@ def wire(stage):
     sent = []
     stage._front.send = lambda message, buffers=None: sent.append((message, buffers))
     stage._receive({"look": LOOK, "serial": "a:1"})
-    stage._receive({"shown": 1})
     return stage, sent
 
 
@@ -393,7 +392,13 @@ def pixels(stage):
 
 def test_sharp_on_dense_screens_and_proportional_in_narrow_cells():
     stage = segment()
-    for width, ratio, expected in ((700, 1, (700, 420)), (2000, 1, (700, 420)), (350, 1, (350, 210)), (700, 2, (1400, 840)), (700, 9, (1750, 1050))):
+    for width, ratio, expected in (
+        (700, 1, (700, 420)),
+        (2000, 1, (700, 420)),
+        (350, 1, (350, 210)),
+        (700, 2, (1400, 840)),
+        (700, 9, (1750, 1050)),
+    ):
         stage._picture.fit(width, ratio, False)
         assert np.abs(np.subtract(Image.open(io.BytesIO(stage.png())).size, expected)).max() <= 1
 

@@ -1,4 +1,4 @@
-"""Stages of chapter 1: what they compute, against closed forms, the library and SciPy, and that each draws, fails and recovers."""
+"""Stages of chapter 1: what they compute, against closed forms and SciPy, and that each draws, fails and recovers."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,9 @@ def test_three_points_gives_the_sheets_frames():
     assert result["distance"] == pytest.approx(np.hypot(2 - 1.01, 1 - 2))
     for T, points, foot in zip(result["frames"], result["points"], result["feet"]):
         assert (points[2] - foot) @ T[:2, 0] == pytest.approx(0, abs=1e-12)  # what is kept is perpendicular
-        assert np.linalg.det([foot - points[0], T[:2, 0]]) == pytest.approx(0, abs=1e-12)  # what is removed lies along x
+        assert np.linalg.det([foot - points[0], T[:2, 0]]) == pytest.approx(
+            0, abs=1e-12
+        )  # what is removed lies along x
 
 
 def test_three_points_removes_the_part_along_x():
@@ -102,9 +104,7 @@ def test_gimbal_axes_are_the_derivatives_of_the_pose():
     angles, h = np.array([40.0, 30.0, 20.0]), 1e-4
     axes = w.compute_kuka_gimbal(dict(zip(("A_deg", "B_deg", "C_deg"), angles)))["axes"]
     for k in range(3):
-        before, after = (
-            Rotation.from_euler("ZYX", angles + s * h * np.eye(3)[k], degrees=True) for s in (-1, 1)
-        )
+        before, after = (Rotation.from_euler("ZYX", angles + s * h * np.eye(3)[k], degrees=True) for s in (-1, 1))
         assert (after * before.inv()).as_rotvec(degrees=True) / (2 * h) == pytest.approx(axes[k], abs=1e-6)
 
 
@@ -115,7 +115,9 @@ def test_at_the_pole_a_and_c_trade_places(pole):
     assert first["T"] == pytest.approx(second["T"], abs=1e-12)
     assert first["singular_values"][2] < 1e-9
     assert first["null"] == pytest.approx([np.sqrt(0.5), 0, np.sign(pole) * np.sqrt(0.5)])
-    assert frames.matrix_from_kuka([0, 0, 0, *np.deg2rad(first["read_back_deg"])]) == pytest.approx(first["T"], abs=1e-12)
+    assert frames.matrix_from_kuka([0, 0, 0, *np.deg2rad(first["read_back_deg"])]) == pytest.approx(
+        first["T"], abs=1e-12
+    )
 
 
 def test_gimbal_presets_show_the_same_pose():

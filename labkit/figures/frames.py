@@ -6,19 +6,20 @@ from matplotlib.ticker import MaxNLocator
 from . import style
 
 CIRCLE_DEG = np.arange(0, 361, 6)
-TOPS = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0)  # deg
+TOPS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)  # deg
 
 
 class PlaneFrame:
-    """A frame seen along the world's z axis: x and y arrows with their letters, and z as a dot (towards us) or a cross."""
+    """A frame seen along the world's z axis: x and y with their letters, z as a dot (towards us) or a cross."""
 
     def __init__(self, ax, name, length, linestyle="-"):
         self.length = length
         self.axes = [
-            ax.plot([], [], color=color, linestyle=linestyle, linewidth=2.4)[0] for color in (style.AXIS_X, style.AXIS_Y)
+            ax.plot([], [], color=color, linestyle=linestyle, linewidth=2.4)[0]
+            for color in (style.AXIS_X, style.AXIS_Y)
         ]
         self.letters = [
-            ax.text(0, 0, letter, color=color, ha="center", va="center", zorder=4)
+            ax.text(0, 0, letter, color=color, ha="center", va="center", zorder=4, clip_on=True)
             for letter, color in (("x", style.AXIS_X), ("y", style.AXIS_Y))
         ]
         (self.z,) = ax.plot([], [], color=style.AXIS_Z, linestyle="none", marker="o", markersize=4, zorder=4)
@@ -26,8 +27,9 @@ class PlaneFrame:
             [], [], color=style.AXIS_Z, linestyle="none", marker="o", markersize=10, markerfacecolor="none", zorder=4
         )
         self.name = ax.annotate(
-            name, (0, 0), xytext=(-9, -9), textcoords="offset points", ha="right", va="top", fontweight="bold", zorder=4
-        )
+            name, (0, 0), xytext=(-9, -9), textcoords="offset points", ha="right", va="top", fontweight="bold",
+            zorder=4, annotation_clip=True, clip_on=True,
+        )  # fmt: skip
         self.artists = [*self.axes, *self.letters, self.z, self.rim, self.name]
 
     def set(self, T):
@@ -56,7 +58,7 @@ class Construction:
         self.artists = [self.arms, self.removed, self.kept, self.foot, self.points]
 
     def set(self, points, foot):
-        """`points`: origin, x_point, y_point, shape (3, 2); `foot`: where y_point falls on the line of the first arm."""
+        """`points`: origin, x_point, y_point, shape (3, 2); `foot`: where y_point falls on the first arm's line."""
         origin, x_point, y_point = points
         self.arms.set_data(*np.transpose([x_point, origin, y_point]))
         self.points.set_data(*np.transpose(points))
@@ -71,7 +73,9 @@ class Matrix:
     def __init__(self, ax, x, y, heading, dx=0.24, dy=0.085):
         place = {"transform": ax.transAxes, "ha": "right", "va": "center"}
         ax.text(x, y + dy, heading, transform=ax.transAxes, fontweight="bold")
-        self.entries = [[ax.text(x + dx * (j + 0.8), y - dy * (i + 0.2), "", **place) for j in range(4)] for i in range(4)]
+        self.entries = [
+            [ax.text(x + dx * (j + 0.8), y - dy * (i + 0.2), "", **place) for j in range(4)] for i in range(4)
+        ]
         self.artists = [entry for row in self.entries for entry in row]
 
     def set(self, T):
@@ -112,7 +116,7 @@ def error_against_height(ax, heights):
     for letter, color, mark, dash in zip("xyz", style.AXES, marks, dashes):
         bounds += ax.plot([], [], color=color, linestyle=dash, linewidth=1.8)
         found += ax.plot(
-            [], [], color=color, linestyle="none", marker=mark, markersize=8, markeredgecolor=style.INK,
+            [], [], color=color, linestyle="none", marker=mark, markersize=8, markeredgecolor=style.INK, clip_on=False,
             label=f"about {letter}",
         )  # fmt: skip
     (key,) = ax.plot([], [], color=style.MUTED, label="bound")
@@ -128,7 +132,9 @@ class Ring:
         self.circle = scene.line(fade=True, color=color, linewidth=1.6)
         self.arc = scene.line(color=color, linewidth=4.5)
         self.axis = scene.line(fade=True, color=color, linewidth=1.2, linestyle=(0, (3, 2)))
-        self.letter = scene.text(letter, offset=(0, 0), color=color, fontweight="bold", fontsize=12, ha="center", va="center")
+        self.letter = scene.text(
+            letter, offset=(0, 0), color=color, fontweight="bold", fontsize=12, ha="center", va="center"
+        )
 
     def set(self, axis, zero, angle):
         """`axis`, `zero`: unit vectors, shape (3,), of the turning axis and of angle 0; `angle` in rad."""
@@ -149,9 +155,9 @@ def compare_errors(ax):
     Returns [(markers, bars), ...] for Gram-Schmidt and the SVD fit; each has three entries.
     """
     style.axes(ax, "", "error of the frame (deg)", "error found, and its bound")
-    ax.set(xlim=(-0.6, 2.6), ylim=(0, TOPS[0]))
+    ax.set(xlim=(-0.6, 2.6), ylim=(0, TOPS[3]))
     ax.set_xticks(range(3), [f"about {letter}" for letter in "xyz"])
-    ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
+    ax.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     ax.grid(axis="x", visible=False)
     pairs = []
     for label, shift, mark, fill in (
@@ -160,7 +166,10 @@ def compare_errors(ax):
     ):
         x = np.arange(3) + shift
         (markers,) = ax.plot(
-            x, x * 0, **style.look("estimates", marker=mark, markersize=9, markerfacecolor=fill, markeredgewidth=2), label=label
+            x,
+            x * 0,
+            **style.look("estimates", marker=mark, markersize=9, markerfacecolor=fill, markeredgewidth=2),
+            label=label,
         )
         (bars,) = ax.plot([], [], color=style.INK, linewidth=2.2, solid_capstyle="butt")
         pairs.append((markers, bars, x))

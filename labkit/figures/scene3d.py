@@ -1,4 +1,5 @@
-"""Scenes in space on plain 2D axes: an orthographic projection of our own, because mplot3d takes 50 ms a frame and this takes 2.
+"""Scenes in space on plain 2D axes: an orthographic projection of our own, because mplot3d takes 50 ms a frame and
+this takes 2.
 
     scene = Scene(ax, radius=300)                       # bare axes, limits fixed: the scene turns inside them
     base, path = scene.triad("B", length=100), scene.line(**style.look("truth"))
@@ -8,7 +9,8 @@
         scene.draw(state["view"])                       # projects everything, in place
     return scene.artists, update
 
-Nearer things are drawn over farther ones, and farther ends of triads, rings and paths fade. The letter stands at each tip.
+Nearer things are drawn over farther ones, and farther ends of triads, rings and paths fade. The letter stands at each
+tip.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +27,10 @@ CIRCLE = np.stack([np.cos(np.linspace(0, 2 * np.pi, 65)), np.sin(np.linspace(0, 
 
 @dataclass(frozen=True)
 class View:
-    """Where the eye stands: azimuth from +x towards +y, elevation above the xy plane (deg), `center` in the middle of the picture."""
+    """Where the eye stands: azimuth from +x towards +y and elevation above the xy plane (deg).
+
+    `center` is the point in space in the middle of the picture.
+    """
 
     azimuth_deg: float = -60.0
     elevation_deg: float = 25.0
@@ -54,7 +59,8 @@ class View:
 class Scene:
     """Things in space on one axes.
 
-    radius : half the height of what is visible, in the unit of the points; half_width : the same across, by default alike.
+    radius : half the height of what is visible, in the unit of the points; half_width : the same across, by default
+        alike.
     """
 
     def __init__(self, ax, radius, title="", half_width=None):
@@ -86,7 +92,7 @@ class Scene:
         return self._add(_Text(self, text, offset, looks))
 
     def ellipsoid(self, **looks):
-        """Outline of an ellipsoid: `.set(center, shape)` with shape (3, 3), for a sphere of radius r: r**2 * I; for an error: its covariance."""
+        """Outline of an ellipsoid: `.set(center, shape)`, shape (3, 3): r**2 * I or a covariance."""
         return self._add(_Ellipsoid(self, looks))
 
     def fixed(self, item, *values):

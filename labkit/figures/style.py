@@ -1,13 +1,14 @@
 """The looks of the whole course: colors by role, line styles, fonts, grid, and what the dark theme makes of them.
 
-The only module with literal colors. Okabe and Ito's palette, readable with the common color blindnesses; no role relies on color alone:
+The only module with literal colors. Okabe and Ito's palette, readable with the common color blindnesses; no role
+relies on color alone:
 
     truth        ink, solid                      measurement  orange, filled circles
     prediction   sky blue, dashed                estimate     reddish purple, solid, diamonds
     rejected     muted, hollow crosses           axes x, y, z vermilion, bluish green, blue, with the letter at the tip
 
-Figures are written for light paper. In JupyterLab's dark theme a Stage exchanges each color of `DARK` while it draws, so that
-no figure needs to know about themes: use the names of this module, and nothing else is to be done.
+Figures are written for light paper. In JupyterLab's dark theme a Stage exchanges each color of `DARK` while it draws,
+so that no figure needs to know about themes: use the names of this module, and nothing else is to be done.
 """
 
 import matplotlib as mpl
@@ -84,7 +85,10 @@ def rc():
 
 
 def look(role, **changes):
-    """Keyword arguments of `ax.plot` for a role: truth, measurement, prediction, estimate, estimates (markers), rejected, guide."""
+    """Keyword arguments of `ax.plot` for a role, with `changes`.
+
+    Roles: truth, measurement, prediction, estimate, estimates (markers instead of a line), rejected, guide.
+    """
     if role not in LOOKS:
         raise ValueError(f"role must be one of {', '.join(LOOKS)}, got {role!r}")
     return {**LOOKS[role], **changes}

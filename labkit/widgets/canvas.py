@@ -1,7 +1,9 @@
-"""A matplotlib figure kept alive on Agg: what moves is drawn over a kept background, in the theme's colors, and encoded fast.
+"""A matplotlib figure kept alive on Agg: what moves is drawn over a kept background, in the theme's colors, and
+encoded fast.
 
-A full redraw of a figure costs 40 ms and more, mostly for ticks and labels; restoring the background and drawing the moving artists costs
-1 to 6 ms. PNG without row filters, deflated at level 1, takes 3 ms for 700 x 400 pixels, against 12 ms by Pillow at level 1 and 9 ms as WebP.
+A full redraw of a figure costs 40 ms and more, mostly for ticks and labels; restoring the background and drawing the
+moving artists costs 1 to 6 ms. PNG without row filters, deflated at level 1, takes 3 ms for 700 x 400 pixels, against
+12 ms by Pillow at level 1 and 9 ms as WebP.
 """
 
 import struct
@@ -21,7 +23,9 @@ MAX_RATIO = 2.5  # device pixels per CSS pixel; sharper screens see no differenc
 MIN_SCALE = 0.85  # a narrower cell shrinks the whole picture, letters too, instead of crowding it further
 MAX_WORDS = 3000  # bitmaps a figure keeps
 
-DRAWING = threading.RLock()  # widget messages may arrive on another thread than the cells, and matplotlib is not thread-safe
+DRAWING = (
+    threading.RLock()
+)  # widget messages may arrive on another thread than the cells, and matplotlib is not thread-safe
 
 
 def _dark(rgba):
@@ -42,7 +46,7 @@ def _dark_rows(colors):
 
 
 class _Renderer(RendererAgg):
-    """Agg that keeps the bitmaps of the words it has drawn: laying out and drawing ten letters takes matplotlib 1 ms and more."""
+    """Agg that keeps the bitmaps of the words it has drawn: ten letters take matplotlib more than 1 ms."""
 
     def __init__(self, *args):
         super().__init__(*args)
@@ -99,7 +103,9 @@ class _DarkRenderer(_Renderer):
         def draw_markers(gc, marker_path, marker_trans, path, trans, rgbFace=None):
             markers(gc, marker_path, marker_trans, path, trans, _dark(rgbFace))
 
-        def draw_path_collection(gc, transform, paths, all_transforms, offsets, offset_trans, faces, edges, *args, **kw):
+        def draw_path_collection(
+            gc, transform, paths, all_transforms, offsets, offset_trans, faces, edges, *args, **kw
+        ):
             collection(gc, transform, paths, all_transforms, offsets, offset_trans,
                        _dark_rows(faces), _dark_rows(edges), *args, **kw)  # fmt: skip
 
@@ -126,7 +132,8 @@ class Picture:
     scene : function(fig) -> (artists, update)
         Draws everything once. `artists` are the moving ones, `update(...)` sets them in place.
     size : (width, height)
-        In inches of 100 CSS pixels: the largest width at which the picture is shown; narrower cells keep the proportions.
+        In inches of 100 CSS pixels: the largest width at which the picture is shown; narrower cells keep the
+        proportions.
     """
 
     def __init__(self, scene, size):
@@ -149,23 +156,24 @@ class Picture:
         return self.canvas.dark
 
     def fit(self, width, ratio, dark):
-        """Adopt the width of the cell (CSS pixels), the device's pixel ratio and the theme; True when something changed."""
+        """Adopt the width of the cell (CSS pixels), the device's pixel ratio and the theme."""
         width = min(max(float(width), 120.0), self.size[0] * CSS_DPI)
         ratio = min(max(float(ratio), 1.0), MAX_RATIO)
         if (width, ratio, bool(dark)) == (self.width, self.ratio, self.dark) and self._background is not None:
-            return False
+            return
         self.width, self.ratio, self.canvas.dark = width, ratio, bool(dark)
         inches = max(width / CSS_DPI, MIN_SCALE * self.size[0])
         self.fig.set_dpi(width * ratio / inches)
         self.fig.set_size_inches(inches, inches * self.size[1] / self.size[0])
         self.fig.set_layout_engine("constrained")
         self._background = None
-        return True
 
     def _draw_background(self):
         with style.rc():
             self.canvas.draw()
-            if self.fig.get_layout_engine() is not None:  # laid out once a size: a layout at every change of limits would make axes jump
+            if (
+                self.fig.get_layout_engine() is not None
+            ):  # laid out once a size: a layout at every change of limits would make axes jump
                 self.fig.set_layout_engine("none")
         self._background = self.canvas.copy_from_bbox(self.fig.bbox)
         self.fig.stale = False

@@ -1,4 +1,4 @@
-"""Stages of chapter 1: three points and their frame, noise and height, the KUKA angles at the pole, SVD against Gram-Schmidt."""
+"""Stages of chapter 1: three points, noise and height, the KUKA angles at the pole, SVD against Gram-Schmidt."""
 
 import functools
 
@@ -27,7 +27,7 @@ def _points():
 
 
 def compute_three_points(state):
-    """Both frames of six points in the plane, what Gram-Schmidt removes, and K0_T_K1 with its angle (deg) and distance."""
+    """Both frames of six points in the plane, what Gram-Schmidt removes, K0_T_K1, its angle (deg) and distance."""
     result = {"frames": [], "points": [], "feet": [], "roll_deg": []}
     for k in "01":
         points = np.array([state["O" + k], state["X" + k], state["Y" + k]])
@@ -108,7 +108,7 @@ def three_points():
 
 @functools.cache
 def _unit_noise(repetitions):
-    """Noise of three points, standard deviation 1, shape (repetitions, 3, 3); the same at every call, so that only what is dragged changes."""
+    """Noise of three points, std 1, shape (repetitions, 3, 3); always the same: only what is dragged moves."""
     noise = np.random.default_rng(1).standard_normal((repetitions, 3, 3))
     noise.setflags(write=False)
     return noise
@@ -131,7 +131,7 @@ def compute_triangle_noise(state, repetitions=200):
 
 
 def _stay_in_plane(state, moved):
-    """Y moves in the plane z = 0: slide it there along the line of sight (straight down when that line nearly lies in the plane)."""
+    """Y moves in the plane z = 0: slide it there along the line of sight, or straight down if that is too flat."""
     y, toward = state["Y"], state["view"].axes[2]
     if abs(toward[2]) > 0.15:
         y = y - y[2] / toward[2] * toward
@@ -170,7 +170,7 @@ def triangle_noise():
         compute=compute_triangle_noise,
         handles={
             "Y": Handle(
-                (30.0, 60.0, 0.0), step=1.0, bounds=((-40, 110), (1, 90), (-200, 200)), label="y point of the triangle",
+                (30.0, 60.0, 0.0), step=1.0, bounds=((-20, 80), (1, 80), (-200, 200)), label="y point of the triangle",
                 color=style.MEASUREMENT,
             )
         },
@@ -187,7 +187,7 @@ def triangle_noise():
 
 
 def compute_kuka_gimbal(state):
-    """Pose of the angles A, B, C (deg), the axes they turn about, singular values of their rates, and the angles read back."""
+    """Pose of the angles A, B, C (deg), the axes they turn about, singular values of their rates, angles read back."""
     a, b, c = np.deg2rad([state["A_deg"], state["B_deg"], state["C_deg"]])
     T = frames.matrix_from_kuka([0, 0, 0, a, b, c])
     Rz, Ry = exp_so3([0, 0, a]), exp_so3([0, b, 0])
@@ -200,7 +200,7 @@ def compute_kuka_gimbal(state):
         "axes": axes,
         "zeros": zeros,
         "singular_values": singular_values,
-        "null": Vt[2] * (1 if Vt[2][0] >= 0 else -1),
+        "null": Vt[2] * (1 if Vt[2][0] >= 0 else -1) if singular_values[0] - singular_values[2] > 1e-9 else None,
         "read_back_deg": np.rad2deg(frames.kuka_from_matrix(T)[3:]),
         "B_deg": float(state["B_deg"]),
     }
@@ -211,8 +211,8 @@ def _gimbal_sentence(result):
     if 90 - abs(result["B_deg"]) < NEAR_POLE_DEG:
         sign, total = ("-", a - c) if result["B_deg"] > 0 else ("+", a + c)
         return (
-            f"At B = {result['B_deg']:.0f} deg, A and C turn about the same line: only A {sign} C = {total:.0f} deg counts, "
-            "and they can trade places while the pose stays."
+            f"At B = {result['B_deg']:.0f} deg, A and C turn about the same line: only A {sign} C = {total:.0f} deg "
+            "counts, and they can trade places while the pose stays."
         )
     return "Each angle turns about its own axis. Bring B to 90 deg and watch the rings of A and C meet."
 
@@ -246,7 +246,10 @@ def kuka_gimbal():
             space.draw(state["view"])
             rows = (np.rad2deg(result["angles"]), result["read_back_deg"], result["singular_values"], result["null"])
             for text, row, decimals in zip(numbers, rows, (0, 0, 3, 2)):
-                text.set_text(",  ".join(f"{round(float(v), decimals) + 0.0:.{decimals}f}" for v in row))
+                words = (
+                    "all alike" if row is None else ",  ".join(f"{round(v, decimals) + 0.0:.{decimals}f}" for v in row)
+                )
+                text.set_text(words)
 
         return [*space.artists, *numbers], update
 
@@ -288,16 +291,19 @@ def compute_svd_against_gram_schmidt(state, repetitions=400):
 
 
 def svd_against_gram_schmidt():
-    """Both constructions on the same noisy points: the fit shares the error among all edges, Gram-Schmidt trusts the first."""
+    """Both constructions on the same noisy points: the fit shares the error among all edges, the other trusts one."""
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.15, 1))
         style.axes(left, "x (mm)", "y (mm)", "measured 400 times", equal=True)
         left.set(xlim=(-25, 135), ylim=(-20, 105))
-        (cloud,) = left.plot([], [], **style.look("measurement", marker=".", markersize=3, markeredgewidth=0, alpha=0.6))
+        (cloud,) = left.plot(
+            [], [], **style.look("measurement", marker=".", markersize=3, markeredgewidth=0, alpha=0.6)
+        )
         (edges,) = left.plot([], [], **style.look("truth"))
         names = [
-            left.annotate(n, (0, 0), xytext=(9, 7), textcoords="offset points", fontweight="bold") for n in ("O", "X", "Y")
+            left.annotate(n, (0, 0), xytext=(9, 7), textcoords="offset points", fontweight="bold")
+            for n in ("O", "X", "Y")
         ]
         pairs = draw.compare_errors(right)
 
@@ -322,8 +328,8 @@ def svd_against_gram_schmidt():
         scene=scene,
         compute=compute_svd_against_gram_schmidt,
         handles={
-            "X": Handle((100.0, 0.0), step=1.0, bounds=((10, 130), (0, 0)), label="x point"),
-            "Y": Handle((30.0, 60.0), step=1.0, bounds=((-20, 130), (2, 100)), label="y point"),
+            "X": Handle((100.0, 0.0), step=1.0, bounds=((10, 120), (0, 0)), label="x point"),
+            "Y": Handle((30.0, 60.0), step=1.0, bounds=((-20, 120), (2, 95)), label="y point"),
         },
         controls={"std": slider(0.1, 4.0, 2.0, step=0.1, label="noise a coordinate (mm)")},
         fail={"X": (15.0, 0.0)},

@@ -77,7 +77,7 @@ function render({ model, el }) {
       shown = message.picture;
       root.dataset.python = message.milliseconds;
       root.dataset.picture = message.picture;
-      if (flight === null && Object.keys(pending).length === 0) model.send({ shown });
+      if (message.serial === null && flight === null && Object.keys(pending).length === 0) model.send({ shown });
       flush();
     }
     drawing = false;
@@ -99,7 +99,10 @@ function render({ model, el }) {
     canvas.dataset.empty = message.empty;
     canvas.dataset.click = message.click;
     canvas.dataset.keys = message.keys;
-    if (message.keys || message.empty === "turn") canvas.tabIndex = 0;
+    if (message.keys || message.empty === "turn") {
+      canvas.tabIndex = 0;
+      canvas.setAttribute("role", "application"); // a screen reader passes arrow keys on to it
+    }
     canvas.setAttribute("aria-label", [message.name, message.caption].filter(Boolean).join(": "));
     if (caption.textContent !== message.caption) {
       caption.textContent = message.caption;

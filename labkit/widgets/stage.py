@@ -1,6 +1,7 @@
-"""Stage: the one base of all interaction. A live figure with draggable handles, at most three controls, Reset and "Make it fail".
+"""Stage: the base of all interaction, a live figure with handles, at most three controls, Reset, "Make it fail".
 
-A Stage is four small things: a pure function from state to result, a scene that draws it, handles one can drag, and a way to make it fail:
+A Stage is four small things: a pure function from state to result, a scene that draws it, handles one can drag, and a
+way to make it fail:
 
     from .stage import Handle, Stage, slider
 
@@ -21,34 +22,43 @@ A Stage is four small things: a pure function from state to result, a scene that
                      fail={"Q": (1, 2)},                  # what "Make it fail" changes, on top of the initial state
                      describe=lambda result: f"The points are {result['distance']:.1f} mm apart.")
 
-The state is a dict: handle name -> array([x, y]) in data coordinates, control name -> value, "t" (s) with `play`, "view" with `view`,
-"click" -> array([x, y]) or None, "brush" -> array (n, 2), "memory" with `advance`. Functions get a copy they may not write into.
+The state is a dict: handle name -> array([x, y]) in data coordinates, control name -> value, "t" (s) with `play`,
+"view" with `view`, "click" -> array([x, y]) or None, "brush" -> array (n, 2), "memory" with `advance`. Functions get a
+copy they may not write into.
 
-Speed. The aim is 50 ms from event to picture. Only the artists returned by the scene are drawn in a frame; everything else is background, kept
-until something in it changes (limits, titles, ticks, legend), which costs about 40 ms. So: keep limits fixed, return as artists all that
-moves, use one artist with many points rather than many artists, `set_data` and friends rather than new artists, and put changing numbers into `ax.text`
-returned as an artist, not into titles. Artists are drawn in order of their zorder, always above the background.
+Speed. The aim is 50 ms from event to picture. Only the artists returned by the scene are drawn in a frame; everything
+else is background, kept until something in it changes (limits, titles, ticks, legend), which costs about 40 ms. So:
+keep limits fixed, return as artists all that moves, use one artist with many points rather than many artists,
+`set_data` and friends rather than new artists, and put changing numbers into `ax.text` returned as an artist, not into
+titles. Artists are drawn in order of their zorder, always above the background.
 
-Colors come from `figures.style`; the dark theme is applied while drawing, nothing is to be done for it. Colormapped images stay as they are.
+Colors come from `figures.style`; the dark theme is applied while drawing, nothing is to be done for it. Colormapped
+images stay as they are.
 
 What else there is
 ------------------
-constrain : handles that must follow a rule beyond `bounds`. `constrain(state, moved)` returns {name: value} to correct, before anything is
-    computed; `moved` is the set of names that changed (all names at the start). The picture's handle goes where it returns.
-Handle((x, y, z)) : a point of a 3D scene; needs `view`. It is drawn where `state["view"].project` puts it in the axes, and dragged in the plane of
-    the screen.
-view=View(azimuth_deg, elevation_deg) : dragging empty space (or arrow keys on the picture) turns `state["view"]`; see `figures.scene3d`.
+constrain : handles that must follow a rule beyond `bounds`. `constrain(state, moved)` returns {name: value} to
+    correct, before anything is computed; `moved` is the set of names that changed (all names at the start). The
+    picture's handle goes where it returns.
+Handle((x, y, z)) : a point of a 3D scene; needs `view`. It is drawn where `state["view"].project` puts it in the axes,
+    and dragged in the plane of the screen.
+view=View(azimuth_deg, elevation_deg) : dragging empty space (or arrow keys on the picture) turns `state["view"]`; see
+    `figures.scene3d`.
 play=Play(t_max, dt) : play, pause and a slider of time; `state["t"]` runs from 0 to t_max (s).
 click=True (or the number of the axes) : `state["click"]` is the place clicked last, None at first.
-brush=True (or the number of the axes) : `state["brush"]` is the path of the stroke being drawn in empty space (the last one, once drawn).
+brush=True (or the number of the axes) : `state["brush"]` is the path of the stroke being drawn in empty space (the
+    last one, once drawn).
 keys=True : arrow keys on the focused picture are events "up", "down", "left", "right" for `advance`.
-start, advance : simulations that go on from what was. `start(state)` returns the memory (at the start, at Reset and at a preset),
-    `advance(state, event)` returns the next one: event is "tick" (each dt of `play`), "up" ... "right", "click" or "brush".
-    Both functions see the memory so far as `state["memory"]` and return a new one, or the old one changed; draw random numbers from an rng in it.
-stage.set(**changes) : the same from Python, from any thread or asyncio task; a few dozen times a second are fine, the newest wins.
+start, advance : simulations that go on from what was. `start(state)` returns the memory (at the start, at Reset and at
+    a preset), `advance(state, event)` returns the next one: event is "tick" (each dt of `play`), "up" ... "right",
+    "click" or "brush". Both functions see the memory so far as `state["memory"]` and return a new one, or the old one
+    changed; draw random numbers from an rng in it.
+stage.set(**changes) : the same from Python, from any thread or asyncio task; a few dozen times a second are fine, the
+newest wins.
 
-Errors. A Stage whose compute, scene or update raises cannot be built. Later, while it is being used, the sentence of a ValueError (or the type and text of
-anything else) appears under the figure and the last good picture stays; with the environment variable LABKIT_STRICT=1 it is raised as well.
+Errors. A Stage whose compute, scene or update raises cannot be built. Later, while it is being used, the sentence of a
+ValueError (or the type and text of anything else) appears under the figure and the last good picture stays; with the
+environment variable LABKIT_STRICT=1 it is raised as well.
 """
 
 import os
@@ -70,16 +80,19 @@ __all__ = ["Handle", "Play", "Stage", "View", "choice", "slider", "toggle"]
 
 MAX_CONTROLS = 3
 ORBIT_DEG_PER_PIXEL = 0.5
-MAX_UNSEEN = 2  # pictures on their way to the browser; further ones wait until it has shown them, and then only the newest is drawn
+# pictures on their way to the browser; further ones wait until it has shown them, and then only the newest is drawn
+MAX_UNSEEN = 2
 RESERVED = ("t", "view", "click", "brush", "memory")
 
 
 @dataclass(frozen=True)
 class Handle:
-    """A point to drag. Two coordinates: data coordinates of the axes number `ax`. Three: a point in space, for Stages with a view.
+    """A point to drag. Two coordinates: data coordinates of the axes number `ax`. Three: a point in space, for Stages
+    with a view.
 
     step : what an arrow key moves it by (ten times with Shift); by default a hundredth of the axes' width.
-    bounds : ((x_low, x_high), (y_low, y_high)[, (z_low, z_high)]); equal ends fix a coordinate. Drags end at the axes' limits anyway.
+    bounds : ((x_low, x_high), (y_low, y_high)[, (z_low, z_high)]); equal ends fix a coordinate. Drags end at the axes'
+        limits anyway.
     label : what a screen reader calls it (default: its name); color : of its ring, one of `figures.style`.
     """
 
@@ -123,12 +136,12 @@ class slider:
             return ipywidgets.IntSlider(min=self.low, max=self.high, step=self.step or 1, **options)
         if self.log:
             low, high = np.log10([self.low, self.high])
-            return ipywidgets.FloatLogSlider(min=low, max=high, step=(high - low) / 100, readout_format=".2g", **options)
+            return ipywidgets.FloatLogSlider(
+                min=low, max=high, step=(high - low) / 100, readout_format=".2g", **options
+            )
         step = self.step or (self.high - self.low) / 100
         decimals = max(0, int(np.ceil(-np.log10(step) - 1e-9)))
-        return ipywidgets.FloatSlider(
-            min=self.low, max=self.high, step=step, readout_format=f".{decimals}f", **options
-        )
+        return ipywidgets.FloatSlider(min=self.low, max=self.high, step=step, readout_format=f".{decimals}f", **options)
 
 
 @dataclass(frozen=True)
@@ -211,7 +224,7 @@ class Stage(ipywidgets.VBox):
     describe : function(result) -> str, optional
         One sentence under the figure, also for screen readers.
     size : (width, height)
-        In inches of 100 CSS pixels, at most; 7 inches fill JupyterLab's usual cell.
+        In inches of 100 CSS pixels, at most; JupyterLab's usual cell is 7 to 9 inches wide.
 
     play, view, constrain, click, brush, keys, start, advance: see the module's docstring.
 
@@ -222,15 +235,17 @@ class Stage(ipywidgets.VBox):
     """
 
     def __init__(
-        self, name, *, scene, compute, fail, handles=None, controls=None, presets=None, play=None, view=None, size=(7.0, 4.2),
-        describe=None, constrain=None, click=None, brush=None, keys=False, start=None, advance=None,
+        self, name, *, scene, compute, fail, handles=None, controls=None, presets=None, describe=None, size=(7.0, 4.2),
+        play=None, view=None, constrain=None, click=None, brush=None, keys=False, start=None, advance=None,
     ):  # fmt: skip
         super().__init__()
         self.name = name
         self._handles, self._controls, self._play, self._presets = handles or {}, controls or {}, play, {}
         self._compute, self._describe, self._constrain = compute, describe, constrain
         self._start, self._advance, self._keys = start, advance, keys
-        self._click, self._brush = (None if a is None or a is False else int(a is not True and a) for a in (click, brush))
+        self._click, self._brush = (
+            None if a is None or a is False else int(a is not True and a) for a in (click, brush)
+        )
         self._check_options(view)
         self._state = {
             **{key: handle.at for key, handle in self._handles.items()},
@@ -263,14 +278,18 @@ class Stage(ipywidgets.VBox):
     def _check_options(self, view):
         where = f"Stage {self.name!r}"
         if len(self._controls) > MAX_CONTROLS:
-            raise ValueError(f"{where}: at most {MAX_CONTROLS} controls, got {len(self._controls)}: split it into two figures")
+            raise ValueError(
+                f"{where}: at most {MAX_CONTROLS} controls, got {len(self._controls)}: split it into two figures"
+            )
         names = [*self._handles, *self._controls]
         for key in names:
             if names.count(key) > 1 or key in RESERVED:
                 raise ValueError(f"{where}: the name {key!r} is used twice or reserved ({', '.join(RESERVED)})")
         for key, handle in self._handles.items():
             if len(handle.at) not in (2, 3) or (len(handle.at) == 3 and view is None):
-                raise ValueError(f"{where}: handle {key!r} must have 2 coordinates, or 3 and the Stage a view; got {handle.at}")
+                raise ValueError(
+                    f"{where}: handle {key!r} must have 2 coordinates, or 3 and the Stage a view; got {handle.at}"
+                )
         if self._keys and not self._advance:
             raise ValueError(f"{where}: keys=True needs advance(state, event), which says what a key does")
         if (self._start is None) != (self._advance is None):
@@ -398,8 +417,8 @@ class Stage(ipywidgets.VBox):
         self._play_widget = ipywidgets.Play(min=0, max=steps, step=stride, interval=interval, show_repeat=False)
         self._play_widget.observe(lambda change: self._on_time(change["new"] * self._play.dt), "value")
         self._time = ipywidgets.FloatSlider(
-            min=0.0, max=self._play.t_max, step=self._play.dt, description="t (s)", readout_format=".2f", disabled=bool(self._advance),
-            style={"description_width": "initial"}, layout=_wide("t (s)"),
+            min=0.0, max=self._play.t_max, step=self._play.dt, description="t (s)", readout_format=".2f",
+            disabled=bool(self._advance), style={"description_width": "initial"}, layout=_wide("t (s)"),
         )  # fmt: skip
         self._time.observe(lambda change: self._on_time(change["new"]), "value")
         return _row([self._play_widget, self._time])
@@ -460,7 +479,7 @@ class Stage(ipywidgets.VBox):
         return changes, events
 
     def _moved(self, key, to=None, steps=None):
-        """Where a handle goes by a drag to a fraction of the picture, or by steps (right, up), inside its axes and bounds."""
+        """Where a handle goes: dragged to a fraction of the picture, or by steps (right, up); in axes and bounds."""
         handle, at = self._handles[key], self._state[key]
         ax = self._picture.fig.axes[handle.ax]
         view = self._state.get("view")
@@ -475,7 +494,7 @@ class Stage(ipywidgets.VBox):
         return self._bounded(key, there if len(at) == 2 else at + view.unproject(there - here))
 
     def _show_picture(self, reply=None):
-        """One picture to the browser, unless it has not yet shown the last ones: then it gets the newest as soon as it has."""
+        """One picture to the browser; one that has not yet shown the last two gets the newest as soon as it has."""
         if not self._attached:
             return
         if reply is None and self._sent - self._shown >= MAX_UNSEEN:
@@ -483,6 +502,8 @@ class Stage(ipywidgets.VBox):
             return
         self._waiting = False
         self._sent += 1
+        if reply is not None:
+            self._shown = self._sent  # the page waits for this one
         png = self._picture.png()
         front = {
             "picture": self._sent,
