@@ -31,7 +31,11 @@ MEDIAN_CHI3 = (
 )
 TUKEY_CUT = 5.0  # residuals beyond this many standard deviations get the weight 0
 SUBSETS = 60  # random pose subsets of the robust start: with a quarter of bad poses one of them is clean with 1 - 1e-5
-FIELD = ((-25.0, 25.0), (3.0, 25.0), (190.0, 290.0))  # mm: x, |y| and z of a sphere center whose arc the scanner sees well
+FIELD = (
+    (-25.0, 25.0),
+    (3.0, 25.0),
+    (190.0, 290.0),
+)  # mm: x, |y| and z of a sphere center whose arc the scanner sees well
 _IRRATIONAL = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0]) % 1.0
 _EYE = np.eye(3)
 _GENERATORS = skew(_EYE)  # derivatives of a small rotation about x, y, z
@@ -455,7 +459,8 @@ def field_problem(x_S):
         bad = (values < low - 1e-9) | (values > high + 1e-9)
         if bad.any():
             name = "|y|" if axis == "y" else axis
-            return f"in {bad.sum()} poses the sphere lies at {name} = {values[bad].ravel()[0]:.1f} mm, outside {low:g} to {high:g}."
+            first = values[bad].ravel()[0]
+            return f"in {bad.sum()} poses the sphere lies at {name} = {first:.1f} mm, outside {low:g} to {high:g}."
     return None
 
 
@@ -563,6 +568,44 @@ def li_two_step(T_BF, x_S, max_turn_deg=0.01):
     T_FS = np.eye(4)
     T_FS[:3, :3], T_FS[:3, 3] = R_FS, u[:3]
     return T_FS, u[3:]
+
+
+def compare_methods(repeats, std, rng):
+    """Errors of the literature's methods and of the joint fit, on simulated poses that suit all of them.
+
+    Each repeat draws a scanner, twelve poses turned about all axes and four that only translate the first, with a
+    sphere in the scanner's field and noise `std` (mm) on each coordinate; Kim's method gets the eight corners of a 60
+    mm cube in place of the sphere.
+
+    Returns
+    -------
+    errors : dict
+        {method: rms error of the translation of T_FS (mm)}.
+    bound : float
+        The Cramer-Rao bound of one sphere (mm), rms over the repeats.
+    """
+    errors, bounds = {}, []
+    corners = 60.0 * (np.indices((2, 2, 2)).reshape(3, 8).T - 0.5)
+    for _ in range(repeats):
+        T_FS, target = pose(exp_so3(rng.uniform(-1, 1, 3)), rng.uniform(-100, 100, 3)), rng.uniform(-500, 500, 3)
+        places = np.column_stack([rng.uniform(-25, 25, 12), rng.uniform(-20, 20, 12), rng.uniform(190, 290, 12)])
+        T_BF = poses_that_see(T_FS, target, exp_so3(rng.uniform(-1, 1, (12, 3))), places)
+        shifts = np.concatenate([30 * np.eye(3), [[-30.0, 20.0, 10.0]]])
+        T_BF = np.concatenate([T_BF, T_BF[:1] @ pose(np.tile(np.eye(3), (4, 1, 1)), shifts)])
+        exact = transform(invert(T_FS), transform(invert(T_BF), target))
+        seen = exact + std * rng.normal(size=exact.shape)
+        cube = transform(invert(T_BF @ T_FS)[:, None], corners + target)
+        cube = cube + std * rng.normal(size=cube.shape)
+        found = {
+            "joint fit (sphere)": calibrate_sphere_target(T_BF, seen).T_FS,
+            "linear start (sphere)": linear_start(T_BF, seen)[0],
+            "Li et al. (sphere)": li_two_step(T_BF, seen)[0],
+            "Kim, Cho, Kim (cube)": kim_linear(T_BF, cube, corners),
+        }
+        for name, T in found.items():
+            errors.setdefault(name, []).append(np.linalg.norm(T[:3, 3] - T_FS[:3, 3]))
+        bounds.append(np.trace(predicted_covariance(T_BF, T_FS, target, std)[3:6, 3:6]))
+    return {name: float(np.sqrt(np.mean(np.square(e)))) for name, e in errors.items()}, float(np.sqrt(np.mean(bounds)))
 
 
 # --- inside ----------------------------------------------------------------------------------------------------------

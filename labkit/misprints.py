@@ -6,6 +6,7 @@ predicted again. A slip that removes the residual in all three axes, where hundr
 row's neighbors in the measuring pattern are the second witness.
 """
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +23,7 @@ SLIPS = (
     "decimal point moved",
 )
 SUSPICIOUS = 6.0  # residual length in standard deviations of one coordinate: a normal error exceeds it with 1e-7
-TURNED = np.deg2rad(0.3)  # a pose turned farther than this from the middle of its neighbors breaks the pattern
+TURNED = np.deg2rad(0.2)  # a pose turned farther than this from the middle of its neighbors breaks the pattern
 EXPLAINED = 4.0  # a slip explains a row when what remains is shorter than this
 
 
@@ -81,6 +82,13 @@ def single_slips(text):
     return found
 
 
+@functools.lru_cache(maxsize=1024)
+def _slips_and_values(text):
+    """The slips of a text as (corrected, slip) pairs, and their values."""
+    slips = tuple(single_slips(text).items())
+    return slips, np.array([float(corrected) for corrected, _ in slips])
+
+
 def explanations(entries, pose, T_FS, target, std):
     """Slips of one row that bring its residual below `EXPLAINED` standard deviations, the most credible first.
 
@@ -104,24 +112,20 @@ def explanations(entries, pose, T_FS, target, std):
     """
     columns = [("C14", c) for c in POSE_COLUMNS] + [("C17", c) for c in CENTER_COLUMNS]
     texts = [entries[table, pose, column] for table, column in columns]
+    tables = [_slips_and_values(text) for text in texts]
+    place = np.repeat(np.arange(len(texts)), [len(values) for _, values in tables])  # the entry each trial changes
+    labels = [slip for slips, _ in tables for slip in slips]
     row = np.array(list(map(float, texts)))
-    trials, labels = [row], [None]
-    for k, text in enumerate(texts):
-        for corrected, slip in single_slips(text).items():
-            trial = row.copy()
-            trial[k] = float(corrected)
-            trials.append(trial)
-            labels.append((*columns[k], text, corrected, slip))
-    trials = np.array(trials)
+    trials = np.tile(row, (len(labels) + 1, 1))  # the last one stays as printed
+    trials[np.arange(len(labels)), place] = np.concatenate([values for _, values in tables])
     T_BF = frames.matrix_from_kuka(frames.kuka_from_degrees(trials[:, :6]))
     lengths = np.linalg.norm(handeye.sphere_residuals(T_BF, trials[:, 6:], T_FS, target), axis=1)
     halfway = _halfway(measurements_from(entries), pose - 1)
     found = []
-    for k in np.flatnonzero(lengths <= EXPLAINED * std):
-        if labels[k]:
-            table, column, printed, corrected, slip = labels[k]
-            turn = np.nan if halfway is None else float(frames.rotation_angle(halfway.T @ T_BF[k, :3, :3]))
-            found.append(Explanation(table, pose, column, printed, corrected, slip, lengths[0], lengths[k], turn))
+    for k in np.flatnonzero(lengths[:-1] <= EXPLAINED * std):
+        (corrected, slip), (table, column) = labels[k], columns[place[k]]
+        turn = np.nan if halfway is None else float(frames.rotation_angle(halfway.T @ T_BF[k, :3, :3]))
+        found.append(Explanation(table, pose, column, texts[place[k]], corrected, slip, lengths[-1], lengths[k], turn))
     return sorted(found, key=lambda e: (e.turn > TURNED, SLIPS.index(e.slip) > 1, e.after))
 
 

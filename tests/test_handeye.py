@@ -328,3 +328,26 @@ def test_simulation_inputs_give_the_printed_coordinates():
     T_FS = frames.matrix_from_kuka(frames.kuka_from_degrees(scanner))
     T_BF, x_S, _, _ = handeye_data.simulation(printed=True)
     assert handeye.rms_distance(handeye.sphere_residuals(T_BF, x_S, T_FS, target)) > 10
+
+
+def test_poses_that_see_put_the_sphere_where_asked():
+    rng = np.random.default_rng(0)
+    x_S = rng.uniform(-20, 20, (5, 3)) + [0, 0, 240]
+    T_BF = handeye.poses_that_see(T_FS0, TARGET0, exp_so3(rng.uniform(-1, 1, (5, 3))), x_S)
+    seen = frames.transform(frames.invert(T_FS0), frames.transform(frames.invert(T_BF), TARGET0))
+    np.testing.assert_allclose(seen, x_S, atol=1e-9)
+
+
+def test_pattern_stays_in_the_field_and_within_the_tilt():
+    T_BF = handeye.pattern(T_FS0, TARGET0, 0.6, (25, 25, 50))
+    seen = frames.transform(frames.invert(T_FS0), frames.transform(frames.invert(T_BF), TARGET0))
+    assert handeye.field_problem(seen) is None
+    down = T_BF[:, :3, :3] @ T_FS0[:3, 2]
+    assert np.arccos(-down[:, 2]).max() <= 0.6 + 1e-9
+    assert "outside 190 to 290" in handeye.field_problem(seen + [0, 0, 200])
+
+
+def test_methods_of_the_literature_do_not_beat_the_bound():
+    errors, bound = handeye.compare_methods(25, 0.1, np.random.default_rng(4))
+    assert errors["joint fit (sphere)"] < 1.35 * bound
+    assert errors["Li et al. (sphere)"] > errors["joint fit (sphere)"]

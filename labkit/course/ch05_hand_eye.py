@@ -500,6 +500,13 @@ CHAPTER = Chapter(
                 Mistake(_not_restored, "After a variable has been moved it must go back before the next one moves: work on a fresh copy of x."),
             ],
         ),
+        Prediction(
+            "step",
+            question="With which step is a central difference by the angle A most accurate here?",
+            choices=("near 0.0000001 deg", "near 0.001 deg", "near 1 deg"),
+            answer="near 0.001 deg",
+            why="Rounding grows as 1/h, curvature as h^2: they meet near the cube root of the machine's precision. The listing's step is too small.",
+        ),
         Exercise(
             "analytic_jacobian",
             reference=analytic_jacobian,
@@ -547,10 +554,10 @@ CHAPTER = Chapter(
         ),
         Prediction(
             "pole",
-            question="The scanner sits at B = -90 deg. What do steps in A, B, C do there that a step on the right of the pose does not?",
-            choices=("they diverge", "they wander in A and C", "nothing"),
-            answer="they wander in A and C",
-            why="At the pole only A + C counts. The step along A - C is arbitrary and can be enormous, while the pose itself may still arrive.",
+            question="The scanner sits next to B = -90 deg. What do Gauss-Newton steps in A, B, C do that steps on the pose do not?",
+            choices=("they never arrive", "they take detours", "nothing"),
+            answer="they take detours",
+            why="Near the pole A and C turn about one line: their steps become huge and nearly cancel. The pose often arrives, after three times the steps.",
         ),
         Exercise(
             "linear_start",
@@ -613,6 +620,13 @@ CHAPTER = Chapter(
                 Mistake(_weights(lambda r: (r < 5 * np.median(r) / handeye.MEDIAN_CHI3).astype(float)),
                         "You cut off sharply. Tukey's weight falls smoothly, so that no pose decides by crossing a line."),
             ],
+        ),
+        Prediction(
+            "slip",
+            question="Pose 3 is printed with x = 1379.64 and misses the sphere by 18.27 mm along -x. What happened?",
+            choices=("the robot sagged", "a digit is missing", "two digits changed places"),
+            answer="two digits changed places",
+            why="1397.64 is 18.00 mm farther, and the neighbors on the line stand at 1397.6 to 1398.1. Then 0.45 mm remain, like everywhere else.",
         ),
         Exercise(
             "find_misprints",
