@@ -17,6 +17,8 @@ pyproject.toml, constraints.txt, the place of this folder or the version of Pyth
 """
 
 import argparse
+import contextlib
+import errno
 import hashlib
 import json
 import os
@@ -24,6 +26,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent
@@ -118,10 +121,28 @@ def set_up(root):
     folder = root / ".venv"
     python = venv_python(folder)
     stamp_file = folder / "labkit-stamp.json"
-    version = version_of(python)
-    if version and read_stamp(stamp_file) == stamp(root, version):
+    if is_ready(root, python, stamp_file):
         return str(python)
-    if read_stamp(stamp_file).get("python") != version or not works(python, "-m", "pip", "--version"):
+    with only_one(root / ".lab" / "setup.lock"):
+        if not is_ready(root, python, stamp_file):
+            make_ready(root, python, stamp_file)
+    return str(python)
+
+
+def is_ready(root, python, stamp_file):
+    """Whether the environment is what pyproject.toml and constraints.txt ask for."""
+    version = version_of(python)
+    return version is not None and read_stamp(stamp_file) == stamp(root, version)
+
+
+def make_ready(root, python, stamp_file):
+    folder = root / ".venv"
+    version = version_of(python)
+    if (
+        version is None
+        or read_stamp(stamp_file).get("python") != version
+        or not works(python, "-m", "pip", "--version")
+    ):
         make_venv(folder)
     if stamp_file.exists():
         stamp_file.unlink()
@@ -134,7 +155,37 @@ def set_up(root):
     settings.mkdir(parents=True, exist_ok=True)
     (settings / "overrides.json").write_text(json.dumps(OVERRIDES, indent=1) + "\n", encoding="utf-8")
     stamp_file.write_text(json.dumps(stamp(root, version_of(python))), encoding="utf-8")
-    return str(python)
+
+
+@contextlib.contextmanager
+def only_one(path):
+    """Two set-ups at once would ruin each other: the second waits. The lock falls when its process ends, however."""
+    path.parent.mkdir(exist_ok=True)
+    with path.open("a+b") as file:
+        try:
+            lock(file, wait=False)
+        except OSError:
+            print("Another window is setting up; waiting for it ...", flush=True)
+            lock(file, wait=True)
+        yield
+
+
+def lock(file, wait):
+    """Lock a file until it is closed; without `wait` an OSError says that another process holds it."""
+    try:
+        import fcntl
+    except ImportError:
+        import msvcrt
+
+        file.seek(0)
+        while True:
+            try:
+                return msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+            except OSError:
+                if not wait:
+                    raise
+                time.sleep(1)
+    fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
 
 
 def venv_python(folder, windows=os.name == "nt"):
@@ -188,7 +239,8 @@ def make_venv(folder):
 
 
 def venv_advice(output):
-    if "ensurepip" in output or "No module named venv" in output:
+    said = " ".join(output.split())
+    if "ensurepip is not available" in said or "No module named venv" in said or "No module named ensurepip" in said:
         return (
             "Python's module for virtual environments is missing. On Debian and Ubuntu it comes with: "
             "sudo apt install python3-venv   Then run this again."
@@ -260,6 +312,7 @@ def lab_command(python, ip, port, no_browser):
         f"--ServerApp.port={port}",
         f"--LabApp.default_url=/lab/tree/{FIRST_NOTEBOOK}",
         "--LabApp.extension_manager=readonly",
+        "--ServerApp.kernel_websocket_connection_class=labkit.widgets.connection.PromptConnection",
         *(["--no-browser"] if no_browser else []),
     ]
 
@@ -281,18 +334,22 @@ def choose_port(ip, wanted=None):
 
 
 def is_free(ip, port):
-    """Whether a server may listen there; an address this machine does not have is refused."""
-    try:
-        family, kind, protocol, _, address = socket.getaddrinfo(ip, port, type=socket.SOCK_STREAM)[0]
-    except OSError:
-        raise Refusal(f"{ip} is no address of this machine. Leave --ip out to listen on localhost.") from None
-    with socket.socket(family, kind, protocol) as probe:
-        if os.name != "nt":
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(address)
-        except OSError:
-            return False
+    """Whether a server may listen there, at every address a name stands for; refuses one this machine does not have."""
+    own = False
+    with contextlib.suppress(socket.gaierror):
+        for family, kind, protocol, _, address in socket.getaddrinfo(ip, port, type=socket.SOCK_STREAM):
+            try:
+                with socket.socket(family, kind, protocol) as probe:
+                    if os.name != "nt":
+                        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                    probe.bind(address)
+            except OSError as error:
+                if error.errno in (errno.EADDRINUSE, errno.EACCES):
+                    return False
+                continue  # such as ::1 on a machine without IPv6
+            own = True
+    if not own:
+        raise Refusal(f"{ip} is no address of this machine. Leave --ip out to listen on localhost.")
     return True
 
 

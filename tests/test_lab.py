@@ -91,6 +91,19 @@ def test_an_unfinished_set_up_is_redone(fake_set_up, checkout, monkeypatch, stop
     assert fake_set_up() == []
 
 
+def test_a_second_set_up_waits_for_the_first(checkout):
+    """A second process asks for the lock while this one holds it, and gets it afterwards."""
+    code = "import lab, pathlib, sys\nwith lab.only_one(pathlib.Path(sys.argv[1])): print('got it')"
+    path = checkout / ".lab" / "setup.lock"
+    with lab.only_one(path):
+        second = subprocess.Popen(
+            [sys.executable, "-u", "-c", code, str(path)], cwd=source.ROOT, stdout=subprocess.PIPE, text=True
+        )
+        assert "waiting" in second.stdout.readline()
+        assert second.poll() is None
+    assert second.communicate(timeout=20)[0] == "got it\n"
+
+
 def test_a_damaged_stamp_counts_as_none(tmp_path):
     for text in ("", "[1]", "{"):
         (tmp_path / "stamp").write_text(text, encoding="utf-8")
@@ -125,7 +138,7 @@ def test_an_old_python_is_refused_before_anything_else(monkeypatch, capsys):
     ("output", "words"),
     [
         (
-            "The virtual environment was not created because ensurepip is not available.",
+            "The virtual environment was not created because ensurepip is not\navailable.",
             "sudo apt install python3-venv",
         ),
         ("/usr/bin/python3: No module named venv", "sudo apt install python3-venv"),
@@ -219,8 +232,16 @@ def test_a_taken_port_is_avoided_or_named(monkeypatch, capsys):
             lab.choose_port("127.0.0.1")
     with pytest.raises(lab.Refusal, match="from 1 to 65535, and 99999 is none"):
         lab.choose_port("localhost", 99999)
-    with pytest.raises(lab.Refusal, match="no address of this machine"):
-        lab.choose_port("no.such.host.invalid")
+    for ip in ("no.such.host.invalid", "192.0.2.1"):
+        with pytest.raises(lab.Refusal, match="no address of this machine"):
+            lab.choose_port(ip)
+
+
+def test_localhost_is_taken_when_any_of_its_addresses_is():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        assert not lab.is_free("localhost", taken.getsockname()[1])
 
 
 def test_signals_and_exit_codes_are_handed_on():

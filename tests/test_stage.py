@@ -154,6 +154,8 @@ def test_presets():
         ({"start": lambda state: 0}, "come together"),
         ({"view": View(), "brush": True}, "both view and brush"),
         ({"fail": {"zz": 1}}, "has no 'zz'"),
+        ({"handles": {"a": Handle((0, 0), ax=1)}}, "a wants axes 1, but the scene has 1"),
+        ({"click": 2}, "click wants axes 2"),
     ],
 )
 def test_options_are_checked(options, sentence):
@@ -492,3 +494,22 @@ def test_colors_stand_out_from_the_paper(dark):
     assert contrast(style.INK) > 12 and contrast(style.MUTED) > 4.5  # words
     for color in (*style.AXES, style.MEASUREMENT, style.PREDICTION, style.ESTIMATE):
         assert contrast(color) > (4 if dark else 2.2)
+
+
+def test_pictures_leave_the_server_at_once(monkeypatch):
+    from jupyter_server.services.kernels.connection.channels import ZMQChannelsWebsocketConnection
+
+    from labkit.widgets.connection import PromptConnection
+
+    calls = []
+
+    class Handler:
+        def set_nodelay(self, on):
+            calls.append(on)
+
+    monkeypatch.setattr(ZMQChannelsWebsocketConnection, "connect", lambda self: calls.append("connect"))
+    connection = PromptConnection.__new__(PromptConnection)
+    connection._trait_values["websocket_handler"] = Handler()
+    connection.connect()
+    assert calls == [True, "connect"]
+    assert f"{PromptConnection.__module__}.{PromptConnection.__name__}" in (ROOT / "lab.py").read_text(encoding="utf-8")

@@ -32,8 +32,12 @@ keep limits fixed, return as artists all that moves, use one artist with many po
 `set_data` and friends rather than new artists, and put changing numbers into `ax.text` returned as an artist, not into
 titles. Artists are drawn in order of their zorder, always above the background.
 
-Colors come from `figures.style`; the dark theme is applied while drawing, nothing is to be done for it. Colormapped
-images stay as they are.
+Looks. Colors come from `figures.style`; the dark theme is applied while drawing, nothing is to be done for it
+(colormapped images stay as they are). The axes are laid out once a size, with what the scene drew at first. Narrow
+cells crowd the picture to 85 % of `size` and then scale it down, so leave words that much room.
+
+Tests need no browser: `stage.set(P=(3, 2))`, then `stage.result`, `stage.caption`, `stage.status`, `stage.png()`;
+`stage.make_it_fail()`, `stage.reset()`, `stage.buttons["name of a preset"].click()`.
 
 What else there is
 ------------------
@@ -162,12 +166,14 @@ class choice:
         return value
 
     def widget(self, name):
-        kind = ipywidgets.ToggleButtons if len(self._pairs) <= 3 else ipywidgets.Dropdown
-        return kind(
-            options=self._pairs, value=self.value, description=self.label or name,
-            style={"description_width": "initial", **({"button_width": "auto"} if len(self._pairs) <= 3 else {})},
-            layout={"width": "max-content", "max_width": "100%"},
-        )  # fmt: skip
+        label, words = self.label or name, [word for word, _ in self._pairs]
+        options = {"options": self._pairs, "value": self.value, "description": label}
+        if len(words) > 3:
+            layout = {"width": f"{6 + 0.55 * (len(label) + max(map(len, words))):.0f}em", "max_width": "100%"}
+            return ipywidgets.Dropdown(style={"description_width": "initial"}, layout=layout, **options)
+        style = {"description_width": "initial", "button_width": "auto"}
+        layout = {"display": "flex", "width": "max-content", "max_width": "100%"}
+        return ipywidgets.ToggleButtons(style=style, layout=layout, **options)
 
 
 @dataclass(frozen=True)
@@ -262,6 +268,7 @@ class Stage(ipywidgets.VBox):
         self._attached = self._showing = False
         self._received = monotonic()
         self._picture = Picture(scene, size)
+        self._check_axes()
         self._correct(set(self._state))
         self.initial = dict(self._state)
         self._presets = {
@@ -296,6 +303,18 @@ class Stage(ipywidgets.VBox):
             raise ValueError(f"{where}: start and advance come together, got only one of them")
         if view is not None and self._brush is not None:
             raise ValueError(f"{where}: dragging empty space either turns the view or draws, got both view and brush")
+
+    def _check_axes(self):
+        count = len(self._picture.fig.axes)
+        for key, ax in {
+            **{k: h.ax for k, h in self._handles.items()},
+            "click": self._click,
+            "brush": self._brush,
+        }.items():
+            if ax is not None and not 0 <= ax < count:
+                raise ValueError(
+                    f"Stage {self.name!r}: {key} wants axes {ax}, but the scene has {count}, counted from 0"
+                )
 
     # -- state
 
@@ -560,7 +579,9 @@ def _frozen(array):
 
 
 def _row(children):
-    return ipywidgets.HBox(list(children), layout={"flex_flow": "row wrap", "align_items": "center"})
+    return ipywidgets.HBox(
+        list(children), layout={"flex_flow": "row wrap", "align_items": "center", "grid_gap": "0 10px"}
+    )
 
 
 def _at(picture, fraction):

@@ -116,7 +116,8 @@ class Lab:
         self.process = subprocess.Popen(
             [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", f"--port={port}", "--port-retries=0",
              f"--ServerApp.root_dir={folder}", f"--IdentityProvider.token={token}",
-             "--LabApp.expose_app_in_browser=True"],
+             "--LabApp.expose_app_in_browser=True",
+             "--ServerApp.kernel_websocket_connection_class=labkit.widgets.connection.PromptConnection"],
             env=env, cwd=folder, stdout=self.log, stderr=self.log,
         )  # fmt: skip
         self.url = f"http://127.0.0.1:{port}/lab/tree/stages.ipynb?token={token}"

@@ -1,0 +1,340 @@
+"""Chapter 4: gradient, Hessian, and the steps of Newton, Gauss-Newton and the trust region."""
+
+import numpy as np
+
+from .. import optimization as opt
+from .. import wells
+from . import metrics
+from .engine import Chapter, Exercise, Mistake, Prediction, Value
+
+
+def place(rng):
+    """A point around the two wells."""
+    return (rng.uniform(-3, 3, 2),)
+
+
+def turned(eigenvalues, angle):
+    """Symmetric 2x2 matrix with these eigenvalues, its axes turned by the angle."""
+    c, s = np.cos(angle), np.sin(angle)
+    V = np.array([[c, -s], [s, c]])
+    return V @ np.diag(eigenvalues) @ V.T
+
+
+def kind_of_point(rng):
+    """Gradient and Hessian of one of the four kinds of point; the saddle has two positive diagonal entries."""
+    angle = np.deg2rad(rng.uniform(30, 60))
+    small, large = rng.uniform(0.5, 1.0), rng.uniform(4.0, 8.0)
+    kind = rng.integers(4)
+    eigenvalues = ((small, large), (-large, -small), (-small, large), (small, large))[kind]
+    g = rng.normal(size=2) if kind == 3 else np.zeros(2)
+    return g, turned(eigenvalues, angle)
+
+
+def gradient_and_hessian(rng):
+    """A gradient and an indefinite or definite Hessian, far from singular."""
+    eigenvalues = rng.uniform(1, 6, 2) * rng.choice([-1, 1], 2)
+    return rng.normal(scale=5, size=2), turned(eigenvalues, rng.uniform(0.3, 1.2))
+
+
+def residual_and_jacobian(rng):
+    """Six residuals of two unknowns."""
+    return rng.normal(size=6), rng.normal(scale=2, size=(6, 2))
+
+
+def tried_step(rng):
+    """Cost before and after a step, with gradient and curvature of the model."""
+    g, B = rng.normal(scale=3, size=2), turned(rng.uniform(1, 4, 2), rng.uniform(0.3, 1.2))
+    step = -rng.uniform(0.1, 0.4) * g
+    cost = rng.uniform(5, 20)
+    return cost, cost - rng.uniform(0.2, 1.2) * opt.predicted_decrease(g, B, step), g, B, step
+
+
+def dogleg_case(rng):
+    """Gradient, positive definite curvature and a radius: shorter than the Cauchy point, between it and Newton, or beyond both."""
+    g, B = rng.normal(scale=4, size=2), turned((rng.uniform(0.4, 0.8), rng.uniform(3, 5)), rng.uniform(0.3, 1.2))
+    corner = np.linalg.norm(opt.cauchy_step(g, B, 1e9))
+    full = np.linalg.norm(opt.newton_step(g, B))
+    radius = (rng.uniform(0.3, 0.8) * corner, corner + rng.uniform(0.2, 0.8) * (full - corner), 1.5 * full)[rng.integers(3)]
+    return g, B, float(radius)
+
+
+# Wrong variants --------------------------------------------------------------------------------------------------------------------------
+
+
+def _terms(x, second=(-1.0, -2.0), one=1.0):
+    d = x - np.array([(1.0, 1.0), second])
+    return d, (d * d).sum(-1) + one
+
+
+def _gradient(power=2, **changes):
+    def variant(x):
+        d, q = _terms(x, **changes)
+        return (2 * wells.DEPTHS / q**power) @ d
+
+    return variant
+
+
+def _hessian(factor=8.0, power=3, bowl=1.0):
+    def variant(x):
+        d, q = _terms(x)
+        outer = np.einsum("k,ki,kj->ij", factor * wells.DEPTHS / q**power, d, d)
+        return bowl * (2 * wells.DEPTHS / q**2).sum() * np.eye(2) - outer
+
+    return variant
+
+
+def _diagonal_only(x):
+    return np.diag(np.diag(wells.hessian(x)))
+
+
+def _stationary(kind):
+    def variant(g, H):
+        return "not stationary" if np.linalg.norm(g) > 1e-6 else kind(H)
+
+    return variant
+
+
+def _by(signs):
+    """Kind by the signs of some numbers."""
+    return lambda H: "minimum" if (signs(H) > 0).all() else "maximum" if (signs(H) < 0).all() else "saddle"
+
+
+def _second_order_only(g, H):
+    return _by(np.linalg.eigvalsh)(H)
+
+
+def _first_order_only(g, H):
+    return "not stationary" if np.linalg.norm(g) > 1e-6 else "minimum"
+
+
+def _swapped(g, H):
+    return {"minimum": "maximum", "maximum": "minimum"}.get(opt.classify_extremum(g, H), opt.classify_extremum(g, H))
+
+
+def _predicted(g, B, step, half=0.5, sign=-1.0):
+    return sign * (g @ step) - half * step @ B @ step
+
+
+def _cut_newton(g, B, radius):
+    full = opt.newton_step(g, B)
+    return full * min(1.0, radius / np.linalg.norm(full))
+
+
+def _uncut_newton(g, B, radius):
+    return opt.newton_step(g, B)
+
+
+def _always_to_the_rim(g, B, radius):
+    step = opt.dogleg_step(g, B, radius)
+    return step * radius / np.linalg.norm(step)
+
+
+def _newton_or_rim(g, B, radius):
+    """The Newton point when it is inside, steepest descent to the rim otherwise."""
+    full = opt.newton_step(g, B)
+    return full if np.linalg.norm(full) <= radius else -radius * g / np.linalg.norm(g)
+
+
+def _leg_from_zero(g, B, radius):
+    """In the second leg: the right share of the leg, added to the start instead of to the corner."""
+    full, corner = opt.newton_step(g, B), opt.cauchy_step(g, B, 1e9)
+    step = opt.dogleg_step(g, B, radius)
+    second = np.linalg.norm(corner) < radius < np.linalg.norm(full)
+    return step - corner if second else step
+
+
+CHAPTER = Chapter(
+    "04-optimization",
+    [
+        Exercise(
+            "gradient",
+            reference=wells.gradient,
+            draw=place,
+            metric=metrics.numbers(1e-9),
+            hints=(
+                "Each well is −w/q with q = |x − c|² + 1. Differentiate it by the chain rule, q first.",
+                "The derivative of −w/q is (w/q²) times the gradient of q, and the gradient of q is 2(x − c).",
+                "`d1, d2 = x - [1, 1], x - [-1, -2]`, then `200 / q1**2 * d1 + 400 / q2**2 * d2`.",
+            ),
+            mistakes=[
+                Mistake(lambda x: wells.gradient(x) / 2, "Half of the gradient: the gradient of |x − c|² is 2(x − c), the 2 is missing."),
+                Mistake(lambda x: -wells.gradient(x), "This points downhill. The wells are −w/q, and the derivative of −1/q is +1/q² times that of q."),
+                Mistake(_gradient(power=1), "Your denominators are q, not q²: the derivative of 1/q is −1/q² times that of q."),
+                Mistake(_gradient(second=(1.0, 2.0)), "The second well sits at (−1, −2): its offsets are x1 + 1 and x2 + 2."),
+                Mistake(_gradient(one=0.0), "The 1 in q = |x − c|² + 1 is missing from your denominators."),
+            ],
+        ),
+        Prediction(
+            "top",
+            question="The parabola that fits f at the start bends downward, the start lies on the slope of the left well. Where does Newton end?",
+            choices=("in the left well", "in the right well", "on top of the pass"),
+            answer="on top of the pass",
+            why="Newton goes to the vertex of the parabola. Where f bends down, that vertex is a maximum.",
+        ),
+        Exercise(
+            "hessian",
+            reference=wells.hessian,
+            draw=place,
+            metric=metrics.numbers(1e-9),
+            hints=(
+                "Differentiate the gradient (2w/q²)(x − c) once more: the product rule gives two terms for each well.",
+                "One term is (2w/q²) I. The other one is (x − c) times the gradient of 2w/q², an outer product.",
+                "For each well: `2 * w / q**2 * np.eye(2) - 8 * w / q**3 * np.outer(d, d)`.",
+            ),
+            mistakes=[
+                Mistake(wells.printed_hessian, "These are the formulas of listing C7, misprints included. Check them against differences of your gradient."),
+                Mistake(_hessian(factor=0.0), "You differentiated only x − c. The factor 2w/q² depends on x as well: product rule."),
+                Mistake(_hessian(factor=-8.0), "The outer product has the wrong sign: 1/q² shrinks as q grows."),
+                Mistake(_diagonal_only, "The mixed derivatives are not zero: the wells lie diagonally to each other."),
+                Mistake(_hessian(factor=4.0), "The outer product is too small by a factor 2: the gradient of q is 2(x − c)."),
+                Mistake(_hessian(power=2), "The derivative of 1/q² has q³ in its denominator."),
+                Mistake(_hessian(bowl=0.0), "Only the outer products are there. The part (2w/q²) I comes from differentiating x − c."),
+            ],
+        ),
+        Exercise(
+            "classify_extremum",
+            reference=opt.classify_extremum,
+            draw=lambda rng: kind_of_point(rng),
+            metric=metrics.exactly(),
+            draws=16,
+            hints=(
+                "First order first: only a place where the gradient vanishes is a candidate at all.",
+                "Second order: the signs of the eigenvalues of H tell how f bends along its two main directions.",
+                "`np.linalg.eigvalsh(H)`: all positive is a minimum, all negative a maximum, mixed a saddle.",
+            ),
+            mistakes=[
+                Mistake(_second_order_only, "You judge places where the gradient is not zero: they are no extrema, whatever H says."),
+                Mistake(_first_order_only, "A vanishing gradient is necessary, not sufficient: a saddle has one too."),
+                Mistake(_stationary(_by(np.diag)), "The diagonal of H bends up in both coordinates and it can still be a saddle: use the eigenvalues."),
+                Mistake(_stationary(lambda H: "minimum" if np.linalg.det(H) > 0 else "saddle"), "A positive determinant also belongs to a maximum: two negative eigenvalues."),
+                Mistake(_swapped, "Minimum and maximum are exchanged: at a minimum f bends up, all eigenvalues are positive."),
+            ],
+        ),
+        Exercise(
+            "newton_step",
+            reference=opt.newton_step,
+            draw=gradient_and_hessian,
+            metric=metrics.numbers(1e-9),
+            hints=(
+                "The quadratic model is stationary where its gradient g + H h vanishes.",
+                "Solve H h = −g for h. No inverse is needed, and no H⁻¹ as in equation (2-26) either.",
+                "`return -np.linalg.solve(H, g)`.",
+            ),
+            mistakes=[
+                Mistake(lambda g, H: np.linalg.solve(H, g), "This is the step with the wrong sign, the d of equations (2-24) and (2-25): there x − d is the next point."),
+                Mistake(lambda g, H: -H @ g, "You multiplied by H, as equation (2-26) has it; the step solves H h = −g."),
+                Mistake(lambda g, H: -g / np.diag(H), "Dividing by the diagonal ignores the mixed derivatives: solve the system."),
+                Mistake(lambda g, H: -g, "That is steepest descent: H is not used at all."),
+            ],
+        ),
+        Value(
+            "saddle",
+            reference=lambda: wells.extrema()[2].x,
+            metric=metrics.numbers(1e-3),
+            hints=(
+                "Newton goes to the nearest place where the gradient vanishes, whatever its kind. Start it between the wells.",
+                "Start at (0, 0) and repeat x = x + newton_step(gradient(x), hessian(x)) until x stands still.",
+                "Ten rounds of `x = x + newton_step(gradient(x), hessian(x))` from `x = np.zeros(2)` are plenty.",
+            ),
+            mistakes=[
+                Mistake(lambda: np.array([0.105, -0.205]), "That is what the thesis prints. Evaluate your gradient there: it is about 2.5 long."),
+                Mistake(lambda: wells.CENTERS.mean(0), "That is halfway between the centers. The deeper well pulls the pass away from there."),
+                Mistake(lambda: wells.extrema()[0].x, "That is the local minimum: start nearer to the pass between the wells."),
+                Mistake(lambda: wells.extrema()[1].x, "That is the global minimum: start nearer to the pass between the wells."),
+            ],
+        ),
+        Prediction(
+            "neighborhood",
+            question="The thesis says a saddle is found only if it is hit exactly. How close must Newton really start?",
+            choices=("exactly at it", "within 0.01 of it", "within 0.7 of it"),
+            answer="within 0.7 of it",
+            why="For Newton the saddle is a root of the gradient like any other, with a whole neighborhood that flows into it.",
+        ),
+        Exercise(
+            "gauss_newton_step",
+            reference=opt.gauss_newton_step,
+            draw=residual_and_jacobian,
+            metric=metrics.numbers(1e-8),
+            hints=(
+                "Replace r(x + h) by r + J h and minimize its length.",
+                "That is linear least squares with matrix J and right-hand side −r; its normal equations are JᵀJ h = −Jᵀr.",
+                "`return -np.linalg.lstsq(J, r)[0]`, or solve the normal equations.",
+            ),
+            mistakes=[
+                Mistake(lambda r, J: np.linalg.lstsq(J, r)[0], "The sign is wrong: r + J h should become small, so h has to counter r."),
+                Mistake(lambda r, J: -J.T @ r, "That is the gradient of the cost, downhill; the curvature JᵀJ is missing."),
+                Mistake(lambda r, J: -J.T @ J @ J.T @ r, "You multiplied by JᵀJ instead of solving with it."),
+                Mistake(lambda r, J: -0.5 * np.linalg.lstsq(J, r)[0], "Half a step: cost ½|r|² has gradient Jᵀr and curvature JᵀJ, both without a 2."),
+                Mistake(lambda r, J: -(J.T @ r) / (J * J).sum(0), "Only the diagonal of JᵀJ is used: the columns of J are not perpendicular."),
+            ],
+        ),
+        Exercise(
+            "gain_ratio",
+            reference=opt.gain_ratio,
+            draw=tried_step,
+            metric=metrics.numbers(1e-8),
+            hints=(
+                "Compare what the step brought with what the model promised, equation (2-36).",
+                "Actual: cost − new_cost. Promised: m(0) − m(h) with m(h) = cost + gᵀh + ½ hᵀB h.",
+                "`return (cost - new_cost) / -(g @ step + 0.5 * step @ B @ step)`.",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda cost, new_cost, g, B, step: _predicted(g, B, step) / (cost - new_cost),
+                    "Upside down: actual over predicted, so that 0.1 means that little of the promise came true.",
+                ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: (cost - new_cost) / _predicted(g, B, step, half=1.0),
+                    "The quadratic term of the model carries a factor ½.",
+                ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: (cost - new_cost) / _predicted(g, B, step, half=0.0),
+                    "Only the linear term is promised here: the curvature ½ hᵀB h is missing.",
+                ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: (new_cost - cost) / _predicted(g, B, step),
+                    "The sign is wrong: a step that lowers the cost as promised has gain +1.",
+                ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: (cost - new_cost) / _predicted(g, B, step, half=-0.5),
+                    "m(0) − m(h) changes the sign of both terms, of ½ hᵀB h too.",
+                ),
+            ],
+        ),
+        Exercise(
+            "dogleg_step",
+            reference=opt.dogleg_step,
+            draw=dogleg_case,
+            metric=metrics.numbers(1e-8),
+            draws=14,
+            hints=(
+                "Three cases: the Newton point is inside; the corner is outside; the rim cuts the second leg.",
+                "The corner is −(gᵀg / gᵀBg) g. On the second leg solve |corner + s (newton − corner)| = radius for s between 0 and 1.",
+                "With leg = newton − corner: a = leg·leg, b = corner·leg, c = corner·corner − radius², and s = (−b + √(b² − ac)) / a.",
+            ),
+            mistakes=[
+                Mistake(opt.cauchy_step, "That is the Cauchy point: it stops at the corner and never takes the second leg."),
+                Mistake(_cut_newton, "You shorten the Newton step to the radius. The dogleg bends: first downhill, then toward Newton."),
+                Mistake(_uncut_newton, "The step leaves the trust region: the Newton point counts only when it lies within the radius."),
+                Mistake(_newton_or_rim, "Between corner and Newton point the rim cuts the second leg; you run straight downhill to the rim."),
+                Mistake(_always_to_the_rim, "When the Newton point is inside the radius, stop there: the model rises beyond it."),
+                Mistake(_leg_from_zero, "The second leg starts at the corner: add corner to s times the leg."),
+            ],
+        ),
+        Prediction(
+            "four",
+            question="All four methods start at (3, 3). How many of them reach the global minimum?",
+            choices=("none", "one", "two", "all"),
+            answer="one",
+            why="Newton and Gauss-Newton fly away, the trust region settles in the local minimum, Levenberg-Marquardt happens to jump across it.",
+        ),
+        Prediction(
+            "share",
+            question="From what share of the starts in the square from −6 to 6 does Newton reach one of the two minima?",
+            choices=("less than 1 %", "about 10 %", "about half"),
+            answer="less than 1 %",
+            why="0.7 % end in a minimum, 2.8 % in the saddle, all others run away across the plain.",
+        ),
+    ],
+    title="Optimization",
+)

@@ -1,0 +1,373 @@
+# %% title [markdown]
+# # 4 · Optimizers one can see
+#
+# **What you will do.** Build Newton, Gauss-Newton and the two decisions of a trust region on a surface you can look at, and check a published comparison of them.
+#
+# **What you will learn.** What a quadratic model is, why Newton climbs as willingly as it descends, what a sum of squares buys, how a gain ratio keeps a
+# method honest, and why "reaches the minimum from far away" says little.
+#
+# **What you need.** Gradient, matrix, a little NumPy. About 80 minutes. Chapter 5 uses all of it on real robot data.
+
+# %% notation [markdown]
+# | letter | meaning |
+# | --- | --- |
+# | $x = (x_1, x_2)$ | the unknowns; $x^k$ is the iterate after $k$ steps. Nothing in this chapter has a unit |
+# | $f$, $g = \nabla f$, $H = \nabla^2 f$ | cost, gradient, Hessian |
+# | $r$, $J$ | residuals and their Jacobian; the cost is then $\tfrac12 |r|^2$ |
+# | $h$, $\Delta$ | a step, and the radius within which it is trusted |
+# | $m(h) = f + g^\top h + \tfrac12 h^\top B h$ | the quadratic model; $B$ is $H$, or $J^\top J$ |
+# | $\rho$ | gain ratio: what a step brought over what the model promised |
+
+# %% setup
+import numpy as np
+
+from labkit import optimization as opt
+from labkit import wells
+from labkit.course import course
+from labkit.ledger.ch04_optimization import stand_ins
+from labkit.widgets import optimization as stages
+
+ex = course("04-optimization")
+np.set_printoptions(precision=4, suppress=True)
+
+# %% the-question [markdown]
+# ## The question
+#
+# The master thesis *Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen* (HAW Hamburg, 2019) has to choose the method that will calibrate a
+# robot's sensor. It tests three on a function it calls a *Potenzfunktion* (section 6.2, equation 6-16):
+#
+# $$f(x) = -\frac{100}{(x_1-1)^2+(x_2-1)^2+1} - \frac{200}{(x_1+1)^2+(x_2+2)^2+1}$$
+#
+# Two wells, a pass between them, a plain around them. Table 7-1 tells from how far away each method still finds the minima, and ranks
+# Newton "bad", Gauss-Newton "good", trust region "very good". The text adds that **none of them finds the saddle** (*Sattelpunkt*). Is that so?
+
+# %% gradient-text [markdown]
+# ## Downhill
+#
+# Write $q = |x - c|^2 + 1$ for a well of depth $w$ at $c$. Then $f$ is a sum of terms $-w/q$, with $w = 100$ at $c = (1, 1)$ and $w = 200$ at
+# $c = (-1, -2)$. Differentiate one of them by the chain rule, and add up both.
+
+# %% gradient
+@ex.gradient
+def gradient(x):
+    """Return the gradient of f at x, shape (2,)."""
+    ### BEGIN SOLUTION
+    d1, d2 = x - np.array([1, 1]), x - np.array([-1, -2])
+    q1, q2 = d1 @ d1 + 1, d2 @ d2 + 1
+    return 200 / q1**2 * d1 + 400 / q2**2 * d2
+    ### END SOLUTION
+
+
+# %% one-line [markdown]
+# ## Everything happens on one line
+#
+# The gradient is a positive number times $x - c_1$ plus another times $x - c_2$. It can vanish only where both pull in opposite directions: **on the
+# straight line between the centers.** Both minima (L and G) and the saddle (S) lie on it.
+#
+# Newton's idea: lay a parabola on $f$ where you stand, with the right height, slope and curvature, and go to its vertex. Decide, then drag the start
+# (or focus it and press the arrow keys). The triangle at the bottom marks the vertex. *Make it fail* goes to a place where the parabola is nearly straight.
+
+# %% predict-top
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "on top of the pass"
+### END SOLUTION
+ex.predict("top", guess, reveal=stages.line)
+
+# %% hessian-text [markdown]
+# ## Curvature
+#
+# In two dimensions the curvature is a matrix. Differentiate $g = \tfrac{2w}{q^2}(x - c)$ once more; the product rule gives
+#
+# $$H = \frac{2w}{q^2}\,I - \frac{8w}{q^3}\,(x-c)(x-c)^\top \qquad \text{for each well.}$$
+#
+# The first part is a round bowl. The second flattens it in the direction away from the center, and beyond $|x - c| = 1/\sqrt3$ bends it downward.
+
+# %% hessian
+@ex.hessian
+def hessian(x):
+    """Return the Hessian of f at x, shape (2, 2)."""
+    ### BEGIN SOLUTION
+    H = np.zeros((2, 2))
+    for w, c in ((100, np.array([1, 1])), (200, np.array([-1, -2]))):
+        d = x - c
+        q = d @ d + 1
+        H += 2 * w / q**2 * np.eye(2) - 8 * w / q**3 * np.outer(d, d)
+    return H
+    ### END SOLUTION
+
+
+# %% listing-c7 [markdown]
+# ## Against the document: listing C7
+#
+# The thesis prints the Hessian twice, as formulas (listing C7) and as MATLAB code (C9). They differ. Who is right? No derivation is needed: the Hessian is the
+# derivative of the gradient, and a derivative can be *measured* by central differences.
+
+# %% compare-listing-c7
+x = np.array([0.3, -0.7])
+h = 1e-6
+columns = [(gradient(x + e) - gradient(x - e)) / (2 * h) for e in h * np.eye(2)]
+measured = np.column_stack(columns)
+for name, H in (("yours", hessian(x)), ("listing C7", wells.printed_hessian(x))):
+    print(f"{name:10}  H11 {H[0, 0]:8.3f}  H12 {H[0, 1]:8.3f}  H22 {H[1, 1]:8.3f}", end="")
+    print(f"   off by {np.abs(H - measured).max():.3f}")
+
+# %% listing-c7-verdict [markdown]
+# Listing C7 is wrong on the diagonal: $H_{11}$ ends in $-(-1600(x_1-1)^2)$ where $-1600(x_1+1)^2$ belongs, and $H_{22}$ repeats $H_{11}$ instead of using $x_2$.
+# The code in C9, which computed the results, is right.
+#
+# ## What kind of place is it?
+#
+# A vanishing gradient is necessary for a minimum. Sufficient is: all eigenvalues of $H$ positive as well (section 2.4.3).
+
+# %% classify_extremum
+@ex.classify_extremum
+def classify_extremum(g, H):
+    """Return "minimum", "maximum", "saddle" or (|g| above 1e-6) "not stationary"."""
+    ### BEGIN SOLUTION
+    if np.linalg.norm(g) > 1e-6:
+        return "not stationary"
+    eigenvalues = np.linalg.eigvalsh(H)
+    if (eigenvalues > 0).all():
+        return "minimum"
+    return "maximum" if (eigenvalues < 0).all() else "saddle"
+    ### END SOLUTION
+
+
+# %% newton-text [markdown]
+# ## Newton's step
+#
+# The model $m(h) = f + g^\top h + \tfrac12 h^\top H h$ is stationary where its gradient $g + H h$ vanishes. The thesis prints this system as (2-26) with an
+# inverse too many and then subtracts the step (2-27). Take those two literally from $(-0.9, -1.9)$ and you land 17 700 away.
+
+# %% newton_step
+@ex.newton_step
+def newton_step(g, H):
+    """Return the step h to the place where the quadratic model is stationary, shape (2,)."""
+    ### BEGIN SOLUTION
+    return np.linalg.solve(H, -g)
+    ### END SOLUTION
+
+
+# %% saddle-text [markdown]
+# ## Find the saddle
+#
+# The table in section 6.2 gives the saddle as $(0.105, -0.205)$. That point does not even lie on the line between the centers. Find the real one with
+# your own three functions.
+
+# %% saddle
+saddle = ...  # your code here
+### BEGIN SOLUTION
+saddle = np.zeros(2)
+for _ in range(10):
+    saddle = saddle + newton_step(gradient(saddle), hessian(saddle))
+### END SOLUTION
+ex.saddle(saddle)
+
+# %% compare-extrema
+for name, printed, e in zip(wells.NAMES, ((0.979, 0.968), (-0.995, -1.992), (0.105, -0.205)), wells.extrema()):
+    kind = classify_extremum(gradient(e.x), hessian(e.x))
+    slope = np.linalg.norm(gradient(np.array(printed)))
+    print(f"{name:15} printed {printed}, |g| there {slope:.3f}; computed {e.x}, f = {e.value:.3f}: {kind}")
+
+# %% saddle-statement [markdown]
+# ## "A saddle must be hit exactly"
+#
+# Rounding to three digits explains slopes up to about 0.3 in the wells and 0.05 at the pass, not 2.5. And you found the saddle with Newton, from $(0, 0)$. Section 7.1.1 says that no method finds it and that one would have to hit "exactly" the point (*exakt der Punkt*);
+# section 2.5.2 of the same thesis says that Newton cannot tell a saddle from a minimum. How large is the neighborhood from which Newton ends in it?
+#
+# In the figure the thin lines are the two directions of curvature, solid where $f$ bends up, dashed where it bends down; the blue angle is the Newton step
+# taken apart along them. Where it bends down, Newton goes *up*. Switch to the trust region for comparison.
+
+# %% predict-neighborhood
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "within 0.7 of it"
+### END SOLUTION
+ex.predict("neighborhood", guess, reveal=stages.saddle)
+
+# %% squares-text [markdown]
+# ## Gauss-Newton needs a sum of squares
+#
+# Gauss-Newton (section 2.5.3) has no Hessian. It minimizes $\tfrac12|r(x)|^2$ by linearizing the *residuals*: $r(x + h) \approx r + J h$, a linear least-squares problem.
+# The thesis never says which residuals it made from the scalar $f$. Here are ours: since $w - w/q = w\,|x-c|^2/q$,
+#
+# $$f + 300 = |r|^2 \quad\text{with}\quad r = \left(\sqrt{\tfrac{100}{q_1}}\,(x - c_1),\ \sqrt{\tfrac{200}{q_2}}\,(x - c_2)\right),$$
+#
+# four residuals with the same minima and the same saddle. (2-32) prints the step with $J F$; with four residuals and two unknowns that product does not
+# exist. A transpose is missing.
+
+# %% gauss_newton_step
+@ex.gauss_newton_step
+def gauss_newton_step(r, J):
+    """Return the step h that minimizes |r + J h|; r shape (m,), J shape (m, n)."""
+    ### BEGIN SOLUTION
+    return -np.linalg.solve(J.T @ J, J.T @ r)
+    ### END SOLUTION
+
+
+# %% gain-text [markdown]
+# ## Trust, but measure
+#
+# $J^\top J$ has no negative eigenvalues, so Gauss-Newton points downhill; but nothing limits how far it goes. A **trust region** asks after every step: how much did $f$
+# really fall, and how much had the model promised? That is $\rho$ in (2-36). Below 0 the step is taken back; below ¼ the radius shrinks; above ¾, at the rim, it doubles.
+# **Levenberg-Marquardt** turns the same knob under another name: it adds $\lambda I$ to $J^\top J$, and a large $\lambda$ means a short step.
+
+# %% gain_ratio
+@ex.gain_ratio
+def gain_ratio(cost, new_cost, g, B, step):
+    """Return actual over predicted decrease for a step, with model curvature B."""
+    ### BEGIN SOLUTION
+    predicted = -(g @ step) - 0.5 * step @ B @ step
+    return (cost - new_cost) / predicted
+    ### END SOLUTION
+
+
+# %% dogleg-text [markdown]
+# ## Inside the radius: the dogleg
+#
+# Minimizing $m$ on a disk exactly takes an inner iteration. Powell's dogleg is a bent path that is nearly as good: from 0 down the gradient to the lowest
+# point in that direction, the *corner* $-\tfrac{g^\top g}{g^\top B g}\,g$, and from there straight to the Newton point $-B^{-1}g$. Follow it until the path ends or the rim cuts it.
+# Stopping on the first leg gives the Cauchy point (2-39).
+
+# %% dogleg_step
+@ex.dogleg_step
+def dogleg_step(g, B, radius):
+    """Return the dogleg step for a positive definite B, no longer than radius."""
+    ### BEGIN SOLUTION
+    newton = np.linalg.solve(B, -g)
+    corner = -(g @ g) / (g @ B @ g) * g
+    if np.linalg.norm(newton) <= radius:
+        return newton
+    if np.linalg.norm(corner) >= radius:
+        return -radius * g / np.linalg.norm(g)
+    leg = newton - corner
+    a, b, c = leg @ leg, corner @ leg, corner @ corner - radius**2
+    return corner + (-b + np.sqrt(b * b - a * c)) / a * leg
+    ### END SOLUTION
+
+
+# %% assemble-text [markdown]
+# ## Your parts, assembled
+#
+# This loop is all there is to a trust region. It uses your functions on the residuals of the two wells, with $B = J^\top J$. Watch $\rho$ and the radius. The
+# workbook's `opt.trust_region` is the same loop with more care.
+
+# %% assemble
+x, radius = np.array([3.0, 3.0]), 1.0
+for k in range(6):
+    r, J = wells.residual(x), wells.jacobian(x)
+    g, B = J.T @ r, J.T @ J
+    step = dogleg_step(g, B, radius)
+    new_r = wells.residual(x + step)
+    rho = gain_ratio(r @ r / 2, new_r @ new_r / 2, g, B, step)
+    print(f"{k}: x = {x}, radius {radius:.3f}, rho {rho:6.2f}, f = {r @ r - 300:.2f}")
+    x = x + step if rho > 0.1 else x
+    at_rim = np.linalg.norm(step) > 0.999 * radius
+    radius = np.linalg.norm(step) / 4 if rho < 0.25 else 2 * radius if rho > 0.75 and at_rim else radius
+
+# %% four-text [markdown]
+# ## Four paths on one map
+#
+# Now all four from the same start. Newton and the trust region (*Trust-Region-Verfahren*) use the true Hessian, Gauss-Newton and Levenberg-Marquardt the sum of squares. Blue lines are
+# the chosen method's model at the chosen iteration, the dashed circle its radius, the thick bar its step. Decide first; then drag the start, and walk through the iterations.
+
+# %% predict-four
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "one"
+### END SOLUTION
+ex.predict("four", guess, reveal=stages.four_paths)
+
+# %% table-text [markdown]
+# ## Against the document: table 7-1
+#
+# Listing C8 stops once $|g_1| + |g_2| \le 10^{-10}$, with the gradient from *before* the last step. With that rule and the printed starts Newton should need 9 and
+# 7 iterations. For the other two methods nothing is published but listing C6, a screenshot of MATLAB's toolbox as set for the robot: *trust region*, derivatives *approximated by solver*. MATLAB's
+# documentation says that `fminunc` then runs a quasi-Newton method instead, because its trust region needs the gradient supplied. SciPy's BFGS is such a method.
+# So: where does each stand-in end, from the thesis's farthest starts?
+
+# %% table-7-1
+for start in ((1.25, 1.25), (-1.25, -2.25)):
+    run = wells.run("newton", start, stop=opt.small_gradient_before(1e-10))
+    print(f"Newton from {start}: {run.iterations} iterations to {run.solution}")
+print("printed: 9 to (0.9789, 0.9684), 7 to (-0.9948, -1.9922)\n")
+claims = ((4.3, "GN: local"), (35, "GN: global"), (4.5, "TR: local"), (45, "TR: global"))
+names = {"GN": "Gauss-Newton", "LM": "Levenberg-M.", "dogleg": "TR, dogleg", "exact": "TR, exact", "BFGS": "BFGS"}
+print(f"{'start':12}{'thesis':22}", *(f"{name:13}" for name in names.values()))
+for s, claim in claims:
+    ends = stand_ins((s, s))
+    words = [f"{wells.NAMES[ends[key][0]].split()[0]:13}" for key in names]
+    print(f"{f'({s:g}, {s:g})':12}{claim:22}", *words)
+
+# %% table-verdict [markdown]
+# The Newton column comes out to the iteration. Of all stand-ins only BFGS ends where the table says for all four other starts: what the thesis praises as its trust
+# region was probably a quasi-Newton method. The deviations $\mu$ of table 7-1 measure no accuracy either: they are an iterate with four digits minus an "ideal" one with two.
+#
+# And "the farthest start"? Before you rub the next figure free, decide how much of the square leads Newton to a minimum. Then try all four methods.
+
+# %% predict-share
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "less than 1 %"
+### END SOLUTION
+ex.predict("share", guess, reveal=stages.basins)
+
+# %% farthest-text [markdown]
+# The ranking of table 7-1 stands. But look along its diagonal: below is one letter for each start $(1, 1), (2, 2), \dots, (60, 60)$, a dash for one that runs away.
+# For the methods that always arrive there *is* no farthest start: L and G take turns to the end. Where a start at 45 lands is chance, not stability.
+
+# %% farthest
+diagonal = np.repeat(np.arange(1, 60.1)[:, None], 2, axis=1)
+square = np.stack(np.meshgrid(*2 * [np.linspace(-6, 6, 121)]), axis=-1)
+for method in wells.METHODS:
+    label, _ = wells.destinations(method, diagonal)
+    share = (wells.destinations(method, square)[0] < 2).mean()
+    print(f"{method:20}", "".join("LGS-"[i] for i in label), f"{100 * share:5.1f} % of the square")
+
+# %% break-it-text [markdown]
+# ## Break it
+#
+# A stopping rule can lie. Out on the plain the gradient fades, and "the gradient is small" is true and worthless. Ask for the place and the kind as well. The
+# last line is another way to fail: two unknowns of which only the sum is seen.
+
+# %% break-it
+run = wells.run("newton", (3.0, 3.0))
+print(f"{run.reason} after {run.iterations} steps: converged = {run.converged}")
+kind = opt.classify_extremum(gradient(run.solution), hessian(run.solution))
+print(f"|x| = {np.linalg.norm(run.solution):.0f}, f = {run.cost[-1]:.1e}, kind: {kind}")
+one_too_many = opt.gauss_newton(lambda x: np.array([x.sum(), 1]), lambda x: np.array([[1, 1], [0, 0]]), [1, 2])
+print(f"{one_too_many.reason}: converged = {one_too_many.converged}")
+
+# %% beyond [markdown]
+# ## Beyond the document: widen the wells
+#
+# Each term of $f$ is a *robust loss*: a pull toward a center that fades with distance, as one wants it for outliers. Its width is 1. Make it 8 and the two wells
+# merge into one; follow its minimum while the width shrinks. This is *graduated non-convexity*, and chapter 5 uses robust losses on real data.
+
+# %% widen
+ends = []
+for x in np.random.default_rng(4).uniform(-40, 40, (40, 2)):
+    for width in (8.0, 4.0, 2.0, 1.0):
+        f, g, H = ((lambda p, u=u, c=width: u(p, c)) for u in (wells.value, wells.gradient, wells.hessian))
+        x = opt.trust_region(f, g, x, hessian=H).solution
+    ends.append(wells.NAMES[wells.which(x)])
+print({name: ends.count(name) for name in wells.NAMES})
+
+# %% in-practice [markdown]
+# ## In practice
+#
+# - Write your problem as residuals whenever you can: no second derivatives, and a curvature that never points uphill.
+# - Never run undamped far from the solution. Levenberg-Marquardt or a trust region costs one gain ratio a step.
+# - Check derivatives by central differences before you trust any result.
+# - Report start, end, kind, reason for stopping and the number of *rejected* steps. Try several starts.
+# - A good start beats a good optimizer. Chapter 5 computes one without iteration.
+#
+# ## Three questions, to answer in words
+#
+# 1. Newton ends in the saddle more often than in both minima together. Why is a root of the gradient with mixed curvature no worse for it than a minimum?
+# 2. Gauss-Newton and Newton use different matrices for the same function. Where do the two matrices agree, and what does that say about residuals that are small at the solution?
+# 3. A colleague reports: "converged, gradient below 1e-10". Which two further numbers do you ask for, and why?
+
+# %% progress
+ex.progress()
