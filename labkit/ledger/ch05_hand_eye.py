@@ -5,7 +5,7 @@ import itertools
 
 import numpy as np
 
-from .. import frames, handeye, handeye_data, misprints
+from .. import frames, handeye, handeye_data, misprints, optimization
 from . import Computed, computes
 
 HALF_LENGTH, HALF_ANGLE = (
@@ -155,6 +155,83 @@ def gauss_newton_sum():
             "At B = -90 deg the pose depends on A + C, which is 0 at the minimum; nine of the ten printed rows have "
             "opposite signs, this one "
             "has A = C = 4e-4: a sign is missing."
+        ),
+    )
+
+
+@functools.cache
+def trust_region_runs():
+    """The ten runs with a trust region in x, y, z, A, B, C (mm, deg), ended by a gradient of 1e-6: (ends, "
+    "iterations)."""
+    T_BF, x_S, target, _ = handeye_data.simulation()
+    unit = np.array([1, 1, 1, *np.deg2rad([1, 1, 1])])
+    runs = [
+        optimization.trust_region(
+            lambda p: handeye.kuka_residuals(p * unit, T_BF, x_S, target),
+            lambda p: handeye.kuka_jacobian(p * unit, T_BF, x_S) * unit,
+            start,
+            radius=10.0,
+            stop=optimization.small_gradient(1e-6),
+        )
+        for start in handeye_data.start_poses_deg()[0]
+    ]
+    return np.array([run.solution for run in runs]), np.array([float(run.iterations) for run in runs])
+
+
+def _start_cost(i):
+    """Sum of squared residuals (mm^2) of a start pose of table 7-2."""
+    T_BF, x_S, target, _ = handeye_data.simulation()
+    residuals = handeye.kuka_residuals(
+        frames.kuka_from_degrees(handeye_data.start_poses_deg()[0][i]), T_BF, x_S, target
+    )
+    return float(residuals @ residuals)
+
+
+@computes("handeye.tr_iterations")
+def trust_region_iterations():
+    return Computed(
+        trust_region_runs()[1],
+        simulated=True,
+        proof=(
+            "The solver is MATLAB's fminunc with the settings of listing C6; ours is the trust region of chapter 4 "
+            "with first radius 10 "
+            f"and gradient tolerance 1e-6, which takes {trust_region_runs()[1].astype(int)} iterations from the ten "
+            "starts."
+        ),
+    )
+
+
+@computes("handeye.tr_failure")
+def trust_region_failure():
+    counts = trust_region_runs()[1].astype(int)
+    return Computed(
+        "found",
+        proof=(
+            f"From these starts our trust region arrives in {counts[4]}, {counts[6]} and {counts[9]} iterations. "
+            "Starts 4 and 6 cost "
+            f"{_start_cost(4):.1e} mm^2, less than the solver's tolerance 1e-6: it stops before the first step. "
+            "Start 9 costs "
+            f"{_start_cost(9):.0f} mm^2, and there the derivatives by A and C are parallel (B = -90.1 deg)."
+        ),
+    )
+
+
+@computes("handeye.tr_end")
+def trust_region_end():
+    T_BF, x_S, _, scanner = handeye_data.simulation()
+    unit = np.array([1, 1, 1, *np.deg2rad([1, 1, 1])])
+    J = handeye.kuka_jacobian(frames.kuka_from_degrees(scanner), T_BF, x_S) * unit
+    values = np.linalg.svd(J, compute_uv=False)
+    slack = 1e-3 * np.sqrt(np.diag(np.linalg.pinv(J.T @ J)))  # how far a cost of 1e-6 mm^2 lets each unknown be off
+    slack[[3, 5]] = 1.0
+    return Computed(
+        np.tile(scanner, (10, 1)),
+        bound=np.tile(slack, (10, 1)),
+        simulated=True,
+        proof=(
+            f"A solver that stops at 1e-6 mm^2 may end {slack[1]:.1e} mm and {slack[4]:.1e} deg (B) off the minimum; "
+            "A and C are free against "
+            f"each other there (last singular value {values[5] / values[0]:.0e} of the first)."
         ),
     )
 
