@@ -498,11 +498,8 @@ def kim_linear(T_BF, points_S, points_W):
             f"points_W must hold four points or more that do not lie in one plane: X_S X_W' has rank {rank}, not 4"
         )
     M = np.swapaxes(X_S, 1, 2) @ X_W
-    blocks = [
-        kim_matrix(invert(p) @ q, Mp @ np.linalg.inv(Mq)) for p, q, Mp, Mq in zip(T_BF[:-1], T_BF[1:], M[:-1], M[1:])
-    ]
-    D, F = np.concatenate([b[0] for b in blocks]), np.concatenate([b[1] for b in blocks])
-    u, _, rank, _ = np.linalg.lstsq(D, F, rcond=1e-10)
+    D, F = kim_matrix(invert(T_BF[:-1]) @ T_BF[1:], M[:-1] @ np.linalg.inv(M[1:]))
+    u, _, rank, _ = np.linalg.lstsq(D.reshape(-1, 12), F.ravel(), rcond=1e-10)
     if rank < 12:
         raise ValueError(f"the motions must turn about two axes: the stacked system has rank {rank}, not 12")
     T_FS = np.eye(4)
@@ -511,15 +508,16 @@ def kim_linear(T_BF, points_S, points_W):
 
 
 def kim_matrix(A, B):
-    """D (12, 12) and F (12,) of A X = X B for the rows of X one after another, X's last row being 0 0 0 1.
+    """D (..., 12, 12) and F (..., 12) of A X = X B for the rows of X one after another, X's last row being 0 0 0 1.
 
     Source: thesis, appendix A.
     """
     A, B = as_finite(A, "A"), as_finite(B, "B")
-    D = np.kron(A[:3, :3], np.eye(4)) - np.kron(np.eye(3), B.T)
-    F = np.zeros(12)
-    F[3::4] = -A[:3, 3]
-    return D, F
+    left = A[..., :3, None, :3, None] * np.eye(4)[:, None]
+    right = np.eye(3)[:, None, :, None] * np.swapaxes(B, -1, -2)[..., None, :, None, :]
+    F = np.zeros((*A.shape[:-2], 3, 4))
+    F[..., 3] = -A[..., :3, 3]
+    return (left - right).reshape(*A.shape[:-2], 12, 12), F.reshape(*A.shape[:-2], 12)
 
 
 def li_two_step(T_BF, x_S, max_turn_deg=0.01):

@@ -457,10 +457,10 @@ CHAPTER = Chapter(
         ),
         Prediction(
             "thirty_one",
-            question="At its one validated pose the thesis is off by 0.7 mm. What is the rms over all 31 (with the decimal point of pose 2 put right)?",
+            question="At its one validated pose the thesis is off by 0.7 mm. What is the rms over all 31 (with one digit of pose 2 put right)?",
             choices=("about 0.7 mm", "about 3 mm", "about 12 mm"),
             answer="about 12 mm",
-            why="The validated pose is the best of the 31. Two poses stand 36 and 43 mm away, and most others 4 to 8.",
+            why="The validated pose is the best of the 31. Two poses stand 36 and 43 mm away, and most others 2 to 9.",
         ),
         Value(
             "rms_before",

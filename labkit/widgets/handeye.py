@@ -240,7 +240,7 @@ def convergence():
         scene=scene,
         compute=compute_iterations,
         handles={"P": Handle((25.0, 20.0), step=0.5, bounds=((-68, 68), (-68, 68)), label="start, tilt and yaw")},
-        controls={"B_deg": choice({"scanner at B = -88 deg": -88.0, "scanner at B = -30 deg": -30.0}, -88.0, label="")},
+        controls={"B_deg": choice({"B = -88 deg": -88.0, "B = -30 deg": -30.0}, -88.0, label="scanner at")},
         fail={"P": (-54.0, -30.0), "B_deg": -30.0},
         describe=_iterations_sentence,
     )
@@ -361,7 +361,7 @@ def thirty_one_poses():
         compute=compute_poses,
         controls={
             "slip": slider(0, SLIPS_SHOWN, 0, step=1, label="undo slip no."),
-            "others": choice({"others as printed": False, "others corrected": True}, False, label=""),
+            "others": choice({"as printed": False, "corrected": True}, False, label="other poses"),
             "fit": choice(
                 {"thesis": "end pose", "least squares": "least squares", "robust": "robust"}, "robust", label="fit"
             ),
@@ -445,7 +445,7 @@ def pattern_designer():
         printed = space.ellipsoid(**style.look("guide", linewidth=2.0))
         found = space.ellipsoid(**style.look("estimate"))
         weak = space.line(color=style.ESTIMATE, linewidth=3)
-        name = space.text("errors of the translation, x 40", offset=(0, 14), ha="center")
+        name = space.text("errors of the translation, x 40", offset=(0, 4), ha="center")
         used, places = draw.field_of_view(right, handeye.FIELD)
 
         def update(state, result):
