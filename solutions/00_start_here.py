@@ -90,16 +90,10 @@ ex.predict("twice", guess, reveal=stages.quarter_turns)
 # %% colors [markdown]
 # ## Colors
 #
-# A color has the same role in every figure, and never works alone: line style, marker or letter say the same.
-#
-# | role | looks |
-# | --- | --- |
-# | truth | black (light gray in the dark theme), solid |
-# | measurement | orange, round dots |
-# | prediction | sky blue, dashed |
-# | estimate | reddish purple, solid or diamonds |
-# | rejected | gray, hollow crosses |
-# | axes x, y, z | vermilion, bluish green, blue, with the letter at the tip |
+# A color has the same role in every figure, and never works alone: line style, marker or letter say the same. In the dark theme, truth turns light.
+
+# %% colors-shown
+stages.colors()
 
 # %% glossary [markdown]
 # ## Words of the four documents

@@ -15,7 +15,10 @@ import time
 from pathlib import Path
 from urllib.parse import urlsplit
 
-ROOT = Path(__file__).resolve().parents[2]
+from labkit import build
+from labkit.course import source
+
+ROOT = source.ROOT
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
 ELSEWHERE = (
     "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
@@ -24,6 +27,18 @@ ELSEWHERE = (
 )
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"]
 FLAGS += ["--disable-component-update", "--disable-sync"]
+
+
+@contextlib.contextmanager
+def notebook_copy(chapter, solved=False):
+    """A chapter's notebook, blank or solved, as its source gives it: a copy below the checkout, named from its root."""
+    path = source.find(chapter)
+    notebook = build.solved_notebook(path) if solved else build.blank_notebook(path)
+    (ROOT / "build").mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=ROOT / "build", prefix="browser-") as folder:
+        copy = Path(folder) / f"{path.stem}.ipynb"
+        copy.write_text(build.as_text(notebook), encoding="utf-8")
+        yield copy.relative_to(ROOT).as_posix()
 
 
 def find_browser():

@@ -7,7 +7,6 @@ cut into pages, and every Stage as a picture of its own. Needs a Chromium, and a
 import argparse
 import os
 import sys
-import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -16,8 +15,6 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "browser")]
 import driver  # noqa: E402
 
 import lab  # noqa: E402
-from labkit import build  # noqa: E402
-from labkit.course import source  # noqa: E402
 
 PAGE = 1600  # CSS pixels a picture
 
@@ -31,14 +28,9 @@ def main(arguments=None):
     parser.add_argument("--no-run", action="store_true", help="do not run the cells")
     parser.add_argument("--width", type=int, default=1280, help="of the window, in pixels")
     options = parser.parse_args(arguments)
-    path = source.find(options.chapter)
-    notebook = build.solved_notebook(path) if options.solved else build.blank_notebook(path)
-    (ROOT / "build").mkdir(exist_ok=True)
     options.folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=ROOT / "build", prefix="pictures-") as folder:
-        copy = Path(folder) / f"{path.stem}.ipynb"
-        copy.write_text(build.as_text(notebook), encoding="utf-8")
-        take(copy.relative_to(ROOT).as_posix(), path.stem, options)
+    with driver.notebook_copy(options.chapter, options.solved) as copy:
+        take(copy, Path(copy).stem, options)
     return 0
 
 

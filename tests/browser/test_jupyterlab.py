@@ -5,13 +5,10 @@ Runs against a copy of chapter 1 as the source gives it. Skipped where there is 
 
 import os
 import sys
-import tempfile
-from pathlib import Path
 
 import driver
 import pytest
 
-from labkit import build
 from labkit.course import source
 
 ROOT = source.ROOT
@@ -50,12 +47,8 @@ def as_root():
 @pytest.fixture(scope="module")
 def notebook():
     """A fresh blank chapter 1 below the checkout, so that no student's file is touched."""
-    (ROOT / "build").mkdir(exist_ok=True)
-    path = source.find("01")
-    with tempfile.TemporaryDirectory(dir=ROOT / "build", prefix="browser-") as folder:
-        copy = Path(folder) / f"{path.stem}.ipynb"
-        copy.write_text(build.as_text(build.blank_notebook(path)), encoding="utf-8")
-        yield copy.relative_to(ROOT).as_posix()
+    with driver.notebook_copy("01") as copy:
+        yield copy
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,63 @@
+"""The two pictures of the README, taken from chapter 1: `python tests/browser/readme_pictures.py`.
+
+A Stage being used, and an exercise that has just named a mistake, both in JupyterLab; written to docs/.
+"""
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "browser")]
+
+import driver  # noqa: E402
+import test_jupyterlab  # noqa: E402
+
+import lab  # noqa: E402
+
+
+def main():
+    words = lab.lab_command(sys.executable, "localhost", lab.choose_port("localhost"), no_browser=True)
+    words += ["--LabApp.expose_app_in_browser=True", "--allow-root"]
+    with tempfile.TemporaryDirectory() as folder, driver.notebook_copy("01") as copy:
+        settings = {"PYTHONPATH": str(ROOT), "LABKIT_PROGRESS": str(Path(folder) / "progress.jsonl")}
+        with (
+            driver.server(words, settings=lab.OVERRIDES, **settings) as address,
+            driver.page_of(driver.find_browser(), False, 1000, 1400, scale=2) as page,
+        ):
+            driver.open_notebook(page, address, copy)
+            driver.show_notebook_alone(page)
+            driver.run_all(page)
+            stage(page)
+            feedback(page)
+
+
+def stage(page):
+    cell = driver.cell_with(page, '"edges"')
+    cell.locator("button").first.click()
+    handles = page.locator(".labkit-stage").first.locator(".handle")
+    handles.first.wait_for(timeout=20_000)
+    for name, keys in (("Y0", ["Shift+ArrowRight"] * 2), ("Y1", ["Shift+ArrowUp"] * 2)):
+        found = [h for h in handles.all() if h.get_attribute("data-handle") == name]
+        if not found:
+            names = [h.get_attribute("data-handle") for h in handles.all()]
+            raise SystemExit(f"expected a handle {name!r}, the Stage has {names}")
+        found[0].focus()
+        for key in keys:
+            page.keyboard.press(key)
+    page.wait_for_timeout(1500)
+    page.locator(".labkit-stage").first.screenshot(path=ROOT / "docs" / "stage_three_points.png")
+
+
+def feedback(page):
+    cell = driver.cell_with(page, "def invert(T)")
+    driver.retype(page, cell, test_jupyterlab.WRONG)
+    cell.get_by_role("button", name="Hint").click()
+    page.wait_for_timeout(800)
+    cell.screenshot(path=ROOT / "docs" / "feedback.png")
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    main()
