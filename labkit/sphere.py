@@ -78,20 +78,29 @@ def fit_circle_algebraic(x, z):
     Minimizes an algebraic error, the distance weighted by about twice the radius: quick, but on a short arc it comes
     out too small.
 
+    Parameters
+    ----------
+    x, z : array-like, shape (..., n)
+        Points of one scan line, or of many; n >= 3.
+
     Returns
     -------
-    center : array, shape (2,)
-    radius : float
+    center : array, shape (..., 2)
+    radius : float, or array of shape (...)
 
     Source: thesis, listing C15.
     """
     points = _profile(x, z)
-    middle = points.mean(0)
-    scale = np.abs(points - middle).max()
-    p = (points - middle) / scale  # centered and scaled: the squares of 200 mm would drown those of the arc
-    a = np.linalg.lstsq(np.column_stack([p, np.ones(len(p))]), -(p * p).sum(1), rcond=None)[0]
-    center = -0.5 * a[:2]
-    return middle + scale * center, float(scale * np.sqrt(max(center @ center - a[2], 0.0)))
+    middle = points.mean(-2)
+    p = points - middle[..., None, :]
+    scale = np.abs(p).max((-2, -1))[..., None]
+    p = p / scale[..., None]  # centered and scaled: the squares of 200 mm would drown those of the arc
+    a = (np.linalg.pinv(np.concatenate([p, np.ones((*p.shape[:-1], 1))], axis=-1)) @ -(p * p).sum(-1)[..., None])[
+        ..., 0
+    ]
+    center = -0.5 * a[..., :2]
+    radius = scale[..., 0] * np.sqrt(np.maximum((center**2).sum(-1) - a[..., 2], 0.0))
+    return middle + scale * center, radius if radius.ndim else float(radius)
 
 
 def fit_circle(x, z, std=None):
@@ -117,8 +126,10 @@ def fit_circle(x, z, std=None):
     Source: thesis, section 6.4.3, which uses the algebraic circle; the geometric one is the maximum-likelihood
     estimate.
     """
-    center, radius = fit_circle_algebraic(x, z)
     points = _profile(x, z)
+    if points.ndim != 2:
+        raise ValueError(f"x and z must be one scan line, shape (n,), got {np.shape(x)}")
+    center, radius = fit_circle_algebraic(x, z)
     solution, residuals, J = _geometric(points, np.append(center, radius))
     covariance, singular_values = _uncertainty(J, residuals, std)
     return Circle(solution[:2], float(solution[2]), residuals, covariance, singular_values)
@@ -248,16 +259,20 @@ def scan_line(center, radius, half_angle, n, std=0.0, rng=None):
 
 
 def _profile(x, z):
-    """Scan line as points (n, 2); refuses other shapes, fewer than three points and collinear ones."""
+    """Scan lines as points (..., n, 2); refuses other shapes, fewer than three points and collinear ones."""
     x, z = as_finite(x, "x"), as_finite(z, "z")
-    if x.ndim != 1 or x.shape != z.shape or len(x) < 3:
-        raise ValueError(f"x and z must have the same shape (n >= 3,), got {x.shape} and {z.shape}")
-    points = np.column_stack([x, z])
-    spread = np.linalg.svd(points - points.mean(0), compute_uv=False)
-    if spread[1] <= MIN_SAGITTA * spread[0]:
+    if x.ndim < 1 or x.shape != z.shape or x.shape[-1] < 3:
+        raise ValueError(f"x and z must have the same shape (..., n >= 3), got {x.shape} and {z.shape}")
+    points = np.stack([x, z], axis=-1)
+    p = points - points.mean(-2, keepdims=True)
+    moments = np.swapaxes(p, -1, -2) @ p
+    values = np.linalg.eigvalsh(
+        moments / np.maximum(np.abs(p).max((-2, -1)), np.finfo(float).tiny)[..., None, None] ** 2
+    )
+    ratio = np.sqrt(np.maximum(values[..., 0], 0.0) / np.maximum(values[..., 1], np.finfo(float).tiny))
+    if (ratio <= MIN_SAGITTA).any():
         raise ValueError(
-            "the points are collinear: the second singular value is "
-            f"{spread[1] / max(spread[0], np.finfo(float).tiny):.1e} of the first, so no circle is fixed"
+            f"the points are collinear: they spread {ratio.min():.1e} times as far across their line as along it"
         )
     return points
 

@@ -42,6 +42,14 @@ def test_noise_free_circle_is_found_by_both_fits(half_angle):
     np.testing.assert_allclose([*center, radius], [3.0, 240.0, 28.5], rtol=1e-9)
 
 
+def test_many_scan_lines_at_once():
+    lines = [arc((3.0 + k, 240.0), 25.0 + k, 0.6, 30, std=0.1, seed=k) for k in range(4)]
+    centers, radii = sphere.fit_circle_algebraic(*np.moveaxis(lines, 1, 0))
+    for k, line in enumerate(lines):
+        center, radius = sphere.fit_circle_algebraic(*line)
+        np.testing.assert_allclose([*centers[k], radii[k]], [*center, radius], rtol=1e-12)
+
+
 def test_geometric_circle_is_the_least_squares_circle_of_scipy():
     x, z = arc((3.0, 240.0), 28.5, 0.6, 40, std=0.2)
     fit = sphere.fit_circle(x, z)

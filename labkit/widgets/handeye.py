@@ -39,9 +39,7 @@ def compute_scan_line(state):
     angle = np.linspace(-1, 1, POINTS) * np.deg2rad(state["half_angle_deg"])
     reach = r + state["std"] * _noise()
     x, depth = reach * np.sin(angle), z - reach * np.cos(angle)
-    fits = [sphere.fit_circle_algebraic(*line) for line in zip(x, depth)]
-    radii = np.array([f[1] for f in fits])
-    centers = np.array([f[0] for f in fits])
+    centers, radii = sphere.fit_circle_algebraic(x, depth)
     off = np.sqrt(np.maximum(RADIUS**2 - radii**2, 0.0)) * (1 if y >= 0 else -1)
     circle = sphere.fit_circle(x[0], depth[0], std=state["std"])
     by_r = np.inf if y == 0 else r / abs(y)
