@@ -39,6 +39,7 @@ FIELD = (
 _IRRATIONAL = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0]) % 1.0
 _EYE = np.eye(3)
 _GENERATORS = skew(_EYE)  # derivatives of a small rotation about x, y, z
+_FLAT_GENERATORS = _GENERATORS.reshape(3, 9)
 
 
 @dataclass(frozen=True)
@@ -255,14 +256,16 @@ def calibrate_sphere_target(T_BF, x_S, target=None, robust=False, rng=None):
     if robust:
         rng = np.random.default_rng(0) if rng is None else rng
         weights = _trimmed_start(R, t, x_S, target, rng)
-        R_FS, t_FS, center, residuals, weights, trace = _tukey(R, t, x_S, target, weights)
+        R_FS, t_FS, center, residuals, weights, trace, moments = _tukey(R, t, x_S, target, weights)
+        squares = np.vdot(residuals * weights[:, None], residuals)
     else:
-        R_FS, t_FS, center, trace = _solve(R, t, x_S, weights, target)
+        R_FS, t_FS, center, trace, moments = _solve(R, t, x_S, weights, target)
         residuals = _residuals(R, t, x_S, R_FS, t_FS, center)
-        trace[-1:] = [_rms(residuals)]
+        squares = np.vdot(residuals, residuals)
+        trace[-1:] = [math.sqrt(squares / len(residuals))]
     T_FS = np.zeros((4, 4))
     T_FS[:3, :3], T_FS[:3, 3], T_FS[3, 3] = R_FS, t_FS, 1.0
-    covariance, singular_values, std = _uncertainty(R, x_S, R_FS, residuals, weights, target is None)
+    covariance, singular_values, std = _uncertainty(*moments, R_FS, squares, target is None)
     return SphereHandEye(T_FS, center, residuals, covariance, singular_values, weights, np.array(trace), std)
 
 
@@ -618,36 +621,40 @@ def _rms(residuals):
     return math.sqrt(np.vdot(residuals, residuals) / len(residuals))
 
 
-def _reduce(R, t, x, w, target):
+def _moments(R, t, x, w, target):
+    """All that the sums over the poses need: weighted mean (15,) and scatter (15, 15) of x, b and R, and the total
+    weight.
+
+    b = R' (target - t) with the target at 0 while it is unknown: where the sphere lies from the flange, but for its
+    turned center.
+    """
+    Z = np.empty((len(R), 15))
+    Z[:, :3], Z[:, 3:6], Z[:, 6:] = x, ((target - t if target is not None else -t)[:, None] @ R)[:, 0], R.reshape(-1, 9)
+    total = float(w.sum())
+    mean = w @ Z / total
+    Z -= mean
+    return mean, (Z * w[:, None]).T @ Z, total
+
+
+def _reduce(mean, G, total, target):
     """The cost without translation and target, r'Sr - 2 h'r + c in the entries r of R_FS, and how to get both back."""
-    total = w.sum()
-    x_mean = w @ x / total
-    dx = x - x_mean
-    wdx = dx * w[:, None]
-    M = wdx.T @ dx
+    x_mean, b_mean, R_mean = mean[:3], mean[3:6], mean[6:].reshape(3, 3)
+    M = G[:3, :3]
     _refuse_narrow(M, x_mean)
-    b = ((target - t if target is not None else -t)[:, None] @ R)[:, 0]
-    b_mean = w @ b / total
-    db = b - b_mean
     if target is not None:
-        return M, db.T @ wdx, 0.0, lambda R_FS: (b_mean - R_FS @ x_mean, target)
-    R_mean = (w @ R.reshape(-1, 9) / total).reshape(3, 3)
-    dR = R - R_mean
-    V = dR.transpose(1, 0, 2).reshape(3, -1)
-    wdb = db * w[:, None]
-    W_inverse = _invert_spread((V * np.repeat(w, 3)) @ V.T, total)
-    D = (dR.transpose(1, 2, 0).reshape(9, -1) @ wdx).reshape(3, 9)
-    d = V @ wdb.ravel()
+        return M, G[3:6, :3], 0.0, lambda R_FS: (b_mean - R_FS @ x_mean, target)
+    W_inverse = _invert_spread(G[6:, 6:].reshape(3, 3, 3, 3).trace(axis1=1, axis2=3), total)
+    D, d = G[6:, :3].reshape(3, 9), G[6:, 3:6].reshape(3, 3, 3).trace(axis1=1, axis2=2)
     DW = D.T @ W_inverse
     S = -DW @ D
     for k in (0, 3, 6):
         S[k : k + 3, k : k + 3] += M
-    h = (db.T @ wdx).ravel() - DW @ d
-    c = np.vdot(wdb, db) - d @ W_inverse @ d
+    h = G[3:6, :3].ravel() - DW @ d
+    c = G[3, 3] + G[4, 4] + G[5, 5] - d @ W_inverse @ d
 
     def recover(R_FS):
         center = W_inverse @ (D @ R_FS.ravel() - d)
-        return b_mean + R_mean.T @ center - R_FS @ x_mean, center
+        return b_mean + center @ R_mean - R_FS @ x_mean, center
 
     return S, h, c, recover
 
@@ -690,13 +697,14 @@ def _refuse_narrow(M, x_mean):
 
 
 def _solve(R, t, x, w, target, steps=MAX_STEPS):
-    """Least squares with given weights: R_FS, t_FS, target, and the rms distance of the iterates."""
-    S, h, c, recover = _reduce(R, t, x, w, target)
+    """Least squares with given weights: R_FS, t_FS, target, the rms distance of the iterates, and the moments."""
+    moments = _moments(R, t, x, w, target)
+    S, h, c, recover = _reduce(*moments, target)
     if target is not None:
         R_FS = nearest_rotation(h)
-        return R_FS, *recover(R_FS), []
+        return R_FS, *recover(R_FS), [], moments
     R_FS, costs = _descend(S, h, _rotation_start(S, h), steps)
-    return R_FS, *recover(R_FS), [math.sqrt(max(cost + c, 0.0) / w.sum()) for cost in costs]
+    return R_FS, *recover(R_FS), [math.sqrt(max(cost + c, 0.0) / moments[2]) for cost in costs], moments
 
 
 def _rotation_start(S, h):
@@ -785,7 +793,7 @@ def _trimmed_start(R, t, x, target, rng):
 
     def concentrate(chosen):
         try:
-            R_FS, t_FS, center, _ = _solve(R[chosen], t[chosen], x[chosen], np.ones(len(chosen)), target, steps=4)
+            R_FS, t_FS, center, *_ = _solve(R[chosen], t[chosen], x[chosen], np.ones(len(chosen)), target, steps=4)
         except (ValueError, np.linalg.LinAlgError):
             return np.inf, None  # a subset without the motions the whole set has
         squares = (_residuals(R, t, x, R_FS, t_FS, center) ** 2).sum(1)
@@ -805,7 +813,7 @@ def _tukey(R, t, x, target, weights):
     """Iteratively reweighted least squares from the trimmed start; the scale is the median residual length."""
     trace = []
     for _ in range(MAX_STEPS):
-        R_FS, t_FS, center, _ = _solve(R, t, x, weights, target)
+        R_FS, t_FS, center, _, moments = _solve(R, t, x, weights, target)
         residuals = _residuals(R, t, x, R_FS, t_FS, center)
         lengths = np.sqrt((residuals * residuals).sum(1))
         trace.append(_rms(residuals))
@@ -817,33 +825,30 @@ def _tukey(R, t, x, target, weights):
         if np.abs(new - weights).max() < 1e-8:
             break
         weights = new
-    return R_FS, t_FS, center, residuals, weights, trace
+    return R_FS, t_FS, center, residuals, weights, trace, moments
 
 
-def _uncertainty(R, x, R_FS, residuals, w, target_free):
+def _uncertainty(mean, G, total, R_FS, square_sum, target_free):
     """Covariance of phi, translation (and target), scaled singular values, and the noise of one coordinate.
 
-    J'J is summed up directly from the blocks of J = (-R_BF R_FS [x], R_BF, -I): no array of 3 N rows is built.
+    J'J is put together from the moments of the poses; J = (-R_BF R_FS [x], R_BF, -I) itself is never built.
     """
-    n, k, total = len(R), 9 if target_free else 6, w.sum()
-    reach = math.sqrt(np.vdot(x, x) / n)
-    wx = (x * w[:, None]).T
-    moment = wx @ x
-    first = (w @ x / reach @ _GENERATORS.reshape(3, 9)).reshape(3, 3) @ R_FS.T
-    A = np.zeros((k, k))
+    k, x_mean = 9 if target_free else 6, mean[:3]
+    moment = G[:3, :3] + total * np.outer(x_mean, x_mean)
+    reach = math.sqrt(moment.trace() / total)
+    first = (total / reach) * (x_mean @ _FLAT_GENERATORS).reshape(3, 3) @ R_FS.T
+    A = total * np.eye(k)
     A[:3, :3] = (moment.trace() * _EYE - moment) / reach**2
     A[:3, 3:6], A[3:6, :3] = first, first.T
-    A[3:, 3:] = total * np.eye(k - 3)
     if target_free:
-        flat = R.reshape(n, 9)
-        turned = -(w @ flat).reshape(3, 3)
-        mixed = (wx @ flat / reach).reshape(3, 3, 3)  # sum of x_j R_BF
+        turned = -total * mean[6:].reshape(3, 3)
+        mixed = (G[:3, 6:] / reach + np.outer(total / reach * x_mean, mean[6:])).reshape(3, 3, 3)  # sum of x_j R_BF
         cross = -(_GENERATORS @ R_FS.T @ mixed.transpose(0, 2, 1)).sum(0)
         A[3:6, 6:], A[6:, 3:6] = turned.T, turned
         A[:3, 6:], A[6:, :3] = cross, cross.T
     values, vectors = np.linalg.eigh(A)
     dof = 3 * total - k
-    variance = np.vdot(residuals * w[:, None], residuals) / dof if dof > 0 else np.nan
+    variance = square_sum / dof if dof > 0 else np.nan
     values = np.maximum(values, np.finfo(float).tiny)
     half = vectors / np.sqrt(values)
     half[:3] /= reach
