@@ -17,6 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .axxb import calibrate_hand_eye as calibrate_hand_eye  # the target is a pose: chapter 6
+from .axxb import solve_ax_xb as solve_ax_xb
 from .checks import as_finite, as_points, as_positive, as_rotations, as_transforms
 from .frames import invert, matrix_from_kuka, pose, transform
 from .handeye_result import HandEye

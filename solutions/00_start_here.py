@@ -18,7 +18,7 @@ ex = course("00-start-here")
 # ## The map, and where you are
 #
 # Each chapter takes 45 to 90 minutes. They build on each other, but an unsolved step never blocks you: its name then stands for the
-# reference solution, and the cell says so.
+# reference solution, and the cell says so. After a restart, run the cells above the place where you go on (*Run > Run All Above Selected Cell*).
 
 # %% course-map tags=["nbval-ignore-output"]
 course_map()
@@ -65,7 +65,7 @@ def quarter_turn(p):
 # %% predict [markdown]
 # ## Predict, then touch
 #
-# Every figure has a question before it. Your first answer is locked in, then the figure appears. Drag its round handles with mouse or finger; or select one with the Tab key and move it
+# Every figure has a question before it. Click an answer (`guess` may stay as it is): the first one is locked in, and the figure appears. Drag its round handles with mouse or finger; or select one with the Tab key and move it
 # with the arrow keys (Shift makes ten steps at once). *Reset* brings the start back, *Make it fail* shows what goes wrong.
 
 # %% predict-twice
@@ -111,7 +111,7 @@ stages.colors()
 # | Vertrauensbereich | oblast důvěry | trust region |
 # | Sattelpunkt | sedlový bod | saddle point |
 # | Lagesensor | tracker | tracker |
-# | Rozptyl: Streuung, Varianz | rozptyl | spread, variance |
+# | Streuung, Varianz | rozptyl | spread, variance |
 # | Koppelnavigation | navigace výpočtem | dead reckoning |
 # | Lateration | laterace | lateration |
 # | Kovarianzmatrix | kovarianční matice | covariance matrix |

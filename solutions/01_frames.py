@@ -6,7 +6,7 @@
 # **What you will learn.** Why the first measured edge is trusted, why the inverse of a pose needs no solver, why a flat triangle makes a bad
 # frame, what happens at B = 90°, and what a wrong convention costs in millimeters.
 #
-# **What you need.** Vectors, matrices, a little NumPy. About 75 minutes.
+# **What you need.** Vectors, matrices, a little NumPy. About 90 minutes.
 
 # %% notation [markdown]
 # | letter | meaning |
@@ -120,7 +120,7 @@ def frame_from_points(origin, x_point, y_point):
 # %% invert
 @ex.invert
 def invert(T):
-    """Return the inverse of a rigid transform, shape (4, 4), without np.linalg."""
+    """Return the inverse of a rigid transform, shape (4, 4); nothing needs to be solved."""
     ### BEGIN SOLUTION
     X = np.eye(4)
     X[:3, :3] = T[:3, :3].T
@@ -133,7 +133,7 @@ def invert(T):
 # What does the pseudo-inverse cost? An iterative SVD instead of nine copied and nine multiplied numbers: about nine times the time, measured by
 # `tests/bench/inverse.py`. Worse is what it *hides*: it
 # accepts anything. Below, one digit of a matrix is mistyped, and then an axis is missing altogether. `np.linalg.pinv` returns numbers for both; the
-# workbook's `frames.invert` says what is wrong.
+# workbook's `frames.invert` says what is wrong. Mind the first line: 0.00 means a perfect inverse, of a matrix that is no pose.
 
 # %% pseudo-inverse-hides
 typo = frame_from_points(*measured["K1"])
@@ -142,7 +142,7 @@ flat = frame_from_points(*measured["K1"])
 flat[:3, 2] = 0
 for name, T in (("mistyped", typo), ("axis missing", flat)):
     back = np.linalg.pinv(T) @ T
-    print(f"{name}: pinv is silent, pinv(T) T differs from I by {np.abs(back - np.eye(4)).max():.2f}")
+    print(f"{name}: pinv says nothing; pinv(T) T differs from I by {np.abs(back - np.eye(4)).max():.2f}")
     try:
         frames.invert(T)
     except ValueError as refusal:
@@ -168,10 +168,10 @@ def relative(T_WA, T_WB):
 # Listing 4 prints $T_{K_0K_1}$ with six digits after the point. Compare yours with it, entry by entry.
 
 # %% compare-listing-4
-K0_T_K1 = relative(frame_from_points(*measured["K0"]), frame_from_points(*measured["K1"]))
+T_K0K1 = relative(frame_from_points(*measured["K0"]), frame_from_points(*measured["K1"]))
 listing_4 = np.array([[0.010000, -0.999950, 0, 0.99], [0.999950, 0.010000, 0, -1], [0, 0, 1, 0], [0, 0, 0, 1]])
-print(K0_T_K1 + 0.0)
-print(f"largest difference from listing 4: {np.abs(K0_T_K1 - listing_4).max():.1e} (half a printed digit is 5.0e-07)")
+print(T_K0K1 + 0.0)
+print(f"largest difference from listing 4: {np.abs(T_K0K1 - listing_4).max():.1e} (half a printed digit is 5.0e-07)")
 
 # %% angle [markdown]
 # Now put it in two numbers. By what angle is $K_1$ turned against $K_0$? The drawing says 90°, but the points were moved by 0.01 on purpose.
@@ -179,14 +179,14 @@ print(f"largest difference from listing 4: {np.abs(K0_T_K1 - listing_4).max():.1
 # %% angle_deg
 angle_deg = ...  # your code here
 ### BEGIN SOLUTION
-angle_deg = np.rad2deg(np.arccos((np.trace(K0_T_K1[:3, :3]) - 1) / 2))
+angle_deg = np.rad2deg(np.arccos((np.trace(T_K0K1[:3, :3]) - 1) / 2))
 ### END SOLUTION
 ex.angle_deg(angle_deg)
 
 # %% distance
 distance = ...  # your code here
 ### BEGIN SOLUTION
-distance = np.linalg.norm(K0_T_K1[:3, 3])
+distance = np.linalg.norm(T_K0K1[:3, 3])
 ### END SOLUTION
 ex.distance(distance)
 
@@ -213,7 +213,11 @@ ex.predict("flat", guess, reveal=stages.triangle_noise)
 # ## Poses as a robot displays them
 #
 # A KUKA controller shows six numbers: x, y, z in mm and the angles A, B, C in degrees. The rotation is $R = R_z(A)\,R_y(B)\,R_x(C)$:
-# turn about z, then about the *new* y, then about the *newest* x. Inside the workbook the three angles are radians.
+# turn about z, then about the *new* y, then about the *newest* x. Inside the workbook the three angles are radians. With $c = \cos\varphi$, $s = \sin\varphi$:
+#
+# $$R_z(\varphi) = \begin{pmatrix} c & -s & 0 \\ s & c & 0 \\ 0 & 0 & 1 \end{pmatrix}, \quad
+# R_y(\varphi) = \begin{pmatrix} c & 0 & s \\ 0 & 1 & 0 \\ -s & 0 & c \end{pmatrix}, \quad
+# R_x(\varphi) = \begin{pmatrix} 1 & 0 & 0 \\ 0 & c & -s \\ 0 & s & c \end{pmatrix}.$$
 
 # %% matrix_from_kuka
 @ex.matrix_from_kuka
@@ -235,7 +239,8 @@ def matrix_from_kuka(xyzabc):
 # ## The pole
 #
 # Three rings carry the flange. At B = ±90° the outer and the inner ring lie in one plane and turn about the same line: one degree of freedom is lost
-# (*gimbal lock*). Decide first, then move the sliders, or press *Make it fail* to go to the pole.
+# (*gimbal lock*). The figure also shows singular values: how strongly the pose answers to the best and the worst combination of changes of A, B, C. A zero among them means that one
+# combination, the "weakest change", moves nothing. Decide first, then move the sliders, or press *Make it fail* to go to the pole.
 
 # %% predict-pole
 guess = ...  # your code here
@@ -245,8 +250,9 @@ guess = "it does not move"
 ex.predict("pole", guess, reveal=stages.kuka_gimbal)
 
 # %% back-to-angles [markdown]
-# The way back reads the angles from the entries that hold few terms: $r_{20} = -\sin B$, $r_{10}/r_{00} = \tan A$, $r_{21}/r_{22} = \tan C$. Near the pole
-# all but $r_{20}$ shrink together, so any A with the right difference A − C is a correct answer. The check compares poses, not angles.
+# The way back reads the angles from the entries that hold few terms: $r_{20} = -\sin B$, $r_{10}/r_{00} = \tan A$, $r_{21}/r_{22} = \tan C$. At the pole the last
+# four of these entries are only rounding noise. Any A is allowed there, but C must fit it: A − C is fixed at B = +90°, A + C at −90°. So take A first, undo it
+# ($R_z(A)^\top R$), and read C from what is left. The check compares poses, not angles.
 
 # %% kuka_from_matrix
 @ex.kuka_from_matrix
@@ -256,7 +262,8 @@ def kuka_from_matrix(T):
     R = T[:3, :3]
     A = np.arctan2(R[1, 0], R[0, 0])
     B = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))
-    C = np.arctan2(R[2, 1], R[2, 2])
+    s, c = np.sin(A), np.cos(A)
+    C = np.arctan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
     return np.array([*T[:3, 3], A, B, C])
     ### END SOLUTION
 
@@ -300,8 +307,8 @@ for y_point in (np.array([50.0, 1e-4, 0]), o, np.array([50.0, np.nan, 0]), np.ar
 # ## Beyond the document: trust all points alike
 #
 # If the drawing of the part says where the three points *should* be, the best frame minimizes the sum of squared distances. The SVD solves it in one step (Kabsch,
-# `frames.fit_frame`), and the information it has to live with is the tensor of inertia of the triangle: no unbiased method can beat that bound.
-# Gram-Schmidt uses neither the drawing nor the length of the second edge. How much does it lose?
+# `frames.fit_frame`). Noise limits every method: how far an unbiased one can get depends only on how widely the points lie around each axis, that is, on their moments of inertia.
+# The black bars in the figure show this bound. Gram-Schmidt does not use the drawing. How much does it lose?
 
 # %% predict-svd
 guess = ...  # your code here

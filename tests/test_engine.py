@@ -615,3 +615,54 @@ def test_malformed_definitions_are_refused():
         Chapter("98-x", [DOUBLE, DOUBLE])
     with pytest.raises(ValueError, match="metric or properties"):
         Exercise("x", reference=abs, draw=lambda rng: (1,), hints=("a", "b", "c"))
+
+
+# What a student's walk through the first chapters taught --------------------------------------------------------------
+
+
+def test_an_array_that_stands_for_the_reference_is_not_shown(capsys):
+    saddle = np.array([0.169, -0.246])
+    place = Value("place", reference=lambda: saddle, hints=("a", "b", "c"), metric=metrics.numbers(1e-6))
+    bound = session.Course(Chapter("98-place", [place])).place(...)
+    assert f"{bound} {bound!r}" == "(still to be found) (still to be found)"
+    np.testing.assert_array_equal(bound + 1, saddle + 1)
+    assert "0.169" in repr(bound + 1 - 1) and "0.169" not in capsys.readouterr().out
+    assert place.judge([0.17, -0.25]).text.startswith("right as far as it goes")
+
+
+@pytest.mark.parametrize(
+    "answer, words", [(1230.0, "not a rounded one"), (1235, "not a rounded one"), (1100.0, "not this")]
+)
+def test_rounded_values_are_told_so(answer, words):
+    assert words in LENGTH.judge(answer).text
+
+
+def test_words_count_without_their_case_and_wrong_ones_are_quoted():
+    kind = Exercise(
+        "kind", reference=lambda x: "minimum", draw=lambda rng: (1.0,), metric=metrics.exactly(), hints=("a", "b", "c")
+    )
+    assert kind.judge(lambda x: " Minimum").status == CORRECT
+    assert kind.judge(lambda x: "low").text == "`'low'` is not the answer here."
+
+
+def test_a_name_from_a_cell_not_yet_run_is_explained():
+    outcome = DOUBLE.judge(lambda v: normalize(v))  # noqa: F821
+    assert outcome.status == RAISED
+    assert "`normalize` is not known: has the cell that defines it been run since the kernel started?" in outcome.text
+
+
+def test_questions_end_without_a_second_mark():
+    assert DOUBLE.judge(lambda v: [None] and np.array(v, copy=True).fill(0)).text.endswith("missing?")
+
+
+def test_the_pole_is_checked_apart():
+    def one_by_one(T):
+        b = np.arctan2(-T[2, 0], np.hypot(T[0, 0], T[1, 0]))
+        return np.array([*T[:3, 3], np.arctan2(T[1, 0], T[0, 0]), b, np.arctan2(T[2, 1], T[2, 2])])
+
+    def zero_at_the_pole(T):
+        return np.zeros(6) if abs(T[2, 0]) > 0.9999 else one_by_one(T)
+
+    exercise = CHAPTER["kuka_from_matrix"]
+    assert "rounding noise" in exercise.judge(one_by_one).text
+    assert exercise.judge(zero_at_the_pole).text.startswith("right away from the pole, but at B = 90 deg")

@@ -27,12 +27,14 @@ def state_of_sheet(**changes):
     return {**{name: np.array(at) for name, at in w._points().items()}, **changes}
 
 
+def test_removed_and_kept_make_up_the_arm():
+    result = w.compute_three_points(state_of_sheet(Y0=np.array([1.8, 2.9])))
+    assert result["removed"][0] ** 2 + result["kept"][0] ** 2 == pytest.approx((1.8 - 1.01) ** 2 + 0.9**2)
+
+
 def test_three_points_gives_the_sheets_frames():
     result = w.compute_three_points(state_of_sheet())
     assert result["K0_T_K1"] == pytest.approx(frames.relative(*result["frames"]))
-    R = result["K0_T_K1"][:3, :3]
-    assert result["angle_deg"] == pytest.approx(np.rad2deg(Rotation.from_matrix(R).magnitude()))
-    assert result["distance"] == pytest.approx(np.hypot(2 - 1.01, 1 - 2))
     for T, points, foot in zip(result["frames"], result["points"], result["feet"]):
         assert (points[2] - foot) @ T[:2, 0] == pytest.approx(0, abs=1e-12)  # what is kept is perpendicular
         assert np.linalg.det([foot - points[0], T[:2, 0]]) == pytest.approx(

@@ -46,6 +46,10 @@ CHAPTER = Chapter(
                     lambda p: np.array([-p[0], p[1]]),
                     "You mirrored the point in the y axis. A quarter turn exchanges the components.",
                 ),
+                Mistake(
+                    lambda p: np.array([[np.cos(90), -np.sin(90)], [np.sin(90), np.cos(90)]]) @ p,
+                    "np.cos and np.sin take radians: a quarter turn is np.pi / 2, not 90.",
+                ),
                 Mistake(lambda p: p, "You return the point as it came."),
             ],
         ),

@@ -140,6 +140,17 @@ def _turn(axis, angle):
     return frames.matrix_from_kuka(np.concatenate([np.zeros(3), abc]))[:3, :3]
 
 
+def _ry_reversed(xyzabc):
+    return frames.matrix_from_kuka(xyzabc * np.array([1, 1, 1, 1, -1, 1]))
+
+
+def _kuka_entry_by_entry(xyzabc):
+    T = np.eye(4)
+    T[:3, :3] = _turn("z", xyzabc[3]) * _turn("y", xyzabc[4]) * _turn("x", xyzabc[5])
+    T[:3, 3] = xyzabc[:3]
+    return T
+
+
 def _kuka_in_degrees(xyzabc):
     return frames.matrix_from_kuka(np.concatenate([xyzabc[:3], np.deg2rad(xyzabc[3:])]))
 
@@ -155,6 +166,29 @@ def _angles(change):
         return np.concatenate([xyzabc[:3], change(xyzabc[3:])])
 
     return variant
+
+
+def _angles_by_quotients(T):
+    with np.errstate(divide="ignore"):
+        a, c = np.arctan(T[1, 0] / T[0, 0]), np.arctan(T[2, 1] / T[2, 2])
+    return np.array([*T[:3, 3], a, np.arcsin(-T[2, 0]), c])
+
+
+def _angles_one_by_one(T):
+    b = np.arctan2(-T[2, 0], np.hypot(T[0, 0], T[1, 0]))
+    return np.array([*T[:3, 3], np.arctan2(T[1, 0], T[0, 0]), b, np.arctan2(T[2, 1], T[2, 2])])
+
+
+def at_the_pole(sign):
+    """A draw at B = +-90 deg, with the rounding noise that a product of two matrices leaves."""
+
+    def draw(rng):
+        xyzabc = kuka_pose(rng)[0]
+        xyzabc[4] = sign * np.pi / 2
+        turn = random_pose(rng)
+        return (frames.invert(turn) @ (turn @ frames.matrix_from_kuka(xyzabc)),)
+
+    return draw
 
 
 def _K0_T_K1():
@@ -185,6 +219,10 @@ CHAPTER = Chapter(
                 "`np.linalg.norm(v)` is that length; return v divided by it.",
             ),
             mistakes=[
+                Mistake(
+                    lambda v: v / ((v @ v) / 2),
+                    "`**1/2` is read as (...**1)/2, so no root is taken. Write `**0.5` or np.sqrt.",
+                ),
                 Mistake(lambda v: v / (v @ v), "You divide by the squared length. The root is missing."),
                 Mistake(
                     lambda v: v / v.sum(),
@@ -209,7 +247,7 @@ CHAPTER = Chapter(
             question="The three points carry the same noise. Which measured direction does Gram-Schmidt keep exactly?",
             choices=("origin to x_point", "origin to y_point", "neither, it averages"),
             answer="origin to x_point",
-            why="x is the first arm, untouched. Of the second arm only the part across x survives, so y_point decides nothing but the plane.",
+            why="x is the first edge, untouched. Of the second edge only the part across x survives, so y_point decides nothing but the plane.",
         ),
         Exercise(
             "gram_schmidt",
@@ -264,6 +302,10 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(
+                    _frame(lambda a, b: frames.gram_schmidt(-a, -b)),
+                    "Your edges point toward the origin: it is x_point - origin, not origin - x_point.",
+                ),
+                Mistake(
                     _axes_in_rows,
                     "Your rotation is the transpose: the axes stand in the rows, so it maps W to F, while the origin is that of T_WF.",
                 ),
@@ -281,11 +323,11 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _frame(_not_rejected),
-                    "Your x and y are not perpendicular: the part of the second arm along x must go first.",
+                    "Your x and y are not perpendicular: the part of the second edge along x must go first.",
                 ),
                 Mistake(
                     _frame(_second_edge_first),
-                    "You trusted the arm to y_point and bent x. The first edge is the trusted one.",
+                    "You trusted the edge to y_point and bent x. The first edge is the trusted one.",
                 ),
                 Mistake(_frame(_left_handed), "Your frame is left-handed: z = x cross y, in this order."),
                 Mistake(
@@ -338,11 +380,16 @@ CHAPTER = Chapter(
             draw=lambda rng: (random_pose(rng), random_pose(rng)),
             metric=metrics.poses(1e-6, 1e-6),
             hints=(
-                "Neighboring letters cancel: which two transforms give A_T_B when W stands between them?",
+                "Neighboring letters cancel: which two transforms give T_AB when W stands between them?",
                 "T_AB = T_AW T_WB, and T_AW is the inverse of T_WA.",
                 "return invert(T_WA) @ T_WB.",
             ),
             mistakes=[
+                Mistake(lambda A, B: frames.invert(A) * B, "You multiplied entry by entry. Matrices multiply with @."),
+                Mistake(
+                    lambda A, B: A * B,
+                    "You multiplied entry by entry (matrices multiply with @), and T_WA is not inverted.",
+                ),
                 Mistake(
                     lambda A, B: A @ frames.invert(B),
                     "The order is reversed: T_WA T_BW puts an A beside a B, where nothing cancels. It is T_AW T_WB.",
@@ -354,7 +401,9 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda A, B: frames.relative(B, A), "This is T_BA, the inverse: you inverted T_WB instead of T_WA."
                 ),
-                Mistake(lambda A, B: A @ B, "You multiplied T_WA by T_WB without inverting: W_A W_B does not cancel."),
+                Mistake(
+                    lambda A, B: A @ B, "You multiplied T_WA by T_WB without inverting: in T_WA T_WB nothing cancels."
+                ),
                 Mistake(lambda A, B: A.T @ B, "The transpose of a 4x4 pose is not its inverse: use your `invert`."),
                 Mistake(
                     lambda A, B: frames.pose(A[:3, :3].T @ B[:3, :3], B[:3, 3] - A[:3, 3]),
@@ -370,7 +419,7 @@ CHAPTER = Chapter(
             hints=(
                 "The trace of a rotation matrix knows its angle.",
                 "trace(R) = 1 + 2 cos(angle).",
-                "np.rad2deg(np.arccos((np.trace(R) - 1) / 2)), with R the rotation block of K0_T_K1.",
+                "np.rad2deg(np.arccos((np.trace(R) - 1) / 2)), with R the rotation block of T_K0K1.",
             ),
             mistakes=[
                 Mistake(
@@ -394,8 +443,8 @@ CHAPTER = Chapter(
             rtol=1e-5,
             hints=(
                 "The distance of two origins does not depend on who looks at them.",
-                "It is the length of the translation in K0_T_K1.",
-                "np.linalg.norm(K0_T_K1[:3, 3]).",
+                "It is the length of the translation in T_K0K1.",
+                "np.linalg.norm(T_K0K1[:3, 3]).",
             ),
             mistakes=[
                 Mistake(
@@ -432,6 +481,11 @@ CHAPTER = Chapter(
                 "x, y, z, A, B, C = xyzabc; T[:3, :3] = rot_z(A) @ rot_y(B) @ rot_x(C); T[:3, 3] = x, y, z.",
             ),
             mistakes=[
+                Mistake(
+                    _ry_reversed,
+                    "Your Ry turns the wrong way: in Ry, + sin B stands top right and - sin B bottom left.",
+                ),
+                Mistake(_kuka_entry_by_entry, "You multiplied entry by entry. Matrices multiply with @."),
                 Mistake(
                     _kuka("xyz"),
                     "You multiplied Rx(C) Ry(B) Rz(A). KUKA turns about z first, then about the new y and the new x: Rz(A) Ry(B) Rx(C).",
@@ -470,12 +524,29 @@ CHAPTER = Chapter(
             reference=frames.kuka_from_matrix,
             draw=lambda rng: (frames.matrix_from_kuka(kuka_pose(rng)[0]),),
             metric=metrics.through(frames.matrix_from_kuka, metrics.poses(1e-6, 1e-6)),
+            noisy=[
+                (at_the_pole(sign), metrics.through(frames.matrix_from_kuka, metrics.poses(1e-4, 1e-6)), words)
+                for sign, words in (
+                    (1, "right away from the pole, but at B = 90 deg"),
+                    (-1, "right, but at B = -90 deg"),
+                )
+            ],
             hints=(
                 "Compare the entries of Rz(A) Ry(B) Rx(C) that hold few terms: the first column and the last row.",
-                "r20 = -sin B; r10 / r00 = tan A; r21 / r22 = tan C. `np.arctan2` keeps the quadrant.",
-                "B = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0])), A = np.arctan2(R[1, 0], R[0, 0]), C = np.arctan2(R[2, 1], R[2, 2]).",
+                "B and A come from the first column, with `np.arctan2`. Then undo A: Rz(A)' R = Ry(B) Rx(C), whose middle row is 0, cos C, -sin C.",
+                "A = np.arctan2(R[1, 0], R[0, 0]); B = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0])); "
+                "C = np.arctan2(np.sin(A) * R[0, 2] - np.cos(A) * R[1, 2], np.cos(A) * R[1, 1] - np.sin(A) * R[0, 1]).",
             ),
             mistakes=[
+                Mistake(
+                    _angles_one_by_one,
+                    "Right except at the pole: there r10, r00, r21, r22 are rounding noise, and A and C, read one by one, do not fit "
+                    "each other. Take A first, undo it, and read C from what is left.",
+                ),
+                Mistake(
+                    _angles_by_quotients,
+                    "A quotient loses the quadrant: use np.arctan2(r10, r00) and np.arctan2(r21, r22).",
+                ),
                 Mistake(
                     _angles(np.rad2deg),
                     "Your angles are in degrees. Inside the workbook angles are radians; degrees are for people.",

@@ -17,6 +17,7 @@ import numpy as np
 from . import guard, metrics
 
 TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
+NOISY = "exact on clean data, but the data are not weighed as they should be: on noisy data"
 TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws
 UNITS = {
     "mm": ("length", 1e-3),
@@ -68,7 +69,8 @@ class Exercise(Item):
     metric:     compares one result with the reference's; None for stochastic code, which `properties` judge.
     hints:      three, from the rule to the line.
     mistakes:   wrong variants; an answer equal to one on all draws gets its text.
-    noisy:      (draw, metric): one more draw, with noise and a tolerance band, for estimators.
+    noisy:      (draw, metric) or (draw, metric, words): one more draw, with noise and a tolerance band for estimators,
+                or at a special place; several such in a list. `words` lead in what is said when only this draw fails.
     properties: functions (student_function, rng) -> None or a sentence that says what does not hold.
     draws:      how many draws a check takes.
     """
@@ -78,12 +80,14 @@ class Exercise(Item):
     metric: object = None
     hints: tuple = ()
     mistakes: tuple = ()
-    noisy: tuple | None = None
+    noisy: tuple = ()
     properties: tuple = ()
     draws: int = 5
 
     def __post_init__(self):
         super().__post_init__()
+        noisy = self.noisy or ()
+        object.__setattr__(self, "noisy", (noisy,) if noisy and callable(noisy[0]) else tuple(noisy))
         if self.metric is None and not self.properties:
             raise ValueError(f"exercise {self.id!r} needs a metric or properties")
 
@@ -100,8 +104,8 @@ class Exercise(Item):
         if not callable(function):
             return Outcome(NOT_YET, f"expected a function, got {metrics._describe(function)}.")
         trial = _Trial(self, function)
-        for draw, metric in self._plan():
-            problem = trial.draw(draw(rng), metric)
+        for draw, metric, words in self._plan():
+            problem = trial.draw(draw(rng), metric, words)
             if problem:
                 return problem
             if trial.spent > TOTAL_TIME and len(trial.pairs) > 1:
@@ -115,8 +119,9 @@ class Exercise(Item):
         return verdict
 
     def _plan(self):
-        plan = [(self.draw, self.metric)] * self.draws
-        return [*plan, self.noisy] if self.noisy else plan
+        """(draw, metric, words) of every draw; words are None for the plain ones."""
+        noisy = [(draw, metric, *(words or (NOISY,))) for draw, metric, *words in self.noisy]
+        return [(self.draw, self.metric, None)] * self.draws + noisy
 
 
 class _Trial:
@@ -124,13 +129,13 @@ class _Trial:
 
     def __init__(self, exercise, function):
         self.exercise, self.function = exercise, function
-        self.pairs, self.inputs, self.metrics = [], [], []
+        self.pairs, self.inputs, self.metrics, self.words = [], [], [], []
         self.refusal, self.printed, self.spent = "", "", 0.0
 
     def outcome(self, status, text="", mistake=None):
         return Outcome(status, text, mistake, self.printed)
 
-    def draw(self, args, metric):
+    def draw(self, args, metric, words=None):
         """Run one draw; returns an Outcome when it ends the check, None otherwise."""
         expected = self.exercise.reference(*copy.deepcopy(args))
         admitted = []
@@ -155,6 +160,7 @@ class _Trial:
         self.inputs.append(args)
         self.pairs.append((admitted[0], expected))
         self.metrics.append(metric)
+        self.words.append(words)
         return None
 
     def property(self, holds, rng):
@@ -173,20 +179,31 @@ class _Trial:
         if named:
             return named
         if self.refusal:
-            return self.outcome(NOT_YET, self.refusal + ".")
-        plain = [(r, e) for m, (r, e) in zip(self.metrics, self.pairs) if m is self.exercise.metric]
-        if all(self.exercise.metric.equal(r, e) for r, e in plain):
-            noisy, (result, expected) = self.metrics[-1], self.pairs[-1]
-            off = [d for d in noisy.deviations(result, expected) if not d.within]
-            return self.outcome(
-                NOT_YET, f"exact on clean data, but on noisy data {off[0]}: it does not weigh the data as it should."
-            )
+            return self.outcome(NOT_YET, _closed(self.refusal))
+        plain = self._plain_pairs()
+        if self._right_on_plain():
+            for metric, pair, words in zip(self.metrics, self.pairs, self.words):
+                if words and not metric.equal(*pair):
+                    off = next(d for d in metric.deviations(*pair) if not d.within)
+                    return self.outcome(NOT_YET, f"{words} {off}.")
         words = metrics.difference_words(self.exercise.metric, plain)
         return self.outcome(NOT_YET, (words + ".") if words else self._deviation(plain))
 
+    def _plain_pairs(self):
+        return [pair for pair, words in zip(self.pairs, self.words) if words is None]
+
+    def _right_on_plain(self):
+        metric = self.exercise.metric
+        return metric is not None and all(metric.equal(*pair) for pair in self._plain_pairs())
+
     def _named_mistake(self):
+        """The mistake that explains all plain draws, and the special ones too where those alone are wrong."""
+        everything = self._right_on_plain()
+        cases = [
+            case[:3] for case in zip(self.inputs, self.metrics, self.pairs, self.words) if everything or case[3] is None
+        ]
         for k, mistake in enumerate(self.exercise.mistakes):
-            if all(self._is_mistake(mistake, *case) for case in zip(self.inputs, self.metrics, self.pairs)):
+            if all(self._is_mistake(mistake, *case) for case in cases):
                 return self.outcome(NOT_YET, mistake.text, k)
         return None
 
@@ -236,6 +253,10 @@ class _Trial:
         if isinstance(error, TypeError) and not run.line:
             wanted = ", ".join(self._names(args))
             return self.outcome(NOT_YET, f"your function cannot be called with ({wanted}): {error}.")
+        if isinstance(error, NameError) and error.name:
+            where = f"\nin {run.line}" if run.line else ""
+            hint = f"`{error.name}` is not known: has the cell that defines it been run since the kernel started?"
+            return self.outcome(RAISED, f"NameError: {hint}{where}")
         if isinstance(error, RecursionError):
             return self.outcome(RAISED, "RecursionError: your function calls itself without an end.")
         call = ", ".join(f"{name}={_short(arg)}" for name, arg in zip(self._names(args), args))
@@ -334,7 +355,7 @@ class Value(Item):
             else guard.run(self._converted, (answer, unit, expected))
         )
         if isinstance(run.error, metrics.Refused | ValueError):
-            return Outcome(NOT_YET, f"{_for_value(run.error)}.")
+            return Outcome(NOT_YET, _closed(_for_value(run.error)))
         if run.error is not None:
             return Outcome(NOT_YET, f"expected a number{self._in_unit()}, got {metrics._describe(answer)}.")
         return self._compare(metric, run.result, expected)
@@ -355,7 +376,7 @@ class Value(Item):
                 if isinstance(run.error, metrics.Refused)
                 else f"{type(run.error).__name__}: {_message(run.error)}"
             )
-            return Outcome(NOT_YET, f"{text}.")
+            return Outcome(NOT_YET, _closed(text))
         return self._compare(metric, run.result, expected)
 
     def _compare(self, metric, answer, expected):
@@ -366,11 +387,33 @@ class Value(Item):
                 return Outcome(NOT_YET, mistake.text, k)
         words = metrics.difference_words(metric, [(answer, expected)])
         if words:
-            return Outcome(NOT_YET, f"{words}.")
+            return Outcome(NOT_YET, _closed(words))
+        if _is_rounded(answer, expected):
+            return Outcome(NOT_YET, "right as far as it goes: hand over the computed value, not a rounded one.")
         return Outcome(NOT_YET, f"not this value{self._in_unit()}: the hints lead on.")
 
     def _in_unit(self):
         return f" in {self.unit}" if self.unit else ""
+
+
+def _closed(sentence):
+    """The sentence with a period, unless it ends already."""
+    return sentence if sentence[-1:] in ".?:" else f"{sentence}."
+
+
+def _is_rounded(answer, expected):
+    """Whether a number or an array is the expected one, rounded to two significant digits or better."""
+    try:
+        answer, expected = np.asarray(answer, dtype=float), np.asarray(expected, dtype=float)
+    except (TypeError, ValueError):
+        return False
+    size = np.abs(expected).max(initial=0.0)
+    if answer.shape != expected.shape or size == 0:
+        return False
+    least = 1 - int(np.floor(np.log10(size)))
+    units = 10.0 ** -np.arange(least, least + 8)
+    off = np.abs(answer - expected).max()
+    return any(off <= 0.5000001 * u and np.allclose(answer / u, np.round(answer / u), rtol=1e-12) for u in units)
 
 
 def _for_value(refusal):

@@ -28,12 +28,15 @@ class Deviation:
     amount: float
     unit: str
     tolerance: float
+    words: str = ""
 
     @property
     def within(self):
         return bool(self.amount <= self.tolerance)
 
     def __str__(self):
+        if self.words:
+            return f"{self.what}: {self.words}" if self.what else self.words
         what = f"{self.what} is off" if self.what else "it is off"
         return f"{what} by {self.amount:.3g}{' ' + self.unit if self.unit else ''}"
 
@@ -242,6 +245,8 @@ class exactly(Metric):
             return array
         if isinstance(result, np.generic) or (isinstance(result, np.ndarray) and result.ndim == 0):
             result = result.item()
+        if isinstance(result, str) and isinstance(expected, str) and result.strip().lower() == expected.lower():
+            return expected
         kinds = ((bool,), "True or False"), ((str,), "a word"), ((int,), "a whole number")
         for types, words in kinds:
             if isinstance(expected, types):
@@ -253,7 +258,8 @@ class exactly(Metric):
 
     def deviations(self, result, expected):
         same = np.array_equal(result, expected) if isinstance(expected, np.ndarray) else bool(result == expected)
-        return [Deviation("", 0.0 if same else 1.0, "", 0.5)]
+        shown = f"`{result!r}`" if isinstance(result, str | bool | int | float) else "what you return"
+        return [Deviation("", 0.0 if same else 1.0, "", 0.5, words=f"{shown} is not the answer here")]
 
 
 @dataclass(frozen=True)
@@ -291,7 +297,7 @@ class several(Metric):
         found = []
         for name, metric, part, want in zip(self.names, self.metrics, result, expected):
             found += [
-                Deviation(f"{name}: {d.what}" if d.what else name, d.amount, d.unit, d.tolerance)
+                Deviation(f"{name}: {d.what}" if d.what else name, d.amount, d.unit, d.tolerance, d.words)
                 for d in metric.deviations(part, want)
             ]
         return found

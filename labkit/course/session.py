@@ -8,6 +8,7 @@ import pkgutil
 import re
 
 import ipywidgets
+import numpy as np
 
 from ..tables import DATA
 from . import engine, feedback, guard, progress, source
@@ -188,6 +189,26 @@ class Bound:
         return self._starter()
 
 
+HIDDEN = "(still to be found)"
+
+
+class ArrayAnswer(np.ndarray):
+    """A checked array. One that stands for the reference counts like any array, but does not show its numbers."""
+
+    hidden = False
+
+    def __repr__(self):
+        return HIDDEN if self.hidden else repr(np.asarray(self))
+
+    __str__ = __repr__
+
+    def __format__(self, spec):
+        return repr(self)
+
+    def _ipython_display_(self):
+        """Nothing: the feedback above has said it."""
+
+
 class Answer(float):
     """A checked number. One that stands for the reference counts like any float, but does not show its digits."""
 
@@ -195,6 +216,9 @@ class Answer(float):
 
     @classmethod
     def of(cls, value):
+        """A number or an array that shows nothing where it is the last line of a cell; anything else as it is."""
+        if isinstance(value, np.ndarray) and value.ndim:
+            return value.view(ArrayAnswer)
         try:
             return cls(value)
         except (TypeError, ValueError):
@@ -202,13 +226,13 @@ class Answer(float):
 
     @classmethod
     def reference(cls, value):
-        answer = cls.of(value)
-        if isinstance(answer, cls):
+        answer = cls.of(np.array(value) if isinstance(value, np.ndarray) else value)
+        if isinstance(answer, cls | ArrayAnswer):
             answer.hidden = True
         return answer
 
     def __repr__(self):
-        return "(still to be found)" if self.hidden else float.__repr__(self)
+        return HIDDEN if self.hidden else float.__repr__(self)
 
     __str__ = __repr__
 

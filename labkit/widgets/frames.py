@@ -16,6 +16,7 @@ NOISE_OF_A_TAPE = 0.01  # the yardstick of three_points, in the sheet's unit
 ARM = 100.0  # mm, the trusted edge of the noisy triangles
 HEIGHTS = np.geomspace(1.0, 100.0, 41)  # mm
 NEAR_POLE_DEG = 1.0
+NEARLY_POLE_DEG = 70.0  # from here on the caption speaks of the weak direction
 FLAT_ROLL_DEG = 20.0  # three_points: from here on the caption speaks of the flat triangle
 
 
@@ -27,8 +28,8 @@ def _points():
 
 
 def compute_three_points(state):
-    """Both frames of six points in the plane, what Gram-Schmidt removes, K0_T_K1, its angle (deg) and distance."""
-    result = {"frames": [], "points": [], "feet": [], "roll_deg": []}
+    """Both frames of six points in the plane, what Gram-Schmidt removes and keeps of Y, and K0_T_K1."""
+    result = {"frames": [], "points": [], "feet": [], "removed": [], "kept": [], "roll_deg": []}
     for k in "01":
         points = np.array([state["O" + k], state["X" + k], state["Y" + k]])
         T = frames.frame_from_points(*np.column_stack([points, np.zeros(3)]))
@@ -39,10 +40,10 @@ def compute_three_points(state):
         result["frames"].append(T)
         result["points"].append(points)
         result["feet"].append(points[0] + (arm @ x) * x)
+        result["removed"].append(abs(arm @ x))
+        result["kept"].append(height)
         result["roll_deg"].append(np.rad2deg(np.sqrt(covariance[0, 0])))
-    K0_T_K1 = frames.relative(*result["frames"])
-    angle, distance = frames.pose_distance(*result["frames"])
-    return {**result, "K0_T_K1": K0_T_K1, "angle_deg": np.rad2deg(angle), "distance": distance}
+    return {**result, "K0_T_K1": frames.relative(*result["frames"])}
 
 
 def _degrees(std_deg):
@@ -53,14 +54,13 @@ def _degrees(std_deg):
 def _three_points_sentence(result):
     for k in range(2):
         if result["roll_deg"][k] > FLAT_ROLL_DEG:
-            height = np.hypot(*(result["points"][k][2] - result["feet"][k]))
             return (
-                f"Y of K{k} is only {height:.3f} away from the x axis: next to nothing is kept of it, "
+                f"Y of K{k} is only {result['kept'][k]:.3f} away from the x axis: next to nothing is kept of it, "
                 "and a touch of noise rolls the frame over."
             )
     return (
-        f"K1 is {result['distance']:.2f} away from K0 and turned by {result['angle_deg']:.1f} deg. "
-        "Hollow cross: where the removed part of Y ends. Dashed: the part that is kept."
+        f"Of the arm to Y, {result['removed'][0]:.2f} is removed in K0 and {result['removed'][1]:.2f} in K1. "
+        "Hollow cross: where the removed part ends. Dashed: the part that is kept."
     )
 
 
@@ -74,7 +74,7 @@ def three_points():
         constructions = [draw.Construction(left) for _ in "01"]
         triads = [draw.PlaneFrame(left, "K0", 0.7), draw.PlaneFrame(left, "K1", 0.7, linestyle=(0, (4, 1.5)))]
         style.bare(right)
-        matrix = draw.Matrix(right, 0.0, 0.86, "K0_T_K1")
+        matrix = draw.Matrix(right, 0.0, 0.86, "T_K0K1")
         words = right.text(0.0, 0.36, "", transform=right.transAxes, va="top", linespacing=1.6)
 
         def update(state, result):
@@ -83,8 +83,7 @@ def three_points():
                 triads[k].set(result["frames"][k])
             matrix.set(result["K0_T_K1"])
             words.set_text(
-                f"angle      {result['angle_deg']:.2f} deg\n"
-                f"distance  {result['distance']:.3f}\n"
+                f"removed of Y: {result['removed'][0]:.3f} in K0,\n{result['removed'][1]:.3f} in K1\n"
                 f"noise of {NOISE_OF_A_TAPE} rolls K0 by\n{_degrees(result['roll_deg'][0])} about its x axis,\n"
                 f"K1 by {_degrees(result['roll_deg'][1])}"
             )
@@ -138,6 +137,14 @@ def _stay_in_plane(state, moved):
     return {"Y": (y[0], y[1], 0.0)}
 
 
+def _noise_sentence(result):
+    off, bounds = ([f"{v:.2g}" for v in result[key]] for key in ("error_deg", "bound_deg"))
+    return (
+        f"Height {result['height']:.0f} mm (1 at least): the frame is off by {off[0]} deg about x, {off[1]} about y, "
+        f"{off[2]} about z (bounds {', '.join(bounds)})."
+    )
+
+
 def triangle_noise():
     """Frames from repeated noisy measurements, and their error against the height of the triangle."""
     length = 60.0
@@ -178,11 +185,7 @@ def triangle_noise():
         view=View(-65, 35, center=(32, 25, 15)),
         constrain=_stay_in_plane,
         fail={"Y": (60.0, 2.0, 0.0)},
-        describe=lambda result: (
-            f"Height {result['height']:.0f} mm: the frame is off by {result['error_deg'][0]:.2g} deg about x, "
-            f"{result['error_deg'][1]:.2g} about y, {result['error_deg'][2]:.2g} about z "
-            f"(bounds {', '.join(f'{b:.2g}' for b in result['bound_deg'])})."
-        ),
+        describe=_noise_sentence,
     )  # fmt: skip
 
 
@@ -213,6 +216,11 @@ def _gimbal_sentence(result):
         return (
             f"At B = {result['B_deg']:.0f} deg, A and C turn about the same line: only A {sign} C = {total:.0f} deg "
             "counts, and they can trade places while the pose stays."
+        )
+    if abs(result["B_deg"]) > NEARLY_POLE_DEG:
+        return (
+            f"The rings of A and C nearly meet: the smallest singular value is {result['singular_values'][2]:.3f}, "
+            "and the pose hardly answers to the weakest change."
         )
     return "Each angle turns about its own axis. Bring B to 90 deg and watch the rings of A and C meet."
 
@@ -320,8 +328,10 @@ def svd_against_gram_schmidt():
         return moving, update
 
     def sentence(result):
-        gram_schmidt, svd = (np.linalg.norm(result[key]) for key in ("gram_schmidt_deg", "svd_deg"))
-        return f"In all: Gram-Schmidt {gram_schmidt:.2g} deg, SVD fit {svd:.2g} deg, from the same points."
+        pairs = zip("xyz", result["gram_schmidt_deg"], result["svd_deg"])
+        errors = ", ".join(f"about {axis} {a:.2g} and {b:.2g}" for axis, a, b in pairs)
+        short = " So short a base makes every turn about y and z bad." if result["triangle"][1, 0] < 25 else ""
+        return f"Gram-Schmidt and SVD fit, deg: {errors}.{short}"
 
     return Stage(
         "SVD against Gram-Schmidt",

@@ -1,6 +1,10 @@
 """Library functions behind the hooks of the peers' benchmark: {hook name: function with the hook's arguments}."""
 
-from labkit import handeye
+from labkit import axxb, handeye
+
+
+def ax_xb(T_BF, T_ST):
+    return axxb.calibrate_hand_eye(T_BF, T_ST).T_FS
 
 
 def sphere_handeye(T_BF, x_S):
@@ -9,5 +13,6 @@ def sphere_handeye(T_BF, x_S):
 
 
 HOOKS = {
+    "handeye": ax_xb,
     "sphere_handeye": sphere_handeye,
 }

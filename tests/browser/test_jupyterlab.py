@@ -14,7 +14,7 @@ from labkit.course import source
 ROOT = source.ROOT
 WRONG = '''@ex.invert
 def invert(T):
-    """Return the inverse of a rigid transform, shape (4, 4), without np.linalg."""
+    """Return the inverse of a rigid transform, shape (4, 4); nothing needs to be solved."""
     X = np.eye(4)
     X[:3, :3] = T[:3, :3].T
     X[:3, 3] = -T[:3, 3]

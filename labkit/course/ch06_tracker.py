@@ -1,0 +1,657 @@
+"""Chapter 6: packets of a tracker, a robot's kinematics, A X = X B by the report's method, outliers, time offset."""
+
+import functools
+
+import numpy as np
+
+from .. import axxb, robot, tracker, tracker_simulation
+from ..frames import invert, normalize, pose, relative
+from ..ledger.ch06_tracker import synthetic_mountings
+from ..lie import exp_so3
+from ..tables import DATA, read_table
+from . import metrics
+from .engine import Chapter, Exercise, Mistake, Prediction, Value
+
+# Packets ---------------------------------------------------------------------------------------------------------------------
+
+
+def decode_packet(data):
+    """Time (s), position (mm) and quaternion (x, y, z, w) of a packet of 184 bytes."""
+    values = tracker.decode_packet(data)
+    return values[tracker.TIME], 1000 * values[tracker.POSITION], values[tracker.QUATERNION]
+
+
+def packet(rng):
+    """A good packet with all fields different."""
+    T = pose(exp_so3(rng.normal(size=3)), rng.uniform(-900, 900, 3))
+    values = tracker.packet_from_pose(
+        T, rng.uniform(1, 900), velocity=rng.uniform(50, 300, 3), angular_velocity=rng.uniform(0.1, 1, 3)
+    )
+    values[8:11], values[18:21] = rng.uniform(0.5, 9, (2, 3))
+    return (tracker.encode_packet(values),)
+
+
+def _fields(change=lambda v: v, dtype="<f8", time=1, position=2, quaternion=11, scale=1000.0):
+    def variant(data):
+        v = change(np.frombuffer(data, dtype).astype(float))
+        return v[time], scale * v[position : position + 3], v[quaternion : quaternion + 4]
+
+    return variant
+
+
+def _scalar_first(data):
+    time, position, q = decode_packet(data)
+    return time, position, np.roll(q, 1)
+
+
+# Kinematics ------------------------------------------------------------------------------------------------------------------
+
+
+def link(rng):
+    """Parameters of one link: rad, mm, mm, rad."""
+    return (*rng.uniform((-3, 50, 50, -1.5), (3, 300, 300, -0.3)),)
+
+
+def _link(order, theta=1, alpha=1, swap=False):
+    """A product of the four elementary transforms in another order; Z, D, A, X for turn z, along z, along x, turn x."""
+
+    def variant(th, d, a, al):
+        if swap:
+            d, a = a, d
+        parts = {
+            "Z": pose(exp_so3([0, 0, theta * th]), [0, 0, 0]),
+            "D": pose(np.eye(3), [0, 0, d]),
+            "A": pose(np.eye(3), [a, 0, 0]),
+            "X": pose(exp_so3([alpha * al, 0, 0]), [0, 0, 0]),
+        }
+        return functools.reduce(np.matmul, [parts[letter] for letter in order])
+
+    return variant
+
+
+def joint_angles(rng):
+    return robot.TX40.dh, rng.uniform(robot.TX40.q_min, robot.TX40.q_max)
+
+
+def _links(dh, q):
+    return robot.dh_matrix(q + dh[:, 0], dh[:, 1], dh[:, 2], dh[:, 3])
+
+
+def _without_offsets(dh, q):
+    return functools.reduce(np.matmul, robot.dh_matrix(q, dh[:, 1], dh[:, 2], dh[:, 3]))
+
+
+# A X = X B -------------------------------------------------------------------------------------------------------------------
+
+
+def motions(rng, n=8, std_deg=0.3, std_mm=1.0):
+    """Motions of flange and tracker with noise, A X = X B."""
+    axes = rng.uniform(0.3, 1.2, (n, 1)) * normalize(rng.normal(size=(n, 3)))
+    X = pose(exp_so3(rng.normal(size=3)), rng.uniform(-80, 80, 3))
+    A = pose(exp_so3(axes), rng.uniform(-200, 200, (n, 3)))
+    noise = pose(exp_so3(np.deg2rad(std_deg) * rng.normal(size=(n, 3))), std_mm * rng.normal(size=(n, 3)))
+    return A, invert(X) @ A @ X @ noise
+
+
+def one_motion(rng):
+    A, B = motions(rng, 1)
+    return A[0, :3, :3], B[0, :3, :3]
+
+
+def kron_row(A, B):
+    """The block m_i of one motion, shape (9, 9): I kron A - B' kron I."""
+    return np.kron(np.eye(3), A) - np.kron(B.T, np.eye(3))
+
+
+def stacked(rng):
+    """The Kronecker matrix of noisy motions: so noisy that its null vector is visibly no rotation."""
+    return (axxb.kronecker_matrix(*motions(rng, std_deg=4.0)),)
+
+
+def rotation_from_nullvector(M):
+    """Rotation of the smallest right singular vector of M, shape (9 N, 9)."""
+    return axxb.rotation_from_kronecker(M)[0]
+
+
+def _null(M, row=-1):
+    return np.linalg.svd(M)[2][row]
+
+
+def _signed(X):
+    return X * np.sign(np.linalg.det(X))
+
+
+def translation_problem(rng):
+    A, B = motions(rng)
+    return A, B, axxb.rotation_from_kronecker(axxb.kronecker_matrix(A, B))[0]
+
+
+def translation_lsq(A, B, R):
+    """Translation of the mounting by least squares, shape (3,), mm."""
+    return axxb.translation_from_motions(A, B, R)[0]
+
+
+def _translation(K1, K2):
+    def variant(A, B, R):
+        return np.linalg.lstsq(K1(A).reshape(-1, 3), K2(A, B, R).ravel(), rcond=None)[0]
+
+    return variant
+
+
+def _k1(A):
+    return np.eye(3) - A[:, :3, :3]
+
+
+def _k2(A, B, R):
+    return A[:, :3, 3] - B[:, :3, 3] @ R.T
+
+
+def gaps(rng):
+    A, B, R = translation_problem(rng)
+    return (axxb.translation_from_motions(A, B, R)[1],)
+
+
+# Outliers and time -----------------------------------------------------------------------------------------------------------
+
+
+def spoiled(rng):
+    """Values about 50 with nonsense on both sides, some gross and some mild, and a factor."""
+    core = np.r_[np.linspace(-1, 1, 31) + 0.02 * rng.normal(size=31), -2.55, 2.6]
+    values = 50 + rng.uniform(0.5, 2) * np.r_[core, -14, -6, 6.5, 42, 45, 47]
+    return rng.permutation(values), 4.0
+
+
+def _keep(center, scale, above=False):
+    def variant(values, factor):
+        distance = values - center(values)
+        return (distance if above else np.abs(distance)) <= factor * scale(values)
+
+    return variant
+
+
+def _mad(values):
+    return np.median(np.abs(values - np.median(values)))
+
+
+def speed_curves(rng):
+    """Angular speeds of a robot and of a tracker that lags by a fraction of a sample."""
+    time = np.arange(600) / 100
+    phase = rng.uniform(0, 6, 3)
+    lag = (rng.integers(2, 8) + rng.choice([0.35, 0.42, 0.58, 0.65])) / 100
+
+    def curve(t):
+        return (
+            1.2
+            + 0.6 * np.sin(2.1 * t + phase[0])
+            + 0.3 * np.sin(3.7 * t + phase[1])
+            + 0.15 * np.sin(5.9 * t + phase[2])
+        )
+
+    return time, curve(time), curve(time - lag), 0.2
+
+
+def _whole_samples(time, reference, delayed, max_offset):
+    step = time[1] - time[0]
+    return round(tracker.time_offset(time, reference, delayed, max_offset) / step) * step
+
+
+# The six runs ----------------------------------------------------------------------------------------------------------------
+
+
+@functools.cache
+def _run_1(factor=4.0):
+    poses = read_table("tracker/poses.csv")
+    T_BF = tracker_simulation.flange_poses(np.deg2rad(np.column_stack([poses[f"q{i} [deg]"] for i in range(1, 7)])))
+    return T_BF, tracker.average_stops(tracker.read_csv(DATA / "tracker/run_1.csv"), factor)[0]
+
+
+def _mounting(factor=4.0, gate=8.0):
+    return tracker.calibrate_mounting(*_run_1(factor), gate).T_FE
+
+
+def _against_the_readings():
+    T_BF, T_WE = _run_1()
+    kept = tracker.calibrate_mounting(T_BF, T_WE).kept
+    A, B = relative(T_BF[0], T_BF)[kept][1:], relative(T_WE[0], T_WE)[kept][1:]
+    return axxb.solve_ax_xb(B, A)
+
+
+@functools.cache
+def _heights():
+    return np.array([m.T_FE[2, 3] for m in synthetic_mountings()])
+
+
+CHAPTER = Chapter(
+    "06-tracker",
+    title="A tracker on a robot flange",
+    items=[
+        Prediction(
+            "loss",
+            question="The packet has no sequence number and no checksum. How can a receiver know that one was lost?",
+            choices=("it cannot", "from gaps in the time stamps", "UDP reports it"),
+            answer="from gaps in the time stamps",
+            why="UDP says nothing. At a known rate a gap in the time stamps can be counted; a duplicate shows the same stamp twice.",
+        ),
+        Exercise(
+            "decode_packet",
+            reference=decode_packet,
+            draw=packet,
+            metric=metrics.several(
+                metrics.numbers(1e-9, "s"),
+                metrics.numbers(1e-9, "mm"),
+                metrics.numbers(1e-9),
+                names=("time", "position", "quaternion"),
+            ),
+            hints=(
+                "Read all 184 bytes as 23 numbers of 8 bytes, then pick by the order of table 1.",
+                '`np.frombuffer(data, "<f8")` gives 23 little-endian doubles; number 0 is the device.',
+                "v = np.frombuffer(data, '<f8'); return v[1], 1000 * v[2:5], v[11:15].",
+            ),
+            mistakes=[
+                Mistake(
+                    _fields(scale=1.0),
+                    "The position is in meters, as the packet carries it. The workbook computes in mm.",
+                ),
+                Mistake(
+                    _fields(time=0, position=1, quaternion=10),
+                    "You are one field too early: number 0 is the device, the time stamp comes second.",
+                ),
+                Mistake(
+                    _fields(position=5),
+                    "These are the linear velocities (bytes 40 to 63). The position starts at byte 16.",
+                ),
+                Mistake(
+                    _fields(quaternion=15),
+                    "These are angular velocities. The quaternion starts at byte 88, which is number 11.",
+                ),
+                Mistake(_scalar_first, "The packet's quaternion is x, y, z, w: you put w first."),
+                Mistake(
+                    _fields(dtype=">f8"),
+                    "You read the bytes in the wrong order (big-endian): the numbers come out absurd. The workbook assumes little-endian doubles.",
+                ),
+            ],
+        ),
+        Prediction(
+            "fold",
+            question="Upper arm and forearm are 225 mm each, the elbow folds to 138 deg. How close can the wrist come to axis 2?",
+            answer=161.3,
+            unit="mm",
+            within=0.03,
+            why="An isosceles triangle: 2 * 225 mm * cos(138 deg / 2) = 161 mm. The data sheet prints 162 mm, so its 138 deg are rounded.",
+        ),
+        Exercise(
+            "dh_matrix",
+            reference=robot.dh_matrix,
+            draw=link,
+            metric=metrics.poses(1e-6, 1e-6),
+            hints=(
+                "Four elementary transforms in a row: turn about z, go along z, go along the new x, turn about the new x.",
+                "Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha): the last column is (a cos theta, a sin theta, d).",
+                "Rows: (c, -s ca, s sa, a c), (s, c ca, -c sa, a s), (0, sa, ca, d), (0, 0, 0, 1).",
+            ),
+            mistakes=[
+                Mistake(
+                    _link("XAZD"),
+                    "This is the modified (Craig) convention, Rot(x) Trans(x) Rot(z) Trans(z). The classic one begins with the turn about z.",
+                ),
+                Mistake(_link("ZDAX", swap=True), "d and a have changed places: d goes along z, a along x."),
+                Mistake(_link("ZDAX", alpha=-1), "alpha has the wrong sign: check the entries with sin(alpha)."),
+                Mistake(_link("ZDAX", theta=-1), "theta has the wrong sign: check the entries with sin(theta)."),
+                Mistake(
+                    _link("DAZX"),
+                    "You moved along x before turning about z, so the step a ignores theta. The last column begins with a cos(theta), a sin(theta).",
+                ),
+                Mistake(
+                    lambda *p: invert(robot.dh_matrix(*p)), "This is the inverse: it maps from frame i - 1 to frame i."
+                ),
+                Mistake(
+                    lambda th, d, a, al: robot.dh_matrix(np.deg2rad(th), d, a, np.deg2rad(al)),
+                    "The angles already are radians: you converted them once too often.",
+                ),
+            ],
+        ),
+        Exercise(
+            "forward_kinematics",
+            reference=robot.forward_kinematics,
+            draw=joint_angles,
+            metric=metrics.poses(1e-6, 1e-6),
+            hints=(
+                "Each link's frame is given in the frame before it, so neighboring letters cancel from the base to the flange.",
+                "T_BF = T_01 T_12 ... T_56, and the angle of a link is its offset plus the joint's angle.",
+                "T = np.eye(4); for (offset, d, a, alpha), angle in zip(dh, q): T = T @ dh_matrix(offset + angle, d, a, alpha); return T.",
+            ),
+            mistakes=[
+                Mistake(
+                    _without_offsets,
+                    "The offsets in the first column of dh are missing: the zero position of the TX40 is upright.",
+                ),
+                Mistake(
+                    lambda dh, q: functools.reduce(np.matmul, _links(dh, q)[::-1]),
+                    "You multiplied from the flange to the base. A new link goes on the right: T = T @ link.",
+                ),
+                Mistake(
+                    lambda dh, q: functools.reduce(np.matmul, _links(dh, q)[:-1]),
+                    "The last link is missing: this is the wrist, not the flange.",
+                ),
+                Mistake(
+                    lambda dh, q: functools.reduce(np.matmul, _links(dh, q)[1:]),
+                    "The first link is missing: did the loop start at 1?",
+                ),
+                Mistake(
+                    lambda dh, q: invert(robot.forward_kinematics(dh, q)),
+                    "This is the base seen from the flange: the inverse.",
+                ),
+                Mistake(
+                    lambda dh, q: robot.forward_kinematics(dh, -q),
+                    "The joint angles enter with the wrong sign: the angle of a link is offset + q.",
+                ),
+            ],
+        ),
+        Prediction(
+            "axes",
+            question="All motions turn about one and the same axis. What do the residuals of the calibration look like?",
+            choices=(
+                "large, one sees it at once",
+                "perfect, and the mounting is arbitrary",
+                "perfect, and so is the mounting",
+            ),
+            answer="perfect, and the mounting is arbitrary",
+            why="Turning the mounting about the common axis changes nothing in A X = X B. Only the singular values tell.",
+        ),
+        Exercise(
+            "kron_row",
+            reference=kron_row,
+            draw=one_motion,
+            metric=metrics.numbers(1e-9),
+            hints=(
+                "Bring A X - X B = 0 into the form M vec(X) = 0, with the columns of X stacked.",
+                "For stacked columns, vec(P X Q) = (Q' kron P) vec(X). Once P = A, Q = I, once P = I, Q = B.",
+                "return np.kron(np.eye(3), A) - np.kron(B.T, np.eye(3)).",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda A, B: np.kron(A, np.eye(3)) - np.kron(np.eye(3), B.T),
+                    "This is the matrix for rows stacked (NumPy's ravel). The report stacks columns, as Matlab does: exchange the factors.",
+                ),
+                Mistake(
+                    lambda A, B: np.kron(np.eye(3), A) - np.kron(B, np.eye(3)),
+                    "B must be transposed: vec(X B) = (B' kron I) vec(X).",
+                ),
+                Mistake(
+                    lambda A, B: np.kron(np.eye(3), B) - np.kron(A.T, np.eye(3)),
+                    "A and B have changed places: in the report A is the tracker's motion, here it is the flange's.",
+                ),
+                Mistake(
+                    lambda A, B: np.kron(np.eye(3), A) + np.kron(B.T, np.eye(3)),
+                    "The sign between the two products is a minus: A X - X B = 0.",
+                ),
+                Mistake(
+                    lambda A, B: np.kron(np.eye(3), A.T) - np.kron(B, np.eye(3)),
+                    "Both matrices are transposed: this is the equation of the inverse motions.",
+                ),
+            ],
+        ),
+        Exercise(
+            "rotation_from_nullvector",
+            reference=rotation_from_nullvector,
+            draw=stacked,
+            metric=metrics.rotations(1e-5),
+            hints=(
+                "The singular vector of the smallest singular value, put back into a 3 x 3 matrix column by column.",
+                'Vt[-1].reshape(3, 3, order="F"); its sign is free, so make the determinant positive; then the nearest rotation by a second SVD.',
+                "X = Vt[-1].reshape(3, 3, order='F'); X *= np.sign(np.linalg.det(X)); U, _, Wt = np.linalg.svd(X); return U @ Wt.",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda M: rotation_from_nullvector(M).T,
+                    "The null vector holds the columns of X. NumPy's reshape fills rows, so you got the transpose: the classic silent error.",
+                ),
+                Mistake(
+                    lambda M: -rotation_from_nullvector(M),
+                    "Your matrix has determinant -1. The null vector's sign is arbitrary: turn it so that the determinant is positive.",
+                ),
+                Mistake(
+                    lambda M: _signed(_null(M).reshape(3, 3, order="F")),
+                    "The null vector has length 1, a rotation has length sqrt(3): scaling and projection to SO(3) are missing.",
+                ),
+                Mistake(
+                    lambda M: np.sqrt(3) * _signed(_null(M).reshape(3, 3, order="F")),
+                    "The scale is right, but noise has sheared the matrix: its columns are not orthonormal. Project it to SO(3).",
+                ),
+                Mistake(
+                    lambda M: axxb.nearest_rotation(_signed(_null(M, 0).reshape(3, 3, order="F"))),
+                    "This belongs to the largest singular value. NumPy sorts them from large to small: take the last row of Vt.",
+                ),
+            ],
+        ),
+        Exercise(
+            "translation_lsq",
+            reference=translation_lsq,
+            draw=translation_problem,
+            metric=metrics.numbers(1e-7, "mm"),
+            hints=(
+                "Write out the last column of A X = X B. It is linear in the translation t once R is known.",
+                "R_A t + t_A = R t_B + t, so (I - R_A) t = t_A - R t_B: three rows a motion, stacked.",
+                "K1 = np.eye(3) - A[:, :3, :3]; K2 = A[:, :3, 3] - B[:, :3, 3] @ R.T; np.linalg.lstsq(K1.reshape(-1, 3), K2.ravel())[0].",
+            ),
+            mistakes=[
+                Mistake(
+                    _translation(lambda A: -_k1(A), _k2),
+                    "The result has the opposite sign: (I - R_A) t = t_A - R t_B, not (R_A - I) t.",
+                ),
+                Mistake(
+                    _translation(_k1, lambda A, B, R: A[:, :3, 3] - B[:, :3, 3]),
+                    "R is missing: the tracker's translations are written in its own axes and must be turned into the flange's.",
+                ),
+                Mistake(
+                    _translation(_k1, lambda A, B, R: A[:, :3, 3] - B[:, :3, 3] @ R),
+                    "You turned the tracker's translations by R' instead of R. For rows, R t is `t @ R.T`.",
+                ),
+                Mistake(
+                    _translation(lambda A: np.eye(3) - np.swapaxes(A[:, :3, :3], 1, 2), _k2),
+                    "The rotations of the motions are transposed.",
+                ),
+                Mistake(
+                    lambda A, B, R: np.linalg.lstsq(_k1(A)[0], _k2(A, B, R)[0], rcond=None)[0],
+                    "Only the first motion is used. Its axis component stays undetermined: stack all motions.",
+                ),
+            ],
+        ),
+        Exercise(
+            "e_rot",
+            reference=tracker.e_rot,
+            draw=stacked,
+            metric=metrics.numbers(1e-9),
+            hints=(
+                "Equation (13), taken at its word: the norm of M'M v, divided by N - 1. v is the null vector, of length 1.",
+                "M has 9 rows a motion, so N = len(M) / 9.",
+                "v = np.linalg.svd(M)[2][-1]; return np.linalg.norm(M.T @ (M @ v)) / (len(M) / 9 - 1).",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda M: tracker.e_rot(M) * (len(M) / 9 - 1) / (len(M) / 9),
+                    "You divide by N. The report divides by N - 1.",
+                ),
+                Mistake(
+                    lambda M: np.linalg.norm(M @ _null(M)) / (len(M) / 9 - 1),
+                    "This is the norm of M v. The report writes M'M v, which is the smallest singular value once more: its square.",
+                ),
+                Mistake(
+                    lambda M: np.sqrt(3) * tracker.e_rot(M),
+                    "Your v has the length of a rotation, sqrt(3). Equation (11) divides by the norm of v: length 1.",
+                ),
+                Mistake(
+                    lambda M: tracker.e_rot(M) * (len(M) / 9 - 1) / (len(M) - 1),
+                    "N counts motions. M has nine rows for each of them.",
+                ),
+                Mistake(
+                    lambda M: np.linalg.norm(M.T @ M @ _null(M, 0)) / (len(M) / 9 - 1),
+                    "This is the largest singular vector. The null vector is the last row of Vt.",
+                ),
+            ],
+        ),
+        Exercise(
+            "e_trans",
+            reference=tracker.e_trans,
+            draw=gaps,
+            metric=metrics.numbers(1e-9, "mm"),
+            hints=(
+                "Equation (17), taken at its word: the norm of K1 t - K2, divided by N - 1.",
+                "The norm runs over all components of all N residuals, and it is not squared.",
+                "return np.linalg.norm(residuals) / (len(residuals) - 1).",
+            ),
+            mistakes=[
+                Mistake(lambda r: np.linalg.norm(r) / len(r), "You divide by N. The report divides by N - 1."),
+                Mistake(
+                    lambda r: (r**2).sum() / (len(r) - 1),
+                    "You squared the norm. The text speaks of squares, equation (17) does not square.",
+                ),
+                Mistake(
+                    lambda r: np.sqrt((r**2).sum() / (len(r) - 1)),
+                    "N - 1 stands outside the root in equation (17). Yours would be the better definition.",
+                ),
+                Mistake(
+                    lambda r: np.linalg.norm(r, axis=1).mean(),
+                    "This is the mean distance. Equation (17) takes one norm over everything.",
+                ),
+                Mistake(lambda r: np.linalg.norm(r) / (r.size - 1), "N counts motions, not coordinates."),
+            ],
+        ),
+        Exercise(
+            "reject_outliers",
+            reference=tracker.reject_outliers,
+            draw=spoiled,
+            metric=metrics.exactly(),
+            hints=(
+                "Measure how far each value is from the middle, in units of a spread. Outliers must move neither of the two.",
+                "Middle: the median. Spread: 1.4826 times the median of the distances from it; for normal noise that is a standard deviation.",
+                "d = np.abs(values - np.median(values)); return d <= factor * 1.4826 * np.median(d).",
+            ),
+            mistakes=[
+                Mistake(
+                    _keep(np.mean, np.std),
+                    "Mean and standard deviation are moved by the very values you want to find: the nonsense hides itself.",
+                ),
+                Mistake(
+                    _keep(np.median, _mad),
+                    "The factor 1.4826 is missing: the median distance is only 0.67 standard deviations.",
+                ),
+                Mistake(
+                    _keep(np.median, lambda v: np.abs(v - np.median(v)).mean()),
+                    "You took the mean of the distances. Gross values blow it up; take their median.",
+                ),
+                Mistake(lambda v, f: ~tracker.reject_outliers(v, f), "True means keep: your answer is the opposite."),
+                Mistake(
+                    _keep(np.median, lambda v: 1.4826 * _mad(v), above=True),
+                    "Values far below the middle pass: take the absolute value of the distance.",
+                ),
+            ],
+        ),
+        Value(
+            "mounting",
+            reference=_mounting,
+            unit="mm",
+            metric=metrics.poses(0.002, 0.02),
+            hints=(
+                "Put your own functions in a row: blocks, rotation, translation. Pose 13 of this run is nonsense and must not take part.",
+                "A = A[kept][1:] and B = B[kept][1:] are the motions that take part: kept poses, without the reference itself.",
+                "M = np.concatenate([kron_row(a[:3, :3], b[:3, :3]) for a, b in zip(A, B)]), then rotation_from_nullvector and translation_lsq.",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: _mounting(gate=1e9),
+                    "The stop at which the tracker talked nonsense is still in: leave out what `kept` excludes.",
+                ),
+                Mistake(lambda: invert(_mounting()), "This is the flange seen from the tracker: the inverse."),
+                Mistake(
+                    _against_the_readings,
+                    "A and B have changed places: A is what the flange did, B what the tracker saw.",
+                ),
+                Mistake(
+                    lambda: pose(_mounting()[:3, :3], _mounting()[:3, 3] / 1000),
+                    "The translation is in meters; wanted are mm.",
+                ),
+            ],
+        ),
+        Value(
+            "spread",
+            reference=lambda: _heights().std(),
+            unit="mm",
+            rtol=1e-2,
+            hints=(
+                "Six numbers, the z of each mounting. Appendix D prints their variance (Rozptyl), divided by 6.",
+                "The standard deviation is the root of that variance.",
+                "heights = np.array([m.T_FE[2, 3] for m in mountings]); spread = heights.std().",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: _heights().std(ddof=1),
+                    "You divided by 5. For estimating a spread that is the better choice; appendix D divides by 6.",
+                ),
+                Mistake(lambda: _heights().var(), "This is the variance, in square millimeters. Its root is wanted."),
+                Mistake(
+                    lambda: np.ptp(_heights()),
+                    "This is the range from the lowest to the highest. Wanted is the standard deviation.",
+                ),
+                Mistake(
+                    lambda: _heights().std() / np.sqrt(6),
+                    "This is the standard error of the mean. Wanted is the spread of single runs.",
+                ),
+            ],
+        ),
+        Prediction(
+            "runs",
+            question="Six runs over the same 21 poses agree within 0.2 mm. How far from the truth is their mean?",
+            choices=("about 0.1 mm", "about 0.2 mm", "more than 1 mm", "the runs alone cannot tell"),
+            answer="the runs alone cannot tell",
+            why="An error that depends on the place repeats with the poses. Repeating shows the random part only; here the mean is off by more than 1 mm.",
+        ),
+        Prediction(
+            "methods",
+            question="Rotations are noisy (0.5 deg), translations good (0.1 mm). What is best?",
+            choices=("all methods alike", "rotation first, then translation", "both together, weighed by their noise"),
+            answer="both together, weighed by their noise",
+            why="Good translations at a distance know the rotation better than the rotations do. Methods that solve the rotation first throw that away.",
+        ),
+        Prediction(
+            "motion",
+            question="A robot moves at 1 m/s, the tracker lags 20 ms behind. How large is the error of the position?",
+            answer=20.0,
+            unit="mm",
+            within=0.05,
+            why="1000 mm/s times 0.02 s = 20 mm: accuracy in motion is a matter of time first.",
+        ),
+        Exercise(
+            "time_offset",
+            reference=tracker.time_offset,
+            draw=speed_curves,
+            metric=metrics.numbers(6e-4, "s"),
+            hints=(
+                "Shift one curve against the other, sample by sample, and find where they differ least. Then look between the samples.",
+                "Cost of a shift s: mean of (delayed[k + s] - reference[k])^2 over the common part. A parabola through the best three has its vertex at the offset.",
+                "With costs l, m, r left, at and right of the best s: offset = (s + 0.5 * (l - r) / (l - 2 * m + r)) * step.",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda *a: -tracker.time_offset(*a),
+                    "The sign is reversed: positive means that the tracker lags behind.",
+                ),
+                Mistake(
+                    _whole_samples,
+                    "You stop at whole samples. At 1 m/s half a sample of 10 ms is 5 mm: fit a parabola through the best three.",
+                ),
+                Mistake(
+                    lambda t, *a: tracker.time_offset(t, *a) / (t[1] - t[0]),
+                    "Your answer counts samples. Multiply by the time between samples.",
+                ),
+                Mistake(
+                    lambda *a: 1000 * tracker.time_offset(*a), "Your answer is in milliseconds; wanted are seconds."
+                ),
+                Mistake(
+                    lambda t, r, d, m: 2 * _whole_samples(t, r, d, m) - tracker.time_offset(t, r, d, m),
+                    "The fraction has the wrong sign: the vertex lies toward the smaller of the two neighbors.",
+                ),
+            ],
+        ),
+    ],
+)

@@ -1,0 +1,386 @@
+# %% title [markdown]
+# # 6 · A tracker on a robot flange
+#
+# **What you will do.** Read the packets of a tracker, mount it on a simulated robot, find where it sits, and judge how well it follows a motion.
+#
+# **What you will learn.** What a receiver can know of a stream, why two rotation axes are needed, what a null vector hides, why six runs that agree may all be
+# wrong, and why accuracy in motion is a matter of time first.
+#
+# **What you need.** Chapter 1, the singular value decomposition by name. About 90 minutes.
+
+# %% notation [markdown]
+# | letter | meaning |
+# | --- | --- |
+# | $B$, $F$ | base and flange of the robot; $T_{BF}$ comes from the joints |
+# | $E$, $W$ | the tracker, and the frame it reports in: its own pose when it was reset. A reading is $T_{WE}$ |
+# | $T_{FE}$ | the mounting, called $X$ while it is unknown |
+# | $A_i$, $B_i$ | motions of flange and tracker since the first pose, $A_i X = X B_i$. The report exchanges the two letters |
+# | mm, s, rad | inside; packets and logs carry meters |
+
+# %% setup
+import numpy as np
+
+from labkit import axxb, robot, tracker, udp
+from labkit import tracker_simulation as simulation
+from labkit.course import course
+from labkit.frames import invert, relative
+from labkit.ledger import ch06_tracker as report
+from labkit.tables import DATA, read_table
+from labkit.widgets import robot as robot_stages
+from labkit.widgets import tracker as stages
+
+ex = course("06-tracker")
+np.set_printoptions(precision=4, suppress=True)
+
+# %% the-question [markdown]
+# ## The question
+#
+# Can a game controller's tracker follow a painter's spray gun? The report *Kalibrace a testování systému OTUS tracker* (Západočeská univerzita v Plzni, 2018) bolts
+# one to a Stäubli TX40 and compares. Its logs were never published, so here a simulated tracker stands in; where the report prints numbers,
+# they are checked.
+
+# %% packets [markdown]
+# ## A packet
+#
+# Table 1 of the report gives 23 fields of 8 bytes: device, time stamp, position, velocity, acceleration, quaternion (x, y, z, w), angular velocity and acceleration, two
+# buttons. It gives **no types**. Our assumption, in one place of `tracker.py`: little-endian doubles, meters, seconds.
+
+# %% decode_packet
+@ex.decode_packet
+def decode_packet(data):
+    """Return time (s), position (mm), shape (3,), and quaternion x, y, z, w, shape (4,), of a packet of 184 bytes."""
+    ### BEGIN SOLUTION
+    values = np.frombuffer(data, "<f8")
+    return values[1], 1000 * values[2:5], values[11:15]
+    ### END SOLUTION
+
+
+# %% stream [markdown]
+# ## A stream
+#
+# The tracker sends 250 packets a second by UDP, and UDP promises nothing. Decide first. Then press play: these are real packets between two threads on
+# your machine. Raise the loss, switch on the nonsense (the report's *nesmyslné hodnoty*), look at the books.
+
+# %% predict-loss
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "from gaps in the time stamps"
+### END SOLUTION
+ex.predict("loss", guess, reveal=stages.live_tracker)
+
+# %% books [markdown]
+# A receiver is honest when its books balance with the sender's, whatever the order of arrival. Two seconds of stream, sent at ten times the speed:
+
+# %% balance-the-books
+faults = udp.Faults(loss=0.05, duplicate=0.03, reorder=0.05, malformed=0.02, foreign=0.02)
+packets = (packet for packet, _ in zip(simulation.endless_packets(np.random.default_rng(0)), range(500)))
+with udp.listen() as listener:
+    stream = udp.stream(packets, 250.0, faults, np.random.default_rng(1))
+    with udp.Sender(stream, listener.port, speed=10.0) as sender:
+        sender.finished.wait(10.0)
+        sender.flush(listener)
+    seen, sent = listener.statistics(), sender.sent
+print("every good packet counted once:", seen.good == sent["good"])
+print("every bad one reported:        ", sum(seen.bad.values()) == sent["malformed"] + sent["foreign"])
+print("reasons:", sorted(seen.bad))
+
+# %% arm [markdown]
+# ## The reference: a robot
+#
+# The robot knows where its flange is, if we know the robot. A link in the Denavit-Hartenberg convention is four elementary transforms:
+# $T = R_z(\theta)\,D_z(d)\,D_x(a)\,R_x(\alpha)$. The data sheet (appendix B) prints reaches, and these fix the lengths: forearm $R_b = 225$, upper arm
+# $450 - 225$, wrist to flange $515 - 450 = 65$ mm. Predict one more reach, then drag the flange.
+
+# %% predict-fold
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = 161
+### END SOLUTION
+ex.predict("fold", guess, reveal=robot_stages.tx40)
+
+# %% dh_matrix
+@ex.dh_matrix
+def dh_matrix(theta, d, a, alpha):
+    """Return the transform of one link, shape (4, 4); rad and mm."""
+    ### BEGIN SOLUTION
+    c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
+    return np.array([[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]])
+    ### END SOLUTION
+
+
+# %% forward_kinematics
+@ex.forward_kinematics
+def forward_kinematics(dh, q):
+    """Return T_BF, shape (4, 4); rows of dh are theta offset, d, a, alpha; q are the joint angles (rad)."""
+    ### BEGIN SOLUTION
+    T = np.eye(4)
+    for (offset, d, a, alpha), angle in zip(dh, q):
+        T = T @ dh_matrix(offset + angle, d, a, alpha)
+    return T
+    ### END SOLUTION
+
+
+# %% equation [markdown]
+# ## A X = X B
+#
+# The reading is relative to a frame nobody knows. Motions get rid of it (equations 2 to 4): from the first pose to the $i$-th, the flange moves by
+# $A_i = T_{BF_0}^{-1} T_{BF_i}$, the tracker by $B_i = T_{WE_0}^{-1} T_{WE_i}$, and both are the same motion seen through the mounting: $A_i X = X B_i$.
+#
+# Drag the two rotation axes; the colored dots are axes of many mountings found from noisy readings. Press *small motions* as well: noise divided by a small
+# angle is a large error, which is why more poses close together can make a calibration worse.
+
+# %% predict-axes
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "perfect, and the mounting is arbitrary"
+### END SOLUTION
+ex.predict("axes", guess, reveal=stages.two_axes)
+
+# %% vec [markdown]
+# ## The rotation as a null vector
+#
+# Stack the **columns** of $X$ into $\operatorname{vec} X$. Then $\operatorname{vec}(PXQ) = (Q^\top \otimes P)\operatorname{vec} X$, and $R_A X - X R_B = 0$ becomes nine
+# linear equations a motion (equations 7 to 9): $\;m_i \operatorname{vec} X = 0$.
+
+# %% kron_row
+@ex.kron_row
+def kron_row(A, B):
+    """Return the block of one motion, shape (9, 9), from the rotations of flange and tracker, (3, 3) each."""
+    ### BEGIN SOLUTION
+    return np.kron(np.eye(3), A) - np.kron(B.T, np.eye(3))
+    ### END SOLUTION
+
+
+# %% null-vector [markdown]
+# With noise nothing is exactly zero, so the singular vector of the smallest singular value must do (equations 10 to 12). Three traps wait: its **sign** is arbitrary, its
+# **length** is 1, and its matrix is only nearly orthonormal. The report names the first and accepts the last; we project to the nearest rotation.
+
+# %% rotation_from_nullvector
+@ex.rotation_from_nullvector
+def rotation_from_nullvector(M):
+    """Return the rotation, shape (3, 3), that the stacked blocks M, shape (9 N, 9), determine."""
+    ### BEGIN SOLUTION
+    X = np.linalg.svd(M)[2][-1].reshape(3, 3, order="F")
+    U, _, Vt = np.linalg.svd(X * np.sign(np.linalg.det(X)))
+    return U @ Vt
+    ### END SOLUTION
+
+
+# %% translation [markdown]
+# ## The translation by least squares
+#
+# With the rotation known, the last column of $A_i X = X B_i$ is linear in $t$ (equations 14 to 16): $(I - R_{A_i})\,t = t_{A_i} - R\,t_{B_i}$. One motion leaves the part of
+# $t$ along its axis free, so two directions are needed again.
+
+# %% translation_lsq
+@ex.translation_lsq
+def translation_lsq(A, B, R):
+    """Return t, shape (3,), mm, from motions A, B, shape (N, 4, 4), and the rotation R of the mounting."""
+    ### BEGIN SOLUTION
+    K1 = np.eye(3) - A[:, :3, :3]
+    K2 = A[:, :3, 3] - B[:, :3, 3] @ R.T
+    return np.linalg.lstsq(K1.reshape(-1, 3), K2.ravel(), rcond=None)[0]
+    ### END SOLUTION
+
+
+# %% errors [markdown]
+# ## Two errors, taken at their word
+#
+# The report measures its fit by $E_{rot} = \frac{1}{N-1}\lVert M^\top M\,v \rVert$ (13) and $E_{trans} = \frac{1}{N-1}\lVert K_1 t - K_2 \rVert$ (17). Write them exactly so. One contains the
+# squares of small angles, the other no square at all, and both shrink with $N$.
+
+# %% e_rot
+@ex.e_rot
+def e_rot(M):
+    """Return E_rot of the stacked blocks M, shape (9 N, 9); v has length 1."""
+    ### BEGIN SOLUTION
+    v = np.linalg.svd(M)[2][-1]
+    return np.linalg.norm(M.T @ (M @ v)) / (len(M) / 9 - 1)
+    ### END SOLUTION
+
+
+# %% e_trans
+@ex.e_trans
+def e_trans(residuals):
+    """Return E_trans of the residuals K1 t - K2, shape (N, 3), mm."""
+    ### BEGIN SOLUTION
+    return np.linalg.norm(residuals) / (len(residuals) - 1)
+    ### END SOLUTION
+
+
+# %% outliers [markdown]
+# ## A rule, before looking
+#
+# At each of 21 poses the robot rests and 4 s of readings are averaged. "Evidently wrong" values were left out by eye. A rule fixed beforehand is fair: keep what
+# lies within some standard deviations of the median, where the standard deviation comes from the median distance and is deaf to outliers.
+
+# %% reject_outliers
+@ex.reject_outliers
+def reject_outliers(values, factor=4.0):
+    """Return a bool array, shape (n,): True where values lie within factor robust standard deviations of the median."""
+    ### BEGIN SOLUTION
+    distance = np.abs(values - np.median(values))
+    return distance <= factor * 1.4826 * np.median(distance)
+    ### END SOLUTION
+
+
+# %% the-log [markdown]
+# ## Calibrate
+#
+# `run_1.csv` is a synthetic log of such a run, its true mounting the report's result. The stops are averaged for you, `A` and `B` are the motions since pose 0, and `kept`
+# says which pose has to go (pose 0 itself is no motion). Put your functions in a row; the result is a matrix, in mm.
+
+# %% read-the-log
+poses = read_table("tracker/poses.csv")
+joints = np.deg2rad(np.column_stack([poses[f"q{i} [deg]"] for i in range(1, 7)]))
+T_BF = np.array([forward_kinematics(robot.TX40.dh, q) for q in joints])
+T_WE, used = tracker.average_stops(tracker.read_csv(DATA / "tracker/run_1.csv"))
+kept = tracker.calibrate_mounting(T_BF, T_WE).kept
+A, B = relative(T_BF[0], T_BF), relative(T_WE[0], T_WE)
+print("share of readings used at a stop:", used.min(), "to", used.max(), "- excluded pose:", np.flatnonzero(~kept))
+
+# %% mounting
+mounting = ...  # your code here
+### BEGIN SOLUTION
+A, B = A[kept][1:], B[kept][1:]
+M = np.concatenate([kron_row(a[:3, :3], b[:3, :3]) for a, b in zip(A, B)])
+mounting = np.eye(4)
+mounting[:3, :3] = rotation_from_nullvector(M)
+mounting[:3, 3] = translation_lsq(A, B, mounting[:3, :3])
+### END SOLUTION
+mounting = ex.mounting(mounting)
+
+# %% spread-text [markdown]
+# Six runs give six mountings. Appendix D prints the variance over the runs (*Rozptyl*), divided by 6. What is the standard deviation of the height z, in mm?
+
+# %% spread
+mountings = report.synthetic_mountings()
+spread = ...  # your code here
+### BEGIN SOLUTION
+spread = np.array([m.T_FE[2, 3] for m in mountings]).std()
+### END SOLUTION
+spread = ex.spread(spread)
+
+# %% compare [markdown]
+# ## Against the document
+#
+# Appendix D checks itself: six times an average less five entries is the sixth. And since the mean $\bar e$ of $N$ distances never exceeds their root mean square,
+# $E_{trans} \ge \bar e \sqrt{N} / (N - 1)$ with $\bar e = 2.67$ mm and $N = 20$.
+
+# %% compare-appendix-d
+runs, mean, variance, _ = report.table_d()
+print(f"run 3, largest error, printed 6; from the average: {6 * mean[11] - np.delete(runs[:, 11], 2).sum():.3f} mm")
+print("run 4, mean and largest angle, printed:", runs[3, 10], runs[3, 12], "deg")
+print(f"Rozptyl of x: {variance[0]}, divided by 6: {runs[:, 0].var():.2e}, by 5: {runs[:, 0].var(ddof=1):.2e}")
+least = mean[9] * np.sqrt(20) / 19
+print(f"E_trans, printed {mean[7]:.6f} 'mm': at least {least:.2f} mm, so it is meters: {1000 * mean[7]:.2f} mm")
+ours = report.synthetic_table()
+for name, average, rozptyl in (("report", mean, variance), ("ours", ours.mean(0), ours.var(0))):
+    print(f"{name:6} z {1000 * average[2]:.2f} mm, Rozptyl {rozptyl[2]:.1e} m^2, mean error {average[9]:.2f} mm")
+    print(f"{'':6} {average[10]:.3f} deg, E_trans {1000 * average[7]:.2f} mm, E_rot {average[8]:.1e}")
+
+# %% contradictions [markdown]
+# More does not fit. Section 3.1 and the table put the origin 49.17 mm below, the conclusion 65.3 mm. The text speaks of a half turn about z, the printed
+# quaternion of 0.8°; with that half turn, x and y change sign as the conclusion has them, but not z. And ±5 rad/s as a mean error would exceed the fastest motion, 3.7 rad/s:
+# degrees are meant. Chapter 10 lists them all.
+#
+# ## Break it: repeat the same mistake
+#
+# The runs agree within 0.2 mm while a single pose is off by 2.5 mm. If these errors were random, 20 poses would scatter the mounting by more than half a
+# millimeter. So?
+
+# %% predict-runs
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "the runs alone cannot tell"
+### END SOLUTION
+ex.predict("runs", guess, reveal=stages.six_runs)
+
+# %% beyond [markdown]
+# ## Beyond the document: can it be done better?
+#
+# The report solves the rotation first, then the translation; so do most methods of OpenCV. The figure shows seven methods beside the Cramér-Rao bound, which no unbiased method can beat
+# (stored results, 400 trials a case). Choose the noise.
+
+# %% predict-methods
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "both together, weighed by their noise"
+### END SOLUTION
+ex.predict("methods", guess, reveal=stages.methods)
+
+# %% everything-at-once [markdown]
+# Rotation first means: translations may not help the rotation. Maximum likelihood weighs both by their noise; `axxb.calibrate_hand_eye` does, and returns a covariance. It treats the
+# first pose like any other, and so needs one more unknown, here $T_{BW}$. On our log it gains little, since the systematic error is nobody's noise model. But
+# its standard deviation says how far off it may be; six equal runs do not.
+
+# %% maximum-likelihood
+best = axxb.calibrate_hand_eye(invert(T_BF), T_WE, robust=True)
+std = np.sqrt(np.diag(best.covariance))[9:]
+for name, t in (("truth", simulation.T_FE), ("report's method", mounting), ("maximum likelihood", best.target)):
+    print(f"{name:19}", t[:3, 3], "mm")
+print("standard deviation ", std, "mm; ignored poses:", np.flatnonzero(best.weights < 0.01))
+
+# %% motion [markdown]
+# ## In motion
+#
+# Section 3.2 moves the robot through the same points slowly, faster, fast, and finds mean errors of ±15 mm and ±1° that hardly depend on speed. Work out what a lag costs, then
+# try speed, latency and nonsense. Which of the four summaries would you print?
+
+# %% predict-motion
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = 20
+### END SOLUTION
+ex.predict("motion", guess, reveal=stages.dynamic_errors)
+
+# %% offset [markdown]
+# A few percent of nonsense are enough to make the mean 15 mm at every speed and to hide a lag of 8 ms. The lag itself is easy to find: the **norm** of the angular velocity is the same in
+# every frame and at every point of the body, so it needs no calibration at all. Shift one curve against the other until they match.
+
+# %% time_offset
+@ex.time_offset
+def time_offset(time, reference, delayed, max_offset=0.2):
+    """Return by how many seconds the speeds `delayed` lag behind `reference`, to a fraction of a sample."""
+    ### BEGIN SOLUTION
+    step = time[1] - time[0]
+    n = round(max_offset / step)
+    core = reference[n:-n]
+    cost = np.array([((delayed[n + s : len(time) - n + s] - core) ** 2).mean() for s in range(-n, n + 1)])
+    best = np.clip(np.argmin(cost), 1, 2 * n - 1)
+    left, middle, right = cost[best - 1 : best + 2]
+    return (best - n + 0.5 * (left - right) / (left - 2 * middle + right)) * step
+    ### END SOLUTION
+
+
+# %% four-motions
+for name in ("slow", "middle", "fast", "rotation"):
+    m = simulation.simulate_motion(name, np.random.default_rng(5))
+    lag = time_offset(m.time, tracker.speeds(m.time, m.T_true)[1], m.w_read)
+    raw = tracker.summarize(tracker.tracking_errors(m.time, m.T_true, m.T_read).translation)
+    then = tracker.shift_time(m.time, m.T_true, -lag)
+    smooth, gate = tracker.filter_positions(m.time, m.T_read[:, :3, 3])
+    left = tracker.summarize(np.linalg.norm(smooth - then[:, :3, 3], axis=1))
+    print(f"{name:9} lag {1000 * lag:4.0f} ms   raw:", ", ".join(f"{k} {v:.0f}" for k, v in raw.items()), "mm")
+    print(f"{'':21} gated: mean {left['mean']:.1f}, max {left['max']:.1f} mm, {100 * (1 - gate.mean()):.0f} % refused")
+
+# %% in-practice [markdown]
+# The report asks for "advanced filtering" in its conclusion. The last lines did it in two steps: a gate refuses what cannot follow from the motion so far, a Kalman filter with
+# constant velocity smooths the rest. What remains is the systematic error, which no filter sees. Chapter 8 builds this filter.
+#
+# ## In practice
+#
+# - Bind a receiver to the address you mean, count what you throw away, and never let it block.
+# - Turn far, about axes far apart. Look at the second smallest singular value before you look at the residual.
+# - Calibrate over the space you will work in. Repeat at *other* poses: same poses repeat their error.
+# - Synchronize first. Then print median and 95 % beside the mean, and say what happened to the outliers.
+
+# %% questions [markdown]
+# ## Three questions, to answer in words
+#
+# 1. The mounting adapter is printed anew. Which figures of appendix D change, which do not?
+# 2. Why does the angular speed need no calibration, while the linear speed does?
+# 3. A colleague halves the error by averaging 40 s instead of 4 s at each pose. What has improved, and what has not?
+
+# %% progress
+ex.progress()

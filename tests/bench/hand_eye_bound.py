@@ -1,0 +1,48 @@
+"""The acceptance measurement of `calibrate_hand_eye`: error over the Cramer-Rao bound and mean NEES in four noise
+cases.
+
+    python tests/bench/hand_eye_bound.py [trials]
+
+Goal: at most 1.05 times the bound with the noise levels not told, mean NEES 6 +- 0.3 over 400 runs (told and not told;
+the mean of 400 has a standard error of 0.17, so about one case in twelve misses 0.3 by chance).
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+
+import test_axxb as lab  # noqa: E402
+
+from labkit import axxb  # noqa: E402
+from labkit.frames import invert  # noqa: E402
+
+
+def main(trials=400):
+    print("poses  deg   mm   rotation  translation  NEES told  not told")
+    for n in (20, 100):
+        for deg, mm in ((0.1, 0.1), (0.1, 1.0), (0.5, 0.1), (0.5, 1.0)):
+            rng, std_rot = np.random.default_rng([n, int(10 * deg), int(10 * mm)]), np.deg2rad(deg)
+            squares, bounds, nees = [], [], []
+            for _ in range(trials):
+                T_BF, T_ST = lab.setup(rng, n, std_rot, mm)
+                exact = invert(lab.T_FS) @ invert(T_BF) @ lab.T_BT
+                C = axxb.calibrate_hand_eye(T_BF, exact, std_rot, mm).covariance
+                bounds.append([np.trace(C[:3, :3]), np.trace(C[3:6, 3:6])])
+                results = axxb.calibrate_hand_eye(T_BF, T_ST, std_rot, mm), axxb.calibrate_hand_eye(T_BF, T_ST)
+                errors = [lab.error(r.T_FS) for r in results]
+                squares.append([errors[1][:3] @ errors[1][:3], errors[1][3:] @ errors[1][3:]])
+                nees.append([e @ np.linalg.solve(r.covariance[:6, :6], e) for r, e in zip(results, errors)])
+            ratio = np.sqrt(np.mean(squares, axis=0) / np.mean(bounds, axis=0))
+            told, not_told = np.mean(nees, axis=0)
+            print(
+                f"{n:5}  {deg:.1f}  {mm:.1f}   {ratio[0]:8.3f}  {ratio[1]:11.3f}  {told:9.2f}  {not_told:8.2f}",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))

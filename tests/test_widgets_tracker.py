@@ -1,0 +1,157 @@
+"""Stages of chapter 6: what they compute, against closed forms, and that each draws, fails and recovers."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from labkit import robot, tracker, tracker_simulation, udp
+from labkit.robot import HOME, TX40
+from labkit.tables import read_table
+from labkit.widgets import robot as wr
+from labkit.widgets import tracker as wt
+
+ALL = (wr.tx40, wt.live_tracker, wt.two_axes, wt.dynamic_errors, wt.methods, wt.six_runs)
+
+
+@pytest.mark.parametrize("make", ALL)
+def test_draws_fails_and_recovers(make):
+    stage = make()
+    before = stage.png()
+    stage.make_it_fail()
+    stage.png()
+    assert stage.status == "" and any(np.any(stage.state[key] != stage.initial[key]) for key in stage.initial)
+    stage.reset()
+    assert stage.png() == before
+    assert repr(stage) == repr(make()) and stage.caption
+
+
+# ---- the robot
+
+
+def test_sliders_and_flange_follow_each_other():
+    stage = wr.tx40()
+    goal = np.array([300.0, 150.0, 550.0])
+    stage.set(flange=goal)
+    np.testing.assert_allclose(stage.result["T_BF"][:3, 3], goal, atol=1e-3)
+    q = wr.joints(stage.state)
+    np.testing.assert_allclose(q[3:], HOME[3:])
+    stage.set(q1=0.0, q2=0.0, q3=0.0)
+    expected = robot.forward_kinematics(TX40.dh, [0, 0, 0, *HOME[3:]])[:3, 3]
+    np.testing.assert_allclose(stage.state["flange"], expected, atol=1e-9)
+
+
+def test_an_unreachable_flange_stops_at_the_arms_reach():
+    stage = wr.tx40()
+    stage.set(flange=(900.0, 0.0, 300.0))
+    q = wr.joints(stage.state)
+    assert robot.within_limits(TX40, q)
+    away = np.linalg.norm(stage.state["flange"] - [0, 0, robot.BASE_HEIGHT])
+    assert 400 < away < np.hypot(robot.REACH_FLANGE, robot.SHOULDER_OFFSET)
+
+
+def test_make_it_fail_is_a_singular_arm():
+    stage = wr.tx40()
+    stage.make_it_fail()
+    assert stage.result["singular_values"][-1] < 1 and "singular" in stage.caption
+
+
+# ---- the stream
+
+
+def test_live_picture_gates_nonsense():
+    packets = tracker_simulation.endless_packets(np.random.default_rng(3), lambda: True)
+    readings = np.array([tracker.decode_packet(next(packets)) for _ in range(1500)])
+    clean = tracker_simulation.endless_packets(np.random.default_rng(3))
+    truth = np.array([tracker.decode_packet(next(clean)) for _ in range(1500)])
+    result = wt.compute_live(readings, udp.Statistics())
+    nonsense = np.linalg.norm(readings[:, tracker.POSITION] - truth[:, tracker.POSITION], axis=1) > 0.1
+    assert nonsense.any() and not result["used"][nonsense].any() and result["used"][~nonsense].mean() > 0.98
+
+
+def test_real_packets_arrive_in_the_stage_and_the_stream_ends_by_itself():
+    stage = wt.live_tracker()
+    before = threading.active_count()
+    stage.set(nonsense=True, loss=0.2)
+    until = time.perf_counter() + 5
+    while time.perf_counter() < until and stage.result["statistics"].good < 100:
+        stage.set(t=stage.state["t"] + wt.LIVE_STEP)
+        time.sleep(0.03)
+    seen = stage.result["statistics"]
+    assert seen.good >= 100 and seen.lost > 0 and "good readings" in stage.caption
+    until = time.perf_counter() + 6
+    while threading.active_count() > before and time.perf_counter() < until:
+        time.sleep(0.1)
+    assert threading.active_count() <= before
+
+
+# ---- two axes
+
+
+def two_axes_state(a, b, angle=40.0, noise=0.1):
+    return {"a": np.array(a, float), "b": np.array(b, float), "angle": angle, "noise": noise}
+
+
+def test_singular_values_of_two_axes():
+    parallel = wt.compute_two_axes(two_axes_state([1, 0, 0], [1, 0, 0]))["singular_values"]
+    half, full = 2 * np.sin(np.deg2rad(20)), 2 * np.sin(np.deg2rad(40))
+    np.testing.assert_allclose(parallel, np.sqrt(2) * np.array([full, full, *[half] * 4, 0, 0, 0]), atol=1e-12)
+    apart = wt.compute_two_axes(two_axes_state([1, 0, 0], [0, 1, 0]))
+    assert apart["singular_values"][-1] < 1e-12 < 0.5 < apart["singular_values"][-2]
+    assert apart["angle_deg"] == pytest.approx(90)
+
+
+def test_parallel_axes_leave_the_mounting_free_and_small_motions_blow_up_the_error():
+    good = wt.compute_two_axes(two_axes_state([1, 0, 0], [0, 0, 1]))
+    assert good["error_deg"] < 2 * good["predicted_deg"] and good["error_deg"] > 0.3 * good["predicted_deg"]
+    bad = wt.compute_two_axes(two_axes_state([1, 0, 0], [1, 0, 0]))
+    assert bad["error_deg"] > 30 and np.isfinite(bad["free"]).all()
+    small = wt.compute_two_axes(two_axes_state([1, 0, 0], [0, 0, 1], angle=2.0))
+    assert 10 < small["error_deg"] / good["error_deg"] < 40  # 40 deg over 2 deg is 20
+
+
+def test_found_rotations_are_rotations_near_the_truth():
+    found = wt.compute_two_axes(two_axes_state([1, 0, 0], [0, 0, 1]))["found"]
+    turn = Rotation.from_matrix(wt.X_TRUE[:3, :3].T @ found).magnitude()
+    assert np.rad2deg(turn.max()) < 1
+
+
+# ---- errors in motion, methods, runs
+
+
+def dynamic(speed=0.35, latency=8.0, nonsense=True):
+    return wt.compute_dynamic({"speed": speed, "latency": latency, "nonsense": nonsense})
+
+
+@pytest.mark.parametrize("speed, latency", [(0.35, 20.0), (1.0, 40.0), (1.4, 60.0)])
+def test_latency_is_found_and_its_error_removed(speed, latency):
+    result = dynamic(speed, latency, nonsense=False)
+    assert result["offset_ms"] == pytest.approx(latency, abs=3)
+    assert result["error"].max() == pytest.approx(speed * latency, abs=8)  # v * dt, and the systematic error
+    assert result["mended"].max() < 10
+
+
+def test_nonsense_moves_the_mean_and_not_the_median():
+    with_it, without = dynamic()["raw_summary"], dynamic(nonsense=False)["raw_summary"]
+    assert with_it["mean"] > 3 * without["mean"] and with_it["median"] < 1.1 * without["median"]
+
+
+def test_methods_are_the_stored_benchmark():
+    table = read_table("tracker/hand_eye_methods.csv", text=("method",))
+    assert len(table["method"]) == 4 * 7
+    for case, (deg, mm) in wt.CASES.items():
+        result = wt.compute_methods({"case": case})
+        rows = (table["std_deg"] == deg) & (table["std_mm"] == mm)
+        np.testing.assert_array_equal(result["rotation"], table["rotation"][rows])
+        best = result["names"].index("maximum likelihood")
+        assert result["rotation"][best] < 1.05 and result["translation"][best] < 1.05
+        assert result["rotation"].argmin() == best
+
+
+def test_repeating_does_not_show_the_systematic_error():
+    none, some = wt.compute_six_runs({"field": 0.0}), wt.compute_six_runs({"field": 2.0})
+    assert none["off"] < 2 * none["std"] and some["off"] > 5 * some["std"]
+    e = some["single"] - tracker_simulation.T_FE[:3, 3]
+    assert e @ np.linalg.solve(some["claim"], e) < 16.27  # 99.9 % of a chi-square with 3 degrees of freedom
