@@ -12,8 +12,8 @@ sections 2.6, 4.4, 6.1, listings C2-C5.
 """
 
 import contextlib
+import functools
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -44,21 +44,44 @@ _GENERATORS = skew(_EYE)  # derivatives of a small rotation about x, y, z
 _FLAT_GENERATORS = _GENERATORS.reshape(3, 9)
 
 
-@dataclass(frozen=True)
 class SphereHandEye(HandEye):
     """A `HandEye` from a sphere: target is its center in B (3,), residuals are (N, 3) in B, all in mm.
 
     singular_values: of the Jacobian with phi times the root-mean-square distance of the sphere, so that every column is
-    mm per mm. trace: rms distance (mm) at the linear start and after each step. std: noise of one coordinate, from the
-    residuals (mm).
+    mm per mm. trace: rms distance (mm) at the linear start and after each step. Covariance and singular values are
+    worked out when they are first asked for.
     """
 
-    std: float
+    def __init__(self, T_FS, target, residuals, weights, trace, moments, target_free):
+        vars(self).update(T_FS=T_FS, target=target, residuals=residuals, weights=weights, trace=trace)
+        vars(self).update(_moments=moments, _target_free=target_free)
 
     @property
     def rms(self):
         """Root mean square of the residual distances over all poses, rejected ones included (mm)."""
         return float(rms_distance(self.residuals))
+
+    @functools.cached_property
+    def std(self):
+        """Noise of one coordinate, estimated from the weighted residuals (mm); NaN without redundancy."""
+        dof = 3 * self._moments[2] - (9 if self._target_free else 6)
+        squares = np.vdot(self.residuals * self.weights[:, None], self.residuals)
+        return math.sqrt(squares / dof) if dof > 0 else math.nan
+
+    @functools.cached_property
+    def _spectrum(self):
+        return _spectrum(*self._moments, self.T_FS[:3, :3], self._target_free)
+
+    @property
+    def covariance(self):
+        """Of phi (rad, in S), translation (mm, in F) and target (mm, in B): std^2 (J'J)^-1, (9, 9) or (6, 6)."""
+        values, half = self._spectrum
+        return self.std**2 * half @ half.T
+
+    @property
+    def singular_values(self):
+        """Of the scaled Jacobian, largest first."""
+        return self._spectrum[0]
 
 
 def rms_distance(residuals):
@@ -259,16 +282,13 @@ def calibrate_sphere_target(T_BF, x_S, target=None, robust=False, rng=None):
         rng = np.random.default_rng(0) if rng is None else rng
         weights = _trimmed_start(R, t, x_S, target, rng)
         R_FS, t_FS, center, residuals, weights, trace, moments = _tukey(R, t, x_S, target, weights)
-        squares = np.vdot(residuals * weights[:, None], residuals)
     else:
         R_FS, t_FS, center, trace, moments = _solve(R, t, x_S, weights, target)
         residuals = _residuals(R, t, x_S, R_FS, t_FS, center)
-        squares = np.vdot(residuals, residuals)
-        trace[-1:] = [math.sqrt(squares / len(residuals))]
+        trace[-1:] = [_rms(residuals)]
     T_FS = np.zeros((4, 4))
     T_FS[:3, :3], T_FS[:3, 3], T_FS[3, 3] = R_FS, t_FS, 1.0
-    covariance, singular_values, std = _uncertainty(*moments, R_FS, squares, target is None)
-    return SphereHandEye(T_FS, center, residuals, covariance, singular_values, weights, np.array(trace), std)
+    return SphereHandEye(T_FS, center, residuals, weights, np.array(trace), moments, target is None)
 
 
 def linear_start(T_BF, x_S):
@@ -731,33 +751,47 @@ def _polar(M):
 
 
 def _descend(S, h, R_FS, steps=MAX_STEPS):
-    """Newton on SO(3) for r'Sr - 2 h'r, Gauss-Newton where that points uphill, steps halved until they descend."""
-    r = R_FS.ravel()
-    gradient = S @ r - h
-    costs = [r @ (gradient - h)]
-    floor = 1e-15 * (abs(r @ h) + abs(costs[0]))
+    """Newton on SO(3) for r'Sr - 2 h'r, Gauss-Newton where that points uphill, steps halved until they descend.
+
+    A short step is followed by one more with the same matrix, which leaves an error of its third power. Returns the
+    rotation and the cost of each iterate.
+    """
+    gradient = S @ R_FS.ravel() - h
+    costs = [R_FS.ravel() @ (gradient - h)]
+    floor = 1e-15 * (abs(R_FS.ravel() @ h) + abs(costs[0]))
+
+    def moved(step, size):
+        Q = _turn(*step.tolist(), size) @ R_FS
+        q = Q.ravel()
+        slope = S @ q - h
+        return Q, slope, q @ (slope - h)
+
     for _ in range(steps):
         G = (_GENERATORS @ R_FS).reshape(3, 9)
         slope, H = G @ gradient, G @ S @ G.T
         Z = gradient.reshape(3, 3) @ R_FS.T
-        step = -np.linalg.solve(H + 0.5 * (Z + Z.T) - Z.trace() * _EYE, slope)
+        inverse = np.linalg.inv(H + 0.5 * (Z + Z.T) - Z.trace() * _EYE)
+        step = -(inverse @ slope)
         if slope @ step > 0:
             step = -np.linalg.solve(H, slope)
         size = math.sqrt(step @ step)
         if size > 1.0:
             step, size = step / size, 1.0
-        while True:
-            Q = _turn(*step.tolist(), size) @ R_FS
-            q = Q.ravel()
-            new_gradient = S @ q - h
-            cost = q @ (new_gradient - h)
-            if cost <= costs[-1] + floor or size < STEP_TOLERANCE:
-                break
+        Q, new_gradient, cost = moved(step, size)
+        while cost > costs[-1] + floor and size >= STEP_TOLERANCE:
             step, size = step / 2, size / 2
+            Q, new_gradient, cost = moved(step, size)
         R_FS, gradient = Q, new_gradient
         costs.append(cost)
         if size < 1e-7:  # the next Newton step would be below 1e-13
             break
+        if size < 1e-2:
+            step = -(inverse @ ((_GENERATORS @ R_FS).reshape(3, 9) @ gradient))
+            again = math.sqrt(step @ step)
+            R_FS, gradient, cost = moved(step, again)
+            costs.append(cost)
+            if size * again < 1e-9:
+                break
     return R_FS, costs
 
 
@@ -830,8 +864,8 @@ def _tukey(R, t, x, target, weights):
     return R_FS, t_FS, center, residuals, weights, trace, moments
 
 
-def _uncertainty(mean, G, total, R_FS, square_sum, target_free):
-    """Covariance of phi, translation (and target), scaled singular values, and the noise of one coordinate.
+def _spectrum(mean, G, total, R_FS, target_free):
+    """Singular values of the scaled Jacobian of phi, translation (and target), and half with (J'J)^-1 = half half'.
 
     J'J is put together from the moments of the poses; J = (-R_BF R_FS [x], R_BF, -I) itself is never built.
     """
@@ -849,9 +883,7 @@ def _uncertainty(mean, G, total, R_FS, square_sum, target_free):
         A[3:6, 6:], A[6:, 3:6] = turned.T, turned
         A[:3, 6:], A[6:, :3] = cross, cross.T
     values, vectors = np.linalg.eigh(A)
-    dof = 3 * total - k
-    variance = square_sum / dof if dof > 0 else np.nan
-    values = np.maximum(values, np.finfo(float).tiny)
-    half = vectors / np.sqrt(values)
+    values = np.sqrt(np.maximum(values, np.finfo(float).tiny))
+    half = vectors / values
     half[:3] /= reach
-    return variance * half @ half.T, np.sqrt(values[::-1]), math.sqrt(variance)
+    return values[::-1], half
