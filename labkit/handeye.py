@@ -252,8 +252,8 @@ def calibrate_sphere_target(T_BF, x_S, target=None, robust=False, rng=None):
     target : array-like, shape (3,), optional
         Sphere center in the base, if it is known; its error then goes into the result undiminished.
     robust : bool
-        Least trimmed squares over random subsets, then Tukey weights on each pose's residual length; bears nearly half
-        of bad poses.
+        Least trimmed squares over random subsets, then Tukey weights on each pose's residual length; bears a third of
+        bad poses.
     rng : numpy.random.Generator, optional
         Source of the subsets; a fixed one is used without it, so that results repeat.
 

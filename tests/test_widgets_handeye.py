@@ -73,6 +73,11 @@ def test_every_misprint_is_offered_as_the_first_slip():
         )
 
 
+def test_innocent_poses_are_offered_no_slip():
+    suspects = {row["pose"] for row in handeye_data.corrections()}
+    assert {pose for pose, slips in enumerate(w._explained(), start=1) if slips} == suspects
+
+
 def test_pattern_predicts_the_covariance_of_simulated_fits():
     state = {"E": np.array([25.0, 290.0]), "across": 25, "tilt_deg": 40}
     result = w.compute_pattern(state)

@@ -287,6 +287,17 @@ def _only_the_grossest(entries):
     return {(s[0].table, s[0].pose, s[0].column) for s in found.values() if s and s[0].before > 30}
 
 
+class Count(metrics.Deviation):
+    """How many entries are wrong, in words."""
+
+    def __init__(self, what, count):
+        super().__init__(what, float(count), "", 0.5)
+
+    def __str__(self):
+        words = self.what if self.amount != 1 else self.what.replace("misprints are", "misprint is").replace("entries are", "entry is")
+        return f"{self.amount:.0f} {words}"
+
+
 class named_entries(metrics.exactly):
     """A set of (table, pose, column), where A and C of pose 12 stand for each other."""
 
@@ -301,8 +312,7 @@ class named_entries(metrics.exactly):
 
     def deviations(self, result, expected):
         missed, accused = len(expected - result), len(result - expected)
-        what = "the number of misprints" if missed >= accused else "the number of innocent entries accused"
-        return [metrics.Deviation(what, float(max(missed, accused)), "", 0.5)]
+        return [Count("misprints are not named yet", missed), Count("entries are accused wrongly", accused)]
 
 
 # --- designing poses -------------------------------------------------------------------------------------------------

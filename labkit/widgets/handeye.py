@@ -32,8 +32,7 @@ def _noise():
 
 
 def compute_scan_line(state):
-    """Centers recovered from repeated noisy scan lines of a sphere, the fitted circle, and the standard deviation of y.
-    """
+    """Centers recovered from repeated noisy scan lines, the fitted circle, and the standard deviation of y."""
     y, z = state["C"]
     r = np.sqrt(RADIUS**2 - y * y)
     angle = np.linspace(-1, 1, POINTS) * np.deg2rad(state["half_angle_deg"])
@@ -249,10 +248,11 @@ def convergence():
 
 @functools.cache
 def _explained():
-    """Up to SLIPS_SHOWN slips that would explain each pose, the most credible first: a list of 31 lists."""
+    """Up to SLIPS_SHOWN slips that would explain each suspicious pose, the most credible first: a list of 31 lists."""
     entries, fit = handeye_data.printed_entries(), _reference_fit()
+    innocent = np.linalg.norm(fit.residuals, axis=1) <= misprints.SUSPICIOUS * fit.std
     return [
-        misprints.explanations(entries, pose, fit.T_FS, fit.target, fit.std)[:SLIPS_SHOWN]
+        [] if innocent[pose - 1] else misprints.explanations(entries, pose, fit.T_FS, fit.target, fit.std)[:SLIPS_SHOWN]
         for pose in range(1, 32)
     ]
 
@@ -309,6 +309,8 @@ def _poses_sentence(result):
         f"{e.column.removesuffix('_deg')} in {e.table} read as {e.corrected} for {e.printed} ({e.slip})"
         if e
         else f"as printed; single slips that would explain it: {result['offered']}"
+        if result["offered"]
+        else "nothing to explain"
     )
     return (
         f"Pose {result['pose']}, {told}: residual {result['lengths'][result['pose'] - 1]:.2f} mm. All 31: rms "
