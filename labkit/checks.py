@@ -7,6 +7,14 @@ ORTHONORMAL_TOLERANCE = 1e-3  # six printed digits pass, a matrix in the wrong u
 
 def as_finite(value, name):
     """`value` as an array of finite floats; refuses objects, complex numbers, NaN and infinities."""
+    array = _as_floats(value, name)
+    if not np.isfinite(array).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise ValueError(f"{name} must be finite, got {array[where]} at index {list(where)}")
+    return array
+
+
+def _as_floats(value, name):
     try:
         array = np.asarray(value)
         if array.dtype.kind not in "biuf":
@@ -17,9 +25,6 @@ def as_finite(value, name):
         raise ValueError(f"{name} must hold real numbers, got {type(value).__name__}") from None
     if array.dtype.kind != "f" or array.dtype.itemsize < 8:
         array = array.astype(float)
-    if not np.isfinite(array).all():
-        where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise ValueError(f"{name} must be finite, got {array[where]} at index {list(where)}")
     return array
 
 
@@ -42,7 +47,10 @@ def as_rotations(value, name):
 
 def as_transforms(value, name):
     """`value` as rigid transforms, shape (..., 4, 4): orthonormal rotation block, last row (0, 0, 0, 1)."""
-    array = as_finite(value, name)
+    array = _as_floats(value, name)
+    if array.ndim > 2 and array.shape[-2:] == (4, 4) and array.size and _are_certainly_rigid(array):
+        return array
+    array = as_finite(array, name)
     if array.shape[-2:] != (4, 4):
         raise ValueError(f"{name} must have shape (..., 4, 4), got {array.shape}")
     if (array[..., 3, :] != (0.0, 0.0, 0.0, 1.0)).any():
@@ -60,6 +68,31 @@ def _refuse_sheared(R, name):
     det = np.linalg.det(R)
     if (det < 0).any():
         raise ValueError(f"{name} must be right-handed, but its rotation block has determinant {det.min():.3g}")
+
+
+def _are_certainly_rigid(T, block=1024):
+    """True only when `as_transforms` would find nothing wrong with a stack (..., 4, 4).
+
+    Quick, because it works on contiguous rows of components: with columns x, y, z, the conditions x cross y = z, y
+    cross z = x and |x| = 1 make a rotation. A sum of squares takes the place of many comparisons; it is NaN or
+    infinite where an entry is. An eighth of the tolerance leaves room for what the omitted products can add up to.
+    """
+    T = T.reshape(-1, 4, 4)
+    for start in range(0, len(T), block):
+        part = T[start : start + block]
+        columns, last = np.empty((3, 5, len(part))), np.empty((4, len(part)))
+        columns[:, :3], last[:] = part[:, :3, :3].transpose(2, 1, 0), part[:, 3].T
+        columns[:, 3:] = columns[:, :2]  # the first two components again: a cross product by slices
+        error = columns[:2, 1:4] * columns[1:, 2:]
+        error -= columns[:2, 2:] * columns[1:, 1:4]
+        error -= columns[2::-2, :3]
+        norm = np.einsum("in,in->n", columns[0, :3], columns[0, :3]) - 1.0
+        last[3] -= 1.0
+        if not np.vdot(error, error) + np.vdot(norm, norm) <= (ORTHONORMAL_TOLERANCE / 8) ** 2:
+            return False
+        if np.vdot(last, last) != 0.0 or not np.isfinite(np.vdot(part, part)):
+            return False
+    return True
 
 
 def as_positive(value, name):

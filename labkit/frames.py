@@ -11,6 +11,7 @@ from .checks import as_finite, as_points, as_positive, as_rotations, as_transfor
 from .lie import nearest_rotation, skew
 
 MIN_ARM_ANGLE_DEG = 1e-3  # below this the triangle is so flat that its height drowns in the last digits of the points
+BLOCK = 2048  # frames built at a time, so that the work stays in the processor's cache
 MIN_ARM = 1e-9  # relative to the largest coordinate: a shorter arm is rounding error, not a direction
 
 
@@ -56,7 +57,7 @@ def gram_schmidt(a, b):
     a, b = np.broadcast_arrays(as_points(a, "a"), as_points(b, "b"))
     _refuse_flat(a, b, ("a", "b"), scale=np.maximum(np.abs(a).max(-1), np.abs(b).max(-1)))
     R = np.empty((*a.shape, 3))
-    _axes_into(R, a, b)
+    _axes_into(R, np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0), 1.0)
     return R
 
 
@@ -81,31 +82,43 @@ def frame_from_points(origin, x_point, y_point):
     Source: lab sheet, section 1, listing 1.
     """
     o, px, py = np.broadcast_arrays(*map(as_points, (origin, x_point, y_point), ("origin", "x_point", "y_point")))
-    a, b = px - o, py - o
-    _refuse_flat(a, b, ("x_point", "y_point"), scale=np.maximum(np.abs(px), np.abs(py)).max(-1))
     T = np.zeros((*o.shape[:-1], 4, 4))
-    _axes_into(T, a, b)
+    rows, origins, xs, ys = T.reshape(-1, 4, 4), *(p.reshape(-1, 3) for p in (o, px, py))
+    suspicious = False
+    for start in range(0, len(rows), BLOCK):
+        part = slice(start, start + BLOCK)
+        corner = np.ascontiguousarray(origins[part].T)
+        scale = max(np.abs(xs[part]).max(), np.abs(ys[part]).max())
+        suspicious |= not _axes_into(rows[part], xs[part].T - corner, ys[part].T - corner, scale)
+    if suspicious:
+        _refuse_flat(px - o, py - o, ("x_point", "y_point"), scale=np.maximum(np.abs(px), np.abs(py)).max(-1))
     T[..., :3, 3] = o
     T[..., 3, 3] = 1.0
     return T
 
 
-def _axes_into(R, a, b):
-    """Write the Gram-Schmidt axes of a, b into the first three rows and columns of R, component by component.
+def _axes_into(R, a, b, scale):
+    """Write the Gram-Schmidt axes of a, b, each of shape (3, ...), into the first three rows and columns of R.
 
     The cross product comes first, y = z x x follows. The axes are perpendicular to about 1e-16 over the sine of the
-    angle between the arms: 1e-11 for the flattest triangle that is let in.
+    angle between the arms: 1e-11 for the flattest triangle that is let in. Returns True when no arm can be short beside
+    `scale` and no triangle flat; otherwise `_refuse_flat` has to look at each one.
     """
-    ax, ay, az = np.moveaxis(a, -1, 0)
-    bx, by, bz = np.moveaxis(b, -1, 0)
-    s = 1 / np.sqrt(ax * ax + ay * ay + az * az)
-    xx, xy, xz = ax * s, ay * s, az * s
-    zx, zy, zz = xy * bz - xz * by, xz * bx - xx * bz, xx * by - xy * bx
-    s = 1 / np.sqrt(zx * zx + zy * zy + zz * zz)
-    zx, zy, zz = zx * s, zy * s, zz * s
-    R[..., 0, 0], R[..., 1, 0], R[..., 2, 0] = xx, xy, xz
-    R[..., 0, 1], R[..., 1, 1], R[..., 2, 1] = zy * xz - zz * xy, zz * xx - zx * xz, zx * xy - zy * xx
-    R[..., 0, 2], R[..., 1, 2], R[..., 2, 2] = zx, zy, zz
+    (ax, ay, az), (bx, by, bz) = a, b
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        base = ax * ax + ay * ay + az * az
+        s = 1 / np.sqrt(base)
+        xx, xy, xz = ax * s, ay * s, az * s
+        zx, zy, zz = xy * bz - xz * by, xz * bx - xx * bz, xx * by - xy * bx
+        height = zx * zx + zy * zy + zz * zz
+        s = 1 / np.sqrt(height)
+        zx, zy, zz = zx * s, zy * s, zz * s
+        R[..., 0, 0], R[..., 1, 0], R[..., 2, 0] = xx, xy, xz
+        R[..., 0, 1], R[..., 1, 1], R[..., 2, 1] = zy * xz - zz * xy, zz * xx - zx * xz, zx * xy - zy * xx
+        R[..., 0, 2], R[..., 1, 2], R[..., 2, 2] = zx, zy, zz
+        slope = np.deg2rad(MIN_ARM_ANGLE_DEG) ** 2 * (bx * bx + by * by + bz * bz)
+        short = 4 * (MIN_ARM * scale) ** 2
+    return bool(np.min(base) > short and np.min(height) > short and (height > 2 * slope).all())
 
 
 def _refuse_flat(a, b, names, scale):

@@ -1,18 +1,49 @@
 """Library functions behind the hooks of the peers' benchmark: {hook name: function with the hook's arguments}."""
 
-from labkit import axxb, handeye
+import numpy as np
+
+from labkit import axxb, chaining, frames, pivot
+from labkit import handeye as sphere
+from labkit import kalman as filters
+
+POSE_NOISE = (np.deg2rad(0.1), 0.2)  # rad and mm, as the benchmark draws them
 
 
-def ax_xb(T_BF, T_ST):
+def handeye(T_BF, T_ST):
     return axxb.calibrate_hand_eye(T_BF, T_ST).T_FS
 
 
 def sphere_handeye(T_BF, x_S):
-    result = handeye.calibrate_sphere_target(T_BF, x_S)
+    result = sphere.calibrate_sphere_target(T_BF, x_S)
     return result.T_FS, result.target
 
 
+def plain_pivot(T):
+    result = pivot.calibrate_pivot(T)
+    return result.tip, result.pivot
+
+
+def robust_pivot(T):
+    result = pivot.calibrate_pivot(T, *POSE_NOISE, robust=True)
+    return result.tip, result.pivot
+
+
+def kalman(F, Q, H, R, x0, P0, z):
+    return filters.filter_series(z, F, H, Q, R, x0, P0)
+
+
+def ekf(u, z, marks, x0, P0, Q, R):
+    std_range, std_bearing = np.sqrt(np.diag(R))
+    return filters.ekf_localize(u, z, marks, x0, P0, 0.1, std_range, std_bearing, cov_v=Q).x
+
+
 HOOKS = {
-    "handeye": ax_xb,
+    "handeye": handeye,
     "sphere_handeye": sphere_handeye,
+    "pivot": plain_pivot,
+    "pivot_robust": robust_pivot,
+    "frames": frames.frame_from_points,
+    "chain": lambda A, B, C: chaining.chain((A, B, C)),
+    "kalman": kalman,
+    "ekf": ekf,
 }

@@ -1,0 +1,432 @@
+"""Chapter 2: chained transforms, the closure error of a loop, and what to do with it."""
+
+import numpy as np
+
+from .. import chaining, frames
+from ..lie import exp_se3, log_se3, nearest_rotation
+from . import metrics
+from .engine import Chapter, Exercise, Mistake, Prediction, Value
+
+
+def random_pose(rng):
+    """A random pose with its origin some hundred millimeters away."""
+    return frames.pose(frames.matrix_from_quaternion(rng.normal(size=4)), rng.uniform(-400, 400, 3))
+
+
+def random_links(rng):
+    """Three to five random transforms, stacked."""
+    return (np.array([random_pose(rng) for _ in range(rng.integers(3, 6))]),)
+
+
+def loop_product(rng):
+    """The product of a loop that nearly closes: some degrees and millimeters off."""
+    turn = frames.normalize(rng.normal(size=3)) * np.deg2rad(rng.uniform(0.5, 8))
+    return (exp_se3(np.concatenate([turn, rng.uniform(0.5, 20) * rng.normal(size=3)])),)
+
+
+def worn_pose(rng):
+    """A pose whose rotation block has lost its right angles."""
+    T = random_pose(rng)
+    T[:3, :3] += rng.uniform(0.02, 0.06) * rng.normal(size=(3, 3))
+    return (T,)
+
+
+def open_loop(rng):
+    """Links of a loop of three to five frames that does not quite close."""
+    links = random_links(rng)[0]
+    links[-1] = frames.relative(chaining.chain(links[:-1]), np.eye(4))
+    return (links @ exp_se3(rng.normal(size=(len(links), 6)) * np.repeat([0.02, 2.0], 3)),)
+
+
+# Wrong variants --------------------------------------------------------------------------------------------------------
+
+
+def _blocks_apart(transforms):
+    """Rotations multiplied, translations merely added."""
+    T = chaining.chain(transforms)
+    T[:3, 3] = transforms[:, :3, 3].sum(0)
+    return T
+
+
+def _elementwise(transforms):
+    T = np.ones((4, 4))
+    for link in transforms:
+        T = T * link
+    return T
+
+
+def _closure(angle, distance=None):
+    """A variant of closure_error with another angle, or distance."""
+
+    def variant(T):
+        right = chaining.closure_error(T)
+        return (angle or (lambda T: right[0]))(T), (distance or (lambda T: right[1]))(T)
+
+    return variant
+
+
+def _trace_angle(R):
+    return np.arccos(np.clip((np.trace(R) - 1) / 2, -1, 1))
+
+
+def _with_rotation(T, R):
+    T = T.copy()
+    T[:3, :3] = R
+    return T
+
+
+def _columns_normalized(T):
+    R = T[:3, :3]
+    return _with_rotation(T, R / np.linalg.norm(R, axis=0))
+
+
+def _svd_variant(rule):
+    def variant(T):
+        U, s, Vt = np.linalg.svd(T[:3, :3])
+        return _with_rotation(T, rule(U, s, Vt))
+
+    return variant
+
+
+def _whole_matrix(T):
+    U, _, Vt = np.linalg.svd(T)
+    return U @ Vt
+
+
+def _parts(transforms):
+    """Links, the poses after 0, 1, ... N links, the twist of the product, and N."""
+    poses = chaining.stations(transforms)
+    return poses, log_se3(poses[-1]), len(transforms)
+
+
+def _all_in_the_last(transforms):
+    links = transforms.copy()
+    links[-1] = links[-1] @ frames.invert(chaining.chain(transforms))
+    return links
+
+
+def _appended_to_each(transforms):
+    _, xi, n = _parts(transforms)
+    return transforms @ exp_se3(-xi / n)
+
+
+def _prepended_to_each(transforms):
+    _, xi, n = _parts(transforms)
+    return exp_se3(-xi / n) @ transforms
+
+
+def _moved(poses, moves):
+    """Links between poses that have been moved."""
+    moved = moves @ poses
+    return frames.relative(moved[:-1], moved[1:])
+
+
+def _equal_moves(transforms):
+    poses, xi, n = _parts(transforms)
+    return _moved(poses, exp_se3(-np.repeat([[0], [1 / n]], [1, n], axis=0) * xi))
+
+
+def _forward_instead_of_back(transforms):
+    poses, xi, n = _parts(transforms)
+    return _moved(poses, exp_se3(np.arange(n + 1)[:, None] / n * xi))
+
+
+def _one_share_too_few(transforms):
+    poses, xi, n = _parts(transforms)
+    return _moved(poses, exp_se3(-np.arange(n + 1)[:, None] / (n + 1) * xi))
+
+
+def _translation_only(transforms):
+    poses, _, n = _parts(transforms)
+    moves = np.tile(np.eye(4), (n + 1, 1, 1))
+    moves[:, :3, 3] = -np.arange(n + 1)[:, None] / n * poses[-1][:3, 3]
+    return _moved(poses, moves)
+
+
+def _poses_returned(transforms):
+    poses, xi, n = _parts(transforms)
+    return (exp_se3(-np.arange(n + 1)[:, None] / n * xi) @ poses)[1:]
+
+
+def _sheet():
+    return chaining.chain(chaining.printed_transforms())
+
+
+def _angle_deg(wrong=None):
+    return np.rad2deg(chaining.closure_error(_sheet())[0] if wrong is None else wrong(_sheet()))
+
+
+CHAPTER = Chapter(
+    "02-chaining",
+    title="Chaining and closing the loop",
+    items=[
+        Prediction(
+            "order",
+            question="Move A shifts and turns, move B only shifts. Does the order of the two matter?",
+            choices=("no, shifts can be exchanged", "yes, one turn is enough", "only if both turn"),
+            answer="yes, one turn is enough",
+            why="B is made in the frame that A has reached. One turn is enough to send it in another direction (only a shift along "
+            "the axis of the turn would not mind).",
+        ),
+        Prediction(
+            "operator",
+            question="The sheet writes the sum of the transforms, and prints one result. Which of the two did its program compute?",
+            choices=("the sum", "the product", "neither"),
+            answer="the product",
+            why="A 1 in the last corner settles it: the sum of four transforms has a 4 there. Listing 6 multiplies (`T *= myT`).",
+        ),
+        Exercise(
+            "chain",
+            reference=chaining.chain,
+            draw=random_links,
+            metric=metrics.poses(1e-6, 1e-6),
+            hints=(
+                "Neighboring letters cancel: T_AB T_BC T_CD = T_AD. What does an empty chain do?",
+                "Start with the identity and multiply each link from the right, in the order given.",
+                "T = np.eye(4); for link in transforms: T = T @ link; return T.",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda Ts: np.sum(Ts, axis=0),
+                    "You added the matrices, as the sheet's sum sign says. The last row became 0 0 0 N: a chain of moves is a product.",
+                ),
+                Mistake(
+                    lambda Ts: chaining.chain(Ts[::-1]),
+                    "You multiplied in the reverse order: each new link belongs to the right of what you have, where its letters meet.",
+                ),
+                Mistake(
+                    _elementwise,
+                    "You multiplied entry by entry: `*` is not `@`.",
+                ),
+                Mistake(
+                    lambda Ts: chaining.chain(Ts[1:]),
+                    "The first link is missing: start with the identity, or with the first link and go on from the second.",
+                ),
+                Mistake(
+                    lambda Ts: chaining.chain(Ts[:-1]),
+                    "The last link is missing from your product.",
+                ),
+                Mistake(
+                    _blocks_apart,
+                    "The rotations are multiplied, but the translations merely added. Each one has to be turned into the first frame: let the 4x4 product do it.",
+                ),
+                Mistake(
+                    lambda Ts: frames.invert(chaining.chain(Ts)),
+                    "This is the inverse of the chain: T_DA instead of T_AD.",
+                ),
+            ],
+        ),
+        Exercise(
+            "closure_error",
+            reference=chaining.closure_error,
+            draw=loop_product,
+            metric=metrics.several(metrics.angles(1e-6), metrics.numbers(1e-9, "mm"), names=("angle", "distance")),
+            hints=(
+                "How far is T from the identity? One number for the turn, one for the shift.",
+                "The angle follows from the trace of the rotation block, the distance is the length of the translation.",
+                "return np.arccos((np.trace(T[:3, :3]) - 1) / 2), np.linalg.norm(T[:3, 3]).",
+            ),
+            mistakes=[
+                Mistake(
+                    _closure(lambda T: np.rad2deg(chaining.closure_error(T)[0])),
+                    "Your angle is in degrees. Inside the workbook angles are radians.",
+                ),
+                Mistake(
+                    _closure(lambda T: np.arccos(np.clip(np.trace(T) / 2 - 0.5, -1, 1))),
+                    "You took the trace of the 4x4 matrix; the 1 in its corner is no part of the rotation.",
+                ),
+                Mistake(
+                    _closure(None, lambda T: np.linalg.norm(T[:, 3])),
+                    "Your distance takes the whole last column, the 1 of the last row included.",
+                ),
+                Mistake(
+                    _closure(None, lambda T: np.linalg.norm(T - np.eye(4))),
+                    "Your distance is the norm of T - I, which adds millimeters to numbers without a unit. Only the last column holds lengths.",
+                ),
+                Mistake(
+                    _closure(lambda T: np.linalg.norm(T[:3, :3] - np.eye(3))),
+                    "The norm of R - I is no angle: for small turns it is sqrt(2) times too large.",
+                ),
+                Mistake(
+                    _closure(None, lambda T: np.sum(T[:3, 3] ** 2)),
+                    "This is the squared distance.",
+                ),
+                Mistake(
+                    _closure(lambda T: np.arctan2(T[1, 0], T[0, 0])),
+                    "You read the turn about z alone. The loop also tilts: the angle of the whole rotation is asked for.",
+                ),
+                Mistake(
+                    lambda T: chaining.closure_error(T)[::-1],
+                    "Angle and distance have changed places.",
+                ),
+            ],
+        ),
+        Value(
+            "closure_angle_deg",
+            reference=_angle_deg,
+            unit="deg",
+            rtol=5e-3,  # arccos of the trace of a rounded matrix is that bad at small angles
+            hints=(
+                "Chain the four printed transforms and ask for the closure error.",
+                "The first of the two results is the angle, in radians.",
+                "closure_angle_deg = np.rad2deg(closure_error(product)[0]).",
+            ),
+            mistakes=[
+                Mistake(lambda: chaining.closure_error(_sheet())[0], "This is the angle in radians."),
+                Mistake(
+                    lambda: _angle_deg(lambda T: np.arctan2(T[1, 0], T[0, 0])),
+                    "You read the turn about z alone. The loop also tilts by some tenths of a degree.",
+                ),
+                Mistake(
+                    lambda: _angle_deg(lambda T: np.linalg.norm(T[:3, :3] - np.eye(3))),
+                    "The norm of R - I is no angle: for small turns it is sqrt(2) times too large.",
+                ),
+                Mistake(
+                    lambda: np.rad2deg(_trace_angle(chaining.chain(chaining.printed_transforms()[1:])[:3, :3])),
+                    "The first link is missing from your chain.",
+                ),
+            ],
+        ),
+        Value(
+            "closure_distance",
+            reference=lambda: chaining.closure_error(_sheet())[1],
+            unit="mm",
+            rtol=1e-3,
+            hints=(
+                "Where does the loop bring the origin of K0?",
+                "It is the length of the last column of the product, without its 1.",
+                "closure_distance = closure_error(product)[1].",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: np.linalg.norm(_sheet()[:, 3]),
+                    "Your column still holds the 1 of the last row: take its first three entries.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_sheet()[:2, 3]),
+                    "You took x and y alone. The loop also misses in z.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(chaining.chain(chaining.printed_transforms()[::-1])[:3, 3]),
+                    "You multiplied the links in the reverse order.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(np.sum(chaining.printed_transforms(), axis=0)[:3, 3]),
+                    "You added the four translations, but each is written in another frame.",
+                ),
+            ],
+        ),
+        Prediction(
+            "lever",
+            question="One link of the loop K0 K1 K2 K3 K0 is turned wrongly by 3 deg, no other has an error. Which link opens the loop most at K0?",
+            choices=("the first, to K1", "the second, to K2", "the fourth, back to K0"),
+            answer="the second, to K2",
+            why="The error turns everything after the link about its end. K2 is farthest from K0; the fourth link ends at K0 and has no lever at all.",
+        ),
+        Exercise(
+            "orthonormalize",
+            reference=chaining.orthonormalize,
+            draw=worn_pose,
+            metric=metrics.poses(1e-6, 1e-6),
+            hints=(
+                "Which rotation lies nearest to a matrix that is almost one? The translation stays.",
+                "With R = U S V', the nearest rotation is U V': the SVD with its singular values set to 1.",
+                "U, _, Vt = np.linalg.svd(T[:3, :3]); X = T.copy(); X[:3, :3] = U @ Vt; return X.",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda T: _with_rotation(T, frames.gram_schmidt(T[:3, 0], T[:3, 1])),
+                    "Gram-Schmidt gives right angles, but not the nearest rotation: it trusts the first column and bends the others.",
+                ),
+                Mistake(
+                    _columns_normalized,
+                    "The columns have length 1, but they are still not perpendicular.",
+                ),
+                Mistake(
+                    _svd_variant(lambda U, s, Vt: U @ Vt.T),
+                    "`np.linalg.svd` returns V already transposed: multiply U by it as it is.",
+                ),
+                Mistake(
+                    _svd_variant(lambda U, s, Vt: U @ np.diag(s) @ Vt),
+                    "With the singular values put back this is R again. Leave them out.",
+                ),
+                Mistake(
+                    _svd_variant(lambda U, s, Vt: Vt.T @ U.T),
+                    "This is the transpose of the nearest rotation, V U' instead of U V'.",
+                ),
+                Mistake(
+                    _whole_matrix,
+                    "You took the SVD of the whole 4x4 matrix: the translation went into it. Only the rotation block is repaired.",
+                ),
+                Mistake(
+                    lambda T: _with_rotation(np.eye(4), nearest_rotation(T[:3, :3])),
+                    "The rotation is right, but the translation has got lost.",
+                ),
+                Mistake(
+                    lambda T: _with_rotation(T, T[:3, :3] / np.cbrt(np.linalg.det(T[:3, :3]))),
+                    "The determinant is 1 now, but that is the volume alone: lengths and angles are still wrong.",
+                ),
+            ],
+        ),
+        Prediction(
+            "growth",
+            question="Frames in a row, each measured from the one before with a small turning error. Twice as many links: how much larger is the error at the end?",
+            choices=("1.4 times", "2 times", "2.8 times"),
+            answer="2.8 times",
+            why="The turns add like random steps, with the square root of N; each one acts through a lever that grows with N: together N^1.5, and 2^1.5 = 2.8.",
+        ),
+        Exercise(
+            "distribute_closure",
+            reference=chaining.distribute_closure,
+            draw=open_loop,
+            metric=metrics.poses(1e-5, 1e-5),
+            hints=(
+                "The product is exp(xi). Going back by all of xi at the end closes the loop; how far back should the pose after link k go?",
+                "The pose after k links, P_k, becomes exp(-k/N xi) P_k. The corrected links are the relative poses of neighbors.",
+                "moved = [exp_se3(-k / N * xi) @ P for k, P in enumerate(poses)]; return np.array([relative(A, B) for A, B in zip(moved, moved[1:])]).",
+            ),
+            mistakes=[
+                Mistake(
+                    _all_in_the_last,
+                    "The loop closes, but the last link alone pays for it. Each link is to take its N-th part.",
+                ),
+                Mistake(
+                    _appended_to_each,
+                    "You appended exp(-xi/N) to each link. But xi is written in the first frame, and each link ends in another one: the loop stays open.",
+                ),
+                Mistake(
+                    _prepended_to_each,
+                    "You put exp(-xi/N) in front of each link. But xi is written in the first frame, and each link begins in another one.",
+                ),
+                Mistake(
+                    _equal_moves,
+                    "You moved all poses by the same share. The pose after k links has collected k shares of the error.",
+                ),
+                Mistake(
+                    _forward_instead_of_back,
+                    "You moved by +k/N xi, on in the direction of the error: now the loop is twice as far open.",
+                ),
+                Mistake(
+                    _one_share_too_few,
+                    "You divide by N + 1, the number of poses. There are N links, and the pose after the last one has to go back by all of xi.",
+                ),
+                Mistake(
+                    _translation_only,
+                    "You shared out the translation but not the rotation: the loop still ends turned.",
+                ),
+                Mistake(
+                    _poses_returned,
+                    "These are the corrected poses. The corrected links are asked for: the relative poses of neighbors.",
+                ),
+            ],
+        ),
+        Prediction(
+            "two_loops",
+            question="Two loops share a link. You share out the error of loop A, then that of loop B. What about loop A?",
+            choices=("it stays closed", "it opens again", "it opens, but less than the noise of one link"),
+            answer="it opens again",
+            why="Closing B changes the common link, and A contains it. Doing it the other way round moves the leftover to B; "
+            "only all links at once can close both.",
+        ),
+    ],
+)

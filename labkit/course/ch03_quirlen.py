@@ -1,0 +1,398 @@
+"""Chapter 3: tip and pivot from poses that touch one point."""
+
+import numpy as np
+
+from .. import pivot
+from ..lie import exp_so3
+from . import metrics
+from .engine import Chapter, Exercise, Mistake, Prediction, Value
+
+
+def turns(rng, n):
+    """n rotations of 10 to 40 deg about random axes."""
+    axis = rng.normal(size=(n, 3))
+    axis *= np.deg2rad(rng.uniform(10, 40, (n, 1))) / np.linalg.norm(axis, axis=1, keepdims=True)
+    return exp_so3(axis)
+
+
+def poses(rng, std_trans=0.0):
+    """Four to eight poses that touch one point, positions off by noise."""
+    tip, point = rng.uniform(-50, 50, 3) - (0, 0, 90), rng.uniform(-300, 300, 3)
+    return pivot.touching_poses(turns(rng, rng.integers(4, 9)), tip, point, 0.0, std_trans, rng)
+
+
+def system(rng, std_trans=0.0):
+    """Stacked matrix and right-hand side."""
+    T = poses(rng, std_trans)
+    return pivot.pivot_matrix(T), pivot.pivot_rhs(T)
+
+
+def poses_and_result(rng):
+    """Noisy poses with some tip and pivot."""
+    T = poses(rng, 1.0)
+    result = pivot.calibrate_pivot(T)
+    return T, result.tip, result.pivot
+
+
+def matrix_and_residuals(rng):
+    """Stacked matrix and the residuals, shape (n, 3), of its solution."""
+    T = poses(rng, 0.5)
+    return pivot.pivot_matrix(T), pivot.calibrate_pivot(T).residuals
+
+
+def distances_and_scale(rng):
+    """Distances, some of them beyond the cutoff, and a scale."""
+    scale = rng.uniform(0.1, 0.6)
+    d = scale * np.concatenate([rng.uniform(0.1, 0.95 * pivot.TUKEY, 8), rng.uniform(1.1, 6, 3) * pivot.TUKEY])
+    return rng.permutation(d), scale
+
+
+# Wrong variants --------------------------------------------------------------------------------------------------------
+
+
+def _blocks(left, right):
+    """A variant of pivot_matrix with other blocks."""
+
+    def variant(T_WF):
+        return np.vstack([np.hstack([left(T[:3, :3]), right]) for T in T_WF])
+
+    return variant
+
+
+def _side_by_side(T_WF):
+    return np.hstack([np.vstack([T[:3, :3], -np.eye(3)]) for T in T_WF])
+
+
+def _tip_alone(A, b):
+    """The pivot forgotten: R tip = -p."""
+    return np.concatenate([np.linalg.lstsq(A[:, :3], b, rcond=None)[0], np.zeros(3)])
+
+
+def _covariance(scale):
+    """A variant of pivot_covariance with another variance: scale(r, n)."""
+
+    def variant(A, residuals):
+        r = residuals.ravel()
+        return scale(r, len(residuals)) * np.linalg.inv(A.T @ A)
+
+    return variant
+
+
+def _weights(rule):
+    """A variant of robust_weights: rule(d / (cutoff scale))."""
+
+    def variant(distances, scale):
+        return rule(distances / (pivot.TUKEY * scale))
+
+    return variant
+
+
+def _tukey_weights(distances, scale):
+    return pivot.robust_weights(distances, scale)
+
+
+def _kreisel():
+    return pivot.calibrate_pivot(pivot.kreisel_poses())
+
+
+def _squares():
+    return (_kreisel().residuals ** 2).sum()
+
+
+CHAPTER = Chapter(
+    "03-quirlen",
+    title="Quirlen: calibration about a pivot",
+    items=[
+        Exercise(
+            "pivot_matrix",
+            reference=pivot.pivot_matrix,
+            draw=lambda rng: (poses(rng),),
+            metric=metrics.numbers(1e-9),
+            hints=(
+                "Each pose gives three rows: which numbers multiply the tip, which the pivot?",
+                "R_i tip - I pivot = -p_i: three rows [R_i  -I], all poses beneath each other.",
+                "return np.vstack([np.hstack([T[:3, :3], -np.eye(3)]) for T in T_WF]).",
+            ),
+            mistakes=[
+                Mistake(
+                    _blocks(lambda R: R, np.eye(3)),
+                    "The pivot enters with the wrong sign: R tip + p - pivot = 0, so its block is -I.",
+                ),
+                Mistake(
+                    _blocks(lambda R: R.T, -np.eye(3)),
+                    "You took R' instead of R: the tip is given in the tool frame, and R turns it into the world.",
+                ),
+                Mistake(
+                    _blocks(lambda R: -R, np.eye(3)),
+                    "Both blocks have the opposite sign. That solves the same problem with +p on the right, but the sheet's right-hand side is -p.",
+                ),
+                Mistake(
+                    lambda T_WF: pivot.pivot_matrix(T_WF)[:, [3, 4, 5, 0, 1, 2]],
+                    "The blocks have changed places: the unknowns are (tip, pivot), the tip first.",
+                ),
+                Mistake(
+                    _side_by_side,
+                    "You set the poses side by side. Each pose adds equations, not unknowns: stack them beneath each other.",
+                ),
+                Mistake(
+                    lambda T_WF: pivot.pivot_matrix(T_WF)[:, :3],
+                    "The columns of the pivot are missing. Its place is unknown too.",
+                ),
+            ],
+        ),
+        Exercise(
+            "pivot_rhs",
+            reference=pivot.pivot_rhs,
+            draw=lambda rng: (poses(rng),),
+            metric=metrics.numbers(1e-9, "mm"),
+            hints=(
+                "What is left when tip and pivot stand on the left side?",
+                "-p_i, the three positions of pose 1, then those of pose 2, ... in one long vector.",
+                "return -T_WF[:, :3, 3].ravel().",
+            ),
+            mistakes=[
+                Mistake(lambda T: T[:, :3, 3].ravel(), "The sign: brought to the right side, p becomes -p."),
+                Mistake(
+                    lambda T: -T[:, :3, 3].T.ravel(),
+                    "All x, then all y, then all z: that does not fit the rows of the matrix, which come pose by pose.",
+                ),
+                Mistake(lambda T: -T[:, :3, 3], "The numbers are right; flatten them into one vector, pose by pose."),
+                Mistake(
+                    lambda T: -T[:, 3, :3].ravel(),
+                    "You took the last row of each pose. The position stands in the last column.",
+                ),
+                Mistake(
+                    lambda T: -np.einsum("nji,nj->ni", T[:, :3, :3], T[:, :3, 3]).ravel(),
+                    "You turned the positions into the tool frame (R'p). The equations are written in the world.",
+                ),
+            ],
+        ),
+        Exercise(
+            "solve_pivot",
+            reference=pivot.solve_pivot,
+            draw=lambda rng: system(rng),
+            metric=metrics.numbers(1e-7, "mm"),
+            noisy=(lambda rng: system(rng, 1.0), metrics.numbers(1e-7, "mm")),
+            hints=(
+                "More equations than unknowns: no x fulfills them all. Which x makes the sum of squares of A x - b least?",
+                "The sheet: x = (A'A)^-1 A'b. Better conditioned, and shorter: `np.linalg.lstsq`.",
+                "return np.linalg.lstsq(A, b, rcond=None)[0].",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda A, b: np.linalg.lstsq(A, -b, rcond=None)[0],
+                    "The sign of b is reversed: the solution comes out negated.",
+                ),
+                Mistake(
+                    lambda A, b: np.linalg.lstsq(A[:6], b[:6], rcond=None)[0],
+                    "You used the first two poses alone, and two poses never determine the tip. Use all equations.",
+                ),
+                Mistake(
+                    lambda A, b: A.T @ b,
+                    "A'b alone is not the solution: (A'A)^-1 is missing in front of it.",
+                ),
+                Mistake(
+                    _tip_alone,
+                    "You solved for the tip alone. The pivot is unknown too, and it takes up most of what you explain by the tip.",
+                ),
+                Mistake(
+                    lambda A, b: np.linalg.lstsq(A, b, rcond=None)[0][[3, 4, 5, 0, 1, 2]],
+                    "Tip and pivot have changed places: x = (tip, pivot).",
+                ),
+            ],
+        ),
+        Value(
+            "tip_length",
+            reference=lambda: np.linalg.norm(_kreisel().tip),
+            unit="mm",
+            rtol=1e-5,
+            hints=(
+                "How long is the tool, from the flange to the tip?",
+                "It is the length of P_t, the first three entries of x.",
+                "tip_length = np.linalg.norm(x[:3]).",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: np.linalg.norm(_kreisel().pivot),
+                    "This is the distance of the pivot from the robot's base: the last three entries of x. The tip is the first three.",
+                ),
+                Mistake(
+                    lambda: np.hypot(np.linalg.norm(_kreisel().tip), np.linalg.norm(_kreisel().pivot)),
+                    "You took the norm of all six entries. The tip is the first three.",
+                ),
+                Mistake(lambda: abs(_kreisel().tip[2]), "This is the z component alone: the tip also sits to the side."),
+                Mistake(lambda: np.abs(_kreisel().tip).sum(), "You added the components. The length is the root of the sum of squares."),
+            ],
+        ),
+        Exercise(
+            "pivot_residuals",
+            reference=pivot.pivot_residuals,
+            draw=poses_and_result,
+            metric=metrics.numbers(1e-9, "mm"),
+            hints=(
+                "Where is the tip in each pose, and where should it be?",
+                "Equation (2) of the sheet: R_i tip + p_i - pivot, one row a pose.",
+                "return np.array([T[:3, :3] @ tip + T[:3, 3] - pivot for T in T_WF]).",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda T, tip, point: point - pivot.pivot_residuals(T, tip, np.zeros(3)),
+                    "The sign is reversed: where the tip is, minus where it should be.",
+                ),
+                Mistake(
+                    lambda T, tip, point: np.einsum("nji,j->ni", T[:, :3, :3], tip) + T[:, :3, 3] - point,
+                    "You turned the tip by R'. R takes it from the tool frame to the world.",
+                ),
+                Mistake(
+                    lambda T, tip, point: pivot.pivot_residuals(T, tip, np.zeros(3)),
+                    "This is where the tip is. Subtract the pivot.",
+                ),
+                Mistake(
+                    lambda T, tip, point: tip + T[:, :3, 3] - point,
+                    "You added the tip without turning it: it is given in the tool frame.",
+                ),
+                Mistake(
+                    lambda T, tip, point: np.linalg.norm(pivot.pivot_residuals(T, tip, point), axis=1),
+                    "These are the lengths. The residual has three components in each pose: shape (n, 3).",
+                ),
+                Mistake(
+                    lambda T, tip, point: pivot.pivot_residuals(T, tip, point).ravel(),
+                    "The numbers are right; one row a pose is wanted, shape (n, 3).",
+                ),
+            ],
+        ),
+        Value(
+            "s0",
+            reference=lambda: _kreisel().s0,
+            unit="mm",
+            rtol=1e-4,
+            hints=(
+                "The sheet's formula, listing 8: the root of the sum of squares over n.",
+                "n is the number of poses, not of equations.",
+                "s0 = np.sqrt((residuals**2).sum() / len(poses)).",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: np.sqrt(_squares() / 36),
+                    "You divided by the 36 equations: the rms of one coordinate. The sheet divides by the 12 poses.",
+                ),
+                Mistake(
+                    lambda: _kreisel().std,
+                    "This is the unbiased estimate, divided by 3n - 6. A better number, but not the sheet's s0.",
+                ),
+                Mistake(lambda: np.sqrt(_squares()), "The division by n is missing under the root."),
+                Mistake(lambda: _squares() / 12, "The root is missing: this is a variance, in mm^2."),
+                Mistake(
+                    lambda: np.linalg.norm(_kreisel().residuals, axis=1).mean(),
+                    "This is the mean distance. The sheet takes the root of the mean square, which is a little larger.",
+                ),
+            ],
+        ),
+        Prediction(
+            "two_poses",
+            question="Two poses give six equations for six unknowns. Is that enough?",
+            choices=("yes, exactly enough", "only with a large turn between them", "never"),
+            answer="never",
+            why="Whatever the turn between the two poses, it has an axis. A tip shifted along it, with the pivot shifted alike, "
+            "fulfills the same equations: R_1 - R_2 has rank 2.",
+        ),
+        Prediction(
+            "spin",
+            question="The tool spins about its own axis, sixty poses, never tilted. What will the residual and the error of the tip be?",
+            choices=("both small", "both large", "a small residual, a large error"),
+            answer="a small residual, a large error",
+            why="The residual only says how well the equations are fulfilled. A tip anywhere on the tool's axis fulfills them.",
+        ),
+        Prediction(
+            "cone",
+            question="Which set gives the better tip: 60 poses within 2 deg of the vertical, or 6 poses within 20 deg?",
+            choices=("60 poses within 2 deg", "6 poses within 20 deg", "both alike"),
+            answer="6 poses within 20 deg",
+            why="The singular value grows with the angle, but only with the root of the number of poses: a tenfold angle against a "
+            "tenfold number is 10 against 3.2.",
+        ),
+        Exercise(
+            "pivot_covariance",
+            reference=pivot.pivot_covariance,
+            draw=matrix_and_residuals,
+            metric=metrics.numbers(1e-6, "mm^2"),
+            hints=(
+                "Noise in b goes through the solution x = (A'A)^-1 A'b. What does it do to x?",
+                "cov = std^2 (A'A)^-1, with the unbiased std^2 = r'r / (3n - 6).",
+                "r = residuals.ravel(); return r @ r / (len(r) - 6) * np.linalg.inv(A.T @ A).",
+            ),
+            mistakes=[
+                Mistake(
+                    _covariance(lambda r, n: r @ r / n),
+                    "You divided by the number of poses: three times too large, as each pose gives three residuals.",
+                ),
+                Mistake(
+                    _covariance(lambda r, n: r @ r / (3 * n)),
+                    "You divided by the number of equations. Six of them were used up by the six unknowns: 3n - 6 remain.",
+                ),
+                Mistake(
+                    _covariance(lambda r, n: np.sqrt(r @ r / (3 * n - 6))),
+                    "A standard deviation stands where its square belongs.",
+                ),
+                Mistake(_covariance(lambda r, n: 1.0), "This is (A'A)^-1 for noise of 1 mm. Scale it by the variance of the residuals."),
+                Mistake(
+                    lambda A, r: np.vdot(r, r) / (r.size - 6) * (A.T @ A),
+                    "You forgot the inverse: A'A is the information, and its inverse the covariance.",
+                ),
+                Mistake(
+                    lambda A, r: np.sqrt(np.diag(pivot.pivot_covariance(A, r))),
+                    "These are the six standard deviations. The whole matrix is wanted, shape (6, 6).",
+                ),
+                Mistake(
+                    _covariance(lambda r, n: r @ r / (n - 6)),
+                    "You counted poses where equations are meant: 3n - 6 degrees of freedom.",
+                ),
+            ],
+        ),
+        Exercise(
+            "robust_weights",
+            reference=_tukey_weights,
+            draw=distances_and_scale,
+            metric=metrics.numbers(1e-9),
+            hints=(
+                "Near poses keep their weight, far ones lose it all, smoothly.",
+                "Tukey: with q = d / (7 scale), w = (1 - q^2)^2, and 0 where q > 1.",
+                "q = distances / (7 * scale); return np.where(q < 1, (1 - q**2) ** 2, 0.0).",
+            ),
+            mistakes=[
+                Mistake(
+                    _weights(lambda q: (1 - q**2) ** 2),
+                    "Beyond the cutoff your weights grow again: (1 - q^2)^2 must be cut to 0 where q > 1.",
+                ),
+                Mistake(
+                    _weights(lambda q: np.maximum(1 - q**2, 0)),
+                    "The outer square is missing: w = (1 - q^2)^2.",
+                ),
+                Mistake(
+                    _weights(lambda q: np.maximum(1 - q, 0) ** 2),
+                    "The inner square is missing: w = (1 - q^2)^2.",
+                ),
+                Mistake(_weights(lambda q: (q < 1).astype(float)), "You cut hard: a pose is in or out. Tukey's weights fall to zero smoothly."),
+                Mistake(
+                    lambda distances, scale: np.maximum(1 - (distances / scale) ** 2, 0) ** 2,
+                    "The cutoff is missing: it is 7 times the scale, not the scale itself.",
+                ),
+                Mistake(
+                    lambda distances, scale: np.maximum(1 - (distances / pivot.TUKEY) ** 2, 0) ** 2,
+                    "You did not divide by the scale: the cutoff is 7 standard deviations, not 7 mm.",
+                ),
+                Mistake(
+                    _weights(lambda q: np.minimum(1, 1 / q)),
+                    "These are Huber's weights: they never vanish, so a pose far away still pulls.",
+                ),
+            ],
+        ),
+        Prediction(
+            "outliers",
+            question="Three of twelve touches are a few millimeters beside the point. How far off is the plain tip, with noise of 0.2 mm?",
+            choices=("like the noise, about 0.1 mm", "about a millimeter", "not at all, errors average out"),
+            answer="about a millimeter",
+            why="Squares listen to the loudest. The robust calibration notices that nine poses agree, and lets go of three.",
+        ),
+    ],
+)

@@ -1,0 +1,639 @@
+"""Chapter 8: the linear Kalman filter, the extended filter with landmarks, and whether they are honest."""
+
+import numpy as np
+
+from .. import kalman, odometry
+from ..odometry import wrap_angle as wrapped
+from . import metrics
+from .engine import Chapter, Exercise, Mistake, Prediction, Value
+
+# Draws -----------------------------------------------------------------------
+
+
+def covariance(rng, n, scale=1.0):
+    M = rng.normal(size=(n, n))
+    return scale * (M @ M.T + 0.3 * np.eye(n))
+
+
+def vehicle_prediction(rng):
+    """State, covariance, A, B, control and its covariance of the lecture's vehicle."""
+    A, B, _ = kalman.vehicle_model(rng.uniform(0.3, 0.9))
+    return rng.normal(size=2) * 5, covariance(rng, 2), A, B, rng.uniform(1, 3, 1), covariance(rng, 1)
+
+
+def two_sensor_update(rng):
+    """State of two, two numbers measured of mixtures of them."""
+    x = rng.normal(size=2) * 3
+    C = rng.normal(size=(2, 2))
+    return x, covariance(rng, 2), C @ x + rng.normal(size=2), C, covariance(rng, 2, 0.5)
+
+
+def one_position_two_sensors(rng):
+    x = rng.uniform(5, 15)
+    return x + rng.normal(), rng.uniform(2, 9), x + rng.uniform(-1, 1, 2), rng.uniform(0.3, 0.9, 2) * [1, 2]
+
+
+def steady_system(rng):
+    A, B, C = kalman.vehicle_model(rng.uniform(0.05, 0.5))
+    return A, C, rng.uniform(0.1, 1) * B @ B.T + 1e-3 * np.eye(2), np.array([[rng.uniform(0.1, 1)]])
+
+
+def seen_landmark(rng):
+    """A pose and a landmark some meters away, on any side."""
+    x = np.array([*rng.uniform(-4, 4, 2), rng.uniform(-3, 3)])
+    angle, r = rng.uniform(-np.pi, np.pi), rng.uniform(1.5, 6)
+    return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
+
+
+def landmark_behind(rng):
+    """A pose with the landmark behind it, so that an unwrapped bearing leaves [-pi, pi)."""
+    x, r = np.array([*rng.uniform(-4, 4, 2), rng.choice([-1, 1]) * rng.uniform(2.6, 3.1)]), rng.uniform(1.5, 6)
+    angle = -np.sign(x[2]) * rng.uniform(0.7, 1.4)
+    return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
+
+
+def pose_control_step(rng):
+    x = np.array([*rng.uniform(-5, 5, 2), rng.uniform(-3, 3)])
+    return x, np.array([rng.uniform(0.6, 2), rng.uniform(0.3, 1.5) * rng.choice([-1, 1])]), rng.uniform(0.2, 0.9)
+
+
+def filter_step(rng):
+    """Everything one step of the landmark filter needs; the bearing innovation crosses +-pi."""
+    x, u, dt = pose_control_step(rng)
+    cov, cov_u = np.diag(rng.uniform(0.01, 0.05, 3)), np.diag(rng.uniform(0.01, 0.1, 2))
+    moved = odometry.step(x, u, dt, "euler")
+    away = moved[2] + np.pi - rng.uniform(0.005, 0.03)
+    landmark = moved[:2] + rng.uniform(2, 5) * np.array([np.cos(away), np.sin(away)])
+    z = kalman.measurement(moved, landmark[None])[0] + [rng.uniform(-0.2, 0.2), rng.uniform(0.06, 0.12)]
+    z[1] = wrapped(z[1])
+    return x, cov, u, dt, cov_u, z, landmark, np.diag([rng.uniform(0.005, 0.02), rng.uniform(0.001, 0.005)])
+
+
+def estimate_and_truth(rng):
+    """True and estimated pose whose headings lie on both sides of +-pi, and a covariance."""
+    truth = np.array([*rng.uniform(-4, 4, 2), np.pi - rng.uniform(0.02, 0.1)])
+    x = truth + [*rng.uniform(-0.3, 0.3, 2), rng.uniform(0.15, 0.3) - 2 * np.pi]
+    return truth, x, covariance(rng, 3, 0.05)
+
+
+def innovation_and_limit(rng):
+    S = covariance(rng, 2, 0.2)
+    y = np.linalg.cholesky(S) @ rng.normal(size=2)
+    limit = 5.991
+    score = float(y @ np.linalg.solve(S, y))
+    wanted = limit * (rng.uniform(0.45, 0.95) if rng.random() < 0.5 else rng.uniform(1.8, 6))
+    return y * np.sqrt(wanted / score), S, limit
+
+
+# References and wrong variants ------------------------------------------------
+
+
+def predict_state(x, cov, A, B, u, cov_u):
+    return kalman.predict(x, cov, A, B, u, cov_u)
+
+
+def _predicted(state, cov):
+    """A prediction with `state(x, A, B, u)` and `cov(P, A, B, cov_u)`."""
+
+    def variant(x, P, A, B, u, cov_u):
+        return state(x, A, B, u), cov(P, A, B, cov_u)
+
+    return variant
+
+
+def _moved(x, A, B, u):
+    return A @ x + B @ u
+
+
+def _grown(P, A, B, Q):
+    return A @ P @ A.T + B @ Q @ B.T
+
+
+def update(x, cov, z, C, cov_z):
+    result = kalman.update(x, cov, z, C, cov_z)
+    return result.x, result.cov
+
+
+def _updated(gain=None, state=None, cov=None):
+    """A correction with one part replaced."""
+
+    def variant(x, P, z, C, R):
+        K = (gain or _gain)(P, C, R)
+        return (state or _corrected)(x, K, z, C), (cov or _shrunk)(P, K, C)
+
+    return variant
+
+
+def _gain(P, C, R):
+    return P @ C.T @ np.linalg.inv(C @ P @ C.T + R)
+
+
+def _corrected(x, K, z, C):
+    return x + K @ (z - C @ x)
+
+
+def _shrunk(P, K, C):
+    return (np.eye(len(P)) - K @ C) @ P
+
+
+def fuse_two_sensors(x0, var0, z, stds):
+    weights = np.array([1 / var0, *(1 / stds**2)])
+    return weights @ [x0, *z] / weights.sum(), 1 / weights.sum()
+
+
+def _fused(weights, var=None):
+    """A weighted mean with `weights(var0, stds)`, three numbers."""
+
+    def variant(x0, var0, z, stds):
+        w = np.asarray(weights(var0, stds))
+        return w @ [x0, *z] / w.sum(), (1 / w.sum() if var is None else var(var0, stds))
+
+    return variant
+
+
+def steady_state_gain(A, C, cov_v, cov_z):
+    return kalman.steady_state(A, C, cov_v, cov_z).gain
+
+
+def wrap_angle(angle):
+    return wrapped(angle)
+
+
+def motion_jacobians(x, u, dt):
+    return odometry.step_jacobians(x, u, dt, "euler")
+
+
+def _jacobians(change_x=None, change_u=None):
+    def variant(x, u, dt):
+        G_x, G_u = motion_jacobians(x, u, dt)
+        return (change_x(G_x, x, u, dt) if change_x else G_x), (change_u(G_u, x, u, dt) if change_u else G_u)
+
+    return variant
+
+
+def _sine_sign(G, x, u, dt):
+    return G * [[1, 1, -1], [1, 1, 1], [1, 1, 1]]
+
+
+def measurement(x, landmark):
+    return kalman.measurement(x, landmark[None])[0]
+
+
+def measurement_jacobian(x, landmark):
+    return kalman.measurement_jacobian(x, landmark[None])[0]
+
+
+def _rows(change):
+    """A Jacobian of wrong rows from dx, dy, r."""
+
+    def variant(x, landmark):
+        d = landmark - x[:2]
+        return np.array(change(*d, np.hypot(*d)))
+
+    return variant
+
+
+def ekf_step(x, cov, u, dt, cov_u, z, landmark, cov_z):
+    return _ekf()(x, cov, u, dt, cov_u, z, landmark, cov_z)
+
+
+def _ekf(noise=True, wrap=True, at="predicted", short=False, carry=True, gain=_gain):
+    """One step of the landmark filter, or a wrong one."""
+
+    def step(x, cov, u, dt, cov_u, z, landmark, cov_z):
+        G_x, G_u = motion_jacobians(x, u, dt)
+        moved = odometry.step(x, u, dt, "euler")
+        cov = (G_x @ cov @ G_x.T if carry else cov) + (G_u @ cov_u @ G_u.T if noise else 0)
+        here = moved if at == "predicted" else x
+        H = measurement_jacobian(here, landmark)
+        y = z - measurement(here, landmark)
+        y[1] = wrapped(y[1]) if wrap else y[1]
+        K = gain(cov, H, cov_z)
+        return (moved, cov) if short else (moved + K @ y, (np.eye(3) - K @ H) @ cov)
+
+    return step
+
+
+def nees(truth, x, cov):
+    return kalman.nees(truth, x, cov, angle=2)
+
+
+def _error(truth, x):
+    e = truth - x
+    e[2] = wrapped(e[2])
+    return e
+
+
+def gate(innovation, cov_innovation, limit):
+    return bool(kalman.nis(innovation, cov_innovation) <= limit)
+
+
+def _gated(score):
+    def variant(y, S, limit):
+        return bool(score(y, S) <= limit)
+
+    return variant
+
+
+def _printed_correction(change=lambda given: given):
+    given = change(dict(kalman.example("vehicle")))
+    cov = np.array([[given["prior_cov_xx"], given["prior_cov_xv"]], [given["prior_cov_xv"], given["prior_cov_vv"]]])
+    return kalman.update([given["prior_x"], given["prior_v"]], cov, [given["z"]], [[1.0, 0.0]], [[given["var_z"]]])
+
+
+def _fusion(**changes):
+    given = kalman.example("fusion") | changes
+    stds = np.array([given["std1"], given["std2"]])
+    return fuse_two_sensors(given["x0"], given["var0"], np.array([given["z1"], given["z2"]]), stds)[0]
+
+
+STATE_AND_COV = metrics.several(metrics.numbers(1e-8), metrics.numbers(1e-8), names=("state", "covariance"))
+
+CHAPTER = Chapter(
+    "08-kalman",
+    title="Kalman filters",
+    items=[
+        Exercise(
+            "predict_state",
+            reference=predict_state,
+            draw=vehicle_prediction,
+            metric=STATE_AND_COV,
+            hints=(
+                "The state follows the model; its uncertainty is carried along, and that of the control is added.",
+                "x = A x + B u and cov = A cov A' + B cov_u B' (lines 2 and 3 of the lecture's algorithm).",
+                "return A @ x + B @ u, A @ cov @ A.T + B @ cov_u @ B.T",
+            ),
+            mistakes=[
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T),
+                    "The control's noise is missing: add B cov_u B'.",
+                ),
+                Mistake(
+                    _predicted(lambda x, A, B, u: A @ x, _grown), "The control itself is missing from the state: add B u."
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A.T @ P @ A + B @ Q @ B.T),
+                    "A stands on the wrong side: A cov A', not A' cov A.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ P + B @ Q @ B.T),
+                    "A covariance is multiplied from both sides: A cov A'.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + Q),
+                    "You added the variance of the acceleration to every entry. It acts through B: B cov_u B'.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: P + B @ Q @ B.T),
+                    "The old covariance must be carried along by A: a velocity error becomes a position error.",
+                ),
+            ],
+        ),
+        Exercise(
+            "update",
+            reference=update,
+            draw=two_sensor_update,
+            metric=STATE_AND_COV,
+            hints=(
+                "How surprising is the measurement, and how much of the surprise belongs to the state?",
+                "S = C cov C' + cov_z, K = cov C' S^-1, x + K (z - C x), (I - K C) cov.",
+                "K = cov @ C.T @ np.linalg.inv(C @ cov @ C.T + cov_z); return x + K @ (z - C @ x), (np.eye(len(x)) - K @ C) @ cov",
+            ),
+            mistakes=[
+                Mistake(
+                    _updated(gain=lambda P, C, R: P @ C.T @ np.linalg.inv(C @ P @ C.T)),
+                    "The sensor's noise is missing from S: your filter believes every measurement.",
+                ),
+                Mistake(
+                    _updated(gain=lambda P, C, R: P @ C.T @ np.linalg.inv(R)),
+                    "S is the noise of the sensor plus the uncertainty of the expected measurement, C cov C'.",
+                ),
+                Mistake(
+                    _updated(state=lambda x, K, z, C: x - K @ (z - C @ x)),
+                    "You correct away from the measurement: add K times the innovation.",
+                ),
+                Mistake(
+                    _updated(state=lambda x, K, z, C: x + K @ z),
+                    "Only the surprise is news: subtract the expected measurement C x.",
+                ),
+                Mistake(_updated(cov=lambda P, K, C: P), "The covariance stays as it was: a measurement must shrink it."),
+                Mistake(
+                    _updated(cov=lambda P, K, C: (np.eye(len(P)) + K @ C) @ P),
+                    "A sign: (I - K C) cov. Yours grows with every measurement.",
+                ),
+                Mistake(
+                    _updated(cov=lambda P, K, C: P @ (np.eye(len(P)) - K @ C)),
+                    "The order: (I - K C) stands to the left of cov.",
+                ),
+            ],
+        ),
+        Prediction(
+            "bell",
+            question="Prediction and measurement are equally sure but 2 m apart. The corrected bell, compared with both, is ...",
+            choices=("wider than both", "as wide as both", "narrower than both"),
+            answer="narrower than both",
+            why="Two independent opinions always make the filter surer, even when they contradict each other. Only the NIS notices the contradiction.",
+        ),
+        Exercise(
+            "fuse_two_sensors",
+            reference=fuse_two_sensors,
+            draw=one_position_two_sensors,
+            metric=metrics.several(metrics.numbers(1e-9, "m"), metrics.numbers(1e-9), names=("position", "variance")),
+            hints=(
+                "Each opinion (the prior, two sensors) counts as much as it is certain.",
+                "Weights are 1 / variance. The variance of the weighted mean is 1 / (sum of the weights).",
+                "w = np.array([1 / var0, *(1 / stds**2)]); return w @ [x0, *z] / w.sum(), 1 / w.sum()",
+            ),
+            mistakes=[
+                Mistake(
+                    _fused(lambda v, s: [1 / np.sqrt(v), *(1 / s)]),
+                    "Weights are one over the variance, not over the standard deviation.",
+                ),
+                Mistake(_fused(lambda v, s: [0, *(1 / s**2)]), "The prior is missing. It is an opinion like the others."),
+                Mistake(_fused(lambda v, s: [1, 1, 1]), "You took the plain mean. The better sensor should count more."),
+                Mistake(
+                    _fused(lambda v, s: [v, *s**2]),
+                    "You weigh by the variance: the worst opinion counts most. Take one over it.",
+                ),
+                Mistake(
+                    _fused(lambda v, s: [1 / v**2, *(1 / s**2)]),
+                    "The prior comes as a variance already: do not square it.",
+                ),
+                Mistake(
+                    _fused(lambda v, s: [1 / v, *(1 / s**2)], lambda v, s: 1 / np.sqrt(1 / v + (1 / s**2).sum())),
+                    "The position is right; you return the standard deviation. The variance is asked for.",
+                ),
+            ],
+        ),
+        Value(
+            "fused",
+            reference=_fusion,
+            unit="m",
+            rtol=5e-5,
+            hints=(
+                "The page's prior is 0 with the variance 20, its sensors have the standard deviations 0.5 and 1.",
+                "Put the printed numbers into your `fuse_two_sensors`; the first result is the position.",
+                "fused = fuse_two_sensors(0.0, 20.0, np.array([9.4, 10.6]), np.array([0.5, 1.0]))[0]",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: _fusion(var0=1e15),
+                    "This is the fusion of the sensors alone. The page prints a prior, Sigma_0 = 20; it pulls a little toward 0.",
+                ),
+                Mistake(
+                    lambda: _fusion(var0=400.0),
+                    "You read the 20 as a standard deviation. Interesting: that gives the printed 9.6. But the page writes Sigma_0, a variance.",
+                ),
+                Mistake(lambda: 9.6, "This is what the page prints. It is not what its numbers give: compute it."),
+                Mistake(
+                    lambda: _fusion(std1=0.25, std2=1.0),
+                    "0.25 is the first sensor's variance already; its standard deviation is 0.5.",
+                ),
+                Mistake(lambda: 10.0, "The mean of both sensors. But the first one is four times as certain in variance."),
+            ],
+        ),
+        Prediction(
+            "velocity",
+            question="The vehicle measures its position, never its velocity. What becomes of the velocity's uncertainty while it drives?",
+            choices=("it grows without end", "it stays as in the beginning", "it settles at a small value"),
+            answer="it settles at a small value",
+            why="The off-diagonal entry of the covariance ties both together: whoever is surprised in position learns about the velocity.",
+        ),
+        Exercise(
+            "steady_state_gain",
+            reference=steady_state_gain,
+            draw=steady_system,
+            metric=metrics.numbers(1e-6),
+            hints=(
+                "The gain does not depend on the data. Run the covariance alone until the gain stands still.",
+                "Repeat: cov = A cov A' + cov_v, K = cov C' S^-1, cov = (I - K C) cov. Some thousand times are cheap. Or let SciPy solve the Riccati equation.",
+                "P = scipy.linalg.solve_discrete_are(A.T, C.T, cov_v, cov_z); return P @ C.T @ np.linalg.inv(C @ P @ C.T + cov_z)",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda A, C, Q, R: _gain(kalman.steady_state(A, C, Q, R).cov_after, C, R),
+                    "Your gain comes from the covariance after the correction. It needs the one before.",
+                ),
+                Mistake(lambda A, C, Q, R: _gain(A @ A.T + Q, C, R), "This is the gain of the first step. Repeat until it stands still."),
+                Mistake(lambda A, C, Q, R: _gain(Q, C, R), "You took the system noise for the covariance. The covariance is what builds up."),
+                Mistake(
+                    lambda A, C, Q, R: A @ kalman.steady_state(A, C, Q, R).gain,
+                    "This is A K, the gain of the form that predicts and corrects in one line. Here the correction's own gain is asked for.",
+                ),
+            ],
+        ),
+        Value(
+            "corrected",
+            reference=lambda: _printed_correction().x,
+            unit="m, m/s",
+            metric=metrics.numbers(1e-4),
+            hints=(
+                "Only the correction is asked for: the prediction is printed.",
+                "Your `update` with C = (1, 0), z = 11.79 and the variance 0.25; the first result is the state.",
+                "corrected = update(np.array([12.5, 5.0]), cov, np.array([11.79]), np.array([[1.0, 0.0]]), np.array([[0.25]]))[0]",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: np.array([11.90, 4.98]),
+                    "This is what the page prints. Its own numbers give something else: compute it.",
+                ),
+                Mistake(
+                    lambda: _printed_correction(lambda g: g | {"var_z": 0.25**2}).x,
+                    "You squared 0.25. The page prints it as Sigma_z: it is a variance already.",
+                ),
+                Mistake(
+                    lambda: _printed_correction(lambda g: g | {"prior_cov_xv": 0.0}).x,
+                    "The velocity is not corrected at all: use the whole covariance, its off-diagonal entry carries the news.",
+                ),
+                Mistake(
+                    lambda: 2 * np.array([12.5, 5.0]) - _printed_correction().x,
+                    "You correct away from the measurement.",
+                ),
+            ],
+        ),
+        Exercise(
+            "wrap_angle",
+            reference=wrap_angle,
+            draw=lambda rng: (rng.uniform(3.3, 6.0) * rng.choice([-1, 1]) + 2 * np.pi * rng.integers(-3, 4),),
+            metric=metrics.numbers(1e-9, "rad"),
+            hints=(
+                "An angle and the same angle plus a full turn are one direction. Choose the one nearest to zero.",
+                "Shift by pi, take the remainder of a full turn, shift back.",
+                "return (angle + np.pi) % (2 * np.pi) - np.pi",
+            ),
+            mistakes=[
+                Mistake(lambda a: a % (2 * np.pi), "Your angles lie between 0 and 2 pi. An error of -0.1 becomes 6.18: shift by pi before and after."),
+                Mistake(lambda a: a % np.pi, "The remainder is to be taken of a full turn, 2 pi."),
+                Mistake(lambda a: np.clip(a, -np.pi, np.pi), "You cut the angle off at pi. A turn too many has to be subtracted."),
+                Mistake(
+                    lambda a: (a + np.pi) % (2 * np.pi),
+                    "The second shift is missing: subtract pi again.",
+                ),
+                Mistake(lambda a: (a + 180) % 360 - 180, "This wraps degrees, so that radians come back as they were: use pi and 2 pi."),
+            ],
+        ),
+        Exercise(
+            "measurement",
+            reference=measurement,
+            draw=landmark_behind,
+            metric=metrics.numbers(1e-9),
+            hints=(
+                "How far away is the landmark, and in which direction seen from where the robot looks?",
+                "d = sqrt(dx^2 + dy^2), alpha = atan2(dy, dx) - theta, with (dx, dy) from robot to landmark.",
+                "dx, dy = landmark - x[:2]; return np.array([np.hypot(dx, dy), wrap_angle(np.arctan2(dy, dx) - x[2])])",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda x, l: measurement(x, l) * [1, 0] + [0, np.arctan2(*(l - x[:2])[::-1])],
+                    "This is the bearing in the hall. The robot sees it relative to its own heading: subtract theta.",
+                ),
+                Mistake(
+                    lambda x, l: measurement(x, l) * [1, 0] + [0, np.arctan2(*(l - x[:2])[::-1]) - x[2]],
+                    "Distance and bearing are right, but the bearing lies outside [-pi, pi): wrap it.",
+                ),
+                Mistake(
+                    lambda x, l: np.array([measurement(x, l)[0], wrapped(np.arctan2(*(x[:2] - l)[::-1]) - x[2])]),
+                    "Your bearing points backward: from the robot to the landmark, not from the landmark to the robot.",
+                ),
+                Mistake(
+                    lambda x, l: np.array([measurement(x, l)[0], wrapped(np.arctan2(*(l - x[:2])) - x[2])]),
+                    "np.arctan2 takes y first, then x.",
+                ),
+                Mistake(lambda x, l: measurement(x, l)[::-1], "The order is distance, bearing."),
+                Mistake(
+                    lambda x, l: measurement(x, l) * [measurement(x, l)[0], 1],
+                    "The distance is squared: the root is missing.",
+                ),
+            ],
+        ),
+        Exercise(
+            "measurement_jacobian",
+            reference=measurement_jacobian,
+            draw=seen_landmark,
+            metric=metrics.numbers(1e-8),
+            hints=(
+                "Move the robot a little toward the landmark, then across, then turn it. What do distance and bearing do?",
+                "Row 0: (-dx/r, -dy/r, 0). Row 1: (dy/q, -dx/q, -1) with q = r^2.",
+                "return np.array([[-dx / r, -dy / r, 0], [dy / q, -dx / q, -1]])",
+            ),
+            mistakes=[
+                Mistake(
+                    _rows(lambda dx, dy, r: [[dx / r, dy / r, 0], [-dy / r**2, dx / r**2, -1]]),
+                    "These are the derivatives by the landmark's position. By the robot's they have the opposite sign.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [dy / r, -dx / r, -1]]),
+                    "The bearing changes by the shift across divided by the distance: divide by r squared, not by r.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [dy / r**2, -dx / r**2, 1]]),
+                    "When the robot turns left the landmark moves to the right: the last entry is -1.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [dy / r**2, -dx / r**2, 0]]),
+                    "The bearing also depends on the heading.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [-dx / r**2, dy / r**2, -1]]),
+                    "In the second row dx and dy are exchanged: only a shift across the line of sight turns it.",
+                ),
+            ],
+        ),
+        Exercise(
+            "motion_jacobians",
+            reference=motion_jacobians,
+            draw=pose_control_step,
+            metric=metrics.several(metrics.numbers(1e-9), metrics.numbers(1e-9), names=("G_x", "G_u")),
+            hints=(
+                "They are F_x and F_u of chapter 7 under another letter.",
+                "G_x is the identity with -v T sin(theta) and v T cos(theta) in the last column; G_u has T cos, T sin and T.",
+                "G_x = [[1, 0, -v T s], [0, 1, v T c], [0, 0, 1]], G_u = [[T c, 0], [T s, 0], [0, T]], with s, c of x[2].",
+            ),
+            mistakes=[
+                Mistake(_jacobians(_sine_sign), "In G_x, the derivative of the cosine is minus the sine."),
+                Mistake(_jacobians(lambda G, x, u, t: G - np.eye(3)), "In G_x the identity is missing: the old pose is part of the new one."),
+                Mistake(_jacobians(change_u=lambda G, x, u, t: G / t), "In G_u the time step is missing."),
+                Mistake(_jacobians(change_u=lambda G, x, u, t: G * u), "In G_u, v and omega must not appear: by them is derived."),
+                Mistake(lambda x, u, t: motion_jacobians(x, u, t)[::-1], "The order is G_x, G_u."),
+                Mistake(lambda x, u, t: odometry.step_jacobians(x, u, t, "midpoint"), "These are the midpoint model's. The lecture's filter moves along the old heading."),
+            ],
+        ),
+        Exercise(
+            "ekf_step",
+            reference=ekf_step,
+            draw=filter_step,
+            metric=metrics.several(metrics.numbers(1e-7), metrics.numbers(1e-7), names=("pose", "covariance")),
+            hints=(
+                "Predict with the model itself and its Jacobians, then correct as before, with H in place of C.",
+                "The Jacobian H and the expected measurement belong to the predicted pose; the bearing innovation is wrapped.",
+                "x = odometry.step(x, u, dt, 'euler'); cov = G_x cov G_x' + G_u cov_u G_u'; y = z - measurement(x, landmark); y[1] = wrap_angle(y[1]); then K, x + K y, (I - K H) cov",
+            ),
+            mistakes=[
+                Mistake(_ekf(wrap=False), "The bearing innovation is not wrapped: a measurement just across +-pi throws your robot around by a full turn."),
+                Mistake(_ekf(noise=False), "The control's noise G_u cov_u G_u' is missing from the prediction."),
+                Mistake(_ekf(at="old"), "Expected measurement and H belong to the predicted pose; you used the old one."),
+                Mistake(_ekf(short=True), "You only predicted: the correction is missing."),
+                Mistake(_ekf(carry=False), "The old covariance must be carried along: G_x cov G_x'."),
+                Mistake(
+                    _ekf(gain=lambda P, H, R: P @ H.T @ np.linalg.inv(H @ P @ H.T)),
+                    "The sensor's noise is missing from S.",
+                ),
+            ],
+        ),
+        Prediction(
+            "wrapping",
+            question="Two landmarks, a robot in circles, and a filter that forgets to wrap the bearing innovation. What happens when a bearing crosses from +180 to -180 deg?",
+            choices=("nothing, the filter averages it out", "the estimate is thrown off at once", "the filter becomes slowly less accurate"),
+            answer="the estimate is thrown off at once",
+            why="An innovation of a few hundredths becomes one of 6.28 rad. The gain turns it into meters, and the covariance shrinks as if all were well.",
+        ),
+        Exercise(
+            "nees",
+            reference=nees,
+            draw=estimate_and_truth,
+            metric=metrics.numbers(1e-8),
+            hints=(
+                "Measure the error in units of the uncertainty the filter claims.",
+                "e' cov^-1 e with e = truth - x, the heading wrapped.",
+                "e = truth - x; e[2] = wrap_angle(e[2]); return e @ np.linalg.solve(cov, e)",
+            ),
+            mistakes=[
+                Mistake(lambda t, x, P: (t - x) @ np.linalg.solve(P, t - x), "The heading error is not wrapped: both headings are nearly the same direction."),
+                Mistake(lambda t, x, P: _error(t, x) @ P @ _error(t, x), "You multiplied by the covariance. Divide by it: its inverse stands in the middle."),
+                Mistake(lambda t, x, P: np.sqrt(nees(t, x, P)), "You took the root. The normalized error *squared* has the expectation 3."),
+                Mistake(lambda t, x, P: _error(t, x) @ _error(t, x), "The covariance is missing: the error counts in units of what the filter promised."),
+                Mistake(
+                    lambda t, x, P: (_error(t, x) ** 2 / np.diag(P)).sum(),
+                    "You left the correlations out: use the whole inverse, not only the diagonal.",
+                ),
+                Mistake(lambda t, x, P: nees(t, x, P) / 3, "You divided by the number of states. Then the expectation is 1; here it should be 3."),
+            ],
+        ),
+        Prediction(
+            "precise",
+            question="A poorly known start, two landmarks. You replace the sensor by one ten times more precise. Is the filter's covariance more or less trustworthy?",
+            choices=("more trustworthy", "equally", "less trustworthy"),
+            answer="less trustworthy",
+            why="The filter replaces a curved circle of positions by its tangent. The better the sensor, the thinner the tangent, and the farther the truth lies from it.",
+        ),
+        Exercise(
+            "gate",
+            reference=gate,
+            draw=innovation_and_limit,
+            metric=metrics.exactly(),
+            draws=24,
+            hints=(
+                "Is the surprise larger than the filter's own idea of how large surprises are?",
+                "Compare y' S^-1 y with the limit.",
+                "return bool(innovation @ np.linalg.solve(cov_innovation, innovation) <= limit)",
+            ),
+            mistakes=[
+                Mistake(lambda y, S, g: not gate(y, S, g), "Exactly the other way round: True means plausible."),
+                Mistake(_gated(lambda y, S: y @ y), "You compare meters and radians with a number without unit: divide by the covariance S."),
+                Mistake(_gated(lambda y, S: np.sqrt(y @ np.linalg.solve(S, y))), "You took the root: the limit is one for the square."),
+                Mistake(_gated(lambda y, S: y @ S @ y), "S stands in the middle as its inverse."),
+                Mistake(_gated(lambda y, S: (y @ np.linalg.solve(S, y)) ** 2), "Squared once too often: y' S^-1 y is the square already."),
+            ],
+        ),
+    ],
+)

@@ -1,0 +1,33 @@
+"""Regions of normal distributions: the ellipse that holds a stated share, and who lies in it."""
+
+import numpy as np
+from scipy.stats import chi2
+
+from .checks import as_finite, as_points
+
+
+def ellipse(mean, cov, probability=0.95, points=61):
+    """Closed outline of the region of a plane normal distribution, (..., points, 2).
+
+    mean : (..., 2).    cov : (..., 2, 2).    probability : share of the distribution inside the outline.
+    """
+    mean, cov = as_points(mean, "mean", 2), as_finite(cov, "cov")
+    values, vectors = np.linalg.eigh(cov)
+    axes = vectors * np.sqrt(np.maximum(values, 0.0) * chi2.ppf(probability, 2))[..., None, :]
+    angle = np.linspace(0, 2 * np.pi, points)
+    circle = np.stack([np.cos(angle), np.sin(angle)])
+    return mean[..., None, :] + np.swapaxes(axes @ circle, -1, -2)
+
+
+def outlines(mean, cov, probability=0.95, points=61):
+    """Many ellipses as one line, (n (points + 1), 2), a row of NaN after each: one artist draws them all."""
+    curves = ellipse(mean, cov, probability, points)
+    gaps = np.full((*curves.shape[:-2], 1, 2), np.nan)
+    return np.concatenate([curves, gaps], axis=-2).reshape(-1, 2)
+
+
+def share_inside(samples, mean, cov, probability=0.95):
+    """Share of samples, (n, dim), inside the region that should hold `probability` of them."""
+    d = as_finite(samples, "samples") - as_finite(mean, "mean")
+    squared = (d * np.linalg.solve(as_finite(cov, "cov"), d.T).T).sum(-1)
+    return float((squared <= chi2.ppf(probability, d.shape[-1])).mean())

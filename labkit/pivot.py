@@ -1,0 +1,506 @@
+"""Quirlen: the tip of a tool and the fixed point it touches, from poses that all keep the tip on that point.
+
+The tool frame F moves, T_WF = (R_i, p_i); the tip sits at `tip` in F and always at `pivot` in W:
+
+    R_i tip + p_i = pivot,    stacked:  [R_i  -I] [tip; pivot] = -p_i
+
+The pivot is eliminated by taking means: with D_i = R_i - mean R and d_i = p_i - mean p the tip solves D_i tip = -d_i,
+and the singular values of the full system are sqrt(n (1 +- s_k)) with the singular values s_k of mean R. Lengths in
+mm, angles in radians. Source: lab sheet "Kalibrierung", Hochschule Darmstadt 2016, section 3.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .checks import as_finite, as_points, as_rotations, as_transforms
+from .lie import exp_so3, skew
+from .tables import read_table
+
+RANK_TOLERANCE = 1e-6  # smallest singular value beside the largest: below, the data do not say where the tip is
+NOISE_TOLERANCE = 1.5  # times std_rot: twice what orientation noise alone feigns
+TUKEY = 7.0  # residuals beyond seven standard deviations get no weight; 98.2 % efficient on Gaussian noise
+SAMPLES, SCORED = 100, 128  # three-pose candidates for a robust start, and poses that judge them
+TUKEY_SHRINK = 0.9170593779364243  # E[w d^2] / (3 E[w]): what the weights leave of a Gaussian variance
+MEDIAN_CHI3 = 1.5381722544550522  # median length of a vector of three standard normal components
+IDENTITY = np.eye(3)
+POSES = ("x", "y", "z", "a_deg", "b_deg", "c_deg")
+
+
+@dataclass(frozen=True)
+class PivotCalibration:
+    """Where the tip is, and how well the poses say so.
+
+    tip: (3,) in the tool frame F. pivot: (3,) in W. residuals: (n, 3), R tip + p - pivot in W. s0: sqrt(r'r / n) as
+    in the lab sheet, a distance in space. std: unbiased standard deviation of one coordinate, sqrt(r'r / (3n - 6)).
+    covariance: (6, 6) of tip and pivot. singular_values: (6,) of the stacked matrix, largest first. weights: (n,), 1
+    unless robust.
+    """
+
+    tip: np.ndarray
+    pivot: np.ndarray
+    residuals: np.ndarray
+    s0: float
+    std: float
+    covariance: np.ndarray
+    singular_values: np.ndarray
+    weights: np.ndarray
+
+
+def poses_in_listing():
+    """Number of poses in the unpublished Kreisel.txt, from the line numbers of the printed output.
+
+    Each "Ptest" block takes five lines: heading, three numbers, blank. The last block must end right before the line
+    of s0.
+    """
+    table = read_table("quirlen/listing.csv", text=("text",))
+    first, last, end = table["line"].astype(int)
+    if (last - first) % 5 or last + 5 != end:
+        raise ValueError(
+            f"quirlen/listing.csv: blocks of five lines do not fit between the lines {first}, {last} and {end}"
+        )
+    return (last - first) // 5 + 1
+
+
+def kreisel_poses():
+    """The synthetic counterpart of Kreisel.txt: T_WF (mm), shape (12, 4, 4)."""
+    table = read_table("quirlen/poses.csv")
+    return poses_from_euler(np.column_stack([table[c] for c in POSES]))
+
+
+def poses_from_euler(xyzabc_deg):
+    """T_WF from x, y, z (mm) and three angles a, b, c (deg) with R = Rx(a) Ry(b) Rz(c); (..., 6) -> (..., 4, 4)."""
+    xyzabc_deg = as_points(xyzabc_deg, "xyzabc_deg", dim=6)
+    abc = np.deg2rad(xyzabc_deg[..., 3:, None]) * np.eye(3)
+    T = np.zeros((*xyzabc_deg.shape[:-1], 4, 4))
+    T[..., :3, :3] = exp_so3(abc[..., 0, :]) @ exp_so3(abc[..., 1, :]) @ exp_so3(abc[..., 2, :])
+    T[..., :3, 3], T[..., 3, 3] = xyzabc_deg[..., :3], 1.0
+    return T
+
+
+def _poses(T_WF, at_least):
+    T = as_transforms(T_WF, "T_WF")
+    if T.ndim != 3:
+        raise ValueError(f"T_WF must have shape (n, 4, 4), got {T.shape}")
+    if len(T) < at_least:
+        raise ValueError(f"T_WF must hold at least {at_least} poses, got {len(T)}{_few(len(T))}")
+    return T
+
+
+def _few(n):
+    return ": two poses always leave the tip free along the axis of the turn between them" if n == 2 else ""
+
+
+def pivot_matrix(T_WF):
+    """The stacked matrix [R_i  -I]; (n, 4, 4) -> (3n, 6). Source: lab sheet, section 3."""
+    T = _poses(T_WF, 1)
+    A = np.empty((len(T), 3, 6))
+    A[..., :3], A[..., 3:] = T[:, :3, :3], -np.eye(3)
+    return A.reshape(-1, 6)
+
+
+def pivot_rhs(T_WF):
+    """The stacked right-hand side -p_i; (n, 4, 4) -> (3n,). Source: lab sheet, section 3."""
+    return -_poses(T_WF, 1)[:, :3, 3].ravel()
+
+
+def solve_pivot(A, b):
+    """Least-squares solution x = (tip, pivot) of A x = b, by orthogonal factorization; (3n, 6), (3n,) -> (6,).
+
+    Raises
+    ------
+    ValueError
+        When A has not rank 6: the smallest singular value is below 1e-6 of the largest.
+
+    Source: lab sheet, section 3, equation (1), which forms (A'A)^-1 A'b and so squares the condition number.
+    """
+    A, b = as_points(A, "A", dim=6), as_finite(b, "b")
+    if A.ndim != 2 or b.shape != (len(A),):
+        raise ValueError(f"A and b must have shapes (m, 6) and (m,), got {A.shape} and {b.shape}")
+    x, _, rank, values = np.linalg.lstsq(A, b, rcond=RANK_TOLERANCE)
+    if rank < 6:
+        raise ValueError(
+            f"A must have rank 6, but its rank is {rank}: the singular values are {np.round(values, 6).tolist()}"
+        )
+    return x
+
+
+def pivot_residuals(T_WF, tip, pivot):
+    """How far the tip misses the pivot in each pose, R_i tip + p_i - pivot; (n, 4, 4) -> (n, 3).
+
+    Source: lab sheet, section 3, equation (2).
+    """
+    T, tip, pivot = _poses(T_WF, 1), as_points(tip, "tip"), as_points(pivot, "pivot")
+    return T[:, :3, :3] @ tip + T[:, :3, 3] - pivot
+
+
+def pivot_covariance(A, residuals):
+    """Covariance of (tip, pivot) when every coordinate of the residuals carries the same noise: std^2 (A'A)^-1.
+
+    Parameters
+    ----------
+    A : array-like, shape (3n, 6)
+    residuals : array-like, shape (n, 3) or (3n,)
+
+    Returns
+    -------
+    covariance : array, shape (6, 6)
+        With std^2 = r'r / (3n - 6), the unbiased estimate.
+    """
+    A, r = as_points(A, "A", dim=6), as_finite(residuals, "residuals").ravel()
+    if A.ndim != 2 or len(r) != len(A) or len(A) <= 6:
+        raise ValueError(f"A must have more than 6 rows and one for each residual, got {A.shape} and {r.shape}")
+    R = np.linalg.qr(A, mode="r")
+    if np.abs(np.diagonal(R)).min() <= RANK_TOLERANCE * np.abs(np.diagonal(R)).max():
+        raise ValueError("A must have rank 6, but a direction of (tip, pivot) is not determined")
+    R_inverse = np.linalg.inv(R)
+    return (r @ r) / (len(r) - 6) * R_inverse @ R_inverse.T
+
+
+def robust_weights(distances, scale, cutoff=TUKEY):
+    """Tukey's weights (1 - (d / (cutoff scale))^2)^2, and 0 beyond the cutoff; (...) -> (...).
+
+    Parameters
+    ----------
+    distances : array-like, shape (...)
+        How far each pose misses, never negative (mm).
+    scale : float
+        Standard deviation of one coordinate of the good poses (mm), positive.
+    """
+    d, scale, cutoff = as_finite(distances, "distances"), float(scale), float(cutoff)
+    if not scale > 0 or not cutoff > 0:
+        raise ValueError(f"scale and cutoff must be positive, got {scale:g} and {cutoff:g}")
+    return _tukey(d / scale, cutoff)
+
+
+def _tukey(d, cutoff=TUKEY):
+    q = 1.0 - (d / cutoff) ** 2
+    return np.maximum(q, 0.0) ** 2
+
+
+def robust_scale(distances):
+    """Standard deviation of a coordinate from the median distance: half the poses may be wrong; (n,) -> float."""
+    return _scale(as_finite(distances, "distances"))
+
+
+def _scale(d):
+    half = len(d) // 2
+    return float(np.partition(d, half)[half]) / MEDIAN_CHI3
+
+
+def calibrate_pivot(T_WF, std_rot=None, std_trans=None, robust=False, rng=None):
+    """Tip and pivot from poses that all touch one point.
+
+    Parameters
+    ----------
+    T_WF : array-like, shape (n, 4, 4)
+        Measured poses of the tool frame, n >= 3, turned about at least two axes; n >= 5 when robust.
+    std_rot, std_trans : float, optional
+        Standard deviation of each component of a pose's rotation vector (rad) and position (mm). Given together, they
+        weight the residuals: orientation noise shakes the tip across its lever, not along it. Then they also scale
+        the covariance (unless robust).
+    robust : bool
+        Give poses that miss by far no weight (Tukey), starting from the best of many three-pose solutions.
+    rng : numpy.random.Generator, optional
+        Draws the three-pose samples; by default a fixed one, so that the same poses give the same result.
+
+    Returns
+    -------
+    PivotCalibration
+
+    Raises
+    ------
+    ValueError
+        When the tip is not determined, with the direction in which it is free, in the tool frame.
+
+    Source: lab sheet, section 3; weights by propagating std_rot through the lever; Tukey's weights as in Huber,
+    "Robust Statistics" (1981).
+    """
+    T = _poses(T_WF, 5 if robust else 3)
+    noise = _noise(std_rot, std_trans)
+    tolerance = RANK_TOLERANCE if noise is None else max(RANK_TOLERANCE, NOISE_TOLERANCE * noise[0])
+    n = len(T)
+    mean, gram = _gram(T)
+    values, inverse, tip = _tip(gram, n, tolerance)
+    M = mean[:, :3]
+    pivot = M @ tip + mean[:, 3]
+    if robust:
+        return _robust(T, noise, tolerance, np.random.default_rng(0) if rng is None else rng)
+    if noise is not None:
+        return _weighted(T, tip, pivot, values, noise)
+    r = _moved(T.reshape(n, 16).T, tip, pivot)
+    squares = float(np.vdot(r, r))
+    both = np.concatenate((IDENTITY, M))  # a shift of the tip moves the pivot along
+    covariance = both @ inverse @ both.T
+    covariance.ravel()[21::7] += 1.0 / n
+    covariance *= squares / (3 * n - 6)
+    std = math.sqrt(squares / (3 * n - 6))
+    return PivotCalibration(tip, pivot, r.T, math.sqrt(squares / n), std, covariance, values, np.ones(n))
+
+
+def _noise(std_rot, std_trans):
+    """(std_rot, std_trans) as floats, or None when neither is given."""
+    if std_rot is None and std_trans is None:
+        return None
+    if std_rot is None or std_trans is None:
+        raise ValueError("std_rot and std_trans must come together: only their ratio tells how to weight")
+    std_rot, std_trans = float(as_finite(std_rot, "std_rot")), float(as_finite(std_trans, "std_trans"))
+    if std_rot < 0 or std_trans <= 0:
+        raise ValueError(
+            f"std_rot must not be negative and std_trans must be positive, got {std_rot:g} and {std_trans:g}"
+        )
+    return std_rot, std_trans
+
+
+def _gram(T):
+    """Mean of [R p] over the poses, and [D d]'[D d] of the deviations from it; (n, 4, 4) -> (3, 4), (4, 4).
+
+    One product of all entries with each other holds both: the last entry of a pose is 1, so its row holds the sums.
+    """
+    n, entries = len(T), T.reshape(-1, 16)
+    products = entries.T @ entries
+    mean = products[15, :12].reshape(3, 4) / n
+    squares = products[:4, :4] + products[4:8, 4:8]
+    squares += products[8:12, 8:12]
+    squares -= n * (mean.T @ mean)
+    return mean, squares
+
+
+def _moved(entries, tip, pivot):
+    """R tip + p - pivot from the entries of the poses, row by row; (16, n) -> (3, n)."""
+    rows = np.zeros((3, 16))
+    rows[0, :3] = rows[1, 4:7] = rows[2, 8:11] = tip
+    rows[0, 3] = rows[1, 7] = rows[2, 11] = 1.0
+    rows[:, 15] = -pivot
+    return rows @ entries
+
+
+def _share(ratio):
+    return "practically nothing" if ratio < 1e-7 else f"{ratio:.1e}"
+
+
+def _tip(gram, n, tolerance):
+    """Singular values of the stacked matrix, (D'D)^-1 and the plain tip; refuses a direction the poses leave free."""
+    squares, axes = np.linalg.eigh(gram[:3, :3])
+    q = [max(v / n, 0.0) for v in squares.tolist()]  # 1 - s^2, in plain floats: NumPy is slow on three numbers
+    s = [math.sqrt(max(1.0 - v, 0.0)) for v in q]
+    small = [math.sqrt(n * v / (1.0 + k)) for v, k in zip(q, s)]
+    values = [math.sqrt(n * (1.0 + k)) for k in s] + small[::-1]
+    if values[5] <= tolerance * values[0]:
+        free = sum(value <= tolerance * values[0] for value in values)
+        v = axes[:, 0] * (1.0 if axes[np.abs(axes[:, 0]).argmax(), 0] > 0 else -1.0)
+        where = (
+            f"along ({v[0]:.2f}, {v[1]:.2f}, {v[2]:.2f}) in the tool frame" if free == 1 else f"in {free} directions"
+        )
+        raise ValueError(
+            f"the poses do not fix the tip, it is free {where}: the smallest singular value is"
+            f" {_share(values[5] / values[0])} of the largest,"
+            f" more than {tolerance:.1e} is needed; turn the tool about {'another axis' if free == 1 else 'two axes'}"
+        )
+    inverse = (axes / squares) @ axes.T
+    return np.array(values), inverse, -inverse @ gram[:3, 3]
+
+
+class _Weighted:
+    """Weighted least squares about a current tip and pivot, on the entries of the poses as contiguous rows (16, n).
+
+    With C = std_trans^2 I + std_rot^2 [tip]x[tip]x' (in F) and u = R tip, R C^-1 R' = (I + g u u') / c, where
+    c = std_trans^2 + (std_rot |tip|)^2 and g = (std_rot / std_trans)^2. Without noise figures C = I, and distances
+    are in mm.
+    """
+
+    def __init__(self, T, noise):
+        std_rot, self.std_trans = (0.0, 1.0) if noise is None else noise
+        self.variance_rot, self.g = std_rot**2, (std_rot / self.std_trans) ** 2
+        self.X = np.ascontiguousarray(T.reshape(-1, 16).T)
+        self.positions = self.X[3:12:4]
+
+    def look(self, tip, pivot):
+        """Residuals (3, n) and Mahalanobis distances (n,) at tip and pivot."""
+        self.tip = tip
+        self.c = self.std_trans**2 + self.variance_rot * (tip @ tip)
+        self.r = _moved(self.X, tip, pivot)
+        squares = np.einsum("in,in->n", self.r, self.r)
+        if self.g:
+            self.u = self.r - self.positions
+            self.u += pivot[:, None]
+            self.along = np.einsum("in,in->n", self.u, self.r)
+            squares += self.g * self.along**2
+        return self.r, np.sqrt(squares / self.c)
+
+    def step(self, w):
+        """Gauss-Newton step (6,) for weights w (n,), and the normal matrix (6, 6)."""
+        N, rhs, total = np.empty((6, 6)), np.empty(6), w.sum()
+        wr = self.r * w
+        products = (self.X[:12] @ wr.T).reshape(3, 4, 3)  # component of [R p], of the residual
+        N[:3, :3] = N[3:, 3:] = total * IDENTITY
+        N[3:, :3] = -(self.X[:12] @ w).reshape(3, 4)[:, :3]
+        rhs[:3], rhs[3:] = np.einsum("iji->j", products)[:3], -wr.sum(1)
+        if self.g:
+            W = IDENTITY + self.g * np.outer(self.tip, self.tip)
+            N[:3, :3] = total * W
+            N[3:, :3] = N[3:, :3] @ W
+            N[3:, 3:] += self.g * ((self.u * w) @ self.u.T)
+            rhs[:3] = W @ rhs[:3]
+            rhs[3:] -= self.g * (self.u @ (w * self.along))
+        N[:3, 3:] = N[3:, :3].T
+        return -np.linalg.solve(N, rhs), N / self.c
+
+
+def _weighted(T, tip, pivot, values, noise):
+    n, problem = len(T), _Weighted(T, noise)
+    w = np.ones(n)
+    for _ in range(3):  # the weights know the tip through its length and direction alone: three steps settle them
+        problem.look(tip, pivot)
+        step, N = problem.step(w)
+        tip, pivot = tip + step[:3], pivot + step[3:]
+    r, _ = problem.look(tip, pivot)
+    squares = float(np.vdot(r, r))
+    s0, std = math.sqrt(squares / n), math.sqrt(squares / (3 * n - 6))
+    return PivotCalibration(tip, pivot, r.T, s0, std, np.linalg.inv(N), values, w)
+
+
+def _robust(T, noise, tolerance, rng):
+    tip, pivot = _best_of_samples(T, rng)
+    problem, n = _Weighted(T, noise), len(T)
+    for k in range(30):
+        r, d = problem.look(tip, pivot)
+        if k < 3:  # the scale settles first; afterwards it stays, so that the steps converge
+            scale = max(_scale(d), 1e-12)
+        w = _tukey(d / scale)
+        step, N = problem.step(w)
+        tip, pivot = tip + step[:3], pivot + step[3:]
+        if k >= 3 and np.abs(step).max() < 1e-2 * scale * math.sqrt(problem.c / n):
+            break
+    kept = w > 0
+    count = int(np.count_nonzero(kept))
+    if count < 4:
+        raise ValueError(f"only {count} of {n} poses agree on a tip; at least 4 must")
+    values, _, _ = _tip(_gram(T[kept])[1], count, tolerance)
+    total = float(w.sum())
+    freedom, squares = max(3 * total - 6, 1.0), float(np.einsum("in,in,n->", r, r, w))
+    slope = (w - 4 / 3 * (d / (TUKEY * scale)) ** 2 * np.sqrt(w)).sum() / total
+    spread = np.vdot(w * d, w * d) / freedom / slope**2
+    s0, std = math.sqrt(squares / total), math.sqrt(squares / freedom / TUKEY_SHRINK)
+    return PivotCalibration(tip, pivot, r.T, s0, std, spread * np.linalg.inv(N), values, w)
+
+
+def _best_of_samples(T, rng):
+    """Tip and pivot of the three poses whose solution has the least median distance over the poses."""
+    n, order = len(T), rng.permutation(len(T))
+    triples = [order[: n // 3 * 3].reshape(-1, 3)]
+    while sum(map(len, triples)) < SAMPLES:
+        triples.append(rng.permutation(n)[: n // 3 * 3].reshape(-1, 3))
+    upper = T[np.concatenate(triples)[:SAMPLES], :3]
+    mean = upper.mean(1)
+    D = (upper - mean[:, None]).reshape(-1, 9, 4)
+    gram = np.swapaxes(D[..., :3], 1, 2) @ D
+    tips = -np.linalg.solve(gram[..., :3] + 1e-9 * IDENTITY, gram[..., 3:])[
+        ..., 0
+    ]  # the ridge lets a degenerate triple lose
+    pivots = (mean[..., :3] @ tips[..., None])[..., 0] + mean[..., 3]
+    squares = _squared_distances(T[order[:SCORED], :3], tips, pivots)
+    half = squares.shape[1] // 2
+    best = np.partition(squares, half, axis=1)[:, half].argmin()
+    return tips[best], pivots[best]
+
+
+def _squared_distances(upper, tips, pivots):
+    """|R tip + p - pivot|^2 of every candidate in every pose, as one matrix product; (n, 3, 4), (k, 3), (k, 3) -> (k,
+    n).
+
+    Multiplied out: |tip|^2 + |p - pivot|^2 + 2 tip'R'(p - pivot), with positions counted from their mean to keep the
+    digits.
+    """
+    n, k, R = len(upper), len(tips), upper[..., :3]
+    center = upper[..., 3].mean(0)
+    p, pivots = upper[..., 3] - center, pivots - center
+    of_pose, of_candidate = np.ones((n, 17)), np.ones((k, 17))
+    of_pose[:, :9], of_pose[:, 9:12] = R.reshape(n, 9), p
+    of_pose[:, 12:15], of_pose[:, 15] = np.einsum("nij,ni->nj", R, p), np.einsum("ni,ni->n", p, p)
+    of_candidate[:, :9] = (-2.0 * pivots[:, :, None] * tips[:, None, :]).reshape(k, 9)
+    of_candidate[:, 9:12], of_candidate[:, 12:15] = -2.0 * pivots, 2.0 * tips
+    of_candidate[:, 16] = np.einsum("ki,ki->k", tips, tips) + np.einsum("ki,ki->k", pivots, pivots)
+    return of_candidate @ of_pose.T
+
+
+def predicted_covariance(R, tip, std_rot, std_trans):
+    """Cramer-Rao bound of (tip, pivot) for planned orientations, before any pose is measured.
+
+    The poses' own rotations are nuisance parameters: their noise reaches the tip through its lever.
+
+    Parameters
+    ----------
+    R : array-like, shape (n, 3, 3)
+    tip : array-like, shape (3,)
+        Roughly where the tip will be, in the tool frame.
+    std_rot, std_trans : float
+        Standard deviation of each component of a pose's rotation vector (rad) and position.
+
+    Returns
+    -------
+    covariance : array, shape (6, 6)
+    """
+    R, tip = as_rotations(R, "R"), as_points(tip, "tip")
+    std_rot, std_trans = _noise(std_rot, std_trans)
+    lever = skew(tip)
+    C = std_trans**2 * np.eye(3) + std_rot**2 * lever @ lever.T
+    A = np.concatenate([R, np.broadcast_to(-np.eye(3), R.shape)], axis=-1)
+    information = (np.swapaxes(A, 1, 2) @ (R @ np.linalg.inv(C) @ np.swapaxes(R, 1, 2)) @ A).sum(0)
+    values = np.linalg.eigvalsh(information)
+    if values[0] <= RANK_TOLERANCE**2 * values[-1]:
+        raise ValueError("the orientations do not fix the tip: the information matrix has a zero eigenvalue")
+    return np.linalg.inv(information)
+
+
+def tilted(directions, spin=0.0):
+    """Rotations that turn the tool's z axis to the given directions by the shortest way, after a spin about it; (...,
+    3) -> (..., 3, 3).
+
+    `directions` need not have length 1 but must not be zero; `spin` in radians, shape (...).
+    """
+    d = as_points(directions, "directions")
+    length = np.linalg.norm(d, axis=-1)
+    if (length == 0).any():
+        raise ValueError("directions must not be zero: the tool has to point somewhere")
+    across = np.cross([0.0, 0.0, 1.0], d / length[..., None])
+    sine = np.linalg.norm(across, axis=-1)
+    angle = np.arctan2(sine, d[..., 2] / length)
+    flipped = (sine < 1e-12) & (angle > 1)  # straight down: turn about x
+    axis = np.where(flipped[..., None], [1.0, 0.0, 0.0], across / np.where(sine < 1e-300, 1.0, sine)[..., None])
+    turn = np.zeros(d.shape)
+    turn[..., 2] = spin
+    return exp_so3(angle[..., None] * axis) @ exp_so3(turn)
+
+
+def cone(n, half_angle, turns=0.0):
+    """Rotations of a tool led once around a cone, its z axis `half_angle` (rad) from the vertical; (n, 3, 3).
+
+    `turns` is how often it spins about its own axis on the way. With exactly one turn the whole motion is a
+    rotation about the vertical, a single axis: then the poses leave the tip free along it.
+    """
+    if n < 1:
+        raise ValueError(f"a cone must have at least one pose, got {n}")
+    phi = 2 * np.pi * np.arange(n) / n
+    sine, cosine = np.sin(as_finite(half_angle, "half_angle")), np.cos(half_angle)
+    d = np.column_stack([sine * np.cos(phi), sine * np.sin(phi), np.full(n, cosine)])
+    return tilted(d, spin=turns * phi)
+
+
+def touching_poses(R, tip, pivot, std_rot=0.0, std_trans=0.0, rng=None):
+    """Measured poses T_WF of a tool that touches `pivot` with `tip` in the orientations R; (..., n, 3, 3) -> (..., n,
+    4, 4).
+
+    Noise: R exp(phi) with components of std_rot (rad), position plus components of std_trans; `rng` is needed when
+    either is not 0.
+    """
+    R, tip, pivot = as_rotations(R, "R"), as_points(tip, "tip"), as_points(pivot, "pivot")
+    T = np.zeros((*R.shape[:-2], 4, 4))
+    T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, pivot - R @ tip, 1.0
+    if std_rot or std_trans:
+        if rng is None:
+            raise ValueError("rng must be given when std_rot or std_trans is not 0")
+        T[..., :3, :3] = R @ exp_so3(std_rot * rng.normal(size=(*R.shape[:-2], 3)))
+        T[..., :3, 3] += std_trans * rng.normal(size=(*R.shape[:-2], 3))
+    return T

@@ -1,0 +1,323 @@
+# %% title [markdown]
+# # 2 · Chaining and closing the loop
+#
+# **What you will do.** Chain four measured transforms around a loop, find by how much the loop misses itself, explain the last printed digits, and
+# share out the error.
+#
+# **What you will learn.** Why the order of a product matters, how a small turn becomes millimeters through its lever, how errors grow with the number
+# of links, what a long product does to right angles, and why two loops need all their links at once.
+#
+# **What you need.** Chapter 1. About 75 minutes.
+
+# %% notation [markdown]
+# | letter | meaning |
+# | --- | --- |
+# | $K_0 \dots K_3$ | four frames on the work piece |
+# | $T_{K_0K_1}$ | a link: the pose of $K_1$ seen from $K_0$ |
+# | $P_k$ | pose after $k$ links: $P_0 = I$, $P_k = P_{k-1}\,T_{k}$ |
+# | $\xi = (\varphi, \rho)$ | twist: turn (rad) and shift (mm) of a small motion $\exp(\xi)$; `exp_se3`, `log_se3` |
+# | $\sigma_r, \sigma_t$ | standard deviation of each component of a link's turn and shift |
+
+# %% setup
+import numpy as np
+
+from labkit import chaining
+from labkit.course import course
+from labkit.frames import relative
+from labkit.lie import exp_se3, log_se3
+from labkit.widgets import chaining as stages
+
+ex = course("02-chaining")
+np.set_printoptions(precision=6, suppress=True)
+
+# %% the-question [markdown]
+# ## The question
+#
+# A measuring arm reaches only so far, and the work piece is larger. So the arm is moved: from stand 1 it measures the frames $K_0$ and $K_1$, from stand 2 $K_1$ and
+# $K_2$, and so on, until stand 4 measures $K_3$ and again $K_0$. **Where does the chain end, and what does the gap tell?** This is section 2 of the lab sheet
+# (*Verkettung von Transformationen*). Its eight measured frames were never published; listing 7 prints the four transforms, one a stand, and their product.
+# To have something to measure, `data/chaining` holds eight synthetic frames (labeled so) that round to the printed digits.
+
+# %% the-links
+printed = chaining.printed_transforms()
+measured = chaining.transforms_from_points(chaining.station_points())
+for k, (T, S) in enumerate(zip(printed, measured)):
+    angle, distance = chaining.closure_error(T)
+    off = np.abs(S - T).max()
+    print(f"K{k} to K{(k + 1) % 4}: {np.rad2deg(angle):6.2f} deg, {distance:6.2f} mm; synthetic is off by {off:.1e}")
+
+# %% order [markdown]
+# ## First A, then B
+#
+# Every move is made *in the frame that has been reached*. Below, A shifts and turns by 60°, B shifts only. Decide first, then drag the frames A and B,
+# and turn them with the sliders. *No turns* shows when you would not notice a wrong order.
+
+# %% predict-order
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "yes, one turn is enough"
+### END SOLUTION
+ex.predict("order", guess, reveal=stages.order_of_product)
+
+# %% sum-or-product [markdown]
+# ## A sum sign
+#
+# Above its listing the sheet writes $K_0 \cdot \sum_{i=1}^{n} {}^{i}T_{i+1} = K_0 \cdot E$. The result it prints is this:
+#
+# | | | | |
+# | ---: | ---: | ---: | ---: |
+# | 0.999905 | −0.012206 | 0.006358 | −1.205218 |
+# | 0.012191 | 0.999923 | 0.002337 | 1.215314 |
+# | −0.006386 | −0.002259 | 0.999977 | −0.128655 |
+# | 0.000000 | 0.000000 | 0.000000 | 1.000000 |
+
+# %% predict-operator
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "the product"
+### END SOLUTION
+ex.predict("operator", guess)
+
+# %% chain
+@ex.chain
+def chain(transforms):
+    """Return T_0N, shape (4, 4), from the links T_01, T_12, ... of shape (N, 4, 4)."""
+    ### BEGIN SOLUTION
+    T = np.eye(4)
+    for link in transforms:
+        T = T @ link
+    return T
+    ### END SOLUTION
+
+
+# %% rounding [markdown]
+# ## Against the document
+#
+# Your product will agree with the printed one, but not to the last digit. Is that an error? The printed links are rounded by up to half a unit of the sixth decimal,
+# $h = 0.5 \cdot 10^{-6}$. An error $E$ in link $k$ arrives in the product as $T_1 \cdots T_{k-1}\,E\,T_{k+1} \cdots T_N$. Adding the absolute values over all links gives
+# a bound for every entry. In the last column the digits of the *rotations* arrive multiplied by a lever of some hundred millimeters.
+
+# %% compare-listing-7
+product = chain(printed)
+listing_7 = chaining.printed_product()
+bound = chaining.rounding_bound(printed)
+off = np.abs(product - listing_7)
+print("corner of the sum:", printed.sum(axis=0)[3, 3], "  of the product:", product[3, 3])
+print(f"rotation:    off by {off[:3, :3].max():.1e}, rounding allows {bound[:3, :3].max():.1e}")
+print(f"translation: off by {off[:3, 3].max():.1e} mm, rounding allows {bound[:3, 3].max():.1e} mm")
+print("every entry within its bound:", bool((off[:3] <= bound[:3] + chaining.HALF_DIGIT).all()))
+print(f"product of the unrounded synthetic links: off by {np.abs(chain(measured) - listing_7).max():.1e}")
+
+# %% closure [markdown]
+# ## The closure error
+#
+# The product should be the identity. How far is it from it? Not by a norm of $T - I$: that adds millimeters to numbers without a unit. A rigid motion has an
+# **angle**, from the trace of its rotation, and a **distance**, the length of its translation.
+
+# %% closure_error
+@ex.closure_error
+def closure_error(T):
+    """Return (angle in rad, distance in mm) by which T, shape (4, 4), differs from the identity."""
+    ### BEGIN SOLUTION
+    angle = np.arccos((np.trace(T[:3, :3]) - 1) / 2)
+    return angle, np.linalg.norm(T[:3, 3])
+    ### END SOLUTION
+
+
+# %% closure_angle_deg
+# by what angle does the sheet's loop miss itself, in degrees?
+closure_angle_deg = ...  # your code here
+### BEGIN SOLUTION
+closure_angle_deg = np.rad2deg(closure_error(product)[0])
+### END SOLUTION
+ex.closure_angle_deg(closure_angle_deg)
+
+# %% closure_distance
+# and by what distance, in mm?
+closure_distance = ...  # your code here
+### BEGIN SOLUTION
+closure_distance = closure_error(product)[1]
+### END SOLUTION
+ex.closure_distance(closure_distance)
+
+# %% work-piece [markdown]
+# (If you took the arccosine of the trace, compare the third digit with `chaining.closure_error(product)`: near 0 the cosine is flat, and six decimals of a matrix leave two or three
+# digits of the angle. The library reads the sine from $R - R^\top$.)
+#
+# The sheet finds its product "annähernd genau" the identity. Whether it is depends on *where* you ask. A point of the work piece at $p$ is displaced by
+# $|T p - p|$, and the angle grows with the distance from the axis of the closure motion.
+
+# %% at-the-work-piece
+for x in (0, 100, 300, 1000):
+    points = x * np.vstack([np.eye(3), -np.eye(3)])
+    d = chaining.displacement(product, points)
+    print(f"{x:5} mm from the origin of K0: {d.min():5.2f} to {d.max():5.2f} mm, depending on the direction")
+
+# %% lever [markdown]
+# ## One bad link
+#
+# A turn at the end of link $k$ moves everything that follows, and the end of the chain moves by the turn times its **lever**: the distance from $K_k$ to the end.
+# The figure shows the sheet's loop in plan view: black as it is, purple as the chain sees it, gray the gap at $K_0$ and at a work piece P. Drag the frames, and choose which link is wrong.
+
+# %% predict-lever
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "the second, to K2"
+### END SOLUTION
+ex.predict("lever", guess, reveal=stages.open_loop)
+
+# %% growth [markdown]
+# ## How errors grow
+#
+# Let every link carry independent noise. Turns of different links add like random steps, a turn moves the end by its lever $l_k$:
+#
+# $$\text{angle}^2 = 3N\sigma_r^2, \qquad \text{distance}^2 = 3N\sigma_t^2 + 2\sigma_r^2 \sum_k |l_k|^2 .$$
+#
+# (A turn about the lever itself moves nothing: two of three components count.) For $N$ links of length $L$ in a row the levers are $0, L, \dots, (N-1)L$, and their squares add up to
+# about $L^2N^3/3$. On a loop of fixed size they stay below its diameter. In the figure, left: where a hundred chains end, seen along the chain; right: the laws, and what was simulated.
+
+# %% predict-growth
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "2.8 times"
+### END SOLUTION
+ex.predict("growth", guess, reveal=stages.growth)
+
+# %% what-the-arm-did [markdown]
+# The law also reads backwards. If the sheet's closure angle is typical, it tells the noise of a single link; with the sheet's levers, this noise predicts the distance.
+# One loop is one sample, so expect agreement within a factor of two or three, not more.
+
+# %% noise-of-the-sheet
+angle, distance = chaining.closure_error(product)
+std_rot = angle / np.sqrt(3 * len(printed))
+expected = chaining.expected_closure(printed, std_rot, 0.0)[1]
+print(f"noise of a link: {np.rad2deg(std_rot):.2f} deg a component, {100 * std_rot:.2f} mm on a triangle of 100 mm")
+print(f"closure distance it predicts: {expected:.1f} mm; found: {distance:.1f} mm")
+
+# %% drift [markdown]
+# ## Right angles wear off
+#
+# Six decimals leave $R^\top R - I$ at about $10^{-6}$. Go around the loop again and again and the defect grows, without any noise. The repair is the nearest rotation:
+# among all rotations, the one with the smallest $|X - R|$. With the SVD $R = U S V^\top$ it is $X = U V^\top$.
+
+# %% orthonormalize
+@ex.orthonormalize
+def orthonormalize(T):
+    """Return T, shape (4, 4), with its rotation block replaced by the nearest rotation."""
+    ### BEGIN SOLUTION
+    U, _, Vt = np.linalg.svd(T[:3, :3])
+    X = T.copy()
+    X[:3, :3] = U @ Vt
+    return X
+    ### END SOLUTION
+
+
+# %% many-rounds
+worn, repaired = np.eye(4), np.eye(4)
+for rounds in range(1, 1001):
+    worn = worn @ product
+    repaired = orthonormalize(repaired @ product)
+    if rounds in (1, 10, 100, 1000):
+        defect, kept = chaining.orthonormality_error(worn), chaining.orthonormality_error(repaired)
+        print(f"{rounds:5} rounds: R'R differs from I by {defect:.1e}; repaired, below 1e-12: {kept < 1e-12}")
+
+# %% sharing [markdown]
+# ## Sharing out the error
+#
+# `log_se3` takes a motion apart into its twist, `exp_se3` puts it together again, and half a twist is half the motion:
+
+# %% half-a-motion
+half = exp_se3(0.5 * log_se3(measured[0]))
+print("half a link, twice, is the link:", np.allclose(half @ half, measured[0]))
+print("half the shift is not half the way:", half[:3, 3].round(1), "against", (0.5 * measured[0][:3, 3]).round(1), "mm")
+
+# %% sharing-derivation [markdown]
+# The pose after $N$ links should be $I$ but is $P_N = \exp(\xi)$. Nobody knows which link is to blame, so each takes its $N$-th part. Move the pose after $k$ links back by $k$ parts,
+# $P_k' = \exp(-\tfrac{k}{N}\xi)\,P_k$, and read off the corrected links between neighbors. Then $P_N' = \exp(-\xi)\exp(\xi) = I$: the loop closes exactly. And
+# every link changes by the same screw $\exp(-\xi/N)$, seen from $K_0$: by exactly its share of the angle.
+
+# %% distribute_closure
+@ex.distribute_closure
+def distribute_closure(transforms):
+    """Return the corrected links, shape (N, 4, 4), of a loop whose links have shape (N, 4, 4)."""
+    ### BEGIN SOLUTION
+    N = len(transforms)
+    poses = [np.eye(4)]
+    for link in transforms:
+        poses.append(poses[-1] @ link)
+    xi = log_se3(poses[-1])
+    moved = [exp_se3(-k / N * xi) @ P for k, P in enumerate(poses)]
+    return np.array([relative(A, B) for A, B in zip(moved, moved[1:])])
+    ### END SOLUTION
+
+
+# %% closed
+links = np.array([orthonormalize(T) for T in printed])
+corrected = distribute_closure(links)
+gaps = [chaining.closure_error(chain(loop))[1] for loop in (links, corrected)]
+print(f"closure before: {gaps[0]:.3f} mm, after: below 1e-9 mm: {gaps[1] < 1e-9}")
+for k, (before, after) in enumerate(zip(links, corrected)):
+    angle, distance = chaining.closure_error(relative(before, after))
+    print(f"link {k + 1}: turned by {np.rad2deg(angle):.4f} deg, its end moved by {distance:.3f} mm")
+
+# %% break-it [markdown]
+# ## Break it
+#
+# Sharing out assumes small errors. Give one link a blunder of 20 mm, a point touched beside its mark, and see who pays for it: the loop closes, the culprit keeps most of its error,
+# and three good links are spoiled. Then ask for the impossible: a loop that misses by half a turn.
+
+# %% break-it-code
+blunder = links.copy()
+blunder[1, 0, 3] += 20.0
+shared = chaining.distribute_closure(blunder)
+print("it closes without complaint:", bool(np.allclose(chain(shared), np.eye(4))))
+for k in range(4):
+    print(f"link {k + 1}: wrong by {np.linalg.norm((shared[k] - links[k])[:3, 3]):5.2f} mm")
+try:
+    chaining.distribute_closure([np.diag([-1.0, -1.0, 1.0, 1.0])])
+except ValueError as refusal:
+    print(refusal)
+
+# %% beyond [markdown]
+# ## Beyond the document: a pose graph
+#
+# Better than equal shares: let the frames be unknowns, and let every measured link pull at its two frames with the strength of its precision. The sum of the weighted squares of
+# $\log(Z_{ij}^{-1} X_i^{-1} X_j)$ over all links is least at the most likely poses (`scipy.optimize.least_squares` finds them). On one loop it closes as exactly as you just did, but
+# it shares differently: it knows that a small turn with a long lever explains more than a shift.
+
+# %% one-loop-two-ways
+graph = chaining.solve_pose_graph([(0, 1), (1, 2), (2, 3), (3, 0)], links, std_rot=std_rot, std_trans=0.3)
+simple = chaining.stations(corrected)[:4]
+angles, distances = chaining.closure_error(relative(graph.poses, simple))
+for k in range(1, 4):
+    print(f"K{k}: graph and equal shares differ by {np.rad2deg(angles[k]):.3f} deg and {distances[k]:.2f} mm")
+print(f"weighted sum of squares {graph.chi2:.1f}, expected about {graph.dof}")
+
+# %% second-loop [markdown]
+# With a second loop the simple way ends. Six frames, seven links, two loops A and B with one link in common. Decide what happens, then step through the measurements.
+# Left: the frames with their errors magnified; right: by how much each loop is still open.
+
+# %% predict-two-loops
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "it opens again"
+### END SOLUTION
+ex.predict("two_loops", guess, reveal=stages.two_loops)
+
+# %% in-practice [markdown]
+# ## In practice
+#
+# - Close the loop whenever you can: it is the only honest check the chain offers. Give the gap as an angle *and* a distance, and in millimeters where the part will be.
+# - Few long links beat many short ones. Large triangles, as in chapter 1, make small turns.
+# - A closed loop proves little: an error common to all links (a wrong scale) closes perfectly.
+# - Orthonormalize after long products, and check before you share out: a closure far above the expected one is a blunder, not noise.
+
+# %% questions [markdown]
+# ## Three questions, to answer in words
+#
+# 1. All four links are too long by one percent, and the loop still closes. How is that possible, and what measurement would show it?
+# 2. Why does an error in the last link turn the loop's end, but hardly move it?
+# 3. The closure angle is the same whether you start the loop at $K_0$ or at $K_2$; the closure distance is not. Why?
+
+# %% progress
+ex.progress()

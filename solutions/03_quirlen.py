@@ -1,0 +1,328 @@
+# %% title [markdown]
+# # 3 · Quirlen: calibration about a pivot
+#
+# **What you will do.** Find the tip of a tool from poses that all touch one point (*Quirlen*, swirling), judge the result, plan better poses, and survive
+# bad ones.
+#
+# **What you will learn.** Why a small residual does not mean a good calibration, what singular values say before anything is measured, what the sheet's
+# $s_0$ means in millimeters, why two poses are never enough, and how to let go of outliers.
+#
+# **What you need.** Chapter 1, least squares. About 90 minutes.
+
+# %% notation [markdown]
+# | letter | meaning |
+# | --- | --- |
+# | $T_{WF}$: $R_i$, $p_i$ | pose $i$ of the tool frame $F$ (the flange) in the world $W$ |
+# | $P_t$, in code `tip` | the tip, seen from $F$ |
+# | $P_\text{pivot}$, in code `point` | the fixed point, seen from $W$ |
+# | $A\,x = b + r$ | stacked equations, $x = (P_t, P_\text{pivot})$, residuals $r$ |
+# | $s_1 \ge \dots \ge s_6$ | singular values of $A$; $v_6$, the null vector, belongs to $s_6 = 0$ |
+# | $\sigma_t$, $\sigma_r$ | noise of a pose: each coordinate (mm), each component of its turn (rad) |
+
+# %% setup
+import numpy as np
+
+from labkit import pivot
+from labkit.course import course
+from labkit.lie import exp_so3
+from labkit.widgets import pivot as stages
+
+ex = course("03-quirlen")
+np.set_printoptions(precision=6, suppress=True)
+
+# %% the-question [markdown]
+# ## The question
+#
+# A robot carries a measuring tip parallel to its old one. **Where is the tip, seen from the flange?** Nobody measures it. Instead the robot
+# touches one fixed point again and again, from different directions. The point's place need not be known. This is section 3 of the lab sheet.
+#
+# Its file `Kreisel.txt` was never published. But the printed output has line numbers: the blocks "Ptest" of five lines each begin at lines 20 and 75,
+# and line 80 prints $s_0$. So we know how many poses there were. `data/quirlen` holds as many synthetic ones, built so that the printed results come out.
+
+# %% the-poses
+print("poses in Kreisel.txt:", (75 - 20) // 5 + 1)
+poses = pivot.kreisel_poses()
+for T in poses[:3]:
+    tilt_deg = np.rad2deg(np.arccos(T[2, 2]))
+    print("flange at", T[:3, 3].round(2), f"mm, tilted by {tilt_deg:.1f} deg")
+print("...", len(poses), "synthetic poses in all")
+
+# %% equation [markdown]
+# ## One pose, three equations
+#
+# In every pose the tip is at the pivot: $R_i P_t + p_i = P_\text{pivot}$. Both unknowns to the left, what is known to the right:
+#
+# $$\begin{pmatrix} R_1 & -I \\ \vdots & \vdots \\ R_n & -I \end{pmatrix} \begin{pmatrix} P_t \\ P_\text{pivot} \end{pmatrix} \cong \begin{pmatrix} -p_1 \\ \vdots \\ -p_n \end{pmatrix} .$$
+
+# %% pivot_matrix
+@ex.pivot_matrix
+def pivot_matrix(T_WF):
+    """Return A, shape (3n, 6), from poses of shape (n, 4, 4)."""
+    ### BEGIN SOLUTION
+    return np.vstack([np.hstack([T[:3, :3], -np.eye(3)]) for T in T_WF])
+    ### END SOLUTION
+
+
+# %% pivot_rhs
+@ex.pivot_rhs
+def pivot_rhs(T_WF):
+    """Return b, shape (3n,), from poses of shape (n, 4, 4)."""
+    ### BEGIN SOLUTION
+    return -T_WF[:, :3, 3].ravel()
+    ### END SOLUTION
+
+
+# %% least-squares [markdown]
+# ## Least squares
+#
+# Measured poses contradict each other, so we ask for the $x$ with the smallest $r^\top r$. Setting the derivative to zero gives the normal equations, and the sheet's
+# equation (1): $x = (A^\top A)^{-1} A^\top b$. It is right, but $A^\top A$ has the *square* of the condition number of $A$. An orthogonal factorization (QR, SVD)
+# works on $A$ itself, and `np.linalg.lstsq` does just that. Use either; further down you will see the difference.
+
+# %% solve_pivot
+@ex.solve_pivot
+def solve_pivot(A, b):
+    """Return x = (tip, point), shape (6,), with the smallest sum of squares of A x - b."""
+    ### BEGIN SOLUTION
+    return np.linalg.lstsq(A, b, rcond=None)[0]
+    ### END SOLUTION
+
+
+# %% compare-listing-9
+A, b = pivot_matrix(poses), pivot_rhs(poses)
+x = solve_pivot(A, b)
+listing_9 = np.array([-1.747805, 44.586360, -87.648108, -253.032904, 107.040686, -3.215224])
+print("tip  ", x[:3], "mm\npoint", x[3:], "mm")
+print(f"off listing 9 by {np.abs(x - listing_9).max():.1e} mm (half a printed digit is 5.0e-07)")
+
+# %% tip_length
+# how long is the tool, from the flange to the tip, in mm?
+tip_length = ...  # your code here
+### BEGIN SOLUTION
+tip_length = np.linalg.norm(x[:3])
+### END SOLUTION
+ex.tip_length(tip_length)
+
+# %% residuals [markdown]
+# ## What is left over
+#
+# The agreement with listing 9 is no surprise: the synthetic poses were made for it. It shows that twelve poses can give these numbers, and what they then mean.
+#
+# The sheet checks its result with equation (2): $P_\text{test} = R_i P_t + p_i - P_\text{pivot}$, ideally zero in every pose. Then it prints
+# $s_0 = \sqrt{r^\top r / n}$.
+
+# %% pivot_residuals
+@ex.pivot_residuals
+def pivot_residuals(T_WF, tip, point):
+    """Return R_i tip + p_i - point of every pose, shape (n, 3)."""
+    ### BEGIN SOLUTION
+    return np.array([T[:3, :3] @ tip + T[:3, 3] - point for T in T_WF])
+    ### END SOLUTION
+
+
+# %% s0
+residuals = pivot_residuals(poses, x[:3], x[3:])
+print("first P_test", residuals[0], " last", residuals[-1])
+s0 = ...  # your code here
+### BEGIN SOLUTION
+s0 = np.sqrt((residuals**2).sum() / len(poses))
+### END SOLUTION
+ex.s0(s0)
+
+# %% what-s0-means [markdown]
+# The sheet divides by the number of *poses*. So $s_0$ is the typical distance in space by which the tip misses. The noise of one *coordinate* is smaller, and its
+# unbiased estimate divides by the degrees of freedom: $3n$ equations less six unknowns. All three are honest numbers once their names are said.
+
+# %% three-numbers
+squares, n = (residuals**2).sum(), len(poses)
+std = np.sqrt(squares / (3 * n - 6))
+print(f"{np.sqrt(squares / n):.3f} mm  s0, rms distance in space (divided by {n} poses)")
+print(f"{np.sqrt(squares / (3 * n)):.3f} mm  rms of a coordinate (divided by {3 * n} equations)")
+print(f"{std:.3f} mm  std of a coordinate, unbiased (divided by {3 * n - 6})")
+print(f"{np.rad2deg(std / np.linalg.norm(x[:3])):.2f} deg turn of the flange that moves the tip as far")
+
+# %% swirl [markdown]
+# ## Small residual, good tip?
+#
+# The sheet concludes: "Wie erwartet gilt für jede Messpose $P_\text{test} \approx \vec 0$." Does that make the tip right? Imagine the tool held upright on the point, spinning about its own axis like a top, never tilting. Decide, then let the time run and watch three
+# bars: the residual $s_0$, the true error of the tip (here we know it), and the error that the covariance predicts. *Make it fail* only spins.
+
+# %% predict-spin
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "a small residual, a large error"
+### END SOLUTION
+ex.predict("spin", guess, reveal=stages.swirl)
+
+# %% two-poses [markdown]
+# ## How many poses?
+#
+# The sheet: "Da es 6 Unbekannt gibt, werden auch mindestens 2 Messposen benötigt". Two poses give six equations. Is that enough?
+
+# %% predict-two-poses
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "never"
+### END SOLUTION
+ex.predict("two_poses", guess)
+
+# %% count-the-rank
+for n in (2, 3, 4, 12):
+    s = np.linalg.svd(pivot_matrix(poses[:n]), compute_uv=False)
+    print(f"{n:2} poses: {3 * n:2} equations, s6/s1 = {s[5] / s[0]:.4f}, rank {np.sum(s > 1e-9 * s[0])}")
+turn = poses[0, :3, :3].T @ poses[1, :3, :3]
+axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+axis /= np.linalg.norm(axis)
+shifted = pivot_residuals(poses[:2], x[:3] + 50 * axis, x[3:] + 50 * poses[0, :3, :3] @ axis)
+change = np.abs(shifted - residuals[:2]).max()
+print(f"tip shifted by 50 mm along the axis of the turn: residuals change by less than 1e-9 mm: {change < 1e-9}")
+
+# %% why-three [markdown]
+# Two poses suffice only with knowledge from elsewhere: if the component along the axis of the turn is known, say because the tool was measured with a ruler. Three poses
+# with different axes of turn fix all six unknowns.
+#
+# ## Plan before you measure
+#
+# $A$ holds orientations only, and those you choose. Its singular values say how well the poses will fix the tip; the null vector shows the
+# direction in which they will not. With noise of known size, even the covariance of the tip follows in advance: the ellipsoid. Which set is better? Decide, then drag the six
+# directions over the sphere; drag beside it to turn the view. *Make it fail* leaves nothing but spin, and the null vector appears.
+
+# %% predict-cone
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "6 poses within 20 deg"
+### END SOLUTION
+ex.predict("cone", guess, reveal=stages.pose_designer)
+
+# %% cone-angle
+tip = np.array([0.0, 0.0, -100.0])
+for n, half_angle_deg in ((60, 1), (60, 2), (6, 20), (60, 20), (60, 45)):
+    R = pivot.cone(n, np.deg2rad(half_angle_deg))
+    s = np.linalg.svd(pivot.pivot_matrix(pivot.touching_poses(R, tip, np.zeros(3))), compute_uv=False)
+    cov = pivot.predicted_covariance(R, tip, std_rot=0.0, std_trans=0.2)
+    condition = s[0] / s[5]
+    print(
+        f"{n:2} poses, cone {half_angle_deg:2} deg: condition {condition:5.0f}, squared {condition**2:8.0f}; "
+        f"tip {np.sqrt(cov[0, 0]):.2f} mm across, {np.sqrt(cov[2, 2]):.2f} mm along"
+    )
+
+# %% squared [markdown]
+# The column "squared" is what the normal equations work with, and every power of ten in it costs one of the 16 digits a computer has. Try it with exact poses on very narrow cones.
+
+# %% normal-equations
+for half_angle_deg in (0.1, 0.001):
+    T = pivot.touching_poses(pivot.cone(60, np.deg2rad(half_angle_deg)), tip, [300.0, 200.0, 100.0])
+    A_cone, b_cone = pivot.pivot_matrix(T), pivot.pivot_rhs(T)
+    by_normal = np.linalg.inv(A_cone.T @ A_cone) @ A_cone.T @ b_cone
+    by_svd = np.linalg.lstsq(A_cone, b_cone, rcond=None)[0]
+    worse = np.linalg.norm(by_normal[:3] - tip) / np.linalg.norm(by_svd[:3] - tip)
+    left = 16 - np.log10(np.linalg.cond(A_cone)) * np.array([1, 2])
+    words = f"cone {half_angle_deg:5} deg: {left[0]:2.0f} digits left by SVD, {left[1]:2.0f} by normal equations,"
+    print(words, f"at least 100 times worse: {worse > 100}")
+
+# %% covariance [markdown]
+# ## How sure are we?
+#
+# Noise in $b$ with covariance $\sigma^2 I$ reaches $x = (A^\top A)^{-1}A^\top b$ as $\operatorname{cov}(x) = \sigma^2 (A^\top A)^{-1}$, and $\sigma$ is estimated from the residuals. Here residual and
+# geometry meet: $\sigma$ says how well the poses agree, $(A^\top A)^{-1}$ how much that agreement is worth.
+
+# %% pivot_covariance
+@ex.pivot_covariance
+def pivot_covariance(A, residuals):
+    """Return the covariance of x, shape (6, 6), from A of shape (3n, 6) and residuals of shape (n, 3)."""
+    ### BEGIN SOLUTION
+    r = residuals.ravel()
+    return r @ r / (len(r) - 6) * np.linalg.inv(A.T @ A)
+    ### END SOLUTION
+
+
+# %% tip-with-its-uncertainty
+cov = pivot_covariance(A, residuals)
+print("tip", x[:3].round(2), "+-", np.sqrt(np.diag(cov))[:3].round(2), "mm; the sheet prints six decimals")
+for half_angle_deg in (5, 10, 20, 45):
+    R = pivot.cone(12, np.deg2rad(half_angle_deg))
+    worst = np.sqrt(np.linalg.eigvalsh(pivot.predicted_covariance(R, x[:3], 0.0, std)[:3, :3]).max())
+    poses_needed = np.ceil(12 * (worst / 0.1) ** 2)
+    print(f"0.1 mm in the worst direction, cone {half_angle_deg:2} deg: about {poses_needed:4.0f} poses")
+
+# %% break-it [markdown]
+# ## Break it
+#
+# Spin only. The workbook's `calibrate_pivot` refuses, and names the direction. The decision is *relative*, so meters in place of millimeters change nothing. Then add orientation noise: now
+# every pose seems a little tilted, and the matrix looks healthy. Only who knows the size of that noise can tell.
+
+# %% break-it-code
+spin = pivot.cone(40, 0.0, turns=1)
+exact = pivot.touching_poses(spin, tip, np.zeros(3))
+noisy = pivot.touching_poses(spin, tip, np.zeros(3), np.deg2rad(0.2), 0.1, np.random.default_rng(1))
+known = {"std_rot": np.deg2rad(0.2), "std_trans": 0.1}
+for words, T, noise in (("exact", exact, {}), ("noisy", noisy, {}), ("noise known", noisy, known)):
+    try:
+        result = pivot.calibrate_pivot(T, **noise)
+        error = np.linalg.norm(result.tip - tip)
+        print(f"{words}: accepted, s0 = {result.s0:.2f} mm, and the tip is off by {error:.0f} mm")
+    except ValueError as refusal:
+        print(f"{words}: {refusal}")
+
+# %% beyond [markdown]
+# ## Beyond the document: bad poses
+#
+# One slip of the tip, one pose read while the robot still moved: squares listen to the loudest. A robust estimate asks which poses *agree*, and weighs each by its distance $d$ from them.
+# Tukey's weights are $w = (1 - q^2)^2$ with $q = d / (7\,\sigma)$, and exactly 0 for $q > 1$. Least squares with these weights is repeated until it settles. It needs a start that no bad pose
+# can spoil: the best of a hundred solutions from three poses each.
+
+# %% robust_weights
+@ex.robust_weights
+def robust_weights(distances, scale):
+    """Return Tukey's weights, shape (n,), with the cutoff at 7 scales."""
+    ### BEGIN SOLUTION
+    q = distances / (7 * scale)
+    return np.where(q < 1, (1 - q**2) ** 2, 0.0)
+    ### END SOLUTION
+
+
+# %% predict-outliers
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "about a millimeter"
+### END SOLUTION
+ex.predict("outliers", guess, reveal=stages.outliers)
+
+# %% weights-for-orientation [markdown]
+# Orientation noise is the second flaw of equation (1): a turn of the flange shakes the tip *across* the lever, not along it. So the components of a residual are not equally good.
+# `calibrate_pivot(T, std_rot, std_trans)` weighs them. The yardstick is the Cramér-Rao bound: no unbiased method does better.
+
+# %% against-the-bound
+rng, tip, squares = np.random.default_rng(3), np.array([12.0, -8.0, 150.0]), {}
+R, noise = exp_so3(rng.uniform(-0.6, 0.6, (50, 3))), {"std_rot": np.deg2rad(0.3), "std_trans": 0.1}
+for _ in range(200):
+    good = pivot.touching_poses(R, tip, np.zeros(3), **noise, rng=rng)
+    bad = good.copy()
+    bad[:5, :3, 3] += 30 * rng.normal(size=(5, 3))
+    cases = {"plain": (good, {}), "weighted": (good, noise), "plain, 10 % bad poses": (bad, {})}
+    cases["robust and weighted, 10 % bad poses"] = (bad, {**noise, "robust": True})
+    for words, (T, options) in cases.items():
+        error = pivot.calibrate_pivot(T, **options).tip - tip
+        squares.setdefault(words, []).append(error @ error)
+bound = np.sqrt(np.trace(pivot.predicted_covariance(R, tip, **noise)[:3, :3]))
+for words, values in squares.items():
+    print(f"{words:36} {np.sqrt(np.mean(values)):5.2f} mm = {np.sqrt(np.mean(values)) / bound:5.2f} x bound")
+
+# %% in-practice [markdown]
+# ## In practice
+#
+# - Tilt as far as the cell allows, in all directions. Twelve poses on a wide cone beat sixty on a narrow one.
+# - Leading the tilted tool around by turning the robot's base alone is one axis again, the vertical one: it looks like a cone and is a spin.
+# - Look at the singular values before you move, at the covariance afterwards, and at the residual last.
+# - Keep a few poses out of the calibration and test the tip on them. On its own poses every result looks good.
+# - Say which number you quote: distance or coordinate, divided by what.
+
+# %% questions [markdown]
+# ## Three questions, to answer in words
+#
+# 1. A colleague proudly shows $s_0 = 0.02$ mm from eighty poses. Which single question do you ask?
+# 2. The tool points along $z$ of the flange and you only need the direction of the shaft, not its length. Is spinning enough?
+# 3. Why does the covariance not warn you when one pose in twelve is grossly wrong, and what in the residuals would?
+
+# %% progress
+ex.progress()

@@ -1,0 +1,352 @@
+# %% title [markdown]
+# # 7 · Lateration and dead reckoning
+#
+# **What you will do.** Find a robot from its distances to landmarks, drive one by counting wheel turns, and compute how its uncertainty grows.
+#
+# **What you will learn.** Why two circles give two answers, why geometry can matter more than the sensor, what the time step does to a motion model, and why
+# odometry that errs by millimeters a meter is lost after a hall's length.
+#
+# **What you need.** Derivatives, matrices, covariances; chapter 4 helps with Newton. About 80 minutes.
+
+# %% notation [markdown]
+# | letter | meaning |
+# | --- | --- |
+# | $x = (x, y, \theta)$ | pose of the robot in the plane (m, m, rad); $\theta$ grows to the left |
+# | $u = (v, \omega)$ | control: speed (m/s) and turn rate (rad/s), held for the time step $T$ (s) |
+# | $\Sigma_x$, $\Sigma_u$ | covariances of pose and control, shapes (3, 3) and (2, 2) |
+# | $F_x$, $F_u$ | derivatives of one step by pose and control |
+# | ICR | instantaneous center of rotation, where the wheel axes meet |
+
+# %% setup
+import numpy as np
+
+from labkit import gaussian, lateration, odometry
+from labkit.course import course
+from labkit.widgets import lateration as circle_stages
+from labkit.widgets import odometry as drive_stages
+
+ex = course("07-dead-reckoning")
+np.set_printoptions(precision=4, suppress=True)
+
+# %% the-question [markdown]
+# ## The question
+#
+# A robot drives through a hall. **Where is it?** The lecture *Lokalisierung* sorts the task (page "Varianten"): tracking from a known start, finding
+# oneself anywhere, and surviving being carried off. Some sensors look inward (wheel counters, gyroscopes), some outward (lasers, cameras). Its table
+# "Übersicht über Lokalisierungsverfahren" then names four methods. Decide first; then change task, sensors and map, and see which rows stay black.
+
+# %% predict-method
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "none of them"
+### END SOLUTION
+ex.predict("method", guess, reveal=circle_stages.methods)
+
+# %% lateration [markdown]
+# ## Lateration: distances to landmarks
+#
+# Let landmark $i$ stand at $l_i$, and let the sensor measure the distance $d_i$. The robot lies on a circle about each landmark. The lecture
+# ("Algorithmus für 2D-Lateration") writes it as a search for zeros:
+#
+# $$f_i(x) = |l_i - x|^2 - d_i^2 = 0 .$$
+
+# %% lateration_residual
+@ex.lateration_residual
+def lateration_residual(landmarks, distances, position):
+    """Return f, shape (n,) in m^2, for landmarks (n, 2), distances (n,) and a position (2,)."""
+    ### BEGIN SOLUTION
+    return ((landmarks - position) ** 2).sum(axis=1) - distances**2
+    ### END SOLUTION
+
+
+# %% newton [markdown]
+# Newton's method replaces $f$ by its tangent planes, goes to where they vanish, and starts again from there:
+# $J\,\Delta = -f$, $x \leftarrow x + \Delta$. Row $i$ of $J$ is $2\,(x - l_i)^\top$.
+
+# %% newton_lateration
+@ex.newton_lateration
+def newton_lateration(landmarks, distances, start):
+    """Return the position, shape (2,), that Newton's method finds from `start` (2,), with landmarks (2, 2)."""
+    ### BEGIN SOLUTION
+    position = np.array(start, dtype=float)
+    for _ in range(20):
+        J = 2 * (position - landmarks)
+        position = position - np.linalg.solve(J, lateration_residual(landmarks, distances, position))
+    return position
+    ### END SOLUTION
+
+
+# %% geometry [markdown]
+# ## Two circles, and a third
+#
+# Drag landmarks, robot and the start of the search. The dashed ellipse holds 95 % of what any unbiased method can promise; the dotted line is the
+# direction the distances see worst. Then press *Make it fail* and look at the singular values: they know of the trouble before the estimate does.
+
+# %% predict-roots
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "two"
+### END SOLUTION
+ex.predict("roots", guess, reveal=circle_stages.circles)
+
+# %% two-costs [markdown]
+# ## Which squares?
+#
+# With more landmarks the circles no longer meet in one point. The lecture ("Least-Square-Verfahren") then minimizes $\sum (|l_i - x|^2 - d_i^2)^2$.
+# But the sensor errs in the *distance* by $e$, and $d^2$ errs by about $2\,d\,e$: far landmarks are heard louder. Maximum likelihood for equal noise minimizes
+# $\sum (|l_i - x| - d_i)^2$ instead. Four landmarks, one of them near, 20,000 measurements with a poor sensor.
+# Mind what the bias does and what the spread does.
+
+# %% two-costs-compared
+landmarks = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
+robot, std = np.array([8.0, 8.0]), 0.5
+true = np.linalg.norm(landmarks - robot, axis=1)
+measured = true + std * np.random.default_rng(1).standard_normal((20_000, 4))
+bound = np.sqrt(np.trace(std**2 * lateration.dilution(landmarks, robot)))
+for name, cost in (("squares, as in the lecture", "squares"), ("distances", "distance")):
+    off = lateration.laterate(landmarks, measured, cost=cost).position - robot
+    bias, spread = 1000 * np.linalg.norm(off.mean(0)), 1000 * np.sqrt((off**2).sum(1).mean())
+    print(f"{name:27} bias {bias:3.0f} mm, RMS {spread:3.0f} mm, {spread / 1000 / bound:.2f} times the bound")
+
+# %% wheels [markdown]
+# ## Dead reckoning (*Koppelnavigation*)
+#
+# No landmark in sight: add up what the wheels report. For a differential drive with track width $l$, $v = (v_R + v_L)/2$ and
+# $\omega = (v_R - v_L)/l$ ("Wiederholung Differentialantrieb").
+
+# %% wheel_to_twist
+@ex.wheel_to_twist
+def wheel_to_twist(v_left, v_right, track):
+    """Return u = (v, omega), shape (2,), from the wheel speeds (m/s) and the track width (m)."""
+    ### BEGIN SOLUTION
+    return np.array([(v_right + v_left) / 2, (v_right - v_left) / track])
+    ### END SOLUTION
+
+
+# %% three-models [markdown]
+# ## Three ways to take a step
+#
+# During $T$ the robot drives an arc. The *simplified* model goes straight along the old heading; the *midpoint* model along $\theta + \omega T/2$. The
+# *arc* is exact: the robot turns about the ICR by $\omega T = 2h$. The chord of that arc points along $\theta + h$, and its length is
+# $v T \sin(h)/h$. Write it so that driving straight on needs no division by zero.
+
+# %% step_euler
+@ex.step_euler
+def step_euler(x, u, dt):
+    """Return the pose (x, y, theta) after one step of the simplified model; x (3,), u = (v, omega), dt in s."""
+    ### BEGIN SOLUTION
+    return np.array([x[0] + u[0] * dt * np.cos(x[2]), x[1] + u[0] * dt * np.sin(x[2]), x[2] + u[1] * dt])
+    ### END SOLUTION
+
+
+# %% step_midpoint
+@ex.step_midpoint
+def step_midpoint(x, u, dt):
+    """Return the pose (x, y, theta) after one step along the heading of half the turn."""
+    ### BEGIN SOLUTION
+    direction = x[2] + u[1] * dt / 2
+    return np.array([x[0] + u[0] * dt * np.cos(direction), x[1] + u[0] * dt * np.sin(direction), x[2] + u[1] * dt])
+    ### END SOLUTION
+
+
+# %% step_arc
+@ex.step_arc
+def step_arc(x, u, dt):
+    """Return the pose (x, y, theta) after driving the exact arc; omega may be 0."""
+    ### BEGIN SOLUTION
+    half_turn = u[1] * dt / 2
+    chord = u[0] * dt * np.sinc(half_turn / np.pi)
+    direction = x[2] + half_turn
+    return np.array([x[0] + chord * np.cos(direction), x[1] + chord * np.sin(direction), x[2] + u[1] * dt])
+    ### END SOLUTION
+
+
+# %% predict-order
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "it becomes a quarter"
+### END SOLUTION
+ex.predict("order", guess, reveal=drive_stages.models)
+
+# %% propagation [markdown]
+# ## How uncertainty travels
+#
+# A small error of the pose before the step and a small error of the control both end in the new pose. To first order
+# ("Fehlerfortpflanzung bei Koppelnavigation (2)"):
+#
+# $$\Sigma_{x'} = F_x \Sigma_x F_x^\top + F_u \Sigma_u F_u^\top .$$
+#
+# The lecture derives both Jacobians for the simplified model.
+
+# %% jacobian_state
+@ex.jacobian_state
+def jacobian_state(x, u, dt):
+    """Return F_x, shape (3, 3), of the simplified model."""
+    ### BEGIN SOLUTION
+    F_x = np.eye(3)
+    F_x[:2, 2] = -u[0] * dt * np.sin(x[2]), u[0] * dt * np.cos(x[2])
+    return F_x
+    ### END SOLUTION
+
+
+# %% jacobian_control
+@ex.jacobian_control
+def jacobian_control(x, u, dt):
+    """Return F_u, shape (3, 2), of the simplified model."""
+    ### BEGIN SOLUTION
+    return dt * np.array([[np.cos(x[2]), 0], [np.sin(x[2]), 0], [0, 1]])
+    ### END SOLUTION
+
+
+# %% control-noise [markdown]
+# ## How wrong are wheels?
+#
+# The lecture ("Fehlermodell für Steuerbefehl") counts variance per way: $k_d$ for the distance per meter, $k_\theta$ for the heading per turn, $k_\mathrm{drift}$ for the
+# heading per meter. A way $d = vT$ has the variance $k_d\,d$, so the speed $d/T$ has $k_d\,d/T^2$:
+#
+# $$\sigma_v^2 = \frac{k_d}{T}|v|, \qquad \sigma_\omega^2 = \frac{k_\theta}{T}|\omega| + \frac{k_\mathrm{drift}}{T}|v| .$$
+#
+# The absolute values are for reversing and for right turns.
+
+# %% control_covariance
+@ex.control_covariance
+def control_covariance(u, dt, k_d, k_theta, k_drift):
+    """Return the covariance of the control u = (v, omega), shape (2, 2)."""
+    ### BEGIN SOLUTION
+    v, omega = np.abs(u)
+    return np.diag([k_d * v / dt, (k_theta * omega + k_drift * v) / dt])
+    ### END SOLUTION
+
+
+# %% propagate
+@ex.propagate
+def propagate(x, cov, u, dt, cov_u):
+    """Return pose (3,) and covariance (3, 3) after one step of the simplified model; cov (3, 3), cov_u (2, 2)."""
+    ### BEGIN SOLUTION
+    F_x, F_u = jacobian_state(x, u, dt), jacobian_control(x, u, dt)
+    return step_euler(x, u, dt), F_x @ cov @ F_x.T + F_u @ cov_u @ F_u.T
+    ### END SOLUTION
+
+
+# %% drive [markdown]
+# ## Drive it
+#
+# Click the picture and use the arrow keys, or press play: that is the lecture's circle (page "Simulation"), 1 m/s and 24°/s in 140 steps of 0.1 s. Black is where
+# the robot really goes, purple what it believes. Watch which way the ellipses grow.
+
+# %% predict-spread
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "to the left or right"
+### END SOLUTION
+ex.predict("spread", guess, reveal=drive_stages.drive)
+
+# %% circle [markdown]
+# ## The circle in numbers
+#
+# The lecture prints the constants, $k_d = (0.02\,\mathrm{m})^2/1\,\mathrm{m}$, $k_\theta = (5°)^2/360°$ and $k_\mathrm{drift} = (2°)^2/1\,\mathrm{m}$, but not where the drive
+# ends. `odometry.circle_drive()` holds them in radians and meters: `drive.controls` (140, 2), `drive.dt`, and `drive.noise` with the three constants by name, to be passed on as `**drive.noise`.
+# Start at the origin with a covariance of zeros and take all steps. (They turn by 336°: the circle does not quite close.)
+
+# %% end_pose
+drive = odometry.circle_drive()
+end_pose = end_cov = ...  # your code here
+### BEGIN SOLUTION
+end_pose, end_cov = np.zeros(3), np.zeros((3, 3))
+for u in drive.controls:
+    cov_u = control_covariance(u, drive.dt, **drive.noise)
+    end_pose, end_cov = propagate(end_pose, end_cov, u, drive.dt, cov_u)
+### END SOLUTION
+end_pose = ex.end_pose(end_pose)
+
+# %% end_cov [markdown]
+# The same loop gives the covariance. Hand it in as well.
+
+# %% end_cov-code
+covariance = ...  # your code here
+### BEGIN SOLUTION
+covariance = end_cov
+### END SOLUTION
+covariance = ex.end_cov(covariance)
+
+# %% what-k-means [markdown]
+# ## What $k_d$ is, and what it is not
+#
+# $k_d$ has the unit m²/m. That is why it survives a change of the time step: cut the same 14 s into other steps and the end stays as uncertain. A speed noise that
+# is *constant per step*, a frequent shortcut, promises more the finer you cut. Compare the heading, and mind the last column.
+
+# %% what-k-means-code
+for dt in (0.5, 0.1, 0.02):
+    cut = odometry.circle_drive(dt)
+    poses, covs = odometry.drive_with_covariance(np.zeros(3), np.zeros((3, 3)), cut.controls, dt, **cut.noise)
+    fixed = control_covariance(cut.controls[0], 0.1, **cut.noise)
+    wrong = np.sqrt(len(cut.controls) * dt**2 * fixed[1, 1])
+    position, heading = np.sqrt(np.trace(covs[-1][:2, :2])), np.degrees(np.sqrt(covs[-1][2, 2]))
+    print(f"T = {dt:4} s: position {position:.3f} m, heading {heading:.2f} deg; shortcut {np.degrees(wrong):5.2f} deg")
+
+# %% banana [markdown]
+# ## Where the Gaussian lies
+#
+# The ellipse is a first-order promise. Let 1500 robots with the same commands and their own noise drive, and look where they end.
+
+# %% predict-banana
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "fewer"
+### END SOLUTION
+ex.predict("banana", guess, reveal=drive_stages.banana)
+
+# %% bend [markdown]
+# ## Beyond the document: bend the Gaussian
+#
+# Switch the region to *bent*. The same ends, written as the constant control that would lead from the computed pose to each of them
+# (their exponential coordinates), are close to normal; carried back to the floor, their ellipse bends. Nothing about the robot changed, only the coordinates in which we call
+# it Gaussian. The check with 10,000 runs of the lecture's noise, 14 m straight on:
+
+# %% bend-code
+controls = drive.controls * [1.0, 0.0]
+poses, covs = odometry.drive_with_covariance(np.zeros(3), np.zeros((3, 3)), controls, drive.dt, **drive.noise)
+rng = np.random.default_rng(5)
+ends = odometry.sample_drives(np.zeros(3), controls, drive.dt, **drive.noise, rng=rng, runs=10_000)[-1]
+_, center, spread = drive_stages.bent_region(poses[-1], ends)
+twists = odometry.log_pose(odometry.relative_pose(poses[-1], ends))
+print(f"inside the 95 % ellipse:      {100 * gaussian.share_inside(ends, poses[-1], covs[-1]):.0f} %")
+print(f"inside the 95 % bent region:  {100 * gaussian.share_inside(twists, center, spread):.0f} %")
+print(f"mean of the ends lags behind: {100 * (poses[-1] - ends.mean(0))[0]:.0f} cm")
+
+# %% break-it [markdown]
+# ## Break it
+#
+# Start Newton on the line through both landmarks: both rows of $J$ point the same way, and no step leads off the line. A millimeter aside is enough. And what if
+# the circles do not meet at all?
+
+# %% break-it-code
+pair, robot = np.array([[0.0, 0.0], [6.0, 0.0]]), np.array([3.0, 2.0])
+distances = np.linalg.norm(pair - robot, axis=1)
+for start in ([4.0, 0.0], [4.0, 0.001], [4.0, -0.001]):
+    search = lateration.newton(pair, distances, start)
+    print(f"from {start}: {search.position} after {len(search.path) - 1} steps. {search.reason}")
+print(lateration.newton(pair, [1.0, 1.0], [3.0, 1.0]).reason)
+try:
+    lateration.laterate(pair, distances)
+except ValueError as refusal:
+    print(refusal)
+
+# %% in-practice [markdown]
+# ## In practice
+#
+# - Place landmarks so that lines of sight cross at right angles. Check singular values before you buy a better sensor.
+# - Give the search the last known position as its start: the mirror image is never far.
+# - Use the midpoint model or the arc. They cost one multiplication more.
+# - Measure $k_d$, $k_\theta$ and $k_\mathrm{drift}$ by driving a long straight line and many turns on the spot, not from the data sheet.
+# - Never trust odometry without an outside measurement. How to add one is chapter 8.
+
+# %% questions [markdown]
+# ## Three questions, to answer in words
+#
+# 1. Two robots have the same sensor. One stands in the middle of four landmarks, one far outside. Whose position is better, and in which direction is the other's bad?
+# 2. Wheel A is 1 % larger than wheel B. Is the error model of the lecture the right one for this? What would you see in the ellipses, and what in reality?
+# 3. The covariance says "ellipse", the samples say "banana". Which of the two would you hand to a filter that comes next, and what would you watch?
+
+# %% progress
+ex.progress()

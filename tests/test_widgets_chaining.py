@@ -1,0 +1,79 @@
+"""Stages of chapter 2: what they compute, against closed forms and the library; each draws, fails, recovers."""
+
+import numpy as np
+import pytest
+
+from labkit import chaining
+from labkit.widgets import chaining as w
+
+
+@pytest.mark.parametrize("make", [w.order_of_product, w.open_loop, w.growth, w.two_loops])
+def test_draws_fails_and_recovers(make):
+    stage = make()
+    before = stage.png()
+    stage.make_it_fail()
+    assert stage.png() != before and stage.status == ""
+    stage.reset()
+    assert stage.png() == before
+    assert repr(stage) == repr(make()) and stage.caption
+
+
+def order(a, b, a_deg, b_deg):
+    return w.compute_order({"A": np.array(a), "B": np.array(b), "A_deg": a_deg, "B_deg": b_deg})
+
+
+def test_order_of_product():
+    result = order((100.0, 0.0), (0.0, 50.0), 90.0, 0.0)
+    assert result["AB"][:2, 3] == pytest.approx([50, 0])  # B is a step along the new y axis, which points to -x
+    assert result["BA"][:2, 3] == pytest.approx([100, 50])
+    assert result["gap"] == pytest.approx(np.hypot(50, 50))
+    assert order((100.0, 0.0), (0.0, 50.0), 0.0, 0.0)["gap"] == pytest.approx(0, abs=1e-12)
+
+
+def loop(link, turn_deg, **places):
+    _, origins = w._sheet_angles()
+    state = {f"K{k}": origins[k] for k in (1, 2, 3)} | {"P": np.array([200.0, 100.0])}
+    return w.compute_open_loop({**state, **places, "link": link, "turn_deg": turn_deg})
+
+
+def test_open_loop_opens_by_the_turn_times_the_lever():
+    for link in (1, 2, 3, 4):
+        result = loop(link, 2.0)
+        chord = 2 * np.sin(np.deg2rad(1.0)) * result["lever"]
+        assert result["distance"] == pytest.approx(chord, abs=1e-9)
+        assert result["angle_deg"] == pytest.approx(2.0)
+    assert loop(4, 2.0)["distance"] == pytest.approx(0, abs=1e-9)
+    closed = loop(2, 0.0)
+    assert closed["distance"] == pytest.approx(0, abs=1e-9) and closed["at_piece"] == pytest.approx(0, abs=1e-9)
+
+
+def test_open_loop_at_the_work_piece():
+    result = loop(1, 3.0, P=np.array([-80.0, 90.0]))
+    assert np.linalg.norm(result["piece"][:, 0] - result["piece"][:, 1]) == pytest.approx(result["at_piece"])
+
+
+@pytest.mark.parametrize("layout", ["row", "loop"])
+def test_growth_agrees_with_its_law(layout):
+    result = w.compute_growth({"n": 20, "std_rot_deg": 0.1, "layout": layout})
+    laws = [
+        chaining.expected_closure(w._layout(layout, int(n))[0], np.deg2rad(0.1), w.STD_TRANS)[1]
+        for n in result["numbers"]
+    ]
+    np.testing.assert_allclose(result["found"], laws, rtol=0.2)  # a hundred runs
+    assert result["expected"] == pytest.approx(laws[list(result["numbers"]).index(20)])
+    assert result["here"] == pytest.approx(result["found"][list(result["numbers"]).index(20)])
+
+
+def test_growth_exponents():
+    result = w.compute_growth({"n": 8, "std_rot_deg": 1.0, "layout": "row"})
+    row, ring = (result["laws"][name] for name in ("row", "loop"))
+    assert np.log2(row[-1] / row[-2]) == pytest.approx(1.5, abs=0.03)
+    assert np.log2(ring[-1] / ring[-2]) == pytest.approx(0.5, abs=0.03)
+
+
+def test_two_loops_only_the_graph_closes_both():
+    for run in range(1, 6):
+        left = w.compute_two_loops({"run": run, "std_rot_deg": 0.2})["left"]
+        assert left["graph"] == pytest.approx([0, 0], abs=1e-6)
+        assert left["A, then B"][1] == pytest.approx(0, abs=1e-6) and left["A, then B"][0] > 0.05
+        assert left["B, then A"][0] == pytest.approx(0, abs=1e-6) and left["B, then A"][1] > 0.05
