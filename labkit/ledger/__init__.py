@@ -124,6 +124,15 @@ def compute(row):
     return computed.at(tuple(map(int, match["index"].split(",")))) if match["index"] else computed
 
 
+def chapter_of(row):
+    """Name of the notebook that a row belongs to, as in "01_frames", from the module that computes it."""
+    _load_chapters()
+    base = _ENTRY.fullmatch(row.id)["base"]
+    if base not in _functions:
+        raise KeyError(f"no function computes the ledger id {base!r}; register one in labkit/ledger with @computes")
+    return _functions[base].__wrapped__.__module__.rpartition(".ch")[2]
+
+
 def half_unit(printed):
     """Half a unit in the last printed digit: the most that rounding the printed number itself can hide.
 

@@ -184,7 +184,7 @@ def latencies(page, output, events):
         page.mouse.down()
         collect("drag", lambda k: page.mouse.move(x + 3 * (k % 5), y - 2 * (k % 7)))
         page.mouse.up()
-    slider = output.locator(".noUi-handle").first
+    slider = output.locator(".noUi-target:not([disabled]) .noUi-handle").first
     if slider.count():
         slider.focus()
         collect("slider", lambda k: page.keyboard.press(("ArrowLeft", "ArrowRight")[k % 2]))

@@ -1,0 +1,825 @@
+"""Chapter 9: particles, maps, resampling, recovery, and four bugs to hunt."""
+
+import functools
+import math
+
+import numpy as np
+
+from .. import maps, museum, odometry, particles
+from . import metrics
+from .engine import Chapter, Exercise, Mistake, Prediction, Value
+
+R_MAX = 18.0
+
+
+@functools.cache
+def building():
+    """The chapter's building, read once."""
+    return maps.load_building()
+
+
+# Draws ---------------------------------------------------------------------------------------------------------------
+
+
+def scan_at_a_pose(rng):
+    """grid, pose near the truth, ranges, bearings, std; all end points lie on the map, whatever the heading."""
+    grid = building().grid
+    pose = np.array([rng.uniform(5, 12), rng.uniform(4.6, 5.3), rng.uniform(-3, 3)])
+    bearings = np.linspace(-2.3, 2.3, 12)
+    ranges = grid.cast(pose, bearings, R_MAX).astype(float)
+    near = pose + rng.normal(0, (0.05, 0.05, 0.03))
+    short = np.clip(ranges - 0.3, 0.05, 3.5)
+    return grid, near, short, bearings, float(rng.uniform(0.15, 0.4))
+
+
+def landmarks_at_a_pose(rng):
+    """pose, z, landmarks, both standard deviations; one bearing in three lies across the seam at 180 deg."""
+    pose = np.array([*rng.uniform(-2, 2, 2), rng.uniform(-3, 3)])
+    phi = np.array([math.pi - 0.02, rng.uniform(-2, 2), rng.uniform(-2, 2)])
+    r = rng.uniform(2, 6, 3)
+    angle = pose[2] + phi
+    landmarks = pose[:2] + r[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    z = np.column_stack([r + 0.1 * rng.normal(size=3), odometry.wrap_angle(phi + (0.05, *0.03 * rng.normal(size=2)))])
+    return pose, z, landmarks, float(rng.uniform(0.15, 0.4)), float(rng.uniform(0.03, 0.08))
+
+
+def beams_at_a_pose(rng):
+    """Measured and expected ranges, std."""
+    expected = rng.uniform(1, 10, 20)
+    return expected + 0.2 * rng.normal(size=20), expected, float(rng.uniform(0.15, 0.4))
+
+
+def plain_ray(rng):
+    """grid, pose, bearing, r_max of a ray that meets a wall squarely enough for any way of stepping along it."""
+    grid = building().grid
+    while True:
+        pose, bearing = particles.uniform_states(grid, 1, rng)[0], rng.uniform(-2, 2)
+        around = [maps.walk_ray(grid, pose, bearing + d, R_MAX) for d in (-0.02, -0.01, 0.0, 0.01, 0.02)]
+        if np.ptp(around) < 0.12 * around[2] and np.ptp(around) < 0.25 and around[2] > 1.0:
+            return grid, pose, bearing, 0.6 * around[2] if rng.random() < 0.5 else R_MAX
+
+
+def motion(rng):
+    """states, u, dt, standard deviations of v and omega, rng."""
+    states = np.column_stack([rng.uniform(-5, 5, (6, 2)), rng.uniform(-3, 3, 6)])
+    return states, np.array([0.8, 0.4]), 0.5, np.array([0.2, 0.3]), np.random.default_rng(rng.integers(2**32))
+
+
+def wheel(rng):
+    """weights that add up to 1, and an rng."""
+    w = rng.exponential(size=12) ** 2
+    return w / w.sum(), np.random.default_rng(rng.integers(2**32))
+
+
+def cloud_weights(rng):
+    """Weights of any sum."""
+    return (rng.exponential(size=30) ** rng.uniform(0.2, 3) * 50 ** rng.uniform(-1, 1),)
+
+
+def averages(rng):
+    """w_mean, w_slow, w_fast, alpha_slow, alpha_fast: a drop as often as a rise."""
+    slow = rng.uniform(0.2, 0.8)
+    return slow * rng.uniform(0.1, 1.9), slow, slow * rng.uniform(0.6, 1.2), 0.05, 0.3
+
+
+def headings(rng):
+    """angles about a direction near the seam, and weights."""
+    angles = odometry.wrap_angle(math.pi + rng.uniform(-0.3, 0.3) + 0.4 * rng.normal(size=20))
+    return angles, rng.exponential(size=20)
+
+
+# References that the library has in another form ---------------------------------------------------------------------
+
+
+def _normal_log(x, std):
+    return -0.5 * np.square(x / std) - np.log(std * math.sqrt(2 * math.pi))
+
+
+def _end_points(pose, ranges, bearings):
+    angle = pose[2] + bearings
+    return pose[:2] + ranges[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _field(grid, points, std):
+    return float(_normal_log(grid.distance[grid.cell_of(points)], std).sum())
+
+
+def distance_field_weight(grid, pose, ranges, bearings, std):
+    """log p of a scan: the sum of log N(0, std^2) over the distances of its end points from the nearest obstacle."""
+    return _field(grid, _end_points(pose, ranges, bearings), std)
+
+
+def landmark_weight(pose, z, landmarks, std_range, std_bearing):
+    """log p of ranges and bearings to known landmarks."""
+    return float(particles.weigh_landmarks(z, landmarks, std_range, std_bearing)(pose))
+
+
+def beam_weight(ranges, expected, std):
+    """log p of ranges, given the expected ones."""
+    return float(_normal_log(ranges - expected, std).sum())
+
+
+def sample_motion(states, u, dt, std_u, rng):
+    """Each particle moved by its own noisy copy of the control."""
+    return particles.sample_motion(states, u, dt, rng, cov_u=np.diag(np.square(std_u)))
+
+
+def resample_roulette(weights, rng):
+    """Indices by independent spins."""
+    return particles.resample_roulette(weights, rng)
+
+
+def resample_systematic(weights, rng):
+    """Indices by one turn of the spoke wheel."""
+    return particles.resample_systematic(weights, rng)
+
+
+def should_resample(weights, threshold):
+    """True when the effective size is below threshold times M."""
+    return particles.should_resample(weights, threshold)
+
+
+def circular_mean(angles, weights):
+    """Weighted mean direction."""
+    return particles.circular_mean(angles, weights)
+
+
+def recover(w_mean, w_slow, w_fast, alpha_slow, alpha_fast):
+    """Share of random particles, and both averages brought up to date."""
+    return particles.recover(w_mean, w_slow, w_fast, alpha_slow, alpha_fast)
+
+
+# Wrong variants ------------------------------------------------------------------------------------------------------
+
+
+def _landmarks(wrap=True, turn=True, swap=False, square=False, log=True, peak=True):
+    def variant(pose, z, landmarks, std_range, std_bearing):
+        dx, dy = (landmarks - pose[:2]).T
+        bearing = np.arctan2(dx, dy) if swap else np.arctan2(dy, dx)
+        error = z[:, 1] - bearing + (pose[2] if turn else 0)
+        error = odometry.wrap_angle(error) if wrap else error
+        stds = (std_range**2, std_bearing**2) if square else (std_range, std_bearing)
+        terms = _normal_log(z[:, 0] - np.hypot(dx, dy), stds[0]) + _normal_log(error, stds[1])
+        total = terms.sum() if peak else terms.sum() + len(z) * np.log(2 * math.pi * stds[0] * stds[1])
+        return float(total if log else np.exp(total))
+
+    return variant
+
+
+def _field_world(grid, pose, ranges, bearings, std):
+    return _field(grid, _end_points(np.array([*pose[:2], 0.0]), ranges, bearings), std)
+
+
+def _field_origin(grid, pose, ranges, bearings, std):
+    return _field(grid, _end_points(np.array([0.0, 0.0, pose[2]]), ranges, bearings), std)
+
+
+def _field_cells(grid, pose, ranges, bearings, std):
+    d = grid.distance[grid.cell_of(_end_points(pose, ranges, bearings))] / grid.resolution
+    return float(_normal_log(d, std).sum())
+
+
+def _field_mean(grid, pose, ranges, bearings, std):
+    return distance_field_weight(grid, pose, ranges, bearings, std) / len(ranges)
+
+
+def _field_probability(grid, pose, ranges, bearings, std):
+    return math.exp(distance_field_weight(grid, pose, ranges, bearings, std))
+
+
+def _field_no_peak(grid, pose, ranges, bearings, std):
+    d = grid.distance[grid.cell_of(_end_points(pose, ranges, bearings))]
+    return float((-0.5 * np.square(d / std)).sum())
+
+
+def _ray_in_cells(grid, pose, bearing, r_max):
+    return maps.walk_ray(grid, pose, bearing, r_max) / grid.resolution
+
+
+def _ray_without_heading(grid, pose, bearing, r_max):
+    return maps.walk_ray(grid, np.array([*pose[:2], 0.0]), bearing, r_max)
+
+
+def _ray_without_bearing(grid, pose, bearing, r_max):
+    return maps.walk_ray(grid, pose, 0.0, r_max)
+
+
+def _ray_without_end(grid, pose, bearing, r_max):
+    return maps.walk_ray(grid, pose, bearing, 1000.0)
+
+
+def _ray_reversed(grid, pose, bearing, r_max):
+    return maps.walk_ray(grid, pose, -bearing, r_max)
+
+
+def _motion(std=lambda s: s, shared=False, on_pose=False, none=False):
+    def variant(states, u, dt, std_u, rng):
+        if on_pose:
+            return odometry.step(states, u, dt) + rng.standard_normal(states.shape) * (*std_u, std_u[1])
+        noise = rng.standard_normal((1 if shared else len(states), 2)) * (0 if none else std(np.asarray(std_u)))
+        return odometry.step(states, u + noise, dt)
+
+    return variant
+
+
+def _largest(weights, rng):
+    return np.full(len(weights), np.argmax(weights))
+
+
+def _uniform_choice(weights, rng):
+    return rng.integers(0, len(weights), len(weights))
+
+
+def _from_the_sum_of_squares(weights):
+    return 1 / np.square(weights).sum()
+
+
+def _draws(resample, weights, rng, runs):
+    """Share of the draws that each index gets over several runs; refuses what are no M valid indices."""
+    total = np.zeros(len(weights))
+    for _ in range(runs):
+        index = np.asarray(resample(weights.copy(), rng))
+        if index.shape != (len(weights),) or index.dtype.kind not in "iu":
+            return f"expected {len(weights)} whole numbers, got shape {index.shape} of {index.dtype}"
+        if index.min() < 0 or index.max() >= len(weights):
+            return f"an index {index.max()} came out of {len(weights)} particles"
+        total += np.bincount(index, minlength=len(weights))
+    return total / total.sum()
+
+
+def _valid(resample, rng):
+    found = _draws(resample, np.array([0.1, 0.7, 0.1, 0.1]), rng, 3)
+    return found + "." if isinstance(found, str) else None
+
+
+def _proportional(resample, rng):
+    for weights in (np.array([0.1, 0.7, 0.1, 0.1, 0.0]), np.array([0.5, 0.25, 0.15, 0.1]), np.array([3.0, 1.0])):
+        found, expected = _draws(resample, weights, rng, 800), weights / weights.sum()
+        if isinstance(found, str):
+            return found + "."
+        k = int(np.argmax(np.abs(found - expected)))
+        if abs(found[k] - expected[k]) > 0.06:
+            return (
+                f"with the weights {weights.tolist()} index {k} gets {100 * found[k]:.0f} % of the draws "
+                f"instead of {100 * expected[k]:.0f} %."
+            )
+    return None
+
+
+def _spins_are_independent(resample, rng):
+    weights = np.full(10, 0.1)
+    counts = np.array([np.bincount(resample(weights.copy(), rng), minlength=10) for _ in range(300)])
+    variance = float(counts.var(0).mean())
+    if variance < 0.6:
+        return (
+            f"the spins are not independent: a count varies by {variance:.2f} instead of 0.9 (variance of a binomial)."
+        )
+    return None
+
+
+def _spokes_are_even(resample, rng):
+    weights = np.array([0.05, 0.3, 0.15, 0.22, 0.28])
+    for _ in range(200):
+        counts = np.bincount(resample(weights.copy(), rng), minlength=5)
+        off = np.abs(counts - 5 * weights)
+        if off.max() >= 1 + 1e-9:
+            k = int(np.argmax(off))
+            return (
+                f"index {k} with M w = {5 * weights[k]:.2f} was drawn {counts[k]} times: evenly spaced spokes meet it "
+                "either the next lower or the next higher whole number of times."
+            )
+    return None
+
+
+def _equal_weights_stay(resample, rng):
+    if (np.sort(resample(np.full(8, 0.125), rng)) != np.arange(8)).any():
+        return "with equal weights every particle must come out exactly once."
+    return None
+
+
+def _survives_rounding(resample, rng):
+    for _ in range(30):
+        weights = rng.exponential(size=200).astype(np.float32)
+        index = resample(weights / weights.sum() * np.float32(0.999999), rng)
+        if np.max(index) >= 200 or len(index) != 200:
+            return "with weights whose sum is rounded below 1 an index beyond the last particle comes out."
+    return None
+
+
+def _noise_is_right(move, rng):
+    """Mean and spread of one step of 4000 particles against first-order propagation."""
+    states, u, std_u = np.zeros((4000, 3)), np.array([1.0, 0.0]), np.array([0.1, 0.2])
+    moved = np.asarray(move(states.copy(), u, 0.5, std_u, rng))
+    if moved.shape != states.shape:
+        return f"expected an array of shape (4000, 3), got {moved.shape}."
+    found = moved.std(0)
+    for name, amount, wanted in (("x", found[0], 0.05), ("theta", found[2], 0.1)):
+        if abs(amount - wanted) > 0.1 * wanted:
+            return f"4000 particles spread by {amount:.3f} in {name} after one step, expected {wanted:.3f}."
+    if np.abs(moved.mean(0) - (0.5, 0, 0)).max() > 0.01:
+        return f"on average the particles move by {np.round(moved.mean(0), 3).tolist()}, expected [0.5, 0, 0]."
+    return None
+
+
+def _noise_off_is_reckoning(move, rng):
+    states = np.array([[0.0, 0, 0], [1, 2, 1.5]])
+    moved = np.asarray(move(states.copy(), np.array([1.0, 0.5]), 0.2, np.zeros(2), rng))
+    if moved.shape != states.shape or np.abs(moved - odometry.step(states, (1.0, 0.5), 0.2)).max() > 1e-9:
+        return "without noise every particle must move as dead reckoning says (odometry.step)."
+    return None
+
+
+# The bug hunt --------------------------------------------------------------------------------------------------------
+
+
+def _stratified(weights, rng):
+    """A third correct way: one spin in each of M equal sectors."""
+    m = len(weights)
+    ends = np.cumsum(weights / np.sum(weights))
+    return np.minimum(np.searchsorted(ends, (np.arange(m) + rng.random(m)) / m, side="right"), m - 1)
+
+
+def _weights_multiplied(states, ranges, landmarks, std):
+    d = np.hypot(*np.moveaxis(landmarks - states[:, None, :2], -1, 0))
+    return particles.normalize((-0.5 * np.square((ranges - d) / std)).sum(1))
+
+
+GOOD = (particles.resample_roulette, particles.resample_systematic, _stratified)
+
+
+def _catches(specimen, good, extra=()):
+    """Properties of a property test: False for the specimen, True for what is correct."""
+
+    def rejects(test, rng):
+        verdict = test(specimen, *((rng,) if extra else ()))
+        if not isinstance(verdict, bool | np.bool_):
+            return f"a test answers True (passed) or False (caught), got {type(verdict).__name__}."
+        return "your test lets the specimen pass." if verdict else None
+
+    def accepts(function):
+        def check(test, rng):
+            if not test(function, *((rng,) if extra else ())):
+                name = function.__name__.strip("_").replace("resample_", "")
+                return f"your test also rejects a correct function ({name}): it asks for more than must hold."
+            return None
+
+        return check
+
+    return (rejects, *(accepts(function) for function in good))
+
+
+def hunt_1(resample, rng):
+    """True when indices are drawn in proportion to their weights."""
+    weights = np.array([0.1, 0.7, 0.1, 0.1])
+    index = np.concatenate([resample(weights, rng) for _ in range(1000)])
+    return bool(np.abs(np.bincount(index, minlength=4) / index.size - weights).max() < 0.05)
+
+
+def hunt_2(resample, rng):
+    """True when light particles get their share too."""
+    weights = np.array([0.5, 0.25, 0.05, 0.05, 0.03, 0.03, 0.03, 0.02, 0.02, 0.02])
+    index = np.concatenate([resample(weights, rng) for _ in range(1000)])
+    return bool(np.abs(np.bincount(index, minlength=10) / index.size - weights).max() < 0.05)
+
+
+def hunt_3(resample, rng):
+    """True when a sum of weights that is a little below 1 does no harm."""
+    weights = np.full(1000, 1e-3) * (1 - 1e-3)
+    try:
+        return bool(max(resample(weights, rng).max() for _ in range(20)) < 1000)
+    except IndexError:
+        return False
+
+
+def hunt_4(weigh):
+    """True when the same reading twice squares the ratio of two weights."""
+    states, landmark = np.array([[0.0, 0, 0], [0.3, 0, 0]]), np.array([[2.0, 0.0]])
+    once = weigh(states, np.array([2.0]), landmark, 0.3)
+    twice = weigh(states, np.array([2.0, 2.0]), np.repeat(landmark, 2, axis=0), 0.3)
+    return bool(np.isclose(twice[0] / twice[1], (once[0] / once[1]) ** 2))
+
+
+def _hunt(id, reference, specimen, hints, good=GOOD, extra=("rng",)):
+    return Exercise(
+        id,
+        reference=reference,
+        draw=lambda rng: (specimen, *((np.random.default_rng(rng.integers(2**32)),) if extra else ())),
+        properties=_catches(specimen, good, extra),
+        hints=hints,
+        mistakes=[
+            Mistake(
+                lambda *_: True, "Your test passes the specimen. Ask for something that only a correct function can do."
+            ),
+            Mistake(lambda *_: None, "Your test returned None: it has to return True (passed) or False (caught)."),
+        ],
+        draws=1,
+    )
+
+
+CHAPTER = Chapter(
+    "09-monte-carlo",
+    title="Monte-Carlo localization",
+    items=[
+        Prediction(
+            "corridor",
+            question="Three equal doors, and the sensor says: door. Where do the particles go?",
+            choices=("to the nearest door", "to all three doors alike", "nowhere, one look says nothing"),
+            answer="to all three doors alike",
+            why="One look cannot tell equal doors apart: three clouds. The move between two looks carries them to different walls, and "
+            "only one cloud meets a door again.",
+        ),
+        Exercise(
+            "sample_motion",
+            reference=sample_motion,
+            draw=motion,
+            properties=(_noise_off_is_reckoning, _noise_is_right),
+            hints=(
+                "The noise belongs to the control, not to the pose, and each particle gets its own.",
+                "Draw one pair of standard normal numbers a particle, scale them by std_u, and add them to u.",
+                "noisy = u + std_u * rng.standard_normal((len(states), 2)); return odometry.step(states, noisy, dt).",
+            ),
+            mistakes=[
+                Mistake(
+                    _motion(none=True),
+                    "All particles moved as dead reckoning says: the noise is missing, so the cloud cannot spread.",
+                ),
+                Mistake(
+                    _motion(shared=True),
+                    "All particles got the same noise: the cloud moves as one block. Draw a pair for each particle.",
+                ),
+                Mistake(
+                    _motion(np.square), "You scaled the noise by the variance. std_u is the standard deviation already."
+                ),
+                Mistake(_motion(np.sqrt), "You took the root of std_u. It is a standard deviation, not a variance."),
+                Mistake(
+                    _motion(on_pose=True),
+                    "You added the noise to the pose. Then a robot could slip sideways. The noise belongs to the control.",
+                ),
+            ],
+            draws=3,
+        ),
+        Exercise(
+            "landmark_weight",
+            reference=landmark_weight,
+            draw=landmarks_at_a_pose,
+            metric=metrics.numbers(1e-8),
+            hints=(
+                "What range and what bearing would a robot at this pose expect? Compare them with z.",
+                "The bearing is atan2(dy, dx) - theta. Wrap the *difference*, then add the logarithms of both normal densities.",
+                "log N = -0.5 * (error / std)**2 - np.log(std * np.sqrt(2 * np.pi)), summed over ranges and bearings.",
+            ),
+            mistakes=[
+                Mistake(
+                    _landmarks(wrap=False),
+                    "A bearing difference near 360 deg counted as a large error. Wrap the difference to [-pi, pi).",
+                ),
+                Mistake(
+                    _landmarks(turn=False), "The heading is missing: a bearing is relative to where the robot looks."
+                ),
+                Mistake(_landmarks(swap=True), "atan2 takes the y difference first: np.arctan2(dy, dx)."),
+                Mistake(
+                    _landmarks(square=True),
+                    "You used the variances as standard deviations: N(0, std^2) divides the error by std.",
+                ),
+                Mistake(
+                    _landmarks(log=False),
+                    "This is the product itself. Return its logarithm, the sum of the logarithms.",
+                ),
+                Mistake(
+                    _landmarks(peak=False),
+                    "The factor 1 / (std sqrt(2 pi)) of each density is missing. It cancels among particles, but p needs it.",
+                ),
+            ],
+        ),
+        Value(
+            "beams_to_zero",
+            reference=lambda: 162,
+            rtol=0,
+            atol=0.5,
+            hints=(
+                "The smallest number above zero that float64 knows is about 4.9e-324.",
+                "0.01 to the power n falls below half of it. Solve for n.",
+                "Count in a loop: p = 1.0; multiply by 0.01 until p == 0.",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: 154,
+                    "There the *normal* numbers of float64 end (2.2e-308). Smaller ones still exist, with fewer digits: count on.",
+                ),
+                Mistake(
+                    lambda: 161,
+                    "0.01 to the power 161 is 1e-322, still a (denormal) number above zero. One more beam ends it.",
+                ),
+                Mistake(lambda: 324, "That counts powers of ten. Each beam contributes two of them."),
+            ],
+        ),
+        Exercise(
+            "cast_ray",
+            reference=maps.walk_ray,
+            draw=plain_ray,
+            metric=metrics.numbers(0.16, "m"),
+            draws=8,
+            hints=(
+                "Walk along the ray in steps smaller than a cell, and stop in the first occupied one.",
+                "The direction is theta + bearing. grid.at([x, y]) says what is there; maps.OCCUPIED is an obstacle.",
+                "for r in np.arange(0, r_max, grid.resolution / 2): look at (x + r cos, y + r sin). If nothing is hit, return r_max.",
+            ),
+            mistakes=[
+                Mistake(_ray_in_cells, "You counted in cells. One cell is grid.resolution meters long."),
+                Mistake(_ray_without_heading, "The heading is missing: the beam points to theta + bearing on the map."),
+                Mistake(_ray_without_bearing, "The bearing is missing: you looked straight ahead."),
+                Mistake(
+                    _ray_reversed, "Bearings count to the left, like angles: theta + bearing, not theta - bearing."
+                ),
+                Mistake(_ray_without_end, "A scanner sees r_max at most: return r_max when nothing is hit before."),
+            ],
+        ),
+        Exercise(
+            "beam_weight",
+            reference=beam_weight,
+            draw=beams_at_a_pose,
+            metric=metrics.numbers(1e-9),
+            hints=(
+                "Each beam is a normal density of measured minus expected range. A product turns into a sum of logarithms.",
+                "log N = -0.5 * (error / std)**2 - log(std sqrt(2 pi)), once for every beam.",
+                "return np.sum(-0.5 * ((ranges - expected) / std) ** 2 - np.log(std * np.sqrt(2 * np.pi))).",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda r, e, s: math.exp(beam_weight(r, e, s)), "This is the product. Its logarithm is asked for."
+                ),
+                Mistake(
+                    lambda r, e, s: beam_weight(r, e, s) / len(r), "You took the mean over the beams. They add up."
+                ),
+                Mistake(
+                    lambda r, e, s: beam_weight(r, e, s * s),
+                    "You divided by the variance: (error / std) is squared, and std stands in the factor in front.",
+                ),
+                Mistake(
+                    lambda r, e, s: float((-0.5 * np.square((r - e) / s)).sum()),
+                    "The factor 1 / (std sqrt(2 pi)) of each beam is missing.",
+                ),
+                Mistake(
+                    lambda r, e, s: float(_normal_log(r - e, s).sum() - 0.5 * np.square((r - e) / s).sum()),
+                    "The factor one half in the exponent is missing.",
+                ),
+            ],
+        ),
+        Exercise(
+            "distance_field_weight",
+            reference=distance_field_weight,
+            draw=scan_at_a_pose,
+            metric=metrics.numbers(1e-6),
+            hints=(
+                "Put the end point of each beam on the map and ask how far the nearest obstacle is.",
+                "End point: x + r cos(theta + b), y + r sin(theta + b). The distance stands in grid.distance at grid.cell_of(point).",
+                "d = grid.distance[grid.cell_of(points)]; the rest is the sum of log N(0, std^2)(d), as in beam_weight.",
+            ),
+            mistakes=[
+                Mistake(_field_world, "The heading is missing: bearings are relative to the robot, the map is not."),
+                Mistake(_field_cells, "grid.distance is in meters already: do not divide by the resolution."),
+                Mistake(_field_mean, "You took the mean over the beams. The logarithms add up."),
+                Mistake(_field_probability, "This is p itself, which underflows with many beams. Return log p."),
+                Mistake(_field_no_peak, "The factor 1 / (std sqrt(2 pi)) of each beam is missing."),
+                Mistake(_field_origin, "The robot's position is missing: a range starts where the robot stands."),
+            ],
+        ),
+        Prediction(
+            "field",
+            question="Both models weigh one scan at every place of the building. Which finds more to like in the wrong rooms?",
+            choices=("beam model", "likelihood field", "both alike"),
+            answer="likelihood field",
+            why="It asks only whether each end point lies near some obstacle, and does not mind a wall in between. Its good places "
+            "form ridges along parallel walls.",
+        ),
+        Exercise(
+            "resample_roulette",
+            reference=resample_roulette,
+            draw=wheel,
+            properties=(_valid, _proportional, _spins_are_independent),
+            hints=(
+                "Each weight owns an interval as wide as itself. Where does a random number fall?",
+                "np.cumsum(weights) are the ends of the intervals, np.searchsorted finds the interval by bisection.",
+                "ends = np.cumsum(weights); return np.searchsorted(ends, rng.random(len(weights)) * ends[-1], side='right').",
+            ),
+            mistakes=[
+                Mistake(_largest, "You always took the heaviest particle. It should be drawn most often, not always."),
+                Mistake(_uniform_choice, "All particles were drawn alike: the weights do not matter yet."),
+                Mistake(
+                    lambda w, rng: np.arange(len(w)), "Every particle came out once: that is the set you started with."
+                ),
+                Mistake(
+                    lambda w, rng: np.searchsorted(w, rng.random(len(w))),
+                    "You searched in the weights. Search in their running sum, np.cumsum(weights).",
+                ),
+            ],
+            draws=3,
+        ),
+        Exercise(
+            "resample_systematic",
+            reference=resample_systematic,
+            draw=wheel,
+            properties=(_valid, _proportional, _equal_weights_stay, _spokes_are_even, _survives_rounding),
+            hints=(
+                "One random number turns the whole wheel. Its M spokes are W / M apart.",
+                "Spokes: (rng.random() + np.arange(M)) * W / M. Then search them in the running sum, as before.",
+                "ends = np.cumsum(weights); spokes = (rng.random() + np.arange(M)) * ends[-1] / M; np.searchsorted(ends, spokes), "
+                "never above M - 1.",
+            ),
+            mistakes=[
+                Mistake(
+                    _largest, "You always took the heaviest particle. It should be met by most spokes, not by all."
+                ),
+                Mistake(
+                    lambda w, rng: np.searchsorted(np.cumsum(w), (rng.random(len(w)) + np.arange(len(w))) / len(w)),
+                    "Each spoke got its own random number (that is stratified resampling). One number turns the whole wheel.",
+                ),
+                Mistake(
+                    lambda w, rng: np.searchsorted(np.cumsum(w), np.arange(len(w)) / len(w)),
+                    "The wheel has not been turned: start with one random number.",
+                ),
+                Mistake(
+                    lambda w, rng: np.arange(len(w)),
+                    "Every particle came out once: that is right for equal weights only.",
+                ),
+            ],
+            draws=3,
+        ),
+        Prediction(
+            "standing",
+            question="A robot stands still, 1000 particles weigh the same, and roulette resamples 200 times. How many of the first 1000 "
+            "particles still have descendants?",
+            choices=("about 630", "about 100", "about 10", "all 1000"),
+            answer="about 10",
+            why="Each round loses 37 % of those that are left at first, later about one of k in 2 M / k rounds: after t rounds some 2 M / t remain.",
+        ),
+        Exercise(
+            "effective_size",
+            reference=particles.effective_size,
+            draw=cloud_weights,
+            metric=metrics.numbers(1e-9),
+            hints=(
+                "M equal weights should give M, a single heavy one should give 1, whatever the sum of the weights is.",
+                "It is the square of the sum over the sum of the squares.",
+                "return weights.sum() ** 2 / (weights ** 2).sum().",
+            ),
+            mistakes=[
+                Mistake(
+                    _from_the_sum_of_squares,
+                    "Right for weights that add up to 1. These do not: divide by their sum first.",
+                ),
+                Mistake(lambda w: w.sum() / np.square(w).sum(), "The sum in the numerator is to be squared."),
+                Mistake(
+                    lambda w: np.square(w).sum() / w.sum() ** 2,
+                    "This is the reciprocal: it is 1/M for equal weights, not M.",
+                ),
+                Mistake(lambda w: float(len(w)), "You counted the particles. Count what their weights are worth."),
+                Mistake(lambda w: w.sum() / w.max(), "That is another measure. Here: squared sum over sum of squares."),
+            ],
+        ),
+        Exercise(
+            "should_resample",
+            reference=should_resample,
+            draw=lambda rng: (*cloud_weights(rng), float(rng.uniform(0.2, 0.9))),
+            metric=metrics.exactly(),
+            hints=(
+                "Resampling costs diversity. When is it worth its price?",
+                "When the effective size is below the share `threshold` of the number of particles.",
+                "return effective_size(weights) < threshold * len(weights).",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda w, t: not particles.should_resample(w, t),
+                    "The other way round: resample when the effective size is low.",
+                ),
+                Mistake(
+                    lambda w, t: particles.effective_size(w) < t * w.sum(),
+                    "Compare with the share of the *number* of particles, len(weights), not of the sum of the weights.",
+                ),
+                Mistake(lambda w, t: True, "You resample always. With even weights that only loses particles."),
+                Mistake(
+                    lambda w, t: False,
+                    "You never resample. Do you compare with a bare share? The effective size counts particles: threshold * len(weights).",
+                ),
+            ],
+            draws=14,
+        ),
+        Exercise(
+            "circular_mean",
+            reference=circular_mean,
+            draw=headings,
+            metric=metrics.angles(1e-9),
+            hints=(
+                "The mean of 179 deg and -179 deg should be 180 deg. What could be averaged instead of angles?",
+                "Average the unit vectors (cos, sin), and take the direction of the result.",
+                "return np.arctan2(np.sum(weights * np.sin(angles)), np.sum(weights * np.cos(angles))).",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda a, w: float(w @ a / w.sum()),
+                    "The arithmetic mean of angles across the seam points backward. Average directions, not numbers.",
+                ),
+                Mistake(lambda a, w: particles.circular_mean(a), "The weights are missing."),
+                Mistake(
+                    lambda a, w: math.atan2((w * np.cos(a)).sum(), (w * np.sin(a)).sum()),
+                    "Sine and cosine have changed places: arctan2 takes the sine part first.",
+                ),
+                Mistake(
+                    lambda a, w: math.atan((w * np.sin(a)).sum() / (w * np.cos(a)).sum()),
+                    "arctan knows only half the circle. arctan2 takes both parts and knows it all.",
+                ),
+            ],
+        ),
+        Prediction(
+            "kidnap",
+            question="The cloud has converged, then the robot is carried into another room. What does the plain filter do?",
+            choices=(
+                "it finds the robot within some steps",
+                "it stays where it is",
+                "its weights become zero and it stops",
+            ),
+            answer="it stays where it is",
+            why="No particle is near the new place, and resampling cannot invent one. Weights are normalized, so even hopeless particles look fine.",
+        ),
+        Exercise(
+            "recover",
+            reference=recover,
+            draw=averages,
+            metric=metrics.several(
+                metrics.numbers(1e-9), metrics.numbers(1e-9), metrics.numbers(1e-9), names=("share", "w_slow", "w_fast")
+            ),
+            hints=(
+                "When the recent weights are worse than usual, something is wrong. Two averages, one quick and one slow, tell it.",
+                "Bring both up to date first: w += alpha (w_mean - w). The share is 1 - w_fast / w_slow, never below 0.",
+                "w_slow += alpha_slow * (w_mean - w_slow), likewise w_fast; return max(0, 1 - w_fast / w_slow), w_slow, w_fast.",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda m, s, f, a, b: (max(0.0, 1 - f / s), *particles.recover(m, s, f, a, b)[1:]),
+                    "The share uses the old averages. Bring them up to date first.",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: (
+                        1 - (f + b * (m - f)) / (s + a * (m - s)),
+                        *particles.recover(m, s, f, a, b)[1:],
+                    ),
+                    "The share can fall below zero when things go well: take the larger of it and 0.",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: (
+                        max(0.0, 1 - (s + a * (m - s)) / (f + b * (m - f))),
+                        *particles.recover(m, s, f, a, b)[1:],
+                    ),
+                    "The ratio is upside down: w_fast is the one that drops first.",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: particles.recover(m, s, f, a, b)[:1] + (s, f),
+                    "You returned the old averages: the next step needs the new ones.",
+                ),
+            ],
+            draws=12,
+        ),
+        _hunt(
+            "hunt_1",
+            hunt_1,
+            museum.specimen_1,
+            (
+                "What must hold for a resampler on average?",
+                "Count how often each index comes out in many runs, and compare with its weight.",
+                "weights = np.array([0.1, 0.7, 0.1, 0.1]); 1000 runs; np.bincount(...) / total within 0.05 of the weights.",
+            ),
+        ),
+        _hunt(
+            "hunt_2",
+            hunt_2,
+            museum.specimen_2,
+            (
+                "Does your first test catch it? If not: which weights did it not try?",
+                "Use many light particles whose share M w is below 1, next to a heavy one.",
+                "weights = .5 .25 .05 .05 .03 .03 .03 .02 .02 .02: each index should get its weight's share of the draws.",
+            ),
+        ),
+        _hunt(
+            "hunt_3",
+            hunt_3,
+            museum.specimen_3,
+            (
+                "On average it is right. What does it take for granted about the weights?",
+                "Floating-point weights need not add up to 1. Try a sum a little below 1, several times.",
+                "weights = np.full(1000, 0.000999); return False on IndexError (try ... except), or when an index reaches 1000.",
+            ),
+        ),
+        _hunt(
+            "hunt_4",
+            hunt_4,
+            museum.specimen_4,
+            (
+                "Independent readings multiply. What must happen when the same reading comes twice?",
+                "The ratio of two particles' weights must be squared.",
+                "once = weigh(states, ranges, marks, std); twice with everything repeated; np.isclose(ratio_twice, ratio_once ** 2).",
+            ),
+            good=(_weights_multiplied,),
+            extra=(),
+        ),
+    ],
+)

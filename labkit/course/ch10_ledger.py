@@ -1,0 +1,140 @@
+"""Chapter 10: what a printed digit hides, and which word a comparison deserves."""
+
+import numpy as np
+
+from ..ledger import Computed, Row, half_unit, judge
+from . import metrics
+from .engine import Chapter, Exercise, Mistake, Prediction
+
+FORMS = ("1.010000", "-0.5", "12", "1,5", "3e-4", "2.50e2", "-1000", "0.00000", "97.3", "-0,250")
+
+
+def printed_number(rng):
+    """A number as a document prints it."""
+    return (str(rng.choice(FORMS)),)
+
+
+def comparison(rng):
+    """printed, value, bound, misprint, simulated: each status comes up."""
+    value = float(np.round(rng.uniform(1, 9), 2))
+    printed, half = f"{value:.2f}", 0.005
+    offset = rng.choice([0.0, 0.4, 2.0, 60.0]) * half * rng.choice([-1, 1])
+    bound = float(rng.choice([0.0, 1.5, 100.0])) * half
+    return printed, value + offset, bound, bool(rng.random() < 0.5), bool(rng.random() < 0.3)
+
+
+def status(printed, value, bound, misprint, simulated):
+    """The word the ledger gives."""
+    row = Row("x", "lecture", "", "", printed, "", "reproduced", "")
+    return judge(row, Computed(value, bound=bound, misprint=misprint, simulated=simulated))
+
+
+def _decimals(printed):
+    return len(printed.lower().partition("e")[0].replace(",", ".").partition(".")[2])
+
+
+def _one_unit(printed):
+    return 2 * half_unit(printed)
+
+
+def _without_exponent(printed):
+    return 0.5 * 10.0 ** -_decimals(printed)
+
+
+def _counts_all_digits(printed):
+    digits = sum(c.isdigit() for c in printed.lower().partition("e")[0])
+    return 0.5 * 10.0 ** (-digits)
+
+
+def _of_the_value(printed):
+    return 0.005 * abs(float(printed.replace(",", ".")))
+
+
+def _status(order):
+    def variant(printed, value, bound, misprint, simulated):
+        half = half_unit(printed)
+        off = abs(value - float(printed))
+        tests = {
+            "reproduced": off <= half * (1 + 1e-6) and not simulated,
+            "rounding": off <= (half + bound) * (1 + 1e-6) and not simulated,
+            "unpublished": simulated,
+            "misprint": misprint,
+        }
+        return next((word for word in order if tests[word]), "superseded")
+
+    return variant
+
+
+CHAPTER = Chapter(
+    "10-ledger",
+    title="The ledger",
+    items=[
+        Prediction(
+            "digits",
+            question="A document prints 0.37. Its own inputs give 0.3746. What is that?",
+            choices=("reproduced", "a rounding difference", "a misprint"),
+            answer="reproduced",
+            why="0.3746 rounds to 0.37: nothing is off. A printed number is an interval, here from 0.365 to 0.375.",
+        ),
+        Exercise(
+            "half_unit",
+            reference=half_unit,
+            draw=printed_number,
+            metric=metrics.numbers(1e-12),
+            hints=(
+                "Which digit was rounded? Half a unit of that digit can be hidden.",
+                "With d decimals it is 0.5 * 10**-d. An exponent, as in 3e-4, shifts that; a comma is a decimal point.",
+                "number, _, exponent = printed.partition('e'); d = len(number.replace(',', '.').partition('.')[2]); "
+                "return 0.5 * 10.0 ** (int(exponent or 0) - d).",
+            ),
+            mistakes=[
+                Mistake(
+                    _one_unit, "That is a whole unit of the last digit. Rounding moves a number by half of it at most."
+                ),
+                Mistake(
+                    _without_exponent,
+                    "In 3e-4 the last digit is worth 0.0001, not 1: the exponent shifts the half unit.",
+                ),
+                Mistake(
+                    _counts_all_digits, "You counted all digits. Only those after the decimal point make it finer."
+                ),
+                Mistake(
+                    _of_the_value, "You took a share of the value. The unit of the last digit does not depend on it."
+                ),
+            ],
+            draws=12,
+        ),
+        Exercise(
+            "status",
+            reference=status,
+            draw=comparison,
+            metric=metrics.exactly(),
+            hints=(
+                "Ask the questions in an order: was the input published at all? Does the value round to the printed one? ...",
+                "off = |value - printed| against half_unit(printed), then against half_unit(printed) + bound. A simulated value within "
+                "either of them is 'unpublished', outside 'superseded'.",
+                "if simulated: 'unpublished' if off <= half + bound else 'superseded'; then 'reproduced', 'rounding', 'misprint' if "
+                "misprint, and 'superseded'.",
+            ),
+            mistakes=[
+                Mistake(
+                    _status(("misprint", "reproduced", "rounding", "unpublished")),
+                    "You ask for the misprint first. A number that comes out is no misprint, whatever else was proved.",
+                ),
+                Mistake(
+                    _status(("unpublished", "reproduced", "rounding", "misprint")),
+                    "A simulation far from the printed value does not stand beside it: the claim is superseded.",
+                ),
+                Mistake(
+                    _status(("reproduced", "rounding", "misprint", "unpublished")),
+                    "A simulated value is never a misprint: without the inputs nothing can be proved.",
+                ),
+                Mistake(
+                    lambda p, v, b, m, s: status(p, v, 0.0, m, s),
+                    "The bound is missing: rounded inputs may move the value by that much more.",
+                ),
+            ],
+            draws=40,
+        ),
+    ],
+)

@@ -1,0 +1,487 @@
+# %% title [markdown]
+# # 9 · Monte-Carlo localization
+#
+# **What you will do.** Find a robot in a building with a cloud of guesses: move them, weigh them by a laser scan,
+# redraw them. Then carry the robot
+# away, and catch four bugs that published code really had.
+#
+# **What you will learn.** Why weights live in logarithms, why two models of the same scanner disagree, what
+# resampling costs, why a mean can lie in a
+# wall, and how a filter notices that it is lost.
+#
+# **What you need.** Chapter 7 (motion models) and the normal distribution. About 90 minutes.
+
+# %% notation [markdown]
+# | letter | meaning |
+# | --- | --- |
+# | $x^{[i]}$, in code a row of `states` | one particle: a pose $x, y, \theta$ (m, m, rad) |
+# | $w_i$, $W$ | its weight, and the sum of all $M$ weights |
+# | $u = (v, \omega)$ | control: speeds over one time step $T$, in code `dt` |
+# | $r$, $\varphi$ | measured range (m) and bearing (rad), relative to the robot |
+# | $N(0, \sigma^2)(e)$ | normal density of an error $e$; $\log N = -\tfrac12 (e/\sigma)^2 - \log(\sigma\sqrt{2\pi})$ |
+
+# %% setup
+import inspect
+
+import numpy as np
+
+from labkit import maps, museum, odometry, particles
+from labkit.course import course
+from labkit.tables import read_table
+from labkit.widgets import particles as stages
+
+ex = course("09-monte-carlo")
+building = maps.load_building()
+grid = building.grid
+
+# %% the-question [markdown]
+# ## The question
+#
+# A robot wakes up in a building it knows, at a place it does not know. **Where is it?** The Kalman filter of chapter
+# 8 needs one good first guess.
+# The lecture *Lokalisierung* answers with thousands of poor ones (section *Monte-Carlo-Lokalisierung*, German
+# slides): every guess, a *particle*, is moved,
+# weighed, and redrawn in proportion to its weight. The slide *Idee* shows it in one dimension, pictures (a) to (e).
+
+# %% predict-corridor
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "to all three doors alike"
+### END SOLUTION
+ex.predict("corridor", guess, reveal=stages.corridor)
+
+# %% maps [markdown]
+# ## What the robot knows: maps
+#
+# The lecture shows four kinds of map (slides *Gitterbasierte*, *Linienbasierte*, *Punktbasierte Karten*,
+# *topologische Karten*). Here they are of one small building.
+# Its plan is ours: the lecture's maps are pictures only. Move the probe and switch the form. The last two are
+# computed from the grid; you will need them soon.
+#
+# The sensor is the lecture's Sick LMS 100: 18 m, 270°, one beam every 0.5° (slide *2D-Laser-Scanner*). A filter takes
+# every ninth beam, because neighbors
+# say nearly the same.
+
+# %% map-forms
+stages.map_forms()
+
+# %% scan
+scanner = maps.Scanner()
+pose = np.array([8.4, 2.4, 0.3])
+ranges, bearings = scanner.scan(grid, pose, np.random.default_rng(1), every=9)
+without_echo = np.sum(ranges == scanner.r_max)
+print(f"{len(scanner.bearings)} beams in a scan, {len(ranges)} of them used, {without_echo} without an echo")
+print(f"nearest obstacle {ranges.min():.2f} m, median {np.median(ranges):.2f} m")
+
+# %% algorithm [markdown]
+# ## The algorithm, and a slip in it
+#
+# For each particle: `sampleMotionModel` moves it, `measurementModel` gives its weight. Then $M$ particles are drawn
+# with probability proportional to
+# their weights. The slide's first line reads $\chi_k' = \chi_k = \emptyset$. Executed as printed, it empties the
+# *input*: no particle is left to move. It means
+# $\chi'_{k+1} = \chi_{k+1} = \emptyset$. And "with probability $w_i$" needs a division by $W$: densities do not add
+# up to 1.
+#
+# **Moving.** Noise of standard deviation `std_u` is added to the control, then chapter 7's model is applied (slide
+# *Bewegungsmodell*).
+
+# %% sample_motion
+@ex.sample_motion
+def sample_motion(states, u, dt, std_u, rng):
+    """Return states, shape (M, 3), moved by odometry.step(x, u, dt), each with its own noisy copy of u."""
+    ### BEGIN SOLUTION
+    noisy = u + std_u * rng.standard_normal((len(states), 2))
+    return odometry.step(states, noisy, dt)
+    ### END SOLUTION
+
+
+# %% landmarks [markdown]
+# ## Weighing by landmarks
+#
+# A landmark $j$ is measured at range $r_j$ and bearing $\varphi_j$. How probable is that, seen from a particle?
+# Multiply both normal densities over all landmarks
+# (slide *Landmarkbasiertes Verfahren (2)*). Return the **logarithm**. And mind the seam: a bearing of 179° and one of
+# −179° differ by 2°
+# (`odometry.wrap_angle` helps).
+
+# %% landmark_weight
+@ex.landmark_weight
+def landmark_weight(pose, z, landmarks, std_range, std_bearing):
+    """Return log p of z, shape (m, 2), ranges (m) and bearings (rad) to landmarks, shape (m, 2), seen from pose."""
+    ### BEGIN SOLUTION
+    dx, dy = (landmarks - pose[:2]).T
+    error_r = z[:, 0] - np.hypot(dx, dy)
+    error_phi = odometry.wrap_angle(z[:, 1] - (np.arctan2(dy, dx) - pose[2]))
+    log_p = -0.5 * (error_r / std_range) ** 2 - 0.5 * (error_phi / std_bearing) ** 2
+    return np.sum(log_p - np.log(2 * np.pi * std_range * std_bearing))
+    ### END SOLUTION
+
+
+# %% underflow [markdown]
+# ## Why logarithms
+#
+# The slides write `p = 1; p = p * ...`. Suppose each beam has a probability of 0.01. After how many beams is the
+# product *exactly* zero in float64?
+
+# %% beams_to_zero
+beams_to_zero = ...  # your code here
+### BEGIN SOLUTION
+p, beams_to_zero = 1.0, 0
+while p > 0:
+    p, beams_to_zero = p * 0.01, beams_to_zero + 1
+### END SOLUTION
+ex.beams_to_zero(beams_to_zero)
+
+# %% beams [markdown]
+# A scan has 541. With all weights zero there is nothing to draw from. A sum of logarithms never gets there, and
+# subtracting the largest one first makes
+# the best particle weigh $e^0 = 1$ (`particles.normalize`).
+#
+# ## Weighing by beams
+#
+# The beam model (slide *Strahlenmodell*) compares each range with the one the map predicts. So follow a beam through
+# the grid to the first obstacle (*Strahlverfolgung*):
+
+# %% cast_ray
+@ex.cast_ray
+def cast_ray(grid, pose, bearing, r_max):
+    """Return the distance (m) to the first occupied cell along a beam, r_max if there is none. grid.at([x, y]) asks
+    the map."""
+    ### BEGIN SOLUTION
+    angle = pose[2] + bearing
+    for r in np.arange(0, r_max, grid.resolution / 2):
+        if grid.at([pose[0] + r * np.cos(angle), pose[1] + r * np.sin(angle)]) == maps.OCCUPIED:
+            return r
+    return r_max
+    ### END SOLUTION
+
+
+# %% beam_weight
+@ex.beam_weight
+def beam_weight(ranges, expected, std):
+    """Return log p of measured ranges, shape (B,), given the expected ones: the product of N(0, std^2)(d - d*)."""
+    ### BEGIN SOLUTION
+    return np.sum(-0.5 * ((ranges - expected) / std) ** 2 - np.log(std * np.sqrt(2 * np.pi)))
+    ### END SOLUTION
+
+
+# %% field [markdown]
+# ## Weighing by the likelihood field
+#
+# Following beams is slow. The likelihood field (slides *Likelihoodfield (1), (2)*) asks another question: how far is
+# the *end point* of each beam from the nearest
+# obstacle? That distance can be computed in advance for every cell: `grid.distance`. Put the end points on the map
+# and look them up.
+
+# %% distance_field_weight
+@ex.distance_field_weight
+def distance_field_weight(grid, pose, ranges, bearings, std):
+    """Return log p: the sum of log N(0, std^2) over the distances of the end points. grid.cell_of(points) gives their
+    cells."""
+    ### BEGIN SOLUTION
+    x = pose[0] + ranges * np.cos(pose[2] + bearings)
+    y = pose[1] + ranges * np.sin(pose[2] + bearings)
+    d = grid.distance[grid.cell_of(np.column_stack([x, y]))]
+    return np.sum(-0.5 * (d / std) ** 2 - np.log(std * np.sqrt(2 * np.pi)))
+    ### END SOLUTION
+
+
+# %% predict-field
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "likelihood field"
+### END SOLUTION
+ex.predict("field", guess, reveal=stages.field_against_beams)
+
+# %% roulette [markdown]
+# ## Resampling
+#
+# *Roulette-Rad*: give each particle an interval as wide as its weight, spin $M$ times, find the interval by
+# bisection: $O(M \log M)$.
+# *Speichenrad*: $M$ spokes at the distance $W/M$, one random turn: $O(M)$. The weights may have any sum. Write both
+# without a Python loop if you can.
+#
+# Then drag the weights and turn the wheel. "2 of 2.2" means: drawn twice, where $M w / W = 2.2$. *Make it fail* shows
+# what roulette does to six equal weights.
+
+# %% resample_roulette
+@ex.resample_roulette
+def resample_roulette(weights, rng):
+    """Return M indices, each drawn independently with probability w / W."""
+    ### BEGIN SOLUTION
+    ends = np.cumsum(weights)
+    return np.searchsorted(ends, rng.random(len(weights)) * ends[-1], side="right")
+    ### END SOLUTION
+
+
+# %% resample_systematic
+@ex.resample_systematic
+def resample_systematic(weights, rng):
+    """Return M indices by one random turn of a wheel with M evenly spaced spokes."""
+    ### BEGIN SOLUTION
+    ends, M = np.cumsum(weights), len(weights)
+    spokes = (rng.random() + np.arange(M)) * ends[-1] / M
+    return np.minimum(np.searchsorted(ends, spokes), M - 1)
+    ### END SOLUTION
+
+
+# %% wheel-stage
+stages.wheel()
+
+# %% predict-standing
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "about 10"
+### END SOLUTION
+ex.predict("standing", guess, reveal=stages.standing)
+
+# %% diversity [markdown]
+# ## When to resample
+#
+# The slide *Diversität der Partikelmenge* says the same in words: under roulette a standing robot ends with $M$
+# copies of one particle, the spoke wheel leaves equal
+# weights alone. It advises to resample only when the weights vary much, and to multiply them up in between. The usual
+# gauge is the effective size
+# $N_\text{eff} = \left(\sum w_i\right)^2 / \sum w_i^2$. For weights of mean 1, $M / N_\text{eff} = 1 +
+# \operatorname{var}(w)$: the slide's advice, as a number.
+
+# %% effective_size
+@ex.effective_size
+def effective_size(weights):
+    """Return how many equal weights these weights, of any sum, are worth."""
+    ### BEGIN SOLUTION
+    return weights.sum() ** 2 / (weights**2).sum()
+    ### END SOLUTION
+
+
+# %% should_resample
+@ex.should_resample
+def should_resample(weights, threshold):
+    """Return True when the effective size is below the share `threshold` of the number of particles."""
+    ### BEGIN SOLUTION
+    return effective_size(weights) < threshold * len(weights)
+    ### END SOLUTION
+
+
+# %% together [markdown]
+# ## All together: twelve pictures
+#
+# The lecture shows a global localization in twelve pictures without numbers (slides *Beispiel (1)* to *(12)*). This
+# is its counterpart in our building, simulated:
+# the ledger calls it *unpublished*. Play it. Where is the estimate wrong, and which picture corrects it?
+
+# %% twelve
+stages.twelve_pictures()
+
+# %% mean [markdown]
+# ## From cloud to pose
+#
+# A pose is wanted, not a cloud. The heading is the first trap: the mean of 179° and −179° is not 0°. Average
+# directions, not numbers.
+#
+# The second trap: while two places are still possible, the mean lies between them. The cell after the exercise puts
+# two clouds into two rooms.
+
+# %% circular_mean
+@ex.circular_mean
+def circular_mean(angles, weights):
+    """Return the weighted mean direction (rad)."""
+    ### BEGIN SOLUTION
+    return np.arctan2(np.sum(weights * np.sin(angles)), np.sum(weights * np.cos(angles)))
+    ### END SOLUTION
+
+
+# %% mean-in-the-wall
+rng = np.random.default_rng(2)
+rooms = np.array([[10.0, 1.5, 0.0], [12.0, 1.5, 0.0]])
+cloud = np.concatenate([rooms[0] + rng.normal(0, 0.2, (600, 3)), rooms[1] + rng.normal(0, 0.2, (600, 3))])
+mean, mode = particles.estimate(cloud).pose, particles.estimate_mode(cloud).pose
+words = ("free", "occupied", "unknown")
+print(f"mean of all          x = {mean[0]:.1f}, y = {mean[1]:.1f}, cell {words[int(grid.at(mean[:2]))]}")
+print(f"heaviest cluster     x = {mode[0]:.1f}, y = {mode[1]:.1f}, cell {words[int(grid.at(mode[:2]))]}")
+
+# %% soccer [markdown]
+# ## Against the document: the soccer field
+#
+# The lecture's example (slides *Beispiel (1)*, *(2)* behind the landmark model): an Aibo robot among six landmarks, and
+# three paths, the true one, odometry, and MCL. The start is known here: *local* localization. Numbers were never
+# published, so this run is simulated, with the three lines as on the slide. Let the camera read only ranges or only
+# bearings, which the slide says is possible.
+
+# %% soccer-stage
+stages.soccer()
+
+# %% kidnapping [markdown]
+# ## The kidnapped robot
+#
+# The lecture names the *kidnapped robot problem* and leaves it there. In the arena below you can do it: **drag the
+# robot away**. A stroke elsewhere
+# draws obstacles that the map does not know. Click the picture and drive with the arrow keys, or press play. Switch
+# models and resamplers while it runs, and when the robot
+# is lost, choose *spoke wheel + recovery*.
+
+# %% predict-kidnap
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "it stays where it is"
+### END SOLUTION
+ex.predict("kidnap", guess, reveal=stages.arena)
+
+# %% recovery [markdown]
+# How does the recovery know? It compares two running averages of the mean weight, a quick and a slow one. When the
+# quick one drops below the slow one,
+# that share of the particles is replaced by random poses: $\max(0,\, 1 - w_\text{fast} / w_\text{slow})$.
+
+# %% recover
+@ex.recover
+def recover(w_mean, w_slow, w_fast, alpha_slow, alpha_fast):
+    """Return the share of random particles, and both averages brought up to date: w += alpha * (w_mean - w)."""
+    ### BEGIN SOLUTION
+    w_slow = w_slow + alpha_slow * (w_mean - w_slow)
+    w_fast = w_fast + alpha_fast * (w_mean - w_fast)
+    return max(0.0, 1 - w_fast / w_slow), w_slow, w_fast
+    ### END SOLUTION
+
+
+# %% rates [markdown]
+# How reliable is it? One good run proves little. The table counts 100 seeded runs each, with 5000 particles: found
+# means within 0.3 m and 10° after 60 steps,
+# or within 60 steps of a kidnapping. The interval says what 100 runs cannot tell apart. *Adaptive* is explained below
+# the table.
+
+# %% success
+table = read_table("monte_carlo/success.csv", text=("task", "model"))
+columns = ("task", "model", "successes", "low", "high", "median_steps")
+for task, model, good, low, high, steps in zip(*(table[name] for name in columns)):
+    interval = f"95 % interval {100 * low:3.0f} to {100 * high:3.0f} %"
+    print(f"{task:10} {model:17} {good:3.0f} of 100 found   {interval}   median {steps:4.1f} steps")
+
+# %% beyond [markdown]
+# ## Beyond the document: fewer particles when fewer will do
+#
+# A converged cloud needs no 5000 particles. KLD sampling counts the bins the cloud occupies and keeps as many
+# particles as a chi-square bound asks for.
+# The price: a cloud that shrinks onto the wrong place too early has nobody left elsewhere. Compare the rows
+# *adaptive* and *global*.
+
+# %% kld
+suite, rng = particles.SensorSuite(building), np.random.default_rng(5)
+drive = particles.random_drive(building, 30, rng, start="hall")
+mcl = particles.localizer(building, "likelihood field", 5000, rng, kld={"n_min": 500, "epsilon": 0.01})
+run = particles.record(mcl, drive, lambda pose, k: suite.measure("likelihood field", pose, rng), rng)
+error = np.hypot(*(run[-1].estimate - run[-1].truth)[:2])
+print("particles before steps 1, 2, 5, 10, 30:", [len(run[k].states) for k in (0, 1, 4, 9, 29)])
+turn = abs(odometry.wrap_angle(run[-1].estimate[2] - run[-1].truth[2]))
+print("found" if error < 0.3 and turn < np.deg2rad(10) else "lost", "at the end")
+
+# %% bug-hunt [markdown]
+# ## Bug hunt
+#
+# Everybody makes these mistakes: each specimen below has a defect that published robotics code really had, rewritten,
+# no names. None raises an error on
+# friendly input, and all look fine in a plot. **Write the test that catches it**: a function that returns True for
+# what is correct and False for the specimen.
+# Your test is tried on correct resamplers too. It must not reject them.
+
+# %% hunt_1
+print(inspect.getsource(museum.specimen_1))
+
+
+@ex.hunt_1
+def hunt_1(resample, rng):
+    """Return True if resample(weights, rng) draws each index in proportion to its weight, False otherwise."""
+    ### BEGIN SOLUTION
+    weights = np.array([0.1, 0.7, 0.1, 0.1])
+    index = np.concatenate([resample(weights, rng) for _ in range(1000)])
+    return np.abs(np.bincount(index, minlength=4) / len(index) - weights).max() < 0.05
+    ### END SOLUTION
+
+
+# %% hunt_2
+print(inspect.getsource(museum.specimen_2))
+
+
+@ex.hunt_2
+def hunt_2(resample, rng):
+    """Return True if even the lightest of many particles get their share, False otherwise."""
+    ### BEGIN SOLUTION
+    weights = np.array([0.5, 0.25, 0.05, 0.05, 0.03, 0.03, 0.03, 0.02, 0.02, 0.02])
+    index = np.concatenate([resample(weights, rng) for _ in range(1000)])
+    return np.abs(np.bincount(index, minlength=10) / len(index) - weights).max() < 0.05
+    ### END SOLUTION
+
+
+# %% hunt_3
+print(inspect.getsource(museum.specimen_3))
+
+
+@ex.hunt_3
+def hunt_3(resample, rng):
+    """Return True if weights whose sum is rounded a little below 1 do no harm, False otherwise."""
+    ### BEGIN SOLUTION
+    try:
+        return all(resample(np.full(1000, 0.000999), rng).max() < 1000 for _ in range(20))
+    except IndexError:
+        return False
+    ### END SOLUTION
+
+
+# %% hunt_4
+print(inspect.getsource(museum.specimen_4))
+
+
+@ex.hunt_4
+def hunt_4(weigh):
+    """Return True if weigh(states, ranges, landmarks, std) treats two readings as independent, False otherwise."""
+    ### BEGIN SOLUTION
+    states, mark = np.array([[0.0, 0, 0], [0.3, 0, 0]]), np.array([[2.0, 0.0]])
+    a, b = weigh(states, np.array([2.0]), mark, 0.3)
+    c, d = weigh(states, np.array([2.0, 2.0]), np.vstack([mark, mark]), 0.3)
+    return np.isclose(c / d, (a / b) ** 2)
+    ### END SOLUTION
+
+
+# %% break-it [markdown]
+# ## Break it
+#
+# One beam without an echo makes the plain beam model say: impossible, everywhere. What should a filter do when *all*
+# weights are zero? Some restart in silence, some add a
+# tiny constant, some die. Ours keeps the cloud, skips the scan, and says so.
+
+# %% break-it-code
+lost = ranges.copy()
+lost[0] = scanner.r_max
+plain = particles.weigh_beams(suite.table, lost, bearings, 0.2, scanner.r_max, shares=(1, 0, 0, 0))
+mixture = particles.weigh_beams(suite.table, lost, bearings, 0.2, scanner.r_max)
+for name, weigh in (("plain", plain), ("mixture", mixture)):
+    near = particles.MonteCarloLocalizer(pose + rng.normal(0, 0.05, (500, 3)))
+    step = near.correct(weigh, rng)
+    print(f"{name:8} all weights zero: {step.all_zero}   scan used: {not step.all_zero}")
+try:
+    particles.normalize(np.full(5, -np.inf))
+except ValueError as refusal:
+    print(refusal)
+
+# %% in-practice [markdown]
+# ## In practice
+#
+# - Temper the weights: 60 beams do not know 60 times as much as one. Our filters multiply log weights by 0.06 to 0.3,
+# found by the success rates above.
+# - Likelihood field for speed, a mixture beam model where people walk about. Leave out readings at the maximum range.
+# - Resample when $N_\text{eff} < M/2$, never while standing still. Log $N_\text{eff}$ and the mean weight: they tell
+# first when things go wrong.
+# - Give motion generous noise. A cloud that is too narrow cannot be right again.
+# - Test resamplers by counting.
+
+# %% questions [markdown]
+# ## Three questions, to answer in words
+#
+# 1. The likelihood field finds a pose behind a wall acceptable that the beam model excludes. Which information does
+# it throw away?
+# 2. Why may the spoke wheel use one random number for $M$ draws, and what is lost compared with independent spins?
+# 3. A crowd surrounds the robot and its mean weight drops, though it is not lost. What does the recovery do, and how
+# would you tell the two cases apart?
+
+# %% progress
+ex.progress()
