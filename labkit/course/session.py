@@ -200,10 +200,11 @@ class ArrayAnswer(np.ndarray):
     def __repr__(self):
         return HIDDEN if self.hidden else repr(np.asarray(self))
 
-    __str__ = __repr__
+    def __str__(self):
+        return HIDDEN if self.hidden else str(np.asarray(self))
 
     def __format__(self, spec):
-        return repr(self)
+        return HIDDEN if self.hidden else format(np.asarray(self), spec)
 
     def _ipython_display_(self):
         """Nothing: the feedback above has said it."""

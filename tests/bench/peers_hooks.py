@@ -3,6 +3,7 @@
 import numpy as np
 
 from labkit import axxb, chaining, frames, pivot
+from labkit import handeye as sphere
 from labkit import kalman as filters
 
 POSE_NOISE = (np.deg2rad(0.1), 0.2)  # rad and mm, as the benchmark draws them
@@ -10,6 +11,11 @@ POSE_NOISE = (np.deg2rad(0.1), 0.2)  # rad and mm, as the benchmark draws them
 
 def handeye(T_BF, T_ST):
     return axxb.calibrate_hand_eye(T_BF, T_ST).T_FS
+
+
+def sphere_handeye(T_BF, x_S):
+    result = sphere.calibrate_sphere_target(T_BF, x_S)
+    return result.T_FS, result.target
 
 
 def plain_pivot(T):
@@ -33,6 +39,7 @@ def ekf(u, z, marks, x0, P0, Q, R):
 
 HOOKS = {
     "handeye": handeye,
+    "sphere_handeye": sphere_handeye,
     "pivot": plain_pivot,
     "pivot_robust": robust_pivot,
     "frames": frames.frame_from_points,

@@ -1,0 +1,99 @@
+"""Stages of chapter 5: what they compute, against library and closed forms, and that each draws, fails, recovers."""
+
+import numpy as np
+import pytest
+
+from labkit import frames, handeye, handeye_data
+from labkit.widgets import handeye as w
+
+ALL = (w.scan_line, w.difference_steps, w.convergence, w.thirty_one_poses, w.pattern_designer)
+
+
+@pytest.mark.parametrize("make", ALL)
+def test_draws_fails_and_recovers(make):
+    stage = make()
+    before = stage.png()
+    stage.make_it_fail()
+    assert stage.png() != before and stage.status == ""
+    stage.reset()
+    assert stage.png() == before
+    assert repr(stage) == repr(make()) and stage.caption
+
+
+def test_scan_line_recovers_the_center_and_its_spread():
+    result = w.compute_scan_line({"C": np.array([15.0, 240.0]), "std": 0.1, "half_angle_deg": 60})
+    assert result["recovered"].mean(0) == pytest.approx([15, 240], abs=0.1)
+    assert result["recovered"][:, 0].std() == pytest.approx(result["std_y"], rel=0.3)
+    assert result["impossible"] == 0
+
+
+def test_scan_line_at_the_equator_says_nothing_about_y():
+    near = w.compute_scan_line({"C": np.array([0.5, 240.0]), "std": 0.1, "half_angle_deg": 60})
+    far = w.compute_scan_line({"C": np.array([15.0, 240.0]), "std": 0.1, "half_angle_deg": 60})
+    assert near["impossible"] > 10 and near["std_y"] > 20 * far["std_y"]
+    assert np.isinf(w.compute_scan_line({"C": np.array([0.0, 240.0]), "std": 0.1, "half_angle_deg": 60})["std_y"])
+
+
+def test_steps_are_best_where_rounding_meets_curvature():
+    result = w.compute_steps({"h": 5e-7})
+    assert 1e-7 < result["best"]["forward"] < 1e-4 < result["best"]["central"] < 1e-2
+    tiny = w.compute_steps({"h": 1e-13})
+    assert tiny["at"]["forward"] > 1e4 * result["at"]["forward"]
+
+
+def test_steps_on_the_pose_need_no_detour():
+    result = w.compute_iterations({"P": np.array([-54.0, -30.0]), "B_deg": -30.0})
+    assert result["euler"]["arrived"] and result["se3"]["arrived"]
+    assert result["euler"]["steps"] > 2 * result["se3"]["steps"]
+    assert result["euler"]["turned_deg"] > 4 * result["se3"]["turned_deg"]
+    assert result["se3"]["path"][0] == pytest.approx([-54, -30], abs=1e-9)
+
+
+def test_residuals_of_the_31_poses_follow_the_edits():
+    state = {"click": np.array([3.2, 1.0]), "slip": 0, "others": False, "fit": "robust"}
+    printed = w.compute_poses(state)
+    assert printed["pose"] == 3 and printed["lengths"][2] == pytest.approx(18.27, abs=0.01)
+    undone = w.compute_poses({**state, "slip": 1})
+    assert undone["slip"].corrected == "1397.64" and undone["lengths"][2] < 0.6
+    all_right = w.compute_poses({**state, "slip": 1, "others": True, "fit": "least squares"})
+    corrected = handeye_data.measurements(True)
+    fit = handeye.calibrate_sphere_target(corrected.T_BF, corrected.x_S)
+    assert all_right["rms"] == pytest.approx(fit.rms, abs=1e-9)
+    thesis = w.compute_poses({**state, "fit": "end pose", "others": True, "slip": 1})
+    assert thesis["rms"] == pytest.approx(5.436, abs=0.01)
+
+
+def test_every_misprint_is_offered_as_the_first_slip():
+    for row in handeye_data.corrections():
+        first = w._explained()[row["pose"] - 1][0]
+        assert (first.table, first.column, float(first.corrected)) == (
+            row["table"],
+            row["column"],
+            float(row["corrected"]),
+        )
+
+
+def test_innocent_poses_are_offered_no_slip():
+    suspects = {row["pose"] for row in handeye_data.corrections()}
+    assert {pose for pose, slips in enumerate(w._explained(), start=1) if slips} == suspects
+
+
+def test_pattern_predicts_the_covariance_of_simulated_fits():
+    state = {"E": np.array([25.0, 290.0]), "across": 25, "tilt_deg": 40}
+    result = w.compute_pattern(state)
+    rng, found, std = np.random.default_rng(0), [], w._corrected_fit().std
+    for _ in range(150):
+        seen = result["x_S"] + std * rng.normal(size=(31, 3))
+        found.append(handeye.calibrate_sphere_target(result["T_BF"], seen).T_FS[:3, 3] - result["T_FS"][:3, 3])
+    assert np.sqrt((np.array(found) ** 2).sum(1).mean()) == pytest.approx(result["std"][1], rel=0.15)
+    assert handeye.field_problem(result["x_S"]) is None
+
+
+def test_pattern_without_tilt_is_not_determined():
+    result = w.compute_pattern({"E": np.array([25.0, 290.0]), "across": 25, "tilt_deg": 0})
+    assert not result["determined"]
+    x_S = frames.transform(
+        frames.invert(result["T_FS"]), frames.transform(frames.invert(result["T_BF"]), result["target"])
+    )
+    J = handeye.joint_jacobian(result["T_BF"], x_S, result["T_FS"])
+    assert np.abs(J @ result["weak"]).max() < 1e-6  # sliding along it changes nothing the scanner sees
