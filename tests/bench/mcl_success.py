@@ -1,12 +1,11 @@
 """Success rates of Monte-Carlo localization in the building over seeded runs, with every sensor model.
 
-    python tests/bench/mcl_success.py [--runs 100] [--write]
+    python tests/bench/mcl_success.py [--runs 100] [--tasks global adaptive kidnapped] [--write]
 
 Global: 5000 particles spread over the whole building; success when after 60 steps the estimate (the heaviest cluster)
-lies
-within 0.3 m and 10 deg of the truth. Adaptive: the same with KLD sampling. Kidnapped: the robot is tracked for 20
-steps and then put into another room; success when
-within 60 steps the estimate is right again, and stays so for five steps. The intervals are Clopper and Pearson's, 95 %.
+lies within 0.3 m and 10 deg of the truth. Adaptive: the same with KLD sampling. Kidnapped: the robot is tracked for 20
+steps and then put into another room; success when within 60 steps the estimate is right again, and stays so for five
+steps. The intervals are Clopper and Pearson's, 95 %.
 `--write` stores the table as data/monte_carlo/success.csv.
 """
 
