@@ -319,8 +319,8 @@ ex.predict("methods", guess, reveal=stages.methods)
 best = axxb.calibrate_hand_eye(invert(T_BF), T_WE, robust=True)
 std = np.sqrt(np.diag(best.covariance))[9:]  # 12 unknowns: two poses, the translation of T_FE comes last
 for name, t in (("truth", simulation.T_FE), ("report's method", mounting), ("maximum likelihood", best.target)):
-    print(f"{name:19}", t[:3, 3], "mm")
-print("standard deviation ", std, "mm; ignored poses:", np.flatnonzero(best.weights < 0.01))
+    print(f"{name:19}", *t[:3, 3].round(2), "mm")
+print("standard deviation ", *std.round(2), "mm; ignored poses:", np.flatnonzero(best.weights < 0.01))
 
 # %% motion [markdown]
 # ## In motion

@@ -121,6 +121,12 @@ def _signed(X):
     return X * np.sign(np.linalg.det(X))
 
 
+def _orthonormal(X):
+    """The nearest orthogonal matrix, reflections included."""
+    U, _, Vt = np.linalg.svd(X)
+    return U @ Vt
+
+
 def translation_problem(rng):
     A, B = motions(rng)
     return A, B, axxb.rotation_from_kronecker(axxb.kronecker_matrix(A, B))[0]
@@ -457,6 +463,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda M: np.sqrt(3) * _signed(_null(M).reshape(3, 3, order="F")),
                     "The scale is right, but noise has sheared the matrix: its columns are not orthonormal. Project it to SO(3).",
+                ),
+                Mistake(
+                    lambda M: _orthonormal(_null(M).reshape(3, 3, order="F")),
+                    "The sign is missing: the null vector may come out as -X, and then your matrix is a reflection. Turn it so that the determinant is positive.",
                 ),
                 Mistake(
                     lambda M: axxb.nearest_rotation(_null(M).reshape(3, 3, order="F")),
