@@ -1,9 +1,7 @@
-"""Library functions of chapter 9 behind the hooks of the peers' benchmark: {hook name: function with the hook's
-arguments}.
+"""Library functions of chapter 9 behind the hooks of the peers' benchmark, by hook name.
 
-The likelihood field and the ray caster work on tables made once a map, as the filter does; the benchmark hands its
-map over in
-every call, so these hooks remember what they made of it.
+The likelihood field and the ray caster work on tables made once a map, as the filter does; the benchmark hands its map
+over in every call, so these hooks remember what they made of it.
 """
 
 import functools

@@ -1,5 +1,6 @@
 """Library functions behind the hooks of the peers' benchmark: {hook name: function with the hook's arguments}."""
 
+import hooks_particles
 import numpy as np
 
 from labkit import axxb, chaining, frames, pivot
@@ -46,4 +47,5 @@ HOOKS = {
     "chain": lambda A, B, C: chaining.chain((A, B, C)),
     "kalman": kalman,
     "ekf": ekf,
+    **hooks_particles.HOOKS,
 }
