@@ -61,7 +61,7 @@ def lateration_residual(landmarks, distances, position):
 
 # %% newton [markdown]
 # Newton's method replaces $f$ by its tangent planes, goes to where they vanish, and starts again from there:
-# $J\,\Delta = -f$, $x \leftarrow x + \Delta$. Row $i$ of $J$ is $2\,(x - l_i)^\top$.
+# $J\,\Delta = -f$, $x \leftarrow x + \Delta$. Row $i$ of $J$ is $2\,(x - l_i)^\top$. Twenty rounds are plenty.
 
 # %% newton_lateration
 @ex.newton_lateration
@@ -129,6 +129,7 @@ def wheel_to_twist(v_left, v_right, track):
 # During $T$ the robot drives an arc. The *simplified* model goes straight along the old heading; the *midpoint* model along $\theta + \omega T/2$. The
 # *arc* is exact: the robot turns about the ICR by $\omega T = 2h$. The chord of that arc points along $\theta + h$, and its length is
 # $v T \sin(h)/h$. Write it so that driving straight on needs no division by zero.
+# Leave $\theta$ as it adds up; it is wrapped into one turn only in chapter 8.
 
 # %% step_euler
 @ex.step_euler

@@ -258,6 +258,10 @@ CHAPTER = Chapter(
                     lambda L, d, p: (L**2).sum(1) - (p**2).sum() - d**2,
                     "|a - b|^2 is not |a|^2 - |b|^2: subtract first, then square.",
                 ),
+                Mistake(
+                    lambda L, d, p: np.linalg.norm(L - p) ** 2 - d**2,
+                    "Without axis=1 the norm runs over all landmarks at once: one sum a row is wanted.",
+                ),
             ],
         ),
         Prediction(
@@ -366,6 +370,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda x, u, dt: np.array([x[0] + u[0] * dt * np.cos(x[2]), x[1] + u[0] * dt * np.sin(x[2]), x[2]]),
                     "The heading stays what it was: add omega T.",
+                ),
+                Mistake(
+                    _straight(_way, lambda th, v, w, dt: np.degrees(th), _turn),
+                    "np.cos and np.sin take radians, and theta is in radians already: do not convert.",
                 ),
             ],
         ),
@@ -483,7 +491,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda x, u, t: jacobian_control(x, u, t) * u,
-                    "You left v and omega in. By them is derived: they disappear.",
+                    "You left v and omega in. The step is linear in both, so its derivatives by them no longer contain them.",
                 ),
                 Mistake(
                     lambda x, u, t: odometry.step_jacobians(x, u, t, "midpoint")[1],
@@ -492,6 +500,10 @@ CHAPTER = Chapter(
                 Mistake(
                     _control_entries(lambda x, t: t * np.cos(x[2]), lambda x, t: t * np.sin(x[2]), lambda t: 1.0),
                     "The last entry is T: omega acts for a time step.",
+                ),
+                Mistake(
+                    lambda x, u, t: jacobian_control(x, u, t) * [u[0], 1.0],
+                    "You left v in the first column. The way is v T, so its derivative by v is T.",
                 ),
             ],
         ),
@@ -570,6 +582,14 @@ CHAPTER = Chapter(
                     lambda x, P, u, t, Q: (step_euler(x, u, t), propagate(step_euler(x, u, t), P, u, t, Q)[1]),
                     "Your Jacobians are taken at the new pose. The step was linearized at the old one.",
                 ),
+                Mistake(
+                    _propagated(lambda F, G, P, Q: F * P * F.T + G @ Q @ G.T),
+                    "`*` multiplies entry by entry. The matrix product is `@`.",
+                ),
+                Mistake(
+                    _propagated(lambda F, G, P, Q: F @ P @ F + G @ Q @ G.T),
+                    "The last factor is the transpose of F_x.",
+                ),
             ],
         ),
         Prediction(
@@ -599,6 +619,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda: odometry.wrap_angle(_circle()[0] * [0, 0, 1]) + _circle()[0] * [1, 1, 0],
                     "The position is right. The heading is turned back into one turn: leave it as the sum of all steps.",
+                ),
+                Mistake(
+                    lambda: _circle()[0] * [1, 1, np.degrees(1)],
+                    "The position is right. The heading is in degrees: leave it in radians.",
                 ),
             ],
         ),

@@ -46,9 +46,9 @@ def seen_landmark(rng):
 
 
 def landmark_behind(rng):
-    """A pose with the landmark behind it, so that an unwrapped bearing leaves [-pi, pi)."""
+    """A landmark at smaller x, where arctan(dy / dx) fails, and a heading that takes the unwrapped bearing out of [-pi, pi)."""
     x, r = np.array([*rng.uniform(-4, 4, 2), rng.choice([-1, 1]) * rng.uniform(2.6, 3.1)]), rng.uniform(1.5, 6)
-    angle = -np.sign(x[2]) * rng.uniform(0.7, 1.4)
+    angle = -np.sign(x[2]) * rng.uniform(1.8, 2.6)
     return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
 
 
@@ -287,6 +287,14 @@ CHAPTER = Chapter(
                     _predicted(_moved, lambda P, A, B, Q: P + B @ Q @ B.T),
                     "The old covariance must be carried along by A: a velocity error becomes a position error.",
                 ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A * P * A.T + B @ Q @ B.T),
+                    "`*` multiplies entry by entry. The matrix product is `@`.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ P @ A + B @ Q @ B.T),
+                    "The last factor is the transpose of A.",
+                ),
             ],
         ),
         Exercise(
@@ -324,6 +332,10 @@ CHAPTER = Chapter(
                 Mistake(
                     _updated(cov=lambda P, K, C: P @ (np.eye(len(P)) - K @ C)),
                     "The order: (I - K C) stands to the left of cov.",
+                ),
+                Mistake(
+                    _updated(cov=lambda P, K, C: (1 - K @ C) @ P),
+                    "1 - K C subtracts from a matrix full of ones. The identity is np.eye(n).",
                 ),
             ],
         ),
@@ -363,6 +375,10 @@ CHAPTER = Chapter(
                     _fused(lambda v, s: [1 / v, *(1 / s**2)], lambda v, s: 1 / np.sqrt(1 / v + (1 / s**2).sum())),
                     "The position is right; you return the standard deviation. The variance is asked for.",
                 ),
+                Mistake(
+                    _fused(lambda v, s: [1 / v, *(1 / s)]),
+                    "The sensors come with standard deviations: square them before you take one over them.",
+                ),
             ],
         ),
         Value(
@@ -390,6 +406,10 @@ CHAPTER = Chapter(
                     "0.25 is the first sensor's variance already; its standard deviation is 0.5.",
                 ),
                 Mistake(lambda: 10.0, "The mean of both sensors. But the first one is four times as certain in variance."),
+                Mistake(
+                    lambda: _fusion(std1=np.sqrt(0.5), std2=1.0),
+                    "You weigh the sensors by one over the standard deviation. One over the variance is 4 and 1.",
+                ),
             ],
         ),
         Prediction(
@@ -504,6 +524,10 @@ CHAPTER = Chapter(
                     lambda x, l: measurement(x, l) * [measurement(x, l)[0], 1],
                     "The distance is squared: the root is missing.",
                 ),
+                Mistake(
+                    lambda x, l: np.array([measurement(x, l)[0], wrapped(np.arctan(np.divide(*(l - x[:2])[::-1])) - x[2])]),
+                    "np.arctan cannot tell a landmark on the left from one on the right of the y axis: np.arctan2(dy, dx) can.",
+                ),
             ],
         ),
         Exercise(
@@ -537,6 +561,14 @@ CHAPTER = Chapter(
                     _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [-dx / r**2, dy / r**2, -1]]),
                     "In the second row dx and dy are exchanged: only a shift across the line of sight turns it.",
                 ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[dx / r, dy / r, 0], [dy / r**2, -dx / r**2, -1]]),
+                    "The sign of row 0: a step toward the landmark makes the distance smaller.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [-dy / r**2, dx / r**2, -1]]),
+                    "The signs of dx and dy in row 1: a step to the left turns the landmark to the right.",
+                ),
             ],
         ),
         Exercise(
@@ -553,7 +585,7 @@ CHAPTER = Chapter(
                 Mistake(_jacobians(_sine_sign), "In G_x, the derivative of the cosine is minus the sine."),
                 Mistake(_jacobians(lambda G, x, u, t: G - np.eye(3)), "In G_x the identity is missing: the old pose is part of the new one."),
                 Mistake(_jacobians(change_u=lambda G, x, u, t: G / t), "In G_u the time step is missing."),
-                Mistake(_jacobians(change_u=lambda G, x, u, t: G * u), "In G_u, v and omega must not appear: by them is derived."),
+                Mistake(_jacobians(change_u=lambda G, x, u, t: G * u), "In G_u, v and omega must not appear: the step is linear in both."),
                 Mistake(lambda x, u, t: motion_jacobians(x, u, t)[::-1], "The order is G_x, G_u."),
                 Mistake(lambda x, u, t: odometry.step_jacobians(x, u, t, "midpoint"), "These are the midpoint model's. The lecture's filter moves along the old heading."),
             ],
@@ -577,6 +609,14 @@ CHAPTER = Chapter(
                 Mistake(
                     _ekf(gain=lambda P, H, R: P @ H.T @ np.linalg.inv(H @ P @ H.T)),
                     "The sensor's noise is missing from S.",
+                ),
+                Mistake(
+                    lambda *given: (2 * _ekf(short=True)(*given)[0] - ekf_step(*given)[0], ekf_step(*given)[1]),
+                    "You correct away from the measurement: the innovation is measured minus expected.",
+                ),
+                Mistake(
+                    lambda *given: (ekf_step(*given)[0], _ekf(short=True)(*given)[1]),
+                    "The pose is right. The covariance was predicted but not corrected: (I - K H) cov.",
                 ),
             ],
         ),
