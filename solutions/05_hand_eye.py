@@ -83,8 +83,8 @@ guess = "through the center"
 ex.predict("equator", guess, reveal=stages.scan_line)
 
 # %% sphere-center [markdown]
-# The derivative tells it: $\partial d/\partial r = -r/d$. Five of the 31 measurements have a plane closer than 8 mm to the center, which cuts near the *equator*: pose 4 at $|y| = 1.2$ mm, where 0.01 mm
-# of circle radius is 0.26 mm of center. Listing C16 always takes the minus sign; table C17 shows that the thesis chose by pose. So pass the side in.
+# The derivative tells it: $\partial d/\partial r = -r/d$. Five of the 31 scan lines pass the center closer than 8 mm, near the sphere's *equator*: pose 4 at
+# $|y| = 1.2$ mm, where 0.01 mm of circle radius is 0.26 mm of center. Listing C16 always takes the minus sign; table C17 shows that the thesis chose by pose. So pass the side in.
 
 # %% sphere_center_from_profile
 @ex.sphere_center_from_profile
@@ -318,7 +318,8 @@ for e in misprints.explanations(handeye_data.printed_entries(), 12, fit.T_FS, fi
 # ## Name them
 #
 # Now write the search. `entries` maps (table, pose, column) to the printed text, such as `'1397.69'`; `handeye_data.measurements_from(entries)` makes arrays of it. Return the set of
-# wrong entries. Any procedure is fine that takes less than two seconds; accusing an innocent entry is not. The check also plants slips of its own.
+# wrong entries. Any procedure is fine, within two seconds a call: recompute only the row you change.
+# Accusing an innocent entry is not. The check also plants slips of its own.
 
 # %% find_misprints
 @ex.find_misprints
