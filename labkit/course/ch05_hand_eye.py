@@ -622,8 +622,6 @@ CHAPTER = Chapter(
                 Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3].T, T[:3, 3]), c)),
                         "Your rotation is the transpose: the nine unknowns came back in the other order (rows and columns)."),
                 Mistake(_linear(lambda T, c: (T, -c)), "The target has the wrong sign: it stands on the other side of the equation, with -R_BF'."),
-                Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3], -T[:3, 3]), -c)),
-                        "Scanner translation and target have the wrong sign: the right side is -R_BF' t_BF."),
                 Mistake(_linear_without_rotation, "On noisy data your nine numbers are not a rotation: take the nearest one."),
                 Mistake(_linear(lambda T, c: (frames.invert(T), c)), "Your pose is the inverse, T_SF."),
                 Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3], -T[:3, 3]), c)), "The translation of T_FS has the wrong sign."),
