@@ -27,7 +27,7 @@ CONTROL_NOISE = {  # variances per way as the lecture prints them: (5 cm)^2 per 
     "k_drift": math.radians(2.0) ** 2 / 1.0,
 }
 SENSORS = ("landmarks", "beams", "likelihood field")
-MIN_INJECTED = 0.02  # with recovery a few random poses always look around: a wrong place may fit fairly well
+MIN_INJECTED = 0.1  # with recovery some random poses always look around: a wrong place may fit fairly well
 MAX_INJECTED = 0.5  # share of the cloud that one step may replace: the rest must be able to hold on to what is right
 _BIN_TURN, _MODE_TURN = math.radians(15), math.radians(30)
 

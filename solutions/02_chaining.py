@@ -4,8 +4,8 @@
 # **What you will do.** Chain four measured transforms around a loop, find by how much the loop misses itself, explain the last printed digits, and
 # share out the error.
 #
-# **What you will learn.** Why the order of a product matters, how a small turn becomes millimeters through its lever, how errors grow with the number
-# of links, what a long product does to right angles, and why two loops need all their links at once.
+# **What you will learn.** What the order of a product does, how a small turn becomes millimeters through its lever, how errors grow with the number
+# of links, what a long product does to right angles, and what a second loop changes.
 #
 # **What you need.** Chapter 1. About 75 minutes.
 
@@ -50,7 +50,7 @@ for k, (T, S) in enumerate(zip(printed, measured)):
 # ## First A, then B
 #
 # Every move is made *in the frame that has been reached*. Below, A shifts and turns by 60°, B shifts only. Decide first, then drag the frames A and B,
-# and turn them with the sliders. *No turns* shows when you would not notice a wrong order.
+# and turn them with the sliders. Then try *No turns*.
 
 # %% predict-order
 guess = ...  # your code here
@@ -169,12 +169,12 @@ ex.predict("lever", guess, reveal=stages.open_loop)
 # %% growth [markdown]
 # ## How errors grow
 #
-# Let every link carry independent noise. Turns of different links add like random steps, a turn moves the end by its lever $l_k$:
+# Let every link carry independent noise, and take the mean over many chains. Turns of different links add like random steps, a turn moves the end by its lever $l_k$:
 #
 # $$\text{angle}^2 = 3N\sigma_r^2, \qquad \text{distance}^2 = 3N\sigma_t^2 + 2\sigma_r^2 \sum_k |l_k|^2 .$$
 #
-# (A turn about the lever itself moves nothing: two of three components count.) For $N$ links of length $L$ in a row the levers are $0, L, \dots, (N-1)L$, and their squares add up to
-# about $L^2N^3/3$. On a loop of fixed size they stay below its diameter. In the figure, left: where a hundred chains end, seen along the chain; right: the laws, and what was simulated.
+# (A turn about the lever itself moves nothing: two of three components count.) For $N$ links of length $L$ in a row the levers are $0, L, \dots, (N-1)L$.
+# On a loop of fixed size they stay below its diameter. In the figure, left: where a hundred chains end, seen along the chain; right: the laws, and what was simulated.
 
 # %% predict-growth
 guess = ...  # your code here
@@ -184,7 +184,7 @@ guess = "2.8 times"
 ex.predict("growth", guess, reveal=stages.growth)
 
 # %% what-the-arm-did [markdown]
-# The law also reads backwards. If the sheet's closure angle is typical, it tells the noise of a single link; with the sheet's levers, this noise predicts the distance.
+# (In a row the squares of the levers add up to about $L^2N^3/3$.) The law also reads backwards. If the sheet's closure angle is typical, it tells the noise of a single link; with the sheet's levers, this noise predicts the distance.
 # One loop is one sample, so expect agreement within a factor of two or three, not more.
 
 # %% noise-of-the-sheet
@@ -294,7 +294,7 @@ for k in range(1, 4):
 print(f"weighted sum of squares {graph.chi2:.1f}, expected about {graph.dof}")
 
 # %% second-loop [markdown]
-# With a second loop the simple way ends. Six frames, seven links, two loops A and B with one link in common. Decide what happens, then step through the measurements.
+# Now a second loop. Six frames, seven links, two loops A and B with one link in common. Decide what happens, then step through the measurements.
 # Left: the frames with their errors magnified; right: by how much each loop is still open.
 
 # %% predict-two-loops

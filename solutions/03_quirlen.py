@@ -4,8 +4,8 @@
 # **What you will do.** Find the tip of a tool from poses that all touch one point (*Quirlen*, swirling), judge the result, plan better poses, and survive
 # bad ones.
 #
-# **What you will learn.** Why a small residual does not mean a good calibration, what singular values say before anything is measured, what the sheet's
-# $s_0$ means in millimeters, why two poses are never enough, and how to let go of outliers.
+# **What you will learn.** What a small residual is worth, what singular values say before anything is measured, what the sheet's
+# $s_0$ means in millimeters, how many poses it takes, and how to let go of outliers.
 #
 # **What you need.** Chapter 1, least squares. About 90 minutes.
 
@@ -267,14 +267,14 @@ for words, T, noise in (("exact", exact, {}), ("noisy", noisy, {}), ("noise know
 # %% beyond [markdown]
 # ## Beyond the document: bad poses
 #
-# One slip of the tip, one pose read while the robot still moved: squares listen to the loudest. A robust estimate asks which poses *agree*, and weighs each by its distance $d$ from them.
+# One slip of the tip, one pose read while the robot still moved: a few bad poses come among the good ones. A robust estimate asks which poses *agree*, and weighs each by its distance $d$ from them.
 # Tukey's weights are $w = (1 - q^2)^2$ with $q = d / (7\,\sigma)$, and exactly 0 for $q > 1$. Least squares with these weights is repeated until it settles. It needs a start that no bad pose
 # can spoil: the best of a hundred solutions from three poses each.
 
 # %% robust_weights
 @ex.robust_weights
 def robust_weights(distances, scale):
-    """Return Tukey's weights, shape (n,), with the cutoff at 7 scales."""
+    """Return Tukey's weights, shape (n,), from distances (mm) and the scale (the noise, mm), with the cutoff at 7 scales."""
     ### BEGIN SOLUTION
     q = distances / (7 * scale)
     return np.where(q < 1, (1 - q**2) ** 2, 0.0)

@@ -6,13 +6,16 @@
 # **What you will learn.** What a quadratic model is, why Newton climbs as willingly as it descends, what a sum of squares buys, how a gain ratio keeps a
 # method honest, and why "reaches the minimum from far away" says little.
 #
-# **What you need.** Gradient, matrix, a little NumPy. About 80 minutes. Chapter 5 uses all of it on real robot data.
+# **What you need.** Gradient, matrix, a little NumPy. Two sittings of about an hour, the second from
+# *Gauss-Newton needs a sum of squares* on. Chapter 5 uses all of it on real robot data.
 
 # %% notation [markdown]
 # | letter | meaning |
 # | --- | --- |
 # | $x = (x_1, x_2)$ | the unknowns; $x^k$ is the iterate after $k$ steps. Nothing in this chapter has a unit |
 # | $f$, $g = \nabla f$, $H = \nabla^2 f$ | cost, gradient, Hessian |
+# | L, G, S | local minimum, global minimum, saddle of this $f$ |
+# | $t$ | place on the line through both centers: 0 at $(1, 1)$, 1 at $(-1, -2)$ |
 # | $r$, $J$ | residuals and their Jacobian; the cost is then $\tfrac12 |r|^2$ |
 # | $h$, $\Delta$ | a step, and the radius within which it is trusted |
 # | $m(h) = f + g^\top h + \tfrac12 h^\top B h$ | the quadratic model; $B$ is $H$, or $J^\top J$ |
@@ -70,7 +73,7 @@ def gradient(x):
 # %% predict-top
 guess = ...  # your code here
 ### BEGIN SOLUTION
-guess = "on top of the pass"
+guess = "on the pass between the wells"
 ### END SOLUTION
 ex.predict("top", guess, reveal=stages.line)
 
@@ -100,8 +103,8 @@ def hessian(x):
 # %% listing-c7 [markdown]
 # ## Against the document: listing C7
 #
-# The thesis prints the Hessian twice, as formulas (listing C7) and as MATLAB code (C9). They differ. Who is right? No derivation is needed: the Hessian is the
-# derivative of the gradient, and a derivative can be *measured* by central differences.
+# The thesis prints the Hessian twice, as formulas (listing C7) and as MATLAB code (C9). They differ. Who is right? The Hessian is the derivative of the
+# gradient, and a derivative can be *measured* by central differences.
 
 # %% compare-listing-c7
 x = np.array([0.3, -0.7])
@@ -162,7 +165,7 @@ saddle = np.zeros(2)
 for _ in range(10):
     saddle = saddle + newton_step(gradient(saddle), hessian(saddle))
 ### END SOLUTION
-ex.saddle(saddle)
+saddle = ex.saddle(saddle)
 
 # %% compare-extrema
 for name, printed, e in zip(wells.NAMES, ((0.979, 0.968), (-0.995, -1.992), (0.105, -0.205)), wells.extrema()):
@@ -210,7 +213,7 @@ def gauss_newton_step(r, J):
 # ## Trust, but measure
 #
 # $J^\top J$ has no negative eigenvalues, so Gauss-Newton points downhill; but nothing limits how far it goes. A **trust region** asks after every step: how much did $f$
-# really fall, and how much had the model promised? That is $\rho$ in (2-36). Below 0 the step is taken back; below ¼ the radius shrinks; above ¾, at the rim, it doubles.
+# really fall, and how much had the model promised? That is $\rho$ in (2-36). Below 0.1 the step is taken back; below ¼ the radius shrinks; above ¾, at the rim, it doubles.
 # **Levenberg-Marquardt** turns the same knob under another name: it adds $\lambda I$ to $J^\top J$, and a large $\lambda$ means a short step.
 
 # %% gain_ratio
@@ -227,8 +230,8 @@ def gain_ratio(cost, new_cost, g, B, step):
 # ## Inside the radius: the dogleg
 #
 # Minimizing $m$ on a disk exactly takes an inner iteration. Powell's dogleg is a bent path that is nearly as good: from 0 down the gradient to the lowest
-# point in that direction, the *corner* $-\tfrac{g^\top g}{g^\top B g}\,g$, and from there straight to the Newton point $-B^{-1}g$. Follow it until the path ends or the rim cuts it.
-# Stopping on the first leg gives the Cauchy point (2-39).
+# point in that direction, the *corner* $p = -\tfrac{g^\top g}{g^\top B g}\,g$, and from there along the leg $l = -B^{-1}g - p$ to the Newton point. Follow it until the path ends or the rim cuts it;
+# on the second leg at $p + s\,l$ with $s = (-b + \sqrt{b^2 - ac})/a$, where $a = l^\top l$, $b = p^\top l$, $c = p^\top p - \Delta^2$. Stopping on the first leg gives the Cauchy point (2-39).
 
 # %% dogleg_step
 @ex.dogleg_step
@@ -250,12 +253,12 @@ def dogleg_step(g, B, radius):
 # %% assemble-text [markdown]
 # ## Your parts, assembled
 #
-# This loop is all there is to a trust region. It uses your functions on the residuals of the two wells, with $B = J^\top J$. Watch $\rho$ and the radius. The
-# workbook's `opt.trust_region` is the same loop with more care.
+# This loop is all there is to a trust region. It uses your functions on the residuals of the two wells, with $B = J^\top J$, far out. Watch $\rho$ and the radius:
+# which step is taken back, and what does the next one do better? The workbook's `opt.trust_region` is the same loop with more care.
 
 # %% assemble
-x, radius = np.array([3.0, 3.0]), 1.0
-for k in range(6):
+x, radius = np.array([10.0, 10.0]), 1.0
+for k in range(8):
     r, J = wells.residual(x), wells.jacobian(x)
     g, B = J.T @ r, J.T @ J
     step = dogleg_step(g, B, radius)
@@ -270,7 +273,7 @@ for k in range(6):
 # ## Four paths on one map
 #
 # Now all four from the same start. Newton and the trust region (*Trust-Region-Verfahren*) use the true Hessian, Gauss-Newton and Levenberg-Marquardt the sum of squares. Blue lines are
-# the chosen method's model at the chosen iteration, the dashed circle its radius, the thick bar its step. Decide first; then drag the start, and walk through the iterations.
+# the chosen method's model at the chosen iteration, the dashed circle its radius, the thick bar its step. Decide; then drag the start and the iteration.
 
 # %% predict-four
 guess = ...  # your code here
@@ -301,10 +304,21 @@ for s, claim in claims:
     print(f"{f'({s:g}, {s:g})':12}{claim:22}", *words)
 
 # %% table-verdict [markdown]
-# The Newton column comes out to the iteration. Of all stand-ins only BFGS ends where the table says for all four other starts: what the thesis praises as its trust
-# region was probably a quasi-Newton method. The deviations $\mu$ of table 7-1 measure no accuracy either: they are an iterate with four digits minus an "ideal" one with two.
+# The Newton column comes out to the iteration. Of the five stand-ins only BFGS ends where the table says from all four other starts. How much is that worth?
+# Suppose that every landing were the toss of a coin, L or G. How likely is it that **at least one of five** stand-ins has all four landings right?
+
+# %% luck
+luck = ...  # your code here
+### BEGIN SOLUTION
+luck = 1 - (1 - 0.5**4) ** 5
+### END SOLUTION
+luck = ex.luck(luck)
+
+# %% luck-verdict [markdown]
+# So four landings are weak evidence, and two of the four starts are Gauss-Newton's. Together with the documented fallback of `fminunc` they *suggest* that the praised trust
+# region was a quasi-Newton method. The deviations $\mu$ of table 7-1 measure no accuracy either: they are an iterate with four digits minus an "ideal" one with two.
 #
-# And "the farthest start"? Before you rub the next figure free, decide how much of the square leads Newton to a minimum. Then try all four methods.
+# And "the farthest start"? Decide how much of the square leads Newton to a minimum, then rub it free for all four methods.
 
 # %% predict-share
 guess = ...  # your code here
@@ -328,16 +342,17 @@ for method in wells.METHODS:
 # %% break-it-text [markdown]
 # ## Break it
 #
-# A stopping rule can lie. Out on the plain the gradient fades, and "the gradient is small" is true and worthless. Ask for the place and the kind as well. The
-# last line is another way to fail: two unknowns of which only the sum is seen.
+# A stopping rule can lie. Out on the plain the gradient fades, and "the gradient is small" is true and worthless. Ask for the place and the kind as well. Even
+# the kind can be fooled, when "vanishes" means an absolute $10^{-6}$: `opt.classify_extremum` compares $|g|$ with the curvature instead.
 
 # %% break-it
 run = wells.run("newton", (3.0, 3.0))
 print(f"{run.reason} after {run.iterations} steps: converged = {run.converged}")
-kind = opt.classify_extremum(gradient(run.solution), hessian(run.solution))
-print(f"|x| = {np.linalg.norm(run.solution):.0f}, f = {run.cost[-1]:.1e}, kind: {kind}")
-one_too_many = opt.gauss_newton(lambda x: np.array([x.sum(), 1]), lambda x: np.array([[1, 1], [0, 0]]), [1, 2])
-print(f"{one_too_many.reason}: converged = {one_too_many.converged}")
+g, H = gradient(run.solution), hessian(run.solution)
+print(f"|x| = {np.linalg.norm(run.solution):.0f}, f = {run.cost[-1]:.1e}, |g| = {np.linalg.norm(g):.0e}")
+print(f"largest curvature {np.abs(np.linalg.eigvalsh(H)).max():.0e}")
+print(f"your classify_extremum: {classify_extremum(g, H)}")
+print(f"opt.classify_extremum:  {opt.classify_extremum(g, H)}")
 
 # %% beyond [markdown]
 # ## Beyond the document: widen the wells

@@ -140,7 +140,7 @@ ex.predict("axes", guess, reveal=stages.two_axes)
 # ## The rotation as a null vector
 #
 # Stack the **columns** of $X$ into $\operatorname{vec} X$. Then $\operatorname{vec}(PXQ) = (Q^\top \otimes P)\operatorname{vec} X$, and $R_A X - X R_B = 0$ becomes nine
-# linear equations a motion (equations 7 to 9): $\;m_i \operatorname{vec} X = 0$.
+# linear equations a motion (equations 7 to 9): $\;m_i \operatorname{vec} X = 0$, stacked over all motions $M \operatorname{vec} X = 0$.
 
 # %% kron_row
 @ex.kron_row
@@ -169,7 +169,7 @@ def rotation_from_nullvector(M):
 # %% translation [markdown]
 # ## The translation by least squares
 #
-# With the rotation known, the last column of $A_i X = X B_i$ is linear in $t$ (equations 14 to 16): $(I - R_{A_i})\,t = t_{A_i} - R\,t_{B_i}$. One motion leaves the part of
+# With the rotation $R$ known, the last column of $A_i X = X B_i$ is linear in $t$ (equations 14 to 16): $(I - R_{A_i})\,t = t_{A_i} - R\,t_{B_i}$, stacked $K_1 t = K_2$. One motion leaves the part of
 # $t$ along its axis free, so two directions are needed again.
 
 # %% translation_lsq
@@ -186,13 +186,13 @@ def translation_lsq(A, B, R):
 # %% errors [markdown]
 # ## Two errors, taken at their word
 #
-# The report measures its fit by $E_{rot} = \frac{1}{N-1}\lVert M^\top M\,v \rVert$ (13) and $E_{trans} = \frac{1}{N-1}\lVert K_1 t - K_2 \rVert$ (17). Write them exactly so. One contains the
-# squares of small angles, the other no square at all, and both shrink with $N$.
+# With $v$ the null vector (of length 1) and $N$ the number of motions, the report measures its fit by $E_{rot} = \frac{1}{N-1}\lVert M^\top M\,v \rVert$ (13) and $E_{trans} = \frac{1}{N-1}\lVert K_1 t - K_2 \rVert$ (17). Write them exactly so. One contains the
+# squares of small angles and hardly changes with $N$; the other has no square at all and shrinks like $1/\sqrt{N}$, however bad the fit.
 
 # %% e_rot
 @ex.e_rot
 def e_rot(M):
-    """Return E_rot of the stacked blocks M, shape (9 N, 9); v has length 1."""
+    """Return E_rot of the stacked blocks M, shape (9 N, 9)."""
     ### BEGIN SOLUTION
     v = np.linalg.svd(M)[2][-1]
     return np.linalg.norm(M.T @ (M @ v)) / (len(M) / 9 - 1)
@@ -242,22 +242,23 @@ print("share of readings used at a stop:", used.min(), "to", used.max(), "- excl
 # %% mounting
 mounting = ...  # your code here
 ### BEGIN SOLUTION
-A, B = A[kept][1:], B[kept][1:]
-M = np.concatenate([kron_row(a[:3, :3], b[:3, :3]) for a, b in zip(A, B)])
+A_kept, B_kept = A[kept][1:], B[kept][1:]
+M = np.concatenate([kron_row(a[:3, :3], b[:3, :3]) for a, b in zip(A_kept, B_kept)])
 mounting = np.eye(4)
 mounting[:3, :3] = rotation_from_nullvector(M)
-mounting[:3, 3] = translation_lsq(A, B, mounting[:3, :3])
+mounting[:3, 3] = translation_lsq(A_kept, B_kept, mounting[:3, :3])
 ### END SOLUTION
 mounting = ex.mounting(mounting)
 
 # %% spread-text [markdown]
-# Six runs give six mountings. Appendix D prints the variance over the runs (*Rozptyl*), divided by 6. What is the standard deviation of the height z, in mm?
+# Six runs over the same poses give six mountings: `mountings`, shape (6, 4, 4), in mm. Appendix D prints the variance over its runs (*Rozptyl*), divided by 6. Divide as it
+# does: what is the standard deviation of the height z over our six, in mm?
 
 # %% spread
-mountings = report.synthetic_mountings()
+mountings = np.array([run.T_FE for run in report.synthetic_mountings()])
 spread = ...  # your code here
 ### BEGIN SOLUTION
-spread = np.array([m.T_FE[2, 3] for m in mountings]).std()
+spread = mountings[:, 2, 3].std()
 ### END SOLUTION
 spread = ex.spread(spread)
 
@@ -300,7 +301,7 @@ ex.predict("runs", guess, reveal=stages.six_runs)
 # ## Beyond the document: can it be done better?
 #
 # The report solves the rotation first, then the translation; so do most methods of OpenCV. The figure shows seven methods beside the Cramér-Rao bound, which no unbiased method can beat
-# (stored results, 400 trials a case). Choose the noise.
+# (stored results of 400 trials a case, so the ratios themselves scatter by about 2 %). Choose the noise.
 
 # %% predict-methods
 guess = ...  # your code here
@@ -311,15 +312,15 @@ ex.predict("methods", guess, reveal=stages.methods)
 
 # %% everything-at-once [markdown]
 # Rotation first means: translations may not help the rotation. Maximum likelihood weighs both by their noise; `axxb.calibrate_hand_eye` does, and returns a covariance. It treats the
-# first pose like any other, and so needs one more unknown, here $T_{BW}$. On our log it gains little, since the systematic error is nobody's noise model. But
-# its standard deviation says how far off it may be; six equal runs do not.
+# first pose like any other, and so needs one more unknown, here $T_{BW}$. On our log it gains little, since the systematic error is nobody's noise model,
+# though `robust` sets aside the worst stop left, pose 4. But its standard deviation says how far off it may be; six equal runs do not.
 
 # %% maximum-likelihood
 best = axxb.calibrate_hand_eye(invert(T_BF), T_WE, robust=True)
-std = np.sqrt(np.diag(best.covariance))[9:]
+std = np.sqrt(np.diag(best.covariance))[9:]  # 12 unknowns: two poses, the translation of T_FE comes last
 for name, t in (("truth", simulation.T_FE), ("report's method", mounting), ("maximum likelihood", best.target)):
-    print(f"{name:19}", t[:3, 3], "mm")
-print("standard deviation ", std, "mm; ignored poses:", np.flatnonzero(best.weights < 0.01))
+    print(f"{name:19}", *t[:3, 3].round(2), "mm")
+print("standard deviation ", *std.round(2), "mm; ignored poses:", np.flatnonzero(best.weights < 0.01))
 
 # %% motion [markdown]
 # ## In motion
@@ -341,7 +342,7 @@ ex.predict("motion", guess, reveal=stages.dynamic_errors)
 # %% time_offset
 @ex.time_offset
 def time_offset(time, reference, delayed, max_offset=0.2):
-    """Return by how many seconds the speeds `delayed` lag behind `reference`, to a fraction of a sample."""
+    """Return by how many seconds, at most +-max_offset, `delayed` lags behind `reference`; finer than a sample."""
     ### BEGIN SOLUTION
     step = time[1] - time[0]
     n = round(max_offset / step)

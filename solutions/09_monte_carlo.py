@@ -332,7 +332,7 @@ ex.predict("kidnap", guess, reveal=stages.arena)
 # How does the recovery know? It compares two running averages of the mean weight, a quick and a slow one. When the
 # quick one drops below the slow one,
 # that share of the particles is replaced by random poses: $\max(0,\, 1 - w_\text{fast} / w_\text{slow})$.
-# Our filter keeps that share between 2 % and 50 %: a few poses always look around, and half of the cloud stays.
+# Our filter keeps that share between 10 % and 50 %: some poses always look around, and half of the cloud stays.
 
 # %% recover
 @ex.recover

@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from labkit import lie, wells
 from labkit import optimization as opt
+from labkit.ledger.ch04_optimization import luck
 
 RNG = np.random.default_rng(4)
 POINTS = RNG.uniform(-4, 4, (30, 2))
@@ -346,3 +347,8 @@ def test_start_in_the_minimum_and_steps_into_nothing():
 def test_bad_input_is_refused_in_one_sentence(call, words):
     with pytest.raises(ValueError, match=words):
         call()
+
+
+def test_luck_is_what_tosses_of_a_coin_give():
+    right = np.random.default_rng(1).integers(2, size=(100_000, 5, 4)).astype(bool)
+    assert right.all(axis=2).any(axis=1).mean() == pytest.approx(luck(), abs=0.005)

@@ -91,3 +91,18 @@ def test_rubbing_uncovers_what_the_brush_touched_and_nothing_else():
     assert stage.result["shares"][:2].sum() < 0.01 < stage.result["shares"][2]  # the prediction "share"
     stage.set(method="trust_region")
     assert stage.result["shares"][:2].sum() == 1
+
+
+@pytest.mark.parametrize("method", wells.METHODS)
+def test_no_sentence_of_a_caption_begins_in_lower_case(method):
+    near = stages.saddle()
+    near.set(method=method) if method in ("newton", "trust_region") else None
+    basins = stages.basins()
+    basins.set(method=method, all=True)
+    for stage in (stages.line(), near, stages.four_paths(), basins):
+        assert not any(sentence[0].islower() for sentence in stage.caption.split(". ")), stage.caption
+
+
+def test_the_first_prediction_comes_true():
+    result = stages.walk({"start": np.array([0.2, 0.0])})
+    assert result["bend"] < 0 and result["end"] == "saddle"

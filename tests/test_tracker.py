@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from labkit import axxb, tracker, tracker_simulation
+from labkit.course import ch06_tracker as ch06
 from labkit.frames import invert, pose, pose_distance
 from labkit.ledger import ch06_tracker
 from labkit.lie import exp_so3
@@ -314,6 +315,18 @@ def test_six_runs_agree_with_each_other_better_than_with_the_truth():
     off = np.linalg.norm(t.mean(0) - T_FE[:3, 3])
     assert np.linalg.norm(t.std(0)) < 0.3 < 1.0 < off < 3.0
     assert [np.flatnonzero(~m.kept).tolist() for m in mountings][0] == [13]
+
+
+def test_more_poses_shrink_e_trans_and_leave_e_rot():
+    """What chapter 6 says of equations (13) and (17): a mean of squares, and one that falls as 1 / sqrt(N)."""
+    few, many = (
+        [axxb.kronecker_matrix(*m) for m in runs]
+        for runs in ([ch06.motions(np.random.default_rng(s), n) for s in range(30)] for n in (20, 80))
+    )
+    e_rot = [np.mean([tracker.e_rot(M) for M in runs]) for runs in (few, many)]
+    np.testing.assert_allclose(e_rot[1] / e_rot[0], 1.0, atol=0.15)
+    gaps = np.random.default_rng(0).normal(size=(8000, 3))
+    np.testing.assert_allclose(tracker.e_trans(gaps) / tracker.e_trans(gaps[:2000]), 0.5, rtol=0.05)
 
 
 def test_hand_eye_with_the_tracker_on_the_flange():

@@ -143,6 +143,12 @@ def _translation_only(transforms):
     return _moved(poses, moves)
 
 
+def _share_on_the_right(transforms):
+    poses, xi, n = _parts(transforms)
+    moved = poses @ exp_se3(-np.arange(n + 1)[:, None] / n * xi)
+    return frames.relative(moved[:-1], moved[1:])
+
+
 def _poses_returned(transforms):
     poses, xi, n = _parts(transforms)
     return (exp_se3(-np.arange(n + 1)[:, None] / n * xi) @ poses)[1:]
@@ -211,6 +217,14 @@ CHAPTER = Chapter(
                     "The rotations are multiplied, but the translations merely added. Each one has to be turned into the first frame: let the 4x4 product do it.",
                 ),
                 Mistake(
+                    lambda Ts: np.eye(4),
+                    "This is the identity: the products are formed but not kept. Write T = T @ link.",
+                ),
+                Mistake(
+                    lambda Ts: Ts[0],
+                    "This is the first link alone: does `return` stand inside the loop?",
+                ),
+                Mistake(
                     lambda Ts: frames.invert(chaining.chain(Ts)),
                     "This is the inverse of the chain: T_DA instead of T_AD.",
                 ),
@@ -223,7 +237,7 @@ CHAPTER = Chapter(
             metric=metrics.several(metrics.angles(1e-6), metrics.numbers(1e-9, "mm"), names=("angle", "distance")),
             hints=(
                 "How far is T from the identity? One number for the turn, one for the shift.",
-                "The angle follows from the trace of the rotation block, the distance is the length of the translation.",
+                "The angle follows from the trace of the 3x3 rotation block (NaN means an arccosine of more than 1), the distance is the length of the translation.",
                 "return np.arccos((np.trace(T[:3, :3]) - 1) / 2), np.linalg.norm(T[:3, 3]).",
             ),
             mistakes=[
@@ -254,6 +268,18 @@ CHAPTER = Chapter(
                 Mistake(
                     _closure(lambda T: np.arctan2(T[1, 0], T[0, 0])),
                     "You read the turn about z alone. The loop also tilts: the angle of the whole rotation is asked for.",
+                ),
+                Mistake(
+                    _closure(lambda T: (np.trace(T[:3, :3]) - 1) / 2),
+                    "This is the cosine of the angle: its arccosine is missing.",
+                ),
+                Mistake(
+                    _closure(None, lambda T: np.abs(T[:3, 3]).sum()),
+                    "You added the components of the shift. The distance is the root of the sum of squares.",
+                ),
+                Mistake(
+                    _closure(None, lambda T: np.linalg.norm(log_se3(T)[3:])),
+                    "This is the length of the twist's shift, a path along a screw. The distance asked for is straight: the length of the translation of T.",
                 ),
                 Mistake(
                     lambda T: chaining.closure_error(T)[::-1],
@@ -307,6 +333,14 @@ CHAPTER = Chapter(
                     "You took x and y alone. The loop also misses in z.",
                 ),
                 Mistake(
+                    lambda: np.abs(_sheet()[:3, 3]).sum(),
+                    "You added the components. The length is the root of the sum of squares.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_sheet()),
+                    "This is the norm of the whole matrix, the numbers of the rotation included. Only the translation holds lengths.",
+                ),
+                Mistake(
                     lambda: np.linalg.norm(chaining.chain(chaining.printed_transforms()[::-1])[:3, 3]),
                     "You multiplied the links in the reverse order.",
                 ),
@@ -348,7 +382,11 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _svd_variant(lambda U, s, Vt: U @ np.diag(s) @ Vt),
-                    "With the singular values put back this is R again. Leave them out.",
+                    "This is R, as worn as before: U S V' puts it together again. Leave the singular values out.",
+                ),
+                Mistake(
+                    _svd_variant(lambda U, s, Vt: Vt @ U),
+                    "The factors have changed places: U V' is not V' U.",
                 ),
                 Mistake(
                     _svd_variant(lambda U, s, Vt: Vt.T @ U.T),
@@ -413,6 +451,14 @@ CHAPTER = Chapter(
                 Mistake(
                     _translation_only,
                     "You shared out the translation but not the rotation: the loop still ends turned.",
+                ),
+                Mistake(
+                    lambda transforms: transforms,
+                    "The links are as they were. If every pose moves alike, nothing between neighbors changes: the pose after k links goes back by k/N.",
+                ),
+                Mistake(
+                    _share_on_the_right,
+                    "You put the share to the right of P_k. But xi is written in the first frame, so it belongs on the left.",
                 ),
                 Mistake(
                     _poses_returned,

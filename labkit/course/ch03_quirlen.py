@@ -131,6 +131,10 @@ CHAPTER = Chapter(
                     "The blocks have changed places: the unknowns are (tip, pivot), the tip first.",
                 ),
                 Mistake(
+                    _blocks(lambda R: R, -np.ones((3, 3))),
+                    "`np.ones` fills the whole block; the identity matrix is `np.eye(3)`.",
+                ),
+                Mistake(
                     _side_by_side,
                     "You set the poses side by side. Each pose adds equations, not unknowns: stack them beneath each other.",
                 ),
@@ -185,7 +189,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda A, b: np.linalg.lstsq(A[:6], b[:6], rcond=None)[0],
-                    "You used the first two poses alone, and two poses never determine the tip. Use all equations.",
+                    "You used the first two poses alone. Use all equations.",
                 ),
                 Mistake(
                     lambda A, b: A.T @ b,
@@ -248,6 +252,18 @@ CHAPTER = Chapter(
                     "This is where the tip is. Subtract the pivot.",
                 ),
                 Mistake(
+                    lambda T, tip, point: T[:, :3, :3] @ tip - point,
+                    "p is missing: the turned tip still has to be carried to where the flange is.",
+                ),
+                Mistake(
+                    lambda T, tip, point: T[:, :3, :3] @ tip - T[:, :3, 3] - point,
+                    "The sign of p: the tip is at R tip + p.",
+                ),
+                Mistake(
+                    lambda T, tip, point: (T[:, :3, :3] * tip).sum(1) + T[:, :3, 3] - point,
+                    "You multiplied entry by entry and summed along the wrong axis: R @ tip adds along each row of R.",
+                ),
+                Mistake(
                     lambda T, tip, point: tip + T[:, :3, 3] - point,
                     "You added the tip without turning it: it is given in the tool frame.",
                 ),
@@ -281,6 +297,10 @@ CHAPTER = Chapter(
                     "This is the unbiased estimate, divided by 3n - 6. A better number, but not the sheet's s0.",
                 ),
                 Mistake(lambda: np.sqrt(_squares()), "The division by n is missing under the root."),
+                Mistake(
+                    lambda: np.sqrt(_squares()) / 12,
+                    "The n belongs under the root: you divided after it.",
+                ),
                 Mistake(lambda: _squares() / 12, "The root is missing: this is a variance, in mm^2."),
                 Mistake(
                     lambda: np.linalg.norm(_kreisel().residuals, axis=1).mean(),
@@ -380,6 +400,18 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda distances, scale: np.maximum(1 - (distances / pivot.TUKEY) ** 2, 0) ** 2,
                     "You did not divide by the scale: the cutoff is 7 standard deviations, not 7 mm.",
+                ),
+                Mistake(
+                    lambda distances, scale: np.maximum(1 - (distances / pivot.TUKEY * scale) ** 2, 0) ** 2,
+                    "`d / 7 * scale` divides by 7 and multiplies by the scale: put 7 * scale in parentheses.",
+                ),
+                Mistake(
+                    _weights(lambda q: 1 - np.maximum(1 - q**2, 0) ** 2),
+                    "The wrong way round: near poses get 0 and far ones 1.",
+                ),
+                Mistake(
+                    lambda distances, scale: np.where(distances > scale, 0.0, (1 - (distances / (pivot.TUKEY * scale)) ** 2) ** 2),
+                    "You cut at one scale. The weight reaches 0 at 7 scales, where q = 1.",
                 ),
                 Mistake(
                     _weights(lambda q: np.minimum(1, 1 / q)),

@@ -4,6 +4,7 @@ import numpy as np
 
 from .. import optimization as opt
 from .. import wells
+from ..ledger import ch04_optimization as ledger
 from . import metrics
 from .engine import Chapter, Exercise, Mistake, Prediction, Value
 
@@ -21,13 +22,17 @@ def turned(eigenvalues, angle):
 
 
 def kind_of_point(rng):
-    """Gradient and Hessian of one of the four kinds of point; the saddle has two positive diagonal entries."""
-    angle = np.deg2rad(rng.uniform(30, 60))
+    """Gradient and Hessian of one kind of point: minimum, maximum, a saddle whose diagonal is positive, one whose
+    diagonal is mixed, and two places that are not stationary, the first with a gradient of negative entries only.
+
+    At the stationary ones |g| is a few 1e-8, as after an iteration.
+    """
+    kind = rng.integers(6)
     small, large = rng.uniform(0.5, 1.0), rng.uniform(4.0, 8.0)
-    kind = rng.integers(4)
-    eigenvalues = ((small, large), (-large, -small), (-small, large), (small, large))[kind]
-    g = rng.normal(size=2) if kind == 3 else np.zeros(2)
-    return g, turned(eigenvalues, angle)
+    eigenvalues = ((small, large), (-large, -small), (-small, large), (-small, large), (small, large), (small, large))
+    angle = rng.uniform(2, 8) if kind == 3 else rng.uniform(30, 60)
+    g = rng.uniform(0.5, 2.0, 2) * ((-1, -1) if kind == 4 else (1, -1)) * (1 if kind > 3 else 4e-8)
+    return g, turned(eigenvalues[kind], np.deg2rad(angle))
 
 
 def gradient_and_hessian(rng):
@@ -74,6 +79,11 @@ def _gradient(power=2, **changes):
     return variant
 
 
+def _gradient_without_square(x):
+    d, _ = _terms(x)
+    return (2 * wells.DEPTHS / (np.linalg.norm(d, axis=-1) + 1) ** 2) @ d
+
+
 def _hessian(factor=8.0, power=3, bowl=1.0):
     def variant(x):
         d, q = _terms(x)
@@ -83,13 +93,28 @@ def _hessian(factor=8.0, power=3, bowl=1.0):
     return variant
 
 
+UNIT = np.eye(2)
+
+
+def _hessian_with(unit=UNIT, product=np.outer, wells_seen=(0, 1)):
+    """The sum over the wells with other things than I and the outer product."""
+
+    def variant(x):
+        d, q = _terms(x)
+        w = wells.DEPTHS
+        terms = [2 * w[k] / q[k] ** 2 * unit - 8 * w[k] / q[k] ** 3 * product(d[k], d[k]) for k in wells_seen]
+        return sum(terms, np.zeros((2, 2)))
+
+    return variant
+
+
 def _diagonal_only(x):
     return np.diag(np.diag(wells.hessian(x)))
 
 
-def _stationary(kind):
+def _stationary(kind, moves=lambda g: np.linalg.norm(g) > 1e-6):
     def variant(g, H):
-        return "not stationary" if np.linalg.norm(g) > 1e-6 else kind(H)
+        return "not stationary" if moves(g) else kind(H)
 
     return variant
 
@@ -143,6 +168,33 @@ def _leg_from_zero(g, B, radius):
     return step - corner if second else step
 
 
+def _leg_by_length(g, B, radius):
+    """In the second leg: what the corner leaves of the radius, as if the leg went on in the same direction."""
+    full, corner = opt.newton_step(g, B), opt.cauchy_step(g, B, 1e9)
+    length = np.linalg.norm(corner)
+    if not length < radius < np.linalg.norm(full):
+        return opt.dogleg_step(g, B, radius)
+    leg = full - corner
+    return corner + (radius - length) * leg / np.linalg.norm(leg)
+
+
+def _newton_to_the_rim(g, B, radius):
+    """In the second leg: the Newton step shortened to the radius."""
+    full, corner = opt.newton_step(g, B), opt.cauchy_step(g, B, 1e9)
+    second = np.linalg.norm(corner) < radius < np.linalg.norm(full)
+    return _cut_newton(g, B, radius) if second else opt.dogleg_step(g, B, radius)
+
+
+def _past_newton(g, B, radius):
+    """Corner outside, or else the rim on the second leg, also where the Newton point is inside."""
+    full, corner = opt.newton_step(g, B), opt.cauchy_step(g, B, 1e9)
+    if np.linalg.norm(corner) >= radius:
+        return -radius * g / np.linalg.norm(g)
+    leg = full - corner
+    a, b, c = leg @ leg, corner @ leg, corner @ corner - radius**2
+    return corner + (-b + np.sqrt(b * b - a * c)) / a * leg
+
+
 CHAPTER = Chapter(
     "04-optimization",
     [
@@ -161,14 +213,16 @@ CHAPTER = Chapter(
                 Mistake(lambda x: -wells.gradient(x), "This points downhill. The wells are −w/q, and the derivative of −1/q is +1/q² times that of q."),
                 Mistake(_gradient(power=1), "Your denominators are q, not q²: the derivative of 1/q is −1/q² times that of q."),
                 Mistake(_gradient(second=(1.0, 2.0)), "The second well sits at (−1, −2): its offsets are x1 + 1 and x2 + 2."),
+                Mistake(_gradient(second=(-1.0, 2.0)), "The second center is (−1, −2): its second offset is x2 + 2, not x2 − 2."),
+                Mistake(_gradient_without_square, "Your q holds the distance |x − c|, not its square: q = |x − c|² + 1, so `d @ d + 1`."),
                 Mistake(_gradient(one=0.0), "The 1 in q = |x − c|² + 1 is missing from your denominators."),
             ],
         ),
         Prediction(
             "top",
-            question="The parabola that fits f at the start bends downward, the start lies on the slope of the left well. Where does Newton end?",
-            choices=("in the left well", "in the right well", "on top of the pass"),
-            answer="on top of the pass",
+            question="The start lies a fifth of the way from (1, 1) to (-1, -2), where f bends downward. Where does Newton end?",
+            choices=("in the well near (1, 1)", "in the well near (-1, -2)", "on the pass between the wells"),
+            answer="on the pass between the wells",
             why="Newton goes to the vertex of the parabola. Where f bends down, that vertex is a maximum.",
         ),
         Exercise(
@@ -188,15 +242,19 @@ CHAPTER = Chapter(
                 Mistake(_diagonal_only, "The mixed derivatives are not zero: the wells lie diagonally to each other."),
                 Mistake(_hessian(factor=4.0), "The outer product is too small by a factor 2: the gradient of q is 2(x − c)."),
                 Mistake(_hessian(power=2), "The derivative of 1/q² has q³ in its denominator."),
+                Mistake(_hessian_with(product=np.dot), "`d @ d` is a number and lowers all four entries alike. The matrix is `np.outer(d, d)`."),
+                Mistake(_hessian_with(product=np.multiply), "`d * d` has two entries and not four. The matrix is `np.outer(d, d)`."),
+                Mistake(_hessian_with(unit=1.0), "The number 2w/q² is added to all four entries: it belongs to the diagonal, times `np.eye(2)`."),
+                Mistake(_hessian_with(wells_seen=(1,)), "This is the last well alone: the wells add up, `H += ...` and not `H = ...`."),
                 Mistake(_hessian(bowl=0.0), "Only the outer products are there. The part (2w/q²) I comes from differentiating x − c."),
             ],
         ),
         Exercise(
             "classify_extremum",
             reference=opt.classify_extremum,
-            draw=lambda rng: kind_of_point(rng),
+            draw=kind_of_point,
             metric=metrics.exactly(),
-            draws=16,
+            draws=40,
             hints=(
                 "First order first: only a place where the gradient vanishes is a candidate at all.",
                 "Second order: the signs of the eigenvalues of H tell how f bends along its two main directions.",
@@ -206,6 +264,15 @@ CHAPTER = Chapter(
                 Mistake(_second_order_only, "You judge places where the gradient is not zero: they are no extrema, whatever H says."),
                 Mistake(_first_order_only, "A vanishing gradient is necessary, not sufficient: a saddle has one too."),
                 Mistake(_stationary(_by(np.diag)), "The diagonal of H bends up in both coordinates and it can still be a saddle: use the eigenvalues."),
+                Mistake(_stationary(_by(np.trace)), "The trace is the sum of the eigenvalues: a saddle with one large positive one has a positive trace too."),
+                Mistake(
+                    _stationary(_by(np.linalg.eigvalsh), lambda g: g.any()),
+                    "After an iteration the gradient is never exactly 0: up to a norm of 1e-6 it counts as vanished (`np.allclose` stops at 1e-8).",
+                ),
+                Mistake(
+                    _stationary(_by(np.linalg.eigvalsh), lambda g: (g > 1e-6).any()),
+                    "A large negative component is not small: use the norm of g.",
+                ),
                 Mistake(_stationary(lambda H: "minimum" if np.linalg.det(H) > 0 else "saddle"), "A positive determinant also belongs to a maximum: two negative eigenvalues."),
                 Mistake(_swapped, "Minimum and maximum are exchanged: at a minimum f bends up, all eigenvalues are positive."),
             ],
@@ -232,8 +299,8 @@ CHAPTER = Chapter(
             reference=lambda: wells.extrema()[2].x,
             metric=metrics.numbers(1e-3),
             hints=(
-                "Newton goes to the nearest place where the gradient vanishes, whatever its kind. Start it between the wells.",
-                "Start at (0, 0) and repeat x = x + newton_step(gradient(x), hessian(x)) until x stands still.",
+                "Close to a place where the gradient vanishes Newton goes there, whatever its kind.",
+                "Start at (0, 0) and repeat x = x + newton_step(gradient(x), hessian(x)) until x stands still. If it runs away, start between the wells.",
                 "Ten rounds of `x = x + newton_step(gradient(x), hessian(x))` from `x = np.zeros(2)` are plenty.",
             ),
             mistakes=[
@@ -297,7 +364,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda cost, new_cost, g, B, step: (cost - new_cost) / _predicted(g, B, step, half=-0.5),
-                    "m(0) − m(h) changes the sign of both terms, of ½ hᵀB h too.",
+                    "The promised decrease m(0) − m(h) changes the sign of both terms, of ½ hᵀB h too.",
                 ),
             ],
         ),
@@ -310,7 +377,7 @@ CHAPTER = Chapter(
             hints=(
                 "Three cases: the Newton point is inside; the corner is outside; the rim cuts the second leg.",
                 "The corner is −(gᵀg / gᵀBg) g. On the second leg solve |corner + s (newton − corner)| = radius for s between 0 and 1.",
-                "With leg = newton − corner: a = leg·leg, b = corner·leg, c = corner·corner − radius², and s = (−b + √(b² − ac)) / a.",
+                "With leg = newton − corner and a, b, c as above: `return corner + (-b + np.sqrt(b * b - a * c)) / a * leg`.",
             ),
             mistakes=[
                 Mistake(opt.cauchy_step, "That is the Cauchy point: it stops at the corner and never takes the second leg."),
@@ -318,6 +385,9 @@ CHAPTER = Chapter(
                 Mistake(_uncut_newton, "The step leaves the trust region: the Newton point counts only when it lies within the radius."),
                 Mistake(_newton_or_rim, "Between corner and Newton point the rim cuts the second leg; you run straight downhill to the rim."),
                 Mistake(_always_to_the_rim, "When the Newton point is inside the radius, stop there: the model rises beyond it."),
+                Mistake(_leg_by_length, "The path bends at the corner: radius − |corner| along the second leg ends inside the rim. Solve |corner + s leg| = radius."),
+                Mistake(_newton_to_the_rim, "Where the rim cuts the second leg you shorten the Newton step. The path runs from the corner toward Newton there."),
+                Mistake(_past_newton, "The Newton point inside the radius is a case of its own: there s exceeds 1, and you run past it to the rim."),
                 Mistake(_leg_from_zero, "The second leg starts at the corner: add corner to s times the leg."),
             ],
         ),
@@ -327,6 +397,23 @@ CHAPTER = Chapter(
             choices=("none", "one", "two", "all"),
             answer="one",
             why="Newton and Gauss-Newton fly away, the trust region settles in the local minimum, Levenberg-Marquardt happens to jump across it.",
+        ),
+        Value(
+            "luck",
+            reference=ledger.luck,
+            rtol=0.02,
+            hints=(
+                "First one stand-in: four tosses, all of them right.",
+                "At least one of five is the opposite of none of five.",
+                "`1 - (1 - p)**5`, where p is the probability that one stand-in has all four right.",
+            ),
+            mistakes=[
+                Mistake(lambda: 0.5**4, "That is one stand-in by itself. Five were tried."),
+                Mistake(lambda: 5 * 0.5**4, "Adding up counts those cases several times where more than one stand-in is right."),
+                Mistake(lambda: (1 - 0.5**4) ** 5, "That is the probability that none of the five is right."),
+                Mistake(lambda: 1 - (1 - 0.5**5) ** 4, "Four and five are exchanged: four landings each, five stand-ins."),
+                Mistake(lambda: 0.5**20, "That all five stand-ins have all landings right. One is enough."),
+            ],
         ),
         Prediction(
             "share",

@@ -6,7 +6,7 @@ import numpy as np
 
 from .. import axxb, robot, tracker, tracker_simulation
 from ..frames import invert, normalize, pose, relative
-from ..ledger.ch06_tracker import synthetic_mountings
+from ..ledger.ch06_tracker import synthetic_mountings, table_d
 from ..lie import exp_so3
 from ..tables import DATA, read_table
 from . import metrics
@@ -121,6 +121,12 @@ def _signed(X):
     return X * np.sign(np.linalg.det(X))
 
 
+def _orthonormal(X):
+    """The nearest orthogonal matrix, reflections included."""
+    U, _, Vt = np.linalg.svd(X)
+    return U @ Vt
+
+
 def translation_problem(rng):
     A, B = motions(rng)
     return A, B, axxb.rotation_from_kronecker(axxb.kronecker_matrix(A, B))[0]
@@ -174,10 +180,10 @@ def _mad(values):
 
 
 def speed_curves(rng):
-    """Angular speeds of a robot and of a tracker that lags by a fraction of a sample."""
+    """Angular speeds of a robot and of a tracker that lags, or leads, by a fraction of a sample."""
     time = np.arange(600) / 100
     phase = rng.uniform(0, 6, 3)
-    lag = (rng.integers(2, 8) + rng.choice([0.35, 0.42, 0.58, 0.65])) / 100
+    lag = rng.choice([-1, 1]) * (rng.integers(2, 8) + rng.choice([0.35, 0.42, 0.58, 0.65])) / 100
 
     def curve(t):
         return (
@@ -188,6 +194,34 @@ def speed_curves(rng):
         )
 
     return time, curve(time), curve(time - lag), 0.2
+
+
+def _overlap(reference, delayed):
+    """Sums of products over the overlap for every shift: the correlation NumPy calls "full", and the shifts."""
+    return -np.correlate(delayed, reference, "full"), np.arange(1 - len(reference), len(delayed))
+
+
+def _centered_overlap(reference, delayed):
+    return _overlap(reference - reference.mean(), delayed - delayed.mean())
+
+
+def _around(reference, delayed):
+    """Costs of shifts that bring the end of the curve back in at its beginning."""
+    shifts = np.arange(-20, 21)
+    return np.array([np.mean((np.roll(reference, s) - delayed) ** 2) for s in shifts]), shifts
+
+
+def _least(costs, between):
+    """A time offset from costs of shifts, by whole samples or between them."""
+
+    def variant(time, reference, delayed, max_offset):
+        cost, shifts = costs(reference, delayed)
+        k = np.argmin(cost)
+        left, middle, right = cost[k - 1 : k + 2]
+        part = 0.5 * (left - right) / (left - 2 * middle + right) if between else 0.0
+        return (shifts[k] + part) * (time[1] - time[0])
+
+    return variant
 
 
 def _whole_samples(time, reference, delayed, max_offset):
@@ -273,7 +307,7 @@ CHAPTER = Chapter(
         ),
         Prediction(
             "fold",
-            question="Upper arm and forearm are 225 mm each, the elbow folds to 138 deg. How close can the wrist come to axis 2?",
+            question="Upper arm and forearm are 225 mm each, the elbow bends by up to 138 deg from straight. How close can the wrist come to axis 2?",
             answer=161.3,
             unit="mm",
             within=0.03,
@@ -342,6 +376,10 @@ CHAPTER = Chapter(
                     "This is the base seen from the flange: the inverse.",
                 ),
                 Mistake(
+                    lambda dh, q: functools.reduce(np.multiply, _links(dh, q)),
+                    "`*` multiplies entry by entry. The product of two transforms is `@`.",
+                ),
+                Mistake(
                     lambda dh, q: robot.forward_kinematics(dh, -q),
                     "The joint angles enter with the wrong sign: the angle of a link is offset + q.",
                 ),
@@ -389,6 +427,14 @@ CHAPTER = Chapter(
                     lambda A, B: np.kron(np.eye(3), A.T) - np.kron(B, np.eye(3)),
                     "Both matrices are transposed: this is the equation of the inverse motions.",
                 ),
+                Mistake(
+                    lambda A, B: np.kron(A, np.eye(3)) - np.kron(np.eye(3), B),
+                    "vec(P X Q) = (Q' kron P) vec(X): P stands on the right of the product, Q on the left and transposed. A is a P, B is a Q.",
+                ),
+                Mistake(
+                    lambda A, B: np.kron(B.T, np.eye(3)) - np.kron(np.eye(3), A),
+                    "This is the block of X B - A X = 0: the same null vector, so nothing is lost, but the report subtracts X B from A X.",
+                ),
             ],
         ),
         Exercise(
@@ -417,6 +463,26 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda M: np.sqrt(3) * _signed(_null(M).reshape(3, 3, order="F")),
                     "The scale is right, but noise has sheared the matrix: its columns are not orthonormal. Project it to SO(3).",
+                ),
+                Mistake(
+                    lambda M: _orthonormal(_null(M).reshape(3, 3, order="F")),
+                    "The sign is missing: the null vector may come out as -X, and then your matrix is a reflection. Turn it so that the determinant is positive.",
+                ),
+                Mistake(
+                    lambda M: axxb.nearest_rotation(_null(M).reshape(3, 3, order="F")),
+                    "The sign is missing. Where the null vector came out as -X you projected a reflection, and that gives another rotation: make the determinant positive first.",
+                ),
+                *(
+                    Mistake(
+                        lambda M, order=order, scale=scale: scale * _null(M).reshape(3, 3, order=order),
+                        "The null vector as it comes is no rotation yet: its length is 1, its sign is arbitrary, its columns are not orthonormal, and NumPy's reshape fills rows.",
+                    )
+                    for order in "CF"
+                    for scale in (1.0, np.sqrt(3))
+                ),
+                Mistake(
+                    lambda M: axxb.nearest_rotation(_signed(np.linalg.svd(M)[2][:, -1].reshape(3, 3, order="F"))),
+                    "You took a column of NumPy's third result. That is V transposed: the singular vectors are its rows.",
                 ),
                 Mistake(
                     lambda M: axxb.nearest_rotation(_signed(_null(M, 0).reshape(3, 3, order="F"))),
@@ -514,6 +580,14 @@ CHAPTER = Chapter(
                     lambda r: np.linalg.norm(r, axis=1).mean(),
                     "This is the mean distance. Equation (17) takes one norm over everything.",
                 ),
+                Mistake(
+                    lambda r: np.linalg.norm(r, axis=1).sum() / (len(r) - 1),
+                    "You added N distances. Equation (17) takes one norm over everything.",
+                ),
+                Mistake(
+                    lambda r: np.linalg.norm(r, 2) / (len(r) - 1),
+                    "For a matrix, norm(..., 2) is its largest singular value. Equation (17) takes the norm of one long vector.",
+                ),
                 Mistake(lambda r: np.linalg.norm(r) / (r.size - 1), "N counts motions, not coordinates."),
             ],
         ),
@@ -554,8 +628,8 @@ CHAPTER = Chapter(
             metric=metrics.poses(0.002, 0.02),
             hints=(
                 "Put your own functions in a row: blocks, rotation, translation. Pose 13 of this run is nonsense and must not take part.",
-                "A = A[kept][1:] and B = B[kept][1:] are the motions that take part: kept poses, without the reference itself.",
-                "M = np.concatenate([kron_row(a[:3, :3], b[:3, :3]) for a, b in zip(A, B)]), then rotation_from_nullvector and translation_lsq.",
+                "A_kept, B_kept = A[kept][1:], B[kept][1:] are the motions that take part: kept poses, without the reference itself.",
+                "M = np.concatenate([kron_row(a[:3, :3], b[:3, :3]) for a, b in zip(A_kept, B_kept)]), then rotation_from_nullvector and translation_lsq.",
             ),
             mistakes=[
                 Mistake(
@@ -581,7 +655,7 @@ CHAPTER = Chapter(
             hints=(
                 "Six numbers, the z of each mounting. Appendix D prints their variance (Rozptyl), divided by 6.",
                 "The standard deviation is the root of that variance.",
-                "heights = np.array([m.T_FE[2, 3] for m in mountings]); spread = heights.std().",
+                "spread = mountings[:, 2, 3].std().",
             ),
             mistakes=[
                 Mistake(
@@ -596,6 +670,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda: _heights().std() / np.sqrt(6),
                     "This is the standard error of the mean. Wanted is the spread of single runs.",
+                ),
+                Mistake(
+                    lambda: 1000 * np.sqrt(table_d()[2][2]),
+                    "This is the spread of the report's runs. Wanted is that of the six in `mountings`.",
                 ),
             ],
         ),
@@ -650,6 +728,22 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda t, r, d, m: 2 * _whole_samples(t, r, d, m) - tracker.time_offset(t, r, d, m),
                     "The fraction has the wrong sign: the vertex lies toward the smaller of the two neighbors.",
+                ),
+                *(
+                    Mistake(
+                        _least(_around, between),
+                        "np.roll brings the end of the curve back in at its beginning. Compare only the part both curves share.",
+                    )
+                    for between in (True, False)
+                ),
+                *(
+                    Mistake(
+                        _least(costs, between),
+                        "A sum of products counts how many samples overlap as well as how alike they are, so its peak is pulled aside. "
+                        "Take the mean of the squared differences over the part both curves share.",
+                    )
+                    for costs in (_overlap, _centered_overlap)
+                    for between in (True, False)
                 ),
             ],
         ),

@@ -84,7 +84,7 @@ def basin_colors(labels, covered):
 
 def profile(ax, t, f, points):
     """f along a line, with named points {name: (t, f)}. Returns the artists (parabola, iterates, vertex, text)."""
-    style.axes(ax, "place on the line through both centers: 0 = (1, 1), 1 = (-1, -2)", "$f$")
+    style.axes(ax, "$t$, on the line through both centers: 0 at (1, 1), 1 at (-1, -2)", "$f$")
     ax.plot(t, f, **style.look("truth"))
     for name, at in points.items():
         below = -15 if name != "saddle" else 8

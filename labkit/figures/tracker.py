@@ -115,7 +115,7 @@ def methods(ax, names):
         **style.look("estimates", marker="o", markersize=8, markerfacecolor="none", markeredgewidth=1.8),
         label="translation",
     )
-    ax.legend(loc="lower right")
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
     return rotation, translation
 
 

@@ -134,9 +134,9 @@ def field_speed():
 def _errors(start, seed=21):
     building, rng = maps.load_building(), np.random.default_rng(seed)
     suite, drive = particles.SensorSuite(building), particles.random_drive(building, 30, rng)
-    filter_ = particles.localizer(building, "likelihood field", 3000, rng, start=drive.truth[0] if start else None)
+    filter_ = particles.localizer(building, "landmarks", 3000, rng, start=drive.truth[0] if start else None)
     for u, pose in zip(drive.controls, drive.truth[1:]):
-        filter_.step(u, drive.dt, suite.measure("likelihood field", pose, rng), rng)
+        filter_.step(u, drive.dt, suite.measure("landmarks", pose, rng), rng)
     return float(np.hypot(*(filter_.estimate().pose - drive.truth[-1])[:2]))
 
 

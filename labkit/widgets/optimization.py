@@ -143,6 +143,12 @@ def four_runs(state):
     }
 
 
+def _name(method):
+    """A method's name as it begins a sentence."""
+    label = draw.PATHS[method]["label"]
+    return label[0].upper() + label[1:]
+
+
 def _end(run):
     return wells.NAMES[wells.which(run.solution, tol=0.05)]
 
@@ -227,7 +233,7 @@ def _saddle_caption(result):
     return (
         f"{result['distance']:.2f} from S, curvatures {low:.0f} and {high:.0f}. "
         f"In the first step f {sense} by {abs(result['climb']):.1f}. "
-        f"{draw.PATHS[result['method']]['label']} ends here: {result['end']}, after {result['run'].iterations} steps."
+        f"{_name(result['method'])} ends here: {result['end']}, after {result['run'].iterations} steps."
     )
 
 
@@ -311,7 +317,7 @@ def _basin_caption(result):
         return "Nothing is uncovered yet: rub over the square."
     shares = ", ".join(f"{name} {100 * share:.1f} %" for name, share in zip(wells.NAMES, result["shares"]))
     free = 100 * (1 - result["covered"].mean())
-    return f"{draw.PATHS[result['method']]['label']}, {free:.0f} % uncovered, of that: {shares}."
+    return f"{_name(result['method'])}, {free:.0f} % uncovered, of that: {shares}."
 
 
 def basins():

@@ -118,8 +118,7 @@ def live_tracker():
     )
 
 
-# ---- A X = X B with two axes
-# ------------------------------------------------------------------------------------------
+# ---- A X = X B with two axes -----------------------------------------------------------------------------------------
 
 REPEATS = 60
 X_TRUE = pose(exp_so3([0.3, -0.5, 0.4]), [30.0, -20.0, 60.0])
@@ -171,6 +170,11 @@ def _on_sphere(state, moved):
     return {name: normalize(state[name]) for name in ("a", "b")}
 
 
+def _two(value):
+    """A number in words: two digits, and no power of ten where it is large."""
+    return f"{value:.0f}" if value >= 100 else f"{value:.2g}"
+
+
 def _axes_sentence(result):
     if result["angle_deg"] < 2:
         return (
@@ -178,7 +182,7 @@ def _axes_sentence(result):
             f"circle). "
             f"Median error {result['error_deg']:.0f} deg, and the residuals look perfect."
         )
-    error = f"{result['error_deg']:.2g} deg and {result['error_mm']:.2g} mm"
+    error = f"{_two(result['error_deg'])} deg and {_two(result['error_mm'])} mm"
     return f"Axes {result['angle_deg']:.0f} deg apart: median error {error}."
 
 
@@ -197,8 +201,8 @@ def two_axes():
             space.draw(state["view"])
             draw.set_singular_values(stems, markers, result["singular_values"])
             words.set_text(
-                f"error {result['error_deg']:.2g} deg, {result['error_mm']:.2g} mm\npredicted "
-                f"{result['predicted_deg']:.2g} deg"
+                f"error {_two(result['error_deg'])} deg, {_two(result['error_mm'])} mm\npredicted "
+                f"{_two(result['predicted_deg'])} deg"
             )
 
         return [*space.artists, stems, markers, words], update
