@@ -485,7 +485,8 @@ def field_problem(x_S):
         if bad.any():
             name = "|y|" if axis == "y" else axis
             first = values[bad].ravel()[0]
-            return f"in {bad.sum()} poses the sphere lies at {name} = {first:.1f} mm, outside {low:g} to {high:g}."
+            poses = "one pose" if bad.sum() == 1 else f"{bad.sum()} poses"
+            return f"in {poses} the sphere lies at {name} = {first:.1f} mm, outside {low:g} to {high:g}."
     return None
 
 

@@ -5,6 +5,7 @@ Source: thesis "Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", H
 listings C10, C14, C17.
 """
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,11 +76,18 @@ def measurements(corrected=False):
 
 def measurements_from(entries):
     """The measurements that a dictionary of entries, as `printed_entries` returns it, stands for."""
-    pattern = measurements()
-    numbers = range(1, len(pattern.line) + 1)
+    line, angle_deg = _pattern()
+    numbers = range(1, len(line) + 1)
     kuka_deg = np.array([[float(entries["C14", i, c]) for c in POSE_COLUMNS] for i in numbers])
     x_S = np.array([[float(entries["C17", i, c]) for c in CENTER_COLUMNS] for i in numbers])
-    return Measurements(kuka_deg, x_S, pattern.line, pattern.angle_deg)
+    return Measurements(kuka_deg, x_S, line.copy(), angle_deg.copy())
+
+
+@functools.cache
+def _pattern():
+    """Pattern line and angle of each pose; read once, for a search asks for thousands of trial tables."""
+    printed = measurements()
+    return printed.line, printed.angle_deg
 
 
 def kuka_pose_deg(name):

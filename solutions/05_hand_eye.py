@@ -17,6 +17,9 @@
 # | $T_{FS}$, `T_FS` | **wanted**: the scanner on the flange; the thesis's $T_F^S$, pose `p2` |
 # | $x_S$, `x_S` | the sphere's center as the scanner sees it, (31, 3) |
 # | $c$, `target` | the same center in the base; the thesis's $T_P^A x_{P'}$ |
+# | $\varepsilon_i$, `e` | residual of pose $i$ in the base, three numbers (mm) |
+# | $[x]$, `skew(x)` | the matrix with $[x]\,v = x\times v$ |
+# | $\varphi$, $\tau$ | small changes of $T_{FS}$: a rotation vector and a translation |
 # | mm, rad | degrees only in names that end in `_deg` |
 
 # %% setup
@@ -80,8 +83,8 @@ guess = "through the center"
 ex.predict("equator", guess, reveal=stages.scan_line)
 
 # %% sphere-center [markdown]
-# The derivative tells it: $\partial d/\partial r = -r/d$. Five of the 31 measurements lie closer than 8 mm to the equator, pose 4 at $|y| = 1.2$ mm, where 0.01 mm
-# of circle radius is 0.26 mm of center. Listing C16 always takes the minus sign; table C17 shows that the thesis chose by pose. So pass the side in.
+# The derivative tells it: $\partial d/\partial r = -r/d$. Five of the 31 scan lines pass the center closer than 8 mm, near the sphere's *equator*: pose 4 at
+# $|y| = 1.2$ mm, where 0.01 mm of circle radius is 0.26 mm of center. Listing C16 always takes the minus sign; table C17 shows that the thesis chose by pose. So pass the side in.
 
 # %% sphere_center_from_profile
 @ex.sphere_center_from_profile
@@ -145,7 +148,7 @@ ex.rms_before(rms_before)
 # %% numeric_jacobian
 @ex.numeric_jacobian
 def numeric_jacobian(function, x, step):
-    """Return the derivative of a vector function, shape (m, n), by central differences."""
+    """Return the derivative of a vector function, shape (m, n), by central differences, a whole step to each side."""
     ### BEGIN SOLUTION
     columns = [(function(x + h) - function(x - h)) / (2 * step) for h in step * np.eye(len(x))]
     return np.column_stack(columns)
@@ -184,7 +187,7 @@ def analytic_jacobian(T_FS, T_BF, x_S):
 # %% gauss_newton_on_pose
 @ex.gauss_newton_on_pose
 def gauss_newton_on_pose(T_FS, T_BF, x_S, target):
-    """Return T_FS after one Gauss-Newton step."""
+    """Return T_FS after one Gauss-Newton step: R_FS exp(phi) and t_FS + tau."""
     ### BEGIN SOLUTION
     e = frames.transform(T_BF, frames.transform(T_FS, x_S)) - target
     step = np.linalg.lstsq(analytic_jacobian(T_FS, T_BF, x_S), -e.ravel(), rcond=None)[0]
@@ -196,7 +199,7 @@ def gauss_newton_on_pose(T_FS, T_BF, x_S, target):
 # ## The pole
 #
 # CAD puts the scanner at B = −90°, where A and C turn about one line (chapter 1). The rate matrix, which makes rotation vectors of $\dot A, \dot B, \dot C$,
-# has determinant $-\cos B$.
+# has determinant $-\cos B$. Decide; then drag the start along the pole's line, and away from it.
 
 # %% predict-pole
 guess = ...  # your code here
@@ -208,7 +211,7 @@ ex.predict("pole", guess, reveal=stages.convergence)
 # %% simulation [markdown]
 # The thesis met this in its simulation (tables 6-2, 7-2, 7-3), where some starts "find no minimum". Its printed inputs contradict each other: z is 20 in one table and 10 in
 # the other, B is −90° and +90°, and the plate's y does not fit. One set makes all 39 printed coordinates come out: z = 20, B = −90°, plate at y = 0. With it,
-# listing C5 takes exactly the printed numbers of iterations. (Two of the three starts where the trust region "finds no minimum" cost 3e-7 mm², less than its tolerance: it
+# listing C5 takes exactly the printed numbers of iterations: 1 from the original pose, 4 from all others. (Two of the three starts where the trust region "finds no minimum" cost 3e-7 mm², less than its tolerance: it
 # stopped before the first step.)
 
 # %% table-7-3
@@ -286,7 +289,7 @@ for i in np.flatnonzero(fit.weights == 0):
     print(f"pose {i + 1:2}: residual in the base {fit.residuals[i]} mm")
 
 # %% suspects [markdown]
-# Seven poses stand out, and look at them: 18.3 along x, 9.1 along y, 8.8 along x, 45 along x, hardly anything across. Robots do not err like that. Pose 3 is printed with
+# Seven poses stand out, and look at four of them: 18.3 along x, 9.1 along y, 8.8 along x, 45 along x, hardly anything across. Robots do not err like that. Pose 3 is printed with
 # x = 1379.64. Decide what happened, then click the bars: the slider undoes one slip after another in the chosen pose. Which single change removes the residual
 # in *all three* axes at once?
 
@@ -314,8 +317,9 @@ for e in misprints.explanations(handeye_data.printed_entries(), 12, fit.T_FS, fi
 # %% find [markdown]
 # ## Name them
 #
-# Now write the search. `entries` maps (table, pose, column) to what is printed; `handeye_data.measurements_from(entries)` makes arrays of it. Return the set of
-# wrong entries. Any procedure is fine; accusing an innocent entry is not. The check also plants slips of its own.
+# Now write the search. `entries` maps (table, pose, column) to the printed text, such as `'1397.69'`; `handeye_data.measurements_from(entries)` makes arrays of it. Return the set of
+# wrong entries. Any procedure is fine, within two seconds a call: recompute only the row you change.
+# Accusing an innocent entry is not. The check also plants slips of its own.
 
 # %% find_misprints
 @ex.find_misprints
@@ -335,7 +339,19 @@ def find_misprints(entries):
 
 # %% corrections [markdown]
 # The corrections stand in `data/hand_eye/corrections.csv`, with reasons, beside the untouched tables. (Table 6-6 prints pose 3 with the same slip: it was made before the tables
-# were set.) Here is what each step buys.
+# were set.) Fit scanner *and* center to the corrected data and give the rms over all 31, none dropped.
+
+# %% rms_after
+corrected = handeye_data.measurements(True)
+rms_after = ...  # your code here
+### BEGIN SOLUTION
+rms_after = handeye.calibrate_sphere_target(corrected.T_BF, corrected.x_S).rms
+### END SOLUTION
+ex.rms_after(rms_after)
+
+# %% rms-after [markdown]
+# Here is what each correction buys. Two things were needed: right numbers *and* a free center. With the printed center even perfect tables leave 4.8 mm, because the
+# touched plate is 6.6 mm off.
 
 # %% steps-of-corrections
 poses = []
@@ -347,18 +363,6 @@ for row in handeye_data.corrections():
     joint = handeye.calibrate_sphere_target(m.T_BF, m.x_S).rms
     print(f"{row['table']} {row['pose']:2} {row['column']:5} {row['printed']:>8} -> {row['corrected']:8}", end=" ")
     print(f"rms {end:6.2f} end pose, {fixed:6.2f} center fixed, {joint:6.2f} all free")
-
-# %% rms-after [markdown]
-# Two things were needed: right numbers *and* a free center. With the printed center even perfect tables leave 4.8 mm, because the touched plate is 6.6 mm off. Fit the
-# corrected data and give the rms over all 31, none dropped.
-
-# %% rms_after
-corrected = handeye_data.measurements(True)
-rms_after = ...  # your code here
-### BEGIN SOLUTION
-rms_after = handeye.calibrate_sphere_target(corrected.T_BF, corrected.x_S).rms
-### END SOLUTION
-ex.rms_after(rms_after)
 
 # %% radius-text [markdown]
 # ## Which sphere was it?

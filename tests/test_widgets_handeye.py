@@ -97,3 +97,10 @@ def test_pattern_without_tilt_is_not_determined():
     )
     J = handeye.joint_jacobian(result["T_BF"], x_S, result["T_FS"])
     assert np.abs(J @ result["weak"]).max() < 1e-6  # sliding along it changes nothing the scanner sees
+
+
+def test_convergence_opens_next_to_the_pole_where_the_detour_is_seen():
+    stage = w.convergence()
+    result = w.compute_iterations({"P": stage.state["P"], "B_deg": stage.state["B_deg"]})
+    assert abs(stage.state["P"][0] - result["pole"]) < 2
+    assert result["euler"]["arrived"] and result["euler"]["steps"] > 2 * result["se3"]["steps"]

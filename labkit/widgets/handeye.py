@@ -236,7 +236,7 @@ def convergence():
         "convergence from a dragged start",
         scene=scene,
         compute=compute_iterations,
-        handles={"P": Handle((25.0, 20.0), step=0.5, bounds=((-68, 68), (-68, 68)), label="start, tilt and yaw")},
+        handles={"P": Handle((-1.0, 30.0), step=0.5, bounds=((-68, 68), (-68, 68)), label="start, tilt and yaw")},
         controls={"B_deg": choice({"B = -88 deg": -88.0, "B = -30 deg": -30.0}, -88.0, label="scanner at")},
         fail={"P": (-54.0, -30.0), "B_deg": -30.0},
         describe=_iterations_sentence,

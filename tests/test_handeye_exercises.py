@@ -1,0 +1,68 @@
+"""Answers of students to chapter 5 that were once judged wrongly."""
+
+import numpy as np
+import pytest
+
+from labkit import frames, handeye_data
+from labkit.course import ch05_hand_eye
+from labkit.course.engine import CORRECT, NOT_YET
+
+ITEMS = {item.id: item for item in ch05_hand_eye.CHAPTER.items}
+
+
+def judged(name, answer, seed=0):
+    return ITEMS[name].judge(answer, rng=np.random.default_rng(seed))
+
+
+def test_the_printed_constant_is_good_enough_for_the_weights():
+    def weights(residuals):
+        lengths = np.linalg.norm(residuals, axis=1)
+        u = np.minimum(lengths / (5 * np.median(lengths) / 1.538), 1)
+        return (1 - u**2) ** 2
+
+    assert all(judged("robust_weights", weights, seed).status == CORRECT for seed in range(5))
+
+
+@pytest.mark.parametrize("nearest, status", [(True, CORRECT), (False, NOT_YET)])
+def test_linear_start_in_the_base_needs_a_rotation_on_noisy_data(nearest, status):
+    def start(T_BF, x_S):
+        R = T_BF[:, :3, :3]
+        rows = [np.hstack([np.kron(R[i], x_S[i]), R[i], -np.eye(3)]) for i in range(len(R))]
+        u = np.linalg.lstsq(np.vstack(rows), -T_BF[:, :3, 3].ravel(), rcond=None)[0]
+        T_FS = np.eye(4)
+        T_FS[:3, :3] = frames.nearest_rotation(u[:9].reshape(3, 3)) if nearest else u[:9].reshape(3, 3)
+        T_FS[:3, 3] = u[9:12]
+        return T_FS, u[12:]
+
+    assert all(judged("linear_start", start, seed).status == status for seed in range(5))
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_constant_side_is_never_accepted(sign):
+    def center(x, z, radius, side):
+        x_c, z_c, r = ch05_hand_eye.fit_circle(x, z)
+        return np.array([x_c, sign * np.sqrt(radius**2 - r**2), z_c])
+
+    texts = {judged("sphere_center_from_profile", center, seed).text for seed in range(20)}
+    assert len(texts) == 1 and "multiply by side" in texts.pop()
+
+
+def test_trial_tables_of_a_search_read_no_file(monkeypatch):
+    entries = handeye_data.printed_entries()
+    first = handeye_data.measurements_from(entries)
+    first.line[:], first.angle_deg[:] = "none", 0.0  # what a caller does to his copy stays there
+    monkeypatch.setattr(handeye_data, "read_table", None)
+    again = handeye_data.measurements_from({**entries, ("C14", 3, "x"): "1397.64"})
+    assert again.kuka_deg[2, 0] == 1397.64 and again.line[0] == "x" and again.angle_deg.any()
+
+
+def test_naming_the_printed_seven_is_told_to_search():
+    def typed(entries):
+        return {(row["table"], row["pose"], row["column"]) for row in handeye_data.corrections()}
+
+    assert "the `entries` you are given" in judged("find_misprints", typed).text
+
+
+def test_a_radius_searched_in_hundredths_is_accepted():
+    assert ITEMS["radius"].judge(29.99).status == CORRECT
+    assert "coarse" in ITEMS["radius"].judge(30.0).text
