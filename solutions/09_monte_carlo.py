@@ -363,8 +363,8 @@ for task, model, good, low, high, steps in zip(*(table[name] for name in columns
 #
 # A converged cloud needs no 5000 particles. KLD sampling counts the bins the cloud occupies and keeps as many
 # particles as a chi-square bound asks for.
-# The price: a cloud that shrinks onto the wrong place too early has nobody left elsewhere. Compare the rows
-# *adaptive* and *global*.
+# The price: a cloud that shrinks onto the wrong place has nobody left elsewhere, and then all hangs on the recovery.
+# Compare the rows *adaptive* and *global*; then run the cell with `recovery=False` and other seeds.
 
 # %% kld
 suite, rng = particles.SensorSuite(building), np.random.default_rng(5)
