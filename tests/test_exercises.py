@@ -94,7 +94,7 @@ def test_hints_do_not_repeat():
 
 
 def test_a_text_is_shared_only_by_variants_of_one_mistake():
-    """Signs and orders multiply the variants of one slip: those may share their text, next to each other in the list."""
+    """Signs and orders multiply the variants of one slip: those may share their text, side by side in the list."""
     for _, item in EXERCISES + VALUES:
         texts = [mistake.text for mistake in item.mistakes]
         groups = [text for k, text in enumerate(texts) if k == 0 or text != texts[k - 1]]

@@ -45,10 +45,10 @@ def seen_landmark(rng):
     return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
 
 
-def landmark_behind(rng):
-    """A landmark at smaller x, where arctan(dy / dx) fails, and a heading that takes the unwrapped bearing out of [-pi, pi)."""
+def landmark_aside(rng):
+    """A landmark on either side in x, and a heading that takes the unwrapped bearing out of [-pi, pi)."""
     x, r = np.array([*rng.uniform(-4, 4, 2), rng.choice([-1, 1]) * rng.uniform(2.6, 3.1)]), rng.uniform(1.5, 6)
-    angle = -np.sign(x[2]) * rng.uniform(1.8, 2.6)
+    angle = -np.sign(x[2]) * rng.uniform(0.6, 2.6)
     return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
 
 
@@ -495,7 +495,8 @@ CHAPTER = Chapter(
         Exercise(
             "measurement",
             reference=measurement,
-            draw=landmark_behind,
+            draw=landmark_aside,
+            draws=12,
             metric=metrics.numbers(1e-9),
             hints=(
                 "How far away is the landmark, and in which direction seen from where the robot looks?",
