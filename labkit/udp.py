@@ -94,7 +94,23 @@ def stream(packets, rate, faults, rng):
         yield sent, datagram, kind
 
 
-class Sender:
+class _Endpoint:
+    """A socket served by a thread of its own until it is closed; a context manager."""
+
+    def close(self):
+        """Stop the thread and free the port; what has been counted or received stays readable."""
+        self._stop.set()
+        self._thread.join(2.0)
+        self._socket.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+
+class Sender(_Endpoint):
     """A simulated tracker: sends a `stream` to a port of this machine in real time, or `speed` times as fast.
 
     `sent` counts by kind; `finished` is set when the stream is over. Use as a context manager, or call `close`.
@@ -131,18 +147,6 @@ class Sender:
             clock.sleep(0.005)
         return listener.statistics().datagrams >= total
 
-    def close(self):
-        """Stop sending and free the socket."""
-        self._stop.set()
-        self._thread.join(2.0)
-        self._socket.close()
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.close()
-
 
 @dataclass(frozen=True)
 class Statistics:
@@ -164,7 +168,7 @@ class Statistics:
     bad: dict = field(default_factory=dict)
 
 
-class Listener:
+class Listener(_Endpoint):
     """A receiver on localhost that never blocks its caller.
 
     Parameters
@@ -276,18 +280,6 @@ class Listener:
         table = np.array(rows).reshape(-1, PACKET.size // 8)
         table = table[np.argsort(table[:, TIME], kind="stable")]
         return table if newest is None else table[-newest:]
-
-    def close(self):
-        """Stop listening and free the port; what has arrived stays readable."""
-        self._stop.set()
-        self._thread.join(2.0)
-        self._socket.close()
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.close()
 
 
 def listen(port=0, **options):
