@@ -220,10 +220,54 @@ def test_a_drag_is_answered_with_one_picture(wired):
     at = sent[-1][0]["handles"]["Q"]["at"]
     stage._receive({"drag": {"Q": (at[0], at[1] + 0.1)}, "serial": "a:2", "shown": 1})
     message, buffers = sent[-1]
-    assert len(sent) == 2 and message["serial"] == "a:2" and len(buffers) == 1
+    assert len(sent) == 2 and message["serial"] == "a:2" and message["on"] == 1 and len(buffers) == 2
     assert stage.state["Q"][0] == pytest.approx(4.0) and 0 < stage.state["Q"][1] < 5.0
     assert message["handles"]["Q"]["at"] == pytest.approx((at[0], at[1] + 0.1))
     assert message["handles"]["Q"]["label"] == "far end"
+
+
+def page_after(sent):
+    """The pixels of a page that follows the messages, and the number of its picture."""
+    pixels = shown = None
+    for message, buffers in sent:
+        if message["on"] is None:
+            pixels = np.array(Image.open(io.BytesIO(*buffers)))
+        else:
+            assert message["on"] == shown
+            places, colors = (np.frombuffer(bytes(buffer), "<u4") for buffer in buffers)
+            pixels.view("<u4").reshape(-1)[places] = colors
+        shown = message["picture"]
+    return pixels, shown
+
+
+def test_only_changed_pixels_follow_a_whole_picture(wired):
+    stage, sent = wired
+    for k in range(2, 6):
+        stage._receive({"step": {"P": (k, 1)}, "serial": f"a:{k}", "shown": k - 1})
+        assert (page_after(sent)[0] == stage._picture.draw()).all()
+    assert [message["on"] for message, _ in sent] == [None, 1, 2, 3, 4]
+    assert all(len(places) == len(colors) < 10_000 for _, (places, colors) in sent[1:])
+    stage._receive({"serial": "a:6"})
+    assert len(sent[-1][1][0]) == 0  # nothing new
+
+
+@pytest.mark.parametrize("look", [{}, {"dark": True}, {"width": 400}, {"ratio": 2.0}])
+def test_a_page_that_looks_gets_a_whole_picture(wired, look):
+    stage, sent = wired
+    stage._receive({"step": {"P": (1, 0)}, "serial": "a:2", "shown": 1})
+    stage._receive({"look": {**LOOK, **look}, "serial": "a:3", "shown": 2})
+    assert sent[-1][0]["on"] is None and (page_after(sent)[0] == stage._picture.draw()).all()
+
+
+def test_a_whole_picture_goes_where_too_much_changes():
+    before = np.zeros((300, 300, 4), np.uint8)
+    after = before.copy()
+    after[:100, :100, 3] = 255
+    places, colors = canvas.changes(before, after)
+    assert len(places) == 10_000 and places[0] == 0 and places[-1] == 99 * 300 + 99
+    assert (colors == 255 << 24).all()
+    after[...] = 7
+    assert canvas.changes(before, after) is None and canvas.changes(before, after[:200]) is None
 
 
 def test_drags_end_at_axes_and_bounds_and_the_page_is_told(wired):

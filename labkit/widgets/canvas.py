@@ -1,9 +1,11 @@
-"""A matplotlib figure kept alive on Agg: what moves is drawn over a kept background, in the theme's colors, and
-encoded fast.
+"""A matplotlib figure kept alive on Agg: what moves is drawn over a kept background, in the theme's colors, and only
+the pixels that changed travel to the browser.
 
 A full redraw of a figure costs 40 ms and more, mostly for ticks and labels; restoring the background and drawing the
-moving artists costs 1 to 6 ms. PNG without row filters, deflated at level 1, takes 3 ms for 700 x 400 pixels, against
-12 ms by Pillow at level 1 and 9 ms as WebP.
+moving artists costs 1 to 6 ms. Of 300,000 pixels a drag changes 2,000 to 15,000: finding them takes 0.3 ms and
+setting them in the page less than 1 ms, where a whole picture takes 2 ms to deflate and 4 to 8 ms to decode. Whole
+pictures go first and whenever too much changes: PNG without row filters, deflated at level 1, takes 2 ms for 700 x 400
+pixels, against 12 ms by Pillow at level 1 and 9 ms as WebP.
 """
 
 import struct
@@ -22,6 +24,7 @@ CSS_DPI = 100  # a figure inch is 100 CSS pixels: 10 pt text is as large as the 
 MAX_RATIO = 2.5  # device pixels per CSS pixel; sharper screens see no difference
 MIN_SCALE = 0.85  # a narrower cell shrinks the whole picture, letters too, instead of crowding it further
 MAX_WORDS = 3000  # bitmaps a figure keeps
+MAX_CHANGES = 40_000  # pixels; eight bytes each, a whole picture is shorter beyond
 
 DRAWING = (
     threading.RLock()
@@ -46,11 +49,13 @@ def _dark_rows(colors):
 
 
 class _Renderer(RendererAgg):
-    """Agg that keeps the bitmaps of the words it has drawn: ten letters take matplotlib more than 1 ms."""
+    """Agg that keeps the bitmaps of the words it has drawn: ten letters take matplotlib more than 1 ms. The heights of
+    a font are kept as well, which it would read from the font's tables for every text.
+    """
 
     def __init__(self, *args):
         super().__init__(*args)
-        self._words = {}
+        self._words, self._heights = {}, {}
 
     def _word(self, s, prop):
         """(bitmap, left, down, width, height, descent) of a word at its own baseline, in pixels."""
@@ -68,6 +73,18 @@ class _Renderer(RendererAgg):
                 np.array(font.get_image()), left / 64, (down + descent) / 64, width / 64, height / 64, descent / 64
             )  # fmt: skip
         return self._words[key]
+
+    def _get_font_height_metrics(self, prop):
+        """(ascent, descent, line gap) of a font in pixels, three times None if unknown: `Text` asks here first."""
+        key = hash(prop)
+        if key not in self._heights:
+            font = self._prepare_font(prop)
+            head, table = font.get_sfnt_table("head"), font.get_sfnt_table("OS/2")
+            scale = self.points_to_pixels(prop.get_size_in_points()) / head["unitsPerEm"]
+            self._heights[key] = (None, None, None) if table is None else (
+                table["sTypoAscender"] * scale, -table["sTypoDescender"] * scale, table["sTypoLineGap"] * scale
+            )  # fmt: skip
+        return self._heights[key]
 
     def draw_text(self, gc, x, y, s, prop, angle, ismath=False, mtext=None):
         if ismath or angle:
@@ -148,7 +165,7 @@ class Picture:
         for artist in self.artists:
             artist.set_animated(True)
             artist.set_in_layout(False)  # what moves must not push the axes about
-        self._background = None
+        self._background = self._sent = None
         self.draw_seconds = 0.0
 
     @property
@@ -196,6 +213,14 @@ class Picture:
         with DRAWING:
             return encode_png(self.draw(), self.fig.dpi)
 
+    def news(self, whole=False):
+        """What the browser lacks since the last call: [png], or [places, colors] of the changed pixels."""
+        with DRAWING:
+            pixels, before = self.draw(), self._sent
+            self._sent = pixels.copy()
+            found = None if whole or before is None else changes(before, self._sent)
+            return [encode_png(pixels, self.fig.dpi)] if found is None else list(found)
+
     # -- where things are: fractions of the picture, from its upper left corner, as the browser counts
 
     def fraction(self, ax, xy):
@@ -208,6 +233,19 @@ class Picture:
         right, down = np.moveaxis(np.asarray(fraction, dtype=float), -1, 0)
         pixels = np.stack([right * self.fig.bbox.width, (1 - down) * self.fig.bbox.height], -1)
         return ax.transData.inverted().transform(pixels)
+
+
+def changes(before, after):
+    """Places (counted along the rows) and colors of the pixels that differ, two uint32 arrays of equal length; None if
+    the shapes differ or too many pixels do.
+
+    before, after : RGBA pixels, shape (height, width, 4), uint8.
+    """
+    if before.shape != after.shape:
+        return None
+    colors = after.view("<u4").ravel()
+    places = np.flatnonzero(before.view("<u4").ravel() != colors)
+    return (places.astype("<u4"), colors[places]) if len(places) <= MAX_CHANGES else None
 
 
 def encode_png(pixels, dpi=CSS_DPI):

@@ -30,7 +30,7 @@ function render({ model, el }) {
   picture.append(canvas);
   root.append(picture, status, caption, spoken);
   el.append(root);
-  const paper = canvas.getContext("bitmaprenderer");
+  const paper = canvas.getContext("2d", { willReadFrequently: true });
   const handles = new Map();
 
   // ---- to Python: one message in flight
@@ -55,32 +55,52 @@ function render({ model, el }) {
     flush();
   }
 
-  // ---- from Python: pictures, the newest wins
-  let newest = null;
-  let drawing = false;
+  // ---- from Python: whole pictures, and what changed since the one before
+  let queue = [];
+  let decoding = false;
+  let image = null; // the pixels shown
 
-  async function draw() {
-    if (drawing) return;
-    drawing = true;
-    while (newest) {
-      const { message, buffer } = newest;
-      newest = null;
-      try {
-        const image = await createImageBitmap(new Blob([buffer], { type: "image/png" }));
-        canvas.width = image.width;
-        canvas.height = image.height;
-        paper.transferFromImageBitmap(image);
+  function draw() {
+    while (queue.length && !decoding) {
+      const { message, buffers } = queue.shift();
+      if (message.on === null) decode(message, buffers[0]);
+      else if (message.on === shown && image) {
+        change(...buffers.map(numbers));
         show(message);
-      } catch (error) {
-        console.error("stage: the picture could not be decoded", error);
+      } else {
+        last = "";
+        look(); // a picture was lost: a whole one is needed
       }
-      shown = message.picture;
-      root.dataset.python = message.milliseconds;
-      root.dataset.picture = message.picture;
-      if (message.serial === null && flight === null && Object.keys(pending).length === 0) model.send({ shown });
-      flush();
     }
-    drawing = false;
+  }
+
+  async function decode(message, png) {
+    decoding = true;
+    try {
+      const bitmap = await createImageBitmap(new Blob([png], { type: "image/png" }));
+      canvas.width = bitmap.width;
+      canvas.height = bitmap.height;
+      paper.drawImage(bitmap, 0, 0);
+      image = paper.getImageData(0, 0, bitmap.width, bitmap.height);
+      show(message);
+    } catch (error) {
+      console.error("stage: the picture could not be decoded", error);
+    }
+    decoding = false;
+    draw();
+  }
+
+  function numbers(view) {
+    return new Uint32Array(view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength));
+  }
+
+  function change(places, colors) {
+    if (!places.length) return;
+    const pixels = new Uint32Array(image.data.buffer);
+    places.forEach((place, k) => { pixels[place] = colors[k]; });
+    const top = Math.floor(places[0] / image.width);
+    const bottom = Math.floor(places[places.length - 1] / image.width);
+    paper.putImageData(image, 0, 0, 0, top, image.width, bottom - top + 1);
   }
 
   function onMessage(message, buffers) {
@@ -90,11 +110,22 @@ function render({ model, el }) {
       clearTimeout(timer);
       root.dataset.answer = (performance.now() - sent).toFixed(1); // ms, for the benchmark
     }
-    newest = { message, buffer: buffers[0] };
+    if (message.on === null) queue = []; // the newest wins
+    queue.push({ message, buffers });
     draw();
   }
 
   function show(message) {
+    words(message);
+    shown = message.picture;
+    root.dataset.python = message.milliseconds;
+    root.dataset.picture = message.picture;
+    if (message.serial === null && flight === null && Object.keys(pending).length === 0) model.send({ shown });
+    flush();
+  }
+
+  // what is said of the picture, and the handles over it
+  function words(message) {
     picture.style.width = `${message.width}px`;
     canvas.dataset.empty = message.empty;
     canvas.dataset.click = message.click;
@@ -182,11 +213,11 @@ function render({ model, el }) {
         node.setAttribute("aria-valuetext", place.value);
         node.setAttribute("aria-valuenow", place.now);
         node.title = place.label;
-        const waiting = pending.drag?.[name] !== undefined || (flight !== null && held);
-        if (held && waiting && !corrected) return; // the pointer is further already
-        const box = canvas.getBoundingClientRect();
-        const off = Math.hypot((place.at[0] - at[0]) * box.width, (place.at[1] - at[1]) * box.height);
-        if (held && off > 2) corrected = true;
+        if (held && !corrected) {
+          if (pending.drag?.[name] !== undefined || flight !== null) return; // the pointer is further already
+          const box = canvas.getBoundingClientRect();
+          corrected = Math.hypot((place.at[0] - at[0]) * box.width, (place.at[1] - at[1]) * box.height) > 2;
+        }
         move(place.at);
       },
     };

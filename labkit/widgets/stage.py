@@ -266,6 +266,7 @@ class Stage(ipywidgets.VBox):
         self.result, self.status, self.caption = None, "", ""
         self._front, self._sent, self._shown, self._waiting = _Front(), 0, 0, False
         self._attached = self._showing = False
+        self._whole = True  # the page needs a whole picture, not only what changed
         self._received = monotonic()
         self._picture = Picture(scene, size)
         self._check_axes()
@@ -467,7 +468,7 @@ class Stage(ipywidgets.VBox):
             self._received = monotonic()
             self._shown = max(self._shown, message.get("shown", 0))
             if "look" in message:
-                self._attached, self._shown = True, self._sent
+                self._attached, self._shown, self._whole = True, self._sent, True
                 self._picture.fit(**message["look"])
             changes, events = self._changes(message)
             if changes or events:
@@ -523,9 +524,11 @@ class Stage(ipywidgets.VBox):
         self._sent += 1
         if reply is not None:
             self._shown = self._sent  # the page waits for this one
-        png = self._picture.png()
+        buffers = self._picture.news(self._whole)
+        self._whole = False
         front = {
             "picture": self._sent,
+            "on": self._sent - 1 if len(buffers) == 2 else None,
             "serial": reply,
             "width": round(self._picture.width),
             "handles": self._places(),
@@ -537,7 +540,7 @@ class Stage(ipywidgets.VBox):
             "click": self._click is not None,
             "milliseconds": round(1e3 * (monotonic() - self._received), 1),
         }
-        self._front.send(front, [png])
+        self._front.send(front, buffers)
 
     def _places(self):
         """Where the browser puts the handles, and what it says of them."""

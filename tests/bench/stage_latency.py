@@ -6,7 +6,7 @@ Finds all functions in labkit.widgets.* that return a Stage without arguments, p
 starts JupyterLab with fresh settings on a free port, runs all cells, moves each Stage (first handle by arrow keys and
 by mouse; otherwise the first slider, or the view), and prints in milliseconds, per Stage and way of moving it: median
 and 95th percentile of event to picture; medians of message to answer in the page and of message to answer in the
-kernel; and without a browser, compute with update, and drawing with PNG. With --shots it also takes a screenshot of
+kernel; and without a browser, compute with update, and drawing with encoding. With --shots also a screenshot of
 each Stage in the light and the dark theme, wide and narrow.
 """
 
@@ -71,7 +71,7 @@ def stages():
 
 
 def python_part(module, name, repetitions=30):
-    """Median milliseconds of (compute and update, picture and PNG), without a browser."""
+    """Median milliseconds of (compute and update, picture and its encoding), without a browser."""
     stage = getattr(importlib.import_module(f"labkit.widgets.{module}"), name)()
     stage._picture.fit(700, 1.0, False)
     times = []
@@ -79,7 +79,7 @@ def python_part(module, name, repetitions=30):
         start = time.perf_counter()
         stage.set()
         middle = time.perf_counter()
-        stage.png()
+        stage._picture.news()
         times.append((middle - start, time.perf_counter() - middle))
     return 1e3 * np.median(times, axis=0)
 
