@@ -48,8 +48,25 @@ def as_rotations(value, name):
 def as_transforms(value, name):
     """`value` as rigid transforms, shape (..., 4, 4): orthonormal rotation block, last row (0, 0, 0, 1)."""
     array = _as_floats(value, name)
-    if array.ndim > 2 and array.shape[-2:] == (4, 4) and array.size and _are_certainly_rigid(array):
+    if array.ndim > 2 and array.shape[-2:] == (4, 4) and _are_certainly_rigid(array.reshape(-1, 16).T):
         return array
+    return _all_rigid(array, name)
+
+
+def as_transform_rows(value, name):
+    """`value`, a stack of rigid transforms, shape (n, 4, 4), with a copy of its entries as contiguous rows (16, n)."""
+    array = _as_floats(value, name)
+    if array.ndim == 3 and array.shape[1:] == (4, 4):
+        rows = np.array(array.reshape(-1, 16).T, order="C")
+        if _are_certainly_rigid(rows):
+            return array, rows
+    array = _all_rigid(array, name)
+    if array.ndim != 3:
+        raise ValueError(f"{name} must have shape (n, 4, 4), got {array.shape}")
+    return array, np.array(array.reshape(-1, 16).T, order="C")
+
+
+def _all_rigid(array, name):
     array = as_finite(array, name)
     if array.shape[-2:] != (4, 4):
         raise ValueError(f"{name} must have shape (..., 4, 4), got {array.shape}")
@@ -70,29 +87,30 @@ def _refuse_sheared(R, name):
         raise ValueError(f"{name} must be right-handed, but its rotation block has determinant {det.min():.3g}")
 
 
-def _are_certainly_rigid(T, block=1024):
-    """True only when `as_transforms` would find nothing wrong with a stack (..., 4, 4).
+def _are_certainly_rigid(rows, block=1024):
+    """True only when `as_transforms` would find nothing wrong with the transforms whose entries are (16, n).
 
     Quick, because it works on contiguous rows of components: with columns x, y, z, the conditions x cross y = z, y
     cross z = x and |x| = 1 make a rotation. A sum of squares takes the place of many comparisons; it is NaN or
     infinite where an entry is. An eighth of the tolerance leaves room for what the omitted products can add up to.
     """
-    T = T.reshape(-1, 4, 4)
-    for start in range(0, len(T), block):
-        part = T[start : start + block]
-        columns, last = np.empty((3, 5, len(part))), np.empty((4, len(part)))
-        columns[:, :3], last[:] = part[:, :3, :3].transpose(2, 1, 0), part[:, 3].T
+    for start in range(0, rows.shape[1], block):
+        part = rows[:, start : start + block]
+        columns = np.empty((3, 5, part.shape[1]))
+        columns[:, :3] = part[:12].reshape(3, 4, -1)[:, :3].swapaxes(0, 1)
         columns[:, 3:] = columns[:, :2]  # the first two components again: a cross product by slices
         error = columns[:2, 1:4] * columns[1:, 2:]
         error -= columns[:2, 2:] * columns[1:, 1:4]
         error -= columns[2::-2, :3]
         norm = np.einsum("in,in->n", columns[0, :3], columns[0, :3]) - 1.0
+        last = np.array(part[12:])
         last[3] -= 1.0
         if not np.vdot(error, error) + np.vdot(norm, norm) <= (ORTHONORMAL_TOLERANCE / 8) ** 2:
             return False
-        if np.vdot(last, last) != 0.0 or not np.isfinite(np.vdot(part, part)):
+        entries = part.ravel(order="K")
+        if np.vdot(last, last) != 0.0 or not np.isfinite(np.vdot(entries, entries)):
             return False
-    return True
+    return rows.shape[1] > 0
 
 
 def as_positive(value, name):

@@ -11,10 +11,11 @@ mm, angles in radians. Source: lab sheet "Kalibrierung", Hochschule Darmstadt 20
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from .checks import as_finite, as_points, as_rotations, as_transforms
+from .checks import as_finite, as_points, as_rotations, as_transform_rows
 from .lie import exp_so3, skew
 from .tables import read_table
 
@@ -46,6 +47,46 @@ class PivotCalibration:
     covariance: np.ndarray
     singular_values: np.ndarray
     weights: np.ndarray
+
+
+class _PlainCalibration(PivotCalibration):
+    """Knows tip and pivot, and works out the rest from its own copy of the poses when first asked: that takes as long
+    again, and a tool that is calibrated on the way does without.
+    """
+
+    def __init__(self, rows, mean, gram, tip, pivot):
+        self.__dict__.update(tip=tip, pivot=pivot, _rows=rows, _mean=mean, _gram=gram)
+
+    @property
+    def _n(self):
+        return self._rows.shape[1]
+
+    @cached_property
+    def residuals(self):
+        return _moved(self._rows, self.tip, self.pivot).T
+
+    @cached_property
+    def s0(self):
+        return math.sqrt(np.vdot(self.residuals, self.residuals) / self._n)
+
+    @cached_property
+    def std(self):
+        return math.sqrt(np.vdot(self.residuals, self.residuals) / (3 * self._n - 6))
+
+    @cached_property
+    def covariance(self):
+        both = np.concatenate((IDENTITY, self._mean[:, :3]))  # a shift of the tip moves the pivot along
+        covariance = both @ np.linalg.inv(self._gram[:3, :3]) @ both.T
+        covariance[3:, 3:] += IDENTITY / self._n
+        return self.std**2 * covariance
+
+    @cached_property
+    def singular_values(self):
+        return _singular_values(self._gram, self._n)
+
+    @cached_property
+    def weights(self):
+        return np.ones(self._n)
 
 
 def poses_in_listing():
@@ -80,12 +121,11 @@ def poses_from_euler(xyzabc_deg):
 
 
 def _poses(T_WF, at_least):
-    T = as_transforms(T_WF, "T_WF")
-    if T.ndim != 3:
-        raise ValueError(f"T_WF must have shape (n, 4, 4), got {T.shape}")
+    """The poses, (n, 4, 4), and their entries as contiguous rows, (16, n)."""
+    T, rows = as_transform_rows(T_WF, "T_WF")
     if len(T) < at_least:
         raise ValueError(f"T_WF must hold at least {at_least} poses, got {len(T)}{_few(len(T))}")
-    return T
+    return T, rows
 
 
 def _few(n):
@@ -94,7 +134,7 @@ def _few(n):
 
 def pivot_matrix(T_WF):
     """The stacked matrix [R_i  -I]; (n, 4, 4) -> (3n, 6). Source: lab sheet, section 3."""
-    T = _poses(T_WF, 1)
+    T, _ = _poses(T_WF, 1)
     A = np.empty((len(T), 3, 6))
     A[..., :3], A[..., 3:] = T[:, :3, :3], -np.eye(3)
     return A.reshape(-1, 6)
@@ -102,7 +142,7 @@ def pivot_matrix(T_WF):
 
 def pivot_rhs(T_WF):
     """The stacked right-hand side -p_i; (n, 4, 4) -> (3n,). Source: lab sheet, section 3."""
-    return -_poses(T_WF, 1)[:, :3, 3].ravel()
+    return -_poses(T_WF, 1)[0][:, :3, 3].ravel()
 
 
 def solve_pivot(A, b):
@@ -131,7 +171,7 @@ def pivot_residuals(T_WF, tip, pivot):
 
     Source: lab sheet, section 3, equation (2).
     """
-    T, tip, pivot = _poses(T_WF, 1), as_points(tip, "tip"), as_points(pivot, "pivot")
+    (T, _), tip, pivot = _poses(T_WF, 1), as_points(tip, "tip"), as_points(pivot, "pivot")
     return T[:, :3, :3] @ tip + T[:, :3, 3] - pivot
 
 
@@ -217,26 +257,17 @@ def calibrate_pivot(T_WF, std_rot=None, std_trans=None, robust=False, rng=None):
     Source: lab sheet, section 3; weights by propagating std_rot through the lever; Tukey's weights as in Huber,
     "Robust Statistics" (1981).
     """
-    T = _poses(T_WF, 5 if robust else 3)
+    T, rows = _poses(T_WF, 5 if robust else 3)
     noise = _noise(std_rot, std_trans)
     tolerance = RANK_TOLERANCE if noise is None else max(RANK_TOLERANCE, NOISE_TOLERANCE * noise[0])
-    n = len(T)
-    mean, gram = _gram(T)
-    values, inverse, tip = _tip(gram, n, tolerance)
-    M = mean[:, :3]
-    pivot = M @ tip + mean[:, 3]
+    mean, gram = _gram(rows)
+    tip = _tip(gram, len(T), tolerance)
     if robust:
-        return _robust(T, noise, tolerance, np.random.default_rng(0) if rng is None else rng)
-    if noise is not None:
-        return _weighted(T, tip, pivot, values, noise)
-    r = _moved(T.reshape(n, 16).T, tip, pivot)
-    squares = float(np.vdot(r, r))
-    both = np.concatenate((IDENTITY, M))  # a shift of the tip moves the pivot along
-    covariance = both @ inverse @ both.T
-    covariance.ravel()[21::7] += 1.0 / n
-    covariance *= squares / (3 * n - 6)
-    std = math.sqrt(squares / (3 * n - 6))
-    return PivotCalibration(tip, pivot, r.T, math.sqrt(squares / n), std, covariance, values, np.ones(n))
+        return _robust(T, rows, noise, tolerance, np.random.default_rng(0) if rng is None else rng)
+    pivot = mean[:, :3] @ tip + mean[:, 3]
+    if noise is None:
+        return _PlainCalibration(rows, mean, gram, tip, pivot)
+    return _weighted(rows, tip, pivot, _singular_values(gram, len(T)), noise)
 
 
 def _noise(std_rot, std_trans):
@@ -253,13 +284,12 @@ def _noise(std_rot, std_trans):
     return std_rot, std_trans
 
 
-def _gram(T):
-    """Mean of [R p] over the poses, and [D d]'[D d] of the deviations from it; (n, 4, 4) -> (3, 4), (4, 4).
+def _gram(rows):
+    """Mean of [R p] over the poses, and [D d]'[D d] of the deviations from it; (16, n) -> (3, 4), (4, 4).
 
     One product of all entries with each other holds both: the last entry of a pose is 1, so its row holds the sums.
     """
-    n, entries = len(T), T.reshape(-1, 16)
-    products = entries.T @ entries
+    n, products = rows.shape[1], rows @ rows.T
     mean = products[15, :12].reshape(3, 4) / n
     squares = products[:4, :4] + products[4:8, 4:8]
     squares += products[8:12, 8:12]
@@ -267,13 +297,13 @@ def _gram(T):
     return mean, squares
 
 
-def _moved(entries, tip, pivot):
-    """R tip + p - pivot from the entries of the poses, row by row; (16, n) -> (3, n)."""
-    rows = np.zeros((3, 16))
-    rows[0, :3] = rows[1, 4:7] = rows[2, 8:11] = tip
-    rows[0, 3] = rows[1, 7] = rows[2, 11] = 1.0
-    rows[:, 15] = -pivot
-    return rows @ entries
+def _moved(rows, tip, pivot):
+    """R tip + p - pivot from the entries of the poses; (16, n) -> (3, n)."""
+    factors = np.zeros((3, 16))
+    factors[0, :3] = factors[1, 4:7] = factors[2, 8:11] = tip
+    factors[0, 3] = factors[1, 7] = factors[2, 11] = 1.0
+    factors[:, 15] = -pivot
+    return factors @ rows
 
 
 def _share(ratio):
@@ -281,25 +311,41 @@ def _share(ratio):
 
 
 def _tip(gram, n, tolerance):
-    """Singular values of the stacked matrix, (D'D)^-1 and the plain tip; refuses a direction the poses leave free."""
-    squares, axes = np.linalg.eigh(gram[:3, :3])
-    q = [max(v / n, 0.0) for v in squares.tolist()]  # 1 - s^2, in plain floats: NumPy is slow on three numbers
-    s = [math.sqrt(max(1.0 - v, 0.0)) for v in q]
-    small = [math.sqrt(n * v / (1.0 + k)) for v, k in zip(q, s)]
-    values = [math.sqrt(n * (1.0 + k)) for k in s] + small[::-1]
-    if values[5] <= tolerance * values[0]:
-        free = sum(value <= tolerance * values[0] for value in values)
-        v = axes[:, 0] * (1.0 if axes[np.abs(axes[:, 0]).argmax(), 0] > 0 else -1.0)
-        where = (
-            f"along ({v[0]:.2f}, {v[1]:.2f}, {v[2]:.2f}) in the tool frame" if free == 1 else f"in {free} directions"
-        )
-        raise ValueError(
-            f"the poses do not fix the tip, it is free {where}: the smallest singular value is"
-            f" {_share(values[5] / values[0])} of the largest,"
-            f" more than {tolerance:.1e} is needed; turn the tool about {'another axis' if free == 1 else 'two axes'}"
-        )
-    inverse = (axes / squares) @ axes.T
-    return np.array(values), inverse, -inverse @ gram[:3, 3]
+    """The plain tip -(D'D)^-1 D'd; refuses a direction that the poses leave free.
+
+    With trace t and determinant of D'D, its least eigenvalue is at least 4 det / t^2, and the stacked matrix has
+    singular values from sqrt(least / 2) to sqrt(2 n): a bound that clears most pose sets without an eigenvalue.
+    """
+    (a, b, c, _), (_, d, e, _), (_, _, f, _), (u, v, w, _) = gram.tolist()  # plain floats: NumPy is slow on so few
+    A, B, C, D, E, F = d * f - e * e, c * e - b * f, b * e - c * d, a * f - c * c, b * c - a * e, a * d - b * b
+    determinant, trace = a * A + b * B + c * C, a + d + f
+    if not determinant > n * tolerance**2 * trace**2:
+        _refuse_free_tip(gram, n, tolerance)
+    return np.array([A * u + B * v + C * w, B * u + D * v + E * w, C * u + E * v + F * w]) / -determinant
+
+
+def _singular_values(gram, n):
+    """Of the stacked matrix, from the deviations of the poses; (6,), largest first."""
+    q = np.maximum(np.linalg.eigvalsh(gram[:3, :3]) / n, 0.0)  # 1 - s^2
+    s = np.sqrt(np.maximum(1.0 - q, 0.0))
+    return np.sqrt(n * np.concatenate([1.0 + s, (q / (1.0 + s))[::-1]]))
+
+
+def _refuse_free_tip(gram, n, tolerance):
+    """Raises when a singular value falls below the tolerance, with the direction that is free."""
+    ratios = _singular_values(gram, n)
+    ratios /= ratios[0]
+    if ratios[5] > tolerance:
+        return
+    free = int((ratios <= tolerance).sum())
+    v = np.linalg.eigh(gram[:3, :3])[1][:, 0]
+    v *= 1.0 if v[np.abs(v).argmax()] > 0 else -1.0
+    where = f"along ({v[0]:.2f}, {v[1]:.2f}, {v[2]:.2f}) in the tool frame" if free == 1 else f"in {free} directions"
+    raise ValueError(
+        f"the poses do not fix the tip, it is free {where}: the smallest singular value is {_share(ratios[5])} of the"
+        f" largest, more than {tolerance:.1e} is needed; turn the tool about"
+        f" {'another axis' if free == 1 else 'two axes'}"
+    )
 
 
 class _Weighted:
@@ -310,17 +356,16 @@ class _Weighted:
     are in mm.
     """
 
-    def __init__(self, T, noise):
+    def __init__(self, rows, noise):
         std_rot, self.std_trans = (0.0, 1.0) if noise is None else noise
         self.variance_rot, self.g = std_rot**2, (std_rot / self.std_trans) ** 2
-        self.X = np.ascontiguousarray(T.reshape(-1, 16).T)
-        self.positions = self.X[3:12:4]
+        self.rows, self.positions = rows, rows[3:12:4]
 
     def look(self, tip, pivot):
         """Residuals (3, n) and Mahalanobis distances (n,) at tip and pivot."""
         self.tip = tip
         self.c = self.std_trans**2 + self.variance_rot * (tip @ tip)
-        self.r = _moved(self.X, tip, pivot)
+        self.r = _moved(self.rows, tip, pivot)
         squares = np.einsum("in,in->n", self.r, self.r)
         if self.g:
             self.u = self.r - self.positions
@@ -333,9 +378,9 @@ class _Weighted:
         """Gauss-Newton step (6,) for weights w (n,), and the normal matrix (6, 6)."""
         N, rhs, total = np.empty((6, 6)), np.empty(6), w.sum()
         wr = self.r * w
-        products = (self.X[:12] @ wr.T).reshape(3, 4, 3)  # component of [R p], of the residual
+        products = (self.rows[:12] @ wr.T).reshape(3, 4, 3)  # component of [R p], of the residual
         N[:3, :3] = N[3:, 3:] = total * IDENTITY
-        N[3:, :3] = -(self.X[:12] @ w).reshape(3, 4)[:, :3]
+        N[3:, :3] = -(self.rows[:12] @ w).reshape(3, 4)[:, :3]
         rhs[:3], rhs[3:] = np.einsum("iji->j", products)[:3], -wr.sum(1)
         if self.g:
             W = IDENTITY + self.g * np.outer(self.tip, self.tip)
@@ -348,22 +393,22 @@ class _Weighted:
         return -np.linalg.solve(N, rhs), N / self.c
 
 
-def _weighted(T, tip, pivot, values, noise):
-    n, problem = len(T), _Weighted(T, noise)
+def _weighted(rows, tip, pivot, values, noise):
+    n, problem = rows.shape[1], _Weighted(rows, noise)
     w = np.ones(n)
     for _ in range(3):  # the weights know the tip through its length and direction alone: three steps settle them
         problem.look(tip, pivot)
         step, N = problem.step(w)
         tip, pivot = tip + step[:3], pivot + step[3:]
     r, _ = problem.look(tip, pivot)
-    squares = float(np.vdot(r, r))
-    s0, std = math.sqrt(squares / n), math.sqrt(squares / (3 * n - 6))
+    total = float(np.vdot(r, r))
+    s0, std = math.sqrt(total / n), math.sqrt(total / (3 * n - 6))
     return PivotCalibration(tip, pivot, r.T, s0, std, np.linalg.inv(N), values, w)
 
 
-def _robust(T, noise, tolerance, rng):
+def _robust(T, rows, noise, tolerance, rng):
     tip, pivot = _best_of_samples(T, rng)
-    problem, n = _Weighted(T, noise), len(T)
+    problem, n = _Weighted(rows, noise), len(T)
     for k in range(30):
         r, d = problem.look(tip, pivot)
         if k < 3:  # the scale settles first; afterwards it stays, so that the steps converge
@@ -377,13 +422,15 @@ def _robust(T, noise, tolerance, rng):
     count = int(np.count_nonzero(kept))
     if count < 4:
         raise ValueError(f"only {count} of {n} poses agree on a tip; at least 4 must")
-    values, _, _ = _tip(_gram(T[kept])[1], count, tolerance)
-    total = float(w.sum())
-    freedom, squares = max(3 * total - 6, 1.0), float(np.einsum("in,in,n->", r, r, w))
+    _, gram = _gram(rows[:, kept])
+    _refuse_free_tip(gram, count, tolerance)
+    total, left = float(w.sum()), float(np.einsum("in,in,n->", r, r, w))
+    freedom = max(3 * total - 6, 1.0)
     slope = (w - 4 / 3 * (d / (TUKEY * scale)) ** 2 * np.sqrt(w)).sum() / total
     spread = np.vdot(w * d, w * d) / freedom / slope**2
-    s0, std = math.sqrt(squares / total), math.sqrt(squares / freedom / TUKEY_SHRINK)
-    return PivotCalibration(tip, pivot, r.T, s0, std, spread * np.linalg.inv(N), values, w)
+    s0, std = math.sqrt(left / total), math.sqrt(left / freedom / TUKEY_SHRINK)
+    covariance = spread * np.linalg.inv(N)
+    return PivotCalibration(tip, pivot, r.T, s0, std, covariance, _singular_values(gram, count), w)
 
 
 def _best_of_samples(T, rng):
