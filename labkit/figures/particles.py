@@ -3,6 +3,8 @@ field.
 """
 
 import numpy as np
+from matplotlib.colors import Normalize
+from matplotlib.image import PcolorImage
 from matplotlib.patches import Wedge
 
 from . import style
@@ -148,13 +150,15 @@ class Wheel:
         self.spokes.set_data(*segments(np.column_stack([0 * s, 0 * c, 0.98 * s, 0.98 * c])))
 
 
-def heat(ax, extent, lines, title, low):
-    """A picture of log weights over a building, from `low` (relative to the best) to 0. Returns the image."""
-    image = ax.imshow(
-        np.full((2, 2), low), extent=extent, origin="lower", cmap=style.HEAT, vmin=low, vmax=0, interpolation="nearest"
-    )
-    floor_plan(ax, lines, title)
-    return image
+def heat(ax, extent, shape, lines, title, low):
+    """A picture of log weights over a building, from `low` (relative to the best) to 0, cells in `shape` (rows,
+    columns), under the walls. Returns (artists, fill); PcolorImage takes half the time of imshow.
+    """
+    left, right, bottom, top = extent
+    x, y = np.linspace(left, right, shape[1] + 1), np.linspace(bottom, top, shape[0] + 1)
+    image = PcolorImage(ax, x, y, np.full(shape, float(low)), cmap=style.HEAT, norm=Normalize(low, 0), zorder=0)
+    ax.add_image(image)
+    return [image, floor_plan(ax, lines, title)], lambda weights: image.set_data(x, y, weights)
 
 
 def ancestors(ax, methods):

@@ -24,7 +24,7 @@ CSS_DPI = 100  # a figure inch is 100 CSS pixels: 10 pt text is as large as the 
 MAX_RATIO = 2.5  # device pixels per CSS pixel; sharper screens see no difference
 MIN_SCALE = 0.85  # a narrower cell shrinks the whole picture, letters too, instead of crowding it further
 MAX_WORDS = 3000  # bitmaps a figure keeps
-MAX_CHANGES = 40_000  # pixels; eight bytes each, a whole picture is shorter beyond
+MAX_CHANGES = 150_000  # pixels, four bytes each; beyond, decoding a whole picture is the quicker way
 
 DRAWING = (
     threading.RLock()
@@ -214,7 +214,7 @@ class Picture:
             return encode_png(self.draw(), self.fig.dpi)
 
     def news(self, whole=False):
-        """What the browser lacks since the last call: [png], or [places, colors] of the changed pixels."""
+        """What the browser lacks since the last call: [png], or [runs, colors] of the changed pixels."""
         with DRAWING:
             pixels, before = self.draw(), self._sent
             self._sent = pixels.copy()
@@ -236,8 +236,8 @@ class Picture:
 
 
 def changes(before, after):
-    """Places (counted along the rows) and colors of the pixels that differ, two uint32 arrays of equal length; None if
-    the shapes differ or too many pixels do.
+    """Runs of changed pixels: first place (counted along the rows) and length of each, shape (n, 2), and their colors
+    one after the other, both uint32; None if the shapes differ or too many pixels do.
 
     before, after : RGBA pixels, shape (height, width, 4), uint8.
     """
@@ -245,7 +245,11 @@ def changes(before, after):
         return None
     colors = after.view("<u4").ravel()
     places = np.flatnonzero(before.view("<u4").ravel() != colors)
-    return (places.astype("<u4"), colors[places]) if len(places) <= MAX_CHANGES else None
+    if len(places) > MAX_CHANGES:
+        return None
+    first = np.flatnonzero(np.diff(places, prepend=-2) > 1)
+    runs = np.column_stack([places[first], np.diff(first, append=len(places))])
+    return runs.astype("<u4"), colors[places]
 
 
 def encode_png(pixels, dpi=CSS_DPI):

@@ -198,6 +198,12 @@ def _unit_twists():
     return noise
 
 
+@functools.lru_cache(maxsize=2)
+def _errors(std_rot):
+    """Error of each of 64 links in RUNS runs, shape (64, runs, 4, 4); kept while only the number of links changes."""
+    return exp_se3(_unit_twists() * np.repeat([std_rot, STD_TRANS], 3))
+
+
 def _ends(name, n, errors):
     """Where noisy chains of a layout end, seen from where they should end; errors (64, runs, 4, 4) -> (runs, 3)."""
     links, back, _ = _layout(name, n)
@@ -212,7 +218,7 @@ def compute_growth(state):
     """Closure distance (mm, rms) of noisy chains of 1 to 64 links: both laws, simulation of the chosen layout."""
     std_rot = np.deg2rad(state["std_rot_deg"])
     numbers = np.unique([*draw.LINKS, state["n"]])
-    errors = exp_se3(_unit_twists() * np.repeat([std_rot, STD_TRANS], 3))
+    errors = _errors(std_rot)
     ends = {n: _ends(state["layout"], n, errors) for n in numbers.tolist()}
     return {
         "n": state["n"],

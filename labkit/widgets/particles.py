@@ -220,21 +220,21 @@ def field_against_beams():
 
     def scene(fig):
         axes = fig.subplots(2, 1)
-        extent, lines = building().grid.extent, building().lines
-        images = [
-            draw.heat(ax, extent, lines, title, HEAT_DEPTH)
-            for ax, title in zip(axes, ("beam model", "likelihood field"))
+        plan = building().grid.extent, _places()[2], building().lines
+        heats = [
+            draw.heat(ax, *plan, title, HEAT_DEPTH) for ax, title in zip(axes, ("beam model", "likelihood field"))
         ]
         robots, scans = [draw.Robot(ax) for ax in axes], [draw.Beams(ax, size=2) for ax in axes]
 
         def update(state, result):
-            for image, key in zip(images, ("beams", "field")):
-                image.set_data(result[key])
+            for (_, fill), key in zip(heats, ("beams", "field")):
+                fill(result[key])
             for robot, scan in zip(robots, scans):
                 robot.set(result["pose"])
                 scan.set(result["pose"], result["ends"])
 
-        return [*images, *(a for item in (*scans, *robots) for a in item.artists)], update
+        pictures = [a for artists, _ in heats for a in artists]
+        return [*pictures, *(a for item in (*scans, *robots) for a in item.artists)], update
 
     return Stage(
         "beam model against likelihood field",

@@ -94,12 +94,14 @@ function render({ model, el }) {
     return new Uint32Array(view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength));
   }
 
-  function change(places, colors) {
-    if (!places.length) return;
+  function change(runs, colors) { // runs of changed pixels: first place, length
+    if (!colors.length) return;
     const pixels = new Uint32Array(image.data.buffer);
-    places.forEach((place, k) => { pixels[place] = colors[k]; });
-    const top = Math.floor(places[0] / image.width);
-    const bottom = Math.floor(places[places.length - 1] / image.width);
+    for (let k = 0, used = 0; k < runs.length; used += runs[k + 1], k += 2) {
+      pixels.set(colors.subarray(used, used + runs[k + 1]), runs[k]);
+    }
+    const top = Math.floor(runs[0] / image.width);
+    const bottom = Math.floor((runs[runs.length - 2] + runs[runs.length - 1] - 1) / image.width);
     paper.putImageData(image, 0, 0, 0, top, image.width, bottom - top + 1);
   }
 
