@@ -125,6 +125,27 @@ def test_controls_follow_and_lead():
             stage.set(**bad)
 
 
+@pytest.mark.parametrize(
+    "control, value, shown",
+    [
+        (slider(-180.0, 180.0, 20.0, step=1.0), 33.3, 33.0),
+        (slider(0.0, 1.0, 0.3, step=0.1), 0.26, 0.3),
+        (slider(0.0, 4.0, 2.0), 1.0101, 1.0),
+        (slider(0.01, 100.0, 0.7, log=True), 0.7001, 0.7),
+        (slider(1, 9, 3), 4, 4),
+    ],
+)
+def test_a_knob_stands_on_a_step_and_its_echo_changes_nothing(control, value, shown):
+    calls = []
+    stage = nothing(controls={"a": control}, compute=lambda state: calls.append(state["a"]))
+    stage.set(a=value)
+    assert stage._widgets["a"].value == pytest.approx(shown, abs=1e-12) and stage.state["a"] == value
+    stage._on_control("a", {"new": stage._widgets["a"].value})  # what the browser sends back
+    assert stage.state["a"] == value and calls == [control.value, value]
+    stage._widgets["a"].value = control.high
+    assert stage.state["a"] == control.high
+
+
 def test_log_slider_and_dropdown():
     controls = {"std": slider(1e-3, 1.0, 0.1, log=True), "k": choice({"one": 1, "two": 2, "three": 3, "four": 4}, 2)}
     stage = nothing(controls=controls, compute=lambda state: (state["std"], state["k"]))

@@ -129,23 +129,37 @@ class slider:
     def integer(self):
         return all(isinstance(v, (int, np.integer)) for v in (self.low, self.high, self.value, self.step or 1))
 
+    @property
+    def _scale(self):
+        """(low, high, step) of the track; in decades when it is logarithmic, with `value` on a step."""
+        if not self.log:
+            return self.low, self.high, self.step or (1 if self.integer else (self.high - self.low) / 100)
+        low, value, high = np.log10([self.low, self.value, self.high]).tolist()
+        below = round(100 * (value - low) / (high - low))
+        return low, high, (value - low) / below if below else (high - low) / 100
+
+    def shown(self, value):
+        """Where the knob stands: on one of its steps. The browser would round any other number and send it back."""
+        low, high, step = self._scale
+        if self.integer:
+            return value
+        at = low + round(((np.log10(value) if self.log else value) - low) / step) * step
+        return float(np.clip(10**at if self.log else round(at, 10), self.low, self.high))
+
     def widget(self, name):
         options = {
-            "value": self.value,
+            "value": self.shown(self.value),
             "description": self.label or name,
             "style": {"description_width": "initial"},
             "layout": _wide(self.label or name),
         }
+        low, high, step = self._scale
         if self.integer:
-            return ipywidgets.IntSlider(min=self.low, max=self.high, step=self.step or 1, **options)
+            return ipywidgets.IntSlider(min=low, max=high, step=step, **options)
         if self.log:
-            low, high = np.log10([self.low, self.high])
-            return ipywidgets.FloatLogSlider(
-                min=low, max=high, step=(high - low) / 100, readout_format=".2g", **options
-            )
-        step = self.step or (self.high - self.low) / 100
+            return ipywidgets.FloatLogSlider(min=low, max=high, step=step, readout_format=".2g", **options)
         decimals = max(0, int(np.ceil(-np.log10(step) - 1e-9)))
-        return ipywidgets.FloatSlider(min=self.low, max=self.high, step=step, readout_format=f".{decimals}f", **options)
+        return ipywidgets.FloatSlider(min=low, max=high, step=step, readout_format=f".{decimals}f", **options)
 
 
 @dataclass(frozen=True)
@@ -159,6 +173,9 @@ class choice:
     @property
     def _pairs(self):
         return list(self.options.items()) if isinstance(self.options, dict) else [(str(v), v) for v in self.options]
+
+    def shown(self, value):
+        return value
 
     def check(self, name, value):
         if value not in [v for _, v in self._pairs]:
@@ -187,6 +204,9 @@ class toggle:
         if not isinstance(value, (bool, np.bool_)):
             raise ValueError(f"{name} must be True or False, got {value!r}")
         return bool(value)
+
+    def shown(self, value):
+        return value
 
     def widget(self, name):
         return ipywidgets.Checkbox(
@@ -444,8 +464,9 @@ class Stage(ipywidgets.VBox):
         return _row([self._play_widget, self._time])
 
     def _on_control(self, key, change):
-        if not self._showing and self._state[key] != change["new"]:
-            self._apply({key: change["new"]})
+        control = self._controls[key]
+        if not self._showing and not _same(control.shown(self._state[key]), change["new"]):
+            self._apply({key: control.check(key, change["new"])})
 
     def _on_time(self, t):
         if not self._showing and abs(self._state["t"] - t) > 1e-9:
@@ -454,7 +475,7 @@ class Stage(ipywidgets.VBox):
     def _show_controls(self):
         self._showing = True  # the controls' own observers stay quiet
         for key, widget in self._widgets.items():
-            widget.value = self._state[key]
+            widget.value = self._controls[key].shown(self._state[key])
         if self._play:
             self._time.value = self._state["t"]
             self._play_widget.value = round(self._state["t"] / self._play.dt)
@@ -574,6 +595,11 @@ class Stage(ipywidgets.VBox):
 def _wide(label):
     """Room for a label, the track of a slider and its number."""
     return {"width": f"{18 + 0.55 * len(label):.0f}em", "max_width": "100%"}
+
+
+def _same(a, b):
+    """Equal but for what decimal fractions lose on their way through a browser."""
+    return a == b or (isinstance(a, float) and abs(a - b) <= 1e-9 * max(abs(a), abs(b)))
 
 
 def _frozen(array):
