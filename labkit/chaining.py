@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from .checks import as_finite, as_points, as_positive, as_transforms
-from .frames import _invert, frame_from_points, relative, rotation_angle
+from .frames import _invert, frame_from_points, invert, relative, rotation_angle
 from .lie import adjoint, exp_se3, log_se3, nearest_rotation, skew
 from .tables import read_table
 
@@ -179,7 +179,7 @@ def distribute_closure(transforms, shares=None):
     ValueError
         When the closure angle is within 0.001 rad of pi, where the direction of the correction is arbitrary.
     """
-    links = [orthonormalize(T) for T in _links(transforms)]
+    links = orthonormalize(np.array(np.broadcast_arrays(*_links(transforms))))
     poses = stations(links)
     N = len(links)
     shares = np.full(N, 1 / N) if shares is None else as_points(shares, "shares", dim=N)
@@ -195,9 +195,12 @@ def distribute_closure(transforms, shares=None):
 
 
 def around(links, loop):
-    """The links of one loop of a graph, in order: `loop` is a sequence of (k, forward), backward links are inverted."""
-    links = _links(links)
-    return [links[k] if forward else relative(links[k], np.eye(4)) for k, forward in loop]
+    """The links of one loop of a graph, in order, as a stack: `loop` is a sequence of (k, forward), backward links are
+    inverted.
+    """
+    numbers, forward = zip(*loop)
+    ordered = np.array(_links(links))[list(numbers)]
+    return np.where(np.reshape(forward, (-1, *[1] * (ordered.ndim - 1))), ordered, invert(ordered))
 
 
 def distribute_in_turn(links, loops):
@@ -214,8 +217,9 @@ def distribute_in_turn(links, loops):
     """
     links = np.array(_links(links))
     for loop in loops:
-        for (k, forward), T in zip(loop, distribute_closure(around(links, loop))):
-            links[k] = T if forward else relative(T, np.eye(4))
+        corrected = distribute_closure(around(links, loop))
+        for (k, forward), T, back in zip(loop, corrected, invert(corrected)):
+            links[k] = T if forward else back
     return links
 
 

@@ -65,7 +65,7 @@ class Drive:
 
 
 def _t(M):
-    return np.swapaxes(M, -1, -2)
+    return M.swapaxes(-1, -2)
 
 
 def _apply(M, x):

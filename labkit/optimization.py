@@ -11,6 +11,7 @@ Source: thesis "Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", H
 computed at once.
 """
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -319,7 +320,8 @@ def _start(evaluate, x0):
 
 
 def _is_finite(point):
-    return np.isfinite(point.cost) and np.isfinite(point.gradient).all() and np.isfinite(point.curvature).all()
+    g, B = point.gradient, point.curvature
+    return math.isfinite(point.cost) and math.isfinite(np.vdot(g, g)) and math.isfinite(np.vdot(B, B))
 
 
 def _undamped(evaluate, x0, next_step, retract, stop, max_iterations):

@@ -101,22 +101,22 @@ def compute_vehicle(state):
     truth, z = _vehicle_truth()
     A, B, C = kalman.vehicle_model(DT)
     x, cov = np.zeros(2), np.diag([NOISE["var_x0"], NOISE["var_v0"]])
-    found, covs, gains, scores = [], [], [], []
+    steps = []
     for k in range(STEPS):
         x, cov = kalman.predict(x, cov, A, B, [1.0], [[state["std_a"] ** 2]])
         missing = state["dropout"] and DROPOUT.start <= k < DROPOUT.stop
         step = kalman.update(x, cov, None if missing else z[k : k + 1], C, [[state["std_z"] ** 2]])
         x, cov = step.x, step.cov
-        found.append(x)
-        covs.append(np.diag(cov))
-        gains.append(step.gain[:, 0])
-        scores.append(np.nan if missing else kalman.nis(step.innovation, step.cov_innovation))
+        steps.append(step)
+    nis = kalman.nis(np.array([s.innovation for s in steps]), np.array([s.cov_innovation for s in steps]))
+    if state["dropout"]:
+        nis[DROPOUT] = np.nan
     return {
         "time": DT * np.arange(1, STEPS + 1),
-        "error": np.array(found) - truth,
-        "std": np.sqrt(covs),
-        "gain": np.array(gains),
-        "nis": np.array(scores),
+        "error": np.array([s.x for s in steps]) - truth,
+        "std": np.sqrt([np.diag(s.cov) for s in steps]),
+        "gain": np.array([s.gain[:, 0] for s in steps]),
+        "nis": nis,
     }
 
 

@@ -1,6 +1,6 @@
 """Chapter 4: the walk along the line, four paths on one map, Newton near the saddle, basins to rub free."""
 
-from functools import cache
+from functools import cache, lru_cache
 
 import contourpy
 import numpy as np
@@ -122,9 +122,15 @@ def model_contours(x, model, half_width, count=7):
     return np.concatenate([np.vstack([piece, [np.nan, np.nan]]) for piece in pieces])
 
 
+@lru_cache(maxsize=4)
+def _runs(start):
+    """Traces of all methods from a start, a tuple; kept while only the method or the iteration changes."""
+    return {name: wells.run(name, np.array(start), max_iterations=SHOWN) for name in wells.METHODS}
+
+
 def four_runs(state):
     """Traces of all methods from the start, and of the chosen one the model, radius and step at iteration k."""
-    runs = {name: wells.run(name, state["start"], max_iterations=SHOWN) for name in wells.METHODS}
+    runs = _runs(tuple(state["start"].tolist()))
     run = runs[state["method"]]
     k = min(state["k"], run.iterations - 1)
     x, step, radius = run.x[k], run.step[k], float(run.radius[k])
