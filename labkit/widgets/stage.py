@@ -452,7 +452,7 @@ class Stage(ipywidgets.VBox):
 
     def _build_play(self):
         steps = round(self._play.t_max / self._play.dt)
-        interval = max(40, round(1000 * self._play.dt / self._play.rate))
+        interval = max(30, round(1000 * self._play.dt / self._play.rate))
         stride = max(1, round(interval * self._play.rate / (1000 * self._play.dt)))
         self._play_widget = ipywidgets.Play(min=0, max=steps, step=stride, interval=interval, show_repeat=False)
         self._play_widget.observe(lambda change: self._on_time(change["new"] * self._play.dt), "value")
