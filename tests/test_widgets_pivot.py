@@ -83,3 +83,15 @@ def test_outliers_move_the_plain_tip_alone():
     assert spoiled["error_plain"] > 5 * spoiled["bound"] > spoiled["error_robust"]
     assert spoiled["weights"][1] == 0 and np.count_nonzero(spoiled["weights"]) == 11
     assert spoiled["touches"][1] == pytest.approx([14.0, 10.0], abs=0.01)
+
+
+@pytest.mark.parametrize("make", [w.swirl, w.outliers])
+def test_words_below_the_bars_stand_on_one_baseline(make):
+    stage = make()
+    stage.png()
+    words = [tick.label1 for tick in stage._picture.fig.axes[1].xaxis.get_major_ticks()]
+    baselines = {round(word.get_transform().transform(word.get_position())[1], 6) for word in words}
+    assert len(baselines) == 1 and {word.get_va() for word in words} == {"baseline"}
+    renderer, axes = stage._picture.canvas.get_renderer(), stage._picture.fig.axes[1]
+    assert all(word.get_window_extent(renderer).y0 > 0 for word in words)
+    assert all(word.get_window_extent(renderer).y1 < axes.bbox.y0 for word in words)
