@@ -95,3 +95,13 @@ def test_words_below_the_bars_stand_on_one_baseline(make):
     renderer, axes = stage._picture.canvas.get_renderer(), stage._picture.fig.axes[1]
     assert all(word.get_window_extent(renderer).y0 > 0 for word in words)
     assert all(word.get_window_extent(renderer).y1 < axes.bbox.y0 for word in words)
+
+
+def test_a_large_ellipsoid_is_cut_at_the_sphere_and_said_to_be():
+    stage = w.pose_designer()
+    assert "cut" not in stage.caption
+    small = np.linalg.eigvalsh(stage.result["covariance_seen"])
+    assert np.sqrt(small) == pytest.approx(stage.result["deviations"][::-1])
+    stage.set(**{f"D{k}": tuple(d) for k, d in enumerate(w._ring(3.0), start=1)})
+    assert stage.result["deviations"].min() > w.LONGEST and "cut there" in stage.caption
+    assert np.sqrt(np.linalg.eigvalsh(stage.result["covariance_seen"])) == pytest.approx(np.full(3, w.LONGEST))

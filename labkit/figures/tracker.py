@@ -17,6 +17,7 @@ class Trail:
         self.rejected = scene.points(**style.look("rejected"))
         self.path = scene.line(**style.look("estimate"))
         self.tracker = scene.triad("E", triad)
+        self.tracker.name_at(-9, 10)
         scene.fixed(scene.triad("W", triad, linestyle=(0, (3, 1.5))), np.eye(4))
 
     def set(self, positions, used, filtered, T_WE):
