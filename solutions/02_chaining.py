@@ -157,7 +157,7 @@ for x in (0, 100, 300, 1000):
 # ## One bad link
 #
 # A turn at the end of link $k$ moves everything that follows, and the end of the chain moves by the turn times its **lever**: the distance from $K_k$ to the end.
-# The figure shows the sheet's loop in plan view: black as it is, purple as the chain sees it, gray the gap at $K_0$ and at a work piece P. Drag the frames, and choose which link is wrong.
+# The figure shows the sheet's loop in plan view: thin (black, or white on dark) as it is, purple as the chain sees it, gray the gap at $K_0$ and at a work piece P. Drag the frames, and choose which link is wrong.
 
 # %% predict-lever
 guess = ...  # your code here

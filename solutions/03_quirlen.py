@@ -122,7 +122,7 @@ def pivot_residuals(T_WF, tip, point):
 
 # %% s0
 residuals = pivot_residuals(poses, x[:3], x[3:])
-print("first P_test", residuals[0], " last", residuals[-1])
+print("first P_test", residuals[0], "\nlast P_test ", residuals[-1])
 listings = np.array([[-0.106450, 0.191828, -0.098577], [0.043934, -0.236217, -0.109208]])
 print("as in listings 9 and 10, to half a digit:", bool((np.abs(residuals[[0, -1]] - listings) < 5e-7).all()))
 s0 = ...  # your code here
@@ -202,15 +202,14 @@ ex.predict("cone", guess, reveal=stages.pose_designer)
 
 # %% cone-angle
 tip = np.array([0.0, 0.0, -100.0])
+print("poses    cone  condition   squared  tip across    along")
 for n, half_angle_deg in ((60, 1), (60, 2), (6, 20), (60, 20), (60, 45)):
     R = pivot.cone(n, np.deg2rad(half_angle_deg))
     s = np.linalg.svd(pivot.pivot_matrix(pivot.touching_poses(R, tip, np.zeros(3))), compute_uv=False)
     cov = pivot.predicted_covariance(R, tip, std_rot=0.0, std_trans=0.2)
     condition = s[0] / s[5]
-    print(
-        f"{n:2} poses, cone {half_angle_deg:2} deg: condition {condition:5.0f}, squared {condition**2:8.0f}; "
-        f"tip {np.sqrt(cov[0, 0]):.2f} mm across, {np.sqrt(cov[2, 2]):.2f} mm along"
-    )
+    across, along = np.sqrt(cov[0, 0]), np.sqrt(cov[2, 2])
+    print(f"{n:5}  {half_angle_deg:2} deg  {condition:9.0f}  {condition**2:8.0f}  {across:7.2f} mm  {along:.2f} mm")
 
 # %% squared [markdown]
 # The column "squared" is what the normal equations work with, and every power of ten in it costs one of the 16 digits a computer has. Try it with exact poses on very narrow cones.
