@@ -15,9 +15,8 @@ class HandEye:
     residuals: array (N, k), one measurement a row; rotation vector (rad) before translation where there are both.
     covariance: of the unknowns. The first six belong to T_FS: rotation vector (rad, about the axes of S), then
     translation (in F); the target follows.
-    singular_values: of the whitened Jacobian with its columns scaled to length 1, largest first; the last one tells how
-    close the data are to leaving
-        something undetermined.
+    singular_values: of the whitened Jacobian with its columns scaled to length 1, largest first; the last one tells
+    how close the data are to leaving something undetermined.
     weights: array (N,), 1 for a measurement that counts fully, 0 for a rejected one.
     trace: one row of figures an iteration (what they are, the function says).
     """

@@ -1,11 +1,10 @@
 """Maps of the surroundings and a laser scanner that looks at them.
 
 The lecture shows one room as a grid, as lines, as points and as a graph; the sensor models need the grid. `cells[i,
-j]` covers the square
-from x = origin[0] + j * resolution and y = origin[1] + i * resolution on: row 0 lies at the *bottom*, as in a
-coordinate system, and pictures and ASCII art are turned over when they are read. Lengths are meters, angles radians,
-planar poses (..., 3) are x, y, theta. Source: lecture "Lokalisierung", slides on maps ("Gitterbasierte Karten" to
-"Punktbasierte Karten"), "2D-Laser-Scanner", "Likelihoodfield".
+j]` covers the square from x = origin[0] + j * resolution and y = origin[1] + i * resolution on: row 0 lies at the
+*bottom*, as in a coordinate system, and pictures and ASCII art are turned over when they are read. Lengths are
+meters, angles radians, planar poses (..., 3) are x, y, theta. Source: lecture "Lokalisierung", slides on maps
+("Gitterbasierte Karten" to "Punktbasierte Karten"), "2D-Laser-Scanner", "Likelihoodfield".
 """
 
 import math
@@ -238,10 +237,9 @@ def walk_ray(grid, pose, bearing, r_max):
 def cast_rays(grid, poses, bearings, r_max):
     """Distances to the first occupied cell from many poses in many directions, by sphere tracing.
 
-    The distance field says how far a ray may jump without hitting anything; near a wall the jumps shrink to one
-    cell. Where a ray ends,
-    the edge of the cell it entered gives the distance. A ray that clips a corner of less than a cell may end one
-    cell late.
+    The distance field says how far a ray may jump without hitting anything; near a wall the jumps shrink to one cell.
+    Where a ray ends, the edge of the cell it entered gives the distance. A ray that clips a corner of less than a
+    cell may end one cell late.
 
     Parameters
     ----------
@@ -401,8 +399,7 @@ class LikelihoodField:
         """Sum of log p over the beams of one scan, for each pose: (..., 3), (B,), (B,) -> (...).
 
         The end point of a beam is [1, r cos b, r sin b] times [x, cos, -sin] and [y, cos, sin]: two matrix products
-        for all particles and
-        beams, without a sine or cosine per beam, then one look-up each.
+        for all particles and beams, without a sine or cosine per beam, then one look-up each.
         """
         poses = as_points(poses, "poses")
         beams = self._beams(ranges, bearings)

@@ -1,9 +1,8 @@
 """Monte-Carlo localization: a cloud of poses that is moved, weighed and redrawn.
 
 States are planar poses (M, 3): x, y, theta in m and rad. A sensor model takes one measurement and returns a
-`Weighting`, a function
-of the states that gives the *logarithm* of each weight: a product of many small densities is a sum that cannot
-underflow.
+`Weighting`, a function of the states that gives the *logarithm* of each weight: a product of many small densities is
+a sum that cannot underflow.
 Source: lecture "Lokalisierung", "Monte-Carlo-Lokalisierung".
 """
 
@@ -141,8 +140,8 @@ def weigh_beams(world, ranges, bearings, std, r_max, shares=(0.75, 0.1, 0.05, 0.
         Range of the scanner (m).
     shares : four numbers that add up to 1
         hit: Gauss about the expected range, normalized on [0, r_max]; short: something unmapped stood in the way;
-        max: nothing came
-        back; random. The lecture's model is (1, 0, 0, 0): one such surprise makes the whole product zero or nearly so.
+        max: nothing came back; random. The lecture's model is (1, 0, 0, 0): one such surprise makes the whole product
+        zero or nearly so.
     decay : float
         Rate of the short readings (1/m).
     step : float, optional
@@ -269,8 +268,7 @@ def resample_roulette(weights, rng, size=None):
     """Indices drawn independently with probability w / sum(w): one spin of the wheel per particle, O(M log M).
 
     weights: (M,), at least 0, of any sum. size: number of draws, M by default. The indices come in rising order:
-    sorted spins find their
-    interval several times faster, as the search stays in the cache.
+    sorted spins find their interval several times faster, as the search stays in the cache.
     Source: lecture, "Resampling mit Roulette-Rad-Verfahren".
     """
     weights = _as_weights(weights)
@@ -397,10 +395,10 @@ def pose_bins(states, cell=0.5, turn=_BIN_TURN):
 def recover(w_mean, w_slow, w_fast, alpha_slow=0.02, alpha_fast=0.3):
     """Share of particles to replace by random poses, and both averages brought up to date: (share, w_slow, w_fast).
 
-    Two exponential averages follow the mean weight of the cloud, a slow and a fast one. When the fast one has
-    dropped below the slow
-    one, the measurements have stopped to fit: share = max(0, 1 - w_fast / w_slow). Start both averages with the first
-    mean weight. Source: beyond the lecture, which names the kidnapped robot problem only (augmented MCL).
+    Two exponential averages follow the mean weight of the cloud, a slow and a fast one. When the fast one has dropped
+    below the slow one, the measurements have stopped to fit: share = max(0, 1 - w_fast / w_slow). Start both averages
+    with the first mean weight. Source: beyond the lecture, which names the kidnapped robot problem only (augmented
+    MCL).
     """
     if not 0 <= alpha_slow < alpha_fast <= 1:
         raise ValueError(

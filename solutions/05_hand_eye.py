@@ -318,7 +318,7 @@ for e in misprints.explanations(handeye_data.printed_entries(), 12, fit.T_FS, fi
 # ## Name them
 #
 # Now write the search. `entries` maps (table, pose, column) to the printed text, such as `'1397.69'`; `handeye_data.measurements_from(entries)` makes arrays of it. Return the set of
-# wrong entries. Any procedure is fine, within two seconds a call: recompute only the row you change.
+# wrong entries. Any procedure is fine, within 15 seconds a call; who recomputes only the row that is changed needs a fraction of one.
 # Accusing an innocent entry is not. The check also plants slips of its own.
 
 # %% find_misprints

@@ -6,6 +6,7 @@ import os
 import sys
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -453,10 +454,35 @@ def test_names_are_bound_to_the_answer_or_the_reference(capsys):
 
 
 def test_a_reference_value_counts_but_does_not_show_itself(capsys):
+    hidden = session.Answer.reference(np.arange(12.0).reshape(3, 4))
+    for part in (hidden[0], hidden[:, 1], hidden[[0, 2]], hidden[1, 2], hidden.T, hidden.ravel(), *hidden):
+        assert str(part) == repr(part) == "(still to be found)"
+    assert str(hidden[:2] + 1) == str(np.arange(8.0).reshape(2, 4) + 1) and hidden[1, 2] + 0 == 6.0
     hidden = session.Course(SMALL).length(...)
     assert f"{hidden:.3f} {hidden} {hidden!r}" == "(still to be found) (still to be found) (still to be found)"
     assert hidden + 1 == 1235.5
     assert "1234" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "text, shown",
+    [
+        ("a loop", "A loop"), ("your result", "Your result"), ("is-it", "Is-it"), ("", ""), ("s0 divides by n", None),
+        ("x is NaN", None), ("`x` is", None), ("dt=0", None), ("T_AB is", None), ("3 of 5", None),
+    ],
+)  # fmt: skip
+def test_sentences_begin_with_a_capital_but_symbols_stay(text, shown):
+    assert session._sentence(text) == (text if shown is None else shown)
+
+
+def test_an_exercise_may_allow_more_time_or_less():
+    def slow(v):
+        time.sleep(0.3)
+        return 2 * v
+
+    patient = replace(DOUBLE, draws=1)
+    assert patient.judge(slow).status == CORRECT
+    assert "did not finish within 0.1 s" in replace(patient, limit=0.1).judge(slow).text
 
 
 def test_feedback_never_shows_the_reference_result():

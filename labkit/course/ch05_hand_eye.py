@@ -688,6 +688,7 @@ CHAPTER = Chapter(
             draw=entries_with_more_slips,
             metric=named_entries(),
             draws=2,
+            limit=15.0,
             properties=(lambda student, rng: _judge_printed(student),),
             hints=(
                 "Two questions: which rows do not fit a robust calibration, and which single slip explains each of them?",

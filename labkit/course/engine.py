@@ -73,6 +73,7 @@ class Exercise(Item):
                 or at a special place; several such in a list. `words` lead in what is said when only this draw fails.
     properties: functions (student_function, rng) -> None or a sentence that says what does not hold.
     draws:      how many draws a check takes.
+    limit:      seconds that one call may take.
     """
 
     reference: object
@@ -83,6 +84,7 @@ class Exercise(Item):
     noisy: tuple = ()
     properties: tuple = ()
     draws: int = 5
+    limit: float = guard.TIME_LIMIT
 
     def __post_init__(self):
         super().__post_init__()
@@ -149,7 +151,7 @@ class _Trial:
             return None
 
         started = time.perf_counter()
-        run = guard.run(self.function, args, finish)
+        run = guard.run(self.function, args, finish, self.exercise.limit)
         self.spent += time.perf_counter() - started
         self.printed = self.printed or run.printed
         if run.error is not None:
@@ -165,7 +167,7 @@ class _Trial:
 
     def property(self, holds, rng):
         """Check one property of the student's function, guarded like a call."""
-        run = guard.run(holds, (self.function, rng))
+        run = guard.run(holds, (self.function, rng), limit=self.exercise.limit)
         if run.error is not None:
             return self._raised(run, ())
         return self.outcome(NOT_YET, str(run.result)) if run.result else None
@@ -241,7 +243,10 @@ class _Trial:
         if isinstance(error, NotImplementedError):
             return self.outcome(TO_DO)
         if isinstance(error, guard.TimeLimit):
-            text = f"your code did not finish within {guard.TIME_LIMIT:.0f} s: is there a loop without an end?"
+            text = (
+                f"your code did not finish within {self.exercise.limit:g} s: is there a loop without an end,"
+                " or one that tries far more than it must?"
+            )
             return self.outcome(NOT_YET, text)
         if isinstance(error, guard.Forbidden):
             return self.outcome(

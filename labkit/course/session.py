@@ -197,6 +197,14 @@ class ArrayAnswer(np.ndarray):
 
     hidden = False
 
+    def __array_finalize__(self, whole):
+        """Another view of a hidden array is hidden as well; what is computed from it is the student's own."""
+        self.hidden = getattr(whole, "hidden", False) and np.may_share_memory(self, whole)
+
+    def __getitem__(self, key):
+        part = super().__getitem__(key)
+        return Answer.reference(part) if self.hidden else part
+
     def __repr__(self):
         return HIDDEN if self.hidden else repr(np.asarray(self))
 
@@ -296,7 +304,8 @@ def _question(chapter, item, reveal):
 
 
 def _sentence(text):
-    return text[:1].upper() + text[1:] if text else ""
+    """The text with a capital, unless it begins with a symbol: s0, x, R."""
+    return text[:1].upper() + text[1:] if re.match(r"(a|[a-z]{2,})[\s,:;'-]", text) else text
 
 
 def chapter_panel(chapter):

@@ -176,9 +176,11 @@ class Picture:
         """Adopt the width of the cell (CSS pixels), the device's pixel ratio and the theme."""
         width = min(max(float(width), 120.0), self.size[0] * CSS_DPI)
         ratio = min(max(float(ratio), 1.0), MAX_RATIO)
-        if (width, ratio, bool(dark)) == (self.width, self.ratio, self.dark) and self._background is not None:
+        if bool(dark) != self.dark:
+            self.canvas.dark, self._background = bool(dark), None
+        if (width, ratio) == (self.width, self.ratio):
             return
-        self.width, self.ratio, self.canvas.dark = width, ratio, bool(dark)
+        self.width, self.ratio = width, ratio
         inches = max(width / CSS_DPI, MIN_SCALE * self.size[0])
         self.fig.set_dpi(width * ratio / inches)
         self.fig.set_size_inches(inches, inches * self.size[1] / self.size[0])

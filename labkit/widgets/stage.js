@@ -283,8 +283,9 @@ function render({ model, el }) {
 
   // ---- what Python must know of the screen
   let last = "";
+  let width = 0;
   function look() {
-    const width = Math.floor(root.getBoundingClientRect().width);
+    width = Math.floor(root.getBoundingClientRect().width) || width; // 0 while hidden, and while a theme is exchanged
     if (!width) return;
     const now = { width, ratio: window.devicePixelRatio || 1, dark: isDark() };
     if (JSON.stringify(now) === last) return;

@@ -3,11 +3,9 @@
     python tests/bench/particles_speed.py PEERS [--repeats 7]
 
 PEERS is the path of the peers' benchmark (peers.py). V is exp of 1e6 doubles, timed right after each repeat; "plain"
-is the
-textbook form in the same file. Goals: landmark update at most 0.7 V at 1e4 particles, likelihood field at most 3 V at
-1e4 x 60
-and 10 times the textbook, ray casting at least 1.7 times plain sphere tracing, systematic resampling at most 1.5 V at
-1e5.
+is the textbook form in the same file. Goals: landmark update at most 0.7 V at 1e4 particles, likelihood field at most
+3 V at 1e4 x 60 and 10 times the textbook, ray casting at least 1.7 times plain sphere tracing, systematic resampling
+at most 1.5 V at 1e5.
 """
 
 import argparse

@@ -114,6 +114,21 @@ def test_a_handle_follows_mouse_and_arrow_keys(page):
     assert abs(handle.bounding_box()["x"] - start["x"]) < 2
 
 
+def test_a_picture_made_of_changes_is_the_whole_picture(page):
+    stage = page.locator(".labkit-stage").first
+    stage.locator(".handle").nth(1).focus()
+    for key in ("Shift+ArrowUp", "Shift+ArrowRight", "ArrowUp"):
+        page.keyboard.press(key)
+    followed = look(page, stage)
+    for dark in (True, False):  # a new theme brings a whole picture
+        number = stage.get_attribute("data-picture")
+        driver.set_theme(page, dark)
+        page.wait_for_function(
+            "([node, number]) => node.dataset.picture !== number", arg=[stage.element_handle(), number]
+        )
+        assert (look(page, stage) == followed) != dark
+
+
 def look(page, stage):
     """The pixels of a Stage, once it has come to rest."""
     page.wait_for_timeout(600)
