@@ -63,7 +63,10 @@ def test_likelihood_field_likes_wrong_rooms_better_than_the_beam_model():
 def test_plain_beams_find_every_place_impossible_with_an_echo_missing():
     state = {"robot": np.array([8.4, 2.4]), "heading_deg": 20, "scan": "as mapped", "beams": "plain"}
     result = stages.compute_heat(state)
-    assert not result["beams_possible"] and result["field_found"]
+    assert not result["beams_possible"] and result["field_off"] < 0.4
+    stage = stages.field_against_beams()
+    stage.set(robot=(7.9, 8.8))
+    assert "in a wall" in stage.caption
 
 
 def wheel_state(method, weights, turn=0.3):

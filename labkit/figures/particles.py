@@ -170,7 +170,7 @@ def heat(ax, extent, shape, lines, title, low):
 def ancestors(ax, methods):
     """Axes of ancestors left against rounds of resampling. Returns a curve for each of the two methods."""
     style.axes(ax, "rounds", "", "ancestors left")
-    ax.set(xlim=(0, 200), ylim=(0.8, 2000), yscale="log")
+    ax.set(xlim=(0, 206), ylim=(0.8, 2000), yscale="log")
     ax.set_yticks([1, 10, 100, 1000], ["1", "10", "100", "1000"])
     ax.minorticks_off()
     now = {"marker": "o", "markevery": [-1], "markersize": 5}

@@ -186,7 +186,8 @@ def compute_heat(state):
         "beams": particles.weigh_beams(sensors.table, ranges, bearings, 0.2, 18.0, shares=shares, step=0.02),
         "field": particles.weigh_likelihood_field(sensors.field, ranges, bearings),
     }
-    result = {"pose": pose, "ends": _ends(pose, ranges, bearings)}
+    free = bool(b.grid.at(pose[:2]) == maps.FREE)
+    result = {"pose": pose, "ends": _ends(pose, ranges, bearings), "free": free}
     for name, weigh in models.items():
         log_w = weigh(poses)
         best = log_w.max()
@@ -194,7 +195,7 @@ def compute_heat(state):
         picture[cells] = np.maximum(log_w - best, HEAT_DEPTH) if np.isfinite(best) else HEAT_DEPTH
         result[name] = picture
         result[f"{name}_possible"] = bool(np.isfinite(best))
-        result[f"{name}_found"] = bool(np.isfinite(best) and np.hypot(*(xy[np.argmax(log_w)] - pose[:2])) < 0.4)
+        result[f"{name}_off"] = float(np.hypot(*(xy[np.argmax(log_w)] - pose[:2]))) if np.isfinite(best) else np.inf
         away = np.hypot(*(xy - pose[:2]).T) > 2.0
         result[f"{name}_elsewhere"] = float(log_w[away].max() - best) if np.isfinite(best) else -np.inf
     return result
@@ -207,14 +208,17 @@ def _ends(pose, ranges, bearings):
 
 
 def _heat_sentence(result):
+    if not result["free"]:
+        return "The robot stands in a wall: nothing can be scanned from there."
     words = []
     for name, long in (("beams", "beam model"), ("field", "likelihood field")):
         if not result[f"{name}_possible"]:
             words.append(f"{long}: every place has weight zero")
+        elif result[f"{name}_off"] > 0.4:
+            words.append(f"{long}: best place is wrong, {result[f'{name}_off']:.1f} m off")
         else:
-            found = "right" if result[f"{name}_found"] else "wrong"
             elsewhere = f"e^{result[f'{name}_elsewhere']:.0f}"
-            words.append(f"{long}: best place is {found}, more than 2 m away at most {elsewhere} of its weight")
+            words.append(f"{long}: best place is right, more than 2 m away at most {elsewhere} of its weight")
     return "; ".join(words).capitalize() + "."
 
 
@@ -324,7 +328,7 @@ def wheel():
             sticks.set_data(*draw.bars(np.arange(1, SECTORS + 1), result["weights"]))
             for k, label in enumerate(labels):
                 label.set_text(f"{result['counts'][k]}\nof {SECTORS * result['shares'][k]:.1f}")
-                label.set_y(result["weights"][k] + 0.04)
+                label.set_y(result["weights"][k] + 0.07)
             disk.set(result["shares"], result["spokes"])
             words.set_text(
                 f"variance of the counts:  roulette {result['variances']['roulette']:.2f},  "
