@@ -219,7 +219,7 @@ def walk_ray(grid, pose, bearing, r_max):
     start = (np.array([y, x]) - grid.origin[::-1]) / grid.resolution
     cell = np.floor(start).astype(int)
     step = np.where(u > 0, 1, -1)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):  # along an axis, or all but
         per_cell = np.abs(1.0 / u)
     to_edge = np.where(u > 0, cell + 1 - start, start - cell)
     crossing = np.array([edge * pace if pace < np.inf else np.inf for edge, pace in zip(to_edge, per_cell)])

@@ -538,22 +538,24 @@ class MonteCarloLocalizer:
         effective = effective_size(self.weights)
         due = self.count % self.every == 0 and effective < self.threshold * len(self.states)
         share = float(np.clip(share, MIN_INJECTED, MAX_INJECTED)) if self.draw is not None else 0.0
-        injected = int(round(share * len(self.states)))
-        if due or injected or self.threshold >= 1 and self.count % self.every == 0:
-            self._redraw(injected, rng)
-            due = True
+        due = due or share > 0 or self.threshold >= 1 and self.count % self.every == 0
+        injected = self._redraw(share, rng) if due else 0
         return Step(len(self.states), effective, due, injected, w_mean, all_zero)
 
-    def _redraw(self, injected, rng):
+    def _redraw(self, share, rng):
+        """Resample, then put random poses in place of a share; how many. They come after the count of KLD sampling:
+        strewn over the whole building they would ask for all particles in every step."""
         size = self.n_max if self.kld is not None else len(self.states)
         chosen = self.states[self.resample(self.weights, rng, size)]
-        if injected:
-            place = rng.choice(size, min(injected, size), replace=False)
-            chosen[place] = self.draw(len(place), rng)
         if self.kld is not None:
             chosen = rng.permutation(chosen)
             chosen = chosen[: kld_take(chosen, **self.kld)]
+        injected = int(round(share * len(chosen)))
+        if injected:
+            place = rng.choice(len(chosen), injected, replace=False)
+            chosen[place] = self.draw(injected, rng)
         self.states, self.log_weights = chosen, np.zeros(len(chosen))
+        return injected
 
 
 # --- simulated drives ------------------------------------------------------------------------------------------------

@@ -42,6 +42,9 @@ grid = building.grid
 # The lecture *Lokalisierung* answers with thousands of poor ones (section *Monte-Carlo-Lokalisierung*, German
 # slides): every guess, a *particle*, is moved,
 # weighed, and redrawn in proportion to its weight. The slide *Idee* shows it in one dimension, pictures (a) to (e).
+#
+# Predict first. Then drag the robot (the triangle) and the orange doors: where must the third door stand, so that two
+# looks do not suffice?
 
 # %% predict-corridor
 guess = ...  # your code here
@@ -89,7 +92,10 @@ print(f"nearest obstacle {ranges.min():.2f} m, median {np.median(ranges):.2f} m"
 # %% sample_motion
 @ex.sample_motion
 def sample_motion(states, u, dt, std_u, rng):
-    """Return states, shape (M, 3), moved by odometry.step(x, u, dt), each with its own noisy copy of u."""
+    """Return states, shape (M, 3), moved by odometry.step(x, u, dt), each with its own noisy copy of u.
+
+    std_u, shape (2,): standard deviations of v and omega. Draw from rng.
+    """
     ### BEGIN SOLUTION
     noisy = u + std_u * rng.standard_normal((len(states), 2))
     return odometry.step(states, noisy, dt)
@@ -146,8 +152,10 @@ ex.beams_to_zero(beams_to_zero)
 # %% cast_ray
 @ex.cast_ray
 def cast_ray(grid, pose, bearing, r_max):
-    """Return the distance (m) to the first occupied cell along a beam, r_max if there is none. grid.at([x, y]) asks
-    the map."""
+    """Return the distance (m) to the first occupied cell along a beam, r_max if there is none.
+
+    grid.at([x, y]) is maps.OCCUPIED there; a cell is grid.resolution wide (m).
+    """
     ### BEGIN SOLUTION
     angle = pose[2] + bearing
     for r in np.arange(0, r_max, grid.resolution / 2):
@@ -177,8 +185,10 @@ def beam_weight(ranges, expected, std):
 # %% distance_field_weight
 @ex.distance_field_weight
 def distance_field_weight(grid, pose, ranges, bearings, std):
-    """Return log p: the sum of log N(0, std^2) over the distances of the end points. grid.cell_of(points) gives their
-    cells."""
+    """Return log p: the sum of log N(0, std^2) over the distances of the end points.
+
+    grid.cell_of(points), points of shape (B, 2), gives the rows and columns of their cells in grid.distance.
+    """
     ### BEGIN SOLUTION
     x = pose[0] + ranges * np.cos(pose[2] + bearings)
     y = pose[1] + ranges * np.sin(pose[2] + bearings)
@@ -317,7 +327,7 @@ stages.soccer()
 #
 # The lecture names the *kidnapped robot problem* and leaves it there. In the arena below you can do it: **drag the
 # robot away**. A stroke elsewhere
-# draws obstacles that the map does not know. Click the picture and drive with the arrow keys, or press play. Switch
+# draws obstacles that the map does not know. Press play, or click the picture and drive with the arrow keys. Switch
 # models and resamplers while it runs, and when the robot
 # is lost, choose *spoke wheel + recovery*.
 
@@ -348,8 +358,8 @@ def recover(w_mean, w_slow, w_fast, alpha_slow, alpha_fast):
 # %% rates [markdown]
 # How reliable is it? One good run proves little. The table counts 100 seeded runs each, with 5000 particles: found
 # means within 0.3 m and 10° after 60 steps,
-# or within 60 steps of a kidnapping. The interval says what 100 runs cannot tell apart. *Adaptive* is explained below
-# the table.
+# or within 60 steps of a kidnapping. The last column says after how many steps half of these runs were right and
+# stayed so. The interval says what 100 runs cannot tell apart. *Adaptive* is explained below the table.
 
 # %% success
 table = read_table("monte_carlo/success.csv", text=("task", "model"))
@@ -361,15 +371,16 @@ for task, model, good, low, high, steps in zip(*(table[name] for name in columns
 # %% beyond [markdown]
 # ## Beyond the document: fewer particles when fewer will do
 #
-# A converged cloud needs no 5000 particles. KLD sampling counts the bins the cloud occupies and keeps as many
-# particles as a chi-square bound asks for.
+# A converged cloud needs no 5000 particles. KLD sampling counts the bins (0.5 m by 0.5 m by 15°) the cloud occupies and
+# keeps as many particles as a chi-square bound asks for, `n_min` at least.
 # The price: a cloud that shrinks onto the wrong place has nobody left elsewhere, and then all hangs on the recovery.
-# Compare the rows *adaptive* and *global*; then run the cell with `recovery=False` and other seeds.
+# Compare the rows *adaptive* and *global*: which model pays it, and why that one? Then run the cell with
+# `recovery=False` and other seeds.
 
 # %% kld
 suite, rng = particles.SensorSuite(building), np.random.default_rng(5)
 drive = particles.random_drive(building, 30, rng, start="hall")
-mcl = particles.localizer(building, "likelihood field", 5000, rng, kld={"n_min": 500, "epsilon": 0.01})
+mcl = particles.localizer(building, "likelihood field", 5000, rng, kld={"n_min": 2000, "epsilon": 0.005})
 run = particles.record(mcl, drive, lambda pose, k: suite.measure("likelihood field", pose, rng), rng)
 error = np.hypot(*(run[-1].estimate - run[-1].truth)[:2])
 print("particles before steps 1, 2, 5, 10, 30:", [len(run[k].states) for k in (0, 1, 4, 9, 29)])
@@ -434,7 +445,10 @@ print(inspect.getsource(museum.specimen_4))
 
 @ex.hunt_4
 def hunt_4(weigh):
-    """Return True if weigh(states, ranges, landmarks, std) treats two readings as independent, False otherwise."""
+    """Return True if weigh(states, ranges, landmarks, std) treats two readings as independent, False otherwise.
+
+    Only ratios of weights count: a common factor is no fault.
+    """
     ### BEGIN SOLUTION
     states, mark = np.array([[0.0, 0, 0], [0.3, 0, 0]]), np.array([[2.0, 0.0]])
     a, b = weigh(states, np.array([2.0]), mark, 0.3)

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
@@ -135,6 +135,7 @@ def test_shape_of_the_cast(room):
 
 @settings(deadline=None, max_examples=40)
 @given(st.floats(1.05, 6.95), st.floats(1.05, 3.95), st.floats(-7, 7), st.floats(-4, 4))
+@example(1.5, 1.5, 5e-324, 0.0)
 def test_turning_robot_and_beam_oppositely_changes_nothing(x, y, theta, bearing):
     grid = OccupancyGrid.from_ascii(ROOM)
     if grid.at([x, y]) == OCCUPIED:

@@ -339,6 +339,14 @@ def test_global_localization_with_fewer_and_fewer_particles(building):
     assert steps[1].n_particles > 1000 and steps[-1].n_particles < 1000
 
 
+def test_random_poses_of_the_recovery_do_not_keep_the_number_of_particles_up(building):
+    kld = {"n_min": 2000, "epsilon": 0.005}
+    filter_, drive, steps = run(building, "beams", 25, size=5000, kld=kld)
+    assert np.hypot(*(filter_.estimate().pose - drive.truth[-1])[:2]) < 0.3
+    assert max(s.n_particles for s in steps[5:]) < 2500
+    assert 0 < steps[-1].injected <= 0.5 * len(filter_.states)
+
+
 def test_threshold_and_every(building):
     never = run(building, "landmarks", 23, n=10, threshold=0.0, recovery=False)[0]
     assert never.count == 10 and np.ptp(never.log_weights) > 10  # weights have multiplied up

@@ -10,6 +10,7 @@ from . import metrics
 from .engine import Chapter, Exercise, Mistake, Prediction, Value
 
 R_MAX = 18.0
+IMPORTS = 6.0  # seconds a call may take where students import scipy.stats, which alone can take two
 
 
 @functools.cache
@@ -21,11 +22,11 @@ def building():
 # Draws ---------------------------------------------------------------------------------------------------------------
 
 
-def scan_at_a_pose(rng):
+def scan_at_a_pose(rng, count=12):
     """grid, pose near the truth, ranges, bearings, std; all end points lie on the map, whatever the heading."""
     grid = building().grid
     pose = np.array([rng.uniform(5, 12), rng.uniform(4.6, 5.3), rng.uniform(-3, 3)])
-    bearings = np.linspace(-2.3, 2.3, 12)
+    bearings = np.linspace(-2.3, 2.3, count)
     ranges = grid.cast(pose, bearings, R_MAX).astype(float)
     near = pose + rng.normal(0, (0.05, 0.05, 0.03))
     short = np.clip(ranges - 0.3, 0.05, 3.5)
@@ -43,20 +44,42 @@ def landmarks_at_a_pose(rng):
     return pose, z, landmarks, float(rng.uniform(0.15, 0.4)), float(rng.uniform(0.03, 0.08))
 
 
-def beams_at_a_pose(rng):
+def beams_at_a_pose(rng, count=20):
     """Measured and expected ranges, std."""
-    expected = rng.uniform(1, 10, 20)
-    return expected + 0.2 * rng.normal(size=20), expected, float(rng.uniform(0.15, 0.4))
+    expected = rng.uniform(1, 10, count)
+    return expected + 0.2 * rng.normal(size=count), expected, float(rng.uniform(0.15, 0.4))
+
+
+def whole_scan(draw):
+    """The draw with as many beams as the scanner has, and so wide a std that a plain product of their densities is zero
+    in float64.
+    """
+
+    def drawn(rng):
+        return *draw(rng, count=541)[:-1], float(rng.uniform(2.5, 3.5))
+
+    return drawn
 
 
 def plain_ray(rng):
-    """grid, pose, bearing, r_max of a ray that meets a wall squarely enough for any way of stepping along it."""
+    """grid, pose, bearing, r_max of a ray that meets a wall squarely enough for any way of stepping along it, and whose
+    range differs from those without heading or bearing and from the mirrored one: a slow answer gets few draws.
+    """
     grid = building().grid
     while True:
-        pose, bearing = particles.uniform_states(grid, 1, rng)[0], rng.uniform(-2, 2)
-        around = [maps.walk_ray(grid, pose, bearing + d, R_MAX) for d in (-0.02, -0.01, 0.0, 0.01, 0.02)]
-        if np.ptp(around) < 0.12 * around[2] and np.ptp(around) < 0.25 and around[2] > 1.0:
-            return grid, pose, bearing, 0.6 * around[2] if rng.random() < 0.5 else R_MAX
+        pose, b = particles.uniform_states(grid, 1, rng)[0], rng.uniform(-2, 2)
+        others = (-pose[2] + b, 0.0, -b, math.pi / 2 - 2 * pose[2] - b)
+        cast = grid.cast(pose, np.array([b - 0.02, b - 0.01, b, b + 0.01, b + 0.02, *others]), R_MAX)
+        around, wrong = cast[:5], cast[5:]
+        squarely = np.ptp(around) < min(0.12 * around[2], 0.25) and around[2] > 1.0
+        if squarely and np.abs(wrong - around[2]).min() > 0.3:
+            return grid, pose, b, R_MAX
+
+
+def short_ray(rng):
+    """The same with an r_max at which nothing has been hit yet."""
+    grid, pose, bearing, r_max = plain_ray(rng)
+    return grid, pose, bearing, 0.6 * maps.walk_ray(grid, pose, bearing, r_max)
 
 
 def motion(rng):
@@ -66,14 +89,14 @@ def motion(rng):
 
 
 def wheel(rng):
-    """weights that add up to 1, and an rng."""
+    """Weights whose sum is well above 1, and an rng."""
     w = rng.exponential(size=12) ** 2
-    return w / w.sum(), np.random.default_rng(rng.integers(2**32))
+    return w / w.sum() * rng.uniform(2, 5), np.random.default_rng(rng.integers(2**32))
 
 
 def cloud_weights(rng):
     """Weights of any sum."""
-    return (rng.exponential(size=30) ** rng.uniform(0.2, 3) * 50 ** rng.uniform(-1, 1),)
+    return (rng.exponential(size=30) ** rng.uniform(0.2, 3) * 50 ** rng.uniform(-2, 1),)
 
 
 def averages(rng):
@@ -93,6 +116,14 @@ def headings(rng):
 
 def _normal_log(x, std):
     return -0.5 * np.square(x / std) - np.log(std * math.sqrt(2 * math.pi))
+
+
+def _no_half(x, std):
+    return -np.square(x / std) - np.log(std * math.sqrt(2 * math.pi))
+
+
+def _no_root(x, std):
+    return -0.5 * np.square(x / std) - np.log(std * 2 * math.pi)
 
 
 def _end_points(pose, ranges, bearings):
@@ -152,18 +183,53 @@ def recover(w_mean, w_slow, w_fast, alpha_slow, alpha_fast):
 # Wrong variants ------------------------------------------------------------------------------------------------------
 
 
-def _landmarks(wrap=True, turn=True, swap=False, square=False, log=True, peak=True):
+def _landmarks(wrap=True, turn=1, swap=False, back=False, square=False, log=True, peak=True, parts=(1, 1), density=None):
+    density = density or _normal_log
+
     def variant(pose, z, landmarks, std_range, std_bearing):
-        dx, dy = (landmarks - pose[:2]).T
+        dx, dy = (pose[:2] - landmarks if back else landmarks - pose[:2]).T
         bearing = np.arctan2(dx, dy) if swap else np.arctan2(dy, dx)
-        error = z[:, 1] - bearing + (pose[2] if turn else 0)
-        error = odometry.wrap_angle(error) if wrap else error
+        if wrap == "expected":
+            error = z[:, 1] - odometry.wrap_angle(bearing - pose[2])
+        else:
+            error = z[:, 1] - bearing + turn * pose[2]
+            error = odometry.wrap_angle(error) if wrap else error
         stds = (std_range**2, std_bearing**2) if square else (std_range, std_bearing)
-        terms = _normal_log(z[:, 0] - np.hypot(dx, dy), stds[0]) + _normal_log(error, stds[1])
+        terms = parts[0] * density(z[:, 0] - np.hypot(dx, dy), stds[0]) + parts[1] * density(error, stds[1])
         total = terms.sum() if peak else terms.sum() + len(z) * np.log(2 * math.pi * stds[0] * stds[1])
         return float(total if log else np.exp(total))
 
     return variant
+
+
+def _field_with(density):
+    def variant(grid, pose, ranges, bearings, std):
+        return float(density(grid.distance[grid.cell_of(_end_points(pose, ranges, bearings))], std).sum())
+
+    return variant
+
+
+def _field_mirrored(grid, pose, ranges, bearings, std):
+    return _field(grid, _end_points(pose, ranges, -bearings), std)
+
+
+def _field_swapped(grid, pose, ranges, bearings, std):
+    offset = _end_points(pose, ranges, bearings) - pose[:2]
+    return _field(grid, pose[:2] + offset[:, ::-1], std)
+
+
+def _field_at_the_robot(grid, pose, ranges, bearings, std):
+    return float(_normal_log(grid.distance[grid.cell_of(pose[:2])], std).sum())
+
+
+def _log_of_the_product(log_terms):
+    with np.errstate(divide="ignore"):
+        return float(np.log(np.prod(np.exp(log_terms))))
+
+
+def _field_plain_product(grid, pose, ranges, bearings, std):
+    d = grid.distance[grid.cell_of(_end_points(pose, ranges, bearings))]
+    return _log_of_the_product(_normal_log(d, std))
 
 
 def _field_world(grid, pose, ranges, bearings, std):
@@ -204,6 +270,15 @@ def _ray_without_bearing(grid, pose, bearing, r_max):
     return maps.walk_ray(grid, pose, 0.0, r_max)
 
 
+def _ray_swapped(grid, pose, bearing, r_max):
+    return maps.walk_ray(grid, np.array([*pose[:2], math.pi / 2 - pose[2] - bearing]), 0.0, r_max)
+
+
+def _ray_to_infinity(grid, pose, bearing, r_max):
+    r = maps.walk_ray(grid, pose, bearing, r_max)
+    return r if r < r_max else math.inf
+
+
 def _ray_without_end(grid, pose, bearing, r_max):
     return maps.walk_ray(grid, pose, bearing, 1000.0)
 
@@ -222,12 +297,28 @@ def _motion(std=lambda s: s, shared=False, on_pose=False, none=False):
     return variant
 
 
+def _spin(weights, rng, scale=None, shift=0):
+    """Indices by independent spins up to `scale` (by default the sum of the weights), moved by `shift`."""
+    ends = np.cumsum(weights)
+    return np.searchsorted(ends, rng.random(len(ends)) * (ends[-1] if scale is None else scale)) + shift
+
+
+def _turn(weights, places, scale=None):
+    """Indices that M evenly spaced spokes meet, each moved by `places` of a gap."""
+    ends, m = np.cumsum(weights), len(weights)
+    return np.searchsorted(ends, (places + np.arange(m)) * (ends[-1] if scale is None else scale) / m)
+
+
 def _largest(weights, rng):
     return np.full(len(weights), np.argmax(weights))
 
 
 def _uniform_choice(weights, rng):
     return rng.integers(0, len(weights), len(weights))
+
+
+def _recover(w_slow, w_fast):
+    return max(0.0, 1 - w_fast / w_slow), w_slow, w_fast
 
 
 def _from_the_sum_of_squares(weights):
@@ -245,6 +336,26 @@ def _draws(resample, weights, rng, runs):
             return f"an index {index.max()} came out of {len(weights)} particles"
         total += np.bincount(index, minlength=len(weights))
     return total / total.sum()
+
+
+def _listens(draw):
+    """A property: what is drawn hangs on the rng, and on nothing else. `draw(function, rng)` gives one result."""
+
+    def check(function, rng):
+        seeds = rng.integers(2**32, size=4)
+        first = [np.asarray(draw(function, np.random.default_rng(seed))) for seed in seeds]
+        again = np.asarray(draw(function, np.random.default_rng(seeds[0])))
+        if all(np.array_equal(first[0], other) for other in first[1:]):
+            return "whatever `rng` is given, the same comes out: draw the random numbers from it."
+        if not np.array_equal(first[0], again):
+            return "two runs with the same seed differ: draw from the `rng` you are given, not from another one."
+        return None
+
+    return check
+
+
+_drawn_from_the_rng = _listens(lambda f, rng: f(np.linspace(0.5, 1.5, 40), rng))
+_moved_by_the_rng = _listens(lambda f, rng: f(np.zeros((3, 3)), np.array([1.0, 0.2]), 0.5, np.array([0.1, 0.2]), rng))
 
 
 def _valid(resample, rng):
@@ -273,6 +384,11 @@ def _spins_are_independent(resample, rng):
     if variance < 0.6:
         return (
             f"the spins are not independent: a count varies by {variance:.2f} instead of 0.9 (variance of a binomial)."
+        )
+    if variance > 1.3:
+        return (
+            f"some spins share their random number: a count varies by {variance:.1f} instead of 0.9 (variance of a "
+            "binomial). Each spin needs its own."
         )
     return None
 
@@ -313,9 +429,14 @@ def _noise_is_right(move, rng):
     if moved.shape != states.shape:
         return f"expected an array of shape (4000, 3), got {moved.shape}."
     found = moved.std(0)
-    for name, amount, wanted in (("x", found[0], 0.05), ("theta", found[2], 0.1)):
+    for name, unit, amount, wanted in (("x", "m", found[0], 0.05), ("theta", "rad", found[2], 0.1)):
         if abs(amount - wanted) > 0.1 * wanted:
-            return f"4000 particles spread by {amount:.3f} in {name} after one step, expected {wanted:.3f}."
+            return (
+                f"4000 particles spread by {amount:.3f} {unit} (standard deviation) in {name} after one step of 0.5 s with "
+                f"std_u = [0.1, 0.2], expected {wanted:.3f} {unit}."
+            )
+    if abs(np.corrcoef(moved[:, 0], moved[:, 2])[0, 1]) > 0.2:
+        return "v and omega of a particle got the same random number: each needs its own."
     if np.abs(moved.mean(0) - (0.5, 0, 0)).max() > 0.01:
         return f"on average the particles move by {np.round(moved.mean(0), 3).tolist()}, expected [0.5, 0, 0]."
     return None
@@ -323,9 +444,12 @@ def _noise_is_right(move, rng):
 
 def _noise_off_is_reckoning(move, rng):
     states = np.array([[0.0, 0, 0], [1, 2, 1.5]])
-    moved = np.asarray(move(states.copy(), np.array([1.0, 0.5]), 0.2, np.zeros(2), rng))
+    moved = move(states.copy(), np.array([1.0, 0.5]), 0.2, np.zeros(2), rng)
+    if moved is None:
+        return "it returned None: is a `return` missing?"
+    moved = np.asarray(moved)
     if moved.shape != states.shape or np.abs(moved - odometry.step(states, (1.0, 0.5), 0.2)).max() > 1e-9:
-        return "without noise every particle must move as dead reckoning says (odometry.step)."
+        return "with std_u = 0 every particle must move as odometry.step(states, u, dt) says: noise enters through u only."
     return None
 
 
@@ -345,6 +469,20 @@ def _weights_multiplied(states, ranges, landmarks, std):
 
 
 GOOD = (particles.resample_roulette, particles.resample_systematic, _stratified)
+
+
+def _on_show(specimen):
+    """The specimen, with advice for a test that lets its exception through."""
+
+    @functools.wraps(specimen)
+    def shown(*args):
+        try:
+            return specimen(*args)
+        except IndexError as error:
+            advice = "raised by the specimen: let your test catch that, try: ... except IndexError: return False"
+            raise IndexError(f"{error} ({advice})") from error
+
+    return shown
 
 
 def _catches(specimen, good, extra=()):
@@ -400,6 +538,7 @@ def hunt_4(weigh):
 
 
 def _hunt(id, reference, specimen, hints, good=GOOD, extra=("rng",)):
+    specimen = _on_show(specimen)
     return Exercise(
         id,
         reference=reference,
@@ -413,6 +552,7 @@ def _hunt(id, reference, specimen, hints, good=GOOD, extra=("rng",)):
             Mistake(lambda *_: None, "Your test returned None: it has to return True (passed) or False (caught)."),
         ],
         draws=1,
+        limit=IMPORTS,
     )
 
 
@@ -432,7 +572,7 @@ CHAPTER = Chapter(
             "sample_motion",
             reference=sample_motion,
             draw=motion,
-            properties=(_noise_off_is_reckoning, _noise_is_right),
+            properties=(_noise_off_is_reckoning, _noise_is_right, _moved_by_the_rng),
             hints=(
                 "The noise belongs to the control, not to the pose, and each particle gets its own.",
                 "Draw one pair of standard normal numbers a particle, scale them by std_u, and add them to u.",
@@ -450,6 +590,18 @@ CHAPTER = Chapter(
                 Mistake(
                     _motion(np.square), "You scaled the noise by the variance. std_u is the standard deviation already."
                 ),
+                Mistake(
+                    lambda x, u, dt, s, rng: odometry.step(x, u + dt * s * rng.standard_normal((len(x), 2)), dt),
+                    "You scaled the noise by dt. It belongs to the speeds; odometry.step multiplies by dt.",
+                ),
+                Mistake(
+                    lambda x, u, dt, s, rng: odometry.step(x, u * (1 + s * rng.standard_normal((len(x), 2))), dt),
+                    "You multiplied the control by its noise. It is added: u + noise.",
+                ),
+                Mistake(
+                    lambda x, u, dt, s, rng: odometry.step(x, u + s * rng.standard_normal((len(x), 1)), dt),
+                    "v and omega of a particle got the same random number: each needs its own.",
+                ),
                 Mistake(_motion(np.sqrt), "You took the root of std_u. It is a standard deviation, not a variance."),
                 Mistake(
                     _motion(on_pose=True),
@@ -463,6 +615,7 @@ CHAPTER = Chapter(
             reference=landmark_weight,
             draw=landmarks_at_a_pose,
             metric=metrics.numbers(1e-8),
+            limit=IMPORTS,
             hints=(
                 "What range and what bearing would a robot at this pose expect? Compare them with z.",
                 "The bearing is atan2(dy, dx) - theta. Wrap the *difference*, then add the logarithms of both normal densities.",
@@ -474,9 +627,29 @@ CHAPTER = Chapter(
                     "A bearing difference near 360 deg counted as a large error. Wrap the difference to [-pi, pi).",
                 ),
                 Mistake(
-                    _landmarks(turn=False), "The heading is missing: a bearing is relative to where the robot looks."
+                    _landmarks(wrap="expected"),
+                    "A bearing difference near 360 deg counted as a large error. Wrap the difference to [-pi, pi).",
                 ),
-                Mistake(_landmarks(swap=True), "atan2 takes the y difference first: np.arctan2(dy, dx)."),
+                Mistake(
+                    _landmarks(turn=-1), "The sign of the heading is wrong: the expected bearing is atan2(dy, dx) - theta."
+                ),
+                Mistake(
+                    _landmarks(back=True), "You looked from the landmark to the robot: the difference is landmark - position."
+                ),
+                Mistake(_landmarks(parts=(1, 0)), "The bearings are missing: both densities are multiplied."),
+                Mistake(_landmarks(parts=(0, 1)), "The ranges are missing: both densities are multiplied."),
+                Mistake(_landmarks(density=_no_half), "The factor one half in the exponent is missing."),
+                Mistake(
+                    _landmarks(density=_no_root), "The root is missing: each density is divided by std * sqrt(2 pi)."
+                ),
+                Mistake(
+                    lambda x, z, *rest: landmark_weight(x, z, *rest) / len(z),
+                    "You took the mean over the landmarks. Their logarithms add up.",
+                ),
+                Mistake(
+                    _landmarks(turn=0), "The heading is missing: a bearing is relative to where the robot looks."
+                ),
+                Mistake(_landmarks(swap=True), "The y difference comes first: np.arctan2(dy, dx)."),
                 Mistake(
                     _landmarks(square=True),
                     "You used the variances as standard deviations: N(0, std^2) divides the error by std.",
@@ -518,7 +691,7 @@ CHAPTER = Chapter(
             reference=maps.walk_ray,
             draw=plain_ray,
             metric=metrics.numbers(0.16, "m"),
-            draws=8,
+            noisy=[(short_ray, metrics.numbers(0.16, "m"), "Right where something is hit, but not where nothing is:")],
             hints=(
                 "Walk along the ray in steps smaller than a cell, and stop in the first occupied one.",
                 "The direction is theta + bearing. grid.at([x, y]) says what is there; maps.OCCUPIED is an obstacle.",
@@ -531,6 +704,8 @@ CHAPTER = Chapter(
                 Mistake(
                     _ray_reversed, "Bearings count to the left, like angles: theta + bearing, not theta - bearing."
                 ),
+                Mistake(_ray_swapped, "Sine and cosine have changed places: x goes with the cosine."),
+                Mistake(_ray_to_infinity, "Nothing hit means r_max, the scanner's limit, not infinity."),
                 Mistake(_ray_without_end, "A scanner sees r_max at most: return r_max when nothing is hit before."),
             ],
         ),
@@ -539,6 +714,8 @@ CHAPTER = Chapter(
             reference=beam_weight,
             draw=beams_at_a_pose,
             metric=metrics.numbers(1e-9),
+            noisy=[(whole_scan(beams_at_a_pose), metrics.numbers(1e-6), "Right for 20 beams, but not for 541:")],
+            limit=IMPORTS,
             hints=(
                 "Each beam is a normal density of measured minus expected range. A product turns into a sum of logarithms.",
                 "log N = -0.5 * (error / std)**2 - log(std sqrt(2 pi)), once for every beam.",
@@ -547,6 +724,22 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     lambda r, e, s: math.exp(beam_weight(r, e, s)), "This is the product. Its logarithm is asked for."
+                ),
+                Mistake(
+                    lambda r, e, s: _log_of_the_product(_normal_log(r - e, s)),
+                    "Right for 20 beams. With 541 the product is zero before you take its logarithm: sum up logarithms.",
+                ),
+                Mistake(
+                    lambda r, e, s: float((-0.5 * np.square((r - e) / s)).sum() - np.log(s * math.sqrt(2 * math.pi))),
+                    "The factor 1 / (std sqrt(2 pi)) stands once in each density: as many times as there are beams.",
+                ),
+                Mistake(
+                    lambda r, e, s: float(_no_root(r - e, s).sum()),
+                    "The root is missing: each density is divided by std * sqrt(2 pi).",
+                ),
+                Mistake(
+                    lambda r, e, s: float((_normal_log(r - e, s) + 2 * np.log(s * math.sqrt(2 * math.pi))).sum()),
+                    "The factor 1 / (std sqrt(2 pi)) divides: its logarithm is subtracted.",
                 ),
                 Mistake(
                     lambda r, e, s: beam_weight(r, e, s) / len(r), "You took the mean over the beams. They add up."
@@ -570,6 +763,7 @@ CHAPTER = Chapter(
             reference=distance_field_weight,
             draw=scan_at_a_pose,
             metric=metrics.numbers(1e-6),
+            noisy=[(whole_scan(scan_at_a_pose), metrics.numbers(1e-6), "Right for 12 beams, but not for 541:")],
             hints=(
                 "Put the end point of each beam on the map and ask how far the nearest obstacle is.",
                 "End point: x + r cos(theta + b), y + r sin(theta + b). The distance stands in grid.distance at grid.cell_of(point).",
@@ -577,7 +771,16 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(_field_world, "The heading is missing: bearings are relative to the robot, the map is not."),
-                Mistake(_field_cells, "grid.distance is in meters already: do not divide by the resolution."),
+                Mistake(_field_mirrored, "Bearings count to the left, like angles: theta + bearing, not theta - bearing."),
+                Mistake(_field_swapped, "Sine and cosine have changed places: x goes with the cosine."),
+                Mistake(_field_at_the_robot, "You looked up the robot's own cell. Look up the end points of its beams."),
+                Mistake(
+                    _field_plain_product,
+                    "Right for 12 beams. With 541 the product is zero before you take its logarithm: sum up logarithms.",
+                ),
+                Mistake(_field_with(_no_half), "The factor one half in the exponent is missing."),
+                Mistake(_field_with(_no_root), "The root is missing: each density is divided by std * sqrt(2 pi)."),
+                Mistake(_field_cells, "The distances are in meters already: do not divide by the resolution."),
                 Mistake(_field_mean, "You took the mean over the beams. The logarithms add up."),
                 Mistake(_field_probability, "This is p itself, which underflows with many beams. Return log p."),
                 Mistake(_field_no_peak, "The factor 1 / (std sqrt(2 pi)) of each beam is missing."),
@@ -590,13 +793,13 @@ CHAPTER = Chapter(
             choices=("beam model", "likelihood field", "both alike"),
             answer="likelihood field",
             why="It asks only whether each end point lies near some obstacle, and does not mind a wall in between. Its good places "
-            "form ridges along parallel walls.",
+            "form ridges along parallel walls. Drag the robot: is there a place where it is the other way round?",
         ),
         Exercise(
             "resample_roulette",
             reference=resample_roulette,
             draw=wheel,
-            properties=(_valid, _proportional, _spins_are_independent),
+            properties=(_valid, _proportional, _spins_are_independent, _drawn_from_the_rng),
             hints=(
                 "Each weight owns an interval as wide as itself. Where does a random number fall?",
                 "np.cumsum(weights) are the ends of the intervals, np.searchsorted finds the interval by bisection.",
@@ -609,17 +812,40 @@ CHAPTER = Chapter(
                     lambda w, rng: np.arange(len(w)), "Every particle came out once: that is the set you started with."
                 ),
                 Mistake(
+                    lambda w, rng: _spin(w, rng, scale=1.0),
+                    "Your spins end at 1, but the weights may have any sum: spin from 0 to W, or divide by W first.",
+                ),
+                Mistake(
+                    lambda w, rng: _spin(w, rng, shift=1),
+                    "Off by one: np.searchsorted gives the index itself, nothing is to be added.",
+                ),
+                Mistake(
+                    lambda w, rng: _spin(w, rng, shift=-1),
+                    "Off by one: np.searchsorted gives the index itself, nothing is to be subtracted.",
+                ),
+                Mistake(
+                    lambda w, rng: np.full(len(w), np.searchsorted(np.cumsum(w), rng.random() * w.sum())),
+                    "One spin for all: each particle needs a random number of its own.",
+                ),
+                Mistake(
                     lambda w, rng: np.searchsorted(w, rng.random(len(w))),
                     "You searched in the weights. Search in their running sum, np.cumsum(weights).",
                 ),
             ],
-            draws=3,
+            draws=8,
         ),
         Exercise(
             "resample_systematic",
             reference=resample_systematic,
             draw=wheel,
-            properties=(_valid, _proportional, _equal_weights_stay, _spokes_are_even, _survives_rounding),
+            properties=(
+                _valid,
+                _proportional,
+                _equal_weights_stay,
+                _spokes_are_even,
+                _survives_rounding,
+                _drawn_from_the_rng,
+            ),
             hints=(
                 "One random number turns the whole wheel. Its M spokes are W / M apart.",
                 "Spokes: (rng.random() + np.arange(M)) * W / M. Then search them in the running sum, as before.",
@@ -631,19 +857,26 @@ CHAPTER = Chapter(
                     _largest, "You always took the heaviest particle. It should be met by most spokes, not by all."
                 ),
                 Mistake(
-                    lambda w, rng: np.searchsorted(np.cumsum(w), (rng.random(len(w)) + np.arange(len(w))) / len(w)),
+                    lambda w, rng: _turn(w, rng.random(len(w))),
                     "Each spoke got its own random number (that is stratified resampling). One number turns the whole wheel.",
                 ),
                 Mistake(
-                    lambda w, rng: np.searchsorted(np.cumsum(w), np.arange(len(w)) / len(w)),
-                    "The wheel has not been turned: start with one random number.",
+                    lambda w, rng: _turn(w, rng.random(), scale=1.0),
+                    "Your spokes end at 1, but the weights may have any sum: space them by W / M, or divide by W first.",
                 ),
+                Mistake(
+                    lambda w, rng: _turn(w, 1 + rng.random()),
+                    "Off by one: the first spoke lies between 0 and W / M, yours between W / M and 2 W / M.",
+                ),
+                Mistake(_spin, "These are M independent spins, the roulette. Here one random number turns all spokes."),
+                Mistake(lambda w, rng: _turn(w, 0.0), "The wheel has not been turned: start with one random number."),
+                Mistake(lambda w, rng: _turn(w, 0.5), "The wheel has not been turned: start with one random number."),
                 Mistake(
                     lambda w, rng: np.arange(len(w)),
                     "Every particle came out once: that is right for equal weights only.",
                 ),
             ],
-            draws=3,
+            draws=8,
         ),
         Prediction(
             "standing",
@@ -674,6 +907,14 @@ CHAPTER = Chapter(
                     "This is the reciprocal: it is 1/M for equal weights, not M.",
                 ),
                 Mistake(lambda w: float(len(w)), "You counted the particles. Count what their weights are worth."),
+                Mistake(
+                    lambda w: len(w) / (1 + np.var(w)),
+                    "That formula holds for weights of mean 1: divide by their mean first.",
+                ),
+                Mistake(
+                    lambda w: particles.effective_size(w) / len(w),
+                    "That is the share of M that is effective. Asked for is the number itself.",
+                ),
                 Mistake(lambda w: w.sum() / w.max(), "That is another measure. Here: squared sum over sum of squares."),
             ],
         ),
@@ -696,13 +937,17 @@ CHAPTER = Chapter(
                     lambda w, t: particles.effective_size(w) < t * w.sum(),
                     "Compare with the share of the *number* of particles, len(weights), not of the sum of the weights.",
                 ),
+                Mistake(
+                    lambda w, t: _from_the_sum_of_squares(w) < t * len(w),
+                    "Your effective size needs weights that add up to 1, and these do not: use effective_size(weights).",
+                ),
                 Mistake(lambda w, t: True, "You resample always. With even weights that only loses particles."),
                 Mistake(
                     lambda w, t: False,
                     "You never resample. Do you compare with a bare share? The effective size counts particles: threshold * len(weights).",
                 ),
             ],
-            draws=14,
+            draws=30,
         ),
         Exercise(
             "circular_mean",
@@ -719,6 +964,14 @@ CHAPTER = Chapter(
                     lambda a, w: float(w @ a / w.sum()),
                     "The arithmetic mean of angles across the seam points backward. Average directions, not numbers.",
                 ),
+                Mistake(
+                    lambda a, w: float(w @ (a % (2 * math.pi)) / w.sum()),
+                    "You moved the seam to 0, where it bites other headings. Average directions: their cosines and sines.",
+                ),
+                Mistake(
+                    lambda a, w: math.degrees(particles.circular_mean(np.radians(a), w)),
+                    "The angles are in radians already: nothing is to be converted.",
+                ),
                 Mistake(lambda a, w: particles.circular_mean(a), "The weights are missing."),
                 Mistake(
                     lambda a, w: math.atan2((w * np.cos(a)).sum(), (w * np.sin(a)).sum()),
@@ -726,7 +979,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a, w: math.atan((w * np.sin(a)).sum() / (w * np.cos(a)).sum()),
-                    "arctan knows only half the circle. arctan2 takes both parts and knows it all.",
+                    "The plain arctan knows only half the circle. arctan2 takes both parts and knows it all.",
                 ),
             ],
         ),
@@ -771,6 +1024,41 @@ CHAPTER = Chapter(
                         *particles.recover(m, s, f, a, b)[1:],
                     ),
                     "The ratio is upside down: w_fast is the one that drops first.",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: (max(0.0, 1 - f / s), s, f),
+                    "Nothing has been brought up to date: w_mean does not enter yet.",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: particles.recover(m, s, f, a, b)[::2] + particles.recover(m, s, f, a, b)[1:2],
+                    "Right numbers in another order: return the share, then w_slow, then w_fast.",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: particles.recover(m, s, f, a, b)[1:] + particles.recover(m, s, f, a, b)[:1],
+                    "Right numbers in another order: return the share, then w_slow, then w_fast.",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: _recover(s + b * (m - s), f + a * (m - f)),
+                    "The two alphas have changed places: alpha_slow belongs to w_slow.",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: _recover(m + a * (s - m), m + b * (f - m)),
+                    "Your alpha weighs the old value: a small alpha has to change the average little.",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: _recover(s + a * m, f + b * m),
+                    "You added alpha * w_mean. An average moves toward w_mean: add alpha * (w_mean - w).",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: _recover(s - a * (m - s), f - b * (m - f)),
+                    "The averages move away from w_mean: add alpha * (w_mean - w).",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: (
+                        min(0.5, max(0.1, particles.recover(m, s, f, a, b)[0])),
+                        *particles.recover(m, s, f, a, b)[1:],
+                    ),
+                    "The limits of 10 % and 50 % are our filter's own. Return the share as the formula gives it.",
                 ),
                 Mistake(
                     lambda m, s, f, a, b: particles.recover(m, s, f, a, b)[:1] + (s, f),

@@ -34,6 +34,12 @@ def floor_plan(ax, lines, title=""):
     return ax.plot(x, y, color=style.INK, linewidth=1.8)[0]
 
 
+def key(ax, named):
+    """Names of moving artists, {name: Cloud, Robot, ...}, in one line above the axes."""
+    handles = [item.artists[-1] for item in named.values()]
+    ax.legend(handles, list(named), loc="lower left", bbox_to_anchor=(-0.01, 1.0), ncols=len(named), borderaxespad=0.1)
+
+
 class Cloud:
     """Particles as dots, one artist for all."""
 
@@ -100,7 +106,7 @@ def corridor(fig, length):
     axes = fig.subplots(5, 1, sharex=True)
     titles = (
         "(a)  nothing is known",
-        "(b)  it sees a door: weights",
+        "(b)  it looks: weights",
         "(c)  resampled and moved",
         "(d)  it looks again: weights",
         "(e)  resampled and moved",
@@ -144,7 +150,7 @@ class Wheel:
             sector.set_theta1(90 - 360 * end)
             sector.set_theta2(90 - 360 * start)
             middle = np.pi * (start + end)
-            number.set_position((0.85 * np.sin(middle), 0.85 * np.cos(middle)))
+            number.set_position((1.14 * np.sin(middle), 1.14 * np.cos(middle)))
             number.set_visible(bool(end - start > 0.03))
         s, c = np.sin(2 * np.pi * spokes), np.cos(2 * np.pi * spokes)
         self.spokes.set_data(*segments(np.column_stack([0 * s, 0 * c, 0.98 * s, 0.98 * c])))
@@ -164,10 +170,11 @@ def heat(ax, extent, shape, lines, title, low):
 def ancestors(ax, methods):
     """Axes of ancestors left against rounds of resampling. Returns a curve for each of the two methods."""
     style.axes(ax, "rounds", "", "ancestors left")
-    ax.set(xlim=(0, 200), ylim=(0.8, 2000), yscale="log")
+    ax.set(xlim=(0, 206), ylim=(0.8, 2000), yscale="log")
     ax.set_yticks([1, 10, 100, 1000], ["1", "10", "100", "1000"])
     ax.minorticks_off()
-    looks = (style.look("estimate"), style.look("prediction", linewidth=2))
+    now = {"marker": "o", "markevery": [-1], "markersize": 5}
+    looks = (style.look("estimate", **now), style.look("prediction", linewidth=2, **now))
     curves = [ax.plot([], [], **look, label=method)[0] for look, method in zip(looks, methods)]
     ax.legend(loc="lower left")
     return curves

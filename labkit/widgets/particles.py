@@ -1,6 +1,7 @@
 """Stages of chapter 9: corridor, maps, sensor models over the building, resampling, recorded runs, the arena."""
 
 import functools
+import itertools
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from .stage import Handle, Play, Stage, choice, slider
 
 CORRIDOR = 12.0  # m
 SHOWN = 300  # particles of the corridor
-DT = 0.5  # s, one step of the arena
+DT = 0.5  # s, one step of the arena and of the twelve pictures
 HISTORY = 120  # steps of the arena's error curve
 HEAT_DEPTH = -250.0  # log weights below the best one by more look alike
 DISK = 0.15  # m, radius of the mouse's pen
@@ -35,7 +36,9 @@ def suite():
 
 
 def compute_corridor(state):
-    """Five pictures: places (n,) and heights (n,) of the particles, the true place, and what the door sensor said."""
+    """Five pictures: places (n,) and heights (n,) of the particles, the true place, and what the door sensor said. The
+    wall at the corridor's end stops robot and particles.
+    """
     rng = np.random.default_rng(2)
     doors = np.array([state[f"D{k}"][0] for k in (1, 2, 3)])
     truth, x = float(state["robot"][0]), rng.uniform(0, CORRIDOR, SHOWN)
@@ -45,8 +48,8 @@ def compute_corridor(state):
         weights = np.exp(particles.weigh_doors(doors, said[-1])(x))
         shots.append((x, weights / weights.max(), truth))
         x = x[particles.resample_systematic(weights, rng)]
-        x = x + state["move"] + state["std"] * rng.standard_normal(SHOWN)
-        truth += state["move"]
+        x = np.clip(x + state["move"] + state["std"] * rng.standard_normal(SHOWN), 0.0, CORRIDOR)
+        truth = min(truth + state["move"], CORRIDOR)
         shots.append((x, np.full(SHOWN, 0.6), truth))
     return {"shots": shots, "doors": doors, "said": said, "near": float(np.mean(np.abs(x - truth) < 0.6))}
 
@@ -56,7 +59,7 @@ def corridor():
 
     def scene(fig):
         axes, doors, sticks, places = draw.corridor(fig, CORRIDOR)
-        words = [ax.text(0.99, 0.8, "", transform=ax.transAxes, ha="right", va="top") for ax in (axes[1], axes[3])]
+        words = [ax.text(1, 1.02, "", transform=ax.transAxes, ha="right", va="bottom") for ax in (axes[1], axes[3])]
 
         def update(state, result):
             for door in doors:
@@ -183,7 +186,8 @@ def compute_heat(state):
         "beams": particles.weigh_beams(sensors.table, ranges, bearings, 0.2, 18.0, shares=shares, step=0.02),
         "field": particles.weigh_likelihood_field(sensors.field, ranges, bearings),
     }
-    result = {"pose": pose, "ends": _ends(pose, ranges, bearings)}
+    free = bool(b.grid.at(pose[:2]) == maps.FREE)
+    result = {"pose": pose, "ends": _ends(pose, ranges, bearings), "free": free}
     for name, weigh in models.items():
         log_w = weigh(poses)
         best = log_w.max()
@@ -191,7 +195,7 @@ def compute_heat(state):
         picture[cells] = np.maximum(log_w - best, HEAT_DEPTH) if np.isfinite(best) else HEAT_DEPTH
         result[name] = picture
         result[f"{name}_possible"] = bool(np.isfinite(best))
-        result[f"{name}_found"] = bool(np.isfinite(best) and np.hypot(*(xy[np.argmax(log_w)] - pose[:2])) < 0.4)
+        result[f"{name}_off"] = float(np.hypot(*(xy[np.argmax(log_w)] - pose[:2]))) if np.isfinite(best) else np.inf
         away = np.hypot(*(xy - pose[:2]).T) > 2.0
         result[f"{name}_elsewhere"] = float(log_w[away].max() - best) if np.isfinite(best) else -np.inf
     return result
@@ -204,14 +208,17 @@ def _ends(pose, ranges, bearings):
 
 
 def _heat_sentence(result):
+    if not result["free"]:
+        return "The robot stands in a wall: nothing can be scanned from there."
     words = []
     for name, long in (("beams", "beam model"), ("field", "likelihood field")):
         if not result[f"{name}_possible"]:
             words.append(f"{long}: every place has weight zero")
+        elif result[f"{name}_off"] > 0.4:
+            words.append(f"{long}: best place is wrong, {result[f'{name}_off']:.1f} m off")
         else:
-            found = "right" if result[f"{name}_found"] else "wrong"
             elsewhere = f"e^{result[f'{name}_elsewhere']:.0f}"
-            words.append(f"{long}: best place is {found}, the best one over 2 m away has {elsewhere} of it")
+            words.append(f"{long}: best place is right, more than 2 m away at most {elsewhere} of its weight")
     return "; ".join(words).capitalize() + "."
 
 
@@ -222,7 +229,8 @@ def field_against_beams():
         axes = fig.subplots(2, 1)
         plan = building().grid.extent, _places()[2], building().lines
         heats = [
-            draw.heat(ax, *plan, title, HEAT_DEPTH) for ax, title in zip(axes, ("beam model", "likelihood field"))
+            draw.heat(ax, *plan, f"{model}: bright is likely (log scale)", HEAT_DEPTH)
+            for ax, model in zip(axes, ("beam model", "likelihood field"))
         ]
         robots, scans = [draw.Robot(ax) for ax in axes], [draw.Beams(ax, size=2) for ax in axes]
 
@@ -267,7 +275,17 @@ def _counts(shares, places):
 
 def compute_wheel(state):
     """One turn of the wheel for six dragged weights, and the variance of the counts over 400 turns of either method."""
-    weights = np.array([max(state[f"W{k + 1}"][1], 1e-6) for k in range(SECTORS)])
+    weights = np.array([state[f"W{k + 1}"][1] for k in range(SECTORS)], dtype=float)
+    if weights.sum() == 0:
+        none = np.zeros(SECTORS)
+        return {
+            "weights": weights,
+            "shares": none,
+            "spokes": none + np.nan,
+            "counts": none.astype(int),
+            "variances": dict.fromkeys(METHODS, 0.0),
+            "effective": 0.0,
+        }
     shares, turn = weights / weights.sum(), state["turn"]
     even = np.arange(SECTORS) / SECTORS
     spokes = even + turn / SECTORS if state["method"] == "spoke wheel" else SPINS[round(200 * turn)]
@@ -285,13 +303,21 @@ def compute_wheel(state):
     }
 
 
+def _wheel_sentence(result):
+    if not result["weights"].any():
+        return "All weights are zero: there is nothing to draw from."
+    alive = int((result["counts"] > 0).sum())
+    return f"{alive} of {SECTORS} particles survive; their weights are worth {result['effective']:.1f} equal ones."
+
+
 def wheel():
     """Drag the weights, turn the wheel: roulette spins six times, the spoke wheel turns once."""
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1, 1))
         style.axes(left, "particle", "weight")
-        left.set(xlim=(0.3, SECTORS + 0.7), ylim=(0, 1.15), xticks=range(1, SECTORS + 1))
+        left.set(xlim=(0.3, SECTORS + 0.7), ylim=(0, 1.4))
+        left.set(xticks=range(1, SECTORS + 1), yticks=(0, 0.2, 0.4, 0.6, 0.8, 1))
         left.grid(axis="x", visible=False)
         (sticks,) = left.plot([], [], color=style.PREDICTION, linewidth=14, solid_capstyle="butt")
         labels = [left.text(k + 1, 0, "", ha="center", va="bottom", color=style.INK) for k in range(SECTORS)]
@@ -301,8 +327,8 @@ def wheel():
         def update(state, result):
             sticks.set_data(*draw.bars(np.arange(1, SECTORS + 1), result["weights"]))
             for k, label in enumerate(labels):
-                label.set_text(f"{result['counts'][k]} of {SECTORS * result['shares'][k]:.1f}")
-                label.set_y(result["weights"][k] + 0.04)
+                label.set_text(f"{result['counts'][k]}\nof {SECTORS * result['shares'][k]:.1f}")
+                label.set_y(result["weights"][k] + 0.07)
             disk.set(result["shares"], result["spokes"])
             words.set_text(
                 f"variance of the counts:  roulette {result['variances']['roulette']:.2f},  "
@@ -325,10 +351,7 @@ def wheel():
             "turn": slider(0.0, 0.995, 0.3, step=0.005, label="turn of the wheel"),
         },
         fail={"method": "roulette", **{f"W{k + 1}": (k + 1, 0.5) for k in range(SECTORS)}},
-        describe=lambda result: (
-            f"{int((result['counts'] > 0).sum())} of {SECTORS} particles survive; "
-            f"their weights are worth {result['effective']:.1f} equal ones."
-        ),
+        describe=_wheel_sentence,
     )
 
 
@@ -403,7 +426,7 @@ def _global_pictures(n_particles):
 def compute_twelve(state):
     """One picture of a global localization: cloud, truth, estimate, its error (m), number of the picture."""
     pictures = _global_pictures(state["particles"])
-    k = min(int(round(state["t"])), len(pictures) - 1)
+    k = min(int(round(state["t"] / DT)), len(pictures) - 1)
     shot = pictures[k]
     error = float(np.hypot(*(shot.estimate - shot.truth)[:2]))
     path = np.array([p.truth[:2] for p in pictures[: k + 1]])
@@ -425,7 +448,8 @@ def twelve_pictures():
         draw.floor_plan(ax, building().lines)
         cloud, truth, guess = draw.Cloud(ax), draw.Robot(ax), draw.Robot(ax, color=style.ESTIMATE)
         (path,) = ax.plot([], [], **style.look("truth"))
-        words = ax.text(0.99, 0.98, "", transform=ax.transAxes, va="top", ha="right")
+        draw.key(ax, {"robot": truth, "estimate": guess})
+        words = ax.text(1, 1.02, "", transform=ax.transAxes, va="bottom", ha="right")
 
         def update(state, result):
             cloud.set(result["states"])
@@ -441,8 +465,8 @@ def twelve_pictures():
         scene=scene,
         compute=compute_twelve,
         controls={"particles": choice((200, 1000, 5000), 5000, label="particles")},
-        play=Play(t_max=11.0, dt=1.0, rate=1.5),
-        fail={"particles": 200, "t": 11.0},
+        play=Play(t_max=11 * DT, dt=DT, rate=1.5 * DT),
+        fail={"particles": 200, "t": 11 * DT},
         describe=lambda result: f"Picture {result['number']}: the estimate is off by {result['error']:.2f} m.",
         size=(7.0, 4.6),
     )
@@ -534,6 +558,7 @@ def start_arena(state):
         "errors": [],
         "step": None,
         "stroke": None,
+        "drawn": 0,
         "carried": False,
     }
 
@@ -587,30 +612,59 @@ def _adopt(filter_, state, rng):
 
 
 def _stroke(memory, path):
-    """A stroke that begins on the robot carries it; any other leaves obstacles that the map does not know."""
+    """A stroke that begins on the robot carries it; any other leaves obstacles that the map does not know. A click does
+    neither: it gives the picture the arrow keys.
+    """
     begin = tuple(path[0])
     if begin != memory["stroke"]:
-        memory["stroke"] = begin
+        memory["stroke"], memory["drawn"] = begin, 0
         memory["carried"] = bool(np.hypot(*(path[0] - memory["pose"][:2])) < 0.7)
-    if memory["carried"]:
-        if building().grid.at(path[-1]) == maps.FREE:
-            memory["pose"] = np.array([*path[-1], memory["pose"][2]])
-            memory["wanderer"].start_over()
+    if len(path) < 2:
         return memory
-    new = path[-1]
-    if not len(memory["disks"]) or np.hypot(*(memory["disks"][:, :2] - new).T).min() > DISK:
-        memory["disks"] = np.vstack([memory["disks"], [*new, DISK]])
-        memory["world"] = memory["world"].with_disks([(*new, DISK)])
+    if not memory["carried"]:
+        return _draw_obstacles(memory, path)
+    if building().grid.at(path[-1]) == maps.FREE:
+        memory["pose"] = np.array([*path[-1], memory["pose"][2]])
+        memory["ends"] = np.empty((0, 2))  # the last scan was taken elsewhere
+        memory["wanderer"].start_over()
     return memory
 
 
+def _draw_obstacles(memory, path):
+    """Disks along what is new of a stroke, without gaps however fast it was drawn."""
+    new = []
+    for place in _along(path[max(memory["drawn"] - 1, 0) :], DISK):
+        known = np.vstack([memory["disks"][:, :2], *new])
+        if not len(known) or np.hypot(*(known - place).T).min() > 0.6 * DISK:
+            new.append(place)
+    memory["drawn"] = len(path)
+    if new:
+        disks = np.column_stack([new, np.full(len(new), DISK)])
+        memory["disks"] = np.vstack([memory["disks"], disks])
+        memory["world"] = memory["world"].with_disks(disks)
+    return memory
+
+
+def _along(path, gap):
+    """Points (n, 2) along a path (k, 2), at most `gap` apart, its corners among them."""
+    points = [path[:1]]
+    for start, end in itertools.pairwise(path):
+        n = max(1, int(np.ceil(np.hypot(*(end - start)) / gap)))
+        points.append(start + (end - start) * np.arange(1, n + 1)[:, None] / n)
+    return np.concatenate(points)
+
+
 def compute_arena(state):
-    """What the picture shows: cloud, true pose, estimate, scan, obstacles, errors, and the filter's numbers."""
+    """What the picture shows: cloud, true pose, estimate, its distance from the robot (m), scan, obstacles, the errors
+    of the steps so far, and the filter's numbers.
+    """
     memory = state["memory"]
+    estimate = memory.get("estimate", np.full(3, np.nan))
     return {
         "states": memory["filter"].states,
         "pose": memory["pose"],
-        "estimate": memory.get("estimate", np.full(3, np.nan)),
+        "estimate": estimate,
+        "off": float(np.hypot(*(estimate - memory["pose"])[:2])),
         "ends": memory["ends"],
         "disks": memory["disks"],
         "errors": np.array(memory["errors"]),
@@ -622,7 +676,7 @@ def _arena_sentence(result):
     if result["step"] is None:
         return "The particles are everywhere. Press play, or click the picture and use the arrow keys."
     step = result["step"]
-    words = f"Off by {result['errors'][-1]:.2f} m; {step.n_particles} particles worth {step.effective:.0f} equal ones"
+    words = f"Off by {result['off']:.2f} m; {step.n_particles} particles worth {step.effective:.0f} equal ones"
     if step.all_zero:
         return f"{words}; no particle explains the scan: all weights are zero."
     return f"{words}; {step.injected} random poses put in." if step.injected else f"{words}."
@@ -639,6 +693,7 @@ def arena():
         top.set(xlabel="", ylabel="y (m)")
         cloud, truth, guess = draw.Cloud(top), draw.Robot(top), draw.Robot(top, color=style.ESTIMATE)
         scan, disks = draw.Beams(top), draw.Disks(top)
+        draw.key(top, {"robot": truth, "estimate": guess, "scan": scan, "obstacles not on the map": disks})
         curve = draw.error_curve(bottom, HISTORY)
 
         def update(state, result):

@@ -64,8 +64,8 @@ def run_global(suite, model, seed, **options):
 
 
 def run_adaptive(suite, model, seed):
-    """The same with a number of particles that adapts, from N_PARTICLES down to 500."""
-    return run_global(suite, model, seed, kld={"n_min": 500, "epsilon": 0.01})
+    """The same with a number of particles that adapts, from N_PARTICLES down to 2000."""
+    return run_global(suite, model, seed, kld={"n_min": 2000, "epsilon": 0.005})
 
 
 def run_kidnapped(suite, model, seed):
