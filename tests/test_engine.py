@@ -1,6 +1,7 @@
 # ruff: noqa: NPY002, SIM105, SIM223 (hostile student code, on purpose)
 """The engine survives any student code and says what is wrong with it."""
 
+import itertools
 import json
 import os
 import sys
@@ -481,6 +482,57 @@ def test_arguments_are_called_as_in_the_students_function():
 
     assert "double(row=" in DOUBLE.judge(mine).text
     assert "double(v=" in DOUBLE.judge(lambda *rows: 1 / 0).text
+
+
+def test_what_raises_in_a_property_is_told_by_the_students_line():
+    def holds(student, rng):
+        return None if student(np.ones(3))[0] > 0 else "the first entry must be positive"
+
+    stochastic = Exercise(
+        "noise", reference=scale, draw=lambda rng: (np.ones(3),), properties=(holds,), hints=tuple("abc")
+    )
+
+    def broken(v):
+        return v / undefined  # noqa: F821
+
+    def failing(v):
+        raise ValueError("no")
+
+    assert (
+        "`undefined` is not known" in stochastic.judge(broken).text
+        and "return v / undefined" in stochastic.judge(broken).text
+    )
+    assert 'raise ValueError("no")' in stochastic.judge(failing).text
+    picky, cell = replace(stochastic, draws=0), {}
+    exec(compile("nothing = lambda v: None\nalone = lambda: 1", "<cell>", "exec"), cell)
+    assert "could not be worked with" in picky.judge(cell["nothing"]).text
+    assert "cannot be called with (v)" in picky.judge(cell["alone"]).text
+
+
+def test_the_first_import_of_a_library_does_not_count(monkeypatch):
+    monkeypatch.delitem(sys.modules, "colorsys", raising=False)
+
+    def importing(v):
+        if "colorsys" not in sys.modules:
+            import colorsys  # noqa: F401
+
+            time.sleep(1.0)
+        return 2 * v
+
+    assert replace(DOUBLE, limit=0.3).judge(importing).status == CORRECT
+
+
+def test_a_slow_answer_still_meets_every_kind_of_draw(monkeypatch):
+    monkeypatch.setattr(time, "perf_counter", itertools.count(0.0, 3.0).__next__)  # every call takes 3 s
+    seen = []
+
+    def student(v):
+        seen.append(v[0])
+        return 2 * v
+
+    special = replace(DOUBLE, noisy=(lambda rng: (np.full(3, 7.0),), metrics.numbers()))
+    assert special.judge(student).status == CORRECT
+    assert len(seen) == 3 and seen[-1] == 7.0
 
 
 def test_a_tall_system_is_told_of_lstsq():
