@@ -222,6 +222,12 @@ def _ekf(noise=True, wrap=True, at="predicted", H_at="predicted", G_at="old", sh
     return step
 
 
+def _old_cov_corrected(x, cov, u, dt, cov_u, z, landmark, cov_z):
+    predicted = _ekf(short=True)(x, cov, u, dt, cov_u, z, landmark, cov_z)[1]
+    corrected = _ekf()(x, cov, u, dt, cov_u, z, landmark, cov_z)[1]
+    return corrected @ np.linalg.solve(predicted, cov)
+
+
 def nees(truth, x, cov):
     return kalman.nees(truth, x, cov, angle=2)
 
@@ -659,6 +665,10 @@ CHAPTER = Chapter(
                         ekf_step(x, cov, u, dt, *given)[1],
                     ),
                     "The pose takes the midpoint step before the correction, the Jacobians are those of the simplified model.",
+                ),
+                Mistake(
+                    lambda x, cov, *given: (ekf_step(x, cov, *given)[0], _old_cov_corrected(x, cov, *given)),
+                    "The pose is right. (I - K H) is to be applied to the predicted covariance; you applied it to the old one.",
                 ),
                 Mistake(_ekf(short=True), "You only predicted: the correction is missing."),
                 Mistake(_ekf(carry=False), "The old covariance must be carried along: G_x cov G_x'."),

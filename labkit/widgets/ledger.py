@@ -63,7 +63,7 @@ def _argument_html(entry):
     said = entry.proof or entry.row.note
     if not said:
         return ""
-    told = f'<div style="max-width: 32em">{html.escape(said)}</div>'
+    told = f'<div style="width: 24em">{html.escape(said)}</div>'
     return f'<details><summary style="{LINK}">why</summary>{told}</details>'
 
 
