@@ -475,6 +475,14 @@ def test_sentences_begin_with_a_capital_but_symbols_stay(text, shown):
     assert session._sentence(text) == (text if shown is None else shown)
 
 
+def test_arguments_are_called_as_in_the_students_function():
+    def mine(row):
+        raise ValueError("no")
+
+    assert "double(row=" in DOUBLE.judge(mine).text
+    assert "double(v=" in DOUBLE.judge(lambda *rows: 1 / 0).text
+
+
 def test_an_exercise_may_allow_more_time_or_less():
     def slow(v):
         time.sleep(0.3)

@@ -187,9 +187,9 @@ class _Trial:
             for metric, pair, words in zip(self.metrics, self.pairs, self.words):
                 if words and not metric.equal(*pair):
                     off = next(d for d in metric.deviations(*pair) if not d.within)
-                    return self.outcome(NOT_YET, f"{words} {off}.")
+                    return self.outcome(NOT_YET, _closed(f"{words} {off}"))
         words = metrics.difference_words(self.exercise.metric, plain)
-        return self.outcome(NOT_YET, (words + ".") if words else self._deviation(plain))
+        return self.outcome(NOT_YET, _closed(words) if words else self._deviation(plain))
 
     def _plain_pairs(self):
         return [pair for pair, words in zip(self.pairs, self.words) if words is None]
@@ -232,10 +232,13 @@ class _Trial:
             if missed == len(pairs)
             else f" It was right on {len(pairs) - missed} of {len(pairs)} draws: which case is special?"
         )
-        return f"{most}.{scope}"
+        return _closed(str(most)) + scope
 
     def _names(self, args):
-        names = self.exercise.arguments
+        """What the arguments are called: as in the student's function if it takes so many, else as in the reference."""
+        own = getattr(self.function, "__code__", None)
+        names = own.co_varnames[: own.co_argcount] if own else ()
+        names = names if len(names) == len(args) else self.exercise.arguments
         return [names[k] if k < len(names) else f"argument {k + 1}" for k in range(len(args))]
 
     def _raised(self, run, args):

@@ -189,7 +189,7 @@ class choice:
             layout = {"width": f"{6 + 0.55 * (len(label) + max(map(len, words))):.0f}em", "max_width": "100%"}
             return ipywidgets.Dropdown(style={"description_width": "initial"}, layout=layout, **options)
         style = {"description_width": "initial", "button_width": "auto"}
-        layout = {"display": "flex", "width": "max-content", "max_width": "100%"}
+        layout = {"display": "flex", "grid_gap": "0 6px", "width": "max-content", "max_width": "100%"}
         return ipywidgets.ToggleButtons(style=style, layout=layout, **options)
 
 
