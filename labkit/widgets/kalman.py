@@ -344,7 +344,7 @@ def honesty():
 
     def scene(fig):
         left, right = fig.subplots(1, 2)
-        style.axes(left, "error in x", "error in y", "errors, zoomed to 90 % of them", equal=True)
+        style.axes(left, "error in x", "error in y", equal=True)
         left.set(xlim=(-1, 1), ylim=(-1, 1), xticks=[], yticks=[])
         style.axes(right, "iterations", "mean NEES of 200 runs")
         right.set(xlim=(0.5, 6.5), ylim=(1, 1e6), yscale="log")
@@ -355,7 +355,7 @@ def honesty():
 
         def update(state, result):
             parts.set(result["positions"], result["ellipse"], result["curve"], result["iterations"])
-            words.set_text(f"half width {result['scale']:.2g} m")
+            words.set_text(f"half width {result['scale']:.2g} m, holds 90 %")
 
         return [*parts.artists, words], update
 
