@@ -44,7 +44,7 @@ measured = chaining.transforms_from_points(chaining.station_points())
 for k, (T, S) in enumerate(zip(printed, measured)):
     angle, distance = chaining.closure_error(T)
     off = np.abs(S - T).max()
-    print(f"K{k} to K{(k + 1) % 4}: {np.rad2deg(angle):6.2f} deg, {distance:6.2f} mm; synthetic is off by {off:.1e}")
+    print(f"K{k} to K{(k + 1) % 4}: {np.rad2deg(angle):6.2f} deg, {distance:6.2f} mm; synthetic entries off by {off:.1e}")
 
 # %% order [markdown]
 # ## First A, then B
@@ -157,7 +157,7 @@ for x in (0, 100, 300, 1000):
 # ## One bad link
 #
 # A turn at the end of link $k$ moves everything that follows, and the end of the chain moves by the turn times its **lever**: the distance from $K_k$ to the end.
-# The figure shows the sheet's loop in plan view: black as it is, purple as the chain sees it, gray the gap at $K_0$ and at a work piece P. Drag the frames, and choose which link is wrong.
+# The figure shows the sheet's loop in plan view: thin (black, or white on dark) as it is, purple as the chain sees it, gray the gap at $K_0$ and at a work piece P. Drag the frames, and choose which link is wrong.
 
 # %% predict-lever
 guess = ...  # your code here
@@ -174,7 +174,7 @@ ex.predict("lever", guess, reveal=stages.open_loop)
 # $$\text{angle}^2 = 3N\sigma_r^2, \qquad \text{distance}^2 = 3N\sigma_t^2 + 2\sigma_r^2 \sum_k |l_k|^2 .$$
 #
 # (A turn about the lever itself moves nothing: two of three components count.) For $N$ links of length $L$ in a row the levers are $0, L, \dots, (N-1)L$.
-# On a loop of fixed size they stay below its diameter. In the figure, left: where a hundred chains end, seen along the chain; right: the laws, and what was simulated.
+# On a loop of fixed size they stay below its diameter. In the figure, left: where a hundred chains end, seen along the chain (dashed circle: the law); right: the laws, and what was simulated.
 
 # %% predict-growth
 guess = ...  # your code here

@@ -33,7 +33,7 @@ np.set_printoptions(precision=6, suppress=True)
 # %% the-question [markdown]
 # ## The question
 #
-# A robot carries a measuring tip parallel to its old one. **Where is the tip, seen from the flange?** Nobody measures it. Instead the robot
+# A robot gets a new measuring tip, parallel to the old one: only a shift is unknown. **Where is the tip, seen from the flange?** Nobody measures it. Instead the robot
 # touches one fixed point again and again, from different directions. The point's place need not be known. This is section 3 of the lab sheet.
 #
 # Its file `Kreisel.txt` was never published. But the printed output has line numbers: the blocks "Ptest" of five lines each begin at lines 20 and 75,
@@ -122,7 +122,9 @@ def pivot_residuals(T_WF, tip, point):
 
 # %% s0
 residuals = pivot_residuals(poses, x[:3], x[3:])
-print("first P_test", residuals[0], " last", residuals[-1])
+print("first P_test", residuals[0], "\nlast P_test ", residuals[-1])
+listings = np.array([[-0.106450, 0.191828, -0.098577], [0.043934, -0.236217, -0.109208]])
+print("as in listings 9 and 10, to half a digit:", bool((np.abs(residuals[[0, -1]] - listings) < 5e-7).all()))
 s0 = ...  # your code here
 ### BEGIN SOLUTION
 s0 = np.sqrt((residuals**2).sum() / len(poses))
@@ -132,6 +134,7 @@ ex.s0(s0)
 # %% what-s0-means [markdown]
 # The sheet divides by the number of *poses*. So $s_0$ is the typical distance in space by which the tip misses. The noise of one *coordinate* is smaller, and its
 # unbiased estimate divides by the degrees of freedom: $3n$ equations less six unknowns. All three are honest numbers once their names are said.
+# And as $n s_0^2 = r^\top r$, the printed $s_0$ even tells how far the ten poses missed that the sheet does not print.
 
 # %% three-numbers
 squares, n = (residuals**2).sum(), len(poses)
@@ -140,6 +143,9 @@ print(f"{np.sqrt(squares / n):.3f} mm  s0, rms distance in space (divided by {n}
 print(f"{np.sqrt(squares / (3 * n)):.3f} mm  rms of a coordinate (divided by {3 * n} equations)")
 print(f"{std:.3f} mm  std of a coordinate, unbiased (divided by {3 * n - 6})")
 print(f"{np.rad2deg(std / np.linalg.norm(x[:3])):.2f} deg turn of the flange that moves the tip as far")
+shown = (listings**2).sum()
+hidden = n * 0.443922**2 - shown
+print(f"{np.sqrt(shown / 2):.3f} mm  rms distance in the two poses printed, {np.sqrt(hidden / (n - 2)):.3f} mm in the ten others")
 
 # %% swirl [markdown]
 # ## Small residual, good tip?
@@ -196,15 +202,14 @@ ex.predict("cone", guess, reveal=stages.pose_designer)
 
 # %% cone-angle
 tip = np.array([0.0, 0.0, -100.0])
+print("poses    cone  condition   squared  tip across    along")
 for n, half_angle_deg in ((60, 1), (60, 2), (6, 20), (60, 20), (60, 45)):
     R = pivot.cone(n, np.deg2rad(half_angle_deg))
     s = np.linalg.svd(pivot.pivot_matrix(pivot.touching_poses(R, tip, np.zeros(3))), compute_uv=False)
     cov = pivot.predicted_covariance(R, tip, std_rot=0.0, std_trans=0.2)
     condition = s[0] / s[5]
-    print(
-        f"{n:2} poses, cone {half_angle_deg:2} deg: condition {condition:5.0f}, squared {condition**2:8.0f}; "
-        f"tip {np.sqrt(cov[0, 0]):.2f} mm across, {np.sqrt(cov[2, 2]):.2f} mm along"
-    )
+    across, along = np.sqrt(cov[0, 0]), np.sqrt(cov[2, 2])
+    print(f"{n:5}  {half_angle_deg:2} deg  {condition:9.0f}  {condition**2:8.0f}  {across:7.2f} mm  {along:.2f} mm")
 
 # %% squared [markdown]
 # The column "squared" is what the normal equations work with, and every power of ten in it costs one of the 16 digits a computer has. Try it with exact poses on very narrow cones.
@@ -248,15 +253,16 @@ for half_angle_deg in (5, 10, 20, 45):
 # %% break-it [markdown]
 # ## Break it
 #
-# Spin only. The workbook's `calibrate_pivot` refuses, and names the direction. The decision is *relative*, so meters in place of millimeters change nothing. Then add orientation noise: now
-# every pose seems a little tilted, and the matrix looks healthy. Only who knows the size of that noise can tell.
+# Spin only. The workbook's `calibrate_pivot` refuses, and names the direction. $A$ holds no lengths, and $s_6$ is judged *relative* to $s_1$: meters in place of millimeters change nothing.
+# Then add orientation noise: now every pose seems a little tilted, and the matrix looks healthy. Only who knows the size of that noise can tell.
 
 # %% break-it-code
 spin = pivot.cone(40, 0.0, turns=1)
+meters = pivot.touching_poses(spin, tip / 1000, np.zeros(3))
 exact = pivot.touching_poses(spin, tip, np.zeros(3))
 noisy = pivot.touching_poses(spin, tip, np.zeros(3), np.deg2rad(0.2), 0.1, np.random.default_rng(1))
 known = {"std_rot": np.deg2rad(0.2), "std_trans": 0.1}
-for words, T, noise in (("exact", exact, {}), ("noisy", noisy, {}), ("noise known", noisy, known)):
+for words, T, noise in (("exact", exact, {}), ("meters", meters, {}), ("noisy", noisy, {}), ("noise known", noisy, known)):
     try:
         result = pivot.calibrate_pivot(T, **noise)
         error = np.linalg.norm(result.tip - tip)

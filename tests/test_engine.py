@@ -483,6 +483,10 @@ def test_arguments_are_called_as_in_the_students_function():
     assert "double(v=" in DOUBLE.judge(lambda *rows: 1 / 0).text
 
 
+def test_a_tall_system_is_told_of_lstsq():
+    assert "`lstsq` takes more" in DOUBLE.judge(lambda v: np.linalg.solve(np.ones((3, 2)), v)).text
+
+
 def test_an_exercise_may_allow_more_time_or_less():
     def slow(v):
         time.sleep(0.3)

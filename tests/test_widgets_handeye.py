@@ -104,3 +104,17 @@ def test_convergence_opens_next_to_the_pole_where_the_detour_is_seen():
     result = w.compute_iterations({"P": stage.state["P"], "B_deg": stage.state["B_deg"]})
     assert abs(stage.state["P"][0] - result["pole"]) < 2
     assert result["euler"]["arrived"] and result["euler"]["steps"] > 2 * result["se3"]["steps"]
+
+
+def test_caption_of_a_pose_says_what_would_explain_it():
+    stage = w.thirty_one_poses()
+    assert stage.caption.startswith("Pose 3: residual 18.27 mm as printed, and a single slip would explain it.")
+    stage.set(slip=1)
+    assert stage.caption.startswith("Pose 3: residual 0.41 mm with x in C14 read as 1397.64 for 1379.64")
+    stage.set(slip=0, click=(10.0, 1.0))
+    assert "as printed, nothing to explain" in stage.caption
+
+
+def test_captions_of_both_ways_to_converge_say_the_same_things():
+    caption = w.convergence().caption
+    assert caption.count("turning") == 2 and caption.count("of the largest") == 2

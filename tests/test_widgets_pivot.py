@@ -83,3 +83,25 @@ def test_outliers_move_the_plain_tip_alone():
     assert spoiled["error_plain"] > 5 * spoiled["bound"] > spoiled["error_robust"]
     assert spoiled["weights"][1] == 0 and np.count_nonzero(spoiled["weights"]) == 11
     assert spoiled["touches"][1] == pytest.approx([14.0, 10.0], abs=0.01)
+
+
+@pytest.mark.parametrize("make", [w.swirl, w.outliers])
+def test_words_below_the_bars_stand_on_one_baseline(make):
+    stage = make()
+    stage.png()
+    words = [tick.label1 for tick in stage._picture.fig.axes[1].xaxis.get_major_ticks()]
+    baselines = {round(word.get_transform().transform(word.get_position())[1], 6) for word in words}
+    assert len(baselines) == 1 and {word.get_va() for word in words} == {"baseline"}
+    renderer, axes = stage._picture.canvas.get_renderer(), stage._picture.fig.axes[1]
+    assert all(word.get_window_extent(renderer).y0 > 0 for word in words)
+    assert all(word.get_window_extent(renderer).y1 < axes.bbox.y0 for word in words)
+
+
+def test_a_large_ellipsoid_is_cut_at_the_sphere_and_said_to_be():
+    stage = w.pose_designer()
+    assert "cut" not in stage.caption
+    small = np.linalg.eigvalsh(stage.result["covariance_seen"])
+    assert np.sqrt(small) == pytest.approx(stage.result["deviations"][::-1])
+    stage.set(**{f"D{k}": tuple(d) for k, d in enumerate(w._ring(3.0), start=1)})
+    assert stage.result["deviations"].min() > w.LONGEST and "cut there" in stage.caption
+    assert np.sqrt(np.linalg.eigvalsh(stage.result["covariance_seen"])) == pytest.approx(np.full(3, w.LONGEST))

@@ -58,6 +58,29 @@ def test_make_it_fail_is_a_singular_arm():
     assert stage.result["singular_values"][-1] < 1 and "singular" in stage.caption
 
 
+@pytest.mark.parametrize("width", [500, 700])
+@pytest.mark.parametrize("preset", ["Reset", "Make it fail", "arm upright"])
+def test_flange_and_tracker_stay_in_the_picture_with_their_letters(preset, width):
+    stage = wr.tx40()
+    stage._picture.fit(width, 1.0, False)
+    stage._preset(preset)
+    stage.png()
+    canvas, whole = stage._picture.canvas, stage._picture.fig.bbox
+    words = {text: text.get_window_extent(canvas.get_renderer()) for text in stage._picture.fig.axes[0].texts}
+    assert {"B", "E", "F"} <= {text.get_text() for text in words}
+    assert all(box.x0 >= 0 and box.x1 <= whole.x1 and box.y0 >= 0 and box.y1 <= whole.y1 for box in words.values())
+    by_name = {text.get_text(): box for text, box in words.items() if text.get_text() in "EF"}
+    assert not by_name["E"].overlaps(by_name["F"])
+
+
+def test_names_of_tracker_and_world_are_apart_before_anything_arrives():
+    stage = wt.live_tracker()
+    stage.png()
+    renderer = stage._picture.canvas.get_renderer()
+    boxes = {text.get_text(): text.get_window_extent(renderer) for text in stage._picture.fig.axes[0].texts}
+    assert not boxes["E"].overlaps(boxes["W"])
+
+
 # ---- the stream
 
 

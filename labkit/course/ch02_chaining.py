@@ -149,9 +149,9 @@ def _share_on_the_right(transforms):
     return frames.relative(moved[:-1], moved[1:])
 
 
-def _poses_returned(transforms):
+def _moved_poses(transforms):
     poses, xi, n = _parts(transforms)
-    return (exp_se3(-np.arange(n + 1)[:, None] / n * xi) @ poses)[1:]
+    return exp_se3(-np.arange(n + 1)[:, None] / n * xi) @ poses
 
 
 def _sheet():
@@ -203,6 +203,14 @@ CHAPTER = Chapter(
                 Mistake(
                     _elementwise,
                     "You multiplied entry by entry: `*` is not `@`.",
+                ),
+                Mistake(
+                    lambda Ts: np.eye(4) * _elementwise(Ts),
+                    "You multiplied entry by entry, so that only the diagonal is left of the identity: `*` is not `@`.",
+                ),
+                Mistake(
+                    lambda Ts: chaining.chain([frames.invert(T) for T in Ts]),
+                    "You inverted every link. The links come as T_01, T_12, ...: their letters meet as they are.",
                 ),
                 Mistake(
                     lambda Ts: chaining.chain(Ts[1:]),
@@ -317,7 +325,7 @@ CHAPTER = Chapter(
             "closure_distance",
             reference=lambda: chaining.closure_error(_sheet())[1],
             unit="mm",
-            rtol=1e-3,
+            rtol=2.5e-3,  # three digits, as for the angle
             hints=(
                 "Where does the loop bring the origin of K0?",
                 "It is the length of the last column of the product, without its 1.",
@@ -368,6 +376,11 @@ CHAPTER = Chapter(
                 "U, _, Vt = np.linalg.svd(T[:3, :3]); X = T.copy(); X[:3, :3] = U @ Vt; return X.",
             ),
             mistakes=[
+                Mistake(
+                    lambda T: _with_rotation(T, np.linalg.qr(T[:3, :3])[0]),
+                    "The Q of a QR factorization has right angles, but it trusts the first column, and its columns may even point the other way. "
+                    "The nearest rotation comes from the SVD.",
+                ),
                 Mistake(
                     lambda T: _with_rotation(T, frames.gram_schmidt(T[:3, 0], T[:3, 1])),
                     "Gram-Schmidt gives right angles, but not the nearest rotation: it trusts the first column and bends the others.",
@@ -421,6 +434,7 @@ CHAPTER = Chapter(
             hints=(
                 "The product is exp(xi). Going back by all of xi at the end closes the loop; how far back should the pose after link k go?",
                 "The pose after k links, P_k, becomes exp(-k/N xi) P_k. The corrected links are the relative poses of neighbors.",
+                "poses = chaining.stations(transforms); N = len(transforms); xi = log_se3(poses[-1]); "
                 "moved = [exp_se3(-k / N * xi) @ P for k, P in enumerate(poses)]; return np.array([relative(A, B) for A, B in zip(moved, moved[1:])]).",
             ),
             mistakes=[
@@ -461,8 +475,12 @@ CHAPTER = Chapter(
                     "You put the share to the right of P_k. But xi is written in the first frame, so it belongs on the left.",
                 ),
                 Mistake(
-                    _poses_returned,
+                    lambda Ts: _moved_poses(Ts)[1:],
                     "These are the corrected poses. The corrected links are asked for: the relative poses of neighbors.",
+                ),
+                Mistake(
+                    _moved_poses,
+                    "These are the N + 1 corrected poses, P_0 included. Between neighbors lie the N corrected links, which are asked for.",
                 ),
             ],
         ),

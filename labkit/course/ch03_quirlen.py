@@ -1,5 +1,7 @@
 """Chapter 3: tip and pivot from poses that touch one point."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .. import pivot
@@ -61,6 +63,26 @@ def _blocks(left, right):
 
 def _side_by_side(T_WF):
     return np.hstack([np.vstack([T[:3, :3], -np.eye(3)]) for T in T_WF])
+
+
+def _rows_overlap(T_WF):
+    """Block i begins in row i, where it should begin in row 3i."""
+    A = np.zeros((3 * len(T_WF), 6))
+    for i, T in enumerate(T_WF):
+        A[i : i + 3] = np.hstack([T[:3, :3], -np.eye(3)])
+    return A
+
+
+@dataclass(frozen=True)
+class _solution(metrics.numbers):
+    """A vector x, with a word to who hands over all that a solver returns."""
+
+    def admit(self, result, expected):
+        if isinstance(result, tuple) and len(result) == 4:
+            raise metrics.Refused(
+                "`lstsq` returns four things in a tuple: x, sum of squares, rank, singular values. Take the first, [0]"
+            )
+        return super().admit(result, expected)
 
 
 def _tip_alone(A, b):
@@ -139,6 +161,10 @@ CHAPTER = Chapter(
                     "You set the poses side by side. Each pose adds equations, not unknowns: stack them beneath each other.",
                 ),
                 Mistake(
+                    _rows_overlap,
+                    "The blocks overwrite each other: each pose takes three rows, so block i begins in row 3 * i.",
+                ),
+                Mistake(
                     lambda T_WF: pivot.pivot_matrix(T_WF)[:, :3],
                     "The columns of the pivot are missing. Its place is unknown too.",
                 ),
@@ -166,6 +192,10 @@ CHAPTER = Chapter(
                     "You took the last row of each pose. The position stands in the last column.",
                 ),
                 Mistake(
+                    lambda T: -T[:, :, 3].ravel(),
+                    "You took the whole last column, the 1 of the last row included: the position is its first three entries.",
+                ),
+                Mistake(
                     lambda T: -np.einsum("nji,nj->ni", T[:, :3, :3], T[:, :3, 3]).ravel(),
                     "You turned the positions into the tool frame (R'p). The equations are written in the world.",
                 ),
@@ -175,8 +205,8 @@ CHAPTER = Chapter(
             "solve_pivot",
             reference=pivot.solve_pivot,
             draw=lambda rng: system(rng),
-            metric=metrics.numbers(1e-7, "mm"),
-            noisy=(lambda rng: system(rng, 1.0), metrics.numbers(1e-7, "mm")),
+            metric=_solution(1e-7, "mm"),
+            noisy=(lambda rng: system(rng, 1.0), _solution(1e-7, "mm")),
             hints=(
                 "More equations than unknowns: no x fulfills them all. Which x makes the sum of squares of A x - b least?",
                 "The sheet: x = (A'A)^-1 A'b. Better conditioned, and shorter: `np.linalg.lstsq`.",
@@ -196,6 +226,10 @@ CHAPTER = Chapter(
                     "A'b alone is not the solution: (A'A)^-1 is missing in front of it.",
                 ),
                 Mistake(
+                    lambda A, b: np.linalg.lstsq(A, b, rcond=None)[1],
+                    "This is the second thing that `lstsq` returns, the sum of squares. The solution is the first, [0].",
+                ),
+                Mistake(
                     _tip_alone,
                     "You solved for the tip alone. The pivot is unknown too, and it takes up most of what you explain by the tip.",
                 ),
@@ -209,10 +243,10 @@ CHAPTER = Chapter(
             "tip_length",
             reference=lambda: np.linalg.norm(_kreisel().tip),
             unit="mm",
-            rtol=1e-5,
+            rtol=1e-3,
             hints=(
-                "How long is the tool, from the flange to the tip?",
-                "It is the length of P_t, the first three entries of x.",
+                "Which of the six numbers in x say where the tip is, and seen from where?",
+                "The tip seen from the flange is P_t, the first three entries of x. Its length is the root of the sum of squares.",
                 "tip_length = np.linalg.norm(x[:3]).",
             ),
             mistakes=[
@@ -230,13 +264,13 @@ CHAPTER = Chapter(
         ),
         Exercise(
             "pivot_residuals",
-            reference=pivot.pivot_residuals,
+            reference=lambda T_WF, tip, point: pivot.pivot_residuals(T_WF, tip, point),
             draw=poses_and_result,
             metric=metrics.numbers(1e-9, "mm"),
             hints=(
                 "Where is the tip in each pose, and where should it be?",
-                "Equation (2) of the sheet: R_i tip + p_i - pivot, one row a pose.",
-                "return np.array([T[:3, :3] @ tip + T[:3, 3] - pivot for T in T_WF]).",
+                "Equation (2) of the sheet: R_i tip + p_i - point, one row a pose.",
+                "return np.array([T[:3, :3] @ tip + T[:3, 3] - point for T in T_WF]).",
             ),
             mistakes=[
                 Mistake(
@@ -281,7 +315,7 @@ CHAPTER = Chapter(
             "s0",
             reference=lambda: _kreisel().s0,
             unit="mm",
-            rtol=1e-4,
+            rtol=1e-3,
             hints=(
                 "The sheet's formula, listing 8: the root of the sum of squares over n.",
                 "n is the number of poses, not of equations.",
@@ -295,6 +329,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda: _kreisel().std,
                     "This is the unbiased estimate, divided by 3n - 6. A better number, but not the sheet's s0.",
+                ),
+                Mistake(
+                    lambda: np.sqrt(_squares() / 11),
+                    "You divided by n - 1. Nothing was estimated as a mean here: the sheet divides by the 12 poses.",
                 ),
                 Mistake(lambda: np.sqrt(_squares()), "The division by n is missing under the root."),
                 Mistake(
@@ -404,6 +442,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda distances, scale: np.maximum(1 - (distances / pivot.TUKEY * scale) ** 2, 0) ** 2,
                     "`d / 7 * scale` divides by 7 and multiplies by the scale: put 7 * scale in parentheses.",
+                ),
+                Mistake(
+                    _weights(lambda q: np.where(q > 1, (1 - q**2) ** 2, 0.0)),
+                    "The two branches have changed places: 0 belongs beyond the cutoff, where q > 1.",
                 ),
                 Mistake(
                     _weights(lambda q: 1 - np.maximum(1 - q**2, 0) ** 2),

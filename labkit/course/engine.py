@@ -267,10 +267,13 @@ class _Trial:
             return self.outcome(RAISED, f"NameError: {hint}{where}")
         if isinstance(error, RecursionError):
             return self.outcome(RAISED, "RecursionError: your function calls itself without an end.")
+        advice = ""
+        if isinstance(error, np.linalg.LinAlgError) and "square" in str(error):
+            advice = " `solve` and `inv` need as many equations as unknowns; `lstsq` takes more."
         call = ", ".join(f"{name}={_short(arg)}" for name, arg in zip(self._names(args), args))
         where = f"\nin {run.line}" if run.line else ""
         with_ = f"\nwhen called as {self.exercise.id}({call})" if call else ""
-        return self.outcome(RAISED, f"{type(error).__name__}: {_message(error)}{where}{with_}")
+        return self.outcome(RAISED, f"{type(error).__name__}: {_message(error)}{advice}{where}{with_}")
 
 
 @dataclass(frozen=True)

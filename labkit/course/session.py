@@ -265,7 +265,7 @@ def ask(chapter, item, answer, reveal):
         try:
             given = item.read(answer)
         except ValueError as error:
-            feedback.show(Panel(f"{item.id}: {NOT_YET}", [f"{error}."], NOT_YET))
+            feedback.show(Panel(f"{item.id}: {NOT_YET}", [_sentence(f"{error}.")], NOT_YET))
             return
     if locked or given is not None:
         feedback.show(_locked_panel(chapter, item, locked[0] if locked else given, first=not locked))

@@ -2,11 +2,14 @@
 
 import numpy as np
 from matplotlib.ticker import LinearLocator
+from matplotlib.transforms import ScaledTranslation
 
 from . import style
 
 EDGES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)  # mm
 LINKS = (1, 2, 4, 8, 16, 32, 64)
+LABEL_INCHES = 0.64  # from an axes to the name of its numbers, wide enough for five letters
+NAME_POINTS = 17  # from an origin to the middle of its name
 
 
 class Chain:
@@ -43,6 +46,12 @@ def names(ax, texts):
     return [ax.annotate(text, (0, 0), **place) for text in texts]
 
 
+def set_name(frame, angle):
+    """Put the name of a `PlaneFrame` beside its origin, in the direction `angle` (rad)."""
+    frame.name.set(ha="center", va="center")
+    frame.name.xyann = NAME_POINTS * np.cos(angle), NAME_POINTS * np.sin(angle)
+
+
 def growth_axes(ax):
     """Closure distance against the number of links, both logarithmic, with the laws and what was found.
 
@@ -64,6 +73,8 @@ def growth_axes(ax):
 def cloud_axes(ax):
     """Axes for where noisy chains end, relative to where they should. Returns (cloud, circle)."""
     style.axes(ax, "error in y (mm)", "error in z (mm)", "where 100 chains end", equal=True)
+    left_of_numbers = ScaledTranslation(-LABEL_INCHES, 0, ax.figure.dpi_scale_trans)
+    ax.yaxis.set_label_coords(0, 0.5, transform=ax.transAxes + left_of_numbers)  # room for -3000 at any edge
     (cloud,) = ax.plot([], [], **style.look("estimates", markersize=3.5, alpha=0.6))
     (circle,) = ax.plot([], [], **style.look("prediction"))
     ax.plot([0], [0], color=style.TRUTH, marker="+", markersize=10)

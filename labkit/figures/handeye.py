@@ -59,7 +59,7 @@ def error_plane(ax):
     style.axes(ax, "tilt off the truth (deg)", "yaw off the truth (deg)", "drag the start")
     ax.set(xlim=(-70, 70), ylim=(-70, 70))
     (pole,) = ax.plot([], [], **style.look("guide", linewidth=1.8))
-    ax.annotate("dotted: B = -90 deg", (0.55, 0.03), xycoords="axes fraction", color=style.MUTED)
+    ax.annotate("dotted:\nB = -90 deg", (0.98, 0.03), xycoords="axes fraction", ha="right", color=style.MUTED)
     (euler,) = ax.plot([], [], **style.look("prediction", marker="o", markersize=5))
     (se3,) = ax.plot([], [], **style.look("estimate", marker="D", markersize=4))
     ax.plot([0], [0], color=style.TRUTH, marker="+", markersize=16, linestyle="none")

@@ -55,7 +55,7 @@ def error_bars(ax, names, decades, title):
     """Axes of a few lengths (mm) as bars on a logarithmic scale. Returns one line a name, for `set_bars`."""
     style.axes(ax, "", "mm", title)
     ax.set(yscale="log", xlim=(-0.6, len(names) - 0.4), ylim=(decades[0], decades[-1]))
-    ax.set_xticks(range(len(names)), names)
+    style.words_below(ax, names)
     _plain_decades(ax, decades)
     ax.grid(axis="x", visible=False)
     return [ax.plot([], [], linewidth=16, solid_capstyle="butt")[0] for _ in names]

@@ -20,6 +20,8 @@ class Arm:
         self.base = scene.triad("B", triad)
         self.flange = scene.triad("F", triad, linestyle=(0, (3, 1.5)))
         self.tool = scene.triad("E", triad)
+        self.flange.name_at(-14, 1)
+        self.tool.name_at(-8, 11)
         scene.fixed(self.base, np.eye(4))
 
     def set(self, points, T_BF, T_BE):

@@ -205,6 +205,11 @@ class _Triad(_Item):
         )
         self.artists = [*self.lines, *self.letters, *([self.name] if name else [])]
 
+    def name_at(self, right, up):
+        """Put the name elsewhere than below on the left, in points from the origin, when another frame is near."""
+        self.name.set(ha="center", va="center")
+        self.name.xyann = right, up
+
     def draw(self, view):
         R, origin = self.value[:3, :3], self.value[:3, 3]
         start, tips = view.project(origin), view.project(origin + self.length * R.T)

@@ -28,6 +28,7 @@ REJECTED = MUTED
 AXIS_X, AXIS_Y, AXIS_Z = "#d55e00", "#009e73", "#0072b2"
 AXES = (AXIS_X, AXIS_Y, AXIS_Z)
 HEAT = "viridis"  # values over an area: costs, grids, densities
+WORD_PAD = 13  # points from an axis down to the baseline of words
 
 DARK = {
     INK: "#e8e8e8",
@@ -100,6 +101,13 @@ def axes(ax, xlabel="", ylabel="", title="", equal=False, grid=True):
     ax.grid(grid)
     if equal:
         ax.set_aspect("equal", adjustable="box")
+    return ax
+
+
+def words_below(ax, words):
+    """Words instead of numbers along x, at 0, 1, ..., on one baseline whatever their letters. Returns ax."""
+    ax.set_xticks(range(len(words)), words, va="baseline")
+    ax.tick_params(axis="x", pad=WORD_PAD)
     return ax
 
 

@@ -17,6 +17,7 @@ class Trail:
         self.rejected = scene.points(**style.look("rejected"))
         self.path = scene.line(**style.look("estimate"))
         self.tracker = scene.triad("E", triad)
+        self.tracker.name_at(-9, 10)
         scene.fixed(scene.triad("W", triad, linestyle=(0, (3, 1.5))), np.eye(4))
 
     def set(self, positions, used, filtered, T_WE):
@@ -59,7 +60,7 @@ class RotationAxes:
 
 def singular_values(ax):
     """The nine singular values of the Kronecker matrix, largest first, logarithmic. Returns (stems, markers)."""
-    style.axes(ax, "number", "singular value", "of the Kronecker matrix")
+    style.axes(ax, "number", "singular value", "Kronecker matrix")
     ax.set(xlim=(0.4, 9.6), ylim=(1e-4, 10), yscale="log")
     ax.set_xticks(range(1, 10))
     ax.yaxis.set_minor_formatter(NullFormatter())
@@ -90,7 +91,7 @@ def summary(ax):
     """Mean, RMS, median and 95 % side by side. Returns (raw, corrected, claim, words)."""
     style.axes(ax, "", "mm", "four summaries")
     ax.set(xlim=(-0.5, 3.5), ylim=(0.5, 1000), yscale="log")
-    ax.set_xticks(range(4), SUMMARY)
+    style.words_below(ax, SUMMARY)
     ax.grid(axis="x", visible=False)
     (raw,) = ax.plot([], [], **style.look("measurement", markersize=9))
     (corrected,) = ax.plot([], [], **style.look("estimates", markersize=8))

@@ -23,6 +23,7 @@ LOOP_A = ((0, True), (1, True), (2, True), (3, True))
 LOOP_B = ((4, True), (5, True), (6, True), (1, False))
 METHODS = ("as measured", "A, then B", "B, then A", "graph")
 MAGNIFIED = 30.0
+WITHIN = ((-440.0, 360.0), (-580.0, 190.0))  # mm: where frames may be dragged, so that their names stay in the picture
 
 
 def _planar(angle, xy):
@@ -37,6 +38,16 @@ def compute_order(state):
     A, B = (_planar(np.deg2rad(state[f"{k}_deg"]), state[k]) for k in "AB")
     AB, BA = chaining.chain([A, B]), chaining.chain([B, A])
     return {"A": A, "B": B, "AB": AB, "BA": BA, "gap": float(np.linalg.norm(AB[:3, 3] - BA[:3, 3]))}
+
+
+def free_direction(directions):
+    """The angle (rad) in the middle of the widest gap between plane directions, shape (n, 2)."""
+    directions = np.asarray(directions, dtype=float)
+    x, y = directions[np.linalg.norm(directions, axis=1) > 1e-9].T
+    angles = np.sort(np.arctan2(y, x))
+    gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
+    widest = np.argmax(gaps)
+    return float(angles[widest] + gaps[widest] / 2)
 
 
 def order_of_product():
@@ -61,7 +72,11 @@ def order_of_product():
             for k, (first, end, other) in enumerate(zip("AB", ends, ends[::-1])):
                 frames[k][0].set(result[first])
                 frames[k][1].set(end)
-                paths[k][0].set_data(*np.transpose([(0, 0), result[first][:2, 3], end[:2, 3]]))
+                middle = result[first][:2, 3]
+                way = end[:2, 3] - middle
+                draw.set_name(frames[k][0], free_direction([*result[first][:2, :2].T, -middle, way]))
+                draw.set_name(frames[k][1], free_direction([*end[:2, :2].T, -way]))
+                paths[k][0].set_data(*np.transpose([(0, 0), middle, end[:2, 3]]))
                 paths[k][1].set_data(*other[:2, 3:])
 
         artists = [a for pair in paths for a in pair] + [a for pair in frames for f in pair for a in f.artists]
@@ -159,10 +174,12 @@ def open_loop():
         compute=compute_open_loop,
         handles={
             **{
-                f"K{k}": Handle(tuple(np.round(origins[k], 1)), step=5.0, label=f"frame K{k}", color=style.TRUTH)
+                f"K{k}": Handle(
+                    tuple(np.round(origins[k], 1)), step=5.0, bounds=WITHIN, label=f"frame K{k}", color=style.TRUTH
+                )
                 for k in (1, 2, 3)
             },
-            "P": Handle((260.0, 60.0), step=5.0, label="work piece", color=style.REJECTED),
+            "P": Handle((260.0, 60.0), step=5.0, bounds=WITHIN, label="work piece", color=style.REJECTED),
         },
         controls={
             "link": slider(1, 4, 2, label="link with the error"),

@@ -211,8 +211,8 @@ def _iterations_sentence(result):
     return (
         f"In A, B, C: {told(euler)}, turning {euler['turned_deg']:.0f} deg in all; at the start the weakest singular "
         "value is "
-        f"{euler['weakest']:.0e} of the largest. On the pose: {told(se3)}, {se3['turned_deg']:.0f} deg, "
-        f"{se3['weakest']:.0e}."
+        f"{euler['weakest']:.0e} of the largest. On the pose: {told(se3)}, turning {se3['turned_deg']:.0f} deg, "
+        f"and {se3['weakest']:.0e} of the largest."
     )
 
 
@@ -305,17 +305,17 @@ def compute_poses(state):
 
 def _poses_sentence(result):
     e = result["slip"]
+    slips = "a single slip" if result["offered"] == 1 else f"{result['offered']} single slips"
     told = (
-        f"{e.column.removesuffix('_deg')} in {e.table} read as {e.corrected} for {e.printed} ({e.slip})"
+        f"with {e.column.removesuffix('_deg')} in {e.table} read as {e.corrected} for {e.printed} ({e.slip})"
         if e
-        else f"as printed; single slips that would explain it: {result['offered']}"
+        else f"as printed, and {slips} would explain it"
         if result["offered"]
-        else "nothing to explain"
+        else "as printed, nothing to explain"
     )
     return (
-        f"Pose {result['pose']}, {told}: residual {result['lengths'][result['pose'] - 1]:.2f} mm. All 31: rms "
-        f"{result['rms']:.2f} mm, median "
-        f"{result['median']:.2f} mm."
+        f"Pose {result['pose']}: residual {result['lengths'][result['pose'] - 1]:.2f} mm {told}. "
+        f"All 31: rms {result['rms']:.2f} mm, median {result['median']:.2f} mm."
     )
 
 

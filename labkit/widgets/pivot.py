@@ -13,7 +13,7 @@ from .stage import Handle, Play, Stage, View, slider
 
 TIP = np.array([0.0, 0.0, -100.0])  # mm: a straight tool that points down, as long as the lab sheet's
 STD_TRANS = 0.2  # mm a coordinate
-LONGEST = 3.0  # radii of the sphere: how far an ellipsoid is drawn
+LONGEST = 1.0  # mm, the radius of the sphere: how far an ellipsoid is drawn
 SWIRL_POSES, SWIRL_STD_ROT_DEG = 60, 0.05
 OUTLIER_POSES = 12
 
@@ -105,7 +105,8 @@ def pose_designer():
         a, b, c = result["deviations"]
         return (
             f"Predicted tip: standard deviations {a:.2f}, {b:.2f}, {c:.2f} mm along the axes of the ellipsoid "
-            f"(the sphere's radius is 1 mm); s6 = {result['singular_values'][5]:.2f}."
+            f"(the sphere's radius is 1 mm{'; longer axes are cut there' if a > LONGEST else ''}); "
+            f"s6 = {result['singular_values'][5]:.2f}."
         )
 
     return Stage(
@@ -120,7 +121,7 @@ def pose_designer():
             "spin_deg": slider(0, 60, 0, step=5, label="spin between poses (deg)"),
             "std_rot_deg": slider(0.0, 0.5, 0.1, step=0.05, label="orientation noise (deg)"),
         },
-        view=View(-60, 30, center=(0, 0, 0.4)),
+        view=View(-60, 30, center=(0, 0, 0.25)),
         constrain=_on_sphere,
         presets={"Narrow cone": {f"D{k}": tuple(d) for k, d in enumerate(_ring(3.0), start=1)}},
         fail={"spin_deg": 60, **{f"D{k}": (0.0, 0.0, 1.0) for k in range(1, 7)}},

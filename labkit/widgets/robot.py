@@ -53,7 +53,7 @@ def tx40():
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.7, 1))
-        space = Scene(left, radius=470)
+        space = Scene(left, radius=530)
         arm = draw.Arm(space)
         style.bare(right)
         words = right.text(0.0, 0.95, "", transform=right.transAxes, va="top", linespacing=1.7)
@@ -82,7 +82,7 @@ def tx40():
             for k, name in enumerate(ARM)
         },
         constrain=follow,
-        view=View(-60, 18, center=(120, 0, 400)),
+        view=View(-60, 18, center=(120, 0, 440)),
         fail={"q1": 30.0, "q2": 60.0, "q3": 14.0},
         presets={"arm upright": {"q1": 0.0, "q2": 0.0, "q3": 0.0}},
         describe=_sentence,

@@ -241,7 +241,8 @@ def main():
             slow = 0
             for k, (module, name) in enumerate(chosen):
                 apply, draw = python_part(module, name)
-                for way, ms in latencies(page, stage_of(page, k), options.events).items():
+                found = latencies(page, stage_of(page, k), options.events)
+                for way, ms in ((way, ms) for way, ms in found.items() if ms):
                     median, answer, python = np.median(ms, axis=0)
                     if way == "slider":  # travels as ipywidgets' own message
                         answer = python = np.nan
