@@ -3,7 +3,7 @@
 #
 # **What you will do.** Find a robot from its distances to landmarks, drive one by counting wheel turns, and compute how its uncertainty grows.
 #
-# **What you will learn.** Why two circles give two answers, why geometry can matter more than the sensor, what the time step does to a motion model, and why
+# **What you will learn.** How a start decides what a search finds, why geometry can matter more than the sensor, what the time step does to a motion model, and why
 # odometry that errs by millimeters a meter is lost after a hall's length.
 #
 # **What you need.** Derivatives, matrices, covariances; chapter 4 helps with Newton. About 80 minutes.
@@ -33,7 +33,7 @@ np.set_printoptions(precision=4, suppress=True)
 #
 # A robot drives through a hall. **Where is it?** The lecture *Lokalisierung* sorts the task (page "Varianten"): tracking from a known start, finding
 # oneself anywhere, and surviving being carried off. Some sensors look inward (wheel counters, gyroscopes), some outward (lasers, cameras). Its table
-# "Übersicht über Lokalisierungsverfahren" then names four methods. Decide first; then change task, sensors and map, and see which rows stay black.
+# "Übersicht über Lokalisierungsverfahren" then names four methods. Decide first; then change task, sensors and map, and see which methods still work.
 
 # %% predict-method
 guess = ...  # your code here
@@ -95,7 +95,7 @@ ex.predict("roots", guess, reveal=circle_stages.circles)
 # With more landmarks the circles no longer meet in one point. The lecture ("Least-Square-Verfahren") then minimizes $\sum (|l_i - x|^2 - d_i^2)^2$.
 # But the sensor errs in the *distance* by $e$, and $d^2$ errs by about $2\,d\,e$: far landmarks are heard louder. Maximum likelihood for equal noise minimizes
 # $\sum (|l_i - x| - d_i)^2$ instead. Four landmarks, one of them near, 20,000 measurements with a poor sensor.
-# Mind what the bias does and what the spread does.
+# A bias of a few millimeters is what 20,000 draws leave to chance; mind the spread.
 
 # %% two-costs-compared
 landmarks = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
@@ -129,7 +129,7 @@ def wheel_to_twist(v_left, v_right, track):
 # During $T$ the robot drives an arc. The *simplified* model goes straight along the old heading; the *midpoint* model along $\theta + \omega T/2$. The
 # *arc* is exact: the robot turns about the ICR by $\omega T = 2h$. The chord of that arc points along $\theta + h$, and its length is
 # $v T \sin(h)/h$. Write it so that driving straight on needs no division by zero.
-# Leave $\theta$ as it adds up; it is wrapped into one turn only in chapter 8.
+# Whole turns in $\theta$ do not matter: leave it as it adds up, or wrap it.
 
 # %% step_euler
 @ex.step_euler
@@ -232,8 +232,8 @@ def propagate(x, cov, u, dt, cov_u):
 # %% drive [markdown]
 # ## Drive it
 #
-# Click the picture and use the arrow keys, or press play: that is the lecture's circle (page "Simulation"), 1 m/s and 24°/s in 140 steps of 0.1 s. Black is where
-# the robot really goes, purple what it believes. Watch which way the ellipses grow.
+# Click the picture and use the arrow keys, or press play: that is the lecture's circle (page "Simulation"), 1 m/s and 24°/s in 140 steps of 0.1 s. The *true path* is where
+# the robot really goes, *dead reckoning* what it believes. Watch which way the ellipses grow.
 
 # %% predict-spread
 guess = ...  # your code here

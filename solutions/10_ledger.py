@@ -37,7 +37,7 @@ found = pages.entries()
 # **Which of their numbers can be trusted?** Setup has just computed all of them afresh, from the data they print and the functions of chapters 1 to 9.
 # Nothing on these pages is typed in: the rows stand in `data/ledger.csv`, the values come from `labkit.ledger`.
 #
-# First a small one. Then search the table: every line shows what is printed, what is computed, and the chapter. Rest the pointer on a line to read the argument.
+# First a small one. Then search the table: every line shows what is printed, what is computed, and the chapter. *why* opens its argument.
 
 # %% predict-digits
 guess = ...  # your code here
@@ -68,7 +68,8 @@ def half_unit(printed):
 #
 # The status is not an opinion. It follows from the printed number, the computed value, and what is known about it: a *bound*, by which rounding of the printed
 # inputs can move the value; whether a computed check proves a *misprint*; whether the value had to be *simulated*. A simulation that lands within bound
-# and half unit makes the row *unpublished*; one that does not shows the claim *superseded*.
+# and half unit makes the row *unpublished*; one that does not shows the claim *superseded*. Otherwise the milder word wins: *reproduced* before *rounding*, *rounding*
+# before *misprint*, and *superseded* where nothing else is left.
 
 # %% status
 @ex.status

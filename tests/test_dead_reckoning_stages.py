@@ -72,3 +72,33 @@ def test_bent_region_holds_its_share_and_the_ellipse_does_not():
     bent = drives.compute_banana(state | {"region": "bent"})
     flat = drives.compute_banana(state | {"region": "ellipse"})
     assert 0.92 < bent["share"] < 0.97 and flat["share"] < 0.85
+
+
+def test_circles_start_with_both_meeting_points_in_the_picture():
+    stage = circles.circles()
+    (low_x, high_x), (low_y, high_y) = (-4.0, 14.8), (-5.4, 6.4)
+    for name in ("A", "B"):
+        radius = np.linalg.norm(LAYOUT["R"] - LAYOUT[name])
+        assert low_x < LAYOUT[name][0] - radius and LAYOUT[name][0] + radius < high_x
+        assert low_y < LAYOUT[name][1] - radius and LAYOUT[name][1] + radius < high_y
+    stage.set(**{"S": (6.0, -2.5)})
+    end = stage.result["path"][-1]
+    np.testing.assert_allclose(end, [4.0, -3.0], atol=0.5)
+
+
+def test_straight_on_is_said_in_words_and_not_as_rounding():
+    stage = drives.models()
+    stage.set(omega_deg=0.0)
+    assert "same point" in stage.caption and "e-" not in stage.caption
+
+
+def test_fourteen_meters_straight_on_stay_in_the_picture_and_more_do_not():
+    stage = drives.drive()
+    stage.set(factor=0.2)
+    for _ in range(35):
+        stage._apply({}, ["up"])
+    assert stage.result["estimate"][-1][0] == pytest.approx(14.0)
+    assert "left the picture" not in stage.caption
+    for _ in range(5):
+        stage._apply({}, ["up"])
+    assert "left the picture" in stage.caption

@@ -71,3 +71,18 @@ def test_honesty_is_lost_with_a_precise_sensor_and_comes_back_by_iterating():
     hard = stages.compute_honesty({"std_prior": 1.0, "std_range": 0.01, "iterations": 1})
     cured = stages.compute_honesty({"std_prior": 1.0, "std_range": 0.01, "iterations": 6})
     assert low < easy["nees"] < high and hard["nees"] > 100 and low < cured["nees"] < high
+
+
+def test_bells_start_as_the_prediction_says_equally_sure_and_2_m_apart():
+    (x, std), (z, std_z), _ = stages.bells().result["bells"]
+    assert z - x == pytest.approx(2.0) and std_z == pytest.approx(std, rel=1e-6)
+
+
+def test_arena_says_when_the_robot_has_left_the_picture():
+    stage = stages.arena()
+    for _ in range(16):
+        stage._apply({}, ["up"])
+    assert "left the picture" not in stage.caption
+    for _ in range(3):
+        stage._apply({}, ["up"])
+    assert "left the picture" in stage.caption

@@ -64,6 +64,11 @@ def test_values_show_one_digit_more_than_is_printed(printed, value, text):
     assert pages.value_text(entry(printed=printed).row, value) == text
 
 
+def test_counts_are_shown_as_counts():
+    assert pages.value_text(entry(printed="31", unit="1").row, 24.0) == "24"
+    assert pages.value_text(entry(printed="31", unit="mm").row, 24.0) == "24.0"
+
+
 def test_rows_with_one_argument_make_one_finding():
     found = pages.findings(SOME, pages.WRONG)
     assert len(found) == 1 and len(found[0].entries) == 2 and found[0].places == ["table 3"]
@@ -76,6 +81,22 @@ def test_rows_with_one_argument_make_one_finding():
 def test_each_row_knows_its_notebook():
     by_topic = {row.id.split(".")[0]: ledger.chapter_of(row) for row in ledger.rows()}
     assert by_topic["frames"] == "01_frames" and by_topic["particles"] == "09_monte_carlo"
+    solved = {path.stem for path in (pages.README.parent / "solutions").glob("*.py")}
+    assert {ledger.chapter_of(row) for row in ledger.rows()} <= solved, "every link leads to a notebook"
+
+
+def test_pages_go_chapter_by_chapter(monkeypatch):
+    some = [row for row in ledger.rows() if row.id in ("kalman.fusion_x", "lateration.landmarks_2d")][::-1]
+    monkeypatch.setattr(pages, "table", lambda: [(row, ledger.compute(row), row.status) for row in some])
+    notebooks = [entry.notebook for entry in pages.entries()]
+    assert len(notebooks) > 1 and notebooks == sorted(notebooks)
+
+
+def test_arguments_open_without_a_mouse_and_no_hit_is_said():
+    page = widget.table_html(SOME)
+    assert page.count("<details>") == len(SOME) and "<summary" in page
+    assert widget.table_html([entry(proof="", note="")]).count("<details>") == 0
+    assert "no row" in widget.table_html([]) and "<table" not in widget.table_html([])
 
 
 @pytest.mark.parametrize(

@@ -111,6 +111,10 @@ def _turn(theta, v, omega, dt):
     return omega * dt
 
 
+def _chord(theta, v, omega, dt):
+    return v * dt * np.sinc(omega * dt / 2 / np.pi)
+
+
 def _old(theta, v, omega, dt):
     return theta
 
@@ -149,7 +153,7 @@ def _straight_line_works(function, rng):
                 result = np.full(3, np.nan)
         if result.shape != (3,) or not np.isfinite(result).all():
             return f"right on curves, but with omega = {omega:g} the result is not finite: the radius v / omega has no value there."
-        if np.abs(result - expected).max() > 1e-6:
+        if not metrics.planar_poses(1e-6).equal(result, expected):
             return f"right on curves, but with omega = {omega:g} the robot should drive straight on; the result is off."
     return None
 
@@ -295,6 +299,10 @@ CHAPTER = Chapter(
                     "Newton works, on the wrong equations: the measured distances are not squared.",
                 ),
                 Mistake(
+                    _newton(lambda J, f, d: (J, np.sqrt(f + d**2) - d)),
+                    "Your residuals are lengths, your Jacobian is that of the squares: both must belong to one f.",
+                ),
+                Mistake(
                     _newton(lambda J, f, d: (J, -f)),
                     "You walk uphill: J points the other way, or the sign of the step is wrong.",
                 ),
@@ -326,7 +334,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a, b, l: np.array([a + b, (b - a) / l]),
-                    "v is the mean of the wheel speeds: the sum is twice too fast.",
+                    "The robot's v is the mean of the wheel speeds: the sum is twice too fast.",
                 ),
                 Mistake(
                     lambda a, b, l: np.array([(a + b) / 2, (b - a) / (l / 2)]),
@@ -341,7 +349,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a, b, l: np.array([(a + b) / 2, (b - a) * l]),
-                    "omega is speed divided by distance: divide by the track, do not multiply.",
+                    "A turn rate is speed divided by distance: divide by the track, do not multiply.",
                 ),
             ],
         ),
@@ -349,7 +357,7 @@ CHAPTER = Chapter(
             "step_euler",
             reference=step_euler,
             draw=pose_control_step,
-            metric=metrics.numbers(1e-9),
+            metric=metrics.planar_poses(),
             hints=(
                 "Drive the way v T along the old heading, then turn.",
                 "x' = x + v T cos(theta), y' = y + v T sin(theta), theta' = theta + omega T.",
@@ -362,6 +370,18 @@ CHAPTER = Chapter(
                 Mistake(
                     _straight(lambda th, v, w, dt: v, _old, lambda th, v, w, dt: w),
                     "The time step is missing: v and omega are per second.",
+                ),
+                Mistake(
+                    _straight(lambda th, v, w, dt: v, _old, _turn),
+                    "The time step is missing from the way: it is v T, not v.",
+                ),
+                Mistake(
+                    _straight(_way, _old, lambda th, v, w, dt: -w * dt),
+                    "Your robot turns to the wrong side: theta grows by omega T.",
+                ),
+                Mistake(
+                    _straight(_way, lambda th, v, w, dt: np.radians(th), _turn),
+                    "theta is in radians already: no conversion inside cosine and sine.",
                 ),
                 Mistake(
                     _straight(_way, _old, lambda th, v, w, dt: w),
@@ -381,7 +401,7 @@ CHAPTER = Chapter(
             "step_midpoint",
             reference=step_midpoint,
             draw=pose_control_step,
-            metric=metrics.numbers(1e-9),
+            metric=metrics.planar_poses(),
             hints=(
                 "While it drives the robot turns by omega T; on average it looked half of that aside.",
                 "As before, with theta + omega T / 2 inside cosine and sine.",
@@ -408,7 +428,7 @@ CHAPTER = Chapter(
             "step_arc",
             reference=step_arc,
             draw=pose_control_step,
-            metric=metrics.numbers(1e-9),
+            metric=metrics.planar_poses(),
             properties=(_straight_line_works,),
             hints=(
                 "The robot turns about the center (ICR) at distance r = v / omega to its left. Where is it after turning by omega T?",
@@ -425,6 +445,14 @@ CHAPTER = Chapter(
                 Mistake(
                     _straight(lambda th, v, w, dt: v * dt * np.sin(w * dt) / (w * dt), _half, _turn),
                     "In sin(h) / h, h is half the turn, omega T / 2.",
+                ),
+                Mistake(
+                    _straight(_chord, _new, _turn),
+                    "The length of the chord is right. It points along theta + h, halfway through the turn; yours along the new heading.",
+                ),
+                Mistake(
+                    _straight(_chord, _old, _turn),
+                    "The length of the chord is right. It points along theta + h, halfway through the turn; yours along the old heading.",
                 ),
                 Mistake(_arc_sign, "Your circle runs the wrong way round: check the signs at the center of rotation."),
                 Mistake(_arc_y_sign, "x is right, y has the wrong sign: the center lies to the left of the heading for omega > 0."),
@@ -465,6 +493,18 @@ CHAPTER = Chapter(
                     "You put in the step itself. The Jacobian holds its derivative by theta.",
                 ),
                 Mistake(
+                    _state_entries(lambda x, u, t: -u[0] * t * np.cos(x[2]), lambda x, u, t: u[0] * t * np.sin(x[2])),
+                    "Sine and cosine are exchanged: the derivative of the cosine is minus the sine.",
+                ),
+                Mistake(
+                    lambda x, u, t: jacobian_state(step_euler(x, u, t), u, t),
+                    "You put in the new heading. The simplified model drives along the old one.",
+                ),
+                Mistake(
+                    lambda x, u, t: odometry.step_jacobians(x, u, t, "midpoint")[0],
+                    "This belongs to the midpoint model. The lecture derives the simplified one.",
+                ),
+                Mistake(
                     lambda x, u, dt: jacobian_state(x, u, dt) - np.eye(3),
                     "The pose before the step is missing: its derivative by itself is the identity.",
                 ),
@@ -500,6 +540,10 @@ CHAPTER = Chapter(
                 Mistake(
                     _control_entries(lambda x, t: t * np.cos(x[2]), lambda x, t: t * np.sin(x[2]), lambda t: 1.0),
                     "The last entry is T: omega acts for a time step.",
+                ),
+                Mistake(
+                    _control_entries(lambda x, t: np.cos(x[2]), lambda x, t: np.sin(x[2]), lambda t: t),
+                    "The time step is missing from the first column: the way is v T.",
                 ),
                 Mistake(
                     lambda x, u, t: jacobian_control(x, u, t) * [u[0], 1.0],
@@ -539,6 +583,18 @@ CHAPTER = Chapter(
                     "The drift is missing: a robot that drives straight on also turns a little.",
                 ),
                 Mistake(
+                    _covariance(lambda v, w, t, a, b, c: a * abs(v) / t, lambda v, w, t, a, b, c: c * abs(v) / t),
+                    "k_theta is missing: turning errs as well, by k_theta |omega| / T.",
+                ),
+                Mistake(
+                    _covariance(lambda v, w, t, a, b, c: a * abs(v) / t, lambda v, w, t, a, b, c: (b + c) * abs(w) / t),
+                    "The drift comes with the way, not with the turn: k_drift |v| / T.",
+                ),
+                Mistake(
+                    _covariance(lambda v, w, t, a, b, c: a * v**2 / t, lambda v, w, t, a, b, c: (b * w**2 + c * v**2) / t),
+                    "Here the variance grows with the way itself, not with its square: |v| and |omega|.",
+                ),
+                Mistake(
                     lambda u, dt, a, b, c: np.sqrt(odometry.control_covariance(u, dt, a, b, c)),
                     "These are standard deviations. A covariance matrix holds variances.",
                 ),
@@ -555,7 +611,7 @@ CHAPTER = Chapter(
             "propagate",
             reference=propagate,
             draw=pose_and_covariances,
-            metric=metrics.several(metrics.numbers(1e-9), metrics.numbers(1e-9), names=("pose", "covariance")),
+            metric=metrics.several(metrics.planar_poses(), metrics.numbers(1e-9), names=("pose", "covariance")),
             hints=(
                 "The pose takes the step. The covariance takes the old uncertainty along and adds that of the control.",
                 "cov' = F_x cov F_x' + F_u cov_u F_u', with both Jacobians at the old pose.",
@@ -577,6 +633,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda x, P, u, t, Q: (x, propagate(x, P, u, t, Q)[1]),
                     "The covariance is right, but the pose did not move.",
+                ),
+                Mistake(
+                    lambda x, P, u, t, Q: (step_midpoint(x, u, t), propagate(x, P, u, t, Q)[1]),
+                    "The covariance is right. The pose took the midpoint step; the lecture propagates with the simplified model.",
                 ),
                 Mistake(
                     lambda x, P, u, t, Q: (step_euler(x, u, t), propagate(step_euler(x, u, t), P, u, t, Q)[1]),
@@ -603,7 +663,7 @@ CHAPTER = Chapter(
             "end_pose",
             reference=lambda: _circle()[0],
             unit="m",
-            metric=metrics.numbers(1e-6),
+            metric=metrics.planar_poses(1e-6),
             hints=(
                 "Start at (0, 0, 0) and take all 140 steps with the simplified model.",
                 "Loop over drive.controls with your `propagate`; the covariance starts as zeros.",
@@ -615,10 +675,6 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda: odometry.drive(np.zeros(3), odometry.circle_drive().controls[:-1], 0.1, "euler")[-1],
                     "One step is missing: there are 140.",
-                ),
-                Mistake(
-                    lambda: odometry.wrap_angle(_circle()[0] * [0, 0, 1]) + _circle()[0] * [1, 1, 0],
-                    "The position is right. The heading is turned back into one turn: leave it as the sum of all steps.",
                 ),
                 Mistake(
                     lambda: _circle()[0] * [1, 1, np.degrees(1)],

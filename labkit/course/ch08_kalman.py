@@ -77,12 +77,20 @@ def estimate_and_truth(rng):
 
 
 def innovation_and_limit(rng):
-    S = covariance(rng, 2, 0.2)
-    y = np.linalg.cholesky(S) @ rng.normal(size=2)
-    limit = 5.991
-    score = float(y @ np.linalg.solve(S, y))
-    wanted = limit * (rng.uniform(0.45, 0.95) if rng.random() < 0.5 else rng.uniform(1.8, 6))
-    return y * np.sqrt(wanted / score), S, limit
+    """An innovation, its correlated covariance, and a limit; in every second draw the correlation decides.
+
+    Against the correlation little is much (the diagonal alone would let it pass), along it much is little.
+    """
+    rho, std, limit = rng.uniform(0.75, 0.95) * rng.choice([-1, 1]), rng.uniform(0.3, 1.5, 2), 5.991
+    S = np.outer(std, std) * [[1, rho], [rho, 1]]
+    wanted, direction = (
+        (rng.uniform(1.5, 2.5), [1, -np.sign(rho)]),
+        (rng.uniform(0.7, 0.9), [1, np.sign(rho)]),
+        (rng.uniform(0.05, 0.9), rng.normal(size=2)),
+        (rng.uniform(7, 20), rng.normal(size=2)),
+    )[rng.integers(4)]
+    y = std * direction * rng.choice([-1, 1])
+    return y * np.sqrt(wanted * limit / (y @ np.linalg.solve(S, y))), S, limit
 
 
 # References and wrong variants ------------------------------------------------
@@ -137,7 +145,7 @@ def _shrunk(P, K, C):
 
 
 def fuse_two_sensors(x0, var0, z, stds):
-    weights = np.array([1 / var0, *(1 / stds**2)])
+    weights = np.array([1 / var0, *(1 / np.square(stds, dtype=float))])
     return weights @ [x0, *z] / weights.sum(), 1 / weights.sum()
 
 
@@ -176,11 +184,11 @@ def _sine_sign(G, x, u, dt):
 
 
 def measurement(x, landmark):
-    return kalman.measurement(x, landmark[None])[0]
+    return kalman.measurement(x, np.atleast_2d(landmark))[0]
 
 
 def measurement_jacobian(x, landmark):
-    return kalman.measurement_jacobian(x, landmark[None])[0]
+    return kalman.measurement_jacobian(x, np.atleast_2d(landmark))[0]
 
 
 def _rows(change):
@@ -197,21 +205,27 @@ def ekf_step(x, cov, u, dt, cov_u, z, landmark, cov_z):
     return _ekf()(x, cov, u, dt, cov_u, z, landmark, cov_z)
 
 
-def _ekf(noise=True, wrap=True, at="predicted", short=False, carry=True, gain=_gain):
-    """One step of the landmark filter, or a wrong one."""
+def _ekf(noise=True, wrap=True, at="predicted", H_at="predicted", G_at="old", short=False, carry=True, gain=_gain):
+    """One step of the landmark filter, or a wrong one; expected measurement and Jacobians "at" old or predicted pose."""
 
     def step(x, cov, u, dt, cov_u, z, landmark, cov_z):
-        G_x, G_u = motion_jacobians(x, u, dt)
-        moved = odometry.step(x, u, dt, "euler")
+        pose = {"old": x, "predicted": odometry.step(x, u, dt, "euler")}
+        moved = pose["predicted"]
+        G_x, G_u = motion_jacobians(pose[G_at], u, dt)
         cov = (G_x @ cov @ G_x.T if carry else cov) + (G_u @ cov_u @ G_u.T if noise else 0)
-        here = moved if at == "predicted" else x
-        H = measurement_jacobian(here, landmark)
-        y = z - measurement(here, landmark)
+        H = measurement_jacobian(pose[H_at], landmark)
+        y = z - measurement(pose[at], landmark)
         y[1] = wrapped(y[1]) if wrap else y[1]
         K = gain(cov, H, cov_z)
         return (moved, cov) if short else (moved + K @ y, (np.eye(3) - K @ H) @ cov)
 
     return step
+
+
+def _old_cov_corrected(x, cov, u, dt, cov_u, z, landmark, cov_z):
+    predicted = _ekf(short=True)(x, cov, u, dt, cov_u, z, landmark, cov_z)[1]
+    corrected = _ekf()(x, cov, u, dt, cov_u, z, landmark, cov_z)[1]
+    return corrected @ np.linalg.solve(predicted, cov)
 
 
 def nees(truth, x, cov):
@@ -323,6 +337,14 @@ CHAPTER = Chapter(
                 Mistake(
                     _updated(state=lambda x, K, z, C: x + K @ z),
                     "Only the surprise is news: subtract the expected measurement C x.",
+                ),
+                Mistake(
+                    _updated(state=lambda x, K, z, C: K @ (z - C @ x)),
+                    "You return the correction alone: add it to the prediction x.",
+                ),
+                Mistake(
+                    _updated(gain=lambda P, C, R: P @ C.T @ (C @ P @ C.T + R)),
+                    "You multiplied by S. The gain divides by it: its inverse stands there.",
                 ),
                 Mistake(_updated(cov=lambda P, K, C: P), "The covariance stays as it was: a measurement must shrink it."),
                 Mistake(
@@ -476,6 +498,7 @@ CHAPTER = Chapter(
             reference=wrap_angle,
             draw=lambda rng: (rng.uniform(3.3, 6.0) * rng.choice([-1, 1]) + 2 * np.pi * rng.integers(-3, 4),),
             metric=metrics.numbers(1e-9, "rad"),
+            draws=12,
             hints=(
                 "An angle and the same angle plus a full turn are one direction. Choose the one nearest to zero.",
                 "Shift by pi, take the remainder of a full turn, shift back.",
@@ -483,6 +506,18 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(lambda a: a % (2 * np.pi), "Your angles lie between 0 and 2 pi. An error of -0.1 becomes 6.18: shift by pi before and after."),
+                Mistake(
+                    lambda a: a - 2 * np.pi * np.sign(a) * (abs(a) > np.pi),
+                    "You take off one turn. An angle that has gathered several keeps the others: take the remainder of a full turn.",
+                ),
+                Mistake(
+                    lambda a: np.fmod(a + np.pi, 2 * np.pi) - np.pi,
+                    "np.fmod keeps the sign of its argument, so that negative angles end below -pi. The operator `%` does not.",
+                ),
+                Mistake(
+                    lambda a: np.fmod(a, 2 * np.pi),
+                    "Whole turns are gone, but up to a full turn on either side is left: shift by pi before and after, and use `%`.",
+                ),
                 Mistake(lambda a: a % np.pi, "The remainder is to be taken of a full turn, 2 pi."),
                 Mistake(lambda a: np.clip(a, -np.pi, np.pi), "You cut the angle off at pi. A turn too many has to be subtracted."),
                 Mistake(
@@ -519,6 +554,18 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda x, l: np.array([measurement(x, l)[0], wrapped(np.arctan2(*(l - x[:2])) - x[2])]),
                     "np.arctan2 takes y first, then x.",
+                ),
+                Mistake(
+                    lambda x, l: measurement(x, l) % [np.inf, 2 * np.pi],
+                    "Your bearing lies between 0 and 2 pi: a landmark just to the right would be seen at 6.2. Wrap it to [-pi, pi).",
+                ),
+                Mistake(
+                    lambda x, l: np.array([measurement(x, l)[0], wrapped(np.arctan2(*(l - x[:2])[::-1]) + x[2])]),
+                    "The heading has the wrong sign: what turns with the robot is subtracted.",
+                ),
+                Mistake(
+                    lambda x, l: np.array([measurement(x, l)[0], np.arctan(np.divide(*(l - x[:2])[::-1])) - x[2]]),
+                    "np.arctan cannot tell left from right of the y axis: np.arctan2(dy, dx) can. And the bearing has to be wrapped.",
                 ),
                 Mistake(lambda x, l: measurement(x, l)[::-1], "The order is distance, bearing."),
                 Mistake(
@@ -595,7 +642,7 @@ CHAPTER = Chapter(
             "ekf_step",
             reference=ekf_step,
             draw=filter_step,
-            metric=metrics.several(metrics.numbers(1e-7), metrics.numbers(1e-7), names=("pose", "covariance")),
+            metric=metrics.several(metrics.planar_poses(1e-7), metrics.numbers(1e-7), names=("pose", "covariance")),
             hints=(
                 "Predict with the model itself and its Jacobians, then correct as before, with H in place of C.",
                 "The Jacobian H and the expected measurement belong to the predicted pose; the bearing innovation is wrapped.",
@@ -604,7 +651,25 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(_ekf(wrap=False), "The bearing innovation is not wrapped: a measurement just across +-pi throws your robot around by a full turn."),
                 Mistake(_ekf(noise=False), "The control's noise G_u cov_u G_u' is missing from the prediction."),
-                Mistake(_ekf(at="old"), "Expected measurement and H belong to the predicted pose; you used the old one."),
+                Mistake(_ekf(at="old", H_at="old"), "Expected measurement and H belong to the predicted pose; you used the old one."),
+                Mistake(_ekf(H_at="old"), "Your H is taken at the old pose. The sensor measures after the motion: H belongs to the predicted pose."),
+                Mistake(_ekf(at="old"), "The expected measurement is that of the predicted pose; you used the old one."),
+                Mistake(_ekf(G_at="predicted"), "Your G_x and G_u are taken at the new pose. The motion starts at the old one, and is linearized there."),
+                Mistake(
+                    lambda x, *given: (ekf_step(x, *given)[0] - _ekf(short=True)(x, *given)[0] + x, ekf_step(x, *given)[1]),
+                    "You add the correction to the old pose: it belongs to the predicted one.",
+                ),
+                Mistake(
+                    lambda x, cov, u, dt, *given: (
+                        odometry.step(x, u, dt, "midpoint") - odometry.step(x, u, dt, "euler") + ekf_step(x, cov, u, dt, *given)[0],
+                        ekf_step(x, cov, u, dt, *given)[1],
+                    ),
+                    "The pose takes the midpoint step before the correction, the Jacobians are those of the simplified model.",
+                ),
+                Mistake(
+                    lambda x, cov, *given: (ekf_step(x, cov, *given)[0], _old_cov_corrected(x, cov, *given)),
+                    "The pose is right. (I - K H) is to be applied to the predicted covariance; you applied it to the old one.",
+                ),
                 Mistake(_ekf(short=True), "You only predicted: the correction is missing."),
                 Mistake(_ekf(carry=False), "The old covariance must be carried along: G_x cov G_x'."),
                 Mistake(
@@ -672,8 +737,14 @@ CHAPTER = Chapter(
                 Mistake(lambda y, S, g: not gate(y, S, g), "Exactly the other way round: True means plausible."),
                 Mistake(_gated(lambda y, S: y @ y), "You compare meters and radians with a number without unit: divide by the covariance S."),
                 Mistake(_gated(lambda y, S: np.sqrt(y @ np.linalg.solve(S, y))), "You took the root: the limit is one for the square."),
+                Mistake(
+                    _gated(lambda y, S: (y**2 / np.diag(S)).sum()),
+                    "You left the correlation out: use the whole inverse of S, not only its diagonal.",
+                ),
                 Mistake(_gated(lambda y, S: y @ S @ y), "S stands in the middle as its inverse."),
                 Mistake(_gated(lambda y, S: (y @ np.linalg.solve(S, y)) ** 2), "Squared once too often: y' S^-1 y is the square already."),
+                Mistake(lambda y, S, g: True, "You let everything pass: what is the limit for?"),
+                Mistake(lambda y, S, g: False, "You refuse everything: such a filter never corrects itself."),
             ],
         ),
     ],

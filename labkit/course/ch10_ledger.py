@@ -6,7 +6,7 @@ from ..ledger import Computed, Row, half_unit, judge
 from . import metrics
 from .engine import Chapter, Exercise, Mistake, Prediction
 
-FORMS = ("1.010000", "-0.5", "12", "1,5", "3e-4", "2.50e2", "-1000", "0.00000", "97.3", "-0,250")
+FORMS = ("1.010000", "12", "1,5", "-0,250", "3e-4", "2.50e2", "-1000", "97.3")
 
 
 def printed_number(rng):
@@ -46,19 +46,35 @@ def _counts_all_digits(printed):
     return 0.5 * 10.0 ** (-digits)
 
 
+def _without_comma(printed):
+    return half_unit(printed.partition(",")[0])
+
+
+def _other_sign(printed):
+    return _without_exponent(printed) ** 2 / half_unit(printed)
+
+
+def _through_float(printed):
+    return half_unit(str(float(printed.replace(",", "."))))
+
+
 def _of_the_value(printed):
     return 0.005 * abs(float(printed.replace(",", ".")))
 
 
-def _status(order):
+def _status(order, careful=False):
+    """Ask for the words in another order; `careful`: a simulation that lands elsewhere is superseded, as it should be."""
+
     def variant(printed, value, bound, misprint, simulated):
         half = half_unit(printed)
         off = abs(value - float(printed))
+        within = off <= (half + bound) * (1 + 1e-6)
         tests = {
             "reproduced": off <= half * (1 + 1e-6) and not simulated,
-            "rounding": off <= (half + bound) * (1 + 1e-6) and not simulated,
-            "unpublished": simulated,
+            "rounding": within and not simulated,
+            "unpublished": simulated and (within or not careful),
             "misprint": misprint,
+            "superseded": simulated and careful,
         }
         return next((word for word in order if tests[word]), "superseded")
 
@@ -98,11 +114,19 @@ CHAPTER = Chapter(
                 Mistake(
                     _counts_all_digits, "You counted all digits. Only those after the decimal point make it finer."
                 ),
+                Mistake(_without_comma, "The comma of 1,5 is a decimal point: this number has one decimal, not none."),
+                Mistake(
+                    _other_sign, "3e-4 is 3 times 10 to the power -4: your exponent shifts the half unit the wrong way."
+                ),
+                Mistake(
+                    _through_float,
+                    "float() forgets how many digits were printed: 1.010000 has six decimals, 12 has none. Work on the string.",
+                ),
                 Mistake(
                     _of_the_value, "You took a share of the value. The unit of the last digit does not depend on it."
                 ),
             ],
-            draws=12,
+            draws=24,
         ),
         Exercise(
             "status",
@@ -119,7 +143,7 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     _status(("misprint", "reproduced", "rounding", "unpublished")),
-                    "You ask for the misprint first. A number that comes out is no misprint, whatever else was proved.",
+                    "You ask for the misprint first. A number that comes out, or was never published, is no misprint.",
                 ),
                 Mistake(
                     _status(("unpublished", "reproduced", "rounding", "misprint")),
@@ -128,6 +152,14 @@ CHAPTER = Chapter(
                 Mistake(
                     _status(("reproduced", "rounding", "misprint", "unpublished")),
                     "A simulated value is never a misprint: without the inputs nothing can be proved.",
+                ),
+                Mistake(
+                    _status(("unpublished", "superseded", "reproduced", "misprint", "rounding"), careful=True),
+                    "You ask for the misprint before rounding. What the bound explains needs no misprint: the milder word wins.",
+                ),
+                Mistake(
+                    lambda p, v, b, m, s: status(p, v, max(0.0, b - half_unit(p)), m, s),
+                    "Half unit and bound add up: the printed number was rounded, and so were its inputs.",
                 ),
                 Mistake(
                     lambda p, v, b, m, s: status(p, v, 0.0, m, s),

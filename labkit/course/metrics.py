@@ -163,6 +163,28 @@ class angles(Metric):
 
 
 @dataclass(frozen=True)
+class planar_poses(Metric):
+    """A planar pose (x, y, theta) in m and rad: theta is an angle, and any number of whole turns more is the same pose.
+
+    `tol` is relative to the size of the expected position (at least 1), and absolute for the heading.
+    """
+
+    tol: float = 1e-9
+
+    def admit(self, result, expected):
+        return as_array(result, np.shape(expected))
+
+    def deviations(self, result, expected):
+        expected = np.asarray(expected, dtype=float)
+        position = numbers(self.tol, "m").deviations(result[..., :2], expected[..., :2])[0]
+        heading = angles(self.tol).deviations(result[..., 2], expected[..., 2])[0]
+        return [
+            Deviation("the position", position.amount, "m", position.tolerance),
+            Deviation("the heading", heading.amount, "deg", heading.tolerance),
+        ]
+
+
+@dataclass(frozen=True)
 class up_to_sign(Metric):
     """An array whose overall sign is free: an axis, a null vector, a quaternion."""
 

@@ -95,7 +95,7 @@ class Honesty:
         (self.believed,) = plane.plot([], [], **style.look("prediction"), label="95 %, as believed")
         cross = {"linestyle": "none", "marker": "+", "markersize": 13}
         (self.truth,) = plane.plot([0], [0], color=style.TRUTH, **cross, label="true")
-        plane.legend(loc="upper left", fontsize=8)
+        plane.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=8, ncols=3, columnspacing=1.0)
         dots = style.look("estimate", marker="o", markersize=4)
         (self.curve,) = score.plot(iterations, np.ones(len(iterations)), **dots)
         (self.now,) = score.plot([], [], **style.look("estimates", markersize=9))

@@ -60,6 +60,20 @@ class Circles:
         self.sights.set_data(*rays.reshape(-1, 2).T)
 
 
+class Spare:
+    """The name of a landmark that can be dragged but is not used at the moment."""
+
+    def __init__(self, ax, text):
+        away = {"xytext": (11, -4), "textcoords": "offset points"}
+        self.name = ax.annotate(text, (0, 0), **away, color=style.MUTED, fontsize=9)
+        self.artists = [self.name]
+
+    def set(self, point, spare):
+        """`point`: (2,); `spare`: whether it is left out now."""
+        self.name.xy = tuple(point)
+        self.name.set_visible(spare)
+
+
 class Search:
     """A path of iterates with its end, a cloud of repeated estimates, an ellipse and the weakest direction."""
 

@@ -22,7 +22,8 @@ class ModelPaths:
     """The exact path and two approximations in the plane, and their errors against the time step."""
 
     def __init__(self, plane, errors, steps):
-        self.lines = {m: plane.plot([], [], **MODEL_LOOKS[m], label=m)[0] for m in ("arc", "euler", "midpoint")}
+        names = {"arc": "arc", "euler": "simplified", "midpoint": "midpoint"}
+        self.lines = {m: plane.plot([], [], **MODEL_LOOKS[m], label=name)[0] for m, name in names.items()}
         plane.legend(loc="upper left", fontsize=8)
         self.curves, self.now = {}, {}
         for model in ("euler", "midpoint"):
@@ -57,8 +58,8 @@ class Driven:
         self.truth.set_data(*truth[:, :2].T)
         self.estimate.set_data(*estimate[:, :2].T)
         self.outlines.set_data(*outlines.T)
-        self.robot.set_data(*robot_outline(truth[-1], 0.45).T)
-        self.ghost.set_data(*robot_outline(estimate[-1], 0.45).T)
+        self.robot.set_data(*robot_outline(truth[-1], 0.6).T)
+        self.ghost.set_data(*robot_outline(estimate[-1], 0.6).T)
 
 
 class Banana:

@@ -130,7 +130,8 @@ def chapter_of(row):
     base = _ENTRY.fullmatch(row.id)["base"]
     if base not in _functions:
         raise KeyError(f"no function computes the ledger id {base!r}; register one in labkit/ledger with @computes")
-    return _functions[base].__wrapped__.__module__.rpartition(".ch")[2]
+    function = _functions[base].__wrapped__
+    return getattr(function, "func", function).__module__.rpartition(".ch")[2]  # a partial has its function's module
 
 
 def half_unit(printed):

@@ -63,6 +63,21 @@ def predicted_state():
     return Computed(np.array([x, v]), bound=bound, misprint=True, proof=proof)
 
 
+@computes("kalman.vehicle_B")
+def input_matrix():
+    """Which of two input matrices leads to the prediction that the printed correction needs (their velocity agrees)."""
+    needed, time = predicted_state(), 5.1  # s, 51 steps of 0.1 s
+    states = {"(0, T)": reconstructed()[0], "(T^2/2, T)": np.array([time**2 / 2, time])}  # at 1 m/s^2
+    hits = [name for name, state in states.items() if (np.abs(state - needed.value) <= needed.bound).all()]
+    euler, exact = (state[0] for state in states.values())
+    proof = (
+        "A constant acceleration a also moves the position, by a T^2/2 in a step. The printed correction needs "
+        f"({needed.value[0]:.3f} +- {needed.bound[0]:.3f}) m before it: 51 steps with (0, T) give {euler:.2f} m, with "
+        f"(T^2/2, T) {exact:.3f} m. The simulation leaves the term out, as the formula does."
+    )
+    return Computed(" or ".join(hits), proof=proof)
+
+
 @computes("kalman.vehicle_prior_cov")
 def predicted_covariance():
     cov = reconstructed()[1]

@@ -26,21 +26,24 @@ class Entry:
 
 
 def entries():
-    """All rows as `Entry`s; computes the whole ledger."""
-    return [
+    """All rows as `Entry`s, chapter by chapter; computes the whole ledger."""
+    found = [
         Entry(row, value_text(row, computed.value), status, computed.proof, f"{chapter_of(row)}.ipynb")
         for row, computed, status in table()
     ]
+    return sorted(found, key=lambda entry: entry.notebook)
 
 
 def value_text(row, value):
-    """A computed value as text, with one digit more than is printed; words as they are."""
+    """A computed value as text, with one digit more than is printed; words and counts as they are."""
     half = half_unit(row.printed)
     if half is None or isinstance(value, str):
         return str(value)
     if "e" in row.printed.lower():
         return f"{float(value):.4g}"
     decimals = row.printed.replace(",", ".").partition(".")[2]
+    if not decimals and row.unit in ("", "1") and float(value).is_integer():
+        return str(int(value))
     text = f"{float(value):.{len(decimals) + 1}f}"
     return text.lstrip("-") if float(text) == 0 else text
 

@@ -8,6 +8,7 @@ from scipy.stats import chi2
 from .. import gaussian, kalman, odometry
 from ..figures import kalman as draw
 from ..figures import style
+from ..figures.lateration import Spare
 from .stage import Handle, Play, Stage, choice, slider, toggle
 
 GRID = np.linspace(0, 20, 401)
@@ -18,6 +19,7 @@ STEPS, DT = 100, 0.1
 DROPOUT = slice(45, 75)
 KEYS = {"up": (1.0, 0.0), "down": (-1.0, 0.0), "left": (0.0, np.pi / 2), "right": (0.0, -np.pi / 2)}
 KEY_STEPS = 4
+ARENA = ((-6.0, 7.0), (-3.0, 8.5))  # m, the part of the floor that is drawn
 RUNS = 200
 ITERATIONS = np.arange(1, 7)
 TWO_MARKS = np.array([[3.0, 0.0], [0.0, 4.0]])
@@ -52,7 +54,7 @@ def bells():
         ax = style.axes(fig.subplots(), "position (m)", "density (1/m)")
         ax.set(xlim=(0, 20), ylim=(0, 1.15))
         three = draw.Bells(ax, GRID)
-        words = ax.text(0.98, 0.95, "", transform=ax.transAxes, ha="right", va="top")
+        words = ax.text(0.27, 0.97, "", transform=ax.transAxes, ha="left", va="top")
 
         def update(state, result):
             three.set(result["before"], result["bells"])
@@ -67,7 +69,7 @@ def bells():
         compute=compute_bells,
         handles={
             "z": Handle(
-                (9.0, 0.5), step=0.1, bounds=((0.5, 19), (0.1, 1.1)), color=style.MEASUREMENT,
+                (9.0, PEAK), step=0.1, bounds=((0.5, 19), (0.1, 1.1)), color=style.MEASUREMENT,
                 label="peak of the measurement: sideways its value, up and down its sigma",
             )
         },
@@ -235,6 +237,8 @@ def _arena_sentence(result):
         return "Click the picture and drive with the arrow keys, or press play for the circle."
     over = float((result["nees"] > chi2.ppf(0.995, 3)).mean())
     text = f"The filter is {100 * result['error']:.0f} cm off; NEES now {result['nees'][-1]:.3g}, expected 3."
+    if not all(low <= x <= high for x, (low, high) in zip(result["truth"][-1, :2], ARENA)):
+        text += " The robot has left the picture: turn back, or Reset."
     return text + (f" Above the upper limit in {100 * over:.0f} % of the steps, expected 0.5 %." if over > 0.02 else "")
 
 
@@ -244,18 +248,20 @@ def arena():
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.45, 1))
         style.axes(left, "x (m)", "y (m)", equal=True)
-        left.set(xlim=(-6, 7), ylim=(-3, 8.5))
+        left.set(xlim=ARENA[0], ylim=ARENA[1])
         style.axes(right, "steps", "NEES")
         right.set(xlim=(0, 400), ylim=(1e-2, 1e5), yscale="log")
-        world, panel = draw.Arena(left), draw.Consistency(right, "NEES of each step", role="estimates")
+        world, spare = draw.Arena(left), Spare(left, "2, not seen")
+        panel = draw.Consistency(right, "NEES of each step", role="estimates")
         right.legend(loc="upper left", fontsize=8)
         limits = chi2.ppf([0.005, 0.995], 3)
 
         def update(state, result):
+            spare.set(state["L2"], state["count"] == 1)
             world.set(*(result[key] for key in ("truth", "estimate", "ellipse", "landmarks", "seen")))
             panel.set(np.arange(1, len(result["nees"]) + 1), result["nees"], *limits)
 
-        return [*world.artists, *panel.artists], update
+        return [*world.artists, *spare.artists, *panel.artists], update
 
     return Stage(
         "landmark arena",
@@ -338,7 +344,7 @@ def honesty():
 
     def scene(fig):
         left, right = fig.subplots(1, 2)
-        style.axes(left, "error in x", "error in y", "errors, zoomed to 90 % of them", equal=True)
+        style.axes(left, "error in x", "error in y", equal=True)
         left.set(xlim=(-1, 1), ylim=(-1, 1), xticks=[], yticks=[])
         style.axes(right, "iterations", "mean NEES of 200 runs")
         right.set(xlim=(0.5, 6.5), ylim=(1, 1e6), yscale="log")
@@ -349,7 +355,7 @@ def honesty():
 
         def update(state, result):
             parts.set(result["positions"], result["ellipse"], result["curve"], result["iterations"])
-            words.set_text(f"half width {result['scale']:.2g} m")
+            words.set_text(f"half width {result['scale']:.2g} m, holds 90 %")
 
         return [*parts.artists, words], update
 

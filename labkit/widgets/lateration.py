@@ -45,7 +45,7 @@ def compute_methods(state):
 
 
 def methods():
-    """The lecture's table of localization methods: choose a task, the rows that fit stay black."""
+    """The lecture's table of localization methods: choose a task, the rows that do not fit turn gray."""
 
     def scene(fig):
         table = _methods()
@@ -136,16 +136,17 @@ def circles():
 
     def scene(fig):
         ax = style.axes(fig.subplots(), "x (m)", "y (m)", equal=True)
-        ax.set(xlim=(-1.5, 13.5), ylim=(-3.2, 6.2))
-        rings, search = draw.Circles(ax), draw.Search(ax)
+        ax.set(xlim=(-4.0, 14.8), ylim=(-5.4, 6.4))
+        rings, search, spare = draw.Circles(ax), draw.Search(ax), draw.Spare(ax, "C, not used")
         words = ax.text(0.02, 0.02, "", transform=ax.transAxes, va="bottom", fontsize=9)
 
         def update(state, result):
             rings.set(result["landmarks"], result["distances"], state["R"])
+            spare.set(state["C"], state["count"] == 2)
             search.set(state["R"], result["path"], result["cloud"], result["ellipse"], result["weak"])
             words.set_text("singular values of the lines of sight: {:.2f}, {:.2f}".format(*result["singular_values"]))
 
-        return [*rings.artists, *search.artists, words], update
+        return [*rings.artists, *spare.artists, *search.artists, words], update
 
     return Stage(
         "distance circles",
@@ -160,7 +161,7 @@ def circles():
         },
         controls={
             "count": choice({"two": 2, "three": 3}, 2, label="landmarks"),
-            "std": slider(0.0, 0.5, 0.1, step=0.01, label="noise of a distance (m)"),
+            "std": slider(0.0, 0.5, 0.2, step=0.01, label="noise of a distance (m)"),
         },
         fail={"R": (4.5, 0.3), "S": (6.0, 0.0)},
         presets={"Start below": {"S": (6.0, -2.5)}},

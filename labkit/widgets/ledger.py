@@ -7,6 +7,7 @@ import ipywidgets
 ALL = "all"
 SHOWN = 150  # rows that are drawn at once; the search narrows what is longer
 HEADER = ("document", "place", "quantity", "printed", "computed", "unit", "status", "chapter")
+LINK = "color: var(--jp-content-link-color, #1976d2); cursor: pointer"
 SIGNS = {"reproduced": "✓", "rounding": "≈", "misprint": "✗", "superseded": "✗", "unpublished": "?"}
 
 
@@ -34,21 +35,36 @@ def table_html(entries):
     body = "".join(_row_html(entry) for entry in entries[:SHOWN])
     count = f"{len(entries)} row{'' if len(entries) == 1 else 's'}"
     count += f", the first {SHOWN} of them shown" if len(entries) > SHOWN else ""
+    if not entries:
+        return '<p role="status">0 rows: no row of this document and status holds all these words.</p>'
     return (
         f'<p role="status">{count}</p><div style="max-height: 26em; overflow: auto">'
-        f'<table style="border-spacing: 0.8em 0.15em"><thead><tr style="text-align: left">{head}</tr></thead>'
+        f'<table style="border-spacing: 0.8em 0.15em; line-height: 1.4">'
+        f'<thead><tr style="text-align: left">{head}</tr></thead>'
         f"<tbody>{body}</tbody></table></div>"
     )
 
 
 def _row_html(entry):
     row = entry.row
-    link = f'<a href="{entry.notebook}" target="_blank">{entry.notebook.removesuffix(".ipynb")}</a>'
+    chapter = entry.notebook.removesuffix(".ipynb")
+    link = f'<a href="{entry.notebook}" target="_blank" style="{LINK}">{chapter}</a>'
     cells = (row.document, row.place, row.quantity, row.printed, entry.value, "" if row.unit == "1" else row.unit)
-    text = "".join(f"<td>{html.escape(cell)}</td>" for cell in cells)
+    told = [html.escape(cell) for cell in cells]
+    told[2] += _argument_html(entry)
+    text = "".join(f"<td>{cell}</td>" for cell in told)
     hover = html.escape(entry.proof or row.note, quote=True)
     status = f'<td style="white-space: nowrap">{SIGNS[entry.status]} {entry.status}</td>'
-    return f'<tr title="{hover}">{text}{status}<td>{link}</td></tr>'
+    return f'<tr title="{hover}" style="vertical-align: top">{text}{status}<td>{link}</td></tr>'
+
+
+def _argument_html(entry):
+    """The argument, folded away: it opens by mouse, touch and keyboard, and stays open to be pointed at."""
+    said = entry.proof or entry.row.note
+    if not said:
+        return ""
+    told = f'<div style="width: 24em">{html.escape(said)}</div>'
+    return f'<details><summary style="{LINK}">why</summary>{told}</details>'
 
 
 class LedgerTable(ipywidgets.VBox):
@@ -61,7 +77,7 @@ class LedgerTable(ipywidgets.VBox):
         self.entries = list(entries)
         documents = [ALL, *dict.fromkeys(entry.row.document for entry in self.entries)]
         statuses = [ALL, *(status for status in SIGNS if any(entry.status == status for entry in self.entries))]
-        self.search = ipywidgets.Text(placeholder="words to look for", description="search")
+        self.search = ipywidgets.Text(placeholder="a place, a quantity, a number", description="search")
         self.document = ipywidgets.Dropdown(options=documents, value=ALL, description="document")
         self.status = ipywidgets.Dropdown(options=statuses, value=ALL, description="status")
         self.table = ipywidgets.HTML()

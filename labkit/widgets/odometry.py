@@ -15,6 +15,7 @@ KEYS = {"up": (1.0, 0.0), "down": (-1.0, 0.0), "left": (0.0, np.pi / 2), "right"
 KEY_STEPS = 4
 EVERY = 10  # steps between two drawn ellipses
 RUNS = 1500
+VIEW = ((-4.4, 15.0), (-4.7, 7.5))  # m; holds the lecture's circle and 14 m straight on
 
 
 def _end_error(omega, count, model):
@@ -38,6 +39,15 @@ def compute_models(state):
     error = {m: max(float(np.linalg.norm((p[-1] - paths["arc"][-1])[:2])), 1e-12) for m, p in paths.items()}
     errors = {m: np.maximum(e, 1e-12) for m, e in _errors(round(omega, 9)).items()}
     return {"dt": dt, "paths": paths, "error": error, "errors": errors}
+
+
+def _models_sentence(result):
+    if max(result["error"].values()) < 1e-9:
+        return f"T = {result['dt']:.2f} s: straight on, all three models end in the same point."
+    return (
+        f"T = {result['dt']:.2f} s: the simplified model ends {result['error']['euler']:.2g} m from the arc, "
+        f"the midpoint model {result['error']['midpoint']:.2g} m."
+    )
 
 
 def models():
@@ -65,10 +75,7 @@ def models():
             "omega_deg": slider(-60.0, 60.0, 40.0, step=2.0, label="turn rate (deg/s)"),
         },
         fail={"count": 3, "omega_deg": 60.0},
-        describe=lambda result: (
-            f"T = {result['dt']:.2f} s: the simplified model ends {result['error']['euler']:.2g} m from the arc, "
-            f"the midpoint model {result['error']['midpoint']:.2g} m."
-        ),
+        describe=_models_sentence,
     )
 
 
@@ -112,12 +119,21 @@ def compute_drive(state):
     }
 
 
+def _drive_sentence(result):
+    text = (
+        f"The estimate is {result['error']:.2f} m off; it expects {result['std']:.2f} m, "
+        f"and {result['std_heading_deg']:.1f} deg in the heading."
+    )
+    inside = all(low <= x <= high for x, (low, high) in zip(result["truth"][-1, :2], VIEW))
+    return text if inside else f"{text} The robot has left the picture: turn back, or Reset."
+
+
 def drive():
     """Drive with the arrow keys, or play the lecture's circle: what odometry believes drifts away from the truth."""
 
     def scene(fig):
         ax = style.axes(fig.subplots(), "x (m)", "y (m)", equal=True)
-        ax.set(xlim=(-6.5, 6.5), ylim=(-1.8, 6.4))
+        ax.set(xlim=VIEW[0], ylim=VIEW[1])
         path = draw.Driven(ax)
 
         def update(state, result):
@@ -135,10 +151,7 @@ def drive():
         start=_start_drive,
         advance=_advance_drive,
         fail={"factor": 3.0},
-        describe=lambda result: (
-            f"The estimate is {result['error']:.2f} m off; it expects {result['std']:.2f} m, "
-            f"and {result['std_heading_deg']:.1f} deg in the heading."
-        ),
+        describe=_drive_sentence,
     )
 
 

@@ -1,0 +1,85 @@
+"""Checks of chapters 7, 8 and 10 that no lucky draw may decide, and answers that are right in another form."""
+
+import numpy as np
+import pytest
+
+from labkit import odometry
+from labkit.course import ch07_dead_reckoning as ch07
+from labkit.course import ch08_kalman as ch08
+from labkit.course import ch10_ledger as ch10
+from labkit.course import metrics
+from labkit.course.engine import CORRECT, NOT_YET
+
+
+def item(module, name):
+    return next(i for i in module.CHAPTER.items if i.id == name)
+
+
+def turned(pose):
+    """The same pose, its heading in (-pi, pi]."""
+    return np.array([*pose[:2], -odometry.wrap_angle(-pose[2])])
+
+
+def test_a_planar_pose_is_the_same_after_a_turn():
+    metric, pose = metrics.planar_poses(), np.array([1.0, -2.0, 3.1])
+    assert metric.equal(pose + [0, 0, -2 * np.pi], pose) and metric.equal(list(pose), pose)
+    assert not metric.equal(pose + [0, 0, 0.01], pose) and not metric.equal(pose + [1e-6, 0, 0], pose)
+    position, heading = metric.deviations(pose + [0.3, 0, 2 * np.pi + 0.1], pose)
+    assert str(position) == "the position is off by 0.3 m" and str(heading) == "the heading is off by 5.73 deg"
+    assert not metric.equal([1.0, 2.0], pose)
+
+
+@pytest.mark.parametrize("name", ["step_euler", "step_midpoint", "step_arc"])
+def test_a_wrapped_heading_is_correct(name):
+    exercise = item(ch07, name)
+    for seed in range(4):
+        outcome = exercise.judge(lambda x, u, dt: turned(exercise.reference(x, u, dt)), rng=np.random.default_rng(seed))
+        assert outcome.status == CORRECT, outcome.text
+
+
+def test_a_wrapped_heading_is_correct_in_the_loop_and_in_the_filter():
+    end = item(ch07, "end_pose")
+    assert end.judge(turned(end.reference())).status == CORRECT
+    for module, name in ((ch07, "propagate"), (ch08, "ekf_step")):
+        exercise = item(module, name)
+
+        def answer(*given, exercise=exercise):
+            pose, cov = exercise.reference(*given)
+            return turned(pose), cov
+
+        assert exercise.judge(answer, rng=np.random.default_rng(0)).status == CORRECT
+
+
+def unlucky(exercise, variant, draws=400):
+    """The share of single draws on which a wrong variant gives the right answer."""
+    rng = np.random.default_rng(5)
+    cases = [exercise.draw(rng) for _ in range(draws)]
+    return np.mean([exercise.metric.equal(variant(*case), exercise.reference(*case)) for case in cases])
+
+
+@pytest.mark.parametrize(
+    "module, name, variant",
+    [
+        (ch08, "gate", lambda y, S, limit: bool((y**2 / np.diag(S)).sum() <= limit)),
+        (ch08, "gate", lambda y, S, limit: True),
+        (ch08, "wrap_angle", lambda a: a - 2 * np.pi * np.sign(a) * (abs(a) > np.pi)),
+        (ch08, "wrap_angle", lambda a: np.fmod(a + np.pi, 2 * np.pi) - np.pi),
+        (ch10, "half_unit", ch10._without_comma),
+        (ch10, "half_unit", ch10._without_exponent),
+    ],
+)
+def test_no_wrong_answer_passes_by_luck(module, name, variant):
+    exercise = item(module, name)
+    assert unlucky(exercise, variant) ** exercise.draws < 2e-3
+
+
+def test_letting_everything_pass_is_named_as_such():
+    outcome = item(ch08, "gate").judge(lambda y, S, limit: True, rng=np.random.default_rng(1))
+    assert outcome.status == NOT_YET and "everything" in outcome.text
+
+
+def test_references_take_lists_as_the_student_would_write_them():
+    x, var = ch08.fuse_two_sensors(0, 20, [9.4, 10.6], [0.5, 1])
+    np.testing.assert_allclose([x, var], [48.2 / 5.05, 1 / 5.05])
+    np.testing.assert_allclose(ch08.measurement([0.0, 0.0, 0.0], [3.0, 4.0]), [5.0, np.arctan2(4, 3)])
+    assert ch08.measurement_jacobian([0.0, 0.0, 0.0], [3.0, 4.0]).shape == (2, 3)
