@@ -268,9 +268,9 @@ class _Trial:
             return self.outcome(RAISED, f"NameError: {hint}{where}")
         if isinstance(error, RecursionError):
             return self.outcome(RAISED, "RecursionError: your function calls itself without an end.")
-        advice = "" if args or run.line else " What your function returned could not be worked with."
+        advice = "" if args or run.line else ". What your function returned could not be worked with."
         if isinstance(error, np.linalg.LinAlgError) and "square" in str(error):
-            advice = " `solve` and `inv` need as many equations as unknowns; `lstsq` takes more."
+            advice = ". `solve` and `inv` need as many equations as unknowns; `lstsq` takes more."
         call = ", ".join(f"{name}={_short(arg)}" for name, arg in zip(self._names(args), args))
         where = f"\nin {run.line}" if run.line else ""
         with_ = f"\nwhen called as {self.exercise.id}({call})" if call else ""

@@ -86,7 +86,8 @@ def as_array(result, shape):
     try:
         array = np.asarray(result)
     except Exception:
-        raise Refused(f"{wanted}, got a {type(result).__name__} whose rows differ in length") from None
+        parts = f" of {len(result)} parts that differ in shape" if type(result) in (list, tuple) else ""
+        raise Refused(f"{wanted}, got {_describe(result)}{parts}: return one array") from None
     if array.dtype.kind == "c":
         if np.abs(array.imag).max(initial=0.0) > 0:
             raise Refused(f"{wanted} of real numbers, got complex ones: is there a square root of a negative number?")
@@ -113,7 +114,10 @@ def as_array(result, shape):
         bad = int((~np.isfinite(array)).sum())
         which = "NaN" if np.isnan(array).any() else "infinity"
         count = "" if array.ndim == 0 else f" in {bad} of {array.size} entries"
-        raise Refused(f"the result holds {which}{count}: look for a division by zero or a root of a negative number")
+        raise Refused(
+            f"the result holds {which}{count}: look for a division by zero, a root of a negative number,"
+            " or an arccos or arcsin of something beyond -1 and 1"
+        )
     return array
 
 
@@ -319,13 +323,18 @@ class several(Metric):
         found = []
         for name, metric, part, want in zip(self.names, self.metrics, result, expected):
             found += [
-                Deviation(f"{name}: {d.what}" if d.what else name, d.amount, d.unit, d.tolerance, d.words)
+                Deviation(_joined(name, d.what), d.amount, d.unit, d.tolerance, d.words)
                 for d in metric.deviations(part, want)
             ]
         return found
 
     def parts(self, result, expected):
         return list(zip(self.names, self.metrics, result, expected))
+
+
+def _joined(name, what):
+    """What is off in a named part; the name alone where the part says nothing more than it."""
+    return name if what in ("", name, f"the {name}") else f"{name}: {what}"
 
 
 @dataclass(frozen=True)
@@ -397,11 +406,11 @@ def _moved(T, R=None, t=None):
 
 
 def _pose_relation(results, expected, holds):
-    if any((np.linalg.det(r[..., :3, :3]) < 0).any() for r in results):
-        return "your rotation is a reflection, its determinant is -1: one axis points the wrong way"
     sheared = max(np.abs(np.swapaxes(r[..., :3, :3], -1, -2) @ r[..., :3, :3] - np.eye(3)).max() for r in results)
     if sheared > 1e-3:
         return f"your rotation block is not orthonormal: R'R differs from I by {sheared:.2g}"
+    if any((np.linalg.det(r[..., :3, :3]) < 0).any() for r in results):
+        return "your rotation is a reflection, its determinant is -1: one axis points the wrong way"
     if holds(frames._invert):
         return "your result is the inverse of the expected pose: it maps in the other direction"
     if holds(lambda T: _moved(T, R=np.swapaxes(T[..., :3, :3], -1, -2))):
@@ -423,11 +432,11 @@ def _pose_relation(results, expected, holds):
 
 
 def _rotation_relation(results, holds):
-    if any((np.linalg.det(r) < 0).any() for r in results):
+    sheared = max(np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).max() for r in results)
+    if sheared <= 1e-3 and any((np.linalg.det(r) < 0).any() for r in results):
         return "your matrix is a reflection, its determinant is -1: one axis points the wrong way"
     if holds(lambda R: np.swapaxes(R, -1, -2)):
         return "your matrix is the transpose of the expected rotation: rows and columns, or the direction of the map"
-    sheared = max(np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).max() for r in results)
     if sheared > 1e-3:
         return f"your matrix is not orthonormal: R'R differs from I by {sheared:.2g}"
     half = all((log_so3(r) * 0 == 0).all() for r in results)
