@@ -130,7 +130,8 @@ def e_trans_in_block():
     return Computed(
         printed,
         misprint=least > 8e-4,
-        proof=f"The same digits in the same wrong unit: at least {least:.2f} mm is needed, {printed:.2f} mm is meant.",
+        proof=f"The results block prints the average of appendix D, {printed / 1000:.6f}, as millimeters. Its mean error "
+        f"makes equation (17) at least {least:.2f} mm: the number is in m, {printed:.2f} mm.",
     )
 
 
@@ -206,7 +207,7 @@ def angular_speed_claims():
     return Computed(
         3.0,
         proof="A mean of 5 deg/s (section 3.2) cannot exceed the 3 deg/s that the conclusion states as the largest "
-        "error.",
+        "error: the two do not hold together. Which of them is meant, the report does not show.",
     )
 
 

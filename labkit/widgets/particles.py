@@ -175,9 +175,9 @@ def compute_heat(state):
     """Log weights of one scan over the building for both models, relative to the best place, and the scan itself."""
     b, sensors = building(), suite()
     pose = np.array([*state["robot"], np.deg2rad(state["heading_deg"])])
-    world = b.grid.with_disks([(*(pose[:2] + 0.9 * np.array([np.cos(pose[2]), np.sin(pose[2])])), 0.25)])
-    if state["scan"] == "as mapped":
-        world = b.grid
+    world = b.grid
+    if state["scan"] != "as mapped":
+        world = world.with_disks([(*(pose[:2] + 0.9 * np.array([np.cos(pose[2]), np.sin(pose[2])])), 0.25)])
     ranges, bearings = sensors.scanner.scan(world, pose, np.random.default_rng(4), every=9)
     xy, cells, shape = _places()
     poses = np.column_stack([xy, np.full(len(xy), pose[2])])

@@ -256,7 +256,8 @@ def compute_dynamic(state):
     step = time[1] - time[0]
     offset = tracker.time_offset(time, w, w_read, max_offset=max(3 * step, 0.08)) if step < 0.05 else 0.0
     error = np.linalg.norm(read[:, :3, 3] - T[:, :3, 3], axis=1)
-    mended = np.linalg.norm(read[:, :3, 3] - tracker.shift_time(time, T, -offset)[:, :3, 3], axis=1)
+    then = np.column_stack([np.interp(time - offset, time, T[:, axis, 3]) for axis in range(3)])
+    mended = np.linalg.norm(read[:, :3, 3] - then, axis=1)
     keep = tracker.reject_outliers(mended, 6.0)
     return {
         "share": np.linspace(0, 1, len(time)), "error": error, "bad": bad, "mended": mended, "keep": keep,
