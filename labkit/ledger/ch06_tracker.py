@@ -130,8 +130,8 @@ def e_trans_in_block():
     return Computed(
         printed,
         misprint=least > 8e-4,
-        proof=f"The results block prints the average of appendix D, {printed / 1000:.6f}, as millimeters. Its mean error "
-        f"makes equation (17) at least {least:.2f} mm: the number is in m, {printed:.2f} mm.",
+        proof=f"The results block prints the average of appendix D, {printed / 1000:.6f}, as millimeters. Its mean "
+        f"error makes equation (17) at least {least:.2f} mm: the number is in m, {printed:.2f} mm.",
     )
 
 

@@ -7,7 +7,7 @@ import ipywidgets
 ALL = "all"
 SHOWN = 150  # rows that are drawn at once; the search narrows what is longer
 HEADER = ("document", "place", "quantity", "printed", "computed", "unit", "status", "chapter")
-LINK = "color: var(--jp-content-link-color, #1976d2); cursor: pointer"
+LINK = "color: var(--jp-content-link-color, currentColor); cursor: pointer"
 SIGNS = {"reproduced": "✓", "rounding": "≈", "misprint": "✗", "superseded": "✗", "unpublished": "?"}
 
 
