@@ -93,25 +93,27 @@ def _refuse_sheared(R, name):
 def _are_certainly_rigid(rows, block=1024):
     """True only when `as_transforms` would find nothing wrong with the transforms whose entries are (16, n).
 
-    Quick, because it works on contiguous rows of components: with columns x, y, z, the conditions x cross y = z, y
-    cross z = x and |x| = 1 make a rotation. A sum of squares takes the place of many comparisons; it is NaN or
-    infinite where an entry is. An eighth of the tolerance leaves room for what the omitted products can add up to.
+    Quick, because it works on contiguous rows of components: columns x, y, z with z = x cross y and length 1 are a
+    rotation, since |x cross y| = 1 leaves no room for x'y. A sum of squares takes the place of many comparisons; it
+    is NaN or infinite where an entry is. Within t of these conditions, x'y is at most sqrt(5 t).
     """
     for start in range(0, rows.shape[1], block):
         part = rows[:, start : start + block]
         columns = np.empty((3, 5, part.shape[1]))
         columns[:, :3] = part[:12].reshape(3, 4, -1)[:, :3].swapaxes(0, 1)
-        columns[:, 3:] = columns[:, :2]  # the first two components again: a cross product by slices
-        error = columns[:2, 1:4] * columns[1:, 2:]
-        error -= columns[:2, 2:] * columns[1:, 1:4]
-        error -= columns[2::-2, :3]
-        norm = np.einsum("in,in->n", columns[0, :3], columns[0, :3]) - 1.0
+        columns[:2, 3:] = columns[:2, :2]  # the first two components again: a cross product by slices
+        x, y, z = columns
+        error = x[1:4] * y[2:]
+        error -= x[2:] * y[1:4]
+        error -= z[:3]
+        norms = np.einsum("kin,kin->kn", columns[:, :3], columns[:, :3])
+        norms -= 1.0
         last = np.array(part[12:])
         last[3] -= 1.0
-        if not np.vdot(error, error) + np.vdot(norm, norm) <= (ORTHONORMAL_TOLERANCE / 8) ** 2:
+        if not np.vdot(error, error) + np.vdot(norms, norms) <= (ORTHONORMAL_TOLERANCE**2 / 10) ** 2:
             return False
         entries = part.ravel(order="K")
-        if np.vdot(last, last) != 0.0 or not np.isfinite(np.vdot(entries, entries)):
+        if np.vdot(last, last) != 0.0 or not math.isfinite(np.vdot(entries, entries)):
             return False
     return rows.shape[1] > 0
 

@@ -287,12 +287,13 @@ def _noise(std_rot, std_trans):
 def _gram(rows):
     """Mean of [R p] over the poses, and [D d]'[D d] of the deviations from it; (16, n) -> (3, 4), (4, 4).
 
-    One product of all entries with each other holds both: the last entry of a pose is 1, so its row holds the sums.
+    The last row of the entries is all ones: a product with it sums.
     """
-    n, products = rows.shape[1], rows @ rows.T
-    mean = products[15, :12].reshape(3, 4) / n
+    n, entries = rows.shape[1], rows[:12]
+    products = entries @ entries.T
+    mean = (entries @ rows[15]).reshape(3, 4) / n
     squares = products[:4, :4] + products[4:8, 4:8]
-    squares += products[8:12, 8:12]
+    squares += products[8:, 8:]
     squares -= n * (mean.T @ mean)
     return mean, squares
 

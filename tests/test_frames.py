@@ -7,6 +7,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from labkit import frames, lie
+from labkit.chaining import orthonormality_error
+from labkit.checks import as_transforms
 from labkit.ledger.ch01_frames import points
 
 RNG = np.random.default_rng(5)
@@ -216,3 +218,22 @@ def test_the_bound_holds_and_only_the_turn_in_the_plane_gains():
 def test_the_six_points_are_the_printed_ones():
     assert points()["K0"].tolist() == [[1.01, 2, 0], [2, 2, 0], [1, 3, 0]]
     assert points()["K1"].tolist() == [[2, 1, 0], [2.01, 2, 0], [1, 1, 0]]
+
+
+@pytest.mark.parametrize("shear", [0.0, 1e-8, 1e-5, 9e-4, 1.1e-3, 0.1])
+@pytest.mark.parametrize("spoil", ["columns 0 and 1", "columns 1 and 2", "columns 2 and 0", "length", "all lengths"])
+def test_the_quick_look_at_a_stack_passes_nothing_that_a_single_pose_fails(shear, spoil):
+    T = random_poses(5)
+    R = T[:, :3, :3]
+    if spoil.startswith("columns"):
+        i, j = int(spoil[8]), int(spoil[-1])
+        R[2, :, j] += shear * R[2, :, i]
+        R[2] /= np.linalg.norm(R[2], axis=0)
+    else:
+        R[2, :, 0 if spoil == "length" else slice(None)] *= 1 + shear / 2
+    if orthonormality_error(T[2]) > 1e-3:
+        for poses in (T, T[2]):
+            with pytest.raises(ValueError, match="orthonormal"):
+                as_transforms(poses, "T")
+    else:
+        assert as_transforms(T, "T") is T and as_transforms(T[2], "T").shape == (4, 4)
