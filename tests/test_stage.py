@@ -309,11 +309,11 @@ def test_newest_wins_while_the_page_is_busy(wired):
     stage, sent = wired
     for k in range(20):
         stage.set(P=(k / 10, 1))
-    assert len(sent) == 1 + 2  # no more than two unseen
+    assert len(sent) == 1 + 3  # no more than three unseen
     stage._receive({"shown": sent[-1][0]["picture"]})
-    assert len(sent) == 4 and sent[-1][0]["handles"]["P"]["now"] == pytest.approx(1.9)
+    assert len(sent) == 5 and sent[-1][0]["handles"]["P"]["now"] == pytest.approx(1.9)
     stage._receive({"shown": sent[-1][0]["picture"]})
-    assert len(sent) == 4  # nothing new, nothing sent
+    assert len(sent) == 5  # nothing new, nothing sent
 
 
 def test_nothing_is_sent_before_a_page_looks():

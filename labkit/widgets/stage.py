@@ -84,8 +84,9 @@ __all__ = ["Handle", "Play", "Stage", "View", "choice", "slider", "toggle"]
 
 MAX_CONTROLS = 3
 ORBIT_DEG_PER_PIXEL = 0.5
-# pictures on their way to the browser; further ones wait until it has shown them, and then only the newest is drawn
-MAX_UNSEEN = 2
+# pictures on their way to the browser, which acknowledges every other one; further ones wait until it has shown them,
+# and then only the newest is drawn
+MAX_UNSEEN = 3
 RESERVED = ("t", "view", "click", "brush", "memory")
 
 
@@ -452,7 +453,7 @@ class Stage(ipywidgets.VBox):
 
     def _build_play(self):
         steps = round(self._play.t_max / self._play.dt)
-        interval = max(30, round(1000 * self._play.dt / self._play.rate))
+        interval = max(20, round(1000 * self._play.dt / self._play.rate))
         stride = max(1, round(interval * self._play.rate / (1000 * self._play.dt)))
         self._play_widget = ipywidgets.Play(min=0, max=steps, step=stride, interval=interval, show_repeat=False)
         self._play_widget.observe(lambda change: self._on_time(change["new"] * self._play.dt), "value")
@@ -535,7 +536,7 @@ class Stage(ipywidgets.VBox):
         return self._bounded(key, there if len(at) == 2 else at + view.unproject(there - here))
 
     def _show_picture(self, reply=None):
-        """One picture to the browser; one that has not yet shown the last two gets the newest as soon as it has."""
+        """One picture to the browser; one that has not yet shown the last three gets the newest as soon as it has."""
         if not self._attached:
             return
         if reply is None and self._sent - self._shown >= MAX_UNSEEN:

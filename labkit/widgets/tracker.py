@@ -18,7 +18,7 @@ from .stage import Handle, Play, Stage, View, choice, slider, toggle
 
 # ---- live ------------------------------------------------------------------------------------------------------------
 
-LIVE_SECONDS, LIVE_STEP, TRAIL = 60.0, 0.03, 375  # s, s (the browser adds what it needs itself), readings drawn
+LIVE_SECONDS, LIVE_STEP, TRAIL = 60.0, 0.02, 375  # s, s (the browser adds what it needs itself), readings drawn
 IDLE = 1.5  # s without a look after which the stream ends by itself
 
 
