@@ -1,4 +1,4 @@
-"""No test writes into the student's progress file."""
+"""No test writes into the student's progress file; what every Stage must be able to do."""
 
 import pytest
 
@@ -7,3 +7,19 @@ import pytest
 def own_progress(tmp_path, monkeypatch):
     monkeypatch.setenv("LABKIT_PROGRESS", str(tmp_path / "progress.jsonl"))
     monkeypatch.delenv("LABKIT_STRICT", raising=False)
+
+
+@pytest.fixture
+def draws_fails_and_recovers():
+    """Asserts of the Stage a function makes: a picture, another one when made to fail, the first again after Reset."""
+
+    def check(make):
+        stage = make()
+        before = stage.png()
+        stage.make_it_fail()
+        assert stage.png() != before and stage.status == ""
+        stage.reset()
+        assert stage.png() == before
+        assert repr(stage) == repr(make()) and stage.caption
+
+    return check

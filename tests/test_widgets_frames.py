@@ -12,15 +12,8 @@ ALL = (w.three_points, w.triangle_noise, w.kuka_gimbal, w.svd_against_gram_schmi
 
 
 @pytest.mark.parametrize("make", ALL)
-def test_draws_fails_and_recovers(make):
-    stage = make()
-    before = stage.png()
-    stage.make_it_fail()
-    failed = stage.png()
-    assert failed != before and stage.status == ""
-    stage.reset()
-    assert stage.png() == before
-    assert repr(stage) == repr(make()) and stage.caption
+def test_draws_fails_and_recovers(make, draws_fails_and_recovers):
+    draws_fails_and_recovers(make)
 
 
 def state_of_sheet(**changes):

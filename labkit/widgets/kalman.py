@@ -9,6 +9,7 @@ from .. import gaussian, kalman, odometry
 from ..figures import kalman as draw
 from ..figures import style
 from ..figures.lateration import Spare
+from .odometry import strayed
 from .stage import Handle, Play, Stage, choice, slider, toggle
 
 GRID = np.linspace(0, 20, 401)
@@ -237,8 +238,7 @@ def _arena_sentence(result):
         return "Click the picture and drive with the arrow keys, or press play for the circle."
     over = float((result["nees"] > chi2.ppf(0.995, 3)).mean())
     text = f"The filter is {100 * result['error']:.0f} cm off; NEES now {result['nees'][-1]:.3g}, expected 3."
-    if not all(low <= x <= high for x, (low, high) in zip(result["truth"][-1, :2], ARENA)):
-        text += " The robot has left the picture: turn back, or Reset."
+    text += strayed(result["truth"][-1], ARENA)
     return text + (f" Above the upper limit in {100 * over:.0f} % of the steps, expected 0.5 %." if over > 0.02 else "")
 
 

@@ -119,13 +119,18 @@ def compute_drive(state):
     }
 
 
+def strayed(pose, view):
+    """A sentence for a robot outside the part of the floor that is drawn, ((left, right), (bottom, top)); else none."""
+    inside = all(low <= x <= high for x, (low, high) in zip(pose, view))
+    return "" if inside else " The robot has left the picture: turn back, or Reset."
+
+
 def _drive_sentence(result):
     text = (
         f"The estimate is {result['error']:.2f} m off; it expects {result['std']:.2f} m, "
         f"and {result['std_heading_deg']:.1f} deg in the heading."
     )
-    inside = all(low <= x <= high for x, (low, high) in zip(result["truth"][-1, :2], VIEW))
-    return text if inside else f"{text} The robot has left the picture: turn back, or Reset."
+    return text + strayed(result["truth"][-1], VIEW)
 
 
 def drive():

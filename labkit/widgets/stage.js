@@ -85,6 +85,7 @@ function render({ model, el }) {
       show(message);
     } catch (error) {
       console.error("stage: the picture could not be decoded", error);
+      flush(); // what happened meanwhile need not wait for the next event
     }
     decoding = false;
     draw();
