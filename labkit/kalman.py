@@ -8,7 +8,7 @@ Source: lecture "Lokalisierung", section "Lokalisierung mit einem Kalman-Filter"
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy import linalg, signal, stats
@@ -109,21 +109,28 @@ def predict(x, cov, A, B=None, u=None, cov_u=None, cov_v=None):
     x = as_finite(x, "x")
     n = x.shape[-1]
     A, cov = _matrix(A, "A", n, n), _matrix(cov, "cov", n, n)
-    x, cov = _apply(A, x), A @ cov @ _t(A)
+    return _predicted(x, cov, A, *_driven(n, B, u, cov_u, cov_v))
+
+
+def _predicted(x, cov, A, push, spread):
+    return _apply(A, x) + push, _symmetric(A @ cov @ _t(A) + spread)
+
+
+def _driven(n, B, u, cov_u, cov_v):
+    """What a step adds to the state, B u, and to its covariance, B cov_u B' + cov_v."""
+    push, spread = 0.0, 0.0
     if B is not None:
         B = as_finite(B, "B")
         k = B.shape[-1]
         if B.shape[-2:] != (n, k):
             raise ValueError(f"B must have shape (..., {n}, k), got {B.shape}")
         if u is not None:
-            x = x + _apply(B, as_points(u, "u", k))
+            push = _apply(B, as_points(u, "u", k))
         if cov_u is not None:
-            cov = cov + B @ _matrix(cov_u, "cov_u", k, k) @ _t(B)
+            spread = B @ _matrix(cov_u, "cov_u", k, k) @ _t(B)
     elif u is not None or cov_u is not None:
         raise ValueError("u and cov_u act through B, but B is missing")
-    if cov_v is not None:
-        cov = cov + _matrix(cov_v, "cov_v", n, n)
-    return x, _symmetric(cov)
+    return push, spread if cov_v is None else spread + _matrix(cov_v, "cov_v", n, n)
 
 
 def update(x, cov, z, C, cov_z, form="joseph", dtype=float):
@@ -144,19 +151,57 @@ def update(x, cov, z, C, cov_z, form="joseph", dtype=float):
     x = as_finite(x, "x").astype(dtype)
     n = x.shape[-1]
     cov = _matrix(cov, "cov", n, n).astype(dtype)
-    C = as_finite(C, "C").astype(dtype)
-    if C.shape[-1:] != (n,) or C.ndim < 2:
-        raise ValueError(f"C must have shape (..., m, {n}), got {C.shape}")
+    C = _measured_by(C, n).astype(dtype)
     m = C.shape[-2]
     cov_z = _matrix(cov_z, "cov_z", m, m).astype(dtype)
+    z = None if z is None else as_points(z, "z", m).astype(dtype)
+    return _corrected(x, cov, z, C, cov_z, form)
+
+
+def _measured_by(C, n):
+    C = as_finite(C, "C")
+    if C.shape[-1:] != (n,) or C.ndim < 2:
+        raise ValueError(f"C must have shape (..., m, {n}), got {C.shape}")
+    return C
+
+
+def _corrected(x, cov, z, C, cov_z, form="joseph"):
     PCt = cov @ _t(C)
     S = C @ PCt + cov_z
     if z is None:
-        nothing = np.zeros((*S.shape[:-1],), dtype)
-        return Corrected(x, cov, nothing, S, np.zeros_like(PCt))
-    innovation = as_points(z, "z", m).astype(dtype) - _apply(C, x)
+        return Corrected(x, cov, np.zeros_like(S[..., 0]), S, np.zeros_like(PCt))
+    innovation = z - _apply(C, x)
     K = _t(np.linalg.solve(S, _t(PCt)))
     return Corrected(x + _apply(K, innovation), _after(cov, K, C, cov_z, form), innovation, S, K)
+
+
+def filter_steps(z, A, C, cov_z, x0, cov0, B=None, u=None, cov_u=None, cov_v=None):
+    """The linear filter along a series: each step predicts as in `predict`, then corrects as in `update`.
+
+    Parameters
+    ----------
+    z : (steps, m), a row of NaN where nothing was measured; x0 : (n,), cov0 : (n, n) before the first step. The others
+    as in `predict` and `update`, the same in every step.
+
+    Returns a `Corrected` whose arrays have the steps as their first axis; innovation and gain are zero where
+    nothing was measured.
+    """
+    x = np.atleast_1d(as_finite(x0, "x0"))
+    n = len(x)
+    A, C, cov = _matrix(A, "A", n, n), _measured_by(C, n), _matrix(cov0, "cov0", n, n)
+    cov_z, z = _matrix(cov_z, "cov_z", len(C), len(C)), np.asarray(z, dtype=float)
+    if z.ndim != 2 or z.shape[1] != len(C):
+        raise ValueError(f"z must have shape (steps, {len(C)}), got {z.shape}")
+    missing = np.isnan(z).all(axis=1)
+    z = as_finite(np.where(missing[:, None], 0.0, z), "z")
+    push, spread = _driven(n, B, u, cov_u, cov_v)
+    steps = []
+    for value, nothing in zip(z, missing):
+        x, cov = _predicted(x, cov, A, push, spread)
+        step = _corrected(x, cov, None if nothing else value, C, cov_z)
+        x, cov = step.x, step.cov
+        steps.append(step)
+    return Corrected(*(np.array([getattr(step, field.name) for step in steps]) for field in fields(Corrected)))
 
 
 def _after(cov, K, C, cov_z, form="joseph"):

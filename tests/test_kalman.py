@@ -9,6 +9,7 @@ from scipy.optimize import least_squares
 from labkit import kalman, odometry
 
 RUNS = 200
+ONE = [[1.0]]
 LANDMARKS = np.array([[4.0, 6.0], [-5.0, 4.0], [-3.0, -6.0], [6.0, -3.0]])
 CONTROLS = np.tile([1.0, 0.3], (120, 1))
 COV_U = np.diag([0.05**2, np.radians(3) ** 2])
@@ -50,6 +51,22 @@ def test_no_measurement_is_no_correction():
     found = kalman.update(x, cov, None, [[1.0, 0.0]], [[1.0]])
     np.testing.assert_array_equal(found.x, x)
     np.testing.assert_array_equal(found.cov, cov)
+
+
+def test_a_series_is_its_steps_and_a_row_of_nan_is_no_correction():
+    rng, (A, B, C) = np.random.default_rng(4), kalman.vehicle_model(0.1)
+    z = rng.standard_normal((6, 1))
+    z[2] = np.nan
+    cov_u, cov_v, cov_z = [[0.16]], 0.01 * np.eye(2), [[0.25]]
+    run = kalman.filter_steps(z, A, C, cov_z, np.zeros(2), np.eye(2), B, [1.0], cov_u, cov_v)
+    x, cov = np.zeros(2), np.eye(2)
+    for k, value in enumerate(z):
+        x, cov = kalman.predict(x, cov, A, B, [1.0], cov_u, cov_v)
+        step = kalman.update(x, cov, None if k == 2 else value, C, cov_z)
+        x, cov = step.x, step.cov
+        for field in ("x", "cov", "innovation", "cov_innovation", "gain"):
+            np.testing.assert_allclose(getattr(run, field)[k], getattr(step, field), atol=1e-14)
+    assert run.gain[2].tolist() == [[0.0], [0.0]]
 
 
 def test_whole_filter_is_weighted_least_squares():
@@ -317,6 +334,8 @@ def test_nees_wraps_the_heading():
         (lambda: kalman.predict(np.zeros(2), np.eye(2), np.eye(2), u=[1.0]), "B is missing"),
         (lambda: kalman.update(np.zeros(2), np.eye(2), [1.0], [[1.0]], [[1.0]]), "C must have shape"),
         (lambda: kalman.update([0.0], [[1.0]], [1.0], [[1.0]], [[1.0]], form="long"), "form must be one of"),
+        (lambda: kalman.filter_steps([1.0], ONE, ONE, ONE, [0.0], ONE), r"z must have shape \(steps, 1\)"),
+        (lambda: kalman.filter_steps([[np.inf]], ONE, ONE, ONE, [0.0], ONE), "z must be finite"),
         (lambda: kalman.measurement_jacobian([4.0, 6.0, 0.0], LANDMARKS), "stands on a landmark"),
         (lambda: kalman.filter_series(np.zeros((5, 2)), np.eye(2), [1, 0], np.eye(2), 1, [0, 0], np.eye(2)), "one num"),
         (lambda: localize(kalman.Drive(None, None, np.zeros((3, 4, 2)))), "z must have shape"),

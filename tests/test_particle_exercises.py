@@ -93,7 +93,7 @@ def test_the_logarithm_of_an_underflown_product_is_refused():
 @pytest.mark.parametrize("seed", range(5))
 def test_every_single_ray_tells_a_forgotten_heading(seed):
     item = next(item for item in CHAPTER.items if item.id == "cast_ray")
-    grid, pose, bearing, r_max = item.draw(np.random.default_rng(seed))
+    grid, pose, bearing, r_max = item.cases[0](np.random.default_rng(seed))
     right = maps.walk_ray(grid, pose, bearing, r_max)
     for x in ((0.0, bearing), (pose[2], 0.0), (pose[2], -bearing)):
         assert abs(maps.walk_ray(grid, np.array([*pose[:2], x[0]]), x[1], r_max) - right) > 0.2

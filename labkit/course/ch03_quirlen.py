@@ -43,9 +43,10 @@ def matrix_and_residuals(rng):
 
 
 def distances_and_scale(rng):
-    """Distances, some of them beyond the cutoff, and a scale."""
+    """Distances, one of them below the scale and some beyond the cutoff, and a scale."""
     scale = rng.uniform(0.1, 0.6)
-    d = scale * np.concatenate([rng.uniform(0.1, 0.95 * pivot.TUKEY, 8), rng.uniform(1.1, 6, 3) * pivot.TUKEY])
+    near, middle, far = rng.uniform(0.2, 0.9, 1), rng.uniform(0.2, 0.95, 7) * pivot.TUKEY, rng.uniform(1.1, 6, 3) * pivot.TUKEY
+    d = scale * np.concatenate([near, middle, far])
     return rng.permutation(d), scale
 
 

@@ -1,5 +1,7 @@
 """Chapter 4: gradient, Hessian, and the steps of Newton, Gauss-Newton and the trust region."""
 
+import functools
+
 import numpy as np
 
 from .. import optimization as opt
@@ -54,13 +56,16 @@ def tried_step(rng):
     return cost, cost - rng.uniform(0.2, 1.2) * opt.predicted_decrease(g, B, step), g, B, step
 
 
-def dogleg_case(rng):
-    """Gradient, positive definite curvature and a radius: shorter than the Cauchy point, between it and Newton, or beyond both."""
+def dogleg_case(rng, between):
+    """Gradient, positive definite curvature and a radius, `between` the corner (at 0) and the Newton point (at 1)."""
     g, B = rng.normal(scale=4, size=2), turned((rng.uniform(0.4, 0.8), rng.uniform(3, 5)), rng.uniform(0.3, 1.2))
     corner = np.linalg.norm(opt.cauchy_step(g, B, 1e9))
     full = np.linalg.norm(opt.newton_step(g, B))
-    radius = (rng.uniform(0.3, 0.8) * corner, corner + rng.uniform(0.2, 0.8) * (full - corner), 1.5 * full)[rng.integers(3)]
-    return g, B, float(radius)
+    share = rng.uniform(*between)
+    return g, B, float((1 + share) * corner if share < 0 else corner + share * (full - corner))
+
+
+DOGLEG_CASES = tuple(functools.partial(dogleg_case, between=b) for b in ((-0.7, -0.2), (0.2, 0.8), (1.3, 2.0)))
 
 
 # Wrong variants --------------------------------------------------------------------------------------------------------------------------
@@ -371,9 +376,9 @@ CHAPTER = Chapter(
         Exercise(
             "dogleg_step",
             reference=opt.dogleg_step,
-            draw=dogleg_case,
+            draw=DOGLEG_CASES,
             metric=metrics.numbers(1e-8),
-            draws=14,
+            draws=9,
             hints=(
                 "Three cases: the Newton point is inside; the corner is outside; the rim cuts the second leg.",
                 "The corner is −(gᵀg / gᵀBg) g. On the second leg solve |corner + s (newton − corner)| = radius for s between 0 and 1.",

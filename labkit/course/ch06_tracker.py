@@ -103,9 +103,18 @@ def kron_row(A, B):
     return np.kron(np.eye(3), A) - np.kron(B.T, np.eye(3))
 
 
-def stacked(rng):
-    """The Kronecker matrix of noisy motions: so noisy that its null vector is visibly no rotation."""
-    return (axxb.kronecker_matrix(*motions(rng, std_deg=4.0)),)
+def stacked(rng, sign):
+    """The Kronecker matrix of noisy motions, so noisy that its null vector is visibly no rotation, and with this sign
+    of the null vector's determinant.
+    """
+    while True:
+        M = axxb.kronecker_matrix(*motions(rng, std_deg=4.0))
+        X = _null(M).reshape(3, 3)
+        if sign * np.linalg.det(X) > 0 and np.abs(3 * X @ X.T - np.eye(3)).max() > 0.01:
+            return (M,)
+
+
+BOTH_SIGNS = tuple(functools.partial(stacked, sign=sign) for sign in (1, -1))
 
 
 def rotation_from_nullvector(M):
@@ -162,7 +171,7 @@ def gaps(rng):
 
 def spoiled(rng):
     """Values about 50 with nonsense on both sides, some gross and some mild, and a factor."""
-    core = np.r_[np.linspace(-1, 1, 31) + 0.02 * rng.normal(size=31), -2.55, 2.6]
+    core = np.r_[np.linspace(-1, 1, 31) + 0.02 * rng.normal(size=31), -3.1, 3.2]
     values = 50 + rng.uniform(0.5, 2) * np.r_[core, -14, -6, 6.5, 42, 45, 47]
     return rng.permutation(values), 4.0
 
@@ -440,7 +449,7 @@ CHAPTER = Chapter(
         Exercise(
             "rotation_from_nullvector",
             reference=rotation_from_nullvector,
-            draw=stacked,
+            draw=BOTH_SIGNS,
             metric=metrics.rotations(1e-5),
             hints=(
                 "The singular vector of the smallest singular value, put back into a 3 x 3 matrix column by column.",
@@ -526,7 +535,7 @@ CHAPTER = Chapter(
         Exercise(
             "e_rot",
             reference=tracker.e_rot,
-            draw=stacked,
+            draw=BOTH_SIGNS,
             metric=metrics.numbers(1e-9),
             hints=(
                 "Equation (13), taken at its word: the norm of M'M v, divided by N - 1. v is the null vector, of length 1.",

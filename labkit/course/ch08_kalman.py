@@ -1,5 +1,8 @@
 """Chapter 8: the linear Kalman filter, the extended filter with landmarks, and whether they are honest."""
 
+import functools
+import itertools
+
 import numpy as np
 
 from .. import kalman, odometry
@@ -45,11 +48,22 @@ def seen_landmark(rng):
     return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
 
 
-def landmark_aside(rng):
-    """A landmark on either side in x, and a heading that takes the unwrapped bearing out of [-pi, pi)."""
-    x, r = np.array([*rng.uniform(-4, 4, 2), rng.choice([-1, 1]) * rng.uniform(2.6, 3.1)]), rng.uniform(1.5, 6)
-    angle = -np.sign(x[2]) * rng.uniform(0.6, 2.6)
+def landmark_aside(rng, side, turned):
+    """A landmark on this side in x, and a heading on this side that takes the unwrapped bearing out of [-pi, pi)."""
+    x, r = np.array([*rng.uniform(-4, 4, 2), turned * rng.uniform(2.6, 3.1)]), rng.uniform(1.5, 6)
+    angle = -turned * (np.pi / 2 - side * rng.uniform(0.15, 0.95))
     return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
+
+
+def turned_too_far(rng, sign):
+    """An angle beyond half a turn, with up to three full turns more."""
+    return (sign * (rng.uniform(3.3, 6.0) + 2 * np.pi * rng.integers(0, 4)),)
+
+
+def each_way(draw, *names):
+    """The draw with every combination of the signs that it takes under these names."""
+    signs = itertools.product((1, -1), repeat=len(names))
+    return tuple(functools.partial(draw, **dict(zip(names, each))) for each in signs)
 
 
 def pose_control_step(rng):
@@ -76,21 +90,30 @@ def estimate_and_truth(rng):
     return truth, x, covariance(rng, 3, 0.05)
 
 
-def innovation_and_limit(rng):
-    """An innovation, its correlated covariance, and a limit; in every second draw the correlation decides.
+LIMIT = 5.991  # 95 % of chi-square with two degrees of freedom
 
-    Against the correlation little is much (the diagonal alone would let it pass), along it much is little.
+
+def surprise(rng, wanted, along=None, std=(0.3, 1.5), measure=np.linalg.solve):
+    """An innovation y, its correlated covariance S, and a limit.
+
+    wanted: range of y' S^-1 y in limits; along: 1 along the correlation, where much is little, -1 across, where little
+    is much (the diagonal alone would let it pass), None anywhere. `measure` takes the place of S^-1 y.
     """
-    rho, std, limit = rng.uniform(0.75, 0.95) * rng.choice([-1, 1]), rng.uniform(0.3, 1.5, 2), 5.991
+    rho, std = rng.uniform(0.75, 0.95) * rng.choice([-1, 1]), rng.uniform(*std, 2)
     S = np.outer(std, std) * [[1, rho], [rho, 1]]
-    wanted, direction = (
-        (rng.uniform(1.5, 2.5), [1, -np.sign(rho)]),
-        (rng.uniform(0.7, 0.9), [1, np.sign(rho)]),
-        (rng.uniform(0.05, 0.9), rng.normal(size=2)),
-        (rng.uniform(7, 20), rng.normal(size=2)),
-    )[rng.integers(4)]
-    y = std * direction * rng.choice([-1, 1])
-    return y * np.sqrt(wanted * limit / (y @ np.linalg.solve(S, y))), S, limit
+    y = std * (rng.normal(size=2) if along is None else [1, along * np.sign(rho)]) * rng.choice([-1, 1])
+    return y * np.sqrt(rng.uniform(*wanted) * LIMIT / (y @ measure(S, y))), S, LIMIT
+
+
+SURPRISES = (
+    functools.partial(surprise, wanted=(1.5, 2.5), along=-1),
+    functools.partial(surprise, wanted=(0.7, 0.9), along=1, std=(0.3, 0.7)),
+    functools.partial(surprise, wanted=(0.05, 0.9)),
+    functools.partial(surprise, wanted=(7, 20)),
+    # short enough to pass without S: one implausible, also by its root, one plausible that S instead of S^-1 refuses
+    functools.partial(surprise, wanted=(7, 10), along=-1, std=(0.3, 0.5)),
+    functools.partial(surprise, wanted=(0.5, 0.7), along=1, std=(1.3, 1.5), measure=lambda S, y: y),
+)
 
 
 # References and wrong variants ------------------------------------------------
@@ -496,7 +519,7 @@ CHAPTER = Chapter(
         Exercise(
             "wrap_angle",
             reference=wrap_angle,
-            draw=lambda rng: (rng.uniform(3.3, 6.0) * rng.choice([-1, 1]) + 2 * np.pi * rng.integers(-3, 4),),
+            draw=each_way(turned_too_far, "sign"),
             metric=metrics.numbers(1e-9, "rad"),
             draws=12,
             hints=(
@@ -530,7 +553,7 @@ CHAPTER = Chapter(
         Exercise(
             "measurement",
             reference=measurement,
-            draw=landmark_aside,
+            draw=each_way(landmark_aside, "side", "turned"),
             draws=12,
             metric=metrics.numbers(1e-9),
             hints=(
@@ -725,7 +748,7 @@ CHAPTER = Chapter(
         Exercise(
             "gate",
             reference=gate,
-            draw=innovation_and_limit,
+            draw=SURPRISES,
             metric=metrics.exactly(),
             draws=24,
             hints=(

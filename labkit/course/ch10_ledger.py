@@ -1,5 +1,8 @@
 """Chapter 10: what a printed digit hides, and which word a comparison deserves."""
 
+import functools
+import itertools
+
 import numpy as np
 
 from ..ledger import Computed, Row, half_unit, judge
@@ -9,18 +12,24 @@ from .engine import Chapter, Exercise, Mistake, Prediction
 FORMS = ("1.010000", "12", "1,5", "-0,250", "3e-4", "2.50e2", "-1000", "97.3")
 
 
-def printed_number(rng):
+def printed_number(rng, form):
     """A number as a document prints it."""
-    return (str(rng.choice(FORMS)),)
+    return (form,)
 
 
-def comparison(rng):
-    """printed, value, bound, misprint, simulated: each status comes up."""
-    value = float(np.round(rng.uniform(1, 9), 2))
-    printed, half = f"{value:.2f}", 0.005
-    offset = rng.choice([0.0, 0.4, 2.0, 60.0]) * half * rng.choice([-1, 1])
-    bound = float(rng.choice([0.0, 1.5, 100.0])) * half
-    return printed, value + offset, bound, bool(rng.random() < 0.5), bool(rng.random() < 0.3)
+def comparison(rng, off, bound, misprint, simulated):
+    """printed, value, bound, misprint, simulated; `off` and `bound` in half units of the last printed digit."""
+    value, half = float(np.round(rng.uniform(1, 9), 2)), 0.005
+    return f"{value:.2f}", value + off * half * rng.choice([-1, 1]), bound * half, misprint, simulated
+
+
+NUMBERS = tuple(functools.partial(printed_number, form=form) for form in FORMS)
+COMPARISONS = tuple(
+    functools.partial(comparison, off=off, bound=bound, misprint=misprint, simulated=simulated)
+    for off, bound, misprint, simulated in itertools.product(
+        (0.0, 0.4, 2.0, 60.0), (0.0, 1.5, 100.0), (False, True), (False, True)
+    )
+)
 
 
 def status(printed, value, bound, misprint, simulated):
@@ -95,7 +104,7 @@ CHAPTER = Chapter(
         Exercise(
             "half_unit",
             reference=half_unit,
-            draw=printed_number,
+            draw=NUMBERS,
             metric=metrics.numbers(1e-12),
             hints=(
                 "Which digit was rounded? Half a unit of that digit can be hidden.",
@@ -126,12 +135,12 @@ CHAPTER = Chapter(
                     _of_the_value, "You took a share of the value. The unit of the last digit does not depend on it."
                 ),
             ],
-            draws=24,
+            draws=16,
         ),
         Exercise(
             "status",
             reference=status,
-            draw=comparison,
+            draw=COMPARISONS,
             metric=metrics.exactly(),
             hints=(
                 "Ask the questions in an order: was the input published at all? Does the value round to the printed one? ...",
@@ -166,7 +175,7 @@ CHAPTER = Chapter(
                     "The bound is missing: rounded inputs may move the value by that much more.",
                 ),
             ],
-            draws=40,
+            draws=len(COMPARISONS),
         ),
     ],
 )

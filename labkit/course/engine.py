@@ -8,6 +8,7 @@ business of `session`.
 
 import copy
 import inspect
+import itertools
 import time
 import types
 from dataclasses import dataclass, field
@@ -65,7 +66,8 @@ class Exercise(Item):
     """A function to write.
 
     reference:  the tested library function.
-    draw:       draw(rng) -> tuple of arguments, fresh at every check.
+    draw:       draw(rng) -> tuple of arguments, fresh at every check. Several in a tuple take turns, so that no
+                case which tells a right answer from a wrong one is left to chance.
     metric:     compares one result with the reference's; None for stochastic code, which `properties` judge.
     hints:      three, from the rule to the line.
     mistakes:   wrong variants; an answer equal to one on all draws gets its text.
@@ -92,6 +94,11 @@ class Exercise(Item):
         object.__setattr__(self, "noisy", (noisy,) if noisy and callable(noisy[0]) else tuple(noisy))
         if self.metric is None and not self.properties:
             raise ValueError(f"exercise {self.id!r} needs a metric or properties")
+
+    @property
+    def cases(self):
+        """The draws that take turns."""
+        return self.draw if isinstance(self.draw, tuple) else (self.draw,)
 
     @property
     def arguments(self):
@@ -124,7 +131,7 @@ class Exercise(Item):
     def _plan(self):
         """(draw, metric, words) of every draw; words are None for the plain ones."""
         noisy = [(draw, metric, *(words or (NOISY,))) for draw, metric, *words in self.noisy]
-        return [(self.draw, self.metric, None)] * self.draws + noisy
+        return [(draw, self.metric, None) for draw in itertools.islice(itertools.cycle(self.cases), self.draws)] + noisy
 
 
 class _Trial:
@@ -289,9 +296,15 @@ def _equal_as_written(metric, result, wrong):
     try:
         metric.admit(wrong, wrong)
     except metrics.Refused:
-        a, b = np.asarray(result, dtype=float), np.asarray(wrong, dtype=float)
-        return a.shape == b.shape and np.allclose(a, b, rtol=1e-9, atol=1e-12, equal_nan=True)
+        return _equal_arrays(result, wrong)
     return metric.equal(result, wrong)
+
+
+def _equal_arrays(a, b):
+    if isinstance(b, tuple):
+        return isinstance(a, tuple | list) and len(a) == len(b) and all(map(_equal_arrays, a, b))
+    a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    return a.shape == b.shape and np.allclose(a, b, rtol=1e-9, atol=1e-12, equal_nan=True)
 
 
 def _message(error):

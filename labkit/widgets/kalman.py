@@ -103,23 +103,18 @@ def compute_vehicle(state):
     """Errors, promised standard deviations, gains and NIS of the vehicle filter, over STEPS steps."""
     truth, z = _vehicle_truth()
     A, B, C = kalman.vehicle_model(DT)
-    x, cov = np.zeros(2), np.diag([NOISE["var_x0"], NOISE["var_v0"]])
-    steps = []
-    for k in range(STEPS):
-        x, cov = kalman.predict(x, cov, A, B, [1.0], [[state["std_a"] ** 2]])
-        missing = state["dropout"] and DROPOUT.start <= k < DROPOUT.stop
-        step = kalman.update(x, cov, None if missing else z[k : k + 1], C, [[state["std_z"] ** 2]])
-        x, cov = step.x, step.cov
-        steps.append(step)
-    nis = kalman.nis(np.array([s.innovation for s in steps]), np.array([s.cov_innovation for s in steps]))
+    z, cov0 = z[:, None].copy(), np.diag([NOISE["var_x0"], NOISE["var_v0"]])
     if state["dropout"]:
-        nis[DROPOUT] = np.nan
+        z[DROPOUT] = np.nan
+    beliefs = {"cov_z": [[state["std_z"] ** 2]], "cov_u": [[state["std_a"] ** 2]]}
+    run = kalman.filter_steps(z, A, C, x0=np.zeros(2), cov0=cov0, B=B, u=[1.0], **beliefs)
+    nis = kalman.nis(run.innovation, run.cov_innovation)
     return {
         "time": DT * np.arange(1, STEPS + 1),
-        "error": np.array([s.x for s in steps]) - truth,
-        "std": np.sqrt([np.diag(s.cov) for s in steps]),
-        "gain": np.array([s.gain[:, 0] for s in steps]),
-        "nis": nis,
+        "error": run.x - truth,
+        "std": np.sqrt(np.diagonal(run.cov, axis1=-2, axis2=-1)),
+        "gain": run.gain[..., 0],
+        "nis": np.where(np.isnan(z[:, 0]), np.nan, nis),
     }
 
 
