@@ -343,7 +343,8 @@ def test_wrong_on_some_draws_only_says_so():
         hints=("a", "b", "c"),
         draws=20,
     )
-    assert "which case is special?" in exercise.judge(lambda v: v, rng=np.random.default_rng(0)).text
+    text = exercise.judge(lambda v: v, rng=np.random.default_rng(0)).text
+    assert "which case is special?" in text and "Not right when called as size(v=-" in text
 
 
 def test_noisy_draw_catches_a_fit_that_is_exact_only_on_clean_data():

@@ -197,7 +197,7 @@ class _Trial:
                     off = next(d for d in metric.deviations(*pair) if not d.within)
                     return self.outcome(NOT_YET, _closed(f"{words} {off}"))
         words = metrics.difference_words(self.exercise.metric, plain)
-        return self.outcome(NOT_YET, _closed(words) if words else self._deviation(plain))
+        return self.outcome(NOT_YET, _closed(words) if words else self._deviation())
 
     def _plain_pairs(self):
         return [pair for pair, words in zip(self.pairs, self.words) if words is None]
@@ -227,20 +227,22 @@ class _Trial:
         except Exception:  # a wrong variant may well fail on a draw: then the answer is not this mistake
             return False
 
-    def _deviation(self, pairs):
-        worst = []
-        for result, expected in pairs:
-            worst += [d for d in self.exercise.metric.deviations(result, expected) if not d.within]
+    def _deviation(self):
+        """The worst deviation on the plain draws; if some of them were right, also a call that was not."""
+        metric, pairs = self.exercise.metric, self._plain_pairs()
+        worst = [d for pair in pairs for d in metric.deviations(*pair) if not d.within]
         if not worst:
             return "right on most draws, but not on all."
         most = max(worst, key=lambda d: d.amount / max(d.tolerance, 1e-300))
-        missed = sum(not self.exercise.metric.equal(r, e) for r, e in pairs)
-        scope = (
-            ""
-            if missed == len(pairs)
-            else f" It was right on {len(pairs) - missed} of {len(pairs)} draws: which case is special?"
-        )
-        return _closed(str(most)) + scope
+        missed = [args for args, pair in zip(self.inputs, pairs) if not metric.equal(*pair)]
+        if len(missed) == len(pairs):
+            return _closed(str(most))
+        right = f"It was right on {len(pairs) - len(missed)} of {len(pairs)} draws: which case is special?"
+        return f"{_closed(str(most))} {right}\nNot right when called as {self._call(missed[0])}"
+
+    def _call(self, args):
+        given = ", ".join(f"{name}={_short(arg)}" for name, arg in zip(self._names(args), args))
+        return f"{self.exercise.id}({given})"
 
     def _names(self, args):
         """What the arguments are called: as in the student's function if it takes so many, else as in the reference."""
@@ -278,9 +280,8 @@ class _Trial:
         advice = "" if args or run.line else ". What your function returned could not be worked with."
         if isinstance(error, np.linalg.LinAlgError) and "square" in str(error):
             advice = ". `solve` and `inv` need as many equations as unknowns; `lstsq` takes more."
-        call = ", ".join(f"{name}={_short(arg)}" for name, arg in zip(self._names(args), args))
         where = f"\nin {run.line}" if run.line else ""
-        with_ = f"\nwhen called as {self.exercise.id}({call})" if call else ""
+        with_ = f"\nwhen called as {self._call(args)}" if args else ""
         return self.outcome(RAISED, f"{type(error).__name__}: {_message(error)}{advice}{where}{with_}")
 
 
