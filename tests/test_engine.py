@@ -279,6 +279,8 @@ def test_seeding_numpy_does_not_fix_the_draws():
         (lambda v: np.deg2rad(2 * v), "in radians where degrees are expected"),
         (lambda v: 2 * v[::-1], "in reverse order"),
         (lambda v: 6.2 * v, "3.1 times the expected one"),
+        (lambda v: 10 * v, "5 times the expected one, on every draw: a sum where a mean is meant?"),
+        (lambda v: 2 * v / 3, "1/3 of the expected one, on every draw: a mean where a sum is meant?"),
         (lambda v: 2 * v + np.array([0, 0, 0.5]), "off by 0.5"),
         (lambda v: v * v, "squared"),
     ],

@@ -471,8 +471,17 @@ def _number_relation(results, expected, holds):
         return "your result is the reciprocal of the expected one"
     ratios = [_constant_ratio(r, e) for r, e in zip(results, expected)]
     if None not in ratios and np.ptp(ratios) < 1e-9 * abs(ratios[0]) and len(ratios) > 1:
-        return f"your result is {ratios[0]:.4g} times the expected one, on every draw"
+        return _times(ratios[0])
     return None
+
+
+def _times(ratio):
+    n, share = round(ratio), round(1 / ratio)
+    if n > 2 and abs(ratio - n) < 1e-6:
+        return f"your result is {n} times the expected one, on every draw: a sum where a mean is meant?"
+    if share > 2 and abs(1 / ratio - share) < 1e-6:
+        return f"your result is 1/{share} of the expected one, on every draw: a mean where a sum is meant?"
+    return f"your result is {ratio:.4g} times the expected one, on every draw"
 
 
 def _constant_ratio(result, expected):
