@@ -569,22 +569,23 @@ def end_pose():
 
 @computes("handeye.end_iterations")
 def end_iterations():
-    counts = []
-    for nudge in (0.0, 1e-4, -1e-4, 1e-2, -1e-2, 0.1, -0.1):
+    """The start lies on the pole B = -90 deg: the last bit of the first step decides how long the listing takes."""
+    counts, measured = [], data(2)
+    for nudge in np.random.default_rng(0).uniform(-0.1, 0.1, 60):
         start = handeye_data.kuka_pose_deg("scanner_start") + [0, 0, 0, 0, nudge, 0]
-        measured = data(2)
         runs, ended = handeye.listing_gauss_newton(
             start, measured.T_BF, measured.x_S, handeye_data.printed_target(), 1e-5, 1e-5
         )
         counts.append(len(runs) - 1.0 if ended else np.inf)
-    spread = np.array(counts)
+    middle = np.median(counts)
     return Computed(
-        spread[0],
-        bound=np.ptp(spread),
+        middle,
+        bound=np.abs(counts - middle).max(),
+        simulated=True,
         proof=(
-            "At the start B = -90 deg the first step of the listing is undetermined; nudging B by 0.1 deg or less "
-            f"gives {spread.min():.0f} to "
-            f"{spread.max():.0f} iterations on the printed data; the run that is reported had other data."
+            "At the start B = -90 deg the first step of the listing is undetermined: 60 starts within 0.1 deg of it take "
+            f"{min(counts):.0f} to {max(counts):.0f} iterations on the printed data, half of them {middle:.0f} or more. "
+            "The run that is reported had other data, which were never published."
         ),
     )
 
