@@ -5,10 +5,12 @@ field.
 import numpy as np
 from matplotlib.colors import Normalize
 from matplotlib.image import PcolorImage
-from matplotlib.patches import Wedge
+from matplotlib.patches import PathPatch, Wedge
+from matplotlib.path import Path
 
 from . import style
 
+CELLS = {1: style.INK, 2: style.MUTED}  # occupied and unknown cells; free ones stay paper
 BARS = np.array([0.0, 1.0, np.nan])
 
 
@@ -32,6 +34,17 @@ def floor_plan(ax, lines, title=""):
     x, y = segments(lines)
     ax.set(xlim=(np.nanmin(x) - 0.3, np.nanmax(x) + 0.3), ylim=(np.nanmin(y) - 0.3, np.nanmax(y) + 0.3))
     return ax.plot(x, y, color=style.INK, linewidth=1.8)[0]
+
+
+def squares(chosen, extent, color):
+    """The chosen cells of a grid, bool (rows, columns) from the lower left, as one filled patch in data coordinates."""
+    row, column = np.nonzero(chosen)
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
+    left, right, bottom, top = extent
+    size = np.array([right - left, top - bottom]) / chosen.shape[::-1]
+    vertices = [left, bottom] + size * (np.column_stack([column, row])[:, None] + corners)
+    codes = np.tile([Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY], len(row))
+    return PathPatch(Path(vertices.reshape(-1, 2), codes), facecolor=color, edgecolor="none")
 
 
 def key(ax, named):
@@ -198,11 +211,10 @@ class MapForms:
         extent = grid.extent
         style.axes(ax, "x (m)", "y (m)", equal=True, grid=False)
         ax.set(xlim=extent[:2], ylim=extent[2:])
-        paper = np.array([255, 0, 160], dtype=np.uint8)[grid.cells]
+        walls, unknown = (ax.add_patch(squares(grid.cells == kind, extent, color)) for kind, color in CELLS.items())
         place = {"extent": extent, "origin": "lower", "interpolation": "nearest"}
         inner = field.table[1:-1, 1:-1]
         self.images = {
-            "occupancy grid": ax.imshow(paper, cmap="gray", vmin=0, vmax=255, **place),
             "distance field": ax.imshow(grid.distance, cmap=style.HEAT, **place),
             "likelihood field": ax.imshow(inner, cmap=style.HEAT, **place),
         }
@@ -219,6 +231,7 @@ class MapForms:
             if not name.startswith("door")
         ]
         self.parts = {
+            "occupancy grid": [walls, unknown],
             **{key: [image] for key, image in self.images.items()},
             "lines": [lines],
             "points": [points],
