@@ -583,9 +583,9 @@ def end_iterations():
         bound=np.abs(counts - middle).max(),
         simulated=True,
         proof=(
-            "At the start B = -90 deg the first step of the listing is undetermined: 60 starts within 0.1 deg of it take "
-            f"{min(counts):.0f} to {max(counts):.0f} iterations on the printed data, half of them {middle:.0f} or more. "
-            "The run that is reported had other data, which were never published."
+            "At the start B = -90 deg the first step of the listing is undetermined: 60 starts within 0.1 deg of it "
+            f"take {min(counts):.0f} to {max(counts):.0f} iterations on the printed data, half of them {middle:.0f} or "
+            "more. The run that is reported had other data, which were never published."
         ),
     )
 
