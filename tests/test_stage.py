@@ -14,7 +14,7 @@ from PIL import Image
 
 from labkit.figures import style
 from labkit.figures.scene3d import Scene, View
-from labkit.widgets import canvas
+from labkit.widgets import canvas, kalman
 from labkit.widgets.stage import Handle, Play, Stage, choice, slider, toggle
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -578,3 +578,13 @@ def test_pictures_leave_the_server_at_once(monkeypatch):
     connection.connect()
     assert calls == [True, "connect"]
     assert f"{PromptConnection.__module__}.{PromptConnection.__name__}" in (ROOT / "lab.py").read_text(encoding="utf-8")
+
+
+def test_going_back_to_a_width_moves_no_axes():
+    picture = kalman.honesty()._picture
+    places = []
+    for width in (700, 420, 700):
+        picture.fit(width, 1.0, dark=False)
+        picture.draw()
+        places.append([ax.get_position().bounds for ax in picture.fig.axes])
+    np.testing.assert_allclose(places[0], places[2], atol=2 / 700)

@@ -25,6 +25,7 @@ MAX_RATIO = 2.5  # device pixels per CSS pixel; sharper screens see no differenc
 MIN_SCALE = 0.85  # a narrower cell shrinks the whole picture, letters too, instead of crowding it further
 MAX_WORDS = 3000  # bitmaps a figure keeps
 MAX_CHANGES = 150_000  # pixels, four bytes each; beyond, decoding a whole picture is the quicker way
+MAX_PASSES = 4  # of the layout, which halves its error in each
 
 DRAWING = (
     threading.RLock()
@@ -189,13 +190,28 @@ class Picture:
 
     def _draw_background(self):
         with style.rc():
+            self._lay_out()
             self.canvas.draw()
-            if (
-                self.fig.get_layout_engine() is not None
-            ):  # laid out once a size: a layout at every change of limits would make axes jump
-                self.fig.set_layout_engine("none")
         self._background = self.canvas.copy_from_bbox(self.fig.bbox)
         self.fig.stale = False
+
+    def _lay_out(self):
+        """Place the axes once a size: a layout at every change of limits would make them jump.
+
+        Each pass starts from where the axes stand and comes nearer to where they stay. They are there when a pass moves
+        them by less than half a pixel; going back and forth between two widths then moves nothing.
+        """
+        engine = self.fig.get_layout_engine()
+        if engine is None:
+            return
+        before = np.inf
+        for _ in range(MAX_PASSES):
+            engine.execute(self.fig)
+            places = np.array([ax.get_position().bounds for ax in self.fig.axes]) * self.fig.bbox.width
+            if np.abs(places - before).max() < 0.5:
+                break
+            before = places
+        self.fig.set_layout_engine("none")
 
     def draw(self):
         """Draw, anew only what has to be; returns the pixels, array of shape (height, width, 4)."""
