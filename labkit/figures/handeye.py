@@ -50,7 +50,7 @@ def error_against_step(ax, steps, curves):
     for (label, errors), look in zip(curves.items(), looks):
         ax.plot(steps, errors, label=label, **look)
         markers += ax.plot([], [], color=look["color"], marker="D", markersize=8, linestyle="none")
-    ax.legend(loc="upper center")
+    ax.legend(loc="lower left")
     return markers
 
 

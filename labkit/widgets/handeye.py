@@ -57,14 +57,12 @@ def _scan_line_sentence(result):
     if result["impossible"]:
         return (
             f"{result['impossible']} of {REPETITIONS} circles are larger than the sphere: so close to the equator "
-            "the profile "
-            "says nothing about y."
+            "the profile says nothing about y."
         )
+    known = f"y is known to {result['std_y']:.2g} mm" if result["std_y"] < RADIUS else "y is not known at all"
     return (
-        f"The center lies {result['y']:.1f} mm off the plane. First order: y is known to {result['std_y']:.2g} mm; "
-        "the mean of "
-        f"{REPETITIONS} recoveries is off by {result['bias_y']:+.2f} mm. The mirror image (dotted) explains the scan "
-        "line as well."
+        f"The center lies {abs(result['y']):.1f} mm off the plane. First order: {known}; the mean of {REPETITIONS} "
+        f"recoveries is off by {result['bias_y']:+.2f} mm. The mirror image (dotted) explains the scan line as well."
     )
 
 
@@ -72,7 +70,7 @@ def scan_line():
     """Drag the sphere through the scan plane and watch how well its center comes back from one scan line."""
 
     def scene(fig):
-        left, right = fig.subplots(1, 2, width_ratios=(1, 1))
+        left, right = fig.subplots(1, 2, width_ratios=(1.24, 1))  # one scale
         outline, other, cloud, spread = draw.side_view(left, ((-62, 62), (190, 290)))
         points, circle, center = draw.profile_view(right, ((-50, 50), (190, 290)))
 
@@ -205,7 +203,8 @@ def compute_iterations(state):
 
 def _iterations_sentence(result):
     def told(run):
-        return f"{run['steps']} steps" if run["arrived"] else "no way to the minimum"
+        steps = "1 step" if run["steps"] == 1 else f"{run['steps']} steps"
+        return steps if run["arrived"] else "no way to the minimum"
 
     euler, se3 = result["euler"], result["se3"]
     return (
@@ -399,18 +398,26 @@ def compute_pattern(state):
     J = handeye.joint_jacobian(T_BF, x_S, fit.T_FS)
     scale = np.array([1 / 240.0] * 3 + [1.0] * 6)
     _, values, Vt = np.linalg.svd(J * scale, full_matrices=False)
-    determined = values[-1] > 1e-3 * values[0]
+    free = Vt[values <= 1e-3 * values[0]]  # changes that the scanner does not see
     result = {
-        "T_BF": T_BF, "x_S": x_S, "spread": spread, "values": values, "weak": Vt[-1] * scale,
-        "determined": bool(determined), "target": fit.target, "T_FS": fit.T_FS,
+        "T_BF": T_BF, "x_S": x_S, "spread": spread, "values": values, "weak": Vt[-1] * scale, "turns": _reaches(free[:, :3]),
+        "slides": _reaches(free[:, 6:]), "determined": not len(free), "target": fit.target, "T_FS": fit.T_FS,
     }  # fmt: skip
-    if determined:
+    if result["determined"]:
         cov = fit.std**2 * np.linalg.inv(J.T @ J)
         result["cov"], result["std"] = cov, _three_stds(cov)
     else:
         result["cov"], result["std"] = np.full((9, 9), np.nan), (np.inf,) * 3
     result["printed_cov"], result["printed_std"] = _printed_pattern(), _three_stds(_printed_pattern())
     return result
+
+
+def _reaches(block):
+    """The direction (3,) in which unseen changes reach farthest into a block of unknowns, None if they leave it alone."""
+    if not len(block):
+        return None
+    _, sizes, directions = np.linalg.svd(block)
+    return directions[0] if sizes[0] > 0.05 else None
 
 
 def _three_stds(cov):
@@ -421,14 +428,16 @@ def _three_stds(cov):
 
 def _pattern_sentence(result):
     if not result["determined"]:
-        return (
-            f"Not determined: the last singular value is {result['values'][-1] / result['values'][0]:.0e} of the "
-            "first. Scanner and sphere can "
-            "slide together along the line drawn through the sphere."
-        )
+        freedoms = {
+            "slides": "scanner and sphere can slide together along the line drawn through the sphere",
+            "turns": "the scanner can turn about the line on which it sees the sphere in every pose",
+        }
+        told = " and ".join(words for key, words in freedoms.items() if result[key] is not None)
+        ratio = result["values"][-1] / result["values"][0]
+        return f"Not determined: the last singular value is {ratio:.0e} of the first; {told}."
     (a, b, c), (A, B, C) = result["std"], result["printed_std"]
     return (
-        f"Predicted: orientation {a:.2f} deg, translation {b:.2f} mm, sphere center {c:.2f} mm. The thesis's 31 poses: "
+        f"Predicted: orientation {a:.2f} deg, translation {b:.2f} mm, sphere center {c:.2f} mm. The thesis's 31 poses (dotted): "
         f"{A:.2f} deg, {B:.2f} mm, {C:.2f} mm."
     )
 
@@ -457,8 +466,8 @@ def pattern_designer():
             aside = target + np.array([0.0, 0.0, -230.0])
             printed.set(aside, 40**2 * result["printed_cov"][3:6, 3:6])
             found.set(aside, 40**2 * (result["cov"][3:6, 3:6] if result["determined"] else np.zeros((3, 3))))
-            along = result["weak"][6:] / max(np.linalg.norm(result["weak"][6:]), 1e-12)
-            weak.set(target + np.outer([-300, 300], along) if not result["determined"] else np.full((2, 3), np.nan))
+            along = np.full(3, np.nan) if result["slides"] is None else result["slides"]
+            weak.set(target + np.outer([-300, 300], along))
             name.set(aside + [0, 0, -175.0])
             space.draw(state["view"])
             (dx, _, dz) = result["spread"]
