@@ -463,6 +463,7 @@ def _joint_rms(*fixed):
     return handeye.calibrate_sphere_target(measured.T_BF, measured.x_S).rms
 
 
+GROWS_BEYOND = "Below u = 1 the weight is (1 - u^2)^2, beyond it 0. Yours grows there, and the worst poses get the most say."
 ALL_FIXED = (2, 3, 4, 7, 12, 21, 30)
 
 CHAPTER = Chapter(
@@ -676,7 +677,6 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(_iterated, "You iterated to the end. Asked for is one step."),
-                Mistake(_step, "This is the step itself. Return the pose it leads to, shape (4, 4)."),
                 Mistake(_step_without_target, "The target is missing from your residual: the step leads to the base's origin."),
                 Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3] @ exp_so3(s[3:]), T[:3, 3] + s[:3])),
                         "Rotation and translation have changed places: the first three entries of the step are phi."),
@@ -782,13 +782,13 @@ CHAPTER = Chapter(
                 Mistake(_weights(lambda r: _tukey(r / 5 * np.median(r) / handeye.MEDIAN_CHI3)), "`/ 5 * s` divides by 5 and multiplies by s: write / (5 * s)."),
                 Mistake(_weights(lambda r: _tukey((r / (5 * np.median(r) / handeye.MEDIAN_CHI3)) ** 2)), "u itself is squared in the formula, yours is squared twice."),
                 Mistake(_weights(lambda r: np.where(r < 5 * np.median(r) / handeye.MEDIAN_CHI3, 0, (1 - (r / (5 * np.median(r) / handeye.MEDIAN_CHI3)) ** 2) ** 2)),
-                        "The two cases have changed places: the weight is 0 beyond u = 1, not below."),
+                        GROWS_BEYOND),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r)))), "The median length of a 3-vector is 1.538 standard deviations: divide by it."),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r) / 0.6745))), "0.6745 belongs to single numbers. The length of a 3-vector has the median 1.538."),
                 Mistake(_weights(lambda r: _tukey(r * handeye.MEDIAN_CHI3 / np.median(r))), "The factor 5 is missing: u = length / (5 s)."),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r) * handeye.MEDIAN_CHI3))), "You multiplied by 1.538: divide the median by it."),
                 Mistake(_weights(lambda r: (1 - (r / (5 * np.median(r) / handeye.MEDIAN_CHI3)) ** 2) ** 2),
-                        "Beyond the cut the weight must stay 0; yours rises again, and the worst poses get the most say."),
+                        GROWS_BEYOND),
                 Mistake(_weights(lambda r: np.sqrt(_tukey(r / (5 * np.median(r) / handeye.MEDIAN_CHI3)))), "The bracket is squared: (1 - u^2)^2."),
                 Mistake(_weights(lambda r: (r < 5 * np.median(r) / handeye.MEDIAN_CHI3).astype(float)),
                         "You cut off sharply. Tukey's weight falls smoothly, so that no pose decides by crossing a line."),

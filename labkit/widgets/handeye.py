@@ -400,8 +400,8 @@ def compute_pattern(state):
     _, values, Vt = np.linalg.svd(J * scale, full_matrices=False)
     free = Vt[values <= 1e-3 * values[0]]  # changes that the scanner does not see
     result = {
-        "T_BF": T_BF, "x_S": x_S, "spread": spread, "values": values, "weak": Vt[-1] * scale, "turns": _reaches(free[:, :3]),
-        "slides": _reaches(free[:, 6:]), "determined": not len(free), "target": fit.target, "T_FS": fit.T_FS,
+        "T_BF": T_BF, "x_S": x_S, "spread": spread, "values": values, "weak": Vt[-1] * scale, "target": fit.target,
+        "T_FS": fit.T_FS, "determined": not len(free), "turns": _reached(free[:, :3]), "slides": _reached(free[:, 6:]),
     }  # fmt: skip
     if result["determined"]:
         cov = fit.std**2 * np.linalg.inv(J.T @ J)
@@ -412,12 +412,10 @@ def compute_pattern(state):
     return result
 
 
-def _reaches(block):
-    """The direction (3,) in which unseen changes reach farthest into a block of unknowns, None if they leave it alone."""
-    if not len(block):
-        return None
+def _reached(block):
+    """Directions (k, 3) in which unseen changes reach into one block of unknowns, the farthest first."""
     _, sizes, directions = np.linalg.svd(block)
-    return directions[0] if sizes[0] > 0.05 else None
+    return directions[: (sizes > 0.05).sum()]
 
 
 def _three_stds(cov):
@@ -428,17 +426,15 @@ def _three_stds(cov):
 
 def _pattern_sentence(result):
     if not result["determined"]:
-        freedoms = {
-            "slides": "scanner and sphere can slide together along the line drawn through the sphere",
-            "turns": "the scanner can turn about the line on which it sees the sphere in every pose",
-        }
-        told = " and ".join(words for key, words in freedoms.items() if result[key] is not None)
+        line = "along the line drawn through the sphere" if len(result["slides"]) == 1 else "in any direction"
+        told = [f"scanner and sphere can slide together {line}"] * bool(len(result["slides"]))
+        told += ["the scanner can turn about the line on which it sees the sphere"] * bool(len(result["turns"]))
         ratio = result["values"][-1] / result["values"][0]
-        return f"Not determined: the last singular value is {ratio:.0e} of the first; {told}."
+        return f"Not determined: the last singular value is {ratio:.0e} of the first; {', and '.join(told)}."
     (a, b, c), (A, B, C) = result["std"], result["printed_std"]
     return (
-        f"Predicted: orientation {a:.2f} deg, translation {b:.2f} mm, sphere center {c:.2f} mm. The thesis's 31 poses (dotted): "
-        f"{A:.2f} deg, {B:.2f} mm, {C:.2f} mm."
+        f"Predicted: orientation {a:.2f} deg, translation {b:.2f} mm, sphere center {c:.2f} mm. "
+        f"The thesis's 31 poses (dotted): {A:.2f} deg, {B:.2f} mm, {C:.2f} mm."
     )
 
 
@@ -466,8 +462,8 @@ def pattern_designer():
             aside = target + np.array([0.0, 0.0, -230.0])
             printed.set(aside, 40**2 * result["printed_cov"][3:6, 3:6])
             found.set(aside, 40**2 * (result["cov"][3:6, 3:6] if result["determined"] else np.zeros((3, 3))))
-            along = np.full(3, np.nan) if result["slides"] is None else result["slides"]
-            weak.set(target + np.outer([-300, 300], along))
+            along = [np.outer([-300, 300, np.nan], direction) for direction in result["slides"]]
+            weak.set(target + np.concatenate(along or [np.full((2, 3), np.nan)]))
             name.set(aside + [0, 0, -175.0])
             space.draw(state["view"])
             (dx, _, dz) = result["spread"]
