@@ -314,7 +314,7 @@ for i in np.flatnonzero(fit.weights == 0):
     print(f"pose {i + 1:2}: residual in the base {fit.residuals[i]} mm")
 
 # %% suspects [markdown]
-# Seven poses stand out, and look at four of them: 18.3 along x, 9.1 along y, 8.8 along x, 45 along x, hardly anything across. Robots do not err like that. Pose 3 is printed with
+# Seven poses stand out, and look at four of them: 18.3 mm along x, 9.1 along y, 8.8 along x, 45 along x, hardly anything across. Robots do not err like that. Pose 3 is printed with
 # x = 1379.64. Decide what happened, then click the bars: the slider undoes one slip after another in the chosen pose. Which single change removes the residual
 # in *all three* axes at once?
 
@@ -497,7 +497,7 @@ print(f"{'bound for one sphere':24} {bound:.2f} mm")
 # ## In practice
 #
 # - Never validate on the pose that fits best. Show all residuals, per pose.
-# - Record poses by machine. Seven of 31 typed rows were wrong, most by two swapped digits.
+# - Record poses by machine. Seven typed entries were wrong, four by two swapped digits.
 # - Free what you cannot touch to the accuracy you want.
 # - Use the whole field of the sensor; a small residual at one place says nothing about orientation.
 # - Cut spheres off their equator, and note the side.

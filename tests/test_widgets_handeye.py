@@ -131,6 +131,8 @@ def test_caption_of_a_pose_says_what_would_explain_it():
     assert stage.caption.startswith("Pose 3: residual 18.27 mm as printed, and a single slip would explain it.")
     stage.set(slip=1)
     assert stage.caption.startswith("Pose 3: residual 0.41 mm with x in C14 read as 1397.64 for 1379.64")
+    stage.set(slip=6)
+    assert "as printed: there is no slip no. 6, a single slip would explain it" in stage.caption
     stage.set(slip=0, click=(10.0, 1.0))
     assert "as printed, nothing to explain" in stage.caption
 

@@ -206,12 +206,14 @@ def _iterations_sentence(result):
         steps = "1 step" if run["steps"] == 1 else f"{run['steps']} steps"
         return steps if run["arrived"] else "no way to the minimum"
 
+    def weakest(run):
+        return f"1/{1 / run['weakest']:.0f} of the largest" if run["weakest"] > 1e-6 else "zero"
+
     euler, se3 = result["euler"], result["se3"]
     return (
         f"In A, B, C: {told(euler)}, turning {euler['turned_deg']:.0f} deg in all; at the start the weakest singular "
-        "value is "
-        f"{euler['weakest']:.0e} of the largest. On the pose: {told(se3)}, turning {se3['turned_deg']:.0f} deg, "
-        f"and {se3['weakest']:.0e} of the largest."
+        f"value is {weakest(euler)}. On the pose: {told(se3)}, turning {se3['turned_deg']:.0f} deg, "
+        f"and {weakest(se3)}."
     )
 
 
@@ -227,7 +229,7 @@ def convergence():
             for path, curve, name in ((euler, curves[0], "euler"), (se3, curves[1], "se3")):
                 path.set_data(*result[name]["path"].T)
                 curve.set_data(np.arange(len(result[name]["rms"])), result[name]["rms"])
-            pole.set_data([result["pole"]] * 2, [-70, 70])
+            pole.set_data([result["pole"]] * 2, [-draw.YAW, draw.YAW])
 
         return [pole, euler, se3, *curves], update
 
@@ -298,7 +300,7 @@ def compute_poses(state):
     return {
         "pose": pose, "residuals": residuals, "lengths": lengths, "rms": float(handeye.rms_distance(residuals)),
         "median": float(np.median(lengths)), "T_FS": T_FS, "target": target, "T_BF": T_BF, "x_S": x_S, "slip": slip,
-        "offered": offered,
+        "offered": offered, "number": state["slip"],
     }  # fmt: skip
 
 
@@ -308,6 +310,8 @@ def _poses_sentence(result):
     told = (
         f"with {e.column.removesuffix('_deg')} in {e.table} read as {e.corrected} for {e.printed} ({e.slip})"
         if e
+        else f"as printed: there is no slip no. {result['number']}, {slips} would explain it"
+        if result["offered"] and result["number"]
         else f"as printed, and {slips} would explain it"
         if result["offered"]
         else "as printed, nothing to explain"
