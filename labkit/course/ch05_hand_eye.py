@@ -878,7 +878,7 @@ CHAPTER = Chapter(
             hints=(
                 "Choose where the scanner should see the sphere, and how the flange should be turned; the flange's position then follows.",
                 "target = R_BF (R_FS x_S + t_FS) + t_BF: draw x_S over the whole field, tilt by up to 45 deg about all axes, solve for t_BF.",
-                "x_S = np.column_stack([rng.uniform(-25, 25, 31), rng.uniform(3, 25, 31), rng.uniform(190, 290, 31)]); turns = rng.uniform(-0.8, 0.8, (31, 3)); "
+                "x_S = np.column_stack([rng.uniform(-25, 25, 31), rng.uniform(3, 25, 31) * rng.choice([-1, 1], 31), rng.choice([190, 290], 31)]); turns = rng.uniform(-0.8, 0.8, (31, 3)); "
                 "return handeye.poses_that_see(T_FS, target, exp_so3(turns) @ np.diag([1, -1, -1]) @ T_FS[:3, :3].T, x_S).",
             ),
         ),
