@@ -62,7 +62,10 @@ print("the thesis's sphere center (tables 6-4 and 6-5):", target)
 # %% fit_circle
 @ex.fit_circle
 def fit_circle(x, z):
-    """Return x_c, z_c and r of the circle through the points of a scan line (mm)."""
+    """Return x_c, z_c and r (mm) of the circle that fits a scan line best.
+
+    x, z: coordinates of its points in the scan plane, shape (n,) each, mm.
+    """
     ### BEGIN SOLUTION
     a = np.linalg.lstsq(np.column_stack([x, z, np.ones(len(x))]), -(x**2 + z**2), rcond=None)[0]
     x_c, z_c = -a[0] / 2, -a[1] / 2
@@ -89,7 +92,10 @@ ex.predict("equator", guess, reveal=stages.scan_line)
 # %% sphere_center_from_profile
 @ex.sphere_center_from_profile
 def sphere_center_from_profile(x, z, radius, side):
-    """Return the sphere's center (x, y, z) in S from one scan line; side (+1 or -1) is the sign of y."""
+    """Return the sphere's center in S, shape (3,), mm.
+
+    x, z: points of the scan line, shape (n,) each, mm; radius: of the sphere, mm; side: +1 or -1, the sign of y.
+    """
     ### BEGIN SOLUTION
     x_c, z_c, r = fit_circle(x, z)
     return np.array([x_c, side * np.sqrt(radius**2 - r**2), z_c])
@@ -99,12 +105,16 @@ def sphere_center_from_profile(x, z, radius, side):
 # %% residual [markdown]
 # ## The model, and a first verdict
 #
-# What is left of (4-1) is the residual $\varepsilon_i = T_{BF,i}\,T_{FS}\,x_{S,i} - c$ (4-3), three numbers a pose. The thesis describes $T_{FS}$ by a KUKA pose `p2`.
+# What is left of (4-1) is the residual $\varepsilon_i = T_{BF,i}\,T_{FS}\,x_{S,i} - c$ (4-3), three numbers a pose. The thesis describes $T_{FS}$ by a KUKA pose `p2`;
+# `frames.matrix_from_kuka(p2)` makes a matrix of it. `frames.transform(T, points)` takes one transform or one a point.
 
 # %% kuka_residual
 @ex.kuka_residual
 def kuka_residual(p2, T_BF, x_S, target):
-    """Return the residual vectors, shape (N, 3), in mm; p2 = x, y, z (mm), A, B, C (rad)."""
+    """Return the residual vectors in B, shape (N, 3), mm.
+
+    p2: x, y, z (mm), A, B, C (rad), shape (6,); T_BF (N, 4, 4); x_S (N, 3), mm; target (3,), mm.
+    """
     ### BEGIN SOLUTION
     T_FS = frames.matrix_from_kuka(p2)
     return frames.transform(T_BF, frames.transform(T_FS, x_S)) - target
@@ -116,7 +126,7 @@ def kuka_residual(p2, T_BF, x_S, target):
 
 # %% validation-code
 e = kuka_residual(p2_end, printed.T_BF, printed.x_S, target)
-print("pose 1:", e[0], "   pose 2:", e[1])
+print("pose 1:", e[0], "mm   pose 2:", e[1], "mm")
 repaired = handeye_data.measurements((2,))
 print("z of pose 2 as printed:", printed.x_S[1, 2], "  and repaired:", repaired.x_S[1, 2])
 
@@ -148,7 +158,10 @@ ex.rms_before(rms_before)
 # %% numeric_jacobian
 @ex.numeric_jacobian
 def numeric_jacobian(function, x, step):
-    """Return the derivative of a vector function, shape (m, n), by central differences, a whole step to each side."""
+    """Return the derivative, shape (m, n), by central differences, a whole step to each side.
+
+    function: takes an array (n,), returns an array (m,); x: where, shape (n,); step: a number, the same for all n.
+    """
     ### BEGIN SOLUTION
     columns = [(function(x + h) - function(x - h)) / (2 * step) for h in step * np.eye(len(x))]
     return np.column_stack(columns)
@@ -177,7 +190,10 @@ print("nearest rotation", nearest_rotation(np.eye(3) + skew(phi)) @ x)
 # %% analytic_jacobian
 @ex.analytic_jacobian
 def analytic_jacobian(T_FS, T_BF, x_S):
-    """Return the derivative by phi and tau, shape (3 N, 6)."""
+    """Return the derivative of the stacked residuals by phi and tau, shape (3 N, 6): x, y, z of pose 1, then pose 2.
+
+    T_FS (4, 4); T_BF (N, 4, 4); x_S (N, 3), mm. Columns: phi (mm per rad), then tau (mm per mm).
+    """
     ### BEGIN SOLUTION
     R_BF = T_BF[:, :3, :3]
     return np.concatenate([-R_BF @ T_FS[:3, :3] @ skew(x_S), R_BF], axis=2).reshape(-1, 6)
@@ -187,7 +203,10 @@ def analytic_jacobian(T_FS, T_BF, x_S):
 # %% gauss_newton_on_pose
 @ex.gauss_newton_on_pose
 def gauss_newton_on_pose(T_FS, T_BF, x_S, target):
-    """Return T_FS after one Gauss-Newton step: R_FS exp(phi) and t_FS + tau."""
+    """Return T_FS, shape (4, 4), after one Gauss-Newton step: R_FS exp(phi) and t_FS + tau.
+
+    T_FS: where the step starts, (4, 4); T_BF (N, 4, 4); x_S (N, 3), mm; target (3,), mm, held fixed.
+    """
     ### BEGIN SOLUTION
     e = frames.transform(T_BF, frames.transform(T_FS, x_S)) - target
     step = np.linalg.lstsq(analytic_jacobian(T_FS, T_BF, x_S), -e.ravel(), rcond=None)[0]
@@ -198,8 +217,8 @@ def gauss_newton_on_pose(T_FS, T_BF, x_S, target):
 # %% pole [markdown]
 # ## The pole
 #
-# CAD puts the scanner at B = −90°, where A and C turn about one line (chapter 1). The rate matrix, which makes rotation vectors of $\dot A, \dot B, \dot C$,
-# has determinant $-\cos B$. Decide; then drag the start along the pole's line, and away from it.
+# CAD puts the scanner at B = −90°, where A and C turn about one line (chapter 1). Only A + C is left of the two there. The rate matrix, which makes a
+# rotation vector of $\dot A, \dot B, \dot C$, has determinant $-\cos B$. Decide; then drag the start along the pole's line, and away from it.
 
 # %% predict-pole
 guess = ...  # your code here
@@ -211,8 +230,8 @@ ex.predict("pole", guess, reveal=stages.convergence)
 # %% simulation [markdown]
 # The thesis met this in its simulation (tables 6-2, 7-2, 7-3), where some starts "find no minimum". Its printed inputs contradict each other: z is 20 in one table and 10 in
 # the other, B is −90° and +90°, and the plate's y does not fit. One set makes all 39 printed coordinates come out: z = 20, B = −90°, plate at y = 0. With it,
-# listing C5 takes exactly the printed numbers of iterations: 1 from the original pose, 4 from all others. (Two of the three starts where the trust region "finds no minimum" cost 3e-7 mm², less than its tolerance: it
-# stopped before the first step.)
+# listing C5 takes exactly the printed numbers of iterations: 1 from the original pose, 4 from all others. (Two of the three starts where the trust region "finds no minimum" begin with
+# a cost of 3e-7 mm², less than its tolerance: it stopped before the first step.)
 
 # %% table-7-3
 T_sim, x_sim, c_sim, true_deg = handeye_data.simulation()
@@ -236,7 +255,10 @@ print(f"listing C3's cost: {handeye.listing_cost(e).sum():.0f} mm2; formula (6-1
 # %% joint_residual
 @ex.joint_residual
 def joint_residual(u, T0, T_BF, x_S):
-    """Return the stacked residuals (3 N,) for u = phi, change of translation, sphere center, around the pose T0."""
+    """Return the stacked residuals, shape (3 N,), mm: x, y, z of pose 1, then of pose 2.
+
+    u: phi (rad), tau (mm), sphere center in B (mm), shape (9,); T0: the scanner pose that phi and tau move, (4, 4).
+    """
     ### BEGIN SOLUTION
     T_FS = frames.pose(T0[:3, :3] @ exp_so3(u[:3]), T0[:3, 3] + u[3:6])
     return (frames.transform(T_BF, frames.transform(T_FS, x_S)) - u[6:]).ravel()
@@ -253,7 +275,10 @@ def joint_residual(u, T0, T_BF, x_S):
 # %% linear_start
 @ex.linear_start
 def linear_start(T_BF, x_S):
-    """Return T_FS, shape (4, 4), and the sphere center in B, shape (3,), from linear equations alone."""
+    """Return T_FS, shape (4, 4), and the sphere center in B, shape (3,), mm, from linear equations alone.
+
+    T_BF (N, 4, 4); x_S (N, 3), mm.
+    """
     ### BEGIN SOLUTION
     rows, right = [], []
     for T, x in zip(T_BF, x_S):
@@ -274,7 +299,7 @@ def linear_start(T_BF, x_S):
 # %% robust_weights
 @ex.robust_weights
 def robust_weights(residuals):
-    """Return one weight a pose, shape (N,), for residual vectors of shape (N, 3)."""
+    """Return one weight (0 to 1) a pose, shape (N,), for residual vectors of shape (N, 3) in mm."""
     ### BEGIN SOLUTION
     lengths = np.linalg.norm(residuals, axis=1)
     u = lengths / (5 * np.median(lengths) / handeye.MEDIAN_CHI3)
@@ -289,7 +314,7 @@ for i in np.flatnonzero(fit.weights == 0):
     print(f"pose {i + 1:2}: residual in the base {fit.residuals[i]} mm")
 
 # %% suspects [markdown]
-# Seven poses stand out, and look at four of them: 18.3 along x, 9.1 along y, 8.8 along x, 45 along x, hardly anything across. Robots do not err like that. Pose 3 is printed with
+# Seven poses stand out, and look at four of them: 18.3 mm along x, 9.1 along y, 8.8 along x, 45 along x, hardly anything across. Robots do not err like that. Pose 3 is printed with
 # x = 1379.64. Decide what happened, then click the bars: the slider undoes one slip after another in the chosen pose. Which single change removes the residual
 # in *all three* axes at once?
 
@@ -302,7 +327,7 @@ ex.predict("slip", guess, reveal=stages.thirty_one_poses)
 
 # %% neighbors [markdown]
 # A second witness needs no calibration at all: the poses turn along four lines by equal steps, so each flange should be turned halfway between its neighbors, and hardly leave
-# the plane of its line. Pose 12 is where it counts: its residual of 3 mm could be a digit in x, but its orientation is one degree off (only A − C counts at B = 90°).
+# the plane of its line (along x, y, and the two diagonals x* and y*). Pose 12 is where it counts: its residual of 3 mm could be a digit in x, but its orientation is one degree off (only A − C counts at B = 90°).
 
 # %% neighbors-code
 turns, offsets = np.rad2deg(misprints.neighbor_turns(printed)), misprints.neighbor_offsets(printed)
@@ -311,7 +336,7 @@ for pose in (2, 3, 4, 7, 12, 21, 30):
 rest = np.setdiff1d(np.arange(31), np.array([2, 3, 4, 7, 12, 21, 30]) - 1)
 print(f"the others, medians: {np.nanmedian(turns[rest]):.2f} deg, {np.median(np.abs(offsets[rest])):.1f} mm")
 for e in misprints.explanations(handeye_data.printed_entries(), 12, fit.T_FS, fit.target, fit.std):
-    rest = f"leaves {e.after:.2f} mm and {np.rad2deg(e.turn):.2f} deg"
+    rest = f"leaves {e.after:.2f} mm, {np.rad2deg(e.turn):.2f} deg off the middle"
     print(f"  {e.column:5} {e.printed} -> {e.corrected}: {rest} ({e.slip})")
 
 # %% find [markdown]
@@ -324,7 +349,10 @@ for e in misprints.explanations(handeye_data.printed_entries(), 12, fit.T_FS, fi
 # %% find_misprints
 @ex.find_misprints
 def find_misprints(entries):
-    """Return the set of misprinted entries, such as {("C17", 2, "z"), ...}; columns x, y, z, A_deg, B_deg, C_deg."""
+    """Return the set of misprinted entries, such as {("C17", 2, "z"), ...}; poses count from 1.
+
+    entries: {(table, pose, column): text} of C14 (x, y, z, A_deg, B_deg, C_deg) and C17 (x, y, z).
+    """
     ### BEGIN SOLUTION
     measured = handeye_data.measurements_from(entries)
     fit = handeye.calibrate_sphere_target(measured.T_BF, measured.x_S, robust=True)
@@ -406,19 +434,23 @@ sigma = np.sqrt(np.diag(fit.covariance))
 left_out = handeye.leave_one_out(corrected.T_BF, corrected.x_S)
 print(f"left out: rms {handeye.rms_distance(left_out):.2f} mm; in the fit: {fit.rms:.2f} mm")
 print("orientation", np.rad2deg(sigma[:3]), "deg; translation", sigma[3:6], "mm; sphere center", sigma[6:], "mm")
-print("spread of the centers in the scanner's field:", np.std(corrected.x_S, axis=0), "mm of 50, 50, 100")
+print("standard deviation of x_S:", np.std(corrected.x_S, axis=0), "mm; all over the field: 14, 15, 29 mm")
 p2, p3 = frames.kuka_from_matrix(fit.T_FS), frames.kuka_from_matrix(handeye_data.frame("plate"))
 J = handeye.plate_jacobian(corrected.T_BF, corrected.x_S, p2, p3, handeye_data.point("sphere_in_plate"))
 print("rank of the thesis's second step:", np.linalg.matrix_rank(J, tol=1e-6), "of 12 unknowns")
 
 # %% design [markdown]
 # The pattern always aimed at the middle of the field. Use all of it: x within ±25 mm, |y| from 3 to 25, z from 190 to 290 (`handeye.FIELD`), line of sight at most 90° from straight
-# down. `handeye.poses_that_see(T_FS, target, R_BF, x_S)` gives the poses for chosen orientations and places. Reach 0.7 of the thesis's orientation error with 31 poses.
+# down. `handeye.poses_that_see(T_FS, target, R_BF, x_S)` gives the poses for chosen orientations and places. With 31 poses, reach 0.7 of the thesis's
+# orientation error, and no more than its translation error.
 
 # %% design_poses
 @ex.design_poses
 def design_poses(T_FS, target, rng):
-    """Return 31 robot poses, shape (31, 4, 4), that would calibrate the scanner better."""
+    """Return 31 robot poses T_BF, shape (31, 4, 4), that would calibrate the scanner better.
+
+    T_FS (4, 4) and target (3,), mm: where scanner and sphere are; rng: a NumPy random generator.
+    """
     ### BEGIN SOLUTION
     x = rng.uniform(-25, 25, 31)
     y = rng.uniform(3, 25, 31) * rng.choice([-1, 1], 31)
@@ -465,7 +497,7 @@ print(f"{'bound for one sphere':24} {bound:.2f} mm")
 # ## In practice
 #
 # - Never validate on the pose that fits best. Show all residuals, per pose.
-# - Record poses by machine. Seven of 31 typed rows were wrong, most by two swapped digits.
+# - Record poses by machine. Seven typed entries were wrong, four by two swapped digits.
 # - Free what you cannot touch to the accuracy you want.
 # - Use the whole field of the sensor; a small residual at one place says nothing about orientation.
 # - Cut spheres off their equator, and note the side.

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from labkit import frames, handeye_data
+from labkit import frames, handeye, handeye_data
 from labkit.course import ch05_hand_eye
 from labkit.course.engine import CORRECT, NOT_YET
+from labkit.lie import exp_so3, skew
 
 ITEMS = {item.id: item for item in ch05_hand_eye.CHAPTER.items}
 
@@ -66,3 +67,50 @@ def test_naming_the_printed_seven_is_told_to_search():
 def test_a_radius_searched_in_hundredths_is_accepted():
     assert ITEMS["radius"].judge(29.99).status == CORRECT
     assert "coarse" in ITEMS["radius"].judge(30.0).text
+
+
+@pytest.mark.parametrize(
+    "tilt, told", [([0, 0, 0], "only translate"), ([0, 0, 3], "about one axis"), ([0.06, 0.06, 3], "translation")]
+)
+def test_a_pattern_must_fix_the_translation_too(tilt, told):
+    def poses(T_FS, target, rng):
+        y = rng.uniform(3, 25, 31) * rng.choice([-1, 1], 31)
+        x_S = np.column_stack([rng.uniform(-25, 25, 31), y, rng.uniform(190, 290, 31)])
+        turns = exp_so3(rng.uniform(-1, 1, (31, 3)) * tilt)
+        return handeye.poses_that_see(T_FS, target, turns @ np.diag([1, -1, -1]) @ T_FS[:3, :3].T, x_S)
+
+    outcome = judged("design_poses", poses)
+    assert outcome.status == NOT_YET and told in outcome.text
+
+
+def test_other_solutions_of_the_linear_start_are_right():
+    def refined(T_BF, x_S):
+        fit = handeye.calibrate_sphere_target(T_BF, x_S)
+        return fit.T_FS, fit.target
+
+    def translation_solved_anew(T_BF, x_S):
+        T_FS, _ = handeye.linear_start(T_BF, x_S)
+        R, n = T_BF[:, :3, :3], len(T_BF)
+        A = np.concatenate([R, np.tile(-np.eye(3), (n, 1, 1))], axis=2).reshape(-1, 6)
+        u = np.linalg.lstsq(A, -frames.transform(T_BF, x_S @ T_FS[:3, :3].T).ravel(), rcond=None)[0]
+        return frames.pose(T_FS[:3, :3], u[:3]), u[3:]
+
+    for answer in (refined, translation_solved_anew):
+        assert all(judged("linear_start", answer, seed).status == CORRECT for seed in range(20))
+
+
+def test_a_circle_through_three_points_is_no_fit():
+    assert all(
+        "Three points" in judged("fit_circle", ch05_hand_eye._circle_through_three, seed).text for seed in range(30)
+    )
+
+
+ONE_LINERS = [name for name, item in ITEMS.items() if "return " in getattr(item, "hints", ("",))[-1]]
+
+
+@pytest.mark.parametrize("name", ONE_LINERS)
+def test_the_last_hint_is_right_when_typed_as_it_stands(name):
+    known = {"np": np, "frames": frames, "handeye": handeye, "exp_so3": exp_so3, "skew": skew}
+    known |= {"fit_circle": ch05_hand_eye.fit_circle, "analytic_jacobian": ch05_hand_eye.analytic_jacobian}
+    exec(f"def answer({', '.join(ITEMS[name].arguments)}): {ITEMS[name].hints[-1].removesuffix('.')}", known)
+    assert all(judged(name, known["answer"], seed).status == CORRECT for seed in range(5))

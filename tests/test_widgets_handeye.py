@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from labkit import frames, handeye, handeye_data
+from labkit.lie import exp_so3
 from labkit.widgets import handeye as w
 
 ALL = (w.scan_line, w.difference_steps, w.convergence, w.thirty_one_poses, w.pattern_designer)
@@ -93,6 +94,31 @@ def test_pattern_without_tilt_is_not_determined():
     assert np.abs(J @ result["weak"]).max() < 1e-6  # sliding along it changes nothing the scanner sees
 
 
+def test_pattern_says_what_is_free():
+    def caption(**state):
+        return w._pattern_sentence(
+            w.compute_pattern({"E": np.array([25.0, 290.0]), "across": 25, "tilt_deg": 30} | state)
+        )
+
+    one_place = np.array([0.0, 240.0])  # the sphere on one line of the field, along y
+    assert "slide together in any direction" in caption(tilt_deg=0) and "turn about" not in caption(tilt_deg=0)
+    assert "turn about the line" in caption(E=one_place) and "slide" not in caption(E=one_place)
+    assert "in any direction, and the scanner can turn" in caption(E=one_place, tilt_deg=0)
+    free = w.compute_pattern({"E": one_place, "across": 25, "tilt_deg": 30})
+    turn = free["T_FS"] @ frames.pose(exp_so3([0, 0.01, 0]), np.zeros(3))
+    turn[:3, 3] += free["T_FS"][:3, :3] @ ([0, 0, 240] - exp_so3([0, 0.01, 0]) @ [0, 0, 240])
+    assert np.abs(handeye.sphere_residuals(free["T_BF"], free["x_S"], turn, free["target"])).max() < 1e-9
+
+
+def test_scan_line_through_the_center_knows_no_y():
+    result = w.compute_scan_line({"C": np.array([0.0, 240.0]), "std": 0.5, "half_angle_deg": 15})
+    assert "y is not known at all" in w._scan_line_sentence(result)
+
+
+def test_one_step_is_one_step():
+    assert "1 step," in w._iterations_sentence(w.compute_iterations({"P": np.zeros(2), "B_deg": -88.0}))
+
+
 def test_convergence_opens_next_to_the_pole_where_the_detour_is_seen():
     stage = w.convergence()
     result = w.compute_iterations({"P": stage.state["P"], "B_deg": stage.state["B_deg"]})
@@ -105,6 +131,8 @@ def test_caption_of_a_pose_says_what_would_explain_it():
     assert stage.caption.startswith("Pose 3: residual 18.27 mm as printed, and a single slip would explain it.")
     stage.set(slip=1)
     assert stage.caption.startswith("Pose 3: residual 0.41 mm with x in C14 read as 1397.64 for 1379.64")
+    stage.set(slip=6)
+    assert "as printed: there is no slip no. 6, a single slip would explain it" in stage.caption
     stage.set(slip=0, click=(10.0, 1.0))
     assert "as printed, nothing to explain" in stage.caption
 

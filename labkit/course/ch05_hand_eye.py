@@ -3,6 +3,7 @@
 import functools
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from .. import frames, handeye, handeye_data, misprints, sphere
 from ..lie import exp_so3, skew
@@ -111,6 +112,20 @@ def _kuka_inverse(p2, T_BF, x_S, target):
     return _residual(frames.invert(frames.matrix_from_kuka(p2)), T_BF, x_S, target)
 
 
+def _kuka_flange_inverse(p2, T_BF, x_S, target):
+    return _residual(frames.matrix_from_kuka(p2), frames.invert(T_BF), x_S, target)
+
+
+def _kuka_angles(sequence):
+    """Reads the three angles in another order."""
+
+    def variant(p2, T_BF, x_S, target):
+        T_FS = frames.pose(Rotation.from_euler(sequence, p2[3:]).as_matrix(), p2[:3])
+        return _residual(T_FS, T_BF, x_S, target)
+
+    return variant
+
+
 def _kuka_degrees(p2, T_BF, x_S, target):
     return _residual(frames.matrix_from_kuka(frames.kuka_from_degrees(p2)), T_BF, x_S, target)
 
@@ -122,6 +137,10 @@ def _kuka_directions(p2, T_BF, x_S, target):
 
 def _forward(function, x, step):
     return handeye.numeric_jacobian(function, x, step, "forward")
+
+
+def _backward(function, x, step):
+    return -handeye.numeric_jacobian(lambda y: function(-y), -x, step, "forward")
 
 
 def _central(function, x, step):
@@ -173,6 +192,13 @@ def _circle_about_mean(x, z):
     return x.mean(), z.mean(), np.hypot(x - x.mean(), z - z.mean()).mean()
 
 
+def _circle_through_three(x, z):
+    """Uses the two ends and the middle of the scan line, and no other point."""
+    k = [0, len(x) // 2, -1]
+    p, q, c = np.linalg.solve(np.column_stack([2 * x[k], 2 * z[k], np.ones(3)]), x[k] ** 2 + z[k] ** 2)
+    return p, q, np.sqrt(c + p * p + q * q)
+
+
 def _center(change):
     def variant(x, z, radius, side):
         cx, cz, r = fit_circle(x, z)
@@ -208,6 +234,16 @@ def _gradient_step(T_FS, T_BF, x_S, target):
     return _applied(T_FS, -J.T @ _residual(T_FS, T_BF, x_S, target).ravel() / (J * J).sum())
 
 
+def _iterated(T_FS, T_BF, x_S, target):
+    for _ in range(20):
+        T_FS = gauss_newton_on_pose(T_FS, T_BF, x_S, target)
+    return T_FS
+
+
+def _step_without_target(T_FS, T_BF, x_S, target):
+    return _applied(T_FS, _step(T_FS, T_BF, x_S, np.zeros(3)))
+
+
 def joint_residual(u, T0, T_BF, x_S):
     """Reference of the exercise: nine unknowns, phi and translation about T0, and the sphere's center."""
     return _residual(_applied(T0, u[:6]), T_BF, x_S, u[6:]).ravel()
@@ -237,6 +273,14 @@ def _linear_without_turning_back(T_BF, x_S):
     D = np.concatenate([np.kron(x_S[:, None], np.eye(3)[None]).reshape(n, 3, 9), np.tile(np.eye(3), (n, 1, 1)), -R], 2)
     u = np.linalg.lstsq(D.reshape(-1, 15), -(R @ T_BF[:, :3, 3, None]).ravel(), rcond=None)[0]
     return frames.pose(handeye.nearest_rotation(u[:9].reshape(3, 3).T), u[9:12]), u[12:]
+
+
+def _linear_with_unturned_right_side(T_BF, x_S):
+    """Turns the target into F, but not the flange's own position."""
+    R_t, n = np.swapaxes(T_BF[:, :3, :3], 1, 2), len(T_BF)
+    D = np.concatenate([np.kron(np.eye(3), x_S[:, None, :]).reshape(n, 3, 9), np.tile(np.eye(3), (n, 1, 1)), -R_t], 2)
+    u = np.linalg.lstsq(D.reshape(-1, 15), -T_BF[:, :3, 3].ravel(), rcond=None)[0]
+    return frames.pose(handeye.nearest_rotation(u[:9].reshape(3, 3)), u[9:12]), u[12:]
 
 
 def robust_weights(residuals):
@@ -297,6 +341,18 @@ def _only_the_grossest(entries):
     return {(s[0].table, s[0].pose, s[0].column) for s in found.values() if s and s[0].before > 30}
 
 
+class near_pose(metrics.poses):
+    """A pose somewhere near the expected one, whose rotation must be a rotation all the same."""
+
+    def admit(self, result, expected):
+        result = super().admit(result, expected)
+        R = result[..., :3, :3].astype(float)
+        sheared = float(np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max())
+        if sheared > metrics.FLOAT32_TOLERANCE:
+            raise metrics.Refused(f"on noisy data the rotation is none: R'R differs from I by {sheared:.2g}")
+        return result
+
+
 class Count(metrics.Deviation):
     """How many entries are wrong, in words."""
 
@@ -334,11 +390,11 @@ def corrected_fit():
     return handeye.calibrate_sphere_target(measured.T_BF, measured.x_S)
 
 
-def printed_pattern_std():
-    """Predicted standard deviation of the scanner's rotation (deg) under the thesis's 31 poses."""
+def predicted_stds(T_BF):
+    """Predicted standard deviations of the scanner's rotation (deg) and translation (mm) under these poses."""
     fit = corrected_fit()
-    cov = handeye.predicted_covariance(handeye_data.measurements(True).T_BF, fit.T_FS, fit.target, fit.std)
-    return float(np.rad2deg(np.sqrt(np.trace(cov[:3, :3]))))
+    cov = handeye.predicted_covariance(T_BF, fit.T_FS, fit.target, fit.std)
+    return float(np.rad2deg(np.sqrt(np.trace(cov[:3, :3])))), float(np.sqrt(np.trace(cov[3:6, 3:6])))
 
 
 def design_poses(T_FS, target, rng):
@@ -367,12 +423,14 @@ def design_is_good(student, rng):
     if steepest > 91:
         return f"one pose looks up at the sphere, {steepest:.0f} deg from straight down: the table is in the way (90 at most)."
     try:
-        cov = handeye.predicted_covariance(T_BF, fit.T_FS, fit.target, fit.std)
-    except np.linalg.LinAlgError:
-        cov = np.full((9, 9), np.inf)
-    std, printed = np.rad2deg(np.sqrt(np.abs(np.trace(cov[:3, :3])))), printed_pattern_std()
-    if not std < 0.7 * printed:
-        return f"the rotation would be known to {std:.2g} deg; the thesis's pattern gives {printed:.2g}, and 0.7 of that is asked for."
+        handeye.calibrate_sphere_target(T_BF, x_S)
+    except ValueError as refusal:  # a motion is missing: it says which
+        return f"{refusal}."
+    (turn, shift), (printed_turn, printed_shift) = predicted_stds(T_BF), predicted_stds(handeye_data.measurements(True).T_BF)
+    if not turn < 0.7 * printed_turn:
+        return f"the rotation would be known to {turn:.2g} deg; the thesis's pattern gives {printed_turn:.2g}, and 0.7 of that is asked for."
+    if not shift < printed_shift:
+        return f"the rotation is better known, but the translation only to {shift:.2g} mm; the thesis's pattern gives {printed_shift:.2g}. Tilt the flange more, about more than one axis."
     return None
 
 
@@ -405,6 +463,7 @@ def _joint_rms(*fixed):
     return handeye.calibrate_sphere_target(measured.T_BF, measured.x_S).rms
 
 
+GROWS_BEYOND = "Below u = 1 the weight is (1 - u^2)^2, beyond it 0. Yours grows there, and the worst poses get the most say."
 ALL_FIXED = (2, 3, 4, 7, 12, 21, 30)
 
 CHAPTER = Chapter(
@@ -417,17 +476,24 @@ CHAPTER = Chapter(
             draw=arc,
             metric=metrics.several(metrics.numbers(1e-6, "mm"), metrics.numbers(1e-6, "mm"), metrics.numbers(1e-6, "mm"),
                                    names=("center x", "center z", "radius")),
-            noisy=(lambda rng: arc(rng, 0.02), metrics.several(
-                metrics.numbers(2e-2, "mm"), metrics.numbers(4e-3, "mm"), metrics.numbers(3e-2, "mm"),
-                names=("center x", "center z", "radius"))),
+            noisy=3 * ((lambda rng: arc(rng, 0.02), metrics.several(
+                metrics.numbers(2e-3, "mm"), metrics.numbers(1e-4, "mm"), metrics.numbers(1e-3, "mm"),
+                names=("center x", "center z", "radius"))),),
             hints=(
                 "A circle is linear in the right unknowns: multiply (x - xc)^2 + (z - zc)^2 = r^2 out.",
                 "x^2 + z^2 + a1 x + a2 z + a3 = 0 with a1 = -2 xc, a2 = -2 zc, a3 = xc^2 + zc^2 - r^2: one equation a point.",
-                "a = np.linalg.lstsq(np.column_stack([x, z, np.ones(len(x))]), -(x**2 + z**2), rcond=None)[0]; then -a[0]/2, -a[1]/2 and the root.",
+                "a = np.linalg.lstsq(np.column_stack([x, z, np.ones(len(x))]), -(x**2 + z**2), rcond=None)[0]; return -a[0]/2, -a[1]/2, np.sqrt(a[0]**2/4 + a[1]**2/4 - a[2]).",
             ),
             mistakes=[
                 Mistake(_circle(lambda x, z, r: (-x, -z, r)), "Your center has the opposite sign: a1 = -2 xc, so xc = -a1/2."),
                 Mistake(_circle(lambda x, z, r: (-2 * x, -2 * z, r)), "You return a1 and a2 themselves. The center is -a1/2, -a2/2."),
+                Mistake(_circle(lambda x, z, r: (-2 * x, -2 * z, x * x + z * z - r * r)),
+                        "You return a1, a2 and a3 themselves. The center is -a1/2, -a2/2; the radius follows from a3."),
+                Mistake(_circle(lambda x, z, r: (x, z, np.sqrt(3 * x * x + 3 * z * z + r * r))),
+                        "a1 and a2 entered the radius whole. They are -2 xc and -2 zc: halve them before you square."),
+                Mistake(_circle(lambda x, z, r: (x, z, np.sqrt(x * x + z * z - r * r))),
+                        "Your radius is the root of a3 alone, but a3 = xc^2 + zc^2 - r^2: solve for r."),
+                Mistake(_circle_through_three, "Three points make a circle, with all their noise in it. Let every point of the scan line count."),
                 Mistake(_circle(lambda x, z, r: (x, z, r * r)), "Your third number is the squared radius: a root is missing."),
                 Mistake(_circle(lambda x, z, r: (x, z, np.sqrt(max(2 * x * x + 2 * z * z - r * r, 0)))),
                         "a3 entered the radius with the wrong sign: r^2 = xc^2 + zc^2 - a3."),
@@ -465,6 +531,14 @@ CHAPTER = Chapter(
                         "You always take the positive root, but the center may lie on either side: multiply by side."),
                 Mistake(_center(lambda x, z, r, R, s: np.array([x, -np.sqrt(R * R - r * r), z])),
                         "You always take the minus sign, as listing C16 does: multiply by side instead."),
+                Mistake(_center(lambda x, z, r, R, s: np.array([x, s * (R * R - r * r), z])),
+                        "This is the square of the offset: take the root of R^2 - r^2."),
+                Mistake(_center(lambda x, z, r, R, s: np.array([x, s * R, z])),
+                        "You went a whole radius of the sphere aside. The offset is d = sqrt(R^2 - r^2)."),
+                Mistake(_center(lambda x, z, r, R, s: np.array([x, s * r, z])),
+                        "You went the circle's radius aside. The offset is d = sqrt(R^2 - r^2)."),
+                Mistake(lambda x, z, R, s: np.array([x.mean(), s * np.sqrt(R * R - fit_circle(x, z)[2] ** 2), z.mean()]),
+                        "x and z are the mean of the points, but an arc lies on one side of its center. Take the circle's center."),
                 Mistake(_center(lambda x, z, r, R, s: np.array([x, 0.0, z])),
                         "This is the center of the circle. The sphere's center lies off the plane by d."),
                 Mistake(_center(lambda x, z, r, R, s: np.array([x, s * np.sqrt(R * R - r * r), z + R])),
@@ -484,6 +558,11 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(lambda p2, T, x, c: -_residual(frames.matrix_from_kuka(p2), T, x, c),
                         "The sign is reversed: (4-3) subtracts the target from the measured side."),
+                Mistake(lambda p2, T, x, c: _residual(frames.matrix_from_kuka(p2), T, x, -c), "The target is to be subtracted; yours is added."),
+                Mistake(lambda p2, T, x, c: frames.transform(T, x) - c, "T_FS is missing: x_S is still in the scanner's frame when T_BF meets it."),
+                Mistake(_kuka_flange_inverse, "You used the inverse of T_BF: it maps F to B, as it stands."),
+                Mistake(_kuka_angles("XYZ"), "You turned by A about x and by C about z. KUKA: A about z, then B about y, then C about x."),
+                Mistake(_kuka_angles("zyx"), "You turned about fixed axes. A, B, C turn about axes that move along: Rz(A) Ry(B) Rx(C)."),
                 Mistake(_kuka_without_target, "The target is missing: these are positions of the sphere in the base, not residuals."),
                 Mistake(_kuka_scanner_first, "The order is T_FS T_BF: the letters do not cancel. From S to F, then from F to B: T_BF T_FS."),
                 Mistake(_kuka_inverse, "You used the inverse of T_FS: p2 is the scanner in the flange frame, it maps S to F."),
@@ -532,6 +611,10 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(_forward, "This is the forward difference of listing C4, off by h f''/2. Take the step in both directions."),
+                Mistake(_backward, "This is the backward difference. Take the step in both directions."),
+                Mistake(lambda f, x, h: _central(f, x, h) * h * h, "`/ 2 * step` divides by 2 and then multiplies by the step: write / (2 * step)."),
+                Mistake(lambda f, x, h: _central(f, x, 1e-6), "You chose a step of your own. Use the argument `step`: the figure below varies it."),
+                Mistake(lambda f, x, h: (f(x + h) - f(x - h)) / (2 * h), "You moved all variables at once. Move one at a time: one column each."),
                 Mistake(lambda f, x, h: -_central(f, x, h),
                         "The sign is reversed: what is ahead minus what is behind."),
                 Mistake(lambda f, x, h: 2 * _central(f, x, h), "Between ahead and behind lie two steps: divide by 2 h."),
@@ -557,7 +640,7 @@ CHAPTER = Chapter(
             hints=(
                 "Insert T_FS exp(phi) into the residual and keep what is linear in phi and in the translation.",
                 "R_BF R_FS exp(phi) x = R_BF R_FS (x + phi x x) = ... - R_BF R_FS [x] phi; the translation enters through R_BF alone.",
-                "J = np.concatenate([-R_BF @ R_FS @ skew(x_S), R_BF], axis=2).reshape(-1, 6), with R_BF = T_BF[:, :3, :3].",
+                "R_BF, R_FS = T_BF[:, :3, :3], T_FS[:3, :3]; return np.concatenate([-R_BF @ R_FS @ skew(x_S), R_BF], axis=2).reshape(-1, 6).",
             ),
             mistakes=[
                 Mistake(functools.partial(_jacobian, sign=1.0), "The first three columns have the wrong sign: phi x x = -[x] phi."),
@@ -571,6 +654,14 @@ CHAPTER = Chapter(
                 Mistake(lambda T, B, x: np.hstack([analytic_jacobian(T, B, x)[:, :3], (B[:, :3, :3] @ T[:3, :3]).reshape(-1, 3)]),
                         "Your translation columns hold R_BF R_FS, but tau is added to t_FS, which is written in F: R_BF alone."),
                 Mistake(lambda T, B, x: _jacobian(T, B, x, left=True), "R_FS is missing between R_BF and [x]."),
+                Mistake(lambda T, B, x: np.hstack([analytic_jacobian(T, B, x)[:, :3], np.tile(np.eye(3), (len(x), 1))]),
+                        "tau is a change in F, the residual is in B: its columns are R_BF, not I."),
+                Mistake(lambda T, B, x: _jacobian(T, np.swapaxes(B, 1, 2), x), "Your R_BF is the transpose: the residual is written in B, so F is turned into B."),
+                Mistake(lambda T, B, x: _jacobian(T.T, B, x), "Your R_FS is the transpose: x_S is turned from S into F."),
+                Mistake(lambda T, B, x: np.concatenate([-T[:3, :3] @ B[:, :3, :3] @ skew(x), B[:, :3, :3]], axis=2).reshape(-1, 6),
+                        "R_FS and R_BF have changed places. From S to F comes first: R_BF R_FS [x]."),
+                Mistake(lambda T, B, x: np.concatenate([-B[:, :3, :3] @ T[:3, :3] @ skew(x), B[:, :3, :3]], axis=1).reshape(-1, 6),
+                        "The two blocks of a pose belong side by side: axis=2, or np.hstack for one pose."),
             ],
         ),
         Exercise(
@@ -581,9 +672,17 @@ CHAPTER = Chapter(
             hints=(
                 "Solve the linearized problem for the step, then move the pose by it.",
                 "step = argmin |J step + e|; the first three entries are a rotation vector on the right of R_FS, the last three a translation.",
-                "step = np.linalg.lstsq(J, -e.ravel(), rcond=None)[0]; R_FS @ exp_so3(step[:3]) and t_FS + step[3:].",
+                "J = analytic_jacobian(T_FS, T_BF, x_S); e = frames.transform(T_BF, frames.transform(T_FS, x_S)) - target; step = np.linalg.lstsq(J, -e.ravel(), rcond=None)[0]; "
+                "return frames.pose(T_FS[:3, :3] @ exp_so3(step[:3]), T_FS[:3, 3] + step[3:]).",
             ),
             mistakes=[
+                Mistake(_iterated, "You iterated to the end. Asked for is one step."),
+                Mistake(_step_without_target, "The target is missing from your residual: the step leads to the base's origin."),
+                Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3] @ exp_so3(s[3:]), T[:3, 3] + s[:3])),
+                        "Rotation and translation have changed places: the first three entries of the step are phi."),
+                Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3] @ Rotation.from_euler("xyz", s[:3]).as_matrix(), T[:3, 3] + s[3:])),
+                        "phi is one rotation vector, not three angles to turn by in turn: use exp_so3."),
+
                 Mistake(_stepped(lambda T, s: _applied(T, -s)), "You stepped uphill: the step solves J step = -e."),
                 Mistake(_stepped(lambda T, s: frames.pose(exp_so3(s[:3]) @ T[:3, :3], T[:3, 3] + s[3:])),
                         "The turn exp(phi) stands on the left. Your Jacobian turns about the scanner's axes, so it belongs on the right of R_FS."),
@@ -603,20 +702,21 @@ CHAPTER = Chapter(
             question="The scanner sits next to B = -90 deg. What do Gauss-Newton steps in A, B, C do that steps on the pose do not?",
             choices=("they never arrive", "they take detours", "nothing"),
             answer="they take detours",
-            why="Near the pole A and C turn about one line: their steps become huge and nearly cancel. The pose often arrives, after three times the steps.",
+            why="Near the pole A and C turn about one line: their steps become huge and nearly cancel. The pose often arrives all the same, after two or three times the steps.",
         ),
         Exercise(
             "linear_start",
             reference=handeye.linear_start,
             draw=lambda rng: scene(rng, n=9)[1:3],
             metric=metrics.several(metrics.poses(1e-5, 1e-4), metrics.numbers(1e-7, "mm"), names=("T_FS", "target")),
-            noisy=(lambda rng: scene(rng, n=12, std=0.2)[1:3],
-                   metrics.several(metrics.poses(2e-2, 0.1), metrics.numbers(0.1, "mm"), names=("T_FS", "target")),
+            noisy=(lambda rng: scene(rng, n=12, std=0.05)[1:3],  # t_FS solved anew, or a refined answer, is right as well
+                   metrics.several(near_pose(0.5, 2.5), metrics.numbers(2e-3, "mm"), names=("T_FS", "target")),
                    "exact on clean data, but on noisy data"),
             hints=(
                 "Forget for a moment that R_FS is a rotation: then all unknowns enter linearly.",
                 "R_FS x + t_FS - R_BF' target = -R_BF' t_BF. Fifteen unknowns: nine of R_FS, three of t_FS, three of the target.",
-                "For each pose the rows are [np.kron(np.eye(3), x), np.eye(3), -R_BF.T]; make a rotation of the nine with `nearest_rotation`.",
+                "For each pose: rows np.hstack([np.kron(np.eye(3), x), np.eye(3), -R_BF.T]), right side -R_BF.T @ t_BF. Stack all, u = np.linalg.lstsq(A, b, rcond=None)[0]; "
+                "T_FS = frames.pose(nearest_rotation(u[:9].reshape(3, 3)), u[9:12]), the center is u[12:].",
             ),
             mistakes=[
                 Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3].T, T[:3, 3]), c)),
@@ -625,6 +725,7 @@ CHAPTER = Chapter(
                 Mistake(_linear_without_rotation, "On noisy data your nine numbers are not a rotation: take the nearest one."),
                 Mistake(_linear(lambda T, c: (frames.invert(T), c)), "Your pose is the inverse, T_SF."),
                 Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3], -T[:3, 3]), c)), "The translation of T_FS has the wrong sign."),
+                Mistake(_linear_with_unturned_right_side, "Your right side is -t_BF. It is to be turned into the flange frame as well: -R_BF' t_BF."),
                 Mistake(_linear_without_turning_back, "You multiplied by R_BF where R_BF' is needed: bring everything into the flange frame."),
             ],
         ),
@@ -636,7 +737,7 @@ CHAPTER = Chapter(
             hints=(
                 "Six of the nine unknowns move the scanner, three are the sphere's center itself.",
                 "T_FS = (R0 exp(phi), t0 + dt) with phi = u[:3], dt = u[3:6]; the center is u[6:].",
-                "T_FS = frames.pose(T0[:3, :3] @ exp_so3(u[:3]), T0[:3, 3] + u[3:6]); then transform twice, subtract u[6:], .ravel().",
+                "T_FS = frames.pose(T0[:3, :3] @ exp_so3(u[:3]), T0[:3, 3] + u[3:6]); return (frames.transform(T_BF, frames.transform(T_FS, x_S)) - u[6:]).ravel().",
             ),
             mistakes=[
                 Mistake(lambda u, T, B, x: _residual(frames.pose(exp_so3(u[:3]) @ T[:3, :3], T[:3, 3] + u[3:6]), B, x, u[6:]).ravel(),
@@ -649,6 +750,16 @@ CHAPTER = Chapter(
                 Mistake(lambda u, T, B, x: _residual(_applied(T, u[:6]), B, x, np.zeros(3)).ravel(), "The center u[6:] is missing."),
                 Mistake(lambda u, T, B, x: _residual(frames.pose(T[:3, :3] @ exp_so3(u[3:6]), T[:3, 3] + u[:3]), B, x, u[6:]).ravel(),
                         "Rotation and translation have changed places: phi comes first."),
+                Mistake(lambda u, T, B, x: _residual(T, B, x, u[6:]).ravel(), "T0 has not been moved by u[:6]."),
+                Mistake(lambda u, T, B, x: _residual(frames.pose(exp_so3(u[:3]), u[3:6]), B, x, u[6:]).ravel(),
+                        "T0 is missing: u[:6] is a change of T0, not a pose of its own."),
+                Mistake(lambda u, T, B, x: _residual(frames.pose(exp_so3(u[:3]), u[3:6]) @ T, B, x, u[6:]).ravel(),
+                        "You moved T0 from the left as a whole. Turn it on the right, R0 exp(phi), and add the change of translation."),
+                Mistake(lambda u, T, B, x: frames.transform(B, x @ (T[:3, :3] @ (np.eye(3) + skew(u[:3]))).T + T[:3, 3] + u[3:6]).ravel() - np.tile(u[6:], len(x)),
+                        "I + [phi] is only nearly a rotation, and phi need not be small: use exp_so3."),
+                Mistake(lambda u, T, B, x: handeye.kuka_residuals(u[:6], B, x, u[6:]).ravel(),
+                        "You read u[:6] as a KUKA pose. It is a rotation vector and a change of translation about T0."),
+                Mistake(lambda u, T, B, x: _residual(_applied(T, u[:6]), B, x, u[6:]).T.ravel(), "The order is all x, all y, all z; wanted is x, y, z of pose 1, then of pose 2, ..."),
                 Mistake(lambda u, T, B, x: _residual(_applied(T, u[:6]), B, x, u[6:]), "The residuals are right; stack them into one vector of 3 N numbers."),
             ],
         ),
@@ -664,12 +775,20 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.sqrt((r**2).mean() / 3)))), "Your scale is the rms: the outliers themselves stretch it. Take the median."),
+                Mistake(_weights(lambda r: _tukey(r / (5 * np.mean(r) / handeye.MEDIAN_CHI3))), "Your scale is the mean length: the outliers stretch it. Take the median."),
+                Mistake(lambda e: _tukey(np.linalg.norm(e, axis=1) / (5 * np.std(e))), "Your scale is the standard deviation of the entries: the outliers stretch it. Take the median length."),
+                Mistake(lambda e: _tukey(np.linalg.norm(e, axis=1) / (5 * np.median(np.abs(e)) / handeye.MEDIAN_CHI3)),
+                        "You took the median of all entries. Take the median of the lengths, one a pose."),
+                Mistake(_weights(lambda r: _tukey(r / 5 * np.median(r) / handeye.MEDIAN_CHI3)), "`/ 5 * s` divides by 5 and multiplies by s: write / (5 * s)."),
+                Mistake(_weights(lambda r: _tukey((r / (5 * np.median(r) / handeye.MEDIAN_CHI3)) ** 2)), "u itself is squared in the formula, yours is squared twice."),
+                Mistake(_weights(lambda r: np.where(r < 5 * np.median(r) / handeye.MEDIAN_CHI3, 0, (1 - (r / (5 * np.median(r) / handeye.MEDIAN_CHI3)) ** 2) ** 2)),
+                        GROWS_BEYOND),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r)))), "The median length of a 3-vector is 1.538 standard deviations: divide by it."),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r) / 0.6745))), "0.6745 belongs to single numbers. The length of a 3-vector has the median 1.538."),
                 Mistake(_weights(lambda r: _tukey(r * handeye.MEDIAN_CHI3 / np.median(r))), "The factor 5 is missing: u = length / (5 s)."),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r) * handeye.MEDIAN_CHI3))), "You multiplied by 1.538: divide the median by it."),
                 Mistake(_weights(lambda r: (1 - (r / (5 * np.median(r) / handeye.MEDIAN_CHI3)) ** 2) ** 2),
-                        "Beyond the cut the weight must stay 0; yours rises again, and the worst poses get the most say."),
+                        GROWS_BEYOND),
                 Mistake(_weights(lambda r: np.sqrt(_tukey(r / (5 * np.median(r) / handeye.MEDIAN_CHI3)))), "The bracket is squared: (1 - u^2)^2."),
                 Mistake(_weights(lambda r: (r < 5 * np.median(r) / handeye.MEDIAN_CHI3).astype(float)),
                         "You cut off sharply. Tukey's weight falls smoothly, so that no pose decides by crossing a line."),
@@ -693,7 +812,8 @@ CHAPTER = Chapter(
             hints=(
                 "Two questions: which rows do not fit a robust calibration, and which single slip explains each of them?",
                 "`misprints.explanations(entries, pose, T_FS, target, std)` tries every slip of a row and puts the most credible first.",
-                "fit robustly, take the poses with a residual beyond 6 std, and add (e.table, e.pose, e.column) of the first explanation e of each.",
+                "m = handeye_data.measurements_from(entries); fit = handeye.calibrate_sphere_target(m.T_BF, m.x_S, robust=True). For each i with np.linalg.norm(fit.residuals[i]) > 6 * fit.std take "
+                "e = misprints.explanations(entries, int(i) + 1, fit.T_FS, fit.target, fit.std)[0], and add (e.table, e.pose, e.column).",
             ),
             mistakes=[
                 Mistake(_by_plain_least_squares, "This is all that a plain least-squares fit shows: its grossest slip bends it so far that the others hide. Fit robustly."),
@@ -701,6 +821,7 @@ CHAPTER = Chapter(
                 Mistake(_all_explanations, "You name every entry that could be changed. One slip a row: take the most credible explanation."),
                 Mistake(lambda entries: {(r["table"], r["pose"], r["column"]) for r in handeye_data.corrections()},
                         "These are the seven of the printed tables. The check plants slips of its own: search the `entries` you are given."),
+                Mistake(lambda entries: {(table, pose - 1, column) for table, pose, column in find_misprints(entries)}, "Your poses are one too low: they count from 1, arrays from 0."),
                 Mistake(_only_the_grossest, "You named the grossest ones only. After the robust fit 9 mm and even 3 mm stand out as clearly."),
             ],
         ),
@@ -757,7 +878,8 @@ CHAPTER = Chapter(
             hints=(
                 "Choose where the scanner should see the sphere, and how the flange should be turned; the flange's position then follows.",
                 "target = R_BF (R_FS x_S + t_FS) + t_BF: draw x_S over the whole field, tilt by up to 45 deg about all axes, solve for t_BF.",
-                "T_BF[:, :3, :3] = R; T_BF[:, :3, 3] = target - R @ frames.transform(T_FS, x_S): see the text for limits of x_S.",
+                "x_S = np.column_stack([rng.uniform(-25, 25, 31), rng.uniform(3, 25, 31) * rng.choice([-1, 1], 31), rng.choice([190, 290], 31)]); turns = rng.uniform(-0.8, 0.8, (31, 3)); "
+                "return handeye.poses_that_see(T_FS, target, exp_so3(turns) @ np.diag([1, -1, -1]) @ T_FS[:3, :3].T, x_S).",
             ),
         ),
     ],

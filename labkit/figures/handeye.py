@@ -4,6 +4,7 @@ import numpy as np
 
 from . import style
 
+TILT, YAW = (-105, 75), 70  # deg, of the error plane: detours past the pole reach farther than a start
 CIRCLE = np.linspace(0, 2 * np.pi, 121)
 LINES = {"x": "o", "y": "s", "x*": "^", "y*": "v"}  # a marker for each line of motion
 
@@ -49,15 +50,15 @@ def error_against_step(ax, steps, curves):
     markers = []
     for (label, errors), look in zip(curves.items(), looks):
         ax.plot(steps, errors, label=label, **look)
-        markers += ax.plot([], [], color=look["color"], marker="D", markersize=8, linestyle="none")
-    ax.legend(loc="upper center")
+        markers += ax.plot([], [], color=look["color"], marker="D", markersize=8, linestyle="none", clip_on=False)
+    ax.legend(loc="lower left")
     return markers
 
 
 def error_plane(ax):
     """Plane of the scanner's rotation error. Returns (path in A, B, C, path on the pose, pole)."""
     style.axes(ax, "tilt off the truth (deg)", "yaw off the truth (deg)", "drag the start")
-    ax.set(xlim=(-70, 70), ylim=(-70, 70))
+    ax.set(xlim=TILT, ylim=(-YAW, YAW))
     (pole,) = ax.plot([], [], **style.look("guide", linewidth=1.8))
     ax.annotate("dotted:\nB = -90 deg", (0.98, 0.03), xycoords="axes fraction", ha="right", color=style.MUTED)
     (euler,) = ax.plot([], [], **style.look("prediction", marker="o", markersize=5))

@@ -57,14 +57,12 @@ def _scan_line_sentence(result):
     if result["impossible"]:
         return (
             f"{result['impossible']} of {REPETITIONS} circles are larger than the sphere: so close to the equator "
-            "the profile "
-            "says nothing about y."
+            "the profile says nothing about y."
         )
+    known = f"y is known to {result['std_y']:.2g} mm" if result["std_y"] < RADIUS else "y is not known at all"
     return (
-        f"The center lies {result['y']:.1f} mm off the plane. First order: y is known to {result['std_y']:.2g} mm; "
-        "the mean of "
-        f"{REPETITIONS} recoveries is off by {result['bias_y']:+.2f} mm. The mirror image (dotted) explains the scan "
-        "line as well."
+        f"The center lies {abs(result['y']):.1f} mm off the plane. First order: {known}; the mean of {REPETITIONS} "
+        f"recoveries is off by {result['bias_y']:+.2f} mm. The mirror image (dotted) explains the scan line as well."
     )
 
 
@@ -72,7 +70,7 @@ def scan_line():
     """Drag the sphere through the scan plane and watch how well its center comes back from one scan line."""
 
     def scene(fig):
-        left, right = fig.subplots(1, 2, width_ratios=(1, 1))
+        left, right = fig.subplots(1, 2, width_ratios=(1.24, 1))  # one scale
         outline, other, cloud, spread = draw.side_view(left, ((-62, 62), (190, 290)))
         points, circle, center = draw.profile_view(right, ((-50, 50), (190, 290)))
 
@@ -205,14 +203,17 @@ def compute_iterations(state):
 
 def _iterations_sentence(result):
     def told(run):
-        return f"{run['steps']} steps" if run["arrived"] else "no way to the minimum"
+        steps = "1 step" if run["steps"] == 1 else f"{run['steps']} steps"
+        return steps if run["arrived"] else "no way to the minimum"
+
+    def weakest(run):
+        return f"1/{1 / run['weakest']:.0f} of the largest" if run["weakest"] > 1e-6 else "zero"
 
     euler, se3 = result["euler"], result["se3"]
     return (
         f"In A, B, C: {told(euler)}, turning {euler['turned_deg']:.0f} deg in all; at the start the weakest singular "
-        "value is "
-        f"{euler['weakest']:.0e} of the largest. On the pose: {told(se3)}, turning {se3['turned_deg']:.0f} deg, "
-        f"and {se3['weakest']:.0e} of the largest."
+        f"value is {weakest(euler)}. On the pose: {told(se3)}, turning {se3['turned_deg']:.0f} deg, "
+        f"and {weakest(se3)}."
     )
 
 
@@ -228,7 +229,7 @@ def convergence():
             for path, curve, name in ((euler, curves[0], "euler"), (se3, curves[1], "se3")):
                 path.set_data(*result[name]["path"].T)
                 curve.set_data(np.arange(len(result[name]["rms"])), result[name]["rms"])
-            pole.set_data([result["pole"]] * 2, [-70, 70])
+            pole.set_data([result["pole"]] * 2, [-draw.YAW, draw.YAW])
 
         return [pole, euler, se3, *curves], update
 
@@ -299,7 +300,7 @@ def compute_poses(state):
     return {
         "pose": pose, "residuals": residuals, "lengths": lengths, "rms": float(handeye.rms_distance(residuals)),
         "median": float(np.median(lengths)), "T_FS": T_FS, "target": target, "T_BF": T_BF, "x_S": x_S, "slip": slip,
-        "offered": offered,
+        "offered": offered, "number": state["slip"],
     }  # fmt: skip
 
 
@@ -309,6 +310,8 @@ def _poses_sentence(result):
     told = (
         f"with {e.column.removesuffix('_deg')} in {e.table} read as {e.corrected} for {e.printed} ({e.slip})"
         if e
+        else f"as printed: there is no slip no. {result['number']}, {slips} would explain it"
+        if result["offered"] and result["number"]
         else f"as printed, and {slips} would explain it"
         if result["offered"]
         else "as printed, nothing to explain"
@@ -399,18 +402,24 @@ def compute_pattern(state):
     J = handeye.joint_jacobian(T_BF, x_S, fit.T_FS)
     scale = np.array([1 / 240.0] * 3 + [1.0] * 6)
     _, values, Vt = np.linalg.svd(J * scale, full_matrices=False)
-    determined = values[-1] > 1e-3 * values[0]
+    free = Vt[values <= 1e-3 * values[0]]  # changes that the scanner does not see
     result = {
-        "T_BF": T_BF, "x_S": x_S, "spread": spread, "values": values, "weak": Vt[-1] * scale,
-        "determined": bool(determined), "target": fit.target, "T_FS": fit.T_FS,
+        "T_BF": T_BF, "x_S": x_S, "spread": spread, "values": values, "weak": Vt[-1] * scale, "target": fit.target,
+        "T_FS": fit.T_FS, "determined": not len(free), "turns": _reached(free[:, :3]), "slides": _reached(free[:, 6:]),
     }  # fmt: skip
-    if determined:
+    if result["determined"]:
         cov = fit.std**2 * np.linalg.inv(J.T @ J)
         result["cov"], result["std"] = cov, _three_stds(cov)
     else:
         result["cov"], result["std"] = np.full((9, 9), np.nan), (np.inf,) * 3
     result["printed_cov"], result["printed_std"] = _printed_pattern(), _three_stds(_printed_pattern())
     return result
+
+
+def _reached(block):
+    """Directions (k, 3) in which unseen changes reach into one block of unknowns, the farthest first."""
+    _, sizes, directions = np.linalg.svd(block)
+    return directions[: (sizes > 0.05).sum()]
 
 
 def _three_stds(cov):
@@ -421,15 +430,15 @@ def _three_stds(cov):
 
 def _pattern_sentence(result):
     if not result["determined"]:
-        return (
-            f"Not determined: the last singular value is {result['values'][-1] / result['values'][0]:.0e} of the "
-            "first. Scanner and sphere can "
-            "slide together along the line drawn through the sphere."
-        )
+        line = "along the line drawn through the sphere" if len(result["slides"]) == 1 else "in any direction"
+        told = [f"scanner and sphere can slide together {line}"] * bool(len(result["slides"]))
+        told += ["the scanner can turn about the line on which it sees the sphere"] * bool(len(result["turns"]))
+        ratio = result["values"][-1] / result["values"][0]
+        return f"Not determined: the last singular value is {ratio:.0e} of the first; {', and '.join(told)}."
     (a, b, c), (A, B, C) = result["std"], result["printed_std"]
     return (
-        f"Predicted: orientation {a:.2f} deg, translation {b:.2f} mm, sphere center {c:.2f} mm. The thesis's 31 poses: "
-        f"{A:.2f} deg, {B:.2f} mm, {C:.2f} mm."
+        f"Predicted: orientation {a:.2f} deg, translation {b:.2f} mm, sphere center {c:.2f} mm. "
+        f"The thesis's 31 poses (dotted): {A:.2f} deg, {B:.2f} mm, {C:.2f} mm."
     )
 
 
@@ -457,8 +466,8 @@ def pattern_designer():
             aside = target + np.array([0.0, 0.0, -230.0])
             printed.set(aside, 40**2 * result["printed_cov"][3:6, 3:6])
             found.set(aside, 40**2 * (result["cov"][3:6, 3:6] if result["determined"] else np.zeros((3, 3))))
-            along = result["weak"][6:] / max(np.linalg.norm(result["weak"][6:]), 1e-12)
-            weak.set(target + np.outer([-300, 300], along) if not result["determined"] else np.full((2, 3), np.nan))
+            along = [np.outer([-300, 300, np.nan], direction) for direction in result["slides"]]
+            weak.set(target + np.concatenate(along or [np.full((2, 3), np.nan)]))
             name.set(aside + [0, 0, -175.0])
             space.draw(state["view"])
             (dx, _, dz) = result["spread"]
