@@ -718,7 +718,7 @@ CHAPTER = Chapter(
             hints=(
                 "Write out the last column of A X = X B. It is linear in the translation t once R is known.",
                 "R_A t + t_A = R t_B + t, so (I - R_A) t = t_A - R t_B: three rows a motion, stacked.",
-                "K1 = np.eye(3) - A[:, :3, :3]; K2 = A[:, :3, 3] - B[:, :3, 3] @ R.T; np.linalg.lstsq(K1.reshape(-1, 3), K2.ravel())[0].",
+                "K1 = np.eye(3) - A[:, :3, :3]; K2 = A[:, :3, 3] - B[:, :3, 3] @ R.T; return np.linalg.lstsq(K1.reshape(-1, 3), K2.ravel())[0].",
             ),
             mistakes=[
                 Mistake(

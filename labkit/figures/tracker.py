@@ -2,6 +2,7 @@
 repeated calibrations."""
 
 import numpy as np
+from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
 from . import style
@@ -19,6 +20,16 @@ class Trail:
         self.tracker = scene.triad("E", triad)
         self.tracker.name_at(-9, 10)
         scene.fixed(scene.triad("W", triad, linestyle=(0, (3, 1.5))), np.eye(4))
+        keys = (
+            ("measurement", "reading", {"markersize": 3}),
+            ("rejected", "refused by the gate", {}),
+            ("estimate", "filtered", {}),
+        )
+        self.legend = scene.ax.legend(
+            handles=[Line2D([], [], **style.look(role, label=name, **more)) for role, name, more in keys],
+            loc="upper left",
+            fontsize=8,
+        )
 
     def set(self, positions, used, filtered, T_WE):
         """Positions (k, 3), which of them passed the gate, the filtered positions, the last pose."""
@@ -124,7 +135,7 @@ class Repeated:
     """Repeated calibrations in two coordinates: each result, the ellipse of their spread, the ellipse a single run
     claims, the truth."""
 
-    def __init__(self, ax, truth, half_width=3.0):
+    def __init__(self, ax, truth, half_width=4.2):
         style.axes(ax, "y of the mounting (mm)", "z of the mounting (mm)", "six runs, each 21 poses")
         ax.set(xlim=(truth[1] - half_width, truth[1] + half_width), ylim=(truth[2] - half_width, truth[2] + half_width))
         ax.plot(
