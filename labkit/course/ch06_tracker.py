@@ -1023,6 +1023,24 @@ CHAPTER = Chapter(
                 ),
                 Mistake(lambda: _heights().var(), "This is the variance, in square millimeters. Its root is wanted."),
                 Mistake(
+                    lambda: _heights().var(ddof=1),
+                    "This is a variance, in square millimeters, and divided by 5. Divide by 6 and take the root.",
+                ),
+                Mistake(
+                    lambda: _heights().mean(), "This is the mean height. Wanted is how far the six scatter about it."
+                ),
+                *(
+                    Mistake(
+                        lambda axis=axis: np.std([m.T_FE[axis, 3] for m in synthetic_mountings()]),
+                        "This is the spread of another coordinate. The height z is `mountings[:, 2, 3]`.",
+                    )
+                    for axis in (0, 1)
+                ),
+                Mistake(
+                    lambda: np.std([m.T_FE for m in synthetic_mountings()]),
+                    "You took all entries of all matrices together. The height z is `mountings[:, 2, 3]`.",
+                ),
+                Mistake(
                     lambda: np.ptp(_heights()),
                     "This is the range from the lowest to the highest. Wanted is the standard deviation.",
                 ),
