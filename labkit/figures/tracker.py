@@ -14,9 +14,9 @@ class Trail:
     """Readings on their way through space: good ones, gated ones, and the filtered path."""
 
     def __init__(self, scene, triad=90.0):
-        self.readings = scene.points(**style.look("measurement", markersize=3, markeredgewidth=0))
+        self.readings = scene.points(**style.look("measurement", markersize=4.5, markeredgewidth=0))
         self.rejected = scene.points(**style.look("rejected"))
-        self.path = scene.line(**style.look("estimate"))
+        self.path = scene.line(**style.look("estimate", linewidth=1.8))
         self.tracker = scene.triad("E", triad)
         self.tracker.name_at(-9, 10)
         scene.fixed(scene.triad("W", triad, linestyle=(0, (3, 1.5))), np.eye(4))
@@ -41,6 +41,10 @@ class Trail:
         ):
             item.set(points if len(points) else nothing)
         self.tracker.set(T_WE)
+
+    def path_in_front(self):
+        """The filtered path over its readings, which are as deep in the scene; call it after the scene is drawn."""
+        self.path.artist.set_zorder(3.2)
 
 
 class RotationAxes:

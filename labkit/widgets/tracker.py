@@ -103,6 +103,7 @@ def live_tracker():
         def update(state, result):
             trail.set(result["positions"], result["used"], result["filtered"], result["T_WE"])
             space.draw(state["view"])
+            trail.path_in_front()
             words.set_text(_live_words(result))
 
         return [*space.artists, words], update
