@@ -59,7 +59,7 @@ def decode_packet(data):
 # ## A stream
 #
 # The tracker sends 250 packets a second by UDP, and UDP promises nothing. Decide first. Then press play: these are real packets between two threads on
-# your machine. Raise the loss, switch on the nonsense (the report's *nesmyslné hodnoty*), look at the books.
+# your machine. Raise the loss, switch on the nonsense (the report's *nesmyslné hodnoty*), watch the counters.
 
 # %% predict-loss
 guess = ...  # your code here
@@ -69,7 +69,7 @@ guess = "from gaps in the time stamps"
 ex.predict("loss", guess, reveal=stages.live_tracker)
 
 # %% books [markdown]
-# A receiver is honest when its books balance with the sender's, whatever the order of arrival. Two seconds of stream, sent at ten times the speed:
+# A receiver is honest when its counts agree with the sender's, whatever the order of arrival. Two seconds of stream, sent at ten times the speed:
 
 # %% balance-the-books
 faults = udp.Faults(loss=0.05, duplicate=0.03, reorder=0.05, malformed=0.02, foreign=0.02)
@@ -111,7 +111,8 @@ def dh_matrix(theta, d, a, alpha):
 # %% forward_kinematics
 @ex.forward_kinematics
 def forward_kinematics(dh, q):
-    """Return T_BF, shape (4, 4); rows of dh are theta offset, d, a, alpha; q are the joint angles (rad)."""
+    """Return T_BF, shape (4, 4); rows of dh, shape (6, 4), are theta offset, d, a, alpha;
+    q, shape (6,), are the joint angles (rad)."""
     ### BEGIN SOLUTION
     T = np.eye(4)
     for (offset, d, a, alpha), angle in zip(dh, q):
@@ -145,7 +146,8 @@ ex.predict("axes", guess, reveal=stages.two_axes)
 # %% kron_row
 @ex.kron_row
 def kron_row(A, B):
-    """Return the block of one motion, shape (9, 9), from the rotations of flange and tracker, (3, 3) each."""
+    """Return the block of one motion, shape (9, 9), from the rotations A of the flange and B of the tracker,
+    shape (3, 3) each; its sign is free."""
     ### BEGIN SOLUTION
     return np.kron(np.eye(3), A) - np.kron(B.T, np.eye(3))
     ### END SOLUTION
@@ -212,7 +214,8 @@ def e_trans(residuals):
 # ## A rule, before looking
 #
 # At each of 21 poses the robot rests and 4 s of readings are averaged. "Evidently wrong" values were left out by eye. A rule fixed beforehand is fair: keep what
-# lies within some standard deviations of the median, where the standard deviation comes from the median distance and is deaf to outliers.
+# lies within some standard deviations of the median. Estimate this standard deviation as 1.4826 times the median of the distances from the median: for normal noise it is
+# the same, and a few outliers hardly move it.
 
 # %% reject_outliers
 @ex.reject_outliers
@@ -342,7 +345,9 @@ ex.predict("motion", guess, reveal=stages.dynamic_errors)
 # %% time_offset
 @ex.time_offset
 def time_offset(time, reference, delayed, max_offset=0.2):
-    """Return by how many seconds, at most +-max_offset, `delayed` lags behind `reference`; finer than a sample."""
+    """Return by how many seconds, at most +-max_offset, `delayed` lags behind `reference`; finer than a sample.
+
+    Both are angular speeds (rad/s), shape (n,), at the same equally spaced times (s)."""
     ### BEGIN SOLUTION
     step = time[1] - time[0]
     n = round(max_offset / step)

@@ -39,6 +39,11 @@ def _fields(change=lambda v: v, dtype="<f8", time=1, position=2, quaternion=11, 
     return variant
 
 
+def _integers(data):
+    v = np.frombuffer(data, "<i8")
+    return v[1], 1000 * v[2:5], v[11:15]
+
+
 def _scalar_first(data):
     time, position, q = decode_packet(data)
     return time, position, np.roll(q, 1)
@@ -50,6 +55,11 @@ def _scalar_first(data):
 def link(rng):
     """Parameters of one link: rad, mm, mm, rad."""
     return (*rng.uniform((-3, 50, 50, -1.5), (3, 300, 300, -0.3)),)
+
+
+def _entry_by_entry(th, d, a, al):
+    steps = ((th, 0, 0, 0), (0, d, 0, 0), (0, 0, a, 0), (0, 0, 0, al))
+    return functools.reduce(np.multiply, [robot.dh_matrix(*map(float, step)) for step in steps])
 
 
 def _link(order, theta=1, alpha=1, swap=False):
@@ -69,6 +79,20 @@ def _link(order, theta=1, alpha=1, swap=False):
     return variant
 
 
+def _moved_last(th, d, a, al):
+    """The link with the step a along an x that nothing has turned, and d along the last z."""
+    return pose(exp_so3([0, 0, th]) @ exp_so3([al, 0, 0]), exp_so3([0, 0, th]) @ exp_so3([al, 0, 0]) @ [a, 0, d])
+
+
+def _without(*steps):
+    """The link without some of its steps."""
+
+    def variant(*given):
+        return robot.dh_matrix(*(0.0 if k in steps else value for k, value in enumerate(given)))
+
+    return variant
+
+
 def joint_angles(rng):
     return robot.TX40.dh, rng.uniform(robot.TX40.q_min, robot.TX40.q_max)
 
@@ -84,8 +108,9 @@ def _without_offsets(dh, q):
 # A X = X B -------------------------------------------------------------------------------------------------------------------
 
 
-def motions(rng, n=8, std_deg=0.3, std_mm=1.0):
-    """Motions of flange and tracker with noise, A X = X B."""
+def motions(rng, n=None, std_deg=0.3, std_mm=1.0):
+    """Motions of flange and tracker with noise, A X = X B; their number differs from draw to draw, never 8 or 9."""
+    n = n or rng.integers(10, 15)
     axes = rng.uniform(0.3, 1.2, (n, 1)) * normalize(rng.normal(size=(n, 3)))
     X = pose(exp_so3(rng.normal(size=3)), rng.uniform(-80, 80, 3))
     A = pose(exp_so3(axes), rng.uniform(-200, 200, (n, 3)))
@@ -136,6 +161,16 @@ def _orthonormal(X):
     return U @ Vt
 
 
+def _transposed_twice(M):
+    U, _, Vt = np.linalg.svd(_signed(_null(M).reshape(3, 3, order="F")))
+    return U @ Vt.T
+
+
+def _by_qr(M, signed):
+    Q, R = np.linalg.qr(_signed(_null(M).reshape(3, 3, order="F")))
+    return Q * np.sign(np.diag(R)) if signed else Q
+
+
 def translation_problem(rng):
     A, B = motions(rng)
     return A, B, axxb.rotation_from_kronecker(axxb.kronecker_matrix(A, B))[0]
@@ -169,11 +204,18 @@ def gaps(rng):
 # Outliers and time -----------------------------------------------------------------------------------------------------------
 
 
-def spoiled(rng):
-    """Values about 50 with nonsense on both sides, some gross and some mild, and a factor."""
-    core = np.r_[np.linspace(-1, 1, 31) + 0.02 * rng.normal(size=31), -3.1, 3.2]
-    values = 50 + rng.uniform(0.5, 2) * np.r_[core, -14, -6, 6.5, 42, 45, 47]
-    return rng.permutation(values), 4.0
+SHARES = np.array([0.43, 0.5, 0.57, 0.64, 0.71, 0.78, 0.85, 0.92, 1.08, 1.2, 1.5, 1.9, 2.6, 4.0, 30.0])
+
+
+def spoiled(rng, factor):
+    """Values about 50, and more on both sides at certain shares of the limit: every other rule draws its line between
+    two of them, the rule itself where none is near.
+    """
+    core = np.r_[np.linspace(-1, 1, 121), np.zeros(4)] + 0.01 * rng.normal(size=125)
+    tail = np.r_[SHARES, SHARES[9:], -SHARES[:9]]
+    limit = factor * 1.4826 * _mad(np.r_[core, 99 * np.sign(tail)])
+    values = np.r_[core, np.median(np.r_[core, 99 * np.sign(tail)]) + limit * tail]
+    return rng.permutation(50 + rng.uniform(0.5, 2) * values), factor
 
 
 def _keep(center, scale, above=False):
@@ -184,15 +226,20 @@ def _keep(center, scale, above=False):
     return variant
 
 
+def _tukey(values, factor):
+    low, high = np.percentile(values, [25, 75])
+    return (values >= low - 1.5 * (high - low)) & (values <= high + 1.5 * (high - low))
+
+
 def _mad(values):
     return np.median(np.abs(values - np.median(values)))
 
 
-def speed_curves(rng):
-    """Angular speeds of a robot and of a tracker that lags, or leads, by a fraction of a sample."""
+def speed_curves(rng, sign):
+    """Angular speeds of a robot and of a tracker that lags (sign 1), or leads (-1), by a fraction of a sample."""
     time = np.arange(600) / 100
     phase = rng.uniform(0, 6, 3)
-    lag = rng.choice([-1, 1]) * (rng.integers(2, 8) + rng.choice([0.35, 0.42, 0.58, 0.65])) / 100
+    lag = sign * (rng.integers(7, 15) + rng.choice([0.35, 0.42, 0.58, 0.65])) / 100
 
     def curve(t):
         return (
@@ -220,14 +267,39 @@ def _around(reference, delayed):
     return np.array([np.mean((np.roll(reference, s) - delayed) ** 2) for s in shifts]), shifts
 
 
+def _shifted(cost, reference, delayed, first=-20):
+    """Costs of the shifts from `first` to 20 samples over the part both curves share, and the shifts."""
+    n, shifts = len(reference), np.arange(first, 21)
+    parts = [(reference[max(0, -s) : n - max(0, s)], delayed[max(0, s) : n + min(0, s)]) for s in shifts]
+    return np.array([cost(r, d) for r, d in parts]), shifts
+
+
+def _squares(reference, delayed, first=-20):
+    return _shifted(lambda r, d: np.mean((d - r) ** 2), reference, delayed, first)
+
+
+def _products(reference, delayed):
+    """Sums of products over a core of constant length: the amount still varies with what the shift brings in."""
+    core = slice(20, -20)
+    shifts = np.arange(-20, 21)
+    return np.array([-(reference[core] * np.roll(delayed, -s)[core]).sum() for s in shifts]), shifts
+
+
+def _plain_differences(reference, delayed):
+    core, shifts = slice(20, -20), np.arange(-20, 21)
+    return np.array([np.mean(reference[core] - np.roll(delayed, -s)[core]) for s in shifts]), shifts
+
+
 def _least(costs, between):
     """A time offset from costs of shifts, by whole samples or between them."""
 
     def variant(time, reference, delayed, max_offset):
         cost, shifts = costs(reference, delayed)
-        k = np.argmin(cost)
-        left, middle, right = cost[k - 1 : k + 2]
-        part = 0.5 * (left - right) / (left - 2 * middle + right) if between else 0.0
+        k = np.clip(np.argmin(cost), 1, len(cost) - 2) if between else np.argmin(cost)
+        part = 0.0
+        if between:
+            left, middle, right = cost[k - 1 : k + 2]
+            part = 0.5 * (left - right) / (left - 2 * middle + right)
         return (shifts[k] + part) * (time[1] - time[0])
 
     return variant
@@ -307,6 +379,27 @@ CHAPTER = Chapter(
                     _fields(quaternion=15),
                     "These are angular velocities. The quaternion starts at byte 88, which is number 11.",
                 ),
+                Mistake(
+                    _fields(position=8),
+                    "These are the linear accelerations (bytes 64 to 87). The position starts at byte 16.",
+                ),
+                Mistake(_fields(time=0), "Number 0 is the device. The time stamp comes second, number 1."),
+                *(
+                    Mistake(_fields(quaternion=k), "The quaternion is shifted by one field: it is numbers 11 to 14.")
+                    for k in (10, 12)
+                ),
+                Mistake(
+                    _fields(dtype="<f4"),
+                    "You read 46 numbers of 4 bytes. The fields have 8 bytes each: 23 doubles, `<f8`.",
+                ),
+                Mistake(
+                    _integers,
+                    "You read the fields as integers, so the numbers come out absurd. The workbook assumes doubles, `<f8`.",
+                ),
+                Mistake(
+                    _fields(dtype="u1"),
+                    "You picked single bytes. Turn every 8 bytes into one number first: `np.frombuffer` or `struct.unpack`.",
+                ),
                 Mistake(_scalar_first, "The packet's quaternion is x, y, z, w: you put w first."),
                 Mistake(
                     _fields(dtype=">f8"),
@@ -330,7 +423,8 @@ CHAPTER = Chapter(
             hints=(
                 "Four elementary transforms in a row: turn about z, go along z, go along the new x, turn about the new x.",
                 "Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha): the last column is (a cos theta, a sin theta, d).",
-                "Rows: (c, -s ca, s sa, a c), (s, c ca, -c sa, a s), (0, sa, ca, d), (0, 0, 0, 1).",
+                "c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha); "
+                "return np.array([[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]]).",
             ),
             mistakes=[
                 Mistake(
@@ -345,11 +439,31 @@ CHAPTER = Chapter(
                     "You moved along x before turning about z, so the step a ignores theta. The last column begins with a cos(theta), a sin(theta).",
                 ),
                 Mistake(
+                    _moved_last,
+                    "d goes along the old z, before the turn by alpha. You moved after both turns.",
+                ),
+                Mistake(_entry_by_entry, "`*` multiplies entry by entry. The product of two transforms is `@`."),
+                Mistake(_without(1), "d is missing: the last column is (a cos theta, a sin theta, d)."),
+                Mistake(
+                    lambda th, d, a, al: robot.dh_matrix(al, d, a, th),
+                    "The angles have changed places: theta turns about z, alpha about x.",
+                ),
+                Mistake(
+                    lambda th, d, a, al: pose(
+                        exp_so3([al, 0, 0]) @ exp_so3([0, 0, th]), robot.dh_matrix(th, d, a, al)[:3, 3]
+                    ),
+                    "The two turns come in the wrong order: first about z, then about the new x, so R = Rz(theta) Rx(alpha).",
+                ),
+                Mistake(
                     lambda *p: invert(robot.dh_matrix(*p)), "This is the inverse: it maps from frame i - 1 to frame i."
                 ),
                 Mistake(
                     lambda th, d, a, al: robot.dh_matrix(np.deg2rad(th), d, a, np.deg2rad(al)),
                     "The angles already are radians: you converted them once too often.",
+                ),
+                Mistake(
+                    lambda th, d, a, al: robot.dh_matrix(np.rad2deg(th), d, a, np.rad2deg(al)),
+                    "The angles already are radians, which is what np.sin and np.cos take: convert nothing.",
                 ),
             ],
         ),
@@ -389,6 +503,41 @@ CHAPTER = Chapter(
                     "`*` multiplies entry by entry. The product of two transforms is `@`.",
                 ),
                 Mistake(
+                    lambda dh, q: robot.forward_kinematics(dh, 0 * q),
+                    "q does nothing here: the angle of a link is its offset plus the joint's angle.",
+                ),
+                Mistake(
+                    lambda dh, q: robot.forward_kinematics(dh, np.deg2rad(q)),
+                    "The joint angles already are radians: you converted them once too often.",
+                ),
+                Mistake(
+                    lambda dh, q: robot.forward_kinematics(dh[:, [0, 2, 1, 3]], q),
+                    "d and a have changed places: the columns of dh are theta offset, d, a, alpha.",
+                ),
+                Mistake(
+                    lambda dh, q: robot.forward_kinematics(dh[:, [3, 1, 2, 0]], q),
+                    "Offset and alpha have changed places: the columns of dh are theta offset, d, a, alpha.",
+                ),
+                Mistake(
+                    lambda dh, q: robot.forward_kinematics(dh, q - 2 * dh[:, 0]),
+                    "The offset enters with the wrong sign: the angle of a link is offset + q.",
+                ),
+                Mistake(
+                    lambda dh, q: _links(dh, q)[-1],
+                    "This is the last link alone. Multiply inside the loop: T = T @ link.",
+                ),
+                Mistake(
+                    lambda dh, q: _links(dh, q)[0],
+                    "This is the first link alone: does `return` stand inside the loop?",
+                ),
+                Mistake(
+                    lambda dh, q: _links(dh, q).sum(axis=0),
+                    "You added the links. Transforms in a row are multiplied with `@`.",
+                ),
+                Mistake(
+                    _links, "You return all links. Their product is the flange: T = T @ link, from base to flange."
+                ),
+                Mistake(
                     lambda dh, q: robot.forward_kinematics(dh, -q),
                     "The joint angles enter with the wrong sign: the angle of a link is offset + q.",
                 ),
@@ -409,7 +558,7 @@ CHAPTER = Chapter(
             "kron_row",
             reference=kron_row,
             draw=one_motion,
-            metric=metrics.numbers(1e-9),
+            metric=metrics.up_to_sign(1e-9),
             hints=(
                 "Bring A X - X B = 0 into the form M vec(X) = 0, with the columns of X stacked.",
                 "For stacked columns, vec(P X Q) = (Q' kron P) vec(X). Once P = A, Q = I, once P = I, Q = B.",
@@ -440,9 +589,36 @@ CHAPTER = Chapter(
                     lambda A, B: np.kron(A, np.eye(3)) - np.kron(np.eye(3), B),
                     "vec(P X Q) = (Q' kron P) vec(X): P stands on the right of the product, Q on the left and transposed. A is a P, B is a Q.",
                 ),
-                Mistake(
-                    lambda A, B: np.kron(B.T, np.eye(3)) - np.kron(np.eye(3), A),
-                    "This is the block of X B - A X = 0: the same null vector, so nothing is lost, but the report subtracts X B from A X.",
+                *(
+                    Mistake(
+                        variant,
+                        "One of the two factors stands on the wrong side: vec(A X) = (I kron A) vec(X), vec(X B) = (B' kron I) vec(X).",
+                    )
+                    for variant in (
+                        lambda A, B: np.kron(np.eye(3), A) - np.kron(np.eye(3), B.T),
+                        lambda A, B: np.kron(A, np.eye(3)) - np.kron(B.T, np.eye(3)),
+                    )
+                ),
+                *(
+                    Mistake(
+                        variant,
+                        "This belongs to the product A X B. Here two products are subtracted, A X - X B: each has its own kron, with I.",
+                    )
+                    for variant in (
+                        lambda A, B: np.kron(B.T, A),
+                        lambda A, B: np.kron(B.T, A) - np.eye(9),
+                        lambda A, B: np.kron(A, B.T),
+                        lambda A, B: np.kron(A, B),
+                    )
+                ),
+                *(
+                    Mistake(
+                        variant, "Only one of the two products is here: the block of A X - X B = 0 is a difference."
+                    )
+                    for variant in (
+                        lambda A, B: np.kron(np.eye(3), A),
+                        lambda A, B: np.kron(B.T, np.eye(3)),
+                    )
                 ),
             ],
         ),
@@ -497,6 +673,41 @@ CHAPTER = Chapter(
                     lambda M: axxb.nearest_rotation(_signed(_null(M, 0).reshape(3, 3, order="F"))),
                     "This belongs to the largest singular value. NumPy sorts them from large to small: take the last row of Vt.",
                 ),
+                Mistake(
+                    lambda M: axxb.nearest_rotation(_signed(np.linalg.eigh(M.T @ M)[1][0].reshape(3, 3, order="F"))),
+                    "You took a row of what `eigh` returns. Its eigenvectors are the columns, smallest eigenvalue first.",
+                ),
+                Mistake(
+                    lambda M: axxb.nearest_rotation(_signed(_null(M[:9]).reshape(3, 3, order="F"))),
+                    "Only the first motion is used, and one axis leaves the rotation about it free: take all rows of M.",
+                ),
+                Mistake(
+                    lambda M: np.zeros((3, 3)),
+                    "Zero solves M x = 0 as well, and that is what `lstsq` and `solve` find. A solution of length 1 is wanted: "
+                    "the last row of Vt.",
+                ),
+                Mistake(
+                    _transposed_twice,
+                    "NumPy's svd returns V transposed as its third result: the nearest rotation is U @ Vt, without another `.T`.",
+                ),
+                *(
+                    Mistake(
+                        lambda M, keep=keep: _by_qr(M, keep),
+                        "QR keeps the direction of the first column and bends the others to fit. The nearest rotation treats all alike: "
+                        "U @ Vt of a second SVD.",
+                    )
+                    for keep in (True, False)
+                ),
+                *(
+                    Mistake(
+                        variant,
+                        "The lengths are right, but noise has sheared the matrix: its columns are not orthogonal. Project it to SO(3).",
+                    )
+                    for variant in (
+                        lambda M: normalize(_signed(_null(M).reshape(3, 3))).T,
+                        lambda M: normalize(_signed(_null(M).reshape(3, 3, order="F"))),
+                    )
+                ),
             ],
         ),
         Exercise(
@@ -507,7 +718,7 @@ CHAPTER = Chapter(
             hints=(
                 "Write out the last column of A X = X B. It is linear in the translation t once R is known.",
                 "R_A t + t_A = R t_B + t, so (I - R_A) t = t_A - R t_B: three rows a motion, stacked.",
-                "K1 = np.eye(3) - A[:, :3, :3]; K2 = A[:, :3, 3] - B[:, :3, 3] @ R.T; np.linalg.lstsq(K1.reshape(-1, 3), K2.ravel())[0].",
+                "K1 = np.eye(3) - A[:, :3, :3]; K2 = A[:, :3, 3] - B[:, :3, 3] @ R.T; return np.linalg.lstsq(K1.reshape(-1, 3), K2.ravel())[0].",
             ),
             mistakes=[
                 Mistake(
@@ -529,6 +740,39 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda A, B, R: np.linalg.lstsq(_k1(A)[0], _k2(A, B, R)[0], rcond=None)[0],
                     "Only the first motion is used. Its axis component stays undetermined: stack all motions.",
+                ),
+                Mistake(
+                    lambda A, B, R: np.einsum("nij,nj->ni", np.linalg.pinv(_k1(A)), _k2(A, B, R)).mean(axis=0),
+                    "You solved each motion alone and averaged. Each leaves t along its own axis free, and pinv sets that part to zero: "
+                    "stack all motions, solve once.",
+                ),
+                Mistake(
+                    _translation(lambda A: np.eye(3) + A[:, :3, :3], _k2),
+                    "K1 has the wrong sign: (I - R_A) t = t_A - R t_B.",
+                ),
+                Mistake(
+                    _translation(_k1, lambda A, B, R: A[:, :3, 3] + B[:, :3, 3] @ R.T),
+                    "K2 has the wrong sign: (I - R_A) t = t_A - R t_B.",
+                ),
+                Mistake(
+                    lambda A, B, R: _translation(_k1, _k2)(B, A, R),
+                    "A and B have changed places: K1 takes the rotations of the flange, and R turns the tracker's translations.",
+                ),
+                Mistake(
+                    lambda A, B, R: _translation(lambda _: _k1(B), _k2)(A, B, R),
+                    "K1 holds the rotations of the tracker. (I - R_A) t = t_A - R t_B: the flange's belong here.",
+                ),
+                *(
+                    Mistake(
+                        variant,
+                        "K1 and K2 stack their rows in different orders: first x, y, z of motion 1, then of motion 2, in both.",
+                    )
+                    for variant in (
+                        lambda A, B, R: np.linalg.lstsq(_k1(A).reshape(-1, 3), _k2(A, B, R).T.ravel(), rcond=None)[0],
+                        lambda A, B, R: np.linalg.lstsq(
+                            np.hstack(_k1(A)).reshape(-1, 3), _k2(A, B, R).ravel(), rcond=None
+                        )[0],
+                    )
                 ),
             ],
         ),
@@ -562,6 +806,35 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda M: np.linalg.norm(M.T @ M @ _null(M, 0)) / (len(M) / 9 - 1),
                     "This is the largest singular vector. The null vector is the last row of Vt.",
+                ),
+                Mistake(
+                    lambda M: tracker.e_rot(M) * (len(M) / 9 - 1),
+                    "The division by N - 1 is missing; N is the number of motions, len(M) / 9.",
+                ),
+                Mistake(
+                    lambda M: tracker.e_rot(M) * (len(M) / 9 - 1) / (len(M) / 9) - 1,
+                    "Parentheses are missing: / (N - 1), not / N - 1.",
+                ),
+                Mistake(
+                    lambda M: (tracker.e_rot(M) * (len(M) / 9 - 1)) ** 2 / (len(M) / 9 - 1),
+                    "You squared the norm. Equation (13) does not square it; M'M contains the squares already.",
+                ),
+                Mistake(
+                    lambda M: np.linalg.norm(M.T @ M @ np.linalg.svd(M)[2][:, -1]) / (len(M) / 9 - 1),
+                    "You took a column of NumPy's third result. That is V transposed: the singular vectors are its rows.",
+                ),
+                *(
+                    Mistake(
+                        lambda M, order=order: (
+                            np.linalg.norm(M.T @ M @ rotation_from_nullvector(M).ravel(order)) / (len(M) / 9 - 1)
+                        ),
+                        "You put in the projected rotation. Equation (13) takes the null vector v itself, before sign, length and projection.",
+                    )
+                    for order in "FC"
+                ),
+                Mistake(
+                    lambda M: np.linalg.norm(M.T @ M) / (len(M) / 9 - 1),
+                    "v is missing: this is the norm of the whole matrix M'M, not of M'M v.",
                 ),
             ],
         ),
@@ -597,13 +870,45 @@ CHAPTER = Chapter(
                     lambda r: np.linalg.norm(r, 2) / (len(r) - 1),
                     "For a matrix, norm(..., 2) is its largest singular value. Equation (17) takes the norm of one long vector.",
                 ),
-                Mistake(lambda r: np.linalg.norm(r) / (r.size - 1), "N counts motions, not coordinates."),
+                *(
+                    Mistake(variant, "N counts motions, not coordinates.")
+                    for variant in (
+                        lambda r: np.linalg.norm(r) / (r.size - 1),
+                        lambda r: np.linalg.norm(r) / (r.size - 3),
+                        lambda r: np.linalg.norm(r) / r.size,
+                    )
+                ),
+                Mistake(
+                    np.linalg.norm, "The division by N - 1 is missing; N is the number of motions, len(residuals)."
+                ),
+                Mistake(lambda r: np.linalg.norm(r) / len(r) - 1, "Parentheses are missing: / (N - 1), not / N - 1."),
+                *(
+                    Mistake(
+                        variant,
+                        "This is a root mean square, the better definition. Equation (17) takes no mean inside the root, and divides by N - 1.",
+                    )
+                    for variant in (
+                        lambda r: np.sqrt((r**2).mean()),
+                        lambda r: np.sqrt((r**2).sum(axis=1).mean()),
+                    )
+                ),
+                *(
+                    Mistake(
+                        lambda r, axis=axis: np.linalg.norm(r, axis=axis) / (len(r) - 1),
+                        "You return several norms. Equation (17) takes one norm over everything: no `axis`.",
+                    )
+                    for axis in (0, 1)
+                ),
+                Mistake(
+                    lambda r: np.abs(r).sum() / (len(r) - 1),
+                    "You added absolute values. The norm is the root of the sum of the squares.",
+                ),
             ],
         ),
         Exercise(
             "reject_outliers",
             reference=tracker.reject_outliers,
-            draw=spoiled,
+            draw=tuple(functools.partial(spoiled, factor=factor) for factor in (4.0, 3.0, 5.0)),
             metric=metrics.exactly(),
             hints=(
                 "Measure how far each value is from the middle, in units of a spread. Outliers must move neither of the two.",
@@ -624,6 +929,50 @@ CHAPTER = Chapter(
                     "You took the mean of the distances. Gross values blow it up; take their median.",
                 ),
                 Mistake(lambda v, f: ~tracker.reject_outliers(v, f), "True means keep: your answer is the opposite."),
+                *(
+                    Mistake(
+                        _keep(np.mean, scale),
+                        "The mean is moved by the nonsense: measure the distances from the median.",
+                    )
+                    for scale in (
+                        lambda v: 1.4826 * _mad(v),
+                        lambda v: 1.4826 * np.median(np.abs(v - v.mean())),
+                    )
+                ),
+                Mistake(
+                    _keep(np.median, lambda v: _mad(v) / 1.4826),
+                    "Multiply the median distance by 1.4826: it is smaller than a standard deviation. You divided.",
+                ),
+                Mistake(
+                    lambda v, f: tracker.reject_outliers(v, 1.0),
+                    "`factor` is missing: you allow one standard deviation.",
+                ),
+                *(
+                    Mistake(
+                        lambda v, f, fixed=fixed: tracker.reject_outliers(v, fixed),
+                        "You use a number of your own in place of `factor`: the caller chooses it.",
+                    )
+                    for fixed in (4.0, 3.0)
+                ),
+                Mistake(
+                    _keep(np.median, lambda v: 1.0),
+                    "You compare distances with `factor` itself. It counts standard deviations: multiply it by the robust one.",
+                ),
+                Mistake(
+                    lambda v, f: v[tracker.reject_outliers(v, f)],
+                    "You return the values that stay. Wanted is True or False for each value.",
+                ),
+                *(
+                    Mistake(variant, "You return indices. Wanted is True or False for each value.")
+                    for variant in (
+                        lambda v, f: np.flatnonzero(tracker.reject_outliers(v, f)),
+                        lambda v, f: np.flatnonzero(~tracker.reject_outliers(v, f)),
+                    )
+                ),
+                Mistake(
+                    _tukey,
+                    "This is the rule of a box plot, 1.5 times the quartile distance. It knows no `factor`; take the median distance.",
+                ),
                 Mistake(
                     _keep(np.median, lambda v: 1.4826 * _mad(v), above=True),
                     "Values far below the middle pass: take the absolute value of the distance.",
@@ -638,7 +987,8 @@ CHAPTER = Chapter(
             hints=(
                 "Put your own functions in a row: blocks, rotation, translation. Pose 13 of this run is nonsense and must not take part.",
                 "A_kept, B_kept = A[kept][1:], B[kept][1:] are the motions that take part: kept poses, without the reference itself.",
-                "M = np.concatenate([kron_row(a[:3, :3], b[:3, :3]) for a, b in zip(A_kept, B_kept)]), then rotation_from_nullvector and translation_lsq.",
+                "M = np.concatenate([kron_row(a[:3, :3], b[:3, :3]) for a, b in zip(A_kept, B_kept)]); R = rotation_from_nullvector(M); "
+                "mounting = np.eye(4); mounting[:3, :3] = R; mounting[:3, 3] = translation_lsq(A_kept, B_kept, R).",
             ),
             mistakes=[
                 Mistake(
@@ -673,6 +1023,24 @@ CHAPTER = Chapter(
                 ),
                 Mistake(lambda: _heights().var(), "This is the variance, in square millimeters. Its root is wanted."),
                 Mistake(
+                    lambda: _heights().var(ddof=1),
+                    "This is a variance, in square millimeters, and divided by 5. Divide by 6 and take the root.",
+                ),
+                Mistake(
+                    lambda: _heights().mean(), "This is the mean height. Wanted is how far the six scatter about it."
+                ),
+                *(
+                    Mistake(
+                        lambda axis=axis: np.std([m.T_FE[axis, 3] for m in synthetic_mountings()]),
+                        "This is the spread of another coordinate. The height z is `mountings[:, 2, 3]`.",
+                    )
+                    for axis in (0, 1)
+                ),
+                Mistake(
+                    lambda: np.std([m.T_FE for m in synthetic_mountings()]),
+                    "You took all entries of all matrices together. The height z is `mountings[:, 2, 3]`.",
+                ),
+                Mistake(
                     lambda: np.ptp(_heights()),
                     "This is the range from the lowest to the highest. Wanted is the standard deviation.",
                 ),
@@ -689,7 +1057,7 @@ CHAPTER = Chapter(
         Prediction(
             "runs",
             question="Six runs over the same 21 poses agree within 0.2 mm. How far from the truth is their mean?",
-            choices=("about 0.1 mm", "about 0.2 mm", "more than 1 mm", "the runs alone cannot tell"),
+            choices=("about 0.1 mm, the spread over root 6", "about 0.2 mm, the spread", "the runs alone cannot tell"),
             answer="the runs alone cannot tell",
             why="An error that depends on the place repeats with the poses. Repeating shows the random part only; here the mean is off by more than 1 mm.",
         ),
@@ -711,12 +1079,15 @@ CHAPTER = Chapter(
         Exercise(
             "time_offset",
             reference=tracker.time_offset,
-            draw=speed_curves,
+            draw=tuple(functools.partial(speed_curves, sign=sign) for sign in (1, -1)),
             metric=metrics.numbers(6e-4, "s"),
             hints=(
                 "Shift one curve against the other, sample by sample, and find where they differ least. Then look between the samples.",
                 "Cost of a shift s: mean of (delayed[k + s] - reference[k])^2 over the common part. A parabola through the best three has its vertex at the offset.",
-                "With costs l, m, r left, at and right of the best s: offset = (s + 0.5 * (l - r) / (l - 2 * m + r)) * step.",
+                "step = time[1] - time[0]; n = round(max_offset / step); core = reference[n:-n]; "
+                "cost = [np.mean((delayed[n + s : len(time) - n + s] - core) ** 2) for s in range(-n, n + 1)]; "
+                "k = np.clip(np.argmin(cost), 1, 2 * n - 1); l, m, r = cost[k - 1 : k + 2]; "
+                "return (k - n + 0.5 * (l - r) / (l - 2 * m + r)) * step.",
             ),
             mistakes=[
                 Mistake(
@@ -751,8 +1122,27 @@ CHAPTER = Chapter(
                         "A sum of products counts how many samples overlap as well as how alike they are, so its peak is pulled aside. "
                         "Take the mean of the squared differences over the part both curves share.",
                     )
-                    for costs in (_overlap, _centered_overlap)
+                    for costs in (_overlap, _centered_overlap, _products)
                     for between in (True, False)
+                ),
+                Mistake(
+                    lambda t, r, d, m: tracker.time_offset(t, r, d, m) + m,
+                    "You count the shifts from the first one tried. That is -max_offset, not 0.",
+                ),
+                Mistake(
+                    lambda t, r, d, m: 2 * tracker.time_offset(t, r, d, m) - _whole_samples(t, r, d, m),
+                    "The fraction is twice too large: the vertex is at 0.5 * (l - r) / (l - 2 m + r).",
+                ),
+                *(
+                    Mistake(
+                        _least(functools.partial(_squares, first=0), between),
+                        "You try shifts in one direction only. The tracker may also lead: from -max_offset to max_offset.",
+                    )
+                    for between in (True, False)
+                ),
+                Mistake(
+                    _least(_plain_differences, False),
+                    "Differences of both signs cancel in a mean. Square them, or take absolute values.",
                 ),
             ],
         ),

@@ -2,6 +2,7 @@
 repeated calibrations."""
 
 import numpy as np
+from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
 from . import style
@@ -13,12 +14,22 @@ class Trail:
     """Readings on their way through space: good ones, gated ones, and the filtered path."""
 
     def __init__(self, scene, triad=90.0):
-        self.readings = scene.points(**style.look("measurement", markersize=3, markeredgewidth=0))
+        self.readings = scene.points(**style.look("measurement", markersize=4.5, markeredgewidth=0))
         self.rejected = scene.points(**style.look("rejected"))
-        self.path = scene.line(**style.look("estimate"))
+        self.path = scene.line(**style.look("estimate", linewidth=1.8))
         self.tracker = scene.triad("E", triad)
         self.tracker.name_at(-9, 10)
         scene.fixed(scene.triad("W", triad, linestyle=(0, (3, 1.5))), np.eye(4))
+        keys = (
+            ("measurement", "reading", {"markersize": 3}),
+            ("rejected", "refused by the gate", {}),
+            ("estimate", "filtered", {}),
+        )
+        self.legend = scene.ax.legend(
+            handles=[Line2D([], [], **style.look(role, label=name, **more)) for role, name, more in keys],
+            loc="upper left",
+            fontsize=8,
+        )
 
     def set(self, positions, used, filtered, T_WE):
         """Positions (k, 3), which of them passed the gate, the filtered positions, the last pose."""
@@ -30,6 +41,10 @@ class Trail:
         ):
             item.set(points if len(points) else nothing)
         self.tracker.set(T_WE)
+
+    def path_in_front(self):
+        """The filtered path over its readings, which are as deep in the scene; call it after the scene is drawn."""
+        self.path.artist.set_zorder(3.2)
 
 
 class RotationAxes:
@@ -124,7 +139,7 @@ class Repeated:
     """Repeated calibrations in two coordinates: each result, the ellipse of their spread, the ellipse a single run
     claims, the truth."""
 
-    def __init__(self, ax, truth, half_width=3.0):
+    def __init__(self, ax, truth, half_width=4.2):
         style.axes(ax, "y of the mounting (mm)", "z of the mounting (mm)", "six runs, each 21 poses")
         ax.set(xlim=(truth[1] - half_width, truth[1] + half_width), ylim=(truth[2] - half_width, truth[2] + half_width))
         ax.plot(
