@@ -132,6 +132,7 @@ def test_controls_follow_and_lead():
         (slider(0.0, 1.0, 0.3, step=0.1), 0.26, 0.3),
         (slider(0.0, 4.0, 2.0), 1.0101, 1.0),
         (slider(0.01, 100.0, 0.7, log=True), 0.7001, 0.7),
+        (slider(1e-13, 10.0, 5e-7, log=True), 10.0, 10.0),
         (slider(1, 9, 3), 4, 4),
     ],
 )
@@ -354,12 +355,26 @@ def test_click_and_brush():
 
 def test_play():
     stage = nothing(play=Play(2.0, 0.1), compute=lambda state: state["t"])
+    stage._play_widget.playing = True
     stage._play_widget.value = 7
     assert stage.result == pytest.approx(0.7) and stage._time.value == pytest.approx(0.7)
     stage._time.value = 1.2
     assert stage._play_widget.value == 12
     stage.set(t=99)
     assert stage.result == 2.0
+
+
+def test_reset_wins_against_a_tick_that_was_under_way():
+    stage = nothing(play=Play(2.0, 0.1), compute=lambda state: state["t"])
+    stage._play_widget.set_state({"playing": True})
+    stage._play_widget.set_state({"value": 7})
+    stage.reset()
+    stage._play_widget.set_state({"value": 8})
+    assert stage.result == 0.0 and (stage._play_widget.value, stage._time.value) == (0, 0.0)
+    stage._play_widget.set_state({"playing": True, "value": 1})
+    assert stage.result == pytest.approx(0.1)
+    stage._play_widget.set_state({"playing": False, "value": 0})  # its own stop button
+    assert stage.result == 0.0
 
 
 def counting(**options):
@@ -373,6 +388,7 @@ def counting(**options):
 def test_memory_follows_ticks_keys_and_clicks():
     stage, sent = wire(counting(play=Play(2.0, 0.1), keys=True, click=True))
     assert sent[-1][0]["keys"] is True
+    stage._play_widget.playing = True
     stage._play_widget.value = 2
     stage._receive({"arrows": ["up", "left"], "serial": "a:2"})
     stage._receive({"click": stage._picture.fraction(stage._picture.fig.axes[0], (1, 1)), "serial": "a:3"})

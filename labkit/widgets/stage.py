@@ -140,11 +140,14 @@ class slider:
         return low, high, (value - low) / below if below else (high - low) / 100
 
     def shown(self, value):
-        """Where the knob stands: on one of its steps. The browser would round any other number and send it back."""
+        """Where the knob stands: on one of its steps, or at the end. The browser would round any other number and send it
+        back.
+        """
         low, high, step = self._scale
         if self.integer:
             return value
-        at = low + round(((np.log10(value) if self.log else value) - low) / step) * step
+        there = np.log10(value) if self.log else value
+        at = min(low + round((there - low) / step) * step, high, key=lambda at: abs(at - there))
         return float(np.clip(10**at if self.log else round(at, 10), self.low, self.high))
 
     def widget(self, name):
@@ -456,7 +459,7 @@ class Stage(ipywidgets.VBox):
         interval = max(20, round(1000 * self._play.dt / self._play.rate))
         stride = max(1, round(interval * self._play.rate / (1000 * self._play.dt)))
         self._play_widget = ipywidgets.Play(min=0, max=steps, step=stride, interval=interval, show_repeat=False)
-        self._play_widget.observe(lambda change: self._on_time(change["new"] * self._play.dt), "value")
+        self._play_widget.observe(lambda change: self._on_tick(change["new"]), "value")
         self._time = ipywidgets.FloatSlider(
             min=0.0, max=self._play.t_max, step=self._play.dt, description="t (s)", readout_format=".2f",
             disabled=bool(self._advance), style={"description_width": "initial"}, layout=_wide("t (s)"),
@@ -468,6 +471,13 @@ class Stage(ipywidgets.VBox):
         control = self._controls[key]
         if not self._showing and not _same(control.shown(self._state[key]), change["new"]):
             self._apply({key: control.check(key, change["new"])})
+
+    def _on_tick(self, tick):
+        """A tick of the play button. One that was under way when Reset stopped the clock is set right, not obeyed."""
+        if self._play_widget.playing or tick == 0:
+            self._on_time(tick * self._play.dt)
+        elif not self._showing:
+            self._show_controls()
 
     def _on_time(self, t):
         if not self._showing and abs(self._state["t"] - t) > 1e-9:
