@@ -53,7 +53,7 @@ np.set_printoptions(precision=4, suppress=True)
 # %% gradient
 @ex.gradient
 def gradient(x):
-    """Return the gradient of f at x, shape (2,)."""
+    """Return the gradient of f at x; both have shape (2,)."""
     ### BEGIN SOLUTION
     d1, d2 = x - np.array([1, 1]), x - np.array([-1, -2])
     q1, q2 = d1 @ d1 + 1, d2 @ d2 + 1
@@ -89,7 +89,7 @@ ex.predict("top", guess, reveal=stages.line)
 # %% hessian
 @ex.hessian
 def hessian(x):
-    """Return the Hessian of f at x, shape (2, 2)."""
+    """Return the Hessian of f, shape (2, 2), at x, shape (2,)."""
     ### BEGIN SOLUTION
     H = np.zeros((2, 2))
     for w, c in ((100, np.array([1, 1])), (200, np.array([-1, -2]))):
@@ -126,7 +126,10 @@ for name, H in (("yours", hessian(x)), ("listing C7", wells.printed_hessian(x)))
 # %% classify_extremum
 @ex.classify_extremum
 def classify_extremum(g, H):
-    """Return "minimum", "maximum", "saddle" or (|g| above 1e-6) "not stationary"."""
+    """Return the kind of a point with gradient g, shape (2,), and Hessian H, shape (2, 2).
+
+    It is one of these words: "minimum", "maximum", "saddle" or, where |g| > 1e-6, "not stationary".
+    """
     ### BEGIN SOLUTION
     if np.linalg.norm(g) > 1e-6:
         return "not stationary"
@@ -146,7 +149,7 @@ def classify_extremum(g, H):
 # %% newton_step
 @ex.newton_step
 def newton_step(g, H):
-    """Return the step h to the place where the quadratic model is stationary, shape (2,)."""
+    """Return the step h, shape (2,), to where the model is stationary; g has shape (2,), H (2, 2)."""
     ### BEGIN SOLUTION
     return np.linalg.solve(H, -g)
     ### END SOLUTION
@@ -179,8 +182,8 @@ for name, printed, e in zip(wells.NAMES, ((0.979, 0.968), (-0.995, -1.992), (0.1
 # Rounding to three digits explains slopes up to about 0.3 in the wells and 0.05 at the pass, not 2.5. And you found the saddle with Newton, from $(0, 0)$. Section 7.1.1 says that no method finds it and that one would have to hit "exactly" the point (*exakt der Punkt*);
 # section 2.5.2 of the same thesis says that Newton cannot tell a saddle from a minimum. How large is the neighborhood from which Newton ends in it?
 #
-# In the figure the thin lines are the two directions of curvature, solid where $f$ bends up, dashed where it bends down; the blue angle is the Newton step
-# taken apart along them. Where it bends down, Newton goes *up*. Switch to the trust region for comparison.
+# In the figure the thin lines are the two directions of curvature, solid where $f$ bends up, dashed where it bends down. The two blue bars are the Newton step,
+# one part along each direction. Where it bends down, Newton goes *up*. Switch to the trust region for comparison.
 
 # %% predict-neighborhood
 guess = ...  # your code here
@@ -203,7 +206,7 @@ ex.predict("neighborhood", guess, reveal=stages.saddle)
 # %% gauss_newton_step
 @ex.gauss_newton_step
 def gauss_newton_step(r, J):
-    """Return the step h that minimizes |r + J h|; r shape (m,), J shape (m, n)."""
+    """Return the step h, shape (n,), that minimizes |r + J h|; r has shape (m,), J (m, n), m >= n."""
     ### BEGIN SOLUTION
     return -np.linalg.solve(J.T @ J, J.T @ r)
     ### END SOLUTION
@@ -219,7 +222,10 @@ def gauss_newton_step(r, J):
 # %% gain_ratio
 @ex.gain_ratio
 def gain_ratio(cost, new_cost, g, B, step):
-    """Return actual over predicted decrease for a step, with model curvature B."""
+    """Return actual over predicted decrease, a number, negative where the cost rose.
+
+    cost and new_cost: numbers, before and after the step; g, step: shape (2,); B: shape (2, 2).
+    """
     ### BEGIN SOLUTION
     predicted = -(g @ step) - 0.5 * step @ B @ step
     return (cost - new_cost) / predicted
@@ -230,13 +236,16 @@ def gain_ratio(cost, new_cost, g, B, step):
 # ## Inside the radius: the dogleg
 #
 # Minimizing $m$ on a disk exactly takes an inner iteration. Powell's dogleg is a bent path that is nearly as good: from 0 down the gradient to the lowest
-# point in that direction, the *corner* $p = -\tfrac{g^\top g}{g^\top B g}\,g$, and from there along the leg $l = -B^{-1}g - p$ to the Newton point. Follow it until the path ends or the rim cuts it;
-# on the second leg at $p + s\,l$ with $s = (-b + \sqrt{b^2 - ac})/a$, where $a = l^\top l$, $b = p^\top l$, $c = p^\top p - \Delta^2$. Stopping on the first leg gives the Cauchy point (2-39).
+# point in that direction, the *corner* $p = -\tfrac{g^\top g}{g^\top B g}\,g$, and from there along the leg $l = -B^{-1}g - p$ to the Newton point. Follow it until the path ends or the rim cuts it:
+# on the first leg at $-\Delta\,g/|g|$, on the second at $p + s\,l$ with $s = (-b + \sqrt{b^2 - ac})/a$, where $a = l^\top l$, $b = p^\top l$, $c = p^\top p - \Delta^2$. Never leaving the first leg gives the Cauchy point (2-39).
 
 # %% dogleg_step
 @ex.dogleg_step
 def dogleg_step(g, B, radius):
-    """Return the dogleg step for a positive definite B, no longer than radius."""
+    """Return the dogleg step, shape (2,), no longer than radius (a positive number).
+
+    g: gradient, shape (2,); B: curvature of the model, shape (2, 2), positive definite.
+    """
     ### BEGIN SOLUTION
     newton = np.linalg.solve(B, -g)
     corner = -(g @ g) / (g @ B @ g) * g

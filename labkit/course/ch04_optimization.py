@@ -23,24 +23,32 @@ def turned(eigenvalues, angle):
     return V @ np.diag(eigenvalues) @ V.T
 
 
-def kind_of_point(rng):
+def kind_of_point(rng, kind):
     """Gradient and Hessian of one kind of point: minimum, maximum, a saddle whose diagonal is positive, one whose
-    diagonal is mixed, and two places that are not stationary, the first with a gradient of negative entries only.
+    diagonal is mixed, one whose diagonal is negative, and three places that are not stationary: with a gradient
+    of negative entries only, with entries of both signs and a negative sum, and of positive entries only.
 
-    At the stationary ones |g| is a few 1e-8, as after an iteration.
+    At the stationary ones |g| is about 1e-7, as after an iteration.
     """
-    kind = rng.integers(6)
     small, large = rng.uniform(0.5, 1.0), rng.uniform(4.0, 8.0)
-    eigenvalues = ((small, large), (-large, -small), (-small, large), (-small, large), (small, large), (small, large))
+    bowl = (small, large)
+    eigenvalues = (bowl, (-large, -small), (-small, large), (-small, large), (-large, small), bowl, bowl, bowl)
     angle = rng.uniform(2, 8) if kind == 3 else rng.uniform(30, 60)
-    g = rng.uniform(0.5, 2.0, 2) * ((-1, -1) if kind == 4 else (1, -1)) * (1 if kind > 3 else 4e-8)
+    signs = {5: (-1, -1), 7: (1, 1)}.get(kind, (1, -3))
+    g = rng.uniform(0.5, 1.3, 2) * signs * (1 if kind > 4 else 4e-8)
     return g, turned(eigenvalues[kind], np.deg2rad(angle))
 
 
-def gradient_and_hessian(rng):
-    """A gradient and an indefinite or definite Hessian, far from singular."""
-    eigenvalues = rng.uniform(1, 6, 2) * rng.choice([-1, 1], 2)
+KINDS = tuple(functools.partial(kind_of_point, kind=k) for k in range(8))
+
+
+def gradient_and_hessian(rng, signs):
+    """A gradient and a Hessian with eigenvalues of these signs, far from singular."""
+    eigenvalues = rng.uniform(1, 6, 2) * signs
     return rng.normal(scale=5, size=2), turned(eigenvalues, rng.uniform(0.3, 1.2))
+
+
+MODELS = tuple(functools.partial(gradient_and_hessian, signs=s) for s in ((1, 1), (-1, 1), (-1, -1), (1, -1)))
 
 
 def residual_and_jacobian(rng):
@@ -48,12 +56,15 @@ def residual_and_jacobian(rng):
     return rng.normal(size=6), rng.normal(scale=2, size=(6, 2))
 
 
-def tried_step(rng):
-    """Cost before and after a step, with gradient and curvature of the model."""
+def tried_step(rng, shares):
+    """Cost before and after a step that kept a share between these of its promise, with the model's g and B."""
     g, B = rng.normal(scale=3, size=2), turned(rng.uniform(1, 4, 2), rng.uniform(0.3, 1.2))
     step = -rng.uniform(0.1, 0.4) * g
     cost = rng.uniform(5, 20)
-    return cost, cost - rng.uniform(0.2, 1.2) * opt.predicted_decrease(g, B, step), g, B, step
+    return cost, cost - rng.uniform(*shares) * opt.predicted_decrease(g, B, step), g, B, step
+
+
+TRIED_STEPS = tuple(functools.partial(tried_step, shares=s) for s in ((0.2, 1.2), (-0.8, -0.2)))
 
 
 def dogleg_case(rng, between):
@@ -71,15 +82,15 @@ DOGLEG_CASES = tuple(functools.partial(dogleg_case, between=b) for b in ((-0.7, 
 # Wrong variants --------------------------------------------------------------------------------------------------------------------------
 
 
-def _terms(x, second=(-1.0, -2.0), one=1.0):
-    d = x - np.array([(1.0, 1.0), second])
+def _terms(x, first=(1.0, 1.0), second=(-1.0, -2.0), one=1.0):
+    d = x - np.array([first, second])
     return d, (d * d).sum(-1) + one
 
 
-def _gradient(power=2, **changes):
+def _gradient(power=2, depths=wells.DEPTHS, **changes):
     def variant(x):
         d, q = _terms(x, **changes)
-        return (2 * wells.DEPTHS / q**power) @ d
+        return (2 * np.array(depths) / q**power) @ d
 
     return variant
 
@@ -89,11 +100,12 @@ def _gradient_without_square(x):
     return (2 * wells.DEPTHS / (np.linalg.norm(d, axis=-1) + 1) ** 2) @ d
 
 
-def _hessian(factor=8.0, power=3, bowl=1.0):
+def _hessian(factor=8.0, power=3, bowl=1.0, depths=wells.DEPTHS, **changes):
     def variant(x):
-        d, q = _terms(x)
-        outer = np.einsum("k,ki,kj->ij", factor * wells.DEPTHS / q**power, d, d)
-        return bowl * (2 * wells.DEPTHS / q**2).sum() * np.eye(2) - outer
+        d, q = _terms(x, **changes)
+        w = np.array(depths)
+        outer = np.einsum("k,ki,kj->ij", factor * w / q**power, d, d)
+        return bowl * (2 * w / q**2).sum() * np.eye(2) - outer
 
     return variant
 
@@ -139,6 +151,11 @@ def _first_order_only(g, H):
 
 def _swapped(g, H):
     return {"minimum": "maximum", "maximum": "minimum"}.get(opt.classify_extremum(g, H), opt.classify_extremum(g, H))
+
+
+def _all_positive(H):
+    eigenvalues, V = np.linalg.eigh(H)
+    return V @ np.diag(np.abs(eigenvalues)) @ V.T
 
 
 def _predicted(g, B, step, half=0.5, sign=-1.0):
@@ -200,6 +217,21 @@ def _past_newton(g, B, radius):
     return corner + (-b + np.sqrt(b * b - a * c)) / a * leg
 
 
+def _dogleg(corner=lambda p: p, full=lambda n: n, rim=None, share=lambda a, b, c: (-b + np.sqrt(b * b - a * c)) / a, leg=None):
+    """The whole path, one of its parts replaced: corner, Newton point, step to the rim, share of the leg, leg."""
+
+    def variant(g, B, radius):
+        n, p = full(opt.newton_step(g, B)), corner(-(g @ g) / (g @ B @ g) * g)
+        if np.linalg.norm(n) <= radius:
+            return n
+        if np.linalg.norm(p) >= radius:
+            return rim(g, p, radius) if rim else -radius * g / np.linalg.norm(g)
+        way = leg(n, p) if leg else n - p
+        return p + share(way @ way, p @ way, p @ p - radius**2) * way
+
+    return variant
+
+
 CHAPTER = Chapter(
     "04-optimization",
     [
@@ -211,7 +243,7 @@ CHAPTER = Chapter(
             hints=(
                 "Each well is −w/q with q = |x − c|² + 1. Differentiate it by the chain rule, q first.",
                 "The derivative of −w/q is (w/q²) times the gradient of q, and the gradient of q is 2(x − c).",
-                "`d1, d2 = x - [1, 1], x - [-1, -2]`, then `200 / q1**2 * d1 + 400 / q2**2 * d2`.",
+                "`d1, d2 = x - [1, 1], x - [-1, -2]`, `q1, q2 = d1 @ d1 + 1, d2 @ d2 + 1`, `return 200 / q1**2 * d1 + 400 / q2**2 * d2`.",
             ),
             mistakes=[
                 Mistake(lambda x: wells.gradient(x) / 2, "Half of the gradient: the gradient of |x − c|² is 2(x − c), the 2 is missing."),
@@ -220,6 +252,12 @@ CHAPTER = Chapter(
                 Mistake(_gradient(second=(1.0, 2.0)), "The second well sits at (−1, −2): its offsets are x1 + 1 and x2 + 2."),
                 Mistake(_gradient(second=(-1.0, 2.0)), "The second center is (−1, −2): its second offset is x2 + 2, not x2 − 2."),
                 Mistake(_gradient_without_square, "Your q holds the distance |x − c|, not its square: q = |x − c|² + 1, so `d @ d + 1`."),
+                Mistake(_gradient(first=(-1.0, -1.0), second=(1.0, 2.0)), "Both centers have the wrong sign: x − c has offsets x1 − 1, x2 − 1 at (1, 1)."),
+                Mistake(_gradient(depths=(100.0, 0.0)), "This is the well at (1, 1) alone: add the one at (−1, −2)."),
+                Mistake(_gradient(depths=(0.0, 200.0)), "This is the well at (−1, −2) alone: add the one at (1, 1)."),
+                Mistake(_gradient(depths=(200.0, 100.0)), "The depths are exchanged: w = 100 at (1, 1), w = 200 at (−1, −2)."),
+                Mistake(_gradient(depths=(100.0, 100.0)), "The well at (−1, −2) is twice as deep: w = 200 there."),
+                Mistake(_gradient(depths=(100.0, -200.0)), "The second well is subtracted: both terms are −w/q, so their gradients add up."),
                 Mistake(_gradient(one=0.0), "The 1 in q = |x − c|² + 1 is missing from your denominators."),
             ],
         ),
@@ -251,19 +289,24 @@ CHAPTER = Chapter(
                 Mistake(_hessian_with(product=np.multiply), "`d * d` has two entries and not four. The matrix is `np.outer(d, d)`."),
                 Mistake(_hessian_with(unit=1.0), "The number 2w/q² is added to all four entries: it belongs to the diagonal, times `np.eye(2)`."),
                 Mistake(_hessian_with(wells_seen=(1,)), "This is the last well alone: the wells add up, `H += ...` and not `H = ...`."),
+                Mistake(_hessian_with(wells_seen=(0,)), "This is the first well alone: add the one at (−1, −2). A `return` inside the loop ends it too early."),
+                Mistake(_hessian(factor=2.0), "The outer product is too small by a factor 4: the derivative of 2w/q² is −4w/q³ times that of q, 2(x − c)."),
+                Mistake(_hessian(depths=(200.0, 100.0)), "The depths are exchanged: w = 100 at (1, 1), w = 200 at (−1, −2)."),
+                Mistake(_hessian(second=(1.0, 2.0)), "The second well sits at (−1, −2): its offsets are x1 + 1 and x2 + 2."),
+                Mistake(_hessian(one=0.0), "The 1 in q = |x − c|² + 1 is missing."),
                 Mistake(_hessian(bowl=0.0), "Only the outer products are there. The part (2w/q²) I comes from differentiating x − c."),
             ],
         ),
         Exercise(
             "classify_extremum",
             reference=opt.classify_extremum,
-            draw=kind_of_point,
+            draw=KINDS,
             metric=metrics.exactly(),
-            draws=40,
+            draws=16,
             hints=(
                 "First order first: only a place where the gradient vanishes is a candidate at all.",
                 "Second order: the signs of the eigenvalues of H tell how f bends along its two main directions.",
-                "`np.linalg.eigvalsh(H)`: all positive is a minimum, all negative a maximum, mixed a saddle.",
+                "`np.linalg.norm(g) > 1e-6` is not stationary. Otherwise `e = np.linalg.eigvalsh(H)`: `(e > 0).all()` is a minimum, `(e < 0).all()` a maximum, mixed a saddle.",
             ),
             mistakes=[
                 Mistake(_second_order_only, "You judge places where the gradient is not zero: they are no extrema, whatever H says."),
@@ -279,13 +322,32 @@ CHAPTER = Chapter(
                     "A large negative component is not small: use the norm of g.",
                 ),
                 Mistake(_stationary(lambda H: "minimum" if np.linalg.det(H) > 0 else "saddle"), "A positive determinant also belongs to a maximum: two negative eigenvalues."),
+                Mistake(
+                    _stationary(lambda H: "minimum" if np.linalg.det(H) > 0 else "maximum"),
+                    "The determinant alone does not tell: it is negative at a saddle, and positive at a minimum and at a maximum.",
+                ),
+                Mistake(_stationary(lambda H: "minimum" if H[0, 0] > 0 else "maximum"), "H[0, 0] is the curvature along x1 alone: use both eigenvalues."),
+                Mistake(_stationary(_by(np.ravel)), "The entries of H are no curvatures along its main directions: use the signs of the eigenvalues."),
+                Mistake(
+                    _stationary(lambda H: "minimum" if (np.linalg.eigvalsh(H) > 0).any() else "maximum"),
+                    "One positive eigenvalue makes no minimum: all of them have to be positive.",
+                ),
+                Mistake(
+                    _stationary(lambda H: "maximum" if (np.linalg.eigvalsh(H) < 0).any() else "minimum"),
+                    "One negative eigenvalue makes no maximum: all of them have to be negative.",
+                ),
+                Mistake(
+                    _stationary(_by(np.linalg.eigvalsh), lambda g: g.sum() > 1e-6),
+                    "Positive and negative components of g cancel in a sum: use its norm.",
+                ),
+                Mistake(lambda g, H: opt.classify_extremum(g, H).replace("saddle", "saddle point"), 'The kinds are right; the word is "saddle", without "point".'),
                 Mistake(_swapped, "Minimum and maximum are exchanged: at a minimum f bends up, all eigenvalues are positive."),
             ],
         ),
         Exercise(
             "newton_step",
             reference=opt.newton_step,
-            draw=gradient_and_hessian,
+            draw=MODELS,
             metric=metrics.numbers(1e-9),
             hints=(
                 "The quadratic model is stationary where its gradient g + H h vanishes.",
@@ -297,6 +359,12 @@ CHAPTER = Chapter(
                 Mistake(lambda g, H: -H @ g, "You multiplied by H, as equation (2-26) has it; the step solves H h = −g."),
                 Mistake(lambda g, H: -g / np.diag(H), "Dividing by the diagonal ignores the mixed derivatives: solve the system."),
                 Mistake(lambda g, H: -g, "That is steepest descent: H is not used at all."),
+                Mistake(lambda g, H: -(1 / H) @ g, "`H**-1` inverts each entry by itself. The inverse matrix is `np.linalg.inv(H)`; better solve the system."),
+                Mistake(lambda g, H: -g / np.linalg.det(H), "Dividing by the determinant is not solving: H h = −g is a system of two equations."),
+                Mistake(
+                    lambda g, H: -np.linalg.solve(_all_positive(H), g),
+                    "Downhill along every direction, by |curvature|. Newton keeps the signs of H: where f bends down it climbs.",
+                ),
             ],
         ),
         Value(
@@ -343,8 +411,9 @@ CHAPTER = Chapter(
         Exercise(
             "gain_ratio",
             reference=opt.gain_ratio,
-            draw=tried_step,
+            draw=TRIED_STEPS,
             metric=metrics.numbers(1e-8),
+            draws=6,
             hints=(
                 "Compare what the step brought with what the model promised, equation (2-36).",
                 "Actual: cost − new_cost. Promised: m(0) − m(h) with m(h) = cost + gᵀh + ½ hᵀB h.",
@@ -371,6 +440,24 @@ CHAPTER = Chapter(
                     lambda cost, new_cost, g, B, step: (cost - new_cost) / _predicted(g, B, step, half=-0.5),
                     "The promised decrease m(0) − m(h) changes the sign of both terms, of ½ hᵀB h too.",
                 ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: abs(cost - new_cost) / _predicted(g, B, step),
+                    "A step that raised the cost has a negative gain: no absolute value, or it would never be taken back.",
+                ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: (cost - new_cost) / (cost - _predicted(g, B, step)),
+                    "You divide by the model's value m(h). What it promised is the decrease m(0) − m(h).",
+                ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: new_cost / (cost - _predicted(g, B, step)),
+                    "This compares values, new cost with m(h). The gain compares decreases.",
+                ),
+                Mistake(lambda cost, new_cost, g, B, step: cost - new_cost, "That is the actual decrease. Divide it by the promised one, m(0) − m(h)."),
+                Mistake(lambda cost, new_cost, g, B, step: _predicted(g, B, step), "That is the promised decrease: divide the actual one, cost − new_cost, by it."),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: cost - new_cost / _predicted(g, B, step),
+                    "Division comes before subtraction: put `cost - new_cost` in parentheses.",
+                ),
             ],
         ),
         Exercise(
@@ -382,7 +469,7 @@ CHAPTER = Chapter(
             hints=(
                 "Three cases: the Newton point is inside; the corner is outside; the rim cuts the second leg.",
                 "The corner is −(gᵀg / gᵀBg) g. On the second leg solve |corner + s (newton − corner)| = radius for s between 0 and 1.",
-                "With leg = newton − corner and a, b, c as above: `return corner + (-b + np.sqrt(b * b - a * c)) / a * leg`.",
+                "Newton point inside: return it. Corner outside: `-radius * g / np.linalg.norm(g)`. Otherwise, with leg = newton − corner and a, b, c as above: `corner + (-b + np.sqrt(b * b - a * c)) / a * leg`.",
             ),
             mistakes=[
                 Mistake(opt.cauchy_step, "That is the Cauchy point: it stops at the corner and never takes the second leg."),
@@ -393,6 +480,18 @@ CHAPTER = Chapter(
                 Mistake(_leg_by_length, "The path bends at the corner: radius − |corner| along the second leg ends inside the rim. Solve |corner + s leg| = radius."),
                 Mistake(_newton_to_the_rim, "Where the rim cuts the second leg you shorten the Newton step. The path runs from the corner toward Newton there."),
                 Mistake(_past_newton, "The Newton point inside the radius is a case of its own: there s exceeds 1, and you run past it to the rim."),
+                Mistake(_dogleg(rim=lambda g, p, radius: p), "Where the corner lies outside the radius, the first leg ends at the rim: you return the corner itself."),
+                Mistake(_dogleg(rim=lambda g, p, radius: -radius * g), "The step to the rim is `radius` times a unit vector: divide g by its norm."),
+                Mistake(_dogleg(rim=lambda g, p, radius: -p * radius / np.linalg.norm(p)), "Where the corner lies outside you run uphill to the rim: downhill is −g."),
+                Mistake(lambda g, B, radius: -radius * g / np.linalg.norm(g), "That is always steepest descent to the rim: corner and Newton point are never used."),
+                Mistake(_dogleg(share=lambda a, b, c: (-b - np.sqrt(b * b - a * c)) / a), "The other root leads backward, to s below 0: take the one with + before the square root."),
+                Mistake(
+                    _dogleg(share=lambda a, b, c: (-b + np.sqrt(b * b - 4 * a * c)) / (2 * a)),
+                    "The equation is a s² + 2 b s + c = 0, its middle term holds the 2 already: s = (−b + √(b² − ac))/a.",
+                ),
+                Mistake(_dogleg(leg=lambda n, p: n), "The second leg is newton − corner; yours is the whole Newton step."),
+                Mistake(_dogleg(corner=lambda p: -p), "Your corner lies uphill: it is −(gᵀg / gᵀBg) g."),
+                Mistake(_dogleg(full=lambda n: -n), "Your Newton point has the wrong sign: it solves B h = −g."),
                 Mistake(_leg_from_zero, "The second leg starts at the corner: add corner to s times the leg."),
             ],
         ),
@@ -417,6 +516,7 @@ CHAPTER = Chapter(
                 Mistake(lambda: 5 * 0.5**4, "Adding up counts those cases several times where more than one stand-in is right."),
                 Mistake(lambda: (1 - 0.5**4) ** 5, "That is the probability that none of the five is right."),
                 Mistake(lambda: 1 - (1 - 0.5**5) ** 4, "Four and five are exchanged: four landings each, five stand-ins."),
+                Mistake(lambda: 100 * ledger.luck(), "Right, in percent: give the probability as a number between 0 and 1."),
                 Mistake(lambda: 0.5**20, "That all five stand-ins have all landings right. One is enough."),
             ],
         ),

@@ -54,7 +54,7 @@ def model(ax):
 def courses(ax, names, iterations, low, high):
     """Cost against iteration, one line a method, and a marker for the one shown. Returns ({name: line}, marker)."""
     style.axes(ax, "iteration", "$f$")
-    ax.set(xlim=(0, iterations), ylim=(low, high))
+    ax.set(xlim=(0, iterations), ylim=(low, high), xticks=range(0, iterations + 1, 4))
     for name in names:
         ax.plot([], [], color=style.INK, linewidth=1.3, markersize=4.5, **PATHS[name])
     ax.legend(loc="upper right", fontsize=8, handlelength=3.0, borderaxespad=0.2)
@@ -92,7 +92,8 @@ def profile(ax, t, f, points):
     (parabola,) = ax.plot([], [], **style.look("prediction"), zorder=3)
     (iterates,) = ax.plot([], [], **style.look("estimate"), marker="D", markersize=5, zorder=4)
     (vertex,) = ax.plot([], [], color=style.PREDICTION, marker="v", markersize=10, linestyle="none", zorder=5)
-    text = ax.text(0.02, 0.05, "", transform=ax.transAxes)
+    text = ax.text(0.02, 0.05, "", transform=ax.transAxes, zorder=6)
+    text.set_bbox({"facecolor": style.PAPER, "edgecolor": "none", "pad": 2})
     return parabola, iterates, vertex, text
 
 

@@ -332,6 +332,7 @@ def basins():
     def scene(fig):
         ax = fig.subplots()
         _map(ax, SQUARE, SQUARE)
+        names = [*ax.lines, *ax.texts]  # drawn anew over the colors
         half = (SQUARE[1] - SQUARE[0]) / (CELLS - 1) / 2
         image, fill = draw.basins(ax, np.linspace(SQUARE[0] - half, SQUARE[1] + half, CELLS + 1))
         ax.set(xlim=SQUARE, ylim=SQUARE)
@@ -341,7 +342,7 @@ def basins():
             fill(draw.basin_colors(result["labels"], result["covered"]))
             path.set_data(*np.clip(result["run"].x, -50, 50).T)
 
-        return [image, path], update
+        return [image, *names, path], update
 
     return Stage(
         "basins of attraction",
