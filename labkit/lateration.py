@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .checks import as_finite, as_points, as_positive
+from .checks import as_count, as_finite, as_number, as_points, as_positive, as_positive_number, as_shape, fit_together
 
 COSTS = ("distance", "squares")
 RANK_TOLERANCE = 1e-7  # a second singular value below this share of the first: the landmarks do not fix the position
@@ -66,12 +66,15 @@ def square_residuals(landmarks, distances, position):
     """
     landmarks, distances = _landmarks(landmarks, distances)
     position = as_points(position, "position", landmarks.shape[1])
+    fit_together(distances=distances.shape[:-1], position=position.shape[:-1])
     return ((landmarks - position[..., None, :]) ** 2).sum(-1) - distances**2
 
 
 def square_jacobian(landmarks, position):
     """Derivative of `square_residuals` by the position: rows 2 (position - landmark), (..., n, dim), in m."""
     landmarks = as_finite(landmarks, "landmarks")
+    if landmarks.ndim != 2:
+        raise ValueError(f"landmarks must have shape (n, dim), got {landmarks.shape}")
     position = as_points(position, "position", landmarks.shape[-1])
     return 2 * (position[..., None, :] - landmarks)
 
@@ -88,7 +91,8 @@ def newton(landmarks, distances, start, steps=50, tolerance=1e-12):
             f"newton needs as many landmarks as coordinates and one set of distances, got {len(landmarks)} landmarks "
             f"in {landmarks.shape[1]}D and distances of shape {distances.shape}; use laterate"
         )
-    path = [as_points(start, "start", landmarks.shape[1])]
+    path = [as_shape(start, "start", landmarks.shape[1])]
+    steps, tolerance = as_count(steps, "steps", at_least=0), as_number(tolerance, "tolerance")
     scale = np.abs(landmarks - landmarks.mean(0)).max() + distances.max()
     for _ in range(steps):
         J = square_jacobian(landmarks, path[-1])
@@ -169,9 +173,9 @@ def laterate(landmarks, distances, start=None, cost="distance", std=1.0, steps=1
     landmarks, distances = _landmarks(landmarks, distances)
     if cost not in COSTS:
         raise ValueError(f"cost must be one of {', '.join(COSTS)}, got {cost!r}")
-    std, dim = as_positive(std, "std"), landmarks.shape[1]
+    std, dim, steps = as_positive_number(std, "std"), landmarks.shape[1], as_count(steps, "steps")
     x = linear_start(landmarks, distances) if start is None else as_points(start, "start", dim)
-    x = np.broadcast_to(x, (*np.broadcast_shapes(x.shape[:-1], distances.shape[:-1]), dim)).copy()
+    x = np.broadcast_to(x, (*fit_together(start=x.shape[:-1], distances=distances.shape[:-1]), dim)).copy()
     x, iterations, converged = _minimize(landmarks, distances, x, cost, steps)
     e, J = _errors(landmarks, distances, x, "distance")
     values = np.linalg.svd(J, compute_uv=False)
@@ -222,6 +226,8 @@ def dilution(landmarks, position):
         Where position and landmarks lie on one line (in 3D: the unit vectors in one plane).
     """
     landmarks = as_finite(landmarks, "landmarks")
+    if landmarks.ndim != 2:
+        raise ValueError(f"landmarks must have shape (n, dim), got {landmarks.shape}")
     position = as_points(position, "position", landmarks.shape[-1])
     away = position[..., None, :] - landmarks
     length = np.linalg.norm(away, axis=-1, keepdims=True)
