@@ -287,7 +287,8 @@ def fit_frame(points_F, points_W):
     Raises
     ------
     ValueError
-        When fewer than three points come, or they are collinear (second singular value below 1e-9 of the first).
+        When fewer than three points come, or they coincide or are collinear (second singular value below 1e-9 of the
+        first).
 
     Source: Kabsch, Acta Cryst. A32 (1976) 922; with the determinant corrected as in Umeyama, PAMI 13 (1991) 376.
     """
@@ -299,6 +300,8 @@ def fit_frame(points_F, points_W):
     p_mean, q_mean = p.mean(-2), q.mean(-2)
     spread = np.swapaxes(p - p_mean[..., None, :], -1, -2) @ (q - q_mean[..., None, :])
     values = np.linalg.svd(spread, compute_uv=False)
+    if (values[..., 0] == 0).any():
+        raise ValueError("the points coincide: they have no orientation")
     if (values[..., 1] <= 1e-9 * values[..., 0]).any():
         ratio = (values[..., 1] / values[..., 0]).min()
         raise ValueError(f"the points are collinear: the second singular value is {ratio:.1e} of the first")

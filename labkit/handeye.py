@@ -453,10 +453,14 @@ def predicted_covariance(T_BF, T_FS, target, std):
     """Covariance (9, 9) of phi, translation and target that a set of poses would give, before anything is measured.
 
     The sphere centers follow from the poses: x_S = T_FS^-1 T_BF^-1 target. This is the Cramer-Rao bound for isotropic
-    noise `std` (mm).
+    noise `std` (mm). Raises ValueError for poses that leave a direction undetermined.
     """
     x_S = transform(invert(T_FS), transform(invert(T_BF), target))
     J = joint_jacobian(T_BF, x_S, T_FS)
+    scale = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
+    values = np.linalg.svd(J / scale, compute_uv=False)
+    if len(values) < 9 or values[-1] <= MIN_SPREAD * values[0]:
+        raise ValueError("the poses leave scanner or target undetermined: too few, or turned about one axis only")
     return as_positive_number(std, "std") ** 2 * np.linalg.inv(J.T @ J)
 
 

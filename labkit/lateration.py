@@ -115,13 +115,13 @@ def _two_circles(landmarks, distances):
 def circle_intersections(landmarks, distances):
     """Both points where two circles meet, (2, 2), in closed form; the first lies left of the way from landmark 1 to 2.
 
-    Raises ValueError where the circles do not meet.
+    Raises ValueError where the circles do not meet, or have one center.
     """
     (a, b), (r1, r2) = _two_circles(landmarks, distances)
     along = b - a
     base = np.hypot(*along)
-    if not abs(r1 - r2) <= base <= r1 + r2:
-        raise ValueError(f"the circles do not meet: radii {r1:g} and {r2:g} m, centers {base:g} m apart")
+    if base == 0 or not abs(r1 - r2) <= base <= r1 + r2:
+        raise ValueError(f"the circles do not meet in two points: radii {r1:g} and {r2:g} m, centers {base:g} m apart")
     foot = (r1**2 - r2**2 + base**2) / (2 * base)
     height = np.sqrt(max(0.0, r1**2 - foot**2))
     along = along / base
@@ -191,7 +191,7 @@ def laterate(landmarks, distances, start=None, cost="distance", std=1.0, steps=1
 
 def _minimize(landmarks, distances, x, cost, steps):
     """Levenberg-Marquardt with one damping a run; returns positions, iterations, converged."""
-    eye = np.eye(x.shape[-1])
+    eye, size = np.eye(x.shape[-1]), np.abs(landmarks - landmarks.mean(0)).max() + distances.max(initial=0.0)
     damping = np.full(x.shape[:-1], 1e-3)
     e, J = _errors(landmarks, distances, x, cost)
     value, done = (e**2).sum(-1), np.zeros(x.shape[:-1], bool)
@@ -203,7 +203,7 @@ def _minimize(landmarks, distances, x, cost, steps):
         tried = x + np.where(done[..., None], 0.0, delta)
         e2, J2 = _errors(landmarks, distances, tried, cost)
         value2 = (e2**2).sum(-1)
-        small = np.abs(delta).max(-1) <= 1e-11 * (1 + np.abs(x).max(-1))
+        small = np.abs(delta).max(-1) <= 1e-11 * (size + np.abs(x).max(-1))
         better = value2 <= value
         x, J = np.where(better[..., None], tried, x), np.where(better[..., None, None], J2, J)
         e, value = np.where(better[..., None], e2, e), np.where(better, value2, value)

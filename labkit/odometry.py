@@ -57,7 +57,7 @@ def circle_drive(dt=None):
 
 
 def wrap_angle(angle):
-    """The same direction within [-pi, pi) (rad); any shape."""
+    """The same direction within [-pi, pi) (rad), but for rounding next to -pi; any shape."""
     return (as_finite(angle, "angle") + np.pi) % (2 * np.pi) - np.pi
 
 

@@ -288,8 +288,11 @@ def _as_weights(weights):
     weights = as_finite(weights, "weights")
     if weights.ndim != 1 or not weights.size:
         raise ValueError(f"weights must be a vector (M,), got shape {weights.shape}")
-    if weights.min() < 0 or weights.max() == 0:
-        raise ValueError(f"weights must be at least 0 and not all 0, got a minimum of {weights.min():g}")
+    low, high = weights.min(), weights.max()
+    if low < 0 or not 1e-300 <= high <= 1e300:  # beyond, their sum or a share of it leaves the range of a float
+        raise ValueError(
+            f"weights must be at least 0 and not all 0, the largest from 1e-300 to 1e300, got {low:g} to {high:g}"
+        )
     return weights
 
 

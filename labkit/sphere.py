@@ -307,7 +307,7 @@ def _geometric(points, start):
         else:
             break
         q, r, J = q + step, r_new, J_new
-        if np.abs(step).max() <= 1e-12 * max(np.abs(q).max(), 1.0):
+        if np.abs(step).max() <= 1e-12 * np.abs(q).max():
             break
     return q, r, J
 

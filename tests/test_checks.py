@@ -23,6 +23,7 @@ from labkit import (
     sphere,
     tracker,
     tracker_simulation,
+    udp,
     wells,
 )
 
@@ -66,6 +67,7 @@ REFUSED = [
     (lambda: frames.gram_schmidt_covariance(0.0, 1.0, 1.0, 0.1), "must not be 0"),
     (lambda: frames.gram_schmidt_covariance([1.0, 2.0], 1.0, 1.0, 0.1), "x_arm must have shape"),
     (lambda: frames.fit_covariance(np.outer(range(4), [1.0, 2.0, 3.0]), 0.1), "collinear"),
+    (lambda: frames.fit_frame(np.ones((4, 3)), np.ones((4, 3))), "the points coincide"),
     (lambda: frames.fit_covariance(I3[:2], 0.1), "at least 3 points"),
     (lambda: chaining.chain(3.0), "must be a sequence of transforms"),
     (lambda: chaining.chain([POSES, POSES[:2]]), r"transforms\[1\]"),
@@ -100,6 +102,7 @@ REFUSED = [
     (lambda: handeye.fit_radius(POSES, np.array([[1.0, 0.0, 1.0]] * 5)), "off the scan plane"),
     (lambda: handeye.kim_linear(POSES, np.zeros((5, 3, 3)), np.zeros((4, 3))), r"points_S must have shape \(5, 4, 3\)"),
     (lambda: handeye.li_two_step(POSES[:1], np.zeros((1, 3))), "at least 2 poses"),
+    (lambda: handeye.predicted_covariance(POSES, I4, O3 + 1.0, 0.1), "undetermined"),
     (lambda: handeye.compare_methods(0, 0.1, rng()), "repeats must be a whole number"),
     (lambda: handeye.pattern(I4, O3, 0.1, [1.0, np.inf, 1.0]), "spread must be finite"),
     (lambda: handeye_data.centers_with_radius([[1.0, np.nan, 1.0]], 30.0), "x_S must be finite"),
@@ -137,9 +140,11 @@ REFUSED = [
     (lambda: tracker.filter_positions(TIME[:0], np.zeros((0, 3))), "at least one reading"),
     (lambda: tracker.filter_positions(-TIME, np.zeros((5, 3))), "time must increase"),
     (lambda: tracker_simulation.calibration_run(rng(), rate=0.1), "readings a stop"),
+    (lambda: next(udp.stream([b""], 0.0, udp.Faults(), rng())), "rate must be positive"),
     # lateration, odometry, gaussian
     (lambda: lateration.laterate(MARKS, [1.0, 2.0, 3.0], O2, std=[0.1, 0.2]), "std must have shape"),
     (lambda: lateration.laterate(MARKS, np.ones((2, 3)), np.zeros((3, 2))), "of start"),
+    (lambda: lateration.circle_intersections(np.zeros((2, 2)), [1.0, 1.0]), "do not meet in two points"),
     (lambda: lateration.square_jacobian(3.0, O2), "landmarks must have shape"),
     (lambda: odometry.wrap_angle([0.0, np.nan]), "angle must be finite"),
     (lambda: odometry.step(np.zeros((2, 3)), np.zeros((3, 2)), 0.1), r"\(2,\) of x, \(3,\) of u"),
@@ -202,6 +207,8 @@ REFUSED = [
     (lambda: particles.beam_density([1.0], [1.0], 0.1, 5.0, (1, 1, 0, 0)), "add up to 1"),
     (lambda: particles.weigh_doors([], True), "at least one position"),
     (lambda: particles.normalize(["a"]), "log_weights must hold real numbers"),
+    (lambda: particles.resample_systematic([5e-324, 5e-324], rng()), "from 1e-300 to 1e300"),
+    (lambda: particles.resample_roulette([1e308, 1e308], rng()), "from 1e-300 to 1e300"),
     (lambda: particles.resample_systematic([1.0, 1.0], rng(), 1.5), "size must be a whole number"),
     (lambda: particles.should_resample([1.0], np.nan), "threshold must be finite"),
     (lambda: particles.estimate(I3, [1.0, 1.0]), "one weight a state"),
@@ -250,5 +257,5 @@ def test_lists_are_as_good_as_arrays():
 
 def test_the_effective_size_has_no_unit():
     weights = np.array([1.0, 2.0, 3.0])
-    for unit in (1e-300, 1e-9, 1e9, 1e300):
+    for unit in (1e-300, 1e-9, 1e9, 1e299):
         np.testing.assert_allclose(particles.effective_size(unit * weights), 36 / 14)
