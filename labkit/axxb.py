@@ -10,8 +10,8 @@ depends on the N poses through two small matrices only, so an iteration takes th
 
 import numpy as np
 
-from .checks import as_positive, as_transforms
-from .frames import pose
+from .checks import as_positive_number, as_rotations, as_shape, as_transforms
+from .frames import pose, rotation_block
 from .handeye_result import HandEye
 from .lie import log_so3, nearest_rotation, skew
 
@@ -40,7 +40,9 @@ def kronecker_matrix(A, B):
     M : array, shape (9 N, 9)
         Blocks I kron A_i - B_i' kron I.
     """
-    A, B = np.asarray(A)[..., :3, :3], np.asarray(B)[..., :3, :3]
+    A, B = rotation_block(A, "A"), rotation_block(B, "B")
+    if A.ndim != 3 or A.shape != B.shape:
+        raise ValueError(f"A and B must be as many motions, (N, 3, 3) or (N, 4, 4), got {A.shape} and {B.shape}")
     left = np.einsum("jl,nik->njilk", _I3, A)
     right = np.einsum("nlj,ik->njilk", B, _I3)
     return (left - right).reshape(-1, 9)
@@ -57,7 +59,8 @@ def rotation_from_kronecker(M):
         The last one is 0 for exact data. When the last but one is as small, the rotation axes are parallel and R is
         arbitrary.
     """
-    _, values, Vt = np.linalg.svd(np.asarray(M).T @ M)
+    M = as_shape(M, "M", "m", 9)
+    _, values, Vt = np.linalg.svd(M.T @ M)
     X = Vt[-1].reshape(3, 3, order="F")
     return nearest_rotation(X * (np.sign(np.linalg.det(X)) or 1.0)), np.sqrt(values)
 
@@ -71,7 +74,9 @@ def translation_from_motions(A, B, R):
     residuals : array, shape (N, 3)
         K1 t - K2 of the report, in F.
     """
-    A, B = as_transforms(A, "A"), as_transforms(B, "B")
+    A, B, R = as_transforms(A, "A"), as_transforms(B, "B"), as_shape(as_rotations(R, "R"), "R", 3, 3)
+    if A.ndim != 3 or A.shape != B.shape:
+        raise ValueError(f"A and B must both have shape (N, 4, 4), got {A.shape} and {B.shape}")
     K1 = _I3 - A[:, :3, :3]
     K2 = A[:, :3, 3] - B[:, :3, 3] @ R.T
     t = np.linalg.lstsq(K1.reshape(-1, 3), K2.ravel(), rcond=None)[0]
@@ -150,7 +155,7 @@ def calibrate_hand_eye(T_BF, T_ST, std_rot=None, std_trans=None, robust=False):
     if T_BF.ndim != 3 or T_BF.shape != T_ST.shape or len(T_BF) < 3:
         raise ValueError(f"T_BF and T_ST must both have shape (N, 4, 4) with N >= 3, got {T_BF.shape} and {T_ST.shape}")
     given = tuple(
-        None if std is None else float(as_positive(std, name))
+        None if std is None else as_positive_number(std, name)
         for std, name in ((std_rot, "std_rot"), (std_trans, "std_trans"))
     )
     problem = _Problem(T_BF, T_ST, given)

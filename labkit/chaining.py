@@ -10,8 +10,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from .checks import as_finite, as_points, as_positive, as_transforms
-from .frames import _invert, frame_from_points, invert, relative, rotation_angle
+from .checks import (
+    as_count,
+    as_finite,
+    as_matrices,
+    as_number,
+    as_points,
+    as_positive_number,
+    as_shape,
+    as_transforms,
+    fit_together,
+)
+from .frames import _invert, frame_from_points, invert, relative, rotation_angle, rotation_block, transform
 from .lie import adjoint, exp_se3, log_se3, nearest_rotation, skew
 from .tables import read_table
 
@@ -55,7 +65,11 @@ def _links(transforms, at_least=1):
     if isinstance(transforms, np.ndarray) and transforms.ndim > 2:
         links = list(as_transforms(transforms, "transforms"))  # one check for all
     else:
+        if not np.iterable(transforms):
+            raise ValueError(f"transforms must be a sequence of transforms, got {type(transforms).__name__}")
         links = [as_transforms(T, f"transforms[{k}]") for k, T in enumerate(transforms)]
+        if len({T.shape for T in links}) > 1:
+            fit_together(**{f"transforms[{k}]": T.shape[:-2] for k, T in enumerate(links)})
     if len(links) < at_least:
         raise ValueError(f"at least {at_least} transform{'s' * (at_least > 1)} must come, got {len(links)}")
     return links
@@ -99,14 +113,13 @@ def closure_error(T):
 
 def displacement(T, points):
     """How far T moves each point: |T p - p|, the closure error at the work piece; (..., 4, 4), (..., 3) -> (...)."""
-    T, points = as_transforms(T, "T"), as_points(points, "points")
-    moved = (T[..., :3, :3] @ points[..., None])[..., 0] + T[..., :3, 3]
-    return np.linalg.norm(moved - points, axis=-1)
+    points = as_points(points, "points")
+    return np.linalg.norm(transform(T, points) - points, axis=-1)
 
 
 def orthonormality_error(T):
     """Largest entry of |R'R - I| of the rotation block; (..., 4, 4) or (..., 3, 3) -> (...)."""
-    R = as_finite(T, "T")[..., :3, :3]
+    R = rotation_block(T)
     return np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max((-1, -2))
 
 
@@ -118,9 +131,7 @@ def orthonormalize(T):
     ValueError
         When the rotation block is singular or left-handed: then no rotation is meant.
     """
-    T = as_finite(T, "T")
-    if T.shape[-2:] != (4, 4):
-        raise ValueError(f"T must have shape (..., 4, 4), got {T.shape}")
+    T = as_matrices(T, "T", 4, 4)
     det = np.linalg.det(T[..., :3, :3])
     if (det <= 1e-9).any():
         raise ValueError(f"T must have a right-handed rotation block, but its determinant is {det.min():.3g}")
@@ -147,7 +158,7 @@ def rounding_bound(transforms, half_unit=HALF_DIGIT):
     """
     links = _links(transforms)
     E = np.zeros((4, 4))
-    E[:3] = float(as_positive(half_unit, "half_unit"))
+    E[:3] = as_positive_number(half_unit, "half_unit")
     bound = np.zeros((4, 4))
     for k in range(len(links)):
         before = chain(links[:k]) if k else np.eye(4)
@@ -198,9 +209,29 @@ def around(links, loop):
     """The links of one loop of a graph, in order, as a stack: `loop` is a sequence of (k, forward), backward links are
     inverted.
     """
-    numbers, forward = zip(*loop)
-    ordered = np.array(_links(links))[list(numbers)]
+    links = _stack(links)
+    numbers, forward = _loop(loop, len(links))
+    ordered = links[numbers]
     return np.where(np.reshape(forward, (-1, *[1] * (ordered.ndim - 1))), ordered, invert(ordered))
+
+
+def _stack(links):
+    links = _links(links)
+    if len({T.shape for T in links}) > 1:
+        raise ValueError(f"all links must have one shape, got {[T.shape for T in links]}")
+    return np.array(links)
+
+
+def _loop(loop, count):
+    """Numbers and directions of a loop's links."""
+    try:
+        numbers, forward = zip(*loop)
+    except (TypeError, ValueError):
+        raise ValueError(f"a loop must be a sequence of pairs (number of the link, forward), got {loop!r}") from None
+    numbers = [as_count(k, "the number of a link", at_least=-count) for k in numbers]
+    if max(numbers) >= count:
+        raise ValueError(f"a loop must name links from 0 to {count - 1}, got {max(numbers)}")
+    return numbers, forward
 
 
 def distribute_in_turn(links, loops):
@@ -215,7 +246,11 @@ def distribute_in_turn(links, loops):
     loops : sequence of loops
         Each a sequence of (k, forward): which link, and whether along its direction.
     """
-    links = np.array(_links(links))
+    links = _stack(links)
+    if np.ndim(links) != 3:
+        raise ValueError(f"links must have shape (m, 4, 4), got {links.shape}")
+    if isinstance(loops, str) or not np.iterable(loops):
+        raise ValueError(f"loops must be a sequence of loops, got {loops!r}")
     for loop in loops:
         corrected = distribute_closure(around(links, loop))
         for (k, forward), T, back in zip(loop, corrected, invert(corrected)):
@@ -256,13 +291,13 @@ def expected_closure(transforms, std_rot, std_trans):
 def noisy_links(transforms, std_rot, std_trans, rng, runs=1):
     """Links with noise, T_k exp(xi_k), components of std_rot (rad) and std_trans; N links -> (N, runs, 4, 4)."""
     std_rot, std_trans = _noise(std_rot, std_trans)
-    links = np.array(_links(transforms))
+    links, runs = as_shape(_stack(transforms), "transforms", "n", 4, 4), as_count(runs, "runs")
     xi = rng.normal(size=(len(links), runs, 6)) * np.repeat([std_rot, std_trans], 3)
     return links[:, None] @ exp_se3(xi)
 
 
 def _noise(std_rot, std_trans):
-    values = [float(as_finite(v, n)) for v, n in ((std_rot, "std_rot"), (std_trans, "std_trans"))]
+    values = [as_number(v, n) for v, n in ((std_rot, "std_rot"), (std_trans, "std_trans"))]
     for value, name in zip(values, ("std_rot", "std_trans")):
         if value < 0:
             raise ValueError(f"{name} must not be negative, got {value:g}")
@@ -271,8 +306,7 @@ def _noise(std_rot, std_trans):
 
 def polygon_loop(n, size):
     """Links of a loop of n frames on a circle in the x-y plane, `size` across, each turned by 360/n deg; (n, 4, 4)."""
-    if n < 1:
-        raise ValueError(f"a loop must have at least one link, got {n}")
+    n, size = as_count(n, "n"), as_number(size, "size")
     turn = 2 * np.pi / n
     link = np.eye(4)
     link[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
@@ -282,8 +316,7 @@ def polygon_loop(n, size):
 
 def straight_chain(n, length):
     """Links of n frames in a row, each `length` further along x; (n, 4, 4)."""
-    if n < 1:
-        raise ValueError(f"a chain must have at least one link, got {n}")
+    n, length = as_count(n, "n"), as_number(length, "length")
     links = np.repeat(np.eye(4)[None], n, axis=0)
     links[:, 0, 3] = length
     return links
@@ -325,10 +358,14 @@ def solve_pose_graph(edges, measured, std_rot, std_trans):
     Source: Grisetti, Kuemmerle, Stachniss, Burgard, "A tutorial on graph-based SLAM", IEEE ITS Magazine 2 (2010) 31.
     """
     Z = as_transforms(measured, "measured")
-    pairs = as_finite(edges, "edges").astype(int)
+    pairs = as_finite(edges, "edges")
     if Z.ndim != 3 or pairs.shape != (len(Z), 2):
         raise ValueError(f"edges must be pairs, one for each of the measured links, got {pairs.shape} for {Z.shape}")
-    weight = np.repeat(1 / np.array([as_positive(std_rot, "std_rot"), as_positive(std_trans, "std_trans")], float), 3)
+    if not len(pairs) or (pairs < 0).any() or (pairs % 1 != 0).any() or (pairs[:, 0] == pairs[:, 1]).any():
+        raise ValueError(f"edges must be pairs of two different nodes, numbered from 0, got {pairs.tolist()}")
+    pairs = pairs.astype(int)
+    stds = [as_positive_number(std_rot, "std_rot"), as_positive_number(std_trans, "std_trans")]
+    weight = np.repeat(1 / np.array(stds), 3)
     start = _spanning_poses(pairs, Z)
     n, inverse_Z = len(start), _invert(Z)
 

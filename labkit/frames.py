@@ -7,7 +7,16 @@ Source: lab sheet "Kalibrierung", Hochschule Darmstadt 2016, section 1.
 
 import numpy as np
 
-from .checks import as_finite, as_points, as_positive, as_rotations, as_transforms
+from .checks import (
+    as_finite,
+    as_number,
+    as_points,
+    as_positive_number,
+    as_rotations,
+    as_shape,
+    as_transforms,
+    fit_together,
+)
 from .lie import nearest_rotation, skew
 
 MIN_ARM_ANGLE_DEG = 1e-3  # below this the triangle is so flat that its height drowns in the last digits of the points
@@ -18,7 +27,7 @@ MIN_ARM = 1e-9  # relative to the largest coordinate: a shorter arm is rounding 
 def pose(R, t):
     """Transform with rotation R, shape (..., 3, 3), and translation t, shape (..., 3)."""
     R, t = as_rotations(R, "R"), as_points(t, "t")
-    T = np.zeros((*np.broadcast_shapes(R.shape[:-2], t.shape[:-1]), 4, 4))
+    T = np.zeros((*fit_together(R=R.shape[:-2], t=t.shape[:-1]), 4, 4))
     T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, t, 1.0
     return T
 
@@ -26,6 +35,8 @@ def pose(R, t):
 def normalize(v):
     """`v` scaled to length 1; (..., n) -> (..., n). Refuses a zero vector."""
     v = as_finite(v, "v")
+    if v.ndim < 1:
+        raise ValueError("v must have shape (..., n), got a single number")
     length = np.linalg.norm(v, axis=-1, keepdims=True)
     if (length == 0).any():
         raise ValueError("v must not be the zero vector: it has no direction")
@@ -54,7 +65,9 @@ def gram_schmidt(a, b):
 
     Source: lab sheet, section 1, the four formulas before listing 1.
     """
-    a, b = np.broadcast_arrays(as_points(a, "a"), as_points(b, "b"))
+    a, b = as_points(a, "a"), as_points(b, "b")
+    fit_together(a=a.shape, b=b.shape)
+    a, b = np.broadcast_arrays(a, b)
     _refuse_flat(a, b, ("a", "b"), scale=np.maximum(np.abs(a).max(-1), np.abs(b).max(-1)))
     R = np.empty((*a.shape, 3))
     _axes_into(R, np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0), 1.0)
@@ -81,7 +94,10 @@ def frame_from_points(origin, x_point, y_point):
 
     Source: lab sheet, section 1, listing 1.
     """
-    o, px, py = np.broadcast_arrays(*map(as_points, (origin, x_point, y_point), ("origin", "x_point", "y_point")))
+    o, px, py = map(as_points, (origin, x_point, y_point), ("origin", "x_point", "y_point"))
+    if not o.shape == px.shape == py.shape:
+        fit_together(origin=o.shape, x_point=px.shape, y_point=py.shape)
+    o, px, py = np.broadcast_arrays(o, px, py)
     T = np.zeros((*o.shape[:-1], 4, 4))
     rows, origins, xs, ys = T.reshape(-1, 4, 4), *(p.reshape(-1, 3) for p in (o, px, py))
     suspicious = False
@@ -138,6 +154,7 @@ def _refuse_flat(a, b, names, scale):
 def arm_angle(a, b):
     """Angle between two directions (rad), accurate also near 0 and pi; (..., 3), (..., 3) -> (...)."""
     a, b = as_points(a, "a"), as_points(b, "b")
+    fit_together(a=a.shape, b=b.shape)
     return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(-1))
 
 
@@ -158,6 +175,8 @@ def _invert(T):
 def transform(T, points):
     """Coordinates in A of `points` given in B, with T = T_AB; (..., 4, 4), (..., 3) -> (..., 3)."""
     T, points = as_transforms(T, "T"), as_points(points, "points")
+    if T.ndim > 2:
+        fit_together(T=T.shape[:-2], points=points.shape[:-1])
     return (T[..., :3, :3] @ points[..., None])[..., 0] + T[..., :3, 3]
 
 
@@ -166,12 +185,22 @@ def relative(T_WA, T_WB):
 
     Source: lab sheet, section 1, the formula for K0_T_K1.
     """
-    return _invert(as_transforms(T_WA, "T_WA")) @ as_transforms(T_WB, "T_WB")
+    T_WA, T_WB = as_transforms(T_WA, "T_WA"), as_transforms(T_WB, "T_WB")
+    fit_together(T_WA=T_WA.shape[:-2], T_WB=T_WB.shape[:-2])
+    return _invert(T_WA) @ T_WB
+
+
+def rotation_block(T, name="T"):
+    """Upper left 3 x 3 block, a rotation or not, of finite matrices; (..., 4, 4) or (..., 3, 3) -> (..., 3, 3)."""
+    T = as_finite(T, name)
+    if T.shape[-2:] not in ((3, 3), (4, 4)):
+        raise ValueError(f"{name} must have shape (..., 4, 4) or (..., 3, 3), got {T.shape}")
+    return T[..., :3, :3]
 
 
 def rotation_angle(T):
     """Angle of the rotation in T (rad, 0 to pi), accurate at both ends; (..., 4, 4) or (..., 3, 3) -> (...)."""
-    R = as_finite(T, "T")[..., :3, :3]
+    R = rotation_block(T)
     twice_sin = np.linalg.norm(
         np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1), axis=-1
     )
@@ -181,6 +210,7 @@ def rotation_angle(T):
 def pose_distance(T1, T2):
     """How far two poses are apart: (angle in rad, distance of the origins in the unit of T), each of shape (...)."""
     T1, T2 = as_transforms(T1, "T1"), as_transforms(T2, "T2")
+    fit_together(T1=T1.shape[:-2], T2=T2.shape[:-2])
     distance = np.linalg.norm(T1[..., :3, 3] - T2[..., :3, 3], axis=-1)
     return rotation_angle(np.swapaxes(T1[..., :3, :3], -1, -2) @ T2[..., :3, :3]), distance
 
@@ -257,16 +287,21 @@ def fit_frame(points_F, points_W):
     Raises
     ------
     ValueError
-        When fewer than three points come, or they are collinear (second singular value below 1e-9 of the first).
+        When fewer than three points come, or they coincide or are collinear (second singular value below 1e-9 of the
+        first).
 
     Source: Kabsch, Acta Cryst. A32 (1976) 922; with the determinant corrected as in Umeyama, PAMI 13 (1991) 376.
     """
-    p, q = np.broadcast_arrays(as_points(points_F, "points_F"), as_points(points_W, "points_W"))
+    p, q = as_points(points_F, "points_F"), as_points(points_W, "points_W")
+    fit_together(points_F=p.shape, points_W=q.shape)
+    p, q = np.broadcast_arrays(p, q)
     if p.ndim < 2 or p.shape[-2] < 3:
         raise ValueError(f"at least 3 points are needed, got {p.shape[-2] if p.ndim > 1 else 1}")
     p_mean, q_mean = p.mean(-2), q.mean(-2)
     spread = np.swapaxes(p - p_mean[..., None, :], -1, -2) @ (q - q_mean[..., None, :])
     values = np.linalg.svd(spread, compute_uv=False)
+    if (values[..., 0] == 0).any():
+        raise ValueError("the points coincide: they have no orientation")
     if (values[..., 1] <= 1e-9 * values[..., 0]).any():
         ratio = (values[..., 1] / values[..., 0]).min()
         raise ValueError(f"the points are collinear: the second singular value is {ratio:.1e} of the first")
@@ -287,9 +322,13 @@ def gram_schmidt_covariance(x_arm, y_along, y_height, std):
     Returns
     -------
     cov_rot : array, shape (3, 3), rad^2
+
+    Raises ValueError where the triangle is flat.
     """
-    c, u, h = (float(as_finite(v, n)) for v, n in ((x_arm, "x_arm"), (y_along, "y_along"), (y_height, "y_height")))
-    std = float(as_positive(std, "std"))
+    c, u, h = (as_number(v, n) for v, n in ((x_arm, "x_arm"), (y_along, "y_along"), (y_height, "y_height")))
+    std = as_positive_number(std, "std")
+    if c == 0 or h == 0:
+        raise ValueError(f"x_arm and y_height must not be 0 (a flat triangle gives no frame), got {c:g} and {h:g}")
     r = u / c
     J = np.array(  # columns: e_o.y, e_o.z, e_x.y, e_x.z, e_y.z
         [[0, (r - 1) / h, 0, -r / h, 1 / h], [0, 1 / c, 0, -1 / c, 0], [-1 / c, 0, 1 / c, 0, 0]]
@@ -301,10 +340,14 @@ def fit_covariance(points_F, std):
     """Cramer-Rao bound of the rotation vector (in F) from points with isotropic noise; (n, 3) -> (3, 3), rad^2.
 
     The information is sum (|d|^2 I - d d') / std^2 over the points d about their mean: the tensor of inertia of the
-    triangle.
+    triangle. Raises ValueError for fewer than three points, or collinear ones.
     """
-    d = as_points(points_F, "points_F")
+    d = as_shape(points_F, "points_F", "n", 3)
+    if len(d) < 3:
+        raise ValueError(f"at least 3 points are needed, got {len(d)}")
     d = d - d.mean(-2, keepdims=True)
-    std = float(as_positive(std, "std"))
-    information = ((d * d).sum() * np.eye(3) - d.T @ d) / std**2
-    return np.linalg.inv(information)
+    std = as_positive_number(std, "std")
+    values = np.linalg.svd(d, compute_uv=False)
+    if values[1] <= 1e-9 * values[0]:
+        raise ValueError("the points are collinear or coincide: the rotation about their line stays free")
+    return std**2 * np.linalg.inv((d * d).sum() * np.eye(3) - d.T @ d)

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.stats import chi2
 
-from .checks import as_finite, as_points
+from .checks import as_count, as_covariances, as_points, as_probability, as_shape, fit_together, solve_covariance
 
 
 def ellipse(mean, cov, probability=0.95, points=61):
@@ -11,7 +11,9 @@ def ellipse(mean, cov, probability=0.95, points=61):
 
     mean : (..., 2).    cov : (..., 2, 2).    probability : share of the distribution inside the outline.
     """
-    mean, cov = as_points(mean, "mean", 2), as_finite(cov, "cov")
+    mean, cov = as_points(mean, "mean", 2), as_covariances(cov, "cov", 2)
+    probability, points = as_probability(probability, "probability"), as_count(points, "points")
+    fit_together(mean=mean.shape[:-1], cov=cov.shape[:-2])
     values, vectors = np.linalg.eigh(cov)
     axes = vectors * np.sqrt(np.maximum(values, 0.0) * chi2.ppf(probability, 2))[..., None, :]
     angle = np.linspace(0, 2 * np.pi, points)
@@ -28,6 +30,10 @@ def outlines(mean, cov, probability=0.95, points=61):
 
 def share_inside(samples, mean, cov, probability=0.95):
     """Share of samples, (n, dim), inside the region that should hold `probability` of them."""
-    d = as_finite(samples, "samples") - as_finite(mean, "mean")
-    squared = (d * np.linalg.solve(as_finite(cov, "cov"), d.T).T).sum(-1)
+    mean = as_shape(mean, "mean", "dim")
+    d = as_shape(samples, "samples", "n", len(mean)) - mean
+    if not d.size:
+        raise ValueError("samples must hold at least one, got none")
+    probability = as_probability(probability, "probability")
+    squared = (d * solve_covariance(as_shape(cov, "cov", len(mean), len(mean)), "cov", d.T).T).sum(-1)
     return float((squared <= chi2.ppf(probability, d.shape[-1])).mean())

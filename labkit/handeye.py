@@ -19,7 +19,19 @@ import numpy as np
 
 from .axxb import calibrate_hand_eye as calibrate_hand_eye  # the target is a pose: chapter 6
 from .axxb import solve_ax_xb as solve_ax_xb
-from .checks import as_finite, as_points, as_positive, as_rotations, as_transforms
+from .checks import (
+    as_count,
+    as_finite,
+    as_matrices,
+    as_number,
+    as_points,
+    as_positive,
+    as_positive_number,
+    as_rotations,
+    as_shape,
+    as_transforms,
+    fit_together,
+)
 from .frames import invert, matrix_from_kuka, pose, transform
 from .handeye_result import HandEye
 from .lie import exp_so3, nearest_rotation, skew
@@ -86,7 +98,9 @@ class SphereHandEye(HandEye):
 
 def rms_distance(residuals):
     """Root of the mean squared length of residual vectors, (..., N, 3) -> (...); per axis it is sqrt(3) smaller."""
-    residuals = as_points(residuals, "residuals", dim=np.shape(residuals)[-1] if np.ndim(residuals) else 3)
+    residuals = as_finite(residuals, "residuals")
+    if residuals.ndim < 2 or not residuals.shape[-2]:
+        raise ValueError(f"residuals must have shape (..., N, 3) with N >= 1, got {residuals.shape}")
     return np.sqrt((residuals**2).sum(-1).mean(-1))
 
 
@@ -98,7 +112,9 @@ def sphere_residuals(T_BF, x_S, T_FS, target):
 
     Source: thesis, formula (4-3).
     """
-    return transform(T_BF, transform(T_FS, x_S)) - as_points(target, "target")
+    moved, target = transform(T_BF, transform(T_FS, x_S)), as_points(target, "target")
+    fit_together(T_BF=moved.shape, target=target.shape)
+    return moved - target
 
 
 def kuka_residuals(p2, T_BF, x_S, target):
@@ -108,8 +124,8 @@ def kuka_residuals(p2, T_BF, x_S, target):
 
 def kuka_jacobian(p2, T_BF, x_S):
     """Analytic derivative of `kuka_residuals` by x, y, z, A, B, C, shape (3 N, 6); mm per mm and mm per rad."""
-    T_BF, x_S = as_transforms(T_BF, "T_BF"), as_points(x_S, "x_S")
-    p2 = as_points(p2, "p2", dim=6)
+    T_BF, x_S = _poses(T_BF, x_S)
+    p2 = as_shape(p2, "p2", 6)
     R = matrix_from_kuka(p2)[:3, :3]
     arms = x_S @ R.T  # the sphere center relative to the scanner's origin, in F
     J = np.empty((len(T_BF), 3, 6))
@@ -125,6 +141,7 @@ def rate_matrix(A, B):
     B: at B = +-90 deg the first and the last axis are one line, A and C become one angle, and no change of the angles
     tilts the frame about the missing direction. Source: what thesis table 7-3 stumbles over without naming it.
     """
+    A, B = as_number(A, "A"), as_number(B, "B")
     ca, sa, cb, sb = np.cos(A), np.sin(A), np.cos(B), np.sin(B)
     return np.array([[0.0, -sa, ca * cb], [0.0, ca, sa * cb], [1.0, 0.0, -sb]])
 
@@ -148,8 +165,10 @@ def numeric_jacobian(function, x, step=1e-6, scheme="forward"):
 
     Source: thesis, formula (6-15) and listing C4 (forward, one step for millimeters and degrees alike).
     """
-    x = as_finite(x, "x")
-    steps = np.broadcast_to(as_positive(step, "step"), x.shape)
+    x, steps = as_shape(x, "x", "n"), as_positive(step, "step")
+    if not len(x) or steps.shape not in ((), x.shape):
+        raise ValueError(f"x and step must have shapes (n,) and () or (n,), got {x.shape} and {steps.shape}")
+    steps = np.broadcast_to(steps, x.shape)
     if scheme not in ("forward", "central"):
         raise ValueError(f"scheme must be 'forward' or 'central', got {scheme!r}")
     columns, f0 = [], function(x) if scheme == "forward" else None
@@ -165,7 +184,7 @@ def numeric_jacobian(function, x, step=1e-6, scheme="forward"):
 
 def joint_jacobian(T_BF, x_S, T_FS, target_free=True):
     """Derivative of the residuals by phi (rad, in S), translation (in F) and target (in B); (3 N, 9) or (3 N, 6)."""
-    T_BF, x_S, T_FS = as_transforms(T_BF, "T_BF"), as_points(x_S, "x_S"), as_transforms(T_FS, "T_FS")
+    (T_BF, x_S), T_FS = _poses(T_BF, x_S), as_shape(as_transforms(T_FS, "T_FS"), "T_FS", 4, 4)
     R = T_BF[:, :3, :3]
     J = np.empty((len(R), 3, 9 if target_free else 6))
     J[..., :3] = -R @ (T_FS[:3, :3] @ skew(x_S))
@@ -181,7 +200,7 @@ def plate_jacobian(T_BF, x_S, p2, p3, x_P):
     p3 enters through the one point T_BP x_P only, so three of its six columns depend on the others whatever the poses:
     the sphere center is observable, the plate's orientation is not. Source: thesis, table 4-2, step 2.
     """
-    p3, x_P = as_points(p3, "p3", dim=6), as_points(x_P, "x_P")
+    p3, x_P = as_shape(p3, "p3", 6), as_shape(x_P, "x_P", 3)
     arm = matrix_from_kuka(p3)[:3, :3] @ x_P
     one = -np.concatenate([np.eye(3), -skew(arm) @ rate_matrix(*p3[3:5])], axis=1)
     return np.concatenate([kuka_jacobian(p2, T_BF, x_S), np.tile(one, (len(x_S), 1))], axis=1)
@@ -195,6 +214,8 @@ def listing_cost(residuals):
     iteration.
     """
     residuals = as_points(residuals, "residuals")
+    if residuals.ndim < 2 or not residuals.shape[-2]:
+        raise ValueError(f"residuals must have shape (n, 3) with n >= 1, got {residuals.shape}")
     return residuals.sum(-2) ** 2 / (2 * residuals.shape[-2])
 
 
@@ -212,7 +233,9 @@ def listing_gauss_newton(start_deg, T_BF, x_S, target, step=5e-7, tolerance=1e-2
     ended : bool
         Whether the stopping rule was met before `max_steps`.
     """
-    p = as_points(start_deg, "start_deg", dim=6)
+    p, max_steps = as_shape(start_deg, "start_deg", 6), as_count(max_steps, "max_steps", at_least=0)
+    T_BF, x_S = _poses(T_BF, x_S)
+    target, tolerance = as_shape(target, "target", 3), as_number(tolerance, "tolerance")
     unit = np.array([1, 1, 1, *np.deg2rad([1, 1, 1])])
 
     def residuals(q):
@@ -269,13 +292,11 @@ def calibrate_sphere_target(T_BF, x_S, target=None, robust=False, rng=None):
 
     Source: thesis, sections 4.4 and 6.1.5, which iterate from a CAD pose with the target held fixed.
     """
-    T_BF, x_S = as_transforms(T_BF, "T_BF"), as_points(x_S, "x_S")
-    if T_BF.ndim != 3 or x_S.shape != (len(T_BF), 3):
-        raise ValueError(f"T_BF and x_S must have shapes (N, 4, 4) and (N, 3), got {T_BF.shape} and {x_S.shape}")
+    T_BF, x_S = _poses(T_BF, x_S)
     fewest = 4 if target is None else 3
     if len(T_BF) < fewest:
         raise ValueError(f"at least {fewest} poses are needed, got {len(T_BF)}")
-    target = None if target is None else as_points(target, "target")
+    target = None if target is None else as_shape(target, "target", 3)
     R, t = T_BF[:, :3, :3], T_BF[:, :3, 3]
     weights = np.ones(len(R))
     if robust:
@@ -297,7 +318,7 @@ def linear_start(T_BF, x_S):
     R_FS x_S + t_FS - R_BF' target = -R_BF' t_BF: three equations a pose, linear because nothing says yet that R_FS is a
     rotation. Needs five poses or more and sphere centers that do not lie in one plane of the scanner frame.
     """
-    T_BF, x_S = as_transforms(T_BF, "T_BF"), as_points(x_S, "x_S")
+    T_BF, x_S = _poses(T_BF, x_S)
     R_t, n = np.swapaxes(T_BF[:, :3, :3], 1, 2), len(T_BF)
     D = np.zeros((n, 3, 15))
     for k in range(3):
@@ -340,10 +361,13 @@ def gauss_newton_pose(start, T_BF, x_S, target=None, parameters="euler", max_ste
     """
     if parameters not in ("euler", "se3"):
         raise ValueError(f"parameters must be 'euler' or 'se3', got {parameters!r}")
-    T_BF, x_S, p = as_transforms(T_BF, "T_BF"), as_points(x_S, "x_S"), as_points(start, "start", dim=6)
+    (T_BF, x_S), p = _poses(T_BF, x_S), as_shape(start, "start", 6)
+    max_steps, tolerance = as_count(max_steps, "max_steps", at_least=0), as_number(tolerance, "tolerance")
     T_FS, free = matrix_from_kuka(p), target is None
-    center = transform(T_BF, transform(T_FS, x_S)).mean(0) if free else as_points(target, "target")
+    center = transform(T_BF, transform(T_FS, x_S)).mean(0) if free else as_shape(target, "target", 3)
     reach = np.sqrt((x_S**2).sum(-1).mean())
+    if not reach > 0:
+        raise ValueError("x_S must hold sphere centers away from the scanner's origin, got none or zeros alone")
     scale = np.array([1, 1, 1, 1 / reach, 1 / reach, 1 / reach] + [1, 1, 1] * free)
     poses, rms, values, converged = [], [], [], False
     for step_number in range(max_steps + 1):
@@ -377,13 +401,13 @@ def gauss_newton_pose(start, T_BF, x_S, target=None, parameters="euler", max_ste
 
 def tukey_weights(lengths, std, cut=TUKEY_CUT):
     """Weights (1 - (r / (cut std))^2)^2 of residual lengths r, 0 beyond the cut: far outliers have no say at all."""
-    u = as_finite(lengths, "lengths") / (cut * float(as_positive(std, "std")))
+    u = as_finite(lengths, "lengths") / (as_positive_number(cut, "cut") * as_positive_number(std, "std"))
     return np.where(np.abs(u) < 1, (1 - u * u) ** 2, 0.0)
 
 
 def leave_one_out(T_BF, x_S, robust=False):
     """Residual vectors (N, 3) of each pose under the calibration from the others: what it is worth elsewhere."""
-    T_BF, x_S = as_transforms(T_BF, "T_BF"), as_points(x_S, "x_S")
+    T_BF, x_S = _poses(T_BF, x_S)
     found = []
     for i in range(len(T_BF)):
         fit = calibrate_sphere_target(np.delete(T_BF, i, 0), np.delete(x_S, i, 0), robust=robust)
@@ -400,9 +424,12 @@ def fit_radius(T_BF, x_S, printed_radius=30.0):
 
     Source: beyond the thesis, which uses three different radii (certificate, listing C16, coordinate machine).
     """
-    x_S = as_points(x_S, "x_S")
-    side, square = np.sign(x_S[:, 1]), x_S[:, 1] ** 2 - printed_radius**2
-    radius = float(as_positive(printed_radius, "printed_radius"))
+    (T_BF, x_S), radius = _poses(T_BF, x_S), as_positive_number(printed_radius, "printed_radius")
+    if len(x_S) < 4:
+        raise ValueError(f"at least 4 poses are needed, got {len(x_S)}")
+    side, square = np.sign(x_S[:, 1]), x_S[:, 1] ** 2 - radius**2
+    if not side.all():
+        raise ValueError("x_S must lie off the scan plane: with y = 0 nothing says on which side the center is")
     for _ in range(MAX_STEPS):
         x = x_S.copy()
         x[:, 1] = side * np.sqrt(np.maximum(square + radius**2, 1e-12))
@@ -419,18 +446,22 @@ def fit_radius(T_BF, x_S, printed_radius=30.0):
 def _by_radius(T_BF, x, T_FS, radius):
     by_R = np.zeros_like(x)
     by_R[:, 1] = radius / x[:, 1]
-    return (np.asarray(T_BF)[:, :3, :3] @ (T_FS[:3, :3] @ by_R[..., None])).reshape(-1, 1)
+    return (T_BF[:, :3, :3] @ (T_FS[:3, :3] @ by_R[..., None])).reshape(-1, 1)
 
 
 def predicted_covariance(T_BF, T_FS, target, std):
     """Covariance (9, 9) of phi, translation and target that a set of poses would give, before anything is measured.
 
     The sphere centers follow from the poses: x_S = T_FS^-1 T_BF^-1 target. This is the Cramer-Rao bound for isotropic
-    noise `std` (mm).
+    noise `std` (mm). Raises ValueError for poses that leave a direction undetermined.
     """
     x_S = transform(invert(T_FS), transform(invert(T_BF), target))
     J = joint_jacobian(T_BF, x_S, T_FS)
-    return float(as_positive(std, "std")) ** 2 * np.linalg.inv(J.T @ J)
+    scale = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
+    values = np.linalg.svd(J / scale, compute_uv=False)
+    if len(values) < 9 or values[-1] <= MIN_SPREAD * values[0]:
+        raise ValueError("the poses leave scanner or target undetermined: too few, or turned about one axis only")
+    return as_positive_number(std, "std") ** 2 * np.linalg.inv(J.T @ J)
 
 
 def poses_that_see(T_FS, target, R_BF, x_S):
@@ -439,6 +470,7 @@ def poses_that_see(T_FS, target, R_BF, x_S):
     From target = R_BF (R_FS x_S + t_FS) + t_BF; (4, 4), (3,), (..., 3, 3), (..., 3) -> T_BF (..., 4, 4).
     """
     R_BF, arms = as_rotations(R_BF, "R_BF"), transform(T_FS, x_S)
+    fit_together(R_BF=R_BF.shape[:-2], x_S=arms.shape[:-1])
     return pose(R_BF, as_points(target, "target") - (R_BF @ arms[..., None])[..., 0])
 
 
@@ -461,6 +493,8 @@ def pattern(T_FS, target, tilt, spread, n=31):
     -------
     T_BF : array, shape (n, 4, 4)
     """
+    n, tilt, spread = as_count(n, "n"), as_number(tilt, "tilt"), as_shape(spread, "spread", 3)
+    T_FS, target = as_shape(as_transforms(T_FS, "T_FS"), "T_FS", 4, 4), as_shape(target, "target", 3)
     k = np.arange(n)
     u = (0.5 + np.outer(k, _IRRATIONAL)) % 1.0  # evenly spread over a cube, without chance
     (x_low, x_high), (y_low, y_high), (z_low, z_high) = FIELD
@@ -474,7 +508,7 @@ def pattern(T_FS, target, tilt, spread, n=31):
     tilted = tilt * np.sqrt(u[:, 5])[:, None] * np.column_stack([np.cos(around), np.sin(around), np.zeros(n)])
     down = np.diag([1.0, -1.0, -1.0])
     turned = exp_so3(np.column_stack([np.zeros((n, 2)), yaw]))
-    return poses_that_see(T_FS, target, exp_so3(tilted) @ turned @ down @ np.asarray(T_FS)[:3, :3].T, x_S)
+    return poses_that_see(T_FS, target, exp_so3(tilted) @ turned @ down @ T_FS[:3, :3].T, x_S)
 
 
 def field_problem(x_S):
@@ -516,7 +550,13 @@ def kim_linear(T_BF, points_S, points_W):
 
     Source: thesis, formulas (2-43) to (2-46) and appendix A, after Kim, Cho, Kim (2001).
     """
-    T_BF, X_S, X_W = as_transforms(T_BF, "T_BF"), as_points(points_S, "points_S"), as_points(points_W, "points_W")
+    T_BF = as_shape(as_transforms(T_BF, "T_BF"), "T_BF", "N", 4, 4)
+    X_W = as_shape(points_W, "points_W", "n", 3)
+    X_S = as_shape(points_S, "points_S", len(T_BF), len(X_W), 3)
+    if len(T_BF) < 3:
+        raise ValueError(f"at least 3 poses are needed, got {len(T_BF)}")
+    if not len(X_W):
+        raise ValueError("points_W must hold four points or more, got none")
     X_S, X_W = (np.concatenate([X, np.ones((*X.shape[:-1], 1))], axis=-1) for X in (X_S, X_W))
     rank = np.linalg.matrix_rank(X_W, tol=1e-9 * np.abs(X_W).max())
     if rank < 4:
@@ -538,7 +578,9 @@ def kim_matrix(A, B):
 
     Source: thesis, appendix A.
     """
-    A, B = as_finite(A, "A"), as_finite(B, "B")
+    A, B = as_matrices(A, "A", 4, 4), as_matrices(B, "B", 4, 4)
+    if A.shape != B.shape:
+        raise ValueError(f"A and B must have the same shape (..., 4, 4), got {A.shape} and {B.shape}")
     left = A[..., :3, None, :3, None] * np.eye(4)[:, None]
     right = np.eye(3)[:, None, :, None] * np.swapaxes(B, -1, -2)[..., None, :, None, :]
     F = np.zeros((*A.shape[:-2], 3, 4))
@@ -566,7 +608,9 @@ def li_two_step(T_BF, x_S, max_turn_deg=0.01):
 
     Source: thesis, formulas (2-40) to (2-42), after Li et al. (2011).
     """
-    T_BF, x_S = as_transforms(T_BF, "T_BF"), as_points(x_S, "x_S")
+    (T_BF, x_S), max_turn_deg = _poses(T_BF, x_S), as_positive_number(max_turn_deg, "max_turn_deg")
+    if len(T_BF) < 2:
+        raise ValueError(f"at least 2 poses are needed, got {len(T_BF)}")
     R, t = T_BF[:, :3, :3], T_BF[:, :3, 3]
     p, q = np.triu_indices(len(R), 1)
     chord = np.linalg.norm(R[p] - R[q], axis=(1, 2))  # 2 sqrt(2) sin(angle / 2)
@@ -608,6 +652,7 @@ def compare_methods(repeats, std, rng):
     bound : float
         The Cramer-Rao bound of one sphere (mm), rms over the repeats.
     """
+    repeats, std = as_count(repeats, "repeats"), as_positive_number(std, "std")
     errors, bounds = {}, []
     corners = 60.0 * (np.indices((2, 2, 2)).reshape(3, 8).T - 0.5)
     for _ in range(repeats):
@@ -633,6 +678,14 @@ def compare_methods(repeats, std, rng):
 
 
 # --- inside ----------------------------------------------------------------------------------------------------------
+
+
+def _poses(T_BF, x_S):
+    """Robot poses (N, 4, 4) with the sphere center (N, 3) seen in each."""
+    T_BF, x_S = as_transforms(T_BF, "T_BF"), as_points(x_S, "x_S")
+    if T_BF.ndim != 3 or x_S.shape != (len(T_BF), 3):
+        raise ValueError(f"T_BF and x_S must have shapes (N, 4, 4) and (N, 3), got {T_BF.shape} and {x_S.shape}")
+    return T_BF, x_S
 
 
 def _residuals(R, t, x, R_FS, t_FS, center):

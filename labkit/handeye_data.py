@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import frames
+from .checks import as_points, as_positive_number
 from .tables import read_table
 
 POSE_COLUMNS = ("x", "y", "z", "A_deg", "B_deg", "C_deg")
@@ -122,7 +123,8 @@ def centers_with_radius(x_S, R, printed_radius=30.0):
 
     A circle larger than the sphere gives y' = 0. Source: thesis, formula (6-27) and listing C16, which takes R = 30 mm.
     """
-    x_S = np.array(x_S, dtype=float)
+    x_S = as_points(x_S, "x_S").copy()
+    R, printed_radius = as_positive_number(R, "R"), as_positive_number(printed_radius, "printed_radius")
     x_S[..., 1] = np.sign(x_S[..., 1]) * np.sqrt(np.maximum(x_S[..., 1] ** 2 + R * R - printed_radius**2, 0.0))
     return x_S
 

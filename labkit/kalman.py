@@ -14,7 +14,22 @@ import numpy as np
 from scipy import linalg, signal, stats
 
 from . import odometry
-from .checks import as_finite, as_points, as_positive
+from .checks import (
+    as_count,
+    as_covariances,
+    as_finite,
+    as_matrices,
+    as_number,
+    as_points,
+    as_positive,
+    as_positive_number,
+    as_probability,
+    as_readings,
+    as_shape,
+    covariance_root,
+    fit_together,
+    solve_covariance,
+)
 from .odometry import wrap_angle
 from .tables import read_table
 
@@ -72,15 +87,15 @@ def _apply(M, x):
     return (M @ x[..., None])[..., 0]
 
 
+def _state(x):
+    x = as_finite(x, "x")
+    if x.ndim < 1:
+        raise ValueError("x must have shape (..., n), got a single number")
+    return x, x.shape[-1]
+
+
 def _symmetric(cov):
     return 0.5 * (cov + _t(cov))
-
-
-def _matrix(value, name, rows, columns):
-    array = as_finite(value, name)
-    if array.shape[-2:] != (rows, columns):
-        raise ValueError(f"{name} must have shape (..., {rows}, {columns}), got {array.shape}")
-    return array
 
 
 # --- the linear filter -------------------------------------------------------
@@ -92,7 +107,7 @@ def vehicle_model(dt):
     B = (0, dt)' is the lecture's; a constant acceleration over dt would also move the position, by dt^2 / 2.
     Source: lecture, "Beispiel: bewegtes Fahrzeug (1)" and "(2)".
     """
-    dt = float(as_positive(dt, "dt"))
+    dt = as_positive_number(dt, "dt")
     return np.array([[1.0, dt], [0.0, 1.0]]), np.array([[0.0], [dt]]), np.array([[1.0, 0.0]])
 
 
@@ -106,10 +121,12 @@ def predict(x, cov, A, B=None, u=None, cov_u=None, cov_v=None):
 
     Source: lecture, "Algorithmus fuer linearen Kalman-Filter", lines 2 and 3.
     """
-    x = as_finite(x, "x")
-    n = x.shape[-1]
-    A, cov = _matrix(A, "A", n, n), _matrix(cov, "cov", n, n)
-    return _predicted(x, cov, A, *_driven(n, B, u, cov_u, cov_v))
+    x, n = _state(x)
+    A, cov = as_matrices(A, "A", n, n), as_matrices(cov, "cov", n, n)
+    push, spread = _driven(n, B, u, cov_u, cov_v)
+    leading = {"x": x.shape[:-1], "cov": cov.shape[:-2], "A": A.shape[:-2]}
+    fit_together(**leading, u=np.shape(push)[:-1], cov_u_and_cov_v=np.shape(spread)[:-2])
+    return _predicted(x, cov, A, push, spread)
 
 
 def _predicted(x, cov, A, push, spread):
@@ -121,16 +138,16 @@ def _driven(n, B, u, cov_u, cov_v):
     push, spread = 0.0, 0.0
     if B is not None:
         B = as_finite(B, "B")
-        k = B.shape[-1]
-        if B.shape[-2:] != (n, k):
+        k = B.shape[-1] if B.ndim > 1 else 0
+        if B.shape[-2:] != (n, k) or not k:
             raise ValueError(f"B must have shape (..., {n}, k), got {B.shape}")
         if u is not None:
             push = _apply(B, as_points(u, "u", k))
         if cov_u is not None:
-            spread = B @ _matrix(cov_u, "cov_u", k, k) @ _t(B)
+            spread = B @ as_covariances(cov_u, "cov_u", k) @ _t(B)
     elif u is not None or cov_u is not None:
         raise ValueError("u and cov_u act through B, but B is missing")
-    return push, spread if cov_v is None else spread + _matrix(cov_v, "cov_v", n, n)
+    return push, spread if cov_v is None else spread + as_covariances(cov_v, "cov_v", n)
 
 
 def update(x, cov, z, C, cov_z, form="joseph", dtype=float):
@@ -148,13 +165,15 @@ def update(x, cov, z, C, cov_z, form="joseph", dtype=float):
     """
     if form not in FORMS:
         raise ValueError(f"form must be one of {', '.join(FORMS)}, got {form!r}")
-    x = as_finite(x, "x").astype(dtype)
-    n = x.shape[-1]
-    cov = _matrix(cov, "cov", n, n).astype(dtype)
+    x, n = _state(x)
+    x = x.astype(dtype)
+    cov = as_matrices(cov, "cov", n, n).astype(dtype)  # the short form may have spoiled it: that is to be seen
     C = _measured_by(C, n).astype(dtype)
     m = C.shape[-2]
-    cov_z = _matrix(cov_z, "cov_z", m, m).astype(dtype)
+    cov_z = as_covariances(cov_z, "cov_z", m).astype(dtype)
     z = None if z is None else as_points(z, "z", m).astype(dtype)
+    leading = {"x": x.shape[:-1], "cov": cov.shape[:-2], "C": C.shape[:-2], "cov_z": cov_z.shape[:-2]}
+    fit_together(**leading, z=() if z is None else z.shape[:-1])
     return _corrected(x, cov, z, C, cov_z, form)
 
 
@@ -171,7 +190,7 @@ def _corrected(x, cov, z, C, cov_z, form="joseph"):
     if z is None:
         return Corrected(x, cov, np.zeros_like(S[..., 0]), S, np.zeros_like(PCt))
     innovation = z - _apply(C, x)
-    K = _t(np.linalg.solve(S, _t(PCt)))
+    K = _t(solve_covariance(S, "C cov C' + cov_z", _t(PCt)))
     return Corrected(x + _apply(K, innovation), _after(cov, K, C, cov_z, form), innovation, S, K)
 
 
@@ -186,10 +205,10 @@ def filter_steps(z, A, C, cov_z, x0, cov0, B=None, u=None, cov_u=None, cov_v=Non
     Returns a `Corrected` whose arrays have the steps as their first axis; innovation and gain are zero where
     nothing was measured.
     """
-    x = np.atleast_1d(as_finite(x0, "x0"))
+    x = as_shape(np.atleast_1d(as_finite(x0, "x0")), "x0", "n")
     n = len(x)
-    A, C, cov = _matrix(A, "A", n, n), _measured_by(C, n), _matrix(cov0, "cov0", n, n)
-    cov_z, z = _matrix(cov_z, "cov_z", len(C), len(C)), np.asarray(z, dtype=float)
+    A, C, cov = as_matrices(A, "A", n, n), _measured_by(C, n), as_covariances(cov0, "cov0", n)
+    cov_z, z = as_matrices(cov_z, "cov_z", len(C), len(C)), as_readings(z, "z")
     if z.ndim != 2 or z.shape[1] != len(C):
         raise ValueError(f"z must have shape (steps, {len(C)}), got {z.shape}")
     missing = np.isnan(z).all(axis=1)
@@ -216,13 +235,17 @@ def steady_state(A, C, cov_v, cov_z):
 
     Raises ValueError where the equation has no stabilizing solution (a mode is neither measured nor stable).
     """
-    A, C = as_finite(A, "A"), as_finite(C, "C")
+    A, C = as_shape(A, "A", "n", "n"), as_shape(C, "C", "m", "n")
+    n, m = len(A), len(C)
+    A, C = as_shape(A, "A", n, n), as_shape(C, "C", m, n)
+    cov_v = as_shape(as_covariances(cov_v, "cov_v", n), "cov_v", n, n)
+    cov_z = as_shape(as_covariances(cov_z, "cov_z", m), "cov_z", m, m)
     try:
-        before = linalg.solve_discrete_are(A.T, C.T, as_finite(cov_v, "cov_v"), as_finite(cov_z, "cov_z"))
+        before = linalg.solve_discrete_are(A.T, C.T, cov_v, cov_z)
     except np.linalg.LinAlgError as error:
         raise ValueError(f"the filter has no steady state: {error}") from None
     gain = np.linalg.solve(C @ before @ C.T + cov_z, C @ before).T
-    return SteadyState(gain, before, _after(before, gain, C, np.asarray(cov_z, dtype=float)))
+    return SteadyState(gain, before, _after(before, gain, C, cov_z))
 
 
 def filter_series(z, A, C, cov_v, cov_z, x0, cov0):
@@ -232,8 +255,8 @@ def filter_series(z, A, C, cov_v, cov_z, x0, cov0):
     recursion with constant coefficients, which `scipy.signal.lfilter` runs in compiled code. Each step predicts, then
     corrects.
     """
-    A, cov_v = as_finite(A, "A"), as_finite(cov_v, "cov_v")
-    n = len(A)
+    n = len(as_shape(A, "A", "n", "n"))
+    A, cov_v = as_shape(A, "A", n, n), as_shape(as_covariances(cov_v, "cov_v", n), "cov_v", n, n)
     C, r = as_finite(C, "C").reshape(-1), as_positive(cov_z, "cov_z").reshape(-1)
     z = as_finite(z, "z")
     if z.ndim > 2 or (z.ndim == 2 and z.shape[1] != 1) or r.shape != (1,) or C.shape != (n,):
@@ -241,7 +264,9 @@ def filter_series(z, A, C, cov_v, cov_z, x0, cov0):
             f"filter_series expects one number a step and n = {n} states, got z {z.shape}, C {C.shape}, cov_z {r.shape}"
         )
     z = z.reshape(-1)
-    x0, cov0 = as_finite(x0, "x0"), _matrix(cov0, "cov0", n, n)
+    x0, cov0 = as_shape(x0, "x0", n), as_shape(as_covariances(cov0, "cov0", n), "cov0", n, n)
+    if not len(z):
+        return np.empty((0, n))
     start = _until_settled_2 if n == 2 else _until_settled
     out, gain = start(z, A, C, cov_v, float(r[0]), x0, cov0)
     done = len(out)
@@ -316,6 +341,8 @@ def _steady_run(z, A, C, gain, out):
 
 def example(name):
     """Printed numbers of a worked example as {name: value}; name is "fusion" or "vehicle" (see data/kalman)."""
+    if name not in ("fusion", "vehicle"):
+        raise ValueError(f'name must be "fusion" or "vehicle", got {name!r}')
     table = read_table(f"kalman/{name}.csv", text=("name", "unit"))
     return dict(zip(table["name"].tolist(), table["value"].tolist()))
 
@@ -323,8 +350,10 @@ def example(name):
 def predict_vehicle(steps, dt, var_x0, var_v0, var_a, acceleration=1.0):
     """State (2,) and covariance (2, 2) of the lecture's vehicle after `steps` predictions from rest, none corrected."""
     A, B, _ = vehicle_model(dt)
-    x, cov = np.zeros(2), np.diag([float(var_x0), float(var_v0)])
-    for _ in range(steps):
+    names = ("var_x0", "var_v0", "var_a", "acceleration")
+    var_x0, var_v0, var_a, acceleration = map(as_number, (var_x0, var_v0, var_a, acceleration), names)
+    x, cov = np.zeros(2), np.diag([var_x0, var_v0])
+    for _ in range(as_count(steps, "steps", at_least=0)):
         x, cov = predict(x, cov, A, B, u=[acceleration], cov_u=[[var_a]])
     return x, cov
 
@@ -335,7 +364,7 @@ def reconstruct_vehicle(cov, steps, dt):
     The covariance is linear in the three and has three entries, so for every number of steps and every time step there
     is exactly one answer. It is possible only where none of the three is negative; steps and dt themselves remain free.
     """
-    cov = _matrix(cov, "cov", 2, 2)
+    cov, steps = as_shape(as_covariances(cov, "cov", 2), "cov", 2, 2), as_count(steps, "steps", at_least=2)
     basis = [predict_vehicle(steps, dt, *row)[1] for row in np.eye(3)]
     entries = np.array([[P[0, 0], P[0, 1], P[1, 1]] for P in basis]).T
     return np.linalg.solve(entries, [cov[0, 0], cov[0, 1], cov[1, 1]])
@@ -346,31 +375,41 @@ def reconstruct_vehicle(cov, steps, dt):
 
 def nees(truth, x, cov, angle=None):
     """Normalized estimation error squared, error' cov^-1 error, (...); `angle` is the index of a state to wrap."""
-    error = as_finite(truth, "truth") - as_finite(x, "x")
+    truth, x = as_finite(truth, "truth"), as_finite(x, "x")
+    fit_together(truth=truth.shape, x=x.shape)
+    error = truth - x
     if angle is not None:
+        if angle not in range(-error.shape[-1], error.shape[-1]):
+            raise ValueError(f"angle must be the index of one of {error.shape[-1]} states, got {angle!r}")
         error[..., angle] = wrap_angle(error[..., angle])
-    return _squared(error, as_finite(cov, "cov"))
+    return _squared(error, cov, "cov")
 
 
 def nis(innovation, cov_innovation):
     """Normalized innovation squared, innovation' S^-1 innovation, (...): the check that needs no truth."""
-    return _squared(as_finite(innovation, "innovation"), as_finite(cov_innovation, "cov_innovation"))
+    return _squared(as_finite(innovation, "innovation"), cov_innovation, "cov_innovation")
 
 
-def _squared(e, cov):
-    return (e * np.linalg.solve(cov, e[..., None])[..., 0]).sum(-1)
+def _squared(e, cov, name):
+    if e.ndim < 1:
+        raise ValueError("an error must have shape (..., n), got a single number")
+    cov = as_covariances(cov, name, e.shape[-1])
+    fit_together(**{"the errors": e.shape[:-1], name: cov.shape[:-2]})
+    return (e * solve_covariance(cov, name, e[..., None])[..., 0]).sum(-1)
 
 
 def mean_band(dof, runs, probability=0.99):
     """Limits (low, high) between which the mean NEES or NIS of `runs` independent runs lies with that probability."""
-    tail = 0.5 * (1 - probability)
+    dof, runs = as_count(dof, "dof"), as_count(runs, "runs")
+    tail = 0.5 * (1 - as_probability(probability, "probability"))
     return tuple(stats.chi2.ppf([tail, 1 - tail], dof * runs) / runs)
 
 
 def gate(innovation, cov_innovation, probability=0.99):
     """Whether an innovation is plausible: its NIS lies below the chi-square quantile of its dimension; (...) bool."""
-    dof = np.shape(innovation)[-1]
-    return nis(innovation, cov_innovation) <= stats.chi2.ppf(probability, dof)
+    innovation = as_finite(innovation, "innovation")
+    squared = nis(innovation, cov_innovation)
+    return squared <= stats.chi2.ppf(as_probability(probability, "probability"), innovation.shape[-1])
 
 
 # --- range and bearing to landmarks -----------------------------------------
@@ -403,18 +442,24 @@ def measurement_jacobian(x, landmarks):
 
 def _toward(x, landmarks):
     x, landmarks = as_points(x, "x", 3), as_points(landmarks, "landmarks", 2)
+    if landmarks.ndim < 2:
+        raise ValueError(f"landmarks must have shape (..., m, 2), got {landmarks.shape}")
+    fit_together(x=x.shape[:-1], landmarks=landmarks.shape[:-2])
     away = landmarks - x[..., None, :2]
     return away[..., 0], away[..., 1], x[..., 2, None]
 
 
 def _stacked(z, predicted, wrap):
     """Innovations (..., 2 m), with NaN for what was not measured replaced by 0, and the mask of what was."""
-    y = np.asarray(z, dtype=float) - predicted
+    z = as_readings(z, "z")
+    if z.shape[-2:] != predicted.shape[-2:]:
+        raise ValueError(f"z must have shape (..., {predicted.shape[-2]}, 2), one row a landmark, got {z.shape}")
+    fit_together(z=z.shape[:-2], x=predicted.shape[:-2])
+    seen = ~np.isnan(z - predicted)
+    y = np.where(seen, z - predicted, 0.0)
     if wrap:
         y[..., 1] = wrap_angle(y[..., 1])
-    y = y.reshape(*y.shape[:-2], -1)
-    seen = np.isfinite(y)
-    return np.where(seen, y, 0.0), seen
+    return y.reshape(*y.shape[:-2], -1), seen.reshape(*seen.shape[:-2], -1)
 
 
 def ekf_update(x, cov, z, landmarks, std_range, std_bearing, iterations=1, wrap=True):
@@ -429,10 +474,11 @@ def ekf_update(x, cov, z, landmarks, std_range, std_bearing, iterations=1, wrap=
 
     Source: lecture, "Algorithmus fuer erweiterten Kalman-Filter", lines 5 to 8.
     """
-    prior, cov = as_points(x, "x", 3), _matrix(cov, "cov", 3, 3)
-    std = np.array([as_positive(std_range, "std_range"), as_positive(std_bearing, "std_bearing")])
+    prior, cov = as_points(x, "x", 3), as_covariances(cov, "cov", 3)
+    std = np.array([as_positive_number(std_range, "std_range"), as_positive_number(std_bearing, "std_bearing")])
+    fit_together(x=prior.shape[:-1], cov=cov.shape[:-2])
     x = prior
-    for _ in range(iterations):
+    for _ in range(as_count(iterations, "iterations")):
         H = measurement_jacobian(x, landmarks)
         H = H.reshape(*H.shape[:-3], -1, 3)
         y, seen = _stacked(z, measurement(x, landmarks), wrap)
@@ -457,7 +503,7 @@ def ekf_step(x, cov, u, dt, cov_u, z, landmarks, std_range, std_bearing, model="
 def _sigma_points(x, cov):
     """Points (..., 2 n + 1, n) at the mean and at +- the columns of the root of 3 cov, and their weights (2 n + 1,)."""
     n = x.shape[-1]
-    columns = _t(np.linalg.cholesky(3 * cov))
+    columns = _t(covariance_root(3 * cov, "the covariance"))
     points = np.concatenate([x[..., None, :], x[..., None, :] + columns, x[..., None, :] - columns], axis=-2)
     weights = np.full(2 * n + 1, 1 / 6)
     weights[0] = (3 - n) / 3
@@ -469,11 +515,11 @@ def unscented_predict(x, cov, u, dt, cov_u, model="euler"):
 
     The arguments are those of `odometry.propagate`; no Jacobian is needed. cov and cov_u must be positive definite.
     """
-    x, cov = as_points(x, "x", 3), _matrix(cov, "cov", 3, 3)
+    x, cov = as_points(x, "x", 3), as_covariances(cov, "cov", 3)
     shape = x.shape[:-1]
     both = np.concatenate([x, np.broadcast_to(as_points(u, "u", 2), (*shape, 2))], axis=-1)
     joint = np.zeros((*shape, 5, 5))
-    joint[..., :3, :3], joint[..., 3:, 3:] = cov, _matrix(cov_u, "cov_u", 2, 2)
+    joint[..., :3, :3], joint[..., 3:, 3:] = cov, as_covariances(cov_u, "cov_u", 2)
     points, weights = _sigma_points(both, joint)
     moved = odometry.step(points[..., :3], points[..., 3:], dt, model)
     mean = weights @ moved
@@ -483,7 +529,8 @@ def unscented_predict(x, cov, u, dt, cov_u, model="euler"):
 
 def unscented_update(x, cov, z, landmarks, std_range, std_bearing):
     """Correct a pose by the unscented transform: a `Corrected`; arguments as `ekf_update`."""
-    x, cov = as_points(x, "x", 3), _matrix(cov, "cov", 3, 3)
+    x, cov = as_points(x, "x", 3), as_covariances(cov, "cov", 3)
+    std_range, std_bearing = as_positive_number(std_range, "std_range"), as_positive_number(std_bearing, "std_bearing")
     points, weights = _sigma_points(x, cov)
     center = measurement(x, landmarks)
     marks = np.asarray(landmarks, dtype=float)
@@ -510,11 +557,14 @@ def associate(x, cov, z, landmarks, std_range, std_bearing, by="mahalanobis", pr
     by : "mahalanobis" compares innovations in units of their covariance; "nearest" compares in meters where the
         measured points would lie, and then gates alike. Each measurement is matched on its own.
     """
-    x, z, landmarks = as_points(x, "x", 3), as_points(z, "z", 2), as_points(landmarks, "landmarks", 2)
+    x, z, landmarks = as_shape(x, "x", 3), as_shape(z, "z", "k", 2), as_shape(landmarks, "landmarks", "m", 2)
+    std_range, std_bearing = as_positive_number(std_range, "std_range"), as_positive_number(std_bearing, "std_bearing")
+    if not len(landmarks):
+        raise ValueError("landmarks must hold at least one, got none")
     predicted, H = measurement(x, landmarks), measurement_jacobian(x, landmarks)
     y = z[:, None, :] - predicted[None, :, :]
     y[..., 1] = wrap_angle(y[..., 1])
-    S = H @ _matrix(cov, "cov", 3, 3) @ _t(H) + np.diag([std_range**2, std_bearing**2])
+    S = H @ as_covariances(cov, "cov", 3) @ _t(H) + np.diag([std_range**2, std_bearing**2])
     distance = nis(y, S)
     if by == "nearest":
         points = x[:2] + z[:, :1] * np.stack([np.cos(x[2] + z[:, 1]), np.sin(x[2] + z[:, 1])], axis=-1)
@@ -523,7 +573,7 @@ def associate(x, cov, z, landmarks, std_range, std_bearing, by="mahalanobis", pr
         best = distance.argmin(1)
     else:
         raise ValueError(f'by must be "mahalanobis" or "nearest", got {by!r}')
-    passed = distance[np.arange(len(z)), best] <= stats.chi2.ppf(probability, 2)
+    passed = distance[np.arange(len(z)), best] <= stats.chi2.ppf(as_probability(probability, "probability"), 2)
     return np.where(passed, best, -1)
 
 
@@ -533,10 +583,14 @@ def simulate_drive(x0, controls, dt, cov_u, landmarks, std_range, std_bearing, r
     x0 : (3,) or (runs, 3) true start.    controls : (n, 2) commands.    cov_u : (2, 2) or (n, 2, 2).
     reach : landmarks farther away (m) are not seen and measure NaN.
     """
-    controls = as_points(controls, "controls", 2)
-    root = np.linalg.cholesky(np.broadcast_to(as_finite(cov_u, "cov_u"), (len(controls), 2, 2)))
+    controls, runs = as_shape(controls, "controls", "n", 2), as_count(runs, "runs")
+    std_range, std_bearing = as_positive_number(std_range, "std_range"), as_positive_number(std_bearing, "std_bearing")
+    root = covariance_root(_control_covariances(cov_u, len(controls)), "cov_u")
+    x0 = as_points(x0, "x0", 3)
+    if x0.shape not in ((3,), (runs, 3)):
+        raise ValueError(f"x0 must have shape (3,) or ({runs}, 3), got {x0.shape}")
     real = controls[:, None, :] + rng.standard_normal((len(controls), runs, 2)) @ _t(root)
-    truth = odometry.drive(np.broadcast_to(as_points(x0, "x0", 3), (runs, 3)), real, dt, model)
+    truth = odometry.drive(np.broadcast_to(x0, (runs, 3)), real, dt, model)
     z = measurement(truth[1:], landmarks)
     far = z[..., 0] > reach
     z = z + rng.standard_normal(z.shape) * [std_range, std_bearing]
@@ -578,7 +632,7 @@ def circle_course(marks=4, steps=300):
 
     The lecture shows such a drive ("Beispielfahrt mit einer Landmarke") without its numbers.
     """
-    circle = odometry.circle_drive()
+    marks, steps, circle = as_count(marks, "marks"), as_count(steps, "steps"), odometry.circle_drive()
     cov_u = odometry.control_covariance(circle.controls[0], circle.dt, **circle.noise)
     landmarks = np.array([[5.0, 5.0], [-4.0, 5.5], [-4.5, -1.0], [4.5, -1.5]])[:marks]
     cov0 = np.diag([0.1**2, 0.1**2, np.radians(3) ** 2])
@@ -601,8 +655,9 @@ def ekf_localize(
     The correction is in information form: with W = sum H' R^-1 H over the landmarks, cov = prior (I + W prior)^-1. It
     equals the lecture's gain form for independent measurements, and inverts one 3 x 3 matrix whatever their number.
     """
-    u, landmarks = as_points(u, "u", 2), as_points(landmarks, "landmarks", 2)
-    z = np.asarray(z, dtype=float)
+    u, landmarks, z = as_points(u, "u", 2), as_shape(landmarks, "landmarks", "m", 2), as_readings(z, "z")
+    if u.ndim not in (2, 3):
+        raise ValueError(f"u must have shape (n, 2) or (n, runs, 2), got {u.shape}")
     m = len(landmarks)
     if model not in ("euler", "midpoint"):
         raise ValueError(f"model must be one of euler, midpoint, got {model!r}")
@@ -611,22 +666,33 @@ def ekf_localize(
             f"z must have shape ({len(u)}, {m}, 2) or ({len(u)}, runs, {m}, 2) for {len(u)} controls and {m} "
             f"landmarks, got {z.shape}"
         )
-    if np.isinf(z).any() or (np.isnan(z[..., 0]) != np.isnan(z[..., 1])).any():
+    if (np.isnan(z[..., 0]) != np.isnan(z[..., 1])).any():
         raise ValueError("z must be finite, or NaN in both numbers of a landmark that was not seen")
     runs = z.shape[1:-2]
-    x0 = np.broadcast_to(as_points(x0, "x0", 3), (*runs, 3))
-    cov0 = np.broadcast_to(_matrix(cov0, "cov0", 3, 3), (*runs, 3, 3))
+    x0, cov0 = as_points(x0, "x0", 3), as_covariances(cov0, "cov0", 3)
+    for name, got in (("u", u.shape[1:-1]), ("x0", x0.shape[:-1]), ("cov0", cov0.shape[:-2])):
+        if got not in ((), runs):
+            raise ValueError(f"{name} must come once for all runs or once a run as z, {runs}, got leading axes {got}")
+    x0, cov0 = np.broadcast_to(x0, (*runs, 3)), np.broadcast_to(cov0, (*runs, 3, 3))
     var_u = np.zeros((len(u), 2)) if cov_u is None else _control_variances(cov_u, len(u))
-    extra = np.zeros((3, 3)) if cov_v is None else _matrix(cov_v, "cov_v", 3, 3)
+    extra = np.zeros((3, 3)) if cov_v is None else as_shape(as_covariances(cov_v, "cov_v", 3), "cov_v", 3, 3)
     turn = 0.5 if model == "midpoint" else 0.0
-    weights = (1 / as_positive(std_range, "std_range") ** 2, 1 / as_positive(std_bearing, "std_bearing") ** 2)
+    stds = as_positive_number(std_range, "std_range"), as_positive_number(std_bearing, "std_bearing")
+    weights = tuple(1 / std**2 for std in stds)
     run = _filter_many if runs else _filter_one
-    x, cov, score = run(u, z, landmarks, x0, cov0, as_positive(dt, "dt"), weights, var_u, extra, turn, wrap)
+    x, cov, score = run(u, z, landmarks, x0, cov0, as_positive_number(dt, "dt"), weights, var_u, extra, turn, wrap)
     return Localization(x, cov, score, np.isfinite(z).sum((-1, -2)))
 
 
+def _control_covariances(cov_u, n):
+    cov_u = as_covariances(cov_u, "cov_u", 2)
+    if cov_u.shape not in ((2, 2), (n, 2, 2)):
+        raise ValueError(f"cov_u must have shape (2, 2) or ({n}, 2, 2), got {cov_u.shape}")
+    return np.broadcast_to(cov_u, (n, 2, 2))
+
+
 def _control_variances(cov_u, n):
-    cov_u = np.broadcast_to(_matrix(cov_u, "cov_u", 2, 2), (n, 2, 2))
+    cov_u = _control_covariances(cov_u, n)
     if (cov_u[:, 0, 1] != 0).any():
         raise ValueError("cov_u must be diagonal: ekf_localize takes v and omega as uncorrelated, as the lecture does")
     return np.diagonal(cov_u, axis1=-2, axis2=-1)

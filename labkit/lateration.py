@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .checks import as_finite, as_points, as_positive
+from .checks import as_count, as_finite, as_number, as_points, as_positive, as_positive_number, as_shape, fit_together
 
 COSTS = ("distance", "squares")
 RANK_TOLERANCE = 1e-7  # a second singular value below this share of the first: the landmarks do not fix the position
@@ -66,12 +66,15 @@ def square_residuals(landmarks, distances, position):
     """
     landmarks, distances = _landmarks(landmarks, distances)
     position = as_points(position, "position", landmarks.shape[1])
+    fit_together(distances=distances.shape[:-1], position=position.shape[:-1])
     return ((landmarks - position[..., None, :]) ** 2).sum(-1) - distances**2
 
 
 def square_jacobian(landmarks, position):
     """Derivative of `square_residuals` by the position: rows 2 (position - landmark), (..., n, dim), in m."""
     landmarks = as_finite(landmarks, "landmarks")
+    if landmarks.ndim != 2:
+        raise ValueError(f"landmarks must have shape (n, dim), got {landmarks.shape}")
     position = as_points(position, "position", landmarks.shape[-1])
     return 2 * (position[..., None, :] - landmarks)
 
@@ -88,7 +91,8 @@ def newton(landmarks, distances, start, steps=50, tolerance=1e-12):
             f"newton needs as many landmarks as coordinates and one set of distances, got {len(landmarks)} landmarks "
             f"in {landmarks.shape[1]}D and distances of shape {distances.shape}; use laterate"
         )
-    path = [as_points(start, "start", landmarks.shape[1])]
+    path = [as_shape(start, "start", landmarks.shape[1])]
+    steps, tolerance = as_count(steps, "steps", at_least=0), as_number(tolerance, "tolerance")
     scale = np.abs(landmarks - landmarks.mean(0)).max() + distances.max()
     for _ in range(steps):
         J = square_jacobian(landmarks, path[-1])
@@ -111,13 +115,13 @@ def _two_circles(landmarks, distances):
 def circle_intersections(landmarks, distances):
     """Both points where two circles meet, (2, 2), in closed form; the first lies left of the way from landmark 1 to 2.
 
-    Raises ValueError where the circles do not meet.
+    Raises ValueError where the circles do not meet, or have one center.
     """
     (a, b), (r1, r2) = _two_circles(landmarks, distances)
     along = b - a
     base = np.hypot(*along)
-    if not abs(r1 - r2) <= base <= r1 + r2:
-        raise ValueError(f"the circles do not meet: radii {r1:g} and {r2:g} m, centers {base:g} m apart")
+    if base == 0 or not abs(r1 - r2) <= base <= r1 + r2:
+        raise ValueError(f"the circles do not meet in two points: radii {r1:g} and {r2:g} m, centers {base:g} m apart")
     foot = (r1**2 - r2**2 + base**2) / (2 * base)
     height = np.sqrt(max(0.0, r1**2 - foot**2))
     along = along / base
@@ -169,9 +173,9 @@ def laterate(landmarks, distances, start=None, cost="distance", std=1.0, steps=1
     landmarks, distances = _landmarks(landmarks, distances)
     if cost not in COSTS:
         raise ValueError(f"cost must be one of {', '.join(COSTS)}, got {cost!r}")
-    std, dim = as_positive(std, "std"), landmarks.shape[1]
+    std, dim, steps = as_positive_number(std, "std"), landmarks.shape[1], as_count(steps, "steps")
     x = linear_start(landmarks, distances) if start is None else as_points(start, "start", dim)
-    x = np.broadcast_to(x, (*np.broadcast_shapes(x.shape[:-1], distances.shape[:-1]), dim)).copy()
+    x = np.broadcast_to(x, (*fit_together(start=x.shape[:-1], distances=distances.shape[:-1]), dim)).copy()
     x, iterations, converged = _minimize(landmarks, distances, x, cost, steps)
     e, J = _errors(landmarks, distances, x, "distance")
     values = np.linalg.svd(J, compute_uv=False)
@@ -187,7 +191,7 @@ def laterate(landmarks, distances, start=None, cost="distance", std=1.0, steps=1
 
 def _minimize(landmarks, distances, x, cost, steps):
     """Levenberg-Marquardt with one damping a run; returns positions, iterations, converged."""
-    eye = np.eye(x.shape[-1])
+    eye, size = np.eye(x.shape[-1]), np.abs(landmarks - landmarks.mean(0)).max() + distances.max(initial=0.0)
     damping = np.full(x.shape[:-1], 1e-3)
     e, J = _errors(landmarks, distances, x, cost)
     value, done = (e**2).sum(-1), np.zeros(x.shape[:-1], bool)
@@ -199,7 +203,7 @@ def _minimize(landmarks, distances, x, cost, steps):
         tried = x + np.where(done[..., None], 0.0, delta)
         e2, J2 = _errors(landmarks, distances, tried, cost)
         value2 = (e2**2).sum(-1)
-        small = np.abs(delta).max(-1) <= 1e-11 * (1 + np.abs(x).max(-1))
+        small = np.abs(delta).max(-1) <= 1e-11 * (size + np.abs(x).max(-1))
         better = value2 <= value
         x, J = np.where(better[..., None], tried, x), np.where(better[..., None, None], J2, J)
         e, value = np.where(better[..., None], e2, e), np.where(better, value2, value)
@@ -222,6 +226,8 @@ def dilution(landmarks, position):
         Where position and landmarks lie on one line (in 3D: the unit vectors in one plane).
     """
     landmarks = as_finite(landmarks, "landmarks")
+    if landmarks.ndim != 2:
+        raise ValueError(f"landmarks must have shape (n, dim), got {landmarks.shape}")
     position = as_points(position, "position", landmarks.shape[-1])
     away = position[..., None, :] - landmarks
     length = np.linalg.norm(away, axis=-1, keepdims=True)

@@ -8,12 +8,15 @@ appendix.
 
 import numpy as np
 
-from .checks import as_finite
+from .checks import as_matrices, as_points
 
 
 def skew(v):
     """Matrix of the cross product, skew(v) @ w = v x w; (..., 3) -> (..., 3, 3)."""
-    v = np.asarray(v, dtype=float)
+    return _skew(as_points(v, "v"))
+
+
+def _skew(v):
     S = np.zeros((*v.shape, 3))
     S[..., 0, 1], S[..., 0, 2], S[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
     S[..., 1, 0], S[..., 2, 0], S[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
@@ -33,8 +36,8 @@ def _coefficients(theta_squared):
 
 def exp_so3(phi):
     """Rotation matrix of the rotation vector phi (rad), Rodrigues' formula; (..., 3) -> (..., 3, 3)."""
-    phi = as_finite(phi, "phi")
-    S = skew(phi)
+    phi = as_points(phi, "phi")
+    S = _skew(phi)
     a, b, _ = _coefficients((phi**2).sum(-1))
     return np.eye(3) + a * S + b * (S @ S)
 
@@ -44,7 +47,7 @@ def log_so3(R):
 
     Accurate over the whole range: near pi, where R - R' vanishes, the axis is read from the symmetric part.
     """
-    R = as_finite(R, "R")
+    R = as_matrices(R, "R", 3, 3)
     w = 0.5 * np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1)
     sin = np.linalg.norm(w, axis=-1)
     cos = 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1)
@@ -70,15 +73,15 @@ def _log_near_pi(R, w, angle):
 
 def left_jacobian_so3(phi):
     """V(phi) with exp(phi + d) = exp(V(phi) d) exp(phi) to first order; (..., 3) -> (..., 3, 3)."""
-    phi = as_finite(phi, "phi")
-    S = skew(phi)
+    phi = as_points(phi, "phi")
+    S = _skew(phi)
     _, b, c = _coefficients((phi**2).sum(-1))
     return np.eye(3) + b * S + c * (S @ S)
 
 
 def exp_se3(xi):
     """Rigid transform of the twist xi = (phi, rho); (..., 6) -> (..., 4, 4)."""
-    xi = as_finite(xi, "xi")
+    xi = as_points(xi, "xi", dim=6)
     T = np.zeros((*xi.shape[:-1], 4, 4))
     T[..., :3, :3] = exp_so3(xi[..., :3])
     T[..., :3, 3] = (left_jacobian_so3(xi[..., :3]) @ xi[..., 3:, None])[..., 0]
@@ -88,7 +91,7 @@ def exp_se3(xi):
 
 def log_se3(T):
     """Twist xi = (phi, rho) of the rigid transform T; (..., 4, 4) -> (..., 6)."""
-    T = as_finite(T, "T")
+    T = as_matrices(T, "T", 4, 4)
     phi = log_so3(T[..., :3, :3])
     rho = np.linalg.solve(left_jacobian_so3(phi), T[..., :3, 3, None])[..., 0]
     return np.concatenate([phi, rho], axis=-1)
@@ -96,16 +99,16 @@ def log_se3(T):
 
 def adjoint(T):
     """Ad(T) with T exp(xi) T^-1 = exp(Ad(T) xi); (..., 4, 4) -> (..., 6, 6), twists rotation first."""
-    T = as_finite(T, "T")
+    T = as_matrices(T, "T", 4, 4)
     A = np.zeros((*T.shape[:-2], 6, 6))
     R = T[..., :3, :3]
     A[..., :3, :3] = A[..., 3:, 3:] = R
-    A[..., 3:, :3] = skew(T[..., :3, 3]) @ R
+    A[..., 3:, :3] = _skew(T[..., :3, 3]) @ R
     return A
 
 
 def nearest_rotation(M):
     """Rotation matrix closest to M in the Frobenius norm, by SVD with the determinant corrected; (..., 3, 3)."""
-    U, _, Vt = np.linalg.svd(as_finite(M, "M"))
+    U, _, Vt = np.linalg.svd(as_matrices(M, "M", 3, 3))
     U[..., :, 2] *= np.sign(np.linalg.det(U @ Vt))[..., None]
     return U @ Vt

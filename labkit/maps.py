@@ -14,13 +14,14 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from .checks import as_finite, as_points, as_positive
+from .checks import as_count, as_finite, as_number, as_points, as_positive_number, as_shape
 from .tables import DATA, read_table
 
 FREE, OCCUPIED, UNKNOWN = 0, 1, 2
 _SYMBOLS = {".": FREE, " ": FREE, "#": OCCUPIED, "?": UNKNOWN}
 _GRAY = (255, 0, 127)  # white = free, black = occupied, gray = unknown, as the lecture draws it
 EVERY = 4
+MOST_CELLS = 1e8  # a larger map is a slip of the unit
 _RAYS = 1 << 17
 _CHUNK = 16384  # rays or beams worked on at once: small enough to stay in the processor's cache
 
@@ -45,12 +46,14 @@ class OccupancyGrid:
                 f"cells must be a (H, W) array of 0 (free), 1 (occupied), 2 (unknown), got shape {cells.shape}"
             )
         object.__setattr__(self, "cells", cells.astype(np.uint8))
-        object.__setattr__(self, "resolution", float(as_positive(self.resolution, "resolution")))
-        object.__setattr__(self, "origin", tuple(as_points(self.origin, "origin", dim=2).tolist()))
+        object.__setattr__(self, "resolution", as_positive_number(self.resolution, "resolution"))
+        object.__setattr__(self, "origin", tuple(as_shape(self.origin, "origin", 2).tolist()))
 
     @classmethod
     def from_ascii(cls, art, resolution=1.0, origin=(0.0, 0.0)):
         """Grid from a drawing: '#' occupied, '.' or blank free, '?' unknown; the first line is the top of the map."""
+        if not isinstance(art, str):
+            raise ValueError(f"art must be a text, got {type(art).__name__}")
         lines = [line for line in art.splitlines() if line.strip()]
         indent = min((len(line) - len(line.lstrip()) for line in lines), default=0)
         lines = [line[indent:].rstrip() for line in lines]
@@ -84,10 +87,15 @@ class OccupancyGrid:
         lines = as_points(lines, "lines", dim=4).reshape(-1, 4)
         if not len(lines):
             raise ValueError("lines must hold at least one segment, got none")
-        resolution = float(as_positive(resolution, "resolution"))
+        resolution, margin = as_positive_number(resolution, "resolution"), as_number(margin, "margin")
+        if margin < 0:
+            raise ValueError(f"margin must not be negative, got {margin:g}")
         ends = lines.reshape(-1, 2)
         low = np.floor((ends.min(0) - margin) / resolution + 1e-9) * resolution
-        shape = np.floor((ends.max(0) + margin - low) / resolution + 1e-9).astype(int) + 1
+        shape = np.floor((ends.max(0) + margin - low) / resolution + 1e-9) + 1
+        if shape.prod() > MOST_CELLS:
+            raise ValueError(f"the map must have at most {MOST_CELLS:g} cells, got {shape[1]:g} by {shape[0]:g}")
+        shape = shape.astype(int)
         cells = np.zeros(shape[::-1], dtype=np.uint8)
         for line in (lines.reshape(-1, 2, 2) - low) / resolution + 1e-9:
             j, i = np.floor(_between_crossings(*line)).astype(int).T
@@ -213,8 +221,8 @@ def walk_ray(grid, pose, bearing, r_max):
 
     Source: lecture, "Strahlenmodell": the distance to the first obstacle by following the beam.
     """
-    x, y, theta = as_points(pose, "pose")
-    angle = float(theta) + float(bearing)
+    x, y, theta = as_shape(pose, "pose", 3)
+    angle = float(theta) + as_number(bearing, "bearing")
     u = np.array([math.sin(angle), math.cos(angle)])  # rows first, as cells are indexed
     start = (np.array([y, x]) - grid.origin[::-1]) / grid.resolution
     cell = np.floor(start).astype(int)
@@ -223,7 +231,7 @@ def walk_ray(grid, pose, bearing, r_max):
         per_cell = np.abs(1.0 / u)
     to_edge = np.where(u > 0, cell + 1 - start, start - cell)
     crossing = np.array([edge * pace if pace < np.inf else np.inf for edge, pace in zip(to_edge, per_cell)])
-    travelled, reach = 0.0, float(as_positive(r_max, "r_max")) / grid.resolution
+    travelled, reach = 0.0, as_positive_number(r_max, "r_max") / grid.resolution
     while travelled < reach and all(0 <= c < n for c, n in zip(cell, grid.cells.shape)):
         if grid.cells[tuple(cell)] == OCCUPIED:
             return travelled * grid.resolution
@@ -261,7 +269,7 @@ def cast_rays(grid, poses, bearings, r_max):
     poses, bearings = as_points(poses, "poses"), as_finite(bearings, "bearings")
     if bearings.ndim != 1:
         raise ValueError(f"bearings must have shape (B,), got {bearings.shape}")
-    r_max = float(as_positive(r_max, "r_max"))
+    r_max = as_positive_number(r_max, "r_max")
     flat = poses.reshape(-1, 3)
     ranges = np.empty((len(flat), len(bearings)), dtype=np.float32)
     rows = max(1, _RAYS // max(1, len(bearings)))
@@ -324,7 +332,7 @@ class RangeTable:
     """
 
     def __init__(self, grid, r_max, n_angles=120):
-        self.grid, self.r_max, self.n_angles = grid, float(as_positive(r_max, "r_max")), int(n_angles)
+        self.grid, self.r_max, self.n_angles = grid, as_positive_number(r_max, "r_max"), as_count(n_angles, "n_angles")
         height, width = grid.cells.shape
         table = np.zeros((height, width, self.n_angles), dtype=np.float32)
         i, j = np.nonzero(~grid.occupied)
@@ -339,8 +347,8 @@ class RangeTable:
 
     def cast(self, poses, bearings, r_max=None):
         """As `cast_rays`, looked up; `r_max` may shorten the range the table was made for."""
-        poses = as_points(poses, "poses")
-        flat, bearings = poses.reshape(-1, 3), as_finite(bearings, "bearings")
+        poses, bearings = as_points(poses, "poses"), as_shape(bearings, "bearings", "B")
+        flat = poses.reshape(-1, 3)
         i, j = self.grid.cell_of(flat[:, :2])
         height, width = self.grid.cells.shape
         inside = (i >= 0) & (i < height) & (j >= 0) & (j < width)
@@ -353,7 +361,7 @@ class RangeTable:
         ranges = self.table.ravel().take(k + cell[:, None])
         ranges[~inside] = self.r_max
         if r_max is not None:
-            np.minimum(ranges, r_max, out=ranges)
+            np.minimum(ranges, as_positive_number(r_max, "r_max"), out=ranges)
         return ranges.reshape(*poses.shape[:-1], len(bearings))
 
 
@@ -378,12 +386,13 @@ class LikelihoodField:
     """
 
     def __init__(self, grid, std, share_hit=0.95, r_max=18.0, max_distance=None):
-        self.grid, self.std = grid, float(as_positive(std, "std"))
-        self.r_max = float(as_positive(r_max, "r_max"))
+        self.grid, self.std = grid, as_positive_number(std, "std")
+        self.r_max = as_positive_number(r_max, "r_max")
+        share_hit = as_number(share_hit, "share_hit")
         if not 0 < share_hit <= 1:
             raise ValueError(f"share_hit must be above 0 and at most 1, got {share_hit:g}")
-        self.share_hit = float(share_hit)
-        self.max_distance = 6 * self.std if max_distance is None else float(as_positive(max_distance, "max_distance"))
+        self.share_hit = share_hit
+        self.max_distance = 6 * self.std if max_distance is None else as_positive_number(max_distance, "max_distance")
         distance = np.minimum(np.pad(grid.distance, 1, constant_values=np.inf), self.max_distance)
         self.table = self.log_density(distance).astype(np.float32)
 
@@ -463,8 +472,8 @@ class Scanner:
 
         Obstacles that the robot's map lacks: hand over `grid.with_disks(...)` here, and the bare grid to the filter.
         """
-        bearings = self.bearings[::every]
-        ranges = cast_rays(grid, as_points(pose, "pose"), bearings, self.r_max).astype(float)
+        bearings = self.bearings[:: as_count(every, "every")]
+        ranges = cast_rays(grid, as_shape(pose, "pose", 3), bearings, self.r_max).astype(float)
         hit = ranges < self.r_max
         ranges = np.where(hit, ranges + self.std_range * rng.standard_normal(ranges.shape), self.r_max)
         ranges[rng.random(ranges.shape) < self.dropout] = self.r_max

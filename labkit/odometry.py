@@ -10,7 +10,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .checks import as_finite, as_points, as_positive
+from .checks import (
+    as_count,
+    as_covariances,
+    as_finite,
+    as_number,
+    as_points,
+    as_positive,
+    as_positive_number,
+    as_shape,
+    fit_together,
+)
 from .tables import read_table
 
 MODELS = ("euler", "midpoint", "arc")
@@ -34,7 +44,9 @@ def circle_drive(dt=None):
     table = read_table("dead_reckoning/circle_drive.csv", text=("name", "unit"))
     given = dict(zip(table["name"].tolist(), table["value"].tolist()))
     duration = given["dt"] * given["steps"]
-    dt = given["dt"] if dt is None else float(as_positive(dt, "dt"))
+    dt = given["dt"] if dt is None else as_positive_number(dt, "dt")
+    if not duration / 1e6 <= dt <= duration:
+        raise ValueError(f"dt must lie between {duration / 1e6:g} s and the drive's {duration:g} s, got {dt:g}")
     noise = {
         "k_d": given["std_distance_per_meter"] ** 2,
         "k_theta": np.radians(given["std_heading_per_turn_deg"]) ** 2 / (2 * np.pi),
@@ -45,8 +57,8 @@ def circle_drive(dt=None):
 
 
 def wrap_angle(angle):
-    """The same direction within [-pi, pi) (rad); any shape."""
-    return (np.asarray(angle, dtype=float) + np.pi) % (2 * np.pi) - np.pi
+    """The same direction within [-pi, pi) (rad), but for rounding next to -pi; any shape."""
+    return (as_finite(angle, "angle") + np.pi) % (2 * np.pi) - np.pi
 
 
 def wheel_to_twist(v_left, v_right, track):
@@ -54,8 +66,9 @@ def wheel_to_twist(v_left, v_right, track):
 
     Source: lecture, "Wiederholung Differentialantrieb": v = (v_R + v_L) / 2, omega = (v_R - v_L) / l.
     """
-    v_left, v_right = as_finite(v_left, "v_left"), as_finite(v_right, "v_right")
-    v, omega = np.broadcast_arrays((v_right + v_left) / 2, (v_right - v_left) / as_positive(track, "track"))
+    v_left, v_right, track = as_finite(v_left, "v_left"), as_finite(v_right, "v_right"), as_positive(track, "track")
+    fit_together(v_left=v_left.shape, v_right=v_right.shape, track=track.shape)
+    v, omega = np.broadcast_arrays((v_right + v_left) / 2, (v_right - v_left) / track)
     return np.stack([v, omega], axis=-1)
 
 
@@ -69,7 +82,9 @@ def twist_to_wheel(u, track):
 def _inputs(x, u, dt, model):
     if model not in MODELS:
         raise ValueError(f"model must be one of {', '.join(MODELS)}, got {model!r}")
-    return as_points(x, "x", 3), as_points(u, "u", 2), as_positive(dt, "dt")
+    x, u, dt = as_points(x, "x", 3), as_points(u, "u", 2), as_positive(dt, "dt")
+    fit_together(x=x.shape[:-1], u=u.shape[:-1], dt=dt.shape)
+    return x, u, dt
 
 
 def _chord(u, dt, model):
@@ -145,6 +160,7 @@ def turning_center(x, u):
     It lies v / omega to the left of the heading. Raises ValueError where omega is zero: a straight line has none.
     """
     x, u = as_points(x, "x", 3), as_points(u, "u", 2)
+    fit_together(x=x.shape[:-1], u=u.shape[:-1])
     if (u[..., 1] == 0).any():
         raise ValueError("omega must not be zero: a robot on a straight line has no center of rotation")
     radius = u[..., 0] / u[..., 1]
@@ -167,8 +183,8 @@ def control_covariance(u, dt, k_d, k_theta, k_drift):
     """
     u, dt = as_points(u, "u", 2), as_positive(dt, "dt")
     for name, value in (("k_d", k_d), ("k_theta", k_theta), ("k_drift", k_drift)):
-        if (as_finite(value, name) < 0).any():
-            raise ValueError(f"{name} must not be negative (it is a variance per way), got {np.min(value):g}")
+        if as_number(value, name) < 0:
+            raise ValueError(f"{name} must not be negative (it is a variance per way), got {value:g}")
     v, omega = np.abs(u[..., 0]), np.abs(u[..., 1])
     var_v, var_omega = np.broadcast_arrays(k_d * v / dt, (k_theta * omega + k_drift * v) / dt)
     cov = np.zeros((*var_v.shape, 2, 2))
@@ -182,10 +198,9 @@ def propagate(x, cov, u, dt, cov_u, model="midpoint"):
     cov : (..., 3, 3) covariance of the pose before.    cov_u : (..., 2, 2) covariance of the control.
     Source: lecture, "Fehlerfortpflanzung bei Koppelnavigation (2)".
     """
-    cov, cov_u = as_finite(cov, "cov"), as_finite(cov_u, "cov_u")
-    if cov.shape[-2:] != (3, 3) or cov_u.shape[-2:] != (2, 2):
-        raise ValueError(f"cov, cov_u must have shapes (..., 3, 3), (..., 2, 2), got {cov.shape}, {cov_u.shape}")
+    cov, cov_u = as_covariances(cov, "cov", 3), as_covariances(cov_u, "cov_u", 2)
     F_x, F_u = step_jacobians(x, u, dt, model)
+    fit_together(cov=cov.shape[:-2], cov_u=cov_u.shape[:-2], pose_and_control=F_x.shape[:-2])
     after = F_x @ cov @ np.swapaxes(F_x, -1, -2) + F_u @ cov_u @ np.swapaxes(F_u, -1, -2)
     return step(x, u, dt, model), 0.5 * (after + np.swapaxes(after, -1, -2))
 
@@ -195,7 +210,9 @@ def drive(x0, controls, dt, model="midpoint"):
     controls = as_points(controls, "controls", 2)
     if controls.ndim < 2:
         raise ValueError(f"controls must have shape (n, ..., 2), got {controls.shape}")
-    path = [np.broadcast_to(as_points(x0, "x0", 3), np.broadcast_shapes(np.shape(x0), (*controls.shape[1:-1], 3)))]
+    dt = as_positive_number(dt, "dt")
+    x0 = as_points(x0, "x0", 3)
+    path = [np.broadcast_to(x0, (*fit_together(x0=x0.shape[:-1], controls=controls.shape[1:-1]), 3))]
     for u in controls:
         path.append(step(path[-1], u, dt, model))
     return np.array(path)
@@ -203,9 +220,9 @@ def drive(x0, controls, dt, model="midpoint"):
 
 def drive_with_covariance(x0, cov0, controls, dt, k_d, k_theta, k_drift, model="midpoint"):
     """Poses (n + 1, 3) and covariances (n + 1, 3, 3) along a drive with the lecture's error model."""
-    controls = as_points(controls, "controls", 2)
-    cov_u = control_covariance(controls, dt, k_d, k_theta, k_drift)
-    poses, covs = [as_points(x0, "x0", 3)], [as_finite(cov0, "cov0")]
+    controls = as_shape(controls, "controls", "n", 2)
+    cov_u = control_covariance(controls, as_positive_number(dt, "dt"), k_d, k_theta, k_drift)
+    poses, covs = [as_shape(x0, "x0", 3)], [as_shape(as_covariances(cov0, "cov0", 3), "cov0", 3, 3)]
     for u, noise in zip(controls, cov_u):
         x, cov = propagate(poses[-1], covs[-1], u, dt, noise, model)
         poses.append(x)
@@ -215,8 +232,8 @@ def drive_with_covariance(x0, cov0, controls, dt, k_d, k_theta, k_drift, model="
 
 def noisy_controls(controls, dt, k_d, k_theta, k_drift, rng, runs):
     """Controls as `runs` robots really execute them, shape (n, runs, 2): each with its own noise."""
-    controls = as_points(controls, "controls", 2)
-    cov_u = control_covariance(controls, dt, k_d, k_theta, k_drift)
+    controls, runs = as_shape(controls, "controls", "n", 2), as_count(runs, "runs")
+    cov_u = control_covariance(controls, as_positive_number(dt, "dt"), k_d, k_theta, k_drift)
     std = np.sqrt(np.diagonal(cov_u, axis1=-2, axis2=-1))
     return controls[:, None, :] + std[:, None, :] * rng.standard_normal((len(controls), runs, 2))
 
@@ -229,6 +246,7 @@ def sample_drives(x0, controls, dt, k_d, k_theta, k_drift, rng, runs, model="mid
 def relative_pose(x, y):
     """Pose y seen from pose x, (..., 3), the heading within [-pi, pi)."""
     x, y = as_points(x, "x", 3), as_points(y, "y", 3)
+    fit_together(x=x.shape[:-1], y=y.shape[:-1])
     d, c, s = y - x, np.cos(x[..., 2]), np.sin(x[..., 2])
     parts = (c * d[..., 0] + s * d[..., 1], c * d[..., 1] - s * d[..., 0], wrap_angle(d[..., 2]))
     return np.stack(parts, axis=-1)
@@ -258,6 +276,7 @@ def exp_pose(xi):
 def compose_pose(x, y):
     """Pose whose coordinates seen from x are y, (..., 3); the inverse of `relative_pose`, the heading not wrapped."""
     x, y = as_points(x, "x", 3), as_points(y, "y", 3)
+    fit_together(x=x.shape[:-1], y=y.shape[:-1])
     c, s = np.cos(x[..., 2]), np.sin(x[..., 2])
     there = (x[..., 0] + c * y[..., 0] - s * y[..., 1], x[..., 1] + s * y[..., 0] + c * y[..., 1])
     return np.stack(np.broadcast_arrays(*there, x[..., 2] + y[..., 2]), axis=-1)

@@ -16,7 +16,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .checks import as_finite, as_positive
+from .checks import (
+    as_count,
+    as_finite,
+    as_matrices,
+    as_nonnegative,
+    as_number,
+    as_positive,
+    as_positive_number,
+    fit_together,
+)
 
 ROUNDING = 10 * np.finfo(float).eps  # a relative change of the cost below this is noise
 
@@ -105,11 +114,38 @@ def settled(tol=1e-12):
 # --- Steps ---
 
 
+def _model(g, B):
+    """Gradient (..., n) and curvature (..., n, n) of a quadratic model."""
+    g = as_finite(g, "the gradient")
+    if g.ndim < 1:
+        raise ValueError("the gradient must have shape (..., n), got a single number")
+    B = as_matrices(B, "the curvature", g.shape[-1], g.shape[-1])
+    fit_together(gradient=g.shape[:-1], curvature=B.shape[:-2])
+    return g, B
+
+
+def _ball(g, B, radius):
+    """A quadratic model and the radius (...) of the ball it is minimized in."""
+    (g, B), radius = _model(g, B), as_nonnegative(radius, "radius")
+    fit_together(gradient=g.shape[:-1], radius=radius.shape)
+    return g, B, radius
+
+
+def _linearized(r, J):
+    """Residual (..., m) and Jacobian (..., m, n) with m >= n."""
+    r, J = as_finite(r, "r"), as_finite(J, "J")
+    if r.ndim < 1 or J.ndim < 2 or J.shape[-2] != r.shape[-1] or J.shape[-2] < J.shape[-1]:
+        raise ValueError(f"r and J must have shapes (..., m) and (..., m, n) with m >= n, got {r.shape} and {J.shape}")
+    fit_together(r=r.shape[:-1], J=J.shape[:-2])
+    return r, J
+
+
 def newton_step(g, H):
     """Step to where the quadratic model is stationary: H step = -g; (..., n), (..., n, n) -> (..., n).
 
     Source: thesis, (2-23), (2-24). Nothing asks whether that place is a minimum. Raises LinAlgError when H is singular.
     """
+    g, H = _model(g, H)
     return -np.linalg.solve(H, g[..., None])[..., 0]
 
 
@@ -118,14 +154,20 @@ def gauss_newton_step(r, J):
 
     A QR factorization instead of the normal equations (2-31): forming J'J squares the condition number.
     """
+    r, J = _linearized(r, J)
     Q, R = np.linalg.qr(J)
     return -np.linalg.solve(R, np.swapaxes(Q, -1, -2) @ r[..., None])[..., 0]
 
 
 def damped_step(r, J, damping):
     """Levenberg-Marquardt step: minimizes |r + J step|^2 + damping |step|^2; broadcasts as `gauss_newton_step`."""
+    r, J, damping = as_finite(r, "r"), as_finite(J, "J"), as_nonnegative(damping, "damping")
+    if r.ndim < 1 or J.ndim < 2 or J.shape[-2] != r.shape[-1]:
+        raise ValueError(f"r and J must have shapes (..., m) and (..., m, n), got {r.shape} and {J.shape}")
+    if fit_together(r=r.shape[:-1], J=J.shape[:-2], damping=damping.shape) != J.shape[:-2] or r.shape != J.shape[:-1]:
+        raise ValueError(f"r, J and damping must share leading axes, got {r.shape}, {J.shape}, {damping.shape}")
     n = J.shape[-1]
-    root = np.sqrt(np.asarray(damping, dtype=float))[..., None, None] * np.eye(n)
+    root = np.sqrt(damping)[..., None, None] * np.eye(n)
     stacked = np.concatenate([J, np.broadcast_to(root, (*J.shape[:-2], n, n))], axis=-2)
     return gauss_newton_step(np.concatenate([r, np.zeros((*r.shape[:-1], n))], axis=-1), stacked)
 
@@ -145,6 +187,7 @@ def cauchy_step(g, B, radius):
     g (..., n), B (..., n, n), radius (...) -> (..., n). Where the model bends down along the gradient,
     the step goes to the rim.
     """
+    g, B, radius = _ball(g, B, radius)
     length, bend = _length(g), _bend(g, B)
     bends_up = bend > 0
     inside = length**3 / np.where(bends_up, bend * radius, 1.0)
@@ -158,6 +201,7 @@ def dogleg_step(g, B, radius):
     g (..., n), B (..., n, n), radius (...) -> (..., n). Where B is not positive definite, the Newton point is no
     minimum and the Cauchy point is returned. Source: thesis (2-33)-(2-35); Nocedal, Wright, Numerical Optimization 4.1.
     """
+    g, B, radius = _ball(g, B, radius)
     eigenvalues = np.linalg.eigvalsh(B)
     convex = eigenvalues[..., 0] > 1e-14 * np.abs(eigenvalues).max(-1)
     safe = np.where(convex[..., None, None], B, np.eye(B.shape[-1]))
@@ -165,7 +209,7 @@ def dogleg_step(g, B, radius):
     bend = _bend(g, safe)
     corner = -((g * g).sum(-1) / np.where(bend > 0, bend, 1.0))[..., None] * g
     leg = full - corner
-    a, b, c = (leg * leg).sum(-1), (corner * leg).sum(-1), (corner * corner).sum(-1) - np.asarray(radius) ** 2
+    a, b, c = (leg * leg).sum(-1), (corner * leg).sum(-1), (corner * corner).sum(-1) - radius**2
     root = np.sqrt(np.maximum(b * b - a * c, 0.0))
     share = np.clip(-c / np.where(b + root > 0, b + root, 1.0), 0.0, 1.0)
     path = np.where((c < 0)[..., None], corner + share[..., None] * leg, cauchy_step(g, safe, radius))
@@ -179,9 +223,9 @@ def exact_step(g, B, radius):
 
     g (..., n), B (..., n, n), radius (...) -> (..., n). Source: More, Sorensen, Computing a trust region step (1983).
     """
+    g, B, radius = _ball(g, B, radius)
     eigenvalues, V = np.linalg.eigh(B)
     along = (np.swapaxes(V, -1, -2) @ g[..., None])[..., 0]
-    radius = np.asarray(radius, dtype=float)
     size = np.abs(eigenvalues).max(-1) + _length(g) / radius
     low = np.maximum(-eigenvalues[..., 0], 0.0) + 1e-14 * size
     high = low + _length(g) / radius
@@ -203,6 +247,10 @@ def exact_step(g, B, radius):
 
 def predicted_decrease(g, B, step):
     """m(0) - m(step) of the quadratic model (2-33); (..., n), (..., n, n), (..., n) -> (...)."""
+    (g, B), step = _model(g, B), as_finite(step, "step")
+    if step.shape[-1:] != g.shape[-1:]:
+        raise ValueError(f"step must have shape (..., {g.shape[-1]}), got {step.shape}")
+    fit_together(gradient=g.shape[:-1], step=step.shape[:-1])
     return -(g * step).sum(-1) - 0.5 * _bend(step, B)
 
 
@@ -212,6 +260,7 @@ def gain_ratio(cost, new_cost, g, B, step):
     Both decreases get a share of the cost's rounding error added, so that the ratio tends to 1 where nothing
     but rounding is left.
     """
+    cost, new_cost = as_finite(cost, "cost"), as_finite(new_cost, "new_cost")
     noise = ROUNDING * np.abs(cost) + np.finfo(float).tiny
     return (cost - new_cost + noise) / (predicted_decrease(g, B, step) + noise)
 
@@ -228,7 +277,7 @@ def classify_extremum(g, H, tol=1e-6):
         A point counts as stationary when |g| <= tol times the largest |eigenvalue| of H (so a length,
         in the unit of x); an eigenvalue counts as zero below tol times the largest.
     """
-    g, H = as_finite(g, "g"), as_finite(H, "H")
+    g, H, tol = as_finite(g, "g"), as_finite(H, "H"), as_positive_number(tol, "tol")
     if g.ndim != 1 or H.shape != (len(g), len(g)):
         raise ValueError(f"g and H must have shapes (n,) and (n, n), got {g.shape} and {H.shape}")
     eigenvalues = np.linalg.eigvalsh(0.5 * (H + H.T))
@@ -247,7 +296,8 @@ def numeric_jacobian(function, x, h=1e-6, retract=np.add, n=None):
 
     Shape (m, n), or (n,) for a scalar function. n defaults to the size of x; h is the half width of each difference.
     """
-    increments = h * np.eye(np.size(x) if n is None else n)
+    x, h = as_finite(x, "x"), as_positive_number(h, "h")
+    increments = h * np.eye(x.size if n is None else as_count(n, "n"))
     columns = [np.subtract(function(retract(x, e)), function(retract(x, -e))) / (2 * h) for e in increments]
     return np.stack(columns, axis=-1)
 
@@ -319,6 +369,11 @@ def _start(evaluate, x0):
     return point
 
 
+def _refuse_scale(scale, point):
+    if scale.shape not in ((), point.gradient.shape):
+        raise ValueError(f"scale must be one number or one an unknown, {point.gradient.shape}, got {scale.shape}")
+
+
 def _is_finite(point):
     g, B = point.gradient, point.curvature
     return math.isfinite(point.cost) and math.isfinite(np.vdot(g, g)) and math.isfinite(np.vdot(B, B))
@@ -328,7 +383,7 @@ def _undamped(evaluate, x0, next_step, retract, stop, max_iterations):
     """The loop Newton and Gauss-Newton share: solve, step, ask the stopping rule."""
     point = _start(evaluate, x0)
     record = _Recorder([point])
-    for _ in range(max_iterations):
+    for _ in range(as_count(max_iterations, "max_iterations", at_least=0)):
         step, trouble = next_step(point)
         if trouble:
             return record.trace(trouble, False)
@@ -426,9 +481,11 @@ def levenberg_marquardt(
     Source: Nielsen, Damping parameter in Marquardt's method, IMM report (1999).
     """
     evaluate, stop, scale = _squares(residual, jacobian), stop or settled(), as_positive(scale, "scale")
+    max_iterations = as_count(max_iterations, "max_iterations", at_least=0)
     point = _start(evaluate, x0)
+    _refuse_scale(scale, point)
     record = _Recorder([point])
-    damping = float(as_positive(damping, "damping")) * ((point.jacobian * scale) ** 2).sum(0).max()
+    damping = as_positive_number(damping, "damping") * ((point.jacobian * scale) ** 2).sum(0).max()
     growth = 2.0
     for _ in range(max_iterations):
         if not point.gradient.any():
@@ -481,12 +538,14 @@ def trust_region(
     Source: thesis, section 2.5.4 and the scheme of section 6.1.6: radius to a quarter of the step below a
     gain of 1/4, doubled above 3/4 when the step reached the rim.
     """
+    accept, max_iterations = as_number(accept, "accept"), as_count(max_iterations, "max_iterations", at_least=0)
     if not 0 <= accept < 0.25:
         raise ValueError(f"accept must lie in [0, 1/4), got {accept:g}")
-    radius, max_radius = float(as_positive(radius, "radius")), float(as_positive(max_radius, "max_radius"))
+    radius, max_radius = as_positive_number(radius, "radius"), as_positive_number(max_radius, "max_radius")
     evaluate = _squares(fun, jac) if hessian is None else _smooth(fun, jac, hessian)
     stop, scale = stop or settled(), as_positive(scale, "scale")
     point = _start(evaluate, x0)
+    _refuse_scale(scale, point)
     record = _Recorder([point])
     for _ in range(max_iterations):
         if not point.gradient.any():

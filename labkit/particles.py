@@ -15,7 +15,18 @@ import numpy as np
 from scipy.special import ndtr
 
 from . import odometry
-from .checks import as_finite, as_points, as_positive
+from .checks import (
+    as_count,
+    as_covariances,
+    as_finite,
+    as_floats,
+    as_nonnegative,
+    as_number,
+    as_points,
+    as_positive_number,
+    as_shape,
+    fit_together,
+)
 from .maps import LikelihoodField, RangeTable, Scanner, cast_rays
 from .odometry import wrap_angle
 from .tables import read_table
@@ -51,9 +62,9 @@ def sample_motion(states, u, dt, rng, cov_u=None, model="midpoint"):
     Source: lecture, "Bewegungsmodell": noise of covariance Sigma_u is added to the control, then f is applied.
     """
     states, u = as_points(states, "states"), as_points(u, "u", dim=2)
-    cov_u = odometry.control_covariance(u, dt, **CONTROL_NOISE) if cov_u is None else as_finite(cov_u, "cov_u")
-    if cov_u.shape != (2, 2):
-        raise ValueError(f"cov_u must have shape (2, 2), got {cov_u.shape}")
+    cov_u = odometry.control_covariance(u, dt, **CONTROL_NOISE) if cov_u is None else as_covariances(cov_u, "cov_u", 2)
+    if u.shape != (2,) or cov_u.shape != (2, 2):
+        raise ValueError(f"u and cov_u must have shapes (2,) and (2, 2), got {u.shape} and {cov_u.shape}")
     noise = rng.standard_normal((*states.shape[:-1], 2)) @ _root(cov_u).T
     return odometry.step(states, u + noise, dt, model)
 
@@ -103,7 +114,7 @@ def weigh_landmarks(z, landmarks, std_range=None, std_bearing=None):
         raise ValueError(f"z and landmarks must have the same shape (m, 2), got {z.shape} and {landmarks.shape}")
     if std_range is None and std_bearing is None:
         raise ValueError("std_range or std_bearing must be given, got neither: nothing would be weighed")
-    stds = [None if std is None else float(as_positive(std, name))
+    stds = [None if std is None else as_positive_number(std, name)
             for std, name in ((std_range, "std_range"), (std_bearing, "std_bearing"))]  # fmt: skip
     best = -len(z) * sum(math.log(std * math.sqrt(2 * math.pi)) for std in stds if std is not None)
 
@@ -153,16 +164,17 @@ def weigh_beams(world, ranges, bearings, std, r_max, shares=(0.75, 0.1, 0.05, 0.
     ranges, bearings = as_finite(ranges, "ranges"), as_finite(bearings, "bearings")
     if ranges.ndim != 1 or ranges.shape != bearings.shape:
         raise ValueError(f"ranges and bearings must have the same shape (B,), got {ranges.shape} and {bearings.shape}")
-    shares = as_finite(shares, "shares")
-    if shares.shape != (4,) or (shares < 0).any() or abs(shares.sum() - 1) > 1e-9:
-        raise ValueError(f"shares must be four numbers from 0 to 1 that add up to 1, got {shares.tolist()}")
-    std, r_max, decay = (float(as_positive(v, n)) for v, n in ((std, "std"), (r_max, "r_max"), (decay, "decay")))
+    shares = _shares(shares)
+    std, r_max, decay = (as_positive_number(v, n) for v, n in ((std, "std"), (r_max, "r_max"), (decay, "decay")))
 
     def log_density(expected):
         with np.errstate(divide="ignore"):  # log 0 = -inf is the honest weight of an impossible pose
-            return np.log(beam_density(ranges, expected, std, r_max, shares, decay))
+            return np.log(_beam_density(ranges, expected, std, r_max, shares, decay))
 
     if step is not None:
+        step = as_positive_number(step, "step")
+        if r_max / step > 1e6:
+            raise ValueError(f"step must be at least a millionth of r_max, got {step:g} m")
         nodes = np.append(np.arange(0, r_max, step), r_max).astype(np.float32)
         table = np.ascontiguousarray(log_density(nodes[:, None]).T)
         rows = np.arange(len(ranges), dtype=np.int32) * len(nodes)
@@ -185,6 +197,21 @@ def beam_density(ranges, expected, std, r_max, shares, decay=0.5):
 
     Each part integrates to its share over [0, r_max], so the whole is a density for every expected range.
     """
+    std, r_max, decay = (as_positive_number(v, n) for v, n in ((std, "std"), (r_max, "r_max"), (decay, "decay")))
+    ranges, expected = as_finite(ranges, "ranges"), as_finite(expected, "expected")
+    fit_together(ranges=ranges.shape, expected=expected.shape)
+    return _beam_density(ranges, expected, std, r_max, _shares(shares), decay)
+
+
+def _shares(shares):
+    shares = as_finite(shares, "shares")
+    if shares.shape != (4,) or (shares < 0).any() or abs(shares.sum() - 1) > 1e-9:
+        raise ValueError(f"shares must be four numbers from 0 to 1 that add up to 1, got {shares.tolist()}")
+    return shares
+
+
+def _beam_density(ranges, expected, std, r_max, shares, decay):
+    """`beam_density` in the precision of the expected ranges, which ray casting gives as float32."""
     hit, short, none, anywhere = (float(share) for share in shares)
     shape = np.broadcast_shapes(np.shape(ranges), np.shape(expected))
     expected = np.atleast_1d(expected)
@@ -224,8 +251,10 @@ def weigh_doors(doors, saw_door, std=0.3, trust=0.9):
     doors: positions (m). std: half width of a door as a Gauss (m). trust: share of right answers in front of a door.
     Source: lecture, "Idee", pictures (b) and (d).
     """
-    doors = as_finite(doors, "doors")
-    std, trust = float(as_positive(std, "std")), float(trust)
+    doors = as_shape(doors, "doors", "n")
+    if not len(doors):
+        raise ValueError("doors must hold at least one position, got none")
+    std, trust = as_positive_number(std, "std"), as_number(trust, "trust")
     if not 0.5 <= trust < 1:
         raise ValueError(f"trust must be at least 0.5 and below 1, got {trust:g}")
 
@@ -245,7 +274,7 @@ def normalize(log_weights):
 
     Raises ValueError when every weight is zero (all logarithms -inf): no particle explains the measurement.
     """
-    log_weights = np.asarray(log_weights, dtype=float)
+    log_weights = as_floats(log_weights, "log_weights")
     if log_weights.ndim != 1 or not log_weights.size or np.isnan(log_weights).any() or (log_weights == np.inf).any():
         raise ValueError(f"log_weights must be a vector of numbers or -inf, got shape {log_weights.shape} or NaN in it")
     top = log_weights.max()
@@ -259,8 +288,11 @@ def _as_weights(weights):
     weights = as_finite(weights, "weights")
     if weights.ndim != 1 or not weights.size:
         raise ValueError(f"weights must be a vector (M,), got shape {weights.shape}")
-    if weights.min() < 0 or weights.max() == 0:
-        raise ValueError(f"weights must be at least 0 and not all 0, got a minimum of {weights.min():g}")
+    low, high = weights.min(), weights.max()
+    if low < 0 or not 1e-300 <= high <= 1e300:  # beyond, their sum or a share of it leaves the range of a float
+        raise ValueError(
+            f"weights must be at least 0 and not all 0, the largest from 1e-300 to 1e300, got {low:g} to {high:g}"
+        )
     return weights
 
 
@@ -273,7 +305,7 @@ def resample_roulette(weights, rng, size=None):
     """
     weights = _as_weights(weights)
     ends = np.cumsum(weights)
-    spins = np.sort(rng.random(len(weights) if size is None else size)) * ends[-1]
+    spins = np.sort(rng.random(len(weights) if size is None else as_count(size, "size", at_least=0))) * ends[-1]
     last = np.searchsorted(ends, ends[-1])  # a spin may round up to the full circle
     return np.minimum(np.searchsorted(ends, spins, side="right"), last)
 
@@ -286,7 +318,7 @@ def resample_systematic(weights, rng, size=None):
     Source: lecture, "Resampling mit Speichenrad-Verfahren".
     """
     weights = _as_weights(weights)
-    size = len(weights) if size is None else int(size)
+    size = len(weights) if size is None else as_count(size, "size", at_least=0)
     ends = np.cumsum(weights)
     ends *= size / ends[-1]
     full = ends >= ends[-1]
@@ -299,6 +331,7 @@ def resample_systematic(weights, rng, size=None):
 def effective_size(weights):
     """sum(w)^2 / sum(w^2): M for equal weights, 1 when one particle has them all."""
     weights = _as_weights(weights)
+    weights = weights / weights.max()  # else the squares of tiny or huge weights leave the range of a float
     return float(weights.sum() ** 2 / np.square(weights).sum())
 
 
@@ -309,12 +342,13 @@ def should_resample(weights, threshold=0.5):
     weights w of mean 1,
     M / effective_size = 1 + variance(w): the same rule in other words.
     """
-    return effective_size(weights) < threshold * len(weights)
+    return effective_size(weights) < as_number(threshold, "threshold") * len(weights)
 
 
 def count_ancestors(resample, n_particles, n_steps, rng):
     """How many of the first particles survive when a standing robot resamples equal weights again and again:
     (n_steps + 1,)."""
+    n_particles, n_steps = as_count(n_particles, "n_particles"), as_count(n_steps, "n_steps", at_least=0)
     names, weights = np.arange(n_particles), np.full(n_particles, 1.0 / n_particles)
     left = [n_particles]
     for _ in range(n_steps):
@@ -326,13 +360,21 @@ def count_ancestors(resample, n_particles, n_steps, rng):
 # --- from cloud to pose ----------------------------------------------------------------------------------------------
 
 
+def _weights_of(states, weights):
+    """Weights of as many states, all 1 when not given."""
+    weights = np.ones(len(states)) if weights is None else _as_weights(weights)
+    if len(weights) != len(states) or not len(states):
+        raise ValueError(f"there must be one weight a state and at least one state, got {len(weights)}, {len(states)}")
+    return weights
+
+
 def circular_mean(angles, weights=None):
     """Mean direction (rad, in [-pi, pi)): the angle of the weighted mean of the unit vectors (cos, sin).
 
     Raises ValueError when the vectors cancel: then no direction is the mean.
     """
-    angles = as_finite(angles, "angles")
-    weights = np.ones(angles.shape) if weights is None else _as_weights(weights)
+    angles = as_shape(angles, "angles", "M")
+    weights = _weights_of(angles, weights)
     c, s = (weights * np.cos(angles)).sum(), (weights * np.sin(angles)).sum()
     if np.hypot(c, s) <= 1e-12 * weights.sum():
         raise ValueError("angles must not cancel: their unit vectors add up to nothing, so no direction is their mean")
@@ -352,7 +394,7 @@ def estimate(states, weights=None):
     """Mean pose and covariance of the whole cloud; the heading is averaged on the circle. Misleading for a cloud
     with two modes."""
     states = as_points(states, "states").reshape(-1, 3)
-    weights = np.ones(len(states)) if weights is None else _as_weights(weights)
+    weights = _weights_of(states, weights)
     w = weights / weights.sum()
     pose = (w[:, None] * states).sum(0)
     pose[2] = circular_mean(states[:, 2], w) if _has_direction(states[:, 2], w) else 0.0
@@ -371,7 +413,7 @@ def estimate_mode(states, weights=None, cell=0.5, turn=_MODE_TURN):
     For a cloud with two modes the mean of all lies between them, maybe in a wall; this one lies in the better mode.
     """
     states = as_points(states, "states").reshape(-1, 3)
-    weights = np.full(len(states), 1.0 / len(states)) if weights is None else _as_weights(weights)
+    weights = _weights_of(states, weights)
     _, index = np.unique(pose_bins(states, cell, turn), return_inverse=True)
     heavy = states[index == np.argmax(np.bincount(index, weights))]
     center = estimate(heavy).pose
@@ -383,7 +425,7 @@ def estimate_mode(states, weights=None, cell=0.5, turn=_MODE_TURN):
 
 def pose_bins(states, cell=0.5, turn=_BIN_TURN):
     """One whole number for each pose, (M, 3) -> (M,), equal for poses in the same bin of `cell` m and `turn` rad."""
-    states = as_points(states, "states")
+    states, cell, turn = as_points(states, "states"), as_positive_number(cell, "cell"), as_positive_number(turn, "turn")
     i, j = np.floor(states[..., 0] / cell).astype(np.int64), np.floor(states[..., 1] / cell).astype(np.int64)
     k = np.floor((states[..., 2] % (2 * np.pi)) / turn).astype(np.int64)
     return (i << 40) + (j << 16) + k
@@ -400,6 +442,10 @@ def recover(w_mean, w_slow, w_fast, alpha_slow=0.02, alpha_fast=0.3):
     with the first mean weight. Source: beyond the lecture, which names the kidnapped robot problem only (augmented
     MCL).
     """
+    names = ("w_mean", "w_slow", "w_fast", "alpha_slow", "alpha_fast")
+    w_mean, w_slow, w_fast, alpha_slow, alpha_fast = map(
+        as_number, (w_mean, w_slow, w_fast, alpha_slow, alpha_fast), names
+    )
     if not 0 <= alpha_slow < alpha_fast <= 1:
         raise ValueError(
             f"alpha_slow must be below alpha_fast, both from 0 to 1, got {alpha_slow:g} and {alpha_fast:g}"
@@ -416,16 +462,18 @@ def kld_size(n_bins, epsilon=0.05, quantile=2.326):
     n_bins: number of bins the cloud occupies (any shape). The chi-square quantile is Wilson and Hilferty's
     approximation.
     """
-    k = np.maximum(np.asarray(n_bins, dtype=float) - 1, 1e-9)
+    n_bins, quantile = as_finite(n_bins, "n_bins"), as_number(quantile, "quantile")
+    epsilon = as_positive_number(epsilon, "epsilon")
+    k = np.maximum(n_bins - 1, 1e-9)
     a = 2 / (9 * k)
     size = np.ceil(k / (2 * epsilon) * (1 - a + np.sqrt(a) * quantile) ** 3)
-    return np.where(np.asarray(n_bins) > 1, size, 1.0)
+    return np.where(n_bins > 1, size, 1.0)
 
 
 def kld_take(states, n_min=100, epsilon=0.05, quantile=2.326, cell=0.5, turn=_BIN_TURN):
     """How many of randomly ordered particles (M, 3) are enough: the first n with n >= kld_size(bins among the first
     n)."""
-    bins = pose_bins(states, cell, turn)
+    bins, n_min = pose_bins(as_shape(states, "states", "M", 3), cell, turn), as_count(n_min, "n_min", at_least=0)
     _, first = np.unique(bins, return_index=True)
     is_new = np.zeros(len(bins), dtype=int)
     is_new[first] = 1
@@ -439,6 +487,7 @@ def uniform_states(grid, n_particles, rng):
     i, j = np.nonzero(grid.free)
     if not len(i):
         raise ValueError("grid must have at least one free cell, got none: there is no place for a particle")
+    n_particles = as_count(n_particles, "n_particles", at_least=0)
     pick = rng.integers(len(i), size=n_particles)
     xy = grid.center_of(i[pick], j[pick]) + grid.resolution * (rng.random((n_particles, 2)) - 0.5)
     return np.column_stack([xy, rng.uniform(-np.pi, np.pi, n_particles)])
@@ -563,6 +612,8 @@ class MonteCarloLocalizer:
 
 def find_route(edges, start, goal):
     """Shortest list of node names from start to goal along the edges of a topological map (breadth first)."""
+    if not all(isinstance(edge, (tuple, list)) and len(edge) == 2 for edge in edges):
+        raise ValueError("edges must be pairs of names")
     before, queue = {start: None}, deque([start])
     while queue and goal not in before:
         here = queue.popleft()
@@ -590,15 +641,19 @@ class Drive:
 
 def follow(start, waypoints, n_steps, dt, speed=0.6, turn_rate=0.8):
     """Controls (n_steps, 2) of a robot that turns toward each waypoint and drives there; it stands still at the end."""
-    x, y, theta = as_points(start, "start")
+    (x, y, theta), n_steps = as_shape(start, "start", 3), as_count(n_steps, "n_steps", at_least=0)
+    named = ((dt, "dt"), (speed, "speed"), (turn_rate, "turn_rate"))
+    dt, speed, turn_rate = (as_positive_number(value, name) for value, name in named)
     controls = []
-    for goal_x, goal_y in waypoints:
+    for goal_x, goal_y in as_points(waypoints, "waypoints", dim=2).reshape(-1, 2).tolist():
+        if len(controls) >= n_steps:
+            break
         way, heading = math.hypot(goal_x - x, goal_y - y), math.atan2(goal_y - y, goal_x - x)
         turn = float(wrap_angle(heading - theta))
         for amount, rate, unit in ((turn, turn_rate, (0, 1)), (way, speed, (1, 0))):
             n = math.ceil(abs(amount) / (rate * dt) - 1e-9)
             if n:
-                controls += [(amount / (n * dt) * unit[0], amount / (n * dt) * unit[1])] * n
+                controls += [(amount / (n * dt) * unit[0], amount / (n * dt) * unit[1])] * min(n, n_steps)
         x, y, theta = goal_x, goal_y, heading
     controls = (controls + [(0.0, 0.0)] * n_steps)[:n_steps]
     return np.array(controls).reshape(-1, 2)
@@ -671,7 +726,9 @@ def see_landmarks(grid, pose, landmarks, rng, std_range=0.1, std_bearing=0.035, 
     Landmarks may sit on a wall: the last 0.1 m before one does not count as an obstacle. grid None: nothing hides
     anything.
     """
-    pose, landmarks = as_points(pose, "pose"), as_points(landmarks, "landmarks", dim=2)
+    pose, landmarks = as_shape(pose, "pose", 3), as_shape(landmarks, "landmarks", "m", 2)
+    named = ((std_range, "std_range"), (std_bearing, "std_bearing"), (r_max, "r_max"))
+    std_range, std_bearing, r_max = (float(as_nonnegative(as_number(value, name), name)) for value, name in named)
     d = landmarks - pose[:2]
     r, phi = np.hypot(*d.T), wrap_angle(np.arctan2(d[:, 1], d[:, 0]) - pose[2])
     seen = r < r_max

@@ -15,7 +15,17 @@ from functools import cached_property
 
 import numpy as np
 
-from .checks import as_finite, as_points, as_rotations, as_transform_rows
+from .checks import (
+    as_count,
+    as_finite,
+    as_nonnegative,
+    as_number,
+    as_points,
+    as_rotations,
+    as_shape,
+    as_transform_rows,
+    fit_together,
+)
 from .lie import exp_so3, skew
 from .tables import read_table
 
@@ -276,7 +286,7 @@ def _noise(std_rot, std_trans):
         return None
     if std_rot is None or std_trans is None:
         raise ValueError("std_rot and std_trans must come together: only their ratio tells how to weight")
-    std_rot, std_trans = float(as_finite(std_rot, "std_rot")), float(as_finite(std_trans, "std_trans"))
+    std_rot, std_trans = as_number(std_rot, "std_rot"), as_number(std_trans, "std_trans")
     if std_rot < 0 or std_trans <= 0:
         raise ValueError(
             f"std_rot must not be negative and std_trans must be positive, got {std_rot:g} and {std_trans:g}"
@@ -490,8 +500,8 @@ def predicted_covariance(R, tip, std_rot, std_trans):
     -------
     covariance : array, shape (6, 6)
     """
-    R, tip = as_rotations(R, "R"), as_points(tip, "tip")
-    std_rot, std_trans = _noise(std_rot, std_trans)
+    R, tip = as_shape(as_rotations(R, "R"), "R", "n", 3, 3), as_shape(tip, "tip", 3)
+    std_rot, std_trans = _noise(as_number(std_rot, "std_rot"), as_number(std_trans, "std_trans"))
     lever = skew(tip)
     C = std_trans**2 * np.eye(3) + std_rot**2 * lever @ lever.T
     A = np.concatenate([R, np.broadcast_to(-np.eye(3), R.shape)], axis=-1)
@@ -508,7 +518,8 @@ def tilted(directions, spin=0.0):
 
     `directions` need not have length 1 but must not be zero; `spin` in radians, shape (...).
     """
-    d = as_points(directions, "directions")
+    d, spin = as_points(directions, "directions"), as_finite(spin, "spin")
+    d = np.broadcast_to(d, (*fit_together(directions=d.shape[:-1], spin=spin.shape), 3))
     length = np.linalg.norm(d, axis=-1)
     if (length == 0).any():
         raise ValueError("directions must not be zero: the tool has to point somewhere")
@@ -528,10 +539,9 @@ def cone(n, half_angle, turns=0.0):
     `turns` is how often it spins about its own axis on the way. With exactly one turn the whole motion is a
     rotation about the vertical, a single axis: then the poses leave the tip free along it.
     """
-    if n < 1:
-        raise ValueError(f"a cone must have at least one pose, got {n}")
+    n, half_angle, turns = as_count(n, "n"), as_number(half_angle, "half_angle"), as_number(turns, "turns")
     phi = 2 * np.pi * np.arange(n) / n
-    sine, cosine = np.sin(as_finite(half_angle, "half_angle")), np.cos(half_angle)
+    sine, cosine = np.sin(half_angle), np.cos(half_angle)
     d = np.column_stack([sine * np.cos(phi), sine * np.sin(phi), np.full(n, cosine)])
     return tilted(d, spin=turns * phi)
 
@@ -543,7 +553,10 @@ def touching_poses(R, tip, pivot, std_rot=0.0, std_trans=0.0, rng=None):
     Noise: R exp(phi) with components of std_rot (rad), position plus components of std_trans; `rng` is needed when
     either is not 0.
     """
-    R, tip, pivot = as_rotations(R, "R"), as_points(tip, "tip"), as_points(pivot, "pivot")
+    R, tip, pivot = as_rotations(R, "R"), as_shape(tip, "tip", 3), as_shape(pivot, "pivot", 3)
+    std_rot, std_trans = (
+        float(as_nonnegative(as_number(v, name), name)) for v, name in ((std_rot, "std_rot"), (std_trans, "std_trans"))
+    )
     T = np.zeros((*R.shape[:-2], 4, 4))
     T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, pivot - R @ tip, 1.0
     if std_rot or std_trans:

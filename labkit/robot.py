@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from .checks import as_finite, as_points, as_positive, as_transforms
-from .frames import invert, pose
+from .checks import as_count, as_finite, as_number, as_points, as_positive_number, as_shape, as_transforms, fit_together
+from .frames import invert, normalize, pose
 from .lie import exp_so3, log_so3
 
 # What the data sheet prints (appendix B): reaches in mm. R.b is axis 3 to axis 5, R.M is axis 1 to axis 5, then axis 1
@@ -58,7 +58,8 @@ def dh_matrix(theta, d, a, alpha):
     Source: report, appendix C (reference [2]).
     """
     theta, d, a, alpha = map(as_finite, (theta, d, a, alpha), ("theta", "d", "a", "alpha"))
-    T = np.zeros((*np.broadcast_shapes(theta.shape, d.shape, a.shape, alpha.shape), 4, 4))
+    shape = fit_together(theta=theta.shape, d=d.shape, a=a.shape, alpha=alpha.shape)
+    T = np.zeros((*shape, 4, 4))
     c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
     T[..., 0, 0], T[..., 0, 1], T[..., 0, 2], T[..., 0, 3] = c, -s * ca, s * sa, a * c
     T[..., 1, 0], T[..., 1, 1], T[..., 1, 2], T[..., 1, 3] = s, c * ca, -c * sa, a * s
@@ -131,13 +132,17 @@ def inverse_kinematics(robot, T_BF, start, iterations=60, tolerance=1e-9):
         False where the pose is out of reach, out of the limits, or the search got stuck; q is then the best it found.
     """
     T_BF = as_transforms(T_BF, "T_BF")
-    q = np.broadcast_to(as_points(start, "start", dim=len(robot.dh)), (*T_BF.shape[:-2], len(robot.dh))).copy()
+    start, iterations = as_points(start, "start", dim=len(robot.dh)), as_count(iterations, "iterations")
+    if fit_together(T_BF=T_BF.shape[:-2], start=start.shape[:-1]) != T_BF.shape[:-2]:
+        raise ValueError(f"start must be one for all or one a pose, got {start.shape} for T_BF {T_BF.shape}")
+    tolerance = as_positive_number(tolerance, "tolerance")
+    q = np.broadcast_to(start, (*T_BF.shape[:-2], len(robot.dh))).copy()
     scale = np.array([1, 1, 1, 1 / 200, 1 / 200, 1 / 200])  # a turn of 1 rad counts as much as 200 mm
     best, best_size = q, np.full(q.shape[:-1], np.inf)
     damping = 1e-3
     for _ in range(iterations):
         frames = link_frames(robot.dh, q)
-        error = pose_error(frames[..., -1, :, :], T_BF) * scale
+        error = _pose_error(frames[..., -1, :, :], T_BF) * scale
         size = np.linalg.norm(error, axis=-1)
         better = size < best_size
         best, best_size = np.where(better[..., None], q, best), np.minimum(size, best_size)
@@ -154,6 +159,12 @@ def inverse_kinematics(robot, T_BF, start, iterations=60, tolerance=1e-9):
 
 def pose_error(T, T_goal):
     """What is missing from T to T_goal in the base: rotation vector (rad) and displacement (mm); (..., 6)."""
+    T, T_goal = as_transforms(T, "T"), as_transforms(T_goal, "T_goal")
+    fit_together(T=T.shape[:-2], T_goal=T_goal.shape[:-2])
+    return _pose_error(T, T_goal)
+
+
+def _pose_error(T, T_goal):
     turn = T_goal[..., :3, :3] @ np.swapaxes(T[..., :3, :3], -1, -2)
     return np.concatenate([log_so3(turn), T_goal[..., :3, 3] - T[..., :3, 3]], axis=-1)
 
@@ -173,12 +184,15 @@ def measuring_poses(robot, rng, count=21, center=None, spread=(0.5, 0.35, 0.35, 
     """
     center = HOME if center is None else as_points(center, "center", dim=len(robot.dh))
     box = np.array([[-600.0] * 3, [600.0, 600.0, 1000.0]]) if box is None else as_finite(box, "box")
+    if box.shape != (2, 3):
+        raise ValueError(f"box must have shape (2, 3), two corners, got {box.shape}")
+    spread, count = as_shape(spread, "spread", len(robot.dh)), as_count(count, "count")
     found, tries = [np.array(center)], 0
     while len(found) < count:
         tries += 1
         if tries > 200 * count:
             raise ValueError(f"only {len(found)} of {count} measuring poses were found: widen spread or box")
-        q = center + np.asarray(spread) * rng.uniform(-1, 1, len(robot.dh))
+        q = center + spread * rng.uniform(-1, 1, len(robot.dh))
         T = forward_kinematics(robot.dh, q)
         inside = (T[:3, 3] >= box[0]).all() and (T[:3, 3] <= box[1]).all()
         if within_limits(robot, q) and inside and T[2, 2] >= facing:
@@ -205,11 +219,19 @@ def smooth_motion(via, duration, rate):
     spline through the points, run along by a polynomial of degree 5 at both ends.
     """
     via = as_finite(via, "via")
-    duration, rate = float(as_positive(duration, "duration")), float(as_positive(rate, "rate"))
+    duration, rate = as_positive_number(duration, "duration"), as_positive_number(rate, "rate")
     if via.ndim != 2 or len(via) < 2:
         raise ValueError(f"via must hold at least 2 joint positions, shape (m, n), got {via.shape}")
-    time = np.arange(round(duration * rate) + 1) / rate
+    time = _samples(duration, rate)
     return time, CubicSpline(np.arange(len(via)), via)(_ramp(time / time[-1]) * (len(via) - 1))
+
+
+def _samples(duration, rate):
+    """Sampling times 0, 1 / rate, ... up to the duration (s)."""
+    count = duration * rate
+    if not 0.5 < count < 1e7:
+        raise ValueError(f"duration and rate must give from 1 to 1e7 steps, got {duration:g} s at {rate:g} samples/s")
+    return np.arange(round(count) + 1) / rate
 
 
 def _ramp(s, ends=RAMP):
@@ -225,7 +247,10 @@ def _ramp(s, ends=RAMP):
 
 def joint_speeds(time, q):
     """Joint speeds by central differences, rad/s; (k,), (k, n) -> (k, n)."""
-    return np.gradient(as_finite(q, "q"), as_finite(time, "time"), axis=0)
+    time = as_shape(time, "time", "k")
+    if len(time) < 2 or (np.diff(time) <= 0).any():
+        raise ValueError("time must hold at least two instants and increase")
+    return np.gradient(as_shape(q, "q", len(time), "n"), time, axis=0)
 
 
 def _as_dh(dh):
@@ -308,12 +333,16 @@ def rotation_only(robot, T_FE, start, axes, angle, duration, rate):
 
     Raises ValueError when a pose of the motion cannot be reached. Source: report, section 3.2, measurement 4.
     """
-    axes = as_points(axes, "axes")
-    time = np.arange(round(duration * rate) + 1) / rate
+    T_FE, start = as_shape(as_transforms(T_FE, "T_FE"), "T_FE", 4, 4), as_shape(start, "start", len(robot.dh))
+    axes, angle = as_shape(axes, "axes", "m", 3), as_number(angle, "angle")
+    if not len(axes) or not np.linalg.norm(axes, axis=-1).all():
+        raise ValueError("axes must hold at least one direction, and none may be zero")
+    duration, rate = as_positive_number(duration, "duration"), as_positive_number(rate, "rate")
+    time = _samples(duration, rate)
     share = np.minimum(time / duration * len(axes), len(axes) - 1e-9)
     k, s = share.astype(int), share - share.astype(int)
     swing = _ramp(np.where(s < 0.5, 2 * s, 2 - 2 * s))
-    unit = axes / np.linalg.norm(axes, axis=-1, keepdims=True)
+    unit = normalize(axes)
     T_BE = tool_pose(robot, start, T_FE)
     R = T_BE[:3, :3] @ exp_so3(angle * swing[:, None] * unit[k])
     T_BF = pose(R, np.broadcast_to(T_BE[:3, 3], (len(time), 3))) @ invert(T_FE)
@@ -340,7 +369,7 @@ def reach_position(robot, position, start, joints=(0, 1, 2), iterations=40):
     q : array, shape (n,)
         Inside the joint limits. Out of reach, the flange stops as close as damped least squares brings it.
     """
-    position, q = as_points(position, "position"), np.array(as_points(start, "start", dim=len(robot.dh)))
+    position, q = as_shape(position, "position", 3), np.array(as_shape(start, "start", len(robot.dh)))
     joints = list(joints)
     best, best_size = q.copy(), np.inf
     for _ in range(iterations):
@@ -360,7 +389,7 @@ def reach_position(robot, position, start, joints=(0, 1, 2), iterations=40):
 
 def arm_points(robot, q):
     """Where to draw the arm: base, axis 2, shoulder, elbow, wrist, flange; (n,) -> (6, 3), mm."""
-    frames = link_frames(robot.dh, q)
+    frames = link_frames(robot.dh, as_shape(q, "q", len(robot.dh)))
     shoulder = frames[1, :3, 3] + robot.dh[1, 1] * frames[1, :3, 2]
     return np.array(
         [frames[0, :3, 3], frames[1, :3, 3], shoulder, frames[2, :3, 3], frames[4, :3, 3], frames[6, :3, 3]]

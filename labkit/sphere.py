@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .checks import as_finite, as_points, as_positive
+from .checks import as_count, as_finite, as_nonnegative, as_number, as_points, as_positive, as_positive_number, as_shape
 
 MIN_SAGITTA = 1e-6  # an arc flatter than this, relative to its length, fixes no circle: the points are collinear
 MAX_STEPS = 50
@@ -67,7 +67,7 @@ def triangulation_std(base, alpha, beta, std_angle):
     dH/da = L sin(b)^2 / sin(a + b)^2: with a fixed base the error grows with the square of the distance.
     """
     triangulation_height(base, alpha, beta)
-    alpha, beta = np.asarray(alpha, float), np.asarray(beta, float)
+    base, alpha, beta = (np.asarray(v, float) for v in (base, alpha, beta))
     s2 = np.sin(alpha + beta) ** 2
     return as_positive(std_angle, "std_angle") * base * np.hypot(np.sin(beta) ** 2 / s2, np.sin(alpha) ** 2 / s2)
 
@@ -211,17 +211,23 @@ def sphere_center_from_profile(x, z, radius, side):
 
     Source: thesis, formulas (6-26) and (6-27), listing C16 (which always takes the negative side).
     """
-    if side not in (1, -1):
-        raise ValueError(f"side must be +1 or -1, the sign of the center's y coordinate, got {side!r}")
-    circle = fit_circle(x, z)
+    _refuse_side(side)
+    radius, circle = as_positive_number(radius, "radius"), fit_circle(x, z)
     return np.array([circle.center[0], side * center_offset(radius, circle.radius), circle.center[1]])
+
+
+def _refuse_side(side):
+    if np.ndim(side) or side not in (1, -1):
+        raise ValueError(f"side must be +1 or -1, the sign of the center's y coordinate, got {side!r}")
 
 
 def profile_center_covariance(radius, circle, side, std_radius=0.0):
     """First-order covariance (3, 3) of the center that `sphere_center_from_profile` finds, from a `Circle` and the
     radius' error.
     """
-    by_R, by_r = offset_sensitivity(radius, circle.radius)
+    _refuse_side(side)
+    by_R, by_r = offset_sensitivity(as_positive_number(radius, "radius"), circle.radius)
+    std_radius = float(as_nonnegative(as_number(std_radius, "std_radius"), "std_radius"))
     J = np.zeros((3, 4))  # columns: circle x, z, r, sphere radius
     J[0, 0], J[2, 1], J[1, 2], J[1, 3] = 1.0, 1.0, side * by_r, side * by_R
     cov = np.zeros((4, 4))
@@ -249,8 +255,11 @@ def scan_line(center, radius, half_angle, n, std=0.0, rng=None):
     -------
     x, z : array, shape (n,)
     """
-    center = as_points(center, "center")
-    r = np.sqrt(max(float(as_positive(radius, "radius")) ** 2 - center[1] ** 2, 0.0))
+    center, half_angle, n = as_shape(center, "center", 3), as_number(half_angle, "half_angle"), as_count(n, "n")
+    std = float(as_nonnegative(as_number(std, "std"), "std"))
+    if std and rng is None:
+        raise ValueError("rng must be given when std is not 0")
+    r = np.sqrt(max(as_positive_number(radius, "radius") ** 2 - center[1] ** 2, 0.0))
     if r == 0:
         raise ValueError(f"the scan plane misses the sphere: |y| = {abs(center[1]):g} mm, radius {radius:g} mm")
     angle = np.linspace(-half_angle, half_angle, n)
@@ -298,7 +307,7 @@ def _geometric(points, start):
         else:
             break
         q, r, J = q + step, r_new, J_new
-        if np.abs(step).max() <= 1e-12 * max(np.abs(q).max(), 1.0):
+        if np.abs(step).max() <= 1e-12 * np.abs(q).max():
             break
     return q, r, J
 
@@ -310,7 +319,7 @@ def _uncertainty(J, residuals, std):
     _, s, Vt = np.linalg.svd(J, full_matrices=False)
     dof = J.shape[0] - J.shape[1]
     if std is not None:
-        variance = float(as_positive(std, "std")) ** 2
+        variance = as_positive_number(std, "std") ** 2
     else:
         variance = residuals @ residuals / dof if dof > 0 else np.nan
     return variance * (Vt.T / s**2) @ Vt, s

@@ -16,7 +16,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from .axxb import kronecker_matrix, rotation_from_kronecker, translation_from_motions
-from .checks import as_finite, as_points, as_positive, as_transforms
+from .checks import (
+    as_finite,
+    as_number,
+    as_points,
+    as_positive_number,
+    as_rotations,
+    as_shape,
+    as_transforms,
+    fit_together,
+)
 from .frames import matrix_from_quaternion, pose, pose_distance, relative, rotation_angle
 from .lie import log_so3
 
@@ -37,7 +46,7 @@ UNIT_TOLERANCE = 1e-3  # how far the length of a quaternion may be from 1
 
 def encode_packet(values):
     """184 bytes of one reading; values, shape (23,), in the order of `FIELDS`."""
-    values = np.asarray(values, dtype=float)
+    values = as_finite(values, "values")
     if values.shape != (len(FIELDS),):
         raise ValueError(f"values must have shape (23,), one number a field of table 1, got {values.shape}")
     return PACKET.pack(*values)
@@ -88,11 +97,16 @@ def check_packet(data):
 def packet_from_pose(T_WE, time, device=1, velocity=(0.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, 0.0)):
     """The 23 numbers for a pose in mm; velocity in mm/s, angular velocity in rad/s. Broadcasts: (..., 4, 4) -> (...,
     23)."""
-    T_WE = as_transforms(T_WE, "T_WE")
+    T_WE, device, time = as_transforms(T_WE, "T_WE"), as_finite(device, "device"), as_finite(time, "time")
+    velocity, angular_velocity = as_points(velocity, "velocity"), as_points(angular_velocity, "angular_velocity")
+    leading = {"device": device.shape, "time": time.shape, "velocity": velocity.shape[:-1]}
+    leading["angular_velocity"] = angular_velocity.shape[:-1]
+    if fit_together(T_WE=T_WE.shape[:-2], **leading) != T_WE.shape[:-2]:
+        raise ValueError(f"there must be one pose, or as many as readings, got T_WE {T_WE.shape} and {leading}")
     values = np.zeros((*T_WE.shape[:-2], len(FIELDS)))
     values[..., 0], values[..., TIME] = device, time
     values[..., POSITION] = T_WE[..., :3, 3] / 1000
-    values[..., VELOCITY] = np.asarray(velocity) / 1000
+    values[..., VELOCITY] = velocity / 1000
     values[..., QUATERNION] = quaternion_from_matrix(T_WE[..., :3, :3])
     values[..., ANGULAR_VELOCITY] = angular_velocity
     return values
@@ -106,7 +120,9 @@ def poses_from_packets(values):
 
 def quaternion_from_matrix(R):
     """Quaternion x, y, z, w with w >= 0; (..., 3, 3) -> (..., 4)."""
-    R = as_finite(R, "R")
+    R = as_rotations(R, "R")
+    if not R.size:
+        return np.zeros((*R.shape[:-2], 4))
     q = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(canonical=True)
     return q.reshape(*R.shape[:-2], 4)
 
@@ -268,6 +284,7 @@ def reject_outliers(values, factor=4.0):
     values = as_finite(values, "values")
     if values.ndim not in (1, 2) or len(values) < 3:
         raise ValueError(f"values must have shape (n,) or (n, d) with n >= 3, got {values.shape}")
+    factor = as_positive_number(factor, "factor")
     columns = values.reshape(len(values), -1)
     distance = np.abs(columns - np.median(columns, axis=0))
     scale = 1.4826 * np.median(distance, axis=0)
@@ -276,7 +293,9 @@ def reject_outliers(values, factor=4.0):
 
 def mean_pose(T):
     """Mean of poses that lie close together; rotations by the projected mean matrix; (n, 4, 4) -> (4, 4)."""
-    T = as_transforms(T, "T")
+    T = as_shape(as_transforms(T, "T"), "T", "n", 4, 4)
+    if not len(T):
+        raise ValueError("T must hold at least one pose, got none")
     return pose(Rotation.from_matrix(T[:, :3, :3]).mean().as_matrix(), T[:, :3, 3].mean(0))
 
 
@@ -291,6 +310,7 @@ def average_stops(log, factor=4.0, share=0.5):
     """
     if log.stop is None:
         raise ValueError("the log has no column 'stop': there is nothing to average over")
+    factor, share = as_positive_number(factor, "factor"), as_number(share, "share")
     means, used = [], []
     for number in np.unique(log.stop):
         T = log.T_WE[log.stop == number]
@@ -344,6 +364,7 @@ def calibrate_mounting(T_BF, T_WE, factor=8.0):
     T_BF, T_WE = as_transforms(T_BF, "T_BF"), as_transforms(T_WE, "T_WE")
     if T_BF.ndim != 3 or T_BF.shape != T_WE.shape or len(T_BF) < 4:
         raise ValueError(f"T_BF and T_WE must both have shape (N, 4, 4) with N >= 4, got {T_BF.shape} and {T_WE.shape}")
+    factor = as_positive_number(factor, "factor")
     A, B = relative(T_BF[0], T_BF), relative(T_WE[0], T_WE)
     kept = np.ones(len(A), bool)
     while True:
@@ -372,7 +393,9 @@ def _mounting(A, B, moved, kept):
 def e_rot(M):
     """Equation (13): |M'M v| / (N - 1) for the smallest right singular vector v of M'M, length 1; N blocks of 9 rows.
     No unit."""
-    M = as_finite(M, "M")
+    M = as_shape(M, "M", "m", 9)
+    if len(M) < 18 or len(M) % 9:
+        raise ValueError(f"M must hold at least two motions, nine rows each, got {len(M)} rows")
     v = np.linalg.svd(M.T @ M)[2][-1]
     return float(np.linalg.norm(M.T @ (M @ v)) / (len(M) / 9 - 1))
 
@@ -380,7 +403,9 @@ def e_rot(M):
 def e_trans(residuals):
     """Equation (17): |K1 t - K2| / (N - 1), the norm **not** squared; residuals, shape (N, 3), in the unit of the
     lengths."""
-    residuals = as_points(residuals, "residuals")
+    residuals = as_shape(residuals, "residuals", "N", 3)
+    if len(residuals) < 2:
+        raise ValueError(f"at least 2 residuals are needed, got {len(residuals)}")
     return float(np.linalg.norm(residuals) / (len(residuals) - 1))
 
 
@@ -397,6 +422,11 @@ class TrackingErrors:
     angular_speed: np.ndarray
 
 
+def _refuse_clock(time):
+    if (np.diff(time) <= 0).any():
+        raise ValueError(f"time must increase, but does not after sample {int(np.argmax(np.diff(time) <= 0))}")
+
+
 def speeds(time, T):
     """Speed (mm/s) and angular speed (rad/s) of a sampled motion by central differences; (k,), (k, 4, 4) -> (k,), (k,).
 
@@ -406,6 +436,7 @@ def speeds(time, T):
     time, T = as_finite(time, "time"), as_transforms(T, "T")
     if T.ndim != 3 or len(T) < 3 or time.shape != T.shape[:1]:
         raise ValueError(f"time and T must have shapes (k,) and (k, 4, 4) with k >= 3, got {time.shape} and {T.shape}")
+    _refuse_clock(time)
     before, after = np.r_[0, : len(T) - 1], np.r_[1 : len(T), len(T) - 1]
     span = time[after] - time[before]
     turn = np.linalg.norm(log_so3(np.swapaxes(T[before, :3, :3], -1, -2) @ T[after, :3, :3]), axis=1)
@@ -430,15 +461,19 @@ def tracking_errors(time, T_true, T_read, velocities=None):
 
     Source: report, section 3.2, figures 10 to 17.
     """
-    rotation, translation = pose_distance(T_true, T_read)
-    v, w = speeds(time, T_true)
-    v_read, w_read = speeds(time, T_read) if velocities is None else velocities
+    (v, w), (rotation, translation) = speeds(time, T_true), pose_distance(T_true, T_read)
+    if velocities is None:
+        v_read, w_read = speeds(time, T_read)
+    else:
+        v_read, w_read = as_shape(velocities, "velocities", 2, len(v))
     return TrackingErrors(translation, rotation, np.abs(v_read - v), np.abs(w_read - w))
 
 
 def summarize(errors):
     """Mean, RMS, median, 95 % quantile and maximum of errors, as a dictionary."""
     errors = as_finite(errors, "errors")
+    if not errors.size:
+        raise ValueError("errors must hold at least one number, got none")
     return {
         "mean": float(errors.mean()),
         "RMS": float(np.sqrt((errors**2).mean())),
@@ -471,8 +506,13 @@ def time_offset(time, reference, delayed, max_offset=0.2):
             f"time, reference and delayed must have the same length, got {time.shape}, {reference.shape}, "
             f"{delayed.shape}"
         )
+    if len(time) < 3:
+        raise ValueError(f"at least 3 samples are needed, got {len(time)}")
     step = (time[-1] - time[0]) / (len(time) - 1)
-    most = int(round(float(as_positive(max_offset, "max_offset")) / step))
+    if not step > 0 or np.abs(np.diff(time) - step).max() > 0.01 * step:
+        raise ValueError("time must increase by even steps, within 1 %")
+    max_offset = as_positive_number(max_offset, "max_offset")
+    most = int(round(min(max_offset / step, len(time))))
     if most < 1 or len(time) < 3 * most:
         raise ValueError(f"max_offset of {max_offset:g} s needs at least {3 * max(most, 1)} samples, got {len(time)}")
     core = reference[most:-most]
@@ -487,7 +527,10 @@ def time_offset(time, reference, delayed, max_offset=0.2):
 def shift_time(time, T, offset):
     """Poses as they were `offset` seconds later: positions linear, rotations along the shortest arc; ends are held. (k,
     4, 4)."""
-    time, T = as_finite(time, "time"), as_transforms(T, "T")
+    time, T, offset = as_finite(time, "time"), as_transforms(T, "T"), as_number(offset, "offset")
+    if T.ndim != 3 or len(T) < 2 or time.shape != T.shape[:1]:
+        raise ValueError(f"time and T must have shapes (k,) and (k, 4, 4) with k >= 2, got {time.shape} and {T.shape}")
+    _refuse_clock(time)
     when = np.clip(time + offset, time[0], time[-1])
     k = np.clip(np.searchsorted(time, when, side="right") - 1, 0, len(time) - 2)
     s = ((when - time[k]) / (time[k + 1] - time[k]))[:, None]
@@ -520,9 +563,13 @@ def filter_positions(time, positions, std_position=3.0, std_acceleration=4000.0,
     time, positions = as_finite(time, "time"), as_points(positions, "positions")
     if positions.ndim != 2 or time.shape != positions.shape[:1]:
         raise ValueError(f"time and positions must have shapes (k,) and (k, 3), got {time.shape} and {positions.shape}")
+    _refuse_clock(time)
+    gate = as_positive_number(gate, "gate")
+    if not len(time):
+        raise ValueError("time and positions must hold at least one reading, got none")
     noise, drive = (
-        float(as_positive(std_position, "std_position")) ** 2,
-        float(as_positive(std_acceleration, "std_acceleration")) ** 2,
+        as_positive_number(std_position, "std_position") ** 2,
+        as_positive_number(std_acceleration, "std_acceleration") ** 2,
     )
     x, v = np.median(positions[:5], axis=0), np.zeros(3)
     pp, pv, vv = noise, 0.0, 1e6  # one covariance for all three axes: position, cross, velocity

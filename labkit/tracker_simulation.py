@@ -12,6 +12,7 @@ from itertools import count
 
 import numpy as np
 
+from .checks import as_count, as_positive_number
 from .frames import invert, matrix_from_quaternion, pose
 from .lie import exp_so3
 from .robot import HOME, RAMP, TX40, forward_kinematics, measuring_poses, rotation_only, smooth_motion, tool_pose
@@ -140,7 +141,7 @@ def calibration_run(rng, tracker=None, joints=None, rate=5.0, lost_stop=None):
     """
     tracker = tracker or RESTING
     joints = measuring_joints() if joints is None else joints
-    readings = int(STOP_TIME * rate)
+    readings = as_count(np.floor(STOP_TIME * as_positive_number(rate, "rate")), "the number of readings a stop")
     T_BE = tool_pose(TX40, joints, T_FE)
     drift = rng.normal(size=(len(joints), 6)) * np.repeat([tracker.drift_rotation, tracker.drift_position], 3)
     stop = np.repeat(np.arange(len(joints)), readings)

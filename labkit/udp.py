@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .checks import as_count, as_positive_number
 from .tracker import PACKET, TIME, check_packet
 
 HOST = "127.0.0.1"
@@ -62,7 +63,7 @@ def stream(packets, rate, faults, rng):
     packets : iterable of bytes; kinds are "good", "duplicate", "malformed", "foreign". A lost packet is yielded as kind
     "lost" with no datagram, so that a sender can keep its books.
     """
-    waiting, count = [], 0
+    rate, waiting, count = as_positive_number(rate, "rate"), [], 0
     for k, data in enumerate(packets):
         due = k / rate + faults.latency
         lost, twice, late, broken, stranger = rng.random(5) < (
@@ -279,7 +280,7 @@ class Listener(_Endpoint):
             rows = list(self._readings)
         table = np.array(rows).reshape(-1, PACKET.size // 8)
         table = table[np.argsort(table[:, TIME], kind="stable")]
-        return table if newest is None else table[-newest:]
+        return table if newest is None else table[max(len(table) - as_count(newest, "newest", at_least=0), 0) :]
 
 
 def listen(port=0, **options):

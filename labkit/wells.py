@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 
 from . import optimization as opt
-from .checks import as_points
+from .checks import as_count, as_points, as_positive_number
 
 CENTERS = np.array([[1.0, 1.0], [-1.0, -2.0]])
 DEPTHS = np.array([100.0, 200.0])
@@ -22,7 +22,7 @@ METHODS = ("newton", "gauss_newton", "levenberg_marquardt", "trust_region")
 
 def _parts(x, width=1.0):
     """Offsets from both centers (..., 2, 2), q = squared distance + width^2 (..., 2), depths times width^2."""
-    d = as_points(x, "x", 2)[..., None, :] - CENTERS
+    d, width = as_points(x, "x", 2)[..., None, :] - CENTERS, as_positive_number(width, "width")
     return d, (d * d).sum(-1) + width**2, DEPTHS * width**2
 
 
@@ -100,7 +100,10 @@ def _extremum(x):
 
 def which(x, tol=1e-4):
     """Index into `NAMES` of the stationary point that lies within tol of x, 3 where none does; (..., 2) -> (...)."""
-    x = np.asarray(x, dtype=float)
+    return _which(as_points(x, "x", 2), tol)
+
+
+def _which(x, tol=1e-4):
     near = np.stack([np.linalg.norm(x - e.x, axis=-1) <= tol for e in extrema()], axis=-1)
     return np.where(near.any(-1), near.argmax(-1), 3)
 
@@ -138,7 +141,8 @@ def destinations(method, starts, max_iterations=100):
     if method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
     advance, first = _ADVANCE[method]
-    x = as_points(starts, "starts", 2).reshape(-1, 2).copy()
+    starts, max_iterations = as_points(starts, "starts", 2), as_count(max_iterations, "max_iterations", at_least=0)
+    x = starts.reshape(-1, 2).copy()
     memory = first(x)
     steps, open_ = np.zeros(len(x), dtype=int), np.arange(len(x))
     for _ in range(max_iterations):
@@ -149,8 +153,8 @@ def destinations(method, starts, max_iterations=100):
         x[open_], steps[open_] = new, steps[open_] + 1
         going = ((np.abs(new - old).max(-1) > 1e-10) | ~moved) & (np.abs(new).max(-1) < 1e4)
         open_, memory = open_[going], memory[going]
-    shape = np.shape(starts)[:-1]
-    return which(x).reshape(shape), steps.reshape(shape)
+    shape = starts.shape[:-1]
+    return _which(x).reshape(shape), steps.reshape(shape)
 
 
 def _advance_newton(x, memory):

@@ -195,3 +195,14 @@ def test_shifting_the_base_changes_the_target_alone():
 def test_refusals(call, words):
     with pytest.raises(ValueError, match=words):
         call(setup(np.random.default_rng(1), 5)[0])
+
+
+def test_both_steps_of_the_report_are_exact_on_exact_motions():
+    A = pose(exp_so3(np.random.default_rng(8).uniform(-1, 1, (4, 3))), np.arange(12.0).reshape(4, 3))
+    B = invert(T_FS) @ A @ T_FS
+    R, values = axxb.rotation_from_kronecker(axxb.kronecker_matrix(A, B))
+    np.testing.assert_allclose(R, T_FS[:3, :3], atol=1e-12)
+    assert values[-1] < 1e-7 < 1e-2 < values[-2]
+    t, gaps = axxb.translation_from_motions(A, B, R)
+    np.testing.assert_allclose(t, T_FS[:3, 3], atol=1e-9)
+    np.testing.assert_allclose(gaps, 0, atol=1e-9)

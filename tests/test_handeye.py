@@ -351,3 +351,8 @@ def test_methods_of_the_literature_do_not_beat_the_bound():
     errors, bound = handeye.compare_methods(25, 0.1, np.random.default_rng(4))
     assert errors["joint fit (sphere)"] < 1.35 * bound
     assert errors["Li et al. (sphere)"] > errors["joint fit (sphere)"]
+
+
+def test_the_tukey_weights_fall_smoothly_to_zero_at_the_cut():
+    lengths = np.array([0.0, 1.0, 5.0, 10.0, 11.0, 1e9])
+    np.testing.assert_allclose(handeye.tukey_weights(lengths, 2.0), [1, 0.99**2, 0.75**2, 0, 0, 0])

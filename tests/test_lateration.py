@@ -142,3 +142,21 @@ def test_collinear_landmarks_leave_the_mirror_image():
 def test_bad_input_is_refused_in_words(call, words):
     with pytest.raises(ValueError, match=words):
         call()
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e-3, 1e9])
+@pytest.mark.parametrize("start", [None, [3.0, 9.0]])
+def test_the_position_does_not_depend_on_the_unit_of_length(unit, start):
+    d = distances(FOUR, [1.0, 2.0]) + [0.1, -0.1, 0.05, 0.1]
+    expected = lateration.laterate(FOUR, d, start).position
+    found = lateration.laterate(unit * FOUR, unit * d, None if start is None else unit * np.array(start))
+    assert found.converged
+    np.testing.assert_allclose(found.position / unit, expected, rtol=1e-7)
+
+
+def test_square_jacobian_is_the_derivative_of_the_lectures_equations():
+    position, d, h = np.array([1.0, 2.5]), distances(FOUR, [2.0, 3.0]), 1e-6
+    J = lateration.square_jacobian(FOUR, position)
+    for k, e in enumerate(h * np.eye(2)):
+        ahead, behind = (lateration.square_residuals(FOUR, d, position + s * e) for s in (1, -1))
+        np.testing.assert_allclose(J[:, k], (ahead - behind) / (2 * h), rtol=1e-8)

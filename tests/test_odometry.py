@@ -183,3 +183,11 @@ def test_ellipse_holds_its_share():
     samples = rng.multivariate_normal([1, 2], cov, 20_000)
     assert abs(gaussian.share_inside(samples, [1.0, 2.0], cov, 0.9) - 0.9) < 0.008
     assert gaussian.outlines(np.zeros((4, 2)), np.broadcast_to(cov, (4, 2, 2)), points=11).shape == (48, 2)
+
+
+def test_noisy_controls_have_the_variances_of_the_error_model():
+    u, dt, runs = np.array([[0.5, -0.3], [-0.2, 0.4]]), 0.2, 40_000
+    noisy = odometry.noisy_controls(u, dt, 0.02, 0.03, 0.01, np.random.default_rng(6), runs)
+    np.testing.assert_allclose(noisy.mean(1), u, atol=5 * 0.25 / np.sqrt(runs))
+    expected = [[0.02 * 0.5 / dt, (0.03 * 0.3 + 0.01 * 0.5) / dt], [0.02 * 0.2 / dt, (0.03 * 0.4 + 0.01 * 0.2) / dt]]
+    np.testing.assert_allclose(noisy.var(1), expected, rtol=5 * np.sqrt(2 / runs))

@@ -352,3 +352,10 @@ def test_bad_input_is_refused_in_one_sentence(call, words):
 def test_luck_is_what_tosses_of_a_coin_give():
     right = np.random.default_rng(1).integers(2, size=(100_000, 5, 4)).astype(bool)
     assert right.all(axis=2).any(axis=1).mean() == pytest.approx(luck(), abs=0.005)
+
+
+def test_the_radius_follows_the_scheme_of_the_thesis():
+    gains = np.array([-np.inf, 0.2, 0.5, 0.9, 0.9, 0.9])
+    lengths = np.array([1.0, 0.4, 1.0, 0.5, 1.0, 1.0])
+    limits = np.array([9.0, 9.0, 9.0, 9.0, 9.0, 1.5])
+    np.testing.assert_allclose(opt.next_radius(1.0, lengths, gains, limits), [0.25, 0.1, 1.0, 1.0, 2.0, 1.5])

@@ -290,7 +290,7 @@ def test_tilted_points_the_tool_axis():
         (lambda: pivot.touching_poses(np.eye(3), TIP, POINT, 1e-3), "rng must be given"),
         (lambda: pivot.predicted_covariance(np.eye(3)[None], TIP, 1e-3, 0.1), "do not fix the tip"),
         (lambda: pivot.tilted([0.0, 0.0, 0.0]), "must not be zero"),
-        (lambda: pivot.cone(0, 0.1), "at least one pose"),
+        (lambda: pivot.cone(0, 0.1), "n must be a whole number, at least 1, got 0"),
     ],
 )
 def test_bad_input_is_refused_in_words(call, text):

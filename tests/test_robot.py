@@ -132,3 +132,20 @@ def test_rotation_only_leaves_the_tool_where_it_is():
 def test_refusals(call, words):
     with pytest.raises(ValueError, match=words):
         call()
+
+
+def test_pose_error_is_what_leads_to_the_goal():
+    rng = np.random.default_rng(4)
+    T = robot.forward_kinematics(robot.TX40.dh, rng.uniform(-1, 1, (5, 6)))
+    goal = robot.forward_kinematics(robot.TX40.dh, rng.uniform(-1, 1, (5, 6)))
+    error = robot.pose_error(T, goal)
+    turned = Rotation.from_rotvec(error[:, :3]).as_matrix() @ T[:, :3, :3]
+    np.testing.assert_allclose(turned, goal[:, :3, :3], atol=1e-12)
+    np.testing.assert_allclose(T[:, :3, 3] + error[:, 3:], goal[:, :3, 3], atol=1e-9)
+
+
+def test_three_joints_reach_a_position_and_leave_the_wrist_alone():
+    goal = robot.forward_kinematics(robot.TX40.dh, robot.HOME + [0.3, -0.2, 0.1, 0.0, 0.0, 0.0])[:3, 3]
+    q = robot.reach_position(robot.TX40, goal, robot.HOME)
+    np.testing.assert_allclose(robot.arm_points(robot.TX40, q)[-1], goal, atol=1e-5)
+    np.testing.assert_array_equal(q[3:], robot.HOME[3:])

@@ -132,3 +132,13 @@ def test_center_covariance_against_monte_carlo():
 def test_bad_input_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e-3, 1e9])
+def test_fits_do_not_depend_on_the_unit_of_length(unit):
+    points = np.random.default_rng(3).normal(size=(9, 3))
+    ball, scaled = sphere.fit_sphere(points), sphere.fit_sphere(unit * points)
+    np.testing.assert_allclose(scaled.center / unit, ball.center, rtol=1e-9)
+    x, z = arc((3.0, 200.0), 20.0, 1.0, 30, std=0.5)
+    circle, scaled = sphere.fit_circle(x, z), sphere.fit_circle(unit * x, unit * z)
+    np.testing.assert_allclose(scaled.center / unit, circle.center, rtol=1e-9)

@@ -83,7 +83,7 @@ def test_duplicates_late_ones_and_foreign_devices():
     assert (seen.good, seen.late, seen.duplicates, seen.lost) == (3, 1, 2, 0)
     assert seen.bad == {"another device": 1, "length": 2}
     np.testing.assert_allclose(listener.readings()[:, tracker.TIME], np.arange(3) / 250)
-    assert len(listener.readings(2)) == 2
+    assert [len(listener.readings(newest)) for newest in (0, 2, 99)] == [0, 2, 3]
 
 
 def test_a_sender_that_starts_over_is_followed():

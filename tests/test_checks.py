@@ -1,0 +1,261 @@
+"""Bad input to any module of the mathematics meets one sentence that says what was expected, what came, and where."""
+
+import numpy as np
+import pytest
+
+from labkit import (
+    axxb,
+    chaining,
+    checks,
+    frames,
+    gaussian,
+    handeye,
+    handeye_data,
+    kalman,
+    lateration,
+    lie,
+    maps,
+    odometry,
+    optimization,
+    particles,
+    pivot,
+    robot,
+    sphere,
+    tracker,
+    tracker_simulation,
+    udp,
+    wells,
+)
+
+I3, I4, O2, O3 = np.eye(3), np.eye(4), np.zeros(2), np.zeros(3)
+POSES = np.tile(I4, (5, 1, 1))
+HOME, ARM = robot.HOME, robot.TX40
+GRID = maps.OccupancyGrid.from_ascii("###\n#.#\n###")
+COV = np.diag([0.1, 0.1, 0.01])
+MARKS = np.array([[0.0, 0.0], [5.0, 1.0], [2.0, 6.0]])
+TIME = np.arange(5.0)
+
+
+def rng():
+    return np.random.default_rng(0)
+
+
+REFUSED = [
+    # the checks themselves
+    (lambda: checks.as_number([1.0, 2.0], "x"), r"x must have shape \(\), got \(2,\)"),
+    (lambda: checks.as_shape(O3, "x", "n", 3), r"x must have shape \(n, 3\), got \(3,\)"),
+    (lambda: checks.as_shape(O3, "x", 2), r"x must have shape \(2,\), got \(3,\)"),
+    (lambda: checks.as_count(2.5, "n"), "n must be a whole number, at least 1, got 2.5"),
+    (lambda: checks.as_count("many", "n"), "n must hold real numbers, got str"),
+    (lambda: checks.as_readings([np.inf], "z"), "z must be finite, or NaN"),
+    (lambda: checks.as_covariances([[1.0, 0.5], [0.0, 1.0]], "cov", 2), "cov must be symmetric"),
+    (lambda: checks.as_covariances([[-1.0, 0.0], [0.0, 1.0]], "cov", 2), "no negative variance, got -1"),
+    (lambda: checks.as_probability(1.0, "p"), "p must lie between 0 and 1"),
+    (lambda: checks.fit_together(a=(2,), b=(3,)), r"got \(2,\) of a, \(3,\) of b"),
+    # lie, frames, chaining, pivot
+    (lambda: lie.skew([1.0, np.nan, 0.0]), "v must be finite"),
+    (lambda: lie.exp_so3(O2), "phi must have shape"),
+    (lambda: lie.log_so3(I4), "R must have shape"),
+    (lambda: lie.exp_se3(O3), "xi must have shape"),
+    (lambda: lie.log_se3(I3), "T must have shape"),
+    (lambda: lie.nearest_rotation(O3), "M must have shape"),
+    (lambda: frames.normalize(2.0), "single number"),
+    (lambda: frames.frame_from_points(np.zeros((2, 3)), np.ones((3, 3)), O3), r"\(2, 3\) of origin"),
+    (lambda: frames.transform(POSES, np.zeros((4, 3))), r"\(5,\) of T, \(4,\) of points"),
+    (lambda: frames.relative(POSES, POSES[:2]), "T_WB"),
+    (lambda: frames.rotation_angle(np.eye(2)), r"T must have shape \(..., 4, 4\) or"),
+    (lambda: frames.gram_schmidt_covariance(0.0, 1.0, 1.0, 0.1), "must not be 0"),
+    (lambda: frames.gram_schmidt_covariance([1.0, 2.0], 1.0, 1.0, 0.1), "x_arm must have shape"),
+    (lambda: frames.fit_covariance(np.outer(range(4), [1.0, 2.0, 3.0]), 0.1), "collinear"),
+    (lambda: frames.fit_frame(np.ones((4, 3)), np.ones((4, 3))), "the points coincide"),
+    (lambda: frames.fit_covariance(I3[:2], 0.1), "at least 3 points"),
+    (lambda: chaining.chain(3.0), "must be a sequence of transforms"),
+    (lambda: chaining.chain([POSES, POSES[:2]]), r"transforms\[1\]"),
+    (lambda: chaining.around(POSES, [(7, True)]), "links from 0 to 4, got 7"),
+    (lambda: chaining.around(POSES, []), "sequence of pairs"),
+    (lambda: chaining.noisy_links(POSES, 0.1, 0.1, rng(), runs=0), "runs must be a whole number"),
+    (lambda: chaining.solve_pose_graph([(0, 1.5)], POSES[:1], 0.1, 0.1), "pairs of two different nodes"),
+    (lambda: chaining.solve_pose_graph([(1, 1)], POSES[:1], 0.1, 0.1), "pairs of two different nodes"),
+    (lambda: chaining.orthonormality_error(O3), "T must have shape"),
+    (lambda: pivot.calibrate_pivot(POSES, [0.1], 0.1), "std_rot must have shape"),
+    (lambda: pivot.touching_poses(I3, O3, O3, 0.0, np.nan, rng()), "std_trans must be finite"),
+    (lambda: pivot.touching_poses(I3, O3, O3, -0.1, 0.0, rng()), "std_rot must not be negative"),
+    (lambda: pivot.tilted(np.ones((2, 3)), spin=[0.1, 0.2, 0.3]), "of spin"),
+    (lambda: pivot.cone(5, 0.1, turns="once"), "turns must hold real numbers"),
+    (lambda: pivot.predicted_covariance(POSES[:, :3, :3], O3, None, 0.1), "std_rot must hold real numbers"),
+    # sphere, hand-eye
+    (lambda: sphere.scan_line(O3, 30.0, np.nan, 5), "half_angle must be finite"),
+    (lambda: sphere.scan_line(O3, 30.0, 1.0, 5, std=0.1), "rng must be given"),
+    (lambda: sphere.scan_line(O3, 30.0, 1.0, 0), "n must be a whole number"),
+    (lambda: sphere.profile_center_covariance(30.0, None, 2), r"side must be \+1 or -1"),
+    (lambda: sphere.sphere_center_from_profile(O3, O3, 30.0, [1, 1]), r"side must be \+1 or -1"),
+    (lambda: handeye.rms_distance(np.zeros((0, 3))), "N >= 1"),
+    (lambda: handeye.listing_cost(np.zeros((0, 3))), "n >= 1"),
+    (lambda: handeye.rate_matrix(np.nan, 0.0), "A must be finite"),
+    (lambda: handeye.kuka_jacobian(np.zeros(6), POSES, np.ones((4, 3))), "T_BF and x_S must have shapes"),
+    (lambda: handeye.joint_jacobian(POSES, np.ones((4, 3)), I4), "T_BF and x_S must have shapes"),
+    (lambda: handeye.linear_start(POSES, np.ones((4, 3))), "T_BF and x_S must have shapes"),
+    (lambda: handeye.leave_one_out(POSES, np.ones((4, 3))), "T_BF and x_S must have shapes"),
+    (lambda: handeye.gauss_newton_pose(np.zeros(6), POSES, np.zeros((5, 3))), "away from the scanner's origin"),
+    (lambda: handeye.numeric_jacobian(np.sin, O2, [1e-6, 1e-6, 1e-6]), "x and step must have shapes"),
+    (lambda: handeye.tukey_weights([1.0], 1.0, cut=np.nan), "cut must be finite"),
+    (lambda: handeye.fit_radius(POSES, np.array([[1.0, 0.0, 1.0]] * 5)), "off the scan plane"),
+    (lambda: handeye.kim_linear(POSES, np.zeros((5, 3, 3)), np.zeros((4, 3))), r"points_S must have shape \(5, 4, 3\)"),
+    (lambda: handeye.li_two_step(POSES[:1], np.zeros((1, 3))), "at least 2 poses"),
+    (lambda: handeye.predicted_covariance(POSES, I4, O3 + 1.0, 0.1), "undetermined"),
+    (lambda: handeye.compare_methods(0, 0.1, rng()), "repeats must be a whole number"),
+    (lambda: handeye.pattern(I4, O3, 0.1, [1.0, np.inf, 1.0]), "spread must be finite"),
+    (lambda: handeye_data.centers_with_radius([[1.0, np.nan, 1.0]], 30.0), "x_S must be finite"),
+    (lambda: handeye_data.centers_with_radius(I3, -1.0), "R must be positive"),
+    (lambda: axxb.kronecker_matrix(POSES * np.nan, POSES), "A must be finite"),
+    (lambda: axxb.kronecker_matrix(POSES, POSES[:2]), "as many motions"),
+    (lambda: axxb.rotation_from_kronecker(I4), r"M must have shape \(m, 9\)"),
+    (lambda: axxb.translation_from_motions(POSES, POSES, np.full((3, 3), np.nan)), "R must be finite"),
+    (lambda: axxb.calibrate_hand_eye(POSES, POSES, std_rot=[0.1]), "std_rot must have shape"),
+    # robot, tracker
+    (lambda: robot.dh_matrix(O2, O3, 0.0, 0.0), r"\(2,\) of theta, \(3,\) of d"),
+    (lambda: robot.pose_error(I3, I4), "T must have shape"),
+    (lambda: robot.inverse_kinematics(ARM, I4, HOME, tolerance=np.nan), "tolerance must be finite"),
+    (lambda: robot.inverse_kinematics(ARM, I4, np.tile(HOME, (2, 1))), "one for all or one a pose"),
+    (lambda: robot.measuring_poses(ARM, rng(), count=np.inf), "count must be finite"),
+    (lambda: robot.smooth_motion(np.tile(HOME, (2, 1)), 1e-9, 1.0), "from 1 to 1e7 steps"),
+    (lambda: robot.rotation_only(ARM, I4, HOME, np.zeros((1, 3)), 0.1, 1.0, 10.0), "none may be zero"),
+    (lambda: robot.joint_speeds(np.zeros(3), np.zeros((3, 6))), "increase"),
+    (lambda: robot.reach_position(ARM, np.zeros((2, 3)), HOME), r"position must have shape \(3,\)"),
+    (lambda: tracker.encode_packet(np.full(23, np.nan)), "values must be finite"),
+    (lambda: tracker.packet_from_pose(I4, np.nan), "time must be finite"),
+    (lambda: tracker.packet_from_pose(I4, [0.0, 1.0]), "as many as readings"),
+    (lambda: tracker.quaternion_from_matrix(2 * I3), "orthonormal"),
+    (lambda: tracker.reject_outliers([1.0, 2.0, 3.0], factor=np.nan), "factor must be finite"),
+    (lambda: tracker.mean_pose(POSES[:0]), "at least one pose"),
+    (lambda: tracker.e_rot(np.zeros((9, 9))), "at least two motions"),
+    (lambda: tracker.e_trans(np.zeros((1, 3))), "at least 2 residuals"),
+    (lambda: tracker.speeds(np.zeros(5), POSES), "time must increase"),
+    (lambda: tracker.tracking_errors(TIME, POSES, POSES, velocities=(O3, O3)), r"velocities must have shape \(2, 5\)"),
+    (lambda: tracker.summarize([]), "at least one number"),
+    (lambda: tracker.time_offset(TIME**2, TIME, TIME), "even steps"),
+    (lambda: tracker.time_offset([], [], []), "at least 3 samples"),
+    (lambda: tracker.shift_time(TIME[::-1], POSES, 0.1), "time must increase"),
+    (lambda: tracker.shift_time(TIME, POSES, np.inf), "offset must be finite"),
+    (lambda: tracker.filter_positions(TIME[:0], np.zeros((0, 3))), "at least one reading"),
+    (lambda: tracker.filter_positions(-TIME, np.zeros((5, 3))), "time must increase"),
+    (lambda: tracker_simulation.calibration_run(rng(), rate=0.1), "readings a stop"),
+    (lambda: next(udp.stream([b""], 0.0, udp.Faults(), rng())), "rate must be positive"),
+    # lateration, odometry, gaussian
+    (lambda: lateration.laterate(MARKS, [1.0, 2.0, 3.0], O2, std=[0.1, 0.2]), "std must have shape"),
+    (lambda: lateration.laterate(MARKS, np.ones((2, 3)), np.zeros((3, 2))), "of start"),
+    (lambda: lateration.circle_intersections(np.zeros((2, 2)), [1.0, 1.0]), "do not meet in two points"),
+    (lambda: lateration.square_jacobian(3.0, O2), "landmarks must have shape"),
+    (lambda: odometry.wrap_angle([0.0, np.nan]), "angle must be finite"),
+    (lambda: odometry.step(np.zeros((2, 3)), np.zeros((3, 2)), 0.1), r"\(2,\) of x, \(3,\) of u"),
+    (lambda: odometry.control_covariance(O2, 0.1, "much", 0.0, 0.0), "k_d must hold real numbers"),
+    (lambda: odometry.propagate(O3, -COV, O2, 0.1, np.eye(2)), "cov must hold no negative variance"),
+    (lambda: odometry.drive(np.zeros((2, 3)), np.zeros((4, 3, 2)), 0.1), "of controls"),
+    (lambda: odometry.noisy_controls(np.zeros((4, 2)), 0.1, 0.1, 0.1, 0.1, rng(), 0), "runs must be a whole number"),
+    (lambda: odometry.circle_drive(1e9), "dt must lie between"),
+    (lambda: gaussian.ellipse(O2, np.eye(2), probability=np.nan), "probability must be finite"),
+    (lambda: gaussian.ellipse(O2, -np.eye(2)), "no negative variance"),
+    (lambda: gaussian.ellipse(O2, I3), "cov must have shape"),
+    (lambda: gaussian.share_inside(np.zeros((0, 2)), O2, np.eye(2)), "at least one"),
+    (lambda: gaussian.share_inside(np.zeros((4, 2)), O2, np.zeros((2, 2))), "positive definite"),
+    # kalman
+    (lambda: kalman.predict(1.0, [[1.0]], [[1.0]]), "single number"),
+    (lambda: kalman.predict(O2, np.eye(2), np.eye(2), [1.0, 0.0]), "B must have shape"),
+    (lambda: kalman.update(O2, np.zeros((2, 2)), [0.0], [[1.0, 0.0]], [[0.0]]), "must be positive definite"),
+    (lambda: kalman.update(O2, np.eye(2), [0.0], [[1.0, 0.0]], [[-1.0]]), "cov_z must hold no negative variance"),
+    (lambda: kalman.filter_steps([[np.inf]], [[1.0]], [[1.0]], [[1.0]], [0.0], [[1.0]]), "NaN where nothing"),
+    (lambda: kalman.filter_series([], np.eye(2), [1.0, 0.0], np.eye(2), 1.0, O3, np.eye(2)), "x0 must have shape"),
+    (lambda: kalman.steady_state(np.eye(2), [[1.0]], np.eye(2), [[1.0]]), r"C must have shape \(1, 2\)"),
+    (lambda: kalman.example("soccer"), "name must be"),
+    (lambda: kalman.reconstruct_vehicle(np.eye(2), 1, 0.1), "steps must be a whole number, at least 2"),
+    (lambda: kalman.nees(O3, O3, np.zeros((3, 3))), "cov must be positive definite"),
+    (lambda: kalman.nees(O3, O3, COV, angle=5), "index of one of 3 states"),
+    (lambda: kalman.nis(O3, np.eye(2)), "cov_innovation must have shape"),
+    (lambda: kalman.mean_band(3, 0), "runs must be a whole number"),
+    (lambda: kalman.gate(O3, COV, probability=2.0), "probability must lie between"),
+    (lambda: kalman.ekf_update(O3, COV, np.full((3, 2), np.inf), MARKS + 1, 0.1, 0.1), "NaN where nothing"),
+    (lambda: kalman.ekf_update(O3, COV, np.ones((2, 2)), MARKS + 1, 0.1, 0.1), "one row a landmark"),
+    (lambda: kalman.ekf_update(O3, COV, MARKS, MARKS + 1, 0.1, 0.1, iterations=0), "iterations must be a whole"),
+    (lambda: kalman.unscented_update(O3, COV, MARKS, MARKS + 1, -0.1, 0.1), "std_range must be positive"),
+    (lambda: kalman.unscented_update(O3, 0 * COV, MARKS, MARKS + 1, 0.1, 0.1), "positive definite"),
+    (lambda: kalman.associate(O3, COV, MARKS, MARKS + 1, 0.1, np.nan), "std_bearing must be finite"),
+    (lambda: kalman.associate(O3, COV, MARKS, np.zeros((0, 2)), 0.1, 0.1), "at least one"),
+    (
+        lambda: kalman.simulate_drive(O3, np.zeros((2, 2)), 0.1, np.eye(2), MARKS, np.nan, 0.1, rng(), 2),
+        "std_range must be finite",
+    ),
+    (
+        lambda: kalman.ekf_localize(
+            np.zeros((2, 2)), np.zeros((2, 3, 2)), MARKS + 1, O3, np.tile(COV, (4, 1, 1)), 0.1, 1, 1
+        ),
+        "cov0 must come once",
+    ),
+    # maps, particles
+    (lambda: maps.OccupancyGrid.from_ascii(None), "art must be a text"),
+    (lambda: maps.OccupancyGrid.from_lines([[0, 0, 1, 1]], 1e-9), "at most 1e\\+08 cells"),
+    (lambda: maps.OccupancyGrid.from_lines([[0, 0, 1, 1]], 0.1, margin=-1.0), "margin must not be negative"),
+    (lambda: maps.walk_ray(GRID, [1.5, 1.5, 0.0], np.nan, 5.0), "bearing must be finite"),
+    (lambda: maps.RangeTable(GRID, 5.0, 0), "n_angles must be a whole number"),
+    (lambda: maps.RangeTable(GRID, 5.0, 4).cast(O3, [0.0], r_max=np.nan), "r_max must be finite"),
+    (lambda: maps.LikelihoodField(GRID, 0.1, share_hit="most"), "share_hit must hold real numbers"),
+    (lambda: maps.Scanner().scan(GRID, O3, rng(), every=0), "every must be a whole number"),
+    (lambda: particles.sample_motion(I3, [1.0, 0.0], 0.1, rng(), -np.eye(2)), "no negative variance"),
+    (lambda: particles.sample_motion(I3, np.ones((3, 2)), 0.1, rng()), "u and cov_u must have shapes"),
+    (lambda: particles.weigh_beams(GRID, [1.0], [0.0], 0.1, 5.0, step=1e-12), "a millionth of r_max"),
+    (lambda: particles.beam_density([np.nan], [1.0], 0.1, 5.0, (1, 0, 0, 0)), "ranges must be finite"),
+    (lambda: particles.beam_density([1.0], [1.0], 0.0, 5.0, (1, 0, 0, 0)), "std must be positive"),
+    (lambda: particles.beam_density([1.0], [1.0], 0.1, 5.0, (1, 1, 0, 0)), "add up to 1"),
+    (lambda: particles.weigh_doors([], True), "at least one position"),
+    (lambda: particles.normalize(["a"]), "log_weights must hold real numbers"),
+    (lambda: particles.resample_systematic([5e-324, 5e-324], rng()), "from 1e-300 to 1e300"),
+    (lambda: particles.resample_roulette([1e308, 1e308], rng()), "from 1e-300 to 1e300"),
+    (lambda: particles.resample_systematic([1.0, 1.0], rng(), 1.5), "size must be a whole number"),
+    (lambda: particles.should_resample([1.0], np.nan), "threshold must be finite"),
+    (lambda: particles.estimate(I3, [1.0, 1.0]), "one weight a state"),
+    (lambda: particles.estimate(np.zeros((0, 3))), "at least one state"),
+    (lambda: particles.estimate_mode(I3, cell=np.inf), "cell must be finite"),
+    (lambda: particles.recover(np.nan, 1.0, 1.0), "w_mean must be finite"),
+    (lambda: particles.kld_size(10, epsilon=0.0), "epsilon must be positive"),
+    (lambda: particles.kld_take(I3, n_min=np.nan), "n_min must be finite"),
+    (lambda: particles.follow(O3, [[1.0, 1.0]], 5, 0.0), "dt must be positive"),
+    (lambda: particles.see_landmarks(None, O3, MARKS, rng(), std_range=-0.1), "std_range must not be negative"),
+    (lambda: particles.find_route(["x"], "a", "b"), "edges must be pairs"),
+    (lambda: particles.uniform_states(GRID, -1, rng()), "n_particles must be a whole number"),
+    # optimization, wells
+    (lambda: optimization.newton_step([1.0, np.nan], np.eye(2)), "the gradient must be finite"),
+    (lambda: optimization.newton_step(O2, I3), "the curvature must have shape"),
+    (lambda: optimization.gauss_newton_step(O2, np.zeros((2, 3))), "m >= n"),
+    (lambda: optimization.damped_step(O3, I3, -1.0), "damping must not be negative"),
+    (lambda: optimization.cauchy_step(O2, np.eye(2), np.nan), "radius must be finite"),
+    (lambda: optimization.dogleg_step(O2, np.eye(2), -1.0), "radius must not be negative"),
+    (lambda: optimization.exact_step(O2, np.eye(2), "far"), "radius must hold real numbers"),
+    (lambda: optimization.predicted_decrease(O2, np.eye(2), O3), "step must have shape"),
+    (lambda: optimization.numeric_jacobian(np.sin, O2, h=0.0), "h must be positive"),
+    (lambda: optimization.trust_region(wells.residual, wells.jacobian, O2, scale=O3 + 1), "one an unknown"),
+    (lambda: optimization.trust_region(wells.residual, wells.jacobian, O2, accept="ok"), "accept must hold real"),
+    (lambda: optimization.gauss_newton(wells.residual, wells.jacobian, O2, max_iterations=1.5), "max_iterations"),
+    (lambda: wells.which([np.nan, 0.0]), "x must be finite"),
+    (lambda: wells.value(O2, width=0.0), "width must be positive"),
+]
+
+
+@pytest.mark.parametrize("call, text", REFUSED)
+def test_bad_input_is_refused_in_words(call, text):
+    with pytest.raises(ValueError, match=text) as refusal:
+        call()
+    assert not isinstance(refusal.value, np.linalg.LinAlgError)
+
+
+def test_lists_are_as_good_as_arrays():
+    g, H, r, J = [1.0, 2.0], [[3.0, 1.0], [1.0, 4.0]], [1.0, 2.0, 3.0], [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]
+    for step in (optimization.cauchy_step, optimization.dogleg_step, optimization.exact_step):
+        np.testing.assert_array_equal(step(g, H, 0.5), step(np.array(g), np.array(H), 0.5))
+    np.testing.assert_allclose(np.array(H) @ optimization.newton_step(g, H), [-1.0, -2.0])
+    np.testing.assert_allclose(np.transpose(J) @ (r + J @ optimization.gauss_newton_step(r, J)), 0.0, atol=1e-14)
+    np.testing.assert_allclose(optimization.damped_step(r, J, 0.0), optimization.gauss_newton_step(r, J))
+
+
+def test_the_effective_size_has_no_unit():
+    weights = np.array([1.0, 2.0, 3.0])
+    for unit in (1e-300, 1e-9, 1e9, 1e299):
+        np.testing.assert_allclose(particles.effective_size(unit * weights), 36 / 14)
