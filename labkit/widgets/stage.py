@@ -140,9 +140,7 @@ class slider:
         return low, high, (value - low) / below if below else (high - low) / 100
 
     def shown(self, value):
-        """Where the knob stands: on one of its steps, or at the end. The browser would round any other number and send it
-        back.
-        """
+        """Where the knob stands: on a step or at the end. The browser would round any other number and send it back."""
         low, high, step = self._scale
         if self.integer:
             return value
