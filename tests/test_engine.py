@@ -3,6 +3,7 @@
 
 import itertools
 import json
+import math
 import os
 import sys
 import threading
@@ -14,9 +15,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from labkit import frames
-from labkit.course import guard, metrics, progress, session
+from labkit.course import engine, guard, metrics, progress, session
 from labkit.course.ch01_frames import CHAPTER, random_pose
 from labkit.course.engine import CORRECT, NOT_YET, RAISED, TO_DO, Chapter, Exercise, Mistake, Prediction, Value
+from labkit.lie import exp_so3
 
 INVERT = CHAPTER["invert"]
 
@@ -279,7 +281,7 @@ def test_seeding_numpy_does_not_fix_the_draws():
         (lambda v: np.deg2rad(2 * v), "in radians where degrees are expected"),
         (lambda v: 2 * v[::-1], "in reverse order"),
         (lambda v: 6.2 * v, "3.1 times the expected one"),
-        (lambda v: 10 * v, "5 times the expected one, on every draw: a sum where a mean is meant?"),
+        (lambda v: 6 * v, "3 times the expected one, on every draw: a sum where a mean is meant?"),
         (lambda v: 2 * v / 3, "1/3 of the expected one, on every draw: a mean where a sum is meant?"),
         (lambda v: 2 * v + np.array([0, 0, 0.5]), "off by 0.5"),
         (lambda v: v * v, "squared"),
@@ -334,6 +336,44 @@ def test_raised_error_names_line_and_call():
     assert "division by zero" in outcome.text
     assert "return 1 / 0" in outcome.text
     assert "when called as double(v=[" in outcome.text
+
+
+@pytest.mark.parametrize(
+    "answer, words",
+    [
+        (lambda v: np.eye(3) @ np.ones((5, 3)), "The inner sizes must agree"),
+        (lambda v: np.linalg.solve(np.zeros((2, 2)), np.ones(2)), "do not determine all unknowns"),
+        (lambda v: np.linalg.lstsq(np.ones((9, 2)), np.ones((3, 3)))[0], "`.ravel()`"),
+        (lambda v: math.sin(v), "`np.sin` and the like take arrays"),
+        (lambda v: np.array([[1, 2], [3]]), "different lengths"),
+    ],
+)
+def test_what_numpy_means(answer, words):
+    outcome = DOUBLE.judge(answer)
+    assert outcome.status == RAISED and words in outcome.text
+
+
+def test_small_arguments_keep_their_digits():
+    assert engine._short(np.array([4e-8, -1.0e-9])) == "[ 4.e-08, -1.e-09]"
+    assert engine._short(np.array([4e-8, 2.0])) == "[0., 2.]"
+
+
+def test_truth_values_are_no_indices():
+    exercise = Exercise(
+        "keep",
+        reference=lambda v: v > 0,
+        draw=lambda rng: (rng.normal(size=5),),
+        metric=metrics.exactly(),
+        hints=("a", "b", "c"),
+    )
+    assert "an array of True and False" in exercise.judge(lambda v: (v > 0).astype(int)).text
+
+
+def test_a_rotation_is_a_rotation_also_within_a_loose_angle():
+    near = metrics.rotations(1.0)
+    turn = exp_so3([0, 0, np.deg2rad(0.5)])
+    assert near.equal(turn, np.eye(3))
+    assert not near.equal(turn + 1e-4 * np.ones((3, 3)), np.eye(3))
 
 
 def test_wrong_on_some_draws_only_says_so():

@@ -196,7 +196,9 @@ class _Trial:
                 if words and not metric.equal(*pair):
                     off = next(d for d in metric.deviations(*pair) if not d.within)
                     return self.outcome(NOT_YET, _closed(f"{words} {off}"))
-        words = metrics.difference_words(self.exercise.metric, plain)
+        arrays = [arg for args in self.inputs for arg in args if isinstance(arg, np.ndarray)]
+        sizes = {n for array in arrays for n in (*array.shape, array.size)}
+        words = metrics.difference_words(self.exercise.metric, plain, sizes)
         return self.outcome(NOT_YET, _closed(words) if words else self._deviation())
 
     def _plain_pairs(self):
@@ -277,9 +279,9 @@ class _Trial:
             return self.outcome(RAISED, f"NameError: {hint}{where}")
         if isinstance(error, RecursionError):
             return self.outcome(RAISED, "RecursionError: your function calls itself without an end.")
-        advice = "" if args or run.line else ". What your function returned could not be worked with."
-        if isinstance(error, np.linalg.LinAlgError) and "square" in str(error):
-            advice = ". `solve` and `inv` need as many equations as unknowns; `lstsq` takes more."
+        advice = next((f". {told}" for words, told in ADVICE.items() if words in _message(error)), "")
+        if not (advice or args or run.line):
+            advice = ". What your function returned could not be worked with."
         where = f"\nin {run.line}" if run.line else ""
         with_ = f"\nwhen called as {self._call(args)}" if args else ""
         return self.outcome(RAISED, f"{type(error).__name__}: {_message(error)}{advice}{where}{with_}")
@@ -308,6 +310,17 @@ def _equal_arrays(a, b):
     return a.shape == b.shape and np.allclose(a, b, rtol=1e-9, atol=1e-12, equal_nan=True)
 
 
+ADVICE = {  # what NumPy means
+    "must be square": "`solve` and `inv` need as many equations as unknowns; `lstsq` takes more.",
+    "Singular matrix": "The equations do not determine all unknowns: is one missing, or there twice?",
+    "Incompatible dimensions": "`lstsq` needs one right side a row of the matrix: is `.ravel()` missing?",
+    "mismatch in its core dimension": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",
+    "not aligned": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",
+    "can be converted to Python scalars": "`math` and `float` take one number; `np.sin` and the like take arrays.",
+    "inhomogeneous": "The parts of this array have different lengths.",
+}
+
+
 def _message(error):
     try:
         return " ".join(str(error).split())[:300]
@@ -320,9 +333,9 @@ def _short(value):
     if isinstance(value, np.ndarray):
         if value.size > 16:
             return f"<array of shape {value.shape}>"
-        return np.array2string(value, precision=3, suppress_small=True, separator=", ", max_line_width=100).replace(
-            "\n", ""
-        )
+        tiny = value.dtype.kind == "f" and 0 < np.abs(value).max(initial=0.0) < 1e-3
+        words = np.array2string(value, precision=3, suppress_small=not tiny, separator=", ", max_line_width=100)
+        return words.replace("\n", "")
     text = f"{value:.4g}" if isinstance(value, float) else repr(value)
     return text if len(text) <= 60 else f"<{type(value).__name__}>"
 

@@ -14,6 +14,7 @@ from ..lie import log_so3
 
 MAX_ENTRIES = 10_000_000
 FLOAT32_TOLERANCE = 2e-5
+ORTHONORMAL = 1e-5  # how far R'R may be from I, also where the angle may be off by much more
 
 
 class Refused(Exception):
@@ -216,8 +217,8 @@ class rotations(Metric):
         single = _is_single(result)
         R = result.astype(float)
         skewness = float(np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(initial=0.0))
-        allowed = max(FLOAT32_TOLERANCE if single else 0.0, np.deg2rad(self.deg))
-        if skewness > max(1e-3, allowed) or (np.linalg.det(R) < 0).any():
+        allowed = max(FLOAT32_TOLERANCE if single else 0.0, min(np.deg2rad(self.deg), ORTHONORMAL))
+        if skewness > 1e-3 or (np.linalg.det(R) < 0).any():
             entry = float(np.abs(R - expected).max(initial=0.0))
             return [Deviation("the rotation", entry, "in its largest entry", allowed)]
         angle = float(np.rad2deg(np.max(frames.rotation_angle(np.swapaxes(R, -1, -2) @ expected), initial=0.0)))
@@ -268,6 +269,8 @@ class exactly(Metric):
                 raise Refused(f"expected an array of shape {expected.shape}, got {_describe(result)}") from None
             if array.shape != expected.shape:
                 raise Refused(f"expected an array of shape {expected.shape}, got shape {array.shape}")
+            if expected.dtype == bool and array.dtype != bool:
+                raise Refused(f"expected an array of True and False, got {array.dtype}")
             return array
         if isinstance(result, np.generic) or (isinstance(result, np.ndarray) and result.ndim == 0):
             result = result.item()
@@ -357,10 +360,11 @@ class through(Metric):
         return self.metric.deviations(image, self.function(expected))
 
 
-def difference_words(metric, pairs):
+def difference_words(metric, pairs, sizes=()):
     """What the general layer says of a wrong result, from relations that hold on *all* draws; None when it knows none.
 
-    `pairs` are (admitted result, expected) of every draw.
+    `pairs` are (admitted result, expected) of every draw; `sizes` the lengths of what was given, which a forgotten or
+    needless division by their number would show.
     """
     for k, (name, part, _, _) in enumerate(metric.parts(*pairs[0])):
         piece = [metric.parts(*pair)[k] for pair in pairs]
@@ -368,14 +372,14 @@ def difference_words(metric, pairs):
         expected = [p[3] for p in piece]
         if all(part.equal(r, e) for r, e in zip(results, expected)):
             continue
-        words = _relation(part, results, expected)
+        words = _relation(part, results, expected, sizes)
         if words:
             return f"{name}: {words}" if name else words
         return None
     return None
 
 
-def _relation(metric, results, expected):
+def _relation(metric, results, expected, sizes):
     if isinstance(metric, exactly | several):
         return None
     if isinstance(metric, through):
@@ -393,7 +397,7 @@ def _relation(metric, results, expected):
         return _pose_relation(results, expected, holds)
     if isinstance(metric, rotations):
         return _rotation_relation(results, holds)
-    return _number_relation(results, expected, holds)
+    return _number_relation(results, expected, holds, sizes)
 
 
 def _moved(T, R=None, t=None):
@@ -445,7 +449,7 @@ def _rotation_relation(results, holds):
     return None
 
 
-def _number_relation(results, expected, holds):
+def _number_relation(results, expected, holds, sizes):
     if holds(lambda r: -r):
         return "your result is right up to its sign"
     if holds(np.deg2rad):
@@ -471,15 +475,15 @@ def _number_relation(results, expected, holds):
         return "your result is the reciprocal of the expected one"
     ratios = [_constant_ratio(r, e) for r, e in zip(results, expected)]
     if None not in ratios and np.ptp(ratios) < 1e-9 * abs(ratios[0]) and len(ratios) > 1:
-        return _times(ratios[0])
+        return _times(ratios[0], sizes)
     return None
 
 
-def _times(ratio):
+def _times(ratio, sizes):
     n, share = round(ratio), round(1 / ratio)
-    if n > 2 and abs(ratio - n) < 1e-6:
+    if n in sizes and abs(ratio - n) < 1e-6:
         return f"your result is {n} times the expected one, on every draw: a sum where a mean is meant?"
-    if share > 2 and abs(1 / ratio - share) < 1e-6:
+    if share in sizes and abs(1 / ratio - share) < 1e-6:
         return f"your result is 1/{share} of the expected one, on every draw: a mean where a sum is meant?"
     return f"your result is {ratio:.4g} times the expected one, on every draw"
 
