@@ -85,7 +85,7 @@ ex.predict("edges", guess, reveal=stages.three_points)
 # %% gram_schmidt
 @ex.gram_schmidt
 def gram_schmidt(a, b):
-    """Return R, shape (3, 3), whose columns are x (along a), y (in the plane of a and b) and z."""
+    """Return R, shape (3, 3), from two edges a, b, shape (3,), in mm: columns x (along a), y (in their plane), z."""
     ### BEGIN SOLUTION
     x = normalize(a)
     y = normalize(b - (b @ x) * x)
@@ -102,7 +102,7 @@ def gram_schmidt(a, b):
 # %% frame_from_points
 @ex.frame_from_points
 def frame_from_points(origin, x_point, y_point):
-    """Return T_WF, shape (4, 4), of the frame through three measured points (mm)."""
+    """Return T_WF, shape (4, 4), of the frame through three measured points, each of shape (3,), in mm."""
     ### BEGIN SOLUTION
     T_WF = np.eye(4)
     T_WF[:3, :3] = gram_schmidt(x_point - origin, y_point - origin)
@@ -156,7 +156,7 @@ for name, T in (("mistyped", typo), ("axis missing", flat)):
 # %% relative
 @ex.relative
 def relative(T_WA, T_WB):
-    """Return T_AB, shape (4, 4): the pose of B seen from A."""
+    """Return T_AB, shape (4, 4): the pose of B seen from A, given T_WA and T_WB, shape (4, 4)."""
     ### BEGIN SOLUTION
     return invert(T_WA) @ T_WB
     ### END SOLUTION
@@ -222,7 +222,7 @@ ex.predict("flat", guess, reveal=stages.triangle_noise)
 # %% matrix_from_kuka
 @ex.matrix_from_kuka
 def matrix_from_kuka(xyzabc):
-    """Return T, shape (4, 4), of a KUKA pose: x, y, z (mm), A, B, C (rad)."""
+    """Return T, shape (4, 4), of a KUKA pose xyzabc, shape (6,): x, y, z (mm), A, B, C (rad)."""
     ### BEGIN SOLUTION
     x, y, z, A, B, C = xyzabc
     rot_z = np.array([[np.cos(A), -np.sin(A), 0], [np.sin(A), np.cos(A), 0], [0, 0, 1]])

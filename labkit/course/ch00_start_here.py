@@ -30,7 +30,7 @@ CHAPTER = Chapter(
             hints=(
                 "Draw the point (1, 0) and where it goes.",
                 "(1, 0) goes to (0, 1), and (0, 1) goes to (-1, 0).",
-                "return np.array([-p[1], p[0]]).",
+                "`return np.array([-p[1], p[0]])`",
             ),
             mistakes=[
                 Mistake(

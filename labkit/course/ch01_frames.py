@@ -257,7 +257,7 @@ CHAPTER = Chapter(
             hints=(
                 "x takes the direction of a. y may only use what b has across x.",
                 "Remove from b its part along x: b - (b . x) x, with x of length 1. Then normalize. z follows from the right-hand rule.",
-                "x = normalize(a); y = normalize(b - (b @ x) * x); z = np.cross(x, y); return np.column_stack([x, y, z]).",
+                "`x = normalize(a); y = normalize(b - (b @ x) * x); z = np.cross(x, y); return np.column_stack([x, y, z])`",
             ),
             mistakes=[
                 Mistake(
@@ -298,7 +298,7 @@ CHAPTER = Chapter(
             hints=(
                 "A pose is a rotation (which way the axes point) and a translation (where the origin is).",
                 "The two directions are x_point - origin and y_point - origin; gram_schmidt makes axes of them.",
-                "T = np.eye(4); T[:3, :3] = gram_schmidt(x_point - origin, y_point - origin); T[:3, 3] = origin.",
+                "`T = np.eye(4); T[:3, :3] = gram_schmidt(x_point - origin, y_point - origin); T[:3, 3] = origin; return T`",
             ),
             mistakes=[
                 Mistake(
@@ -344,7 +344,7 @@ CHAPTER = Chapter(
             hints=(
                 "Solve p_W = R p_F + t for p_F.",
                 "p_F = R' (p_W - t) = R' p_W - R' t: the rotation is R', the translation is -R' t.",
-                "X = np.eye(4); X[:3, :3] = R.T; X[:3, 3] = -R.T @ t.",
+                "`R, t = T[:3, :3], T[:3, 3]; X = np.eye(4); X[:3, :3] = R.T; X[:3, 3] = -R.T @ t; return X`",
             ),
             mistakes=[
                 Mistake(
@@ -382,7 +382,7 @@ CHAPTER = Chapter(
             hints=(
                 "Neighboring letters cancel: which two transforms give T_AB when W stands between them?",
                 "T_AB = T_AW T_WB, and T_AW is the inverse of T_WA.",
-                "return invert(T_WA) @ T_WB.",
+                "`return invert(T_WA) @ T_WB`",
             ),
             mistakes=[
                 Mistake(lambda A, B: frames.invert(A) * B, "You multiplied entry by entry. Matrices multiply with @."),
@@ -419,7 +419,7 @@ CHAPTER = Chapter(
             hints=(
                 "The trace of a rotation matrix knows its angle.",
                 "trace(R) = 1 + 2 cos(angle).",
-                "np.rad2deg(np.arccos((np.trace(R) - 1) / 2)), with R the rotation block of T_K0K1.",
+                "`angle_deg = np.rad2deg(np.arccos((np.trace(T_K0K1[:3, :3]) - 1) / 2))`",
             ),
             mistakes=[
                 Mistake(
@@ -444,7 +444,7 @@ CHAPTER = Chapter(
             hints=(
                 "The distance of two origins does not depend on who looks at them.",
                 "It is the length of the translation in T_K0K1.",
-                "np.linalg.norm(T_K0K1[:3, 3]).",
+                "`distance = np.linalg.norm(T_K0K1[:3, 3])`",
             ),
             mistakes=[
                 Mistake(
