@@ -50,6 +50,10 @@ CHAPTER = Chapter(
                     lambda p: np.array([[np.cos(90), -np.sin(90)], [np.sin(90), np.cos(90)]]) @ p,
                     "np.cos and np.sin take radians: a quarter turn is np.pi / 2, not 90.",
                 ),
+                Mistake(
+                    lambda p: np.array([p[0] - p[1], p[0] + p[1]]) / np.sqrt(2),
+                    "You turn by 45 deg. A quarter of a full turn is 90 deg.",
+                ),
                 Mistake(lambda p: p, "You return the point as it came."),
             ],
         ),

@@ -1,6 +1,9 @@
 """Chapter 1: frames from three points, rigid transforms, KUKA angles."""
 
+import functools
+
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from .. import frames
 from ..ledger.ch01_frames import points
@@ -19,19 +22,27 @@ def random_pose(rng):
     return frames.pose(frames.matrix_from_quaternion(q), rng.uniform(-500, 500, 3))
 
 
-def two_directions(rng):
-    """Two directions at 35 to 145 degrees, of different length."""
+ACUTE, OBTUSE = (35, 80), (100, 145)  # deg
+
+
+def two_directions(rng, between=ACUTE):
+    """Two directions at so many degrees, of different length."""
     a = random_direction(rng)
     across = frames.normalize(np.cross(a, rng.normal(size=3)))
-    angle = np.deg2rad(rng.uniform(35, 80) if rng.random() < 0.5 else rng.uniform(100, 145))
+    angle = np.deg2rad(rng.uniform(*between))
     return a, rng.uniform(20, 300) * (np.cos(angle) * frames.normalize(a) + np.sin(angle) * across)
 
 
-def three_points(rng):
+def three_points(rng, between=ACUTE):
     """Three measured points of a frame, in millimeters."""
     origin = rng.uniform(-500, 500, 3)
-    a, b = two_directions(rng)
+    a, b = two_directions(rng, between)
     return origin, origin + a, origin + b
+
+
+def either_angle(draw):
+    """The draw with an acute and with an obtuse angle at the origin, in turn."""
+    return tuple(functools.partial(draw, between=between) for between in (ACUTE, OBTUSE))
 
 
 def kuka_pose(rng):
@@ -63,6 +74,13 @@ def _second_edge_first(a, b):
     y = b / np.linalg.norm(b)
     x = a - (a @ y) * y
     x /= np.linalg.norm(x)
+    return _columns(x, y, np.cross(x, y))
+
+
+def _added(a, b):
+    x = a / np.linalg.norm(a)
+    y = b + (b @ x) * x
+    y /= np.linalg.norm(y)
     return _columns(x, y, np.cross(x, y))
 
 
@@ -216,7 +234,7 @@ CHAPTER = Chapter(
             hints=(
                 "A direction keeps its direction when it is divided by a positive number.",
                 "The length of v is the root of the sum of its squared components.",
-                "`np.linalg.norm(v)` is that length; return v divided by it.",
+                "`return v / np.linalg.norm(v)`",
             ),
             mistakes=[
                 Mistake(
@@ -239,6 +257,22 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda v: v / len(v), "`len(v)` counts the components. The length you need is `np.linalg.norm(v)`."
                 ),
+                Mistake(
+                    lambda v: v / np.abs(v).mean(),
+                    "You divide by a mean. The length is the root of the sum of the squared components.",
+                ),
+                Mistake(
+                    lambda v: v / v.mean(),
+                    "You divide by a mean. The length is the root of the sum of the squared components.",
+                ),
+                Mistake(
+                    lambda v: v / np.sqrt((v @ v) / len(v)),
+                    "You divide by the root of the *mean* square. The length is the root of the sum of the squares.",
+                ),
+                Mistake(
+                    lambda v: v / np.hypot(v[0], v[1]),
+                    "Only two components are in your length. np.hypot takes two; np.linalg.norm takes all.",
+                ),
                 Mistake(lambda v: v, "You return v as it came. Its length is not 1 yet."),
             ],
         ),
@@ -252,7 +286,7 @@ CHAPTER = Chapter(
         Exercise(
             "gram_schmidt",
             reference=frames.gram_schmidt,
-            draw=two_directions,
+            draw=either_angle(two_directions),
             metric=metrics.rotations(1e-7),
             hints=(
                 "x takes the direction of a. y may only use what b has across x.",
@@ -285,6 +319,22 @@ CHAPTER = Chapter(
                     "Your z points the wrong way: x, y, z form a left-handed system. z = x cross y, in this order.",
                 ),
                 Mistake(
+                    _added,
+                    "You added the part of b along x. It has to go: b - (b . x) x.",
+                ),
+                Mistake(
+                    lambda a, b: frames.gram_schmidt(a, b) * (1, -1, -1),
+                    "Your y points away from b, and z with it: y is b minus its part along x, not the other way round.",
+                ),
+                Mistake(
+                    lambda a, b: frames.gram_schmidt(a, b) * (-1, -1, 1),
+                    "Your x points against a: QR leaves the signs open. Turn each column to the side of its edge.",
+                ),
+                Mistake(
+                    lambda a, b: np.linalg.qr(np.column_stack([a, b, np.cross(a, b)]))[0],
+                    "QR does Gram-Schmidt's work, but leaves the signs open. Turn each column to the side of its edge.",
+                ),
+                Mistake(
                     _projection_kept,
                     "You kept the part of b along x and threw the rest away. y is the rest: b minus its projection.",
                 ),
@@ -293,7 +343,7 @@ CHAPTER = Chapter(
         Exercise(
             "frame_from_points",
             reference=frames.frame_from_points,
-            draw=three_points,
+            draw=either_angle(three_points),
             metric=metrics.poses(1e-6, 1e-6),
             hints=(
                 "A pose is a rotation (which way the axes point) and a translation (where the origin is).",
@@ -320,6 +370,10 @@ CHAPTER = Chapter(
                 Mistake(
                     _no_translation,
                     "The axes are right, but the frame sits at the origin of W: put `origin` into the last column.",
+                ),
+                Mistake(
+                    lambda o, px, py: _with(frames.frame_from_points(o, px, py), t=frames.frame_from_points(o, px, py)[:3, :3] @ o),
+                    "You rotated the origin. It is measured in W already: put it into the last column as it is.",
                 ),
                 Mistake(
                     _frame(_not_rejected),
@@ -371,6 +425,10 @@ CHAPTER = Chapter(
                     lambda T: _with(T, t=-T[:3, 3]),
                     "You negated the translation, but the rotation has to be undone as well: use R'.",
                 ),
+                Mistake(
+                    lambda T: _with(T, R=T[:3, :3].T, t=np.zeros(3)),
+                    "The rotation is undone, the translation is missing: it is -R' t.",
+                ),
                 Mistake(lambda T: T, "This is T itself. The inverse maps the other way."),
             ],
         ),
@@ -403,6 +461,14 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda A, B: A @ B, "You multiplied T_WA by T_WB without inverting: in T_WA T_WB nothing cancels."
+                ),
+                Mistake(
+                    lambda A, B: frames.invert(A) @ frames.invert(B),
+                    "You inverted both. In T_AW T_BW nothing cancels: only T_WA is turned round.",
+                ),
+                Mistake(
+                    lambda A, B: _with(frames.relative(A, B), t=np.zeros(3)),
+                    "The rotation is right, the translation is missing: multiply the whole 4x4 matrices.",
                 ),
                 Mistake(lambda A, B: A.T @ B, "The transpose of a 4x4 pose is not its inverse: use your `invert`."),
                 Mistake(
@@ -478,7 +544,8 @@ CHAPTER = Chapter(
             hints=(
                 "Three elementary turns, multiplied in the order the controller names them, and a translation.",
                 "R = Rz(A) Ry(B) Rx(C). The angles arrive in radians, in the order A, B, C.",
-                "x, y, z, A, B, C = xyzabc; T[:3, :3] = rot_z(A) @ rot_y(B) @ rot_x(C); T[:3, 3] = x, y, z.",
+                "With cA = np.cos(A), sA = np.sin(A) and so on: Rz = [[cA, -sA, 0], [sA, cA, 0], [0, 0, 1]], Ry = [[cB, 0, sB], [0, 1, 0], [-sB, 0, cB]], "
+                "Rx = [[1, 0, 0], [0, cC, -sC], [0, sC, cC]]. Start from `T = np.eye(4)`, then `T[:3, :3] = Rz @ Ry @ Rx` (as arrays) and `T[:3, 3] = xyzabc[:3]`.",
             ),
             mistakes=[
                 Mistake(
@@ -492,11 +559,20 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _kuka("zyx", (5, 4, 3)),
-                    "A and C have changed places: A belongs to z, B to y, C to x.",
+                    'A and C have changed places: A belongs to z, B to y, C to x. (SciPy means that by from_euler("ZYX", [A, B, C]).)',
                 ),
                 Mistake(
                     _kuka("xyz", (5, 4, 3)),
                     "You read A, B, C as turns about x, y, z. At KUKA, A turns about z, B about y, C about x.",
+                ),
+                Mistake(_kuka("zyz"), "You turned about z, y, z. KUKA's third turn is about x: Rz(A) Ry(B) Rx(C)."),
+                Mistake(
+                    lambda p: frames.matrix_from_kuka(p * np.array([1, 1, 1, -1, 1, 1])),
+                    "Your Rz turns the wrong way: in Rz, - sin A stands top right and + sin A below it.",
+                ),
+                Mistake(
+                    lambda p: frames.matrix_from_kuka(p * np.array([1, 1, 1, 1, 1, -1])),
+                    "Your Rx turns the wrong way: in Rx, - sin C stands above the diagonal and + sin C below.",
                 ),
                 Mistake(_kuka_in_degrees, "The angles already are radians: you converted them once too often."),
                 Mistake(
@@ -534,8 +610,9 @@ CHAPTER = Chapter(
             hints=(
                 "Compare the entries of Rz(A) Ry(B) Rx(C) that hold few terms: the first column and the last row.",
                 "B and A come from the first column, with `np.arctan2`. Then undo A: Rz(A)' R = Ry(B) Rx(C), whose middle row is 0, cos C, -sin C.",
-                "A = np.arctan2(R[1, 0], R[0, 0]); B = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0])); "
-                "C = np.arctan2(np.sin(A) * R[0, 2] - np.cos(A) * R[1, 2], np.cos(A) * R[1, 1] - np.sin(A) * R[0, 1]).",
+                "`R = T[:3, :3]; A = np.arctan2(R[1, 0], R[0, 0]); B = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0])); "
+                "C = np.arctan2(np.sin(A) * R[0, 2] - np.cos(A) * R[1, 2], np.cos(A) * R[1, 1] - np.sin(A) * R[0, 1]); "
+                "return np.array([*T[:3, 3], A, B, C])`",
             ),
             mistakes=[
                 Mistake(
@@ -551,7 +628,26 @@ CHAPTER = Chapter(
                     _angles(np.rad2deg),
                     "Your angles are in degrees. Inside the workbook angles are radians; degrees are for people.",
                 ),
-                Mistake(_angles(lambda abc: abc[::-1]), "Your angles come in the order C, B, A."),
+                Mistake(
+                    _angles(lambda abc: abc[::-1]),
+                    'Your angles come in the order C, B, A. (SciPy gives A, B, C by as_euler("ZYX"), and C, B, A by "xyz".)',
+                ),
+                Mistake(
+                    lambda T: np.roll(frames.kuka_from_matrix(T), 3),
+                    "The position comes first, then the angles: x, y, z, A, B, C.",
+                ),
+                Mistake(
+                    _angles(lambda abc: np.array([np.pi / 2 - abc[0], abc[1], np.pi / 2 - abc[2]])),
+                    "np.arctan2 takes y first, then x: the sine before the cosine.",
+                ),
+                Mistake(
+                    lambda T: np.array([*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_euler("XYZ")]),
+                    "These are turns about x, then the new y, then the new z. KUKA's order is z, y, x.",
+                ),
+                Mistake(
+                    lambda T: np.array([*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_euler("XYZ")[::-1]]),
+                    "These are turns about x, then the new y, then the new z. KUKA's order is z, y, x.",
+                ),
                 Mistake(_angles(lambda abc: abc * (1, -1, 1)), "B has the wrong sign: the entry r20 is -sin B."),
                 Mistake(
                     _angles(lambda abc: -abc), "All three angles have the wrong sign: you read the transposed matrix."
