@@ -357,9 +357,9 @@ def test_play():
     stage = nothing(play=Play(2.0, 0.1), compute=lambda state: state["t"])
     stage._play_widget.playing = True
     stage._play_widget.value = 7
-    assert stage.result == pytest.approx(0.7) and stage._time.value == pytest.approx(0.7)
-    stage._time.value = 1.2
-    assert stage._play_widget.value == 12
+    assert stage.result == pytest.approx(0.7) and (stage._time.value, stage._time.description) == (7, "t = 0.70 s")
+    stage._time.value = 12
+    assert stage.result == pytest.approx(1.2) and stage._play_widget.value == 12
     stage.set(t=99)
     assert stage.result == 2.0
 

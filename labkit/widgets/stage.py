@@ -458,11 +458,12 @@ class Stage(ipywidgets.VBox):
         stride = max(1, round(interval * self._play.rate / (1000 * self._play.dt)))
         self._play_widget = ipywidgets.Play(min=0, max=steps, step=stride, interval=interval, show_repeat=False)
         self._play_widget.observe(lambda change: self._on_tick(change["new"]), "value")
-        self._time = ipywidgets.FloatSlider(
-            min=0.0, max=self._play.t_max, step=self._play.dt, description="t (s)", readout_format=".2f",
-            disabled=bool(self._advance), style={"description_width": "initial"}, layout=_wide("t (s)"),
+        # counts steps: of seconds the browser would send back its own roundings, and those come late when Reset is pressed
+        self._time = ipywidgets.IntSlider(
+            min=0, max=steps, description="t = 0.00 s", readout=False,
+            disabled=bool(self._advance), style={"description_width": "6.5em"}, layout=_wide("t = 0.00 s"),
         )  # fmt: skip
-        self._time.observe(lambda change: self._on_time(change["new"]), "value")
+        self._time.observe(lambda change: self._on_time(change["new"] * self._play.dt), "value")
         return _row([self._play_widget, self._time])
 
     def _on_control(self, key, change):
@@ -486,8 +487,8 @@ class Stage(ipywidgets.VBox):
         for key, widget in self._widgets.items():
             widget.value = self._controls[key].shown(self._state[key])
         if self._play:
-            self._time.value = self._state["t"]
-            self._play_widget.value = round(self._state["t"] / self._play.dt)
+            self._time.value = self._play_widget.value = round(self._state["t"] / self._play.dt)
+            self._time.description = f"t = {self._state['t']:.2f} s"
         self._showing = False
 
     # -- the browser: one message in flight, the newest wins
