@@ -458,7 +458,7 @@ class Stage(ipywidgets.VBox):
         stride = max(1, round(interval * self._play.rate / (1000 * self._play.dt)))
         self._play_widget = ipywidgets.Play(min=0, max=steps, step=stride, interval=interval, show_repeat=False)
         self._play_widget.observe(lambda change: self._on_tick(change["new"]), "value")
-        # counts steps: of seconds the browser would send back its own roundings, and those come late when Reset is pressed
+        # counts steps: of seconds the browser would send back its own roundings, and late ones would undo a Reset
         self._time = ipywidgets.IntSlider(
             min=0, max=steps, description="t = 0.00 s", readout=False,
             disabled=bool(self._advance), style={"description_width": "6.5em"}, layout=_wide("t = 0.00 s"),
