@@ -358,6 +358,13 @@ def test_small_arguments_keep_their_digits():
     assert engine._short(np.array([4e-8, 2.0])) == "[0., 2.]"
 
 
+def test_a_word_may_be_written_in_more_than_one_way():
+    words = metrics.exactly()
+    for written in ("not stationary", " Not_Stationary", "not-stationary"):
+        assert words.equal(words.admit(written, "not stationary"), "not stationary")
+    assert not words.equal(words.admit("notstationary", "not stationary"), "not stationary")
+
+
 def test_truth_values_are_no_indices():
     exercise = Exercise(
         "keep",

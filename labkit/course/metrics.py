@@ -274,7 +274,7 @@ class exactly(Metric):
             return array
         if isinstance(result, np.generic) or (isinstance(result, np.ndarray) and result.ndim == 0):
             result = result.item()
-        if isinstance(result, str) and isinstance(expected, str) and result.strip().lower() == expected.lower():
+        if isinstance(result, str) and isinstance(expected, str) and _plain(result) == _plain(expected):
             return expected
         kinds = ((bool,), "True or False"), ((str,), "a word"), ((int,), "a whole number")
         for types, words in kinds:
@@ -289,6 +289,11 @@ class exactly(Metric):
         same = np.array_equal(result, expected) if isinstance(expected, np.ndarray) else bool(result == expected)
         shown = f"`{result!r}`" if isinstance(result, str | bool | int | float) else "what you return"
         return [Deviation("", 0.0 if same else 1.0, "", 0.5, words=f"{shown} is not the answer here")]
+
+
+def _plain(words):
+    """Words without their case, and with single spaces for underscores and hyphens."""
+    return " ".join(words.lower().replace("_", " ").replace("-", " ").split())
 
 
 @dataclass(frozen=True)
