@@ -284,7 +284,7 @@ CHAPTER = Chapter(
             hints=(
                 "Neighboring letters cancel: T_AB T_BC T_CD = T_AD. What does an empty chain do?",
                 "Start with the identity and multiply each link from the right, in the order given.",
-                "T = np.eye(4); for link in transforms: T = T @ link; return T.",
+                "`T = np.eye(4)\nfor link in transforms:\n    T = T @ link\nreturn T`",
             ),
             mistakes=[
                 Mistake(
@@ -381,7 +381,7 @@ CHAPTER = Chapter(
             hints=(
                 "How far is T from the identity? One number for the turn, one for the shift.",
                 "The angle follows from the trace of the 3x3 rotation block (NaN means an arccosine of more than 1), the distance is the length of the translation.",
-                "return np.arccos((np.trace(T[:3, :3]) - 1) / 2), np.linalg.norm(T[:3, 3]).",
+                "`return np.arccos((np.trace(T[:3, :3]) - 1) / 2), np.linalg.norm(T[:3, 3])`",
             ),
             mistakes=[
                 Mistake(
@@ -490,7 +490,7 @@ CHAPTER = Chapter(
             hints=(
                 "Chain the four printed transforms and ask for the closure error.",
                 "The first of the two results is the angle, in radians.",
-                "closure_angle_deg = np.rad2deg(closure_error(product)[0]).",
+                "`closure_angle_deg = np.rad2deg(closure_error(product)[0])`",
             ),
             mistakes=[
                 Mistake(lambda: chaining.closure_error(_sheet())[0], "This is the angle in radians."),
@@ -507,11 +507,15 @@ CHAPTER = Chapter(
                     "The first link is missing from your chain.",
                 ),
                 Mistake(
-                    lambda: _angle_deg(lambda T: frames.rotation_angle(chaining.chain(chaining.printed_transforms()[:-1]))),
+                    lambda: _angle_deg(
+                        lambda T: frames.rotation_angle(chaining.chain(chaining.printed_transforms()[:-1]))
+                    ),
                     "The last link is missing from your chain.",
                 ),
                 Mistake(
-                    lambda: _angle_deg(lambda T: frames.rotation_angle(chaining.chain(chaining.printed_transforms()[::-1]))),
+                    lambda: _angle_deg(
+                        lambda T: frames.rotation_angle(chaining.chain(chaining.printed_transforms()[::-1]))
+                    ),
                     "You multiplied the links in the reverse order.",
                 ),
                 Mistake(
@@ -540,7 +544,7 @@ CHAPTER = Chapter(
             hints=(
                 "Where does the loop bring the origin of K0?",
                 "It is the length of the last column of the product, without its 1.",
-                "closure_distance = closure_error(product)[1].",
+                "`closure_distance = closure_error(product)[1]`",
             ),
             mistakes=[
                 Mistake(
@@ -608,7 +612,7 @@ CHAPTER = Chapter(
             hints=(
                 "Which rotation lies nearest to a matrix that is almost one? The translation stays.",
                 "With R = U S V', the nearest rotation is U V': the SVD with its singular values set to 1.",
-                "U, _, Vt = np.linalg.svd(T[:3, :3]); X = T.copy(); X[:3, :3] = U @ Vt; return X.",
+                "`U, _, Vt = np.linalg.svd(T[:3, :3]); X = T.copy(); X[:3, :3] = U @ Vt; return X`",
             ),
             mistakes=[
                 Mistake(
@@ -705,8 +709,8 @@ CHAPTER = Chapter(
             hints=(
                 "The product is exp(xi). Going back by all of xi at the end closes the loop; how far back should the pose after link k go?",
                 "The pose after k links, P_k, becomes exp(-k/N xi) P_k. The corrected links are the relative poses of neighbors.",
-                "poses = chaining.stations(transforms); N = len(transforms); xi = log_se3(poses[-1]); "
-                "moved = [exp_se3(-k / N * xi) @ P for k, P in enumerate(poses)]; return np.array([relative(A, B) for A, B in zip(moved, moved[1:])]).",
+                "`poses = chaining.stations(transforms)\nN = len(transforms)\nxi = log_se3(poses[-1])\n"
+                "moved = [exp_se3(-k / N * xi) @ P for k, P in enumerate(poses)]\nreturn np.array([relative(A, B) for A, B in zip(moved, moved[1:])])`",
             ),
             mistakes=[
                 Mistake(

@@ -42,17 +42,17 @@ def matrix_and_residuals(rng):
     return pivot.pivot_matrix(T), pivot.calibrate_pivot(T).residuals
 
 
-def distances_and_scale(rng):
-    """Distances, one of them below the scale and some beyond the cutoff, and a scale."""
+def near_first(rng):
+    """Distances, one of them far below the scale and some beyond the cutoff, and a scale; the nearest leads."""
     scale = rng.uniform(0.1, 0.6)
-    near, middle, far = rng.uniform(0.2, 0.9, 1), rng.uniform(0.2, 0.95, 7) * pivot.TUKEY, rng.uniform(1.1, 6, 3) * pivot.TUKEY
-    d = scale * np.concatenate([near, middle, far])
-    return rng.permutation(d), scale
+    near, far = rng.uniform(0.02, 0.13, 1), rng.uniform(1.1, 6, 3) * pivot.TUKEY
+    middle = rng.uniform(0.2, 0.95, 7) * pivot.TUKEY
+    return scale * np.concatenate([near, rng.permutation(np.concatenate([middle, far]))]), scale
 
 
 def far_first(rng):
     """The same, one beyond the cutoff leading: a 0 for it must not make whole numbers of all weights."""
-    d, scale = distances_and_scale(rng)
+    d, scale = near_first(rng)
     return np.sort(d)[::-1].copy(), scale
 
 
@@ -147,7 +147,7 @@ CHAPTER = Chapter(
             hints=(
                 "Each pose gives three rows: which numbers multiply the tip, which the pivot?",
                 "R_i tip - I pivot = -p_i: three rows [R_i  -I], all poses beneath each other.",
-                "return np.vstack([np.hstack([T[:3, :3], -np.eye(3)]) for T in T_WF]).",
+                "`return np.vstack([np.hstack([T[:3, :3], -np.eye(3)]) for T in T_WF])`",
             ),
             mistakes=[
                 Mistake(
@@ -232,7 +232,7 @@ CHAPTER = Chapter(
             hints=(
                 "What is left when tip and pivot stand on the left side?",
                 "-p_i, the three positions of pose 1, then those of pose 2, ... in one long vector.",
-                "return -T_WF[:, :3, 3].ravel().",
+                "`return -T_WF[:, :3, 3].ravel()`",
             ),
             mistakes=[
                 Mistake(lambda T: T[:, :3, 3].ravel(), "The sign: brought to the right side, p becomes -p."),
@@ -292,7 +292,7 @@ CHAPTER = Chapter(
             hints=(
                 "More equations than unknowns: no x fulfills them all. Which x makes the sum of squares of A x - b least?",
                 "The sheet: x = (A'A)^-1 A'b. Better conditioned, and shorter: `np.linalg.lstsq`.",
-                "return np.linalg.lstsq(A, b, rcond=None)[0].",
+                "`return np.linalg.lstsq(A, b, rcond=None)[0]`",
             ),
             mistakes=[
                 Mistake(
@@ -353,7 +353,7 @@ CHAPTER = Chapter(
             hints=(
                 "Which of the six numbers in x say where the tip is, and seen from where?",
                 "The tip seen from the flange is P_t, the first three entries of x. Its length is the root of the sum of squares.",
-                "tip_length = np.linalg.norm(x[:3]).",
+                "`tip_length = np.linalg.norm(x[:3])`",
             ),
             mistakes=[
                 Mistake(
@@ -364,10 +364,18 @@ CHAPTER = Chapter(
                     lambda: np.hypot(np.linalg.norm(_kreisel().tip), np.linalg.norm(_kreisel().pivot)),
                     "You took the norm of all six entries. The tip is the first three.",
                 ),
-                Mistake(lambda: abs(_kreisel().tip[2]), "This is the z component alone: the tip also sits to the side."),
-                Mistake(lambda: np.abs(_kreisel().tip).sum(), "You added the components. The length is the root of the sum of squares."),
+                Mistake(
+                    lambda: abs(_kreisel().tip[2]), "This is the z component alone: the tip also sits to the side."
+                ),
+                Mistake(
+                    lambda: np.abs(_kreisel().tip).sum(),
+                    "You added the components. The length is the root of the sum of squares.",
+                ),
                 Mistake(lambda: _kreisel().tip[2], "This is the z component alone: the tip also sits to the side."),
-                Mistake(lambda: _kreisel().tip.sum(), "You added the components. The length is the root of the sum of squares."),
+                Mistake(
+                    lambda: _kreisel().tip.sum(),
+                    "You added the components. The length is the root of the sum of squares.",
+                ),
                 Mistake(
                     lambda: np.linalg.norm(_kreisel().tip[:2]),
                     "You took x and y alone, the distance from the flange's z axis: the slice x[:2] holds two entries.",
@@ -390,7 +398,7 @@ CHAPTER = Chapter(
             hints=(
                 "Where is the tip in each pose, and where should it be?",
                 "Equation (2) of the sheet: R_i tip + p_i - point, one row a pose.",
-                "return np.array([T[:3, :3] @ tip + T[:3, 3] - point for T in T_WF]).",
+                "`return np.array([T[:3, :3] @ tip + T[:3, 3] - point for T in T_WF])`",
             ),
             mistakes=[
                 Mistake(
@@ -487,7 +495,7 @@ CHAPTER = Chapter(
             hints=(
                 "The sheet's formula, listing 8: the root of the sum of squares over n.",
                 "n is the number of poses, not of equations; r'r is the sum of the squares of all 3n numbers.",
-                "s0 = np.sqrt((residuals**2).sum() / len(poses)).",
+                "`s0 = np.sqrt((residuals**2).sum() / len(poses))`",
             ),
             mistakes=[
                 Mistake(
@@ -509,7 +517,10 @@ CHAPTER = Chapter(
                 ),
                 Mistake(lambda: _squares() / 12, "The root is missing: this is a variance, in mm^2."),
                 Mistake(lambda: _squares(), "This is r'r. Divide it by n and take the root."),
-                Mistake(lambda: _squares() / 36, "The root is missing, and you divided by the 36 equations instead of the 12 poses."),
+                Mistake(
+                    lambda: _squares() / 36,
+                    "The root is missing, and you divided by the 36 equations instead of the 12 poses.",
+                ),
                 Mistake(
                     lambda: np.linalg.norm(_kreisel().residuals, axis=1).std(),
                     "This is how much the lengths differ from their mean. The sheet measures them from zero: the root of their mean square.",
@@ -567,7 +578,7 @@ CHAPTER = Chapter(
             hints=(
                 "Noise in b goes through the solution x = (A'A)^-1 A'b. What does it do to x?",
                 "cov = std^2 (A'A)^-1, with the unbiased std^2 = r'r / (3n - 6).",
-                "r = residuals.ravel(); return r @ r / (len(r) - 6) * np.linalg.inv(A.T @ A).",
+                "`r = residuals.ravel(); return r @ r / (len(r) - 6) * np.linalg.inv(A.T @ A)`",
             ),
             mistakes=[
                 Mistake(
@@ -582,7 +593,10 @@ CHAPTER = Chapter(
                     _covariance(lambda r, n: np.sqrt(r @ r / (3 * n - 6))),
                     "A standard deviation stands where its square belongs.",
                 ),
-                Mistake(_covariance(lambda r, n: 1.0), "This is (A'A)^-1 for noise of 1 mm. Scale it by the variance of the residuals."),
+                Mistake(
+                    _covariance(lambda r, n: 1.0),
+                    "This is (A'A)^-1 for noise of 1 mm. Scale it by the variance of the residuals.",
+                ),
                 Mistake(
                     lambda A, r: np.vdot(r, r) / (r.size - 6) * (A.T @ A),
                     "You forgot the inverse: A'A is the information, and its inverse the covariance.",
@@ -640,12 +654,12 @@ CHAPTER = Chapter(
         Exercise(
             "robust_weights",
             reference=_tukey_weights,
-            draw=(distances_and_scale, far_first),
+            draw=(near_first, far_first),
             metric=metrics.numbers(1e-9),
             hints=(
                 "Near poses keep their weight, far ones lose it all, smoothly.",
                 "Tukey: with q = d / (7 scale), w = (1 - q^2)^2, and 0 where q > 1.",
-                "q = distances / (7 * scale); return np.where(q < 1, (1 - q**2) ** 2, 0.0).",
+                "`q = distances / (7 * scale); return np.where(q < 1, (1 - q**2) ** 2, 0.0)`",
             ),
             mistakes=[
                 Mistake(
@@ -660,7 +674,10 @@ CHAPTER = Chapter(
                     _weights(lambda q: np.maximum(1 - q, 0) ** 2),
                     "The inner square is missing: w = (1 - q^2)^2.",
                 ),
-                Mistake(_weights(lambda q: (q < 1).astype(float)), "You cut hard: a pose is in or out. Tukey's weights fall to zero smoothly."),
+                Mistake(
+                    _weights(lambda q: (q < 1).astype(float)),
+                    "You cut hard: a pose is in or out. Tukey's weights fall to zero smoothly.",
+                ),
                 Mistake(
                     lambda distances, scale: np.maximum(1 - (distances / scale) ** 2, 0) ** 2,
                     "The cutoff is missing: it is 7 times the scale, not the scale itself.",
@@ -682,11 +699,15 @@ CHAPTER = Chapter(
                     "The wrong way round: near poses get 0 and far ones 1.",
                 ),
                 Mistake(
-                    lambda distances, scale: np.where(distances > scale, 0.0, (1 - (distances / (pivot.TUKEY * scale)) ** 2) ** 2),
+                    lambda distances, scale: np.where(
+                        distances > scale, 0.0, (1 - (distances / (pivot.TUKEY * scale)) ** 2) ** 2
+                    ),
                     "You cut at one scale. The weight reaches 0 at 7 scales, where q = 1.",
                 ),
                 Mistake(
-                    lambda distances, scale: np.where(distances < pivot.TUKEY, (1 - (distances / (pivot.TUKEY * scale)) ** 2) ** 2, 0.0),
+                    lambda distances, scale: np.where(
+                        distances < pivot.TUKEY, (1 - (distances / (pivot.TUKEY * scale)) ** 2) ** 2, 0.0
+                    ),
                     "You cut at 7 mm. The weight reaches 0 at 7 scales, where q = 1.",
                 ),
                 Mistake(
@@ -694,7 +715,9 @@ CHAPTER = Chapter(
                     "`d / scale * 7` multiplies by 7: put 7 * scale in parentheses.",
                 ),
                 Mistake(
-                    lambda distances, scale: np.where(distances < pivot.TUKEY * scale, (1 - distances**2 / (pivot.TUKEY * scale)) ** 2, 0.0),
+                    lambda distances, scale: np.where(
+                        distances < pivot.TUKEY * scale, (1 - distances**2 / (pivot.TUKEY * scale)) ** 2, 0.0
+                    ),
                     "Only d is squared. Square the whole quotient q = d / (7 scale).",
                 ),
                 Mistake(
