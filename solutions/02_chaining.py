@@ -35,7 +35,7 @@ np.set_printoptions(precision=6, suppress=True)
 #
 # A measuring arm reaches only so far, and the work piece is larger. So the arm is moved: from stand 1 it measures the frames $K_0$ and $K_1$, from stand 2 $K_1$ and
 # $K_2$, and so on, until stand 4 measures $K_3$ and again $K_0$. **Where does the chain end, and what does the gap tell?** This is section 2 of the lab sheet
-# (*Verkettung von Transformationen*). The eight frames that its program read were never published; listing 7 prints the four transforms, one a stand, and their product.
+# (*Verkettung von Transformationen*). The eight frames that its program read were never published; listing 7 prints four transforms, each from one pair of frames, and their product. (The sheet's prose counts the stands a little differently; four pairs mean four stands.)
 # To have something to measure, `data/chaining` holds eight synthetic frames (labeled so) that round to the printed digits.
 
 # %% the-links

@@ -132,6 +132,7 @@ s0 = np.sqrt((residuals**2).sum() / len(poses))
 ex.s0(s0)
 
 # %% what-s0-means [markdown]
+# The sheet calls $s_0$ the standard deviation of the result (*Standardabweichung des Ergebnisses*). That it is not: it says how far the poses disagree, and how sure the result is comes further down.
 # The sheet divides by the number of *poses*. So $s_0$ is the typical distance in space by which the tip misses. The noise of one *coordinate* is smaller, and its
 # unbiased estimate divides by the degrees of freedom: $3n$ equations less six unknowns. All three are honest numbers once their names are said.
 # And as $n s_0^2 = r^\top r$, the printed $s_0$ even tells how far the ten poses missed that the sheet does not print.
