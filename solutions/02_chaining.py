@@ -35,7 +35,7 @@ np.set_printoptions(precision=6, suppress=True)
 #
 # A measuring arm reaches only so far, and the work piece is larger. So the arm is moved: from stand 1 it measures the frames $K_0$ and $K_1$, from stand 2 $K_1$ and
 # $K_2$, and so on, until stand 4 measures $K_3$ and again $K_0$. **Where does the chain end, and what does the gap tell?** This is section 2 of the lab sheet
-# (*Verkettung von Transformationen*). Its eight measured frames were never published; listing 7 prints the four transforms, one a stand, and their product.
+# (*Verkettung von Transformationen*). The eight frames that its program read were never published; listing 7 prints four transforms, each from one pair of frames, and their product. (The sheet's prose counts the stands a little differently; four pairs mean four stands.)
 # To have something to measure, `data/chaining` holds eight synthetic frames (labeled so) that round to the printed digits.
 
 # %% the-links
@@ -81,7 +81,7 @@ ex.predict("operator", guess)
 # %% chain
 @ex.chain
 def chain(transforms):
-    """Return T_0N, shape (4, 4), from the links T_01, T_12, ... of shape (N, 4, 4)."""
+    """Return T_0N, shape (4, 4), from the links T_01, T_12, ... stacked in an array of shape (N, 4, 4), in mm."""
     ### BEGIN SOLUTION
     T = np.eye(4)
     for link in transforms:
@@ -142,21 +142,21 @@ ex.closure_distance(closure_distance)
 
 # %% work-piece [markdown]
 # (If you took the arccosine of the trace, compare the third digit with `chaining.closure_error(product)`: near 0 the cosine is flat, and six decimals of a matrix leave two or three
-# digits of the angle. The library reads the sine from $R - R^\top$.)
+# digits of the angle. The library also reads the sine, from $R - R^\top$.)
 #
 # The sheet finds its product "annähernd genau" the identity. Whether it is depends on *where* you ask. A point of the work piece at $p$ is displaced by
-# $|T p - p|$, and the angle grows with the distance from the axis of the closure motion.
+# $|T p - p|$, and what the angle adds to this grows with the distance from the axis of the closure motion.
 
 # %% at-the-work-piece
 for x in (0, 100, 300, 1000):
     points = x * np.vstack([np.eye(3), -np.eye(3)])
     d = chaining.displacement(product, points)
-    print(f"{x:5} mm from the origin of K0: {d.min():5.2f} to {d.max():5.2f} mm, depending on the direction")
+    print(f"{x:5} mm from the origin of K0: {d.min():5.2f} to {d.max():5.2f} mm, along the axes")
 
 # %% lever [markdown]
 # ## One bad link
 #
-# A turn at the end of link $k$ moves everything that follows, and the end of the chain moves by the turn times its **lever**: the distance from $K_k$ to the end.
+# A turn at the end of link $k$ moves everything that follows. The end of the chain moves by the turn (in rad) times its **lever**: the distance from $K_k$ to the end.
 # The figure shows the sheet's loop in plan view: thin (black, or white on dark) as it is, purple as the chain sees it, gray the gap at $K_0$ and at a work piece P. Drag the frames, and choose which link is wrong.
 
 # %% predict-lever
@@ -184,7 +184,7 @@ guess = "2.8 times"
 ex.predict("growth", guess, reveal=stages.growth)
 
 # %% what-the-arm-did [markdown]
-# (In a row the squares of the levers add up to about $L^2N^3/3$.) The law also reads backwards. If the sheet's closure angle is typical, it tells the noise of a single link; with the sheet's levers, this noise predicts the distance.
+# (In a row the squares of the levers add up to about $L^2N^3/3$, the better the longer the row.) The law also reads backwards. If the sheet's closure angle is typical, it tells the noise of a single link; with the sheet's levers, this noise predicts the distance.
 # One loop is one sample, so expect agreement within a factor of two or three, not more.
 
 # %% noise-of-the-sheet
@@ -198,12 +198,12 @@ print(f"closure distance it predicts: {expected:.1f} mm; found: {distance:.1f} m
 # ## Right angles wear off
 #
 # Six decimals leave $R^\top R - I$ at about $10^{-6}$. Go around the loop again and again and the defect grows, without any noise. The repair is the nearest rotation:
-# among all rotations, the one with the smallest $|X - R|$. With the SVD $R = U S V^\top$ it is $X = U V^\top$.
+# among all rotations, the one with the smallest $|X - R|$ (root of the sum of squares). With the SVD $R = U S V^\top$ it is $X = U V^\top$, as long as $\det R > 0$.
 
 # %% orthonormalize
 @ex.orthonormalize
 def orthonormalize(T):
-    """Return T, shape (4, 4), with its rotation block replaced by the nearest rotation."""
+    """Return a copy of T, shape (4, 4), with its rotation block replaced by the nearest rotation."""
     ### BEGIN SOLUTION
     U, _, Vt = np.linalg.svd(T[:3, :3])
     X = T.copy()
@@ -239,7 +239,7 @@ print("half the shift is not half the way:", half[:3, 3].round(1), "against", (0
 # %% distribute_closure
 @ex.distribute_closure
 def distribute_closure(transforms):
-    """Return the corrected links, shape (N, 4, 4), of a loop whose links have shape (N, 4, 4)."""
+    """Return the corrected links, shape (N, 4, 4), of a loop from its links T_01, ... T_(N-1)0, shape (N, 4, 4), in mm."""
     ### BEGIN SOLUTION
     N = len(transforms)
     poses = [np.eye(4)]
@@ -291,7 +291,7 @@ simple = chaining.stations(corrected)[:4]
 angles, distances = chaining.closure_error(relative(graph.poses, simple))
 for k in range(1, 4):
     print(f"K{k}: graph and equal shares differ by {np.rad2deg(angles[k]):.3f} deg and {distances[k]:.2f} mm")
-print(f"weighted sum of squares {graph.chi2:.1f}, expected about {graph.dof}")
+print(f"weighted sum of squares {graph.chi2:.1f}, expected about {graph.dof} (std_rot comes from this very loop: no test)")
 
 # %% second-loop [markdown]
 # Now a second loop. Six frames, seven links, two loops A and B with one link in common. Decide what happens, then step through the measurements.

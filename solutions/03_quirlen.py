@@ -36,7 +36,7 @@ np.set_printoptions(precision=6, suppress=True)
 # A robot gets a new measuring tip, parallel to the old one: only a shift is unknown. **Where is the tip, seen from the flange?** Nobody measures it. Instead the robot
 # touches one fixed point again and again, from different directions. The point's place need not be known. This is section 3 of the lab sheet.
 #
-# Its file `Kreisel.txt` was never published. But the printed output has line numbers: the blocks "Ptest" of five lines each begin at lines 20 and 75,
+# Its file `Kreisel.txt` was never published. But the printed output has line numbers: of the blocks "Ptest", five lines each, the first begins at line 20 and the last at line 75,
 # and line 80 prints $s_0$. So we know how many poses there were. `data/quirlen` holds as many synthetic ones, built so that the printed results come out.
 
 # %% the-poses
@@ -57,7 +57,7 @@ print("...", len(poses), "synthetic poses in all")
 # %% pivot_matrix
 @ex.pivot_matrix
 def pivot_matrix(T_WF):
-    """Return A, shape (3n, 6), from poses of shape (n, 4, 4)."""
+    """Return A, shape (3n, 6), from poses T_WF of shape (n, 4, 4), in mm: three rows a pose, pose after pose."""
     ### BEGIN SOLUTION
     return np.vstack([np.hstack([T[:3, :3], -np.eye(3)]) for T in T_WF])
     ### END SOLUTION
@@ -66,7 +66,7 @@ def pivot_matrix(T_WF):
 # %% pivot_rhs
 @ex.pivot_rhs
 def pivot_rhs(T_WF):
-    """Return b, shape (3n,), from poses of shape (n, 4, 4)."""
+    """Return b, shape (3n,) in mm, from poses T_WF of shape (n, 4, 4): three numbers a pose, pose after pose."""
     ### BEGIN SOLUTION
     return -T_WF[:, :3, 3].ravel()
     ### END SOLUTION
@@ -82,7 +82,7 @@ def pivot_rhs(T_WF):
 # %% solve_pivot
 @ex.solve_pivot
 def solve_pivot(A, b):
-    """Return x = (tip, point), shape (6,), with the smallest sum of squares of A x - b."""
+    """Return x = (tip, point), shape (6,) in mm, with the least sum of squares of A x - b; A is (3n, 6), b is (3n,)."""
     ### BEGIN SOLUTION
     return np.linalg.lstsq(A, b, rcond=None)[0]
     ### END SOLUTION
@@ -114,7 +114,7 @@ ex.tip_length(tip_length)
 # %% pivot_residuals
 @ex.pivot_residuals
 def pivot_residuals(T_WF, tip, point):
-    """Return R_i tip + p_i - point of every pose, shape (n, 3)."""
+    """Return R_i tip + p_i - point (mm) of every pose, shape (n, 3); T_WF is (n, 4, 4), tip and point are (3,)."""
     ### BEGIN SOLUTION
     return np.array([T[:3, :3] @ tip + T[:3, 3] - point for T in T_WF])
     ### END SOLUTION
@@ -132,6 +132,7 @@ s0 = np.sqrt((residuals**2).sum() / len(poses))
 ex.s0(s0)
 
 # %% what-s0-means [markdown]
+# The sheet calls $s_0$ the standard deviation of the result (*Standardabweichung des Ergebnisses*). That it is not: it says how far the poses disagree, and how sure the result is comes further down.
 # The sheet divides by the number of *poses*. So $s_0$ is the typical distance in space by which the tip misses. The noise of one *coordinate* is smaller, and its
 # unbiased estimate divides by the degrees of freedom: $3n$ equations less six unknowns. All three are honest numbers once their names are said.
 # And as $n s_0^2 = r^\top r$, the printed $s_0$ even tells how far the ten poses missed that the sheet does not print.
@@ -234,7 +235,7 @@ for half_angle_deg in (0.1, 0.001):
 # %% pivot_covariance
 @ex.pivot_covariance
 def pivot_covariance(A, residuals):
-    """Return the covariance of x, shape (6, 6), from A of shape (3n, 6) and residuals of shape (n, 3)."""
+    """Return the covariance of x (mm^2), shape (6, 6), from A of shape (3n, 6) and residuals (mm) of shape (n, 3)."""
     ### BEGIN SOLUTION
     r = residuals.ravel()
     return r @ r / (len(r) - 6) * np.linalg.inv(A.T @ A)
@@ -295,8 +296,8 @@ guess = "about a millimeter"
 ex.predict("outliers", guess, reveal=stages.outliers)
 
 # %% weights-for-orientation [markdown]
-# Orientation noise is the second flaw of equation (1): a turn of the flange shakes the tip *across* the lever, not along it. So the components of a residual are not equally good.
-# `calibrate_pivot(T, std_rot, std_trans)` weighs them. The yardstick is the Cramér-Rao bound: no unbiased method does better.
+# Equation (1) takes all numbers to be equally good. Bad poses are not, and orientation noise is another reason: a turn of the flange shakes the tip *across* the lever, not along it. So the components of a residual are not equally good.
+# `calibrate_pivot(T, std_rot, std_trans)` weighs them. The yardstick is the Cramér-Rao bound: no unbiased method does better (two hundred runs leave a few percent of each number to chance).
 
 # %% against-the-bound
 rng, tip, squares = np.random.default_rng(3), np.array([12.0, -8.0, 150.0]), {}
@@ -328,7 +329,7 @@ for words, values in squares.items():
 #
 # 1. A colleague proudly shows $s_0 = 0.02$ mm from eighty poses. Which single question do you ask?
 # 2. The tool points along $z$ of the flange and you only need the direction of the shaft, not its length. Is spinning enough?
-# 3. Why does the covariance not warn you when one pose in twelve is grossly wrong, and what in the residuals would?
+# 3. One pose in twelve is grossly wrong. The covariance grows, but does not say which pose it was. Why not, and what in the residuals would?
 
 # %% progress
 ex.progress()

@@ -1,10 +1,12 @@
 """Answers to chapters 2 and 3 that were once judged wrongly or told too little, and their last hints as they stand."""
 
 import re
+import textwrap
 
 import numpy as np
 import pytest
 import scipy.linalg
+import scipy.optimize
 from numpy.linalg import lstsq
 
 from labkit import chaining, pivot
@@ -16,6 +18,7 @@ from labkit.lie import exp_se3, log_se3
 CHAPTERS = (ch02_chaining.CHAPTER, ch03_quirlen.CHAPTER)
 ITEMS = {item.id: item for chapter in CHAPTERS for item in chapter.items}
 EXERCISES = [name for name, item in ITEMS.items() if isinstance(item, Exercise)]
+VALUES = [name for name, item in ITEMS.items() if isinstance(item, Value)]
 KNOWN = {  # what the notebooks have imported
     "np": np, "chaining": chaining, "pivot": pivot, "relative": relative, "exp_se3": exp_se3, "log_se3": log_se3,
 }  # fmt: skip
@@ -34,13 +37,30 @@ def parameters(name):
     raise AssertionError(name)
 
 
+def typed(name):
+    """The last hint as a student types it: the code between its backticks."""
+    hint = ITEMS[name].hints[-1]
+    assert hint[0] == hint[-1] == "`" and hint.count("`") == 2, hint
+    return hint.strip("`")
+
+
 @pytest.mark.parametrize("name", EXERCISES)
 def test_the_last_hint_is_a_solution(name):
-    lines = "\n    ".join(ITEMS[name].hints[-1].removesuffix(".").split("; "))
     space = dict(KNOWN)
-    exec(f"def answer({', '.join(parameters(name))}):\n    {lines}", space)
+    exec(f"def answer({', '.join(parameters(name))}):\n" + textwrap.indent(typed(name), "    "), space)
     outcome = judged(name, space["answer"])
     assert outcome.status == CORRECT, outcome.text
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_the_last_hint_is_the_value(name):
+    """With the names that the notebook has by then."""
+    poses, product = pivot.kreisel_poses(), chaining.chain(chaining.printed_transforms())
+    x = pivot.solve_pivot(pivot.pivot_matrix(poses), pivot.pivot_rhs(poses))
+    residuals = pivot.pivot_residuals(poses, x[:3], x[3:])
+    space = {**KNOWN, "poses": poses, "product": product, "x": x, "residuals": residuals}
+    exec(typed(name), {**space, "closure_error": chaining.closure_error}, space)
+    assert judged(name, space[name]).status == CORRECT
 
 
 @pytest.mark.parametrize("name", EXERCISES)
@@ -50,7 +70,7 @@ def test_a_raised_call_is_shown_with_the_names_of_the_notebook(name):
 
 
 @pytest.mark.parametrize("digits", [3, 4, 6])
-@pytest.mark.parametrize("name", [name for name, item in ITEMS.items() if isinstance(item, Value)])
+@pytest.mark.parametrize("name", VALUES)
 def test_values_may_be_rounded_to_three_digits(name, digits):
     rounded = float(f"{ITEMS[name].reference():.{digits}g}")
     assert judged(name, rounded).status == CORRECT
@@ -92,3 +112,58 @@ def test_blocks_of_the_pivot_matrix_that_overlap():
         return A
 
     assert "3 * i" in judged("pivot_matrix", matrix).text
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_residuals_are_those_of_the_tip_that_was_given(seed):
+    def fitted_anew(T_WF, tip, point):
+        x = pivot.solve_pivot(pivot.pivot_matrix(T_WF), pivot.pivot_rhs(T_WF))
+        return pivot.pivot_residuals(T_WF, x[:3], x[3:])
+
+    def without_mean(T_WF, tip, point):
+        r = pivot.pivot_residuals(T_WF, tip, point)
+        return r - r.mean(0)
+
+    for wrong in (fitted_anew, without_mean):
+        assert judged("pivot_residuals", wrong, seed).status == NOT_YET
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_single_precision_and_general_minimizers_are_right_too(seed):
+    def single(T_WF, tip, point):
+        T, tip, point = (a.astype(np.float32) for a in (T_WF, tip, point))
+        return T[:, :3, :3] @ tip + T[:, :3, 3] - point
+
+    def minimized(A, b):
+        return scipy.optimize.minimize(lambda x: ((A @ x - b) ** 2).sum(), np.zeros(6)).x
+
+    assert judged("pivot_residuals", single, seed).status == CORRECT
+    assert judged("solve_pivot", minimized, seed).status == CORRECT
+
+
+def test_the_report_of_an_optimizer_is_answered_by_its_x():
+    report = judged("solve_pivot", lambda A, b: scipy.optimize.least_squares(lambda x: A @ x - b, np.zeros(6)))
+    assert report.status == NOT_YET and "`.x`" in report.text
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_whole_numbers_of_vectorize_never_pass(seed):
+    def weights(distances, scale):
+        return np.vectorize(lambda d: (1 - (d / (7 * scale)) ** 2) ** 2 if d < 7 * scale else 0)(distances)
+
+    assert "first result" in judged("robust_weights", weights, seed).text
+
+
+@pytest.mark.parametrize(
+    "cosine",
+    [
+        lambda T: (np.trace(T) - 1) / 2,
+        lambda T: np.trace(T[:3, :3]) - 1 / 2,
+        lambda T: np.trace(T[:3, :3]) - 1,
+        lambda T: (np.trace(T[:3, :3]) + 1) / 2,
+    ],
+)
+def test_an_arccosine_of_more_than_1_names_its_argument(cosine):
+    with np.errstate(invalid="ignore"):
+        outcome = judged("closure_error", lambda T: (np.arccos(cosine(T)), np.linalg.norm(T[:3, 3])))
+    assert "(trace - 1) / 2" in outcome.text
