@@ -346,6 +346,10 @@ def test_raised_error_names_line_and_call():
         (lambda v: np.linalg.lstsq(np.ones((9, 2)), np.ones((3, 3)))[0], "`.ravel()`"),
         (lambda v: math.sin(v), "`np.sin` and the like take arrays"),
         (lambda v: np.array([[1, 2], [3]]), "different lengths"),
+        (lambda v: v if v > 0 else -v, "`np.where` chooses"),
+        (lambda v: v ^ 2, "write `**`"),
+        (lambda v: math.sqrt(-1.0), "np.clip"),
+        (lambda v: v * np.ones((5, 2)), "is `@` meant"),
     ],
 )
 def test_what_numpy_means(answer, words):
@@ -356,6 +360,29 @@ def test_what_numpy_means(answer, words):
 def test_small_arguments_keep_their_digits():
     assert engine._short(np.array([4e-8, -1.0e-9])) == "[ 4.e-08, -1.e-09]"
     assert engine._short(np.array([4e-8, 2.0])) == "[0., 2.]"
+
+
+def test_a_near_wrong_value_is_told_from_a_rounded_right_one():
+    length = Value(
+        "length",
+        reference=lambda: 98.352,
+        unit="mm",
+        hints=("a", "b", "c"),
+        mistakes=[Mistake(lambda: 98.337, "y and z alone")],
+    )
+    assert length.judge(98.35).status == length.judge(98.4).status == CORRECT
+    assert length.judge(98.337).text == "y and z alone"
+
+
+def test_degrees_converted_twice_are_not_told_to_be_radians():
+    angle = Value("angle", reference=lambda: 2.5, unit="deg", hints=("a", "b", "c"))
+    assert "once too often" in angle.judge(np.rad2deg(2.5)).text
+    assert "in radians where degrees" in angle.judge(np.deg2rad(2.5)).text
+
+
+def test_the_rotation_alone_can_be_a_named_mistake_of_a_pose():
+    exercise = replace(INVERT, mistakes=(Mistake(lambda T: T[:3, :3].T, "the rotation alone"),))
+    assert exercise.judge(lambda T: T[:3, :3].T).text == "the rotation alone"
 
 
 def test_a_word_may_be_written_in_more_than_one_way():

@@ -560,6 +560,10 @@ CHAPTER = Chapter(
                     "You added the components. The length is the root of the sum of squares.",
                 ),
                 Mistake(
+                    lambda: np.linalg.norm(_sheet() - np.eye(4)),
+                    "This is the norm of the whole product less I, the numbers of the rotation included. Only the translation holds lengths.",
+                ),
+                Mistake(
                     lambda: np.linalg.norm(_sheet()),
                     "This is the norm of the whole matrix, the numbers of the rotation included. Only the translation holds lengths.",
                 ),

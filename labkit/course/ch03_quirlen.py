@@ -367,14 +367,18 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda: abs(_kreisel().tip[2]), "This is the z component alone: the tip also sits to the side."
                 ),
+                Mistake(lambda: _kreisel().tip[2], "This is the z component alone: the tip also sits to the side."),
                 Mistake(
                     lambda: np.abs(_kreisel().tip).sum(),
                     "You added the components. The length is the root of the sum of squares.",
                 ),
-                Mistake(lambda: _kreisel().tip[2], "This is the z component alone: the tip also sits to the side."),
                 Mistake(
                     lambda: _kreisel().tip.sum(),
                     "You added the components. The length is the root of the sum of squares.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_kreisel().tip[1:]),
+                    "You took y and z alone: Python counts from 0, so the first three entries are x[:3].",
                 ),
                 Mistake(
                     lambda: np.linalg.norm(_kreisel().tip[:2]),

@@ -318,6 +318,11 @@ ADVICE = {  # what NumPy means
     "not aligned": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",
     "can be converted to Python scalars": "`math` and `float` take one number; `np.sin` and the like take arrays.",
     "inhomogeneous": "The parts of this array have different lengths.",
+    "truth value of an array": "`if` takes one truth value; `np.where` chooses entry by entry.",
+    "bitwise_xor": "`^` is no power in Python: write `**`.",
+    "for ^: ": "`^` is no power in Python: write `**`.",
+    "math domain error": "A root of a negative number, or an arccosine beyond 1, perhaps by rounding: see `np.clip`.",
+    "could not be broadcast": "These shapes do not fit entry by entry: is `@` meant, or a `[:, None]` missing?",
 }
 
 
@@ -397,7 +402,16 @@ class Value(Item):
             return Outcome(NOT_YET, _closed(_for_value(run.error)))
         if run.error is not None:
             return Outcome(NOT_YET, f"expected a number{self._in_unit()}, got {metrics._describe(answer)}.")
-        return self._compare(metric, run.result, expected)
+        return self._exact_mistake(run.result, expected) or self._compare(metric, run.result, expected)
+
+    def _exact_mistake(self, answer, expected):
+        """The mistake that gives just this number, even where it lies within the tolerance of rounded answers."""
+        exact = metrics.numbers(1e-9)
+        for k, mistake in enumerate(self.mistakes):
+            wrong = float(mistake.variant())
+            if exact.equal(answer, wrong) and not exact.equal(answer, expected):
+                return Outcome(NOT_YET, mistake.text, k)
+        return None
 
     def _converted(self, answer, unit, expected):
         if unit == self.unit:

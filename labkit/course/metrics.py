@@ -236,6 +236,8 @@ class poses(Metric):
 
     def admit(self, result, expected):
         result = as_array(result, np.shape(expected))
+        if result.shape[-2:] != (4, 4):
+            raise Refused(f"a pose has shape (..., 4, 4), not {result.shape}")
         if not np.allclose(result[..., 3, :], (0, 0, 0, 1), atol=1e-6):
             row = result[..., 3, :].reshape(-1, 4)[0]
             raise Refused(f"the last row must be 0 0 0 1, got {' '.join(f'{v:.3g}' for v in row)}")
@@ -402,7 +404,7 @@ def _relation(metric, results, expected, sizes):
         return _pose_relation(results, expected, holds)
     if isinstance(metric, rotations):
         return _rotation_relation(results, holds)
-    return _number_relation(results, expected, holds, sizes)
+    return _number_relation(results, expected, holds, sizes, getattr(metric, "unit", ""))
 
 
 def _moved(T, R=None, t=None):
@@ -454,10 +456,12 @@ def _rotation_relation(results, holds):
     return None
 
 
-def _number_relation(results, expected, holds, sizes):
+def _number_relation(results, expected, holds, sizes, unit):
     if holds(lambda r: -r):
         return "your result is right up to its sign"
     if holds(np.deg2rad):
+        if unit == "deg":
+            return "your result has been converted to degrees once too often"
         return "your result is in degrees where radians are expected"
     if holds(np.rad2deg):
         return "your result is in radians where degrees are expected"
