@@ -11,13 +11,19 @@ from .engine import Chapter, Exercise, Mistake, Prediction, Value
 # Draws -----------------------------------------------------------------------
 
 
-def two_circles(rng):
-    """Two landmarks, exact distances to a robot off their line, and a start near it."""
-    angle, base = rng.uniform(-np.pi, np.pi), rng.uniform(4, 9)
+def two_circles(rng, left=True, up=True, with_origin=True):
+    """Two landmarks, exact distances to a robot off their line, and a start near it.
+
+    left: of the way from the first landmark to the second; up: above its mirror image; with_origin: on the origin's
+    side of the line, which a search from (0, 0) finds without the start.
+    """
+    side = 1 if left else -1
+    angle, base = rng.uniform(-1.4, 1.4) + (0 if left == up else np.pi), rng.uniform(4, 9)
     along = np.array([np.cos(angle), np.sin(angle)])
-    across = np.array([-along[1], along[0]])
+    across = side * np.array([-along[1], along[0]])
     a = rng.uniform(-5, 5, 2)
-    robot = a + rng.uniform(0.2, 0.8) * base * along + rng.uniform(2, 5) * rng.choice([-1, 1]) * across
+    a = a if (a @ across < 0) == with_origin else -a
+    robot = a + rng.uniform(0.2, 0.8) * base * along + rng.uniform(2, 5) * across
     landmarks = np.array([a, a + base * along])
     return landmarks, np.linalg.norm(landmarks - robot, axis=1), robot + rng.uniform(-0.6, 0.6, 2)
 
@@ -29,18 +35,37 @@ def several_circles(rng):
     return landmarks, np.linalg.norm(landmarks - position, axis=1) + rng.uniform(0.1, 0.5), position
 
 
-def pose_control_step(rng):
-    """A pose, a control that turns, and a time step long enough to tell the models apart."""
+CIRCLES = tuple(
+    functools.partial(two_circles, left=left, up=up, with_origin=left == up) for up in (True, False) for left in (True, False)
+)
+
+
+def two_wheels(rng, faster_right=True):
+    """Speeds of the left and the right wheel that turn the robot to this side, and the track."""
+    slow, more = rng.uniform(-1, 1), rng.uniform(0.2, 1)
+    return (slow, slow + more, rng.uniform(0.2, 0.8)) if faster_right else (slow + more, slow, rng.uniform(0.2, 0.8))
+
+
+WHEELS = (two_wheels, functools.partial(two_wheels, faster_right=False))
+
+
+def pose_control_step(rng, side=None):
+    """A pose, a control that turns to this side (1 left, -1 right), and a time step that tells the models apart."""
     x = np.array([*rng.uniform(-5, 5, 2), rng.uniform(-3, 3)])
-    omega = rng.uniform(0.4, 1.5) * rng.choice([-1, 1])
+    omega = rng.uniform(0.4, 1.5) * (side or rng.choice([-1, 1]))
     return x, np.array([rng.uniform(0.5, 2), omega]), rng.uniform(0.3, 0.9)
 
 
-def noisy_control(rng):
-    """A control with at least one negative part, a time step, and three noise constants."""
+EITHER_SIDE = (functools.partial(pose_control_step, side=1), functools.partial(pose_control_step, side=-1))
+
+
+def noisy_control(rng, signs):
+    """A control whose parts have these signs, a time step, and three noise constants."""
     v, omega = rng.uniform(0.3, 2), rng.uniform(0.2, 1.5)
-    signs = ((-1, 1), (1, -1), (-1, -1))[rng.integers(3)]
     return np.array([v, omega]) * signs, rng.uniform(0.05, 0.5), *rng.uniform(0.001, 0.02, 3)
+
+
+NOISY_CONTROLS = tuple(functools.partial(noisy_control, signs=signs) for signs in ((-1, 1), (1, -1), (-1, -1)))
 
 
 def pose_and_covariances(rng):
@@ -242,7 +267,7 @@ CHAPTER = Chapter(
             hints=(
                 "Each landmark gives one equation that is zero when the position lies on its circle.",
                 "The lecture's equation i: (x_i - x)^2 + (y_i - y)^2 - d_i^2.",
-                "return ((landmarks - position) ** 2).sum(axis=1) - distances**2",
+                "`return ((landmarks - position) ** 2).sum(axis=1) - distances**2`",
             ),
             mistakes=[
                 Mistake(
@@ -264,7 +289,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda L, d, p: np.linalg.norm(L - p) ** 2 - d**2,
-                    "Without axis=1 the norm runs over all landmarks at once: one sum a row is wanted.",
+                    "Without axis=1 the sum (or the norm) runs over all landmarks at once: one sum a row is wanted.",
                 ),
             ],
         ),
@@ -278,12 +303,12 @@ CHAPTER = Chapter(
         Exercise(
             "newton_lateration",
             reference=newton_lateration,
-            draw=two_circles,
+            draw=CIRCLES,
             metric=metrics.numbers(1e-8, "m"),
             hints=(
                 "Replace the residuals by their tangent planes, go to where those are zero, repeat.",
                 "Row i of the Jacobian is 2 (position - landmark_i). The step solves J step = -residual.",
-                "In a loop of 20: J = 2 * (position - landmarks); position = position - np.linalg.solve(J, lateration_residual(landmarks, distances, position))",
+                "`position = start; for _ in range(20): position = position - np.linalg.solve(2 * (position - landmarks), lateration_residual(landmarks, distances, position))` on two lines, and on a third `return position`",
             ),
             mistakes=[
                 Mistake(
@@ -308,7 +333,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _newton(lambda J, f, d: (J / 2, f)),
-                    "Your Jacobian lacks the factor 2 of the square, so that every step is twice too long.",
+                    "You end where you started. Does the loop change the position? A Jacobian without the factor 2 of the square doubles every step, and every second one then leads back.",
                 ),
                 Mistake(
                     lambda L, d, s: newton_lateration(L, d, s) - s,
@@ -320,7 +345,7 @@ CHAPTER = Chapter(
         Exercise(
             "wheel_to_twist",
             reference=odometry.wheel_to_twist,
-            draw=lambda rng: (rng.uniform(-1, 2), rng.uniform(-1, 2), rng.uniform(0.2, 0.8)),
+            draw=WHEELS,
             metric=metrics.numbers(1e-9),
             hints=(
                 "The middle of the axle moves with the mean of both wheels; what differs between them turns the robot.",
@@ -356,7 +381,7 @@ CHAPTER = Chapter(
         Exercise(
             "step_euler",
             reference=step_euler,
-            draw=pose_control_step,
+            draw=EITHER_SIDE,
             metric=metrics.planar_poses(),
             hints=(
                 "Drive the way v T along the old heading, then turn.",
@@ -400,7 +425,7 @@ CHAPTER = Chapter(
         Exercise(
             "step_midpoint",
             reference=step_midpoint,
-            draw=pose_control_step,
+            draw=EITHER_SIDE,
             metric=metrics.planar_poses(),
             hints=(
                 "While it drives the robot turns by omega T; on average it looked half of that aside.",
@@ -427,7 +452,7 @@ CHAPTER = Chapter(
         Exercise(
             "step_arc",
             reference=step_arc,
-            draw=pose_control_step,
+            draw=EITHER_SIDE,
             metric=metrics.planar_poses(),
             properties=(_straight_line_works,),
             hints=(
@@ -454,7 +479,7 @@ CHAPTER = Chapter(
                     _straight(_chord, _old, _turn),
                     "The length of the chord is right. It points along theta + h, halfway through the turn; yours along the old heading.",
                 ),
-                Mistake(_arc_sign, "Your circle runs the wrong way round: check the signs at the center of rotation."),
+                Mistake(_arc_sign, "Your robot drives its circle backward: check the signs at the center of rotation."),
                 Mistake(_arc_y_sign, "x is right, y has the wrong sign: the center lies to the left of the heading for omega > 0."),
             ],
         ),
@@ -469,7 +494,7 @@ CHAPTER = Chapter(
             "jacobian_state",
             reference=jacobian_state,
             draw=pose_control_step,
-            metric=metrics.numbers(1e-9),
+            metric=metrics.numbers(1e-5),
             hints=(
                 "Change x, y or theta a little: what does it change in the pose after the step?",
                 "A shift of x or y is passed on as it is. A turn of theta swings the way v T sideways.",
@@ -514,7 +539,7 @@ CHAPTER = Chapter(
             "jacobian_control",
             reference=jacobian_control,
             draw=pose_control_step,
-            metric=metrics.numbers(1e-9),
+            metric=metrics.numbers(1e-5),
             hints=(
                 "Three rows (x, y, theta), two columns (v, omega).",
                 "A little more v moves the robot by T along the heading; a little more omega turns it by T.",
@@ -554,7 +579,7 @@ CHAPTER = Chapter(
         Exercise(
             "control_covariance",
             reference=odometry.control_covariance,
-            draw=noisy_control,
+            draw=NOISY_CONTROLS,
             metric=metrics.numbers(1e-9),
             hints=(
                 "A diagonal matrix: the variance of v and the variance of omega.",
