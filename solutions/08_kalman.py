@@ -347,8 +347,8 @@ for name, step in filters.items():
 # ## Which landmark was that?
 #
 # Real landmarks wear no numbers, and some measurements belong to none. The innovation in units of its covariance, $y^\top S^{-1} y$ (the NIS), decides: nearest in this distance, and only if it
-# lies below the chi-square limit (5.99 for two numbers and 95 %). In the example the filter's heading is off by 8°: the nearest landmark *in meters* is then the wrong one, and the gate can
-# only throw the measurement away.
+# lies below the chi-square limit (5.99 for two numbers and 95 %). In the example the filter's heading is off by 8°: what it measures of landmark 0 then lies nearer to
+# landmark 1 *in meters*, and the gate can only throw the measurement away.
 
 # %% gate
 @ex.gate

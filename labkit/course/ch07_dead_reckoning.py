@@ -32,8 +32,8 @@ def several_circles(rng):
     """Three to five landmarks, distances that do not fit exactly, and a position."""
     landmarks = rng.uniform(-5, 5, (rng.integers(3, 6), 2))
     position = rng.uniform(-5, 5, 2)
-    off = rng.uniform(0.1, 0.5, len(landmarks)) * (-1) ** np.arange(len(landmarks))
-    return landmarks, np.linalg.norm(landmarks - position, axis=1) + off, position
+    off = rng.uniform(0.05, 0.2, len(landmarks)) * (-1) ** np.arange(len(landmarks))
+    return landmarks, np.linalg.norm(landmarks - position, axis=1) * (1 + off), position
 
 
 CIRCLES = tuple(
@@ -413,7 +413,7 @@ CHAPTER = Chapter(
             hints=(
                 "Replace the residuals by their tangent planes, go to where those are zero, repeat.",
                 "Row i of the Jacobian is 2 (position - landmark_i). The step solves J step = -residual.",
-                "`position = start; for _ in range(20): position = position - np.linalg.solve(2 * (position - landmarks), lateration_residual(landmarks, distances, position))` on two lines, and on a third `return position`",
+                "Three lines: `position = start`, `for _ in range(20): position = position - np.linalg.solve(2 * (position - landmarks), lateration_residual(landmarks, distances, position))`, `return position`",
             ),
             mistakes=[
                 Mistake(
