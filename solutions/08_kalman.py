@@ -182,7 +182,7 @@ for T in (0.05, 0.09, 0.11, 0.12):
 
 # %% verdict [markdown]
 # So the simulation ran 51 steps (0 to 50), from variances 1 and 0.01, with $\sigma_a = 0.4$. It predicted (12.75, 5.10), not the printed (12.5, 5.0), which are the ideal
-# $\tfrac12 a t^2$ and $a t$ at 5 s. Corrected, 12.75 gives the printed 11.90, and the velocity 4.989, printed cut off as 4.98. What stays free: any $T$ from about 0.06 to 0.11 s allows
+# $\tfrac12 a t^2$ and $a t$ at 5 s. Corrected, 12.75 gives the printed 11.90, and the velocity 4.989, printed cut off as 4.98. What stays free: any $T$ from about 0.055 to 0.11 s allows
 # non-negative variances; only roundness, and the ratio of the printed position to the velocity, single out 0.1.
 
 # %% ekf [markdown]
