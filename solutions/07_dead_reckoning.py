@@ -4,7 +4,7 @@
 # **What you will do.** Find a robot from its distances to landmarks, drive one by counting wheel turns, and compute how its uncertainty grows.
 #
 # **What you will learn.** How a start decides what a search finds, why geometry can matter more than the sensor, what the time step does to a motion model, and why
-# odometry that errs by millimeters a meter is lost after a hall's length.
+# odometry that errs by two centimeters in its first meter is a meter off after fourteen.
 #
 # **What you need.** Derivatives, matrices, covariances; chapter 4 helps with Newton. About 80 minutes.
 
@@ -338,7 +338,7 @@ except ValueError as refusal:
 #
 # - Place landmarks so that lines of sight cross at right angles. Check singular values before you buy a better sensor.
 # - Give the search the last known position as its start: the mirror image is never far.
-# - Use the midpoint model or the arc. They cost one multiplication more.
+# - Use the midpoint model or the arc. They cost next to nothing more.
 # - Measure $k_d$, $k_\theta$ and $k_\mathrm{drift}$ by driving a long straight line and many turns on the spot, not from the data sheet.
 # - Never trust odometry without an outside measurement. How to add one is chapter 8.
 

@@ -182,7 +182,7 @@ for T in (0.05, 0.09, 0.11, 0.12):
 
 # %% verdict [markdown]
 # So the simulation ran 51 steps (0 to 50), from variances 1 and 0.01, with $\sigma_a = 0.4$. It predicted (12.75, 5.10), not the printed (12.5, 5.0), which are the ideal
-# $\tfrac12 a t^2$ and $a t$ at 5 s. Corrected, 12.75 gives the printed 11.90, and the velocity 4.989, printed cut off as 4.98. What stays free: any $T$ from about 0.06 to 0.11 s allows
+# $\tfrac12 a t^2$ and $a t$ at 5 s. Corrected, 12.75 gives the printed 11.90, and the velocity 4.989, printed cut off as 4.98. What stays free: any $T$ from about 0.055 to 0.11 s allows
 # non-negative variances; only roundness, and the ratio of the printed position to the velocity, single out 0.1.
 
 # %% ekf [markdown]
@@ -347,8 +347,8 @@ for name, step in filters.items():
 # ## Which landmark was that?
 #
 # Real landmarks wear no numbers, and some measurements belong to none. The innovation in units of its covariance, $y^\top S^{-1} y$ (the NIS), decides: nearest in this distance, and only if it
-# lies below the chi-square limit (5.99 for two numbers and 95 %). In the example the filter's heading is off by 8°: the nearest landmark *in meters* is then the wrong one, and the gate can
-# only throw the measurement away.
+# lies below the chi-square limit (5.99 for two numbers and 95 %). In the example the filter's heading is off by 8°: what it measures of landmark 0 then lies nearer to
+# landmark 1 *in meters*, and the gate can only throw the measurement away.
 
 # %% gate
 @ex.gate

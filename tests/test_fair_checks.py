@@ -1,14 +1,16 @@
 """Checks of chapters 7, 8 and 10 that no lucky draw may decide, and answers that are right in another form."""
 
+import re
+
 import numpy as np
 import pytest
 
-from labkit import odometry
+from labkit import kalman, odometry
 from labkit.course import ch07_dead_reckoning as ch07
 from labkit.course import ch08_kalman as ch08
 from labkit.course import ch10_ledger as ch10
 from labkit.course import metrics
-from labkit.course.engine import CORRECT, NOT_YET
+from labkit.course.engine import CORRECT, NOT_YET, Exercise, Value
 
 
 def item(module, name):
@@ -85,3 +87,59 @@ def test_references_take_lists_as_the_student_would_write_them():
     np.testing.assert_allclose([x, var], [48.2 / 5.05, 1 / 5.05])
     np.testing.assert_allclose(ch08.measurement([0.0, 0.0, 0.0], [3.0, 4.0]), [5.0, np.arctan2(4, 3)])
     assert ch08.measurement_jacobian([0.0, 0.0, 0.0], [3.0, 4.0]).shape == (2, 3)
+
+
+def with_last_hints(kind):
+    items = [(module, i) for module in (ch07, ch08) for i in module.CHAPTER.items if isinstance(i, kind)]
+    return pytest.mark.parametrize("module, item", items, ids=[i.id for _, i in items])
+
+
+def lines_of(item):
+    """The code of a last hint, a line in each pair of backquotes."""
+    return re.findall("`([^`]*)`", item.hints[-1])
+
+
+def notebook_names(module):
+    known = {i.id: i.reference for i in module.CHAPTER.items if isinstance(i, Exercise)}
+    prior_cov = np.array([[1.9469, 0.2550], [0.2550, 0.0916]])
+    return known | {"np": np, "odometry": odometry, "drive": odometry.circle_drive(), "prior_cov": prior_cov}
+
+
+@with_last_hints(Exercise)
+def test_the_last_hint_is_a_solution_as_it_stands(module, item):
+    space = notebook_names(module)
+    exec("\n    ".join([f"def answer({', '.join(item.arguments)}):", *lines_of(item)]), space)
+    outcome = item.judge(space["answer"], rng=np.random.default_rng(3))
+    assert outcome.status == CORRECT, outcome.text
+
+
+@pytest.mark.parametrize("name", ["end_pose", "fused", "corrected"])
+def test_the_last_hint_gives_the_value_as_it_stands(name):
+    module = ch07 if name == "end_pose" else ch08
+    value, space = item(module, name), notebook_names(module)
+    assert isinstance(value, Value)
+    exec("\n".join(lines_of(value)), space)
+    assert value.judge(space[name]).status == CORRECT
+
+
+def test_forward_differences_are_a_jacobian():
+    def slopes(function, x, h=1e-6):
+        return np.column_stack([(function(x + h * e) - function(x)) / h for e in np.eye(len(x))])
+
+    def F_x(x, u, dt):
+        return slopes(lambda x: odometry.step(x, u, dt, "euler"), x)
+
+    def H(x, landmark):
+        return slopes(lambda x: kalman.measurement(x, landmark[None])[0], x)
+
+    assert item(ch07, "jacobian_state").judge(F_x, rng=np.random.default_rng(0)).status == CORRECT
+    assert item(ch08, "measurement_jacobian").judge(H, rng=np.random.default_rng(0)).status == CORRECT
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_search_that_ignores_its_start_never_passes(seed):
+    def from_origin(landmarks, distances, start):
+        return ch07.newton_lateration(landmarks, distances, np.zeros(2))
+
+    outcome = item(ch07, "newton_lateration").judge(from_origin, rng=np.random.default_rng(seed))
+    assert outcome.status == NOT_YET and "origin" in outcome.text

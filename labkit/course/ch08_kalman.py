@@ -106,6 +106,8 @@ def surprise(rng, wanted, along=None, std=(0.3, 1.5), measure=np.linalg.solve):
 
 
 SURPRISES = (
+    # large in itself, little for its S: refused without S
+    functools.partial(surprise, wanted=(0.75, 0.85), along=1, std=(3.0, 4.0)),
     functools.partial(surprise, wanted=(1.5, 2.5), along=-1),
     functools.partial(surprise, wanted=(0.7, 0.9), along=1, std=(0.3, 0.7)),
     functools.partial(surprise, wanted=(0.05, 0.9)),
@@ -186,6 +188,20 @@ def steady_state_gain(A, C, cov_v, cov_z):
     return kalman.steady_state(A, C, cov_v, cov_z).gain
 
 
+def _rounds(n):
+    """The gain after n rounds from the identity."""
+
+    def variant(A, C, Q, R):
+        P = np.eye(len(A))
+        for _ in range(n):
+            P = A @ P @ A.T + Q
+            K = _gain(P, C, R)
+            P = _shrunk(P, K, C)
+        return K
+
+    return variant
+
+
 def wrap_angle(angle):
     return wrapped(angle)
 
@@ -200,6 +216,15 @@ def _jacobians(change_x=None, change_u=None):
         return (change_x(G_x, x, u, dt) if change_x else G_x), (change_u(G_u, x, u, dt) if change_u else G_u)
 
     return variant
+
+
+def _last_column(entries):
+    def change(G, x, u, dt):
+        G = G.copy()
+        G[:2, 2] = entries(x, u, dt)
+        return G
+
+    return change
 
 
 def _sine_sign(G, x, u, dt):
@@ -228,11 +253,11 @@ def ekf_step(x, cov, u, dt, cov_u, z, landmark, cov_z):
     return _ekf()(x, cov, u, dt, cov_u, z, landmark, cov_z)
 
 
-def _ekf(noise=True, wrap=True, at="predicted", H_at="predicted", G_at="old", short=False, carry=True, gain=_gain):
+def _ekf(noise=True, wrap=True, at="predicted", H_at="predicted", G_at="old", short=False, carry=True, gain=_gain, shrink=_shrunk, model="euler"):
     """One step of the landmark filter, or a wrong one; expected measurement and Jacobians "at" old or predicted pose."""
 
     def step(x, cov, u, dt, cov_u, z, landmark, cov_z):
-        pose = {"old": x, "predicted": odometry.step(x, u, dt, "euler")}
+        pose = {"old": x, "predicted": odometry.step(x, u, dt, model)}
         moved = pose["predicted"]
         G_x, G_u = motion_jacobians(pose[G_at], u, dt)
         cov = (G_x @ cov @ G_x.T if carry else cov) + (G_u @ cov_u @ G_u.T if noise else 0)
@@ -240,7 +265,7 @@ def _ekf(noise=True, wrap=True, at="predicted", H_at="predicted", G_at="old", sh
         y = z - measurement(pose[at], landmark)
         y[1] = wrapped(y[1]) if wrap else y[1]
         K = gain(cov, H, cov_z)
-        return (moved, cov) if short else (moved + K @ y, (np.eye(3) - K @ H) @ cov)
+        return (moved, cov) if short else (moved + K @ y, shrink(cov, K, H))
 
     return step
 
@@ -298,7 +323,7 @@ CHAPTER = Chapter(
             hints=(
                 "The state follows the model; its uncertainty is carried along, and that of the control is added.",
                 "x = A x + B u and cov = A cov A' + B cov_u B' (lines 2 and 3 of the lecture's algorithm).",
-                "return A @ x + B @ u, A @ cov @ A.T + B @ cov_u @ B.T",
+                "`return A @ x + B @ u, A @ cov @ A.T + B @ cov_u @ B.T`",
             ),
             mistakes=[
                 Mistake(
@@ -332,6 +357,21 @@ CHAPTER = Chapter(
                     _predicted(_moved, lambda P, A, B, Q: A @ P @ A + B @ Q @ B.T),
                     "The last factor is the transpose of A.",
                 ),
+                Mistake(_predicted(_moved, lambda P, A, B, Q: A @ P @ A.T - B @ Q @ B.T), "Uncertainties add: there is no minus."),
+                Mistake(_predicted(lambda x, A, B, u: A @ x - B @ u, _grown), "A sign: the control is added, A x + B u."),
+                Mistake(_predicted(lambda x, A, B, u: x + B @ u, _grown), "The state must be carried along by A: the velocity moves the position."),
+                Mistake(_predicted(lambda x, A, B, u: B @ u, _grown), "The old state is missing: add A x."),
+                Mistake(_predicted(lambda x, A, B, u: A @ (x + B @ u), _grown), "The control acts during this step: it is added after A x, not before."),
+                Mistake(_predicted(lambda x, A, B, u: x @ A + B @ u, _grown), "The order: A x is written A @ x. Yours is A' x."),
+                Mistake(_predicted(lambda x, A, B, u: A @ x + u, _grown), "You added the acceleration to every entry of the state. It acts through B: B u."),
+                Mistake(_predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + B @ Q), "The control's covariance is multiplied from both sides: B cov_u B'."),
+                Mistake(_predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + B @ B.T), "The covariance of the control is missing between B and its transpose."),
+                Mistake(_predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + B @ Q @ Q @ B.T), "cov_u holds variances already: do not square it."),
+                Mistake(_predicted(_moved, lambda P, A, B, Q: A @ (P + B @ Q @ B.T) @ A.T), "The control's noise comes in during this step: it is added after A cov A', not carried along with it."),
+                Mistake(_predicted(_moved, lambda P, A, B, Q: A @ P @ np.linalg.inv(A) + B @ Q @ B.T), "The last factor is the transpose of A, not its inverse."),
+                Mistake(_predicted(_moved, lambda P, A, B, Q: B @ Q @ B.T), "The old covariance is missing: add A cov A'."),
+                Mistake(_predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + Q[0, 0] * np.eye(len(A))), "You added the variance of the acceleration to every state. It acts through B: B cov_u B'."),
+                Mistake(lambda *given: predict_state(*given)[::-1], "The order is state, covariance."),
             ],
         ),
         Exercise(
@@ -342,7 +382,7 @@ CHAPTER = Chapter(
             hints=(
                 "How surprising is the measurement, and how much of the surprise belongs to the state?",
                 "S = C cov C' + cov_z, K = cov C' S^-1, x + K (z - C x), (I - K C) cov.",
-                "K = cov @ C.T @ np.linalg.inv(C @ cov @ C.T + cov_z); return x + K @ (z - C @ x), (np.eye(len(x)) - K @ C) @ cov",
+                "`K = cov @ C.T @ np.linalg.inv(C @ cov @ C.T + cov_z); return x + K @ (z - C @ x), (np.eye(len(x)) - K @ C) @ cov`",
             ),
             mistakes=[
                 Mistake(
@@ -382,6 +422,43 @@ CHAPTER = Chapter(
                     _updated(cov=lambda P, K, C: (1 - K @ C) @ P),
                     "1 - K C subtracts from a matrix full of ones. The identity is np.eye(n).",
                 ),
+                Mistake(_updated(gain=lambda P, C, R: P @ C.T @ np.linalg.inv(C @ P @ C.T - R)), "Uncertainties add: S = C cov C' + cov_z."),
+                Mistake(_updated(gain=lambda P, C, R: P @ np.linalg.inv(P + R)), "C is missing from the gain: the sensor does not see the state itself."),
+                Mistake(_updated(gain=lambda P, C, R: P @ C @ np.linalg.inv(C @ P @ C.T + R)), "C stands transposed in the gain: cov C' S^-1."),
+                Mistake(_updated(gain=lambda P, C, R: C.T @ np.linalg.inv(C @ P @ C.T + R)), "cov is missing from the gain: cov C' S^-1."),
+                Mistake(_updated(gain=lambda P, C, R: np.linalg.inv(C @ P @ C.T + R) @ P @ C.T), "The order: the inverse of S stands to the right of cov C'."),
+                Mistake(_updated(gain=lambda P, C, R: np.linalg.inv(C @ P @ C.T + R) @ C @ P), "This is the transpose of the gain: K = cov C' S^-1."),
+                Mistake(_updated(gain=lambda P, C, R: P @ C.T), "The division by S is missing from the gain."),
+                Mistake(
+                    _updated(gain=lambda P, C, R: P @ C.T / (C @ P @ C.T + R)),
+                    "`/` divides entry by entry. Dividing by a matrix is multiplying by its inverse, np.linalg.inv(S).",
+                ),
+                Mistake(
+                    _updated(gain=lambda P, C, R: P @ C.T @ (1 / (C @ P @ C.T + R))),
+                    "`1 / S` turns every entry over. The inverse of a matrix is np.linalg.inv(S).",
+                ),
+                Mistake(_updated(gain=lambda P, C, R: P @ C.T @ np.linalg.inv(C @ P @ C.T + R @ R)), "cov_z holds variances already: do not square it."),
+                Mistake(_updated(gain=lambda P, C, R: P @ C.T @ np.linalg.inv(C.T @ P @ C + R)), "C is on the wrong side in S: C cov C', not C' cov C."),
+                Mistake(_updated(state=lambda x, K, z, C: x + K @ (z - x)), "The expected measurement is C x, not x."),
+                Mistake(_updated(state=lambda x, K, z, C: x + (z - C @ x)), "The gain is missing from the state: K times the innovation."),
+                Mistake(_updated(state=lambda x, K, z, C: z), "You return the measurement. The filter believes only a part of it: x + K (z - C x)."),
+                Mistake(_updated(state=lambda x, K, z, C: x), "The covariance is right, but the state was not corrected: x + K (z - C x)."),
+                Mistake(_updated(state=lambda x, K, z, C: x + K.T @ (z - C @ x)), "K stands transposed in the state: K (z - C x)."),
+                Mistake(_updated(cov=lambda P, K, C: (np.eye(len(P)) - K) @ P), "C is missing from the covariance: (I - K C) cov."),
+                Mistake(_updated(cov=lambda P, K, C: (np.eye(len(P)) - C @ K) @ P), "The order: K C, not C K."),
+                Mistake(_updated(cov=lambda P, K, C: K @ C @ P), "This is what is taken away. The new covariance is what is left: (I - K C) cov."),
+                Mistake(_updated(cov=lambda P, K, C: np.eye(len(P)) - K @ C @ P), "Brackets are missing: (I - K C) cov."),
+                Mistake(_updated(cov=lambda P, K, C: (np.eye(len(P)) - K @ C) * P), "`*` multiplies entry by entry. The matrix product is `@`."),
+                Mistake(_updated(cov=lambda P, K, C: np.eye(len(P)) - K @ C), "The last factor is missing: (I - K C) cov."),
+                Mistake(
+                    _updated(cov=lambda P, K, C: (np.eye(len(P)) - K @ C) @ P @ (np.eye(len(P)) - K @ C).T),
+                    "Half of Joseph's form: K cov_z K' is missing. Or leave the last factor out: (I - K C) cov.",
+                ),
+                Mistake(
+                    lambda x, P, z, C, R: (_corrected(x, _gain(update(x, P, z, C, R)[1], C, R), z, C), update(x, P, z, C, R)[1]),
+                    "The gain comes from the covariance before the correction. You computed it anew from the corrected one.",
+                ),
+                Mistake(lambda *given: update(*given)[::-1], "The order is state, covariance."),
             ],
         ),
         Prediction(
@@ -399,7 +476,7 @@ CHAPTER = Chapter(
             hints=(
                 "Each opinion (the prior, two sensors) counts as much as it is certain.",
                 "Weights are 1 / variance. The variance of the weighted mean is 1 / (sum of the weights).",
-                "w = np.array([1 / var0, *(1 / stds**2)]); return w @ [x0, *z] / w.sum(), 1 / w.sum()",
+                "`w = np.array([1 / var0, *(1 / stds**2)]); return w @ [x0, *z] / w.sum(), 1 / w.sum()`",
             ),
             mistakes=[
                 Mistake(
@@ -424,6 +501,20 @@ CHAPTER = Chapter(
                     _fused(lambda v, s: [1 / v, *(1 / s)]),
                     "The sensors come with standard deviations: square them before you take one over them.",
                 ),
+                Mistake(lambda *given: fuse_two_sensors(*given)[::-1], "The order is position, variance."),
+                Mistake(_fused(lambda v, s: [1 / v, *(1 / s**2)], lambda v, s: 1 / v + (1 / s**2).sum()), "The position is right. The new variance is one over the sum of the weights."),
+                Mistake(_fused(lambda v, s: [1 / v, *(1 / s**2)], lambda v, s: v + (s**2).sum()), "The position is right. Variances do not add here, their reciprocals do: 1 / (sum of the weights)."),
+                Mistake(_fused(lambda v, s: [1 / v, *(1 / s**2)], lambda v, s: v), "The position is right, but the variance is still the prior's."),
+                Mistake(_fused(lambda v, s: [1 / v, *(1 / s**2)], lambda v, s: 1 / (1 / s**2).sum()), "The position is right. The prior is missing from the variance."),
+                Mistake(_fused(lambda v, s: [1 / v, *(1 / s**2)], lambda v, s: (v + (s**2).sum()) / 3), "The position is right. The variance is no mean: three opinions are surer than each of them."),
+                Mistake(_fused(lambda v, s: [0, 1, 1]), "You took the mean of the sensors: the better one should count more, and the prior is an opinion, too."),
+                Mistake(_fused(lambda v, s: [1 / v, 1 / s[0] ** 2, 0]), "The second sensor is missing."),
+                Mistake(_fused(lambda v, s: [1 / v, 0, 1 / s[1] ** 2]), "The first sensor is missing."),
+                Mistake(_fused(lambda v, s: [1 / v, *(1 / s**4)]), "You squared the standard deviations twice."),
+                Mistake(
+                    lambda x0, v, z, s: (fuse_two_sensors(x0, v, z, s)[0] / fuse_two_sensors(x0, v, z, s)[1], fuse_two_sensors(x0, v, z, s)[1]),
+                    "The variance is right. A weighted mean is divided by the sum of its weights.",
+                ),
             ],
         ),
         Value(
@@ -434,7 +525,7 @@ CHAPTER = Chapter(
             hints=(
                 "The page's prior is 0 with the variance 20, its sensors have the standard deviations 0.5 and 1.",
                 "Put the printed numbers into your `fuse_two_sensors`; the first result is the position.",
-                "fused = fuse_two_sensors(0.0, 20.0, np.array([9.4, 10.6]), np.array([0.5, 1.0]))[0]",
+                "`fused = fuse_two_sensors(0.0, 20.0, np.array([9.4, 10.6]), np.array([0.5, 1.0]))[0]`",
             ),
             mistakes=[
                 Mistake(
@@ -455,6 +546,16 @@ CHAPTER = Chapter(
                     lambda: _fusion(std1=np.sqrt(0.5), std2=1.0),
                     "You weigh the sensors by one over the standard deviation. One over the variance is 4 and 1.",
                 ),
+                Mistake(lambda: 1 / 5.05, "This is the variance, the second result. The position is asked for."),
+                Mistake(lambda: 20 / 3, "The plain mean of prior and sensors. Each counts as much as one over its variance."),
+                Mistake(lambda: _fusion(x0=10.0), "You put in the true position as the prior. The page's prior is 0."),
+                Mistake(lambda: _fusion(std1=1.0, std2=0.5), "The standard deviations are exchanged: the first sensor is the better one."),
+                Mistake(lambda: _fusion(x0=20.0), "20 is the prior's variance. Its position is 0."),
+                Mistake(lambda: _fusion(var0=20.0**0.5), "You took the root of the prior's variance: it goes in as it is."),
+                Mistake(lambda: _fusion(std2=1e9), "The second sensor is missing."),
+                Mistake(lambda: _fusion(std1=1e9), "The first sensor is missing."),
+                Mistake(lambda: 9.4 * 4 + 10.6, "A weighted mean is divided by the sum of its weights."),
+                Mistake(lambda: (9.4 / 0.5 + 10.6) / (20**-0.5 + 2 + 1), "Weights are one over the variance, not over the standard deviation."),
             ],
         ),
         Prediction(
@@ -472,7 +573,7 @@ CHAPTER = Chapter(
             hints=(
                 "The gain does not depend on the data. Run the covariance alone until the gain stands still.",
                 "Repeat: cov = A cov A' + cov_v, K = cov C' S^-1, cov = (I - K C) cov. Some thousand times are cheap. Or let SciPy solve the Riccati equation.",
-                "P = scipy.linalg.solve_discrete_are(A.T, C.T, cov_v, cov_z); return P @ C.T @ np.linalg.inv(C @ P @ C.T + cov_z)",
+                "`from scipy.linalg import solve_discrete_are; P = solve_discrete_are(A.T, C.T, cov_v, cov_z); return P @ C.T @ np.linalg.inv(C @ P @ C.T + cov_z)`",
             ),
             mistakes=[
                 Mistake(
@@ -485,6 +586,10 @@ CHAPTER = Chapter(
                     lambda A, C, Q, R: A @ kalman.steady_state(A, C, Q, R).gain,
                     "This is A K, the gain of the form that predicts and corrects in one line. Here the correction's own gain is asked for.",
                 ),
+                Mistake(_rounds(5), "Five rounds are too few: repeat until the gain stands still, some thousand times."),
+                Mistake(_rounds(10), "Ten rounds are too few: repeat until the gain stands still, some thousand times."),
+                Mistake(lambda A, C, Q, R: kalman.steady_state(A, C, Q, R @ R).gain, "cov_z holds variances already: do not square it."),
+                Mistake(lambda A, C, Q, R: steady_state_gain(A, C, Q, R)[:, 0], "The values are right; K is a matrix, shape (n, m), here one column."),
             ],
         ),
         Value(
@@ -495,7 +600,7 @@ CHAPTER = Chapter(
             hints=(
                 "Only the correction is asked for: the prediction is printed.",
                 "Your `update` with C = (1, 0), z = 11.79 and the variance 0.25; the first result is the state.",
-                "corrected = update(np.array([12.5, 5.0]), cov, np.array([11.79]), np.array([[1.0, 0.0]]), np.array([[0.25]]))[0]",
+                "`corrected = update(np.array([12.5, 5.0]), prior_cov, np.array([11.79]), np.array([[1.0, 0.0]]), np.array([[0.25]]))[0]`",
             ),
             mistakes=[
                 Mistake(
@@ -514,6 +619,16 @@ CHAPTER = Chapter(
                     lambda: 2 * np.array([12.5, 5.0]) - _printed_correction().x,
                     "You correct away from the measurement.",
                 ),
+                Mistake(lambda: _printed_correction(lambda g: g | {"var_z": 0.5}).x, "You took the root of 0.25. A variance goes in as it is."),
+                Mistake(lambda: _printed_correction(lambda g: g | {"prior_x": 12.75, "prior_v": 5.1}).x, "This is the correction of (12.75, 5.10). The page prints the prediction (12.5, 5.0): start from it."),
+                Mistake(lambda: np.array([12.5, 5.0]), "This is the prediction: the correction is missing."),
+                Mistake(lambda: np.array([11.79, 5.0]), "You took the measurement for the position. The filter believes only a part of it."),
+                Mistake(lambda: _printed_correction().x - [12.5, 5.0], "This is the correction alone: add it to the prediction."),
+                Mistake(
+                    lambda: _printed_correction(lambda g: g | {"prior_cov_xx": 0.2216, "prior_cov_xv": 0.0290, "prior_cov_vv": 0.0620}).x,
+                    "You put in the covariance after the correction. The gain comes from the one before, prior_cov.",
+                ),
+                Mistake(lambda: _printed_correction(lambda g: g | {"var_z": 0.0}).x, "The sensor's variance 0.25 is missing: your filter believes the measurement entirely."),
             ],
         ),
         Exercise(
@@ -525,7 +640,7 @@ CHAPTER = Chapter(
             hints=(
                 "An angle and the same angle plus a full turn are one direction. Choose the one nearest to zero.",
                 "Shift by pi, take the remainder of a full turn, shift back.",
-                "return (angle + np.pi) % (2 * np.pi) - np.pi",
+                "`return (angle + np.pi) % (2 * np.pi) - np.pi`",
             ),
             mistakes=[
                 Mistake(lambda a: a % (2 * np.pi), "Your angles lie between 0 and 2 pi. An error of -0.1 becomes 6.18: shift by pi before and after."),
@@ -547,7 +662,17 @@ CHAPTER = Chapter(
                     lambda a: (a + np.pi) % (2 * np.pi),
                     "The second shift is missing: subtract pi again.",
                 ),
-                Mistake(lambda a: (a + 180) % 360 - 180, "This wraps degrees, so that radians come back as they were: use pi and 2 pi."),
+                Mistake(lambda a: (a + 180) % 360 - 180, "Your angles come back as they were. The remainder `%` is taken of (angle + pi), in brackets, and of 2 pi: radians, not degrees."),
+                Mistake(lambda a: a % (2 * np.pi) - np.pi, "The first shift is missing: add pi before the remainder. Yours points backward."),
+                Mistake(lambda a: (a - np.pi) % (2 * np.pi) + np.pi, "The second shift has the wrong sign: your angles lie between pi and 3 pi. Subtract pi again."),
+                Mistake(lambda a: (a + np.pi) % np.pi - np.pi, "The remainder is to be taken of a full turn, 2 pi."),
+                Mistake(lambda a: a - np.pi * np.round(a / np.pi), "Take off full turns, 2 pi. Half a turn more or less points backward."),
+                Mistake(lambda a: np.arctan2(np.cos(a), np.sin(a)), "np.arctan2 takes the sine first, then the cosine."),
+                Mistake(lambda a: np.arcsin(np.sin(a)), "The sine alone cannot tell ahead from behind: np.arctan2(sin, cos) can."),
+                Mistake(lambda a: np.arccos(np.cos(a)), "The cosine alone cannot tell left from right: np.arctan2(sin, cos) can."),
+                Mistake(lambda a: wrapped(a) if a > 0 else a, "Right for positive angles. Negative ones below -pi have to be turned up as well."),
+                Mistake(lambda a: a - 2 * np.pi if a > np.pi else a, "You take off one turn, and only from positive angles: take the remainder of a full turn."),
+                Mistake(lambda a: (a + np.pi) % 2 * np.pi - np.pi, "Brackets are missing: % (2 * np.pi). Without them Python takes the remainder of 2, then multiplies by pi."),
             ],
         ),
         Exercise(
@@ -559,7 +684,7 @@ CHAPTER = Chapter(
             hints=(
                 "How far away is the landmark, and in which direction seen from where the robot looks?",
                 "d = sqrt(dx^2 + dy^2), alpha = atan2(dy, dx) - theta, with (dx, dy) from robot to landmark.",
-                "dx, dy = landmark - x[:2]; return np.array([np.hypot(dx, dy), wrap_angle(np.arctan2(dy, dx) - x[2])])",
+                "`dx, dy = landmark - x[:2]; return np.array([np.hypot(dx, dy), wrap_angle(np.arctan2(dy, dx) - x[2])])`",
             ),
             mistakes=[
                 Mistake(
@@ -599,17 +724,26 @@ CHAPTER = Chapter(
                     lambda x, l: np.array([measurement(x, l)[0], wrapped(np.arctan(np.divide(*(l - x[:2])[::-1])) - x[2])]),
                     "np.arctan cannot tell a landmark on the left from one on the right of the y axis: np.arctan2(dy, dx) can.",
                 ),
+                Mistake(lambda x, l: measurement(x, l) * [1, -1], "The bearing has the wrong sign: direction to the landmark minus heading; the left is positive."),
+                Mistake(lambda x, l: np.array([measurement(x, l)[0], x[2] - np.arctan2(*(l - x[:2])[::-1])]), "The bearing has the wrong sign, and it is not wrapped: direction to the landmark minus heading."),
+                Mistake(lambda x, l: measurement(x, l) * [1, np.degrees(1)], "The bearing is in degrees: leave it in radians."),
+                Mistake(lambda x, l: np.array([measurement(x, l)[0], np.arctan2(*(l - x[:2])) - x[2]]), "np.arctan2 takes y first, then x. And the bearing has to be wrapped."),
+                Mistake(lambda x, l: np.array([measurement(x, l)[0], np.arctan2(*(x[:2] - l)[::-1]) - x[2]]), "Your bearing points backward: from the robot to the landmark, not from the landmark to the robot."),
+                Mistake(lambda x, l: measurement(x, l) + [0, np.pi], "The second shift of the wrap is missing: subtract pi again."),
+                Mistake(lambda x, l: np.array([measurement(x, l)[0], abs(measurement(x, l)[1])]), "No absolute value: a landmark on the right has a negative bearing."),
+                Mistake(lambda x, l: np.array([np.abs(l - x[:2]).sum(), measurement(x, l)[1]]), "The bearing is right. The distance is the root of dx^2 + dy^2."),
+                Mistake(lambda x, l: np.array([np.hypot(*l), wrapped(np.arctan2(l[1], l[0]) - x[2])]), "The robot's position is missing: dx and dy lead from the robot to the landmark."),
             ],
         ),
         Exercise(
             "measurement_jacobian",
             reference=measurement_jacobian,
             draw=seen_landmark,
-            metric=metrics.numbers(1e-8),
+            metric=metrics.numbers(1e-5),
             hints=(
                 "Move the robot a little toward the landmark, then across, then turn it. What do distance and bearing do?",
                 "Row 0: (-dx/r, -dy/r, 0). Row 1: (dy/q, -dx/q, -1) with q = r^2.",
-                "return np.array([[-dx / r, -dy / r, 0], [dy / q, -dx / q, -1]])",
+                "`dx, dy = landmark - x[:2]; q = dx**2 + dy**2; r = np.sqrt(q); return np.array([[-dx / r, -dy / r, 0], [dy / q, -dx / q, -1]])`",
             ),
             mistakes=[
                 Mistake(
@@ -640,17 +774,30 @@ CHAPTER = Chapter(
                     _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [-dy / r**2, dx / r**2, -1]]),
                     "The signs of dx and dy in row 1: a step to the left turns the landmark to the right.",
                 ),
+                Mistake(_rows(lambda dx, dy, r: [[-dx / r**2, -dy / r**2, 0], [dy / r**2, -dx / r**2, -1]]), "Row 0 is divided by r, not by r squared: a step straight toward the landmark shortens the distance by just this step."),
+                Mistake(_rows(lambda dx, dy, r: [[-dx, -dy, 0], [dy, -dx, -1]]), "The divisions are missing: row 0 by r, row 1 by r squared."),
+                Mistake(_rows(lambda dx, dy, r: [[-2 * dx, -2 * dy, 0], [dy / r**2, -dx / r**2, -1]]), "Row 0 is the derivative of the squared distance. That of the distance is -dx / r, -dy / r."),
+                Mistake(_rows(lambda dx, dy, r: [[-dx / r / 2, -dy / r / 2, 0], [dy / r**2, -dx / r**2, -1]]), "The derivative of the root has a factor 1/2, that of the square a factor 2: they cancel in row 0."),
+                Mistake(_rows(lambda dx, dy, r: [[-2 * dx / r, -2 * dy / r, 0], [dy / r**2, -dx / r**2, -1]]), "The derivative of the root has a factor 1/2, that of the square a factor 2: they cancel in row 0."),
+                Mistake(lambda x, l: measurement_jacobian(x, l)[::-1], "The order is distance, bearing: your rows are exchanged."),
+                Mistake(lambda x, l: measurement_jacobian(x, l)[:, :2], "The column of the heading is missing: distance and bearing by theta are 0 and -1."),
+                Mistake(_rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [dy / r**2, dx / r**2, -1]]), "A sign in row 1: -dx / r^2 in the column of y."),
+                Mistake(_rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [-dy / r**2, -dx / r**2, -1]]), "A sign in row 1: plus dy / r^2 in the column of x."),
+                Mistake(_rows(lambda dx, dy, r: [[dx / r, dy / r, 0], [-dy / r**2, dx / r**2, 1]]), "All signs are turned around: these are the derivatives of minus the measurement."),
+                Mistake(_rows(lambda dx, dy, r: [[-dy / r, -dx / r, 0], [dy / r**2, -dx / r**2, -1]]), "In row 0 dx and dy are exchanged."),
+                Mistake(_rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [dx / r**2, -dy / r**2, -1]]), "In row 1 dx and dy are exchanged: only a shift across the line of sight turns it."),
+                Mistake(_rows(lambda dx, dy, r: [[-dx / r, -dy / r, -1], [dy / r**2, -dx / r**2, -1]]), "The distance does not depend on the heading: the last entry of row 0 is 0."),
             ],
         ),
         Exercise(
             "motion_jacobians",
             reference=motion_jacobians,
             draw=pose_control_step,
-            metric=metrics.several(metrics.numbers(1e-9), metrics.numbers(1e-9), names=("G_x", "G_u")),
+            metric=metrics.several(metrics.numbers(1e-5), metrics.numbers(1e-5), names=("G_x", "G_u")),
             hints=(
                 "They are F_x and F_u of chapter 7 under another letter.",
                 "G_x is the identity with -v T sin(theta) and v T cos(theta) in the last column; G_u has T cos, T sin and T.",
-                "G_x = [[1, 0, -v T s], [0, 1, v T c], [0, 0, 1]], G_u = [[T c, 0], [T s, 0], [0, T]], with s, c of x[2].",
+                "`c, s, d = np.cos(x[2]), np.sin(x[2]), u[0] * dt; return np.array([[1, 0, -d * s], [0, 1, d * c], [0, 0, 1]]), dt * np.array([[c, 0], [s, 0], [0, 1]])`",
             ),
             mistakes=[
                 Mistake(_jacobians(_sine_sign), "In G_x, the derivative of the cosine is minus the sine."),
@@ -659,6 +806,22 @@ CHAPTER = Chapter(
                 Mistake(_jacobians(change_u=lambda G, x, u, t: G * u), "In G_u, v and omega must not appear: the step is linear in both."),
                 Mistake(lambda x, u, t: motion_jacobians(x, u, t)[::-1], "The order is G_x, G_u."),
                 Mistake(lambda x, u, t: odometry.step_jacobians(x, u, t, "midpoint"), "These are the midpoint model's. The lecture's filter moves along the old heading."),
+                Mistake(_jacobians(lambda G, x, u, t: G * [[1, 1, 1], [1, 1, -1], [1, 1, 1]]), "In G_x, the derivative of the sine is plus the cosine: a sign in row 1."),
+                Mistake(_jacobians(_last_column(lambda x, u, t: (-u[0] * np.sin(x[2]), u[0] * np.cos(x[2])))), "In G_x the time step is missing: the way is v T."),
+                Mistake(_jacobians(_last_column(lambda x, u, t: (-t * np.sin(x[2]), t * np.cos(x[2])))), "In G_x the speed is missing: the way is v T."),
+                Mistake(_jacobians(_last_column(lambda x, u, t: (-u[0] * np.sin(x[2]), u[0] * np.cos(x[2]))), lambda G, x, u, t: G / t), "The time step is missing from both."),
+                Mistake(_jacobians(_last_column(lambda x, u, t: (-u[0] * t * np.cos(x[2]), u[0] * t * np.sin(x[2])))), "In G_x, sine and cosine are exchanged."),
+                Mistake(_jacobians(_last_column(lambda x, u, t: (u[0] * t * np.cos(x[2]), u[0] * t * np.sin(x[2])))), "In G_x you put in the step itself. It holds the derivative of the step by theta."),
+                Mistake(_jacobians(_last_column(lambda x, u, t: (-u[1] * t * np.sin(x[2]), u[1] * t * np.cos(x[2])))), "In G_x you took omega for the speed: v is u[0]."),
+                Mistake(_jacobians(lambda G, x, u, t: G + np.diag([0, 0, u[1] * t])), "In G_x, omega T does not depend on theta: the last entry is 1."),
+                Mistake(_jacobians(change_u=lambda G, x, u, t: G / [[1, 1], [1, 1], [1, t]]), "In G_u the last entry is T: omega acts for a time step."),
+                Mistake(_jacobians(change_u=lambda G, x, u, t: G / [[t, 1], [t, 1], [1, 1]]), "In G_u the time step is missing from the first column."),
+                Mistake(_jacobians(change_u=lambda G, x, u, t: G[[1, 0, 2]]), "In G_u, sine and cosine are exchanged."),
+                Mistake(_jacobians(change_u=lambda G, x, u, t: G[:, ::-1]), "In G_u the columns are exchanged: first v, then omega."),
+                Mistake(_jacobians(change_u=lambda G, x, u, t: G * [u[0], 1]), "In G_u, v must not appear: the step is linear in it."),
+                Mistake(_jacobians(change_u=lambda G, x, u, t: G * [1, u[1]]), "In G_u, omega must not appear: the step is linear in it."),
+                Mistake(lambda x, u, t: motion_jacobians(odometry.step(x, u, t, "euler"), u, t), "You put in the new heading. The simplified model drives along the old one."),
+                Mistake(lambda x, u, t: odometry.step_jacobians(x, u, t, "arc"), "These are the exact arc's. The lecture's filter moves along the old heading."),
             ],
         ),
         Exercise(
@@ -669,7 +832,7 @@ CHAPTER = Chapter(
             hints=(
                 "Predict with the model itself and its Jacobians, then correct as before, with H in place of C.",
                 "The Jacobian H and the expected measurement belong to the predicted pose; the bearing innovation is wrapped.",
-                "x = odometry.step(x, u, dt, 'euler'); cov = G_x cov G_x' + G_u cov_u G_u'; y = z - measurement(x, landmark); y[1] = wrap_angle(y[1]); then K, x + K y, (I - K H) cov",
+                "`G_x, G_u = motion_jacobians(x, u, dt); x = odometry.step(x, u, dt, 'euler'); cov = G_x @ cov @ G_x.T + G_u @ cov_u @ G_u.T; H = measurement_jacobian(x, landmark); y = z - measurement(x, landmark); y[1] = wrap_angle(y[1]); K = cov @ H.T @ np.linalg.inv(H @ cov @ H.T + cov_z); return x + K @ y, (np.eye(3) - K @ H) @ cov`",
             ),
             mistakes=[
                 Mistake(_ekf(wrap=False), "The bearing innovation is not wrapped: a measurement just across +-pi throws your robot around by a full turn."),
@@ -707,6 +870,29 @@ CHAPTER = Chapter(
                     lambda *given: (ekf_step(*given)[0], _ekf(short=True)(*given)[1]),
                     "The pose is right. The covariance was predicted but not corrected: (I - K H) cov.",
                 ),
+                Mistake(_ekf(gain=lambda P, H, R: P @ H.T @ np.linalg.inv(R)), "S is the noise of the sensor plus the uncertainty of the expected measurement, H cov H'."),
+                Mistake(_ekf(gain=lambda P, H, R: P @ H.T @ (H @ P @ H.T + R)), "You multiplied by S. The gain divides by it: its inverse stands there."),
+                Mistake(_ekf(gain=lambda P, H, R: P @ H.T), "The division by S is missing from the gain."),
+                Mistake(_ekf(gain=lambda P, H, R: P @ H.T @ np.linalg.inv(H @ P @ H.T + R @ R)), "cov_z holds variances already: do not square it."),
+                Mistake(_ekf(shrink=lambda P, K, H: (np.eye(3) + K @ H) @ P), "A sign: (I - K H) cov. Yours grows with every measurement."),
+                Mistake(_ekf(shrink=lambda P, K, H: (1 - K @ H) @ P), "1 - K H subtracts from a matrix full of ones. The identity is np.eye(3)."),
+                Mistake(_ekf(shrink=lambda P, K, H: P @ (np.eye(3) - K @ H)), "The order: (I - K H) stands to the left of cov."),
+                Mistake(_ekf(shrink=lambda P, K, H: K @ H @ P), "This is what is taken away. The new covariance is what is left: (I - K H) cov."),
+                Mistake(_ekf(model="midpoint"), "The pose takes the midpoint step. This filter moves with the simplified model, \"euler\"."),
+                Mistake(_ekf(model="arc"), "The pose drives the arc. This filter moves with the simplified model, \"euler\"."),
+                Mistake(
+                    lambda x, cov, u, dt, cov_u, *given: _ekf(noise=False, carry=False)(x, cov, np.zeros(2), dt, cov_u, *given),
+                    "You only corrected: the prediction, motion and growing covariance, is missing.",
+                ),
+                Mistake(
+                    lambda x, cov, u, dt, cov_u, *given: _ekf(short=True)(*_ekf(noise=False)(x, cov, np.zeros(2), dt, cov_u, *given), u, dt, cov_u, *given),
+                    "You corrected first and moved then. The sensor measures after the motion: predict, then correct.",
+                ),
+                Mistake(
+                    lambda *given: (ekf_step(*given)[0] - _ekf(short=True)(*given)[0], ekf_step(*given)[1]),
+                    "You return the correction alone: add it to the predicted pose.",
+                ),
+                Mistake(lambda *given: ekf_step(*given)[::-1], "The order is pose, covariance."),
             ],
         ),
         Prediction(
@@ -724,7 +910,7 @@ CHAPTER = Chapter(
             hints=(
                 "Measure the error in units of the uncertainty the filter claims.",
                 "e' cov^-1 e with e = truth - x, the heading wrapped.",
-                "e = truth - x; e[2] = wrap_angle(e[2]); return e @ np.linalg.solve(cov, e)",
+                "`e = truth - x; e[2] = wrap_angle(e[2]); return e @ np.linalg.solve(cov, e)`",
             ),
             mistakes=[
                 Mistake(lambda t, x, P: (t - x) @ np.linalg.solve(P, t - x), "The heading error is not wrapped: both headings are nearly the same direction."),
@@ -736,6 +922,17 @@ CHAPTER = Chapter(
                     "You left the correlations out: use the whole inverse, not only the diagonal.",
                 ),
                 Mistake(lambda t, x, P: nees(t, x, P) / 3, "You divided by the number of states. Then the expectation is 1; here it should be 3."),
+                Mistake(lambda t, x, P: _error(t, x)[:2] @ np.linalg.solve(P[:2, :2], _error(t, x)[:2]), "The heading is missing: all three states count."),
+                Mistake(lambda t, x, P: (_error(t, x) / np.sqrt(np.diag(P))).sum(), "The errors have to be squared before they are added: e' cov^-1 e."),
+                Mistake(lambda t, x, P: (_error(t, x) ** 2 / np.sqrt(np.diag(P))).sum(), "Squares are divided by variances, and the correlations count as well: e' cov^-1 e."),
+                Mistake(lambda t, x, P: _error(t, x) * np.linalg.solve(P, _error(t, x)), "The sum is missing: `e @ ...` multiplies and adds, `e * ...` only multiplies."),
+                Mistake(lambda t, x, P: _error(t, x) @ (1 / P) @ _error(t, x), "`1 / cov` turns every entry over. The inverse of a matrix is np.linalg.inv(cov)."),
+                Mistake(lambda t, x, P: _error(t, x) @ _error(t, x) / np.linalg.det(P), "A determinant does not weigh directions: the inverse stands between e' and e."),
+                Mistake(lambda t, x, P: _error(t, x) @ _error(t, x) / np.trace(P), "The trace does not weigh directions: the inverse stands between e' and e."),
+                Mistake(lambda t, x, P: nees(t, x, P) ** 2, "Squared once too often: e' cov^-1 e is the square already."),
+                Mistake(lambda t, x, P: nees(t, x, P) / 2, "No half: that belongs to the exponent of the bell. The expectation is 3."),
+                Mistake(lambda t, x, P: ((t - x) ** 2 / np.diag(P)).sum(), "Two slips: the heading error is not wrapped, and the correlations are left out."),
+                Mistake(lambda t, x, P: (t - x) @ P @ (t - x), "Two slips: the heading error is not wrapped, and the covariance stands there instead of its inverse."),
             ],
         ),
         Prediction(
@@ -750,24 +947,27 @@ CHAPTER = Chapter(
             reference=gate,
             draw=SURPRISES,
             metric=metrics.exactly(),
-            draws=24,
+            draws=28,
             hints=(
                 "Is the surprise larger than the filter's own idea of how large surprises are?",
                 "Compare y' S^-1 y with the limit.",
-                "return bool(innovation @ np.linalg.solve(cov_innovation, innovation) <= limit)",
+                "`return bool(innovation @ np.linalg.solve(cov_innovation, innovation) <= limit)`",
             ),
             mistakes=[
                 Mistake(lambda y, S, g: not gate(y, S, g), "Exactly the other way round: True means plausible."),
                 Mistake(_gated(lambda y, S: y @ y), "You compare meters and radians with a number without unit: divide by the covariance S."),
-                Mistake(_gated(lambda y, S: np.sqrt(y @ np.linalg.solve(S, y))), "You took the root: the limit is one for the square."),
+                Mistake(_gated(lambda y, S: np.sqrt(y @ np.linalg.solve(S, y))), "Too much passes: the limit belongs to y' S^-1 y itself, no root taken, and stays what is given."),
                 Mistake(
                     _gated(lambda y, S: (y**2 / np.diag(S)).sum()),
                     "You left the correlation out: use the whole inverse of S, not only its diagonal.",
                 ),
                 Mistake(_gated(lambda y, S: y @ S @ y), "S stands in the middle as its inverse."),
-                Mistake(_gated(lambda y, S: (y @ np.linalg.solve(S, y)) ** 2), "Squared once too often: y' S^-1 y is the square already."),
+                Mistake(_gated(lambda y, S: (y @ np.linalg.solve(S, y)) ** 2), "Too little passes: y' S^-1 y is the square already, and the limit belongs to it as it is."),
                 Mistake(lambda y, S, g: True, "You let everything pass: what is the limit for?"),
                 Mistake(lambda y, S, g: False, "You refuse everything: such a filter never corrects itself."),
+                Mistake(lambda y, S, g: bool((y**2 <= g * np.diag(S)).all()), "You left the correlation out: use the whole inverse of S, not only its diagonal."),
+                Mistake(lambda y, S, g: bool((np.abs(y) <= 3 * np.sqrt(np.diag(S))).all()), "You left the correlation out: use the whole inverse of S, not only its diagonal."),
+                Mistake(lambda y, S, g: bool((np.abs(y) <= 2 * np.sqrt(np.diag(S))).all()), "You left the correlation out: use the whole inverse of S, not only its diagonal."),
             ],
         ),
     ],
