@@ -63,7 +63,8 @@ def whole_scan(draw):
 
 def plain_ray(rng):
     """grid, pose, bearing, r_max of a ray that meets a wall squarely enough for any way of stepping along it, and whose
-    range differs from those without heading or bearing and from the mirrored one: a slow answer gets few draws.
+    range differs from those without heading or bearing, from the mirrored one, and from that of the last wall behind: a
+    slow answer gets few draws.
     """
     grid = building().grid
     while True:
@@ -72,7 +73,8 @@ def plain_ray(rng):
         cast = grid.cast(pose, np.array([b - 0.02, b - 0.01, b, b + 0.01, b + 0.02, *others]), R_MAX)
         around, wrong = cast[:5], cast[5:]
         squarely = np.ptp(around) < min(0.12 * around[2], 0.25) and around[2] > 1.0
-        if squarely and np.abs(wrong - around[2]).min() > 0.3:
+        behind = squarely and _hits(grid, pose, b, R_MAX, grid.resolution / 2).max(initial=0.0) > around[2] + 1.0
+        if behind and np.abs(wrong - around[2]).min() > 0.3:
             return grid, pose, b, R_MAX
 
 
@@ -392,10 +394,6 @@ def _ray_reversed(grid, pose, bearing, r_max):
     return maps.walk_ray(grid, pose, -bearing, r_max)
 
 
-def _ray_from_the_origin(grid, pose, bearing, r_max):
-    return maps.walk_ray(grid, np.array([0.0, 0.0, pose[2]]), bearing, r_max)
-
-
 def _hits(grid, pose, bearing, r_max, step):
     """Distances, `step` apart, at which a ray is in an occupied cell."""
     angle, r = pose[2] + bearing, np.arange(0, r_max, step)
@@ -403,14 +401,7 @@ def _hits(grid, pose, bearing, r_max, step):
 
 
 def _ray_to_the_last(grid, pose, bearing, r_max):
-    return float(_hits(grid, pose, bearing, r_max, grid.resolution / 2)[-1])
-
-
-def _ray_in_steps(step):
-    def variant(grid, pose, bearing, r_max):
-        return float([*_hits(grid, pose, bearing, r_max, step), r_max][0])
-
-    return variant
+    return float([r_max, *_hits(grid, pose, bearing, r_max, grid.resolution / 2)][-1])
 
 
 def _motion(std=lambda s: s, shared=False, on_pose=False, none=False):
@@ -856,6 +847,14 @@ CHAPTER = Chapter(
                     "A small negative error became one near 360 deg. Wrap the difference to [-pi, pi).",
                 ),
                 Mistake(_landmarks(wrap="degrees"), "Your bearing error is in degrees, std_bearing is in radians."),
+                Mistake(
+                    lambda x, z, *rest: landmark_weight(x, z[:, ::-1], *rest),
+                    "Range and bearing have changed places: z[:, 0] are the ranges, z[:, 1] the bearings.",
+                ),
+                Mistake(
+                    lambda x, z, marks, *stds: landmark_weight(x, z[:1], marks[:1], *stds),
+                    "Only the first landmark counts. Is `return` inside the loop? It belongs after it.",
+                ),
                 Mistake(_landmarks(stds=(1, 0)), "The two standard deviations have changed places."),
                 Mistake(_landmarks(stds=(0, 0)), "Bearings have a standard deviation of their own, std_bearing."),
                 Mistake(
@@ -940,13 +939,12 @@ CHAPTER = Chapter(
                 Mistake(_ray_swapped, "Sine and cosine have changed places: x goes with the cosine."),
                 Mistake(
                     lambda grid, x, b, r_max: r_max,
-                    "You return r_max whatever stands in the way. Is `return r_max` inside the loop? It belongs after it.",
+                    "You return r_max whatever stands in the way. Is `return r_max` inside the loop, or a step longer than a cell is wide?",
                 ),
                 Mistake(
                     lambda grid, x, b, r_max: 0.0,
-                    "Your ray ends where it starts: go on while the cell is *not* maps.OCCUPIED.",
+                    "Your ray ends where it starts. Does it start at x, y of the pose, and go on while the cell is *not* maps.OCCUPIED?",
                 ),
-                Mistake(_ray_from_the_origin, "The robot's position is missing: the beam starts at x, y of the pose."),
                 Mistake(
                     lambda grid, x, b, r_max: maps.walk_ray(grid, x, b - 2 * x[2], r_max),
                     "The heading counts the wrong way: the beam points to theta + bearing.",
@@ -956,8 +954,6 @@ CHAPTER = Chapter(
                     "cos and sin take radians, and pose and bearing are in radians already.",
                 ),
                 Mistake(_ray_to_the_last, "Your ray goes on through walls: stop in the *first* occupied cell."),
-                Mistake(_ray_in_steps(0.5), "Your steps are longer than a cell is wide: they jump over walls."),
-                Mistake(_ray_in_steps(1.0), "Your steps are longer than a cell is wide: they jump over walls."),
                 Mistake(_ray_to_infinity, "Nothing hit means r_max, the scanner's limit, not infinity."),
                 Mistake(_ray_without_end, "A scanner sees r_max at most: return r_max when nothing is hit before."),
             ],
@@ -987,6 +983,14 @@ CHAPTER = Chapter(
                     "The factor 1 / (std sqrt(2 pi)) stands once in each density: as many times as there are beams.",
                 ),
                 *_density_mistakes(_beams, "beams"),
+                Mistake(
+                    lambda r, e, s: float(np.prod(_normal_log(r - e, s))),
+                    "You multiplied logarithms. The logarithm of a product is the *sum* of the logarithms.",
+                ),
+                Mistake(
+                    lambda r, e, s: float(_normal_log(r[0] - e[0], s)),
+                    "Only the first beam counts. Is `return` inside the loop? It belongs after it.",
+                ),
                 Mistake(
                     _errors_added_first, "You added the errors and squared their sum. Square each error, then add up."
                 ),
@@ -1255,10 +1259,6 @@ CHAPTER = Chapter(
                     lambda w, t: w.max() > t,
                     "You compare the largest weight. Compare effective_size(weights) with threshold * len(weights).",
                 ),
-                Mistake(
-                    lambda w, t: np.var(w) > t,
-                    "The variance of weights of any sum has no fixed yardstick: compare effective_size(weights).",
-                ),
                 Mistake(lambda w, t: True, "You resample always. With even weights that only loses particles."),
                 Mistake(
                     lambda w, t: False,
@@ -1279,6 +1279,10 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(
+                    lambda a, w: float(odometry.wrap_angle(a.mean())),
+                    "The arithmetic mean of angles across the seam points backward. Average directions, not numbers.",
+                ),
+                Mistake(
                     lambda a, w: float(w @ a / w.sum()),
                     "The arithmetic mean of angles across the seam points backward. Average directions, not numbers.",
                 ),
@@ -1292,8 +1296,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(lambda a, w: particles.circular_mean(a), "The weights are missing."),
                 Mistake(
-                    lambda a, w: float(odometry.wrap_angle(a.mean())),
-                    "The arithmetic mean of angles across the seam points backward. Average directions, not numbers.",
+                    lambda a, w: (float((w * np.cos(a)).sum()), float((w * np.sin(a)).sum())),
+                    "That is the mean vector. Its direction is asked for: np.arctan2(sine part, cosine part).",
                 ),
                 Mistake(lambda a, w: float(np.median(a)), "The median of angles depends on where their seam lies."),
                 Mistake(

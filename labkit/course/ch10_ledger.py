@@ -27,7 +27,7 @@ NUMBERS = tuple(functools.partial(printed_number, form=form) for form in FORMS)
 COMPARISONS = tuple(
     functools.partial(comparison, off=off, bound=bound, misprint=misprint, simulated=simulated)
     for off, bound, misprint, simulated in itertools.product(
-        (0.0, 0.4, 2.0, 60.0), (0.0, 1.5, 100.0), (False, True), (False, True)
+        (0.0, 0.4, 1.8, 60.0), (0.0, 1.5, 100.0), (False, True), (False, True)
     )
 )
 
@@ -147,7 +147,7 @@ STATUSES = (
     ),
     (
         _judged(_real_word, lambda h, o, b, m: "unpublished" if o <= h + b else "misprint" if m else "superseded"),
-        "A simulated value is never a misprint: without the inputs nothing can be proved.",
+        "A simulation far from the printed value proves no misprint: the claim is superseded.",
     ),
     (
         _judged(_real_word, lambda h, o, b, m: "unpublished" if o <= h else "superseded"),
@@ -170,7 +170,7 @@ STATUSES = (
             lambda h, o, b, m: "misprint" if m else _real_word(h, o, b, m),
             lambda h, o, b, m: "misprint" if m else _simulated_word(h, o, b, m),
         ),
-        "You ask for the misprint first. A number that comes out, or was never published, is no misprint.",
+        "*misprint* comes last: ask for `simulated` first, then for *reproduced* and *rounding*.",
     ),
     (
         _judged(lambda h, o, b, m: "rounding" if o <= h + b else _real_word(h, o, b, m)),
@@ -187,7 +187,7 @@ STATUSES = (
             lambda h, o, b, m: "reproduced" if o <= h else "rounding" if o <= b else "misprint" if m else "superseded",
             lambda h, o, b, m: "unpublished" if o <= b else "superseded",
         ),
-        "Half unit and bound add up: the printed number was rounded, and so were its inputs.",
+        "Compare with half unit + bound: the printed number itself was rounded too.",
     ),
     (_within_a_unit, "You compare with a whole unit of the last digit. Rounding hides half of it."),
     (_signed, "A value below the printed one is off as well: take the absolute difference."),
