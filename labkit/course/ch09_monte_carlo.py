@@ -10,7 +10,7 @@ from . import metrics
 from .engine import Chapter, Exercise, Mistake, Prediction, Value
 
 R_MAX = 18.0
-IMPORTS = 6.0  # seconds a call may take where students import scipy.stats, which alone can take two
+IMPORTS = 6.0  # seconds a call may take where students use scipy.stats: its import alone can take two, and it is slow
 
 
 @functools.cache
@@ -1101,6 +1101,7 @@ CHAPTER = Chapter(
                 ),
             ],
             draws=8,
+            limit=IMPORTS,
         ),
         Exercise(
             "resample_systematic",
@@ -1145,6 +1146,7 @@ CHAPTER = Chapter(
                 ),
             ],
             draws=8,
+            limit=IMPORTS,
         ),
         Prediction(
             "standing",
