@@ -218,7 +218,7 @@ ex.predict("field", guess, reveal=stages.field_against_beams)
 # %% resample_roulette
 @ex.resample_roulette
 def resample_roulette(weights, rng):
-    """Return M indices, each drawn independently with probability w / W."""
+    """Return M indices, each drawn independently with probability w / W; weights, shape (M,), have any sum W."""
     ### BEGIN SOLUTION
     ends = np.cumsum(weights)
     return np.searchsorted(ends, rng.random(len(weights)) * ends[-1], side="right")
@@ -228,7 +228,7 @@ def resample_roulette(weights, rng):
 # %% resample_systematic
 @ex.resample_systematic
 def resample_systematic(weights, rng):
-    """Return M indices by one random turn of a wheel with M evenly spaced spokes."""
+    """Return M indices by one random turn of a wheel with M evenly spaced spokes; weights, shape (M,), have any sum."""
     ### BEGIN SOLUTION
     ends, M = np.cumsum(weights), len(weights)
     spokes = (rng.random() + np.arange(M)) * ends[-1] / M
@@ -259,7 +259,7 @@ ex.predict("standing", guess, reveal=stages.standing)
 # %% effective_size
 @ex.effective_size
 def effective_size(weights):
-    """Return how many equal weights these weights, of any sum, are worth."""
+    """Return how many equal weights these weights, shape (M,), of any sum, are worth."""
     ### BEGIN SOLUTION
     return weights.sum() ** 2 / (weights**2).sum()
     ### END SOLUTION
@@ -296,7 +296,7 @@ stages.twelve_pictures()
 # %% circular_mean
 @ex.circular_mean
 def circular_mean(angles, weights):
-    """Return the weighted mean direction (rad)."""
+    """Return the weighted mean direction (rad) of angles (rad), shape (n,), with weights, shape (n,), of any sum."""
     ### BEGIN SOLUTION
     return np.arctan2(np.sum(weights * np.sin(angles)), np.sum(weights * np.cos(angles)))
     ### END SOLUTION
@@ -394,7 +394,7 @@ print("found" if error < 0.3 and turn < np.deg2rad(10) else "lost", "at the end"
 # no names. None raises an error on
 # friendly input, and all look fine in a plot. **Write the test that catches it**: a function that returns True for
 # what is correct and False for the specimen.
-# Your test is tried on correct resamplers too. It must not reject them.
+# It answers with `return`, not with `assert`. It is tried on correct functions too, and must not reject them.
 
 # %% hunt_1
 print(inspect.getsource(museum.specimen_1))

@@ -117,7 +117,7 @@ HTML(pages.findings_html(found, pages.UNPUBLISHED))
 # %% break-it [markdown]
 # ## Break it
 #
-# Does the ledger notice? Take the first rows that are reproduced, change the last digit of the printed number, and judge again.
+# Does the ledger notice? Take three reproduced rows that print 0.99..., move the last digit of the printed number by five, and judge again.
 
 # %% break-it-code
 from dataclasses import replace

@@ -1,8 +1,10 @@
 """Chapter 9's exercises: answers that look right and are not, and right ones of more than one style."""
 
+import re
+
 import numpy as np
 import pytest
-from scipy.stats import norm
+from scipy.stats import chisquare, norm
 
 from labkit import maps, odometry, particles
 from labkit.course import session
@@ -110,3 +112,106 @@ def test_recover_in_another_order_is_named():
         return slow, fast, share
 
     assert "order" in judge("recover", turned).text
+
+
+ITEMS = {item.id: item for item in CHAPTER.items if hasattr(item, "hints")}
+
+
+@pytest.mark.parametrize("name", [name for name, item in ITEMS.items() if hasattr(item, "draw")])
+def test_the_last_hint_is_right_when_typed_as_it_stands(name):
+    code = [line for part in re.findall("`([^`]*)`", ITEMS[name].hints[-1]) for line in part.split("; ")]
+    known = {"np": np, "maps": maps, "odometry": odometry, "effective_size": particles.effective_size}
+    exec(f"def answer({', '.join(ITEMS[name].arguments)}):\n    " + "\n    ".join(code), known)
+    assert judge(name, known["answer"]).status == CORRECT
+
+
+def test_noise_in_single_precision_is_right():
+    def answer(states, u, dt, std_u, rng):
+        noise = std_u * rng.standard_normal((len(states), 2), dtype=np.float32)
+        return odometry.step(states, u + noise, dt).astype(np.float32)
+
+    assert judge("sample_motion", answer).status == CORRECT
+
+
+MOTIONS_WITHOUT_NOISE = {
+    "stands still": lambda x, u, dt, std_u, rng: odometry.step(x, std_u * rng.standard_normal((len(x), 2)), dt),
+    "still scatter": lambda x, u, dt, std_u, rng: odometry.step(x, u + rng.standard_normal((len(x), 2)), dt),
+    "dt were 1": lambda x, u, dt, std_u, rng: odometry.step(x, u + std_u * rng.standard_normal((len(x), 2)), 1.0),
+    "shape (2, 3)": lambda x, u, dt, std_u, rng: odometry.step(x[0], u + std_u * rng.standard_normal(2), dt),
+}
+
+
+@pytest.mark.parametrize("words", MOTIONS_WITHOUT_NOISE)
+def test_what_is_wrong_without_noise_is_said(words):
+    assert words in judge("sample_motion", MOTIONS_WITHOUT_NOISE[words]).text
+
+
+def test_spins_that_go_on_where_the_last_one_ended_are_refused():
+    def wheel(weights, rng):
+        found, i, left = [], int(rng.integers(len(weights))), 0.0
+        for _ in weights:
+            left += 2 * weights.max() * rng.random()
+            while left > weights[i]:
+                left, i = left - weights[i], (i + 1) % len(weights)
+            found.append(i)
+        return found
+
+    assert all("not independent" in judge("resample_roulette", wheel, seed).text for seed in range(3))
+
+
+@pytest.mark.parametrize("answer", [161.65, 162.5])
+def test_beams_are_whole(answer):
+    assert ITEMS["beams_to_zero"].judge(answer).status == NOT_YET
+
+
+def chi_square(resample, rng):
+    weights = np.array([0.1, 0.7, 0.1, 0.1])
+    counts = sum(np.bincount(resample(weights, rng), minlength=4) for _ in range(1000))
+    return chisquare(counts, weights * counts.sum()).pvalue > 1e-6
+
+
+def impossible_ones(resample, rng):
+    weights = np.array([0.0, 0.01, 0.0, 0.99])
+    return not any(np.isin(resample(weights, rng), (0, 2)).any() for _ in range(500))
+
+
+def by_the_heavy_one(resample, rng):
+    weights = np.r_[0.55, np.full(9, 0.05)]
+    return bool(abs(np.mean([np.mean(resample(weights, rng) == 0) for _ in range(2000)]) - 0.55) < 0.02)
+
+
+def any_exception(resample, rng):
+    try:
+        return all(resample(np.full(100, 0.0098), rng).max() < 100 for _ in range(50))
+    except Exception:
+        return False
+
+
+def three_readings(weigh):
+    states, mark = np.array([[0.0, 0, 0], [0.2, 0, 0]]), np.array([[1.0, 0]])
+    one, three = (np.log(weigh(states, np.ones(n), np.repeat(mark, n, 0), 0.3)) for n in (1, 3))
+    return abs(np.diff(three)[0] - 3 * np.diff(one)[0]) < 1e-6
+
+
+TESTS = {"hunt_1": (chi_square, impossible_ones), "hunt_2": (by_the_heavy_one,), "hunt_3": (any_exception,)}
+
+
+@pytest.mark.parametrize(
+    "name, test", [(k, t) for k, tests in {**TESTS, "hunt_4": (three_readings,)}.items() for t in tests]
+)
+def test_property_tests_of_several_kinds_catch_a_specimen(name, test):
+    assert judge(name, test).status == CORRECT
+
+
+def test_a_test_that_looks_at_the_name_catches_nothing():
+    outcome = judge("hunt_1", lambda resample, rng: resample.__name__ != "specimen_1")
+    assert outcome.status == NOT_YET and "shares" in outcome.text
+
+
+def test_a_test_that_is_too_strict_is_told_which_correct_function_it_rejects():
+    def exact(resample, rng):
+        return np.allclose(
+            np.bincount(resample(np.array([0.1, 0.7, 0.1, 0.1]), rng), minlength=4), [0.4, 2.8, 0.4, 0.4]
+        )
+
+    assert "counts scatter" in judge("hunt_1", exact).text

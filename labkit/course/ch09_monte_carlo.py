@@ -10,7 +10,7 @@ from . import metrics
 from .engine import Chapter, Exercise, Mistake, Prediction, Value
 
 R_MAX = 18.0
-IMPORTS = 6.0  # seconds a call may take where students import scipy.stats, which alone can take two
+IMPORTS = 6.0  # seconds a call may take where students use scipy.stats: its import alone can take two, and it is slow
 
 
 @functools.cache
@@ -63,7 +63,8 @@ def whole_scan(draw):
 
 def plain_ray(rng):
     """grid, pose, bearing, r_max of a ray that meets a wall squarely enough for any way of stepping along it, and whose
-    range differs from those without heading or bearing and from the mirrored one: a slow answer gets few draws.
+    range differs from those without heading or bearing, from the mirrored one, and from that of the last wall behind: a
+    slow answer gets few draws.
     """
     grid = building().grid
     while True:
@@ -72,7 +73,9 @@ def plain_ray(rng):
         cast = grid.cast(pose, np.array([b - 0.02, b - 0.01, b, b + 0.01, b + 0.02, *others]), R_MAX)
         around, wrong = cast[:5], cast[5:]
         squarely = np.ptp(around) < min(0.12 * around[2], 0.25) and around[2] > 1.0
-        if squarely and np.abs(wrong - around[2]).min() > 0.3:
+        behind = squarely and _hits(grid, pose, b, R_MAX, grid.resolution / 2).max(initial=0.0) > around[2] + 1.0
+        apart = np.diff(np.sort(wrong)).min() > 0.2  # none of these slips is mistaken for another one
+        if behind and apart and np.abs(wrong - around[2]).min() > 0.3:
             return grid, pose, b, R_MAX
 
 
@@ -127,6 +130,69 @@ def _no_half(x, std):
 
 def _no_root(x, std):
     return -0.5 * np.square(x / std) - np.log(std * 2 * math.pi)
+
+
+def _log_density(power=1.0, peak=None, exponent=2, sign=-1):
+    """A slip in log N: the error divided by std**power, raised to `exponent`, `sign`; peak(std): what is subtracted."""
+    peak = peak or (lambda std: np.log(std * math.sqrt(2 * math.pi)))
+
+    def density(x, std):
+        return sign * 0.5 * np.abs(x / std**power) ** exponent - peak(std)
+
+    return density
+
+
+def _normal(x, std):
+    return np.exp(_normal_log(x, std))
+
+
+def _logarithm(total):
+    return float(np.log(total))
+
+
+DENSITIES = (
+    (_no_half, "The factor one half in the exponent is missing."),
+    (_log_density(power=0.5), "The error is divided by std and then squared: std is squared with it."),
+    (_log_density(exponent=1), "The error divided by std is to be squared."),
+    (_log_density(sign=1), "The exponent is negative: a large error makes p small."),
+    (_no_root, "The root is missing: each density is divided by std * sqrt(2 pi)."),
+    (
+        _log_density(peak=lambda std: np.log(2 * math.pi * std**2)),
+        "The root is missing: each density is divided by std * sqrt(2 pi).",
+    ),
+    (
+        _log_density(peak=lambda std: np.log(std**2 * math.sqrt(2 * math.pi))),
+        "Each density is divided by std * sqrt(2 pi), not by the variance times the root.",
+    ),
+    (_log_density(peak=np.log), "sqrt(2 pi) is missing: each density is divided by std * sqrt(2 pi)."),
+    (
+        _log_density(peak=lambda std: 0.5 * np.log(2 * math.pi)),
+        "std is missing in the factor in front: each density is divided by std * sqrt(2 pi).",
+    ),
+    (
+        _log_density(peak=lambda std: np.log(std * math.sqrt(2) * math.pi)),
+        "The root covers 2 and pi both: each density is divided by std * sqrt(2 pi).",
+    ),
+    (
+        _log_density(peak=lambda std: np.log(std * math.sqrt(2))),
+        "pi is missing: each density is divided by std * sqrt(2 pi).",
+    ),
+    (
+        _log_density(peak=lambda std: -np.log(std * math.sqrt(2 * math.pi))),
+        "The factor 1 / (std sqrt(2 pi)) divides: its logarithm is subtracted.",
+    ),
+    (
+        lambda x, std: _normal_log(x, std) / math.log(10),
+        "That is the logarithm to base 10. log is the natural one here, np.log.",
+    ),
+)
+
+
+def _density_mistakes(variant, readings):
+    """Slips in the density; variant(density, after=...) sums up densities of the readings, `after` is applied to it."""
+    slips = [Mistake(variant(density), text) for density, text in DENSITIES]
+    added = f"You added the densities. Independent {readings} multiply: their *logarithms* are added."
+    return [*slips, Mistake(variant(_normal), added), Mistake(variant(_normal, after=_logarithm), added)]
 
 
 def _end_points(pose, ranges, bearings):
@@ -186,30 +252,69 @@ def recover(w_mean, w_slow, w_fast, alpha_slow, alpha_fast):
 # Wrong variants ------------------------------------------------------------------------------------------------------
 
 
-def _landmarks(wrap=True, turn=1, swap=False, back=False, square=False, log=True, peak=True, parts=(1, 1), density=None):
+def _landmarks(
+    density=None,
+    wrap=True,
+    turn=1,
+    swap=False,
+    back=False,
+    square=False,
+    log=True,
+    peak=True,
+    parts=(1, 1),
+    stds=None,
+    after=float,
+):
     density = density or _normal_log
+    exchanged = stds
 
     def variant(pose, z, landmarks, std_range, std_bearing):
         dx, dy = (pose[:2] - landmarks if back else landmarks - pose[:2]).T
         bearing = np.arctan2(dx, dy) if swap else np.arctan2(dy, dx)
         if wrap == "expected":
             error = z[:, 1] - odometry.wrap_angle(bearing - pose[2])
+        elif wrap == "positive":
+            error = (z[:, 1] - bearing + pose[2]) % (2 * math.pi)
+        elif wrap == "degrees":
+            error = np.rad2deg(odometry.wrap_angle(z[:, 1] - bearing + pose[2]))
         else:
             error = z[:, 1] - bearing + turn * pose[2]
             error = odometry.wrap_angle(error) if wrap else error
         stds = (std_range**2, std_bearing**2) if square else (std_range, std_bearing)
+        stds = stds if exchanged is None else tuple(stds[k] for k in exchanged)
         terms = parts[0] * density(z[:, 0] - np.hypot(dx, dy), stds[0]) + parts[1] * density(error, stds[1])
         total = terms.sum() if peak else terms.sum() + len(z) * np.log(2 * math.pi * stds[0] * stds[1])
-        return float(total if log else np.exp(total))
+        return after(total if log else np.exp(total))
 
     return variant
 
 
-def _field_with(density):
+def _products_added(pose, z, landmarks, std_range, std_bearing):
+    one = [landmark_weight(pose, z[k : k + 1], landmarks[k : k + 1], std_range, std_bearing) for k in range(len(z))]
+    return _logarithm(np.exp(one).sum())
+
+
+def _beams(density, after=float):
+    return lambda ranges, expected, std: after(density(ranges - expected, std).sum())
+
+
+def _errors_added_first(ranges, expected, std):
+    return float(-0.5 * (np.sum(ranges - expected) / std) ** 2 - len(ranges) * np.log(std * math.sqrt(2 * math.pi)))
+
+
+def _field_with(density, after=float):
     def variant(grid, pose, ranges, bearings, std):
-        return float(density(grid.distance[grid.cell_of(_end_points(pose, ranges, bearings))], std).sum())
+        return after(density(grid.distance[grid.cell_of(_end_points(pose, ranges, bearings))], std).sum())
 
     return variant
+
+
+def _field_straight_ahead(grid, pose, ranges, bearings, std):
+    return _field(grid, _end_points(pose, ranges, np.zeros_like(bearings)), std)
+
+
+def _field_one_peak(grid, pose, ranges, bearings, std):
+    return _field_no_peak(grid, pose, ranges, bearings, std) - math.log(std * math.sqrt(2 * math.pi))
 
 
 def _field_mirrored(grid, pose, ranges, bearings, std):
@@ -290,6 +395,16 @@ def _ray_reversed(grid, pose, bearing, r_max):
     return maps.walk_ray(grid, pose, -bearing, r_max)
 
 
+def _hits(grid, pose, bearing, r_max, step):
+    """Distances, `step` apart, at which a ray is in an occupied cell."""
+    angle, r = pose[2] + bearing, np.arange(0, r_max, step)
+    return r[grid.at(pose[:2] + r[:, None] * [math.cos(angle), math.sin(angle)]) == maps.OCCUPIED]
+
+
+def _ray_to_the_last(grid, pose, bearing, r_max):
+    return float([r_max, *_hits(grid, pose, bearing, r_max, grid.resolution / 2)][-1])
+
+
 def _motion(std=lambda s: s, shared=False, on_pose=False, none=False):
     def variant(states, u, dt, std_u, rng):
         if on_pose:
@@ -322,6 +437,59 @@ def _uniform_choice(weights, rng):
 
 def _recover(w_slow, w_fast):
     return max(0.0, 1 - w_fast / w_slow), w_slow, w_fast
+
+
+def _share(share):
+    """Right averages and another share of them."""
+
+    def variant(*args):
+        _, slow, fast = particles.recover(*args)
+        return share(slow, fast), slow, fast
+
+    return variant
+
+
+def _averaged(change):
+    """Averages by another rule change(w, w_mean, alpha), and the share of those."""
+    return lambda m, s, f, a, b: _recover(change(s, m, a), change(f, m, b))
+
+
+RECOVERIES = (
+    Mistake(
+        _share(lambda s, f: f / s), "That is the ratio itself. The share is what it lacks to 1: 1 - w_fast / w_slow."
+    ),
+    Mistake(
+        _share(lambda s, f: min(1.0, f / s)),
+        "That is the ratio itself. The share is what it lacks to 1: 1 - w_fast / w_slow.",
+    ),
+    Mistake(_share(lambda s, f: min(0.0, 1 - f / s)), "You took the smaller of the two. Take the larger, max(0, ...)."),
+    Mistake(_share(lambda s, f: max(1.0, 1 - f / s)), "The limit below is 0, not 1: max(0, 1 - w_fast / w_slow)."),
+    Mistake(_share(lambda s, f: abs(1 - f / s)), "When things go well nothing is replaced: below 0 means 0, no abs."),
+    Mistake(_share(lambda s, f: max(0.0, f / s - 1)), "The sign is wrong: the share is large when w_fast is *small*."),
+    Mistake(_share(lambda s, f: max(0.0, s - f)), "The share has no unit: divide by w_slow, 1 - w_fast / w_slow."),
+    Mistake(_share(lambda s, f: max(0.0, (1 - f) / s)), "Brackets: 1 - w_fast / w_slow, not (1 - w_fast) / w_slow."),
+    Mistake(_share(lambda s, f: 100 * max(0.0, 1 - f / s)), "A share lies between 0 and 1; yours is in percent."),
+    Mistake(_share(lambda s, f: round(max(0.0, 1 - f / s), 2)), "Return the share as it comes out, without rounding."),
+    Mistake(
+        lambda m, s, f, a, b: (max(0.0, 1 - m / s), *particles.recover(m, s, f, a, b)[1:]),
+        "You compare the mean weight itself. Compare its quick average w_fast: single scans jump.",
+    ),
+    Mistake(_averaged(lambda w, m, a: a * (m - w)), "That is the change alone. It is added to the old average."),
+    Mistake(_averaged(lambda w, m, a: a * m), "The old average is lost: w + alpha * (w_mean - w)."),
+    Mistake(_averaged(lambda w, m, a: m), "alpha is missing: the averages jump to w_mean at once."),
+    Mistake(_averaged(lambda w, m, a: w * (1 + a * (m - w))), "You multiplied the average by its change. It is added."),
+    Mistake(
+        _averaged(lambda w, m, a: (1 - a) * w + m), "alpha is missing before w_mean: (1 - alpha) * w + alpha * w_mean."
+    ),
+    Mistake(lambda m, s, f, a, b: _recover(s + a * (m - s), f + a * (m - f)), "w_fast has its own alpha, alpha_fast."),
+    Mistake(lambda m, s, f, a, b: _recover(s + b * (m - s), f + b * (m - f)), "w_slow has its own alpha, alpha_slow."),
+    Mistake(lambda m, s, f, a, b: _recover(s, f + b * (m - f)), "w_slow has not been brought up to date."),
+    Mistake(lambda m, s, f, a, b: _recover(s + a * (m - s), f), "w_fast has not been brought up to date."),
+    Mistake(
+        lambda m, s, f, a, b: (lambda slow: _recover(slow, f + b * (slow - f)))(s + a * (m - s)),
+        "w_fast moves toward w_mean, not toward w_slow.",
+    ),
+)
 
 
 def _from_the_sum_of_squares(weights):
@@ -385,7 +553,7 @@ def _proportional(resample, rng):
 
 def _spins_are_independent(resample, rng):
     weights = np.full(10, 0.1)
-    counts = np.array([np.bincount(resample(weights.copy(), rng), minlength=10) for _ in range(300)])
+    counts = np.array([np.bincount(resample(weights.copy(), rng), minlength=10) for _ in range(600)])
     variance = float(counts.var(0).mean())
     if variance < 0.6:
         return (
@@ -395,6 +563,12 @@ def _spins_are_independent(resample, rng):
         return (
             f"some spins share their random number: a count varies by {variance:.1f} instead of 0.9 (variance of a "
             "binomial). Each spin needs its own."
+        )
+    half = float(counts[:, :5].sum(1).var())
+    if half < 1.9:
+        return (
+            f"the spins are not independent: the draws from one half of the wheel vary by {half:.1f} instead of 2.5. "
+            "Does each spin start where the last one ended?"
         )
     return None
 
@@ -453,10 +627,22 @@ def _noise_off_is_reckoning(move, rng):
     moved = move(states.copy(), np.array([1.0, 0.5]), 0.2, np.zeros(2), rng)
     if moved is None:
         return "it returned None: is a `return` missing?"
-    moved = np.asarray(moved)
-    if moved.shape != states.shape or np.abs(moved - odometry.step(states, (1.0, 0.5), 0.2)).max() > 1e-9:
-        return "with std_u = 0 every particle must move as odometry.step(states, u, dt) says: noise enters through u only."
-    return None
+    moved, right = np.asarray(moved), odometry.step(states, (1.0, 0.5), 0.2)
+    if moved.shape != states.shape:
+        return f"expected an array of shape (2, 3) for two particles, got {moved.shape}."
+    if np.abs(moved - right).max() <= (1e-5 if moved.dtype == np.float32 else 1e-9):
+        return None
+    if np.abs(moved - states).max() < 1e-9:
+        return "with std_u = 0 every particle stands still: u itself is missing. The noise is added to it."
+    if np.abs(moved - odometry.step(states, (1.0, 0.5), 1.0)).max() < 1e-9:
+        return "the particles move as if dt were 1: hand dt to odometry.step."
+    again = np.asarray(move(states.copy(), np.array([1.0, 0.5]), 0.2, np.zeros(2), rng))
+    if np.abs(again - moved).max() > 1e-9:
+        return "with std_u = 0 the particles still scatter: noise enters through u only, scaled by std_u."
+    return (
+        f"with std_u = 0 every particle must move as odometry.step(states, u, dt) says, from {states[1].tolist()} "
+        f"to {np.round(right[1], 4).tolist()}. Yours gets to {np.round(moved[1], 4).tolist()}."
+    )
 
 
 # The bug hunt --------------------------------------------------------------------------------------------------------
@@ -475,20 +661,25 @@ def _weights_multiplied(states, ranges, landmarks, std):
 
 
 GOOD = (particles.resample_roulette, particles.resample_systematic, _stratified)
+GOOD_WORDS = {
+    particles.resample_roulette: "roulette, whose counts scatter from run to run, so that only shares over many runs are near the weights",
+    particles.resample_systematic: "the spoke wheel, whose draws come in order and are not independent",
+    _stratified: "one spin in each of M equal sectors, whose draws come in order",
+    _weights_multiplied: "densities multiplied, then divided by their sum",
+}
 
 
 def _on_show(specimen):
     """The specimen, with advice for a test that lets its exception through."""
 
-    @functools.wraps(specimen)
-    def shown(*args):
+    def resample(*args):
         try:
             return specimen(*args)
         except IndexError as error:
             advice = "raised by the specimen: let your test catch that, try: ... except IndexError: return False"
             raise IndexError(f"{error} ({advice})") from error
 
-    return shown
+    return resample  # under a name that gives nothing away
 
 
 def _catches(specimen, good, extra=()):
@@ -498,13 +689,16 @@ def _catches(specimen, good, extra=()):
         verdict = test(specimen, *((rng,) if extra else ()))
         if not isinstance(verdict, bool | np.bool_):
             return f"a test answers True (passed) or False (caught), got {type(verdict).__name__}."
-        return "your test lets the specimen pass." if verdict else None
+        return (
+            "your test sometimes lets the specimen pass: give it more runs, or weights it fails on clearly."
+            if verdict
+            else None
+        )
 
     def accepts(function):
         def check(test, rng):
             if not test(function, *((rng,) if extra else ())):
-                name = function.__name__.strip("_").replace("resample_", "")
-                return f"your test also rejects a correct function ({name}): it asks for more than must hold."
+                return f"your test also rejects a correct function ({GOOD_WORDS[function]}): it asks for more than must hold."
             return None
 
         return check
@@ -543,7 +737,7 @@ def hunt_4(weigh):
     return bool(np.isclose(twice[0] / twice[1], (once[0] / once[1]) ** 2))
 
 
-def _hunt(id, reference, specimen, hints, good=GOOD, extra=("rng",)):
+def _hunt(id, reference, specimen, why, hints, good=GOOD, extra=("rng",)):
     specimen = _on_show(specimen)
     return Exercise(
         id,
@@ -552,9 +746,7 @@ def _hunt(id, reference, specimen, hints, good=GOOD, extra=("rng",)):
         properties=_catches(specimen, good, extra),
         hints=hints,
         mistakes=[
-            Mistake(
-                lambda *_: True, "Your test passes the specimen. Ask for something that only a correct function can do."
-            ),
+            Mistake(lambda *_: True, f"Your test passes the specimen. {why}"),
             Mistake(lambda *_: None, "Your test returned None: it has to return True (passed) or False (caught)."),
         ],
         draws=1,
@@ -582,7 +774,7 @@ CHAPTER = Chapter(
             hints=(
                 "The noise belongs to the control, not to the pose, and each particle gets its own.",
                 "Draw one pair of standard normal numbers a particle, scale them by std_u, and add them to u.",
-                "noisy = u + std_u * rng.standard_normal((len(states), 2)); return odometry.step(states, noisy, dt).",
+                "`noisy = u + std_u * rng.standard_normal((len(states), 2)); return odometry.step(states, noisy, dt)`",
             ),
             mistakes=[
                 Mistake(
@@ -625,7 +817,10 @@ CHAPTER = Chapter(
             hints=(
                 "What range and what bearing would a robot at this pose expect? Compare them with z.",
                 "The bearing is atan2(dy, dx) - theta. Wrap the *difference*, then add the logarithms of both normal densities.",
-                "log N = -0.5 * (error / std)**2 - np.log(std * np.sqrt(2 * np.pi)), summed over ranges and bearings.",
+                "`dx, dy = (landmarks - pose[:2]).T; e = z[:, 0] - np.hypot(dx, dy); "
+                "f = odometry.wrap_angle(z[:, 1] - np.arctan2(dy, dx) + pose[2]); "
+                "log_p = -0.5 * (e / std_range) ** 2 - 0.5 * (f / std_bearing) ** 2; "
+                "return np.sum(log_p - np.log(2 * np.pi * std_range * std_bearing))`",
             ),
             mistakes=[
                 Mistake(
@@ -637,24 +832,37 @@ CHAPTER = Chapter(
                     "A bearing difference near 360 deg counted as a large error. Wrap the difference to [-pi, pi).",
                 ),
                 Mistake(
-                    _landmarks(turn=-1), "The sign of the heading is wrong: the expected bearing is atan2(dy, dx) - theta."
+                    _landmarks(turn=-1),
+                    "The sign of the heading is wrong: the expected bearing is atan2(dy, dx) - theta.",
                 ),
                 Mistake(
-                    _landmarks(back=True), "You looked from the landmark to the robot: the difference is landmark - position."
+                    _landmarks(back=True),
+                    "You looked from the landmark to the robot: the difference is landmark - position.",
                 ),
                 Mistake(_landmarks(parts=(1, 0)), "The bearings are missing: both densities are multiplied."),
                 Mistake(_landmarks(parts=(0, 1)), "The ranges are missing: both densities are multiplied."),
-                Mistake(_landmarks(density=_no_half), "The factor one half in the exponent is missing."),
+                *_density_mistakes(_landmarks, "readings"),
+                Mistake(_products_added, "You added over the landmarks what must be multiplied: add *logarithms*."),
                 Mistake(
-                    _landmarks(density=_no_root), "The root is missing: each density is divided by std * sqrt(2 pi)."
+                    _landmarks(wrap="positive"),
+                    "A small negative error became one near 360 deg. Wrap the difference to [-pi, pi).",
                 ),
+                Mistake(_landmarks(wrap="degrees"), "Your bearing error is in degrees, std_bearing is in radians."),
+                Mistake(
+                    lambda x, z, *rest: landmark_weight(x, z[:, ::-1], *rest),
+                    "Range and bearing have changed places: z[:, 0] are the ranges, z[:, 1] the bearings.",
+                ),
+                Mistake(
+                    lambda x, z, marks, *stds: landmark_weight(x, z[:1], marks[:1], *stds),
+                    "Only the first landmark counts. Is `return` inside the loop? It belongs after it.",
+                ),
+                Mistake(_landmarks(stds=(1, 0)), "The two standard deviations have changed places."),
+                Mistake(_landmarks(stds=(0, 0)), "Bearings have a standard deviation of their own, std_bearing."),
                 Mistake(
                     lambda x, z, *rest: landmark_weight(x, z, *rest) / len(z),
                     "You took the mean over the landmarks. Their logarithms add up.",
                 ),
-                Mistake(
-                    _landmarks(turn=0), "The heading is missing: a bearing is relative to where the robot looks."
-                ),
+                Mistake(_landmarks(turn=0), "The heading is missing: a bearing is relative to where the robot looks."),
                 Mistake(_landmarks(swap=True), "The y difference comes first: np.arctan2(dy, dx)."),
                 Mistake(
                     _landmarks(square=True),
@@ -674,11 +882,11 @@ CHAPTER = Chapter(
             "beams_to_zero",
             reference=lambda: 162,
             rtol=0,
-            atol=0.5,
+            atol=0.01,
             hints=(
                 "The smallest number above zero that float64 knows is about 4.9e-324.",
                 "0.01 to the power n falls below half of it. Solve for n.",
-                "Count in a loop: p = 1.0; multiply by 0.01 until p == 0.",
+                "`beams_to_zero = next(n for n in range(1, 1000) if 0.01**n == 0)`",
             ),
             mistakes=[
                 Mistake(
@@ -689,6 +897,23 @@ CHAPTER = Chapter(
                     lambda: 161,
                     "0.01 to the power 161 is 1e-322, still a (denormal) number above zero. One more beam ends it.",
                 ),
+                Mistake(lambda: 163, "One too many: the product is zero already after the beam before."),
+                Mistake(
+                    lambda: 160, "0.01 to the power 160 is 1e-320, still a (denormal) number above zero: count on."
+                ),
+                Mistake(
+                    lambda: math.log(5e-324) / math.log(0.01),
+                    "Beams are whole. After 161 of them something above zero is left: round up.",
+                ),
+                Mistake(
+                    lambda: (math.log(5e-324) - math.log(2)) / math.log(0.01),
+                    "Beams are whole. After 161 of them something above zero is left: round up.",
+                ),
+                Mistake(
+                    lambda: 308,
+                    "That counts powers of ten, and stops where the *normal* numbers end. Each beam contributes two.",
+                ),
+                Mistake(lambda: 323, "That counts powers of ten. Each beam contributes two of them."),
                 Mistake(lambda: 324, "That counts powers of ten. Each beam contributes two of them."),
             ],
         ),
@@ -701,7 +926,9 @@ CHAPTER = Chapter(
             hints=(
                 "Walk along the ray in steps smaller than a cell, and stop in the first occupied one.",
                 "The direction is theta + bearing. grid.at([x, y]) says what is there; maps.OCCUPIED is an obstacle.",
-                "for r in np.arange(0, r_max, grid.resolution / 2): look at (x + r cos, y + r sin). If nothing is hit, return r_max.",
+                "`a = pose[2] + bearing; r = np.arange(0, r_max, grid.resolution / 2); "
+                "xy = pose[:2] + r[:, None] * [np.cos(a), np.sin(a)]; "
+                "hits = r[grid.at(xy) == maps.OCCUPIED]; return hits[0] if len(hits) else r_max`",
             ),
             mistakes=[
                 Mistake(_ray_in_cells, "You counted in cells. One cell is grid.resolution meters long."),
@@ -711,6 +938,23 @@ CHAPTER = Chapter(
                     _ray_reversed, "Bearings count to the left, like angles: theta + bearing, not theta - bearing."
                 ),
                 Mistake(_ray_swapped, "Sine and cosine have changed places: x goes with the cosine."),
+                Mistake(
+                    lambda grid, x, b, r_max: r_max,
+                    "You return r_max whatever stands in the way. Is `return r_max` inside the loop, or a step longer than a cell is wide?",
+                ),
+                Mistake(
+                    lambda grid, x, b, r_max: 0.0,
+                    "Your ray ends where it starts. Does it start at x, y of the pose, and go on while the cell is *not* maps.OCCUPIED?",
+                ),
+                Mistake(
+                    lambda grid, x, b, r_max: maps.walk_ray(grid, x, b - 2 * x[2], r_max),
+                    "The heading counts the wrong way: the beam points to theta + bearing.",
+                ),
+                Mistake(
+                    lambda grid, x, b, r_max: maps.walk_ray(grid, x, math.degrees(x[2] + b) - x[2], r_max),
+                    "cos and sin take radians, and pose and bearing are in radians already.",
+                ),
+                Mistake(_ray_to_the_last, "Your ray goes on through walls: stop in the *first* occupied cell."),
                 Mistake(_ray_to_infinity, "Nothing hit means r_max, the scanner's limit, not infinity."),
                 Mistake(_ray_without_end, "A scanner sees r_max at most: return r_max when nothing is hit before."),
             ],
@@ -725,7 +969,7 @@ CHAPTER = Chapter(
             hints=(
                 "Each beam is a normal density of measured minus expected range. A product turns into a sum of logarithms.",
                 "log N = -0.5 * (error / std)**2 - log(std sqrt(2 pi)), once for every beam.",
-                "return np.sum(-0.5 * ((ranges - expected) / std) ** 2 - np.log(std * np.sqrt(2 * np.pi))).",
+                "`return np.sum(-0.5 * ((ranges - expected) / std) ** 2 - np.log(std * np.sqrt(2 * np.pi)))`",
             ),
             mistakes=[
                 Mistake(
@@ -739,13 +983,17 @@ CHAPTER = Chapter(
                     lambda r, e, s: float((-0.5 * np.square((r - e) / s)).sum() - np.log(s * math.sqrt(2 * math.pi))),
                     "The factor 1 / (std sqrt(2 pi)) stands once in each density: as many times as there are beams.",
                 ),
+                *_density_mistakes(_beams, "beams"),
                 Mistake(
-                    lambda r, e, s: float(_no_root(r - e, s).sum()),
-                    "The root is missing: each density is divided by std * sqrt(2 pi).",
+                    lambda r, e, s: float(np.prod(_normal_log(r - e, s))),
+                    "You multiplied logarithms. The logarithm of a product is the *sum* of the logarithms.",
                 ),
                 Mistake(
-                    lambda r, e, s: float((_normal_log(r - e, s) + 2 * np.log(s * math.sqrt(2 * math.pi))).sum()),
-                    "The factor 1 / (std sqrt(2 pi)) divides: its logarithm is subtracted.",
+                    lambda r, e, s: float(_normal_log(r[0] - e[0], s)),
+                    "Only the first beam counts. Is `return` inside the loop? It belongs after it.",
+                ),
+                Mistake(
+                    _errors_added_first, "You added the errors and squared their sum. Square each error, then add up."
                 ),
                 Mistake(
                     lambda r, e, s: beam_weight(r, e, s) / len(r), "You took the mean over the beams. They add up."
@@ -758,10 +1006,6 @@ CHAPTER = Chapter(
                     lambda r, e, s: float((-0.5 * np.square((r - e) / s)).sum()),
                     "The factor 1 / (std sqrt(2 pi)) of each beam is missing.",
                 ),
-                Mistake(
-                    lambda r, e, s: float(_normal_log(r - e, s).sum() - 0.5 * np.square((r - e) / s).sum()),
-                    "The factor one half in the exponent is missing.",
-                ),
             ],
         ),
         Exercise(
@@ -773,19 +1017,33 @@ CHAPTER = Chapter(
             hints=(
                 "Put the end point of each beam on the map and ask how far the nearest obstacle is.",
                 "End point: x + r cos(theta + b), y + r sin(theta + b). The distance stands in grid.distance at grid.cell_of(point).",
-                "d = grid.distance[grid.cell_of(points)]; the rest is the sum of log N(0, std^2)(d), as in beam_weight.",
+                "`a = pose[2] + bearings; xy = pose[:2] + np.column_stack([ranges * np.cos(a), ranges * np.sin(a)]); "
+                "d = grid.distance[grid.cell_of(xy)]; "
+                "return np.sum(-0.5 * (d / std) ** 2 - np.log(std * np.sqrt(2 * np.pi)))`",
             ),
             mistakes=[
                 Mistake(_field_world, "The heading is missing: bearings are relative to the robot, the map is not."),
-                Mistake(_field_mirrored, "Bearings count to the left, like angles: theta + bearing, not theta - bearing."),
+                Mistake(
+                    _field_mirrored, "Bearings count to the left, like angles: theta + bearing, not theta - bearing."
+                ),
                 Mistake(_field_swapped, "Sine and cosine have changed places: x goes with the cosine."),
-                Mistake(_field_at_the_robot, "You looked up the robot's own cell. Look up the end points of its beams."),
+                Mistake(
+                    _field_at_the_robot, "You looked up the robot's own cell. Look up the end points of its beams."
+                ),
                 Mistake(
                     _field_plain_product,
                     "Right for 12 beams. With 541 the product is zero before you take its logarithm: sum up logarithms.",
                 ),
-                Mistake(_field_with(_no_half), "The factor one half in the exponent is missing."),
-                Mistake(_field_with(_no_root), "The root is missing: each density is divided by std * sqrt(2 pi)."),
+                *_density_mistakes(_field_with, "beams"),
+                Mistake(_field_straight_ahead, "The bearings are missing: each beam points to theta + bearing."),
+                Mistake(
+                    lambda grid, x, r, b, s: distance_field_weight(grid, x, r, b, s * s),
+                    "You used the variance as standard deviation: N(0, std^2) divides the distance by std.",
+                ),
+                Mistake(
+                    _field_one_peak,
+                    "The factor 1 / (std sqrt(2 pi)) stands once in each density: as many times as there are beams.",
+                ),
                 Mistake(_field_cells, "The distances are in meters already: do not divide by the resolution."),
                 Mistake(_field_mean, "You took the mean over the beams. The logarithms add up."),
                 Mistake(_field_probability, "This is p itself, which underflows with many beams. Return log p."),
@@ -805,11 +1063,11 @@ CHAPTER = Chapter(
             "resample_roulette",
             reference=resample_roulette,
             draw=WHEELS,
-            properties=(_valid, _proportional, _spins_are_independent, _drawn_from_the_rng),
+            properties=(_valid, _drawn_from_the_rng, _proportional, _spins_are_independent),
             hints=(
                 "Each weight owns an interval as wide as itself. Where does a random number fall?",
                 "np.cumsum(weights) are the ends of the intervals, np.searchsorted finds the interval by bisection.",
-                "ends = np.cumsum(weights); return np.searchsorted(ends, rng.random(len(weights)) * ends[-1], side='right').",
+                "`ends = np.cumsum(weights); return np.searchsorted(ends, rng.random(len(weights)) * ends[-1], side='right')`",
             ),
             mistakes=[
                 Mistake(_largest, "You always took the heaviest particle. It should be drawn most often, not always."),
@@ -834,11 +1092,16 @@ CHAPTER = Chapter(
                     "One spin for all: each particle needs a random number of its own.",
                 ),
                 Mistake(
+                    lambda w, rng: rng.multinomial(len(w), w / w.sum()),
+                    "These are counts, how often each particle comes out. Asked for are the indices: np.repeat makes them.",
+                ),
+                Mistake(
                     lambda w, rng: np.searchsorted(w, rng.random(len(w))),
                     "You searched in the weights. Search in their running sum, np.cumsum(weights).",
                 ),
             ],
             draws=8,
+            limit=IMPORTS,
         ),
         Exercise(
             "resample_systematic",
@@ -846,17 +1109,17 @@ CHAPTER = Chapter(
             draw=WHEELS,
             properties=(
                 _valid,
+                _drawn_from_the_rng,
                 _proportional,
                 _equal_weights_stay,
                 _spokes_are_even,
                 _survives_rounding,
-                _drawn_from_the_rng,
             ),
             hints=(
                 "One random number turns the whole wheel. Its M spokes are W / M apart.",
                 "Spokes: (rng.random() + np.arange(M)) * W / M. Then search them in the running sum, as before.",
-                "ends = np.cumsum(weights); spokes = (rng.random() + np.arange(M)) * ends[-1] / M; np.searchsorted(ends, spokes), "
-                "never above M - 1.",
+                "`ends, M = np.cumsum(weights), len(weights); spokes = (rng.random() + np.arange(M)) * ends[-1] / M; "
+                "return np.minimum(np.searchsorted(ends, spokes), M - 1)`",
             ),
             mistakes=[
                 Mistake(
@@ -883,6 +1146,7 @@ CHAPTER = Chapter(
                 ),
             ],
             draws=8,
+            limit=IMPORTS,
         ),
         Prediction(
             "standing",
@@ -890,7 +1154,7 @@ CHAPTER = Chapter(
             "particles still have descendants?",
             choices=("about 630", "about 100", "about 10", "all 1000"),
             answer="about 10",
-            why="Each round loses 37 % of those that are left at first, later about one of k in 2 M / k rounds: after t rounds some 2 M / t remain.",
+            why="The first round loses 37 %. Later, with k families left, the next one dies out after some 2 M / k^2 rounds: after t rounds about 2 M / t remain.",
         ),
         Exercise(
             "effective_size",
@@ -900,7 +1164,7 @@ CHAPTER = Chapter(
             hints=(
                 "M equal weights should give M, a single heavy one should give 1, whatever the sum of the weights is.",
                 "It is the square of the sum over the sum of the squares.",
-                "return weights.sum() ** 2 / (weights ** 2).sum().",
+                "`return weights.sum() ** 2 / (weights ** 2).sum()`",
             ),
             mistakes=[
                 Mistake(
@@ -921,6 +1185,41 @@ CHAPTER = Chapter(
                     lambda w: particles.effective_size(w) / len(w),
                     "That is the share of M that is effective. Asked for is the number itself.",
                 ),
+                Mistake(lambda w: np.square(w).sum(), "That is the sum of the squares: it stands in the denominator."),
+                Mistake(
+                    lambda w: (w.sum() / np.square(w).sum()) ** 2,
+                    "You squared the whole quotient. Squared are the sum above, and each weight below.",
+                ),
+                Mistake(
+                    lambda w: w.sum() ** 2 / w.sum() ** 2,
+                    "Below stands the sum of the squares, (weights ** 2).sum(), not the square of the sum.",
+                ),
+                Mistake(
+                    lambda w: 1 / np.square(w / w.mean()).sum(), "Divide the weights by their sum, not by their mean."
+                ),
+                Mistake(
+                    lambda w: 1 / np.square(w / w.max()).sum(), "Divide the weights by their sum, not by the largest."
+                ),
+                Mistake(
+                    lambda w: len(w) / (1 + np.var(w / w.sum())),
+                    "That formula holds for weights of mean 1: divide by their mean, not by their sum.",
+                ),
+                Mistake(
+                    lambda w: len(w) / (1 + np.var(w / w.mean(), ddof=1)),
+                    "The variance here is the mean square deviation, np.var without ddof=1.",
+                ),
+                Mistake(
+                    lambda w: float(round(particles.effective_size(w))),
+                    "An effective size need not be whole: return it as it comes out.",
+                ),
+                Mistake(
+                    lambda w: float(int(particles.effective_size(w))),
+                    "An effective size need not be whole: return it as it comes out.",
+                ),
+                Mistake(
+                    lambda w: math.exp(-(w / w.sum()) @ np.log(w / w.sum())),
+                    "That is the exponential of the entropy, another measure. Here: squared sum over sum of squares.",
+                ),
                 Mistake(lambda w: w.sum() / w.max(), "That is another measure. Here: squared sum over sum of squares."),
             ],
         ),
@@ -932,7 +1231,7 @@ CHAPTER = Chapter(
             hints=(
                 "Resampling costs diversity. When is it worth its price?",
                 "When the effective size is below the share `threshold` of the number of particles.",
-                "return effective_size(weights) < threshold * len(weights).",
+                "`return effective_size(weights) < threshold * len(weights)`",
             ),
             mistakes=[
                 Mistake(
@@ -946,6 +1245,18 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda w, t: _from_the_sum_of_squares(w) < t * len(w),
                     "Your effective size needs weights that add up to 1, and these do not: use effective_size(weights).",
+                ),
+                Mistake(
+                    lambda w, t: particles.effective_size(w) < 0.5 * len(w),
+                    "You compare with half of the particles. The share is handed over: threshold * len(weights).",
+                ),
+                Mistake(
+                    lambda w, t: particles.effective_size(w) < (1 - t) * len(w),
+                    "Compare with the share `threshold` itself, not with 1 - threshold.",
+                ),
+                Mistake(
+                    lambda w, t: w.sum() < t * len(w),
+                    "You compare the sum of the weights. Compare effective_size(weights).",
                 ),
                 Mistake(lambda w, t: True, "You resample always. With even weights that only loses particles."),
                 Mistake(
@@ -963,9 +1274,13 @@ CHAPTER = Chapter(
             hints=(
                 "The mean of 179 deg and -179 deg should be 180 deg. What could be averaged instead of angles?",
                 "Average the unit vectors (cos, sin), and take the direction of the result.",
-                "return np.arctan2(np.sum(weights * np.sin(angles)), np.sum(weights * np.cos(angles))).",
+                "`return np.arctan2(np.sum(weights * np.sin(angles)), np.sum(weights * np.cos(angles)))`",
             ),
             mistakes=[
+                Mistake(
+                    lambda a, w: float(odometry.wrap_angle(a.mean())),
+                    "The arithmetic mean of angles across the seam points backward. Average directions, not numbers.",
+                ),
                 Mistake(
                     lambda a, w: float(w @ a / w.sum()),
                     "The arithmetic mean of angles across the seam points backward. Average directions, not numbers.",
@@ -979,6 +1294,42 @@ CHAPTER = Chapter(
                     "The angles are in radians already: nothing is to be converted.",
                 ),
                 Mistake(lambda a, w: particles.circular_mean(a), "The weights are missing."),
+                Mistake(
+                    lambda a, w: (float((w * np.cos(a)).sum()), float((w * np.sin(a)).sum())),
+                    "That is the mean vector. Its direction is asked for: np.arctan2(sine part, cosine part).",
+                ),
+                Mistake(lambda a, w: float(np.median(a)), "The median of angles depends on where their seam lies."),
+                Mistake(
+                    lambda a, w: float(w @ a),
+                    "You added angles. Add directions, (cos, sin) times the weight, and take the direction of the sum.",
+                ),
+                Mistake(
+                    lambda a, w: math.atan2(np.sin(w * a).sum(), np.cos(w * a).sum()),
+                    "A weight makes a direction longer, it does not turn it: w * np.sin(a), not np.sin(w * a).",
+                ),
+                Mistake(
+                    lambda a, w: math.atan2(np.sin(w * a / w.sum()).sum(), np.cos(w * a / w.sum()).sum()),
+                    "A weight makes a direction longer, it does not turn it: w * np.sin(a), not np.sin(w * a).",
+                ),
+                Mistake(
+                    lambda a, w: math.atan2((w * np.sin(a)).sum(), np.cos(a).sum()), "The cosines have no weights."
+                ),
+                Mistake(lambda a, w: math.atan2(np.sin(a).sum(), (w * np.cos(a)).sum()), "The sines have no weights."),
+                Mistake(
+                    lambda a, w: math.asin((w * np.sin(a)).sum() / w.sum()),
+                    "The arcsine knows only half the circle, and wants a unit vector. np.arctan2 takes both parts.",
+                ),
+                Mistake(
+                    lambda a, w: math.acos((w * np.cos(a)).sum() / w.sum()),
+                    "The arccosine knows only half the circle, and wants a unit vector. np.arctan2 takes both parts.",
+                ),
+                Mistake(
+                    lambda a, w: math.atan((w * np.tan(a)).sum() / w.sum()),
+                    "Tangents are not parts of a vector. Average cosines and sines, then take np.arctan2.",
+                ),
+                Mistake(
+                    lambda a, w: float(a[np.argmax(w)]), "You took the heaviest angle. The others have a say as well."
+                ),
                 Mistake(
                     lambda a, w: math.atan2((w * np.cos(a)).sum(), (w * np.sin(a)).sum()),
                     "Sine and cosine have changed places: arctan2 takes the sine part first.",
@@ -1010,7 +1361,8 @@ CHAPTER = Chapter(
             hints=(
                 "When the recent weights are worse than usual, something is wrong. Two averages, one quick and one slow, tell it.",
                 "Bring both up to date first: w += alpha (w_mean - w). The share is 1 - w_fast / w_slow, never below 0.",
-                "w_slow += alpha_slow * (w_mean - w_slow), likewise w_fast; return max(0, 1 - w_fast / w_slow), w_slow, w_fast.",
+                "`w_slow += alpha_slow * (w_mean - w_slow); w_fast += alpha_fast * (w_mean - w_fast); "
+                "return max(0, 1 - w_fast / w_slow), w_slow, w_fast`",
             ),
             mistakes=[
                 Mistake(
@@ -1066,6 +1418,7 @@ CHAPTER = Chapter(
                     ),
                     "The limits of 10 % and 50 % are our filter's own. Return the share as the formula gives it.",
                 ),
+                *RECOVERIES,
                 Mistake(
                     lambda m, s, f, a, b: particles.recover(m, s, f, a, b)[:1] + (s, f),
                     "You returned the old averages: the next step needs the new ones.",
@@ -1077,40 +1430,48 @@ CHAPTER = Chapter(
             "hunt_1",
             hunt_1,
             museum.specimen_1,
+            "An index in front of a heavy one comes out too often. Unequal weights show it, and shares counted over many runs.",
             (
                 "What must hold for a resampler on average?",
                 "Count how often each index comes out in many runs, and compare with its weight.",
-                "weights = np.array([0.1, 0.7, 0.1, 0.1]); 1000 runs; np.bincount(...) / total within 0.05 of the weights.",
+                "`w = np.array([0.1, 0.7, 0.1, 0.1]); index = np.concatenate([resample(w, rng) for _ in range(1000)]); "
+                "return np.abs(np.bincount(index, minlength=4) / len(index) - w).max() < 0.05`",
             ),
         ),
         _hunt(
             "hunt_2",
             hunt_2,
             museum.specimen_2,
+            "Copies of the heavy particles hide it. Count over many runs how often the light ones come out, next to a heavy one.",
             (
                 "Does your first test catch it? If not: which weights did it not try?",
                 "Use many light particles whose share M w is below 1, next to a heavy one.",
-                "weights = .5 .25 .05 .05 .03 .03 .03 .02 .02 .02: each index should get its weight's share of the draws.",
+                "`w = np.array([0.5] + 10 * [0.05]); index = np.concatenate([resample(w, rng) for _ in range(1000)]); "
+                "return np.abs(np.bincount(index, minlength=11) / len(index) - w).max() < 0.02`",
             ),
         ),
         _hunt(
             "hunt_3",
             hunt_3,
             museum.specimen_3,
+            "While the weights add up to 1 it does no harm. Let their sum be a little less, and try several times: the last spoke must fall beyond it.",
             (
                 "On average it is right. What does it take for granted about the weights?",
                 "Floating-point weights need not add up to 1. Try a sum a little below 1, several times.",
-                "weights = np.full(1000, 0.000999); return False on IndexError (try ... except), or when an index reaches 1000.",
+                "Two lines: `try: return all(resample(np.full(1000, 0.000999), rng).max() < 1000 for _ in range(20))` and "
+                "`except IndexError: return False`",
             ),
         ),
         _hunt(
             "hunt_4",
             hunt_4,
             museum.specimen_4,
+            "With one reading, or by which particle is heavier, it looks right. What must a second reading do to the *ratio* of two weights?",
             (
                 "Independent readings multiply. What must happen when the same reading comes twice?",
                 "The ratio of two particles' weights must be squared.",
-                "once = weigh(states, ranges, marks, std); twice with everything repeated; np.isclose(ratio_twice, ratio_once ** 2).",
+                "`x, mark = np.array([[0.0, 0, 0], [0.3, 0, 0]]), np.array([[2.0, 0]]); a, b = weigh(x, np.array([2.0]), mark, 0.3); "
+                "c, d = weigh(x, np.array([2.0, 2.0]), np.vstack([mark, mark]), 0.3); return np.isclose(c / d, (a / b) ** 2)`",
             ),
             good=(_weights_multiplied,),
             extra=(),
