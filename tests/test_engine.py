@@ -338,6 +338,10 @@ def test_raised_error_names_line_and_call():
     assert "when called as double(v=[" in outcome.text
 
 
+def asserting(v):
+    raise AssertionError  # what a bare assert raises outside of pytest
+
+
 @pytest.mark.parametrize(
     "answer, words",
     [
@@ -350,6 +354,7 @@ def test_raised_error_names_line_and_call():
         (lambda v: v ^ 2, "write `**`"),
         (lambda v: math.sqrt(-1.0), "np.clip"),
         (lambda v: v * np.ones((5, 2)), "is `@` meant"),
+        (asserting, "handed over with `return`"),
     ],
 )
 def test_what_numpy_means(answer, words):
@@ -383,6 +388,23 @@ def test_degrees_converted_twice_are_not_told_to_be_radians():
 def test_the_rotation_alone_can_be_a_named_mistake_of_a_pose():
     exercise = replace(INVERT, mistakes=(Mistake(lambda T: T[:3, :3].T, "the rotation alone"),))
     assert exercise.judge(lambda T: T[:3, :3].T).text == "the rotation alone"
+
+
+def test_a_count_is_not_rounded():
+    count = Value("count", reference=lambda: 162, hints=("a", "b", "c"), rtol=1e-6)
+    assert "as far as it goes" not in count.judge(160).text
+    length = Value("length", reference=lambda: 162.37, hints=("a", "b", "c"), rtol=1e-6)
+    assert "as far as it goes" in length.judge(162).text
+
+
+def test_one_array_for_two_results_is_told_its_shape():
+    two = metrics.several(metrics.numbers(), metrics.numbers(), names=("x", "cov"))
+    with pytest.raises(metrics.Refused, match=r"got one array of shape \(3,\)"):
+        two.admit(np.zeros(3), (0.0, 1.0))
+
+
+def test_a_function_among_the_arguments_is_shown_by_its_name():
+    assert engine._short(asserting) == "asserting"
 
 
 def test_a_word_may_be_written_in_more_than_one_way():
@@ -468,7 +490,7 @@ def test_several_results_are_named():
     )
     assert exercise.judge(lambda v: [v, -v]).status == CORRECT
     assert "pivot: your result is right up to its sign" in exercise.judge(lambda v: (v, v)).text.lower()
-    assert "expected 2 results (tip, pivot), got 3" in exercise.judge(lambda v: v).text
+    assert "expected 2 results (tip, pivot), got one array of shape (3,)" in exercise.judge(lambda v: v).text
     assert "pivot: expected an array of shape (3,)" in exercise.judge(lambda v: (v, 1.0)).text
 
 

@@ -279,12 +279,15 @@ class _Trial:
             return self.outcome(RAISED, f"NameError: {hint}{where}")
         if isinstance(error, RecursionError):
             return self.outcome(RAISED, "RecursionError: your function calls itself without an end.")
-        advice = next((f". {told}" for words, told in ADVICE.items() if words in _message(error)), "")
+        said = _message(error)
+        if isinstance(error, AssertionError) and not said:
+            said = "`assert` raises; an answer is handed over with `return`"
+        advice = next((f". {told}" for words, told in ADVICE.items() if words in said), "")
         if not (advice or args or run.line):
             advice = ". What your function returned could not be worked with."
         where = f"\nin {run.line}" if run.line else ""
         with_ = f"\nwhen called as {self._call(args)}" if args else ""
-        return self.outcome(RAISED, f"{type(error).__name__}: {_message(error)}{advice}{where}{with_}")
+        return self.outcome(RAISED, f"{type(error).__name__}: {said}{advice}{where}{with_}")
 
 
 @dataclass(frozen=True)
@@ -322,7 +325,7 @@ ADVICE = {  # what NumPy means
     "bitwise_xor": "`^` is no power in Python: write `**`.",
     "for ^: ": "`^` is no power in Python: write `**`.",
     "math domain error": "A root of a negative number, or an arccosine beyond 1, perhaps by rounding: see `np.clip`.",
-    "could not be broadcast": "These shapes do not fit entry by entry: is `@` meant, or a `[:, None]` missing?",
+    "could not be broadcast": "Entry by entry these shapes do not fit: is `@` meant, is a sum over an axis missing?",
 }
 
 
@@ -341,6 +344,8 @@ def _short(value):
         tiny = value.dtype.kind == "f" and 0 < np.abs(value).max(initial=0.0) < 1e-3
         words = np.array2string(value, precision=3, suppress_small=not tiny, separator=", ", max_line_width=100)
         return words.replace("\n", "")
+    if inspect.isfunction(value):
+        return value.__name__
     text = f"{value:.4g}" if isinstance(value, float) else repr(value)
     return text if len(text) <= 60 else f"<{type(value).__name__}>"
 
@@ -464,7 +469,7 @@ def _is_rounded(answer, expected):
     if answer.shape != expected.shape or size == 0:
         return False
     least = 1 - int(np.floor(np.log10(size)))
-    units = 10.0 ** -np.arange(least, least + 8)
+    units = 10.0 ** -np.arange(max(least, 0) if (expected == np.round(expected)).all() else least, least + 8)
     off = np.abs(answer - expected).max()
     return any(off <= 0.5000001 * u and np.allclose(answer / u, np.round(answer / u), rtol=1e-12) for u in units)
 

@@ -91,7 +91,8 @@ def as_array(result, shape):
         raise Refused(f"{wanted}, got {_describe(result)}{parts}: return one array") from None
     if array.dtype.kind == "c":
         if np.abs(array.imag).max(initial=0.0) > 0:
-            raise Refused(f"{wanted} of real numbers, got complex ones: is there a square root of a negative number?")
+            cause = "a root of a negative number, or is `np.angle` missing?"
+            raise Refused(f"{wanted} of real numbers, got complex ones: {cause}")
         array = array.real
     if array.dtype.kind == "b":
         raise Refused(f"{wanted}, got True or False: is there a comparison where a formula should be?")
@@ -117,7 +118,7 @@ def as_array(result, shape):
         count = "" if array.ndim == 0 else f" in {bad} of {array.size} entries"
         raise Refused(
             f"the result holds {which}{count}: look for a division by zero, a root of a negative number,"
-            " or an arccos or arcsin of something beyond -1 and 1"
+            " an arccos or arcsin of something beyond -1 and 1, or an iteration that runs away"
         )
     return array
 
@@ -274,7 +275,7 @@ class exactly(Metric):
             if expected.dtype == bool and array.dtype != bool:
                 raise Refused(f"expected an array of True and False, got {array.dtype}")
             return array
-        if isinstance(result, np.generic) or (isinstance(result, np.ndarray) and result.ndim == 0):
+        if isinstance(result, np.generic) or (isinstance(result, np.ndarray) and result.size == 1):
             result = result.item()
         if isinstance(result, str) and isinstance(expected, str) and _plain(result) == _plain(expected):
             return expected
@@ -320,7 +321,8 @@ class several(Metric):
         except TypeError:
             raise Refused(f"{wanted}, got {_describe(result)}") from None
         if count != len(self.names):
-            raise Refused(f"{wanted}, got {count}")
+            one = f"one array of shape {result.shape}" if isinstance(result, np.ndarray) else count
+            raise Refused(f"{wanted}, got {one}")
         admitted = []
         for name, metric, part, want in zip(self.names, self.metrics, result, expected):
             try:
