@@ -1,6 +1,8 @@
 """Every exercise of every chapter, proved by right and wrong answers."""
 
+import ast
 import re
+import textwrap
 
 import numpy as np
 import pytest
@@ -86,6 +88,30 @@ def test_every_item_is_used_in_the_notebook(chapter):
     for item in chapter.items:
         used = rf'ex\.predict\(\s*"{item.id}"' if isinstance(item, Prediction) else rf"ex\.{item.id}\b"
         assert re.search(used, text), f"{item.id} is defined but never asked"
+
+
+def typed(hint):
+    """The code of a last hint as a student types it: each pair of backquotes is a line, or several."""
+    parts = re.findall("`([^`]*)`", hint) or [hint.removesuffix(".")]
+    return "\n".join(part if "\n" in part else "\n".join(part.split("; ")) for part in parts)
+
+
+def known_in(chapter):
+    """What a notebook knows, imports and exercises; and the parameters of each function, as written there."""
+    tree = ast.parse((session.SOLUTIONS / f"{chapter.notebook}.py").read_text(encoding="utf-8"))
+    known = {item.id: item.reference for item in chapter.items if isinstance(item, Exercise)}
+    for node in tree.body:
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            exec(ast.unparse(node), known)
+    return known, {node.name: ast.unparse(node.args) for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+
+
+@pytest.mark.parametrize("chapter, item", EXERCISES, ids=names(EXERCISES))
+def test_the_last_hint_is_right_when_typed_as_it_stands(chapter, item):
+    known, parameters = known_in(chapter)
+    exec(f"def {item.id}({parameters[item.id]}):\n{textwrap.indent(typed(item.hints[-1]), '    ')}", known)
+    outcome = item.judge(known[item.id], rng=np.random.default_rng(0))
+    assert outcome.status == CORRECT, outcome.text
 
 
 def test_hints_do_not_repeat():

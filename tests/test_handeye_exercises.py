@@ -6,7 +6,7 @@ import pytest
 from labkit import frames, handeye, handeye_data
 from labkit.course import ch05_hand_eye
 from labkit.course.engine import CORRECT, NOT_YET
-from labkit.lie import exp_so3, skew
+from labkit.lie import exp_so3
 
 ITEMS = {item.id: item for item in ch05_hand_eye.CHAPTER.items}
 
@@ -103,14 +103,3 @@ def test_a_circle_through_three_points_is_no_fit():
     assert all(
         "Three points" in judged("fit_circle", ch05_hand_eye._circle_through_three, seed).text for seed in range(30)
     )
-
-
-ONE_LINERS = [name for name, item in ITEMS.items() if "return " in getattr(item, "hints", ("",))[-1]]
-
-
-@pytest.mark.parametrize("name", ONE_LINERS)
-def test_the_last_hint_is_right_when_typed_as_it_stands(name):
-    known = {"np": np, "frames": frames, "handeye": handeye, "exp_so3": exp_so3, "skew": skew}
-    known |= {"fit_circle": ch05_hand_eye.fit_circle, "analytic_jacobian": ch05_hand_eye.analytic_jacobian}
-    exec(f"def answer({', '.join(ITEMS[name].arguments)}): {ITEMS[name].hints[-1].removesuffix('.')}", known)
-    assert all(judged(name, known["answer"], seed).status == CORRECT for seed in range(5))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from labkit import robot, tracker
+from labkit import tracker
 from labkit.course import ch06_tracker as ch06
-from labkit.course.engine import CORRECT, NOT_YET, Exercise
+from labkit.course.engine import CORRECT, NOT_YET
 
 ITEMS = {item.id: item for item in ch06.CHAPTER.items}
 SEEDS = range(4)
@@ -54,15 +54,3 @@ def test_a_tracker_that_leads_is_asked_for_at_every_check():
         return (k + 0.5 * (left - right) / (left - 2 * middle + right)) * step
 
     assert "one direction" in texts("time_offset", lags_only).pop()
-
-
-@pytest.mark.parametrize("name", [item.id for item in ITEMS.values() if isinstance(item, Exercise)])
-def test_the_third_hint_leads_to_a_right_answer_as_it_stands(name):
-    lines = ITEMS[name].hints[2].removesuffix(".").replace(": T = ", ":; T = ").split("; ")
-    before = ["Vt = np.linalg.svd(M)[2]"] if name == "rotation_from_nullvector" else []
-    loop = next((k for k, line in enumerate(lines) if line.endswith(":")), len(lines))
-    code = [f"def answer({', '.join(ITEMS[name].arguments)}):", *("    " + line for line in before)]
-    code += [" " * (8 if k == loop + 1 else 4) + line for k, line in enumerate(lines)]
-    space = {"np": np, "dh_matrix": robot.dh_matrix}
-    exec("\n".join(code), space)
-    texts(name, space["answer"], CORRECT)

@@ -544,8 +544,9 @@ CHAPTER = Chapter(
             hints=(
                 "Three elementary turns, multiplied in the order the controller names them, and a translation.",
                 "R = Rz(A) Ry(B) Rx(C). The angles arrive in radians, in the order A, B, C.",
-                "With cA = np.cos(A), sA = np.sin(A) and so on: Rz = [[cA, -sA, 0], [sA, cA, 0], [0, 0, 1]], Ry = [[cB, 0, sB], [0, 1, 0], [-sB, 0, cB]], "
-                "Rx = [[1, 0, 0], [0, cC, -sC], [0, sC, cC]]. Start from `T = np.eye(4)`, then `T[:3, :3] = Rz @ Ry @ Rx` (as arrays) and `T[:3, 3] = xyzabc[:3]`.",
+                "`(cA, cB, cC), (sA, sB, sC) = np.cos(xyzabc[3:]), np.sin(xyzabc[3:])`, `Rz = np.array([[cA, -sA, 0], [sA, cA, 0], [0, 0, 1]])`, "
+                "`Ry = np.array([[cB, 0, sB], [0, 1, 0], [-sB, 0, cB]])`, `Rx = np.array([[1, 0, 0], [0, cC, -sC], [0, sC, cC]])`, "
+                "`T = np.eye(4); T[:3, :3] = Rz @ Ry @ Rx; T[:3, 3] = xyzabc[:3]; return T`",
             ),
             mistakes=[
                 Mistake(

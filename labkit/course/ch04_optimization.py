@@ -276,7 +276,8 @@ CHAPTER = Chapter(
             hints=(
                 "Differentiate the gradient (2w/q²)(x − c) once more: the product rule gives two terms for each well.",
                 "One term is (2w/q²) I. The other one is (x − c) times the gradient of 2w/q², an outer product.",
-                "For each well: `2 * w / q**2 * np.eye(2) - 8 * w / q**3 * np.outer(d, d)`.",
+                "`d1, d2 = x - [1, 1], x - [-1, -2]`, `q1, q2 = d1 @ d1 + 1, d2 @ d2 + 1`, `one = 200 / q1**2 * np.eye(2) - 800 / q1**3 * np.outer(d1, d1)`, "
+                "`return one + 400 / q2**2 * np.eye(2) - 1600 / q2**3 * np.outer(d2, d2)`.",
             ),
             mistakes=[
                 Mistake(wells.printed_hessian, "These are the formulas of listing C7, misprints included. Check them against differences of your gradient."),
@@ -306,7 +307,8 @@ CHAPTER = Chapter(
             hints=(
                 "First order first: only a place where the gradient vanishes is a candidate at all.",
                 "Second order: the signs of the eigenvalues of H tell how f bends along its two main directions.",
-                "`np.linalg.norm(g) > 1e-6` is not stationary. Otherwise `e = np.linalg.eigvalsh(H)`: `(e > 0).all()` is a minimum, `(e < 0).all()` a maximum, mixed a saddle.",
+                '`if np.linalg.norm(g) > 1e-6: return "not stationary"`, `e = np.linalg.eigvalsh(H)`, '
+                '`return "minimum" if (e > 0).all() else "maximum" if (e < 0).all() else "saddle"`.',
             ),
             mistakes=[
                 Mistake(_second_order_only, "You judge places where the gradient is not zero: they are no extrema, whatever H says."),
@@ -469,7 +471,9 @@ CHAPTER = Chapter(
             hints=(
                 "Three cases: the Newton point is inside; the corner is outside; the rim cuts the second leg.",
                 "The corner is −(gᵀg / gᵀBg) g. On the second leg solve |corner + s (newton − corner)| = radius for s between 0 and 1.",
-                "Newton point inside: return it. Corner outside: `-radius * g / np.linalg.norm(g)`. Otherwise, with leg = newton − corner and a, b, c as above: `corner + (-b + np.sqrt(b * b - a * c)) / a * leg`.",
+                "`newton, corner = np.linalg.solve(B, -g), -(g @ g) / (g @ B @ g) * g`, `if np.linalg.norm(newton) <= radius: return newton`, "
+                "`if np.linalg.norm(corner) >= radius: return -radius * g / np.linalg.norm(g)`, `leg = newton - corner`, "
+                "`a, b, c = leg @ leg, corner @ leg, corner @ corner - radius**2`, `return corner + (-b + np.sqrt(b * b - a * c)) / a * leg`.",
             ),
             mistakes=[
                 Mistake(opt.cauchy_step, "That is the Cauchy point: it stops at the corner and never takes the second leg."),

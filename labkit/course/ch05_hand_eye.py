@@ -595,7 +595,7 @@ CHAPTER = Chapter(
             hints=(
                 "Move one variable at a time, and look at the function ahead and behind.",
                 "Column k is (f(x + h e_k) - f(x - h e_k)) / (2 h), with e_k the k-th unit vector.",
-                "np.column_stack([(function(x + h) - function(x - h)) / (2 * step) for h in step * np.eye(len(x))]).",
+                "`return np.column_stack([(function(x + h) - function(x - h)) / (2 * step) for h in step * np.eye(len(x))])`",
             ),
             mistakes=[
                 Mistake(_forward, "This is the forward difference of listing C4, off by h f''/2. Take the step in both directions."),
@@ -703,8 +703,9 @@ CHAPTER = Chapter(
             hints=(
                 "Forget for a moment that R_FS is a rotation: then all unknowns enter linearly.",
                 "R_FS x + t_FS - R_BF' target = -R_BF' t_BF. Fifteen unknowns: nine of R_FS, three of t_FS, three of the target.",
-                "For each pose: rows np.hstack([np.kron(np.eye(3), x), np.eye(3), -R_BF.T]), right side -R_BF.T @ t_BF. Stack all, u = np.linalg.lstsq(A, b, rcond=None)[0]; "
-                "T_FS = frames.pose(nearest_rotation(u[:9].reshape(3, 3)), u[9:12]), the center is u[12:].",
+                "`A = np.vstack([np.hstack([np.kron(np.eye(3), x), np.eye(3), -T[:3, :3].T]) for T, x in zip(T_BF, x_S)])`, "
+                "`b = np.concatenate([-T[:3, :3].T @ T[:3, 3] for T in T_BF])`, `u = np.linalg.lstsq(A, b, rcond=None)[0]`, "
+                "`return frames.pose(nearest_rotation(u[:9].reshape(3, 3)), u[9:12]), u[12:]`",
             ),
             mistakes=[
                 Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3].T, T[:3, 3]), c)),
@@ -759,7 +760,7 @@ CHAPTER = Chapter(
             hints=(
                 "First a scale that outliers cannot spoil, then a weight that falls to zero.",
                 "std = median length / 1.538; u = length / (5 std); the weight is (1 - u^2)^2 below u = 1 and 0 above.",
-                "r = np.linalg.norm(residuals, axis=1); u = r / (5 * np.median(r) / handeye.MEDIAN_CHI3); np.where(u < 1, (1 - u**2)**2, 0).",
+                "`r = np.linalg.norm(residuals, axis=1); u = r / (5 * np.median(r) / handeye.MEDIAN_CHI3); return np.where(u < 1, (1 - u**2)**2, 0)`",
             ),
             mistakes=[
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.sqrt((r**2).mean() / 3)))), "Your scale is the rms: the outliers themselves stretch it. Take the median."),
@@ -800,8 +801,10 @@ CHAPTER = Chapter(
             hints=(
                 "Two questions: which rows do not fit a robust calibration, and which single slip explains each of them?",
                 "`misprints.explanations(entries, pose, T_FS, target, std)` tries every slip of a row and puts the most credible first.",
-                "m = handeye_data.measurements_from(entries); fit = handeye.calibrate_sphere_target(m.T_BF, m.x_S, robust=True). For each i with np.linalg.norm(fit.residuals[i]) > 6 * fit.std take "
-                "e = misprints.explanations(entries, int(i) + 1, fit.T_FS, fit.target, fit.std)[0], and add (e.table, e.pose, e.column).",
+                "`m = handeye_data.measurements_from(entries); fit = handeye.calibrate_sphere_target(m.T_BF, m.x_S, robust=True)`, "
+                "`bad = np.flatnonzero(np.linalg.norm(fit.residuals, axis=1) > 6 * fit.std)`, "
+                "`best = [misprints.explanations(entries, int(i) + 1, fit.T_FS, fit.target, fit.std)[0] for i in bad]`, "
+                "`return {(e.table, e.pose, e.column) for e in best}`",
             ),
             mistakes=[
                 Mistake(_by_plain_least_squares, "This is all that a plain least-squares fit shows: its grossest slip bends it so far that the others hide. Fit robustly."),

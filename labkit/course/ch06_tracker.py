@@ -630,7 +630,7 @@ CHAPTER = Chapter(
             hints=(
                 "The singular vector of the smallest singular value, put back into a 3 x 3 matrix column by column.",
                 'Vt[-1].reshape(3, 3, order="F"); its sign is free, so make the determinant positive; then the nearest rotation by a second SVD.',
-                "X = Vt[-1].reshape(3, 3, order='F'); X *= np.sign(np.linalg.det(X)); U, _, Wt = np.linalg.svd(X); return U @ Wt.",
+                "Vt = np.linalg.svd(M)[2]; X = Vt[-1].reshape(3, 3, order='F'); X *= np.sign(np.linalg.det(X)); U, _, Wt = np.linalg.svd(X); return U @ Wt.",
             ),
             mistakes=[
                 Mistake(
