@@ -304,12 +304,9 @@ def compute_two_loops(state):
         "B, then A": chaining.distribute_in_turn(measured, (LOOP_B, LOOP_A)),
         "graph": relative(graph.poses[EDGES[:, 0]], graph.poses[EDGES[:, 1]]),
     }
-    left = {
-        name: np.array(
-            [chaining.closure_error(chaining.chain(chaining.around(T, loop)))[1] for loop in (LOOP_A, LOOP_B)]
-        )
-        for name, T in links.items()
-    }
+    every = np.stack(list(links.values()), axis=1)
+    left = [chaining.closure_error(chaining.chain(chaining.around(every, loop)))[1] for loop in (LOOP_A, LOOP_B)]
+    left = dict(zip(links, np.transpose(left)))
     return {"true": true, "graph": graph.poses, "walked": _walk(links["A, then B"]), "left": left}
 
 

@@ -406,8 +406,8 @@ class Stage(ipywidgets.VBox):
                 if os.environ.get("LABKIT_STRICT"):
                     raise
             finally:
+                self._show_picture(reply)  # before the controls, whose messages keep the page busy
                 self._show_controls()
-                self._show_picture(reply)
 
     def _correct(self, moved):
         if self._constrain:

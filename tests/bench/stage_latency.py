@@ -214,7 +214,7 @@ def shoot(page, chosen, folder):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", nargs="*", default=[], help="module or function names")
+    parser.add_argument("--only", nargs="*", default=[], help="names: module, Stage or module.Stage")
     parser.add_argument("--events", type=int, default=40)
     parser.add_argument("--shots", type=Path)
     parser.add_argument("--ratio", type=float, default=1.0, help="device pixels per CSS pixel")
@@ -222,7 +222,11 @@ def main():
     options = parser.parse_args()
     from playwright.sync_api import sync_playwright
 
-    chosen = [(m, n) for m, n in stages() if not options.only or m in options.only or n in options.only]
+    every = stages()
+    unknown = [word for word in options.only if not any(word in (m, n, f"{m}.{n}") for m, n in every)]
+    if unknown:
+        parser.error(f"no module or Stage is named {', '.join(unknown)}")
+    chosen = [(m, n) for m, n in every if not options.only or {m, n, f"{m}.{n}"} & set(options.only)]
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as play:
         lab = Lab(Path(folder), notebook(chosen))
         browser = play.chromium.launch(executable_path=options.chromium, args=FLAGS)
