@@ -246,8 +246,8 @@ def cast_rays(grid, poses, bearings, r_max):
     """Distances to the first occupied cell from many poses in many directions, by sphere tracing.
 
     The distance field says how far a ray may jump without hitting anything; near a wall the jumps shrink to one cell.
-    Where a ray ends, the edge of the cell it entered gives the distance. A ray that clips a corner of less than a
-    cell may end one cell late.
+    Where a ray ends, the edge of the cell it entered gives the distance. A ray that clips the corner of a cell may pass
+    it: `walk_ray` does not.
 
     Parameters
     ----------

@@ -133,7 +133,7 @@ def stacked(rng, sign):
     of the null vector's determinant.
     """
     while True:
-        M = axxb.kronecker_matrix(*motions(rng, std_deg=4.0))
+        M = axxb.kronecker_matrix(*motions(rng, std_deg=8.0))
         X = _null(M).reshape(3, 3)
         if sign * np.linalg.det(X) > 0 and np.abs(3 * X @ X.T - np.eye(3)).max() > 0.01:
             return (M,)

@@ -68,15 +68,27 @@ def plain_ray(rng):
     """
     grid = building().grid
     while True:
-        pose, b = particles.uniform_states(grid, 1, rng)[0], rng.uniform(-2, 2)
-        others = (-pose[2] + b, 0.0, -b, math.pi / 2 - 2 * pose[2] - b)
-        cast = grid.cast(pose, np.array([b - 0.02, b - 0.01, b, b + 0.01, b + 0.02, *others]), R_MAX)
-        around, wrong = cast[:5], cast[5:]
-        squarely = np.ptp(around) < min(0.12 * around[2], 0.25) and around[2] > 1.0
-        behind = squarely and _hits(grid, pose, b, R_MAX, grid.resolution / 2).max(initial=0.0) > around[2] + 1.0
-        apart = np.diff(np.sort(wrong)).min() > 0.2  # none of these slips is mistaken for another one
-        if behind and apart and np.abs(wrong - around[2]).min() > 0.3:
-            return grid, pose, b, R_MAX
+        poses, bearings = particles.uniform_states(grid, 24, rng), rng.uniform(-2, 2, 24)
+        for pose, b, r in zip(poses, bearings, _casts(grid, poses, bearings)):
+            around, wrong = r[:5], r[5:]
+            squarely = np.ptp(around) < min(0.12 * around[2], 0.25) and around[2] > 1.0
+            apart = np.diff(np.sort(wrong)).min() > 0.2  # none of these slips is mistaken for another one
+            if squarely and apart and np.abs(wrong - around[2]).min() > 0.3:
+                clips = abs(maps.walk_ray(grid, pose, b, R_MAX) - around[2]) > grid.resolution  # a corner before
+                behind = _hits(grid, pose, b, R_MAX, grid.resolution / 2).max(initial=0.0) > around[2] + 1.0
+                if behind and not clips:
+                    return grid, pose, float(b), R_MAX
+
+
+def _casts(grid, poses, bearings):
+    """Ranges (n, 9) of n rays: five nearly alike, the right one in their middle, and four of slips with the angle."""
+    theta, ray = poses[:, 2], poses[:, 2] + bearings
+    angles = np.stack(
+        [ray - 0.02, ray - 0.01, ray, ray + 0.01, ray + 0.02,
+         bearings, theta, theta - bearings, math.pi / 2 - ray], axis=1
+    )  # fmt: skip
+    xy = np.broadcast_to(poses[:, None, :2], (*angles.shape, 2))
+    return grid.cast(np.dstack([xy, angles]), np.zeros(1), R_MAX)[..., 0]
 
 
 def short_ray(rng):
