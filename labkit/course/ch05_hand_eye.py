@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .. import frames, handeye, handeye_data, misprints, sphere
+from ..chaining import orthonormality_error
 from ..lie import exp_so3, skew
 from . import metrics
 from .engine import Chapter, Exercise, Mistake, Prediction, Value
@@ -32,6 +33,14 @@ def scene(rng, n=8, std=0.0):
     x_S = np.column_stack([rng.uniform(-25, 25, n), rng.uniform(-20, 20, n), rng.uniform(190, 290, n)])
     T_BF = frames.pose(R, target - (R @ frames.transform(T_FS, x_S)[..., None])[..., 0])
     return T_FS, T_BF, x_S + std * rng.normal(size=(n, 3)), target
+
+
+def noisy_scene(rng):
+    """Poses and noisy centers whose linear equations give nine numbers that are visibly no rotation."""
+    while True:
+        _, T_BF, x_S, _ = scene(rng, n=12, std=0.05)
+        if orthonormality_error(_linear_without_rotation(T_BF, x_S)[0]) > 2e-3:
+            return T_BF, x_S
 
 
 def kuka_scene(rng):
@@ -697,7 +706,7 @@ CHAPTER = Chapter(
             reference=handeye.linear_start,
             draw=lambda rng: scene(rng, n=9)[1:3],
             metric=metrics.several(metrics.poses(1e-5, 1e-4), metrics.numbers(1e-7, "mm"), names=("T_FS", "target")),
-            noisy=(lambda rng: scene(rng, n=12, std=0.05)[1:3],  # t_FS solved anew, or a refined answer, is right as well
+            noisy=(noisy_scene,  # t_FS solved anew, or a refined answer, is right as well
                    metrics.several(metrics.poses(0.5, 2.5), metrics.numbers(2e-3, "mm"), names=("T_FS", "target")),
                    "exact on clean data, but on noisy data"),
             hints=(

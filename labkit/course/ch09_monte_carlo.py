@@ -117,6 +117,14 @@ def cloud_weights(rng):
     return (rng.exponential(size=30) ** rng.uniform(0.2, 3) * 50 ** rng.uniform(-2, 1),)
 
 
+def cloud_and_threshold(rng, slip):
+    """Weights and a threshold for which this slip decides wrongly."""
+    while True:
+        w, threshold = *cloud_weights(rng), float(rng.uniform(0.2, 0.9))
+        if slip(w, threshold) != particles.should_resample(w, threshold):
+            return w, threshold
+
+
 def averages(rng):
     """w_mean, w_slow, w_fast, alpha_slow, alpha_fast: a drop as often as a rise."""
     slow = rng.uniform(0.2, 0.8)
@@ -415,6 +423,39 @@ def _hits(grid, pose, bearing, r_max, step):
 
 def _ray_to_the_last(grid, pose, bearing, r_max):
     return float([r_max, *_hits(grid, pose, bearing, r_max, grid.resolution / 2)][-1])
+
+
+RESAMPLING_SLIPS = (
+    (
+        lambda w, t: not particles.should_resample(w, t),
+        "The other way round: resample when the effective size is low.",
+    ),
+    (
+        lambda w, t: particles.effective_size(w) < t * w.sum(),
+        "Compare with the share of the *number* of particles, len(weights), not of the sum of the weights.",
+    ),
+    (
+        lambda w, t: _from_the_sum_of_squares(w) < t * len(w),
+        "Your effective size needs weights that add up to 1, and these do not: use effective_size(weights).",
+    ),
+    (
+        lambda w, t: particles.effective_size(w) < 0.5 * len(w),
+        "You compare with half of the particles. The share is handed over: threshold * len(weights).",
+    ),
+    (
+        lambda w, t: particles.effective_size(w) < (1 - t) * len(w),
+        "Compare with the share `threshold` itself, not with 1 - threshold.",
+    ),
+    (
+        lambda w, t: w.sum() < t * len(w),
+        "You compare the sum of the weights. Compare effective_size(weights).",
+    ),
+    (lambda w, t: True, "You resample always. With even weights that only loses particles."),
+    (
+        lambda w, t: False,
+        "You never resample. Do you compare with a bare share? The effective size counts particles: threshold * len(weights).",
+    ),
+)
 
 
 def _motion(std=lambda s: s, shared=False, on_pose=False, none=False):
@@ -1238,44 +1279,14 @@ CHAPTER = Chapter(
         Exercise(
             "should_resample",
             reference=should_resample,
-            draw=lambda rng: (*cloud_weights(rng), float(rng.uniform(0.2, 0.9))),
+            draw=tuple(functools.partial(cloud_and_threshold, slip=slip) for slip, _ in RESAMPLING_SLIPS),
             metric=metrics.exactly(),
             hints=(
                 "Resampling costs diversity. When is it worth its price?",
                 "When the effective size is below the share `threshold` of the number of particles.",
                 "`return effective_size(weights) < threshold * len(weights)`",
             ),
-            mistakes=[
-                Mistake(
-                    lambda w, t: not particles.should_resample(w, t),
-                    "The other way round: resample when the effective size is low.",
-                ),
-                Mistake(
-                    lambda w, t: particles.effective_size(w) < t * w.sum(),
-                    "Compare with the share of the *number* of particles, len(weights), not of the sum of the weights.",
-                ),
-                Mistake(
-                    lambda w, t: _from_the_sum_of_squares(w) < t * len(w),
-                    "Your effective size needs weights that add up to 1, and these do not: use effective_size(weights).",
-                ),
-                Mistake(
-                    lambda w, t: particles.effective_size(w) < 0.5 * len(w),
-                    "You compare with half of the particles. The share is handed over: threshold * len(weights).",
-                ),
-                Mistake(
-                    lambda w, t: particles.effective_size(w) < (1 - t) * len(w),
-                    "Compare with the share `threshold` itself, not with 1 - threshold.",
-                ),
-                Mistake(
-                    lambda w, t: w.sum() < t * len(w),
-                    "You compare the sum of the weights. Compare effective_size(weights).",
-                ),
-                Mistake(lambda w, t: True, "You resample always. With even weights that only loses particles."),
-                Mistake(
-                    lambda w, t: False,
-                    "You never resample. Do you compare with a bare share? The effective size counts particles: threshold * len(weights).",
-                ),
-            ],
+            mistakes=[Mistake(slip, text) for slip, text in RESAMPLING_SLIPS],
             draws=30,
         ),
         Exercise(

@@ -214,7 +214,7 @@ def swirl():
 def _swirl_sentence(result):
     words = (
         f"{result['n']} poses: residual {result['residual']:.2f} mm, true error of the tip {result['error']:.2f} mm, "
-        f"predicted {_length(result['deviation'])}; smallest singular value {result['ratio']:.1e} of the largest"
+        f"predicted {_length(result['deviation'])}; smallest singular value {result['ratio']:.2g} of the largest"
     )
     if result["ratio"] > pivot.NOISE_TOLERANCE * np.deg2rad(SWIRL_STD_ROT_DEG):
         return words + "."
