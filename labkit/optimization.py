@@ -143,20 +143,28 @@ def _linearized(r, J):
 def newton_step(g, H):
     """Step to where the quadratic model is stationary: H step = -g; (..., n), (..., n, n) -> (..., n).
 
-    Source: thesis, (2-23), (2-24). Nothing asks whether that place is a minimum. Raises LinAlgError when H is singular.
+    Source: thesis, (2-23), (2-24). Nothing asks whether that place is a minimum. Raises ValueError when H is singular.
     """
     g, H = _model(g, H)
-    return -np.linalg.solve(H, g[..., None])[..., 0]
+    return -_solve(H, g[..., None], "the curvature H is singular: the model has no stationary place, or many")
 
 
 def gauss_newton_step(r, J):
     """Step that minimizes |r + J step|; r shape (..., m), J shape (..., m, n) -> (..., n).
 
-    A QR factorization instead of the normal equations (2-31): forming J'J squares the condition number.
+    A QR factorization instead of the normal equations (2-31): forming J'J squares the condition number. Raises
+    ValueError when the columns of J depend on each other.
     """
     r, J = _linearized(r, J)
     Q, R = np.linalg.qr(J)
-    return -np.linalg.solve(R, np.swapaxes(Q, -1, -2) @ r[..., None])[..., 0]
+    return -_solve(R, np.swapaxes(Q, -1, -2) @ r[..., None], "the columns of J depend on each other: many steps fit")
+
+
+def _solve(A, right, why_not):
+    try:
+        return np.linalg.solve(A, right)[..., 0]
+    except np.linalg.LinAlgError:
+        raise ValueError(why_not) from None
 
 
 def damped_step(r, J, damping):

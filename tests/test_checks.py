@@ -224,7 +224,9 @@ REFUSED = [
     # optimization, wells
     (lambda: optimization.newton_step([1.0, np.nan], np.eye(2)), "the gradient must be finite"),
     (lambda: optimization.newton_step(O2, I3), "the curvature must have shape"),
+    (lambda: optimization.newton_step(O2, np.zeros((2, 2))), "the curvature H is singular"),
     (lambda: optimization.gauss_newton_step(O2, np.zeros((2, 3))), "m >= n"),
+    (lambda: optimization.gauss_newton_step(O3, np.zeros((3, 2))), "the columns of J depend on each other"),
     (lambda: optimization.damped_step(O3, I3, -1.0), "damping must not be negative"),
     (lambda: optimization.cauchy_step(O2, np.eye(2), np.nan), "radius must be finite"),
     (lambda: optimization.dogleg_step(O2, np.eye(2), -1.0), "radius must not be negative"),
