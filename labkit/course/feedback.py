@@ -42,6 +42,7 @@ class Panel:
             )
         return (
             f'<div role="status" style="border-left:4px solid {color};padding:4px 10px;max-width:60em;line-height:1.45;'
+            "font-size:var(--jp-content-font-size1, inherit);"
             f'color:var(--jp-content-font-color1, inherit)">{"".join(parts)}</div>'
         )
 
