@@ -396,15 +396,13 @@ def estimate(states, weights=None):
     states = as_points(states, "states").reshape(-1, 3)
     weights = _weights_of(states, weights)
     w = weights / weights.sum()
-    pose = (w[:, None] * states).sum(0)
-    pose[2] = circular_mean(states[:, 2], w) if _has_direction(states[:, 2], w) else 0.0
+    x, y, theta = states.T
+    c, s = w @ np.cos(theta), w @ np.sin(theta)
+    heading = np.arctan2(s, c) if np.hypot(c, s) > 1e-9 else 0.0  # headings that cancel have no mean
+    pose = np.array([w @ x, w @ y, heading])
     deviation = states - pose
     deviation[:, 2] = wrap_angle(deviation[:, 2])
-    return Estimate(pose, (w[:, None] * deviation).T @ deviation)
-
-
-def _has_direction(angles, w):
-    return np.hypot((w * np.cos(angles)).sum(), (w * np.sin(angles)).sum()) > 1e-9
+    return Estimate(pose, (deviation.T * w) @ deviation)
 
 
 def estimate_mode(states, weights=None, cell=0.5, turn=_MODE_TURN):
