@@ -375,10 +375,14 @@ def circular_mean(angles, weights=None):
     """
     angles = as_shape(angles, "angles", "M")
     weights = _weights_of(angles, weights)
-    c, s = (weights * np.cos(angles)).sum(), (weights * np.sin(angles)).sum()
+    c, s = _mean_vector(angles, weights)
     if np.hypot(c, s) <= 1e-12 * weights.sum():
         raise ValueError("angles must not cancel: their unit vectors add up to nothing, so no direction is their mean")
     return float(np.arctan2(s, c))
+
+
+def _mean_vector(angles, weights):
+    return weights @ np.cos(angles), weights @ np.sin(angles)
 
 
 @dataclass(frozen=True)
@@ -397,7 +401,7 @@ def estimate(states, weights=None):
     weights = _weights_of(states, weights)
     w = weights / weights.sum()
     x, y, theta = states.T
-    c, s = w @ np.cos(theta), w @ np.sin(theta)
+    c, s = _mean_vector(theta, w)
     heading = np.arctan2(s, c) if np.hypot(c, s) > 1e-9 else 0.0  # headings that cancel have no mean
     pose = np.array([w @ x, w @ y, heading])
     deviation = states - pose
