@@ -17,7 +17,7 @@ def pytest_configure(config):
     strict = config.getoption("nbval", False)
     if not (strict or config.getoption("nbval_lax", False)):
         return
-    from labkit.build import SECONDS_A_CELL, kernel_environment
+    from labkit.verbs.build import SECONDS_A_CELL, kernel_environment
 
     scratch = tempfile.mkdtemp(prefix="labkit-")
     config.add_cleanup(lambda: shutil.rmtree(scratch, ignore_errors=True))

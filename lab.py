@@ -10,7 +10,7 @@
     python lab.py build --check     for authors: say which notebooks are stale
 
 Options of the first: --no-browser, --port N, --ip ADDRESS; any other option goes to JupyterLab as it is.
-Behind `test` you may name what pytest shall run, as in: python lab.py test tests/test_frames.py -k invert
+Behind `test` you may name what pytest shall run, as in: python lab.py test tests/geometry/test_frames.py -k invert
 
 The set-up is a virtual environment in .venv with the packages of constraints.txt. It is repeated only when
 pyproject.toml, constraints.txt, the place of this folder or the version of Python has changed.
@@ -102,10 +102,10 @@ def command(verb, python, rest):
     """The command line behind every verb but the first."""
     return {
         "test": [python, str(ROOT / "tests" / "run.py"), *rest],
-        "build": [python, "-m", "labkit.build", *rest],
-        "reset": [python, "-m", "labkit.build", "--reset", *rest],
-        "progress": [python, "-c", "from labkit.course import progress_text; print(progress_text())"],
-        "ledger": [python, "-c", "from labkit import ledger; print(ledger.as_text())"],
+        "build": [python, "-m", "labkit.verbs.build", *rest],
+        "reset": [python, "-m", "labkit.verbs.build", "--reset", *rest],
+        "progress": [python, "-c", "from labkit.exercises import progress_text; print(progress_text())"],
+        "ledger": [python, "-c", "from labkit.documents import ledger; print(ledger.as_text())"],
     }[verb]
 
 
@@ -312,7 +312,7 @@ def lab_command(python, ip, port, no_browser):
         f"--ServerApp.port={port}",
         f"--LabApp.default_url=/lab/tree/{FIRST_NOTEBOOK}",
         "--LabApp.extension_manager=readonly",
-        "--ServerApp.kernel_websocket_connection_class=labkit.widgets.connection.PromptConnection",
+        "--ServerApp.kernel_websocket_connection_class=labkit.stage.connection.PromptConnection",
         *(["--no-browser"] if no_browser else []),
     ]
 

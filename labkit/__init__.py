@@ -1,5 +1,10 @@
-"""Robot calibration and localization, one module a topic.
+"""Robot calibration and localization, on four storeys; imports go down only.
 
-The mathematics lives in the modules of this folder and needs NumPy and SciPy alone; `figures` draws it, `widgets` makes
-the figures touchable, `course` holds the exercises, and `ledger` recomputes every number the four documents print.
+chapters      what belongs to one notebook: exercises, figures, stages
+documents     what the four documents print, and their claims recomputed
+mathematics   geometry, estimation, calibration, machines, localization; tuned twins in `fast`
+checks        what arrives at the border (`tables` reads what lies in `data/`)
+
+Beside them stand two engines that know no chapter: `exercises` judges an answer, `stage` is a figure one can touch.
+`verbs` is the command line.
 """

@@ -9,8 +9,8 @@
 # %% setup
 import numpy as np
 
-from labkit.course import course, course_map
-from labkit.widgets import start as stages
+from labkit.chapters.ch00_start_here import stages
+from labkit.exercises import course, course_map
 
 ex = course("00-start-here")
 

@@ -20,10 +20,10 @@
 # %% setup
 import numpy as np
 
-from labkit import frames
-from labkit.course import course
-from labkit.ledger.ch01_frames import points
-from labkit.widgets import frames as stages
+from labkit.chapters.ch01_frames import stages
+from labkit.documents.lab_sheet.printed import points
+from labkit.exercises import course
+from labkit.geometry import frames
 
 ex = course("01-frames")
 np.set_printoptions(precision=6, suppress=True)

@@ -21,11 +21,12 @@
 # %% setup
 import numpy as np
 
-from labkit import chaining
-from labkit.course import course
-from labkit.frames import relative
-from labkit.lie import exp_se3, log_se3
-from labkit.widgets import chaining as stages
+from labkit.chapters.ch02_chaining import stages
+from labkit.documents.lab_sheet import printed as lab_sheet
+from labkit.exercises import course
+from labkit.geometry import chaining
+from labkit.geometry.frames import relative
+from labkit.geometry.lie import exp_se3, log_se3
 
 ex = course("02-chaining")
 np.set_printoptions(precision=6, suppress=True)
@@ -39,8 +40,8 @@ np.set_printoptions(precision=6, suppress=True)
 # To have something to measure, `data/chaining` holds eight synthetic frames (labeled so) that round to the printed digits.
 
 # %% the-links
-printed = chaining.printed_transforms()
-measured = chaining.transforms_from_points(chaining.station_points())
+printed = lab_sheet.printed_transforms()
+measured = chaining.transforms_from_points(lab_sheet.station_points())
 for k, (T, S) in enumerate(zip(printed, measured)):
     angle, distance = chaining.closure_error(T)
     off = np.abs(S - T).max()
@@ -99,7 +100,7 @@ def chain(transforms):
 
 # %% compare-listing-7
 product = chain(printed)
-listing_7 = chaining.printed_product()
+listing_7 = lab_sheet.printed_product()
 bound = chaining.rounding_bound(printed)
 off = np.abs(product - listing_7)
 print("corner of the sum:", printed.sum(axis=0)[3, 3], "  of the product:", product[3, 3])

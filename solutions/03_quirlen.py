@@ -22,10 +22,11 @@
 # %% setup
 import numpy as np
 
-from labkit import pivot
-from labkit.course import course
-from labkit.lie import exp_so3
-from labkit.widgets import pivot as stages
+from labkit.calibration import pivot
+from labkit.chapters.ch03_quirlen import stages
+from labkit.documents.lab_sheet import printed as lab_sheet
+from labkit.exercises import course
+from labkit.geometry.lie import exp_so3
 
 ex = course("03-quirlen")
 np.set_printoptions(precision=6, suppress=True)
@@ -41,7 +42,7 @@ np.set_printoptions(precision=6, suppress=True)
 
 # %% the-poses
 print("poses in Kreisel.txt:", (75 - 20) // 5 + 1)
-poses = pivot.kreisel_poses()
+poses = lab_sheet.kreisel_poses()
 for T in poses[:3]:
     tilt_deg = np.rad2deg(np.arccos(T[2, 2]))
     print("flange at", T[:3, 3].round(2), f"mm, tilted by {tilt_deg:.1f} deg")

@@ -24,11 +24,11 @@
 # %% setup
 import numpy as np
 
-from labkit import optimization as opt
-from labkit import wells
-from labkit.course import course
-from labkit.ledger.ch04_optimization import stand_ins
-from labkit.widgets import optimization as stages
+from labkit.chapters.ch04_optimization import stages
+from labkit.documents.thesis import wells
+from labkit.documents.thesis.wells import stand_ins
+from labkit.estimation import optimization as opt
+from labkit.exercises import course
 
 ex = course("04-optimization")
 np.set_printoptions(precision=4, suppress=True)

@@ -25,12 +25,17 @@
 # %% setup
 import numpy as np
 
-from labkit import frames, handeye, handeye_data, misprints
-from labkit.course import course
-from labkit.lie import exp_so3, nearest_rotation, skew
-from labkit.widgets import handeye as stages
+from labkit.calibration import hand_eye
+from labkit.calibration.literature import compare_methods, kim_linear, li_two_step
+from labkit.chapters.ch05_hand_eye import stages
+from labkit.documents import misprints
+from labkit.documents.thesis import printed as thesis
+from labkit.documents.thesis.listings import listing_cost, listing_gauss_newton
+from labkit.exercises import course
+from labkit.geometry import frames
+from labkit.geometry.lie import exp_so3, nearest_rotation, skew
 
-ex = course("05-hand_eye")
+ex = course("05-hand-eye")
 np.set_printoptions(precision=3, suppress=True, linewidth=110)
 
 # %% the-question [markdown]
@@ -45,11 +50,11 @@ np.set_printoptions(precision=3, suppress=True, linewidth=110)
 # Appendix C14 prints the poses, C17 the centers, table 7-4 the result. Section 7.3 promises deviations of 0.1 to 0.6 mm.
 
 # %% the-data
-printed = handeye_data.measurements()
+printed = thesis.measurements()
 for i in (0, 11, 30):
     print(f"pose {i + 1:2}, line {printed.line[i]:2}  {printed.kuka_deg[i]}  sees the sphere at {printed.x_S[i]}")
-p2_end = frames.kuka_from_degrees(handeye_data.kuka_pose_deg("scanner_end"))
-target = handeye_data.printed_target()
+p2_end = frames.kuka_from_degrees(thesis.kuka_pose_deg("scanner_end"))
+target = thesis.printed_target()
 print("the thesis's sphere center (tables 6-4 and 6-5):", target)
 
 # %% circle [markdown]
@@ -127,7 +132,7 @@ def kuka_residual(p2, T_BF, x_S, target):
 # %% validation-code
 e = kuka_residual(p2_end, printed.T_BF, printed.x_S, target)
 print("pose 1:", e[0], "mm   pose 2:", e[1], "mm")
-repaired = handeye_data.measurements((2,))
+repaired = thesis.measurements((2,))
 print("z of pose 2 as printed:", printed.x_S[1, 2], "  and repaired:", repaired.x_S[1, 2])
 
 # %% predict-31
@@ -234,14 +239,14 @@ ex.predict("pole", guess, reveal=stages.convergence)
 # a cost of 3e-7 mm², less than its tolerance: it stopped before the first step.)
 
 # %% table-7-3
-T_sim, x_sim, c_sim, true_deg = handeye_data.simulation()
-for start, name in zip(*handeye_data.start_poses_deg()):
-    runs, _ = handeye.listing_gauss_newton(start, T_sim, x_sim, c_sim)
+T_sim, x_sim, c_sim, true_deg = thesis.simulation()
+for start, name in zip(*thesis.start_poses_deg()):
+    runs, _ = listing_gauss_newton(start, T_sim, x_sim, c_sim)
     print(f"{name:18} {len(runs) - 1} iterations, A + C = {abs(runs[-1, 3] + runs[-1, 5]):.1f} deg")
-J = handeye.kuka_jacobian(frames.kuka_from_degrees(true_deg), T_sim, x_sim)
+J = hand_eye.kuka_jacobian(frames.kuka_from_degrees(true_deg), T_sim, x_sim)
 print("rank of the Jacobian at B = -90 deg:", np.linalg.matrix_rank(J, tol=1e-9), "of 6")
 e = kuka_residual(p2_end, repaired.T_BF, repaired.x_S, target)
-print(f"listing C3's cost: {handeye.listing_cost(e).sum():.0f} mm2; formula (6-11): {0.5 * (e**2).sum():.0f} mm2")
+print(f"listing C3's cost: {listing_cost(e).sum():.0f} mm2; formula (6-11): {0.5 * (e**2).sum():.0f} mm2")
 
 # %% cost [markdown]
 # The last line is a find of its own: the code squares the *sum* of the residuals where (6-11) sums the squares. Errors of opposite sign cancel in it. It only decides when to stop,
@@ -294,7 +299,7 @@ def linear_start(T_BF, x_S):
 # ## Let the outliers speak for themselves
 #
 # Even with pose 2 repaired and the center free, least squares leaves 11 mm: a few poses spoil all. Tukey's weights give them no say. The scale must not be spoiled either: the *median* length of
-# a 3-vector of unit noise is 1.538 (`handeye.MEDIAN_CHI3`), so $s = \mathrm{median}/1.538$, $u = |\varepsilon_i|/(5s)$, and $w = (1-u^2)^2$ below $u = 1$, else 0.
+# a 3-vector of unit noise is 1.538 (`hand_eye.MEDIAN_CHI3`), so $s = \mathrm{median}/1.538$, $u = |\varepsilon_i|/(5s)$, and $w = (1-u^2)^2$ below $u = 1$, else 0.
 
 # %% robust_weights
 @ex.robust_weights
@@ -302,13 +307,13 @@ def robust_weights(residuals):
     """Return one weight (0 to 1) a pose, shape (N,), for residual vectors of shape (N, 3) in mm."""
     ### BEGIN SOLUTION
     lengths = np.linalg.norm(residuals, axis=1)
-    u = lengths / (5 * np.median(lengths) / handeye.MEDIAN_CHI3)
+    u = lengths / (5 * np.median(lengths) / hand_eye.MEDIAN_CHI3)
     return np.where(u < 1, (1 - u**2) ** 2, 0.0)
     ### END SOLUTION
 
 
 # %% robust-code
-fit = handeye.calibrate_sphere_target(printed.T_BF, printed.x_S, robust=True)
+fit = hand_eye.calibrate_sphere_target(printed.T_BF, printed.x_S, robust=True)
 print("poses with weight 0:", np.flatnonzero(fit.weights == 0) + 1, f"  noise of the others: {fit.std:.2f} mm")
 for i in np.flatnonzero(fit.weights == 0):
     print(f"pose {i + 1:2}: residual in the base {fit.residuals[i]} mm")
@@ -335,14 +340,14 @@ for pose in (2, 3, 4, 7, 12, 21, 30):
     print(f"pose {pose:2}: turned {turns[pose - 1]:5.2f} deg off the middle, {offsets[pose - 1]:6.2f} mm off its plane")
 rest = np.setdiff1d(np.arange(31), np.array([2, 3, 4, 7, 12, 21, 30]) - 1)
 print(f"the others, medians: {np.nanmedian(turns[rest]):.2f} deg, {np.median(np.abs(offsets[rest])):.1f} mm")
-for e in misprints.explanations(handeye_data.printed_entries(), 12, fit.T_FS, fit.target, fit.std):
+for e in misprints.explanations(thesis.printed_entries(), 12, fit.T_FS, fit.target, fit.std):
     rest = f"leaves {e.after:.2f} mm, {np.rad2deg(e.turn):.2f} deg off the middle"
     print(f"  {e.column:5} {e.printed} -> {e.corrected}: {rest} ({e.slip})")
 
 # %% find [markdown]
 # ## Name them
 #
-# Now write the search. `entries` maps (table, pose, column) to the printed text, such as `'1397.69'`; `handeye_data.measurements_from(entries)` makes arrays of it. Return the set of
+# Now write the search. `entries` maps (table, pose, column) to the printed text, such as `'1397.69'`; `thesis.measurements_from(entries)` makes arrays of it. Return the set of
 # wrong entries. Any procedure is fine, within 15 seconds a call; who recomputes only the row that is changed needs a fraction of one.
 # Accusing an innocent entry is not. The check also plants slips of its own.
 
@@ -354,8 +359,8 @@ def find_misprints(entries):
     entries: {(table, pose, column): text} of C14 (x, y, z, A_deg, B_deg, C_deg) and C17 (x, y, z).
     """
     ### BEGIN SOLUTION
-    measured = handeye_data.measurements_from(entries)
-    fit = handeye.calibrate_sphere_target(measured.T_BF, measured.x_S, robust=True)
+    measured = thesis.measurements_from(entries)
+    fit = hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S, robust=True)
     named = set()
     for i in np.flatnonzero(np.linalg.norm(fit.residuals, axis=1) > 6 * fit.std):
         slips = misprints.explanations(entries, int(i) + 1, fit.T_FS, fit.target, fit.std)
@@ -370,10 +375,10 @@ def find_misprints(entries):
 # were set.) Fit scanner *and* center to the corrected data and give the rms over all 31, none dropped.
 
 # %% rms_after
-corrected = handeye_data.measurements(True)
+corrected = thesis.measurements(True)
 rms_after = ...  # your code here
 ### BEGIN SOLUTION
-rms_after = handeye.calibrate_sphere_target(corrected.T_BF, corrected.x_S).rms
+rms_after = hand_eye.calibrate_sphere_target(corrected.T_BF, corrected.x_S).rms
 ### END SOLUTION
 ex.rms_after(rms_after)
 
@@ -383,12 +388,12 @@ ex.rms_after(rms_after)
 
 # %% steps-of-corrections
 poses = []
-for row in handeye_data.corrections():
+for row in thesis.corrections():
     poses.append(row["pose"])
-    m = handeye_data.measurements(poses)
-    end = handeye.rms_distance(kuka_residual(p2_end, m.T_BF, m.x_S, target))
-    fixed = handeye.calibrate_sphere_target(m.T_BF, m.x_S, target=target).rms
-    joint = handeye.calibrate_sphere_target(m.T_BF, m.x_S).rms
+    m = thesis.measurements(poses)
+    end = hand_eye.rms_distance(kuka_residual(p2_end, m.T_BF, m.x_S, target))
+    fixed = hand_eye.calibrate_sphere_target(m.T_BF, m.x_S, target=target).rms
+    joint = hand_eye.calibrate_sphere_target(m.T_BF, m.x_S).rms
     print(f"{row['table']} {row['pose']:2} {row['column']:5} {row['printed']:>8} -> {row['corrected']:8}", end=" ")
     print(f"rms {end:6.2f} end pose, {fixed:6.2f} center fixed, {joint:6.2f} all free")
 
@@ -401,17 +406,17 @@ for row in handeye_data.corrections():
 # %% radius
 radius = ...  # your code here
 ### BEGIN SOLUTION
-radius, std_radius = handeye.fit_radius(corrected.T_BF, corrected.x_S)
+radius, std_radius = hand_eye.fit_radius(corrected.T_BF, corrected.x_S)
 ### END SOLUTION
 ex.radius(radius)
 
 # %% radius-verdict
-R, std = handeye.fit_radius(corrected.T_BF, corrected.x_S)
+R, std = hand_eye.fit_radius(corrected.T_BF, corrected.x_S)
 no_4 = np.arange(31) != 3
-R4, std4 = handeye.fit_radius(corrected.T_BF[no_4], corrected.x_S[no_4])
+R4, std4 = hand_eye.fit_radius(corrected.T_BF[no_4], corrected.x_S[no_4])
 print(f"all poses: {R:.3f} +- {std:.3f} mm; without pose 4, next to the equator: {R4:.3f} +- {std4:.3f} mm")
 for source in ("certificate", "listing", "coordinate machine"):
-    r = handeye_data.radius(source)
+    r = thesis.radius(source)
     print(f"{source:19} {r:.4f} mm: {abs(r - R) / std:4.1f} and {abs(r - R4) / std4:4.1f} standard deviations away")
 
 # %% known [markdown]
@@ -429,19 +434,19 @@ guess = "the scanner's orientation"
 ex.predict("weak", guess, reveal=stages.pattern_designer)
 
 # %% known-code
-fit = handeye.calibrate_sphere_target(corrected.T_BF, corrected.x_S)
+fit = hand_eye.calibrate_sphere_target(corrected.T_BF, corrected.x_S)
 sigma = np.sqrt(np.diag(fit.covariance))
-left_out = handeye.leave_one_out(corrected.T_BF, corrected.x_S)
-print(f"left out: rms {handeye.rms_distance(left_out):.2f} mm; in the fit: {fit.rms:.2f} mm")
+left_out = hand_eye.leave_one_out(corrected.T_BF, corrected.x_S)
+print(f"left out: rms {hand_eye.rms_distance(left_out):.2f} mm; in the fit: {fit.rms:.2f} mm")
 print("orientation", np.rad2deg(sigma[:3]), "deg; translation", sigma[3:6], "mm; sphere center", sigma[6:], "mm")
 print("standard deviation of x_S:", np.std(corrected.x_S, axis=0), "mm; all over the field: 14, 15, 29 mm")
-p2, p3 = frames.kuka_from_matrix(fit.T_FS), frames.kuka_from_matrix(handeye_data.frame("plate"))
-J = handeye.plate_jacobian(corrected.T_BF, corrected.x_S, p2, p3, handeye_data.point("sphere_in_plate"))
+p2, p3 = frames.kuka_from_matrix(fit.T_FS), frames.kuka_from_matrix(thesis.frame("plate"))
+J = hand_eye.plate_jacobian(corrected.T_BF, corrected.x_S, p2, p3, thesis.point("sphere_in_plate"))
 print("rank of the thesis's second step:", np.linalg.matrix_rank(J, tol=1e-6), "of 12 unknowns")
 
 # %% design [markdown]
-# The pattern always aimed at the middle of the field. Use all of it: x within ±25 mm, |y| from 3 to 25, z from 190 to 290 (`handeye.FIELD`), line of sight at most 90° from straight
-# down. `handeye.poses_that_see(T_FS, target, R_BF, x_S)` gives the poses for chosen orientations and places. With 31 poses, reach 0.7 of the thesis's
+# The pattern always aimed at the middle of the field. Use all of it: x within ±25 mm, |y| from 3 to 25, z from 190 to 290 (`hand_eye.FIELD`), line of sight at most 90° from straight
+# down. `hand_eye.poses_that_see(T_FS, target, R_BF, x_S)` gives the poses for chosen orientations and places. With 31 poses, reach 0.7 of the thesis's
 # orientation error, and no more than its translation error.
 
 # %% design_poses
@@ -457,7 +462,7 @@ def design_poses(T_FS, target, rng):
     z = rng.choice([190, 290], 31)
     down = np.diag([1.0, -1.0, -1.0]) @ T_FS[:3, :3].T  # the scanner looks straight down
     turn = np.column_stack([rng.uniform(-0.8, 0.8, (31, 2)), rng.uniform(-3, 3, 31)])
-    return handeye.poses_that_see(T_FS, target, exp_so3(turn) @ down, np.column_stack([x, y, z]))
+    return hand_eye.poses_that_see(T_FS, target, exp_so3(turn) @ down, np.column_stack([x, y, z]))
     ### END SOLUTION
 
 
@@ -470,10 +475,10 @@ def design_poses(T_FS, target, rng):
 shifted = np.tile(corrected.T_BF[0], (6, 1, 1))
 shifted[:, :3, 3] += 50 * np.random.default_rng(0).normal(size=(6, 3))
 attempts = {
-    "translated only": lambda: handeye.calibrate_sphere_target(shifted, corrected.x_S[:6]),
-    "one line of motion": lambda: handeye.calibrate_sphere_target(corrected.T_BF[:4], corrected.x_S[:4]),
-    "Kim, Cho, Kim": lambda: handeye.kim_linear(corrected.T_BF, corrected.x_S[:, None], fit.target[None]),
-    "Li et al.": lambda: handeye.li_two_step(corrected.T_BF, corrected.x_S),
+    "translated only": lambda: hand_eye.calibrate_sphere_target(shifted, corrected.x_S[:6]),
+    "one line of motion": lambda: hand_eye.calibrate_sphere_target(corrected.T_BF[:4], corrected.x_S[:4]),
+    "Kim, Cho, Kim": lambda: kim_linear(corrected.T_BF, corrected.x_S[:, None], fit.target[None]),
+    "Li et al.": lambda: li_two_step(corrected.T_BF, corrected.x_S),
 }
 for name, attempt in attempts.items():
     try:
@@ -488,7 +493,7 @@ for name, attempt in attempts.items():
 # Cramér-Rao bound. (Kim needs a body with four points or more; it gets a cube's eight corners. The formula (2-41) of Li's first step has its sign reversed in the thesis.)
 
 # %% literature
-errors, bound = handeye.compare_methods(150, std=0.1, rng=np.random.default_rng(0))
+errors, bound = compare_methods(150, std=0.1, rng=np.random.default_rng(0))
 for name, error in errors.items():
     print(f"{name:24} {error:.2f} mm")
 print(f"{'bound for one sphere':24} {bound:.2f} mm")

@@ -20,14 +20,16 @@
 # %% setup
 import numpy as np
 
-from labkit import axxb, robot, tracker, udp
-from labkit import tracker_simulation as simulation
-from labkit.course import course
-from labkit.frames import invert, relative
-from labkit.ledger import ch06_tracker as report
+from labkit.calibration import ax_xb
+from labkit.chapters.ch06_tracker import stages
+from labkit.documents.report import printed as report
+from labkit.documents.report.reconstruction import synthetic_mountings, synthetic_table
+from labkit.exercises import course
+from labkit.geometry.frames import invert, relative
+from labkit.machines import accuracy, arm, simulation, udp
+from labkit.machines.log import average_stops, read_csv
+from labkit.machines.mounting import calibrate_mounting
 from labkit.tables import DATA, read_table
-from labkit.widgets import robot as robot_stages
-from labkit.widgets import tracker as stages
 
 ex = course("06-tracker")
 np.set_printoptions(precision=4, suppress=True)
@@ -43,7 +45,7 @@ np.set_printoptions(precision=4, suppress=True)
 # ## A packet
 #
 # Table 1 of the report gives 23 fields of 8 bytes: device, time stamp, position, velocity, acceleration, quaternion (x, y, z, w), angular velocity and acceleration, two
-# buttons. It gives **no types**. Our assumption, in one place of `tracker.py`: little-endian doubles, meters, seconds.
+# buttons. It gives **no types**. Our assumption, in one place of `machines/packet.py`: little-endian doubles, meters, seconds.
 
 # %% decode_packet
 @ex.decode_packet
@@ -96,7 +98,7 @@ guess = ...  # your code here
 ### BEGIN SOLUTION
 guess = 161
 ### END SOLUTION
-ex.predict("fold", guess, reveal=robot_stages.tx40)
+ex.predict("fold", guess, reveal=stages.tx40)
 
 # %% dh_matrix
 @ex.dh_matrix
@@ -236,9 +238,9 @@ def reject_outliers(values, factor=4.0):
 # %% read-the-log
 poses = read_table("tracker/poses.csv")
 joints = np.deg2rad(np.column_stack([poses[f"q{i} [deg]"] for i in range(1, 7)]))
-T_BF = np.array([forward_kinematics(robot.TX40.dh, q) for q in joints])
-T_WE, used = tracker.average_stops(tracker.read_csv(DATA / "tracker/run_1.csv"))
-kept = tracker.calibrate_mounting(T_BF, T_WE).kept
+T_BF = np.array([forward_kinematics(arm.TX40.dh, q) for q in joints])
+T_WE, used = average_stops(read_csv(DATA / "tracker/run_1.csv"))
+kept = calibrate_mounting(T_BF, T_WE).kept
 A, B = relative(T_BF[0], T_BF), relative(T_WE[0], T_WE)
 print("share of readings used at a stop:", used.min(), "to", used.max(), "- excluded pose:", np.flatnonzero(~kept))
 
@@ -258,7 +260,7 @@ mounting = ex.mounting(mounting)
 # does: what is the standard deviation of the height z over our six, in mm?
 
 # %% spread
-mountings = np.array([run.T_FE for run in report.synthetic_mountings()])
+mountings = np.array([run.T_FE for run in synthetic_mountings()])
 spread = ...  # your code here
 ### BEGIN SOLUTION
 spread = mountings[:, 2, 3].std()
@@ -278,7 +280,7 @@ print("run 4, mean and largest angle, printed:", runs[3, 10], runs[3, 12], "deg"
 print(f"Rozptyl of x: {variance[0]}, divided by 6: {runs[:, 0].var():.2e}, by 5: {runs[:, 0].var(ddof=1):.2e}")
 least = mean[9] * np.sqrt(20) / 19
 print(f"E_trans, printed {mean[7]:.6f} 'mm': at least {least:.2f} mm, so it is meters: {1000 * mean[7]:.2f} mm")
-ours = report.synthetic_table()
+ours = synthetic_table()
 for name, average, rozptyl in (("report", mean, variance), ("ours", ours.mean(0), ours.var(0))):
     print(f"{name:6} z {1000 * average[2]:.2f} mm, Rozptyl {rozptyl[2]:.1e} m^2, mean error {average[9]:.2f} mm")
     print(f"{'':6} {average[10]:.3f} deg, E_trans {1000 * average[7]:.2f} mm, E_rot {average[8]:.1e}")
@@ -314,12 +316,12 @@ guess = "both together, weighed by their noise"
 ex.predict("methods", guess, reveal=stages.methods)
 
 # %% everything-at-once [markdown]
-# Rotation first means: translations may not help the rotation. Maximum likelihood weighs both by their noise; `axxb.calibrate_hand_eye` does, and returns a covariance. It treats the
+# Rotation first means: translations may not help the rotation. Maximum likelihood weighs both by their noise; `ax_xb.calibrate_hand_eye` does, and returns a covariance. It treats the
 # first pose like any other, and so needs one more unknown, here $T_{BW}$. On our log it gains little, since the systematic error is nobody's noise model,
 # though `robust` sets aside the worst stop left, pose 4. But its standard deviation says how far off it may be; six equal runs do not.
 
 # %% maximum-likelihood
-best = axxb.calibrate_hand_eye(invert(T_BF), T_WE, robust=True)
+best = ax_xb.calibrate_hand_eye(invert(T_BF), T_WE, robust=True)
 std = np.sqrt(np.diag(best.covariance))[9:]  # 12 unknowns: two poses, the translation of T_FE comes last
 for name, t in (("truth", simulation.T_FE), ("report's method", mounting), ("maximum likelihood", best.target)):
     print(f"{name:19}", *t[:3, 3].round(2), "mm")
@@ -362,11 +364,11 @@ def time_offset(time, reference, delayed, max_offset=0.2):
 # %% four-motions
 for name in ("slow", "middle", "fast", "rotation"):
     m = simulation.simulate_motion(name, np.random.default_rng(5))
-    lag = time_offset(m.time, tracker.speeds(m.time, m.T_true)[1], m.w_read)
-    raw = tracker.summarize(tracker.tracking_errors(m.time, m.T_true, m.T_read).translation)
-    then = tracker.shift_time(m.time, m.T_true, -lag)
-    smooth, gate = tracker.filter_positions(m.time, m.T_read[:, :3, 3])
-    left = tracker.summarize(np.linalg.norm(smooth - then[:, :3, 3], axis=1))
+    lag = time_offset(m.time, accuracy.speeds(m.time, m.T_true)[1], m.w_read)
+    raw = accuracy.summarize(accuracy.tracking_errors(m.time, m.T_true, m.T_read).translation)
+    then = accuracy.shift_time(m.time, m.T_true, -lag)
+    smooth, gate = accuracy.filter_positions(m.time, m.T_read[:, :3, 3])
+    left = accuracy.summarize(np.linalg.norm(smooth - then[:, :3, 3], axis=1))
     print(f"{name:9} lag {1000 * lag:4.0f} ms   raw:", ", ".join(f"{k} {v:.0f}" for k, v in raw.items()), "mm")
     print(f"{'':21} gated: mean {left['mean']:.1f}, max {left['max']:.1f} mm, {100 * (1 - gate.mean()):.0f} % refused")
 

@@ -20,10 +20,12 @@
 # %% setup
 import numpy as np
 
-from labkit import gaussian, lateration, odometry
-from labkit.course import course
-from labkit.widgets import lateration as circle_stages
-from labkit.widgets import odometry as drive_stages
+from labkit.chapters.ch07_dead_reckoning import stages
+from labkit.documents.lecture import printed as lecture
+from labkit.estimation import gaussian
+from labkit.exercises import course
+from labkit.geometry import planar
+from labkit.localization import lateration, odometry
 
 ex = course("07-dead-reckoning")
 np.set_printoptions(precision=4, suppress=True)
@@ -40,7 +42,7 @@ guess = ...  # your code here
 ### BEGIN SOLUTION
 guess = "none of them"
 ### END SOLUTION
-ex.predict("method", guess, reveal=circle_stages.methods)
+ex.predict("method", guess, reveal=stages.methods)
 
 # %% lateration [markdown]
 # ## Lateration: distances to landmarks
@@ -87,7 +89,7 @@ guess = ...  # your code here
 ### BEGIN SOLUTION
 guess = "two"
 ### END SOLUTION
-ex.predict("roots", guess, reveal=circle_stages.circles)
+ex.predict("roots", guess, reveal=stages.circles)
 
 # %% two-costs [markdown]
 # ## Which squares?
@@ -167,7 +169,7 @@ guess = ...  # your code here
 ### BEGIN SOLUTION
 guess = "it becomes a quarter"
 ### END SOLUTION
-ex.predict("order", guess, reveal=drive_stages.models)
+ex.predict("order", guess, reveal=stages.models)
 
 # %% propagation [markdown]
 # ## How uncertainty travels
@@ -240,17 +242,17 @@ guess = ...  # your code here
 ### BEGIN SOLUTION
 guess = "to the left or right"
 ### END SOLUTION
-ex.predict("spread", guess, reveal=drive_stages.drive)
+ex.predict("spread", guess, reveal=stages.drive)
 
 # %% circle [markdown]
 # ## The circle in numbers
 #
 # The lecture prints the constants, $k_d = (0.02\,\mathrm{m})^2/1\,\mathrm{m}$, $k_\theta = (5°)^2/360°$ and $k_\mathrm{drift} = (2°)^2/1\,\mathrm{m}$, but not where the drive
-# ends. `odometry.circle_drive()` holds them in radians and meters: `drive.controls` (140, 2), `drive.dt`, and `drive.noise` with the three constants by name, to be passed on as `**drive.noise`.
+# ends. `lecture.circle_drive()` holds them in radians and meters: `drive.controls` (140, 2), `drive.dt`, and `drive.noise` with the three constants by name, to be passed on as `**drive.noise`.
 # Start at the origin with a covariance of zeros and take all steps. (They turn by 336°: the circle does not quite close.)
 
 # %% end_pose
-drive = odometry.circle_drive()
+drive = lecture.circle_drive()
 end_pose = end_cov = ...  # your code here
 ### BEGIN SOLUTION
 end_pose, end_cov = np.zeros(3), np.zeros((3, 3))
@@ -278,7 +280,7 @@ covariance = ex.end_cov(covariance)
 
 # %% what-k-means-code
 for dt in (0.5, 0.1, 0.02):
-    cut = odometry.circle_drive(dt)
+    cut = lecture.circle_drive(dt)
     poses, covs = odometry.drive_with_covariance(np.zeros(3), np.zeros((3, 3)), cut.controls, dt, **cut.noise)
     fixed = control_covariance(cut.controls[0], 0.1, **cut.noise)
     wrong = np.sqrt(len(cut.controls) * dt**2 * fixed[1, 1])
@@ -295,7 +297,7 @@ guess = ...  # your code here
 ### BEGIN SOLUTION
 guess = "fewer"
 ### END SOLUTION
-ex.predict("banana", guess, reveal=drive_stages.banana)
+ex.predict("banana", guess, reveal=stages.banana)
 
 # %% bend [markdown]
 # ## Beyond the document: bend the Gaussian
@@ -309,8 +311,8 @@ controls = drive.controls * [1.0, 0.0]
 poses, covs = odometry.drive_with_covariance(np.zeros(3), np.zeros((3, 3)), controls, drive.dt, **drive.noise)
 rng = np.random.default_rng(5)
 ends = odometry.sample_drives(np.zeros(3), controls, drive.dt, **drive.noise, rng=rng, runs=10_000)[-1]
-_, center, spread = drive_stages.bent_region(poses[-1], ends)
-twists = odometry.log_pose(odometry.relative_pose(poses[-1], ends))
+_, center, spread = gaussian.bent_region(poses[-1], ends)
+twists = planar.log_pose(planar.relative_pose(poses[-1], ends))
 print(f"inside the 95 % ellipse:      {100 * gaussian.share_inside(ends, poses[-1], covs[-1]):.0f} %")
 print(f"inside the 95 % bent region:  {100 * gaussian.share_inside(twists, center, spread):.0f} %")
 print(f"mean of the ends lags behind: {100 * (poses[-1] - ends.mean(0))[0]:.0f} cm")
@@ -325,9 +327,9 @@ print(f"mean of the ends lags behind: {100 * (poses[-1] - ends.mean(0))[0]:.0f} 
 pair, robot = np.array([[0.0, 0.0], [6.0, 0.0]]), np.array([3.0, 2.0])
 distances = np.linalg.norm(pair - robot, axis=1)
 for start in ([4.0, 0.0], [4.0, 0.001], [4.0, -0.001]):
-    search = lateration.newton(pair, distances, start)
+    search = lateration.newton_lateration(pair, distances, start)
     print(f"from {start}: {search.position} after {len(search.path) - 1} steps. {search.reason}")
-print(lateration.newton(pair, [1.0, 1.0], [3.0, 1.0]).reason)
+print(lateration.newton_lateration(pair, [1.0, 1.0], [3.0, 1.0]).reason)
 try:
     lateration.laterate(pair, distances)
 except ValueError as refusal:

@@ -22,10 +22,13 @@
 # %% setup
 import numpy as np
 
-from labkit import kalman, odometry, tracker
-from labkit import tracker_simulation as simulation
-from labkit.course import course
-from labkit.widgets import kalman as stages
+from labkit.chapters.ch08_kalman import stages
+from labkit.documents.lecture.examples import circle_course, predict_vehicle, reconstruct_vehicle
+from labkit.estimation import kalman
+from labkit.exercises import course
+from labkit.localization import ekf, odometry
+from labkit.machines import simulation
+from labkit.machines.accuracy import shift_time
 
 ex = course("08-kalman")
 np.set_printoptions(precision=4, suppress=True)
@@ -133,7 +136,7 @@ ex.predict("velocity", guess, reveal=stages.vehicle)
 # ## The gain knows before the data do
 #
 # No measurement appears in the formulas of $K$ and $\Sigma$. In a time-invariant system both therefore settle, whatever is measured, where one step
-# changes nothing more: at the solution of the Riccati equation. (This makes filters fast: once the gain stands still, `kalman.filter_series` runs the rest as a digital filter.)
+# changes nothing more: at the solution of the Riccati equation. (This makes filters fast: once the gain stands still, `labkit.fast.kalman.filter_series` runs the rest as a digital filter.)
 
 # %% steady_state_gain
 @ex.steady_state_gain
@@ -172,13 +175,13 @@ corrected = ex.corrected(corrected)
 
 # %% detective-code
 for n in (49, 50, 51, 52):
-    var_x0, var_v0, var_a = kalman.reconstruct_vehicle(prior_cov, n, 0.1)
+    var_x0, var_v0, var_a = reconstruct_vehicle(prior_cov, n, 0.1)
     print(f"{n} steps of 0.1 s: starting variances {var_x0:.4f} and {var_v0:.4f}, acceleration {var_a:.4f}")
-x_51, cov_51 = kalman.predict_vehicle(51, 0.1, 1.0, 0.01, 0.16)
+x_51, cov_51 = predict_vehicle(51, 0.1, 1.0, 0.01, 0.16)
 result = kalman.update(x_51, cov_51, [11.79], [[1.0, 0.0]], [[0.25]])
 print("prediction after 51 steps at 1 m/s^2:", x_51, " corrected:", result.x)
 for T in (0.05, 0.09, 0.11, 0.12):
-    print(f"51 steps of {T} s would need", kalman.reconstruct_vehicle(prior_cov, 51, T))
+    print(f"51 steps of {T} s would need", reconstruct_vehicle(prior_cov, 51, T))
 
 # %% verdict [markdown]
 # So the simulation ran 51 steps (0 to 50), from variances 1 and 0.01, with $\sigma_a = 0.4$. It predicted (12.75, 5.10), not the printed (12.5, 5.0), which are the ideal
@@ -302,7 +305,7 @@ def nees(truth, x, cov):
 
 
 # %% two-hundred-runs
-four = kalman.circle_course(marks=4)
+four = circle_course(marks=4)
 drives = four.simulate(np.random.default_rng(1), runs=200)
 beliefs = {"as it is": {}, "bearing not wrapped": {"wrap": False}}
 beliefs["drive believed 3 times too good"] = {"cov_u": four.cov_u / 9}
@@ -335,10 +338,10 @@ ex.predict("precise", guess, reveal=stages.honesty)
 marks, std_range, std_bearing = stages.TWO_MARKS, 0.01, np.radians(0.2)
 cov, rng = np.diag([1.0, 1.0, np.radians(10) ** 2]), np.random.default_rng(4)
 prior = rng.standard_normal((200, 3)) * np.sqrt(np.diag(cov))
-z = kalman.measurement(np.zeros(3), marks) + rng.standard_normal((200, 2, 2)) * [std_range, std_bearing]
+z = ekf.measurement(np.zeros(3), marks) + rng.standard_normal((200, 2, 2)) * [std_range, std_bearing]
 given = (prior, np.broadcast_to(cov, (200, 3, 3)), z, marks, std_range, std_bearing)
-filters = {"extended": kalman.ekf_update(*given), "unscented": kalman.unscented_update(*given)}
-filters["iterated"] = kalman.ekf_update(*given, iterations=10)
+filters = {"extended": ekf.ekf_update(*given), "unscented": ekf.unscented_update(*given)}
+filters["iterated"] = ekf.ekf_update(*given, iterations=10)
 for name, step in filters.items():
     rms = 1000 * np.sqrt((step.x[:, :2] ** 2).sum(1).mean())
     print(f"{name:10} RMS {rms:4.0f} mm, mean NEES {kalman.nees(np.zeros(3), step.x, step.cov, angle=2).mean():7.3g}")
@@ -362,12 +365,12 @@ def gate(innovation, cov_innovation, limit):
 # %% association
 marks = np.array([[10.0, 0.0], [8.7, 1.6]])
 truth, cov = np.array([0.0, 0.0, np.radians(-8)]), np.diag([1e-4, 1e-4, np.radians(8) ** 2])
-z = kalman.measurement(truth, marks)
+z = ekf.measurement(truth, marks)
 believed = np.zeros(3)  # the filter thinks the robot looks straight ahead
 for by in ("nearest", "mahalanobis"):
-    print(f"{by:12} landmarks 0 and 1 are taken for", kalman.associate(believed, cov, z, marks, 0.05, 0.01, by=by))
+    print(f"{by:12} landmarks 0 and 1 are taken for", ekf.associate(believed, cov, z, marks, 0.05, 0.01, by=by))
 stray = np.array([[4.0, 1.0]])
-print("a chair at 4 m is taken for", kalman.associate(believed, cov, stray, marks, 0.05, 0.01), "(-1: for nothing)")
+print("a chair at 4 m is taken for", ekf.associate(believed, cov, stray, marks, 0.05, 0.01), "(-1: for nothing)")
 
 # %% tracker [markdown]
 # ## The tracker of chapter 6, filtered
@@ -378,7 +381,7 @@ print("a chair at 4 m is taken for", kalman.associate(believed, cov, stray, mark
 # %% tracker-code
 motion = simulation.simulate_motion("middle", np.random.default_rng(5))
 read, dt = motion.T_read[:, :3, 3], motion.time[1] - motion.time[0]
-truth = tracker.shift_time(motion.time, motion.T_true, -simulation.MOVING.latency)[:, :3, 3]
+truth = shift_time(motion.time, motion.T_true, -simulation.MOVING.latency)[:, :3, 3]
 A, B, C = (np.kron(M, np.eye(3)) for M in ([[1, dt], [0, 1]], [[dt**2 / 2], [dt]], [[1, 0]]))
 cov_z = 9.0 * np.eye(3)
 for std_a in (4000.0, 400.0):
@@ -416,7 +419,7 @@ for dtype in (np.float64, np.float32):
 # - Wrap every difference of angles. Test it with a robot that faces backward.
 # - A covariance that is too small is worse than one that is too large: inflate when in doubt.
 # - Gate, but count what you reject: a filter that rejects everything is lost, and sure of itself.
-# - Batch over runs, not over time: `kalman.ekf_localize` filters 200 robots in the time of a few.
+# - Batch over runs, not over time: `labkit.fast.ekf.ekf_localize` filters 200 robots in the time of a few.
 
 # %% questions [markdown]
 # ## Three questions, to answer in words

@@ -25,13 +25,16 @@ import inspect
 
 import numpy as np
 
-from labkit import maps, museum, odometry, particles
-from labkit.course import course
+from labkit.chapters.ch09_monte_carlo import specimens, stages
+from labkit.documents.lecture.examples import load_building
+from labkit.exercises import course
+from labkit.geometry import planar
+from labkit.localization import drives, maps, odometry, particles, sensors
+from labkit.localization.mcl import MonteCarloLocalizer, localizer, record
 from labkit.tables import read_table
-from labkit.widgets import particles as stages
 
 ex = course("09-monte-carlo")
-building = maps.load_building()
+building = load_building()
 grid = building.grid
 
 # %% the-question [markdown]
@@ -69,7 +72,7 @@ ex.predict("corridor", guess, reveal=stages.corridor)
 stages.map_forms()
 
 # %% scan
-scanner = maps.Scanner()
+scanner = sensors.Scanner()
 pose = np.array([8.4, 2.4, 0.3])
 ranges, bearings = scanner.scan(grid, pose, np.random.default_rng(1), every=9)
 without_echo = np.sum(ranges == scanner.r_max)
@@ -109,7 +112,7 @@ def sample_motion(states, u, dt, std_u, rng):
 # Multiply both normal densities over all landmarks
 # (slide *Landmarkbasiertes Verfahren (2)*). Return the **logarithm**. And mind the seam: a bearing of 179° and one of
 # −179° differ by 2°
-# (`odometry.wrap_angle` helps).
+# (`planar.wrap_angle` helps).
 
 # %% landmark_weight
 @ex.landmark_weight
@@ -118,7 +121,7 @@ def landmark_weight(pose, z, landmarks, std_range, std_bearing):
     ### BEGIN SOLUTION
     dx, dy = (landmarks - pose[:2]).T
     error_r = z[:, 0] - np.hypot(dx, dy)
-    error_phi = odometry.wrap_angle(z[:, 1] - (np.arctan2(dy, dx) - pose[2]))
+    error_phi = planar.wrap_angle(z[:, 1] - (np.arctan2(dy, dx) - pose[2]))
     log_p = -0.5 * (error_r / std_range) ** 2 - 0.5 * (error_phi / std_bearing) ** 2
     return np.sum(log_p - np.log(2 * np.pi * std_range * std_bearing))
     ### END SOLUTION
@@ -142,7 +145,7 @@ ex.beams_to_zero(beams_to_zero)
 # %% beams [markdown]
 # A scan has 541. With all weights zero there is nothing to draw from. A sum of logarithms never gets there, and
 # subtracting the largest one first makes
-# the best particle weigh $e^0 = 1$ (`particles.normalize`).
+# the best particle weigh $e^0 = 1$ (`particles.normalize_weights`).
 #
 # ## Weighing by beams
 #
@@ -378,13 +381,13 @@ for task, model, good, low, high, steps in zip(*(table[name] for name in columns
 # `recovery=False` and other seeds.
 
 # %% kld
-suite, rng = particles.SensorSuite(building), np.random.default_rng(5)
-drive = particles.random_drive(building, 30, rng, start="hall")
-mcl = particles.localizer(building, "likelihood field", 5000, rng, kld={"n_min": 2000, "epsilon": 0.005})
-run = particles.record(mcl, drive, lambda pose, k: suite.measure("likelihood field", pose, rng), rng)
+suite, rng = sensors.SensorSuite(building), np.random.default_rng(5)
+drive = drives.random_drive(building, 30, rng, start="hall")
+mcl = localizer(building, "likelihood field", 5000, rng, kld={"n_min": 2000, "epsilon": 0.005})
+run = record(mcl, drive, lambda pose, k: suite.measure("likelihood field", pose, rng), rng)
 error = np.hypot(*(run[-1].estimate - run[-1].truth)[:2])
 print("particles before steps 1, 2, 5, 10, 30:", [len(run[k].states) for k in (0, 1, 4, 9, 29)])
-turn = abs(odometry.wrap_angle(run[-1].estimate[2] - run[-1].truth[2]))
+turn = abs(planar.wrap_angle(run[-1].estimate[2] - run[-1].truth[2]))
 print("found" if error < 0.3 and turn < np.deg2rad(10) else "lost", "at the end")
 
 # %% bug-hunt [markdown]
@@ -397,7 +400,7 @@ print("found" if error < 0.3 and turn < np.deg2rad(10) else "lost", "at the end"
 # It answers with `return`, not with `assert`. It is tried on correct functions too, and must not reject them.
 
 # %% hunt_1
-print(inspect.getsource(museum.specimen_1))
+print(inspect.getsource(specimens.specimen_1))
 
 
 @ex.hunt_1
@@ -411,7 +414,7 @@ def hunt_1(resample, rng):
 
 
 # %% hunt_2
-print(inspect.getsource(museum.specimen_2))
+print(inspect.getsource(specimens.specimen_2))
 
 
 @ex.hunt_2
@@ -425,7 +428,7 @@ def hunt_2(resample, rng):
 
 
 # %% hunt_3
-print(inspect.getsource(museum.specimen_3))
+print(inspect.getsource(specimens.specimen_3))
 
 
 @ex.hunt_3
@@ -440,7 +443,7 @@ def hunt_3(resample, rng):
 
 
 # %% hunt_4
-print(inspect.getsource(museum.specimen_4))
+print(inspect.getsource(specimens.specimen_4))
 
 
 @ex.hunt_4
@@ -467,14 +470,14 @@ def hunt_4(weigh):
 # %% break-it-code
 lost = ranges.copy()
 lost[0] = scanner.r_max
-plain = particles.weigh_beams(suite.table, lost, bearings, 0.2, scanner.r_max, shares=(1, 0, 0, 0))
-mixture = particles.weigh_beams(suite.table, lost, bearings, 0.2, scanner.r_max)
+plain = sensors.weigh_beams(suite.table, lost, bearings, 0.2, scanner.r_max, shares=(1, 0, 0, 0))
+mixture = sensors.weigh_beams(suite.table, lost, bearings, 0.2, scanner.r_max)
 for name, weigh in (("plain", plain), ("mixture", mixture)):
-    near = particles.MonteCarloLocalizer(pose + rng.normal(0, 0.05, (500, 3)))
+    near = MonteCarloLocalizer(pose + rng.normal(0, 0.05, (500, 3)))
     step = near.correct(weigh, rng)
     print(f"{name:8} all weights zero: {step.all_zero}   scan used: {not step.all_zero}")
 try:
-    particles.normalize(np.full(5, -np.inf))
+    particles.normalize_weights(np.full(5, -np.inf))
 except ValueError as refusal:
     print(refusal)
 

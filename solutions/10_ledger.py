@@ -22,10 +22,9 @@ from functools import partial
 
 from IPython.display import HTML, Markdown
 
-from labkit import ledger
-from labkit.course import course
-from labkit.ledger import pages
-from labkit.widgets.ledger import LedgerTable
+from labkit.chapters.ch10_ledger.table import LedgerTable
+from labkit.documents import ledger, pages
+from labkit.exercises import course
 
 ex = course("10-ledger")
 found = pages.entries()
@@ -35,7 +34,7 @@ found = pages.entries()
 #
 # Four documents, written with care, and read by many: the lab sheet *Kalibrierung*, a master thesis, a research report, the lecture *Lokalisierung*.
 # **Which of their numbers can be trusted?** Setup has just computed all of them afresh, from the data they print and the functions of chapters 1 to 9.
-# Nothing on these pages is typed in: the rows stand in `data/ledger.csv`, the values come from `labkit.ledger`.
+# Nothing on these pages is typed in: the rows stand in `data/ledger.csv`, the values come from `labkit.documents`.
 #
 # First a small one. Then search the table: every line shows what is printed, what is computed, and the chapter. *why* opens its argument.
 

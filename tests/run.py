@@ -16,8 +16,8 @@ import time
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
-from labkit import build
-from labkit.course import source
+from labkit.exercises import source
+from labkit.verbs import build
 
 ROOT = source.ROOT
 SECONDS_A_JOB = 900

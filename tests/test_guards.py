@@ -8,8 +8,8 @@ import sys
 
 import pytest
 
-from labkit import build
-from labkit.course import source
+from labkit.exercises import source
+from labkit.verbs import build
 
 ROOT = source.ROOT
 SOURCES = source.sources()
@@ -78,10 +78,10 @@ def test_outputs_are_stored_where_nbval_compares_them_and_hold_text_alone(name):
                 assert not bad, f"the output of cell {cell['id']} holds {what}: {bad[0]!r}"
 
 
-def layer_of(path):
-    """mathematics, figures, widgets, course, ledger or build."""
+def storey_of(path):
+    """The room of labkit that a module stands in: "geometry", "chapters" and so on; "checks" for `tables`, too."""
     parts = path.relative_to(ROOT / "labkit").parts
-    return parts[0] if len(parts) > 1 else ("build" if parts[0] == "build.py" else "mathematics")
+    return parts[0] if len(parts) > 1 else GROUND_FLOOR.get(path.stem, "verbs")
 
 
 def imported(path):
@@ -96,28 +96,41 @@ def imported(path):
             yield from (f"{module}.{alias.name}" for alias in node.names)
 
 
-MAY_IMPORT = {
-    "mathematics": {"mathematics"},
-    "ledger": {"mathematics", "ledger"},
-    "figures": {"mathematics", "figures"},
-    "widgets": {"mathematics", "figures", "widgets"},
-    "course": {"mathematics", "ledger", "course"},
-    "build": {"course"},
+GROUND_FLOOR = {"checks": "checks", "tables": "checks", "__init__": "checks"}
+MATHEMATICS = ("geometry", "estimation", "calibration", "machines", "localization", "fast")
+MAY_IMPORT = {  # besides itself
+    "checks": (),
+    "geometry": ("checks",),
+    "estimation": ("checks", "geometry"),
+    "calibration": ("checks", "geometry", "estimation"),
+    "machines": ("checks", "geometry", "estimation", "calibration"),
+    "localization": ("checks", "geometry", "estimation"),
+    "fast": ("checks", *MATHEMATICS),
+    "documents": ("checks", *MATHEMATICS),
+    "exercises": ("checks", "geometry"),
+    "stage": ("checks",),
+    "chapters": ("checks", *MATHEMATICS, "documents", "exercises", "stage"),
+    "verbs": ("checks", *MATHEMATICS, "documents", "exercises", "stage", "chapters"),
 }
+NEEDS_NO_FRONT_END = ("checks", *MATHEMATICS, "documents")
 MODULES = sorted((ROOT / "labkit").rglob("*.py"))
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_imports_run_one_way(path):
-    """mathematics <- figures <- widgets; the exercises import mathematics alone, and the ledger belongs to it."""
-    layer = layer_of(path)
+def test_imports_go_down_only(path):
+    """chapters -> documents -> mathematics -> checks; the engines know no chapter, a chapter knows no other."""
+    storey = storey_of(path)
     for name in imported(path):
         first, *rest = name.split(".")
         if first == "labkit" and rest:
-            other = rest[0] if rest[0] in MAY_IMPORT else "mathematics"
-            assert other in MAY_IMPORT[layer], f"{layer} must not import {name}"
-        if layer in ("mathematics", "ledger"):
-            assert first not in FRONT_ENDS, f"{layer} must not import {name}"
+            other = GROUND_FLOOR.get(rest[0], rest[0])
+            assert other in (storey, *MAY_IMPORT[storey]), f"{storey} must not import {name}"
+            if storey == other == "chapters":
+                assert rest[1] in path.parts, f"{path.parent.name} must not import {name}: move it down a storey"
+            if storey == "chapters" and other == "documents":
+                assert not rest[-2].startswith("claims_"), f"{name} belongs to the ledger: move it to what is printed"
+        if storey in NEEDS_NO_FRONT_END:
+            assert first not in FRONT_ENDS, f"{storey} must not import {name}"
 
 
 def literal_colors(tree):
@@ -138,13 +151,13 @@ def literal_colors(tree):
                         yield node.lineno, value
 
 
-DRAWING = [p for p in MODULES if layer_of(p) in ("figures", "widgets") and p.name != "style.py"] + SOURCES
+DRAWING = [p for p in MODULES if storey_of(p) in ("stage", "chapters") and p.name != "style.py"] + SOURCES
 
 
 @pytest.mark.parametrize("path", DRAWING, ids=lambda path: str(path.relative_to(ROOT)))
 def test_colors_come_from_the_style_alone(path):
     found = list(literal_colors(ast.parse(path.read_text(encoding="utf-8"))))
-    assert not found, f"line {found[0][0]} writes the color {found[0][1]!r}: take it from labkit/figures/style.py"
+    assert not found, f"line {found[0][0]} writes the color {found[0][1]!r}: take it from labkit/stage/style.py"
 
 
 def test_the_color_guard_sees_colors():
@@ -166,11 +179,7 @@ def test_the_readme_lists_every_chapter(path):
     assert f"| {int(path.stem[:2])} | `{path.stem}` |" in (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def test_ruff_is_content():
-    ruff = subprocess.run(
-        [sys.executable, "-m", "ruff", "check", "--output-format=concise", "."],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-    )
+@pytest.mark.parametrize("arguments", (["check", "--output-format=concise"], ["format", "--check"]), ids=" ".join)
+def test_ruff_is_content(arguments):
+    ruff = subprocess.run([sys.executable, "-m", "ruff", *arguments, "."], cwd=ROOT, capture_output=True, text=True)
     assert not ruff.returncode, ruff.stdout + ruff.stderr

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import lab
-from labkit import build
-from labkit.course import source
+from labkit.exercises import source
+from labkit.verbs import build
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ import subprocess
 
 import pytest
 
-from labkit import build
-from labkit.course import source
+from labkit.exercises import source
+from labkit.verbs import build
 
 SOURCES = source.sources()
 NOTEBOOKS, SOLUTIONS = source.ROOT / "notebooks", source.ROOT / "solutions"

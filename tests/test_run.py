@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from labkit.course import source
+from labkit.exercises import source
 
 spec = importlib.util.spec_from_file_location("run_tests", source.ROOT / "tests" / "run.py")
 run = importlib.util.module_from_spec(spec)
@@ -46,7 +46,7 @@ def test_the_last_line_is_the_sum(tmp_path, capsys):
 def test_every_test_file_and_notebook_is_in_exactly_one_job(tmp_path):
     words = [word for job in run.all_jobs(tmp_path).values() for word in job if not word.startswith("-")]
     assert len(set(words)) == len(words)
-    files = {str(path) for path in (source.ROOT / "tests").glob("*/test_*.py") if path.parent.name != "browser"}
+    files = {str(path) for path in (source.ROOT / "tests").glob("**/test_*.py") if path.parent.name != "browser"}
     files |= {str(path) for path in (source.ROOT / "tests").glob("test_*.py")}
     files |= {str(path) for path in (source.ROOT / "solutions").glob("*.ipynb")}
     assert files | {str(source.ROOT / "tests" / "browser")} <= set(words)

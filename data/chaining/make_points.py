@@ -18,9 +18,10 @@ from scipy.optimize import linprog
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent.parent))
 
-from labkit import chaining  # noqa: E402
-from labkit.frames import relative, transform  # noqa: E402
-from labkit.lie import exp_se3  # noqa: E402
+from labkit.documents.lab_sheet import printed as lab_sheet
+from labkit.geometry import chaining
+from labkit.geometry.frames import relative, transform
+from labkit.geometry.lie import exp_se3
 
 SEED = 2016
 STD_IN_PLANE = 0.2  # mm
@@ -51,7 +52,7 @@ def unrounded_links(printed, product):
 def lines():
     """The lines of points.csv."""
     rng = np.random.default_rng(SEED)
-    links = unrounded_links(chaining.printed_transforms(), chaining.printed_product())
+    links = unrounded_links(lab_sheet.printed_transforms(), lab_sheet.printed_product())
     poses = chaining.stations(links)
     triangles = np.array(
         [[[0, 0, 0], [rng.uniform(80, 120), 0, 0], [*rng.uniform((5, 60), (30, 90)), 0]] for _ in range(4)]

@@ -11,7 +11,8 @@ from scipy.ndimage import label
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent.parent))
 
-from labkit.maps import FREE, UNKNOWN, OccupancyGrid, Scanner, cast_rays  # noqa: E402
+from labkit.localization.maps import FREE, UNKNOWN, OccupancyGrid, cast_rays
+from labkit.localization.sensors import Scanner
 
 RESOLUTION, SEED = 0.1, 9
 OUTER = [(0, 0), (16, 0), (16, 8), (13.5, 10), (0, 10), (0, 0)]

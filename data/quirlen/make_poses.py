@@ -18,10 +18,11 @@ from scipy.spatial.transform import Rotation
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent.parent))
 
-from labkit import pivot  # noqa: E402
+from labkit.calibration import pivot
+from labkit.documents.lab_sheet import printed as lab_sheet
 
 SEED = 2016
-POSES = pivot.poses_in_listing()
+POSES = lab_sheet.poses_in_listing()
 TIP, PIVOT = np.array([-1.747805, 44.586360, -87.648108]), np.array([-253.032904, 107.040686, -3.215224])
 FIRST, LAST, S0 = (-0.106450, 0.191828, -0.098577), (0.043934, -0.236217, -0.109208), 0.443922
 
@@ -49,7 +50,7 @@ def lines():
     abc = np.round(Rotation.from_matrix(R).as_euler("XYZ", degrees=True), 9)
     R = Rotation.from_euler("XYZ", abc, degrees=True).as_matrix()
     p = pivot.touching_poses(R, TIP, PIVOT)[:, :3, 3] + residuals(R, rng)
-    yield ",".join(pivot.POSES)
+    yield ",".join(lab_sheet.POSE_COLUMNS)
     for row in np.column_stack([p, abc]):
         yield ",".join(f"{value:.9f}" for value in row)
 

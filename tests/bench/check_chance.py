@@ -11,8 +11,8 @@ import time
 
 import numpy as np
 
-from labkit.course import session
-from labkit.course.engine import CORRECT, NOT_YET, Exercise
+from labkit.exercises import session
+from labkit.exercises.engine import CORRECT, NOT_YET, Exercise
 
 
 def oddities(item, seconds):

@@ -7,8 +7,8 @@ import time
 
 import numpy as np
 
-from labkit.course import session
-from labkit.course.engine import Exercise
+from labkit.exercises import session
+from labkit.exercises.engine import Exercise
 
 
 def median_ms(item, answer, repeats=9):

@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "calibration")]
 
-import test_axxb as lab  # noqa: E402
+import test_ax_xb as lab
 
-from labkit import axxb  # noqa: E402
-from labkit.frames import invert  # noqa: E402
+from labkit.calibration import ax_xb
+from labkit.geometry.frames import invert
 
 BAND = 0.3  # about 6
 
@@ -31,9 +31,9 @@ def batch(n, deg, mm, runs, seed):
     for _ in range(runs):
         T_BF, T_ST = lab.setup(rng, n, std_rot, mm)
         exact = invert(lab.T_FS) @ invert(T_BF) @ lab.T_BT
-        C = axxb.calibrate_hand_eye(T_BF, exact, std_rot, mm).covariance
+        C = ax_xb.calibrate_hand_eye(T_BF, exact, std_rot, mm).covariance
         bounds.append([np.trace(C[:3, :3]), np.trace(C[3:6, 3:6])])
-        results = axxb.calibrate_hand_eye(T_BF, T_ST, std_rot, mm), axxb.calibrate_hand_eye(T_BF, T_ST)
+        results = ax_xb.calibrate_hand_eye(T_BF, T_ST, std_rot, mm), ax_xb.calibrate_hand_eye(T_BF, T_ST)
         errors = [lab.error(r.T_FS) for r in results]
         squares.append([errors[1][:3] @ errors[1][:3], errors[1][3:] @ errors[1][3:]])
         nees.append([e @ np.linalg.solve(r.covariance[:6, :6], e) for r, e in zip(results, errors)])

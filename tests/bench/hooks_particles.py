@@ -9,8 +9,9 @@ import math
 
 import numpy as np
 
-from labkit import particles
-from labkit.maps import LikelihoodField, OccupancyGrid, cast_rays
+from labkit.localization import particles
+from labkit.localization.maps import OccupancyGrid, cast_rays
+from labkit.localization.sensors import LikelihoodField, weigh_landmarks
 
 _maps = {}
 
@@ -18,8 +19,8 @@ _maps = {}
 def pf_update(p, u, z, marks, rng):
     """Move, weigh by four landmarks and resample, with the benchmark's noises."""
     moved = particles.sample_motion(p, u, 0.1, rng, cov_u=np.diag([0.1**2, 0.05**2]), model="euler")
-    weigh = particles.weigh_landmarks(z, marks, 0.2, 0.05)
-    return moved.take(particles.resample_systematic(particles.normalize(weigh(moved)), rng), axis=0)
+    weigh = weigh_landmarks(z, marks, 0.2, 0.05)
+    return moved.take(particles.resample_systematic(particles.normalize_weights(weigh(moved)), rng), axis=0)
 
 
 @functools.cache

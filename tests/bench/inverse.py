@@ -4,7 +4,7 @@ import timeit
 
 import numpy as np
 
-from labkit import frames
+from labkit.geometry import frames
 
 
 def by_transposing(T):

@@ -10,7 +10,7 @@ import time
 import numpy as np
 from peers_hooks import HOOKS
 
-from labkit import kalman
+from labkit.localization import ekf
 
 DT = 0.1
 A3, B3 = np.random.default_rng(0).normal(size=(2, 3, 3))
@@ -50,7 +50,7 @@ def landmark_case(marks=4, runs=None):
     rng, n = np.random.default_rng(5), 1000
     landmarks, u = rng.uniform(-10, 10, (marks, 2)), np.tile([1.0, 0.2], (n, 1))
     cov_u = np.diag([0.01, 0.01])
-    drive = kalman.simulate_drive(np.zeros(3), u, DT, cov_u, landmarks, 0.1, 0.02, rng, runs or 1)
+    drive = ekf.simulate_drive(np.zeros(3), u, DT, cov_u, landmarks, 0.1, 0.02, rng, runs or 1)
     z = drive.z if runs else drive.z[:, 0]
     return u, z, landmarks, np.zeros(3), 0.1 * np.eye(3), np.diag([1e-4, 1e-4, 1e-5]), np.diag([0.01, 4e-4])
 
@@ -86,8 +86,8 @@ def filterpy_landmarks(u, z, landmarks, x0, P0, Q, R):
         f.F = np.array([[1, 0, -DT * u[i, 0] * s], [0, 1, DT * u[i, 0] * c], [0, 0, 1]])
         f.predict(u[i])
         f.update(
-            z[i].ravel(), lambda x: kalman.measurement_jacobian(x, landmarks).reshape(-1, 3),
-            lambda x: kalman.measurement(x, landmarks).ravel(), residual=residual,
+            z[i].ravel(), lambda x: ekf.measurement_jacobian(x, landmarks).reshape(-1, 3),
+            lambda x: ekf.measurement(x, landmarks).ravel(), residual=residual,
         )  # fmt: skip
         out[i] = f.x
     return out

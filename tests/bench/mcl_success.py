@@ -21,7 +21,11 @@ from scipy.stats import beta
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from labkit import maps, odometry, particles  # noqa: E402
+from labkit.documents.lecture.examples import load_building
+from labkit.geometry import planar
+from labkit.localization import mcl
+from labkit.localization.drives import random_drive
+from labkit.localization.sensors import SENSORS, SensorSuite
 
 N_PARTICLES, N_STEPS, N_TRACKED, N_STAY = 5000, 60, 20, 5
 NEAR, TURN = 0.3, np.radians(10)
@@ -31,7 +35,7 @@ HEADER = ("task", "model", "runs", "successes", "low", "high", "median_steps", "
 def errors(filter_, pose):
     """Distance (m) and angle (rad) between the estimate and the true pose."""
     found = filter_.estimate().pose
-    return np.hypot(*(found[:2] - pose[:2])), abs(odometry.wrap_angle(found[2] - pose[2]))
+    return np.hypot(*(found[:2] - pose[:2])), abs(planar.wrap_angle(found[2] - pose[2]))
 
 
 def steps_right(suite, model, filter_, drive, rng, world=None):
@@ -56,8 +60,8 @@ def first_stay(right):
 def run_global(suite, model, seed, **options):
     """(success, steps until right and staying, last errors) of one global localization."""
     rng = np.random.default_rng([1, seed])
-    drive = particles.random_drive(suite.building, N_STEPS, rng)
-    filter_ = particles.localizer(suite.building, model, N_PARTICLES, rng, **options)
+    drive = random_drive(suite.building, N_STEPS, rng)
+    filter_ = mcl.localizer(suite.building, model, N_PARTICLES, rng, **options)
     found = steps_right(suite, model, filter_, drive, rng)
     right = is_right(found)
     return bool(right[-1]), first_stay(right), found[-1]
@@ -71,11 +75,11 @@ def run_adaptive(suite, model, seed):
 def run_kidnapped(suite, model, seed):
     """(success, steps until right and staying, last errors) of one kidnapping."""
     rng = np.random.default_rng([2, seed])
-    before = particles.random_drive(suite.building, N_TRACKED, rng)
-    filter_ = particles.localizer(suite.building, model, N_PARTICLES, rng, start=before.truth[0])
+    before = random_drive(suite.building, N_TRACKED, rng)
+    filter_ = mcl.localizer(suite.building, model, N_PARTICLES, rng, start=before.truth[0])
     steps_right(suite, model, filter_, before, rng)
     while True:
-        after = particles.random_drive(suite.building, N_STEPS, rng)
+        after = random_drive(suite.building, N_STEPS, rng)
         if np.hypot(*(after.truth[0, :2] - before.truth[-1, :2])) > 3.0:
             break
     found = steps_right(suite, model, filter_, after, rng)
@@ -100,11 +104,11 @@ def main():
     parser.add_argument("--write", action="store_true", help="store the table in data/monte_carlo/success.csv")
     parser.add_argument("--tasks", nargs="+", choices=list(TASKS), default=list(TASKS))
     args = parser.parse_args()
-    suite = particles.SensorSuite(maps.load_building())
+    suite = SensorSuite(load_building())
     rows = []
     for task in args.tasks:
         run = TASKS[task]
-        for model in particles.SENSORS:
+        for model in SENSORS:
             began = time.perf_counter()
             results = [run(suite, model, seed) for seed in range(args.runs)]
             good = sum(ok for ok, _, _ in results)

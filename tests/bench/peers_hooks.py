@@ -3,15 +3,17 @@
 import hooks_particles
 import numpy as np
 
-from labkit import axxb, chaining, frames, pivot
-from labkit import handeye as sphere
-from labkit import kalman as filters
+from labkit.calibration import ax_xb, pivot
+from labkit.calibration import hand_eye as sphere
+from labkit.fast.ekf import ekf_localize
+from labkit.fast.kalman import filter_series
+from labkit.geometry import chaining, frames
 
 POSE_NOISE = (np.deg2rad(0.1), 0.2)  # rad and mm, as the benchmark draws them
 
 
 def handeye(T_BF, T_ST):
-    return axxb.calibrate_hand_eye(T_BF, T_ST).T_FS
+    return ax_xb.calibrate_hand_eye(T_BF, T_ST).T_FS
 
 
 def sphere_handeye(T_BF, x_S):
@@ -30,12 +32,12 @@ def robust_pivot(T):
 
 
 def kalman(F, Q, H, R, x0, P0, z):
-    return filters.filter_series(z, F, H, Q, R, x0, P0)
+    return filter_series(z, F, H, Q, R, x0, P0)
 
 
 def ekf(u, z, marks, x0, P0, Q, R):
     std_range, std_bearing = np.sqrt(np.diag(R))
-    return filters.ekf_localize(u, z, marks, x0, P0, 0.1, std_range, std_bearing, cov_v=Q).x
+    return ekf_localize(u, z, marks, x0, P0, 0.1, std_range, std_bearing, cov_v=Q).x
 
 
 HOOKS = {

@@ -13,8 +13,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from labkit import pivot
-from labkit.lie import exp_so3
+from labkit.calibration import pivot
+from labkit.geometry.lie import exp_so3
 
 TIP, PIVOT = np.array([12.0, -8.0, 150.0]), np.array([100.0, 50.0, -900.0])
 STD_ROT, STD_TRANS = np.deg2rad(0.1), 0.2

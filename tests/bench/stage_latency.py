@@ -2,7 +2,7 @@
 
     python tests/bench/stage_latency.py [--only NAME ...] [--events 40] [--shots DIR] [--chromium PATH]
 
-Finds all functions in labkit.widgets.* that return a Stage without arguments, puts them into one generated notebook,
+Finds all functions in labkit.chapters.*.stages that return a Stage without arguments, puts them into one notebook,
 starts JupyterLab with fresh settings on a free port, runs all cells, moves each Stage (first handle by arrow keys and
 by mouse; otherwise the first slider, or the view), and prints in milliseconds, per Stage and way of moving it: median
 and 95th percentile of event to picture; medians of message to answer in the page and of message to answer in the
@@ -13,6 +13,7 @@ With --shots also a screenshot of each Stage in the light and the dark theme, wi
 
 import argparse
 import importlib
+import importlib.util
 import inspect
 import json
 import os
@@ -52,14 +53,16 @@ WATCH = """(root) => {
 
 
 def stages():
-    """[(module, function name)] of all functions in labkit.widgets that return a Stage without arguments."""
+    """[(chapter, function name)] of all Stages."""
     sys.path.insert(0, str(ROOT))
-    import labkit.widgets
-    from labkit.widgets.stage import Stage
+    import labkit.chapters
+    from labkit.stage import Stage
 
     found = []
-    for info in pkgutil.iter_modules(labkit.widgets.__path__):
-        module = importlib.import_module(f"labkit.widgets.{info.name}")
+    for info in pkgutil.iter_modules(labkit.chapters.__path__):
+        if importlib.util.find_spec(f"labkit.chapters.{info.name}.stages") is None:
+            continue
+        module = importlib.import_module(f"labkit.chapters.{info.name}.stages")
         for name, function in vars(module).items():
             if (
                 inspect.isfunction(function) and function.__module__ == module.__name__
@@ -73,7 +76,7 @@ def stages():
 
 def python_part(module, name, repetitions=30):
     """Median milliseconds of (compute and update, picture and its encoding), without a browser."""
-    stage = getattr(importlib.import_module(f"labkit.widgets.{module}"), name)()
+    stage = getattr(importlib.import_module(f"labkit.chapters.{module}.stages"), name)()
     stage._picture.fit(700, 1.0, False)
     times = []
     for _ in range(repetitions):
@@ -99,7 +102,7 @@ def reference(repetitions=15):
 def notebook(chosen):
     cells = [
         {"cell_type": "code", "execution_count": None, "id": f"{module}-{name}".replace("_", "-")[:60], "metadata": {},
-         "outputs": [], "source": f"from labkit.widgets import {module}\n{module}.{name}()"}
+         "outputs": [], "source": f"from labkit.chapters.{module} import stages\nstages.{name}()"}
         for module, name in chosen
     ]  # fmt: skip
     kernel = {"display_name": "Python 3", "language": "python", "name": "python3"}
@@ -129,7 +132,7 @@ class Lab:
             [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", f"--port={port}", "--port-retries=0",
              f"--ServerApp.root_dir={folder}", f"--IdentityProvider.token={token}",
              "--LabApp.expose_app_in_browser=True",
-             "--ServerApp.kernel_websocket_connection_class=labkit.widgets.connection.PromptConnection"],
+             "--ServerApp.kernel_websocket_connection_class=labkit.stage.connection.PromptConnection"],
             env=env, cwd=folder, stdout=self.log, stderr=self.log,
         )  # fmt: skip
         self.url = f"http://127.0.0.1:{port}/lab/tree/stages.ipynb?token={token}"

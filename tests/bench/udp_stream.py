@@ -15,7 +15,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
 
-from labkit import tracker, udp
+from labkit.machines import udp
+from labkit.machines.packet import TIME, encode_packet, packet_from_pose
 
 
 def main(seconds=60.0, speed=1.0):
@@ -24,7 +25,7 @@ def main(seconds=60.0, speed=1.0):
     faults = udp.Faults(loss=0.05, duplicate=0.03, reorder=0.05, malformed=0.01, foreign=0.01)
     T = np.tile(np.eye(4), (count, 1, 1))
     T[:, 0, 3] = np.arange(count) % 1000
-    packets = [tracker.encode_packet(v) for v in tracker.packet_from_pose(T, np.arange(count) / 250)]
+    packets = [encode_packet(v) for v in packet_from_pose(T, np.arange(count) / 250)]
     started, cpu = time.perf_counter(), time.process_time()
     with (
         udp.listen(keep=count) as listener,
@@ -32,7 +33,7 @@ def main(seconds=60.0, speed=1.0):
     ):
         sender.finished.wait(seconds / speed + 30)
         time.sleep(0.3)
-        statistics, stamps = listener.statistics(), listener.readings()[:, tracker.TIME]
+        statistics, stamps = listener.statistics(), listener.readings()[:, TIME]
     print(
         f"{time.perf_counter() - started:.1f} s, {time.process_time() - cpu:.1f} s of processor time, "
         f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB"

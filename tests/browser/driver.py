@@ -15,8 +15,8 @@ import time
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from labkit import build
-from labkit.course import source
+from labkit.exercises import source
+from labkit.verbs import build
 
 ROOT = source.ROOT
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")

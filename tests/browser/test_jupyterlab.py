@@ -9,7 +9,7 @@ import sys
 import driver
 import pytest
 
-from labkit.course import source
+from labkit.exercises import source
 
 ROOT = source.ROOT
 WRONG = '''@ex.invert

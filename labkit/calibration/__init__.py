@@ -1,0 +1,9 @@
+"""Where a tool, a sensor or a scanner sits, with covariance.
+
+pivot       the tip of a tool that turns about a fixed point (Quirlen)
+sphere      what a line scanner sees of a sphere
+hand_eye    a scanner on a flange, from a sphere seen in many poses
+ax_xb       a sensor on a flange, from poses of both: A X = X B
+literature  the methods of Kim and of Li, as the thesis cites them
+result      what a hand-eye calibration returns
+"""

@@ -1,0 +1,185 @@
+"""Hand-eye methods of the literature that the thesis cites: Kim, Cho, Kim and Li et al.
+
+Source: thesis "Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", HAW Hamburg 2019, section 2.6.
+"""
+
+import numpy as np
+
+from ..checks import as_count, as_matrices, as_points, as_positive_number, as_shape, as_transforms
+from ..geometry.frames import invert, pose, transform
+from ..geometry.lie import exp_so3, nearest_rotation
+from .hand_eye import (
+    FIELD,
+    MIN_SPREAD,
+    _poses,
+    calibrate_sphere_target,
+    linear_start,
+    poses_that_see,
+    predicted_covariance,
+)
+
+
+def field_problem(x_S):
+    """What keeps the scanner from seeing a sphere at these places, as a sentence; None where all lie in its field."""
+    x_S = as_points(x_S, "x_S")
+    for axis, (low, high), values in zip("xyz", FIELD, (x_S[..., 0], np.abs(x_S[..., 1]), x_S[..., 2])):
+        bad = (values < low - 1e-9) | (values > high + 1e-9)
+        if bad.any():
+            name = "|y|" if axis == "y" else axis
+            first = values[bad].ravel()[0]
+            poses = "one pose" if bad.sum() == 1 else f"{bad.sum()} poses"
+            return f"in {poses} the sphere lies at {name} = {first:.1f} mm, outside {low:g} to {high:g}."
+    return None
+
+
+# --- the calibrations of the literature ------------------------------------------------------------------------------
+
+
+def kim_linear(T_BF, points_S, points_W):
+    """T_FS by the linear system D U = F of Kim, Cho and Kim, from a body with several marked points.
+
+    Delta_T T_FS = T_FS (X_S,p X_W') (X_S,q X_W')^-1 for two poses p and q: one AX = XB with twelve unknowns for all
+    consecutive pairs, stacked and solved by least squares; the rotation block is then made a rotation. The world frame
+    of the body cancels.
+
+    Parameters
+    ----------
+    T_BF : array-like, shape (N, 4, 4), N >= 3
+    points_S : array-like, shape (N, n, 3)
+        The points as measured in each pose (mm).
+    points_W : array-like, shape (n, 3)
+        The same points in the body's own frame.
+
+    Raises
+    ------
+    ValueError
+        When the points do not span space: X_S X_W' is then singular. A sphere offers one point, rank 1: the method
+        needs four or more.
+
+    Source: thesis, formulas (2-43) to (2-46) and appendix A, after Kim, Cho, Kim (2001).
+    """
+    T_BF = as_shape(as_transforms(T_BF, "T_BF"), "T_BF", "N", 4, 4)
+    X_W = as_shape(points_W, "points_W", "n", 3)
+    X_S = as_shape(points_S, "points_S", len(T_BF), len(X_W), 3)
+    if len(T_BF) < 3:
+        raise ValueError(f"at least 3 poses are needed, got {len(T_BF)}")
+    if not len(X_W):
+        raise ValueError("points_W must hold four points or more, got none")
+    X_S, X_W = (np.concatenate([X, np.ones((*X.shape[:-1], 1))], axis=-1) for X in (X_S, X_W))
+    rank = np.linalg.matrix_rank(X_W, tol=1e-9 * np.abs(X_W).max())
+    if rank < 4:
+        raise ValueError(
+            f"points_W must hold four points or more that do not lie in one plane: X_S X_W' has rank {rank}, not 4"
+        )
+    M = np.swapaxes(X_S, 1, 2) @ X_W
+    D, F = kim_matrix(invert(T_BF[:-1]) @ T_BF[1:], M[:-1] @ np.linalg.inv(M[1:]))
+    u, _, rank, _ = np.linalg.lstsq(D.reshape(-1, 12), F.ravel(), rcond=1e-10)
+    if rank < 12:
+        raise ValueError(f"the motions must turn about two axes: the stacked system has rank {rank}, not 12")
+    T_FS = np.eye(4)
+    T_FS[:3, :3], T_FS[:3, 3] = nearest_rotation(u.reshape(3, 4)[:, :3]), u.reshape(3, 4)[:, 3]
+    return T_FS
+
+
+def kim_matrix(A, B):
+    """D (..., 12, 12) and F (..., 12) of A X = X B for the rows of X one after another, X's last row being 0 0 0 1.
+
+    Source: thesis, appendix A.
+    """
+    A, B = as_matrices(A, "A", 4, 4), as_matrices(B, "B", 4, 4)
+    if A.shape != B.shape:
+        raise ValueError(f"A and B must have the same shape (..., 4, 4), got {A.shape} and {B.shape}")
+    left = A[..., :3, None, :3, None] * np.eye(4)[:, None]
+    right = np.eye(3)[:, None, :, None] * np.swapaxes(B, -1, -2)[..., None, :, None, :]
+    F = np.zeros((*A.shape[:-2], 3, 4))
+    F[..., 3] = -A[..., :3, 3]
+    return (left - right).reshape(*A.shape[:-2], 12, 12), F.reshape(*A.shape[:-2], 12)
+
+
+def li_two_step(T_BF, x_S, max_turn_deg=0.01):
+    """T_FS and target by the two steps of Li et al.: rotation from pure translations, then translation.
+
+    Step 1: two poses of the same orientation see the sphere shifted, R_BF R_FS (x_q - x_p) = t_p - t_q (the thesis
+    prints the right side of (2-41) with the sign reversed); the directions are fitted by SVD. Step 2: with R_FS known,
+    R_BF t_FS - target = -(t_BF + R_BF R_FS x_S) is linear in t_FS and target.
+
+    Parameters
+    ----------
+    T_BF, x_S : as in `calibrate_sphere_target`
+    max_turn_deg : float
+        Poses whose orientations differ by at most this (deg) count as translated only.
+
+    Raises
+    ------
+    ValueError
+        When fewer than two independent translations are among the poses, or the other poses turn about one axis only.
+
+    Source: thesis, formulas (2-40) to (2-42), after Li et al. (2011).
+    """
+    (T_BF, x_S), max_turn_deg = _poses(T_BF, x_S), as_positive_number(max_turn_deg, "max_turn_deg")
+    if len(T_BF) < 2:
+        raise ValueError(f"at least 2 poses are needed, got {len(T_BF)}")
+    R, t = T_BF[:, :3, :3], T_BF[:, :3, 3]
+    p, q = np.triu_indices(len(R), 1)
+    chord = np.linalg.norm(R[p] - R[q], axis=(1, 2))  # 2 sqrt(2) sin(angle / 2)
+    same = chord <= 2 * np.sqrt(2) * np.sin(np.deg2rad(max_turn_deg) / 2)
+    if not same.any():
+        least = np.rad2deg(2 * np.arcsin(chord.min() / (2 * np.sqrt(2))))
+        raise ValueError(
+            f"no two poses have the same orientation (the nearest differ by {least:.3g} deg): "
+            "step 1 needs the robot to translate without turning"
+        )
+    p, q = p[same], q[same]
+    seen = x_S[q] - x_S[p]
+    moved = (np.swapaxes(R[p], 1, 2) @ (t[p] - t[q])[..., None])[..., 0]
+    values = np.linalg.svd(moved, compute_uv=False)
+    if len(values) < 2 or values[1] <= MIN_SPREAD * values[0]:
+        raise ValueError("the translations must not all lie along one line: the rotation about it stays free")
+    R_FS = nearest_rotation(moved.T @ seen)
+    design = np.concatenate([R, np.tile(-np.eye(3), (len(R), 1, 1))], axis=2).reshape(-1, 6)
+    right = -(t + (R @ (x_S @ R_FS.T)[..., None])[..., 0])
+    u, _, rank, _ = np.linalg.lstsq(design, right.ravel(), rcond=1e-9)
+    if rank < 6:
+        raise ValueError(f"the rotations must turn about two axes: step 2 has rank {rank}, not 6")
+    T_FS = np.eye(4)
+    T_FS[:3, :3], T_FS[:3, 3] = R_FS, u[:3]
+    return T_FS, u[3:]
+
+
+def compare_methods(repeats, std, rng):
+    """Errors of the literature's methods and of the joint fit, on simulated poses that suit all of them.
+
+    Each repeat draws a scanner, twelve poses turned about all axes and four that only translate the first, with a
+    sphere in the scanner's field and noise `std` (mm) on each coordinate; Kim's method gets the eight corners of a 60
+    mm cube in place of the sphere.
+
+    Returns
+    -------
+    errors : dict
+        {method: rms error of the translation of T_FS (mm)}.
+    bound : float
+        The Cramer-Rao bound of one sphere (mm), rms over the repeats.
+    """
+    repeats, std = as_count(repeats, "repeats"), as_positive_number(std, "std")
+    errors, bounds = {}, []
+    corners = 60.0 * (np.indices((2, 2, 2)).reshape(3, 8).T - 0.5)
+    for _ in range(repeats):
+        T_FS, target = pose(exp_so3(rng.uniform(-1, 1, 3)), rng.uniform(-100, 100, 3)), rng.uniform(-500, 500, 3)
+        places = np.column_stack([rng.uniform(-25, 25, 12), rng.uniform(-20, 20, 12), rng.uniform(190, 290, 12)])
+        T_BF = poses_that_see(T_FS, target, exp_so3(rng.uniform(-1, 1, (12, 3))), places)
+        shifts = np.concatenate([30 * np.eye(3), [[-30.0, 20.0, 10.0]]])
+        T_BF = np.concatenate([T_BF, T_BF[:1] @ pose(np.tile(np.eye(3), (4, 1, 1)), shifts)])
+        exact = transform(invert(T_FS), transform(invert(T_BF), target))
+        seen = exact + std * rng.normal(size=exact.shape)
+        cube = transform(invert(T_BF @ T_FS)[:, None], corners + target)
+        cube = cube + std * rng.normal(size=cube.shape)
+        found = {
+            "joint fit (sphere)": calibrate_sphere_target(T_BF, seen).T_FS,
+            "linear start (sphere)": linear_start(T_BF, seen)[0],
+            "Li et al. (sphere)": li_two_step(T_BF, seen)[0],
+            "Kim, Cho, Kim (cube)": kim_linear(T_BF, cube, corners),
+        }
+        for name, T in found.items():
+            errors.setdefault(name, []).append(np.linalg.norm(T[:3, 3] - T_FS[:3, 3]))
+        bounds.append(np.trace(predicted_covariance(T_BF, T_FS, target, std)[3:6, 3:6]))
+    return {name: float(np.sqrt(np.mean(np.square(e)))) for name, e in errors.items()}, float(np.sqrt(np.mean(bounds)))

@@ -1,0 +1,334 @@
+"""What a laser line scanner sees of a sphere: triangulation, circle through a scan line, sphere center from the circle.
+
+A scan line lies in the plane y = 0 of the sensor frame S: x along the line, z along the distance, both in mm. The plane
+cuts a sphere of radius R in a circle of radius r, and the center lies sqrt(R^2 - r^2) in front of the plane or behind
+it: the scan line alone does not say on which side. Source: thesis "Optimierung bei der Kalibrierung von
+Sensor-Roboter-Systemen", HAW Hamburg 2019, sections 2.2 and 6.4.3, listings C15 and C16.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..checks import (
+    as_count,
+    as_finite,
+    as_nonnegative,
+    as_number,
+    as_points,
+    as_positive,
+    as_positive_number,
+    as_shape,
+)
+
+MIN_SAGITTA = 1e-6  # an arc flatter than this, relative to its length, fixes no circle: the points are collinear
+MAX_STEPS = 50
+
+
+class Circle(NamedTuple):
+    """Circle through a scan line: center (x, z), radius, signed residuals (n,), covariance (3, 3) of x, z, radius,
+    singular values.
+    """
+
+    center: np.ndarray
+    radius: float
+    residuals: np.ndarray
+    covariance: np.ndarray
+    singular_values: np.ndarray
+
+
+class Sphere(NamedTuple):
+    """Sphere through points: center (3,), radius, signed residuals (n,), covariance (4, 4) of x, y, z, radius, singular
+    values.
+    """
+
+    center: np.ndarray
+    radius: float
+    residuals: np.ndarray
+    covariance: np.ndarray
+    singular_values: np.ndarray
+
+
+def triangulation_height(base, alpha, beta):
+    """Height of a triangle over its base from the angles at both ends (rad), in the unit of `base`; broadcasts.
+
+    H = L tan(a) tan(b) / (tan(a) + tan(b)) = L sin(a) sin(b) / sin(a + b); the second form also holds where an angle is
+    90 deg.
+
+    Raises
+    ------
+    ValueError
+        When base or an angle is not positive, or the rays do not meet (angles adding up to 180 deg or more).
+
+    Source: thesis, formulas (2-9) to (2-12).
+    """
+    base, alpha, beta = as_positive(base, "base"), as_positive(alpha, "alpha"), as_positive(beta, "beta")
+    if (alpha + beta >= np.pi).any():
+        worst = np.rad2deg(np.max(alpha + beta))
+        raise ValueError(f"the rays must meet: alpha + beta must stay below 180 deg, got {worst:.6g} deg")
+    return base * np.sin(alpha) * np.sin(beta) / np.sin(alpha + beta)
+
+
+def triangulation_std(base, alpha, beta, std_angle):
+    """Standard deviation of the height for independent errors `std_angle` (rad) of both angles, first order;
+    broadcasts.
+
+    dH/da = L sin(b)^2 / sin(a + b)^2: with a fixed base the error grows with the square of the distance.
+    """
+    triangulation_height(base, alpha, beta)
+    base, alpha, beta = (np.asarray(v, float) for v in (base, alpha, beta))
+    s2 = np.sin(alpha + beta) ** 2
+    return as_positive(std_angle, "std_angle") * base * np.hypot(np.sin(beta) ** 2 / s2, np.sin(alpha) ** 2 / s2)
+
+
+def fit_circle_algebraic(x, z):
+    """Circle by the linear equations x^2 + z^2 + a1 x + a2 z + a3 = 0.
+
+    Minimizes an algebraic error, the distance weighted by about twice the radius: quick, but on a short arc it comes
+    out too small.
+
+    Parameters
+    ----------
+    x, z : array-like, shape (..., n)
+        Points of one scan line, or of many; n >= 3.
+
+    Returns
+    -------
+    center : array, shape (..., 2)
+    radius : float, or array of shape (...)
+
+    Source: thesis, listing C15.
+    """
+    points = _profile(x, z)
+    middle = points.mean(-2)
+    p = points - middle[..., None, :]
+    scale = np.abs(p).max((-2, -1))[..., None]
+    p = p / scale[..., None]  # centered and scaled: the squares of 200 mm would drown those of the arc
+    a = (np.linalg.pinv(np.concatenate([p, np.ones((*p.shape[:-1], 1))], axis=-1)) @ -(p * p).sum(-1)[..., None])[
+        ..., 0
+    ]
+    center = -0.5 * a[..., :2]
+    radius = scale[..., 0] * np.sqrt(np.maximum((center**2).sum(-1) - a[..., 2], 0.0))
+    return middle + scale * center, radius if radius.ndim else float(radius)
+
+
+def fit_circle(x, z, std=None):
+    """Circle by geometric least squares: minimizes the sum of squared distances of the points from the circle.
+
+    Parameters
+    ----------
+    x, z : array-like, shape (n,)
+        Points of the scan line, n >= 3.
+    std : float, optional
+        Standard deviation of a point across the arc; without it the residuals give the scale of the covariance (n >=
+        4).
+
+    Returns
+    -------
+    Circle
+
+    Raises
+    ------
+    ValueError
+        When fewer than three points come, or they are collinear.
+
+    Source: thesis, section 6.4.3, which uses the algebraic circle; the geometric one is the maximum-likelihood
+    estimate.
+    """
+    points = _profile(x, z)
+    if points.ndim != 2:
+        raise ValueError(f"x and z must be one scan line, shape (n,), got {np.shape(x)}")
+    center, radius = fit_circle_algebraic(x, z)
+    solution, residuals, J = _geometric(points, np.append(center, radius))
+    covariance, singular_values = _uncertainty(J, residuals, std)
+    return Circle(solution[:2], float(solution[2]), residuals, covariance, singular_values)
+
+
+def fit_sphere(points, std=None):
+    """Sphere by geometric least squares from its algebraic start; points (n, 3), n >= 4 and not in one plane."""
+    points = as_points(points, "points")
+    if points.ndim != 2 or len(points) < 4:
+        raise ValueError(f"points must have shape (n >= 4, 3), got {points.shape}")
+    middle = points.mean(0)
+    scale = max(np.abs(points - middle).max(), np.finfo(float).tiny)
+    p = (points - middle) / scale
+    flatness = np.linalg.svd(p, compute_uv=False)
+    if flatness[2] <= MIN_SAGITTA * flatness[0]:
+        raise ValueError(
+            f"points must not lie in one plane: the third singular value is {flatness[2] / flatness[0]:.1e} of the "
+            "first"
+        )
+    a = np.linalg.lstsq(np.column_stack([p, np.ones(len(p))]), -(p * p).sum(1), rcond=None)[0]
+    center = -0.5 * a[:3]
+    start = np.append(middle + scale * center, scale * np.sqrt(max(center @ center - a[3], 0.0)))
+    solution, residuals, J = _geometric(points, start)
+    covariance, singular_values = _uncertainty(J, residuals, std)
+    return Sphere(solution[:3], float(solution[3]), residuals, covariance, singular_values)
+
+
+def center_offset(radius, circle_radius):
+    """Distance of the center of a sphere from a plane that cuts it in a circle of `circle_radius`, sqrt(R^2 - r^2);
+    broadcasts.
+
+    Raises
+    ------
+    ValueError
+        When the circle is larger than the sphere.
+
+    Source: thesis, formula (6-27).
+    """
+    R, r = as_positive(radius, "radius"), as_positive(circle_radius, "circle_radius")
+    if (r > R).any():
+        raise ValueError(
+            f"the circle must not be larger than the sphere: radius {np.min(R):g} mm, circle {np.max(r):.6g} mm"
+        )
+    return np.sqrt((R - r) * (R + r))
+
+
+def offset_sensitivity(radius, circle_radius):
+    """How errors of R and r move the center across the plane: (dd/dR, dd/dr) = (R, -r) / d.
+
+    Both grow without bound as the plane approaches the equator (r -> R): there a circle error of 0.01 mm is one of
+    millimeters.
+    """
+    d = center_offset(radius, circle_radius)
+    with np.errstate(divide="ignore"):
+        return radius / d, -np.asarray(circle_radius, float) / d
+
+
+def sphere_center_from_profile(x, z, radius, side):
+    """Center of a sphere of known radius from one scan line, in the sensor frame.
+
+    Parameters
+    ----------
+    x, z : array-like, shape (n,)
+        Points of the scan line in the plane y = 0 (mm).
+    radius : float
+        Radius of the sphere (mm).
+    side : {+1, -1}
+        Sign of the y coordinate of the center. The scan line cannot tell: tilt the scanner and watch whether the arc
+        grows.
+
+    Returns
+    -------
+    center : array, shape (3,)
+
+    Raises
+    ------
+    ValueError
+        When side is neither +1 nor -1, or the fitted circle is larger than the sphere.
+
+    Source: thesis, formulas (6-26) and (6-27), listing C16 (which always takes the negative side).
+    """
+    _refuse_side(side)
+    radius, circle = as_positive_number(radius, "radius"), fit_circle(x, z)
+    return np.array([circle.center[0], side * center_offset(radius, circle.radius), circle.center[1]])
+
+
+def _refuse_side(side):
+    if np.ndim(side) or side not in (1, -1):
+        raise ValueError(f"side must be +1 or -1, the sign of the center's y coordinate, got {side!r}")
+
+
+def profile_center_covariance(radius, circle, side, std_radius=0.0):
+    """First-order covariance (3, 3) of the center that `sphere_center_from_profile` finds, from a `Circle` and the
+    radius' error.
+    """
+    _refuse_side(side)
+    by_R, by_r = offset_sensitivity(as_positive_number(radius, "radius"), circle.radius)
+    std_radius = float(as_nonnegative(as_number(std_radius, "std_radius"), "std_radius"))
+    J = np.zeros((3, 4))  # columns: circle x, z, r, sphere radius
+    J[0, 0], J[2, 1], J[1, 2], J[1, 3] = 1.0, 1.0, side * by_r, side * by_R
+    cov = np.zeros((4, 4))
+    cov[:3, :3], cov[3, 3] = circle.covariance, std_radius**2
+    return J @ cov @ J.T
+
+
+def scan_line(center, radius, half_angle, n, std=0.0, rng=None):
+    """Points a scanner at the origin of S measures on a sphere: the arc of the cut that faces it.
+
+    Parameters
+    ----------
+    center : array-like, shape (3,)
+        Center of the sphere in S (mm); |y| < radius.
+    radius : float
+        Its radius (mm).
+    half_angle : float
+        Half the angle of the arc, seen from the center of the circle (rad).
+    n : int
+        Number of points.
+    std, rng : float, numpy.random.Generator
+        Noise across the arc (mm) and its generator.
+
+    Returns
+    -------
+    x, z : array, shape (n,)
+    """
+    center, half_angle, n = as_shape(center, "center", 3), as_number(half_angle, "half_angle"), as_count(n, "n")
+    std = float(as_nonnegative(as_number(std, "std"), "std"))
+    if std and rng is None:
+        raise ValueError("rng must be given when std is not 0")
+    r = np.sqrt(max(as_positive_number(radius, "radius") ** 2 - center[1] ** 2, 0.0))
+    if r == 0:
+        raise ValueError(f"the scan plane misses the sphere: |y| = {abs(center[1]):g} mm, radius {radius:g} mm")
+    angle = np.linspace(-half_angle, half_angle, n)
+    reach = r + (std * rng.normal(size=n) if std > 0 else 0.0)
+    return center[0] + reach * np.sin(angle), center[2] - reach * np.cos(angle)
+
+
+def _profile(x, z):
+    """Scan lines as points (..., n, 2); refuses other shapes, fewer than three points and collinear ones."""
+    x, z = as_finite(x, "x"), as_finite(z, "z")
+    if x.ndim < 1 or x.shape != z.shape or x.shape[-1] < 3:
+        raise ValueError(f"x and z must have the same shape (..., n >= 3), got {x.shape} and {z.shape}")
+    points = np.stack([x, z], axis=-1)
+    p = points - points.mean(-2, keepdims=True)
+    moments = np.swapaxes(p, -1, -2) @ p
+    values = np.linalg.eigvalsh(
+        moments / np.maximum(np.abs(p).max((-2, -1)), np.finfo(float).tiny)[..., None, None] ** 2
+    )
+    ratio = np.sqrt(np.maximum(values[..., 0], 0.0) / np.maximum(values[..., 1], np.finfo(float).tiny))
+    if (ratio <= MIN_SAGITTA).any():
+        raise ValueError(
+            f"the points are collinear: they spread {ratio.min():.1e} times as far across their line as along it"
+        )
+    return points
+
+
+def _geometric(points, start):
+    """Gauss-Newton on center and radius with step halving: (solution, residuals, Jacobian at the solution)."""
+
+    def linearize(q):
+        d = q[:-1] - points
+        length = np.linalg.norm(d, axis=1)
+        J = np.column_stack([d / np.maximum(length, np.finfo(float).tiny)[:, None], -np.ones(len(points))])
+        return length - q[-1], J
+
+    q = start
+    r, J = linearize(q)
+    for _ in range(MAX_STEPS):
+        step = np.linalg.lstsq(J, -r, rcond=None)[0]
+        for _ in range(30):
+            r_new, J_new = linearize(q + step)
+            if r_new @ r_new <= r @ r * (1 + 1e-12):
+                break
+            step = step / 2
+        else:
+            break
+        q, r, J = q + step, r_new, J_new
+        if np.abs(step).max() <= 1e-12 * np.abs(q).max():
+            break
+    return q, r, J
+
+
+def _uncertainty(J, residuals, std):
+    """Covariance s0^2 (J'J)^-1 and singular values of J; s0 is `std`, or comes from the residuals where there are
+    enough.
+    """
+    _, s, Vt = np.linalg.svd(J, full_matrices=False)
+    dof = J.shape[0] - J.shape[1]
+    if std is not None:
+        variance = as_positive_number(std, "std") ** 2
+    else:
+        variance = residuals @ residuals / dof if dof > 0 else np.nan
+    return variance * (Vt.T / s**2) @ Vt, s

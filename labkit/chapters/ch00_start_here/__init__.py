@@ -1,0 +1,1 @@
+"""Chapter 0: course map, notation, how exercises work."""

@@ -1,0 +1,673 @@
+"""Chapter 1: frames from three points, rigid transforms, KUKA angles."""
+
+import functools
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ...documents.lab_sheet.printed import points
+from ...exercises import metrics
+from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...geometry import frames
+
+
+def random_direction(rng):
+    """A vector of random direction, 20 to 300 long."""
+    return frames.unit_vector(rng.normal(size=3)) * rng.uniform(20, 300)
+
+
+def random_pose(rng):
+    """A random pose with its origin some hundred millimeters away."""
+    q = rng.normal(size=4)
+    return frames.pose(frames.matrix_from_quaternion(q), rng.uniform(-500, 500, 3))
+
+
+ACUTE, OBTUSE = (35, 80), (100, 145)  # deg
+
+
+def two_directions(rng, between=ACUTE):
+    """Two directions at so many degrees, of different length."""
+    a = random_direction(rng)
+    across = frames.unit_vector(np.cross(a, rng.normal(size=3)))
+    angle = np.deg2rad(rng.uniform(*between))
+    return a, rng.uniform(20, 300) * (np.cos(angle) * frames.unit_vector(a) + np.sin(angle) * across)
+
+
+def three_points(rng, between=ACUTE):
+    """Three measured points of a frame, in millimeters."""
+    origin = rng.uniform(-500, 500, 3)
+    a, b = two_directions(rng, between)
+    return origin, origin + a, origin + b
+
+
+def either_angle(draw):
+    """The draw with an acute and with an obtuse angle at the origin, in turn."""
+    return tuple(functools.partial(draw, between=between) for between in (ACUTE, OBTUSE))
+
+
+def kuka_pose(rng):
+    """A KUKA pose well away from the gimbal lock."""
+    return (np.concatenate([rng.uniform(-800, 800, 3), np.deg2rad(rng.uniform((-170, -80, -170), (170, 80, 170)))]),)
+
+
+# Wrong variants of Gram-Schmidt, of frames and of transforms -----------------------------------------------------------------
+
+
+def _columns(x, y, z):
+    return np.column_stack([x, y, z])
+
+
+def _unnormalized(a, b):
+    x = a / np.linalg.norm(a)
+    y = b - (b @ x) * x
+    return _columns(x, y, np.cross(x, y))
+
+
+def _projected_without_square(a, b):
+    x = a / np.linalg.norm(a)
+    y = b - (b @ a) / np.linalg.norm(a) * a
+    y /= np.linalg.norm(y)
+    return _columns(x, y, np.cross(x, y))
+
+
+def _second_edge_first(a, b):
+    y = b / np.linalg.norm(b)
+    x = a - (a @ y) * y
+    x /= np.linalg.norm(x)
+    return _columns(x, y, np.cross(x, y))
+
+
+def _added(a, b):
+    x = a / np.linalg.norm(a)
+    y = b + (b @ x) * x
+    y /= np.linalg.norm(y)
+    return _columns(x, y, np.cross(x, y))
+
+
+def _not_rejected(a, b):
+    x, y = a / np.linalg.norm(a), b / np.linalg.norm(b)
+    return _columns(x, y, np.cross(x, y))
+
+
+def _left_handed(a, b):
+    R = frames.gram_schmidt(a, b)
+    return R * (1, 1, -1)
+
+
+def _projection_kept(a, b):
+    """y along the part of b that should have been removed, signs aside: the classic mix-up of rejection and projection."""
+    R = frames.gram_schmidt(a, b)
+    return _columns(R[:, 0], R[:, 0] * np.sign(a @ b), np.zeros(3))
+
+
+def _frame(axes):
+    def variant(origin, x_point, y_point):
+        T = np.eye(4)
+        T[:3, :3] = axes(x_point - origin, y_point - origin)
+        T[:3, 3] = origin
+        return T
+
+    return variant
+
+
+def _axes_in_rows(origin, x_point, y_point):
+    T = frames.frame_from_points(origin, x_point, y_point)
+    T[:3, :3] = T[:3, :3].T
+    return T
+
+
+def _points_as_directions(origin, x_point, y_point):
+    T = np.eye(4)
+    T[:3, :3] = frames.gram_schmidt(x_point, y_point)
+    T[:3, 3] = origin
+    return T
+
+
+def _no_translation(origin, x_point, y_point):
+    T = frames.frame_from_points(origin, x_point, y_point)
+    T[:3, 3] = 0
+    return T
+
+
+def _inverse_frame(origin, x_point, y_point):
+    return frames.invert(frames.frame_from_points(origin, x_point, y_point))
+
+
+def _with(T, R=None, t=None):
+    T = T.copy()
+    T[:3, :3] = T[:3, :3] if R is None else R
+    T[:3, 3] = T[:3, 3] if t is None else t
+    return T
+
+
+def _kuka(order, angles=(3, 4, 5)):
+    """Rotation by the elementary turns in another order, e.g. "xyz" for Rx Ry Rz, fed with the entries `angles` of the pose."""
+
+    def variant(xyzabc):
+        turns = {"z": xyzabc[angles[0]], "y": xyzabc[angles[1]], "x": xyzabc[angles[2]]}
+        R = np.eye(3)
+        for axis in order:
+            R = R @ _turn(axis, turns[axis])
+        return frames.pose(R, xyzabc[:3])
+
+    return variant
+
+
+def _turn(axis, angle):
+    abc = {"z": (angle, 0, 0), "y": (0, angle, 0), "x": (0, 0, angle)}[axis]
+    return frames.matrix_from_kuka(np.concatenate([np.zeros(3), abc]))[:3, :3]
+
+
+def _ry_reversed(xyzabc):
+    return frames.matrix_from_kuka(xyzabc * np.array([1, 1, 1, 1, -1, 1]))
+
+
+def _kuka_entry_by_entry(xyzabc):
+    T = np.eye(4)
+    T[:3, :3] = _turn("z", xyzabc[3]) * _turn("y", xyzabc[4]) * _turn("x", xyzabc[5])
+    T[:3, 3] = xyzabc[:3]
+    return T
+
+
+def _kuka_in_degrees(xyzabc):
+    return frames.matrix_from_kuka(np.concatenate([xyzabc[:3], np.deg2rad(xyzabc[3:])]))
+
+
+def _kuka_transposed(xyzabc):
+    T = frames.matrix_from_kuka(xyzabc)
+    return _with(T, R=T[:3, :3].T)
+
+
+def _angles(change):
+    def variant(T):
+        xyzabc = frames.kuka_from_matrix(T)
+        return np.concatenate([xyzabc[:3], change(xyzabc[3:])])
+
+    return variant
+
+
+def _angles_by_quotients(T):
+    with np.errstate(divide="ignore"):
+        a, c = np.arctan(T[1, 0] / T[0, 0]), np.arctan(T[2, 1] / T[2, 2])
+    return np.array([*T[:3, 3], a, np.arcsin(-T[2, 0]), c])
+
+
+def _angles_one_by_one(T):
+    b = np.arctan2(-T[2, 0], np.hypot(T[0, 0], T[1, 0]))
+    return np.array([*T[:3, 3], np.arctan2(T[1, 0], T[0, 0]), b, np.arctan2(T[2, 1], T[2, 2])])
+
+
+def at_the_pole(sign):
+    """A draw at B = +-90 deg, with the rounding noise that a product of two matrices leaves."""
+
+    def draw(rng):
+        xyzabc = kuka_pose(rng)[0]
+        xyzabc[4] = sign * np.pi / 2
+        turn = random_pose(rng)
+        return (frames.invert(turn) @ (turn @ frames.matrix_from_kuka(xyzabc)),)
+
+    return draw
+
+
+def _K0_T_K1():
+    K0, K1 = (frames.frame_from_points(*points()[name]) for name in ("K0", "K1"))
+    return frames.relative(K0, K1)
+
+
+def _distance():
+    return np.linalg.norm(_K0_T_K1()[:3, 3])
+
+
+def _flat_distance():
+    return np.linalg.norm(points()["K0"][1] - points()["K1"][1])
+
+
+CHAPTER = Chapter(
+    "01-frames",
+    title="Frames from three points",
+    items=[
+        Exercise(
+            "normalize",
+            reference=frames.unit_vector,
+            draw=lambda rng: (random_direction(rng),),
+            metric=metrics.Numbers(1e-9),
+            hints=(
+                "A direction keeps its direction when it is divided by a positive number.",
+                "The length of v is the root of the sum of its squared components.",
+                "`return v / np.linalg.norm(v)`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda v: v / ((v @ v) / 2),
+                    "`**1/2` is read as (...**1)/2, so no root is taken. Write `**0.5` or np.sqrt.",
+                ),
+                Mistake(lambda v: v / (v @ v), "You divide by the squared length. The root is missing."),
+                Mistake(
+                    lambda v: v / v.sum(),
+                    "You divide by the sum of the components. The length is the root of the sum of their squares.",
+                ),
+                Mistake(
+                    lambda v: v / np.abs(v).sum(),
+                    "You divide by the sum of absolute values (the 1-norm). The Euclidean length is the root of the sum of squares.",
+                ),
+                Mistake(
+                    lambda v: v / np.abs(v).max(),
+                    "You divide by the largest component, so that one becomes 1. The length should become 1.",
+                ),
+                Mistake(
+                    lambda v: v / len(v), "`len(v)` counts the components. The length you need is `np.linalg.norm(v)`."
+                ),
+                Mistake(
+                    lambda v: v / np.abs(v).mean(),
+                    "You divide by a mean. The length is the root of the sum of the squared components.",
+                ),
+                Mistake(
+                    lambda v: v / v.mean(),
+                    "You divide by a mean. The length is the root of the sum of the squared components.",
+                ),
+                Mistake(
+                    lambda v: v / np.sqrt((v @ v) / len(v)),
+                    "You divide by the root of the *mean* square. The length is the root of the sum of the squares.",
+                ),
+                Mistake(
+                    lambda v: v / np.hypot(v[0], v[1]),
+                    "Only two components are in your length. np.hypot takes two; np.linalg.norm takes all.",
+                ),
+                Mistake(lambda v: v, "You return v as it came. Its length is not 1 yet."),
+            ],
+        ),
+        Prediction(
+            "edges",
+            question="The three points carry the same noise. Which measured direction does Gram-Schmidt keep exactly?",
+            choices=("origin to x_point", "origin to y_point", "neither, it averages"),
+            answer="origin to x_point",
+            why="x is the first edge, untouched. Of the second edge only the part across x survives, so y_point decides nothing but the plane.",
+        ),
+        Exercise(
+            "gram_schmidt",
+            reference=frames.gram_schmidt,
+            draw=either_angle(two_directions),
+            metric=metrics.Rotations(1e-7),
+            hints=(
+                "x takes the direction of a. y may only use what b has across x.",
+                "Remove from b its part along x: b - (b . x) x, with x of length 1. Then normalize. z follows from the right-hand rule.",
+                "`x = normalize(a); y = normalize(b - (b @ x) * x); z = np.cross(x, y); return np.column_stack([x, y, z])`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda a, b: frames.gram_schmidt(a, b).T,
+                    "Your axes stand in the rows. As columns they turn coordinates in F into coordinates in W; your matrix is the transpose.",
+                ),
+                Mistake(
+                    _not_rejected,
+                    "Your x and y are not perpendicular: you normalized b without removing its part along x.",
+                ),
+                Mistake(
+                    _unnormalized,
+                    "You removed the part along x, but y has not been normalized afterwards (and z inherits its length).",
+                ),
+                Mistake(
+                    _projected_without_square,
+                    "The part along a is (b . a)/(a . a) a. You divide by the length of a once, it takes the square (or a normalized a).",
+                ),
+                Mistake(
+                    _second_edge_first,
+                    "You started with b: your y is exact and x gives way. The sheet trusts the first edge, so start with a.",
+                ),
+                Mistake(
+                    _left_handed,
+                    "Your z points the wrong way: x, y, z form a left-handed system. z = x cross y, in this order.",
+                ),
+                Mistake(
+                    _added,
+                    "You added the part of b along x. It has to go: b - (b . x) x.",
+                ),
+                Mistake(
+                    lambda a, b: frames.gram_schmidt(a, b) * (1, -1, -1),
+                    "Your y points away from b, and z with it: y is b minus its part along x, not the other way round.",
+                ),
+                Mistake(
+                    lambda a, b: frames.gram_schmidt(a, b) * (-1, -1, 1),
+                    "Your x points against a: QR leaves the signs open. Turn each column to the side of its edge.",
+                ),
+                Mistake(
+                    lambda a, b: np.linalg.qr(np.column_stack([a, b, np.cross(a, b)]))[0],
+                    "QR does Gram-Schmidt's work, but leaves the signs open. Turn each column to the side of its edge.",
+                ),
+                Mistake(
+                    _projection_kept,
+                    "You kept the part of b along x and threw the rest away. y is the rest: b minus its projection.",
+                ),
+            ],
+        ),
+        Exercise(
+            "frame_from_points",
+            reference=frames.frame_from_points,
+            draw=either_angle(three_points),
+            metric=metrics.Poses(1e-6, 1e-6),
+            hints=(
+                "A pose is a rotation (which way the axes point) and a translation (where the origin is).",
+                "The two directions are x_point - origin and y_point - origin; gram_schmidt makes axes of them.",
+                "`T = np.eye(4); T[:3, :3] = gram_schmidt(x_point - origin, y_point - origin); T[:3, 3] = origin; return T`",
+            ),
+            mistakes=[
+                Mistake(
+                    _frame(lambda a, b: frames.gram_schmidt(-a, -b)),
+                    "Your edges point toward the origin: it is x_point - origin, not origin - x_point.",
+                ),
+                Mistake(
+                    _axes_in_rows,
+                    "Your rotation is the transpose: the axes stand in the rows, so it maps W to F, while the origin is that of T_WF.",
+                ),
+                Mistake(
+                    _inverse_frame,
+                    "This is T_FW, the inverse: it maps coordinates in W to the frame. T_WF has the origin itself in its last column.",
+                ),
+                Mistake(
+                    _points_as_directions,
+                    "You used the points themselves as directions. They are positions in W; a direction is the difference of two points.",
+                ),
+                Mistake(
+                    _no_translation,
+                    "The axes are right, but the frame sits at the origin of W: put `origin` into the last column.",
+                ),
+                Mistake(
+                    lambda o, px, py: _with(
+                        frames.frame_from_points(o, px, py), t=frames.frame_from_points(o, px, py)[:3, :3] @ o
+                    ),
+                    "You rotated the origin. It is measured in W already: put it into the last column as it is.",
+                ),
+                Mistake(
+                    _frame(_not_rejected),
+                    "Your x and y are not perpendicular: the part of the second edge along x must go first.",
+                ),
+                Mistake(
+                    _frame(_second_edge_first),
+                    "You trusted the edge to y_point and bent x. The first edge is the trusted one.",
+                ),
+                Mistake(_frame(_left_handed), "Your frame is left-handed: z = x cross y, in this order."),
+                Mistake(
+                    lambda o, px, py: frames.frame_from_points(o, py, px),
+                    "x_point and y_point have changed places: your x axis runs toward y_point.",
+                ),
+            ],
+        ),
+        Exercise(
+            "invert",
+            reference=frames.invert,
+            draw=lambda rng: (random_pose(rng),),
+            metric=metrics.Poses(1e-6, 1e-6),
+            hints=(
+                "Solve p_W = R p_F + t for p_F.",
+                "p_F = R' (p_W - t) = R' p_W - R' t: the rotation is R', the translation is -R' t.",
+                "`R, t = T[:3, :3], T[:3, 3]; X = np.eye(4); X[:3, :3] = R.T; X[:3, 3] = -R.T @ t; return X`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda T: T.T,
+                    "You transposed the whole 4x4 matrix: the translation slipped into the last row. Only the rotation is transposed.",
+                ),
+                Mistake(
+                    lambda T: _with(T, R=T[:3, :3].T),
+                    "You transposed the rotation but left the translation as it was. It becomes -R' t.",
+                ),
+                Mistake(
+                    lambda T: _with(T, R=T[:3, :3].T, t=-T[:3, 3]),
+                    "You negated the translation but did not rotate it: seen from the frame, W lies at -R' t, not at -t.",
+                ),
+                Mistake(
+                    lambda T: _with(T, R=T[:3, :3].T, t=T[:3, :3].T @ T[:3, 3]),
+                    "You rotated the translation but kept its sign: it is -R' t.",
+                ),
+                Mistake(
+                    lambda T: _with(T, R=T[:3, :3].T, t=-T[:3, :3] @ T[:3, 3]),
+                    "You rotated the translation by R. On the way back everything turns by R'.",
+                ),
+                Mistake(
+                    lambda T: _with(T, t=-T[:3, 3]),
+                    "You negated the translation, but the rotation has to be undone as well: use R'.",
+                ),
+                Mistake(
+                    lambda T: _with(T, R=T[:3, :3].T, t=np.zeros(3)),
+                    "The rotation is undone, the translation is missing: it is -R' t.",
+                ),
+                Mistake(lambda T: T, "This is T itself. The inverse maps the other way."),
+            ],
+        ),
+        Exercise(
+            "relative",
+            reference=frames.relative,
+            draw=lambda rng: (random_pose(rng), random_pose(rng)),
+            metric=metrics.Poses(1e-6, 1e-6),
+            hints=(
+                "Neighboring letters cancel: which two transforms give T_AB when W stands between them?",
+                "T_AB = T_AW T_WB, and T_AW is the inverse of T_WA.",
+                "`return invert(T_WA) @ T_WB`",
+            ),
+            mistakes=[
+                Mistake(lambda A, B: frames.invert(A) * B, "You multiplied entry by entry. Matrices multiply with @."),
+                Mistake(
+                    lambda A, B: A * B,
+                    "You multiplied entry by entry (matrices multiply with @), and T_WA is not inverted.",
+                ),
+                Mistake(
+                    lambda A, B: A @ frames.invert(B),
+                    "The order is reversed: T_WA T_BW puts an A beside a B, where nothing cancels. It is T_AW T_WB.",
+                ),
+                Mistake(
+                    lambda A, B: B @ frames.invert(A),
+                    "This is T_WB T_AW: the motion that carries A to B, seen from W. Seen from A it is T_AW T_WB.",
+                ),
+                Mistake(
+                    lambda A, B: frames.relative(B, A), "This is T_BA, the inverse: you inverted T_WB instead of T_WA."
+                ),
+                Mistake(
+                    lambda A, B: A @ B, "You multiplied T_WA by T_WB without inverting: in T_WA T_WB nothing cancels."
+                ),
+                Mistake(
+                    lambda A, B: frames.invert(A) @ frames.invert(B),
+                    "You inverted both. In T_AW T_BW nothing cancels: only T_WA is turned round.",
+                ),
+                Mistake(
+                    lambda A, B: _with(frames.relative(A, B), t=np.zeros(3)),
+                    "The rotation is right, the translation is missing: multiply the whole 4x4 matrices.",
+                ),
+                Mistake(lambda A, B: A.T @ B, "The transpose of a 4x4 pose is not its inverse: use your `invert`."),
+                Mistake(
+                    lambda A, B: frames.pose(A[:3, :3].T @ B[:3, :3], B[:3, 3] - A[:3, 3]),
+                    "The rotation is right. The vector from A to B is still written in W: turn it into A with R_WA'.",
+                ),
+            ],
+        ),
+        Value(
+            "angle_deg",
+            reference=lambda: np.rad2deg(frames.rotation_angle(_K0_T_K1())),
+            unit="deg",
+            rtol=1e-4,
+            hints=(
+                "The trace of a rotation matrix knows its angle.",
+                "trace(R) = 1 + 2 cos(angle).",
+                "`angle_deg = np.rad2deg(np.arccos((np.trace(T_K0K1[:3, :3]) - 1) / 2))`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: 90.0,
+                    "90 deg is what the sheet's drawing suggests. The points were moved by 0.01, and the angle shows it: compute it from the matrix.",
+                ),
+                Mistake(
+                    lambda: np.rad2deg(np.arccos(np.clip(np.trace(_K0_T_K1()) / 2 - 0.5, -1, 1))),
+                    "You took the trace of the 4x4 matrix; the 1 in its corner is no part of the rotation.",
+                ),
+                Mistake(
+                    lambda: np.rad2deg(np.arccos(np.trace(_K0_T_K1()[:3, :3]) - 1)),
+                    "The half is missing: trace(R) = 1 + 2 cos(angle).",
+                ),
+            ],
+        ),
+        Value(
+            "distance",
+            reference=_distance,
+            unit="mm",
+            rtol=1e-5,
+            hints=(
+                "The distance of two origins does not depend on who looks at them.",
+                "It is the length of the translation in T_K0K1.",
+                "`distance = np.linalg.norm(T_K0K1[:3, 3])`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: np.linalg.norm(_K0_T_K1()),
+                    "You took the norm of the whole matrix. Only its last column holds lengths.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_K0_T_K1()[:, 3]),
+                    "Your column still holds the 1 of the last row: take its first three entries.",
+                ),
+                Mistake(lambda: _distance() ** 2, "This is the squared distance."),
+                Mistake(
+                    lambda: np.abs(_K0_T_K1()[:3, 3]).sum(),
+                    "You added the absolute components. The distance is the root of the sum of squares.",
+                ),
+                Mistake(_flat_distance, "This is the distance of the two x_points. The frames sit at their origins."),
+            ],
+        ),
+        Prediction(
+            "flat",
+            question="The triangle is 100 mm long and 10 mm high; the noise is 0.05 mm. What helps the rotation about x most?",
+            choices=("a base twice as long", "a height twice as large", "both help alike"),
+            answer="a height twice as large",
+            why="About x, the frame turns by noise over height. A longer base only helps the two other angles.",
+        ),
+        Exercise(
+            "matrix_from_kuka",
+            reference=frames.matrix_from_kuka,
+            draw=kuka_pose,
+            metric=metrics.Poses(1e-6, 1e-6),
+            hints=(
+                "Three elementary turns, multiplied in the order the controller names them, and a translation.",
+                "R = Rz(A) Ry(B) Rx(C). The angles arrive in radians, in the order A, B, C.",
+                "`(cA, cB, cC), (sA, sB, sC) = np.cos(xyzabc[3:]), np.sin(xyzabc[3:])`, `Rz = np.array([[cA, -sA, 0], [sA, cA, 0], [0, 0, 1]])`, "
+                "`Ry = np.array([[cB, 0, sB], [0, 1, 0], [-sB, 0, cB]])`, `Rx = np.array([[1, 0, 0], [0, cC, -sC], [0, sC, cC]])`, "
+                "`T = np.eye(4); T[:3, :3] = Rz @ Ry @ Rx; T[:3, 3] = xyzabc[:3]; return T`",
+            ),
+            mistakes=[
+                Mistake(
+                    _ry_reversed,
+                    "Your Ry turns the wrong way: in Ry, + sin B stands top right and - sin B bottom left.",
+                ),
+                Mistake(_kuka_entry_by_entry, "You multiplied entry by entry. Matrices multiply with @."),
+                Mistake(
+                    _kuka("xyz"),
+                    "You multiplied Rx(C) Ry(B) Rz(A). KUKA turns about z first, then about the new y and the new x: Rz(A) Ry(B) Rx(C).",
+                ),
+                Mistake(
+                    _kuka("zyx", (5, 4, 3)),
+                    'A and C have changed places: A belongs to z, B to y, C to x. (SciPy means that by from_euler("ZYX", [A, B, C]).)',
+                ),
+                Mistake(
+                    _kuka("xyz", (5, 4, 3)),
+                    "You read A, B, C as turns about x, y, z. At KUKA, A turns about z, B about y, C about x.",
+                ),
+                Mistake(_kuka("zyz"), "You turned about z, y, z. KUKA's third turn is about x: Rz(A) Ry(B) Rx(C)."),
+                Mistake(
+                    lambda p: frames.matrix_from_kuka(p * np.array([1, 1, 1, -1, 1, 1])),
+                    "Your Rz turns the wrong way: in Rz, - sin A stands top right and + sin A below it.",
+                ),
+                Mistake(
+                    lambda p: frames.matrix_from_kuka(p * np.array([1, 1, 1, 1, 1, -1])),
+                    "Your Rx turns the wrong way: in Rx, - sin C stands above the diagonal and + sin C below.",
+                ),
+                Mistake(_kuka_in_degrees, "The angles already are radians: you converted them once too often."),
+                Mistake(
+                    _kuka_transposed, "Your rotation is the transpose: every elementary turn has its signs reversed."
+                ),
+                Mistake(
+                    lambda p: _with(frames.matrix_from_kuka(p), t=np.zeros(3)),
+                    "The rotation is right; x, y, z are missing from the last column.",
+                ),
+                Mistake(
+                    lambda p: _with(frames.matrix_from_kuka(p), t=frames.matrix_from_kuka(p)[:3, :3] @ p[:3]),
+                    "You rotated the position as well. x, y, z are already written in the base frame.",
+                ),
+            ],
+        ),
+        Prediction(
+            "pole",
+            question="At B = 90 deg you raise A by 30 deg and C by 30 deg. How does the flange move?",
+            choices=("it does not move", "it turns by 30 deg", "it turns by 60 deg"),
+            answer="it does not move",
+            why="At the pole the axes of A and C coincide in opposite sense: only A - C counts, and it has not changed.",
+        ),
+        Exercise(
+            "kuka_from_matrix",
+            reference=frames.kuka_from_matrix,
+            draw=lambda rng: (frames.matrix_from_kuka(kuka_pose(rng)[0]),),
+            metric=metrics.Through(frames.matrix_from_kuka, metrics.Poses(1e-6, 1e-6)),
+            noisy=[
+                (at_the_pole(sign), metrics.Through(frames.matrix_from_kuka, metrics.Poses(1e-4, 1e-6)), words)
+                for sign, words in (
+                    (1, "right away from the pole, but at B = 90 deg"),
+                    (-1, "right, but at B = -90 deg"),
+                )
+            ],
+            hints=(
+                "Compare the entries of Rz(A) Ry(B) Rx(C) that hold few terms: the first column and the last row.",
+                "B and A come from the first column, with `np.arctan2`. Then undo A: Rz(A)' R = Ry(B) Rx(C), whose middle row is 0, cos C, -sin C.",
+                "`R = T[:3, :3]; A = np.arctan2(R[1, 0], R[0, 0]); B = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0])); "
+                "C = np.arctan2(np.sin(A) * R[0, 2] - np.cos(A) * R[1, 2], np.cos(A) * R[1, 1] - np.sin(A) * R[0, 1]); "
+                "return np.array([*T[:3, 3], A, B, C])`",
+            ),
+            mistakes=[
+                Mistake(
+                    _angles_one_by_one,
+                    "Right except at the pole: there r10, r00, r21, r22 are rounding noise, and A and C, read one by one, do not fit "
+                    "each other. Take A first, undo it, and read C from what is left.",
+                ),
+                Mistake(
+                    _angles_by_quotients,
+                    "A quotient loses the quadrant: use np.arctan2(r10, r00) and np.arctan2(r21, r22).",
+                ),
+                Mistake(
+                    _angles(np.rad2deg),
+                    "Your angles are in degrees. Inside the workbook angles are radians; degrees are for people.",
+                ),
+                Mistake(
+                    _angles(lambda abc: abc[::-1]),
+                    'Your angles come in the order C, B, A. (SciPy gives A, B, C by as_euler("ZYX"), and C, B, A by "xyz".)',
+                ),
+                Mistake(
+                    lambda T: np.roll(frames.kuka_from_matrix(T), 3),
+                    "The position comes first, then the angles: x, y, z, A, B, C.",
+                ),
+                Mistake(
+                    _angles(lambda abc: np.array([np.pi / 2 - abc[0], abc[1], np.pi / 2 - abc[2]])),
+                    "np.arctan2 takes y first, then x: the sine before the cosine.",
+                ),
+                Mistake(
+                    lambda T: np.array([*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_euler("XYZ")]),
+                    "These are turns about x, then the new y, then the new z. KUKA's order is z, y, x.",
+                ),
+                Mistake(
+                    lambda T: np.array([*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_euler("XYZ")[::-1]]),
+                    "These are turns about x, then the new y, then the new z. KUKA's order is z, y, x.",
+                ),
+                Mistake(_angles(lambda abc: abc * (1, -1, 1)), "B has the wrong sign: the entry r20 is -sin B."),
+                Mistake(
+                    _angles(lambda abc: -abc), "All three angles have the wrong sign: you read the transposed matrix."
+                ),
+                Mistake(
+                    lambda T: frames.kuka_from_matrix(frames.invert(T)),
+                    "This is the pose of the inverse: you read T' instead of T.",
+                ),
+            ],
+        ),
+        Prediction(
+            "svd",
+            question="The SVD weighs all three points alike. About which axes is its frame better than Gram-Schmidt's?",
+            choices=("about all three", "only about x", "only about z"),
+            answer="only about z",
+            why="Three points lie in one plane whatever method you take, so the turns about x and y agree. Within the plane, "
+            "Gram-Schmidt listens to the first edge alone; the SVD hears the third point too.",
+        ),
+    ],
+)

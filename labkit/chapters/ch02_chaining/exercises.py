@@ -1,0 +1,856 @@
+"""Chapter 2: chained transforms, the closure error of a loop, and what to do with it."""
+
+import numpy as np
+
+from ...documents.lab_sheet import printed as lab_sheet
+from ...exercises import metrics
+from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...geometry import chaining, frames
+from ...geometry.lie import exp_se3, log_se3, nearest_rotation
+
+
+def random_pose(rng):
+    """A random pose with its origin some hundred millimeters away."""
+    return frames.pose(frames.matrix_from_quaternion(rng.normal(size=4)), rng.uniform(-400, 400, 3))
+
+
+def random_links(rng):
+    """Three to five random transforms, stacked."""
+    return (np.array([random_pose(rng) for _ in range(rng.integers(3, 6))]),)
+
+
+def loop_product(rng):
+    """The product of a loop that nearly closes: some degrees and millimeters off."""
+    turn = frames.unit_vector(rng.normal(size=3)) * np.deg2rad(rng.uniform(2, 8))  # a sine is no longer its angle
+    return (exp_se3(np.concatenate([turn, rng.uniform(0.5, 20) * rng.normal(size=3)])),)
+
+
+def worn_pose(rng):
+    """A pose whose rotation block has lost its right angles."""
+    T = random_pose(rng)
+    T[:3, :3] += rng.uniform(0.02, 0.06) * rng.normal(size=(3, 3))
+    return (T,)
+
+
+def open_loop(rng):
+    """Links of a loop of three to five frames that does not quite close."""
+    links = random_links(rng)[0]
+    links[-1] = frames.relative(chaining.chain(links[:-1]), np.eye(4))
+    return (links @ exp_se3(rng.normal(size=(len(links), 6)) * np.repeat([0.02, 2.0], 3)),)
+
+
+# Wrong variants --------------------------------------------------------------------------------------------------------
+
+
+def _blocks_apart(transforms):
+    """Rotations multiplied, translations merely added."""
+    T = chaining.chain(transforms)
+    T[:3, 3] = transforms[:, :3, 3].sum(0)
+    return T
+
+
+def _turned_too_far(transforms):
+    """Each translation turned by its own link as well."""
+    T = np.eye(4)
+    for link in transforms:
+        T[:3, :3] = T[:3, :3] @ link[:3, :3]
+        T[:3, 3] += T[:3, :3] @ link[:3, 3]
+    return T
+
+
+def _from(start):
+    """A chain that begins with something else than the identity."""
+    return lambda transforms: start @ chaining.chain(transforms)
+
+
+def _elementwise(transforms):
+    T = np.ones((4, 4))
+    for link in transforms:
+        T = T * link
+    return T
+
+
+def _closure(angle, distance=None):
+    """A variant of closure_error with another angle, or distance."""
+
+    def variant(T):
+        right = chaining.closure_error(T)
+        return (angle or (lambda T: right[0]))(T), (distance or (lambda T: right[1]))(T)
+
+    return variant
+
+
+def _distance(distance):
+    return _closure(None, distance)
+
+
+def _twice_sine(T):
+    R = T[:3, :3]
+    return np.linalg.norm([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+
+
+def _trace_angle(R):
+    return np.arccos(np.clip((np.trace(R) - 1) / 2, -1, 1))
+
+
+def _with_rotation(T, R):
+    T = T.copy()
+    T[:3, :3] = R
+    return T
+
+
+def _columns_normalized(T):
+    R = T[:3, :3]
+    return _with_rotation(T, R / np.linalg.norm(R, axis=0))
+
+
+def _rows_normalized(T):
+    R = T[:3, :3]
+    return _with_rotation(T, R / np.linalg.norm(R, axis=1, keepdims=True))
+
+
+def _gram_schmidt(first, second):
+    """Right angles from two columns, in another order than x, y."""
+
+    def variant(T):
+        R = np.empty((3, 3))
+        R[:, [first, second, 3 - first - second]] = frames.gram_schmidt(T[:3, first], T[:3, second])
+        R[:, 3 - first - second] *= np.sign(np.linalg.det(R))
+        return _with_rotation(T, R)
+
+    return variant
+
+
+def _svd_variant(rule):
+    def variant(T):
+        U, s, Vt = np.linalg.svd(T[:3, :3])
+        return _with_rotation(T, rule(U, s, Vt))
+
+    return variant
+
+
+def _whole_matrix(T):
+    U, _, Vt = np.linalg.svd(T)
+    return U @ Vt
+
+
+def _parts(transforms):
+    """Links, the poses after 0, 1, ... N links, the twist of the product, and N."""
+    poses = chaining.stations(transforms)
+    return poses, log_se3(poses[-1]), len(transforms)
+
+
+def _all_in_the_last(transforms):
+    links = transforms.copy()
+    links[-1] = links[-1] @ frames.invert(chaining.chain(transforms))
+    return links
+
+
+def _all_in_the_first(transforms):
+    links = transforms.copy()
+    links[0] = frames.invert(chaining.chain(transforms)) @ links[0]
+    return links
+
+
+def _appended_to_each(transforms, sign=-1):
+    _, xi, n = _parts(transforms)
+    return transforms @ exp_se3(sign * xi / n)
+
+
+def _prepended_to_each(transforms, sign=-1):
+    _, xi, n = _parts(transforms)
+    return exp_se3(sign * xi / n) @ transforms
+
+
+def _links_moved(first, left=True):
+    """The links, not the poses, moved by shares that grow from `first`."""
+
+    def variant(transforms):
+        _, xi, n = _parts(transforms)
+        moves = exp_se3(-np.arange(first, first + n)[:, None] / n * xi)
+        return moves @ transforms if left else transforms @ moves
+
+    return variant
+
+
+def _twists_subtracted(transforms):
+    _, xi, n = _parts(transforms)
+    return exp_se3(log_se3(transforms) - xi / n)
+
+
+def _moved(poses, moves):
+    """Links between poses that have been moved."""
+    moved = moves @ poses
+    return frames.relative(moved[:-1], moved[1:])
+
+
+def _equal_moves(transforms):
+    poses, xi, n = _parts(transforms)
+    return _moved(poses, exp_se3(-np.repeat([[0], [1 / n]], [1, n], axis=0) * xi))
+
+
+def _forward_instead_of_back(transforms):
+    poses, xi, n = _parts(transforms)
+    return _moved(poses, exp_se3(np.arange(n + 1)[:, None] / n * xi))
+
+
+def _divided_by(number):
+    """k / number(N) in place of k / N."""
+
+    def variant(transforms):
+        poses, xi, n = _parts(transforms)
+        return _moved(poses, exp_se3(-np.arange(n + 1)[:, None] / number(n) * xi))
+
+    return variant
+
+
+def _between(rule):
+    """Another rule than the relative pose for the link between two corrected poses."""
+    return lambda transforms: rule(_moved_poses(transforms)[:-1], _moved_poses(transforms)[1:])
+
+
+def _rotation_only(transforms):
+    poses, xi, n = _parts(transforms)
+    return _moved(poses, exp_se3(-np.arange(n + 1)[:, None] / n * xi * np.repeat([1, 0], 3)))
+
+
+def _turn_and_shift_apart(transforms, from_twist=False):
+    """Rotation and translation shared out each for itself: of the poses, or of the twist."""
+    poses, xi, n = _parts(transforms)
+    if from_twist:
+        moves = exp_se3(-np.arange(n + 1)[:, None] / n * xi)
+        moves[:, :3, 3] = -np.arange(n + 1)[:, None] / n * xi[3:]
+        return _moved(poses, moves)
+    moved = exp_se3(-np.arange(n + 1)[:, None] / n * xi * np.repeat([1, 0], 3)) @ poses
+    moved[:, :3, 3] = poses[:, :3, 3] - np.arange(n + 1)[:, None] / n * poses[-1, :3, 3]
+    return frames.relative(moved[:-1], moved[1:])
+
+
+def _translation_from_links(transforms):
+    links = transforms.copy()
+    links[:, :3, 3] -= chaining.chain(transforms)[:3, 3] / len(links)
+    return links
+
+
+def _translation_only(transforms):
+    poses, _, n = _parts(transforms)
+    moves = np.tile(np.eye(4), (n + 1, 1, 1))
+    moves[:, :3, 3] = -np.arange(n + 1)[:, None] / n * poses[-1][:3, 3]
+    return _moved(poses, moves)
+
+
+def _share_on_the_right(transforms):
+    poses, xi, n = _parts(transforms)
+    moved = poses @ exp_se3(-np.arange(n + 1)[:, None] / n * xi)
+    return frames.relative(moved[:-1], moved[1:])
+
+
+def _moved_poses(transforms):
+    poses, xi, n = _parts(transforms)
+    return exp_se3(-np.arange(n + 1)[:, None] / n * xi) @ poses
+
+
+def _sheet():
+    return chaining.chain(lab_sheet.printed_transforms())
+
+
+def _angle_deg(wrong=None):
+    return np.rad2deg(chaining.closure_error(_sheet())[0] if wrong is None else wrong(_sheet()))
+
+
+CHAPTER = Chapter(
+    "02-chaining",
+    title="Chaining and closing the loop",
+    items=[
+        Prediction(
+            "order",
+            question="Move A shifts and turns, move B only shifts. Does the order of the two matter?",
+            choices=("no, shifts can be exchanged", "yes, one turn is enough", "only if both turn"),
+            answer="yes, one turn is enough",
+            why="B is made in the frame that A has reached. One turn is enough to send it in another direction (only a shift along "
+            "the axis of the turn would not mind).",
+        ),
+        Prediction(
+            "operator",
+            question="The sheet writes the sum of the transforms, and prints one result. Which of the two did its program compute?",
+            choices=("the sum", "the product", "neither"),
+            answer="the product",
+            why="A 1 in the last corner settles it: the sum of four transforms has a 4 there. Listing 6 multiplies (`T *= myT`).",
+        ),
+        Exercise(
+            "chain",
+            reference=chaining.chain,
+            draw=random_links,
+            metric=metrics.Poses(1e-6, 1e-6),
+            hints=(
+                "Neighboring letters cancel: T_AB T_BC T_CD = T_AD. What does an empty chain do?",
+                "Start with the identity and multiply each link from the right, in the order given.",
+                "`T = np.eye(4)\nfor link in transforms:\n    T = T @ link\nreturn T`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda Ts: np.sum(Ts, axis=0),
+                    "You added the matrices, as the sheet's sum sign says. The last row became 0 0 0 N: a chain of moves is a product.",
+                ),
+                Mistake(
+                    lambda Ts: chaining.chain(Ts[::-1]),
+                    "You multiplied in the reverse order: each new link belongs to the right of what you have, where its letters meet.",
+                ),
+                Mistake(
+                    _elementwise,
+                    "You multiplied entry by entry: `*` is not `@`.",
+                ),
+                Mistake(
+                    lambda Ts: np.eye(4) * _elementwise(Ts),
+                    "You multiplied entry by entry, so that only the diagonal is left of the identity: `*` is not `@`.",
+                ),
+                Mistake(
+                    lambda Ts: chaining.chain([frames.invert(T) for T in Ts]),
+                    "You inverted every link. The links come as T_01, T_12, ...: their letters meet as they are.",
+                ),
+                Mistake(
+                    lambda Ts: chaining.chain(Ts[1:]),
+                    "The first link is missing: start with the identity, or with the first link and go on from the second.",
+                ),
+                Mistake(
+                    lambda Ts: chaining.chain(Ts[:-1]),
+                    "The last link is missing from your product.",
+                ),
+                Mistake(
+                    _blocks_apart,
+                    "The rotations are multiplied, but the translations merely added. Each one has to be turned into the first frame: let the 4x4 product do it.",
+                ),
+                Mistake(
+                    lambda Ts: np.eye(4),
+                    "This is the identity: the products are formed but not kept. Write T = T @ link.",
+                ),
+                Mistake(
+                    lambda Ts: Ts[0],
+                    "This is the first link alone: does `return` stand inside the loop?",
+                ),
+                Mistake(
+                    lambda Ts: frames.invert(chaining.chain(Ts)),
+                    "This is the inverse of the chain: T_DA instead of T_AD.",
+                ),
+                Mistake(
+                    lambda Ts: chaining.chain(Ts).T,
+                    "This is the transpose of the chain: the translation belongs in the last column.",
+                ),
+                Mistake(
+                    _from(np.zeros((4, 4))),
+                    "You started with zeros, and everything times zero is zero. Start with the identity, np.eye(4).",
+                ),
+                Mistake(
+                    _from(np.ones((4, 4))),
+                    "You started with ones everywhere. Start with the identity, np.eye(4).",
+                ),
+                Mistake(
+                    lambda Ts: np.eye(4) + np.sum(Ts, axis=0),
+                    "You added the matrices to the identity: a chain of moves is a product, T = T @ link.",
+                ),
+                Mistake(
+                    lambda Ts: _from(Ts[0])(Ts),
+                    "The first link is in your product twice: start with the identity, or go on from the second link.",
+                ),
+                Mistake(
+                    lambda Ts: Ts[-1],
+                    "This is the last link alone: each turn of the loop throws away what came before. Write T = T @ link.",
+                ),
+                Mistake(
+                    lambda Ts: Ts[-2] @ Ts[-1],
+                    "This is the product of the last two links alone: each turn of the loop throws away what came before. Write T = T @ link.",
+                ),
+                Mistake(
+                    lambda Ts: chaining.stations(Ts),
+                    "These are the poses after 0, 1, ... N links. The chain is the last of them.",
+                ),
+                Mistake(
+                    lambda Ts: chaining.stations(Ts)[1:],
+                    "These are the poses after 1, 2, ... N links. The chain is the last of them.",
+                ),
+                Mistake(
+                    _turned_too_far,
+                    "The rotations are right, but you turned each translation by its own link too: add R @ p first, then go on to the new R.",
+                ),
+            ],
+        ),
+        Exercise(
+            "closure_error",
+            reference=chaining.closure_error,
+            draw=loop_product,
+            metric=metrics.Several(metrics.Angles(1e-6), metrics.Numbers(1e-9, "mm"), names=("angle", "distance")),
+            hints=(
+                "How far is T from the identity? One number for the turn, one for the shift.",
+                "The angle follows from the trace of the 3x3 rotation block (NaN means an arccosine of more than 1), the distance is the length of the translation.",
+                "`return np.arccos((np.trace(T[:3, :3]) - 1) / 2), np.linalg.norm(T[:3, 3])`",
+            ),
+            mistakes=[
+                Mistake(
+                    _closure(lambda T: np.rad2deg(chaining.closure_error(T)[0])),
+                    "Your angle is in degrees. Inside the workbook angles are radians.",
+                ),
+                Mistake(
+                    _closure(lambda T: np.arccos(np.clip(np.trace(T) / 2 - 0.5, -1, 1))),
+                    "You took the trace of the 4x4 matrix; the 1 in its corner is no part of the rotation.",
+                ),
+                Mistake(
+                    _closure(lambda T: np.nan),
+                    "Your arccosine got more than 1. Its argument is (trace - 1) / 2, parentheses included, with the trace of the 3x3 block: the 1 in the corner of T is no part of the rotation.",
+                ),
+                Mistake(
+                    _closure(lambda T: np.arccos(np.trace(T[:3, :3]) / 3)),
+                    "You took a third of the trace. The trace of a rotation is 1 + 2 cos(angle): solve this for the angle.",
+                ),
+                Mistake(
+                    _closure(lambda T: log_se3(T)[:3]),
+                    "This is the rotation vector. The angle is its length.",
+                ),
+                Mistake(
+                    _closure(lambda T: _twice_sine(T) / 2),
+                    "This is the sine of the angle: its arcsine is missing.",
+                ),
+                Mistake(
+                    _closure(_twice_sine),
+                    "The length of the vector from R - R' is twice the sine of the angle: halve it and take the arcsine.",
+                ),
+                Mistake(
+                    _closure(lambda T: np.linalg.norm(frames.kuka_from_matrix(T)[3:])),
+                    "You took the root of the sum of squares of three Euler angles. Successive turns about different axes do not add like lengths; the trace gives the angle.",
+                ),
+                Mistake(
+                    _closure(lambda T: np.abs(frames.kuka_from_matrix(T)[3:]).max()),
+                    "This is the largest of three Euler angles. The angle of the whole rotation is larger; the trace gives it.",
+                ),
+                Mistake(
+                    _distance(lambda T: T[:3, 3]),
+                    "This is the translation as a vector. The distance is its length.",
+                ),
+                Mistake(
+                    _distance(lambda T: np.linalg.norm(T)),
+                    "Your distance is the norm of the whole matrix. Only the last column holds lengths.",
+                ),
+                Mistake(
+                    _distance(lambda T: np.linalg.norm(T[3, :3])),
+                    "You took the last row. The translation stands in the last column, T[:3, 3].",
+                ),
+                Mistake(
+                    _distance(lambda T: np.linalg.norm(T[:2, 3])),
+                    "You took x and y alone. The loop also misses in z.",
+                ),
+                Mistake(
+                    _distance(lambda T: np.linalg.norm(T[:, 3])),
+                    "Your distance takes the whole last column, the 1 of the last row included.",
+                ),
+                Mistake(
+                    _distance(lambda T: np.linalg.norm(T - np.eye(4))),
+                    "Your distance is the norm of T - I, which adds millimeters to numbers without a unit. Only the last column holds lengths.",
+                ),
+                Mistake(
+                    _closure(lambda T: np.linalg.norm(T[:3, :3] - np.eye(3))),
+                    "The norm of R - I is no angle: for small turns it is sqrt(2) times too large.",
+                ),
+                Mistake(
+                    _distance(lambda T: np.sum(T[:3, 3] ** 2)),
+                    "This is the squared distance.",
+                ),
+                Mistake(
+                    _closure(lambda T: np.arctan2(T[1, 0], T[0, 0])),
+                    "You read the turn about z alone. The loop also tilts: the angle of the whole rotation is asked for.",
+                ),
+                Mistake(
+                    _closure(lambda T: (np.trace(T[:3, :3]) - 1) / 2),
+                    "This is the cosine of the angle: its arccosine is missing.",
+                ),
+                Mistake(
+                    _distance(lambda T: np.abs(T[:3, 3]).sum()),
+                    "You added the components of the shift. The distance is the root of the sum of squares.",
+                ),
+                Mistake(
+                    _distance(lambda T: T[:3, 3].sum()),
+                    "You added the components of the shift. The distance is the root of the sum of squares.",
+                ),
+                Mistake(
+                    _distance(lambda T: np.abs(T[:3, 3]).max()),
+                    "This is the largest component of the shift. The distance is the root of the sum of squares.",
+                ),
+                Mistake(
+                    _distance(lambda T: np.linalg.norm(log_se3(T)[3:])),
+                    "This is the length of the twist's shift, a path along a screw. The distance asked for is straight: the length of the translation of T.",
+                ),
+                Mistake(
+                    lambda T: chaining.closure_error(T)[::-1],
+                    "Angle and distance have changed places.",
+                ),
+            ],
+        ),
+        Value(
+            "closure_angle_deg",
+            reference=_angle_deg,
+            unit="deg",
+            rtol=5e-3,  # arccos of the trace of a rounded matrix is that bad at small angles
+            hints=(
+                "Chain the four printed transforms and ask for the closure error.",
+                "The first of the two results is the angle, in radians.",
+                "`closure_angle_deg = np.rad2deg(closure_error(product)[0])`",
+            ),
+            mistakes=[
+                Mistake(lambda: chaining.closure_error(_sheet())[0], "This is the angle in radians."),
+                Mistake(
+                    lambda: _angle_deg(lambda T: np.arctan2(T[1, 0], T[0, 0])),
+                    "You read the turn about z alone. The loop also tilts by some tenths of a degree.",
+                ),
+                Mistake(
+                    lambda: _angle_deg(lambda T: np.linalg.norm(T[:3, :3] - np.eye(3))),
+                    "The norm of R - I is no angle: for small turns it is sqrt(2) times too large.",
+                ),
+                Mistake(
+                    lambda: np.rad2deg(_trace_angle(chaining.chain(lab_sheet.printed_transforms()[1:])[:3, :3])),
+                    "The first link is missing from your chain.",
+                ),
+                Mistake(
+                    lambda: _angle_deg(
+                        lambda T: frames.rotation_angle(chaining.chain(lab_sheet.printed_transforms()[:-1]))
+                    ),
+                    "The last link is missing from your chain.",
+                ),
+                Mistake(
+                    lambda: _angle_deg(
+                        lambda T: frames.rotation_angle(chaining.chain(lab_sheet.printed_transforms()[::-1]))
+                    ),
+                    "You multiplied the links in the reverse order.",
+                ),
+                Mistake(
+                    lambda: np.rad2deg(_angle_deg()),
+                    "You converted to degrees twice.",
+                ),
+                Mistake(
+                    lambda: np.deg2rad(chaining.closure_error(_sheet())[0]),
+                    "You converted in the wrong direction: `closure_error` returns radians, so `np.rad2deg` is needed.",
+                ),
+                Mistake(
+                    lambda: chaining.closure_error(_sheet())[1],
+                    "This is the distance, in mm: the second of the two results. The angle is the first.",
+                ),
+                Mistake(
+                    lambda: np.rad2deg(chaining.closure_error(_sheet())[1]),
+                    "You converted the distance. The angle is the first of the two results.",
+                ),
+            ],
+        ),
+        Value(
+            "closure_distance",
+            reference=lambda: chaining.closure_error(_sheet())[1],
+            unit="mm",
+            rtol=2.5e-3,  # three digits, as for the angle
+            hints=(
+                "Where does the loop bring the origin of K0?",
+                "It is the length of the last column of the product, without its 1.",
+                "`closure_distance = closure_error(product)[1]`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: np.linalg.norm(_sheet()[:, 3]),
+                    "Your column still holds the 1 of the last row: take its first three entries.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_sheet()[:2, 3]),
+                    "You took x and y alone. The loop also misses in z.",
+                ),
+                Mistake(
+                    lambda: np.abs(_sheet()[:3, 3]).sum(),
+                    "You added the components. The length is the root of the sum of squares.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_sheet() - np.eye(4)),
+                    "This is the norm of the whole product less I, the numbers of the rotation included. Only the translation holds lengths.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_sheet()),
+                    "This is the norm of the whole matrix, the numbers of the rotation included. Only the translation holds lengths.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(chaining.chain(lab_sheet.printed_transforms()[::-1])[:3, 3]),
+                    "You multiplied the links in the reverse order.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(np.sum(lab_sheet.printed_transforms(), axis=0)[:3, 3]),
+                    "You added the four translations, but each is written in another frame.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(lab_sheet.printed_transforms()[:, :3, 3], axis=1).sum(),
+                    "This is the length of the way around the loop, not the gap at its end.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(chaining.chain(lab_sheet.printed_transforms()[1:])[:3, 3]),
+                    "The first link is missing from your chain.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(chaining.chain(lab_sheet.printed_transforms()[:-1])[:3, 3]),
+                    "The last link is missing from your chain.",
+                ),
+                Mistake(
+                    _angle_deg,
+                    "This is the angle, in degrees. The distance is the second of the two results.",
+                ),
+                Mistake(
+                    lambda: chaining.closure_error(_sheet())[0],
+                    "This is the angle, in radians. The distance is the second of the two results.",
+                ),
+                Mistake(
+                    lambda: np.abs(_sheet()[:3, 3]).max(),
+                    "This is the largest component alone. The length is the root of the sum of squares.",
+                ),
+            ],
+        ),
+        Prediction(
+            "lever",
+            question="One link of the loop K0 K1 K2 K3 K0 is turned wrongly by 3 deg, no other has an error. Which link opens the loop most at K0?",
+            choices=("the first, to K1", "the second, to K2", "the fourth, back to K0"),
+            answer="the second, to K2",
+            why="The error turns everything after the link about its end. K2 is farthest from K0; the fourth link ends at K0 and has no lever at all.",
+        ),
+        Exercise(
+            "orthonormalize",
+            reference=chaining.orthonormalize,
+            draw=worn_pose,
+            metric=metrics.Poses(1e-6, 1e-6),
+            hints=(
+                "Which rotation lies nearest to a matrix that is almost one? The translation stays.",
+                "With R = U S V', the nearest rotation is U V': the SVD with its singular values set to 1.",
+                "`U, _, Vt = np.linalg.svd(T[:3, :3]); X = T.copy(); X[:3, :3] = U @ Vt; return X`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda T: _with_rotation(T, np.linalg.qr(T[:3, :3])[0]),
+                    "The Q of a QR factorization has right angles, but it trusts the first column, and its columns may even point the other way. "
+                    "The nearest rotation comes from the SVD.",
+                ),
+                Mistake(
+                    lambda T: _with_rotation(T, frames.gram_schmidt(T[:3, 0], T[:3, 1])),
+                    "Gram-Schmidt gives right angles, but not the nearest rotation: it trusts the first column and bends the others.",
+                ),
+                Mistake(
+                    _gram_schmidt(0, 2),
+                    "Gram-Schmidt gives right angles, but not the nearest rotation: it trusts one column and bends the others.",
+                ),
+                Mistake(
+                    _gram_schmidt(1, 0),
+                    "Gram-Schmidt gives right angles, but not the nearest rotation: it trusts one column and bends the others.",
+                ),
+                Mistake(
+                    _gram_schmidt(1, 2),
+                    "Gram-Schmidt gives right angles, but not the nearest rotation: it trusts one column and bends the others.",
+                ),
+                Mistake(
+                    _gram_schmidt(2, 0),
+                    "Gram-Schmidt gives right angles, but not the nearest rotation: it trusts one column and bends the others.",
+                ),
+                Mistake(
+                    _gram_schmidt(2, 1),
+                    "Gram-Schmidt gives right angles, but not the nearest rotation: it trusts one column and bends the others.",
+                ),
+                Mistake(
+                    _columns_normalized,
+                    "The columns have length 1, but they are still not perpendicular.",
+                ),
+                Mistake(
+                    _rows_normalized,
+                    "The rows have length 1, but they are still not perpendicular.",
+                ),
+                Mistake(
+                    lambda T: _with_rotation(T, T[:3, :3] / np.linalg.norm(T[:3, :3], axis=1)),
+                    "You divided columns by the lengths of rows. And length 1 alone makes no right angles.",
+                ),
+                Mistake(
+                    _svd_variant(lambda U, s, Vt: U @ Vt.T),
+                    "`np.linalg.svd` returns V already transposed: multiply U by it as it is.",
+                ),
+                Mistake(
+                    _svd_variant(lambda U, s, Vt: U @ np.diag(s) @ Vt),
+                    "This is R, as worn as before: U S V' puts it together again. Leave the singular values out.",
+                ),
+                Mistake(
+                    _svd_variant(lambda U, s, Vt: Vt @ U),
+                    "The factors have changed places: U V' is not V' U.",
+                ),
+                Mistake(
+                    _svd_variant(lambda U, s, Vt: Vt.T @ U.T),
+                    "This is the transpose of the nearest rotation, V U' instead of U V'.",
+                ),
+                Mistake(
+                    _whole_matrix,
+                    "You took the SVD of the whole 4x4 matrix: the translation went into it. Only the rotation block is repaired.",
+                ),
+                Mistake(
+                    lambda T: _with_rotation(np.eye(4), nearest_rotation(T[:3, :3])),
+                    "The rotation is right, but the translation has got lost.",
+                ),
+                Mistake(
+                    lambda T: _with_rotation(T, T[:3, :3] / np.cbrt(np.linalg.det(T[:3, :3]))),
+                    "The determinant is 1 now, but that is the volume alone: lengths and angles are still wrong.",
+                ),
+                Mistake(
+                    lambda T: _with_rotation(T, T[:3, :3] / np.linalg.det(T[:3, :3])),
+                    "Dividing by the determinant makes all axes longer or shorter alike: the angles between them are still wrong.",
+                ),
+                Mistake(
+                    _svd_variant(lambda U, s, Vt: U * Vt),
+                    "You multiplied entry by entry: `*` is not `@`.",
+                ),
+            ],
+        ),
+        Prediction(
+            "growth",
+            question="Frames in a row, each measured from the one before with a small turning error. Twice as many links: how much larger is the error at the end?",
+            choices=("1.4 times", "2 times", "2.8 times"),
+            answer="2.8 times",
+            why="The turns add like random steps, with the square root of N; each one acts through a lever that grows with N: together N^1.5, and 2^1.5 = 2.8 (somewhat more in short rows).",
+        ),
+        Exercise(
+            "distribute_closure",
+            reference=chaining.distribute_closure,
+            draw=open_loop,
+            metric=metrics.Poses(1e-5, 1e-5),
+            hints=(
+                "The product is exp(xi). Going back by all of xi at the end closes the loop; how far back should the pose after link k go?",
+                "The pose after k links, P_k, becomes exp(-k/N xi) P_k. The corrected links are the relative poses of neighbors.",
+                "`poses = chaining.stations(transforms)\nN = len(transforms)\nxi = log_se3(poses[-1])\n"
+                "moved = [exp_se3(-k / N * xi) @ P for k, P in enumerate(poses)]\nreturn np.array([relative(A, B) for A, B in zip(moved, moved[1:])])`",
+            ),
+            mistakes=[
+                Mistake(
+                    _all_in_the_last,
+                    "The loop closes, but the last link alone pays for it. Each link is to take its N-th part.",
+                ),
+                Mistake(
+                    _all_in_the_first,
+                    "The loop closes, but the first link alone pays for it. Each link is to take its N-th part.",
+                ),
+                Mistake(
+                    lambda Ts: np.tile(np.eye(4), (len(Ts), 1, 1)),
+                    "All your links are the identity. Such a loop closes, but nothing is left of the measurement.",
+                ),
+                Mistake(
+                    _appended_to_each,
+                    "You appended exp(-xi/N) to each link. But xi is written in the first frame, and each link ends in another one: the loop stays open.",
+                ),
+                Mistake(
+                    _prepended_to_each,
+                    "You put exp(-xi/N) in front of each link. But xi is written in the first frame, and each link begins in another one.",
+                ),
+                Mistake(
+                    lambda Ts: _appended_to_each(Ts, 1),
+                    "You appended exp(xi/N) to each link: that is on in the direction of the error, and in the frame of the link, while xi is written in the first frame.",
+                ),
+                Mistake(
+                    lambda Ts: _prepended_to_each(Ts, 1),
+                    "You put exp(xi/N) in front of each link: that is on in the direction of the error, and in the frame of the link, while xi is written in the first frame.",
+                ),
+                Mistake(
+                    _links_moved(0),
+                    "You moved the links. What goes back by k/N is the pose after k links, P_k: the product of the first k.",
+                ),
+                Mistake(
+                    _links_moved(1),
+                    "You moved the links. What goes back by k/N is the pose after k links, P_k: the product of the first k.",
+                ),
+                Mistake(
+                    _links_moved(0, left=False),
+                    "You moved the links. What goes back by k/N is the pose after k links, P_k: the product of the first k.",
+                ),
+                Mistake(
+                    _links_moved(1, left=False),
+                    "You moved the links. What goes back by k/N is the pose after k links, P_k: the product of the first k.",
+                ),
+                Mistake(
+                    _twists_subtracted,
+                    "You subtracted xi/N from the twist of each link. Twists of different motions do not add up: move the poses P_k by exp_se3(-k / N * xi).",
+                ),
+                Mistake(
+                    _equal_moves,
+                    "You moved all poses by the same share. The pose after k links has collected k shares of the error.",
+                ),
+                Mistake(
+                    _forward_instead_of_back,
+                    "You moved by +k/N xi, on in the direction of the error: now the loop is twice as far open.",
+                ),
+                Mistake(
+                    _divided_by(lambda n: n + 1),
+                    "You divide by N + 1, the number of poses. There are N links, and the pose after the last one has to go back by all of xi.",
+                ),
+                Mistake(
+                    _divided_by(lambda n: n - 1),
+                    "You divide by N - 1: the pose after the last link goes back by more than xi. There are N links.",
+                ),
+                Mistake(
+                    _divided_by(lambda n: 1),
+                    "The division by N is missing: the pose after the last link is to go back by xi, not by N xi.",
+                ),
+                Mistake(
+                    _translation_only,
+                    "You shared out the translation but not the rotation: the loop still ends turned.",
+                ),
+                Mistake(
+                    _translation_from_links,
+                    "You took a share of the translation off each link. But each is written in another frame, and the rotation stays open.",
+                ),
+                Mistake(
+                    _rotation_only,
+                    "You shared out the rotation but not the translation: the loop still ends beside its start.",
+                ),
+                Mistake(
+                    _turn_and_shift_apart,
+                    "You shared out turn and shift each for itself. The loop closes, but half the shift is not half the way: move the poses by exp_se3(-k / N * xi).",
+                ),
+                Mistake(
+                    lambda Ts: _turn_and_shift_apart(Ts, from_twist=True),
+                    "You took the shift of the twist for the translation of the motion: exp_se3(-k / N * xi) makes the one from the other.",
+                ),
+                Mistake(
+                    lambda transforms: transforms,
+                    "The links are as they were. If every pose moves alike, nothing between neighbors changes: the pose after k links goes back by k/N.",
+                ),
+                Mistake(
+                    _share_on_the_right,
+                    "You put the share to the right of P_k. But xi is written in the first frame, so it belongs on the left.",
+                ),
+                Mistake(
+                    lambda Ts: _moved_poses(Ts)[1:],
+                    "These are the corrected poses. The corrected links are asked for: the relative poses of neighbors.",
+                ),
+                Mistake(
+                    _moved_poses,
+                    "These are the N + 1 corrected poses, P_0 included. Between neighbors lie the N corrected links, which are asked for.",
+                ),
+                Mistake(
+                    lambda Ts: _moved_poses(Ts)[:-1],
+                    "These are corrected poses, and the last one is missing. The corrected links are asked for: the relative poses of neighbors.",
+                ),
+                Mistake(
+                    lambda Ts: _moved(_moved_poses(Ts), np.eye(4))[1:],
+                    "One link is missing: the first one leads from P_0, the identity, to P_1.",
+                ),
+                Mistake(
+                    _between(lambda A, B: A @ B),
+                    "You multiplied neighboring poses. The link from A to B is inv(A) @ B, `relative(A, B)`.",
+                ),
+                Mistake(
+                    _between(lambda A, B: frames.relative(B, A)),
+                    "Your links lead backward: the link from A to B is inv(A) @ B, `relative(A, B)`.",
+                ),
+                Mistake(
+                    _between(lambda A, B: B @ frames.invert(A)),
+                    "B @ inv(A) is the move seen from K0. The link from A to B, seen from A, is inv(A) @ B, `relative(A, B)`.",
+                ),
+            ],
+        ),
+        Prediction(
+            "two_loops",
+            question="Two loops share a link. You share out the error of loop A, then that of loop B. What about loop A?",
+            choices=("it stays closed", "it opens again", "it opens, but less than the noise of one link"),
+            answer="it opens again",
+            why="Closing B changes the common link, and A contains it. Doing it the other way round moves the leftover to B; "
+            "only all links at once can close both.",
+        ),
+    ],
+)

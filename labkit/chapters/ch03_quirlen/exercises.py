@@ -1,0 +1,775 @@
+"""Chapter 3: tip and pivot from poses that touch one point."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...calibration import pivot
+from ...documents.lab_sheet import printed as lab_sheet
+from ...exercises import metrics
+from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...geometry import frames
+from ...geometry.lie import exp_so3
+
+
+def turns(rng, n):
+    """n rotations of 10 to 40 deg about random axes."""
+    axis = rng.normal(size=(n, 3))
+    axis *= np.deg2rad(rng.uniform(10, 40, (n, 1))) / np.linalg.norm(axis, axis=1, keepdims=True)
+    return exp_so3(axis)
+
+
+def poses(rng, std_trans=0.0):
+    """Four to eight poses that touch one point, positions off by noise."""
+    tip, point = rng.uniform(-50, 50, 3) - (0, 0, 90), rng.uniform(-300, 300, 3)
+    return pivot.touching_poses(turns(rng, rng.integers(4, 9)), tip, point, 0.0, std_trans, rng)
+
+
+def system(rng, std_trans=0.0):
+    """Stacked matrix and right-hand side."""
+    T = poses(rng, std_trans)
+    return pivot.pivot_matrix(T), pivot.pivot_rhs(T)
+
+
+def poses_and_result(rng):
+    """Noisy poses with some tip and pivot, not the best ones: who fits anew, or takes the mean off, is found out."""
+    T = poses(rng, 1.0)
+    result = pivot.calibrate_pivot(T)
+    return T, result.tip + rng.uniform(-20, 20, 3), result.pivot + rng.uniform(-20, 20, 3)
+
+
+def matrix_and_residuals(rng):
+    """Stacked matrix and the residuals, shape (n, 3), of its solution."""
+    T = poses(rng, 0.5)
+    return pivot.pivot_matrix(T), pivot.calibrate_pivot(T).residuals
+
+
+def near_first(rng):
+    """Distances, one of them far below the scale and some beyond the cutoff, and a scale; the nearest leads."""
+    scale = rng.uniform(0.1, 0.6)
+    near, far = rng.uniform(0.02, 0.13, 1), rng.uniform(1.1, 6, 3) * pivot.TUKEY
+    middle = rng.uniform(0.2, 0.95, 7) * pivot.TUKEY
+    return scale * np.concatenate([near, rng.permutation(np.concatenate([middle, far]))]), scale
+
+
+def far_first(rng):
+    """The same, one beyond the cutoff leading: a 0 for it must not make whole numbers of all weights."""
+    d, scale = near_first(rng)
+    return np.sort(d)[::-1].copy(), scale
+
+
+# Wrong variants --------------------------------------------------------------------------------------------------------
+
+
+def _blocks(left, right):
+    """A variant of pivot_matrix with other blocks."""
+
+    def variant(T_WF):
+        return np.vstack([np.hstack([left(T[:3, :3]), right]) for T in T_WF])
+
+    return variant
+
+
+def _side_by_side(T_WF):
+    return np.hstack([np.vstack([T[:3, :3], -np.eye(3)]) for T in T_WF])
+
+
+def _with_pivot_block(block):
+    """The columns of the tip, with other ones of the pivot: block(n)."""
+    return lambda T_WF: np.hstack([pivot.pivot_matrix(T_WF)[:, :3], block(len(T_WF))])
+
+
+def _rows_overlap(T_WF):
+    """Block i begins in row i, where it should begin in row 3i."""
+    A = np.zeros((3 * len(T_WF), 6))
+    for i, T in enumerate(T_WF):
+        A[i : i + 3] = np.hstack([T[:3, :3], -np.eye(3)])
+    return A
+
+
+@dataclass(frozen=True)
+class _solution(metrics.Numbers):
+    """A vector x, with a word to who hands over all that a solver returns."""
+
+    def admit(self, result, expected):
+        if isinstance(result, tuple) and len(result) == 4:
+            raise metrics.Refused(
+                "`lstsq` returns four things in a tuple: x, sum of squares, rank, singular values. Take the first, [0]"
+            )
+        if hasattr(result, "x") and hasattr(result, "success"):
+            raise metrics.Refused("the optimizer returns a whole report; its solution is the attribute `.x`")
+        return super().admit(result, expected)
+
+
+def _tip_alone(A, b):
+    """The pivot forgotten: R tip = -p."""
+    return np.concatenate([np.linalg.lstsq(A[:, :3], b, rcond=None)[0], np.zeros(3)])
+
+
+def _covariance(scale):
+    """A variant of pivot_covariance with another variance: scale(r, n)."""
+
+    def variant(A, residuals):
+        r = residuals.ravel()
+        return scale(r, len(residuals)) * np.linalg.inv(A.T @ A)
+
+    return variant
+
+
+def _weights(rule):
+    """A variant of robust_weights: rule(d / (cutoff scale))."""
+
+    def variant(distances, scale):
+        return rule(distances / (pivot.TUKEY * scale))
+
+    return variant
+
+
+def _tukey_weights(distances, scale):
+    return pivot.robust_weights(distances, scale)
+
+
+def _kreisel():
+    return pivot.calibrate_pivot(lab_sheet.kreisel_poses())
+
+
+def _squares():
+    return (_kreisel().residuals ** 2).sum()
+
+
+CHAPTER = Chapter(
+    "03-quirlen",
+    title="Quirlen: calibration about a pivot",
+    items=[
+        Exercise(
+            "pivot_matrix",
+            reference=pivot.pivot_matrix,
+            draw=lambda rng: (poses(rng),),
+            metric=metrics.Numbers(1e-9),
+            hints=(
+                "Each pose gives three rows: which numbers multiply the tip, which the pivot?",
+                "R_i tip - I pivot = -p_i: three rows [R_i  -I], all poses beneath each other.",
+                "`return np.vstack([np.hstack([T[:3, :3], -np.eye(3)]) for T in T_WF])`",
+            ),
+            mistakes=[
+                Mistake(
+                    _blocks(lambda R: R, np.eye(3)),
+                    "The pivot enters with the wrong sign: R tip + p - pivot = 0, so its block is -I.",
+                ),
+                Mistake(
+                    _blocks(lambda R: R.T, -np.eye(3)),
+                    "You took R' instead of R: the tip is given in the tool frame, and R turns it into the world.",
+                ),
+                Mistake(
+                    _blocks(lambda R: -R, np.eye(3)),
+                    "Both blocks have the opposite sign. That solves the same problem with +p on the right, but the sheet's right-hand side is -p.",
+                ),
+                Mistake(
+                    lambda T_WF: pivot.pivot_matrix(T_WF)[:, [3, 4, 5, 0, 1, 2]],
+                    "The blocks have changed places: the unknowns are (tip, pivot), the tip first.",
+                ),
+                Mistake(
+                    _blocks(lambda R: R, -np.ones((3, 3))),
+                    "`np.ones` fills the whole block; the identity matrix is `np.eye(3)`.",
+                ),
+                Mistake(
+                    _side_by_side,
+                    "You set the poses side by side. Each pose adds equations, not unknowns: stack them beneath each other.",
+                ),
+                Mistake(
+                    _rows_overlap,
+                    "The blocks overwrite each other: each pose takes three rows, so block i begins in row 3 * i.",
+                ),
+                Mistake(
+                    lambda T_WF: pivot.pivot_matrix(T_WF)[:, :3],
+                    "The columns of the pivot are missing. Its place is unknown too.",
+                ),
+                Mistake(
+                    _blocks(lambda R: R.T, np.eye(3)),
+                    "Two slips: you took R' instead of R, and the pivot enters with -I.",
+                ),
+                Mistake(
+                    _blocks(lambda R: -R, -np.eye(3)),
+                    "The sign of R: R tip + p - pivot = 0, so only the block of the pivot is negative.",
+                ),
+                Mistake(
+                    lambda T_WF: -pivot.pivot_matrix(T_WF)[:, [3, 4, 5, 0, 1, 2]],
+                    "The blocks have changed places, and with them their signs: the unknowns are (tip, pivot), so each pose gives [R  -I].",
+                ),
+                Mistake(
+                    _with_pivot_block(lambda n: np.repeat(-np.eye(3), n, axis=0)),
+                    "`np.repeat` repeats each row by itself: the rows of -I come out of step with those of R. `np.tile(-np.eye(3), (n, 1))` repeats the block.",
+                ),
+                Mistake(
+                    _with_pivot_block(lambda n: -np.eye(3 * n)[:, :3]),
+                    "Only the first pose has its -I: every pose touches the same pivot, so each three rows need one.",
+                ),
+                Mistake(
+                    _with_pivot_block(lambda n: np.zeros((3 * n, 3))),
+                    "The block of the pivot is zero. Its place is unknown too: the block is -I.",
+                ),
+                Mistake(
+                    lambda T_WF: np.vstack([np.hstack([T[:3], -np.eye(3)]) for T in T_WF]),
+                    "Your rows have seven entries: T[:3] holds the position as well. R is T[:3, :3]; p goes to the right-hand side.",
+                ),
+                Mistake(
+                    lambda T_WF: pivot.pivot_matrix(T_WF[:1]),
+                    "These are the rows of the first pose alone: does `return` stand inside the loop?",
+                ),
+                Mistake(
+                    lambda T_WF: pivot.pivot_matrix(T_WF[-1:]),
+                    "These are the rows of the last pose alone: collect the blocks and stack them beneath each other.",
+                ),
+                Mistake(
+                    lambda T_WF: pivot.pivot_matrix(T_WF).T,
+                    "This is the transpose: each pose gives three rows, each unknown a column.",
+                ),
+            ],
+        ),
+        Exercise(
+            "pivot_rhs",
+            reference=pivot.pivot_rhs,
+            draw=lambda rng: (poses(rng),),
+            metric=metrics.Numbers(1e-9, "mm"),
+            hints=(
+                "What is left when tip and pivot stand on the left side?",
+                "-p_i, the three positions of pose 1, then those of pose 2, ... in one long vector.",
+                "`return -T_WF[:, :3, 3].ravel()`",
+            ),
+            mistakes=[
+                Mistake(lambda T: T[:, :3, 3].ravel(), "The sign: brought to the right side, p becomes -p."),
+                Mistake(
+                    lambda T: -T[:, :3, 3].T.ravel(),
+                    "All x, then all y, then all z: that does not fit the rows of the matrix, which come pose by pose.",
+                ),
+                Mistake(lambda T: -T[:, :3, 3], "The numbers are right; flatten them into one vector, pose by pose."),
+                Mistake(
+                    lambda T: -T[:, 3, :3].ravel(),
+                    "You took the last row of each pose. The position stands in the last column.",
+                ),
+                Mistake(
+                    lambda T: -T[:, :, 3].ravel(),
+                    "You took the whole last column, the 1 of the last row included: the position is its first three entries.",
+                ),
+                Mistake(
+                    lambda T: -np.einsum("nji,nj->ni", T[:, :3, :3], T[:, :3, 3]).ravel(),
+                    "You turned the positions into the tool frame (R'p). The equations are written in the world.",
+                ),
+                Mistake(
+                    lambda T: -np.einsum("nij,nj->ni", T[:, :3, :3], T[:, :3, 3]).ravel(),
+                    "You turned the positions by R. They are written in the world already: R belongs to the tip alone.",
+                ),
+                Mistake(
+                    lambda T: -(T[:, :3, 3] - T[:, :3, 3].mean(0)).ravel(),
+                    "You took the mean off the positions. That suits a fit without the pivot; here the pivot is one of the unknowns.",
+                ),
+                Mistake(
+                    lambda T: -T[:3, 3].ravel(),
+                    "The first index counts the poses, and `:3` takes three of them. All poses, of the last column three entries: T_WF[:, :3, 3].",
+                ),
+                Mistake(
+                    lambda T: -T[:3, :, 3].ravel(),
+                    "The first index counts the poses, and `:3` takes three of them. All poses, of the last column three entries: T_WF[:, :3, 3].",
+                ),
+                Mistake(
+                    lambda T: -T[0, :3, 3],
+                    "This is the first pose alone: does `return` stand inside the loop?",
+                ),
+                Mistake(
+                    lambda T: -T[-1, :3, 3],
+                    "This is the last pose alone: collect the positions of all poses in one long vector.",
+                ),
+                Mistake(
+                    lambda T: T[:, :3, 3],
+                    "The sign, and the shape: brought to the right side, p becomes -p, all in one long vector.",
+                ),
+            ],
+        ),
+        Exercise(
+            "solve_pivot",
+            reference=pivot.solve_pivot,
+            draw=lambda rng: system(rng),
+            metric=_solution(1e-6, "mm"),  # a general minimizer stops some 1e-5 mm away
+            noisy=(lambda rng: system(rng, 1.0), _solution(1e-6, "mm")),
+            hints=(
+                "More equations than unknowns: no x fulfills them all. Which x makes the sum of squares of A x - b least?",
+                "The sheet: x = (A'A)^-1 A'b. Better conditioned, and shorter: `np.linalg.lstsq`.",
+                "`return np.linalg.lstsq(A, b, rcond=None)[0]`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda A, b: np.linalg.lstsq(A, -b, rcond=None)[0],
+                    "The sign of b is reversed: the solution comes out negated.",
+                ),
+                Mistake(
+                    lambda A, b: np.linalg.lstsq(A[:6], b[:6], rcond=None)[0],
+                    "You used the first two poses alone. Use all equations.",
+                ),
+                Mistake(
+                    lambda A, b: A.T @ b,
+                    "A'b alone is not the solution: (A'A)^-1 is missing in front of it.",
+                ),
+                Mistake(
+                    lambda A, b: np.linalg.lstsq(A, b, rcond=None)[1],
+                    "This is the second thing that `lstsq` returns, the sum of squares. The solution is the first, [0].",
+                ),
+                Mistake(
+                    _tip_alone,
+                    "You solved for the tip alone. The pivot is unknown too, and it takes up most of what you explain by the tip.",
+                ),
+                Mistake(
+                    lambda A, b: np.linalg.lstsq(A, b, rcond=None)[0][[3, 4, 5, 0, 1, 2]],
+                    "Tip and pivot have changed places: x = (tip, pivot).",
+                ),
+                Mistake(
+                    lambda A, b: np.linalg.lstsq(A[:9], b[:9], rcond=None)[0],
+                    "You used the first three poses alone. They determine x, but the others know something too: use all equations.",
+                ),
+                Mistake(
+                    lambda A, b: np.linalg.lstsq(A, b, rcond=None)[3],
+                    "These are the singular values, the last thing that `lstsq` returns. The solution is the first, [0].",
+                ),
+                Mistake(
+                    lambda A, b: A.T @ A @ (A.T @ b),
+                    "The inverse is missing: x = (A'A)^-1 A'b, `np.linalg.solve(A.T @ A, A.T @ b)`.",
+                ),
+                Mistake(
+                    lambda A, b: (A.T @ A) ** -1.0 @ A.T @ b,
+                    "`** -1` takes the reciprocal of every entry. The inverse matrix is `np.linalg.inv(A.T @ A)`.",
+                ),
+                Mistake(
+                    lambda A, b: pivot.solve_pivot(A, b)[:3],
+                    "This is the tip alone. x holds the pivot too: all six numbers are wanted.",
+                ),
+                Mistake(
+                    lambda A, b: A @ pivot.solve_pivot(A, b) - b,
+                    "These are the residuals A x - b. The solution x itself is wanted, shape (6,).",
+                ),
+            ],
+        ),
+        Value(
+            "tip_length",
+            reference=lambda: np.linalg.norm(_kreisel().tip),
+            unit="mm",
+            rtol=1e-3,
+            hints=(
+                "Which of the six numbers in x say where the tip is, and seen from where?",
+                "The tip seen from the flange is P_t, the first three entries of x. Its length is the root of the sum of squares.",
+                "`tip_length = np.linalg.norm(x[:3])`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: np.linalg.norm(_kreisel().pivot),
+                    "This is the distance of the pivot from the robot's base: the last three entries of x. The tip is the first three.",
+                ),
+                Mistake(
+                    lambda: np.hypot(np.linalg.norm(_kreisel().tip), np.linalg.norm(_kreisel().pivot)),
+                    "You took the norm of all six entries. The tip is the first three.",
+                ),
+                Mistake(
+                    lambda: abs(_kreisel().tip[2]), "This is the z component alone: the tip also sits to the side."
+                ),
+                Mistake(lambda: _kreisel().tip[2], "This is the z component alone: the tip also sits to the side."),
+                Mistake(
+                    lambda: np.abs(_kreisel().tip).sum(),
+                    "You added the components. The length is the root of the sum of squares.",
+                ),
+                Mistake(
+                    lambda: _kreisel().tip.sum(),
+                    "You added the components. The length is the root of the sum of squares.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_kreisel().tip[1:]),
+                    "You took y and z alone: Python counts from 0, so the first three entries are x[:3].",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_kreisel().tip[:2]),
+                    "You took x and y alone, the distance from the flange's z axis: the slice x[:2] holds two entries.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_kreisel().tip - _kreisel().pivot),
+                    "You subtracted two points of different frames: the tip is seen from the flange, the pivot from the world.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_kreisel().tip) / np.sqrt(3),
+                    "This is the rms of the three components. The length is the root of their sum of squares.",
+                ),
+            ],
+        ),
+        Exercise(
+            "pivot_residuals",
+            reference=lambda T_WF, tip, point: pivot.pivot_residuals(T_WF, tip, point),
+            draw=poses_and_result,
+            metric=metrics.Numbers(1e-9, "mm"),
+            hints=(
+                "Where is the tip in each pose, and where should it be?",
+                "Equation (2) of the sheet: R_i tip + p_i - point, one row a pose.",
+                "`return np.array([T[:3, :3] @ tip + T[:3, 3] - point for T in T_WF])`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda T, tip, point: point - pivot.pivot_residuals(T, tip, np.zeros(3)),
+                    "The sign is reversed: where the tip is, minus where it should be.",
+                ),
+                Mistake(
+                    lambda T, tip, point: np.einsum("nji,j->ni", T[:, :3, :3], tip) + T[:, :3, 3] - point,
+                    "You turned the tip by R'. R takes it from the tool frame to the world.",
+                ),
+                Mistake(
+                    lambda T, tip, point: pivot.pivot_residuals(T, tip, np.zeros(3)),
+                    "This is where the tip is. Subtract the pivot.",
+                ),
+                Mistake(
+                    lambda T, tip, point: T[:, :3, :3] @ tip - point,
+                    "p is missing: the turned tip still has to be carried to where the flange is.",
+                ),
+                Mistake(
+                    lambda T, tip, point: T[:, :3, :3] @ tip - T[:, :3, 3] - point,
+                    "The sign of p: the tip is at R tip + p.",
+                ),
+                Mistake(
+                    lambda T, tip, point: (T[:, :3, :3] * tip).sum(1) + T[:, :3, 3] - point,
+                    "You multiplied entry by entry and summed along the wrong axis: R @ tip adds along each row of R.",
+                ),
+                Mistake(
+                    lambda T, tip, point: tip + T[:, :3, 3] - point,
+                    "You added the tip without turning it: it is given in the tool frame.",
+                ),
+                Mistake(
+                    lambda T, tip, point: np.linalg.norm(pivot.pivot_residuals(T, tip, point), axis=1),
+                    "These are the lengths. The residual has three components in each pose: shape (n, 3).",
+                ),
+                Mistake(
+                    lambda T, tip, point: pivot.pivot_residuals(T, tip, point).ravel(),
+                    "The numbers are right; one row a pose is wanted, shape (n, 3).",
+                ),
+                Mistake(
+                    lambda T, tip, point: pivot.pivot_residuals(T, tip, -point),
+                    "The sign of the pivot: where the tip is, minus where it should be.",
+                ),
+                Mistake(
+                    lambda T, tip, point: pivot.pivot_residuals(T, point, tip),
+                    "Tip and pivot have changed places: R turns the tip, which is given in the tool frame.",
+                ),
+                Mistake(
+                    lambda T, tip, point: (T[:, :3, :3] @ (tip + T[:, :3, 3])[..., None])[..., 0] - point,
+                    "You turned p as well. Only the tip is given in the tool frame: R tip + p.",
+                ),
+                Mistake(
+                    lambda T, tip, point: pivot.pivot_residuals(frames.invert(T), point, tip),
+                    "You went to the tool frame and compared there. The residual is wanted in the world: R tip + p - point.",
+                ),
+                Mistake(
+                    lambda T, tip, point: -pivot.pivot_residuals(frames.invert(T), point, tip),
+                    "You went to the tool frame and compared there. The residual is wanted in the world: R tip + p - point.",
+                ),
+                Mistake(
+                    lambda T, tip, point: T @ np.append(tip, 1.0) - np.append(point, 0.0),
+                    "Your rows have four entries: the last is the 1 of the homogeneous point. Drop it.",
+                ),
+                Mistake(
+                    lambda T, tip, point: T @ np.append(tip, 1.0) - np.append(point, 1.0),
+                    "Your rows have four entries: the last is the 1 of the homogeneous point. Drop it.",
+                ),
+                Mistake(
+                    lambda T, tip, point: np.abs(pivot.pivot_residuals(T, tip, point)),
+                    "The sign of each component has got lost: the residual is a vector.",
+                ),
+                Mistake(
+                    lambda T, tip, point: np.square(pivot.pivot_residuals(T, tip, point)),
+                    "The sign of each component has got lost: the residual is a vector.",
+                ),
+                Mistake(
+                    lambda T, tip, point: T[:, :3, :3] * tip + T[:, None, :3, 3] - point,
+                    "`*` multiplies entry by entry: R turns the tip by `@`.",
+                ),
+                Mistake(
+                    lambda T, tip, point: pivot.pivot_residuals(T[:1], tip, point)[0],
+                    "This is the first pose alone: does `return` stand inside the loop?",
+                ),
+                Mistake(
+                    lambda T, tip, point: pivot.pivot_residuals(T, tip, point).T,
+                    "The numbers are right, but each pose stands in a column: one row a pose is wanted, shape (n, 3).",
+                ),
+            ],
+        ),
+        Value(
+            "s0",
+            reference=lambda: _kreisel().s0,
+            unit="mm",
+            rtol=1e-3,
+            hints=(
+                "The sheet's formula, listing 8: the root of the sum of squares over n.",
+                "n is the number of poses, not of equations; r'r is the sum of the squares of all 3n numbers.",
+                "`s0 = np.sqrt((residuals**2).sum() / len(poses))`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: np.sqrt(_squares() / 36),
+                    "You divided by the 36 equations: the rms of one coordinate. The sheet divides by the 12 poses.",
+                ),
+                Mistake(
+                    lambda: _kreisel().std,
+                    "This is the unbiased estimate, divided by 3n - 6. A better number, but not the sheet's s0.",
+                ),
+                Mistake(
+                    lambda: np.sqrt(_squares() / 11),
+                    "You divided by n - 1. Nothing was estimated as a mean here: the sheet divides by the 12 poses.",
+                ),
+                Mistake(lambda: np.sqrt(_squares()), "The division by n is missing under the root."),
+                Mistake(
+                    lambda: np.sqrt(_squares()) / 12,
+                    "The n belongs under the root: you divided after it.",
+                ),
+                Mistake(lambda: _squares() / 12, "The root is missing: this is a variance, in mm^2."),
+                Mistake(lambda: _squares(), "This is r'r. Divide it by n and take the root."),
+                Mistake(
+                    lambda: _squares() / 36,
+                    "The root is missing, and you divided by the 36 equations instead of the 12 poses.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_kreisel().residuals, axis=1).std(),
+                    "This is how much the lengths differ from their mean. The sheet measures them from zero: the root of their mean square.",
+                ),
+                Mistake(
+                    lambda: np.sqrt(_squares() / 35),
+                    "You divided by 36 - 1 (`ddof=1`). Nothing was estimated as a mean here: the sheet divides by the 12 poses.",
+                ),
+                Mistake(
+                    lambda: np.sqrt(_squares() / 33),
+                    "You divided by 36 - 3. The sheet divides by the 12 poses (and there are six unknowns, not three).",
+                ),
+                Mistake(
+                    lambda: np.sqrt(_squares() / 6),
+                    "You divided by 12 - 6. The sheet divides by the 12 poses.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_kreisel().residuals, axis=1).max(),
+                    "This is the largest distance. The sheet takes the root of the mean square.",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_kreisel().residuals, axis=1).mean(),
+                    "This is the mean distance. The sheet takes the root of the mean square, which is a little larger.",
+                ),
+            ],
+        ),
+        Prediction(
+            "two_poses",
+            question="Two poses give six equations for six unknowns. Is that enough?",
+            choices=("yes, exactly enough", "only with a large turn between them", "never"),
+            answer="never",
+            why="Whatever the turn between the two poses, it has an axis. A tip shifted along it, with the pivot shifted alike, "
+            "fulfills the same equations: R_1 - R_2 has rank 2.",
+        ),
+        Prediction(
+            "spin",
+            question="The tool spins about its own axis, sixty poses, never tilted. What will the residual and the error of the tip be?",
+            choices=("both small", "both large", "a small residual, a large error"),
+            answer="a small residual, a large error",
+            why="The residual only says how well the equations are fulfilled. A tip anywhere on the tool's axis fulfills them.",
+        ),
+        Prediction(
+            "cone",
+            question="Which set gives the better tip: 60 poses within 2 deg of the vertical, or 6 poses within 20 deg?",
+            choices=("60 poses within 2 deg", "6 poses within 20 deg", "both alike"),
+            answer="6 poses within 20 deg",
+            why="The singular value grows with the angle, but only with the root of the number of poses: a tenfold angle against a "
+            "tenfold number is 10 against 3.2.",
+        ),
+        Exercise(
+            "pivot_covariance",
+            reference=pivot.pivot_covariance,
+            draw=matrix_and_residuals,
+            metric=metrics.Numbers(1e-6, "mm^2"),
+            hints=(
+                "Noise in b goes through the solution x = (A'A)^-1 A'b. What does it do to x?",
+                "cov = std^2 (A'A)^-1, with the unbiased std^2 = r'r / (3n - 6).",
+                "`r = residuals.ravel(); return r @ r / (len(r) - 6) * np.linalg.inv(A.T @ A)`",
+            ),
+            mistakes=[
+                Mistake(
+                    _covariance(lambda r, n: r @ r / n),
+                    "You divided by the number of poses: three times too large, as each pose gives three residuals.",
+                ),
+                Mistake(
+                    _covariance(lambda r, n: r @ r / (3 * n)),
+                    "You divided by the number of equations. Six of them were used up by the six unknowns: 3n - 6 remain.",
+                ),
+                Mistake(
+                    _covariance(lambda r, n: np.sqrt(r @ r / (3 * n - 6))),
+                    "A standard deviation stands where its square belongs.",
+                ),
+                Mistake(
+                    _covariance(lambda r, n: 1.0),
+                    "This is (A'A)^-1 for noise of 1 mm. Scale it by the variance of the residuals.",
+                ),
+                Mistake(
+                    lambda A, r: np.vdot(r, r) / (r.size - 6) * (A.T @ A),
+                    "You forgot the inverse: A'A is the information, and its inverse the covariance.",
+                ),
+                Mistake(
+                    lambda A, r: np.sqrt(np.diag(pivot.pivot_covariance(A, r))),
+                    "These are the six standard deviations. The whole matrix is wanted, shape (6, 6).",
+                ),
+                Mistake(
+                    _covariance(lambda r, n: r @ r / (n - 6)),
+                    "You counted poses where equations are meant: 3n - 6 degrees of freedom.",
+                ),
+                Mistake(
+                    _covariance(lambda r, n: r @ r / (n - 1)),
+                    "You counted poses where equations are meant: 3n - 6 degrees of freedom.",
+                ),
+                Mistake(
+                    _covariance(lambda r, n: r @ r / (3 * n - 1)),
+                    "You divided by 3n - 1, as if one mean had been estimated. Six unknowns were: 3n - 6 remain.",
+                ),
+                Mistake(
+                    _covariance(lambda r, n: r @ r / (3 * n - 3)),
+                    "You divided by 3n - 3: the pivot is unknown as well as the tip, so 3n - 6 remain.",
+                ),
+                Mistake(
+                    _covariance(lambda r, n: r @ r),
+                    "r'r grows with the number of poses. The variance of one coordinate is r'r / (3n - 6).",
+                ),
+                Mistake(
+                    _covariance(lambda r, n: np.sqrt(r @ r / (3 * n))),
+                    "A standard deviation stands where the variance belongs, and it is divided by 3n in place of 3n - 6.",
+                ),
+                Mistake(
+                    _covariance(lambda r, n: np.sqrt(r @ r / n)),
+                    "This is the sheet's s0 times (A'A)^-1. What belongs there is the variance of one coordinate, r'r / (3n - 6).",
+                ),
+                Mistake(
+                    lambda A, r: np.diag(pivot.pivot_covariance(A, r)),
+                    "These are the six variances. The whole matrix is wanted, shape (6, 6).",
+                ),
+                Mistake(
+                    lambda A, r: np.diag(np.diag(pivot.pivot_covariance(A, r))),
+                    "You kept the diagonal alone. The errors of tip and pivot go together: the whole matrix is wanted.",
+                ),
+                Mistake(
+                    lambda A, r: pivot.pivot_covariance(A, r)[:3, :3],
+                    "This is the block of the tip. The covariance of all six unknowns is wanted, shape (6, 6).",
+                ),
+                Mistake(
+                    lambda A, r: np.vdot(r, r) / (r.size - 6) * (A.T @ A) ** -1.0,
+                    "You took the reciprocal of every entry. The inverse matrix is `np.linalg.inv(A.T @ A)`.",
+                ),
+            ],
+        ),
+        Exercise(
+            "robust_weights",
+            reference=_tukey_weights,
+            draw=(near_first, far_first),
+            metric=metrics.Numbers(1e-9),
+            hints=(
+                "Near poses keep their weight, far ones lose it all, smoothly.",
+                "Tukey: with q = d / (7 scale), w = (1 - q^2)^2, and 0 where q > 1.",
+                "`q = distances / (7 * scale); return np.where(q < 1, (1 - q**2) ** 2, 0.0)`",
+            ),
+            mistakes=[
+                Mistake(
+                    _weights(lambda q: (1 - q**2) ** 2),
+                    "Beyond the cutoff your weights grow again: (1 - q^2)^2 must be cut to 0 where q > 1.",
+                ),
+                Mistake(
+                    _weights(lambda q: np.maximum(1 - q**2, 0)),
+                    "The outer square is missing: w = (1 - q^2)^2.",
+                ),
+                Mistake(
+                    _weights(lambda q: np.maximum(1 - q, 0) ** 2),
+                    "The inner square is missing: w = (1 - q^2)^2.",
+                ),
+                Mistake(
+                    _weights(lambda q: (q < 1).astype(float)),
+                    "You cut hard: a pose is in or out. Tukey's weights fall to zero smoothly.",
+                ),
+                Mistake(
+                    lambda distances, scale: np.maximum(1 - (distances / scale) ** 2, 0) ** 2,
+                    "The cutoff is missing: it is 7 times the scale, not the scale itself.",
+                ),
+                Mistake(
+                    lambda distances, scale: np.maximum(1 - (distances / pivot.TUKEY) ** 2, 0) ** 2,
+                    "You did not divide by the scale: the cutoff is 7 standard deviations, not 7 mm.",
+                ),
+                Mistake(
+                    lambda distances, scale: np.maximum(1 - (distances / pivot.TUKEY * scale) ** 2, 0) ** 2,
+                    "`d / 7 * scale` divides by 7 and multiplies by the scale: put 7 * scale in parentheses.",
+                ),
+                Mistake(
+                    _weights(lambda q: np.where(q > 1, (1 - q**2) ** 2, 0.0)),
+                    "The two branches have changed places: 0 belongs beyond the cutoff, where q > 1.",
+                ),
+                Mistake(
+                    _weights(lambda q: 1 - np.maximum(1 - q**2, 0) ** 2),
+                    "The wrong way round: near poses get 0 and far ones 1.",
+                ),
+                Mistake(
+                    lambda distances, scale: np.where(
+                        distances > scale, 0.0, (1 - (distances / (pivot.TUKEY * scale)) ** 2) ** 2
+                    ),
+                    "You cut at one scale. The weight reaches 0 at 7 scales, where q = 1.",
+                ),
+                Mistake(
+                    lambda distances, scale: np.where(
+                        distances < pivot.TUKEY, (1 - (distances / (pivot.TUKEY * scale)) ** 2) ** 2, 0.0
+                    ),
+                    "You cut at 7 mm. The weight reaches 0 at 7 scales, where q = 1.",
+                ),
+                Mistake(
+                    lambda distances, scale: np.maximum(1 - (distances / scale * pivot.TUKEY) ** 2, 0) ** 2,
+                    "`d / scale * 7` multiplies by 7: put 7 * scale in parentheses.",
+                ),
+                Mistake(
+                    lambda distances, scale: np.where(
+                        distances < pivot.TUKEY * scale, (1 - distances**2 / (pivot.TUKEY * scale)) ** 2, 0.0
+                    ),
+                    "Only d is squared. Square the whole quotient q = d / (7 scale).",
+                ),
+                Mistake(
+                    lambda distances, scale: np.maximum(1 - (distances / (4.685 * scale)) ** 2, 0) ** 2,
+                    "4.685 is the usual cutoff for single numbers. Distances in space are larger: here it is 7 scales.",
+                ),
+                Mistake(
+                    _weights(lambda q: np.where(q < 1, (1 - q**2) ** 2, 1.0)),
+                    "Beyond the cutoff a pose has no weight: 0, not 1.",
+                ),
+                Mistake(
+                    _weights(lambda q: np.minimum((1 - q**2) ** 2, 1.0)),
+                    "Beyond the cutoff a pose has no weight: 0, not 1.",
+                ),
+                Mistake(
+                    _weights(lambda q: (lambda w: w / w.sum())(np.maximum(1 - q**2, 0) ** 2)),
+                    "You made the weights add up to 1. They are wanted as they are: 1 for a pose that agrees perfectly.",
+                ),
+                Mistake(
+                    _weights(lambda q: (1 - q[q < 1] ** 2) ** 2),
+                    "You left out the far poses. They keep their place and get the weight 0.",
+                ),
+                Mistake(
+                    _weights(lambda q: np.where(q < 1, np.trunc((1 - q**2) ** 2), 0.0)),
+                    "Your weights are whole numbers: was the array made of integers? Zeros of `np.zeros` are not.",
+                ),
+                Mistake(
+                    _weights(np.vectorize(lambda q: (1 - q**2) ** 2 if q < 1 else 0)),
+                    "`np.vectorize` takes the type of its first result: where that is 0, all weights become whole numbers. Write 0.0.",
+                ),
+                Mistake(
+                    _weights(lambda q: np.maximum(1 - q**4, 0)),
+                    "The square belongs around 1 - q^2, not on q^2: w = (1 - q^2)^2.",
+                ),
+                Mistake(
+                    _weights(lambda q: np.minimum(1, 1 / q)),
+                    "These are Huber's weights: they never vanish, so a pose far away still pulls.",
+                ),
+            ],
+        ),
+        Prediction(
+            "outliers",
+            question="Three of twelve touches are a few millimeters beside the point. How far off is the plain tip, with noise of 0.2 mm?",
+            choices=("like the noise, about 0.1 mm", "about a millimeter", "not at all, errors average out"),
+            answer="about a millimeter",
+            why="Squares listen to the loudest. The robust calibration notices that nine poses agree, and lets go of three.",
+        ),
+    ],
+)

@@ -1,0 +1,110 @@
+"""Chapter 4: contour maps, paths of iterates, models and their trust regions, basins, the walk along the line."""
+
+import numpy as np
+from matplotlib.colors import to_rgba
+from matplotlib.image import PcolorImage
+
+from ...stage import style
+
+PATHS = {
+    "newton": {"linestyle": "-", "marker": "o", "label": "Newton"},
+    "gauss_newton": {"linestyle": ":", "marker": "s", "label": "Gauss-Newton"},
+    "levenberg_marquardt": {"linestyle": "--", "marker": "^", "label": "Levenberg-Marquardt"},
+    "trust_region": {"linestyle": "-.", "marker": "D", "label": "trust region"},
+}
+BASINS = {
+    "local minimum": style.PREDICTION,
+    "global minimum": style.ESTIMATE,
+    "saddle": style.MEASUREMENT,
+    "nowhere": style.MUTED,
+}
+LETTERS = {"local minimum": "L", "global minimum": "G", "saddle": "S"}
+
+
+def contour_map(ax, x, y, f, levels, points=()):
+    """Thin contour lines of f over the grid x, y, and named points {name: (x, y)}. Returns ax."""
+    style.axes(ax, "$x_1$", "$x_2$", equal=True, grid=False)
+    ax.contour(x, y, f, levels=levels, colors=style.MUTED, linewidths=0.6, linestyles="solid", alpha=0.7)
+    for name, at in dict(points).items():
+        ax.plot(*at, marker="+", color=style.INK, markersize=9, markeredgewidth=1.6)
+        ax.annotate(LETTERS[name], at, xytext=(6, 5), textcoords="offset points", weight="bold")
+    return ax
+
+
+def paths(ax, names):
+    """One empty path for each method. Returns {name: line}."""
+    return {name: ax.plot([], [], color=style.MUTED, linewidth=1.3, markersize=4.5, **PATHS[name])[0] for name in names}
+
+
+def emphasize(lines, chosen):
+    """The chosen one of several lines in the color of the estimate and on top, the others muted."""
+    for name, line in lines.items():
+        line.set(color=style.ESTIMATE if name == chosen else style.MUTED, linewidth=2.4 if name == chosen else 1.3)
+        line.set_zorder(4 if name == chosen else 3)
+
+
+def model(ax):
+    """Contours of a quadratic model, the rim of its trust region, and the step. Returns (contours, rim, step)."""
+    (contours,) = ax.plot([], [], color=style.PREDICTION, linewidth=1.2, zorder=2)
+    (rim,) = ax.plot([], [], color=style.INK, linewidth=1.4, linestyle=(0, (2, 2)), zorder=5)
+    (step,) = ax.plot([], [], color=style.INK, linewidth=2.6, marker="o", markevery=[-1], markersize=7, zorder=6)
+    return contours, rim, step
+
+
+def courses(ax, names, iterations, low, high):
+    """Cost against iteration, one line a method, and a marker for the one shown. Returns ({name: line}, marker)."""
+    style.axes(ax, "iteration", "$f$")
+    ax.set(xlim=(0, iterations), ylim=(low, high), xticks=range(0, iterations + 1, 4))
+    for name in names:
+        ax.plot([], [], color=style.INK, linewidth=1.3, markersize=4.5, **PATHS[name])
+    ax.legend(loc="upper right", fontsize=8, handlelength=3.0, borderaxespad=0.2)
+    lines = paths(ax, names)
+    (here,) = ax.plot([], [], marker="o", markersize=11, markerfacecolor="none", color=style.INK, zorder=6)
+    return lines, here
+
+
+def basins(ax, edges):
+    """A square image of where each start ends, empty at first, its legend beside it. Returns (image, fill).
+
+    `edges` are the borders of the cells, alike in both directions. PcolorImage takes half the time of imshow.
+    """
+    image = PcolorImage(ax, edges, edges, np.zeros((len(edges) - 1, len(edges) - 1, 4), dtype=np.uint8), zorder=1)
+    ax.add_image(image)
+    for name, color in BASINS.items():
+        ax.plot([], [], marker="s", markersize=9, linestyle="none", color=color, label=name)
+    ax.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), title="ends in", alignment="left")
+    return image, lambda colors: image.set_data(edges, edges, colors)
+
+
+def basin_colors(labels, covered):
+    """RGBA bytes of an array of labels (order of `BASINS`); transparent where covered."""
+    table = np.array([*(to_rgba(color, 0.75) for color in BASINS.values()), (0, 0, 0, 0)])
+    return np.round(255 * table).astype(np.uint8)[np.where(covered, len(BASINS), labels)]
+
+
+def profile(ax, t, f, points):
+    """f along a line, with named points {name: (t, f)}. Returns the artists (parabola, iterates, vertex, text)."""
+    style.axes(ax, "$t$, on the line through both centers: 0 at (1, 1), 1 at (-1, -2)", "$f$")
+    ax.plot(t, f, **style.look("truth"))
+    for name, at in points.items():
+        below = -15 if name != "saddle" else 8
+        ax.annotate(LETTERS[name], at, xytext=(-4, below), textcoords="offset points", weight="bold")
+    (parabola,) = ax.plot([], [], **style.look("prediction"), zorder=3)
+    (iterates,) = ax.plot([], [], **style.look("estimate"), marker="D", markersize=5, zorder=4)
+    (vertex,) = ax.plot([], [], color=style.PREDICTION, marker="v", markersize=10, linestyle="none", zorder=5)
+    text = ax.text(0.02, 0.05, "", transform=ax.transAxes, zorder=6)
+    text.set_bbox({"facecolor": style.PAPER, "edgecolor": "none", "pad": 2})
+    return parabola, iterates, vertex, text
+
+
+def curvature(ax):
+    """Both directions of curvature at a point and the step's share along each. Returns (first, second, shares)."""
+    first, second = (ax.plot([], [], color=style.INK, linewidth=1.4, zorder=3)[0] for _ in range(2))
+    (shares,) = ax.plot([], [], color=style.PREDICTION, linewidth=3.2, zorder=3)
+    return first, second, shares
+
+
+def indefinite(ax, x, y, lowest):
+    """Shade where the smallest eigenvalue of the Hessian is negative, and say so. Returns the contour set."""
+    ax.text(0.015, 0.975, "gray: the Hessian is indefinite", transform=ax.transAxes, va="top", fontsize=9)
+    return ax.contourf(x, y, lowest, levels=[-1e9, 0], colors=[style.FAINT], zorder=0)

@@ -1,0 +1,362 @@
+"""Chapter 4: the walk along the line, four paths on one map, Newton near the saddle, basins to rub free."""
+
+from functools import cache, lru_cache
+
+import contourpy
+import numpy as np
+
+from ...documents.thesis import wells
+from ...estimation import optimization as opt
+from ...stage import Choice, Handle, Slider, Stage, Toggle, style
+from . import figures as draw
+
+LEVELS = (-200, -170, -140, -110, -90, -75, -67.58, -60, -50, -40, -30, -22, -16, -12)
+ALONG = wells.CENTERS[1] - wells.CENTERS[0]
+SHOWN = 12  # iterations in the picture; who needs more has left it
+SQUARE = (-6.0, 6.0)
+CELLS = 121
+BRUSH = 0.5
+WORDS = {"Newton": "newton", "Gauss-Newton": "gauss_newton", "Levenberg-Marquardt": "levenberg_marquardt"}
+METHODS = {**WORDS, "trust region": "trust_region"}
+
+
+def _grid(x, y, n):
+    """Points of a grid over two intervals, shape (n, n, 2)."""
+    return np.stack(np.meshgrid(np.linspace(*x, n), np.linspace(*y, n)), axis=-1)
+
+
+def _map(ax, x, y):
+    grid = _grid(x, y, 141)
+    points = {name: e.x for name, e in zip(wells.NAMES, wells.extrema())}
+    draw.contour_map(ax, grid[..., 0], grid[..., 1], wells.value(grid), LEVELS, points)
+    ax.set(xlim=x, ylim=y)
+    return ax
+
+
+# --- The walk along the line ---
+
+
+def line_point(t):
+    """Place t on the line through both centers, 0 at (1, 1) and 1 at (-1, -2); (...) -> (..., 2)."""
+    return wells.CENTERS[0] + np.multiply.outer(t, ALONG)
+
+
+def walk(state):
+    """Newton from a place on the line: iterates t, the first parabola, its vertex, its curvature."""
+    t = float(state["start"][0])
+    slope = float(wells.gradient(line_point(t)) @ ALONG)
+    bend = float(ALONG @ wells.hessian(line_point(t)) @ ALONG)
+    run = wells.run("newton", line_point(t), max_iterations=SHOWN)
+    iterates = (run.x - wells.CENTERS[0]) @ ALONG / (ALONG @ ALONG)
+    around = t + np.linspace(-0.6, 0.6, 61)
+    parabola = float(wells.value(line_point(t))) + slope * (around - t) + 0.5 * bend * (around - t) ** 2
+    vertex = t - slope / bend
+    end = wells.NAMES[wells.which(run.solution)] if run.converged else "nowhere"
+    return {"t": iterates, "around": around, "parabola": parabola, "bend": bend, "vertex": vertex, "end": end}
+
+
+def _walk_caption(result):
+    kind = "a minimum" if result["bend"] > 0 else "a maximum"
+    return (
+        f"At t = {result['t'][0]:.2f} the parabola's vertex is {kind}, at t = {result['vertex']:.2f}. "
+        f"Newton goes there, and in the end: {result['end']}."
+    )
+
+
+def line():
+    """Drag the start along the line through both wells and see the parabola whose vertex is Newton's next point."""
+
+    def scene(fig):
+        ax = fig.subplots()
+        t = np.linspace(-0.6, 1.6, 441)
+        points = {}
+        for name, e in zip(wells.NAMES, wells.extrema()):
+            points[name] = ((e.x - wells.CENTERS[0]) @ ALONG / (ALONG @ ALONG), e.value)
+        parabola, iterates, vertex, text = draw.profile(ax, t, wells.value(line_point(t)), points)
+        ax.set(xlim=(-0.6, 1.6), ylim=(-240, 10))
+
+        def update(state, result):
+            parabola.set_data(result["around"], result["parabola"])
+            inside = np.clip(result["t"], -0.6, 1.6)
+            iterates.set_data(inside, wells.value(line_point(inside)))
+            vertex.set_data([np.clip(result["vertex"], -0.6, 1.6)], [-236])
+            text.set_text(f"curvature {result['bend']:+.0f}")
+
+        return [parabola, iterates, vertex, text], update
+
+    def follow(state, moved):
+        t = state["start"][0]
+        return {"start": (t, float(wells.value(line_point(t))))}
+
+    return Stage(
+        "Newton on a line",
+        scene=scene,
+        compute=walk,
+        handles={"start": Handle((0.2, -90.0), step=0.01)},
+        constrain=follow,
+        fail={"start": (0.84, -160.0)},
+        describe=_walk_caption,
+        size=(7.0, 3.6),
+    )
+
+
+# --- Four paths ---
+
+
+def model_of(method, x):
+    """Value, gradient and curvature of the model a method builds at x, in the units of f."""
+    if method in ("gauss_newton", "levenberg_marquardt"):
+        r, J = wells.residual(x), wells.jacobian(x)
+        return float(wells.value(x)), 2 * J.T @ r, 2 * J.T @ J
+    return float(wells.value(x)), wells.gradient(x), wells.hessian(x)
+
+
+def model_contours(x, model, half_width, count=7):
+    """Contour lines of a quadratic model in a square around x, as one polyline broken by NaN, shape (n, 2)."""
+    f, g, B = model
+    h = _grid((-half_width, half_width), (-half_width, half_width), 41)
+    m = f - opt.predicted_decrease(g, B, h)
+    levels = np.linspace(m.min(), m.max(), count + 2)[1:-1]
+    generator = contourpy.contour_generator(h[0, :, 0] + x[0], h[:, 0, 1] + x[1], m)
+    pieces = [piece for level in levels for piece in generator.lines(level)]
+    return np.concatenate([np.vstack([piece, [np.nan, np.nan]]) for piece in pieces])
+
+
+@lru_cache(maxsize=4)
+def _runs(start):
+    """Traces of all methods from a start, a tuple; kept while only the method or the iteration changes."""
+    return {name: wells.run(name, np.array(start), max_iterations=SHOWN) for name in wells.METHODS}
+
+
+def four_runs(state):
+    """Traces of all methods from the start, and of the chosen one the model, radius and step at iteration k."""
+    runs = _runs(tuple(state["start"].tolist()))
+    run = runs[state["method"]]
+    k = min(state["k"], run.iterations - 1)
+    x, step, radius = run.x[k], run.step[k], float(run.radius[k])
+    reach = min(radius if np.isfinite(radius) else np.linalg.norm(step), 3.0)
+    return {
+        "runs": runs,
+        "method": state["method"],
+        "k": k,
+        "x": x,
+        "step": step,
+        "radius": radius,
+        "gain": float(run.gain[k]),
+        "accepted": bool(run.accepted[k]),
+        "contours": model_contours(x, model_of(state["method"], x), max(1.25 * reach, 0.15)),
+        "ends": {name: _end(r) for name, r in runs.items()},
+    }
+
+
+def _name(method):
+    """A method's name as it begins a sentence."""
+    label = draw.PATHS[method]["label"]
+    return label[0].upper() + label[1:]
+
+
+def _end(run):
+    return wells.NAMES[wells.which(run.solution, tol=0.05)]
+
+
+def _four_caption(result):
+    ends = ", ".join(f"{draw.PATHS[name]['label']}: {end}" for name, end in result["ends"].items())
+    gain = "" if np.isnan(result["gain"]) else f", gain {result['gain']:.2f}"
+    taken = "" if result["accepted"] else ", rejected"
+    radius = "none" if np.isinf(result["radius"]) else f"{result['radius']:.2f}"
+    return (
+        f"{ends}. Step {result['k'] + 1} of {draw.PATHS[result['method']]['label']}: length "
+        f"{np.linalg.norm(result['step']):.2f}, radius {radius}{gain}{taken}."
+    )
+
+
+def four_paths():
+    """Drag the start; compare the four paths, and look at one method's model, radius and step at each iteration."""
+
+    def scene(fig):
+        ax, beside = fig.subplots(1, 2, width_ratios=(2.1, 1))
+        _map(ax, (-4.5, 4.5), (-4.5, 4.5))
+        lines = draw.paths(ax, wells.METHODS)
+        contours, rim, step = draw.model(ax)
+        costs, here = draw.courses(beside, wells.METHODS, SHOWN, -215, 60)
+        circle = np.linspace(0, 2 * np.pi, 121)
+
+        def update(state, result):
+            draw.emphasize(lines, result["method"])
+            draw.emphasize(costs, result["method"])
+            for name, run in result["runs"].items():
+                lines[name].set_data(*np.clip(run.x, -50, 50).T)
+                costs[name].set_data(np.arange(len(run.cost)), wells.value(run.x))
+            x, end = result["x"], result["x"] + result["step"]
+            contours.set_data(*result["contours"].T)
+            step.set_data(*np.clip([x, end], -50, 50).T)
+            radius = result["radius"] if np.isfinite(result["radius"]) else np.nan
+            rim.set_data(x[0] + radius * np.cos(circle), x[1] + radius * np.sin(circle))
+            here.set_data([result["k"]], [wells.value(x)])
+
+        return [*lines.values(), contours, rim, step, *costs.values(), here], update
+
+    return Stage(
+        "four paths",
+        scene=scene,
+        compute=four_runs,
+        handles={"start": Handle((3.0, 3.0), step=0.1)},
+        controls={
+            "method": Choice(METHODS, "trust_region", label="model of"),
+            "k": Slider(0, SHOWN - 1, 0, label="iteration"),
+        },
+        fail={"start": (1.3, 1.3), "method": "newton", "k": 2},
+        describe=_four_caption,
+        size=(7.6, 4.6),
+    )
+
+
+# --- Near the saddle ---
+
+
+def near_saddle(state):
+    """One run from the start, and the Newton step there taken apart along the directions of curvature."""
+    x = state["start"]
+    run = wells.run(state["method"], x, max_iterations=SHOWN)
+    eigenvalues, V = np.linalg.eigh(wells.hessian(x))
+    along = V.T @ wells.gradient(x)
+    shares = -(along / eigenvalues) * V  # columns: the step's part along each direction
+    return {
+        "run": run,
+        "method": state["method"],
+        "eigenvalues": eigenvalues,
+        "directions": V,
+        "shares": np.clip(shares, -20, 20),
+        "climb": float(wells.value(run.x[min(1, run.iterations)]) - wells.value(x)),
+        "end": _end(run),
+        "distance": float(np.linalg.norm(x - wells.extrema()[2].x)),
+    }
+
+
+def _saddle_caption(result):
+    low, high = result["eigenvalues"]
+    sense = "rises" if result["climb"] > 0 else "falls"
+    return (
+        f"{result['distance']:.2f} from S, curvatures {low:.0f} and {high:.0f}. "
+        f"In the first step f {sense} by {abs(result['climb']):.1f}. "
+        f"{_name(result['method'])} ends here: {result['end']}, after {result['run'].iterations} steps."
+    )
+
+
+def saddle():
+    """Drag the start near the saddle: Newton against the trust region, and the Newton step along both curvatures."""
+
+    def scene(fig):
+        ax = fig.subplots()
+        x, y = (-1.6, 1.9), (-1.3, 0.8)
+        grid = _grid(x, y, 101)
+        lowest = np.linalg.eigvalsh(wells.hessian(grid))[..., 0]
+        draw.indefinite(ax, grid[..., 0], grid[..., 1], lowest)
+        _map(ax, x, y)
+        lines = draw.paths(ax, ("newton", "trust_region"))
+        arms = draw.curvature(ax)
+
+        def update(state, result):
+            start, V = state["start"], result["directions"]
+            draw.emphasize(lines, result["method"])
+            for name, drawn in lines.items():
+                drawn.set_data(*(np.clip(result["run"].x, -50, 50).T if name == result["method"] else ([], [])))
+            for arm, direction, value in zip(arms[:2], (V[:, 1], V[:, 0]), result["eigenvalues"][::-1]):
+                arm.set_data(*np.transpose([start - 0.35 * direction, start + 0.35 * direction]))
+                arm.set_linestyle("-" if value > 0 else (0, (4, 2)))
+            first, second = result["shares"].T
+            arms[2].set_data(*np.transpose([start, start + first, start + first + second]))
+
+        return [*lines.values(), *arms], update
+
+    return Stage(
+        "near the saddle",
+        scene=scene,
+        compute=near_saddle,
+        handles={"start": Handle((0.6, 0.2), step=0.02)},
+        controls={"method": Choice({"Newton": "newton", "trust region": "trust_region"}, "newton", label="method")},
+        fail={"start": (0.9, 0.35)},
+        describe=_saddle_caption,
+        size=(7.0, 4.6),
+    )
+
+
+# --- Basins ---
+
+
+@cache
+def basin_map(method):
+    """Where each cell of the square ends: labels, shape (CELLS, CELLS), not to be written into."""
+    labels, _ = wells.destinations(method, _grid(SQUARE, SQUARE, CELLS))
+    labels.setflags(write=False)
+    return labels
+
+
+def covered_at_first(state):
+    """Everything covered, or nothing."""
+    return np.full((CELLS, CELLS), not state["all"])
+
+
+def rub(state, event):
+    """Uncover the cells within the brush's radius of its last places and of the straight ways between them."""
+    covered, places = state["memory"].copy(), state["brush"][-60:]
+    ways = [np.linspace(a, b, 2 + int(4 * np.abs(b - a).max() / BRUSH)) for a, b in zip(places, places[1:])]
+    cells = np.linspace(*SQUARE, CELLS)
+    for x, y in np.concatenate([places, *ways]):
+        columns, rows = (slice(*np.searchsorted(cells, (at - BRUSH, at + BRUSH))) for at in (x, y))
+        inside = (cells[None, columns] - x) ** 2 + (cells[rows, None] - y) ** 2 <= BRUSH**2
+        covered[rows, columns] &= ~inside
+    return covered
+
+
+def basin_view(state):
+    """Labels of the chosen method, what is still covered, the shares of what is free, and the path from the handle."""
+    labels, covered = basin_map(state["method"]), state["memory"] & (not state["all"])
+    free = labels[~covered]
+    run = wells.run(state["method"], state["start"], max_iterations=SHOWN)
+    shares = np.bincount(free, minlength=4) / max(free.size, 1)
+    return {"labels": labels, "covered": covered, "shares": shares, "run": run, "method": state["method"]}
+
+
+def _basin_caption(result):
+    if result["covered"].all():
+        return "Nothing is uncovered yet: rub over the square."
+    shares = ", ".join(f"{name} {100 * share:.1f} %" for name, share in zip(wells.NAMES, result["shares"]))
+    free = 100 * (1 - result["covered"].mean())
+    return f"{_name(result['method'])}, {free:.0f} % uncovered, of that: {shares}."
+
+
+def basins():
+    """Rub the square free: the color of a place is where a run from there ends. The handle shows one run."""
+
+    def scene(fig):
+        ax = fig.subplots()
+        _map(ax, SQUARE, SQUARE)
+        names = [*ax.lines, *ax.texts]  # drawn anew over the colors
+        half = (SQUARE[1] - SQUARE[0]) / (CELLS - 1) / 2
+        image, fill = draw.basins(ax, np.linspace(SQUARE[0] - half, SQUARE[1] + half, CELLS + 1))
+        ax.set(xlim=SQUARE, ylim=SQUARE)
+        (path,) = ax.plot([], [], color=style.INK, linewidth=1.4, marker="o", markersize=3.5, zorder=5)
+
+        def update(state, result):
+            fill(draw.basin_colors(result["labels"], result["covered"]))
+            path.set_data(*np.clip(result["run"].x, -50, 50).T)
+
+        return [image, *names, path], update
+
+    return Stage(
+        "basins of attraction",
+        scene=scene,
+        compute=basin_view,
+        handles={"start": Handle((2.0, -2.0), step=0.1)},
+        controls={
+            "method": Choice(METHODS, "newton", label="method"),
+            "all": Toggle(False, label="uncover everything"),
+        },
+        brush=True,
+        start=covered_at_first,
+        advance=rub,
+        fail={"method": "gauss_newton", "all": True, "start": (4.0, 4.0)},
+        describe=_basin_caption,
+        size=(7.0, 5.0),
+    )

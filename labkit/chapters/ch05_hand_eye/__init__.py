@@ -1,0 +1,1 @@
+"""Chapter 5: a line scanner on a robot."""

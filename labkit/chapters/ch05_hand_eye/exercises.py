@@ -1,0 +1,922 @@
+"""Chapter 5: hand-eye calibration of a line scanner, from one scan line to 31 audited poses."""
+
+import functools
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ...calibration import hand_eye, sphere
+from ...calibration.literature import field_problem
+from ...documents import misprints
+from ...documents.thesis import printed as thesis
+from ...estimation.differences import numeric_jacobian
+from ...exercises import metrics
+from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...geometry import frames, lie
+from ...geometry.chaining import orthonormality_error
+from ...geometry.lie import exp_so3, skew
+
+SUBSTITUTES = {("C14", 12, "A_deg"): ("C14", 12, "C_deg")}  # only A - C counts there: either answer is right
+
+
+# --- draws -----------------------------------------------------------------------------------------------------------
+
+
+def random_rotation(rng, angle=1.0):
+    axis = frames.unit_vector(rng.normal(size=3))
+    return exp_so3(angle * rng.uniform(0.3, 1.0) * axis)
+
+
+def random_scanner(rng):
+    return frames.pose(random_rotation(rng, 2.5), rng.uniform(-150, 150, 3))
+
+
+def scene(rng, n=8, std=0.0):
+    """Scanner, robot poses, sphere centers and target of a small calibration."""
+    T_FS, target = random_scanner(rng), rng.uniform(-900, 900, 3)
+    R = exp_so3(rng.uniform(-1.2, 1.2, (n, 3)))
+    x_S = np.column_stack([rng.uniform(-25, 25, n), rng.uniform(-20, 20, n), rng.uniform(190, 290, n)])
+    T_BF = frames.pose(R, target - (R @ frames.transform(T_FS, x_S)[..., None])[..., 0])
+    return T_FS, T_BF, x_S + std * rng.normal(size=(n, 3)), target
+
+
+def noisy_scene(rng):
+    """Poses and noisy centers whose linear equations give nine numbers that are visibly no rotation."""
+    while True:
+        _, T_BF, x_S, _ = scene(rng, n=12, std=0.05)
+        if orthonormality_error(_linear_without_rotation(T_BF, x_S)[0]) > 2e-3:
+            return T_BF, x_S
+
+
+def kuka_scene(rng):
+    """A KUKA pose (mm, rad) somewhat off the true scanner, with poses, centers and target."""
+    T_FS, T_BF, x_S, target = scene(rng)
+    return (
+        frames.kuka_from_matrix(T_FS) + np.append(rng.uniform(-5, 5, 3), rng.uniform(-0.1, 0.1, 3)),
+        T_BF,
+        x_S,
+        target,
+    )
+
+
+def pose_off(rng):
+    """A scanner pose off the truth by some degrees and millimeters."""
+    T_FS, T_BF, x_S, target = scene(rng)
+    return (
+        frames.pose(T_FS[:3, :3] @ random_rotation(rng, 0.15), T_FS[:3, 3] + rng.uniform(-8, 8, 3)),
+        T_BF,
+        x_S,
+        target,
+    )
+
+
+def smooth_function(rng):
+    """A curved function of three variables, a place and a step large enough to tell the schemes apart."""
+    M, c = rng.normal(size=(4, 3)), rng.normal(size=4)
+    return (lambda x: np.sin(M @ x) + c * (x @ x)), rng.normal(size=3), 0.05
+
+
+def arc(rng, std=0.0):
+    """A scan line: points of a circle, 60 to 120 deg of it."""
+    angle = np.linspace(-1, 1, 60) * rng.uniform(0.55, 1.0)
+    r = rng.uniform(20, 30) + std * rng.normal(size=60)
+    return rng.uniform(-20, 20) + r * np.sin(angle), rng.uniform(200, 280) - r * np.cos(angle)
+
+
+def profile(rng):
+    radius, side = 30.0, int(rng.choice([-1, 1]))
+    center = np.array([rng.uniform(4, 20), side * rng.uniform(6, 20), rng.uniform(200, 280)])
+    return *sphere.scan_line(center, radius, rng.uniform(0.6, 1.0), 50), radius, side
+
+
+def increments(rng):
+    """Nine unknowns around a start pose, with the poses and centers they are judged by."""
+    T_FS, T_BF, x_S, target = scene(rng)
+    return np.concatenate([rng.normal(size=3) * 0.2, rng.normal(size=3) * 10, target]), T_FS, T_BF, x_S
+
+
+def residuals_with_outliers(rng):
+    """Residual vectors of 20 poses, four of them gross, and their odd-sized noise."""
+    e = rng.uniform(0.1, 2.0) * rng.normal(size=(21, 3))
+    e[rng.choice(21, 4, replace=False)] *= rng.uniform(5, 40, (4, 1))
+    return (e,)
+
+
+def entries_with_more_slips(rng):
+    """The printed tables with two further slips in good rows: two digits of a length swapped, 9 to 90 mm away."""
+    entries = thesis.printed_entries()
+    for pose in rng.choice(np.array([6, 10, 14, 18, 19, 23, 27]), 2, replace=False):
+        key = "C14", int(pose), str(rng.choice(["x", "y", "z"]))
+        slips = [
+            text
+            for text, slip in misprints.single_slips(entries[key]).items()
+            if slip == "two digits swapped" and 8.5 < abs(float(text) - float(entries[key])) < 95
+        ]
+        if slips:
+            entries[key] = str(rng.choice(slips))
+    return (entries,)
+
+
+# --- wrong variants --------------------------------------------------------------------------------------------------
+
+
+def _residual(T_FS, T_BF, x_S, target):
+    return hand_eye.sphere_residuals(T_BF, x_S, T_FS, target)
+
+
+def _kuka_without_target(p2, T_BF, x_S, target):
+    return _residual(frames.matrix_from_kuka(p2), T_BF, x_S, np.zeros(3))
+
+
+def _kuka_scanner_first(p2, T_BF, x_S, target):
+    return frames.transform(frames.matrix_from_kuka(p2) @ T_BF, x_S) - target
+
+
+def _kuka_inverse(p2, T_BF, x_S, target):
+    return _residual(frames.invert(frames.matrix_from_kuka(p2)), T_BF, x_S, target)
+
+
+def _kuka_flange_inverse(p2, T_BF, x_S, target):
+    return _residual(frames.matrix_from_kuka(p2), frames.invert(T_BF), x_S, target)
+
+
+def _kuka_angles(sequence):
+    """Reads the three angles in another order."""
+
+    def variant(p2, T_BF, x_S, target):
+        T_FS = frames.pose(Rotation.from_euler(sequence, p2[3:]).as_matrix(), p2[:3])
+        return _residual(T_FS, T_BF, x_S, target)
+
+    return variant
+
+
+def _kuka_degrees(p2, T_BF, x_S, target):
+    return _residual(frames.matrix_from_kuka(frames.kuka_from_degrees(p2)), T_BF, x_S, target)
+
+
+def _kuka_directions(p2, T_BF, x_S, target):
+    y = frames.transform(frames.matrix_from_kuka(p2), x_S)
+    return (T_BF[:, :3, :3] @ y[..., None])[..., 0] - target
+
+
+def _forward(function, x, step):
+    return numeric_jacobian(function, x, step, "forward")
+
+
+def _backward(function, x, step):
+    return -numeric_jacobian(lambda y: function(-y), -x, step, "forward")
+
+
+def _central(function, x, step):
+    return numeric_jacobian(function, x, step, "central")
+
+
+def _not_restored(function, x, step):
+    """Forgets to undo a step before the next variable is moved."""
+    here, columns = x.copy(), []
+    for k in range(len(x)):
+        here[k] += step
+        ahead = function(here)
+        here[k] -= 2 * step
+        columns.append((ahead - function(here)) / (2 * step))
+    return np.column_stack(columns)
+
+
+def _jacobian(T_FS, T_BF, x_S, sign=-1.0, arms=None, left=False):
+    R = T_BF[:, :3, :3]
+    arms = x_S if arms is None else arms
+    turn = skew(arms) if left else T_FS[:3, :3] @ skew(arms)
+    return np.concatenate([sign * R @ turn, R], axis=2).reshape(-1, 6)
+
+
+def analytic_jacobian(T_FS, T_BF, x_S):
+    """Reference of the exercise: increments of a pose with the sphere's center held fixed."""
+    return hand_eye.joint_jacobian(T_BF, x_S, T_FS, target_free=False)
+
+
+def _jacobian_without_base(T_FS, T_BF, x_S):
+    J = -(T_FS[:3, :3] @ skew(x_S))
+    return np.concatenate([J, np.tile(np.eye(3), (len(x_S), 1, 1))], axis=2).reshape(-1, 6)
+
+
+def fit_circle(x, z):
+    """Reference of the exercise: center and radius of the geometric circle."""
+    circle = sphere.fit_circle(x, z)
+    return circle.center[0], circle.center[1], circle.radius
+
+
+def _circle(change):
+    def variant(x, z):
+        return change(*fit_circle(x, z))
+
+    return variant
+
+
+def _circle_about_mean(x, z):
+    return x.mean(), z.mean(), np.hypot(x - x.mean(), z - z.mean()).mean()
+
+
+def _circle_through_three(x, z):
+    """Uses the two ends and the middle of the scan line, and no other point."""
+    k = [0, len(x) // 2, -1]
+    p, q, c = np.linalg.solve(np.column_stack([2 * x[k], 2 * z[k], np.ones(3)]), x[k] ** 2 + z[k] ** 2)
+    return p, q, np.sqrt(c + p * p + q * q)
+
+
+def _center(change):
+    def variant(x, z, radius, side):
+        cx, cz, r = fit_circle(x, z)
+        return change(cx, cz, r, radius, side)
+
+    return variant
+
+
+def gauss_newton_on_pose(T_FS, T_BF, x_S, target):
+    """Reference of the exercise: one Gauss-Newton step with an increment on the right of the pose."""
+    step = _step(T_FS, T_BF, x_S, target)
+    return _applied(T_FS, step)
+
+
+def _step(T_FS, T_BF, x_S, target):
+    J = analytic_jacobian(T_FS, T_BF, x_S)
+    return -np.linalg.lstsq(J, _residual(T_FS, T_BF, x_S, target).ravel(), rcond=None)[0]
+
+
+def _applied(T_FS, step):
+    return frames.pose(T_FS[:3, :3] @ exp_so3(step[:3]), T_FS[:3, 3] + step[3:])
+
+
+def _stepped(change):
+    def variant(T_FS, T_BF, x_S, target):
+        return change(T_FS, _step(T_FS, T_BF, x_S, target))
+
+    return variant
+
+
+def _gradient_step(T_FS, T_BF, x_S, target):
+    J = analytic_jacobian(T_FS, T_BF, x_S)
+    return _applied(T_FS, -J.T @ _residual(T_FS, T_BF, x_S, target).ravel() / (J * J).sum())
+
+
+def _iterated(T_FS, T_BF, x_S, target):
+    for _ in range(20):
+        T_FS = gauss_newton_on_pose(T_FS, T_BF, x_S, target)
+    return T_FS
+
+
+def _step_without_target(T_FS, T_BF, x_S, target):
+    return _applied(T_FS, _step(T_FS, T_BF, x_S, np.zeros(3)))
+
+
+def joint_residual(u, T0, T_BF, x_S):
+    """Reference of the exercise: nine unknowns, phi and translation about T0, and the sphere's center."""
+    return _residual(_applied(T0, u[:6]), T_BF, x_S, u[6:]).ravel()
+
+
+def _linear(change):
+    def variant(T_BF, x_S):
+        T_FS, target = hand_eye.linear_start(T_BF, x_S)
+        return change(T_FS, target)
+
+    return variant
+
+
+def _linear_without_rotation(T_BF, x_S):
+    """Leaves the nine entries of R_FS as the linear equations give them."""
+    R_t, n = np.swapaxes(T_BF[:, :3, :3], 1, 2), len(T_BF)
+    rows = np.concatenate(
+        [np.kron(np.eye(3), x_S[:, None, :]).reshape(n, 3, 9), np.tile(np.eye(3), (n, 1, 1)), -R_t], 2
+    )
+    u = np.linalg.lstsq(rows.reshape(-1, 15), -(R_t @ T_BF[:, :3, 3, None]).ravel(), rcond=None)[0]
+    T_FS = np.eye(4)
+    T_FS[:3] = np.column_stack([u[:9].reshape(3, 3), u[9:12]])
+    return T_FS, u[12:]
+
+
+def _linear_without_turning_back(T_BF, x_S):
+    """Writes the equations with R_BF where R_BF' belongs."""
+    R, n = T_BF[:, :3, :3], len(T_BF)
+    D = np.concatenate([np.kron(x_S[:, None], np.eye(3)[None]).reshape(n, 3, 9), np.tile(np.eye(3), (n, 1, 1)), -R], 2)
+    u = np.linalg.lstsq(D.reshape(-1, 15), -(R @ T_BF[:, :3, 3, None]).ravel(), rcond=None)[0]
+    return frames.pose(lie.nearest_rotation(u[:9].reshape(3, 3).T), u[9:12]), u[12:]
+
+
+def _linear_with_unturned_right_side(T_BF, x_S):
+    """Turns the target into F, but not the flange's own position."""
+    R_t, n = np.swapaxes(T_BF[:, :3, :3], 1, 2), len(T_BF)
+    D = np.concatenate([np.kron(np.eye(3), x_S[:, None, :]).reshape(n, 3, 9), np.tile(np.eye(3), (n, 1, 1)), -R_t], 2)
+    u = np.linalg.lstsq(D.reshape(-1, 15), -T_BF[:, :3, 3].ravel(), rcond=None)[0]
+    return frames.pose(lie.nearest_rotation(u[:9].reshape(3, 3)), u[9:12]), u[12:]
+
+
+def robust_weights(residuals):
+    """Reference of the exercise: Tukey weights with the median length as the scale."""
+    lengths = np.linalg.norm(residuals, axis=1)
+    return hand_eye.tukey_weights(lengths, np.median(lengths) / hand_eye.MEDIAN_CHI3)
+
+
+def _weights(change):
+    def variant(residuals):
+        return change(np.linalg.norm(residuals, axis=1))
+
+    return variant
+
+
+def _tukey(u):
+    return np.where(u < 1, (1 - u**2) ** 2, 0)
+
+
+def find_misprints(entries):
+    """Reference of the exercise: the first explanation of every suspicious row."""
+    found = misprints.find(entries)
+    return {(slips[0].table, slips[0].pose, slips[0].column) for slips in found.values() if slips}
+
+
+def _by_plain_least_squares(entries):
+    measured = thesis.measurements_from(entries)
+    fit = hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S)
+    lengths = np.linalg.norm(fit.residuals, axis=1)
+    return _first_slips(entries, fit, np.flatnonzero(lengths > 2 * np.median(lengths)) + 1)
+
+
+def _robust(entries):
+    measured = thesis.measurements_from(entries)
+    return hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S, robust=True)
+
+
+def _first_slips(entries, fit, suspects):
+    named = set()
+    for pose in suspects:
+        slips = misprints.explanations(entries, int(pose), fit.T_FS, fit.target, fit.std)
+        named |= {(slips[0].table, slips[0].pose, slips[0].column)} if slips else {("C14", int(pose), "x")}
+    return named
+
+
+def _too_strict(entries):
+    fit = _robust(entries)
+    return _first_slips(entries, fit, np.flatnonzero(np.linalg.norm(fit.residuals, axis=1) > 2.5 * fit.std) + 1)
+
+
+def _all_explanations(entries):
+    named = {(e.table, e.pose, e.column) for slips in misprints.find(entries).values() for e in slips}
+    return {SUBSTITUTES.get(entry, entry) for entry in named}
+
+
+def _only_the_grossest(entries):
+    found = misprints.find(entries)
+    return {(s[0].table, s[0].pose, s[0].column) for s in found.values() if s and s[0].before > 30}
+
+
+class Count(metrics.Deviation):
+    """How many entries are wrong, in words."""
+
+    def __init__(self, what, count):
+        super().__init__(what, float(count), "", 0.5)
+
+    def __str__(self):
+        words = (
+            self.what
+            if self.amount != 1
+            else self.what.replace("misprints are", "misprint is").replace("entries are", "entry is")
+        )
+        return f"{self.amount:.0f} {words}"
+
+
+class named_entries(metrics.Exactly):
+    """A set of (table, pose, column), where A and C of pose 12 stand for each other."""
+
+    def admit(self, result, expected):
+        if result is None:
+            raise metrics.Refused("it returned None: is a `return` missing?")
+        try:
+            found = {(str(table), int(pose), str(column)) for table, pose, column in result}
+        except (TypeError, ValueError):
+            raise metrics.Refused('expected a set of (table, pose, column) such as ("C14", 3, "x")') from None
+        return {SUBSTITUTES.get(entry, entry) for entry in found}
+
+    def deviations(self, result, expected):
+        missed, accused = len(expected - result), len(result - expected)
+        return [Count("misprints are not named yet", missed), Count("entries are accused wrongly", accused)]
+
+
+# --- designing poses -------------------------------------------------------------------------------------------------
+
+
+@functools.cache
+def corrected_fit():
+    measured = thesis.measurements(True)
+    return hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S)
+
+
+def predicted_stds(T_BF):
+    """Predicted standard deviations of the scanner's rotation (deg) and translation (mm) under these poses."""
+    fit = corrected_fit()
+    cov = hand_eye.predicted_covariance(T_BF, fit.T_FS, fit.target, fit.std)
+    return float(np.rad2deg(np.sqrt(np.trace(cov[:3, :3])))), float(np.sqrt(np.trace(cov[3:6, 3:6])))
+
+
+def design_poses(T_FS, target, rng):
+    """Reference of the exercise: the sphere all over the scanner's field, the flange tilted about all axes."""
+    x_S = np.column_stack(
+        [rng.uniform(-25, 25, 31), rng.uniform(3, 25, 31) * rng.choice([-1, 1], 31), rng.uniform(190, 290, 31)]
+    )
+    down = np.diag([1.0, -1.0, -1.0]) @ T_FS[:3, :3].T
+    tilt = np.column_stack([rng.uniform(-0.8, 0.8, (31, 2)), rng.uniform(-3, 3, 31)])
+    return hand_eye.poses_that_see(T_FS, target, exp_so3(tilt) @ down, x_S)
+
+
+def design_is_good(student, rng):
+    """What the poses of the exercise must fulfil; a sentence when they do not."""
+    fit = corrected_fit()
+    T_BF = np.asarray(student(fit.T_FS, fit.target, np.random.default_rng(int(rng.integers(1 << 30)))), dtype=float)
+    if T_BF.shape != (31, 4, 4):
+        return f"31 poses are wanted, shape (31, 4, 4); got {T_BF.shape}."
+    try:
+        x_S = frames.transform(frames.invert(fit.T_FS), frames.transform(frames.invert(T_BF), fit.target))
+    except ValueError as refusal:
+        return f"{refusal}."
+    problem = field_problem(x_S)
+    if problem:
+        return problem
+    down = T_BF[:, :3, :3] @ fit.T_FS[:3, 2]
+    steepest = np.rad2deg(np.arccos(np.clip(-down[:, 2], -1, 1))).max()
+    if steepest > 91:
+        return f"one pose looks up at the sphere, {steepest:.0f} deg from straight down: the table is in the way (90 at most)."
+    try:
+        hand_eye.calibrate_sphere_target(T_BF, x_S)
+    except ValueError as refusal:  # a motion is missing: it says which
+        return f"{refusal}."
+    (turn, shift), (printed_turn, printed_shift) = predicted_stds(T_BF), predicted_stds(thesis.measurements(True).T_BF)
+    if not turn < 0.7 * printed_turn:
+        return f"the rotation would be known to {turn:.2g} deg; the thesis's pattern gives {printed_turn:.2g}, and 0.7 of that is asked for."
+    if not shift < printed_shift:
+        return f"the rotation is better known, but the translation only to {shift:.2g} mm; the thesis's pattern gives {printed_shift:.2g}. Tilt the flange more, about more than one axis."
+    return None
+
+
+# --- values ----------------------------------------------------------------------------------------------------------
+
+
+def _rms_of_end_pose(*fixed):
+    measured = thesis.measurements(fixed)
+    residuals = _residual(thesis.frame("scanner_end"), measured.T_BF, measured.x_S, thesis.printed_target())
+    return float(hand_eye.rms_distance(residuals))
+
+
+def _lengths_of_end_pose():
+    measured = thesis.measurements((2,))
+    residuals = _residual(thesis.frame("scanner_end"), measured.T_BF, measured.x_S, thesis.printed_target())
+    return np.linalg.norm(residuals, axis=1)
+
+
+def _rms_with_printed_target():
+    measured = thesis.measurements(True)
+    return hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S, target=thesis.printed_target()).rms
+
+
+def _per_axis(value):
+    return value / np.sqrt(3)
+
+
+def _joint_rms(*fixed):
+    measured = thesis.measurements(fixed)
+    return hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S).rms
+
+
+GROWS_BEYOND = (
+    "Below u = 1 the weight is (1 - u^2)^2, beyond it 0. Yours grows there, and the worst poses get the most say."
+)
+ALL_FIXED = (2, 3, 4, 7, 12, 21, 30)
+
+CHAPTER = Chapter(
+    "05-hand-eye",
+    title="Hand-eye calibration on 31 real poses",
+    items=[
+        Exercise(
+            "fit_circle",
+            reference=fit_circle,
+            draw=arc,
+            metric=metrics.Several(metrics.Numbers(1e-6, "mm"), metrics.Numbers(1e-6, "mm"), metrics.Numbers(1e-6, "mm"),
+                                   names=("center x", "center z", "radius")),
+            noisy=3 * ((lambda rng: arc(rng, 0.02), metrics.Several(
+                metrics.Numbers(2e-3, "mm"), metrics.Numbers(1e-4, "mm"), metrics.Numbers(1e-3, "mm"),
+                names=("center x", "center z", "radius"))),),
+            hints=(
+                "A circle is linear in the right unknowns: multiply (x - xc)^2 + (z - zc)^2 = r^2 out.",
+                "x^2 + z^2 + a1 x + a2 z + a3 = 0 with a1 = -2 xc, a2 = -2 zc, a3 = xc^2 + zc^2 - r^2: one equation a point.",
+                "a = np.linalg.lstsq(np.column_stack([x, z, np.ones(len(x))]), -(x**2 + z**2), rcond=None)[0]; return -a[0]/2, -a[1]/2, np.sqrt(a[0]**2/4 + a[1]**2/4 - a[2]).",
+            ),
+            mistakes=[
+                Mistake(_circle(lambda x, z, r: (-x, -z, r)), "Your center has the opposite sign: a1 = -2 xc, so xc = -a1/2."),
+                Mistake(_circle(lambda x, z, r: (-2 * x, -2 * z, r)), "You return a1 and a2 themselves. The center is -a1/2, -a2/2."),
+                Mistake(_circle(lambda x, z, r: (-2 * x, -2 * z, x * x + z * z - r * r)),
+                        "You return a1, a2 and a3 themselves. The center is -a1/2, -a2/2; the radius follows from a3."),
+                Mistake(_circle(lambda x, z, r: (x, z, np.sqrt(3 * x * x + 3 * z * z + r * r))),
+                        "a1 and a2 entered the radius whole. They are -2 xc and -2 zc: halve them before you square."),
+                Mistake(_circle(lambda x, z, r: (x, z, np.sqrt(x * x + z * z - r * r))),
+                        "Your radius is the root of a3 alone, but a3 = xc^2 + zc^2 - r^2: solve for r."),
+                Mistake(_circle_through_three, "Three points make a circle, with all their noise in it. Let every point of the scan line count."),
+                Mistake(_circle(lambda x, z, r: (x, z, r * r)), "Your third number is the squared radius: a root is missing."),
+                Mistake(_circle(lambda x, z, r: (x, z, np.sqrt(max(2 * x * x + 2 * z * z - r * r, 0)))),
+                        "a3 entered the radius with the wrong sign: r^2 = xc^2 + zc^2 - a3."),
+                Mistake(_circle_about_mean, "You took the mean of the points for the center. An arc lies on one side of its center."),
+                Mistake(_circle(lambda x, z, r: (z, x, r)), "The two coordinates of the center have changed places."),
+            ],
+        ),
+        Prediction(
+            "equator",
+            question="The scan plane may cut the sphere anywhere. Where does the profile tell least about how far away the center is?",
+            choices=("through the center", "halfway out", "near the edge"),
+            answer="through the center",
+            why="There the circle is largest and hardly changes when the plane moves: dd/dr = -r/d, and d is 0. Near the edge the arc gets short instead.",
+        ),
+        Exercise(
+            "sphere_center_from_profile",
+            reference=sphere.sphere_center_from_profile,
+            draw=profile,
+            draws=10,  # both sides must occur
+            metric=metrics.Numbers(1e-6, "mm"),
+            hints=(
+                "The scan line gives a circle in the plane y = 0; the center of the sphere lies straight before or behind its center.",
+                "Pythagoras: R^2 = r^2 + d^2, and side says whether y is +d or -d.",
+                "xc, zc, r = fit_circle(x, z); return np.array([xc, side * np.sqrt(radius**2 - r**2), zc]).",
+            ),
+            mistakes=[
+                Mistake(_center(lambda x, z, r, R, s: np.array([x, -s * np.sqrt(R * R - r * r), z])),
+                        "The sign of y is reversed: side = +1 means a positive y."),
+                Mistake(_center(lambda x, z, r, R, s: np.array([x, z, s * np.sqrt(R * R - r * r)])),
+                        "The offset belongs into y, the second coordinate; the third is z, the distance."),
+                Mistake(_center(lambda x, z, r, R, s: np.array([x, s * np.sqrt(R * R + r * r), z])),
+                        "R is the hypotenuse: d^2 = R^2 - r^2, with a minus."),
+                Mistake(_center(lambda x, z, r, R, s: np.array([x, s * (R - r), z])), "You took R - r for the distance from the plane: the three form a right triangle."),
+                Mistake(_center(lambda x, z, r, R, s: np.array([x, np.sqrt(R * R - r * r), z])),
+                        "You always take the positive root, but the center may lie on either side: multiply by side."),
+                Mistake(_center(lambda x, z, r, R, s: np.array([x, -np.sqrt(R * R - r * r), z])),
+                        "You always take the minus sign, as listing C16 does: multiply by side instead."),
+                Mistake(_center(lambda x, z, r, R, s: np.array([x, s * (R * R - r * r), z])),
+                        "This is the square of the offset: take the root of R^2 - r^2."),
+                Mistake(_center(lambda x, z, r, R, s: np.array([x, s * R, z])),
+                        "You went a whole radius of the sphere aside. The offset is d = sqrt(R^2 - r^2)."),
+                Mistake(_center(lambda x, z, r, R, s: np.array([x, s * r, z])),
+                        "You went the circle's radius aside. The offset is d = sqrt(R^2 - r^2)."),
+                Mistake(lambda x, z, R, s: np.array([x.mean(), s * np.sqrt(R * R - fit_circle(x, z)[2] ** 2), z.mean()]),
+                        "x and z are the mean of the points, but an arc lies on one side of its center. Take the circle's center."),
+                Mistake(_center(lambda x, z, r, R, s: np.array([x, 0.0, z])),
+                        "This is the center of the circle. The sphere's center lies off the plane by d."),
+                Mistake(_center(lambda x, z, r, R, s: np.array([x, s * np.sqrt(R * R - r * r), z + R])),
+                        "You went a radius deeper. The circle's center is already as deep as the sphere's."),
+            ],
+        ),
+        Exercise(
+            "kuka_residual",
+            reference=lambda p2, T_BF, x_S, target: _residual(frames.matrix_from_kuka(p2), T_BF, x_S, target),
+            draw=kuka_scene,
+            metric=metrics.Numbers(1e-9, "mm"),
+            hints=(
+                "Follow the point from the scanner outward: which transform comes first?",
+                "T_BF T_FS x_S - target, with T_FS = matrix_from_kuka(p2). `frames.transform` takes stacks of poses.",
+                "return frames.transform(T_BF, frames.transform(frames.matrix_from_kuka(p2), x_S)) - target.",
+            ),
+            mistakes=[
+                Mistake(lambda p2, T, x, c: -_residual(frames.matrix_from_kuka(p2), T, x, c),
+                        "The sign is reversed: (4-3) subtracts the target from the measured side."),
+                Mistake(lambda p2, T, x, c: _residual(frames.matrix_from_kuka(p2), T, x, -c), "The target is to be subtracted; yours is added."),
+                Mistake(lambda p2, T, x, c: frames.transform(T, x) - c, "T_FS is missing: x_S is still in the scanner's frame when T_BF meets it."),
+                Mistake(_kuka_flange_inverse, "You used the inverse of T_BF: it maps F to B, as it stands."),
+                Mistake(_kuka_angles("XYZ"), "You turned by A about x and by C about z. KUKA: A about z, then B about y, then C about x."),
+                Mistake(_kuka_angles("zyx"), "You turned about fixed axes. A, B, C turn about axes that move along: Rz(A) Ry(B) Rx(C)."),
+                Mistake(_kuka_without_target, "The target is missing: these are positions of the sphere in the base, not residuals."),
+                Mistake(_kuka_scanner_first, "The order is T_FS T_BF: the letters do not cancel. From S to F, then from F to B: T_BF T_FS."),
+                Mistake(_kuka_inverse, "You used the inverse of T_FS: p2 is the scanner in the flange frame, it maps S to F."),
+                Mistake(_kuka_degrees, "You converted the angles from degrees, but p2 holds radians here."),
+                Mistake(lambda p2, T, x, c: _residual(frames.matrix_from_kuka(np.deg2rad(p2)), T, x, c),
+                        "You converted all of p2 from degrees, but it holds millimeters and radians."),
+                Mistake(_kuka_directions, "The flange's own position is missing: use the whole T_BF, not its rotation alone."),
+            ],
+        ),
+        Prediction(
+            "thirty_one",
+            question="At its one validated pose the thesis is off by 0.7 mm. What is the rms over all 31 (with one digit of pose 2 put right)?",
+            choices=("about 0.7 mm", "about 3 mm", "about 12 mm"),
+            answer="about 12 mm",
+            why="The validated pose is the best of the 31. Two poses stand 36 and 43 mm away, and most others 2 to 9.",
+        ),
+        Value(
+            "rms_before",
+            reference=lambda: _rms_of_end_pose(2),
+            unit="mm",
+            rtol=2e-3,
+            hints=(
+                "The residuals of all 31 poses under the thesis's end pose and its printed sphere center.",
+                "rms distance: the root of the mean of the squared lengths, one length a pose.",
+                "np.sqrt((e**2).sum(axis=1).mean()) with e = kuka_residual(p2_end, repaired.T_BF, repaired.x_S, target).",
+            ),
+            mistakes=[
+                Mistake(lambda: _per_axis(_rms_of_end_pose(2)), "This is the rms of one coordinate, sqrt(3) smaller. Sum the squares of a pose first."),
+                Mistake(_rms_of_end_pose, "This includes the 2237 mm of pose 2. Use the measurements with that one entry repaired."),
+                Mistake(lambda: _rms_of_end_pose(*ALL_FIXED), "This uses all corrections. At this point only pose 2 is repaired."),
+                Mistake(lambda: float(_lengths_of_end_pose().mean()), "This is the mean length: square before you take the mean, then take the root."),
+                Mistake(lambda: float(np.median(_lengths_of_end_pose())), "This is the median length. Asked for is the rms, in which the worst poses count."),
+                Mistake(lambda: _rms_of_end_pose(2) ** 2, "This is the mean square: take its root."),
+                Mistake(lambda: np.sqrt(31) * _rms_of_end_pose(2), "This is the root of the sum: divide by the number of poses first."),
+            ],
+        ),
+        Exercise(
+            "numeric_jacobian",
+            reference=_central,
+            draw=smooth_function,
+            metric=metrics.Numbers(1e-9),
+            hints=(
+                "Move one variable at a time, and look at the function ahead and behind.",
+                "Column k is (f(x + h e_k) - f(x - h e_k)) / (2 h), with e_k the k-th unit vector.",
+                "`return np.column_stack([(function(x + h) - function(x - h)) / (2 * step) for h in step * np.eye(len(x))])`",
+            ),
+            mistakes=[
+                Mistake(_forward, "This is the forward difference of listing C4, off by h f''/2. Take the step in both directions."),
+                Mistake(_backward, "This is the backward difference. Take the step in both directions."),
+                Mistake(lambda f, x, h: _central(f, x, h) * h * h, "`/ 2 * step` divides by 2 and then multiplies by the step: write / (2 * step)."),
+                Mistake(lambda f, x, h: _central(f, x, 1e-6), "You chose a step of your own. Use the argument `step`: the figure below varies it."),
+                Mistake(lambda f, x, h: (f(x + h) - f(x - h)) / (2 * h), "You moved all variables at once. Move one at a time: one column each."),
+                Mistake(lambda f, x, h: -_central(f, x, h),
+                        "The sign is reversed: what is ahead minus what is behind."),
+                Mistake(lambda f, x, h: 2 * _central(f, x, h), "Between ahead and behind lie two steps: divide by 2 h."),
+                Mistake(lambda f, x, h: _central(f, x, h) * 2 * h, "You have not divided by the distance 2 h yet."),
+                Mistake(lambda f, x, h: _central(f, x, h).T, "Your matrix is the transpose: one row a function value, one column a variable."),
+                Mistake(lambda f, x, h: _central(f, x, h / 2),
+                        "You go half a step to each side. That is a central difference too, but of step / 2; here each side takes a whole step."),
+                Mistake(_not_restored, "After a variable has been moved it must go back before the next one moves: work on a fresh copy of x."),
+            ],
+        ),
+        Prediction(
+            "step",
+            question="With which step is a central difference by the angle A most accurate here?",
+            choices=("near 0.0000001 deg", "near 0.001 deg", "near 1 deg"),
+            answer="near 0.001 deg",
+            why="Rounding grows as 1/h, curvature as h^2: they meet near the cube root of the machine's precision. The listing's step is too small.",
+        ),
+        Exercise(
+            "analytic_jacobian",
+            reference=analytic_jacobian,
+            draw=lambda rng: pose_off(rng)[:3],
+            metric=metrics.Numbers(1e-9),
+            hints=(
+                "Insert T_FS exp(phi) into the residual and keep what is linear in phi and in the translation.",
+                "R_BF R_FS exp(phi) x = R_BF R_FS (x + phi x x) = ... - R_BF R_FS [x] phi; the translation enters through R_BF alone.",
+                "R_BF, R_FS = T_BF[:, :3, :3], T_FS[:3, :3]; return np.concatenate([-R_BF @ R_FS @ skew(x_S), R_BF], axis=2).reshape(-1, 6).",
+            ),
+            mistakes=[
+                Mistake(functools.partial(_jacobian, sign=1.0), "The first three columns have the wrong sign: phi x x = -[x] phi."),
+                Mistake(lambda T, B, x: _jacobian(T, B, frames.transform(T, x), left=True),
+                        "Your arm is T_FS x_S: the rotation would turn about the flange's origin, translation included. Only x_S itself is turned."),
+                Mistake(lambda T, B, x: _jacobian(T, B, x @ T[:3, :3].T, left=True),
+                        "You turned about the axes of F, exp(phi) R_FS. Here the increment stands on the right, R_FS exp(phi)."),
+                Mistake(_jacobian_without_base, "R_BF is missing: the residual is written in the base."),
+                Mistake(lambda T, B, x: analytic_jacobian(T, B, x)[:, [3, 4, 5, 0, 1, 2]],
+                        "The blocks have changed places: rotation first, then translation."),
+                Mistake(lambda T, B, x: np.hstack([analytic_jacobian(T, B, x)[:, :3], (B[:, :3, :3] @ T[:3, :3]).reshape(-1, 3)]),
+                        "Your translation columns hold R_BF R_FS, but tau is added to t_FS, which is written in F: R_BF alone."),
+                Mistake(lambda T, B, x: _jacobian(T, B, x, left=True), "R_FS is missing between R_BF and [x]."),
+                Mistake(lambda T, B, x: np.hstack([analytic_jacobian(T, B, x)[:, :3], np.tile(np.eye(3), (len(x), 1))]),
+                        "tau is a change in F, the residual is in B: its columns are R_BF, not I."),
+                Mistake(lambda T, B, x: _jacobian(T, np.swapaxes(B, 1, 2), x), "Your R_BF is the transpose: the residual is written in B, so F is turned into B."),
+                Mistake(lambda T, B, x: _jacobian(T.T, B, x), "Your R_FS is the transpose: x_S is turned from S into F."),
+                Mistake(lambda T, B, x: np.concatenate([-T[:3, :3] @ B[:, :3, :3] @ skew(x), B[:, :3, :3]], axis=2).reshape(-1, 6),
+                        "R_FS and R_BF have changed places. From S to F comes first: R_BF R_FS [x]."),
+                Mistake(lambda T, B, x: np.concatenate([-B[:, :3, :3] @ T[:3, :3] @ skew(x), B[:, :3, :3]], axis=1).reshape(-1, 6),
+                        "The two blocks of a pose belong side by side: axis=2, or np.hstack for one pose."),
+            ],
+        ),
+        Exercise(
+            "gauss_newton_on_pose",
+            reference=gauss_newton_on_pose,
+            draw=pose_off,
+            metric=metrics.Poses(1e-6, 1e-6),
+            hints=(
+                "Solve the linearized problem for the step, then move the pose by it.",
+                "step = argmin |J step + e|; the first three entries are a rotation vector on the right of R_FS, the last three a translation.",
+                "J = analytic_jacobian(T_FS, T_BF, x_S); e = frames.transform(T_BF, frames.transform(T_FS, x_S)) - target; step = np.linalg.lstsq(J, -e.ravel(), rcond=None)[0]; "
+                "return frames.pose(T_FS[:3, :3] @ exp_so3(step[:3]), T_FS[:3, 3] + step[3:]).",
+            ),
+            mistakes=[
+                Mistake(_iterated, "You iterated to the end. Asked for is one step."),
+                Mistake(_step_without_target, "The target is missing from your residual: the step leads to the base's origin."),
+                Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3] @ exp_so3(s[3:]), T[:3, 3] + s[:3])),
+                        "Rotation and translation have changed places: the first three entries of the step are phi."),
+                Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3] @ Rotation.from_euler("xyz", s[:3]).as_matrix(), T[:3, 3] + s[3:])),
+                        "phi is one rotation vector, not three angles to turn by in turn: use exp_so3."),
+
+                Mistake(_stepped(lambda T, s: _applied(T, -s)), "You stepped uphill: the step solves J step = -e."),
+                Mistake(_stepped(lambda T, s: frames.pose(exp_so3(s[:3]) @ T[:3, :3], T[:3, 3] + s[3:])),
+                        "The turn exp(phi) stands on the left. Your Jacobian turns about the scanner's axes, so it belongs on the right of R_FS."),
+                Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3] @ lie.nearest_rotation(np.eye(3) + skew(s[:3])), T[:3, 3] + s[3:])),
+                        "The nearest rotation to I + [phi] would arrive too, but it turns by atan |phi|, not |phi|. Asked for is exp_so3."),
+                Mistake(_stepped(lambda T, s: np.block([[T[:3, :3] @ (np.eye(3) + skew(s[:3])), (T[:3, 3] + s[3:])[:, None]], [0, 0, 0, 1]])),
+                        "I + [phi] is only nearly a rotation. Use exp_so3, or the error grows with every step."),
+                Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3], T[:3, 3] + s[3:])), "The rotation has not been moved."),
+                Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3] @ exp_so3(s[:3]), T[:3, 3])), "The translation has not been moved."),
+                Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3] @ exp_so3(s[:3]), T[:3, 3] + T[:3, :3] @ s[3:])),
+                        "Your translation step is turned by R_FS; in this Jacobian it is already written in F."),
+                Mistake(_gradient_step, "You went along the gradient. Gauss-Newton solves with J'J as well."),
+            ],
+        ),
+        Prediction(
+            "pole",
+            question="The scanner sits next to B = -90 deg. What do Gauss-Newton steps in A, B, C do that steps on the pose do not?",
+            choices=("they never arrive", "they take detours", "nothing"),
+            answer="they take detours",
+            why="Near the pole A and C turn about one line: their steps become huge and nearly cancel. The pose often arrives all the same, after two or three times the steps.",
+        ),
+        Exercise(
+            "linear_start",
+            reference=hand_eye.linear_start,
+            draw=lambda rng: scene(rng, n=9)[1:3],
+            metric=metrics.Several(metrics.Poses(1e-5, 1e-4), metrics.Numbers(1e-7, "mm"), names=("T_FS", "target")),
+            noisy=(noisy_scene,  # t_FS solved anew, or a refined answer, is right as well
+                   metrics.Several(metrics.Poses(0.5, 2.5), metrics.Numbers(2e-3, "mm"), names=("T_FS", "target")),
+                   "exact on clean data, but on noisy data"),
+            hints=(
+                "Forget for a moment that R_FS is a rotation: then all unknowns enter linearly.",
+                "R_FS x + t_FS - R_BF' target = -R_BF' t_BF. Fifteen unknowns: nine of R_FS, three of t_FS, three of the target.",
+                "`A = np.vstack([np.hstack([np.kron(np.eye(3), x), np.eye(3), -T[:3, :3].T]) for T, x in zip(T_BF, x_S)])`, "
+                "`b = np.concatenate([-T[:3, :3].T @ T[:3, 3] for T in T_BF])`, `u = np.linalg.lstsq(A, b, rcond=None)[0]`, "
+                "`return frames.pose(nearest_rotation(u[:9].reshape(3, 3)), u[9:12]), u[12:]`",
+            ),
+            mistakes=[
+                Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3].T, T[:3, 3]), c)),
+                        "Your rotation is the transpose: the nine unknowns came back in the other order (rows and columns)."),
+                Mistake(_linear(lambda T, c: (T, -c)), "The target has the wrong sign: it stands on the other side of the equation, with -R_BF'."),
+                Mistake(_linear_without_rotation, "On noisy data your nine numbers are not a rotation: take the nearest one."),
+                Mistake(_linear(lambda T, c: (frames.invert(T), c)), "Your pose is the inverse, T_SF."),
+                Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3], -T[:3, 3]), c)), "The translation of T_FS has the wrong sign."),
+                Mistake(_linear_with_unturned_right_side, "Your right side is -t_BF. It is to be turned into the flange frame as well: -R_BF' t_BF."),
+                Mistake(_linear_without_turning_back, "You multiplied by R_BF where R_BF' is needed: bring everything into the flange frame."),
+            ],
+        ),
+        Exercise(
+            "joint_residual",
+            reference=joint_residual,
+            draw=increments,
+            metric=metrics.Numbers(1e-9, "mm"),
+            hints=(
+                "Six of the nine unknowns move the scanner, three are the sphere's center itself.",
+                "T_FS = (R0 exp(phi), t0 + dt) with phi = u[:3], dt = u[3:6]; the center is u[6:].",
+                "T_FS = frames.pose(T0[:3, :3] @ exp_so3(u[:3]), T0[:3, 3] + u[3:6]); return (frames.transform(T_BF, frames.transform(T_FS, x_S)) - u[6:]).ravel().",
+            ),
+            mistakes=[
+                Mistake(lambda u, T, B, x: _residual(frames.pose(exp_so3(u[:3]) @ T[:3, :3], T[:3, 3] + u[3:6]), B, x, u[6:]).ravel(),
+                        "The turn exp(phi) belongs on the right of R0."),
+                Mistake(lambda u, T, B, x: _residual(frames.pose(T[:3, :3] @ exp_so3(u[:3]), u[3:6]), B, x, u[6:]).ravel(),
+                        "The change of translation u[3:6] is to be added to the translation of T0."),
+                Mistake(lambda u, T, B, x: _residual(frames.pose(T[:3, :3] @ exp_so3(u[:3]), T[:3, 3] + T[:3, :3] @ u[3:6]), B, x, u[6:]).ravel(),
+                        "Your change of translation is turned by R0. It is written in F, so add it as it is."),
+                Mistake(lambda u, T, B, x: _residual(_applied(T, u[:6]), B, x, -u[6:]).ravel(), "The center is subtracted, yours is added."),
+                Mistake(lambda u, T, B, x: _residual(_applied(T, u[:6]), B, x, np.zeros(3)).ravel(), "The center u[6:] is missing."),
+                Mistake(lambda u, T, B, x: _residual(frames.pose(T[:3, :3] @ exp_so3(u[3:6]), T[:3, 3] + u[:3]), B, x, u[6:]).ravel(),
+                        "Rotation and translation have changed places: phi comes first."),
+                Mistake(lambda u, T, B, x: _residual(T, B, x, u[6:]).ravel(), "T0 has not been moved by u[:6]."),
+                Mistake(lambda u, T, B, x: _residual(frames.pose(exp_so3(u[:3]), u[3:6]), B, x, u[6:]).ravel(),
+                        "T0 is missing: u[:6] is a change of T0, not a pose of its own."),
+                Mistake(lambda u, T, B, x: _residual(frames.pose(exp_so3(u[:3]), u[3:6]) @ T, B, x, u[6:]).ravel(),
+                        "You moved T0 from the left as a whole. Turn it on the right, R0 exp(phi), and add the change of translation."),
+                Mistake(lambda u, T, B, x: frames.transform(B, x @ (T[:3, :3] @ (np.eye(3) + skew(u[:3]))).T + T[:3, 3] + u[3:6]).ravel() - np.tile(u[6:], len(x)),
+                        "I + [phi] is only nearly a rotation, and phi need not be small: use exp_so3."),
+                Mistake(lambda u, T, B, x: hand_eye.kuka_residuals(u[:6], B, x, u[6:]).ravel(),
+                        "You read u[:6] as a KUKA pose. It is a rotation vector and a change of translation about T0."),
+                Mistake(lambda u, T, B, x: _residual(_applied(T, u[:6]), B, x, u[6:]).T.ravel(), "The order is all x, all y, all z; wanted is x, y, z of pose 1, then of pose 2, ..."),
+                Mistake(lambda u, T, B, x: _residual(_applied(T, u[:6]), B, x, u[6:]), "The residuals are right; stack them into one vector of 3 N numbers."),
+            ],
+        ),
+        Exercise(
+            "robust_weights",
+            reference=robust_weights,
+            draw=residuals_with_outliers,
+            metric=metrics.Numbers(1e-3),  # the printed 1.538 is good enough
+            hints=(
+                "First a scale that outliers cannot spoil, then a weight that falls to zero.",
+                "std = median length / 1.538; u = length / (5 std); the weight is (1 - u^2)^2 below u = 1 and 0 above.",
+                "`r = np.linalg.norm(residuals, axis=1); u = r / (5 * np.median(r) / hand_eye.MEDIAN_CHI3); return np.where(u < 1, (1 - u**2)**2, 0)`",
+            ),
+            mistakes=[
+                Mistake(_weights(lambda r: _tukey(r / (5 * np.sqrt((r**2).mean() / 3)))), "Your scale is the rms: the outliers themselves stretch it. Take the median."),
+                Mistake(_weights(lambda r: _tukey(r / (5 * np.mean(r) / hand_eye.MEDIAN_CHI3))), "Your scale is the mean length: the outliers stretch it. Take the median."),
+                Mistake(lambda e: _tukey(np.linalg.norm(e, axis=1) / (5 * np.std(e))), "Your scale is the standard deviation of the entries: the outliers stretch it. Take the median length."),
+                Mistake(lambda e: _tukey(np.linalg.norm(e, axis=1) / (5 * np.median(np.abs(e)) / hand_eye.MEDIAN_CHI3)),
+                        "You took the median of all entries. Take the median of the lengths, one a pose."),
+                Mistake(_weights(lambda r: _tukey(r / 5 * np.median(r) / hand_eye.MEDIAN_CHI3)), "`/ 5 * s` divides by 5 and multiplies by s: write / (5 * s)."),
+                Mistake(_weights(lambda r: _tukey((r / (5 * np.median(r) / hand_eye.MEDIAN_CHI3)) ** 2)), "u itself is squared in the formula, yours is squared twice."),
+                Mistake(_weights(lambda r: (1 - (r / (5 * np.median(r) / hand_eye.MEDIAN_CHI3)) ** 2) ** 2),
+                        GROWS_BEYOND),
+                Mistake(_weights(lambda r: np.where(r < 5 * np.median(r) / hand_eye.MEDIAN_CHI3, 0, (1 - (r / (5 * np.median(r) / hand_eye.MEDIAN_CHI3)) ** 2) ** 2)),
+                        GROWS_BEYOND),
+                Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r)))), "The median length of a 3-vector is 1.538 standard deviations: divide by it."),
+                Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r) / 0.6745))), "0.6745 belongs to single numbers. The length of a 3-vector has the median 1.538."),
+                Mistake(_weights(lambda r: _tukey(r * hand_eye.MEDIAN_CHI3 / np.median(r))), "The factor 5 is missing: u = length / (5 s)."),
+                Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r) * hand_eye.MEDIAN_CHI3))), "You multiplied by 1.538: divide the median by it."),
+                Mistake(_weights(lambda r: np.sqrt(_tukey(r / (5 * np.median(r) / hand_eye.MEDIAN_CHI3)))), "The bracket is squared: (1 - u^2)^2."),
+                Mistake(_weights(lambda r: (r < 5 * np.median(r) / hand_eye.MEDIAN_CHI3).astype(float)),
+                        "You cut off sharply. Tukey's weight falls smoothly, so that no pose decides by crossing a line."),
+            ],
+        ),
+        Prediction(
+            "slip",
+            question="Pose 3 is printed with x = 1379.64 and misses the sphere by 18.27 mm along -x. What happened?",
+            choices=("the robot sagged", "a digit is missing", "two digits changed places"),
+            answer="two digits changed places",
+            why="1397.64 is 18.00 mm farther, and the neighbors on the line stand at 1397.6 to 1398.1. Then 0.45 mm remain, like everywhere else.",
+        ),
+        Exercise(
+            "find_misprints",
+            reference=find_misprints,
+            draw=entries_with_more_slips,
+            metric=named_entries(),
+            draws=2,
+            limit=15.0,
+            properties=(lambda student, rng: _judge_printed(student),),
+            hints=(
+                "Two questions: which rows do not fit a robust calibration, and which single slip explains each of them?",
+                "`misprints.explanations(entries, pose, T_FS, target, std)` tries every slip of a row and puts the most credible first.",
+                "`m = thesis.measurements_from(entries); fit = hand_eye.calibrate_sphere_target(m.T_BF, m.x_S, robust=True)`, "
+                "`bad = np.flatnonzero(np.linalg.norm(fit.residuals, axis=1) > 6 * fit.std)`, "
+                "`best = [misprints.explanations(entries, int(i) + 1, fit.T_FS, fit.target, fit.std)[0] for i in bad]`, "
+                "`return {(e.table, e.pose, e.column) for e in best}`",
+            ),
+            mistakes=[
+                Mistake(_by_plain_least_squares, "This is all that a plain least-squares fit shows: its grossest slip bends it so far that the others hide. Fit robustly."),
+                Mistake(_too_strict, "You accuse poses that are merely noisy. Among 31 poses some exceed 2.5 standard deviations by chance; take 6."),
+                Mistake(_all_explanations, "You name every entry that could be changed. One slip a row: take the most credible explanation."),
+                Mistake(lambda entries: {(r["table"], r["pose"], r["column"]) for r in thesis.corrections()},
+                        "These are the seven of the printed tables. The check plants slips of its own: search the `entries` you are given."),
+                Mistake(lambda entries: {(table, pose - 1, column) for table, pose, column in find_misprints(entries)}, "Your poses are one too low: they count from 1, arrays from 0."),
+                Mistake(_only_the_grossest, "You named the grossest ones only. After the robust fit 9 mm and even 3 mm stand out as clearly."),
+            ],
+        ),
+        Value(
+            "rms_after",
+            reference=lambda: _joint_rms(*ALL_FIXED),
+            unit="mm",
+            rtol=3e-3,
+            hints=(
+                "Scanner and center together, all 31 poses, all seven corrections.",
+                "`hand_eye.calibrate_sphere_target` on the corrected measurements; no pose is dropped.",
+                "corrected = thesis.measurements(True); hand_eye.calibrate_sphere_target(corrected.T_BF, corrected.x_S).rms.",
+            ),
+            mistakes=[
+                Mistake(lambda: _per_axis(_joint_rms(*ALL_FIXED)), "This is the rms of one coordinate. Sum the squares of a pose first."),
+                Mistake(lambda: _joint_rms(2, 3, 4, 7, 21, 30), "Pose 12 is not corrected yet: one degree is missing there."),
+                Mistake(_rms_with_printed_target, "Here the thesis's sphere center was held fixed. Free it."),
+                Mistake(lambda: _joint_rms(2), "Only pose 2 is repaired in this fit. Use all corrections."),
+                Mistake(lambda: corrected_fit().std, "This is the estimated noise of one coordinate, with 84 degrees of freedom. Asked for is the rms distance."),
+                Mistake(lambda: _rms_of_end_pose(*ALL_FIXED), "These are the corrected data under the thesis's end pose. Fit scanner and center anew."),
+            ],
+        ),
+        Value(
+            "radius",
+            reference=lambda: hand_eye.fit_radius(thesis.measurements(True).T_BF, thesis.measurements(True).x_S)[0],
+            unit="mm",
+            rtol=2e-4,  # to 0.01 mm
+            hints=(
+                "Every y was computed as sqrt(30^2 - r^2). Another radius moves all centers along y, and some radius fits best.",
+                "`thesis.centers_with_radius(x_S, R)` gives the centers for another R: try a grid, or make R a tenth unknown.",
+                "radius, std = hand_eye.fit_radius(corrected.T_BF, corrected.x_S).",
+            ),
+            mistakes=[
+                Mistake(lambda: thesis.radius("certificate"), "This is the certificate's radius. Ask the 31 poses instead."),
+                Mistake(lambda: thesis.radius("coordinate machine"), "This is the coordinate machine's radius, and the data exclude it. Fit it."),
+                Mistake(lambda: thesis.radius("listing"), "This is what listing C16 assumes; if your search gave it, its steps are too coarse. Go to 0.01 mm or finer."),
+                Mistake(lambda: 2 * hand_eye.fit_radius(thesis.measurements(True).T_BF, thesis.measurements(True).x_S)[0],
+                        "This is a diameter: half of it."),
+            ],
+        ),
+        Prediction(
+            "weak",
+            question="All 31 poses keep the sphere near one place of the scanner's field. What is known worst?",
+            choices=("the sphere's center", "the scanner's orientation", "the distance to the sphere"),
+            answer="the scanner's orientation",
+            why="Turning the scanner about the sphere, and shifting it to match, changes hardly anything it sees: rotation and translation err together.",
+        ),
+        Exercise(
+            "design_poses",
+            reference=design_poses,
+            draw=lambda rng: (corrected_fit().T_FS, corrected_fit().target, np.random.default_rng(int(rng.integers(1 << 30)))),
+            properties=(design_is_good,),
+            draws=1,
+            hints=(
+                "Choose where the scanner should see the sphere, and how the flange should be turned; the flange's position then follows.",
+                "target = R_BF (R_FS x_S + t_FS) + t_BF: draw x_S over the whole field, tilt by up to 45 deg about all axes, solve for t_BF.",
+                "x_S = np.column_stack([rng.uniform(-25, 25, 31), rng.uniform(3, 25, 31) * rng.choice([-1, 1], 31), rng.choice([190, 290], 31)]); turns = rng.uniform(-0.8, 0.8, (31, 3)); "
+                "return hand_eye.poses_that_see(T_FS, target, exp_so3(turns) @ np.diag([1, -1, -1]) @ T_FS[:3, :3].T, x_S).",
+            ),
+        ),
+    ],
+)  # fmt: skip
+
+
+def _judge_printed(student):
+    """The printed tables themselves must be among what is checked."""
+    wanted = {(r["table"], r["pose"], r["column"]) for r in thesis.corrections()}
+    named = named_entries().admit(student(thesis.printed_entries()), wanted)
+    if named - wanted:
+        return f"in the printed tables {sorted(named - wanted)[0]} is accused wrongly."
+    if wanted - named:
+        return f"in the printed tables {len(wanted - named)} of the 7 misprints are not named yet."
+    return None

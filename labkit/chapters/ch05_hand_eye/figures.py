@@ -1,0 +1,127 @@
+"""Figures of chapter 5: scan line and sphere, steps of differences, iterations, residuals of the 31 poses, patterns."""
+
+import numpy as np
+
+from ...stage import style
+
+TILT, YAW = (-105, 75), 70  # deg, of the error plane: detours past the pole reach farther than a start
+CIRCLE = np.linspace(0, 2 * np.pi, 121)
+LINES = {"x": "o", "y": "s", "x*": "^", "y*": "v"}  # a marker for each line of motion
+
+
+def side_view(ax, limits):
+    """Sphere, scan plane and scanner seen along the scan line (y to the right, z down).
+
+    Returns
+    -------
+    (sphere, other, cloud, spread) : outline, mirror solution, recovered centers, one standard deviation.
+    """
+    style.axes(ax, "y across the scan plane (mm)", "z (mm)", "side view", equal=True)
+    ax.set(xlim=limits[0], ylim=limits[1][::-1])
+    ax.axvline(0, color=style.MEASUREMENT, linewidth=1.6)
+    ax.annotate("scan plane", (0, limits[1][0]), xytext=(5, -12), textcoords="offset points")
+    (sphere,) = ax.plot([], [], **style.look("truth"))
+    (other,) = ax.plot([], [], **style.look("guide"))
+    (spread,) = ax.plot([], [], color=style.PREDICTION, linewidth=6, alpha=0.6, solid_capstyle="butt")
+    (cloud,) = ax.plot([], [], **style.look("estimates", markersize=4, alpha=0.7))
+    return sphere, other, cloud, spread
+
+
+def profile_view(ax, limits):
+    """The scan line itself: measured points, fitted circle, its center. Returns (points, circle, center)."""
+    style.axes(ax, "x along the scan line (mm)", "z (mm)", "what the scanner sees", equal=True)
+    ax.set(xlim=limits[0], ylim=limits[1][::-1])
+    (circle,) = ax.plot([], [], **style.look("estimate"))
+    (points,) = ax.plot([], [], **style.look("measurement", markersize=3))
+    (center,) = ax.plot([], [], **style.look("estimates", markersize=7))
+    return points, circle, center
+
+
+def set_circle(line, x, z, radius):
+    """Move a circle."""
+    line.set_data(x + radius * np.cos(CIRCLE), z + radius * np.sin(CIRCLE))
+
+
+def error_against_step(ax, steps, curves):
+    """Error of finite differences over the step. `curves`: {label: errors}. Returns the moving markers, one a curve."""
+    style.axes(ax, "step h (deg)", "largest error (mm per deg)", "error of the derivative by A")
+    ax.set(xscale="log", yscale="log", xlim=(steps[0], steps[-1]), ylim=(1e-12, 1e3))
+    looks = (style.look("prediction"), style.look("estimate"))
+    markers = []
+    for (label, errors), look in zip(curves.items(), looks):
+        ax.plot(steps, errors, label=label, **look)
+        markers += ax.plot([], [], color=look["color"], marker="D", markersize=8, linestyle="none", clip_on=False)
+    ax.legend(loc="lower left")
+    return markers
+
+
+def error_plane(ax):
+    """Plane of the scanner's rotation error. Returns (path in A, B, C, path on the pose, pole)."""
+    style.axes(ax, "tilt off the truth (deg)", "yaw off the truth (deg)", "drag the start")
+    ax.set(xlim=TILT, ylim=(-YAW, YAW))
+    (pole,) = ax.plot([], [], **style.look("guide", linewidth=1.8))
+    ax.annotate("dotted:\nB = -90 deg", (0.98, 0.03), xycoords="axes fraction", ha="right", color=style.MUTED)
+    (euler,) = ax.plot([], [], **style.look("prediction", marker="o", markersize=5))
+    (se3,) = ax.plot([], [], **style.look("estimate", marker="D", markersize=4))
+    ax.plot([0], [0], color=style.TRUTH, marker="+", markersize=16, linestyle="none")
+    return euler, se3, pole
+
+
+def iterations(ax, steps=30):
+    """Error of the scanner over the iterations, logarithmic. Returns (Euler curve, SE(3) curve)."""
+    style.axes(ax, "iteration", "rms distance (mm)", "how fast")
+    ax.set(yscale="log", xlim=(0, steps), ylim=(1e-13, 1e4))
+    (euler,) = ax.plot([], [], label="steps in A, B, C", **style.look("prediction", marker="o", markersize=5))
+    (se3,) = ax.plot([], [], label="steps on the pose", **style.look("estimate", marker="D", markersize=5))
+    ax.legend(loc="upper right")
+    return euler, se3
+
+
+def residual_bars(ax, n, top=3000.0):
+    """Residual length of each pose on a logarithmic scale; returns (stems, chosen, yardstick)."""
+    style.axes(ax, "pose (click one)", "residual (mm)")
+    ax.set(yscale="log", xlim=(0, n + 1), ylim=(0.08, top))
+    ax.set_xticks([1, 9, 17, 25], ["1\nline x", "9\ny", "17\nx*", "25\ny*"])
+    (stems,) = ax.plot([], [], color=style.ESTIMATE, linewidth=4, solid_capstyle="butt")
+    (chosen,) = ax.plot([], [], color=style.INK, marker="v", markersize=9, linestyle="none")
+    (yardstick,) = ax.plot([], [], **style.look("guide", linewidth=1.6))
+    return stems, chosen, yardstick
+
+
+def set_bars(stems, lengths, floor=0.08):
+    """Move the bars of `residual_bars`."""
+    n = len(lengths)
+    x = np.repeat(np.arange(1, n + 1, dtype=float), 3)
+    y = np.column_stack([np.full(n, floor), np.maximum(lengths, floor), np.full(n, np.nan)]).ravel()
+    stems.set_data(x, y)
+
+
+def cell(scene):
+    """Sphere, flange positions by line of motion, scanner frame of the chosen pose and residual vectors in space.
+
+    Returns a dictionary of the items of the scene.
+    """
+    flanges = {
+        line: scene.points(color=style.MEASUREMENT, marker=marker, markersize=4.5, linestyle="none")
+        for line, marker in LINES.items()
+    }
+    return {
+        **flanges,
+        "sight": scene.line(**style.look("guide")),
+        "sphere": scene.ellipsoid(**style.look("truth")),
+        "residuals": scene.line(color=style.ESTIMATE, linewidth=2.0),
+        "chosen": scene.line(color=style.INK, linewidth=2.6),
+        "flange": scene.triad("F", 110),
+        "scanner": scene.triad("S", 90, linestyle=(0, (4, 1.5))),
+    }
+
+
+def field_of_view(ax, field):
+    """The scanner's field with what is used of it. Returns (used, places)."""
+    (x_low, x_high), _, (z_low, z_high) = field
+    style.axes(ax, "x along the scan line (mm)", "z (mm)", "where the sphere is seen")
+    ax.set(xlim=(x_low - 8, x_high + 8), ylim=(z_high + 8, z_low - 8))
+    ax.plot([x_low, x_high, x_high, x_low, x_low], [z_low, z_low, z_high, z_high, z_low], color=style.INK, linewidth=1)
+    (used,) = ax.plot([], [], **style.look("prediction"))
+    (places,) = ax.plot([], [], **style.look("measurement"))
+    return used, places

@@ -1,0 +1,496 @@
+"""Stages of chapter 5: scan line and sphere, difference steps, iterations at the pole, the 31 poses, a measuring
+pattern.
+"""
+
+import functools
+
+import numpy as np
+
+from ...calibration import hand_eye, sphere
+from ...documents import misprints
+from ...documents.thesis import printed as thesis
+from ...estimation.differences import numeric_jacobian
+from ...geometry import frames
+from ...geometry.lie import exp_so3, log_so3
+from ...stage import Choice, Handle, Slider, Stage, style
+from ...stage.scene3d import Scene, View
+from . import figures as draw
+
+RADIUS = 30.0  # mm, the sphere
+REPETITIONS = 60
+POINTS = 60  # of one scan line
+SLIPS_SHOWN = 6
+SHOWN_RESIDUAL = 60.0  # mm: a residual vector is drawn no longer than this
+REST_MM = 1e-13  # what is left of a residual at the end, on the logarithmic axis
+
+
+# --- one scan line ---------------------------------------------------------------------------------------------------
+
+
+@functools.cache
+def _noise():
+    noise = np.random.default_rng(5).standard_normal((REPETITIONS, POINTS))
+    noise.setflags(write=False)
+    return noise
+
+
+def compute_scan_line(state):
+    """Centers recovered from repeated noisy scan lines, the fitted circle, and the standard deviation of y."""
+    y, z = state["C"]
+    r = np.sqrt(RADIUS**2 - y * y)
+    angle = np.linspace(-1, 1, POINTS) * np.deg2rad(state["half_angle_deg"])
+    reach = r + state["std"] * _noise()
+    x, depth = reach * np.sin(angle), z - reach * np.cos(angle)
+    centers, radii = sphere.fit_circle_algebraic(x, depth)
+    off = np.sqrt(np.maximum(RADIUS**2 - radii**2, 0.0)) * (1 if y >= 0 else -1)
+    circle = sphere.fit_circle(x[0], depth[0], std=state["std"])
+    by_r = np.inf if y == 0 else r / abs(y)
+    return {
+        "y": float(y),
+        "points": np.column_stack([x[0], depth[0]]),
+        "circle": (centers[0, 0], centers[0, 1], radii[0]),
+        "recovered": np.column_stack([off, centers[:, 1]]),
+        "impossible": int((radii > RADIUS).sum()),
+        "std_y": by_r * float(np.sqrt(circle.covariance[2, 2])),
+        "bias_y": float(np.mean(off) - y),
+    }
+
+
+def _scan_line_sentence(result):
+    if result["impossible"]:
+        return (
+            f"{result['impossible']} of {REPETITIONS} circles are larger than the sphere: so close to the equator "
+            "the profile says nothing about y."
+        )
+    known = f"y is known to {result['std_y']:.2g} mm" if result["std_y"] < RADIUS else "y is not known at all"
+    return (
+        f"The center lies {abs(result['y']):.1f} mm off the plane. First order: {known}; the mean of {REPETITIONS} "
+        f"recoveries is off by {result['bias_y']:+.2f} mm. The mirror image (dotted) explains the scan line as well."
+    )
+
+
+def scan_line():
+    """Drag the sphere through the scan plane and watch how well its center comes back from one scan line."""
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2, width_ratios=(1.24, 1))  # one scale
+        outline, other, cloud, spread = draw.side_view(left, ((-62, 62), (190, 290)))
+        points, circle, center = draw.profile_view(right, ((-50, 50), (190, 290)))
+
+        def update(state, result):
+            y, z = state["C"]
+            draw.set_circle(outline, y, z, RADIUS)
+            draw.set_circle(other, -y, z, RADIUS)
+            cloud.set_data(*result["recovered"].T)
+            reach = min(result["std_y"], 60.0)
+            spread.set_data([y - reach, y + reach], [z, z])
+            points.set_data(*result["points"].T)
+            draw.set_circle(circle, *result["circle"])
+            center.set_data([result["circle"][0]], [result["circle"][1]])
+
+        return [spread, outline, other, cloud, circle, points, center], update
+
+    return Stage(
+        "scan line and sphere",
+        scene=scene,
+        compute=compute_scan_line,
+        handles={"C": Handle((14.0, 240.0), step=0.5, bounds=((-28, 28), (230, 260)), label="center of the sphere")},
+        controls={
+            "std": Slider(0.01, 0.5, 0.05, step=0.01, label="noise (mm)"),
+            "half_angle_deg": Slider(15, 70, 50, step=1, label="half the arc (deg)"),
+        },
+        fail={"C": (0.8, 240.0)},
+        describe=_scan_line_sentence,
+    )
+
+
+# --- steps of differences --------------------------------------------------------------------------------------------
+
+STEPS_DEG = np.geomspace(1e-13, 10.0, 57)
+
+
+@functools.cache
+def _step_errors():
+    """Largest error of forward and central differences by A at the CAD pose on the real poses, over STEPS_DEG."""
+    measured, target = thesis.measurements(True), thesis.printed_target()
+    p = thesis.kuka_pose_deg("scanner_end")
+    unit = np.array([1, 1, 1, *np.deg2rad([1, 1, 1])])
+    exact = hand_eye.kuka_jacobian(p * unit, measured.T_BF, measured.x_S)[:, 3] * unit[3]
+
+    def residual(A):
+        q = p.copy()
+        q[3] = A[0]
+        return hand_eye.kuka_residuals(q * unit, measured.T_BF, measured.x_S, target)
+
+    errors = {}
+    for scheme in ("forward", "central"):
+        found = [numeric_jacobian(residual, p[3:4], h, scheme)[:, 0] for h in STEPS_DEG]
+        errors[scheme] = np.maximum(np.abs(np.array(found) - exact).max(1), 1e-14)
+    return errors
+
+
+def compute_steps(state):
+    """Errors of both schemes at the chosen step (mm per deg), and the best steps."""
+    errors, h = _step_errors(), state["h"]
+    at = {k: float(np.exp(np.interp(np.log(h), np.log(STEPS_DEG), np.log(e)))) for k, e in errors.items()}
+    best = {k: float(STEPS_DEG[np.argmin(e)]) for k, e in errors.items()}
+    return {"h": h, "at": at, "best": best}
+
+
+def difference_steps():
+    """The step of a finite difference: too large, and curvature spoils it; too small, and rounding does."""
+
+    def scene(fig):
+        ax = fig.subplots()
+        errors = _step_errors()
+        markers = draw.error_against_step(ax, STEPS_DEG, errors)
+        ax.axvline(5e-7, **style.look("guide"))
+        ax.annotate("listing C4", (5e-7, 1e-12), xytext=(4, 4), textcoords="offset points", color=style.MUTED)
+
+        def update(state, result):
+            for marker, scheme in zip(markers, errors):
+                marker.set_data([result["h"]], [result["at"][scheme]])
+
+        return markers, update
+
+    return Stage(
+        "step of the differences",
+        scene=scene,
+        compute=compute_steps,
+        controls={"h": Slider(1e-13, 10.0, 5e-7, log=True, label="step (deg)")},
+        fail={"h": 1e-13},
+        describe=lambda result: (
+            f"Step {result['h']:.1e} deg: forward is off by {result['at']['forward']:.1e}, central by "
+            f"{result['at']['central']:.1e} mm per "
+            f"deg. Best steps: {result['best']['forward']:.0e} and {result['best']['central']:.0e} deg."
+        ),
+    )
+
+
+# --- iterations ------------------------------------------------------------------------------------------------------
+
+
+@functools.cache
+def _simulated(B_deg):
+    """The simulation model with its scanner turned to B: T_BF, x_S, target, true T_FS."""
+    T_BF, _, target, scanner = thesis.simulation()
+    T_FS = frames.matrix_from_kuka(frames.kuka_from_degrees([*scanner[:4], B_deg, scanner[5]]))
+    return T_BF, frames.transform(frames.invert(T_FS), frames.transform(frames.invert(T_BF), target)), target, T_FS
+
+
+def compute_iterations(state):
+    """Gauss-Newton from one start in A, B, C and on the pose: errors (tilt, yaw) in deg, rms, steps and largest turn
+    (deg).
+
+    The start is turned off the truth by the rotation vector (0, tilt, yaw) in F: tilt changes B, yaw is what A does.
+    """
+    T_BF, x_S, target, truth = _simulated(state["B_deg"])
+    tilt, yaw = np.deg2rad(state["P"])
+    start = truth.copy()
+    start[:3, :3] = exp_so3([0, tilt, yaw]) @ truth[:3, :3]
+    result = {"pole": -90.0 - state["B_deg"]}
+    for name in ("euler", "se3"):
+        poses, rms, values, converged = hand_eye.gauss_newton_pose(
+            frames.kuka_from_matrix(start), T_BF, x_S, target, parameters=name, max_steps=30
+        )
+        R = poses[:, :3, :3]
+        error = np.rad2deg(log_so3(R @ truth[:3, :3].T))
+        turns = np.rad2deg(frames.rotation_angle(np.swapaxes(R[:-1], 1, 2) @ R[1:]))
+        result[name] = {
+            "path": error[:, 1:], "rms": np.maximum(rms, REST_MM), "steps": len(poses) - 1,
+            "arrived": bool(converged and rms[-1] < 1e-6), "turned_deg": float(turns.sum()),
+            "weakest": float(values[0, -1] / values[0, 0]),
+        }  # fmt: skip
+    return result
+
+
+def _iterations_sentence(result):
+    def told(run):
+        steps = "1 step" if run["steps"] == 1 else f"{run['steps']} steps"
+        return steps if run["arrived"] else "no way to the minimum"
+
+    def weakest(run):
+        return f"1/{1 / run['weakest']:.0f} of the largest" if run["weakest"] > 1e-6 else "zero"
+
+    euler, se3 = result["euler"], result["se3"]
+    return (
+        f"In A, B, C: {told(euler)}, turning {euler['turned_deg']:.0f} deg in all; at the start the weakest singular "
+        f"value is {weakest(euler)}. On the pose: {told(se3)}, turning {se3['turned_deg']:.0f} deg, "
+        f"and {weakest(se3)}."
+    )
+
+
+def convergence():
+    """Drag the start pose: the same Gauss-Newton with steps in A, B, C and with steps on the right of the pose."""
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2)
+        euler, se3, pole = draw.error_plane(left)
+        curves = draw.iterations(right)
+
+        def update(state, result):
+            for path, curve, name in ((euler, curves[0], "euler"), (se3, curves[1], "se3")):
+                path.set_data(*result[name]["path"].T)
+                curve.set_data(np.arange(len(result[name]["rms"])), result[name]["rms"])
+            pole.set_data([result["pole"]] * 2, [-draw.YAW, draw.YAW])
+
+        return [pole, euler, se3, *curves], update
+
+    return Stage(
+        "convergence from a dragged start",
+        scene=scene,
+        compute=compute_iterations,
+        handles={"P": Handle((-1.0, 30.0), step=0.5, bounds=((-68, 68), (-68, 68)), label="start, tilt and yaw")},
+        controls={"B_deg": Choice({"B = -88 deg": -88.0, "B = -30 deg": -30.0}, -88.0, label="scanner at")},
+        fail={"P": (-54.0, -30.0), "B_deg": -30.0},
+        describe=_iterations_sentence,
+    )
+
+
+# --- the 31 poses ----------------------------------------------------------------------------------------------------
+
+
+@functools.cache
+def _explained():
+    """Up to SLIPS_SHOWN slips that would explain each suspicious pose, the most credible first: a list of 31 lists."""
+    entries, fit = thesis.printed_entries(), _reference_fit()
+    innocent = np.linalg.norm(fit.residuals, axis=1) <= misprints.SUSPICIOUS * fit.std
+    return [
+        [] if innocent[pose - 1] else misprints.explanations(entries, pose, fit.T_FS, fit.target, fit.std)[:SLIPS_SHOWN]
+        for pose in range(1, 32)
+    ]
+
+
+@functools.cache
+def _reference_fit():
+    measured = thesis.measurements()
+    return hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S, robust=True)
+
+
+def _edited(pose, slip, others):
+    """Measurements with the poses in `others` corrected and one slip undone in the chosen pose."""
+    measured = thesis.measurements(others)
+    kuka, x_S = measured.kuka_deg.copy(), measured.x_S.copy()
+    printed = thesis.measurements()
+    kuka[pose - 1], x_S[pose - 1] = printed.kuka_deg[pose - 1], printed.x_S[pose - 1]
+    if slip:
+        e = slip
+        table, columns = (kuka, thesis.POSE_COLUMNS) if e.table == "C14" else (x_S, thesis.CENTER_COLUMNS)
+        table[pose - 1, columns.index(e.column)] = float(e.corrected)
+    return frames.matrix_from_kuka(frames.kuka_from_degrees(kuka)), x_S
+
+
+@functools.lru_cache(maxsize=256)
+def _pose_fit(pose, slip, others, fit):
+    """Residuals (31, 3) in B, scanner, target and the edited poses for one choice of everything."""
+    slips = _explained()[pose - 1]
+    chosen = slips[slip - 1] if 0 < slip <= len(slips) else None
+    fixed = tuple(row["pose"] for row in thesis.corrections()) if others else ()
+    T_BF, x_S = _edited(pose, chosen, fixed)
+    if fit == "end pose":
+        T_FS, target = thesis.frame("scanner_end"), thesis.printed_target()
+    else:
+        found = hand_eye.calibrate_sphere_target(T_BF, x_S, robust=fit == "robust")
+        T_FS, target = found.T_FS, found.target
+    return hand_eye.sphere_residuals(T_BF, x_S, T_FS, target), T_FS, target, T_BF, x_S, chosen, len(slips)
+
+
+def compute_poses(state):
+    """Residuals of all poses under the chosen fit, the chosen pose (from 1), the slip undone in it, and the rms."""
+    pose = 3 if state["click"] is None else int(np.clip(np.rint(state["click"][0]), 1, 31))
+    residuals, T_FS, target, T_BF, x_S, slip, offered = _pose_fit(pose, state["slip"], state["others"], state["fit"])
+    lengths = np.linalg.norm(residuals, axis=1)
+    return {
+        "pose": pose, "residuals": residuals, "lengths": lengths, "rms": float(hand_eye.rms_distance(residuals)),
+        "median": float(np.median(lengths)), "T_FS": T_FS, "target": target, "T_BF": T_BF, "x_S": x_S, "slip": slip,
+        "offered": offered, "number": state["slip"],
+    }  # fmt: skip
+
+
+def _poses_sentence(result):
+    e = result["slip"]
+    slips = "a single slip" if result["offered"] == 1 else f"{result['offered']} single slips"
+    told = (
+        f"with {e.column.removesuffix('_deg')} in {e.table} read as {e.corrected} for {e.printed} ({e.slip})"
+        if e
+        else f"as printed: there is no slip no. {result['number']}, {slips} would explain it"
+        if result["offered"] and result["number"]
+        else f"as printed, and {slips} would explain it"
+        if result["offered"]
+        else "as printed, nothing to explain"
+    )
+    return (
+        f"Pose {result['pose']}: residual {result['lengths'][result['pose'] - 1]:.2f} mm {told}. "
+        f"All 31: rms {result['rms']:.2f} mm, median {result['median']:.2f} mm."
+    )
+
+
+def thirty_one_poses():
+    """Robot, scanner and sphere with the residual vectors of all 31 poses; click a pose, undo a slip, see the fit
+    change.
+    """
+    lines = thesis.measurements().line
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2, width_ratios=(1, 1.05))
+        space = Scene(left, radius=520)
+        items = draw.cell(space)
+        stems, chosen, yardstick = draw.residual_bars(right, 31)
+        style.bare(left, "residual vectors x 8")
+        rms = right.text(0.98, 0.97, "", transform=right.transAxes, ha="right", va="top")
+
+        def update(state, result):
+            target, T_BF, k = result["target"], result["T_BF"], result["pose"] - 1
+            for line in draw.LINES:
+                items[line].set(T_BF[lines == line, :3, 3])
+            items["sphere"].set(target, RADIUS**2 * np.eye(3))
+            seen = result["residuals"] * np.minimum(1, SHOWN_RESIDUAL / np.maximum(result["lengths"], 1e-9))[:, None]
+            tips = target + 8 * seen  # magnified, for the eye
+            gaps = np.full_like(tips, np.nan)
+            items["residuals"].set(np.stack([np.broadcast_to(target, tips.shape), tips, gaps], 1).reshape(-1, 3))
+            items["chosen"].set([target, tips[k]])
+            scanner = T_BF[k] @ result["T_FS"]
+            items["flange"].set(T_BF[k])
+            items["scanner"].set(scanner)
+            items["sight"].set([T_BF[k, :3, 3], scanner[:3, 3], frames.transform(scanner, result["x_S"][k])])
+            space.draw(state["view"])
+            draw.set_bars(stems, result["lengths"])
+            chosen.set_data([k + 1], [max(result["lengths"][k], 0.08) * 1.5])
+            yardstick.set_data([0, 32], [result["rms"]] * 2)
+            rms.set_text(f"rms {result['rms']:.2f} mm\nmedian {result['median']:.2f} mm")
+
+        return [*space.artists, stems, chosen, yardstick, rms], update
+
+    return Stage(
+        "31 poses and their residuals",
+        scene=scene,
+        compute=compute_poses,
+        controls={
+            "slip": Slider(0, SLIPS_SHOWN, 0, step=1, label="undo slip no."),
+            "others": Choice({"as printed": False, "corrected": True}, False, label="other poses"),
+            "fit": Choice(
+                {"thesis": "end pose", "least squares": "least squares", "robust": "robust"}, "robust", label="fit"
+            ),
+        },
+        click=1,
+        view=View(-60, 20, center=(1500.0, -600.0, 1300.0)),
+        fail={"fit": "least squares"},
+        presets={"All corrected": {"others": True, "slip": 1, "fit": "least squares"}},
+        describe=_poses_sentence,
+        size=(7.6, 4.4),
+    )
+
+
+# --- a measuring pattern ---------------------------------------------------------------------------------------------
+
+
+@functools.cache
+def _corrected_fit():
+    measured = thesis.measurements(True)
+    return hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S)
+
+
+@functools.cache
+def _printed_pattern():
+    fit = _corrected_fit()
+    return hand_eye.predicted_covariance(thesis.measurements(True).T_BF, fit.T_FS, fit.target, fit.std)
+
+
+def compute_pattern(state):
+    """Predicted covariance of a designed pattern beside the thesis's: standard deviations, weakest direction, poses."""
+    fit, x_mid, z_mid = _corrected_fit(), 0.0, 240.0
+    spread = np.array([state["E"][0] - x_mid, state["across"], state["E"][1] - z_mid])
+    T_BF = hand_eye.pattern(fit.T_FS, fit.target, np.deg2rad(state["tilt_deg"]), spread)
+    x_S = frames.transform(frames.invert(fit.T_FS), frames.transform(frames.invert(T_BF), fit.target))
+    J = hand_eye.joint_jacobian(T_BF, x_S, fit.T_FS)
+    scale = np.array([1 / 240.0] * 3 + [1.0] * 6)
+    _, values, Vt = np.linalg.svd(J * scale, full_matrices=False)
+    free = Vt[values <= 1e-3 * values[0]]  # changes that the scanner does not see
+    result = {
+        "T_BF": T_BF, "x_S": x_S, "spread": spread, "values": values, "weak": Vt[-1] * scale, "target": fit.target,
+        "T_FS": fit.T_FS, "determined": not len(free), "turns": _reached(free[:, :3]), "slides": _reached(free[:, 6:]),
+    }  # fmt: skip
+    if result["determined"]:
+        cov = fit.std**2 * np.linalg.inv(J.T @ J)
+        result["cov"], result["std"] = cov, _three_stds(cov)
+    else:
+        result["cov"], result["std"] = np.full((9, 9), np.nan), (np.inf,) * 3
+    result["printed_cov"], result["printed_std"] = _printed_pattern(), _three_stds(_printed_pattern())
+    return result
+
+
+def _reached(block):
+    """Directions (k, 3) in which unseen changes reach into one block of unknowns, the farthest first."""
+    _, sizes, directions = np.linalg.svd(block)
+    return directions[: (sizes > 0.05).sum()]
+
+
+def _three_stds(cov):
+    """Standard deviations of rotation (deg), translation (mm) and sphere center (mm)."""
+    blocks = [np.sqrt(np.trace(cov[k : k + 3, k : k + 3])) for k in (0, 3, 6)]
+    return float(np.rad2deg(blocks[0])), float(blocks[1]), float(blocks[2])
+
+
+def _pattern_sentence(result):
+    if not result["determined"]:
+        line = "along the line drawn through the sphere" if len(result["slides"]) == 1 else "in any direction"
+        told = [f"scanner and sphere can slide together {line}"] * bool(len(result["slides"]))
+        told += ["the scanner can turn about the line on which it sees the sphere"] * bool(len(result["turns"]))
+        ratio = result["values"][-1] / result["values"][0]
+        return f"Not determined: the last singular value is {ratio:.0e} of the first; {', and '.join(told)}."
+    (a, b, c), (A, B, C) = result["std"], result["printed_std"]
+    return (
+        f"Predicted: orientation {a:.2f} deg, translation {b:.2f} mm, sphere center {c:.2f} mm. "
+        f"The thesis's 31 poses (dotted): {A:.2f} deg, {B:.2f} mm, {C:.2f} mm."
+    )
+
+
+def pattern_designer():
+    """Choose how much of the field and how much tilt 31 poses use, and see how well the scanner would be known."""
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2, width_ratios=(1.15, 1))
+        space = Scene(left, radius=480)
+        flanges = space.points(**style.look("measurement", markersize=4))
+        sights = space.line(**style.look("guide", alpha=0.5))
+        ball = space.ellipsoid(**style.look("truth"))
+        printed = space.ellipsoid(**style.look("guide", linewidth=2.0))
+        found = space.ellipsoid(**style.look("estimate"))
+        weak = space.line(color=style.ESTIMATE, linewidth=3)
+        name = space.text("errors of the translation, x 40", offset=(0, 4), ha="center")
+        used, places = draw.field_of_view(right, hand_eye.FIELD)
+
+        def update(state, result):
+            target, T_BF = result["target"], result["T_BF"]
+            flanges.set(T_BF[:, :3, 3])
+            gaps = np.full((len(T_BF), 3), np.nan)
+            sights.set(np.stack([T_BF[:, :3, 3], np.broadcast_to(target, (len(T_BF), 3)), gaps], 1).reshape(-1, 3))
+            ball.set(target, RADIUS**2 * np.eye(3))
+            aside = target + np.array([0.0, 0.0, -230.0])
+            printed.set(aside, 40**2 * result["printed_cov"][3:6, 3:6])
+            found.set(aside, 40**2 * (result["cov"][3:6, 3:6] if result["determined"] else np.zeros((3, 3))))
+            along = [np.outer([-300, 300, np.nan], direction) for direction in result["slides"]]
+            weak.set(target + np.concatenate(along or [np.full((2, 3), np.nan)]))
+            name.set(aside + [0, 0, -175.0])
+            space.draw(state["view"])
+            (dx, _, dz) = result["spread"]
+            used.set_data(dx * np.array([-1, 1, 1, -1, -1]), 240 + dz * np.array([-1, -1, 1, 1, -1]))
+            places.set_data(result["x_S"][:, 0], result["x_S"][:, 2])
+
+        return [*space.artists, used, places], update
+
+    return Stage(
+        "designing a measuring pattern",
+        scene=scene,
+        compute=compute_pattern,
+        handles={
+            "E": Handle((6.0, 250.0), step=1.0, bounds=((0, 25), (240, 290)), ax=1, label="corner of the used field")
+        },
+        controls={
+            "tilt_deg": Slider(0, 85, 30, step=1, label="tilt up to (deg)"),
+            "across": Slider(3, 25, 12, step=1, label="|y| up to (mm)"),
+        },
+        view=View(-55, 15, center=(1528.0, -602.0, 1190.0)),
+        fail={"tilt_deg": 0},
+        describe=_pattern_sentence,
+    )

@@ -1,0 +1,1154 @@
+"""Chapter 6: packets of a tracker, a robot's kinematics, A X = X B by the report's method, outliers, time offset."""
+
+import functools
+
+import numpy as np
+
+from ...calibration import ax_xb
+from ...documents.report.printed import table_d
+from ...documents.report.reconstruction import synthetic_mountings
+from ...exercises import metrics
+from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...geometry import lie
+from ...geometry.frames import invert, pose, relative, unit_vector
+from ...geometry.lie import exp_so3
+from ...machines import packet, simulation
+from ...machines.accuracy import time_offset
+from ...machines.arm import TX40, dh_matrix, forward_kinematics
+from ...machines.log import average_stops, read_csv, reject_outliers
+from ...machines.mounting import calibrate_mounting, e_rot, e_trans
+from ...machines.packet import POSITION, QUATERNION, TIME, encode_packet, packet_from_pose
+from ...tables import DATA, read_table
+
+# Packets ---------------------------------------------------------------------------------------------------------------------
+
+
+def decode_packet(data):
+    """Time (s), position (mm) and quaternion (x, y, z, w) of a packet of 184 bytes."""
+    values = packet.decode_packet(data)
+    return values[TIME], 1000 * values[POSITION], values[QUATERNION]
+
+
+def _packet(rng):
+    """A good packet with all fields different."""
+    T = pose(exp_so3(rng.normal(size=3)), rng.uniform(-900, 900, 3))
+    values = packet_from_pose(
+        T, rng.uniform(1, 900), velocity=rng.uniform(50, 300, 3), angular_velocity=rng.uniform(0.1, 1, 3)
+    )
+    values[8:11], values[18:21] = rng.uniform(0.5, 9, (2, 3))
+    return (encode_packet(values),)
+
+
+def _fields(change=lambda v: v, dtype="<f8", time=1, position=2, quaternion=11, scale=1000.0):
+    def variant(data):
+        v = change(np.frombuffer(data, dtype).astype(float))
+        return v[time], scale * v[position : position + 3], v[quaternion : quaternion + 4]
+
+    return variant
+
+
+def _integers(data):
+    v = np.frombuffer(data, "<i8")
+    return v[1], 1000 * v[2:5], v[11:15]
+
+
+def _scalar_first(data):
+    time, position, q = decode_packet(data)
+    return time, position, np.roll(q, 1)
+
+
+# Kinematics ------------------------------------------------------------------------------------------------------------------
+
+
+def link(rng):
+    """Parameters of one link: rad, mm, mm, rad."""
+    return (*rng.uniform((-3, 50, 50, -1.5), (3, 300, 300, -0.3)),)
+
+
+def _entry_by_entry(th, d, a, al):
+    steps = ((th, 0, 0, 0), (0, d, 0, 0), (0, 0, a, 0), (0, 0, 0, al))
+    return functools.reduce(np.multiply, [dh_matrix(*map(float, step)) for step in steps])
+
+
+def _link(order, theta=1, alpha=1, swap=False):
+    """A product of the four elementary transforms in another order; Z, D, A, X for turn z, along z, along x, turn x."""
+
+    def variant(th, d, a, al):
+        if swap:
+            d, a = a, d
+        parts = {
+            "Z": pose(exp_so3([0, 0, theta * th]), [0, 0, 0]),
+            "D": pose(np.eye(3), [0, 0, d]),
+            "A": pose(np.eye(3), [a, 0, 0]),
+            "X": pose(exp_so3([alpha * al, 0, 0]), [0, 0, 0]),
+        }
+        return functools.reduce(np.matmul, [parts[letter] for letter in order])
+
+    return variant
+
+
+def _moved_last(th, d, a, al):
+    """The link with the step a along an x that nothing has turned, and d along the last z."""
+    return pose(exp_so3([0, 0, th]) @ exp_so3([al, 0, 0]), exp_so3([0, 0, th]) @ exp_so3([al, 0, 0]) @ [a, 0, d])
+
+
+def _without(*steps):
+    """The link without some of its steps."""
+
+    def variant(*given):
+        return dh_matrix(*(0.0 if k in steps else value for k, value in enumerate(given)))
+
+    return variant
+
+
+def joint_angles(rng):
+    return TX40.dh, rng.uniform(TX40.q_min, TX40.q_max)
+
+
+def _links(dh, q):
+    return dh_matrix(q + dh[:, 0], dh[:, 1], dh[:, 2], dh[:, 3])
+
+
+def _without_offsets(dh, q):
+    return functools.reduce(np.matmul, dh_matrix(q, dh[:, 1], dh[:, 2], dh[:, 3]))
+
+
+# A X = X B -------------------------------------------------------------------------------------------------------------------
+
+
+def motions(rng, n=None, std_deg=0.3, std_mm=1.0):
+    """Motions of flange and tracker with noise, A X = X B; their number differs from draw to draw, never 8 or 9."""
+    n = n or rng.integers(10, 15)
+    axes = rng.uniform(0.3, 1.2, (n, 1)) * unit_vector(rng.normal(size=(n, 3)))
+    X = pose(exp_so3(rng.normal(size=3)), rng.uniform(-80, 80, 3))
+    A = pose(exp_so3(axes), rng.uniform(-200, 200, (n, 3)))
+    noise = pose(exp_so3(np.deg2rad(std_deg) * rng.normal(size=(n, 3))), std_mm * rng.normal(size=(n, 3)))
+    return A, invert(X) @ A @ X @ noise
+
+
+def one_motion(rng):
+    A, B = motions(rng, 1)
+    return A[0, :3, :3], B[0, :3, :3]
+
+
+def kron_row(A, B):
+    """The block m_i of one motion, shape (9, 9): I kron A - B' kron I."""
+    return np.kron(np.eye(3), A) - np.kron(B.T, np.eye(3))
+
+
+def stacked(rng, sign):
+    """The Kronecker matrix of noisy motions, so noisy that its null vector is visibly no rotation, and with this sign
+    of the null vector's determinant.
+    """
+    while True:
+        M = ax_xb.kronecker_matrix(*motions(rng, std_deg=8.0))
+        X = _null(M).reshape(3, 3)
+        if sign * np.linalg.det(X) > 0 and np.abs(3 * X @ X.T - np.eye(3)).max() > 0.01:
+            return (M,)
+
+
+BOTH_SIGNS = tuple(functools.partial(stacked, sign=sign) for sign in (1, -1))
+
+
+def rotation_from_nullvector(M):
+    """Rotation of the smallest right singular vector of M, shape (9 N, 9)."""
+    return ax_xb.rotation_from_kronecker(M)[0]
+
+
+def _null(M, row=-1):
+    return np.linalg.svd(M)[2][row]
+
+
+def _signed(X):
+    return X * np.sign(np.linalg.det(X))
+
+
+def _orthonormal(X):
+    """The nearest orthogonal matrix, reflections included."""
+    U, _, Vt = np.linalg.svd(X)
+    return U @ Vt
+
+
+def _transposed_twice(M):
+    U, _, Vt = np.linalg.svd(_signed(_null(M).reshape(3, 3, order="F")))
+    return U @ Vt.T
+
+
+def _by_qr(M, signed):
+    Q, R = np.linalg.qr(_signed(_null(M).reshape(3, 3, order="F")))
+    return Q * np.sign(np.diag(R)) if signed else Q
+
+
+def translation_problem(rng):
+    A, B = motions(rng)
+    return A, B, ax_xb.rotation_from_kronecker(ax_xb.kronecker_matrix(A, B))[0]
+
+
+def translation_lsq(A, B, R):
+    """Translation of the mounting by least squares, shape (3,), mm."""
+    return ax_xb.translation_from_motions(A, B, R)[0]
+
+
+def _translation(K1, K2):
+    def variant(A, B, R):
+        return np.linalg.lstsq(K1(A).reshape(-1, 3), K2(A, B, R).ravel(), rcond=None)[0]
+
+    return variant
+
+
+def _k1(A):
+    return np.eye(3) - A[:, :3, :3]
+
+
+def _k2(A, B, R):
+    return A[:, :3, 3] - B[:, :3, 3] @ R.T
+
+
+def gaps(rng):
+    A, B, R = translation_problem(rng)
+    return (ax_xb.translation_from_motions(A, B, R)[1],)
+
+
+# Outliers and time -----------------------------------------------------------------------------------------------------------
+
+
+SHARES = np.array([0.43, 0.5, 0.57, 0.64, 0.71, 0.78, 0.85, 0.92, 1.08, 1.2, 1.5, 1.9, 2.6, 4.0, 30.0])
+
+
+def spoiled(rng, factor):
+    """Values about 50, and more on both sides at certain shares of the limit: every other rule draws its line between
+    two of them, the rule itself where none is near.
+    """
+    core = np.r_[np.linspace(-1, 1, 121), np.zeros(4)] + 0.01 * rng.normal(size=125)
+    tail = np.r_[SHARES, SHARES[9:], -SHARES[:9]]
+    limit = factor * 1.4826 * _mad(np.r_[core, 99 * np.sign(tail)])
+    values = np.r_[core, np.median(np.r_[core, 99 * np.sign(tail)]) + limit * tail]
+    return rng.permutation(50 + rng.uniform(0.5, 2) * values), factor
+
+
+def _keep(center, scale, above=False):
+    def variant(values, factor):
+        distance = values - center(values)
+        return (distance if above else np.abs(distance)) <= factor * scale(values)
+
+    return variant
+
+
+def _tukey(values, factor):
+    low, high = np.percentile(values, [25, 75])
+    return (values >= low - 1.5 * (high - low)) & (values <= high + 1.5 * (high - low))
+
+
+def _mad(values):
+    return np.median(np.abs(values - np.median(values)))
+
+
+def speed_curves(rng, sign):
+    """Angular speeds of a robot and of a tracker that lags (sign 1), or leads (-1), by a fraction of a sample."""
+    time = np.arange(600) / 100
+    phase = rng.uniform(0, 6, 3)
+    lag = sign * (rng.integers(7, 15) + rng.choice([0.35, 0.42, 0.58, 0.65])) / 100
+
+    def curve(t):
+        return (
+            1.2
+            + 0.6 * np.sin(2.1 * t + phase[0])
+            + 0.3 * np.sin(3.7 * t + phase[1])
+            + 0.15 * np.sin(5.9 * t + phase[2])
+        )
+
+    return time, curve(time), curve(time - lag), 0.2
+
+
+def _overlap(reference, delayed):
+    """Sums of products over the overlap for every shift: the correlation NumPy calls "full", and the shifts."""
+    return -np.correlate(delayed, reference, "full"), np.arange(1 - len(reference), len(delayed))
+
+
+def _centered_overlap(reference, delayed):
+    return _overlap(reference - reference.mean(), delayed - delayed.mean())
+
+
+def _around(reference, delayed):
+    """Costs of shifts that bring the end of the curve back in at its beginning."""
+    shifts = np.arange(-20, 21)
+    return np.array([np.mean((np.roll(reference, s) - delayed) ** 2) for s in shifts]), shifts
+
+
+def _shifted(cost, reference, delayed, first=-20):
+    """Costs of the shifts from `first` to 20 samples over the part both curves share, and the shifts."""
+    n, shifts = len(reference), np.arange(first, 21)
+    parts = [(reference[max(0, -s) : n - max(0, s)], delayed[max(0, s) : n + min(0, s)]) for s in shifts]
+    return np.array([cost(r, d) for r, d in parts]), shifts
+
+
+def _squares(reference, delayed, first=-20):
+    return _shifted(lambda r, d: np.mean((d - r) ** 2), reference, delayed, first)
+
+
+def _products(reference, delayed):
+    """Sums of products over a core of constant length: the amount still varies with what the shift brings in."""
+    core = slice(20, -20)
+    shifts = np.arange(-20, 21)
+    return np.array([-(reference[core] * np.roll(delayed, -s)[core]).sum() for s in shifts]), shifts
+
+
+def _plain_differences(reference, delayed):
+    core, shifts = slice(20, -20), np.arange(-20, 21)
+    return np.array([np.mean(reference[core] - np.roll(delayed, -s)[core]) for s in shifts]), shifts
+
+
+def _least(costs, between):
+    """A time offset from costs of shifts, by whole samples or between them."""
+
+    def variant(time, reference, delayed, max_offset):
+        cost, shifts = costs(reference, delayed)
+        k = np.clip(np.argmin(cost), 1, len(cost) - 2) if between else np.argmin(cost)
+        part = 0.0
+        if between:
+            left, middle, right = cost[k - 1 : k + 2]
+            part = 0.5 * (left - right) / (left - 2 * middle + right)
+        return (shifts[k] + part) * (time[1] - time[0])
+
+    return variant
+
+
+def _whole_samples(time, reference, delayed, max_offset):
+    step = time[1] - time[0]
+    return round(time_offset(time, reference, delayed, max_offset) / step) * step
+
+
+# The six runs ----------------------------------------------------------------------------------------------------------------
+
+
+@functools.cache
+def _run_1(factor=4.0):
+    poses = read_table("tracker/poses.csv")
+    T_BF = simulation.flange_poses(np.deg2rad(np.column_stack([poses[f"q{i} [deg]"] for i in range(1, 7)])))
+    return T_BF, average_stops(read_csv(DATA / "tracker/run_1.csv"), factor)[0]
+
+
+def _mounting(factor=4.0, gate=8.0):
+    return calibrate_mounting(*_run_1(factor), gate).T_FE
+
+
+def _against_the_readings():
+    T_BF, T_WE = _run_1()
+    kept = calibrate_mounting(T_BF, T_WE).kept
+    A, B = relative(T_BF[0], T_BF)[kept][1:], relative(T_WE[0], T_WE)[kept][1:]
+    return ax_xb.solve_ax_xb(B, A)
+
+
+@functools.cache
+def _heights():
+    return np.array([m.T_FE[2, 3] for m in synthetic_mountings()])
+
+
+CHAPTER = Chapter(
+    "06-tracker",
+    title="A tracker on a robot flange",
+    items=[
+        Prediction(
+            "loss",
+            question="The packet has no sequence number and no checksum. How can a receiver know that one was lost?",
+            choices=("it cannot", "from gaps in the time stamps", "UDP reports it"),
+            answer="from gaps in the time stamps",
+            why="UDP says nothing. At a known rate a gap in the time stamps can be counted; a duplicate shows the same stamp twice.",
+        ),
+        Exercise(
+            "decode_packet",
+            reference=decode_packet,
+            draw=_packet,
+            metric=metrics.Several(
+                metrics.Numbers(1e-9, "s"),
+                metrics.Numbers(1e-9, "mm"),
+                metrics.Numbers(1e-9),
+                names=("time", "position", "quaternion"),
+            ),
+            hints=(
+                "Read all 184 bytes as 23 numbers of 8 bytes, then pick by the order of table 1.",
+                '`np.frombuffer(data, "<f8")` gives 23 little-endian doubles; number 0 is the device.',
+                "v = np.frombuffer(data, '<f8'); return v[1], 1000 * v[2:5], v[11:15].",
+            ),
+            mistakes=[
+                Mistake(
+                    _fields(scale=1.0),
+                    "The position is in meters, as the packet carries it. The workbook computes in mm.",
+                ),
+                Mistake(
+                    _fields(time=0, position=1, quaternion=10),
+                    "You are one field too early: number 0 is the device, the time stamp comes second.",
+                ),
+                Mistake(
+                    _fields(position=5),
+                    "These are the linear velocities (bytes 40 to 63). The position starts at byte 16.",
+                ),
+                Mistake(
+                    _fields(quaternion=15),
+                    "These are angular velocities. The quaternion starts at byte 88, which is number 11.",
+                ),
+                Mistake(
+                    _fields(position=8),
+                    "These are the linear accelerations (bytes 64 to 87). The position starts at byte 16.",
+                ),
+                Mistake(_fields(time=0), "Number 0 is the device. The time stamp comes second, number 1."),
+                *(
+                    Mistake(_fields(quaternion=k), "The quaternion is shifted by one field: it is numbers 11 to 14.")
+                    for k in (10, 12)
+                ),
+                Mistake(
+                    _fields(dtype="<f4"),
+                    "You read 46 numbers of 4 bytes. The fields have 8 bytes each: 23 doubles, `<f8`.",
+                ),
+                Mistake(
+                    _integers,
+                    "You read the fields as integers, so the numbers come out absurd. The workbook assumes doubles, `<f8`.",
+                ),
+                Mistake(
+                    _fields(dtype="u1"),
+                    "You picked single bytes. Turn every 8 bytes into one number first: `np.frombuffer` or `struct.unpack`.",
+                ),
+                Mistake(_scalar_first, "The packet's quaternion is x, y, z, w: you put w first."),
+                Mistake(
+                    _fields(dtype=">f8"),
+                    "You read the bytes in the wrong order (big-endian): the numbers come out absurd. The workbook assumes little-endian doubles.",
+                ),
+            ],
+        ),
+        Prediction(
+            "fold",
+            question="Upper arm and forearm are 225 mm each, the elbow bends by up to 138 deg from straight. How close can the wrist come to axis 2?",
+            answer=161.3,
+            unit="mm",
+            within=0.03,
+            why="An isosceles triangle: 2 * 225 mm * cos(138 deg / 2) = 161 mm. The data sheet prints 162 mm, so its 138 deg are rounded.",
+        ),
+        Exercise(
+            "dh_matrix",
+            reference=dh_matrix,
+            draw=link,
+            metric=metrics.Poses(1e-6, 1e-6),
+            hints=(
+                "Four elementary transforms in a row: turn about z, go along z, go along the new x, turn about the new x.",
+                "Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha): the last column is (a cos theta, a sin theta, d).",
+                "c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha); "
+                "return np.array([[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]]).",
+            ),
+            mistakes=[
+                Mistake(
+                    _link("XAZD"),
+                    "This is the modified (Craig) convention, Rot(x) Trans(x) Rot(z) Trans(z). The classic one begins with the turn about z.",
+                ),
+                Mistake(_link("ZDAX", swap=True), "d and a have changed places: d goes along z, a along x."),
+                Mistake(_link("ZDAX", alpha=-1), "alpha has the wrong sign: check the entries with sin(alpha)."),
+                Mistake(_link("ZDAX", theta=-1), "theta has the wrong sign: check the entries with sin(theta)."),
+                Mistake(
+                    _link("DAZX"),
+                    "You moved along x before turning about z, so the step a ignores theta. The last column begins with a cos(theta), a sin(theta).",
+                ),
+                Mistake(
+                    _moved_last,
+                    "d goes along the old z, before the turn by alpha. You moved after both turns.",
+                ),
+                Mistake(_entry_by_entry, "`*` multiplies entry by entry. The product of two transforms is `@`."),
+                Mistake(_without(1), "d is missing: the last column is (a cos theta, a sin theta, d)."),
+                Mistake(
+                    lambda th, d, a, al: dh_matrix(al, d, a, th),
+                    "The angles have changed places: theta turns about z, alpha about x.",
+                ),
+                Mistake(
+                    lambda th, d, a, al: pose(
+                        exp_so3([al, 0, 0]) @ exp_so3([0, 0, th]), dh_matrix(th, d, a, al)[:3, 3]
+                    ),
+                    "The two turns come in the wrong order: first about z, then about the new x, so R = Rz(theta) Rx(alpha).",
+                ),
+                Mistake(lambda *p: invert(dh_matrix(*p)), "This is the inverse: it maps from frame i - 1 to frame i."),
+                Mistake(
+                    lambda th, d, a, al: dh_matrix(np.deg2rad(th), d, a, np.deg2rad(al)),
+                    "The angles already are radians: you converted them once too often.",
+                ),
+                Mistake(
+                    lambda th, d, a, al: dh_matrix(np.rad2deg(th), d, a, np.rad2deg(al)),
+                    "The angles already are radians, which is what np.sin and np.cos take: convert nothing.",
+                ),
+            ],
+        ),
+        Exercise(
+            "forward_kinematics",
+            reference=forward_kinematics,
+            draw=joint_angles,
+            metric=metrics.Poses(1e-6, 1e-6),
+            hints=(
+                "Each link's frame is given in the frame before it, so neighboring letters cancel from the base to the flange.",
+                "T_BF = T_01 T_12 ... T_56, and the angle of a link is its offset plus the joint's angle.",
+                "T = np.eye(4); for (offset, d, a, alpha), angle in zip(dh, q): T = T @ dh_matrix(offset + angle, d, a, alpha); return T.",
+            ),
+            mistakes=[
+                Mistake(
+                    _without_offsets,
+                    "The offsets in the first column of dh are missing: the zero position of the TX40 is upright.",
+                ),
+                Mistake(
+                    lambda dh, q: functools.reduce(np.matmul, _links(dh, q)[::-1]),
+                    "You multiplied from the flange to the base. A new link goes on the right: T = T @ link.",
+                ),
+                Mistake(
+                    lambda dh, q: functools.reduce(np.matmul, _links(dh, q)[:-1]),
+                    "The last link is missing: this is the wrist, not the flange.",
+                ),
+                Mistake(
+                    lambda dh, q: functools.reduce(np.matmul, _links(dh, q)[1:]),
+                    "The first link is missing: did the loop start at 1?",
+                ),
+                Mistake(
+                    lambda dh, q: invert(forward_kinematics(dh, q)),
+                    "This is the base seen from the flange: the inverse.",
+                ),
+                Mistake(
+                    lambda dh, q: functools.reduce(np.multiply, _links(dh, q)),
+                    "`*` multiplies entry by entry. The product of two transforms is `@`.",
+                ),
+                Mistake(
+                    lambda dh, q: forward_kinematics(dh, 0 * q),
+                    "q does nothing here: the angle of a link is its offset plus the joint's angle.",
+                ),
+                Mistake(
+                    lambda dh, q: forward_kinematics(dh, np.deg2rad(q)),
+                    "The joint angles already are radians: you converted them once too often.",
+                ),
+                Mistake(
+                    lambda dh, q: forward_kinematics(dh[:, [0, 2, 1, 3]], q),
+                    "d and a have changed places: the columns of dh are theta offset, d, a, alpha.",
+                ),
+                Mistake(
+                    lambda dh, q: forward_kinematics(dh[:, [3, 1, 2, 0]], q),
+                    "Offset and alpha have changed places: the columns of dh are theta offset, d, a, alpha.",
+                ),
+                Mistake(
+                    lambda dh, q: forward_kinematics(dh, q - 2 * dh[:, 0]),
+                    "The offset enters with the wrong sign: the angle of a link is offset + q.",
+                ),
+                Mistake(
+                    lambda dh, q: _links(dh, q)[-1],
+                    "This is the last link alone. Multiply inside the loop: T = T @ link.",
+                ),
+                Mistake(
+                    lambda dh, q: _links(dh, q)[0],
+                    "This is the first link alone: does `return` stand inside the loop?",
+                ),
+                Mistake(
+                    lambda dh, q: _links(dh, q).sum(axis=0),
+                    "You added the links. Transforms in a row are multiplied with `@`.",
+                ),
+                Mistake(
+                    _links, "You return all links. Their product is the flange: T = T @ link, from base to flange."
+                ),
+                Mistake(
+                    lambda dh, q: forward_kinematics(dh, -q),
+                    "The joint angles enter with the wrong sign: the angle of a link is offset + q.",
+                ),
+            ],
+        ),
+        Prediction(
+            "axes",
+            question="All motions turn about one and the same axis. What do the residuals of the calibration look like?",
+            choices=(
+                "large, one sees it at once",
+                "perfect, and the mounting is arbitrary",
+                "perfect, and so is the mounting",
+            ),
+            answer="perfect, and the mounting is arbitrary",
+            why="Turning the mounting about the common axis changes nothing in A X = X B. Only the singular values tell.",
+        ),
+        Exercise(
+            "kron_row",
+            reference=kron_row,
+            draw=one_motion,
+            metric=metrics.UpToSign(1e-9),
+            hints=(
+                "Bring A X - X B = 0 into the form M vec(X) = 0, with the columns of X stacked.",
+                "For stacked columns, vec(P X Q) = (Q' kron P) vec(X). Once P = A, Q = I, once P = I, Q = B.",
+                "return np.kron(np.eye(3), A) - np.kron(B.T, np.eye(3)).",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda A, B: np.kron(A, np.eye(3)) - np.kron(np.eye(3), B.T),
+                    "This is the matrix for rows stacked (NumPy's ravel). The report stacks columns, as Matlab does: exchange the factors.",
+                ),
+                Mistake(
+                    lambda A, B: np.kron(np.eye(3), A) - np.kron(B, np.eye(3)),
+                    "B must be transposed: vec(X B) = (B' kron I) vec(X).",
+                ),
+                Mistake(
+                    lambda A, B: np.kron(np.eye(3), B) - np.kron(A.T, np.eye(3)),
+                    "A and B have changed places: in the report A is the tracker's motion, here it is the flange's.",
+                ),
+                Mistake(
+                    lambda A, B: np.kron(np.eye(3), A) + np.kron(B.T, np.eye(3)),
+                    "The sign between the two products is a minus: A X - X B = 0.",
+                ),
+                Mistake(
+                    lambda A, B: np.kron(np.eye(3), A.T) - np.kron(B, np.eye(3)),
+                    "Both matrices are transposed: this is the equation of the inverse motions.",
+                ),
+                Mistake(
+                    lambda A, B: np.kron(A, np.eye(3)) - np.kron(np.eye(3), B),
+                    "vec(P X Q) = (Q' kron P) vec(X): P stands on the right of the product, Q on the left and transposed. A is a P, B is a Q.",
+                ),
+                *(
+                    Mistake(
+                        variant,
+                        "One of the two factors stands on the wrong side: vec(A X) = (I kron A) vec(X), vec(X B) = (B' kron I) vec(X).",
+                    )
+                    for variant in (
+                        lambda A, B: np.kron(np.eye(3), A) - np.kron(np.eye(3), B.T),
+                        lambda A, B: np.kron(A, np.eye(3)) - np.kron(B.T, np.eye(3)),
+                    )
+                ),
+                *(
+                    Mistake(
+                        variant,
+                        "This belongs to the product A X B. Here two products are subtracted, A X - X B: each has its own kron, with I.",
+                    )
+                    for variant in (
+                        lambda A, B: np.kron(B.T, A),
+                        lambda A, B: np.kron(B.T, A) - np.eye(9),
+                        lambda A, B: np.kron(A, B.T),
+                        lambda A, B: np.kron(A, B),
+                    )
+                ),
+                *(
+                    Mistake(
+                        variant, "Only one of the two products is here: the block of A X - X B = 0 is a difference."
+                    )
+                    for variant in (
+                        lambda A, B: np.kron(np.eye(3), A),
+                        lambda A, B: np.kron(B.T, np.eye(3)),
+                    )
+                ),
+            ],
+        ),
+        Exercise(
+            "rotation_from_nullvector",
+            reference=rotation_from_nullvector,
+            draw=BOTH_SIGNS,
+            metric=metrics.Rotations(1e-5),
+            hints=(
+                "The singular vector of the smallest singular value, put back into a 3 x 3 matrix column by column.",
+                'Vt[-1].reshape(3, 3, order="F"); its sign is free, so make the determinant positive; then the nearest rotation by a second SVD.',
+                "Vt = np.linalg.svd(M)[2]; X = Vt[-1].reshape(3, 3, order='F'); X *= np.sign(np.linalg.det(X)); U, _, Wt = np.linalg.svd(X); return U @ Wt.",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda M: rotation_from_nullvector(M).T,
+                    "The null vector holds the columns of X. NumPy's reshape fills rows, so you got the transpose: the classic silent error.",
+                ),
+                Mistake(
+                    lambda M: -rotation_from_nullvector(M),
+                    "Your matrix has determinant -1. The null vector's sign is arbitrary: turn it so that the determinant is positive.",
+                ),
+                Mistake(
+                    lambda M: _signed(_null(M).reshape(3, 3, order="F")),
+                    "The null vector has length 1, a rotation has length sqrt(3): scaling and projection to SO(3) are missing.",
+                ),
+                Mistake(
+                    lambda M: np.sqrt(3) * _signed(_null(M).reshape(3, 3, order="F")),
+                    "The scale is right, but noise has sheared the matrix: its columns are not orthonormal. Project it to SO(3).",
+                ),
+                Mistake(
+                    lambda M: _orthonormal(_null(M).reshape(3, 3, order="F")),
+                    "The sign is missing: the null vector may come out as -X, and then your matrix is a reflection. Turn it so that the determinant is positive.",
+                ),
+                Mistake(
+                    lambda M: lie.nearest_rotation(_null(M).reshape(3, 3, order="F")),
+                    "The sign is missing. Where the null vector came out as -X you projected a reflection, and that gives another rotation: make the determinant positive first.",
+                ),
+                *(
+                    Mistake(
+                        lambda M, order=order, scale=scale: scale * _null(M).reshape(3, 3, order=order),
+                        "The null vector as it comes is no rotation yet: its length is 1, its sign is arbitrary, its columns are not orthonormal, and NumPy's reshape fills rows.",
+                    )
+                    for order in "CF"
+                    for scale in (1.0, np.sqrt(3))
+                ),
+                Mistake(
+                    lambda M: lie.nearest_rotation(_signed(np.linalg.svd(M)[2][:, -1].reshape(3, 3, order="F"))),
+                    "You took a column of NumPy's third result. That is V transposed: the singular vectors are its rows.",
+                ),
+                Mistake(
+                    lambda M: lie.nearest_rotation(_signed(_null(M, 0).reshape(3, 3, order="F"))),
+                    "This belongs to the largest singular value. NumPy sorts them from large to small: take the last row of Vt.",
+                ),
+                Mistake(
+                    lambda M: lie.nearest_rotation(_signed(np.linalg.eigh(M.T @ M)[1][0].reshape(3, 3, order="F"))),
+                    "You took a row of what `eigh` returns. Its eigenvectors are the columns, smallest eigenvalue first.",
+                ),
+                Mistake(
+                    lambda M: lie.nearest_rotation(_signed(_null(M[:9]).reshape(3, 3, order="F"))),
+                    "Only the first motion is used, and one axis leaves the rotation about it free: take all rows of M.",
+                ),
+                Mistake(
+                    lambda M: np.zeros((3, 3)),
+                    "Zero solves M x = 0 as well, and that is what `lstsq` and `solve` find. A solution of length 1 is wanted: "
+                    "the last row of Vt.",
+                ),
+                Mistake(
+                    _transposed_twice,
+                    "NumPy's svd returns V transposed as its third result: the nearest rotation is U @ Vt, without another `.T`.",
+                ),
+                *(
+                    Mistake(
+                        lambda M, keep=keep: _by_qr(M, keep),
+                        "QR keeps the direction of the first column and bends the others to fit. The nearest rotation treats all alike: "
+                        "U @ Vt of a second SVD.",
+                    )
+                    for keep in (True, False)
+                ),
+                *(
+                    Mistake(
+                        variant,
+                        "The lengths are right, but noise has sheared the matrix: its columns are not orthogonal. Project it to SO(3).",
+                    )
+                    for variant in (
+                        lambda M: unit_vector(_signed(_null(M).reshape(3, 3))).T,
+                        lambda M: unit_vector(_signed(_null(M).reshape(3, 3, order="F"))),
+                    )
+                ),
+            ],
+        ),
+        Exercise(
+            "translation_lsq",
+            reference=translation_lsq,
+            draw=translation_problem,
+            metric=metrics.Numbers(1e-7, "mm"),
+            hints=(
+                "Write out the last column of A X = X B. It is linear in the translation t once R is known.",
+                "R_A t + t_A = R t_B + t, so (I - R_A) t = t_A - R t_B: three rows a motion, stacked.",
+                "K1 = np.eye(3) - A[:, :3, :3]; K2 = A[:, :3, 3] - B[:, :3, 3] @ R.T; return np.linalg.lstsq(K1.reshape(-1, 3), K2.ravel())[0].",
+            ),
+            mistakes=[
+                Mistake(
+                    _translation(lambda A: -_k1(A), _k2),
+                    "The result has the opposite sign: (I - R_A) t = t_A - R t_B, not (R_A - I) t.",
+                ),
+                Mistake(
+                    _translation(_k1, lambda A, B, R: A[:, :3, 3] - B[:, :3, 3]),
+                    "R is missing: the tracker's translations are written in its own axes and must be turned into the flange's.",
+                ),
+                Mistake(
+                    _translation(_k1, lambda A, B, R: A[:, :3, 3] - B[:, :3, 3] @ R),
+                    "You turned the tracker's translations by R' instead of R. For rows, R t is `t @ R.T`.",
+                ),
+                Mistake(
+                    _translation(lambda A: np.eye(3) - np.swapaxes(A[:, :3, :3], 1, 2), _k2),
+                    "The rotations of the motions are transposed.",
+                ),
+                Mistake(
+                    lambda A, B, R: np.linalg.lstsq(_k1(A)[0], _k2(A, B, R)[0], rcond=None)[0],
+                    "Only the first motion is used. Its axis component stays undetermined: stack all motions.",
+                ),
+                Mistake(
+                    lambda A, B, R: np.einsum("nij,nj->ni", np.linalg.pinv(_k1(A)), _k2(A, B, R)).mean(axis=0),
+                    "You solved each motion alone and averaged. Each leaves t along its own axis free, and pinv sets that part to zero: "
+                    "stack all motions, solve once.",
+                ),
+                Mistake(
+                    _translation(lambda A: np.eye(3) + A[:, :3, :3], _k2),
+                    "K1 has the wrong sign: (I - R_A) t = t_A - R t_B.",
+                ),
+                Mistake(
+                    _translation(_k1, lambda A, B, R: A[:, :3, 3] + B[:, :3, 3] @ R.T),
+                    "K2 has the wrong sign: (I - R_A) t = t_A - R t_B.",
+                ),
+                Mistake(
+                    lambda A, B, R: _translation(_k1, _k2)(B, A, R),
+                    "A and B have changed places: K1 takes the rotations of the flange, and R turns the tracker's translations.",
+                ),
+                Mistake(
+                    lambda A, B, R: _translation(lambda _: _k1(B), _k2)(A, B, R),
+                    "K1 holds the rotations of the tracker. (I - R_A) t = t_A - R t_B: the flange's belong here.",
+                ),
+                *(
+                    Mistake(
+                        variant,
+                        "K1 and K2 stack their rows in different orders: first x, y, z of motion 1, then of motion 2, in both.",
+                    )
+                    for variant in (
+                        lambda A, B, R: np.linalg.lstsq(_k1(A).reshape(-1, 3), _k2(A, B, R).T.ravel(), rcond=None)[0],
+                        lambda A, B, R: np.linalg.lstsq(
+                            np.hstack(_k1(A)).reshape(-1, 3), _k2(A, B, R).ravel(), rcond=None
+                        )[0],
+                    )
+                ),
+            ],
+        ),
+        Exercise(
+            "e_rot",
+            reference=e_rot,
+            draw=BOTH_SIGNS,
+            metric=metrics.Numbers(1e-9),
+            hints=(
+                "Equation (13), taken at its word: the norm of M'M v, divided by N - 1. v is the null vector, of length 1.",
+                "M has 9 rows a motion, so N = len(M) / 9.",
+                "v = np.linalg.svd(M)[2][-1]; return np.linalg.norm(M.T @ (M @ v)) / (len(M) / 9 - 1).",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda M: e_rot(M) * (len(M) / 9 - 1) / (len(M) / 9),
+                    "You divide by N. The report divides by N - 1.",
+                ),
+                Mistake(
+                    lambda M: np.linalg.norm(M @ _null(M)) / (len(M) / 9 - 1),
+                    "This is the norm of M v. The report writes M'M v, which is the smallest singular value once more: its square.",
+                ),
+                Mistake(
+                    lambda M: np.sqrt(3) * e_rot(M),
+                    "Your v has the length of a rotation, sqrt(3). Equation (11) divides by the norm of v: length 1.",
+                ),
+                Mistake(
+                    lambda M: e_rot(M) * (len(M) / 9 - 1) / (len(M) - 1),
+                    "N counts motions. M has nine rows for each of them.",
+                ),
+                Mistake(
+                    lambda M: np.linalg.norm(M.T @ M @ _null(M, 0)) / (len(M) / 9 - 1),
+                    "This is the largest singular vector. The null vector is the last row of Vt.",
+                ),
+                Mistake(
+                    lambda M: e_rot(M) * (len(M) / 9 - 1),
+                    "The division by N - 1 is missing; N is the number of motions, len(M) / 9.",
+                ),
+                Mistake(
+                    lambda M: e_rot(M) * (len(M) / 9 - 1) / (len(M) / 9) - 1,
+                    "Parentheses are missing: / (N - 1), not / N - 1.",
+                ),
+                Mistake(
+                    lambda M: (e_rot(M) * (len(M) / 9 - 1)) ** 2 / (len(M) / 9 - 1),
+                    "You squared the norm. Equation (13) does not square it; M'M contains the squares already.",
+                ),
+                Mistake(
+                    lambda M: np.linalg.norm(M.T @ M @ np.linalg.svd(M)[2][:, -1]) / (len(M) / 9 - 1),
+                    "You took a column of NumPy's third result. That is V transposed: the singular vectors are its rows.",
+                ),
+                *(
+                    Mistake(
+                        lambda M, order=order: (
+                            np.linalg.norm(M.T @ M @ rotation_from_nullvector(M).ravel(order)) / (len(M) / 9 - 1)
+                        ),
+                        "You put in the projected rotation. Equation (13) takes the null vector v itself, before sign, length and projection.",
+                    )
+                    for order in "FC"
+                ),
+                Mistake(
+                    lambda M: np.linalg.norm(M.T @ M) / (len(M) / 9 - 1),
+                    "v is missing: this is the norm of the whole matrix M'M, not of M'M v.",
+                ),
+            ],
+        ),
+        Exercise(
+            "e_trans",
+            reference=e_trans,
+            draw=gaps,
+            metric=metrics.Numbers(1e-9, "mm"),
+            hints=(
+                "Equation (17), taken at its word: the norm of K1 t - K2, divided by N - 1.",
+                "The norm runs over all components of all N residuals, and it is not squared.",
+                "return np.linalg.norm(residuals) / (len(residuals) - 1).",
+            ),
+            mistakes=[
+                Mistake(lambda r: np.linalg.norm(r) / len(r), "You divide by N. The report divides by N - 1."),
+                Mistake(
+                    lambda r: (r**2).sum() / (len(r) - 1),
+                    "You squared the norm. The text speaks of squares, equation (17) does not square.",
+                ),
+                Mistake(
+                    lambda r: np.sqrt((r**2).sum() / (len(r) - 1)),
+                    "N - 1 stands outside the root in equation (17). Yours would be the better definition.",
+                ),
+                Mistake(
+                    lambda r: np.linalg.norm(r, axis=1).mean(),
+                    "This is the mean distance. Equation (17) takes one norm over everything.",
+                ),
+                Mistake(
+                    lambda r: np.linalg.norm(r, axis=1).sum() / (len(r) - 1),
+                    "You added N distances. Equation (17) takes one norm over everything.",
+                ),
+                Mistake(
+                    lambda r: np.linalg.norm(r, 2) / (len(r) - 1),
+                    "For a matrix, norm(..., 2) is its largest singular value. Equation (17) takes the norm of one long vector.",
+                ),
+                *(
+                    Mistake(variant, "N counts motions, not coordinates.")
+                    for variant in (
+                        lambda r: np.linalg.norm(r) / (r.size - 1),
+                        lambda r: np.linalg.norm(r) / (r.size - 3),
+                        lambda r: np.linalg.norm(r) / r.size,
+                    )
+                ),
+                Mistake(
+                    np.linalg.norm, "The division by N - 1 is missing; N is the number of motions, len(residuals)."
+                ),
+                Mistake(lambda r: np.linalg.norm(r) / len(r) - 1, "Parentheses are missing: / (N - 1), not / N - 1."),
+                *(
+                    Mistake(
+                        variant,
+                        "This is a root mean square, the better definition. Equation (17) takes no mean inside the root, and divides by N - 1.",
+                    )
+                    for variant in (
+                        lambda r: np.sqrt((r**2).mean()),
+                        lambda r: np.sqrt((r**2).sum(axis=1).mean()),
+                    )
+                ),
+                *(
+                    Mistake(
+                        lambda r, axis=axis: np.linalg.norm(r, axis=axis) / (len(r) - 1),
+                        "You return several norms. Equation (17) takes one norm over everything: no `axis`.",
+                    )
+                    for axis in (0, 1)
+                ),
+                Mistake(
+                    lambda r: np.abs(r).sum() / (len(r) - 1),
+                    "You added absolute values. The norm is the root of the sum of the squares.",
+                ),
+            ],
+        ),
+        Exercise(
+            "reject_outliers",
+            reference=reject_outliers,
+            draw=tuple(functools.partial(spoiled, factor=factor) for factor in (4.0, 3.0, 5.0)),
+            metric=metrics.Exactly(),
+            hints=(
+                "Measure how far each value is from the middle, in units of a spread. Outliers must move neither of the two.",
+                "Middle: the median. Spread: 1.4826 times the median of the distances from it; for normal noise that is a standard deviation.",
+                "d = np.abs(values - np.median(values)); return d <= factor * 1.4826 * np.median(d).",
+            ),
+            mistakes=[
+                Mistake(
+                    _keep(np.mean, np.std),
+                    "Mean and standard deviation are moved by the very values you want to find: the nonsense hides itself.",
+                ),
+                Mistake(
+                    _keep(np.median, _mad),
+                    "The factor 1.4826 is missing: the median distance is only 0.67 standard deviations.",
+                ),
+                Mistake(
+                    _keep(np.median, lambda v: np.abs(v - np.median(v)).mean()),
+                    "You took the mean of the distances. Gross values blow it up; take their median.",
+                ),
+                Mistake(lambda v, f: ~reject_outliers(v, f), "True means keep: your answer is the opposite."),
+                *(
+                    Mistake(
+                        _keep(np.mean, scale),
+                        "The mean is moved by the nonsense: measure the distances from the median.",
+                    )
+                    for scale in (
+                        lambda v: 1.4826 * _mad(v),
+                        lambda v: 1.4826 * np.median(np.abs(v - v.mean())),
+                    )
+                ),
+                Mistake(
+                    _keep(np.median, lambda v: _mad(v) / 1.4826),
+                    "Multiply the median distance by 1.4826: it is smaller than a standard deviation. You divided.",
+                ),
+                Mistake(
+                    lambda v, f: reject_outliers(v, 1.0),
+                    "`factor` is missing: you allow one standard deviation.",
+                ),
+                *(
+                    Mistake(
+                        lambda v, f, fixed=fixed: reject_outliers(v, fixed),
+                        "You use a number of your own in place of `factor`: the caller chooses it.",
+                    )
+                    for fixed in (4.0, 3.0)
+                ),
+                Mistake(
+                    _keep(np.median, lambda v: 1.0),
+                    "You compare distances with `factor` itself. It counts standard deviations: multiply it by the robust one.",
+                ),
+                Mistake(
+                    lambda v, f: v[reject_outliers(v, f)],
+                    "You return the values that stay. Wanted is True or False for each value.",
+                ),
+                *(
+                    Mistake(variant, "You return indices. Wanted is True or False for each value.")
+                    for variant in (
+                        lambda v, f: np.flatnonzero(reject_outliers(v, f)),
+                        lambda v, f: np.flatnonzero(~reject_outliers(v, f)),
+                    )
+                ),
+                Mistake(
+                    _tukey,
+                    "This is the rule of a box plot, 1.5 times the quartile distance. It knows no `factor`; take the median distance.",
+                ),
+                Mistake(
+                    _keep(np.median, lambda v: 1.4826 * _mad(v), above=True),
+                    "Values far below the middle pass: take the absolute value of the distance.",
+                ),
+            ],
+        ),
+        Value(
+            "mounting",
+            reference=_mounting,
+            unit="mm",
+            metric=metrics.Poses(0.002, 0.02),
+            hints=(
+                "Put your own functions in a row: blocks, rotation, translation. Pose 13 of this run is nonsense and must not take part.",
+                "A_kept, B_kept = A[kept][1:], B[kept][1:] are the motions that take part: kept poses, without the reference itself.",
+                "M = np.concatenate([kron_row(a[:3, :3], b[:3, :3]) for a, b in zip(A_kept, B_kept)]); R = rotation_from_nullvector(M); "
+                "mounting = np.eye(4); mounting[:3, :3] = R; mounting[:3, 3] = translation_lsq(A_kept, B_kept, R).",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: _mounting(gate=1e9),
+                    "The stop at which the tracker talked nonsense is still in: leave out what `kept` excludes.",
+                ),
+                Mistake(lambda: invert(_mounting()), "This is the flange seen from the tracker: the inverse."),
+                Mistake(
+                    _against_the_readings,
+                    "A and B have changed places: A is what the flange did, B what the tracker saw.",
+                ),
+                Mistake(
+                    lambda: pose(_mounting()[:3, :3], _mounting()[:3, 3] / 1000),
+                    "The translation is in meters; wanted are mm.",
+                ),
+            ],
+        ),
+        Value(
+            "spread",
+            reference=lambda: _heights().std(),
+            unit="mm",
+            rtol=1e-2,
+            hints=(
+                "Six numbers, the z of each mounting. Appendix D prints their variance (Rozptyl), divided by 6.",
+                "The standard deviation is the root of that variance.",
+                "spread = mountings[:, 2, 3].std().",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: _heights().std(ddof=1),
+                    "You divided by 5. For estimating a spread that is the better choice; appendix D divides by 6.",
+                ),
+                Mistake(lambda: _heights().var(), "This is the variance, in square millimeters. Its root is wanted."),
+                Mistake(
+                    lambda: _heights().var(ddof=1),
+                    "This is a variance, in square millimeters, and divided by 5. Divide by 6 and take the root.",
+                ),
+                Mistake(
+                    lambda: _heights().mean(), "This is the mean height. Wanted is how far the six scatter about it."
+                ),
+                *(
+                    Mistake(
+                        lambda axis=axis: np.std([m.T_FE[axis, 3] for m in synthetic_mountings()]),
+                        "This is the spread of another coordinate. The height z is `mountings[:, 2, 3]`.",
+                    )
+                    for axis in (0, 1)
+                ),
+                Mistake(
+                    lambda: np.std([m.T_FE for m in synthetic_mountings()]),
+                    "You took all entries of all matrices together. The height z is `mountings[:, 2, 3]`.",
+                ),
+                Mistake(
+                    lambda: np.ptp(_heights()),
+                    "This is the range from the lowest to the highest. Wanted is the standard deviation.",
+                ),
+                Mistake(
+                    lambda: _heights().std() / np.sqrt(6),
+                    "This is the standard error of the mean. Wanted is the spread of single runs.",
+                ),
+                Mistake(
+                    lambda: 1000 * np.sqrt(table_d()[2][2]),
+                    "This is the spread of the report's runs. Wanted is that of the six in `mountings`.",
+                ),
+            ],
+        ),
+        Prediction(
+            "runs",
+            question="Six runs over the same 21 poses agree within 0.2 mm. How far from the truth is their mean?",
+            choices=("about 0.1 mm, the spread over root 6", "about 0.2 mm, the spread", "the runs alone cannot tell"),
+            answer="the runs alone cannot tell",
+            why="An error that depends on the place repeats with the poses. Repeating shows the random part only; here the mean is off by more than 1 mm.",
+        ),
+        Prediction(
+            "methods",
+            question="Rotations are noisy (0.5 deg), translations good (0.1 mm). What is best?",
+            choices=("all methods alike", "rotation first, then translation", "both together, weighed by their noise"),
+            answer="both together, weighed by their noise",
+            why="Good translations at a distance know the rotation better than the rotations do. Methods that solve the rotation first throw that away.",
+        ),
+        Prediction(
+            "motion",
+            question="A robot moves at 1 m/s, the tracker lags 20 ms behind. How large is the error of the position?",
+            answer=20.0,
+            unit="mm",
+            within=0.05,
+            why="1000 mm/s times 0.02 s = 20 mm: accuracy in motion is a matter of time first.",
+        ),
+        Exercise(
+            "time_offset",
+            reference=time_offset,
+            draw=tuple(functools.partial(speed_curves, sign=sign) for sign in (1, -1)),
+            metric=metrics.Numbers(6e-4, "s"),
+            hints=(
+                "Shift one curve against the other, sample by sample, and find where they differ least. Then look between the samples.",
+                "Cost of a shift s: mean of (delayed[k + s] - reference[k])^2 over the common part. A parabola through the best three has its vertex at the offset.",
+                "step = time[1] - time[0]; n = round(max_offset / step); core = reference[n:-n]; "
+                "cost = [np.mean((delayed[n + s : len(time) - n + s] - core) ** 2) for s in range(-n, n + 1)]; "
+                "k = np.clip(np.argmin(cost), 1, 2 * n - 1); l, m, r = cost[k - 1 : k + 2]; "
+                "return (k - n + 0.5 * (l - r) / (l - 2 * m + r)) * step.",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda *a: -time_offset(*a),
+                    "The sign is reversed: positive means that the tracker lags behind.",
+                ),
+                Mistake(
+                    _whole_samples,
+                    "You stop at whole samples. At 1 m/s half a sample of 10 ms is 5 mm: fit a parabola through the best three.",
+                ),
+                Mistake(
+                    lambda t, *a: time_offset(t, *a) / (t[1] - t[0]),
+                    "Your answer counts samples. Multiply by the time between samples.",
+                ),
+                Mistake(lambda *a: 1000 * time_offset(*a), "Your answer is in milliseconds; wanted are seconds."),
+                Mistake(
+                    lambda t, r, d, m: 2 * _whole_samples(t, r, d, m) - time_offset(t, r, d, m),
+                    "The fraction has the wrong sign: the vertex lies toward the smaller of the two neighbors.",
+                ),
+                *(
+                    Mistake(
+                        _least(_around, between),
+                        "np.roll brings the end of the curve back in at its beginning. Compare only the part both curves share.",
+                    )
+                    for between in (True, False)
+                ),
+                *(
+                    Mistake(
+                        _least(costs, between),
+                        "A sum of products counts how many samples overlap as well as how alike they are, so its peak is pulled aside. "
+                        "Take the mean of the squared differences over the part both curves share.",
+                    )
+                    for costs in (_overlap, _centered_overlap, _products)
+                    for between in (True, False)
+                ),
+                Mistake(
+                    lambda t, r, d, m: time_offset(t, r, d, m) + m,
+                    "You count the shifts from the first one tried. That is -max_offset, not 0.",
+                ),
+                Mistake(
+                    lambda t, r, d, m: 2 * time_offset(t, r, d, m) - _whole_samples(t, r, d, m),
+                    "The fraction is twice too large: the vertex is at 0.5 * (l - r) / (l - 2 m + r).",
+                ),
+                *(
+                    Mistake(
+                        _least(functools.partial(_squares, first=0), between),
+                        "You try shifts in one direction only. The tracker may also lead: from -max_offset to max_offset.",
+                    )
+                    for between in (True, False)
+                ),
+                Mistake(
+                    _least(_plain_differences, False),
+                    "Differences of both signs cancel in a mean. Square them, or take absolute values.",
+                ),
+            ],
+        ),
+    ],
+)

@@ -1,0 +1,194 @@
+"""Figures of chapter 6: a serial arm as a stick figure with its flange and its tool."""
+
+import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
+
+from ...stage import style
+
+GROUND = np.linspace(0, 2 * np.pi, 49)
+
+
+class ArmPicture:
+    """The links of a robot, its joints, and the frames of flange and tool, in a 3D scene."""
+
+    def __init__(self, scene, triad=110.0):
+        floor = np.column_stack([np.cos(GROUND), np.sin(GROUND), 0 * GROUND])
+        for radius in (120.0, 240.0):
+            scene.fixed(scene.line(**style.look("guide")), radius * floor)
+        self.links = scene.line(color=style.MUTED, linewidth=7, solid_joinstyle="round")
+        self.core = scene.line(color=style.INK, linewidth=1.4)
+        self.joints = scene.points(color=style.INK, linestyle="none", marker="o", markersize=6)
+        self.base = scene.triad("B", triad)
+        self.flange = scene.triad("F", triad, linestyle=(0, (3, 1.5)))
+        self.tool = scene.triad("E", triad)
+        self.flange.name_at(-14, 1)
+        self.tool.name_at(-8, 11)
+        scene.fixed(self.base, np.eye(4))
+
+    def set(self, points, T_BF, T_BE):
+        """`points`: where the arm goes along, shape (6, 3), mm; the poses of flange and tool."""
+        for line in (self.links, self.core, self.joints):
+            line.set(points)
+        self.flange.set(T_BF)
+        self.tool.set(T_BE)
+
+
+SUMMARY = ("mean", "RMS", "median", "95 %")
+
+
+class Trail:
+    """Readings on their way through space: good ones, gated ones, and the filtered path."""
+
+    def __init__(self, scene, triad=90.0):
+        self.readings = scene.points(**style.look("measurement", markersize=4.5, markeredgewidth=0))
+        self.rejected = scene.points(**style.look("rejected"))
+        self.path = scene.line(**style.look("estimate", linewidth=1.8))
+        self.tracker = scene.triad("E", triad)
+        self.tracker.name_at(-9, 10)
+        scene.fixed(scene.triad("W", triad, linestyle=(0, (3, 1.5))), np.eye(4))
+        keys = (
+            ("measurement", "reading", {"markersize": 3}),
+            ("rejected", "refused by the gate", {}),
+            ("estimate", "filtered", {}),
+        )
+        self.legend = scene.ax.legend(
+            handles=[Line2D([], [], **style.look(role, label=name, **more)) for role, name, more in keys],
+            loc="upper left",
+            fontsize=8,
+        )
+
+    def set(self, positions, used, filtered, T_WE):
+        """Positions (k, 3), which of them passed the gate, the filtered positions, the last pose."""
+        nothing = np.full((1, 3), np.nan)
+        for item, points in (
+            (self.readings, positions[used]),
+            (self.rejected, positions[~used]),
+            (self.path, filtered),
+        ):
+            item.set(points if len(points) else nothing)
+        self.tracker.set(T_WE)
+
+    def path_in_front(self):
+        """The filtered path over its readings, which are as deep in the scene; call it after the scene is drawn."""
+        self.path.artist.set_zorder(3.2)
+
+
+class RotationAxes:
+    """Two rotation axes as lines through a sphere, and the frames that a noisy calibration finds, seen from their
+    tips."""
+
+    def __init__(self, scene, radius):
+        self.radius = radius
+        scene.fixed(scene.ellipsoid(**style.look("guide")), np.zeros(3), radius**2 * np.eye(3))
+        self.lines = [scene.line(color=style.INK, linewidth=2.0, linestyle=dash) for dash in ("-", (0, (4, 2)))]
+        self.clouds = [
+            scene.points(color=color, linestyle="none", marker=".", markersize=6, alpha=0.55, markeredgewidth=0)
+            for color in style.AXES
+        ]
+        self.truth = scene.triad("X", 0.55 * radius)
+        self.free = scene.line(**style.look("prediction"))
+
+    def set(self, axes, T, found, free):
+        """`axes` (2, 3), the true mounting, the found ones (n, 3, 3), and the path of a point that the data leave free
+        (or nothing)."""
+        for line, axis in zip(self.lines, axes):
+            line.set(np.outer([-1.0, 1.0], axis) * self.radius)
+        for k, cloud in enumerate(self.clouds):
+            cloud.set(0.55 * self.radius * found[:, :, k])
+        self.truth.set(T)
+        self.free.set(free)
+
+
+def singular_values(ax):
+    """The nine singular values of the Kronecker matrix, largest first, logarithmic. Returns (stems, markers)."""
+    style.axes(ax, "number", "singular value", "Kronecker matrix")
+    ax.set(xlim=(0.4, 9.6), ylim=(1e-4, 10), yscale="log")
+    ax.set_xticks(range(1, 10))
+    ax.yaxis.set_minor_formatter(NullFormatter())
+    (stems,) = ax.plot([], [], color=style.MUTED, linewidth=1.5)
+    (markers,) = ax.plot([], [], **style.look("estimates", markersize=7))
+    return stems, markers
+
+
+def set_singular_values(stems, markers, values):
+    """Nine values, (9,); what is below the axes is drawn at its edge."""
+    x, y = np.arange(1, 10), np.maximum(values, 1.2e-4)
+    stems.set_data(np.repeat(x, 3), np.column_stack([np.full(9, 1e-5), y, np.full(9, np.nan)]).ravel())
+    markers.set_data(x, y)
+
+
+def error_over_time(ax, seconds):
+    """Error of the readings and after correction over time, logarithmic. Returns (raw, nonsense, corrected)."""
+    style.axes(ax, "time, share of the motion", "error of the position (mm)")
+    ax.set(xlim=(0, seconds), ylim=(0.5, 20000), yscale="log")
+    (raw,) = ax.plot([], [], **style.look("measurement", markersize=2.5, markeredgewidth=0), label="reading")
+    (nonsense,) = ax.plot([], [], **style.look("rejected", markersize=5), label="nonsense")
+    (corrected,) = ax.plot([], [], **style.look("estimate", linewidth=1.6), label="gated, offset removed")
+    ax.legend(loc="upper right", ncol=1, markerscale=1.5)
+    return raw, nonsense, corrected
+
+
+def summary(ax):
+    """Mean, RMS, median and 95 % side by side. Returns (raw, corrected, claim, words)."""
+    style.axes(ax, "", "mm", "four summaries")
+    ax.set(xlim=(-0.5, 3.5), ylim=(0.5, 1000), yscale="log")
+    style.words_below(ax, SUMMARY)
+    ax.grid(axis="x", visible=False)
+    (raw,) = ax.plot([], [], **style.look("measurement", markersize=9))
+    (corrected,) = ax.plot([], [], **style.look("estimates", markersize=8))
+    claim = ax.axhline(15.0, **style.look("guide"))
+    ax.text(3.45, 16.5, "the report's 15 mm", ha="right", va="bottom", color=style.MUTED, fontsize=9)
+    words = ax.text(0.02, 0.98, "", transform=ax.transAxes, va="top", linespacing=1.5)
+    return raw, corrected, claim, words
+
+
+def method_chart(ax, names):
+    """Error over bound of several methods, rotation and translation. Returns (rotation, translation)."""
+    style.axes(ax, "rms error / Cramer-Rao bound", "", "20 poses, 400 trials")
+    ax.set(xlim=(0.8, 150), xscale="log", ylim=(len(names) - 0.4, -0.6))
+    ax.set_yticks(range(len(names)), names)
+    ax.set_xticks([1, 3, 10, 30, 100], ["1", "3", "10", "30", "100"])
+    ax.minorticks_off()
+    ax.axvline(1.0, color=style.INK, linewidth=1.6)
+    (rotation,) = ax.plot([], [], **style.look("estimates", markersize=8), label="rotation")
+    (translation,) = ax.plot(
+        [],
+        [],
+        **style.look("estimates", marker="o", markersize=8, markerfacecolor="none", markeredgewidth=1.8),
+        label="translation",
+    )
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
+    return rotation, translation
+
+
+class Repeated:
+    """Repeated calibrations in two coordinates: each result, the ellipse of their spread, the ellipse a single run
+    claims, the truth."""
+
+    def __init__(self, ax, truth, half_width=4.2):
+        style.axes(ax, "y of the mounting (mm)", "z of the mounting (mm)", "six runs, each 21 poses")
+        ax.set(xlim=(truth[1] - half_width, truth[1] + half_width), ylim=(truth[2] - half_width, truth[2] + half_width))
+        ax.plot(
+            *truth[1:], color=style.TRUTH, marker="+", markersize=16, markeredgewidth=2, linestyle="none", label="truth"
+        )
+        (self.runs,) = ax.plot([], [], **style.look("estimates", markersize=5), label="one run each")
+        (self.spread,) = ax.plot([], [], **style.look("estimate"), label="spread of the runs, 3 std")
+        (self.claim,) = ax.plot([], [], **style.look("prediction"), label="covariance of one run, 3 std")
+        ax.legend(loc="lower left", fontsize=8)
+        self.artists = [self.runs, self.spread, self.claim]
+
+    def set(self, results, spread, center, claim):
+        """Results (n, 2), their covariance (2, 2), center (2,) and covariance (2, 2) of a single run."""
+        self.runs.set_data(*results.T)
+        self.spread.set_data(*ellipse(results.mean(0), spread).T)
+        self.claim.set_data(*ellipse(center, claim).T)
+
+
+def ellipse(center, covariance, sigmas=3.0):
+    """Outline of an error ellipse, shape (65, 2)."""
+    angle = np.linspace(0, 2 * np.pi, 65)
+    values, vectors = np.linalg.eigh(covariance)
+    return (
+        center + sigmas * np.column_stack([np.cos(angle), np.sin(angle)]) @ (vectors * np.sqrt(np.maximum(values, 0))).T
+    )

@@ -1,0 +1,524 @@
+"""Stages of chapter 6: the TX40 with joint sliders and a flange to drag."""
+
+import functools
+import threading
+import time as clock
+
+import numpy as np
+
+from ...calibration import ax_xb
+from ...geometry.frames import invert, matrix_from_quaternion, pose, pose_distance, unit_vector
+from ...geometry.lie import exp_so3, nearest_rotation
+from ...machines import simulation, udp
+from ...machines.accuracy import filter_positions, shift_time, speeds, summarize, time_offset
+from ...machines.arm import HOME, TX40, arm_points, forward_kinematics, jacobian, reach_position, tool_pose
+from ...machines.log import reject_outliers
+from ...machines.packet import POSITION, QUATERNION, TIME, packet_from_pose
+from ...machines.simulation import T_FE, Tracker
+from ...stage import Choice, Handle, Play, Slider, Stage, Toggle, style
+from ...stage.scene3d import Scene, View
+from ...tables import read_table
+from . import figures as draw
+
+ARM = ("q1", "q2", "q3")
+NEARLY_SINGULAR = 25.0  # mm per rad: below it, turning the arm's joints hardly moves the flange in some direction
+
+
+def joints(state):
+    """Joint angles, rad, shape (6,): the arm from the sliders (deg), the wrist as at home."""
+    return np.concatenate([np.deg2rad([state[name] for name in ARM]), HOME[3:]])
+
+
+def compute_tx40(state):
+    """Arm, poses of flange and tracker, and what the first three joints can do at the flange: singular values, mm per
+    rad."""
+    q = joints(state)
+    T_BF = forward_kinematics(TX40.dh, q)
+    values = np.linalg.svd(jacobian(TX40.dh, q)[3:, :3], compute_uv=False)
+    return {"q": q, "points": arm_points(TX40, q), "T_BF": T_BF, "T_BE": T_BF @ T_FE, "singular_values": values}
+
+
+def follow(state, moved):
+    """Dragging the flange turns the arm, turning the arm moves the flange."""
+    q = joints(state)
+    if "flange" in moved and not moved & set(ARM):
+        q = reach_position(TX40, state["flange"], q)
+    at = forward_kinematics(TX40.dh, q)[:3, 3]
+    return {"flange": at, **{name: float(np.rad2deg(q[k])) for k, name in enumerate(ARM)}}
+
+
+def _sentence(result):
+    x, y, z = result["T_BE"][:3, 3]
+    if result["singular_values"][-1] < NEARLY_SINGULAR:
+        return (
+            f"A singular arm: in one direction the flange moves only {result['singular_values'][-1]:.0f} mm per rad. "
+            "Stretched out, no joint can push it farther."
+        )
+    off = np.linalg.norm(T_FE[:3, 3])
+    return f"The tracker E is at ({x:.0f}, {y:.0f}, {z:.0f}) mm in the base, {off:.0f} mm off the flange F."
+
+
+def tx40():
+    """The TX40: sliders for the arm's joints, the flange to drag; F is the flange, E the tracker mounted on it."""
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2, width_ratios=(1.7, 1))
+        space = Scene(left, radius=530)
+        arm = draw.ArmPicture(space)
+        style.bare(right)
+        words = right.text(0.0, 0.95, "", transform=right.transAxes, va="top", linespacing=1.7)
+
+        def update(state, result):
+            arm.set(result["points"], result["T_BF"], result["T_BE"])
+            space.draw(state["view"])
+            angles = "\n".join(f"joint {k + 1}   {np.rad2deg(a):6.0f} deg" for k, a in enumerate(result["q"]))
+            x, y, z = result["T_BF"][:3, 3]
+            low = result["singular_values"][-1]
+            words.set_text(f"{angles}\n\nF at {x:.0f}, {y:.0f}, {z:.0f} mm\nleast mobility\n{low:.0f} mm per rad")
+
+        return [*space.artists, words], update
+
+    limits = np.rad2deg([TX40.q_min[:3], TX40.q_max[:3]])
+    start = np.rad2deg(HOME[:3])
+    return Stage(
+        "TX40 with a tracker on its flange",
+        scene=scene,
+        compute=compute_tx40,
+        handles={"flange": Handle(tuple(forward_kinematics(TX40.dh, HOME)[:3, 3]), step=10, label="flange")},
+        controls={
+            name: Slider(
+                float(limits[0, k]), float(limits[1, k]), float(round(start[k])), step=1.0, label=f"joint {k + 1} (deg)"
+            )
+            for k, name in enumerate(ARM)
+        },
+        constrain=follow,
+        view=View(-60, 18, center=(120, 0, 440)),
+        fail={"q1": 30.0, "q2": 60.0, "q3": 14.0},
+        presets={"arm upright": {"q1": 0.0, "q2": 0.0, "q3": 0.0}},
+        describe=_sentence,
+    )
+
+
+# ---- live ------------------------------------------------------------------------------------------------------------
+
+LIVE_SECONDS, LIVE_STEP, TRAIL = 60.0, 0.02, 375  # s, s (the browser adds what it needs itself), readings drawn
+IDLE = 1.5  # s without a look after which the stream ends by itself
+
+
+class Link:
+    """A simulated tracker and a receiver, connected by real UDP packets; both start at the first look and end when
+    nobody looks any more."""
+
+    def __init__(self):
+        self.faults, self.nonsense = udp.Faults(duplicate=0.01, reorder=0.02, malformed=0.01), False
+        self._lock = threading.Lock()
+        self._listener = self._sender = None
+        self._looked = 0.0
+
+    def look(self, loss, nonsense):
+        """Readings (k, 23) and `udp.Statistics` so far; starts the stream if need be."""
+        self.faults.loss, self.nonsense = float(loss), bool(nonsense)
+        with self._lock:
+            self._looked = clock.monotonic()
+            if self._listener is None:
+                self._listener = udp.listen(keep=TRAIL)
+                packets = simulation.endless_packets(np.random.default_rng(1), lambda: self.nonsense)
+                stream = udp.stream(packets, simulation.RATE, self.faults, np.random.default_rng(2))
+                self._sender = udp.Sender(stream, self._listener.port)
+                threading.Thread(target=self._watch, name="tracker link", daemon=True).start()
+            return self._listener.readings(), self._listener.statistics()
+
+    def _watch(self):
+        while True:
+            clock.sleep(0.2)
+            with self._lock:
+                if clock.monotonic() - self._looked > IDLE:
+                    self._sender.close()
+                    self._listener.close()
+                    self._listener = self._sender = None
+                    return
+
+
+def compute_live(readings, statistics):
+    """What the picture shows of readings (k, 23): positions (mm), which passed the gate, the filtered path, the last
+    pose, the statistics."""
+    if len(readings) < 5:
+        readings = packet_from_pose(np.tile(np.eye(4), (5, 1, 1)), np.arange(5) / simulation.RATE)
+    positions = 1000 * readings[:, POSITION]
+    filtered, used = filter_positions(readings[:, TIME], positions)
+    last = pose(matrix_from_quaternion(readings[-1, QUATERNION]), filtered[-1])
+    return {"positions": positions, "used": used, "filtered": filtered, "T_WE": last, "statistics": statistics}
+
+
+SHORT = {
+    "length": "not 184 bytes",
+    "a number is not finite": "a number not finite",
+    "the quaternion is not of length 1": "quaternion not a unit",
+}
+
+
+def _live_words(result):
+    s = result["statistics"]
+    bad = "\n".join(f"   {SHORT.get(why, why)}   {count}" for why, count in sorted(s.bad.items())) or "   none"
+    return (
+        f"datagrams   {s.datagrams}\ngood   {s.good}\nlate   {s.late}\nduplicates   {s.duplicates}\n"
+        f"lost (from time stamps)   {s.lost}\nrefused by the gate, of {len(result['used'])}   "
+        f"{np.count_nonzero(~result['used'])}\nbad\n{bad}"
+    )
+
+
+def live_tracker():
+    """Real packets over UDP on this machine: press play, then lose packets and let the optics talk nonsense."""
+    link = Link()
+
+    def compute(state):
+        if state["t"] <= 0:
+            return compute_live(np.empty((0, 23)), udp.Statistics())
+        return compute_live(*link.look(state["loss"], state["nonsense"]))
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2, width_ratios=(1.5, 1))
+        space = Scene(left, radius=420)
+        trail = draw.Trail(space)
+        style.bare(right)
+        words = right.text(0.0, 0.97, "", transform=right.transAxes, va="top", linespacing=1.5)
+
+        def update(state, result):
+            trail.set(result["positions"], result["used"], result["filtered"], result["T_WE"])
+            space.draw(state["view"])
+            trail.path_in_front()
+            words.set_text(_live_words(result))
+
+        return [*space.artists, words], update
+
+    def sentence(result):
+        s = result["statistics"]
+        if not s.datagrams:
+            return "Press play: 250 packets a second start to arrive."
+        return f"{s.good} good readings, {s.lost} lost, {sum(s.bad.values())} bad, each counted once."
+
+    return Stage(
+        "live tracker",
+        scene=scene,
+        compute=compute,
+        controls={"loss": Slider(0.0, 0.5, 0.0, step=0.01, label="loss"), "nonsense": Toggle(False, "nonsense")},
+        play=Play(LIVE_SECONDS, LIVE_STEP),
+        view=View(-50, 30, center=(-60, 60, 0)),
+        fail={"loss": 0.4, "nonsense": True},
+        describe=sentence,
+    )
+
+
+# ---- A X = X B with two axes -----------------------------------------------------------------------------------------
+
+REPEATS = 60
+X_TRUE = pose(exp_so3([0.3, -0.5, 0.4]), [30.0, -20.0, 60.0])
+STD_TRANS = 0.2  # mm, of the sensor's translations
+
+
+@functools.cache
+def _axes_noise():
+    noise = np.random.default_rng(6).standard_normal((REPEATS, 2, 6))
+    noise.setflags(write=False)
+    return noise
+
+
+def compute_two_axes(state):
+    """Two motions about the dragged axes, calibrated from noisy readings again and again by the report's method.
+
+    Returns a dictionary: axes (2, 3), angle_deg between them, singular_values (9,) without noise, found (n, 3, 3),
+    error_deg and error_mm (median), predicted_deg (rms, from the smallest but one singular value), free: path of the
+    tip of X that parallel axes leave undetermined, (m, 3).
+    """
+    axes = unit_vector(np.array([state["a"], state["b"]]))
+    angle, noise = np.deg2rad(state["angle"]), np.deg2rad(state["noise"])
+    A = pose(exp_so3(angle * axes), [[120.0, -60, 80], [-70.0, 150, 40]])
+    B = invert(X_TRUE) @ A @ X_TRUE
+    values = np.linalg.svd(ax_xb.kronecker_matrix(A, B), compute_uv=False)
+    e = _axes_noise()
+    noisy = B @ pose(exp_so3(noise * e[..., :3]), STD_TRANS * e[..., 3:])
+    M = ax_xb.kronecker_matrix(np.tile(A, (REPEATS, 1, 1)), noisy.reshape(-1, 4, 4)).reshape(REPEATS, 18, 9)
+    X = np.swapaxes(np.linalg.svd(M)[2][:, -1].reshape(-1, 3, 3), 1, 2)
+    X = nearest_rotation(X * np.where(np.linalg.det(X) < 0, -1.0, 1.0)[:, None, None])
+    K1 = np.broadcast_to((np.eye(3) - A[:, :3, :3]).reshape(6, 3), (REPEATS, 6, 3))
+    K2 = (A[:, :3, 3] - (X[:, None] @ noisy[..., :3, 3, None])[..., 0]).reshape(REPEATS, 6, 1)
+    t = (np.linalg.pinv(K1) @ K2)[..., 0]
+    turn, off = pose_distance(pose(X, t), X_TRUE)
+    apart = np.rad2deg(np.arctan2(np.linalg.norm(np.cross(*axes)), abs(axes[0] @ axes[1])))
+    free = (
+        exp_so3(np.linspace(0, 2 * np.pi, 60)[:, None] * axes[0]) @ X_TRUE[:3, 0]
+        if apart < 2
+        else np.full((1, 3), np.nan)
+    )
+    return {
+        "axes": axes, "angle_deg": apart, "singular_values": values, "found": X, "free": 0.55 * free,
+        "error_deg": float(np.rad2deg(np.median(turn))), "error_mm": float(np.median(off)),
+        "predicted_deg": float(np.rad2deg(2 * noise / values[-2])) if values[-2] > 1e-9 else np.inf,
+    }  # fmt: skip
+
+
+def _on_sphere(state, moved):
+    return {name: unit_vector(state[name]) for name in ("a", "b")}
+
+
+def _two(value):
+    """A number in words: two digits, and no power of ten where it is large."""
+    return f"{value:.0f}" if value >= 100 else f"{value:.2g}"
+
+
+def _axes_sentence(result):
+    if result["angle_deg"] < 2:
+        return (
+            f"The axes are {result['angle_deg']:.1f} deg apart: the mounting may turn freely about them (dashed "
+            f"circle). "
+            f"Median error {result['error_deg']:.0f} deg, and the residuals look perfect."
+        )
+    error = f"{_two(result['error_deg'])} deg and {_two(result['error_mm'])} mm"
+    return f"Axes {result['angle_deg']:.0f} deg apart: median error {error}."
+
+
+def two_axes():
+    """Drag both rotation axes: the singular values and the error of the mounting follow."""
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2, width_ratios=(1.2, 1))
+        space = Scene(left, radius=1.3)
+        picture = draw.RotationAxes(space, 1.0)
+        stems, markers = draw.singular_values(right)
+        words = left.text(0.0, 1.0, "", transform=left.transAxes, va="top", linespacing=1.4, fontsize=9)
+
+        def update(state, result):
+            picture.set(result["axes"], pose(X_TRUE[:3, :3], np.zeros(3)), result["found"], result["free"])
+            space.draw(state["view"])
+            draw.set_singular_values(stems, markers, result["singular_values"])
+            words.set_text(
+                f"median error {_two(result['error_deg'])} deg, {_two(result['error_mm'])} mm\npredicted "
+                + (f"{_two(deg)} deg rms" if (deg := result["predicted_deg"]) < 180 else "without limit")
+            )
+
+        return [*space.artists, stems, markers, words], update
+
+    return Stage(
+        "A X = X B with two axes",
+        scene=scene,
+        compute=compute_two_axes,
+        handles={
+            "a": Handle((1.0, 0.0, 0.0), step=0.05, label="first rotation axis"),
+            "b": Handle((0.0, 0.6, 0.8), step=0.05, label="second rotation axis"),
+        },
+        controls={
+            "angle": Slider(1.0, 120.0, 40.0, step=1.0, label="angle of the motions (deg)"),
+            "noise": Slider(0.01, 1.0, 0.1, step=0.01, label="noise (deg)"),
+        },
+        constrain=_on_sphere,
+        view=View(-50, 25),
+        fail={"a": (0.0, 0.6, 0.8)},
+        presets={"small motions": {"angle": 2.0}},
+        describe=_axes_sentence,
+    )
+
+
+# ---- errors in motion ------------------------------------------------------------------------------------------------
+
+SAMPLES = 400
+
+
+@functools.cache
+def _slow_path():
+    time, q = simulation.robot_motion("slow", SAMPLES / simulation.SLOW_DURATION)
+    return time, tool_pose(TX40, q, T_FE)
+
+
+@functools.cache
+def _slow_speed():
+    return speeds(*_slow_path())[0].max() / 1000
+
+
+def compute_dynamic(state):
+    """Errors of the path run at a top speed (m/s) with a latency (ms), with nonsense or not, raw and mended."""
+    time, T = _slow_path()
+    time = time * _slow_speed() / state["speed"]
+    rng = np.random.default_rng(13)
+    tracker_now = Tracker(nonsense=0.015 if state["nonsense"] else 0.0, burst=2.0, latency=state["latency"] / 1000)
+    late = shift_time(time, T, -tracker_now.latency)
+    read, bad = tracker_now.spoil(tracker_now.read(late, rng), rng)
+    w, w_read = speeds(time, T)[1], speeds(time, late)[1]
+    w_read = np.abs(w_read + tracker_now.std_gyro * rng.normal(size=len(time)))
+    step = time[1] - time[0]
+    offset = time_offset(time, w, w_read, max_offset=max(3 * step, 0.08)) if step < 0.05 else 0.0
+    error = np.linalg.norm(read[:, :3, 3] - T[:, :3, 3], axis=1)
+    then = np.column_stack([np.interp(time - offset, time, T[:, axis, 3]) for axis in range(3)])
+    mended = np.linalg.norm(read[:, :3, 3] - then, axis=1)
+    keep = reject_outliers(mended, 6.0)
+    return {
+        "share": np.linspace(0, 1, len(time)), "error": error, "bad": bad, "mended": mended, "keep": keep,
+        "offset_ms": 1000 * offset,
+        "raw_summary": summarize(error), "mended_summary": summarize(mended[keep]),
+    }  # fmt: skip
+
+
+def dynamic_errors():
+    """One path at many speeds: latency, nonsense, and what four summaries make of them."""
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2, width_ratios=(1.4, 1))
+        raw, nonsense, corrected = draw.error_over_time(left, 1.0)
+        before, after, claim, words = draw.summary(right)
+
+        def update(state, result):
+            x, good = result["share"], ~result["bad"]
+            raw.set_data(x[good], result["error"][good])
+            nonsense.set_data(x[~good], result["error"][~good])
+            corrected.set_data(x[result["keep"]], result["mended"][result["keep"]])
+            before.set_data(range(4), [result["raw_summary"][name] for name in draw.SUMMARY])
+            after.set_data(range(4), [result["mended_summary"][name] for name in draw.SUMMARY])
+            words.set_text(f"offset found {result['offset_ms']:.1f} ms")
+
+        return [raw, nonsense, corrected, before, after, words], update
+
+    def sentence(result):
+        raw, mended = result["raw_summary"], result["mended_summary"]
+        return (
+            f"Readings: mean {raw['mean']:.1f} mm, median {raw['median']:.1f}, RMS {raw['RMS']:.0f}. "
+            f"Gated, with the offset of {result['offset_ms']:.0f} ms removed: mean {mended['mean']:.1f} mm."
+        )
+
+    return Stage(
+        "errors in motion",
+        scene=scene,
+        compute=compute_dynamic,
+        controls={
+            "speed": Slider(0.1, 1.4, 0.35, step=0.05, label="top speed (m/s)"),
+            "latency": Slider(0.0, 60.0, 8.0, step=1.0, label="latency (ms)"),
+            "nonsense": Toggle(True, "nonsense"),
+        },
+        fail={"speed": 1.4, "latency": 60.0},
+        presets={"fast, no nonsense": {"speed": 1.4, "latency": 20.0, "nonsense": False}},
+        describe=sentence,
+    )
+
+
+# ---- methods beside the bound ----------------------------------------------------------------------------------------
+
+CASES = {
+    "0.1 deg, 0.1 mm": (0.1, 0.1),
+    "0.1 deg, 1 mm": (0.1, 1.0),
+    "0.5 deg, 0.1 mm": (0.5, 0.1),
+    "0.5 deg, 1 mm": (0.5, 1.0),
+}
+
+
+@functools.cache
+def _benchmark():
+    return read_table("tracker/hand_eye_methods.csv", text=("method",))
+
+
+def compute_methods(state):
+    """Stored benchmark of one noise case: names, and error over bound of rotation and translation."""
+    table = _benchmark()
+    deg, mm = CASES[state["case"]]
+    rows = (table["std_deg"] == deg) & (table["std_mm"] == mm)
+    return {
+        "names": list(table["method"][rows]),
+        "rotation": table["rotation"][rows],
+        "translation": table["translation"][rows],
+    }
+
+
+def methods():
+    """Seven methods for A X = X B, their error as a multiple of the Cramer-Rao bound; stored results."""
+
+    def scene(fig):
+        names = compute_methods({"case": next(iter(CASES))})["names"]
+        rotation, translation = draw.method_chart(fig.subplots(), names)
+
+        def update(state, result):
+            for markers, key in ((rotation, "rotation"), (translation, "translation")):
+                markers.set_data(result[key], range(len(result["names"])))
+
+        return [rotation, translation], update
+
+    def sentence(result):
+        best, worst = np.argmin(result["rotation"]), np.argmax(result["rotation"])
+        return (
+            f"{result['names'][best]}: {result['rotation'][best]:.2f} times the bound in rotation; "
+            f"{result['names'][worst]}: {result['rotation'][worst]:.1f} times."
+        )
+
+    return Stage(
+        "methods beside the bound",
+        scene=scene,
+        compute=compute_methods,
+        controls={"case": Choice(list(CASES), "0.1 deg, 1 mm", label="noise")},
+        fail={"case": "0.5 deg, 0.1 mm"},
+        describe=sentence,
+        size=(7.0, 3.6),
+    )
+
+
+# ---- six runs --------------------------------------------------------------------------------------------------------
+
+
+@functools.cache
+def _stops():
+    joints = simulation.measuring_joints()
+    return simulation.flange_poses(joints), tool_pose(TX40, joints, T_FE)
+
+
+def compute_six_runs(state):
+    """Six calibrations over the same 21 poses, with a systematic error of a size (mm rms an axis) that depends on the
+    place."""
+    T_BF, T_BE = _stops()
+    field = float(state["field"])
+    tracker_now = Tracker(
+        std_position=0.06, std_rotation=np.deg2rad(0.008), field_position=field, field_rotation=np.deg2rad(0.14) * field
+    )
+    results = []
+    for run in range(simulation.RUNS):
+        rng = np.random.default_rng([66, run])
+        drift = rng.normal(size=(len(T_BE), 6)) * np.repeat([tracker_now.drift_rotation, tracker_now.drift_position], 3)
+        T_read = tracker_now.read(T_BE, rng, drift)
+        reading = invert(T_read[0]) @ T_read
+        A, B = invert(T_BF[0]) @ T_BF[1:], reading[1:]
+        results.append(ax_xb.solve_ax_xb(A, B)[:3, 3])
+    single = ax_xb.calibrate_hand_eye(invert(T_BF), reading)
+    results = np.array(results)
+    return {
+        "results": results, "spread": np.cov(results.T, bias=True), "mean": results.mean(0),
+        "single": single.target[:3, 3], "claim": single.covariance[9:, 9:],
+        "off": float(np.linalg.norm(results.mean(0) - T_FE[:3, 3])),
+        "std": float(np.sqrt(results.var(0).sum())),
+    }  # fmt: skip
+
+
+def six_runs():
+    """Six runs over the same poses: how well they agree, and how far they all are from the truth."""
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2, width_ratios=(1.35, 1))
+        picture = draw.Repeated(left, T_FE[:3, 3])
+        style.bare(right)
+        words = right.text(0.0, 0.9, "", transform=right.transAxes, va="top", linespacing=1.7)
+
+        def update(state, result):
+            picture.set(
+                result["results"][:, 1:], result["spread"][1:, 1:], result["single"][1:], result["claim"][1:, 1:]
+            )
+            words.set_text(
+                f"spread over six runs\n{result['std']:.2f} mm\n\nmean off the truth\n{result['off']:.2f} mm\n\n"
+                f"std that one run claims\n{np.sqrt(np.trace(result['claim'])):.2f} mm"
+            )
+
+        return [*picture.artists, words], update
+
+    return Stage(
+        "six runs",
+        scene=scene,
+        compute=compute_six_runs,
+        controls={"field": Slider(0.0, 3.0, 2.0, step=0.1, label="systematic error (mm)")},
+        fail={"field": 3.0},
+        presets={"no systematic error": {"field": 0.0}},
+        describe=lambda r: (
+            f"The six runs agree within {r['std']:.2f} mm; their mean is {r['off']:.2f} mm off the truth."
+        ),
+    )

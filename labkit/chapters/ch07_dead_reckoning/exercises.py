@@ -1,0 +1,1242 @@
+"""Chapter 7: lateration, motion models, propagation of uncertainty."""
+
+import functools
+
+import numpy as np
+
+from ...documents.lecture import printed as lecture
+from ...exercises import metrics
+from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...localization import lateration, odometry
+
+# Draws -----------------------------------------------------------------------
+
+
+def two_circles(rng, left=True, up=True, with_origin=True):
+    """Two landmarks, exact distances to a robot off their line, and a start near it.
+
+    left: of the way from the first landmark to the second; up: above its mirror image; with_origin: on the origin's
+    side of the line, which a search from (0, 0) finds without the start.
+    """
+    side = 1 if left else -1
+    angle, base = rng.uniform(-1.4, 1.4) + (0 if left == up else np.pi), rng.uniform(4, 9)
+    along = np.array([np.cos(angle), np.sin(angle)])
+    across = side * np.array([-along[1], along[0]])
+    a = rng.uniform(-5, 5, 2)
+    a = a if (a @ across < 0) == with_origin else -a
+    robot = a + rng.uniform(0.2, 0.8) * base * along + rng.uniform(2, 5) * across
+    landmarks = np.array([a, a + base * along])
+    return landmarks, np.linalg.norm(landmarks - robot, axis=1), robot + rng.uniform(-0.6, 0.6, 2)
+
+
+def several_circles(rng):
+    """Three to five landmarks, distances that do not fit exactly, and a position."""
+    landmarks = rng.uniform(-5, 5, (rng.integers(3, 6), 2))
+    position = rng.uniform(-5, 5, 2)
+    off = rng.uniform(0.05, 0.2, len(landmarks)) * (-1) ** np.arange(len(landmarks))
+    return landmarks, np.linalg.norm(landmarks - position, axis=1) * (1 + off), position
+
+
+CIRCLES = tuple(
+    functools.partial(two_circles, left=left, up=up, with_origin=left == up)
+    for up in (True, False)
+    for left in (True, False)
+)
+
+
+def two_wheels(rng, faster_right=True):
+    """Speeds of the left and the right wheel that turn the robot to this side, and the track."""
+    slow, more = rng.uniform(-1, 1), rng.uniform(0.2, 1)
+    return (slow, slow + more, rng.uniform(0.2, 0.8)) if faster_right else (slow + more, slow, rng.uniform(0.2, 0.8))
+
+
+WHEELS = (two_wheels, functools.partial(two_wheels, faster_right=False))
+
+
+def pose_control_step(rng, side=None):
+    """A pose, a control that turns to this side (1 left, -1 right), and a time step that tells the models apart."""
+    x = np.array([*rng.uniform(-5, 5, 2), rng.uniform(-3, 3)])
+    omega = rng.uniform(0.4, 1.5) * (side or rng.choice([-1, 1]))
+    return x, np.array([rng.uniform(0.5, 2), omega]), rng.uniform(0.3, 0.9)
+
+
+EITHER_SIDE = (functools.partial(pose_control_step, side=1), functools.partial(pose_control_step, side=-1))
+
+
+def noisy_control(rng, signs):
+    """A control whose parts have these signs, a time step, and three noise constants."""
+    v, omega = rng.uniform(0.3, 2), rng.uniform(0.2, 1.5)
+    return np.array([v, omega]) * signs, rng.uniform(0.05, 0.5), *rng.uniform(0.001, 0.02, 3)
+
+
+NOISY_CONTROLS = tuple(functools.partial(noisy_control, signs=signs) for signs in ((-1, 1), (1, -1), (-1, -1)))
+
+
+def pose_and_covariances(rng):
+    """Pose, its covariance, control, time step, covariance of the control."""
+    x, u, dt = pose_control_step(rng)
+    M, N = rng.normal(size=(3, 3)), rng.normal(size=(2, 2))
+    return x, 0.1 * M @ M.T, u, dt, 0.05 * N @ N.T
+
+
+# References and wrong variants ------------------------------------------------
+
+
+def newton_lateration(landmarks, distances, start):
+    return lateration.newton_lateration(landmarks, distances, start).position
+
+
+def lateration_residual(landmarks, distances, position):
+    return lateration.square_residuals(landmarks, distances, position)
+
+
+def _newton(change, steps=20):
+    """A Newton iteration whose residuals and Jacobian pass through `change(J, f, distances)` before the step."""
+
+    def variant(landmarks, distances, start):
+        x = np.array(start, dtype=float)
+        for _ in range(steps):
+            away = x - landmarks
+            J, f = change(2 * away, (away**2).sum(1) - distances**2, distances)
+            x = x - np.linalg.solve(J, f)
+        return x
+
+    return variant
+
+
+def _mirrored(landmarks, distances, start):
+    roots = lateration.circle_intersections(landmarks, distances)
+    return roots[np.argmax(np.linalg.norm(roots - start, axis=1))]
+
+
+def step_euler(x, u, dt):
+    return odometry.step(x, u, dt, "euler")
+
+
+def step_midpoint(x, u, dt):
+    return odometry.step(x, u, dt, "midpoint")
+
+
+def step_arc(x, u, dt):
+    return odometry.step(x, u, dt, "arc")
+
+
+def _straight(length, direction, turn):
+    """Step variants: how far, in which direction, by how much the heading turns, each a function of (theta, v, omega, dt)."""
+
+    def variant(x, u, dt):
+        values = (x[2], u[0], u[1], dt)
+        d, a = length(*values), direction(*values)
+        return np.array([x[0] + d * np.cos(a), x[1] + d * np.sin(a), x[2] + turn(*values)])
+
+    return variant
+
+
+def _way(theta, v, omega, dt):
+    return v * dt
+
+
+def _turn(theta, v, omega, dt):
+    return omega * dt
+
+
+def _before(theta, v, omega, dt):
+    return theta - omega * dt / 2
+
+
+def _mean(theta, v, omega, dt):
+    return (theta + omega * dt) / 2
+
+
+def _beyond(theta, v, omega, dt):
+    return theta + 1.5 * omega * dt
+
+
+def _slips(length, direction, angle):
+    """What goes wrong in every model: the right `length` and `direction` with one slip; `angle` names the latter."""
+    step = _straight(length, direction, _turn)
+
+    def per_second(theta, v, omega, dt):
+        return length(theta, v, omega, dt) / dt
+
+    return [
+        Mistake(
+            _straight(per_second, direction, lambda th, v, w, dt: w),
+            "The time step is missing: v and omega are per second.",
+        ),
+        Mistake(_straight(per_second, direction, _turn), "The time step is missing from the way: it is v T, not v."),
+        Mistake(_straight(length, direction, lambda th, v, w, dt: w), "The heading turns by omega T, not by omega."),
+        Mistake(
+            _straight(length, direction, lambda th, v, w, dt: -w * dt),
+            "Your robot turns to the wrong side: theta grows by omega T.",
+        ),
+        Mistake(_straight(length, direction, lambda th, v, w, dt: 0.0), "The heading stays what it was: add omega T."),
+        Mistake(
+            _straight(length, direction, lambda th, v, w, dt: w * dt / 2),
+            "The robot ends turned by the whole omega T, not by half of it.",
+        ),
+        Mistake(
+            _straight(length, lambda *given: np.radians(direction(*given)), _turn),
+            "theta is in radians already: no conversion inside cosine and sine.",
+        ),
+        Mistake(
+            _straight(length, lambda *given: np.degrees(direction(*given)), _turn),
+            "np.cos and np.sin take radians, and theta is in radians already: do not convert.",
+        ),
+        Mistake(
+            lambda x, u, dt: x + (step(x, u, dt) - x)[[1, 0, 2]],
+            f"Sine and cosine are exchanged: x goes with the cosine of {angle}, y with the sine.",
+        ),
+        Mistake(lambda x, u, dt: step(x, u, dt) - x, "You return what the step adds: add the old pose."),
+        Mistake(
+            lambda x, u, dt: step(x, u, dt) - x * [1, 1, 0],
+            "The old position is missing: add x[0] and x[1] to the way.",
+        ),
+        Mistake(
+            lambda x, u, dt: step(x, u, dt) - x * [0, 0, 1], "The old heading is missing: theta' = theta + omega T."
+        ),
+        Mistake(
+            lambda x, u, dt: step(x, u, dt) * [1, 1, np.degrees(1)], "The heading is in degrees: leave it in radians."
+        ),
+        Mistake(lambda x, u, dt: step(x, u[::-1], dt), "v and omega have changed places: u = (v, omega)."),
+        Mistake(
+            lambda x, u, dt: step(x, u, dt) * [1, -1, 1] + 2 * x * [0, 1, 0],
+            f"A sign in y: add the way times the sine of {angle}.",
+        ),
+    ]
+
+
+def _chord(theta, v, omega, dt):
+    return v * dt * np.sinc(omega * dt / 2 / np.pi)
+
+
+def _old(theta, v, omega, dt):
+    return theta
+
+
+def _half(theta, v, omega, dt):
+    return theta + omega * dt / 2
+
+
+def _new(theta, v, omega, dt):
+    return theta + omega * dt
+
+
+def _arc_sign(x, u, dt):
+    r, after = u[0] / u[1], x[2] + u[1] * dt
+    return np.array([x[0] + r * (np.sin(x[2]) - np.sin(after)), x[1] + r * (np.cos(after) - np.cos(x[2])), after])
+
+
+def _arc_from(radius):
+    def variant(x, u, dt):
+        r, after = radius(*u), x[2] + u[1] * dt
+        return np.array([x[0] + r * (np.sin(after) - np.sin(x[2])), x[1] - r * (np.cos(after) - np.cos(x[2])), after])
+
+    return variant
+
+
+def _arc_y_sign(x, u, dt):
+    r, after = u[0] / u[1], x[2] + u[1] * dt
+    return np.array([x[0] + r * (np.sin(after) - np.sin(x[2])), x[1] + r * (np.cos(after) - np.cos(x[2])), after])
+
+
+def _straight_line_works(function, rng):
+    """The limit omega -> 0: exactly straight, and near it without a jump."""
+    x, u, dt = np.array([1.0, 2.0, rng.uniform(-3, 3)]), np.array([1.5, 0.0]), 0.8
+    expected = odometry.step(x, u, dt, "arc")
+    for omega in (0.0, 1e-9):
+        with np.errstate(all="ignore"):
+            try:
+                result = np.asarray(function(x, np.array([1.5, omega]), dt), dtype=float)
+            except ZeroDivisionError:
+                result = np.full(3, np.nan)
+        if result.shape != (3,) or not np.isfinite(result).all():
+            return f"right on curves, but with omega = {omega:g} the result is not finite: the radius v / omega has no value there."
+        if not metrics.PlanarPoses(1e-6).equal(result, expected):
+            return f"right on curves, but with omega = {omega:g} the robot should drive straight on; the result is off."
+    return None
+
+
+def jacobian_state(x, u, dt):
+    return odometry.step_jacobians(x, u, dt, "euler")[0]
+
+
+def jacobian_control(x, u, dt):
+    return odometry.step_jacobians(x, u, dt, "euler")[1]
+
+
+def _state_entries(first, second):
+    def variant(x, u, dt):
+        F = np.eye(3)
+        F[0, 2], F[1, 2] = first(x, u, dt), second(x, u, dt)
+        return F
+
+    return variant
+
+
+def _control_entries(first, second, third):
+    def variant(x, u, dt):
+        F = np.zeros((3, 2))
+        F[0, 0], F[1, 0], F[2, 1] = first(x, dt), second(x, dt), third(dt)
+        return F
+
+    return variant
+
+
+def _covariance(var_v, var_omega):
+    def variant(u, dt, k_d, k_theta, k_drift):
+        arguments = (u[0], u[1], dt, k_d, k_theta, k_drift)
+        return np.diag([var_v(*arguments), var_omega(*arguments)])
+
+    return variant
+
+
+def propagate(x, cov, u, dt, cov_u):
+    return odometry.propagate(x, cov, u, dt, cov_u, "euler")
+
+
+def _propagated(change):
+    """Propagation with `change(F_x, F_u, cov, cov_u)` for the covariance."""
+
+    def variant(x, cov, u, dt, cov_u):
+        F_x, F_u = odometry.step_jacobians(x, u, dt, "euler")
+        return odometry.step(x, u, dt, "euler"), change(F_x, F_u, cov, cov_u)
+
+    return variant
+
+
+@functools.cache
+def _circle(model="euler", **changes):
+    drive = lecture.circle_drive()
+    noise = drive.noise | changes
+    poses, covs = odometry.drive_with_covariance(
+        np.zeros(3), np.zeros((3, 3)), drive.controls, drive.dt, **noise, model=model
+    )
+    return poses[-1], covs[-1]
+
+
+@functools.cache
+def _loop(step=propagate, steps=None, start_cov=0.0, **noise):
+    """The loop over the circle with another step, fewer steps, another covariance at the start or other constants."""
+    drive = lecture.circle_drive()
+    x, cov = np.zeros(3), start_cov * np.eye(3)
+    for u in drive.controls[:steps]:
+        x, cov = step(x, cov, u, drive.dt, odometry.control_covariance(u, drive.dt, **(drive.noise | noise)))
+    return x, cov
+
+
+def _turned_first(x, cov, u, dt, cov_u):
+    return _straight(_way, _new, _turn)(x, u, dt), cov
+
+
+def _wrong_side(x, cov, u, dt, cov_u):
+    F_x, F_u = odometry.step_jacobians(x, u, dt, "euler")
+    return step_euler(x, u, dt), F_x.T @ cov @ F_x + F_u @ cov_u @ F_u.T
+
+
+def _at_new_pose(x, cov, u, dt, cov_u):
+    moved = step_euler(x, u, dt)
+    return moved, propagate(moved, cov, u, dt, cov_u)[1]
+
+
+def _exchanged():
+    noise = lecture.circle_drive().noise
+    return _loop(k_theta=noise["k_drift"], k_drift=noise["k_theta"])[1]
+
+
+def _without_carrying():
+    """The control's noise of all steps added up, what earlier errors do later left out."""
+    drive = lecture.circle_drive()
+    poses = odometry.drive(np.zeros(3), drive.controls, drive.dt, "euler")[:-1]
+    F_u = odometry.step_jacobians(poses, drive.controls, drive.dt, "euler")[1]
+    cov_u = odometry.control_covariance(drive.controls, drive.dt, **drive.noise)
+    return (F_u @ cov_u @ np.swapaxes(F_u, -1, -2)).sum(0)
+
+
+CHAPTER = Chapter(
+    "07-dead-reckoning",
+    title="Lateration and dead reckoning",
+    items=[
+        Prediction(
+            "method",
+            question="A robot wakes up somewhere in a known hall and has nothing but wheel odometry. Which method finds out where it is?",
+            choices=("dead reckoning", "the Kalman filter", "the particle filter", "none of them"),
+            answer="none of them",
+            why="Odometry only says how far the robot came from where it was. Without a known start there is nothing to add it to.",
+        ),
+        Exercise(
+            "lateration_residual",
+            reference=lateration_residual,
+            draw=several_circles,
+            metric=metrics.Numbers(1e-9),
+            hints=(
+                "Each landmark gives one equation that is zero when the position lies on its circle.",
+                "The lecture's equation i: (x_i - x)^2 + (y_i - y)^2 - d_i^2.",
+                "`return ((landmarks - position) ** 2).sum(axis=1) - distances**2`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda L, d, p: np.linalg.norm(L - p, axis=1) - d,
+                    "You compare lengths, in meters. That is the better cost, as you will see, but the lecture's equation compares squares.",
+                ),
+                Mistake(lambda L, d, p: ((L - p) ** 2).sum(1) - d, "You forgot to square the measured distances."),
+                Mistake(
+                    lambda L, d, p: (((L - p) ** 2).sum(1) - d**2) ** 2,
+                    "You squared the residual as well. The squaring is done when the residuals are added up to the cost.",
+                ),
+                Mistake(
+                    lambda L, d, p: ((L - p) ** 2).sum(1) + d**2,
+                    "The measured square is to be subtracted: on the circle the residual is zero.",
+                ),
+                Mistake(
+                    lambda L, d, p: (L**2).sum(1) - (p**2).sum() - d**2,
+                    "|a - b|^2 is not |a|^2 - |b|^2: subtract first, then square.",
+                ),
+                Mistake(
+                    lambda L, d, p: np.linalg.norm(L - p) ** 2 - d**2,
+                    "Without axis=1 the sum (or the norm) runs over all landmarks at once: one sum a row is wanted.",
+                ),
+                Mistake(
+                    lambda L, d, p: d**2 - ((L - p) ** 2).sum(1),
+                    "Turned around: the lecture's equation is computed square minus measured square.",
+                ),
+                Mistake(
+                    lambda L, d, p: np.abs(((L - p) ** 2).sum(1) - d**2),
+                    "No absolute value: the sign tells inside from outside of the circle, and the search needs it.",
+                ),
+                Mistake(
+                    lambda L, d, p: np.linalg.norm(L - p, axis=1) - d**2,
+                    "You square the measured distance, but not the computed one.",
+                ),
+                Mistake(
+                    lambda L, d, p: (np.linalg.norm(L - p, axis=1) - d) ** 2,
+                    "Square first, then subtract: (a - b)^2 is not a^2 - b^2.",
+                ),
+                Mistake(
+                    lambda L, d, p: (L - p).sum(1) ** 2 - d**2,
+                    "Square dx and dy one by one, then add: (dx + dy)^2 is not dx^2 + dy^2.",
+                ),
+                Mistake(
+                    lambda L, d, p: (((L - p) ** 2).sum(1) - d**2).sum(),
+                    "One residual a landmark is wanted, not their sum.",
+                ),
+                Mistake(
+                    lambda L, d, p: ((((L - p) ** 2).sum(1) - d**2) ** 2).sum(),
+                    "This is the cost, one number. Here the residuals are wanted, one a landmark.",
+                ),
+                Mistake(
+                    lambda L, d, p: ((L[0] - p) ** 2).sum() - d[0] ** 2,
+                    "Only the first landmark: does `return` stand inside the loop?",
+                ),
+            ],
+        ),
+        Prediction(
+            "roots",
+            question="Two landmarks, two exact distances. In how many points of the plane can the robot stand?",
+            choices=("one", "two", "infinitely many"),
+            answer="two",
+            why="Two circles meet in two points, mirror images in the line through the landmarks. Which one Newton finds is decided by the start.",
+        ),
+        Exercise(
+            "newton_lateration",
+            reference=newton_lateration,
+            draw=CIRCLES,
+            metric=metrics.Numbers(1e-8, "m"),
+            hints=(
+                "Replace the residuals by their tangent planes, go to where those are zero, repeat.",
+                "Row i of the Jacobian is 2 (position - landmark_i). The step solves J step = -residual.",
+                "Three lines: `position = start`, `for _ in range(20): position = position - np.linalg.solve(2 * (position - landmarks), lateration_residual(landmarks, distances, position))`, `return position`",
+            ),
+            mistakes=[
+                Mistake(
+                    _newton(lambda J, f, d: (J, f), steps=1),
+                    "This is one Newton step. Repeat it, each time with a new Jacobian.",
+                ),
+                Mistake(
+                    lambda L, d, s: s - 20 * np.linalg.solve(2 * (s - L), lateration_residual(L, d, s)),
+                    "You take the same step again and again: residuals and Jacobian have to be computed anew at each position.",
+                ),
+                Mistake(
+                    _newton(lambda J, f, d: (J, f + d**2 - d)),
+                    "Newton works, on the wrong equations: the measured distances are not squared.",
+                ),
+                Mistake(
+                    _newton(lambda J, f, d: (J, np.sqrt(f + d**2) - d)),
+                    "Your residuals are lengths, your Jacobian is that of the squares: both must belong to one f.",
+                ),
+                Mistake(
+                    _newton(lambda J, f, d: (J, -f)),
+                    "You walk uphill: J points the other way, or the sign of the step is wrong.",
+                ),
+                Mistake(
+                    _newton(lambda J, f, d: (J / 2, f)),
+                    "You end where you started. Does the loop change the position? A Jacobian without the factor 2 of the square doubles every step, and every second one then leads back.",
+                ),
+                Mistake(
+                    lambda L, d, s: newton_lateration(L, d, s) - s,
+                    "You return the way from the start to the position. Add the start.",
+                ),
+                Mistake(
+                    _mirrored, "This is the mirror image: it also fits, but the given start is nearer to the other one."
+                ),
+                Mistake(
+                    _newton(lambda J, f, d: (J, f), steps=2),
+                    "Newton is right, but two steps are too few: take about twenty.",
+                ),
+                Mistake(
+                    lambda L, d, s: newton_lateration(L, d, np.zeros(2)),
+                    "You start at the origin: the search has to begin at `start`, or it may find the mirror image.",
+                ),
+                Mistake(
+                    lambda L, d, s: np.zeros(2), "You return the last step, which is zero by then, not the position."
+                ),
+                Mistake(
+                    lambda L, d, s: np.full(2, np.nan),
+                    "The search runs off to infinity: the step must solve J step = -f, with J = 2 (position - landmarks) at the present position.",
+                ),
+            ],
+        ),
+        Exercise(
+            "wheel_to_twist",
+            reference=odometry.wheel_to_twist,
+            draw=WHEELS,
+            metric=metrics.Numbers(1e-9),
+            hints=(
+                "The middle of the axle moves with the mean of both wheels; what differs between them turns the robot.",
+                "v = (v_R + v_L) / 2 and omega = (v_R - v_L) / l.",
+                "`return np.array([(v_right + v_left) / 2, (v_right - v_left) / track])`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda a, b, l: np.array([(a + b) / 2, (a - b) / l]),
+                    "Your robot turns the wrong way: when the right wheel is faster it turns left, counterclockwise, omega > 0.",
+                ),
+                Mistake(
+                    lambda a, b, l: np.array([a + b, (b - a) / l]),
+                    "The robot's v is the mean of the wheel speeds: the sum is twice too fast.",
+                ),
+                Mistake(
+                    lambda a, b, l: np.array([(a + b) / 2, (b - a) / (l / 2)]),
+                    "The difference acts across the whole track l, not across half of it.",
+                ),
+                Mistake(
+                    lambda a, b, l: np.array([(a + b) / 2, (b - a) / 2 / l]),
+                    "Half the difference is the speed of a wheel about the middle, which is l/2 away: the halves cancel.",
+                ),
+                Mistake(
+                    lambda a, b, l: np.array([(b - a) / l, (a + b) / 2]), "The order is (v, omega): yours is exchanged."
+                ),
+                Mistake(
+                    lambda a, b, l: np.array([(a + b) / 2, (b - a) * l]),
+                    "A turn rate is speed divided by distance: divide by the track, do not multiply.",
+                ),
+                Mistake(
+                    lambda a, b, l: np.array([(a + b) / 2, b - a]),
+                    "The turn rate is to be divided by the track: wheels farther apart turn the robot more slowly.",
+                ),
+                Mistake(
+                    lambda a, b, l: np.array([(a + b) / 2, np.degrees((b - a) / l)]),
+                    "The turn rate is wanted in rad/s, and the quotient is in rad/s already.",
+                ),
+                Mistake(lambda a, b, l: np.array([a + b, b - a]), "Divide: the sum by 2, the difference by the track."),
+                Mistake(
+                    lambda a, b, l: np.array([(b - a) / 2, (a + b) / l]),
+                    "Sum and difference have changed places: the sum drives, the difference turns.",
+                ),
+                Mistake(
+                    lambda a, b, l: np.array([b + a / 2, (b - a) / l]), "Brackets are missing: (v_right + v_left) / 2."
+                ),
+                Mistake(
+                    lambda a, b, l: np.array([(a + b) / 2, b - a / l]),
+                    "Brackets are missing: (v_right - v_left) / track.",
+                ),
+                Mistake(
+                    lambda a, b, l: np.array([(a + b) / 2, abs(b - a) / l]),
+                    "No absolute value: a turn to the right has omega < 0.",
+                ),
+                Mistake(
+                    lambda a, b, l: np.array([a + b, (a - b) / l]),
+                    "Two slips: v is half the sum, and omega is positive when the right wheel is faster.",
+                ),
+            ],
+        ),
+        Exercise(
+            "step_euler",
+            reference=step_euler,
+            draw=EITHER_SIDE,
+            metric=metrics.PlanarPoses(),
+            hints=(
+                "Drive the way v T along the old heading, then turn.",
+                "x' = x + v T cos(theta), y' = y + v T sin(theta), theta' = theta + omega T.",
+                "`return np.array([x[0] + u[0] * dt * np.cos(x[2]), x[1] + u[0] * dt * np.sin(x[2]), x[2] + u[1] * dt])`",
+            ),
+            mistakes=[
+                Mistake(
+                    _straight(_way, _new, _turn),
+                    "You turn first and drive along the new heading. This model drives along the old one.",
+                ),
+                Mistake(
+                    _straight(_way, _half, _turn),
+                    "This is the midpoint model already. The simplified one leaves omega T / 2 out.",
+                ),
+                Mistake(
+                    _straight(_way, _before, _turn),
+                    "The half turn does not belong here, and its sign is wrong: drive along theta.",
+                ),
+                *_slips(_way, _old, "theta"),
+            ],
+        ),
+        Exercise(
+            "step_midpoint",
+            reference=step_midpoint,
+            draw=EITHER_SIDE,
+            metric=metrics.PlanarPoses(),
+            hints=(
+                "While it drives the robot turns by omega T; on average it looked half of that aside.",
+                "As before, with theta + omega T / 2 inside cosine and sine.",
+                "`a = x[2] + u[1] * dt / 2; return np.array([x[0] + u[0] * dt * np.cos(a), x[1] + u[0] * dt * np.sin(a), x[2] + u[1] * dt])`",
+            ),
+            mistakes=[
+                Mistake(step_euler, "This is the simplified model: omega T / 2 is missing inside cosine and sine."),
+                Mistake(
+                    _straight(_way, _new, _turn),
+                    "You drive along the new heading: only half of the turn belongs there.",
+                ),
+                Mistake(
+                    _straight(_way, lambda th, v, w, dt: th + w / 2, _turn),
+                    "The time step is missing inside cosine and sine: omega T / 2.",
+                ),
+                Mistake(
+                    _straight(_way, lambda th, v, w, dt: th - w * dt / 2, _turn),
+                    "The half turn has the wrong sign: the robot looks ahead into the curve.",
+                ),
+                Mistake(
+                    _straight(_way, _mean, _turn), "A bracket too many: theta + omega T / 2, not (theta + omega T) / 2."
+                ),
+                Mistake(
+                    _straight(_way, _beyond, _turn),
+                    "The heading was turned before it was used: keep the old theta for cosine and sine.",
+                ),
+                *_slips(_way, _half, "theta + omega T / 2"),
+            ],
+        ),
+        Exercise(
+            "step_arc",
+            reference=step_arc,
+            draw=EITHER_SIDE,
+            metric=metrics.PlanarPoses(),
+            properties=(_straight_line_works,),
+            hints=(
+                "The robot turns about the center (ICR) at distance r = v / omega to its left. Where is it after turning by omega T?",
+                "The chord of the arc points along theta + h with h = omega T / 2, and its length is v T sin(h) / h.",
+                "np.sinc(t) is sin(pi t) / (pi t), and 1 at t = 0: `h = u[1] * dt / 2; d = u[0] * dt * np.sinc(h / np.pi); return np.array([x[0] + d * np.cos(x[2] + h), x[1] + d * np.sin(x[2] + h), x[2] + 2 * h])`",
+            ),
+            mistakes=[
+                Mistake(
+                    step_midpoint,
+                    "This is the midpoint model: its way is the length of the arc, but the chord is shorter, by sin(h) / h.",
+                ),
+                Mistake(step_euler, "This is the simplified model: no curve in it yet."),
+                Mistake(
+                    _straight(lambda th, v, w, dt: v * dt * np.sinc(w * dt / 2), _half, _turn),
+                    "`np.sinc(t)` is sin(pi t) / (pi t): give it h / pi.",
+                ),
+                Mistake(
+                    _straight(lambda th, v, w, dt: v * dt * np.sin(w * dt) / (w * dt), _half, _turn),
+                    "In sin(h) / h, h is half the turn, omega T / 2.",
+                ),
+                Mistake(
+                    _straight(_chord, _new, _turn),
+                    "The length of the chord is right. It points along theta + h, halfway through the turn; yours along the new heading.",
+                ),
+                Mistake(
+                    _straight(_chord, _old, _turn),
+                    "The length of the chord is right. It points along theta + h, halfway through the turn; yours along the old heading.",
+                ),
+                Mistake(_arc_sign, "Your robot drives its circle backward: check the signs at the center of rotation."),
+                Mistake(
+                    _arc_y_sign,
+                    "x is right, y has the wrong sign: the center lies to the left of the heading for omega > 0.",
+                ),
+                Mistake(
+                    _straight(_chord, _before, _turn),
+                    "The half turn has the wrong sign: the chord points along theta + h.",
+                ),
+                Mistake(
+                    _straight(_chord, _mean, _turn),
+                    "A bracket too many: theta + omega T / 2, not (theta + omega T) / 2.",
+                ),
+                Mistake(
+                    _straight(_chord, _beyond, _turn),
+                    "The heading was turned before it was used: keep the old theta for cosine and sine.",
+                ),
+                Mistake(
+                    _straight(_chord, lambda th, v, w, dt: th + w / 2, _turn),
+                    "The time step is missing inside cosine and sine: h = omega T / 2.",
+                ),
+                Mistake(
+                    _straight(lambda th, v, w, dt: v * dt * np.sinc(w * dt), _half, _turn),
+                    "`np.sinc(t)` is sin(pi t) / (pi t): give it h / pi, with h = omega T / 2.",
+                ),
+                Mistake(
+                    _straight(lambda th, v, w, dt: v * dt * np.sin(w * dt / 2), _half, _turn),
+                    "The division by h is missing: sin(h) / h.",
+                ),
+                Mistake(
+                    _straight(lambda th, v, w, dt: v / w * np.sin(w * dt / 2), _half, _turn),
+                    "This is half the chord: with r = v / omega it is 2 r sin(h).",
+                ),
+                Mistake(
+                    _arc_from(lambda v, w: v / abs(w)),
+                    "No absolute value: for a turn to the right the radius is negative, the center lies on the right.",
+                ),
+                Mistake(
+                    _arc_from(lambda v, w: w / v),
+                    "The radius is v / omega: the faster it turns, the smaller the circle.",
+                ),
+                Mistake(
+                    lambda x, u, dt: step_arc(x, u, dt) + u[0] / u[1] * np.array([np.sin(x[2]), -np.cos(x[2]), 0.0]),
+                    "The center of rotation is missing: it lies at x - r sin(theta), y + r cos(theta).",
+                ),
+                Mistake(
+                    lambda x, u, dt: step_arc(x, u, dt) * [-1, 1, 1] + 2 * x * [1, 0, 0],
+                    "y is right, x has the wrong sign: the center lies to the left of the heading for omega > 0.",
+                ),
+                *_slips(_chord, _half, "theta + h")[:-1],  # the sign in y has its own text above
+            ],
+        ),
+        Prediction(
+            "order",
+            question="You halve the time step. What becomes of the midpoint model's error at the end of a drive?",
+            choices=("it halves", "it becomes a quarter", "it stays"),
+            answer="it becomes a quarter",
+            why="The midpoint model is of second order, the simplified one of first. The arc is exact at any time step.",
+        ),
+        Exercise(
+            "jacobian_state",
+            reference=jacobian_state,
+            draw=pose_control_step,
+            metric=metrics.Numbers(1e-5),
+            hints=(
+                "Change x, y or theta a little: what does it change in the pose after the step?",
+                "A shift of x or y is passed on as it is. A turn of theta swings the way v T sideways.",
+                "`F_x = np.eye(3); F_x[0, 2] = -u[0] * dt * np.sin(x[2]); F_x[1, 2] = u[0] * dt * np.cos(x[2]); return F_x`",
+            ),
+            mistakes=[
+                Mistake(
+                    _state_entries(lambda x, u, t: u[0] * t * np.sin(x[2]), lambda x, u, t: u[0] * t * np.cos(x[2])),
+                    "The derivative of the cosine is minus the sine: a sign in row 0.",
+                ),
+                Mistake(
+                    _state_entries(lambda x, u, t: -t * np.sin(x[2]), lambda x, u, t: t * np.cos(x[2])),
+                    "The speed is missing: the way is v T.",
+                ),
+                Mistake(
+                    _state_entries(lambda x, u, t: -u[0] * np.sin(x[2]), lambda x, u, t: u[0] * np.cos(x[2])),
+                    "The time step is missing: the way is v T.",
+                ),
+                Mistake(
+                    _state_entries(lambda x, u, t: u[0] * t * np.cos(x[2]), lambda x, u, t: u[0] * t * np.sin(x[2])),
+                    "You put in the step itself. The Jacobian holds its derivative by theta.",
+                ),
+                Mistake(
+                    _state_entries(lambda x, u, t: -u[0] * t * np.cos(x[2]), lambda x, u, t: u[0] * t * np.sin(x[2])),
+                    "Sine and cosine are exchanged: the derivative of the cosine is minus the sine.",
+                ),
+                Mistake(
+                    lambda x, u, t: jacobian_state(step_euler(x, u, t), u, t),
+                    "You put in the new heading. The simplified model drives along the old one.",
+                ),
+                Mistake(
+                    lambda x, u, t: odometry.step_jacobians(x, u, t, "midpoint")[0],
+                    "This belongs to the midpoint model. The lecture derives the simplified one.",
+                ),
+                Mistake(
+                    lambda x, u, dt: jacobian_state(x, u, dt) - np.eye(3),
+                    "The pose before the step is missing: its derivative by itself is the identity.",
+                ),
+                Mistake(
+                    _state_entries(lambda x, u, t: -u[0] * t * np.sin(x[2]), lambda x, u, t: -u[0] * t * np.cos(x[2])),
+                    "The derivative of the sine is plus the cosine: a sign in row 1.",
+                ),
+                Mistake(
+                    _state_entries(lambda x, u, t: u[0] * t * np.sin(x[2]), lambda x, u, t: -u[0] * t * np.cos(x[2])),
+                    "Both signs in the last column are turned around: the cosine becomes minus the sine, the sine plus the cosine.",
+                ),
+                Mistake(
+                    _state_entries(lambda x, u, t: -np.sin(x[2]), lambda x, u, t: np.cos(x[2])),
+                    "Speed and time step are missing: the way is v T.",
+                ),
+                Mistake(
+                    _state_entries(lambda x, u, t: -u[1] * t * np.sin(x[2]), lambda x, u, t: u[1] * t * np.cos(x[2])),
+                    "You took omega for the speed: the way is v T, and v is u[0].",
+                ),
+                Mistake(
+                    lambda x, u, t: jacobian_state(x, u, t) - np.diag([0, 0, 1]),
+                    "theta' = theta + omega T: its derivative by theta, the last entry, is 1.",
+                ),
+                Mistake(
+                    lambda x, u, t: jacobian_state(x, u, t) + np.diag([0, 0, u[1] * t]),
+                    "omega T does not depend on theta: the last entry is 1.",
+                ),
+                Mistake(
+                    lambda x, u, t: jacobian_state(x, u, t) + np.diag([0, 0, t - 1]),
+                    "theta' = theta + omega T: its derivative by theta, the last entry, is 1, not T.",
+                ),
+                Mistake(
+                    lambda x, u, t: np.hstack([jacobian_state(x, u, t), jacobian_control(x, u, t)]),
+                    "This is the whole Jacobian, by pose and control. F_x is its first three columns.",
+                ),
+                Mistake(
+                    lambda x, u, t: jacobian_control(x, u, t),
+                    "This is F_u, by the control. F_x is the derivative by the pose.",
+                ),
+            ],
+        ),
+        Exercise(
+            "jacobian_control",
+            reference=jacobian_control,
+            draw=pose_control_step,
+            metric=metrics.Numbers(1e-5),
+            hints=(
+                "Three rows (x, y, theta), two columns (v, omega).",
+                "A little more v moves the robot by T along the heading; a little more omega turns it by T.",
+                "`return dt * np.array([[np.cos(x[2]), 0], [np.sin(x[2]), 0], [0, 1]])`",
+            ),
+            mistakes=[
+                Mistake(
+                    _control_entries(lambda x, t: np.cos(x[2]), lambda x, t: np.sin(x[2]), lambda t: 1.0),
+                    "The time step is missing.",
+                ),
+                Mistake(
+                    _control_entries(lambda x, t: t * np.sin(x[2]), lambda x, t: t * np.cos(x[2]), lambda t: t),
+                    "Sine and cosine are exchanged.",
+                ),
+                Mistake(
+                    lambda x, u, t: jacobian_control(x, u, t) * u,
+                    "You left v and omega in. The step is linear in both, so its derivatives by them no longer contain them.",
+                ),
+                Mistake(
+                    lambda x, u, t: odometry.step_jacobians(x, u, t, "midpoint")[1],
+                    "This belongs to the midpoint model. The lecture derives the simplified one.",
+                ),
+                Mistake(
+                    _control_entries(lambda x, t: t * np.cos(x[2]), lambda x, t: t * np.sin(x[2]), lambda t: 1.0),
+                    "The last entry is T: omega acts for a time step.",
+                ),
+                Mistake(
+                    _control_entries(lambda x, t: np.cos(x[2]), lambda x, t: np.sin(x[2]), lambda t: t),
+                    "The time step is missing from the first column: the way is v T.",
+                ),
+                Mistake(
+                    lambda x, u, t: jacobian_control(x, u, t) * [u[0], 1.0],
+                    "You left v in the first column. The way is v T, so its derivative by v is T.",
+                ),
+                Mistake(
+                    lambda x, u, t: jacobian_control(x, u, t) * [1.0, u[1]],
+                    "You left omega in the second column: the derivative of omega T by omega is T.",
+                ),
+                Mistake(
+                    lambda x, u, t: jacobian_control(x, u, t) * u / t,
+                    "You left v and omega in, and the time step out: the derivatives of v T and omega T are T.",
+                ),
+                Mistake(
+                    lambda x, u, t: jacobian_control(x, u, t)[:, ::-1],
+                    "The columns are exchanged: first v, then omega.",
+                ),
+                Mistake(
+                    _control_entries(lambda x, t: -t * np.sin(x[2]), lambda x, t: t * np.cos(x[2]), lambda t: t),
+                    "You took the derivative by theta. By v the cosine stays a cosine and the sine a sine.",
+                ),
+                Mistake(
+                    _control_entries(lambda x, t: t * np.cos(x[2]), lambda x, t: t * np.sin(x[2]), lambda t: 0.0),
+                    "omega turns the robot: the last entry is T.",
+                ),
+                Mistake(
+                    _control_entries(lambda x, t: t * np.cos(x[2]), lambda x, t: -t * np.sin(x[2]), lambda t: t),
+                    "A sign: by v, the sine in row 1 stays plus the sine.",
+                ),
+                Mistake(
+                    lambda x, u, t: jacobian_control(step_euler(x, u, t), u, t),
+                    "You put in the new heading. The simplified model drives along the old one.",
+                ),
+                Mistake(
+                    lambda x, u, t: jacobian_state(x, u, t),
+                    "This is F_x, by the pose. F_u is the derivative by the control.",
+                ),
+            ],
+        ),
+        Exercise(
+            "control_covariance",
+            reference=odometry.control_covariance,
+            draw=NOISY_CONTROLS,
+            metric=metrics.Numbers(1e-9),
+            hints=(
+                "A diagonal matrix: the variance of v and the variance of omega.",
+                "sigma_v^2 = k_d |v| / T and sigma_omega^2 = (k_theta |omega| + k_drift |v|) / T.",
+                "`v, omega = np.abs(u); return np.diag([k_d * v / dt, (k_theta * omega + k_drift * v) / dt])`",
+            ),
+            mistakes=[
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: a * v / t,
+                        lambda v, w, t, a, b, c: (b * abs(w) + c * abs(v)) / t,
+                    ),
+                    "In reverse or to the right your variance is wrong, even negative: take absolute values, as the lecture remarks.",
+                ),
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: a * abs(v) / t,
+                        lambda v, w, t, a, b, c: (b * w + c * abs(v)) / t,
+                    ),
+                    "In reverse or to the right your variance is wrong, even negative: take absolute values, as the lecture remarks.",
+                ),
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: a * abs(v) / t,
+                        lambda v, w, t, a, b, c: (b * abs(w) + c * v) / t,
+                    ),
+                    "In reverse or to the right your variance is wrong, even negative: take absolute values, as the lecture remarks.",
+                ),
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: a * abs(v) / t,
+                        lambda v, w, t, a, b, c: (b * w + c * v) / t,
+                    ),
+                    "In reverse or to the right your variance is wrong, even negative: take absolute values, as the lecture remarks.",
+                ),
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: a * v / t,
+                        lambda v, w, t, a, b, c: (b * abs(w) + c * v) / t,
+                    ),
+                    "In reverse or to the right your variance is wrong, even negative: take absolute values, as the lecture remarks.",
+                ),
+                Mistake(
+                    _covariance(lambda v, w, t, a, b, c: a * v / t, lambda v, w, t, a, b, c: (b * w + c * v) / t),
+                    "In reverse or to the right your variance is wrong, even negative: take absolute values, as the lecture remarks.",
+                ),
+                Mistake(
+                    _covariance(lambda v, w, t, a, b, c: a * abs(v), lambda v, w, t, a, b, c: b * abs(w) + c * abs(v)),
+                    "The division by T is missing: the constants speak of ways, the variances of speeds.",
+                ),
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: a * abs(v) * t, lambda v, w, t, a, b, c: (b * abs(w) + c * abs(v)) * t
+                    ),
+                    "You multiplied by T. The variance of the way is k_d v T; the speed is that way divided by T, so its variance by T squared.",
+                ),
+                Mistake(
+                    _covariance(lambda v, w, t, a, b, c: a * abs(v) / t, lambda v, w, t, a, b, c: b * abs(w) / t),
+                    "The drift is missing: a robot that drives straight on also turns a little.",
+                ),
+                Mistake(
+                    _covariance(lambda v, w, t, a, b, c: a * abs(v) / t, lambda v, w, t, a, b, c: c * abs(v) / t),
+                    "k_theta is missing: turning errs as well, by k_theta |omega| / T.",
+                ),
+                Mistake(
+                    _covariance(lambda v, w, t, a, b, c: a * abs(v) / t, lambda v, w, t, a, b, c: (b + c) * abs(w) / t),
+                    "The drift comes with the way, not with the turn: k_drift |v| / T.",
+                ),
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: a * v**2 / t, lambda v, w, t, a, b, c: (b * w**2 + c * v**2) / t
+                    ),
+                    "Here the variance grows with the way itself, not with its square: |v| and |omega|.",
+                ),
+                Mistake(
+                    lambda u, dt, a, b, c: np.sqrt(odometry.control_covariance(u, dt, a, b, c)),
+                    "These are standard deviations. A covariance matrix holds variances.",
+                ),
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: a * abs(v) / t,
+                        lambda v, w, t, a, b, c: (c * abs(w) + b * abs(v)) / t,
+                    ),
+                    "k_theta and k_drift have changed places: k_theta belongs to the turn, k_drift to the way.",
+                ),
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: a * abs(v) / t,
+                        lambda v, w, t, a, b, c: abs(b * w + c * v) / t,
+                    ),
+                    "Take the absolute values one by one: both errors add, whichever way it turns.",
+                ),
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: a * abs(v) / t**2,
+                        lambda v, w, t, a, b, c: (b * abs(w) + c * abs(v)) / t**2,
+                    ),
+                    "You divided by T twice: k_d d / T^2 with the way d = v T leaves one T.",
+                ),
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: a * abs(v) / t,
+                        lambda v, w, t, a, b, c: b * abs(w) + c * abs(v) / t,
+                    ),
+                    "Both parts of the turn rate's variance are divided by T: brackets.",
+                ),
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: a * abs(v) / t,
+                        lambda v, w, t, a, b, c: b * abs(w) / t + c * abs(v),
+                    ),
+                    "Both parts of the turn rate's variance are divided by T: the drift, too.",
+                ),
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: a * abs(v) / t,
+                        lambda v, w, t, a, b, c: b * abs(w) + c * abs(v),
+                    ),
+                    "The division by T is missing from the turn rate's variance.",
+                ),
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: a * abs(v),
+                        lambda v, w, t, a, b, c: (b * abs(w) + c * abs(v)) / t,
+                    ),
+                    "The division by T is missing from the speed's variance.",
+                ),
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: (a + c) * abs(v) / t,
+                        lambda v, w, t, a, b, c: b * abs(w) / t,
+                    ),
+                    "The drift comes from the way, but it turns the robot: it belongs to the variance of omega.",
+                ),
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: (b * abs(w) + c * abs(v)) / t,
+                        lambda v, w, t, a, b, c: a * abs(v) / t,
+                    ),
+                    "The order is v, omega: your variances are exchanged.",
+                ),
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: a * abs(v) / t,
+                        lambda v, w, t, a, b, c: (b * abs(w) - c * abs(v)) / t,
+                    ),
+                    "Variances of independent errors add.",
+                ),
+                Mistake(
+                    lambda u, dt, a, b, c: np.diag(odometry.control_covariance(u, dt, a, b, c)),
+                    "The variances are right. A covariance matrix has them on its diagonal: np.diag.",
+                ),
+                Mistake(
+                    lambda u, dt, a, b, c: odometry.control_covariance(u, dt, a, b, c) ** 2,
+                    "sigma^2 in the formula is the variance already: do not square it.",
+                ),
+            ],
+        ),
+        Exercise(
+            "propagate",
+            reference=propagate,
+            draw=pose_and_covariances,
+            metric=metrics.Several(metrics.PlanarPoses(), metrics.Numbers(1e-9), names=("pose", "covariance")),
+            hints=(
+                "The pose takes the step. The covariance takes the old uncertainty along and adds that of the control.",
+                "cov' = F_x cov F_x' + F_u cov_u F_u', with both Jacobians at the old pose.",
+                "`F_x, F_u = jacobian_state(x, u, dt), jacobian_control(x, u, dt); return step_euler(x, u, dt), F_x @ cov @ F_x.T + F_u @ cov_u @ F_u.T`",
+            ),
+            mistakes=[
+                Mistake(
+                    _propagated(lambda F, G, P, Q: F @ P @ F.T),
+                    "You only carry the old uncertainty along: the control's own is missing.",
+                ),
+                Mistake(
+                    _propagated(lambda F, G, P, Q: P + G @ Q @ G.T),
+                    "You only add the control's uncertainty: the old one must be carried along by F_x.",
+                ),
+                Mistake(
+                    _propagated(lambda F, G, P, Q: F.T @ P @ F + G @ Q @ G.T),
+                    "F_x is on the wrong side: F cov F', not F' cov F.",
+                ),
+                Mistake(
+                    lambda x, P, u, t, Q: (x, propagate(x, P, u, t, Q)[1]),
+                    "The covariance is right, but the pose did not move.",
+                ),
+                Mistake(
+                    lambda x, P, u, t, Q: (step_midpoint(x, u, t), propagate(x, P, u, t, Q)[1]),
+                    "The covariance is right. The pose took the midpoint step; the lecture propagates with the simplified model.",
+                ),
+                Mistake(
+                    lambda x, P, u, t, Q: (step_euler(x, u, t), propagate(step_euler(x, u, t), P, u, t, Q)[1]),
+                    "Your Jacobians are taken at the new pose. The step was linearized at the old one.",
+                ),
+                Mistake(
+                    _propagated(lambda F, G, P, Q: F * P * F.T + G @ Q @ G.T),
+                    "`*` multiplies entry by entry. The matrix product is `@`.",
+                ),
+                Mistake(
+                    _propagated(lambda F, G, P, Q: F @ P @ F + G @ Q @ G.T),
+                    "The last factor is the transpose of F_x.",
+                ),
+                Mistake(
+                    _propagated(lambda F, G, P, Q: G @ Q @ G.T),
+                    "The old covariance is missing: F_x cov F_x' is to be added.",
+                ),
+                Mistake(
+                    _propagated(lambda F, G, P, Q: F @ P @ F.T - G @ Q @ G.T), "Uncertainties add: there is no minus."
+                ),
+                Mistake(
+                    _propagated(lambda F, G, P, Q: F @ P + G @ Q @ G.T),
+                    "A covariance is multiplied from both sides: F_x cov F_x'.",
+                ),
+                Mistake(
+                    _propagated(lambda F, G, P, Q: F @ P @ F.T + G @ G.T),
+                    "The covariance of the control is missing between F_u and its transpose.",
+                ),
+                Mistake(
+                    _propagated(lambda F, G, P, Q: P @ F @ F.T + G @ Q @ G.T),
+                    "The order: cov stands between F_x and its transpose.",
+                ),
+                Mistake(
+                    _propagated(lambda F, G, P, Q: F @ P @ np.linalg.inv(F) + G @ Q @ G.T),
+                    "The last factor is the transpose of F_x, not its inverse.",
+                ),
+                Mistake(
+                    _propagated(lambda F, G, P, Q: F @ (P + G @ Q @ G.T) @ F.T),
+                    "The control's noise comes in during this step: it is added after F_x cov F_x', not carried along with it.",
+                ),
+                Mistake(
+                    _propagated(lambda F, G, P, Q: F @ np.diag(np.diag(P)) @ F.T + G @ Q @ G.T),
+                    "You left the correlations of the old pose out: carry the whole matrix.",
+                ),
+                Mistake(
+                    lambda x, P, u, t, Q: (
+                        jacobian_state(x, u, t) @ x + jacobian_control(x, u, t) @ u,
+                        propagate(x, P, u, t, Q)[1],
+                    ),
+                    "The covariance is right. The pose takes the step of the model itself: the Jacobians only carry small errors.",
+                ),
+                Mistake(
+                    lambda x, P, u, t, Q: (step_arc(x, u, t), propagate(x, P, u, t, Q)[1]),
+                    "The covariance is right. The pose drove the arc; the lecture propagates with the simplified model.",
+                ),
+                Mistake(
+                    lambda x, P, u, t, Q: odometry.propagate(x, P, u, t, Q, "midpoint"),
+                    "This is the midpoint model throughout; the lecture propagates with the simplified one.",
+                ),
+                Mistake(lambda x, P, u, t, Q: propagate(x, P, u, t, Q)[::-1], "The order is pose, covariance."),
+            ],
+        ),
+        Prediction(
+            "spread",
+            question="The robot drives 14 m straight on by odometry alone. Where does its true position most likely differ?",
+            choices=("ahead or behind", "to the left or right", "all around alike"),
+            answer="to the left or right",
+            why="A small turn at the beginning moves the far end sideways, and more so the farther it drives: heading errors win over distance errors.",
+        ),
+        Value(
+            "end_pose",
+            reference=lambda: _circle()[0],
+            unit="m",
+            metric=metrics.PlanarPoses(1e-6),
+            hints=(
+                "Start at (0, 0, 0) and take all 140 steps with the simplified model.",
+                "Loop over drive.controls with your `propagate`; the covariance starts as zeros.",
+                "Two lines: `end_pose, end_cov = np.zeros(3), np.zeros((3, 3))`, `for u in drive.controls: end_pose, end_cov = propagate(end_pose, end_cov, u, drive.dt, control_covariance(u, drive.dt, **drive.noise))`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: _circle("midpoint")[0],
+                    "This is the end of the midpoint model; the lecture propagates with the simplified one.",
+                ),
+                Mistake(
+                    lambda: _circle("arc")[0],
+                    "This is where the arc ends, the true drive. The estimate of the simplified model ends elsewhere.",
+                ),
+                Mistake(
+                    lambda: odometry.drive(np.zeros(3), lecture.circle_drive().controls[:-1], 0.1, "euler")[-1],
+                    "One step is missing: there are 140.",
+                ),
+                Mistake(
+                    lambda: _circle()[0] * [1, 1, np.degrees(1)],
+                    "The position is right. The heading is in degrees: leave it in radians.",
+                ),
+                Mistake(
+                    lambda: _loop(steps=1)[0],
+                    "This is the end of the first step: the pose has to be handed on from step to step.",
+                ),
+                Mistake(lambda: np.zeros(3), "This is the start. Does the loop store the new pose?"),
+                Mistake(
+                    lambda: _loop(_turned_first)[0],
+                    "Each step turns first and drives along the new heading. The simplified model drives along the old one.",
+                ),
+                Mistake(lambda: _circle()[0] * [1, 1, 0], "The position is right, the heading is missing."),
+                Mistake(
+                    lambda: _circle()[0] * [1, -1, -1],
+                    "Your robot drives its circle to the right: omega > 0 turns left.",
+                ),
+            ],
+        ),
+        Value(
+            "end_cov",
+            reference=lambda: _circle()[1],
+            unit="m, rad",
+            metric=metrics.Numbers(1e-6),
+            hints=(
+                "It comes out of the same loop as the pose.",
+                "The constants are in radians already; the covariance starts as zeros.",
+                "`covariance = end_cov`, with the end_cov that the loop of the cell before has left.",
+            ),
+            mistakes=[
+                Mistake(lambda: _circle(k_drift=0.0)[1], "The drift is missing from the control's covariance."),
+                Mistake(
+                    lambda: _circle(k_theta=0.0)[1],
+                    "The turning error k_theta is missing from the control's covariance.",
+                ),
+                Mistake(
+                    _without_carrying,
+                    "You added up the noise of the steps. Earlier heading errors also move all later positions: F_x cov F_x'.",
+                ),
+                Mistake(
+                    lambda: _circle("midpoint")[1],
+                    "This is the midpoint model's covariance; the lecture uses the simplified one.",
+                ),
+                Mistake(lambda: _loop(k_d=0.0)[1], "The distance error k_d is missing from the control's covariance."),
+                Mistake(
+                    lambda: _loop(k_theta=5.0**2 / 360, k_drift=2.0**2)[1],
+                    "k_theta and k_drift are in degrees. `drive.noise` holds them in radians.",
+                ),
+                Mistake(_exchanged, "k_theta and k_drift have changed places."),
+                Mistake(
+                    lambda: _loop(start_cov=1.0)[1],
+                    "You started with the identity. The start is known: a covariance of zeros.",
+                ),
+                Mistake(
+                    lambda: np.zeros((3, 3)), "This is the covariance of the start. Does the loop store the new one?"
+                ),
+                Mistake(lambda: _loop(steps=-1)[1], "One step is missing: there are 140."),
+                Mistake(
+                    lambda: _loop(steps=1)[1],
+                    "This is one step's covariance: it has to be handed on from step to step.",
+                ),
+                Mistake(
+                    lambda: np.diag(np.diag(_circle()[1])),
+                    "The diagonal is right. Hand in the whole matrix, correlations included.",
+                ),
+                Mistake(
+                    lambda: _circle()[1] * np.outer([1, 1, np.degrees(1)], [1, 1, np.degrees(1)]),
+                    "The heading is in degrees: leave it in radians.",
+                ),
+                Mistake(lambda: _loop(_wrong_side)[1], "F_x is on the wrong side: F cov F', not F' cov F."),
+                Mistake(
+                    lambda: _loop(_at_new_pose)[1],
+                    "Your Jacobians are taken at the new pose: compute them before the pose moves.",
+                ),
+                Mistake(
+                    lambda: _circle("arc")[1],
+                    "This is the covariance of the exact arc; the lecture uses the simplified model.",
+                ),
+            ],
+        ),
+        Prediction(
+            "banana",
+            question="The ellipse of error propagation is said to hold 95 % of the poses. How many of the true ends does it hold after 14 m?",
+            choices=("about 95 %", "fewer", "more"),
+            answer="fewer",
+            why="The true ends lie on a bent band, because a wrong heading swings the way around. An ellipse cannot bend.",
+        ),
+    ],
+)

@@ -1,0 +1,380 @@
+"""Stages of lateration: which method fits a task, and distance circles to drag."""
+
+import functools
+
+import numpy as np
+
+from ...documents.lecture import printed as lecture
+from ...estimation import gaussian
+from ...geometry import planar
+from ...localization import lateration, odometry
+from ...stage import Choice, Handle, Play, Slider, Stage, style
+from ...stage.marks import Spare, strayed
+from ...tables import read_table
+from . import figures as draw
+
+TASKS = {"start known": "local", "start unknown": "global", "may be carried off": "kidnapped"}
+SENSES = ("odometry", "distances", "both")
+REPETITIONS = 200
+WEAK = 0.05  # a second singular value below this share of the first: the caption speaks of the weak direction
+
+
+@functools.cache
+def _methods():
+    return read_table(
+        "dead_reckoning/methods.csv", text=("method", "local", "global", "accuracy", "sensors", "map")
+    )  # fmt: skip
+
+
+def _reason(sensors, needs_map, can_find, state):
+    """Why a method cannot be used for a task, or ""."""
+    if state["sensor"] != "both" and state["sensor"] not in sensors:
+        return f"needs {sensors}"
+    if sensors == "odometry and distances" and state["sensor"] != "both":
+        return "needs both sensors"
+    if needs_map and state["map"] == "none":
+        return "needs a map"
+    if state["task"] != "local" and not can_find:
+        return "needs a known start"
+    return ""
+
+
+def compute_methods(state):
+    """For each method of the lecture's table, why it does not fit the task ("" where it does)."""
+    table = _methods()
+    rows = zip(table["sensors"], table["map"], table["global"])
+    verdicts = [_reason(sensors, needed != "no", able == "yes", state) for sensors, needed, able in rows]
+    return {"verdicts": verdicts, "usable": [m for m, v in zip(table["method"].tolist(), verdicts) if not v]}
+
+
+def methods():
+    """The lecture's table of localization methods: choose a task, the rows that do not fit turn gray."""
+
+    def scene(fig):
+        table = _methods()
+        rows = draw.MethodTable(fig.subplots(), zip(table["method"], table["accuracy"], table["sensors"]))
+
+        def update(state, result):
+            rows.set(result["verdicts"])
+
+        return rows.artists, update
+
+    return Stage(
+        "methods of localization",
+        scene=scene,
+        compute=compute_methods,
+        controls={
+            "task": Choice(TASKS, "local", label="task"),
+            "sensor": Choice(SENSES, "both", label="sensors"),
+            "map": Choice({"known": "known", "none": "none"}, "known", label="landmarks or map"),
+        },
+        fail={"task": "kidnapped", "sensor": "odometry", "map": "none"},
+        size=(7.0, 2.4),
+        describe=lambda result: (
+            f"Fits: {', '.join(result['usable'])}." if result["usable"] else "Nothing in the table fits this task."
+        ),
+    )
+
+
+@functools.cache
+def _circle_noise():
+    noise = np.random.default_rng(7).standard_normal((REPETITIONS, 3))
+    noise[0] = 0.8, -0.9, 0.6  # the measurement whose circles are drawn
+    noise.setflags(write=False)
+    return noise
+
+
+def compute_circles(state):
+    """Search, repeated estimates, bound and weakest direction for two or three landmarks and a robot."""
+    landmarks = np.array([state[name] for name in "ABC"[: state["count"]]])
+    robot, std = state["R"], state["std"]
+    true = np.maximum(np.linalg.norm(landmarks - robot, axis=1), 1e-3)
+    distances = np.maximum(true + std * _circle_noise()[:, : len(landmarks)], 1e-3)
+    directions = (robot - landmarks) / true[:, None]
+    values, Vt = np.linalg.svd(directions)[1:]
+    fixed = values[1] > lateration.RANK_TOLERANCE * values[0]
+    if len(landmarks) == 2:
+        search = lateration.newton_lateration(landmarks, distances[0], state["S"])
+        path, reason = search.path, "" if search.converged else search.reason
+    else:
+        path, reason = _path(landmarks, distances[0], state["S"]), ""
+    return {
+        "landmarks": landmarks,
+        "distances": distances[0],
+        "path": path,
+        "reason": reason,
+        "cloud": lateration.laterate(landmarks, distances, start=robot + [0, 1e-3], steps=12).position,
+        "ellipse": _bound(landmarks, robot, std) if fixed else np.empty((0, 2)),
+        "weak": robot + np.outer([-1.2, 1.2], Vt[1]),
+        "singular_values": values,
+        "error": float(np.linalg.norm(path[-1] - robot)),
+        "dilution": float(np.sqrt((1 / values**2).sum())) if fixed else np.inf,
+        "std": std,
+    }
+
+
+def _bound(landmarks, robot, std):
+    return gaussian.ellipse(robot, std**2 * lateration.dilution(landmarks, robot))
+
+
+def _path(landmarks, distances, start):
+    """Iterates of least squares from the start: the library's search, cut off after one, two, ... steps."""
+    steps = [lateration.laterate(landmarks, distances, start=start, steps=k).position for k in (1, 2, 3, 5, 30)]
+    return np.array([start, *steps])
+
+
+def _circles_sentence(result):
+    ratio = result["singular_values"][1] / result["singular_values"][0]
+    if result["reason"]:
+        return f"Newton gives up. {result['reason'].capitalize()}."
+    text = f"The search ends {result['error']:.2f} m from the robot. Dilution {result['dilution']:.3g}: "
+    text += f"{result['std']:.2f} m in a distance become {result['dilution'] * result['std']:.3g} m in the position."
+    if ratio < WEAK:
+        text += " The lines of sight are nearly parallel: across them the distances say little."
+    return text
+
+
+def circles():
+    """Two or three landmarks, a robot and the start of the search, all to be dragged."""
+
+    def scene(fig):
+        ax = style.axes(fig.subplots(), "x (m)", "y (m)", equal=True)
+        ax.set(xlim=(-4.0, 14.8), ylim=(-5.4, 6.4))
+        rings, search, spare = draw.Circles(ax), draw.Search(ax), Spare(ax, "C, not used")
+        words = ax.text(0.02, 0.02, "", transform=ax.transAxes, va="bottom", fontsize=9)
+
+        def update(state, result):
+            rings.set(result["landmarks"], result["distances"], state["R"])
+            spare.set(state["C"], state["count"] == 2)
+            search.set(state["R"], result["path"], result["cloud"], result["ellipse"], result["weak"])
+            words.set_text("singular values of the lines of sight: {:.2f}, {:.2f}".format(*result["singular_values"]))
+
+        return [*rings.artists, *spare.artists, *search.artists, words], update
+
+    return Stage(
+        "distance circles",
+        scene=scene,
+        compute=compute_circles,
+        handles={
+            "A": Handle((1.0, 0.0), step=0.1, label="landmark A"),
+            "B": Handle((8.0, 0.0), step=0.1, label="landmark B"),
+            "C": Handle((4.0, 5.5), step=0.1, label="landmark C, used with three"),
+            "R": Handle((4.0, 3.0), step=0.1, label="robot", color=style.TRUTH),
+            "S": Handle((6.0, 4.5), step=0.1, label="start of the search", color=style.ESTIMATE),
+        },
+        controls={
+            "count": Choice({"two": 2, "three": 3}, 2, label="landmarks"),
+            "std": Slider(0.0, 0.5, 0.2, step=0.01, label="noise of a distance (m)"),
+        },
+        fail={"R": (4.5, 0.3), "S": (6.0, 0.0)},
+        presets={"Start below": {"S": (6.0, -2.5)}},
+        describe=_circles_sentence,
+    )
+
+
+DURATION = 5.0  # s, of the drive on which the models are compared
+COUNTS = np.array([3, 5, 10, 20, 50, 100])  # time steps it is cut into
+KEYS = {"up": (1.0, 0.0), "down": (-1.0, 0.0), "left": (0.0, np.pi / 2), "right": (0.0, -np.pi / 2)}  # for 0.4 s
+KEY_STEPS = 4
+EVERY = 10  # steps between two drawn ellipses
+RUNS = 1500
+VIEW = ((-4.4, 15.0), (-4.7, 7.5))  # m; holds the lecture's circle and 14 m straight on
+
+
+def _end_error(omega, count, model):
+    end = odometry.drive(np.zeros(3), np.tile([1.0, omega], (count, 1)), DURATION / count, model)[-1]
+    exact = odometry.step(np.zeros(3), [1.0, omega], DURATION, "arc")
+    return float(np.linalg.norm((end - exact)[:2]))
+
+
+@functools.lru_cache(maxsize=256)
+def _errors(omega):
+    return {m: np.array([_end_error(omega, n, m) for n in COUNTS]) for m in ("euler", "midpoint")}
+
+
+def compute_models(state):
+    """Paths of the three models over 5 s at 1 m/s, and the distance of their ends from the exact one (m)."""
+    count, omega = int(state["count"]), np.radians(state["omega_deg"])
+    dt = DURATION / count
+    controls = np.tile([1.0, omega], (count, 1))
+    paths = {m: odometry.drive(np.zeros(3), controls, dt, m) for m in ("euler", "midpoint")}
+    paths["arc"] = odometry.drive(np.zeros(3), np.tile([1.0, omega], (60, 1)), DURATION / 60, "arc")
+    error = {m: max(float(np.linalg.norm((p[-1] - paths["arc"][-1])[:2])), 1e-12) for m, p in paths.items()}
+    errors = {m: np.maximum(e, 1e-12) for m, e in _errors(round(omega, 9)).items()}
+    return {"dt": dt, "paths": paths, "error": error, "errors": errors}
+
+
+def _models_sentence(result):
+    if max(result["error"].values()) < 1e-9:
+        return f"T = {result['dt']:.2f} s: straight on, all three models end in the same point."
+    return (
+        f"T = {result['dt']:.2f} s: the simplified model ends {result['error']['euler']:.2g} m from the arc, "
+        f"the midpoint model {result['error']['midpoint']:.2g} m."
+    )
+
+
+def models():
+    """Euler, midpoint and exact arc on the same drive, cut into few or many steps."""
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2, width_ratios=(1.2, 1))
+        style.axes(left, "x (m)", "y (m)", "5 s at 1 m/s", equal=True)
+        left.set(xlim=(-2.4, 5.6), ylim=(-4, 5))
+        style.axes(right, "time step T (s)", "error of the end (m)", "slope 1 and slope 2")
+        right.set(xscale="log", yscale="log", xlim=(0.05, 2.5), ylim=(1e-4, 10))
+        paths = draw.ModelPaths(left, right, DURATION / COUNTS)
+
+        def update(state, result):
+            paths.set(result)
+
+        return paths.artists, update
+
+    return Stage(
+        "three motion models",
+        scene=scene,
+        compute=compute_models,
+        controls={
+            "count": Slider(3, 100, 8, label="number of steps"),
+            "omega_deg": Slider(-60.0, 60.0, 40.0, step=2.0, label="turn rate (deg/s)"),
+        },
+        fail={"count": 3, "omega_deg": 60.0},
+        describe=_models_sentence,
+    )
+
+
+def _start_drive(state):
+    zero = np.zeros(3)
+    return {
+        "truth": [zero],
+        "estimate": [zero],
+        "cov": [np.zeros((3, 3))],
+        "rng": np.random.default_rng(11),
+    }
+
+
+def _advance_drive(state, event):
+    """Drive on: a tick is one step of the lecture's circle, an arrow key four steps of its own."""
+    memory, circle = state["memory"], lecture.circle_drive()
+    u = circle.controls[0] if event == "tick" else np.array(KEYS[event])
+    noise = {name: value * state["factor"] ** 2 for name, value in circle.noise.items()}
+    cov_u = odometry.control_covariance(u, circle.dt, **noise)
+    for _ in range(1 if event == "tick" else KEY_STEPS):
+        real = u + np.sqrt(np.diag(cov_u)) * memory["rng"].standard_normal(2)
+        x, cov = odometry.propagate(memory["estimate"][-1], memory["cov"][-1], u, circle.dt, cov_u, "euler")
+        memory["truth"].append(odometry.step(memory["truth"][-1], real, circle.dt, "arc"))
+        memory["estimate"].append(x)
+        memory["cov"].append(cov)
+    return memory
+
+
+def compute_drive(state):
+    """Paths, ellipses along the estimated one, and how far off the estimate is."""
+    memory = state["memory"]
+    truth, estimate, cov = (np.array(memory[key]) for key in ("truth", "estimate", "cov"))
+    shown = np.unique([*range(0, len(cov), EVERY), len(cov) - 1])
+    return {
+        "truth": truth,
+        "estimate": estimate,
+        "outlines": gaussian.outlines(estimate[shown, :2], cov[shown, :2, :2], points=31),
+        "error": float(np.linalg.norm((truth[-1] - estimate[-1])[:2])),
+        "std": float(np.sqrt(np.trace(cov[-1, :2, :2]))),
+        "std_heading_deg": float(np.degrees(np.sqrt(cov[-1, 2, 2]))),
+    }
+
+
+def _drive_sentence(result):
+    text = (
+        f"The estimate is {result['error']:.2f} m off; it expects {result['std']:.2f} m, "
+        f"and {result['std_heading_deg']:.1f} deg in the heading."
+    )
+    return text + strayed(result["truth"][-1], VIEW)
+
+
+def drive():
+    """Drive with the arrow keys, or play the lecture's circle: what odometry believes drifts away from the truth."""
+
+    def scene(fig):
+        ax = style.axes(fig.subplots(), "x (m)", "y (m)", equal=True)
+        ax.set(xlim=VIEW[0], ylim=VIEW[1])
+        path = draw.Driven(ax)
+
+        def update(state, result):
+            path.set(result["truth"], result["estimate"], result["outlines"])
+
+        return path.artists, update
+
+    return Stage(
+        "drive a robot",
+        scene=scene,
+        compute=compute_drive,
+        controls={"factor": Slider(0.2, 3.0, 1.0, step=0.1, label="noise, times the lecture's")},
+        play=Play(lecture.circle_drive().dt * 140, dt=0.1, rate=2.0),
+        keys=True,
+        start=_start_drive,
+        advance=_advance_drive,
+        fail={"factor": 3.0},
+        describe=_drive_sentence,
+    )
+
+
+@functools.lru_cache(maxsize=64)
+def _runs(path, factor):
+    """Computed path, covariance, and 1500 true ends of a noisy drive."""
+    circle = lecture.circle_drive()
+    noise = {name: value * factor**2 for name, value in circle.noise.items()}
+    controls = circle.controls if path == "circle" else circle.controls * [1.0, 0.0]
+    poses, covs = odometry.drive_with_covariance(np.zeros(3), np.zeros((3, 3)), controls, circle.dt, **noise)
+    std = np.sqrt(np.diag(odometry.control_covariance(controls[0], circle.dt, **noise)))
+    ends = odometry.drive(np.zeros((RUNS, 3)), controls[:, None, :] + std * _unit_noise(len(controls)), circle.dt)[-1]
+    return poses, covs[-1], ends
+
+
+@functools.cache
+def _unit_noise(steps):
+    noise = np.random.default_rng(3).standard_normal((steps, RUNS, 2))
+    noise.setflags(write=False)
+    return noise
+
+
+def compute_banana(state):
+    """Ends of the runs, the region said to hold 95 % of them, and the share it does hold (of all three coordinates)."""
+    poses, cov, ends = _runs(state["path"], state["factor"])
+    if state["region"] == "ellipse":
+        outline = gaussian.ellipse(poses[-1, :2], cov[:2, :2])
+        error = ends - poses[-1]
+        share = gaussian.share_inside(error, np.zeros(3), cov)
+    else:
+        outline, center, spread = gaussian.bent_region(poses[-1], ends)
+        share = gaussian.share_inside(planar.log_pose(planar.relative_pose(poses[-1], ends)), center, spread)
+    lag = float(np.linalg.norm((ends.mean(0) - poses[-1])[:2]))
+    return {"poses": poses, "ends": ends, "outline": outline, "share": share, "lag": lag, "region": state["region"]}
+
+
+def banana():
+    """Where 1500 noisy drives really end, against the ellipse of error propagation."""
+
+    def scene(fig):
+        ax = style.axes(fig.subplots(), "x (m)", "y (m)", equal=True)
+        ax.set(xlim=(-4.5, 16.5), ylim=(-6.4, 6.4))
+        cloud = draw.Banana(ax)
+
+        def update(state, result):
+            cloud.set(result["poses"], result["ends"], result["outline"])
+
+        return cloud.artists, update
+
+    return Stage(
+        "the banana",
+        scene=scene,
+        compute=compute_banana,
+        controls={
+            "path": Choice({"straight": "straight", "circle": "circle"}, "straight", label="path"),
+            "factor": Slider(0.5, 4.0, 2.0, step=0.5, label="noise, times the lecture's"),
+            "region": Choice(["ellipse", "bent"], "ellipse", label="region"),
+        },
+        fail={"factor": 4.0},
+        describe=lambda result: (
+            f"{100 * result['share']:.0f} % of the poses lie in the region said to hold 95 %. "
+            f"On average the robots end {result['lag']:.2f} m from the computed end."
+        ),
+    )

@@ -1,0 +1,1429 @@
+"""Chapter 8: the linear Kalman filter, the extended filter with landmarks, and whether they are honest."""
+
+import functools
+import itertools
+
+import numpy as np
+
+from ...documents.lecture import printed as lecture
+from ...estimation import kalman
+from ...exercises import metrics
+from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...geometry.planar import wrap_angle as wrapped
+from ...localization import ekf, odometry
+
+# Draws -----------------------------------------------------------------------
+
+
+def covariance(rng, n, scale=1.0):
+    M = rng.normal(size=(n, n))
+    return scale * (M @ M.T + 0.3 * np.eye(n))
+
+
+def vehicle_prediction(rng):
+    """State, covariance, A, B, control and its covariance of the lecture's vehicle."""
+    A, B, _ = kalman.vehicle_model(rng.uniform(0.3, 0.9))
+    return rng.normal(size=2) * 5, covariance(rng, 2), A, B, rng.uniform(1, 3, 1), covariance(rng, 1)
+
+
+def two_sensor_update(rng):
+    """State of two, two numbers measured of mixtures of them."""
+    x = rng.normal(size=2) * 3
+    C = rng.normal(size=(2, 2))
+    return x, covariance(rng, 2), C @ x + rng.normal(size=2), C, covariance(rng, 2, 0.5)
+
+
+def one_position_two_sensors(rng):
+    x = rng.uniform(5, 15)
+    return x + rng.normal(), rng.uniform(2, 9), x + rng.uniform(-1, 1, 2), rng.uniform(0.3, 0.9, 2) * [1, 2]
+
+
+def steady_system(rng):
+    A, B, C = kalman.vehicle_model(rng.uniform(0.05, 0.5))
+    return A, C, rng.uniform(0.1, 1) * B @ B.T + 1e-3 * np.eye(2), np.array([[rng.uniform(0.1, 1)]])
+
+
+def seen_landmark(rng):
+    """A pose and a landmark some meters away, on any side."""
+    x = np.array([*rng.uniform(-4, 4, 2), rng.uniform(-3, 3)])
+    angle, r = rng.uniform(-np.pi, np.pi), rng.uniform(1.5, 6)
+    return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
+
+
+def landmark_aside(rng, side, turned):
+    """A landmark on this side in x, and a heading on this side that takes the unwrapped bearing out of [-pi, pi)."""
+    x, r = np.array([*rng.uniform(-4, 4, 2), turned * rng.uniform(2.6, 3.1)]), rng.uniform(1.5, 6)
+    angle = -turned * (np.pi / 2 - side * rng.uniform(0.15, 0.95))
+    return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
+
+
+def turned_too_far(rng, sign):
+    """An angle beyond half a turn, with up to three full turns more."""
+    return (sign * (rng.uniform(3.3, 6.0) + 2 * np.pi * rng.integers(0, 4)),)
+
+
+def each_way(draw, *names):
+    """The draw with every combination of the signs that it takes under these names."""
+    signs = itertools.product((1, -1), repeat=len(names))
+    return tuple(functools.partial(draw, **dict(zip(names, each))) for each in signs)
+
+
+def pose_control_step(rng):
+    x = np.array([*rng.uniform(-5, 5, 2), rng.uniform(-3, 3)])
+    return x, np.array([rng.uniform(0.6, 2), rng.uniform(0.3, 1.5) * rng.choice([-1, 1])]), rng.uniform(0.2, 0.9)
+
+
+def filter_step(rng):
+    """Everything one step of the landmark filter needs; the bearing innovation crosses +-pi."""
+    x, u, dt = pose_control_step(rng)
+    cov, cov_u = np.diag(rng.uniform(0.01, 0.05, 3)), np.diag(rng.uniform(0.01, 0.1, 2))
+    moved = odometry.step(x, u, dt, "euler")
+    away = moved[2] + np.pi - rng.uniform(0.005, 0.03)
+    landmark = moved[:2] + rng.uniform(2, 5) * np.array([np.cos(away), np.sin(away)])
+    z = ekf.measurement(moved, landmark[None])[0] + [rng.uniform(-0.2, 0.2), rng.uniform(0.06, 0.12)]
+    z[1] = wrapped(z[1])
+    return x, cov, u, dt, cov_u, z, landmark, np.diag([rng.uniform(0.005, 0.02), rng.uniform(0.001, 0.005)])
+
+
+def estimate_and_truth(rng):
+    """True and estimated pose whose headings lie on both sides of +-pi, and a covariance."""
+    truth = np.array([*rng.uniform(-4, 4, 2), np.pi - rng.uniform(0.02, 0.1)])
+    x = truth + [*rng.uniform(-0.3, 0.3, 2), rng.uniform(0.15, 0.3) - 2 * np.pi]
+    return truth, x, covariance(rng, 3, 0.05)
+
+
+LIMIT = 5.991  # 95 % of chi-square with two degrees of freedom
+
+
+def surprise(rng, wanted, along=None, std=(0.3, 1.5), measure=np.linalg.solve):
+    """An innovation y, its correlated covariance S, and a limit.
+
+    wanted: range of y' S^-1 y in limits; along: 1 along the correlation, where much is little, -1 across, where little
+    is much (the diagonal alone would let it pass), None anywhere. `measure` takes the place of S^-1 y.
+    """
+    rho, std = rng.uniform(0.75, 0.95) * rng.choice([-1, 1]), rng.uniform(*std, 2)
+    S = np.outer(std, std) * [[1, rho], [rho, 1]]
+    y = std * (rng.normal(size=2) if along is None else [1, along * np.sign(rho)]) * rng.choice([-1, 1])
+    return y * np.sqrt(rng.uniform(*wanted) * LIMIT / (y @ measure(S, y))), S, LIMIT
+
+
+SURPRISES = (
+    # large in itself, little for its S: refused without S
+    functools.partial(surprise, wanted=(0.75, 0.85), along=1, std=(3.0, 4.0)),
+    functools.partial(surprise, wanted=(1.5, 2.5), along=-1),
+    functools.partial(surprise, wanted=(0.7, 0.9), along=1, std=(0.3, 0.7)),
+    functools.partial(surprise, wanted=(0.05, 0.9)),
+    functools.partial(surprise, wanted=(7, 20)),
+    # short enough to pass without S: one implausible, also by its root, one plausible that S instead of S^-1 refuses
+    functools.partial(surprise, wanted=(7, 10), along=-1, std=(0.3, 0.5)),
+    functools.partial(surprise, wanted=(0.5, 0.7), along=1, std=(1.3, 1.5), measure=lambda S, y: y),
+)
+
+
+# References and wrong variants ------------------------------------------------
+
+
+def predict_state(x, cov, A, B, u, cov_u):
+    return kalman.predict(x, cov, A, B, u, cov_u)
+
+
+def _predicted(state, cov):
+    """A prediction with `state(x, A, B, u)` and `cov(P, A, B, cov_u)`."""
+
+    def variant(x, P, A, B, u, cov_u):
+        return state(x, A, B, u), cov(P, A, B, cov_u)
+
+    return variant
+
+
+def _moved(x, A, B, u):
+    return A @ x + B @ u
+
+
+def _grown(P, A, B, Q):
+    return A @ P @ A.T + B @ Q @ B.T
+
+
+def update(x, cov, z, C, cov_z):
+    result = kalman.update(x, cov, z, C, cov_z)
+    return result.x, result.cov
+
+
+def _updated(gain=None, state=None, cov=None):
+    """A correction with one part replaced."""
+
+    def variant(x, P, z, C, R):
+        K = (gain or _gain)(P, C, R)
+        return (state or _corrected)(x, K, z, C), (cov or _shrunk)(P, K, C)
+
+    return variant
+
+
+def _gain(P, C, R):
+    return P @ C.T @ np.linalg.inv(C @ P @ C.T + R)
+
+
+def _corrected(x, K, z, C):
+    return x + K @ (z - C @ x)
+
+
+def _shrunk(P, K, C):
+    return (np.eye(len(P)) - K @ C) @ P
+
+
+def fuse_two_sensors(x0, var0, z, stds):
+    weights = np.array([1 / var0, *(1 / np.square(stds, dtype=float))])
+    return weights @ [x0, *z] / weights.sum(), 1 / weights.sum()
+
+
+def _fused(weights, var=None):
+    """A weighted mean with `weights(var0, stds)`, three numbers."""
+
+    def variant(x0, var0, z, stds):
+        w = np.asarray(weights(var0, stds))
+        return w @ [x0, *z] / w.sum(), (1 / w.sum() if var is None else var(var0, stds))
+
+    return variant
+
+
+def steady_state_gain(A, C, cov_v, cov_z):
+    return kalman.steady_state(A, C, cov_v, cov_z).gain
+
+
+def _rounds(n):
+    """The gain after n rounds from the identity."""
+
+    def variant(A, C, Q, R):
+        P = np.eye(len(A))
+        for _ in range(n):
+            P = A @ P @ A.T + Q
+            K = _gain(P, C, R)
+            P = _shrunk(P, K, C)
+        return K
+
+    return variant
+
+
+def wrap_angle(angle):
+    return wrapped(angle)
+
+
+def motion_jacobians(x, u, dt):
+    return odometry.step_jacobians(x, u, dt, "euler")
+
+
+def _jacobians(change_x=None, change_u=None):
+    def variant(x, u, dt):
+        G_x, G_u = motion_jacobians(x, u, dt)
+        return (change_x(G_x, x, u, dt) if change_x else G_x), (change_u(G_u, x, u, dt) if change_u else G_u)
+
+    return variant
+
+
+def _last_column(entries):
+    def change(G, x, u, dt):
+        G = G.copy()
+        G[:2, 2] = entries(x, u, dt)
+        return G
+
+    return change
+
+
+def _sine_sign(G, x, u, dt):
+    return G * [[1, 1, -1], [1, 1, 1], [1, 1, 1]]
+
+
+def measurement(x, landmark):
+    return ekf.measurement(x, np.atleast_2d(landmark))[0]
+
+
+def measurement_jacobian(x, landmark):
+    return ekf.measurement_jacobian(x, np.atleast_2d(landmark))[0]
+
+
+def _rows(change):
+    """A Jacobian of wrong rows from dx, dy, r."""
+
+    def variant(x, landmark):
+        d = landmark - x[:2]
+        return np.array(change(*d, np.hypot(*d)))
+
+    return variant
+
+
+def ekf_step(x, cov, u, dt, cov_u, z, landmark, cov_z):
+    return _ekf()(x, cov, u, dt, cov_u, z, landmark, cov_z)
+
+
+def _ekf(
+    noise=True,
+    wrap=True,
+    at="predicted",
+    H_at="predicted",
+    G_at="old",
+    short=False,
+    carry=True,
+    gain=_gain,
+    shrink=_shrunk,
+    model="euler",
+):
+    """One step of the landmark filter, or a wrong one; expected measurement and Jacobians "at" old or predicted pose."""
+
+    def step(x, cov, u, dt, cov_u, z, landmark, cov_z):
+        pose = {"old": x, "predicted": odometry.step(x, u, dt, model)}
+        moved = pose["predicted"]
+        G_x, G_u = motion_jacobians(pose[G_at], u, dt)
+        cov = (G_x @ cov @ G_x.T if carry else cov) + (G_u @ cov_u @ G_u.T if noise else 0)
+        H = measurement_jacobian(pose[H_at], landmark)
+        y = z - measurement(pose[at], landmark)
+        y[1] = wrapped(y[1]) if wrap else y[1]
+        K = gain(cov, H, cov_z)
+        return (moved, cov) if short else (moved + K @ y, shrink(cov, K, H))
+
+    return step
+
+
+def _old_cov_corrected(x, cov, u, dt, cov_u, z, landmark, cov_z):
+    predicted = _ekf(short=True)(x, cov, u, dt, cov_u, z, landmark, cov_z)[1]
+    corrected = _ekf()(x, cov, u, dt, cov_u, z, landmark, cov_z)[1]
+    return corrected @ np.linalg.solve(predicted, cov)
+
+
+def nees(truth, x, cov):
+    return kalman.nees(truth, x, cov, angle=2)
+
+
+def _error(truth, x):
+    e = truth - x
+    e[2] = wrapped(e[2])
+    return e
+
+
+def gate(innovation, cov_innovation, limit):
+    return bool(kalman.nis(innovation, cov_innovation) <= limit)
+
+
+def _gated(score):
+    def variant(y, S, limit):
+        return bool(score(y, S) <= limit)
+
+    return variant
+
+
+def _printed_correction(change=lambda given: given):
+    given = change(dict(lecture.example("vehicle")))
+    cov = np.array([[given["prior_cov_xx"], given["prior_cov_xv"]], [given["prior_cov_xv"], given["prior_cov_vv"]]])
+    return kalman.update([given["prior_x"], given["prior_v"]], cov, [given["z"]], [[1.0, 0.0]], [[given["var_z"]]])
+
+
+def _fusion(**changes):
+    given = lecture.example("fusion") | changes
+    stds = np.array([given["std1"], given["std2"]])
+    return fuse_two_sensors(given["x0"], given["var0"], np.array([given["z1"], given["z2"]]), stds)[0]
+
+
+STATE_AND_COV = metrics.Several(metrics.Numbers(1e-8), metrics.Numbers(1e-8), names=("state", "covariance"))
+
+CHAPTER = Chapter(
+    "08-kalman",
+    title="Kalman filters",
+    items=[
+        Exercise(
+            "predict_state",
+            reference=predict_state,
+            draw=vehicle_prediction,
+            metric=STATE_AND_COV,
+            hints=(
+                "The state follows the model; its uncertainty is carried along, and that of the control is added.",
+                "x = A x + B u and cov = A cov A' + B cov_u B' (lines 2 and 3 of the lecture's algorithm).",
+                "`return A @ x + B @ u, A @ cov @ A.T + B @ cov_u @ B.T`",
+            ),
+            mistakes=[
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T),
+                    "The control's noise is missing: add B cov_u B'.",
+                ),
+                Mistake(
+                    _predicted(lambda x, A, B, u: A @ x, _grown),
+                    "The control itself is missing from the state: add B u.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A.T @ P @ A + B @ Q @ B.T),
+                    "A stands on the wrong side: A cov A', not A' cov A.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ P + B @ Q @ B.T),
+                    "A covariance is multiplied from both sides: A cov A'.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + Q),
+                    "You added the variance of the acceleration to every entry. It acts through B: B cov_u B'.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: P + B @ Q @ B.T),
+                    "The old covariance must be carried along by A: a velocity error becomes a position error.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A * P * A.T + B @ Q @ B.T),
+                    "`*` multiplies entry by entry. The matrix product is `@`.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ P @ A + B @ Q @ B.T),
+                    "The last factor is the transpose of A.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T - B @ Q @ B.T),
+                    "Uncertainties add: there is no minus.",
+                ),
+                Mistake(
+                    _predicted(lambda x, A, B, u: A @ x - B @ u, _grown), "A sign: the control is added, A x + B u."
+                ),
+                Mistake(
+                    _predicted(lambda x, A, B, u: x + B @ u, _grown),
+                    "The state must be carried along by A: the velocity moves the position.",
+                ),
+                Mistake(_predicted(lambda x, A, B, u: B @ u, _grown), "The old state is missing: add A x."),
+                Mistake(
+                    _predicted(lambda x, A, B, u: A @ (x + B @ u), _grown),
+                    "The control acts during this step: it is added after A x, not before.",
+                ),
+                Mistake(
+                    _predicted(lambda x, A, B, u: x @ A + B @ u, _grown),
+                    "The order: A x is written A @ x. Yours is A' x.",
+                ),
+                Mistake(
+                    _predicted(lambda x, A, B, u: A @ x + u, _grown),
+                    "You added the acceleration to every entry of the state. It acts through B: B u.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + B @ Q),
+                    "The control's covariance is multiplied from both sides: B cov_u B'.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + B @ B.T),
+                    "The covariance of the control is missing between B and its transpose.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + B @ Q @ Q @ B.T),
+                    "cov_u holds variances already: do not square it.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ (P + B @ Q @ B.T) @ A.T),
+                    "The control's noise comes in during this step: it is added after A cov A', not carried along with it.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ P @ np.linalg.inv(A) + B @ Q @ B.T),
+                    "The last factor is the transpose of A, not its inverse.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: B @ Q @ B.T), "The old covariance is missing: add A cov A'."
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + Q[0, 0] * np.eye(len(A))),
+                    "You added the variance of the acceleration to every state. It acts through B: B cov_u B'.",
+                ),
+                Mistake(lambda *given: predict_state(*given)[::-1], "The order is state, covariance."),
+            ],
+        ),
+        Exercise(
+            "update",
+            reference=update,
+            draw=two_sensor_update,
+            metric=STATE_AND_COV,
+            hints=(
+                "How surprising is the measurement, and how much of the surprise belongs to the state?",
+                "S = C cov C' + cov_z, K = cov C' S^-1, x + K (z - C x), (I - K C) cov.",
+                "`K = cov @ C.T @ np.linalg.inv(C @ cov @ C.T + cov_z); return x + K @ (z - C @ x), (np.eye(len(x)) - K @ C) @ cov`",
+            ),
+            mistakes=[
+                Mistake(
+                    _updated(gain=lambda P, C, R: P @ C.T @ np.linalg.inv(C @ P @ C.T)),
+                    "The sensor's noise is missing from S: your filter believes every measurement.",
+                ),
+                Mistake(
+                    _updated(gain=lambda P, C, R: P @ C.T @ np.linalg.inv(R)),
+                    "S is the noise of the sensor plus the uncertainty of the expected measurement, C cov C'.",
+                ),
+                Mistake(
+                    _updated(state=lambda x, K, z, C: x - K @ (z - C @ x)),
+                    "You correct away from the measurement: add K times the innovation.",
+                ),
+                Mistake(
+                    _updated(state=lambda x, K, z, C: x + K @ z),
+                    "Only the surprise is news: subtract the expected measurement C x.",
+                ),
+                Mistake(
+                    _updated(state=lambda x, K, z, C: K @ (z - C @ x)),
+                    "You return the correction alone: add it to the prediction x.",
+                ),
+                Mistake(
+                    _updated(gain=lambda P, C, R: P @ C.T @ (C @ P @ C.T + R)),
+                    "You multiplied by S. The gain divides by it: its inverse stands there.",
+                ),
+                Mistake(
+                    _updated(cov=lambda P, K, C: P), "The covariance stays as it was: a measurement must shrink it."
+                ),
+                Mistake(
+                    _updated(cov=lambda P, K, C: (np.eye(len(P)) + K @ C) @ P),
+                    "A sign: (I - K C) cov. Yours grows with every measurement.",
+                ),
+                Mistake(
+                    _updated(cov=lambda P, K, C: P @ (np.eye(len(P)) - K @ C)),
+                    "The order: (I - K C) stands to the left of cov.",
+                ),
+                Mistake(
+                    _updated(cov=lambda P, K, C: (1 - K @ C) @ P),
+                    "1 - K C subtracts from a matrix full of ones. The identity is np.eye(n).",
+                ),
+                Mistake(
+                    _updated(gain=lambda P, C, R: P @ C.T @ np.linalg.inv(C @ P @ C.T - R)),
+                    "Uncertainties add: S = C cov C' + cov_z.",
+                ),
+                Mistake(
+                    _updated(gain=lambda P, C, R: P @ np.linalg.inv(P + R)),
+                    "C is missing from the gain: the sensor does not see the state itself.",
+                ),
+                Mistake(
+                    _updated(gain=lambda P, C, R: P @ C @ np.linalg.inv(C @ P @ C.T + R)),
+                    "C stands transposed in the gain: cov C' S^-1.",
+                ),
+                Mistake(
+                    _updated(gain=lambda P, C, R: C.T @ np.linalg.inv(C @ P @ C.T + R)),
+                    "cov is missing from the gain: cov C' S^-1.",
+                ),
+                Mistake(
+                    _updated(gain=lambda P, C, R: np.linalg.inv(C @ P @ C.T + R) @ P @ C.T),
+                    "The order: the inverse of S stands to the right of cov C'.",
+                ),
+                Mistake(
+                    _updated(gain=lambda P, C, R: np.linalg.inv(C @ P @ C.T + R) @ C @ P),
+                    "This is the transpose of the gain: K = cov C' S^-1.",
+                ),
+                Mistake(_updated(gain=lambda P, C, R: P @ C.T), "The division by S is missing from the gain."),
+                Mistake(
+                    _updated(gain=lambda P, C, R: P @ C.T / (C @ P @ C.T + R)),
+                    "`/` divides entry by entry. Dividing by a matrix is multiplying by its inverse, np.linalg.inv(S).",
+                ),
+                Mistake(
+                    _updated(gain=lambda P, C, R: P @ C.T @ (1 / (C @ P @ C.T + R))),
+                    "`1 / S` turns every entry over. The inverse of a matrix is np.linalg.inv(S).",
+                ),
+                Mistake(
+                    _updated(gain=lambda P, C, R: P @ C.T @ np.linalg.inv(C @ P @ C.T + R @ R)),
+                    "cov_z holds variances already: do not square it.",
+                ),
+                Mistake(
+                    _updated(gain=lambda P, C, R: P @ C.T @ np.linalg.inv(C.T @ P @ C + R)),
+                    "C is on the wrong side in S: C cov C', not C' cov C.",
+                ),
+                Mistake(_updated(state=lambda x, K, z, C: x + K @ (z - x)), "The expected measurement is C x, not x."),
+                Mistake(
+                    _updated(state=lambda x, K, z, C: x + (z - C @ x)),
+                    "The gain is missing from the state: K times the innovation.",
+                ),
+                Mistake(
+                    _updated(state=lambda x, K, z, C: z),
+                    "You return the measurement. The filter believes only a part of it: x + K (z - C x).",
+                ),
+                Mistake(
+                    _updated(state=lambda x, K, z, C: x),
+                    "The covariance is right, but the state was not corrected: x + K (z - C x).",
+                ),
+                Mistake(
+                    _updated(state=lambda x, K, z, C: x + K.T @ (z - C @ x)),
+                    "K stands transposed in the state: K (z - C x).",
+                ),
+                Mistake(
+                    _updated(cov=lambda P, K, C: (np.eye(len(P)) - K) @ P),
+                    "C is missing from the covariance: (I - K C) cov.",
+                ),
+                Mistake(_updated(cov=lambda P, K, C: (np.eye(len(P)) - C @ K) @ P), "The order: K C, not C K."),
+                Mistake(
+                    _updated(cov=lambda P, K, C: K @ C @ P),
+                    "This is what is taken away. The new covariance is what is left: (I - K C) cov.",
+                ),
+                Mistake(
+                    _updated(cov=lambda P, K, C: np.eye(len(P)) - K @ C @ P), "Brackets are missing: (I - K C) cov."
+                ),
+                Mistake(
+                    _updated(cov=lambda P, K, C: (np.eye(len(P)) - K @ C) * P),
+                    "`*` multiplies entry by entry. The matrix product is `@`.",
+                ),
+                Mistake(
+                    _updated(cov=lambda P, K, C: np.eye(len(P)) - K @ C), "The last factor is missing: (I - K C) cov."
+                ),
+                Mistake(
+                    _updated(cov=lambda P, K, C: (np.eye(len(P)) - K @ C) @ P @ (np.eye(len(P)) - K @ C).T),
+                    "Half of Joseph's form: K cov_z K' is missing. Or leave the last factor out: (I - K C) cov.",
+                ),
+                Mistake(
+                    lambda x, P, z, C, R: (
+                        _corrected(x, _gain(update(x, P, z, C, R)[1], C, R), z, C),
+                        update(x, P, z, C, R)[1],
+                    ),
+                    "The gain comes from the covariance before the correction. You computed it anew from the corrected one.",
+                ),
+                Mistake(lambda *given: update(*given)[::-1], "The order is state, covariance."),
+            ],
+        ),
+        Prediction(
+            "bell",
+            question="Prediction and measurement are equally sure but 2 m apart. The corrected bell, compared with both, is ...",
+            choices=("wider than both", "as wide as both", "narrower than both"),
+            answer="narrower than both",
+            why="Two independent opinions always make the filter surer, even when they contradict each other. Only the NIS notices the contradiction.",
+        ),
+        Exercise(
+            "fuse_two_sensors",
+            reference=fuse_two_sensors,
+            draw=one_position_two_sensors,
+            metric=metrics.Several(metrics.Numbers(1e-9, "m"), metrics.Numbers(1e-9), names=("position", "variance")),
+            hints=(
+                "Each opinion (the prior, two sensors) counts as much as it is certain.",
+                "Weights are 1 / variance. The variance of the weighted mean is 1 / (sum of the weights).",
+                "`w = np.array([1 / var0, *(1 / stds**2)]); return w @ [x0, *z] / w.sum(), 1 / w.sum()`",
+            ),
+            mistakes=[
+                Mistake(
+                    _fused(lambda v, s: [1 / np.sqrt(v), *(1 / s)]),
+                    "Weights are one over the variance, not over the standard deviation.",
+                ),
+                Mistake(
+                    _fused(lambda v, s: [0, *(1 / s**2)]), "The prior is missing. It is an opinion like the others."
+                ),
+                Mistake(
+                    _fused(lambda v, s: [1, 1, 1]), "You took the plain mean. The better sensor should count more."
+                ),
+                Mistake(
+                    _fused(lambda v, s: [v, *s**2]),
+                    "You weigh by the variance: the worst opinion counts most. Take one over it.",
+                ),
+                Mistake(
+                    _fused(lambda v, s: [1 / v**2, *(1 / s**2)]),
+                    "The prior comes as a variance already: do not square it.",
+                ),
+                Mistake(
+                    _fused(lambda v, s: [1 / v, *(1 / s**2)], lambda v, s: 1 / np.sqrt(1 / v + (1 / s**2).sum())),
+                    "The position is right; you return the standard deviation. The variance is asked for.",
+                ),
+                Mistake(
+                    _fused(lambda v, s: [1 / v, *(1 / s)]),
+                    "The sensors come with standard deviations: square them before you take one over them.",
+                ),
+                Mistake(lambda *given: fuse_two_sensors(*given)[::-1], "The order is position, variance."),
+                Mistake(
+                    _fused(lambda v, s: [1 / v, *(1 / s**2)], lambda v, s: 1 / v + (1 / s**2).sum()),
+                    "The position is right. The new variance is one over the sum of the weights.",
+                ),
+                Mistake(
+                    _fused(lambda v, s: [1 / v, *(1 / s**2)], lambda v, s: v + (s**2).sum()),
+                    "The position is right. Variances do not add here, their reciprocals do: 1 / (sum of the weights).",
+                ),
+                Mistake(
+                    _fused(lambda v, s: [1 / v, *(1 / s**2)], lambda v, s: v),
+                    "The position is right, but the variance is still the prior's.",
+                ),
+                Mistake(
+                    _fused(lambda v, s: [1 / v, *(1 / s**2)], lambda v, s: 1 / (1 / s**2).sum()),
+                    "The position is right. The prior is missing from the variance.",
+                ),
+                Mistake(
+                    _fused(lambda v, s: [1 / v, *(1 / s**2)], lambda v, s: (v + (s**2).sum()) / 3),
+                    "The position is right. The variance is no mean: three opinions are surer than each of them.",
+                ),
+                Mistake(
+                    _fused(lambda v, s: [0, 1, 1]),
+                    "You took the mean of the sensors: the better one should count more, and the prior is an opinion, too.",
+                ),
+                Mistake(_fused(lambda v, s: [1 / v, 1 / s[0] ** 2, 0]), "The second sensor is missing."),
+                Mistake(_fused(lambda v, s: [1 / v, 0, 1 / s[1] ** 2]), "The first sensor is missing."),
+                Mistake(_fused(lambda v, s: [1 / v, *(1 / s**4)]), "You squared the standard deviations twice."),
+                Mistake(
+                    lambda x0, v, z, s: (
+                        fuse_two_sensors(x0, v, z, s)[0] / fuse_two_sensors(x0, v, z, s)[1],
+                        fuse_two_sensors(x0, v, z, s)[1],
+                    ),
+                    "The variance is right. A weighted mean is divided by the sum of its weights.",
+                ),
+            ],
+        ),
+        Value(
+            "fused",
+            reference=_fusion,
+            unit="m",
+            rtol=5e-5,
+            hints=(
+                "The page's prior is 0 with the variance 20, its sensors have the standard deviations 0.5 and 1.",
+                "Put the printed numbers into your `fuse_two_sensors`; the first result is the position.",
+                "`fused = fuse_two_sensors(0.0, 20.0, np.array([9.4, 10.6]), np.array([0.5, 1.0]))[0]`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: _fusion(var0=1e15),
+                    "This is the fusion of the sensors alone. The page prints a prior, Sigma_0 = 20; it pulls a little toward 0.",
+                ),
+                Mistake(
+                    lambda: _fusion(var0=400.0),
+                    "You read the 20 as a standard deviation. Interesting: that gives the printed 9.6. But the page writes Sigma_0, a variance.",
+                ),
+                Mistake(lambda: 9.6, "This is what the page prints. It is not what its numbers give: compute it."),
+                Mistake(
+                    lambda: _fusion(std1=0.25, std2=1.0),
+                    "0.25 is the first sensor's variance already; its standard deviation is 0.5.",
+                ),
+                Mistake(
+                    lambda: 10.0, "The mean of both sensors. But the first one is four times as certain in variance."
+                ),
+                Mistake(
+                    lambda: _fusion(std1=np.sqrt(0.5), std2=1.0),
+                    "You weigh the sensors by one over the standard deviation. One over the variance is 4 and 1.",
+                ),
+                Mistake(lambda: 1 / 5.05, "This is the variance, the second result. The position is asked for."),
+                Mistake(
+                    lambda: 20 / 3, "The plain mean of prior and sensors. Each counts as much as one over its variance."
+                ),
+                Mistake(lambda: _fusion(x0=10.0), "You put in the true position as the prior. The page's prior is 0."),
+                Mistake(
+                    lambda: _fusion(std1=1.0, std2=0.5),
+                    "The standard deviations are exchanged: the first sensor is the better one.",
+                ),
+                Mistake(lambda: _fusion(x0=20.0), "20 is the prior's variance. Its position is 0."),
+                Mistake(
+                    lambda: _fusion(var0=20.0**0.5), "You took the root of the prior's variance: it goes in as it is."
+                ),
+                Mistake(lambda: _fusion(std2=1e9), "The second sensor is missing."),
+                Mistake(lambda: _fusion(std1=1e9), "The first sensor is missing."),
+                Mistake(lambda: 9.4 * 4 + 10.6, "A weighted mean is divided by the sum of its weights."),
+                Mistake(
+                    lambda: (9.4 / 0.5 + 10.6) / (20**-0.5 + 2 + 1),
+                    "Weights are one over the variance, not over the standard deviation.",
+                ),
+            ],
+        ),
+        Prediction(
+            "velocity",
+            question="The vehicle measures its position, never its velocity. What becomes of the velocity's uncertainty while it drives?",
+            choices=("it grows without end", "it stays as in the beginning", "it settles at a small value"),
+            answer="it settles at a small value",
+            why="The off-diagonal entry of the covariance ties both together: whoever is surprised in position learns about the velocity.",
+        ),
+        Exercise(
+            "steady_state_gain",
+            reference=steady_state_gain,
+            draw=steady_system,
+            metric=metrics.Numbers(1e-6),
+            hints=(
+                "The gain does not depend on the data. Run the covariance alone until the gain stands still.",
+                "Repeat: cov = A cov A' + cov_v, K = cov C' S^-1, cov = (I - K C) cov. Some thousand times are cheap. Or let SciPy solve the Riccati equation.",
+                "`from scipy.linalg import solve_discrete_are; P = solve_discrete_are(A.T, C.T, cov_v, cov_z); return P @ C.T @ np.linalg.inv(C @ P @ C.T + cov_z)`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda A, C, Q, R: _gain(kalman.steady_state(A, C, Q, R).cov_after, C, R),
+                    "Your gain comes from the covariance after the correction. It needs the one before.",
+                ),
+                Mistake(
+                    lambda A, C, Q, R: _gain(A @ A.T + Q, C, R),
+                    "This is the gain of the first step. Repeat until it stands still.",
+                ),
+                Mistake(
+                    lambda A, C, Q, R: _gain(Q, C, R),
+                    "You took the system noise for the covariance. The covariance is what builds up.",
+                ),
+                Mistake(
+                    lambda A, C, Q, R: A @ kalman.steady_state(A, C, Q, R).gain,
+                    "This is A K, the gain of the form that predicts and corrects in one line. Here the correction's own gain is asked for.",
+                ),
+                Mistake(
+                    _rounds(5), "Five rounds are too few: repeat until the gain stands still, some thousand times."
+                ),
+                Mistake(
+                    _rounds(10), "Ten rounds are too few: repeat until the gain stands still, some thousand times."
+                ),
+                Mistake(
+                    lambda A, C, Q, R: kalman.steady_state(A, C, Q, R @ R).gain,
+                    "cov_z holds variances already: do not square it.",
+                ),
+                Mistake(
+                    lambda A, C, Q, R: steady_state_gain(A, C, Q, R)[:, 0],
+                    "The values are right; K is a matrix, shape (n, m), here one column.",
+                ),
+            ],
+        ),
+        Value(
+            "corrected",
+            reference=lambda: _printed_correction().x,
+            unit="m, m/s",
+            metric=metrics.Numbers(1e-4),
+            hints=(
+                "Only the correction is asked for: the prediction is printed.",
+                "Your `update` with C = (1, 0), z = 11.79 and the variance 0.25; the first result is the state.",
+                "`corrected = update(np.array([12.5, 5.0]), prior_cov, np.array([11.79]), np.array([[1.0, 0.0]]), np.array([[0.25]]))[0]`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: np.array([11.90, 4.98]),
+                    "This is what the page prints. Its own numbers give something else: compute it.",
+                ),
+                Mistake(
+                    lambda: _printed_correction(lambda g: g | {"var_z": 0.25**2}).x,
+                    "You squared 0.25. The page prints it as Sigma_z: it is a variance already.",
+                ),
+                Mistake(
+                    lambda: _printed_correction(lambda g: g | {"prior_cov_xv": 0.0}).x,
+                    "The velocity is not corrected at all: use the whole covariance, its off-diagonal entry carries the news.",
+                ),
+                Mistake(
+                    lambda: 2 * np.array([12.5, 5.0]) - _printed_correction().x,
+                    "You correct away from the measurement.",
+                ),
+                Mistake(
+                    lambda: _printed_correction(lambda g: g | {"var_z": 0.5}).x,
+                    "You took the root of 0.25. A variance goes in as it is.",
+                ),
+                Mistake(
+                    lambda: _printed_correction(lambda g: g | {"prior_x": 12.75, "prior_v": 5.1}).x,
+                    "This is the correction of (12.75, 5.10). The page prints the prediction (12.5, 5.0): start from it.",
+                ),
+                Mistake(lambda: np.array([12.5, 5.0]), "This is the prediction: the correction is missing."),
+                Mistake(
+                    lambda: np.array([11.79, 5.0]),
+                    "You took the measurement for the position. The filter believes only a part of it.",
+                ),
+                Mistake(
+                    lambda: _printed_correction().x - [12.5, 5.0],
+                    "This is the correction alone: add it to the prediction.",
+                ),
+                Mistake(
+                    lambda: (
+                        _printed_correction(
+                            lambda g: g | {"prior_cov_xx": 0.2216, "prior_cov_xv": 0.0290, "prior_cov_vv": 0.0620}
+                        ).x
+                    ),
+                    "You put in the covariance after the correction. The gain comes from the one before, prior_cov.",
+                ),
+                Mistake(
+                    lambda: _printed_correction(lambda g: g | {"var_z": 0.0}).x,
+                    "The sensor's variance 0.25 is missing: your filter believes the measurement entirely.",
+                ),
+            ],
+        ),
+        Exercise(
+            "wrap_angle",
+            reference=wrap_angle,
+            draw=each_way(turned_too_far, "sign"),
+            metric=metrics.Numbers(1e-9, "rad"),
+            draws=12,
+            hints=(
+                "An angle and the same angle plus a full turn are one direction. Choose the one nearest to zero.",
+                "Shift by pi, take the remainder of a full turn, shift back.",
+                "`return (angle + np.pi) % (2 * np.pi) - np.pi`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda a: a % (2 * np.pi),
+                    "Your angles lie between 0 and 2 pi. An error of -0.1 becomes 6.18: shift by pi before and after.",
+                ),
+                Mistake(
+                    lambda a: a - 2 * np.pi * np.sign(a) * (abs(a) > np.pi),
+                    "You take off one turn. An angle that has gathered several keeps the others: take the remainder of a full turn.",
+                ),
+                Mistake(
+                    lambda a: np.fmod(a + np.pi, 2 * np.pi) - np.pi,
+                    "np.fmod keeps the sign of its argument, so that negative angles end below -pi. The operator `%` does not.",
+                ),
+                Mistake(
+                    lambda a: np.fmod(a, 2 * np.pi),
+                    "Whole turns are gone, but up to a full turn on either side is left: shift by pi before and after, and use `%`.",
+                ),
+                Mistake(lambda a: a % np.pi, "The remainder is to be taken of a full turn, 2 pi."),
+                Mistake(lambda a: (a + np.pi) % np.pi - np.pi, "The remainder is to be taken of a full turn, 2 pi."),
+                Mistake(
+                    lambda a: np.clip(a, -np.pi, np.pi),
+                    "You cut the angle off at pi. A turn too many has to be subtracted.",
+                ),
+                Mistake(
+                    lambda a: (a + np.pi) % (2 * np.pi),
+                    "The second shift is missing: subtract pi again.",
+                ),
+                Mistake(
+                    lambda a: (a + 180) % 360 - 180,
+                    "Your angles come back as they were. The remainder `%` is taken of (angle + pi), in brackets, and of 2 pi: radians, not degrees.",
+                ),
+                Mistake(
+                    lambda a: a % (2 * np.pi) - np.pi,
+                    "The first shift is missing: add pi before the remainder. Yours points backward.",
+                ),
+                Mistake(
+                    lambda a: (a - np.pi) % (2 * np.pi) + np.pi,
+                    "The second shift has the wrong sign: your angles lie between pi and 3 pi. Subtract pi again.",
+                ),
+                Mistake(
+                    lambda a: a - np.pi * np.round(a / np.pi),
+                    "Take off full turns, 2 pi. Half a turn more or less points backward.",
+                ),
+                Mistake(
+                    lambda a: np.arctan2(np.cos(a), np.sin(a)), "np.arctan2 takes the sine first, then the cosine."
+                ),
+                Mistake(
+                    lambda a: np.arcsin(np.sin(a)),
+                    "The sine alone cannot tell ahead from behind: np.arctan2(sin, cos) can.",
+                ),
+                Mistake(
+                    lambda a: np.arccos(np.cos(a)),
+                    "The cosine alone cannot tell left from right: np.arctan2(sin, cos) can.",
+                ),
+                Mistake(
+                    lambda a: wrapped(a) if a > 0 else a,
+                    "Right for positive angles. Negative ones below -pi have to be turned up as well.",
+                ),
+                Mistake(
+                    lambda a: a - 2 * np.pi if a > np.pi else a,
+                    "You take off one turn, and only from positive angles: take the remainder of a full turn.",
+                ),
+                Mistake(
+                    lambda a: (a + np.pi) % 2 * np.pi - np.pi,
+                    "Brackets are missing: % (2 * np.pi). Without them Python takes the remainder of 2, then multiplies by pi.",
+                ),
+            ],
+        ),
+        Exercise(
+            "measurement",
+            reference=measurement,
+            draw=each_way(landmark_aside, "side", "turned"),
+            draws=12,
+            metric=metrics.Numbers(1e-9),
+            hints=(
+                "How far away is the landmark, and in which direction seen from where the robot looks?",
+                "d = sqrt(dx^2 + dy^2), alpha = atan2(dy, dx) - theta, with (dx, dy) from robot to landmark.",
+                "`dx, dy = landmark - x[:2]; return np.array([np.hypot(dx, dy), wrap_angle(np.arctan2(dy, dx) - x[2])])`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda x, l: measurement(x, l) * [1, 0] + [0, np.arctan2(*(l - x[:2])[::-1])],
+                    "This is the bearing in the hall. The robot sees it relative to its own heading: subtract theta.",
+                ),
+                Mistake(
+                    lambda x, l: measurement(x, l) * [1, 0] + [0, np.arctan2(*(l - x[:2])[::-1]) - x[2]],
+                    "Distance and bearing are right, but the bearing lies outside [-pi, pi): wrap it.",
+                ),
+                Mistake(
+                    lambda x, l: np.array([measurement(x, l)[0], wrapped(np.arctan2(*(x[:2] - l)[::-1]) - x[2])]),
+                    "Your bearing points backward: from the robot to the landmark, not from the landmark to the robot.",
+                ),
+                Mistake(
+                    lambda x, l: np.array([measurement(x, l)[0], np.arctan2(*(x[:2] - l)[::-1]) - x[2]]),
+                    "Your bearing points backward: from the robot to the landmark, not from the landmark to the robot.",
+                ),
+                Mistake(
+                    lambda x, l: np.array([measurement(x, l)[0], wrapped(np.arctan2(*(l - x[:2])) - x[2])]),
+                    "np.arctan2 takes y first, then x.",
+                ),
+                Mistake(
+                    lambda x, l: measurement(x, l) % [np.inf, 2 * np.pi],
+                    "Your bearing lies between 0 and 2 pi: a landmark just to the right would be seen at 6.2. Wrap it to [-pi, pi).",
+                ),
+                Mistake(
+                    lambda x, l: np.array([measurement(x, l)[0], wrapped(np.arctan2(*(l - x[:2])[::-1]) + x[2])]),
+                    "The heading has the wrong sign: what turns with the robot is subtracted.",
+                ),
+                Mistake(
+                    lambda x, l: np.array([measurement(x, l)[0], np.arctan(np.divide(*(l - x[:2])[::-1])) - x[2]]),
+                    "np.arctan cannot tell left from right of the y axis: np.arctan2(dy, dx) can. And the bearing has to be wrapped.",
+                ),
+                Mistake(lambda x, l: measurement(x, l)[::-1], "The order is distance, bearing."),
+                Mistake(
+                    lambda x, l: measurement(x, l) * [measurement(x, l)[0], 1],
+                    "The distance is squared: the root is missing.",
+                ),
+                Mistake(
+                    lambda x, l: np.array(
+                        [measurement(x, l)[0], wrapped(np.arctan(np.divide(*(l - x[:2])[::-1])) - x[2])]
+                    ),
+                    "np.arctan cannot tell a landmark on the left from one on the right of the y axis: np.arctan2(dy, dx) can.",
+                ),
+                Mistake(
+                    lambda x, l: measurement(x, l) * [1, -1],
+                    "The bearing has the wrong sign: direction to the landmark minus heading; the left is positive.",
+                ),
+                Mistake(
+                    lambda x, l: np.array([measurement(x, l)[0], x[2] - np.arctan2(*(l - x[:2])[::-1])]),
+                    "The bearing has the wrong sign, and it is not wrapped: direction to the landmark minus heading.",
+                ),
+                Mistake(
+                    lambda x, l: measurement(x, l) * [1, np.degrees(1)],
+                    "The bearing is in degrees: leave it in radians.",
+                ),
+                Mistake(
+                    lambda x, l: np.array([measurement(x, l)[0], np.arctan2(*(l - x[:2])) - x[2]]),
+                    "np.arctan2 takes y first, then x. And the bearing has to be wrapped.",
+                ),
+                Mistake(
+                    lambda x, l: measurement(x, l) + [0, np.pi],
+                    "The second shift of the wrap is missing: subtract pi again.",
+                ),
+                Mistake(
+                    lambda x, l: np.array([measurement(x, l)[0], abs(measurement(x, l)[1])]),
+                    "No absolute value: a landmark on the right has a negative bearing.",
+                ),
+                Mistake(
+                    lambda x, l: np.array([np.abs(l - x[:2]).sum(), measurement(x, l)[1]]),
+                    "The bearing is right. The distance is the root of dx^2 + dy^2.",
+                ),
+                Mistake(
+                    lambda x, l: np.array([np.hypot(*l), wrapped(np.arctan2(l[1], l[0]) - x[2])]),
+                    "The robot's position is missing: dx and dy lead from the robot to the landmark.",
+                ),
+            ],
+        ),
+        Exercise(
+            "measurement_jacobian",
+            reference=measurement_jacobian,
+            draw=seen_landmark,
+            metric=metrics.Numbers(1e-5),
+            hints=(
+                "Move the robot a little toward the landmark, then across, then turn it. What do distance and bearing do?",
+                "Row 0: (-dx/r, -dy/r, 0). Row 1: (dy/q, -dx/q, -1) with q = r^2.",
+                "`dx, dy = landmark - x[:2]; q = dx**2 + dy**2; r = np.sqrt(q); return np.array([[-dx / r, -dy / r, 0], [dy / q, -dx / q, -1]])`",
+            ),
+            mistakes=[
+                Mistake(
+                    _rows(lambda dx, dy, r: [[dx / r, dy / r, 0], [-dy / r**2, dx / r**2, -1]]),
+                    "These are the derivatives by the landmark's position. By the robot's they have the opposite sign.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [dy / r, -dx / r, -1]]),
+                    "The bearing changes by the shift across divided by the distance: divide by r squared, not by r.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [dy / r**2, -dx / r**2, 1]]),
+                    "When the robot turns left the landmark moves to the right: the last entry is -1.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [dy / r**2, -dx / r**2, 0]]),
+                    "The bearing also depends on the heading.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [-dx / r**2, dy / r**2, -1]]),
+                    "In the second row dx and dy are exchanged: only a shift across the line of sight turns it.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[dx / r, dy / r, 0], [dy / r**2, -dx / r**2, -1]]),
+                    "The sign of row 0: a step toward the landmark makes the distance smaller.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [-dy / r**2, dx / r**2, -1]]),
+                    "The signs of dx and dy in row 1: a step to the left turns the landmark to the right.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dx / r**2, -dy / r**2, 0], [dy / r**2, -dx / r**2, -1]]),
+                    "Row 0 is divided by r, not by r squared: a step straight toward the landmark shortens the distance by just this step.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dx, -dy, 0], [dy, -dx, -1]]),
+                    "The divisions are missing: row 0 by r, row 1 by r squared.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-2 * dx, -2 * dy, 0], [dy / r**2, -dx / r**2, -1]]),
+                    "Row 0 is the derivative of the squared distance. That of the distance is -dx / r, -dy / r.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dx / r / 2, -dy / r / 2, 0], [dy / r**2, -dx / r**2, -1]]),
+                    "The derivative of the root has a factor 1/2, that of the square a factor 2: they cancel in row 0.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-2 * dx / r, -2 * dy / r, 0], [dy / r**2, -dx / r**2, -1]]),
+                    "The derivative of the root has a factor 1/2, that of the square a factor 2: they cancel in row 0.",
+                ),
+                Mistake(
+                    lambda x, l: measurement_jacobian(x, l)[::-1],
+                    "The order is distance, bearing: your rows are exchanged.",
+                ),
+                Mistake(
+                    lambda x, l: measurement_jacobian(x, l)[:, :2],
+                    "The column of the heading is missing: distance and bearing by theta are 0 and -1.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [dy / r**2, dx / r**2, -1]]),
+                    "A sign in row 1: -dx / r^2 in the column of y.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [-dy / r**2, -dx / r**2, -1]]),
+                    "A sign in row 1: plus dy / r^2 in the column of x.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[dx / r, dy / r, 0], [-dy / r**2, dx / r**2, 1]]),
+                    "All signs are turned around: these are the derivatives of minus the measurement.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dy / r, -dx / r, 0], [dy / r**2, -dx / r**2, -1]]),
+                    "In row 0 dx and dy are exchanged.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [dx / r**2, -dy / r**2, -1]]),
+                    "In row 1 dx and dy are exchanged: only a shift across the line of sight turns it.",
+                ),
+                Mistake(
+                    _rows(lambda dx, dy, r: [[-dx / r, -dy / r, -1], [dy / r**2, -dx / r**2, -1]]),
+                    "The distance does not depend on the heading: the last entry of row 0 is 0.",
+                ),
+            ],
+        ),
+        Exercise(
+            "motion_jacobians",
+            reference=motion_jacobians,
+            draw=pose_control_step,
+            metric=metrics.Several(metrics.Numbers(1e-5), metrics.Numbers(1e-5), names=("G_x", "G_u")),
+            hints=(
+                "They are F_x and F_u of chapter 7 under another letter.",
+                "G_x is the identity with -v T sin(theta) and v T cos(theta) in the last column; G_u has T cos, T sin and T.",
+                "`c, s, d = np.cos(x[2]), np.sin(x[2]), u[0] * dt; return np.array([[1, 0, -d * s], [0, 1, d * c], [0, 0, 1]]), dt * np.array([[c, 0], [s, 0], [0, 1]])`",
+            ),
+            mistakes=[
+                Mistake(_jacobians(_sine_sign), "In G_x, the derivative of the cosine is minus the sine."),
+                Mistake(
+                    _jacobians(lambda G, x, u, t: G - np.eye(3)),
+                    "In G_x the identity is missing: the old pose is part of the new one.",
+                ),
+                Mistake(_jacobians(change_u=lambda G, x, u, t: G / t), "In G_u the time step is missing."),
+                Mistake(
+                    _jacobians(change_u=lambda G, x, u, t: G * u),
+                    "In G_u, v and omega must not appear: the step is linear in both.",
+                ),
+                Mistake(lambda x, u, t: motion_jacobians(x, u, t)[::-1], "The order is G_x, G_u."),
+                Mistake(
+                    lambda x, u, t: odometry.step_jacobians(x, u, t, "midpoint"),
+                    "These are the midpoint model's. The lecture's filter moves along the old heading.",
+                ),
+                Mistake(
+                    _jacobians(lambda G, x, u, t: G * [[1, 1, 1], [1, 1, -1], [1, 1, 1]]),
+                    "In G_x, the derivative of the sine is plus the cosine: a sign in row 1.",
+                ),
+                Mistake(
+                    _jacobians(_last_column(lambda x, u, t: (-u[0] * np.sin(x[2]), u[0] * np.cos(x[2])))),
+                    "In G_x the time step is missing: the way is v T.",
+                ),
+                Mistake(
+                    _jacobians(_last_column(lambda x, u, t: (-t * np.sin(x[2]), t * np.cos(x[2])))),
+                    "In G_x the speed is missing: the way is v T.",
+                ),
+                Mistake(
+                    _jacobians(
+                        _last_column(lambda x, u, t: (-u[0] * np.sin(x[2]), u[0] * np.cos(x[2]))),
+                        lambda G, x, u, t: G / t,
+                    ),
+                    "The time step is missing from both.",
+                ),
+                Mistake(
+                    _jacobians(_last_column(lambda x, u, t: (-u[0] * t * np.cos(x[2]), u[0] * t * np.sin(x[2])))),
+                    "In G_x, sine and cosine are exchanged.",
+                ),
+                Mistake(
+                    _jacobians(_last_column(lambda x, u, t: (u[0] * t * np.cos(x[2]), u[0] * t * np.sin(x[2])))),
+                    "In G_x you put in the step itself. It holds the derivative of the step by theta.",
+                ),
+                Mistake(
+                    _jacobians(_last_column(lambda x, u, t: (-u[1] * t * np.sin(x[2]), u[1] * t * np.cos(x[2])))),
+                    "In G_x you took omega for the speed: v is u[0].",
+                ),
+                Mistake(
+                    _jacobians(lambda G, x, u, t: G + np.diag([0, 0, u[1] * t])),
+                    "In G_x, omega T does not depend on theta: the last entry is 1.",
+                ),
+                Mistake(
+                    _jacobians(change_u=lambda G, x, u, t: G / [[1, 1], [1, 1], [1, t]]),
+                    "In G_u the last entry is T: omega acts for a time step.",
+                ),
+                Mistake(
+                    _jacobians(change_u=lambda G, x, u, t: G / [[t, 1], [t, 1], [1, 1]]),
+                    "In G_u the time step is missing from the first column.",
+                ),
+                Mistake(_jacobians(change_u=lambda G, x, u, t: G[[1, 0, 2]]), "In G_u, sine and cosine are exchanged."),
+                Mistake(
+                    _jacobians(change_u=lambda G, x, u, t: G[:, ::-1]),
+                    "In G_u the columns are exchanged: first v, then omega.",
+                ),
+                Mistake(
+                    _jacobians(change_u=lambda G, x, u, t: G * [u[0], 1]),
+                    "In G_u, v must not appear: the step is linear in it.",
+                ),
+                Mistake(
+                    _jacobians(change_u=lambda G, x, u, t: G * [1, u[1]]),
+                    "In G_u, omega must not appear: the step is linear in it.",
+                ),
+                Mistake(
+                    lambda x, u, t: motion_jacobians(odometry.step(x, u, t, "euler"), u, t),
+                    "You put in the new heading. The simplified model drives along the old one.",
+                ),
+                Mistake(
+                    lambda x, u, t: odometry.step_jacobians(x, u, t, "arc"),
+                    "These are the exact arc's. The lecture's filter moves along the old heading.",
+                ),
+            ],
+        ),
+        Exercise(
+            "ekf_step",
+            reference=ekf_step,
+            draw=filter_step,
+            metric=metrics.Several(metrics.PlanarPoses(1e-7), metrics.Numbers(1e-7), names=("pose", "covariance")),
+            hints=(
+                "Predict with the model itself and its Jacobians, then correct as before, with H in place of C.",
+                "The Jacobian H and the expected measurement belong to the predicted pose; the bearing innovation is wrapped.",
+                "`G_x, G_u = motion_jacobians(x, u, dt); x = odometry.step(x, u, dt, 'euler'); cov = G_x @ cov @ G_x.T + G_u @ cov_u @ G_u.T; H = measurement_jacobian(x, landmark); y = z - measurement(x, landmark); y[1] = wrap_angle(y[1]); K = cov @ H.T @ np.linalg.inv(H @ cov @ H.T + cov_z); return x + K @ y, (np.eye(3) - K @ H) @ cov`",
+            ),
+            mistakes=[
+                Mistake(
+                    _ekf(wrap=False),
+                    "The bearing innovation is not wrapped: a measurement just across +-pi throws your robot around by a full turn.",
+                ),
+                Mistake(_ekf(noise=False), "The control's noise G_u cov_u G_u' is missing from the prediction."),
+                Mistake(
+                    _ekf(at="old", H_at="old"),
+                    "Expected measurement and H belong to the predicted pose; you used the old one.",
+                ),
+                Mistake(
+                    _ekf(H_at="old"),
+                    "Your H is taken at the old pose. The sensor measures after the motion: H belongs to the predicted pose.",
+                ),
+                Mistake(
+                    _ekf(at="old"), "The expected measurement is that of the predicted pose; you used the old one."
+                ),
+                Mistake(
+                    _ekf(G_at="predicted"),
+                    "Your G_x and G_u are taken at the new pose. The motion starts at the old one, and is linearized there.",
+                ),
+                Mistake(
+                    lambda x, *given: (
+                        ekf_step(x, *given)[0] - _ekf(short=True)(x, *given)[0] + x,
+                        ekf_step(x, *given)[1],
+                    ),
+                    "You add the correction to the old pose: it belongs to the predicted one.",
+                ),
+                Mistake(
+                    lambda x, cov, u, dt, *given: (
+                        odometry.step(x, u, dt, "midpoint")
+                        - odometry.step(x, u, dt, "euler")
+                        + ekf_step(x, cov, u, dt, *given)[0],
+                        ekf_step(x, cov, u, dt, *given)[1],
+                    ),
+                    "The pose takes the midpoint step before the correction, the Jacobians are those of the simplified model.",
+                ),
+                Mistake(
+                    lambda x, cov, *given: (ekf_step(x, cov, *given)[0], _old_cov_corrected(x, cov, *given)),
+                    "The pose is right. (I - K H) is to be applied to the predicted covariance; you applied it to the old one.",
+                ),
+                Mistake(_ekf(short=True), "You only predicted: the correction is missing."),
+                Mistake(_ekf(carry=False), "The old covariance must be carried along: G_x cov G_x'."),
+                Mistake(
+                    _ekf(gain=lambda P, H, R: P @ H.T @ np.linalg.inv(H @ P @ H.T)),
+                    "The sensor's noise is missing from S.",
+                ),
+                Mistake(
+                    lambda *given: (2 * _ekf(short=True)(*given)[0] - ekf_step(*given)[0], ekf_step(*given)[1]),
+                    "You correct away from the measurement: the innovation is measured minus expected.",
+                ),
+                Mistake(
+                    lambda *given: (ekf_step(*given)[0], _ekf(short=True)(*given)[1]),
+                    "The pose is right. The covariance was predicted but not corrected: (I - K H) cov.",
+                ),
+                Mistake(
+                    _ekf(gain=lambda P, H, R: P @ H.T @ np.linalg.inv(R)),
+                    "S is the noise of the sensor plus the uncertainty of the expected measurement, H cov H'.",
+                ),
+                Mistake(
+                    _ekf(gain=lambda P, H, R: P @ H.T @ (H @ P @ H.T + R)),
+                    "You multiplied by S. The gain divides by it: its inverse stands there.",
+                ),
+                Mistake(_ekf(gain=lambda P, H, R: P @ H.T), "The division by S is missing from the gain."),
+                Mistake(
+                    _ekf(gain=lambda P, H, R: P @ H.T @ np.linalg.inv(H @ P @ H.T + R @ R)),
+                    "cov_z holds variances already: do not square it.",
+                ),
+                Mistake(
+                    _ekf(shrink=lambda P, K, H: (np.eye(3) + K @ H) @ P),
+                    "A sign: (I - K H) cov. Yours grows with every measurement.",
+                ),
+                Mistake(
+                    _ekf(shrink=lambda P, K, H: (1 - K @ H) @ P),
+                    "1 - K H subtracts from a matrix full of ones. The identity is np.eye(3).",
+                ),
+                Mistake(
+                    _ekf(shrink=lambda P, K, H: P @ (np.eye(3) - K @ H)),
+                    "The order: (I - K H) stands to the left of cov.",
+                ),
+                Mistake(
+                    _ekf(shrink=lambda P, K, H: K @ H @ P),
+                    "This is what is taken away. The new covariance is what is left: (I - K H) cov.",
+                ),
+                Mistake(
+                    _ekf(model="midpoint"),
+                    'The pose takes the midpoint step. This filter moves with the simplified model, "euler".',
+                ),
+                Mistake(
+                    _ekf(model="arc"), 'The pose drives the arc. This filter moves with the simplified model, "euler".'
+                ),
+                Mistake(
+                    lambda x, cov, u, dt, cov_u, *given: _ekf(noise=False, carry=False)(
+                        x, cov, np.zeros(2), dt, cov_u, *given
+                    ),
+                    "You only corrected: the prediction, motion and growing covariance, is missing.",
+                ),
+                Mistake(
+                    lambda x, cov, u, dt, cov_u, *given: _ekf(short=True)(
+                        *_ekf(noise=False)(x, cov, np.zeros(2), dt, cov_u, *given), u, dt, cov_u, *given
+                    ),
+                    "You corrected first and moved then. The sensor measures after the motion: predict, then correct.",
+                ),
+                Mistake(
+                    lambda *given: (ekf_step(*given)[0] - _ekf(short=True)(*given)[0], ekf_step(*given)[1]),
+                    "You return the correction alone: add it to the predicted pose.",
+                ),
+                Mistake(lambda *given: ekf_step(*given)[::-1], "The order is pose, covariance."),
+            ],
+        ),
+        Prediction(
+            "wrapping",
+            question="Two landmarks, a robot in circles, and a filter that forgets to wrap the bearing innovation. What happens when a bearing crosses from +180 to -180 deg?",
+            choices=(
+                "nothing, the filter averages it out",
+                "the estimate is thrown off at once",
+                "the filter becomes slowly less accurate",
+            ),
+            answer="the estimate is thrown off at once",
+            why="An innovation of a few hundredths becomes one of 6.28 rad. The gain turns it into meters, and the covariance shrinks as if all were well.",
+        ),
+        Exercise(
+            "nees",
+            reference=nees,
+            draw=estimate_and_truth,
+            metric=metrics.Numbers(1e-8),
+            hints=(
+                "Measure the error in units of the uncertainty the filter claims.",
+                "e' cov^-1 e with e = truth - x, the heading wrapped.",
+                "`e = truth - x; e[2] = wrap_angle(e[2]); return e @ np.linalg.solve(cov, e)`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda t, x, P: (t - x) @ np.linalg.solve(P, t - x),
+                    "The heading error is not wrapped: both headings are nearly the same direction.",
+                ),
+                Mistake(
+                    lambda t, x, P: _error(t, x) @ P @ _error(t, x),
+                    "You multiplied by the covariance. Divide by it: its inverse stands in the middle.",
+                ),
+                Mistake(
+                    lambda t, x, P: np.sqrt(nees(t, x, P)),
+                    "You took the root. The normalized error *squared* has the expectation 3.",
+                ),
+                Mistake(
+                    lambda t, x, P: _error(t, x) @ _error(t, x),
+                    "The covariance is missing: the error counts in units of what the filter promised.",
+                ),
+                Mistake(
+                    lambda t, x, P: (_error(t, x) ** 2 / np.diag(P)).sum(),
+                    "You left the correlations out: use the whole inverse, not only the diagonal.",
+                ),
+                Mistake(
+                    lambda t, x, P: nees(t, x, P) / 3,
+                    "You divided by the number of states. Then the expectation is 1; here it should be 3.",
+                ),
+                Mistake(
+                    lambda t, x, P: _error(t, x)[:2] @ np.linalg.solve(P[:2, :2], _error(t, x)[:2]),
+                    "The heading is missing: all three states count.",
+                ),
+                Mistake(
+                    lambda t, x, P: (_error(t, x) / np.sqrt(np.diag(P))).sum(),
+                    "The errors have to be squared before they are added: e' cov^-1 e.",
+                ),
+                Mistake(
+                    lambda t, x, P: (_error(t, x) ** 2 / np.sqrt(np.diag(P))).sum(),
+                    "Squares are divided by variances, and the correlations count as well: e' cov^-1 e.",
+                ),
+                Mistake(
+                    lambda t, x, P: _error(t, x) * np.linalg.solve(P, _error(t, x)),
+                    "The sum is missing: `e @ ...` multiplies and adds, `e * ...` only multiplies.",
+                ),
+                Mistake(
+                    lambda t, x, P: _error(t, x) @ (1 / P) @ _error(t, x),
+                    "`1 / cov` turns every entry over. The inverse of a matrix is np.linalg.inv(cov).",
+                ),
+                Mistake(
+                    lambda t, x, P: _error(t, x) @ _error(t, x) / np.linalg.det(P),
+                    "A determinant does not weigh directions: the inverse stands between e' and e.",
+                ),
+                Mistake(
+                    lambda t, x, P: _error(t, x) @ _error(t, x) / np.trace(P),
+                    "The trace does not weigh directions: the inverse stands between e' and e.",
+                ),
+                Mistake(
+                    lambda t, x, P: nees(t, x, P) ** 2, "Squared once too often: e' cov^-1 e is the square already."
+                ),
+                Mistake(
+                    lambda t, x, P: nees(t, x, P) / 2,
+                    "No half: that belongs to the exponent of the bell. The expectation is 3.",
+                ),
+                Mistake(
+                    lambda t, x, P: ((t - x) ** 2 / np.diag(P)).sum(),
+                    "Two slips: the heading error is not wrapped, and the correlations are left out.",
+                ),
+                Mistake(
+                    lambda t, x, P: (t - x) @ P @ (t - x),
+                    "Two slips: the heading error is not wrapped, and the covariance stands there instead of its inverse.",
+                ),
+            ],
+        ),
+        Prediction(
+            "precise",
+            question="A poorly known start, two landmarks. You replace the sensor by one ten times more precise. Is the filter's covariance more or less trustworthy?",
+            choices=("more trustworthy", "equally", "less trustworthy"),
+            answer="less trustworthy",
+            why="The filter replaces a curved circle of positions by its tangent. The better the sensor, the thinner the tangent, and the farther the truth lies from it.",
+        ),
+        Exercise(
+            "gate",
+            reference=gate,
+            draw=SURPRISES,
+            metric=metrics.Exactly(),
+            draws=28,
+            hints=(
+                "Is the surprise larger than the filter's own idea of how large surprises are?",
+                "Compare y' S^-1 y with the limit.",
+                "`return bool(innovation @ np.linalg.solve(cov_innovation, innovation) <= limit)`",
+            ),
+            mistakes=[
+                Mistake(lambda y, S, g: not gate(y, S, g), "Exactly the other way round: True means plausible."),
+                Mistake(
+                    _gated(lambda y, S: y @ y),
+                    "You compare meters and radians with a number without unit: divide by the covariance S.",
+                ),
+                Mistake(
+                    _gated(lambda y, S: np.sqrt(y @ np.linalg.solve(S, y))),
+                    "Too much passes: the limit belongs to y' S^-1 y itself, no root taken, and stays what is given.",
+                ),
+                Mistake(
+                    _gated(lambda y, S: (y**2 / np.diag(S)).sum()),
+                    "You left the correlation out: use the whole inverse of S, not only its diagonal.",
+                ),
+                Mistake(
+                    lambda y, S, g: bool((y**2 <= g * np.diag(S)).all()),
+                    "You left the correlation out: use the whole inverse of S, not only its diagonal.",
+                ),
+                Mistake(
+                    lambda y, S, g: bool((np.abs(y) <= 3 * np.sqrt(np.diag(S))).all()),
+                    "You left the correlation out: use the whole inverse of S, not only its diagonal.",
+                ),
+                Mistake(
+                    lambda y, S, g: bool((np.abs(y) <= 2 * np.sqrt(np.diag(S))).all()),
+                    "You left the correlation out: use the whole inverse of S, not only its diagonal.",
+                ),
+                Mistake(_gated(lambda y, S: y @ S @ y), "S stands in the middle as its inverse."),
+                Mistake(
+                    _gated(lambda y, S: (y @ np.linalg.solve(S, y)) ** 2),
+                    "Too little passes: y' S^-1 y is the square already, and the limit belongs to it as it is.",
+                ),
+                Mistake(lambda y, S, g: True, "You let everything pass: what is the limit for?"),
+                Mistake(lambda y, S, g: False, "You refuse everything: such a filter never corrects itself."),
+            ],
+        ),
+    ],
+)

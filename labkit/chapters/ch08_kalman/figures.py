@@ -1,0 +1,109 @@
+"""Figures of Kalman filters: three bells, bands over time, the landmark arena with its consistency panel."""
+
+import numpy as np
+
+from ...stage import style
+from ...stage.marks import robot_outline
+
+
+class Bells:
+    """Prediction, measurement and correction as normal densities over one axis."""
+
+    ROLES = (("prediction", "prediction"), ("measurement", "measurement"), ("estimate", "corrected"))
+
+    def __init__(self, ax, grid):
+        self.grid = grid
+        self.lines = []
+        for role, label in self.ROLES:
+            solid = {"marker": "", "linestyle": "-", "linewidth": 2.2} if role == "measurement" else {}
+            self.lines += ax.plot([], [], **style.look(role, **solid), label=label)
+        (self.before,) = ax.plot([], [], **style.look("guide"), label="before the motion")
+        ax.legend(loc="upper left", fontsize=8)
+        self.artists = [self.before, *self.lines]
+
+    def set(self, before, bells):
+        """`before`, and each of `bells` in the order prediction, measurement, corrected: (mean, std)."""
+        for line, (mean, std) in zip((self.before, *self.lines), (before, *bells)):
+            density = np.exp(-0.5 * ((self.grid - mean) / std) ** 2) / (std * np.sqrt(2 * np.pi))
+            line.set_data(self.grid, density)
+
+
+class ErrorBand:
+    """An error over time within the band that the filter promises."""
+
+    def __init__(self, ax, label):
+        promised = "\N{PLUS-MINUS SIGN}2 sigma, promised"
+        (self.band,) = ax.plot([], [], **style.look("prediction", linewidth=1.6), label=promised)
+        (self.error,) = ax.plot([], [], **style.look("estimate", linewidth=1.6), label=label)
+        ax.axhline(0, color=style.GRID, linewidth=1)
+        self.artists = [self.band, self.error]
+
+    def set(self, time, error, std):
+        """`time`, `error`, `std`: (n,)."""
+        self.error.set_data(time, error)
+        self.band.set_data([*time, np.nan, *time], [*(2 * std), np.nan, *(-2 * std)])
+
+
+class Consistency:
+    """NIS or NEES over time on a logarithmic axis, with the limits between which 99 % should lie."""
+
+    def __init__(self, ax, label, role="measurement"):
+        look = style.look(role, linestyle="none", marker="." if role == "measurement" else "D", markersize=4)
+        (self.values,) = ax.plot([], [], **look, label=label)
+        (self.limits,) = ax.plot([], [], **style.look("guide", color=style.INK), label="99 % limits")
+        self.artists = [self.limits, self.values]
+
+    def set(self, time, values, low, high):
+        """`time`, `values`: (n,); `low`, `high`: the limits."""
+        self.values.set_data(time, np.maximum(values, 1e-3))
+        ends = [time[0], time[-1]] if len(time) else [0, 1]
+        self.limits.set_data([*ends, np.nan, *ends], [low, low, np.nan, high, high])
+
+
+class Arena:
+    """True and estimated path, one ellipse, both robots, landmarks and where each measurement puts its landmark."""
+
+    def __init__(self, ax):
+        (self.truth,) = ax.plot([], [], **style.look("truth"), label="true path")
+        (self.estimate,) = ax.plot([], [], **style.look("estimate", linewidth=1.6), label="filter")
+        (self.ellipse,) = ax.plot([], [], **style.look("prediction", linewidth=1.6), label="95 % ellipse")
+        (self.robot,) = ax.plot([], [], color=style.TRUTH, linewidth=1.6)
+        (self.ghost,) = ax.plot([], [], color=style.ESTIMATE, linewidth=1.6)
+        (self.marks,) = ax.plot([], [], color=style.INK, linestyle="none", marker="^", markersize=9)
+        stars = style.look("measurement", marker="*", markersize=7, alpha=0.7)
+        (self.seen,) = ax.plot([], [], **stars, label="measured")
+        self.artists = [self.seen, self.truth, self.estimate, self.ellipse, self.marks, self.ghost, self.robot]
+        ax.legend(loc="upper left", fontsize=8, ncols=2)
+
+    def set(self, truth, estimate, ellipse, landmarks, seen):
+        """`truth`, `estimate`: (n, 3); `ellipse`: (m, 2); `landmarks`: (k, 2); `seen`: (j, 2)."""
+        self.truth.set_data(*truth[:, :2].T)
+        self.estimate.set_data(*estimate[:, :2].T)
+        self.ellipse.set_data(*ellipse.T)
+        self.robot.set_data(*robot_outline(truth[-1], 0.5).T)
+        self.ghost.set_data(*robot_outline(estimate[-1], 0.5).T)
+        self.marks.set_data(*landmarks.T)
+        self.seen.set_data(*seen.T)
+
+
+class Honesty:
+    """Estimates of many runs around the true position with the ellipse they believe in, and NEES against iterations."""
+
+    def __init__(self, plane, score, iterations):
+        look = style.look("estimates", marker=".", markersize=4, markeredgewidth=0, alpha=0.7)
+        (self.cloud,) = plane.plot([], [], **look, label="200 corrected positions")
+        (self.believed,) = plane.plot([], [], **style.look("prediction"), label="95 %, as believed")
+        cross = {"linestyle": "none", "marker": "+", "markersize": 13}
+        (self.truth,) = plane.plot([0], [0], color=style.TRUTH, **cross, label="true")
+        plane.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=8, ncols=3, columnspacing=1.0)
+        dots = style.look("estimate", marker="o", markersize=4)
+        (self.curve,) = score.plot(iterations, np.ones(len(iterations)), **dots)
+        (self.now,) = score.plot([], [], **style.look("estimates", markersize=9))
+        self.artists = [self.cloud, self.believed, self.truth, self.curve, self.now]
+
+    def set(self, cloud, believed, curve, iterations):
+        """`cloud`: (n, 2); `believed`: (m, 2); `curve`: mean NEES for 1, 2, ... iterations; `iterations`: chosen."""
+        self.cloud.set_data(*cloud.T)
+        self.believed.set_data(*believed.T)
+        self.curve.set_ydata(curve)
+        self.now.set_data([iterations], [curve[iterations - 1]])

@@ -1,0 +1,371 @@
+"""Stages of Kalman filters: three bells, the lecture's vehicle, a landmark arena, a precise sensor and a poor prior."""
+
+import functools
+
+import numpy as np
+from scipy.stats import chi2
+
+from ...documents.lecture import printed as lecture
+from ...documents.lecture.examples import circle_course
+from ...estimation import gaussian, kalman
+from ...geometry import planar
+from ...localization import ekf, odometry
+from ...stage import Choice, Handle, Play, Slider, Stage, Toggle, style
+from ...stage.marks import Spare, strayed
+from . import figures as draw
+
+GRID = np.linspace(0, 20, 401)
+SHIFT = 2.0  # m, the commanded motion of the one-dimensional example
+PEAK = 1 / np.sqrt(2 * np.pi)  # height of the bell of standard deviation 1
+NOISE = {"var_x0": 1.0, "var_v0": 0.01, "var_a": 0.16, "var_z": 0.25}  # the vehicle, as reconstructed
+STEPS, DT = 100, 0.1
+DROPOUT = slice(45, 75)
+KEYS = {"up": (1.0, 0.0), "down": (-1.0, 0.0), "left": (0.0, np.pi / 2), "right": (0.0, -np.pi / 2)}
+KEY_STEPS = 4
+ARENA = ((-6.0, 7.0), (-3.0, 8.5))  # m, the part of the floor that is drawn
+RUNS = 200
+ITERATIONS = np.arange(1, 7)
+TWO_MARKS = np.array([[3.0, 0.0], [0.0, 4.0]])
+
+
+# --- one dimension ------------------------------------------------------------
+
+
+def compute_bells(state):
+    """Prediction and correction of one coordinate: (mean, std) of each bell, the gain and the NIS."""
+    std_z = PEAK / state["z"][1]
+    before = (5.0, state["std0"])
+    x, cov = kalman.predict([before[0]], [[before[1] ** 2]], [[1.0]], [[1.0]], [SHIFT], [[state["std_u"] ** 2]])
+    corrected = kalman.update(x, cov, [state["z"][0]], [[1.0]], [[std_z**2]])
+    bells = [(x[0], np.sqrt(cov[0, 0])), (state["z"][0], std_z), (corrected.x[0], np.sqrt(corrected.cov[0, 0]))]
+    score = float(kalman.nis(corrected.innovation, corrected.cov_innovation))
+    return {"before": before, "bells": bells, "gain": float(corrected.gain[0, 0]), "nis": score}
+
+
+def _bells_sentence(result):
+    (_, s_p), (_, s_z), (x, s) = result["bells"]
+    text = f"Standard deviations: predicted {s_p:.2f} m, measured {s_z:.2f} m, corrected {s:.2f} m, at {x:.2f} m."
+    if result["nis"] > chi2.ppf(0.99, 1):
+        text += f" NIS {result['nis']:.0f}: fewer than one in a hundred fits so badly. The bell does not show it."
+    return text
+
+
+def bells():
+    """Prediction, measurement, correction in one dimension: drag the peak of the measurement, sharper is higher."""
+
+    def scene(fig):
+        ax = style.axes(fig.subplots(), "position (m)", "density (1/m)")
+        ax.set(xlim=(0, 20), ylim=(0, 1.15))
+        three = draw.Bells(ax, GRID)
+        words = ax.text(0.27, 0.97, "", transform=ax.transAxes, ha="left", va="top")
+
+        def update(state, result):
+            three.set(result["before"], result["bells"])
+            limit = chi2.ppf(0.99, 1)
+            words.set_text(f"gain K = {result['gain']:.2f}\nNIS = {result['nis']:.2f} (99 % below {limit:.1f})")
+
+        return [*three.artists, words], update
+
+    return Stage(
+        "predict and correct",
+        scene=scene,
+        compute=compute_bells,
+        handles={
+            "z": Handle(
+                (9.0, PEAK), step=0.1, bounds=((0.5, 19), (0.1, 1.1)), color=style.MEASUREMENT,
+                label="peak of the measurement: sideways its value, up and down its sigma",
+            )
+        },
+        controls={
+            "std0": Slider(0.2, 3.0, 0.6, step=0.1, label="std before (m)"),
+            "std_u": Slider(0.0, 3.0, 0.8, step=0.1, label="std of the motion (m)"),
+        },
+        fail={"z": (15.0, 1.0)},
+        describe=_bells_sentence,
+    )  # fmt: skip
+
+
+# --- the vehicle ----------------------------------------------------------------
+
+
+@functools.cache
+def _vehicle_truth():
+    """True states (STEPS, 2) and position measurements of one drive with the reconstructed noise."""
+    rng, (A, B, C) = np.random.default_rng(2), kalman.vehicle_model(DT)
+    x = rng.standard_normal(2) * np.sqrt([NOISE["var_x0"], NOISE["var_v0"]])
+    states, z = [], []
+    for _ in range(STEPS):
+        x = A @ x + B[:, 0] * (1.0 + np.sqrt(NOISE["var_a"]) * rng.standard_normal())
+        states.append(x)
+        z.append(C[0] @ x + np.sqrt(NOISE["var_z"]) * rng.standard_normal())
+    return np.array(states), np.array(z)
+
+
+def compute_vehicle(state):
+    """Errors, promised standard deviations, gains and NIS of the vehicle filter, over STEPS steps."""
+    truth, z = _vehicle_truth()
+    A, B, C = kalman.vehicle_model(DT)
+    z, cov0 = z[:, None].copy(), np.diag([NOISE["var_x0"], NOISE["var_v0"]])
+    if state["dropout"]:
+        z[DROPOUT] = np.nan
+    beliefs = {"cov_z": [[state["std_z"] ** 2]], "cov_u": [[state["std_a"] ** 2]]}
+    run = kalman.filter_steps(z, A, C, x0=np.zeros(2), cov0=cov0, B=B, u=[1.0], **beliefs)
+    nis = kalman.nis(run.innovation, run.cov_innovation)
+    return {
+        "time": DT * np.arange(1, STEPS + 1),
+        "error": run.x - truth,
+        "std": np.sqrt(np.diagonal(run.cov, axis1=-2, axis2=-1)),
+        "gain": run.gain[..., 0],
+        "nis": np.where(np.isnan(z[:, 0]), np.nan, nis),
+    }
+
+
+def _vehicle_sentence(result):
+    seen = np.isfinite(result["nis"])
+    mean, (low, high) = result["nis"][seen].mean(), kalman.mean_band(1, int(seen.sum()))
+    verdict = "in its band" if low < mean < high else "too large: the filter promises too much" if mean > high else (
+        "too small: the filter promises too little"
+    )  # fmt: skip
+    return f"Mean NIS {mean:.2f} (99 % band {low:.2f} to {high:.2f}): {verdict}. Last gain {result['gain'][-1, 0]:.2f}."
+
+
+def vehicle():
+    """Position and velocity of the lecture's vehicle, what the filter promises, and its NIS."""
+
+    def scene(fig):
+        grid = fig.subplot_mosaic([["x", "nis"], ["v", "nis"]], width_ratios=(1.35, 1))
+        for key, label, limit in (("x", "position error (m)", 2.2), ("v", "velocity error (m/s)", 1.3)):
+            style.axes(grid[key], "time (s)" if key == "v" else "", label)
+            grid[key].set(xlim=(0, STEPS * DT), ylim=(-limit, limit))
+        style.axes(grid["nis"], "time (s)", "NIS")
+        grid["nis"].set(xlim=(0, STEPS * DT), ylim=(1e-3, 300), yscale="log")
+        lines = [draw.ErrorBand(grid["x"], "error"), draw.ErrorBand(grid["v"], "error")]
+        nis = draw.Consistency(grid["nis"], "NIS of each step")
+        grid["x"].legend(loc="upper right", fontsize=8, ncols=2)
+        grid["nis"].legend(loc="upper right", fontsize=8)
+        limits = chi2.ppf([0.005, 0.995], 1)
+
+        def update(state, result):
+            for k, line in enumerate(lines):
+                line.set(result["time"], result["error"][:, k], result["std"][:, k])
+            nis.set(result["time"], result["nis"], *limits)
+
+        return [a for item in (*lines, nis) for a in item.artists], update
+
+    return Stage(
+        "the vehicle",
+        scene=scene,
+        compute=compute_vehicle,
+        controls={
+            "std_a": Slider(0.02, 2.0, 0.4, step=0.02, label="believed noise of a (m/s\N{SUPERSCRIPT TWO})"),
+            "std_z": Slider(0.05, 2.0, 0.5, step=0.05, label="believed noise of z (m)"),
+            "dropout": Toggle(False, label="no measurements from 4.5 to 7.5 s"),
+        },
+        fail={"std_z": 0.15, "std_a": 0.04},
+        describe=_vehicle_sentence,
+    )
+
+
+# --- the arena ------------------------------------------------------------------
+
+
+def _start_arena(state):
+    course = circle_course(2)
+    return {
+        "truth": [course.x0],
+        "estimate": [course.x0],
+        "cov": [course.cov0],
+        "nees": [],
+        "nis": [],
+        "seen": np.empty((0, 2)),
+        "rng": np.random.default_rng(21),
+    }
+
+
+def _landmarks(state):
+    return np.array([state["L1"], state["L2"]])[: state["count"]]
+
+
+def _advance_arena(state, event):
+    """One step of the circle for a tick, four for an arrow key: move, measure, predict, correct."""
+    memory, course = state["memory"], circle_course(2)
+    u = course.controls[0] if event == "tick" else np.array(KEYS[event])
+    for _ in range(1 if event == "tick" else KEY_STEPS):
+        _arena_step(state, memory, course, u)
+    return memory
+
+
+def _arena_step(state, memory, course, u):
+    rng, marks = memory["rng"], _landmarks(state)
+    noise = lecture.circle_drive().noise
+    cov_u = odometry.control_covariance(u, course.dt, **noise)
+    real = u + np.sqrt(np.diag(cov_u)) * rng.standard_normal(2)
+    truth = odometry.step(memory["truth"][-1], real, course.dt, "euler")
+    z = ekf.measurement(truth, marks) + rng.standard_normal((len(marks), 2)) * [course.std_range, course.std_bearing]
+    z[:, 1] = planar.wrap_angle(z[:, 1])
+    believed = (state["factor"] * course.std_range, state["factor"] * course.std_bearing)
+    before, cov = memory["estimate"][-1], memory["cov"][-1]
+    step = ekf.ekf_step(before, cov, u, course.dt, cov_u, z, marks, *believed, wrap=state["wrap"])
+    memory["truth"].append(truth)
+    memory["estimate"].append(step.x)
+    memory["cov"].append(step.cov)
+    memory["nees"].append(float(kalman.nees(truth, step.x, step.cov, angle=2)))
+    memory["nis"].append(float(kalman.nis(step.innovation, step.cov_innovation)) / len(marks))
+    toward = step.x[2] + z[:, 1]
+    memory["seen"] = step.x[:2] + z[:, :1] * np.stack([np.cos(toward), np.sin(toward)], axis=1)
+
+
+def compute_arena(state):
+    """Paths, ellipse and consistency of the drive so far."""
+    memory = state["memory"]
+    truth, estimate = np.array(memory["truth"]), np.array(memory["estimate"])
+    return {
+        "truth": truth,
+        "estimate": estimate,
+        "ellipse": gaussian.ellipse(estimate[-1, :2], memory["cov"][-1][:2, :2]),
+        "landmarks": _landmarks(state),
+        "seen": memory["seen"],
+        "nees": np.array(memory["nees"]),
+        "error": float(np.linalg.norm((truth[-1] - estimate[-1])[:2])),
+    }
+
+
+def _arena_sentence(result):
+    if not len(result["nees"]):
+        return "Click the picture and drive with the arrow keys, or press play for the circle."
+    over = float((result["nees"] > chi2.ppf(0.995, 3)).mean())
+    text = f"The filter is {100 * result['error']:.0f} cm off; NEES now {result['nees'][-1]:.3g}, expected 3."
+    text += strayed(result["truth"][-1], ARENA)
+    return text + (f" Above the upper limit in {100 * over:.0f} % of the steps, expected 0.5 %." if over > 0.02 else "")
+
+
+def arena():
+    """A robot, one or two landmarks and an extended Kalman filter, with its consistency beside it."""
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2, width_ratios=(1.45, 1))
+        style.axes(left, "x (m)", "y (m)", equal=True)
+        left.set(xlim=ARENA[0], ylim=ARENA[1])
+        style.axes(right, "steps", "NEES")
+        right.set(xlim=(0, 400), ylim=(1e-2, 1e5), yscale="log")
+        world, spare = draw.Arena(left), Spare(left, "2, not seen")
+        panel = draw.Consistency(right, "NEES of each step", role="estimates")
+        right.legend(loc="upper left", fontsize=8)
+        limits = chi2.ppf([0.005, 0.995], 3)
+
+        def update(state, result):
+            spare.set(state["L2"], state["count"] == 1)
+            world.set(*(result[key] for key in ("truth", "estimate", "ellipse", "landmarks", "seen")))
+            panel.set(np.arange(1, len(result["nees"]) + 1), result["nees"], *limits)
+
+        return [*world.artists, *spare.artists, *panel.artists], update
+
+    return Stage(
+        "landmark arena",
+        scene=scene,
+        compute=compute_arena,
+        handles={
+            "L1": Handle((5.0, 5.0), step=0.2, label="landmark 1"),
+            "L2": Handle((-4.0, 5.5), step=0.2, label="landmark 2, seen with two"),
+        },
+        controls={
+            "count": Choice({"one": 1, "two": 2}, 1, label="landmarks"),
+            "factor": Slider(0.1, 5.0, 1.0, label="believed sensor noise, times the true one", log=True),
+            "wrap": Toggle(True, label="wrap the bearing innovation"),
+        },
+        play=Play(30.0, dt=0.1, rate=2.0),
+        keys=True,
+        start=_start_arena,
+        advance=_advance_arena,
+        fail={"wrap": False, "count": 2},
+        presets={"Sensor believed too good": {"factor": 0.2}},
+        describe=_arena_sentence,
+    )
+
+
+# --- curvature ------------------------------------------------------------------
+
+
+@functools.cache
+def _unit_draws():
+    rng = np.random.default_rng(9)
+    draws = rng.standard_normal((RUNS, 3)), rng.standard_normal((RUNS, 2, 2))
+    for draw_ in draws:
+        draw_.setflags(write=False)
+    return draws
+
+
+@functools.lru_cache(maxsize=64)
+def corrections(std_prior, std_range):
+    """One correction of 200 poor priors by two landmarks, for 1 to 6 iterations: (positions, cov, NEES) of each."""
+    cov = np.diag([std_prior**2, std_prior**2, np.radians(10) ** 2])
+    std_bearing = std_range / 3.0  # as precise across a landmark 3 m away as along it
+    starts, noises = _unit_draws()
+    prior = starts * np.sqrt(np.diag(cov))
+    z = ekf.measurement(np.zeros(3), TWO_MARKS) + noises * [std_range, std_bearing]
+    found = []
+    for n in ITERATIONS:
+        step = ekf.ekf_update(prior, cov, z, TWO_MARKS, std_range, std_bearing, iterations=int(n))
+        score = kalman.nees(np.zeros(3), step.x, step.cov, angle=2).mean()
+        found.append((step.x[:, :2], step.cov.mean(0), float(score)))
+    return found
+
+
+def compute_honesty(state):
+    """Corrected positions, the mean believed ellipse and mean NEES over the iterations."""
+    found = corrections(round(float(state["std_prior"]), 4), round(float(state["std_range"]), 4))
+    positions, cov, score = found[state["iterations"] - 1]
+    scale = float(np.sqrt(np.percentile((positions**2).sum(1), 90)) * 1.4)
+    return {
+        "positions": positions / scale,
+        "ellipse": gaussian.ellipse(np.zeros(2), cov[:2, :2]) / scale,
+        "scale": scale,
+        "curve": np.array([row[2] for row in found]),
+        "iterations": state["iterations"],
+        "nees": score,
+        "rms": float(np.sqrt((positions**2).sum(1).mean())),
+    }
+
+
+def _honesty_sentence(result):
+    low, high = kalman.mean_band(3, RUNS)
+    verdict = "honest" if low < result["nees"] < high else "the filter believes its ellipse, and is wrong"
+    return (
+        f"RMS error {1000 * result['rms']:.0f} mm, mean NEES {result['nees']:.3g} "
+        f"(99 % band {low:.2f} to {high:.2f}): {verdict}."
+    )
+
+
+def honesty():
+    """A poor prior, a precise sensor: plain and iterated corrections of 200 robots at the origin."""
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2)
+        style.axes(left, "error in x", "error in y", equal=True)
+        left.set(xlim=(-1, 1), ylim=(-1, 1), xticks=[], yticks=[])
+        style.axes(right, "iterations", "mean NEES of 200 runs")
+        right.set(xlim=(0.5, 6.5), ylim=(1, 1e6), yscale="log")
+        low, high = kalman.mean_band(3, RUNS)
+        right.axhspan(low, high, color=style.GRID)
+        parts = draw.Honesty(left, right, ITERATIONS)
+        words = left.text(0.02, 0.02, "", transform=left.transAxes, va="bottom")
+
+        def update(state, result):
+            parts.set(result["positions"], result["ellipse"], result["curve"], result["iterations"])
+            words.set_text(f"half width {result['scale']:.2g} m, holds 90 %")
+
+        return [*parts.artists, words], update
+
+    return Stage(
+        "a precise sensor and a poor prior",
+        scene=scene,
+        compute=compute_honesty,
+        controls={
+            "std_prior": Slider(0.1, 1.5, 0.3, step=0.1, label="std of the prior (m)"),
+            "std_range": Slider(0.01, 0.5, 0.1, label="std of the distance (m)", log=True),
+            "iterations": Slider(1, 6, 1, label="iterations"),
+        },
+        fail={"std_prior": 1.0, "std_range": 0.01},
+        presets={"Iterate": {"std_prior": 1.0, "std_range": 0.01, "iterations": 6}},
+        describe=_honesty_sentence,
+    )

@@ -1,0 +1,1507 @@
+"""Chapter 9: particles, maps, resampling, recovery, and four bugs to hunt."""
+
+import functools
+import math
+
+import numpy as np
+
+from ...documents.lecture.examples import load_building
+from ...exercises import metrics
+from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...geometry import planar
+from ...localization import maps, mcl, odometry, particles
+from ...localization.sensors import weigh_landmarks
+from . import specimens
+
+R_MAX = 18.0
+IMPORTS = 6.0  # seconds a call may take where students use scipy.stats: its import alone can take two, and it is slow
+
+
+@functools.cache
+def building():
+    """The chapter's building, read once."""
+    return load_building()
+
+
+# Draws ---------------------------------------------------------------------------------------------------------------
+
+
+def scan_at_a_pose(rng, count=12):
+    """grid, pose near the truth, ranges, bearings, std; all end points lie on the map, whatever the heading."""
+    grid = building().grid
+    pose = np.array([rng.uniform(5, 12), rng.uniform(4.6, 5.3), rng.uniform(-3, 3)])
+    bearings = np.linspace(-2.3, 2.3, count)
+    ranges = grid.cast(pose, bearings, R_MAX).astype(float)
+    near = pose + rng.normal(0, (0.05, 0.05, 0.03))
+    short = np.clip(ranges - 0.3, 0.05, 3.5)
+    return grid, near, short, bearings, float(rng.uniform(0.15, 0.4))
+
+
+def landmarks_at_a_pose(rng):
+    """pose, z, landmarks, both standard deviations; one bearing in three lies across the seam at 180 deg."""
+    pose = np.array([*rng.uniform(-2, 2, 2), rng.uniform(-3, 3)])
+    phi = np.array([math.pi - 0.02, rng.uniform(-2, 2), rng.uniform(-2, 2)])
+    r = rng.uniform(2, 6, 3)
+    angle = pose[2] + phi
+    landmarks = pose[:2] + r[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    z = np.column_stack([r + 0.1 * rng.normal(size=3), planar.wrap_angle(phi + (0.05, *0.03 * rng.normal(size=2)))])
+    return pose, z, landmarks, float(rng.uniform(0.15, 0.4)), float(rng.uniform(0.03, 0.08))
+
+
+def beams_at_a_pose(rng, count=20):
+    """Measured and expected ranges, std."""
+    expected = rng.uniform(1, 10, count)
+    return expected + 0.2 * rng.normal(size=count), expected, float(rng.uniform(0.15, 0.4))
+
+
+def whole_scan(draw):
+    """The draw with as many beams as the scanner has, and so wide a std that a plain product of their densities is zero
+    in float64.
+    """
+
+    def drawn(rng):
+        return *draw(rng, count=541)[:-1], float(rng.uniform(2.5, 3.5))
+
+    return drawn
+
+
+def plain_ray(rng):
+    """grid, pose, bearing, r_max of a ray that meets a wall squarely enough for any way of stepping along it, and whose
+    range differs from those without heading or bearing, from the mirrored one, and from that of the last wall behind: a
+    slow answer gets few draws.
+    """
+    grid = building().grid
+    while True:
+        poses, bearings = particles.uniform_states(grid, 24, rng), rng.uniform(-2, 2, 24)
+        for pose, b, r in zip(poses, bearings, _casts(grid, poses, bearings)):
+            around, wrong = r[:5], r[5:]
+            squarely = np.ptp(around) < min(0.12 * around[2], 0.25) and around[2] > 1.0
+            apart = np.diff(np.sort(wrong)).min() > 0.2  # none of these slips is mistaken for another one
+            if squarely and apart and np.abs(wrong - around[2]).min() > 0.3:
+                clips = abs(maps.walk_ray(grid, pose, b, R_MAX) - around[2]) > grid.resolution  # a corner before
+                behind = _hits(grid, pose, b, R_MAX, grid.resolution / 2).max(initial=0.0) > around[2] + 1.0
+                if behind and not clips:
+                    return grid, pose, float(b), R_MAX
+
+
+def _casts(grid, poses, bearings):
+    """Ranges (n, 9) of n rays: five nearly alike, the right one in their middle, and four of slips with the angle."""
+    theta, ray = poses[:, 2], poses[:, 2] + bearings
+    angles = np.stack(
+        [ray - 0.02, ray - 0.01, ray, ray + 0.01, ray + 0.02,
+         bearings, theta, theta - bearings, math.pi / 2 - ray], axis=1
+    )  # fmt: skip
+    xy = np.broadcast_to(poses[:, None, :2], (*angles.shape, 2))
+    return grid.cast(np.dstack([xy, angles]), np.zeros(1), R_MAX)[..., 0]
+
+
+def short_ray(rng):
+    """The same with an r_max at which nothing has been hit yet."""
+    grid, pose, bearing, r_max = plain_ray(rng)
+    return grid, pose, bearing, 0.6 * maps.walk_ray(grid, pose, bearing, r_max)
+
+
+def motion(rng):
+    """states, u, dt, standard deviations of v and omega, rng."""
+    states = np.column_stack([rng.uniform(-5, 5, (6, 2)), rng.uniform(-3, 3, 6)])
+    return states, np.array([0.8, 0.4]), 0.5, np.array([0.2, 0.3]), np.random.default_rng(rng.integers(2**32))
+
+
+def wheel(rng, power):
+    """Weights whose sum is well above 1, the more alike the smaller the power, and an rng."""
+    w = rng.uniform(0.1, 1, size=12) ** power
+    return w / w.sum() * rng.uniform(2, 5), np.random.default_rng(rng.integers(2**32))
+
+
+WHEELS = tuple(functools.partial(wheel, power=power) for power in (4, 0.5))
+
+
+def cloud_weights(rng):
+    """Weights of any sum."""
+    return (rng.exponential(size=30) ** rng.uniform(0.2, 3) * 50 ** rng.uniform(-2, 1),)
+
+
+def cloud_and_threshold(rng, slip):
+    """Weights and a threshold for which this slip decides wrongly."""
+    while True:
+        w, threshold = *cloud_weights(rng), float(rng.uniform(0.2, 0.9))
+        if slip(w, threshold) != particles.should_resample(w, threshold):
+            return w, threshold
+
+
+def averages(rng):
+    """w_mean, w_slow, w_fast, alpha_slow, alpha_fast: a drop as often as a rise."""
+    slow = rng.uniform(0.2, 0.8)
+    return slow * rng.uniform(0.1, 1.9), slow, slow * rng.uniform(0.6, 1.2), 0.05, 0.3
+
+
+def headings(rng):
+    """angles about a direction near the seam, and weights."""
+    angles = planar.wrap_angle(math.pi + rng.uniform(-0.3, 0.3) + 0.4 * rng.normal(size=20))
+    return angles, rng.exponential(size=20)
+
+
+# References that the library has in another form ---------------------------------------------------------------------
+
+
+def _normal_log(x, std):
+    return -0.5 * np.square(x / std) - np.log(std * math.sqrt(2 * math.pi))
+
+
+def _no_half(x, std):
+    return -np.square(x / std) - np.log(std * math.sqrt(2 * math.pi))
+
+
+def _no_root(x, std):
+    return -0.5 * np.square(x / std) - np.log(std * 2 * math.pi)
+
+
+def _log_density(power=1.0, peak=None, exponent=2, sign=-1):
+    """A slip in log N: the error divided by std**power, raised to `exponent`, `sign`; peak(std): what is subtracted."""
+    peak = peak or (lambda std: np.log(std * math.sqrt(2 * math.pi)))
+
+    def density(x, std):
+        return sign * 0.5 * np.abs(x / std**power) ** exponent - peak(std)
+
+    return density
+
+
+def _normal(x, std):
+    return np.exp(_normal_log(x, std))
+
+
+def _logarithm(total):
+    return float(np.log(total))
+
+
+DENSITIES = (
+    (_no_half, "The factor one half in the exponent is missing."),
+    (_log_density(power=0.5), "The error is divided by std and then squared: std is squared with it."),
+    (_log_density(exponent=1), "The error divided by std is to be squared."),
+    (_log_density(sign=1), "The exponent is negative: a large error makes p small."),
+    (_no_root, "The root is missing: each density is divided by std * sqrt(2 pi)."),
+    (
+        _log_density(peak=lambda std: np.log(2 * math.pi * std**2)),
+        "The root is missing: each density is divided by std * sqrt(2 pi).",
+    ),
+    (
+        _log_density(peak=lambda std: np.log(std**2 * math.sqrt(2 * math.pi))),
+        "Each density is divided by std * sqrt(2 pi), not by the variance times the root.",
+    ),
+    (_log_density(peak=np.log), "sqrt(2 pi) is missing: each density is divided by std * sqrt(2 pi)."),
+    (
+        _log_density(peak=lambda std: 0.5 * np.log(2 * math.pi)),
+        "std is missing in the factor in front: each density is divided by std * sqrt(2 pi).",
+    ),
+    (
+        _log_density(peak=lambda std: np.log(std * math.sqrt(2) * math.pi)),
+        "The root covers 2 and pi both: each density is divided by std * sqrt(2 pi).",
+    ),
+    (
+        _log_density(peak=lambda std: np.log(std * math.sqrt(2))),
+        "pi is missing: each density is divided by std * sqrt(2 pi).",
+    ),
+    (
+        _log_density(peak=lambda std: -np.log(std * math.sqrt(2 * math.pi))),
+        "The factor 1 / (std sqrt(2 pi)) divides: its logarithm is subtracted.",
+    ),
+    (
+        lambda x, std: _normal_log(x, std) / math.log(10),
+        "That is the logarithm to base 10. log is the natural one here, np.log.",
+    ),
+)
+
+
+def _density_mistakes(variant, readings):
+    """Slips in the density; variant(density, after=...) sums up densities of the readings, `after` is applied to it."""
+    slips = [Mistake(variant(density), text) for density, text in DENSITIES]
+    added = f"You added the densities. Independent {readings} multiply: their *logarithms* are added."
+    return [*slips, Mistake(variant(_normal), added), Mistake(variant(_normal, after=_logarithm), added)]
+
+
+def _end_points(pose, ranges, bearings):
+    angle = pose[2] + bearings
+    return pose[:2] + ranges[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _field(grid, points, std):
+    return float(_normal_log(grid.distance[grid.cell_of(points)], std).sum())
+
+
+def distance_field_weight(grid, pose, ranges, bearings, std):
+    """log p of a scan: the sum of log N(0, std^2) over the distances of its end points from the nearest obstacle."""
+    return _field(grid, _end_points(pose, ranges, bearings), std)
+
+
+def landmark_weight(pose, z, landmarks, std_range, std_bearing):
+    """log p of ranges and bearings to known landmarks."""
+    return float(weigh_landmarks(z, landmarks, std_range, std_bearing)(pose))
+
+
+def beam_weight(ranges, expected, std):
+    """log p of ranges, given the expected ones."""
+    return float(_normal_log(ranges - expected, std).sum())
+
+
+def sample_motion(states, u, dt, std_u, rng):
+    """Each particle moved by its own noisy copy of the control."""
+    return particles.sample_motion(states, u, dt, rng, cov_u=np.diag(np.square(std_u)))
+
+
+def resample_roulette(weights, rng):
+    """Indices by independent spins."""
+    return particles.resample_roulette(weights, rng)
+
+
+def resample_systematic(weights, rng):
+    """Indices by one turn of the spoke wheel."""
+    return particles.resample_systematic(weights, rng)
+
+
+def should_resample(weights, threshold):
+    """True when the effective size is below threshold times M."""
+    return particles.should_resample(weights, threshold)
+
+
+def circular_mean(angles, weights):
+    """Weighted mean direction."""
+    return particles.circular_mean(angles, weights)
+
+
+def recover(w_mean, w_slow, w_fast, alpha_slow, alpha_fast):
+    """Share of random particles, and both averages brought up to date."""
+    return mcl.recover(w_mean, w_slow, w_fast, alpha_slow, alpha_fast)
+
+
+# Wrong variants ------------------------------------------------------------------------------------------------------
+
+
+def _landmarks(
+    density=None,
+    wrap=True,
+    turn=1,
+    swap=False,
+    back=False,
+    square=False,
+    log=True,
+    peak=True,
+    parts=(1, 1),
+    stds=None,
+    after=float,
+):
+    density = density or _normal_log
+    exchanged = stds
+
+    def variant(pose, z, landmarks, std_range, std_bearing):
+        dx, dy = (pose[:2] - landmarks if back else landmarks - pose[:2]).T
+        bearing = np.arctan2(dx, dy) if swap else np.arctan2(dy, dx)
+        if wrap == "expected":
+            error = z[:, 1] - planar.wrap_angle(bearing - pose[2])
+        elif wrap == "positive":
+            error = (z[:, 1] - bearing + pose[2]) % (2 * math.pi)
+        elif wrap == "degrees":
+            error = np.rad2deg(planar.wrap_angle(z[:, 1] - bearing + pose[2]))
+        else:
+            error = z[:, 1] - bearing + turn * pose[2]
+            error = planar.wrap_angle(error) if wrap else error
+        stds = (std_range**2, std_bearing**2) if square else (std_range, std_bearing)
+        stds = stds if exchanged is None else tuple(stds[k] for k in exchanged)
+        terms = parts[0] * density(z[:, 0] - np.hypot(dx, dy), stds[0]) + parts[1] * density(error, stds[1])
+        total = terms.sum() if peak else terms.sum() + len(z) * np.log(2 * math.pi * stds[0] * stds[1])
+        return after(total if log else np.exp(total))
+
+    return variant
+
+
+def _products_added(pose, z, landmarks, std_range, std_bearing):
+    one = [landmark_weight(pose, z[k : k + 1], landmarks[k : k + 1], std_range, std_bearing) for k in range(len(z))]
+    return _logarithm(np.exp(one).sum())
+
+
+def _beams(density, after=float):
+    return lambda ranges, expected, std: after(density(ranges - expected, std).sum())
+
+
+def _errors_added_first(ranges, expected, std):
+    return float(-0.5 * (np.sum(ranges - expected) / std) ** 2 - len(ranges) * np.log(std * math.sqrt(2 * math.pi)))
+
+
+def _field_with(density, after=float):
+    def variant(grid, pose, ranges, bearings, std):
+        return after(density(grid.distance[grid.cell_of(_end_points(pose, ranges, bearings))], std).sum())
+
+    return variant
+
+
+def _field_straight_ahead(grid, pose, ranges, bearings, std):
+    return _field(grid, _end_points(pose, ranges, np.zeros_like(bearings)), std)
+
+
+def _field_one_peak(grid, pose, ranges, bearings, std):
+    return _field_no_peak(grid, pose, ranges, bearings, std) - math.log(std * math.sqrt(2 * math.pi))
+
+
+def _field_mirrored(grid, pose, ranges, bearings, std):
+    return _field(grid, _end_points(pose, ranges, -bearings), std)
+
+
+def _field_swapped(grid, pose, ranges, bearings, std):
+    offset = _end_points(pose, ranges, bearings) - pose[:2]
+    return _field(grid, pose[:2] + offset[:, ::-1], std)
+
+
+def _field_at_the_robot(grid, pose, ranges, bearings, std):
+    return float(_normal_log(grid.distance[grid.cell_of(pose[:2])], std).sum())
+
+
+def _log_of_the_product(log_terms):
+    with np.errstate(divide="ignore"):
+        return float(np.log(np.prod(np.exp(log_terms))))
+
+
+def _field_plain_product(grid, pose, ranges, bearings, std):
+    d = grid.distance[grid.cell_of(_end_points(pose, ranges, bearings))]
+    return _log_of_the_product(_normal_log(d, std))
+
+
+def _field_world(grid, pose, ranges, bearings, std):
+    return _field(grid, _end_points(np.array([*pose[:2], 0.0]), ranges, bearings), std)
+
+
+def _field_origin(grid, pose, ranges, bearings, std):
+    return _field(grid, _end_points(np.array([0.0, 0.0, pose[2]]), ranges, bearings), std)
+
+
+def _field_cells(grid, pose, ranges, bearings, std):
+    d = grid.distance[grid.cell_of(_end_points(pose, ranges, bearings))] / grid.resolution
+    return float(_normal_log(d, std).sum())
+
+
+def _field_mean(grid, pose, ranges, bearings, std):
+    return distance_field_weight(grid, pose, ranges, bearings, std) / len(ranges)
+
+
+def _field_probability(grid, pose, ranges, bearings, std):
+    return math.exp(distance_field_weight(grid, pose, ranges, bearings, std))
+
+
+def _field_no_peak(grid, pose, ranges, bearings, std):
+    d = grid.distance[grid.cell_of(_end_points(pose, ranges, bearings))]
+    return float((-0.5 * np.square(d / std)).sum())
+
+
+def _ray_in_cells(grid, pose, bearing, r_max):
+    return maps.walk_ray(grid, pose, bearing, r_max) / grid.resolution
+
+
+def _ray_without_heading(grid, pose, bearing, r_max):
+    return maps.walk_ray(grid, np.array([*pose[:2], 0.0]), bearing, r_max)
+
+
+def _ray_without_bearing(grid, pose, bearing, r_max):
+    return maps.walk_ray(grid, pose, 0.0, r_max)
+
+
+def _ray_swapped(grid, pose, bearing, r_max):
+    return maps.walk_ray(grid, np.array([*pose[:2], math.pi / 2 - pose[2] - bearing]), 0.0, r_max)
+
+
+def _ray_to_infinity(grid, pose, bearing, r_max):
+    r = maps.walk_ray(grid, pose, bearing, r_max)
+    return r if r < r_max else math.inf
+
+
+def _ray_without_end(grid, pose, bearing, r_max):
+    return maps.walk_ray(grid, pose, bearing, 1000.0)
+
+
+def _ray_reversed(grid, pose, bearing, r_max):
+    return maps.walk_ray(grid, pose, -bearing, r_max)
+
+
+def _hits(grid, pose, bearing, r_max, step):
+    """Distances, `step` apart, at which a ray is in an occupied cell."""
+    angle, r = pose[2] + bearing, np.arange(0, r_max, step)
+    return r[grid.at(pose[:2] + r[:, None] * [math.cos(angle), math.sin(angle)]) == maps.OCCUPIED]
+
+
+def _ray_to_the_last(grid, pose, bearing, r_max):
+    return float([r_max, *_hits(grid, pose, bearing, r_max, grid.resolution / 2)][-1])
+
+
+RESAMPLING_SLIPS = (
+    (
+        lambda w, t: not particles.should_resample(w, t),
+        "The other way round: resample when the effective size is low.",
+    ),
+    (
+        lambda w, t: particles.effective_size(w) < t * w.sum(),
+        "Compare with the share of the *number* of particles, len(weights), not of the sum of the weights.",
+    ),
+    (
+        lambda w, t: _from_the_sum_of_squares(w) < t * len(w),
+        "Your effective size needs weights that add up to 1, and these do not: use effective_size(weights).",
+    ),
+    (
+        lambda w, t: particles.effective_size(w) < 0.5 * len(w),
+        "You compare with half of the particles. The share is handed over: threshold * len(weights).",
+    ),
+    (
+        lambda w, t: particles.effective_size(w) < (1 - t) * len(w),
+        "Compare with the share `threshold` itself, not with 1 - threshold.",
+    ),
+    (
+        lambda w, t: w.sum() < t * len(w),
+        "You compare the sum of the weights. Compare effective_size(weights).",
+    ),
+    (lambda w, t: True, "You resample always. With even weights that only loses particles."),
+    (
+        lambda w, t: False,
+        "You never resample. Do you compare with a bare share? The effective size counts particles: threshold * len(weights).",
+    ),
+)
+
+
+def _motion(std=lambda s: s, shared=False, on_pose=False, none=False):
+    def variant(states, u, dt, std_u, rng):
+        if on_pose:
+            return odometry.step(states, u, dt) + rng.standard_normal(states.shape) * (*std_u, std_u[1])
+        noise = rng.standard_normal((1 if shared else len(states), 2)) * (0 if none else std(np.asarray(std_u)))
+        return odometry.step(states, u + noise, dt)
+
+    return variant
+
+
+def _spin(weights, rng, scale=None, shift=0):
+    """Indices by independent spins up to `scale` (by default the sum of the weights), moved by `shift`."""
+    ends = np.cumsum(weights)
+    return np.searchsorted(ends, rng.random(len(ends)) * (ends[-1] if scale is None else scale)) + shift
+
+
+def _turn(weights, places, scale=None):
+    """Indices that M evenly spaced spokes meet, each moved by `places` of a gap."""
+    ends, m = np.cumsum(weights), len(weights)
+    return np.searchsorted(ends, (places + np.arange(m)) * (ends[-1] if scale is None else scale) / m)
+
+
+def _largest(weights, rng):
+    return np.full(len(weights), np.argmax(weights))
+
+
+def _uniform_choice(weights, rng):
+    return rng.integers(0, len(weights), len(weights))
+
+
+def _recover(w_slow, w_fast):
+    return max(0.0, 1 - w_fast / w_slow), w_slow, w_fast
+
+
+def _share(share):
+    """Right averages and another share of them."""
+
+    def variant(*args):
+        _, slow, fast = mcl.recover(*args)
+        return share(slow, fast), slow, fast
+
+    return variant
+
+
+def _averaged(change):
+    """Averages by another rule change(w, w_mean, alpha), and the share of those."""
+    return lambda m, s, f, a, b: _recover(change(s, m, a), change(f, m, b))
+
+
+RECOVERIES = (
+    Mistake(
+        _share(lambda s, f: f / s), "That is the ratio itself. The share is what it lacks to 1: 1 - w_fast / w_slow."
+    ),
+    Mistake(
+        _share(lambda s, f: min(1.0, f / s)),
+        "That is the ratio itself. The share is what it lacks to 1: 1 - w_fast / w_slow.",
+    ),
+    Mistake(_share(lambda s, f: min(0.0, 1 - f / s)), "You took the smaller of the two. Take the larger, max(0, ...)."),
+    Mistake(_share(lambda s, f: max(1.0, 1 - f / s)), "The limit below is 0, not 1: max(0, 1 - w_fast / w_slow)."),
+    Mistake(_share(lambda s, f: abs(1 - f / s)), "When things go well nothing is replaced: below 0 means 0, no abs."),
+    Mistake(_share(lambda s, f: max(0.0, f / s - 1)), "The sign is wrong: the share is large when w_fast is *small*."),
+    Mistake(_share(lambda s, f: max(0.0, s - f)), "The share has no unit: divide by w_slow, 1 - w_fast / w_slow."),
+    Mistake(_share(lambda s, f: max(0.0, (1 - f) / s)), "Brackets: 1 - w_fast / w_slow, not (1 - w_fast) / w_slow."),
+    Mistake(_share(lambda s, f: 100 * max(0.0, 1 - f / s)), "A share lies between 0 and 1; yours is in percent."),
+    Mistake(_share(lambda s, f: round(max(0.0, 1 - f / s), 2)), "Return the share as it comes out, without rounding."),
+    Mistake(
+        lambda m, s, f, a, b: (max(0.0, 1 - m / s), *mcl.recover(m, s, f, a, b)[1:]),
+        "You compare the mean weight itself. Compare its quick average w_fast: single scans jump.",
+    ),
+    Mistake(_averaged(lambda w, m, a: a * (m - w)), "That is the change alone. It is added to the old average."),
+    Mistake(_averaged(lambda w, m, a: a * m), "The old average is lost: w + alpha * (w_mean - w)."),
+    Mistake(_averaged(lambda w, m, a: m), "alpha is missing: the averages jump to w_mean at once."),
+    Mistake(_averaged(lambda w, m, a: w * (1 + a * (m - w))), "You multiplied the average by its change. It is added."),
+    Mistake(
+        _averaged(lambda w, m, a: (1 - a) * w + m), "alpha is missing before w_mean: (1 - alpha) * w + alpha * w_mean."
+    ),
+    Mistake(lambda m, s, f, a, b: _recover(s + a * (m - s), f + a * (m - f)), "w_fast has its own alpha, alpha_fast."),
+    Mistake(lambda m, s, f, a, b: _recover(s + b * (m - s), f + b * (m - f)), "w_slow has its own alpha, alpha_slow."),
+    Mistake(lambda m, s, f, a, b: _recover(s, f + b * (m - f)), "w_slow has not been brought up to date."),
+    Mistake(lambda m, s, f, a, b: _recover(s + a * (m - s), f), "w_fast has not been brought up to date."),
+    Mistake(
+        lambda m, s, f, a, b: (lambda slow: _recover(slow, f + b * (slow - f)))(s + a * (m - s)),
+        "w_fast moves toward w_mean, not toward w_slow.",
+    ),
+)
+
+
+def _from_the_sum_of_squares(weights):
+    return 1 / np.square(weights).sum()
+
+
+def _draws(resample, weights, rng, runs):
+    """Share of the draws that each index gets over several runs; refuses what are no M valid indices."""
+    total = np.zeros(len(weights))
+    for _ in range(runs):
+        index = np.asarray(resample(weights.copy(), rng))
+        if index.shape != (len(weights),) or index.dtype.kind not in "iu":
+            return f"expected {len(weights)} whole numbers, got shape {index.shape} of {index.dtype}"
+        if index.min() < 0 or index.max() >= len(weights):
+            return f"an index {index.max()} came out of {len(weights)} particles"
+        total += np.bincount(index, minlength=len(weights))
+    return total / total.sum()
+
+
+def _listens(draw):
+    """A property: what is drawn hangs on the rng, and on nothing else. `draw(function, rng)` gives one result.
+
+    A wheel of few particles has few results, so one pair of equal ones proves nothing: eight seeds are compared.
+    """
+
+    def check(function, rng):
+        seeds = rng.integers(2**32, size=8)
+        first = [np.asarray(draw(function, np.random.default_rng(seed))) for seed in seeds]
+        again = [np.asarray(draw(function, np.random.default_rng(seed))) for seed in seeds]
+        if all(np.array_equal(first[0], other) for other in first + again):
+            return "whatever `rng` is given, the same comes out: draw the random numbers from it."
+        if not all(map(np.array_equal, first, again)):
+            return "two runs with the same seed differ: draw from the `rng` you are given, not from another one."
+        return None
+
+    return check
+
+
+_drawn_from_the_rng = _listens(lambda f, rng: f(np.linspace(0.5, 1.5, 40), rng))
+_moved_by_the_rng = _listens(lambda f, rng: f(np.zeros((3, 3)), np.array([1.0, 0.2]), 0.5, np.array([0.1, 0.2]), rng))
+
+
+def _valid(resample, rng):
+    found = _draws(resample, np.array([0.1, 0.7, 0.1, 0.1]), rng, 3)
+    return found + "." if isinstance(found, str) else None
+
+
+def _proportional(resample, rng):
+    for weights in (np.array([0.1, 0.7, 0.1, 0.1, 0.0]), np.array([0.5, 0.25, 0.15, 0.1]), np.array([3.0, 1.0])):
+        found, expected = _draws(resample, weights, rng, 2000 // len(weights)), weights / weights.sum()
+        if isinstance(found, str):
+            return found + "."
+        k = int(np.argmax(np.abs(found - expected)))
+        if abs(found[k] - expected[k]) > 0.06:
+            return (
+                f"with the weights {weights.tolist()} index {k} gets {100 * found[k]:.0f} % of the draws "
+                f"instead of {100 * expected[k]:.0f} %."
+            )
+    return None
+
+
+def _spins_are_independent(resample, rng):
+    weights = np.full(10, 0.1)
+    counts = np.array([np.bincount(resample(weights.copy(), rng), minlength=10) for _ in range(600)])
+    variance = float(counts.var(0).mean())
+    if variance < 0.6:
+        return (
+            f"the spins are not independent: a count varies by {variance:.2f} instead of 0.9 (variance of a binomial)."
+        )
+    if variance > 1.3:
+        return (
+            f"some spins share their random number: a count varies by {variance:.1f} instead of 0.9 (variance of a "
+            "binomial). Each spin needs its own."
+        )
+    half = float(counts[:, :5].sum(1).var())
+    if half < 1.9:
+        return (
+            f"the spins are not independent: the draws from one half of the wheel vary by {half:.1f} instead of 2.5. "
+            "Does each spin start where the last one ended?"
+        )
+    return None
+
+
+def _spokes_are_even(resample, rng):
+    weights = np.array([0.05, 0.3, 0.15, 0.22, 0.28])
+    for _ in range(200):
+        counts = np.bincount(resample(weights.copy(), rng), minlength=5)
+        off = np.abs(counts - 5 * weights)
+        if off.max() >= 1 + 1e-9:
+            k = int(np.argmax(off))
+            return (
+                f"index {k} with M w = {5 * weights[k]:.2f} was drawn {counts[k]} times: evenly spaced spokes meet it "
+                "either the next lower or the next higher whole number of times."
+            )
+    return None
+
+
+def _equal_weights_stay(resample, rng):
+    if (np.sort(resample(np.full(8, 0.125), rng)) != np.arange(8)).any():
+        return "with equal weights every particle must come out exactly once."
+    return None
+
+
+def _survives_rounding(resample, rng):
+    for _ in range(30):
+        weights = rng.exponential(size=200).astype(np.float32)
+        index = resample(weights / weights.sum() * np.float32(0.999999), rng)
+        if np.max(index) >= 200 or len(index) != 200:
+            return "with weights whose sum is rounded below 1 an index beyond the last particle comes out."
+    return None
+
+
+def _noise_is_right(move, rng):
+    """Mean and spread of one step of 4000 particles against first-order propagation."""
+    states, u, std_u = np.zeros((4000, 3)), np.array([1.0, 0.0]), np.array([0.1, 0.2])
+    moved = np.asarray(move(states.copy(), u, 0.5, std_u, rng))
+    if moved.shape != states.shape:
+        return f"expected an array of shape (4000, 3), got {moved.shape}."
+    found = moved.std(0)
+    for name, unit, amount, wanted in (("x", "m", found[0], 0.05), ("theta", "rad", found[2], 0.1)):
+        if abs(amount - wanted) > 0.1 * wanted:
+            return (
+                f"4000 particles spread by {amount:.3f} {unit} (standard deviation) in {name} after one step of 0.5 s with "
+                f"std_u = [0.1, 0.2], expected {wanted:.3f} {unit}."
+            )
+    if abs(np.corrcoef(moved[:, 0], moved[:, 2])[0, 1]) > 0.2:
+        return "v and omega of a particle got the same random number: each needs its own."
+    if np.abs(moved.mean(0) - (0.5, 0, 0)).max() > 0.01:
+        return f"on average the particles move by {np.round(moved.mean(0), 3).tolist()}, expected [0.5, 0, 0]."
+    return None
+
+
+def _noise_off_is_reckoning(move, rng):
+    states = np.array([[0.0, 0, 0], [1, 2, 1.5]])
+    moved = move(states.copy(), np.array([1.0, 0.5]), 0.2, np.zeros(2), rng)
+    if moved is None:
+        return "it returned None: is a `return` missing?"
+    moved, right = np.asarray(moved), odometry.step(states, (1.0, 0.5), 0.2)
+    if moved.shape != states.shape:
+        return f"expected an array of shape (2, 3) for two particles, got {moved.shape}."
+    if np.abs(moved - right).max() <= (1e-5 if moved.dtype == np.float32 else 1e-9):
+        return None
+    if np.abs(moved - states).max() < 1e-9:
+        return "with std_u = 0 every particle stands still: u itself is missing. The noise is added to it."
+    if np.abs(moved - odometry.step(states, (1.0, 0.5), 1.0)).max() < 1e-9:
+        return "the particles move as if dt were 1: hand dt to odometry.step."
+    again = np.asarray(move(states.copy(), np.array([1.0, 0.5]), 0.2, np.zeros(2), rng))
+    if np.abs(again - moved).max() > 1e-9:
+        return "with std_u = 0 the particles still scatter: noise enters through u only, scaled by std_u."
+    return (
+        f"with std_u = 0 every particle must move as odometry.step(states, u, dt) says, from {states[1].tolist()} "
+        f"to {np.round(right[1], 4).tolist()}. Yours gets to {np.round(moved[1], 4).tolist()}."
+    )
+
+
+# The bug hunt --------------------------------------------------------------------------------------------------------
+
+
+def _stratified(weights, rng):
+    """A third correct way: one spin in each of M equal sectors."""
+    m = len(weights)
+    ends = np.cumsum(weights / np.sum(weights))
+    return np.minimum(np.searchsorted(ends, (np.arange(m) + rng.random(m)) / m, side="right"), m - 1)
+
+
+def _weights_multiplied(states, ranges, landmarks, std):
+    d = np.hypot(*np.moveaxis(landmarks - states[:, None, :2], -1, 0))
+    return particles.normalize_weights((-0.5 * np.square((ranges - d) / std)).sum(1))
+
+
+GOOD = (particles.resample_roulette, particles.resample_systematic, _stratified)
+GOOD_WORDS = {
+    particles.resample_roulette: "roulette, whose counts scatter from run to run, so that only shares over many runs are near the weights",
+    particles.resample_systematic: "the spoke wheel, whose draws come in order and are not independent",
+    _stratified: "one spin in each of M equal sectors, whose draws come in order",
+    _weights_multiplied: "densities multiplied, then divided by their sum",
+}
+
+
+def _on_show(specimen):
+    """The specimen, with advice for a test that lets its exception through."""
+
+    def resample(*args):
+        try:
+            return specimen(*args)
+        except IndexError as error:
+            advice = "raised by the specimen: let your test catch that, try: ... except IndexError: return False"
+            raise IndexError(f"{error} ({advice})") from error
+
+    return resample  # under a name that gives nothing away
+
+
+def _catches(specimen, good, extra=()):
+    """Properties of a property test: False for the specimen, True for what is correct."""
+
+    def rejects(test, rng):
+        verdict = test(specimen, *((rng,) if extra else ()))
+        if not isinstance(verdict, bool | np.bool_):
+            return f"a test answers True (passed) or False (caught), got {type(verdict).__name__}."
+        return (
+            "your test sometimes lets the specimen pass: give it more runs, or weights it fails on clearly."
+            if verdict
+            else None
+        )
+
+    def accepts(function):
+        def check(test, rng):
+            if not test(function, *((rng,) if extra else ())):
+                return f"your test also rejects a correct function ({GOOD_WORDS[function]}): it asks for more than must hold."
+            return None
+
+        return check
+
+    return (rejects, *(accepts(function) for function in good))
+
+
+def hunt_1(resample, rng):
+    """True when indices are drawn in proportion to their weights."""
+    weights = np.array([0.1, 0.7, 0.1, 0.1])
+    index = np.concatenate([resample(weights, rng) for _ in range(1000)])
+    return bool(np.abs(np.bincount(index, minlength=4) / index.size - weights).max() < 0.05)
+
+
+def hunt_2(resample, rng):
+    """True when light particles get their share too."""
+    weights = np.array([0.5, 0.25, 0.05, 0.05, 0.03, 0.03, 0.03, 0.02, 0.02, 0.02])
+    index = np.concatenate([resample(weights, rng) for _ in range(1000)])
+    return bool(np.abs(np.bincount(index, minlength=10) / index.size - weights).max() < 0.05)
+
+
+def hunt_3(resample, rng):
+    """True when a sum of weights that is a little below 1 does no harm."""
+    weights = np.full(1000, 1e-3) * (1 - 1e-3)
+    try:
+        return bool(max(resample(weights, rng).max() for _ in range(20)) < 1000)
+    except IndexError:
+        return False
+
+
+def hunt_4(weigh):
+    """True when the same reading twice squares the ratio of two weights."""
+    states, landmark = np.array([[0.0, 0, 0], [0.3, 0, 0]]), np.array([[2.0, 0.0]])
+    once = weigh(states, np.array([2.0]), landmark, 0.3)
+    twice = weigh(states, np.array([2.0, 2.0]), np.repeat(landmark, 2, axis=0), 0.3)
+    return bool(np.isclose(twice[0] / twice[1], (once[0] / once[1]) ** 2))
+
+
+def _hunt(id, reference, specimen, why, hints, good=GOOD, extra=("rng",)):
+    specimen = _on_show(specimen)
+    return Exercise(
+        id,
+        reference=reference,
+        draw=lambda rng: (specimen, *((np.random.default_rng(rng.integers(2**32)),) if extra else ())),
+        properties=_catches(specimen, good, extra),
+        hints=hints,
+        mistakes=[
+            Mistake(lambda *_: True, f"Your test passes the specimen. {why}"),
+            Mistake(lambda *_: None, "Your test returned None: it has to return True (passed) or False (caught)."),
+        ],
+        draws=1,
+        limit=IMPORTS,
+    )
+
+
+CHAPTER = Chapter(
+    "09-monte-carlo",
+    title="Monte-Carlo localization",
+    items=[
+        Prediction(
+            "corridor",
+            question="Three equal doors, and the sensor says: door. Where do the particles go?",
+            choices=("to the nearest door", "to all three doors alike", "nowhere, one look says nothing"),
+            answer="to all three doors alike",
+            why="One look cannot tell equal doors apart: three clouds. The move between two looks carries them to different walls, and "
+            "only one cloud meets a door again.",
+        ),
+        Exercise(
+            "sample_motion",
+            reference=sample_motion,
+            draw=motion,
+            properties=(_noise_off_is_reckoning, _noise_is_right, _moved_by_the_rng),
+            hints=(
+                "The noise belongs to the control, not to the pose, and each particle gets its own.",
+                "Draw one pair of standard normal numbers a particle, scale them by std_u, and add them to u.",
+                "`noisy = u + std_u * rng.standard_normal((len(states), 2)); return odometry.step(states, noisy, dt)`",
+            ),
+            mistakes=[
+                Mistake(
+                    _motion(none=True),
+                    "All particles moved as dead reckoning says: the noise is missing, so the cloud cannot spread.",
+                ),
+                Mistake(
+                    _motion(shared=True),
+                    "All particles got the same noise: the cloud moves as one block. Draw a pair for each particle.",
+                ),
+                Mistake(
+                    _motion(np.square), "You scaled the noise by the variance. std_u is the standard deviation already."
+                ),
+                Mistake(
+                    lambda x, u, dt, s, rng: odometry.step(x, u + dt * s * rng.standard_normal((len(x), 2)), dt),
+                    "You scaled the noise by dt. It belongs to the speeds; odometry.step multiplies by dt.",
+                ),
+                Mistake(
+                    lambda x, u, dt, s, rng: odometry.step(x, u * (1 + s * rng.standard_normal((len(x), 2))), dt),
+                    "You multiplied the control by its noise. It is added: u + noise.",
+                ),
+                Mistake(
+                    lambda x, u, dt, s, rng: odometry.step(x, u + s * rng.standard_normal((len(x), 1)), dt),
+                    "v and omega of a particle got the same random number: each needs its own.",
+                ),
+                Mistake(_motion(np.sqrt), "You took the root of std_u. It is a standard deviation, not a variance."),
+                Mistake(
+                    _motion(on_pose=True),
+                    "You added the noise to the pose. Then a robot could slip sideways. The noise belongs to the control.",
+                ),
+            ],
+            draws=3,
+        ),
+        Exercise(
+            "landmark_weight",
+            reference=landmark_weight,
+            draw=landmarks_at_a_pose,
+            metric=metrics.Numbers(1e-8),
+            limit=IMPORTS,
+            hints=(
+                "What range and what bearing would a robot at this pose expect? Compare them with z.",
+                "The bearing is atan2(dy, dx) - theta. Wrap the *difference*, then add the logarithms of both normal densities.",
+                "`dx, dy = (landmarks - pose[:2]).T; e = z[:, 0] - np.hypot(dx, dy); "
+                "f = planar.wrap_angle(z[:, 1] - np.arctan2(dy, dx) + pose[2]); "
+                "log_p = -0.5 * (e / std_range) ** 2 - 0.5 * (f / std_bearing) ** 2; "
+                "return np.sum(log_p - np.log(2 * np.pi * std_range * std_bearing))`",
+            ),
+            mistakes=[
+                Mistake(
+                    _landmarks(wrap=False),
+                    "A bearing difference near 360 deg counted as a large error. Wrap the difference to [-pi, pi).",
+                ),
+                Mistake(
+                    _landmarks(wrap="expected"),
+                    "A bearing difference near 360 deg counted as a large error. Wrap the difference to [-pi, pi).",
+                ),
+                Mistake(
+                    _landmarks(turn=-1),
+                    "The sign of the heading is wrong: the expected bearing is atan2(dy, dx) - theta.",
+                ),
+                Mistake(
+                    _landmarks(back=True),
+                    "You looked from the landmark to the robot: the difference is landmark - position.",
+                ),
+                Mistake(_landmarks(parts=(1, 0)), "The bearings are missing: both densities are multiplied."),
+                Mistake(_landmarks(parts=(0, 1)), "The ranges are missing: both densities are multiplied."),
+                *_density_mistakes(_landmarks, "readings"),
+                Mistake(_products_added, "You added over the landmarks what must be multiplied: add *logarithms*."),
+                Mistake(
+                    _landmarks(wrap="positive"),
+                    "A small negative error became one near 360 deg. Wrap the difference to [-pi, pi).",
+                ),
+                Mistake(_landmarks(wrap="degrees"), "Your bearing error is in degrees, std_bearing is in radians."),
+                Mistake(
+                    lambda x, z, *rest: landmark_weight(x, z[:, ::-1], *rest),
+                    "Range and bearing have changed places: z[:, 0] are the ranges, z[:, 1] the bearings.",
+                ),
+                Mistake(
+                    lambda x, z, marks, *stds: landmark_weight(x, z[:1], marks[:1], *stds),
+                    "Only the first landmark counts. Is `return` inside the loop? It belongs after it.",
+                ),
+                Mistake(_landmarks(stds=(1, 0)), "The two standard deviations have changed places."),
+                Mistake(_landmarks(stds=(0, 0)), "Bearings have a standard deviation of their own, std_bearing."),
+                Mistake(
+                    lambda x, z, *rest: landmark_weight(x, z, *rest) / len(z),
+                    "You took the mean over the landmarks. Their logarithms add up.",
+                ),
+                Mistake(_landmarks(turn=0), "The heading is missing: a bearing is relative to where the robot looks."),
+                Mistake(_landmarks(swap=True), "The y difference comes first: np.arctan2(dy, dx)."),
+                Mistake(
+                    _landmarks(square=True),
+                    "You used the variances as standard deviations: N(0, std^2) divides the error by std.",
+                ),
+                Mistake(
+                    _landmarks(log=False),
+                    "This is the product itself. Return its logarithm, the sum of the logarithms.",
+                ),
+                Mistake(
+                    _landmarks(peak=False),
+                    "The factor 1 / (std sqrt(2 pi)) of each density is missing. It cancels among particles, but p needs it.",
+                ),
+            ],
+        ),
+        Value(
+            "beams_to_zero",
+            reference=lambda: 162,
+            rtol=0,
+            atol=0.01,
+            hints=(
+                "The smallest number above zero that float64 knows is about 4.9e-324.",
+                "0.01 to the power n falls below half of it. Solve for n.",
+                "`beams_to_zero = next(n for n in range(1, 1000) if 0.01**n == 0)`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: 154,
+                    "There the *normal* numbers of float64 end (2.2e-308). Smaller ones still exist, with fewer digits: count on.",
+                ),
+                Mistake(
+                    lambda: 161,
+                    "0.01 to the power 161 is 1e-322, still a (denormal) number above zero. One more beam ends it.",
+                ),
+                Mistake(lambda: 163, "One too many: the product is zero already after the beam before."),
+                Mistake(
+                    lambda: 160, "0.01 to the power 160 is 1e-320, still a (denormal) number above zero: count on."
+                ),
+                Mistake(
+                    lambda: math.log(5e-324) / math.log(0.01),
+                    "Beams are whole. After 161 of them something above zero is left: round up.",
+                ),
+                Mistake(
+                    lambda: (math.log(5e-324) - math.log(2)) / math.log(0.01),
+                    "Beams are whole. After 161 of them something above zero is left: round up.",
+                ),
+                Mistake(
+                    lambda: 308,
+                    "That counts powers of ten, and stops where the *normal* numbers end. Each beam contributes two.",
+                ),
+                Mistake(lambda: 323, "That counts powers of ten. Each beam contributes two of them."),
+                Mistake(lambda: 324, "That counts powers of ten. Each beam contributes two of them."),
+            ],
+        ),
+        Exercise(
+            "cast_ray",
+            reference=maps.walk_ray,
+            draw=plain_ray,
+            metric=metrics.Numbers(0.16, "m"),
+            noisy=[(short_ray, metrics.Numbers(0.16, "m"), "Right where something is hit, but not where nothing is:")],
+            hints=(
+                "Walk along the ray in steps smaller than a cell, and stop in the first occupied one.",
+                "The direction is theta + bearing. grid.at([x, y]) says what is there; maps.OCCUPIED is an obstacle.",
+                "`a = pose[2] + bearing; r = np.arange(0, r_max, grid.resolution / 2); "
+                "xy = pose[:2] + r[:, None] * [np.cos(a), np.sin(a)]; "
+                "hits = r[grid.at(xy) == maps.OCCUPIED]; return hits[0] if len(hits) else r_max`",
+            ),
+            mistakes=[
+                Mistake(_ray_in_cells, "You counted in cells. One cell is grid.resolution meters long."),
+                Mistake(_ray_without_heading, "The heading is missing: the beam points to theta + bearing on the map."),
+                Mistake(_ray_without_bearing, "The bearing is missing: you looked straight ahead."),
+                Mistake(
+                    _ray_reversed, "Bearings count to the left, like angles: theta + bearing, not theta - bearing."
+                ),
+                Mistake(_ray_swapped, "Sine and cosine have changed places: x goes with the cosine."),
+                Mistake(
+                    lambda grid, x, b, r_max: r_max,
+                    "You return r_max whatever stands in the way. Is `return r_max` inside the loop, or a step longer than a cell is wide?",
+                ),
+                Mistake(
+                    lambda grid, x, b, r_max: 0.0,
+                    "Your ray ends where it starts. Does it start at x, y of the pose, and go on while the cell is *not* maps.OCCUPIED?",
+                ),
+                Mistake(
+                    lambda grid, x, b, r_max: maps.walk_ray(grid, x, b - 2 * x[2], r_max),
+                    "The heading counts the wrong way: the beam points to theta + bearing.",
+                ),
+                Mistake(
+                    lambda grid, x, b, r_max: maps.walk_ray(grid, x, math.degrees(x[2] + b) - x[2], r_max),
+                    "cos and sin take radians, and pose and bearing are in radians already.",
+                ),
+                Mistake(_ray_to_the_last, "Your ray goes on through walls: stop in the *first* occupied cell."),
+                Mistake(_ray_to_infinity, "Nothing hit means r_max, the scanner's limit, not infinity."),
+                Mistake(_ray_without_end, "A scanner sees r_max at most: return r_max when nothing is hit before."),
+            ],
+        ),
+        Exercise(
+            "beam_weight",
+            reference=beam_weight,
+            draw=beams_at_a_pose,
+            metric=metrics.Numbers(1e-9),
+            noisy=[(whole_scan(beams_at_a_pose), metrics.Numbers(1e-6), "Right for 20 beams, but not for 541:")],
+            limit=IMPORTS,
+            hints=(
+                "Each beam is a normal density of measured minus expected range. A product turns into a sum of logarithms.",
+                "log N = -0.5 * (error / std)**2 - log(std sqrt(2 pi)), once for every beam.",
+                "`return np.sum(-0.5 * ((ranges - expected) / std) ** 2 - np.log(std * np.sqrt(2 * np.pi)))`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda r, e, s: math.exp(beam_weight(r, e, s)), "This is the product. Its logarithm is asked for."
+                ),
+                Mistake(
+                    lambda r, e, s: _log_of_the_product(_normal_log(r - e, s)),
+                    "Right for 20 beams. With 541 the product is zero before you take its logarithm: sum up logarithms.",
+                ),
+                Mistake(
+                    lambda r, e, s: float((-0.5 * np.square((r - e) / s)).sum() - np.log(s * math.sqrt(2 * math.pi))),
+                    "The factor 1 / (std sqrt(2 pi)) stands once in each density: as many times as there are beams.",
+                ),
+                *_density_mistakes(_beams, "beams"),
+                Mistake(
+                    lambda r, e, s: float(np.prod(_normal_log(r - e, s))),
+                    "You multiplied logarithms. The logarithm of a product is the *sum* of the logarithms.",
+                ),
+                Mistake(
+                    lambda r, e, s: float(_normal_log(r[0] - e[0], s)),
+                    "Only the first beam counts. Is `return` inside the loop? It belongs after it.",
+                ),
+                Mistake(
+                    _errors_added_first, "You added the errors and squared their sum. Square each error, then add up."
+                ),
+                Mistake(
+                    lambda r, e, s: beam_weight(r, e, s) / len(r), "You took the mean over the beams. They add up."
+                ),
+                Mistake(
+                    lambda r, e, s: beam_weight(r, e, s * s),
+                    "You divided by the variance: (error / std) is squared, and std stands in the factor in front.",
+                ),
+                Mistake(
+                    lambda r, e, s: float((-0.5 * np.square((r - e) / s)).sum()),
+                    "The factor 1 / (std sqrt(2 pi)) of each beam is missing.",
+                ),
+            ],
+        ),
+        Exercise(
+            "distance_field_weight",
+            reference=distance_field_weight,
+            draw=scan_at_a_pose,
+            metric=metrics.Numbers(1e-6),
+            noisy=[(whole_scan(scan_at_a_pose), metrics.Numbers(1e-6), "Right for 12 beams, but not for 541:")],
+            hints=(
+                "Put the end point of each beam on the map and ask how far the nearest obstacle is.",
+                "End point: x + r cos(theta + b), y + r sin(theta + b). The distance stands in grid.distance at grid.cell_of(point).",
+                "`a = pose[2] + bearings; xy = pose[:2] + np.column_stack([ranges * np.cos(a), ranges * np.sin(a)]); "
+                "d = grid.distance[grid.cell_of(xy)]; "
+                "return np.sum(-0.5 * (d / std) ** 2 - np.log(std * np.sqrt(2 * np.pi)))`",
+            ),
+            mistakes=[
+                Mistake(_field_world, "The heading is missing: bearings are relative to the robot, the map is not."),
+                Mistake(
+                    _field_mirrored, "Bearings count to the left, like angles: theta + bearing, not theta - bearing."
+                ),
+                Mistake(_field_swapped, "Sine and cosine have changed places: x goes with the cosine."),
+                Mistake(
+                    _field_at_the_robot, "You looked up the robot's own cell. Look up the end points of its beams."
+                ),
+                Mistake(
+                    _field_plain_product,
+                    "Right for 12 beams. With 541 the product is zero before you take its logarithm: sum up logarithms.",
+                ),
+                *_density_mistakes(_field_with, "beams"),
+                Mistake(_field_straight_ahead, "The bearings are missing: each beam points to theta + bearing."),
+                Mistake(
+                    lambda grid, x, r, b, s: distance_field_weight(grid, x, r, b, s * s),
+                    "You used the variance as standard deviation: N(0, std^2) divides the distance by std.",
+                ),
+                Mistake(
+                    _field_one_peak,
+                    "The factor 1 / (std sqrt(2 pi)) stands once in each density: as many times as there are beams.",
+                ),
+                Mistake(_field_cells, "The distances are in meters already: do not divide by the resolution."),
+                Mistake(_field_mean, "You took the mean over the beams. The logarithms add up."),
+                Mistake(_field_probability, "This is p itself, which underflows with many beams. Return log p."),
+                Mistake(_field_no_peak, "The factor 1 / (std sqrt(2 pi)) of each beam is missing."),
+                Mistake(_field_origin, "The robot's position is missing: a range starts where the robot stands."),
+            ],
+        ),
+        Prediction(
+            "field",
+            question="Both models weigh one scan at every place of the building. Which finds more to like in the wrong rooms?",
+            choices=("beam model", "likelihood field", "both alike"),
+            answer="likelihood field",
+            why="It asks only whether each end point lies near some obstacle, and does not mind a wall in between. Its good places "
+            "form ridges along parallel walls. Drag the robot: is there a place where it is the other way round?",
+        ),
+        Exercise(
+            "resample_roulette",
+            reference=resample_roulette,
+            draw=WHEELS,
+            properties=(_valid, _drawn_from_the_rng, _proportional, _spins_are_independent),
+            hints=(
+                "Each weight owns an interval as wide as itself. Where does a random number fall?",
+                "np.cumsum(weights) are the ends of the intervals, np.searchsorted finds the interval by bisection.",
+                "`ends = np.cumsum(weights); return np.searchsorted(ends, rng.random(len(weights)) * ends[-1], side='right')`",
+            ),
+            mistakes=[
+                Mistake(_largest, "You always took the heaviest particle. It should be drawn most often, not always."),
+                Mistake(_uniform_choice, "All particles were drawn alike: the weights do not matter yet."),
+                Mistake(
+                    lambda w, rng: np.arange(len(w)), "Every particle came out once: that is the set you started with."
+                ),
+                Mistake(
+                    lambda w, rng: _spin(w, rng, scale=1.0),
+                    "Your spins end at 1, but the weights may have any sum: spin from 0 to W, or divide by W first.",
+                ),
+                Mistake(
+                    lambda w, rng: _spin(w, rng, shift=1),
+                    "Off by one: np.searchsorted gives the index itself, nothing is to be added.",
+                ),
+                Mistake(
+                    lambda w, rng: _spin(w, rng, shift=-1),
+                    "Off by one: np.searchsorted gives the index itself, nothing is to be subtracted.",
+                ),
+                Mistake(
+                    lambda w, rng: np.full(len(w), np.searchsorted(np.cumsum(w), rng.random() * w.sum())),
+                    "One spin for all: each particle needs a random number of its own.",
+                ),
+                Mistake(
+                    lambda w, rng: rng.multinomial(len(w), w / w.sum()),
+                    "These are counts, how often each particle comes out. Asked for are the indices: np.repeat makes them.",
+                ),
+                Mistake(
+                    lambda w, rng: np.searchsorted(w, rng.random(len(w))),
+                    "You searched in the weights. Search in their running sum, np.cumsum(weights).",
+                ),
+            ],
+            draws=8,
+            limit=IMPORTS,
+        ),
+        Exercise(
+            "resample_systematic",
+            reference=resample_systematic,
+            draw=WHEELS,
+            properties=(
+                _valid,
+                _drawn_from_the_rng,
+                _proportional,
+                _equal_weights_stay,
+                _spokes_are_even,
+                _survives_rounding,
+            ),
+            hints=(
+                "One random number turns the whole wheel. Its M spokes are W / M apart.",
+                "Spokes: (rng.random() + np.arange(M)) * W / M. Then search them in the running sum, as before.",
+                "`ends, M = np.cumsum(weights), len(weights); spokes = (rng.random() + np.arange(M)) * ends[-1] / M; "
+                "return np.minimum(np.searchsorted(ends, spokes), M - 1)`",
+            ),
+            mistakes=[
+                Mistake(
+                    _largest, "You always took the heaviest particle. It should be met by most spokes, not by all."
+                ),
+                Mistake(
+                    lambda w, rng: _turn(w, rng.random(len(w))),
+                    "Each spoke got its own random number (that is stratified resampling). One number turns the whole wheel.",
+                ),
+                Mistake(
+                    lambda w, rng: _turn(w, rng.random(), scale=1.0),
+                    "Your spokes end at 1, but the weights may have any sum: space them by W / M, or divide by W first.",
+                ),
+                Mistake(
+                    lambda w, rng: _turn(w, 1 + rng.random()),
+                    "Off by one: the first spoke lies between 0 and W / M, yours between W / M and 2 W / M.",
+                ),
+                Mistake(_spin, "These are M independent spins, the roulette. Here one random number turns all spokes."),
+                Mistake(lambda w, rng: _turn(w, 0.0), "The wheel has not been turned: start with one random number."),
+                Mistake(lambda w, rng: _turn(w, 0.5), "The wheel has not been turned: start with one random number."),
+                Mistake(
+                    lambda w, rng: np.arange(len(w)),
+                    "Every particle came out once: that is right for equal weights only.",
+                ),
+            ],
+            draws=8,
+            limit=IMPORTS,
+        ),
+        Prediction(
+            "standing",
+            question="A robot stands still, 1000 particles weigh the same, and roulette resamples 200 times. How many of the first 1000 "
+            "particles still have descendants?",
+            choices=("about 630", "about 100", "about 10", "all 1000"),
+            answer="about 10",
+            why="The first round loses 37 %. Later, with k families left, the next one dies out after some 2 M / k^2 rounds: after t rounds about 2 M / t remain.",
+        ),
+        Exercise(
+            "effective_size",
+            reference=particles.effective_size,
+            draw=cloud_weights,
+            metric=metrics.Numbers(1e-9),
+            hints=(
+                "M equal weights should give M, a single heavy one should give 1, whatever the sum of the weights is.",
+                "It is the square of the sum over the sum of the squares.",
+                "`return weights.sum() ** 2 / (weights ** 2).sum()`",
+            ),
+            mistakes=[
+                Mistake(
+                    _from_the_sum_of_squares,
+                    "Right for weights that add up to 1. These do not: divide by their sum first.",
+                ),
+                Mistake(lambda w: w.sum() / np.square(w).sum(), "The sum in the numerator is to be squared."),
+                Mistake(
+                    lambda w: np.square(w).sum() / w.sum() ** 2,
+                    "This is the reciprocal: it is 1/M for equal weights, not M.",
+                ),
+                Mistake(lambda w: float(len(w)), "You counted the particles. Count what their weights are worth."),
+                Mistake(
+                    lambda w: len(w) / (1 + np.var(w)),
+                    "That formula holds for weights of mean 1: divide by their mean first.",
+                ),
+                Mistake(
+                    lambda w: particles.effective_size(w) / len(w),
+                    "That is the share of M that is effective. Asked for is the number itself.",
+                ),
+                Mistake(lambda w: np.square(w).sum(), "That is the sum of the squares: it stands in the denominator."),
+                Mistake(
+                    lambda w: (w.sum() / np.square(w).sum()) ** 2,
+                    "You squared the whole quotient. Squared are the sum above, and each weight below.",
+                ),
+                Mistake(
+                    lambda w: w.sum() ** 2 / w.sum() ** 2,
+                    "Below stands the sum of the squares, (weights ** 2).sum(), not the square of the sum.",
+                ),
+                Mistake(
+                    lambda w: 1 / np.square(w / w.mean()).sum(), "Divide the weights by their sum, not by their mean."
+                ),
+                Mistake(
+                    lambda w: 1 / np.square(w / w.max()).sum(), "Divide the weights by their sum, not by the largest."
+                ),
+                Mistake(
+                    lambda w: len(w) / (1 + np.var(w / w.sum())),
+                    "That formula holds for weights of mean 1: divide by their mean, not by their sum.",
+                ),
+                Mistake(
+                    lambda w: len(w) / (1 + np.var(w / w.mean(), ddof=1)),
+                    "The variance here is the mean square deviation, np.var without ddof=1.",
+                ),
+                Mistake(
+                    lambda w: float(round(particles.effective_size(w))),
+                    "An effective size need not be whole: return it as it comes out.",
+                ),
+                Mistake(
+                    lambda w: float(int(particles.effective_size(w))),
+                    "An effective size need not be whole: return it as it comes out.",
+                ),
+                Mistake(
+                    lambda w: math.exp(-(w / w.sum()) @ np.log(w / w.sum())),
+                    "That is the exponential of the entropy, another measure. Here: squared sum over sum of squares.",
+                ),
+                Mistake(lambda w: w.sum() / w.max(), "That is another measure. Here: squared sum over sum of squares."),
+            ],
+        ),
+        Exercise(
+            "should_resample",
+            reference=should_resample,
+            draw=tuple(functools.partial(cloud_and_threshold, slip=slip) for slip, _ in RESAMPLING_SLIPS),
+            metric=metrics.Exactly(),
+            hints=(
+                "Resampling costs diversity. When is it worth its price?",
+                "When the effective size is below the share `threshold` of the number of particles.",
+                "`return effective_size(weights) < threshold * len(weights)`",
+            ),
+            mistakes=[Mistake(slip, text) for slip, text in RESAMPLING_SLIPS],
+            draws=30,
+        ),
+        Exercise(
+            "circular_mean",
+            reference=circular_mean,
+            draw=headings,
+            metric=metrics.Angles(1e-9),
+            hints=(
+                "The mean of 179 deg and -179 deg should be 180 deg. What could be averaged instead of angles?",
+                "Average the unit vectors (cos, sin), and take the direction of the result.",
+                "`return np.arctan2(np.sum(weights * np.sin(angles)), np.sum(weights * np.cos(angles)))`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda a, w: float(planar.wrap_angle(a.mean())),
+                    "The arithmetic mean of angles across the seam points backward. Average directions, not numbers.",
+                ),
+                Mistake(
+                    lambda a, w: float(w @ a / w.sum()),
+                    "The arithmetic mean of angles across the seam points backward. Average directions, not numbers.",
+                ),
+                Mistake(
+                    lambda a, w: float(w @ (a % (2 * math.pi)) / w.sum()),
+                    "You moved the seam to 0, where it bites other headings. Average directions: their cosines and sines.",
+                ),
+                Mistake(
+                    lambda a, w: math.degrees(particles.circular_mean(np.radians(a), w)),
+                    "The angles are in radians already: nothing is to be converted.",
+                ),
+                Mistake(lambda a, w: particles.circular_mean(a), "The weights are missing."),
+                Mistake(
+                    lambda a, w: (float((w * np.cos(a)).sum()), float((w * np.sin(a)).sum())),
+                    "That is the mean vector. Its direction is asked for: np.arctan2(sine part, cosine part).",
+                ),
+                Mistake(lambda a, w: float(np.median(a)), "The median of angles depends on where their seam lies."),
+                Mistake(
+                    lambda a, w: float(w @ a),
+                    "You added angles. Add directions, (cos, sin) times the weight, and take the direction of the sum.",
+                ),
+                Mistake(
+                    lambda a, w: math.atan2(np.sin(w * a).sum(), np.cos(w * a).sum()),
+                    "A weight makes a direction longer, it does not turn it: w * np.sin(a), not np.sin(w * a).",
+                ),
+                Mistake(
+                    lambda a, w: math.atan2(np.sin(w * a / w.sum()).sum(), np.cos(w * a / w.sum()).sum()),
+                    "A weight makes a direction longer, it does not turn it: w * np.sin(a), not np.sin(w * a).",
+                ),
+                Mistake(
+                    lambda a, w: math.atan2((w * np.sin(a)).sum(), np.cos(a).sum()), "The cosines have no weights."
+                ),
+                Mistake(lambda a, w: math.atan2(np.sin(a).sum(), (w * np.cos(a)).sum()), "The sines have no weights."),
+                Mistake(
+                    lambda a, w: math.asin((w * np.sin(a)).sum() / w.sum()),
+                    "The arcsine knows only half the circle, and wants a unit vector. np.arctan2 takes both parts.",
+                ),
+                Mistake(
+                    lambda a, w: math.acos((w * np.cos(a)).sum() / w.sum()),
+                    "The arccosine knows only half the circle, and wants a unit vector. np.arctan2 takes both parts.",
+                ),
+                Mistake(
+                    lambda a, w: math.atan((w * np.tan(a)).sum() / w.sum()),
+                    "Tangents are not parts of a vector. Average cosines and sines, then take np.arctan2.",
+                ),
+                Mistake(
+                    lambda a, w: float(a[np.argmax(w)]), "You took the heaviest angle. The others have a say as well."
+                ),
+                Mistake(
+                    lambda a, w: math.atan2((w * np.cos(a)).sum(), (w * np.sin(a)).sum()),
+                    "Sine and cosine have changed places: arctan2 takes the sine part first.",
+                ),
+                Mistake(
+                    lambda a, w: math.atan((w * np.sin(a)).sum() / (w * np.cos(a)).sum()),
+                    "The plain arctan knows only half the circle. arctan2 takes both parts and knows it all.",
+                ),
+            ],
+        ),
+        Prediction(
+            "kidnap",
+            question="The cloud has converged, then the robot is carried into another room. What does the plain filter do?",
+            choices=(
+                "it finds the robot within some steps",
+                "it stays where it is",
+                "its weights become zero and it stops",
+            ),
+            answer="it stays where it is",
+            why="No particle is near the new place, and resampling cannot invent one. Weights are normalized, so even hopeless particles look fine.",
+        ),
+        Exercise(
+            "recover",
+            reference=recover,
+            draw=averages,
+            metric=metrics.Several(
+                metrics.Numbers(1e-9), metrics.Numbers(1e-9), metrics.Numbers(1e-9), names=("share", "w_slow", "w_fast")
+            ),
+            hints=(
+                "When the recent weights are worse than usual, something is wrong. Two averages, one quick and one slow, tell it.",
+                "Bring both up to date first: w += alpha (w_mean - w). The share is 1 - w_fast / w_slow, never below 0.",
+                "`w_slow += alpha_slow * (w_mean - w_slow); w_fast += alpha_fast * (w_mean - w_fast); "
+                "return max(0, 1 - w_fast / w_slow), w_slow, w_fast`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda m, s, f, a, b: (max(0.0, 1 - f / s), *mcl.recover(m, s, f, a, b)[1:]),
+                    "The share uses the old averages. Bring them up to date first.",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: (
+                        1 - (f + b * (m - f)) / (s + a * (m - s)),
+                        *mcl.recover(m, s, f, a, b)[1:],
+                    ),
+                    "The share can fall below zero when things go well: take the larger of it and 0.",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: (
+                        max(0.0, 1 - (s + a * (m - s)) / (f + b * (m - f))),
+                        *mcl.recover(m, s, f, a, b)[1:],
+                    ),
+                    "The ratio is upside down: w_fast is the one that drops first.",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: (max(0.0, 1 - f / s), s, f),
+                    "Nothing has been brought up to date: w_mean does not enter yet.",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: mcl.recover(m, s, f, a, b)[::2] + mcl.recover(m, s, f, a, b)[1:2],
+                    "Right numbers in another order: return the share, then w_slow, then w_fast.",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: mcl.recover(m, s, f, a, b)[1:] + mcl.recover(m, s, f, a, b)[:1],
+                    "Right numbers in another order: return the share, then w_slow, then w_fast.",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: _recover(s + b * (m - s), f + a * (m - f)),
+                    "The two alphas have changed places: alpha_slow belongs to w_slow.",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: _recover(m + a * (s - m), m + b * (f - m)),
+                    "Your alpha weighs the old value: a small alpha has to change the average little.",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: _recover(s + a * m, f + b * m),
+                    "You added alpha * w_mean. An average moves toward w_mean: add alpha * (w_mean - w).",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: _recover(s - a * (m - s), f - b * (m - f)),
+                    "The averages move away from w_mean: add alpha * (w_mean - w).",
+                ),
+                Mistake(
+                    lambda m, s, f, a, b: (
+                        min(0.5, max(0.1, mcl.recover(m, s, f, a, b)[0])),
+                        *mcl.recover(m, s, f, a, b)[1:],
+                    ),
+                    "The limits of 10 % and 50 % are our filter's own. Return the share as the formula gives it.",
+                ),
+                *RECOVERIES,
+                Mistake(
+                    lambda m, s, f, a, b: mcl.recover(m, s, f, a, b)[:1] + (s, f),
+                    "You returned the old averages: the next step needs the new ones.",
+                ),
+            ],
+            draws=12,
+        ),
+        _hunt(
+            "hunt_1",
+            hunt_1,
+            specimens.specimen_1,
+            "An index in front of a heavy one comes out too often. Unequal weights show it, and shares counted over many runs.",
+            (
+                "What must hold for a resampler on average?",
+                "Count how often each index comes out in many runs, and compare with its weight.",
+                "`w = np.array([0.1, 0.7, 0.1, 0.1]); index = np.concatenate([resample(w, rng) for _ in range(1000)]); "
+                "return np.abs(np.bincount(index, minlength=4) / len(index) - w).max() < 0.05`",
+            ),
+        ),
+        _hunt(
+            "hunt_2",
+            hunt_2,
+            specimens.specimen_2,
+            "Copies of the heavy particles hide it. Count over many runs how often the light ones come out, next to a heavy one.",
+            (
+                "Does your first test catch it? If not: which weights did it not try?",
+                "Use many light particles whose share M w is below 1, next to a heavy one.",
+                "`w = np.array([0.5] + 10 * [0.05]); index = np.concatenate([resample(w, rng) for _ in range(1000)]); "
+                "return np.abs(np.bincount(index, minlength=11) / len(index) - w).max() < 0.02`",
+            ),
+        ),
+        _hunt(
+            "hunt_3",
+            hunt_3,
+            specimens.specimen_3,
+            "While the weights add up to 1 it does no harm. Let their sum be a little less, and try several times: the last spoke must fall beyond it.",
+            (
+                "On average it is right. What does it take for granted about the weights?",
+                "Floating-point weights need not add up to 1. Try a sum a little below 1, several times.",
+                "Two lines: `try: return all(resample(np.full(1000, 0.000999), rng).max() < 1000 for _ in range(20))` and "
+                "`except IndexError: return False`",
+            ),
+        ),
+        _hunt(
+            "hunt_4",
+            hunt_4,
+            specimens.specimen_4,
+            "With one reading, or by which particle is heavier, it looks right. What must a second reading do to the *ratio* of two weights?",
+            (
+                "Independent readings multiply. What must happen when the same reading comes twice?",
+                "The ratio of two particles' weights must be squared.",
+                "`x, mark = np.array([[0.0, 0, 0], [0.3, 0, 0]]), np.array([[2.0, 0]]); a, b = weigh(x, np.array([2.0]), mark, 0.3); "
+                "c, d = weigh(x, np.array([2.0, 2.0]), np.vstack([mark, mark]), 0.3); return np.isclose(c / d, (a / b) ** 2)`",
+            ),
+            good=(_weights_multiplied,),
+            extra=(),
+        ),
+    ],
+)

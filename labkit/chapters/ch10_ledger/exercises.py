@@ -1,0 +1,328 @@
+"""Chapter 10: what a printed digit hides, and which word a comparison deserves."""
+
+import functools
+import itertools
+
+import numpy as np
+
+from ...documents.ledger import Computed, Row, half_unit, judge
+from ...exercises import metrics
+from ...exercises.engine import Chapter, Exercise, Mistake, Prediction
+
+FORMS = ("1.010000", "12", "1,5", "-0,250", "3e-4", "2.50e2", "-1000", "97.3")
+
+
+def printed_number(rng, form):
+    """A number as a document prints it."""
+    return (form,)
+
+
+def comparison(rng, off, bound, misprint, simulated):
+    """printed, value, bound, misprint, simulated; `off` and `bound` in half units of the last printed digit."""
+    value, half = float(np.round(rng.uniform(1, 9), 2)), 0.005
+    return f"{value:.2f}", float(value + off * half * rng.choice([-1, 1])), bound * half, misprint, simulated
+
+
+NUMBERS = tuple(functools.partial(printed_number, form=form) for form in FORMS)
+COMPARISONS = tuple(
+    functools.partial(comparison, off=off, bound=bound, misprint=misprint, simulated=simulated)
+    for off, bound, misprint, simulated in itertools.product(
+        (0.0, 0.4, 1.8, 60.0), (0.0, 1.5, 100.0), (False, True), (False, True)
+    )
+)
+
+
+def status(printed, value, bound, misprint, simulated):
+    """The word the ledger gives."""
+    row = Row("x", "lecture", "", "", printed, "", "reproduced", "")
+    return judge(row, Computed(value, bound=bound, misprint=misprint, simulated=simulated))
+
+
+def _decimals(printed):
+    return len(printed.lower().partition("e")[0].replace(",", ".").partition(".")[2])
+
+
+def _one_unit(printed):
+    return 2 * half_unit(printed)
+
+
+def _without_exponent(printed):
+    return 0.5 * 10.0 ** -_decimals(printed)
+
+
+def _counts_all_digits(printed):
+    digits = sum(c.isdigit() for c in printed.lower().partition("e")[0])
+    return 0.5 * 10.0 ** (-digits)
+
+
+def _without_comma(printed):
+    return half_unit(printed.partition(",")[0])
+
+
+def _other_sign(printed):
+    return _without_exponent(printed) ** 2 / half_unit(printed)
+
+
+def _through_float(printed):
+    return half_unit(str(float(printed.replace(",", "."))))
+
+
+def _of_the_value(printed):
+    return 0.005 * abs(float(printed.replace(",", ".")))
+
+
+def _digits_left(strip):
+    """Count the decimals of what `strip` leaves of the number before its exponent."""
+
+    def variant(printed):
+        number, _, exponent = printed.replace(",", ".").partition("e")
+        decimals = len(strip(number).partition(".")[2])
+        return 0.5 * 10.0 ** (int(exponent or 0) - decimals)
+
+    return variant
+
+
+def _without_zeros(number):
+    return number.rstrip("0") if "." in number else number
+
+
+def _whole_is_exact(printed):
+    return 0.0 if printed.lstrip("-").isdigit() else half_unit(printed)
+
+
+def _whole_zeros_do_not_count(printed):
+    zeros = len(printed) - len(printed.rstrip("0")) if printed.lstrip("-").isdigit() else 0
+    return half_unit(printed) * 10**zeros
+
+
+def _with_the_sign(printed):
+    return -half_unit(printed) if printed.startswith("-") else half_unit(printed)
+
+
+def _judged(real, simulated=None):
+    """Words by two rules (half, off, bound, misprint) -> word: for real values and, by default the right one, simulated
+    ones.
+    """
+
+    def variant(printed, value, bound, misprint, is_simulated):
+        half, off = half_unit(printed) * (1 + 1e-6), abs(value - float(printed))
+        return ((simulated or _simulated_word) if is_simulated else real)(half, off, bound, misprint)
+
+    return variant
+
+
+def _simulated_word(half, off, bound, misprint):
+    return "unpublished" if off <= half + bound else "superseded"
+
+
+def _real_word(half, off, bound, misprint):
+    if off <= half:
+        return "reproduced"
+    return "rounding" if off <= half + bound else "misprint" if misprint else "superseded"
+
+
+def _signed(printed, value, bound, misprint, simulated):
+    value = float(printed) if value < float(printed) else value
+    return status(printed, value, bound, misprint, simulated)
+
+
+def _within_a_unit(printed, value, bound, misprint, simulated):
+    rule = _simulated_word if simulated else _real_word
+    return rule(2 * half_unit(printed) * (1 + 1e-6), abs(value - float(printed)), bound, misprint)
+
+
+STATUSES = (
+    (_judged(_real_word, _real_word), "`simulated` does not enter yet: without the inputs nothing is reproduced."),
+    (
+        _judged(_real_word, lambda h, o, b, m: "reproduced" if o <= h else "unpublished"),
+        "Ask for `simulated` first. A simulated value is *unpublished* within half unit and bound, else *superseded*.",
+    ),
+    (
+        _judged(_real_word, lambda h, o, b, m: _real_word(h, o, b, m) if o <= h + b else "unpublished"),
+        "Ask for `simulated` first. A simulated value is *unpublished* within half unit and bound, else *superseded*.",
+    ),
+    (
+        _judged(_real_word, lambda h, o, b, m: "superseded" if o <= h + b else "unpublished"),
+        "A simulation within half unit and bound stands beside the printed number: unpublished. Yours is turned round.",
+    ),
+    (
+        _judged(_real_word, lambda h, o, b, m: "unpublished" if o <= h + b else "misprint" if m else "superseded"),
+        "A simulation far from the printed value proves no misprint: the claim is superseded.",
+    ),
+    (
+        _judged(_real_word, lambda h, o, b, m: "unpublished" if o <= h else "superseded"),
+        "A simulation has its bound as well: compare with half unit + bound.",
+    ),
+    (
+        _judged(lambda h, o, b, m: _real_word(h, o, b, True)),
+        "`misprint` does not enter yet: without a proof the word is *superseded*.",
+    ),
+    (
+        _judged(lambda h, o, b, m: _real_word(h, o, b, False)),
+        "`misprint` does not enter yet: where it is True nothing milder is left, and the word is *misprint*.",
+    ),
+    (
+        _judged(lambda h, o, b, m: _real_word(h, o, b, not m)),
+        "`misprint` is turned round: True means that a misprint is proved.",
+    ),
+    (
+        _judged(
+            lambda h, o, b, m: "misprint" if m else _real_word(h, o, b, m),
+            lambda h, o, b, m: "misprint" if m else _simulated_word(h, o, b, m),
+        ),
+        "*misprint* comes last: ask for `simulated` first, then for *reproduced* and *rounding*.",
+    ),
+    (
+        _judged(lambda h, o, b, m: "rounding" if o <= h + b else _real_word(h, o, b, m)),
+        "Ask for *reproduced* before *rounding*: what is within the half unit is within half unit + bound too.",
+    ),
+    (
+        _judged(
+            lambda h, o, b, m: "reproduced" if o < h / 100 else "rounding" if o <= h + b else _real_word(h, o, b, m)
+        ),
+        "Equal to the printed *digits* is enough: reproduced reaches to half a unit of the last digit.",
+    ),
+    (
+        _judged(
+            lambda h, o, b, m: "reproduced" if o <= h else "rounding" if o <= b else "misprint" if m else "superseded",
+            lambda h, o, b, m: "unpublished" if o <= b else "superseded",
+        ),
+        "Compare with half unit + bound: the printed number itself was rounded too.",
+    ),
+    (_within_a_unit, "You compare with a whole unit of the last digit. Rounding hides half of it."),
+    (_signed, "A value below the printed one is off as well: take the absolute difference."),
+)
+
+
+def _status(order, careful=False):
+    """Ask for the words in another order; `careful`: a simulation that lands elsewhere is superseded, as it should be."""
+
+    def variant(printed, value, bound, misprint, simulated):
+        half = half_unit(printed)
+        off = abs(value - float(printed))
+        within = off <= (half + bound) * (1 + 1e-6)
+        tests = {
+            "reproduced": off <= half * (1 + 1e-6) and not simulated,
+            "rounding": within and not simulated,
+            "unpublished": simulated and (within or not careful),
+            "misprint": misprint,
+            "superseded": simulated and careful,
+        }
+        return next((word for word in order if tests[word]), "superseded")
+
+    return variant
+
+
+CHAPTER = Chapter(
+    "10-ledger",
+    title="The ledger",
+    items=[
+        Prediction(
+            "digits",
+            question="A document prints 0.37. Its own inputs give 0.3746. What is that?",
+            choices=("reproduced", "a rounding difference", "a misprint"),
+            answer="reproduced",
+            why="0.3746 rounds to 0.37: nothing is off. A printed number is an interval, here from 0.365 to 0.375.",
+        ),
+        Exercise(
+            "half_unit",
+            reference=half_unit,
+            draw=NUMBERS,
+            metric=metrics.Numbers(1e-12),
+            hints=(
+                "Which digit was rounded? Half a unit of that digit can be hidden.",
+                "With d decimals it is 0.5 * 10**-d. An exponent, as in 3e-4, shifts that; a comma is a decimal point.",
+                "`number, _, exponent = printed.partition('e'); d = len(number.replace(',', '.').partition('.')[2]); "
+                "return 0.5 * 10.0 ** (int(exponent or 0) - d)`",
+            ),
+            mistakes=[
+                Mistake(
+                    _one_unit, "That is a whole unit of the last digit. Rounding moves a number by half of it at most."
+                ),
+                Mistake(
+                    _without_exponent,
+                    "In 3e-4 the last digit is worth 0.0001, not 1: the exponent shifts the half unit.",
+                ),
+                Mistake(
+                    _counts_all_digits, "You counted all digits. Only those after the decimal point make it finer."
+                ),
+                Mistake(_without_comma, "The comma of 1,5 is a decimal point: this number has one decimal, not none."),
+                Mistake(
+                    _other_sign, "3e-4 is 3 times 10 to the power -4: your exponent shifts the half unit the wrong way."
+                ),
+                Mistake(
+                    _through_float,
+                    "float() forgets how many digits were printed: 1.010000 has six decimals, 12 has none. Work on the string.",
+                ),
+                Mistake(
+                    _digits_left(_without_zeros),
+                    "Zeros at the end are digits too: 1.010000 has six decimals, and says more than 1.01.",
+                ),
+                Mistake(_whole_is_exact, "12 is rounded as well: it can be anything from 11.5 to 12.5."),
+                Mistake(
+                    _whole_zeros_do_not_count,
+                    "Here all printed digits count, the zeros of -1000 too: its last digit is worth 1.",
+                ),
+                Mistake(_with_the_sign, "Half a unit is a size, without a sign: that of -0,250 is 0.0005."),
+                Mistake(
+                    lambda printed: 0.5 * 10.0 ** _decimals(printed),
+                    "More decimals make the half unit smaller: the power of ten is negative.",
+                ),
+                Mistake(
+                    lambda printed: float(_decimals(printed)),
+                    "You counted the decimals. With d of them half a unit is 0.5 * 10**-d.",
+                ),
+                Mistake(
+                    lambda printed: half_unit(printed) / 10,
+                    "One decimal too many: with d decimals half a unit is 0.5 * 10**-d.",
+                ),
+                Mistake(
+                    _of_the_value, "You took a share of the value. The unit of the last digit does not depend on it."
+                ),
+            ],
+            draws=16,
+        ),
+        Exercise(
+            "status",
+            reference=status,
+            draw=COMPARISONS,
+            metric=metrics.Exactly(),
+            hints=(
+                "Ask the questions in an order: was the input published at all? Does the value round to the printed one? ...",
+                "off = |value - printed| against half_unit(printed), then against half_unit(printed) + bound. A simulated value within "
+                "either of them is 'unpublished', outside 'superseded'.",
+                "`half, off = half_unit(printed) + 1e-9, abs(value - float(printed)); near = off <= half + bound; "
+                "sim, real = 'unpublished' if near else 'superseded', 'misprint' if misprint else 'superseded'; "
+                "return sim if simulated else 'reproduced' if off <= half else 'rounding' if near else real`",
+            ),
+            mistakes=[
+                Mistake(
+                    _status(("misprint", "reproduced", "rounding", "unpublished")),
+                    "You ask for the misprint first. A number that comes out, or was never published, is no misprint.",
+                ),
+                Mistake(
+                    _status(("unpublished", "reproduced", "rounding", "misprint")),
+                    "A simulation far from the printed value does not stand beside it: the claim is superseded.",
+                ),
+                Mistake(
+                    _status(("reproduced", "rounding", "misprint", "unpublished")),
+                    "A simulated value is never a misprint: without the inputs nothing can be proved.",
+                ),
+                Mistake(
+                    _status(("unpublished", "superseded", "reproduced", "misprint", "rounding"), careful=True),
+                    "You ask for the misprint before rounding. What the bound explains needs no misprint: the milder word wins.",
+                ),
+                Mistake(
+                    lambda p, v, b, m, s: status(p, v, max(0.0, b - half_unit(p)), m, s),
+                    "Half unit and bound add up: the printed number was rounded, and so were its inputs.",
+                ),
+                Mistake(
+                    lambda p, v, b, m, s: status(p, v, 0.0, m, s),
+                    "The bound is missing: rounded inputs may move the value by that much more.",
+                ),
+                *(Mistake(variant, text) for variant, text in STATUSES),
+            ],
+            draws=len(COMPARISONS),
+        ),
+    ],
+)

@@ -1,0 +1,1 @@
+"""Lab sheet "Kalibrierung", Hochschule Darmstadt 2016: chapters 1 to 3."""

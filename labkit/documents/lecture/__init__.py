@@ -1,0 +1,1 @@
+"""Lecture "Lokalisierung": chapters 7 to 9."""

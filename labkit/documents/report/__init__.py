@@ -1,0 +1,1 @@
+"""Report "Kalibrace a testovani systemu OTUS tracker", ZCU Plzen 2018: chapter 6."""

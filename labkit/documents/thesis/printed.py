@@ -1,0 +1,176 @@
+"""The thesis's measurements and simulation inputs, read from `data/hand_eye/` as printed, and the corrections beside
+them.
+
+Source: thesis "Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", HAW Hamburg 2019, tables 6-2 to 7-5,
+listings C10, C14, C17.
+"""
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...checks import as_points, as_positive_number
+from ...geometry import frames
+from ...tables import read_table
+
+POSE_COLUMNS = ("x", "y", "z", "A_deg", "B_deg", "C_deg")
+CENTER_COLUMNS = ("x", "y", "z")
+SIMULATED_TURNS = {"z": 3, "y": 4, "x": 5}  # which KUKA angle a line of listing C10 varies
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """31 robot poses with the sphere's center in each: KUKA poses in mm and deg (31, 6), centers in mm (31, 3), pattern
+    line and angle.
+    """
+
+    kuka_deg: np.ndarray
+    x_S: np.ndarray
+    line: np.ndarray
+    angle_deg: np.ndarray
+
+    @property
+    def T_BF(self):
+        """Robot poses as transforms, base <- flange, (31, 4, 4)."""
+        return frames.matrix_from_kuka(frames.kuka_from_degrees(self.kuka_deg))
+
+
+def printed_entries():
+    """What listings C14 and C17 print, digit by digit: {(table, pose, column): text}, poses counted from 1."""
+    found = {}
+    for table, file, columns in (("C14", "poses", POSE_COLUMNS), ("C17", "centers", CENTER_COLUMNS)):
+        data = read_table(f"hand_eye/{file}.csv", text=("axis", *columns))
+        for i, pose in enumerate(data["pose"]):
+            found.update({(table, int(pose), column): str(data[column][i]) for column in columns})
+    return found
+
+
+def corrections():
+    """The corrected entries as a list of dictionaries: table, pose, column, printed, corrected, slip, reason."""
+    keys = ("table", "column", "printed", "corrected", "slip", "reason")
+    data = read_table("hand_eye/corrections.csv", text=keys)
+    return [{"pose": int(pose), **{key: str(data[key][i]) for key in keys}} for i, pose in enumerate(data["pose"])]
+
+
+def measurements(corrected=False):
+    """The 31 poses and centers as printed, or with corrections.
+
+    Parameters
+    ----------
+    corrected : bool or iterable of int
+        True applies all corrections, a collection of pose numbers (from 1) those of these poses.
+    """
+    poses = read_table("hand_eye/poses.csv", text=("axis",))
+    centers = read_table("hand_eye/centers.csv", text=("axis",))
+    tables = {
+        "C14": np.column_stack([poses[c] for c in POSE_COLUMNS]),
+        "C17": np.column_stack([centers[c] for c in CENTER_COLUMNS]),
+    }
+    columns = {"C14": POSE_COLUMNS, "C17": CENTER_COLUMNS}
+    wanted = range(1, len(poses["pose"]) + 1) if corrected is True else corrected or ()
+    for row in corrections():
+        if row["pose"] in wanted:
+            tables[row["table"]][row["pose"] - 1, columns[row["table"]].index(row["column"])] = float(row["corrected"])
+    return Measurements(tables["C14"], tables["C17"], poses["axis"], poses["angle_deg"])
+
+
+def measurements_from(entries):
+    """The measurements that a dictionary of entries, as `printed_entries` returns it, stands for."""
+    line, angle_deg = _pattern()
+    numbers = range(1, len(line) + 1)
+    kuka_deg = np.array([[float(entries["C14", i, c]) for c in POSE_COLUMNS] for i in numbers])
+    x_S = np.array([[float(entries["C17", i, c]) for c in CENTER_COLUMNS] for i in numbers])
+    return Measurements(kuka_deg, x_S, line.copy(), angle_deg.copy())
+
+
+@functools.cache
+def _pattern():
+    """Pattern line and angle of each pose; read once, for a search asks for thousands of trial tables."""
+    printed = measurements()
+    return printed.line, printed.angle_deg
+
+
+def kuka_pose_deg(name):
+    """A pose of `frames.csv` as printed: x, y, z in mm, A, B, C in deg."""
+    data = read_table("hand_eye/frames.csv", text=("name", "place"))
+    return _row(data, name, POSE_COLUMNS)
+
+
+def frame(name):
+    """The same as a transform (4, 4)."""
+    return frames.matrix_from_kuka(frames.kuka_from_degrees(kuka_pose_deg(name)))
+
+
+def point(name):
+    """A point of `points.csv` (mm)."""
+    return _row(read_table("hand_eye/points.csv", text=("name", "place")), name, CENTER_COLUMNS)
+
+
+def radius(source):
+    """A sphere radius of `radii.csv` (mm): half the printed diameter."""
+    return 0.5 * float(_row(read_table("hand_eye/radii.csv", text=("source", "place")), source, ("diameter",))[0])
+
+
+def printed_target():
+    """Sphere center in the base as the thesis holds it fixed: T_BP x_P' of tables 6-4 and 6-5 (mm)."""
+    return frames.transform(frame("plate"), point("sphere_in_plate"))
+
+
+def centers_with_radius(x_S, R, printed_radius=30.0):
+    """Sphere centers recomputed for another sphere radius: y' = +-sqrt(y^2 + R^2 - 30^2), the fitted circles staying as
+    they are.
+
+    A circle larger than the sphere gives y' = 0. Source: thesis, formula (6-27) and listing C16, which takes R = 30 mm.
+    """
+    x_S = as_points(x_S, "x_S").copy()
+    R, printed_radius = as_positive_number(R, "R"), as_positive_number(printed_radius, "printed_radius")
+    x_S[..., 1] = np.sign(x_S[..., 1]) * np.sqrt(np.maximum(x_S[..., 1] ** 2 + R * R - printed_radius**2, 0.0))
+    return x_S
+
+
+def simulation(exact=True, printed=False):
+    """The thirteen poses of the simulation model: T_BF (13, 4, 4), x_S (13, 3), target (3,) and the true scanner pose
+    in deg.
+
+    The printed inputs contradict each other. With table 6-2's height z = 20 and B = -90 deg, and the sphere at y = 5
+    instead of 0 (the plate at y = 0 instead of -5), all 39 printed sensor coordinates follow to their two decimals; no
+    other choice of the printed variants does.
+
+    Parameters
+    ----------
+    exact : bool
+        Sensor coordinates to full precision; False takes the two decimals of listing C10.
+    printed : bool
+        The contradictory inputs of listing C10 as they stand (z = 10, B = 90 deg, plate at y = -5).
+    """
+    data = read_table("hand_eye/simulation.csv", text=("axis",))
+    flange = kuka_pose_deg("simulated_flange_C10" if printed else "simulated_flange")
+    kuka_deg = np.tile(flange, (len(data["axis"]), 1))
+    for i, axis in enumerate(data["axis"]):
+        kuka_deg[i, SIMULATED_TURNS[axis]] = data["angle_deg"][i]
+    T_BF = frames.matrix_from_kuka(frames.kuka_from_degrees(kuka_deg))
+    plate = kuka_pose_deg("simulated_plate")
+    if not printed:
+        plate[1] = 0.0
+    target = plate[:3] + point("simulated_sphere")
+    scanner = kuka_pose_deg("simulated_scanner_C10" if printed else "simulated_scanner")
+    x_S = np.column_stack([data[c] for c in CENTER_COLUMNS])
+    if exact and not printed:
+        T_FS = frames.matrix_from_kuka(frames.kuka_from_degrees(scanner))
+        x_S = frames.transform(frames.invert(T_FS), frames.transform(frames.invert(T_BF), target))
+    return T_BF, x_S, target, scanner
+
+
+def start_poses_deg():
+    """The ten start poses of table 7-2, (10, 6) in mm and deg, and their names."""
+    data = read_table("hand_eye/start_poses.csv", text=("name",))
+    return np.column_stack([data[c] for c in POSE_COLUMNS]), data["name"]
+
+
+def _row(data, name, columns):
+    key = "name" if "name" in data else "source"
+    found = np.flatnonzero(data[key] == name)
+    if len(found) != 1:
+        raise ValueError(f"{key} must be one of {', '.join(sorted(data[key]))}, got {name!r}")
+    return np.array([data[c][found[0]] for c in columns])

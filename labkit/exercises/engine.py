@@ -1,0 +1,547 @@
+"""Exercises as the lecturer writes them, and how an answer is judged.
+
+An `Exercise` is a reference function, a random draw of its arguments, a metric, three hints, and a list of
+`Mistake`s: wrong variants of the reference, each with the sentence a student needs who made exactly this mistake.
+`judge` is pure: it runs an answer and returns an `Outcome`. What is displayed, remembered and bound to a name is the
+business of `session`.
+"""
+
+import copy
+import inspect
+import itertools
+import time
+import types
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from . import guard, metrics
+
+TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
+NOISY = "exact on clean data, but the data are not weighed as they should be: on noisy data"
+TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws of each kind
+UNITS = {
+    "mm": ("length", 1e-3),
+    "cm": ("length", 1e-2),
+    "m": ("length", 1.0),
+    "rad": ("angle", 1.0),
+    "deg": ("angle", np.pi / 180),
+}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The judgment of one answer: status, what to say about it, and the index of the named mistake it is, if any."""
+
+    status: str
+    text: str = ""
+    mistake: int | None = None
+    printed: str = ""
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """A wrong variant of the reference, with the same arguments, and what to tell who made it."""
+
+    variant: object
+    text: str
+
+
+@dataclass(frozen=True)
+class Item:
+    """What all exercises share."""
+
+    id: str
+
+    def __post_init__(self):
+        if not self.id.isidentifier():
+            raise ValueError(f"an exercise id must be a Python name, got {self.id!r}")
+        hints = getattr(self, "hints", None)
+        if hints is not None and (isinstance(hints, str) or len(hints) != 3):
+            raise ValueError(f"exercise {self.id!r} needs exactly three hints, got {len(hints)}")
+
+
+@dataclass(frozen=True)
+class Exercise(Item):
+    """A function to write.
+
+    reference:  the tested library function.
+    draw:       draw(rng) -> tuple of arguments, fresh at every check. Several in a tuple take turns, so that no
+                case which tells a right answer from a wrong one is left to chance.
+    metric:     compares one result with the reference's; None for stochastic code, which `properties` judge.
+    hints:      three, from the rule to the line.
+    mistakes:   wrong variants; an answer equal to one on all draws gets its text.
+    noisy:      (draw, metric) or (draw, metric, words): one more draw, with noise and a tolerance band for estimators,
+                or at a special place; several such in a list. `words` lead in what is said when only this draw fails.
+    properties: functions (student_function, rng) -> None or a sentence that says what does not hold.
+    draws:      how many draws a check takes.
+    limit:      seconds that one call may take.
+    """
+
+    reference: object
+    draw: object
+    metric: object = None
+    hints: tuple = ()
+    mistakes: tuple = ()
+    noisy: tuple = ()
+    properties: tuple = ()
+    draws: int = 5
+    limit: float = guard.TIME_LIMIT
+
+    def __post_init__(self):
+        super().__post_init__()
+        noisy = self.noisy or ()
+        object.__setattr__(self, "noisy", (noisy,) if noisy and callable(noisy[0]) else tuple(noisy))
+        if self.metric is None and not self.properties:
+            raise ValueError(f"exercise {self.id!r} needs a metric or properties")
+
+    @property
+    def cases(self):
+        """The draws that take turns."""
+        return self.draw if isinstance(self.draw, tuple) else (self.draw,)
+
+    @property
+    def arguments(self):
+        """Names of the reference's parameters that a draw fills."""
+        return list(inspect.signature(self.reference).parameters)
+
+    def judge(self, function, rng=None):
+        """Run the student's function on fresh draws and say what came out; never raises, whatever the function does."""
+        rng = np.random.default_rng() if rng is None else rng
+        if is_blank(function):
+            return Outcome(TO_DO)
+        if not callable(function):
+            return Outcome(NOT_YET, f"expected a function, got {metrics._describe(function)}.")
+        trial, seen = _Trial(self, function), []
+        for draw, metric, words in self._plan():
+            if trial.spent > TOTAL_TIME and len(seen) > 1 and draw in seen:
+                continue
+            problem = trial.draw(draw(rng), metric, words)
+            if problem:
+                return problem
+            seen.append(draw)
+        verdict = trial.verdict()
+        if verdict.status == CORRECT:
+            for holds in self.properties:
+                problem = trial.property(holds, rng)
+                if problem:
+                    return problem
+        return verdict
+
+    def _plan(self):
+        """(draw, metric, words) of every draw; words are None for the plain ones."""
+        noisy = [(draw, metric, *(words or (NOISY,))) for draw, metric, *words in self.noisy]
+        return [(draw, self.metric, None) for draw in itertools.islice(itertools.cycle(self.cases), self.draws)] + noisy
+
+
+class _Trial:
+    """One check in progress: the draws so far, what the student's function made of them, what it printed."""
+
+    def __init__(self, exercise, function):
+        self.exercise, self.function = exercise, function
+        self.pairs, self.inputs, self.metrics, self.words = [], [], [], []
+        self.refusal, self.printed, self.spent = "", "", 0.0
+
+    def outcome(self, status, text="", mistake=None):
+        return Outcome(status, text, mistake, self.printed)
+
+    def draw(self, args, metric, words=None):
+        """Run one draw; returns an Outcome when it ends the check, None otherwise."""
+        expected = self.exercise.reference(*copy.deepcopy(args))
+        admitted = []
+
+        def finish(result):
+            try:
+                admitted.append(metric.admit(result, expected) if metric else result)
+            except metrics.Refused as refusal:
+                self.refusal = self.refusal or str(refusal)
+                admitted.append(_Refusal(result))
+            return None
+
+        started = time.perf_counter()
+        run = guard.run(self.function, args, finish, self.exercise.limit)
+        self.spent += time.perf_counter() - started
+        self.printed = self.printed or run.printed
+        if run.error is not None:
+            return self._raised(run, args)
+        if run.changed:
+            names = ", ".join(f"`{name}`" for k, name in enumerate(self._names(args)) if k in run.changed)
+            return self.outcome(NOT_YET, f"your function changes its argument {names} in place: work on a copy.")
+        self.inputs.append(args)
+        self.pairs.append((admitted[0], expected))
+        self.metrics.append(metric)
+        self.words.append(words)
+        return None
+
+    def property(self, holds, rng):
+        """Check one property of the student's function, guarded like a call."""
+        run = guard.run(holds, (self.function, rng), limit=self.exercise.limit, author=self.function)
+        if run.error is not None:
+            return self._raised(run, ())
+        return self.outcome(NOT_YET, str(run.result)) if run.result else None
+
+    def verdict(self):
+        """Compare what came back with the references, then the named mistakes, then by the general layer."""
+        if all(m is None or m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)) and not self.refusal:
+            named = self._named_mistake() if self.exercise.metric is None else None
+            return named or self.outcome(CORRECT)
+        named = self._named_mistake()
+        if named:
+            return named
+        if self.refusal:
+            return self.outcome(NOT_YET, _closed(self.refusal))
+        plain = self._plain_pairs()
+        if self._right_on_plain():
+            for metric, pair, words in zip(self.metrics, self.pairs, self.words):
+                if words and not metric.equal(*pair):
+                    off = next(d for d in metric.deviations(*pair) if not d.within)
+                    return self.outcome(NOT_YET, _closed(f"{words} {off}"))
+        arrays = [arg for args in self.inputs for arg in args if isinstance(arg, np.ndarray)]
+        sizes = {n for array in arrays for n in (*array.shape, array.size)}
+        words = metrics.difference_words(self.exercise.metric, plain, sizes)
+        return self.outcome(NOT_YET, _closed(words) if words else self._deviation())
+
+    def _plain_pairs(self):
+        return [pair for pair, words in zip(self.pairs, self.words) if words is None]
+
+    def _right_on_plain(self):
+        metric = self.exercise.metric
+        return metric is not None and all(metric.equal(*pair) for pair in self._plain_pairs())
+
+    def _named_mistake(self):
+        """The mistake that explains all plain draws, and the special ones too where those alone are wrong."""
+        everything = self._right_on_plain()
+        cases = [
+            case[:3] for case in zip(self.inputs, self.metrics, self.pairs, self.words) if everything or case[3] is None
+        ]
+        for k, mistake in enumerate(self.exercise.mistakes):
+            if all(self._is_mistake(mistake, *case) for case in cases):
+                return self.outcome(NOT_YET, mistake.text, k)
+        return None
+
+    def _is_mistake(self, mistake, args, metric, pair):
+        metric = metric or metrics.Numbers(1e-12)
+        try:
+            with np.errstate(all="ignore"):
+                wrong = mistake.variant(*copy.deepcopy(args))
+                result = pair[0].value if isinstance(pair[0], _Refusal) else pair[0]
+                return _equal_as_written(metric, result, wrong)
+        except Exception:  # a wrong variant may well fail on a draw: then the answer is not this mistake
+            return False
+
+    def _deviation(self):
+        """The worst deviation on the plain draws; if some of them were right, also a call that was not."""
+        metric, pairs = self.exercise.metric, self._plain_pairs()
+        worst = [d for pair in pairs for d in metric.deviations(*pair) if not d.within]
+        if not worst:
+            return "right on most draws, but not on all."
+        most = max(worst, key=lambda d: d.amount / max(d.tolerance, 1e-300))
+        missed = [args for args, pair in zip(self.inputs, pairs) if not metric.equal(*pair)]
+        if len(missed) == len(pairs):
+            return _closed(str(most))
+        right = f"It was right on {len(pairs) - len(missed)} of {len(pairs)} draws: which case is special?"
+        return f"{_closed(str(most))} {right}\nNot right when called as {self._call(missed[0])}"
+
+    def _call(self, args):
+        given = ", ".join(f"{name}={_short(arg)}" for name, arg in zip(self._names(args), args))
+        return f"{self.exercise.id}({given})"
+
+    def _names(self, args):
+        """What the arguments are called: as in the student's function if it takes so many, else as in the reference."""
+        own = getattr(self.function, "__code__", None)
+        names = own.co_varnames[: own.co_argcount] if own else ()
+        names = names if len(names) == len(args) else self.exercise.arguments
+        return [names[k] if k < len(names) else f"argument {k + 1}" for k in range(len(args))]
+
+    def _raised(self, run, args):
+        error = run.error
+        if isinstance(error, NotImplementedError):
+            return self.outcome(TO_DO)
+        if isinstance(error, guard.TimeLimit):
+            text = (
+                f"your code did not finish within {self.exercise.limit:g} s: is there a loop without an end,"
+                " or one that tries far more than it must?"
+            )
+            return self.outcome(NOT_YET, text)
+        if isinstance(error, guard.Forbidden):
+            return self.outcome(
+                NOT_YET,
+                f"your code calls {error}, which a checked function must not do: it gets its data as arguments.",
+            )
+        if isinstance(error, SystemExit):
+            return self.outcome(NOT_YET, "your code calls exit(): a function ends with `return`.")
+        if isinstance(error, TypeError) and not run.line and "argument" in str(error):
+            wanted = ", ".join(self._names(args) if args else self.exercise.arguments)
+            return self.outcome(NOT_YET, f"your function cannot be called with ({wanted}): {error}.")
+        if isinstance(error, NameError) and error.name:
+            where = f"\nin {run.line}" if run.line else ""
+            hint = f"`{error.name}` is not known: has the cell that defines it been run since the kernel started?"
+            return self.outcome(RAISED, f"NameError: {hint}{where}")
+        if isinstance(error, RecursionError):
+            return self.outcome(RAISED, "RecursionError: your function calls itself without an end.")
+        said = _message(error)
+        if isinstance(error, AssertionError) and not said:
+            said = "`assert` raises; an answer is handed over with `return`"
+        advice = next((f". {told}" for words, told in ADVICE.items() if words in said), "")
+        if not (advice or args or run.line):
+            advice = ". What your function returned could not be worked with."
+        where = f"\nin {run.line}" if run.line else ""
+        with_ = f"\nwhen called as {self._call(args)}" if args else ""
+        return self.outcome(RAISED, f"{type(error).__name__}: {said}{advice}{where}{with_}")
+
+
+@dataclass(frozen=True)
+class _Refusal:
+    """A result the metric refused, kept because a named mistake may explain it (a transposed shape, say)."""
+
+    value: object
+
+
+def _equal_as_written(metric, result, wrong):
+    """Whether a result equals a mistake's: by the metric, or as bare arrays where it refuses the mistake itself."""
+    try:
+        metric.admit(wrong, wrong)
+    except metrics.Refused:
+        return _equal_arrays(result, wrong)
+    return metric.equal(result, wrong)
+
+
+def _equal_arrays(a, b):
+    if isinstance(b, tuple):
+        return isinstance(a, tuple | list) and len(a) == len(b) and all(map(_equal_arrays, a, b))
+    a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    return a.shape == b.shape and np.allclose(a, b, rtol=1e-9, atol=1e-12, equal_nan=True)
+
+
+ADVICE = {  # what NumPy means
+    "must be square": "`solve` and `inv` need as many equations as unknowns; `lstsq` takes more.",
+    "Singular matrix": "The equations do not determine all unknowns: is one missing, or there twice?",
+    "Incompatible dimensions": "`lstsq` needs one right side a row of the matrix: is `.ravel()` missing?",
+    "mismatch in its core dimension": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",
+    "not aligned": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",
+    "can be converted to Python scalars": "`math` and `float` take one number; `np.sin` and the like take arrays.",
+    "inhomogeneous": "The parts of this array have different lengths.",
+    "truth value of an array": "`if` takes one truth value; `np.where` chooses entry by entry.",
+    "bitwise_xor": "`^` is no power in Python: write `**`.",
+    "for ^: ": "`^` is no power in Python: write `**`.",
+    "math domain error": "A root of a negative number, or an arccosine beyond 1, perhaps by rounding: see `np.clip`.",
+    "could not be broadcast": "Entry by entry these shapes do not fit: is `@` meant, is a sum over an axis missing?",
+}
+
+
+def _message(error):
+    try:
+        return " ".join(str(error).split())[:300]
+    except Exception:  # a student's exception class may fail to print itself
+        return "(its message cannot be shown)"
+
+
+def _short(value):
+    """An argument in a few characters."""
+    if isinstance(value, np.ndarray):
+        if value.size > 16:
+            return f"<array of shape {value.shape}>"
+        tiny = value.dtype.kind == "f" and 0 < np.abs(value).max(initial=0.0) < 1e-3
+        words = np.array2string(value, precision=3, suppress_small=not tiny, separator=", ", max_line_width=100)
+        return words.replace("\n", "")
+    if inspect.isfunction(value):
+        return value.__name__
+    text = f"{value:.4g}" if isinstance(value, float) else repr(value)
+    return text if len(text) <= 60 else f"<{type(value).__name__}>"
+
+
+def _bare(): ...
+
+
+def _told():
+    """A docstring and nothing else."""
+
+
+_BLANK_CODES = {_bare.__code__.co_code, _told.__code__.co_code}
+
+
+def is_blank(answer):
+    """Whether nothing has been written: `...`, None, or a function whose body is `...` or `pass`."""
+    if answer is None or answer is ...:
+        return True
+    if not isinstance(answer, types.FunctionType):
+        return False
+    code = answer.__code__
+    return code.co_code in _BLANK_CODES and all(constant is None for constant in code.co_consts[1:])
+
+
+@dataclass(frozen=True)
+class Value(Item):
+    """A number to find, with its unit.
+
+    reference: function without arguments that computes it from data and library.
+    rtol, atol: how close an answer must be (relative to the value, absolute in `unit`).
+    mistakes:  functions without arguments that give a wrong value.
+    """
+
+    reference: object
+    unit: str = ""
+    rtol: float = 1e-3
+    atol: float = 0.0
+    hints: tuple = ()
+    mistakes: tuple = ()
+    metric: object = None
+
+    def measure(self):
+        expected = float(self.reference())
+        return expected, metrics.Numbers(max(self.rtol * abs(expected), self.atol) / max(1.0, abs(expected)), self.unit)
+
+    def judge(self, answer, unit=None, rng=None):
+        """Compare a number with the reference, in any unit of the same kind; never raises."""
+        if is_blank(answer):
+            return Outcome(TO_DO)
+        if self.metric is not None:
+            return self._judge_with(self.metric, self.reference(), answer)
+        expected, metric = self.measure()
+        run = (
+            guard.run(metric.admit, (answer, expected))
+            if unit is None
+            else guard.run(self._converted, (answer, unit, expected))
+        )
+        if isinstance(run.error, metrics.Refused | ValueError):
+            return Outcome(NOT_YET, _closed(_for_value(run.error)))
+        if run.error is not None:
+            return Outcome(NOT_YET, f"expected a number{self._in_unit()}, got {metrics._describe(answer)}.")
+        return self._exact_mistake(run.result, expected) or self._compare(metric, run.result, expected)
+
+    def _exact_mistake(self, answer, expected):
+        """The mistake that gives just this number, even where it lies within the tolerance of rounded answers."""
+        exact = metrics.Numbers(1e-9)
+        for k, mistake in enumerate(self.mistakes):
+            wrong = float(mistake.variant())
+            if exact.equal(answer, wrong) and not exact.equal(answer, expected):
+                return Outcome(NOT_YET, mistake.text, k)
+        return None
+
+    def _converted(self, answer, unit, expected):
+        if unit == self.unit:
+            return metrics.Numbers().admit(answer, expected)
+        here, there = UNITS.get(self.unit), UNITS.get(unit)
+        if here is None or there is None or here[0] != there[0]:
+            raise ValueError(f"the answer is wanted in {self.unit or 'no unit'}, got {unit!r}")
+        return metrics.Numbers().admit(answer, expected) * there[1] / here[1]
+
+    def _judge_with(self, metric, expected, answer):
+        run = guard.run(metric.admit, (answer, expected))
+        if run.error is not None:
+            text = (
+                _for_value(run.error)
+                if isinstance(run.error, metrics.Refused)
+                else f"{type(run.error).__name__}: {_message(run.error)}"
+            )
+            return Outcome(NOT_YET, _closed(text))
+        return self._compare(metric, run.result, expected)
+
+    def _compare(self, metric, answer, expected):
+        if metric.equal(answer, expected):
+            return Outcome(CORRECT)
+        for k, mistake in enumerate(self.mistakes):
+            if metric.equal(answer, mistake.variant()):
+                return Outcome(NOT_YET, mistake.text, k)
+        words = metrics.difference_words(metric, [(answer, expected)])
+        if words:
+            return Outcome(NOT_YET, _closed(words))
+        if _is_rounded(answer, expected):
+            return Outcome(NOT_YET, "right as far as it goes: hand over the computed value, not a rounded one.")
+        return Outcome(NOT_YET, f"not this value{self._in_unit()}: the hints lead on.")
+
+    def _in_unit(self):
+        return f" in {self.unit}" if self.unit else ""
+
+
+def _closed(sentence):
+    """The sentence with a period, unless it ends already."""
+    return sentence if sentence[-1:] in ".?:" else f"{sentence}."
+
+
+def _is_rounded(answer, expected):
+    """Whether a number or an array is the expected one, rounded to two significant digits or better."""
+    try:
+        answer, expected = np.asarray(answer, dtype=float), np.asarray(expected, dtype=float)
+    except (TypeError, ValueError):
+        return False
+    size = np.abs(expected).max(initial=0.0)
+    if answer.shape != expected.shape or size == 0:
+        return False
+    least = 1 - int(np.floor(np.log10(size)))
+    units = 10.0 ** -np.arange(max(least, 0) if (expected == np.round(expected)).all() else least, least + 8)
+    off = np.abs(answer - expected).max()
+    return any(off <= 0.5000001 * u and np.allclose(answer / u, np.round(answer / u), rtol=1e-12) for u in units)
+
+
+def _for_value(refusal):
+    return str(refusal).replace("it returned None: is a `return` missing?", "got None").replace("it returned", "got")
+
+
+@dataclass(frozen=True)
+class Prediction(Item):
+    """A question to be answered before a figure is shown; the first answer is locked in.
+
+    choices: the possible answers, one of them `answer`; empty for a number in `unit`, right within the relative
+             distance `within`.
+    why:     one or two sentences that say what the figure will show.
+    """
+
+    question: str
+    answer: object
+    choices: tuple = ()
+    why: str = ""
+    unit: str = ""
+    within: float = 0.2
+
+    def __post_init__(self):
+        super().__post_init__()
+        if self.choices and self.answer not in self.choices:
+            raise ValueError(f"prediction {self.id!r}: the answer {self.answer!r} is none of the choices")
+
+    def read(self, answer):
+        """The choice (or number) that an answer means; raises ValueError with the possible ones."""
+        if not self.choices:
+            try:
+                return float(answer)
+            except (TypeError, ValueError):
+                raise ValueError(
+                    f"expected a number{' in ' + self.unit if self.unit else ''}, got {answer!r}"
+                ) from None
+        for choice in self.choices:
+            if str(answer).strip().lower() == str(choice).lower():
+                return choice
+        raise ValueError(f"expected one of: {'; '.join(map(str, self.choices))}. Got {answer!r}")
+
+    def is_right(self, answer):
+        if self.choices:
+            return answer == self.answer
+        return abs(answer - self.answer) <= self.within * abs(self.answer)
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """A chapter's exercises in the order of its notebook; `name` is "NN-name" for the notebook NN_name."""
+
+    name: str
+    items: tuple = field(default_factory=tuple)
+    title: str = ""
+
+    def __post_init__(self):
+        object.__setattr__(self, "items", tuple(self.items))
+        object.__setattr__(self, "title", self.title or self.name.partition("-")[2].replace("-", " ").capitalize())
+        ids = [item.id for item in self.items]
+        double = {i for i in ids if ids.count(i) > 1}
+        taken = {"predict", "progress", "chapter"} & set(ids)
+        if double or taken:
+            raise ValueError(f"chapter {self.name}: the exercise id {min(double | taken)!r} is taken")
+
+    def __getitem__(self, id):
+        for item in self.items:
+            if item.id == id:
+                return item
+        raise KeyError(id)
+
+    @property
+    def notebook(self):
+        return self.name.replace("-", "_")

@@ -1,0 +1,507 @@
+"""How a student's result is compared with the reference: in degrees and millimeters, never without a unit.
+
+A metric first *admits* a result (converts what is harmless, refuses the rest with one sentence), then measures its
+deviations from the expected value, each with a unit and a tolerance.
+"""
+
+import inspect
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry import frames
+from ..geometry.lie import log_so3
+
+MAX_ENTRIES = 10_000_000
+FLOAT32_TOLERANCE = 2e-5
+ORTHONORMAL = 1e-5  # how far R'R may be from I, also where the angle may be off by much more
+
+
+class Refused(Exception):
+    """The result cannot be compared at all; the message says what was expected and what came."""
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """How far one aspect of a result is off."""
+
+    what: str
+    amount: float
+    unit: str
+    tolerance: float
+    words: str = ""
+
+    @property
+    def within(self):
+        return bool(self.amount <= self.tolerance)
+
+    def __str__(self):
+        if self.words:
+            return f"{self.what}: {self.words}" if self.what else self.words
+        what = f"{self.what} is off" if self.what else "it is off"
+        return f"{what} by {self.amount:.3g}{' ' + self.unit if self.unit else ''}"
+
+
+class Metric:
+    """Base: `admit(result, expected)` then `deviations(result, expected)`."""
+
+    def admit(self, result, expected):
+        raise NotImplementedError
+
+    def deviations(self, result, expected):
+        raise NotImplementedError
+
+    def parts(self, result, expected):
+        """(name, metric, result, expected) of the pieces that the general layer may diagnose one by one."""
+        return [("", self, result, expected)]
+
+    def equal(self, result, expected):
+        try:
+            return all(d.within for d in self.deviations(self.admit(result, expected), expected))
+        except Refused:
+            return False
+
+
+def as_array(result, shape):
+    """The result as a float array of this shape; refuses everything that is no harmless way of writing one."""
+    if result is None:
+        raise Refused("it returned None: is a `return` missing?")
+    if result is ...:
+        raise Refused("it returned `...`: the placeholder is still there")
+    if inspect.isgenerator(result) or inspect.iscoroutine(result):
+        raise Refused(f"it returned a {type(result).__name__}: use `return`, not `yield`")
+    for method in ("as_matrix", "toarray"):
+        if hasattr(result, method) and not isinstance(result, type):
+            result = getattr(result, method)()
+    if callable(result):
+        raise Refused(
+            f"it returned {getattr(result, '__name__', 'something callable')}, a function: are the parentheses missing?"
+        )
+    wanted = f"expected {'a number' if shape == () else f'an array of shape {shape}'}"
+    if (
+        getattr(result, "size", 0) is not None
+        and np.size(getattr(result, "shape", ()))
+        and np.prod(np.asarray(result.shape, dtype=float)) > MAX_ENTRIES
+    ):
+        raise Refused(f"{wanted}, got one of shape {tuple(result.shape)}")
+    try:
+        array = np.asarray(result)
+    except Exception:
+        parts = f" of {len(result)} parts that differ in shape" if type(result) in (list, tuple) else ""
+        raise Refused(f"{wanted}, got {_describe(result)}{parts}: return one array") from None
+    if array.dtype.kind == "c":
+        if np.abs(array.imag).max(initial=0.0) > 0:
+            cause = "a root of a negative number, or is `np.angle` missing?"
+            raise Refused(f"{wanted} of real numbers, got complex ones: {cause}")
+        array = array.real
+    if array.dtype.kind == "b":
+        raise Refused(f"{wanted}, got True or False: is there a comparison where a formula should be?")
+    if array.dtype.kind == "O":
+        try:
+            array = array.astype(float)
+        except Exception:
+            raise Refused(f"{wanted}, got {_describe(result)}") from None
+    if array.dtype.kind not in "iuf":
+        raise Refused(f"{wanted}, got {_describe(result)}")
+    if shape == () and array.size == 1:
+        array = array.reshape(())
+    if array.shape != shape:
+        hint = ""
+        if array.ndim == 2 and array.T.shape == shape:
+            hint = ": transposed?"
+        elif array.size == np.prod(shape):
+            hint = ": the right number of entries, arranged differently"
+        raise Refused(f"{wanted}, got {'a number' if array.shape == () else f'shape {array.shape}'}{hint}")
+    if not np.isfinite(array).all():
+        bad = int((~np.isfinite(array)).sum())
+        which = "NaN" if np.isnan(array).any() else "infinity"
+        count = "" if array.ndim == 0 else f" in {bad} of {array.size} entries"
+        raise Refused(
+            f"the result holds {which}{count}: look for a division by zero, a root of a negative number,"
+            " an arccos or arcsin of something beyond -1 and 1, or an iteration that runs away"
+        )
+    return array
+
+
+def _describe(result):
+    name = type(result).__name__
+    return f"{'an' if name[0] in 'aeiouAEIOU' else 'a'} {name}"
+
+
+def _is_single(array):
+    return array.dtype.itemsize < 8 and array.dtype.kind == "f"
+
+
+@dataclass(frozen=True)
+class Numbers(Metric):
+    """A number or an array: largest deviation, relative to the size of the expected entries (at least 1).
+
+    `tol` is that relative tolerance; `unit` names the deviation.
+    """
+
+    tol: float = 1e-9
+    unit: str = ""
+
+    def admit(self, result, expected):
+        return as_array(result, np.shape(expected))
+
+    def deviations(self, result, expected):
+        expected = np.asarray(expected, dtype=float)
+        scale = max(1.0, np.abs(expected).max(initial=0.0))
+        tol = max(self.tol, FLOAT32_TOLERANCE) if _is_single(result) else self.tol
+        amount = float(np.abs(result.astype(float) - expected).max(initial=0.0))
+        return [Deviation("the largest entry" if result.ndim else "", amount, self.unit, tol * scale)]
+
+
+@dataclass(frozen=True)
+class Angles(Metric):
+    """Angles in radians, compared around the circle."""
+
+    tol: float = 1e-9
+
+    def admit(self, result, expected):
+        return as_array(result, np.shape(expected))
+
+    def deviations(self, result, expected):
+        off = np.abs(np.angle(np.exp(1j * (result.astype(float) - expected)))).max(initial=0.0)
+        tol = max(self.tol, FLOAT32_TOLERANCE) if _is_single(result) else self.tol
+        return [Deviation("the angle", float(np.rad2deg(off)), "deg", float(np.rad2deg(tol)))]
+
+
+@dataclass(frozen=True)
+class PlanarPoses(Metric):
+    """A planar pose (x, y, theta) in m and rad: theta is an angle, and any number of whole turns more is the same pose.
+
+    `tol` is relative to the size of the expected position (at least 1), and absolute for the heading.
+    """
+
+    tol: float = 1e-9
+
+    def admit(self, result, expected):
+        return as_array(result, np.shape(expected))
+
+    def deviations(self, result, expected):
+        expected = np.asarray(expected, dtype=float)
+        position = Numbers(self.tol, "m").deviations(result[..., :2], expected[..., :2])[0]
+        heading = Angles(self.tol).deviations(result[..., 2], expected[..., 2])[0]
+        return [
+            Deviation("the position", position.amount, "m", position.tolerance),
+            Deviation("the heading", heading.amount, "deg", heading.tolerance),
+        ]
+
+
+@dataclass(frozen=True)
+class UpToSign(Metric):
+    """An array whose overall sign is free: an axis, a null vector, a quaternion."""
+
+    tol: float = 1e-9
+    unit: str = ""
+
+    def admit(self, result, expected):
+        return as_array(result, np.shape(expected))
+
+    def deviations(self, result, expected):
+        plain = Numbers(self.tol, self.unit)
+        return min((plain.deviations(s * result, expected) for s in (1, -1)), key=lambda d: d[0].amount)
+
+
+@dataclass(frozen=True)
+class Rotations(Metric):
+    """Rotation matrices, shape (..., 3, 3): angle between them, and how far the result is from orthonormal."""
+
+    deg: float = 1e-6
+
+    def admit(self, result, expected):
+        return as_array(result, np.shape(expected))
+
+    def deviations(self, result, expected):
+        single = _is_single(result)
+        R = result.astype(float)
+        skewness = float(np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(initial=0.0))
+        allowed = max(FLOAT32_TOLERANCE if single else 0.0, min(np.deg2rad(self.deg), ORTHONORMAL))
+        if skewness > 1e-3 or (np.linalg.det(R) < 0).any():
+            entry = float(np.abs(R - expected).max(initial=0.0))
+            return [Deviation("the rotation", entry, "in its largest entry", allowed)]
+        angle = float(np.rad2deg(np.max(frames.rotation_angle(np.swapaxes(R, -1, -2) @ expected), initial=0.0)))
+        tol = max(self.deg, 2e-3) if single else self.deg
+        return [Deviation("the rotation", angle, "deg", tol), Deviation("R'R - I", skewness, "", max(allowed, 1e-9))]
+
+
+@dataclass(frozen=True)
+class Poses(Metric):
+    """Rigid transforms, shape (..., 4, 4): angle of the rotations and distance of the origins."""
+
+    deg: float = 1e-6
+    mm: float = 1e-6
+    unit: str = "mm"
+
+    def admit(self, result, expected):
+        result = as_array(result, np.shape(expected))
+        if result.shape[-2:] != (4, 4):
+            raise Refused(f"a pose has shape (..., 4, 4), not {result.shape}")
+        if not np.allclose(result[..., 3, :], (0, 0, 0, 1), atol=1e-6):
+            row = result[..., 3, :].reshape(-1, 4)[0]
+            raise Refused(f"the last row must be 0 0 0 1, got {' '.join(f'{v:.3g}' for v in row)}")
+        return result
+
+    def deviations(self, result, expected):
+        turn = Rotations(self.deg).deviations(result[..., :3, :3], expected[..., :3, :3])
+        tol = self.mm
+        if _is_single(result):
+            tol = max(tol, FLOAT32_TOLERANCE * max(1.0, np.abs(expected[..., :3, 3]).max(initial=0.0)))
+        distance = np.linalg.norm(result[..., :3, 3].astype(float) - expected[..., :3, 3], axis=-1).max(initial=0.0)
+        return [*turn, Deviation("the origin", float(distance), self.unit, tol)]
+
+
+@dataclass(frozen=True)
+class Exactly(Metric):
+    """Counts, words, truth values, sets: equal or not."""
+
+    def admit(self, result, expected):
+        if result is None and expected is not None:
+            raise Refused("it returned None: is a `return` missing?")
+        if isinstance(expected, set | frozenset):
+            try:
+                return {v.item() if isinstance(v, np.generic) else v for v in result}
+            except TypeError:
+                raise Refused(f"expected a set, got {_describe(result)}") from None
+        if isinstance(expected, np.ndarray):
+            try:
+                array = np.asarray(result)
+            except Exception:
+                raise Refused(f"expected an array of shape {expected.shape}, got {_describe(result)}") from None
+            if array.shape != expected.shape:
+                raise Refused(f"expected an array of shape {expected.shape}, got shape {array.shape}")
+            if expected.dtype == bool and array.dtype != bool:
+                raise Refused(f"expected an array of True and False, got {array.dtype}")
+            return array
+        if isinstance(result, np.generic) or (isinstance(result, np.ndarray) and result.size == 1):
+            result = result.item()
+        if isinstance(result, str) and isinstance(expected, str) and _plain(result) == _plain(expected):
+            return expected
+        kinds = ((bool,), "True or False"), ((str,), "a word"), ((int,), "a whole number")
+        for types, words in kinds:
+            if isinstance(expected, types):
+                whole = types == (int,) and isinstance(result, float) and result.is_integer()
+                if not isinstance(result, types) and not whole:
+                    raise Refused(f"expected {words}, got {_describe(result)}")
+                break
+        return result
+
+    def deviations(self, result, expected):
+        same = np.array_equal(result, expected) if isinstance(expected, np.ndarray) else bool(result == expected)
+        shown = f"`{result!r}`" if isinstance(result, str | bool | int | float) else "what you return"
+        return [Deviation("", 0.0 if same else 1.0, "", 0.5, words=f"{shown} is not the answer here")]
+
+
+def _plain(words):
+    """Words without their case, and with single spaces for underscores and hyphens."""
+    return " ".join(words.lower().replace("_", " ").replace("-", " ").split())
+
+
+@dataclass(frozen=True)
+class Several(Metric):
+    """A tuple of results, each with its own metric and name."""
+
+    metrics: tuple
+    names: tuple
+
+    def __init__(self, *metrics, names):
+        object.__setattr__(self, "metrics", metrics)
+        object.__setattr__(self, "names", tuple(names))
+        if len(metrics) != len(self.names):
+            raise ValueError(f"{len(metrics)} metrics need as many names, got {len(self.names)}")
+
+    def admit(self, result, expected):
+        wanted = f"expected {len(self.names)} results ({', '.join(self.names)})"
+        if result is None:
+            raise Refused("it returned None: is a `return` missing?")
+        try:
+            count = len(result)
+        except TypeError:
+            raise Refused(f"{wanted}, got {_describe(result)}") from None
+        if count != len(self.names):
+            one = f"one array of shape {result.shape}" if isinstance(result, np.ndarray) else count
+            raise Refused(f"{wanted}, got {one}")
+        admitted = []
+        for name, metric, part, want in zip(self.names, self.metrics, result, expected):
+            try:
+                admitted.append(metric.admit(part, want))
+            except Refused as error:
+                raise Refused(f"{name}: {error}") from None
+        return admitted
+
+    def deviations(self, result, expected):
+        found = []
+        for name, metric, part, want in zip(self.names, self.metrics, result, expected):
+            found += [
+                Deviation(_joined(name, d.what), d.amount, d.unit, d.tolerance, d.words)
+                for d in metric.deviations(part, want)
+            ]
+        return found
+
+    def parts(self, result, expected):
+        return list(zip(self.names, self.metrics, result, expected))
+
+
+def _joined(name, what):
+    """What is off in a named part; the name alone where the part says nothing more than it."""
+    return name if what in ("", name, f"the {name}") else f"{name}: {what}"
+
+
+@dataclass(frozen=True)
+class Through(Metric):
+    """Compare after a function: through(matrix_from_kuka, poses()) lets every set of angles of the same pose pass."""
+
+    function: object
+    metric: Metric
+
+    def admit(self, result, expected):
+        return as_array(result, np.shape(expected))
+
+    def deviations(self, result, expected):
+        try:
+            image = np.asarray(self.function(result.astype(float)))
+        except ValueError as error:
+            raise Refused(str(error)) from None
+        if _is_single(result):
+            image = image.astype(np.float32)
+        return self.metric.deviations(image, self.function(expected))
+
+
+def difference_words(metric, pairs, sizes=()):
+    """What the general layer says of a wrong result, from relations that hold on *all* draws; None when it knows none.
+
+    `pairs` are (admitted result, expected) of every draw; `sizes` the lengths of what was given, which a forgotten or
+    needless division by their number would show.
+    """
+    for k, (name, part, _, _) in enumerate(metric.parts(*pairs[0])):
+        piece = [metric.parts(*pair)[k] for pair in pairs]
+        results = [p[2] for p in piece]
+        expected = [p[3] for p in piece]
+        if all(part.equal(r, e) for r, e in zip(results, expected)):
+            continue
+        words = _relation(part, results, expected, sizes)
+        if words:
+            return f"{name}: {words}" if name else words
+        return None
+    return None
+
+
+def _relation(metric, results, expected, sizes):
+    if isinstance(metric, Exactly | Several):
+        return None
+    if isinstance(metric, Through):
+        metric = Numbers(1e-9)
+    results = [np.asarray(r, dtype=float) for r in results]
+    expected = [np.asarray(e, dtype=float) for e in expected]
+
+    def holds(change):
+        try:
+            return all(metric.equal(change(r), e) for r, e in zip(results, expected))
+        except (ValueError, np.linalg.LinAlgError):
+            return False
+
+    if isinstance(metric, Poses):
+        return _pose_relation(results, expected, holds)
+    if isinstance(metric, Rotations):
+        return _rotation_relation(results, holds)
+    return _number_relation(results, expected, holds, sizes, getattr(metric, "unit", ""))
+
+
+def _moved(T, R=None, t=None):
+    T = T.copy()
+    if R is not None:
+        T[..., :3, :3] = R
+    if t is not None:
+        T[..., :3, 3] = t
+    return T
+
+
+def _pose_relation(results, expected, holds):
+    sheared = max(np.abs(np.swapaxes(r[..., :3, :3], -1, -2) @ r[..., :3, :3] - np.eye(3)).max() for r in results)
+    if sheared > 1e-3:
+        return f"your rotation block is not orthonormal: R'R differs from I by {sheared:.2g}"
+    if any((np.linalg.det(r[..., :3, :3]) < 0).any() for r in results):
+        return "your rotation is a reflection, its determinant is -1: one axis points the wrong way"
+    if holds(frames._invert):
+        return "your result is the inverse of the expected pose: it maps in the other direction"
+    if holds(lambda T: _moved(T, R=np.swapaxes(T[..., :3, :3], -1, -2))):
+        return "the origin is right, the rotation is transposed"
+    for factor, words in ((1e3, "a thousandth"), (1e-3, "a thousand times")):
+        if holds(lambda T, factor=factor: _moved(T, t=factor * T[..., :3, 3])):
+            return f"the rotation is right, the translation is {words} of what it should be: mm against m?"
+    if holds(lambda T: _moved(T, t=-T[..., :3, 3])):
+        return "the rotation is right, the translation has the opposite sign"
+    turn_only = all(
+        np.max(frames.rotation_angle(np.swapaxes(r[..., :3, :3], -1, -2) @ e[..., :3, :3])) < 1e-7
+        for r, e in zip(results, expected)
+    )
+    if turn_only:
+        return "the rotation is right, the translation is not"
+    if all(np.linalg.norm(r[..., :3, 3] - e[..., :3, 3], axis=-1).max() < 1e-6 for r, e in zip(results, expected)):
+        return "the translation is right, the rotation is not"
+    return None
+
+
+def _rotation_relation(results, holds):
+    sheared = max(np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).max() for r in results)
+    if sheared <= 1e-3 and any((np.linalg.det(r) < 0).any() for r in results):
+        return "your matrix is a reflection, its determinant is -1: one axis points the wrong way"
+    if holds(lambda R: np.swapaxes(R, -1, -2)):
+        return "your matrix is the transpose of the expected rotation: rows and columns, or the direction of the map"
+    if sheared > 1e-3:
+        return f"your matrix is not orthonormal: R'R differs from I by {sheared:.2g}"
+    half = all((log_so3(r) * 0 == 0).all() for r in results)
+    if half and holds(lambda R: R @ R):
+        return "you turn by half the angle"
+    return None
+
+
+def _number_relation(results, expected, holds, sizes, unit):
+    if holds(lambda r: -r):
+        return "your result is right up to its sign"
+    if holds(np.deg2rad):
+        if unit == "deg":
+            return "your result has been converted to degrees once too often"
+        return "your result is in degrees where radians are expected"
+    if holds(np.rad2deg):
+        return "your result is in radians where degrees are expected"
+    for factor, words in ((1e3, "a thousandth of"), (1e-3, "a thousand times"), (0.5, "twice"), (2.0, "half")):
+        if holds(lambda r, factor=factor: factor * r):
+            unit = ": mm against m?" if factor in (1e3, 1e-3) else ""
+            return f"your result is {words} the expected one{unit}"
+    if all(r.shape and r.shape[-1] == 4 and r.ndim == 1 for r in results) and holds(lambda r: np.roll(r, -1)):
+        return "the scalar part comes first in your quaternion; here it comes last (x, y, z, w)"
+    if all(r.ndim == 2 and r.shape[0] == r.shape[1] for r in results) and holds(np.transpose):
+        return "your matrix is the transpose of the expected one"
+    if all(r.ndim == 1 and r.size > 1 for r in results) and holds(lambda r: r[::-1]):
+        return "the entries are right, in reverse order"
+    if all((r >= 0).all() for r in results):
+        if holds(np.sqrt):
+            return "your result is the square of the expected one: is a root missing?"
+        if holds(np.square):
+            return "your result is the square root of the expected one"
+    if holds(lambda r: 1 / np.where(r == 0, np.inf, r)):
+        return "your result is the reciprocal of the expected one"
+    ratios = [_constant_ratio(r, e) for r, e in zip(results, expected)]
+    if None not in ratios and np.ptp(ratios) < 1e-9 * abs(ratios[0]) and len(ratios) > 1:
+        return _times(ratios[0], sizes)
+    return None
+
+
+def _times(ratio, sizes):
+    n, share = round(ratio), round(1 / ratio)
+    if n in sizes and abs(ratio - n) < 1e-6:
+        return f"your result is {n} times the expected one, on every draw: a sum where a mean is meant?"
+    if share in sizes and abs(1 / ratio - share) < 1e-6:
+        return f"your result is 1/{share} of the expected one, on every draw: a mean where a sum is meant?"
+    return f"your result is {ratio:.4g} times the expected one, on every draw"
+
+
+def _constant_ratio(result, expected):
+    use = np.abs(expected) > 1e-12
+    if not use.any() or (np.abs(result[~use]) > 1e-9).any():
+        return None
+    ratio = result[use] / expected[use]
+    return float(ratio.flat[0]) if np.ptp(ratio) <= 1e-9 * abs(ratio.flat[0]) and ratio.flat[0] != 0 else None

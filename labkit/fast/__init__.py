@@ -1,0 +1,8 @@
+"""Tuned kernels. Each stands under the name of the readable function it equals; a test shows that they agree.
+
+Use them where a figure drags ten thousand particles or a benchmark names a goal. To understand a method, read its
+twin in `estimation`, `calibration` or `localization`.
+
+kalman      the time-invariant filter along a series
+ekf         the landmark filter along a drive, one robot or many
+"""

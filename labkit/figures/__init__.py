@@ -1,1 +1,0 @@
-"""Figures: every function takes `ax`, draws, and returns its artists; no mathematics in here."""

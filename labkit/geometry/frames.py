@@ -1,0 +1,353 @@
+"""Frames from three measured points, rigid transforms, and the angles of a KUKA controller.
+
+`T_AB` maps coordinates in B to coordinates in A, so neighboring letters cancel: `T_AC = T_AB @ T_BC`. Lengths carry
+whatever unit the points have (mm in this chapter), angles are radians, and all functions broadcast over leading axes.
+Source: lab sheet "Kalibrierung", Hochschule Darmstadt 2016, section 1.
+"""
+
+import numpy as np
+
+from ..checks import (
+    as_finite,
+    as_number,
+    as_points,
+    as_positive_number,
+    as_rotations,
+    as_shape,
+    as_transforms,
+    fit_together,
+)
+from .lie import nearest_rotation, skew
+
+MIN_ARM_ANGLE_DEG = 1e-3  # below this the triangle is so flat that its height drowns in the last digits of the points
+BLOCK = 2048  # frames built at a time, so that the work stays in the processor's cache
+MIN_ARM = 1e-9  # relative to the largest coordinate: a shorter arm is rounding error, not a direction
+
+
+def pose(R, t):
+    """Transform with rotation R, shape (..., 3, 3), and translation t, shape (..., 3)."""
+    R, t = as_rotations(R, "R"), as_points(t, "t")
+    T = np.zeros((*fit_together(R=R.shape[:-2], t=t.shape[:-1]), 4, 4))
+    T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, t, 1.0
+    return T
+
+
+def unit_vector(v):
+    """`v` scaled to length 1; (..., n) -> (..., n). Refuses a zero vector."""
+    v = as_finite(v, "v")
+    if v.ndim < 1:
+        raise ValueError("v must have shape (..., n), got a single number")
+    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    if (length == 0).any():
+        raise ValueError("v must not be the zero vector: it has no direction")
+    return v / length
+
+
+def gram_schmidt(a, b):
+    """Right-handed orthonormal axes from two directions.
+
+    x points along `a`, y is what remains of `b` once its part along `a` is removed, z = x cross y.
+
+    Parameters
+    ----------
+    a, b : array-like, shape (..., 3)
+        Two directions, neither zero nor parallel. `a` is kept, `b` only fixes the plane.
+
+    Returns
+    -------
+    R : array, shape (..., 3, 3)
+        The columns are x, y, z.
+
+    Raises
+    ------
+    ValueError
+        When a direction is zero or both are parallel within 0.001 deg, with the angle found.
+
+    Source: lab sheet, section 1, the four formulas before listing 1.
+    """
+    a, b = as_points(a, "a"), as_points(b, "b")
+    fit_together(a=a.shape, b=b.shape)
+    a, b = np.broadcast_arrays(a, b)
+    _refuse_flat(a, b, ("a", "b"), scale=np.maximum(np.abs(a).max(-1), np.abs(b).max(-1)))
+    R = np.empty((*a.shape, 3))
+    _axes_into(R, np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0), 1.0)
+    return R
+
+
+def frame_from_points(origin, x_point, y_point):
+    """Frame through three measured points.
+
+    Parameters
+    ----------
+    origin, x_point, y_point : array-like, shape (..., 3)
+        The origin, a point on the positive x axis and a point on the side of positive y, all measured in W.
+
+    Returns
+    -------
+    T_WF : array, shape (..., 4, 4)
+        Maps coordinates in the frame F to coordinates in W.
+
+    Raises
+    ------
+    ValueError
+        When two points coincide or all three are collinear, with the angle between the arms.
+
+    Source: lab sheet, section 1, listing 1.
+    """
+    o, px, py = map(as_points, (origin, x_point, y_point), ("origin", "x_point", "y_point"))
+    if not o.shape == px.shape == py.shape:
+        fit_together(origin=o.shape, x_point=px.shape, y_point=py.shape)
+    o, px, py = np.broadcast_arrays(o, px, py)
+    T = np.zeros((*o.shape[:-1], 4, 4))
+    rows, origins, xs, ys = T.reshape(-1, 4, 4), *(p.reshape(-1, 3) for p in (o, px, py))
+    suspicious = False
+    for start in range(0, len(rows), BLOCK):
+        part = slice(start, start + BLOCK)
+        corner = np.ascontiguousarray(origins[part].T)
+        scale = max(np.abs(xs[part]).max(), np.abs(ys[part]).max())
+        suspicious |= not _axes_into(rows[part], xs[part].T - corner, ys[part].T - corner, scale)
+    if suspicious:
+        _refuse_flat(px - o, py - o, ("x_point", "y_point"), scale=np.maximum(np.abs(px), np.abs(py)).max(-1))
+    T[..., :3, 3] = o
+    T[..., 3, 3] = 1.0
+    return T
+
+
+def _axes_into(R, a, b, scale):
+    """Write the Gram-Schmidt axes of a, b, each of shape (3, ...), into the first three rows and columns of R.
+
+    The cross product comes first, y = z x x follows. The axes are perpendicular to about 1e-16 over the sine of the
+    angle between the arms: 1e-11 for the flattest triangle that is let in. Returns True when no arm can be short beside
+    `scale` and no triangle flat; otherwise `_refuse_flat` has to look at each one.
+    """
+    (ax, ay, az), (bx, by, bz) = a, b
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        base = ax * ax + ay * ay + az * az
+        s = 1 / np.sqrt(base)
+        xx, xy, xz = ax * s, ay * s, az * s
+        zx, zy, zz = xy * bz - xz * by, xz * bx - xx * bz, xx * by - xy * bx
+        height = zx * zx + zy * zy + zz * zz
+        s = 1 / np.sqrt(height)
+        zx, zy, zz = zx * s, zy * s, zz * s
+        R[..., 0, 0], R[..., 1, 0], R[..., 2, 0] = xx, xy, xz
+        R[..., 0, 1], R[..., 1, 1], R[..., 2, 1] = zy * xz - zz * xy, zz * xx - zx * xz, zx * xy - zy * xx
+        R[..., 0, 2], R[..., 1, 2], R[..., 2, 2] = zx, zy, zz
+        slope = np.deg2rad(MIN_ARM_ANGLE_DEG) ** 2 * (bx * bx + by * by + bz * bz)
+        short = 4 * (MIN_ARM * scale) ** 2
+    return bool(np.min(base) > short and np.min(height) > short and (height > 2 * slope).all())
+
+
+def _refuse_flat(a, b, names, scale):
+    """Raise when an arm has no length beside the coordinates it came from, or the arms are parallel."""
+    for arm, name in ((a, names[0]), (b, names[1])):
+        length = np.sqrt((arm * arm).sum(-1))
+        if (length <= MIN_ARM * scale).any():
+            what = "is zero" if names[0] == "a" else "coincides with origin"
+            raise ValueError(f"{name} {what}: the arm is {length.min():.3g} long and gives no direction")
+    angle = arm_angle(a, b)
+    flat = np.minimum(angle, np.pi - angle).min(initial=np.inf)
+    if flat < np.deg2rad(MIN_ARM_ANGLE_DEG):
+        subject = "a and b are parallel" if names[0] == "a" else "origin, x_point and y_point are collinear"
+        raise ValueError(f"{subject}: the angle between the arms is {np.rad2deg(flat):.2g} deg")
+
+
+def arm_angle(a, b):
+    """Angle between two directions (rad), accurate also near 0 and pi; (..., 3), (..., 3) -> (...)."""
+    a, b = as_points(a, "a"), as_points(b, "b")
+    fit_together(a=a.shape, b=b.shape)
+    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(-1))
+
+
+def invert(T):
+    """Inverse of rigid transforms without solving anything: (R, t) -> (R', -R' t); (..., 4, 4)."""
+    return _invert(as_transforms(T, "T"))
+
+
+def _invert(T):
+    inverse = np.zeros_like(T)
+    R_t = np.swapaxes(T[..., :3, :3], -1, -2)
+    inverse[..., :3, :3] = R_t
+    inverse[..., :3, 3] = -(R_t @ T[..., :3, 3, None])[..., 0]
+    inverse[..., 3, 3] = 1.0
+    return inverse
+
+
+def transform(T, points):
+    """Coordinates in A of `points` given in B, with T = T_AB; (..., 4, 4), (..., 3) -> (..., 3)."""
+    T, points = as_transforms(T, "T"), as_points(points, "points")
+    if T.ndim > 2:
+        fit_together(T=T.shape[:-2], points=points.shape[:-1])
+    return (T[..., :3, :3] @ points[..., None])[..., 0] + T[..., :3, 3]
+
+
+def relative(T_WA, T_WB):
+    """T_AB = T_WA^-1 T_WB: the pose of B seen from A; (..., 4, 4).
+
+    Source: lab sheet, section 1, the formula for K0_T_K1.
+    """
+    T_WA, T_WB = as_transforms(T_WA, "T_WA"), as_transforms(T_WB, "T_WB")
+    fit_together(T_WA=T_WA.shape[:-2], T_WB=T_WB.shape[:-2])
+    return _invert(T_WA) @ T_WB
+
+
+def rotation_block(T, name="T"):
+    """Upper left 3 x 3 block, a rotation or not, of finite matrices; (..., 4, 4) or (..., 3, 3) -> (..., 3, 3)."""
+    T = as_finite(T, name)
+    if T.shape[-2:] not in ((3, 3), (4, 4)):
+        raise ValueError(f"{name} must have shape (..., 4, 4) or (..., 3, 3), got {T.shape}")
+    return T[..., :3, :3]
+
+
+def rotation_angle(T):
+    """Angle of the rotation in T (rad, 0 to pi), accurate at both ends; (..., 4, 4) or (..., 3, 3) -> (...)."""
+    R = rotation_block(T)
+    twice_sin = np.linalg.norm(
+        np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1), axis=-1
+    )
+    return np.arctan2(twice_sin, np.trace(R, axis1=-2, axis2=-1) - 1)
+
+
+def pose_distance(T1, T2):
+    """How far two poses are apart: (angle in rad, distance of the origins in the unit of T), each of shape (...)."""
+    T1, T2 = as_transforms(T1, "T1"), as_transforms(T2, "T2")
+    fit_together(T1=T1.shape[:-2], T2=T2.shape[:-2])
+    distance = np.linalg.norm(T1[..., :3, 3] - T2[..., :3, 3], axis=-1)
+    return rotation_angle(np.swapaxes(T1[..., :3, :3], -1, -2) @ T2[..., :3, :3]), distance
+
+
+def matrix_from_kuka(xyzabc):
+    """Transform of a KUKA pose: rotation Rz(A) Ry(B) Rx(C), translation (x, y, z).
+
+    Parameters
+    ----------
+    xyzabc : array-like, shape (..., 6)
+        x, y, z in a length unit, then A, B, C in **radians**; `kuka_from_degrees` converts what a controller displays.
+
+    Returns
+    -------
+    T : array, shape (..., 4, 4)
+    """
+    xyzabc = as_points(xyzabc, "xyzabc", dim=6)
+    ca, cb, cc = np.moveaxis(np.cos(xyzabc[..., 3:]), -1, 0)
+    sa, sb, sc = np.moveaxis(np.sin(xyzabc[..., 3:]), -1, 0)
+    T = np.zeros((*xyzabc.shape[:-1], 4, 4))
+    T[..., 0, 0], T[..., 0, 1], T[..., 0, 2] = ca * cb, ca * sb * sc - sa * cc, ca * sb * cc + sa * sc
+    T[..., 1, 0], T[..., 1, 1], T[..., 1, 2] = sa * cb, sa * sb * sc + ca * cc, sa * sb * cc - ca * sc
+    T[..., 2, 0], T[..., 2, 1], T[..., 2, 2] = -sb, cb * sc, cb * cc
+    T[..., :3, 3] = xyzabc[..., :3]
+    T[..., 3, 3] = 1.0
+    return T
+
+
+def kuka_from_matrix(T):
+    """KUKA pose x, y, z, A, B, C (rad) of a transform; (..., 4, 4) -> (..., 6).
+
+    B lies in [-pi/2, pi/2], A and C in [-pi, pi]. At B = +-pi/2 only A -+ C is determined; there A comes out of what
+    rounding left, or 0, and C takes the rest, so that `matrix_from_kuka` always returns the same T.
+    """
+    T = as_transforms(T, "T")
+    a = np.arctan2(T[..., 1, 0], T[..., 0, 0])
+    sa, ca = np.sin(a), np.cos(a)
+    b = np.arctan2(-T[..., 2, 0], ca * T[..., 0, 0] + sa * T[..., 1, 0])
+    c = np.arctan2(sa * T[..., 0, 2] - ca * T[..., 1, 2], ca * T[..., 1, 1] - sa * T[..., 0, 1])
+    return np.concatenate([T[..., :3, 3], np.stack([a, b, c], axis=-1)], axis=-1)
+
+
+def kuka_from_degrees(xyzabc_deg):
+    """KUKA poses as a controller displays them (A, B, C in degrees) with the angles turned into radians; (..., 6)."""
+    xyzabc_deg = as_points(xyzabc_deg, "xyzabc_deg", dim=6)
+    return np.concatenate([xyzabc_deg[..., :3], np.deg2rad(xyzabc_deg[..., 3:])], axis=-1)
+
+
+def matrix_from_quaternion(xyzw):
+    """Rotation matrix of a quaternion, scalar last, of any nonzero length; (..., 4) -> (..., 3, 3)."""
+    q = as_points(xyzw, "xyzw", dim=4)
+    if (np.linalg.norm(q, axis=-1) == 0).any():
+        raise ValueError("xyzw must not be the zero quaternion: it is no rotation")
+    q = unit_vector(q)
+    v, w = q[..., :3], q[..., 3, None, None]
+    S = skew(v)
+    return np.eye(3) + 2 * w * S + 2 * S @ S
+
+
+def fit_frame(points_F, points_W):
+    """Frame that fits many points at once, by SVD (Kabsch): minimizes sum |T_WF p_F - p_W|^2.
+
+    Parameters
+    ----------
+    points_F : array-like, shape (..., n, 3)
+        Where the points sit in the frame: the drawing of the part.
+    points_W : array-like, shape (..., n, 3)
+        Where they were measured. n >= 3, not collinear.
+
+    Returns
+    -------
+    T_WF : array, shape (..., 4, 4)
+
+    Raises
+    ------
+    ValueError
+        When fewer than three points come, or they coincide or are collinear (second singular value below 1e-9 of the
+        first).
+
+    Source: Kabsch, Acta Cryst. A32 (1976) 922; with the determinant corrected as in Umeyama, PAMI 13 (1991) 376.
+    """
+    p, q = as_points(points_F, "points_F"), as_points(points_W, "points_W")
+    fit_together(points_F=p.shape, points_W=q.shape)
+    p, q = np.broadcast_arrays(p, q)
+    if p.ndim < 2 or p.shape[-2] < 3:
+        raise ValueError(f"at least 3 points are needed, got {p.shape[-2] if p.ndim > 1 else 1}")
+    p_mean, q_mean = p.mean(-2), q.mean(-2)
+    spread = np.swapaxes(p - p_mean[..., None, :], -1, -2) @ (q - q_mean[..., None, :])
+    values = np.linalg.svd(spread, compute_uv=False)
+    if (values[..., 0] == 0).any():
+        raise ValueError("the points coincide: they have no orientation")
+    if (values[..., 1] <= 1e-9 * values[..., 0]).any():
+        ratio = (values[..., 1] / values[..., 0]).min()
+        raise ValueError(f"the points are collinear: the second singular value is {ratio:.1e} of the first")
+    R = nearest_rotation(np.swapaxes(spread, -1, -2))
+    return pose(R, q_mean - (R @ p_mean[..., None])[..., 0])
+
+
+def gram_schmidt_covariance(x_arm, y_along, y_height, std):
+    """First-order covariance of the rotation vector (in F) of `frame_from_points`.
+
+    Each of the three points carries isotropic noise of standard deviation `std`. With the origin at 0, x_point at
+    (x_arm, 0, 0) and y_point at (y_along, y_height, 0), the error of the frame about its own axes is
+
+        about x: (e_y.z - e_o.z - (y_along / x_arm) (e_x.z - e_o.z)) / y_height
+        about y: -(e_x.z - e_o.z) / x_arm
+        about z: (e_x.y - e_o.y) / x_arm
+
+    Returns
+    -------
+    cov_rot : array, shape (3, 3), rad^2
+
+    Raises ValueError where the triangle is flat.
+    """
+    c, u, h = (as_number(v, n) for v, n in ((x_arm, "x_arm"), (y_along, "y_along"), (y_height, "y_height")))
+    std = as_positive_number(std, "std")
+    if c == 0 or h == 0:
+        raise ValueError(f"x_arm and y_height must not be 0 (a flat triangle gives no frame), got {c:g} and {h:g}")
+    r = u / c
+    J = np.array(  # columns: e_o.y, e_o.z, e_x.y, e_x.z, e_y.z
+        [[0, (r - 1) / h, 0, -r / h, 1 / h], [0, 1 / c, 0, -1 / c, 0], [-1 / c, 0, 1 / c, 0, 0]]
+    )
+    return std**2 * J @ J.T
+
+
+def fit_covariance(points_F, std):
+    """Cramer-Rao bound of the rotation vector (in F) from points with isotropic noise; (n, 3) -> (3, 3), rad^2.
+
+    The information is sum (|d|^2 I - d d') / std^2 over the points d about their mean: the tensor of inertia of the
+    triangle. Raises ValueError for fewer than three points, or collinear ones.
+    """
+    d = as_shape(points_F, "points_F", "n", 3)
+    if len(d) < 3:
+        raise ValueError(f"at least 3 points are needed, got {len(d)}")
+    d = d - d.mean(-2, keepdims=True)
+    std = as_positive_number(std, "std")
+    values = np.linalg.svd(d, compute_uv=False)
+    if values[1] <= 1e-9 * values[0]:
+        raise ValueError("the points are collinear or coincide: the rotation about their line stays free")
+    return std**2 * np.linalg.inv((d * d).sum() * np.eye(3) - d.T @ d)

@@ -1,0 +1,11 @@
+"""Where a mobile robot is.
+
+lateration  from distances to landmarks
+odometry    by dead reckoning (Koppelnavigation)
+ekf         with landmarks, by an extended Kalman filter
+maps        grids, lines, points, graphs; rays through them
+sensors     weightings: what a measurement says about each of many poses
+particles   clouds of poses: motion, weights, resampling, estimates
+mcl         Monte-Carlo localization: the filter itself, with recovery
+drives      routes and drives to simulate
+"""

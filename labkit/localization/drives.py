@@ -1,0 +1,124 @@
+"""Drives to simulate: routes on a topological map, robots that follow them, and what their odometry reports."""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..checks import as_count, as_points, as_positive_number, as_shape
+from ..geometry.planar import wrap_angle
+from . import odometry
+from .particles import CONTROL_NOISE
+
+# --- simulated drives ------------------------------------------------------------------------------------------------
+
+
+def find_route(edges, start, goal):
+    """Shortest list of node names from start to goal along the edges of a topological map (breadth first)."""
+    if not all(isinstance(edge, (tuple, list)) and len(edge) == 2 for edge in edges):
+        raise ValueError("edges must be pairs of names")
+    before, queue = {start: None}, deque([start])
+    while queue and goal not in before:
+        here = queue.popleft()
+        for a, b in edges:
+            for one, other in ((a, b), (b, a)):
+                if one == here and other not in before:
+                    before[other] = here
+                    queue.append(other)
+    if goal not in before:
+        raise ValueError(f"edges must connect {start!r} with {goal!r}, but no chain of edges does")
+    route = [goal]
+    while before[route[-1]] is not None:
+        route.append(before[route[-1]])
+    return route[::-1]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A simulated drive: true poses (n + 1, 3), the controls that odometry reports (n, 2), and the time step (s)."""
+
+    truth: np.ndarray
+    controls: np.ndarray
+    dt: float
+
+
+def follow(start, waypoints, n_steps, dt, speed=0.6, turn_rate=0.8):
+    """Controls (n_steps, 2) of a robot that turns toward each waypoint and drives there; it stands still at the end."""
+    (x, y, theta), n_steps = as_shape(start, "start", 3), as_count(n_steps, "n_steps", at_least=0)
+    named = ((dt, "dt"), (speed, "speed"), (turn_rate, "turn_rate"))
+    dt, speed, turn_rate = (as_positive_number(value, name) for value, name in named)
+    controls = []
+    for goal_x, goal_y in as_points(waypoints, "waypoints", dim=2).reshape(-1, 2).tolist():
+        if len(controls) >= n_steps:
+            break
+        way, heading = math.hypot(goal_x - x, goal_y - y), math.atan2(goal_y - y, goal_x - x)
+        turn = float(wrap_angle(heading - theta))
+        for amount, rate, unit in ((turn, turn_rate, (0, 1)), (way, speed, (1, 0))):
+            n = math.ceil(abs(amount) / (rate * dt) - 1e-9)
+            if n:
+                controls += [(amount / (n * dt) * unit[0], amount / (n * dt) * unit[1])] * min(n, n_steps)
+        x, y, theta = goal_x, goal_y, heading
+    controls = (controls + [(0.0, 0.0)] * n_steps)[:n_steps]
+    return np.array(controls).reshape(-1, 2)
+
+
+def random_drive(building, n_steps, rng, dt=0.5, start=None):
+    """A `Drive` from room to room of a building, in a random order; odometry reports it with the lecture's noise.
+
+    start: name of the first node, random when not given.
+    """
+    rooms = [name for name in building.nodes if not name.startswith(("door", "corridor"))]
+    here = start or rooms[rng.integers(len(rooms))]
+    xy = np.array(building.nodes[here])
+    pose = np.array([*xy, rng.uniform(-np.pi, np.pi)])
+    waypoints = []
+    while len(waypoints) < 2 * n_steps * dt:  # more than can be reached
+        goal = rooms[rng.integers(len(rooms))]
+        if goal != here:
+            waypoints += [building.nodes[name] for name in find_route(building.edges, here, goal)[1:]]
+            here = goal
+    controls = follow(pose, waypoints, n_steps, dt)
+    truth = odometry.drive(pose, controls, dt)
+    return Drive(truth, odometry.noisy_controls(controls, dt, **CONTROL_NOISE, rng=rng, runs=1)[:, 0], dt)
+
+
+class Wanderer:
+    """A robot that goes on from place to place of a topological map, from wherever it is put.
+
+    control(pose, dt): the control for the next step; it turns toward the place it is heading for, then drives there.
+    """
+
+    def __init__(self, building, rng):
+        self.building, self.rng, self.at, self.goal = building, rng, None, None
+
+    def start_over(self):
+        """Forget where it was heading: it has been carried away."""
+        self.at = self.goal = None
+
+    def control(self, pose, dt, speed=0.6, turn_rate=0.8):
+        """v and omega, shape (2,)."""
+        if self.goal is None:
+            self.goal = self._in_sight(pose)
+        if self.goal is None:
+            return np.array([0.0, turn_rate / 2])
+        way = np.subtract(self.building.nodes[self.goal], pose[:2])
+        if np.hypot(*way) < 0.02:
+            self.at, self.goal = self.goal, self._next()
+            way = np.subtract(self.building.nodes[self.goal], pose[:2])
+        turn = float(wrap_angle(np.arctan2(way[1], way[0]) - pose[2]))
+        if abs(turn) > 0.02:
+            return np.array([0.0, np.clip(turn / dt, -turn_rate, turn_rate)])
+        return np.array([min(speed, np.hypot(*way) / dt), 0.0])
+
+    def _next(self):
+        neighbors = [b if a == self.goal else a for a, b in self.building.edges if self.goal in (a, b)]
+        onward = [name for name in neighbors if name != self.at] or neighbors
+        return onward[self.rng.integers(len(onward))]
+
+    def _in_sight(self, pose):
+        names = list(self.building.nodes)
+        ways = np.array([self.building.nodes[name] for name in names]) - pose[:2]
+        distance, direction = np.hypot(*ways.T), np.arctan2(ways[:, 1], ways[:, 0])
+        free = self.building.grid.cast((*pose[:2], 0.0), direction, 30.0) > distance
+        return names[int(np.argmin(np.where(free, distance, np.inf)))] if free.any() else None

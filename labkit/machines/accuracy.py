@@ -1,0 +1,194 @@
+"""How well a tracker follows a motion: errors by sample, time offset, a filter for its positions.
+
+Source: report "Kalibrace a testovani systemu OTUS tracker", ZCU Plzen 2018, section 3.2.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from ..checks import as_finite, as_number, as_points, as_positive_number, as_shape, as_transforms
+from ..geometry.frames import pose, pose_distance
+from ..geometry.lie import log_so3
+
+# ---- accuracy in motion ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class TrackingErrors:
+    """Errors sample by sample, each of shape (k,): translation mm, rotation rad, speed mm/s, angular_speed rad/s."""
+
+    translation: np.ndarray
+    rotation: np.ndarray
+    speed: np.ndarray
+    angular_speed: np.ndarray
+
+
+def _refuse_clock(time):
+    if (np.diff(time) <= 0).any():
+        raise ValueError(f"time must increase, but does not after sample {int(np.argmax(np.diff(time) <= 0))}")
+
+
+def speeds(time, T):
+    """Speed (mm/s) and angular speed (rad/s) of a sampled motion by central differences; (k,), (k, 4, 4) -> (k,), (k,).
+
+    Neither depends on the frame the poses are given in, as long as it rests; the angular speed not even on where the
+    frame sits on the body.
+    """
+    time, T = as_finite(time, "time"), as_transforms(T, "T")
+    if T.ndim != 3 or len(T) < 3 or time.shape != T.shape[:1]:
+        raise ValueError(f"time and T must have shapes (k,) and (k, 4, 4) with k >= 3, got {time.shape} and {T.shape}")
+    _refuse_clock(time)
+    before, after = np.r_[0, : len(T) - 1], np.r_[1 : len(T), len(T) - 1]
+    span = time[after] - time[before]
+    turn = np.linalg.norm(log_so3(np.swapaxes(T[before, :3, :3], -1, -2) @ T[after, :3, :3]), axis=1)
+    return np.linalg.norm(T[after, :3, 3] - T[before, :3, 3], axis=1) / span, turn / span
+
+
+def tracking_errors(time, T_true, T_read, velocities=None):
+    """Errors of readings against a reference motion of the same frame, at the same times.
+
+    Parameters
+    ----------
+    time : array-like, shape (k,), s
+    T_true, T_read : array-like, shape (k, 4, 4)
+        The tracker's frame as the robot carries it and as the tracker reports it, both in the same frame.
+    velocities : pair of arrays, optional
+        The speeds (mm/s) and angular speeds (rad/s) the tracker reports; without them they come from differences of its
+        poses.
+
+    Returns
+    -------
+    TrackingErrors
+
+    Source: report, section 3.2, figures 10 to 17.
+    """
+    (v, w), (rotation, translation) = speeds(time, T_true), pose_distance(T_true, T_read)
+    if velocities is None:
+        v_read, w_read = speeds(time, T_read)
+    else:
+        v_read, w_read = as_shape(velocities, "velocities", 2, len(v))
+    return TrackingErrors(translation, rotation, np.abs(v_read - v), np.abs(w_read - w))
+
+
+def summarize(errors):
+    """Mean, RMS, median, 95 % quantile and maximum of errors, as a dictionary."""
+    errors = as_finite(errors, "errors")
+    if not errors.size:
+        raise ValueError("errors must hold at least one number, got none")
+    return {
+        "mean": float(errors.mean()),
+        "RMS": float(np.sqrt((errors**2).mean())),
+        "median": float(np.median(errors)),
+        "95 %": float(np.quantile(errors, 0.95)),
+        "max": float(errors.max()),
+    }
+
+
+def time_offset(time, reference, delayed, max_offset=0.2):
+    """How much later a signal comes than its reference (s): best match of two speed curves, to a fraction of a sample.
+
+    Parameters
+    ----------
+    time : array-like, shape (k,), s, evenly spaced
+    reference, delayed : array-like, shape (k,)
+        Angular speeds (their norms need no calibration), the robot's and the tracker's.
+    max_offset : float, s
+        Offsets up to this size are tried, in both directions.
+
+    Returns
+    -------
+    offset : float
+        Positive when `delayed` lags. The mean squared difference over the common part is minimized; a parabola through
+        the best three gives the fraction.
+    """
+    time, reference, delayed = as_finite(time, "time"), as_finite(reference, "reference"), as_finite(delayed, "delayed")
+    if time.ndim != 1 or not time.shape == reference.shape == delayed.shape:
+        raise ValueError(
+            f"time, reference and delayed must have the same length, got {time.shape}, {reference.shape}, "
+            f"{delayed.shape}"
+        )
+    if len(time) < 3:
+        raise ValueError(f"at least 3 samples are needed, got {len(time)}")
+    step = (time[-1] - time[0]) / (len(time) - 1)
+    if not step > 0 or np.abs(np.diff(time) - step).max() > 0.01 * step:
+        raise ValueError("time must increase by even steps, within 1 %")
+    max_offset = as_positive_number(max_offset, "max_offset")
+    most = int(round(min(max_offset / step, len(time))))
+    if most < 1 or len(time) < 3 * most:
+        raise ValueError(f"max_offset of {max_offset:g} s needs at least {3 * max(most, 1)} samples, got {len(time)}")
+    core = reference[most:-most]
+    costs = np.array([((delayed[most + s : len(time) - most + s] - core) ** 2).mean() for s in range(-most, most + 1)])
+    best = int(np.clip(np.argmin(costs), 1, 2 * most - 1))
+    left, middle, right = costs[best - 1 : best + 2]
+    curvature = left - 2 * middle + right
+    fraction = 0.5 * (left - right) / curvature if curvature > 0 else 0.0
+    return float((best - most + np.clip(fraction, -1, 1)) * step)
+
+
+def shift_time(time, T, offset):
+    """Poses as they were `offset` seconds later: positions linear, rotations along the shortest arc; ends are held. (k,
+    4, 4)."""
+    time, T, offset = as_finite(time, "time"), as_transforms(T, "T"), as_number(offset, "offset")
+    if T.ndim != 3 or len(T) < 2 or time.shape != T.shape[:1]:
+        raise ValueError(f"time and T must have shapes (k,) and (k, 4, 4) with k >= 2, got {time.shape} and {T.shape}")
+    _refuse_clock(time)
+    when = np.clip(time + offset, time[0], time[-1])
+    k = np.clip(np.searchsorted(time, when, side="right") - 1, 0, len(time) - 2)
+    s = ((when - time[k]) / (time[k + 1] - time[k]))[:, None]
+    return pose(
+        Slerp(time, Rotation.from_matrix(T[:, :3, :3]))(when).as_matrix(), (1 - s) * T[k, :3, 3] + s * T[k + 1, :3, 3]
+    )
+
+
+def filter_positions(time, positions, std_position=3.0, std_acceleration=4000.0, gate=16.27):
+    """Gate, then a Kalman filter with constant velocity: what the report's conclusion asks for, and the bridge to
+    chapter 8.
+
+    Parameters
+    ----------
+    time : array-like, shape (k,), s
+    positions : array-like, shape (k, 3), mm
+    std_position : float, mm
+        Standard deviation of a good reading, per axis.
+    std_acceleration : float, mm/s^2
+        What the hand or robot may do to the velocity.
+    gate : float
+        A reading whose squared normalized innovation exceeds this is not used; 16.27 lets 99.9 % of good ones pass
+        (chi-square, 3 degrees of freedom).
+
+    Returns
+    -------
+    filtered : array, shape (k, 3), mm
+    used : bool array, shape (k,)
+    """
+    time, positions = as_finite(time, "time"), as_points(positions, "positions")
+    if positions.ndim != 2 or time.shape != positions.shape[:1]:
+        raise ValueError(f"time and positions must have shapes (k,) and (k, 3), got {time.shape} and {positions.shape}")
+    _refuse_clock(time)
+    gate = as_positive_number(gate, "gate")
+    if not len(time):
+        raise ValueError("time and positions must hold at least one reading, got none")
+    noise, drive = (
+        as_positive_number(std_position, "std_position") ** 2,
+        as_positive_number(std_acceleration, "std_acceleration") ** 2,
+    )
+    x, v = np.median(positions[:5], axis=0), np.zeros(3)
+    pp, pv, vv = noise, 0.0, 1e6  # one covariance for all three axes: position, cross, velocity
+    filtered, used = np.empty_like(positions), np.zeros(len(time), bool)
+    last = time[0]
+    for k, z in enumerate(positions):
+        dt, last = time[k] - last, time[k]
+        x = x + dt * v
+        pp += 2 * dt * pv + dt * dt * vv + 0.25 * dt**4 * drive
+        pv += dt * vv + 0.5 * dt**3 * drive
+        vv += dt * dt * drive
+        innovation, s = z - x, pp + noise
+        if innovation @ innovation <= gate * s:
+            gain_x, gain_v = pp / s, pv / s
+            x, v = x + gain_x * innovation, v + gain_v * innovation
+            pp, pv, vv = (1 - gain_x) * pp, (1 - gain_x) * pv, vv - gain_v * pv
+            used[k] = True
+        filtered[k] = x
+    return filtered, used

@@ -1,1 +1,0 @@
-"""Figures one can touch; all interaction goes through `Stage`."""

@@ -1,0 +1,361 @@
+"""Hand-eye calibration on a sphere against SciPy, finite differences, Monte Carlo and the thesis's own numbers."""
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from labkit.calibration import hand_eye
+from labkit.calibration.literature import compare_methods, field_problem, kim_linear, kim_matrix, li_two_step
+from labkit.documents.thesis import printed as thesis
+from labkit.documents.thesis.listings import listing_cost, listing_gauss_newton
+from labkit.estimation.differences import numeric_jacobian
+from labkit.geometry import frames
+from labkit.geometry.lie import exp_so3
+
+T_FS0 = frames.pose(exp_so3([0.3, -0.5, 1.1]), np.array([30.0, -20.0, 120.0]))
+TARGET0 = np.array([700.0, 80.0, -150.0])
+
+
+def scene(n=31, std=0.1, seed=0, turn=1.0, reach=200.0):
+    """Random poses, and the sphere as the scanner sees it."""
+    rng = np.random.default_rng(seed)
+    axis = rng.normal(size=(n, 3))
+    angle = turn * rng.uniform(0.1, 1, (n, 1))
+    R = exp_so3(angle * axis / np.linalg.norm(axis, axis=1, keepdims=True))
+    T_BF = frames.pose(R, rng.uniform(-reach, reach, (n, 3)))
+    x_S = frames.transform(frames.invert(T_FS0), frames.transform(frames.invert(T_BF), TARGET0))
+    return T_BF, x_S + std * rng.normal(size=x_S.shape)
+
+
+def scipy_fit(T_BF, x_S, T_FS, target, free=True):
+    def at(d):
+        T = T_FS.copy()
+        T[:3, :3] = T[:3, :3] @ exp_so3(d[:3])
+        T[:3, 3] = T[:3, 3] + d[3:6]
+        return T, target + d[6:] if free else target
+
+    fit = least_squares(
+        lambda d: hand_eye.sphere_residuals(T_BF, x_S, *at(d)).ravel(),
+        np.zeros(9 if free else 6),
+        x_scale=[1e-3] * 3 + [1.0] * (6 if free else 3),
+        xtol=1e-15,
+        ftol=1e-15,
+        gtol=1e-15,
+    )
+    return *at(fit.x), fit
+
+
+# --- the estimate ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("n", [5, 31])
+def test_noise_free_data_give_the_exact_pose(n):
+    fit = hand_eye.calibrate_sphere_target(*scene(n, std=0))
+    np.testing.assert_allclose(fit.T_FS, T_FS0, atol=1e-9)
+    np.testing.assert_allclose(fit.target, TARGET0, atol=1e-8)
+    assert fit.rms < 1e-8
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_estimate_and_covariance_are_those_of_scipy(seed):
+    T_BF, x_S = scene(seed=seed, std=0.5)
+    fit = hand_eye.calibrate_sphere_target(T_BF, x_S)
+    T_FS, target, want = scipy_fit(T_BF, x_S, T_FS0, TARGET0)
+    np.testing.assert_allclose(fit.T_FS, T_FS, atol=2e-6)
+    np.testing.assert_allclose(fit.target, target, atol=2e-5)
+    assert (fit.residuals**2).sum() <= 2 * want.cost * (1 + 1e-12)
+    T0, _, at_end = scipy_fit(T_BF, x_S, fit.T_FS, fit.target)
+    cov = 2 * want.cost / (93 - 9) * np.linalg.inv(at_end.jac.T @ at_end.jac)
+    np.testing.assert_allclose(
+        fit.covariance, cov, rtol=1e-3, atol=1e-4 * np.sqrt(np.outer(np.diag(cov), np.diag(cov))).max()
+    )
+
+
+def test_known_target_is_one_fit_of_two_point_sets():
+    T_BF, x_S = scene(std=0.5)
+    fit = hand_eye.calibrate_sphere_target(T_BF, x_S, target=TARGET0)
+    kabsch = frames.fit_frame(x_S, frames.transform(frames.invert(T_BF), TARGET0))
+    np.testing.assert_allclose(fit.T_FS, kabsch, atol=1e-9)
+    assert fit.covariance.shape == (6, 6)
+    np.testing.assert_allclose(fit.T_FS, scipy_fit(T_BF, x_S, T_FS0, TARGET0, free=False)[0], atol=1e-5)
+
+
+def test_error_reaches_the_bound():
+    errors, bounds = [], []
+    for seed in range(150):
+        fit = hand_eye.calibrate_sphere_target(*scene(seed=seed))
+        T_BF, _ = scene(seed=seed, std=0)
+        cov = hand_eye.predicted_covariance(T_BF, T_FS0, TARGET0, 0.1)
+        errors.append(
+            (frames.rotation_angle(fit.T_FS[:3, :3].T @ T_FS0[:3, :3]), np.linalg.norm(fit.T_FS[:3, 3] - T_FS0[:3, 3]))
+        )
+        bounds.append((np.sqrt(np.trace(cov[:3, :3])), np.sqrt(np.trace(cov[3:6, 3:6]))))
+    ratio = np.sqrt(np.mean(np.square(errors), 0) / np.mean(np.square(bounds), 0))
+    assert (ratio < 1.08).all()  # 150 draws scatter by 4 percent
+
+
+def test_flat_data_need_no_linear_start():
+    """All spheres in one plane of the scanner: the 15 linear unknowns are not determined, the 9 of the problem are."""
+    rng = np.random.default_rng(5)
+    x_S = np.column_stack([rng.uniform(-20, 20, 12), rng.uniform(-15, 15, 12), np.full(12, 240.0)])
+    R = exp_so3(rng.uniform(-1, 1, (12, 3)))
+    T_BF = frames.pose(R, TARGET0 - (R @ frames.transform(T_FS0, x_S)[..., None])[..., 0])
+    with pytest.raises(ValueError, match="rank 15"):
+        hand_eye.linear_start(T_BF, x_S)
+    np.testing.assert_allclose(hand_eye.calibrate_sphere_target(T_BF, x_S).T_FS, T_FS0, atol=1e-7)
+
+
+def test_linear_start_is_exact_without_noise():
+    T_FS, target = hand_eye.linear_start(*scene(std=0))
+    np.testing.assert_allclose(T_FS, T_FS0, atol=1e-9)
+    np.testing.assert_allclose(target, TARGET0, atol=1e-8)
+
+
+def test_robust_fit_survives_a_third_of_bad_poses_and_costs_little_without():
+    T_BF, x_S = scene(seed=3)
+    bad = np.arange(0, 30, 3)
+    clean = hand_eye.calibrate_sphere_target(np.delete(T_BF, bad, 0), np.delete(x_S, bad, 0))
+    x_S[bad] += np.random.default_rng(1).normal(size=(10, 3)) * 100
+    fit = hand_eye.calibrate_sphere_target(T_BF, x_S, robust=True)
+    assert (fit.weights[bad] == 0).all()
+    assert np.linalg.norm(fit.T_FS[:3, 3] - clean.T_FS[:3, 3]) < 0.05
+    assert fit.std == pytest.approx(0.1, rel=0.3)
+    again = hand_eye.calibrate_sphere_target(T_BF, x_S, robust=True)
+    np.testing.assert_array_equal(fit.T_FS, again.T_FS)
+
+
+def test_robust_fit_of_noise_free_data_keeps_all():
+    fit = hand_eye.calibrate_sphere_target(*scene(std=0), robust=True)
+    np.testing.assert_array_equal(fit.weights, 1.0)
+
+
+# --- refusals --------------------------------------------------------------------------------------------------------
+
+
+def test_pure_translation_is_refused():
+    T_BF, x_S = scene(8, turn=0)
+    with pytest.raises(ValueError, match="only translate.*two different axes"):
+        hand_eye.calibrate_sphere_target(T_BF, x_S)
+
+
+@pytest.mark.parametrize("axis", [(0, 0, 1), (0.6, 0, 0.8)])
+def test_turns_about_one_axis_are_refused_with_the_axis(axis):
+    rng = np.random.default_rng(0)
+    T_BF = frames.pose(exp_so3(rng.uniform(-1, 1, (8, 1)) * np.array(axis)), rng.uniform(-200, 200, (8, 3)))
+    x_S = frames.transform(frames.invert(T_FS0), frames.transform(frames.invert(T_BF), TARGET0))
+    with pytest.raises(ValueError, match=rf"one axis, \({axis[0]:.3f}, {axis[1]:.3f}, {axis[2]:.3f}\)"):
+        hand_eye.calibrate_sphere_target(T_BF, x_S)
+
+
+@pytest.mark.parametrize("spread, where", [((0, 0, 0), "at one place"), ((0, 0, 30), "on one line")])
+def test_sphere_that_does_not_move_in_the_field_is_refused(spread, where):
+    rng = np.random.default_rng(0)
+    R = exp_so3(rng.uniform(-1, 1, (9, 3)))
+    x_S = np.array([3.0, 5.0, 240.0]) + rng.normal(size=(9, 1)) * np.array(spread)
+    T_BF = frames.pose(R, TARGET0 - (R @ frames.transform(T_FS0, x_S)[..., None])[..., 0])
+    with pytest.raises(ValueError, match=where):
+        hand_eye.calibrate_sphere_target(T_BF, x_S)
+
+
+def test_shapes_and_numbers_are_checked():
+    T_BF, x_S = scene(6)
+    with pytest.raises(ValueError, match=r"\(N, 4, 4\) and \(N, 3\), got"):
+        hand_eye.calibrate_sphere_target(T_BF, x_S[:5])
+    with pytest.raises(ValueError, match="at least 4 poses"):
+        hand_eye.calibrate_sphere_target(T_BF[:3], x_S[:3])
+    with pytest.raises(ValueError, match="finite"):
+        hand_eye.calibrate_sphere_target(T_BF, np.where(x_S > 0, np.nan, x_S))
+
+
+# --- derivatives -----------------------------------------------------------------------------------------------------
+
+
+def test_jacobians_against_central_differences():
+    T_BF, x_S = scene(7)
+    p2, p3, x_P = (
+        np.array([30.0, -20, 120, 0.4, -0.9, 1.3]),
+        np.array([1.0, 2, 3, 0.1, 0.2, -0.3]),
+        np.array([98.0, 99, 181]),
+    )
+    want = numeric_jacobian(lambda q: hand_eye.kuka_residuals(q, T_BF, x_S, TARGET0), p2, 1e-5, "central")
+    np.testing.assert_allclose(hand_eye.kuka_jacobian(p2, T_BF, x_S), want, atol=1e-5)
+
+    def both(q):
+        target = frames.transform(frames.matrix_from_kuka(q[6:]), x_P)
+        return hand_eye.kuka_residuals(q[:6], T_BF, x_S, target)
+
+    want = numeric_jacobian(both, np.append(p2, p3), 1e-5, "central")
+    J = hand_eye.plate_jacobian(T_BF, x_S, p2, p3, x_P)
+    np.testing.assert_allclose(J, want, atol=1e-5)
+    assert np.linalg.matrix_rank(J, tol=1e-6) == 9
+
+
+def test_rate_matrix_gives_the_angular_velocity_and_loses_rank_at_90_deg():
+    abc, rate, h = np.array([0.4, -1.1, 2.0]), np.array([0.3, -0.7, 0.2]), 1e-6
+    R = [frames.matrix_from_kuka(np.append(np.zeros(3), abc + s * h * rate))[:3, :3] for s in (-1, 1)]
+    W = (R[1] - R[0]) / (2 * h) @ ((R[0] + R[1]) / 2).T
+    np.testing.assert_allclose([W[2, 1], W[0, 2], W[1, 0]], hand_eye.rate_matrix(*abc[:2]) @ rate, atol=1e-8)
+    assert np.linalg.det(hand_eye.rate_matrix(0.4, -1.1)) == pytest.approx(-np.cos(-1.1))
+    assert np.linalg.cond(hand_eye.rate_matrix(0.0, np.deg2rad(-89.9))) == pytest.approx(1146, rel=1e-3)
+
+
+def test_numeric_jacobian_orders():
+    errors = {}
+    for scheme in ("forward", "central"):
+        errors[scheme] = [abs(numeric_jacobian(np.sin, [1.0], h, scheme)[0, 0] - np.cos(1.0)) for h in (1e-2, 1e-3)]
+    assert errors["forward"][0] / errors["forward"][1] == pytest.approx(10, rel=0.02)
+    assert errors["central"][0] / errors["central"][1] == pytest.approx(100, rel=0.02)
+    with pytest.raises(ValueError, match="'forward' or 'central'"):
+        numeric_jacobian(np.sin, [1.0], 1e-3, "backward")
+
+
+# --- the thesis's iteration ------------------------------------------------------------------------------------------
+
+
+def test_the_code_squares_the_sum():
+    e = np.array([[1.0, 2, 0], [-1, 2, 0]])
+    np.testing.assert_allclose(listing_cost(e), [0.0, 4.0, 0.0])
+
+
+@pytest.mark.parametrize("parameters", ["euler", "se3"])
+def test_plain_gauss_newton_ends_at_the_estimate(parameters):
+    T_BF, x_S = scene(std=0.2)
+    start = frames.kuka_from_matrix(T_FS0) + [5, -5, 5, 0.1, -0.1, 0.1]
+    poses, rms, values, converged = hand_eye.gauss_newton_pose(start, T_BF, x_S, parameters=parameters)
+    fit = hand_eye.calibrate_sphere_target(T_BF, x_S)
+    assert converged
+    np.testing.assert_allclose(poses[-1], fit.T_FS, atol=1e-7)
+    assert rms[-1] == pytest.approx(fit.rms)
+    assert len(poses) == len(rms) == len(values)
+
+
+def test_iteration_counts_of_table_7_3():
+    T_BF, x_S, target, _ = thesis.simulation()
+    counts = [len(listing_gauss_newton(p, T_BF, x_S, target)[0]) - 1 for p in thesis.start_poses_deg()[0]]
+    assert counts == [1] + 9 * [4]
+
+
+# --- literature ------------------------------------------------------------------------------------------------------
+
+
+def cube_scene(seed=0, std=0.0, n=10):
+    rng = np.random.default_rng(seed)
+    T_BF, _ = scene(n, seed=seed)
+    corners = 40.0 * (np.indices((2, 2, 2)).reshape(3, 8).T - 0.5)
+    points_S = frames.transform(frames.invert(T_BF @ T_FS0)[:, None], corners + TARGET0)
+    return T_BF, points_S + std * rng.normal(size=points_S.shape), corners
+
+
+def test_kim_solves_the_cube_and_refuses_the_sphere():
+    T_BF, points_S, corners = cube_scene()
+    np.testing.assert_allclose(kim_linear(T_BF, points_S, corners), T_FS0, atol=1e-7)
+    with pytest.raises(ValueError, match="rank 1, not 4"):
+        kim_linear(T_BF, points_S[:, :1], corners[:1])
+
+
+def test_kim_matrix_is_the_printed_one():
+    rng = np.random.default_rng(0)
+    A, B, X = (np.vstack([rng.normal(size=(3, 4)), [0, 0, 0, 1]]) for _ in range(3))
+    D, F = kim_matrix(A, B)
+    np.testing.assert_allclose(D @ X[:3].ravel() - F, (A @ X - X @ B)[:3].ravel(), atol=1e-12)
+    np.testing.assert_allclose(
+        D[0, :6], [A[0, 0] - B[0, 0], -B[1, 0], -B[2, 0], -B[3, 0], A[0, 1], 0]
+    )  # first row of appendix A
+
+
+def test_li_two_steps_and_their_missing_motion():
+    T_BF, _ = scene(6)
+    shifted = T_BF[:1] @ frames.pose(np.tile(np.eye(3), (3, 1, 1)), 60.0 * np.eye(3))
+    T_BF = np.concatenate([T_BF, shifted])
+    x_S = frames.transform(frames.invert(T_FS0), frames.transform(frames.invert(T_BF), TARGET0))
+    T_FS, target = li_two_step(T_BF, x_S)
+    np.testing.assert_allclose(T_FS, T_FS0, atol=1e-9)
+    np.testing.assert_allclose(target, TARGET0, atol=1e-8)
+    measured = thesis.measurements(True)
+    with pytest.raises(ValueError, match="no two poses have the same orientation"):
+        li_two_step(measured.T_BF, measured.x_S)
+
+
+# --- the measured data -----------------------------------------------------------------------------------------------
+
+
+def test_corrections_change_one_entry_each_and_bring_the_fit_below_the_goal():
+    printed, corrected = thesis.measurements(), thesis.measurements(True)
+    changed = (printed.kuka_deg != corrected.kuka_deg).sum(1) + (printed.x_S != corrected.x_S).sum(1)
+    assert changed.max() == 1 and changed.sum() == 7
+    entries = thesis.printed_entries()
+    for row in thesis.corrections():
+        assert entries[row["table"], row["pose"], row["column"]] == row["printed"]
+    fit = hand_eye.calibrate_sphere_target(corrected.T_BF, corrected.x_S)
+    assert fit.rms == pytest.approx(0.5722, abs=1e-3)
+    six = thesis.measurements((2, 3, 4, 7, 21, 30))
+    assert hand_eye.calibrate_sphere_target(six.T_BF, six.x_S).rms < 0.78
+
+
+def test_leave_one_out_is_a_real_refit():
+    measured = thesis.measurements(True)
+    left = hand_eye.leave_one_out(measured.T_BF, measured.x_S)
+    keep = np.arange(31) != 4
+    T_FS, target, _ = scipy_fit(
+        measured.T_BF[keep], measured.x_S[keep], thesis.frame("scanner_end"), np.array([1528.0, -601, 1121])
+    )
+    np.testing.assert_allclose(
+        left[4], hand_eye.sphere_residuals(measured.T_BF[4], measured.x_S[4], T_FS, target), atol=1e-3
+    )
+    assert np.sqrt((left**2).sum(1).mean()) == pytest.approx(0.625, abs=2e-3)
+
+
+def test_radius_as_a_tenth_unknown_against_scipy():
+    measured = thesis.measurements(True)
+    fit = hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S)
+
+    def residuals(d):
+        T = fit.T_FS.copy()
+        T[:3, :3], T[:3, 3] = T[:3, :3] @ exp_so3(d[:3]), T[:3, 3] + d[3:6]
+        return hand_eye.sphere_residuals(
+            measured.T_BF, thesis.centers_with_radius(measured.x_S, d[9]), T, fit.target + d[6:9]
+        ).ravel()
+
+    want = least_squares(residuals, [0] * 9 + [30.0], x_scale=[1e-3] * 3 + [1] * 6 + [0.1], xtol=1e-13)
+    radius, std = hand_eye.fit_radius(measured.T_BF, measured.x_S)
+    assert radius == pytest.approx(want.x[9], abs=1e-4)
+    cov = 2 * want.cost / 83 * np.linalg.inv(want.jac.T @ want.jac)
+    assert std == pytest.approx(np.sqrt(cov[9, 9]), rel=0.02)
+
+
+def test_simulation_inputs_give_the_printed_coordinates():
+    _, exact, _, _ = thesis.simulation()
+    _, printed, _, _ = thesis.simulation(exact=False)
+    assert np.abs(exact - printed).max() < 0.01
+    _, _, target, scanner = thesis.simulation(printed=True)
+    T_FS = frames.matrix_from_kuka(frames.kuka_from_degrees(scanner))
+    T_BF, x_S, _, _ = thesis.simulation(printed=True)
+    assert hand_eye.rms_distance(hand_eye.sphere_residuals(T_BF, x_S, T_FS, target)) > 10
+
+
+def test_poses_that_see_put_the_sphere_where_asked():
+    rng = np.random.default_rng(0)
+    x_S = rng.uniform(-20, 20, (5, 3)) + [0, 0, 240]
+    T_BF = hand_eye.poses_that_see(T_FS0, TARGET0, exp_so3(rng.uniform(-1, 1, (5, 3))), x_S)
+    seen = frames.transform(frames.invert(T_FS0), frames.transform(frames.invert(T_BF), TARGET0))
+    np.testing.assert_allclose(seen, x_S, atol=1e-9)
+
+
+def test_pattern_stays_in_the_field_and_within_the_tilt():
+    T_BF = hand_eye.pattern(T_FS0, TARGET0, 0.6, (25, 25, 50))
+    seen = frames.transform(frames.invert(T_FS0), frames.transform(frames.invert(T_BF), TARGET0))
+    assert field_problem(seen) is None
+    down = T_BF[:, :3, :3] @ T_FS0[:3, 2]
+    assert np.arccos(-down[:, 2]).max() <= 0.6 + 1e-9
+    assert "outside 190 to 290" in field_problem(seen + [0, 0, 200])
+
+
+def test_methods_of_the_literature_do_not_beat_the_bound():
+    errors, bound = compare_methods(25, 0.1, np.random.default_rng(4))
+    assert errors["joint fit (sphere)"] < 1.35 * bound
+    assert errors["Li et al. (sphere)"] > errors["joint fit (sphere)"]
+
+
+def test_the_tukey_weights_fall_smoothly_to_zero_at_the_cut():
+    lengths = np.array([0.0, 1.0, 5.0, 10.0, 11.0, 1e9])
+    np.testing.assert_allclose(hand_eye.tukey_weights(lengths, 2.0), [1, 0.99**2, 0.75**2, 0, 0, 0])

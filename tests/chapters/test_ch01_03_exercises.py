@@ -1,0 +1,164 @@
+"""Answers to chapters 2 and 3 that were once judged wrongly or told too little, and the last hints of their values."""
+
+import re
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.optimize
+from numpy.linalg import lstsq
+
+from labkit.calibration import pivot
+from labkit.chapters.ch02_chaining import exercises
+from labkit.chapters.ch03_quirlen import exercises as ch03_exercises
+from labkit.documents.lab_sheet import printed as lab_sheet
+from labkit.exercises import source
+from labkit.exercises.engine import CORRECT, NOT_YET, Exercise, Value
+from labkit.geometry import chaining
+from labkit.geometry.frames import relative
+from labkit.geometry.lie import exp_se3, log_se3
+
+CHAPTERS = (exercises.CHAPTER, ch03_exercises.CHAPTER)
+ITEMS = {item.id: item for chapter in CHAPTERS for item in chapter.items}
+EXERCISES = [name for name, item in ITEMS.items() if isinstance(item, Exercise)]
+VALUES = [name for name, item in ITEMS.items() if isinstance(item, Value)]
+KNOWN = {  # what the notebooks have imported
+    "np": np, "chaining": chaining, "pivot": pivot, "relative": relative, "exp_se3": exp_se3, "log_se3": log_se3,
+}  # fmt: skip
+
+
+def judged(name, answer, seed=0):
+    return ITEMS[name].judge(answer, rng=np.random.default_rng(seed))
+
+
+def parameters(name):
+    """The argument names of an exercise as its notebook has them."""
+    for chapter in CHAPTERS:
+        found = re.search(rf"def {name}\((.*)\):", source.find(chapter.notebook[:2]).read_text(encoding="utf-8"))
+        if found:
+            return found[1].split(", ")
+    raise AssertionError(name)
+
+
+def typed(name):
+    """The last hint as a student types it: the code between its backticks."""
+    hint = ITEMS[name].hints[-1]
+    assert hint[0] == hint[-1] == "`" and hint.count("`") == 2, hint
+    return hint.strip("`")
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_the_last_hint_is_the_value(name):
+    """With the names that the notebook has by then."""
+    poses, product = lab_sheet.kreisel_poses(), chaining.chain(lab_sheet.printed_transforms())
+    x = pivot.solve_pivot(pivot.pivot_matrix(poses), pivot.pivot_rhs(poses))
+    residuals = pivot.pivot_residuals(poses, x[:3], x[3:])
+    space = {**KNOWN, "poses": poses, "product": product, "x": x, "residuals": residuals}
+    exec(typed(name), {**space, "closure_error": chaining.closure_error}, space)
+    assert judged(name, space[name]).status == CORRECT
+
+
+@pytest.mark.parametrize("name", EXERCISES)
+def test_a_raised_call_is_shown_with_the_names_of_the_notebook(name):
+    names = parameters(name)
+    assert ITEMS[name].arguments[: len(names)] == names
+
+
+@pytest.mark.parametrize("digits", [3, 4, 6])
+@pytest.mark.parametrize("name", VALUES)
+def test_values_may_be_rounded_to_three_digits(name, digits):
+    rounded = float(f"{ITEMS[name].reference():.{digits}g}")
+    assert judged(name, rounded).status == CORRECT
+
+
+@pytest.mark.parametrize("solver", [lambda A, b: lstsq(A, b, rcond=None), scipy.linalg.lstsq])
+def test_all_that_lstsq_returns_is_answered_by_its_first(solver):
+    outcome = judged("solve_pivot", lambda A, b: solver(A, b))
+    assert outcome.status == NOT_YET and "[0]" in outcome.text
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("ones", [np.ones, np.eye])
+def test_entry_by_entry_is_no_reflection(ones, seed):
+    def chain(transforms):
+        T = ones(4)
+        for link in transforms:
+            T = T * link
+        return T
+
+    assert "entry by entry" in judged("chain", chain, seed).text
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_corrected_poses_are_not_links(first):
+    def distribute(transforms):
+        poses = chaining.stations(transforms)
+        back = [exp_se3(-k / len(transforms) * log_se3(poses[-1])) for k in range(len(poses))]
+        return (np.array(back) @ poses)[first:]
+
+    assert "corrected poses" in judged("distribute_closure", distribute).text
+
+
+def test_blocks_of_the_pivot_matrix_that_overlap():
+    def matrix(T_WF):
+        A = np.zeros((3 * len(T_WF), 6))
+        for i, T in enumerate(T_WF):
+            A[i : i + 3, :3], A[i : i + 3, 3:] = T[:3, :3], -np.eye(3)
+        return A
+
+    assert "3 * i" in judged("pivot_matrix", matrix).text
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_residuals_are_those_of_the_tip_that_was_given(seed):
+    def fitted_anew(T_WF, tip, point):
+        x = pivot.solve_pivot(pivot.pivot_matrix(T_WF), pivot.pivot_rhs(T_WF))
+        return pivot.pivot_residuals(T_WF, x[:3], x[3:])
+
+    def without_mean(T_WF, tip, point):
+        r = pivot.pivot_residuals(T_WF, tip, point)
+        return r - r.mean(0)
+
+    for wrong in (fitted_anew, without_mean):
+        assert judged("pivot_residuals", wrong, seed).status == NOT_YET
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_single_precision_and_general_minimizers_are_right_too(seed):
+    def single(T_WF, tip, point):
+        T, tip, point = (a.astype(np.float32) for a in (T_WF, tip, point))
+        return T[:, :3, :3] @ tip + T[:, :3, 3] - point
+
+    def minimized(A, b):
+        return scipy.optimize.minimize(lambda x: ((A @ x - b) ** 2).sum(), np.zeros(6)).x
+
+    assert judged("pivot_residuals", single, seed).status == CORRECT
+    assert judged("solve_pivot", minimized, seed).status == CORRECT
+
+
+def test_the_report_of_an_optimizer_is_answered_by_its_x():
+    report = judged("solve_pivot", lambda A, b: scipy.optimize.least_squares(lambda x: A @ x - b, np.zeros(6)))
+    assert report.status == NOT_YET and "`.x`" in report.text
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_whole_numbers_of_vectorize_never_pass(seed):
+    def weights(distances, scale):
+        return np.vectorize(lambda d: (1 - (d / (7 * scale)) ** 2) ** 2 if d < 7 * scale else 0)(distances)
+
+    assert "first result" in judged("robust_weights", weights, seed).text
+
+
+@pytest.mark.parametrize(
+    "cosine",
+    [
+        lambda T: (np.trace(T) - 1) / 2,
+        lambda T: np.trace(T[:3, :3]) - 1 / 2,
+        lambda T: np.trace(T[:3, :3]) - 1,
+        lambda T: (np.trace(T[:3, :3]) + 1) / 2,
+    ],
+)
+def test_an_arccosine_of_more_than_1_names_its_argument(cosine):
+    with np.errstate(invalid="ignore"):
+        outcome = judged("closure_error", lambda T: (np.arccos(cosine(T)), np.linalg.norm(T[:3, 3])))
+    assert "(trace - 1) / 2" in outcome.text

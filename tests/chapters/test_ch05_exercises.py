@@ -1,0 +1,105 @@
+"""Answers of students to chapter 5 that were once judged wrongly."""
+
+import numpy as np
+import pytest
+
+from labkit.calibration import hand_eye
+from labkit.chapters.ch05_hand_eye import exercises
+from labkit.documents.thesis import printed as thesis
+from labkit.exercises.engine import CORRECT, NOT_YET
+from labkit.geometry import frames, lie
+from labkit.geometry.lie import exp_so3
+
+ITEMS = {item.id: item for item in exercises.CHAPTER.items}
+
+
+def judged(name, answer, seed=0):
+    return ITEMS[name].judge(answer, rng=np.random.default_rng(seed))
+
+
+def test_the_printed_constant_is_good_enough_for_the_weights():
+    def weights(residuals):
+        lengths = np.linalg.norm(residuals, axis=1)
+        u = np.minimum(lengths / (5 * np.median(lengths) / 1.538), 1)
+        return (1 - u**2) ** 2
+
+    assert all(judged("robust_weights", weights, seed).status == CORRECT for seed in range(5))
+
+
+@pytest.mark.parametrize("nearest, status", [(True, CORRECT), (False, NOT_YET)])
+def test_linear_start_in_the_base_needs_a_rotation_on_noisy_data(nearest, status):
+    def start(T_BF, x_S):
+        R = T_BF[:, :3, :3]
+        rows = [np.hstack([np.kron(R[i], x_S[i]), R[i], -np.eye(3)]) for i in range(len(R))]
+        u = np.linalg.lstsq(np.vstack(rows), -T_BF[:, :3, 3].ravel(), rcond=None)[0]
+        T_FS = np.eye(4)
+        T_FS[:3, :3] = lie.nearest_rotation(u[:9].reshape(3, 3)) if nearest else u[:9].reshape(3, 3)
+        T_FS[:3, 3] = u[9:12]
+        return T_FS, u[12:]
+
+    assert all(judged("linear_start", start, seed).status == status for seed in range(5))
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_constant_side_is_never_accepted(sign):
+    def center(x, z, radius, side):
+        x_c, z_c, r = exercises.fit_circle(x, z)
+        return np.array([x_c, sign * np.sqrt(radius**2 - r**2), z_c])
+
+    texts = {judged("sphere_center_from_profile", center, seed).text for seed in range(20)}
+    assert len(texts) == 1 and "multiply by side" in texts.pop()
+
+
+def test_trial_tables_of_a_search_read_no_file(monkeypatch):
+    entries = thesis.printed_entries()
+    first = thesis.measurements_from(entries)
+    first.line[:], first.angle_deg[:] = "none", 0.0  # what a caller does to his copy stays there
+    monkeypatch.setattr(thesis, "read_table", None)
+    again = thesis.measurements_from({**entries, ("C14", 3, "x"): "1397.64"})
+    assert again.kuka_deg[2, 0] == 1397.64 and again.line[0] == "x" and again.angle_deg.any()
+
+
+def test_naming_the_printed_seven_is_told_to_search():
+    def typed(entries):
+        return {(row["table"], row["pose"], row["column"]) for row in thesis.corrections()}
+
+    assert "the `entries` you are given" in judged("find_misprints", typed).text
+
+
+def test_a_radius_searched_in_hundredths_is_accepted():
+    assert ITEMS["radius"].judge(29.99).status == CORRECT
+    assert "coarse" in ITEMS["radius"].judge(30.0).text
+
+
+@pytest.mark.parametrize(
+    "tilt, told", [([0, 0, 0], "only translate"), ([0, 0, 3], "about one axis"), ([0.06, 0.06, 3], "translation")]
+)
+def test_a_pattern_must_fix_the_translation_too(tilt, told):
+    def poses(T_FS, target, rng):
+        y = rng.uniform(3, 25, 31) * rng.choice([-1, 1], 31)
+        x_S = np.column_stack([rng.uniform(-25, 25, 31), y, rng.uniform(190, 290, 31)])
+        turns = exp_so3(rng.uniform(-1, 1, (31, 3)) * tilt)
+        return hand_eye.poses_that_see(T_FS, target, turns @ np.diag([1, -1, -1]) @ T_FS[:3, :3].T, x_S)
+
+    outcome = judged("design_poses", poses)
+    assert outcome.status == NOT_YET and told in outcome.text
+
+
+def test_other_solutions_of_the_linear_start_are_right():
+    def refined(T_BF, x_S):
+        fit = hand_eye.calibrate_sphere_target(T_BF, x_S)
+        return fit.T_FS, fit.target
+
+    def translation_solved_anew(T_BF, x_S):
+        T_FS, _ = hand_eye.linear_start(T_BF, x_S)
+        R, n = T_BF[:, :3, :3], len(T_BF)
+        A = np.concatenate([R, np.tile(-np.eye(3), (n, 1, 1))], axis=2).reshape(-1, 6)
+        u = np.linalg.lstsq(A, -frames.transform(T_BF, x_S @ T_FS[:3, :3].T).ravel(), rcond=None)[0]
+        return frames.pose(T_FS[:3, :3], u[:3]), u[3:]
+
+    for answer in (refined, translation_solved_anew):
+        assert all(judged("linear_start", answer, seed).status == CORRECT for seed in range(20))
+
+
+def test_a_circle_through_three_points_is_no_fit():
+    assert all("Three points" in judged("fit_circle", exercises._circle_through_three, seed).text for seed in range(30))

@@ -1,0 +1,188 @@
+"""Stages of chapter 6: what they compute, against closed forms, and that each draws, fails and recovers."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from labkit.chapters.ch06_tracker import stages as wr
+from labkit.machines import simulation, udp
+from labkit.machines.arm import (
+    BASE_HEIGHT,
+    HOME,
+    REACH_FLANGE,
+    SHOULDER_OFFSET,
+    TX40,
+    forward_kinematics,
+    within_limits,
+)
+from labkit.machines.packet import POSITION, decode_packet
+from labkit.tables import read_table
+
+ALL = (wr.tx40, wr.live_tracker, wr.two_axes, wr.dynamic_errors, wr.methods, wr.six_runs)
+
+
+@pytest.mark.parametrize("make", ALL)
+def test_draws_fails_and_recovers(make):
+    stage = make()
+    before = stage.png()
+    stage.make_it_fail()
+    stage.png()
+    assert stage.status == "" and any(np.any(stage.state[key] != stage.initial[key]) for key in stage.initial)
+    stage.reset()
+    assert stage.png() == before
+    assert repr(stage) == repr(make()) and stage.caption
+
+
+# ---- the robot
+
+
+def test_sliders_and_flange_follow_each_other():
+    stage = wr.tx40()
+    goal = np.array([300.0, 150.0, 550.0])
+    stage.set(flange=goal)
+    np.testing.assert_allclose(stage.result["T_BF"][:3, 3], goal, atol=1e-3)
+    q = wr.joints(stage.state)
+    np.testing.assert_allclose(q[3:], HOME[3:])
+    stage.set(q1=0.0, q2=0.0, q3=0.0)
+    expected = forward_kinematics(TX40.dh, [0, 0, 0, *HOME[3:]])[:3, 3]
+    np.testing.assert_allclose(stage.state["flange"], expected, atol=1e-9)
+
+
+def test_an_unreachable_flange_stops_at_the_arms_reach():
+    stage = wr.tx40()
+    stage.set(flange=(900.0, 0.0, 300.0))
+    q = wr.joints(stage.state)
+    assert within_limits(TX40, q)
+    away = np.linalg.norm(stage.state["flange"] - [0, 0, BASE_HEIGHT])
+    assert 400 < away < np.hypot(REACH_FLANGE, SHOULDER_OFFSET)
+
+
+def test_make_it_fail_is_a_singular_arm():
+    stage = wr.tx40()
+    stage.make_it_fail()
+    assert stage.result["singular_values"][-1] < 1 and "singular" in stage.caption
+
+
+@pytest.mark.parametrize("width", [500, 700])
+@pytest.mark.parametrize("preset", ["Reset", "Make it fail", "arm upright"])
+def test_flange_and_tracker_stay_in_the_picture_with_their_letters(preset, width):
+    stage = wr.tx40()
+    stage._picture.fit(width, 1.0, False)
+    stage._preset(preset)
+    stage.png()
+    canvas, whole = stage._picture.canvas, stage._picture.fig.bbox
+    words = {text: text.get_window_extent(canvas.get_renderer()) for text in stage._picture.fig.axes[0].texts}
+    assert {"B", "E", "F"} <= {text.get_text() for text in words}
+    assert all(box.x0 >= 0 and box.x1 <= whole.x1 and box.y0 >= 0 and box.y1 <= whole.y1 for box in words.values())
+    by_name = {text.get_text(): box for text, box in words.items() if text.get_text() in "EF"}
+    assert not by_name["E"].overlaps(by_name["F"])
+
+
+def test_names_of_tracker_and_world_are_apart_before_anything_arrives():
+    stage = wr.live_tracker()
+    stage.png()
+    renderer = stage._picture.canvas.get_renderer()
+    boxes = {text.get_text(): text.get_window_extent(renderer) for text in stage._picture.fig.axes[0].texts}
+    assert not boxes["E"].overlaps(boxes["W"])
+
+
+# ---- the stream
+
+
+def test_live_picture_gates_nonsense():
+    packets = simulation.endless_packets(np.random.default_rng(3), lambda: True)
+    readings = np.array([decode_packet(next(packets)) for _ in range(1500)])
+    clean = simulation.endless_packets(np.random.default_rng(3))
+    truth = np.array([decode_packet(next(clean)) for _ in range(1500)])
+    result = wr.compute_live(readings, udp.Statistics())
+    nonsense = np.linalg.norm(readings[:, POSITION] - truth[:, POSITION], axis=1) > 0.1
+    assert nonsense.any() and not result["used"][nonsense].any() and result["used"][~nonsense].mean() > 0.98
+
+
+def test_real_packets_arrive_in_the_stage_and_the_stream_ends_by_itself():
+    stage = wr.live_tracker()
+    before = threading.active_count()
+    stage.set(nonsense=True, loss=0.2)
+    until = time.perf_counter() + 5
+    while time.perf_counter() < until and stage.result["statistics"].good < 100:
+        stage.set(t=stage.state["t"] + wr.LIVE_STEP)
+        time.sleep(0.03)
+    seen = stage.result["statistics"]
+    assert seen.good >= 100 and seen.lost > 0 and "good readings" in stage.caption
+    until = time.perf_counter() + 6
+    while threading.active_count() > before and time.perf_counter() < until:
+        time.sleep(0.1)
+    assert threading.active_count() <= before
+
+
+# ---- two axes
+
+
+def two_axes_state(a, b, angle=40.0, noise=0.1):
+    return {"a": np.array(a, float), "b": np.array(b, float), "angle": angle, "noise": noise}
+
+
+def test_singular_values_of_two_axes():
+    parallel = wr.compute_two_axes(two_axes_state([1, 0, 0], [1, 0, 0]))["singular_values"]
+    half, full = 2 * np.sin(np.deg2rad(20)), 2 * np.sin(np.deg2rad(40))
+    np.testing.assert_allclose(parallel, np.sqrt(2) * np.array([full, full, *[half] * 4, 0, 0, 0]), atol=1e-12)
+    apart = wr.compute_two_axes(two_axes_state([1, 0, 0], [0, 1, 0]))
+    assert apart["singular_values"][-1] < 1e-12 < 0.5 < apart["singular_values"][-2]
+    assert apart["angle_deg"] == pytest.approx(90)
+
+
+def test_parallel_axes_leave_the_mounting_free_and_small_motions_blow_up_the_error():
+    good = wr.compute_two_axes(two_axes_state([1, 0, 0], [0, 0, 1]))
+    assert good["error_deg"] < 2 * good["predicted_deg"] and good["error_deg"] > 0.3 * good["predicted_deg"]
+    bad = wr.compute_two_axes(two_axes_state([1, 0, 0], [1, 0, 0]))
+    assert bad["error_deg"] > 30 and np.isfinite(bad["free"]).all()
+    small = wr.compute_two_axes(two_axes_state([1, 0, 0], [0, 0, 1], angle=2.0))
+    assert 10 < small["error_deg"] / good["error_deg"] < 40  # 40 deg over 2 deg is 20
+
+
+def test_found_rotations_are_rotations_near_the_truth():
+    found = wr.compute_two_axes(two_axes_state([1, 0, 0], [0, 0, 1]))["found"]
+    turn = Rotation.from_matrix(wr.X_TRUE[:3, :3].T @ found).magnitude()
+    assert np.rad2deg(turn.max()) < 1
+
+
+# ---- errors in motion, methods, runs
+
+
+def dynamic(speed=0.35, latency=8.0, nonsense=True):
+    return wr.compute_dynamic({"speed": speed, "latency": latency, "nonsense": nonsense})
+
+
+@pytest.mark.parametrize("speed, latency", [(0.35, 20.0), (1.0, 40.0), (1.4, 60.0)])
+def test_latency_is_found_and_its_error_removed(speed, latency):
+    result = dynamic(speed, latency, nonsense=False)
+    assert result["offset_ms"] == pytest.approx(latency, abs=3)
+    assert result["error"].max() == pytest.approx(speed * latency, abs=8)  # v * dt, and the systematic error
+    assert result["mended"].max() < 10
+
+
+def test_nonsense_moves_the_mean_and_not_the_median():
+    with_it, without = dynamic()["raw_summary"], dynamic(nonsense=False)["raw_summary"]
+    assert with_it["mean"] > 3 * without["mean"] and with_it["median"] < 1.1 * without["median"]
+
+
+def test_methods_are_the_stored_benchmark():
+    table = read_table("tracker/hand_eye_methods.csv", text=("method",))
+    assert len(table["method"]) == 4 * 7
+    for case, (deg, mm) in wr.CASES.items():
+        result = wr.compute_methods({"case": case})
+        rows = (table["std_deg"] == deg) & (table["std_mm"] == mm)
+        np.testing.assert_array_equal(result["rotation"], table["rotation"][rows])
+        best = result["names"].index("maximum likelihood")
+        assert result["rotation"][best] < 1.05 and result["translation"][best] < 1.05
+        assert result["rotation"].argmin() == best
+
+
+def test_repeating_does_not_show_the_systematic_error():
+    none, some = wr.compute_six_runs({"field": 0.0}), wr.compute_six_runs({"field": 2.0})
+    assert none["off"] < 2 * none["std"] and some["off"] > 5 * some["std"]
+    e = some["single"] - simulation.T_FE[:3, 3]
+    assert e @ np.linalg.solve(some["claim"], e) < 16.27  # 99.9 % of a chi-square with 3 degrees of freedom

@@ -1,0 +1,204 @@
+"""Chapter 9's exercises: answers that look right and are not, and right ones of more than one style."""
+
+import numpy as np
+import pytest
+from scipy.stats import chisquare, norm
+
+from labkit.exercises import session
+from labkit.exercises.engine import CORRECT, NOT_YET, RAISED
+from labkit.localization import maps, mcl, odometry, particles
+
+CHAPTER = next(chapter for chapter in session.chapters() if chapter.name == "09-monte-carlo")
+
+
+def judge(name, answer, seed=0):
+    item = next(item for item in CHAPTER.items if item.id == name)
+    return item.judge(answer, rng=np.random.default_rng(seed))
+
+
+def moved(noise):
+    return lambda x, u, dt, std_u, rng: odometry.step(x, u + noise(len(x), std_u, rng), dt)
+
+
+OTHER_MOTIONS = {
+    "seed differ": moved(lambda m, s, rng: s * np.random.default_rng().standard_normal((m, 2))),
+    "the same comes out": moved(lambda m, s, rng: s * np.random.default_rng(0).standard_normal((m, 2))),
+    "v and omega": moved(lambda m, s, rng: s * rng.standard_normal(m)[:, None]),
+    "standard deviation": moved(lambda m, s, rng: s * rng.uniform(-1, 1, (m, 2))),
+}
+
+
+@pytest.mark.parametrize("words", OTHER_MOTIONS)
+def test_noise_from_elsewhere_or_shared_is_refused(words):
+    outcome = judge("sample_motion", OTHER_MOTIONS[words])
+    assert outcome.status == NOT_YET and words in outcome.text
+
+
+@pytest.mark.parametrize("name", ["resample_roulette", "resample_systematic"])
+@pytest.mark.parametrize("seed", [None, 0])
+def test_resamplers_draw_from_the_rng_they_get(name, seed):
+    def answer(weights, rng):
+        return getattr(particles, name)(weights, np.random.default_rng(seed))
+
+    assert judge(name, answer).status == NOT_YET
+
+
+def test_spins_that_share_their_random_number_are_refused():
+    def pairs(w, rng):
+        spins = np.repeat(rng.random(len(w) // 2 + 1), 2)[: len(w)]
+        return np.searchsorted(np.cumsum(w), spins * w.sum())
+
+    assert "own" in judge("resample_roulette", pairs).text
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_right_resamplers_of_several_styles(seed):
+    def by_choice(weights, rng):
+        return rng.choice(len(weights), len(weights), p=weights / weights.sum())
+
+    def by_a_loop(weights, rng):
+        m, found, i, end = len(weights), [], 0, weights[0]
+        first = rng.uniform(0, weights.sum() / m)
+        for k in range(m):
+            while first + k * weights.sum() / m > end and i < m - 1:
+                i += 1
+                end += weights[i]
+            found.append(i)
+        return found
+
+    assert judge("resample_roulette", by_choice, seed).status == CORRECT
+    assert judge("resample_systematic", by_a_loop, seed).status == CORRECT
+
+
+def test_weights_of_any_sum_raise_in_the_students_line():
+    outcome = judge("resample_roulette", lambda weights, rng: rng.choice(len(weights), len(weights), p=weights))
+    assert outcome.status == RAISED and "weights=" in outcome.text
+
+
+def test_the_logarithm_of_an_underflown_product_is_refused():
+    def beams(ranges, expected, std):
+        return np.log(np.prod(norm.pdf(ranges, expected, std)))
+
+    def field(grid, pose, ranges, bearings, std):
+        angle = pose[2] + bearings
+        points = pose[:2] + ranges[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+        return np.log(np.prod(norm.pdf(grid.distance[grid.cell_of(points)], 0, std)))
+
+    for name, answer in (("beam_weight", beams), ("distance_field_weight", field)):
+        outcome = judge(name, answer)
+        assert outcome.status == NOT_YET and "541" in outcome.text
+    assert judge("beam_weight", lambda r, e, s: norm.logpdf(r, e, s).sum()).status == CORRECT
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_every_single_ray_tells_a_forgotten_heading(seed):
+    item = next(item for item in CHAPTER.items if item.id == "cast_ray")
+    grid, pose, bearing, r_max = item.cases[0](np.random.default_rng(seed))
+    right = maps.walk_ray(grid, pose, bearing, r_max)
+    for x in ((0.0, bearing), (pose[2], 0.0), (pose[2], -bearing)):
+        assert abs(maps.walk_ray(grid, np.array([*pose[:2], x[0]]), x[1], r_max) - right) > 0.2
+
+
+def test_a_test_that_lets_the_specimen_raise_is_told_to_catch():
+    outcome = judge("hunt_3", lambda resample, rng: resample(np.full(1000, 0.000999), rng).max() < 1000)
+    assert outcome.status == RAISED and "except IndexError" in outcome.text
+
+
+def test_recover_in_another_order_is_named():
+    def turned(*args):
+        share, slow, fast = mcl.recover(*args)
+        return slow, fast, share
+
+    assert "order" in judge("recover", turned).text
+
+
+def test_noise_in_single_precision_is_right():
+    def answer(states, u, dt, std_u, rng):
+        noise = std_u * rng.standard_normal((len(states), 2), dtype=np.float32)
+        return odometry.step(states, u + noise, dt).astype(np.float32)
+
+    assert judge("sample_motion", answer).status == CORRECT
+
+
+MOTIONS_WITHOUT_NOISE = {
+    "stands still": lambda x, u, dt, std_u, rng: odometry.step(x, std_u * rng.standard_normal((len(x), 2)), dt),
+    "still scatter": lambda x, u, dt, std_u, rng: odometry.step(x, u + rng.standard_normal((len(x), 2)), dt),
+    "dt were 1": lambda x, u, dt, std_u, rng: odometry.step(x, u + std_u * rng.standard_normal((len(x), 2)), 1.0),
+    "shape (2, 3)": lambda x, u, dt, std_u, rng: odometry.step(x[0], u + std_u * rng.standard_normal(2), dt),
+}
+
+
+@pytest.mark.parametrize("words", MOTIONS_WITHOUT_NOISE)
+def test_what_is_wrong_without_noise_is_said(words):
+    assert words in judge("sample_motion", MOTIONS_WITHOUT_NOISE[words]).text
+
+
+def test_spins_that_go_on_where_the_last_one_ended_are_refused():
+    def wheel(weights, rng):
+        found, i, left = [], int(rng.integers(len(weights))), 0.0
+        for _ in weights:
+            left += 2 * weights.max() * rng.random()
+            while left > weights[i]:
+                left, i = left - weights[i], (i + 1) % len(weights)
+            found.append(i)
+        return found
+
+    assert all("not independent" in judge("resample_roulette", wheel, seed).text for seed in range(3))
+
+
+@pytest.mark.parametrize("answer", [161.65, 162.5])
+def test_beams_are_whole(answer):
+    assert CHAPTER["beams_to_zero"].judge(answer).status == NOT_YET
+
+
+def chi_square(resample, rng):
+    weights = np.array([0.1, 0.7, 0.1, 0.1])
+    counts = sum(np.bincount(resample(weights, rng), minlength=4) for _ in range(1000))
+    return chisquare(counts, weights * counts.sum()).pvalue > 1e-6
+
+
+def impossible_ones(resample, rng):
+    weights = np.array([0.0, 0.01, 0.0, 0.99])
+    return not any(np.isin(resample(weights, rng), (0, 2)).any() for _ in range(500))
+
+
+def by_the_heavy_one(resample, rng):
+    weights = np.r_[0.55, np.full(9, 0.05)]
+    return bool(abs(np.mean([np.mean(resample(weights, rng) == 0) for _ in range(2000)]) - 0.55) < 0.02)
+
+
+def any_exception(resample, rng):
+    try:
+        return all(resample(np.full(100, 0.0098), rng).max() < 100 for _ in range(50))
+    except Exception:
+        return False
+
+
+def three_readings(weigh):
+    states, mark = np.array([[0.0, 0, 0], [0.2, 0, 0]]), np.array([[1.0, 0]])
+    one, three = (np.log(weigh(states, np.ones(n), np.repeat(mark, n, 0), 0.3)) for n in (1, 3))
+    return abs(np.diff(three)[0] - 3 * np.diff(one)[0]) < 1e-6
+
+
+TESTS = {"hunt_1": (chi_square, impossible_ones), "hunt_2": (by_the_heavy_one,), "hunt_3": (any_exception,)}
+
+
+@pytest.mark.parametrize(
+    "name, test", [(k, t) for k, tests in {**TESTS, "hunt_4": (three_readings,)}.items() for t in tests]
+)
+def test_property_tests_of_several_kinds_catch_a_specimen(name, test):
+    assert judge(name, test).status == CORRECT
+
+
+def test_a_test_that_looks_at_the_name_catches_nothing():
+    outcome = judge("hunt_1", lambda resample, rng: resample.__name__ != "specimen_1")
+    assert outcome.status == NOT_YET and "shares" in outcome.text
+
+
+def test_a_test_that_is_too_strict_is_told_which_correct_function_it_rejects():
+    def exact(resample, rng):
+        return np.allclose(
+            np.bincount(resample(np.array([0.1, 0.7, 0.1, 0.1]), rng), minlength=4), [0.4, 2.8, 0.4, 0.4]
+        )
+
+    assert "counts scatter" in judge("hunt_1", exact).text

@@ -1,0 +1,135 @@
+"""Every exercise of every chapter, proved by right and wrong answers."""
+
+import ast
+import re
+import textwrap
+
+import numpy as np
+import pytest
+
+from labkit.exercises import metrics, session, source
+from labkit.exercises.engine import CORRECT, NOT_YET, TO_DO, Exercise, Prediction, Value
+
+CHAPTERS = session.chapters()
+ITEMS = [(chapter, item) for chapter in CHAPTERS for item in chapter.items]
+EXERCISES = [(c, i) for c, i in ITEMS if isinstance(i, Exercise)]
+VALUES = [(c, i) for c, i in ITEMS if isinstance(i, Value)]
+
+
+def names(pairs):
+    return [f"{chapter.name}/{item.id}" for chapter, item in pairs]
+
+
+def mistakes(pairs):
+    cases = [(item, k) for _, item in pairs for k in range(len(item.mistakes))]
+    return pytest.mark.parametrize("item, k", cases, ids=[f"{item.id}-{k}" for item, k in cases])
+
+
+def same_answer(item, variant):
+    """A student's own function, distinct from the library's, that returns what the variant returns."""
+
+    def answer(*args):
+        return variant(*args)
+
+    return answer
+
+
+@pytest.mark.parametrize("chapter, item", EXERCISES, ids=names(EXERCISES))
+def test_reference_passes_on_many_seeds(chapter, item):
+    for seed in range(5):
+        outcome = item.judge(same_answer(item, item.reference), rng=np.random.default_rng(seed))
+        assert outcome.status == CORRECT, outcome.text
+
+
+@pytest.mark.parametrize("chapter, item", EXERCISES, ids=names(EXERCISES))
+def test_blank_is_to_do(chapter, item):
+    def untouched(*args):
+        """Docstring."""
+        ...
+
+    assert item.judge(untouched).status == TO_DO
+
+
+@mistakes(EXERCISES)
+def test_each_mistake_gets_its_own_text(item, k):
+    for seed in range(3):
+        outcome = item.judge(same_answer(item, item.mistakes[k].variant), rng=np.random.default_rng(seed))
+        assert (outcome.status, outcome.text) == (NOT_YET, item.mistakes[k].text)
+
+
+@pytest.mark.parametrize("chapter, item", VALUES, ids=names(VALUES))
+def test_value_accepts_the_reference_and_refuses_its_neighbors(chapter, item):
+    expected = item.reference()
+    assert item.judge(expected).status == CORRECT
+    assert item.judge(...).status == TO_DO
+    if item.metric is None:
+        assert item.judge(np.float64(expected) + 3 * max(item.rtol * abs(expected), item.atol)).status == NOT_YET
+
+
+@mistakes(VALUES)
+def test_each_wrong_value_gets_its_own_text(item, k):
+    outcome = item.judge(item.mistakes[k].variant())
+    assert (outcome.status, outcome.mistake) == (NOT_YET, k), outcome.text
+
+
+@pytest.mark.parametrize("chapter, item", EXERCISES + VALUES, ids=names(EXERCISES + VALUES))
+def test_shown_solution_stands_in_the_source(chapter, item):
+    """That it also passes is proved by the solved notebook, which runs in strict mode."""
+    bound = session.Bound(chapter, item)
+    cell = bound._cell()
+    assert cell, f"no cell of solutions/{chapter.notebook}.py checks {item.id}"
+    assert source.region(cell).strip()
+    assert "your code here" in source.blank(cell)
+
+
+@pytest.mark.parametrize("chapter", CHAPTERS, ids=lambda c: c.name)
+def test_every_item_is_used_in_the_notebook(chapter):
+    text = (session.SOLUTIONS / f"{chapter.notebook}.py").read_text(encoding="utf-8")
+    for item in chapter.items:
+        used = rf'ex\.predict\(\s*"{item.id}"' if isinstance(item, Prediction) else rf"ex\.{item.id}\b"
+        assert re.search(used, text), f"{item.id} is defined but never asked"
+
+
+def typed(hint):
+    """The code of a last hint as a student types it: each pair of backquotes is a line, or several."""
+    parts = re.findall("`([^`]*)`", hint) or [hint.removesuffix(".")]
+    return "\n".join(part if "\n" in part else "\n".join(part.split("; ")) for part in parts)
+
+
+def known_in(chapter):
+    """What a notebook knows, imports and exercises; and the parameters of each function, as written there."""
+    tree = ast.parse((session.SOLUTIONS / f"{chapter.notebook}.py").read_text(encoding="utf-8"))
+    known = {item.id: item.reference for item in chapter.items if isinstance(item, Exercise)}
+    for node in tree.body:
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            exec(ast.unparse(node), known)
+    return known, {node.name: ast.unparse(node.args) for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+
+
+@pytest.mark.parametrize("chapter, item", EXERCISES, ids=names(EXERCISES))
+def test_the_last_hint_is_right_when_typed_as_it_stands(chapter, item):
+    known, parameters = known_in(chapter)
+    exec(f"def {item.id}({parameters[item.id]}):\n{textwrap.indent(typed(item.hints[-1]), '    ')}", known)
+    outcome = item.judge(known[item.id], rng=np.random.default_rng(0))
+    assert outcome.status == CORRECT, outcome.text
+
+
+def test_hints_do_not_repeat():
+    for _, item in EXERCISES + VALUES:
+        assert len(set(item.hints)) == 3
+
+
+def test_a_text_is_shared_only_by_variants_of_one_mistake():
+    """Signs and orders multiply the variants of one slip: those may share their text, side by side in the list."""
+    for _, item in EXERCISES + VALUES:
+        texts = [mistake.text for mistake in item.mistakes]
+        groups = [text for k, text in enumerate(texts) if k == 0 or text != texts[k - 1]]
+        assert len(set(groups)) == len(groups), item.id
+
+
+def test_metrics_of_all_exercises_admit_their_reference():
+    for _, item in EXERCISES:
+        if isinstance(item.metric, metrics.Metric):
+            args = item.cases[0](np.random.default_rng(1))
+            expected = item.reference(*args)
+            assert item.metric.equal(expected, expected)

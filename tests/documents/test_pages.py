@@ -1,0 +1,128 @@
+"""The ledger's pages: built from rows and computations alone, and README says what they say."""
+
+from dataclasses import replace
+
+import pytest
+
+from labkit.chapters.ch10_ledger import table as widget
+from labkit.documents import ledger, pages
+
+
+def entry(**changes):
+    row = ledger.Row("pivot.tip", "thesis", "table 3", "tip, x", "1.25", "mm", "misprint", "a note")
+    given = {
+        "value": "1.521",
+        "status": "misprint",
+        "proof": "The mean of the rows above is 1.521.",
+        "notebook": "03_quirlen.ipynb",
+    }
+    row = replace(row, **{k: v for k, v in changes.items() if k in ledger.COLUMNS and k != "status"})
+    return pages.Entry(row, **{**given, **{k: v for k, v in changes.items() if k in given}})
+
+
+SOME = [
+    entry(),
+    entry(id="pivot.tip[1]", quantity="tip, y", printed="2.5", value="5.20"),
+    entry(document="lecture", status="reproduced", proof="", quantity="<script>", place="Übersicht"),
+    entry(document="report", status="unpublished", proof="Simulated: 3 mm."),
+]
+
+
+def test_readme_shows_the_totals():
+    text = pages.README.read_text(encoding="utf-8")
+    assert text == pages.with_totals(text, ledger.rows()), "run: python -m labkit.documents.pages"
+
+
+def test_totals_add_up():
+    rows = ledger.rows()
+    counts = pages.totals_by_document(rows)
+    assert sum(sum(count.values()) for count in counts.values()) == len(rows)
+    last = pages.totals_markdown(rows).splitlines()[-1]
+    assert last.startswith("| all four |") and last.endswith(f"| {len(rows)} |")
+
+
+def test_totals_need_their_marks():
+    with pytest.raises(ValueError, match="once each"):
+        pages.with_totals("no marks here", [])
+    again = pages.with_totals(f"a\n{pages.BEGIN}\nold\n{pages.END}\nb", [])
+    assert "old" not in again and again.startswith("a\n") and again.endswith("\nb")
+
+
+@pytest.mark.parametrize(
+    ("printed", "value", "text"),
+    [
+        ("1.25", 1.2512, "1.251"),
+        ("12", 12.04, "12.0"),
+        ("1,5", 1.46, "1.46"),
+        ("0.0", -1e-12, "0.00"),
+        ("3e-4", 3.14e-4, "0.000314"),
+        ("O(M)", "O(M)", "O(M)"),
+    ],
+)
+def test_values_show_one_digit_more_than_is_printed(printed, value, text):
+    assert pages.value_text(entry(printed=printed).row, value) == text
+
+
+def test_counts_are_shown_as_counts():
+    assert pages.value_text(entry(printed="31", unit="1").row, 24.0) == "24"
+    assert pages.value_text(entry(printed="31", unit="mm").row, 24.0) == "24.0"
+
+
+def test_rows_with_one_argument_make_one_finding():
+    found = pages.findings(SOME, pages.WRONG)
+    assert len(found) == 1 and len(found[0].entries) == 2 and found[0].places == ["table 3"]
+    page = pages.findings_html(SOME, pages.WRONG)
+    assert "1.521" in page and "The mean of the rows above" in page and "03_quirlen" in page and "report" not in page
+    assert "Simulated: 3 mm." in pages.findings_html(SOME, pages.UNPUBLISHED)
+    assert "<script>" not in pages.findings_html(SOME, ("reproduced",)) + widget.table_html(SOME)
+
+
+def test_each_row_knows_its_notebook():
+    by_topic = {row.id.split(".")[0]: ledger.chapter_of(row) for row in ledger.rows()}
+    assert by_topic["frames"] == "01_frames" and by_topic["particles"] == "09_monte_carlo"
+    solved = {path.stem for path in (pages.README.parent / "solutions").glob("*.py")}
+    assert {ledger.chapter_of(row) for row in ledger.rows()} <= solved, "every link leads to a notebook"
+
+
+def test_pages_go_chapter_by_chapter(monkeypatch):
+    some = [row for row in ledger.rows() if row.id in ("kalman.fusion_x", "lateration.landmarks_2d")][::-1]
+    monkeypatch.setattr(pages, "table", lambda: [(row, ledger.compute(row), row.status) for row in some])
+    notebooks = [entry.notebook for entry in pages.entries()]
+    assert len(notebooks) > 1 and notebooks == sorted(notebooks)
+
+
+def test_arguments_open_without_a_mouse_and_no_hit_is_said():
+    page = widget.table_html(SOME)
+    assert page.count("<details>") == len(SOME) and "<summary" in page
+    assert widget.table_html([entry(proof="", note="")]).count("<details>") == 0
+    assert "no row" in widget.table_html([]) and "<table" not in widget.table_html([])
+
+
+@pytest.mark.parametrize(
+    ("search", "count"),
+    [
+        ({}, 4),
+        ({"text": "TIP y"}, 1),
+        ({"document": "thesis"}, 2),
+        ({"status": "misprint"}, 2),
+        ({"text": "übersicht"}, 1),
+        ({"text": "mean rows", "status": "misprint"}, 2),
+        ({"text": "nothing like it"}, 0),
+        ({"document": "lab sheet"}, 0),
+    ],
+)
+def test_search(search, count):
+    assert len(widget.matching(SOME, **search)) == count
+
+
+def test_table_follows_its_controls_and_its_text_is_constant():
+    table = widget.LedgerTable(SOME)
+    assert "4 rows" in table.table.value
+    table.search.value = "simulated"
+    assert "1 row<" in table.table.value and table.status.options[0] == "all"
+    assert repr(table) == repr(widget.LedgerTable(SOME[:1])) == table._repr_mimebundle_()["text/plain"]
+
+
+def test_long_tables_are_cut():
+    many = widget.table_html(SOME * 100)
+    assert many.count("<tr title") == widget.SHOWN and "400 rows, the first 150" in many

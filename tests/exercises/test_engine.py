@@ -1,0 +1,856 @@
+# ruff: noqa: NPY002, SIM105, SIM223 (hostile student code, on purpose)
+"""The engine survives any student code and says what is wrong with it."""
+
+import itertools
+import json
+import math
+import os
+import sys
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from labkit.chapters.ch01_frames.exercises import CHAPTER, random_pose
+from labkit.exercises import engine, feedback, guard, metrics, progress, session
+from labkit.exercises.engine import CORRECT, NOT_YET, RAISED, TO_DO, Chapter, Exercise, Mistake, Prediction, Value
+from labkit.exercises.feedback import Panel
+from labkit.geometry import frames
+from labkit.geometry.lie import exp_so3
+
+INVERT = CHAPTER["invert"]
+
+
+def scale(v):
+    return 2.0 * v
+
+
+DOUBLE = Exercise(
+    "double",
+    reference=scale,
+    draw=lambda rng: (rng.normal(size=3),),
+    metric=metrics.Numbers(),
+    hints=("a", "b", "c"),
+    mistakes=[Mistake(lambda v: v * v, "squared")],
+)
+
+
+# Correct ways ---------------------------------------------------------------------------------------------------------
+
+
+def loops(T):
+    X = [[0.0] * 4 for _ in range(4)]
+    for i in range(3):
+        for j in range(3):
+            X[i][j] = float(T[j][i])
+        X[i][3] = -sum(float(T[k][i] * T[k][3]) for k in range(3))
+    X[3][3] = 1.0
+    return X
+
+
+def broadcast(T):
+    return np.block([[T[:3, :3].T, -T[:3, :3].T @ T[:3, 3:]], [np.zeros(3), 1.0]])
+
+
+def with_scipy(T):
+    R = Rotation.from_matrix(T[:3, :3]).inv()
+    X = np.eye(4)
+    X[:3, :3], X[:3, 3] = R.as_matrix(), -R.apply(T[:3, 3])
+    return X
+
+
+@pytest.mark.parametrize(
+    "way",
+    [
+        loops,
+        broadcast,
+        with_scipy,
+        np.linalg.inv,
+        lambda T: np.asmatrix(np.linalg.inv(T)),
+        lambda T: frames.invert(T).astype(np.float32),
+    ],
+)
+def test_every_correct_way_is_accepted(way):
+    assert INVERT.judge(way).status == CORRECT
+
+
+def test_scipy_rotation_counts_as_its_matrix():
+    gram_schmidt = CHAPTER["gram_schmidt"]
+    assert gram_schmidt.judge(lambda a, b: Rotation.from_matrix(frames.gram_schmidt(a, b))).status == CORRECT
+
+
+def test_printing_and_seeding_does_not_make_a_right_answer_wrong():
+    def chatty(v):
+        np.random.seed(1)
+        print("looking at", v)
+        return 2 * v
+
+    outcome = DOUBLE.judge(chatty)
+    assert outcome.status == CORRECT
+    assert outcome.printed.startswith("looking at")
+
+
+# Hostile code ---------------------------------------------------------------------------------------------------------
+
+
+def endless(v):
+    while True:
+        pass
+
+
+def endless_with_bare_except(v):
+    while True:
+        try:
+            v = v + 0
+        except:  # noqa: E722
+            pass
+
+
+def sleeping(v):
+    time.sleep(60)
+
+
+def recursive(v):
+    return recursive(v)
+
+
+def raising(v):
+    return 1 / 0
+
+
+def leaving(v):
+    sys.exit(0)
+
+
+def killing(v):
+    os._exit(1)
+
+
+def asking(v):
+    return float(input("value? "))
+
+
+def flooding(v):
+    for _ in range(2000):
+        print("x" * 1000)
+    return 2 * v
+
+
+def huge_view(v):
+    return np.broadcast_to(0.0, (10**5, 10**5, 3))
+
+
+def mutating(v):
+    v *= 2
+    return v
+
+
+def interrupting(v):
+    raise KeyboardInterrupt
+
+
+class Unprintable(Exception):
+    def __str__(self):
+        raise RuntimeError("no")
+
+
+def unprintable(v):
+    raise Unprintable
+
+
+class Hostile:
+    def __array__(self, *args, **kwargs):
+        raise RuntimeError("no array")
+
+
+@pytest.mark.parametrize(
+    "function, status, words",
+    [
+        (endless, NOT_YET, "did not finish within 2 s"),
+        (endless_with_bare_except, NOT_YET, "did not finish within 2 s"),
+        (sleeping, NOT_YET, "did not finish within 2 s"),
+        (recursive, RAISED, "calls itself without an end"),
+        (raising, RAISED, "ZeroDivisionError"),
+        (leaving, NOT_YET, "calls exit()"),
+        (killing, NOT_YET, "os._exit()"),
+        (asking, NOT_YET, "input()"),
+        (interrupting, RAISED, "KeyboardInterrupt"),
+        (unprintable, RAISED, "Unprintable"),
+        (huge_view, NOT_YET, "got one of shape (100000, 100000, 3)"),
+        (mutating, NOT_YET, "changes its argument `v`"),
+        (lambda v: None, TO_DO, ""),
+        (lambda v: [] and v, NOT_YET, "expected an array of shape (3,), got shape (0,)"),
+        (lambda v: np.full(3, np.nan), NOT_YET, "NaN in 3 of 3"),
+        (lambda v: (x for x in v), NOT_YET, "generator"),
+        (lambda v: object(), NOT_YET, "an object"),
+        (lambda v: Hostile(), NOT_YET, "Hostile"),
+        (lambda v: np.linalg.norm, NOT_YET, "parentheses"),
+        (lambda v: v[:, None], NOT_YET, "the right number of entries, arranged differently"),
+        (lambda v: "2v", NOT_YET, "got a str"),
+        (lambda v: v + 1j, NOT_YET, "complex"),
+        (lambda v: v > 0, NOT_YET, "True or False"),
+        (lambda: 0, NOT_YET, "cannot be called with (v)"),
+        (lambda a, b: a, NOT_YET, "cannot be called with (v)"),
+        (lambda v: [[1, 2], [3]], NOT_YET, "of 2 parts that differ in shape: return one array"),
+        (17, NOT_YET, "expected a function"),
+        ("text", NOT_YET, "expected a function"),
+    ],
+)
+def test_hostile_code_gets_one_sentence(function, status, words):
+    started = time.perf_counter()
+    outcome = DOUBLE.judge(function)
+    assert (outcome.status, words in outcome.text) == (status, True), outcome
+    assert time.perf_counter() - started < 4
+
+
+def test_flood_of_output_is_cut():
+    outcome = DOUBLE.judge(flooding)
+    assert outcome.status == CORRECT
+    assert len(outcome.printed) < 2 * guard.OUTPUT_LIMIT
+    assert "more characters" in outcome.printed
+
+
+def test_time_limit_in_another_thread():
+    """Where no signal can be used (Windows, other threads) a second thread ends a Python loop."""
+    found = []
+    thread = threading.Thread(target=lambda: found.append(DOUBLE.judge(endless)))
+    thread.start()
+    thread.join(timeout=10)
+    assert "did not finish" in found[0].text
+
+
+def test_interpreter_state_is_put_back():
+    def careless(v):
+        np.random.seed(0)
+        np.seterr(all="raise")
+        np.set_printoptions(precision=1)
+        sys.setrecursionlimit(5000)
+        os.chdir("/")
+        return 2 * v
+
+    before = np.random.get_state()[1].copy(), np.geterr(), np.get_printoptions(), sys.getrecursionlimit(), os.getcwd()
+    assert DOUBLE.judge(careless).status == CORRECT
+    after = np.random.get_state()[1], np.geterr(), np.get_printoptions(), sys.getrecursionlimit(), os.getcwd()
+    np.testing.assert_array_equal(before[0], after[0])
+    assert before[1:] == after[1:]
+
+
+def test_patching_the_library_changes_no_check_and_is_named(capsys):
+    original, norm = frames._invert, np.linalg.norm
+    ex = session.course("01-frames")
+
+    def patching(T):
+        frames._invert = lambda T: T
+        np.linalg.norm = lambda *_, **__: 0.0
+        return T
+
+    ex.invert(patching)
+    assert frames._invert is original and np.linalg.norm is norm
+    assert "labkit.geometry.frames._invert, numpy.linalg.norm" in capsys.readouterr().out
+    frames.invert = None  # a careless cell before the check
+    ex.relative(frames.relative)
+    assert "Replaced in the library, and put back: labkit.geometry.frames.invert" in capsys.readouterr().out
+
+
+def test_seeding_numpy_does_not_fix_the_draws():
+    seen = []
+
+    def spy(v):
+        seen.append(v)
+        return 2 * v
+
+    for _ in range(2):
+        np.random.seed(3)
+        DOUBLE.judge(spy)
+    assert len({v.tobytes() for v in seen}) == len(seen)
+
+
+# Diagnosis ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        (lambda v: -2 * v, "right up to its sign"),
+        (lambda v: 2000 * v, "a thousand times the expected one: mm against m?"),
+        (lambda v: 4 * v, "twice the expected one"),
+        (lambda v: v, "half the expected one"),
+        (lambda v: np.rad2deg(2 * v), "in degrees where radians are expected"),
+        (lambda v: np.deg2rad(2 * v), "in radians where degrees are expected"),
+        (lambda v: 2 * v[::-1], "in reverse order"),
+        (lambda v: 6.2 * v, "3.1 times the expected one"),
+        (lambda v: 6 * v, "3 times the expected one, on every draw: a sum where a mean is meant?"),
+        (lambda v: 2 * v / 3, "1/3 of the expected one, on every draw: a mean where a sum is meant?"),
+        (lambda v: 2 * v + np.array([0, 0, 0.5]), "off by 0.5"),
+        (lambda v: v * v, "squared"),
+    ],
+)
+def test_general_layer_on_numbers(change, words):
+    outcome = DOUBLE.judge(change)
+    assert outcome.status == NOT_YET
+    assert words in outcome.text.lower(), outcome.text
+
+
+POSE = Exercise(
+    "pose",
+    reference=lambda T: T.copy(),
+    draw=lambda rng: (random_pose(rng),),
+    metric=metrics.Poses(),
+    hints=("a", "b", "c"),
+)
+
+
+def moved(T, R=None, t=None):
+    X = T.copy()
+    X[:3, :3] = T[:3, :3] if R is None else R
+    X[:3, 3] = T[:3, 3] if t is None else t
+    return X
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        (frames.invert, "inverse of the expected pose"),
+        (lambda T: moved(T, R=T[:3, :3].T), "rotation is transposed"),
+        (lambda T: moved(T, t=T[:3, 3] / 1000), "mm against m"),
+        (lambda T: moved(T, t=-T[:3, 3]), "opposite sign"),
+        (lambda T: moved(T, R=T[:3, :3] * (1, 1, -1)), "determinant is -1"),
+        (lambda T: moved(T, R=2 * T[:3, :3]), "not orthonormal"),
+        (lambda T: moved(T, t=T[:3, 3] + 5), "translation is not"),
+        (lambda T: moved(T, R=np.eye(3)), "rotation is not"),
+        (lambda T: T.T.copy(), "last row must be 0 0 0 1"),
+        (lambda T: T[:3], "expected an array of shape (4, 4)"),
+        (lambda T: frames.pose(T[:3, :3] @ frames.matrix_from_kuka([0, 0, 0, 0.1, 0, 0])[:3, :3], T[:3, 3] + 1), "deg"),
+    ],
+)
+def test_general_layer_on_poses(change, words):
+    outcome = POSE.judge(change)
+    assert outcome.status == NOT_YET
+    assert words in outcome.text, outcome.text
+
+
+def test_raised_error_names_line_and_call():
+    outcome = DOUBLE.judge(raising)
+    assert "division by zero" in outcome.text
+    assert "return 1 / 0" in outcome.text
+    assert "when called as double(v=[" in outcome.text
+
+
+def asserting(v):
+    raise AssertionError  # what a bare assert raises outside of pytest
+
+
+@pytest.mark.parametrize(
+    "answer, words",
+    [
+        (lambda v: np.eye(3) @ np.ones((5, 3)), "The inner sizes must agree"),
+        (lambda v: np.linalg.solve(np.zeros((2, 2)), np.ones(2)), "do not determine all unknowns"),
+        (lambda v: np.linalg.lstsq(np.ones((9, 2)), np.ones((3, 3)))[0], "`.ravel()`"),
+        (lambda v: math.sin(v), "`np.sin` and the like take arrays"),
+        (lambda v: np.array([[1, 2], [3]]), "different lengths"),
+        (lambda v: v if v > 0 else -v, "`np.where` chooses"),
+        (lambda v: v ^ 2, "write `**`"),
+        (lambda v: math.sqrt(-1.0), "np.clip"),
+        (lambda v: v * np.ones((5, 2)), "is `@` meant"),
+        (asserting, "handed over with `return`"),
+    ],
+)
+def test_what_numpy_means(answer, words):
+    outcome = DOUBLE.judge(answer)
+    assert outcome.status == RAISED and words in outcome.text
+
+
+def test_small_arguments_keep_their_digits():
+    assert engine._short(np.array([4e-8, -1.0e-9])) == "[ 4.e-08, -1.e-09]"
+    assert engine._short(np.array([4e-8, 2.0])) == "[0., 2.]"
+
+
+def test_a_near_wrong_value_is_told_from_a_rounded_right_one():
+    length = Value(
+        "length",
+        reference=lambda: 98.352,
+        unit="mm",
+        hints=("a", "b", "c"),
+        mistakes=[Mistake(lambda: 98.337, "y and z alone")],
+    )
+    assert length.judge(98.35).status == length.judge(98.4).status == CORRECT
+    assert length.judge(98.337).text == "y and z alone"
+
+
+def test_degrees_converted_twice_are_not_told_to_be_radians():
+    angle = Value("angle", reference=lambda: 2.5, unit="deg", hints=("a", "b", "c"))
+    assert "once too often" in angle.judge(np.rad2deg(2.5)).text
+    assert "in radians where degrees" in angle.judge(np.deg2rad(2.5)).text
+
+
+def test_the_rotation_alone_can_be_a_named_mistake_of_a_pose():
+    exercise = replace(INVERT, mistakes=(Mistake(lambda T: T[:3, :3].T, "the rotation alone"),))
+    assert exercise.judge(lambda T: T[:3, :3].T).text == "the rotation alone"
+
+
+def test_a_count_is_not_rounded():
+    count = Value("count", reference=lambda: 162, hints=("a", "b", "c"), rtol=1e-6)
+    assert "as far as it goes" not in count.judge(160).text
+    length = Value("length", reference=lambda: 162.37, hints=("a", "b", "c"), rtol=1e-6)
+    assert "as far as it goes" in length.judge(162).text
+
+
+def test_one_array_for_two_results_is_told_its_shape():
+    two = metrics.Several(metrics.Numbers(), metrics.Numbers(), names=("x", "cov"))
+    with pytest.raises(metrics.Refused, match=r"got one array of shape \(3,\)"):
+        two.admit(np.zeros(3), (0.0, 1.0))
+
+
+def test_a_function_among_the_arguments_is_shown_by_its_name():
+    assert engine._short(asserting) == "asserting"
+
+
+def test_a_word_may_be_written_in_more_than_one_way():
+    words = metrics.Exactly()
+    for written in ("not stationary", " Not_Stationary", "not-stationary"):
+        assert words.equal(words.admit(written, "not stationary"), "not stationary")
+    assert not words.equal(words.admit("notstationary", "not stationary"), "not stationary")
+
+
+def test_truth_values_are_no_indices():
+    exercise = Exercise(
+        "keep",
+        reference=lambda v: v > 0,
+        draw=lambda rng: (rng.normal(size=5),),
+        metric=metrics.Exactly(),
+        hints=("a", "b", "c"),
+    )
+    assert "an array of True and False" in exercise.judge(lambda v: (v > 0).astype(int)).text
+
+
+def test_a_rotation_is_a_rotation_also_within_a_loose_angle():
+    near = metrics.Rotations(1.0)
+    turn = exp_so3([0, 0, np.deg2rad(0.5)])
+    assert near.equal(turn, np.eye(3))
+    assert not near.equal(turn + 1e-4 * np.ones((3, 3)), np.eye(3))
+
+
+def test_wrong_on_some_draws_only_says_so():
+    exercise = Exercise(
+        "size",
+        reference=abs,
+        draw=lambda rng: (float(rng.choice([-1, 1]) * rng.uniform(1, 2)),),
+        metric=metrics.Numbers(),
+        hints=("a", "b", "c"),
+        draws=20,
+    )
+    text = exercise.judge(lambda v: v, rng=np.random.default_rng(0)).text
+    assert "which case is special?" in text and "Not right when called as size(v=-" in text
+
+
+def test_noisy_draw_catches_a_fit_that_is_exact_only_on_clean_data():
+    mean = Exercise(
+        "mean",
+        reference=np.mean,
+        draw=lambda rng: (np.full(9, rng.normal()),),
+        metric=metrics.Numbers(),
+        noisy=(lambda rng: (rng.normal(size=9),), metrics.Numbers(1e-6)),
+        hints=("a", "b", "c"),
+    )
+    assert mean.judge(lambda x: x.mean()).status == CORRECT
+    assert "on noisy data" in mean.judge(lambda x: x[0]).text
+
+
+def test_properties_judge_stochastic_code():
+    def unbiased(draw_one, rng):
+        mean = np.mean([draw_one(rng) for _ in range(400)])
+        return None if abs(mean - 0.5) < 0.1 else f"the mean of 400 draws is {mean:.2f}, expected about 0.5"
+
+    def uniform(rng):
+        return rng.uniform()
+
+    exercise = Exercise(
+        "uniform",
+        reference=uniform,
+        draw=lambda rng: (np.random.default_rng(int(rng.integers(2**31))),),
+        properties=[unbiased],
+        mistakes=[Mistake(lambda rng: rng.uniform() ** 2, "squared")],
+        hints=("a", "b", "c"),
+    )
+    assert exercise.judge(lambda rng: 1 - rng.uniform()).status == CORRECT
+    assert exercise.judge(lambda rng: rng.uniform() ** 2).text == "squared"
+    assert "the mean of 400" in exercise.judge(lambda rng: 0.3 * rng.uniform()).text
+    assert "ZeroDivisionError" in exercise.judge(lambda rng: 1 / 0).text
+
+
+def test_several_results_are_named():
+    exercise = Exercise(
+        "both",
+        reference=lambda v: (v, -v),
+        draw=lambda rng: (rng.normal(size=3),),
+        hints=("a", "b", "c"),
+        metric=metrics.Several(metrics.Numbers(unit="mm"), metrics.Numbers(), names=("tip", "pivot")),
+    )
+    assert exercise.judge(lambda v: [v, -v]).status == CORRECT
+    assert "pivot: your result is right up to its sign" in exercise.judge(lambda v: (v, v)).text.lower()
+    assert "expected 2 results (tip, pivot), got one array of shape (3,)" in exercise.judge(lambda v: v).text
+    assert "pivot: expected an array of shape (3,)" in exercise.judge(lambda v: (v, 1.0)).text
+
+
+# Values and predictions -----------------------------------------------------------------------------------------------
+
+LENGTH = Value(
+    "length",
+    reference=lambda: 1234.5,
+    unit="mm",
+    rtol=1e-4,
+    hints=("a", "b", "c"),
+    mistakes=[Mistake(lambda: 1000.0, "rounded")],
+)
+
+
+@pytest.mark.parametrize(
+    "answer, unit, status, words",
+    [
+        (1234.5, None, CORRECT, ""),
+        (np.array([1234.5]), None, CORRECT, ""),
+        (1.2345, "m", CORRECT, ""),
+        (1.2345, None, NOT_YET, "mm against m"),
+        (1000, None, NOT_YET, "rounded"),
+        (-1234.5, None, NOT_YET, "sign"),
+        (5, "deg", NOT_YET, "wanted in mm"),
+        (..., None, TO_DO, ""),
+        (None, None, TO_DO, ""),
+        ("long", None, NOT_YET, "expected a number"),
+        (np.nan, None, NOT_YET, "NaN"),
+        ([1, 2], None, NOT_YET, "expected a number"),
+        (77.0, None, NOT_YET, "not this value in mm"),
+    ],
+)
+def test_values_with_units(answer, unit, status, words):
+    outcome = LENGTH.judge(answer, unit)
+    assert (outcome.status, words in outcome.text) == (status, True), outcome
+
+
+SMALL = Chapter(
+    "98-small",
+    [
+        DOUBLE,
+        LENGTH,
+        Prediction("guess", question="Up or down?", choices=("up", "down"), answer="up", why="Because."),
+        Prediction("count", question="How many?", answer=10.0, unit="mm", why="Ten."),
+    ],
+)
+
+
+def test_names_are_bound_to_the_answer_or_the_reference(capsys):
+    ex = session.Course(SMALL)
+    assert ex.double(np.asarray) is scale
+    assert "stands for the reference" in capsys.readouterr().out
+
+    def mine(v):
+        return 2 * v
+
+    assert ex.double(mine) is mine
+    assert ex.length(1234.5) == 1234.5
+    assert ex.length(...) == 1234.5
+
+
+def test_a_reference_value_counts_but_does_not_show_itself(capsys):
+    hidden = session.Answer.reference(np.arange(12.0).reshape(3, 4))
+    for part in (hidden[0], hidden[:, 1], hidden[[0, 2]], hidden[1, 2], hidden.T, hidden.ravel(), *hidden):
+        assert str(part) == repr(part) == "(still to be found)"
+    assert str(hidden[:2] + 1) == str(np.arange(8.0).reshape(2, 4) + 1) and hidden[1, 2] + 0 == 6.0
+    hidden = session.Course(SMALL).length(...)
+    assert f"{hidden:.3f} {hidden} {hidden!r}" == "(still to be found) (still to be found) (still to be found)"
+    assert hidden + 1 == 1235.5
+    assert "1234" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "text, shown",
+    [
+        ("a loop", "A loop"), ("your result", "Your result"), ("is-it", "Is-it"), ("", ""), ("s0 divides by n", None),
+        ("x is NaN", None), ("`x` is", None), ("dt=0", None), ("T_AB is", None), ("3 of 5", None),
+    ],
+)  # fmt: skip
+def test_sentences_begin_with_a_capital_but_symbols_stay(text, shown):
+    assert session._sentence(text) == (text if shown is None else shown)
+
+
+def test_arguments_are_called_as_in_the_students_function():
+    def mine(row):
+        raise ValueError("no")
+
+    assert "double(row=" in DOUBLE.judge(mine).text
+    assert "double(v=" in DOUBLE.judge(lambda *rows: 1 / 0).text
+
+
+def test_what_raises_in_a_property_is_told_by_the_students_line():
+    def holds(student, rng):
+        return None if student(np.ones(3))[0] > 0 else "the first entry must be positive"
+
+    stochastic = Exercise(
+        "noise", reference=scale, draw=lambda rng: (np.ones(3),), properties=(holds,), hints=tuple("abc")
+    )
+
+    def broken(v):
+        return v / undefined  # noqa: F821
+
+    def failing(v):
+        raise ValueError("no")
+
+    assert (
+        "`undefined` is not known" in stochastic.judge(broken).text
+        and "return v / undefined" in stochastic.judge(broken).text
+    )
+    assert 'raise ValueError("no")' in stochastic.judge(failing).text
+    picky, cell = replace(stochastic, draws=0), {}
+    exec(compile("number = lambda v: len(v)\nalone = lambda: 1", "<cell>", "exec"), cell)
+    assert "could not be worked with" in picky.judge(cell["number"]).text
+    assert "cannot be called with (v)" in picky.judge(cell["alone"]).text
+
+
+def test_the_first_import_of_a_library_does_not_count(monkeypatch):
+    monkeypatch.delitem(sys.modules, "colorsys", raising=False)
+
+    def importing(v):
+        if "colorsys" not in sys.modules:
+            import colorsys  # noqa: F401
+
+            time.sleep(1.0)
+        return 2 * v
+
+    assert replace(DOUBLE, limit=0.3).judge(importing).status == CORRECT
+
+
+def test_a_slow_answer_still_meets_every_kind_of_draw(monkeypatch):
+    monkeypatch.setattr(time, "perf_counter", itertools.count(0.0, 3.0).__next__)  # every call takes 3 s
+    seen = []
+
+    def student(v):
+        seen.append(v[0])
+        return 2 * v
+
+    special = replace(DOUBLE, noisy=(lambda rng: (np.full(3, 7.0),), metrics.Numbers()))
+    assert special.judge(student).status == CORRECT
+    assert len(seen) == 3 and seen[-1] == 7.0
+
+
+def test_a_tall_system_is_told_of_lstsq():
+    assert "`lstsq` takes more" in DOUBLE.judge(lambda v: np.linalg.solve(np.ones((3, 2)), v)).text
+
+
+def test_an_exercise_may_allow_more_time_or_less():
+    def slow(v):
+        time.sleep(0.3)
+        return 2 * v
+
+    patient = replace(DOUBLE, draws=1)
+    assert patient.judge(slow).status == CORRECT
+    assert "did not finish within 0.1 s" in replace(patient, limit=0.1).judge(slow).text
+
+
+def test_feedback_never_shows_the_reference_result():
+    for answer in (lambda v: v, lambda v: v + 1, lambda v: np.zeros(2), lambda v: 1 / 0):
+        given = []
+
+        def spy(v, answer=answer, given=given):
+            given.append(v)
+            return answer(v)
+
+        text = DOUBLE.judge(spy).text
+        assert not any(f"{entry:.3f}" in text for v in given for entry in 2 * v)
+
+
+def test_strict_mode_raises_unless_correct(monkeypatch):
+    monkeypatch.setenv("LABKIT_STRICT", "1")
+    ex = session.Course(SMALL)
+    with pytest.raises(session.NotCorrect, match="double: to do"):
+        ex.double(lambda v: None)
+    with pytest.raises(session.NotCorrect, match="prediction"):
+        ex.predict("guess")
+    with pytest.raises(session.NotCorrect, match="not the right one"):
+        ex.predict("guess", "down")
+    assert ex.double(scale) is scale
+    ex.predict("guess", "up")
+
+
+def test_the_first_prediction_stays_and_reveals(capsys):
+    ex, shown = session.Course(SMALL), []
+    ex.predict("guess", "sideways", reveal=lambda: shown.append(1))
+    assert "Expected one of: up; down" in capsys.readouterr().out.replace("expected", "Expected")
+    assert not shown
+    ex.predict("guess", "Down", reveal=lambda: shown.append(1))
+    assert "Your prediction: down. What happens: up." in capsys.readouterr().out
+    ex.predict("guess", "up", reveal=lambda: shown.append(1))
+    assert "Your prediction: down." in capsys.readouterr().out
+    assert shown == [1, 1]
+    ex.predict("count", 11)
+    assert "Your prediction: 11.0 mm. That is what happens." in capsys.readouterr().out
+
+
+def test_a_click_locks_in_and_reveals():
+    import ipywidgets
+
+    box = session._question(SMALL, SMALL["guess"], lambda: ipywidgets.Label("the figure"))
+    buttons = box.children[1].children
+    assert [b.description for b in buttons] == ["up", "down"]
+    assert repr(box) == "[predict first: Up or down? up | down]"
+    buttons[0].click()
+    assert box.children[1].value == "the figure"
+    assert ("98-small", "guess") in progress.solved()
+
+
+def test_unknown_names_are_answered_with_the_known_ones():
+    ex = session.course("01-frames")
+    with pytest.raises(AttributeError, match="did you mean 'invert'"):
+        _ = ex.inverse
+    with pytest.raises(AttributeError, match="no prediction"):
+        ex.predict("nothing")
+    with pytest.raises(ValueError, match="there is no chapter '77-none'; there are .*01-frames"):
+        session.course("77-none")
+
+
+# Hints, solution, progress --------------------------------------------------------------------------------------------
+
+
+def test_hints_come_one_after_the_other(capsys):
+    ex = session.course("01-frames")
+    for number in (1, 2, 3, 1):
+        ex.invert.hint()
+        assert f"hint {number} of 3" in capsys.readouterr().out
+    ex.invert.hint(2)
+    assert INVERT.hints[1] in capsys.readouterr().out
+    with pytest.raises(ValueError, match="hints 1, 2 and 3"):
+        ex.invert.hint(4)
+
+
+def test_hints_advance_where_nothing_can_be_written(capsys, monkeypatch, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    monkeypatch.setenv("LABKIT_PROGRESS", str(blocked / "progress.jsonl"))
+    ex = session.course("01-frames")
+    ex.invert.hint()
+    ex.invert.hint()
+    assert "hint 2 of 3" in capsys.readouterr().out
+
+
+def test_solution_and_starter_come_from_the_source(capsys):
+    ex = session.course("01-frames")
+    ex.invert.solution()
+    shown = capsys.readouterr().out
+    assert ".T" in shown and "SOLUTION" not in shown
+    ex.invert.starter()
+    shown = capsys.readouterr().out
+    assert "def invert" in shown and "your code here" in shown
+
+
+def test_progress_is_counted_and_started_over():
+    ex = session.course("01-frames")
+    ex.invert(frames.invert)
+    assert ("01-frames", "invert") in progress.solved()
+    assert "1 of" in session.progress_text().split("01-frames")[1].splitlines()[0]
+    ex.invert.reset()
+    assert ("01-frames", "invert") not in progress.solved()
+
+
+def test_progress_survives_broken_lines_and_two_writers():
+    progress.record("c", "a", "correct")
+    with open(progress.path(), "a", encoding="utf-8") as file:
+        file.write('{"chapter": "c", "exer')
+    writers = [
+        threading.Thread(target=lambda k=k: [progress.record("c", f"e{k}_{i}", "correct") for i in range(50)])
+        for k in range(4)
+    ]
+    for writer in writers:
+        writer.start()
+    for writer in writers:
+        writer.join()
+    assert len(progress.solved()) == 201
+    lines = progress.path().read_text(encoding="utf-8").splitlines()
+    assert sum(1 for line in lines if not line.endswith("}")) == 1
+    assert json.loads(lines[-1])["event"] == "correct"
+
+
+def test_button_row_shows_hint_solution_and_starter():
+
+    bound = session.course("01-frames").invert
+    row = feedback.button_row(bound._next_hint, bound._solution, bound._start_over)
+    assert repr(row) == "[buttons: hint, solution, start over]"
+    hint, solution, again = row.children[0].children
+    hint.click()
+    assert "hint 1 of 3" in row.children[1].value and hint.description == "Hint (2 left)"
+    solution.click()
+    assert "a solution" in row.children[1].value
+    again.click()
+    assert "your code here" in row.children[1].value
+
+
+def test_panel_is_readable_without_color_and_by_a_screen_reader():
+
+    panel = Panel("invert: not yet", ["Use `R.T`, not <R>."], NOT_YET)
+    assert repr(panel) == "✗ invert: not yet\nUse `R.T`, not <R>."
+    html = panel.html()
+    assert 'role="status"' in html and "<code>R.T</code>" in html and "&lt;R&gt;" in html
+    assert "var(--jp-" in html and "<script" not in html and " id=" not in html
+
+
+def test_malformed_definitions_are_refused():
+    with pytest.raises(ValueError, match="three hints, got 2"):
+        Exercise("x", reference=abs, draw=lambda rng: (1,), metric=metrics.Numbers(), hints=("a", "b"))
+    with pytest.raises(ValueError, match="none of the choices"):
+        Prediction("x", question="?", choices=("a",), answer="b")
+    with pytest.raises(ValueError, match="'double' is taken"):
+        Chapter("98-x", [DOUBLE, DOUBLE])
+    with pytest.raises(ValueError, match="metric or properties"):
+        Exercise("x", reference=abs, draw=lambda rng: (1,), hints=("a", "b", "c"))
+
+
+# What a student's walk through the first chapters taught --------------------------------------------------------------
+
+
+def test_an_array_that_stands_for_the_reference_is_not_shown(capsys):
+    saddle = np.array([0.169, -0.246])
+    place = Value("place", reference=lambda: saddle, hints=("a", "b", "c"), metric=metrics.Numbers(1e-6))
+    bound = session.Course(Chapter("98-place", [place])).place(...)
+    assert f"{bound} {bound!r}" == "(still to be found) (still to be found)"
+    np.testing.assert_array_equal(bound + 1, saddle + 1)
+    assert "0.169" in repr(bound + 1 - 1) and "0.169" not in capsys.readouterr().out
+    assert place.judge([0.17, -0.25]).text.startswith("right as far as it goes")
+
+
+@pytest.mark.parametrize(
+    "answer, words", [(1230.0, "not a rounded one"), (1235, "not a rounded one"), (1100.0, "not this")]
+)
+def test_rounded_values_are_told_so(answer, words):
+    assert words in LENGTH.judge(answer).text
+
+
+def test_words_count_without_their_case_and_wrong_ones_are_quoted():
+    kind = Exercise(
+        "kind", reference=lambda x: "minimum", draw=lambda rng: (1.0,), metric=metrics.Exactly(), hints=("a", "b", "c")
+    )
+    assert kind.judge(lambda x: " Minimum").status == CORRECT
+    assert kind.judge(lambda x: "low").text == "`'low'` is not the answer here."
+
+
+def test_a_name_from_a_cell_not_yet_run_is_explained():
+    outcome = DOUBLE.judge(lambda v: normalize(v))  # noqa: F821
+    assert outcome.status == RAISED
+    assert "`normalize` is not known: has the cell that defines it been run since the kernel started?" in outcome.text
+
+
+def test_questions_end_without_a_second_mark():
+    assert DOUBLE.judge(lambda v: [None] and np.array(v, copy=True).fill(0)).text.endswith("missing?")
+
+
+def test_the_pole_is_checked_apart():
+    def one_by_one(T):
+        b = np.arctan2(-T[2, 0], np.hypot(T[0, 0], T[1, 0]))
+        return np.array([*T[:3, 3], np.arctan2(T[1, 0], T[0, 0]), b, np.arctan2(T[2, 1], T[2, 2])])
+
+    def zero_at_the_pole(T):
+        return np.zeros(6) if abs(T[2, 0]) > 0.9999 else one_by_one(T)
+
+    exercise = CHAPTER["kuka_from_matrix"]
+    assert "rounding noise" in exercise.judge(one_by_one).text
+    assert exercise.judge(zero_at_the_pole).text.startswith("right away from the pole, but at B = 90 deg")

@@ -1,0 +1,65 @@
+"""Exponential and logarithm against SciPy and scipy.linalg.expm."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+
+from labkit.geometry import lie
+
+ANGLES = [0.0, 1e-12, 1e-8, 1e-5, 1e-3, 0.1, 1.0, 3.0, 3.14159, np.pi - 1e-8]
+
+
+def vectors(length, n=20):
+    v = np.random.default_rng(2).normal(size=(n, 3))
+    return length * v / np.linalg.norm(v, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+def test_so3_round_trip_and_scipy(angle):
+    phi = vectors(angle)
+    R = lie.exp_so3(phi)
+    np.testing.assert_allclose(R, Rotation.from_rotvec(phi).as_matrix(), atol=3e-15)
+    np.testing.assert_allclose(lie.log_so3(R), phi, atol=1e-12)
+
+
+def test_log_at_pi_returns_a_half_turn():
+    R = Rotation.from_rotvec(vectors(np.pi)).as_matrix()
+    phi = lie.log_so3(R)
+    np.testing.assert_allclose(np.linalg.norm(phi, axis=1), np.pi)
+    np.testing.assert_allclose(lie.exp_so3(phi), R, atol=1e-7)
+
+
+@pytest.mark.parametrize("angle", ANGLES[:-2])
+def test_se3_against_the_matrix_exponential(angle):
+    xi = np.c_[vectors(angle), np.random.default_rng(3).normal(size=(20, 3))]
+    for x in xi:
+        generator = np.zeros((4, 4))
+        generator[:3, :3], generator[:3, 3] = lie.skew(x[:3]), x[3:]
+        np.testing.assert_allclose(lie.exp_se3(x), expm(generator), atol=1e-13)
+    np.testing.assert_allclose(lie.log_se3(lie.exp_se3(xi)), xi, atol=1e-9)
+
+
+def test_adjoint_moves_a_twist_to_the_other_side():
+    twists, xi = np.random.default_rng(4).normal(size=(2, 10, 6))
+    T = lie.exp_se3(0.6 * twists)
+    left = T @ lie.exp_se3(xi) @ np.linalg.inv(T)
+    np.testing.assert_allclose(lie.exp_se3((lie.adjoint(T) @ xi[..., None])[..., 0]), left, atol=1e-10)
+
+
+def test_left_jacobian_by_finite_differences():
+    phi, h = np.array([0.4, -0.7, 0.2]), 1e-6
+    for k, d in enumerate(np.eye(3)):
+        turned = lie.log_so3(lie.exp_so3(phi + h * d) @ lie.exp_so3(phi).T) / h
+        np.testing.assert_allclose(lie.left_jacobian_so3(phi)[:, k], turned, atol=1e-6)
+
+
+def test_nearest_rotation_is_the_nearest():
+    rng = np.random.default_rng(6)
+    M = Rotation.random(8, rng).as_matrix() + 0.2 * rng.normal(size=(8, 3, 3))
+    M[0] *= -1
+    R = lie.nearest_rotation(M)
+    np.testing.assert_allclose(np.linalg.det(R), 1)
+    best = np.linalg.norm(R - M, axis=(1, 2))
+    for other in Rotation.random(200, rng).as_matrix():
+        assert (np.linalg.norm(other - M, axis=(1, 2)) >= best - 1e-12).all()

@@ -1,0 +1,173 @@
+"""The TX40's kinematics against elementary transforms, finite differences and the data sheet."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from labkit.geometry.frames import pose, pose_distance
+from labkit.machines.arm import (
+    BASE_HEIGHT,
+    HOME,
+    REACH_FLANGE,
+    REACH_FOREARM,
+    REACH_WRIST,
+    SHOULDER_OFFSET,
+    TX40,
+    _ramp,
+    arm_points,
+    dh_matrix,
+    forward_kinematics,
+    inverse_kinematics,
+    jacobian,
+    joint_speeds,
+    measuring_poses,
+    pose_error,
+    reach_position,
+    rotation_only,
+    smooth_motion,
+    tool_pose,
+    within_limits,
+    wrist_reach,
+)
+
+RNG = np.random.default_rng(60)
+Q = RNG.uniform(TX40.q_min, TX40.q_max, (50, 6))
+
+
+def elementary(theta, d, a, alpha):
+    """Rot(z) Trans(z) Trans(x) Rot(x), multiplied out one by one with SciPy's rotations."""
+    turn_z, turn_x = Rotation.from_rotvec([0, 0, theta]).as_matrix(), Rotation.from_rotvec([alpha, 0, 0]).as_matrix()
+    zero = np.zeros(3)
+    return pose(turn_z, zero) @ pose(np.eye(3), [0, 0, d]) @ pose(np.eye(3), [a, 0, 0]) @ pose(turn_x, zero)
+
+
+def test_dh_matrix_is_the_product_of_four_elementary_transforms():
+    for row in RNG.uniform(-3, 3, (20, 4)):
+        np.testing.assert_allclose(dh_matrix(*row), elementary(*row), atol=1e-14)
+
+
+def test_dh_matrix_broadcasts():
+    rows = RNG.uniform(-3, 3, (4, 5, 1))
+    T = dh_matrix(rows[0], rows[1], rows[2].T, 0.3)
+    assert T.shape == (5, 5, 4, 4)
+    np.testing.assert_allclose(T[2, 3], dh_matrix(rows[0, 2, 0], rows[1, 2, 0], rows[2, 3, 0], 0.3))
+
+
+def test_forward_kinematics_is_the_product_of_the_links_and_broadcasts():
+    T = forward_kinematics(TX40.dh, Q.reshape(5, 10, 6))
+    for k in range(10):
+        expected = np.eye(4)
+        for (offset, d, a, alpha), angle in zip(TX40.dh, Q[k]):
+            expected = expected @ elementary(offset + angle, d, a, alpha)
+        np.testing.assert_allclose(T[0, k], expected, atol=1e-10)
+
+
+def test_the_arm_stands_upright_at_zero():
+    T = forward_kinematics(TX40.dh, np.zeros(6))
+    upright = BASE_HEIGHT + REACH_FLANGE
+    np.testing.assert_allclose(T, pose(np.eye(3), [0, SHOULDER_OFFSET, upright]), atol=1e-10)
+
+
+def test_jacobian_against_central_differences():
+    h = 1e-6
+    for q in Q[:10]:
+        J = jacobian(TX40.dh, q)
+        for k in range(6):
+            step = h * np.eye(6)[k]
+            left, right = forward_kinematics(TX40.dh, q - step), forward_kinematics(TX40.dh, q + step)
+            turn = Rotation.from_matrix(right[:3, :3] @ left[:3, :3].T).as_rotvec()
+            np.testing.assert_allclose(J[:, k], np.concatenate([turn, right[:3, 3] - left[:3, 3]]) / (2 * h), atol=1e-5)
+
+
+def test_inverse_kinematics_reaches_the_measuring_poses():
+    joints = measuring_poses(TX40, np.random.default_rng(1))
+    T = forward_kinematics(TX40.dh, joints)
+    q, reached = inverse_kinematics(TX40, T, HOME)
+    assert reached.all() and within_limits(TX40, q).all()
+    angle, distance = pose_distance(forward_kinematics(TX40.dh, q), T)
+    assert angle.max() < 1e-8 and distance.max() < 1e-5
+
+
+def test_inverse_kinematics_says_what_is_out_of_reach():
+    far = pose(np.eye(3), [2000.0, 0, 0])
+    q, reached = inverse_kinematics(TX40, far, HOME)
+    assert not reached and within_limits(TX40, q)
+
+
+def test_measuring_poses_are_reachable_and_spread_out():
+    joints = measuring_poses(TX40, np.random.default_rng(3), count=30)
+    T = forward_kinematics(TX40.dh, joints)
+    assert joints.shape == (30, 6) and within_limits(TX40, joints).all() and (T[:, 2, 2] >= 0.3).all()
+    with pytest.raises(ValueError, match="widen spread or box"):
+        measuring_poses(TX40, np.random.default_rng(3), box=[[0, 0, 0], [1, 1, 1]])
+
+
+def test_data_sheet_reaches():
+    in_plane, shoulder, elbow = wrist_reach(TX40, Q)
+    assert in_plane.max() <= REACH_WRIST + 1e-9 and shoulder.max() <= REACH_WRIST + 1e-9
+    np.testing.assert_allclose(elbow, REACH_FOREARM)
+    fold = TX40.q_max[2]  # law of cosines, and the legs of the right triangle with the arm upright
+    folded = wrist_reach(TX40, [0, 0, fold, 0, 0, 0])
+    np.testing.assert_allclose(folded[1], 2 * 225 * np.cos(fold / 2))
+    np.testing.assert_allclose(folded[0], 225 * np.sin(fold))
+
+
+@pytest.mark.parametrize("ends", [0.05, 0.12, 0.5])
+def test_ramp_starts_and_ends_at_rest_and_is_symmetric(ends):
+    s = np.linspace(0, 1, 2001)
+    u = _ramp(s, ends)
+    speed = np.gradient(u, s)
+    np.testing.assert_allclose(u[[0, 1000, 2000]], [0, 0.5, 1], atol=1e-12)
+    np.testing.assert_allclose(u + u[::-1], 1, atol=1e-12)
+    assert speed[0] < 1e-4 and speed[-1] < 1e-4 and (speed > -1e-9).all()
+    np.testing.assert_allclose(speed.max(), 1 / (1 - ends), rtol=1e-3)
+
+
+def test_smooth_motion_passes_its_points_within_the_joint_speeds():
+    via = HOME + RNG.uniform(-0.3, 0.3, (4, 6))
+    time, q = smooth_motion(via, 4.0, 100)
+    np.testing.assert_allclose(q[[0, -1]], via[[0, -1]], atol=1e-12)
+    assert all(np.abs(q - point).max(1).min() < 0.02 for point in via)
+    assert (np.abs(joint_speeds(time, q)) < TX40.speed).all()
+
+
+def test_rotation_only_leaves_the_tool_where_it_is():
+    T_FE = pose(Rotation.from_rotvec([0.1, 0.2, 0]).as_matrix(), [10, 20, 50])
+    time, q = rotation_only(TX40, T_FE, HOME, np.eye(3), 0.4, 6.0, 50)
+    T = tool_pose(TX40, q, T_FE)
+    assert np.abs(T[:, :3, 3] - T[0, :3, 3]).max() < 1e-4
+    turned = pose_distance(T[0], T)[0]
+    np.testing.assert_allclose(turned.max(), 0.4, atol=1e-3)
+    with pytest.raises(ValueError, match="cannot be reached"):
+        rotation_only(TX40, T_FE, HOME, np.eye(3), 3.0, 6.0, 20)
+
+
+@pytest.mark.parametrize(
+    "call, words",
+    [
+        (lambda: forward_kinematics(TX40.dh, np.zeros(5)), r"q must have shape \(\.\.\., 6\)"),
+        (lambda: forward_kinematics(np.zeros((6, 3)), np.zeros(6)), r"dh must have shape \(n, 4\)"),
+        (lambda: forward_kinematics(TX40.dh, [0, 0, np.nan, 0, 0, 0]), "q must be finite"),
+        (lambda: smooth_motion([HOME], 1, 10), "at least 2 joint positions"),
+    ],
+)
+def test_refusals(call, words):
+    with pytest.raises(ValueError, match=words):
+        call()
+
+
+def test_pose_error_is_what_leads_to_the_goal():
+    rng = np.random.default_rng(4)
+    T = forward_kinematics(TX40.dh, rng.uniform(-1, 1, (5, 6)))
+    goal = forward_kinematics(TX40.dh, rng.uniform(-1, 1, (5, 6)))
+    error = pose_error(T, goal)
+    turned = Rotation.from_rotvec(error[:, :3]).as_matrix() @ T[:, :3, :3]
+    np.testing.assert_allclose(turned, goal[:, :3, :3], atol=1e-12)
+    np.testing.assert_allclose(T[:, :3, 3] + error[:, 3:], goal[:, :3, 3], atol=1e-9)
+
+
+def test_three_joints_reach_a_position_and_leave_the_wrist_alone():
+    goal = forward_kinematics(TX40.dh, HOME + [0.3, -0.2, 0.1, 0.0, 0.0, 0.0])[:3, 3]
+    q = reach_position(TX40, goal, HOME)
+    np.testing.assert_allclose(arm_points(TX40, q)[-1], goal, atol=1e-5)
+    np.testing.assert_array_equal(q[3:], HOME[3:])

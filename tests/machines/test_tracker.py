@@ -1,0 +1,352 @@
+"""Packets, logs, the mounting by the report's equations, errors in motion, and the synthetic data."""
+
+import importlib
+import sys
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from labkit.calibration import ax_xb
+from labkit.chapters.ch06_tracker import exercises as ch06
+from labkit.documents.report.reconstruction import synthetic_mountings
+from labkit.geometry.frames import invert, pose, pose_distance
+from labkit.geometry.lie import exp_so3
+from labkit.machines import simulation
+from labkit.machines.accuracy import filter_positions, shift_time, speeds, summarize, time_offset, tracking_errors
+from labkit.machines.arm import TX40, forward_kinematics
+from labkit.machines.log import Log, average_stops, mean_pose, read_csv, reject_outliers, write_csv
+from labkit.machines.mounting import calibrate_mounting, e_rot, e_trans
+from labkit.machines.packet import (
+    FIELDS,
+    PACKET,
+    VELOCITY,
+    decode_packet,
+    encode_packet,
+    packet_from_pose,
+    poses_from_packets,
+)
+from labkit.machines.simulation import T_FE
+from labkit.tables import DATA, read_table
+
+
+def some_poses(rng, n):
+    return pose(Rotation.random(n, random_state=int(rng.integers(1 << 30))).as_matrix(), rng.uniform(-900, 900, (n, 3)))
+
+
+# ---- packet
+
+
+def test_packet_has_the_offsets_of_table_1():
+    table = read_table("tracker/packet.csv", text=("bytes", "meaning"))
+    assert len(table["bytes"]) == len(FIELDS) == 23 and PACKET.size == 184
+    for k, span in enumerate(table["bytes"]):
+        first, last = map(int, span.split("-"))
+        values = np.zeros(23)
+        values[k] = 1.0
+        data = encode_packet(values)
+        assert data[first : last + 1] == np.array(1.0, dtype="<f8").tobytes()
+        assert not any(data[:first]) and not any(data[last + 1 :])
+
+
+def test_packets_carry_poses_there_and_back():
+    T = some_poses(np.random.default_rng(1), 20)
+    values = packet_from_pose(T, np.arange(20) / 250, velocity=np.full((20, 3), 100.0))
+    decoded = np.array([decode_packet(encode_packet(v)) for v in values])
+    np.testing.assert_array_equal(decoded, values)
+    np.testing.assert_allclose(poses_from_packets(decoded), T, atol=1e-9)
+    np.testing.assert_allclose(decoded[:, VELOCITY], 0.1)
+
+
+def good():
+    return packet_from_pose(np.eye(4), 0.0)
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        (lambda v: v[:-1].tobytes(), "length: expected 184 bytes"),
+        (lambda v: v.tobytes() + b"x", "length"),
+        (lambda v: np.where(np.arange(23) == 7, np.nan, v).tobytes(), "not finite"),
+        (lambda v: np.where(np.arange(23) == 20, -np.inf, v).tobytes(), "not finite"),
+        (lambda v: np.where(np.arange(23) == 14, 0.9, v).tobytes(), "quaternion"),
+        (lambda v: np.where(np.arange(23) == 3, 500.0, v).tobytes(), "more than 10 m away"),
+        (lambda v: b"", "length"),
+    ],
+)
+def test_bad_packets_are_refused_with_the_reason(change, words):
+    with pytest.raises(ValueError, match=words):
+        decode_packet(change(good()))
+
+
+# ---- log
+
+
+def a_log(n=30):
+    rng = np.random.default_rng(2)
+    return Log(np.arange(n) / 10, some_poses(rng, n), np.arange(n) // 10)
+
+
+@pytest.mark.parametrize("unit", ["m", "mm"])
+def test_log_there_and_back(tmp_path, unit):
+    log = a_log()
+    write_csv(tmp_path / "log.csv", log, unit)
+    back = read_csv(tmp_path / "log.csv")
+    np.testing.assert_allclose(back.time, log.time)
+    np.testing.assert_array_equal(back.stop, log.stop)
+    angle, distance = pose_distance(back.T_WE, log.T_WE)
+    assert angle.max() < 5e-6 and distance.max() < 0.01
+    write_csv(tmp_path / "plain.csv", Log(log.time, log.T_WE, None), unit)
+    assert read_csv(tmp_path / "plain.csv").stop is None
+
+
+def spoil_line(text, number, change):
+    lines = text.splitlines()
+    lines[number - 1] = change(lines[number - 1])
+    return "\n".join(lines) + "\n"
+
+
+def in_millimeters(line):
+    time, stop, *rest = line.split(",")
+    return ",".join([time, stop, *(f"{1000 * float(v):.2f}" for v in rest[:3]), *rest[3:]])
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        (lambda t: "", "the file is empty"),
+        (lambda t: t[:-20], "line 31: the file ends in the middle of this line"),
+        (
+            lambda t: spoil_line(t, 1, lambda h: h.replace("y [m]", "y [mm]")),
+            "line 1: x, y and z must share one unit, got m, mm, m",
+        ),
+        (lambda t: spoil_line(t, 1, lambda h: h.replace("[m]", "[in]")), "line 1: lengths must be in m or mm, got in"),
+        (lambda t: spoil_line(t, 1, lambda h: h.replace("qx", "qw")), "line 1: a column name appears twice"),
+        (lambda t: spoil_line(t, 1, lambda h: h.replace("qx", "Qx")), "line 1: expected a column 'qx'"),
+        (lambda t: spoil_line(t, 7, lambda line: line + ",1"), "line 7: expected 9 entries, got 10"),
+        (lambda t: spoil_line(t, 9, lambda line: line.replace(",", ";", 3)), "line 9: expected 9 entries, got 6"),
+        (lambda t: spoil_line(t, 5, lambda line: line.replace("0.3", "O.3", 1)), "line 5: expected a number, got 'O.3"),
+        (lambda t: spoil_line(t, 6, lambda line: "nan" + line[5:]), "line 6: a number is not finite"),
+        (lambda t: spoil_line(t, 8, lambda line: "0.000" + line[5:]), "line 8: time does not increase"),
+        (
+            lambda t: spoil_line(t, 4, lambda line: line.rsplit(",", 1)[0] + ",3"),
+            "line 4: the quaternion is not of length 1",
+        ),
+        (lambda t: spoil_line(t, 12, in_millimeters), "line 12: .*another unit"),
+    ],
+)
+def test_broken_logs_are_refused_with_the_line(tmp_path, change, words):
+    path = tmp_path / "log.csv"
+    write_csv(path, a_log())
+    path.write_text(change(path.read_text()))
+    with pytest.raises(ValueError, match=words):
+        read_csv(path)
+
+
+def test_rows_in_another_unit_inside_the_tracking_area(tmp_path):
+    """Positions of some millimeters, written in mm in a file of meters, stay within 10 m; the jump gives them away."""
+    n = 20
+    T = np.tile(np.eye(4), (n, 1, 1))
+    T[:, :3, 3] = [400.0, 200.0, 100.0] + np.arange(n)[:, None]
+    path = tmp_path / "log.csv"
+    write_csv(path, Log(np.arange(n) / 10, T, None), "mm")
+    lines = path.read_text().splitlines()
+    for k in range(10, n + 1):
+        time, *rest = lines[k].split(",")
+        lines[k] = ",".join([time, *(f"{float(v) / 1000:.5f}" for v in rest[:3]), *rest[3:]])
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(ValueError, match="line 11: the position jumps by a factor of 1000"):
+        read_csv(path)
+
+
+# ---- mounting
+
+
+def readings(rng, n=21, noise=0.0):
+    """Poses of the flange, and what a tracker mounted at T_FE reports in the frame of its first reading."""
+    T_BF = pose(exp_so3(0.6 * rng.normal(size=(n, 3))), rng.uniform(-200, 200, (n, 3)))
+    T_BE = T_BF @ T_FE
+    T_BE = pose(
+        T_BE[:, :3, :3] @ exp_so3(1e-3 * noise * rng.normal(size=(n, 3))),
+        T_BE[:, :3, 3] + noise * rng.normal(size=(n, 3)),
+    )
+    return T_BF, invert(T_BE[0]) @ T_BE
+
+
+def test_mounting_is_exact_without_noise():
+    m = calibrate_mounting(*readings(np.random.default_rng(3)))
+    angle, distance = pose_distance(m.T_FE, T_FE)
+    assert angle < 1e-9 and distance < 1e-8 and m.kept.all() and m.E_rot < 1e-15 and m.E_trans < 1e-9
+    assert m.rotation[0] == m.translation[0] == 0
+
+
+def test_errors_are_what_the_equations_say():
+    """E_rot and E_trans from the report's matrices, written out with Kronecker products."""
+    T_BF, T_WE = readings(np.random.default_rng(4), 12, noise=1.0)
+    m = calibrate_mounting(T_BF, T_WE, factor=1e9)
+    A, B = np.linalg.inv(T_BF[0]) @ T_BF[1:], np.linalg.inv(T_WE[0]) @ T_WE[1:]
+    M = np.concatenate([np.kron(np.eye(3), a[:3, :3]) - np.kron(b[:3, :3].T, np.eye(3)) for a, b in zip(A, B)])
+    w, V = np.linalg.eigh(M.T @ M)
+    np.testing.assert_allclose(m.E_rot, np.linalg.norm(M.T @ M @ V[:, 0]) / 10, rtol=1e-6)
+    np.testing.assert_allclose(m.E_rot, w[0] / 10, rtol=1e-6)
+    R, t = m.T_FE[:3, :3], m.T_FE[:3, 3]
+    K1 = np.concatenate([np.eye(3) - a[:3, :3] for a in A])
+    K2 = np.concatenate([a[:3, 3] - R @ b[:3, 3] for a, b in zip(A, B)])
+    np.testing.assert_allclose(t, np.linalg.inv(K1.T @ K1) @ K1.T @ K2, atol=1e-8)
+    np.testing.assert_allclose(m.E_trans, np.linalg.norm(K1 @ t - K2) / 10, rtol=1e-9)
+    predicted = np.linalg.inv(m.T_FE) @ A @ m.T_FE
+    angle, distance = pose_distance(predicted, B)
+    np.testing.assert_allclose(m.rotation[1:], angle, rtol=1e-6)
+    np.testing.assert_allclose(m.translation[1:], distance, rtol=1e-9)
+
+
+def test_small_errors_make_e_rot_two_thirds_of_the_mean_squared_angle():
+    """What the ledger uses to tell the unit of appendix D: E_rot = 2/3 sum(angle^2) / (N - 1) for a null vector of
+    length 1."""
+    m = calibrate_mounting(*readings(np.random.default_rng(5), 21, noise=3.0), factor=1e9)
+    np.testing.assert_allclose(m.E_rot, 2 / 3 * (m.rotation[1:] ** 2).sum() / 19, rtol=0.01)
+
+
+def test_a_pose_of_nonsense_is_left_out():
+    T_BF, T_WE = readings(np.random.default_rng(6), 21, noise=0.5)
+    T_WE[7] = T_WE[7] @ pose(exp_so3([0.3, 0, 0.2]), [80.0, -60.0, 10.0])
+    m = calibrate_mounting(T_BF, T_WE)
+    assert np.flatnonzero(~m.kept).tolist() == [7] and np.isnan(m.translation[7])
+    assert pose_distance(m.T_FE, T_FE)[1] < 2
+
+
+def test_reject_outliers_by_the_rule():
+    values = np.array([1.0, 1.1, 0.9, 1.05, 0.95, 9.0])
+    np.testing.assert_array_equal(reject_outliers(values), [True] * 5 + [False])
+    np.testing.assert_array_equal(reject_outliers(np.ones(5)), [True] * 5)
+    clean = np.random.default_rng(7).normal(size=20000)
+    assert abs(1 - reject_outliers(clean, 2.0).mean() - 0.0455) < 0.005  # the scale is a standard deviation
+    two = np.column_stack([values, np.r_[50.0, values[:-1]]])
+    np.testing.assert_array_equal(reject_outliers(two), [False, True, True, True, True, False])
+
+
+def test_stops_are_averaged_without_their_outliers():
+    rng = np.random.default_rng(8)
+    T = pose(exp_so3(1e-3 * rng.normal(size=(40, 3))), [100.0, 0, 0] + 0.3 * rng.normal(size=(40, 3)))
+    clean = mean_pose(T[:30])
+    T[30:, :3, 3] += 300
+    mean, used = average_stops(Log(np.arange(40) / 10, T, np.zeros(40, int)))
+    assert used[0] == 0.75
+    angle, distance = pose_distance(mean[0], clean)
+    assert angle < 1e-9 and distance < 1e-9
+
+
+# ---- motion
+
+
+def test_speeds_of_a_known_rotation_do_not_depend_on_frames():
+    time = np.arange(200) / 100
+    T = pose(
+        exp_so3(np.outer(0.7 * time, [0, 0, 1])),
+        np.column_stack([300 * np.cos(0.7 * time), 300 * np.sin(0.7 * time), 0 * time]),
+    )
+    v, w = speeds(time, T)
+    np.testing.assert_allclose(w, 0.7, rtol=1e-6)
+    np.testing.assert_allclose(v, 210, rtol=1e-4)
+    G = some_poses(np.random.default_rng(9), 1)[0]
+    np.testing.assert_allclose(speeds(time, G @ T), (v, w), rtol=1e-9)
+    np.testing.assert_allclose(speeds(time, T @ G)[1], w, rtol=1e-9)
+
+
+@pytest.mark.parametrize("delay", [-0.031, 0.0, 0.0123, 0.1])
+def test_time_offset_to_a_fraction_of_a_sample(delay):
+    time = np.arange(2000) / 250
+
+    def curve(t):
+        return 1 + np.sin(2 * t) + 0.5 * np.cos(5 * t)
+
+    rng = np.random.default_rng(10)
+    found = time_offset(time, curve(time), curve(time - delay) + 0.03 * rng.normal(size=2000))
+    assert abs(found - delay) < 5e-4
+
+
+def test_shift_time_undoes_a_latency():
+    motion = simulation.simulate_motion(
+        "slow",
+        np.random.default_rng(1),
+        simulation.Tracker(0, 0, 0, 0, field_position=0, field_rotation=0, latency=0.05),
+    )
+    late = tracking_errors(motion.time, motion.T_true, motion.T_read)
+    mended = shift_time(motion.time, motion.T_read, 0.05)
+    inside = slice(20, -20)
+    expected = 0.05 * speeds(motion.time, motion.T_true)[0][inside]
+    np.testing.assert_allclose(late.translation[inside], expected, atol=0.8)
+    assert pose_distance(mended[inside], motion.T_true[inside])[1].max() < 0.05
+
+
+def test_summary_of_known_errors():
+    s = summarize(np.arange(101.0))
+    assert s["mean"] == s["median"] == 50 and s["95 %"] == 95 and s["max"] == 100
+    np.testing.assert_allclose(s["RMS"], np.sqrt(100 * 201 / 6))
+
+
+def test_filter_rejects_nonsense_and_follows_the_motion():
+    motion = simulation.simulate_motion("middle", np.random.default_rng(11))
+    filtered, used = filter_positions(motion.time, motion.T_read[:, :3, 3])
+    assert (used[~motion.nonsense].mean() > 0.99) and not used[motion.nonsense].any()
+    raw = np.linalg.norm(motion.T_read[:, :3, 3] - motion.T_true[:, :3, 3], axis=1)
+    smooth = np.linalg.norm(filtered - motion.T_true[:, :3, 3], axis=1)
+    assert smooth.mean() < 0.6 * raw.mean() and smooth.max() < 0.1 * raw.max()
+
+
+def test_motions_keep_joint_limits_and_speeds():
+    for name in ("slow", "middle", "fast", "rotation"):
+        time, q = simulation.robot_motion(name, 100)
+        robot = TX40
+        assert forward_kinematics(robot.dh, q)[:, 2, 3].min() > 0
+        assert ((q > robot.q_min) & (q < robot.q_max)).all()
+        assert (np.abs(np.gradient(q, time, axis=0)) < robot.speed).all()
+
+
+# ---- synthetic data and what they teach
+
+
+def test_the_generator_gives_the_stored_files(tmp_path):
+    sys.path.insert(0, str(DATA / "tracker"))
+    try:
+        importlib.import_module("make_runs").write(tmp_path)
+    finally:
+        sys.path.remove(str(DATA / "tracker"))
+    for path in sorted(tmp_path.iterdir()):
+        new, old = path.read_text().splitlines(), (DATA / "tracker" / path.name).read_text().splitlines()
+        assert len(new) == len(old) and new[0] == old[0]
+        table = [np.array([line.split(",") for line in lines[1:]], dtype=float) for lines in (new, old)]
+        np.testing.assert_allclose(
+            *table, atol=2.1e-5
+        )  # the last digit may round differently with another linear algebra
+
+
+def test_six_runs_agree_with_each_other_better_than_with_the_truth():
+    """The systematic error repeats, so the spread over the runs says nothing about it; the covariance of one run
+    does."""
+    mountings = synthetic_mountings()
+    t = np.array([m.T_FE[:3, 3] for m in mountings])
+    off = np.linalg.norm(t.mean(0) - T_FE[:3, 3])
+    assert np.linalg.norm(t.std(0)) < 0.3 < 1.0 < off < 3.0
+    assert [np.flatnonzero(~m.kept).tolist() for m in mountings][0] == [13]
+
+
+def test_more_poses_shrink_e_trans_and_leave_e_rot():
+    """What chapter 6 says of equations (13) and (17): a mean of squares, and one that falls as 1 / sqrt(N)."""
+    few, many = (
+        [ax_xb.kronecker_matrix(*m) for m in runs]
+        for runs in ([ch06.motions(np.random.default_rng(s), n) for s in range(30)] for n in (20, 80))
+    )
+    means = [np.mean([e_rot(M) for M in runs]) for runs in (few, many)]
+    np.testing.assert_allclose(means[1] / means[0], 1.0, atol=0.15)
+    gaps = np.random.default_rng(0).normal(size=(8000, 3))
+    np.testing.assert_allclose(e_trans(gaps) / e_trans(gaps[:2000]), 0.5, rtol=0.05)
+
+
+def test_hand_eye_with_the_tracker_on_the_flange():
+    """The tracker's readings are noisy, so the roles are exchanged: its target is the mounting."""
+    T_BF, T_WE = readings(np.random.default_rng(12), 21, noise=0.5)
+    result = ax_xb.calibrate_hand_eye(invert(T_BF), T_WE)
+    angle, distance = pose_distance(result.target, T_FE)
+    std = np.sqrt(np.diagonal(result.covariance))
+    assert angle < 4 * np.linalg.norm(std[6:9]) and distance < 4 * np.linalg.norm(std[9:])
