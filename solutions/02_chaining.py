@@ -101,12 +101,12 @@ def chain(transforms):
 # %% compare-listing-7
 product = chain(printed)
 listing_7 = lab_sheet.printed_product()
-bound = chaining.rounding_bound(printed)
+bound = chaining.rounding_bound(printed, lab_sheet.HALF_DIGIT)
 off = np.abs(product - listing_7)
 print("corner of the sum:", printed.sum(axis=0)[3, 3], "  of the product:", product[3, 3])
 print(f"rotation:    off by {off[:3, :3].max():.1e}, rounding allows {bound[:3, :3].max():.1e}")
 print(f"translation: off by {off[:3, 3].max():.1e} mm, rounding allows {bound[:3, 3].max():.1e} mm")
-print("every entry within its bound:", bool((off[:3] <= bound[:3] + chaining.HALF_DIGIT).all()))
+print("every entry within its bound:", bool((off[:3] <= bound[:3] + lab_sheet.HALF_DIGIT).all()))
 print(f"product of the unrounded synthetic links: off by {np.abs(chain(measured) - listing_7).max():.1e}")
 
 # %% closure [markdown]

@@ -133,6 +133,51 @@ def test_imports_go_down_only(path):
             assert first not in FRONT_ENDS, f"{storey} must not import {name}"
 
 
+READS_A_TABLE = {  # outside documents/
+    "chapters/ch06_tracker/stages.py": "hand_eye_methods.csv is the project's own benchmark, printed by no document",
+    "tables.py": "defines read_table",
+}
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_what_a_document_prints_is_read_in_its_room(path):
+    """No table of `data/` is read above or beside documents/: what two places read would have two names."""
+    if storey_of(path) in ("documents", "verbs") or path.relative_to(ROOT / "labkit").as_posix() in READS_A_TABLE:
+        return
+    names = {getattr(node, "id", getattr(node, "attr", "")) for node in ast.walk(ast.parse(path.read_text("utf-8")))}
+    assert not names & {"read_table", "DATA"}, f"{path.name} reads a table: move it to labkit/documents"
+
+
+LONGEST_FUNCTION = 40  # lines of a body, without its docstring
+STILL_LONGER = {  # besides the builders of Stages
+    "chapters/ch07_dead_reckoning/exercises.py": "_slips",
+    "exercises/metrics.py": "as_array",
+    "fast/ekf.py": "_filter_many",
+}
+
+
+def long_functions(path):
+    """Names of the functions of a module whose body is longer than LONGEST_FUNCTION; builders of Stages excepted."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef):
+            body = node.body[1:] if ast.get_docstring(node) and len(node.body) > 1 else node.body
+            builds = any(isinstance(n, ast.Return) and _makes_a_stage(n.value) for n in node.body)
+            if node.end_lineno - body[0].lineno >= LONGEST_FUNCTION and not builds:
+                yield node.name
+
+
+def _makes_a_stage(value):
+    return isinstance(value, ast.Call) and getattr(value.func, "id", "") == "Stage"
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_functions_are_short(path):
+    allowed = {STILL_LONGER.get(path.relative_to(ROOT / "labkit").as_posix())}
+    assert set(long_functions(path)) <= allowed, (
+        f"no more than {LONGEST_FUNCTION} lines: cut it where its parts have names"
+    )
+
+
 def literal_colors(tree):
     """(line, color) of each color written as text in the code."""
     for node in ast.walk(tree):

@@ -1,10 +1,32 @@
-"""Regions of normal distributions: the ellipse that holds a stated share, and who lies in it."""
+"""Normal distributions: noise that repeats, the ellipse that holds a stated share, and who lies in it."""
+
+import functools
 
 import numpy as np
 from scipy.stats import chi2
 
 from ..checks import as_count, as_covariances, as_points, as_probability, as_shape, fit_together, solve_covariance
 from ..geometry import planar
+
+
+@functools.cache
+def unit_noise(shape, seed):
+    """Independent normal numbers of standard deviation 1: the same for a shape and a seed, and read-only.
+
+    A figure that scales them shows the change alone: what is dragged moves, the draw stays.
+
+    Parameters
+    ----------
+    shape : tuple of int
+    seed : int
+
+    Returns
+    -------
+    noise : array of that shape, read-only
+    """
+    noise = np.random.default_rng(seed).standard_normal(shape)
+    noise.setflags(write=False)
+    return noise
 
 
 def ellipse(mean, cov, probability=0.95, points=61):

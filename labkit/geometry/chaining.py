@@ -24,8 +24,6 @@ from ..checks import (
 from .frames import _invert, frame_from_points, invert, relative, rotation_angle, rotation_block, transform
 from .lie import adjoint, exp_se3, log_se3, nearest_rotation, skew
 
-HALF_DIGIT = 0.5e-6  # half a unit in the last of the sheet's six printed decimals
-
 
 def transforms_from_points(points):
     """Transform from the first to the second frame of each station; (..., 2, 3, 3) points -> (..., 4, 4).
@@ -118,7 +116,7 @@ def orthonormalize(T):
     return repaired
 
 
-def rounding_bound(transforms, half_unit=HALF_DIGIT):
+def rounding_bound(transforms, half_unit):
     """How far rounding of the printed links can move each entry of their product, to first order.
 
     Every entry of every link (the last row is exact) may be off by `half_unit`. An error E in link k arrives in the

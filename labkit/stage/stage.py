@@ -299,7 +299,7 @@ class Stage(ipywidgets.VBox):
         self._recompute()
         self._picture.draw()
         self._text = f"[stage: {name}] {self.caption}".rstrip()
-        self._front.on_msg(lambda _, message, buffers: self._receive(message))
+        self._front.on_msg(lambda _, message, buffers: self.receive(message))
         self._build_controls()
 
     def _check_options(self, view):
@@ -490,7 +490,7 @@ class Stage(ipywidgets.VBox):
 
     # -- the browser: one message in flight, the newest wins
 
-    def _receive(self, message):
+    def receive(self, message):
         """One message of the browser: everything that happened since the last one, merged."""
         with DRAWING:
             self._received = monotonic()

@@ -17,7 +17,7 @@ def test_draws_fails_and_recovers(make, draws_fails_and_recovers):
 
 
 def state_of_sheet(**changes):
-    return {**{name: np.array(at) for name, at in w._points().items()}, **changes}
+    return {**{name: np.array(at) for name, at in w.sheet_points().items()}, **changes}
 
 
 def test_removed_and_kept_make_up_the_arm():
@@ -81,7 +81,7 @@ def test_y_stays_in_the_plane_of_the_triangle():
     view = stage.state["view"]
     aim = view.project((50, 40, 0))[:2]
     at = stage._picture.fraction(stage._picture.fig.axes[0], aim)
-    stage._receive({"drag": {"Y": at}})
+    stage.receive({"drag": {"Y": at}})
     assert stage.state["Y"] == pytest.approx([50, 40, 0], abs=1e-9)
     stage.set(view=View(0, 0, center=view.center), Y=(40, 30, 5))  # seen from the side: straight down
     assert stage.state["Y"] == pytest.approx([40, 30, 0])

@@ -99,7 +99,7 @@ def test_frames_of_the_open_loop_stay_in_the_picture_with_their_names(place):
     stage = w.open_loop()
     for name in ("K1", "K2", "K3", "P"):
         right, down = (1.0, 0.0) if place[0] > 0 else (0.0, 1.0)
-        stage._receive({"drag": {name: (right, down)}})
+        stage.receive({"drag": {name: (right, down)}})
     stage.png()
     names = [text for text in stage._picture.fig.axes[0].texts if text.get_text() in ("K1", "K2", "K3", "P")]
     assert len(names) == 4 and all(inside(name, stage) for name in names)

@@ -37,8 +37,8 @@ def test_points_file_is_what_its_script_writes():
 
 def test_synthetic_points_round_to_the_printed_transforms_and_product():
     T = chaining.transforms_from_points(lab_sheet.station_points())
-    assert np.abs(T - lab_sheet.printed_transforms()).max() < chaining.HALF_DIGIT
-    assert np.abs(chaining.chain(T) - lab_sheet.printed_product()).max() < chaining.HALF_DIGIT
+    assert np.abs(T - lab_sheet.printed_transforms()).max() < lab_sheet.HALF_DIGIT
+    assert np.abs(chaining.chain(T) - lab_sheet.printed_product()).max() < lab_sheet.HALF_DIGIT
 
 
 def test_chain_multiplies_in_order_and_broadcasts():

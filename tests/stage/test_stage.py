@@ -61,7 +61,7 @@ def wired():
 def wire(stage):
     sent = []
     stage._front.send = lambda message, buffers=None: sent.append((message, buffers))
-    stage._receive({"look": LOOK, "serial": "a:1"})
+    stage.receive({"look": LOOK, "serial": "a:1"})
     return stage, sent
 
 
@@ -240,7 +240,7 @@ def test_png_holds_the_pixels():
 def test_a_drag_is_answered_with_one_picture(wired):
     stage, sent = wired
     at = sent[-1][0]["handles"]["Q"]["at"]
-    stage._receive({"drag": {"Q": (at[0], at[1] + 0.1)}, "serial": "a:2", "shown": 1})
+    stage.receive({"drag": {"Q": (at[0], at[1] + 0.1)}, "serial": "a:2", "shown": 1})
     message, buffers = sent[-1]
     assert len(sent) == 2 and message["serial"] == "a:2" and message["on"] == 1 and len(buffers) == 2
     assert stage.state["Q"][0] == pytest.approx(4.0) and 0 < stage.state["Q"][1] < 5.0
@@ -266,19 +266,19 @@ def page_after(sent):
 def test_only_changed_pixels_follow_a_whole_picture(wired):
     stage, sent = wired
     for k in range(2, 6):
-        stage._receive({"step": {"P": (k, 1)}, "serial": f"a:{k}", "shown": k - 1})
+        stage.receive({"step": {"P": (k, 1)}, "serial": f"a:{k}", "shown": k - 1})
         assert (page_after(sent)[0] == stage._picture.draw()).all()
     assert [message["on"] for message, _ in sent] == [None, 1, 2, 3, 4]
     assert all(0 < len(colors) < 10_000 for _, (_, colors) in sent[1:])
-    stage._receive({"serial": "a:6"})
+    stage.receive({"serial": "a:6"})
     assert len(sent[-1][1][0]) == len(sent[-1][1][1]) == 0  # nothing new
 
 
 @pytest.mark.parametrize("look", [{}, {"dark": True}, {"width": 400}, {"ratio": 2.0}])
 def test_a_page_that_looks_gets_a_whole_picture(wired, look):
     stage, sent = wired
-    stage._receive({"step": {"P": (1, 0)}, "serial": "a:2", "shown": 1})
-    stage._receive({"look": {**LOOK, **look}, "serial": "a:3", "shown": 2})
+    stage.receive({"step": {"P": (1, 0)}, "serial": "a:2", "shown": 1})
+    stage.receive({"look": {**LOOK, **look}, "serial": "a:3", "shown": 2})
     assert sent[-1][0]["on"] is None and (page_after(sent)[0] == stage._picture.draw()).all()
 
 
@@ -294,14 +294,14 @@ def test_a_whole_picture_goes_where_too_much_changes():
 
 def test_drags_end_at_axes_and_bounds_and_the_page_is_told(wired):
     stage, sent = wired
-    stage._receive({"drag": {"Q": (1.0, 0.0), "P": (1.0, 0.0)}, "serial": "a:2"})
+    stage.receive({"drag": {"Q": (1.0, 0.0), "P": (1.0, 0.0)}, "serial": "a:2"})
     assert stage.state["Q"] == pytest.approx([10, 5]) and stage.state["P"] == pytest.approx([9, 4])
     assert sent[-1][0]["handles"]["P"]["at"][0] < 1.0
 
 
 def test_steps(wired):
     stage, _ = wired
-    stage._receive({"step": {"P": (1, 0), "Q": (0, -10)}, "serial": "a:2"})
+    stage.receive({"step": {"P": (1, 0), "Q": (0, -10)}, "serial": "a:2"})
     assert stage.state["P"] == pytest.approx([1.5, 1.0])
     assert stage.state["Q"] == pytest.approx([4.0, 4.0])  # a hundredth of the width, ten times
 
@@ -311,9 +311,9 @@ def test_newest_wins_while_the_page_is_busy(wired):
     for k in range(20):
         stage.set(P=(k / 10, 1))
     assert len(sent) == 1 + 3  # no more than three unseen
-    stage._receive({"shown": sent[-1][0]["picture"]})
+    stage.receive({"shown": sent[-1][0]["picture"]})
     assert len(sent) == 5 and sent[-1][0]["handles"]["P"]["now"] == pytest.approx(1.9)
-    stage._receive({"shown": sent[-1][0]["picture"]})
+    stage.receive({"shown": sent[-1][0]["picture"]})
     assert len(sent) == 5  # nothing new, nothing sent
 
 
@@ -339,14 +339,14 @@ def test_click_and_brush():
     assert stage.state["click"] is None and stage.state["brush"].shape == (0, 2)
     ax = stage._picture.fig.axes[0]
     at = [stage._picture.fraction(ax, xy) for xy in ((2, 2), (4, 3), (6, 3))]
-    stage._receive({"click": at[0], "serial": "a:2"})
+    stage.receive({"click": at[0], "serial": "a:2"})
     assert stage.result[0] == pytest.approx([2, 2])
-    stage._receive({"click": (0.001, 0.999), "serial": "a:3"})  # outside the axes
+    stage.receive({"click": (0.001, 0.999), "serial": "a:3"})  # outside the axes
     assert stage.result[0] == pytest.approx([2, 2])
-    stage._receive({"brush": at[:2], "fresh": True, "serial": "a:4"})
-    stage._receive({"brush": at[2:], "serial": "a:5"})
+    stage.receive({"brush": at[:2], "fresh": True, "serial": "a:4"})
+    stage.receive({"brush": at[2:], "serial": "a:5"})
     assert stage.result[1] == pytest.approx(np.array([[2, 2], [4, 3], [6, 3]]))
-    stage._receive({"brush": at[2:], "fresh": True, "serial": "a:6"})
+    stage.receive({"brush": at[2:], "fresh": True, "serial": "a:6"})
     assert len(stage.result[1]) == 1 and sent[-1][0]["empty"] == "draw"
 
 
@@ -390,8 +390,8 @@ def test_memory_follows_ticks_keys_and_clicks():
     assert sent[-1][0]["keys"] is True
     stage._play_widget.playing = True
     stage._play_widget.value = 2
-    stage._receive({"arrows": ["up", "left"], "serial": "a:2"})
-    stage._receive({"click": stage._picture.fraction(stage._picture.fig.axes[0], (1, 1)), "serial": "a:3"})
+    stage.receive({"arrows": ["up", "left"], "serial": "a:2"})
+    stage.receive({"click": stage._picture.fraction(stage._picture.fig.axes[0], (1, 1)), "serial": "a:3"})
     assert stage.result == ["tick", "tick", "up", "left", "click"]
     stage._play_widget.value = 1  # back in time: from the start
     assert stage.result == ["tick"]
@@ -435,18 +435,18 @@ def space(**options):
 def test_a_point_in_space_is_dragged_in_the_plane_of_the_screen():
     stage, sent = wire(space())
     before, view = stage.state["P"], stage.state["view"]
-    stage._receive({"step": {"P": (2, 1)}, "serial": "a:2"})
+    stage.receive({"step": {"P": (2, 1)}, "serial": "a:2"})
     shift = view.project(stage.state["P"]) - view.project(before)
     assert shift == pytest.approx([2, 1, 0])
     at = stage._picture.fraction(stage._picture.fig.axes[0], (-3, 4))
-    stage._receive({"drag": {"P": at}, "serial": "a:3"})
+    stage.receive({"drag": {"P": at}, "serial": "a:3"})
     assert view.project(stage.state["P"])[:2] == pytest.approx([-3, 4])
     assert sent[-1][0]["handles"]["P"]["at"] == pytest.approx(at)
 
 
 def test_orbit_turns_the_view_and_presets_keep_it():
     stage, _ = wire(space(presets={"home": {"P": (0, 0, 0)}}))
-    stage._receive({"orbit": (20, 10), "serial": "a:2"})
+    stage.receive({"orbit": (20, 10), "serial": "a:2"})
     turned = View(310, 30)
     assert stage.state["view"] == turned
     stage.buttons["home"].click()

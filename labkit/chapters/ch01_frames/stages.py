@@ -1,15 +1,14 @@
 """Stages of chapter 1: three points, noise and height, the KUKA angles at the pole, SVD against Gram-Schmidt."""
 
-import functools
-
 import numpy as np
 
+from ...documents.lab_sheet import printed as lab_sheet
+from ...estimation.gaussian import unit_noise
 from ...geometry import frames
 from ...geometry.lie import exp_so3, log_so3
 from ...stage import Handle, Slider, Stage, style
 from ...stage.marks import PlaneFrame
 from ...stage.scene3d import Scene, View
-from ...tables import read_table
 from . import figures as draw
 
 NOISE_OF_A_TAPE = 0.01  # the yardstick of three_points, in the sheet's unit
@@ -20,11 +19,13 @@ NEARLY_POLE_DEG = 70.0  # from here on the caption speaks of the weak direction
 FLAT_ROLL_DEG = 20.0  # three_points: from here on the caption speaks of the flat triangle
 
 
-def _points():
-    """The sheet's points as {handle name: (x, y)}; all have z = 0."""
-    table = read_table("frames/points.csv", text=("frame", "point"))
-    names = [f"{point[0].upper()}{frame[-1]}" for frame, point in zip(table["frame"], table["point"])]
-    return dict(zip(names, zip(table["x"].tolist(), table["y"].tolist())))
+def sheet_points():
+    """The sheet's points as {handle name: (x, y)}, "O0" the origin of K0 and so on; all have z = 0."""
+    return {
+        f"{letter}{frame[-1]}": tuple(corner[:2].tolist())
+        for frame, corners in lab_sheet.points().items()
+        for letter, corner in zip("OXY", corners)
+    }
 
 
 def compute_three_points(state):
@@ -98,19 +99,11 @@ def three_points():
         compute=compute_three_points,
         handles={
             name: Handle(at, step=0.01, label=f"{labels[name[0]]} of K{name[1]}", color=style.MEASUREMENT)
-            for name, at in _points().items()
+            for name, at in sheet_points().items()
         },
         fail={"Y0": (1.7, 2.004)},
         describe=_three_points_sentence,
     )
-
-
-@functools.cache
-def _unit_noise(repetitions):
-    """Noise of three points, std 1, shape (repetitions, 3, 3); always the same: only what is dragged moves."""
-    noise = np.random.default_rng(1).standard_normal((repetitions, 3, 3))
-    noise.setflags(write=False)
-    return noise
 
 
 def _triangle(x_arm, y_along, y_height):
@@ -121,7 +114,7 @@ def compute_triangle_noise(state, repetitions=200):
     """Frames of a noisy triangle measured many times: error about x, y, z (deg, rms), bound here and over HEIGHTS."""
     along, height = state["Y"][:2]
     std = state["std"]
-    measured = _triangle(ARM, along, height) + std * _unit_noise(repetitions)
+    measured = _triangle(ARM, along, height) + std * unit_noise((repetitions, 3, 3), seed=1)
     T = frames.frame_from_points(*np.moveaxis(measured, 1, 0))
     error_deg = np.rad2deg(np.sqrt((log_so3(T[:, :3, :3]) ** 2).mean(0)))
     bounds_deg = np.rad2deg([np.sqrt(np.diag(frames.gram_schmidt_covariance(ARM, along, h, std))) for h in HEIGHTS])
@@ -281,7 +274,7 @@ def compute_svd_against_gram_schmidt(state, repetitions=400):
     """Error (deg, rms about x, y, z) of both constructions on the same noisy points, and the bound of each."""
     (x_arm, _), (along, height), std = state["X"], state["Y"], state["std"]
     truth = _triangle(x_arm, along, height)
-    measured = truth + std * _unit_noise(repetitions)
+    measured = truth + std * unit_noise((repetitions, 3, 3), seed=1)
 
     def error_deg(T):
         return np.rad2deg(np.sqrt((log_so3(T[:, :3, :3]) ** 2).mean(0)))

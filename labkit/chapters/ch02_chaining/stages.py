@@ -5,6 +5,7 @@ import functools
 import numpy as np
 
 from ...documents.lab_sheet import printed as lab_sheet
+from ...estimation.gaussian import unit_noise
 from ...geometry import chaining
 from ...geometry.frames import relative
 from ...geometry.lie import exp_se3
@@ -207,18 +208,10 @@ def _law(name, n, std_rot):
     return np.hypot(np.sqrt(3 * n) * STD_TRANS, _layout(name, n)[2] * std_rot)
 
 
-@functools.cache
-def _unit_twists():
-    """Noise of 64 links in RUNS runs, standard deviation 1; the same at every call."""
-    noise = np.random.default_rng(2).standard_normal((max(draw.LINKS), RUNS, 6))
-    noise.setflags(write=False)
-    return noise
-
-
 @functools.lru_cache(maxsize=2)
 def _errors(std_rot):
     """Error of each of 64 links in RUNS runs, shape (64, runs, 4, 4); kept while only the number of links changes."""
-    return exp_se3(_unit_twists() * np.repeat([std_rot, STD_TRANS], 3))
+    return exp_se3(unit_noise((max(draw.LINKS), RUNS, 6), seed=2) * np.repeat([std_rot, STD_TRANS], 3))
 
 
 def _ends(name, n, errors):

@@ -5,6 +5,7 @@ import functools
 import numpy as np
 
 from ...calibration import pivot
+from ...estimation.gaussian import unit_noise
 from ...geometry.lie import exp_so3
 from ...stage import Handle, Play, Slider, Stage, style
 from ...stage.scene3d import Scene, View
@@ -128,20 +129,13 @@ def pose_designer():
     )
 
 
-@functools.cache
-def _swirl_noise():
-    noise = np.random.default_rng(4).standard_normal((2, SWIRL_POSES, 3))
-    noise.setflags(write=False)
-    return noise
-
-
 def _swirl(cone_deg, std_trans, std_rot):
     """Poses of a tool led twice around a cone while it spins, with noise; true rotations and measured poses."""
     R = pivot.cone(SWIRL_POSES, np.deg2rad(cone_deg), turns=3.0)[(2 * np.arange(SWIRL_POSES)) % SWIRL_POSES]
     T = pivot.touching_poses(R, TIP, np.zeros(3))
-    small = std_rot * _swirl_noise()[0]
-    T[:, :3, :3] = R @ exp_so3(small)
-    T[:, :3, 3] += std_trans * _swirl_noise()[1]
+    turns, shifts = unit_noise((2, SWIRL_POSES, 3), seed=4)
+    T[:, :3, :3] = R @ exp_so3(std_rot * turns)
+    T[:, :3, 3] += std_trans * shifts
     return R, T
 
 

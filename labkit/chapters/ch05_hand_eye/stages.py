@@ -10,6 +10,7 @@ from ...calibration import hand_eye, sphere
 from ...documents import misprints
 from ...documents.thesis import printed as thesis
 from ...estimation.differences import numeric_jacobian
+from ...estimation.gaussian import unit_noise
 from ...geometry import frames
 from ...geometry.lie import exp_so3, log_so3
 from ...stage import Choice, Handle, Slider, Stage, style
@@ -27,19 +28,12 @@ REST_MM = 1e-13  # what is left of a residual at the end, on the logarithmic axi
 # --- one scan line ---------------------------------------------------------------------------------------------------
 
 
-@functools.cache
-def _noise():
-    noise = np.random.default_rng(5).standard_normal((REPETITIONS, POINTS))
-    noise.setflags(write=False)
-    return noise
-
-
 def compute_scan_line(state):
     """Centers recovered from repeated noisy scan lines, the fitted circle, and the standard deviation of y."""
     y, z = state["C"]
     r = np.sqrt(RADIUS**2 - y * y)
     angle = np.linspace(-1, 1, POINTS) * np.deg2rad(state["half_angle_deg"])
-    reach = r + state["std"] * _noise()
+    reach = r + state["std"] * unit_noise((REPETITIONS, POINTS), seed=5)
     x, depth = reach * np.sin(angle), z - reach * np.cos(angle)
     centers, radii = sphere.fit_circle_algebraic(x, depth)
     off = np.sqrt(np.maximum(RADIUS**2 - radii**2, 0.0)) * (1 if y >= 0 else -1)

@@ -6,19 +6,18 @@ import numpy as np
 
 from ...calibration import ax_xb
 from ...documents.report.printed import table_d
-from ...documents.report.reconstruction import synthetic_mountings
+from ...documents.report.reconstruction import stop_poses, synthetic_log, synthetic_mountings
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
 from ...geometry import lie
 from ...geometry.frames import invert, pose, relative, unit_vector
 from ...geometry.lie import exp_so3
-from ...machines import packet, simulation
+from ...machines import packet
 from ...machines.accuracy import time_offset
 from ...machines.arm import TX40, dh_matrix, forward_kinematics
-from ...machines.log import average_stops, read_csv, reject_outliers
+from ...machines.log import average_stops, reject_outliers
 from ...machines.mounting import calibrate_mounting, e_rot, e_trans
 from ...machines.packet import POSITION, QUATERNION, TIME, encode_packet, packet_from_pose
-from ...tables import DATA, read_table
 
 # Packets ---------------------------------------------------------------------------------------------------------------------
 
@@ -323,9 +322,7 @@ def _whole_samples(time, reference, delayed, max_offset):
 
 @functools.cache
 def _run_1(factor=4.0):
-    poses = read_table("tracker/poses.csv")
-    T_BF = simulation.flange_poses(np.deg2rad(np.column_stack([poses[f"q{i} [deg]"] for i in range(1, 7)])))
-    return T_BF, average_stops(read_csv(DATA / "tracker/run_1.csv"), factor)[0]
+    return stop_poses(), average_stops(synthetic_log(1), factor)[0]
 
 
 def _mounting(factor=4.0, gate=8.0):
@@ -1055,7 +1052,7 @@ CHAPTER = Chapter(
                     "This is the standard error of the mean. Wanted is the spread of single runs.",
                 ),
                 Mistake(
-                    lambda: 1000 * np.sqrt(table_d()[2][2]),
+                    lambda: 1000 * np.sqrt(table_d().variance[2]),
                     "This is the spread of the report's runs. Wanted is that of the six in `mountings`.",
                 ),
             ],

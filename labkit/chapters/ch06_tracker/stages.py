@@ -7,6 +7,7 @@ import time as clock
 import numpy as np
 
 from ...calibration import ax_xb
+from ...estimation.gaussian import unit_noise
 from ...geometry.frames import invert, matrix_from_quaternion, pose, pose_distance, unit_vector
 from ...geometry.lie import exp_so3, nearest_rotation
 from ...machines import simulation, udp
@@ -216,13 +217,6 @@ X_TRUE = pose(exp_so3([0.3, -0.5, 0.4]), [30.0, -20.0, 60.0])
 STD_TRANS = 0.2  # mm, of the sensor's translations
 
 
-@functools.cache
-def _axes_noise():
-    noise = np.random.default_rng(6).standard_normal((REPEATS, 2, 6))
-    noise.setflags(write=False)
-    return noise
-
-
 def compute_two_axes(state):
     """Two motions about the dragged axes, calibrated from noisy readings again and again by the report's method.
 
@@ -235,7 +229,7 @@ def compute_two_axes(state):
     A = pose(exp_so3(angle * axes), [[120.0, -60, 80], [-70.0, 150, 40]])
     B = invert(X_TRUE) @ A @ X_TRUE
     values = np.linalg.svd(ax_xb.kronecker_matrix(A, B), compute_uv=False)
-    e = _axes_noise()
+    e = unit_noise((REPEATS, 2, 6), seed=6)
     noisy = B @ pose(exp_so3(noise * e[..., :3]), STD_TRANS * e[..., 3:])
     M = ax_xb.kronecker_matrix(np.tile(A, (REPEATS, 1, 1)), noisy.reshape(-1, 4, 4)).reshape(REPEATS, 18, 9)
     X = np.swapaxes(np.linalg.svd(M)[2][:, -1].reshape(-1, 3, 3), 1, 2)

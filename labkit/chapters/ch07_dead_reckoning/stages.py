@@ -10,20 +10,12 @@ from ...geometry import planar
 from ...localization import lateration, odometry
 from ...stage import Choice, Handle, Play, Slider, Stage, style
 from ...stage.marks import Spare, strayed
-from ...tables import read_table
 from . import figures as draw
 
 TASKS = {"start known": "local", "start unknown": "global", "may be carried off": "kidnapped"}
 SENSES = ("odometry", "distances", "both")
 REPETITIONS = 200
 WEAK = 0.05  # a second singular value below this share of the first: the caption speaks of the weak direction
-
-
-@functools.cache
-def _methods():
-    return read_table(
-        "dead_reckoning/methods.csv", text=("method", "local", "global", "accuracy", "sensors", "map")
-    )  # fmt: skip
 
 
 def _reason(sensors, needs_map, can_find, state):
@@ -41,7 +33,7 @@ def _reason(sensors, needs_map, can_find, state):
 
 def compute_methods(state):
     """For each method of the lecture's table, why it does not fit the task ("" where it does)."""
-    table = _methods()
+    table = lecture.methods()
     rows = zip(table["sensors"], table["map"], table["global"])
     verdicts = [_reason(sensors, needed != "no", able == "yes", state) for sensors, needed, able in rows]
     return {"verdicts": verdicts, "usable": [m for m, v in zip(table["method"].tolist(), verdicts) if not v]}
@@ -51,7 +43,7 @@ def methods():
     """The lecture's table of localization methods: choose a task, the rows that do not fit turn gray."""
 
     def scene(fig):
-        table = _methods()
+        table = lecture.methods()
         rows = draw.MethodTable(fig.subplots(), zip(table["method"], table["accuracy"], table["sensors"]))
 
         def update(state, result):
@@ -76,12 +68,12 @@ def methods():
     )
 
 
-@functools.cache
+SHOWN_NOISE = (0.8, -0.9, 0.6)  # of the measurement whose circles are drawn
+
+
 def _circle_noise():
-    noise = np.random.default_rng(7).standard_normal((REPETITIONS, 3))
-    noise[0] = 0.8, -0.9, 0.6  # the measurement whose circles are drawn
-    noise.setflags(write=False)
-    return noise
+    """Noise of three distances in REPETITIONS measurements, standard deviation 1; the first one is drawn."""
+    return np.vstack([SHOWN_NOISE, gaussian.unit_noise((REPETITIONS, 3), seed=7)[1:]])
 
 
 def compute_circles(state):
@@ -325,15 +317,9 @@ def _runs(path, factor):
     controls = circle.controls if path == "circle" else circle.controls * [1.0, 0.0]
     poses, covs = odometry.drive_with_covariance(np.zeros(3), np.zeros((3, 3)), controls, circle.dt, **noise)
     std = np.sqrt(np.diag(odometry.control_covariance(controls[0], circle.dt, **noise)))
-    ends = odometry.drive(np.zeros((RUNS, 3)), controls[:, None, :] + std * _unit_noise(len(controls)), circle.dt)[-1]
+    noisy = controls[:, None, :] + std * gaussian.unit_noise((len(controls), RUNS, 2), seed=3)
+    ends = odometry.drive(np.zeros((RUNS, 3)), noisy, circle.dt)[-1]
     return poses, covs[-1], ends
-
-
-@functools.cache
-def _unit_noise(steps):
-    noise = np.random.default_rng(3).standard_normal((steps, RUNS, 2))
-    noise.setflags(write=False)
-    return noise
 
 
 def compute_banana(state):

@@ -286,21 +286,13 @@ def arena():
 # --- curvature ------------------------------------------------------------------
 
 
-@functools.cache
-def _unit_draws():
-    rng = np.random.default_rng(9)
-    draws = rng.standard_normal((RUNS, 3)), rng.standard_normal((RUNS, 2, 2))
-    for draw_ in draws:
-        draw_.setflags(write=False)
-    return draws
-
-
 @functools.lru_cache(maxsize=64)
 def corrections(std_prior, std_range):
     """One correction of 200 poor priors by two landmarks, for 1 to 6 iterations: (positions, cov, NEES) of each."""
     cov = np.diag([std_prior**2, std_prior**2, np.radians(10) ** 2])
     std_bearing = std_range / 3.0  # as precise across a landmark 3 m away as along it
-    starts, noises = _unit_draws()
+    noise = gaussian.unit_noise((RUNS * 7,), seed=9)
+    starts, noises = noise[: RUNS * 3].reshape(RUNS, 3), noise[RUNS * 3 :].reshape(RUNS, 2, 2)
     prior = starts * np.sqrt(np.diag(cov))
     z = ekf.measurement(np.zeros(3), TWO_MARKS) + noises * [std_range, std_bearing]
     found = []

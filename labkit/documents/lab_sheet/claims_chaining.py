@@ -42,7 +42,7 @@ def fourth_link():
 @computes("chaining.product", "chaining.T_Ist")
 def product():
     links = lab_sheet.printed_transforms()
-    value, bound = chaining.chain(links), chaining.rounding_bound(links)
+    value, bound = chaining.chain(links), chaining.rounding_bound(links, lab_sheet.HALF_DIGIT)
     lever = np.linalg.norm(chaining.stations(links)[1:, :3, 3] - value[:3, 3], axis=-1).max()
     off = np.abs(value - lab_sheet.printed_product())
     unrounded = chaining.chain(chaining.transforms_from_points(lab_sheet.station_points()))
@@ -71,7 +71,7 @@ def operator():
     proof = (
         f"The printed result has 1 in its last entry; the sum of the four matrices has {total[3, 3]:.0f} there and is"
         f" not a rigid transform. The product meets the printed result within"
-        f" {chaining.rounding_bound(links).max():.0e} mm, which rounding explains."
+        f" {chaining.rounding_bound(links, lab_sheet.HALF_DIGIT).max():.0e} mm, which rounding explains."
     )
     return Computed(name, misprint=name != "sum", proof=proof)
 

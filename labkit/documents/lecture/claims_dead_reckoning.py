@@ -3,21 +3,15 @@
 import numpy as np
 
 from ...localization import lateration, odometry
-from ...tables import read_table
 from ..ledger import Computed, computes
 from . import printed as lecture
 
 NOTEBOOK = "07_dead_reckoning"
 
 
-def _printed(name):
-    table = read_table(f"dead_reckoning/{name}.csv", text=("name", "unit"))
-    return dict(zip(table["name"].tolist(), table["value"].tolist()))
-
-
 def _std_after(u, duration, noise):
     """Standard deviations (x, y, theta) after driving u for `duration` in the lecture's time steps."""
-    dt = _printed("circle_drive")["dt"]
+    dt = lecture.constants("circle_drive")["dt"]
     controls = np.tile(u, (round(duration / dt), 1))
     cov = odometry.drive_with_covariance(np.zeros(3), np.zeros((3, 3)), controls, dt, **noise, model="euler")[1][-1]
     return np.sqrt(np.diag(cov))
@@ -31,7 +25,7 @@ def distance_after_one_meter():
 
 @computes("odometry.std_distance_1m_example")
 def distance_after_one_meter_example():
-    k_d = _printed("circle_drive")["std_distance_per_meter_example"] ** 2
+    k_d = lecture.constants("circle_drive")["std_distance_per_meter_example"] ** 2
     return Computed(_std_after([1.0, 0.0], 1.0, {"k_d": k_d, "k_theta": 0.0, "k_drift": 0.0})[0])
 
 
@@ -108,13 +102,13 @@ def roots():
 
 @computes("lateration.lms100_rate")
 def scan_rate():
-    given = _printed("sensors")
+    given = lecture.constants("sensors")
     ratio = given["lms100_resolution_coarse_deg"] / given["lms100_resolution_fine_deg"]
     return Computed(given["lms100_rate_fine"] * ratio)
 
 
 @computes("lateration.xtion_vertical")
 def vertical_field_of_view():
-    given = _printed("sensors")
+    given = lecture.constants("sensors")
     half = np.tan(np.radians(given["xtion_horizontal_deg"] / 2)) * given["xtion_rows"] / given["xtion_columns"]
     return Computed(np.degrees(2 * np.arctan(half)))

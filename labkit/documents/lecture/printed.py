@@ -1,8 +1,9 @@
-"""What the lecture prints: its circle drive and the numbers of its worked examples.
+"""What the lecture prints: its circle drive, its table of methods and the numbers of its worked examples.
 
-Source: lecture "Lokalisierung"; data/dead_reckoning, data/kalman.
+Lengths are m. Source: lecture "Lokalisierung"; data/dead_reckoning, data/kalman.
 """
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,20 +11,78 @@ import numpy as np
 from ...checks import as_positive_number
 from ...tables import read_table
 
-# --- the lecture's worked examples -------------------------------------------
+
+def constants(name):
+    """Numbers that the lecture prints one by one.
+
+    Parameters
+    ----------
+    name : str
+        "circle_drive" (the simulated drive) or "sensors" (laser scanner and depth camera).
+
+    Returns
+    -------
+    constants : dict
+        {name: number}; the units stand in data/dead_reckoning.
+
+    Source: lecture, pages "Simulation", "Fehlermodell für Steuerbefehl (1)" and "(2)", "2D-Laser-Scanner" and
+    "RGBD-Kamera".
+    """
+    return _by_name(f"dead_reckoning/{name}.csv")
 
 
 def example(name):
-    """Printed numbers of a worked example as {name: value}; name is "fusion" or "vehicle" (see data/kalman)."""
+    """Numbers of a worked example of the Kalman filter.
+
+    Parameters
+    ----------
+    name : str
+        "fusion" or "vehicle".
+
+    Returns
+    -------
+    numbers : dict
+        {name: number}; the units stand in data/kalman.
+
+    Raises
+    ------
+    ValueError
+        For any other name.
+
+    Source: lecture, Kalman filter; the pages stand in data/kalman.
+    """
     if name not in ("fusion", "vehicle"):
         raise ValueError(f'name must be "fusion" or "vehicle", got {name!r}')
-    table = read_table(f"kalman/{name}.csv", text=("name", "unit"))
+    return _by_name(f"kalman/{name}.csv")
+
+
+def _by_name(file):
+    table = read_table(file, text=("name", "unit"))
     return dict(zip(table["name"].tolist(), table["value"].tolist()))
 
 
-@dataclass(frozen=True)
+@functools.cache
+def methods():
+    """The table of localization methods: what each can do, how accurate it is, what it measures, whether it needs a map.
+
+    Returns
+    -------
+    methods : dict
+        {column: array (4,) of str}: method, local, global, accuracy, sensors, map.
+
+    Source: lecture, page "Übersicht über Lokalisierungsverfahren", translated; data/dead_reckoning.
+    """
+    return read_table(
+        "dead_reckoning/methods.csv", text=("method", "local", "global", "accuracy", "sensors", "map")
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
 class CircleDrive:
-    """The lecture's drive: controls (n, 2), time step dt (s), error constants `noise` (k_d, k_theta, k_drift)."""
+    """The lecture's drive: controls (n, 2) in m/s and rad/s, time step dt (s), `noise` (k_d, k_theta, k_drift).
+
+    k_d is m^2 per m, k_theta rad^2 per rad, k_drift rad^2 per m.
+    """
 
     controls: np.ndarray
     dt: float
@@ -31,12 +90,25 @@ class CircleDrive:
 
 
 def circle_drive(dt=None):
-    """The lecture's circle drive as a `CircleDrive`; another dt (s) drives the same 14 s in other steps.
+    """The lecture's circle drive; the constants are the squares of the printed standard deviations over their way.
 
-    The constants are the squares of the printed standard deviations over their way, degrees turned to radians.
+    Parameters
+    ----------
+    dt : float, s, optional
+        Drive the same 14 s in other steps.
+
+    Returns
+    -------
+    CircleDrive
+
+    Raises
+    ------
+    ValueError
+        When dt is longer than the drive, or shorter than a millionth of it.
+
     Source: lecture, section "Koppelnavigation", page "Simulation"; data/dead_reckoning.
     """
-    given = _circle_table()
+    given = constants("circle_drive")
     duration = given["dt"] * given["steps"]
     dt = given["dt"] if dt is None else as_positive_number(dt, "dt")
     if not duration / 1e6 <= dt <= duration:
@@ -46,19 +118,23 @@ def circle_drive(dt=None):
 
 
 def example_noise():
-    """The error constants that the lecture gives as examples ("z.B."), {"k_d", "k_theta", "k_drift"}.
+    """The error constants that the lecture gives as examples ("z.B."): a larger k_d than its simulated drive has.
 
-    (0.05 m)^2 per m, (5 deg)^2 per turn of 360 deg and (2 deg)^2 per m, degrees turned to radians. The simulated circle
-    drive has a smaller k_d: `circle_drive().noise`.
+    (0.05 m)^2 per m, (5 deg)^2 per turn of 360 deg and (2 deg)^2 per m, degrees turned to radians.
+
+    Returns
+    -------
+    noise : dict
+        {"k_d", "k_theta", "k_drift"}: float, m^2 per m, rad^2 per rad, rad^2 per m.
+
+    See Also
+    --------
+    circle_drive
+
     Source: lecture, pages "Fehlermodell fuer Steuerbefehl (1)" and "(2)"; data/dead_reckoning.
     """
-    given = _circle_table()
+    given = constants("circle_drive")
     return _noise(given, given["std_distance_per_meter_example"])
-
-
-def _circle_table():
-    table = read_table("dead_reckoning/circle_drive.csv", text=("name", "unit"))
-    return dict(zip(table["name"].tolist(), table["value"].tolist()))
 
 
 def _noise(given, std_distance):

@@ -8,9 +8,8 @@ from ...machines import simulation
 from ...machines.accuracy import tracking_errors
 from ...machines.arm import REACH_FLANGE, REACH_WRIST, SHOULDER_OFFSET, TX40, forward_kinematics, wrist_reach
 from ...machines.packet import FIELDS, PACKET
-from ...tables import read_table
 from ..ledger import Computed, computes
-from .printed import COLUMNS, COPIED, POSES, RUNS, UPSIDE_DOWN, corrected_runs, table_d
+from .printed import COLUMNS, COPIED, POSES, RUNS, UPSIDE_DOWN, corrected_runs, motions, packet_bytes, table_d
 from .reconstruction import synthetic_table
 
 NOTEBOOK = "06_tracker"
@@ -24,7 +23,7 @@ def packet():
 
 @computes("tracker.packet_size")
 def packet_size():
-    last = read_table("tracker/packet.csv", text=("bytes", "meaning"))["bytes"][-1]
+    last = packet_bytes()[-1]
     return Computed(f"0-{PACKET.size - 1}" if last.endswith(f"-{PACKET.size - 1}") else "another size")
 
 
@@ -51,7 +50,7 @@ def entries():
 
 @computes("tracker.average")
 def averages():
-    halves = table_d()[3]
+    halves = table_d().half_units
     return Computed(
         corrected_runs().mean(0), halves[:RUNS].mean(0), proof="The averages of the printed entries, run 3 with 9 mm."
     )
@@ -60,7 +59,7 @@ def averages():
 @computes("tracker.variance")
 def variances():
     """Printed "Rozptyl": divided by 6, not by 5."""
-    runs, halves = corrected_runs(), table_d()[3][:RUNS]
+    runs, halves = corrected_runs(), table_d().half_units[:RUNS]
     spread = 2 * (np.abs(runs - runs.mean(0)) * halves).mean(0) + (halves**2).mean(0)
     return Computed(
         runs.var(0), spread, proof=f"Divided by {RUNS}; the sample variance (by {RUNS - 1}) would be 20 % larger."
@@ -83,7 +82,7 @@ def results_block():
 @computes("tracker.block_max_deg")
 def largest_angle():
     """The average of the largest angles, without the entry that cannot be right."""
-    runs = table_d()[0][:, -1]
+    runs = table_d().runs[:, -1]
     kept = np.delete(runs, COPIED[0])
     proof = (
         f"One of the averaged maxima, {runs[COPIED[0]]}, copies a mean; the other five average {kept.mean():.3f} deg."
@@ -94,13 +93,13 @@ def largest_angle():
 def _least_e_trans():
     """What equation (17) can at least be, in mm, for the printed mean errors: the mean is never above the root mean
     square."""
-    mean_mm = table_d()[1][COLUMNS.index("mean_mm")]
+    mean_mm = table_d().mean[COLUMNS.index("mean_mm")]
     return mean_mm * np.sqrt(POSES) / (POSES - 1)
 
 
 @computes("tracker.E_trans_unit")
 def unit_of_e_trans():
-    printed, least = table_d()[1][COLUMNS.index("E_trans")], _least_e_trans()
+    printed, least = table_d().mean[COLUMNS.index("E_trans")], _least_e_trans()
     inside = least <= 1000 * printed <= 2 * least
     return Computed(
         "m" if inside else "mm",
@@ -113,7 +112,7 @@ def unit_of_e_trans():
 
 @computes("tracker.block_E_trans")
 def e_trans_in_block():
-    printed, least = 1000 * table_d()[1][COLUMNS.index("E_trans")], _least_e_trans()
+    printed, least = 1000 * table_d().mean[COLUMNS.index("E_trans")], _least_e_trans()
     return Computed(
         printed,
         misprint=least > 8e-4,
@@ -126,7 +125,7 @@ def e_trans_in_block():
 def unit_of_e_rot():
     """Equation (13) has no unit; for a null vector of length 1 it is 2/3 of the sum of squared angles (rad) over N -
     1."""
-    mean = dict(zip(COLUMNS, table_d()[1]))
+    mean = dict(zip(COLUMNS, table_d().mean))
     angle = np.rad2deg(np.sqrt(1.5 * mean["E_rot"] * (POSES - 1) / POSES))
     return Computed(
         "1",
@@ -138,7 +137,7 @@ def unit_of_e_rot():
 
 
 def _mounting_angle_deg():
-    q = table_d()[1][3:7]
+    q = table_d().mean[3:7]
     return float(np.rad2deg(frames.rotation_angle(frames.matrix_from_quaternion(q))))
 
 
@@ -169,17 +168,17 @@ def orientation_negligible():
 @computes("tracker.conclusion_offset")
 def offset_after_half_turn():
     """The mounting seen with x and y reversed, as a half turn about z would, beside the conclusion's offset."""
-    x, y, z = 1000 * table_d()[1][:3]
+    x, y, z = 1000 * table_d().mean[:3]
     proof = (
         f"Appendix D and section 3.1 give {z:.2f} mm; the conclusion's 65.3 mm is {65.3 - z:.1f} mm more, and a "
         "half turn about z leaves z alone."
     )
-    return Computed(np.array([-x, -y, z]), 1000 * table_d()[3][RUNS][:3], proof=proof)
+    return Computed(np.array([-x, -y, z]), 1000 * table_d().half_units[RUNS][:3], proof=proof)
 
 
 @computes("tracker.speed_claim_unit")
 def unit_of_angular_speed_claim():
-    fastest = read_table("tracker/motions.csv", text=("motion",))["w_high"].max()
+    fastest = motions()["w_high"].max()
     return Computed(
         "deg/s",
         misprint=fastest < 5,

@@ -1,7 +1,11 @@
-"""What the report prints: the six runs of appendix D.
+"""What the report prints: its packet, its motions and the six runs of appendix D.
 
+What a machine is made of stands with the machine: the TX40's link lengths and limits (appendix B) in `machines.arm`, the
+packet's fields (table 1) in `machines.packet`; a robot on the bench has them without any document.
 Source: report "Kalibrace a testovani systemu OTUS tracker", ZCU Plzen 2018; data/tracker.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,17 +18,68 @@ POSES = 20  # measuring poses of a run besides the reference (21 in all)
 UPSIDE_DOWN, COPIED = (2, COLUMNS.index("max_mm")), (3, COLUMNS.index("max_deg"))
 
 
+class TableD(NamedTuple):
+    """Appendix D as printed; columns as in `COLUMNS`, positions in m.
+
+    runs: array (6, 13). mean, variance: arrays (13,), the rows *Průměr* and *Rozptyl*. half_units: array (8, 13), half
+    a unit in the last printed digit of every entry.
+    """
+
+    runs: np.ndarray
+    mean: np.ndarray
+    variance: np.ndarray
+    half_units: np.ndarray
+
+
 def table_d():
-    """Appendix D as printed: runs (6, 13), means (13,), variances (13,), and half a unit of the last digit of each,
-    shape (8, 13)."""
+    """The six runs with their averages and variances.
+
+    Returns
+    -------
+    TableD
+
+    Source: report, appendix D.
+    """
     printed = read_table("tracker/table_d.csv", text=("run", *COLUMNS))
     words = np.column_stack([printed[c] for c in COLUMNS])
-    values, halves = words.astype(float), np.vectorize(half_unit)(words)
-    return values[:RUNS], values[RUNS], values[RUNS + 1], halves
+    values = words.astype(float)
+    return TableD(values[:RUNS], values[RUNS], values[RUNS + 1], np.vectorize(half_unit)(words))
 
 
 def corrected_runs():
-    """The runs with the one entry restored that the averages prove."""
-    runs = table_d()[0].copy()
+    """The runs with the one entry restored that the averages prove.
+
+    Returns
+    -------
+    runs : array, shape (6, 13)
+
+    Source: report, appendix D; data/tracker/table_d_corrections.csv.
+    """
+    runs = table_d().runs.copy()
     runs[UPSIDE_DOWN] = 9.0
     return runs
+
+
+def packet_bytes():
+    """The bytes of each field of a packet, as printed, such as "0-7".
+
+    Returns
+    -------
+    bytes : array of str, shape (23,)
+
+    Source: report, section 2, table 1.
+    """
+    return read_table("tracker/packet.csv", text=("bytes", "meaning"))["bytes"]
+
+
+def motions():
+    """The approximate speeds of the four motions.
+
+    Returns
+    -------
+    motions : dict
+        {column: array (4,)}: motion, and the lowest and highest speed (m/s) and angular speed (rad/s).
+
+    Source: report, section 3.2.
+    """
+    return read_table("tracker/motions.csv", text=("motion",))

@@ -1,4 +1,7 @@
-"""The report's calibration runs, simulated: its logs were never published. See data/tracker."""
+"""The report's calibration runs, simulated: its logs were never published. Lengths are mm.
+
+Source: data/tracker; the truth of the simulation is the report's result.
+"""
 
 import numpy as np
 
@@ -11,7 +14,13 @@ from .printed import RUNS
 
 
 def synthetic_table():
-    """The six synthetic runs in the columns and units of appendix D (E_trans in m), shape (6, 13)."""
+    """The six synthetic runs in the columns and units of appendix D.
+
+    Returns
+    -------
+    runs : array, shape (6, 13)
+        As `printed.TableD.runs`; E_trans in m.
+    """
     rows = []
     for m in synthetic_mountings():
         q = quaternion_from_matrix(m.T_FE[:3, :3])
@@ -26,10 +35,33 @@ def synthetic_table():
     return np.array(rows)
 
 
-def synthetic_mountings():
-    """`calibrate_mounting` on the six synthetic logs in data/tracker."""
+def stop_poses():
+    """Poses of the flange at the 21 stops of every synthetic run.
+
+    Returns
+    -------
+    T_BF : array, shape (21, 4, 4), mm
+    """
     poses = read_table("tracker/poses.csv")
-    joints = np.deg2rad(np.column_stack([poses[f"q{i} [deg]"] for i in range(1, 7)]))
-    T_BF = simulation.flange_poses(joints)
-    logs = [read_csv(DATA / f"tracker/run_{run}.csv") for run in range(1, RUNS + 1)]
-    return [calibrate_mounting(T_BF, average_stops(log)[0]) for log in logs]
+    return simulation.flange_poses(np.deg2rad(np.column_stack([poses[f"q{i} [deg]"] for i in range(1, 7)])))
+
+
+def synthetic_log(run):
+    """The log of a synthetic run, 1 to 6.
+
+    Returns
+    -------
+    labkit.machines.log.Log
+    """
+    return read_csv(DATA / f"tracker/run_{run}.csv")
+
+
+def synthetic_mountings():
+    """The mounting that each of the six synthetic logs gives.
+
+    Returns
+    -------
+    mountings : list of labkit.machines.mounting.Mounting
+    """
+    T_BF, runs = stop_poses(), range(1, RUNS + 1)
+    return [calibrate_mounting(T_BF, average_stops(synthetic_log(run))[0]) for run in runs]

@@ -12,8 +12,8 @@ import numpy as np
 
 from ...estimation import optimization as opt
 from ...estimation.differences import numeric_jacobian
-from ...tables import read_table
 from ..ledger import Computed, computes
+from . import printed as thesis
 from . import wells
 from .wells import luck, stand_ins
 
@@ -22,15 +22,6 @@ NOTEBOOK = "04_optimization"
 MINIMA = {"local": 0, "global": 1}
 SQUARE = np.stack(np.meshgrid(*2 * [np.linspace(-6, 6, 121)]), axis=-1)  # starts for the share of each method
 DIAGONAL = np.repeat(np.arange(1.0, 100.1, 0.5)[:, None], 2, axis=1)  # the thesis's line of starts, x1 = x2
-
-
-def _printed(method):
-    """Lines of table 7-1 of one method, local minimum first: {column: (2, 2) or (2,)}."""
-    table = read_table("optimization/table_7_1.csv", text=("method", "minimum"))
-    rows = table["method"] == method
-    names = ("ideal", "x", "start", "mu")
-    pairs = {name: np.column_stack([table[f"{name}_1"], table[f"{name}_2"]])[rows] for name in names}
-    return pairs | {"iterations": table["iterations"][rows]}
 
 
 def _minima():
@@ -52,7 +43,7 @@ def _share(method):
 def _printed_saddle():
     """The printed saddle, the length of the gradient there, and whether that is more than three rounded digits "
     "explain."""
-    saddle = np.array([0.105, -0.205])
+    saddle = thesis.extrema()["saddle"][1:]
     slope = np.linalg.norm(wells.gradient(saddle))
     return saddle, slope, slope > 0.5e-3 * np.sqrt(2) * np.abs(np.linalg.eigvalsh(wells.hessian(saddle))).max()
 
@@ -239,7 +230,7 @@ def ideal():
 
 @computes("optimization.x_newton", "optimization.x_gauss_newton", "optimization.x_trust_region")
 def results():
-    minima, printed = _minima(), _printed("newton")["x"]
+    minima, printed = _minima(), thesis.table_7_1("newton")["x"]
     return Computed(
         minima,
         misprint=np.abs(minima - printed) > 0.5e-4,
@@ -250,7 +241,7 @@ def results():
 
 
 def _deviation(method):
-    printed = _printed(method)
+    printed = thesis.table_7_1(method)
     return Computed(np.abs(printed["x"] - printed["ideal"]))
 
 
@@ -271,7 +262,7 @@ def mu_trust_region():
 
 @computes("optimization.mu_is_accuracy")
 def mu_is_accuracy():
-    printed = _printed("newton")
+    printed = thesis.table_7_1("newton")
     run = wells.run("newton", printed["start"][0], stop=opt.small_gradient_before())
     true = np.abs(run.solution - _minima()[0]).max()
     return Computed(
@@ -299,7 +290,9 @@ def farthest_newton():
 
 @computes("optimization.iterations_newton")
 def iterations_newton():
-    runs = [wells.run("newton", start, stop=opt.small_gradient_before()) for start in _printed("newton")["start"]]
+    runs = [
+        wells.run("newton", start, stop=opt.small_gradient_before()) for start in thesis.table_7_1("newton")["start"]
+    ]
     return Computed(np.array([run.iterations for run in runs]))
 
 
@@ -318,7 +311,7 @@ def _iterations(method):
     """BFGS's count from the printed starts; the bound is how far the other stand-ins that reach the same minimum "
     "differ from it."""
     value, bound, words = [], [], []
-    for name, start in zip(MINIMA, _printed(method)["start"]):
+    for name, start in zip(MINIMA, thesis.table_7_1(method)["start"]):
         ends = stand_ins(start)
         counts = [n for end, n in ends.values() if end == MINIMA[name]]
         value.append(ends["BFGS"][1])
@@ -380,7 +373,7 @@ def farthest_trust_region():
 
 @computes("optimization.start_distance_newton")
 def start_distance():
-    gaps = _printed("newton")["start"] - _minima()
+    gaps = thesis.table_7_1("newton")["start"] - _minima()
     far = np.linalg.norm(gaps, axis=1)
     return Computed(
         far.max(),
@@ -392,7 +385,9 @@ def start_distance():
 
 @computes("optimization.start_spacing")
 def start_spacing():
-    starts = np.concatenate([_printed(method)["start"] for method in wells.METHODS if method != "levenberg_marquardt"])
+    starts = np.concatenate(
+        [thesis.table_7_1(method)["start"] for method in wells.METHODS if method != "levenberg_marquardt"]
+    )
     gaps = np.diff(np.unique(np.abs(starts)))
     odd = gaps[np.abs(gaps / 0.5 - np.round(gaps / 0.5)) > 1e-6]
     return Computed(
@@ -421,7 +416,7 @@ def dogleg_accuracy():
 
 @computes("optimization.fewer_iterations")
 def fewer_iterations():
-    counts = {name: _printed(name)["iterations"] for name in ("trust_region", "gauss_newton")}
+    counts = {name: thesis.table_7_1(name)["iterations"] for name in ("trust_region", "gauss_newton")}
     return Computed("trust region" if (counts["trust_region"] < counts["gauss_newton"]).all() else "neither")
 
 

@@ -1,8 +1,8 @@
-"""The thesis's measurements and simulation inputs, read from `data/hand_eye/` as printed, and the corrections beside
-them.
+"""What the thesis prints: measurements, simulation inputs, start poses, the corrections beside them, table 7-1.
 
+Read from `data/hand_eye/` and `data/optimization/`. KUKA poses are x, y, z (mm), A, B, C (deg); centers are mm.
 Source: thesis "Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", HAW Hamburg 2019, tables 6-2 to 7-5,
-listings C10, C14, C17.
+listings C10, C14, C16, C17.
 """
 
 import functools
@@ -19,10 +19,12 @@ CENTER_COLUMNS = ("x", "y", "z")
 SIMULATED_TURNS = {"z": 3, "y": 4, "x": 5}  # which KUKA angle a line of listing C10 varies
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Measurements:
-    """31 robot poses with the sphere's center in each: KUKA poses in mm and deg (31, 6), centers in mm (31, 3), pattern
-    line and angle.
+    """31 robot poses with the sphere's center in each.
+
+    kuka_deg: array (31, 6), mm and deg. x_S: array (31, 3), mm, in the scanner. line: array (31,) of str, the pattern
+    line "x", "y", "z" or "none". angle_deg: array (31,).
     """
 
     kuka_deg: np.ndarray
@@ -37,7 +39,15 @@ class Measurements:
 
 
 def printed_entries():
-    """What listings C14 and C17 print, digit by digit: {(table, pose, column): text}, poses counted from 1."""
+    """What listings C14 and C17 print, digit by digit.
+
+    Returns
+    -------
+    entries : dict
+        {(table, pose, column): text}, poses counted from 1.
+
+    Source: thesis, listings C14 (poses) and C17 (centers).
+    """
     found = {}
     for table, file, columns in (("C14", "poses", POSE_COLUMNS), ("C17", "centers", CENTER_COLUMNS)):
         data = read_table(f"hand_eye/{file}.csv", text=("axis", *columns))
@@ -47,7 +57,15 @@ def printed_entries():
 
 
 def corrections():
-    """The corrected entries as a list of dictionaries: table, pose, column, printed, corrected, slip, reason."""
+    """The entries that are not taken as printed.
+
+    Returns
+    -------
+    corrections : list of dict
+        table, pose (from 1), column, printed, corrected, slip, reason.
+
+    Source: data/hand_eye/corrections.csv; `labkit.documents.misprints` finds them.
+    """
     keys = ("table", "column", "printed", "corrected", "slip", "reason")
     data = read_table("hand_eye/corrections.csv", text=keys)
     return [{"pose": int(pose), **{key: str(data[key][i]) for key in keys}} for i, pose in enumerate(data["pose"])]
@@ -60,6 +78,12 @@ def measurements(corrected=False):
     ----------
     corrected : bool or iterable of int
         True applies all corrections, a collection of pose numbers (from 1) those of these poses.
+
+    Returns
+    -------
+    Measurements
+
+    Source: thesis, listings C14 and C17.
     """
     poses = read_table("hand_eye/poses.csv", text=("axis",))
     centers = read_table("hand_eye/centers.csv", text=("axis",))
@@ -76,7 +100,17 @@ def measurements(corrected=False):
 
 
 def measurements_from(entries):
-    """The measurements that a dictionary of entries, as `printed_entries` returns it, stands for."""
+    """The measurements that a dictionary of entries stands for.
+
+    Parameters
+    ----------
+    entries : dict
+        As `printed_entries` returns it.
+
+    Returns
+    -------
+    Measurements
+    """
     line, angle_deg = _pattern()
     numbers = range(1, len(line) + 1)
     kuka_deg = np.array([[float(entries["C14", i, c]) for c in POSE_COLUMNS] for i in numbers])
@@ -92,28 +126,79 @@ def _pattern():
 
 
 def kuka_pose_deg(name):
-    """A pose of `frames.csv` as printed: x, y, z in mm, A, B, C in deg."""
+    """A pose as printed.
+
+    Parameters
+    ----------
+    name : str
+        A name of `data/hand_eye/frames.csv`, which states the place of each.
+
+    Returns
+    -------
+    pose : array, shape (6,), mm and deg
+
+    Raises
+    ------
+    ValueError
+        For an unknown name, with all known ones.
+    """
     data = read_table("hand_eye/frames.csv", text=("name", "place"))
     return _row(data, name, POSE_COLUMNS)
 
 
 def frame(name):
-    """The same as a transform (4, 4)."""
+    """The same as a transform.
+
+    Returns
+    -------
+    T : array, shape (4, 4), mm
+
+    See Also
+    --------
+    kuka_pose_deg
+    """
     return frames.matrix_from_kuka(frames.kuka_from_degrees(kuka_pose_deg(name)))
 
 
 def point(name):
-    """A point of `points.csv` (mm)."""
+    """A point as printed; names and places stand in `data/hand_eye/points.csv`.
+
+    Returns
+    -------
+    point : array, shape (3,), mm
+
+    Raises
+    ------
+    ValueError
+        For an unknown name, with all known ones.
+    """
     return _row(read_table("hand_eye/points.csv", text=("name", "place")), name, CENTER_COLUMNS)
 
 
 def radius(source):
-    """A sphere radius of `radii.csv` (mm): half the printed diameter."""
+    """A sphere radius, half the printed diameter; sources and places stand in `data/hand_eye/radii.csv`.
+
+    Returns
+    -------
+    radius : float, mm
+
+    Raises
+    ------
+    ValueError
+        For an unknown source, with all known ones.
+    """
     return 0.5 * float(_row(read_table("hand_eye/radii.csv", text=("source", "place")), source, ("diameter",))[0])
 
 
 def printed_target():
-    """Sphere center in the base as the thesis holds it fixed: T_BP x_P' of tables 6-4 and 6-5 (mm)."""
+    """Sphere center in the base as the thesis holds it fixed, T_BP x_P'.
+
+    Returns
+    -------
+    target : array, shape (3,), mm
+
+    Source: thesis, tables 6-4 and 6-5.
+    """
     return frames.transform(frame("plate"), point("sphere_in_plate"))
 
 
@@ -121,7 +206,19 @@ def centers_with_radius(x_S, R, printed_radius=30.0):
     """Sphere centers recomputed for another sphere radius: y' = +-sqrt(y^2 + R^2 - 30^2), the fitted circles staying as
     they are.
 
-    A circle larger than the sphere gives y' = 0. Source: thesis, formula (6-27) and listing C16, which takes R = 30 mm.
+    A circle larger than the sphere gives y' = 0.
+
+    Parameters
+    ----------
+    x_S : array-like, shape (..., 3), mm
+    R, printed_radius : float, mm
+        The radius to take, and the one that was taken.
+
+    Returns
+    -------
+    x_S : array, shape (..., 3), mm
+
+    Source: thesis, formula (6-27) and listing C16, which takes R = 30 mm.
     """
     x_S = as_points(x_S, "x_S").copy()
     R, printed_radius = as_positive_number(R, "R"), as_positive_number(printed_radius, "printed_radius")
@@ -130,8 +227,7 @@ def centers_with_radius(x_S, R, printed_radius=30.0):
 
 
 def simulation(exact=True, printed=False):
-    """The thirteen poses of the simulation model: T_BF (13, 4, 4), x_S (13, 3), target (3,) and the true scanner pose
-    in deg.
+    """The thirteen poses of the simulation model.
 
     The printed inputs contradict each other. With table 6-2's height z = 20 and B = -90 deg, and the sphere at y = 5
     instead of 0 (the plate at y = 0 instead of -5), all 39 printed sensor coordinates follow to their two decimals; no
@@ -143,6 +239,16 @@ def simulation(exact=True, printed=False):
         Sensor coordinates to full precision; False takes the two decimals of listing C10.
     printed : bool
         The contradictory inputs of listing C10 as they stand (z = 10, B = 90 deg, plate at y = -5).
+
+    Returns
+    -------
+    T_BF : array, shape (13, 4, 4), mm
+    x_S : array, shape (13, 3), mm
+    target : array, shape (3,), mm
+    scanner : array, shape (6,), mm and deg
+        The true pose of the scanner.
+
+    Source: thesis, table 6-2 and listing C10.
     """
     data = read_table("hand_eye/simulation.csv", text=("axis",))
     flange = kuka_pose_deg("simulated_flange_C10" if printed else "simulated_flange")
@@ -163,9 +269,53 @@ def simulation(exact=True, printed=False):
 
 
 def start_poses_deg():
-    """The ten start poses of table 7-2, (10, 6) in mm and deg, and their names."""
+    """The ten start poses of the comparison.
+
+    Returns
+    -------
+    poses : array, shape (10, 6), mm and deg
+    names : array of str, shape (10,)
+
+    Source: thesis, table 7-2.
+    """
     data = read_table("hand_eye/start_poses.csv", text=("name",))
     return np.column_stack([data[c] for c in POSE_COLUMNS]), data["name"]
+
+
+def table_7_1(method):
+    """Results of one method on the surface with two minima, local minimum first.
+
+    Parameters
+    ----------
+    method : str
+        "newton", "gauss_newton", "levenberg_marquardt" or "trust_region".
+
+    Returns
+    -------
+    lines : dict
+        {"ideal", "x", "start", "mu": array (2 minima, 2 coordinates), "iterations": array (2,)}.
+
+    Source: thesis, table 7-1.
+    """
+    table = read_table("optimization/table_7_1.csv", text=("method", "minimum"))
+    rows = table["method"] == method
+    names = ("ideal", "x", "start", "mu")
+    pairs = {name: np.column_stack([table[f"{name}_1"], table[f"{name}_2"]])[rows] for name in names}
+    return pairs | {"iterations": table["iterations"][rows]}
+
+
+def extrema():
+    """The stationary points of function (6-16).
+
+    Returns
+    -------
+    extrema : dict
+        {"saddle", "local minimum", "global minimum": array (3,), f and both coordinates}.
+
+    Source: thesis, section 6.2, "Numerische Lösung".
+    """
+    table = read_table("optimization/extrema.csv", text=("point",))
+    return dict(zip(table["point"].tolist(), np.column_stack([table["f"], table["x1"], table["x2"]])))
 
 
 def _row(data, name, columns):
