@@ -154,7 +154,11 @@ def _beyond(theta, v, omega, dt):
 
 def _slips(length, direction, angle):
     """What goes wrong in every model: the right `length` and `direction` with one slip; `angle` names the latter."""
-    step = _straight(length, direction, _turn)
+    return [*_slips_of_units(length, direction), *_slips_of_the_sum(_straight(length, direction, _turn), angle)]
+
+
+def _slips_of_units(length, direction):
+    """A time step or a conversion of angles too many or missing."""
 
     def per_second(theta, v, omega, dt):
         return length(theta, v, omega, dt) / dt
@@ -183,6 +187,12 @@ def _slips(length, direction, angle):
             _straight(length, lambda *given: np.degrees(direction(*given)), _turn),
             "np.cos and np.sin take radians, and theta is in radians already: do not convert.",
         ),
+    ]
+
+
+def _slips_of_the_sum(step, angle):
+    """A right `step` put together wrongly."""
+    return [
         Mistake(
             lambda x, u, dt: x + (step(x, u, dt) - x)[[1, 0, 2]],
             f"Sine and cosine are exchanged: x goes with the cosine of {angle}, y with the sine.",

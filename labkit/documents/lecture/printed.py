@@ -63,7 +63,7 @@ def _by_name(file):
 
 @functools.cache
 def methods():
-    """The table of localization methods: what each can do, how accurate it is, what it measures, whether it needs a map.
+    """The table of localization methods: what each can do, how accurately, with which sensors, and with a map or not.
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """What the report prints: its packet, its motions and the six runs of appendix D.
 
-What a machine is made of stands with the machine: the TX40's link lengths and limits (appendix B) in `machines.arm`, the
-packet's fields (table 1) in `machines.packet`; a robot on the bench has them without any document.
+What a machine is made of stands with the machine: the TX40's link lengths and limits (appendix B) in `machines.arm`,
+the packet's fields (table 1) in `machines.packet`; a robot on the bench has them without any document.
 Source: report "Kalibrace a testovani systemu OTUS tracker", ZCU Plzen 2018; data/tracker.
 """
 
