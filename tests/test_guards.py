@@ -103,16 +103,17 @@ MAY_IMPORT = {  # besides itself
     "geometry": ("checks",),
     "estimation": ("checks", "geometry"),
     "calibration": ("checks", "geometry", "estimation"),
+    "files": ("checks", "geometry"),
     "machines": ("checks", "geometry", "estimation", "calibration"),
     "localization": ("checks", "geometry", "estimation"),
     "fast": ("checks", *MATHEMATICS),
     "documents": ("checks", *MATHEMATICS),
     "exercises": ("checks", "geometry"),
     "stage": ("checks",),
-    "chapters": ("checks", *MATHEMATICS, "documents", "exercises", "stage"),
-    "verbs": ("checks", *MATHEMATICS, "documents", "exercises", "stage", "chapters"),
+    "chapters": ("checks", "files", *MATHEMATICS, "documents", "exercises", "stage"),
+    "verbs": ("checks", "files", *MATHEMATICS, "documents", "exercises", "stage", "chapters"),
 }
-NEEDS_NO_FRONT_END = ("checks", *MATHEMATICS, "documents")
+NEEDS_NO_FRONT_END = ("checks", "files", *MATHEMATICS, "documents")
 MODULES = sorted((ROOT / "labkit").rglob("*.py"))
 
 

@@ -1,0 +1,10 @@
+"""Files of other people: poses, points and logs in the formats robots, trackers and cameras write.
+
+text     lines and columns of a text file: separators, decimal commas, comments, headers, line numbers
+columns  what a column means, from its title, and in which unit
+poses    poses in any of the usual notations, with what was assumed about them
+points   measured points
+logs     odometry, landmarks, readings and true poses of a drive
+
+Every refusal is one sentence with file and line.
+"""
