@@ -7,11 +7,12 @@ business of `session`.
 """
 
 import copy
+import hashlib
 import inspect
 import itertools
 import time
 import types
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -41,10 +42,15 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Mistake:
-    """A wrong variant of the reference, with the same arguments, and what to tell who made it."""
+    """A wrong variant of the reference, with the same arguments, and what to tell who made it.
+
+    `id` is the same in every term and in every list, so that two classes can be compared. Left out, it follows from
+    the exercise and the sentence; whoever only improves the sentence writes the old id down.
+    """
 
     variant: object
     text: str
+    id: str = ""
 
 
 @dataclass(frozen=True)
@@ -59,6 +65,18 @@ class Item:
         hints = getattr(self, "hints", None)
         if hints is not None and (isinstance(hints, str) or len(hints) != 3):
             raise ValueError(f"exercise {self.id!r} needs exactly three hints, got {len(hints)}")
+        if hasattr(self, "mistakes"):
+            object.__setattr__(self, "mistakes", _with_ids(self.id, self.mistakes))
+
+
+def _with_ids(exercise, mistakes):
+    """The mistakes, each with an id of its own: that of its sentence, numbered where several variants share it."""
+    named = []
+    for mistake in mistakes:
+        words = f"{exercise}-{hashlib.sha256(mistake.text.encode()).hexdigest()[:6]}"
+        same = sum(other.text == mistake.text for other in named)
+        named.append(replace(mistake, id=mistake.id or (f"{words}-{same + 1}" if same else words)))
+    return tuple(named)
 
 
 @dataclass(frozen=True)

@@ -112,7 +112,8 @@ class Bound:
         is_value = isinstance(self._item, Value)
         outcome = self._item.judge(answer, unit) if is_value else self._item.judge(answer)
         if not is_strict() or outcome.status == CORRECT:
-            progress.record(self._chapter.name, self._item.id, outcome.status)
+            named = {} if outcome.mistake is None else {"mistake": self._item.mistakes[outcome.mistake].id}
+            progress.record(self._chapter.name, self._item.id, outcome.status, **named)
         feedback.show(self._panel(outcome, guard.PRISTINE.drain()))
         if outcome.status == CORRECT:
             return Answer.of(answer) if is_value else answer

@@ -127,6 +127,12 @@ def test_a_text_is_shared_only_by_variants_of_one_mistake():
         assert len(set(groups)) == len(groups), item.id
 
 
+@pytest.mark.parametrize("chapter", CHAPTERS, ids=lambda c: c.name)
+def test_the_ids_of_mistakes_are_unique_in_their_chapter(chapter):
+    ids = [mistake.id for item in chapter.items for mistake in getattr(item, "mistakes", ())]
+    assert all(ids) and len(set(ids)) == len(ids)
+
+
 def test_metrics_of_all_exercises_admit_their_reference():
     for _, item in EXERCISES:
         if isinstance(item.metric, metrics.Metric):

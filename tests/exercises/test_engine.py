@@ -744,6 +744,25 @@ def test_solution_and_starter_come_from_the_source(capsys):
     assert "def invert" in shown and "your code here" in shown
 
 
+def test_a_mistake_keeps_its_id_when_others_come_before_it_or_its_sentence_is_improved():
+    def ids(*mistakes):
+        hints = ("a", "b", "c")
+        return [m.id for m in engine.Value("n", reference=lambda: 1.0, hints=hints, mistakes=mistakes).mistakes]
+
+    first, second = engine.Mistake(lambda: 2.0, "Twice."), engine.Mistake(lambda: 3.0, "Thrice.")
+    same, again = ids(first, engine.Mistake(lambda: -2.0, "Twice."))
+    assert same == "n-e82e28" and again == "n-e82e28-2"
+    assert ids(second, first)[1] == same
+    assert ids(engine.Mistake(lambda: 2.0, "That is twice as much.", id=same)) == [same]
+
+
+def test_progress_records_which_mistake_it_was():
+    ex = session.course("01-frames")
+    mistake = ex._chapter["distance"].mistakes[2]
+    ex.distance(mistake.variant())
+    assert [(e["event"], e["mistake"]) for e in progress.of("01-frames", "distance")] == [("not yet", mistake.id)]
+
+
 def test_progress_is_counted_and_started_over():
     ex = session.course("01-frames")
     ex.invert(frames.invert)
