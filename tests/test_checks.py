@@ -1,5 +1,8 @@
 """Bad input to any module of the mathematics meets one sentence that says what was expected, what came, and where."""
 
+from decimal import Decimal
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -35,7 +38,7 @@ from labkit.machines.arm import (
 )
 from labkit.machines.log import mean_pose, reject_outliers
 from labkit.machines.mounting import e_rot, e_trans
-from labkit.machines.packet import encode_packet, packet_from_pose, quaternion_from_matrix
+from labkit.machines.packet import encode_packet, packet_from_pose
 
 I3, I4, O2, O3 = np.eye(3), np.eye(4), np.zeros(2), np.zeros(3)
 POSES = np.tile(I4, (5, 1, 1))
@@ -56,7 +59,23 @@ REFUSED = [
     (lambda: checks.as_shape(O3, "x", "n", 3), r"x must have shape \(n, 3\), got \(3,\)"),
     (lambda: checks.as_shape(O3, "x", 2), r"x must have shape \(2,\), got \(3,\)"),
     (lambda: checks.as_count(2.5, "n"), "n must be a whole number, at least 1, got 2.5"),
-    (lambda: checks.as_count("many", "n"), "n must hold real numbers, got str"),
+    (lambda: checks.as_count("many", "n"), "n must hold real numbers, got text"),
+    (lambda: checks.as_floats(np.array([1j]), "x"), "x must hold real numbers, got complex numbers"),
+    (lambda: checks.as_floats(np.array(["1"]), "x"), "x must hold real numbers, got text"),
+    (lambda: checks.as_floats(b"1", "x"), "x must hold real numbers, got bytes"),
+    (lambda: checks.as_floats([True, False], "x"), "x must hold real numbers, got truth values"),
+    (lambda: checks.as_floats(np.array(["2016-05-04"], "M8[D]"), "x"), "x must hold real numbers, got dates"),
+    (lambda: checks.as_floats(np.array([3], "m8[s]"), "x"), "x must hold real numbers, got durations"),
+    (lambda: checks.as_floats(None, "x"), "x must hold real numbers, got None"),
+    (lambda: checks.as_floats([1.0, None], "x"), "x must hold real numbers, got None"),
+    (lambda: checks.as_floats(np.array(["1", 2.0], object), "x"), "got an entry of type str"),
+    (lambda: checks.as_floats({}, "x"), "got an entry of type dict"),
+    (lambda: checks.as_floats([[1.0, 2.0], [3.0]], "x"), "got rows of different lengths"),
+    (lambda: checks.as_floats([10**400], "x"), "x must hold numbers below 1e308"),
+    (lambda: checks.as_floats(np.zeros(2, [("a", float)]), "x"), "got entries of type"),
+    (lambda: checks.as_points([0.0, 1e200], "x", 2), r"x must hold numbers below 1e\+75, got 1e\+200"),
+    (lambda: checks.as_transforms(np.diag([1, 1, 1, 1 + 1e-5]), "T"), r"got \(0, 0, 0, 1.00001\)"),
+    (lambda: checks.as_transforms(np.diag([1, 1, 1, -1]), "T"), r"got \(0, 0, 0, -1\)"),
     (lambda: checks.as_readings([np.inf], "z"), "z must be finite, or NaN"),
     (lambda: checks.as_covariances([[1.0, 0.5], [0.0, 1.0]], "cov", 2), "cov must be symmetric"),
     (lambda: checks.as_covariances([[-1.0, 0.0], [0.0, 1.0]], "cov", 2), "no negative variance, got -1"),
@@ -70,7 +89,7 @@ REFUSED = [
     (lambda: lie.log_se3(I3), "T must have shape"),
     (lambda: lie.nearest_rotation(O3), "M must have shape"),
     (lambda: frames.unit_vector(2.0), "single number"),
-    (lambda: frames.frame_from_points(np.zeros((2, 3)), np.ones((3, 3)), O3), r"\(2, 3\) of origin"),
+    (lambda: frames.frame_from_points(np.zeros((2, 3)), np.ones((3, 3)), O3), r"\(2,\) of origin, \(3,\) of x_point"),
     (lambda: frames.transform(POSES, np.zeros((4, 3))), r"\(5,\) of T, \(4,\) of points"),
     (lambda: frames.relative(POSES, POSES[:2]), "T_WB"),
     (lambda: frames.rotation_angle(np.eye(2)), r"T must have shape \(..., 4, 4\) or"),
@@ -135,7 +154,7 @@ REFUSED = [
     (lambda: encode_packet(np.full(23, np.nan)), "values must be finite"),
     (lambda: packet_from_pose(I4, np.nan), "time must be finite"),
     (lambda: packet_from_pose(I4, [0.0, 1.0]), "as many as readings"),
-    (lambda: quaternion_from_matrix(2 * I3), "orthonormal"),
+    (lambda: frames.quaternion_from_matrix(2 * I3), "orthonormal"),
     (lambda: reject_outliers([1.0, 2.0, 3.0], factor=np.nan), "factor must be finite"),
     (lambda: mean_pose(POSES[:0]), "at least one pose"),
     (lambda: e_rot(np.zeros((9, 9))), "at least two motions"),
@@ -254,6 +273,43 @@ def test_bad_input_is_refused_in_words(call, text):
     with pytest.raises(ValueError, match=text) as refusal:
         call()
     assert not isinstance(refusal.value, np.linalg.LinAlgError)
+
+
+@pytest.mark.parametrize(
+    "value, form, text",
+    [
+        (-1e-9, ".3f", "0.000"),
+        (-0.0, "g", "0"),
+        (-0.04, ".1f", "0.0"),
+        (-0.06, ".1f", "-0.1"),
+        (-1e-9, ".3g", "-1e-09"),
+        ((0.6, -1e-17, -0.8), ".3f", "(0.600, 0.000, -0.800)"),
+        (np.array([[-0.0, 1.0], [2.0, -3.0]]), "g", "((0, 1), (2, -3))"),
+    ],
+)
+def test_what_rounds_to_zero_is_shown_without_a_sign(value, form, text):
+    assert checks.shown(value, form) == text
+
+
+def test_every_kind_of_real_number_is_a_float():
+    kinds = ([1, 2], np.array([1, 2], np.int8), np.array([1, 2], np.float16), np.array([1, 2], np.longdouble))
+    for value in (*kinds, [Fraction(1), Decimal(2)], np.array([1, 2.0], object), np.array([1.0, 2.0], ">f8")):
+        array = checks.as_floats(value, "x")
+        assert array.dtype == np.float64 and array.tolist() == [1.0, 2.0]
+    kept = np.zeros(3)
+    assert checks.as_floats(kept, "x") is kept
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_pose_that_is_off_by_rounding_is_a_pose(dtype):
+    """A long product of poses and the general inverse leave a few last bits in the last row and in R'R."""
+    T = lie.exp_se3(np.random.default_rng(3).normal(size=(50, 6)) * (1, 1, 1, 500, 500, 500)).astype(dtype)
+    product = np.linalg.inv(np.linalg.multi_dot(list(T)))
+    product[3, 3] += 2 * np.finfo(dtype).eps
+    back = frames.invert(product)
+    np.testing.assert_array_equal(back[3], (0.0, 0.0, 0.0, 1.0))
+    scale = np.abs(product[:3, 3]).max()
+    np.testing.assert_allclose((back @ product)[:3], np.eye(4)[:3], atol=1e3 * np.finfo(dtype).eps * scale)
 
 
 def test_lists_are_as_good_as_arrays():

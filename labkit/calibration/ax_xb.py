@@ -10,7 +10,7 @@ depends on the N poses through two small matrices only, so an iteration takes th
 
 import numpy as np
 
-from ..checks import as_positive_number, as_rotations, as_shape, as_transforms
+from ..checks import as_positive_number, as_rotations, as_shape, as_transforms, shown
 from ..geometry.frames import pose, rotation_block
 from ..geometry.lie import log_so3, nearest_rotation, skew
 from .result import HandEye
@@ -115,7 +115,7 @@ def solve_ax_xb(A, B):
     if values[-2] <= RELATIVE_RANK * np.sqrt(len(A)):
         raise ValueError(
             "the rotation axes of all motions are parallel or nothing turns: the second smallest singular value of the "
-            f"Kronecker matrix is {values[-2]:.2g}, so one angle of the mounting stays free"
+            f"Kronecker matrix is {shown(values[-2], '.2g')}, so one angle of the mounting stays free"
         )
     return pose(R, translation_from_motions(A, B, R)[0])
 

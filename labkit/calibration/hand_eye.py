@@ -27,6 +27,7 @@ from ..checks import (
     as_shape,
     as_transforms,
     fit_together,
+    shown,
 )
 from ..geometry.frames import invert, matrix_from_kuka, pose, transform
 from ..geometry.lie import exp_so3, nearest_rotation, skew
@@ -499,7 +500,7 @@ def _invert_spread(W, total):
             )
         axis = vectors[:, 0] * np.sign(vectors[np.argmax(np.abs(vectors[:, 0])), 0])
         raise ValueError(
-            f"all poses turn about one axis, ({axis[0]:.3f}, {axis[1]:.3f}, {axis[2]:.3f}) in the base: scanner and "
+            f"all poses turn about one axis, {shown(axis, '.3f')} in the base: scanner and "
             "sphere "
             "can be shifted together along it; add poses that turn the flange about another axis"
         )

@@ -5,7 +5,7 @@ Source: thesis "Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", H
 
 import numpy as np
 
-from ..checks import as_count, as_matrices, as_points, as_positive_number, as_shape, as_transforms
+from ..checks import as_count, as_matrices, as_points, as_positive_number, as_shape, as_transforms, shown
 from ..geometry.frames import invert, pose, transform
 from ..geometry.lie import exp_so3, nearest_rotation
 from .hand_eye import (
@@ -28,7 +28,7 @@ def field_problem(x_S):
             name = "|y|" if axis == "y" else axis
             first = values[bad].ravel()[0]
             poses = "one pose" if bad.sum() == 1 else f"{bad.sum()} poses"
-            return f"in {poses} the sphere lies at {name} = {first:.1f} mm, outside {low:g} to {high:g}."
+            return f"in {poses} the sphere lies at {name} = {shown(first, '.1f')} mm, outside {low:g} to {high:g}."
     return None
 
 
@@ -126,7 +126,7 @@ def li_two_step(T_BF, x_S, max_turn_deg=0.01):
     if not same.any():
         least = np.rad2deg(2 * np.arcsin(chord.min() / (2 * np.sqrt(2))))
         raise ValueError(
-            f"no two poses have the same orientation (the nearest differ by {least:.3g} deg): "
+            f"no two poses have the same orientation (the nearest differ by {shown(least, '.3g')} deg): "
             "step 1 needs the robot to translate without turning"
         )
     p, q = p[same], q[same]

@@ -25,6 +25,7 @@ from ..checks import (
     as_shape,
     as_transform_rows,
     fit_together,
+    shown,
 )
 from ..geometry.lie import exp_so3, skew
 
@@ -147,9 +148,7 @@ def solve_pivot(A, b):
         raise ValueError(f"A and b must have shapes (m, 6) and (m,), got {A.shape} and {b.shape}")
     x, _, rank, values = np.linalg.lstsq(A, b, rcond=RANK_TOLERANCE)
     if rank < 6:
-        raise ValueError(
-            f"A must have rank 6, but its rank is {rank}: the singular values are {np.round(values, 6).tolist()}"
-        )
+        raise ValueError(f"A must have rank 6, but its rank is {rank}: the singular values are {shown(values, '.6g')}")
     return x
 
 
@@ -197,7 +196,7 @@ def robust_weights(distances, scale, cutoff=TUKEY):
     """
     d, scale, cutoff = as_finite(distances, "distances"), float(scale), float(cutoff)
     if not scale > 0 or not cutoff > 0:
-        raise ValueError(f"scale and cutoff must be positive, got {scale:g} and {cutoff:g}")
+        raise ValueError(f"scale and cutoff must be positive, got {shown(scale)} and {shown(cutoff)}")
     return _tukey(d / scale, cutoff)
 
 
@@ -266,7 +265,7 @@ def _noise(std_rot, std_trans):
     std_rot, std_trans = as_number(std_rot, "std_rot"), as_number(std_trans, "std_trans")
     if std_rot < 0 or std_trans <= 0:
         raise ValueError(
-            f"std_rot must not be negative and std_trans must be positive, got {std_rot:g} and {std_trans:g}"
+            f"std_rot must not be negative and std_trans must be positive, got {shown(std_rot)} and {shown(std_trans)}"
         )
     return std_rot, std_trans
 
@@ -328,10 +327,10 @@ def _refuse_free_tip(gram, n, tolerance):
     free = int((ratios <= tolerance).sum())
     v = np.linalg.eigh(gram[:3, :3])[1][:, 0]
     v *= 1.0 if v[np.abs(v).argmax()] > 0 else -1.0
-    where = f"along ({v[0]:.2f}, {v[1]:.2f}, {v[2]:.2f}) in the tool frame" if free == 1 else f"in {free} directions"
+    where = f"along {shown(v, '.2f')} in the tool frame" if free == 1 else f"in {free} directions"
     raise ValueError(
         f"the poses do not fix the tip, it is free {where}: the smallest singular value is {_share(ratios[5])} of the"
-        f" largest, more than {tolerance:.1e} is needed; turn the tool about"
+        f" largest, more than {shown(tolerance, '.1e')} is needed; turn the tool about"
         f" {'another axis' if free == 1 else 'two axes'}"
     )
 

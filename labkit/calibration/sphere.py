@@ -19,6 +19,7 @@ from ..checks import (
     as_positive,
     as_positive_number,
     as_shape,
+    shown,
 )
 
 MIN_SAGITTA = 1e-6  # an arc flatter than this, relative to its length, fixes no circle: the points are collinear
@@ -65,7 +66,7 @@ def triangulation_height(base, alpha, beta):
     base, alpha, beta = as_positive(base, "base"), as_positive(alpha, "alpha"), as_positive(beta, "beta")
     if (alpha + beta >= np.pi).any():
         worst = np.rad2deg(np.max(alpha + beta))
-        raise ValueError(f"the rays must meet: alpha + beta must stay below 180 deg, got {worst:.6g} deg")
+        raise ValueError(f"the rays must meet: alpha + beta must stay below 180 deg, got {shown(worst, '.6g')} deg")
     return base * np.sin(alpha) * np.sin(beta) / np.sin(alpha + beta)
 
 
@@ -155,8 +156,8 @@ def fit_sphere(points, std=None):
     flatness = np.linalg.svd(p, compute_uv=False)
     if flatness[2] <= MIN_SAGITTA * flatness[0]:
         raise ValueError(
-            f"points must not lie in one plane: the third singular value is {flatness[2] / flatness[0]:.1e} of the "
-            "first"
+            "points must not lie in one plane: the third singular value is "
+            f"{shown(flatness[2] / flatness[0], '.1e')} of the first"
         )
     a = np.linalg.lstsq(np.column_stack([p, np.ones(len(p))]), -(p * p).sum(1), rcond=None)[0]
     center = -0.5 * a[:3]
@@ -180,7 +181,8 @@ def center_offset(radius, circle_radius):
     R, r = as_positive(radius, "radius"), as_positive(circle_radius, "circle_radius")
     if (r > R).any():
         raise ValueError(
-            f"the circle must not be larger than the sphere: radius {np.min(R):g} mm, circle {np.max(r):.6g} mm"
+            "the circle must not be larger than the sphere: "
+            f"radius {shown(np.min(R))} mm, circle {shown(np.max(r), '.6g')} mm"
         )
     return np.sqrt((R - r) * (R + r))
 
@@ -270,7 +272,9 @@ def scan_line(center, radius, half_angle, n, std=0.0, rng=None):
         raise ValueError("rng must be given when std is not 0")
     r = np.sqrt(max(as_positive_number(radius, "radius") ** 2 - center[1] ** 2, 0.0))
     if r == 0:
-        raise ValueError(f"the scan plane misses the sphere: |y| = {abs(center[1]):g} mm, radius {radius:g} mm")
+        raise ValueError(
+            f"the scan plane misses the sphere: |y| = {shown(abs(center[1]))} mm, radius {shown(radius)} mm"
+        )
     angle = np.linspace(-half_angle, half_angle, n)
     reach = r + (std * rng.normal(size=n) if std > 0 else 0.0)
     return center[0] + reach * np.sin(angle), center[2] - reach * np.cos(angle)
@@ -290,7 +294,8 @@ def _profile(x, z):
     ratio = np.sqrt(np.maximum(values[..., 0], 0.0) / np.maximum(values[..., 1], np.finfo(float).tiny))
     if (ratio <= MIN_SAGITTA).any():
         raise ValueError(
-            f"the points are collinear: they spread {ratio.min():.1e} times as far across their line as along it"
+            f"the points are collinear: they spread {shown(ratio.min(), '.1e')} times as far across their line "
+            "as along it"
         )
     return points
 

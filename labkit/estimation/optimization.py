@@ -25,6 +25,7 @@ from ..checks import (
     as_positive,
     as_positive_number,
     fit_together,
+    shown,
 )
 
 ROUNDING = 10 * np.finfo(float).eps  # a relative change of the cost below this is noise
@@ -537,7 +538,7 @@ def trust_region(
     """
     accept, max_iterations = as_number(accept, "accept"), as_count(max_iterations, "max_iterations", at_least=0)
     if not 0 <= accept < 0.25:
-        raise ValueError(f"accept must lie in [0, 1/4), got {accept:g}")
+        raise ValueError(f"accept must lie in [0, 1/4), got {shown(accept)}")
     radius, max_radius = as_positive_number(radius, "radius"), as_positive_number(max_radius, "max_radius")
     evaluate = _squares(fun, jac) if hessian is None else _smooth(fun, jac, hessian)
     stop, scale = stop or settled(), as_positive(scale, "scale")

@@ -20,6 +20,7 @@ from ..checks import (
     as_shape,
     as_transforms,
     fit_together,
+    shown,
 )
 from .frames import _invert, frame_from_points, invert, relative, rotation_angle, rotation_block, transform
 from .lie import adjoint, exp_se3, log_se3, nearest_rotation, skew
@@ -110,7 +111,7 @@ def orthonormalize(T):
     T = as_matrices(T, "T", 4, 4)
     det = np.linalg.det(T[..., :3, :3])
     if (det <= 1e-9).any():
-        raise ValueError(f"T must have a right-handed rotation block, but its determinant is {det.min():.3g}")
+        raise ValueError(f"T must have a right-handed rotation block, but its determinant is {shown(det.min(), '.3g')}")
     repaired = T.copy()
     repaired[..., :3, :3] = nearest_rotation(T[..., :3, :3])
     return repaired
@@ -171,10 +172,12 @@ def distribute_closure(transforms, shares=None):
     N = len(links)
     shares = np.full(N, 1 / N) if shares is None else as_points(shares, "shares", dim=N)
     if shares.ndim != 1 or (shares < 0).any() or shares.sum() <= 0:
-        raise ValueError(f"shares must be {N} numbers, none negative and not all zero, got {shares.tolist()}")
+        raise ValueError(f"shares must be {N} numbers, none negative and not all zero, got {shown(shares)}")
     angle = rotation_angle(poses[-1]).max(initial=0)
     if angle > np.pi - 1e-3:
-        raise ValueError(f"the loop misses by {np.rad2deg(angle):.1f} deg: half a turn has no nearest way back")
+        raise ValueError(
+            f"the loop misses by {shown(np.rad2deg(angle), '.1f')} deg: half a turn has no nearest way back"
+        )
     moved = np.concatenate([[0.0], np.cumsum(shares / shares.sum())])
     twist = log_se3(poses[-1])
     corrected = exp_se3(-moved.reshape(-1, *[1] * twist.ndim) * twist) @ poses
@@ -276,7 +279,7 @@ def _noise(std_rot, std_trans):
     values = [as_number(v, n) for v, n in ((std_rot, "std_rot"), (std_trans, "std_trans"))]
     for value, name in zip(values, ("std_rot", "std_trans")):
         if value < 0:
-            raise ValueError(f"{name} must not be negative, got {value:g}")
+            raise ValueError(f"{name} must not be negative, got {shown(value)}")
     return values
 
 
@@ -338,7 +341,7 @@ def solve_pose_graph(edges, measured, std_rot, std_trans):
     if Z.ndim != 3 or pairs.shape != (len(Z), 2):
         raise ValueError(f"edges must be pairs, one for each of the measured links, got {pairs.shape} for {Z.shape}")
     if not len(pairs) or (pairs < 0).any() or (pairs % 1 != 0).any() or (pairs[:, 0] == pairs[:, 1]).any():
-        raise ValueError(f"edges must be pairs of two different nodes, numbered from 0, got {pairs.tolist()}")
+        raise ValueError(f"edges must be pairs of two different nodes, numbered from 0, got {shown(pairs)}")
     pairs = pairs.astype(int)
     stds = [as_positive_number(std_rot, "std_rot"), as_positive_number(std_trans, "std_trans")]
     weight = np.repeat(1 / np.array(stds), 3)

@@ -6,6 +6,7 @@ Source: lab sheet "Kalibrierung", Hochschule Darmstadt 2016, section 1.
 """
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ..checks import (
     as_finite,
@@ -16,11 +17,11 @@ from ..checks import (
     as_shape,
     as_transforms,
     fit_together,
+    shown,
 )
 from .lie import nearest_rotation, skew
 
 MIN_ARM_ANGLE_DEG = 1e-3  # below this the triangle is so flat that its height drowns in the last digits of the points
-BLOCK = 2048  # frames built at a time, so that the work stays in the processor's cache
 MIN_ARM = 1e-9  # relative to the largest coordinate: a shorter arm is rounding error, not a direction
 
 
@@ -37,10 +38,11 @@ def unit_vector(v):
     v = as_finite(v, "v")
     if v.ndim < 1:
         raise ValueError("v must have shape (..., n), got a single number")
-    length = np.linalg.norm(v, axis=-1, keepdims=True)
-    if (length == 0).any():
+    largest = np.abs(v).max(-1, keepdims=True, initial=0.0)
+    if (largest == 0).any():
         raise ValueError("v must not be the zero vector: it has no direction")
-    return v / length
+    v = v / largest  # so that no square overflows or vanishes
+    return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
 def gram_schmidt(a, b):
@@ -66,12 +68,23 @@ def gram_schmidt(a, b):
     Source: lab sheet, section 1, the four formulas before listing 1.
     """
     a, b = as_points(a, "a"), as_points(b, "b")
-    fit_together(a=a.shape, b=b.shape)
-    a, b = np.broadcast_arrays(a, b)
-    _refuse_flat(a, b, ("a", "b"), scale=np.maximum(np.abs(a).max(-1), np.abs(b).max(-1)))
-    R = np.empty((*a.shape, 3))
-    _axes_into(R, np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0), 1.0)
-    return R
+    fit_together(a=a.shape[:-1], b=b.shape[:-1])
+    for arm, name in ((a, "a"), (b, "b")):
+        if (arm == 0).all(-1).any():
+            raise ValueError(f"{name} is zero: it gives no direction")
+    return _axes(a, b, "a and b are parallel")
+
+
+def _axes(a, b, if_flat):
+    """The formulas of `gram_schmidt`; `if_flat` begins the refusal of parallel directions."""
+    x, b = unit_vector(a), unit_vector(b)
+    angle = arm_angle(x, b)
+    flattest = np.minimum(angle, np.pi - angle).min(initial=np.pi)
+    if flattest < np.deg2rad(MIN_ARM_ANGLE_DEG):
+        raise ValueError(f"{if_flat}: the angle between the arms is {shown(np.rad2deg(flattest), '.2g')} deg")
+    y = unit_vector(b - (x * b).sum(-1, keepdims=True) * x)
+    z = np.cross(x, y)
+    return np.stack(np.broadcast_arrays(x, y, z), axis=-1)
 
 
 def frame_from_points(origin, x_point, y_point):
@@ -95,60 +108,20 @@ def frame_from_points(origin, x_point, y_point):
     Source: lab sheet, section 1, listing 1.
     """
     o, px, py = map(as_points, (origin, x_point, y_point), ("origin", "x_point", "y_point"))
-    if not o.shape == px.shape == py.shape:
-        fit_together(origin=o.shape, x_point=px.shape, y_point=py.shape)
-    o, px, py = np.broadcast_arrays(o, px, py)
-    T = np.zeros((*o.shape[:-1], 4, 4))
-    rows, origins, xs, ys = T.reshape(-1, 4, 4), *(p.reshape(-1, 3) for p in (o, px, py))
-    suspicious = False
-    for start in range(0, len(rows), BLOCK):
-        part = slice(start, start + BLOCK)
-        corner = np.ascontiguousarray(origins[part].T)
-        scale = max(np.abs(xs[part]).max(), np.abs(ys[part]).max())
-        suspicious |= not _axes_into(rows[part], xs[part].T - corner, ys[part].T - corner, scale)
-    if suspicious:
-        _refuse_flat(px - o, py - o, ("x_point", "y_point"), scale=np.maximum(np.abs(px), np.abs(py)).max(-1))
-    T[..., :3, 3] = o
-    T[..., 3, 3] = 1.0
-    return T
+    fit_together(origin=o.shape[:-1], x_point=px.shape[:-1], y_point=py.shape[:-1])
+    for point, name in ((px, "x_point"), (py, "y_point")):
+        _refuse_short(point - o, point, name)
+    R = _axes(px - o, py - o, "origin, x_point and y_point are collinear")
+    return pose(R, o)
 
 
-def _axes_into(R, a, b, scale):
-    """Write the Gram-Schmidt axes of a, b, each of shape (3, ...), into the first three rows and columns of R.
-
-    The cross product comes first, y = z x x follows. The axes are perpendicular to about 1e-16 over the sine of the
-    angle between the arms: 1e-11 for the flattest triangle that is let in. Returns True when no arm can be short beside
-    `scale` and no triangle flat; otherwise `_refuse_flat` has to look at each one.
-    """
-    (ax, ay, az), (bx, by, bz) = a, b
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        base = ax * ax + ay * ay + az * az
-        s = 1 / np.sqrt(base)
-        xx, xy, xz = ax * s, ay * s, az * s
-        zx, zy, zz = xy * bz - xz * by, xz * bx - xx * bz, xx * by - xy * bx
-        height = zx * zx + zy * zy + zz * zz
-        s = 1 / np.sqrt(height)
-        zx, zy, zz = zx * s, zy * s, zz * s
-        R[..., 0, 0], R[..., 1, 0], R[..., 2, 0] = xx, xy, xz
-        R[..., 0, 1], R[..., 1, 1], R[..., 2, 1] = zy * xz - zz * xy, zz * xx - zx * xz, zx * xy - zy * xx
-        R[..., 0, 2], R[..., 1, 2], R[..., 2, 2] = zx, zy, zz
-        slope = np.deg2rad(MIN_ARM_ANGLE_DEG) ** 2 * (bx * bx + by * by + bz * bz)
-        short = 4 * (MIN_ARM * scale) ** 2
-    return bool(np.min(base) > short and np.min(height) > short and (height > 2 * slope).all())
-
-
-def _refuse_flat(a, b, names, scale):
-    """Raise when an arm has no length beside the coordinates it came from, or the arms are parallel."""
-    for arm, name in ((a, names[0]), (b, names[1])):
-        length = np.sqrt((arm * arm).sum(-1))
-        if (length <= MIN_ARM * scale).any():
-            what = "is zero" if names[0] == "a" else "coincides with origin"
-            raise ValueError(f"{name} {what}: the arm is {length.min():.3g} long and gives no direction")
-    angle = arm_angle(a, b)
-    flat = np.minimum(angle, np.pi - angle).min(initial=np.inf)
-    if flat < np.deg2rad(MIN_ARM_ANGLE_DEG):
-        subject = "a and b are parallel" if names[0] == "a" else "origin, x_point and y_point are collinear"
-        raise ValueError(f"{subject}: the angle between the arms is {np.rad2deg(flat):.2g} deg")
+def _refuse_short(arm, point, name):
+    """Raise when an arm has no length beside the coordinates it came from."""
+    if (np.abs(arm).max(-1) <= MIN_ARM * np.abs(point).max(-1)).any():
+        length = np.linalg.norm(arm, axis=-1)
+        raise ValueError(
+            f"{name} coincides with origin: the arm is {shown(length.min(), '.3g')} long and gives no direction"
+        )
 
 
 def arm_angle(a, b):
@@ -262,12 +235,24 @@ def kuka_from_degrees(xyzabc_deg):
 def matrix_from_quaternion(xyzw):
     """Rotation matrix of a quaternion, scalar last, of any nonzero length; (..., 4) -> (..., 3, 3)."""
     q = as_points(xyzw, "xyzw", dim=4)
-    if (np.linalg.norm(q, axis=-1) == 0).any():
+    if (q == 0).all(-1).any():
         raise ValueError("xyzw must not be the zero quaternion: it is no rotation")
     q = unit_vector(q)
     v, w = q[..., :3], q[..., 3, None, None]
     S = skew(v)
     return np.eye(3) + 2 * w * S + 2 * S @ S
+
+
+def quaternion_from_matrix(R):
+    """Quaternion x, y, z, w with w >= 0 of a rotation matrix; (..., 3, 3) -> (..., 4).
+
+    See Also
+    --------
+    matrix_from_quaternion : the way back.
+    """
+    R = as_rotations(R, "R")
+    q = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(canonical=True) if R.size else np.zeros((0, 4))
+    return q.reshape(*R.shape[:-2], 4)
 
 
 def fit_frame(points_F, points_W):
@@ -304,7 +289,7 @@ def fit_frame(points_F, points_W):
         raise ValueError("the points coincide: they have no orientation")
     if (values[..., 1] <= 1e-9 * values[..., 0]).any():
         ratio = (values[..., 1] / values[..., 0]).min()
-        raise ValueError(f"the points are collinear: the second singular value is {ratio:.1e} of the first")
+        raise ValueError(f"the points are collinear: the second singular value is {shown(ratio, '.1e')} of the first")
     R = nearest_rotation(np.swapaxes(spread, -1, -2))
     return pose(R, q_mean - (R @ p_mean[..., None])[..., 0])
 
@@ -328,7 +313,9 @@ def gram_schmidt_covariance(x_arm, y_along, y_height, std):
     c, u, h = (as_number(v, n) for v, n in ((x_arm, "x_arm"), (y_along, "y_along"), (y_height, "y_height")))
     std = as_positive_number(std, "std")
     if c == 0 or h == 0:
-        raise ValueError(f"x_arm and y_height must not be 0 (a flat triangle gives no frame), got {c:g} and {h:g}")
+        raise ValueError(
+            f"x_arm and y_height must not be 0 (a flat triangle gives no frame), got {shown(c)} and {shown(h)}"
+        )
     r = u / c
     J = np.array(  # columns: e_o.y, e_o.z, e_x.y, e_x.z, e_y.z
         [[0, (r - 1) / h, 0, -r / h, 1 / h], [0, 1 / c, 0, -1 / c, 0], [-1 / c, 0, 1 / c, 0, 0]]

@@ -8,7 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import as_count, as_finite, as_number, as_points, as_positive, as_positive_number, as_shape, fit_together
+from ..checks import (
+    as_count,
+    as_finite,
+    as_number,
+    as_points,
+    as_positive,
+    as_positive_number,
+    as_shape,
+    fit_together,
+    shown,
+)
 
 COSTS = ("distance", "squares")
 RANK_TOLERANCE = 1e-7  # a second singular value below this share of the first: the landmarks do not fix the position
@@ -121,7 +131,9 @@ def circle_intersections(landmarks, distances):
     along = b - a
     base = np.hypot(*along)
     if base == 0 or not abs(r1 - r2) <= base <= r1 + r2:
-        raise ValueError(f"the circles do not meet in two points: radii {r1:g} and {r2:g} m, centers {base:g} m apart")
+        raise ValueError(
+            f"the circles do not meet in two points: radii {shown(r1)} and {shown(r2)} m, centers {shown(base)} m apart"
+        )
     foot = (r1**2 - r2**2 + base**2) / (2 * base)
     height = np.sqrt(max(0.0, r1**2 - foot**2))
     along = along / base

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from ..checks import as_count, as_finite, as_number, as_points, as_positive_number, as_shape
+from ..checks import as_count, as_finite, as_number, as_points, as_positive_number, as_shape, shown
 
 FREE, OCCUPIED, UNKNOWN = 0, 1, 2
 _SYMBOLS = {".": FREE, " ": FREE, "#": OCCUPIED, "?": UNKNOWN}
@@ -88,12 +88,14 @@ class OccupancyGrid:
             raise ValueError("lines must hold at least one segment, got none")
         resolution, margin = as_positive_number(resolution, "resolution"), as_number(margin, "margin")
         if margin < 0:
-            raise ValueError(f"margin must not be negative, got {margin:g}")
+            raise ValueError(f"margin must not be negative, got {shown(margin)}")
         ends = lines.reshape(-1, 2)
         low = np.floor((ends.min(0) - margin) / resolution + 1e-9) * resolution
         shape = np.floor((ends.max(0) + margin - low) / resolution + 1e-9) + 1
         if shape.prod() > MOST_CELLS:
-            raise ValueError(f"the map must have at most {MOST_CELLS:g} cells, got {shape[1]:g} by {shape[0]:g}")
+            raise ValueError(
+                f"the map must have at most {MOST_CELLS:g} cells, got {shown(shape[1])} by {shown(shape[0])}"
+            )
         shape = shape.astype(int)
         cells = np.zeros(shape[::-1], dtype=np.uint8)
         for line in (lines.reshape(-1, 2, 2) - low) / resolution + 1e-9:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import as_number, as_points
+from ..checks import as_number, as_points, shown
 from .particles import (
     effective_size,
     estimate_mode,
@@ -39,7 +39,7 @@ def recover(w_mean, w_slow, w_fast, alpha_slow=0.02, alpha_fast=0.3):
     )
     if not 0 <= alpha_slow < alpha_fast <= 1:
         raise ValueError(
-            f"alpha_slow must be below alpha_fast, both from 0 to 1, got {alpha_slow:g} and {alpha_fast:g}"
+            f"alpha_slow must be below alpha_fast, both from 0 to 1, got {shown(alpha_slow)} and {shown(alpha_fast)}"
         )
     w_slow = w_slow + alpha_slow * (w_mean - w_slow)
     w_fast = w_fast + alpha_fast * (w_mean - w_fast)

@@ -18,6 +18,7 @@ from ..checks import (
     as_positive_number,
     as_shape,
     fit_together,
+    shown,
 )
 
 MODELS = ("euler", "midpoint", "arc")
@@ -146,7 +147,7 @@ def control_covariance(u, dt, k_d, k_theta, k_drift):
     u, dt = as_points(u, "u", 2), as_positive(dt, "dt")
     for name, value in (("k_d", k_d), ("k_theta", k_theta), ("k_drift", k_drift)):
         if as_number(value, name) < 0:
-            raise ValueError(f"{name} must not be negative (it is a variance per way), got {value:g}")
+            raise ValueError(f"{name} must not be negative (it is a variance per way), got {shown(value)}")
     v, omega = np.abs(u[..., 0]), np.abs(u[..., 1])
     var_v, var_omega = np.broadcast_arrays(k_d * v / dt, (k_theta * omega + k_drift * v) / dt)
     cov = np.zeros((*var_v.shape, 2, 2))

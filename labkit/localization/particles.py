@@ -9,7 +9,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import as_count, as_covariances, as_finite, as_floats, as_number, as_points, as_positive_number, as_shape
+from ..checks import (
+    as_count,
+    as_covariances,
+    as_finite,
+    as_floats,
+    as_number,
+    as_points,
+    as_positive_number,
+    as_shape,
+    shown,
+)
 from ..geometry.planar import wrap_angle
 from . import odometry
 
@@ -81,7 +91,8 @@ def _as_weights(weights):
     low, high = weights.min(), weights.max()
     if low < 0 or not 1e-300 <= high <= 1e300:  # beyond, their sum or a share of it leaves the range of a float
         raise ValueError(
-            f"weights must be at least 0 and not all 0, the largest from 1e-300 to 1e300, got {low:g} to {high:g}"
+            "weights must be at least 0 and not all 0, the largest from 1e-300 to 1e300, "
+            f"got {shown(low)} to {shown(high)}"
         )
     return weights
 

@@ -21,6 +21,7 @@ from ..checks import (
     as_positive_number,
     as_shape,
     fit_together,
+    shown,
 )
 from ..geometry.planar import wrap_angle
 from .maps import _CHUNK, RangeTable, cast_rays
@@ -51,7 +52,7 @@ class LikelihoodField:
         self.r_max = as_positive_number(r_max, "r_max")
         share_hit = as_number(share_hit, "share_hit")
         if not 0 < share_hit <= 1:
-            raise ValueError(f"share_hit must be above 0 and at most 1, got {share_hit:g}")
+            raise ValueError(f"share_hit must be above 0 and at most 1, got {shown(share_hit)}")
         self.share_hit = share_hit
         self.max_distance = 6 * self.std if max_distance is None else as_positive_number(max_distance, "max_distance")
         distance = np.minimum(np.pad(grid.distance, 1, constant_values=np.inf), self.max_distance)
@@ -241,7 +242,7 @@ def weigh_beams(world, ranges, bearings, std, r_max, shares=(0.75, 0.1, 0.05, 0.
     if step is not None:
         step = as_positive_number(step, "step")
         if r_max / step > 1e6:
-            raise ValueError(f"step must be at least a millionth of r_max, got {step:g} m")
+            raise ValueError(f"step must be at least a millionth of r_max, got {shown(step)} m")
         nodes = np.append(np.arange(0, r_max, step), r_max).astype(np.float32)
         table = np.ascontiguousarray(log_density(nodes[:, None]).T)
         rows = np.arange(len(ranges), dtype=np.int32) * len(nodes)
@@ -273,7 +274,7 @@ def beam_density(ranges, expected, std, r_max, shares, decay=0.5):
 def _shares(shares):
     shares = as_finite(shares, "shares")
     if shares.shape != (4,) or (shares < 0).any() or abs(shares.sum() - 1) > 1e-9:
-        raise ValueError(f"shares must be four numbers from 0 to 1 that add up to 1, got {shares.tolist()}")
+        raise ValueError(f"shares must be four numbers from 0 to 1 that add up to 1, got {shown(shares)}")
     return shares
 
 
@@ -323,7 +324,7 @@ def weigh_doors(doors, saw_door, std=0.3, trust=0.9):
         raise ValueError("doors must hold at least one position, got none")
     std, trust = as_positive_number(std, "std"), as_number(trust, "trust")
     if not 0.5 <= trust < 1:
-        raise ValueError(f"trust must be at least 0.5 and below 1, got {trust:g}")
+        raise ValueError(f"trust must be at least 0.5 and below 1, got {shown(trust)}")
 
     def weigh(x):
         nearest = np.abs(as_finite(x, "x")[..., None] - doors).min(-1)

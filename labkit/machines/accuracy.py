@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from ..checks import as_finite, as_number, as_points, as_positive_number, as_shape, as_transforms
+from ..checks import as_finite, as_number, as_points, as_positive_number, as_shape, as_transforms, shown
 from ..geometry.frames import pose, pose_distance
 from ..geometry.lie import log_so3
 
@@ -117,7 +117,9 @@ def time_offset(time, reference, delayed, max_offset=0.2):
     max_offset = as_positive_number(max_offset, "max_offset")
     most = int(round(min(max_offset / step, len(time))))
     if most < 1 or len(time) < 3 * most:
-        raise ValueError(f"max_offset of {max_offset:g} s needs at least {3 * max(most, 1)} samples, got {len(time)}")
+        raise ValueError(
+            f"max_offset of {shown(max_offset)} s needs at least {3 * max(most, 1)} samples, got {len(time)}"
+        )
     core = reference[most:-most]
     costs = np.array([((delayed[most + s : len(time) - most + s] - core) ** 2).mean() for s in range(-most, most + 1)])
     best = int(np.clip(np.argmin(costs), 1, 2 * most - 1))

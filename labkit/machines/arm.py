@@ -22,6 +22,7 @@ from ..checks import (
     as_shape,
     as_transforms,
     fit_together,
+    shown,
 )
 from ..geometry.frames import invert, pose, unit_vector
 from ..geometry.lie import exp_so3, log_so3
@@ -239,7 +240,9 @@ def _samples(duration, rate):
     """Sampling times 0, 1 / rate, ... up to the duration (s)."""
     count = duration * rate
     if not 0.5 < count < 1e7:
-        raise ValueError(f"duration and rate must give from 1 to 1e7 steps, got {duration:g} s at {rate:g} samples/s")
+        raise ValueError(
+            f"duration and rate must give from 1 to 1e7 steps, got {shown(duration)} s at {shown(rate)} samples/s"
+        )
     return np.arange(round(count) + 1) / rate
 
 
@@ -359,7 +362,7 @@ def rotation_only(robot, T_FE, start, axes, angle, duration, rate):
     if not reached.all():
         raise ValueError(
             f"the motion cannot be reached: {np.count_nonzero(~reached)} of {len(time)} poses, first at "
-            f"{time[~reached][0]:.2f} s"
+            f"{shown(time[~reached][0], '.2f')} s"
         )
     return time, q
 

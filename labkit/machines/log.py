@@ -13,9 +13,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..checks import as_finite, as_number, as_positive_number, as_shape, as_transforms
-from ..geometry.frames import matrix_from_quaternion, pose
+from ..geometry.frames import matrix_from_quaternion, pose, quaternion_from_matrix
 from ..geometry.lie import log_so3
-from .packet import MAX_POSITION, UNIT_TOLERANCE, quaternion_from_matrix
+from .packet import MAX_POSITION, UNIT_TOLERANCE
 
 # ---- the log ---------------------------------------------------------------------------------------------------------
 

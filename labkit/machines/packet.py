@@ -9,10 +9,9 @@ Source: report "Kalibrace a testovani systemu OTUS tracker", ZCU Plzen 2018: tab
 import struct
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from ..checks import as_finite, as_points, as_rotations, as_transforms, fit_together
-from ..geometry.frames import matrix_from_quaternion, pose
+from ..checks import as_finite, as_points, as_transforms, fit_together
+from ..geometry.frames import matrix_from_quaternion, pose, quaternion_from_matrix
 
 # ---- the packet ------------------------------------------------------------------------------------------------------
 
@@ -101,12 +100,3 @@ def poses_from_packets(values):
     """Poses T_WE in mm of decoded packets; (..., 23) -> (..., 4, 4)."""
     values = as_points(values, "values", dim=len(FIELDS))
     return pose(matrix_from_quaternion(values[..., QUATERNION]), 1000 * values[..., POSITION])
-
-
-def quaternion_from_matrix(R):
-    """Quaternion x, y, z, w with w >= 0; (..., 3, 3) -> (..., 4)."""
-    R = as_rotations(R, "R")
-    if not R.size:
-        return np.zeros((*R.shape[:-2], 4))
-    q = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(canonical=True)
-    return q.reshape(*R.shape[:-2], 4)

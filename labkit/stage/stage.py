@@ -75,7 +75,7 @@ import anywidget
 import ipywidgets
 import numpy as np
 
-from ..checks import as_finite
+from ..checks import as_finite, shown
 from . import style
 from .canvas import DRAWING, Picture
 
@@ -120,7 +120,7 @@ class Slider:
     def check(self, name, value):
         value = float(as_finite(value, name))
         if not self.low - 1e-9 <= value <= self.high * (1 + 1e-9) + 1e-9:
-            raise ValueError(f"{name} must lie in [{self.low:g}, {self.high:g}], got {value:g}")
+            raise ValueError(f"{name} must lie in [{shown(self.low)}, {shown(self.high)}], got {shown(value)}")
         return round(value) if self.integer else value
 
     @property

@@ -56,8 +56,10 @@ def test_frames_broadcast_like_a_loop():
         ((1e9, 0, 0), (1e9 + 1e-7, 0, 0), (1e9, 1, 0), "x_point coincides with origin"),
         ((0, 0, np.nan), (1, 0, 0), (0, 1, 0), r"origin must be finite, got nan at index \[2\]"),
         ((0, 0), (1, 0, 0), (0, 1, 0), r"origin must have shape \(..., 3\), got \(2,\)"),
-        ("abc", (1, 0, 0), (0, 1, 0), "origin must hold real numbers, got str"),
-        ((0, 0, 1j), (1, 0, 0), (0, 1, 0), "origin must hold real numbers"),
+        ("abc", (1, 0, 0), (0, 1, 0), "origin must hold real numbers, got text"),
+        ((0, 0, 1j), (1, 0, 0), (0, 1, 0), "origin must hold real numbers, got complex numbers"),
+        ((0, 0, 0), (1e200, 0, 0), (0, 1, 0), r"x_point must hold numbers below 1e\+75, got 1e\+200"),
+        ((1e308, 0, 0), (-1e308, 0, 0), (0, 1, 0), "origin must hold numbers below"),
     ],
 )
 def test_bad_points_are_refused_with_what_arrived(origin, x_point, y_point, words):
@@ -79,6 +81,27 @@ def test_the_flattest_triangles_let_in_still_give_a_frame():
     T = frames.frame_from_points(np.zeros(3), tilt @ (100, 0, 0), tilt @ (100, height, 0))
     np.testing.assert_allclose(T[:3, :3].T @ T[:3, :3], np.eye(3), atol=1e-11)
     assert frames.rotation_angle(T[:3, :3].T @ tilt) < 1e-10
+
+
+@pytest.mark.parametrize("size", [1e-200, 1e-70, 1.0, 1e70])
+def test_the_unit_of_length_does_not_matter(size):
+    o, px, py = TRIPLES
+    R = frames.gram_schmidt(size * (px - o), py - o)
+    np.testing.assert_allclose(R, frames.gram_schmidt(px - o, py - o), atol=1e-13)
+    T = frames.frame_from_points(size * o, size * px, size * py)
+    np.testing.assert_allclose(T[:, :3, :3], R, atol=1e-11)
+    np.testing.assert_array_equal(T[:, :3, 3], size * o)
+    np.testing.assert_allclose(np.linalg.norm(frames.unit_vector(size * px), axis=-1), 1, rtol=1e-15)
+
+
+def test_quaternions_against_scipy_and_back():
+    R = Rotation.random(30, RNG).as_matrix()
+    xyzw = frames.quaternion_from_matrix(R.reshape(5, 6, 3, 3))
+    assert xyzw.shape == (5, 6, 4) and (xyzw[..., 3] >= 0).all()
+    np.testing.assert_allclose(frames.matrix_from_quaternion(xyzw), R.reshape(5, 6, 3, 3), atol=1e-14)
+    half = frames.quaternion_from_matrix(lie.exp_so3([0.0, 0.0, np.pi / 2]))
+    np.testing.assert_allclose(half, [0, 0, np.sqrt(0.5), np.sqrt(0.5)], atol=1e-15)
+    assert frames.quaternion_from_matrix(np.zeros((0, 3, 3))).shape == (0, 4)
 
 
 def test_normalize_and_zero():

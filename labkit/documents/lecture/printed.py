@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...checks import as_positive_number
+from ...checks import as_positive_number, shown
 from ...tables import read_table
 
 
@@ -112,7 +112,9 @@ def circle_drive(dt=None):
     duration = given["dt"] * given["steps"]
     dt = given["dt"] if dt is None else as_positive_number(dt, "dt")
     if not duration / 1e6 <= dt <= duration:
-        raise ValueError(f"dt must lie between {duration / 1e6:g} s and the drive's {duration:g} s, got {dt:g}")
+        raise ValueError(
+            f"dt must lie between {shown(duration / 1e6)} s and the drive's {shown(duration)} s, got {shown(dt)}"
+        )
     u = [given["v"], np.radians(given["omega_deg"])]
     return CircleDrive(np.tile(u, (round(duration / dt), 1)), dt, _noise(given, given["std_distance_per_meter"]))
 

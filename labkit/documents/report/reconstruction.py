@@ -5,10 +5,10 @@ Source: data/tracker; the truth of the simulation is the report's result.
 
 import numpy as np
 
+from ...geometry.frames import quaternion_from_matrix
 from ...machines import simulation
 from ...machines.log import average_stops, read_csv
 from ...machines.mounting import calibrate_mounting
-from ...machines.packet import quaternion_from_matrix
 from ...tables import DATA, read_table
 from .printed import RUNS
 
