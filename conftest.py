@@ -22,9 +22,19 @@ def pytest_configure(config):
     scratch = tempfile.mkdtemp(prefix="labkit-")
     config.add_cleanup(lambda: shutil.rmtree(scratch, ignore_errors=True))
     os.environ.update(kernel_environment(scratch, strict))
+    if os.environ.get("LAST_BITS"):
+        stir_kernels(Path(scratch) / "ipython")
     config.option.nbval_current_env = True
     config.option.nbval_cell_timeout = SECONDS_A_CELL
     config.option.nbval_sanitize_with = str(ROOT / "tests" / "notebooks" / "sanitize.cfg")
+
+
+def stir_kernels(ipython):
+    """Let every kernel load `tests/last_bits.py`, which stirs the last bits of its linear algebra."""
+    (ipython / "profile_default").mkdir(parents=True)
+    configuration = 'get_config().InteractiveShellApp.extensions = ["last_bits"]\n'
+    (ipython / "profile_default" / "ipython_config.py").write_text(configuration, encoding="utf-8")
+    os.environ["PYTHONPATH"] += os.pathsep + str(ROOT / "tests")
 
 
 def pytest_collectstart(collector):

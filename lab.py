@@ -11,6 +11,7 @@
 
 Options of the first: --no-browser, --port N, --ip ADDRESS; any other option goes to JupyterLab as it is.
 Behind `test` you may name what pytest shall run, as in: python lab.py test tests/geometry/test_frames.py -k invert
+`test --last-bits SEED` runs unit tests and solved notebooks with last bits as another processor would compute them.
 
 The set-up is a virtual environment in .venv with the packages of constraints.txt. It is repeated only when
 pyproject.toml, constraints.txt, the place of this folder or the version of Python has changed.

@@ -1,6 +1,10 @@
 """No test writes into the student's progress file; what every Stage must be able to do."""
 
 import pytest
+from hypothesis import settings
+
+settings.register_profile("the same examples each time", derandomize=True, database=None, deadline=None)
+settings.load_profile("the same examples each time")
 
 
 @pytest.fixture(autouse=True)

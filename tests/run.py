@@ -1,8 +1,14 @@
 """Every test of the workbook, as `python lab.py test` runs it; named arguments go to one pytest instead.
 
+    python lab.py test                            everything
+    python lab.py test tests/stage -k play        what is named
+    python lab.py test --last-bits 1              unit tests and solved notebooks, the last bits of what linear algebra
+                                                  returns stirred (`last_bits.py`); also before names
+
 Unit tests, solved notebooks (strict) and blank notebooks (lax) are dealt out to a few pytest processes, as many at a
 time as there are processors. The last line is the sum, "N passed, N failed"; the exit code is 1 if anything failed.
 
+In continuous integration (CI=true) the second half of the unit tests runs with stirred last bits.
 A blank notebook that a student has worked in is judged by no test: a fresh one from the source is run in its place.
 """
 
@@ -27,11 +33,18 @@ COUNTED = ("passed", "failed", "error", "skipped", "xfailed")
 def main(arguments):
     """Run the jobs; returns the exit code."""
     begun = time.monotonic()
+    try:
+        seed, named = split(list(arguments))
+    except ValueError as reason:
+        print(reason, file=sys.stderr)
+        return 1
     with tempfile.TemporaryDirectory(dir=scratch_folder()) as scratch:
-        jobs = {"named": list(arguments)} if arguments else all_jobs(Path(scratch))
+        jobs = {"named": named} if named else all_jobs(Path(scratch))
+        seeds = stirred_jobs(jobs, seed)
+        jobs = {name: words for name, words in jobs.items() if seed is None or name in seeds}
         total = dict.fromkeys(COUNTED, 0)
         with ThreadPoolExecutor(max(2, os.cpu_count() or 2) if len(jobs) > 1 else 1) as pool:
-            running = {pool.submit(run, words): name for name, words in jobs.items()}
+            running = {pool.submit(run, words, seeds.get(name)): name for name, words in jobs.items()}
             for job in as_completed(running):
                 counts, output, seconds = job.result()
                 report(running[job], counts, output, seconds)
@@ -40,6 +53,22 @@ def main(arguments):
     print(f"{total['skipped']} skipped, {time.monotonic() - begun:.0f} s in all")
     print(f"{total['passed']} passed, {failed} failed")
     return 1 if failed else 0
+
+
+def split(arguments):
+    """(seed of the stirred last bits or None, what pytest is told)."""
+    if arguments[:1] != ["--last-bits"]:
+        return None, arguments
+    if not arguments[1:] or not arguments[1].isdecimal():
+        raise ValueError("--last-bits needs a seed, a whole number. For example: python lab.py test --last-bits 1")
+    return int(arguments[1]), arguments[2:]
+
+
+def stirred_jobs(names, seed):
+    """{name: seed} of the jobs that run with stirred last bits."""
+    if seed is not None:
+        return {name: seed for name in names if name.startswith(("named", "unit", "solved"))}
+    return {name: 1 for name in names if name == "unit tests 2" and os.environ.get("CI") == "true"}
 
 
 def scratch_folder():
@@ -77,10 +106,14 @@ def blank_notebooks(scratch):
         yield notebook
 
 
-def run(words):
-    """(counts, output, seconds) of one pytest process."""
+def run(words, seed=None):
+    """(counts, output, seconds) of one pytest process; with a seed its last bits are stirred, and its kernels'."""
     begun = time.monotonic()
     environment = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **os.environ}
+    if seed is not None:
+        paths = filter(None, [environment.get("PYTHONPATH"), str(ROOT / "tests")])
+        environment |= {"LAST_BITS": str(seed), "PYTHONPATH": os.pathsep.join(paths)}
+        words = ["-p", "last_bits", *words]
     with contextlib.suppress(subprocess.TimeoutExpired):
         process = subprocess.run(
             [sys.executable, "-m", "pytest", "-rs", "--durations=5", "--durations-min=5", *words],
