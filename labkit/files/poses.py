@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..geometry.frames import kuka_from_degrees, matrix_from_kuka
+from ..geometry.frames import kuka_from_degrees, matrix_from_kuka, matrix_from_quaternion, pose
 from ..geometry.lie import exp_so3, nearest_rotation
 from .columns import ANGLES, LENGTHS, TIMES, columns_of, need, one_unit
 from .text import FileError, read_table, read_text, shown
@@ -264,25 +264,7 @@ def _from_quaternions(table, values, order):
     if bad.any():
         k = int(np.argmax(bad))
         raise FileError(f"{table.name}, line {table.lines[k]}: the quaternion has length {length[k]:.4g}, not 1")
-    return _assembled(_rotations(q / length[:, None]), values[:, :3])
-
-
-def _rotations(q):
-    x, y, z, w = q.T
-    return np.stack(
-        [
-            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], -1),
-            np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], -1),
-            np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], -1),
-        ],
-        -2,
-    )
-
-
-def _assembled(R, t):
-    T = np.zeros((len(R), 4, 4))
-    T[:, :3, :3], T[:, :3, 3], T[:, 3, 3] = R, t, 1.0
-    return T
+    return pose(matrix_from_quaternion(q), values[:, :3])
 
 
 def _from_angles(table, values, kind, unit):
@@ -309,7 +291,7 @@ def _from_angles(table, values, kind, unit):
     if kind == "kuka":
         pose6 = kuka_from_degrees(values) if factor != 1.0 else values
         return matrix_from_kuka(pose6), how
-    return _assembled(exp_so3(values[:, 3:] * factor), values[:, :3]), how
+    return pose(exp_so3(values[:, 3:] * factor), values[:, :3]), how
 
 
 # --- matrices, folders, JSON -----------------------------------------------------------------------------------------

@@ -112,3 +112,27 @@ def nearest_rotation(M):
     U, _, Vt = np.linalg.svd(as_matrices(M, "M", 3, 3))
     U[..., :, 2] *= np.sign(np.linalg.det(U @ Vt))[..., None]
     return U @ Vt
+
+
+def interpolate(T0, T1, s):
+    """Pose a share s of the way from T0 to T1 at constant twist, T0 exp(s log(T0^-1 T1)).
+
+    Parameters
+    ----------
+    T0, T1 : array-like, shape (..., 4, 4)
+    s : array-like, shape (...)
+        0 gives T0, 1 gives T1.
+
+    Returns
+    -------
+    T : array, shape (..., 4, 4)
+
+    Source: Sola, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics" (2018), section II.
+    """
+    T0, T1 = as_matrices(T0, "T0", 4, 4), as_matrices(T1, "T1", 4, 4)
+    R_t = np.swapaxes(T0[..., :3, :3], -1, -2)
+    between = np.zeros(np.broadcast_shapes(T0.shape, T1.shape))
+    between[..., :3, :3] = R_t @ T1[..., :3, :3]
+    between[..., :3, 3] = (R_t @ (T1[..., :3, 3] - T0[..., :3, 3])[..., None])[..., 0]
+    between[..., 3, 3] = 1.0
+    return T0 @ exp_se3(np.asarray(s, float)[..., None] * log_se3(between))

@@ -1,0 +1,100 @@
+"""What single measurements do to a least-squares estimate: distances that unmask outliers, and leaving one out.
+
+A fit minimizes the sum of |r_i|^2 over blocks of residuals r_i, whitened so that each has covariance I; J_i is the
+derivative of r_i by the p parameters. With N = sum J_i'J_i and H_i = J_i N^-1 J_i' the residual of a block that was
+fitted has covariance I - H_i, that of a new one I + H_i. Leaving a block out needs no second fit: r_i becomes
+(I - H_i)^-1 r_i.
+Source: Cook, Weisberg, "Residuals and Influence in Regression" (1982), chapter 2; exact for linear problems.
+"""
+
+import numpy as np
+from scipy import stats
+
+from ..checks import as_finite, as_probability, as_shape
+
+
+def _blocks(residuals, jacobian):
+    r, J = as_finite(residuals, "residuals"), as_finite(jacobian, "jacobian")
+    if r.ndim != 2 or J.ndim != 3 or J.shape[:2] != r.shape:
+        raise ValueError(f"residuals and jacobian must have shapes (n, k) and (n, k, p), got {r.shape} and {J.shape}")
+    return r, J
+
+
+def _inverse_normal(J):
+    """N^-1 by scaled columns; refuses parameters that the blocks leave undetermined."""
+    flat = J.reshape(-1, J.shape[2])
+    scale = np.sqrt((flat**2).sum(0))
+    if not (scale > 0).all():
+        raise ValueError("jacobian must not hold a column of zeros: that parameter is not determined")
+    values, vectors = np.linalg.eigh((flat / scale).T @ (flat / scale))
+    if values[0] <= 1e-12 * values[-1]:
+        raise ValueError("jacobian leaves a direction of the parameters undetermined")
+    half = vectors / np.sqrt(values) / scale[:, None]
+    return half @ half.T
+
+
+def squared_distances(residuals, jacobian, kept):
+    """Squared distance of each block from what the kept ones predict, in standard deviations; shape (n,).
+
+    Parameters
+    ----------
+    residuals : array-like, shape (n, k)
+        Whitened residuals at the fit of the kept blocks.
+    jacobian : array-like, shape (n, k, p)
+    kept : array-like of bool, shape (n,)
+        Which blocks were fitted.
+
+    Returns
+    -------
+    distances : array, shape (n,)
+        Chi-square with k degrees of freedom for good blocks, fitted or not.
+    """
+    r, J = _blocks(residuals, jacobian)
+    kept = np.asarray(kept, bool)
+    H = J @ _inverse_normal(J[kept]) @ np.swapaxes(J, 1, 2)
+    spread = np.eye(r.shape[1]) - np.where(kept, 1.0, -1.0)[:, None, None] * H
+    values, vectors = np.linalg.eigh(spread)
+    along = (np.swapaxes(vectors, 1, 2) @ r[..., None])[..., 0]
+    # a block that alone fixes a parameter fits perfectly, whatever it says: along that direction nothing is known
+    known = values > 1e-9
+    return np.where(known, along**2 / np.where(known, values, 1.0), 0.0).sum(1)
+
+
+def distance_limit(k, dof, probability=0.999):
+    """Squared distance that a good block of k numbers stays below, noise estimated from `dof` degrees of freedom."""
+    return k * stats.f.ppf(as_probability(probability, "probability"), k, max(dof, 1))
+
+
+def leave_out(residuals, jacobian, groups=None):
+    """Residuals under the fit to the other blocks, and how far the parameters move without them.
+
+    Parameters
+    ----------
+    residuals : array-like, shape (n, k)
+        Whitened.
+    jacobian : array-like, shape (n, k, p)
+    groups : array-like, shape (n,), optional
+        Blocks with the same label are left out together; each on its own without it.
+
+    Returns
+    -------
+    residuals : array, shape (n, k)
+        NaN where the other blocks do not determine the parameters.
+    shifts : array, shape (g, p)
+        Estimate without the group minus the estimate with it, groups in ascending order.
+    """
+    r, J = _blocks(residuals, jacobian)
+    labels = np.arange(len(r)) if groups is None else as_shape(groups, "groups", len(r))
+    inverse = _inverse_normal(J)
+    predicted, shifts = np.full_like(r, np.nan), []
+    for label in np.unique(labels):
+        at = labels == label
+        Ji, ri = J[at].reshape(-1, J.shape[2]), r[at].ravel()
+        spread = np.eye(len(ri)) - Ji @ inverse @ Ji.T
+        if np.linalg.eigvalsh(spread)[0] > 1e-9:
+            alone = np.linalg.solve(spread, ri)
+            predicted[at] = alone.reshape(-1, r.shape[1])
+            shifts.append(inverse @ Ji.T @ alone)
+        else:
+            shifts.append(np.full(J.shape[2], np.nan))
+    return predicted, np.array(shifts)

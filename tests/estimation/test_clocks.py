@@ -1,0 +1,80 @@
+"""Interpolation against SciPy, and the offset of two clocks against the one put in."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation, Slerp
+
+from labkit.estimation.clocks import angular_speed, clock_offset, sample_stream
+from labkit.geometry.lie import exp_se3, exp_so3, interpolate
+
+
+def motion(time):
+    """A smooth motion, sampled anywhere."""
+    phi = np.stack([np.sin(0.9 * time), 0.7 * np.sin(1.7 * time + 1), 0.5 * np.sin(0.4 * time) + 0.1 * time], -1)
+    T = np.tile(np.eye(4), (len(time), 1, 1))
+    T[:, :3, :3], T[:, :3, 3] = exp_so3(phi), 300 * np.cos(phi)
+    return T
+
+
+def streams(seed, offset, n=1500, noise=1e-3):
+    """One motion seen at 50 Hz and, by something mounted askew, at 30.3 Hz on a clock ahead by `offset`."""
+    rng = np.random.default_rng(seed)
+    time_a, true_b = 0.02 * np.arange(n), 5 + 0.033 * np.arange(int(0.45 * n)) + 0.002 * rng.random(int(0.45 * n))
+    askew, world = exp_se3([0.3, -1, 2, 50, 20, 9]), exp_se3([1, 2, -0.4, 900, -70, 3])
+    T_a, T_b = motion(time_a), world @ motion(true_b) @ askew
+    for T in (T_a, T_b):
+        T[:, :3, :3] = T[:, :3, :3] @ exp_so3(noise * rng.normal(size=(len(T), 3)))
+    return time_a, T_a, true_b + offset, T_b
+
+
+def test_interpolation_turns_evenly_and_meets_the_ends():
+    T0, T1 = exp_se3([0.1, 0.2, 0.3, 1, 2, 3]), exp_se3([-1, 2, 0.5, 4, 5, 6])
+    s = np.linspace(0, 1, 7)
+    T = interpolate(T0, T1, s)
+    turned = Slerp([0, 1], Rotation.from_matrix(np.stack([T0, T1])[:, :3, :3]))(s)
+    assert np.allclose(T[:, :3, :3], turned.as_matrix()) and np.allclose(T[[0, -1]], [T0, T1])
+    steps = np.linalg.inv(T[:-1]) @ T[1:]
+    assert np.allclose(steps, steps[0])  # one twist, the same on every part of the way
+
+
+def test_gaps_are_never_bridged():
+    time = np.r_[0:1:0.1, 2:3:0.1]
+    when = np.array([-0.01, 0, 0.05, 0.9, 0.95, 1.5, 2.0, 2.55, 2.95])
+    poses, known = sample_stream(time, motion(time), when)
+    assert known.tolist() == [False, True, True, True, False, False, True, True, False]
+    assert np.abs(poses[known] - motion(when)[known]).max() < 0.5  # of 300 mm, over steps of 0.1 s
+    assert np.isnan(angular_speed(time, motion(time), np.array([1.5, 0.95]), 0.2)).all()
+
+
+def test_sampled_speeds_do_not_depend_on_the_mounting():
+    time_a, T_a, _, _ = streams(0, 0.0, noise=0)
+    when = np.linspace(1, 20, 40)
+    askew = exp_se3([1, 2, -0.4, 900, -70, 3]) @ T_a @ exp_se3([0.3, -1, 2, 50, 20, 9])
+    assert np.allclose(angular_speed(time_a, T_a, when, 0.1), angular_speed(time_a, askew, when, 0.1), atol=1e-9)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.1234, -3.7, 1.7e9])
+def test_offset_is_found_at_any_size(offset):
+    found = clock_offset(*streams(1, offset))
+    assert abs(found.offset - offset) < 5 * found.std and 1e-5 < found.std < 5e-3
+    assert found.agreement > 0.99 and found.overlap > 15
+
+
+def test_the_standard_deviation_of_the_offset_is_honest():
+    scores = []
+    for seed in range(40):  # fixed seeds
+        found = clock_offset(*streams(seed, 0.05, n=900, noise=3e-3))
+        scores.append((found.offset - 0.05) / found.std)
+    assert 0.6 < np.sqrt(np.mean(np.square(scores))) < 1.6
+
+
+def test_what_cannot_be_aligned_is_refused():
+    time_a, T_a, time_b, T_b = streams(2, 0.0)
+    with pytest.raises(ValueError, match="the second stream never changes its angular speed"):
+        clock_offset(time_a, T_a, time_b, np.tile(T_b[0], (len(T_b), 1, 1)))
+    with pytest.raises(ValueError, match="no time offset brings the angular speeds together"):
+        clock_offset(time_a, T_a, time_b, motion(np.cumsum(np.random.default_rng(0).random(len(time_b))) * 0.05)[::-1])
+    with pytest.raises(ValueError, match="at least 24 steps"):
+        clock_offset(time_a[:9], T_a[:9], time_b, T_b)
+    with pytest.raises(ValueError, match="do not overlap enough"):
+        clock_offset(time_a, T_a, time_b + 100, T_b, max_offset=10)
