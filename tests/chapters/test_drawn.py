@@ -1,0 +1,449 @@
+"""What is drawn is what is meant: vertices of the artists beside closed forms and results, for the Stages of 1 to 8.
+
+One mechanism: `drawn` reads the vertices of all moving lines, `assert_drawn` wants one of them to hold exactly the
+expected ones, projected first where the Stage shows space.
+"""
+
+import numpy as np
+import pytest
+from matplotlib.lines import Line2D
+from matplotlib.text import Annotation
+from scipy.spatial.transform import Rotation
+
+from labkit.chapters.ch01_frames import stages as ch01
+from labkit.chapters.ch02_chaining import stages as ch02
+from labkit.chapters.ch03_quirlen import stages as ch03
+from labkit.chapters.ch04_optimization import stages as ch04
+from labkit.chapters.ch05_hand_eye import stages as ch05
+from labkit.chapters.ch06_tracker import figures as ch06_figures
+from labkit.chapters.ch06_tracker import stages as ch06
+from labkit.chapters.ch07_dead_reckoning import stages as ch07
+from labkit.chapters.ch08_kalman import stages as ch08
+from labkit.documents.thesis import wells
+
+GAP = [np.nan, np.nan]
+
+
+def drawn(stage):
+    """Vertices (n, 2) of every moving line of a Stage, as its axes hold them."""
+    lines = (a for a in stage._picture.artists if isinstance(a, Line2D) and a.get_visible())
+    return [vertices for line in lines if len(vertices := line.get_xydata())]
+
+
+def assert_drawn(stage, *expected):
+    """One moving line holds each of the expected rows of vertices, (n, 2), or (n, 3) of a scene in space."""
+    found = drawn(stage)
+    for points in expected:
+        points = np.asarray(points, dtype=float)
+        if points.shape[-1] == 3:
+            points = stage.state["view"].project(points)[:, :2]
+        scale = np.nanmax(np.abs(points)) + 1
+        alike = [v for v in found if v.shape == points.shape]
+        assert any(np.allclose(v, points, rtol=0, atol=1e-9 * scale, equal_nan=True) for v in alike), points
+
+
+def at(stage, **changes):
+    stage.set(**changes)
+    assert not stage.status
+    return stage
+
+
+def plane(angle_deg):
+    """The rotation of the plane, (2, 2)."""
+    return Rotation.from_euler("z", angle_deg, degrees=True).as_matrix()[:2, :2]
+
+
+# --- handles ----------------------------------------------------------------------------------------------------------
+
+WITH_HANDLES = (
+    ch01.three_points, ch01.triangle_noise, ch01.svd_against_gram_schmidt, ch02.order_of_product, ch02.open_loop,
+    ch03.pose_designer, ch03.outliers, ch04.line, ch04.four_paths, ch04.saddle, ch04.basins, ch05.scan_line,
+    ch05.convergence, ch05.pattern_designer, ch06.tx40, ch06.two_axes, ch07.circles, ch08.bells, ch08.arena,
+)  # fmt: skip
+
+
+def gaps(stage):
+    """How far each handle is from the nearest drawn vertex or name of its axes, as a share of their width."""
+    artists = stage._picture.artists
+    for key, handle in stage._handles.items():
+        place, ax = stage.state[key], stage._picture.fig.axes[handle.ax]
+        here = stage.state["view"].project(place)[:2] if len(place) == 3 else place
+        lines = [a.get_xydata() for a in artists if isinstance(a, Line2D) and a.axes is ax and len(a.get_xydata())]
+        names = [np.array([a.xy]) for a in artists if isinstance(a, Annotation) and a.axes is ax]
+        distances = [np.linalg.norm(v - here, axis=1) for v in (*lines, *names)]
+        yield key, np.nanmin(np.concatenate(distances)) / abs(np.subtract(*ax.get_xlim()))
+
+
+@pytest.mark.parametrize("make", WITH_HANDLES, ids=lambda make: f"{make.__module__.split('.')[2]}.{make.__name__}")
+@pytest.mark.parametrize("move", ("start", "made to fail", "moved"))
+def test_every_handle_lies_on_what_it_moves(make, move):
+    stage = make()
+    if move == "made to fail":
+        stage.make_it_fail()
+    elif move == "moved":
+        for key, handle in stage._handles.items():
+            width = abs(np.subtract(*stage._picture.fig.axes[handle.ax].get_xlim()))
+            stage.set(**{key: stage.state[key] - 0.03 * width})
+    assert max(gap for _, gap in gaps(stage)) < 1e-3  # less than a pixel: circles are drawn as polygons
+
+
+# --- chapter 1 --------------------------------------------------------------------------------------------------------
+
+
+def test_three_points_draw_their_construction():
+    O0, X0, Y0 = np.array([0.5, 0.4]), np.array([2.1, 1.6]), np.array([0.3, 2.4])
+    stage = at(ch01.three_points(), O0=O0, X0=X0, Y0=Y0)
+    x = (X0 - O0) / 2.0  # 1.6, 1.2: 2 long
+    y = np.array([-0.6, 0.8])
+    foot = O0 + x * (x @ (Y0 - O0))
+    assert_drawn(stage, [X0, O0, Y0], [O0, foot], [foot], [foot, Y0], [O0, O0 + 0.7 * x], [O0, O0 + 0.7 * y])
+
+
+def test_noisy_triangle_and_its_frame():
+    stage = at(ch01.triangle_noise(), Y=(20.0, 45.0, 0.0))
+    assert_drawn(stage, [[0, 0, 0], [100, 0, 0], [20, 45, 0], [0, 0, 0]], *([[0, 0, 0], e] for e in 60.0 * np.eye(3)))
+    first = stage.result["T"][:, :3, 3] + 60.0 * stage.result["T"][:, :3, 0]
+    assert_drawn(stage, first)
+
+
+def test_gimbal_draws_the_frame_of_the_angles():
+    stage = at(ch01.kuka_gimbal(), A_deg=30, B_deg=50, C_deg=-70)
+    R = Rotation.from_euler("ZYX", [30, 50, -70], degrees=True).as_matrix()
+    assert_drawn(stage, *([np.zeros(3), 0.58 * axis] for axis in R.T))
+    turned = np.deg2rad(np.linspace(0, 30, 25))
+    assert_drawn(stage, np.column_stack([np.cos(turned), np.sin(turned), 0 * turned]))  # the arc of A, radius 1
+
+
+def test_both_constructions_stand_on_the_triangle():
+    stage = at(ch01.svd_against_gram_schmidt(), X=(80.0, 0.0), Y=(10.0, 70.0))
+    measured = stage.result["measured"]
+    assert_drawn(stage, [[0, 0], [80, 0], [10, 70], [0, 0]], measured.reshape(-1, 3)[:, :2])
+    found = np.column_stack([np.arange(3) - 0.16, stage.result["gram_schmidt_deg"]])
+    assert_drawn(stage, found)
+
+
+# --- chapter 2 --------------------------------------------------------------------------------------------------------
+
+
+def test_second_move_starts_in_the_frame_of_the_first():
+    A, B = np.array([140.0, 20.0]), np.array([-50.0, 110.0])
+    stage = at(ch02.order_of_product(), A=A, B=B, A_deg=50, B_deg=-35)
+    AB, BA = A + plane(50) @ B, B + plane(-35) @ A
+    assert_drawn(stage, [(0, 0), A, AB], [(0, 0), B, BA], [AB], [BA])
+    assert_drawn(stage, [AB, AB + 90 * plane(15)[:, 0]], [AB, AB + 90 * plane(15)[:, 1]])
+
+
+@pytest.mark.parametrize("link", (1, 2, 3, 4))
+def test_a_turned_link_opens_the_loop_about_its_end(link):
+    stage = at(ch02.open_loop(), link=link, turn_deg=8.0, K2=(-200.0, -300.0))
+    corners = [np.zeros(2), *(stage.state[f"K{k}"] for k in (1, 2, 3)), np.zeros(2)]
+    after = [c if k <= link else corners[link] + plane(8.0) @ (c - corners[link]) for k, c in enumerate(corners)]
+    place = stage.state["P"]
+    moved = after[-1] + plane(8.0) @ place
+    assert_drawn(stage, corners, after, [corners[link], after[-1]], [(0, 0), after[-1]], [place, moved])
+
+
+def test_laws_of_growth_are_the_sums_over_the_levers():
+    """Each link turns all that follows: in a row about levers of 0, 300, 600 mm, on a loop about chords of 300 mm."""
+    stage = at(ch02.growth(), std_rot_deg=0.5)
+    std = np.deg2rad(0.5)
+
+    def law(levers):
+        return np.sqrt(3 * len(levers) * 0.1**2 + 2 * std**2 * np.sum(levers**2))
+
+    numbers = np.array([1, 2, 4, 8, 16, 32, 64])
+    row = [law(300.0 * np.arange(n)) for n in numbers]
+    loop = [law(300.0 * np.sin(np.pi * np.arange(n) / n)) for n in numbers]
+    assert_drawn(stage, np.column_stack([numbers, row]), np.column_stack([numbers, loop]))
+    circle = np.deg2rad(np.linspace(0, 360, 73))
+    assert_drawn(stage, law(300.0 * np.arange(8)) * np.column_stack([np.cos(circle), np.sin(circle)]))
+
+
+def test_two_loops_are_magnified_about_the_true_corners():
+    stage = ch02.two_loops()
+    outline = [0, 1, 2, 3, 0, 1, 4, 5, 2]
+    true = np.array([[0, 0], [400, 0], [400, 300], [0, 300], [800, 0], [800, 300.0]])
+    graph = stage.result["graph"][:, :2, 3]
+    assert_drawn(stage, true[outline], (true + 30 * (graph - true))[outline])
+
+
+# --- chapter 3 --------------------------------------------------------------------------------------------------------
+
+
+def test_pose_designer_draws_its_directions_and_the_null_vector():
+    stage = ch03.pose_designer()
+    directions = np.array([stage.state[f"D{k}"] for k in range(1, 7)])
+    stems = np.stack([0 * directions, directions, np.full((6, 3), np.nan)], axis=1).reshape(-1, 3)
+    assert_drawn(stage, directions, stems)
+    stage.make_it_fail()  # all directions up, spun about themselves: the tip may slide along z
+    assert_drawn(stage, [[0, 0, -1.15], [0, 0, 1.15]])
+
+
+def test_swirling_tool_reaches_from_flange_to_pivot():
+    stage = at(ch03.swirl(), std_trans=0.0, t=2.0)
+    origin = stage.result["T"][:3, 3]
+    assert np.linalg.norm(origin) == pytest.approx(100.0)  # the tip is 100 mm from the flange
+    assert origin[2] == pytest.approx(100 * np.cos(np.deg2rad(25)))  # on a cone of 25 deg, the flange above
+    assert_drawn(stage, [origin, [0, 0, 0]], [origin, origin + 35 * stage.result["T"][:3, 0]])
+
+
+def test_outliers_are_crossed_out_where_they_were_dragged():
+    stage = at(ch03.outliers(), **{"pose 2": (12.0, 9.0)})
+    gone = stage.result["weights"] == 0
+    touches = stage.result["touches"]
+    assert gone[1] and touches[1] == pytest.approx([12.0, 9.0], abs=0.01)
+    assert_drawn(stage, touches[~gone], touches[gone])
+
+
+# --- chapter 4 --------------------------------------------------------------------------------------------------------
+
+
+def test_parabola_touches_the_curve_and_its_vertex_is_the_next_iterate():
+    stage = at(ch04.line(), start=(0.3, 0.0))
+    t, h = stage.result["around"], 1e-4
+    f = [float(wells.value(ch04.line_point(at_))) for at_ in (0.3 - h, 0.3, 0.3 + h)]
+    slope, bend = (f[2] - f[0]) / (2 * h), (f[2] - 2 * f[1] + f[0]) / h**2
+    curve = next(v for v in drawn(stage) if v.shape == (61, 2))
+    np.testing.assert_allclose(curve[:, 0], t)
+    np.testing.assert_allclose(curve[:, 1], f[1] + slope * (t - 0.3) + 0.5 * bend * (t - 0.3) ** 2, atol=1e-3)
+    iterates = stage.result["t"]
+    assert iterates[1] == pytest.approx(0.3 - slope / bend, abs=1e-5)
+    shown = np.clip(iterates, -0.6, 1.6)
+    assert_drawn(stage, np.column_stack([shown, wells.value(ch04.line_point(shown))]))
+
+
+def test_step_and_radius_start_at_the_iterate():
+    stage = at(ch04.four_paths(), k=1)
+    x, step, radius = (stage.result[key] for key in ("x", "step", "radius"))
+    run = wells.run("trust_region", stage.state["start"], max_iterations=12)
+    assert_drawn(stage, run.x, [run.x[1], run.x[1] + run.step[1]], [x, x + step])
+    rim = next(v for v in drawn(stage) if v.shape == (121, 2))
+    np.testing.assert_allclose(np.linalg.norm(rim - x, axis=1), radius)
+    inside = [v for v in drawn(stage) if np.isnan(v).any()]  # the contours of the model, around the iterate
+    assert len(inside) == 1 and np.nanmin(inside[0][:, 0]) < x[0] < np.nanmax(inside[0][:, 0])
+
+
+def test_newton_step_is_the_sum_of_its_shares():
+    stage = at(ch04.saddle(), start=(0.5, 0.1))
+    start = stage.state["start"]
+    newton = -np.linalg.solve(wells.hessian(start), wells.gradient(start))
+    shares = next(v for v in drawn(stage) if v.shape == (3, 2) and np.allclose(v[0], start))
+    np.testing.assert_allclose(shares[2], start + newton, atol=1e-9)
+    _, V = np.linalg.eigh(wells.hessian(start))
+    assert abs((shares[1] - start) @ V[:, 1]) < 1e-9 * np.linalg.norm(newton)  # first along the lower curvature
+    for direction in V.T:
+        assert_drawn(stage, [start - 0.35 * direction, start + 0.35 * direction])
+
+
+def test_path_over_the_basins_is_the_run():
+    stage = at(ch04.basins(), start=(1.2, 1.1))
+    assert_drawn(stage, np.clip(wells.run("newton", [1.2, 1.1], max_iterations=12).x, -50, 50))
+
+
+# --- chapter 5 --------------------------------------------------------------------------------------------------------
+
+
+def test_sphere_its_mirror_image_and_the_circle_of_the_scan():
+    stage = at(ch05.scan_line(), C=(18.0, 245.0), std=0.01)
+    radius = ch05.RADIUS
+    turn = np.column_stack([np.cos(ch05.draw.CIRCLE), np.sin(ch05.draw.CIRCLE)])
+    assert_drawn(stage, (18.0, 245.0) + radius * turn, (-18.0, 245.0) + radius * turn, stage.result["points"])
+    circles = [v for v in drawn(stage) if v.shape == turn.shape]
+    cut = circles[2]  # the circle in which the plane cuts the sphere, fitted to the points
+    assert np.ptp(cut[:, 0]) / 2 == pytest.approx(np.sqrt(radius**2 - 18.0**2), abs=0.05)
+    assert cut.mean(0)[1] == pytest.approx(245.0, abs=0.5)
+
+
+def test_paths_of_both_parametrizations_start_at_the_handle():
+    stage = at(ch05.convergence(), P=(-2.0, 20.0))
+    for name in ("euler", "se3"):
+        run = stage.result[name]
+        assert run["path"][0] == pytest.approx([-2.0, 20.0], abs=1e-9)
+        assert_drawn(stage, run["path"], np.column_stack([np.arange(len(run["rms"])), run["rms"]]))
+
+
+def test_the_chosen_pose_sees_the_sphere_where_its_residual_ends():
+    stage = at(ch05.thirty_one_poses(), click=(12.0, 1.0))
+    result, k = stage.result, 11
+    scanner = result["T_BF"][k] @ result["T_FS"]
+    seen = scanner[:3, :3] @ result["x_S"][k] + scanner[:3, 3]
+    assert_drawn(stage, [result["T_BF"][k, :3, 3], scanner[:3, 3], seen])
+    assert result["residuals"][k] == pytest.approx(seen - result["target"], abs=1e-9)
+    assert_drawn(stage, [result["target"], result["target"] + 8 * result["residuals"][k]])
+    assert_drawn(stage, [[12, max(result["lengths"][k], 0.08) * 1.5]])
+
+
+def test_used_field_and_flanges_of_a_pattern():
+    stage = at(ch05.pattern_designer(), E=(10.0, 255.0))
+    assert_drawn(stage, [[-10, 225], [10, 225], [10, 255], [-10, 255], [-10, 225]])
+    T_BF, x_S = stage.result["T_BF"], stage.result["x_S"]
+    assert_drawn(stage, T_BF[:, :3, 3], x_S[:, [0, 2]])
+    places = np.einsum("nij,nj->ni", T_BF[:, :3, :3] @ stage.result["T_FS"][:3, :3], x_S)
+    places += T_BF[:, :3, :3] @ stage.result["T_FS"][:3, 3] + T_BF[:, :3, 3]
+    np.testing.assert_allclose(places, np.tile(stage.result["target"], (len(places), 1)), atol=1e-8)
+
+
+# --- chapter 6 --------------------------------------------------------------------------------------------------------
+
+UPRIGHT = [[0, 0, 0], [0, 0, 320], [0, 35, 320], [0, 35, 545], [0, 35, 770], [0, 35, 835]]
+
+
+def test_the_arm_upright_has_its_shoulder_on_the_left():
+    """The drawing's convention at zero: everything above the shoulder, which is offset along the second axis, +y."""
+    stage = at(ch06.tx40(), q1=0.0, q2=0.0, q3=0.0)
+    wrist = Rotation.from_euler("y", -70, degrees=True).as_matrix() @ [0, 0, 65]  # HOME bends joint 5
+    assert_drawn(stage, [*UPRIGHT[:5], UPRIGHT[4] + wrist])
+
+
+def test_the_arm_keeps_its_lengths_in_every_position():
+    stage = at(ch06.tx40(), q1=35.0, q2=-20.0, q3=70.0)
+    points = stage.result["points"]
+    assert_drawn(stage, points)
+    np.testing.assert_allclose(np.linalg.norm(np.diff(points, axis=0), axis=1), [320, 35, 225, 225, 65], atol=1e-9)
+    left = [-np.sin(np.deg2rad(35)), np.cos(np.deg2rad(35)), 0]
+    np.testing.assert_allclose(points[2] - points[1], 35.0 * np.array(left), atol=1e-9)
+    assert points[5] == pytest.approx(stage.state["flange"], abs=1e-9)
+
+
+class OneTrail:
+    """A scene that only remembers what was set."""
+
+    class Item:
+        def set(self, value):
+            self.value = np.asarray(value)
+
+        def name_at(self, *_):
+            pass
+
+    class ax:
+        legend = staticmethod(lambda **_: None)
+
+    def points(self, **_):
+        return self.Item()
+
+    line = points
+
+    def triad(self, *_, **__):
+        return self.Item()
+
+    def fixed(self, item, value):
+        item.set(value)
+
+
+def test_trail_sorts_readings_by_the_gate():
+    trail = ch06_figures.Trail(OneTrail())
+    positions, used = np.arange(12.0).reshape(4, 3), np.array([True, False, True, True])
+    trail.set(positions, used, positions + 1, np.eye(4))
+    np.testing.assert_array_equal(trail.readings.value, positions[[0, 2, 3]])
+    np.testing.assert_array_equal(trail.rejected.value, positions[[1]])
+    np.testing.assert_array_equal(trail.path.value, positions + 1)
+
+
+def test_rotation_axes_pass_through_the_middle():
+    a, b = np.array([0.6, 0.0, 0.8]), np.array([0.0, 1.0, 0.0])
+    stage = at(ch06.two_axes(), a=a, b=b)
+    assert_drawn(stage, [-a, a], [-b, b], *([np.zeros(3), 0.55 * axis] for axis in ch06.X_TRUE[:3, :3].T))
+    assert_drawn(stage, 0.55 * stage.result["found"][:, :, 0])
+
+
+def test_errors_in_motion_stand_over_their_time():
+    stage = ch06.dynamic_errors()
+    r = stage.result
+    good = ~r["bad"]
+    assert_drawn(
+        stage, np.column_stack([r["share"], r["error"]])[good], np.column_stack([r["share"], r["error"]])[~good]
+    )
+    assert_drawn(stage, np.column_stack([r["share"], r["mended"]])[r["keep"]])
+    assert_drawn(stage, np.column_stack([range(4), [r["raw_summary"][n] for n in ("mean", "RMS", "median", "95 %")]]))
+
+
+def test_methods_stand_in_their_rows():
+    stage = ch06.methods()
+    rows = np.arange(len(stage.result["names"]))
+    assert_drawn(stage, *(np.column_stack([stage.result[k], rows]) for k in ("rotation", "translation")))
+
+
+def test_ellipses_of_six_runs_are_three_standard_deviations():
+    stage = ch06.six_runs()
+    r = stage.result
+    assert_drawn(stage, r["results"][:, 1:])
+    outlines = [v for v in drawn(stage) if len(v) > 20]
+    for outline, center, cov in zip(outlines, (r["mean"][1:], r["single"][1:]), (r["spread"], r["claim"]), strict=True):
+        d = outline - center
+        np.testing.assert_allclose((d * np.linalg.solve(cov[1:, 1:], d.T).T).sum(1), 9.0)
+
+
+# --- chapter 7 --------------------------------------------------------------------------------------------------------
+
+
+def test_distance_circles_have_the_measured_radii():
+    stage = at(ch07.circles(), count=3, R=(4.0, 2.0))
+    rings = next(v for v in drawn(stage) if np.isnan(v).sum() == 6 and len(v) > 100)
+    for ring, name, distance in zip(rings.reshape(3, -1, 2), "ABC", stage.result["distances"]):
+        np.testing.assert_allclose(np.linalg.norm(ring[:-1] - stage.state[name], axis=1), distance)
+    sights = [row for name in "ABC" for row in (stage.state[name], (4.0, 2.0), GAP)]
+    assert_drawn(stage, sights, stage.result["path"], stage.result["cloud"])
+
+
+def test_models_of_motion_leave_the_same_start():
+    stage = at(ch07.models(), count=4, omega_deg=30.0)
+    radius, turn = 1 / np.deg2rad(30), np.deg2rad(30) * np.linspace(0, 5, 61)
+    assert_drawn(stage, radius * np.column_stack([np.sin(turn), 1 - np.cos(turn)]))
+    heading = np.deg2rad(30) * 1.25 * np.arange(4)
+    steps = 1.25 * np.column_stack([np.cos(heading), np.sin(heading)])
+    assert_drawn(stage, np.vstack([[0, 0], np.cumsum(steps, axis=0)]))  # the simplified model: straight, then turn
+
+
+def test_driven_robot_points_where_it_drives():
+    stage = at(ch07.drive(), t=3.0)
+    truth, estimate = stage.result["truth"], stage.result["estimate"]
+    assert_drawn(stage, truth[:, :2], estimate[:, :2], stage.result["outlines"])
+    for pose in (truth[-1], estimate[-1]):
+        outline = [v for v in drawn(stage) if v.shape == (5, 2)]
+        ahead = pose[:2] + 0.6 * 0.65 * np.array([np.cos(pose[2]), np.sin(pose[2])])  # the tip of the arrowhead
+        assert any(np.abs(v - ahead).sum(1).min() < 1e-9 for v in outline)
+
+
+def test_banana_and_its_ellipse():
+    stage = ch07.banana()
+    r = stage.result
+    assert_drawn(
+        stage, r["poses"][:, :2], r["ends"][:, :2], r["outline"], r["poses"][-1:, :2], [r["ends"][:, :2].mean(0)]
+    )
+
+
+# --- chapter 8 --------------------------------------------------------------------------------------------------------
+
+
+def test_bells_hold_one_and_stand_over_their_means():
+    stage = at(ch08.bells(), z=(11.0, 0.5))
+    found = drawn(stage)
+    assert len(found) == 4
+    for curve, (mean, std) in zip(found, (stage.result["before"], *stage.result["bells"])):
+        x, density = curve.T
+        assert np.trapezoid(density, x) == pytest.approx(1.0, abs=1e-3)
+        assert np.trapezoid(x * density, x) == pytest.approx(mean, abs=1e-2)
+        assert np.trapezoid((x - mean) ** 2 * density, x) == pytest.approx(std**2, rel=0.02)
+
+
+def test_vehicle_errors_within_twice_the_promised_deviation():
+    stage = ch08.vehicle()
+    r, gap = stage.result, [np.nan, np.nan]
+    for k in (0, 1):
+        upper = np.column_stack([r["time"], 2 * r["std"][:, k]])
+        assert_drawn(stage, np.column_stack([r["time"], r["error"][:, k]]), np.vstack([upper, gap, upper * [1, -1]]))
+
+
+def test_arena_draws_what_the_filter_believes():
+    stage = at(ch08.arena(), t=2.0, count=2)
+    r = stage.result
+    assert_drawn(stage, r["truth"][:, :2], r["estimate"][:, :2], r["ellipse"], r["landmarks"], r["seen"])
+    assert_drawn(stage, np.column_stack([np.arange(1, len(r["nees"]) + 1), r["nees"]]))
+    off = np.linalg.norm(r["ellipse"].mean(0) - r["estimate"][-1, :2])
+    assert off < 0.05 * np.ptp(r["ellipse"], axis=0).max()
+
+
+def test_honesty_marks_the_chosen_number_of_iterations():
+    stage = at(ch08.honesty(), iterations=3)
+    r = stage.result
+    assert_drawn(stage, r["positions"], r["ellipse"], [[3, r["curve"][2]]])
