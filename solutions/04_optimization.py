@@ -208,7 +208,7 @@ ex.predict("neighborhood", guess, reveal=stages.saddle)
 def gauss_newton_step(r, J):
     """Return the step h, shape (n,), that minimizes |r + J h|; r has shape (m,), J (m, n), m >= n."""
     ### BEGIN SOLUTION
-    return -np.linalg.solve(J.T @ J, J.T @ r)
+    return -np.linalg.lstsq(J, r)[0]
     ### END SOLUTION
 
 
@@ -343,10 +343,12 @@ ex.predict("share", guess, reveal=stages.basins)
 # %% farthest
 diagonal = np.repeat(np.arange(1, 60.1)[:, None], 2, axis=1)
 square = np.stack(np.meshgrid(*2 * [np.linspace(-6, 6, 121)]), axis=-1)
+letters = np.array(["L", "G", "S", "-"])
 for method in wells.METHODS:
-    label, _ = wells.destinations(method, diagonal)
-    share = (wells.destinations(method, square)[0] < 2).mean()
-    print(f"{method:20}", "".join("LGS-"[i] for i in label), f"{100 * share:5.1f} % of the square")
+    ends, _ = wells.destinations(method, diagonal)
+    ends_in_square, _ = wells.destinations(method, square)
+    share = (ends_in_square < 2).mean()
+    print(f"{method:20}", "".join(letters[ends]), f"{100 * share:5.1f} % of the square")
 
 # %% break-it-text [markdown]
 # ## Break it
@@ -371,18 +373,18 @@ print(f"opt.classify_extremum:  {opt.classify_extremum(g, H)}")
 
 # %% widen
 ends = []
-for x in np.random.default_rng(4).uniform(-40, 40, (40, 2)):
+for start in np.random.default_rng(4).uniform(-40, 40, (40, 2)):
+    lowest = start
     for width in (8.0, 4.0, 2.0, 1.0):
-        f, g, H = ((lambda p, u=u, c=width: u(p, c)) for u in (wells.value, wells.gradient, wells.hessian))
-        x = opt.trust_region(f, g, x, hessian=H).solution
-    ends.append(wells.NAMES[wells.which(x)])
+        lowest = wells.run("trust_region", lowest, width=width).solution
+    ends.append(wells.NAMES[wells.which(lowest)])
 print({name: ends.count(name) for name in wells.NAMES})
 
 # %% in-practice [markdown]
 # ## In practice
 #
 # - Write your problem as residuals whenever you can: no second derivatives, and a curvature that never points uphill.
-# - Never run undamped far from the solution. Levenberg-Marquardt or a trust region costs one gain ratio a step.
+# - Never run undamped far from the solution. Levenberg-Marquardt or a trust region costs one gain ratio per step.
 # - Check derivatives by central differences before you trust any result.
 # - Report start, end, kind, reason for stopping and the number of *rejected* steps. Try several starts.
 # - A good start beats a good optimizer. Chapter 5 computes one without iteration.

@@ -24,7 +24,6 @@ from labkit.chapters.ch07_dead_reckoning import stages
 from labkit.documents.lecture import printed as lecture
 from labkit.estimation import gaussian
 from labkit.exercises import course
-from labkit.geometry import planar
 from labkit.localization import lateration, odometry
 
 ex = course("07-dead-reckoning")
@@ -249,28 +248,30 @@ ex.predict("spread", guess, reveal=stages.drive)
 #
 # The lecture prints the constants, $k_d = (0.02\,\mathrm{m})^2/1\,\mathrm{m}$, $k_\theta = (5°)^2/360°$ and $k_\mathrm{drift} = (2°)^2/1\,\mathrm{m}$, but not where the drive
 # ends. `lecture.circle_drive()` holds them in radians and meters: `drive.controls` (140, 2), `drive.dt`, and `drive.noise` with the three constants by name, to be passed on as `**drive.noise`.
-# Start at the origin with a covariance of zeros and take all steps. (They turn by 336°: the circle does not quite close.)
+# Start at the origin and take all steps. (They turn by 336°: the circle does not quite close.)
 
 # %% end_pose
 drive = lecture.circle_drive()
-end_pose = end_cov = ...  # your code here
+end_pose = ...  # your code here
 ### BEGIN SOLUTION
-end_pose, end_cov = np.zeros(3), np.zeros((3, 3))
+end_pose = np.zeros(3)
 for u in drive.controls:
-    cov_u = control_covariance(u, drive.dt, **drive.noise)
-    end_pose, end_cov = propagate(end_pose, end_cov, u, drive.dt, cov_u)
+    end_pose = step_euler(end_pose, u, drive.dt)
 ### END SOLUTION
 end_pose = ex.end_pose(end_pose)
 
 # %% end_cov [markdown]
-# The same loop gives the covariance. Hand it in as well.
+# How sure may the robot be of it? Start once more, this time with a covariance of zeros, and let `propagate` take the steps.
 
 # %% end_cov-code
-covariance = ...  # your code here
+end_cov = ...  # your code here
 ### BEGIN SOLUTION
-covariance = end_cov
+x, end_cov = np.zeros(3), np.zeros((3, 3))
+for u in drive.controls:
+    cov_u = control_covariance(u, drive.dt, **drive.noise)
+    x, end_cov = propagate(x, end_cov, u, drive.dt, cov_u)
 ### END SOLUTION
-covariance = ex.end_cov(covariance)
+end_cov = ex.end_cov(end_cov)
 
 # %% what-k-means [markdown]
 # ## What $k_d$ is, and what it is not
@@ -311,10 +312,9 @@ controls = drive.controls * [1.0, 0.0]
 poses, covs = odometry.drive_with_covariance(np.zeros(3), np.zeros((3, 3)), controls, drive.dt, **drive.noise)
 rng = np.random.default_rng(5)
 ends = odometry.sample_drives(np.zeros(3), controls, drive.dt, **drive.noise, rng=rng, runs=10_000)[-1]
-_, center, spread = gaussian.bent_region(poses[-1], ends)
-twists = planar.log_pose(planar.relative_pose(poses[-1], ends))
+bent = gaussian.bent_region(poses[-1], ends)
 print(f"inside the 95 % ellipse:      {100 * gaussian.share_inside(ends, poses[-1], covs[-1]):.0f} %")
-print(f"inside the 95 % bent region:  {100 * gaussian.share_inside(twists, center, spread):.0f} %")
+print(f"inside the 95 % bent region:  {100 * gaussian.share_inside(bent.twists, bent.mean, bent.cov):.0f} %")
 print(f"mean of the ends lags behind: {100 * (poses[-1] - ends.mean(0))[0]:.0f} cm")
 
 # %% break-it [markdown]

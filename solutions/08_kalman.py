@@ -136,12 +136,12 @@ ex.predict("velocity", guess, reveal=stages.vehicle)
 # ## The gain knows before the data do
 #
 # No measurement appears in the formulas of $K$ and $\Sigma$. In a time-invariant system both therefore settle, whatever is measured, where one step
-# changes nothing more: at the solution of the Riccati equation. (This makes filters fast: once the gain stands still, `labkit.fast.kalman.filter_series` runs the rest as a digital filter.)
+# changes nothing more: at the solution of the Riccati equation. (This makes filters fast: once the gain stands still, `labkit.fast.kalman.filter_steps` runs the rest as a digital filter.)
 
 # %% steady_state_gain
 @ex.steady_state_gain
 def steady_state_gain(A, C, cov_v, cov_z):
-    """Return the gain K, shape (n, m), after very many steps; cov_v (n, n) is the system noise of a step."""
+    """Return the gain K, shape (n, m), after very many steps; cov_v (n, n) is the system noise per step."""
     ### BEGIN SOLUTION
     cov = np.eye(len(A))
     for _ in range(3000):
@@ -350,7 +350,8 @@ for name, step in filters.items():
 # ## Which landmark was that?
 #
 # Real landmarks wear no numbers, and some measurements belong to none. The innovation in units of its covariance, $y^\top S^{-1} y$ (the NIS), decides: nearest in this distance, and only if it
-# lies below the chi-square limit (5.99 for two numbers and 95 %). In the example the filter's heading is off by 8°: what it measures of landmark 0 then lies nearer to
+# lies below the chi-square limit (5.99 for two numbers and 95 %). Only what was measured counts: with one landmark in sight and three on the map the limit is that of two numbers, not of six
+# (`kalman.gate` takes the number from `step.dof`). In the example the filter's heading is off by 8°: what it measures of landmark 0 then lies nearer to
 # landmark 1 *in meters*, and the gate can only throw the measurement away.
 
 # %% gate
@@ -386,11 +387,11 @@ A, B, C = (np.kron(M, np.eye(3)) for M in ([[1, dt], [0, 1]], [[dt**2 / 2], [dt]
 cov_z = 9.0 * np.eye(3)
 for std_a in (4000.0, 400.0):
     x, cov, off = np.array([*read[0], 0, 0, 0]), np.diag([9.0] * 3 + [1e6] * 3), []
-    for z in read:
+    for z, position in zip(read, truth):
         x, cov = predict_state(x, cov, A, B, np.zeros(3), std_a**2 * np.eye(3))
         if gate(z - C @ x, C @ cov @ C.T + cov_z, 16.27):
             x, cov = update(x, cov, z, C, cov_z)
-        off.append(np.linalg.norm(x[:3] - truth[len(off)]))
+        off.append(np.linalg.norm(x[:3] - position))
     print(f"believed {std_a:4.0f} mm/s^2: median error {np.median(off):5.1f} mm, largest {max(off):5.0f} mm")
 
 # %% tracker-compare [markdown]
@@ -419,7 +420,7 @@ for dtype in (np.float64, np.float32):
 # - Wrap every difference of angles. Test it with a robot that faces backward.
 # - A covariance that is too small is worse than one that is too large: inflate when in doubt.
 # - Gate, but count what you reject: a filter that rejects everything is lost, and sure of itself.
-# - Batch over runs, not over time: `labkit.fast.ekf.ekf_localize` filters 200 robots in the time of a few.
+# - Batch over runs, not over time: `labkit.fast.ekf.ekf_localize` filters 200 robots in the time of a few; `localization.ekf.ekf_localize`, which your runs above used, shows what it computes.
 
 # %% questions [markdown]
 # ## Three questions, to answer in words

@@ -17,7 +17,7 @@ from labkit.documents.thesis.listings import listing_cost
 from labkit.estimation import gaussian, kalman, optimization
 from labkit.estimation.differences import numeric_jacobian
 from labkit.fast.ekf import ekf_localize
-from labkit.fast.kalman import filter_series
+from labkit.fast.kalman import filter_steps
 from labkit.geometry import chaining, frames, lie, planar
 from labkit.localization import ekf, lateration, maps, mcl, odometry, particles
 from labkit.localization.drives import find_route, follow
@@ -193,7 +193,10 @@ REFUSED = [
     (lambda: kalman.update(O2, np.zeros((2, 2)), [0.0], [[1.0, 0.0]], [[0.0]]), "must be positive definite"),
     (lambda: kalman.update(O2, np.eye(2), [0.0], [[1.0, 0.0]], [[-1.0]]), "cov_z must hold no negative variance"),
     (lambda: kalman.filter_steps([[np.inf]], [[1.0]], [[1.0]], [[1.0]], [0.0], [[1.0]]), "NaN where nothing"),
-    (lambda: filter_series([], np.eye(2), [1.0, 0.0], np.eye(2), 1.0, O3, np.eye(2)), "x0 must have shape"),
+    (
+        lambda: filter_steps([[1.0]], np.eye(2), [[1.0, 0.0]], [[1.0]], O3, np.eye(2)),
+        r"C must have shape \(..., m, 3\)",
+    ),
     (lambda: kalman.steady_state(np.eye(2), [[1.0]], np.eye(2), [[1.0]]), r"C must have shape \(1, 2\)"),
     (lambda: lecture.example("soccer"), "name must be"),
     (lambda: reconstruct_vehicle(np.eye(2), 1, 0.1), "steps must be a whole number, at least 2"),
@@ -201,9 +204,9 @@ REFUSED = [
     (lambda: kalman.nees(O3, O3, COV, angle=5), "index of one of 3 states"),
     (lambda: kalman.nis(O3, np.eye(2)), "cov_innovation must have shape"),
     (lambda: kalman.mean_band(3, 0), "runs must be a whole number"),
-    (lambda: kalman.gate(O3, COV, probability=2.0), "probability must lie between"),
+    (lambda: kalman.gate(O3, probability=2.0), "probability must lie between"),
     (lambda: ekf.ekf_update(O3, COV, np.full((3, 2), np.inf), MARKS + 1, 0.1, 0.1), "NaN where nothing"),
-    (lambda: ekf.ekf_update(O3, COV, np.ones((2, 2)), MARKS + 1, 0.1, 0.1), "one row a landmark"),
+    (lambda: ekf.ekf_update(O3, COV, np.ones((2, 2)), MARKS + 1, 0.1, 0.1), "one row per landmark"),
     (lambda: ekf.ekf_update(O3, COV, MARKS, MARKS + 1, 0.1, 0.1, iterations=0), "iterations must be a whole"),
     (lambda: ekf.unscented_update(O3, COV, MARKS, MARKS + 1, -0.1, 0.1), "std_range must be positive"),
     (lambda: ekf.unscented_update(O3, 0 * COV, MARKS, MARKS + 1, 0.1, 0.1), "positive definite"),
@@ -260,7 +263,7 @@ REFUSED = [
     (lambda: optimization.exact_step(O2, np.eye(2), "far"), "radius must hold real numbers"),
     (lambda: optimization.predicted_decrease(O2, np.eye(2), O3), "step must have shape"),
     (lambda: numeric_jacobian(np.sin, O2, step=0.0), "step must be positive"),
-    (lambda: optimization.trust_region(wells.residual, wells.jacobian, O2, scale=O3 + 1), "one an unknown"),
+    (lambda: optimization.trust_region(wells.residual, wells.jacobian, O2, scale=O3 + 1), "one per unknown"),
     (lambda: optimization.trust_region(wells.residual, wells.jacobian, O2, accept="ok"), "accept must hold real"),
     (lambda: optimization.gauss_newton(wells.residual, wells.jacobian, O2, max_iterations=1.5), "max_iterations"),
     (lambda: wells.which([np.nan, 0.0]), "x must be finite"),

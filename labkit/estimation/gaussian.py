@@ -2,6 +2,8 @@
 
 import functools
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.stats import chi2
 
@@ -30,9 +32,27 @@ def unit_noise(shape, seed):
 
 
 def ellipse(mean, cov, probability=0.95, points=61):
-    """Closed outline of the region of a plane normal distribution, (..., points, 2).
+    """Closed outline of the region of a normal distribution in the plane.
 
-    mean : (..., 2).    cov : (..., 2, 2).    probability : share of the distribution inside the outline.
+    Parameters
+    ----------
+    mean : array-like, shape (..., 2)
+        Its center.
+    cov : array-like, shape (..., 2, 2)
+        Its covariance.
+    probability : float
+        Share of the distribution inside the outline.
+    points : int
+        Number of points of the outline, the last equal to the first.
+
+    Returns
+    -------
+    outline : array, shape (..., points, 2)
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, a negative variance, a probability that is none.
     """
     mean, cov = as_points(mean, "mean", 2), as_covariances(cov, "cov", 2)
     probability, points = as_probability(probability, "probability"), as_count(points, "points")
@@ -45,14 +65,39 @@ def ellipse(mean, cov, probability=0.95, points=61):
 
 
 def outlines(mean, cov, probability=0.95, points=61):
-    """Many ellipses as one line, (n (points + 1), 2), a row of NaN after each: one artist draws them all."""
+    """Many ellipses as one line, a row of NaN after each, so that one artist draws them all.
+
+    The parameters are those of `ellipse`, with n ellipses.
+
+    Returns
+    -------
+    line : array, shape (n (points + 1), 2)
+    """
     curves = ellipse(mean, cov, probability, points)
     gaps = np.full((*curves.shape[:-2], 1, 2), np.nan)
     return np.concatenate([curves, gaps], axis=-2).reshape(-1, 2)
 
 
 def share_inside(samples, mean, cov, probability=0.95):
-    """Share of samples, (n, dim), inside the region that should hold `probability` of them."""
+    """Share of samples inside the region that should hold `probability` of them.
+
+    Parameters
+    ----------
+    samples : array-like, shape (n, dim)
+    mean, cov : array-like, shapes (dim,) and (dim, dim)
+        Of the normal distribution.
+    probability : float
+        Share of the distribution inside its region.
+
+    Returns
+    -------
+    share : float
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, no sample, a covariance without an inverse.
+    """
     mean = as_shape(mean, "mean", "dim")
     d = as_shape(samples, "samples", "n", len(mean)) - mean
     if not d.size:
@@ -62,15 +107,52 @@ def share_inside(samples, mean, cov, probability=0.95):
     return float((squared <= chi2.ppf(probability, d.shape[-1])).mean())
 
 
-def bent_region(mean, ends, probability=0.95, points=61):
-    """Outline in the plane of the region that is an ellipse in exponential coordinates about `mean`, and their moments.
+@dataclass(frozen=True, eq=False)
+class BentRegion:
+    """A region of poses that is an ellipse in exponential coordinates about a pose.
 
-    Returns (outline (points, 2), mean (3,), covariance (3, 3)) of the exponential coordinates of the ends.
+    outline : (points, 2) in the plane (m).
+    twists : (n, 3) exponential coordinates of the samples, as `planar.log_pose` gives them.
+    mean, cov : (3,) and (3, 3), moments of the twists.
     """
-    xi = planar.log_pose(planar.relative_pose(mean, ends))
-    center, cov = xi.mean(0), np.cov(xi.T)
+
+    outline: np.ndarray
+    twists: np.ndarray
+    mean: np.ndarray
+    cov: np.ndarray
+
+
+def bent_region(pose, ends, probability=0.95, points=61):
+    """The region of many poses that is an ellipse in exponential coordinates about one of them.
+
+    Parameters
+    ----------
+    pose : array-like, shape (3,)
+        Where the coordinates start (m, m, rad).
+    ends : array-like, shape (n, 3)
+        Sampled poses, at least two.
+    probability : float
+        Share inside the outline of the two widest directions, in their plane.
+    points : int
+        Number of points of the outline.
+
+    Returns
+    -------
+    BentRegion
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, fewer than two poses, a probability that is none.
+    """
+    pose, ends = as_shape(pose, "pose", 3), as_shape(ends, "ends", "n", 3)
+    if len(ends) < 2:
+        raise ValueError(f"ends must hold at least two poses, got {len(ends)}")
+    probability, points = as_probability(probability, "probability"), as_count(points, "points")
+    twists = planar.log_pose(planar.relative_pose(pose, ends))
+    mean, cov = twists.mean(0), np.cov(twists.T)
     values, vectors = np.linalg.eigh(cov)
-    angle = np.linspace(0, 2 * np.pi, points)[:, None]
-    radius = np.sqrt(-2 * np.log(1 - probability))
-    ring = np.cos(angle) * np.sqrt(values[2]) * vectors[:, 2] + np.sin(angle) * np.sqrt(values[1]) * vectors[:, 1]
-    return planar.compose_pose(mean, planar.exp_pose(center + radius * ring))[:, :2], center, cov
+    angle = np.linspace(0, 2 * np.pi, points)
+    circle = np.stack([np.sin(angle), np.cos(angle)])
+    ring = (vectors[:, 1:] * np.sqrt(np.maximum(values[1:], 0.0) * chi2.ppf(probability, 2)) @ circle).T
+    return BentRegion(planar.compose_pose(pose, planar.exp_pose(mean + ring))[:, :2], twists, mean, cov)

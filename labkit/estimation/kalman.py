@@ -1,8 +1,7 @@
-"""Kalman filters: the lecture's linear filter, its steady state, the extended filter with landmarks, and their checks.
+"""Kalman filters: the lecture's linear filter, its steady state, and the checks of a filter's honesty.
 
 States are (..., n), covariances (..., n, n); everything that is not a time loop broadcasts over leading axes. The
-landmark filter works on planar poses x = (x, y, theta) in m, m, rad with controls u = (v, omega) as in `odometry`; a
-measurement is (distance, bearing) to each landmark, z (..., m, 2) in m and rad, NaN where a landmark was not seen.
+letters are the lecture's: x = A x + B u moves the state, z = C x measures it, K is the gain.
 Source: lecture "Lokalisierung", section "Lokalisierung mit einem Kalman-Filter".
 """
 
@@ -29,18 +28,31 @@ from ..geometry.planar import wrap_angle
 FORMS = ("joseph", "short")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Corrected:
-    """A correction: state x (..., n), covariance, innovation z - C x with its covariance, and the gain (..., n, m)."""
+    """What a measurement made of a prediction.
+
+    x : (..., n) state.    cov : (..., n, n) its covariance.
+    innovation : (..., m) measured minus expected; 0 where a number was not measured.
+    cov_innovation : (..., m, m) covariance of the innovation, S = C cov C' + cov_z.
+    gain : (..., n, m) K; columns of zeros where a number was not measured.
+    dof : (...) how many numbers were measured: the degrees of freedom of the innovation.
+    """
 
     x: np.ndarray
     cov: np.ndarray
     innovation: np.ndarray
     cov_innovation: np.ndarray
     gain: np.ndarray
+    dof: np.ndarray
+
+    @property
+    def nis(self):
+        """Normalized innovation squared, (...); chi-square with `dof` degrees of freedom for an honest filter."""
+        return nis(self.innovation, self.cov_innovation)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SteadyState:
     """Where a time-invariant filter settles: gain (n, m), covariance before and after a correction (n, n)."""
 
@@ -57,13 +69,6 @@ def _apply(M, x):
     return (M @ x[..., None])[..., 0]
 
 
-def _state(x):
-    x = as_finite(x, "x")
-    if x.ndim < 1:
-        raise ValueError("x must have shape (..., n), got a single number")
-    return x, x.shape[-1]
-
-
 def _symmetric(cov):
     return 0.5 * (cov + _t(cov))
 
@@ -72,9 +77,20 @@ def _symmetric(cov):
 
 
 def vehicle_model(dt):
-    """Matrices (A, B, C) of the lecture's vehicle: state (position, velocity), control acceleration, position measured.
+    """Matrices (A, B, C) of the lecture's vehicle.
 
-    B = (0, dt)' is the lecture's; a constant acceleration over dt would also move the position, by dt^2 / 2.
+    The state is (position, velocity), the control an acceleration, and the position is measured. B = (0, dt)' is the
+    lecture's; a constant acceleration over dt would also move the position, by dt^2 / 2.
+
+    Parameters
+    ----------
+    dt : float
+        Time step (s).
+
+    Returns
+    -------
+    A, B, C : arrays, shapes (2, 2), (2, 1), (1, 2)
+
     Source: lecture, "Beispiel: bewegtes Fahrzeug (1)" and "(2)".
     """
     dt = as_positive_number(dt, "dt")
@@ -86,8 +102,25 @@ def predict(x, cov, A, B=None, u=None, cov_u=None, cov_v=None):
 
     Parameters
     ----------
-    x : (..., n), cov : (..., n, n), A : (..., n, n), B : (..., n, k), u : (..., k), cov_u : (..., k, k) of the control.
-    cov_v : (..., n, n) of further system noise; the lecture has none beside the control's.
+    x : array-like, shape (..., n)
+        State.
+    cov : array-like, shape (..., n, n)
+        Its covariance.
+    A, B : array-like, shapes (..., n, n) and (..., n, k)
+        How the state follows itself, and how the control acts.
+    u, cov_u : array-like, shapes (..., k) and (..., k, k), optional
+        Control and its covariance; they act through B.
+    cov_v : array-like, shape (..., n, n), optional
+        Further noise of the system; the lecture has none beside the control's.
+
+    Returns
+    -------
+    x, cov : arrays, shapes (..., n) and (..., n, n)
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, numbers that are not finite, a negative variance, a control without B.
 
     Source: lecture, "Algorithmus fuer linearen Kalman-Filter", lines 2 and 3.
     """
@@ -99,8 +132,11 @@ def predict(x, cov, A, B=None, u=None, cov_u=None, cov_v=None):
     return _predicted(x, cov, A, push, spread)
 
 
-def _predicted(x, cov, A, push, spread):
-    return _apply(A, x) + push, _symmetric(A @ cov @ _t(A) + spread)
+def _state(x):
+    x = as_finite(x, "x")
+    if x.ndim < 1:
+        raise ValueError("x must have shape (..., n), got a single number")
+    return x, x.shape[-1]
 
 
 def _driven(n, B, u, cov_u, cov_v):
@@ -120,16 +156,36 @@ def _driven(n, B, u, cov_u, cov_v):
     return push, spread if cov_v is None else spread + as_covariances(cov_v, "cov_v", n)
 
 
+def _predicted(x, cov, A, push, spread):
+    return _apply(A, x) + push, _symmetric(A @ cov @ _t(A) + spread)
+
+
 def update(x, cov, z, C, cov_z, form="joseph", dtype=float):
-    """Correct a prediction with the measurement z = C x + noise: a `Corrected`.
+    """Correct a prediction with the measurement z = C x + noise.
 
     Parameters
     ----------
-    x : (..., n), cov : (..., n, n), C : (..., m, n), cov_z : (..., m, m).
-    z : (..., m), or None for a time step without measurement: the prediction is returned as it is.
-    form : "joseph" (I - K C) cov (I - K C)' + K cov_z K', symmetric and positive for every gain, or the lecture's
-        "short" (I - K C) cov.
-    dtype : float or numpy.float32, to see what single precision does to either form.
+    x : array-like, shape (..., n)
+        Predicted state.
+    cov : array-like, shape (..., n, n)
+        Its covariance.
+    z : array-like, shape (..., m), or None
+        Measurement; None for a time step without one: the prediction is returned as it is.
+    C, cov_z : array-like, shapes (..., m, n) and (..., m, m)
+        What is measured of the state, and the covariance of the measurement.
+    form : {"joseph", "short"}
+        (I - K C) cov (I - K C)' + K cov_z K', symmetric and positive for every gain, or the lecture's (I - K C) cov.
+    dtype : type
+        float, or numpy.float32 to see what single precision does to either form.
+
+    Returns
+    -------
+    Corrected
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, numbers that are not finite, a negative variance, an innovation whose covariance is singular.
 
     Source: lecture, "Algorithmus fuer linearen Kalman-Filter", lines 5 to 8, and the remark on missing measurements.
     """
@@ -158,39 +214,12 @@ def _corrected(x, cov, z, C, cov_z, form="joseph"):
     PCt = cov @ _t(C)
     S = C @ PCt + cov_z
     if z is None:
-        return Corrected(x, cov, np.zeros_like(S[..., 0]), S, np.zeros_like(PCt))
+        innovation = np.zeros_like(S[..., 0])
+        return Corrected(x, cov, innovation, S, np.zeros_like(PCt), np.zeros(innovation.shape[:-1], int))
     innovation = z - _apply(C, x)
     K = _t(solve_covariance(S, "C cov C' + cov_z", _t(PCt)))
-    return Corrected(x + _apply(K, innovation), _after(cov, K, C, cov_z, form), innovation, S, K)
-
-
-def filter_steps(z, A, C, cov_z, x0, cov0, B=None, u=None, cov_u=None, cov_v=None):
-    """The linear filter along a series: each step predicts as in `predict`, then corrects as in `update`.
-
-    Parameters
-    ----------
-    z : (steps, m), a row of NaN where nothing was measured; x0 : (n,), cov0 : (n, n) before the first step. The others
-    as in `predict` and `update`, the same in every step.
-
-    Returns a `Corrected` whose arrays have the steps as their first axis; innovation and gain are zero where
-    nothing was measured.
-    """
-    x = as_shape(np.atleast_1d(as_finite(x0, "x0")), "x0", "n")
-    n = len(x)
-    A, C, cov = as_matrices(A, "A", n, n), _measured_by(C, n), as_covariances(cov0, "cov0", n)
-    cov_z, z = as_matrices(cov_z, "cov_z", len(C), len(C)), as_readings(z, "z")
-    if z.ndim != 2 or z.shape[1] != len(C):
-        raise ValueError(f"z must have shape (steps, {len(C)}), got {z.shape}")
-    missing = np.isnan(z).all(axis=1)
-    z = as_finite(np.where(missing[:, None], 0.0, z), "z")
-    push, spread = _driven(n, B, u, cov_u, cov_v)
-    steps = []
-    for value, nothing in zip(z, missing):
-        x, cov = _predicted(x, cov, A, push, spread)
-        step = _corrected(x, cov, None if nothing else value, C, cov_z)
-        x, cov = step.x, step.cov
-        steps.append(step)
-    return Corrected(*(np.array([getattr(step, field.name) for step in steps]) for field in fields(Corrected)))
+    dof = np.full(innovation.shape[:-1], innovation.shape[-1])
+    return Corrected(x + _apply(K, innovation), _after(cov, K, C, cov_z, form), innovation, S, K, dof)
 
 
 def _after(cov, K, C, cov_z, form="joseph"):
@@ -200,10 +229,108 @@ def _after(cov, K, C, cov_z, form="joseph"):
     return keep @ cov @ _t(keep) + K @ cov_z @ _t(K)
 
 
+@dataclass(frozen=True, eq=False)
+class _Series:
+    """Checked arguments of `filter_steps`; push and spread are what a step adds to the state and to its covariance."""
+
+    z: np.ndarray
+    missing: np.ndarray
+    A: np.ndarray
+    C: np.ndarray
+    cov_z: np.ndarray
+    x0: np.ndarray
+    cov0: np.ndarray
+    push: np.ndarray
+    spread: np.ndarray
+
+
+def _series(z, A, C, cov_z, x0, cov0, B, u, cov_u, cov_v):
+    x0 = as_shape(np.atleast_1d(as_finite(x0, "x0")), "x0", "n")
+    n = len(x0)
+    C = as_shape(_measured_by(C, n), "C", "m", n)
+    m, z = len(C), as_readings(z, "z")
+    if z.ndim != 2 or z.shape[1] != m:
+        raise ValueError(f"z must have shape (steps, {m}), got {z.shape}")
+    unread = np.isnan(z)
+    missing = unread.all(axis=1)
+    push, spread = _driven(n, B, u, cov_u, cov_v)
+    return _Series(
+        z=as_finite(np.where(missing[:, None], 0.0, z), "z") if unread.any() else z,
+        missing=missing,
+        A=as_shape(A, "A", n, n),
+        C=C,
+        cov_z=as_shape(as_covariances(cov_z, "cov_z", m), "cov_z", m, m),
+        x0=x0,
+        cov0=_symmetric(as_shape(as_covariances(cov0, "cov0", n), "cov0", n, n)),
+        push=as_shape(push + np.zeros(n), "B u", n),
+        spread=_symmetric(as_shape(spread + np.zeros((n, n)), "B cov_u B' + cov_v", n, n)),
+    )
+
+
+def filter_steps(z, A, C, cov_z, x0, cov0, B=None, u=None, cov_u=None, cov_v=None):
+    """The linear filter along a series: each step predicts as in `predict`, then corrects as in `update`.
+
+    Parameters
+    ----------
+    z : array-like, shape (steps, m)
+        One measurement per step, a row of NaN where nothing was measured.
+    A, C, cov_z : array-like, shapes (n, n), (m, n), (m, m)
+        As in `predict` and `update`, the same in every step.
+    x0, cov0 : array-like, shapes (n,) and (n, n)
+        State and covariance before the first step.
+    B, u, cov_u, cov_v : array-like, shapes (n, k), (k,), (k, k), (n, n), optional
+        As in `predict`, the same in every step.
+
+    Returns
+    -------
+    Corrected
+        Its arrays have the steps as their first axis.
+
+    Raises
+    ------
+    ValueError
+        As `predict` and `update`; a row of z in which only a part is NaN.
+
+    See Also
+    --------
+    labkit.fast.kalman.filter_steps : the same for long series of single numbers.
+    """
+    given = _series(z, A, C, cov_z, x0, cov0, B, u, cov_u, cov_v)
+    x, cov, steps = given.x0, given.cov0, []
+    for measured, missing in zip(given.z, given.missing):
+        x, cov = _predicted(x, cov, given.A, given.push, given.spread)
+        step = _corrected(x, cov, None if missing else measured, given.C, given.cov_z)
+        x, cov = step.x, step.cov
+        steps.append(step)
+    return _stacked(steps, given)
+
+
+def _stacked(steps, given):
+    """One `Corrected` of many, the steps along the first axis; of the right shapes also without any step."""
+    if steps:
+        return Corrected(*(np.array([getattr(step, field.name) for step in steps]) for field in fields(Corrected)))
+    m, n = given.C.shape
+    return Corrected(*(np.empty((0, *s)) for s in ((n,), (n, n), (m,), (m, m), (n, m))), np.empty(0, int))
+
+
 def steady_state(A, C, cov_v, cov_z):
     """Gain and covariances of a time-invariant filter after many steps, from the discrete Riccati equation.
 
-    Raises ValueError where the equation has no stabilizing solution (a mode is neither measured nor stable).
+    Parameters
+    ----------
+    A, C : array-like, shapes (n, n) and (m, n)
+        Model and measurement.
+    cov_v, cov_z : array-like, shapes (n, n) and (m, m)
+        Noise of the system per step, and of the measurement.
+
+    Returns
+    -------
+    SteadyState
+
+    Raises
+    ------
+    ValueError
+        Where the equation has no stabilizing solution: a mode is neither measured nor stable.
     """
     A, C = as_shape(A, "A", "n", "n"), as_shape(C, "C", "m", "n")
     n, m = len(A), len(C)
@@ -222,7 +349,27 @@ def steady_state(A, C, cov_v, cov_z):
 
 
 def nees(truth, x, cov, angle=None):
-    """Normalized estimation error squared, error' cov^-1 error, (...); `angle` is the index of a state to wrap."""
+    """Normalized estimation error squared, error' cov^-1 error.
+
+    Parameters
+    ----------
+    truth, x : array-like, shape (..., n)
+        True and estimated state.
+    cov : array-like, shape (..., n, n)
+        Covariance that the filter claims.
+    angle : int, optional
+        Index of a state that is an angle (rad): its error is wrapped.
+
+    Returns
+    -------
+    nees : array, shape (...)
+        Chi-square with n degrees of freedom for an honest filter.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, an index that is none, a covariance without an inverse.
+    """
     truth, x = as_finite(truth, "truth"), as_finite(x, "x")
     fit_together(truth=truth.shape, x=x.shape)
     error = truth - x
@@ -234,7 +381,15 @@ def nees(truth, x, cov, angle=None):
 
 
 def nis(innovation, cov_innovation):
-    """Normalized innovation squared, innovation' S^-1 innovation, (...): the check that needs no truth."""
+    """Normalized innovation squared, innovation' S^-1 innovation, (...): the check that needs no truth.
+
+    Parameters
+    ----------
+    innovation : array-like, shape (..., m)
+        Measured minus expected.
+    cov_innovation : array-like, shape (..., m, m)
+        Its covariance S.
+    """
     return _squared(as_finite(innovation, "innovation"), cov_innovation, "cov_innovation")
 
 
@@ -253,8 +408,22 @@ def mean_band(dof, runs, probability=0.99):
     return tuple(stats.chi2.ppf([tail, 1 - tail], dof * runs) / runs)
 
 
-def gate(innovation, cov_innovation, probability=0.99):
-    """Whether an innovation is plausible: its NIS lies below the chi-square quantile of its dimension; (...) bool."""
-    innovation = as_finite(innovation, "innovation")
-    squared = nis(innovation, cov_innovation)
-    return squared <= stats.chi2.ppf(as_probability(probability, "probability"), innovation.shape[-1])
+def gate(step, probability=0.99):
+    """Whether what was measured is plausible: its NIS lies below the chi-square quantile of as many numbers.
+
+    Only what was seen counts: one landmark of three is two numbers, not six. Where nothing was seen, nothing is
+    implausible.
+
+    Parameters
+    ----------
+    step : Corrected or Localization
+        A correction, or many of them: whatever has `nis` and `dof`, of shape (...).
+    probability : float
+        Share of honest measurements that pass.
+
+    Returns
+    -------
+    plausible : array of bool, shape (...)
+    """
+    probability, dof = as_probability(probability, "probability"), np.maximum(step.dof, 1)  # of nothing, NIS is 0
+    return step.nis <= stats.chi2.ppf(probability, dof)

@@ -369,7 +369,7 @@ def _start(evaluate, x0):
 
 def _refuse_scale(scale, point):
     if scale.shape not in ((), point.gradient.shape):
-        raise ValueError(f"scale must be one number or one an unknown, {point.gradient.shape}, got {scale.shape}")
+        raise ValueError(f"scale must be one number or one per unknown, {point.gradient.shape}, got {scale.shape}")
 
 
 def _is_finite(point):

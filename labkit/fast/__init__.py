@@ -3,6 +3,6 @@
 Use them where a figure drags ten thousand particles or a benchmark names a goal. To understand a method, read its
 twin in `estimation`, `calibration` or `localization`.
 
-kalman      the time-invariant filter along a series
-ekf         the landmark filter along a drive, one robot or many
+kalman      filter_steps: the linear filter along a series
+ekf         ekf_localize: the landmark filter along a drive, one robot or many
 """

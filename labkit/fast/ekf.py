@@ -1,97 +1,69 @@
-"""The landmark filter along a drive, in information form; equals steps of `localization.ekf.ekf_step`."""
+"""The landmark filter along a drive, in information form; equals `localization.ekf.ekf_localize`."""
 
 import math
 
 import numpy as np
 
-from ..checks import as_covariances, as_points, as_positive_number, as_readings, as_shape
-from ..localization.ekf import Localization, _control_covariances
+from ..localization import ekf as readable
+from ..localization.ekf import ON_LANDMARK, Localization, _given
 
 
 def ekf_localize(
     u, z, landmarks, x0, cov0, dt, std_range, std_bearing, cov_u=None, cov_v=None, model="euler", wrap=True
 ):
-    """Extended Kalman filter along a whole drive, one robot or many at once: a `Localization`.
-
-    Parameters
-    ----------
-    u : (n, 2), or (n, runs, 2), commands; step k moves with u[k] and then corrects with z[k].
-    z : (n, m, 2) or (n, runs, m, 2), NaN where nothing was measured.    landmarks : (m, 2).
-    x0 : (3,) or (runs, 3).    cov0 : (3, 3) or (runs, 3, 3).
-    cov_u : (2, 2) or (n, 2, 2) noise of the control, uncorrelated as in the lecture.    cov_v : (3, 3) further noise.
+    """`localization.ekf.ekf_localize`, which has the arguments, one robot or many at once.
 
     The correction is in information form: with W = sum H' R^-1 H over the landmarks, cov = prior (I + W prior)^-1. It
     equals the lecture's gain form for independent measurements, and inverts one 3 x 3 matrix whatever their number.
+    Where v and omega are correlated, or the model is the arc, the readable twin does the work.
     """
-    u, landmarks, z = as_points(u, "u", 2), as_shape(landmarks, "landmarks", "m", 2), as_readings(z, "z")
-    if u.ndim not in (2, 3):
-        raise ValueError(f"u must have shape (n, 2) or (n, runs, 2), got {u.shape}")
-    m = len(landmarks)
-    if model not in ("euler", "midpoint"):
-        raise ValueError(f"model must be one of euler, midpoint, got {model!r}")
-    if z.ndim not in (3, 4) or z.shape[0] != len(u) or z.shape[-2:] != (m, 2):
-        raise ValueError(
-            f"z must have shape ({len(u)}, {m}, 2) or ({len(u)}, runs, {m}, 2) for {len(u)} controls and {m} "
-            f"landmarks, got {z.shape}"
-        )
-    if (np.isnan(z[..., 0]) != np.isnan(z[..., 1])).any():
-        raise ValueError("z must be finite, or NaN in both numbers of a landmark that was not seen")
-    runs = z.shape[1:-2]
-    x0, cov0 = as_points(x0, "x0", 3), as_covariances(cov0, "cov0", 3)
-    for name, got in (("u", u.shape[1:-1]), ("x0", x0.shape[:-1]), ("cov0", cov0.shape[:-2])):
-        if got not in ((), runs):
-            raise ValueError(f"{name} must come once for all runs or once a run as z, {runs}, got leading axes {got}")
-    x0, cov0 = np.broadcast_to(x0, (*runs, 3)), np.broadcast_to(cov0, (*runs, 3, 3))
-    var_u = np.zeros((len(u), 2)) if cov_u is None else _control_variances(cov_u, len(u))
-    extra = np.zeros((3, 3)) if cov_v is None else as_shape(as_covariances(cov_v, "cov_v", 3), "cov_v", 3, 3)
-    turn = 0.5 if model == "midpoint" else 0.0
-    stds = as_positive_number(std_range, "std_range"), as_positive_number(std_bearing, "std_bearing")
-    weights = tuple(1 / std**2 for std in stds)
-    run = _filter_many if runs else _filter_one
-    x, cov, score = run(u, z, landmarks, x0, cov0, as_positive_number(dt, "dt"), weights, var_u, extra, turn, wrap)
-    return Localization(x, cov, score, np.isfinite(z).sum((-1, -2)))
-
-
-def _control_variances(cov_u, n):
-    cov_u = _control_covariances(cov_u, n)
-    if (cov_u[:, 0, 1] != 0).any():
-        raise ValueError("cov_u must be diagonal: ekf_localize takes v and omega as uncorrelated, as the lecture does")
-    return np.diagonal(cov_u, axis1=-2, axis2=-1)
+    given = _given(u, z, landmarks, x0, cov0, dt, std_range, std_bearing, cov_u, cov_v, model, wrap)
+    if model == "arc" or given.cov_u[:, 0, 1].any() or not len(given.u):
+        return readable.ekf_localize(u, z, landmarks, x0, cov0, dt, std_range, std_bearing, cov_u, cov_v, model, wrap)
+    var_u = np.diagonal(given.cov_u, axis1=-2, axis2=-1)
+    weights = 1 / given.std_range**2, 1 / given.std_bearing**2
+    run = _filter_many if given.z.ndim == 4 else _filter_one
+    x, cov, score = run(given, weights, var_u, 0.5 if model == "midpoint" else 0.0)
+    return Localization(x, cov, score, np.isfinite(given.z).sum((-1, -2)))
 
 
 _UPPER = ((0, 0, 0, 1, 1, 2), (0, 1, 2, 1, 2, 2))
 
 
-def _filter_one(u, z, landmarks, x0, cov0, dt, weights, var_u, extra, turn, wrap):
+def _filter_one(given, weights, var_u, turn):
     """One robot on Python floats: no array is worth its call for three numbers."""
-    pose, P, extra = tuple(x0.tolist()), tuple(cov0[_UPPER].tolist()), tuple(extra[_UPPER].tolist())
-    w_r, w_b = (float(w) for w in weights)
-    dt, marks, out = float(dt), landmarks.tolist(), []
-    sqrt, atan2, pi, tau = math.sqrt, math.atan2, math.pi, math.tau
-    for (v, w), noise, seen in zip(u.tolist(), var_u.tolist(), z.tolist()):
+    pose, P, extra = given.x0.tolist(), given.cov0[_UPPER].tolist(), given.cov_v[_UPPER].tolist()
+    (w_r, w_b), dt, wrap, marks, out = weights, given.dt, given.wrap, given.landmarks.tolist(), []
+    hypot, atan2, pi, tau = math.hypot, math.atan2, math.pi, math.tau
+    for (v, w), noise, seen in zip(given.u.tolist(), var_u.tolist(), given.z.tolist()):
         pose, P = _move(pose, P, v, w, dt, noise, extra, turn)
         x, y, theta = pose
         a = b = c = d = e = f = g0 = g1 = g2 = score = 0.0
         for (lx, ly), (distance, bearing) in zip(marks, seen):
-            if distance != distance:  # NaN: not seen
-                continue
             dx, dy = lx - x, ly - y
-            q = dx * dx + dy * dy
-            r = sqrt(q)
-            ux, uy, bx, by = dx / r, dy / r, dy / q, -dx / q
+            if distance != distance:  # NaN: not seen
+                if dx == dy == 0:
+                    raise ValueError(ON_LANDMARK)
+                continue
+            r = hypot(dx, dy)
+            try:
+                ux, uy = dx / r, dy / r
+            except ZeroDivisionError:
+                raise ValueError(ON_LANDMARK) from None
+            bx, by = uy / r, ux / r  # the bearing by x and, negative, by y
             er, eb = distance - r, bearing - atan2(dy, dx) + theta
             if wrap:
                 eb = (eb + pi) % tau - pi
             wx, wy, vx, vy = w_r * ux, w_r * uy, w_b * bx, w_b * by
-            a, b, d = a + wx * ux + vx * bx, b + wx * uy + vx * by, d + wy * uy + vy * by
-            c, e, f = c - vx, e - vy, f + w_b
-            g0, g1, g2 = g0 - wx * er + vx * eb, g1 - wy * er + vy * eb, g2 - w_b * eb
+            a, b, d = a + wx * ux + vx * bx, b + wx * uy - vx * by, d + wy * uy + vy * by
+            c, e, f = c - vx, e + vy, f + w_b
+            g0, g1, g2 = g0 - wx * er + vx * eb, g1 - wy * er - vy * eb, g2 - w_b * eb
             score += w_r * er * er + w_b * eb * eb
         pose, P, explained = _absorb(pose, P, (a, b, c, d, e, f), (g0, g1, g2))
         out += pose
         out += P
         out.append(score - explained)
-    out = np.array(out).reshape(len(u), 10)
+    out = np.array(out).reshape(-1, 10)
     cov = out[:, [3, 4, 5, 4, 6, 7, 5, 7, 8]].reshape(-1, 3, 3)
     return out[:, :3], cov, out[:, 9]
 
@@ -141,13 +113,13 @@ def _absorb(pose, P, W, g):
     return (pose[0] + x, pose[1] + y, pose[2] + z), (n00, n01, n02, n11, n12, n22), x * g0 + y * g1 + z * g2
 
 
-def _filter_many(u, z, landmarks, x0, cov0, dt, weights, var_u, extra, turn, wrap):
+def _filter_many(given, weights, var_u, turn):
     """Many robots at once: states (3, runs), covariances (3, 3, runs), so that every operation runs along the runs."""
-    steps, runs, m, _ = z.shape
+    (steps, runs, m, _), u, dt = given.z.shape, given.u, given.dt
     u = np.broadcast_to(u if u.ndim == 3 else u[:, None, :], (steps, runs, 2)).transpose(0, 2, 1)
-    pose, P = x0.T.copy(), cov0.transpose(1, 2, 0).copy()
-    marks, extra, noisy = landmarks.T[:, :, None], extra[:, :, None], extra.any()
-    z = np.ascontiguousarray(z.transpose(0, 3, 2, 1))  # step, number, landmark, run
+    pose, P = given.x0.T.copy(), given.cov0.transpose(1, 2, 0).copy()
+    marks, extra, noisy = given.landmarks.T[:, :, None], given.cov_v[:, :, None], given.cov_v.any()
+    z = np.ascontiguousarray(given.z.transpose(0, 3, 2, 1))  # step, number, landmark, run
     weight = np.isfinite(z) * np.reshape(weights, (2, 1, 1))
     z = np.where(np.isfinite(z), z, 0.0)
     poses, covs, scores = np.empty((steps, 3, runs)), np.empty((steps, 3, 3, runs)), np.empty((steps, runs))
@@ -162,12 +134,14 @@ def _filter_many(u, z, landmarks, x0, cov0, dt, weights, var_u, extra, turn, wra
         d = marks - pose[:2, None]
         minus_q = d[0] * d[0]
         minus_q += d[1] * d[1]
+        if not minus_q.all():
+            raise ValueError(ON_LANDMARK)
         r = np.sqrt(minus_q)
         np.negative(minus_q, out=minus_q)
         np.subtract(z[k, 0], r, out=y[0])
         np.subtract(z[k, 1], np.arctan2(d[1], d[0]), out=y[1])
         y[1] += pose[2]
-        if wrap:
+        if given.wrap:
             y[1] -= math.tau * np.rint(y[1] * (1 / math.tau))
         np.negative(r, out=r)
         np.divide(d, r, out=H[:2, 0])

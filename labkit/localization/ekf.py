@@ -26,11 +26,13 @@ from ..geometry.planar import wrap_angle
 from . import odometry
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Localization:
-    """A filtered drive: poses x (n, ..., 3), covariances (n, ..., 3, 3), NIS (n, ...), and what it counts.
+    """A filtered drive, one robot or many.
 
-    dof (n, ...): numbers measured in the step, the degrees of freedom of that step's NIS.
+    x : (n, ..., 3) corrected poses (m, m, rad).    cov : (n, ..., 3, 3) their covariances.
+    nis : (n, ...) normalized innovation squared of each step.
+    dof : (n, ...) how many numbers were measured in the step, the degrees of freedom of its NIS.
     """
 
     x: np.ndarray
@@ -39,20 +41,38 @@ class Localization:
     dof: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SimulatedRuns:
-    """A simulated drive: true poses (n + 1, runs, 3), commands (n, 2), measurements (n, runs, m, 2)."""
+    """Many robots on the same commands.
+
+    truth : (n + 1, runs, 3) true poses, the start included.    controls : (n, 2) commands.
+    z : (n, runs, m, 2) measurements, NaN where a landmark was not seen.
+    """
 
     truth: np.ndarray
     controls: np.ndarray
     z: np.ndarray
 
 
+ON_LANDMARK = "the robot stands on a landmark: the bearing to it has no value"
+
+
 # --- range and bearing to landmarks -----------------------------------------
 
 
 def measurement(x, landmarks):
-    """Distance (m) and bearing (rad, within [-pi, pi)) from the pose x to each landmark, (..., m, 2).
+    """Distance (m) and bearing (rad, within [-pi, pi)) from a pose to each landmark.
+
+    Parameters
+    ----------
+    x : array-like, shape (..., 3)
+        Pose (m, m, rad).
+    landmarks : array-like, shape (m, 2) or (..., m, 2)
+        Positions (m).
+
+    Returns
+    -------
+    z : array, shape (..., m, 2)
 
     Source: lecture, "Messmodell" of "Selbstlokalisierung mit Landmarken".
     """
@@ -61,14 +81,21 @@ def measurement(x, landmarks):
 
 
 def measurement_jacobian(x, landmarks):
-    """Derivative of `measurement` by the pose, (..., m, 2, 3).
+    """Derivative H of `measurement` by the pose; the parameters are those of `measurement`.
 
-    Raises ValueError where the robot stands on a landmark: the bearing has no value there.
+    Returns
+    -------
+    H : array, shape (..., m, 2, 3)
+
+    Raises
+    ------
+    ValueError
+        Where the robot stands on a landmark: the bearing has no value there.
     """
     dx, dy, _ = _toward(x, landmarks)
     q = dx**2 + dy**2
     if (q == 0).any():
-        raise ValueError("the robot stands on a landmark: the bearing to it has no value")
+        raise ValueError(ON_LANDMARK)
     r = np.sqrt(q)
     H = np.zeros((*q.shape, 2, 3))
     H[..., 0, 0], H[..., 0, 1] = -dx / r, -dy / r
@@ -89,7 +116,7 @@ def _stacked(z, predicted, wrap):
     """Innovations (..., 2 m), with NaN for what was not measured replaced by 0, and the mask of what was."""
     z = as_readings(z, "z")
     if z.shape[-2:] != predicted.shape[-2:]:
-        raise ValueError(f"z must have shape (..., {predicted.shape[-2]}, 2), one row a landmark, got {z.shape}")
+        raise ValueError(f"z must have shape (..., {predicted.shape[-2]}, 2), one row per landmark, got {z.shape}")
     fit_together(z=z.shape[:-2], x=predicted.shape[:-2])
     seen = ~np.isnan(z - predicted)
     y = np.where(seen, z - predicted, 0.0)
@@ -99,14 +126,35 @@ def _stacked(z, predicted, wrap):
 
 
 def ekf_update(x, cov, z, landmarks, std_range, std_bearing, iterations=1, wrap=True):
-    """Correct a pose with distances and bearings to known landmarks: a `Corrected` over all 2 m numbers stacked.
+    """Correct a pose with distances and bearings to known landmarks.
 
     Parameters
     ----------
-    x : (..., 3), cov : (..., 3, 3), landmarks : (m, 2) or (..., m, 2), z : (..., m, 2), NaN where nothing was measured.
-    iterations : 1 is the extended Kalman filter; more linearize again at the corrected pose (iterated filter), which is
+    x : array-like, shape (..., 3)
+        Predicted pose (m, m, rad).
+    cov : array-like, shape (..., 3, 3)
+        Its covariance.
+    z : array-like, shape (..., m, 2)
+        Distance (m) and bearing (rad) to each landmark, NaN where nothing was measured.
+    landmarks : array-like, shape (m, 2) or (..., m, 2)
+        Positions (m).
+    std_range, std_bearing : float
+        Standard deviations of distance (m) and bearing (rad).
+    iterations : int
+        1 is the extended Kalman filter; more linearize again at the corrected pose (iterated filter), which is
         Gauss-Newton on prior and measurement together.
-    wrap : False leaves the bearing innovation as it is, which fails as soon as it crosses +-pi.
+    wrap : bool
+        False leaves the bearing innovation as it is, which fails as soon as it crosses +-pi.
+
+    Returns
+    -------
+    Corrected
+        Innovation and gain over all 2 m numbers stacked; `dof` counts those that were measured.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, numbers that are not finite, a robot that stands on a landmark.
 
     Source: lecture, "Algorithmus fuer erweiterten Kalman-Filter", lines 5 to 8.
     """
@@ -119,18 +167,143 @@ def ekf_update(x, cov, z, landmarks, std_range, std_bearing, iterations=1, wrap=
         H = H.reshape(*H.shape[:-3], -1, 3)
         y, seen = _stacked(z, measurement(x, landmarks), wrap)
         H = np.where(seen[..., None], H, 0.0)
-        R = np.broadcast_to(np.tile(std**2, H.shape[-2] // 2), seen.shape)
-        R = R[..., None] * np.eye(H.shape[-2])
+        R = np.tile(std**2, H.shape[-2] // 2) * np.eye(H.shape[-2])
         S = H @ cov @ _t(H) + R
         K = _t(np.linalg.solve(S, H @ cov))
         x = prior + _apply(K, y - _apply(H, prior - x))
-    return Corrected(x, _symmetric(_after(cov, K, H, R)), y, S, K)
+    return Corrected(x, _symmetric(_after(cov, K, H, R)), y, S, K, seen.sum(-1))
 
 
-def ekf_step(x, cov, u, dt, cov_u, z, landmarks, std_range, std_bearing, model="euler", iterations=1, wrap=True):
-    """One prediction and correction of the landmark filter: a `Corrected`; arguments of `propagate`, `ekf_update`."""
+def ekf_step(
+    x, cov, u, dt, cov_u, z, landmarks, std_range, std_bearing, model="euler", iterations=1, wrap=True, cov_v=None
+):
+    """One prediction and one correction of the landmark filter.
+
+    Parameters
+    ----------
+    x, cov, u, dt, cov_u, model
+        As in `odometry.propagate`.
+    z, landmarks, std_range, std_bearing, iterations, wrap
+        As in `ekf_update`.
+    cov_v : array-like, shape (..., 3, 3), optional
+        Noise of the motion beside the control's.
+
+    Returns
+    -------
+    Corrected
+
+    Source: lecture, "Algorithmus fuer erweiterten Kalman-Filter".
+    """
     x, cov = odometry.propagate(x, cov, u, dt, cov_u, model)
+    if cov_v is not None:
+        cov = cov + as_covariances(cov_v, "cov_v", 3)
     return ekf_update(x, cov, z, landmarks, std_range, std_bearing, iterations, wrap)
+
+
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """Checked arguments of `ekf_localize`; x0 and cov0 once per run, cov_u once per step."""
+
+    u: np.ndarray
+    z: np.ndarray
+    landmarks: np.ndarray
+    x0: np.ndarray
+    cov0: np.ndarray
+    dt: float
+    std_range: float
+    std_bearing: float
+    cov_u: np.ndarray
+    cov_v: np.ndarray
+    model: str
+    wrap: bool
+
+
+def _given(u, z, landmarks, x0, cov0, dt, std_range, std_bearing, cov_u, cov_v, model, wrap):
+    u, landmarks, z = as_points(u, "u", 2), as_shape(landmarks, "landmarks", "m", 2), as_readings(z, "z")
+    if u.ndim not in (2, 3):
+        raise ValueError(f"u must have shape (n, 2) or (n, runs, 2), got {u.shape}")
+    n, m = len(u), len(landmarks)
+    if model not in odometry.MODELS:
+        raise ValueError(f"model must be one of {', '.join(odometry.MODELS)}, got {model!r}")
+    if z.ndim not in (3, 4) or z.shape[0] != n or z.shape[-2:] != (m, 2):
+        raise ValueError(
+            f"z must have shape ({n}, {m}, 2) or ({n}, runs, {m}, 2) for {n} controls and {m} landmarks, got {z.shape}"
+        )
+    if (np.isnan(z[..., 0]) != np.isnan(z[..., 1])).any():
+        raise ValueError("z must be finite, or NaN in both numbers of a landmark that was not seen")
+    runs = z.shape[1:-2]
+    x0, cov0 = as_points(x0, "x0", 3), as_covariances(cov0, "cov0", 3)
+    for name, got in (("u", u.shape[1:-1]), ("x0", x0.shape[:-1]), ("cov0", cov0.shape[:-2])):
+        if got not in ((), runs):
+            raise ValueError(f"{name} must come once for all runs or once per run as z, {runs}, got leading axes {got}")
+    cov_v = np.zeros((3, 3)) if cov_v is None else as_shape(as_covariances(cov_v, "cov_v", 3), "cov_v", 3, 3)
+    return _Given(
+        u, z, landmarks, np.broadcast_to(x0, (*runs, 3)), _symmetric(np.broadcast_to(cov0, (*runs, 3, 3))),
+        as_positive_number(dt, "dt"), as_positive_number(std_range, "std_range"),
+        as_positive_number(std_bearing, "std_bearing"),
+        _control_covariances(np.zeros((2, 2)) if cov_u is None else cov_u, n), _symmetric(cov_v), model, bool(wrap),
+    )  # fmt: skip
+
+
+def ekf_localize(
+    u, z, landmarks, x0, cov0, dt, std_range, std_bearing, cov_u=None, cov_v=None, model="euler", wrap=True
+):
+    """The landmark filter along a whole drive, one robot or many at once: `ekf_step` after `ekf_step`.
+
+    Parameters
+    ----------
+    u : array-like, shape (n, 2) or (n, runs, 2)
+        Commands (m/s, rad/s); step k moves with u[k] and then corrects with z[k].
+    z : array-like, shape (n, m, 2) or (n, runs, m, 2)
+        Distance (m) and bearing (rad) to each landmark, NaN in both where it was not seen.
+    landmarks : array-like, shape (m, 2)
+        Positions (m).
+    x0 : array-like, shape (3,) or (runs, 3)
+        Pose before the first step (m, m, rad).
+    cov0 : array-like, shape (3, 3) or (runs, 3, 3)
+        Its covariance.
+    dt : float
+        Time step (s).
+    std_range, std_bearing : float
+        Standard deviations of distance (m) and bearing (rad).
+    cov_u : array-like, shape (2, 2) or (n, 2, 2), optional
+        Covariance of the control; none by default.
+    cov_v : array-like, shape (3, 3), optional
+        Noise of the motion per step beside the control's.
+    model : {"euler", "midpoint", "arc"}
+        As in `odometry.step`.
+    wrap : bool
+        As in `ekf_update`.
+
+    Returns
+    -------
+    Localization
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, numbers that are not finite, a landmark seen by half, a robot that stands on a landmark.
+
+    See Also
+    --------
+    labkit.fast.ekf.ekf_localize : the same, many times as fast.
+
+    Source: lecture, "Algorithmus fuer erweiterten Kalman-Filter".
+    """
+    given = _given(u, z, landmarks, x0, cov0, dt, std_range, std_bearing, cov_u, cov_v, model, wrap)
+    x, cov, steps = given.x0, given.cov0, []
+    sensor = {"landmarks": given.landmarks, "std_range": given.std_range, "std_bearing": given.std_bearing}
+    for u, cov_u, z in zip(given.u, given.cov_u, given.z):
+        step = ekf_step(x, cov, u, given.dt, cov_u, z, **sensor, model=model, wrap=wrap, cov_v=given.cov_v)
+        x, cov = step.x, step.cov
+        steps.append(step)
+    return Localization(*(_column(steps, name, given.x0.shape[:-1]) for name in ("x", "cov", "nis", "dof")))
+
+
+def _column(steps, name, runs):
+    """One figure of all steps, the steps along the first axis; of the right shape also without any step."""
+    shape = {"x": (3,), "cov": (3, 3), "nis": (), "dof": ()}[name]
+    return np.array([getattr(step, name) for step in steps]).reshape(len(steps), *runs, *shape)
 
 
 # --- the unscented filter ----------------------------------------------------
@@ -147,9 +320,23 @@ def _sigma_points(x, cov):
 
 
 def unscented_predict(x, cov, u, dt, cov_u, model="euler"):
-    """Pose and covariance after one step from 11 points of pose and control driven through the model itself.
+    """Pose and covariance after one step, from 11 points of pose and control driven through the model itself.
 
-    The arguments are those of `odometry.propagate`; no Jacobian is needed. cov and cov_u must be positive definite.
+    No Jacobian is needed; cov and cov_u must be positive definite.
+
+    Parameters
+    ----------
+    x, cov, u, dt, cov_u, model
+        As in `odometry.propagate`.
+
+    Returns
+    -------
+    x, cov : arrays, shapes (..., 3) and (..., 3, 3)
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, numbers that are not finite, a covariance that is not positive definite.
     """
     x, cov = as_points(x, "x", 3), as_covariances(cov, "cov", 3)
     shape = x.shape[:-1]
@@ -164,7 +351,22 @@ def unscented_predict(x, cov, u, dt, cov_u, model="euler"):
 
 
 def unscented_update(x, cov, z, landmarks, std_range, std_bearing):
-    """Correct a pose by the unscented transform: a `Corrected`; arguments as `ekf_update`."""
+    """Correct a pose by sending seven points through the measurement itself (unscented transform).
+
+    Parameters
+    ----------
+    x, cov, z, landmarks, std_range, std_bearing
+        As in `ekf_update`; cov must be positive definite.
+
+    Returns
+    -------
+    Corrected
+
+    Raises
+    ------
+    ValueError
+        As `ekf_update`, and where cov is not positive definite.
+    """
     x, cov = as_points(x, "x", 3), as_covariances(cov, "cov", 3)
     std_range, std_bearing = as_positive_number(std_range, "std_range"), as_positive_number(std_bearing, "std_bearing")
     points, weights = _sigma_points(x, cov)
@@ -181,17 +383,39 @@ def unscented_update(x, cov, z, landmarks, std_range, std_bearing):
     var = np.tile([std_range**2, std_bearing**2], h.shape[-1] // 2)
     S = _t(weights[:, None] * spread) @ spread + np.diag(var)
     K = _t(np.linalg.solve(S, _t(weights[:, None] * spread) @ (points - x[..., None, :])))
-    return Corrected(x + _apply(K, y), _symmetric(cov - K @ S @ _t(K)), y, S, K)
+    return Corrected(x + _apply(K, y), _symmetric(cov - K @ S @ _t(K)), y, S, K, seen.sum(-1))
 
 
-# --- association and whole drives --------------------------------------------
+# --- association and simulated drives ----------------------------------------
 
 
 def associate(x, cov, z, landmarks, std_range, std_bearing, by="mahalanobis", probability=0.99):
-    """Index of the landmark each measurement belongs to, (k,) int, -1 where none passes the gate; x (3,), z (k, 2).
+    """Index of the landmark each measurement belongs to; each is matched on its own.
 
-    by : "mahalanobis" compares innovations in units of their covariance; "nearest" compares in meters where the
-        measured points would lie, and then gates alike. Each measurement is matched on its own.
+    Parameters
+    ----------
+    x, cov : array-like, shapes (3,) and (3, 3)
+        Pose (m, m, rad) and its covariance.
+    z : array-like, shape (k, 2)
+        Distances (m) and bearings (rad) to unknown landmarks.
+    landmarks : array-like, shape (m, 2)
+        Positions (m).
+    std_range, std_bearing : float
+        Standard deviations of distance (m) and bearing (rad).
+    by : {"mahalanobis", "nearest"}
+        Compare innovations in units of their covariance, or in meters where the measured points would lie.
+    probability : float
+        Share of honest measurements that pass the gate: chi-square with two degrees of freedom.
+
+    Returns
+    -------
+    index : array of int, shape (k,)
+        -1 where none passes the gate.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, no landmark, a pose on a landmark.
     """
     x, z, landmarks = as_shape(x, "x", 3), as_shape(z, "z", "k", 2), as_shape(landmarks, "landmarks", "m", 2)
     std_range, std_bearing = as_positive_number(std_range, "std_range"), as_positive_number(std_bearing, "std_bearing")
@@ -214,10 +438,38 @@ def associate(x, cov, z, landmarks, std_range, std_bearing, by="mahalanobis", pr
 
 
 def simulate_drive(x0, controls, dt, cov_u, landmarks, std_range, std_bearing, rng, runs, model="euler", reach=np.inf):
-    """A `Drive` of `runs` robots whose controls and measurements carry Gaussian noise.
+    """Drives of many robots on the same commands, their controls and measurements with Gaussian noise.
 
-    x0 : (3,) or (runs, 3) true start.    controls : (n, 2) commands.    cov_u : (2, 2) or (n, 2, 2).
-    reach : landmarks farther away (m) are not seen and measure NaN.
+    Parameters
+    ----------
+    x0 : array-like, shape (3,) or (runs, 3)
+        True start (m, m, rad).
+    controls : array-like, shape (n, 2)
+        Commands (m/s, rad/s).
+    dt : float
+        Time step (s).
+    cov_u : array-like, shape (2, 2) or (n, 2, 2)
+        Covariance of the control, positive definite.
+    landmarks : array-like, shape (m, 2)
+        Positions (m).
+    std_range, std_bearing : float
+        Standard deviations of distance (m) and bearing (rad).
+    rng : numpy.random.Generator
+    runs : int
+        Number of robots.
+    model : {"euler", "midpoint", "arc"}
+        As in `odometry.step`.
+    reach : float
+        Landmarks farther away (m) are not seen and measure NaN.
+
+    Returns
+    -------
+    SimulatedRuns
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, a covariance that is not positive definite.
     """
     controls, runs = as_shape(controls, "controls", "n", 2), as_count(runs, "runs")
     std_range, std_bearing = as_positive_number(std_range, "std_range"), as_positive_number(std_bearing, "std_bearing")

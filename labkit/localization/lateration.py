@@ -62,7 +62,7 @@ def _landmarks(landmarks, distances):
         raise ValueError(f"landmarks must have shape (n, 2) or (n, 3), got {landmarks.shape}")
     distances = as_positive(distances, "distances")
     if distances.ndim < 1 or distances.shape[-1] != len(landmarks):
-        raise ValueError(f"distances must have shape (..., {len(landmarks)}), one a landmark, got {distances.shape}")
+        raise ValueError(f"distances must have shape (..., {len(landmarks)}), one per landmark, got {distances.shape}")
     needed = landmarks.shape[1]
     if len(landmarks) < needed:
         raise ValueError(f"a position in {needed}D needs at least {needed} landmarks, got {len(landmarks)}")
@@ -202,7 +202,7 @@ def laterate(landmarks, distances, start=None, cost="distance", std=1.0, steps=1
 
 
 def _minimize(landmarks, distances, x, cost, steps):
-    """Levenberg-Marquardt with one damping a run; returns positions, iterations, converged."""
+    """Levenberg-Marquardt with one damping per run; returns positions, iterations, converged."""
     eye, size = np.eye(x.shape[-1]), np.abs(landmarks - landmarks.mean(0)).max() + distances.max(initial=0.0)
     damping = np.full(x.shape[:-1], 1e-3)
     e, J = _errors(landmarks, distances, x, cost)

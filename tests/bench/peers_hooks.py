@@ -6,7 +6,7 @@ import numpy as np
 from labkit.calibration import ax_xb, pivot
 from labkit.calibration import hand_eye as sphere
 from labkit.fast.ekf import ekf_localize
-from labkit.fast.kalman import filter_series
+from labkit.fast.kalman import filter_steps
 from labkit.geometry import chaining, frames
 
 POSE_NOISE = (np.deg2rad(0.1), 0.2)  # rad and mm, as the benchmark draws them
@@ -32,7 +32,7 @@ def robust_pivot(T):
 
 
 def kalman(F, Q, H, R, x0, P0, z):
-    return filter_series(z, F, H, Q, R, x0, P0)
+    return filter_steps(z, F, H, R, x0, P0, cov_v=Q).x
 
 
 def ekf(u, z, marks, x0, P0, Q, R):

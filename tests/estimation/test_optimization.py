@@ -64,14 +64,12 @@ def test_wider_wells_have_the_right_derivatives_and_lead_to_the_global_minimum()
         np.testing.assert_allclose(numeric, wells.gradient(x, 3.0), atol=1e-6)
         numeric = numeric_jacobian(lambda p: wells.gradient(p, 3.0), x)
         np.testing.assert_allclose(numeric, wells.hessian(x, 3.0), atol=1e-6)
+        x = 10 * x
         for width in (4.0, 2.0, 1.0):
-            x = opt.trust_region(
-                lambda p, c=width: wells.value(p, c),
-                lambda p, c=width: wells.gradient(p, c),
-                10 * x if width == 4.0 else x,
-                hessian=lambda p, c=width: wells.hessian(p, c),
-            ).solution
+            x = wells.run("trust_region", x, width=width).solution
         assert wells.which(x) == 1
+    with pytest.raises(ValueError, match="residual of width 1"):
+        wells.run("gauss_newton", [0.0, 0.0], width=3.0)
 
 
 def test_printed_hessian_is_wrong_on_the_diagonal_only():

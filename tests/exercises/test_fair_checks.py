@@ -102,9 +102,9 @@ def notebook_names(module):
     return known | {"np": np, "odometry": odometry, "drive": lecture.circle_drive(), "prior_cov": prior_cov}
 
 
-@pytest.mark.parametrize("name", ["end_pose", "fused", "corrected"])
+@pytest.mark.parametrize("name", ["end_pose", "end_cov", "fused", "corrected"])
 def test_the_last_hint_gives_the_value_as_it_stands(name):
-    module = ch07 if name == "end_pose" else ch08
+    module = ch07 if name.startswith("end") else ch08
     value, space = item(module, name), notebook_names(module)
     assert isinstance(value, Value)
     exec("\n".join(lines_of(value)), space)

@@ -130,7 +130,7 @@ def test_collinear_landmarks_leave_the_mirror_image():
     "call, words",
     [
         (lambda: lateration.laterate(TWO[:1], [1.0]), "at least 2 landmarks"),
-        (lambda: lateration.laterate(TWO, [1.0, 2.0, 3.0]), "one a landmark"),
+        (lambda: lateration.laterate(TWO, [1.0, 2.0, 3.0]), "one per landmark"),
         (lambda: lateration.laterate(TWO, [1.0, -2.0]), "positive"),
         (lambda: lateration.laterate(FOUR, np.ones(4), cost="cubes"), "cost must be one of"),
         (lambda: lateration.newton_lateration(FOUR, np.ones(4), [0, 0]), "use laterate"),

@@ -510,7 +510,7 @@ CHAPTER = Chapter(
             hints=(
                 "Replace r(x + h) by r + J h and minimize its length.",
                 "That is linear least squares with matrix J and right-hand side −r; its normal equations are JᵀJ h = −Jᵀr.",
-                "`return -np.linalg.lstsq(J, r)[0]`, or solve the normal equations.",
+                "`return -np.linalg.lstsq(J, r)[0]`. The normal equations are right as well; they lose twice the digits, as in chapter 3.",
             ),
             mistakes=[
                 Mistake(

@@ -1144,8 +1144,8 @@ CHAPTER = Chapter(
             metric=metrics.PlanarPoses(1e-6),
             hints=(
                 "Start at (0, 0, 0) and take all 140 steps with the simplified model.",
-                "Loop over drive.controls with your `propagate`; the covariance starts as zeros.",
-                "Two lines: `end_pose, end_cov = np.zeros(3), np.zeros((3, 3))`, `for u in drive.controls: end_pose, end_cov = propagate(end_pose, end_cov, u, drive.dt, control_covariance(u, drive.dt, **drive.noise))`",
+                "Loop over drive.controls with your `step_euler`: the pose after one step is the start of the next.",
+                "Two lines: `end_pose = np.zeros(3)`, `for u in drive.controls: end_pose = step_euler(end_pose, u, drive.dt)`",
             ),
             mistakes=[
                 Mistake(
@@ -1186,9 +1186,9 @@ CHAPTER = Chapter(
             unit="m, rad",
             metric=metrics.Numbers(1e-6),
             hints=(
-                "It comes out of the same loop as the pose.",
-                "The constants are in radians already; the covariance starts as zeros.",
-                "`covariance = end_cov`, with the end_cov that the loop of the cell before has left.",
+                "The same loop as for the pose, with `propagate` in place of the step: it hands on pose and covariance.",
+                "The control's covariance is `control_covariance(u, drive.dt, **drive.noise)`; the pose's starts as zeros.",
+                "Two lines: `x, end_cov = np.zeros(3), np.zeros((3, 3))`, `for u in drive.controls: x, end_cov = propagate(x, end_cov, u, drive.dt, control_covariance(u, drive.dt, **drive.noise))`",
             ),
             mistakes=[
                 Mistake(lambda: _circle(k_drift=0.0)[1], "The drift is missing from the control's covariance."),

@@ -6,7 +6,6 @@ import numpy as np
 
 from ...documents.lecture import printed as lecture
 from ...estimation import gaussian
-from ...geometry import planar
 from ...localization import lateration, odometry
 from ...stage import Choice, Handle, Play, Slider, Stage, style
 from ...stage.marks import Spare, strayed
@@ -330,8 +329,8 @@ def compute_banana(state):
         error = ends - poses[-1]
         share = gaussian.share_inside(error, np.zeros(3), cov)
     else:
-        outline, center, spread = gaussian.bent_region(poses[-1], ends)
-        share = gaussian.share_inside(planar.log_pose(planar.relative_pose(poses[-1], ends)), center, spread)
+        bent = gaussian.bent_region(poses[-1], ends)
+        outline, share = bent.outline, gaussian.share_inside(bent.twists, bent.mean, bent.cov)
     lag = float(np.linalg.norm((ends.mean(0) - poses[-1])[:2]))
     return {"poses": poses, "ends": ends, "outline": outline, "share": share, "lag": lag, "region": state["region"]}
 

@@ -10,20 +10,35 @@ import numpy as np
 
 from ...checks import as_count, as_covariances, as_number, as_shape
 from ...estimation.kalman import predict, vehicle_model
-from ...fast.ekf import ekf_localize
 from ...localization import odometry
 from ...localization.drives import Drive, follow, random_drive
-from ...localization.ekf import simulate_drive
+from ...localization.ekf import ekf_localize, simulate_drive
 from ...localization.maps import OccupancyGrid
 from ...localization.mcl import MonteCarloLocalizer, localizer, record
-from ...localization.particles import CONTROL_NOISE, sample_motion
+from ...localization.particles import sample_motion
 from ...localization.sensors import SensorSuite, see_landmarks, weigh_landmarks
 from ...tables import DATA, read_table
 from . import printed as lecture
 
 
 def predict_vehicle(steps, dt, var_x0, var_v0, var_a, acceleration=1.0):
-    """State (2,) and covariance (2, 2) of the lecture's vehicle after `steps` predictions from rest, none corrected."""
+    """State and covariance of the lecture's vehicle after predictions from rest, none of them corrected.
+
+    Parameters
+    ----------
+    steps : int
+        Number of predictions.
+    dt : float
+        Time step (s).
+    var_x0, var_v0, var_a : float
+        Variances of the first position (m^2), the first velocity (m^2/s^2) and the acceleration (m^2/s^4).
+    acceleration : float
+        The commanded one (m/s^2).
+
+    Returns
+    -------
+    x, cov : arrays, shapes (2,) and (2, 2)
+    """
     A, B, _ = vehicle_model(dt)
     names = ("var_x0", "var_v0", "var_a", "acceleration")
     var_x0, var_v0, var_a, acceleration = map(as_number, (var_x0, var_v0, var_a, acceleration), names)
@@ -34,10 +49,19 @@ def predict_vehicle(steps, dt, var_x0, var_v0, var_a, acceleration=1.0):
 
 
 def reconstruct_vehicle(cov, steps, dt):
-    """Variances (var_x0, var_v0, var_a) with which `steps` uncorrected predictions lead to the covariance, (3,).
+    """Variances (var_x0, var_v0, var_a) with which so many uncorrected predictions lead to a covariance, (3,).
 
     The covariance is linear in the three and has three entries, so for every number of steps and every time step there
     is exactly one answer. It is possible only where none of the three is negative; steps and dt themselves remain free.
+
+    Parameters
+    ----------
+    cov : array-like, shape (2, 2)
+        Covariance of position and velocity that is to be explained.
+    steps : int
+        Number of predictions, at least 2.
+    dt : float
+        Time step (s).
     """
     cov, steps = as_shape(as_covariances(cov, "cov", 2), "cov", 2, 2), as_count(steps, "steps", at_least=2)
     basis = [predict_vehicle(steps, dt, *row)[1] for row in np.eye(3)]
@@ -45,11 +69,13 @@ def reconstruct_vehicle(cov, steps, dt):
     return np.linalg.solve(entries, [cov[0, 0], cov[0, 1], cov[1, 1]])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scenario:
-    """A drive past landmarks with all its settings; `simulate` drives it, `localize` filters what was measured.
+    """A drive past landmarks with all its settings.
 
-    controls (n, 2), dt (s), cov_u (2, 2), landmarks (m, 2), std_range (m), std_bearing (rad), x0 (3,), cov0 (3, 3).
+    controls : (n, 2) commands (m/s, rad/s).    dt : time step (s).    cov_u : (2, 2) noise of the control.
+    landmarks : (m, 2) in m.    std_range (m), std_bearing (rad) : noise of the sensor.
+    x0, cov0 : (3,) and (3, 3), what is known of the start (m, m, rad).
     """
 
     controls: np.ndarray
@@ -62,21 +88,30 @@ class Scenario:
     cov0: np.ndarray
 
     def simulate(self, rng, runs, **more):
-        """A `Drive` of many robots, each with its own start drawn from x0 and cov0; options as `simulate_drive`."""
+        """`SimulatedRuns`, each with its own start drawn from x0 and cov0; options as `simulate_drive`."""
         start = self.x0 + rng.standard_normal((runs, 3)) @ np.linalg.cholesky(self.cov0).T
         noise = (self.cov_u, self.landmarks, self.std_range, self.std_bearing)
         return simulate_drive(start, self.controls, self.dt, *noise, rng, runs, **more)
 
     def localize(self, drive, **changes):
-        """The `Localization` of a drive by a filter that believes the course, but for the `changes`."""
+        """`Localization` of what `simulate` drove, by a filter that believes the scenario but for the `changes`."""
         believed = {"cov_u": self.cov_u, "std_range": self.std_range, "std_bearing": self.std_bearing} | changes
         return ekf_localize(drive.controls, drive.z, self.landmarks, self.x0, self.cov0, self.dt, **believed)
 
 
 def circle_course(marks=4, steps=300):
-    """The lecture's circle of chapter 7 past one to four landmarks, a `Course`; sensor and start are ours.
+    """The lecture's circle of chapter 7 past one to four landmarks; sensor and start are ours.
 
-    The lecture shows such a drive ("Beispielfahrt mit einer Landmarke") without its numbers.
+    Parameters
+    ----------
+    marks, steps : int
+        Number of landmarks, of time steps.
+
+    Returns
+    -------
+    Scenario
+
+    Source: lecture, "Beispielfahrt mit einer Landmarke", which shows such a drive without its numbers.
     """
     marks, steps, circle = as_count(marks, "marks"), as_count(steps, "steps"), lecture.circle_drive()
     cov_u = odometry.control_covariance(circle.controls[0], circle.dt, **circle.noise)
@@ -86,13 +121,12 @@ def circle_course(marks=4, steps=300):
     return Scenario(controls, circle.dt, cov_u, landmarks, 0.1, np.radians(1), np.zeros(3), cov0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Building:
-    """One small building in the four forms of the lecture.
+    """One small building in the four forms of the lecture, in m.
 
-    lines: (n, 4) walls. points: (m, 2) obstacle points. nodes: {name: (x, y)}, edges: pairs of names. grid:
-    OccupancyGrid.
-    landmarks: (k, 2).
+    lines : (n, 4) walls.    points : (m, 2) obstacle points.    nodes : {name: (x, y)}.    edges : pairs of names.
+    grid : OccupancyGrid.    landmarks : (k, 2).
     """
 
     lines: np.ndarray
@@ -121,8 +155,9 @@ def load_building():
 
 
 def global_example(building, n_particles=5000, n_steps=12, seed=5):
-    """The lecture's twelve pictures, "Beispiel (1)" to "(12)", on the workbook's building: global localization,
-    simulated.
+    """Global localization on the workbook's building, simulated: what the lecture shows in twelve pictures.
+
+    Source: lecture, "Beispiel (1)" to "(12)".
     """
     rng, suite = np.random.default_rng(seed), SensorSuite(building)
     drive = random_drive(building, n_steps, rng, start="hall")
@@ -130,12 +165,12 @@ def global_example(building, n_particles=5000, n_steps=12, seed=5):
     return record(filter_, drive, lambda pose, k: suite.measure("likelihood field", pose, rng), rng)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SoccerRun:
     """The lecture's soccer example, simulated.
 
-    landmarks (6, 2); truth (n + 1, 3); odometry (n + 1, 3): the path that the controls alone give; estimates (n, 3);
-    seen (n,): the landmark recognized at each step, or -1; pictures: one `Picture` a step.
+    landmarks : (6, 2).    truth : (n + 1, 3).    odometry : (n + 1, 3) the path that the controls alone give.
+    estimates : (n, 3).    seen : (n,) the landmark recognized at each step, or -1.    pictures : a `Picture` per step.
     """
 
     landmarks: np.ndarray
@@ -147,12 +182,22 @@ class SoccerRun:
 
 
 def soccer_run(n_particles=1000, n_steps=120, seed=5, use=("range", "bearing")):
-    """A robot with a camera drives over a soccer field and recognizes one of six landmarks at a time; the start is
-    known.
+    """A robot with a camera drives over a soccer field and recognizes one of six landmarks at a time.
 
-    The camera looks 28 deg to either side and sees the nearest landmark within. Odometry has four times the lecture's
-    noise, as legs slip more than wheels. use: which of "range" and "bearing" the filter may use; none leaves it to
-    odometry. Source: lecture, "Beispiel (1)" and "(2)" behind the landmark model; its data were never published.
+    The start is known. The camera looks 28 deg to either side and sees the nearest landmark within. Odometry has four
+    times the variance of the lecture's example, as legs slip more than wheels.
+
+    Parameters
+    ----------
+    n_particles, n_steps, seed : int
+    use : tuple of str
+        Which of "range" and "bearing" the filter may use; none leaves it to odometry.
+
+    Returns
+    -------
+    SoccerRun
+
+    Source: lecture, "Beispiel (1)" and "(2)" behind the landmark model; its data were never published.
     """
     rng = np.random.default_rng(seed)
     marks = read_table("monte_carlo/soccer_landmarks.csv")
@@ -161,7 +206,7 @@ def soccer_run(n_particles=1000, n_steps=120, seed=5, use=("range", "bearing")):
     dt, start = 0.4, np.array([0.8, 2.1, -math.pi / 2])
     std_range, std_bearing = 0.15, 0.08
     controls = follow(start, corners, n_steps, dt, speed=0.25, turn_rate=0.6)
-    noise = {key: 4 * value for key, value in CONTROL_NOISE.items()}
+    noise = {key: 4 * value for key, value in lecture.example_noise().items()}
     noisy = odometry.noisy_controls(controls, dt, **noise, rng=rng, runs=1)[:, 0]
     drive = Drive(odometry.drive(start, controls, dt), noisy, dt)
 

@@ -7,7 +7,7 @@ bei der Kalibrierung von Sensor-Roboter-Systemen", HAW Hamburg 2019, section 6.2
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from scipy.optimize import minimize
@@ -109,14 +109,21 @@ def _which(x, tol=1e-4):
     return np.where(near.any(-1), near.argmax(-1), 3)
 
 
-def run(method, start, **options):
-    """Trace of one of `METHODS` on the two wells, from start, shape (2,)."""
+def run(method, start, width=1.0, **options):
+    """Trace of one of `METHODS` on the two wells, from start, shape (2,).
+
+    Newton and the trust region use gradient and Hessian, also of wells of another `width`. Raises ValueError where
+    Gauss-Newton or Levenberg-Marquardt, which use the residual, are asked for another width: it is that of width 1.
+    """
+    f, g, H = (partial(of, width=width) for of in (value, gradient, hessian))
     if method in ("gauss_newton", "levenberg_marquardt"):
+        if width != 1.0:
+            raise ValueError(f"{method} uses the residual of width 1, got width {width:g}")
         return getattr(opt, method)(residual, jacobian, start, **options)
     if method == "newton":
-        return opt.newton(value, gradient, hessian, start, **options)
+        return opt.newton(f, g, H, start, **options)
     if method == "trust_region":
-        return opt.trust_region(value, gradient, start, hessian=hessian, **options)
+        return opt.trust_region(f, g, start, hessian=H, **options)
     raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
 
 

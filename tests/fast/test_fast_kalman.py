@@ -1,0 +1,87 @@
+"""The fast linear filter equals the readable one on series long and short, well and badly scaled; it refuses alike."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from labkit.estimation import kalman
+from labkit.fast.kalman import filter_steps
+
+Z = np.random.default_rng(3).normal(size=(400, 1)).cumsum(0)
+
+
+def random_covariance(rng, n):
+    M = rng.normal(size=(n, n))
+    return M @ M.T + 0.1 * np.eye(n)
+
+
+def system(n, seed=0):
+    """A chain of n integrators of which the first is measured: A, C, x0, cov0, cov_v."""
+    rng = np.random.default_rng(seed)
+    A = np.eye(n) + 0.1 * np.eye(n, k=1)
+    return A, np.eye(n)[:1], rng.normal(size=n), random_covariance(rng, n), 0.01 * random_covariance(rng, n)
+
+
+def assert_equal(*given, rtol=1e-9, **more):
+    """Every array of both results, compared to its largest entry."""
+    found, expected = filter_steps(*given, **more), kalman.filter_steps(*given, **more)
+    for field in fields(kalman.Corrected):
+        a, b = getattr(found, field.name), getattr(expected, field.name)
+        assert a.shape == b.shape and a.dtype == b.dtype
+        np.testing.assert_allclose(a, b, rtol=0, atol=rtol * np.abs(b).max(initial=1e-300), err_msg=field.name)
+    return found
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+def test_equals_the_readable_filter(n):
+    A, C, x0, cov0, cov_v = system(n)
+    for steps in (400, 3, 2, 1, 0):
+        assert_equal(Z[:steps], A, C, [[0.04]], x0, cov0, cov_v=cov_v)
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_equals_it_where_little_or_nothing_is_certain(n):
+    A, C, x0, cov0, cov_v = system(n)
+    assert_equal(Z, A, C, [[0.04]], x0, cov0)  # no noise of the system: the gain never settles
+    assert_equal(Z, A, C, [[0.04]], x0, 0 * cov0, cov_v=cov_v)  # the start is known
+    assert_equal(Z, A, C, [[0.04]], x0, 0 * cov0)  # all is known: nothing is corrected
+    assert_equal(Z, A, C, [[1e-3]], x0, 1e6 * cov0, cov_v=cov_v, rtol=1e-8)  # a poor start, a precise sensor
+    assert_equal(Z, A, C, [[0.0]], x0, cov0, cov_v=cov_v)  # a perfect sensor
+    unseen = assert_equal(Z, np.eye(n), C, [[0.04]], x0, np.eye(n), cov_v=0.1 * np.eye(n))
+    np.testing.assert_allclose(unseen.cov[-1, -1, -1], 1 + 0.1 * len(Z))  # what is not seen grows, settled gain or not
+
+
+def test_equals_it_on_single_precision_and_whole_numbers():
+    A, C, x0, cov0, cov_v = (part.astype(np.float32) for part in system(2))
+    found = assert_equal(Z.astype(np.float32), A, C, np.float32([[0.04]]), x0, cov0, cov_v=cov_v)
+    assert found.x.dtype == np.float64
+    assert_equal(np.arange(50)[:, None], [[1, 1], [0, 1]], [[1, 0]], [[1]], [0, 0], np.eye(2, dtype=int), cov_v=cov_v)
+
+
+def test_hands_over_what_it_does_not_tune():
+    A, C, x0, cov0, cov_v = system(2)
+    gaps = np.where(np.arange(400)[:, None] % 7, Z, np.nan)
+    assert assert_equal(gaps, A, C, [[0.04]], x0, cov0, cov_v=cov_v).dof.sum() == 400 - 58
+    assert_equal(Z, A, C, [[0.04]], x0, cov0, B=[[0.0], [0.1]], u=[2.0], cov_u=[[0.3]])
+    assert_equal(np.hstack([Z, Z]), A, np.eye(2), 0.04 * np.eye(2), x0, cov0, cov_v=cov_v)
+
+
+@pytest.mark.parametrize(
+    "z, C, cov_z, x0",
+    [
+        ([1.0], [[1.0, 0.0]], [[1.0]], [0.0, 0.0]),
+        ([[np.inf]], [[1.0, 0.0]], [[1.0]], [0.0, 0.0]),
+        ([[1.0]], [[1.0]], [[1.0]], [0.0, 0.0]),
+        ([[1.0]], [[1.0, 0.0]], [[-1.0]], [0.0, 0.0]),
+        ([[1.0]], [[1.0, 0.0]], [[1.0]], [0.0, np.nan]),
+        ([[1.0]], [[0.0, 0.0]], [[0.0]], [0.0, 0.0]),
+    ],
+)
+def test_refuses_in_the_same_words(z, C, cov_z, x0):
+    said = []
+    for filter_ in (kalman.filter_steps, filter_steps):
+        with pytest.raises(ValueError) as refusal:
+            filter_(z, np.eye(2), C, cov_z, x0, np.eye(2))
+        said.append(str(refusal.value))
+    assert said[0] == said[1]
