@@ -1,7 +1,6 @@
 """Normal distributions: noise that repeats, the ellipse that holds a stated share, and who lies in it."""
 
 import functools
-
 from dataclasses import dataclass
 
 import numpy as np
