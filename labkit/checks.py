@@ -19,6 +19,14 @@ def shown(value, form="g"):
     text = format(float(array), form)
     return text.lstrip("-") if float(text) == 0 else text
 
+def shown(value, form="g"):
+    """A number, or a vector as "(x, y, z)", for a sentence; what rounds to zero has no sign."""
+    array = np.asarray(value, dtype=float)
+    if array.ndim:
+        return f"({', '.join(shown(entry, form) for entry in array)})"
+    text = format(float(array), form)
+    return text.lstrip("-") if float(text) == 0 else text
+
 
 def as_finite(value, name):
     """`value` as an array of finite floats; refuses what is no number, NaN and infinities."""

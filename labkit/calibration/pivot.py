@@ -4,13 +4,13 @@ The tool frame F moves, T_WF = (R_i, p_i); the tip sits at `tip` in F and always
 
     R_i tip + p_i = pivot,    stacked:  [R_i  -I] [tip; pivot] = -p_i
 
-The pivot is eliminated by taking means: with D_i = R_i - mean R and d_i = p_i - mean p the tip solves D_i tip = -d_i,
-and the singular values of the full system are sqrt(n (1 +- s_k)) with the singular values s_k of mean R. Lengths in
-mm, angles in radians. Source: lab sheet "Kalibrierung", Hochschule Darmstadt 2016, section 3.
+Plain, this is one linear least-squares problem. With known noise each three rows are whitened: orientation noise shakes
+the tip across its lever. Robust, poses that miss by far lose their weight. `labkit.fast.pivot` does the plain case for
+thousands of poses. Lengths in mm, angles in radians. Source: lab sheet "Kalibrierung", Hochschule Darmstadt 2016,
+section 3.
 """
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -23,83 +23,112 @@ from ..checks import (
     as_points,
     as_rotations,
     as_shape,
-    as_transform_rows,
+    as_transforms,
     fit_together,
     shown,
 )
 from ..geometry.lie import exp_so3, skew
+from .result import Result, point_parameters, result_class
+from .robust import median_std, tukey_weights
 
 RANK_TOLERANCE = 1e-6  # smallest singular value beside the largest: below, the data do not say where the tip is
 NOISE_TOLERANCE = 1.5  # times std_rot: twice what orientation noise alone feigns
 TUKEY = 7.0  # residuals beyond seven standard deviations get no weight; 98.2 % efficient on Gaussian noise
-SAMPLES, SCORED = 100, 128  # three-pose candidates for a robust start, and poses that judge them
 TUKEY_SHRINK = 0.9170593779364243  # E[w d^2] / (3 E[w]): what the weights leave of a Gaussian variance
-MEDIAN_CHI3 = 1.5381722544550522  # median length of a vector of three standard normal components
-IDENTITY = np.eye(3)
+SAMPLES, SCORED = 100, 128  # three-pose candidates for a robust start, and poses that judge them
 
 
-@dataclass(frozen=True)
-class PivotCalibration:
+@result_class
+class PivotCalibration(Result):
     """Where the tip is, and how well the poses say so.
 
-    tip: (3,) in the tool frame F. pivot: (3,) in W. residuals: (n, 3), R tip + p - pivot in W. s0: sqrt(r'r / n) as
-    in the lab sheet, a distance in space. std: unbiased standard deviation of one coordinate, sqrt(r'r / (3n - 6)).
-    covariance: (6, 6) of tip and pivot. singular_values: (6,) of the stacked matrix, largest first. weights: (n,), 1
-    unless robust.
+    Attributes
+    ----------
+    tip : array, shape (3,)
+        In the tool frame F (mm).
+    pivot : array, shape (3,)
+        In W (mm).
+    T_WF : array, shape (n, 4, 4)
+        The poses.
+    weights : array, shape (n,)
+        1 unless robust; 0 for a pose that was rejected.
+    noise : tuple or None
+        (std_rot, std_trans) in rad and mm, where they were given.
+    robust : bool
+        Whether the weights follow from the residuals.
+    residuals : array, shape (n, 3)
+        R tip + p - pivot in W (mm).
+    s0 : float
+        sqrt(r'r / n) as in the lab sheet: a distance in space (mm).
+    std : float
+        Unbiased standard deviation of one coordinate, sqrt(r'r / (3n - 6)) (mm).
+    covariance : array, shape (6, 6)
+        Of tip and pivot (mm^2).
+    singular_values : array, shape (6,)
+        Of the stacked matrix of the poses with weight, largest first.
     """
 
     tip: np.ndarray
     pivot: np.ndarray
-    residuals: np.ndarray
-    s0: float
-    std: float
-    covariance: np.ndarray
-    singular_values: np.ndarray
+    T_WF: np.ndarray
     weights: np.ndarray
+    noise: tuple | None = None
+    robust: bool = False
 
-
-class _PlainCalibration(PivotCalibration):
-    """Knows tip and pivot, and works out the rest from its own copy of the poses when first asked: that takes as long
-    again, and a tool that is calibrated on the way does without.
-    """
-
-    def __init__(self, rows, mean, gram, tip, pivot):
-        self.__dict__.update(tip=tip, pivot=pivot, _rows=rows, _mean=mean, _gram=gram)
-
-    @property
-    def _n(self):
-        return self._rows.shape[1]
+    parameters = point_parameters("tip") + point_parameters("pivot")
 
     @cached_property
     def residuals(self):
-        return _moved(self._rows, self.tip, self.pivot).T
+        return pivot_residuals(self.T_WF, self.tip, self.pivot)
 
     @cached_property
     def s0(self):
-        return math.sqrt(np.vdot(self.residuals, self.residuals) / self._n)
+        return math.sqrt(self._sum_of_squares / self.weights.sum())
 
     @cached_property
     def std(self):
-        return math.sqrt(np.vdot(self.residuals, self.residuals) / (3 * self._n - 6))
+        return math.sqrt(self._sum_of_squares / self._freedom / (TUKEY_SHRINK if self.robust else 1.0))
 
     @cached_property
     def covariance(self):
-        both = np.concatenate((IDENTITY, self._mean[:, :3]))  # a shift of the tip moves the pivot along
-        covariance = both @ np.linalg.inv(self._gram[:3, :3]) @ both.T
-        covariance[3:, 3:] += IDENTITY / self._n
-        return self.std**2 * covariance
+        W = _whitening(self.T_WF, self.tip, self.noise)
+        A = (W @ pivot_matrix(self.T_WF).reshape(-1, 3, 6)) * np.sqrt(self.weights)[:, None, None]
+        inverse = _inverse_gram(A.reshape(-1, 6))
+        if self.robust:
+            return self._spread(np.linalg.norm((W @ self.residuals[..., None])[..., 0], axis=1)) * inverse
+        return inverse if self.noise else self.std**2 * inverse
 
     @cached_property
     def singular_values(self):
-        return _singular_values(self._gram, self._n)
+        return np.linalg.svd(np.linalg.qr(pivot_matrix(self.T_WF[self.weights > 0]), mode="r"), compute_uv=False)
 
-    @cached_property
-    def weights(self):
-        return np.ones(self._n)
+    @property
+    def _sum_of_squares(self):
+        return float(self.weights @ (self.residuals**2).sum(1))
+
+    @property
+    def _freedom(self):
+        return max(3 * self.weights.sum() - 6, 1.0)
+
+    def _spread(self, d):
+        """Variance of a whitened residual for an M-estimate: squares of psi = w d over the squared mean slope of it."""
+        w = self.weights
+        slope = (w - 4 / 3 * (1 - np.sqrt(w)) * np.sqrt(w)).sum() / w.sum()
+        return (w * d) @ (w * d) / self._freedom / slope**2
 
 
 def poses_from_euler(xyzabc_deg):
-    """T_WF from x, y, z (mm) and three angles a, b, c (deg) with R = Rx(a) Ry(b) Rz(c); (..., 6) -> (..., 4, 4)."""
+    """Poses from positions and three angles with R = Rx(a) Ry(b) Rz(c).
+
+    Parameters
+    ----------
+    xyzabc_deg : array-like, shape (..., 6)
+        x, y, z (mm) and a, b, c (deg).
+
+    Returns
+    -------
+    T_WF : array, shape (..., 4, 4)
+    """
     xyzabc_deg = as_points(xyzabc_deg, "xyzabc_deg", dim=6)
     abc = np.deg2rad(xyzabc_deg[..., 3:, None]) * np.eye(3)
     T = np.zeros((*xyzabc_deg.shape[:-1], 4, 4))
@@ -108,33 +137,56 @@ def poses_from_euler(xyzabc_deg):
     return T
 
 
-def _poses(T_WF, at_least):
-    """The poses, (n, 4, 4), and their entries as contiguous rows, (16, n)."""
-    T, rows = as_transform_rows(T_WF, "T_WF")
-    if len(T) < at_least:
-        raise ValueError(f"T_WF must hold at least {at_least} poses, got {len(T)}{_few(len(T))}")
-    return T, rows
-
-
-def _few(n):
-    return ": two poses always leave the tip free along the axis of the turn between them" if n == 2 else ""
+# --- the linear system -----------------------------------------------------------------------------------------------
 
 
 def pivot_matrix(T_WF):
-    """The stacked matrix [R_i  -I]; (n, 4, 4) -> (3n, 6). Source: lab sheet, section 3."""
-    T, _ = _poses(T_WF, 1)
+    """The stacked matrix [R_i  -I].
+
+    Parameters
+    ----------
+    T_WF : array-like, shape (n, 4, 4)
+
+    Returns
+    -------
+    A : array, shape (3n, 6)
+
+    Source: lab sheet, section 3.
+    """
+    T = as_poses(T_WF, 1)
     A = np.empty((len(T), 3, 6))
     A[..., :3], A[..., 3:] = T[:, :3, :3], -np.eye(3)
     return A.reshape(-1, 6)
 
 
 def pivot_rhs(T_WF):
-    """The stacked right-hand side -p_i; (n, 4, 4) -> (3n,). Source: lab sheet, section 3."""
-    return -_poses(T_WF, 1)[0][:, :3, 3].ravel()
+    """The stacked right-hand side -p_i.
+
+    Parameters
+    ----------
+    T_WF : array-like, shape (n, 4, 4)
+
+    Returns
+    -------
+    b : array, shape (3n,), mm
+
+    Source: lab sheet, section 3.
+    """
+    return -as_poses(T_WF, 1)[:, :3, 3].ravel()
 
 
 def solve_pivot(A, b):
-    """Least-squares solution x = (tip, pivot) of A x = b, by orthogonal factorization; (3n, 6), (3n,) -> (6,).
+    """Least-squares solution of A x = b, by orthogonal factorization.
+
+    Parameters
+    ----------
+    A : array-like, shape (3n, 6)
+    b : array-like, shape (3n,), mm
+
+    Returns
+    -------
+    x : array, shape (6,), mm
+        Tip, then pivot.
 
     Raises
     ------
@@ -153,11 +205,21 @@ def solve_pivot(A, b):
 
 
 def pivot_residuals(T_WF, tip, pivot):
-    """How far the tip misses the pivot in each pose, R_i tip + p_i - pivot; (n, 4, 4) -> (n, 3).
+    """How far the tip misses the pivot in each pose, R_i tip + p_i - pivot.
+
+    Parameters
+    ----------
+    T_WF : array-like, shape (n, 4, 4)
+    tip, pivot : array-like, shape (3,), mm
+
+    Returns
+    -------
+    residuals : array, shape (n, 3), mm
+        In W.
 
     Source: lab sheet, section 3, equation (2).
     """
-    (T, _), tip, pivot = _poses(T_WF, 1), as_points(tip, "tip"), as_points(pivot, "pivot")
+    T, tip, pivot = as_poses(T_WF, 1), as_points(tip, "tip"), as_points(pivot, "pivot")
     return T[:, :3, :3] @ tip + T[:, :3, 3] - pivot
 
 
@@ -167,52 +229,34 @@ def pivot_covariance(A, residuals):
     Parameters
     ----------
     A : array-like, shape (3n, 6)
-    residuals : array-like, shape (n, 3) or (3n,)
+    residuals : array-like, shape (n, 3) or (3n,), mm
 
     Returns
     -------
-    covariance : array, shape (6, 6)
+    covariance : array, shape (6, 6), mm^2
         With std^2 = r'r / (3n - 6), the unbiased estimate.
+
+    Raises
+    ------
+    ValueError
+        When A has not more than 6 rows, or not rank 6.
     """
     A, r = as_points(A, "A", dim=6), as_finite(residuals, "residuals").ravel()
     if A.ndim != 2 or len(r) != len(A) or len(A) <= 6:
         raise ValueError(f"A must have more than 6 rows and one for each residual, got {A.shape} and {r.shape}")
+    return (r @ r) / (len(r) - 6) * _inverse_gram(A)
+
+
+def _inverse_gram(A):
+    """(A'A)^-1 from the triangular factor of A, which does not square the condition number."""
     R = np.linalg.qr(A, mode="r")
     if np.abs(np.diagonal(R)).min() <= RANK_TOLERANCE * np.abs(np.diagonal(R)).max():
         raise ValueError("A must have rank 6, but a direction of (tip, pivot) is not determined")
     R_inverse = np.linalg.inv(R)
-    return (r @ r) / (len(r) - 6) * R_inverse @ R_inverse.T
+    return R_inverse @ R_inverse.T
 
 
-def robust_weights(distances, scale, cutoff=TUKEY):
-    """Tukey's weights (1 - (d / (cutoff scale))^2)^2, and 0 beyond the cutoff; (...) -> (...).
-
-    Parameters
-    ----------
-    distances : array-like, shape (...)
-        How far each pose misses, never negative (mm).
-    scale : float
-        Standard deviation of one coordinate of the good poses (mm), positive.
-    """
-    d, scale, cutoff = as_finite(distances, "distances"), float(scale), float(cutoff)
-    if not scale > 0 or not cutoff > 0:
-        raise ValueError(f"scale and cutoff must be positive, got {shown(scale)} and {shown(cutoff)}")
-    return _tukey(d / scale, cutoff)
-
-
-def _tukey(d, cutoff=TUKEY):
-    q = 1.0 - (d / cutoff) ** 2
-    return np.maximum(q, 0.0) ** 2
-
-
-def robust_scale(distances):
-    """Standard deviation of a coordinate from the median distance: half the poses may be wrong; (n,) -> float."""
-    return _scale(as_finite(distances, "distances"))
-
-
-def _scale(d):
-    half = len(d) // 2
-    return float(np.partition(d, half)[half]) / MEDIAN_CHI3
+# --- calibration -----------------------------------------------------------------------------------------------------
 
 
 def calibrate_pivot(T_WF, std_rot=None, std_trans=None, robust=False, rng=None):
@@ -242,21 +286,38 @@ def calibrate_pivot(T_WF, std_rot=None, std_trans=None, robust=False, rng=None):
 
     Source: lab sheet, section 3; weights by propagating std_rot through the lever; Tukey's weights as in Huber,
     "Robust Statistics" (1981).
+
+    See Also
+    --------
+    labkit.fast.pivot.calibrate_pivot : the same for thousands of poses.
     """
-    T, rows = _poses(T_WF, 5 if robust else 3)
-    noise = _noise(std_rot, std_trans)
-    tolerance = RANK_TOLERANCE if noise is None else max(RANK_TOLERANCE, NOISE_TOLERANCE * noise[0])
-    mean, gram = _gram(rows)
-    tip = _tip(gram, len(T), tolerance)
+    T, noise = as_poses(T_WF, 5 if robust else 3).copy(), as_noise(std_rot, std_trans)
+    tolerance = rank_tolerance(noise)
+    refuse_free_tip(T, tolerance)
     if robust:
-        return _robust(T, rows, noise, tolerance, np.random.default_rng(0) if rng is None else rng)
-    pivot = mean[:, :3] @ tip + mean[:, 3]
-    if noise is None:
-        return _PlainCalibration(rows, mean, gram, tip, pivot)
-    return _weighted(rows, tip, pivot, _singular_values(gram, len(T)), noise)
+        x, weights = _reweighted(T, noise, np.random.default_rng(0) if rng is None else rng)
+        if (count := np.count_nonzero(weights)) < 4:
+            raise ValueError(f"only {count} of {len(T)} poses agree on a tip; at least 4 must")
+        refuse_free_tip(T[weights > 0], tolerance)
+    else:
+        x, weights = solve_pivot(pivot_matrix(T), pivot_rhs(T)), np.ones(len(T))
+        for _ in range(3 if noise else 0):  # the whitening knows the tip through its lever alone: three rounds settle
+            x = _weighted_solution(T, weights, _whitening(T, x[:3], noise))
+    return PivotCalibration(x[:3], x[3:], T, weights, noise, robust)
 
 
-def _noise(std_rot, std_trans):
+def as_poses(T_WF, at_least):
+    """The poses as an array (n, 4, 4), n >= at_least; anything else is refused."""
+    T = as_transforms(T_WF, "T_WF")
+    if T.ndim != 3:
+        raise ValueError(f"T_WF must have shape (n, 4, 4), got {T.shape}")
+    if len(T) < at_least:
+        why = ": two poses always leave the tip free along the axis of the turn between them" if len(T) == 2 else ""
+        raise ValueError(f"T_WF must hold at least {at_least} poses, got {len(T)}{why}")
+    return T
+
+
+def as_noise(std_rot, std_trans):
     """(std_rot, std_trans) as floats, or None when neither is given."""
     if std_rot is None and std_trans is None:
         return None
@@ -270,193 +331,81 @@ def _noise(std_rot, std_trans):
     return std_rot, std_trans
 
 
-def _gram(rows):
-    """Mean of [R p] over the poses, and [D d]'[D d] of the deviations from it; (16, n) -> (3, 4), (4, 4).
+def rank_tolerance(noise):
+    """How small the smallest singular value may be beside the largest: orientation noise feigns some of its own."""
+    return RANK_TOLERANCE if noise is None else max(RANK_TOLERANCE, NOISE_TOLERANCE * noise[0])
 
-    The last row of the entries is all ones: a product with it sums.
+
+def refuse_free_tip(T, tolerance):
+    """Refuses poses whose stacked matrix has a singular value below the tolerance (relative to the largest).
+
+    The null vector is (v, R_i v): the tip can move along v, fixed in the tool, and the pivot with it.
     """
-    n, entries = rows.shape[1], rows[:12]
-    products = entries @ entries.T
-    mean = (entries @ rows[15]).reshape(3, 4) / n
-    squares = products[:4, :4] + products[4:8, 4:8]
-    squares += products[8:, 8:]
-    squares -= n * (mean.T @ mean)
-    return mean, squares
-
-
-def _moved(rows, tip, pivot):
-    """R tip + p - pivot from the entries of the poses; (16, n) -> (3, n)."""
-    factors = np.zeros((3, 16))
-    factors[0, :3] = factors[1, 4:7] = factors[2, 8:11] = tip
-    factors[0, 3] = factors[1, 7] = factors[2, 11] = 1.0
-    factors[:, 15] = -pivot
-    return factors @ rows
-
-
-def _share(ratio):
-    return "practically nothing" if ratio < 1e-7 else f"{ratio:.1e}"
-
-
-def _tip(gram, n, tolerance):
-    """The plain tip -(D'D)^-1 D'd; refuses a direction that the poses leave free.
-
-    With trace t and determinant of D'D, its least eigenvalue is at least 4 det / t^2, and the stacked matrix has
-    singular values from sqrt(least / 2) to sqrt(2 n): a bound that clears most pose sets without an eigenvalue.
-    """
-    (a, b, c, _), (_, d, e, _), (_, _, f, _), (u, v, w, _) = gram.tolist()  # plain floats: NumPy is slow on so few
-    A, B, C, D, E, F = d * f - e * e, c * e - b * f, b * e - c * d, a * f - c * c, b * c - a * e, a * d - b * b
-    determinant, trace = a * A + b * B + c * C, a + d + f
-    if not determinant > n * tolerance**2 * trace**2:
-        _refuse_free_tip(gram, n, tolerance)
-    return np.array([A * u + B * v + C * w, B * u + D * v + E * w, C * u + E * v + F * w]) / -determinant
-
-
-def _singular_values(gram, n):
-    """Of the stacked matrix, from the deviations of the poses; (6,), largest first."""
-    q = np.maximum(np.linalg.eigvalsh(gram[:3, :3]) / n, 0.0)  # 1 - s^2
-    s = np.sqrt(np.maximum(1.0 - q, 0.0))
-    return np.sqrt(n * np.concatenate([1.0 + s, (q / (1.0 + s))[::-1]]))
-
-
-def _refuse_free_tip(gram, n, tolerance):
-    """Raises when a singular value falls below the tolerance, with the direction that is free."""
-    ratios = _singular_values(gram, n)
-    ratios /= ratios[0]
+    _, values, Vt = np.linalg.svd(np.linalg.qr(pivot_matrix(T), mode="r"))
+    ratios = values / values[0]
     if ratios[5] > tolerance:
         return
-    free = int((ratios <= tolerance).sum())
-    v = np.linalg.eigh(gram[:3, :3])[1][:, 0]
+    free, v = int((ratios <= tolerance).sum()), Vt[5, :3] / np.linalg.norm(Vt[5, :3])
     v *= 1.0 if v[np.abs(v).argmax()] > 0 else -1.0
     where = f"along {shown(v, '.2f')} in the tool frame" if free == 1 else f"in {free} directions"
+    share = "practically nothing" if ratios[5] < 1e-7 else shown(ratios[5], ".1e")
     raise ValueError(
-        f"the poses do not fix the tip, it is free {where}: the smallest singular value is {_share(ratios[5])} of the"
-        f" largest, more than {shown(tolerance, '.1e')} is needed; turn the tool about"
-        f" {'another axis' if free == 1 else 'two axes'}"
+        f"the poses do not fix the tip, it is free {where}: the smallest singular value is {share} of the largest, "
+        f"more than {shown(tolerance, '.1e')} is needed; turn the tool about "
+        f"{'another axis' if free == 1 else 'two axes'}"
     )
 
 
-class _Weighted:
-    """Weighted least squares about a current tip and pivot, on the entries of the poses as contiguous rows (16, n).
+def _whitening(T, tip, noise):
+    """W_i, (n, 3, 3), that turn the residuals in W into three numbers of variance 1 each (without noise, into F).
 
-    With C = std_trans^2 I + std_rot^2 [tip]x[tip]x' (in F) and u = R tip, R C^-1 R' = (I + g u u') / c, where
-    c = std_trans^2 + (std_rot |tip|)^2 and g = (std_rot / std_trans)^2. Without noise figures C = I, and distances
-    are in mm.
+    In F a residual has the covariance std_trans^2 I + std_rot^2 [tip]x [tip]x'.
     """
-
-    def __init__(self, rows, noise):
-        std_rot, self.std_trans = (0.0, 1.0) if noise is None else noise
-        self.variance_rot, self.g = std_rot**2, (std_rot / self.std_trans) ** 2
-        self.rows, self.positions = rows, rows[3:12:4]
-
-    def look(self, tip, pivot):
-        """Residuals (3, n) and Mahalanobis distances (n,) at tip and pivot."""
-        self.tip = tip
-        self.c = self.std_trans**2 + self.variance_rot * (tip @ tip)
-        self.r = _moved(self.rows, tip, pivot)
-        squares = np.einsum("in,in->n", self.r, self.r)
-        if self.g:
-            self.u = self.r - self.positions
-            self.u += pivot[:, None]
-            self.along = np.einsum("in,in->n", self.u, self.r)
-            squares += self.g * self.along**2
-        return self.r, np.sqrt(squares / self.c)
-
-    def step(self, w):
-        """Gauss-Newton step (6,) for weights w (n,), and the normal matrix (6, 6)."""
-        N, rhs, total = np.empty((6, 6)), np.empty(6), w.sum()
-        wr = self.r * w
-        products = (self.rows[:12] @ wr.T).reshape(3, 4, 3)  # component of [R p], of the residual
-        N[:3, :3] = N[3:, 3:] = total * IDENTITY
-        N[3:, :3] = -(self.rows[:12] @ w).reshape(3, 4)[:, :3]
-        rhs[:3], rhs[3:] = np.einsum("iji->j", products)[:3], -wr.sum(1)
-        if self.g:
-            W = IDENTITY + self.g * np.outer(self.tip, self.tip)
-            N[:3, :3] = total * W
-            N[3:, :3] = N[3:, :3] @ W
-            N[3:, 3:] += self.g * ((self.u * w) @ self.u.T)
-            rhs[:3] = W @ rhs[:3]
-            rhs[3:] -= self.g * (self.u @ (w * self.along))
-        N[:3, 3:] = N[3:, :3].T
-        return -np.linalg.solve(N, rhs), N / self.c
+    std_rot, std_trans = (0.0, 1.0) if noise is None else noise
+    C = std_trans**2 * np.eye(3) + std_rot**2 * skew(tip) @ skew(tip).T
+    return np.linalg.inv(np.linalg.cholesky(C)) @ np.swapaxes(T[:, :3, :3], 1, 2)
 
 
-def _weighted(rows, tip, pivot, values, noise):
-    n, problem = rows.shape[1], _Weighted(rows, noise)
-    w = np.ones(n)
-    for _ in range(3):  # the weights know the tip through its length and direction alone: three steps settle them
-        problem.look(tip, pivot)
-        step, N = problem.step(w)
-        tip, pivot = tip + step[:3], pivot + step[3:]
-    r, _ = problem.look(tip, pivot)
-    total = float(np.vdot(r, r))
-    s0, std = math.sqrt(total / n), math.sqrt(total / (3 * n - 6))
-    return PivotCalibration(tip, pivot, r.T, s0, std, np.linalg.inv(N), values, w)
+def _weighted_solution(T, weights, W):
+    """x = (tip, pivot) that minimizes the sum of weights |W_i (R_i tip + p_i - pivot)|^2."""
+    W = W * np.sqrt(weights)[:, None, None]
+    A, b = W @ pivot_matrix(T).reshape(-1, 3, 6), W @ pivot_rhs(T).reshape(-1, 3, 1)
+    return np.linalg.lstsq(A.reshape(-1, 6), b.ravel(), rcond=None)[0]
 
 
-def _robust(T, rows, noise, tolerance, rng):
-    tip, pivot = _best_of_samples(T, rng)
-    problem, n = _Weighted(rows, noise), len(T)
+def _reweighted(T, noise, rng):
+    """Iteratively reweighted least squares from the best sample: x = (tip, pivot) and the weights."""
+    x, weights = _best_of_samples(T, rng), np.zeros(len(T))
     for k in range(30):
-        r, d = problem.look(tip, pivot)
+        W = _whitening(T, x[:3], noise)
+        d = np.linalg.norm((W @ pivot_residuals(T, x[:3], x[3:])[..., None])[..., 0], axis=1)
         if k < 3:  # the scale settles first; afterwards it stays, so that the steps converge
-            scale = max(_scale(d), 1e-12)
-        w = _tukey(d / scale)
-        step, N = problem.step(w)
-        tip, pivot = tip + step[:3], pivot + step[3:]
-        if k >= 3 and np.abs(step).max() < 1e-2 * scale * math.sqrt(problem.c / n):
+            scale = max(median_std(d), 1e-12)
+        last, weights = weights, tukey_weights(d, scale, TUKEY)
+        x = _weighted_solution(T, weights, W)
+        if k >= 3 and np.abs(weights - last).max() < 1e-4:
             break
-    kept = w > 0
-    count = int(np.count_nonzero(kept))
-    if count < 4:
-        raise ValueError(f"only {count} of {n} poses agree on a tip; at least 4 must")
-    _, gram = _gram(rows[:, kept])
-    _refuse_free_tip(gram, count, tolerance)
-    total, left = float(w.sum()), float(np.einsum("in,in,n->", r, r, w))
-    freedom = max(3 * total - 6, 1.0)
-    slope = (w - 4 / 3 * (d / (TUKEY * scale)) ** 2 * np.sqrt(w)).sum() / total
-    spread = np.vdot(w * d, w * d) / freedom / slope**2
-    s0, std = math.sqrt(left / total), math.sqrt(left / freedom / TUKEY_SHRINK)
-    covariance = spread * np.linalg.inv(N)
-    return PivotCalibration(tip, pivot, r.T, s0, std, covariance, _singular_values(gram, count), w)
+    return x, weights
 
 
 def _best_of_samples(T, rng):
-    """Tip and pivot of the three poses whose solution has the least median distance over the poses."""
+    """x = (tip, pivot) of the three poses whose solution has the least median distance over the poses.
+
+    A triple that leaves the tip free gives some point of its line, and loses.
+    """
     n, order = len(T), rng.permutation(len(T))
     triples = [order[: n // 3 * 3].reshape(-1, 3)]
     while sum(map(len, triples)) < SAMPLES:
         triples.append(rng.permutation(n)[: n // 3 * 3].reshape(-1, 3))
-    upper = T[np.concatenate(triples)[:SAMPLES], :3]
-    mean = upper.mean(1)
-    D = (upper - mean[:, None]).reshape(-1, 9, 4)
-    gram = np.swapaxes(D[..., :3], 1, 2) @ D
-    tips = -np.linalg.solve(gram[..., :3] + 1e-9 * IDENTITY, gram[..., 3:])[
-        ..., 0
-    ]  # the ridge lets a degenerate triple lose
-    pivots = (mean[..., :3] @ tips[..., None])[..., 0] + mean[..., 3]
-    squares = _squared_distances(T[order[:SCORED], :3], tips, pivots)
-    half = squares.shape[1] // 2
-    best = np.partition(squares, half, axis=1)[:, half].argmin()
-    return tips[best], pivots[best]
+    triples = np.concatenate(triples)[:SAMPLES]
+    A, b = pivot_matrix(T).reshape(n, 3, 6)[triples], pivot_rhs(T).reshape(n, 3)[triples]
+    x = (np.linalg.pinv(A.reshape(-1, 9, 6), rcond=RANK_TOLERANCE) @ b.reshape(-1, 9, 1))[..., 0]
+    R, p = T[order[:SCORED], :3, :3], T[order[:SCORED], :3, 3]
+    misses = np.einsum("nij,kj->kni", R, x[:, :3]) + p - x[:, None, 3:]
+    return x[np.median((misses**2).sum(-1), axis=1).argmin()]
 
 
-def _squared_distances(upper, tips, pivots):
-    """|R tip + p - pivot|^2 of every candidate in every pose, as one matrix product; (n, 3, 4), (k, 3), (k, 3) -> (k,
-    n).
-
-    Multiplied out: |tip|^2 + |p - pivot|^2 + 2 tip'R'(p - pivot), with positions counted from their mean to keep the
-    digits.
-    """
-    n, k, R = len(upper), len(tips), upper[..., :3]
-    center = upper[..., 3].mean(0)
-    p, pivots = upper[..., 3] - center, pivots - center
-    of_pose, of_candidate = np.ones((n, 17)), np.ones((k, 17))
-    of_pose[:, :9], of_pose[:, 9:12] = R.reshape(n, 9), p
-    of_pose[:, 12:15], of_pose[:, 15] = np.einsum("nij,ni->nj", R, p), np.einsum("ni,ni->n", p, p)
-    of_candidate[:, :9] = (-2.0 * pivots[:, :, None] * tips[:, None, :]).reshape(k, 9)
-    of_candidate[:, 9:12], of_candidate[:, 12:15] = -2.0 * pivots, 2.0 * tips
-    of_candidate[:, 16] = np.einsum("ki,ki->k", tips, tips) + np.einsum("ki,ki->k", pivots, pivots)
-    return of_candidate @ of_pose.T
+# --- planning --------------------------------------------------------------------------------------------------------
 
 
 def predicted_covariance(R, tip, std_rot, std_trans):
@@ -474,10 +423,15 @@ def predicted_covariance(R, tip, std_rot, std_trans):
 
     Returns
     -------
-    covariance : array, shape (6, 6)
+    covariance : array, shape (6, 6), mm^2
+
+    Raises
+    ------
+    ValueError
+        When the orientations do not fix the tip.
     """
     R, tip = as_shape(as_rotations(R, "R"), "R", "n", 3, 3), as_shape(tip, "tip", 3)
-    std_rot, std_trans = _noise(as_number(std_rot, "std_rot"), as_number(std_trans, "std_trans"))
+    std_rot, std_trans = as_noise(as_number(std_rot, "std_rot"), as_number(std_trans, "std_trans"))
     lever = skew(tip)
     C = std_trans**2 * np.eye(3) + std_rot**2 * lever @ lever.T
     A = np.concatenate([R, np.broadcast_to(-np.eye(3), R.shape)], axis=-1)
@@ -489,10 +443,23 @@ def predicted_covariance(R, tip, std_rot, std_trans):
 
 
 def tilted(directions, spin=0.0):
-    """Rotations that turn the tool's z axis to the given directions by the shortest way, after a spin about it; (...,
-    3) -> (..., 3, 3).
+    """Rotations that turn the tool's z axis to the given directions by the shortest way, after a spin about it.
 
-    `directions` need not have length 1 but must not be zero; `spin` in radians, shape (...).
+    Parameters
+    ----------
+    directions : array-like, shape (..., 3)
+        Of any length but zero.
+    spin : array-like, shape (...)
+        Turn of the tool about its own z axis before (rad).
+
+    Returns
+    -------
+    R : array, shape (..., 3, 3)
+
+    Raises
+    ------
+    ValueError
+        When a direction is zero.
     """
     d, spin = as_points(directions, "directions"), as_finite(spin, "spin")
     d = np.broadcast_to(d, (*fit_together(directions=d.shape[:-1], spin=spin.shape), 3))
@@ -510,10 +477,21 @@ def tilted(directions, spin=0.0):
 
 
 def cone(n, half_angle, turns=0.0):
-    """Rotations of a tool led once around a cone, its z axis `half_angle` (rad) from the vertical; (n, 3, 3).
+    """Rotations of a tool led once around a cone.
 
-    `turns` is how often it spins about its own axis on the way. With exactly one turn the whole motion is a
-    rotation about the vertical, a single axis: then the poses leave the tip free along it.
+    Parameters
+    ----------
+    n : int
+        Number of poses.
+    half_angle : float
+        Between the tool's z axis and the vertical (rad).
+    turns : float
+        How often the tool spins about its own axis on the way. With exactly one turn the whole motion is a rotation
+        about the vertical, a single axis: then the poses leave the tip free along it.
+
+    Returns
+    -------
+    R : array, shape (n, 3, 3)
     """
     n, half_angle, turns = as_count(n, "n"), as_number(half_angle, "half_angle"), as_number(turns, "turns")
     phi = 2 * np.pi * np.arange(n) / n
@@ -523,11 +501,21 @@ def cone(n, half_angle, turns=0.0):
 
 
 def touching_poses(R, tip, pivot, std_rot=0.0, std_trans=0.0, rng=None):
-    """Measured poses T_WF of a tool that touches `pivot` with `tip` in the orientations R; (..., n, 3, 3) -> (..., n,
-    4, 4).
+    """Measured poses of a tool that touches `pivot` with `tip` in given orientations.
 
-    Noise: R exp(phi) with components of std_rot (rad), position plus components of std_trans; `rng` is needed when
-    either is not 0.
+    Parameters
+    ----------
+    R : array-like, shape (..., n, 3, 3)
+        Orientations of the tool.
+    tip, pivot : array-like, shape (3,), mm
+    std_rot, std_trans : float
+        Noise: R exp(phi) with components of std_rot (rad), position plus components of std_trans (mm).
+    rng : numpy.random.Generator
+        Needed when either is not 0.
+
+    Returns
+    -------
+    T_WF : array, shape (..., n, 4, 4)
     """
     R, tip, pivot = as_rotations(R, "R"), as_shape(tip, "tip", 3), as_shape(pivot, "pivot", 3)
     std_rot, std_trans = (
