@@ -3,8 +3,9 @@
 import hooks_particles
 import numpy as np
 
-from labkit.calibration import ax_xb, pivot
+from labkit.calibration import ax_xb
 from labkit.calibration import hand_eye as sphere
+from labkit.fast import pivot
 from labkit.fast.ekf import ekf_localize
 from labkit.fast.kalman import filter_steps
 from labkit.geometry import chaining, frames

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...calibration import pivot
+from ...calibration import pivot, robust
 from ...documents.lab_sheet import printed as lab_sheet
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
@@ -126,7 +126,7 @@ def _weights(rule):
 
 
 def _tukey_weights(distances, scale):
-    return pivot.robust_weights(distances, scale)
+    return robust.tukey_weights(distances, scale, pivot.TUKEY)
 
 
 def _kreisel():

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...calibration import pivot
 from ...estimation.gaussian import unit_noise
+from ...fast.pivot import calibrate_pivot
 from ...geometry.lie import exp_so3
 from ...stage import Handle, Play, Slider, Stage, style
 from ...stage.scene3d import Scene, View
@@ -240,7 +241,7 @@ def compute_outliers(state):
     for k in DRAGGED:
         T[k, :2, 3] += state[f"pose {k + 1}"] - _where_tip(k)
     touches = pivot.pivot_residuals(T, TIP, np.zeros(3))[:, :2]
-    plain, robust = pivot.calibrate_pivot(T), pivot.calibrate_pivot(T, robust=True)
+    plain, robust = calibrate_pivot(T), calibrate_pivot(T, robust=True)
     bound = pivot.predicted_covariance(T[:, :3, :3], TIP, 0.0, STD_TRANS)
     return {
         "touches": touches,
