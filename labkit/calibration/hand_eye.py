@@ -5,15 +5,16 @@ describe one point:
 
     T_BF,i  T_FS  x_S,i  =  target          (thesis, formulas (4-1) to (4-3); there T_A^F T_F^S x_S = T_P^A x_P')
 
-Lengths in mm, angles in rad. Increments are T_FS exp(phi, .): phi is a rotation vector in the scanner frame S,
-translations are plain differences in F, the target lives in B. Covariances and singular values follow that order: phi,
-translation, target. Source: thesis "Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", HAW Hamburg 2019,
-sections 2.6, 4.4, 6.1, listings C2-C5.
+`linear_start` forgets that R_FS is a rotation and solves fifteen linear equations; Gauss-Newton steps on the pose do the
+rest. `labkit.fast.hand_eye` finds the same minimum from sums over the poses. Lengths in mm, angles in rad. Increments
+are T_FS exp(phi, .): phi is a rotation vector in the scanner frame S, translations are plain differences in F, the
+target lives in B. Covariances and singular values follow that order: phi, translation, target. Source: thesis
+"Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", HAW Hamburg 2019, sections 2.6, 4.4, 6.1, listings C2-C5.
 """
 
-import contextlib
-import functools
 import math
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -31,70 +32,152 @@ from ..checks import (
 )
 from ..geometry.frames import invert, matrix_from_kuka, pose, transform
 from ..geometry.lie import exp_so3, nearest_rotation, skew
-from .result import HandEye
+from .motion import refuse_one_axis
+from .result import Parameter, Result, point_parameters, pose_parameters, result_class
+from .robust import median_std, tukey_weights
 
-MIN_TURN = 1e-3  # rad: poses turned by less than this about an axis do not fix the target across it
 MIN_SPREAD = 1e-6  # relative: sphere centers closer to one line of the scanner frame than this fix no rotation
+LINEAR_SPREAD = 1e-5  # relative: below, fifteen linear unknowns say nothing about where to start
 MAX_STEPS = 50
-STEP_TOLERANCE = 1e-12  # rad
-MEDIAN_CHI3 = (
-    1.5381722544550522  # median length of a 3-vector of unit normal errors: turns a median into a standard deviation
-)
+STEP_TOLERANCE = 1e-11  # rad: Gauss-Newton would make the next step about a thousand times smaller
 TUKEY_CUT = 5.0  # residuals beyond this many standard deviations get the weight 0
 SUBSETS = 60  # random pose subsets of the robust start: with a quarter of bad poses one of them is clean with 1 - 1e-5
+SAMPLE, SAMPLE_KNOWN = 6, 4  # poses in a subset, and where the target is known
 FIELD = (
     (-25.0, 25.0),
     (3.0, 25.0),
     (190.0, 290.0),
 )  # mm: x, |y| and z of a sphere center whose arc the scanner sees well
 _IRRATIONAL = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0]) % 1.0
-_EYE = np.eye(3)
-_GENERATORS = skew(_EYE)  # derivatives of a small rotation about x, y, z
-_FLAT_GENERATORS = _GENERATORS.reshape(3, 9)
 
 
-class SphereHandEye(HandEye):
-    """A `HandEye` from a sphere: target is its center in B (3,), residuals are (N, 3) in B, all in mm.
+@result_class
+class SphereHandEye(Result):
+    """Where a scanner sits on the flange, from a sphere seen in many poses.
 
-    singular_values: of the Jacobian with phi times the root-mean-square distance of the sphere, so that every column is
-    mm per mm. trace: rms distance (mm) at the linear start and after each step. Covariance and singular values are
-    worked out when they are first asked for.
+    Attributes
+    ----------
+    T_FS : array, shape (4, 4)
+        The scanner in the flange (mm).
+    target : array, shape (3,)
+        Center of the sphere in the base (mm).
+    T_BF, x_S : array, shape (N, 4, 4) and (N, 3)
+        The poses, and the centers seen in them (mm).
+    weights : array, shape (N,)
+        1 for a pose that counts fully, 0 for a rejected one.
+    history : array
+        Root-mean-square distance (mm) at the start and after each step, or after each round of weights when robust.
+    target_known : bool
+        Whether the target was given and not estimated.
+    residuals : array, shape (N, 3)
+        T_BF T_FS x_S - target in the base (mm).
+    rms : float
+        Root mean square of the residual distances over all poses, rejected ones included (mm).
+    std : float
+        Noise of one coordinate, from the weighted residuals (mm); NaN without redundancy.
+    covariance : array, shape (9, 9), or (6, 6) with a known target
+        std^2 (J'J)^-1 of phi (rad, in S), translation (mm, in F) and target (mm, in B).
+    singular_values : array
+        Of the Jacobian with phi times the root-mean-square distance of the sphere, so that every column is mm per mm;
+        largest first.
     """
 
-    def __init__(self, T_FS, target, residuals, weights, trace, moments, target_free):
-        vars(self).update(T_FS=T_FS, target=target, residuals=residuals, weights=weights, trace=trace)
-        vars(self).update(_moments=moments, _target_free=target_free)
+    T_FS: np.ndarray
+    target: np.ndarray
+    T_BF: np.ndarray
+    x_S: np.ndarray
+    weights: np.ndarray
+    history: np.ndarray
+    target_known: bool = False
+
+    @property
+    def parameters(self):
+        return pose_parameters("T_FS") + (() if self.target_known else point_parameters("target"))
+
+    @cached_property
+    def residuals(self):
+        return sphere_residuals(self.T_BF, self.x_S, self.T_FS, self.target)
 
     @property
     def rms(self):
-        """Root mean square of the residual distances over all poses, rejected ones included (mm)."""
         return float(rms_distance(self.residuals))
 
-    @functools.cached_property
+    @cached_property
     def std(self):
-        """Noise of one coordinate, estimated from the weighted residuals (mm); NaN without redundancy."""
-        dof = 3 * self._moments[2] - (9 if self._target_free else 6)
-        squares = np.vdot(self.residuals * self.weights[:, None], self.residuals)
-        return math.sqrt(squares / dof) if dof > 0 else math.nan
+        freedom = 3 * self.weights.sum() - len(self.parameters)
+        return math.sqrt(self.weights @ (self.residuals**2).sum(1) / freedom) if freedom > 0 else math.nan
 
-    @functools.cached_property
-    def _spectrum(self):
-        return _spectrum(*self._moments, self.T_FS[:3, :3], self._target_free)
+    @cached_property
+    def _decomposition(self):
+        """Singular values of the scaled Jacobian, and half with (J'J)^-1 = half half'."""
+        J = joint_jacobian(self.T_BF, self.x_S, self.T_FS, target_free=not self.target_known)
+        reach = math.sqrt(self.weights @ (self.x_S**2).sum(1) / self.weights.sum())
+        scale = np.array([1 / reach] * 3 + [1.0] * (J.shape[1] - 3))
+        _, values, Vt = np.linalg.svd(J * np.sqrt(np.repeat(self.weights, 3))[:, None] * scale, full_matrices=False)
+        return values, scale[:, None] * Vt.T / values
 
-    @property
+    @cached_property
     def covariance(self):
-        """Of phi (rad, in S), translation (mm, in F) and target (mm, in B): std^2 (J'J)^-1, (9, 9) or (6, 6)."""
-        values, half = self._spectrum
+        half = self._decomposition[1]
         return self.std**2 * half @ half.T
 
     @property
     def singular_values(self):
-        """Of the scaled Jacobian, largest first."""
-        return self._spectrum[0]
+        return self._decomposition[0]
+
+
+@result_class
+class SphereRadius(SphereHandEye):
+    """A `SphereHandEye` whose sphere radius was estimated along, the last of its parameters.
+
+    radius: float (mm). x_S holds the centers that follow from it.
+    """
+
+    radius: float = math.nan
+
+    parameters = (*pose_parameters("T_FS"), *point_parameters("target"), Parameter("radius", "mm"))
+
+    @cached_property
+    def _decomposition(self):
+        J = radius_jacobian(self.T_BF, self.x_S, self.T_FS, self.radius)
+        scale = 1 / np.linalg.norm(J, axis=0)
+        _, values, Vt = np.linalg.svd(J * scale, full_matrices=False)
+        return values, scale[:, None] * Vt.T / values
+
+
+@dataclass(frozen=True, eq=False)
+class PoseIterates:
+    """What plain Gauss-Newton did.
+
+    Attributes
+    ----------
+    poses : array, shape (k + 1, 4, 4)
+        T_FS at the start and after each step.
+    rms : array, shape (k + 1,)
+        Root-mean-square distance there (mm).
+    singular_values : array, shape (k + 1, 6 or 9)
+        Of the Jacobian at each iterate (angles times the mean distance of the sphere, all mm per mm), largest first.
+    converged : bool
+    """
+
+    poses: np.ndarray
+    rms: np.ndarray
+    singular_values: np.ndarray
+    converged: bool
 
 
 def rms_distance(residuals):
-    """Root of the mean squared length of residual vectors, (..., N, 3) -> (...); per axis it is sqrt(3) smaller."""
+    """Root of the mean squared length of residual vectors; per axis it is sqrt(3) smaller.
+
+    Parameters
+    ----------
+    residuals : array-like, shape (..., N, 3)
+
+    Returns
+    -------
+    rms : float or array, shape (...)
+        In the unit of the residuals.
+    """
     residuals = as_finite(residuals, "residuals")
     if residuals.ndim < 2 or not residuals.shape[-2]:
         raise ValueError(f"residuals must have shape (..., N, 3) with N >= 1, got {residuals.shape}")
@@ -105,7 +188,19 @@ def rms_distance(residuals):
 
 
 def sphere_residuals(T_BF, x_S, T_FS, target):
-    """Residual vectors T_BF T_FS x_S - target in B (mm); (..., N, 4, 4), (..., N, 3), (4, 4), (3,) -> (..., N, 3).
+    """Residual vectors T_BF T_FS x_S - target.
+
+    Parameters
+    ----------
+    T_BF : array-like, shape (..., N, 4, 4)
+    x_S : array-like, shape (..., N, 3), mm
+    T_FS : array-like, shape (4, 4)
+    target : array-like, shape (3,), mm
+
+    Returns
+    -------
+    residuals : array, shape (..., N, 3), mm
+        In B.
 
     Source: thesis, formula (4-3).
     """
@@ -115,13 +210,33 @@ def sphere_residuals(T_BF, x_S, T_FS, target):
 
 
 def kuka_residuals(p2, T_BF, x_S, target):
-    """The same for T_FS given as a KUKA pose `p2` = x, y, z, A, B, C (mm, rad), stacked as the vector (3 N,)."""
+    """The same for T_FS given as a KUKA pose, stacked.
+
+    Parameters
+    ----------
+    p2 : array-like, shape (6,)
+        x, y, z (mm), A, B, C (rad).
+
+    Returns
+    -------
+    residuals : array, shape (3 N,), mm
+
+    See Also
+    --------
+    sphere_residuals
+    """
     return sphere_residuals(T_BF, x_S, matrix_from_kuka(p2), target).ravel()
 
 
 def kuka_jacobian(p2, T_BF, x_S):
-    """Analytic derivative of `kuka_residuals` by x, y, z, A, B, C, shape (3 N, 6); mm per mm and mm per rad."""
-    T_BF, x_S = _poses(T_BF, x_S)
+    """Analytic derivative of `kuka_residuals` by x, y, z, A, B, C.
+
+    Returns
+    -------
+    J : array, shape (3 N, 6)
+        mm per mm and mm per rad.
+    """
+    T_BF, x_S = as_sightings(T_BF, x_S)
     p2 = as_shape(p2, "p2", 6)
     R = matrix_from_kuka(p2)[:3, :3]
     arms = x_S @ R.T  # the sphere center relative to the scanner's origin, in F
@@ -136,7 +251,17 @@ def rate_matrix(A, B):
 
     Its columns are the three axes the angles turn about: z, then y turned by A, then x turned by A and B. det E = -cos
     B: at B = +-90 deg the first and the last axis are one line, A and C become one angle, and no change of the angles
-    tilts the frame about the missing direction. Source: what thesis table 7-3 stumbles over without naming it.
+    tilts the frame about the missing direction.
+
+    Parameters
+    ----------
+    A, B : float, rad
+
+    Returns
+    -------
+    E : array, shape (3, 3)
+
+    Source: what thesis table 7-3 stumbles over without naming it.
     """
     A, B = as_number(A, "A"), as_number(B, "B")
     ca, sa, cb, sb = np.cos(A), np.sin(A), np.cos(B), np.sin(B)
@@ -144,22 +269,54 @@ def rate_matrix(A, B):
 
 
 def joint_jacobian(T_BF, x_S, T_FS, target_free=True):
-    """Derivative of the residuals by phi (rad, in S), translation (in F) and target (in B); (3 N, 9) or (3 N, 6)."""
-    (T_BF, x_S), T_FS = _poses(T_BF, x_S), as_shape(as_transforms(T_FS, "T_FS"), "T_FS", 4, 4)
+    """Derivative of the residuals by phi (rad, in S), translation (in F) and target (in B).
+
+    Returns
+    -------
+    J : array, shape (3 N, 9), or (3 N, 6) without the target
+        mm per rad and mm per mm.
+    """
+    (T_BF, x_S), T_FS = as_sightings(T_BF, x_S), as_shape(as_transforms(T_FS, "T_FS"), "T_FS", 4, 4)
     R = T_BF[:, :3, :3]
     J = np.empty((len(R), 3, 9 if target_free else 6))
     J[..., :3] = -R @ (T_FS[:3, :3] @ skew(x_S))
     J[..., 3:6] = R
     if target_free:
-        J[..., 6:] = -_EYE
+        J[..., 6:] = -np.eye(3)
     return J.reshape(3 * len(R), -1)
 
 
+def radius_jacobian(T_BF, x_S, T_FS, radius):
+    """The same with the sphere's radius as a tenth column: y = +-sqrt(R^2 - r^2) has dy/dR = R / y.
+
+    Returns
+    -------
+    J : array, shape (3 N, 10)
+    """
+    by_R = np.zeros_like(x_S)
+    by_R[:, 1] = radius / x_S[:, 1]
+    moved = T_BF[:, :3, :3] @ (T_FS[:3, :3] @ by_R[..., None])
+    return np.concatenate([joint_jacobian(T_BF, x_S, T_FS), moved.reshape(-1, 1)], axis=1)
+
+
 def plate_jacobian(T_BF, x_S, p2, p3, x_P):
-    """Derivative of the residuals by both KUKA poses of the thesis's second step, T_FS and T_BP; (3 N, 12).
+    """Derivative of the residuals by both KUKA poses of the thesis's second step, T_FS and T_BP.
 
     p3 enters through the one point T_BP x_P only, so three of its six columns depend on the others whatever the poses:
-    the sphere center is observable, the plate's orientation is not. Source: thesis, table 4-2, step 2.
+    the sphere center is observable, the plate's orientation is not.
+
+    Parameters
+    ----------
+    p2, p3 : array-like, shape (6,)
+        T_FS and T_BP as x, y, z (mm), A, B, C (rad).
+    x_P : array-like, shape (3,), mm
+        The sphere in the plate.
+
+    Returns
+    -------
+    J : array, shape (3 N, 12)
+
+    Source: thesis, table 4-2, step 2.
     """
     p3, x_P = as_shape(p3, "p3", 6), as_shape(x_P, "x_P", 3)
     arm = matrix_from_kuka(p3)[:3, :3] @ x_P
@@ -173,23 +330,21 @@ def plate_jacobian(T_BF, x_S, p2, p3, x_P):
 def calibrate_sphere_target(T_BF, x_S, target=None, robust=False, rng=None):
     """Pose of a scanner on the flange, and the sphere's center, from the center seen in N robot poses, without a start.
 
-    Minimizes the sum of squared residual vectors: the maximum-likelihood estimate for equal, isotropic errors.
-    Translation and target enter linearly and are eliminated once; what remains is a quadratic function of the nine
-    entries of the rotation matrix, solved freely (the linear start) and then on SO(3) by Gauss-Newton steps that no
-    longer depend on N. With a known target even that is one step: the fit of two point sets.
+    Minimizes the sum of squared residual vectors: the maximum-likelihood estimate for equal, isotropic errors. With a
+    known target this is the fit of two point sets; otherwise a linear start and Gauss-Newton steps on the pose.
 
     Parameters
     ----------
     T_BF : array-like, shape (N, 4, 4)
-        Robot poses, base <- flange. N >= 4, turned about at least two axes (N >= 3 and no turning needed when `target`
-        is given).
+        Robot poses, base <- flange. N >= 4, turned about at least two axes; N >= 3 and no turning needed when `target`
+        is given; N >= 7, or 5 with a target, when robust.
     x_S : array-like, shape (N, 3)
         Sphere centers in the scanner frame (mm).
     target : array-like, shape (3,), optional
-        Sphere center in the base, if it is known; its error then goes into the result undiminished.
+        Sphere center in the base (mm), if it is known; its error then goes into the result undiminished.
     robust : bool
-        Least trimmed squares over random subsets, then Tukey weights on each pose's residual length; bears a third of
-        bad poses.
+        Least trimmed squares over random subsets, then Tukey weights on each pose's residual length; tolerates a third
+        of bad poses.
     rng : numpy.random.Generator, optional
         Source of the subsets; a fixed one is used without it, so that results repeat.
 
@@ -204,49 +359,165 @@ def calibrate_sphere_target(T_BF, x_S, target=None, robust=False, rng=None):
         place or on one line of the scanner frame; and wrong shapes.
 
     Source: thesis, sections 4.4 and 6.1.5, which iterate from a CAD pose with the target held fixed.
+
+    See Also
+    --------
+    labkit.fast.hand_eye.calibrate_sphere_target : the same from sums over the poses.
     """
-    T_BF, x_S = _poses(T_BF, x_S)
-    fewest = 4 if target is None else 3
+    return calibrate_with(_least_squares, T_BF, x_S, target, robust, rng)
+
+
+def calibrate_with(fit, T_BF, x_S, target, robust, rng):
+    """What `calibrate_sphere_target` does around its fit: input, outliers, result.
+
+    `fit(T_BF, x_S, weights, target, max_steps)` returns T_FS, target and the rms distance (mm) of its iterates.
+    """
+    (T_BF, x_S), sample = as_sightings(T_BF, x_S), SAMPLE if target is None else SAMPLE_KNOWN
+    fewest = sample + 1 if robust else 4 if target is None else 3
     if len(T_BF) < fewest:
-        raise ValueError(f"at least {fewest} poses are needed, got {len(T_BF)}")
-    target = None if target is None else as_shape(target, "target", 3)
-    R, t = T_BF[:, :3, :3], T_BF[:, :3, 3]
-    weights = np.ones(len(R))
+        raise ValueError(f"at least {fewest} poses are needed{' when robust' if robust else ''}, got {len(T_BF)}")
+    known = None if target is None else as_shape(target, "target", 3)
+    T_BF, x_S, weights = T_BF.copy(), x_S.copy(), np.ones(len(T_BF))
     if robust:
-        rng = np.random.default_rng(0) if rng is None else rng
-        weights = _trimmed_start(R, t, x_S, target, rng)
-        R_FS, t_FS, center, residuals, weights, trace, moments = _tukey(R, t, x_S, target, weights)
+        weights = _trimmed_start(fit, T_BF, x_S, known, sample, np.random.default_rng(0) if rng is None else rng)
+        T_FS, center, weights, history = _reweighted(fit, T_BF, x_S, known, weights)
     else:
-        R_FS, t_FS, center, trace, moments = _solve(R, t, x_S, weights, target)
-        residuals = _residuals(R, t, x_S, R_FS, t_FS, center)
-        trace[-1:] = [_rms(residuals)]
-    T_FS = np.zeros((4, 4))
-    T_FS[:3, :3], T_FS[:3, 3], T_FS[3, 3] = R_FS, t_FS, 1.0
-    return SphereHandEye(T_FS, center, residuals, weights, np.array(trace), moments, target is None)
+        T_FS, center, history = fit(T_BF, x_S, weights, known, MAX_STEPS)
+    return SphereHandEye(T_FS, center, T_BF, x_S, weights, np.array(history), target is not None)
+
+
+def as_sightings(T_BF, x_S):
+    """Robot poses (N, 4, 4) with the sphere center (N, 3) seen in each; anything else is refused."""
+    T_BF, x_S = as_transforms(T_BF, "T_BF"), as_points(x_S, "x_S")
+    if T_BF.ndim != 3 or x_S.shape != (len(T_BF), 3):
+        raise ValueError(f"T_BF and x_S must have shapes (N, 4, 4) and (N, 3), got {T_BF.shape} and {x_S.shape}")
+    return T_BF, x_S
+
+
+def refuse_undetermined(T_BF, x_S, weights, target_known):
+    """Refuses poses that leave scanner or sphere free, naming the missing motion."""
+    refuse_one_line(x_S, weights)
+    if not target_known:
+        refuse_one_axis(T_BF[:, :3, :3], weights, "base", "scanner and sphere")
+
+
+def refuse_one_line(x_S, weights):
+    """Refuses sphere centers on one line of the scanner frame: nothing then fixes the rotation about it."""
+    mean = weights @ x_S / weights.sum()
+    spread = np.linalg.svd((x_S - mean) * np.sqrt(weights)[:, None], compute_uv=False)
+    far = math.sqrt(weights.sum()) * np.linalg.norm(mean)
+    if spread[1] <= MIN_SPREAD * max(spread[0], MIN_SPREAD * far):
+        where = "at one place" if spread[0] <= MIN_SPREAD * far else "on one line"
+        raise ValueError(
+            f"the sphere stays {where} of the scanner frame, so the scanner's rotation about it is free; change its "
+            "depth and its place along the scan line between the poses"
+        )
+
+
+def _least_squares(T_BF, x_S, weights, target, max_steps):
+    """T_FS and target that minimize the weighted sum of squares, and the rms distance of the iterates."""
+    refuse_undetermined(T_BF, x_S, weights, target is not None)
+    if target is not None:
+        T_FS = _fit_frame(x_S, transform(invert(T_BF), target), weights)
+        return T_FS, target, [rms_distance(sphere_residuals(T_BF, x_S, T_FS, target))]
+    u, spread = _linear_solution(T_BF, x_S, weights)
+    if spread > LINEAR_SPREAD:
+        return _gauss_newton(nearest_rotation(u[:9].reshape(3, 3)), T_BF, x_S, weights, max_steps)
+    tried = [_gauss_newton(R_FS, T_BF, x_S, weights, max_steps) for R_FS in right_angled()]
+    return min(tried, key=lambda found: found[2][-1])
+
+
+def _fit_frame(x_S, x_F, weights):
+    """The transform that takes weighted points from S to F with the least sum of squares (Kabsch)."""
+    mean_S, mean_F = weights @ x_S / weights.sum(), weights @ x_F / weights.sum()
+    R_FS = nearest_rotation((weights[:, None] * (x_F - mean_F)).T @ (x_S - mean_S))
+    return pose(R_FS, mean_F - R_FS @ mean_S)
+
+
+def _gauss_newton(R_FS, T_BF, x_S, weights, max_steps):
+    """Gauss-Newton from an orientation, steps halved until they descend: T_FS, target, rms distance of the iterates."""
+    root = np.sqrt(np.repeat(weights, 3))
+
+    def residuals(T_FS, target):
+        r = sphere_residuals(T_BF, x_S, T_FS, target).ravel() * root
+        return r, r @ r
+
+    def moved(T_FS, target, step):
+        return pose(T_FS[:3, :3] @ exp_so3(step[:3]), T_FS[:3, 3] + step[3:6]), target + step[6:]
+
+    T_FS, target = moved(pose(R_FS, np.zeros(3)), np.zeros(3), np.append(np.zeros(3), _best_shift(R_FS, T_BF, x_S, root)))
+    (r, cost), costs = residuals(T_FS, target), []
+    for _ in range(max_steps):
+        costs.append(cost)
+        step = np.linalg.lstsq(joint_jacobian(T_BF, x_S, T_FS) * root[:, None], -r, rcond=None)[0]
+        trial = residuals(*moved(T_FS, target, step))
+        while trial[1] > cost and np.abs(step[:3]).max() > STEP_TOLERANCE:
+            step = step / 2
+            trial = residuals(*moved(T_FS, target, step))
+        (T_FS, target), (r, cost) = moved(T_FS, target, step), trial
+        if np.abs(step[:3]).max() <= STEP_TOLERANCE:
+            break
+    return T_FS, target, np.sqrt(np.array([*costs, cost]) / weights.sum())
+
+
+def _best_shift(R_FS, T_BF, x_S, root):
+    """Translation and target, (6,), that fit best with the orientation R_FS: they enter linearly."""
+    T_FS = pose(R_FS, np.zeros(3))
+    J = joint_jacobian(T_BF, x_S, T_FS)[:, 3:] * root[:, None]
+    return np.linalg.lstsq(J, -sphere_residuals(T_BF, x_S, T_FS, np.zeros(3)).ravel() * root, rcond=None)[0]
+
+
+def right_angled():
+    """The 24 rotations that map axes to axes, shape (24, 3, 3)."""
+    signs = np.stack(np.meshgrid([1, -1], [1, -1], [1, -1]), -1).reshape(-1, 1, 3)
+    axes = np.eye(3)[[[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]]]
+    found = (signs[:, None] * axes).reshape(-1, 3, 3)
+    return found[np.linalg.det(found) > 0]
 
 
 def linear_start(T_BF, x_S):
     """T_FS and target from the linear equations in 15 unknowns (R_FS, t_FS, target), R_FS then made a rotation.
 
-    R_FS x_S + t_FS - R_BF' target = -R_BF' t_BF: three equations a pose, linear because nothing says yet that R_FS is a
-    rotation. Needs five poses or more and sphere centers that do not lie in one plane of the scanner frame.
+    R_FS x_S + t_FS - R_BF' target = -R_BF' t_BF: three equations per pose, linear because nothing says yet that R_FS is
+    a rotation. Needs five poses or more and sphere centers that do not lie in one plane of the scanner frame.
+
+    Parameters
+    ----------
+    T_BF : array-like, shape (N, 4, 4)
+    x_S : array-like, shape (N, 3), mm
+
+    Returns
+    -------
+    T_FS : array, shape (4, 4)
+    target : array, shape (3,), mm
+
+    Raises
+    ------
+    ValueError
+        When the system has not rank 15.
     """
-    T_BF, x_S = _poses(T_BF, x_S)
+    T_BF, x_S = as_sightings(T_BF, x_S)
+    u, spread = _linear_solution(T_BF, x_S, np.ones(len(T_BF)))
+    if spread < 1e-12:
+        raise ValueError(
+            "the linear system needs rank 15, got less: take five poses or more, turned about two axes, with the sphere "
+            "at different depths and places of the scanner's field"
+        )
+    return pose(nearest_rotation(u[:9].reshape(3, 3)), u[9:12]), u[12:]
+
+
+def _linear_solution(T_BF, x_S, weights):
+    """The 15 unknowns, and the smallest singular value of their system (centers scaled to length 1) over the largest."""
     R_t, n = np.swapaxes(T_BF[:, :3, :3], 1, 2), len(T_BF)
+    reach = max(math.sqrt((x_S**2).sum(-1).mean()), np.finfo(float).tiny)
     D = np.zeros((n, 3, 15))
     for k in range(3):
-        D[:, k, 3 * k : 3 * k + 3] = x_S
+        D[:, k, 3 * k : 3 * k + 3] = x_S / reach
     D[..., 9:12], D[..., 12:] = np.eye(3), -R_t
-    F = -(R_t @ T_BF[:, :3, 3, None])[..., 0]
-    u, _, rank, s = np.linalg.lstsq(D.reshape(-1, 15), F.ravel(), rcond=1e-12)
-    if rank < 15:
-        raise ValueError(
-            f"the linear system needs rank 15, got {rank}: take five poses or more, turned about two axes, "
-            "with the sphere at different depths and places of the scanner's field"
-        )
-    T_FS = np.eye(4)
-    T_FS[:3, :3], T_FS[:3, 3] = nearest_rotation(u[:9].reshape(3, 3)), u[9:12]
-    return T_FS, u[12:]
+    F, root = -(R_t @ T_BF[:, :3, 3, None])[..., 0], np.sqrt(np.repeat(weights, 3))
+    u, _, _, values = np.linalg.lstsq(D.reshape(-1, 15) * root[:, None], F.ravel() * root, rcond=None)
+    u[:9] /= reach
+    return u, values[14] / values[0] if 3 * n >= 15 else 0.0
 
 
 def gauss_newton_pose(start, T_BF, x_S, target=None, parameters="euler", max_steps=50, tolerance=1e-10):
@@ -266,15 +537,13 @@ def gauss_newton_pose(start, T_BF, x_S, target=None, parameters="euler", max_ste
 
     Returns
     -------
-    poses : array, shape (k + 1, 4, 4)
-    rms : array, shape (k + 1,)
-    singular_values : array, shape (k + 1, 6)
-        Of the Jacobian by the pose at each iterate (angles times the mean distance of the sphere, all mm per mm).
-    converged : bool
+    PoseIterates
+
+    Source: thesis, listings C3 to C5; `labkit.documents.thesis.listings` has them as printed.
     """
     if parameters not in ("euler", "se3"):
         raise ValueError(f"parameters must be 'euler' or 'se3', got {parameters!r}")
-    (T_BF, x_S), p = _poses(T_BF, x_S), as_shape(start, "start", 6)
+    (T_BF, x_S), p = as_sightings(T_BF, x_S), as_shape(start, "start", 6)
     max_steps, tolerance = as_count(max_steps, "max_steps", at_least=0), as_number(tolerance, "tolerance")
     T_FS, free = matrix_from_kuka(p), target is None
     center = transform(T_BF, transform(T_FS, x_S)).mean(0) if free else as_shape(target, "target", 3)
@@ -309,18 +578,17 @@ def gauss_newton_pose(start, T_BF, x_S, target=None, parameters="euler", max_ste
             T_FS[:3, 3] += step[:3]
         center = center + step[6:] if free else center
         converged = bool(np.abs(scaled).max() <= tolerance)
-    return np.array(poses), np.array(rms), np.array(values), converged
-
-
-def tukey_weights(lengths, std, cut=TUKEY_CUT):
-    """Weights (1 - (r / (cut std))^2)^2 of residual lengths r, 0 beyond the cut: far outliers have no say at all."""
-    u = as_finite(lengths, "lengths") / (as_positive_number(cut, "cut") * as_positive_number(std, "std"))
-    return np.where(np.abs(u) < 1, (1 - u * u) ** 2, 0.0)
+    return PoseIterates(np.array(poses), np.array(rms), np.array(values), converged)
 
 
 def leave_one_out(T_BF, x_S, robust=False):
-    """Residual vectors (N, 3) of each pose under the calibration from the others: what it is worth elsewhere."""
-    T_BF, x_S = _poses(T_BF, x_S)
+    """Residual vector of each pose under the calibration from the others: what it is worth elsewhere.
+
+    Returns
+    -------
+    residuals : array, shape (N, 3), mm
+    """
+    T_BF, x_S = as_sightings(T_BF, x_S)
     found = []
     for i in range(len(T_BF)):
         fit = calibrate_sphere_target(np.delete(T_BF, i, 0), np.delete(x_S, i, 0), robust=robust)
@@ -329,44 +597,122 @@ def leave_one_out(T_BF, x_S, robust=False):
 
 
 def fit_radius(T_BF, x_S, printed_radius=30.0):
-    """Sphere radius that the poses themselves ask for, all else free as well: (radius, standard deviation), mm.
+    """Sphere radius that the poses themselves ask for, all else free as well.
 
     Each center was computed from a fitted circle as y = +-sqrt(R^2 - r^2) with R = `printed_radius`; another R moves it
     along y only, y' = +-sqrt(y^2 + R^2 - printed_radius^2). Residuals linear in y make this a tenth column of the
-    Jacobian; Gauss-Newton steps on R^2, all else solved exactly in between.
+    Jacobian; Gauss-Newton steps on R, all else solved exactly in between.
+
+    Parameters
+    ----------
+    T_BF : array-like, shape (N, 4, 4)
+    x_S : array-like, shape (N, 3), mm
+        Centers off the scan plane, y not 0; N >= 4.
+    printed_radius : float
+        The radius that the centers were computed with (mm).
+
+    Returns
+    -------
+    SphereRadius
+
+    Raises
+    ------
+    ValueError
+        When a center lies on the scan plane, or the steps do not settle on a radius.
 
     Source: beyond the thesis, which uses three different radii (certificate, listing C16, coordinate machine).
     """
-    (T_BF, x_S), radius = _poses(T_BF, x_S), as_positive_number(printed_radius, "printed_radius")
+    (T_BF, x_S), radius = as_sightings(T_BF, x_S), as_positive_number(printed_radius, "printed_radius")
     if len(x_S) < 4:
         raise ValueError(f"at least 4 poses are needed, got {len(x_S)}")
     side, square = np.sign(x_S[:, 1]), x_S[:, 1] ** 2 - radius**2
     if not side.all():
         raise ValueError("x_S must lie off the scan plane: with y = 0 nothing says on which side the center is")
+    history = []
     for _ in range(MAX_STEPS):
         x = x_S.copy()
         x[:, 1] = side * np.sqrt(np.maximum(square + radius**2, 1e-12))
         fit = calibrate_sphere_target(T_BF, x)
-        J = np.concatenate([joint_jacobian(T_BF, x, fit.T_FS), _by_radius(T_BF, x, fit.T_FS, radius)], axis=1)
+        history.append(fit.rms)
+        J = radius_jacobian(T_BF, x, fit.T_FS, radius)
         step = np.linalg.lstsq(J, -fit.residuals.ravel(), rcond=None)[0][9]
+        if abs(step) < 1e-9 and (square + radius**2 > 1e-12).all():
+            return SphereRadius(fit.T_FS, fit.target, fit.T_BF, x, fit.weights, np.array(history), radius=radius)
         radius += step
-        if abs(step) < 1e-9:
+    raise ValueError(
+        f"the radius does not settle: after {MAX_STEPS} steps it is {shown(radius, '.6g')} mm and the last step was "
+        f"{shown(step, '.2g')} mm; are these centers those of circles on one sphere?"
+    )
+
+
+# --- outliers --------------------------------------------------------------------------------------------------------
+
+
+def _trimmed_start(fit, T_BF, x_S, target, size, rng):
+    """Weights 0 or 1 of the half of the poses that agree best: random subsets, the best five of them concentrated."""
+    n = len(T_BF)
+    half = min(n, (n + size) // 2 + 1)
+
+    def concentrate(chosen):
+        try:
+            T_FS, center, _ = fit(T_BF[chosen], x_S[chosen], np.ones(len(chosen)), target, 4)
+        except (ValueError, np.linalg.LinAlgError):
+            return np.inf, None  # a subset without the motions the whole set has
+        squares = (sphere_residuals(T_BF, x_S, T_FS, center) ** 2).sum(1)
+        nearest = np.argsort(squares, kind="stable")[:half]
+        return squares[nearest].sum(), nearest
+
+    found = [concentrate(rng.choice(n, size, replace=False)) for _ in range(SUBSETS)]
+    found = sorted((f for f in found if f[1] is not None), key=lambda f: f[0])[:5]
+    for _ in range(3):
+        found = [concentrate(nearest) for _, nearest in found]
+    weights = np.zeros(n)
+    weights[min(found, key=lambda f: f[0])[1] if found else slice(None)] = 1.0
+    return weights
+
+
+def _reweighted(fit, T_BF, x_S, target, weights):
+    """Iteratively reweighted least squares from the trimmed start; the scale is the median residual length."""
+    history, exact = [], 1e-12 * np.abs(x_S).max()
+    for _ in range(MAX_STEPS):
+        T_FS, center, _ = fit(T_BF, x_S, weights, target, MAX_STEPS)
+        lengths = np.linalg.norm(sphere_residuals(T_BF, x_S, T_FS, center), axis=1)
+        history.append(math.sqrt((lengths**2).mean()))
+        scale = median_std(lengths)
+        if scale <= exact:  # noise-free: what does not fit exactly is wrong
+            new = (lengths <= 1000 * exact).astype(float)
+        else:
+            new = tukey_weights(lengths, scale, TUKEY_CUT)
+        if np.abs(new - weights).max() < 1e-8:
             break
-    variance = (fit.residuals**2).sum() / (3 * len(x) - 10)
-    return radius, float(np.sqrt(variance * np.linalg.inv(J.T @ J)[9, 9]))
+        weights = new
+    return T_FS, center, weights, history
 
 
-def _by_radius(T_BF, x, T_FS, radius):
-    by_R = np.zeros_like(x)
-    by_R[:, 1] = radius / x[:, 1]
-    return (T_BF[:, :3, :3] @ (T_FS[:3, :3] @ by_R[..., None])).reshape(-1, 1)
+# --- planning --------------------------------------------------------------------------------------------------------
 
 
 def predicted_covariance(T_BF, T_FS, target, std):
-    """Covariance (9, 9) of phi, translation and target that a set of poses would give, before anything is measured.
+    """Covariance of phi, translation and target that a set of poses would give, before anything is measured.
 
-    The sphere centers follow from the poses: x_S = T_FS^-1 T_BF^-1 target. This is the Cramer-Rao bound for isotropic
-    noise `std` (mm). Raises ValueError for poses that leave a direction undetermined.
+    The sphere centers follow from the poses: x_S = T_FS^-1 T_BF^-1 target. This is the Cramer-Rao bound.
+
+    Parameters
+    ----------
+    T_BF : array-like, shape (N, 4, 4)
+    T_FS : array-like, shape (4, 4)
+    target : array-like, shape (3,), mm
+    std : float
+        Isotropic noise of a center, per coordinate (mm).
+
+    Returns
+    -------
+    covariance : array, shape (9, 9), rad and mm
+
+    Raises
+    ------
+    ValueError
+        For poses that leave a direction undetermined.
     """
     x_S = transform(invert(T_FS), transform(invert(T_BF), target))
     J = joint_jacobian(T_BF, x_S, T_FS)
@@ -380,7 +726,18 @@ def predicted_covariance(T_BF, T_FS, target, std):
 def poses_that_see(T_FS, target, R_BF, x_S):
     """Robot poses with given orientations in which the scanner sees the sphere at given places.
 
-    From target = R_BF (R_FS x_S + t_FS) + t_BF; (4, 4), (3,), (..., 3, 3), (..., 3) -> T_BF (..., 4, 4).
+    From target = R_BF (R_FS x_S + t_FS) + t_BF.
+
+    Parameters
+    ----------
+    T_FS : array-like, shape (4, 4)
+    target : array-like, shape (3,), mm
+    R_BF : array-like, shape (..., 3, 3)
+    x_S : array-like, shape (..., 3), mm
+
+    Returns
+    -------
+    T_BF : array, shape (..., 4, 4)
     """
     R_BF, arms = as_rotations(R_BF, "R_BF"), transform(T_FS, x_S)
     fit_together(R_BF=R_BF.shape[:-2], x_S=arms.shape[:-1])
@@ -422,269 +779,3 @@ def pattern(T_FS, target, tilt, spread, n=31):
     down = np.diag([1.0, -1.0, -1.0])
     turned = exp_so3(np.column_stack([np.zeros((n, 2)), yaw]))
     return poses_that_see(T_FS, target, exp_so3(tilted) @ turned @ down @ T_FS[:3, :3].T, x_S)
-
-
-# --- inside ----------------------------------------------------------------------------------------------------------
-
-
-def _poses(T_BF, x_S):
-    """Robot poses (N, 4, 4) with the sphere center (N, 3) seen in each."""
-    T_BF, x_S = as_transforms(T_BF, "T_BF"), as_points(x_S, "x_S")
-    if T_BF.ndim != 3 or x_S.shape != (len(T_BF), 3):
-        raise ValueError(f"T_BF and x_S must have shapes (N, 4, 4) and (N, 3), got {T_BF.shape} and {x_S.shape}")
-    return T_BF, x_S
-
-
-def _residuals(R, t, x, R_FS, t_FS, center):
-    y = x @ R_FS.T + t_FS
-    return (R * y[:, None]).sum(-1) + (t - center)
-
-
-def _rms(residuals):
-    return math.sqrt(np.vdot(residuals, residuals) / len(residuals))
-
-
-def _moments(R, t, x, w, target):
-    """All that the sums over the poses need: weighted mean (15,) and scatter (15, 15) of x, b and R, and the total
-    weight.
-
-    b = R' (target - t) with the target at 0 while it is unknown: where the sphere lies from the flange, but for its
-    turned center.
-    """
-    Z = np.empty((len(R), 15))
-    Z[:, :3], Z[:, 3:6], Z[:, 6:] = x, ((target - t if target is not None else -t)[:, None] @ R)[:, 0], R.reshape(-1, 9)
-    total = float(w.sum())
-    mean = w @ Z / total
-    Z -= mean
-    return mean, (Z * w[:, None]).T @ Z, total
-
-
-def _reduce(mean, G, total, target):
-    """The cost without translation and target, r'Sr - 2 h'r + c in the entries r of R_FS, and how to get both back."""
-    x_mean, b_mean, R_mean = mean[:3], mean[3:6], mean[6:].reshape(3, 3)
-    M = G[:3, :3]
-    _refuse_narrow(M, x_mean)
-    if target is not None:
-        return M, G[3:6, :3], 0.0, lambda R_FS: (b_mean - R_FS @ x_mean, target)
-    W_inverse = _invert_spread(G[6:, 6:].reshape(3, 3, 3, 3).trace(axis1=1, axis2=3), total)
-    D, d = G[6:, :3].reshape(3, 9), G[6:, 3:6].reshape(3, 3, 3).trace(axis1=1, axis2=2)
-    DW = D.T @ W_inverse
-    S = -DW @ D
-    for k in (0, 3, 6):
-        S[k : k + 3, k : k + 3] += M
-    h = G[3:6, :3].ravel() - DW @ d
-    c = G[3, 3] + G[4, 4] + G[5, 5] - d @ W_inverse @ d
-
-    def recover(R_FS):
-        center = W_inverse @ (D @ R_FS.ravel() - d)
-        return b_mean + center @ R_mean - R_FS @ x_mean, center
-
-    return S, h, c, recover
-
-
-def _invert_spread(W, total):
-    """Inverse of the spread of the orientations, sum of dR dR'; refuses poses that leave the target free."""
-    with contextlib.suppress(np.linalg.LinAlgError):
-        inverse = np.linalg.inv(W)
-        if (
-            0 < np.vdot(inverse, inverse) < (total * MIN_TURN**2) ** -2
-        ):  # then no eigenvalue of W is below total MIN_TURN^2
-            return inverse
-    values, vectors = np.linalg.eigh(W)
-    turn = np.sqrt(np.maximum(values, 0.0) / total)  # rad, roughly the rms turn about the axes across each direction
-    if turn[0] < MIN_TURN:
-        if turn[2] < MIN_TURN:
-            raise ValueError(
-                "the poses only translate: scanner and sphere can be shifted together in any direction; "
-                "add poses that turn the flange about two different axes"
-            )
-        axis = vectors[:, 0] * np.sign(vectors[np.argmax(np.abs(vectors[:, 0])), 0])
-        raise ValueError(
-            f"all poses turn about one axis, {shown(axis, '.3f')} in the base: scanner and "
-            "sphere "
-            "can be shifted together along it; add poses that turn the flange about another axis"
-        )
-    return (vectors / values) @ vectors.T
-
-
-def _refuse_narrow(M, x_mean):
-    """Refuse sphere centers on one line of the scanner frame: nothing then fixes the rotation about it."""
-    size = M.trace()
-    minors = 0.5 * (size * size - np.vdot(M, M))  # about the product of the two largest eigenvalues
-    if minors <= MIN_SPREAD**2 * max(size, x_mean @ x_mean * np.finfo(float).eps) ** 2:
-        where = "at one place" if size <= MIN_SPREAD**2 * (x_mean @ x_mean) else "on one line"
-        raise ValueError(
-            f"the sphere stays {where} of the scanner frame, so the scanner's rotation about it is free; "
-            "change its depth and its place along the scan line between the poses"
-        )
-
-
-def _solve(R, t, x, w, target, steps=MAX_STEPS):
-    """Least squares with given weights: R_FS, t_FS, target, the rms distance of the iterates, and the moments."""
-    moments = _moments(R, t, x, w, target)
-    S, h, c, recover = _reduce(*moments, target)
-    if target is not None:
-        R_FS = nearest_rotation(h)
-        return R_FS, *recover(R_FS), [], moments
-    R_FS, costs = _descend(S, h, _rotation_start(S, h), steps)
-    return R_FS, *recover(R_FS), [math.sqrt(max(cost + c, 0.0) / moments[2]) for cost in costs], moments
-
-
-def _rotation_start(S, h):
-    """Rotation next to the unconstrained minimum S^-1 h, or the best of 24 right-angled ones where S is singular."""
-    values, vectors = np.linalg.eigh(S)
-    if values[0] > 1e-9 * values[8]:
-        return _polar(((vectors / values) @ (h @ vectors)).reshape(3, 3))
-    return min((_descend(S, h, Q) for Q in _RIGHT_ANGLED), key=lambda found: found[1][-1])[0]
-
-
-def _polar(M):
-    """Nearest rotation by Newton-Schulz steps where M almost is one, by SVD elsewhere."""
-    for _ in range(6):
-        error = M.T @ M - _EYE
-        square = np.vdot(error, error)
-        if square > 0.1:
-            break
-        M = M - 0.5 * (M @ error)
-        if square < 1e-16:
-            return M
-    return nearest_rotation(M)
-
-
-def _descend(S, h, R_FS, steps=MAX_STEPS):
-    """Newton on SO(3) for r'Sr - 2 h'r, Gauss-Newton where that points uphill, steps halved until they descend.
-
-    A short step is followed by one more with the same matrix, which leaves an error of its third power. Returns the
-    rotation and the cost of each iterate.
-    """
-    gradient = S @ R_FS.ravel() - h
-    costs = [R_FS.ravel() @ (gradient - h)]
-    floor = 1e-15 * (abs(R_FS.ravel() @ h) + abs(costs[0]))
-
-    def moved(step, size):
-        Q = _turn(*step.tolist(), size) @ R_FS
-        q = Q.ravel()
-        slope = S @ q - h
-        return Q, slope, q @ (slope - h)
-
-    for _ in range(steps):
-        G = (_GENERATORS @ R_FS).reshape(3, 9)
-        slope, H = G @ gradient, G @ S @ G.T
-        Z = gradient.reshape(3, 3) @ R_FS.T
-        inverse = np.linalg.inv(H + 0.5 * (Z + Z.T) - Z.trace() * _EYE)
-        step = -(inverse @ slope)
-        if slope @ step > 0:
-            step = -np.linalg.solve(H, slope)
-        size = math.sqrt(step @ step)
-        if size > 1.0:
-            step, size = step / size, 1.0
-        Q, new_gradient, cost = moved(step, size)
-        while cost > costs[-1] + floor and size >= STEP_TOLERANCE:
-            step, size = step / 2, size / 2
-            Q, new_gradient, cost = moved(step, size)
-        R_FS, gradient = Q, new_gradient
-        costs.append(cost)
-        if size < 1e-7:  # the next Newton step would be below 1e-13
-            break
-        if size < 1e-2:
-            step = -(inverse @ ((_GENERATORS @ R_FS).reshape(3, 9) @ gradient))
-            again = math.sqrt(step @ step)
-            R_FS, gradient, cost = moved(step, again)
-            costs.append(cost)
-            if size * again < 1e-9:
-                break
-    return R_FS, costs
-
-
-def _turn(x, y, z, angle):
-    """Rodrigues' formula for one rotation vector of known length, in plain floats: a tenth of the time of `exp_so3`."""
-    a = math.sin(angle) / angle if angle > 1e-7 else 1.0
-    b = (1 - math.cos(angle)) / angle**2 if angle > 1e-4 else 0.5
-    return np.array(
-        [
-            [1 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y],
-            [b * x * y + a * z, 1 - b * (x * x + z * z), b * y * z - a * x],
-            [b * x * z - a * y, b * y * z + a * x, 1 - b * (x * x + y * y)],
-        ]
-    )
-
-
-def _right_angled():
-    found = []
-    for axes in ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)):
-        for signs in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
-            Q = np.zeros((3, 3))
-            Q[0, axes[0]], Q[1, axes[1]], Q[2, axes[2]] = *signs, 1
-            Q[2] *= np.linalg.det(Q)
-            found.append(Q)
-    return found
-
-
-_RIGHT_ANGLED = _right_angled()
-
-
-def _trimmed_start(R, t, x, target, rng):
-    """Weights 0 or 1 of the half of the poses that agree best: random subsets, the best five of them concentrated."""
-    n, size = len(R), min(len(R), 6 if target is None else 4)
-    half = min(n, (n + size) // 2 + 1)
-
-    def concentrate(chosen):
-        try:
-            R_FS, t_FS, center, *_ = _solve(R[chosen], t[chosen], x[chosen], np.ones(len(chosen)), target, steps=4)
-        except (ValueError, np.linalg.LinAlgError):
-            return np.inf, None  # a subset without the motions the whole set has
-        squares = (_residuals(R, t, x, R_FS, t_FS, center) ** 2).sum(1)
-        nearest = np.argsort(squares, kind="stable")[:half]
-        return squares[nearest].sum(), nearest
-
-    found = [concentrate(rng.choice(n, size, replace=False)) for _ in range(SUBSETS)]
-    found = sorted((f for f in found if f[1] is not None), key=lambda f: f[0])[:5]
-    for _ in range(3):
-        found = [concentrate(nearest) for _, nearest in found]
-    weights = np.zeros(n)
-    weights[min(found, key=lambda f: f[0])[1] if found else slice(None)] = 1.0
-    return weights
-
-
-def _tukey(R, t, x, target, weights):
-    """Iteratively reweighted least squares from the trimmed start; the scale is the median residual length."""
-    trace = []
-    for _ in range(MAX_STEPS):
-        R_FS, t_FS, center, _, moments = _solve(R, t, x, weights, target)
-        residuals = _residuals(R, t, x, R_FS, t_FS, center)
-        lengths = np.sqrt((residuals * residuals).sum(1))
-        trace.append(_rms(residuals))
-        scale = np.median(lengths) / MEDIAN_CHI3
-        if scale <= 1e-12 * np.abs(x).max():  # noise-free: what does not fit exactly is wrong
-            new = (lengths <= 1e-9 * np.abs(x).max()).astype(float)
-        else:
-            new = tukey_weights(lengths, scale)
-        if np.abs(new - weights).max() < 1e-8:
-            break
-        weights = new
-    return R_FS, t_FS, center, residuals, weights, trace, moments
-
-
-def _spectrum(mean, G, total, R_FS, target_free):
-    """Singular values of the scaled Jacobian of phi, translation (and target), and half with (J'J)^-1 = half half'.
-
-    J'J is put together from the moments of the poses; J = (-R_BF R_FS [x], R_BF, -I) itself is never built.
-    """
-    k, x_mean = 9 if target_free else 6, mean[:3]
-    moment = G[:3, :3] + total * np.outer(x_mean, x_mean)
-    reach = math.sqrt(moment.trace() / total)
-    first = (total / reach) * (x_mean @ _FLAT_GENERATORS).reshape(3, 3) @ R_FS.T
-    A = total * np.eye(k)
-    A[:3, :3] = (moment.trace() * _EYE - moment) / reach**2
-    A[:3, 3:6], A[3:6, :3] = first, first.T
-    if target_free:
-        turned = -total * mean[6:].reshape(3, 3)
-        mixed = (G[:3, 6:] / reach + np.outer(total / reach * x_mean, mean[6:])).reshape(3, 3, 3)  # sum of x_j R_BF
-        cross = -(_GENERATORS @ R_FS.T @ mixed.transpose(0, 2, 1)).sum(0)
-        A[3:6, 6:], A[6:, 3:6] = turned.T, turned
-        A[:3, 6:], A[6:, :3] = cross, cross.T
-    values, vectors = np.linalg.eigh(A)
-    values = np.sqrt(np.maximum(values, np.finfo(float).tiny))
-    half = vectors / values
-    half[:3] /= reach
-    return values[::-1], half

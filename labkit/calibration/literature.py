@@ -11,7 +11,7 @@ from ..geometry.lie import exp_so3, nearest_rotation
 from .hand_eye import (
     FIELD,
     MIN_SPREAD,
-    _poses,
+    as_sightings,
     calibrate_sphere_target,
     linear_start,
     poses_that_see,
@@ -116,7 +116,7 @@ def li_two_step(T_BF, x_S, max_turn_deg=0.01):
 
     Source: thesis, formulas (2-40) to (2-42), after Li et al. (2011).
     """
-    (T_BF, x_S), max_turn_deg = _poses(T_BF, x_S), as_positive_number(max_turn_deg, "max_turn_deg")
+    (T_BF, x_S), max_turn_deg = as_sightings(T_BF, x_S), as_positive_number(max_turn_deg, "max_turn_deg")
     if len(T_BF) < 2:
         raise ValueError(f"at least 2 poses are needed, got {len(T_BF)}")
     R, t = T_BF[:, :3, :3], T_BF[:, :3, 3]

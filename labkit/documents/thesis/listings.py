@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...calibration.hand_eye import _poses, kuka_residuals
+from ...calibration.hand_eye import as_sightings, kuka_residuals
 from ...checks import as_count, as_number, as_points, as_shape
 from ...estimation.differences import numeric_jacobian
 
@@ -35,7 +35,7 @@ def listing_gauss_newton(start_deg, T_BF, x_S, target, step=5e-7, tolerance=1e-2
         Whether the stopping rule was met before `max_steps`.
     """
     p, max_steps = as_shape(start_deg, "start_deg", 6), as_count(max_steps, "max_steps", at_least=0)
-    T_BF, x_S = _poses(T_BF, x_S)
+    T_BF, x_S = as_sightings(T_BF, x_S)
     target, tolerance = as_shape(target, "target", 3), as_number(tolerance, "tolerance")
     unit = np.array([1, 1, 1, *np.deg2rad([1, 1, 1])])
 
