@@ -19,14 +19,6 @@ def shown(value, form="g"):
     text = format(float(array), form)
     return text.lstrip("-") if float(text) == 0 else text
 
-def shown(value, form="g"):
-    """A number, or a vector as "(x, y, z)", for a sentence; what rounds to zero has no sign."""
-    array = np.asarray(value, dtype=float)
-    if array.ndim:
-        return f"({', '.join(shown(entry, form) for entry in array)})"
-    text = format(float(array), form)
-    return text.lstrip("-") if float(text) == 0 else text
-
 
 def as_finite(value, name):
     """`value` as an array of finite floats; refuses what is no number, NaN and infinities."""
@@ -159,14 +151,6 @@ def as_transforms(value, name):
         raise ValueError(f"{name} must have the last row 0 0 0 1, got {shown(row, '.9g')}")
     _refuse_sheared(array[..., :3, :3], name)
     return array
-
-
-def as_transform_rows(value, name):
-    """`value`, a stack of rigid transforms, shape (n, 4, 4), with a copy of its entries as contiguous rows (16, n)."""
-    array = as_transforms(value, name)
-    if array.ndim != 3:
-        raise ValueError(f"{name} must have shape (n, 4, 4), got {array.shape}")
-    return array, np.array(array.reshape(-1, 16).T, order="C")
 
 
 def _refuse_sheared(R, name):

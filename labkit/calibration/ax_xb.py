@@ -1,30 +1,144 @@
 """A X = X B: where a sensor sits on a flange, from motions alone.
 
-`T_BF` is the flange F in the robot's base B, `T_ST` the target T as the sensor S sees it, `T_FS` the mounting looked
-for; the closed loop says T_BF T_FS T_ST = T_BT for every pose. Lengths mm, angles rad.
+`T_BF` is the flange F in the robot's base B, `T_ST` the target T as the sensor S sees it. Either the sensor rides on
+the flange and the target stands still (eye in hand), or the other way round (eye to hand):
 
-`solve_ax_xb` is the method of the report (ZCU Plzen 2018, section 3.1, equations 4 to 16), rotation first, then
-translation. `calibrate_hand_eye` is the maximum-likelihood estimate for noise on the sensor's readings. Its cost
-depends on the N poses through two small matrices only, so an iteration takes the same time for 20 poses and for 20000.
+    T_BF T_FS T_ST = T_BT    eye in hand: unknown T_FS and T_BT
+    T_BF T_FT = T_BS T_ST    eye to hand: unknown T_FT and T_BS, the same loop with T_BF inverted
+
+Lengths mm, angles rad. `solve_ax_xb` is the method of the report (ZCU Plzen 2018, section 3.1, equations 4 to 16),
+rotation first, then translation. `calibrate_hand_eye` is the maximum-likelihood estimate for noise on the sensor's
+readings; `labkit.fast.ax_xb` finds it from sums over the poses.
 """
+
+from functools import cached_property
 
 import numpy as np
 
 from ..checks import as_positive_number, as_rotations, as_shape, as_transforms, shown
-from ..geometry.frames import pose, rotation_block
-from ..geometry.lie import log_so3, nearest_rotation, skew
-from .result import HandEye
+from ..geometry.frames import invert, pose, rotation_block
+from ..geometry.lie import exp_so3, log_so3, nearest_rotation, skew
+from .motion import refuse_one_axis
+from .result import Result, pose_parameters, result_class
+from .robust import median_std
 
-RELATIVE_RANK = 1e-6  # second smallest singular value of the Kronecker matrix a motion: below it the axes are parallel
+RELATIVE_RANK = 1e-6  # second smallest singular value of the Kronecker matrix per motion: below, the axes are parallel
 MIN_ANGLE_STD, MIN_LENGTH_STD = 1e-9, 1e-9  # rad, and relative to the lengths: noise-free data must not divide by zero
-MAX_STEPS, STEP_TOLERANCE = (
-    30,
-    1e-8,
-)  # rad; the step is taken before it is judged, and the next one would be 1000 times smaller
-TUKEY, STARTS = 5.2, 12  # cut-off in robust standard deviations of the 6-vector; loose rounds before it is applied
+MAX_STEPS = 30
+STEP_TOLERANCE = 1e-8  # rad; the step is taken before it is judged, and the next would be a thousand times smaller
+TUKEY, LOOSE_ROUNDS = 5.2, 12  # cut-off in robust standard deviations of the 6-vector; rounds before it is applied
 
-_GENERATORS = skew(np.eye(3))  # (3, 3, 3): d/dphi_k exp(phi) at 0
-_I3 = np.eye(3)
+
+class HandEye(Result):
+    """Base of `EyeInHand` and `EyeToHand`, with the loop of both: robot @ sensor @ T_ST = target.
+
+    Attributes
+    ----------
+    T_BF, T_ST : array, shape (N, 4, 4)
+        Poses of the flange, and the target as the sensor saw it there (mm).
+    weights : array, shape (N,)
+        1 for a reading that counts fully, 0 for a rejected one.
+    given : tuple
+        (std_rot, std_trans) as given, None for what was estimated.
+    history : array, shape (steps, 3)
+        std_rot (rad), std_trans (mm) and the size of the step (rad) in each iteration.
+    residuals : array, shape (N, 6)
+        Rotation vector (rad, in T) and translation (mm, in S) of the reading against the prediction.
+    std : array, shape (6,)
+        Noise of each column of the residuals (rad, mm), as given or as estimated.
+    covariance : array, shape (12, 12)
+        Of the sensor's pose (rotation vector about the axes of S, then translation) and of the target's (axes of T).
+    singular_values : array, shape (12,)
+        Of the whitened Jacobian with its columns scaled to length 1, largest first; the last one tells how close the
+        data are to leaving something undetermined.
+    """
+
+    @cached_property
+    def _loop(self):
+        """(robot, sensor, target) with robot @ sensor @ T_ST = target."""
+        return self.T_BF, self.T_FS, self.T_BT
+
+    @cached_property
+    def residuals(self):
+        robot, sensor, target = self._loop
+        predicted = invert(robot @ sensor) @ target
+        turn = log_so3(np.swapaxes(predicted[:, :3, :3], 1, 2) @ self.T_ST[:, :3, :3])
+        return np.concatenate([turn, self.T_ST[:, :3, 3] - predicted[:, :3, 3]], axis=1)
+
+    @cached_property
+    def _information(self):
+        """Normal matrices of the twelve unknowns for noise of size 1, rotations and translations apart."""
+        root = np.sqrt(np.repeat(self.weights, 3))[:, None]
+        by_turns, by_gaps = (root * J for J in loop_jacobians(*self._loop, self.T_ST))
+        return by_turns.T @ by_turns, by_gaps.T @ by_gaps
+
+    @cached_property
+    def std(self):
+        """Each noise level that is estimated pays for the share of the unknowns that it determines."""
+        N_rot, N_trans = self._information
+        squares = self.weights @ self.residuals**2
+        observations, share = 3 * self.weights.sum(), 6.0
+        for _ in range(2 if None in self.given else 1):
+            freedom = observations - 12 + share, observations - share
+            std_rot, std_trans = noise_levels(squares[:3].sum(), squares[3:].sum(), freedom, self.given, _size(self))
+            N = N_rot / std_rot**2 + N_trans / std_trans**2
+            share = np.trace(_inverse(N) @ N_trans) / std_trans**2
+        return np.repeat([std_rot, std_trans], 3)
+
+    @property
+    def _normal_matrix(self):
+        N_rot, N_trans = self._information
+        return N_rot / self.std[0] ** 2 + N_trans / self.std[3] ** 2
+
+    @cached_property
+    def covariance(self):
+        return _inverse(self._normal_matrix)
+
+    @cached_property
+    def singular_values(self):
+        N = self._normal_matrix
+        scale = 1 / np.sqrt(np.diagonal(N))
+        return np.sqrt(np.maximum(np.linalg.eigvalsh(N * scale[:, None] * scale)[::-1], 0.0))
+
+
+@result_class
+class EyeInHand(HandEye):
+    """The sensor on the flange, T_FS, and the target in the base, T_BT; the figures of `HandEye`."""
+
+    T_FS: np.ndarray
+    T_BT: np.ndarray
+    T_BF: np.ndarray
+    T_ST: np.ndarray
+    weights: np.ndarray
+    given: tuple
+    history: np.ndarray
+
+    parameters = pose_parameters("T_FS") + pose_parameters("T_BT")
+
+
+@result_class
+class EyeToHand(HandEye):
+    """The sensor in the base, T_BS, and the target on the flange, T_FT; the figures of `HandEye`."""
+
+    T_BS: np.ndarray
+    T_FT: np.ndarray
+    T_BF: np.ndarray
+    T_ST: np.ndarray
+    weights: np.ndarray
+    given: tuple
+    history: np.ndarray
+
+    parameters = pose_parameters("T_BS") + pose_parameters("T_FT")
+
+    @cached_property
+    def _loop(self):
+        return invert(self.T_BF), self.T_BS, self.T_FT
+
+
+ROLES = {"in hand": EyeInHand, "to hand": EyeToHand}
+
+
+# --- the report's method ---------------------------------------------------------------------------------------------
 
 
 def kronecker_matrix(A, B):
@@ -43,8 +157,8 @@ def kronecker_matrix(A, B):
     A, B = rotation_block(A, "A"), rotation_block(B, "B")
     if A.ndim != 3 or A.shape != B.shape:
         raise ValueError(f"A and B must be as many motions, (N, 3, 3) or (N, 4, 4), got {A.shape} and {B.shape}")
-    left = np.einsum("jl,nik->njilk", _I3, A)
-    right = np.einsum("nlj,ik->njilk", B, _I3)
+    left = np.einsum("jl,nik->njilk", np.eye(3), A)
+    right = np.einsum("nlj,ik->njilk", B, np.eye(3))
     return (left - right).reshape(-1, 9)
 
 
@@ -77,15 +191,14 @@ def translation_from_motions(A, B, R):
     A, B, R = as_transforms(A, "A"), as_transforms(B, "B"), as_shape(as_rotations(R, "R"), "R", 3, 3)
     if A.ndim != 3 or A.shape != B.shape:
         raise ValueError(f"A and B must both have shape (N, 4, 4), got {A.shape} and {B.shape}")
-    K1 = _I3 - A[:, :3, :3]
+    K1 = np.eye(3) - A[:, :3, :3]
     K2 = A[:, :3, 3] - B[:, :3, 3] @ R.T
     t = np.linalg.lstsq(K1.reshape(-1, 3), K2.ravel(), rcond=None)[0]
     return t, K1 @ t - K2
 
 
 def solve_ax_xb(A, B):
-    """Mounting from motion pairs by the report's method: Kronecker product and SVD for the rotation, then least
-    squares.
+    """Mounting from motion pairs by the report's method: Kronecker product for the rotation, then least squares.
 
     Parameters
     ----------
@@ -120,215 +233,184 @@ def solve_ax_xb(A, B):
     return pose(R, translation_from_motions(A, B, R)[0])
 
 
-def calibrate_hand_eye(T_BF, T_ST, std_rot=None, std_trans=None, robust=False):
-    """Maximum-likelihood mounting when the sensor's readings carry the noise and the robot does not.
+# --- maximum likelihood ----------------------------------------------------------------------------------------------
+
+
+def calibrate_hand_eye(T_BF, T_ST, std_rot=None, std_trans=None, robust=False, *, eye="in hand"):
+    """Maximum-likelihood poses of sensor and target when the readings carry the noise and the robot does not.
 
     Parameters
     ----------
     T_BF : array-like, shape (N, 4, 4)
-        Poses of the flange.
+        Poses of the flange in the base (mm). N >= 3, turned about at least two axes.
     T_ST : array-like, shape (N, 4, 4)
-        The target as the sensor saw it. N >= 3, rotation axes of the motions not all parallel.
+        Readings: the target as the sensor saw it in each (mm).
     std_rot, std_trans : float, optional
-        Standard deviation of a reading per axis, rad and mm. What is not given is estimated together with the mounting.
+        Standard deviation of a reading per axis, rad and mm. What is not given is estimated together with the poses.
     robust : bool
         Down-weight and finally ignore readings that fit nothing (Tukey's biweight over the six normalized residuals,
         scale by the median).
+    eye : {"in hand", "to hand"}
+        Whether the sensor rides on the flange, or stands still and looks at a target that does.
 
     Returns
     -------
-    HandEye
-        target is T_BT, shape (4, 4). residuals, shape (N, 6): rotation vector (rad) and translation (mm, in S) of the
-        reading against the prediction. covariance, shape (12, 12): T_FS first (rotation vector about the axes of S,
-        translation in F), T_BT after it (axes of T, translation in B). trace, shape (steps, 3): std_rot, std_trans and
-        the size of the step.
+    EyeInHand or EyeToHand
+        With T_FS and T_BT, or with T_BS and T_FT.
 
     Raises
     ------
     ValueError
-        When the stacks differ, N < 3, or the data leave a direction of the mounting undetermined.
+        When the stacks differ, N < 3, or the poses do not turn about two axes.
 
-    The start is linear: rotations by the singular vectors of one 9 x 9 matrix (Shah 2013), translations by least
-    squares.
+    Source: the start solves for the rotations by one singular value decomposition (Shah 2013) and for the translations
+    by least squares; beyond the report.
+
+    See Also
+    --------
+    labkit.fast.ax_xb.calibrate_hand_eye : the same from sums over the poses.
+    """
+    return calibrate_with(_gauss_newton, T_BF, T_ST, std_rot, std_trans, robust, eye)
+
+
+def calibrate_with(fit, T_BF, T_ST, std_rot, std_trans, robust, eye):
+    """What `calibrate_hand_eye` does around its fit: input, outliers, result.
+
+    `fit(robot, T_ST, weights, given)` returns sensor and target of the loop robot @ sensor @ T_ST = target, and the
+    history.
     """
     T_BF, T_ST = as_transforms(T_BF, "T_BF"), as_transforms(T_ST, "T_ST")
     if T_BF.ndim != 3 or T_BF.shape != T_ST.shape or len(T_BF) < 3:
         raise ValueError(f"T_BF and T_ST must both have shape (N, 4, 4) with N >= 3, got {T_BF.shape} and {T_ST.shape}")
+    if eye not in ROLES:
+        raise ValueError(f"eye must be 'in hand' or 'to hand', got {eye!r}")
     given = tuple(
         None if std is None else as_positive_number(std, name)
         for std, name in ((std_rot, "std_rot"), (std_trans, "std_trans"))
     )
-    problem = _Problem(T_BF, T_ST, given)
-    weights = np.ones(len(T_BF))
-    state = problem.fit(weights, problem.start(weights))
-    if robust:
-        weights, state = _reweigh(problem, weights, state)
-    return problem.result(weights, state)
+    T_BF, T_ST, weights = T_BF.copy(), T_ST.copy(), np.ones(len(T_BF))
+    robot, frame = (T_BF, "base") if eye == "in hand" else (invert(T_BF), "flange")
+
+    def solve(weights):
+        refuse_one_axis(robot[:, :3, :3], weights, frame, "sensor and target")
+        sensor, target, history = fit(robot, T_ST, weights, given)
+        return ROLES[eye](sensor, target, T_BF, T_ST, weights, given, np.array(history))
+
+    return _reweighted(solve, solve(weights)) if robust else solve(weights)
 
 
-class _Problem:
-    """The data of one calibration, and its cost as a function of Rx (of T_FS) and Ry (of T_BT) alone."""
-
-    def __init__(self, T_BF, T_ST, given):
-        self.given, self.n = given, len(T_BF)
-        self.R, self.A = T_BF[:, :3, :3], T_ST[:, :3, :3]
-        self.p, self.a = T_BF[:, :3, 3], T_ST[:, :3, 3]
-        self.size = np.abs(self.p).max() + np.abs(self.a).max() + 1e-300
-        # translation residual in B: e_i = R_i tx + R_i Rx a_i + p_i - ty = C_i (tx, rvec Rx, 1) - ty
-        self.C = np.empty((self.n, 3, 13))
-        self.C[:, :, :3] = self.R
-        self.C[:, :, 3:12] = (self.R[:, :, :, None] * self.a[:, None, None, :]).reshape(self.n, 3, 9)
-        self.C[:, :, 12] = self.p
-        self.trace = []
-
-    def sums(self, weights):
-        """All that the iterations need: K of the rotations, and the translation cost with tx and ty eliminated."""
-        total = weights.sum()
-        flat = self.R.reshape(-1, 9)
-        weighted = flat if total == self.n else flat * weights[:, None]
-        # rvec(R X A) = (R kron A') rvec(X)
-        K = (weighted.T @ self.A.reshape(-1, 9)).reshape(3, 3, 3, 3).transpose(0, 3, 1, 2).reshape(9, 9)
-        mean = (weights @ self.C.reshape(-1, 39)).reshape(3, 13) / total
-        rows = (self.C - mean).reshape(-1, 13)
-        scaled = rows if total == self.n else rows * np.repeat(weights, 3)[:, None]
-        G = scaled.T @ rows
-        try:
-            elimination = np.linalg.solve(G[:3, :3], G[:3, 3:])
-        except np.linalg.LinAlgError:
-            raise ValueError(_UNDETERMINED) from None
-        H = G[3:, 3:] - G[3:, :3] @ elimination
-        mean_A = (weights @ self.A.reshape(-1, 9)).reshape(3, 3)
-        return K, H, elimination, mean, mean_A, total
-
-    def start(self, weights):
-        """Rotations from the leading singular vectors of K: K rvec(Rx) = N rvec(Ry) for exact data."""
-        sums = self.sums(weights)
-        U, values, Vt = np.linalg.svd(sums[0])
-        if values[0] - values[1] <= RELATIVE_RANK**2 * values[0]:
-            raise ValueError(_UNDETERMINED)
-        both = np.stack([Vt[0], U[:, 0]]).reshape(2, 3, 3)
-        if np.linalg.det(both[0]) < 0:
-            both = -both
-        return nearest_rotation(both), sums
-
-    def fit(self, weights, start):
-        """Gauss-Newton on (Rx, Ry), the noise levels estimated along when they are not given."""
-        both, sums = start
-        K, H, _, _, sum_A, total = sums
-        H9, h, h0 = H[:9, :9], H[:9, 9], H[9, 9]
-        normal_r = np.empty((6, 6))
-        normal_r[:3, :3] = normal_r[3:, 3:] = total * _I3
-        normal_r[:3, 3:], normal_r[3:, :3] = -sum_A, -sum_A.T
-        freedom = max(3 * total - 6, 1.0)
-        for _ in range(MAX_STEPS):
-            x, y = both.reshape(2, 9)
-            Lx, Ly = (both[:, None] @ _GENERATORS).reshape(2, 3, 9)
-            Kx, Hx = K @ x, H9 @ x + h
-            std_r, std_t = self.stds(3 * total - y @ Kx, x @ Hx + h @ x + h0, freedom)
-            normal, gradient = normal_r / std_r**2, np.empty(6)
-            normal[:3, :3] += Lx @ H9 @ Lx.T / std_t**2
-            gradient[:3] = Lx @ (Hx / std_t**2 - 0.5 / std_r**2 * (K.T @ y))
-            gradient[3:] = -0.5 / std_r**2 * (Ly @ Kx)
-            step = -np.linalg.solve(normal, gradient)
-            both = _turned(both, step.reshape(2, 3))
-            size = np.abs(step).max()
-            self.trace.append((std_r, std_t, size))
-            if size < STEP_TOLERANCE:
-                break
-        Rx, Ry = both
-        tx = -sums[2] @ np.append(Rx.ravel(), 1.0)
-        ty = sums[3] @ np.concatenate([tx, Rx.ravel(), [1.0]])
-        return Rx, Ry, tx, ty
-
-    def stds(self, cost_r, cost_t, freedom):
-        """Noise levels: as given, or from the residuals, a quarter of the unknowns charged to each of the four
-        blocks."""
-        std_r = self.given[0] or max(max(cost_r, 0.0) / freedom, MIN_ANGLE_STD**2) ** 0.5
-        std_t = self.given[1] or max(max(cost_t, 0.0) / freedom, (MIN_LENGTH_STD * self.size) ** 2) ** 0.5
-        return std_r, std_t
-
-    def residuals(self, state):
-        """Reading against prediction, shape (N, 6), in the axes of the target (rotation) and of S (translation)."""
-        Rx, Ry, tx, ty = state
-        RX = self.R @ Rx
-        turn = log_so3(Ry.T @ RX @ self.A)
-        gap = self.a @ Rx.T + tx
-        e = (self.R @ gap[:, :, None])[..., 0] + self.p - ty
-        return turn, (np.swapaxes(RX, 1, 2) @ e[:, :, None])[..., 0]
-
-    def information(self, weights, Rx):
-        """Normal matrices of the twelve unknowns for noise of size 1, rotations and translations apart, from sums in
-        closed form."""
-        total = weights.sum()
-        A_sum, R_sum = (weights @ self.A.reshape(-1, 9)).reshape(3, 3), (weights @ self.R.reshape(-1, 9)).reshape(3, 3)
-        aw = self.a * weights[:, None]
-        aa = aw.T @ self.a
-        # sum of skew(a_i) Rx' R_i' over the poses, column by column a cross product
-        aR = Rx.T @ (aw.T @ self.R.transpose(0, 2, 1).reshape(-1, 9)).reshape(3, 3, 3)
-        cross = np.array([aR[1, 2] - aR[2, 1], aR[2, 0] - aR[0, 2], aR[0, 1] - aR[1, 0]])
-        N_r, N_t = np.zeros((12, 12)), np.zeros((12, 12))
-        N_r[:3, :3] = N_r[6:9, 6:9] = N_t[3:6, 3:6] = N_t[9:, 9:] = total * _I3
-        N_r[:3, 6:9], N_r[6:9, :3] = -A_sum, -A_sum.T
-        N_t[:3, :3] = (aa[0, 0] + aa[1, 1] + aa[2, 2]) * _I3 - aa
-        arm = skew(aw.sum(0)) @ Rx.T
-        N_t[:3, 3:6], N_t[3:6, :3] = arm, arm.T
-        N_t[:3, 9:], N_t[9:, :3] = -cross, -cross.T
-        N_t[3:6, 9:], N_t[9:, 3:6] = -R_sum.T, -R_sum
-        return N_r, N_t
-
-    def result(self, weights, state):
-        """Residuals, noise levels and covariance at the solution; each noise level pays for the share of the unknowns
-        it determines."""
-        turn, e = self.residuals(state)
-        cost_r, cost_t = weights @ (turn * turn).sum(1), weights @ (e * e).sum(1)
-        N_r, N_t = self.information(weights, state[0])
-        observations = 3 * weights.sum()
-        share = 6.0
-        for _ in range(2 if None in self.given else 1):
-            std_r = self.stds(cost_r, cost_t, max(observations - 12 + share, 1.0))[0]
-            std_t = self.stds(cost_r, cost_t, max(observations - share, 1.0))[1]
-            N_w = N_t / std_t**2
-            N = N_r / std_r**2 + N_w
-            scale = 1 / np.sqrt(N.diagonal())
-            unit = N * scale[:, None] * scale
-            covariance = np.linalg.inv(unit) * scale[:, None] * scale
-            share = (covariance * N_w).sum()
-        values = np.linalg.eigvalsh(unit)
-        if values[0] <= RELATIVE_RANK**2 * values[-1]:
-            raise ValueError(_UNDETERMINED)
-        Rx, Ry, tx, ty = state
-        T = np.zeros((2, 4, 4))
-        T[0, :3, :3], T[1, :3, :3], T[0, :3, 3], T[1, :3, 3], T[:, 3, 3] = Rx, Ry, tx, ty, 1.0
-        return HandEye(
-            T[0], T[1], np.concatenate([turn, e], 1), covariance, np.sqrt(values[::-1]), weights, np.array(self.trace)
-        )
-
-
-_UNDETERMINED = (
-    "T_BF leaves a direction of the mounting undetermined: the rotation axes of all motions are parallel, "
-    "or the poses do not turn"
-)
-
-
-def _turned(R, phi):
-    """R, shape (n, 3, 3), turned by phi, shape (n, 3), about its own axes, by Cayley's map: exactly orthonormal, equal
-    to the exponential up to |phi|^3 / 12."""
-    S = (phi @ _GENERATORS.reshape(3, 9)).reshape(R.shape)
-    return R @ (_I3 + (S + 0.5 * (S @ S)) / (1.0 + 0.25 * (phi * phi).sum(-1))[:, None, None])
-
-
-def _reweigh(problem, weights, state):
+def _reweighted(solve, result):
     """Iteratively reweighted least squares: first bounded influence (1 / distance), then Tukey's biweight."""
-    for k in range(3 * STARTS):
-        turn, e = problem.residuals(state)
-        scales = [1.4826 * np.median(np.linalg.norm(v, axis=1)) / 2.2817 for v in (turn, e)]
-        floor = (MIN_ANGLE_STD, MIN_LENGTH_STD * problem.size)
-        d = np.sqrt(sum((v * v).sum(1) / max(s, f) ** 2 for v, s, f in zip((turn, e), scales, floor)))
-        fresh = 1 / np.maximum(d, 1.0) if k < STARTS else np.maximum(1 - (d / TUKEY) ** 2, 0.0) ** 2
+    floors = MIN_ANGLE_STD, MIN_LENGTH_STD * _size(result)
+    for k in range(3 * LOOSE_ROUNDS):
+        parts = result.residuals[:, :3], result.residuals[:, 3:]
+        lengths = [np.linalg.norm(part, axis=1) for part in parts]
+        d = np.hypot(*(length / max(median_std(length), floor) for length, floor in zip(lengths, floors)))
+        fresh = 1 / np.maximum(d, 1.0) if k < LOOSE_ROUNDS else np.maximum(1 - (d / TUKEY) ** 2, 0.0) ** 2
         if fresh.sum() < 4:
             raise ValueError("robust: fewer than 4 readings agree with each other, so no majority can be followed")
-        if k > STARTS and np.abs(fresh - weights).max() < 1e-6:
+        if k > LOOSE_ROUNDS and np.abs(fresh - result.weights).max() < 1e-6:
             break
-        weights = fresh
-        state = problem.fit(weights, problem.start(weights))
-    return weights, state
+        result = solve(fresh)
+    return result
+
+
+def linear_rotations(robot, T_ST, weights):
+    """Rotations of sensor and target: R X A = Y for all poses is K rvec(X) = N rvec(Y), X and Y singular vectors of K.
+
+    Returns
+    -------
+    both : array, shape (2, 3, 3)
+
+    Source: Shah (2013).
+    """
+    K = np.einsum("n,nij,nkl->iljk", weights, robot[:, :3, :3], T_ST[:, :3, :3]).reshape(9, 9)
+    U, _, Vt = np.linalg.svd(K)
+    both = np.stack([Vt[0], U[:, 0]]).reshape(2, 3, 3)
+    return nearest_rotation(both if np.linalg.det(both[0]) > 0 else -both)
+
+
+def _best_shifts(robot, T_ST, weights, Rx, Ry):
+    """Sensor and target with the rotations Rx and Ry and the translations that fit best: they enter linearly."""
+    sensor, target = pose(Rx, np.zeros(3)), pose(Ry, np.zeros(3))
+    root = np.sqrt(np.repeat(weights, 3))
+    J = loop_jacobians(robot, sensor, target, T_ST)[1][:, [3, 4, 5, 9, 10, 11]]
+    gaps = (robot @ sensor @ T_ST)[:, :3, 3].ravel()
+    t = np.linalg.lstsq(J * root[:, None], -gaps * root, rcond=None)[0]
+    return pose(Rx, t[:3]), pose(Ry, t[3:])
+
+
+def loop_jacobians(robot, sensor, target, T_ST):
+    """Derivatives of the loop's errors by small rotations and translations of sensor and target.
+
+    The error of the rotation is the rotation vector of target' robot sensor T_ST, that of the translation the gap
+    between both sides in the base.
+
+    Returns
+    -------
+    by_turns, by_gaps : array, shape (3 N, 12)
+        Columns: rotation vector about the axes of S, translation of the sensor; the same of the target.
+    """
+    n, R, A, a = len(robot), robot[:, :3, :3], T_ST[:, :3, :3], T_ST[:, :3, 3]
+    by_turns, by_gaps = np.zeros((2, n, 3, 12))
+    by_turns[..., :3], by_turns[..., 6:9] = np.swapaxes(A, 1, 2), -np.eye(3)
+    by_gaps[..., :3] = -R @ (sensor[:3, :3] @ skew(a))
+    by_gaps[..., 3:6], by_gaps[..., 9:] = R, -np.eye(3)
+    return by_turns.reshape(-1, 12), by_gaps.reshape(-1, 12)
+
+
+def _gauss_newton(robot, T_ST, weights, given):
+    """Gauss-Newton on both poses from the linear start, the noise levels estimated along when they are not given.
+
+    Rotations are compared by the chordal distance, 2 sin(angle / 2), whose gradient is the skew part of the error.
+    """
+    sensor, target = _best_shifts(robot, T_ST, weights, *linear_rotations(robot, T_ST, weights))
+    root, freedom = np.sqrt(np.repeat(weights, 3)), 3 * weights.sum() - 6
+    size, history = _length(robot, T_ST), []
+    for _ in range(MAX_STEPS):
+        closed = robot @ sensor @ T_ST
+        E, gap = target[:3, :3].T @ closed[:, :3, :3], closed[:, :3, 3] - target[:3, 3]
+        turn = 0.5 * np.stack([E[:, 2, 1] - E[:, 1, 2], E[:, 0, 2] - E[:, 2, 0], E[:, 1, 0] - E[:, 0, 1]], axis=1)
+        squares = weights @ (3 - np.trace(E, axis1=1, axis2=2)), weights @ (gap**2).sum(1)
+        std_rot, std_trans = noise_levels(*squares, (freedom, freedom), given, size)
+        by_turns, by_gaps = loop_jacobians(robot, sensor, target, T_ST)
+        J = np.concatenate([by_turns * root[:, None] / std_rot, by_gaps * root[:, None] / std_trans])
+        r = np.concatenate([turn.ravel() * root / std_rot, gap.ravel() * root / std_trans])
+        scale = 1 / np.linalg.norm(J, axis=0)
+        step = scale * np.linalg.lstsq(J * scale, -r, rcond=None)[0]
+        sensor, target = _moved(sensor, step[:6]), _moved(target, step[6:])
+        largest = np.abs(step[[0, 1, 2, 6, 7, 8]]).max()
+        history.append((std_rot, std_trans, largest))
+        if largest < STEP_TOLERANCE:
+            break
+    return sensor, target, history
+
+
+def _moved(T, step):
+    return pose(T[:3, :3] @ exp_so3(step[:3]), T[:3, 3] + step[3:])
+
+
+def noise_levels(square_rot, square_trans, freedom, given, size):
+    """Standard deviations of the readings (rad, mm): as given, or from sums of squares and their degrees of freedom.
+
+    At the least what noise-free data of the given size (mm) may have by rounding.
+    """
+    floors = MIN_ANGLE_STD, MIN_LENGTH_STD * size
+    return tuple(
+        known or max(max(square, 0.0) / max(free, 1.0), floor**2) ** 0.5
+        for known, square, free, floor in zip(given, (square_rot, square_trans), freedom, floors)
+    )
+
+
+def _length(robot, T_ST):
+    return np.abs(robot[:, :3, 3]).max() + np.abs(T_ST[:, :3, 3]).max() + 1e-300
+
+
+def _size(result):
+    return _length(result._loop[0], result.T_ST)
+
+
+def _inverse(N):
+    """Inverse of a normal matrix whose unknowns have different units."""
+    scale = 1 / np.sqrt(np.diagonal(N))
+    return np.linalg.inv(N * scale[:, None] * scale) * scale[:, None] * scale

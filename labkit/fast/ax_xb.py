@@ -1,0 +1,76 @@
+"""Maximum-likelihood hand-eye calibration from sums over the poses; equals `calibration.ax_xb`.
+
+The cost depends on the N poses through two small matrices only, so an iteration takes the same time for 20 poses and for
+20000.
+"""
+
+import numpy as np
+
+from ..calibration.ax_xb import MAX_STEPS, STEP_TOLERANCE, calibrate_with, linear_rotations, noise_levels
+from ..geometry.lie import skew
+
+_GENERATORS = skew(np.eye(3))  # (3, 3, 3): d/dphi_k exp(phi) at 0
+_I3 = np.eye(3)
+
+
+def calibrate_hand_eye(T_BF, T_ST, std_rot=None, std_trans=None, robust=False, *, eye="in hand"):
+    """Poses of sensor and target from noisy readings: `labkit.calibration.ax_xb.calibrate_hand_eye`."""
+    return calibrate_with(_fit, T_BF, T_ST, std_rot, std_trans, robust, eye)
+
+
+def _fit(robot, T_ST, weights, given):
+    """Gauss-Newton on the rotations of sensor and target alone, the translations eliminated."""
+    size = np.abs(robot[:, :3, 3]).max() + np.abs(T_ST[:, :3, 3]).max() + 1e-300
+    K, H, elimination, mean, sum_A, total = _sums(robot, T_ST, weights)
+    H9, h, h0 = H[:9, :9], H[:9, 9], H[9, 9]
+    normal_r = np.empty((6, 6))
+    normal_r[:3, :3] = normal_r[3:, 3:] = total * _I3
+    normal_r[:3, 3:], normal_r[3:, :3] = -sum_A, -sum_A.T
+    both, freedom, history = linear_rotations(robot, T_ST, weights), 3 * total - 6, []
+    for _ in range(MAX_STEPS):
+        x, y = both.reshape(2, 9)
+        Lx, Ly = (both[:, None] @ _GENERATORS).reshape(2, 3, 9)
+        Kx, Hx = K @ x, H9 @ x + h
+        std_r, std_t = noise_levels(3 * total - y @ Kx, x @ Hx + h @ x + h0, (freedom, freedom), given, size)
+        normal, gradient = normal_r / std_r**2, np.empty(6)
+        normal[:3, :3] += Lx @ H9 @ Lx.T / std_t**2
+        gradient[:3] = Lx @ (Hx / std_t**2 - 0.5 / std_r**2 * (K.T @ y))
+        gradient[3:] = -0.5 / std_r**2 * (Ly @ Kx)
+        step = -np.linalg.solve(normal, gradient)
+        both = _turned(both, step.reshape(2, 3))
+        largest = np.abs(step).max()
+        history.append((std_r, std_t, largest))
+        if largest < STEP_TOLERANCE:
+            break
+    T = np.zeros((2, 4, 4))
+    T[:, :3, :3], T[:, 3, 3] = both, 1.0
+    T[0, :3, 3] = -elimination @ np.append(both[0].ravel(), 1.0)
+    T[1, :3, 3] = mean @ np.concatenate([T[0, :3, 3], both[0].ravel(), [1.0]])
+    return T[0], T[1], history
+
+
+def _sums(robot, T_ST, weights):
+    """K of the rotations, and the translation cost with both translations eliminated.
+
+    The gap is R tx + R Rx a + p - ty = C (tx, rvec Rx, 1) - ty.
+    """
+    (R, p), (A, a) = ((T[:, :3, :3], T[:, :3, 3]) for T in (robot, T_ST))
+    n, total = len(R), weights.sum()
+    C = np.empty((n, 3, 13))
+    C[:, :, :3], C[:, :, 12] = R, p
+    C[:, :, 3:12] = (R[:, :, :, None] * a[:, None, None, :]).reshape(n, 3, 9)
+    # rvec(R X A) = (R kron A') rvec(X)
+    K = ((R.reshape(-1, 9) * weights[:, None]).T @ A.reshape(-1, 9)).reshape(3, 3, 3, 3).transpose(0, 3, 1, 2)
+    mean = (weights @ C.reshape(-1, 39)).reshape(3, 13) / total
+    rows = (C - mean).reshape(-1, 13)
+    G = (rows * np.repeat(weights, 3)[:, None]).T @ rows
+    elimination = np.linalg.solve(G[:3, :3], G[:3, 3:])
+    H = G[3:, 3:] - G[3:, :3] @ elimination
+    return K.reshape(9, 9), H, elimination, mean, (weights @ A.reshape(-1, 9)).reshape(3, 3), total
+
+
+def _turned(R, phi):
+    """R, shape (n, 3, 3), turned by phi, shape (n, 3), about its own axes, by Cayley's map: exactly orthonormal, equal
+    to the exponential up to |phi|^3 / 12."""
+    S = (phi @ _GENERATORS.reshape(3, 9)).reshape(R.shape)
+    return R @ (_I3 + (S + 0.5 * (S @ S)) / (1.0 + 0.25 * (phi * phi).sum(-1))[:, None, None])
