@@ -120,8 +120,9 @@ print(f"product of the unrounded synthetic links: off by {np.abs(chain(measured)
 def closure_error(T):
     """Return (angle in rad, distance in mm) by which T, shape (4, 4), differs from the identity."""
     ### BEGIN SOLUTION
-    angle = np.arccos((np.trace(T[:3, :3]) - 1) / 2)
-    return angle, np.linalg.norm(T[:3, 3])
+    R = T[:3, :3]
+    twice_sine = np.linalg.norm([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    return np.arctan2(twice_sine, np.trace(R) - 1), np.linalg.norm(T[:3, 3])
     ### END SOLUTION
 
 

@@ -145,9 +145,12 @@ print(f"{np.sqrt(squares / n):.3f} mm  s0, rms distance in space (divided by {n}
 print(f"{np.sqrt(squares / (3 * n)):.3f} mm  rms of a coordinate (divided by {3 * n} equations)")
 print(f"{std:.3f} mm  std of a coordinate, unbiased (divided by {3 * n - 6})")
 print(f"{np.rad2deg(std / np.linalg.norm(x[:3])):.2f} deg turn of the flange that moves the tip as far")
-shown = (listings**2).sum()
-hidden = n * 0.443922**2 - shown
-print(f"{np.sqrt(shown / 2):.3f} mm  rms distance in the two poses printed, {np.sqrt(hidden / (n - 2)):.3f} mm in the ten others")
+
+# %% ten-others
+s0_printed = 0.443922
+sum_of_all, sum_of_two = n * s0_printed**2, (listings**2).sum()
+print(f"{np.sqrt(sum_of_two / 2):.3f} mm  rms distance in the two poses printed")
+print(f"{np.sqrt((sum_of_all - sum_of_two) / (n - 2)):.3f} mm  in the ten others")
 
 # %% swirl [markdown]
 # ## Small residual, good tip?

@@ -25,7 +25,7 @@
 # %% setup
 import numpy as np
 
-from labkit.calibration import hand_eye
+from labkit.calibration import hand_eye, robust
 from labkit.calibration.literature import compare_methods, kim_linear, li_two_step
 from labkit.chapters.ch05_hand_eye import stages
 from labkit.documents import misprints
@@ -299,15 +299,15 @@ def linear_start(T_BF, x_S):
 # ## Let the outliers speak for themselves
 #
 # Even with pose 2 repaired and the center free, least squares leaves 11 mm: a few poses spoil all. Tukey's weights give them no say. The scale must not be spoiled either: the *median* length of
-# a 3-vector of unit noise is 1.538 (`hand_eye.MEDIAN_CHI3`), so $s = \mathrm{median}/1.538$, $u = |\varepsilon_i|/(5s)$, and $w = (1-u^2)^2$ below $u = 1$, else 0.
+# a 3-vector of unit noise is 1.538 (`robust.MEDIAN_CHI3`), so $s = \mathrm{median}/1.538$, $u = |\varepsilon_i|/(5s)$, and $w = (1-u^2)^2$ below $u = 1$, else 0.
 
 # %% robust_weights
 @ex.robust_weights
 def robust_weights(residuals):
-    """Return one weight (0 to 1) a pose, shape (N,), for residual vectors of shape (N, 3) in mm."""
+    """Return one weight (0 to 1) per pose, shape (N,), for residual vectors of shape (N, 3) in mm."""
     ### BEGIN SOLUTION
     lengths = np.linalg.norm(residuals, axis=1)
-    u = lengths / (5 * np.median(lengths) / hand_eye.MEDIAN_CHI3)
+    u = lengths / (5 * np.median(lengths) / robust.MEDIAN_CHI3)
     return np.where(u < 1, (1 - u**2) ** 2, 0.0)
     ### END SOLUTION
 
@@ -406,18 +406,22 @@ for row in thesis.corrections():
 # %% radius
 radius = ...  # your code here
 ### BEGIN SOLUTION
-radius, std_radius = hand_eye.fit_radius(corrected.T_BF, corrected.x_S)
+radius = hand_eye.fit_radius(corrected.T_BF, corrected.x_S).radius
 ### END SOLUTION
 ex.radius(radius)
 
 # %% radius-verdict
-R, std = hand_eye.fit_radius(corrected.T_BF, corrected.x_S)
 no_4 = np.arange(31) != 3
-R4, std4 = hand_eye.fit_radius(corrected.T_BF[no_4], corrected.x_S[no_4])
-print(f"all poses: {R:.3f} +- {std:.3f} mm; without pose 4, next to the equator: {R4:.3f} +- {std4:.3f} mm")
+fits = {
+    "all poses": hand_eye.fit_radius(corrected.T_BF, corrected.x_S),
+    "without pose 4, next to the equator": hand_eye.fit_radius(corrected.T_BF[no_4], corrected.x_S[no_4]),
+}
+for name, found in fits.items():
+    print(f"{name}: {found.radius:.3f} +- {found.std_of('radius'):.3f} mm")
 for source in ("certificate", "listing", "coordinate machine"):
     r = thesis.radius(source)
-    print(f"{source:19} {r:.4f} mm: {abs(r - R) / std:4.1f} and {abs(r - R4) / std4:4.1f} standard deviations away")
+    away = [abs(r - found.radius) / found.std_of("radius") for found in fits.values()]
+    print(f"{source:19} {r:.4f} mm: {away[0]:4.1f} and {away[1]:4.1f} standard deviations away")
 
 # %% known [markdown]
 # Certificate and listing both fit; the coordinate machine's 30.28 does not.
@@ -435,11 +439,17 @@ ex.predict("weak", guess, reveal=stages.pattern_designer)
 
 # %% known-code
 fit = hand_eye.calibrate_sphere_target(corrected.T_BF, corrected.x_S)
-sigma = np.sqrt(np.diag(fit.covariance))
 left_out = hand_eye.leave_one_out(corrected.T_BF, corrected.x_S)
 print(f"left out: rms {hand_eye.rms_distance(left_out):.2f} mm; in the fit: {fit.rms:.2f} mm")
-print("orientation", np.rad2deg(sigma[:3]), "deg; translation", sigma[3:6], "mm; sphere center", sigma[6:], "mm")
-print("standard deviation of x_S:", np.std(corrected.x_S, axis=0), "mm; all over the field: 14, 15, 29 mm")
+print(fit)
+
+# %% known-spread
+anywhere = np.random.default_rng(0).uniform(*np.transpose(hand_eye.FIELD), size=(100_000, 3))
+anywhere[:, 1] *= np.where(np.arange(len(anywhere)) % 2, 1, -1)  # on both sides of the scan plane
+print("standard deviation of x_S:", corrected.x_S.std(axis=0).round(1), "mm")
+print("all over the field:       ", anywhere.std(axis=0).round(1), "mm")
+
+# %% known-rank
 p2, p3 = frames.kuka_from_matrix(fit.T_FS), frames.kuka_from_matrix(thesis.frame("plate"))
 J = hand_eye.plate_jacobian(corrected.T_BF, corrected.x_S, p2, p3, thesis.point("sphere_in_plate"))
 print("rank of the thesis's second step:", np.linalg.matrix_rank(J, tol=1e-6), "of 12 unknowns")

@@ -25,7 +25,7 @@ from labkit.chapters.ch06_tracker import stages
 from labkit.documents.report import printed as report
 from labkit.documents.report.reconstruction import synthetic_mountings, synthetic_table
 from labkit.exercises import course
-from labkit.geometry.frames import invert, relative
+from labkit.geometry.frames import relative
 from labkit.machines import accuracy, arm, simulation, udp
 from labkit.machines.log import average_stops, read_csv
 from labkit.machines.mounting import calibrate_mounting
@@ -317,15 +317,15 @@ ex.predict("methods", guess, reveal=stages.methods)
 
 # %% everything-at-once [markdown]
 # Rotation first means: translations may not help the rotation. Maximum likelihood weighs both by their noise; `ax_xb.calibrate_hand_eye` does, and returns a covariance. It treats the
-# first pose like any other, and so needs one more unknown, here $T_{BW}$. On our log it gains little, since the systematic error is nobody's noise model,
+# first pose like any other, and so needs one more unknown, here $T_{BW}$. For it the eye stands still, at W, and looks *to the hand*; the tracker is what it sees. On our log it gains little, since the systematic error is nobody's noise model,
 # though `robust` sets aside the worst stop left, pose 4. But its standard deviation says how far off it may be; six equal runs do not.
 
 # %% maximum-likelihood
-best = ax_xb.calibrate_hand_eye(invert(T_BF), T_WE, robust=True)
-std = np.sqrt(np.diag(best.covariance))[9:]  # 12 unknowns: two poses, the translation of T_FE comes last
-for name, t in (("truth", simulation.T_FE), ("report's method", mounting), ("maximum likelihood", best.target)):
-    print(f"{name:19}", *t[:3, 3].round(2), "mm")
-print("standard deviation ", *std.round(2), "mm; ignored poses:", np.flatnonzero(best.weights < 0.01))
+best = ax_xb.calibrate_hand_eye(T_BF, T_WE, robust=True, eye="to hand")  # the tracker is the target, T_FT
+for name, T in (("truth", simulation.T_FE), ("report's method", mounting), ("maximum likelihood", best.T_FT)):
+    print(f"{name:19}", *T[:3, 3].round(2), "mm")
+print("standard deviation ", *best.std_of("T_FT.translation").round(2), "mm")
+print("ignored poses:", np.flatnonzero(best.weights < 0.01))
 
 # %% motion [markdown]
 # ## In motion

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from labkit import checks
-from labkit.calibration import ax_xb, hand_eye, pivot, sphere
+from labkit.calibration import ax_xb, hand_eye, pivot, robust, sphere
 from labkit.calibration.literature import compare_methods, kim_linear, li_two_step
 from labkit.documents.lecture import printed as lecture
 from labkit.documents.lecture.examples import reconstruct_vehicle
@@ -127,7 +127,7 @@ REFUSED = [
     (lambda: hand_eye.leave_one_out(POSES, np.ones((4, 3))), "T_BF and x_S must have shapes"),
     (lambda: hand_eye.gauss_newton_pose(np.zeros(6), POSES, np.zeros((5, 3))), "away from the scanner's origin"),
     (lambda: numeric_jacobian(np.sin, O2, [1e-6, 1e-6, 1e-6]), "x and step must have shapes"),
-    (lambda: hand_eye.tukey_weights([1.0], 1.0, cut=np.nan), "cut must be finite"),
+    (lambda: robust.tukey_weights([1.0], 1.0, cut=np.nan), "cut must be finite"),
     (lambda: hand_eye.fit_radius(POSES, np.array([[1.0, 0.0, 1.0]] * 5)), "off the scan plane"),
     (lambda: kim_linear(POSES, np.zeros((5, 3, 3)), np.zeros((4, 3))), r"points_S must have shape \(5, 4, 3\)"),
     (lambda: li_two_step(POSES[:1], np.zeros((1, 3))), "at least 2 poses"),

@@ -5,5 +5,7 @@ sphere      what a line scanner sees of a sphere
 hand_eye    a scanner on a flange, from a sphere seen in many poses
 ax_xb       a sensor on a flange, from poses of both: A X = X B
 literature  the methods of Kim and of Li, as the thesis cites them
-result      what a hand-eye calibration returns
+motion      how the robot has to turn, and the refusal where it does not
+robust      weights and scales that bad measurements cannot carry away
+result      the one convention for what an estimator returns
 """

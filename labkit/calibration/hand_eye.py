@@ -5,11 +5,12 @@ describe one point:
 
     T_BF,i  T_FS  x_S,i  =  target          (thesis, formulas (4-1) to (4-3); there T_A^F T_F^S x_S = T_P^A x_P')
 
-`linear_start` forgets that R_FS is a rotation and solves fifteen linear equations; Gauss-Newton steps on the pose do the
-rest. `labkit.fast.hand_eye` finds the same minimum from sums over the poses. Lengths in mm, angles in rad. Increments
-are T_FS exp(phi, .): phi is a rotation vector in the scanner frame S, translations are plain differences in F, the
-target lives in B. Covariances and singular values follow that order: phi, translation, target. Source: thesis
-"Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", HAW Hamburg 2019, sections 2.6, 4.4, 6.1, listings C2-C5.
+`linear_start` forgets that R_FS is a rotation and solves linear equations in fifteen unknowns; Gauss-Newton steps on
+the pose do the rest. `labkit.fast.hand_eye` finds the same minimum from sums over the poses. Lengths in mm, angles in rad.
+Increments are T_FS exp(phi, .): phi is a rotation vector in the scanner frame S, translations are plain differences in
+F, the target lives in B. Covariances and singular values follow that order: phi, translation, target. Source: thesis
+"Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", HAW Hamburg 2019, sections 2.6, 4.4, 6.1, listings C2 to
+C5.
 """
 
 import math
@@ -445,7 +446,8 @@ def _gauss_newton(R_FS, T_BF, x_S, weights, max_steps):
     def moved(T_FS, target, step):
         return pose(T_FS[:3, :3] @ exp_so3(step[:3]), T_FS[:3, 3] + step[3:6]), target + step[6:]
 
-    T_FS, target = moved(pose(R_FS, np.zeros(3)), np.zeros(3), np.append(np.zeros(3), _best_shift(R_FS, T_BF, x_S, root)))
+    shift = _best_shift(R_FS, T_BF, x_S, root)
+    T_FS, target = pose(R_FS, shift[:3]), shift[3:]
     (r, cost), costs = residuals(T_FS, target), []
     for _ in range(max_steps):
         costs.append(cost)
@@ -500,14 +502,14 @@ def linear_start(T_BF, x_S):
     u, spread = _linear_solution(T_BF, x_S, np.ones(len(T_BF)))
     if spread < 1e-12:
         raise ValueError(
-            "the linear system needs rank 15, got less: take five poses or more, turned about two axes, with the sphere "
-            "at different depths and places of the scanner's field"
+            "the linear system needs rank 15, got less: take five poses or more, turned about two axes, "
+            "with the sphere at different depths and places of the scanner's field"
         )
     return pose(nearest_rotation(u[:9].reshape(3, 3)), u[9:12]), u[12:]
 
 
 def _linear_solution(T_BF, x_S, weights):
-    """The 15 unknowns, and the smallest singular value of their system (centers scaled to length 1) over the largest."""
+    """The 15 unknowns, and the smallest singular value of their system over the largest, centers scaled to length 1."""
     R_t, n = np.swapaxes(T_BF[:, :3, :3], 1, 2), len(T_BF)
     reach = max(math.sqrt((x_S**2).sum(-1).mean()), np.finfo(float).tiny)
     D = np.zeros((n, 3, 15))
@@ -679,10 +681,8 @@ def _reweighted(fit, T_BF, x_S, target, weights):
         lengths = np.linalg.norm(sphere_residuals(T_BF, x_S, T_FS, center), axis=1)
         history.append(math.sqrt((lengths**2).mean()))
         scale = median_std(lengths)
-        if scale <= exact:  # noise-free: what does not fit exactly is wrong
-            new = (lengths <= 1000 * exact).astype(float)
-        else:
-            new = tukey_weights(lengths, scale, TUKEY_CUT)
+        noise_free = scale <= exact  # then what does not fit exactly is wrong
+        new = (lengths <= 1000 * exact) * 1.0 if noise_free else tukey_weights(lengths, scale, TUKEY_CUT)
         if np.abs(new - weights).max() < 1e-8:
             break
         weights = new

@@ -112,7 +112,9 @@ class Result:
 
     def _repr_html_(self):
         head = "".join(f"<th>{word}</th>" for word in ("", "estimate", "standard deviation", "unit"))
-        rows = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in self._rows())
+        rows = "".join(
+            "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in self._rows()
+        )
         caption = f"<caption>{type(self).__name__}: {html.escape(self._note())}</caption>"
         return f"<table>{caption}<tr>{head}</tr>{rows}</table>"
 

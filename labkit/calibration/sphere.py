@@ -6,7 +6,8 @@ it: the scan line alone does not say on which side. Source: thesis "Optimierung 
 Sensor-Roboter-Systemen", HAW Hamburg 2019, sections 2.2 and 6.4.3, listings C15 and C16.
 """
 
-from typing import NamedTuple
+import math
+from functools import cached_property
 
 import numpy as np
 
@@ -21,40 +22,84 @@ from ..checks import (
     as_shape,
     shown,
 )
+from .result import Parameter, Result, point_parameters, result_class
 
 MIN_SAGITTA = 1e-6  # an arc flatter than this, relative to its length, fixes no circle: the points are collinear
 MAX_STEPS = 50
 
 
-class Circle(NamedTuple):
-    """Circle through a scan line: center (x, z), radius, signed residuals (n,), covariance (3, 3) of x, z, radius,
-    singular values.
+@result_class
+class Circle(Result):
+    """Circle through a scan line.
+
+    Attributes
+    ----------
+    center : array, shape (2,)
+        x and z (mm).
+    radius : float
+        In mm.
+    residuals : array, shape (n,)
+        Signed distances of the points from the circle, positive inside (mm).
+    std : float
+        Of a point across the arc, given or estimated (mm); NaN without redundancy.
+    covariance : array, shape (3, 3)
+        Of x, z and radius (mm^2).
+    singular_values : array, shape (3,)
+        Of the Jacobian, largest first.
     """
 
     center: np.ndarray
     radius: float
     residuals: np.ndarray
-    covariance: np.ndarray
-    singular_values: np.ndarray
+    jacobian: np.ndarray
+    given_std: float | None = None
+
+    parameters = (*point_parameters("center", "xz"), Parameter("radius", "mm"))
+
+    @property
+    def weights(self):
+        return np.ones(len(self.residuals))
+
+    @cached_property
+    def std(self):
+        if self.given_std is not None:
+            return self.given_std
+        freedom = len(self.residuals) - len(self.parameters)
+        return math.sqrt(self.residuals @ self.residuals / freedom) if freedom > 0 else math.nan
+
+    @cached_property
+    def covariance(self):
+        _, values, Vt = np.linalg.svd(self.jacobian, full_matrices=False)
+        return self.std**2 * (Vt.T / values**2) @ Vt
+
+    @cached_property
+    def singular_values(self):
+        return np.linalg.svd(self.jacobian, compute_uv=False)
 
 
-class Sphere(NamedTuple):
-    """Sphere through points: center (3,), radius, signed residuals (n,), covariance (4, 4) of x, y, z, radius, singular
-    values.
-    """
+@result_class
+class Sphere(Circle):
+    """Sphere through points: like `Circle`, with the center (3,) and the covariance (4, 4) of x, y, z and radius."""
 
-    center: np.ndarray
-    radius: float
-    residuals: np.ndarray
-    covariance: np.ndarray
-    singular_values: np.ndarray
+    parameters = (*point_parameters("center"), Parameter("radius", "mm"))
 
 
 def triangulation_height(base, alpha, beta):
-    """Height of a triangle over its base from the angles at both ends (rad), in the unit of `base`; broadcasts.
+    """Height of a triangle over its base from the angles at both ends; broadcasts.
 
     H = L tan(a) tan(b) / (tan(a) + tan(b)) = L sin(a) sin(b) / sin(a + b); the second form also holds where an angle is
     90 deg.
+
+    Parameters
+    ----------
+    base : array-like
+        In any unit of length.
+    alpha, beta : array-like, rad
+
+    Returns
+    -------
+    height : float or array
+        In the unit of `base`.
 
     Raises
     ------
@@ -71,10 +116,20 @@ def triangulation_height(base, alpha, beta):
 
 
 def triangulation_std(base, alpha, beta, std_angle):
-    """Standard deviation of the height for independent errors `std_angle` (rad) of both angles, first order;
-    broadcasts.
+    """Standard deviation of the height for independent errors of both angles, to first order; broadcasts.
 
     dH/da = L sin(b)^2 / sin(a + b)^2: with a fixed base the error grows with the square of the distance.
+
+    Parameters
+    ----------
+    base : array-like
+        In any unit of length.
+    alpha, beta, std_angle : array-like, rad
+
+    Returns
+    -------
+    std : float or array
+        In the unit of `base`.
     """
     triangulation_height(base, alpha, beta)
     base, alpha, beta = (np.asarray(v, float) for v in (base, alpha, beta))
@@ -105,9 +160,9 @@ def fit_circle_algebraic(x, z):
     p = points - middle[..., None, :]
     scale = np.abs(p).max((-2, -1))[..., None]
     p = p / scale[..., None]  # centered and scaled: the squares of 200 mm would drown those of the arc
-    a = (np.linalg.pinv(np.concatenate([p, np.ones((*p.shape[:-1], 1))], axis=-1)) @ -(p * p).sum(-1)[..., None])[
-        ..., 0
-    ]
+    A = np.concatenate([p, np.ones((*p.shape[:-1], 1))], axis=-1)
+    a = -np.linalg.pinv(A) @ (p * p).sum(-1)[..., None]
+    a = a[..., 0]
     center = -0.5 * a[..., :2]
     radius = scale[..., 0] * np.sqrt(np.maximum((center**2).sum(-1) - a[..., 2], 0.0))
     return middle + scale * center, radius if radius.ndim else float(radius)
@@ -121,8 +176,8 @@ def fit_circle(x, z, std=None):
     x, z : array-like, shape (n,)
         Points of the scan line, n >= 3.
     std : float, optional
-        Standard deviation of a point across the arc; without it the residuals give the scale of the covariance (n >=
-        4).
+        Standard deviation of a point across the arc (mm); without it the residuals give the scale of the covariance,
+        which takes n >= 4.
 
     Returns
     -------
@@ -141,12 +196,28 @@ def fit_circle(x, z, std=None):
         raise ValueError(f"x and z must be one scan line, shape (n,), got {np.shape(x)}")
     center, radius = fit_circle_algebraic(x, z)
     solution, residuals, J = _geometric(points, np.append(center, radius))
-    covariance, singular_values = _uncertainty(J, residuals, std)
-    return Circle(solution[:2], float(solution[2]), residuals, covariance, singular_values)
+    return Circle(solution[:2], float(solution[2]), residuals, J, _as_given(std))
 
 
 def fit_sphere(points, std=None):
-    """Sphere by geometric least squares from its algebraic start; points (n, 3), n >= 4 and not in one plane."""
+    """Sphere by geometric least squares from its algebraic start.
+
+    Parameters
+    ----------
+    points : array-like, shape (n, 3), mm
+        n >= 4 and not in one plane.
+    std : float, optional
+        Standard deviation of a point across the surface (mm).
+
+    Returns
+    -------
+    Sphere
+
+    Raises
+    ------
+    ValueError
+        When fewer than four points come, or they lie in one plane.
+    """
     points = as_points(points, "points")
     if points.ndim != 2 or len(points) < 4:
         raise ValueError(f"points must have shape (n >= 4, 3), got {points.shape}")
@@ -163,13 +234,19 @@ def fit_sphere(points, std=None):
     center = -0.5 * a[:3]
     start = np.append(middle + scale * center, scale * np.sqrt(max(center @ center - a[3], 0.0)))
     solution, residuals, J = _geometric(points, start)
-    covariance, singular_values = _uncertainty(J, residuals, std)
-    return Sphere(solution[:3], float(solution[3]), residuals, covariance, singular_values)
+    return Sphere(solution[:3], float(solution[3]), residuals, J, _as_given(std))
 
 
 def center_offset(radius, circle_radius):
-    """Distance of the center of a sphere from a plane that cuts it in a circle of `circle_radius`, sqrt(R^2 - r^2);
-    broadcasts.
+    """Distance of the center of a sphere from a plane that cuts it in a circle, sqrt(R^2 - r^2); broadcasts.
+
+    Parameters
+    ----------
+    radius, circle_radius : array-like, mm
+
+    Returns
+    -------
+    offset : float or array, mm
 
     Raises
     ------
@@ -192,6 +269,14 @@ def offset_sensitivity(radius, circle_radius):
 
     Both grow without bound as the plane approaches the equator (r -> R): there a circle error of 0.01 mm is one of
     millimeters.
+
+    Parameters
+    ----------
+    radius, circle_radius : array-like, mm
+
+    Returns
+    -------
+    by_R, by_r : float or array, mm per mm
     """
     d = center_offset(radius, circle_radius)
     with np.errstate(divide="ignore"):
@@ -233,8 +318,21 @@ def _refuse_side(side):
 
 
 def profile_center_covariance(radius, circle, side, std_radius=0.0):
-    """First-order covariance (3, 3) of the center that `sphere_center_from_profile` finds, from a `Circle` and the
-    radius' error.
+    """First-order covariance of the center that `sphere_center_from_profile` finds.
+
+    Parameters
+    ----------
+    radius : float, mm
+        Of the sphere.
+    circle : Circle
+    side : {+1, -1}
+        Sign of the y coordinate of the center.
+    std_radius : float, mm
+        Standard deviation of the sphere's radius.
+
+    Returns
+    -------
+    covariance : array, shape (3, 3), mm^2
     """
     _refuse_side(side)
     by_R, by_r = offset_sensitivity(as_positive_number(radius, "radius"), circle.radius)
@@ -278,6 +376,10 @@ def scan_line(center, radius, half_angle, n, std=0.0, rng=None):
     angle = np.linspace(-half_angle, half_angle, n)
     reach = r + (std * rng.normal(size=n) if std > 0 else 0.0)
     return center[0] + reach * np.sin(angle), center[2] - reach * np.cos(angle)
+
+
+def _as_given(std):
+    return None if std is None else as_positive_number(std, "std")
 
 
 def _profile(x, z):
@@ -324,16 +426,3 @@ def _geometric(points, start):
         if np.abs(step).max() <= 1e-12 * np.abs(q).max():
             break
     return q, r, J
-
-
-def _uncertainty(J, residuals, std):
-    """Covariance s0^2 (J'J)^-1 and singular values of J; s0 is `std`, or comes from the residuals where there are
-    enough.
-    """
-    _, s, Vt = np.linalg.svd(J, full_matrices=False)
-    dof = J.shape[0] - J.shape[1]
-    if std is not None:
-        variance = as_positive_number(std, "std") ** 2
-    else:
-        variance = residuals @ residuals / dof if dof > 0 else np.nan
-    return variance * (Vt.T / s**2) @ Vt, s

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..calibration import hand_eye
+from ..fast.hand_eye import calibrate_sphere_target
 from ..geometry import frames, lie
 from .thesis.printed import CENTER_COLUMNS, POSE_COLUMNS, measurements_from
 
@@ -136,7 +137,7 @@ def find(entries):
     The robust fit gives every suspicious row the weight 0, so that the calibration a row is judged by never saw it.
     """
     measured = measurements_from(entries)
-    fit = hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S, robust=True)
+    fit = calibrate_sphere_target(measured.T_BF, measured.x_S, robust=True)
     lengths = np.linalg.norm(fit.residuals, axis=1)
     suspects = np.flatnonzero(lengths > SUSPICIOUS * fit.std) + 1
     return {int(i): explanations(entries, int(i), fit.T_FS, fit.target, fit.std) for i in suspects}

@@ -3,6 +3,9 @@
 Use them where a figure drags ten thousand particles or a benchmark names a goal. To understand a method, read its
 twin in `estimation`, `calibration` or `localization`.
 
+pivot       calibrate_pivot: tip and pivot from sums over the poses
+hand_eye    calibrate_sphere_target: scanner and sphere from sums over the poses
+ax_xb       calibrate_hand_eye: sensor and target from sums over the poses
 kalman      filter_steps: the linear filter along a series
 ekf         ekf_localize: the landmark filter along a drive, one robot or many
 """

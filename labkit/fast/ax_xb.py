@@ -1,7 +1,7 @@
 """Maximum-likelihood hand-eye calibration from sums over the poses; equals `calibration.ax_xb`.
 
-The cost depends on the N poses through two small matrices only, so an iteration takes the same time for 20 poses and for
-20000.
+The cost depends on the N poses through two small matrices only, so an iteration takes the same time for 20 poses and
+for 20000.
 """
 
 import numpy as np

@@ -9,7 +9,14 @@ import math
 
 import numpy as np
 
-from ..calibration.hand_eye import MAX_STEPS, calibrate_with, refuse_undetermined, right_angled, rms_distance, sphere_residuals
+from ..calibration.hand_eye import (
+    MAX_STEPS,
+    calibrate_with,
+    refuse_undetermined,
+    right_angled,
+    rms_distance,
+    sphere_residuals,
+)
 from ..calibration.motion import MIN_TURN
 from ..geometry.lie import nearest_rotation, skew
 
@@ -19,7 +26,7 @@ _GENERATORS = skew(_EYE)  # derivatives of a small rotation about x, y, z
 
 
 def calibrate_sphere_target(T_BF, x_S, target=None, robust=False, rng=None):
-    """Pose of a scanner on the flange, and the sphere's center: `labkit.calibration.hand_eye.calibrate_sphere_target`."""
+    """Scanner on the flange and center of the sphere: `labkit.calibration.hand_eye.calibrate_sphere_target`."""
     return calibrate_with(_fit, T_BF, x_S, target, robust, rng)
 
 

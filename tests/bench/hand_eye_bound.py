@@ -18,7 +18,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "calibration")]
 
 import test_ax_xb as lab
 
-from labkit.calibration import ax_xb
+from labkit.fast import ax_xb
 from labkit.geometry.frames import invert
 
 BAND = 0.3  # about 6

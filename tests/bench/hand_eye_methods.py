@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT))
 
 from labkit.calibration import ax_xb
+from labkit.fast.ax_xb import calibrate_hand_eye
 from labkit.geometry.frames import invert, pose, rotation_angle
 from labkit.geometry.lie import exp_so3
 
@@ -58,12 +59,12 @@ def main(trials=400):
         errors, bounds = {}, []
         for _ in range(trials):
             T_BF, exact, T_ST = draw(rng, np.deg2rad(deg), mm)
-            covariance = ax_xb.calibrate_hand_eye(T_BF, exact, np.deg2rad(deg), mm).covariance
+            covariance = calibrate_hand_eye(T_BF, exact, np.deg2rad(deg), mm).covariance
             bounds.append([np.trace(covariance[:3, :3]), np.trace(covariance[3:6, 3:6])])
             motions = T_BF[:-1], T_ST[:-1]
             found = {f"OpenCV {m.title()}": opencv(T_BF, T_ST, m) for m in OPENCV}
             found["report"] = ax_xb.solve_ax_xb(invert(T_BF[1:]) @ motions[0], T_ST[1:] @ invert(motions[1]))
-            found["maximum likelihood"] = ax_xb.calibrate_hand_eye(T_BF, T_ST).T_FS
+            found["maximum likelihood"] = calibrate_hand_eye(T_BF, T_ST).T_FS
             for name, T in found.items():
                 errors.setdefault(name, []).append(
                     [rotation_angle(T_FS[:3, :3].T @ T[:3, :3]), np.linalg.norm(T[:3, 3] - T_FS[:3, 3])]

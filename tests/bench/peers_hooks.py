@@ -3,9 +3,7 @@
 import hooks_particles
 import numpy as np
 
-from labkit.calibration import ax_xb
-from labkit.calibration import hand_eye as sphere
-from labkit.fast import pivot
+from labkit.fast import ax_xb, hand_eye, pivot
 from labkit.fast.ekf import ekf_localize
 from labkit.fast.kalman import filter_steps
 from labkit.geometry import chaining, frames
@@ -18,7 +16,7 @@ def handeye(T_BF, T_ST):
 
 
 def sphere_handeye(T_BF, x_S):
-    result = sphere.calibrate_sphere_target(T_BF, x_S)
+    result = hand_eye.calibrate_sphere_target(T_BF, x_S)
     return result.T_FS, result.target
 
 

@@ -6,6 +6,7 @@ from scipy.optimize import least_squares
 
 from labkit.calibration import hand_eye
 from labkit.calibration.literature import compare_methods, field_problem, kim_linear, kim_matrix, li_two_step
+from labkit.calibration.robust import tukey_weights
 from labkit.documents.thesis import printed as thesis
 from labkit.documents.thesis.listings import listing_cost, listing_gauss_newton
 from labkit.estimation.differences import numeric_jacobian
@@ -221,12 +222,12 @@ def test_the_code_squares_the_sum():
 def test_plain_gauss_newton_ends_at_the_estimate(parameters):
     T_BF, x_S = scene(std=0.2)
     start = frames.kuka_from_matrix(T_FS0) + [5, -5, 5, 0.1, -0.1, 0.1]
-    poses, rms, values, converged = hand_eye.gauss_newton_pose(start, T_BF, x_S, parameters=parameters)
+    run = hand_eye.gauss_newton_pose(start, T_BF, x_S, parameters=parameters)
     fit = hand_eye.calibrate_sphere_target(T_BF, x_S)
-    assert converged
-    np.testing.assert_allclose(poses[-1], fit.T_FS, atol=1e-7)
-    assert rms[-1] == pytest.approx(fit.rms)
-    assert len(poses) == len(rms) == len(values)
+    assert run.converged
+    np.testing.assert_allclose(run.poses[-1], fit.T_FS, atol=1e-7)
+    assert run.rms[-1] == pytest.approx(fit.rms)
+    assert len(run.poses) == len(run.rms) == len(run.singular_values)
 
 
 def test_iteration_counts_of_table_7_3():
@@ -317,10 +318,10 @@ def test_radius_as_a_tenth_unknown_against_scipy():
         ).ravel()
 
     want = least_squares(residuals, [0] * 9 + [30.0], x_scale=[1e-3] * 3 + [1] * 6 + [0.1], xtol=1e-13)
-    radius, std = hand_eye.fit_radius(measured.T_BF, measured.x_S)
-    assert radius == pytest.approx(want.x[9], abs=1e-4)
+    found = hand_eye.fit_radius(measured.T_BF, measured.x_S)
+    assert found.radius == pytest.approx(want.x[9], abs=1e-4)
     cov = 2 * want.cost / 83 * np.linalg.inv(want.jac.T @ want.jac)
-    assert std == pytest.approx(np.sqrt(cov[9, 9]), rel=0.02)
+    assert found.std_of("radius") == pytest.approx(np.sqrt(cov[9, 9]), rel=0.02)
 
 
 def test_simulation_inputs_give_the_printed_coordinates():
@@ -358,4 +359,4 @@ def test_methods_of_the_literature_do_not_beat_the_bound():
 
 def test_the_tukey_weights_fall_smoothly_to_zero_at_the_cut():
     lengths = np.array([0.0, 1.0, 5.0, 10.0, 11.0, 1e9])
-    np.testing.assert_allclose(hand_eye.tukey_weights(lengths, 2.0), [1, 0.99**2, 0.75**2, 0, 0, 0])
+    np.testing.assert_allclose(tukey_weights(lengths, 2.0, 5.0), [1, 0.99**2, 0.75**2, 0, 0, 0])

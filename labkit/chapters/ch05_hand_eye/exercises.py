@@ -5,7 +5,7 @@ import functools
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ...calibration import hand_eye, sphere
+from ...calibration import hand_eye, robust, sphere
 from ...calibration.literature import field_problem
 from ...documents import misprints
 from ...documents.thesis import printed as thesis
@@ -312,7 +312,7 @@ def _linear_with_unturned_right_side(T_BF, x_S):
 def robust_weights(residuals):
     """Reference of the exercise: Tukey weights with the median length as the scale."""
     lengths = np.linalg.norm(residuals, axis=1)
-    return hand_eye.tukey_weights(lengths, np.median(lengths) / hand_eye.MEDIAN_CHI3)
+    return robust.tukey_weights(lengths, robust.median_std(lengths), hand_eye.TUKEY_CUT)
 
 
 def _weights(change):
@@ -487,6 +487,13 @@ GROWS_BEYOND = (
     "Below u = 1 the weight is (1 - u^2)^2, beyond it 0. Yours grows there, and the worst poses get the most say."
 )
 ALL_FIXED = (2, 3, 4, 7, 12, 21, 30)
+
+
+@functools.cache
+def _fitted_radius():
+    measured = thesis.measurements(True)
+    return hand_eye.fit_radius(measured.T_BF, measured.x_S).radius
+
 
 CHAPTER = Chapter(
     "05-hand-eye",
@@ -794,26 +801,26 @@ CHAPTER = Chapter(
             hints=(
                 "First a scale that outliers cannot spoil, then a weight that falls to zero.",
                 "std = median length / 1.538; u = length / (5 std); the weight is (1 - u^2)^2 below u = 1 and 0 above.",
-                "`r = np.linalg.norm(residuals, axis=1); u = r / (5 * np.median(r) / hand_eye.MEDIAN_CHI3); return np.where(u < 1, (1 - u**2)**2, 0)`",
+                "`r = np.linalg.norm(residuals, axis=1); u = r / (5 * np.median(r) / robust.MEDIAN_CHI3); return np.where(u < 1, (1 - u**2)**2, 0)`",
             ),
             mistakes=[
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.sqrt((r**2).mean() / 3)))), "Your scale is the rms: the outliers themselves stretch it. Take the median."),
-                Mistake(_weights(lambda r: _tukey(r / (5 * np.mean(r) / hand_eye.MEDIAN_CHI3))), "Your scale is the mean length: the outliers stretch it. Take the median."),
+                Mistake(_weights(lambda r: _tukey(r / (5 * np.mean(r) / robust.MEDIAN_CHI3))), "Your scale is the mean length: the outliers stretch it. Take the median."),
                 Mistake(lambda e: _tukey(np.linalg.norm(e, axis=1) / (5 * np.std(e))), "Your scale is the standard deviation of the entries: the outliers stretch it. Take the median length."),
-                Mistake(lambda e: _tukey(np.linalg.norm(e, axis=1) / (5 * np.median(np.abs(e)) / hand_eye.MEDIAN_CHI3)),
-                        "You took the median of all entries. Take the median of the lengths, one a pose."),
-                Mistake(_weights(lambda r: _tukey(r / 5 * np.median(r) / hand_eye.MEDIAN_CHI3)), "`/ 5 * s` divides by 5 and multiplies by s: write / (5 * s)."),
-                Mistake(_weights(lambda r: _tukey((r / (5 * np.median(r) / hand_eye.MEDIAN_CHI3)) ** 2)), "u itself is squared in the formula, yours is squared twice."),
-                Mistake(_weights(lambda r: (1 - (r / (5 * np.median(r) / hand_eye.MEDIAN_CHI3)) ** 2) ** 2),
+                Mistake(lambda e: _tukey(np.linalg.norm(e, axis=1) / (5 * np.median(np.abs(e)) / robust.MEDIAN_CHI3)),
+                        "You took the median of all entries. Take the median of the lengths, one per pose."),
+                Mistake(_weights(lambda r: _tukey(r / 5 * np.median(r) / robust.MEDIAN_CHI3)), "`/ 5 * s` divides by 5 and multiplies by s: write / (5 * s)."),
+                Mistake(_weights(lambda r: _tukey((r / (5 * np.median(r) / robust.MEDIAN_CHI3)) ** 2)), "u itself is squared in the formula, yours is squared twice."),
+                Mistake(_weights(lambda r: (1 - (r / (5 * np.median(r) / robust.MEDIAN_CHI3)) ** 2) ** 2),
                         GROWS_BEYOND),
-                Mistake(_weights(lambda r: np.where(r < 5 * np.median(r) / hand_eye.MEDIAN_CHI3, 0, (1 - (r / (5 * np.median(r) / hand_eye.MEDIAN_CHI3)) ** 2) ** 2)),
+                Mistake(_weights(lambda r: np.where(r < 5 * np.median(r) / robust.MEDIAN_CHI3, 0, (1 - (r / (5 * np.median(r) / robust.MEDIAN_CHI3)) ** 2) ** 2)),
                         GROWS_BEYOND),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r)))), "The median length of a 3-vector is 1.538 standard deviations: divide by it."),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r) / 0.6745))), "0.6745 belongs to single numbers. The length of a 3-vector has the median 1.538."),
-                Mistake(_weights(lambda r: _tukey(r * hand_eye.MEDIAN_CHI3 / np.median(r))), "The factor 5 is missing: u = length / (5 s)."),
-                Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r) * hand_eye.MEDIAN_CHI3))), "You multiplied by 1.538: divide the median by it."),
-                Mistake(_weights(lambda r: np.sqrt(_tukey(r / (5 * np.median(r) / hand_eye.MEDIAN_CHI3)))), "The bracket is squared: (1 - u^2)^2."),
-                Mistake(_weights(lambda r: (r < 5 * np.median(r) / hand_eye.MEDIAN_CHI3).astype(float)),
+                Mistake(_weights(lambda r: _tukey(r * robust.MEDIAN_CHI3 / np.median(r))), "The factor 5 is missing: u = length / (5 s)."),
+                Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r) * robust.MEDIAN_CHI3))), "You multiplied by 1.538: divide the median by it."),
+                Mistake(_weights(lambda r: np.sqrt(_tukey(r / (5 * np.median(r) / robust.MEDIAN_CHI3)))), "The bracket is squared: (1 - u^2)^2."),
+                Mistake(_weights(lambda r: (r < 5 * np.median(r) / robust.MEDIAN_CHI3).astype(float)),
                         "You cut off sharply. Tukey's weight falls smoothly, so that no pose decides by crossing a line."),
             ],
         ),
@@ -871,19 +878,19 @@ CHAPTER = Chapter(
         ),
         Value(
             "radius",
-            reference=lambda: hand_eye.fit_radius(thesis.measurements(True).T_BF, thesis.measurements(True).x_S)[0],
+            reference=lambda: _fitted_radius(),
             unit="mm",
             rtol=2e-4,  # to 0.01 mm
             hints=(
                 "Every y was computed as sqrt(30^2 - r^2). Another radius moves all centers along y, and some radius fits best.",
                 "`thesis.centers_with_radius(x_S, R)` gives the centers for another R: try a grid, or make R a tenth unknown.",
-                "radius, std = hand_eye.fit_radius(corrected.T_BF, corrected.x_S).",
+                "radius = hand_eye.fit_radius(corrected.T_BF, corrected.x_S).radius.",
             ),
             mistakes=[
                 Mistake(lambda: thesis.radius("certificate"), "This is the certificate's radius. Ask the 31 poses instead."),
                 Mistake(lambda: thesis.radius("coordinate machine"), "This is the coordinate machine's radius, and the data exclude it. Fit it."),
                 Mistake(lambda: thesis.radius("listing"), "This is what listing C16 assumes; if your search gave it, its steps are too coarse. Go to 0.01 mm or finer."),
-                Mistake(lambda: 2 * hand_eye.fit_radius(thesis.measurements(True).T_BF, thesis.measurements(True).x_S)[0],
+                Mistake(lambda: 2 * _fitted_radius(),
                         "This is a diameter: half of it."),
             ],
         ),

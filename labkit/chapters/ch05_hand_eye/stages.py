@@ -11,6 +11,7 @@ from ...documents import misprints
 from ...documents.thesis import printed as thesis
 from ...estimation.differences import numeric_jacobian
 from ...estimation.gaussian import unit_noise
+from ...fast.hand_eye import calibrate_sphere_target
 from ...geometry import frames
 from ...geometry.lie import exp_so3, log_so3
 from ...stage import Choice, Handle, Slider, Stage, style
@@ -184,15 +185,15 @@ def compute_iterations(state):
     start[:3, :3] = exp_so3([0, tilt, yaw]) @ truth[:3, :3]
     result = {"pole": -90.0 - state["B_deg"]}
     for name in ("euler", "se3"):
-        poses, rms, values, converged = hand_eye.gauss_newton_pose(
+        run = hand_eye.gauss_newton_pose(
             frames.kuka_from_matrix(start), T_BF, x_S, target, parameters=name, max_steps=30
         )
-        R = poses[:, :3, :3]
+        R, values = run.poses[:, :3, :3], run.singular_values
         error = np.rad2deg(log_so3(R @ truth[:3, :3].T))
         turns = np.rad2deg(frames.rotation_angle(np.swapaxes(R[:-1], 1, 2) @ R[1:]))
         result[name] = {
-            "path": error[:, 1:], "rms": np.maximum(rms, REST_MM), "steps": len(poses) - 1,
-            "arrived": bool(converged and rms[-1] < 1e-6), "turned_deg": float(turns.sum()),
+            "path": error[:, 1:], "rms": np.maximum(run.rms, REST_MM), "steps": len(run.poses) - 1,
+            "arrived": bool(run.converged and run.rms[-1] < 1e-6), "turned_deg": float(turns.sum()),
             "weakest": float(values[0, -1] / values[0, 0]),
         }  # fmt: skip
     return result
@@ -258,7 +259,7 @@ def _explained():
 @functools.cache
 def _reference_fit():
     measured = thesis.measurements()
-    return hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S, robust=True)
+    return calibrate_sphere_target(measured.T_BF, measured.x_S, robust=True)
 
 
 def _edited(pose, slip, others):
@@ -284,7 +285,7 @@ def _pose_fit(pose, slip, others, fit):
     if fit == "end pose":
         T_FS, target = thesis.frame("scanner_end"), thesis.printed_target()
     else:
-        found = hand_eye.calibrate_sphere_target(T_BF, x_S, robust=fit == "robust")
+        found = calibrate_sphere_target(T_BF, x_S, robust=fit == "robust")
         T_FS, target = found.T_FS, found.target
     return hand_eye.sphere_residuals(T_BF, x_S, T_FS, target), T_FS, target, T_BF, x_S, chosen, len(slips)
 
@@ -381,7 +382,7 @@ def thirty_one_poses():
 @functools.cache
 def _corrected_fit():
     measured = thesis.measurements(True)
-    return hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S)
+    return calibrate_sphere_target(measured.T_BF, measured.x_S)
 
 
 @functools.cache

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...calibration import ax_xb
 from ...estimation.gaussian import unit_noise
+from ...fast.ax_xb import calibrate_hand_eye
 from ...geometry.frames import invert, matrix_from_quaternion, pose, pose_distance, unit_vector
 from ...geometry.lie import exp_so3, nearest_rotation
 from ...machines import simulation, udp
@@ -475,11 +476,11 @@ def compute_six_runs(state):
         reading = invert(T_read[0]) @ T_read
         A, B = invert(T_BF[0]) @ T_BF[1:], reading[1:]
         results.append(ax_xb.solve_ax_xb(A, B)[:3, 3])
-    single = ax_xb.calibrate_hand_eye(invert(T_BF), reading)
+    single = calibrate_hand_eye(T_BF, reading, eye="to hand")
     results = np.array(results)
     return {
         "results": results, "spread": np.cov(results.T, bias=True), "mean": results.mean(0),
-        "single": single.target[:3, 3], "claim": single.covariance[9:, 9:],
+        "single": single.T_FT[:3, 3], "claim": single.covariance_of("T_FT.translation"),
         "off": float(np.linalg.norm(results.mean(0) - T_FE[:3, 3])),
         "std": float(np.sqrt(results.var(0).sum())),
     }  # fmt: skip

@@ -483,7 +483,8 @@ computes("handeye.radius_computed_model")(functools.partial(_half, "computed mod
 @functools.cache
 def radius_fit(skip=()):
     """Sphere radius as a tenth unknown on the corrected data: (radius, its standard deviation), mm."""
-    return hand_eye.fit_radius(*_without(skip))
+    fit = hand_eye.fit_radius(*_without(skip))
+    return fit.radius, fit.std_of("radius")
 
 
 def _without(skip):
