@@ -121,8 +121,8 @@ def closure_error(T):
     """Return (angle in rad, distance in mm) by which T, shape (4, 4), differs from the identity."""
     ### BEGIN SOLUTION
     R = T[:3, :3]
-    twice_sine = np.linalg.norm([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    return np.arctan2(twice_sine, np.trace(R) - 1), np.linalg.norm(T[:3, 3])
+    twice_sine, twice_cosine = np.linalg.norm(R - R.T) / np.sqrt(2), np.trace(R) - 1
+    return np.arctan2(twice_sine, twice_cosine), np.linalg.norm(T[:3, 3])
     ### END SOLUTION
 
 

@@ -147,6 +147,7 @@ print(f"{std:.3f} mm  std of a coordinate, unbiased (divided by {3 * n - 6})")
 print(f"{np.rad2deg(std / np.linalg.norm(x[:3])):.2f} deg turn of the flange that moves the tip as far")
 
 # %% ten-others
+# the sheet prints s0 of all twelve poses, and the residuals of two
 s0_printed = 0.443922
 sum_of_all, sum_of_two = n * s0_printed**2, (listings**2).sum()
 print(f"{np.sqrt(sum_of_two / 2):.3f} mm  rms distance in the two poses printed")

@@ -412,16 +412,13 @@ ex.radius(radius)
 
 # %% radius-verdict
 no_4 = np.arange(31) != 3
-fits = {
-    "all poses": hand_eye.fit_radius(corrected.T_BF, corrected.x_S),
-    "without pose 4, next to the equator": hand_eye.fit_radius(corrected.T_BF[no_4], corrected.x_S[no_4]),
-}
-for name, found in fits.items():
+fits = [hand_eye.fit_radius(corrected.T_BF[k], corrected.x_S[k]) for k in (..., no_4)]
+for name, found in zip(("all poses", "without pose 4, next to the equator"), fits):
     print(f"{name}: {found.radius:.3f} +- {found.std_of('radius'):.3f} mm")
 for source in ("certificate", "listing", "coordinate machine"):
     r = thesis.radius(source)
-    away = [abs(r - found.radius) / found.std_of("radius") for found in fits.values()]
-    print(f"{source:19} {r:.4f} mm: {away[0]:4.1f} and {away[1]:4.1f} standard deviations away")
+    away = [abs(r - found.radius) / found.std_of("radius") for found in fits]
+    print(f"{source:19} {r:.4f} mm: {away[0]:4.1f} and {away[1]:4.1f} std away")
 
 # %% known [markdown]
 # Certificate and listing both fit; the coordinate machine's 30.28 does not.

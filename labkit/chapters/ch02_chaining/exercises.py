@@ -381,9 +381,9 @@ CHAPTER = Chapter(
             metric=metrics.Several(metrics.Angles(1e-6), metrics.Numbers(1e-9, "mm"), names=("angle", "distance")),
             hints=(
                 "How far is T from the identity? One number for the turn, one for the shift.",
-                "The trace of the 3x3 rotation block is 1 + 2 cos of the angle (NaN means an arccosine of more than 1), R - R' holds 2 sin times the axis; the distance is the length of the translation.",
-                "`R = T[:3, :3]; s = np.linalg.norm([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]); "
-                "return np.arctan2(s, np.trace(R) - 1), np.linalg.norm(T[:3, 3])`",
+                "The trace of the 3x3 rotation block is 1 + 2 cos of the angle (NaN means an arccosine of more than 1), R - R' has the Frobenius norm 2 sqrt(2) sin; the distance is the length of the translation.",
+                "`R = T[:3, :3]; twice_sine = np.linalg.norm(R - R.T) / np.sqrt(2); "
+                "return np.arctan2(twice_sine, np.trace(R) - 1), np.linalg.norm(T[:3, 3])`",
             ),
             mistakes=[
                 Mistake(
