@@ -7,10 +7,10 @@ describe one point:
 
 `linear_start` forgets that R_FS is a rotation and solves linear equations in fifteen unknowns; Gauss-Newton steps on
 the pose do the rest. `labkit.fast.hand_eye` finds the same minimum from sums over the poses. Lengths in mm, angles in
-rad. Increments are T_FS exp(phi, .): phi is a rotation vector in the scanner frame S, translations are plain differences in
-F, the target lives in B. Covariances and singular values follow that order: phi, translation, target. Source: thesis
-"Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", HAW Hamburg 2019, sections 2.6, 4.4, 6.1, listings C2 to
-C5.
+rad. Increments are T_FS exp(phi, .): phi is a rotation vector in the scanner frame S, translations are plain
+differences in F, the target lives in B. Covariances and singular values follow that order: phi, translation, target.
+Source: thesis "Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", HAW Hamburg 2019, sections 2.6, 4.4,
+6.1, listings C2 to C5.
 """
 
 import math
