@@ -14,13 +14,18 @@ import random
 import signal
 import sys
 import threading
+import time
 import traceback
 import warnings
 from dataclasses import dataclass, field
 
 import numpy as np
 
-TIME_LIMIT = 2.0  # seconds a single call may take
+TIME_LIMIT = 2.0  # seconds of processor time that a single call may take
+PATIENCE = 3  # times as long may a call take that shares its processor with others
+WAITING = 0.02  # share of its time that code computes which only waits, in a sleep say
+PERIOD = 0.05  # seconds between two rings of the clock
+SWALLOWED = 10  # rings that code may swallow before every line of it raises
 OUTPUT_LIMIT = 2000  # characters of printed text that are kept
 PROTECTED = ("numpy", "numpy.linalg", "math")
 
@@ -92,61 +97,106 @@ class Pristine:
 PRISTINE = Pristine()
 
 
-@contextlib.contextmanager
-def time_limit(seconds):
-    """Raise `TimeLimit` in this thread after so many seconds, and again and again if the code swallows it.
+class _Clock:
+    """Raises `TimeLimit` in this thread after so many seconds of processor time, and again if the code swallows it.
 
-    Where the platform has interval timers (Linux, macOS) and this is the main thread, a signal does it, which also ends
-    a sleep. Elsewhere a second thread raises it between two lines of Python; a single call into compiled code cannot
-    be stopped there.
+    Processor time does not depend on what else the machine is doing; a call that shares its processor is ended after
+    `PATIENCE` times as long, one that only waits at once. Where the platform has interval timers (Linux, macOS) and this is the main thread,
+    a signal does it, which also ends a sleep. Elsewhere a second thread raises it between two lines of Python; a
+    single call into compiled code cannot be stopped there.
     """
-    if hasattr(signal, "setitimer") and threading.current_thread() is threading.main_thread():
-        yield from _limit_by_signal(seconds)
-    else:
-        yield from _limit_by_thread(seconds)
 
+    def __init__(self, seconds):
+        self.seconds, self.rung = seconds, 0
+        self.by_signal = hasattr(signal, "setitimer") and threading.current_thread() is threading.main_thread()
 
-def _limit_by_signal(seconds):
-    active = True
+    def start(self):
+        self.ends_cpu, self.ends_wall = time.thread_time() + self.seconds, time.monotonic() + PATIENCE * self.seconds
+        if self.by_signal:
+            self.before = signal.signal(signal.SIGALRM, self._ring)
+            self.ticking = True
+            signal.setitimer(signal.ITIMER_REAL, self.seconds, PERIOD)
+        else:
+            self.lock, self.done = threading.Lock(), threading.Event()
+            self.ticking, self.target = True, ctypes.c_ulong(threading.get_ident())
+            threading.Thread(target=self._watch, daemon=True).start()
 
-    def ring(*_):
-        if active:
+    def stop(self):
+        """Afterwards nothing rings any more; a ring on the way out is taken back."""
+        while self.ticking:
+            with contextlib.suppress(TimeLimit):
+                self._disarm()
+        if self.rung > SWALLOWED:
+            sys.settrace(None)
+
+    ticking = False
+
+    def _disarm(self):
+        if self.by_signal:
+            self.ticking = False
+            signal.setitimer(signal.ITIMER_REAL, 0)
+            signal.signal(signal.SIGALRM, self.before)
+        else:
+            with self.lock:
+                self.ticking = False
+                self.done.set()
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(self.target, None)
+
+    def _ring(self, _, frame):
+        left = self.ends_cpu - time.thread_time()
+        waits = left > (1 - WAITING) * self.seconds
+        if self.ticking and (left <= 0 or waits or time.monotonic() >= self.ends_wall):
+            self.rung += 1
+            if self.rung > SWALLOWED:
+                _raise_at_every_line(frame)
             raise TimeLimit
 
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds, 0.05)
+    def _watch(self):
+        wait = self.seconds
+        while not self.done.wait(wait):
+            wait = PERIOD
+            with self.lock:
+                if self.ticking:
+                    ctypes.pythonapi.PyThreadState_SetAsyncExc(self.target, ctypes.py_object(TimeLimit))
+
+
+def _raise_at_every_line(frame):
+    """Code that swallows one `TimeLimit` after the other gets one at each line, up to the frame that runs it."""
+
+    def tell(frame, event, value):
+        if event == "line":
+            raise TimeLimit
+        return tell
+
+    while frame is not None and frame.f_code is not _call.__code__:
+        frame.f_trace = tell
+        frame = frame.f_back
+    sys.settrace(lambda *_: None)
+
+
+def _call(function, args, finish):
+    """The frame beneath which a student's code runs."""
+    return finish(function(*args))
+
+
+@contextlib.contextmanager
+def time_limit(seconds):
+    """Raise `TimeLimit` in what runs under `with` for more than so many seconds."""
+    clock = _Clock(seconds)
+    clock.start()
     try:
         yield
     finally:
-        active = False
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        clock.stop()
 
 
-def _limit_by_thread(seconds):
-    target = ctypes.c_ulong(threading.get_ident())
-    lock, done = threading.Lock(), threading.Event()
+def _forbid(what, original=None):
+    """A function that refuses in this thread; others, such as the kernel's watch on its parent, go on with theirs."""
+    checked = threading.get_ident()
 
-    def watch():
-        wait = seconds
-        while not done.wait(wait):
-            wait = 0.05
-            with lock:
-                if not done.is_set():
-                    ctypes.pythonapi.PyThreadState_SetAsyncExc(target, ctypes.py_object(TimeLimit))
-
-    watcher = threading.Thread(target=watch, daemon=True)
-    watcher.start()
-    try:
-        yield
-    finally:
-        with lock:
-            done.set()
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(target, None)
-
-
-def _forbid(what):
-    def refuse(*_, **__):
+    def refuse(*args, **kwargs):
+        if original is not None and threading.get_ident() != checked:
+            return original(*args, **kwargs)
         raise Forbidden(what)
 
     return refuse
@@ -171,7 +221,7 @@ def sandbox(capture):
     """Everything student code may touch, put back afterwards."""
     state, python_state = np.random.get_state(), random.getstate()  # noqa: NPY002 (what students may seed)
     err = np.geterr()
-    options, depth, folder = np.get_printoptions(), sys.getrecursionlimit(), os.getcwd()
+    options, depth, folder = np.get_printoptions(), sys.getrecursionlimit(), _working_folder()
     with contextlib.ExitStack() as stack:
         stack.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore")
@@ -180,7 +230,7 @@ def sandbox(capture):
         stack.enter_context(_replaced(builtins, "input", _forbid("input()")))
         stack.enter_context(_replaced(builtins, "breakpoint", _forbid("breakpoint()")))
         for name in ("_exit", "abort", "kill", "fork", "execv"):
-            stack.enter_context(_replaced(os, name, _forbid(f"os.{name}()")))
+            stack.enter_context(_replaced(os, name, _forbid(f"os.{name}()", getattr(os, name, None))))
         stack.enter_context(_replaced(_shell(), "ask_exit", _forbid("exit()")))
         try:
             yield
@@ -190,8 +240,17 @@ def sandbox(capture):
             np.seterr(**err)
             np.set_printoptions(**options)
             sys.setrecursionlimit(depth)
-            if os.getcwd() != folder:
-                os.chdir(folder)
+            if folder is not None and _working_folder() != folder:
+                with contextlib.suppress(OSError):
+                    os.chdir(folder)
+
+
+def _working_folder():
+    """The working directory, or None where it has been deleted."""
+    try:
+        return os.getcwd()
+    except OSError:
+        return None
 
 
 def _shell():
@@ -216,10 +275,17 @@ def run(function, args, finish=lambda result: result, limit=TIME_LIMIT, author=N
 
 def _run_once(function, args, finish, limit, author):
     given = copy.deepcopy(args)
-    outcome, capture = Run(), _Capture()
+    outcome, capture, clock = Run(), _Capture(), _Clock(limit)
     try:
-        with sandbox(capture), time_limit(limit):
-            outcome.result = finish(function(*given))
+        try:
+            with sandbox(capture):
+                try:
+                    clock.start()
+                    outcome.result = _call(function, given, finish)
+                finally:
+                    clock.stop()
+        finally:
+            clock.stop()  # a ring on the way to the first one leaves it for this
     except BaseException as error:  # SystemExit and KeyboardInterrupt of student code stay here as well
         outcome.error = error
         outcome.line = _student_line(error, author)

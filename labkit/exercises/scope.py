@@ -1,0 +1,102 @@
+"""What a checked function sees besides its arguments: its own name, the notebook's data, the library's twin."""
+
+import contextlib
+import functools
+import sys
+import types
+
+from . import guard
+
+OWN_ROOMS = ("labkit.chapters.", "labkit.exercises.", "labkit.stage.", "labkit.verbs.")
+DATA_TYPES = (int, float, complex, list, tuple, dict, set)
+
+
+class TwinCalled(guard.Forbidden):
+    """Raised in a student's function that calls the library's version of the very function it should be."""
+
+
+def is_the_librarys(function):
+    """Whether an answer is no answer of one's own, but a function of the library."""
+    return isinstance(function, types.FunctionType) and (function.__module__ or "").split(".")[0] == "labkit"
+
+
+@contextlib.contextmanager
+def own_name(function, name):
+    """While a function is judged, its name means the function: it may call itself, and is not judged with another."""
+    known = getattr(function, "__globals__", None)
+    if known is None:
+        yield
+        return
+    absent = object()
+    names = {name, getattr(function, "__name__", name)} - {"<lambda>"}
+    before = {key: known.get(key, absent) for key in names}
+    known.update(dict.fromkeys(names, function))
+    try:
+        yield
+    finally:
+        for key, value in before.items():
+            if value is absent:
+                known.pop(key, None)
+            else:
+                known[key] = value
+
+
+@contextlib.contextmanager
+def without_twin(function, exercise):
+    """While a function is judged, the notebook's code cannot call the library's function of the same name.
+
+    The library itself can: only a call from the globals of the judged function raises `TwinCalled`.
+    """
+    theirs = getattr(function, "__globals__", None)
+    twins = list(_twins(exercise)) if theirs is not None else []
+    for module, name, twin in twins:
+        setattr(module, name, _refusing(twin, f"{module.__name__.rpartition('.')[2]}.{name}", theirs))
+    try:
+        yield
+    finally:
+        for module, name, twin in twins:
+            setattr(module, name, twin)
+
+
+def _twins(exercise):
+    """(module, name, function) of the library's functions that are the exercise's reference, or have its name."""
+    for module_name, module in list(sys.modules.items()):
+        if module is None or not module_name.startswith("labkit.") or module_name.startswith(OWN_ROOMS):
+            continue
+        for name, value in list(vars(module).items()):
+            is_public = isinstance(value, types.FunctionType) and not name.startswith("_")
+            if is_public and (value is exercise.reference or name == exercise.id):
+                yield module, name, value
+
+
+def _refusing(twin, where, theirs):
+    @functools.wraps(twin)
+    def guarded(*args, **kwargs):
+        if sys._getframe(1).f_globals is theirs:
+            raise TwinCalled(where)
+        return twin(*args, **kwargs)
+
+    return guarded
+
+
+def notebook_data(function):
+    """Names of the notebook's data (no functions, no modules) that a function reads without being given them."""
+    known, code = getattr(function, "__globals__", {}), getattr(function, "__code__", None)
+    if code is None:
+        return []
+    return [name for name in _names(code) if name in known and _is_data(known[name])]
+
+
+def _names(code):
+    """Global names a code object uses, and those of the functions defined within it, each once and in order."""
+    found = dict.fromkeys(code.co_names)
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            found |= dict.fromkeys(_names(constant))
+    return list(found)
+
+
+def _is_data(value):
+    if isinstance(value, bool) or callable(value) or isinstance(value, types.ModuleType):
+        return False
+    return isinstance(value, DATA_TYPES) or type(value).__module__.split(".")[0] in ("numpy", "labkit")
