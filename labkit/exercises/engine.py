@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from . import guard, metrics
+from . import guard, metrics, relations, scope
 
 TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
 NOISY = "exact on clean data, but the data are not weighed as they should be: on noisy data"
@@ -130,6 +130,15 @@ class Exercise(Item):
             return Outcome(TO_DO)
         if not callable(function):
             return Outcome(NOT_YET, f"expected a function, got {metrics._describe(function)}.")
+        if scope.is_the_librarys(function, self):
+            where = f"{function.__module__}.{function.__name__}"
+            return Outcome(
+                NOT_YET, f"that is the library's own function, `{where}`: it is the one you are asked to write."
+            )
+        with scope.own_name(function, self.id), scope.without_twin(function, self):
+            return self._try(function, rng)
+
+    def _try(self, function, rng):
         trial, seen = _Trial(self, function), []
         for draw, metric, words in self._plan():
             if trial.spent > TOTAL_TIME and len(seen) > 1 and draw in seen:
@@ -203,11 +212,11 @@ class _Trial:
         if all(m is None or m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)) and not self.refusal:
             named = self._named_mistake() if self.exercise.metric is None else None
             return named or self.outcome(CORRECT)
-        named = self._named_mistake()
+        named = self._named_mistake() or self._named_in_parts()
         if named:
             return named
         if self.refusal:
-            return self.outcome(NOT_YET, _closed(self.refusal))
+            return self.outcome(NOT_YET, _closed(self.refusal) + self._about_globals())
         plain = self._plain_pairs()
         if self._right_on_plain():
             for metric, pair, words in zip(self.metrics, self.pairs, self.words):
@@ -216,8 +225,15 @@ class _Trial:
                     return self.outcome(NOT_YET, _closed(f"{words} {off}"))
         arrays = [arg for args in self.inputs for arg in args if isinstance(arg, np.ndarray)]
         sizes = {n for array in arrays for n in (*array.shape, array.size)}
-        words = metrics.difference_words(self.exercise.metric, plain, sizes)
-        return self.outcome(NOT_YET, _closed(words) if words else self._deviation())
+        words = relations.difference_words(self.exercise.metric, plain, sizes)
+        return self.outcome(NOT_YET, (_closed(words) if words else self._deviation()) + self._about_globals())
+
+    def _about_globals(self):
+        """A line about data of the notebook that the function reads, which a checked function is not given."""
+        names = ", ".join(f"`{name}`" for name in scope.notebook_data(self.function))
+        if not names:
+            return ""
+        return f"\nYour function reads {names} from the notebook: what it computes with should come in as an argument."
 
     def _plain_pairs(self):
         return [pair for pair, words in zip(self.pairs, self.words) if words is None]
@@ -237,6 +253,32 @@ class _Trial:
                 return self.outcome(NOT_YET, mistake.text, k)
         return None
 
+    def _named_in_parts(self):
+        """Of several results each may be a slip of its own: then each gets its text."""
+        if not isinstance(self.exercise.metric, metrics.Several) or self.refusal:
+            return None
+        cases = [case[:3] for case in zip(self.inputs, self.metrics, self.pairs, self.words) if case[3] is None]
+        texts, first = {}, None
+        for part, (name, metric, _, _) in enumerate(self.exercise.metric.parts(*cases[0][2])):
+            if all(metric.equal(pair[0][part], pair[1][part]) for _, _, pair in cases):
+                continue
+            k = next((k for k in range(len(self.exercise.mistakes)) if self._is_slip_of(k, part, metric, cases)), None)
+            if k is None:
+                return None
+            texts[name], first = self.exercise.mistakes[k].text, k if first is None else first
+        words = "\n".join(f"{name}: {text}" for name, text in texts.items())
+        return self.outcome(NOT_YET, words, first) if len(texts) > 1 else None
+
+    def _is_slip_of(self, k, part, metric, cases):
+        """Whether one part of the results is that of mistake k on all draws."""
+        try:
+            with np.errstate(all="ignore"):
+                wrong = [self.exercise.mistakes[k].variant(*copy.deepcopy(args))[part] for args, _, _ in cases]
+                same = all(_equal_as_written(metric, pair[0][part], w) for (_, _, pair), w in zip(cases, wrong))
+                return same and not all(metric.equal(w, pair[1][part]) for (_, _, pair), w in zip(cases, wrong))
+        except Exception:  # a wrong variant may well fail on a draw: then the answer is not this mistake
+            return False
+
     def _is_mistake(self, mistake, args, metric, pair):
         metric = metric or metrics.Numbers(1e-12)
         try:
@@ -254,6 +296,9 @@ class _Trial:
         if not worst:
             return "right on most draws, but not on all."
         most = max(worst, key=lambda d: d.amount / max(d.tolerance, 1e-300))
+        near = relations.not_accurate_enough(most)
+        if near:
+            return near
         missed = [args for args, pair in zip(self.inputs, pairs) if not metric.equal(*pair)]
         if len(missed) == len(pairs):
             return _closed(str(most))
@@ -281,6 +326,10 @@ class _Trial:
                 " or one that tries far more than it must?"
             )
             return self.outcome(NOT_YET, text)
+        if isinstance(error, scope.TwinCalled):
+            return self.outcome(
+                NOT_YET, f"your function calls the library's `{error}`: that is the function you are asked to write."
+            )
         if isinstance(error, guard.Forbidden):
             return self.outcome(
                 NOT_YET,
@@ -394,6 +443,7 @@ class Value(Item):
 
     reference: function without arguments that computes it from data and library.
     rtol, atol: how close an answer must be (relative to the value, absolute in `unit`).
+    digits:     a right answer may be rounded to so many significant digits, as a notebook prints it.
     mistakes:  functions without arguments that give a wrong value.
     """
 
@@ -404,6 +454,7 @@ class Value(Item):
     hints: tuple = ()
     mistakes: tuple = ()
     metric: object = None
+    digits: int = 3
 
     def measure(self):
         expected = float(self.reference())
@@ -416,6 +467,8 @@ class Value(Item):
         if self.metric is not None:
             return self._judge_with(self.metric, self.reference(), answer)
         expected, metric = self.measure()
+        if isinstance(answer, np.ndarray) and answer.size == 1:
+            answer = answer.reshape(())
         run = (
             guard.run(metric.admit, (answer, expected))
             if unit is None
@@ -425,14 +478,12 @@ class Value(Item):
             return Outcome(NOT_YET, _closed(_for_value(run.error)))
         if run.error is not None:
             return Outcome(NOT_YET, f"expected a number{self._in_unit()}, got {metrics._describe(answer)}.")
-        return self._exact_mistake(run.result, expected) or self._compare(metric, run.result, expected)
+        return self._compare(metric, run.result, expected)
 
-    def _exact_mistake(self, answer, expected):
-        """The mistake that gives just this number, even where it lies within the tolerance of rounded answers."""
-        exact = metrics.Numbers(1e-9)
+    def _mistake(self, answer, is_it):
+        """The first mistake whose value `is_it` finds in the answer."""
         for k, mistake in enumerate(self.mistakes):
-            wrong = float(mistake.variant())
-            if exact.equal(answer, wrong) and not exact.equal(answer, expected):
+            if is_it(answer, mistake.variant()):
                 return Outcome(NOT_YET, mistake.text, k)
         return None
 
@@ -456,17 +507,34 @@ class Value(Item):
         return self._compare(metric, run.result, expected)
 
     def _compare(self, metric, answer, expected):
-        if metric.equal(answer, expected):
+        """Right, or a mistake to its own digits, or what the general layer says; rounded answers need `digits`.
+
+        A mistake is compared by itself, not with the tolerance of right answers: a number near it is not it.
+        """
+        exact = metrics.Numbers(1e-9)
+        is_right = metric.equal(answer, expected)
+        named = None if exact.equal(answer, expected) else self._mistake(answer, exact.equal)
+        if named:
+            return named
+        digits = 0 if _is_whole(expected) else relations.significant_digits(answer, expected)
+        if is_right or digits >= self.digits:
             return Outcome(CORRECT)
-        for k, mistake in enumerate(self.mistakes):
-            if metric.equal(answer, mistake.variant()):
-                return Outcome(NOT_YET, mistake.text, k)
-        words = metrics.difference_words(metric, [(answer, expected)])
-        if words:
-            return Outcome(NOT_YET, _closed(words))
-        if _is_rounded(answer, expected):
-            return Outcome(NOT_YET, "right as far as it goes: hand over the computed value, not a rounded one.")
-        return Outcome(NOT_YET, f"not this value{self._in_unit()}: the hints lead on.")
+        named = self._mistake(answer, lambda a, w: relations.significant_digits(a, w) >= max(self.digits, digits + 1))
+        if named:
+            return named
+        if digits > 1:
+            least = f"at least {self.digits} digits are needed"
+            return Outcome(NOT_YET, f"right as far as it goes: {least}, so hand over the computed value.")
+        words = relations.difference_words(metric, [(answer, expected)])
+        return Outcome(NOT_YET, _closed(words) if words else self._which_way(answer, expected))
+
+    def _which_way(self, answer, expected):
+        if np.ndim(expected) or not np.isfinite(answer):
+            return f"not this value{self._in_unit()}: the hints lead on."
+        size = "large" if abs(answer) > abs(expected) else "small"
+        if answer * expected < 0:
+            return f"not this value{self._in_unit()}, and it should have the other sign: the hints lead on."
+        return f"not this value{self._in_unit()}: yours is too {size}. The hints lead on."
 
     def _in_unit(self):
         return f" in {self.unit}" if self.unit else ""
@@ -477,19 +545,9 @@ def _closed(sentence):
     return sentence if sentence[-1:] in ".?:" else f"{sentence}."
 
 
-def _is_rounded(answer, expected):
-    """Whether a number or an array is the expected one, rounded to two significant digits or better."""
-    try:
-        answer, expected = np.asarray(answer, dtype=float), np.asarray(expected, dtype=float)
-    except (TypeError, ValueError):
-        return False
-    size = np.abs(expected).max(initial=0.0)
-    if answer.shape != expected.shape or size == 0:
-        return False
-    least = 1 - int(np.floor(np.log10(size)))
-    units = 10.0 ** -np.arange(max(least, 0) if (expected == np.round(expected)).all() else least, least + 8)
-    off = np.abs(answer - expected).max()
-    return any(off <= 0.5000001 * u and np.allclose(answer / u, np.round(answer / u), rtol=1e-12) for u in units)
+def _is_whole(expected):
+    """Whether numbers are counts, which nobody rounds."""
+    return bool(np.all(np.asarray(expected) == np.round(expected)))
 
 
 def _for_value(refusal):

@@ -8,6 +8,7 @@ import builtins
 import contextlib
 import copy
 import ctypes
+import functools
 import io
 import os
 import random
@@ -84,7 +85,8 @@ class Pristine:
         """Put back what was replaced, and note the names, e.g. "labkit.geometry.frames.invert", in `replaced`."""
         for name, (now, then) in self.saved.items():
             for key, value in then.items():
-                if now.get(key, self) is not value and key != "__warningregistry__":
+                found = now.get(key, self)
+                if getattr(found, "_stands_for", found) is not value and key != "__warningregistry__":
                     now[key] = value
                     self.replaced.append(f"{name}.{key}")
 
@@ -97,13 +99,23 @@ class Pristine:
 PRISTINE = Pristine()
 
 
+def standing_for(original):
+    """Decorator of a function that takes another one's place for a while, which `PRISTINE` lets it."""
+
+    def decorate(function):
+        function._stands_for = original
+        return functools.wraps(original)(function)
+
+    return decorate
+
+
 class _Clock:
     """Raises `TimeLimit` in this thread after so many seconds of processor time, and again if the code swallows it.
 
     Processor time does not depend on what else the machine is doing; a call that shares its processor is ended after
-    `PATIENCE` times as long, one that only waits at once. Where the platform has interval timers (Linux, macOS) and this is the main thread,
-    a signal does it, which also ends a sleep. Elsewhere a second thread raises it between two lines of Python; a
-    single call into compiled code cannot be stopped there.
+    `PATIENCE` times as long, one that only waits at once. Where the platform has interval timers (Linux, macOS) and
+    this is the main thread, a signal does it, which also ends a sleep. Elsewhere a second thread raises it between two
+    lines of Python; a single call into compiled code cannot be stopped there.
     """
 
     def __init__(self, seconds):

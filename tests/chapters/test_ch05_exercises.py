@@ -86,12 +86,14 @@ def test_a_pattern_must_fix_the_translation_too(tilt, told):
 
 
 def test_other_solutions_of_the_linear_start_are_right():
+    linear_start = hand_eye.linear_start
+
     def refined(T_BF, x_S):
         fit = hand_eye.calibrate_sphere_target(T_BF, x_S)
         return fit.T_FS, fit.target
 
     def translation_solved_anew(T_BF, x_S):
-        T_FS, _ = hand_eye.linear_start(T_BF, x_S)
+        T_FS, _ = linear_start(T_BF, x_S)
         R, n = T_BF[:, :3, :3], len(T_BF)
         A = np.concatenate([R, np.tile(-np.eye(3), (n, 1, 1))], axis=2).reshape(-1, 6)
         u = np.linalg.lstsq(A, -frames.transform(T_BF, x_S @ T_FS[:3, :3].T).ravel(), rcond=None)[0]
@@ -102,4 +104,7 @@ def test_other_solutions_of_the_linear_start_are_right():
 
 
 def test_a_circle_through_three_points_is_no_fit():
-    assert all("Three points" in judged("fit_circle", exercises._circle_through_three, seed).text for seed in range(30))
+    assert all(
+        "Three points" in judged("fit_circle", lambda *points: exercises._circle_through_three(*points), seed).text
+        for seed in range(30)
+    )

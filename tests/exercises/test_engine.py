@@ -22,6 +22,11 @@ from labkit.geometry import frames
 from labkit.geometry.lie import exp_so3
 
 INVERT = CHAPTER["invert"]
+THEIRS = {
+    "invert": frames.invert,
+    "gram_schmidt": frames.gram_schmidt,
+    "relative": frames.relative,
+}  # as nobody may call
 
 
 def scale(v):
@@ -70,7 +75,7 @@ def with_scipy(T):
         with_scipy,
         np.linalg.inv,
         lambda T: np.asmatrix(np.linalg.inv(T)),
-        lambda T: frames.invert(T).astype(np.float32),
+        lambda T: THEIRS["invert"](T).astype(np.float32),
     ],
 )
 def test_every_correct_way_is_accepted(way):
@@ -79,7 +84,7 @@ def test_every_correct_way_is_accepted(way):
 
 def test_scipy_rotation_counts_as_its_matrix():
     gram_schmidt = CHAPTER["gram_schmidt"]
-    assert gram_schmidt.judge(lambda a, b: Rotation.from_matrix(frames.gram_schmidt(a, b))).status == CORRECT
+    assert gram_schmidt.judge(lambda a, b: Rotation.from_matrix(THEIRS["gram_schmidt"](a, b))).status == CORRECT
 
 
 def test_printing_and_seeding_does_not_make_a_right_answer_wrong():
@@ -200,10 +205,10 @@ class Hostile:
     ],
 )
 def test_hostile_code_gets_one_sentence(function, status, words):
-    started = time.perf_counter()
+    started = time.thread_time()
     outcome = DOUBLE.judge(function)
     assert (outcome.status, words in outcome.text) == (status, True), outcome
-    assert time.perf_counter() - started < 4
+    assert time.thread_time() - started < 3
 
 
 def test_flood_of_output_is_cut():
@@ -395,7 +400,8 @@ def test_a_count_is_not_rounded():
     count = Value("count", reference=lambda: 162, hints=("a", "b", "c"), rtol=1e-6)
     assert "as far as it goes" not in count.judge(160).text
     length = Value("length", reference=lambda: 162.37, hints=("a", "b", "c"), rtol=1e-6)
-    assert "as far as it goes" in length.judge(162).text
+    assert length.judge(162).status == CORRECT
+    assert "as far as it goes" in length.judge(160).text
 
 
 def test_one_array_for_two_results_is_told_its_shape():
@@ -423,7 +429,8 @@ def test_truth_values_are_no_indices():
         metric=metrics.Exactly(),
         hints=("a", "b", "c"),
     )
-    assert "an array of True and False" in exercise.judge(lambda v: (v > 0).astype(int)).text
+    assert "an array of True and False" in exercise.judge(lambda v: np.argsort(v)).text
+    assert exercise.judge(lambda v: (v > 0).astype(int)).status == CORRECT
 
 
 def test_a_rotation_is_a_rotation_also_within_a_loose_angle():
@@ -670,7 +677,11 @@ def test_strict_mode_raises_unless_correct(monkeypatch):
         ex.predict("guess")
     with pytest.raises(session.NotCorrect, match="not the right one"):
         ex.predict("guess", "down")
-    assert ex.double(scale) is scale
+
+    def twice(v):
+        return v + v
+
+    assert ex.double(twice) is twice
     ex.predict("guess", "up")
 
 
@@ -765,7 +776,7 @@ def test_progress_records_which_mistake_it_was():
 
 def test_progress_is_counted_and_started_over():
     ex = session.course("01-frames")
-    ex.invert(frames.invert)
+    ex.invert(loops)
     assert ("01-frames", "invert") in progress.solved()
     assert "1 of" in session.progress_text().split("01-frames")[1].splitlines()[0]
     ex.invert.reset()
@@ -835,13 +846,22 @@ def test_an_array_that_stands_for_the_reference_is_not_shown(capsys):
     np.testing.assert_array_equal(bound + 1, saddle + 1)
     assert "0.169" in repr(bound + 1 - 1) and "0.169" not in capsys.readouterr().out
     assert place.judge([0.17, -0.25]).text.startswith("right as far as it goes")
+    assert place.judge([0.169, -0.246]).status == CORRECT
 
 
 @pytest.mark.parametrize(
-    "answer, words", [(1230.0, "not a rounded one"), (1235, "not a rounded one"), (1100.0, "not this")]
+    "answer, status, words",
+    [
+        (1235, CORRECT, ""),
+        (1230.0, CORRECT, ""),
+        (1200.0, NOT_YET, "at least 3 digits"),
+        (1100.0, NOT_YET, "too small"),
+    ],
 )
-def test_rounded_values_are_told_so(answer, words):
-    assert words in LENGTH.judge(answer).text
+def test_rounded_values_need_three_digits(answer, status, words):
+    """1234.5: what a notebook prints is enough, whatever the tolerance."""
+    outcome = LENGTH.judge(answer)
+    assert outcome.status == status and words in outcome.text
 
 
 def test_words_count_without_their_case_and_wrong_ones_are_quoted():

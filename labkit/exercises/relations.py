@@ -1,0 +1,303 @@
+"""The general layer: what a wrong result that no named mistake explains has to do with the right one.
+
+A relation counts only when it holds on *all* draws. What is said is true of the result, whatever code it came from;
+what the cause may be is said with a question mark.
+"""
+
+import itertools
+
+import numpy as np
+
+from ..geometry import frames
+from ..geometry.lie import log_so3
+from .metrics import Exactly, Numbers, Poses, Rotations, Several, Through
+
+CLOSE = 1e4  # tolerances: an answer nearer than this is right in kind, but not accurate enough
+LONGEST = 12  # entries along the last axis that are tried one by one
+FACTORS = {"pi": np.pi, "2 pi": 2 * np.pi, "the root of 2": np.sqrt(2.0), "the root of 3": np.sqrt(3.0)}
+
+
+def difference_words(metric, pairs, sizes=()):
+    """What the general layer says of a wrong result, from relations that hold on all draws; None when it knows none.
+
+    `pairs` are (admitted result, expected) of every draw; `sizes` the lengths of what was given, which a forgotten or
+    needless division by their number would show.
+    """
+    for k, (name, part, _, _) in enumerate(metric.parts(*pairs[0])):
+        piece = [metric.parts(*pair)[k] for pair in pairs]
+        results, expected = [p[2] for p in piece], [p[3] for p in piece]
+        if all(part.equal(r, e) for r, e in zip(results, expected)):
+            continue
+        words = _relation(part, results, expected, sizes)
+        if words:
+            return f"{name}: {words}" if name else words
+        return None
+    return None
+
+
+def _relation(metric, results, expected, sizes):
+    if isinstance(metric, Exactly | Several):
+        return None
+    if isinstance(metric, Through):
+        metric = Numbers(1e-9)
+    results = [np.asarray(r, dtype=float) for r in results]
+    expected = [np.asarray(e, dtype=float) for e in expected]
+
+    def holds(change):
+        try:
+            return all(metric.equal(change(r), e) for r, e in zip(results, expected))
+        except (ValueError, IndexError, np.linalg.LinAlgError):
+            return False
+
+    if isinstance(metric, Poses):
+        return _pose_relation(metric, results, expected, holds)
+    if isinstance(metric, Rotations):
+        return _rotation_relation(results, holds)
+    unit = getattr(metric, "unit", "")
+    return (
+        _sign_or_unit(holds, unit)
+        or _arrangement(results, holds)
+        or _power(results, holds)
+        or _factor(results, expected, sizes)
+        or _one_part(results, expected, holds, unit)
+        or _offset(results, expected, unit)
+    )
+
+
+# Poses and rotations -------------------------------------------------------------------------------------------------
+
+
+def _moved(T, R=None, t=None):
+    T = T.copy()
+    if R is not None:
+        T[..., :3, :3] = R
+    if t is not None:
+        T[..., :3, 3] = t
+    return T
+
+
+def _pose_relation(metric, results, expected, holds):
+    turned = _rotation_kind([r[..., :3, :3] for r in results], "rotation block")
+    if turned:
+        return turned
+    if holds(frames.invert):
+        return "your result is the inverse of the expected pose: it maps in the other direction"
+    if holds(lambda T: _moved(T, R=np.swapaxes(T[..., :3, :3], -1, -2))):
+        return "the origin is right, the rotation is transposed"
+    for factor, words in ((1e3, "a thousandth"), (1e-3, "a thousand times")):
+        if holds(lambda T, factor=factor: _moved(T, t=factor * T[..., :3, 3])):
+            return f"the rotation is right, the translation is {words} of what it should be: mm against m?"
+    if holds(lambda T: _moved(T, t=-T[..., :3, 3])):
+        return "the rotation is right, the translation has the opposite sign"
+    if all(map(_are_rounded, results, expected)):
+        return "your result is rounded: hand over all digits"
+    *turn, origin = (max(d, key=lambda d: d.amount) for d in zip(*map(metric.deviations, results, expected)))
+    if all(d.within for d in turn):
+        return f"the rotation is right, the translation is not: it is off by {origin.amount:.3g} {origin.unit}"
+    if origin.within:
+        return f"the translation is right, the rotation is not: it is off by {turn[0].amount:.3g} {turn[0].unit}"
+    return None
+
+
+def _rotation_kind(matrices, what):
+    """What keeps matrices from being rotations, if anything does."""
+    sheared = max(np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).max(initial=0.0) for r in matrices)
+    if sheared > 1e-3:
+        return f"your {what} is not orthonormal: R'R differs from I by {sheared:.2g}"
+    if any((np.linalg.det(r) < 0).any() for r in matrices):
+        return f"your {what} is a reflection, its determinant is -1: one axis points the wrong way"
+    return None
+
+
+def _rotation_relation(results, holds):
+    if holds(lambda R: np.swapaxes(R, -1, -2)):
+        return "your matrix is the transpose of the expected rotation: rows and columns, or the direction of the map"
+    kind = _rotation_kind(results, "matrix")
+    if kind:
+        return kind
+    if all(np.isfinite(log_so3(r)).all() for r in results) and holds(lambda R: R @ R):
+        return "you turn by half the angle"
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1, -1), repeat=3):
+            if holds(lambda R, o=list(order), s=signs: R[..., o] * s):
+                return f"your axes are the right lines under other names: {_axes(order, signs)}"
+    return None
+
+
+def _axes(order, signs):
+    named = [f"{'-' if s < 0 else ''}{'xyz'[o]}" for o, s in zip(order, signs)]
+    return ", ".join(f"{axis} should be your {name}" for axis, name in zip("xyz", named) if axis != name)
+
+
+# Numbers -------------------------------------------------------------------------------------------------------------
+
+
+def _sign_or_unit(holds, unit):
+    if holds(np.negative):
+        return "your result is right up to its sign"
+    if holds(np.deg2rad):
+        once_too_often = "your result has been converted to degrees once too often"
+        return once_too_often if unit == "deg" else "your result is in degrees where radians are expected"
+    if holds(np.rad2deg):
+        return "your result is in radians where degrees are expected"
+    for factor, words in ((1e3, "a thousandth of"), (1e-3, "a thousand times"), (0.5, "twice"), (2.0, "half")):
+        if holds(lambda r, factor=factor: factor * r):
+            return f"your result is {words} the expected one{': mm against m?' if factor in (1e3, 1e-3) else ''}"
+    return None
+
+
+def _arrangement(results, holds):
+    """Right entries in another order."""
+    first = results[0]
+    if all(r.shape == (4,) for r in results) and holds(lambda r: np.roll(r, -1)):
+        return "the scalar part comes first in your quaternion; here it comes last (x, y, z, w)"
+    if all(r.ndim == 2 and r.shape[0] == r.shape[1] > 1 for r in results):
+        if holds(np.transpose):
+            return "your matrix is the transpose of the expected one"
+        if holds(np.linalg.inv):
+            return "your matrix is the inverse of the expected one"
+    if not first.ndim or first.shape[-1] < 2 or any(r.shape[-1:] != first.shape[-1:] for r in results):
+        return None
+    if first.ndim == 1 and first.size > 2 and holds(lambda r: r[::-1]):
+        return "the entries are right, in reverse order"
+    if first.shape[-1] <= LONGEST:
+        for i, j in itertools.combinations(range(first.shape[-1]), 2):
+            if holds(lambda r, i=i, j=j: _exchanged(r, i, j)):
+                return f"the entries {i} and {j} (counted from 0) are exchanged{_along(first)}; all others are right"
+    for shift in (1, -1):
+        if len(first) > 2 and holds(lambda r, shift=shift: np.roll(r, shift, axis=0)):
+            return f"the entries are right, but all stand one place too {'early' if shift > 0 else 'late'}"
+    return None
+
+
+def _along(array):
+    return " in each row" if array.ndim > 1 else ""
+
+
+def _exchanged(r, i, j):
+    r = r.copy()
+    r[..., [i, j]] = r[..., [j, i]]
+    return r
+
+
+def _power(results, holds):
+    if all((r >= 0).all() for r in results):
+        if holds(np.sqrt):
+            return "your result is the square of the expected one: is a root missing?"
+        if holds(np.square):
+            return "your result is the square root of the expected one"
+    if all((r != 0).all() for r in results) and holds(np.reciprocal):
+        return "your result is the reciprocal of the expected one"
+    return None
+
+
+def _factor(results, expected, sizes):
+    ratios = [_constant_ratio(r, e) for r, e in zip(results, expected)]
+    if None in ratios or len(ratios) < 2 or np.ptp(ratios) > 1e-9 * abs(ratios[0]):
+        return None
+    ratio = ratios[0]
+    for name, factor in FACTORS.items():
+        for sign, word in ((1, ""), (-1, "minus ")):
+            if abs(ratio * sign / factor - 1) < 1e-9:
+                return f"your result is {word}{name} times the expected one, on every draw"
+            if abs(ratio * sign * factor - 1) < 1e-9:
+                return f"{name} times your result is {word or ''}the expected one, on every draw"
+    return _times(ratio, sizes)
+
+
+def _times(ratio, sizes):
+    n, share = round(ratio), round(1 / ratio)
+    if n in sizes and abs(ratio - n) < 1e-6:
+        return f"your result is {n} times the expected one, on every draw: a sum where a mean is meant?"
+    if share in sizes and abs(1 / ratio - share) < 1e-6:
+        return f"your result is 1/{share} of the expected one, on every draw: a mean where a sum is meant?"
+    if share > 1 and abs(1 / ratio - share) < 1e-6:
+        return f"your result is 1/{share} of the expected one, on every draw"
+    return f"your result is {ratio:.4g} times the expected one, on every draw"
+
+
+def _constant_ratio(result, expected):
+    use = np.abs(expected) > 1e-12
+    if not use.any() or (np.abs(result[~use]) > 1e-9).any():
+        return None
+    ratio = result[use] / expected[use]
+    return float(ratio.flat[0]) if np.ptp(ratio) <= 1e-9 * abs(ratio.flat[0]) and ratio.flat[0] != 0 else None
+
+
+def _one_part(results, expected, holds, unit):
+    """One entry along the last axis, or all rows after the first ones, are wrong; the rest is right."""
+    first = results[0]
+    if not first.ndim or any(r.shape[-1:] != first.shape[-1:] for r in results):
+        return None
+    if 1 < first.shape[-1] <= LONGEST:
+        for k in range(first.shape[-1]):
+            if holds(lambda r, k=k: _with_entry(r, k, -r[..., k])):
+                return f"entry {k} (counted from 0) has the opposite sign{_along(first)}; all others are right"
+        for k in range(first.shape[-1]):
+            patched = [_with_entry(r, k, e[..., k]) for r, e in zip(results, expected)]
+            if _all_equal(patched, expected):
+                off = max(np.abs(r[..., k] - e[..., k]).max() for r, e in zip(results, expected))
+                where = f"only entry {k} (counted from 0){_along(first)}"
+                return f"{where} is not right: it is off by {off:.3g}{' ' + unit if unit else ''}"
+    if len(first) > 2:
+        for rows in range(len(first) - 1, 0, -1):
+            if _all_equal([r[:rows] for r in results], [e[:rows] for e in expected]):
+                return f"the first {rows} are right, those behind are not: does your loop run to the end?"
+    return None
+
+
+def _with_entry(r, k, value):
+    r = r.copy()
+    r[..., k] = value
+    return r
+
+
+def _all_equal(results, expected):
+    return all(np.allclose(r, e, rtol=1e-9, atol=1e-12) for r, e in zip(results, expected))
+
+
+def _offset(results, expected, unit):
+    """The same number added to every entry, on all draws."""
+    gaps = np.concatenate([np.ravel(r - e) for r, e in zip(results, expected)])
+    if len(results) > 1 and abs(gaps[0]) > 1e-9 and np.ptp(gaps) < 1e-9 * max(1.0, abs(gaps[0])):
+        amount = f"{abs(gaps[0]):.4g}{' ' + unit if unit else ''}"
+        return f"your result is too {'large' if gaps[0] > 0 else 'small'} by {amount}, on every draw"
+    return None
+
+
+# Digits --------------------------------------------------------------------------------------------------------------
+
+
+def _are_rounded(result, expected):
+    return any(np.array_equal(result, np.round(expected, n)) for n in range(1, 9))
+
+
+def significant_digits(answer, expected):
+    """To how many significant digits an answer is the expected number (or array) rounded; 0 where it is not at all.
+
+    2.0 is 1.996 to three digits: what looks like fewer may be the zeros that a number does not show.
+    """
+    try:
+        answer, expected = np.asarray(answer, dtype=float), np.asarray(expected, dtype=float)
+    except (TypeError, ValueError):
+        return 0
+    size = np.abs(expected).max(initial=0.0)
+    if answer.shape != expected.shape or not 0 < size < np.inf:
+        return 0
+    leading, found = int(np.floor(np.log10(size))), 0
+    for digits in range(1, 13):
+        unit = 10.0 ** (leading + 1 - digits)
+        on_grid = np.allclose(answer / unit, np.round(answer / unit), rtol=1e-12, atol=1e-6)
+        if on_grid and np.abs(answer - expected).max() <= 0.5000001 * unit:
+            found = digits
+    return found
+
+
+def not_accurate_enough(deviation):
+    """What to say of an answer that is right in kind; None for one that is farther off."""
+    if deviation.words or deviation.amount > CLOSE * deviation.tolerance:
+        return None
+    return (
+        f"{deviation}: right in kind, but not accurate enough. Too few iterations, a step of differences too large, or "
+        "a rounded number on the way?"
+    )

@@ -1,0 +1,132 @@
+"""What the general layer finds in a wrong result, and that it finds nothing in an unrelated one."""
+
+import numpy as np
+import pytest
+
+from labkit.exercises import metrics, relations
+from labkit.exercises.engine import CORRECT, NOT_YET, Mistake, Value
+from labkit.geometry.frames import matrix_from_kuka
+from labkit.geometry.lie import exp_so3
+
+RNG = np.random.default_rng(4)
+VECTORS = [RNG.normal(size=4) + 3 for _ in range(4)]
+TABLES = [RNG.normal(size=(5, 3)) for _ in range(4)]
+SQUARES = [RNG.normal(size=(3, 3)) for _ in range(4)]
+TURNS = [exp_so3(RNG.normal(size=3)) for _ in range(4)]
+
+
+def words(change, expected, metric=None):
+    return relations.difference_words(metric or metrics.Numbers(1e-9, "mm"), [(change(e), e) for e in expected])
+
+
+def changed(index, value):
+    def change(e):
+        e = e.copy()
+        e[index] = value(e[index]) if callable(value) else value
+        return e
+
+    return change
+
+
+@pytest.mark.parametrize(
+    "change, expected, told",
+    [
+        (np.negative, VECTORS, "up to its sign"),
+        (lambda e: e / np.pi, VECTORS, "pi times your result is the expected one"),
+        (lambda e: np.sqrt(3) * e, TABLES, "the root of 3 times the expected one"),
+        (lambda e: e / 7, TABLES, "1/7 of the expected one"),
+        (changed(1, np.negative), VECTORS, "entry 1 (counted from 0) has the opposite sign"),
+        (changed((slice(None), 2), np.negative), TABLES, "entry 2 (counted from 0) has the opposite sign in each row"),
+        (lambda e: e[[2, 1, 0, 3]], VECTORS, "the entries 0 and 2 (counted from 0) are exchanged"),
+        (lambda e: e[:, [1, 0, 2]], TABLES, "the entries 0 and 1 (counted from 0) are exchanged in each row"),
+        (lambda e: np.roll(e, 1, axis=0), TABLES, "one place too late"),
+        (changed(3, lambda v: v + 5.0), VECTORS, "only entry 3 (counted from 0) is not right: it is off by 5 mm"),
+        (changed(slice(3, None), 0.0), TABLES, "the first 3 are right"),
+        (lambda e: e + 2.5, TABLES, "too large by 2.5 mm, on every draw"),
+        (np.linalg.inv, SQUARES, "the inverse of the expected one"),
+        (np.square, VECTORS, "the square of the expected one"),
+        (np.reciprocal, VECTORS, "the reciprocal of the expected one"),
+    ],
+)
+def test_relations_of_numbers(change, expected, told):
+    assert told in words(change, expected)
+
+
+@pytest.mark.parametrize("expected", [VECTORS, TABLES, SQUARES])
+def test_unrelated_numbers_have_no_relation(expected):
+    rng = np.random.default_rng(1)
+    assert words(lambda e: rng.normal(size=e.shape), expected) is None
+
+
+@pytest.mark.parametrize(
+    "change, told",
+    [
+        (lambda R: R[:, [1, 0, 2]] * (1, 1, -1), "x should be your y, y should be your x, z should be your -z"),
+        (lambda R: np.swapaxes(R, -1, -2), "transpose"),
+        (lambda R: 1.1 * R, "not orthonormal"),
+        (lambda R: R * (1, 1, -1), "reflection"),
+    ],
+)
+def test_relations_of_rotations(change, told):
+    assert told in words(change, TURNS, metrics.Rotations())
+
+
+def test_a_pose_that_is_wrong_in_one_part_says_by_how_much():
+    poses = [matrix_from_kuka([*RNG.normal(size=3) * 100, *RNG.normal(size=3)]) for _ in range(3)]
+    assert "off by 7 mm" in words(changed((0, 3), lambda x: x + 7.0), poses, metrics.Poses())
+    assert words(lambda T: np.round(T, 4), poses, metrics.Poses()) == "your result is rounded: hand over all digits"
+
+
+def test_a_rotation_near_something_that_is_none_is_not_taken_for_it():
+    """The polar factor of a sheared matrix turns by nothing against it, and is not equal to it."""
+    sheared = TURNS[0] @ (np.eye(3) + 0.2 * np.ones((3, 3)))
+    u, _, vt = np.linalg.svd(sheared)
+    assert not metrics.Rotations(1e-6).equal(u @ vt, sheared)
+
+
+@pytest.mark.parametrize(
+    "answer, expected, digits",
+    [
+        (1.41, 1.41421356, 3),
+        (1.4142, 1.41421356, 5),
+        (2.0, 1.996, 3),
+        (1.42, 1.41421356, 0),
+        (0.17, 0.169, 2),
+        (0, 0, 0),
+    ],
+)
+def test_significant_digits(answer, expected, digits):
+    assert relations.significant_digits(answer, expected) == digits
+
+
+AREA = Value(
+    "area",
+    reference=lambda: 0.2758,
+    unit="mm",
+    rtol=0.02,
+    hints=("a", "b", "c"),
+    mistakes=[Mistake(lambda: 0.0625, "one alone"), Mistake(lambda: 0.2741, "near the truth")],
+)
+
+
+@pytest.mark.parametrize(
+    "answer, status, told",
+    [
+        (0.276, CORRECT, ""),
+        (0.0625, NOT_YET, "one alone"),
+        (0.0602, NOT_YET, "too small"),  # near a mistake is not that mistake
+        (0.2741, NOT_YET, "near the truth"),  # exactly a mistake is one, also within the tolerance
+        (0.9, NOT_YET, "too large"),
+        (-0.9, NOT_YET, "the other sign"),
+        (-0.2758, NOT_YET, "up to its sign"),
+    ],
+)
+def test_values_are_compared_with_mistakes_by_their_own_digits(answer, status, told):
+    outcome = AREA.judge(answer)
+    assert outcome.status == status and told in outcome.text
+
+
+def test_an_answer_that_has_not_converged_is_told_so():
+    deviation = metrics.Numbers(1e-9, "m").deviations(np.array(1.0 + 1e-7), 1.0)[0]
+    assert "not accurate enough" in relations.not_accurate_enough(deviation)
+    assert relations.not_accurate_enough(metrics.Numbers(1e-9).deviations(np.array(1.1), 1.0)[0]) is None
