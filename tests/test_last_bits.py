@@ -44,7 +44,8 @@ def test_a_given_array_receives_the_stirred_result():
     np.testing.assert_array_equal(out, last_bits.stirred(np.dot(A, A), 1))
 
 
-def test_a_notebook_runs_with_stirred_last_bits(tmp_path):
+def test_a_notebook_runs_with_stirred_last_bits(tmp_path, monkeypatch):
+    monkeypatch.delenv("LAST_BITS", raising=False)  # set when this very test runs with stirred last bits
     run = load("run")
     code = "import numpy as np\nprint(type(np.linalg.inv).__name__)"
     output = {"output_type": "stream", "name": "stdout", "text": "function\n"}

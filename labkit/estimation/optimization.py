@@ -498,9 +498,9 @@ def levenberg_marquardt(
             damping *= growth
             growth *= 2.0
         record.add(new if gain > 0 else point, step, radius, gain, gain > 0)
-        reason = stop(point, new) if gain > 0 else _stuck(point, step)
+        reason, converged = (stop(point, new), True) if gain > 0 else _stuck(point, step)
         if reason:
-            return record.trace(reason, gain > 0)
+            return record.trace(reason, converged)
         point = record.points[-1]
     return record.trace(f"no convergence within {max_iterations} iterations", False)
 
@@ -554,9 +554,9 @@ def trust_region(
         new, gain = _try(evaluate, point, retract, step)
         record.add(new if gain > accept else point, step, radius, gain, gain > accept)
         radius = next_radius(radius, length, gain, max_radius)
-        reason = stop(point, new) if gain > accept else _stuck(point, step)
+        reason, converged = (stop(point, new), True) if gain > accept else _stuck(point, step)
         if reason:
-            return record.trace(reason, gain > accept)
+            return record.trace(reason, converged)
         point = record.points[-1]
     return record.trace(f"no convergence within {max_iterations} iterations", False)
 
@@ -578,7 +578,14 @@ def _try(evaluate, point, retract, step):
 
 
 def _stuck(point, step):
-    """Text when a rejected step has become too short to change x at all."""
-    if np.linalg.norm(step) > np.finfo(float).eps * (np.finfo(float).tiny + np.linalg.norm(point.x)):
-        return ""
-    return "no step lowers the cost, down to rounding"
+    """(reason, converged) when a rejected step has become too short to change x at all, else ("", False).
+
+    Converged when even the whole Newton step promises less than rounding of the cost can show: then the last bits
+    decided that no step was taken, and x is the minimum as exactly as it can be told.
+    """
+    eps = np.finfo(float).eps
+    if np.linalg.norm(step) > eps * (np.finfo(float).tiny + np.linalg.norm(point.x)):
+        return "", False
+    newton = -np.linalg.lstsq(point.curvature, point.gradient, rcond=None)[0]
+    promised = -0.5 * point.gradient @ newton
+    return "no step lowers the cost, down to rounding", bool(abs(promised) <= 8 * eps * abs(point.cost))

@@ -14,132 +14,20 @@ import zlib
 from time import monotonic
 
 import numpy as np
-from matplotlib.backend_bases import GraphicsContextBase
-from matplotlib.backends.backend_agg import FigureCanvasAgg, RendererAgg, get_hinting_flag
 from matplotlib.figure import Figure
 
 from . import style
+from .renderer import Canvas
 
 CSS_DPI = 100  # a figure inch is 100 CSS pixels: 10 pt text is as large as the notebook's own
 MAX_RATIO = 2.5  # device pixels per CSS pixel; sharper screens see no difference
 MIN_SCALE = 0.85  # a narrower cell shrinks the whole picture, letters too, instead of crowding it further
-MAX_WORDS = 3000  # bitmaps a figure keeps
 MAX_CHANGES = 150_000  # pixels, four bytes each; beyond, decoding a whole picture is the quicker way
 MAX_PASSES = 4  # of the layout, which halves its error in each
 
 DRAWING = (
     threading.RLock()
 )  # widget messages may arrive on another thread than the cells, and matplotlib is not thread-safe
-
-
-def _dark(rgba):
-    """One color with its dark counterpart; alpha stays."""
-    if rgba is None:
-        return None
-    rgb = tuple(rgba[:3])
-    return (*style.DARK_RGB.get(rgb, rgb), *rgba[3:])
-
-
-def _dark_rows(colors):
-    colors = np.array(colors, dtype=float)
-    if colors.size:
-        light = colors.copy()
-        for rgb, dark in style.DARK_RGB.items():
-            colors[(light[:, :3] == rgb).all(-1), :3] = dark
-    return colors
-
-
-class _Renderer(RendererAgg):
-    """Agg that keeps the bitmaps of the words it has drawn: ten letters take matplotlib more than 1 ms. The heights of
-    a font are kept as well, which it would read from the font's tables for every text.
-    """
-
-    def __init__(self, *args):
-        super().__init__(*args)
-        self._words, self._heights = {}, {}
-
-    def _word(self, s, prop):
-        """(bitmap, left, down, width, height, descent) of a word at its own baseline, in pixels."""
-        key = s, hash(prop)
-        if key not in self._words:
-            font = self._prepare_font(prop)
-            font.set_text(s, 0.0, flags=get_hinting_flag())
-            width, height = font.get_width_height()
-            descent = font.get_descent()
-            font.draw_glyphs_to_bitmap(antialiased=True)
-            left, down = font.get_bitmap_offset()
-            if len(self._words) >= MAX_WORDS:
-                self._words.clear()
-            self._words[key] = (
-                np.array(font.get_image()), left / 64, (down + descent) / 64, width / 64, height / 64, descent / 64
-            )  # fmt: skip
-        return self._words[key]
-
-    def _get_font_height_metrics(self, prop):
-        """(ascent, descent, line gap) of a font in pixels, three times None if unknown: `Text` asks here first."""
-        key = hash(prop)
-        if key not in self._heights:
-            font = self._prepare_font(prop)
-            head, table = font.get_sfnt_table("head"), font.get_sfnt_table("OS/2")
-            scale = self.points_to_pixels(prop.get_size_in_points()) / head["unitsPerEm"]
-            self._heights[key] = (None, None, None) if table is None else (
-                table["sTypoAscender"] * scale, -table["sTypoDescender"] * scale, table["sTypoLineGap"] * scale
-            )  # fmt: skip
-        return self._heights[key]
-
-    def draw_text(self, gc, x, y, s, prop, angle, ismath=False, mtext=None):
-        if ismath or angle:
-            return super().draw_text(gc, x, y, s, prop, angle, ismath, mtext)
-        bitmap, left, down = self._word(s, prop)[:3]
-        self._renderer.draw_text_image(bitmap, round(x + left), round(y + down) + 1, 0, gc)
-
-    def get_text_width_height_descent(self, s, prop, ismath):
-        if ismath:
-            return super().get_text_width_height_descent(s, prop, ismath)
-        return self._word(s, prop)[3:]
-
-
-class _DarkContext(GraphicsContextBase):
-    def set_foreground(self, fg, isRGBA=False):
-        super().set_foreground(fg, isRGBA)
-        self._rgb = _dark(self._rgb)
-
-
-class _DarkRenderer(_Renderer):
-    """Agg with every color of `style.DARK` exchanged at the moment of drawing, so that figures stay free of themes."""
-
-    def new_gc(self):
-        return _DarkContext()
-
-    def draw_path(self, gc, path, transform, rgbFace=None):
-        super().draw_path(gc, path, transform, _dark(rgbFace))
-
-    def _update_methods(self):
-        super()._update_methods()
-        markers, collection = self.draw_markers, self.draw_path_collection
-
-        def draw_markers(gc, marker_path, marker_trans, path, trans, rgbFace=None):
-            markers(gc, marker_path, marker_trans, path, trans, _dark(rgbFace))
-
-        def draw_path_collection(
-            gc, transform, paths, all_transforms, offsets, offset_trans, faces, edges, *args, **kw
-        ):
-            collection(gc, transform, paths, all_transforms, offsets, offset_trans,
-                       _dark_rows(faces), _dark_rows(edges), *args, **kw)  # fmt: skip
-
-        self.draw_markers, self.draw_path_collection = draw_markers, draw_path_collection
-
-
-class _Canvas(FigureCanvasAgg):
-    dark = False
-
-    def get_renderer(self):
-        width, height = self.get_width_height(physical=True)
-        key = width, height, self.figure.dpi, self.dark
-        if key != self._lastKey:
-            self.renderer = (_DarkRenderer if self.dark else _Renderer)(width, height, self.figure.dpi)
-            self._lastKey = key
-        return self.renderer
 
 
 class Picture:
@@ -158,7 +46,7 @@ class Picture:
         self.size = size
         self.width, self.ratio = size[0] * CSS_DPI, 1.0
         self.fig = Figure(figsize=size, dpi=CSS_DPI, layout="constrained")
-        self.canvas = _Canvas(self.fig)
+        self.canvas = Canvas(self.fig)
         with DRAWING, style.rc():
             self.fig.set(facecolor=style.PAPER)
             self.artists, self.update = scene(self.fig)

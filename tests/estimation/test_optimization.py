@@ -142,7 +142,7 @@ def test_rosenbrock_with_its_hessian(subproblem, n):
         np.testing.assert_allclose(run.solution, np.ones(n), atol=1e-8)
     else:  # in four dimensions there is a second minimum, near (-0.776, 0.613, 0.382, 0.146)
         assert opt.classify_extremum(rosen_der(run.solution), rosen_hess(run.solution), tol=1e-9) == "minimum"
-    assert (np.diff(run.cost) <= 0).all()
+    assert (np.diff(run.cost) <= 8 * np.finfo(float).eps * run.cost[:-1]).all()  # down to rounding
 
 
 def test_cauchy_steps_alone_descend_slowly():

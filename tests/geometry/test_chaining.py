@@ -88,7 +88,7 @@ def test_rounding_bound_holds_and_is_reached():
         wrong = links.copy()
         wrong[:, :3] += half * rng.choice([-1.0, 1.0], size=(4, 3, 4))
         worst = np.maximum(worst, np.abs(np.linalg.multi_dot(wrong) - product))
-    assert (worst <= bound * 1.001).all()
+    assert (worst[:3] <= bound[:3] * 1.001).all() and not bound[3].any()
     assert worst[:3].min() > 0 and (worst[:3] / bound[:3]).min() > 0.4
     signs = np.sign(links[0] @ links[1] @ links[2])[
         0, :3

@@ -15,6 +15,7 @@ from PIL import Image
 from labkit.chapters.ch08_kalman import stages
 from labkit.stage import Choice, Handle, Play, Slider, Stage, Toggle, canvas, style
 from labkit.stage.connection import PromptConnection
+from labkit.stage.renderer import Canvas
 from labkit.stage.scene3d import Scene, View
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -541,7 +542,7 @@ def test_words_kept_as_bitmaps_look_like_matplotlibs_own():
         fig.canvas.draw()
         return 255 - np.asarray(fig.canvas.buffer_rgba())[..., 0].astype(float)
 
-    own, theirs = ink(canvas._Canvas), ink(FigureCanvasAgg)
+    own, theirs = ink(Canvas), ink(FigureCanvasAgg)
     assert own.sum() == pytest.approx(theirs.sum(), rel=0.1)
     shifted = [np.roll(theirs, (i, j), (0, 1)) for i in (-1, 0, 1) for j in (-1, 0, 1)]
     assert min(np.abs(own - other).sum() for other in shifted) < 0.35 * theirs.sum()
