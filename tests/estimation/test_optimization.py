@@ -321,7 +321,7 @@ def test_start_in_the_minimum_and_steps_into_nothing():
     def bend(x):
         return np.diag(1 / x**2)
 
-    log = opt.newton(barrier, slope, bend, [2.0])
+    log = opt.newton(barrier, slope, bend, [3.0])  # to x = -3, where there is no logarithm
     assert not log.converged and "not finite" in log.reason
     safe = opt.trust_region(barrier, slope, [9.0], hessian=bend, radius=20)
     assert safe.converged and safe.solution[0] == pytest.approx(1)
