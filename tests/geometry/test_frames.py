@@ -211,6 +211,10 @@ def test_fit_frame_refuses_a_line_and_too_few_points():
     line = np.outer([0.0, 1, 2], [1, 1, 0])
     with pytest.raises(ValueError, match="collinear: the second singular value"):
         frames.fit_frame(line, line)
+    with pytest.raises(ValueError, match="collinear: the second singular value"):
+        frames.fit_frame(1e6 * line, 1e6 * line)
+    triangle = 1e-4 * np.array([[0.0, 0, 0], [3, 0, 0], [0, 2, 0]])  # small is not flat
+    np.testing.assert_allclose(frames.fit_frame(triangle, triangle), np.eye(4), atol=1e-9)
     with pytest.raises(ValueError, match="at least 3 points are needed, got 2"):
         frames.fit_frame(line[:2], line[:2])
 

@@ -63,3 +63,21 @@ def test_nearest_rotation_is_the_nearest():
     best = np.linalg.norm(R - M, axis=(1, 2))
     for other in Rotation.random(200, rng).as_matrix():
         assert (np.linalg.norm(other - M, axis=(1, 2)) >= best - 1e-12).all()
+
+
+def test_log_near_pi_keeps_the_side_in_stacks_of_any_shape():
+    axes = np.array([[[1.0, 2, 2], [-2, 1, 2]], [[2, 2, -1], [-1, -2, -2]]]) / 3
+    phi = (np.pi - 1e-3) * axes
+    np.testing.assert_allclose(
+        lie.log_so3(Rotation.from_rotvec(phi.reshape(-1, 3)).as_matrix().reshape(2, 2, 3, 3)), phi
+    )
+    np.testing.assert_allclose(lie.log_so3(Rotation.from_rotvec(phi[1, 1]).as_matrix()), phi[1, 1])
+
+
+@pytest.mark.parametrize("angle", (1e-5, 3e-4, 9.99e-4, 1.01e-3, 0.5, 3.0))
+def test_left_jacobian_is_the_mean_of_the_rotations_on_the_way(angle):
+    """V(phi) = integral of exp(s phi) over s from 0 to 1; the series meets the closed form to the last digits."""
+    phi = angle * np.array([2.0, -1, 2]) / 3
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    way = Rotation.from_rotvec(0.5 * (1 + nodes)[:, None] * phi).as_matrix()
+    np.testing.assert_allclose(lie.left_jacobian_so3(phi), np.tensordot(weights / 2, way, 1), rtol=0, atol=3e-14)

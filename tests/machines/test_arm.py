@@ -149,11 +149,23 @@ def test_rotation_only_leaves_the_tool_where_it_is():
         (lambda: forward_kinematics(np.zeros((6, 3)), np.zeros(6)), r"dh must have shape \(n, 4\)"),
         (lambda: forward_kinematics(TX40.dh, [0, 0, np.nan, 0, 0, 0]), "q must be finite"),
         (lambda: smooth_motion([HOME], 1, 10), "at least 2 joint positions"),
+        (lambda: rotation_only(TX40, np.eye(4), HOME, [[0, 0, 1], [0, 0, 0]], 0.4, 6.0, 50), "none may be zero"),
+        (lambda: rotation_only(TX40, np.eye(4), HOME, np.zeros((0, 3)), 0.4, 6.0, 50), "at least one direction"),
     ],
 )
 def test_refusals(call, words):
     with pytest.raises(ValueError, match=words):
         call()
+
+
+def test_points_of_the_arm_upright_and_turned():
+    """At zero everything stands above the shoulder, which is offset along the second axis: +y, then turned by q1."""
+    upright = np.array([[0, 0, 0], [0, 0, 320], [0, 35, 320], [0, 35, 545], [0, 35, 770], [0, 35, 835]])
+    np.testing.assert_allclose(arm_points(TX40, np.zeros(6)), upright, atol=1e-9)
+    turned = Rotation.from_euler("z", 40, degrees=True).apply(upright)
+    np.testing.assert_allclose(arm_points(TX40, np.deg2rad([40, 0, 0, 0, 0, 0])), turned, atol=1e-9)
+    bent = arm_points(TX40, np.deg2rad([0, 90, 0, 0, 0, 0]))  # the whole arm leans forward
+    np.testing.assert_allclose(bent[2:], [[0, 35, 320], [225, 35, 320], [450, 35, 320], [515, 35, 320]], atol=1e-9)
 
 
 def test_pose_error_is_what_leads_to_the_goal():

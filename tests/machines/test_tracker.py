@@ -20,6 +20,7 @@ from labkit.machines.mounting import calibrate_mounting, e_rot, e_trans
 from labkit.machines.packet import (
     FIELDS,
     PACKET,
+    POSITION,
     VELOCITY,
     decode_packet,
     encode_packet,
@@ -301,6 +302,35 @@ def test_motions_keep_joint_limits_and_speeds():
         assert forward_kinematics(robot.dh, q)[:, 2, 3].min() > 0
         assert ((q > robot.q_min) & (q < robot.q_max)).all()
         assert (np.abs(np.gradient(q, time, axis=0)) < robot.speed).all()
+
+
+def test_rotation_only_turns_at_its_printed_speed():
+    time, q = simulation.robot_motion("rotation", 100)
+    v, w = speeds(time, forward_kinematics(TX40.dh, q) @ T_FE)
+    assert w.max() == pytest.approx(0.2, rel=0.01) and v.max() < 0.1  # rad/s, and mm/s
+
+
+def test_reported_speeds_are_the_true_ones_with_the_noise_of_each():
+    tracker = simulation.Tracker(std_speed=8.0, std_gyro=0.05)
+    motion = simulation.simulate_motion("slow", np.random.default_rng(3), tracker)
+    v, w = speeds(motion.time, motion.T_true)
+    fast = (v > 100) & (w > 0.5)  # far from zero, where a norm cannot become negative
+    assert fast.sum() > 500
+    assert np.std((motion.v_read - v)[fast]) == pytest.approx(8.0, rel=0.15)
+    assert np.std((motion.w_read - w)[fast]) == pytest.approx(0.05, rel=0.15)
+
+
+def test_nonsense_of_the_stream_jumps_by_the_stated_length():
+    still = {"std_position": 0.0, "std_rotation": 0.0, "field_position": 0.0, "field_rotation": 0.0}
+    tracker = simulation.Tracker(nonsense=1.0, burst=3.0, jump=350.0, **still)
+
+    def positions(nonsense):
+        packets = simulation.endless_packets(np.random.default_rng(1), lambda: nonsense, tracker)
+        return np.array([decode_packet(next(packets))[POSITION] for _ in range(40)])
+
+    shift = positions(True) - positions(False)
+    np.testing.assert_allclose(np.linalg.norm(shift, axis=1), 0.35, rtol=1e-9)  # m
+    assert len(np.unique(shift.round(9), axis=0)) > 5  # several bursts, each in a direction of its own
 
 
 # ---- synthetic data and what they teach
