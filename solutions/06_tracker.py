@@ -60,7 +60,7 @@ def decode_packet(data):
 # %% stream [markdown]
 # ## A stream
 #
-# The tracker sends 250 packets a second by UDP, and UDP promises nothing. Decide first. Then press play: these are real packets between two threads on
+# The tracker sends 250 packets per second by UDP, and UDP promises nothing. Decide first. Then press play: these are real packets between two threads on
 # your machine. Raise the loss, switch on the nonsense (the report's *nesmyslné hodnoty*), watch the counters.
 
 # %% predict-loss

@@ -242,7 +242,7 @@ def motion_jacobians(x, u, dt):
 
 # %% numeric-check-code
 def slopes(function, x, h=1e-6):
-    """Central differences of function(x) by x, one column a coordinate."""
+    """Central differences of function(x) by x, one column per coordinate."""
     return np.column_stack([(function(x + h * e) - function(x - h * e)) / (2 * h) for e in np.eye(len(x))])
 
 

@@ -181,7 +181,7 @@ def totals():
 
 
 def as_text():
-    """The whole ledger as plain text, one line a row, and the totals beneath; `python lab.py ledger` prints it."""
+    """The whole ledger as plain text, one line per row, and the totals beneath; `python lab.py ledger` prints it."""
     lines = []
     for row, computed, status in table():
         value = computed.value if isinstance(computed.value, str) else f"{float(computed.value):.8g}"

@@ -110,7 +110,7 @@ def totals_by_document(all_rows):
 
 
 def totals_markdown(all_rows):
-    """The totals as a Markdown table, a line a document and one for all."""
+    """The totals as a Markdown table, a line per document and one for all."""
     counts = totals_by_document(all_rows)
     counts["all four"] = {status: sum(c[status] for c in counts.values()) for status in STATUSES}
     lines = [f"| document | {' | '.join(STATUSES)} | rows |", f"| --- |{' ---: |' * (len(STATUSES) + 1)}"]

@@ -40,7 +40,7 @@ RAMP = 0.12  # share of a motion's time spent on getting up to speed, and on slo
 class Arm:
     """A serial arm.
 
-    dh: array (n, 4), one link a row: theta offset (rad), d (mm), a (mm), alpha (rad).
+    dh: array (n, 4), one link per row: theta offset (rad), d (mm), a (mm), alpha (rad).
     q_min, q_max: joint limits, rad. speed: joint speed limits, rad/s.
     """
 
@@ -83,7 +83,7 @@ def link_frames(dh, q):
     flange."""
     dh, q = _as_dh(dh), as_finite(q, "q")
     if q.ndim < 1 or q.shape[-1] != len(dh):
-        raise ValueError(f"q must have shape (..., {len(dh)}), one angle a joint, got {q.shape}")
+        raise ValueError(f"q must have shape (..., {len(dh)}), one angle per joint, got {q.shape}")
     links = dh_matrix(q + dh[:, 0], dh[:, 1], dh[:, 2], dh[:, 3])
     frames = np.empty((*q.shape[:-1], len(dh) + 1, 4, 4))
     frames[..., 0, :, :] = np.eye(4)
@@ -98,7 +98,7 @@ def forward_kinematics(dh, q):
     Parameters
     ----------
     dh : array-like, shape (n, 4)
-        One link a row: theta offset (rad), d (mm), a (mm), alpha (rad).
+        One link per row: theta offset (rad), d (mm), a (mm), alpha (rad).
     q : array-like, shape (..., n)
         Joint angles, rad.
 
@@ -133,7 +133,9 @@ def inverse_kinematics(robot, T_BF, start, iterations=60, tolerance=1e-9):
         Where the search begins. A start near the solution picks the branch (elbow, wrist); one start for a whole path
         keeps the path smooth.
     iterations : int
-        At most so many steps. tolerance: stop when every pose is closer than this (rad, and mm per 200 mm of arm).
+        The most steps taken.
+    tolerance : float
+        The search stops when every pose is closer than this, in rad and in 200 mm.
 
     Returns
     -------
@@ -144,7 +146,7 @@ def inverse_kinematics(robot, T_BF, start, iterations=60, tolerance=1e-9):
     T_BF = as_transforms(T_BF, "T_BF")
     start, iterations = as_points(start, "start", dim=len(robot.dh)), as_count(iterations, "iterations")
     if fit_together(T_BF=T_BF.shape[:-2], start=start.shape[:-1]) != T_BF.shape[:-2]:
-        raise ValueError(f"start must be one for all or one a pose, got {start.shape} for T_BF {T_BF.shape}")
+        raise ValueError(f"start must be one for all or one per pose, got {start.shape} for T_BF {T_BF.shape}")
     tolerance = as_positive_number(tolerance, "tolerance")
     q = np.broadcast_to(start, (*T_BF.shape[:-2], len(robot.dh))).copy()
     scale = np.array([1, 1, 1, 1 / 200, 1 / 200, 1 / 200])  # a turn of 1 rad counts as much as 200 mm

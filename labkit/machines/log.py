@@ -34,8 +34,26 @@ _LENGTHS = {"m": 1000.0, "mm": 1.0}
 
 
 def write_csv(path, log, unit="m", digits=5):
-    """Write a log. Columns: time [s], stop (where the log has stops), x y z [unit], qx qy qz qw; positions with so many
-    decimals of a meter."""
+    """Write a log as a table: time [s], stop (where the log has stops), x y z [unit], qx qy qz qw.
+
+    Parameters
+    ----------
+    path : str or path
+    log : Log
+    unit : str
+        "m" or "mm", of the positions in the file.
+    digits : int
+        Decimals of a meter, whatever the unit.
+
+    Raises
+    ------
+    ValueError
+        For another unit.
+
+    See Also
+    --------
+    read_csv
+    """
     if unit not in _LENGTHS:
         raise ValueError(f"unit must be m or mm, got {unit!r}")
     positions = log.T_WE[:, :3, 3] / _LENGTHS[unit]

@@ -32,7 +32,7 @@ def encode_packet(values):
     """184 bytes of one reading; values, shape (23,), in the order of `FIELDS`."""
     values = as_finite(values, "values")
     if values.shape != (len(FIELDS),):
-        raise ValueError(f"values must have shape (23,), one number a field of table 1, got {values.shape}")
+        raise ValueError(f"values must have shape (23,), one number per field of table 1, got {values.shape}")
     return PACKET.pack(*values)
 
 
@@ -86,7 +86,7 @@ def packet_from_pose(T_WE, time, device=1, velocity=(0.0, 0.0, 0.0), angular_vel
     leading = {"device": device.shape, "time": time.shape, "velocity": velocity.shape[:-1]}
     leading["angular_velocity"] = angular_velocity.shape[:-1]
     if fit_together(T_WE=T_WE.shape[:-2], **leading) != T_WE.shape[:-2]:
-        raise ValueError(f"there must be one pose, or as many as readings, got T_WE {T_WE.shape} and {leading}")
+        raise ValueError(f"there must be one pose, or one per reading, got T_WE {T_WE.shape} and {leading}")
     values = np.zeros((*T_WE.shape[:-2], len(FIELDS)))
     values[..., 0], values[..., TIME] = device, time
     values[..., POSITION] = T_WE[..., :3, 3] / 1000

@@ -132,7 +132,7 @@ def calibration_run(rng, tracker=None, joints=None, rate=5.0, lost_stop=None):
     Parameters
     ----------
     rate : float
-        Readings a second that are kept in the log (the stream has 250).
+        Readings per second that the log keeps (the stream has 250).
     lost_stop : int, optional
         A stop in which the tracker reports nonsense from beginning to end, as in the report's figure 8.
 
@@ -143,7 +143,7 @@ def calibration_run(rng, tracker=None, joints=None, rate=5.0, lost_stop=None):
     """
     tracker = tracker or RESTING
     joints = measuring_joints() if joints is None else joints
-    readings = as_count(np.floor(STOP_TIME * as_positive_number(rate, "rate")), "the number of readings a stop")
+    readings = as_count(np.floor(STOP_TIME * as_positive_number(rate, "rate")), "the number of readings per stop")
     T_BE = tool_pose(TX40, joints, T_FE)
     drift = rng.normal(size=(len(joints), 6)) * np.repeat([tracker.drift_rotation, tracker.drift_position], 3)
     stop = np.repeat(np.arange(len(joints)), readings)

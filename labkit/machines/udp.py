@@ -21,12 +21,12 @@ from .packet import PACKET, TIME, check_packet
 HOST = "127.0.0.1"
 BUFFER = 1 << 20  # bytes the system may hold back for us: 20 s of the stream
 MEMORY = 2048  # timestamps remembered to tell duplicates: 8 s at 250 Hz
-RESTART = 50  # so many readings in a row from before the memory mean that the sender has started over
+RESTART = 50  # readings in a row from before the memory: this many mean that the sender has started over
 
 
 @dataclass
 class Faults:
-    """What can happen to a stream, each as a probability a packet; may be changed while the stream runs.
+    """What can happen to a stream, each as a probability per packet; it may be changed while the stream runs.
 
     loss: not sent. duplicate: sent twice. reorder: sent up to 5 packets late. malformed: sent truncated, too long, with
     a NaN or with a broken quaternion.
@@ -179,9 +179,9 @@ class Listener(_Endpoint):
     device : float or None
         Readings of another device are reported as bad. None accepts all.
     rate : float
-        Readings a second, to estimate how many were lost.
+        Readings per second, to estimate how many were lost.
     keep : int
-        So many of the newest readings are kept.
+        How many of the newest readings are kept.
 
     Use as a context manager, or call `close`. Raises ValueError when the port is taken.
     """
@@ -275,7 +275,18 @@ class Listener(_Endpoint):
             return Statistics(**counts, bad=dict(self._bad))
 
     def readings(self, newest=None):
-        """The kept readings (or the `newest` so many) in the order of their timestamps, shape (k, 23)."""
+        """The kept readings in the order of their timestamps.
+
+        Parameters
+        ----------
+        newest : int, optional
+            Return no more than the newest of this number.
+
+        Returns
+        -------
+        readings : array, shape (k, 23)
+            Fields as in `packet.FIELDS`.
+        """
         with self._lock:
             rows = list(self._readings)
         table = np.array(rows).reshape(-1, PACKET.size // 8)

@@ -203,7 +203,7 @@ def test_jacobian_of_the_graph_agrees_with_finite_differences():
 
 
 def test_right_jacobian_and_its_inverse_against_the_matrix_exponential():
-    """J = (1 - exp(-ad)) / ad, read from the exponential of a block matrix; the series is good to 1e-4 at half a rad."""
+    """J = (1 - exp(-ad)) / ad, read from a block's exponential; the series is good to 1e-4 at half a radian."""
     xi = np.array([0.3, -0.2, 0.35, 40.0, -10, 25])
     ad = chaining._ad(xi)
     exact = expm(np.block([[-ad, np.eye(6)], [np.zeros((6, 12))]]))[:6, 6:]

@@ -26,7 +26,7 @@ ACUTE, OBTUSE = (35, 80), (100, 145)  # deg
 
 
 def two_directions(rng, between=ACUTE):
-    """Two directions at so many degrees, of different length."""
+    """Two directions at the given angles (deg), of different length."""
     a = random_direction(rng)
     across = frames.unit_vector(np.cross(a, rng.normal(size=3)))
     angle = np.deg2rad(rng.uniform(*between))

@@ -48,7 +48,7 @@ class Matrix:
 
 
 class TipCloud:
-    """Tips of many noisy frames in a 3D scene, a color an axis, around the true frame."""
+    """Tips of many noisy frames in a 3D scene, a color per axis, around the true frame."""
 
     def __init__(self, scene, length):
         self.length = length
@@ -66,7 +66,7 @@ class TipCloud:
 def error_against_height(ax, heights):
     """Axes of error about x, y, z (deg) against the triangle's height (mm), both logarithmic.
 
-    Returns (bounds, found): a line an axis over `heights`, and a marker an axis for what the repetitions gave.
+    Returns (bounds, found): a line per axis over `heights`, and a marker per axis for what the repetitions gave.
     """
     style.axes(ax, "height of the triangle (mm)", "error of the frame (deg)", "measured error and its bound")
     ax.set(xscale="log", yscale="log", xlim=(heights[0], heights[-1]), ylim=(0.02, 200))

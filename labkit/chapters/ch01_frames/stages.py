@@ -174,7 +174,7 @@ def triangle_noise():
                 color=style.MEASUREMENT,
             )
         },
-        controls={"std": Slider(0.05, 3.0, 0.5, step=0.05, label="noise a coordinate (mm)")},
+        controls={"std": Slider(0.05, 3.0, 0.5, step=0.05, label="noise per coordinate (mm)")},
         view=View(-65, 35, center=(32, 25, 15)),
         constrain=_stay_in_plane,
         fail={"Y": (60.0, 2.0, 0.0)},
@@ -334,7 +334,7 @@ def svd_against_gram_schmidt():
             "X": Handle((100.0, 0.0), step=1.0, bounds=((10, 120), (0, 0)), label="x point"),
             "Y": Handle((30.0, 60.0), step=1.0, bounds=((-20, 120), (2, 95)), label="y point"),
         },
-        controls={"std": Slider(0.1, 4.0, 2.0, step=0.1, label="noise a coordinate (mm)")},
+        controls={"std": Slider(0.1, 4.0, 2.0, step=0.1, label="noise per coordinate (mm)")},
         fail={"X": (15.0, 0.0)},
         describe=sentence,
     )

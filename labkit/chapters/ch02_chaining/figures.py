@@ -55,7 +55,7 @@ def set_name(frame, angle):
 def growth_axes(ax):
     """Closure distance against the number of links, both logarithmic, with the laws and what was found.
 
-    Returns (laws, found, here): a line a layout, markers of the layout shown, a ring for the number chosen.
+    Returns (laws, found, here): a line per layout, markers of the layout shown, a ring for the number chosen.
     """
     style.axes(ax, "number of links", "closure distance (mm, rms)", "law and simulation")
     ax.set(xscale="log", yscale="log", xlim=(0.9, 75), ylim=(0.1, 3000))
@@ -98,7 +98,7 @@ def set_circle(line, radius):
 
 
 def compare_loops(ax, methods):
-    """Axes of the closure distance left in loops A and B, a marker a method. Returns the marker series."""
+    """Axes of the closure distance left in loops A and B, a marker per method. Returns the marker series."""
     style.axes(ax, "", "closure left (mm)", "what is left in each loop")
     ax.set(xlim=(-0.6, 1.6), ylim=(-0.6, 12))
     ax.set_xticks([0, 1], ["loop A", "loop B"])

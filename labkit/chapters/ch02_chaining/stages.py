@@ -16,7 +16,7 @@ from . import figures as draw
 RUNS = 100
 LINK_LENGTH = 300.0  # mm, of the chains that grow
 LOOP_SIZE = 300.0  # mm across, whatever the number of links
-STD_TRANS = 0.1  # mm a coordinate and link
+STD_TRANS = 0.1  # mm per coordinate and link
 LAYOUTS = {"in a row": "row", "on a loop": "loop"}
 CORNERS = np.array([[0, 0, 0], [400, 0, 0], [400, 300, 0], [0, 300, 0], [800, 0, 0], [800, 300, 0.0]])  # mm
 EDGES = np.array([(0, 1), (1, 2), (2, 3), (3, 0), (1, 4), (4, 5), (5, 2)])

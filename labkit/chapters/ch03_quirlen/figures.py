@@ -52,7 +52,7 @@ def _plain_decades(ax, values):
 
 
 def error_bars(ax, names, decades, title):
-    """Axes of a few lengths (mm) as bars on a logarithmic scale. Returns one line a name, for `set_bars`."""
+    """Axes of a few lengths (mm) as bars on a logarithmic scale. Returns one line per name, for `set_bars`."""
     style.axes(ax, "", "mm", title)
     ax.set(yscale="log", xlim=(-0.6, len(names) - 0.4), ylim=(decades[0], decades[-1]))
     style.words_below(ax, names)

@@ -13,7 +13,7 @@ from ...stage.scene3d import Scene, View
 from . import figures as draw
 
 TIP = np.array([0.0, 0.0, -100.0])  # mm: a straight tool that points down, as long as the lab sheet's
-STD_TRANS = 0.2  # mm a coordinate
+STD_TRANS = 0.2  # mm per coordinate
 LONGEST = 1.0  # mm, the radius of the sphere: how far an ellipsoid is drawn
 SWIRL_POSES, SWIRL_STD_ROT_DEG = 60, 0.05
 OUTLIER_POSES = 12

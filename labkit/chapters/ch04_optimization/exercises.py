@@ -509,7 +509,7 @@ CHAPTER = Chapter(
             metric=metrics.Numbers(1e-8),
             hints=(
                 "Replace r(x + h) by r + J h and minimize its length.",
-                "That is linear least squares with matrix J and right-hand side −r; its normal equations are JᵀJ h = −Jᵀr.",
+                "That is linear least squares with matrix J and right-hand side −r; its normal equations are J'J h = −J'r.",
                 "`return -np.linalg.lstsq(J, r)[0]`. The normal equations are right as well; they lose twice the digits, as in chapter 3.",
             ),
             mistakes=[
@@ -518,16 +518,16 @@ CHAPTER = Chapter(
                     "The sign is wrong: r + J h should become small, so h has to counter r.",
                 ),
                 Mistake(
-                    lambda r, J: -J.T @ r, "That is the gradient of the cost, downhill; the curvature JᵀJ is missing."
+                    lambda r, J: -J.T @ r, "That is the gradient of the cost, downhill; the curvature J'J is missing."
                 ),
-                Mistake(lambda r, J: -J.T @ J @ J.T @ r, "You multiplied by JᵀJ instead of solving with it."),
+                Mistake(lambda r, J: -J.T @ J @ J.T @ r, "You multiplied by J'J instead of solving with it."),
                 Mistake(
                     lambda r, J: -0.5 * np.linalg.lstsq(J, r)[0],
-                    "Half a step: cost ½|r|² has gradient Jᵀr and curvature JᵀJ, both without a 2.",
+                    "Half a step: cost 1/2 |r|² has gradient J'r and curvature J'J, both without a 2.",
                 ),
                 Mistake(
                     lambda r, J: -(J.T @ r) / (J * J).sum(0),
-                    "Only the diagonal of JᵀJ is used: the columns of J are not perpendicular.",
+                    "Only the diagonal of J'J is used: the columns of J are not perpendicular.",
                 ),
             ],
         ),
@@ -539,7 +539,7 @@ CHAPTER = Chapter(
             draws=6,
             hints=(
                 "Compare what the step brought with what the model promised, equation (2-36).",
-                "Actual: cost − new_cost. Promised: m(0) − m(h) with m(h) = cost + gᵀh + ½ hᵀB h.",
+                "Actual: cost − new_cost. Promised: m(0) − m(h) with m(h) = cost + g'h + 1/2 h'B h.",
                 "`return (cost - new_cost) / -(g @ step + 0.5 * step @ B @ step)`.",
             ),
             mistakes=[
@@ -549,11 +549,11 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda cost, new_cost, g, B, step: (cost - new_cost) / _predicted(g, B, step, half=1.0),
-                    "The quadratic term of the model carries a factor ½.",
+                    "The quadratic term of the model carries a factor 1/2.",
                 ),
                 Mistake(
                     lambda cost, new_cost, g, B, step: (cost - new_cost) / _predicted(g, B, step, half=0.0),
-                    "Only the linear term is promised here: the curvature ½ hᵀB h is missing.",
+                    "Only the linear term is promised here: the curvature 1/2 h'B h is missing.",
                 ),
                 Mistake(
                     lambda cost, new_cost, g, B, step: (new_cost - cost) / _predicted(g, B, step),
@@ -561,7 +561,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda cost, new_cost, g, B, step: (cost - new_cost) / _predicted(g, B, step, half=-0.5),
-                    "The promised decrease m(0) − m(h) changes the sign of both terms, of ½ hᵀB h too.",
+                    "The promised decrease m(0) − m(h) changes the sign of both terms, of 1/2 h'B h too.",
                 ),
                 Mistake(
                     lambda cost, new_cost, g, B, step: abs(cost - new_cost) / _predicted(g, B, step),
@@ -597,7 +597,7 @@ CHAPTER = Chapter(
             draws=9,
             hints=(
                 "Three cases: the Newton point is inside; the corner is outside; the rim cuts the second leg.",
-                "The corner is −(gᵀg / gᵀBg) g. On the second leg solve |corner + s (newton − corner)| = radius for s between 0 and 1.",
+                "The corner is −(g'g / g'Bg) g. On the second leg solve |corner + s (newton − corner)| = radius for s between 0 and 1.",
                 "`newton, corner = np.linalg.solve(B, -g), -(g @ g) / (g @ B @ g) * g`, `if np.linalg.norm(newton) <= radius: return newton`, "
                 "`if np.linalg.norm(corner) >= radius: return -radius * g / np.linalg.norm(g)`, `leg = newton - corner`, "
                 "`a, b, c = leg @ leg, corner @ leg, corner @ corner - radius**2`, `return corner + (-b + np.sqrt(b * b - a * c)) / a * leg`.",
@@ -661,7 +661,7 @@ CHAPTER = Chapter(
                 Mistake(
                     _dogleg(leg=lambda n, p: n), "The second leg is newton − corner; yours is the whole Newton step."
                 ),
-                Mistake(_dogleg(corner=lambda p: -p), "Your corner lies uphill: it is −(gᵀg / gᵀBg) g."),
+                Mistake(_dogleg(corner=lambda p: -p), "Your corner lies uphill: it is −(g'g / g'Bg) g."),
                 Mistake(_dogleg(full=lambda n: -n), "Your Newton point has the wrong sign: it solves B h = −g."),
                 Mistake(_leg_from_zero, "The second leg starts at the corner: add corner to s times the leg."),
             ],

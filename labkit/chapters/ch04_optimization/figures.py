@@ -52,7 +52,7 @@ def model(ax):
 
 
 def courses(ax, names, iterations, low, high):
-    """Cost against iteration, one line a method, and a marker for the one shown. Returns ({name: line}, marker)."""
+    """Cost against iteration, one line per method, and a marker for the one shown. Returns ({name: line}, marker)."""
     style.axes(ax, "iteration", "$f$")
     ax.set(xlim=(0, iterations), ylim=(low, high), xticks=range(0, iterations + 1, 4))
     for name in names:

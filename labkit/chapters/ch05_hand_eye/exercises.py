@@ -511,7 +511,7 @@ CHAPTER = Chapter(
             hints=(
                 "A circle is linear in the right unknowns: multiply (x - xc)^2 + (z - zc)^2 = r^2 out.",
                 "x^2 + z^2 + a1 x + a2 z + a3 = 0 with a1 = -2 xc, a2 = -2 zc, a3 = xc^2 + zc^2 - r^2: one equation a point.",
-                "a = np.linalg.lstsq(np.column_stack([x, z, np.ones(len(x))]), -(x**2 + z**2), rcond=None)[0]; return -a[0]/2, -a[1]/2, np.sqrt(a[0]**2/4 + a[1]**2/4 - a[2]).",
+                "`a = np.linalg.lstsq(np.column_stack([x, z, np.ones(len(x))]), -(x**2 + z**2), rcond=None)[0]; return -a[0]/2, -a[1]/2, np.sqrt(a[0]**2/4 + a[1]**2/4 - a[2])`",
             ),
             mistakes=[
                 Mistake(_circle(lambda x, z, r: (-x, -z, r)), "Your center has the opposite sign: a1 = -2 xc, so xc = -a1/2."),
@@ -546,7 +546,7 @@ CHAPTER = Chapter(
             hints=(
                 "The scan line gives a circle in the plane y = 0; the center of the sphere lies straight before or behind its center.",
                 "Pythagoras: R^2 = r^2 + d^2, and side says whether y is +d or -d.",
-                "xc, zc, r = fit_circle(x, z); return np.array([xc, side * np.sqrt(radius**2 - r**2), zc]).",
+                "`xc, zc, r = fit_circle(x, z); return np.array([xc, side * np.sqrt(radius**2 - r**2), zc])`",
             ),
             mistakes=[
                 Mistake(_center(lambda x, z, r, R, s: np.array([x, -s * np.sqrt(R * R - r * r), z])),
@@ -582,7 +582,7 @@ CHAPTER = Chapter(
             hints=(
                 "Follow the point from the scanner outward: which transform comes first?",
                 "T_BF T_FS x_S - target, with T_FS = matrix_from_kuka(p2). `frames.transform` takes stacks of poses.",
-                "return frames.transform(T_BF, frames.transform(frames.matrix_from_kuka(p2), x_S)) - target.",
+                "`return frames.transform(T_BF, frames.transform(frames.matrix_from_kuka(p2), x_S)) - target`",
             ),
             mistakes=[
                 Mistake(lambda p2, T, x, c: -_residual(frames.matrix_from_kuka(p2), T, x, c),
@@ -616,7 +616,7 @@ CHAPTER = Chapter(
             hints=(
                 "The residuals of all 31 poses under the thesis's end pose and its printed sphere center.",
                 "rms distance: the root of the mean of the squared lengths, one length a pose.",
-                "np.sqrt((e**2).sum(axis=1).mean()) with e = kuka_residual(p2_end, repaired.T_BF, repaired.x_S, target).",
+                "`np.sqrt((e**2).sum(axis=1).mean()) with e = kuka_residual(p2_end, repaired.T_BF, repaired.x_S, target)`",
             ),
             mistakes=[
                 Mistake(lambda: _per_axis(_rms_of_end_pose(2)), "This is the rms of one coordinate, sqrt(3) smaller. Sum the squares of a pose first."),
@@ -669,7 +669,7 @@ CHAPTER = Chapter(
             hints=(
                 "Insert T_FS exp(phi) into the residual and keep what is linear in phi and in the translation.",
                 "R_BF R_FS exp(phi) x = R_BF R_FS (x + phi x x) = ... - R_BF R_FS [x] phi; the translation enters through R_BF alone.",
-                "R_BF, R_FS = T_BF[:, :3, :3], T_FS[:3, :3]; return np.concatenate([-R_BF @ R_FS @ skew(x_S), R_BF], axis=2).reshape(-1, 6).",
+                "`R_BF, R_FS = T_BF[:, :3, :3], T_FS[:3, :3]; return np.concatenate([-R_BF @ R_FS @ skew(x_S), R_BF], axis=2).reshape(-1, 6)`",
             ),
             mistakes=[
                 Mistake(functools.partial(_jacobian, sign=1.0), "The first three columns have the wrong sign: phi x x = -[x] phi."),
@@ -701,8 +701,8 @@ CHAPTER = Chapter(
             hints=(
                 "Solve the linearized problem for the step, then move the pose by it.",
                 "step = argmin |J step + e|; the first three entries are a rotation vector on the right of R_FS, the last three a translation.",
-                "J = analytic_jacobian(T_FS, T_BF, x_S); e = frames.transform(T_BF, frames.transform(T_FS, x_S)) - target; step = np.linalg.lstsq(J, -e.ravel(), rcond=None)[0]; "
-                "return frames.pose(T_FS[:3, :3] @ exp_so3(step[:3]), T_FS[:3, 3] + step[3:]).",
+                "`J = analytic_jacobian(T_FS, T_BF, x_S); e = frames.transform(T_BF, frames.transform(T_FS, x_S)) - target; step = np.linalg.lstsq(J, -e.ravel(), rcond=None)[0]; "
+                "return frames.pose(T_FS[:3, :3] @ exp_so3(step[:3]), T_FS[:3, 3] + step[3:])`",
             ),
             mistakes=[
                 Mistake(_iterated, "You iterated to the end. Asked for is one step."),
@@ -767,7 +767,7 @@ CHAPTER = Chapter(
             hints=(
                 "Six of the nine unknowns move the scanner, three are the sphere's center itself.",
                 "T_FS = (R0 exp(phi), t0 + dt) with phi = u[:3], dt = u[3:6]; the center is u[6:].",
-                "T_FS = frames.pose(T0[:3, :3] @ exp_so3(u[:3]), T0[:3, 3] + u[3:6]); return (frames.transform(T_BF, frames.transform(T_FS, x_S)) - u[6:]).ravel().",
+                "`T_FS = frames.pose(T0[:3, :3] @ exp_so3(u[:3]), T0[:3, 3] + u[3:6]); return (frames.transform(T_BF, frames.transform(T_FS, x_S)) - u[6:]).ravel()`",
             ),
             mistakes=[
                 Mistake(lambda u, T, B, x: _residual(frames.pose(exp_so3(u[:3]) @ T[:3, :3], T[:3, 3] + u[3:6]), B, x, u[6:]).ravel(),
@@ -850,7 +850,7 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(_by_plain_least_squares, "This is all that a plain least-squares fit shows: its grossest slip bends it so far that the others hide. Fit robustly."),
                 Mistake(_too_strict, "You accuse poses that are merely noisy. Among 31 poses some exceed 2.5 standard deviations by chance; take 6."),
-                Mistake(_all_explanations, "You name every entry that could be changed. One slip a row: take the most credible explanation."),
+                Mistake(_all_explanations, "You name every entry that could be changed. One slip per row: take the most credible explanation."),
                 Mistake(lambda entries: {(r["table"], r["pose"], r["column"]) for r in thesis.corrections()},
                         "These are the seven of the printed tables. The check plants slips of its own: search the `entries` you are given."),
                 Mistake(lambda entries: {(table, pose - 1, column) for table, pose, column in find_misprints(entries)}, "Your poses are one too low: they count from 1, arrays from 0."),
@@ -865,7 +865,7 @@ CHAPTER = Chapter(
             hints=(
                 "Scanner and center together, all 31 poses, all seven corrections.",
                 "`hand_eye.calibrate_sphere_target` on the corrected measurements; no pose is dropped.",
-                "corrected = thesis.measurements(True); hand_eye.calibrate_sphere_target(corrected.T_BF, corrected.x_S).rms.",
+                "`corrected = thesis.measurements(True); hand_eye.calibrate_sphere_target(corrected.T_BF, corrected.x_S).rms`",
             ),
             mistakes=[
                 Mistake(lambda: _per_axis(_joint_rms(*ALL_FIXED)), "This is the rms of one coordinate. Sum the squares of a pose first."),
@@ -884,7 +884,7 @@ CHAPTER = Chapter(
             hints=(
                 "Every y was computed as sqrt(30^2 - r^2). Another radius moves all centers along y, and some radius fits best.",
                 "`thesis.centers_with_radius(x_S, R)` gives the centers for another R: try a grid, or make R a tenth unknown.",
-                "radius = hand_eye.fit_radius(corrected.T_BF, corrected.x_S).radius.",
+                "`radius = hand_eye.fit_radius(corrected.T_BF, corrected.x_S).radius`",
             ),
             mistakes=[
                 Mistake(lambda: thesis.radius("certificate"), "This is the certificate's radius. Ask the 31 poses instead."),
@@ -910,8 +910,8 @@ CHAPTER = Chapter(
             hints=(
                 "Choose where the scanner should see the sphere, and how the flange should be turned; the flange's position then follows.",
                 "target = R_BF (R_FS x_S + t_FS) + t_BF: draw x_S over the whole field, tilt by up to 45 deg about all axes, solve for t_BF.",
-                "x_S = np.column_stack([rng.uniform(-25, 25, 31), rng.uniform(3, 25, 31) * rng.choice([-1, 1], 31), rng.choice([190, 290], 31)]); turns = rng.uniform(-0.8, 0.8, (31, 3)); "
-                "return hand_eye.poses_that_see(T_FS, target, exp_so3(turns) @ np.diag([1, -1, -1]) @ T_FS[:3, :3].T, x_S).",
+                "`x_S = np.column_stack([rng.uniform(-25, 25, 31), rng.uniform(3, 25, 31) * rng.choice([-1, 1], 31), rng.choice([190, 290], 31)]); turns = rng.uniform(-0.8, 0.8, (31, 3)); "
+                "return hand_eye.poses_that_see(T_FS, target, exp_so3(turns) @ np.diag([1, -1, -1]) @ T_FS[:3, :3].T, x_S)`",
             ),
         ),
     ],

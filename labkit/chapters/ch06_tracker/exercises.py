@@ -365,7 +365,7 @@ CHAPTER = Chapter(
             hints=(
                 "Read all 184 bytes as 23 numbers of 8 bytes, then pick by the order of table 1.",
                 '`np.frombuffer(data, "<f8")` gives 23 little-endian doubles; number 0 is the device.',
-                "v = np.frombuffer(data, '<f8'); return v[1], 1000 * v[2:5], v[11:15].",
+                "`v = np.frombuffer(data, '<f8'); return v[1], 1000 * v[2:5], v[11:15]`",
             ),
             mistakes=[
                 Mistake(
@@ -428,8 +428,8 @@ CHAPTER = Chapter(
             hints=(
                 "Four elementary transforms in a row: turn about z, go along z, go along the new x, turn about the new x.",
                 "Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha): the last column is (a cos theta, a sin theta, d).",
-                "c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha); "
-                "return np.array([[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]]).",
+                "`c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha); "
+                "return np.array([[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]])`",
             ),
             mistakes=[
                 Mistake(
@@ -478,7 +478,7 @@ CHAPTER = Chapter(
             hints=(
                 "Each link's frame is given in the frame before it, so neighboring letters cancel from the base to the flange.",
                 "T_BF = T_01 T_12 ... T_56, and the angle of a link is its offset plus the joint's angle.",
-                "T = np.eye(4); for (offset, d, a, alpha), angle in zip(dh, q): T = T @ dh_matrix(offset + angle, d, a, alpha); return T.",
+                "`T = np.eye(4); for (offset, d, a, alpha), angle in zip(dh, q): T = T @ dh_matrix(offset + angle, d, a, alpha); return T`",
             ),
             mistakes=[
                 Mistake(
@@ -565,7 +565,7 @@ CHAPTER = Chapter(
             hints=(
                 "Bring A X - X B = 0 into the form M vec(X) = 0, with the columns of X stacked.",
                 "For stacked columns, vec(P X Q) = (Q' kron P) vec(X). Once P = A, Q = I, once P = I, Q = B.",
-                "return np.kron(np.eye(3), A) - np.kron(B.T, np.eye(3)).",
+                "`return np.kron(np.eye(3), A) - np.kron(B.T, np.eye(3))`",
             ),
             mistakes=[
                 Mistake(
@@ -633,7 +633,7 @@ CHAPTER = Chapter(
             hints=(
                 "The singular vector of the smallest singular value, put back into a 3 x 3 matrix column by column.",
                 'Vt[-1].reshape(3, 3, order="F"); its sign is free, so make the determinant positive; then the nearest rotation by a second SVD.',
-                "Vt = np.linalg.svd(M)[2]; X = Vt[-1].reshape(3, 3, order='F'); X *= np.sign(np.linalg.det(X)); U, _, Wt = np.linalg.svd(X); return U @ Wt.",
+                "`Vt = np.linalg.svd(M)[2]; X = Vt[-1].reshape(3, 3, order='F'); X *= np.sign(np.linalg.det(X)); U, _, Wt = np.linalg.svd(X); return U @ Wt`",
             ),
             mistakes=[
                 Mistake(
@@ -721,7 +721,7 @@ CHAPTER = Chapter(
             hints=(
                 "Write out the last column of A X = X B. It is linear in the translation t once R is known.",
                 "R_A t + t_A = R t_B + t, so (I - R_A) t = t_A - R t_B: three rows a motion, stacked.",
-                "K1 = np.eye(3) - A[:, :3, :3]; K2 = A[:, :3, 3] - B[:, :3, 3] @ R.T; return np.linalg.lstsq(K1.reshape(-1, 3), K2.ravel())[0].",
+                "`K1 = np.eye(3) - A[:, :3, :3]; K2 = A[:, :3, 3] - B[:, :3, 3] @ R.T; return np.linalg.lstsq(K1.reshape(-1, 3), K2.ravel())[0]`",
             ),
             mistakes=[
                 Mistake(
@@ -787,7 +787,7 @@ CHAPTER = Chapter(
             hints=(
                 "Equation (13), taken at its word: the norm of M'M v, divided by N - 1. v is the null vector, of length 1.",
                 "M has 9 rows a motion, so N = len(M) / 9.",
-                "v = np.linalg.svd(M)[2][-1]; return np.linalg.norm(M.T @ (M @ v)) / (len(M) / 9 - 1).",
+                "`v = np.linalg.svd(M)[2][-1]; return np.linalg.norm(M.T @ (M @ v)) / (len(M) / 9 - 1)`",
             ),
             mistakes=[
                 Mistake(
@@ -849,7 +849,7 @@ CHAPTER = Chapter(
             hints=(
                 "Equation (17), taken at its word: the norm of K1 t - K2, divided by N - 1.",
                 "The norm runs over all components of all N residuals, and it is not squared.",
-                "return np.linalg.norm(residuals) / (len(residuals) - 1).",
+                "`return np.linalg.norm(residuals) / (len(residuals) - 1)`",
             ),
             mistakes=[
                 Mistake(lambda r: np.linalg.norm(r) / len(r), "You divide by N. The report divides by N - 1."),
@@ -916,7 +916,7 @@ CHAPTER = Chapter(
             hints=(
                 "Measure how far each value is from the middle, in units of a spread. Outliers must move neither of the two.",
                 "Middle: the median. Spread: 1.4826 times the median of the distances from it; for normal noise that is a standard deviation.",
-                "d = np.abs(values - np.median(values)); return d <= factor * 1.4826 * np.median(d).",
+                "`d = np.abs(values - np.median(values)); return d <= factor * 1.4826 * np.median(d)`",
             ),
             mistakes=[
                 Mistake(
@@ -990,8 +990,8 @@ CHAPTER = Chapter(
             hints=(
                 "Put your own functions in a row: blocks, rotation, translation. Pose 13 of this run is nonsense and must not take part.",
                 "A_kept, B_kept = A[kept][1:], B[kept][1:] are the motions that take part: kept poses, without the reference itself.",
-                "M = np.concatenate([kron_row(a[:3, :3], b[:3, :3]) for a, b in zip(A_kept, B_kept)]); R = rotation_from_nullvector(M); "
-                "mounting = np.eye(4); mounting[:3, :3] = R; mounting[:3, 3] = translation_lsq(A_kept, B_kept, R).",
+                "`M = np.concatenate([kron_row(a[:3, :3], b[:3, :3]) for a, b in zip(A_kept, B_kept)]); R = rotation_from_nullvector(M); "
+                "mounting = np.eye(4); mounting[:3, :3] = R; mounting[:3, 3] = translation_lsq(A_kept, B_kept, R)`",
             ),
             mistakes=[
                 Mistake(
@@ -1017,7 +1017,7 @@ CHAPTER = Chapter(
             hints=(
                 "Six numbers, the z of each mounting. Appendix D prints their variance (Rozptyl), divided by 6.",
                 "The standard deviation is the root of that variance.",
-                "spread = mountings[:, 2, 3].std().",
+                "`spread = mountings[:, 2, 3].std()`",
             ),
             mistakes=[
                 Mistake(
@@ -1087,10 +1087,10 @@ CHAPTER = Chapter(
             hints=(
                 "Shift one curve against the other, sample by sample, and find where they differ least. Then look between the samples.",
                 "Cost of a shift s: mean of (delayed[k + s] - reference[k])^2 over the common part. A parabola through the best three has its vertex at the offset.",
-                "step = time[1] - time[0]; n = round(max_offset / step); core = reference[n:-n]; "
+                "`step = time[1] - time[0]; n = round(max_offset / step); core = reference[n:-n]; "
                 "cost = [np.mean((delayed[n + s : len(time) - n + s] - core) ** 2) for s in range(-n, n + 1)]; "
                 "k = np.clip(np.argmin(cost), 1, 2 * n - 1); l, m, r = cost[k - 1 : k + 2]; "
-                "return (k - n + 0.5 * (l - r) / (l - 2 * m + r)) * step.",
+                "return (k - n + 0.5 * (l - r) / (l - 2 * m + r)) * step`",
             ),
             mistakes=[
                 Mistake(

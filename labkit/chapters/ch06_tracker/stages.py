@@ -196,7 +196,7 @@ def live_tracker():
     def sentence(result):
         s = result["statistics"]
         if not s.datagrams:
-            return "Press play: 250 packets a second start to arrive."
+            return "Press play: 250 packets per second start to arrive."
         return f"{s.good} good readings, {s.lost} lost, {sum(s.bad.values())} bad, each counted once."
 
     return Stage(
@@ -461,7 +461,7 @@ def _stops():
 
 
 def compute_six_runs(state):
-    """Six calibrations over the same 21 poses, with a systematic error of a size (mm rms an axis) that depends on the
+    """Six calibrations over the same 21 poses, with a systematic error of a size (mm rms per axis) that depends on the
     place."""
     T_BF, T_BE = _stops()
     field = float(state["field"])

@@ -432,7 +432,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda L, d, p: ((((L - p) ** 2).sum(1) - d**2) ** 2).sum(),
-                    "This is the cost, one number. Here the residuals are wanted, one a landmark.",
+                    "This is the cost, one number. Here the residuals are wanted, one per landmark.",
                 ),
                 Mistake(
                     lambda L, d, p: ((L[0] - p) ** 2).sum() - d[0] ** 2,

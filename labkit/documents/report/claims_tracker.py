@@ -105,8 +105,7 @@ def unit_of_e_trans():
         "m" if inside else "mm",
         misprint=inside,
         proof=f"A mean error of 2.666 mm over {POSES} poses makes equation (17) at least {least:.2f} mm. The printed "
-        f"{printed:.6f} is "
-        f"{1000 * printed:.2f} mm when read in m, and 800 times too small in mm.",
+        f"{printed:.6f} is {1000 * printed:.2f} mm when read in m, and 800 times too small in mm.",
     )
 
 
@@ -131,8 +130,7 @@ def unit_of_e_rot():
         "1",
         misprint=mean["mean_deg"] < angle < 1.5 * mean["mean_deg"],
         proof=f"Without a unit, as the block of section 3.1 prints it, {mean['E_rot']:.3e} means an rms angle of "
-        f"{angle:.3f} deg, in "
-        f"keeping with the printed mean of {mean['mean_deg']:.3f} deg.",
+        f"{angle:.3f} deg, in keeping with the printed mean of {mean['mean_deg']:.3f} deg.",
     )
 
 
@@ -160,8 +158,7 @@ def orientation_negligible():
     return Computed(
         "negligible" if angle < noise else "not negligible",
         proof=f"The identified turn of {angle:.2f} deg is {angle / noise:.1f} times the mean error of a reading and "
-        f"{angle / spread:.0f} times the spread over "
-        "the six runs.",
+        f"{angle / spread:.0f} times the spread over the six runs.",
     )
 
 

@@ -65,8 +65,7 @@ def _consistent_proof():
     best, second = sorted(found.values())[:2]
     return (
         f"With z = 20, B = -90 deg and the plate at y = 0 all 39 sensor coordinates of C10 follow within {best:.4f} "
-        "mm; "
-        f"the best other reading of the printed inputs misses by {second:.1f} mm."
+        f"mm; the best other reading of the printed inputs misses by {second:.1f} mm."
     )
 
 
@@ -147,8 +146,7 @@ def gauss_newton_end():
             "What is printed beyond the exact 5, 0, 5, 0, -90, 0 is rounding: translation and B to 1e-9, while A and "
             "C are not determined "
             f"one by one at B = -90 deg (the last singular value is {values[5] / values[0]:.0e} of the first), only "
-            "their sum, which is "
-            f"{turn:.0e} deg in all ten runs."
+            f"their sum, which is {turn:.0e} deg in all ten runs."
         ),
     )
 
@@ -161,8 +159,7 @@ def gauss_newton_sum():
         misprint=True,
         proof=(
             "At B = -90 deg the pose depends on A + C, which is 0 at the minimum; nine of the ten printed rows have "
-            "opposite signs, this one "
-            "has A = C = 4e-4: a sign is missing."
+            "opposite signs, this one has A = C = 4e-4: a sign is missing."
         ),
     )
 
@@ -241,8 +238,7 @@ def trust_region_end():
         simulated=True,
         proof=(
             f"A solver that stops at 1e-6 mm^2 may end {slack[1]:.1e} mm and {slack[4]:.1e} deg (B) off the minimum; "
-            "A and C are free against "
-            f"each other there (last singular value {values[5] / values[0]:.0e} of the first)."
+            f"A and C are free against each other there (last singular value {values[5] / values[0]:.0e} of the first)."
         ),
     )
 
@@ -310,8 +306,7 @@ def pattern_step():
         misprint=True,
         proof=(
             f"The poses of this column are turned by {np.rad2deg(np.mean(turns)):.2f} deg against those of the 45 "
-            "deg column; "
-            "with steps of 22.5 deg (6-22) the column is 67.5 deg."
+            "deg column; with steps of 22.5 deg (6-22) the column is 67.5 deg."
         ),
     )
 
@@ -678,8 +673,7 @@ def li_sign():
         misprint=True,
         proof=(
             f"A flange moved by +10 mm along x sees the sphere shifted by {left[0]:.0f} mm there: X_b = R0 (R_s X_l "
-            "+ T_s) + T_0 being constant, "
-            "the right side of (2-41) is T_01 - T_02."
+            "+ T_s) + T_0 being constant, the right side of (2-41) is T_01 - T_02."
         ),
     )
 

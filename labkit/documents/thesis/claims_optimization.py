@@ -41,8 +41,8 @@ def _share(method):
 
 
 def _printed_saddle():
-    """The printed saddle, the length of the gradient there, and whether that is more than three rounded digits "
-    "explain."""
+    """The printed saddle, the length of the gradient there, and whether that is more than three rounded digits
+    explain."""
     saddle = thesis.extrema()["saddle"][1:]
     slope = np.linalg.norm(wells.gradient(saddle))
     return saddle, slope, slope > 0.5e-3 * np.sqrt(2) * np.abs(np.linalg.eigvalsh(wells.hessian(saddle))).max()
@@ -74,15 +74,14 @@ def extrema():
         f"stationary point; it vanishes at ({saddle.x[0]:.4f}, {saddle.x[1]:.4f}), f = {saddle.value:.3f}, with "
         "Hessian eigenvalues "
         f"{saddle.eigenvalues[0]:.1f} and {saddle.eigenvalues[1]:.1f}. The global minimum {lowest.value:.4f} cut "
-        "after three decimals is the "
-        f"printed {_cut(lowest.value, 3):.3f}; rounded it is {lowest.value:.3f}.",
+        f"after three decimals is the printed {_cut(lowest.value, 3):.3f}; rounded it is {lowest.value:.3f}.",
     )
 
 
 @computes("optimization.stationary_points")
 def stationary_points():
-    """Both terms pull toward their centers, so the gradient vanishes only on the segment between them: count sign "
-    "changes there."""
+    """Both terms pull toward their centers, so the gradient vanishes only on the segment between them: count sign
+    changes there."""
     t = np.linspace(0, 1, 10001)[:, None]
     way = wells.CENTERS[1] - wells.CENTERS[0]
     slope = wells.gradient(wells.CENTERS[0] + t * way) @ way
@@ -104,7 +103,7 @@ def gradient():
 
 @cache
 def _hessian_errors():
-    """Largest deviation from central differences of the gradient over a grid: of the printed Hessian and of "
+    """Largest deviation from central differences of the gradient over a grid: of the printed Hessian and of
     "`wells.hessian`."""
     x = SQUARE[::10, ::10].reshape(-1, 2)
     numeric = np.array([numeric_jacobian(wells.gradient, p) for p in x])
@@ -278,8 +277,8 @@ def mu_is_accuracy():
 
 @computes("optimization.start_newton")
 def farthest_newton():
-    """Start pushed along the thesis's diagonals in steps of 0.25 from the wells' centers until Newton misses; "
-    "nothing beyond comes back."""
+    """Start pushed along the thesis's diagonals in steps of 0.25 from the wells' centers until Newton misses;
+    nothing beyond comes back."""
     found = []
     for center, way, target in ((wells.CENTERS[0], 1.0, 0), (wells.CENTERS[1], -1.0, 1)):
         offsets = np.arange(0, 50, 0.25)
@@ -308,8 +307,8 @@ def iterations_trust_region():
 
 @cache
 def _iterations(method):
-    """BFGS's count from the printed starts; the bound is how far the other stand-ins that reach the same minimum "
-    "differ from it."""
+    """BFGS's count from the printed starts; the bound is how far the other stand-ins that reach the same minimum
+    differ from it."""
     value, bound, words = [], [], []
     for name, start in zip(MINIMA, thesis.table_7_1(method)["start"]):
         ends = stand_ins(start)
@@ -332,8 +331,8 @@ def _iterations(method):
 
 @cache
 def _reach():
-    """Farthest start on the diagonal up to (100, 100), in steps of 0.5, from which each method reaches local and "
-    "global minimum."""
+    """Farthest start on the diagonal up to (100, 100), in steps of 0.5, from which each method reaches local and
+    global minimum."""
     table = {}
     for method in wells.METHODS[1:]:
         label, _ = wells.destinations(method, DIAGONAL)
@@ -430,8 +429,7 @@ def saddle_newton():
         proof=f"Newton ends in the saddle from {100 * share[2]:.1f} % of the starts in [-6, 6]^2 and in a minimum "
         "from only "
         f"{100 * (share[0] + share[1]):.1f} %; from (0, 0) in {steps} steps, and from (1.3, 1.3), 0.05 beyond the "
-        "thesis's own start, "
-        f"it ends in the {wells.NAMES[thesis_line[0]]}.",
+        f"thesis's own start, it ends in the {wells.NAMES[thesis_line[0]]}.",
     )
 
 
