@@ -27,6 +27,11 @@ def numeric_jacobian(function, x, step=1e-6, scheme="central", retract=np.add, n
     -------
     J : array, shape (..., n)
 
+    Raises
+    ------
+    ValueError
+        Wrong shapes, a step that is not positive, an unknown scheme.
+
     Source: thesis, formula (6-15) and listing C4 (forward, one step for millimeters and degrees alike).
     """
     x, steps = as_finite(x, "x"), as_positive(step, "step")

@@ -31,18 +31,18 @@ from ..checks import (
 ROUNDING = 10 * np.finfo(float).eps  # a relative change of the cost below this is noise
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trace:
     """Every iterate of one run, so that it can be drawn and counted.
 
-    x: iterates, shape (K + 1, ...), the start first; a rejected step repeats its iterate.
-    cost: value of the cost at every iterate, shape (K + 1,).
-    step: increments tried, shape (K, n), rejected ones included.
-    radius: how long each step was allowed to be, shape (K,), in units of `scale`: infinite for Newton and Gauss-Newton;
-        for Levenberg-Marquardt its own length, for a damped step minimizes the model in the ball it just reaches.
-    converged: whether the stopping rule was met; reason: in words, what ended the run.
-    gain: actual over predicted decrease of every step, shape (K,); NaN where the method does not ask.
-    accepted: whether each step was taken, shape (K,).
+    x : (K + 1, ...) iterates, the start first; a rejected step repeats its iterate.
+    cost : (K + 1,) value of the cost at every iterate.
+    step : (K, n) increments tried, rejected ones included.
+    radius : (K,) how long each step was allowed to be, in units of `scale`: infinite for Newton and Gauss-Newton; for
+        Levenberg-Marquardt its own length, for a damped step minimizes the model in the ball it just reaches.
+    converged : whether the stopping rule was met.    reason : in words, what ended the run.
+    gain : (K,) actual over predicted decrease of every step; NaN where the method does not ask.
+    accepted : (K,) whether each step was taken.
     """
 
     x: np.ndarray
@@ -65,10 +65,13 @@ class Trace:
         return len(self.step)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Point:
-    """What a method knows at one iterate: cost, gradient and curvature B (Hessian or J'J); residual and J of a sum of
-    squares."""
+    """What a method knows at one iterate.
+
+    x : the iterate.    cost : float.    gradient : (n,).    curvature : (n, n) B, the Hessian or J'J.
+    residual, jacobian : (m,) and (m, n) of a sum of squares.
+    """
 
     x: np.ndarray
     cost: float
@@ -142,19 +145,46 @@ def _linearized(r, J):
 
 
 def newton_step(g, H):
-    """Step to where the quadratic model is stationary: H step = -g; (..., n), (..., n, n) -> (..., n).
+    """Step to where the quadratic model is stationary, H step = -g; nothing asks whether that is a minimum.
 
-    Source: thesis, (2-23), (2-24). Nothing asks whether that place is a minimum. Raises ValueError when H is singular.
+    Parameters
+    ----------
+    g, H : array-like, shapes (..., n) and (..., n, n)
+        Gradient and Hessian.
+
+    Returns
+    -------
+    step : array, shape (..., n)
+
+    Raises
+    ------
+    ValueError
+        Where H is singular.
+
+    Source: thesis, (2-23), (2-24).
     """
     g, H = _model(g, H)
     return -_solve(H, g[..., None], "the curvature H is singular: the model has no stationary place, or many")
 
 
 def gauss_newton_step(r, J):
-    """Step that minimizes |r + J step|; r shape (..., m), J shape (..., m, n) -> (..., n).
+    """Step that minimizes |r + J step|, by a QR factorization: the normal equations square the condition number.
 
-    A QR factorization instead of the normal equations (2-31): forming J'J squares the condition number. Raises
-    ValueError when the columns of J depend on each other.
+    Parameters
+    ----------
+    r, J : array-like, shapes (..., m) and (..., m, n)
+        Residual and Jacobian, m >= n.
+
+    Returns
+    -------
+    step : array, shape (..., n)
+
+    Raises
+    ------
+    ValueError
+        Where the columns of J depend on each other.
+
+    Source: thesis, (2-31), which solves the normal equations.
     """
     r, J = _linearized(r, J)
     Q, R = np.linalg.qr(J)
@@ -169,7 +199,19 @@ def _solve(A, right, why_not):
 
 
 def damped_step(r, J, damping):
-    """Levenberg-Marquardt step: minimizes |r + J step|^2 + damping |step|^2; broadcasts as `gauss_newton_step`."""
+    """Levenberg-Marquardt step: minimizes |r + J step|^2 + damping |step|^2.
+
+    Parameters
+    ----------
+    r, J : array-like, shapes (..., m) and (..., m, n)
+        Residual and Jacobian.
+    damping : array-like, shape (...)
+        Not negative.
+
+    Returns
+    -------
+    step : array, shape (..., n)
+    """
     r, J, damping = as_finite(r, "r"), as_finite(J, "J"), as_nonnegative(damping, "damping")
     if r.ndim < 1 or J.ndim < 2 or J.shape[-2] != r.shape[-1]:
         raise ValueError(f"r and J must have shapes (..., m) and (..., m, n), got {r.shape} and {J.shape}")
@@ -191,10 +233,20 @@ def _bend(g, B):
 
 
 def cauchy_step(g, B, radius):
-    """Minimizer of the model along steepest descent inside the radius: the Cauchy point (2-39).
+    """Minimizer of the model along steepest descent inside the radius; to the rim where the model bends down there.
 
-    g (..., n), B (..., n, n), radius (...) -> (..., n). Where the model bends down along the gradient,
-    the step goes to the rim.
+    Parameters
+    ----------
+    g, B : array-like, shapes (..., n) and (..., n, n)
+        Gradient and curvature of the model.
+    radius : array-like, shape (...)
+        Not negative.
+
+    Returns
+    -------
+    step : array, shape (..., n)
+
+    Source: thesis, (2-39): the Cauchy point.
     """
     g, B, radius = _ball(g, B, radius)
     length, bend = _length(g), _bend(g, B)
@@ -207,8 +259,14 @@ def cauchy_step(g, B, radius):
 def dogleg_step(g, B, radius):
     """Powell's dogleg: down the gradient to the model's minimum there, on toward the Newton point, cut at the radius.
 
-    g (..., n), B (..., n, n), radius (...) -> (..., n). Where B is not positive definite, the Newton point is no
-    minimum and the Cauchy point is returned. Source: thesis (2-33)-(2-35); Nocedal, Wright, Numerical Optimization 4.1.
+    Where B is not positive definite, the Newton point is no minimum and the Cauchy point is returned. The parameters
+    are those of `cauchy_step`.
+
+    Returns
+    -------
+    step : array, shape (..., n)
+
+    Source: thesis (2-33)-(2-35); Nocedal, Wright, Numerical Optimization, section 4.1.
     """
     g, B, radius = _ball(g, B, radius)
     eigenvalues = np.linalg.eigvalsh(B)
@@ -227,10 +285,15 @@ def dogleg_step(g, B, radius):
 
 
 def exact_step(g, B, radius):
-    """The model's minimizer inside the radius, also for an indefinite B: (B + shift I) step = -g with the smallest
-    sufficient shift.
+    """The model's minimizer inside the radius, also for an indefinite B.
 
-    g (..., n), B (..., n, n), radius (...) -> (..., n). Source: More, Sorensen, Computing a trust region step (1983).
+    It solves (B + shift I) step = -g with the smallest sufficient shift. The parameters are those of `cauchy_step`.
+
+    Returns
+    -------
+    step : array, shape (..., n)
+
+    Source: More, Sorensen, Computing a trust region step (1983).
     """
     g, B, radius = _ball(g, B, radius)
     eigenvalues, V = np.linalg.eigh(B)
@@ -255,7 +318,20 @@ def exact_step(g, B, radius):
 
 
 def predicted_decrease(g, B, step):
-    """m(0) - m(step) of the quadratic model (2-33); (..., n), (..., n, n), (..., n) -> (...)."""
+    """Decrease m(0) - m(step) that the quadratic model promises.
+
+    Parameters
+    ----------
+    g, B : array-like, shapes (..., n) and (..., n, n)
+        Gradient and curvature of the model.
+    step : array-like, shape (..., n)
+
+    Returns
+    -------
+    decrease : array, shape (...)
+
+    Source: thesis, (2-33).
+    """
     (g, B), step = _model(g, B), as_finite(step, "step")
     if step.shape[-1:] != g.shape[-1:]:
         raise ValueError(f"step must have shape (..., {g.shape[-1]}), got {step.shape}")
@@ -264,10 +340,23 @@ def predicted_decrease(g, B, step):
 
 
 def gain_ratio(cost, new_cost, g, B, step):
-    """Actual over predicted decrease (2-36), broadcasting: 1 for a perfect model, below 0 when the cost rose.
+    """Actual over predicted decrease: 1 for a perfect model, below 0 when the cost rose.
 
     Both decreases get a share of the cost's rounding error added, so that the ratio tends to 1 where nothing
     but rounding is left.
+
+    Parameters
+    ----------
+    cost, new_cost : array-like, shape (...)
+        Before and after the step.
+    g, B, step
+        As in `predicted_decrease`.
+
+    Returns
+    -------
+    gain : array, shape (...)
+
+    Source: thesis, (2-36).
     """
     cost, new_cost = as_finite(cost, "cost"), as_finite(new_cost, "new_cost")
     noise = ROUNDING * np.abs(cost) + np.finfo(float).tiny
@@ -275,8 +364,7 @@ def gain_ratio(cost, new_cost, g, B, step):
 
 
 def classify_extremum(g, H, tol=1e-6):
-    """Kind of a point by first and second order (section 2.4.3): minimum, maximum, saddle, degenerate, or not
-    stationary.
+    """Kind of a point by first and second order.
 
     Parameters
     ----------
@@ -285,6 +373,13 @@ def classify_extremum(g, H, tol=1e-6):
     tol : float
         A point counts as stationary when |g| <= tol times the largest |eigenvalue| of H (so a length,
         in the unit of x); an eigenvalue counts as zero below tol times the largest.
+
+    Returns
+    -------
+    kind : str
+        "minimum", "maximum", "saddle", "degenerate" or "not stationary".
+
+    Source: thesis, section 2.4.3.
     """
     g, H, tol = as_finite(g, "g"), as_finite(H, "H"), as_positive_number(tol, "tol")
     if g.ndim != 1 or H.shape != (len(g), len(g)):
@@ -398,8 +493,7 @@ def _undamped(evaluate, x0, next_step, retract, stop, max_iterations):
 
 
 def newton(cost, gradient, hessian, x0, *, stop=None, max_iterations=100):
-    """Newton's method on a smooth function: full steps -H^-1 g, toward whichever stationary point comes first, saddles
-    included.
+    """Newton's method on a smooth function: full steps toward whichever stationary point comes first.
 
     Parameters
     ----------

@@ -24,9 +24,12 @@ COSTS = ("distance", "squares")
 RANK_TOLERANCE = 1e-7  # a second singular value below this share of the first: the landmarks do not fix the position
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class NewtonPath:
-    """A Newton iteration: `path` (k, dim) from start to end, `converged`, and in words the `reason` it stopped."""
+    """A Newton iteration.
+
+    path : (k, dim) from start to end (m).    converged : bool.    reason : in words, why it stopped.
+    """
 
     path: np.ndarray
     converged: bool
@@ -38,14 +41,14 @@ class NewtonPath:
         return self.path[-1]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lateration:
     """A position by least squares.
 
-    position (..., dim) m.    residuals (..., n): measured minus computed distance, m.
-    covariance (..., dim, dim): m^2, infinite where the geometry does not fix the position.
-    singular_values (..., dim) of the unit vectors to the landmarks.
-    iterations: of the slowest run.    converged (...): whether each run stopped at a minimum.
+    position : (..., dim) in m.    residuals : (..., n) measured minus computed distance (m).
+    covariance : (..., dim, dim) in m^2, infinite where the geometry does not fix the position.
+    singular_values : (..., dim) of the unit vectors to the landmarks.
+    iterations : of the slowest run.    converged : (...) whether each run stopped at a minimum.
     """
 
     position: np.ndarray
@@ -70,7 +73,21 @@ def _landmarks(landmarks, distances):
 
 
 def square_residuals(landmarks, distances, position):
-    """The lecture's equations |landmark - position|^2 - distance^2 (m^2), zero where all circles meet; (..., n).
+    """The lecture's equations |landmark - position|^2 - distance^2, zero where all circles meet.
+
+    Parameters
+    ----------
+    landmarks : array-like, shape (n, dim)
+        Positions (m).
+    distances : array-like, shape (..., n)
+        Measured distances (m).
+    position : array-like, shape (..., dim)
+        Where the equations are evaluated (m).
+
+    Returns
+    -------
+    f : array, shape (..., n)
+        In m^2.
 
     Source: lecture, "Algorithmus fuer 2D-Lateration".
     """
@@ -81,7 +98,18 @@ def square_residuals(landmarks, distances, position):
 
 
 def square_jacobian(landmarks, position):
-    """Derivative of `square_residuals` by the position: rows 2 (position - landmark), (..., n, dim), in m."""
+    """Derivative of `square_residuals` by the position: rows 2 (position - landmark).
+
+    Parameters
+    ----------
+    landmarks, position : array-like, shapes (n, dim) and (..., dim)
+        In m.
+
+    Returns
+    -------
+    J : array, shape (..., n, dim)
+        In m.
+    """
     landmarks = as_finite(landmarks, "landmarks")
     if landmarks.ndim != 2:
         raise ValueError(f"landmarks must have shape (n, dim), got {landmarks.shape}")
@@ -90,10 +118,34 @@ def square_jacobian(landmarks, position):
 
 
 def newton_lateration(landmarks, distances, start, steps=50, tolerance=1e-12):
-    """Newton's method on the lecture's equations with as many landmarks as coordinates: a `Newton`.
+    """Newton's method on the lecture's equations with as many landmarks as coordinates.
 
     Two circles meet in two points; the start decides which one is found. On the line through both landmarks the
     Jacobian loses its rank; the iteration stops there and says so.
+
+    Parameters
+    ----------
+    landmarks : array-like, shape (dim, dim)
+        Positions (m).
+    distances : array-like, shape (dim,)
+        Measured distances (m).
+    start : array-like, shape (dim,)
+        Where the search starts (m).
+    steps : int
+        At most so many.
+    tolerance : float
+        A step shorter than this share of the scene ends the search.
+
+    Returns
+    -------
+    NewtonPath
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, more landmarks than coordinates.
+
+    Source: lecture, "Algorithmus fuer 2D-Lateration".
     """
     landmarks, distances = _landmarks(landmarks, distances)
     if len(landmarks) != landmarks.shape[1] or distances.ndim != 1:
@@ -123,9 +175,21 @@ def _two_circles(landmarks, distances):
 
 
 def circle_intersections(landmarks, distances):
-    """Both points where two circles meet, (2, 2), in closed form; the first lies left of the way from landmark 1 to 2.
+    """Both points where two circles meet, in closed form; the first lies left of the way from landmark 1 to 2.
 
-    Raises ValueError where the circles do not meet, or have one center.
+    Parameters
+    ----------
+    landmarks, distances : array-like, shapes (2, 2) and (2,)
+        Centers and radii (m).
+
+    Returns
+    -------
+    points : array, shape (2, 2)
+
+    Raises
+    ------
+    ValueError
+        Where the circles do not meet, or have one center.
     """
     (a, b), (r1, r2) = _two_circles(landmarks, distances)
     along = b - a
@@ -142,10 +206,24 @@ def circle_intersections(landmarks, distances):
 
 
 def linear_start(landmarks, distances):
-    """Position from the differences of the squared equations, which are linear, (..., dim); a start for `laterate`.
+    """Position from the differences of the squared equations, which are linear; a start for `laterate`.
 
-    Subtracting the mean equation removes |position|^2. Raises ValueError where the landmarks lie on one line (in 3D: in
-    one plane): then the mirror image fits as well, and a linear equation cannot choose.
+    Subtracting the mean equation removes |position|^2.
+
+    Parameters
+    ----------
+    landmarks, distances : array-like, shapes (n, dim) and (..., n)
+        In m.
+
+    Returns
+    -------
+    position : array, shape (..., dim)
+
+    Raises
+    ------
+    ValueError
+        Where the landmarks lie on one line (in 3D: in one plane): then the mirror image fits as well, and a linear
+        equation cannot choose.
     """
     landmarks, distances = _landmarks(landmarks, distances)
     mean = landmarks.mean(0)
@@ -170,17 +248,34 @@ def _errors(landmarks, distances, x, cost):
 
 
 def laterate(landmarks, distances, start=None, cost="distance", std=1.0, steps=100):
-    """Position by least squares from two or more distances: a `Lateration`.
+    """Position by least squares from two or more distances: Levenberg-Marquardt, all runs at once.
 
     Parameters
     ----------
-    landmarks : (n, dim) m.    distances : (..., n) m.    start : (..., dim) m; None takes `linear_start`.
-    cost : "distance" sums (length - distance)^2, maximum likelihood for equal Gaussian noise on the distances;
-        "squares" sums the lecture's (length^2 - distance^2)^2, which weighs each landmark with its squared distance.
-    std : standard deviation of a distance (m), for the covariance.
+    landmarks : array-like, shape (n, dim)
+        Positions (m).
+    distances : array-like, shape (..., n)
+        Measured distances (m).
+    start : array-like, shape (..., dim), optional
+        Where the search starts (m); `linear_start` by default.
+    cost : {"distance", "squares"}
+        Sum (length - distance)^2, maximum likelihood for equal Gaussian noise on the distances, or the lecture's
+        (length^2 - distance^2)^2, which weighs each landmark with its squared distance.
+    std : float
+        Standard deviation of a distance (m), for the covariance.
+    steps : int
+        At most so many.
 
-    Levenberg-Marquardt, all runs at once. Source of "squares": lecture, "Least-Square-Verfahren bei mehr als 2
-    Landmarken".
+    Returns
+    -------
+    Lateration
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, distances that are not positive, no start where landmarks on one line need one.
+
+    Source: lecture, "Least-Square-Verfahren bei mehr als 2 Landmarken" (the cost "squares").
     """
     landmarks, distances = _landmarks(landmarks, distances)
     if cost not in COSTS:
@@ -227,10 +322,19 @@ def _minimize(landmarks, distances, x, cost, steps):
 
 
 def dilution(landmarks, position):
-    """Dilution of precision at a position: the covariance per unit distance variance, (..., dim, dim), without unit.
+    """Dilution of precision at a position: the covariance per unit distance variance, without unit.
 
     The inverse of the sum of u u' over the unit vectors u to the landmarks. The root of its trace times the standard
     deviation of a distance is the position's RMS error; std^2 times the matrix is the Cramer-Rao bound.
+
+    Parameters
+    ----------
+    landmarks, position : array-like, shapes (n, dim) and (..., dim)
+        In m.
+
+    Returns
+    -------
+    dilution : array, shape (..., dim, dim)
 
     Raises
     ------

@@ -25,7 +25,19 @@ MODELS = ("euler", "midpoint", "arc")
 
 
 def wheel_to_twist(v_left, v_right, track):
-    """Control u = (v, omega), shape (..., 2), of a differential drive from wheel speeds (m/s) and track width (m).
+    """Control of a differential drive from the speeds of its wheels.
+
+    Parameters
+    ----------
+    v_left, v_right : array-like, shape (...)
+        Speeds (m/s).
+    track : array-like, shape (...)
+        Distance between the wheels (m).
+
+    Returns
+    -------
+    u : array, shape (..., 2)
+        v (m/s) and omega (rad/s).
 
     Source: lecture, "Wiederholung Differentialantrieb": v = (v_R + v_L) / 2, omega = (v_R - v_L) / l.
     """
@@ -36,7 +48,20 @@ def wheel_to_twist(v_left, v_right, track):
 
 
 def twist_to_wheel(u, track):
-    """Wheel speeds (v_left, v_right) in m/s that give the control u; the inverse of `wheel_to_twist`."""
+    """Wheel speeds that give a control; the inverse of `wheel_to_twist`.
+
+    Parameters
+    ----------
+    u : array-like, shape (..., 2)
+        v (m/s) and omega (rad/s).
+    track : array-like, shape (...)
+        Distance between the wheels (m).
+
+    Returns
+    -------
+    v_left, v_right : arrays, shape (...)
+        In m/s.
+    """
     u = as_points(u, "u", 2)
     half = as_positive(track, "track") / 2
     return u[..., 0] - half * u[..., 1], u[..., 0] + half * u[..., 1]
@@ -62,14 +87,24 @@ def _chord(u, dt, model):
 
 
 def step(x, u, dt, model="midpoint"):
-    """Pose after driving with the control u for dt, shape (..., 3).
+    """Pose after driving with the control u for dt.
 
     Parameters
     ----------
-    x : (..., 3) pose (m, m, rad).    u : (..., 2) control (m/s, rad/s).    dt : time step (s).
-    model : "euler" drives straight along the old heading, "midpoint" straight along the heading of half the turn,
-        "arc" along the exact circle about the instantaneous center of rotation. The length of the arc's chord is
-        v dt sin(h) / h with h = omega dt / 2, so the straight line needs no case of its own.
+    x : array-like, shape (..., 3)
+        Pose (m, m, rad).
+    u : array-like, shape (..., 2)
+        Control (m/s, rad/s).
+    dt : array-like, shape (...)
+        Time step (s).
+    model : {"euler", "midpoint", "arc"}
+        Straight along the old heading, straight along the heading of half the turn, or along the exact circle about
+        the instantaneous center of rotation. The length of the arc's chord is v dt sin(h) / h with h = omega dt / 2,
+        so the straight line needs no case of its own.
+
+    Returns
+    -------
+    x : array, shape (..., 3)
 
     Raises
     ------
@@ -88,7 +123,11 @@ def step(x, u, dt, model="midpoint"):
 
 
 def step_jacobians(x, u, dt, model="midpoint"):
-    """Derivatives (F_x, F_u) of `step` by the pose, (..., 3, 3), and by the control, (..., 3, 2).
+    """Derivatives of `step`, which has the parameters, by the pose and by the control.
+
+    Returns
+    -------
+    F_x, F_u : arrays, shapes (..., 3, 3) and (..., 3, 2)
 
     Source: lecture, "Berechnung der Jacobi-Matrizen" (for the model "euler"); the others by the product rule.
     """
@@ -118,9 +157,22 @@ def _sinc_slope(h):
 
 
 def turning_center(x, u):
-    """Instantaneous center of rotation (ICR) of a robot at x under the control u, shape (..., 2), in m.
+    """Instantaneous center of rotation (ICR): it lies v / omega to the left of the heading.
 
-    It lies v / omega to the left of the heading. Raises ValueError where omega is zero: a straight line has none.
+    Parameters
+    ----------
+    x, u : array-like, shapes (..., 3) and (..., 2)
+        Pose (m, m, rad) and control (m/s, rad/s).
+
+    Returns
+    -------
+    center : array, shape (..., 2)
+        In m.
+
+    Raises
+    ------
+    ValueError
+        Where omega is zero: a straight line has none.
     """
     x, u = as_points(x, "x", 3), as_points(u, "u", 2)
     fit_together(x=x.shape[:-1], u=u.shape[:-1])
@@ -132,16 +184,34 @@ def turning_center(x, u):
 
 
 def control_covariance(u, dt, k_d, k_theta, k_drift):
-    """Covariance of the control u = (v, omega), shape (..., 2, 2), in (m/s)^2 and (rad/s)^2.
-
-    Parameters
-    ----------
-    k_d : variance of the distance per meter driven (m^2 / m).
-    k_theta : variance of the heading per radian turned (rad^2 / rad).
-    k_drift : variance of the heading per meter driven (rad^2 / m).
+    """Covariance of a control by the lecture's error model, which counts variance per way.
 
     The variances k_d |v| / dt and (k_theta |omega| + k_drift |v|) / dt grow as dt shrinks, so that the variance
     of the way after a given time does not depend on dt. Reversing and right turns count with their absolute values.
+
+    Parameters
+    ----------
+    u : array-like, shape (..., 2)
+        Control (m/s, rad/s).
+    dt : array-like, shape (...)
+        Time step (s).
+    k_d : float
+        Variance of the distance per meter driven (m^2 / m).
+    k_theta : float
+        Variance of the heading per radian turned (rad^2 / rad).
+    k_drift : float
+        Variance of the heading per meter driven (rad^2 / m).
+
+    Returns
+    -------
+    cov_u : array, shape (..., 2, 2)
+        In (m/s)^2 and (rad/s)^2.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, a negative constant.
+
     Source: lecture, "Fehlermodell fuer Steuerbefehl (1) to (3)".
     """
     u, dt = as_points(u, "u", 2), as_positive(dt, "dt")
@@ -156,9 +226,21 @@ def control_covariance(u, dt, k_d, k_theta, k_drift):
 
 
 def propagate(x, cov, u, dt, cov_u, model="midpoint"):
-    """Pose and covariance after one step, ((..., 3), (..., 3, 3)), to first order: F_x cov F_x' + F_u cov_u F_u'.
+    """Pose and covariance after one step, to first order: F_x cov F_x' + F_u cov_u F_u'.
 
-    cov : (..., 3, 3) covariance of the pose before.    cov_u : (..., 2, 2) covariance of the control.
+    Parameters
+    ----------
+    x, u, dt, model
+        As in `step`.
+    cov : array-like, shape (..., 3, 3)
+        Covariance of the pose before.
+    cov_u : array-like, shape (..., 2, 2)
+        Covariance of the control.
+
+    Returns
+    -------
+    x, cov : arrays, shapes (..., 3) and (..., 3, 3)
+
     Source: lecture, "Fehlerfortpflanzung bei Koppelnavigation (2)".
     """
     cov, cov_u = as_covariances(cov, "cov", 3), as_covariances(cov_u, "cov_u", 2)
@@ -169,7 +251,24 @@ def propagate(x, cov, u, dt, cov_u, model="midpoint"):
 
 
 def drive(x0, controls, dt, model="midpoint"):
-    """Poses along a drive, start included, shape (n + 1, ..., 3); controls (n, ..., 2), one row a time step."""
+    """Poses along a drive.
+
+    Parameters
+    ----------
+    x0 : array-like, shape (..., 3)
+        Start (m, m, rad).
+    controls : array-like, shape (n, ..., 2)
+        One control (m/s, rad/s) per time step.
+    dt : float
+        Time step (s).
+    model : {"euler", "midpoint", "arc"}
+        As in `step`.
+
+    Returns
+    -------
+    poses : array, shape (n + 1, ..., 3)
+        The start included.
+    """
     controls = as_points(controls, "controls", 2)
     if controls.ndim < 2:
         raise ValueError(f"controls must have shape (n, ..., 2), got {controls.shape}")
@@ -182,7 +281,21 @@ def drive(x0, controls, dt, model="midpoint"):
 
 
 def drive_with_covariance(x0, cov0, controls, dt, k_d, k_theta, k_drift, model="midpoint"):
-    """Poses (n + 1, 3) and covariances (n + 1, 3, 3) along a drive with the lecture's error model."""
+    """Poses and covariances along a drive with the lecture's error model.
+
+    Parameters
+    ----------
+    x0, cov0 : array-like, shapes (3,) and (3, 3)
+        Start (m, m, rad) and its covariance.
+    controls, dt, model
+        As in `drive`, one robot.
+    k_d, k_theta, k_drift : float
+        As in `control_covariance`.
+
+    Returns
+    -------
+    poses, covs : arrays, shapes (n + 1, 3) and (n + 1, 3, 3)
+    """
     controls = as_shape(controls, "controls", "n", 2)
     cov_u = control_covariance(controls, as_positive_number(dt, "dt"), k_d, k_theta, k_drift)
     poses, covs = [as_shape(x0, "x0", 3)], [as_shape(as_covariances(cov0, "cov0", 3), "cov0", 3, 3)]
@@ -194,7 +307,22 @@ def drive_with_covariance(x0, cov0, controls, dt, k_d, k_theta, k_drift, model="
 
 
 def noisy_controls(controls, dt, k_d, k_theta, k_drift, rng, runs):
-    """Controls as `runs` robots really execute them, shape (n, runs, 2): each with its own noise."""
+    """Controls as many robots really execute them, each with its own noise.
+
+    Parameters
+    ----------
+    controls : array-like, shape (n, 2)
+        Commands (m/s, rad/s).
+    dt, k_d, k_theta, k_drift
+        As in `control_covariance`.
+    rng : numpy.random.Generator
+    runs : int
+        Number of robots.
+
+    Returns
+    -------
+    controls : array, shape (n, runs, 2)
+    """
     controls, runs = as_shape(controls, "controls", "n", 2), as_count(runs, "runs")
     cov_u = control_covariance(controls, as_positive_number(dt, "dt"), k_d, k_theta, k_drift)
     std = np.sqrt(np.diagonal(cov_u, axis1=-2, axis2=-1))
@@ -202,5 +330,12 @@ def noisy_controls(controls, dt, k_d, k_theta, k_drift, rng, runs):
 
 
 def sample_drives(x0, controls, dt, k_d, k_theta, k_drift, rng, runs, model="midpoint"):
-    """Paths of `runs` robots given the same commands, each with its own noise, shape (n + 1, runs, 3)."""
+    """Paths of many robots given the same commands, each with its own noise.
+
+    The parameters are those of `drive` and `noisy_controls`.
+
+    Returns
+    -------
+    poses : array, shape (n + 1, runs, 3)
+    """
     return drive(x0, noisy_controls(controls, dt, k_d, k_theta, k_drift, rng, runs), dt, model)
