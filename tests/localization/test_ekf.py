@@ -111,6 +111,26 @@ def test_unscented_filter_agrees_where_the_models_are_nearly_linear():
     np.testing.assert_allclose(cov, found.cov[59], atol=2e-4)
 
 
+def test_unscented_update_is_the_textbooks_sum_over_seven_points():
+    """A wide prior next to a landmark, where the mean of the points lies far from the point of the mean."""
+    x, cov, marks = np.array([0.2, -0.1, 0.4]), np.diag([0.3, 0.2, 0.05]), np.array([[1.5, 0.8], [-2.0, 1.0]])
+    cov[0, 1] = cov[1, 0] = 0.1
+    z = ekf.measurement([0.5, 0.1, 0.3], marks)
+    z[1] = np.nan
+    columns = np.sqrt(3) * np.linalg.cholesky(cov).T
+    points, weights = [x, *(x + columns), *(x - columns)], [0.0, *[1 / 6] * 6]
+    h = [ekf.measurement(point, marks)[0] for point in points]  # of the landmark seen; no bearing near +-pi
+    mean = sum(w * value for w, value in zip(weights, h))
+    S = sum(w * np.outer(v - mean, v - mean) for w, v in zip(weights, h)) + np.diag([0.1**2, 0.02**2])
+    K = sum(w * np.outer(p - x, v - mean) for w, p, v in zip(weights, points, h)) @ np.linalg.inv(S)
+    assert np.abs(mean - h[0]).max() > 0.01
+    found = ekf.unscented_update(x, cov, z, marks, 0.1, 0.02)
+    np.testing.assert_allclose(found.innovation, [*(z[0] - mean), 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(found.cov_innovation[:2, :2], S, atol=1e-12)
+    np.testing.assert_allclose(found.x, x + K @ (z[0] - mean), atol=1e-12)
+    np.testing.assert_allclose(found.cov, cov - K @ S @ K.T, atol=1e-12)
+
+
 def test_unscented_transform_is_exact_for_a_linear_map():
     cov, cov_u = np.diag([0.1, 0.2, 1e-8]), np.diag([0.01, 1e-8])
     x, after = ekf.unscented_predict(np.zeros(3), cov, [1.0, 0.0], 0.1, cov_u)
