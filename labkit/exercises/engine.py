@@ -92,6 +92,8 @@ class Exercise(Item):
     noisy:      (draw, metric) or (draw, metric, words): one more draw, with noise and a tolerance band for estimators,
                 or at a special place; several such in a list. `words` lead in what is said when only this draw fails.
     properties: functions (student_function, rng) -> None or a sentence that says what does not hold.
+    fixed:      {argument: reason} of arguments that are the same, or of one shape, in all draws: what the docstring
+                leaves free must vary, or an answer could be wired to it.
     draws:      how many draws a check takes.
     limit:      seconds that one call may take.
     """
@@ -103,6 +105,7 @@ class Exercise(Item):
     mistakes: tuple = ()
     noisy: tuple = ()
     properties: tuple = ()
+    fixed: dict = field(default_factory=dict)
     draws: int = 5
     limit: float = guard.TIME_LIMIT
 
