@@ -16,12 +16,14 @@ from labkit.documents.thesis import wells
 from labkit.documents.thesis.listings import listing_cost
 from labkit.estimation import gaussian, kalman, optimization
 from labkit.estimation.differences import numeric_jacobian
+from labkit.fast import sensors as fast_sensors
 from labkit.fast.ekf import ekf_localize
 from labkit.fast.kalman import filter_steps
+from labkit.fast.maps import RangeTable
 from labkit.geometry import chaining, frames, lie, planar
 from labkit.localization import ekf, lateration, maps, mcl, odometry, particles
 from labkit.localization.drives import find_route, follow
-from labkit.localization.sensors import LikelihoodField, Scanner, beam_density, see_landmarks, weigh_beams, weigh_doors
+from labkit.localization.sensors import LikelihoodField, Scanner, beam_density, see_landmarks, weigh_doors
 from labkit.machines import simulation, udp
 from labkit.machines.accuracy import filter_positions, shift_time, speeds, summarize, time_offset, tracking_errors
 from labkit.machines.arm import (
@@ -225,13 +227,13 @@ REFUSED = [
     (lambda: maps.OccupancyGrid.from_lines([[0, 0, 1, 1]], 1e-9), "at most 1e\\+08 cells"),
     (lambda: maps.OccupancyGrid.from_lines([[0, 0, 1, 1]], 0.1, margin=-1.0), "margin must not be negative"),
     (lambda: maps.walk_ray(GRID, [1.5, 1.5, 0.0], np.nan, 5.0), "bearing must be finite"),
-    (lambda: maps.RangeTable(GRID, 5.0, 0), "n_angles must be a whole number"),
-    (lambda: maps.RangeTable(GRID, 5.0, 4).cast(O3, [0.0], r_max=np.nan), "r_max must be finite"),
+    (lambda: RangeTable(GRID, 5.0, 0), "n_angles must be a whole number"),
+    (lambda: RangeTable(GRID, 5.0, 4).cast(O3, [0.0], r_max=np.nan), "r_max must be finite"),
     (lambda: LikelihoodField(GRID, 0.1, share_hit="most"), "share_hit must hold real numbers"),
     (lambda: Scanner().scan(GRID, O3, rng(), every=0), "every must be a whole number"),
     (lambda: particles.sample_motion(I3, [1.0, 0.0], 0.1, rng(), -np.eye(2)), "no negative variance"),
-    (lambda: particles.sample_motion(I3, np.ones((3, 2)), 0.1, rng()), "u and cov_u must have shapes"),
-    (lambda: weigh_beams(GRID, [1.0], [0.0], 0.1, 5.0, step=1e-12), "a millionth of r_max"),
+    (lambda: particles.sample_motion(I3, np.ones((3, 2)), 0.1, rng(), np.eye(2)), "u and cov_u must have shapes"),
+    (lambda: fast_sensors.weigh_beams(GRID, [1.0], [0.0], 0.1, 5.0, step=1e-12), "a millionth of r_max"),
     (lambda: beam_density([np.nan], [1.0], 0.1, 5.0, (1, 0, 0, 0)), "ranges must be finite"),
     (lambda: beam_density([1.0], [1.0], 0.0, 5.0, (1, 0, 0, 0)), "std must be positive"),
     (lambda: beam_density([1.0], [1.0], 0.1, 5.0, (1, 1, 0, 0)), "add up to 1"),
@@ -241,12 +243,12 @@ REFUSED = [
     (lambda: particles.resample_roulette([1e308, 1e308], rng()), "from 1e-300 to 1e300"),
     (lambda: particles.resample_systematic([1.0, 1.0], rng(), 1.5), "size must be a whole number"),
     (lambda: particles.should_resample([1.0], np.nan), "threshold must be finite"),
-    (lambda: particles.estimate(I3, [1.0, 1.0]), "one weight a state"),
+    (lambda: particles.estimate(I3, [1.0, 1.0]), "one weight per state"),
     (lambda: particles.estimate(np.zeros((0, 3))), "at least one state"),
     (lambda: particles.estimate_mode(I3, cell=np.inf), "cell must be finite"),
     (lambda: mcl.recover(np.nan, 1.0, 1.0), "w_mean must be finite"),
     (lambda: particles.kld_size(10, epsilon=0.0), "epsilon must be positive"),
-    (lambda: particles.kld_take(I3, n_min=np.nan), "n_min must be finite"),
+    (lambda: particles.KldSampling(n_min=np.nan).enough(I3), "n_min must be finite"),
     (lambda: follow(O3, [[1.0, 1.0]], 5, 0.0), "dt must be positive"),
     (lambda: see_landmarks(None, O3, MARKS, rng(), std_range=-0.1), "std_range must not be negative"),
     (lambda: find_route(["x"], "a", "b"), "edges must be pairs"),

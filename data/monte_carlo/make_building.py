@@ -11,7 +11,8 @@ from scipy.ndimage import label
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent.parent))
 
-from labkit.localization.maps import FREE, UNKNOWN, OccupancyGrid, cast_rays
+from labkit.fast.maps import cast_rays
+from labkit.localization.maps import FREE, UNKNOWN, OccupancyGrid
 from labkit.localization.sensors import Scanner
 
 RESOLUTION, SEED = 0.1, 9

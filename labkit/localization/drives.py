@@ -9,13 +9,27 @@ import numpy as np
 from ..checks import as_count, as_points, as_positive_number, as_shape
 from ..geometry.planar import wrap_angle
 from . import odometry
-from .particles import CONTROL_NOISE
-
-# --- simulated drives ------------------------------------------------------------------------------------------------
 
 
 def find_route(edges, start, goal):
-    """Shortest list of node names from start to goal along the edges of a topological map (breadth first)."""
+    """Shortest way through a topological map, breadth first.
+
+    Parameters
+    ----------
+    edges : sequence of pairs of names
+    start, goal : name
+
+    Returns
+    -------
+    list of names, from start to goal
+
+    Raises
+    ------
+    ValueError
+        When no chain of edges connects them.
+
+    Source: lecture, "topologische Karten".
+    """
     if not all(isinstance(edge, (tuple, list)) and len(edge) == 2 for edge in edges):
         raise ValueError("edges must be pairs of names")
     before, queue = {start: None}, deque([start])
@@ -34,9 +48,19 @@ def find_route(edges, start, goal):
     return route[::-1]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Drive:
-    """A simulated drive: true poses (n + 1, 3), the controls that odometry reports (n, 2), and the time step (s)."""
+    """A simulated drive.
+
+    Attributes
+    ----------
+    truth : array, shape (n + 1, 3)
+        True poses (m, m, rad).
+    controls : array, shape (n, 2)
+        What odometry reports, v and omega (m/s, rad/s).
+    dt : float
+        Time step (s).
+    """
 
     truth: np.ndarray
     controls: np.ndarray
@@ -44,7 +68,24 @@ class Drive:
 
 
 def follow(start, waypoints, n_steps, dt, speed=0.6, turn_rate=0.8):
-    """Controls (n_steps, 2) of a robot that turns toward each waypoint and drives there; it stands still at the end."""
+    """Controls of a robot that turns toward each waypoint and drives there; it stands still at the end.
+
+    Parameters
+    ----------
+    start : array-like, shape (3,)
+        m, m, rad.
+    waypoints : array-like, shape (k, 2)
+        m.
+    n_steps : int
+    dt : float
+        Time step (s).
+    speed, turn_rate : float
+        m/s and rad/s, never exceeded.
+
+    Returns
+    -------
+    array, shape (n_steps, 2)
+    """
     (x, y, theta), n_steps = as_shape(start, "start", 3), as_count(n_steps, "n_steps", at_least=0)
     named = ((dt, "dt"), (speed, "speed"), (turn_rate, "turn_rate"))
     dt, speed, turn_rate = (as_positive_number(value, name) for value, name in named)
@@ -63,10 +104,25 @@ def follow(start, waypoints, n_steps, dt, speed=0.6, turn_rate=0.8):
     return np.array(controls).reshape(-1, 2)
 
 
-def random_drive(building, n_steps, rng, dt=0.5, start=None):
-    """A `Drive` from room to room of a building, in a random order; odometry reports it with the lecture's noise.
+def random_drive(building, noise, n_steps, rng, dt=0.5, start=None):
+    """A `Drive` from room to room of a building, in a random order.
 
-    start: name of the first node, random when not given.
+    Parameters
+    ----------
+    building : Building
+        With `nodes` and `edges`; doors and corridors are passed, never a goal.
+    noise : dict
+        k_d, k_theta, k_drift of what odometry reports, as for `odometry.control_covariance`.
+    n_steps : int
+    rng : numpy.random.Generator
+    dt : float
+        Time step (s).
+    start : str, optional
+        Name of the first node, random when not given.
+
+    Returns
+    -------
+    Drive
     """
     rooms = [name for name in building.nodes if not name.startswith(("door", "corridor"))]
     here = start or rooms[rng.integers(len(rooms))]
@@ -80,13 +136,17 @@ def random_drive(building, n_steps, rng, dt=0.5, start=None):
             here = goal
     controls = follow(pose, waypoints, n_steps, dt)
     truth = odometry.drive(pose, controls, dt)
-    return Drive(truth, odometry.noisy_controls(controls, dt, **CONTROL_NOISE, rng=rng, runs=1)[:, 0], dt)
+    return Drive(truth, odometry.noisy_controls(controls, dt, **noise, rng=rng, runs=1)[:, 0], dt)
 
 
 class Wanderer:
     """A robot that goes on from place to place of a topological map, from wherever it is put.
 
-    control(pose, dt): the control for the next step; it turns toward the place it is heading for, then drives there.
+    Parameters
+    ----------
+    building : Building
+        With `nodes`, `edges` and `grid`.
+    rng : numpy.random.Generator
     """
 
     def __init__(self, building, rng):
@@ -97,7 +157,17 @@ class Wanderer:
         self.at = self.goal = None
 
     def control(self, pose, dt, speed=0.6, turn_rate=0.8):
-        """v and omega, shape (2,)."""
+        """The control for the next step, shape (2,): it turns toward the place it is heading for, then drives there.
+
+        Parameters
+        ----------
+        pose : array-like, shape (3,)
+            m, m, rad.
+        dt : float
+            Time step (s).
+        speed, turn_rate : float
+            m/s and rad/s.
+        """
         if self.goal is None:
             self.goal = self._in_sight(pose)
         if self.goal is None:

@@ -14,24 +14,33 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from ..checks import as_count, as_finite, as_number, as_points, as_positive_number, as_shape, shown
+from ..checks import as_finite, as_number, as_points, as_positive_number, as_shape, shown
 
 FREE, OCCUPIED, UNKNOWN = 0, 1, 2
 _SYMBOLS = {".": FREE, " ": FREE, "#": OCCUPIED, "?": UNKNOWN}
 _GRAY = (255, 0, 127)  # white = free, black = occupied, gray = unknown, as the lecture draws it
 MOST_CELLS = 1e8  # a larger map is a slip of the unit
-_RAYS = 1 << 17
-EVERY = 4
-_CHUNK = 16384  # rays or beams worked on at once: small enough to stay in the processor's cache
 
 
 @dataclass(frozen=True, eq=False)
 class OccupancyGrid:
     """A map of square cells, each free, occupied or unknown.
 
-    cells: array (H, W) of FREE, OCCUPIED, UNKNOWN; row 0 is the lowest.
-    resolution: length of a cell's side (m).
-    origin: x, y of the lower left corner of cells[0, 0] (m).
+    Parameters
+    ----------
+    cells : array-like, shape (H, W)
+        FREE, OCCUPIED or UNKNOWN; row 0 is the lowest.
+    resolution : float
+        Length of a cell's side (m).
+    origin : array-like, shape (2,)
+        x, y of the lower left corner of cells[0, 0] (m).
+
+    Raises
+    ------
+    ValueError
+        Other cells, a resolution that is not positive.
+
+    Source: lecture, "Gitterbasierte Karten".
     """
 
     cells: np.ndarray
@@ -50,7 +59,15 @@ class OccupancyGrid:
 
     @classmethod
     def from_ascii(cls, art, resolution=1.0, origin=(0.0, 0.0)):
-        """Grid from a drawing: '#' occupied, '.' or blank free, '?' unknown; the first line is the top of the map."""
+        """Grid from a drawing.
+
+        Parameters
+        ----------
+        art : str
+            '#' occupied, '.' or blank free, '?' unknown; the first line is the top of the map.
+        resolution, origin
+            As for the grid.
+        """
         if not isinstance(art, str):
             raise ValueError(f"art must be a text, got {type(art).__name__}")
         lines = [line for line in art.splitlines() if line.strip()]
@@ -68,8 +85,16 @@ class OccupancyGrid:
 
     @classmethod
     def from_png(cls, path, resolution, origin=(0.0, 0.0), occupied_below=0.35, free_above=0.8):
-        """Grid from a gray picture: darker than `occupied_below` (of white) is occupied, lighter than `free_above`
-        is free."""
+        """Grid from a gray picture.
+
+        Parameters
+        ----------
+        path : str or Path
+        resolution, origin
+            As for the grid.
+        occupied_below, free_above : float
+            Shares of white: what is darker is occupied, what is lighter is free, what lies between is unknown.
+        """
         from PIL import Image
 
         with Image.open(path) as image:
@@ -81,7 +106,21 @@ class OccupancyGrid:
     def from_lines(cls, lines, resolution, margin=0.0):
         """Grid in which each cell that a line segment crosses is occupied and all others are free.
 
-        lines: array (n, 4), each row x1, y1, x2, y2 (m). The grid reaches `margin` (m) beyond the outermost end points.
+        Parameters
+        ----------
+        lines : array-like, shape (n, 4)
+            x1, y1, x2, y2 of each segment (m).
+        resolution : float
+            m.
+        margin : float
+            How far the grid reaches beyond the outermost end points (m).
+
+        Raises
+        ------
+        ValueError
+            No segment, or more than MOST_CELLS cells.
+
+        Source: lecture, "Linienbasierte Karten".
         """
         lines = as_points(lines, "lines", dim=4).reshape(-1, 4)
         if not len(lines):
@@ -166,15 +205,6 @@ class OccupancyGrid:
         """`cast_rays(self, poses, bearings, r_max)`: what a scanner in this map would measure."""
         return cast_rays(self, poses, bearings, r_max)
 
-    @cached_property
-    def _steps(self):
-        """How far a ray may go from each cell without passing an obstacle, in cells, with a rim; 0 where it ends."""
-        stop = np.pad(self.occupied, 1, constant_values=True)
-        distance = distance_transform_edt(~stop)
-        steps = np.maximum(0.999 * distance, 1.0)
-        steps[stop] = 0.0
-        return steps.astype(np.float32)
-
 
 def _between_crossings(start, end):
     """One point within each cell of side 1 that the segment passes through, shape (n, 2)."""
@@ -191,9 +221,14 @@ def _between_crossings(start, end):
 def distance_field(grid):
     """Distance from the middle of each cell to the middle of the nearest occupied one.
 
+    Parameters
+    ----------
+    grid : OccupancyGrid
+
     Returns
     -------
-    array, shape (H, W), in meters; 0 in the occupied cells themselves.
+    array, shape (H, W)
+        m; 0 in the occupied cells themselves.
 
     Raises
     ------
@@ -213,154 +248,91 @@ def walk_ray(grid, pose, bearing, r_max):
     Parameters
     ----------
     grid : OccupancyGrid
+        Unknown cells do not stop a ray.
     pose : array-like, shape (3,)
-        x, y, theta of the sensor (m, m, rad).
+        x, y, theta of the sensor (m, m, rad). A pose inside an obstacle sees 0, a pose beyond the map sees nothing.
     bearing : float
         Direction of the ray, relative to the pose (rad).
     r_max : float
-        The range of the sensor (m); returned where nothing is hit.
+        The range of the sensor (m).
 
-    Source: lecture, "Strahlenmodell": the distance to the first obstacle by following the beam.
+    Returns
+    -------
+    float
+        m; r_max where nothing is hit.
+
+    Source: lecture, "Strahlenmodell" (*Strahlverfolgung*): the distance to the first obstacle by following the beam.
     """
-    x, y, theta = as_shape(pose, "pose", 3)
-    angle = float(theta) + as_number(bearing, "bearing")
-    u = np.array([math.sin(angle), math.cos(angle)])  # rows first, as cells are indexed
-    start = (np.array([y, x]) - grid.origin[::-1]) / grid.resolution
-    cell = np.floor(start).astype(int)
-    step = np.where(u > 0, 1, -1)
-    with np.errstate(divide="ignore", over="ignore"):  # along an axis, or all but
-        per_cell = np.abs(1.0 / u)
-    to_edge = np.where(u > 0, cell + 1 - start, start - cell)
-    crossing = np.array([edge * pace if pace < np.inf else np.inf for edge, pace in zip(to_edge, per_cell)])
-    travelled, reach = 0.0, as_positive_number(r_max, "r_max") / grid.resolution
-    while travelled < reach and all(0 <= c < n for c, n in zip(cell, grid.cells.shape)):
-        if grid.cells[tuple(cell)] == OCCUPIED:
+    x, y, theta = as_shape(pose, "pose", 3).tolist()
+    angle = theta + as_number(bearing, "bearing")
+    r_max = as_positive_number(r_max, "r_max")
+    height, width = grid.cells.shape
+    row = _Axis((y - grid.origin[1]) / grid.resolution, math.sin(angle))
+    column = _Axis((x - grid.origin[0]) / grid.resolution, math.cos(angle))
+    travelled = 0.0
+    while travelled < r_max / grid.resolution and 0 <= row.cell < height and 0 <= column.cell < width:
+        if grid.cells[row.cell, column.cell] == OCCUPIED:
             return travelled * grid.resolution
-        axis = int(crossing[1] < crossing[0])
-        travelled = crossing[axis]
-        crossing[axis] += per_cell[axis]
-        cell[axis] += step[axis]
-    return float(r_max)
+        nearer = column if column.crossing < row.crossing else row
+        travelled = nearer.go_on()
+    return r_max
+
+
+class _Axis:
+    """One coordinate of a ray, in cells: the cell it is in, and the way along the ray to where it leaves that cell."""
+
+    def __init__(self, start, slope):
+        self.cell = math.floor(start)
+        self.step = 1 if slope > 0 else -1
+        self.per_cell = abs(1.0 / slope) if abs(slope) > 1e-300 else math.inf
+        to_edge = self.cell + 1 - start if slope > 0 else start - self.cell
+        self.crossing = to_edge * self.per_cell if self.per_cell < math.inf else math.inf
+
+    def go_on(self):
+        """Enter the next cell; the way to its edge."""
+        travelled = self.crossing
+        self.cell += self.step
+        self.crossing += self.per_cell
+        return travelled
 
 
 def cast_rays(grid, poses, bearings, r_max):
-    """Distances to the first occupied cell from many poses in many directions, by sphere tracing.
-
-    The distance field says how far a ray may jump without hitting anything; near a wall the jumps shrink to one cell.
-    Where a ray ends, the edge of the cell it entered gives the distance. A ray that clips the corner of a cell may pass
-    it: `walk_ray` does not.
+    """`walk_ray` from many poses in many directions.
 
     Parameters
     ----------
     grid : OccupancyGrid
-        Unknown cells do not stop a ray.
     poses : array-like, shape (..., 3)
-        x, y, theta of the sensor (m, m, rad). A pose inside an obstacle sees 0, a pose beyond the map sees nothing.
+        x, y, theta of the sensor (m, m, rad).
     bearings : array-like, shape (B,)
         Directions relative to the pose (rad).
     r_max : float
-        The range of the sensor (m); returned where nothing is hit.
+        The range of the sensor (m).
 
     Returns
     -------
-    array, shape (..., B), in meters, float32
+    array, shape (..., B)
+        m; r_max where nothing is hit.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, numbers that are not finite, a range that is not positive.
+
+    See Also
+    --------
+    labkit.fast.maps.cast_rays : the same for thousands of poses
 
     Source: lecture, "Strahlenmodell" (*Strahlverfolgung*).
     """
+    poses, bearings, r_max = as_rays(poses, bearings, r_max)
+    ranges = [walk_ray(grid, pose, bearing, r_max) for pose in poses.reshape(-1, 3) for bearing in bearings]
+    return np.array(ranges).reshape(*poses.shape[:-1], len(bearings))
+
+
+def as_rays(poses, bearings, r_max):
+    """The arguments of `cast_rays`, checked."""
     poses, bearings = as_points(poses, "poses"), as_finite(bearings, "bearings")
     if bearings.ndim != 1:
         raise ValueError(f"bearings must have shape (B,), got {bearings.shape}")
-    r_max = as_positive_number(r_max, "r_max")
-    flat = poses.reshape(-1, 3)
-    ranges = np.empty((len(flat), len(bearings)), dtype=np.float32)
-    rows = max(1, _RAYS // max(1, len(bearings)))
-    for start in range(0, len(flat), rows):
-        _trace(grid, flat[start : start + rows], bearings, r_max, ranges[start : start + rows])
-    return ranges.reshape(*poses.shape[:-1], len(bearings))
-
-
-def _trace(grid, poses, bearings, r_max, out):
-    """Sphere tracing of one chunk of poses (n, 3) into `out` (n, B); all in cells of the map with its rim."""
-    steps, width = grid._steps.ravel(), grid._steps.shape[1]
-    angle = (poses[:, 2:] + bearings).astype(np.float32).ravel()
-    c, s = np.cos(angle), np.sin(angle)
-    start = ((poses[:, :2] - grid.origin) / grid.resolution + 1.0).astype(np.float32)
-    height = grid._steps.shape[0]
-    inside = ((start >= 1) & (start < (width - 1, height - 1))).all(1)
-    start[~inside] = 0.5  # on the rim, where a ray ends at once
-    x0, y0 = np.repeat(start, len(bearings), axis=0).T.copy()
-    x, y = x0.copy(), y0.copy()
-    reach = np.float32(r_max / grid.resolution)
-    t = np.zeros_like(x)
-    live, result = np.arange(x.size), np.full(x.size, reach, dtype=np.float32)
-    while live.size:
-        for _ in range(EVERY):
-            index = y.astype(np.int32)
-            index *= width
-            index += x.astype(np.int32)
-            step = steps.take(index)
-            t += step
-            x += step * c
-            y += step * s
-        done = np.flatnonzero(step == 0)
-        hit = live.take(done)
-        result[hit] = _entry(x0[hit], y0[hit], c[done], s[done], index[done], width, height, reach)
-        keep = np.flatnonzero((step > 0) & (t < reach))
-        live, x, y, t, c, s = (a.take(keep) for a in (live, x, y, t, c, s))
-    out[:] = result.reshape(out.shape)
-    out *= grid.resolution
-    np.minimum(out, r_max, out=out)
-
-
-def _entry(x, y, c, s, index, width, height, reach):
-    """Where a ray from (x, y) along (c, s) enters the cell in which it ended, in cells; `reach` on the rim of the
-    map."""
-    i, j = np.divmod(index, width)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        tx = np.where(c != 0, (j + (c < 0) - x) / c, -np.inf)
-        ty = np.where(s != 0, (i + (s < 0) - y) / s, -np.inf)
-    rim = (i == 0) | (j == 0) | (i == height - 1) | (j == width - 1)
-    return np.where(rim, reach, np.maximum(np.maximum(tx, ty), 0))
-
-
-class RangeTable:
-    """Ranges computed in advance: for each cell and each of `n_angles` directions, from the middle of the cell.
-
-    A look-up takes the place of the tracing, some thirty times faster, at the price of memory (`nbytes`) and of
-    rounding the
-    direction: 3 deg at 120 angles, so 2.6 cells across at 100 cells' distance. Good enough for a filter with a wide
-    sigma.
-    """
-
-    def __init__(self, grid, r_max, n_angles=120):
-        self.grid, self.r_max, self.n_angles = grid, as_positive_number(r_max, "r_max"), as_count(n_angles, "n_angles")
-        height, width = grid.cells.shape
-        table = np.zeros((height, width, self.n_angles), dtype=np.float32)
-        i, j = np.nonzero(~grid.occupied)
-        poses = np.column_stack([grid.center_of(i, j), np.zeros(len(i))])
-        table[i, j] = cast_rays(grid, poses, np.arange(self.n_angles) * (2 * np.pi / self.n_angles), self.r_max)
-        self.table = table
-
-    @property
-    def nbytes(self):
-        """Size of the table in bytes."""
-        return self.table.nbytes
-
-    def cast(self, poses, bearings, r_max=None):
-        """As `cast_rays`, looked up; `r_max` may shorten the range the table was made for."""
-        poses, bearings = as_points(poses, "poses"), as_shape(bearings, "bearings", "B")
-        flat = poses.reshape(-1, 3)
-        i, j = self.grid.cell_of(flat[:, :2])
-        height, width = self.grid.cells.shape
-        inside = (i >= 0) & (i < height) & (j >= 0) & (j < width)
-        cell = np.where(inside, i * width + j, 0) * self.n_angles
-        turn = self.n_angles / (2 * np.pi)
-        theta, beam = (np.remainder(angle * turn, self.n_angles).astype(np.float32) for angle in (flat[:, 2], bearings))
-        k = (theta[:, None] + (beam + np.float32(0.5))).astype(np.int32)  # 0 to 2 n_angles: two turns too far at most
-        for _ in range(2):
-            np.subtract(k, self.n_angles, out=k, where=k >= self.n_angles)
-        ranges = self.table.ravel().take(k + cell[:, None])
-        ranges[~inside] = self.r_max
-        if r_max is not None:
-            np.minimum(ranges, as_positive_number(r_max, "r_max"), out=ranges)
-        return ranges.reshape(*poses.shape[:-1], len(bearings))
+    return poses, bearings, as_positive_number(r_max, "r_max")

@@ -1,37 +1,150 @@
 """Monte-Carlo localization: the filter that moves, weighs and redraws a cloud of poses, and recovers from kidnapping.
 
+When to redraw, where random poses come from and how many particles to keep are small objects, put together by whoever
+makes the filter.
 Source: lecture "Lokalisierung", "Monte-Carlo-Lokalisierung".
 """
 
+import functools
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from ..checks import as_number, as_points, shown
+from ..checks import as_count, as_number, as_points, shown
 from .particles import (
     effective_size,
     estimate_mode,
-    kld_take,
     normalize_weights,
     resample_systematic,
-    sample_motion,
+    should_resample,
     uniform_states,
 )
 
-MIN_INJECTED = 0.1  # with recovery some random poses always look around: a wrong place may fit fairly well
-MAX_INJECTED = 0.5  # share of the cloud that one step may replace: the rest must be able to hold on to what is right
+SPREAD_ABOUT_START = (0.2, 0.2, 0.1)  # m, m, rad: standard deviations of a first cloud about a known pose
+
+# --- when to resample ------------------------------------------------------------------------------------------------
 
 
-# --- recovery and the number of particles ----------------------------------------------------------------------------
+@dataclass(frozen=True, eq=False)
+class Policy:
+    """When to resample. Policies combine: `a & b` resamples when both say so, `a | b` when either does.
+
+    Between two resamplings the weights multiply up.
+
+    Parameters
+    ----------
+    rule : function (step, weights) -> bool
+        step: number of the step, from 1 on. weights: shape (M,), of any sum.
+
+    See Also
+    --------
+    every, when_effective_below
+    """
+
+    rule: object
+
+    def __call__(self, step, weights):
+        return bool(self.rule(step, weights))
+
+    def __and__(self, other):
+        return Policy(lambda step, weights: self(step, weights) and other(step, weights))
+
+    def __or__(self, other):
+        return Policy(lambda step, weights: self(step, weights) or other(step, weights))
+
+
+def every(n):
+    """Resample in every n-th step; every(1) is the lecture's plain algorithm.
+
+    Parameters
+    ----------
+    n : int
+        At least 1.
+
+    Returns
+    -------
+    Policy
+
+    Source: lecture, "Diversitaet der Partikelmenge".
+    """
+    n = as_count(n, "n")
+    return Policy(lambda step, weights: step % n == 0)
+
+
+def when_effective_below(share):
+    """Resample when the effective size has fallen below this share of the number of particles.
+
+    Parameters
+    ----------
+    share : float
+        0 never resamples.
+
+    Returns
+    -------
+    Policy
+
+    See Also
+    --------
+    particles.should_resample
+
+    Source: lecture, "Diversitaet der Partikelmenge": resample only when the variance of the weights is high.
+    """
+    share = as_number(share, "share")
+    return Policy(lambda step, weights: should_resample(weights, share))
+
+
+@dataclass(frozen=True, eq=False)
+class Resampling:
+    """When and how a filter redraws its cloud.
+
+    Parameters
+    ----------
+    when : Policy
+    draw : function (weights, rng, size) -> indices
+        `resample_systematic` or `resample_roulette`.
+    """
+
+    when: Policy = when_effective_below(0.5)
+    draw: object = resample_systematic
+
+
+# --- recovery --------------------------------------------------------------------------------------------------------
+
+
+class Recovered(NamedTuple):
+    """Share of particles to replace by random poses, and both averages brought up to date."""
+
+    share: float
+    w_slow: float
+    w_fast: float
 
 
 def recover(w_mean, w_slow, w_fast, alpha_slow=0.02, alpha_fast=0.3):
-    """Share of particles to replace by random poses, and both averages brought up to date: (share, w_slow, w_fast).
+    """How many random poses a fall of the mean weight asks for: max(0, 1 - w_fast / w_slow).
 
     Two exponential averages follow the mean weight of the cloud, a slow and a fast one. When the fast one has dropped
-    below the slow one, the measurements have stopped to fit: share = max(0, 1 - w_fast / w_slow). Start both averages
-    with the first mean weight. Source: beyond the lecture, which names the kidnapped robot problem only (augmented
-    MCL).
+    below the slow one, the measurements have ceased to fit. Start both with the first mean weight.
+
+    Parameters
+    ----------
+    w_mean : float
+        Mean weight of the cloud by the newest measurement.
+    w_slow, w_fast : float
+        Both averages before it.
+    alpha_slow, alpha_fast : float
+        The share of its distance from w_mean that each average moves, 0 <= alpha_slow < alpha_fast <= 1.
+
+    Returns
+    -------
+    Recovered
+
+    Raises
+    ------
+    ValueError
+        When the two alphas are out of order or out of range.
+
+    Source: beyond the lecture, which names the kidnapped robot problem only (augmented MCL).
     """
     names = ("w_mean", "w_slow", "w_fast", "alpha_slow", "alpha_fast")
     w_mean, w_slow, w_fast, alpha_slow, alpha_fast = map(
@@ -43,162 +156,260 @@ def recover(w_mean, w_slow, w_fast, alpha_slow=0.02, alpha_fast=0.3):
         )
     w_slow = w_slow + alpha_slow * (w_mean - w_slow)
     w_fast = w_fast + alpha_fast * (w_mean - w_fast)
-    return (max(0.0, 1.0 - w_fast / w_slow) if w_slow > 0 else 0.0), w_slow, w_fast
+    return Recovered(max(0.0, 1.0 - w_fast / w_slow) if w_slow > 0 else 0.0, w_slow, w_fast)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class Recovery:
+    """Random poses for a filter that may be lost: where they come from, and how many of them.
+
+    Parameters
+    ----------
+    draw : function (n, rng) -> states, shape (n, 3)
+        For example `functools.partial(uniform_states, grid)`.
+    least, most : float
+        Limits of the share of the cloud that one resampling replaces, 0 <= least <= most <= 1. The least look around
+        always, since a wrong place may fit fairly well; the rest of the cloud holds on to what is right.
+    alpha_slow, alpha_fast : float
+        As for `recover`.
+    """
+
+    draw: object
+    least: float = 0.3
+    most: float = 0.5
+    alpha_slow: float = 0.02
+    alpha_fast: float = 0.3
+
+    def __post_init__(self):
+        least, most = as_number(self.least, "least"), as_number(self.most, "most")
+        if not 0 <= least <= most <= 1:
+            raise ValueError(f"least must not be above most, both from 0 to 1, got {shown(least)} and {shown(most)}")
+
+    def watch(self, mean_weight, averages):
+        """`recover` for a filter: averages, a `Recovered` or None before the first measurement."""
+        w_slow, w_fast = (mean_weight, mean_weight) if averages is None else averages[1:]
+        return recover(mean_weight, w_slow, w_fast, self.alpha_slow, self.alpha_fast)
+
+    def count(self, asked, n):
+        """How many of n particles to replace when the averages ask for the share `asked`."""
+        return round(min(max(asked, self.least), self.most) * n)
+
+
+# --- the filter ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
 class StepReport:
     """What one step of the filter did.
 
-    n_particles; effective: effective size before resampling; resampled: whether it was; injected: random poses put in;
-    w_mean: mean weight (1 = every particle fits perfectly); all_zero: no particle explained the scan, so it was not
-    used.
+    Attributes
+    ----------
+    states, weights : arrays, shapes (M, 3) and (M,)
+        The cloud after motion and measurement, before resampling; the weights add up to 1.
+    resampled : bool
+    injected : int
+        Random poses put in.
+    mean_weight : float or None
+        1 when every particle fits perfectly; None when nothing was measured.
+    all_zero : bool
+        No particle explained the measurement, so it was not used.
     """
 
-    n_particles: int
-    effective: float
+    states: np.ndarray
+    weights: np.ndarray
     resampled: bool
     injected: int
-    w_mean: float
+    mean_weight: float
     all_zero: bool
+
+    @property
+    def n_particles(self):
+        """Number of particles before resampling."""
+        return len(self.states)
+
+    @functools.cached_property
+    def effective(self):
+        """Effective size before resampling."""
+        return effective_size(self.weights)
+
+    @functools.cached_property
+    def estimate(self):
+        """`Estimate` by the heaviest cluster before resampling."""
+        return estimate_mode(self.states, self.weights)
 
 
 class MonteCarloLocalizer:
-    """The lecture's MCL with its options: when and how to resample, recovery, and a number of particles that adapts.
+    """The lecture's Monte-Carlo localization: move, weigh, redraw.
 
     Parameters
     ----------
     states : array-like, shape (M, 3)
         The first cloud: about a known pose (local) or `uniform_states` (global localization).
-    resample : function (weights, rng, size) -> indices
-        `resample_systematic` or `resample_roulette`.
-    threshold : float
-        Resample when the effective size is below this share of M: 1 resamples always, 0 never. In between the
-        weights multiply up.
-    every : int
-        Resample in every `every`-th step at most (the lecture's N).
-    exponent : float
-        The log weights are multiplied by it. Neighboring beams share their errors: 60 of them do not know 60 times
-        as much as one.
-    draw : function (n, rng) -> states, optional
-        Where recovery takes random poses from, for at most half of the cloud a step; without it there is no recovery.
-    recovery : (alpha_slow, alpha_fast)
-    kld : dict, optional
-        Options of `kld_take`, with which each resampling chooses the number of particles, up to the first cloud's.
     motion : function (states, u, dt, rng) -> states
+        For example `particles.odometry_motion(...)`.
+    resampling : Resampling
+    recovery : Recovery, optional
+        Without it no random poses come in. With it they take the places of redrawn particles, in steps that resample
+        and have measured something; when the averages have asked for them, both start over, as the new poses change
+        the mean weight by themselves.
+    adaptive : particles.KldSampling, optional
+        Lets each resampling choose the number of particles, up to M.
+
+    Attributes
+    ----------
+    states : array, shape (M, 3)
+    weights : array, shape (M,), normalized
+
+    Source: lecture, "Monte-Carlo-Lokalisierung"; recovery and adaptive number are beyond it.
     """
 
-    def __init__(
-        self,
-        states,
-        resample=resample_systematic,
-        threshold=0.5,
-        every=1,
-        exponent=1.0,
-        draw=None,
-        recovery=(0.02, 0.3),
-        kld=None,
-        motion=sample_motion,
-    ):
+    def __init__(self, states, motion, resampling=Resampling(), recovery=None, adaptive=None):
         self.states = as_points(states, "states").reshape(-1, 3).copy()
+        self.motion, self.resampling, self.recovery, self.adaptive = motion, resampling, recovery, adaptive
         self.n_max = len(self.states)
-        self.log_weights = np.zeros(self.n_max)
-        self.resample, self.threshold, self.every, self.exponent = resample, threshold, every, exponent
-        self.draw, self.recovery, self.kld, self.motion = draw, recovery, kld, motion
-        self.averages = None
-        self.count = 0
+        self._log_weights = np.zeros(self.n_max)
+        self._averages = None
+        self._step = 0
 
     @property
     def weights(self):
-        """Normalized weights (M,)."""
-        return normalize_weights(self.log_weights)
+        """Normalized weights, shape (M,)."""
+        return normalize_weights(self._log_weights)
 
     def estimate(self):
-        """Pose and covariance of the heaviest cluster."""
+        """`Estimate` by the heaviest cluster."""
         return estimate_mode(self.states, self.weights)
 
-    def step(self, u, dt, weigh, rng):
-        """Move by u for dt, weigh by a `Weighting` (or None when nothing was measured), and resample if it is time;
-        a `Step`."""
+    def step(self, u, dt, weighting, rng):
+        """Move, weigh, and resample if it is time.
+
+        Parameters
+        ----------
+        u : array-like, shape (2,)
+            v (m/s) and omega (rad/s), as odometry reports them.
+        dt : float
+            Time step (s).
+        weighting : sensors.Weighting or None
+            None when nothing was measured.
+        rng : numpy.random.Generator
+
+        Returns
+        -------
+        StepReport
+        """
         self.states = self.motion(self.states, u, dt, rng)
-        return self.correct(weigh, rng)
+        return self.correct(weighting, rng)
 
-    def correct(self, weigh, rng):
-        """Weigh and resample without moving."""
-        self.count += 1
-        share, w_mean, all_zero = 0.0, 1.0, False
-        if weigh is not None:
-            log_w = self.exponent * (weigh(self.states) - weigh.best)
-            all_zero = bool((self.log_weights + log_w == -np.inf).all())
-            w_mean = float((self.weights * np.exp(log_w)).sum())
-            if not all_zero:
-                self.log_weights = self.log_weights + log_w
-                self.log_weights -= self.log_weights.max()
-            if self.draw is not None:
-                slow, fast = self.averages or (w_mean, w_mean)
-                share, *self.averages = recover(w_mean, slow, fast, *self.recovery)
-        effective = effective_size(self.weights)
-        due = self.count % self.every == 0 and effective < self.threshold * len(self.states)
-        share = float(np.clip(share, MIN_INJECTED, MAX_INJECTED)) if self.draw is not None else 0.0
-        due = due or share > 0 or self.threshold >= 1 and self.count % self.every == 0
-        injected = self._redraw(share, rng) if due else 0
-        return StepReport(len(self.states), effective, due, injected, w_mean, all_zero)
+    def correct(self, weighting, rng):
+        """The `StepReport` of a step without motion."""
+        self._step += 1
+        mean_weight, all_zero = (None, False) if weighting is None else self._weigh(weighting)
+        states, weights = self.states, self.weights
+        due = self.resampling.when(self._step, weights)
+        if due:
+            self._redraw(weights, rng)
+        injected = self._inject(rng) if due and mean_weight is not None and self.recovery is not None else 0
+        return StepReport(states, weights, due, injected, mean_weight, all_zero)
 
-    def _redraw(self, share, rng):
-        """Resample, then put random poses in place of a share; how many. They come after the count of KLD sampling:
-        strewn over the whole building they would ask for all particles in every step."""
-        size = self.n_max if self.kld is not None else len(self.states)
-        chosen = self.states[self.resample(self.weights, rng, size)]
-        if self.kld is not None:
-            chosen = rng.permutation(chosen)
-            chosen = chosen[: kld_take(chosen, **self.kld)]
-        injected = int(round(share * len(chosen)))
-        if injected:
-            place = rng.choice(len(chosen), injected, replace=False)
-            chosen[place] = self.draw(injected, rng)
-        self.states, self.log_weights = chosen, np.zeros(len(chosen))
-        return injected
+    def resize(self, n_particles, rng):
+        """Go on with another number of particles, drawn from this cloud."""
+        self.n_max = as_count(n_particles, "n_particles")
+        self.states = self.states[self.resampling.draw(self.weights, rng, self.n_max)]
+        self._log_weights = np.zeros(self.n_max)
+
+    def _weigh(self, weighting):
+        """Multiply the weights by the measurement's, unless all would be zero; the measurement's mean, and whether."""
+        log_w = weighting(self.states) - weighting.best
+        mean_weight = float(self.weights @ np.exp(log_w))
+        product = self._log_weights + log_w
+        all_zero = bool((product == -np.inf).all())
+        if not all_zero:
+            self._log_weights = product - product.max()
+        if self.recovery is not None:
+            self._averages = self.recovery.watch(mean_weight, self._averages)
+        return mean_weight, all_zero
+
+    def _redraw(self, weights, rng):
+        if self.adaptive is None:
+            self.states = self.states[self.resampling.draw(weights, rng, len(weights))]
+        else:
+            drawn = rng.permutation(self.states[self.resampling.draw(weights, rng, self.n_max)])
+            self.states = drawn[: self.adaptive.enough(drawn)]
+        self._log_weights = np.zeros(len(self.states))
+
+    def _inject(self, rng):
+        """Put random poses in place of redrawn ones; how many. They come after the count of `adaptive`: strewn over
+        the whole building they would ask for all particles in every step."""
+        asked = self._averages.share
+        n = self.recovery.count(asked, len(self.states))
+        self.states[rng.choice(len(self.states), n, replace=False)] = self.recovery.draw(n, rng)
+        if asked > self.recovery.least:
+            self._averages = None
+        return n
 
 
-# Shares of the log weights that each model contributes, found by the success rates in tests/bench/mcl_success.py
-EXPONENTS = {"landmarks": 0.3, "beams": 0.1, "likelihood field": 0.06}
+def localizer(grid, motion, n_particles, rng, start=None, recovery=True, **options):
+    """A `MonteCarloLocalizer` spread over a map, or about a known pose.
 
+    Parameters
+    ----------
+    grid : maps.OccupancyGrid
+    motion : function (states, u, dt, rng) -> states
+    n_particles : int
+    rng : numpy.random.Generator
+    start : array-like, shape (3,), optional
+        A known pose (m, m, rad): local localization. When not given, global.
+    recovery : bool
+        Whether random poses from all over the map may come in.
+    **options
+        Further arguments of `MonteCarloLocalizer`.
 
-def localizer(building, model, n_particles, rng, start=None, recovery=True, **options):
-    """A `MonteCarloLocalizer` with the settings of the success rates; spread over the building, or about a pose
-    `start`.
+    Returns
+    -------
+    MonteCarloLocalizer
     """
     if start is None:
-        states = uniform_states(building.grid, n_particles, rng)
+        states = uniform_states(grid, n_particles, rng)
     else:
-        states = as_points(start, "start") + rng.standard_normal((n_particles, 3)) * [0.2, 0.2, 0.1]
-    draw = (lambda n, rng: uniform_states(building.grid, n, rng)) if recovery else None
-    options = {"exponent": EXPONENTS[model], "draw": draw, **options}
-    return MonteCarloLocalizer(states, **options)
+        states = as_points(start, "start") + rng.standard_normal((n_particles, 3)) * SPREAD_ABOUT_START
+    policy = Recovery(functools.partial(uniform_states, grid)) if recovery else None
+    return MonteCarloLocalizer(states, motion, recovery=policy, **options)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Picture:
-    """One moment of a recorded run: cloud and weights before resampling, true pose, estimate, what the filter did."""
+    """One moment of a recorded run: the true pose, shape (3,), and the filter's `StepReport`."""
 
-    states: np.ndarray
-    weights: np.ndarray
     truth: np.ndarray
-    estimate: np.ndarray
     step: StepReport
+
+    @property
+    def states(self):
+        """The cloud before resampling, shape (M, 3)."""
+        return self.step.states
+
+    @property
+    def estimate(self):
+        """The estimated pose, shape (3,)."""
+        return self.step.estimate.pose
 
 
 def record(filter_, drive, measure, rng):
     """Run a filter along a drive and keep a `Picture` of each step.
 
-    measure: function (pose, k) -> Weighting or None, the measurement at the true pose after step k.
+    Parameters
+    ----------
+    filter_ : MonteCarloLocalizer
+    drive : drives.Drive
+    measure : function (pose, k) -> Weighting or None
+        The measurement at the true pose after step k.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    list of Picture
     """
-    pictures = []
-    for k, (u, pose) in enumerate(zip(drive.controls, drive.truth[1:])):
-        filter_.states = filter_.motion(filter_.states, u, drive.dt, rng)
-        weigh, before = measure(pose, k), filter_.states
-        log_w = filter_.log_weights + (0 if weigh is None else filter_.exponent * (weigh(before) - weigh.best))
-        weights = normalize_weights(log_w) if np.isfinite(log_w).any() else filter_.weights
-        step = filter_.correct(weigh, rng)
-        pictures.append(Picture(before, weights, pose, estimate_mode(before, weights).pose, step))
-    return pictures
+    return [
+        Picture(pose, filter_.step(u, drive.dt, measure(pose, k), rng))
+        for k, (u, pose) in enumerate(zip(drive.controls, drive.truth[1:]))
+    ]

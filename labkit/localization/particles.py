@@ -23,39 +23,71 @@ from ..checks import (
 from ..geometry.planar import wrap_angle
 from . import odometry
 
-CONTROL_NOISE = {  # variances per way as the lecture prints them: (5 cm)^2 per m, (5 deg)^2 per turn, (2 deg)^2 per m
-    "k_d": 0.05**2 / 1.0,
-    "k_theta": math.radians(5.0) ** 2 / math.radians(360.0),
-    "k_drift": math.radians(2.0) ** 2 / 1.0,
-}
 _BIN_TURN, _MODE_TURN = math.radians(15), math.radians(30)
 
+# --- motion ----------------------------------------------------------------------------------------------------------
 
-def sample_motion(states, u, dt, rng, cov_u=None, model="midpoint"):
+
+def sample_motion(states, u, dt, rng, cov_u, model="midpoint"):
     """Each particle moved by its own noisy copy of the control.
 
     Parameters
     ----------
-    states : array-like, shape (M, 3)
+    states : array-like, shape (..., 3)
+        x, y, theta (m, m, rad).
     u : array-like, shape (2,)
         v (m/s) and omega (rad/s).
     dt : float
         Time step (s).
     rng : numpy.random.Generator
-    cov_u : array-like, shape (2, 2), optional
-        Covariance of the control; by default `control_covariance` with the lecture's constants, so a standing
-        robot's cloud stands still.
+    cov_u : array-like, shape (2, 2)
+        Covariance of the control, (m/s)^2 and (rad/s)^2.
     model : str
-        One of chapter 7's motion models: "euler", "midpoint", "arc".
+        One of `odometry.MODELS`.
+
+    Returns
+    -------
+    array, shape (..., 3)
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, a negative variance, a time step that is not positive, an unknown model.
+
+    See Also
+    --------
+    odometry_motion
 
     Source: lecture, "Bewegungsmodell": noise of covariance Sigma_u is added to the control, then f is applied.
     """
-    states, u = as_points(states, "states"), as_points(u, "u", dim=2)
-    cov_u = odometry.control_covariance(u, dt, **CONTROL_NOISE) if cov_u is None else as_covariances(cov_u, "cov_u", 2)
+    states, u, cov_u = as_points(states, "states"), as_points(u, "u", dim=2), as_covariances(cov_u, "cov_u", 2)
     if u.shape != (2,) or cov_u.shape != (2, 2):
         raise ValueError(f"u and cov_u must have shapes (2,) and (2, 2), got {u.shape} and {cov_u.shape}")
     noise = rng.standard_normal((*states.shape[:-1], 2)) @ _root(cov_u).T
     return odometry.step(states, u + noise, dt, model)
+
+
+def odometry_motion(k_d, k_theta, k_drift, model="midpoint"):
+    """The motion of particles whose controls are as uncertain as odometry says; a standing cloud stands still.
+
+    Parameters
+    ----------
+    k_d, k_theta, k_drift : float
+        Variances per way (m^2/m, rad^2/rad, rad^2/m), as for `odometry.control_covariance`.
+    model : str
+        One of `odometry.MODELS`.
+
+    Returns
+    -------
+    function (states, u, dt, rng) -> states
+
+    Source: lecture, "Fehlermodell fuer Steuerbefehl (1) to (3)".
+    """
+
+    def motion(states, u, dt, rng):
+        return sample_motion(states, u, dt, rng, odometry.control_covariance(u, dt, k_d, k_theta, k_drift), model)
+
+    return motion
 
 
 def _root(cov):
@@ -70,9 +102,21 @@ def _root(cov):
 
 
 def normalize_weights(log_weights):
-    """Weights that add up to 1 from their logarithms, (M,); the largest is subtracted first, so that it becomes exp(0).
+    """Weights that add up to 1; the largest logarithm is subtracted first, so that it becomes exp(0).
 
-    Raises ValueError when every weight is zero (all logarithms -inf): no particle explains the measurement.
+    Parameters
+    ----------
+    log_weights : array-like, shape (M,)
+        Numbers or -inf.
+
+    Returns
+    -------
+    array, shape (M,)
+
+    Raises
+    ------
+    ValueError
+        When every weight is zero (all logarithms -inf): no particle explains the measurement.
     """
     log_weights = as_floats(log_weights, "log_weights")
     if log_weights.ndim != 1 or not log_weights.size or np.isnan(log_weights).any() or (log_weights == np.inf).any():
@@ -84,7 +128,8 @@ def normalize_weights(log_weights):
     return weights / weights.sum()
 
 
-def _as_weights(weights):
+def as_weights(weights):
+    """`weights` as a vector (M,) of floats, at least 0 and not all 0; refuses what cannot be added up."""
     weights = as_finite(weights, "weights")
     if weights.ndim != 1 or not weights.size:
         raise ValueError(f"weights must be a vector (M,), got shape {weights.shape}")
@@ -100,38 +145,87 @@ def _as_weights(weights):
 def resample_roulette(weights, rng, size=None):
     """Indices drawn independently with probability w / sum(w): one spin of the wheel per particle, O(M log M).
 
-    weights: (M,), at least 0, of any sum. size: number of draws, M by default. The indices come in rising order:
-    sorted spins find their interval several times faster, as the search stays in the cache.
+    Parameters
+    ----------
+    weights : array-like, shape (M,)
+        At least 0, of any sum.
+    rng : numpy.random.Generator
+    size : int, optional
+        Number of draws, M when not given.
+
+    Returns
+    -------
+    array of int, shape (size,)
+        In rising order: sorted spins find their interval several times faster, as the search stays in the cache.
+
+    Raises
+    ------
+    ValueError
+        A negative weight, or no weight above 0.
+
     Source: lecture, "Resampling mit Roulette-Rad-Verfahren".
     """
-    weights = _as_weights(weights)
-    ends = np.cumsum(weights)
-    spins = np.sort(rng.random(len(weights) if size is None else as_count(size, "size", at_least=0))) * ends[-1]
-    last = np.searchsorted(ends, ends[-1])  # a spin may round up to the full circle
-    return np.minimum(np.searchsorted(ends, spins, side="right"), last)
+    weights = as_weights(weights)
+    spins = np.sort(rng.random(len(weights) if size is None else as_count(size, "size", at_least=0)))
+    return _pointed_at(weights, spins)
 
 
 def resample_systematic(weights, rng, size=None):
     """Indices by one turn of a wheel with evenly spaced spokes: O(M), and equal weights give every particle once.
 
-    A particle of weight w is drawn either floor(M w / W) or ceil(M w / W) times. weights, size: as for
-    `resample_roulette`.
+    A particle of weight w is drawn either floor(M w / W) or ceil(M w / W) times.
+
+    Parameters
+    ----------
+    weights, rng, size
+        As for `resample_roulette`.
+
+    Returns
+    -------
+    array of int, shape (size,), in rising order
+
+    Raises
+    ------
+    ValueError
+        A negative weight, or no weight above 0.
+
+    See Also
+    --------
+    labkit.fast.particles.resample_systematic : the same without a search
+
     Source: lecture, "Resampling mit Speichenrad-Verfahren".
     """
-    weights = _as_weights(weights)
+    weights = as_weights(weights)
     size = len(weights) if size is None else as_count(size, "size", at_least=0)
+    return _pointed_at(weights, (np.arange(size) + rng.random()) / max(size, 1))
+
+
+def _pointed_at(weights, places):
+    """The particles whose sectors hold these places of the wheel, 0 <= place < 1; none of weight zero."""
     ends = np.cumsum(weights)
-    ends *= size / ends[-1]
-    full = ends >= ends[-1]
-    ends -= rng.random()
-    spokes = np.ceil(ends, out=ends).astype(np.intp)  # how many spokes point at this particle or an earlier one
-    spokes[full] = size
-    return np.repeat(np.arange(len(weights)), np.diff(spokes, prepend=0))
+    last = np.searchsorted(ends, ends[-1])  # a place may round up to the full circle
+    return np.minimum(np.searchsorted(ends, places * ends[-1], side="right"), last)
 
 
 def effective_size(weights):
-    """sum(w)^2 / sum(w^2): M for equal weights, 1 when one particle has them all."""
-    weights = _as_weights(weights)
+    """How many equal weights these weights are worth: sum(w)^2 / sum(w^2).
+
+    Parameters
+    ----------
+    weights : array-like, shape (M,)
+        At least 0, of any sum.
+
+    Returns
+    -------
+    float
+        M for equal weights, 1 when one particle has them all.
+
+    Raises
+    ------
+    ValueError
+        A negative weight, or no weight above 0.
+    """
+    weights = as_weights(weights)
     weights = weights / weights.max()  # else the squares of tiny or huge weights leave the range of a float
     return float(weights.sum() ** 2 / np.square(weights).sum())
 
@@ -139,16 +233,35 @@ def effective_size(weights):
 def should_resample(weights, threshold=0.5):
     """True when the effective size has fallen below `threshold` times the number of particles.
 
-    Source: lecture, "Diversitaet der Partikelmenge": resample only when the variance of the weights is high. For
-    weights w of mean 1,
-    M / effective_size = 1 + variance(w): the same rule in other words.
+    The lecture says it in other words: for weights w of mean 1, M / effective_size = 1 + variance(w).
+
+    Parameters
+    ----------
+    weights : array-like, shape (M,)
+    threshold : float
+
+    Returns
+    -------
+    bool
+
+    Source: lecture, "Diversitaet der Partikelmenge": resample only when the variance of the weights is high.
     """
     return effective_size(weights) < as_number(threshold, "threshold") * len(weights)
 
 
 def count_ancestors(resample, n_particles, n_steps, rng):
-    """How many of the first particles survive when a standing robot resamples equal weights again and again:
-    (n_steps + 1,)."""
+    """How many of the first particles survive when a standing robot resamples equal weights again and again.
+
+    Parameters
+    ----------
+    resample : function (weights, rng) -> indices
+    n_particles, n_steps : int
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    array of int, shape (n_steps + 1,)
+    """
     n_particles, n_steps = as_count(n_particles, "n_particles"), as_count(n_steps, "n_steps", at_least=0)
     names, weights = np.arange(n_particles), np.full(n_particles, 1.0 / n_particles)
     left = [n_particles]
@@ -163,16 +276,33 @@ def count_ancestors(resample, n_particles, n_steps, rng):
 
 def _weights_of(states, weights):
     """Weights of as many states, all 1 when not given."""
-    weights = np.ones(len(states)) if weights is None else _as_weights(weights)
+    weights = np.ones(len(states)) if weights is None else as_weights(weights)
     if len(weights) != len(states) or not len(states):
-        raise ValueError(f"there must be one weight a state and at least one state, got {len(weights)}, {len(states)}")
+        raise ValueError(
+            f"there must be one weight per state and at least one state, got {len(weights)}, {len(states)}"
+        )
     return weights
 
 
 def circular_mean(angles, weights=None):
-    """Mean direction (rad, in [-pi, pi)): the angle of the weighted mean of the unit vectors (cos, sin).
+    """Mean direction: the angle of the weighted mean of the unit vectors (cos, sin).
 
-    Raises ValueError when the vectors cancel: then no direction is the mean.
+    Parameters
+    ----------
+    angles : array-like, shape (M,)
+        rad.
+    weights : array-like, shape (M,), optional
+        All 1 when not given.
+
+    Returns
+    -------
+    float
+        rad, within [-pi, pi].
+
+    Raises
+    ------
+    ValueError
+        When the vectors cancel: then no direction is the mean.
     """
     angles = as_shape(angles, "angles", "M")
     weights = _weights_of(angles, weights)
@@ -186,9 +316,19 @@ def _mean_vector(angles, weights):
     return weights @ np.cos(angles), weights @ np.sin(angles)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Estimate:
-    """What a cloud says: pose (3,), covariance (3, 3) and the share of the weight that it rests on."""
+    """What a cloud says.
+
+    Attributes
+    ----------
+    pose : array, shape (3,)
+        x, y, theta (m, m, rad).
+    covariance : array, shape (3, 3)
+        Of x, y, theta.
+    share : float
+        The share of the weight that the pose rests on.
+    """
 
     pose: np.ndarray
     covariance: np.ndarray
@@ -196,8 +336,28 @@ class Estimate:
 
 
 def estimate(states, weights=None):
-    """Mean pose and covariance of the whole cloud; the heading is averaged on the circle. Misleading for a cloud
-    with two modes."""
+    """Mean pose and covariance of the whole cloud; misleading for a cloud with two modes.
+
+    Parameters
+    ----------
+    states : array-like, shape (M, 3)
+    weights : array-like, shape (M,), optional
+        All 1 when not given.
+
+    Returns
+    -------
+    Estimate
+        The heading is averaged on the circle; where the headings cancel it is 0.
+
+    Raises
+    ------
+    ValueError
+        No state, or not one weight per state.
+
+    See Also
+    --------
+    estimate_mode, circular_mean
+    """
     states = as_points(states, "states").reshape(-1, 3)
     weights = _weights_of(states, weights)
     w = weights / weights.sum()
@@ -211,9 +371,25 @@ def estimate(states, weights=None):
 
 
 def estimate_mode(states, weights=None, cell=0.5, turn=_MODE_TURN):
-    """Mean of the heaviest cluster alone: the heaviest bin of `cell` m and `turn` rad, with its neighbors.
+    """Mean of the heaviest cluster alone: what lies near the middle of the heaviest bin.
 
     For a cloud with two modes the mean of all lies between them, maybe in a wall; this one lies in the better mode.
+
+    Parameters
+    ----------
+    states : array-like, shape (M, 3)
+    weights : array-like, shape (M,), optional
+        All 1 when not given.
+    cell, turn : float
+        Size of the bins (m, rad).
+
+    Returns
+    -------
+    Estimate
+
+    See Also
+    --------
+    estimate, pose_bins
     """
     states = as_points(states, "states").reshape(-1, 3)
     weights = _weights_of(states, weights)
@@ -226,20 +402,51 @@ def estimate_mode(states, weights=None, cell=0.5, turn=_MODE_TURN):
     return Estimate(part.pose, part.covariance, float(weights[near].sum() / weights.sum()))
 
 
+# --- how many particles ----------------------------------------------------------------------------------------------
+
+
 def pose_bins(states, cell=0.5, turn=_BIN_TURN):
-    """One whole number for each pose, (M, 3) -> (M,), equal for poses in the same bin of `cell` m and `turn` rad."""
+    """One whole number per pose, equal for poses in the same bin.
+
+    Parameters
+    ----------
+    states : array-like, shape (..., 3)
+    cell, turn : float
+        Size of the bins (m, rad).
+
+    Returns
+    -------
+    array of int, shape (...)
+    """
     states, cell, turn = as_points(states, "states"), as_positive_number(cell, "cell"), as_positive_number(turn, "turn")
     i, j = np.floor(states[..., 0] / cell).astype(np.int64), np.floor(states[..., 1] / cell).astype(np.int64)
-    k = np.floor((states[..., 2] % (2 * np.pi)) / turn).astype(np.int64)
+    heading = states[..., 2] % (2 * np.pi) % (2 * np.pi)  # the remainder of -1e-17 is a whole turn; its own is 0
+    k = np.floor(heading / turn).astype(np.int64)
     return (i << 40) + (j << 16) + k
 
 
 def kld_size(n_bins, epsilon=0.05, quantile=2.326):
-    """Particles needed so that, with the probability of the normal `quantile`, the Kullback-Leibler error stays
-    below epsilon.
+    """Particles needed so that the Kullback-Leibler error stays below epsilon.
 
-    n_bins: number of bins the cloud occupies (any shape). The chi-square quantile is Wilson and Hilferty's
-    approximation.
+    Parameters
+    ----------
+    n_bins : array-like, any shape
+        Number of bins the cloud occupies.
+    epsilon : float
+    quantile : float
+        Normal quantile of the probability with which it does; 2.326 is 99 %.
+
+    Returns
+    -------
+    array, shape of n_bins
+        With Wilson and Hilferty's approximation of the chi-square quantile.
+
+    Raises
+    ------
+    ValueError
+        epsilon is not positive.
+
+    Source: beyond the lecture (KLD sampling).
     """
     n_bins, quantile = as_finite(n_bins, "n_bins"), as_number(quantile, "quantile")
     epsilon = as_positive_number(epsilon, "epsilon")
@@ -249,20 +456,58 @@ def kld_size(n_bins, epsilon=0.05, quantile=2.326):
     return np.where(n_bins > 1, size, 1.0)
 
 
-def kld_take(states, n_min=100, epsilon=0.05, quantile=2.326, cell=0.5, turn=_BIN_TURN):
-    """How many of randomly ordered particles (M, 3) are enough: the first n with n >= kld_size(bins among the first
-    n)."""
-    bins, n_min = pose_bins(as_shape(states, "states", "M", 3), cell, turn), as_count(n_min, "n_min", at_least=0)
-    _, first = np.unique(bins, return_index=True)
-    is_new = np.zeros(len(bins), dtype=int)
-    is_new[first] = 1
-    n = np.arange(1, len(bins) + 1)
-    enough = n >= np.maximum(kld_size(np.cumsum(is_new), epsilon, quantile), n_min)
-    return int(np.argmax(enough)) + 1 if enough.any() else len(bins)
+@dataclass(frozen=True, eq=False)
+class KldSampling:
+    """A number of particles that adapts: as many as the bins that the cloud occupies ask for.
+
+    Parameters
+    ----------
+    n_min : int
+        Never fewer, if there are so many.
+    epsilon, quantile : float
+        As for `kld_size`.
+    cell, turn : float
+        Size of the bins (m, rad).
+
+    Source: beyond the lecture (KLD sampling).
+    """
+
+    n_min: int = 100
+    epsilon: float = 0.05
+    quantile: float = 2.326
+    cell: float = 0.5
+    turn: float = _BIN_TURN
+
+    def enough(self, states):
+        """How many of randomly ordered particles (M, 3) are enough: the first n >= kld_size(bins among the first n)."""
+        bins = pose_bins(as_shape(states, "states", "M", 3), self.cell, self.turn)
+        n_min = as_count(self.n_min, "n_min", at_least=0)
+        _, first = np.unique(bins, return_index=True)
+        is_new = np.zeros(len(bins), dtype=int)
+        is_new[first] = 1
+        n = np.arange(1, len(bins) + 1)
+        enough = n >= np.maximum(kld_size(np.cumsum(is_new), self.epsilon, self.quantile), n_min)
+        return int(np.argmax(enough)) + 1 if enough.any() else len(bins)
 
 
 def uniform_states(grid, n_particles, rng):
-    """Poses (n, 3) spread evenly over the free cells of a map and over all headings."""
+    """Poses spread evenly over the free cells of a map and over all headings.
+
+    Parameters
+    ----------
+    grid : maps.OccupancyGrid
+    n_particles : int
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    array, shape (n_particles, 3)
+
+    Raises
+    ------
+    ValueError
+        When no cell is free.
+    """
     i, j = np.nonzero(grid.free)
     if not len(i):
         raise ValueError("grid must have at least one free cell, got none: there is no place for a particle")

@@ -9,9 +9,11 @@ import math
 
 import numpy as np
 
+from labkit.fast.maps import cast_rays
+from labkit.fast.particles import resample_systematic
+from labkit.fast.sensors import LikelihoodField, weigh_landmarks
 from labkit.localization import particles
-from labkit.localization.maps import OccupancyGrid, cast_rays
-from labkit.localization.sensors import LikelihoodField, weigh_landmarks
+from labkit.localization.maps import OccupancyGrid
 
 _maps = {}
 
@@ -20,7 +22,7 @@ def pf_update(p, u, z, marks, rng):
     """Move, weigh by four landmarks and resample, with the benchmark's noises."""
     moved = particles.sample_motion(p, u, 0.1, rng, cov_u=np.diag([0.1**2, 0.05**2]), model="euler")
     weigh = weigh_landmarks(z, marks, 0.2, 0.05)
-    return moved.take(particles.resample_systematic(particles.normalize_weights(weigh(moved)), rng), axis=0)
+    return moved.take(resample_systematic(particles.normalize_weights(weigh(moved)), rng), axis=0)
 
 
 @functools.cache
@@ -53,5 +55,5 @@ HOOKS = {
     "pf_update": pf_update,
     "likelihood_field": likelihood_field,
     "raycast": raycast,
-    "systematic": particles.resample_systematic,
+    "systematic": resample_systematic,
 }

@@ -22,13 +22,18 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from labkit.documents.lecture.examples import load_building
+from labkit.documents.lecture.printed import example_noise
+from labkit.fast.sensors import SensorSuite
 from labkit.geometry import planar
 from labkit.localization import mcl
 from labkit.localization.drives import random_drive
-from labkit.localization.sensors import SENSORS, SensorSuite
+from labkit.localization.particles import KldSampling, odometry_motion
+from labkit.localization.sensors import SENSORS
 
 N_PARTICLES, N_STEPS, N_TRACKED, N_STAY = 5000, 60, 20, 5
 NEAR, TURN = 0.3, np.radians(10)
+NOISE = example_noise()
+MOTION = odometry_motion(**NOISE)
 HEADER = ("task", "model", "runs", "successes", "low", "high", "median_steps", "median_error", "median_error_deg")
 
 
@@ -60,8 +65,8 @@ def first_stay(right):
 def run_global(suite, model, seed, **options):
     """(success, steps until right and staying, last errors) of one global localization."""
     rng = np.random.default_rng([1, seed])
-    drive = random_drive(suite.building, N_STEPS, rng)
-    filter_ = mcl.localizer(suite.building, model, N_PARTICLES, rng, **options)
+    drive = random_drive(suite.building, NOISE, N_STEPS, rng)
+    filter_ = mcl.localizer(suite.building.grid, MOTION, N_PARTICLES, rng, **options)
     found = steps_right(suite, model, filter_, drive, rng)
     right = is_right(found)
     return bool(right[-1]), first_stay(right), found[-1]
@@ -69,17 +74,17 @@ def run_global(suite, model, seed, **options):
 
 def run_adaptive(suite, model, seed):
     """The same with a number of particles that adapts, from N_PARTICLES down to 2000."""
-    return run_global(suite, model, seed, kld={"n_min": 2000, "epsilon": 0.005})
+    return run_global(suite, model, seed, adaptive=KldSampling(n_min=2000, epsilon=0.005))
 
 
 def run_kidnapped(suite, model, seed):
     """(success, steps until right and staying, last errors) of one kidnapping."""
     rng = np.random.default_rng([2, seed])
-    before = random_drive(suite.building, N_TRACKED, rng)
-    filter_ = mcl.localizer(suite.building, model, N_PARTICLES, rng, start=before.truth[0])
+    before = random_drive(suite.building, NOISE, N_TRACKED, rng)
+    filter_ = mcl.localizer(suite.building.grid, MOTION, N_PARTICLES, rng, start=before.truth[0])
     steps_right(suite, model, filter_, before, rng)
     while True:
-        after = random_drive(suite.building, N_STEPS, rng)
+        after = random_drive(suite.building, NOISE, N_STEPS, rng)
         if np.hypot(*(after.truth[0, :2] - before.truth[-1, :2])) > 3.0:
             break
     found = steps_right(suite, model, filter_, after, rng)

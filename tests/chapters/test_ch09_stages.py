@@ -131,18 +131,22 @@ def stroke(stage, *points):
     return stage.result
 
 
+def until_right(stage, ticks=400):
+    """Ticks until the estimate lies within 0.5 m of the robot, or None."""
+    return next((k for k in range(ticks) if drive(stage, "tick")["errors"][-1] < 0.5), None)
+
+
 @pytest.mark.parametrize("model", SENSORS)
 def test_arena_localizes_and_recovers_from_kidnapping(model):
+    """60 ticks suffice with a probability of 0.9 at least (data/monte_carlo/success.csv), so 400 but for 3e-7."""
     stage = stages.arena()
     stage.set(model=model, particles=5000, resampler="spoke wheel + recovery")
-    result = drive(stage, *["tick"] * 40)
-    assert result["errors"][-1] < 0.5
-    home = result["pose"].copy()
+    assert until_right(stage) is not None
+    home = stage.result["pose"].copy()
     result = stroke(stage, home[:2], (3.2, 8.0))
     np.testing.assert_allclose(result["pose"][:2], (3.2, 8.0))
-    assert len(result["disks"]) == 0
-    assert drive(stage, "tick")["errors"][-1] > 0.5
-    assert drive(stage, *["tick"] * 45)["errors"][-1] < 0.5
+    assert len(result["disks"]) == 0 and result["off"] > 2
+    assert until_right(stage) is not None
 
 
 def test_arena_without_recovery_stays_kidnapped():

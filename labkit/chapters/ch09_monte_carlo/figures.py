@@ -213,10 +213,9 @@ class MapForms:
         ax.set(xlim=extent[:2], ylim=extent[2:])
         walls, unknown = (ax.add_patch(squares(grid.cells == kind, extent, color)) for kind, color in CELLS.items())
         place = {"extent": extent, "origin": "lower", "interpolation": "nearest"}
-        inner = field.table[1:-1, 1:-1]
         self.images = {
             "distance field": ax.imshow(grid.distance, cmap=style.HEAT, **place),
-            "likelihood field": ax.imshow(inner, cmap=style.HEAT, **place),
+            "likelihood field": ax.imshow(field.table, cmap=style.HEAT, **place),
         }
         (lines,) = ax.plot(*segments(building.lines), color=style.INK, linewidth=2)
         (points,) = ax.plot(*building.points.T, **style.look("measurement", markersize=2.5))

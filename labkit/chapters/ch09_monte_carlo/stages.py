@@ -6,16 +6,12 @@ import itertools
 import numpy as np
 
 from ...documents.lecture.examples import global_example, load_building, soccer_run
+from ...documents.lecture.printed import example_noise
+from ...fast.particles import resample_systematic
+from ...fast.sensors import SensorSuite, weigh_beams
 from ...localization import maps, mcl, odometry, particles
 from ...localization.drives import Wanderer
-from ...localization.sensors import (
-    SENSORS,
-    SensorSuite,
-    see_landmarks,
-    weigh_beams,
-    weigh_doors,
-    weigh_likelihood_field,
-)
+from ...localization.sensors import SENSORS, weigh_doors, weigh_likelihood_field
 from ...stage import Choice, Handle, Play, Slider, Stage, style
 from . import figures as draw
 
@@ -34,10 +30,16 @@ def building():
 
 
 @functools.cache
+def recovery():
+    """Random poses from all over the building."""
+    return mcl.Recovery(functools.partial(particles.uniform_states, building().grid))
+
+
+@functools.cache
 def suite():
     """Its sensors; the range table is made here, once."""
     made = SensorSuite(building())
-    _ = made.table
+    _ = made.ranges
     return made
 
 
@@ -56,7 +58,7 @@ def compute_corridor(state):
         said.append(bool(np.abs(doors - truth).min() < 0.45))
         weights = np.exp(weigh_doors(doors, said[-1])(x))
         shots.append((x, weights / weights.max(), truth))
-        x = x[particles.resample_systematic(weights, rng)]
+        x = x[resample_systematic(weights, rng)]
         x = np.clip(x + state["move"] + state["std"] * rng.standard_normal(SHOWN), 0.0, CORRIDOR)
         truth = min(truth + state["move"], CORRIDOR)
         shots.append((x, np.full(SHOWN, 0.6), truth))
@@ -187,12 +189,12 @@ def compute_heat(state):
     world = b.grid
     if state["scan"] != "as mapped":
         world = world.with_disks([(*(pose[:2] + 0.9 * np.array([np.cos(pose[2]), np.sin(pose[2])])), 0.25)])
-    ranges, bearings = sensors.scanner.scan(world, pose, np.random.default_rng(4), every=9)
+    ranges, bearings = sensors.scan(pose, np.random.default_rng(4), world)
     xy, cells, shape = _places()
     poses = np.column_stack([xy, np.full(len(xy), pose[2])])
     shares = (1, 0, 0, 0) if state["beams"] == "plain" else (0.75, 0.1, 0.05, 0.1)
     models = {
-        "beams": weigh_beams(sensors.table, ranges, bearings, 0.2, 18.0, shares=shares, step=0.02),
+        "beams": weigh_beams(sensors.ranges, ranges, bearings, 0.2, 18.0, shares=shares),
         "field": weigh_likelihood_field(sensors.field, ranges, bearings),
     }
     free = bool(b.grid.at(pose[:2]) == maps.FREE)
@@ -368,7 +370,7 @@ def wheel():
 def _descendants(n=1000, rounds=200):
     """Names of the first particles still in the set after each round of equal weights: {method: (rounds + 1, n)}."""
     found = {}
-    for method, resample in zip(METHODS, (particles.resample_systematic, particles.resample_roulette)):
+    for method, resample in zip(METHODS, (resample_systematic, particles.resample_roulette)):
         rng, names = np.random.default_rng(7), [np.arange(n)]
         for _ in range(rounds):
             names.append(names[-1][resample(np.full(n, 1 / n), rng)])
@@ -543,9 +545,9 @@ def soccer():
 # Arena ---------------------------------------------------------------------------------------------------------------
 
 RESAMPLERS = {
-    "spoke wheel": particles.resample_systematic,
-    "roulette": particles.resample_roulette,
-    "spoke wheel + recovery": particles.resample_systematic,
+    "spoke wheel": mcl.Resampling(draw=resample_systematic),
+    "roulette": mcl.Resampling(draw=particles.resample_roulette),
+    "spoke wheel + recovery": mcl.Resampling(draw=resample_systematic),
 }
 KEYS = {"up": (0.6, 0.0), "down": (-0.6, 0.0), "left": (0.0, 0.6), "right": (0.0, -0.6)}
 COUNTS = (100, 500, 1000, 2000, 5000, 10_000, 20_000)
@@ -555,7 +557,8 @@ def start_arena(state):
     """The memory of the arena: true pose, filter, world, history; global localization begins."""
     rng = np.random.default_rng(8)
     pose = np.array([*building().nodes["hall"], 0.3])
-    filter_ = mcl.localizer(building(), state["model"], state["particles"], rng, recovery=False)
+    motion = particles.odometry_motion(**example_noise())
+    filter_ = mcl.localizer(building().grid, motion, state["particles"], rng, recovery=False)
     return {
         "rng": rng,
         "pose": pose,
@@ -592,30 +595,24 @@ def advance_arena(state, event):
 def _filter_step(state, memory, u):
     rng, filter_, pose = memory["rng"], memory["filter"], memory["pose"]
     _adopt(filter_, state, rng)
-    noisy = odometry.noisy_controls(u[None], DT, **particles.CONTROL_NOISE, rng=rng, runs=1)[0, 0]
+    noisy = odometry.noisy_controls(u[None], DT, **example_noise(), rng=rng, runs=1)[0, 0]
     if state["model"] == "landmarks":
-        weigh = suite().measure("landmarks", pose, rng, memory["world"])
-        memory["ends"] = building().landmarks[see_landmarks(memory["world"], pose, building().landmarks, rng)[0]]
+        index, z = suite().look(pose, rng, memory["world"])
+        weighting, memory["ends"] = suite().weigh_sighting(index, z), building().landmarks[index]
     else:
-        ranges, bearings = suite().scanner.scan(memory["world"], pose, rng, every=9)
-        weigh = suite().weigh_scan(state["model"], ranges, bearings)
-        memory["ends"] = _ends(pose, ranges, bearings)
-    memory["step"] = filter_.step(noisy, DT, weigh, rng)
-    memory["estimate"] = filter_.estimate().pose
+        ranges, bearings = suite().scan(pose, rng, memory["world"])
+        weighting, memory["ends"] = suite().weigh_scan(state["model"], ranges, bearings), _ends(pose, ranges, bearings)
+    memory["step"] = filter_.step(noisy, DT, weighting, rng)
+    memory["estimate"] = memory["step"].estimate.pose
     memory["errors"] = [*memory["errors"], float(np.hypot(*(memory["estimate"] - pose)[:2]))][-HISTORY:]
 
 
 def _adopt(filter_, state, rng):
-    """Carry over what the controls say: model, resampler, number of particles."""
-    filter_.exponent = mcl.EXPONENTS[state["model"]]
-    filter_.resample = RESAMPLERS[state["resampler"]]
-    if "recovery" not in state["resampler"]:
-        filter_.draw, filter_.averages = None, None
-    elif filter_.draw is None:
-        filter_.draw = lambda n, rng: particles.uniform_states(building().grid, n, rng)
+    """Carry over what the controls say: resampling, recovery, number of particles."""
+    filter_.resampling = RESAMPLERS[state["resampler"]]
+    filter_.recovery = recovery() if "recovery" in state["resampler"] else None
     if len(filter_.states) != state["particles"]:
-        index = particles.resample_systematic(filter_.weights, rng, state["particles"])
-        filter_.states, filter_.log_weights = filter_.states[index], np.zeros(state["particles"])
+        filter_.resize(state["particles"], rng)
 
 
 def _stroke(memory, path):

@@ -4,13 +4,15 @@ printed.
 
 import numpy as np
 
+from ...fast.maps import cast_rays
+from ...fast.sensors import SensorSuite
 from ...localization import maps, particles
 from ...localization.drives import random_drive
-from ...localization.maps import cast_rays
 from ...localization.mcl import localizer
-from ...localization.sensors import SensorSuite, weigh_doors
+from ...localization.sensors import see_landmarks, weigh_doors, weigh_landmarks
 from ..ledger import Computed, computes
 from .examples import global_example, load_building, soccer_run
+from .printed import example_noise
 
 NOTEBOOK = "09_monte_carlo"
 
@@ -37,9 +39,10 @@ def mcl_first_line():
 def draw_probability():
     building = load_building()
     rng = np.random.default_rng(9)
-    suite = SensorSuite(building)
-    weigh = suite.measure("landmarks", np.array([8.4, 2.4, 0.0]), rng)
-    near = np.array([8.4, 2.4, 0.0]) + 0.05 * rng.standard_normal((1000, 3))
+    pose, marks = np.array([8.4, 2.4, 0.0]), building.landmarks
+    index, z = see_landmarks(building.grid, pose, marks, rng)
+    weigh = weigh_landmarks(z, marks[index], 0.1, 0.035)
+    near = pose + 0.05 * rng.standard_normal((1000, 3))
     total = np.exp(weigh(near)).sum()
     return Computed(
         "mit Wahrscheinlichkeit w_i / W",
@@ -139,8 +142,10 @@ def field_speed():
 
 def _errors(start, seed=21):
     building, rng = load_building(), np.random.default_rng(seed)
-    suite, drive = SensorSuite(building), random_drive(building, 30, rng)
-    filter_ = localizer(building, "landmarks", 3000, rng, start=drive.truth[0] if start else None)
+    noise = example_noise()
+    suite, drive = SensorSuite(building), random_drive(building, noise, 30, rng)
+    motion, known = particles.odometry_motion(**noise), drive.truth[0] if start else None
+    filter_ = localizer(building.grid, motion, 3000, rng, start=known)
     for u, pose in zip(drive.controls, drive.truth[1:]):
         filter_.step(u, drive.dt, suite.measure("landmarks", pose, rng), rng)
     return float(np.hypot(*(filter_.estimate().pose - drive.truth[-1])[:2]))

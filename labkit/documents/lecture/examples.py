@@ -10,13 +10,14 @@ import numpy as np
 
 from ...checks import as_count, as_covariances, as_number, as_shape
 from ...estimation.kalman import predict, vehicle_model
+from ...fast.sensors import SensorSuite
 from ...localization import odometry
 from ...localization.drives import Drive, follow, random_drive
 from ...localization.ekf import ekf_localize, simulate_drive
 from ...localization.maps import OccupancyGrid
 from ...localization.mcl import MonteCarloLocalizer, localizer, record
-from ...localization.particles import sample_motion
-from ...localization.sensors import SensorSuite, see_landmarks, weigh_landmarks
+from ...localization.particles import odometry_motion
+from ...localization.sensors import see_landmarks, weigh_landmarks
 from ...tables import DATA, read_table
 from . import printed as lecture
 
@@ -159,9 +160,9 @@ def global_example(building, n_particles=5000, n_steps=12, seed=5):
 
     Source: lecture, "Beispiel (1)" to "(12)".
     """
-    rng, suite = np.random.default_rng(seed), SensorSuite(building)
-    drive = random_drive(building, n_steps, rng, start="hall")
-    filter_ = localizer(building, "likelihood field", n_particles, rng, recovery=False)
+    rng, suite, noise = np.random.default_rng(seed), SensorSuite(building), lecture.example_noise()
+    drive = random_drive(building, noise, n_steps, rng, start="hall")
+    filter_ = localizer(building.grid, odometry_motion(**noise), n_particles, rng, recovery=False)
     return record(filter_, drive, lambda pose, k: suite.measure("likelihood field", pose, rng), rng)
 
 
@@ -210,9 +211,6 @@ def soccer_run(n_particles=1000, n_steps=120, seed=5, use=("range", "bearing")):
     noisy = odometry.noisy_controls(controls, dt, **noise, rng=rng, runs=1)[:, 0]
     drive = Drive(odometry.drive(start, controls, dt), noisy, dt)
 
-    def motion(states, u, dt, rng):
-        return sample_motion(states, u, dt, rng, cov_u=odometry.control_covariance(u, dt, **noise))
-
     seen = []
 
     def measure(pose, k):
@@ -229,7 +227,7 @@ def soccer_run(n_particles=1000, n_steps=120, seed=5, use=("range", "bearing")):
         return weigh_landmarks(z[nearest : nearest + 1], landmarks[seen[-1] : seen[-1] + 1], **stds)
 
     cloud = start + rng.standard_normal((n_particles, 3)) * [0.1, 0.1, 0.1]
-    pictures = record(MonteCarloLocalizer(cloud, motion=motion), drive, measure, rng)
+    pictures = record(MonteCarloLocalizer(cloud, odometry_motion(**noise)), drive, measure, rng)
     reckoned = odometry.drive(start, noisy, dt)
     estimates = np.array([picture.estimate for picture in pictures])
     return SoccerRun(landmarks, drive.truth, reckoned, estimates, np.array(seen), pictures)
