@@ -26,17 +26,15 @@ import inspect
 import numpy as np
 
 from labkit.chapters.ch09_monte_carlo import specimens, stages
-from labkit.documents.lecture.examples import load_building
-from labkit.documents.lecture.printed import example_noise
+from labkit.documents.lecture import examples, printed
 from labkit.exercises import course
 from labkit.fast.sensors import SensorSuite
 from labkit.geometry import planar
-from labkit.localization import drives, maps, odometry, particles, sensors
-from labkit.localization.mcl import MonteCarloLocalizer, localizer, record
+from labkit.localization import drives, maps, mcl, odometry, particles, sensors
 from labkit.tables import read_table
 
 ex = course("09-monte-carlo")
-building = load_building()
+building = examples.load_building()
 grid = building.grid
 
 # %% the-question [markdown]
@@ -389,11 +387,12 @@ for task, model, good, low, high, steps in zip(*(table[name] for name in columns
 
 # %% kld
 suite, rng = SensorSuite(building), np.random.default_rng(5)
-drive = drives.random_drive(building, example_noise(), 30, rng, start="hall")
-motion = particles.odometry_motion(**example_noise())
+noise = printed.example_noise()
+drive = drives.random_drive(building, noise, 30, rng, start="hall")
+motion = particles.odometry_motion(**noise)
 kld = particles.KldSampling(n_min=2000, epsilon=0.005)
-mcl = localizer(grid, motion, 5000, rng, adaptive=kld)
-run = record(mcl, drive, lambda pose, k: suite.measure("likelihood field", pose, rng), rng)
+robot = mcl.localizer(grid, motion, 5000, rng, adaptive=kld)
+run = mcl.record(robot, drive, lambda pose, k: suite.measure("likelihood field", pose, rng), rng)
 error = np.hypot(*(run[-1].estimate - run[-1].truth)[:2])
 print("particles before steps 1, 2, 5, 10, 30:", [len(run[k].states) for k in (0, 1, 4, 9, 29)])
 turn = abs(planar.wrap_angle(run[-1].estimate[2] - run[-1].truth[2]))
@@ -482,7 +481,7 @@ lost[0] = scanner.r_max
 plain = sensors.weigh_beams(suite.ranges, lost, bearings, 0.2, scanner.r_max, shares=(1, 0, 0, 0))
 mixture = sensors.weigh_beams(suite.ranges, lost, bearings, 0.2, scanner.r_max)
 for name, weigh in (("plain", plain), ("mixture", mixture)):
-    near = MonteCarloLocalizer(pose + rng.normal(0, 0.05, (500, 3)), motion)
+    near = mcl.MonteCarloLocalizer(pose + rng.normal(0, 0.05, (500, 3)), motion)
     step = near.correct(weigh, rng)
     print(f"{name:8} all weights zero: {step.all_zero}   scan used: {not step.all_zero}")
 try:
