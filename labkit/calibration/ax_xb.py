@@ -324,7 +324,8 @@ def linear_rotations(robot, T_ST, weights):
 
     Source: Shah (2013).
     """
-    K = np.einsum("n,nij,nkl->iljk", weights, robot[:, :3, :3], T_ST[:, :3, :3]).reshape(9, 9)
+    sums = np.tensordot(weights[:, None, None] * robot[:, :3, :3], T_ST[:, :3, :3], (0, 0))  # of R_ij A_kl
+    K = sums.transpose(0, 3, 1, 2).reshape(9, 9)
     U, _, Vt = np.linalg.svd(K)
     both = np.stack([Vt[0], U[:, 0]]).reshape(2, 3, 3)
     return nearest_rotation(both if np.linalg.det(both[0]) > 0 else -both)

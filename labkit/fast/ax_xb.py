@@ -6,8 +6,17 @@ for 20000.
 
 import numpy as np
 
-from ..calibration.ax_xb import MAX_STEPS, STEP_TOLERANCE, calibrate_with, linear_rotations, noise_levels
-from ..geometry.lie import skew
+from ..calibration.ax_xb import (
+    MAX_STEPS,
+    STEP_TOLERANCE,
+    calibrate_with,
+    kronecker_matrix,
+    linear_rotations,
+    noise_levels,
+)
+from ..checks import as_transforms
+from ..geometry.frames import pose
+from ..geometry.lie import nearest_rotation, skew
 
 _GENERATORS = skew(np.eye(3))  # (3, 3, 3): d/dphi_k exp(phi) at 0
 _I3 = np.eye(3)
@@ -16,6 +25,35 @@ _I3 = np.eye(3)
 def calibrate_hand_eye(T_BF, T_ST, std_rot=None, std_trans=None, robust=False, *, eye="in hand"):
     """Poses of sensor and target from noisy readings: `labkit.calibration.ax_xb.calibrate_hand_eye`."""
     return calibrate_with(_fit, T_BF, T_ST, std_rot, std_trans, robust, eye)
+
+
+def solve_ax_xb(A, B):
+    """Mountings from many readings of the same motions at once: `labkit.calibration.ax_xb.solve_ax_xb`.
+
+    Motions whose axes are parallel are not refused: noise alone then decides the free angle of each mounting.
+
+    Parameters
+    ----------
+    A : array-like, shape (N, 4, 4)
+        Motions of the flange (mm).
+    B : array-like, shape (..., N, 4, 4)
+        Readings of them by the sensor (mm).
+
+    Returns
+    -------
+    T_FS : array, shape (..., 4, 4)
+    """
+    A, B = as_transforms(A, "A"), as_transforms(B, "B")
+    if A.ndim != 3 or B.shape[-3:] != A.shape or len(A) < 2:
+        raise ValueError(f"A and B must have shapes (N, 4, 4) and (..., N, 4, 4) with N >= 2, got {A.shape}, {B.shape}")
+    runs, n = B.shape[:-3], len(A)
+    every = np.broadcast_to(A, B.shape)
+    M = kronecker_matrix(every.reshape(-1, 4, 4), B.reshape(-1, 4, 4)).reshape(*runs, 9 * n, 9)
+    X = np.swapaxes(np.linalg.svd(M, full_matrices=False)[2][..., -1, :].reshape(*runs, 3, 3), -1, -2)
+    R = nearest_rotation(X * np.where(np.linalg.det(X) < 0, -1.0, 1.0)[..., None, None])
+    K1 = (_I3 - A[:, :3, :3]).reshape(-1, 3)
+    K2 = every[..., :3, 3] - (R[..., None, :, :] @ B[..., :3, 3, None])[..., 0]
+    return pose(R, K2.reshape(*runs, 3 * n) @ np.linalg.pinv(K1).T)
 
 
 def _fit(robot, T_ST, weights, given):

@@ -1,5 +1,7 @@
 """Hand-eye calibration on a sphere against SciPy, finite differences, Monte Carlo and the thesis's own numbers."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -322,6 +324,26 @@ def test_radius_as_a_tenth_unknown_against_scipy():
     assert found.radius == pytest.approx(want.x[9], abs=1e-4)
     cov = 2 * want.cost / 83 * np.linalg.inv(want.jac.T @ want.jac)
     assert found.std_of("radius") == pytest.approx(np.sqrt(cov[9, 9]), rel=0.02)
+
+
+def test_a_radius_that_does_not_settle_is_refused():
+    T_BF, x_S = scene(8, std=0.0)
+    x_S[:, 1] = np.where(np.arange(8) % 2, 1.0, -1.0) * (20.0 + 5.0 * np.random.default_rng(3).normal(size=8))
+    with pytest.raises(ValueError, match=r"does not settle: after 50 steps it is .* mm"):
+        hand_eye.fit_radius(T_BF, x_S)
+
+
+@pytest.mark.parametrize("known, n, words", [(None, 6, "at least 7"), (TARGET0, 4, "at least 5")])
+def test_robust_needs_one_pose_more_than_a_sample(known, n, words):
+    with pytest.raises(ValueError, match=f"{words} poses are needed when robust, got {n}"):
+        hand_eye.calibrate_sphere_target(*scene(n), known, robust=True)
+
+
+def test_without_redundancy_the_noise_is_unknown():
+    fit = hand_eye.calibrate_sphere_target(*scene(3, std=0.1), target=TARGET0)
+    assert fit.std > 0 and len(fit.covariance) == 6
+    weights = np.array([1.0, 1.0, 0.0])
+    assert np.isnan(dataclasses.replace(fit, weights=weights).std)
 
 
 def test_simulation_inputs_give_the_printed_coordinates():

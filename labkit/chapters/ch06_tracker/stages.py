@@ -8,9 +8,9 @@ import numpy as np
 
 from ...calibration import ax_xb
 from ...estimation.gaussian import unit_noise
-from ...fast.ax_xb import calibrate_hand_eye
+from ...fast.ax_xb import calibrate_hand_eye, solve_ax_xb
 from ...geometry.frames import invert, matrix_from_quaternion, pose, pose_distance, unit_vector
-from ...geometry.lie import exp_so3, nearest_rotation
+from ...geometry.lie import exp_so3
 from ...machines import simulation, udp
 from ...machines.accuracy import filter_positions, shift_time, speeds, summarize, time_offset
 from ...machines.arm import HOME, TX40, arm_points, forward_kinematics, jacobian, reach_position, tool_pose
@@ -232,13 +232,8 @@ def compute_two_axes(state):
     values = np.linalg.svd(ax_xb.kronecker_matrix(A, B), compute_uv=False)
     e = unit_noise((REPEATS, 2, 6), seed=6)
     noisy = B @ pose(exp_so3(noise * e[..., :3]), STD_TRANS * e[..., 3:])
-    M = ax_xb.kronecker_matrix(np.tile(A, (REPEATS, 1, 1)), noisy.reshape(-1, 4, 4)).reshape(REPEATS, 18, 9)
-    X = np.swapaxes(np.linalg.svd(M)[2][:, -1].reshape(-1, 3, 3), 1, 2)
-    X = nearest_rotation(X * np.where(np.linalg.det(X) < 0, -1.0, 1.0)[:, None, None])
-    K1 = np.broadcast_to((np.eye(3) - A[:, :3, :3]).reshape(6, 3), (REPEATS, 6, 3))
-    K2 = (A[:, :3, 3] - (X[:, None] @ noisy[..., :3, 3, None])[..., 0]).reshape(REPEATS, 6, 1)
-    t = (np.linalg.pinv(K1) @ K2)[..., 0]
-    turn, off = pose_distance(pose(X, t), X_TRUE)
+    found = solve_ax_xb(A, noisy)
+    turn, off = pose_distance(found, X_TRUE)
     apart = np.rad2deg(np.arctan2(np.linalg.norm(np.cross(*axes)), abs(axes[0] @ axes[1])))
     free = (
         exp_so3(np.linspace(0, 2 * np.pi, 60)[:, None] * axes[0]) @ X_TRUE[:3, 0]
@@ -246,7 +241,7 @@ def compute_two_axes(state):
         else np.full((1, 3), np.nan)
     )
     return {
-        "axes": axes, "angle_deg": apart, "singular_values": values, "found": X, "free": 0.55 * free,
+        "axes": axes, "angle_deg": apart, "singular_values": values, "found": found[:, :3, :3], "free": 0.55 * free,
         "error_deg": float(np.rad2deg(np.median(turn))), "error_mm": float(np.median(off)),
         "predicted_deg": float(np.rad2deg(2 * noise / values[-2])) if values[-2] > 1e-9 else np.inf,
     }  # fmt: skip

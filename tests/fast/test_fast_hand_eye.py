@@ -1,0 +1,107 @@
+"""The sphere's hand-eye calibration from sums equals the readable one."""
+
+import numpy as np
+import pytest
+
+from labkit.calibration import hand_eye as readable
+from labkit.fast import hand_eye as fast
+from labkit.geometry import frames
+from labkit.geometry.lie import exp_so3
+
+T_FS = frames.pose(exp_so3([0.3, -0.5, 1.1]), np.array([30.0, -20.0, 120.0]))
+TARGET = np.array([700.0, 80.0, -150.0])
+
+
+def scene(n, std=0.0, seed=0, turn=1.0):
+    rng = np.random.default_rng([n, seed])
+    T_BF = frames.pose(exp_so3(turn * rng.uniform(-1, 1, (n, 3))), rng.uniform(-200, 200, (n, 3)))
+    x_S = frames.transform(frames.invert(T_FS), frames.transform(frames.invert(T_BF), TARGET))
+    return T_BF, x_S + std * rng.normal(size=x_S.shape)
+
+
+def flat(n=12):
+    """All spheres in one plane of the scanner, where the linear start says nothing."""
+    rng = np.random.default_rng(5)
+    x_S = np.column_stack([rng.uniform(-20, 20, n), rng.uniform(-15, 15, n), np.full(n, 240.0)])
+    return readable.poses_that_see(T_FS, TARGET, exp_so3(rng.uniform(-1, 1, (n, 3))), x_S), x_S
+
+
+def assert_same(one, two, atol=1e-6):
+    np.testing.assert_allclose(two.T_FS, one.T_FS, atol=atol)
+    np.testing.assert_allclose(two.target, one.target, atol=atol)
+    np.testing.assert_allclose(two.weights, one.weights, atol=1e-4)
+    np.testing.assert_allclose(two.rms, one.rms, rtol=1e-6, atol=1e-3 * atol)
+    size = np.sqrt(np.diagonal(one.covariance))
+    np.testing.assert_allclose(two.covariance / np.outer(size, size), one.covariance / np.outer(size, size), atol=1e-3)
+
+
+@pytest.mark.parametrize("n", [6, 31, 200])
+@pytest.mark.parametrize("std", [0.1, 1.0])
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_random_poses_give_the_same_result(n, std, dtype):
+    T_BF, x_S = (a.astype(dtype) for a in scene(n, std))
+    atol = 1e-6 if dtype == np.float64 else 2e-4  # the sums take R'R = I for granted: 1e-7 on an arm of 1000 mm
+    assert_same(readable.calibrate_sphere_target(T_BF, x_S), fast.calibrate_sphere_target(T_BF, x_S), atol)
+
+
+@pytest.mark.parametrize("n", [3, 31])
+def test_a_known_target_gives_the_same_result(n):
+    T_BF, x_S = scene(n, 0.5)
+    one, two = (m.calibrate_sphere_target(T_BF, x_S, TARGET) for m in (readable, fast))
+    assert_same(one, two, atol=1e-9)
+    assert two.covariance.shape == (6, 6)
+
+
+def test_outliers_get_the_same_weights():
+    T_BF, x_S = scene(31, 0.1)
+    x_S[::4] += 80.0 * np.random.default_rng(1).normal(size=x_S[::4].shape)
+    one, two = (m.calibrate_sphere_target(T_BF, x_S, robust=True) for m in (readable, fast))
+    assert_same(one, two)
+    assert (two.weights[::4] == 0).all()
+
+
+@pytest.mark.parametrize("data", [scene(4), flat(), flat(5)], ids=["four poses", "flat", "flat, five poses"])
+def test_where_the_linear_start_fails_both_find_the_same(data):
+    one, two = (m.calibrate_sphere_target(*data) for m in (readable, fast))
+    np.testing.assert_allclose(one.T_FS, T_FS, atol=1e-6)
+    np.testing.assert_allclose(two.T_FS, one.T_FS, atol=1e-6)
+
+
+def nearly_one_axis(tilt):
+    rng = np.random.default_rng(3)
+    turns = np.column_stack([tilt * rng.normal(size=(9, 2)), rng.uniform(-1, 1, 9)])
+    T_BF = frames.pose(exp_so3(turns), rng.uniform(-200, 200, (9, 3)))
+    return T_BF, frames.transform(frames.invert(T_FS), frames.transform(frames.invert(T_BF), TARGET))
+
+
+@pytest.mark.parametrize("tilt", [3e-3, 1e-2, 0.1])
+def test_nearly_one_axis_gives_the_same_scanner(tilt):
+    one, two = (m.calibrate_sphere_target(*nearly_one_axis(tilt)) for m in (readable, fast))
+    np.testing.assert_allclose(two.T_FS, one.T_FS, atol=1e-8 / tilt**2)
+
+
+def still(spread):
+    rng = np.random.default_rng(0)
+    x_S = np.array([3.0, 5.0, 240.0]) + rng.normal(size=(9, 1)) * np.array(spread)
+    return readable.poses_that_see(T_FS, TARGET, exp_so3(rng.uniform(-1, 1, (9, 3))), x_S), x_S
+
+
+@pytest.mark.parametrize(
+    "data, words",
+    [
+        (scene(8, turn=0.0), "only translate"),
+        (nearly_one_axis(0.0), r"one axis, \(0.000, 0.000, 1.000\) in the base"),
+        (nearly_one_axis(3e-4), "one axis"),
+        (still((0, 0, 0)), "at one place"),
+        (still((0, 0, 30)), "on one line"),
+        ((scene(6)[0], scene(5)[1]), r"\(N, 4, 4\) and \(N, 3\)"),
+        ((scene(3)[0], scene(3)[1]), "at least 4 poses"),
+    ],
+)
+def test_both_refuse_with_the_same_words(data, words):
+    found = []
+    for module in (readable, fast):
+        with pytest.raises(ValueError, match=words) as refused:
+            module.calibrate_sphere_target(*data)
+        found.append(str(refused.value))
+    assert found[0] == found[1]
