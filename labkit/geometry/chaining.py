@@ -22,7 +22,7 @@ from ..checks import (
     fit_together,
     shown,
 )
-from .frames import _invert, frame_from_points, invert, relative, rotation_angle, rotation_block, transform
+from .frames import frame_from_points, invert, relative, rotation_angle, rotation_block, transform
 from .lie import adjoint, exp_se3, log_se3, nearest_rotation, skew
 
 
@@ -336,42 +336,55 @@ def solve_pose_graph(edges, measured, std_rot, std_trans):
 
     Source: Grisetti, Kuemmerle, Stachniss, Burgard, "A tutorial on graph-based SLAM", IEEE ITS Magazine 2 (2010) 31.
     """
+    pairs, Z = _as_graph(edges, measured)
+    stds = [as_positive_number(std_rot, "std_rot"), as_positive_number(std_trans, "std_trans")]
+    weight = np.repeat(1 / np.array(stds), 3)
+    start = _spanning_poses(pairs, Z)
+
+    def poses(x):
+        return np.concatenate([start[:1], start[1:] @ exp_se3(x.reshape(-1, 6))])
+
+    def weighted_residuals(x):
+        return (_graph_residuals(poses(x), pairs, Z) * weight).ravel()
+
+    def jacobian(x):
+        return _graph_jacobian(poses(x), x, pairs, Z, weight)
+
+    zero = np.zeros(6 * (len(start) - 1))
+    fit = least_squares(weighted_residuals, zero, jac=jacobian, method="lm", x_scale="jac")
+    X, dof = poses(fit.x), 6 * (len(Z) - len(start) + 1)
+    J = _graph_jacobian(X, zero, pairs, Z, weight)
+    values = np.linalg.svd(J, compute_uv=False)
+    return PoseGraph(X, _graph_residuals(X, pairs, Z), 2 * fit.cost, dof, np.linalg.inv(J.T @ J), values)
+
+
+def _as_graph(edges, measured):
+    """Pairs of nodes, (m, 2), and measured links, (m, 4, 4), one for each other."""
     Z = as_transforms(measured, "measured")
     pairs = as_finite(edges, "edges")
     if Z.ndim != 3 or pairs.shape != (len(Z), 2):
         raise ValueError(f"edges must be pairs, one for each of the measured links, got {pairs.shape} for {Z.shape}")
     if not len(pairs) or (pairs < 0).any() or (pairs % 1 != 0).any() or (pairs[:, 0] == pairs[:, 1]).any():
         raise ValueError(f"edges must be pairs of two different nodes, numbered from 0, got {shown(pairs)}")
-    pairs = pairs.astype(int)
-    stds = [as_positive_number(std_rot, "std_rot"), as_positive_number(std_trans, "std_trans")]
-    weight = np.repeat(1 / np.array(stds), 3)
-    start = _spanning_poses(pairs, Z)
-    n, inverse_Z = len(start), _invert(Z)
+    return pairs.astype(int), Z
 
-    def poses(x):
-        return np.concatenate([start[:1], start[1:] @ exp_se3(x.reshape(-1, 6))])
 
-    def residuals(x):
-        X = poses(x)
-        return log_se3(inverse_Z @ _invert(X[pairs[:, 0]]) @ X[pairs[:, 1]])
+def _graph_residuals(X, pairs, Z):
+    """log(Z^-1 X_i^-1 X_j) of every link from i to j, (m, 6)."""
+    i, j = pairs.T
+    return log_se3(invert(Z) @ relative(X[i], X[j]))
 
-    def jacobian(X, steps):
-        steps = np.concatenate([np.zeros((1, 6)), steps.reshape(-1, 6)])
-        i, j = pairs.T
-        between = _invert(X[i]) @ X[j]
-        outer = weight[:, None] * _right_jacobian_inverse(log_se3(inverse_Z @ between))
-        J, m = np.zeros((len(Z), 6, n, 6)), np.arange(len(Z))
-        J[m, :, j] += outer @ _right_jacobian(steps[j])
-        J[m, :, i] -= outer @ adjoint(_invert(between)) @ _right_jacobian(steps[i])
-        return J[:, :, 1:].reshape(6 * len(Z), -1)
 
-    zero = np.zeros(6 * (n - 1))
-    fit = least_squares(
-        lambda x: (residuals(x) * weight).ravel(), zero, jac=lambda x: jacobian(poses(x), x), method="lm", x_scale="jac"
-    )
-    J = jacobian(poses(fit.x), zero)
-    values = np.linalg.svd(J, compute_uv=False)
-    return PoseGraph(poses(fit.x), residuals(fit.x), 2 * fit.cost, 6 * (len(Z) - n + 1), np.linalg.inv(J.T @ J), values)
+def _graph_jacobian(X, x, pairs, Z, weight):
+    """Weighted Jacobian of the residuals to the steps x from the start that led to X, (6m, 6n - 6); node 0 is held."""
+    steps = np.concatenate([np.zeros((1, 6)), x.reshape(-1, 6)])
+    i, j = pairs.T
+    between = relative(X[i], X[j])
+    outer = weight[:, None] * _right_jacobian_inverse(log_se3(invert(Z) @ between))
+    J, m = np.zeros((len(Z), 6, len(X), 6)), np.arange(len(Z))
+    J[m, :, j] += outer @ _right_jacobian(steps[j])
+    J[m, :, i] -= outer @ adjoint(invert(between)) @ _right_jacobian(steps[i])
+    return J[:, :, 1:].reshape(6 * len(Z), -1)
 
 
 def _ad(xi):
