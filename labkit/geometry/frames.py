@@ -26,7 +26,19 @@ MIN_ARM = 1e-9  # relative to the largest coordinate: a shorter arm is rounding 
 
 
 def pose(R, t):
-    """Transform with rotation R, shape (..., 3, 3), and translation t, shape (..., 3)."""
+    """Transform with a given rotation and translation.
+
+    Parameters
+    ----------
+    R : array-like, shape (..., 3, 3)
+        Rotation.
+    t : array-like, shape (..., 3)
+        Translation, in the unit of the points.
+
+    Returns
+    -------
+    T : array, shape (..., 4, 4)
+    """
     R, t = as_rotations(R, "R"), as_points(t, "t")
     T = np.zeros((*fit_together(R=R.shape[:-2], t=t.shape[:-1]), 4, 4))
     T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, t, 1.0
@@ -34,7 +46,22 @@ def pose(R, t):
 
 
 def unit_vector(v):
-    """`v` scaled to length 1; (..., n) -> (..., n). Refuses a zero vector."""
+    """Directions of length 1.
+
+    Parameters
+    ----------
+    v : array-like, shape (..., n)
+        Vectors of any length but zero.
+
+    Returns
+    -------
+    direction : array, shape (..., n)
+
+    Raises
+    ------
+    ValueError
+        When a vector is zero.
+    """
     v = as_finite(v, "v")
     if v.ndim < 1:
         raise ValueError("v must have shape (..., n), got a single number")
@@ -125,14 +152,44 @@ def _refuse_short(arm, point, name):
 
 
 def arm_angle(a, b):
-    """Angle between two directions (rad), accurate also near 0 and pi; (..., 3), (..., 3) -> (...)."""
+    """Angle between two directions, accurate also near 0 and pi.
+
+    Parameters
+    ----------
+    a, b : array-like, shape (..., 3)
+        Two directions of any length.
+
+    Returns
+    -------
+    angle : array, shape (...)
+        From 0 to pi (rad).
+
+    See Also
+    --------
+    rotation_angle : the angle of a rotation.
+    """
     a, b = as_points(a, "a"), as_points(b, "b")
     fit_together(a=a.shape, b=b.shape)
     return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(-1))
 
 
 def invert(T):
-    """Inverse of rigid transforms without solving anything: (R, t) -> (R', -R' t); (..., 4, 4)."""
+    """Inverse of rigid transforms without solving anything: (R, t) becomes (R', -R' t).
+
+    Parameters
+    ----------
+    T : array-like, shape (..., 4, 4)
+        T_AB.
+
+    Returns
+    -------
+    inverse : array, shape (..., 4, 4)
+        T_BA.
+
+    See Also
+    --------
+    relative : the inverse of one pose times another.
+    """
     return _invert(as_transforms(T, "T"))
 
 
@@ -146,7 +203,20 @@ def _invert(T):
 
 
 def transform(T, points):
-    """Coordinates in A of `points` given in B, with T = T_AB; (..., 4, 4), (..., 3) -> (..., 3)."""
+    """Coordinates in A of points given in B.
+
+    Parameters
+    ----------
+    T : array-like, shape (..., 4, 4)
+        T_AB.
+    points : array-like, shape (..., 3)
+        Coordinates in B.
+
+    Returns
+    -------
+    points : array, shape (..., 3)
+        Coordinates in A.
+    """
     T, points = as_transforms(T, "T"), as_points(points, "points")
     if T.ndim > 2:
         fit_together(T=T.shape[:-2], points=points.shape[:-1])
@@ -154,7 +224,16 @@ def transform(T, points):
 
 
 def relative(T_WA, T_WB):
-    """T_AB = T_WA^-1 T_WB: the pose of B seen from A; (..., 4, 4).
+    """Pose of B seen from A: T_AB = T_WA^-1 T_WB.
+
+    Parameters
+    ----------
+    T_WA, T_WB : array-like, shape (..., 4, 4)
+        Both poses in one frame W.
+
+    Returns
+    -------
+    T_AB : array, shape (..., 4, 4)
 
     Source: lab sheet, section 1, the formula for K0_T_K1.
     """
@@ -164,7 +243,18 @@ def relative(T_WA, T_WB):
 
 
 def rotation_block(T, name="T"):
-    """Upper left 3 x 3 block, a rotation or not, of finite matrices; (..., 4, 4) or (..., 3, 3) -> (..., 3, 3)."""
+    """Upper left 3 x 3 block of finite matrices, a rotation or not.
+
+    Parameters
+    ----------
+    T : array-like, shape (..., 4, 4) or (..., 3, 3)
+    name : str
+        What a refusal calls it.
+
+    Returns
+    -------
+    R : array, shape (..., 3, 3)
+    """
     T = as_finite(T, name)
     if T.shape[-2:] not in ((3, 3), (4, 4)):
         raise ValueError(f"{name} must have shape (..., 4, 4) or (..., 3, 3), got {T.shape}")
@@ -172,7 +262,21 @@ def rotation_block(T, name="T"):
 
 
 def rotation_angle(T):
-    """Angle of the rotation in T (rad, 0 to pi), accurate at both ends; (..., 4, 4) or (..., 3, 3) -> (...)."""
+    """Angle of a rotation, accurate also near 0 and pi.
+
+    Parameters
+    ----------
+    T : array-like, shape (..., 4, 4) or (..., 3, 3)
+
+    Returns
+    -------
+    angle : array, shape (...)
+        From 0 to pi (rad).
+
+    See Also
+    --------
+    pose_distance : the angle and the distance between two poses.
+    """
     R = rotation_block(T)
     twice_sin = np.linalg.norm(
         np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1), axis=-1
@@ -181,7 +285,19 @@ def rotation_angle(T):
 
 
 def pose_distance(T1, T2):
-    """How far two poses are apart: (angle in rad, distance of the origins in the unit of T), each of shape (...)."""
+    """How far two poses are apart.
+
+    Parameters
+    ----------
+    T1, T2 : array-like, shape (..., 4, 4)
+
+    Returns
+    -------
+    angle : array, shape (...)
+        Angle of the rotation between them (rad).
+    distance : array, shape (...)
+        Distance of their origins, in the unit of the poses.
+    """
     T1, T2 = as_transforms(T1, "T1"), as_transforms(T2, "T2")
     fit_together(T1=T1.shape[:-2], T2=T2.shape[:-2])
     distance = np.linalg.norm(T1[..., :3, 3] - T2[..., :3, 3], axis=-1)
@@ -213,10 +329,21 @@ def matrix_from_kuka(xyzabc):
 
 
 def kuka_from_matrix(T):
-    """KUKA pose x, y, z, A, B, C (rad) of a transform; (..., 4, 4) -> (..., 6).
+    """KUKA pose of a transform.
 
-    B lies in [-pi/2, pi/2], A and C in [-pi, pi]. At B = +-pi/2 only A -+ C is determined; there A comes out of what
-    rounding left, or 0, and C takes the rest, so that `matrix_from_kuka` always returns the same T.
+    Parameters
+    ----------
+    T : array-like, shape (..., 4, 4)
+
+    Returns
+    -------
+    xyzabc : array, shape (..., 6)
+        x, y, z, then A, B, C (rad): B in [-pi/2, pi/2], A and C in [-pi, pi]. At B = +-pi/2 only A -+ C is
+        determined; there A comes out of what rounding left, or 0, and C takes the rest.
+
+    See Also
+    --------
+    matrix_from_kuka : the way back; it always returns the same T.
     """
     T = as_transforms(T, "T")
     a = np.arctan2(T[..., 1, 0], T[..., 0, 0])
@@ -227,13 +354,37 @@ def kuka_from_matrix(T):
 
 
 def kuka_from_degrees(xyzabc_deg):
-    """KUKA poses as a controller displays them (A, B, C in degrees) with the angles turned into radians; (..., 6)."""
+    """KUKA poses with the angles in radians.
+
+    Parameters
+    ----------
+    xyzabc_deg : array-like, shape (..., 6)
+        x, y, z, then A, B, C in degrees, as a controller displays them.
+
+    Returns
+    -------
+    xyzabc : array, shape (..., 6)
+    """
     xyzabc_deg = as_points(xyzabc_deg, "xyzabc_deg", dim=6)
     return np.concatenate([xyzabc_deg[..., :3], np.deg2rad(xyzabc_deg[..., 3:])], axis=-1)
 
 
 def matrix_from_quaternion(xyzw):
-    """Rotation matrix of a quaternion, scalar last, of any nonzero length; (..., 4) -> (..., 3, 3)."""
+    """Rotation matrix of a quaternion.
+
+    Parameters
+    ----------
+    xyzw : array-like, shape (..., 4)
+        Scalar last, of any length but zero.
+
+    Returns
+    -------
+    R : array, shape (..., 3, 3)
+
+    See Also
+    --------
+    quaternion_from_matrix : the way back.
+    """
     q = as_points(xyzw, "xyzw", dim=4)
     if (q == 0).all(-1).any():
         raise ValueError("xyzw must not be the zero quaternion: it is no rotation")
@@ -244,7 +395,16 @@ def matrix_from_quaternion(xyzw):
 
 
 def quaternion_from_matrix(R):
-    """Quaternion x, y, z, w with w >= 0 of a rotation matrix; (..., 3, 3) -> (..., 4).
+    """Quaternion of a rotation matrix.
+
+    Parameters
+    ----------
+    R : array-like, shape (..., 3, 3)
+
+    Returns
+    -------
+    xyzw : array, shape (..., 4)
+        Scalar last, w >= 0, length 1.
 
     See Also
     --------
