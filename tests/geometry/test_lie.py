@@ -72,6 +72,8 @@ def test_log_near_pi_keeps_the_side_in_stacks_of_any_shape():
         lie.log_so3(Rotation.from_rotvec(phi.reshape(-1, 3)).as_matrix().reshape(2, 2, 3, 3)), phi
     )
     np.testing.assert_allclose(lie.log_so3(Rotation.from_rotvec(phi[1, 1]).as_matrix()), phi[1, 1])
+    mixed = np.array([(np.pi - 1e-11) * axes[0, 0], 0.3 * axes[0, 1]])  # so near that R - R' no longer tells the axis
+    np.testing.assert_allclose(lie.log_so3(Rotation.from_rotvec(mixed).as_matrix()), mixed, atol=1e-7)
 
 
 @pytest.mark.parametrize("angle", (1e-5, 3e-4, 9.99e-4, 1.01e-3, 0.5, 3.0))
