@@ -88,7 +88,7 @@ def test_refuses_in_the_same_words(z, C, cov_z, x0):
 
 
 def test_a_huge_prior_leaves_no_rounding_behind():
-    """The velocity is measured: every entry to nine digits, though what is left is a billionth of what was subtracted (Joseph's form)."""
+    """Nine digits of every entry, though what is left of the measured velocity is a billionth of the prior (Joseph)."""
     for size in (1e6, 3e6, 7e6):
         given = Z[:3], system(2)[0], [[0.0, 1.0]], [[1e-3]], np.zeros(2), size * np.diag([1.1, 1.3])
         np.testing.assert_allclose(filter_steps(*given).cov, kalman.filter_steps(*given).cov, rtol=1e-9)
