@@ -5,6 +5,7 @@
     python lab.py test              set up if need be, and run every test
     python lab.py reset NN          a fresh chapter NN; your copy of it is kept beside it
     python lab.py progress          what you have solved
+    python lab.py calibrate ...     your own poses in, a calibration with covariance, outliers and advice out
     python lab.py ledger            every number the four documents print, recomputed
     python lab.py build [NN ...]    for authors: write the notebooks from solutions/NN_name.py
     python lab.py build --check     for authors: say which notebooks are stale
@@ -34,6 +35,7 @@ ROOT = Path(__file__).resolve().parent
 OLDEST = (3, 11)
 FIRST_NOTEBOOK = "notebooks/00_start_here.ipynb"
 FIRST_PORT, PORTS = 8888, 50
+ON_OWN_FILES = ("calibrate",)  # verbs whose files are named from the folder one stands in
 OVERRIDES = {
     # neither news nor a look for updates: nothing is asked, and no other host is called
     "@jupyterlab/apputils-extension:notification": {"fetchNews": "false", "checkForUpdates": False},
@@ -68,7 +70,9 @@ def main(arguments):
             return 0
         options = lab_options(rest) if verb == "lab" else None
         python = set_up(ROOT)
-        return start_lab(python, *options) if verb == "lab" else call(command(verb, python, rest))
+        if verb == "lab":
+            return start_lab(python, *options)
+        return call(command(verb, python, rest), Path.cwd() if verb in ON_OWN_FILES else ROOT)
     except Refusal as reason:
         print(reason, file=sys.stderr)
         return 1
@@ -91,7 +95,7 @@ def split(arguments):
     if not arguments or arguments[0].startswith("-"):
         return "lab", list(arguments)
     verb, rest = arguments[0], list(arguments[1:])
-    verbs = ("test", "build", "reset", "progress", "ledger")
+    verbs = ("test", "build", "reset", "progress", "ledger", *ON_OWN_FILES)
     if verb not in verbs:
         raise Refusal(f"There is no command {verb!r}. There are {', '.join(verbs)}; see: python lab.py --help")
     if verb == "reset" and not rest:
@@ -101,6 +105,8 @@ def split(arguments):
 
 def command(verb, python, rest):
     """The command line behind every verb but the first."""
+    if verb in ON_OWN_FILES:
+        return [python, "-m", "labkit", verb, *rest]
     return {
         "test": [python, str(ROOT / "tests" / "run.py"), *rest],
         "build": [python, "-m", "labkit.verbs.build", *rest],
@@ -354,9 +360,9 @@ def is_free(ip, port):
     return True
 
 
-def call(words, **environment):
-    """Run a command in this folder until it ends, handing signals on; returns its exit code."""
-    process = subprocess.Popen(words, cwd=str(ROOT), env={"PYTHONUTF8": "1", **environment, **os.environ})
+def call(words, folder=ROOT, **environment):
+    """Run a command in a folder (this one by default) until it ends, handing signals on; returns its exit code."""
+    process = subprocess.Popen(words, cwd=str(folder), env={"PYTHONUTF8": "1", **environment, **os.environ})
     if hasattr(signal, "SIGTERM"):
         signal.signal(signal.SIGTERM, lambda number, frame: process.terminate())
     while True:

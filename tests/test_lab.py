@@ -188,6 +188,8 @@ def test_verbs_and_options():
     assert lab.split(["--port", "9000"]) == ("lab", ["--port", "9000"])
     assert lab.split(["test", "-k", "invert"]) == ("test", ["-k", "invert"])
     assert lab.split(["--help"]) == ("help", [])
+    assert lab.split(["calibrate", "--help"]) == ("calibrate", ["--help"])
+    assert lab.command("calibrate", "py", ["pivot", "p.csv"]) == ["py", "-m", "labkit", "calibrate", "pivot", "p.csv"]
     with pytest.raises(lab.Refusal, match="no command 'tset'. There are test, build, reset, progress, ledger"):
         lab.split(["tset"])
     with pytest.raises(lab.Refusal, match="Which chapter"):

@@ -8,4 +8,7 @@ literature  the methods of Kim and of Li, as the thesis cites them
 motion      how the robot has to turn, and the refusal where it does not
 robust      weights and scales that bad measurements cannot carry away
 result      the one convention for what an estimator returns
+
+calibrate   one call from one's own poses to a result with covariance, outliers and advice
+own_data    what it fits, what disagrees, what to measure next; advice puts it in words
 """

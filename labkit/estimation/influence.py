@@ -20,15 +20,20 @@ def _blocks(residuals, jacobian):
     return r, J
 
 
-def _inverse_normal(J):
-    """N^-1 by scaled columns; refuses parameters that the blocks leave undetermined."""
+def inverse_normal(J):
+    """(sum J_i'J_i)^-1, (n, k, p) -> (p, p); refuses parameters that the blocks leave undetermined."""
     flat = J.reshape(-1, J.shape[2])
-    scale = np.sqrt((flat**2).sum(0))
+    return invert_normal(flat.T @ flat)
+
+
+def invert_normal(N):
+    """Inverse of a normal matrix with its columns scaled alike, (p, p); refuses one that is singular beside that."""
+    scale = np.sqrt(np.diagonal(N))
     if not (scale > 0).all():
-        raise ValueError("jacobian must not hold a column of zeros: that parameter is not determined")
-    values, vectors = np.linalg.eigh((flat / scale).T @ (flat / scale))
+        raise ValueError("a parameter changes no residual, so it is not determined")
+    values, vectors = np.linalg.eigh(N / scale / scale[:, None])
     if values[0] <= 1e-12 * values[-1]:
-        raise ValueError("jacobian leaves a direction of the parameters undetermined")
+        raise ValueError("the measurements leave a direction of the parameters undetermined")
     half = vectors / np.sqrt(values) / scale[:, None]
     return half @ half.T
 
@@ -51,7 +56,7 @@ def squared_distances(residuals, jacobian, kept):
     """
     r, J = _blocks(residuals, jacobian)
     kept = np.asarray(kept, bool)
-    H = J @ _inverse_normal(J[kept]) @ np.swapaxes(J, 1, 2)
+    H = J @ inverse_normal(J[kept]) @ np.swapaxes(J, 1, 2)
     spread = np.eye(r.shape[1]) - np.where(kept, 1.0, -1.0)[:, None, None] * H
     values, vectors = np.linalg.eigh(spread)
     along = (np.swapaxes(vectors, 1, 2) @ r[..., None])[..., 0]
@@ -84,17 +89,23 @@ def leave_out(residuals, jacobian, groups=None):
         Estimate without the group minus the estimate with it, groups in ascending order.
     """
     r, J = _blocks(residuals, jacobian)
-    labels = np.arange(len(r)) if groups is None else as_shape(groups, "groups", len(r))
-    inverse = _inverse_normal(J)
-    predicted, shifts = np.full_like(r, np.nan), []
+    inverse = inverse_normal(J)
+    if groups is None:
+        return _without(r, J, inverse)
+    labels, predicted, shifts = as_shape(groups, "groups", len(r)), np.full_like(r, np.nan), []
     for label in np.unique(labels):
         at = labels == label
-        Ji, ri = J[at].reshape(-1, J.shape[2]), r[at].ravel()
-        spread = np.eye(len(ri)) - Ji @ inverse @ Ji.T
-        if np.linalg.eigvalsh(spread)[0] > 1e-9:
-            alone = np.linalg.solve(spread, ri)
-            predicted[at] = alone.reshape(-1, r.shape[1])
-            shifts.append(inverse @ Ji.T @ alone)
-        else:
-            shifts.append(np.full(J.shape[2], np.nan))
+        alone, shift = _without(r[at].reshape(1, -1), J[at].reshape(1, -1, J.shape[2]), inverse)
+        predicted[at] = alone.reshape(-1, r.shape[1])
+        shifts.append(shift[0])
     return predicted, np.array(shifts)
+
+
+def _without(r, J, inverse):
+    """Residuals (n, k) and shifts (n, p) of blocks left out one by one, NaN where the others do not determine all."""
+    spread = np.eye(r.shape[1]) - J @ inverse @ np.swapaxes(J, 1, 2)
+    known = np.linalg.eigvalsh(spread)[:, 0] > 1e-9
+    predicted, shifts = np.full_like(r, np.nan), np.full((len(r), J.shape[2]), np.nan)
+    predicted[known] = np.linalg.solve(spread[known], r[known][..., None])[..., 0]
+    shifts[known] = (inverse @ np.swapaxes(J[known], 1, 2) @ predicted[known][..., None])[..., 0]
+    return predicted, shifts

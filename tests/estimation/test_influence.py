@@ -49,7 +49,7 @@ def test_distances_follow_chi_square_fitted_or_not():
 def test_what_stays_undetermined_is_refused_or_unknown():
     flat = J.copy()
     flat[..., 0] = 0
-    with pytest.raises(ValueError, match="not determined"):
+    with pytest.raises(ValueError, match="so it is not determined"):
         leave_out(Y, flat)
     flat[..., 0] = flat[..., 1]
     with pytest.raises(ValueError, match="undetermined"):

@@ -1,0 +1,102 @@
+"""What a calibration leaves unknown, in words, and what went wrong with the roles of its files."""
+
+import numpy as np
+
+from ..geometry.frames import invert
+from ..geometry.lie import log_so3
+from .own_data import HandEyeModel
+
+WORSE = 2.0  # times: a direction this much less certain than the best is worth a sentence
+LEAST_TURN = np.deg2rad(1.0)  # rms turn about the second axis of the motions; less is one axis
+CLEARLY = 10.0  # times better, in angle or distance, that another role must fit, and worse in neither
+PLAIN = 0.02  # of the turn about the second axis: a loop that closes this well has its roles right
+OPEN = 0.3  # of the turn about the second axis: residuals as large are no noise
+AXES = "xyz"
+HYPOTHESES = (  # robot inverted, sensor inverted, what it means; with both, or files exchanged, the loop closes alike
+    (False, True, "it seems that the sensor file holds the sensor in the target, not the target in the sensor"),
+    (True, False, "it seems that the robot file holds the base in the flange, or that {other} was meant"),
+)
+
+
+def axis_name(v, frame):
+    """A direction in words: `the flange's z axis`, or its three numbers where it is none."""
+    v = v * np.sign(v[np.argmax(np.abs(v))])
+    k = int(np.argmax(np.abs(v)))
+    if abs(v[k]) > 0.94:  # within 20 deg
+        return f"the {frame}'s {AXES[k]} axis"
+    return f"the direction ({', '.join(f'{x + 0.0:.2f}' for x in v)}) of the {frame}"
+
+
+def weak_direction(covariance, frame, what):
+    """(ratio, axis, best axis) of a 3 x 3 block of a covariance, and the sentence about it or None.
+
+    what: "turning about" or "the position along".
+    """
+    values, vectors = np.linalg.eigh(covariance)
+    if not values[-1] > 0:
+        return 1.0, None
+    ratio = float(np.sqrt(values[-1] / max(values[0], 1e-300)))
+    worst, best = (axis_name(vectors[:, k], frame) for k in (2, 0))
+    if ratio < WORSE:
+        return ratio, None
+    times = f"{ratio:.0f}" if ratio >= 10 else f"{ratio:.1f}"
+    return ratio, f"{what} {worst} is known {times} times worse than {'about' if 'about' in what else 'along'} {best}"
+
+
+def axis_spread(T):
+    """Rms turn of poses about each principal axis of their motions, largest first (rad), and these axes as columns."""
+    middle = T[len(T) // 2, :3, :3]
+    turns = log_so3(middle.T @ T[:, :3, :3])
+    values, vectors = np.linalg.eigh(turns.T @ turns / len(T))
+    return np.sqrt(np.maximum(values[::-1], 0.0)), vectors[:, ::-1]
+
+
+def refuse_one_axis(T, name="the flange"):
+    """Refuse poses that turn about one axis only, or not at all: they leave a direction free."""
+    spread, axes = axis_spread(T)
+    if spread[0] < LEAST_TURN:
+        raise ValueError(f"{name} does not turn, by {np.rad2deg(spread[0]):.2g} deg (rms): nothing can be calibrated")
+    if spread[1] < LEAST_TURN:
+        raise ValueError(
+            f"{name} turns about one axis only, {axis_name(axes[:, 0], 'flange')}, by {np.rad2deg(spread[0]):.3g} deg, "
+            f"and by {np.rad2deg(spread[1]):.2g} deg across it: one direction stays free, tilt it about a second axis"
+        )
+
+
+def refuse_mixed_roles(model, eye_to_hand):
+    """Refuse poses whose inverses close the loop far better: (robot or sensor) files that mean something else."""
+    turn, reach = axis_spread(model.T_BF)[0][1], np.linalg.norm(model.T_ST[:, :3, 3], axis=1).max()
+    if model.misfit[0] < PLAIN * turn and model.misfit[1] < PLAIN * turn * reach:
+        return  # wrong roles miss by as much as the poses turn
+    found = []
+    for robot, sensor, sentence in HYPOTHESES:
+        T_BF, T_ST = (invert(T) if inverse else T for T, inverse in ((model.T_BF, robot), (model.T_ST, sensor)))
+        angle, distance = HandEyeModel(T_BF, T_ST).misfit
+        ratios = model.misfit[0] / (angle + 1e-12), model.misfit[1] / (distance + 1e-12)
+        found.append((max(ratios) if min(ratios) > 0.5 else 0.0, sentence))
+    better, sentence = max(found)
+    if better > CLEARLY:
+        other = "no --eye-to-hand" if eye_to_hand else "--eye-to-hand"
+        raise ValueError(f"{sentence.format(other=other)}: so taken, the loop closes {better:.0f} times better")
+
+
+def refuse_open_loop(T, residuals):
+    """Refuse residuals (n, 6) as large as the turns of the poses: nothing closes, so nothing is calibrated."""
+    angle, turn = np.sqrt((residuals[:, :3] ** 2).sum(1).mean()), axis_spread(T)[0][1]
+    if angle > OPEN * turn:
+        length = np.sqrt((residuals[:, 3:] ** 2).sum(1).mean())
+        raise ValueError(
+            f"the loop does not close: even the rows that agree best miss by {np.rad2deg(angle):.3g} deg and "
+            f"{length:.3g} (rms), while the poses turn by {np.rad2deg(turn):.3g} deg: "
+            "are the rows of both files in the same order?"
+        )
+
+
+def moved_block(kept, agree):
+    """(first, last) row, counted from 1, of one block of rejected rows that agree among themselves, or None."""
+    out = np.flatnonzero(~kept)
+    if len(out) < 4 or not agree:
+        return None
+    first, last = out[0], out[-1]
+    inside = (~kept[first : last + 1]).mean()
+    return (int(first) + 1, int(last) + 1) if inside > 0.85 else None
