@@ -200,7 +200,7 @@ class HandEyeModel(Model):
 
     def fit(self, kept):
         found = calibrate_hand_eye(self.T_BF[kept], self.T_ST[kept], *self.std)
-        return found.T_FS, found.target
+        return found.T_FS, found.T_BT
 
     def linearize(self, solution):
         X, Y = solution
