@@ -7,6 +7,7 @@ listings C10, C14, C16, C17.
 
 import functools
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -226,6 +227,19 @@ def centers_with_radius(x_S, R, printed_radius=30.0):
     return x_S
 
 
+class Simulation(NamedTuple):
+    """The simulation model of the thesis.
+
+    T_BF: array (13, 4, 4), mm. x_S: array (13, 3), mm. target: array (3,), mm. scanner_deg: array (6,), the true pose
+    of the scanner, mm and deg.
+    """
+
+    T_BF: np.ndarray
+    x_S: np.ndarray
+    target: np.ndarray
+    scanner_deg: np.ndarray
+
+
 def simulation(exact=True, printed=False):
     """The thirteen poses of the simulation model.
 
@@ -242,11 +256,7 @@ def simulation(exact=True, printed=False):
 
     Returns
     -------
-    T_BF : array, shape (13, 4, 4), mm
-    x_S : array, shape (13, 3), mm
-    target : array, shape (3,), mm
-    scanner : array, shape (6,), mm and deg
-        The true pose of the scanner.
+    Simulation
 
     Source: thesis, table 6-2 and listing C10.
     """
@@ -265,7 +275,7 @@ def simulation(exact=True, printed=False):
     if exact and not printed:
         T_FS = frames.matrix_from_kuka(frames.kuka_from_degrees(scanner))
         x_S = frames.transform(frames.invert(T_FS), frames.transform(frames.invert(T_BF), target))
-    return T_BF, x_S, target, scanner
+    return Simulation(T_BF, x_S, target, scanner)
 
 
 def start_poses_deg():
