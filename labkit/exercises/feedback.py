@@ -5,6 +5,7 @@ import html
 import ipywidgets
 from IPython.display import display
 
+from .. import live
 from .engine import CORRECT, NOT_YET, RAISED, TO_DO
 
 SIGNS = {TO_DO: "○", NOT_YET: "✗", CORRECT: "✓", RAISED: "!"}
@@ -57,21 +58,22 @@ def _marked(text):
 
 
 class Named(ipywidgets.VBox):
-    """A box of widgets with a constant text where no front end runs."""
+    """A box of widgets with a constant text where no front end runs, and `still()`, HTML of what it shows now."""
 
-    def __init__(self, children, text):
+    def __init__(self, children, text, still):
         super().__init__(children)
-        self.text = text
+        self.text, self.still, self._live = text, still, None
 
     def __repr__(self):
         return self.text
 
-    def _repr_mimebundle_(self, include=None, exclude=None, **kwargs):
-        bundle = super()._repr_mimebundle_(**kwargs) or {}
-        data = bundle[0] if isinstance(bundle, tuple) else bundle
-        data["text/plain"] = self.text
-        data.pop("text/html", None)
-        return data
+    def _ipython_display_(self):
+        self._live = live.show(lambda: self, self.text, self.still)
+
+    def store(self):
+        """What it shows has changed: the notebook shall remember it."""
+        if self._live:
+            self._live.refresh()
 
 
 def button(label, action):
@@ -87,17 +89,17 @@ def button_row(hint, solution, starter):
 
     def show(panel):
         shown.value = panel.html()
+        row.store()
 
     def next_hint():
         panel, left = hint()
-        show(panel)
         hints.description = f"Hint ({left} left)" if left else "Hints again"
+        show(panel)
 
     hints = button("Hint", next_hint)
-    row = ipywidgets.HBox(
-        [hints, button("Solution", lambda: show(solution())), button("Start over", lambda: show(starter()))]
-    )
-    return Named([row, shown], "[buttons: hint, solution, start over]")
+    buttons = [hints, button("Solution", lambda: show(solution())), button("Start over", lambda: show(starter()))]
+    row = Named([ipywidgets.HBox(buttons), shown], "[buttons: hint, solution, start over]", lambda: shown.value)
+    return row
 
 
 def show(thing):

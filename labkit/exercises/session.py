@@ -289,13 +289,23 @@ def _question(chapter, item, reveal):
     """The question with a button for each choice; a click locks it in and puts the figure beneath."""
     text = ipywidgets.HTML(Panel(f"{item.id}: predict first", [item.question], TO_DO).html())
     answers = ipywidgets.HBox(layout=ipywidgets.Layout(flex_flow="row wrap"))
+    name = f"[predict first: {item.question} {' | '.join(map(str, item.choices))}]".replace(" ]", "]")
+    choices = "".join(f"<li>{html.escape(str(choice))}</li>" for choice in item.choices)
+    revealed = []
     box = Named(
-        [text, answers], f"[predict first: {item.question} {' | '.join(map(str, item.choices))}]".replace(" ]", "]")
+        [text, answers],
+        name,
+        lambda: text.value + (f"<ul>{choices}</ul>" if answers.children else "".join(t.still() for t in revealed)),
     )
 
     def lock(choice):
         text.value = _locked_panel(chapter, item, choice, first=True).html()
-        box.children = [text, reveal()] if reveal else [text]
+        answers.children = []
+        revealed.extend([reveal()] if reveal else [])
+        box.children = [text, *(thing.widget for thing in revealed)]
+        for thing in revealed:
+            thing.at_rest.append(box.store)
+        box.store()
 
     if item.choices:
         answers.children = [feedback.button(str(c), lambda c=c: lock(c)) for c in item.choices]

@@ -1,6 +1,9 @@
 """The figure one can touch; it knows no chapter and no mathematics.
 
-stage       the Stage: handles, controls, presets, play
+stage       the Stage: state, presets, what goes to the page and comes from it
+controls    what one may declare: handles, sliders, choices, toggles, time
+stage.js    the front end, the same in notebooks and on any other page
+front       a Stage in a notebook
 canvas      pictures drawn, compared and sent
 scene3d     points, lines and triads in space
 style       colors and letters by role
@@ -8,7 +11,8 @@ marks       small things that several chapters draw
 connection  pictures leave the server at once
 """
 
+from .controls import Choice, Handle, Play, Slider, Toggle
 from .scene3d import View
-from .stage import Choice, Handle, Play, Slider, Stage, Toggle
+from .stage import Stage
 
 __all__ = ["Choice", "Handle", "Play", "Slider", "Stage", "Toggle", "View"]

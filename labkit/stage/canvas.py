@@ -8,6 +8,7 @@ pictures go first and whenever too much changes: PNG without row filters, deflat
 pixels, against 12 ms by Pillow at level 1 and 9 ms as WebP.
 """
 
+import io
 import struct
 import threading
 import zlib
@@ -15,13 +16,18 @@ from time import monotonic
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from PIL import Image
 
 from . import style
 from .renderer import Canvas
 
 CSS_DPI = 100  # a figure inch is 100 CSS pixels: 10 pt text is as large as the notebook's own
-MAX_RATIO = 2.5  # device pixels per CSS pixel; sharper screens see no difference
-MIN_SCALE = 0.85  # a narrower cell shrinks the whole picture, letters too, instead of crowding it further
+MAX_PIXELS = 5e6  # of a picture; beyond, a sharper screen gets fewer of its pixels
+MIN_SCALE = 0.85  # a narrower or lower place shrinks the whole picture, letters too, instead of crowding it further
+MAX_STRETCH = 1.45  # a low place makes the picture so much wider than designed, but no wider
+STORED_WIDTH, STORED_COLORS = 700, 48  # pixels and colors of a picture in a file
+RING = 13  # points across the ring of a handle in such a picture
 MAX_CHANGES = 150_000  # pixels, four bytes each; beyond, decoding a whole picture is the quicker way
 MAX_PASSES = 4  # of the layout, which halves its error in each
 
@@ -38,13 +44,12 @@ class Picture:
     scene : function(fig) -> (artists, update)
         Draws everything once. `artists` are the moving ones, `update(...)` sets them in place.
     size : (width, height)
-        In inches of 100 CSS pixels: the largest width at which the picture is shown; narrower cells keep the
-        proportions.
+        In inches of 100 CSS pixels, as designed; the picture takes the room it is given and keeps its letters' size.
     """
 
     def __init__(self, scene, size):
         self.size = size
-        self.width, self.ratio = size[0] * CSS_DPI, 1.0
+        self.width, self.height, self._room = size[0] * CSS_DPI, size[1] * CSS_DPI, None
         self.fig = Figure(figsize=size, dpi=CSS_DPI, layout="constrained")
         self.canvas = Canvas(self.fig)
         with DRAWING, style.rc():
@@ -61,18 +66,25 @@ class Picture:
     def dark(self):
         return self.canvas.dark
 
-    def fit(self, width, ratio, dark):
-        """Adopt the width of the cell (CSS pixels), the device's pixel ratio and the theme."""
-        width = min(max(float(width), 120.0), self.size[0] * CSS_DPI)
-        ratio = min(max(float(ratio), 1.0), MAX_RATIO)
+    def fit(self, width, height, ratio, dark, letters=1.0):
+        """Adopt a room of width x height (CSS pixels), the device's pixel ratio, the theme, and the size of the letters
+        around, as a multiple of the designed one.
+        """
         if bool(dark) != self.dark:
             self.canvas.dark, self._background = bool(dark), None
-        if (width, ratio) == (self.width, self.ratio):
+        room = max(float(width), 120.0), max(float(height), 120.0), float(ratio), float(letters)
+        if room == self._room:
             return
-        self.width, self.ratio = width, ratio
-        inches = max(width / CSS_DPI, MIN_SCALE * self.size[0])
-        self.fig.set_dpi(width * ratio / inches)
-        self.fig.set_size_inches(inches, inches * self.size[1] / self.size[0])
+        self._room = room
+        width, height, ratio, letters = room
+        aspect = self.size[1] / self.size[0]
+        height = min(height, width * aspect)
+        self.width, self.height = round(min(width, MAX_STRETCH * height / aspect)), round(height)
+        inches = np.array([self.width, self.height]) / (CSS_DPI * letters)
+        inches /= min(1.0, *(inches / (MIN_SCALE * np.array(self.size))))
+        ratio = min(max(ratio, 1.0), np.sqrt(MAX_PIXELS / (self.width * self.height)))
+        self.fig.set_dpi(self.width * ratio / inches[0])
+        self.fig.set_size_inches(*inches)
         self.fig.set_layout_engine("constrained")
         self._background = None
 
@@ -118,6 +130,24 @@ class Picture:
         """The picture as PNG bytes."""
         with DRAWING:
             return encode_png(self.draw(), self.fig.dpi)
+
+    def small_png(self, rings=()):
+        """The picture in few colors, with rings at (fraction, color): some 20 kB."""
+        with DRAWING:
+            self.draw()
+            renderer = self.canvas.get_renderer()
+            for (right, down), color in rings:
+                x, y = right * self.fig.bbox.width, (1 - down) * self.fig.bbox.height
+                look = {"marker": "o", "markersize": RING, "markerfacecolor": "none", "markeredgewidth": 1.6}
+                ring = Line2D([x], [y], markeredgecolor=color, **look)
+                ring.set_figure(self.fig)
+                ring.draw(renderer)
+            image = Image.fromarray(np.array(renderer.buffer_rgba())[..., :3])
+        if image.width > STORED_WIDTH:
+            image = image.resize((STORED_WIDTH, round(image.height * STORED_WIDTH / image.width)))
+        file = io.BytesIO()
+        image.quantize(STORED_COLORS, dither=Image.Dither.NONE).save(file, "png", optimize=True)
+        return file.getvalue()
 
     def news(self, whole=False):
         """What the browser lacks since the last call: [png], or [runs, colors] of the changed pixels."""

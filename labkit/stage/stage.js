@@ -1,316 +1,781 @@
-// The picture of a Stage and the handles over it. Everything that happens is merged into `pending`; one message is in flight,
-// the next one carries what came meanwhile, so that a drag never queues up. Python answers with one picture.
+// A Stage in a page: the picture, the handles over it, the words under it, and the controls it declares.
+//
+// Whoever shows it (a notebook, a demo page, a reading edition) hands `render` an element and a model of four functions:
+//
+//   get("declaration")       what does not change: Stage.declaration() of labkit/stage/stage.py, as JSON
+//   on("msg:custom", hear)   from now on hear(message, buffers) is called with what Stage sends; buffers are DataViews
+//   off("msg:custom", hear)  no more
+//   send(message)            to Stage.receive(message), as JSON
+//
+// A model may also announce "comm_live_update": the line to Python was cut or mended. `render` returns a function that
+// takes everything down again. Nothing here knows what a value means: sliders and words speak in positions.
 
+const PATIENCE = 2500; // ms until a message without an answer is given up, and said
+const SPEAK_AFTER = 700; // ms of rest until a screen reader hears the new caption,
+const SPEAK_EVERY = 2000; // ms between two captions it hears while the picture keeps changing
+const REST = 900; // ms without an event until the picture may be stored
+const SETTLED = 150; // ms without a change of size or theme until the picture follows
+const CLICK_RADIUS = 4; // CSS pixels
+const NEAR = 13; // CSS pixels: handles nearer than that are fanned out
+const MAX_ARROWS = 10; // presses kept while a message is in flight
+const CALM_INTERVAL = 500; // ms from picture to picture where the reader asks for reduced motion
+const LETTERS = 13; // CSS pixels of the words around, at which the picture's letters have their own size
+const LARGEST = 2.4; // times as large letters may become in the whole window
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const NAMES = { ArrowLeft: "left", ArrowRight: "right", ArrowUp: "up", ArrowDown: "down" };
-const PATIENCE = 3000; // ms until a message without an answer (kernel restarted) is given up
-const SPEAK_AFTER = 700; // ms of rest until a screen reader hears the new caption
-const CLICK_RADIUS = 4; // CSS pixels
-const MAX_ARROWS = 10; // presses kept while a message is in flight
-
-function element(tag, className, attributes = {}) {
-  const node = document.createElement(tag);
-  node.className = className;
-  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
-  return node;
-}
-
-function isDark() {
-  return document.body.dataset.jpThemeLight === "false";
-}
+const SILENT = "Python does not answer. It is busy with another cell, or it was restarted: then Run All makes the figure live again.";
 
 function render({ model, el }) {
-  const view = Math.random().toString(36).slice(2);
-  const root = element("div", "labkit-stage");
-  const picture = element("div", "picture");
-  const canvas = element("canvas", "", { role: "img" });
-  const caption = element("p", "caption", { "aria-hidden": "true" });
-  const status = element("p", "status", { role: "status" });
-  const spoken = element("div", "spoken", { "aria-live": "polite" });
-  picture.append(canvas);
-  root.append(picture, status, caption, spoken);
-  el.append(root);
-  const paper = canvas.getContext("2d", { willReadFrequently: true });
-  const handles = new Map();
-
-  // ---- to Python: one message in flight
-  let pending = {};
-  let flight = null;
-  let timer = 0;
-  let sent = 0;
-  let count = 0;
-  let shown = 0;
-
-  function flush() {
-    if (flight !== null || Object.keys(pending).length === 0) return;
-    flight = `${view}:${++count}`;
-    sent = performance.now();
-    model.send({ ...pending, shown, serial: flight });
-    pending = {};
-    timer = setTimeout(() => { flight = null; flush(); }, PATIENCE);
-  }
-
-  function add(key, combine) {
-    pending[key] = combine(pending[key]);
-    flush();
-  }
-
-  // ---- from Python: whole pictures, and what changed since the one before
-  let queue = [];
-  let decoding = false;
-  let image = null; // the pixels shown
-
-  function draw() {
-    while (queue.length && !decoding) {
-      const { message, buffers } = queue.shift();
-      if (message.on === null) decode(message, buffers[0]);
-      else if (message.on === shown && image) {
-        change(...buffers.map(numbers));
-        show(message);
-      } else {
-        last = "";
-        look(); // a picture was lost: a whole one is needed
-      }
-    }
-  }
-
-  async function decode(message, png) {
-    decoding = true;
-    try {
-      const bitmap = await createImageBitmap(new Blob([png], { type: "image/png" }));
-      canvas.width = bitmap.width;
-      canvas.height = bitmap.height;
-      paper.drawImage(bitmap, 0, 0);
-      image = paper.getImageData(0, 0, bitmap.width, bitmap.height);
-      show(message);
-    } catch (error) {
-      console.error("stage: the picture could not be decoded", error);
-      flush(); // what happened meanwhile need not wait for the next event
-    }
-    decoding = false;
-    draw();
-  }
-
-  function numbers(view) {
-    return new Uint32Array(view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength));
-  }
-
-  function change(runs, colors) { // runs of changed pixels: first place, length
-    if (!colors.length) return;
-    const pixels = new Uint32Array(image.data.buffer);
-    for (let k = 0, used = 0; k < runs.length; used += runs[k + 1], k += 2) {
-      pixels.set(colors.subarray(used, used + runs[k + 1]), runs[k]);
-    }
-    const top = Math.floor(runs[0] / image.width);
-    const bottom = Math.floor((runs[runs.length - 2] + runs[runs.length - 1] - 1) / image.width);
-    paper.putImageData(image, 0, 0, 0, top, image.width, bottom - top + 1);
-  }
-
-  function onMessage(message, buffers) {
-    if (message.picture === undefined) return;
-    if (message.serial !== null && message.serial === flight) {
-      flight = null;
-      clearTimeout(timer);
-      root.dataset.answer = (performance.now() - sent).toFixed(1); // ms, for the benchmark
-    }
-    if (message.on === null) queue = []; // the newest wins
-    queue.push({ message, buffers });
-    draw();
-  }
-
-  function show(message) {
-    words(message);
-    shown = message.picture;
-    root.dataset.python = message.milliseconds;
-    root.dataset.picture = message.picture;
-    // every other picture is acknowledged: Python waits after three
-    const quiet = flight === null && Object.keys(pending).length === 0;
-    if (message.serial === null && quiet && shown % 2 === 0) model.send({ shown });
-    flush();
-  }
-
-  // what is said of the picture, and the handles over it
-  function words(message) {
-    picture.style.width = `${message.width}px`;
-    canvas.dataset.empty = message.empty;
-    canvas.dataset.click = message.click;
-    canvas.dataset.keys = message.keys;
-    if (message.keys || message.empty === "turn") {
-      canvas.tabIndex = 0;
-      canvas.setAttribute("role", "application"); // a screen reader passes arrow keys on to it
-    }
-    canvas.setAttribute("aria-label", [message.name, message.caption].filter(Boolean).join(": "));
-    if (caption.textContent !== message.caption) {
-      caption.textContent = message.caption;
-      speak(message.caption);
-    }
-    if (status.textContent !== message.status) status.textContent = message.status;
-    for (const [name, place] of Object.entries(message.handles)) {
-      if (!handles.has(name)) handles.set(name, makeHandle(name));
-      handles.get(name).put(place);
-    }
-  }
-
-  let speaking = 0;
-  function speak(text) {
-    clearTimeout(speaking);
-    speaking = setTimeout(() => { spoken.textContent = text; }, SPEAK_AFTER);
-  }
-
-  // ---- places: fractions of the picture, right and down
-  function fraction(event) {
-    const box = canvas.getBoundingClientRect();
-    const limit = (x) => Math.min(1, Math.max(0, x));
-    return [limit((event.clientX - box.left) / box.width), limit((event.clientY - box.top) / box.height)];
-  }
-
-  function makeHandle(name) {
-    const node = element("div", "handle", {
-      role: "slider", tabindex: "0", "aria-roledescription": "point to drag", "data-handle": name, "data-lm-suppress-shortcuts": "true",
-    });
-    picture.append(node);
-    let held = null; // [pointer's offset right, down] while dragging
-    let corrected = false; // Python keeps it elsewhere than the pointer: then only Python moves it
-    let at = [0, 0];
-
-    const move = ([right, down]) => {
-      at = [right, down];
-      node.style.left = `${100 * right}%`;
-      node.style.top = `${100 * down}%`;
-    };
-    node.addEventListener("pointerdown", (event) => {
-      if (event.button !== 0) return;
-      event.preventDefault();
-      event.stopPropagation();
-      node.focus({ preventScroll: true });
-      node.setPointerCapture(event.pointerId);
-      node.classList.add("held");
-      const [right, down] = fraction(event);
-      held = [at[0] - right, at[1] - down];
-      corrected = false;
-    });
-    node.addEventListener("pointermove", (event) => {
-      if (!held) return;
-      const [right, down] = fraction(event);
-      const target = [right + held[0], down + held[1]];
-      if (!corrected) move(target);
-      add("drag", (drag) => ({ ...drag, [name]: target }));
-    });
-    const release = () => { held = null; node.classList.remove("held"); };
-    node.addEventListener("pointerup", release);
-    node.addEventListener("pointercancel", release);
-    node.addEventListener("lostpointercapture", release);
-    node.addEventListener("keydown", (event) => {
-      const arrow = ARROWS[event.key];
-      if (!arrow || event.ctrlKey || event.metaKey || event.altKey) return;
-      event.preventDefault();
-      event.stopPropagation();
-      const size = event.shiftKey ? 10 : 1;
-      add("step", (step = {}) => {
-        const [right, up] = step[name] ?? [0, 0];
-        return { ...step, [name]: [right + size * arrow[0], up + size * arrow[1]] };
-      });
-    });
-    return {
-      put(place) {
-        node.style.setProperty("--ring", place.color);
-        node.setAttribute("aria-label", place.label);
-        node.setAttribute("aria-valuetext", place.value);
-        node.setAttribute("aria-valuenow", place.now);
-        node.title = place.label;
-        if (held && !corrected) {
-          if (pending.drag?.[name] !== undefined || flight !== null) return; // the pointer is further already
-          const box = canvas.getBoundingClientRect();
-          corrected = Math.hypot((place.at[0] - at[0]) * box.width, (place.at[1] - at[1]) * box.height) > 2;
-        }
-        move(place.at);
-      },
-    };
-  }
-
-  // ---- empty space: click, draw, turn, drive
-  let press = null;
-  canvas.addEventListener("pointerdown", (event) => {
-    if (event.button !== 0) return;
-    press = { x: event.clientX, y: event.clientY, start: fraction(event), moved: false };
-    if (canvas.dataset.empty === "draw" || canvas.dataset.empty === "turn") {
-      canvas.setPointerCapture(event.pointerId);
-      event.preventDefault();
-    }
-    if (canvas.tabIndex === 0) canvas.focus({ preventScroll: true });
-  });
-  canvas.addEventListener("pointermove", (event) => {
-    if (!press) return;
-    const right = event.clientX - press.x;
-    const down = event.clientY - press.y;
-    if (!press.moved && Math.hypot(right, down) < CLICK_RADIUS) return;
-    if (canvas.dataset.empty === "turn") {
-      add("orbit", ([a, b] = [0, 0]) => [a - right, b + down]);
-      press.x = event.clientX;
-      press.y = event.clientY;
-    } else if (canvas.dataset.empty === "draw") {
-      if (!press.moved) {
-        pending.fresh = true;
-        pending.brush = [press.start];
-      }
-      const points = (event.getCoalescedEvents?.() ?? []).map(fraction);
-      add("brush", (path = []) => [...path, ...(points.length ? points : [fraction(event)])]);
-    }
-    press.moved = true;
-  });
-  const release = (event) => {
-    if (press && !press.moved && event.type === "pointerup") {
-      if (canvas.dataset.click === "true") add("click", () => fraction(event));
-      else if (canvas.dataset.empty === "draw") {
-        pending.fresh = true;
-        add("brush", () => [fraction(event)]);
-      }
-    }
-    press = null;
-  };
-  canvas.addEventListener("pointerup", release);
-  canvas.addEventListener("pointercancel", release);
-  canvas.setAttribute("data-lm-suppress-shortcuts", "true");
-  canvas.addEventListener("keydown", (event) => {
-    const arrow = ARROWS[event.key];
-    if (!arrow || event.ctrlKey || event.metaKey || event.altKey) return;
-    event.preventDefault();
-    event.stopPropagation();
-    if (canvas.dataset.keys === "true") {
-      add("arrows", (names = []) => [...names, NAMES[event.key]].slice(-MAX_ARROWS));
-    } else if (canvas.dataset.empty === "turn") {
-      const size = event.shiftKey ? 60 : 10;
-      add("orbit", ([a, b] = [0, 0]) => [a + size * arrow[0], b - size * arrow[1]]);
-    }
-  });
-
-  // ---- what Python must know of the screen
-  let last = "";
-  let width = 0;
-  function look() {
-    width = Math.floor(root.getBoundingClientRect().width) || width; // 0 while hidden, and while a theme is exchanged
-    if (!width) return;
-    const now = { width, ratio: window.devicePixelRatio || 1, dark: isDark() };
-    if (JSON.stringify(now) === last) return;
-    last = JSON.stringify(now);
-    add("look", () => now);
-  }
-  const resizing = new ResizeObserver(look);
-  resizing.observe(root);
-  const theming = new MutationObserver(look);
-  theming.observe(document.body, { attributes: true, attributeFilter: ["data-jp-theme-light", "data-jp-theme-name"] });
-  window.addEventListener("resize", look); // also fired when the zoom, and with it the pixel ratio, changes
-  model.on("msg:custom", onMessage);
-  look();
-
-  return () => {
-    resizing.disconnect();
-    theming.disconnect();
-    window.removeEventListener("resize", look);
-    clearTimeout(timer);
-    clearTimeout(speaking);
-    model.off("msg:custom", onMessage);
-  };
+  const figure = new Figure(model, el);
+  return () => figure.close();
 }
 
 export default { render };
+
+function element(tag, className = "", attributes = {}, children = []) {
+  const node = document.createElement(tag);
+  if (className) node.className = className;
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  node.append(...children);
+  return node;
+}
+
+/** The arrow a key event stands for, [right, up]; none with Ctrl, Alt or Meta. */
+function arrowOf(event) {
+  return event.ctrlKey || event.metaKey || event.altKey ? undefined : ARROWS[event.key];
+}
+
+function taken(event) {
+  event.preventDefault();
+  event.stopPropagation();
+}
+
+const limit = (x) => Math.min(1, Math.max(0, x));
+
+/** All parts of one Stage, and what passes between them. */
+class Figure {
+  constructor(model, el) {
+    const declared = model.get("declaration");
+    this.name = declared.name;
+    this.root = element("div", "labkit-stage", { role: "group", "aria-label": declared.name });
+    el.append(this.root);
+    this.line = new Line(model, () => this.silent());
+    this.picture = element("div", "picture");
+    this.screen = new Screen(this.picture, (message) => this.show(message), () => this.room.look(true));
+    this.space = new Space(this.picture, this.screen.canvas, declared, this.line);
+    this.handles = new Handles(this.picture, declared.handles, this.line);
+    this.words = new Words();
+    this.clock = declared.play ? new Clock(declared.play, this.line) : null;
+    this.controls = new Controls(declared.controls, this.line);
+    this.buttons = buttonRow(declared.buttons, (key) => { this.clock?.stop(); this.line.press(key); });
+    this.room = new Room(this.root, this.picture, declared.size, this.line, this.buttons);
+    this.root.append(this.picture, ...this.words.nodes, ...(this.clock ? [this.clock.row] : []), this.controls.row, this.buttons);
+    // JupyterLab's shortcuts (arrow keys fold headings, letters cut cells) stay away from whatever has the focus here
+    for (const node of this.root.querySelectorAll("input, select, button, canvas, .handle")) node.dataset.lmSuppressShortcuts = "true";
+    this.hear = (message, buffers) => this.receive(message, buffers);
+    this.probe = () => this.room.look(true);
+    model.on("msg:custom", this.hear);
+    model.on("comm_live_update", this.probe);
+    this.model = model;
+    this.room.look();
+  }
+
+  receive(message, buffers) {
+    if (message.picture === undefined) return;
+    if (this.line.hasAnswer(message)) this.root.dataset.answer = this.line.took.toFixed(1); // ms, for the benchmark
+    this.screen.receive(message, buffers);
+  }
+
+  /** One picture is on the screen: the words, handles and controls that belong to it. */
+  show(message) {
+    this.picture.style.width = `${message.width}px`;
+    this.picture.style.aspectRatio = `${message.width} / ${message.height}`;
+    this.screen.canvas.setAttribute("aria-label", [this.name, message.caption].filter(Boolean).join(": "));
+    this.words.show(message);
+    this.handles.show(message.handles);
+    this.controls.show(message.controls);
+    this.clock?.show(message.time);
+    this.root.dataset.python = message.milliseconds;
+    this.root.dataset.picture = message.picture;
+    this.line.seen(message);
+  }
+
+  /** Python does not answer: that is said, and nothing pretends to move. */
+  silent() {
+    this.words.notice(SILENT);
+    this.clock?.stop();
+    this.handles.goBack();
+    this.controls.goBack();
+  }
+
+  close() {
+    this.model.off("msg:custom", this.hear);
+    this.model.off("comm_live_update", this.probe);
+    for (const part of [this.line, this.words, this.clock, this.room]) part?.close();
+    this.root.remove();
+  }
+}
+
+/** To Python: all that happened is merged into `pending`; one message is in flight, the next carries what came meanwhile,
+ *  so that a drag never queues up. Python answers each with one picture. */
+class Line {
+  constructor(model, onSilence) {
+    Object.assign(this, { model, onSilence, pending: {}, flight: null, timer: 0, resting: 0, count: 0, shown: 0, took: 0 });
+    this.view = Math.random().toString(36).slice(2); // two views of one Stage tell their answers apart
+  }
+
+  get idle() {
+    return this.flight === null && Object.keys(this.pending).length === 0;
+  }
+
+  add(key, combine) {
+    this.pending[key] = combine(this.pending[key]);
+    this.flush();
+  }
+
+  /** A button undoes what was under way. */
+  press(key) {
+    const { look } = this.pending;
+    this.pending = { ...(look && { look }), button: key };
+    this.flush();
+  }
+
+  flush() {
+    clearTimeout(this.resting);
+    if (this.flight !== null || Object.keys(this.pending).length === 0) return;
+    this.flight = `${this.view}:${++this.count}`;
+    this.sent = performance.now();
+    this.model.send({ ...this.pending, shown: this.shown, serial: this.flight });
+    this.pending = {};
+    this.timer = setTimeout(() => { this.flight = null; this.onSilence(); this.flush(); }, PATIENCE);
+  }
+
+  /** Whether a message is the answer to the one in flight. */
+  hasAnswer(message) {
+    if (message.serial === null || message.serial !== this.flight) return false;
+    this.flight = null;
+    clearTimeout(this.timer);
+    this.took = performance.now() - this.sent;
+    return true;
+  }
+
+  /** A picture is on the screen. Python waits after three: every other one that is no answer is acknowledged. */
+  seen(message) {
+    this.shown = message.picture;
+    if (message.serial === null && this.idle && this.shown % 2 === 0) this.model.send({ shown: this.shown });
+    this.flush();
+    clearTimeout(this.resting);
+    if (this.idle) this.resting = setTimeout(() => this.model.send({ rest: true }), REST);
+  }
+
+  close() {
+    clearTimeout(this.timer);
+    clearTimeout(this.resting);
+  }
+}
+
+/** From Python: whole pictures (PNG), and runs of pixels that changed since the one before. */
+class Screen {
+  constructor(place, show, lost) {
+    this.canvas = element("canvas", "", { role: "img" });
+    place.append(this.canvas);
+    this.paper = this.canvas.getContext("2d", { willReadFrequently: true });
+    Object.assign(this, { show, lost, queue: [], decoding: false, image: null, number: 0 });
+  }
+
+  receive(message, buffers) {
+    if (message.on === null) this.queue = []; // the newest wins
+    this.queue.push({ message, buffers });
+    this.draw();
+  }
+
+  draw() {
+    while (this.queue.length && !this.decoding) {
+      const { message, buffers } = this.queue.shift();
+      if (message.on === null) this.decode(message, buffers[0]);
+      else if (message.on === this.number && this.image) this.change(message, ...buffers.map(numbers));
+      else this.lost(); // a picture is missing: a whole one is needed
+    }
+  }
+
+  async decode(message, png) {
+    this.decoding = true;
+    try {
+      const bitmap = await createImageBitmap(new Blob([png], { type: "image/png" }));
+      this.canvas.width = bitmap.width;
+      this.canvas.height = bitmap.height;
+      this.paper.drawImage(bitmap, 0, 0);
+      this.image = this.paper.getImageData(0, 0, bitmap.width, bitmap.height);
+      this.number = message.picture;
+      this.show(message);
+    } catch (error) {
+      console.error("stage: the picture could not be decoded", error);
+    }
+    this.decoding = false;
+    this.draw();
+  }
+
+  /** runs: first place and length of each run of changed pixels; colors: theirs, one after the other. */
+  change(message, runs, colors) {
+    if (colors.length) {
+      const pixels = new Uint32Array(this.image.data.buffer);
+      for (let k = 0, used = 0; k < runs.length; used += runs[k + 1], k += 2) {
+        pixels.set(colors.subarray(used, used + runs[k + 1]), runs[k]);
+      }
+      const top = Math.floor(runs[0] / this.image.width);
+      const bottom = Math.floor((runs[runs.length - 2] + runs[runs.length - 1] - 1) / this.image.width);
+      this.paper.putImageData(this.image, 0, 0, 0, top, this.image.width, bottom - top + 1);
+    }
+    this.number = message.picture;
+    this.show(message);
+  }
+}
+
+function numbers(view) {
+  return new Uint32Array(view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength));
+}
+
+/** Where an event is: fractions of a picture, right and down. */
+function fraction(node, event) {
+  const box = node.getBoundingClientRect();
+  return [limit((event.clientX - box.left) / box.width), limit((event.clientY - box.top) / box.height)];
+}
+
+/** Caption, status, and what a screen reader hears. */
+class Words {
+  constructor() {
+    this.caption = element("p", "caption", { "aria-hidden": "true" }); // heard from `spoken`
+    this.status = element("p", "status", { role: "status" });
+    this.gone = element("p", "gone", { role: "status" });
+    this.spoken = element("div", "spoken", { "aria-live": "polite" });
+    this.nodes = [this.status, this.gone, this.caption, this.spoken];
+    Object.assign(this, { timer: 0, since: 0, cursor: "" });
+  }
+
+  show({ caption, status, cursor }) {
+    if (this.caption.textContent !== caption) {
+      this.caption.textContent = caption;
+      this.speak(caption);
+    }
+    if (cursor && cursor !== this.cursor) this.speak(cursor);
+    this.cursor = cursor;
+    if (this.status.textContent !== status) this.status.textContent = status;
+    this.notice("");
+  }
+
+  notice(text) {
+    if (this.gone.textContent !== text) this.gone.textContent = text;
+  }
+
+  speak(text) {
+    const now = performance.now();
+    this.since ||= now; // of the first change not yet heard
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => {
+      this.spoken.textContent = text;
+      this.since = 0;
+    }, Math.min(SPEAK_AFTER, Math.max(0, this.since + SPEAK_EVERY - now)));
+  }
+
+  close() {
+    clearTimeout(this.timer);
+  }
+}
+
+/** Points to drag, by mouse, touch and arrow keys. */
+class Handles {
+  constructor(place, declared, line) {
+    this.place = place;
+    this.all = Object.entries(declared).map(([name, label]) => new Handle(place, name, label, line));
+  }
+
+  show(places) {
+    for (const handle of this.all) handle.put(places[handle.name]);
+    this.fan();
+  }
+
+  goBack() {
+    for (const handle of this.all) handle.goBack();
+  }
+
+  /** Handles that lie on each other are drawn around their spot, each with its name, and can be pulled one by one. */
+  fan() {
+    const box = this.place.getBoundingClientRect();
+    const spots = this.all.map((h) => [h.at[0] * box.width, h.at[1] * box.height]);
+    this.all.forEach((handle, k) => {
+      const group = this.all.map((_, j) => j).filter((j) => Math.hypot(spots[j][0] - spots[k][0], spots[j][1] - spots[k][1]) < NEAR);
+      handle.aside(group.indexOf(k), group.length);
+    });
+  }
+}
+
+class Handle {
+  constructor(place, name, label, line) {
+    Object.assign(this, { place, name, line, at: [0, 0], last: null, held: null, corrected: false });
+    this.node = element("div", "handle", {
+      role: "slider", tabindex: "0", "aria-roledescription": "point to drag", "aria-label": label, title: label,
+      "data-handle": name, "data-name": name,
+    });
+    this.node.hidden = true; // until a picture says where it is
+    place.append(this.node);
+    this.node.addEventListener("pointerdown", (event) => this.grab(event));
+    this.node.addEventListener("pointermove", (event) => this.pull(event));
+    for (const type of ["pointerup", "pointercancel", "lostpointercapture"]) this.node.addEventListener(type, () => this.drop());
+    this.node.addEventListener("keydown", (event) => this.step(event));
+  }
+
+  grab(event) {
+    if (event.button !== 0) return;
+    taken(event);
+    this.node.focus({ preventScroll: true });
+    this.node.setPointerCapture(event.pointerId);
+    this.node.classList.add("held");
+    const [right, down] = fraction(this.place, event);
+    this.held = [this.at[0] - right, this.at[1] - down];
+    this.corrected = false; // Python keeps it elsewhere than the pointer: then only Python moves it
+  }
+
+  pull(event) {
+    if (!this.held) return;
+    const [right, down] = fraction(this.place, event);
+    const target = [right + this.held[0], down + this.held[1]];
+    if (!this.corrected) this.move(target);
+    this.line.add("drag", (drag) => ({ ...drag, [this.name]: target }));
+  }
+
+  drop() {
+    this.held = null;
+    this.node.classList.remove("held");
+  }
+
+  step(event) {
+    const arrow = arrowOf(event);
+    if (!arrow) return;
+    taken(event);
+    const size = event.shiftKey ? 10 : 1;
+    this.line.add("step", (steps = {}) => {
+      const [right, up] = steps[this.name] ?? [0, 0];
+      return { ...steps, [this.name]: [right + size * arrow[0], up + size * arrow[1]] };
+    });
+  }
+
+  move([right, down]) {
+    this.at = [right, down];
+    this.node.style.left = `${100 * right}%`;
+    this.node.style.top = `${100 * down}%`;
+  }
+
+  put(place) {
+    this.last = place.at;
+    this.node.hidden = false;
+    this.node.style.setProperty("--ring", place.color);
+    this.node.setAttribute("aria-valuetext", place.value);
+    this.node.setAttribute("aria-valuenow", place.now);
+    if (this.held && !this.corrected) {
+      if (this.line.pending.drag?.[this.name] !== undefined || this.line.flight !== null) return; // the pointer is further already
+      const box = this.place.getBoundingClientRect();
+      this.corrected = Math.hypot((place.at[0] - this.at[0]) * box.width, (place.at[1] - this.at[1]) * box.height) > 2;
+    }
+    this.move(place.at);
+  }
+
+  goBack() {
+    this.drop();
+    if (this.last) this.move(this.last);
+  }
+
+  /** Beside its spot when it is number k of several there. */
+  aside(k, count) {
+    this.node.classList.toggle("fanned", count > 1);
+    const angle = (2 * Math.PI * k) / count - Math.PI / 2;
+    const reach = count > 1 ? 10 + 4 * count : 0;
+    this.node.style.translate = count > 1 ? `${(reach * Math.sin(angle)).toFixed(1)}px ${(reach * Math.cos(angle)).toFixed(1)}px` : "";
+  }
+}
+
+/** Empty space of the picture: click, draw, turn, drive; by pointer, and by keys with a cursor of its own. */
+class Space {
+  constructor(place, canvas, { empty, click, keys }, line) {
+    Object.assign(this, { place, canvas, empty, click, keys, line, press: null, cursor: null, pen: false });
+    canvas.dataset.empty = empty;
+    canvas.dataset.click = click;
+    if (!(keys || click || empty)) return;
+    canvas.tabIndex = 0;
+    canvas.setAttribute("role", "application"); // a screen reader passes arrow keys on to it
+    this.hint = element("div", "hint", {}, [this.keysInWords()]);
+    canvas.setAttribute("aria-description", this.hint.textContent);
+    this.mark = element("div", "cursor", { "aria-hidden": "true" });
+    this.mark.hidden = true;
+    place.append(this.mark, this.hint);
+    canvas.addEventListener("pointerdown", (event) => this.down(event));
+    canvas.addEventListener("pointermove", (event) => this.moved(event));
+    canvas.addEventListener("pointerup", (event) => this.up(event));
+    canvas.addEventListener("pointercancel", () => { this.press = null; });
+    canvas.addEventListener("keydown", (event) => this.key(event));
+    canvas.addEventListener("blur", () => this.leave());
+  }
+
+  get points() {
+    return this.click || this.empty === "draw";
+  }
+
+  keysInWords() {
+    const arrows = this.keys ? "Arrow keys drive." : this.empty === "turn" ? "Arrow keys turn the view." : "";
+    if (!this.points) return arrows;
+    const mode = arrows ? "Enter: a cursor for the arrow keys; " : "Arrow keys move a cursor; ";
+    return `${arrows} ${mode}${this.empty === "draw" ? "Space puts the pen down and lifts it" : "Space clicks"}.`.trim();
+  }
+
+  down(event) {
+    if (event.button !== 0) return;
+    this.press = { x: event.clientX, y: event.clientY, start: fraction(this.canvas, event), moved: false };
+    if (this.empty) {
+      this.canvas.setPointerCapture(event.pointerId);
+      event.preventDefault();
+    }
+    this.canvas.focus({ preventScroll: true });
+  }
+
+  moved(event) {
+    if (!this.press) return;
+    const right = event.clientX - this.press.x;
+    const down = event.clientY - this.press.y;
+    if (!this.press.moved && Math.hypot(right, down) < CLICK_RADIUS) return;
+    if (this.empty === "turn") {
+      this.turn(-right, down);
+      this.press.x = event.clientX;
+      this.press.y = event.clientY;
+    } else if (this.empty === "draw") {
+      if (!this.press.moved) this.begin(this.press.start);
+      const points = (event.getCoalescedEvents?.() ?? []).map((e) => fraction(this.canvas, e));
+      this.draw(points.length ? points : [fraction(this.canvas, event)]);
+    }
+    this.press.moved = true;
+  }
+
+  up(event) {
+    if (this.press && !this.press.moved) this.touch(fraction(this.canvas, event));
+    this.press = null;
+  }
+
+  /** A click, or a stroke of one point. */
+  touch(at) {
+    if (this.click) this.line.add("click", () => at);
+    else if (this.empty === "draw") {
+      this.begin(at);
+      this.draw([]);
+    }
+  }
+
+  turn(right, down) {
+    this.line.add("orbit", ([a, b] = [0, 0]) => [a + right, b + down]);
+  }
+
+  begin(at) {
+    this.line.pending.fresh = true;
+    this.line.pending.brush = [at];
+  }
+
+  draw(points) {
+    this.line.add("brush", (path = []) => [...path, ...points]);
+  }
+
+  key(event) {
+    const arrow = arrowOf(event);
+    if (arrow) {
+      taken(event);
+      if (this.cursor || (this.points && !this.keys && this.empty !== "turn")) this.shift(arrow, event.shiftKey ? 0.05 : 0.01);
+      else if (this.keys) this.line.add("arrows", (names = []) => [...names, NAMES[event.key]].slice(-MAX_ARROWS));
+      else if (this.empty === "turn") this.turn(...arrow.map((a, k) => (event.shiftKey ? 60 : 10) * (k ? -a : a)));
+    } else if (this.points && (event.key === "Enter" || event.key === " ")) {
+      taken(event);
+      if (!this.cursor) this.shift([0, 0], 0);
+      else this.strike();
+    } else if (event.key === "Escape" && this.cursor) {
+      taken(event);
+      this.leave();
+    }
+  }
+
+  /** Move the keyboard's cursor; with the pen down it draws. */
+  shift([right, up], size) {
+    const [x, y] = this.cursor ?? [0.5, 0.5];
+    this.cursor = [limit(x + size * right), limit(y - size * up)];
+    this.mark.hidden = false;
+    this.mark.style.left = `${100 * this.cursor[0]}%`;
+    this.mark.style.top = `${100 * this.cursor[1]}%`;
+    if (this.pen) this.draw([this.cursor]);
+    this.line.add("cursor", () => this.cursor);
+  }
+
+  strike() {
+    if (this.empty !== "draw") return this.touch(this.cursor);
+    this.pen = !this.pen;
+    this.mark.classList.toggle("down", this.pen);
+    if (this.pen) this.touch(this.cursor);
+    else if (this.click) this.touch(this.cursor);
+  }
+
+  leave() {
+    this.cursor = null;
+    this.pen = false;
+    this.mark.hidden = true;
+    this.mark.classList.remove("down");
+  }
+}
+
+/** Sliders, words and toggles, as native inputs. */
+class Controls {
+  constructor(declared, line) {
+    this.line = line;
+    this.row = element("div", "row controls");
+    this.inputs = new Map();
+    for (const [name, control] of Object.entries(declared)) {
+      const make = { slider: sliderInput, list: listInput, words: wordsInput, toggle: toggleInput }[control.kind];
+      const input = make(control, (position) => line.add("control", (all) => ({ ...all, [name]: position })));
+      input.node.dataset.control = name;
+      this.inputs.set(name, input);
+      this.row.append(input.node);
+    }
+  }
+
+  show(values) {
+    this.last = values;
+    for (const [name, input] of this.inputs) {
+      if (this.line.pending.control?.[name] === undefined) input.show(values[name].at, values[name].text); // else it is further already
+    }
+  }
+
+  goBack() {
+    for (const [name, input] of this.last ? this.inputs : []) input.show(this.last[name].at, this.last[name].text);
+  }
+}
+
+function sliderInput({ label, positions, unit }, send) {
+  const input = element("input", "", { type: "range", min: 0, max: positions, step: 1 });
+  const number = element("output", "", { "aria-hidden": "true" });
+  input.addEventListener("input", () => send(Number(input.value)));
+  return {
+    node: element("div", "control", {}, [element("label", "", {}, [label, input]), number]),
+    show(at, text) {
+      if (Number(input.value) !== at) input.value = at;
+      number.textContent = text;
+      input.setAttribute("aria-valuetext", unit ? `${text} ${unit}` : text);
+    },
+  };
+}
+
+function listInput({ label, words }, send) {
+  const input = element("select", "", {}, words.map((word) => element("option", "", {}, [word])));
+  input.addEventListener("change", () => send(input.selectedIndex));
+  return {
+    node: element("div", "control", {}, [element("label", "", {}, [label, input])]),
+    show(at) { input.selectedIndex = at; },
+  };
+}
+
+function wordsInput({ label, words }, send) {
+  const group = Math.random().toString(36).slice(2);
+  const inputs = words.map((_, k) => {
+    const input = element("input", "", { type: "radio", name: group });
+    input.addEventListener("change", () => send(k));
+    return input;
+  });
+  const labels = words.map((word, k) => element("label", "word", {}, [inputs[k], word]));
+  const head = element("span", "head", { "aria-hidden": "true" }, [label]);
+  return {
+    node: element("div", "control", { role: "radiogroup", "aria-label": label }, [head, ...labels]),
+    show(at) { inputs[at].checked = true; },
+  };
+}
+
+function toggleInput({ label }, send) {
+  const input = element("input", "", { type: "checkbox" });
+  input.addEventListener("change", () => send(Number(input.checked)));
+  return {
+    node: element("div", "control", {}, [element("label", "word", {}, [input, label])]),
+    show(at) { input.checked = at === 1; },
+  };
+}
+
+function buttonRow(keys, press) {
+  const row = element("div", "row buttons");
+  for (const key of keys) {
+    const button = element("button", "", { type: "button" }, [key]);
+    button.addEventListener("click", () => press(key));
+    row.append(button);
+  }
+  return row;
+}
+
+/** Play, pause, and a slider of time where any moment can be asked for. The page beats the time; Python says what it is. */
+class Clock {
+  constructor({ steps, interval, stride, seekable }, line) {
+    const calm = window.matchMedia?.("(prefers-reduced-motion: reduce)").matches;
+    const slower = calm ? Math.max(1, Math.round(CALM_INTERVAL / interval)) : 1;
+    Object.assign(this, { steps, line, interval: interval * slower, stride: stride * slower, patient: !seekable });
+    Object.assign(this, { at: 0, epoch: 0, timer: 0, playing: false });
+    this.button = element("button", "play", { type: "button" });
+    this.button.addEventListener("click", () => (this.playing ? this.stop() : this.start()));
+    this.number = element("output", "", { "aria-hidden": "true" });
+    this.row = element("div", "row time", {}, [this.button]);
+    if (seekable) {
+      this.slider = element("input", "", { type: "range", min: 0, max: steps, step: 1, "aria-label": "time" });
+      this.slider.addEventListener("input", () => { this.stop(); this.ask(Number(this.slider.value)); });
+      this.row.append(this.slider);
+    }
+    this.row.append(this.number);
+    this.stop();
+  }
+
+  start() {
+    this.playing = true;
+    this.button.textContent = "Pause";
+    if (this.at >= this.steps) this.ask(0);
+    this.due = performance.now() + this.interval;
+    this.timer = setTimeout(() => this.beat(), this.interval);
+  }
+
+  stop() {
+    this.playing = false;
+    this.button.textContent = "Play";
+    clearTimeout(this.timer);
+  }
+
+  /** One step of time; a simulation waits for its answer, anything else leaves out what it was too late for. */
+  beat() {
+    const now = performance.now();
+    if (this.line.flight === null && this.line.pending.time === undefined) {
+      const late = this.patient ? 0 : Math.floor((now - this.due) / this.interval);
+      const next = Math.min(this.steps, this.at + this.stride * (1 + late));
+      this.due = Math.max(this.due + this.interval * (1 + late), now);
+      this.ask(next);
+      if (next >= this.steps) return this.stop();
+    }
+    this.timer = setTimeout(() => this.beat(), Math.max(4, this.due - performance.now()));
+  }
+
+  ask(step) {
+    this.at = step;
+    this.line.add("time", () => ({ at: step, epoch: this.epoch }));
+  }
+
+  show({ at, text, epoch }) {
+    if (epoch !== this.epoch) this.stop(); // Python went back to the start
+    this.epoch = epoch;
+    this.number.textContent = text;
+    if (this.line.pending.time !== undefined) return;
+    this.at = at;
+    if (!this.slider) return;
+    this.slider.value = at;
+    this.slider.setAttribute("aria-valuetext", text);
+  }
+
+  close() {
+    clearTimeout(this.timer);
+  }
+}
+
+/** The place the picture may fill, the device's pixels and the theme; and the button that gives it the whole window. */
+class Room {
+  constructor(root, picture, size, line, buttons) {
+    Object.assign(this, { root, picture, size, line, last: "", enlarged: false });
+    this.button = element("button", "enlarge", { type: "button", "aria-pressed": "false" }, ["Enlarge"]);
+    this.button.addEventListener("click", () => this.enlarge(!this.enlarged));
+    buttons.append(this.button);
+    root.addEventListener("keydown", (event) => {
+      if (event.key !== "Escape" || !this.enlarged) return;
+      taken(event);
+      this.enlarge(false);
+    });
+    this.watch = () => { // once it has come to rest: while a theme is exchanged, nothing has its size or color
+      clearTimeout(this.settling);
+      this.settling = setTimeout(() => this.look(), SETTLED);
+    };
+    this.resizing = new ResizeObserver(this.watch);
+    this.resizing.observe(root);
+    this.theming = new MutationObserver(this.watch);
+    for (const node of [document.documentElement, document.body]) this.theming.observe(node, { attributes: true });
+    window.addEventListener("resize", this.watch); // also fired when the zoom, and with it the pixel ratio, changes
+    this.scheme = window.matchMedia("(prefers-color-scheme: dark)");
+    this.scheme.addEventListener("change", this.watch);
+  }
+
+  /** Tell Python of the room when it has changed; `again` asks for a whole picture in any case. */
+  look(again = false) {
+    const width = Math.floor(this.root.clientWidth);
+    if (!width) return; // hidden, or a theme is being exchanged
+    if (this.enlarged) this.root.style.fontSize = `${this.lettersOfTheWindow()}px`;
+    const style = getComputedStyle(this.root);
+    const height = Math.floor(this.visibleHeight() / 8) * 8;
+    const look = {
+      width: Math.floor(width - parseFloat(style.paddingLeft) - parseFloat(style.paddingRight)), height,
+      ratio: window.devicePixelRatio || 1, dark: isLight(style.color), letters: parseFloat(style.fontSize) / LETTERS,
+    };
+    const words = JSON.stringify(look);
+    if (words === this.last && !again) return;
+    this.last = words;
+    this.line.add("look", () => look);
+  }
+
+  /** What the picture may have of the height one sees at once, beside caption and controls. */
+  visibleHeight() {
+    if (this.enlarged) return window.innerHeight - this.rows() - 12;
+    let seen = window.innerHeight;
+    for (let node = this.root.parentElement; node; node = node.parentElement) { // the outermost that scrolls is the notebook
+      if (/auto|scroll/.test(getComputedStyle(node).overflowY) && node.clientHeight > 100) seen = Math.min(window.innerHeight, node.clientHeight);
+    }
+    return seen - (this.root.offsetHeight - this.picture.offsetHeight) - 12;
+  }
+
+  rows() {
+    const style = getComputedStyle(this.root);
+    let sum = parseFloat(style.paddingTop) + parseFloat(style.paddingBottom);
+    for (const node of this.root.children) if (node !== this.picture) sum += node.offsetHeight;
+    return sum + 24;
+  }
+
+  /** Letters as large as the whole figure grows: a lecture hall reads them. */
+  lettersOfTheWindow() {
+    const [width, height] = this.size;
+    const growth = Math.min(window.innerWidth / (width + 40), window.innerHeight / (height + 190));
+    return Math.round(LETTERS * Math.min(LARGEST, Math.max(1, growth)));
+  }
+
+  enlarge(on) {
+    this.enlarged = on;
+    const top = typeof this.root.showPopover === "function"; // the top layer: no ancestor can clip it
+    const focused = document.activeElement;
+    if (on) {
+      if (top) {
+        this.root.popover = "manual";
+        this.root.showPopover();
+      }
+    } else {
+      if (top) {
+        this.root.hidePopover();
+        this.root.popover = null;
+      }
+      this.root.style.fontSize = "";
+    }
+    this.root.classList.toggle("enlarged", on);
+    this.button.textContent = on ? "Back" : "Enlarge";
+    this.button.setAttribute("aria-pressed", on);
+    (this.root.contains(focused) ? focused : this.button).focus({ preventScroll: true });
+    this.look();
+  }
+
+  close() {
+    clearTimeout(this.settling);
+    this.resizing.disconnect();
+    this.theming.disconnect();
+    window.removeEventListener("resize", this.watch);
+    this.scheme.removeEventListener("change", this.watch);
+  }
+}
+
+/** Whether a computed color, such as that of the words, is a light one: then the paper is dark. */
+function isLight(color) {
+  const [red, green, blue] = (color.match(/[\d.]+/g) ?? [0, 0, 0]).map(Number);
+  return 0.299 * red + 0.587 * green + 0.114 * blue > 128;
+}

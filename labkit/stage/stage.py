@@ -3,7 +3,7 @@
 A Stage is four small things: a pure function from state to result, a scene that draws it, handles one can drag, and a
 way to make it fail:
 
-    from .stage import Handle, Stage, slider
+    from labkit.stage import Handle, Slider, Stage
 
     def compute(state):                                   # pure, at module level, tested without a browser
         return {"distance": np.hypot(*(state["P"] - state["Q"])) + state["offset"]}
@@ -18,7 +18,7 @@ way to make it fail:
             return [line], update                         # the moving artists, and their update
         return Stage("distance", scene=scene, compute=compute,
                      handles={"P": Handle((1, 2), step=0.1), "Q": Handle((7, 3), step=0.1)},
-                     controls={"offset": slider(0, 5, 0, step=0.1, label="offset (mm)")},
+                     controls={"offset": Slider(0, 5, 0, step=0.1, label="offset (mm)")},
                      fail={"Q": (1, 2)},                  # what "Make it fail" changes, on top of the initial state
                      describe=lambda result: f"The points are {result['distance']:.1f} mm apart.")
 
@@ -32,12 +32,12 @@ keep limits fixed, return as artists all that moves, use one artist with many po
 `set_data` and friends rather than new artists, and put changing numbers into `ax.text` returned as an artist, not into
 titles. Artists are drawn in order of their zorder, always above the background.
 
-Looks. Colors come from `figures.style`; the dark theme is applied while drawing, nothing is to be done for it
+Looks. Colors come from `stage.style`; the dark theme is applied while drawing, nothing is to be done for it
 (colormapped images stay as they are). The axes are laid out once a size, with what the scene drew at first. Narrow
 cells crowd the picture to 85 % of `size` and then scale it down, so leave words that much room.
 
 Tests need no browser: `stage.set(P=(3, 2))`, then `stage.result`, `stage.caption`, `stage.status`, `stage.png()`;
-`stage.make_it_fail()`, `stage.reset()`, `stage.buttons["name of a preset"].click()`.
+`stage.make_it_fail()`, `stage.reset()`, `stage.press("name of a button")`.
 
 What else there is
 ------------------
@@ -47,7 +47,7 @@ constrain : handles that must follow a rule beyond `bounds`. `constrain(state, m
 Handle((x, y, z)) : a point of a 3D scene; needs `view`. It is drawn where `state["view"].project` puts it in the axes,
     and dragged in the plane of the screen.
 view=View(azimuth_deg, elevation_deg) : dragging empty space (or arrow keys on the picture) turns `state["view"]`; see
-    `figures.scene3d`.
+    `stage.scene3d`.
 play=Play(t_max, dt) : play, pause and a slider of time; `state["t"]` runs from 0 to t_max (s).
 click=True (or the number of the axes) : `state["click"]` is the place clicked last, None at first.
 brush=True (or the number of the axes) : `state["brush"]` is the path of the stroke being drawn in empty space (the
@@ -65,19 +65,15 @@ ValueError (or the type and text of anything else) appears under the figure and 
 environment variable LABKIT_STRICT=1 it is raised as well.
 """
 
-import os
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
 from time import monotonic
 
-import anywidget
-import ipywidgets
 import numpy as np
 
-from ..checks import as_finite, shown
-from . import style
-from .canvas import DRAWING, Picture
+from .. import live
+from ..checks import as_finite
+from . import front, style
+from .canvas import CSS_DPI, DRAWING, Picture
 
 MAX_CONTROLS = 3
 ORBIT_DEG_PER_PIXEL = 0.5
@@ -87,149 +83,7 @@ MAX_UNSEEN = 3
 RESERVED = ("t", "view", "click", "brush", "memory")
 
 
-@dataclass(frozen=True)
-class Handle:
-    """A point to drag. Two coordinates: data coordinates of the axes number `ax`. Three: a point in space, for Stages
-    with a view.
-
-    step : what an arrow key moves it by (ten times with Shift); by default a hundredth of the axes' width.
-    bounds : ((x_low, x_high), (y_low, y_high)[, (z_low, z_high)]); equal ends fix a coordinate. Drags end at the axes'
-        limits anyway.
-    label : what a screen reader calls it (default: its name); color : of its ring, one of `figures.style`.
-    """
-
-    at: tuple
-    step: float | None = None
-    bounds: tuple | None = None
-    ax: int = 0
-    label: str = ""
-    color: str = style.INK
-
-
-@dataclass(frozen=True)
-class Slider:
-    """A number between `low` and `high`; integers stay integers. `log` spreads it over the decades."""
-
-    low: float
-    high: float
-    value: float
-    step: float | None = None
-    label: str = ""
-    log: bool = False
-
-    def check(self, name, value):
-        value = float(as_finite(value, name))
-        if not self.low - 1e-9 <= value <= self.high * (1 + 1e-9) + 1e-9:
-            raise ValueError(f"{name} must lie in [{shown(self.low)}, {shown(self.high)}], got {shown(value)}")
-        return round(value) if self.integer else value
-
-    @property
-    def integer(self):
-        return all(isinstance(v, (int, np.integer)) for v in (self.low, self.high, self.value, self.step or 1))
-
-    @property
-    def _scale(self):
-        """(low, high, step) of the track; in decades when it is logarithmic, with `value` on a step."""
-        if not self.log:
-            return self.low, self.high, self.step or (1 if self.integer else (self.high - self.low) / 100)
-        low, value, high = np.log10([self.low, self.value, self.high]).tolist()
-        below = round(100 * (value - low) / (high - low))
-        return low, high, (value - low) / below if below else (high - low) / 100
-
-    def shown(self, value):
-        """Where the knob stands: on a step or at the end. The browser would round any other number and send it back."""
-        low, high, step = self._scale
-        if self.integer:
-            return value
-        there = np.log10(value) if self.log else value
-        at = min(low + round((there - low) / step) * step, high, key=lambda at: abs(at - there))
-        return float(np.clip(10**at if self.log else round(at, 10), self.low, self.high))
-
-    def widget(self, name):
-        options = {
-            "value": self.shown(self.value),
-            "description": self.label or name,
-            "style": {"description_width": "initial"},
-            "layout": _wide(self.label or name),
-        }
-        low, high, step = self._scale
-        if self.integer:
-            return ipywidgets.IntSlider(min=low, max=high, step=step, **options)
-        if self.log:
-            return ipywidgets.FloatLogSlider(min=low, max=high, step=step, readout_format=".2g", **options)
-        decimals = max(0, int(np.ceil(-np.log10(step) - 1e-9)))
-        return ipywidgets.FloatSlider(min=low, max=high, step=step, readout_format=f".{decimals}f", **options)
-
-
-@dataclass(frozen=True)
-class Choice:
-    """One of several words; `options` is a list, or a dict {word: value}."""
-
-    options: object
-    value: object
-    label: str = ""
-
-    @property
-    def _pairs(self):
-        return list(self.options.items()) if isinstance(self.options, dict) else [(str(v), v) for v in self.options]
-
-    def shown(self, value):
-        return value
-
-    def check(self, name, value):
-        if value not in [v for _, v in self._pairs]:
-            raise ValueError(f"{name} must be one of {', '.join(str(v) for _, v in self._pairs)}, got {value!r}")
-        return value
-
-    def widget(self, name):
-        label, words = self.label or name, [word for word, _ in self._pairs]
-        options = {"options": self._pairs, "value": self.value, "description": label}
-        if len(words) > 3:
-            layout = {"width": f"{6 + 0.55 * (len(label) + max(map(len, words))):.0f}em", "max_width": "100%"}
-            return ipywidgets.Dropdown(style={"description_width": "initial"}, layout=layout, **options)
-        style = {"description_width": "initial", "button_width": "auto"}
-        layout = {"display": "flex", "grid_gap": "0 6px", "width": "max-content", "max_width": "100%"}
-        return ipywidgets.ToggleButtons(style=style, layout=layout, **options)
-
-
-@dataclass(frozen=True)
-class Toggle:
-    """On or off."""
-
-    value: bool = False
-    label: str = ""
-
-    def check(self, name, value):
-        if not isinstance(value, (bool, np.bool_)):
-            raise ValueError(f"{name} must be True or False, got {value!r}")
-        return bool(value)
-
-    def shown(self, value):
-        return value
-
-    def widget(self, name):
-        return ipywidgets.Checkbox(
-            value=self.value, description=self.label or name, indent=False, layout={"width": "auto"}
-        )
-
-
-@dataclass(frozen=True)
-class Play:
-    """A control of time: `state["t"]` from 0 to t_max in steps of dt (s), `rate` times as fast as real time."""
-
-    t_max: float
-    dt: float = 0.05
-    rate: float = 1.0
-
-
-class _Front(anywidget.AnyWidget):
-    """The picture in the browser, and the handles over it."""
-
-    _esm = Path(__file__).with_name("stage.js")
-    _css = Path(__file__).with_name("stage.css")
-
-
-class Stage(ipywidgets.VBox):
+class Stage:
     """A figure one can touch; the module's docstring tells how to write one.
 
     Parameters
@@ -241,7 +95,7 @@ class Stage(ipywidgets.VBox):
     compute : function(state) -> result
         Pure.
     handles, controls : dict
-        {name: Handle}, {name: slider | choice | toggle}; at most three controls.
+        {name: Handle}, {name: Slider | Choice | Toggle}; at most three controls.
     fail : dict
         What "Make it fail" changes on top of the initial state.
     presets : dict, optional
@@ -263,7 +117,6 @@ class Stage(ipywidgets.VBox):
         self, name, *, scene, compute, fail, handles=None, controls=None, presets=None, describe=None, size=(7.0, 4.2),
         play=None, view=None, constrain=None, click=None, brush=None, keys=False, start=None, advance=None,
     ):  # fmt: skip
-        super().__init__()
         self.name = name
         self._handles, self._controls, self._play, self._presets = handles or {}, controls or {}, play, {}
         self._compute, self._describe, self._constrain = compute, describe, constrain
@@ -283,8 +136,9 @@ class Stage(ipywidgets.VBox):
         }
         self._state = {key: self._checked(key, value) for key, value in self._state.items()}
         self.result, self.status, self.caption = None, "", ""
-        self._front, self._sent, self._shown, self._waiting = _Front(), 0, 0, False
-        self._attached = self._showing = False
+        self._send, self._widget, self.at_rest = None, None, []
+        self._sent, self._shown, self._waiting, self._attached, self._epoch = 0, 0, False, False, 0
+        self._cursor = ""
         self._whole = True  # the page needs a whole picture, not only what changed
         self._received = monotonic()
         self._picture = Picture(scene, size)
@@ -299,8 +153,6 @@ class Stage(ipywidgets.VBox):
         self._recompute()
         self._picture.draw()
         self._text = f"[stage: {name}] {self.caption}".rstrip()
-        self._front.on_msg(lambda _, message, buffers: self.receive(message))
-        self._build_controls()
 
     def _check_options(self, view):
         where = f"Stage {self.name!r}"
@@ -352,11 +204,11 @@ class Stage(ipywidgets.VBox):
 
     def reset(self):
         """What the button Reset does."""
-        self._preset("Reset")
+        self._press("Reset")
 
     def make_it_fail(self):
         """What the button "Make it fail" does."""
-        self._preset("Make it fail")
+        self._press("Make it fail")
 
     def _checked(self, key, value):
         """A value as the state holds it, or a ValueError that names it."""
@@ -400,11 +252,10 @@ class Stage(ipywidgets.VBox):
                 self._recompute()
             except Exception as error:
                 self.status = str(error) if type(error) is ValueError else f"{type(error).__name__}: {error}"
-                if os.environ.get("LABKIT_STRICT"):
+                if live.is_built():
                     raise
             finally:
-                self._show_picture(reply)  # before the controls, whose messages keep the page busy
-                self._show_controls()
+                self._show_picture(reply)
 
     def _correct(self, moved):
         if self._constrain:
@@ -423,86 +274,71 @@ class Stage(ipywidgets.VBox):
         self.result, self.status = result, ""
         self.caption = str(self._describe(result)) if self._describe else ""
 
-    def _preset(self, key):
-        kept = {} if key == "Reset" else {k: v for k, v in self._state.items() if k == "view"}
-        if self._play:
-            self._play_widget.playing = False
-        self._apply({**self.initial, **kept, **self._presets[key]}, restart=True)
+    @property
+    def buttons(self):
+        """The names of all buttons: Reset, Make it fail, and the presets."""
+        return tuple(self._presets)
 
-    # -- controls: plain ipywidgets
+    def press(self, button):
+        """What a button does."""
+        self._press(button)
 
-    def _build_controls(self):
-        self._widgets = {key: control.widget(key) for key, control in self._controls.items()}
-        for key, widget in self._widgets.items():
-            widget.observe(partial(self._on_control, key), "value")
-        rows = [self._front]
-        if self._play:
-            rows.append(self._build_play())
-        if self._widgets:
-            rows.append(_row(self._widgets.values()))
-        buttons = []
-        for key in self._presets:
-            button = ipywidgets.Button(description=key, layout={"width": "auto"})
-            button.on_click(lambda _, key=key: self._preset(key))
-            buttons.append(button)
-        self.buttons = dict(zip(self._presets, buttons))
-        rows.append(_row(buttons))
-        self.children = rows
+    def _press(self, button, reply=None):
+        """A button's changes on top of the initial state; a step of time that is under way comes too late from now."""
+        if button not in self._presets:
+            raise ValueError(f"Stage {self.name!r} has no button {button!r}, only {', '.join(self._presets)}")
+        kept = {} if button == "Reset" else {k: v for k, v in self._state.items() if k == "view"}
+        self._epoch += 1
+        self._apply({**self.initial, **kept, **self._presets[button]}, restart=True, reply=reply)
 
-    def _build_play(self):
-        steps = round(self._play.t_max / self._play.dt)
-        interval = max(20, round(1000 * self._play.dt / self._play.rate))
-        stride = max(1, round(interval * self._play.rate / (1000 * self._play.dt)))
-        self._play_widget = ipywidgets.Play(min=0, max=steps, step=stride, interval=interval, show_repeat=False)
-        self._play_widget.observe(lambda change: self._on_tick(change["new"]), "value")
-        # counts steps: of seconds the browser would send back its own roundings, and late ones would undo a Reset
-        self._time = ipywidgets.IntSlider(
-            min=0, max=steps, description="t = 0.00 s", readout=False,
-            disabled=bool(self._advance), style={"description_width": "6.5em"}, layout=_wide("t = 0.00 s"),
-        )  # fmt: skip
-        self._time.observe(lambda change: self._on_time(change["new"] * self._play.dt), "value")
-        return _row([self._play_widget, self._time])
+    # -- the page: one message in flight, the newest wins
 
-    def _on_control(self, key, change):
-        control = self._controls[key]
-        if not self._showing and not _same(control.shown(self._state[key]), change["new"]):
-            self._apply({key: control.check(key, change["new"])})
+    def declaration(self):
+        """What the page must know once: names, controls, buttons, and what empty space is for."""
+        return {
+            "name": self.name,
+            "size": [self._picture.size[0] * CSS_DPI, self._picture.size[1] * CSS_DPI],
+            "handles": {key: handle.label or key for key, handle in self._handles.items()},
+            "controls": {key: control.declare(key) for key, control in self._controls.items()},
+            "play": self._play.declare(seekable=self._advance is None) if self._play else None,
+            "buttons": self.buttons,
+            "empty": "turn" if "view" in self._state else "draw" if self._brush is not None else "",
+            "keys": self._keys,
+            "click": self._click is not None,
+        }
 
-    def _on_tick(self, tick):
-        """A tick of the play button. One that was under way when Reset stopped the clock is set right, not obeyed."""
-        if self._play_widget.playing or tick == 0:
-            self._on_time(tick * self._play.dt)
-        elif not self._showing:
-            self._show_controls()
-
-    def _on_time(self, t):
-        if not self._showing and abs(self._state["t"] - t) > 1e-9:
-            self._apply({"t": self._checked("t", t)})
-
-    def _show_controls(self):
-        self._showing = True  # the controls' own observers stay quiet
-        for key, widget in self._widgets.items():
-            widget.value = self._controls[key].shown(self._state[key])
-        if self._play:
-            self._time.value = self._play_widget.value = round(self._state["t"] / self._play.dt)
-            self._time.description = f"t = {self._state['t']:.2f} s"
-        self._showing = False
-
-    # -- the browser: one message in flight, the newest wins
+    def connect(self, send):
+        """From now on pictures go to `send(message, buffers)`: a dict for JSON, and a list of bytes."""
+        self._send, self._attached = send, False
 
     def receive(self, message):
-        """One message of the browser: everything that happened since the last one, merged."""
+        """One message of the page: everything that happened since the last one, merged."""
         with DRAWING:
             self._received = monotonic()
             self._shown = max(self._shown, message.get("shown", 0))
             if "look" in message:
                 self._attached, self._shown, self._whole = True, self._sent, True
                 self._picture.fit(**message["look"])
+            if "cursor" in message:
+                self._cursor = self._place_in_words(message["cursor"])
+            if "button" in message:
+                self._press(message["button"], reply=message.get("serial"))
             changes, events = self._changes(message)
             if changes or events:
-                self._apply(changes, events, reply=message.get("serial"))
+                self._apply(changes, events, reply=None if "button" in message else message.get("serial"))
+            elif "button" in message:
+                pass  # it has been answered
             elif "serial" in message or self._waiting:
                 self._show_picture(message.get("serial"))
+            if "rest" in message:
+                for store in self.at_rest:
+                    store()
+
+    def _place_in_words(self, fraction):
+        """Where the keyboard's cursor stands, for a screen reader."""
+        number = self._click if self._click is not None else self._brush or 0
+        x, y = self._picture.data(self._picture.fig.axes[number], fraction)
+        return f"x {x:.3g}, y {y:.3g}"
 
     def _changes(self, message):
         """Changes of the state and events for `advance` in a message of the browser."""
@@ -511,6 +347,11 @@ class Stage(ipywidgets.VBox):
             changes[key] = self._moved(key, to=fraction)
         for key, steps in message.get("step", {}).items():
             changes[key] = self._moved(key, steps=steps)
+        for key, position in message.get("control", {}).items():
+            changes[key] = self._controls[key].check(key, self._controls[key].at(position))
+        time = message.get("time", {})
+        if self._play and time.get("epoch") == self._epoch and "button" not in message:
+            changes["t"] = self._checked("t", time["at"] * self._play.dt)
         if "orbit" in message and "view" in self._state:
             changes["view"] = self._state["view"].turned(*(ORBIT_DEG_PER_PIXEL * np.array(message["orbit"])))
         if self._keys:
@@ -554,21 +395,31 @@ class Stage(ipywidgets.VBox):
             self._shown = self._sent  # the page waits for this one
         buffers = self._picture.news(self._whole)
         self._whole = False
-        front = {
+        message = {
             "picture": self._sent,
             "on": self._sent - 1 if len(buffers) == 2 else None,
             "serial": reply,
             "width": round(self._picture.width),
+            "height": round(self._picture.height),
             "handles": self._places(),
-            "name": self.name,
+            "controls": {key: self._shown_control(key) for key in self._controls},
+            "time": self._shown_time(),
             "caption": self.caption,
             "status": self.status,
-            "empty": "turn" if "view" in self._state else "draw" if self._brush is not None else "",
-            "keys": self._keys,
-            "click": self._click is not None,
+            "cursor": self._cursor,
             "milliseconds": round(1e3 * (monotonic() - self._received), 1),
         }
-        self._front.send(front, buffers)
+        self._send(message, buffers)
+
+    def _shown_control(self, key):
+        control, value = self._controls[key], self._state[key]
+        return {"at": control.position(value), "text": control.text(value)}
+
+    def _shown_time(self):
+        if not self._play:
+            return None
+        t = self._state["t"]
+        return {"at": round(t / self._play.dt), "text": f"t = {t:.2f} s", "epoch": self._epoch}
 
     def _places(self):
         """Where the browser puts the handles, and what it says of them."""
@@ -578,46 +429,43 @@ class Stage(ipywidgets.VBox):
             here = self._state["view"].project(at)[:2] if len(at) == 3 else at
             places[key] = {
                 "at": self._picture.fraction(self._picture.fig.axes[handle.ax], here),
-                "label": handle.label or key,
                 "value": ", ".join(f"{letter} {value:.4g}" for letter, value in zip("xyz", at)),
                 "now": float(at[0]),
                 "color": style.themed(handle.color, self._picture.dark),
             }
         return places
 
-    # -- without a browser
+    # -- in a notebook, and without a page
+
+    @property
+    def widget(self):
+        """The figure as a Jupyter widget, made when it is first asked for."""
+        if self._widget is None:
+            self._widget = front.widget(self)
+        return self._widget
+
+    def still(self):
+        """The figure as it is now, as HTML that needs neither kernel nor script: picture, handles, caption."""
+        return front.still(self)
 
     def png(self):
         """The picture as PNG bytes."""
         return self._picture.png()
 
+    def small_png(self):
+        """The picture with the rings of its handles, at its own size and in few colors: for files."""
+        return self._picture.small_png([(place["at"], place["color"]) for place in self._places().values()])
+
     def __repr__(self):
         return self._text
 
-    def _repr_mimebundle_(self, **kwargs):
-        bundle = super()._repr_mimebundle_(**kwargs)
-        return {**bundle, "text/plain": self._text, "image/png": self.png()}
-
-
-def _wide(label):
-    """Room for a label, the track of a slider and its number."""
-    return {"width": f"{18 + 0.55 * len(label):.0f}em", "max_width": "100%"}
-
-
-def _same(a, b):
-    """Equal but for what decimal fractions lose on their way through a browser."""
-    return a == b or (isinstance(a, float) and abs(a - b) <= 1e-9 * max(abs(a), abs(b)))
+    def _ipython_display_(self):
+        front.show(self)
 
 
 def _frozen(array):
     array.setflags(write=False)
     return array
-
-
-def _row(children):
-    return ipywidgets.HBox(
-        list(children), layout={"flex_flow": "row wrap", "align_items": "center", "grid_gap": "0 10px"}
-    )
 
 
 def _at(picture, fraction):

@@ -1,13 +1,16 @@
 """Two notebooks from one source: `solutions/NN_name.py` gives `notebooks/NN_name.ipynb` and `solutions/NN_name.ipynb`.
 
 The first is blank: no solution, no output. The second is solved, executed in strict mode, where an exercise that is not
-correct is an error, and stores its text and HTML outputs for nbval to compare. Both come out byte for byte the same
-each time: cell ids from the source, no timestamps, no widget state, no images, no addresses or paths of one machine.
+correct is an error, and stores its text and HTML outputs for nbval to compare, and one small picture of every Stage.
+Both come out byte for byte the same each time: cell ids from the source, no timestamps, no widget state, no addresses
+or paths of one machine; a stored picture stays until another would look different.
 `python lab.py build` runs `main`.
 """
 
 import argparse
 import asyncio
+import base64
+import io
 import os
 import re
 import sys
@@ -15,15 +18,18 @@ import tempfile
 from pathlib import Path
 
 import nbformat
+import numpy as np
 from nbclient import NotebookClient
 from nbclient.exceptions import CellExecutionError, CellTimeoutError, DeadKernelError
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+from PIL import Image
 
 from ..exercises import source
 
 KERNEL = {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"}
 SECONDS_A_CELL = 60
-PICTURES = ("image/png", "image/jpeg", "image/svg+xml", "application/vnd.jupyter.widget-view+json")
+UNSTABLE = ("image/jpeg", "image/svg+xml", "application/vnd.jupyter.widget-view+json")
+VISIBLE_LEVELS, VISIBLE_SHARE = 32, 0.002  # of 255 in a color; of all pixels
 
 
 class BuildError(Exception):
@@ -108,7 +114,7 @@ def kernel_environment(scratch, strict):
 def clean(notebook, chapter):
     """Take from executed cells what changes from run to run or machine to machine; refuse what cannot be taken.
 
-    Outputs that nbval is told to ignore are not stored at all.
+    Outputs that nbval is told to ignore are not stored, but for the picture of a Stage.
     """
     notebook.metadata.pop("widgets", None)
     notebook.metadata["language_info"] = {"name": "python"}
@@ -116,19 +122,54 @@ def clean(notebook, chapter):
         cell.metadata.pop("execution", None)
         if cell.cell_type == "code":
             ignored = "nbval-ignore-output" in cell.metadata.get("tags", [])
-            cell.outputs = [output for output in cell.outputs if _keep(output) and not ignored]
+            cell.outputs = [output for output in cell.outputs if _keep(output) and (not ignored or _named(output))]
             for output in cell.outputs:
                 _refuse_unstable(output, f"{chapter}, cell {cell.id!r}")
     return notebook
 
 
 def _keep(output):
+    """Whether something of an output is left to store: text, and a picture that has words for those who cannot see."""
     if "data" not in output:
         return True
-    for kind in PICTURES:
+    for kind in UNSTABLE:
         output.data.pop(kind, None)
-    output.metadata = nbformat.from_dict({})
+    words = output.metadata.get("image/png", {}).get("alt")
+    if not words:
+        output.data.pop("image/png", None)
+    output.metadata = nbformat.from_dict({"image/png": {"alt": words}} if words else {})
     return bool(output.data)
+
+
+def _named(output):
+    """Whether an output is a Stage's picture; its words are then cut down to the name, as they differ each time."""
+    name = re.match(r"\[stage: .*?\]", output.get("data", {}).get("text/plain", ""))
+    if not name or "image/png" not in output.data:
+        return False
+    output.data["text/plain"] = name[0]
+    output.metadata["image/png"]["alt"] = name[0]
+    return True
+
+
+def keep_pictures(notebook, path):
+    """Take the pictures stored in the file `path`, where those of the notebook look the same; returns the notebook."""
+    if path.exists():
+        stored = {cell.id: _pictures(cell) for cell in nbformat.read(path, as_version=4).cells}
+        for cell in notebook.cells:
+            for new, old in zip(_pictures(cell), stored.get(cell.id, [])):
+                if looks_like(new["image/png"], old["image/png"]):
+                    new["image/png"] = old["image/png"]
+    return notebook
+
+
+def _pictures(cell):
+    return [o.data for o in cell.get("outputs", []) if "image/png" in o.get("data", {})]
+
+
+def looks_like(new, old):
+    """Whether two pictures, PNG in base64, cannot be told apart by eye."""
+    a, b = (np.asarray(Image.open(io.BytesIO(base64.b64decode(png))).convert("RGB")).astype(int) for png in (new, old))
+    return a.shape == b.shape and (np.abs(a - b).max(-1) > VISIBLE_LEVELS).mean() <= VISIBLE_SHARE
 
 
 def _refuse_unstable(output, where):
@@ -136,7 +177,8 @@ def _refuse_unstable(output, where):
         raise BuildError(
             f"{where}: a built notebook warns of nothing, but this went to stderr: {output.text.strip()!r}"
         )
-    text = output.text if "text" in output else "\n".join(str(value) for value in output.data.values())
+    told = [str(value) for kind, value in output.get("data", {}).items() if kind != "image/png"]
+    text = output.text if "text" in output else "\n".join(told)
     paths = {str(source.ROOT), sys.prefix, tempfile.gettempdir(), str(Path.home())} - {os.sep}
     found = re.search("|".join([r"0x[0-9a-f]{6,}", r"ipykernel_\d+", *map(re.escape, sorted(paths))]), text)
     if found:
@@ -161,18 +203,18 @@ async def _build_solved(paths, solutions):
     async def one(path):
         async with kernels:
             try:
-                _write(solutions / f"{path.stem}.ipynb", await executed_text(path))
+                _write(solutions / f"{path.stem}.ipynb", await executed_text(path, solutions))
             except BuildError as error:
                 return error
 
     return await asyncio.gather(*map(one, paths))
 
 
-async def executed_text(path):
-    """The text of the solved notebook's file, executed afresh."""
+async def executed_text(path, solutions):
+    """The text of the solved notebook's file in the folder `solutions`, executed afresh."""
     notebook = solved_notebook(path)
     await execute(notebook, path.stem, path.parent)
-    return as_text(clean(notebook, path.stem))
+    return as_text(keep_pictures(clean(notebook, path.stem), solutions / f"{path.stem}.ipynb"))
 
 
 def _write(path, text):
@@ -195,7 +237,7 @@ def stale(paths, notebooks, solutions, rerun=False):
             found.append(f"{path.stem}: notebooks/{name} is not what solutions/{path.name} gives")
         if not _is_solved(solutions / name, path):
             found.append(f"{path.stem}: solutions/{name} is not what solutions/{path.name} gives")
-        elif rerun and _text(solutions / name) != asyncio.run(executed_text(path)):
+        elif rerun and _text(solutions / name) != asyncio.run(executed_text(path, solutions)):
             found.append(f"{path.stem}: the outputs in solutions/{name} are not what its cells give today")
     return found
 

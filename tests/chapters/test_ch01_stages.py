@@ -120,7 +120,7 @@ def test_gimbal_presets_show_the_same_pose():
     stage.make_it_fail()
     pose = stage.result["T"]
     assert "A - C = 40 deg" in stage.caption
-    stage.buttons["A and C trade places"].click()
+    stage.press("A and C trade places")
     assert stage.result["T"] == pytest.approx(pose, abs=1e-12)
 
 

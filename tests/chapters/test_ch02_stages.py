@@ -83,7 +83,7 @@ def inside(artist, stage):
 @pytest.mark.parametrize("width", [500, 700])
 def test_growth_keeps_room_for_wide_numbers(width):
     stage = w.growth()
-    stage._picture.fit(width, 1.0, False)
+    stage._picture.fit(width, 1000, 1.0, False)
     stage.png()  # the layout is made for the numbers at the start
     stage.make_it_fail()
     stage.png()

@@ -14,9 +14,9 @@ FUNCTIONS = (stages.line, stages.four_paths, stages.saddle, stages.basins)
 def test_presets_change_the_picture_and_reset_brings_it_back(function):
     stage = function()
     first, text = stage.png(), repr(stage)
-    stage.buttons["Make it fail"].click()
+    stage.press("Make it fail")
     assert stage.status == "" and stage.png() != first
-    stage.buttons["Reset"].click()
+    stage.press("Reset")
     assert stage.status == "" and stage.png() == first
     assert repr(stage) == text and text.startswith("[stage: ")
 

@@ -70,8 +70,8 @@ def test_make_it_fail_is_a_singular_arm():
 @pytest.mark.parametrize("preset", ["Reset", "Make it fail", "arm upright"])
 def test_flange_and_tracker_stay_in_the_picture_with_their_letters(preset, width):
     stage = wr.tx40()
-    stage._picture.fit(width, 1.0, False)
-    stage._preset(preset)
+    stage._picture.fit(width, 1000, 1.0, False)
+    stage.press(preset)
     stage.png()
     canvas, whole = stage._picture.canvas, stage._picture.fig.bbox
     words = {text: text.get_window_extent(canvas.get_renderer()) for text in stage._picture.fig.axes[0].texts}

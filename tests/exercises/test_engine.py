@@ -702,12 +702,20 @@ def test_the_first_prediction_stays_and_reveals(capsys):
 def test_a_click_locks_in_and_reveals():
     import ipywidgets
 
-    box = session._question(SMALL, SMALL["guess"], lambda: ipywidgets.Label("the figure"))
+    class Figure:
+        widget, at_rest = ipywidgets.Label("the figure"), []
+
+        def still(self):
+            return "<p>its picture</p>"
+
+    box = session._question(SMALL, SMALL["guess"], Figure)
+    assert "<li>up</li><li>down</li>" in box.still()
     buttons = box.children[1].children
     assert [b.description for b in buttons] == ["up", "down"]
     assert repr(box) == "[predict first: Up or down? up | down]"
     buttons[0].click()
-    assert box.children[1].value == "the figure"
+    assert box.children[1].value == "the figure" and Figure.at_rest == [box.store]
+    assert "Your prediction: up" in box.still() and box.still().endswith("<p>its picture</p>")
     assert ("98-small", "guess") in progress.solved()
 
 

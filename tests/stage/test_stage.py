@@ -1,6 +1,7 @@
 """Stage without a browser: state, corrections, presets, errors, what goes to the page, and what comes from it."""
 
 import io
+import json
 import re
 import threading
 from pathlib import Path
@@ -19,7 +20,7 @@ from labkit.stage.renderer import Canvas
 from labkit.stage.scene3d import Scene, View
 
 ROOT = Path(__file__).resolve().parents[2]
-LOOK = {"width": 600, "ratio": 1, "dark": False}
+LOOK = {"width": 600, "height": 400, "ratio": 1, "dark": False, "letters": 1.0}
 
 
 def scene(fig):
@@ -61,7 +62,7 @@ def wired():
 
 def wire(stage):
     sent = []
-    stage._front.send = lambda message, buffers=None: sent.append((message, buffers))
+    stage.connect(lambda message, buffers: sent.append((message, buffers)))
     stage.receive({"look": LOOK, "serial": "a:1"})
     return stage, sent
 
@@ -115,12 +116,17 @@ def test_bounds_and_constrain_correct_handles():
 def test_controls_follow_and_lead():
     controls = {"n": Slider(1, 9, 3), "way": Choice(["a", "b"], "a"), "on": Toggle(True)}
     stage = nothing(controls=controls, compute=lambda state: (state["n"], state["way"], state["on"]), fail={"n": 9})
-    stage._widgets["n"].value = 5
+    stage, sent = wire(stage)
+    stage.receive({"control": {"n": 4}, "serial": "a:2"})
     assert stage.result == (5, "a", True)
-    stage.set(way="b", on=False)
-    assert (stage._widgets["way"].value, stage._widgets["on"].value) == ("b", False)
-    stage.make_it_fail()
-    assert stage.result == (9, "a", True) and stage._widgets["n"].value == 9
+    stage.receive({"control": {"way": 1, "on": 0}, "serial": "a:3"})
+    assert stage.result == (5, "b", False)
+    shown = sent[-1][0]["controls"]
+    assert {key: (c["at"], c["text"]) for key, c in shown.items()} == {
+        "n": (4, "5"), "way": (1, "b"), "on": (0, "off")
+    }  # fmt: skip
+    stage.receive({"button": "Make it fail", "serial": "a:4"})
+    assert stage.result == (9, "a", True) and sent[-1][0]["controls"]["n"] == {"at": 8, "text": "9"}
     for bad in ({"way": "c"}, {"on": 1}, {"n": 0}):
         with pytest.raises(ValueError):
             stage.set(**bad)
@@ -137,32 +143,40 @@ def test_controls_follow_and_lead():
         (Slider(1, 9, 3), 4, 4),
     ],
 )
-def test_a_knob_stands_on_a_step_and_its_echo_changes_nothing(control, value, shown):
-    calls = []
-    stage = nothing(controls={"a": control}, compute=lambda state: calls.append(state["a"]))
-    stage.set(a=value)
-    assert stage._widgets["a"].value == pytest.approx(shown, abs=1e-12) and stage.state["a"] == value
-    stage._on_control("a", {"new": stage._widgets["a"].value})  # what the browser sends back
-    assert stage.state["a"] == value and calls == [control.value, value]
-    stage._widgets["a"].value = control.high
-    assert stage.state["a"] == control.high
+def test_a_knob_stands_on_the_nearest_step_and_ends_at_both_ends(control, value, shown):
+    assert control.at(control.position(value)) == pytest.approx(shown, abs=1e-12)
+    assert control.at(control.position(control.value)) == control.value
+    assert (control.at(0), control.at(control.positions)) == (control.low, control.high)
+    assert [control.position(control.at(k)) for k in range(control.positions + 1)] == [*range(control.positions + 1)]
+    assert control.at(-3) == control.low and control.at(10**6) == control.high
 
 
-def test_log_slider_and_dropdown():
-    controls = {"std": Slider(1e-3, 1.0, 0.1, log=True), "k": Choice({"one": 1, "two": 2, "three": 3, "four": 4}, 2)}
-    stage = nothing(controls=controls, compute=lambda state: (state["std"], state["k"]))
-    stage._widgets["std"].value = 0.01
-    stage.set(k=3)
-    assert stage.result == (0.01, 3)
+def test_a_value_between_two_steps_stays_until_the_knob_is_moved():
+    stage, _ = wire(nothing(controls={"a": Slider(0.0, 1.0, 0.3, step=0.1)}, compute=lambda state: state["a"]))
+    stage.set(a=0.26)
+    assert stage.result == 0.26 and stage._shown_control("a") == {"at": 3, "text": "0.3"}
+    stage.receive({"control": {"a": 4}, "serial": "a:2"})
+    assert stage.result == pytest.approx(0.4)
+
+
+def test_the_declaration_says_what_the_page_draws():
+    controls = {"std": Slider(1e-3, 1.0, 0.1, label="noise (mm)", log=True), "k": Choice({w: w for w in "abcd"}, "b")}
+    told = segment(controls={**controls, "on": Toggle(label="all")}, click=True).declaration()
+    json.dumps(told)
+    assert told["handles"] == {"P": "P", "Q": "far end"} and told["buttons"] == ("Reset", "Make it fail")
+    assert told["controls"]["std"]["unit"] == "mm" and told["controls"]["std"]["label"] == "noise (mm)"
+    assert told["controls"]["k"] == {"kind": "list", "label": "k", "words": ["a", "b", "c", "d"]}
+    assert told["controls"]["on"] == {"kind": "toggle", "label": "all"}
+    assert (told["click"], told["empty"], told["play"]) == (True, "", None)
 
 
 def test_presets():
     stage = segment(presets={"close": {"Q": (1, 2)}})
     assert list(stage.buttons) == ["Reset", "Make it fail", "close"]
     stage.set(scale=2.0)
-    stage.buttons["close"].click()
+    stage.press("close")
     assert stage.result == pytest.approx(1.0)
-    stage.buttons["Reset"].click()
+    stage.press("Reset")
     assert stage.result == pytest.approx(5.0)
 
 
@@ -221,13 +235,22 @@ def test_strict_raises_too(monkeypatch):
 # -- outputs
 
 
-def test_text_is_constant_and_the_view_wins():
+def test_text_is_constant_and_what_is_stored_needs_no_kernel():
     stage = segment()
+    before = stage.still()
     stage.set(Q=(1, 2))
-    bundle = stage._repr_mimebundle_()
-    assert bundle["text/plain"] == repr(stage) == "[stage: segment] 5.0 mm"
-    assert "application/vnd.jupyter.widget-view+json" in bundle
-    assert Image.open(io.BytesIO(bundle["image/png"])).size == (700, 420)
+    assert repr(stage) == "[stage: segment] 5.0 mm"
+    assert "1.0 mm" in stage.still() and stage.still() != before and "widget" not in stage.still()
+    assert Image.open(io.BytesIO(stage.png())).size == (700, 420)
+
+
+def test_a_small_picture_shows_the_rings_of_the_handles():
+    stage = segment(handles={"P": Handle((1, 1)), "Q": Handle((4, 2), color=style.MEASUREMENT)})
+    image = np.asarray(Image.open(io.BytesIO(stage.small_png())).convert("RGB")).astype(int)
+    right, down = stage._picture.fraction(stage._picture.fig.axes[0], (4, 2))
+    near = image[round(420 * down) - 12 : round(420 * down) + 12, round(700 * right) - 12 : round(700 * right) + 12]
+    orange = np.abs(near - 255 * np.array(to_rgb(style.MEASUREMENT))).max(-1) < 60
+    assert orange.sum() > 40 and len(stage.small_png()) < 20_000
 
 
 def test_png_holds_the_pixels():
@@ -246,7 +269,6 @@ def test_a_drag_is_answered_with_one_picture(wired):
     assert len(sent) == 2 and message["serial"] == "a:2" and message["on"] == 1 and len(buffers) == 2
     assert stage.state["Q"][0] == pytest.approx(4.0) and 0 < stage.state["Q"][1] < 5.0
     assert message["handles"]["Q"]["at"] == pytest.approx((at[0], at[1] + 0.1))
-    assert message["handles"]["Q"]["label"] == "far end"
 
 
 def page_after(sent):
@@ -320,7 +342,7 @@ def test_newest_wins_while_the_page_is_busy(wired):
 
 def test_nothing_is_sent_before_a_page_looks():
     stage, sent = segment(), []
-    stage._front.send = lambda *args: sent.append(args)
+    stage.connect(lambda *args: sent.append(args))
     stage.set(scale=2.0)
     assert not sent
 
@@ -348,34 +370,51 @@ def test_click_and_brush():
     stage.receive({"brush": at[2:], "serial": "a:5"})
     assert stage.result[1] == pytest.approx(np.array([[2, 2], [4, 3], [6, 3]]))
     stage.receive({"brush": at[2:], "fresh": True, "serial": "a:6"})
-    assert len(stage.result[1]) == 1 and sent[-1][0]["empty"] == "draw"
+    assert len(stage.result[1]) == 1 and stage.declaration()["empty"] == "draw"
+    stage.receive({"cursor": at[0], "serial": "a:7"})
+    assert sent[-1][0]["cursor"] == "x 2, y 2"
 
 
 # -- time and memory
 
 
 def test_play():
-    stage = nothing(play=Play(2.0, 0.1), compute=lambda state: state["t"])
-    stage._play_widget.playing = True
-    stage._play_widget.value = 7
-    assert stage.result == pytest.approx(0.7) and (stage._time.value, stage._time.description) == (7, "t = 0.70 s")
-    stage._time.value = 12
-    assert stage.result == pytest.approx(1.2) and stage._play_widget.value == 12
+    stage, sent = wire(nothing(play=Play(2.0, 0.1), compute=lambda state: state["t"]))
+    stage.receive({"time": {"at": 7, "epoch": 0}, "serial": "a:2"})
+    assert stage.result == pytest.approx(0.7)
+    assert sent[-1][0]["time"] == {"at": 7, "text": "t = 0.70 s", "epoch": 0}
     stage.set(t=99)
     assert stage.result == 2.0
+    assert stage.declaration()["play"] == {"steps": 20, "interval": 100, "stride": 1, "seekable": True}
 
 
-def test_reset_wins_against_a_tick_that_was_under_way():
-    stage = nothing(play=Play(2.0, 0.1), compute=lambda state: state["t"])
-    stage._play_widget.set_state({"playing": True})
-    stage._play_widget.set_state({"value": 7})
+def test_reset_wins_against_a_step_of_time_that_was_under_way():
+    stage, sent = wire(nothing(play=Play(2.0, 0.1), compute=lambda state: state["t"]))
+    stage.receive({"time": {"at": 7, "epoch": 0}, "serial": "a:2"})
     stage.reset()
-    stage._play_widget.set_state({"value": 8})
-    assert stage.result == 0.0 and (stage._play_widget.value, stage._time.value) == (0, 0.0)
-    stage._play_widget.set_state({"playing": True, "value": 1})
+    stage.receive({"time": {"at": 8, "epoch": 0}, "serial": "a:3"})
+    assert stage.result == 0.0 and sent[-1][0]["serial"] == "a:3"
+    stage.receive({"time": {"at": 1, "epoch": sent[-1][0]["time"]["epoch"]}, "serial": "a:4"})
     assert stage.result == pytest.approx(0.1)
-    stage._play_widget.set_state({"playing": False, "value": 0})  # its own stop button
-    assert stage.result == 0.0
+
+
+def test_a_button_is_answered_once_and_what_was_moved_after_it_counts(wired):
+    stage, sent = wired
+    stage.receive({"button": "Reset", "step": {"P": (1, 0)}, "serial": "a:2"})
+    assert [message["serial"] for message, _ in sent].count("a:2") == 1
+    assert stage.state["P"] == pytest.approx([1.5, 1.0])
+    with pytest.raises(ValueError, match="no button 'Undo', only Reset, Make it fail"):
+        stage.press("Undo")
+
+
+def test_a_rest_stores_what_is_shown(wired):
+    stage, _ = wired
+    stored = []
+    stage.at_rest.append(lambda: stored.append(stage.caption))
+    stage.receive({"step": {"P": (2, 0)}, "serial": "a:2"})
+    assert not stored
+    stage.receive({"rest": True})
+    assert stored == [stage.caption]
 
 
 def counting(**options):
@@ -388,13 +427,12 @@ def counting(**options):
 
 def test_memory_follows_ticks_keys_and_clicks():
     stage, sent = wire(counting(play=Play(2.0, 0.1), keys=True, click=True))
-    assert sent[-1][0]["keys"] is True
-    stage._play_widget.playing = True
-    stage._play_widget.value = 2
+    assert stage.declaration()["keys"] is True and sent[-1][0]["time"]["at"] == 0
+    stage.receive({"time": {"at": 2, "epoch": 0}, "serial": "a:1"})
     stage.receive({"arrows": ["up", "left"], "serial": "a:2"})
     stage.receive({"click": stage._picture.fraction(stage._picture.fig.axes[0], (1, 1)), "serial": "a:3"})
     assert stage.result == ["tick", "tick", "up", "left", "click"]
-    stage._play_widget.value = 1  # back in time: from the start
+    stage.set(t=0.1)  # back in time: from the start
     assert stage.result == ["tick"]
     stage.reset()
     assert stage.result == [] and stage.state["t"] == 0.0
@@ -450,7 +488,7 @@ def test_orbit_turns_the_view_and_presets_keep_it():
     stage.receive({"orbit": (20, 10), "serial": "a:2"})
     turned = View(310, 30)
     assert stage.state["view"] == turned
-    stage.buttons["home"].click()
+    stage.press("home")
     assert stage.state["view"] == turned
     stage.reset()
     assert stage.state["view"] == View(-60, 25)
@@ -474,23 +512,37 @@ def pixels(stage):
     return np.asarray(Image.open(io.BytesIO(stage.png())))[..., :3]
 
 
-def test_sharp_on_dense_screens_and_proportional_in_narrow_cells():
+@pytest.mark.parametrize(
+    ("room", "ratio", "expected"),
+    [
+        ((700, 900), 1, (700, 420)),
+        ((1400, 900), 1, (1400, 840)),
+        ((350, 900), 1, (350, 210)),
+        ((700, 900), 2, (1400, 840)),
+        ((350, 900), 3, (1050, 630)),
+        ((1000, 300), 1, (725, 300)),
+        ((2000, 1200), 3, (2887, 1732)),
+    ],
+)
+def test_the_picture_takes_its_room_sharply_and_letters_keep_their_size(room, ratio, expected):
+    """Wider rooms give wider pictures; below 85 % of the designed size letters shrink; 5 million pixels are enough."""
     stage = segment()
-    for width, ratio, expected in (
-        (700, 1, (700, 420)),
-        (2000, 1, (700, 420)),
-        (350, 1, (350, 210)),
-        (700, 2, (1400, 840)),
-        (700, 9, (1750, 1050)),
-    ):
-        stage._picture.fit(width, ratio, False)
-        assert np.abs(np.subtract(Image.open(io.BytesIO(stage.png())).size, expected)).max() <= 1
+    stage._picture.fit(*room, ratio, False)
+    assert np.abs(np.subtract(Image.open(io.BytesIO(stage.png())).size, expected)).max() <= 1
+    letters = stage._picture.fig.dpi / (expected[0] / stage._picture.width) / canvas.CSS_DPI
+    assert letters == pytest.approx(min(1, room[0] / (0.85 * 700), room[1] / (0.85 * 420)), abs=0.01)
+
+
+def test_letters_grow_with_those_around():
+    stage = segment()
+    stage._picture.fit(1400, 840, 1, False, letters=2.0)
+    assert stage._picture.fig.get_size_inches() == pytest.approx([7.0, 4.2]) and stage._picture.fig.dpi == 200
 
 
 def test_dark_theme_exchanges_paper_and_ink_only():
     stage = segment()
     light = pixels(stage)
-    stage._picture.fit(700, 1, True)
+    stage._picture.fit(700, 900, 1, True)
     dark = pixels(stage)
 
     def count(image, color):
@@ -511,7 +563,7 @@ def test_dark_theme_reaches_collections_and_markers():
         return [dots, mark], lambda state, result: None
 
     stage = Stage("dots", scene=scene, compute=lambda state: None, fail={})
-    stage._picture.fit(700, 1, True)
+    stage._picture.fit(700, 900, 1, True)
     assert pixels(stage).min(-1).max() == round(255 * to_rgb(style.DARK[style.INK])[0])
     assert pixels(stage).max(-1).min() > 0
 
@@ -528,7 +580,7 @@ def test_background_is_drawn_only_when_it_changes(monkeypatch):
     stage._picture.fig.axes[0].set_xlim(0, 20)
     stage.png()
     assert len(draws) == 1
-    stage._picture.fit(500, 1, False)
+    stage._picture.fit(500, 900, 1, False)
     stage.png()
     assert len(draws) == 2
 
@@ -599,7 +651,7 @@ def test_going_back_to_a_width_moves_no_axes():
     picture = stages.honesty()._picture
     places = []
     for width in (700, 420, 700):
-        picture.fit(width, 1.0, dark=False)
+        picture.fit(width, 900, 1.0, dark=False)
         picture.draw()
         places.append([ax.get_position().bounds for ax in picture.fig.axes])
     np.testing.assert_allclose(places[0], places[2], atol=2 / 700)

@@ -4,6 +4,8 @@ import html
 
 import ipywidgets
 
+from ... import live
+
 ALL = "all"
 SHOWN = 150  # rows that are drawn at once; the search narrows what is longer
 HEADER = ("document", "place", "quantity", "printed", "computed", "unit", "status", "chapter")
@@ -74,7 +76,7 @@ class LedgerTable(ipywidgets.VBox):
     """
 
     def __init__(self, entries):
-        self.entries = list(entries)
+        self.entries, self.at_rest = list(entries), []
         documents = [ALL, *dict.fromkeys(entry.row.document for entry in self.entries)]
         statuses = [ALL, *(status for status in SIGNS if any(entry.status == status for entry in self.entries))]
         self.search = ipywidgets.Text(placeholder="a place, a quantity, a number", description="search")
@@ -90,9 +92,22 @@ class LedgerTable(ipywidgets.VBox):
     def _show(self, change=None):
         found = matching(self.entries, self.search.value, self.document.value, self.status.value)
         self.table.value = table_html(found)
+        for store in self.at_rest:
+            store()
 
     def __repr__(self):
         return "[table: the ledger, searchable]"
 
-    def _repr_mimebundle_(self, **kwargs):
-        return {**super()._repr_mimebundle_(**kwargs), "text/plain": repr(self)}
+    @property
+    def widget(self):
+        """Itself: what a prediction reveals is asked for its widget."""
+        return self
+
+    def still(self):
+        """The table as it is now, as HTML that needs no kernel."""
+        return f"{self.table.value}<small>{live.AGAIN}</small>"
+
+    def _ipython_display_(self):
+        shown = live.show(lambda: self, repr(self), self.still)
+        if shown:
+            self.at_rest.append(shown.refresh)

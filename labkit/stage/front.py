@@ -1,0 +1,49 @@
+"""A Stage in a notebook: the widget that carries its messages, and what is stored of it."""
+
+import base64
+import html
+from pathlib import Path
+
+import anywidget
+import traitlets
+from IPython.display import display
+
+from .. import live
+
+
+class Front(anywidget.AnyWidget):
+    """`stage.js` with its model: the declaration, and messages both ways."""
+
+    _esm = Path(__file__).with_name("stage.js")
+    _css = Path(__file__).with_name("stage.css")
+    declaration = traitlets.Dict().tag(sync=True)
+
+
+def widget(stage):
+    """The widget of a Stage, connected to it."""
+    made = Front(declaration=stage.declaration())
+    stage.connect(made.send)
+    made.on_msg(lambda _, message, buffers: stage.receive(message))
+    return made
+
+
+def still(stage):
+    """Picture with handles, and caption, as HTML."""
+    picture = base64.b64encode(stage.small_png()).decode()
+    words = html.escape(stage.caption)
+    return (
+        f'<figure style="margin:0"><img alt="{html.escape(stage.name)}: {words}" '
+        f'style="max-width:100%" src="data:image/png;base64,{picture}"/>'
+        f"<figcaption>{words}<br/><small>{live.AGAIN}</small></figcaption></figure>"
+    )
+
+
+def show(stage):
+    """Show a Stage beneath the running cell; in notebooks that are built, its text and its small picture."""
+    if live.is_built():
+        picture = {"text/plain": repr(stage), "image/png": stage.small_png()}
+        display(picture, metadata={"image/png": {"alt": stage.caption or stage.name}}, raw=True)
+        return
+    shown = live.show(lambda: stage.widget, repr(stage), stage.still)
+    if shown:
+        stage.at_rest.append(shown.refresh)
