@@ -1,6 +1,7 @@
 """`python -m labkit VERB ...`: the command line of an installed workbook; `lab.py` hands its verbs on to this.
 
 calibrate KIND FILES   your own poses in, a calibration with covariance, outliers and advice out
+localize FILES         your own log in, the path with its covariance out
 """
 
 import sys
@@ -8,7 +9,7 @@ from importlib import import_module
 
 from .verbs.arguments import run
 
-VERBS = {"calibrate": "calibrate"}
+VERBS = {"calibrate": "calibrate", "localize": "localize"}
 
 
 def main(arguments=None):

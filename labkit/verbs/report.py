@@ -132,8 +132,8 @@ def _svg(parts, label):
 class View:
     """What a 3D view shows: lines and words, each with a role of the page's colors."""
 
-    def __init__(self):
-        self.lines, self.words = [], []
+    def __init__(self, above=False):
+        self.lines, self.words, self.above = [], [], above
 
     def line(self, points, role, width=1.5, dash=None):
         """A polyline through points (n, 3)."""
@@ -170,6 +170,7 @@ class View:
             "size": float(max(np.linalg.norm(high - low) / 2, 1e-9)),
             "lines": self.lines,
             "words": self.words,
+            "above": self.above,
         }
         text = json.dumps(data).replace("</", "<\\/")
         return (
