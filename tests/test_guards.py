@@ -157,10 +157,6 @@ def test_what_a_document_prints_is_read_in_its_room(path):
 
 
 LONGEST_FUNCTION = 40  # lines of a body, without its docstring
-STILL_LONGER = {  # besides the builders of Stages
-    "exercises/metrics.py": "as_array",
-    "fast/ekf.py": "_filter_many",
-}
 
 
 def long_functions(path):
@@ -179,8 +175,7 @@ def _makes_a_stage(value):
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_functions_are_short(path):
-    allowed = {STILL_LONGER.get(path.relative_to(ROOT / "labkit").as_posix())}
-    found = set(long_functions(path)) - allowed
+    found = set(long_functions(path))
     assert not found, f"{found} exceeds {LONGEST_FUNCTION} lines: cut it where its parts have names"
 
 

@@ -62,7 +62,34 @@ class Metric:
 
 
 def as_array(result, shape):
-    """The result as a float array of this shape; refuses everything that is no harmless way of writing one."""
+    """The result as a float array of this shape; refuses everything that is no harmless way of writing one.
+
+    Parameters
+    ----------
+    result : anything
+        What a student's code returned.
+    shape : tuple of int
+        The shape that is expected; () is a number.
+
+    Returns
+    -------
+    array : array of that shape, of integers or floats
+
+    Raises
+    ------
+    Refused
+        With what was expected and what came.
+    """
+    wanted = f"expected {'a number' if shape == () else f'an array of shape {shape}'}"
+    result = _value(result)
+    array = _real(_converted(result, wanted), result, wanted)
+    _refuse_shape(array, shape, wanted)
+    _refuse_infinite(array)
+    return array
+
+
+def _value(result):
+    """The result itself; that of SciPy's rotations and sparse matrices as an array."""
     if result is None:
         raise Refused("it returned None: is a `return` missing?")
     if result is ...:
@@ -73,21 +100,26 @@ def as_array(result, shape):
         if hasattr(result, method) and not isinstance(result, type):
             result = getattr(result, method)()
     if callable(result):
-        raise Refused(
-            f"it returned {getattr(result, '__name__', 'something callable')}, a function: are the parentheses missing?"
-        )
-    wanted = f"expected {'a number' if shape == () else f'an array of shape {shape}'}"
-    if (
-        getattr(result, "size", 0) is not None
-        and np.size(getattr(result, "shape", ()))
-        and np.prod(np.asarray(result.shape, dtype=float)) > MAX_ENTRIES
-    ):
-        raise Refused(f"{wanted}, got one of shape {tuple(result.shape)}")
+        name = getattr(result, "__name__", "something callable")
+        raise Refused(f"it returned {name}, a function: are the parentheses missing?")
+    return result
+
+
+def _converted(result, wanted):
+    """The result as an array of whatever kind, unless it is too large to look at or its parts do not fit."""
+    dimensions = getattr(result, "shape", ())
+    sized = getattr(result, "size", 0) is not None and np.size(dimensions)
+    if sized and np.prod(np.asarray(dimensions, dtype=float)) > MAX_ENTRIES:
+        raise Refused(f"{wanted}, got one of shape {tuple(dimensions)}")
     try:
-        array = np.asarray(result)
+        return np.asarray(result)
     except Exception:
         parts = f" of {len(result)} parts that differ in shape" if type(result) in (list, tuple) else ""
         raise Refused(f"{wanted}, got {_describe(result)}{parts}: return one array") from None
+
+
+def _real(array, result, wanted):
+    """The array as integers or floats."""
     if array.dtype.kind == "c":
         if np.abs(array.imag).max(initial=0.0) > 0:
             cause = "a root of a negative number, or is `np.angle` missing?"
@@ -102,6 +134,10 @@ def as_array(result, shape):
             raise Refused(f"{wanted}, got {_describe(result)}") from None
     if array.dtype.kind not in "iuf":
         raise Refused(f"{wanted}, got {_describe(result)}")
+    return array
+
+
+def _refuse_shape(array, shape, wanted):
     if shape == () and array.size == 1 and array.ndim:
         raise Refused(f"{wanted}, got an array of shape {array.shape} that holds one: take it out, with `.item()`")
     if array.shape != shape:
@@ -111,6 +147,9 @@ def as_array(result, shape):
         elif array.size == np.prod(shape):
             hint = ": the right number of entries, arranged differently"
         raise Refused(f"{wanted}, got {'a number' if array.shape == () else f'shape {array.shape}'}{hint}")
+
+
+def _refuse_infinite(array):
     if not np.isfinite(array).all():
         bad = int((~np.isfinite(array)).sum())
         which = "NaN" if np.isnan(array).any() else "infinity"
@@ -119,7 +158,6 @@ def as_array(result, shape):
             f"the result holds {which}{count}: look for a division by zero, a root of a negative number,"
             " an arccos or arcsin of something beyond -1 and 1, or an iteration that runs away"
         )
-    return array
 
 
 def _describe(result):

@@ -131,23 +131,7 @@ def _filter_many(given, weights, var_u, turn):
         _move_many(pose, P, u[k], dt, var_u[k], turn, along)
         if noisy:
             P += extra
-        d = marks - pose[:2, None]
-        minus_q = d[0] * d[0]
-        minus_q += d[1] * d[1]
-        if not minus_q.all():
-            raise ValueError(ON_LANDMARK)
-        r = np.sqrt(minus_q)
-        np.negative(minus_q, out=minus_q)
-        np.subtract(z[k, 0], r, out=y[0])
-        np.subtract(z[k, 1], np.arctan2(d[1], d[0]), out=y[1])
-        y[1] += pose[2]
-        if given.wrap:
-            y[1] -= math.tau * np.rint(y[1] * (1 / math.tau))
-        np.negative(r, out=r)
-        np.divide(d, r, out=H[:2, 0])
-        np.divide(d[1], minus_q, out=H[0, 1])
-        np.negative(H[0, 1], out=H[0, 1])
-        np.divide(d[0], minus_q, out=H[1, 1])
+        _measured_many(pose, marks, z[k], given.wrap, H, y)
         np.multiply(rows, weight[k], out=weighted)
         g = np.einsum("ikr,kr->ir", weighted, error)
         P = _absorb_many(P, np.einsum("ikr,jkr->ijr", weighted, rows))
@@ -180,6 +164,27 @@ def _move_many(pose, P, u, dt, noise, turn, along):
             P[:2, 2] += cross
             P[2, :2] += cross
             P[:2, :2] += (turn * dt) ** 2 * noise[1] * bend[:, None] * bend
+
+
+def _measured_many(pose, marks, z, wrap, H, y):
+    """Innovations of all landmarks into y (2, m, runs), and how they change with the pose into H (3, 2, m, runs)."""
+    d = marks - pose[:2, None]
+    minus_q = d[0] * d[0]
+    minus_q += d[1] * d[1]
+    if not minus_q.all():
+        raise ValueError(ON_LANDMARK)
+    r = np.sqrt(minus_q)
+    np.negative(minus_q, out=minus_q)
+    np.subtract(z[0], r, out=y[0])
+    np.subtract(z[1], np.arctan2(d[1], d[0]), out=y[1])
+    y[1] += pose[2]
+    if wrap:
+        y[1] -= math.tau * np.rint(y[1] * (1 / math.tau))
+    np.negative(r, out=r)
+    np.divide(d, r, out=H[:2, 0])
+    np.divide(d[1], minus_q, out=H[0, 1])
+    np.negative(H[0, 1], out=H[0, 1])
+    np.divide(d[0], minus_q, out=H[1, 1])
 
 
 def _absorb_many(P, W):
