@@ -723,6 +723,60 @@ def predicted_covariance(T_BF, T_FS, target, std):
     return as_positive_number(std, "std") ** 2 * np.linalg.inv(J.T @ J)
 
 
+@dataclass(frozen=True, eq=False)
+class Unseen:
+    """What a set of poses would leave free, before anything is measured.
+
+    Attributes
+    ----------
+    singular_values : array, shape (9,)
+        Of the Jacobian with phi times the root-mean-square distance of the sphere, in mm per mm; largest first.
+    weakest : array, shape (9,)
+        The change of phi (rad), translation and target (mm) that is seen least; a step of length 1 mm.
+    turns, slides : arrays, shapes (k, 3) and (m, 3)
+        Directions in which phi (in S) and the target (in B) can change unseen, the farthest first; none in general.
+    """
+
+    singular_values: np.ndarray
+    weakest: np.ndarray
+    turns: np.ndarray
+    slides: np.ndarray
+
+
+def unseen_changes(T_BF, T_FS, target, tolerance=1e-3):
+    """Changes of scanner and sphere that a set of poses hardly sees.
+
+    Parameters
+    ----------
+    T_BF : array-like, shape (N, 4, 4)
+        At least three poses.
+    T_FS : array-like, shape (4, 4)
+    target : array-like, shape (3,), mm
+    tolerance : float
+        A change counts as unseen when its singular value is no more than this share of the largest.
+
+    Returns
+    -------
+    Unseen
+
+    See Also
+    --------
+    predicted_covariance : how well the poses determine what they see.
+    """
+    x_S = transform(invert(T_FS), transform(invert(T_BF), target))
+    distance = math.sqrt((x_S**2).sum(-1).mean())
+    scale = np.array([1 / distance] * 3 + [1.0] * 6)
+    _, values, Vt = np.linalg.svd(joint_jacobian(T_BF, x_S, T_FS) * scale, full_matrices=False)
+    free = Vt[values <= tolerance * values[0]]
+    return Unseen(values, Vt[-1] * scale, _reached(free[:, :3]), _reached(free[:, 6:]))
+
+
+def _reached(block):
+    """Directions (k, 3) in which unseen changes reach into one block of unknowns, the farthest first."""
+    _, sizes, directions = np.linalg.svd(block)
+    return directions[: (sizes > 0.05).sum()]
+
+
 def poses_that_see(T_FS, target, R_BF, x_S):
     """Robot poses with given orientations in which the scanner sees the sphere at given places.
 

@@ -6,7 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from ..checks import as_count, as_covariances, as_points, as_probability, as_shape, fit_together, solve_covariance
+from ..checks import (
+    as_count,
+    as_covariances,
+    as_finite,
+    as_points,
+    as_positive_number,
+    as_probability,
+    as_shape,
+    fit_together,
+    solve_covariance,
+)
 from ..geometry import planar
 
 
@@ -61,6 +71,30 @@ def ellipse(mean, cov, probability=0.95, points=61):
     angle = np.linspace(0, 2 * np.pi, points)
     circle = np.stack([np.cos(angle), np.sin(angle)])
     return mean[..., None, :] + np.swapaxes(axes @ circle, -1, -2)
+
+
+def cut_axes(cov, longest):
+    """Covariance of the same axes, none of whose standard deviations exceeds a limit: what still fits a picture.
+
+    Parameters
+    ----------
+    cov : array-like, shape (..., n, n)
+    longest : float
+        The largest standard deviation, in the unit of the variables.
+
+    Returns
+    -------
+    cut : array, shape (..., n, n)
+
+    Raises
+    ------
+    ValueError
+        A wrong shape, a limit that is not positive.
+    """
+    cov = as_finite(cov, "cov")
+    cov, longest = as_covariances(cov, "cov", cov.shape[-1]), as_positive_number(longest, "longest")
+    values, axes = np.linalg.eigh(cov)
+    return (axes * np.minimum(values, longest**2)[..., None, :]) @ np.swapaxes(axes, -1, -2)
 
 
 def outlines(mean, cov, probability=0.95, points=61):

@@ -167,6 +167,37 @@ def newton_step(g, H):
     return -_solve(H, g[..., None], "the curvature H is singular: the model has no stationary place, or many")
 
 
+def newton_parts(g, H):
+    """The Newton step taken apart along the directions of curvature; it is the sum of its parts.
+
+    Parameters
+    ----------
+    g, H : array-like, shapes (n,) and (n, n)
+        Gradient and symmetric Hessian.
+
+    Returns
+    -------
+    curvatures : array, shape (n,)
+        Eigenvalues of H, smallest first. Where one is negative, its part of the step goes uphill.
+    directions, parts : arrays, shape (n, n)
+        Column k is the direction of curvature k, and the part of the step along it.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, a curvature of zero.
+
+    See Also
+    --------
+    newton_step : the same step at once.
+    """
+    g, H = _model(g, H)
+    curvatures, directions = np.linalg.eigh(H)
+    if (curvatures == 0).any():
+        raise ValueError("the curvature H is singular: the model has no stationary place, or many")
+    return curvatures, directions, -(directions.T @ g / curvatures) * directions
+
+
 def gauss_newton_step(r, J):
     """Step that minimizes |r + J step|, by a QR factorization: the normal equations square the condition number.
 

@@ -98,6 +98,10 @@ class Tracker:
         error[:, 3:] += self.std_position * rng.normal(size=(len(T_BE), 3))
         return pose(T_BE[:, :3, :3] @ exp_so3(error[:, :3]), T_BE[:, :3, 3] + error[:, 3:])
 
+    def drift(self, stops, rng):
+        """What each stop adds to all of its readings: rotation vector (rad) and displacement (mm), (stops, 6)."""
+        return rng.normal(size=(stops, 6)) * np.repeat([self.drift_rotation, self.drift_position], 3)
+
     def spoil(self, T, rng, tail=0.15):
         """Put bursts of nonsense into readings; returns the readings and where they are nonsense. The size of a burst
         is `jump` on the median."""
@@ -145,7 +149,7 @@ def calibration_run(rng, tracker=None, joints=None, rate=5.0, lost_stop=None):
     joints = measuring_joints() if joints is None else joints
     readings = as_count(np.floor(STOP_TIME * as_positive_number(rate, "rate")), "the number of readings per stop")
     T_BE = tool_pose(TX40, joints, T_FE)
-    drift = rng.normal(size=(len(joints), 6)) * np.repeat([tracker.drift_rotation, tracker.drift_position], 3)
+    drift = tracker.drift(len(joints), rng)
     stop = np.repeat(np.arange(len(joints)), readings)
     time = np.repeat(5.0 * np.arange(len(joints)), readings) + np.tile(np.arange(readings) / rate, len(joints))
     T = tracker.read(T_BE[stop], rng, drift[stop])
@@ -156,6 +160,25 @@ def calibration_run(rng, tracker=None, joints=None, rate=5.0, lost_stop=None):
         T[gone] = T[gone] @ pose(exp_so3(rng.normal(size=3) * tracker.swing), rng.normal(size=3) * 0.3 * tracker.jump)
     T[0] = reset
     return Log(time, invert(reset) @ T, stop)
+
+
+def stop_readings(T_BE, tracker, rng):
+    """One reading at each stop, in the frame W of the first; (n, 4, 4) -> (n, 4, 4).
+
+    Parameters
+    ----------
+    T_BE : array, shape (n, 4, 4)
+        Where the robot holds the tracker's frame E.
+    tracker : Tracker
+        Its white noise is that of the mean over a stop.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    T_WE : array, shape (n, 4, 4)
+    """
+    T = tracker.read(T_BE, rng, tracker.drift(len(T_BE), rng))
+    return invert(T[0]) @ T
 
 
 @dataclass(frozen=True)
@@ -188,20 +211,64 @@ def robot_motion(name, rate=RATE):
 
 
 def simulate_motion(name, rng, tracker=None, rate=RATE):
-    """A motion of section 3.2 as the robot makes it and the tracker sees it. The reference frame W is the true first
-    pose: no error of the reset in it."""
+    """A motion of section 3.2 as the robot makes it and the tracker sees it.
+
+    Parameters
+    ----------
+    name : str
+        slow, middle, fast or rotation.
+    rng : numpy.random.Generator
+    tracker : Tracker, optional
+        `MOVING` unless given.
+    rate : float
+        Readings per second.
+
+    Returns
+    -------
+    Motion
+        Its reference frame W is the true first pose: no error of the reset in it.
+
+    Raises
+    ------
+    ValueError
+        An unknown name.
+
+    Source: report, section 3.2.
+    """
     tracker = tracker or MOVING
     time, q = robot_motion(name, rate)
     T_BE = tool_pose(TX40, q, T_FE)
+    T_read, v_read, w_read, bad = follow_path(time, T_BE, tracker, rng)
+    to_W = invert(T_BE[0])
+    return Motion(time, q, to_W @ T_BE, to_W @ T_read, v_read, w_read, bad)
+
+
+def follow_path(time, T_BE, tracker, rng):
+    """What a tracker reports while it is carried along a path.
+
+    Parameters
+    ----------
+    time : array, shape (k,), s
+    T_BE : array, shape (k, 4, 4)
+        The path of its frame E.
+    tracker : Tracker
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    T_read : array, shape (k, 4, 4)
+    v_read, w_read : arrays, shape (k,)
+        Reported speed (mm/s) and angular speed (rad/s).
+    nonsense : bool array, shape (k,)
+        Where the optical reading is nonsense.
+    """
     late = shift_time(time, T_BE, -tracker.latency)
     T_read, bad = tracker.spoil(tracker.read(late, rng), rng)
     v, w = speeds(time, late)
     v_read = np.abs(v + tracker.std_speed * rng.normal(size=len(v))) + np.where(
         bad, rng.uniform(0, 10 * tracker.jump, len(v)), 0.0
     )
-    w_read = np.abs(w + tracker.std_gyro * rng.normal(size=len(w)))
-    to_W = invert(T_BE[0])
-    return Motion(time, q, to_W @ T_BE, to_W @ T_read, v_read, w_read, bad)
+    return T_read, v_read, np.abs(w + tracker.std_gyro * rng.normal(size=len(w))), bad
 
 
 def motion_speeds(name):

@@ -25,7 +25,7 @@ def test_walk_on_the_line_is_newton_in_one_dimension():
     t = 0.35
     result = stages.walk({"start": np.array([t, 0.0])})
     h = 1e-4
-    f = [wells.value(stages.line_point(t + k * h)) for k in (-1, 0, 1)]
+    f = [wells.value(wells.on_line(t + k * h)) for k in (-1, 0, 1)]
     slope, bend = (f[2] - f[0]) / (2 * h), (f[2] - 2 * f[1] + f[0]) / h**2
     assert result["bend"] == pytest.approx(bend, rel=1e-5)
     assert result["vertex"] == pytest.approx(t - slope / bend, rel=1e-6) == pytest.approx(result["t"][1], abs=1e-6)
@@ -35,7 +35,7 @@ def test_walk_on_the_line_is_newton_in_one_dimension():
 def test_the_handle_stays_on_the_curve():
     stage = stages.line()
     stage.set(start=(0.9, 0.0))
-    assert stage.state["start"][1] == pytest.approx(wells.value(stages.line_point(0.9)))
+    assert stage.state["start"][1] == pytest.approx(wells.value(wells.on_line(0.9)))
 
 
 @pytest.mark.parametrize("method", wells.METHODS)
@@ -47,7 +47,7 @@ def test_four_paths_show_the_step_of_every_iteration(method):
         shown = min(k, run.iterations - 1)
         assert result["k"] == shown
         np.testing.assert_allclose(result["step"], run.step[shown])
-        x, (f, g, B) = result["x"], stages.model_of(method, result["x"])
+        x, (f, g, B) = result["x"], wells.model(method, result["x"])
         assert f == pytest.approx(wells.value(x))
         np.testing.assert_allclose(g, wells.gradient(x), atol=1e-9)
         if method == "newton":
@@ -56,7 +56,7 @@ def test_four_paths_show_the_step_of_every_iteration(method):
 
 def test_model_contours_lie_on_levels_of_the_model():
     x = np.array([0.5, -0.4])
-    f, g, B = stages.model_of("newton", x)
+    f, g, B = wells.model("newton", x)
     lines = stages.model_contours(x, (f, g, B), 0.5)
     pieces = np.split(lines, np.flatnonzero(np.isnan(lines[:, 0])))
     for piece in pieces:

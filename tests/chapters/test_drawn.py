@@ -201,7 +201,7 @@ def test_outliers_are_crossed_out_where_they_were_dragged():
 def test_parabola_touches_the_curve_and_its_vertex_is_the_next_iterate():
     stage = at(ch04.line(), start=(0.3, 0.0))
     t, h = stage.result["around"], 1e-4
-    f = [float(wells.value(ch04.line_point(at_))) for at_ in (0.3 - h, 0.3, 0.3 + h)]
+    f = [float(wells.value(wells.on_line(at_))) for at_ in (0.3 - h, 0.3, 0.3 + h)]
     slope, bend = (f[2] - f[0]) / (2 * h), (f[2] - 2 * f[1] + f[0]) / h**2
     curve = next(v for v in drawn(stage) if v.shape == (61, 2))
     np.testing.assert_allclose(curve[:, 0], t)
@@ -209,7 +209,7 @@ def test_parabola_touches_the_curve_and_its_vertex_is_the_next_iterate():
     iterates = stage.result["t"]
     assert iterates[1] == pytest.approx(0.3 - slope / bend, abs=1e-5)
     shown = np.clip(iterates, -0.6, 1.6)
-    assert_drawn(stage, np.column_stack([shown, wells.value(ch04.line_point(shown))]))
+    assert_drawn(stage, np.column_stack([shown, wells.value(wells.on_line(shown))]))
 
 
 def test_step_and_radius_start_at_the_iterate():

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from labkit.documents.lecture import printed as lecture
-from labkit.documents.lecture.examples import predict_vehicle, reconstruct_vehicle
+from labkit.documents.lecture.examples import predict_vehicle, reconstruct_vehicle, simulate_vehicle
 from labkit.estimation import kalman
 
 RUNS = 200
@@ -220,3 +220,14 @@ def test_nees_wraps_the_heading():
 def test_bad_input_is_refused_in_words(call, words):
     with pytest.raises(ValueError, match=words):
         call()
+
+
+def test_simulated_vehicle_spreads_as_predicted():
+    """Of 2000 drives; a variance is known to 3.2 %, so 20 % are six standard deviations."""
+    variances, rng = {"var_x0": 0.5, "var_v0": 0.1, "var_a": 0.3}, np.random.default_rng(3)
+    drives = [simulate_vehicle(10, 0.1, **variances, var_z=0.25, rng=rng) for _ in range(2000)]
+    ends, measured = np.array([x[-1] for x, _ in drives]), np.array([z[-1] for _, z in drives])
+    x, P = predict_vehicle(10, 0.1, **variances)
+    np.testing.assert_array_less(np.abs(ends.mean(0) - x), 6 * np.sqrt(np.diag(P) / 2000))
+    np.testing.assert_allclose(np.diag(np.cov(ends.T)), np.diag(P), rtol=0.2)
+    assert np.var(measured - ends[:, 0]) == pytest.approx(0.25, rel=0.2)

@@ -53,6 +53,28 @@ def test_derivatives_against_central_differences():
         np.testing.assert_allclose(numeric_jacobian(wells.residual, x), wells.jacobian(x), atol=1e-7)
 
 
+def test_line_through_the_centers_and_its_model():
+    t, h = 0.37, 1e-4
+    assert wells.along_line(wells.on_line(t)) == pytest.approx(t)
+    np.testing.assert_allclose(wells.on_line([0.0, 1.0]), [[1, 1], [-1, -2]])
+    before, here, after = wells.value(wells.on_line([t - h, t, t + h]))
+    value, slope, curvature = wells.line_model(t)
+    assert value == pytest.approx(here) and slope == pytest.approx((after - before) / (2 * h), rel=1e-6)
+    assert curvature == pytest.approx((after - 2 * here + before) / h**2, rel=1e-5)
+
+
+def test_parts_of_the_newton_step_lie_along_the_curvatures():
+    g, H = np.array([1.0, -2.0, 0.5]), np.array([[2.0, 0.3, 0.1], [0.3, -1.0, 0.4], [0.1, 0.4, 3.0]])
+    curvatures, directions, parts = opt.newton_parts(g, H)
+    np.testing.assert_allclose(parts.sum(1), np.linalg.solve(H, -g))
+    np.testing.assert_allclose(np.cross(parts.T, directions.T), np.zeros((3, 3)), atol=1e-12)
+    np.testing.assert_allclose(H @ directions, directions * curvatures, atol=1e-12)
+    uphill = g @ parts > 0
+    np.testing.assert_array_equal(uphill, curvatures < 0)
+    with pytest.raises(ValueError, match="singular"):
+        opt.newton_parts(g, np.diag([1.0, 0.0, 2.0]))
+
+
 def test_squares_of_the_residual_add_up_to_the_function():
     np.testing.assert_allclose((wells.residual(POINTS) ** 2).sum(-1), wells.value(POINTS) + 300, rtol=1e-12)
     assert wells.residual(POINTS[:, None]).shape == (30, 1, 4) and wells.jacobian(POINTS[None]).shape == (1, 30, 4, 2)

@@ -5,9 +5,9 @@ import functools
 import numpy as np
 
 from ...calibration import pivot
-from ...estimation.gaussian import unit_noise
+from ...estimation.gaussian import cut_axes, unit_noise
 from ...fast.pivot import calibrate_pivot
-from ...geometry.lie import exp_so3
+from ...geometry.lie import exp_so3, nearest_rotation
 from ...stage import Handle, Play, Slider, Stage, style
 from ...stage.scene3d import Scene, View
 from . import figures as draw
@@ -55,10 +55,8 @@ def compute_pose_designer(state):
 
 def _in_scene(covariance, mean):
     """The tip's covariance turned into the world by the rotation nearest to the mean, with its axes cut at LONGEST."""
-    values, axes = np.linalg.eigh(covariance)
-    U, _, Vt = np.linalg.svd(mean)
-    axes = U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt @ axes
-    return (axes * np.minimum(values, LONGEST**2)) @ axes.T
+    R = nearest_rotation(mean)
+    return R @ cut_axes(covariance, LONGEST) @ R.T
 
 
 def _on_sphere(state, moved):
@@ -145,20 +143,17 @@ def compute_swirl(state):
     std_rot = np.deg2rad(SWIRL_STD_ROT_DEG)
     R, T = _swirl(state["cone_deg"], state["std_trans"], std_rot)
     n = 3 + int(round(state["t"] / 0.1))
-    A, b = pivot.pivot_matrix(T[:n]), pivot.pivot_rhs(T[:n])
-    x, _, _, values = np.linalg.lstsq(A, b, rcond=None)
-    residuals = (A @ x - b).reshape(n, 3)
-    std = np.sqrt((residuals**2).sum() / (3 * n - 6)) if n > 2 else 0.0
-    _, s, Vt = np.linalg.svd(A, full_matrices=False)
-    deviation = std * np.sqrt(((Vt[:, :3] / np.maximum(s, 1e-12)[:, None]) ** 2).sum())
+    x = pivot.solve_pivot(pivot.pivot_matrix(T[:n]), pivot.pivot_rhs(T[:n]))
+    found = pivot.PivotCalibration(x[:3], x[3:], T[:n], np.ones(n))  # also where `calibrate_pivot` would refuse
+    values = found.singular_values
     return {
         "n": n,
         "T": T[n - 1],
         "trail": T[:n, :3, 3],
-        "tip_seen": T[n - 1, :3, :3] @ x[:3] + T[n - 1, :3, 3],
-        "residual": float(np.sqrt((residuals**2).sum() / n)),
-        "error": float(np.linalg.norm(x[:3] - TIP)),
-        "deviation": float(deviation),
+        "tip_seen": T[n - 1, :3, :3] @ found.tip + T[n - 1, :3, 3],
+        "residual": found.s0,
+        "error": float(np.linalg.norm(found.tip - TIP)),
+        "deviation": float(np.sqrt(np.trace(found.covariance_of("tip")))),
         "ratio": float(values[-1] / values[0]),
     }
 

@@ -11,7 +11,6 @@ from ...stage import Choice, Handle, Slider, Stage, Toggle, style
 from . import figures as draw
 
 LEVELS = (-200, -170, -140, -110, -90, -75, -67.58, -60, -50, -40, -30, -22, -16, -12)
-ALONG = wells.CENTERS[1] - wells.CENTERS[0]
 SHOWN = 12  # iterations in the picture; who needs more has left it
 SQUARE = (-6.0, 6.0)
 CELLS = 121
@@ -36,23 +35,19 @@ def _map(ax, x, y):
 # --- The walk along the line ---
 
 
-def line_point(t):
-    """Place t on the line through both centers, 0 at (1, 1) and 1 at (-1, -2); (...) -> (..., 2)."""
-    return wells.CENTERS[0] + np.multiply.outer(t, ALONG)
-
-
 def walk(state):
     """Newton from a place on the line: iterates t, the first parabola, its vertex, its curvature."""
     t = float(state["start"][0])
-    slope = float(wells.gradient(line_point(t)) @ ALONG)
-    bend = float(ALONG @ wells.hessian(line_point(t)) @ ALONG)
-    run = wells.run("newton", line_point(t), max_iterations=SHOWN)
-    iterates = (run.x - wells.CENTERS[0]) @ ALONG / (ALONG @ ALONG)
+    value, slope, bend = wells.line_model(t)
+    run = wells.run("newton", wells.on_line(t), max_iterations=SHOWN)
     around = t + np.linspace(-0.6, 0.6, 61)
-    parabola = float(wells.value(line_point(t))) + slope * (around - t) + 0.5 * bend * (around - t) ** 2
+    parabola = value + slope * (around - t) + 0.5 * bend * (around - t) ** 2
     vertex = t - slope / bend
     end = wells.NAMES[wells.which(run.solution)] if run.converged else "nowhere"
-    return {"t": iterates, "around": around, "parabola": parabola, "bend": bend, "vertex": vertex, "end": end}
+    return {
+        "t": wells.along_line(run.x), "around": around, "parabola": parabola, "bend": bend, "vertex": vertex,
+        "end": end,
+    }  # fmt: skip
 
 
 def _walk_caption(result):
@@ -71,14 +66,14 @@ def line():
         t = np.linspace(-0.6, 1.6, 441)
         points = {}
         for name, e in zip(wells.NAMES, wells.extrema()):
-            points[name] = ((e.x - wells.CENTERS[0]) @ ALONG / (ALONG @ ALONG), e.value)
-        parabola, iterates, vertex, text = draw.profile(ax, t, wells.value(line_point(t)), points)
+            points[name] = (wells.along_line(e.x), e.value)
+        parabola, iterates, vertex, text = draw.profile(ax, t, wells.value(wells.on_line(t)), points)
         ax.set(xlim=(-0.6, 1.6), ylim=(-240, 10))
 
         def update(state, result):
             parabola.set_data(result["around"], result["parabola"])
             inside = np.clip(result["t"], -0.6, 1.6)
-            iterates.set_data(inside, wells.value(line_point(inside)))
+            iterates.set_data(inside, wells.value(wells.on_line(inside)))
             vertex.set_data([np.clip(result["vertex"], -0.6, 1.6)], [-236])
             text.set_text(f"curvature {result['bend']:+.0f}")
 
@@ -86,7 +81,7 @@ def line():
 
     def follow(state, moved):
         t = state["start"][0]
-        return {"start": (t, float(wells.value(line_point(t))))}
+        return {"start": (t, float(wells.value(wells.on_line(t))))}
 
     return Stage(
         "Newton on a line",
@@ -101,14 +96,6 @@ def line():
 
 
 # --- Four paths ---
-
-
-def model_of(method, x):
-    """Value, gradient and curvature of the model a method builds at x, in the units of f."""
-    if method in ("gauss_newton", "levenberg_marquardt"):
-        r, J = wells.residual(x), wells.jacobian(x)
-        return float(wells.value(x)), 2 * J.T @ r, 2 * J.T @ J
-    return float(wells.value(x)), wells.gradient(x), wells.hessian(x)
 
 
 def model_contours(x, model, half_width, count=7):
@@ -144,7 +131,7 @@ def four_runs(state):
         "radius": radius,
         "gain": float(run.gain[k]),
         "accepted": bool(run.accepted[k]),
-        "contours": model_contours(x, model_of(state["method"], x), max(1.25 * reach, 0.15)),
+        "contours": model_contours(x, wells.model(state["method"], x), max(1.25 * reach, 0.15)),
         "ends": {name: _end(r) for name, r in runs.items()},
     }
 
@@ -218,9 +205,7 @@ def near_saddle(state):
     """One run from the start, and the Newton step there taken apart along the directions of curvature."""
     x = state["start"]
     run = wells.run(state["method"], x, max_iterations=SHOWN)
-    eigenvalues, V = np.linalg.eigh(wells.hessian(x))
-    along = V.T @ wells.gradient(x)
-    shares = -(along / eigenvalues) * V  # columns: the step's part along each direction
+    eigenvalues, V, shares = opt.newton_parts(wells.gradient(x), wells.hessian(x))
     return {
         "run": run,
         "method": state["method"],

@@ -397,27 +397,18 @@ def compute_pattern(state):
     spread = np.array([state["E"][0] - x_mid, state["across"], state["E"][1] - z_mid])
     T_BF = hand_eye.pattern(fit.T_FS, fit.target, np.deg2rad(state["tilt_deg"]), spread)
     x_S = frames.transform(frames.invert(fit.T_FS), frames.transform(frames.invert(T_BF), fit.target))
-    J = hand_eye.joint_jacobian(T_BF, x_S, fit.T_FS)
-    scale = np.array([1 / 240.0] * 3 + [1.0] * 6)
-    _, values, Vt = np.linalg.svd(J * scale, full_matrices=False)
-    free = Vt[values <= 1e-3 * values[0]]  # changes that the scanner does not see
-    result = {
-        "T_BF": T_BF, "x_S": x_S, "spread": spread, "values": values, "weak": Vt[-1] * scale, "target": fit.target,
-        "T_FS": fit.T_FS, "determined": not len(free), "turns": _reached(free[:, :3]), "slides": _reached(free[:, 6:]),
-    }  # fmt: skip
-    if result["determined"]:
-        cov = fit.std**2 * np.linalg.inv(J.T @ J)
-        result["cov"], result["std"] = cov, _three_stds(cov)
+    unseen = hand_eye.unseen_changes(T_BF, fit.T_FS, fit.target)
+    determined = not (len(unseen.turns) or len(unseen.slides))
+    if determined:
+        cov = hand_eye.predicted_covariance(T_BF, fit.T_FS, fit.target, fit.std)
+        std = _three_stds(cov)
     else:
-        result["cov"], result["std"] = np.full((9, 9), np.nan), (np.inf,) * 3
-    result["printed_cov"], result["printed_std"] = _printed_pattern(), _three_stds(_printed_pattern())
-    return result
-
-
-def _reached(block):
-    """Directions (k, 3) in which unseen changes reach into one block of unknowns, the farthest first."""
-    _, sizes, directions = np.linalg.svd(block)
-    return directions[: (sizes > 0.05).sum()]
+        cov, std = np.full((9, 9), np.nan), (np.inf,) * 3
+    return {
+        "T_BF": T_BF, "x_S": x_S, "spread": spread, "unseen": unseen, "target": fit.target, "T_FS": fit.T_FS,
+        "determined": determined, "cov": cov, "std": std,
+        "printed_cov": _printed_pattern(), "printed_std": _three_stds(_printed_pattern()),
+    }  # fmt: skip
 
 
 def _three_stds(cov):
@@ -428,10 +419,12 @@ def _three_stds(cov):
 
 def _pattern_sentence(result):
     if not result["determined"]:
-        line = "along the line drawn through the sphere" if len(result["slides"]) == 1 else "in any direction"
-        told = [f"scanner and sphere can slide together {line}"] * bool(len(result["slides"]))
-        told += ["the scanner can turn about the line on which it sees the sphere"] * bool(len(result["turns"]))
-        ratio = result["values"][-1] / result["values"][0]
+        unseen, line = result["unseen"], "in any direction"
+        if len(unseen.slides) == 1:
+            line = "along the line drawn through the sphere"
+        told = [f"scanner and sphere can slide together {line}"] * bool(len(unseen.slides))
+        told += ["the scanner can turn about the line on which it sees the sphere"] * bool(len(unseen.turns))
+        ratio = unseen.singular_values[-1] / unseen.singular_values[0]
         return f"Not determined: the last singular value is {ratio:.0e} of the first; {', and '.join(told)}."
     (a, b, c), (A, B, C) = result["std"], result["printed_std"]
     return (
@@ -464,7 +457,7 @@ def pattern_designer():
             aside = target + np.array([0.0, 0.0, -230.0])
             printed.set(aside, 40**2 * result["printed_cov"][3:6, 3:6])
             found.set(aside, 40**2 * (result["cov"][3:6, 3:6] if result["determined"] else np.zeros((3, 3))))
-            along = [np.outer([-300, 300, np.nan], direction) for direction in result["slides"]]
+            along = [np.outer([-300, 300, np.nan], direction) for direction in result["unseen"].slides]
             weak.set(target + np.concatenate(along or [np.full((2, 3), np.nan)]))
             name.set(aside + [0, 0, -175.0])
             space.draw(state["view"])

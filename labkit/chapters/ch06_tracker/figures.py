@@ -178,17 +178,8 @@ class Repeated:
         ax.legend(loc="lower left", fontsize=8)
         self.artists = [self.runs, self.spread, self.claim]
 
-    def set(self, results, spread, center, claim):
-        """Results (n, 2), their covariance (2, 2), center (2,) and covariance (2, 2) of a single run."""
+    def set(self, results, spread, claim):
+        """Results (n, 2), and outlines (m, 2): of their spread, of what a single run claims."""
         self.runs.set_data(*results.T)
-        self.spread.set_data(*ellipse(results.mean(0), spread).T)
-        self.claim.set_data(*ellipse(center, claim).T)
-
-
-def ellipse(center, covariance, sigmas=3.0):
-    """Outline of an error ellipse, shape (65, 2)."""
-    angle = np.linspace(0, 2 * np.pi, 65)
-    values, vectors = np.linalg.eigh(covariance)
-    return (
-        center + sigmas * np.column_stack([np.cos(angle), np.sin(angle)]) @ (vectors * np.sqrt(np.maximum(values, 0))).T
-    )
+        self.spread.set_data(*spread.T)
+        self.claim.set_data(*claim.T)

@@ -5,9 +5,10 @@ import threading
 import time as clock
 
 import numpy as np
+from scipy.stats import chi2
 
 from ...calibration import ax_xb
-from ...estimation.gaussian import unit_noise
+from ...estimation.gaussian import ellipse, unit_noise
 from ...fast.ax_xb import calibrate_hand_eye, solve_ax_xb
 from ...geometry.frames import invert, matrix_from_quaternion, pose, pose_distance, unit_vector
 from ...geometry.lie import exp_so3
@@ -330,15 +331,11 @@ def compute_dynamic(state):
     time = time * _slow_speed() / state["speed"]
     rng = np.random.default_rng(13)
     tracker_now = Tracker(nonsense=0.015 if state["nonsense"] else 0.0, burst=2.0, latency=state["latency"] / 1000)
-    late = shift_time(time, T, -tracker_now.latency)
-    read, bad = tracker_now.spoil(tracker_now.read(late, rng), rng)
-    w, w_read = speeds(time, T)[1], speeds(time, late)[1]
-    w_read = np.abs(w_read + tracker_now.std_gyro * rng.normal(size=len(time)))
+    read, _, w_read, bad = simulation.follow_path(time, T, tracker_now, rng)
     step = time[1] - time[0]
-    offset = time_offset(time, w, w_read, max_offset=max(3 * step, 0.08)) if step < 0.05 else 0.0
-    error = np.linalg.norm(read[:, :3, 3] - T[:, :3, 3], axis=1)
-    then = np.column_stack([np.interp(time - offset, time, T[:, axis, 3]) for axis in range(3)])
-    mended = np.linalg.norm(read[:, :3, 3] - then, axis=1)
+    offset = time_offset(time, speeds(time, T)[1], w_read, max_offset=max(3 * step, 0.08)) if step < 0.05 else 0.0
+    error = pose_distance(T, read)[1]
+    mended = pose_distance(shift_time(time, T, -offset), read)[1]
     keep = reject_outliers(mended, 6.0)
     return {
         "share": np.linspace(0, 1, len(time)), "error": error, "bad": bad, "mended": mended, "keep": keep,
@@ -448,6 +445,8 @@ def methods():
 
 # ---- six runs --------------------------------------------------------------------------------------------------------
 
+THREE_STD = chi2.cdf(3.0**2, 2)  # share of a normal distribution in the plane within three standard deviations
+
 
 @functools.cache
 def _stops():
@@ -463,19 +462,18 @@ def compute_six_runs(state):
     tracker_now = Tracker(
         std_position=0.06, std_rotation=np.deg2rad(0.008), field_position=field, field_rotation=np.deg2rad(0.14) * field
     )
-    results = []
-    for run in range(simulation.RUNS):
-        rng = np.random.default_rng([66, run])
-        drift = rng.normal(size=(len(T_BE), 6)) * np.repeat([tracker_now.drift_rotation, tracker_now.drift_position], 3)
-        T_read = tracker_now.read(T_BE, rng, drift)
-        reading = invert(T_read[0]) @ T_read
-        A, B = invert(T_BF[0]) @ T_BF[1:], reading[1:]
-        results.append(ax_xb.solve_ax_xb(A, B)[:3, 3])
-    single = calibrate_hand_eye(T_BF, reading, eye="to hand")
-    results = np.array(results)
+    rngs = [np.random.default_rng([66, run]) for run in range(simulation.RUNS)]
+    readings = [simulation.stop_readings(T_BE, tracker_now, rng) for rng in rngs]
+    A = invert(T_BF[0]) @ T_BF[1:]
+    results = np.array([ax_xb.solve_ax_xb(A, T_WE[1:])[:3, 3] for T_WE in readings])
+    single = calibrate_hand_eye(T_BF, readings[-1], eye="to hand")
+    spread, claim = np.cov(results.T, bias=True), single.covariance_of("T_FT.translation")
     return {
-        "results": results, "spread": np.cov(results.T, bias=True), "mean": results.mean(0),
-        "single": single.T_FT[:3, 3], "claim": single.covariance_of("T_FT.translation"),
+        "results": results, "spread": spread, "mean": results.mean(0), "single": single.T_FT[:3, 3], "claim": claim,
+        "outlines": [
+            ellipse(center[1:], cov[1:, 1:], THREE_STD)
+            for center, cov in ((results.mean(0), spread), (single.T_FT[:3, 3], claim))
+        ],
         "off": float(np.linalg.norm(results.mean(0) - T_FE[:3, 3])),
         "std": float(np.sqrt(results.var(0).sum())),
     }  # fmt: skip
@@ -491,9 +489,7 @@ def six_runs():
         words = right.text(0.0, 0.9, "", transform=right.transAxes, va="top", linespacing=1.7)
 
         def update(state, result):
-            picture.set(
-                result["results"][:, 1:], result["spread"][1:, 1:], result["single"][1:], result["claim"][1:, 1:]
-            )
+            picture.set(result["results"][:, 1:], *result["outlines"])
             words.set_text(
                 f"spread over six runs\n{result['std']:.2f} mm\n\nmean off the truth\n{result['off']:.2f} mm\n\n"
                 f"std that one run claims\n{np.sqrt(np.trace(result['claim'])):.2f} mm"

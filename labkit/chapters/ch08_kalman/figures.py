@@ -1,6 +1,7 @@
 """Figures of Kalman filters: three bells, bands over time, the landmark arena with its consistency panel."""
 
 import numpy as np
+from scipy.stats import norm
 
 from ...stage import style
 from ...stage.marks import robot_outline
@@ -24,8 +25,7 @@ class Bells:
     def set(self, before, bells):
         """`before`, and each of `bells` in the order prediction, measurement, corrected: (mean, std)."""
         for line, (mean, std) in zip((self.before, *self.lines), (before, *bells)):
-            density = np.exp(-0.5 * ((self.grid - mean) / std) ** 2) / (std * np.sqrt(2 * np.pi))
-            line.set_data(self.grid, density)
+            line.set_data(self.grid, norm.pdf(self.grid, mean, std))
 
 
 class ErrorBand:

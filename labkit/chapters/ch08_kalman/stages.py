@@ -6,7 +6,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ...documents.lecture import printed as lecture
-from ...documents.lecture.examples import circle_course
+from ...documents.lecture.examples import circle_course, simulate_vehicle
 from ...estimation import gaussian, kalman
 from ...geometry import planar
 from ...localization import ekf, odometry
@@ -91,14 +91,7 @@ def bells():
 @functools.cache
 def _vehicle_truth():
     """True states (STEPS, 2) and position measurements of one drive with the reconstructed noise."""
-    rng, (A, B, C) = np.random.default_rng(2), kalman.vehicle_model(DT)
-    x = rng.standard_normal(2) * np.sqrt([NOISE["var_x0"], NOISE["var_v0"]])
-    states, z = [], []
-    for _ in range(STEPS):
-        x = A @ x + B[:, 0] * (1.0 + np.sqrt(NOISE["var_a"]) * rng.standard_normal())
-        states.append(x)
-        z.append(C[0] @ x + np.sqrt(NOISE["var_z"]) * rng.standard_normal())
-    return np.array(states), np.array(z)
+    return simulate_vehicle(STEPS, DT, **NOISE, rng=np.random.default_rng(2))
 
 
 def compute_vehicle(state):

@@ -49,6 +49,37 @@ def predict_vehicle(steps, dt, var_x0, var_v0, var_a, acceleration=1.0):
     return x, cov
 
 
+def simulate_vehicle(steps, dt, var_x0, var_v0, var_a, var_z, rng, acceleration=1.0):
+    """One drive of the lecture's vehicle from rest, with noise in start, acceleration and measurement.
+
+    Parameters
+    ----------
+    steps : int
+        Number of time steps.
+    dt : float
+        Time step (s).
+    var_x0, var_v0, var_a, var_z : float
+        Variances of the first position (m^2) and velocity (m^2/s^2), of the acceleration (m^2/s^4) and of a measured
+        position (m^2).
+    rng : numpy.random.Generator
+    acceleration : float
+        The commanded one (m/s^2).
+
+    Returns
+    -------
+    states, z : arrays, shapes (steps, 2) and (steps,)
+        True position (m) and velocity (m/s) after each step, and the position measured there (m).
+    """
+    A, B, C = vehicle_model(dt)
+    x = rng.standard_normal(2) * np.sqrt([var_x0, var_v0])
+    states, z = [], []
+    for _ in range(as_count(steps, "steps")):
+        x = A @ x + B[:, 0] * (acceleration + math.sqrt(var_a) * rng.standard_normal())
+        states.append(x)
+        z.append(C[0] @ x + math.sqrt(var_z) * rng.standard_normal())
+    return np.array(states), np.array(z)
+
+
 def reconstruct_vehicle(cov, steps, dt):
     """Variances (var_x0, var_v0, var_a) with which so many uncorrected predictions lead to a covariance, (3,).
 

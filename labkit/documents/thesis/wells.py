@@ -17,6 +17,7 @@ from ...estimation import optimization as opt
 
 CENTERS = np.array([[1.0, 1.0], [-1.0, -2.0]])
 DEPTHS = np.array([100.0, 200.0])
+ALONG = CENTERS[1] - CENTERS[0]
 NAMES = ("local minimum", "global minimum", "saddle", "nowhere")
 METHODS = ("newton", "gauss_newton", "levenberg_marquardt", "trust_region")
 
@@ -64,6 +65,48 @@ def jacobian(x):
     d, q, _ = _parts(x)
     J = np.sqrt(DEPTHS / q)[..., None, None] * (np.eye(2) - d[..., :, None] * d[..., None, :] / q[..., None, None])
     return J.reshape(*J.shape[:-3], 4, 2)
+
+
+def model(method, x):
+    """Quadratic model that one of `METHODS` builds of f at a point.
+
+    Parameters
+    ----------
+    method : str
+        Gauss-Newton and Levenberg-Marquardt put 2 J'J in place of the Hessian.
+    x : array-like, shape (2,)
+
+    Returns
+    -------
+    f, g, B : float, arrays of shapes (2,) and (2, 2)
+        Value, gradient and curvature, in the units of f.
+    """
+    if method in ("gauss_newton", "levenberg_marquardt"):
+        r, J = residual(x), jacobian(x)
+        return float(value(x)), 2 * J.T @ r, 2 * J.T @ J
+    return float(value(x)), gradient(x), hessian(x)
+
+
+# --- The line through both centers ---
+
+
+def on_line(t):
+    """Place t on the line through both centers, 0 at (1, 1) and 1 at (-1, -2); (...) -> (..., 2)."""
+    return CENTERS[0] + np.multiply.outer(t, ALONG)
+
+
+def along_line(x):
+    """The t of the place on the line that lies closest to x; (..., 2) -> (...)."""
+    return (x - CENTERS[0]) @ ALONG / (ALONG @ ALONG)
+
+
+def line_model(t):
+    """Value, slope and curvature of f along the line through both centers, at a place t, by t."""
+    x = on_line(t)
+    return float(value(x)), float(gradient(x) @ ALONG), float(ALONG @ hessian(x) @ ALONG)
+
+
+# --- What listing C7 prints ---
 
 
 def printed_hessian(x):
