@@ -105,7 +105,7 @@ class Resampling:
         `resample_systematic` or `resample_roulette`.
     """
 
-    when: Policy = when_effective_below(0.5)
+    when: Policy = when_effective_below(0.7)
     draw: object = resample_systematic
 
 

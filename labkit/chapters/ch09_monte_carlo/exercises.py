@@ -1443,7 +1443,7 @@ CHAPTER = Chapter(
                         min(0.5, max(0.1, mcl.recover(m, s, f, a, b)[0])),
                         *mcl.recover(m, s, f, a, b)[1:],
                     ),
-                    "The limits of 10 % and 50 % are our filter's own. Return the share as the formula gives it.",
+                    "Limits of the share are the filter's own business: return it as the formula gives it.",
                 ),
                 *RECOVERIES,
                 Mistake(
