@@ -7,6 +7,7 @@
     python lab.py progress          what you have solved
     python lab.py calibrate ...     your own poses in, a calibration with covariance, outliers and advice out
     python lab.py localize ...      your own log in, the path with its covariance out
+    python lab.py collect ...       for lecturers: submitted notebooks in, marks and a page on the class out
     python lab.py ledger            every number the four documents print, recomputed
     python lab.py build [NN ...]    for authors: write the notebooks from solutions/NN_name.py
     python lab.py build --check     for authors: say which notebooks are stale
@@ -36,7 +37,7 @@ ROOT = Path(__file__).resolve().parent
 OLDEST = (3, 11)
 FIRST_NOTEBOOK = "notebooks/00_start_here.ipynb"
 FIRST_PORT, PORTS = 8888, 50
-ON_OWN_FILES = ("calibrate", "localize")  # verbs whose files are named from the folder one stands in
+ON_OWN_FILES = ("calibrate", "localize", "collect")  # verbs whose files are named from the folder one stands in
 OVERRIDES = {
     # neither news nor a look for updates: nothing is asked, and no other host is called
     "@jupyterlab/apputils-extension:notification": {"fetchNews": "false", "checkForUpdates": False},

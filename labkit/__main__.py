@@ -2,6 +2,7 @@
 
 calibrate KIND FILES   your own poses in, a calibration with covariance, outliers and advice out
 localize FILES         your own log in, the path with its covariance out
+collect FOLDERS        submitted notebooks in, marks, a page on the class and feedback pages out
 """
 
 import sys
@@ -9,7 +10,7 @@ from importlib import import_module
 
 from .verbs.arguments import run
 
-VERBS = {"calibrate": "calibrate", "localize": "localize"}
+VERBS = {"calibrate": "calibrate", "localize": "localize", "collect": "collect"}
 
 
 def main(arguments=None):

@@ -118,7 +118,8 @@ MAY_IMPORT = {  # besides itself
     "exercises": ("checks", "geometry", "live"),
     "stage": ("checks", "live"),
     "chapters": ("checks", "files", *MATHEMATICS, "documents", "live", "exercises", "stage"),
-    "verbs": ("checks", "files", *MATHEMATICS, "documents", "live", "exercises", "stage", "chapters"),
+    "collect": ("checks", "exercises"),  # chapters are found by name
+    "verbs": ("checks", "files", *MATHEMATICS, "documents", "live", "exercises", "stage", "chapters", "collect"),
 }
 NEEDS_NO_FRONT_END = ("checks", "files", *MATHEMATICS, "documents")
 MODULES = sorted((ROOT / "labkit").rglob("*.py"))

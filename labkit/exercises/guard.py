@@ -276,7 +276,8 @@ def run(function, args, finish=lambda result: result, limit=TIME_LIMIT, author=N
 
     `finish` is where a result is converted: a returned object may be as hostile as the function itself. `author` is the
     function whose line is quoted when it raises, if another one than `function`. The first import of a library may
-    take longer than a call: then it is called once more.
+    take longer than a call: then it is called once more. An author with a `clock` of its own, such as a function in
+    another process, keeps time itself.
     """
     known = len(sys.modules)
     outcome = _run_once(function, args, finish, limit, author or function)
@@ -287,7 +288,7 @@ def run(function, args, finish=lambda result: result, limit=TIME_LIMIT, author=N
 
 def _run_once(function, args, finish, limit, author):
     given = copy.deepcopy(args)
-    outcome, capture, clock = Run(), _Capture(), _Clock(limit)
+    outcome, capture, clock = Run(), _Capture(), getattr(author, "clock", _Clock)(limit)
     try:
         try:
             with sandbox(capture):
@@ -320,7 +321,12 @@ def _same(before, after):
 
 
 def _student_line(error, function):
-    """The student's own line on which it happened, the innermost one, as "line 3: x = 1 / 0"; empty where unknown."""
+    """The student's own line on which it happened, the innermost one, as "line 3: x = 1 / 0"; empty where unknown.
+
+    An error that comes from another process brings its line along as `student_line`.
+    """
+    if hasattr(error, "student_line"):
+        return error.student_line
     code = getattr(function, "__code__", None)
     if code is None:
         return ""
