@@ -193,7 +193,7 @@ class _Trial:
         self.spent += time.perf_counter() - started
         self.printed = self.printed or run.printed
         if run.error is not None:
-            return self._raised(run, args)
+            return self._named_by_failing(run.error, args) or self._raised(run, args)
         if run.changed:
             names = ", ".join(f"`{name}`" for k, name in enumerate(self._names(args)) if k in run.changed)
             return self.outcome(NOT_YET, f"your function changes its argument {names} in place: work on a copy.")
@@ -253,6 +253,16 @@ class _Trial:
         ]
         for k, mistake in enumerate(self.exercise.mistakes):
             if all(self._is_mistake(mistake, *case) for case in cases):
+                return self.outcome(NOT_YET, mistake.text, k)
+        return None
+
+    def _named_by_failing(self, error, args):
+        """The mistake that explains the draws so far and fails on this one as well: right, or possible, in one size."""
+        if not isinstance(error, ValueError | TypeError | IndexError):
+            return None
+        cases = [*zip(self.inputs, self.metrics, self.pairs)]
+        for k, mistake in enumerate(self.exercise.mistakes):
+            if cases and _fails(mistake, args) and all(self._is_mistake(mistake, *case) for case in cases):
                 return self.outcome(NOT_YET, mistake.text, k)
         return None
 
@@ -357,7 +367,19 @@ class _Trial:
             advice = ". What your function returned could not be worked with."
         where = f"\nin {run.line}" if run.line else ""
         with_ = f"\nwhen called as {self._call(args)}" if args else ""
+        if args and self.pairs and all(m and m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)):
+            with_ += "\nIt was right before, on other draws: what is different about this one, its shapes perhaps?"
         return self.outcome(RAISED, f"{type(error).__name__}: {said}{advice}{where}{with_}")
+
+
+def _fails(mistake, args):
+    """Whether a wrong variant cannot compute a draw at all."""
+    try:
+        with np.errstate(all="ignore"):
+            mistake.variant(*copy.deepcopy(args))
+    except Exception:
+        return True
+    return False
 
 
 @dataclass(frozen=True)

@@ -375,6 +375,8 @@ class Several(Metric):
             try:
                 admitted.append(metric.admit(part, want))
             except Refused as error:
+                if isinstance(result, np.ndarray):  # one array, taken apart into its rows
+                    raise Refused(f"{wanted}, got one array of shape {result.shape}") from None
                 raise Refused(f"{name}: {error}") from None
         return admitted
 
@@ -389,6 +391,31 @@ class Several(Metric):
 
     def parts(self, result, expected):
         return list(zip(self.names, self.metrics, result, expected))
+
+
+@dataclass(frozen=True)
+class First(Metric):
+    """The first of several results: alone, or with the others behind it, which are then compared as well.
+
+    `others` are (name, metric, function that gives the expected value) of what may follow.
+    """
+
+    metric: Metric
+    others: tuple
+
+    def admit(self, result, expected):
+        if not isinstance(result, tuple) or len(result) != 1 + len(self.others):
+            return self.metric.admit(result, expected)
+        first = self.metric.admit(result[0], expected)
+        for (name, metric, reference), part in zip(self.others, result[1:]):
+            wanted = reference()
+            off = [d for d in metric.deviations(metric.admit(part, wanted), wanted) if not d.within]
+            if off and self.metric.equal(first, expected):
+                raise Refused(f"the first result is right, the {name} is not: {off[0]}")
+        return first
+
+    def deviations(self, result, expected):
+        return self.metric.deviations(result, expected)
 
 
 def _joined(name, what):

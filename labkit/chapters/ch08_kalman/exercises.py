@@ -26,21 +26,33 @@ def vehicle_prediction(rng):
     return rng.normal(size=2) * 5, covariance(rng, 2), A, B, rng.uniform(1, 3, 1), covariance(rng, 1)
 
 
-def two_sensor_update(rng):
-    """State of two, two numbers measured of mixtures of them."""
-    x = rng.normal(size=2) * 3
-    C = rng.normal(size=(2, 2))
-    return x, covariance(rng, 2), C @ x + rng.normal(size=2), C, covariance(rng, 2, 0.5)
+def prediction(rng, n, k):
+    """The same of any system with n states and k controls."""
+    A, B = rng.normal(size=(n, n)), rng.normal(size=(n, k))
+    return rng.normal(size=n) * 5, covariance(rng, n), A, B, rng.normal(size=k) * 2, covariance(rng, k)
+
+
+def mixed_measurement(rng, n, m):
+    """State of n, and m numbers measured of mixtures of them."""
+    x = rng.normal(size=n) * 3
+    C = rng.normal(size=(m, n))
+    return x, covariance(rng, n), C @ x + rng.normal(size=m), C, covariance(rng, m, 0.5)
 
 
 def one_position_two_sensors(rng):
-    x = rng.uniform(5, 15)
+    x = rng.uniform(5, 15) * rng.choice([-1, 1])
     return x + rng.normal(), rng.uniform(2, 9), x + rng.uniform(-1, 1, 2), rng.uniform(0.3, 0.9, 2) * [1, 2]
 
 
-def steady_system(rng):
-    A, B, C = kalman.vehicle_model(rng.uniform(0.05, 0.5))
-    return A, C, rng.uniform(0.1, 1) * B @ B.T + 1e-3 * np.eye(2), np.array([[rng.uniform(0.1, 1)]])
+def steady_vehicle(rng):
+    A, B, C = kalman.vehicle_model(rng.uniform(0.1, 0.5))
+    return A, C, rng.uniform(0.3, 1) * B @ B.T + 1e-3 * np.eye(2), np.array([[rng.uniform(0.1, 1)]])
+
+
+def steady_system(rng, n, m):
+    """A system of n states that remember for a while, all of them seen in m mixed numbers."""
+    A = np.diag(rng.uniform(0.7, 0.95, n)) + np.diag(rng.uniform(0.1, 0.5, n - 1), 1)
+    return A, np.eye(m, n) + 0.3 * rng.normal(size=(m, n)), covariance(rng, n, 0.05), covariance(rng, m, 0.3)
 
 
 def seen_landmark(rng):
@@ -57,6 +69,10 @@ def landmark_aside(rng, side, turned):
     return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
 
 
+def within_half_a_turn(rng):
+    return (rng.uniform(-3, 3),)
+
+
 def turned_too_far(rng, sign):
     """An angle beyond half a turn, with up to three full turns more."""
     return (sign * (rng.uniform(3.3, 6.0) + 2 * np.pi * rng.integers(0, 4)),)
@@ -68,55 +84,67 @@ def each_way(draw, *names):
     return tuple(functools.partial(draw, **dict(zip(names, each))) for each in signs)
 
 
-def pose_control_step(rng):
+def pose_control_step(rng, ahead=1):
+    """A pose, a control (forward, or backward with ahead = -1) and a time step."""
     x = np.array([*rng.uniform(-5, 5, 2), rng.uniform(-3, 3)])
-    return x, np.array([rng.uniform(0.6, 2), rng.uniform(0.3, 1.5) * rng.choice([-1, 1])]), rng.uniform(0.2, 0.9)
+    u = np.array([ahead * rng.uniform(0.6, 2), rng.uniform(0.3, 1.5) * rng.choice([-1, 1])])
+    return x, u, rng.uniform(0.2, 0.9)
 
 
-def filter_step(rng):
-    """Everything one step of the landmark filter needs; the bearing innovation crosses +-pi."""
-    x, u, dt = pose_control_step(rng)
-    cov, cov_u = np.diag(rng.uniform(0.01, 0.05, 3)), np.diag(rng.uniform(0.01, 0.1, 2))
+def filter_step(rng, ahead=1, astray=0.2):
+    """Everything one step of the landmark filter needs; the bearing innovation crosses +-pi.
+
+    astray: how far the measured distance may be off (m).
+    """
+    x, u, dt = pose_control_step(rng, ahead)
+    cov, cov_u = covariance(rng, 3, 0.01), covariance(rng, 2, 0.02)
     moved = odometry.step(x, u, dt, "euler")
     away = moved[2] + np.pi - rng.uniform(0.005, 0.03)
     landmark = moved[:2] + rng.uniform(2, 5) * np.array([np.cos(away), np.sin(away)])
-    z = ekf.measurement(moved, landmark[None])[0] + [rng.uniform(-0.2, 0.2), rng.uniform(0.06, 0.12)]
+    off = rng.uniform(0.8, 1.0) * astray * (1 if astray > 1 else rng.choice([-1, 1]))
+    z = ekf.measurement(moved, landmark[None])[0] + [off, rng.uniform(0.06, 0.12)]
     z[1] = wrapped(z[1])
-    return x, cov, u, dt, cov_u, z, landmark, np.diag([rng.uniform(0.005, 0.02), rng.uniform(0.001, 0.005)])
+    return x, cov, u, dt, cov_u, z, landmark, covariance(rng, 2, 0.003)
 
 
-def estimate_and_truth(rng):
-    """True and estimated pose whose headings lie on both sides of +-pi, and a covariance."""
-    truth = np.array([*rng.uniform(-4, 4, 2), np.pi - rng.uniform(0.02, 0.1)])
-    x = truth + [*rng.uniform(-0.3, 0.3, 2), rng.uniform(0.15, 0.3) - 2 * np.pi]
-    return truth, x, covariance(rng, 3, 0.05)
+def estimate_and_truth(rng, side=1, astray=0.3):
+    """True and estimated pose whose headings lie on both sides of +-pi, and a covariance; errors up to `astray` m."""
+    truth = np.array([*rng.uniform(-4, 4, 2), side * (np.pi - rng.uniform(0.02, 0.1))])
+    off = rng.uniform(0.8, 1.0, 2) * astray * rng.choice([-1, 1], 2)
+    return truth, truth + [*off, side * (rng.uniform(0.15, 0.3) - 2 * np.pi)], covariance(rng, 3, 0.05)
 
 
-LIMIT = 5.991  # 95 % of chi-square with two degrees of freedom
-
-
-def surprise(rng, wanted, along=None, std=(0.3, 1.5), measure=np.linalg.solve):
-    """An innovation y, its correlated covariance S, and a limit.
+def surprise(rng, wanted, along=None, std=(0.3, 1.5), measure=np.linalg.solve, limit=(4.0, 9.0)):
+    """An innovation y (2,), its correlated covariance S, and a limit from a range.
 
     wanted: range of y' S^-1 y in limits; along: 1 along the correlation, where much is little, -1 across, where little
     is much (the diagonal alone would let it pass), None anywhere. `measure` takes the place of S^-1 y.
     """
     rho, std = rng.uniform(0.75, 0.95) * rng.choice([-1, 1]), rng.uniform(*std, 2)
-    S = np.outer(std, std) * [[1, rho], [rho, 1]]
+    S, limit = np.outer(std, std) * [[1, rho], [rho, 1]], rng.uniform(*limit)
     y = std * (rng.normal(size=2) if along is None else [1, along * np.sign(rho)]) * rng.choice([-1, 1])
-    return y * np.sqrt(rng.uniform(*wanted) * LIMIT / (y @ measure(S, y))), S, LIMIT
+    return y * np.sqrt(rng.uniform(*wanted) * limit / (y @ measure(S, y))), S, limit
+
+
+def surprise_of(rng, m, wanted):
+    """An innovation of m numbers with y' S^-1 y in this range of limits, its covariance, and a limit."""
+    S, y, limit = covariance(rng, m, 0.2), rng.normal(size=m), rng.uniform(4, 17)
+    return y * np.sqrt(rng.uniform(*wanted) * limit / (y @ np.linalg.solve(S, y))), S, limit
 
 
 SURPRISES = (
     # large in itself, little for its S: refused without S
-    functools.partial(surprise, wanted=(0.75, 0.85), along=1, std=(3.0, 4.0)),
-    functools.partial(surprise, wanted=(1.5, 2.5), along=-1),
+    functools.partial(surprise, wanted=(0.75, 0.85), along=1, std=(3.0, 4.0), limit=(9.0, 17.0)),
+    functools.partial(surprise, wanted=(1.5, 2.5), along=-1, limit=(2.5, 3.5)),
     functools.partial(surprise, wanted=(0.7, 0.9), along=1, std=(0.3, 0.7)),
     functools.partial(surprise, wanted=(0.05, 0.9)),
     functools.partial(surprise, wanted=(7, 20)),
     # short enough to pass without S: one implausible, also by its root, one plausible that S instead of S^-1 refuses
-    functools.partial(surprise, wanted=(7, 10), along=-1, std=(0.3, 0.5)),
-    functools.partial(surprise, wanted=(0.5, 0.7), along=1, std=(1.3, 1.5), measure=lambda S, y: y),
+    functools.partial(surprise, wanted=(7, 10), along=-1, std=(0.3, 0.5), limit=(4.0, 6.0)),
+    functools.partial(surprise, wanted=(0.5, 0.7), along=1, std=(1.3, 1.5), measure=lambda S, y: y, limit=(5.0, 7.0)),
+    functools.partial(surprise_of, m=3, wanted=(0.3, 0.9)),
+    functools.partial(surprise_of, m=3, wanted=(1.1, 3.0)),
+    functools.partial(surprise_of, m=1, wanted=(1.1, 3.0)),
 )
 
 
@@ -157,6 +185,17 @@ def _updated(gain=None, state=None, cov=None):
         return (state or _corrected)(x, K, z, C), (cov or _shrunk)(P, K, C)
 
     return variant
+
+
+def _joseph(sign):
+    """Joseph's form with this sign before its second part."""
+
+    def step(x, P, z, C, R):
+        K = _gain(P, C, R)
+        keep = np.eye(len(P)) - K @ C
+        return _corrected(x, K, z, C), keep @ P @ keep.T + sign * K @ R @ K.T
+
+    return step
 
 
 def _gain(P, C, R):
@@ -283,6 +322,30 @@ def _ekf(
     return step
 
 
+def _through_the_linear_filter(predict_too, correct_too):
+    """One step that hands the Jacobians to the linear filter: the bent functions themselves are lost."""
+
+    def step(x, cov, u, dt, cov_u, z, landmark, cov_z):
+        G_x, G_u = motion_jacobians(x, u, dt)
+        moved = G_x @ x + G_u @ u if predict_too else odometry.step(x, u, dt, "euler")
+        cov = G_x @ cov @ G_x.T + G_u @ cov_u @ G_u.T
+        H = measurement_jacobian(moved, landmark)
+        y = z - (H @ moved if correct_too else measurement(moved, landmark))
+        if not correct_too:
+            y[1] = wrapped(y[1])
+        K = _gain(cov, H, cov_z)
+        return moved + K @ y, _shrunk(cov, K, H)
+
+    return step
+
+
+def _all_wrapped(x, cov, u, dt, cov_u, z, landmark, cov_z):
+    moved, cov = _ekf(short=True)(x, cov, u, dt, cov_u, z, landmark, cov_z)
+    H = measurement_jacobian(moved, landmark)
+    K = _gain(cov, H, cov_z)
+    return moved + K @ wrapped(z - measurement(moved, landmark)), _shrunk(cov, K, H)
+
+
 def _old_cov_corrected(x, cov, u, dt, cov_u, z, landmark, cov_z):
     predicted = _ekf(short=True)(x, cov, u, dt, cov_u, z, landmark, cov_z)[1]
     corrected = _ekf()(x, cov, u, dt, cov_u, z, landmark, cov_z)[1]
@@ -322,6 +385,11 @@ def _fusion(**changes):
     return fuse_two_sensors(given["x0"], given["var0"], np.array([given["z1"], given["z2"]]), stds)[0]
 
 
+POSE = "a planar pose has three numbers"
+LANDMARK = "a landmark of the floor has two coordinates"
+READING = "a reading is a distance and a bearing"
+CONTROL = "the control is a speed and a turn rate"
+
 STATE_AND_COV = metrics.Several(metrics.Numbers(1e-8), metrics.Numbers(1e-8), names=("state", "covariance"))
 
 CHAPTER = Chapter(
@@ -331,7 +399,12 @@ CHAPTER = Chapter(
         Exercise(
             "predict_state",
             reference=predict_state,
-            draw=vehicle_prediction,
+            draw=(
+                vehicle_prediction,
+                functools.partial(prediction, n=3, k=2),
+                functools.partial(prediction, n=2, k=2),
+                functools.partial(prediction, n=4, k=1),
+            ),
             metric=STATE_AND_COV,
             hints=(
                 "The state follows the model; its uncertainty is carried along, and that of the control is added.",
@@ -357,7 +430,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + Q),
-                    "You added the variance of the acceleration to every entry. It acts through B: B cov_u B'.",
+                    "You added cov_u as it is. The control acts through B, and so does its noise: B cov_u B'.",
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: P + B @ Q @ B.T),
@@ -370,6 +443,14 @@ CHAPTER = Chapter(
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ P @ A + B @ Q @ B.T),
                     "The last factor is the transpose of A.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + B * Q * B.T),
+                    "`*` multiplies entry by entry, which is right for a single control only: B @ cov_u @ B.T.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + B @ B.T * Q),
+                    "`*` multiplies entry by entry, which is right for a single control only: B @ cov_u @ B.T.",
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T - B @ Q @ B.T),
@@ -393,7 +474,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _predicted(lambda x, A, B, u: A @ x + u, _grown),
-                    "You added the acceleration to every entry of the state. It acts through B: B u.",
+                    "You added u as it is. The control acts through B: B u.",
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + B @ Q),
@@ -420,7 +501,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + Q[0, 0] * np.eye(len(A))),
-                    "You added the variance of the acceleration to every state. It acts through B: B cov_u B'.",
+                    "You added the variance of the first control to every state. It acts through B: B cov_u B'.",
                 ),
                 Mistake(lambda *given: predict_state(*given)[::-1], "The order is state, covariance."),
             ],
@@ -428,12 +509,15 @@ CHAPTER = Chapter(
         Exercise(
             "update",
             reference=update,
-            draw=two_sensor_update,
+            draw=tuple(
+                functools.partial(mixed_measurement, n=n, m=m) for n, m in ((2, 2), (3, 1), (2, 3), (3, 3), (4, 2))
+            ),
             metric=STATE_AND_COV,
             hints=(
                 "How surprising is the measurement, and how much of the surprise belongs to the state?",
                 "S = C cov C' + cov_z, K = cov C' S^-1, x + K (z - C x), (I - K C) cov.",
-                "`K = cov @ C.T @ np.linalg.inv(C @ cov @ C.T + cov_z); return x + K @ (z - C @ x), (np.eye(len(x)) - K @ C) @ cov`",
+                "`K = cov @ C.T @ np.linalg.inv(C @ cov @ C.T + cov_z)\n"
+                "return x + K @ (z - C @ x), (np.eye(len(x)) - K @ C) @ cov`",
             ),
             mistakes=[
                 Mistake(
@@ -474,6 +558,27 @@ CHAPTER = Chapter(
                 Mistake(
                     _updated(cov=lambda P, K, C: (1 - K @ C) @ P),
                     "1 - K C subtracts from a matrix full of ones. The identity is np.eye(n).",
+                ),
+                Mistake(
+                    _updated(cov=lambda P, K, C: (np.eye(len(C)) - K @ C) @ P),
+                    "The identity has the size of the state, np.eye(len(x)), whatever the number of measurements.",
+                ),
+                Mistake(
+                    _updated(cov=lambda P, K, C: (np.eye(2) - K @ C) @ P),
+                    "The identity is 2 x 2 in your function. It has the size of the state: np.eye(len(x)).",
+                ),
+                Mistake(
+                    _updated(cov=lambda P, K, C: P - K @ C),
+                    "The last factor is missing: what is taken away is K C cov.",
+                ),
+                Mistake(_joseph(-1), "Joseph's form has a plus: the sensor's noise K cov_z K' comes in again."),
+                Mistake(
+                    _updated(gain=lambda P, C, R: _gain(P, C, np.diag(np.diag(R)))),
+                    "You took the diagonal of cov_z alone. Noises that belong together have entries beside it.",
+                ),
+                Mistake(
+                    _updated(gain=lambda P, C, R: C @ P @ np.linalg.inv(C @ P @ C.T + R)),
+                    "The gain begins with cov C', not C cov.",
                 ),
                 Mistake(
                     _updated(gain=lambda P, C, R: P @ C.T @ np.linalg.inv(C @ P @ C.T - R)),
@@ -577,11 +682,12 @@ CHAPTER = Chapter(
             "fuse_two_sensors",
             reference=fuse_two_sensors,
             draw=one_position_two_sensors,
+            fixed={"z": "there are two sensors", "stds": "there are two sensors"},
             metric=metrics.Several(metrics.Numbers(1e-9, "m"), metrics.Numbers(1e-9), names=("position", "variance")),
             hints=(
                 "Each opinion (the prior, two sensors) counts as much as it is certain.",
                 "Weights are 1 / variance. The variance of the weighted mean is 1 / (sum of the weights).",
-                "`w = np.array([1 / var0, *(1 / stds**2)]); return w @ [x0, *z] / w.sum(), 1 / w.sum()`",
+                "`w = np.array([1 / var0, *(1 / stds**2)])\nreturn w @ [x0, *z] / w.sum(), 1 / w.sum()`",
             ),
             mistakes=[
                 Mistake(
@@ -710,12 +816,18 @@ CHAPTER = Chapter(
         Exercise(
             "steady_state_gain",
             reference=steady_state_gain,
-            draw=steady_system,
-            metric=metrics.Numbers(1e-6),
+            draw=(
+                steady_vehicle,
+                functools.partial(steady_system, n=3, m=2),
+                functools.partial(steady_system, n=2, m=2),
+            ),
+            metric=metrics.Numbers(1e-5),
             hints=(
                 "The gain does not depend on the data. Run the covariance alone until the gain stands still.",
                 "Repeat: cov = A cov A' + cov_v, K = cov C' S^-1, cov = (I - K C) cov. Some thousand times are cheap. Or let SciPy solve the Riccati equation.",
-                "`from scipy.linalg import solve_discrete_are; P = solve_discrete_are(A.T, C.T, cov_v, cov_z); return P @ C.T @ np.linalg.inv(C @ P @ C.T + cov_z)`",
+                "`from scipy.linalg import solve_discrete_are\n"
+                "P = solve_discrete_are(A.T, C.T, cov_v, cov_z)\n"
+                "return P @ C.T @ np.linalg.inv(C @ P @ C.T + cov_z)`",
             ),
             mistakes=[
                 Mistake(
@@ -729,6 +841,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda A, C, Q, R: _gain(Q, C, R),
                     "You took the system noise for the covariance. The covariance is what builds up.",
+                ),
+                Mistake(
+                    lambda A, C, Q, R: kalman.steady_state(A, C, Q, R).cov_before @ C.T @ np.linalg.inv(R),
+                    "Not cov_z alone is divided by: the covariance before the correction goes with S = C cov C' + cov_z.",
                 ),
                 Mistake(
                     lambda A, C, Q, R: A @ kalman.steady_state(A, C, Q, R).gain,
@@ -746,7 +862,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda A, C, Q, R: steady_state_gain(A, C, Q, R)[:, 0],
-                    "The values are right; K is a matrix, shape (n, m), here one column.",
+                    "This is the first column alone. K is a matrix, shape (n, m), also where it has one column.",
                 ),
             ],
         ),
@@ -754,11 +870,13 @@ CHAPTER = Chapter(
             "corrected",
             reference=lambda: _printed_correction().x,
             unit="m, m/s",
-            metric=metrics.Numbers(1e-4),
+            metric=metrics.First(
+                metrics.Numbers(1e-4), (("covariance", metrics.Numbers(1e-4), lambda: _printed_correction().cov),)
+            ),
             hints=(
                 "Only the correction is asked for: the prediction is printed.",
-                "Your `update` with C = (1, 0), z = 11.79 and the variance 0.25; the first result is the state.",
-                "`corrected = update(np.array([12.5, 5.0]), prior_cov, np.array([11.79]), np.array([[1.0, 0.0]]), np.array([[0.25]]))[0]`",
+                "Your `update` with C = (1, 0), z = 11.79 and the variance 0.25. State and covariance, or the state alone.",
+                "`corrected = update(np.array([12.5, 5.0]), prior_cov, np.array([11.79]), np.array([[1.0, 0.0]]), np.array([[0.25]]))`",
             ),
             mistakes=[
                 Mistake(
@@ -811,7 +929,7 @@ CHAPTER = Chapter(
         Exercise(
             "wrap_angle",
             reference=wrap_angle,
-            draw=each_way(turned_too_far, "sign"),
+            draw=(*each_way(turned_too_far, "sign"), within_half_a_turn),
             metric=metrics.Numbers(1e-9, "rad"),
             draws=12,
             hints=(
@@ -836,8 +954,14 @@ CHAPTER = Chapter(
                     lambda a: np.fmod(a, 2 * np.pi),
                     "Whole turns are gone, but up to a full turn on either side is left: shift by pi before and after, and use `%`.",
                 ),
-                Mistake(lambda a: a % np.pi, "The remainder is to be taken of a full turn, 2 pi."),
-                Mistake(lambda a: (a + np.pi) % np.pi - np.pi, "The remainder is to be taken of a full turn, 2 pi."),
+                Mistake(
+                    lambda a: a % np.pi,
+                    "Half turns are lost: your angles lie between 0 and pi, as if 2.5 and 2.5 + pi were one direction. Only full turns, 2 pi, may be taken off.",
+                ),
+                Mistake(
+                    lambda a: (a + np.pi) % np.pi - np.pi,
+                    "Half turns are lost: your angles lie between -pi and 0. The remainder is to be taken of a full turn, 2 pi.",
+                ),
                 Mistake(
                     lambda a: np.clip(a, -np.pi, np.pi),
                     "You cut the angle off at pi. A turn too many has to be subtracted.",
@@ -891,12 +1015,14 @@ CHAPTER = Chapter(
             "measurement",
             reference=measurement,
             draw=each_way(landmark_aside, "side", "turned"),
+            fixed={"x": POSE, "landmark": LANDMARK},
             draws=12,
             metric=metrics.Numbers(1e-9),
             hints=(
                 "How far away is the landmark, and in which direction seen from where the robot looks?",
                 "d = sqrt(dx^2 + dy^2), alpha = atan2(dy, dx) - theta, with (dx, dy) from robot to landmark.",
-                "`dx, dy = landmark - x[:2]; return np.array([np.hypot(dx, dy), wrap_angle(np.arctan2(dy, dx) - x[2])])`",
+                "`dx, dy = landmark - x[:2]\n"
+                "return np.array([np.hypot(dx, dy), wrap_angle(np.arctan2(dy, dx) - x[2])])`",
             ),
             mistakes=[
                 Mistake(
@@ -964,7 +1090,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda x, l: np.array([measurement(x, l)[0], abs(measurement(x, l)[1])]),
-                    "No absolute value: a landmark on the right has a negative bearing.",
+                    "Your bearings are never negative, but a landmark on the right has a negative one: an absolute value or an arccosine cannot tell left from right.",
                 ),
                 Mistake(
                     lambda x, l: np.array([np.abs(l - x[:2]).sum(), measurement(x, l)[1]]),
@@ -980,11 +1106,15 @@ CHAPTER = Chapter(
             "measurement_jacobian",
             reference=measurement_jacobian,
             draw=seen_landmark,
+            fixed={"x": POSE, "landmark": LANDMARK},
             metric=metrics.Numbers(1e-5),
             hints=(
                 "Move the robot a little toward the landmark, then across, then turn it. What do distance and bearing do?",
                 "Row 0: (-dx/r, -dy/r, 0). Row 1: (dy/q, -dx/q, -1) with q = r^2.",
-                "`dx, dy = landmark - x[:2]; q = dx**2 + dy**2; r = np.sqrt(q); return np.array([[-dx / r, -dy / r, 0], [dy / q, -dx / q, -1]])`",
+                "`dx, dy = landmark - x[:2]\n"
+                "q = dx**2 + dy**2\n"
+                "r = np.sqrt(q)\n"
+                "return np.array([[-dx / r, -dy / r, 0], [dy / q, -dx / q, -1]])`",
             ),
             mistakes=[
                 Mistake(
@@ -1064,6 +1194,10 @@ CHAPTER = Chapter(
                     "In row 1 dx and dy are exchanged: only a shift across the line of sight turns it.",
                 ),
                 Mistake(
+                    lambda x, l: measurement_jacobian(x, l) * [[1], [np.degrees(1)]],
+                    "Row 1 is in degrees: angles are radians here.",
+                ),
+                Mistake(
                     _rows(lambda dx, dy, r: [[-dx / r, -dy / r, -1], [dy / r**2, -dx / r**2, -1]]),
                     "The distance does not depend on the heading: the last entry of row 0 is 0.",
                 ),
@@ -1072,12 +1206,14 @@ CHAPTER = Chapter(
         Exercise(
             "motion_jacobians",
             reference=motion_jacobians,
-            draw=pose_control_step,
+            draw=each_way(pose_control_step, "ahead"),
+            fixed={"x": POSE, "u": CONTROL},
             metric=metrics.Several(metrics.Numbers(1e-5), metrics.Numbers(1e-5), names=("G_x", "G_u")),
             hints=(
                 "They are F_x and F_u of chapter 7 under another letter.",
                 "G_x is the identity with -v T sin(theta) and v T cos(theta) in the last column; G_u has T cos, T sin and T.",
-                "`c, s, d = np.cos(x[2]), np.sin(x[2]), u[0] * dt; return np.array([[1, 0, -d * s], [0, 1, d * c], [0, 0, 1]]), dt * np.array([[c, 0], [s, 0], [0, 1]])`",
+                "`c, s, d = np.cos(x[2]), np.sin(x[2]), u[0] * dt\n"
+                "return np.array([[1, 0, -d * s], [0, 1, d * c], [0, 0, 1]]), dt * np.array([[c, 0], [s, 0], [0, 1]])`",
             ),
             mistakes=[
                 Mistake(_jacobians(_sine_sign), "In G_x, the derivative of the cosine is minus the sine."),
@@ -1106,6 +1242,10 @@ CHAPTER = Chapter(
                 Mistake(
                     _jacobians(_last_column(lambda x, u, t: (-t * np.sin(x[2]), t * np.cos(x[2])))),
                     "In G_x the speed is missing: the way is v T.",
+                ),
+                Mistake(
+                    _jacobians(lambda G, x, u, t: G * [[1, 1, -1], [1, 1, -1], [1, 1, 1]]),
+                    "In G_x both signs of the last column are turned: -v T sin(theta) and +v T cos(theta).",
                 ),
                 Mistake(
                     _jacobians(
@@ -1164,17 +1304,53 @@ CHAPTER = Chapter(
         Exercise(
             "ekf_step",
             reference=ekf_step,
-            draw=filter_step,
+            draw=(
+                filter_step,
+                functools.partial(filter_step, ahead=-1),
+                functools.partial(filter_step, astray=5.0),
+            ),
+            fixed={
+                "x": POSE,
+                "cov": POSE,
+                "u": CONTROL,
+                "cov_u": CONTROL,
+                "z": READING,
+                "landmark": LANDMARK,
+                "cov_z": READING,
+            },
             metric=metrics.Several(metrics.PlanarPoses(1e-7), metrics.Numbers(1e-7), names=("pose", "covariance")),
             hints=(
-                "Predict with the model itself and its Jacobians, then correct as before, with H in place of C.",
+                "The pose takes the motion model itself, only its covariance takes G_x and G_u. Then correct: the innovation takes the measurement itself, gain and covariance take H in place of C.",
                 "The Jacobian H and the expected measurement belong to the predicted pose; the bearing innovation is wrapped.",
-                "`G_x, G_u = motion_jacobians(x, u, dt); x = odometry.step(x, u, dt, 'euler'); cov = G_x @ cov @ G_x.T + G_u @ cov_u @ G_u.T; H = measurement_jacobian(x, landmark); y = z - measurement(x, landmark); y[1] = wrap_angle(y[1]); K = cov @ H.T @ np.linalg.inv(H @ cov @ H.T + cov_z); return x + K @ y, (np.eye(3) - K @ H) @ cov`",
+                "`G_x, G_u = motion_jacobians(x, u, dt)\n"
+                "x = odometry.step(x, u, dt, 'euler')\n"
+                "cov = G_x @ cov @ G_x.T + G_u @ cov_u @ G_u.T\n"
+                "H = measurement_jacobian(x, landmark)\n"
+                "y = z - measurement(x, landmark)\n"
+                "y[1] = wrap_angle(y[1])\n"
+                "K = cov @ H.T @ np.linalg.inv(H @ cov @ H.T + cov_z)\n"
+                "return x + K @ y, (np.eye(3) - K @ H) @ cov`",
             ),
             mistakes=[
                 Mistake(
                     _ekf(wrap=False),
                     "The bearing innovation is not wrapped: a measurement just across +-pi throws your robot around by a full turn.",
+                ),
+                Mistake(
+                    _through_the_linear_filter(True, False),
+                    "The pose is moved as G_x x + G_u u: a straight line through a bent model. The pose takes the motion itself, only its covariance takes the Jacobians.",
+                ),
+                Mistake(
+                    _through_the_linear_filter(False, True),
+                    "You expect H x, as in the linear filter, and the bearing is not wrapped. The expected measurement is `measurement(x, landmark)`; H belongs into gain and covariance.",
+                ),
+                Mistake(
+                    _through_the_linear_filter(True, True),
+                    "This is the linear filter with Jacobians for its matrices. The pose takes the motion itself, the innovation the measurement itself; Jacobians move covariances only.",
+                ),
+                Mistake(
+                    _all_wrapped,
+                    "You wrapped the whole innovation. Only the bearing is an angle: a distance that is 5 m off stays 5 m off.",
                 ),
                 Mistake(_ekf(noise=False), "The control's noise G_u cov_u G_u' is missing from the prediction."),
                 Mistake(
@@ -1295,17 +1471,22 @@ CHAPTER = Chapter(
         Exercise(
             "nees",
             reference=nees,
-            draw=estimate_and_truth,
+            draw=(*each_way(estimate_and_truth, "side"), functools.partial(estimate_and_truth, astray=5.0)),
+            fixed={"truth": POSE, "x": POSE, "cov": POSE},
             metric=metrics.Numbers(1e-8),
             hints=(
                 "Measure the error in units of the uncertainty the filter claims.",
                 "e' cov^-1 e with e = truth - x, the heading wrapped.",
-                "`e = truth - x; e[2] = wrap_angle(e[2]); return e @ np.linalg.solve(cov, e)`",
+                "`e = truth - x\ne[2] = wrap_angle(e[2])\nreturn e @ np.linalg.solve(cov, e)`",
             ),
             mistakes=[
                 Mistake(
                     lambda t, x, P: (t - x) @ np.linalg.solve(P, t - x),
                     "The heading error is not wrapped: both headings are nearly the same direction.",
+                ),
+                Mistake(
+                    lambda t, x, P: float(wrapped(t - x) @ np.linalg.solve(P, wrapped(t - x))),
+                    "You wrapped all three differences. Only the heading is an angle: a position that is 5 m off stays 5 m off.",
                 ),
                 Mistake(
                     lambda t, x, P: _error(t, x) @ P @ _error(t, x),
@@ -1384,7 +1565,7 @@ CHAPTER = Chapter(
             reference=gate,
             draw=SURPRISES,
             metric=metrics.Exactly(),
-            draws=28,
+            draws=40,
             hints=(
                 "Is the surprise larger than the filter's own idea of how large surprises are?",
                 "Compare y' S^-1 y with the limit.",
@@ -1395,6 +1576,18 @@ CHAPTER = Chapter(
                 Mistake(
                     _gated(lambda y, S: y @ y),
                     "You compare meters and radians with a number without unit: divide by the covariance S.",
+                ),
+                Mistake(
+                    _gated(lambda y, S: np.linalg.norm(y)),
+                    "You compare meters and radians with a number without unit: divide by the covariance S.",
+                ),
+                Mistake(
+                    _gated(lambda y, S: y @ (1 / S) @ y),
+                    "`1 / S` turns every entry over. The inverse of a matrix is np.linalg.inv(S), or np.linalg.solve.",
+                ),
+                Mistake(
+                    lambda y, S, g: gate(y, S, 5.991),
+                    "Your limit stays 5.99. It comes as an argument: other sizes and probabilities have others.",
                 ),
                 Mistake(
                     _gated(lambda y, S: np.sqrt(y @ np.linalg.solve(S, y))),
