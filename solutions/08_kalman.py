@@ -3,17 +3,18 @@
 #
 # **What you will do.** Predict and correct, first a number, then a vehicle, then a robot among landmarks. Rebuild an example of the lecture from four printed digits.
 #
-# **What you will learn.** Why two contradicting sensors still make a filter surer, how a velocity is estimated that nobody measures, what one forgotten wrap of an
+# **What you will learn.** What two contradicting sensors do to a filter, what becomes of a velocity that nobody measures, what one forgotten wrap of an
 # angle costs, and how to tell whether a filter is honest.
 #
-# **What you need.** Chapter 7 and covariances. About 90 minutes.
+# **What you need.** Chapter 7 and covariances. About 90 minutes; sections called *further* come on top.
 
 # %% notation [markdown]
 # | letter | meaning |
 # | --- | --- |
 # | $x$, $\Sigma$, in code `x`, `cov` | state and its covariance; $x^-$ before the correction |
-# | $A$, $B$, $C$ | the state follows itself, the control acts, the sensor sees |
+# | $A$, $B$, $C$ | the state follows itself, the control acts, the sensor sees; $A^\top$, in hints `A'`, is the transpose |
 # | $\Sigma_u$, $\Sigma_z$ | covariances of control and measurement |
+# | $\Sigma_v$, in code `cov_v` | noise of the system in one step, here $B \Sigma_u B^\top$ |
 # | $y = z - Cx^-$, $S$ | innovation (what surprises) and its covariance |
 # | $K$ | gain: how much of the surprise is believed |
 # | $G_x$, $G_u$, $H$ | Jacobians of motion and measurement in the extended filter |
@@ -69,7 +70,7 @@ def update(x, cov, z, C, cov_z):
 # %% bells [markdown]
 # ## Three bells
 #
-# Decide, then drag the peak of the measurement: sideways moves it, upward makes it sharper. The gain follows the two widths alone; where the measurement lies does not matter to it.
+# Decide, then drag the peak of the measurement: sideways moves it, upward makes it sharper. Watch what the gain follows, and what it does not look at.
 # *Make it fail* shows what the bells do not tell.
 
 # %% predict-bell
@@ -106,15 +107,20 @@ fused = fuse_two_sensors(0.0, 20.0, np.array([9.4, 10.6]), np.array([0.5, 1.0]))
 ex.fused(fused)
 
 # %% fused-against [markdown]
-# Printed is 9.6, and the true position is 10. Yours rounds to another digit. Which reading of the page gives 9.6? (It also calls the new variance $\Sigma_0$; it is $\Sigma_1$.)
+# Printed is 9.6, and the true position is 10. Yours rounds to another digit. Which other reading of the page gives 9.6? (It also calls the new
+# variance $\Sigma_0$; it is $\Sigma_1$.)
 
 # %% fused-readings
 z, stds = np.array([9.4, 10.6]), np.array([0.5, 1.0])
-readings = {"as printed": (0, 20, z), "20 is a standard deviation": (0, 20**2, z), "no prior": (0, 1e12, z)}
+readings = {"20 is a standard deviation": (0, 20**2, z), "no prior": (0, 1e12, z)}
 readings |= {"prior mean 10": (10, 20, z), "z[0] was 9.407, printed 9.4": (0, 20, z + [0.007, 0])}
 for name, (x0, var0, values) in readings.items():
     x, var = fuse_two_sensors(x0, var0, values, stds)
     print(f"{name:28} x = {x:.4f}, rounds to {x:.1f}; variance {var:.3f}")
+
+# %% fused-verdict [markdown]
+# All four give 9.6, so the page alone does not tell which it was. The last line decides how severe to be: an input that was rounded in print, 9.407 to 9.4, already explains the difference.
+# Nothing more is proved, and the ledger of chapter 10 calls the row *rounding*, not a misprint.
 
 # %% vehicle [markdown]
 # ## A velocity nobody measures
@@ -135,13 +141,17 @@ ex.predict("velocity", guess, reveal=stages.vehicle)
 # %% steady [markdown]
 # ## The gain knows before the data do
 #
-# No measurement appears in the formulas of $K$ and $\Sigma$. In a time-invariant system both therefore settle, whatever is measured, where one step
-# changes nothing more: at the solution of the Riccati equation. (This makes filters fast: once the gain stands still, `labkit.fast.kalman.filter_steps` runs the rest as a digital filter.)
+# No measurement appears in the formulas of $K$ and $\Sigma$: both can be computed before the first one is taken. In a time-invariant system whose sensor sees every state, directly or
+# through the model, they settle where one step changes nothing more: at the solution of the Riccati equation. (Measure the velocity alone instead: the gain still settles, but the variance
+# of the position grows without end, for nothing ever tells where the vehicle is.) A gain that stands still makes filters fast: `labkit.fast.kalman.filter_steps` runs the rest as a digital filter.
 
 # %% steady_state_gain
 @ex.steady_state_gain
 def steady_state_gain(A, C, cov_v, cov_z):
-    """Return the gain K, shape (n, m), after very many steps; cov_v (n, n) is the system noise per step."""
+    """Return the gain K, shape (n, m), after very many steps, right to 0.001.
+
+    A (n, n), C (m, n), cov_v (n, n) of the system per step, cov_z (m, m).
+    """
     ### BEGIN SOLUTION
     cov = np.eye(len(A))
     for _ in range(3000):
@@ -157,16 +167,16 @@ def steady_state_gain(A, C, cov_v, cov_z):
 #
 # "Simulation des Kalmanfilters (2)" prints the prediction $x^- = (12.5,\ 5.0)$ with
 # $\Sigma^- = \begin{pmatrix}1.9469 & 0.2550\\0.2550 & 0.0916\end{pmatrix}$, the measurement 11.79 with variance 0.25, and the result:
-# $(11.90,\ 4.98)$ with $\begin{pmatrix}0.2216 & 0.0290\\0.0290 & 0.0620\end{pmatrix}$. Compute it.
+# $(11.90,\ 4.98)$ with $\begin{pmatrix}0.2216 & 0.0290\\0.0290 & 0.0620\end{pmatrix}$. Compute the corrected state, with its covariance if you like.
 
 # %% corrected
 prior_cov = np.array([[1.9469, 0.2550], [0.2550, 0.0916]])
 corrected = ...  # your code here
 ### BEGIN SOLUTION
 C, cov_z = np.array([[1.0, 0.0]]), np.array([[0.25]])
-corrected, corrected_cov = update(np.array([12.5, 5.0]), prior_cov, np.array([11.79]), C, cov_z)
+corrected = update(np.array([12.5, 5.0]), prior_cov, np.array([11.79]), C, cov_z)
 ### END SOLUTION
-corrected = ex.corrected(corrected)
+ex.corrected(corrected)
 
 # %% detective [markdown]
 # The covariance agrees to the last digit, the state does not: printed is (11.90, 4.98). Four digits of a covariance are a good witness. After $n$
@@ -226,10 +236,17 @@ def measurement_jacobian(x, landmark):
     ### END SOLUTION
 
 
+# %% motion-model [markdown]
+# The robot moves by the simplified model of chapter 7, straight along its *old* heading, with speed $v$, turn rate $\omega$ and time step $T$:
+#
+# $$x' = x + v T \cos\theta, \qquad y' = y + v T \sin\theta, \qquad \theta' = \theta + \omega T .$$
+#
+# In code that is `odometry.step(x, u, dt, "euler")` with `u = (v, omega)`. (Without `"euler"` it takes the midpoint step.) Its derivatives by the pose and by the control:
+
 # %% motion_jacobians
 @ex.motion_jacobians
 def motion_jacobians(x, u, dt):
-    """Return G_x (3, 3) and G_u (3, 2) of the simplified motion model of chapter 7."""
+    """Return G_x (3, 3) and G_u (3, 2), the derivatives of the motion above by pose and control; u = (v, omega)."""
     ### BEGIN SOLUTION
     c, s = np.cos(x[2]), np.sin(x[2])
     G_x = np.array([[1, 0, -u[0] * dt * s], [0, 1, u[0] * dt * c], [0, 0, 1]])
@@ -238,7 +255,8 @@ def motion_jacobians(x, u, dt):
 
 
 # %% numeric-check [markdown]
-# A Jacobian by hand is checked by differences before it is used, always. And then one step of the whole filter: everything you wrote, in eight lines.
+# A Jacobian by hand is checked by differences before it is used, always. And then one step of the whole filter, in eight lines: states go through the
+# bent functions themselves, covariances through the Jacobians.
 
 # %% numeric-check-code
 def slopes(function, x, h=1e-6):
@@ -258,7 +276,7 @@ for name, (by_hand, numeric) in pairs.items():
 # %% ekf_step
 @ex.ekf_step
 def ekf_step(x, cov, u, dt, cov_u, z, landmark, cov_z):
-    """Return pose and covariance after moving with u = (v, omega) and measuring z = (distance, bearing).
+    """Return pose and covariance after a step of the simplified model with u = (v, omega), and z = (distance, bearing).
 
     x (3,), cov (3, 3), cov_u (2, 2) of the control, landmark (2,), cov_z (2, 2) of z.
     """
@@ -291,7 +309,8 @@ ex.predict("wrapping", guess, reveal=stages.arena)
 # ## Is the filter honest?
 #
 # A filter that errs by a meter and says so is useful; one that errs by 5 cm and claims 1 cm is dangerous. The test: $e^\top \Sigma^{-1} e$, the NEES, where $e$ is truth minus estimate.
-# It follows a chi-square distribution with as many degrees of freedom as states. Over 200 runs its mean must lie in a narrow band around 3.
+# For an honest filter, its model right and its errors Gaussian, it follows a chi-square distribution with as many degrees of freedom as states. Then the mean of 200 runs lies in a narrow band
+# around 3, with a probability of 99 %.
 
 # %% nees
 @ex.nees
@@ -319,10 +338,9 @@ for name, belief in beliefs.items():
     print(f"{name:33} {shown:>9}  {'honest' if low < mean < high else 'not honest'}")
 
 # %% curvature [markdown]
-# ## Beyond the document: when a better sensor makes it worse
+# ## Further, beyond the document: a sensor ten times more precise
 #
-# The extended filter replaces a curve by its tangent at the prediction. That is fine while the prediction is good compared with the sensor. Here 200 robots know their start poorly and are
-# corrected once. The cure is to linearize again at the corrected pose, and again: the *iterated* filter, which is Gauss-Newton from chapter 4 on prior and measurement together.
+# The extended filter replaces a curve by its tangent at the prediction. Here 200 robots know their start poorly, and are corrected once.
 
 # %% predict-precise
 guess = ...  # your code here
@@ -332,7 +350,9 @@ guess = "less trustworthy"
 ex.predict("precise", guess, reveal=stages.honesty)
 
 # %% unscented [markdown]
-# The *unscented* filter needs no Jacobian: it sends seven points through the measurement itself. Same priors, same measurements:
+# The tangent is good enough while the prediction is good compared with the sensor. The cure is to linearize again at the corrected pose, and again: the *iterated* filter, which is Gauss-Newton
+# from chapter 4 on prior and measurement together. The *unscented* filter needs no Jacobian: it sends seven points through the measurement itself. Which of the three will be honest here? Same
+# priors, same measurements:
 
 # %% unscented-code
 marks, std_range, std_bearing = stages.TWO_MARKS, 0.01, np.radians(0.2)
@@ -346,6 +366,10 @@ for name, step in filters.items():
     rms = 1000 * np.sqrt((step.x[:, :2] ** 2).sum(1).mean())
     print(f"{name:10} RMS {rms:4.0f} mm, mean NEES {kalman.nees(np.zeros(3), step.x, step.cov, angle=2).mean():7.3g}")
 
+# %% unscented-verdict [markdown]
+# Only the iterated filter is: accurate, and its NEES near 3. The unscented one is even farther off than the extended, but claims less: its points lie 1.7 standard deviations of a wide prior from the middle, too
+# coarse for a curve that the sensor resolves to a centimeter. Neither number alone tells that; the RMS sees the error, the NEES whether it was admitted.
+
 # %% gates [markdown]
 # ## Which landmark was that?
 #
@@ -357,7 +381,7 @@ for name, step in filters.items():
 # %% gate
 @ex.gate
 def gate(innovation, cov_innovation, limit):
-    """Return True where the innovation (2,) is plausible: its NIS, with the covariance (2, 2), is below the limit."""
+    """Return True where the innovation (m,) is plausible: its NIS, with the covariance (m, m), is below the limit."""
     ### BEGIN SOLUTION
     return bool(innovation @ np.linalg.solve(cov_innovation, innovation) <= limit)
     ### END SOLUTION
@@ -374,7 +398,7 @@ stray = np.array([[4.0, 1.0]])
 print("a chair at 4 m is taken for", ekf.associate(believed, cov, stray, marks, 0.05, 0.01), "(-1: for nothing)")
 
 # %% tracker [markdown]
-# ## The tracker of chapter 6, filtered
+# ## Further: the tracker of chapter 6, filtered
 #
 # Chapter 6 simulated the report's motions and ended with a filter it did not explain. You have all its parts now: constant velocity as the model, accelerations as its noise, your gate (16.27 is
 # the 99.9 % limit for three numbers), your correction. The tracker jumps by up to half a meter now and then. The second line believes that the robot accelerates ten times less; watch the gate.
@@ -399,7 +423,7 @@ for std_a in (4000.0, 400.0):
 # sure one refused a good reading, drove on by its model, and then refused nearly all of them: it is lost, several times farther off than its covariance admits.
 
 # %% break-it [markdown]
-# ## Break it: the short form in single precision
+# ## Further, break it: the short form in single precision
 #
 # $(I - KC)\,\Sigma^-$ subtracts two nearly equal numbers. Joseph's form $(I - KC)\,\Sigma^-(I - KC)^\top + K\Sigma_zK^\top$ adds what is positive, for any gain. In double precision
 # you will rarely see the difference; on a small controller with 32-bit numbers you will: prior variance 10⁶, sensor variance 10⁻³, two measurements.

@@ -821,7 +821,7 @@ CHAPTER = Chapter(
                 functools.partial(steady_system, n=3, m=2),
                 functools.partial(steady_system, n=2, m=2),
             ),
-            metric=metrics.Numbers(1e-5),
+            metric=metrics.Numbers(1e-3),
             hints=(
                 "The gain does not depend on the data. Run the covariance alone until the gain stands still.",
                 "Repeat: cov = A cov A' + cov_v, K = cov C' S^-1, cov = (I - K C) cov. Some thousand times are cheap. Or let SciPy solve the Riccati equation.",

@@ -1,0 +1,159 @@
+"""Chapter 8's exercises: answers once judged wrongly, and sentences of the notebook computed."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from labkit.chapters.ch08_kalman import exercises as ch08
+from labkit.chapters.ch08_kalman import stages
+from labkit.estimation import kalman
+from labkit.exercises.engine import CORRECT, NOT_YET, RAISED
+from labkit.geometry.planar import wrap_angle
+from labkit.localization import ekf, odometry
+
+ITEMS = {item.id: item for item in ch08.CHAPTER.items}
+RIGHT = {name: getattr(ch08, name) for name in ITEMS if hasattr(ch08, name)}
+
+
+def judged(name, answer, seeds=range(3)):
+    """Status and texts of an answer on several seeds; the status must not depend on the seed."""
+    outcomes = [ITEMS[name].judge(answer, rng=np.random.default_rng(seed)) for seed in seeds]
+    assert len({outcome.status for outcome in outcomes}) == 1
+    return outcomes[0].status, {outcome.text for outcome in outcomes}
+
+
+def only_for_one_size(x, cov, A, B, u, cov_u):
+    return A @ x + B @ u, A @ cov @ A.T + B * cov_u * B.T
+
+
+def with_two_states(x, cov, z, C, cov_z):
+    K = cov @ C.T @ np.linalg.inv(C @ cov @ C.T + cov_z)
+    return x + K @ (z - C @ x), (np.eye(2) - K @ C) @ cov
+
+
+def as_many_states_as_readings(x, cov, z, C, cov_z):
+    K = cov @ C.T @ np.linalg.inv(C @ cov @ C.T + cov_z)
+    return x + K @ (z - C @ x), (np.eye(len(z)) - K @ C) @ cov
+
+
+@pytest.mark.parametrize(
+    "name, answer, words",
+    [
+        ("predict_state", only_for_one_size, "single control"),
+        ("update", with_two_states, "2 x 2"),
+        ("update", as_many_states_as_readings, "size of the state"),
+        ("gate", lambda y, S, limit: bool(y @ np.linalg.inv(S) @ y <= 5.99), "Your limit stays 5.99"),
+        ("predict_state", lambda x, P, A, B, u, Q: A @ x + B @ u, "expected 2 results"),
+    ],
+)
+def test_what_one_size_or_one_limit_hides_is_named(name, answer, words):
+    status, texts = judged(name, answer)
+    assert status == NOT_YET and all(words in text for text in texts), texts
+
+
+def test_an_inverse_written_for_two_rows_meets_three():
+    def by_hand(y, S, limit):
+        (a, b), (c, d) = S
+        return bool(y @ (np.array([[d, -b], [-c, a]]) / (a * d - b * c)) @ y <= limit)
+
+    status, texts = judged("gate", by_hand)
+    assert status == RAISED and all("It was right before" in text for text in texts)
+
+
+def test_arrays_that_hold_one_number_are_no_numbers():
+    def through_update(x0, var0, z, stds):
+        return RIGHT["update"](np.array([x0]), np.array([[var0]]), z, np.ones((2, 1)), np.diag(stds**2))
+
+    status, texts = judged("fuse_two_sensors", through_update)
+    assert status == NOT_YET and all("a number" in text for text in texts)
+
+
+def stopped_at(A, C, cov_v, cov_z, stands_still):
+    P, old = np.eye(len(A)), np.full((len(A), len(C)), np.inf)
+    while True:
+        P = A @ P @ A.T + cov_v
+        K = P @ C.T @ np.linalg.inv(C @ P @ C.T + cov_z)
+        P = (np.eye(len(A)) - K @ C) @ P
+        if stands_still(K, old):
+            return K
+        old = K
+
+
+def test_iterations_that_go_on_long_enough_are_right():
+    for rule in (np.allclose, lambda K, old: np.abs(K - old).max() < 1e-6):
+        assert judged("steady_state_gain", lambda *given: stopped_at(*given, rule), range(10))[0] == CORRECT
+
+
+def test_differences_are_as_good_as_formulas():
+    def slopes(f, x, h=1e-6):
+        return np.column_stack([(f(x + h * e) - f(x - h * e)) / (2 * h) for e in np.eye(len(x))])
+
+    def jacobians(x, u, dt):
+        return (
+            slopes(lambda x: odometry.step(x, u, dt, "euler"), x),
+            slopes(lambda u: odometry.step(x, u, dt, "euler"), u),
+        )
+
+    assert judged("motion_jacobians", jacobians)[0] == CORRECT
+    assert judged("measurement_jacobian", lambda x, m: slopes(lambda x: ch08.measurement(x, m), x))[0] == CORRECT
+
+
+def test_the_printed_example_takes_the_state_or_both_results():
+    x, cov = ch08._printed_correction().x, ch08._printed_correction().cov
+    item = ITEMS["corrected"]
+    assert item.judge(x).status == item.judge((x, cov)).status == CORRECT
+    assert "covariance is not" in item.judge((x, 2 * cov)).text
+    assert item.judge((np.array([12.5, 5.0]), cov)).text == item.judge(np.array([12.5, 5.0])).text
+
+
+@pytest.mark.parametrize("name", ["nees", "ekf_step"])
+def test_only_the_angle_is_wrapped(name):
+    def error(truth, x, cov):
+        e = wrap_angle(truth - x)
+        return e @ np.linalg.solve(cov, e)
+
+    answers = {"nees": error, "ekf_step": ch08._all_wrapped}
+    status, texts = judged(name, lambda *given: answers[name](*given))
+    assert status == NOT_YET and all("Only the" in text and "angle" in text for text in texts)
+
+
+def test_a_position_that_nothing_measures_becomes_ever_less_sure_while_the_gain_settles():
+    A, B, _ = kalman.vehicle_model(0.1)
+    C, cov, variances, gains = np.array([[0.0, 1.0]]), np.diag([1.0, 0.01]), [], []
+    for _ in range(10_000):
+        cov = A @ cov @ A.T + 0.16 * B @ B.T
+        gains.append(ch08._gain(cov, C, np.array([[0.25]])))
+        cov = ch08._shrunk(cov, gains[-1], C)
+        variances.append(cov[0, 0])
+    assert np.allclose(gains[-1], gains[3000], atol=1e-6)
+    assert np.all(np.diff(variances[::1000]) > 2.0)  # 2.5 m^2 for a thousand steps, without end
+
+
+def test_the_nees_is_chi_square_for_an_honest_filter():
+    """Each number lies within 5.3 standard deviations of its expectation, beyond which is one case in ten million."""
+    rng, cov, runs = np.random.default_rng(0), np.diag([0.04, 0.09, 0.01]), 4000
+    x = np.zeros((runs, 3))
+    score = kalman.nees(x + rng.standard_normal((runs, 3)) * np.sqrt(np.diag(cov)), x, cov, angle=2)
+    assert abs(score.mean() - 3) < 5.3 * np.sqrt(6 / runs)
+    assert abs((score < stats.chi2.ppf(0.5, 3)).mean() - 0.5) < 5.3 * 0.5 / np.sqrt(runs)
+
+
+def test_what_the_notebook_says_of_the_three_filters():
+    marks, std_range, std_bearing = stages.TWO_MARKS, 0.01, np.radians(0.2)
+    cov, rng = np.diag([1.0, 1.0, np.radians(10) ** 2]), np.random.default_rng(4)
+    prior = rng.standard_normal((200, 3)) * np.sqrt(np.diag(cov))
+    z = ekf.measurement(np.zeros(3), marks) + rng.standard_normal((200, 2, 2)) * [std_range, std_bearing]
+    given = (prior, np.broadcast_to(cov, (200, 3, 3)), z, marks, std_range, std_bearing)
+    steps = [ekf.ekf_update(*given), ekf.unscented_update(*given), ekf.ekf_update(*given, iterations=10)]
+    rms = [np.sqrt((step.x[:, :2] ** 2).sum(1).mean()) for step in steps]
+    nees = [kalman.nees(np.zeros(3), step.x, step.cov, angle=2).mean() for step in steps]
+    low, high = kalman.mean_band(3, 200)
+    assert rms[1] > 1.2 * rms[0] and rms[2] < 0.02  # the unscented filter is farther off than the extended one ...
+    assert nees[0] > 3 * nees[1] > 300 and low < nees[2] < high  # ... but claims less; the iterated one is honest
+
+
+def test_all_other_readings_of_the_page_round_to_what_it_prints():
+    z, stds = np.array([9.4, 10.6]), np.array([0.5, 1.0])
+    readings = [(0, 400, z), (0, 1e12, z), (10, 20, z), (0, 20, z + [0.007, 0])]
+    assert all(round(ch08.fuse_two_sensors(x0, var0, values, stds)[0], 1) == 9.6 for x0, var0, values in readings)
+    assert round(ch08.fuse_two_sensors(0, 20, z, stds)[0], 1) == 9.5
