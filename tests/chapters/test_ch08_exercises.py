@@ -79,9 +79,9 @@ def stopped_at(A, C, cov_v, cov_z, stands_still):
         old = K
 
 
-def test_iterations_that_go_on_long_enough_are_right():
-    for rule in (np.allclose, lambda K, old: np.abs(K - old).max() < 1e-6):
-        assert judged("steady_state_gain", lambda *given: stopped_at(*given, rule), range(10))[0] == CORRECT
+@pytest.mark.parametrize("rule", [np.allclose, lambda K, old: np.abs(K - old).max() < 1e-6])
+def test_iterations_that_go_on_long_enough_are_right(rule):
+    assert judged("steady_state_gain", lambda *given: stopped_at(*given, rule), range(10))[0] == CORRECT
 
 
 def test_differences_are_as_good_as_formulas():
