@@ -73,9 +73,9 @@ def within_half_a_turn(rng):
     return (rng.uniform(-3, 3),)
 
 
-def turned_too_far(rng, sign):
-    """An angle beyond half a turn, with up to three full turns more."""
-    return (sign * (rng.uniform(3.3, 6.0) + 2 * np.pi * rng.integers(0, 4)),)
+def turned_too_far(rng, sign, gathered):
+    """An angle beyond half a turn; with gathered = 1 it has one to three full turns more, with -1 none."""
+    return (sign * (rng.uniform(3.3, 6.0) + 2 * np.pi * rng.integers(1, 4) * (gathered > 0)),)
 
 
 def each_way(draw, *names):
@@ -127,8 +127,12 @@ def surprise(rng, wanted, along=None, std=(0.3, 1.5), measure=np.linalg.solve, l
 
 
 def surprise_of(rng, m, wanted):
-    """An innovation of m numbers with y' S^-1 y in this range of limits, its covariance, and a limit."""
+    """An innovation of m numbers with y' S^-1 y in this range of limits, its covariance, and a limit.
+
+    What is implausible is so by its last number: whoever looks at the first ones alone lets it pass.
+    """
     S, y, limit = covariance(rng, m, 0.2), rng.normal(size=m), rng.uniform(4, 17)
+    y[:-1] *= 0.01 if wanted[0] > 1 else 1.0
     return y * np.sqrt(rng.uniform(*wanted) * limit / (y @ np.linalg.solve(S, y))), S, limit
 
 
@@ -305,6 +309,7 @@ def _ekf(
     gain=_gain,
     shrink=_shrunk,
     model="euler",
+    control=lambda cov_u, dt: cov_u,
 ):
     """One step of the landmark filter, or a wrong one; expected measurement and Jacobians "at" old or predicted pose."""
 
@@ -312,7 +317,7 @@ def _ekf(
         pose = {"old": x, "predicted": odometry.step(x, u, dt, model)}
         moved = pose["predicted"]
         G_x, G_u = motion_jacobians(pose[G_at], u, dt)
-        cov = (G_x @ cov @ G_x.T if carry else cov) + (G_u @ cov_u @ G_u.T if noise else 0)
+        cov = (G_x @ cov @ G_x.T if carry else cov) + (G_u @ control(cov_u, dt) @ G_u.T if noise else 0)
         H = measurement_jacobian(pose[H_at], landmark)
         y = z - measurement(pose[at], landmark)
         y[1] = wrapped(y[1]) if wrap else y[1]
@@ -344,6 +349,14 @@ def _all_wrapped(x, cov, u, dt, cov_u, z, landmark, cov_z):
     H = measurement_jacobian(moved, landmark)
     K = _gain(cov, H, cov_z)
     return moved + K @ wrapped(z - measurement(moved, landmark)), _shrunk(cov, K, H)
+
+
+def _shrunk_at_the_end(x, cov, u, dt, cov_u, z, landmark, cov_z):
+    moved, cov = _ekf(short=True)(x, cov, u, dt, cov_u, z, landmark, cov_z)
+    K = _gain(cov, measurement_jacobian(moved, landmark), cov_z)
+    y = z - measurement(moved, landmark)
+    y[1] = wrapped(y[1])
+    return _shrunk(cov, K, measurement_jacobian(moved + K @ y, landmark))
 
 
 def _old_cov_corrected(x, cov, u, dt, cov_u, z, landmark, cov_z):
@@ -491,6 +504,14 @@ CHAPTER = Chapter(
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ (P + B @ Q @ B.T) @ A.T),
                     "The control's noise comes in during this step: it is added after A cov A', not carried along with it.",
+                ),
+                Mistake(
+                    _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + Q[0, 0] * B @ B.T),
+                    "You took the first entry of cov_u alone. It is a matrix, one row per control: B cov_u B'.",
+                ),
+                Mistake(
+                    _predicted(lambda x, A, B, u: A @ x + B[:, 0] * u[0], _grown),
+                    "You added the first control alone: B u takes them all, B @ u.",
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ P @ np.linalg.inv(A) + B @ Q @ B.T),
@@ -741,6 +762,10 @@ CHAPTER = Chapter(
                     _fused(lambda v, s: [0, 1, 1]),
                     "You took the mean of the sensors: the better one should count more, and the prior is an opinion, too.",
                 ),
+                Mistake(
+                    lambda x0, v, z, s: (np.mean([x0, *z]), fuse_two_sensors(x0, v, z, s)[1]),
+                    "The variance is right. The position is no plain mean: the weights 1 / variance belong to it, too.",
+                ),
                 Mistake(_fused(lambda v, s: [1 / v, 1 / s[0] ** 2, 0]), "The second sensor is missing."),
                 Mistake(_fused(lambda v, s: [1 / v, 0, 1 / s[1] ** 2]), "The first sensor is missing."),
                 Mistake(_fused(lambda v, s: [1 / v, *(1 / s**4)]), "You squared the standard deviations twice."),
@@ -929,7 +954,7 @@ CHAPTER = Chapter(
         Exercise(
             "wrap_angle",
             reference=wrap_angle,
-            draw=(*each_way(turned_too_far, "sign"), within_half_a_turn),
+            draw=(*each_way(turned_too_far, "sign", "gathered"), within_half_a_turn),
             metric=metrics.Numbers(1e-9, "rad"),
             draws=12,
             hints=(
@@ -1085,6 +1110,12 @@ CHAPTER = Chapter(
                     "np.arctan2 takes y first, then x. And the bearing has to be wrapped.",
                 ),
                 Mistake(
+                    lambda x, l: np.array(
+                        [measurement(x, l)[0], np.arcsin((l - x[:2])[1] / measurement(x, l)[0]) - x[2]]
+                    ),
+                    "The arcsine cannot tell ahead from behind, in x: np.arctan2(dy, dx) can. And the bearing has to be wrapped.",
+                ),
+                Mistake(
                     lambda x, l: measurement(x, l) + [0, np.pi],
                     "The second shift of the wrap is missing: subtract pi again.",
                 ),
@@ -1164,6 +1195,10 @@ CHAPTER = Chapter(
                 Mistake(
                     _rows(lambda dx, dy, r: [[-2 * dx / r, -2 * dy / r, 0], [dy / r**2, -dx / r**2, -1]]),
                     "The derivative of the root has a factor 1/2, that of the square a factor 2: they cancel in row 0.",
+                ),
+                Mistake(
+                    lambda x, l: np.array([[-np.cos(x[2]), -np.sin(x[2]), 0], [np.sin(x[2]), -np.cos(x[2]), -1]]),
+                    "The heading is not the direction to the landmark, and a far landmark turns less than a near one: take dx, dy and r.",
                 ),
                 Mistake(
                     lambda x, l: measurement_jacobian(x, l)[::-1],
@@ -1388,6 +1423,18 @@ CHAPTER = Chapter(
                     lambda x, cov, *given: (ekf_step(x, cov, *given)[0], _old_cov_corrected(x, cov, *given)),
                     "The pose is right. (I - K H) is to be applied to the predicted covariance; you applied it to the old one.",
                 ),
+                Mistake(
+                    _ekf(control=lambda cov_u, dt: np.eye(2)),
+                    "The covariance of the control is missing between G_u and its transpose.",
+                ),
+                Mistake(
+                    _ekf(control=lambda cov_u, dt: cov_u * dt),
+                    "The time step stands in G_u already: G_u cov_u G_u' as it is.",
+                ),
+                Mistake(
+                    lambda x, cov, *given: (ekf_step(x, cov, *given)[0], _shrunk_at_the_end(x, cov, *given)),
+                    "The pose is right. (I - K H) takes the H of the gain, at the predicted pose; yours is taken at the corrected one.",
+                ),
                 Mistake(_ekf(short=True), "You only predicted: the correction is missing."),
                 Mistake(_ekf(carry=False), "The old covariance must be carried along: G_x cov G_x'."),
                 Mistake(
@@ -1610,6 +1657,10 @@ CHAPTER = Chapter(
                     "You left the correlation out: use the whole inverse of S, not only its diagonal.",
                 ),
                 Mistake(_gated(lambda y, S: y @ S @ y), "S stands in the middle as its inverse."),
+                Mistake(
+                    _gated(lambda y, S: y @ np.linalg.solve(S, y) / len(y)),
+                    "Too much passes: the limit belongs to the sum, not to the mean over the numbers. It is larger for more of them.",
+                ),
                 Mistake(
                     _gated(lambda y, S: (y @ np.linalg.solve(S, y)) ** 2),
                     "Too little passes: y' S^-1 y is the square already, and the limit belongs to it as it is.",
