@@ -180,6 +180,53 @@ def test_functions_are_short(path):
     assert not found, f"{found} exceeds {LONGEST_FUNCTION} lines: cut it where its parts have names"
 
 
+def public_functions(path):
+    """(definition, docstring) of each public function of a module with two or more parameters."""
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+            given = node.args
+            if len(given.posonlyargs + given.args + given.kwonlyargs) >= 2:
+                yield node, ast.get_docstring(node) or ""
+
+
+def own_statements(function):
+    """Nodes of a function's body, without those of functions defined in it."""
+    open_ = list(function.body)
+    while open_:
+        node = open_.pop()
+        yield node
+        if not isinstance(node, (ast.FunctionDef, ast.Lambda)):
+            open_ += ast.iter_child_nodes(node)
+
+
+def has_section(text, name):
+    return re.search(rf"^{name}\n-{{{len(name)}}}$", text, re.M) is not None
+
+
+MATHEMATICAL = [path for path in MODULES if storey_of(path) in MATHEMATICS]
+DESCRIBED = {node.name for p in MATHEMATICAL for node, text in public_functions(p) if has_section(text, "Parameters")}
+
+
+@pytest.mark.parametrize("path", MATHEMATICAL, ids=lambda path: str(path.relative_to(ROOT)))
+def test_mathematics_says_what_goes_in_and_what_comes_out(path):
+    """Parameters, Returns and Raises as sections; or, in backquotes, the function whose parameters these are.
+
+    Border checks (`as_...`, `refuse_...`) say in a sentence what they let pass.
+    """
+    for node, text in public_functions(path):
+        if node.name.startswith(("as_", "refuse_")):
+            continue
+        if not has_section(text, "Parameters"):
+            named = {name.split(".")[-1] for name in re.findall(r"`([\w.]+)`", text)}
+            assert named & DESCRIBED, f"{node.name} needs a section Parameters, or the name of a function that has it"
+            continue
+        body = list(own_statements(node))
+        if any(isinstance(part, ast.Return) and part.value is not None for part in body):
+            assert has_section(text, "Returns"), f"{node.name} needs a section Returns"
+        if any(isinstance(part, ast.Raise) for part in body):
+            assert has_section(text, "Raises"), f"{node.name} needs a section Raises"
+
+
 def literal_colors(tree):
     """(line, color) of each color written as text in the code."""
     for node in ast.walk(tree):

@@ -19,7 +19,19 @@ HYPOTHESES = (  # robot inverted, sensor inverted, what it means; with both, or 
 
 
 def axis_name(v, frame):
-    """A direction in words: `the flange's z axis`, or its three numbers where it is none."""
+    """A direction in words: `the flange's z axis`, or its three numbers where it is none.
+
+    Parameters
+    ----------
+    v : array, shape (3,)
+        Of length 1; its sign does not matter.
+    frame : str
+        Whose axes they are.
+
+    Returns
+    -------
+    words : str
+    """
     v = v * np.sign(v[np.argmax(np.abs(v))])
     k = int(np.argmax(np.abs(v)))
     if abs(v[k]) > 0.94:  # within 20 deg
@@ -28,9 +40,22 @@ def axis_name(v, frame):
 
 
 def weak_direction(covariance, frame, what):
-    """(ratio, axis, best axis) of a 3 x 3 block of a covariance, and the sentence about it or None.
+    """How unevenly a block of a covariance is determined, and a sentence about it.
 
-    what: "turning about" or "the position along".
+    Parameters
+    ----------
+    covariance : array, shape (3, 3)
+    frame : str
+        Whose axes they are.
+    what : str
+        "turning about" or "the position along".
+
+    Returns
+    -------
+    ratio : float
+        Largest standard deviation over the smallest.
+    sentence : str or None
+        None where they hardly differ.
     """
     values, vectors = np.linalg.eigh(covariance)
     if not values[-1] > 0:
@@ -93,7 +118,19 @@ def refuse_open_loop(T, residuals):
 
 
 def moved_block(kept, agree):
-    """(first, last) row, counted from 1, of one block of rejected rows that agree among themselves, or None."""
+    """The block of rejected rows that agree among themselves.
+
+    Parameters
+    ----------
+    kept : bool array, shape (n,)
+    agree : bool
+        Whether the rejected rows agree with one solution of their own.
+
+    Returns
+    -------
+    block : (first, last) or None
+        Rows counted from 1; None where the rejected rows are no block.
+    """
     out = np.flatnonzero(~kept)
     if len(out) < 4 or not agree:
         return None

@@ -153,6 +153,11 @@ def kronecker_matrix(A, B):
     -------
     M : array, shape (9 N, 9)
         Blocks I kron A_i - B_i' kron I.
+
+    Raises
+    ------
+    ValueError
+        Motions of different number.
     """
     A, B = rotation_block(A, "A"), rotation_block(B, "B")
     if A.ndim != 3 or A.shape != B.shape:
@@ -180,13 +185,27 @@ def rotation_from_kronecker(M):
 
 
 def translation_from_motions(A, B, R):
-    """Translation by least squares from (R_A - I) t = R t_B - t_A; equations (14) to (16).
+    """Translation by least squares from (R_A - I) t = R t_B - t_A.
+
+    Parameters
+    ----------
+    A, B : array-like, shape (N, 4, 4)
+        Motions of flange and sensor.
+    R : array-like, shape (3, 3)
+        Rotation of the sensor on the flange.
 
     Returns
     -------
-    t : array, shape (3,)
-    residuals : array, shape (N, 3)
+    t : array, shape (3,), mm
+    residuals : array, shape (N, 3), mm
         K1 t - K2 of the report, in F.
+
+    Raises
+    ------
+    ValueError
+        Motions of different number.
+
+    Source: report, equations (14) to (16).
     """
     A, B, R = as_transforms(A, "A"), as_transforms(B, "B"), as_shape(as_rotations(R, "R"), "R", 3, 3)
     if A.ndim != 3 or A.shape != B.shape:
@@ -318,6 +337,12 @@ def _reweighted(solve, result):
 def linear_rotations(robot, T_ST, weights):
     """Rotations of sensor and target: R X A = Y for all poses is K rvec(X) = N rvec(Y), X and Y singular vectors of K.
 
+    Parameters
+    ----------
+    robot, T_ST : array, shape (N, 4, 4)
+        The loop is robot @ sensor @ T_ST = target.
+    weights : array, shape (N,)
+
     Returns
     -------
     both : array, shape (2, 3, 3)
@@ -346,6 +371,11 @@ def loop_jacobians(robot, sensor, target, T_ST):
 
     The error of the rotation is the rotation vector of target' robot sensor T_ST, that of the translation the gap
     between both sides in the base.
+
+    Parameters
+    ----------
+    robot, T_ST : array, shape (N, 4, 4)
+    sensor, target : array, shape (4, 4)
 
     Returns
     -------
@@ -392,9 +422,20 @@ def _moved(T, step):
 
 
 def noise_levels(square_rot, square_trans, freedom, given, size):
-    """Standard deviations of the readings (rad, mm): as given, or from sums of squares and their degrees of freedom.
+    """Standard deviations of the readings: as given, or from sums of squares and their degrees of freedom.
 
-    At the least what noise-free data of the given size (mm) may have by rounding.
+    Parameters
+    ----------
+    square_rot, square_trans : float
+        Sums of squares (rad^2, mm^2).
+    freedom, given : pairs
+        Degrees of freedom, and standard deviations where they are known (rad, mm) or None, of rotation and translation.
+    size : float
+        Of the data (mm): noise-free data have at least its rounding.
+
+    Returns
+    -------
+    std_rot, std_trans : float, rad and mm
     """
     floors = MIN_ANGLE_STD, MIN_LENGTH_STD * size
     return tuple(

@@ -276,9 +276,19 @@ def hand_eye(
 
 
 def pivot(poses, *, groups=None, length_unit="mm"):
-    """Tip of a tool and the point it touches, from poses (N, 4, 4) that all touch it: a `Calibration`.
+    """Tip of a tool and the point it touches, from poses that all touch it.
 
-    T is a translation to the tip: its orientation is not determined. covariance is of tip and pivot.
+    Parameters
+    ----------
+    poses : array-like, shape (N, 4, 4)
+    groups : sequence, optional
+        As in `hand_eye`.
+    length_unit : str
+
+    Returns
+    -------
+    Calibration
+        T is a translation to the tip: its orientation is not determined. covariance is of tip and pivot.
     """
     model = PivotModel(poses)
     advice.refuse_one_axis(model.T_WF, "the tool")
@@ -297,9 +307,21 @@ def pivot(poses, *, groups=None, length_unit="mm"):
 
 
 def sphere(robot, points, *, groups=None, length_unit="mm"):
-    """Where a scanner sits on the flange, from flange poses (N, 4, 4) and the center of one sphere in its frame (N, 3).
+    """Where a scanner sits on the flange, from flange poses and the center of one sphere seen in each.
 
-    T is the sensor in the flange; `points["center"]` the center in the base. Returns a `Calibration`.
+    Parameters
+    ----------
+    robot : array-like, shape (N, 4, 4)
+    points : array-like, shape (N, 3)
+        The centers in the scanner's frame.
+    groups : sequence, optional
+        As in `hand_eye`.
+    length_unit : str
+
+    Returns
+    -------
+    Calibration
+        T is the sensor in the flange; `points["center"]` the center in the base.
     """
     model = SphereModel(robot, points)
     advice.refuse_one_axis(model.T_BF)
@@ -327,6 +349,11 @@ def frame(points, nominal=None, *, std_trans=None, groups=None, length_unit="mm"
     Returns
     -------
     Calibration
+
+    Raises
+    ------
+    ValueError
+        Fewer than three points, points on one line, too few that agree.
     """
     points = as_points(points, "points")
     if nominal is None:
@@ -366,6 +393,11 @@ def compare(time_a, a, time_b, b, *, length_unit="mm", max_offset=None, max_gap=
     -------
     Calibration
         T is the marker in the flange, T_target the tracker's world in the base.
+
+    Raises
+    ------
+    ValueError
+        Streams that hardly overlap, poses that turn about one axis only, too few that agree.
     """
     a, b = as_transforms(a, "a"), as_transforms(b, "b")
     clocks = clock_offset(time_a, a, time_b, b, max_offset)

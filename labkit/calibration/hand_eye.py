@@ -232,6 +232,13 @@ def kuka_residuals(p2, T_BF, x_S, target):
 def kuka_jacobian(p2, T_BF, x_S):
     """Analytic derivative of `kuka_residuals` by x, y, z, A, B, C.
 
+    Parameters
+    ----------
+    p2 : array-like, shape (6,)
+        The scanner in the flange (mm, rad).
+    T_BF : array-like, shape (N, 4, 4)
+    x_S : array-like, shape (N, 3), mm
+
     Returns
     -------
     J : array, shape (3 N, 6)
@@ -270,7 +277,15 @@ def rate_matrix(A, B):
 
 
 def joint_jacobian(T_BF, x_S, T_FS, target_free=True):
-    """Derivative of the residuals by phi (rad, in S), translation (in F) and target (in B).
+    """Derivative of the residuals by phi (in S), translation (in F) and target (in B).
+
+    Parameters
+    ----------
+    T_BF : array-like, shape (N, 4, 4)
+    x_S : array-like, shape (N, 3), mm
+    T_FS : array-like, shape (4, 4)
+    target_free : bool
+        Whether the target is estimated, too.
 
     Returns
     -------
@@ -288,7 +303,14 @@ def joint_jacobian(T_BF, x_S, T_FS, target_free=True):
 
 
 def radius_jacobian(T_BF, x_S, T_FS, radius):
-    """The same with the sphere's radius as a tenth column: y = +-sqrt(R^2 - r^2) has dy/dR = R / y.
+    """`joint_jacobian` with the sphere's radius as a tenth column: y = +-sqrt(R^2 - r^2) has dy/dR = R / y.
+
+    Parameters
+    ----------
+    T_BF : array-like, shape (N, 4, 4)
+    x_S : array-like, shape (N, 3), mm
+    T_FS : array-like, shape (4, 4)
+    radius : float, mm
 
     Returns
     -------
@@ -541,6 +563,11 @@ def gauss_newton_pose(start, T_BF, x_S, target=None, parameters="euler", max_ste
     -------
     PoseIterates
 
+    Raises
+    ------
+    ValueError
+        An unknown parametrization, or no sphere center away from the scanner's origin.
+
     Source: thesis, listings C3 to C5; `labkit.documents.thesis.listings` has them as printed.
     """
     if parameters not in ("euler", "se3"):
@@ -585,6 +612,13 @@ def gauss_newton_pose(start, T_BF, x_S, target=None, parameters="euler", max_ste
 
 def leave_one_out(T_BF, x_S, robust=False):
     """Residual vector of each pose under the calibration from the others: what it is worth elsewhere.
+
+    Parameters
+    ----------
+    T_BF : array-like, shape (N, 4, 4)
+    x_S : array-like, shape (N, 3), mm
+    robust : bool
+        As in `calibrate_sphere_target`.
 
     Returns
     -------

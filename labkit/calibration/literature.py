@@ -50,6 +50,10 @@ def kim_linear(T_BF, points_S, points_W):
     points_W : array-like, shape (n, 3)
         The same points in the body's own frame.
 
+    Returns
+    -------
+    T_FS : array, shape (4, 4)
+
     Raises
     ------
     ValueError
@@ -82,7 +86,20 @@ def kim_linear(T_BF, points_S, points_W):
 
 
 def kim_matrix(A, B):
-    """D (..., 12, 12) and F (..., 12) of A X = X B for the rows of X one after another, X's last row being 0 0 0 1.
+    """A X = X B as linear equations D x = F in the rows of X one after another, X's last row being 0 0 0 1.
+
+    Parameters
+    ----------
+    A, B : array-like, shape (..., 4, 4)
+
+    Returns
+    -------
+    D, F : arrays, shapes (..., 12, 12) and (..., 12)
+
+    Raises
+    ------
+    ValueError
+        A and B of different shapes.
 
     Source: thesis, appendix A.
     """
@@ -108,6 +125,11 @@ def li_two_step(T_BF, x_S, max_turn_deg=0.01):
     T_BF, x_S : as in `calibrate_sphere_target`
     max_turn_deg : float
         Poses whose orientations differ by at most this (deg) count as translated only.
+
+    Returns
+    -------
+    T_FS : array, shape (4, 4)
+    target : array, shape (3,), mm
 
     Raises
     ------
@@ -150,8 +172,14 @@ def compare_methods(repeats, std, rng):
     """Errors of the literature's methods and of the joint fit, on simulated poses that suit all of them.
 
     Each repeat draws a scanner, twelve poses turned about all axes and four that only translate the first, with a
-    sphere in the scanner's field and noise `std` (mm) on each coordinate; Kim's method gets the eight corners of a 60
-    mm cube in place of the sphere.
+    sphere in the scanner's field; Kim's method gets the eight corners of a 60 mm cube in place of the sphere.
+
+    Parameters
+    ----------
+    repeats : int
+    std : float
+        Noise of each coordinate (mm).
+    rng : numpy.random.Generator
 
     Returns
     -------

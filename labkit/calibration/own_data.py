@@ -118,11 +118,25 @@ def majority(model):
 
 
 def best_candidate(n, solve, misfit, seed=0):
-    """The rows that the best of many three-row solutions explains, bool (n,), and its misfit in each channel.
+    """The rows that the best of many three-row solutions explains.
 
-    solve: rows (m, 3) -> solutions. misfit: (solutions, rows) -> tuple of arrays (m, len(rows)), one a channel. The
-    score is the product of the channels' misfits at the row that closes the required share, so no scale is needed; the
-    misfit returned is that of the best.
+    The score is the product of the channels' misfits at the row that closes the required share, so no scale is needed.
+
+    Parameters
+    ----------
+    n : int
+        Number of rows.
+    solve : callable
+        rows (m, 3) -> m solutions.
+    misfit : callable
+        (solutions, rows) -> tuple of arrays (m, len(rows)), one per channel.
+    seed : int
+
+    Returns
+    -------
+    explained : bool array, shape (n,)
+    misfit : tuple
+        Of the best, in each channel.
     """
     rng = np.random.default_rng(seed)
     every = n * (n - 1) * (n - 2) // 6
@@ -146,7 +160,16 @@ def best_candidate(n, solve, misfit, seed=0):
 
 
 def next_poses(model, solution, kept, count=3):
-    """Poses that would improve the first six parameters most, one after the other: (poses, shares, stds).
+    """Poses that would improve the first six parameters most, one after the other.
+
+    Parameters
+    ----------
+    model : Model
+    solution : tuple
+        As `model.fit` gives it.
+    kept : bool array, shape (n,)
+        The rows that count.
+    count : int
 
     Returns
     -------
@@ -392,7 +415,20 @@ class FrameModel(Model):
 
 
 def three_point_frame(points, std):
-    """Frame through three points and its covariance (6, 6), for noise `std` on each coordinate (zeros without it)."""
+    """Frame through three points, with its covariance.
+
+    Parameters
+    ----------
+    points : array-like, shape (3, 3)
+        Origin, a point on x, a point beyond it in the x-y plane.
+    std : float or None
+        Noise of each coordinate.
+
+    Returns
+    -------
+    T : array, shape (4, 4)
+    covariance : array, shape (6, 6), or None without noise
+    """
     points = as_shape(points, "points", 3, 3)
     T = frame_from_points(*points)
     if std is None:

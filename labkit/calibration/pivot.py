@@ -516,6 +516,11 @@ def touching_poses(R, tip, pivot, std_rot=0.0, std_trans=0.0, rng=None):
     Returns
     -------
     T_WF : array, shape (..., n, 4, 4)
+
+    Raises
+    ------
+    ValueError
+        Noise without a generator.
     """
     R, tip, pivot = as_rotations(R, "R"), as_shape(tip, "tip", 3), as_shape(pivot, "pivot", 3)
     std_rot, std_trans = (

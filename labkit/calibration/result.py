@@ -25,7 +25,18 @@ class Parameter(NamedTuple):
 
 
 def point_parameters(name, axes="xyz"):
-    """The coordinates of a point: name.x, name.y, name.z in mm."""
+    """The coordinates of a point, as parameters in mm.
+
+    Parameters
+    ----------
+    name : str
+    axes : str
+
+    Returns
+    -------
+    parameters : tuple of Parameter
+        name.x, name.y, name.z.
+    """
     return tuple(Parameter(f"{name}.{axis}", "mm") for axis in axes)
 
 

@@ -363,6 +363,11 @@ def scan_line(center, radius, half_angle, n, std=0.0, rng=None):
     Returns
     -------
     x, z : array, shape (n,)
+
+    Raises
+    ------
+    ValueError
+        Noise without a generator, a scan plane that misses the sphere.
     """
     center, half_angle, n = as_shape(center, "center", 3), as_number(half_angle, "half_angle"), as_count(n, "n")
     std = float(as_nonnegative(as_number(std, "std"), "std"))

@@ -54,6 +54,11 @@ def sample_stream(time, T, when, max_gap=None):
         Identity where there is none.
     known : bool array, shape (n,)
         False before the first sample, behind the last, and in gaps.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, fewer than two samples, a time that does not increase.
     """
     time, T, when = as_finite(time, "time"), as_transforms(T, "T"), as_finite(when, "when")
     if T.ndim != 3 or len(T) < 2 or time.shape != T.shape[:1]:
@@ -70,7 +75,21 @@ def sample_stream(time, T, when, max_gap=None):
 
 
 def angular_speed(time, T, when, span):
-    """Mean angular speed over `span` seconds around each time (rad/s), NaN where the stream does not cover it; (n,)."""
+    """Mean angular speed of a stream of poses around given times.
+
+    Parameters
+    ----------
+    time : array, shape (k,), s
+    T : array, shape (k, 4, 4)
+    when : array, shape (n,), s
+    span : float
+        Width of the interval around each time (s).
+
+    Returns
+    -------
+    speed : array, shape (n,), rad/s
+        NaN where the stream does not cover the interval.
+    """
     (before, known_0), (after, known_1) = (sample_stream(time, T, when + side * span / 2) for side in (-1, 1))
     turn = np.linalg.norm(log_so3(np.swapaxes(before[:, :3, :3], -1, -2) @ after[:, :3, :3]), axis=1)
     return np.where(known_0 & known_1, turn / span, np.nan)

@@ -66,7 +66,21 @@ def squared_distances(residuals, jacobian, kept):
 
 
 def distance_limit(k, dof, probability=0.999):
-    """Squared distance that a good block of k numbers stays below, noise estimated from `dof` degrees of freedom."""
+    """Squared distance that a good block of numbers stays below.
+
+    Parameters
+    ----------
+    k : int
+        Numbers in the block.
+    dof : float
+        Degrees of freedom from which the noise was estimated.
+    probability : float
+
+    Returns
+    -------
+    limit : float
+        k times a quantile of the F distribution.
+    """
     return k * stats.f.ppf(as_probability(probability, "probability"), k, max(dof, 1))
 
 

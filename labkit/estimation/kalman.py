@@ -381,7 +381,7 @@ def nees(truth, x, cov, angle=None):
 
 
 def nis(innovation, cov_innovation):
-    """Normalized innovation squared, innovation' S^-1 innovation, (...): the check that needs no truth.
+    """Normalized innovation squared, innovation' S^-1 innovation: the check that needs no truth.
 
     Parameters
     ----------
@@ -389,6 +389,10 @@ def nis(innovation, cov_innovation):
         Measured minus expected.
     cov_innovation : array-like, shape (..., m, m)
         Its covariance S.
+
+    Returns
+    -------
+    nis : array, shape (...)
     """
     return _squared(as_finite(innovation, "innovation"), cov_innovation, "cov_innovation")
 
@@ -402,7 +406,19 @@ def _squared(e, cov, name):
 
 
 def mean_band(dof, runs, probability=0.99):
-    """Limits (low, high) between which the mean NEES or NIS of `runs` independent runs lies with that probability."""
+    """Limits between which the mean NEES or NIS of independent runs lies.
+
+    Parameters
+    ----------
+    dof : int
+        Degrees of freedom of one run: the number of states, or of measured numbers.
+    runs : int
+    probability : float
+
+    Returns
+    -------
+    low, high : float
+    """
     dof, runs = as_count(dof, "dof"), as_count(runs, "runs")
     tail = 0.5 * (1 - as_probability(probability, "probability"))
     return tuple(stats.chi2.ppf([tail, 1 - tail], dof * runs) / runs)

@@ -242,6 +242,11 @@ def damped_step(r, J, damping):
     Returns
     -------
     step : array, shape (..., n)
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not fit together, a damping that is not positive.
     """
     r, J, damping = as_finite(r, "r"), as_finite(J, "J"), as_nonnegative(damping, "damping")
     if r.ndim < 1 or J.ndim < 2 or J.shape[-2] != r.shape[-1]:
@@ -361,6 +366,11 @@ def predicted_decrease(g, B, step):
     -------
     decrease : array, shape (...)
 
+    Raises
+    ------
+    ValueError
+        Shapes that do not fit together.
+
     Source: thesis, (2-33).
     """
     (g, B), step = _model(g, B), as_finite(step, "step")
@@ -409,6 +419,11 @@ def classify_extremum(g, H, tol=1e-6):
     -------
     kind : str
         "minimum", "maximum", "saddle", "degenerate" or "not stationary".
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not fit together.
 
     Source: thesis, section 2.4.3.
     """
@@ -658,6 +673,11 @@ def trust_region(
     -------
     Trace
 
+    Raises
+    ------
+    ValueError
+        Values of `accept`, radius or scale that are out of range; a start where the function is not finite.
+
     Source: thesis, section 2.5.4 and the scheme of section 6.1.6: radius to a quarter of the step below a
     gain of 1/4, doubled above 3/4 when the step reached the rim.
     """
@@ -687,7 +707,21 @@ def trust_region(
 
 
 def next_radius(radius, length, gain, max_radius):
-    """The radius after a step of this length and gain (scheme of section 6.1.6); broadcasts."""
+    """The radius of a trust region after a step.
+
+    Parameters
+    ----------
+    radius, length, gain : array-like, shapes that broadcast
+        Radius and length of the step, and the gain ratio it had.
+    max_radius : float
+
+    Returns
+    -------
+    radius : float or array
+        A quarter of the length after a poor gain, twice the radius after a good one at the rim, else as before.
+
+    Source: thesis, section 6.1.6.
+    """
     on_rim = length >= (1 - 1e-9) * radius
     wider = np.where((gain > 0.75) & on_rim, np.minimum(2 * radius, max_radius), radius)
     return np.where(gain < 0.25, 0.25 * length, wider)[()]

@@ -42,6 +42,11 @@ def solve_ax_xb(A, B):
     Returns
     -------
     T_FS : array, shape (..., 4, 4)
+
+    Raises
+    ------
+    ValueError
+        Fewer than two motions, or not as many of both.
     """
     A, B = as_transforms(A, "A"), as_transforms(B, "B")
     if A.ndim != 3 or B.shape[-3:] != A.shape or len(A) < 2:

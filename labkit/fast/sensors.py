@@ -46,6 +46,15 @@ def weigh_beams(world, ranges, bearings, std, r_max, shares=(0.75, 0.1, 0.05, 0.
     step : float
         Distance of the expected ranges in the look-up table (m); harmless while far below std.
 
+    Returns
+    -------
+    Weighting
+
+    Raises
+    ------
+    ValueError
+        A step too small for a table.
+
     The other parameters are those of the namesake.
     """
     ranges, bearings = as_scan(ranges, bearings)

@@ -89,7 +89,17 @@ def closure_error(T):
 
 
 def displacement(T, points):
-    """How far T moves each point: |T p - p|, the closure error at the work piece; (..., 4, 4), (..., 3) -> (...)."""
+    """How far T moves each point, |T p - p|: the closure error at the work piece.
+
+    Parameters
+    ----------
+    T : array-like, shape (..., 4, 4)
+    points : array-like, shape (..., 3), mm
+
+    Returns
+    -------
+    distance : array, shape (...), mm
+    """
     points = as_points(points, "points")
     return np.linalg.norm(transform(T, points) - points, axis=-1)
 
@@ -185,8 +195,23 @@ def distribute_closure(transforms, shares=None):
 
 
 def around(links, loop):
-    """The links of one loop of a graph, in order, as a stack: `loop` is a sequence of (k, forward), backward links are
-    inverted.
+    """The links of one loop of a graph in their order, those that are passed backward inverted.
+
+    Parameters
+    ----------
+    links : array-like, shape (n, ..., 4, 4)
+        Of the whole graph.
+    loop : sequence of (k, forward)
+        Number of each link, from 0, and whether it is passed forward.
+
+    Returns
+    -------
+    ordered : array, shape (len(loop), ..., 4, 4)
+
+    Raises
+    ------
+    ValueError
+        A loop that is none, or names a link that is not there.
     """
     links = _stack(links)
     numbers, forward = _loop(loop, len(links))
@@ -214,7 +239,7 @@ def _loop(loop, count):
 
 
 def distribute_in_turn(links, loops):
-    """Share out the closure error of several loops one after another; (m, 4, 4) -> (m, 4, 4).
+    """Share out the closure error of several loops one after another.
 
     Each loop closes when its turn comes. A link that two loops share is changed twice: the earlier loop opens again.
 
@@ -224,6 +249,15 @@ def distribute_in_turn(links, loops):
         All measured links of a graph.
     loops : sequence of loops
         Each a sequence of (k, forward): which link, and whether along its direction.
+
+    Returns
+    -------
+    corrected : array, shape (m, 4, 4)
+
+    Raises
+    ------
+    ValueError
+        Links that are no stack of poses, loops that are none.
     """
     links = _stack(links)
     if np.ndim(links) != 3:
@@ -268,7 +302,20 @@ def expected_closure(transforms, std_rot, std_trans):
 
 
 def noisy_links(transforms, std_rot, std_trans, rng, runs=1):
-    """Links with noise, T_k exp(xi_k), components of std_rot (rad) and std_trans; N links -> (N, runs, 4, 4)."""
+    """Links with noise, T_k exp(xi_k).
+
+    Parameters
+    ----------
+    transforms : array-like, shape (N, 4, 4)
+    std_rot, std_trans : float
+        Standard deviation of each component of the rotation vector (rad) and the translation (mm).
+    rng : numpy.random.Generator
+    runs : int
+
+    Returns
+    -------
+    links : array, shape (N, runs, 4, 4)
+    """
     std_rot, std_trans = _noise(std_rot, std_trans)
     links, runs = as_shape(_stack(transforms), "transforms", "n", 4, 4), as_count(runs, "runs")
     xi = rng.normal(size=(len(links), runs, 6)) * np.repeat([std_rot, std_trans], 3)
@@ -284,7 +331,18 @@ def _noise(std_rot, std_trans):
 
 
 def polygon_loop(n, size):
-    """Links of a loop of n frames on a circle in the x-y plane, `size` across, each turned by 360/n deg; (n, 4, 4)."""
+    """Links of a loop of n frames on a circle in the x-y plane, each turned by 360/n deg.
+
+    Parameters
+    ----------
+    n : int
+    size : float
+        Diameter of the circle (mm).
+
+    Returns
+    -------
+    links : array, shape (n, 4, 4)
+    """
     n, size = as_count(n, "n"), as_number(size, "size")
     turn = 2 * np.pi / n
     link = np.eye(4)
@@ -294,7 +352,18 @@ def polygon_loop(n, size):
 
 
 def straight_chain(n, length):
-    """Links of n frames in a row, each `length` further along x; (n, 4, 4)."""
+    """Links of n frames in a row along x.
+
+    Parameters
+    ----------
+    n : int
+    length : float
+        Of each link (mm).
+
+    Returns
+    -------
+    links : array, shape (n, 4, 4)
+    """
     n, length = as_count(n, "n"), as_number(length, "length")
     links = np.repeat(np.eye(4)[None], n, axis=0)
     links[:, 0, 3] = length

@@ -254,6 +254,11 @@ def rotation_block(T, name="T"):
     Returns
     -------
     R : array, shape (..., 3, 3)
+
+    Raises
+    ------
+    ValueError
+        Any other shape.
     """
     T = as_finite(T, name)
     if T.shape[-2:] not in ((3, 3), (4, 4)):
@@ -457,18 +462,28 @@ def fit_frame(points_F, points_W):
 def gram_schmidt_covariance(x_arm, y_along, y_height, std):
     """First-order covariance of the rotation vector (in F) of `frame_from_points`.
 
-    Each of the three points carries isotropic noise of standard deviation `std`. With the origin at 0, x_point at
-    (x_arm, 0, 0) and y_point at (y_along, y_height, 0), the error of the frame about its own axes is
+    With the origin at 0, x_point at (x_arm, 0, 0) and y_point at (y_along, y_height, 0), the error of the frame about
+    its own axes is
 
         about x: (e_y.z - e_o.z - (y_along / x_arm) (e_x.z - e_o.z)) / y_height
         about y: -(e_x.z - e_o.z) / x_arm
         about z: (e_x.y - e_o.y) / x_arm
 
+    Parameters
+    ----------
+    x_arm, y_along, y_height : float
+        The triangle, as above (mm).
+    std : float
+        Isotropic noise of each of the three points, per coordinate (mm).
+
     Returns
     -------
     cov_rot : array, shape (3, 3), rad^2
 
-    Raises ValueError where the triangle is flat.
+    Raises
+    ------
+    ValueError
+        Where the triangle is flat.
     """
     c, u, h = (as_number(v, n) for v, n in ((x_arm, "x_arm"), (y_along, "y_along"), (y_height, "y_height")))
     std = as_positive_number(std, "std")
@@ -484,10 +499,30 @@ def gram_schmidt_covariance(x_arm, y_along, y_height, std):
 
 
 def fit_covariance(points_F, std):
-    """Cramer-Rao bound of the rotation vector (in F) from points with isotropic noise; (n, 3) -> (3, 3), rad^2.
+    """Cramer-Rao bound of the rotation vector (in F) of a frame fitted to points with isotropic noise.
 
     The information is sum (|d|^2 I - d d') / std^2 over the points d about their mean: the tensor of inertia of the
-    triangle. Raises ValueError for fewer than three points, or collinear ones.
+    triangle.
+
+    Parameters
+    ----------
+    points_F : array-like, shape (n, 3), mm
+        Where the points are on the body.
+    std : float
+        Noise of each measured coordinate (mm).
+
+    Returns
+    -------
+    cov_rot : array, shape (3, 3), rad^2
+
+    Raises
+    ------
+    ValueError
+        For fewer than three points, or collinear ones.
+
+    See Also
+    --------
+    fit_frame : the estimate that attains it.
     """
     d = as_shape(points_F, "points_F", "n", 3)
     if len(d) < 3:

@@ -11,7 +11,22 @@ def wrap_angle(angle):
 
 
 def relative_pose(x, y):
-    """Pose y seen from pose x, (..., 3), the heading within [-pi, pi)."""
+    """Pose y seen from pose x.
+
+    Parameters
+    ----------
+    x, y : array-like, shape (..., 3)
+        x, y (m) and heading (rad) of both.
+
+    Returns
+    -------
+    seen : array, shape (..., 3)
+        The heading within [-pi, pi).
+
+    See Also
+    --------
+    compose_pose : the way back.
+    """
     x, y = as_points(x, "x", 3), as_points(y, "y", 3)
     fit_together(x=x.shape[:-1], y=y.shape[:-1])
     d, c, s = y - x, np.cos(x[..., 2]), np.sin(x[..., 2])
@@ -42,7 +57,18 @@ def exp_pose(xi):
 
 
 def compose_pose(x, y):
-    """Pose whose coordinates seen from x are y, (..., 3); the inverse of `relative_pose`, the heading not wrapped."""
+    """Pose whose coordinates seen from x are y: the inverse of `relative_pose`.
+
+    Parameters
+    ----------
+    x, y : array-like, shape (..., 3)
+        x, y (m) and heading (rad).
+
+    Returns
+    -------
+    pose : array, shape (..., 3)
+        The heading is not wrapped.
+    """
     x, y = as_points(x, "x", 3), as_points(y, "y", 3)
     fit_together(x=x.shape[:-1], y=y.shape[:-1])
     c, s = np.cos(x[..., 2]), np.sin(x[..., 2])

@@ -109,6 +109,11 @@ def square_jacobian(landmarks, position):
     -------
     J : array, shape (..., n, dim)
         In m.
+
+    Raises
+    ------
+    ValueError
+        Landmarks that are no list of points.
     """
     landmarks = as_finite(landmarks, "landmarks")
     if landmarks.ndim != 2:

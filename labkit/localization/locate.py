@@ -131,10 +131,24 @@ def mend_clock(time):
 
 
 def place_readings(odometry_time, starts, reading_time):
-    """Row and lag of each reading, row -1 where the odometry does not cover it: (row, lag).
+    """The odometry row in which each reading was taken.
 
     Where a clock was set back, times come twice: readings in the order of their file stay in one part of the odometry
     until their own time falls back or leaves it.
+
+    Parameters
+    ----------
+    odometry_time : array, shape (n,), s
+    starts : array of int, shape (k,)
+        Rows in which a part of the odometry with rising times begins.
+    reading_time : array, shape (m,), s
+
+    Returns
+    -------
+    row : array of int, shape (m,)
+        -1 where the odometry does not cover the reading.
+    lag : array, shape (m,), s
+        Since the time of that row.
     """
     ends = np.concatenate([starts[1:], [len(odometry_time)]])
     usual = float(np.median(np.abs(np.diff(odometry_time))))
@@ -166,6 +180,17 @@ def global_start(log, noise, rng):
     Each reading puts the robot on a circle around the landmark it names (around all of them when it names none). The
     particles there are carried back to the first row, judged by all readings of the window with a likelihood that
     forgives spurious ones, and the best is refined.
+
+    Parameters
+    ----------
+    log : Log
+    noise : Noise
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    x0, cov0 : arrays, shapes (3,) and (3, 3)
+        m, m, rad.
 
     Raises
     ------
@@ -244,10 +269,26 @@ def _misfits(particles, way, z, landmark, landmarks, std):
 
 
 def fit_noise(log, x0, cov0, noise, free, filter_path):
-    """Standard deviations of greatest likelihood for the named ones, from the first readings of a log: a `Noise`.
+    """Standard deviations of greatest likelihood, from the first readings of a log.
 
-    The likelihood of a reading is that of its innovation, mixed with a tenth that means nothing: spurious readings
-    cost the same whatever the noise.
+    The likelihood of a reading is that of its innovation, mixed with a tenth that means nothing: spurious readings cost
+    the same whatever the noise.
+
+    Parameters
+    ----------
+    log : Log
+    x0, cov0 : arrays, shapes (3,) and (3, 3)
+        What is known of the start (m, m, rad).
+    noise : Noise
+        Where to begin, and what is not free.
+    free : sequence of str
+        The names of those to find.
+    filter_path : callable
+        Of `localization.path` or `fast.path`.
+
+    Returns
+    -------
+    Noise
     """
     log = log.readings(slice(0, FIT_READINGS))
     log = log.rows(0, int(log.row[-1]) + 1)

@@ -268,6 +268,11 @@ def drive(x0, controls, dt, model="midpoint"):
     -------
     poses : array, shape (n + 1, ..., 3)
         The start included.
+
+    Raises
+    ------
+    ValueError
+        Controls that are no pairs.
     """
     controls = as_points(controls, "controls", 2)
     if controls.ndim < 2:

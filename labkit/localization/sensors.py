@@ -113,7 +113,18 @@ def as_sighting(z, landmarks, std_range, std_bearing):
 
 
 def log_normal(error, std):
-    """log N(0, std^2) of an error."""
+    """Logarithm of a normal density, log N(0, std^2).
+
+    Parameters
+    ----------
+    error : array-like
+    std : float
+        In the unit of the error.
+
+    Returns
+    -------
+    log_density : array of the error's shape
+    """
     return -0.5 * np.square(error / std) - math.log(std * math.sqrt(2 * math.pi))
 
 
@@ -362,6 +373,11 @@ def weigh_doors(doors, saw_door, std=0.3, trust=0.9):
     -------
     Weighting
         Of positions x (m), shape (M,).
+
+    Raises
+    ------
+    ValueError
+        No door, or a trust outside [0.5, 1).
 
     Source: lecture, "Idee", pictures (b) and (d).
     """

@@ -31,10 +31,25 @@ def _refuse_clock(time):
 
 
 def speeds(time, T):
-    """Speed (mm/s) and angular speed (rad/s) of a sampled motion by central differences; (k,), (k, 4, 4) -> (k,), (k,).
+    """Speed and angular speed of a sampled motion by central differences.
 
     Neither depends on the frame the poses are given in, as long as it rests; the angular speed not even on where the
     frame sits on the body.
+
+    Parameters
+    ----------
+    time : array-like, shape (k,), s
+        At least three instants, increasing.
+    T : array-like, shape (k, 4, 4)
+
+    Returns
+    -------
+    speed, angular_speed : arrays, shape (k,), mm/s and rad/s
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, fewer than three samples, a time that does not increase.
     """
     time, T = as_finite(time, "time"), as_transforms(T, "T")
     if T.ndim != 3 or len(T) < 3 or time.shape != T.shape[:1]:
@@ -102,6 +117,11 @@ def time_offset(time, reference, delayed, max_offset=0.2):
     offset : float
         Positive when `delayed` lags. The mean squared difference over the common part is minimized; a parabola through
         the best three gives the fraction.
+
+    Raises
+    ------
+    ValueError
+        Signals of different length, an uneven clock, fewer samples than three times the largest offset.
     """
     time, reference, delayed = as_finite(time, "time"), as_finite(reference, "reference"), as_finite(delayed, "delayed")
     if time.ndim != 1 or not time.shape == reference.shape == delayed.shape:
@@ -130,8 +150,25 @@ def time_offset(time, reference, delayed, max_offset=0.2):
 
 
 def shift_time(time, T, offset):
-    """Poses as they were `offset` seconds later: positions linear, rotations along the shortest arc; ends are held. (k,
-    4, 4)."""
+    """Poses of a motion as they were some time later: positions linear, rotations along the shortest arc.
+
+    Parameters
+    ----------
+    time : array-like, shape (k,), s
+        At least two instants, increasing.
+    T : array-like, shape (k, 4, 4)
+    offset : float, s
+        Positive looks ahead; beyond the ends the end is held.
+
+    Returns
+    -------
+    T : array, shape (k, 4, 4)
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, fewer than two samples, a time that does not increase.
+    """
     time, T, offset = as_finite(time, "time"), as_transforms(T, "T"), as_number(offset, "offset")
     if T.ndim != 3 or len(T) < 2 or time.shape != T.shape[:1]:
         raise ValueError(f"time and T must have shapes (k,) and (k, 4, 4) with k >= 2, got {time.shape} and {T.shape}")
@@ -164,6 +201,11 @@ def filter_positions(time, positions, std_position=3.0, std_acceleration=4000.0,
     -------
     filtered : array, shape (k, 3), mm
     used : bool array, shape (k,)
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, no reading, a time that does not increase.
     """
     time, positions = as_finite(time, "time"), as_points(positions, "positions")
     if positions.ndim != 2 or time.shape != positions.shape[:1]:

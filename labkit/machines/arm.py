@@ -79,8 +79,24 @@ def dh_matrix(theta, d, a, alpha):
 
 
 def link_frames(dh, q):
-    """Poses of the base and of every link, (..., n) -> (..., n + 1, 4, 4); the first is the identity, the last is the
-    flange."""
+    """Poses of the base and of every link.
+
+    Parameters
+    ----------
+    dh : array-like, shape (n, 4)
+        Denavit-Hartenberg table: theta, d, a, alpha (rad, mm).
+    q : array-like, shape (..., n), rad
+
+    Returns
+    -------
+    frames : array, shape (..., n + 1, 4, 4)
+        In B; the first is the identity, the last is the flange.
+
+    Raises
+    ------
+    ValueError
+        Where q has not one angle per joint.
+    """
     dh, q = _as_dh(dh), as_finite(q, "q")
     if q.ndim < 1 or q.shape[-1] != len(dh):
         raise ValueError(f"q must have shape (..., {len(dh)}), one angle per joint, got {q.shape}")
@@ -112,8 +128,19 @@ def forward_kinematics(dh, q):
 
 
 def jacobian(dh, q):
-    """Geometric Jacobian, shape (..., 6, n): joint rates to angular velocity (rows 0-2) and velocity of the flange
-    (3-5), both in B."""
+    """Geometric Jacobian: joint rates to angular velocity and velocity of the flange, both in B.
+
+    Parameters
+    ----------
+    dh : array-like, shape (n, 4)
+        As in `link_frames`.
+    q : array-like, shape (..., n), rad
+
+    Returns
+    -------
+    J : array, shape (..., 6, n)
+        Rows 0-2 angular velocity (rad/s per rad/s), rows 3-5 velocity (mm/s per rad/s).
+    """
     return _jacobian(link_frames(dh, q))
 
 
@@ -142,6 +169,11 @@ def inverse_kinematics(robot, T_BF, start, iterations=60, tolerance=1e-9):
     q : array, shape (..., n)
     reached : bool array, shape (...)
         False where the pose is out of reach, out of the limits, or the search got stuck; q is then the best it found.
+
+    Raises
+    ------
+    ValueError
+        A number of starts that fits neither one nor each pose.
     """
     T_BF = as_transforms(T_BF, "T_BF")
     start, iterations = as_points(start, "start", dim=len(robot.dh)), as_count(iterations, "iterations")
@@ -170,7 +202,17 @@ def inverse_kinematics(robot, T_BF, start, iterations=60, tolerance=1e-9):
 
 
 def pose_error(T, T_goal):
-    """What is missing from T to T_goal in the base: rotation vector (rad) and displacement (mm); (..., 6)."""
+    """What is missing from one pose to another, in the base.
+
+    Parameters
+    ----------
+    T, T_goal : array-like, shape (..., 4, 4)
+
+    Returns
+    -------
+    error : array, shape (..., 6)
+        Rotation vector (rad), displacement (mm).
+    """
     T, T_goal = as_transforms(T, "T"), as_transforms(T_goal, "T_goal")
     fit_together(T=T.shape[:-2], T_goal=T_goal.shape[:-2])
     return _pose_error(T, T_goal)
@@ -182,7 +224,17 @@ def _pose_error(T, T_goal):
 
 
 def within_limits(robot, q):
-    """True where all joints keep their limits; (..., n) -> (...)."""
+    """Whether all joints keep their limits.
+
+    Parameters
+    ----------
+    robot : Arm
+    q : array-like, shape (..., n), rad
+
+    Returns
+    -------
+    within : bool array, shape (...)
+    """
     q = as_points(q, "q", dim=len(robot.dh))
     return ((q >= robot.q_min) & (q <= robot.q_max)).all(-1)
 
@@ -190,9 +242,28 @@ def within_limits(robot, q):
 def measuring_poses(robot, rng, count=21, center=None, spread=(0.5, 0.35, 0.35, 0.9, 0.7, 0.9), box=None, facing=0.3):
     """Joint angles of reachable measuring poses about a center pose, the first being the center itself.
 
-    Drawn uniformly within `spread` (rad) about `center`; kept when the limits hold, the flange lies in the `box` (two
-    corners in B, mm) and its z axis still points to the base stations overhead (component along z of B at least
-    `facing`).
+    Parameters
+    ----------
+    robot : Arm
+    rng : numpy.random.Generator
+    count : int
+    center : array-like, shape (n,), rad
+        `HOME` unless given.
+    spread : array-like, shape (n,), rad
+        Joint angles are drawn uniformly this far on either side.
+    box : array-like, shape (2, 3), mm
+        Two corners in B between which the flange must lie.
+    facing : float
+        Least component along z of B of the flange's z axis, which must point to the base stations overhead.
+
+    Returns
+    -------
+    q : array, shape (count, n), rad
+
+    Raises
+    ------
+    ValueError
+        A box that is none, or too few poses found in it.
     """
     center = HOME if center is None else as_points(center, "center", dim=len(robot.dh))
     box = np.array([[-600.0] * 3, [600.0, 600.0, 1000.0]]) if box is None else as_finite(box, "box")
@@ -227,6 +298,11 @@ def smooth_motion(via, duration, rate):
     time : array, shape (k,), s
     q : array, shape (k, n), rad
 
+    Raises
+    ------
+    ValueError
+        Fewer than two joint positions.
+
     A natural-looking stand-in for "prujezd nekolika body s polynomialnim napojovanim" (report, section 3.2): a cubic
     spline through the points, run along by a polynomial of degree 5 at both ends.
     """
@@ -260,7 +336,23 @@ def _ramp(s, ends=RAMP):
 
 
 def joint_speeds(time, q):
-    """Joint speeds by central differences, rad/s; (k,), (k, n) -> (k, n)."""
+    """Joint speeds by central differences.
+
+    Parameters
+    ----------
+    time : array-like, shape (k,), s
+        Increasing.
+    q : array-like, shape (k, n), rad
+
+    Returns
+    -------
+    speeds : array, shape (k, n), rad/s
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, fewer than two instants, a time that does not increase.
+    """
     time = as_shape(time, "time", "k")
     if len(time) < 2 or (np.diff(time) <= 0).any():
         raise ValueError("time must hold at least two instants and increase")
@@ -309,11 +401,16 @@ HOME = np.deg2rad(
 
 
 def wrist_reach(robot, q):
-    """Distances of the wrist center (axis 5), mm, as the data sheet names them, at joint angles q.
+    """Distances of the wrist center (axis 5) as the data sheet names them.
+
+    Parameters
+    ----------
+    robot : Arm
+    q : array-like, shape (..., n), rad
 
     Returns
     -------
-    in_plane, shoulder, elbow : arrays, shape (...)
+    in_plane, shoulder, elbow : arrays, shape (...), mm
         Horizontal distance from axis 1 measured in the plane of the arm (without the shoulder offset), distance from
         axis 2, distance from axis 3.
     """
@@ -326,7 +423,18 @@ def wrist_reach(robot, q):
 
 
 def tool_pose(robot, q, T_FE):
-    """Pose in B of a frame E mounted on the flange; (..., n), (4, 4) -> (..., 4, 4)."""
+    """Pose in B of a frame E mounted on the flange.
+
+    Parameters
+    ----------
+    robot : Arm
+    q : array-like, shape (..., n), rad
+    T_FE : array-like, shape (4, 4)
+
+    Returns
+    -------
+    T_BE : array, shape (..., 4, 4)
+    """
     return forward_kinematics(robot.dh, q) @ as_transforms(T_FE, "T_FE")
 
 
@@ -345,7 +453,12 @@ def rotation_only(robot, T_FE, start, axes, angle, duration, rate):
     time : array, shape (k,), s
     q : array, shape (k, n), rad
 
-    Raises ValueError when a pose of the motion cannot be reached. Source: report, section 3.2, measurement 4.
+    Raises
+    ------
+    ValueError
+        No axis, or one that is zero; a pose of the motion that cannot be reached.
+
+    Source: report, section 3.2, measurement 4.
     """
     T_FE, start = as_shape(as_transforms(T_FE, "T_FE"), "T_FE", 4, 4), as_shape(start, "start", len(robot.dh))
     axes, angle = as_shape(axes, "axes", "m", 3), as_number(angle, "angle")
@@ -402,7 +515,17 @@ def reach_position(robot, position, start, joints=(0, 1, 2), iterations=40):
 
 
 def arm_points(robot, q):
-    """Where to draw the arm: base, axis 2, shoulder, elbow, wrist, flange; (n,) -> (6, 3), mm."""
+    """Where to draw the arm: base, axis 2, shoulder, elbow, wrist, flange.
+
+    Parameters
+    ----------
+    robot : Arm
+    q : array-like, shape (n,), rad
+
+    Returns
+    -------
+    points : array, shape (6, 3), mm
+    """
     frames = link_frames(robot.dh, as_shape(q, "q", len(robot.dh)))
     shoulder = frames[1, :3, 3] + robot.dh[1, 1] * frames[1, :3, 2]
     return np.array(

@@ -188,6 +188,11 @@ def reject_outliers(values, factor=4.0):
     -------
     keep : bool array, shape (n,)
         All True when more than half of the values are equal (no scale to judge by).
+
+    Raises
+    ------
+    ValueError
+        Fewer than three values.
     """
     values = as_finite(values, "values")
     if values.ndim not in (1, 2) or len(values) < 3:
@@ -210,11 +215,25 @@ def mean_pose(T):
 def average_stops(log, factor=4.0, share=0.5):
     """Mean reading of every stop, with outliers left out by `reject_outliers` on position and rotation vector.
 
+    Parameters
+    ----------
+    log : Log
+        With stops.
+    factor : float
+        As in `reject_outliers`.
+    share : float
+        A stop of which less was used should not be trusted.
+
     Returns
     -------
     T_WE : array, shape (m, 4, 4)
     used : array, shape (m,)
-        Share of the readings used; a stop with less than `share` of them should not be trusted.
+        Share of the readings used.
+
+    Raises
+    ------
+    ValueError
+        A log without stops.
     """
     if log.stop is None:
         raise ValueError("the log has no column 'stop': there is nothing to average over")

@@ -130,6 +130,11 @@ def calibrate_mounting(T_BF, T_WE, factor=8.0):
     -------
     Mounting
 
+    Raises
+    ------
+    ValueError
+        Fewer than four poses, or not as many of both.
+
     Source: report, section 3.1, equations (2) to (17), footnote 5.
     """
     T_BF, T_WE = as_transforms(T_BF, "T_BF"), as_transforms(T_WE, "T_WE")

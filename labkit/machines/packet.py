@@ -79,8 +79,27 @@ def check_packet(data):
 
 
 def packet_from_pose(T_WE, time, device=1, velocity=(0.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, 0.0)):
-    """The 23 numbers for a pose in mm; velocity in mm/s, angular velocity in rad/s. Broadcasts: (..., 4, 4) -> (...,
-    23)."""
+    """The 23 numbers of a packet for a pose.
+
+    Parameters
+    ----------
+    T_WE : array-like, shape (..., 4, 4)
+        mm.
+    time : array-like, shape (...), s
+    device : array-like, shape (...)
+    velocity, angular_velocity : array-like, shape (..., 3)
+        mm/s and rad/s.
+
+    Returns
+    -------
+    values : array, shape (..., 23)
+        In the order of `FIELDS`.
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not fit the poses.
+    """
     T_WE, device, time = as_transforms(T_WE, "T_WE"), as_finite(device, "device"), as_finite(time, "time")
     velocity, angular_velocity = as_points(velocity, "velocity"), as_points(angular_velocity, "angular_velocity")
     leading = {"device": device.shape, "time": time.shape, "velocity": velocity.shape[:-1]}

@@ -201,7 +201,27 @@ class Motion:
 
 
 def robot_motion(name, rate=RATE):
-    """Time and joint angles of one of the motions of section 3.2: slow, middle, fast or rotation."""
+    """Joint angles of one of the motions of section 3.2.
+
+    Parameters
+    ----------
+    name : str
+        slow, middle, fast or rotation.
+    rate : float
+        Samples per second.
+
+    Returns
+    -------
+    time : array, shape (k,), s
+    q : array, shape (k, 6), rad
+
+    Raises
+    ------
+    ValueError
+        An unknown name.
+
+    Source: report, section 3.2.
+    """
     if name == "rotation":
         to_and_fro = 2 * TURN_ANGLE / ((1 - RAMP) * TURN_SPEED)
         return rotation_only(TX40, T_FE, HOME, np.eye(3), TURN_ANGLE, 3 * to_and_fro, rate)
@@ -285,8 +305,17 @@ def flange_poses(joints):
 def endless_packets(rng, nonsense=lambda: False, tracker=None):
     """Packets of a tracker that is carried through the slow motion again and again; a generator without an end.
 
-    `nonsense()` is asked at every packet whether bursts of nonsense may begin, so that it can be switched while the
-    stream runs.
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    nonsense : callable
+        Asked at every packet whether bursts of nonsense may begin, so that it can be switched while the stream runs.
+    tracker : Tracker, optional
+        `MOVING` unless given.
+
+    Yields
+    ------
+    packet : bytes
     """
     tracker = tracker or MOVING
     time, q = robot_motion("slow")

@@ -42,7 +42,18 @@ class Faults:
 
 
 def break_packet(data, rng):
-    """A malformed version of a packet: cut, padded, a NaN in it, or a quaternion that is none."""
+    """A malformed version of a packet: cut, padded, a NaN in it, or a quaternion that is none.
+
+    Parameters
+    ----------
+    data : bytes
+        A good packet.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    bad : bytes
+    """
     kind = rng.integers(4)
     if kind == 0:
         return data[: int(rng.integers(0, len(data)))]
@@ -57,11 +68,24 @@ def break_packet(data, rng):
 
 
 def stream(packets, rate, faults, rng):
-    """Turn packets into what goes over the wire: yields (seconds since the start, datagram, kind) in the order of
-    sending.
+    """What goes over the wire in place of a row of packets, in the order of sending.
 
-    packets : iterable of bytes; kinds are "good", "duplicate", "malformed", "foreign". A lost packet is yielded as kind
-    "lost" with no datagram, so that a sender can keep its books.
+    Parameters
+    ----------
+    packets : iterable of bytes
+    rate : float
+        Packets per second.
+    faults : Faults
+    rng : numpy.random.Generator
+
+    Yields
+    ------
+    due : float
+        Seconds since the start.
+    datagram : bytes or None
+    kind : str
+        "good", "duplicate", "malformed", "foreign"; a lost packet is yielded as "lost" with no datagram, so that a
+        sender can keep its books.
     """
     rate, waiting, count = as_positive_number(rate, "rate"), [], 0
     for k, data in enumerate(packets):
