@@ -58,7 +58,7 @@ print("...", len(poses), "synthetic poses in all")
 # %% pivot_matrix
 @ex.pivot_matrix
 def pivot_matrix(T_WF):
-    """Return A, shape (3n, 6), from poses T_WF of shape (n, 4, 4), in mm: three rows a pose, pose after pose."""
+    """Return A, shape (3n, 6), from poses T_WF of shape (n, 4, 4), in mm: three rows per pose, pose after pose."""
     ### BEGIN SOLUTION
     return np.vstack([np.hstack([T[:3, :3], -np.eye(3)]) for T in T_WF])
     ### END SOLUTION
@@ -67,7 +67,7 @@ def pivot_matrix(T_WF):
 # %% pivot_rhs
 @ex.pivot_rhs
 def pivot_rhs(T_WF):
-    """Return b, shape (3n,) in mm, from poses T_WF of shape (n, 4, 4): three numbers a pose, pose after pose."""
+    """Return b, shape (3n,) in mm, from poses T_WF of shape (n, 4, 4): three numbers per pose, pose after pose."""
     ### BEGIN SOLUTION
     return -T_WF[:, :3, 3].ravel()
     ### END SOLUTION

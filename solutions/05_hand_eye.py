@@ -110,8 +110,8 @@ def sphere_center_from_profile(x, z, radius, side):
 # %% residual [markdown]
 # ## The model, and a first verdict
 #
-# What is left of (4-1) is the residual $\varepsilon_i = T_{BF,i}\,T_{FS}\,x_{S,i} - c$ (4-3), three numbers a pose. The thesis describes $T_{FS}$ by a KUKA pose `p2`;
-# `frames.matrix_from_kuka(p2)` makes a matrix of it. `frames.transform(T, points)` takes one transform or one a point.
+# What is left of (4-1) is the residual $\varepsilon_i = T_{BF,i}\,T_{FS}\,x_{S,i} - c$ (4-3), three numbers per pose. The thesis describes $T_{FS}$ by a KUKA pose `p2`;
+# `frames.matrix_from_kuka(p2)` makes a matrix of it. `frames.transform(T, points)` takes one transform or one per point.
 
 # %% kuka_residual
 @ex.kuka_residual

@@ -143,7 +143,7 @@ ex.predict("axes", guess, reveal=stages.two_axes)
 # ## The rotation as a null vector
 #
 # Stack the **columns** of $X$ into $\operatorname{vec} X$. Then $\operatorname{vec}(PXQ) = (Q^\top \otimes P)\operatorname{vec} X$, and $R_A X - X R_B = 0$ becomes nine
-# linear equations a motion (equations 7 to 9): $\;m_i \operatorname{vec} X = 0$, stacked over all motions $M \operatorname{vec} X = 0$.
+# linear equations per motion (equations 7 to 9): $\;m_i \operatorname{vec} X = 0$, stacked over all motions $M \operatorname{vec} X = 0$.
 
 # %% kron_row
 @ex.kron_row

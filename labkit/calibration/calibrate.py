@@ -191,8 +191,8 @@ class Calibration:
 class Comparison:
     """How far the second stream is from the first, sample by sample.
 
-    time (n,) s, rotation_deg (n,), translation (n,), speed (n,) length unit a second; table: rows (from, to, count, rms
-    deg, rms translation) over speed.
+    time (n,) s, rotation_deg (n,), translation (n,), speed (n,) length unit per second; table: rows (from, to, count,
+    rms deg, rms translation) over speed.
     """
 
     time: np.ndarray

@@ -87,8 +87,8 @@ def findings_html(found, statuses):
 
 def _finding_html(finding):
     rows_shown = [
-        f"<li>{html.escape(e.row.quantity)}: printed <b>{html.escape(e.row.printed)}</b>, "
-        f"computed <b>{html.escape(e.value)}</b> {html.escape(e.row.unit if e.row.unit != '1' else '')} "
+        f"<li>{html.escape(e.row.quantity)}: printed <b>{html.escape(e.row.printed)}</b>, computed "
+        f"<b>{html.escape(e.value)}</b> {html.escape(e.row.unit if e.row.unit != '1' else '')} "
         f"<i>({e.status})</i></li>"
         for e in finding.entries[:MAX_SHOWN]
     ]

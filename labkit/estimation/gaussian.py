@@ -144,9 +144,14 @@ def share_inside(samples, mean, cov, probability=0.95):
 class BentRegion:
     """A region of poses that is an ellipse in exponential coordinates about a pose.
 
-    outline : (points, 2) in the plane (m).
-    twists : (n, 3) exponential coordinates of the samples, as `planar.log_pose` gives them.
-    mean, cov : (3,) and (3, 3), moments of the twists.
+    Attributes
+    ----------
+    outline : array, shape (points, 2), m
+        In the plane.
+    twists : array, shape (n, 3)
+        Exponential coordinates of the samples, as `planar.log_pose` gives them.
+    mean, cov : arrays, shapes (3,) and (3, 3)
+        Moments of the twists.
     """
 
     outline: np.ndarray

@@ -32,11 +32,18 @@ FORMS = ("joseph", "short")
 class Corrected:
     """What a measurement made of a prediction.
 
-    x : (..., n) state.    cov : (..., n, n) its covariance.
-    innovation : (..., m) measured minus expected; 0 where a number was not measured.
-    cov_innovation : (..., m, m) covariance of the innovation, S = C cov C' + cov_z.
-    gain : (..., n, m) K; columns of zeros where a number was not measured.
-    dof : (...) how many numbers were measured: the degrees of freedom of the innovation.
+    Attributes
+    ----------
+    x, cov : arrays, shapes (..., n) and (..., n, n)
+        State and its covariance.
+    innovation : array, shape (..., m)
+        Measured minus expected; 0 where a number was not measured.
+    cov_innovation : array, shape (..., m, m)
+        Covariance of the innovation, S = C cov C' + cov_z.
+    gain : array, shape (..., n, m)
+        K; columns of zeros where a number was not measured.
+    dof : array of int, shape (...)
+        How many numbers were measured: the degrees of freedom of the innovation.
     """
 
     x: np.ndarray

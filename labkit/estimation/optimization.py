@@ -35,14 +35,25 @@ ROUNDING = 10 * np.finfo(float).eps  # a relative change of the cost below this 
 class Trace:
     """Every iterate of one run, so that it can be drawn and counted.
 
-    x : (K + 1, ...) iterates, the start first; a rejected step repeats its iterate.
-    cost : (K + 1,) value of the cost at every iterate.
-    step : (K, n) increments tried, rejected ones included.
-    radius : (K,) how long each step was allowed to be, in units of `scale`: infinite for Newton and Gauss-Newton; for
+    Attributes
+    ----------
+    x : array, shape (K + 1, ...)
+        Iterates, the start first; a rejected step repeats its iterate.
+    cost : array, shape (K + 1,)
+        Value of the cost at every iterate.
+    step : array, shape (K, n)
+        Increments tried, rejected ones included.
+    radius : array, shape (K,)
+        How long each step was allowed to be, in units of `scale`: infinite for Newton and Gauss-Newton; for
         Levenberg-Marquardt its own length, for a damped step minimizes the model in the ball it just reaches.
-    converged : whether the stopping rule was met.    reason : in words, what ended the run.
-    gain : (K,) actual over predicted decrease of every step; NaN where the method does not ask.
-    accepted : (K,) whether each step was taken.
+    converged : bool
+        Whether the stopping rule was met.
+    reason : str
+        In words, what ended the run.
+    gain : array, shape (K,)
+        Actual over predicted decrease of every step; NaN where the method does not ask.
+    accepted : bool array, shape (K,)
+        Whether each step was taken.
     """
 
     x: np.ndarray
@@ -69,8 +80,16 @@ class Trace:
 class Point:
     """What a method knows at one iterate.
 
-    x : the iterate.    cost : float.    gradient : (n,).    curvature : (n, n) B, the Hessian or J'J.
-    residual, jacobian : (m,) and (m, n) of a sum of squares.
+    Attributes
+    ----------
+    x : array
+        The iterate.
+    cost : float
+    gradient : array, shape (n,)
+    curvature : array, shape (n, n)
+        B, the Hessian or J'J.
+    residual, jacobian : arrays, shapes (m,) and (m, n)
+        Of a sum of squares.
     """
 
     x: np.ndarray

@@ -8,7 +8,7 @@ hand_eye    calibrate_sphere_target: scanner and sphere from sums over the poses
 ax_xb       calibrate_hand_eye: sensor and target from sums over the poses
 kalman      filter_steps: the linear filter along a series
 ekf         ekf_localize: the landmark filter along a drive, one robot or many
-path        filter_path: a log with one step a reading, however many rows lie between
+path        filter_path: a log with one step per reading, however many rows lie between
 maps        cast_rays: rays through a map from thousands of poses; RangeTable: looked up
 sensors     weigh_landmarks, weigh_beams, LikelihoodField, SensorSuite for thousands of particles
 particles   resample_systematic without a search

@@ -4,7 +4,7 @@ quaternion  x y z qx qy qz qw in named columns of any order
 tum         t x y z qx qy qz qw without header
 kuka        x y z A B C, Rz(A) Ry(B) Rx(C), degrees
 ur          x y z rx ry rz, a rotation vector in radians
-matrix      4 x 4 or 3 x 4 row-major, one a line or in blocks of four lines
+matrix      4 x 4 or 3 x 4 row-major, one per line or in blocks of four lines
 folder      text files of one 4 x 4 each, in the order of their numbers
 json        a list of 4 x 4, or of pairs of 4 x 4 (robot first), or of samples as MoveIt names them
 
@@ -330,7 +330,7 @@ def _rigid(name, T, places):
 
 
 def _from_folder(path):
-    """One 4 x 4 a file, in the order of the last number in the names."""
+    """One 4 x 4 per file, in the order of the last number in the names."""
     numbered = {}
     for file in sorted(path.iterdir()):
         digits = re.findall(r"\d+", file.stem)

@@ -374,9 +374,19 @@ def straight_chain(n, length):
 class PoseGraph:
     """Poses that fit many measured links at once.
 
-    poses: (n, 4, 4), node 0 is the identity. residuals: (m, 6), log(Z^-1 X_i^-1 X_j), rotation (rad) first. chi2:
-    weighted sum of squares, to be expected near dof. covariance: of the twists of nodes 1..n-1 in their own frames,
-    (6n - 6, 6n - 6). singular_values: of the weighted Jacobian.
+    Attributes
+    ----------
+    poses : array, shape (n, 4, 4)
+        Node 0 is the identity.
+    residuals : array, shape (m, 6)
+        log(Z^-1 X_i^-1 X_j), rotation (rad) first.
+    chi2 : float
+        Weighted sum of squares, to be expected near dof.
+    dof : int
+    covariance : array, shape (6n - 6, 6n - 6)
+        Of the twists of nodes 1..n-1 in their own frames.
+    singular_values : array
+        Of the weighted Jacobian.
     """
 
     poses: np.ndarray

@@ -30,9 +30,15 @@ from . import odometry
 class Localization:
     """A filtered drive, one robot or many.
 
-    x : (n, ..., 3) corrected poses (m, m, rad).    cov : (n, ..., 3, 3) their covariances.
-    nis : (n, ...) normalized innovation squared of each step.
-    dof : (n, ...) how many numbers were measured in the step, the degrees of freedom of its NIS.
+    Attributes
+    ----------
+    x : array, shape (n, ..., 3)
+        Corrected poses (m, m, rad).
+    cov : array, shape (n, ..., 3, 3)
+    nis : array, shape (n, ...)
+        Normalized innovation squared of each step.
+    dof : array of int, shape (n, ...)
+        How many numbers were measured in the step, the degrees of freedom of its NIS.
     """
 
     x: np.ndarray
@@ -45,8 +51,14 @@ class Localization:
 class SimulatedRuns:
     """Many robots on the same commands.
 
-    truth : (n + 1, runs, 3) true poses, the start included.    controls : (n, 2) commands.
-    z : (n, runs, m, 2) measurements, NaN where a landmark was not seen.
+    Attributes
+    ----------
+    truth : array, shape (n + 1, runs, 3)
+        True poses, the start included.
+    controls : array, shape (n, 2)
+        Commands.
+    z : array, shape (n, runs, m, 2)
+        Measurements, NaN where a landmark was not seen.
     """
 
     truth: np.ndarray

@@ -28,7 +28,13 @@ RANK_TOLERANCE = 1e-7  # a second singular value below this share of the first: 
 class NewtonPath:
     """A Newton iteration.
 
-    path : (k, dim) from start to end (m).    converged : bool.    reason : in words, why it stopped.
+    Attributes
+    ----------
+    path : array, shape (k, dim), m
+        From start to end.
+    converged : bool
+    reason : str
+        In words, why it stopped.
     """
 
     path: np.ndarray
@@ -45,10 +51,19 @@ class NewtonPath:
 class Lateration:
     """A position by least squares.
 
-    position : (..., dim) in m.    residuals : (..., n) measured minus computed distance (m).
-    covariance : (..., dim, dim) in m^2, infinite where the geometry does not fix the position.
-    singular_values : (..., dim) of the unit vectors to the landmarks.
-    iterations : of the slowest run.    converged : (...) whether each run stopped at a minimum.
+    Attributes
+    ----------
+    position : array, shape (..., dim), m
+    residuals : array, shape (..., n), m
+        Measured minus computed distance.
+    covariance : array, shape (..., dim, dim), m^2
+        Infinite where the geometry does not fix the position.
+    singular_values : array, shape (..., dim)
+        Of the unit vectors to the landmarks.
+    iterations : int
+        Of the slowest run.
+    converged : bool array, shape (...)
+        Whether each run stopped at a minimum.
     """
 
     position: np.ndarray

@@ -54,7 +54,7 @@ class Log:
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations: range (m), bearing (rad), and of the odometry a root second (m and rad)."""
+    """Standard deviations: range (m), bearing (rad), and of the odometry per root second (m and rad)."""
 
     std_range: float
     std_bearing: float

@@ -17,7 +17,15 @@ from ..geometry.lie import log_so3
 
 @dataclass(frozen=True)
 class TrackingErrors:
-    """Errors sample by sample, each of shape (k,): translation mm, rotation rad, speed mm/s, angular_speed rad/s."""
+    """Errors of a tracker sample by sample.
+
+    Attributes
+    ----------
+    translation : array, shape (k,), mm
+    rotation : array, shape (k,), rad
+    speed : array, shape (k,), mm/s
+    angular_speed : array, shape (k,), rad/s
+    """
 
     translation: np.ndarray
     rotation: np.ndarray

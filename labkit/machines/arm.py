@@ -40,8 +40,14 @@ RAMP = 0.12  # share of a motion's time spent on getting up to speed, and on slo
 class Arm:
     """A serial arm.
 
-    dh: array (n, 4), one link per row: theta offset (rad), d (mm), a (mm), alpha (rad).
-    q_min, q_max: joint limits, rad. speed: joint speed limits, rad/s.
+    Attributes
+    ----------
+    dh : array, shape (n, 4)
+        One link per row: theta offset (rad), d (mm), a (mm), alpha (rad).
+    q_min, q_max : arrays, shape (n,), rad
+        Joint limits.
+    speed : array, shape (n,), rad/s
+        Joint speed limits.
     """
 
     name: str

@@ -22,8 +22,16 @@ from .packet import MAX_POSITION, UNIT_TOLERANCE
 
 @dataclass(frozen=True)
 class Log:
-    """A log of readings: time (k,) s; T_WE (k, 4, 4) in mm; stop (k,), the number of the stop each reading belongs to,
-    or None."""
+    """A log of readings.
+
+    Attributes
+    ----------
+    time : array, shape (k,), s
+    T_WE : array, shape (k, 4, 4)
+        mm.
+    stop : array of int, shape (k,), or None
+        The number of the stop each reading belongs to.
+    """
 
     time: np.ndarray
     T_WE: np.ndarray

@@ -45,14 +45,27 @@ TURN_SPEED, TURN_ANGLE = 0.2, 0.5  # rad/s and rad, measurement 4; the report gi
 
 @dataclass(frozen=True)
 class Tracker:
-    """Error model of the tracker. Standard deviations are per axis.
+    """Error model of the tracker; standard deviations are per axis.
 
-    std_position (mm), std_rotation (rad), std_speed (mm/s), std_gyro (rad/s): white noise of a reading. drift_position,
-    drift_rotation: what a stop of some seconds adds and averaging cannot remove. field_position (mm), field_rotation
-    (rad): rms per axis of the systematic error over the room, with the `wavelength` (mm) of its ups and downs.
-    nonsense: probability that a burst of nonsense begins at a reading; burst: mean number of readings in it; jump (mm),
-    swing (rad): typical size.
-    latency: s.
+    Attributes
+    ----------
+    std_position, std_rotation, std_speed, std_gyro : float, mm, rad, mm/s, rad/s
+        White noise of a reading.
+    drift_position, drift_rotation : float, mm and rad
+        What a stop of some seconds adds and averaging cannot remove.
+    field_position, field_rotation : float, mm and rad
+        Rms per axis of the systematic error over the room.
+    wavelength : float, mm
+        Of the ups and downs of that error.
+    nonsense : float
+        Probability that a burst of nonsense begins at a reading.
+    burst : float
+        Mean number of readings in a burst.
+    jump, swing : float, mm and rad
+        Typical size of nonsense.
+    latency : float, s
+    seed : int
+        Of the systematic error, which belongs to the room.
     """
 
     std_position: float = 0.4
@@ -84,27 +97,71 @@ class Tracker:
         return waves, rng.uniform(0, 2 * np.pi, 12), rng.normal(size=(12, 6)) / np.sqrt(6.0)
 
     def systematic(self, positions):
-        """Systematic error at places of the room (mm): rotation vector (rad) and displacement (mm); (..., 3) -> (...,
-        6)."""
+        """Systematic error at places of the room.
+
+        Parameters
+        ----------
+        positions : array, shape (..., 3), mm
+
+        Returns
+        -------
+        error : array, shape (..., 6)
+            Rotation vector (rad) and displacement (mm).
+        """
         waves, phases, amplitudes = self._waves
         error = np.sin(positions @ waves.T + phases) @ amplitudes
         return error * np.repeat([self.field_rotation, self.field_position], 3)
 
     def read(self, T_BE, rng, drift=None):
-        """Readings of the true poses in the room (here the robot's base), without nonsense and latency; (k, 4, 4) ->
-        (k, 4, 4)."""
+        """Readings of the true poses in the room (here the robot's base), without nonsense and latency.
+
+        Parameters
+        ----------
+        T_BE : array, shape (k, 4, 4)
+        rng : numpy.random.Generator
+        drift : array, shape (k, 6), optional
+            What the stops add, as `drift` draws it.
+
+        Returns
+        -------
+        T : array, shape (k, 4, 4)
+        """
         error = self.systematic(T_BE[:, :3, 3]) + (0.0 if drift is None else drift)
         error[:, :3] += self.std_rotation * rng.normal(size=(len(T_BE), 3))
         error[:, 3:] += self.std_position * rng.normal(size=(len(T_BE), 3))
         return pose(T_BE[:, :3, :3] @ exp_so3(error[:, :3]), T_BE[:, :3, 3] + error[:, 3:])
 
     def drift(self, stops, rng):
-        """What each stop adds to all of its readings: rotation vector (rad) and displacement (mm), (stops, 6)."""
+        """What each stop adds to all of its readings.
+
+        Parameters
+        ----------
+        stops : int
+        rng : numpy.random.Generator
+
+        Returns
+        -------
+        drift : array, shape (stops, 6)
+            Rotation vector (rad) and displacement (mm).
+        """
         return rng.normal(size=(stops, 6)) * np.repeat([self.drift_rotation, self.drift_position], 3)
 
     def spoil(self, T, rng, tail=0.15):
-        """Put bursts of nonsense into readings; returns the readings and where they are nonsense. The size of a burst
-        is `jump` on the median."""
+        """Put bursts of nonsense into readings.
+
+        Parameters
+        ----------
+        T : array, shape (k, 4, 4)
+        rng : numpy.random.Generator
+        tail : float
+            Spread of the logarithm of a burst's size, whose median is `jump`.
+
+        Returns
+        -------
+        T : array, shape (k, 4, 4)
+        bad : bool array, shape (k,)
+            Where the readings are nonsense.
+        """
         starts = rng.random(len(T)) < self.nonsense
         bad = np.zeros(len(T), bool)
         T = T.copy()
@@ -163,7 +220,7 @@ def calibration_run(rng, tracker=None, joints=None, rate=5.0, lost_stop=None):
 
 
 def stop_readings(T_BE, tracker, rng):
-    """One reading at each stop, in the frame W of the first; (n, 4, 4) -> (n, 4, 4).
+    """One reading at each stop, in the frame W of the first.
 
     Parameters
     ----------
@@ -185,10 +242,20 @@ def stop_readings(T_BE, tracker, rng):
 class Motion:
     """A simulated motion, k samples.
 
-    time (k,) s; q (k, 6) joint angles, rad; T_true and T_read (k, 4, 4), the frame E as the robot carries it and as the
-    tracker reports it, both in W; v_read (k,) mm/s and w_read (k,) rad/s, the norms of the velocities it reports;
-    nonsense (k,), True where the optical reading is nonsense. The angular velocity comes from the tracker's gyroscope
-    and stays sound while the optics report nonsense: an assumption of the simulation.
+    The angular velocity comes from the tracker's gyroscope and stays sound while the optics report
+    nonsense: an assumption of the simulation.
+
+    Attributes
+    ----------
+    time : array, shape (k,), s
+    q : array, shape (k, 6), rad
+        Joint angles.
+    T_true, T_read : arrays, shape (k, 4, 4)
+        The frame E as the robot carries it and as the tracker reports it, both in W.
+    v_read, w_read : arrays, shape (k,), mm/s and rad/s
+        Norms of the velocities it reports.
+    nonsense : bool array, shape (k,)
+        True where the optical reading is nonsense.
     """
 
     time: np.ndarray

@@ -28,9 +28,20 @@ RESTART = 50  # readings in a row from before the memory: this many mean that th
 class Faults:
     """What can happen to a stream, each as a probability per packet; it may be changed while the stream runs.
 
-    loss: not sent. duplicate: sent twice. reorder: sent up to 5 packets late. malformed: sent truncated, too long, with
-    a NaN or with a broken quaternion.
-    foreign: a stranger's datagram besides. latency: seconds that every packet comes later.
+    Attributes
+    ----------
+    loss : float
+        Not sent.
+    duplicate : float
+        Sent twice.
+    reorder : float
+        Sent up to 5 packets late.
+    malformed : float
+        Sent truncated, too long, with a NaN or with a broken quaternion.
+    foreign : float
+        A stranger's datagram besides.
+    latency : float, s
+        How much later every packet comes.
     """
 
     loss: float = 0.0
@@ -177,10 +188,20 @@ class Sender(_Endpoint):
 class Statistics:
     """What a receiver has seen: datagrams = good + duplicates + stale + all bad ones.
 
-    good: readings, each counted once; late: good ones that came after a younger one; duplicates; stale: too old to tell
-    whether they are duplicates.
-    bad: reason -> count. lost: readings missing between the first and the last timestamp, estimated with `rate`.
-    restarts: times the sender started over.
+    Attributes
+    ----------
+    good : int
+        Readings, each counted once.
+    late : int
+        Good ones that came after a younger one.
+    duplicates, stale : int
+        Seen before; too old to tell whether they were.
+    bad : dict
+        {reason: count}.
+    lost : int
+        Readings missing between the first and the last timestamp, estimated with `rate`.
+    restarts : int
+        Times the sender started over.
     """
 
     datagrams: int = 0

@@ -1,4 +1,4 @@
-"""Scenes in space on plain 2D axes: an orthographic projection of our own, because mplot3d takes 50 ms a frame and
+"""Scenes in space on plain 2D axes: an orthographic projection of our own, because mplot3d takes 50 ms per frame and
 this takes 2.
 
     scene = Scene(ax, radius=300)                       # bare axes, limits fixed: the scene turns inside them

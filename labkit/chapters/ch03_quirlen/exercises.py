@@ -403,7 +403,7 @@ CHAPTER = Chapter(
             metric=metrics.Numbers(1e-9, "mm"),
             hints=(
                 "Where is the tip in each pose, and where should it be?",
-                "Equation (2) of the sheet: R_i tip + p_i - point, one row a pose.",
+                "Equation (2) of the sheet: R_i tip + p_i - point, one row per pose.",
                 "`return np.array([T[:3, :3] @ tip + T[:3, 3] - point for T in T_WF])`",
             ),
             mistakes=[
@@ -441,7 +441,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda T, tip, point: pivot.pivot_residuals(T, tip, point).ravel(),
-                    "The numbers are right; one row a pose is wanted, shape (n, 3).",
+                    "The numbers are right; one row per pose is wanted, shape (n, 3).",
                 ),
                 Mistake(
                     lambda T, tip, point: pivot.pivot_residuals(T, tip, -point),
@@ -489,7 +489,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda T, tip, point: pivot.pivot_residuals(T, tip, point).T,
-                    "The numbers are right, but each pose stands in a column: one row a pose is wanted, shape (n, 3).",
+                    "The numbers are right, but each pose stands in a column: one row per pose is wanted, shape (n, 3).",
                 ),
             ],
         ),

@@ -615,7 +615,7 @@ CHAPTER = Chapter(
             rtol=2e-3,
             hints=(
                 "The residuals of all 31 poses under the thesis's end pose and its printed sphere center.",
-                "rms distance: the root of the mean of the squared lengths, one length a pose.",
+                "rms distance: the root of the mean of the squared lengths, one length per pose.",
                 "`np.sqrt((e**2).sum(axis=1).mean()) with e = kuka_residual(p2_end, repaired.T_BF, repaired.x_S, target)`",
             ),
             mistakes=[

@@ -43,7 +43,7 @@ def set_circle(line, x, z, radius):
 
 
 def error_against_step(ax, steps, curves):
-    """Error of finite differences over the step. `curves`: {label: errors}. Returns the moving markers, one a curve."""
+    """Error of finite differences over the step. `curves`: {label: errors}. Returns the markers, one per curve."""
     style.axes(ax, "step h (deg)", "largest error (mm per deg)", "error of the derivative by A")
     ax.set(xscale="log", yscale="log", xlim=(steps[0], steps[-1]), ylim=(1e-12, 1e3))
     looks = (style.look("prediction"), style.look("estimate"))

@@ -156,8 +156,8 @@ def difference_steps():
         fail={"h": 1e-13},
         describe=lambda result: (
             f"Step {result['h']:.1e} deg: forward is off by {result['at']['forward']:.1e}, central by "
-            f"{result['at']['central']:.1e} mm per "
-            f"deg. Best steps: {result['best']['forward']:.0e} and {result['best']['central']:.0e} deg."
+            f"{result['at']['central']:.1e} mm per deg. Best steps: {result['best']['forward']:.0e} and "
+            f"{result['best']['central']:.0e} deg."
         ),
     )
 
@@ -210,8 +210,8 @@ def _iterations_sentence(result):
     euler, se3 = result["euler"], result["se3"]
     return (
         f"In A, B, C: {told(euler)}, turning {euler['turned_deg']:.0f} deg in all; at the start the weakest singular "
-        f"value is {weakest(euler)}. On the pose: {told(se3)}, turning {se3['turned_deg']:.0f} deg, "
-        f"and {weakest(se3)}."
+        f"value is {weakest(euler)}. On the pose: {told(se3)}, turning {se3['turned_deg']:.0f} deg, and "
+        f"{weakest(se3)}."
     )
 
 
@@ -315,8 +315,8 @@ def _poses_sentence(result):
         else "as printed, nothing to explain"
     )
     return (
-        f"Pose {result['pose']}: residual {result['lengths'][result['pose'] - 1]:.2f} mm {told}. "
-        f"All 31: rms {result['rms']:.2f} mm, median {result['median']:.2f} mm."
+        f"Pose {result['pose']}: residual {result['lengths'][result['pose'] - 1]:.2f} mm {told}. All 31: rms "
+        f"{result['rms']:.2f} mm, median {result['median']:.2f} mm."
     )
 
 
@@ -428,8 +428,8 @@ def _pattern_sentence(result):
         return f"Not determined: the last singular value is {ratio:.0e} of the first; {', and '.join(told)}."
     (a, b, c), (A, B, C) = result["std"], result["printed_std"]
     return (
-        f"Predicted: orientation {a:.2f} deg, translation {b:.2f} mm, sphere center {c:.2f} mm. "
-        f"The thesis's 31 poses (dotted): {A:.2f} deg, {B:.2f} mm, {C:.2f} mm."
+        f"Predicted: orientation {a:.2f} deg, translation {b:.2f} mm, sphere center {c:.2f} mm. The thesis's 31 poses "
+        f"(dotted): {A:.2f} deg, {B:.2f} mm, {C:.2f} mm."
     )
 
 

@@ -720,7 +720,7 @@ CHAPTER = Chapter(
             metric=metrics.Numbers(1e-7, "mm"),
             hints=(
                 "Write out the last column of A X = X B. It is linear in the translation t once R is known.",
-                "R_A t + t_A = R t_B + t, so (I - R_A) t = t_A - R t_B: three rows a motion, stacked.",
+                "R_A t + t_A = R t_B + t, so (I - R_A) t = t_A - R t_B: three rows per motion, stacked.",
                 "`K1 = np.eye(3) - A[:, :3, :3]; K2 = A[:, :3, 3] - B[:, :3, 3] @ R.T; return np.linalg.lstsq(K1.reshape(-1, 3), K2.ravel())[0]`",
             ),
             mistakes=[
@@ -786,7 +786,7 @@ CHAPTER = Chapter(
             metric=metrics.Numbers(1e-9),
             hints=(
                 "Equation (13), taken at its word: the norm of M'M v, divided by N - 1. v is the null vector, of length 1.",
-                "M has 9 rows a motion, so N = len(M) / 9.",
+                "M has 9 rows per motion, so N = len(M) / 9.",
                 "`v = np.linalg.svd(M)[2][-1]; return np.linalg.norm(M.T @ (M @ v)) / (len(M) / 9 - 1)`",
             ),
             mistakes=[

@@ -261,8 +261,7 @@ def _axes_sentence(result):
     if result["angle_deg"] < 2:
         return (
             f"The axes are {result['angle_deg']:.1f} deg apart: the mounting may turn freely about them (dashed "
-            f"circle). "
-            f"Median error {result['error_deg']:.0f} deg, and the residuals look perfect."
+            f"circle). Median error {result['error_deg']:.0f} deg, and the residuals look perfect."
         )
     error = f"{_two(result['error_deg'])} deg and {_two(result['error_mm'])} mm"
     return f"Axes {result['angle_deg']:.0f} deg apart: median error {error}."
@@ -366,8 +365,8 @@ def dynamic_errors():
     def sentence(result):
         raw, mended = result["raw_summary"], result["mended_summary"]
         return (
-            f"Readings: mean {raw['mean']:.1f} mm, median {raw['median']:.1f}, RMS {raw['RMS']:.0f}. "
-            f"Gated, with the offset of {result['offset_ms']:.0f} ms removed: mean {mended['mean']:.1f} mm."
+            f"Readings: mean {raw['mean']:.1f} mm, median {raw['median']:.1f}, RMS {raw['RMS']:.0f}. Gated, with the "
+            f"offset of {result['offset_ms']:.0f} ms removed: mean {mended['mean']:.1f} mm."
         )
 
     return Stage(

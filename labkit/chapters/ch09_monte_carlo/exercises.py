@@ -830,7 +830,7 @@ CHAPTER = Chapter(
             properties=(_noise_off_is_reckoning, _noise_is_right, _moved_by_the_rng),
             hints=(
                 "The noise belongs to the control, not to the pose, and each particle gets its own.",
-                "Draw one pair of standard normal numbers a particle, scale them by std_u, and add them to u.",
+                "Draw one pair of standard normal numbers per particle, scale them by std_u, and add them to u.",
                 "`noisy = u + std_u * rng.standard_normal((len(states), 2)); return odometry.step(states, noisy, dt)`",
             ),
             mistakes=[

@@ -139,7 +139,7 @@ def corridor(fig, length):
 
 
 class Wheel:
-    """The resampling wheel: a sector a particle, as wide as its weight, and the spokes or spins that point at them."""
+    """The resampling wheel: a sector per particle, as wide as its weight, and the spokes or spins pointing at them."""
 
     def __init__(self, ax, count):
         style.bare(ax)

@@ -48,10 +48,10 @@ def product():
     unrounded = chaining.chain(chaining.transforms_from_points(lab_sheet.station_points()))
     met = np.abs(unrounded - lab_sheet.printed_product()).max()
     proof = (
-        f"The product of the printed matrices misses the printed product by up to {off[:3, 3].max():.1e} mm and"
-        f" {off[:3, :3].max():.1e}; rounding to six decimals can move it by {bound[:3, 3].max():.1e}"
-        f" mm (levers up to {lever:.0f} mm) and {bound[:3, :3].max():.1e}. Links inside the rounding exist whose"
-        f" product is the printed one: those of points.csv meet it within {met:.1e}."
+        f"The product of the printed matrices misses the printed product by up to {off[:3, 3].max():.1e} mm and "
+        f"{off[:3, :3].max():.1e}; rounding to six decimals can move it by {bound[:3, 3].max():.1e} mm (levers up to "
+        f"{lever:.0f} mm) and {bound[:3, :3].max():.1e}. Links inside the rounding exist whose product is the printed "
+        f"one: those of points.csv meet it within {met:.1e}."
     )
     return Computed(value, bound=bound, proof=proof)
 
@@ -69,9 +69,9 @@ def operator():
     off = {"sum": np.abs(total - np.eye(4)).max(), "product": np.abs(result - np.eye(4)).max()}
     name = min(off, key=off.get)
     proof = (
-        f"The printed result has 1 in its last entry; the sum of the four matrices has {total[3, 3]:.0f} there and is"
-        f" not a rigid transform. The product meets the printed result within"
-        f" {chaining.rounding_bound(links, lab_sheet.HALF_DIGIT).max():.0e} mm, which rounding explains."
+        f"The printed result has 1 in its last entry; the sum of the four matrices has {total[3, 3]:.0f} there and is "
+        "not a rigid transform. The product meets the printed result within "
+        f"{chaining.rounding_bound(links, lab_sheet.HALF_DIGIT).max():.0e} mm, which rounding explains."
     )
     return Computed(name, misprint=name != "sum", proof=proof)
 

@@ -105,9 +105,19 @@ def reconstruct_vehicle(cov, steps, dt):
 class Scenario:
     """A drive past landmarks with all its settings.
 
-    controls : (n, 2) commands (m/s, rad/s).    dt : time step (s).    cov_u : (2, 2) noise of the control.
-    landmarks : (m, 2) in m.    std_range (m), std_bearing (rad) : noise of the sensor.
-    x0, cov0 : (3,) and (3, 3), what is known of the start (m, m, rad).
+    Attributes
+    ----------
+    controls : array, shape (n, 2), m/s and rad/s
+        Commands.
+    dt : float, s
+        Time step.
+    cov_u : array, shape (2, 2)
+        Noise of the control.
+    landmarks : array, shape (m, 2), m
+    std_range, std_bearing : float, m and rad
+        Noise of the sensor.
+    x0, cov0 : arrays, shapes (3,) and (3, 3)
+        What is known of the start (m, m, rad).
     """
 
     controls: np.ndarray
@@ -157,8 +167,18 @@ def circle_course(marks=4, steps=300):
 class Building:
     """One small building in the four forms of the lecture, in m.
 
-    lines : (n, 4) walls.    points : (m, 2) obstacle points.    nodes : {name: (x, y)}.    edges : pairs of names.
-    grid : OccupancyGrid.    landmarks : (k, 2).
+    Attributes
+    ----------
+    lines : array, shape (n, 4)
+        Walls.
+    points : array, shape (m, 2)
+        Obstacle points.
+    nodes : dict
+        {name: (x, y)}.
+    edges : tuple
+        Pairs of names.
+    grid : OccupancyGrid
+    landmarks : array, shape (k, 2)
     """
 
     lines: np.ndarray
@@ -199,10 +219,19 @@ def global_example(building, n_particles=5000, n_steps=12, seed=5):
 
 @dataclass(frozen=True, eq=False)
 class SoccerRun:
-    """The lecture's soccer example, simulated.
+    """The lecture's soccer example, simulated; lengths in m.
 
-    landmarks : (6, 2).    truth : (n + 1, 3).    odometry : (n + 1, 3) the path that the controls alone give.
-    estimates : (n, 3).    seen : (n,) the landmark recognized at each step, or -1.    pictures : a `Picture` per step.
+    Attributes
+    ----------
+    landmarks : array, shape (6, 2)
+    truth : array, shape (n + 1, 3)
+    odometry : array, shape (n + 1, 3)
+        The path that the controls alone give.
+    estimates : array, shape (n, 3)
+    seen : array of int, shape (n,)
+        The landmark recognized at each step, or -1.
+    pictures : list
+        A `Picture` per step.
     """
 
     landmarks: np.ndarray

@@ -40,10 +40,9 @@ def entries():
     misprint[UPSIDE_DOWN] = abs(implied[UPSIDE_DOWN] - 9) < 1e-9
     misprint[COPIED] = runs[COPIED] == runs[COPIED[0], COLUMNS.index("mean_deg")] and least[COPIED[0]] > runs[COPIED]
     proof = (
-        f"Six times the average less the five others gives each entry; run 3's largest error comes out as "
-        f"{implied[UPSIDE_DOWN]:.3f} mm, not 6. "
-        f"Run 4's largest angle equals its mean angle, and its E_rot alone demands at least {least[COPIED[0]]:.3f} "
-        f"deg (root mean square of the angles)."
+        "Six times the average less the five others gives each entry; run 3's largest error comes out as "
+        f"{implied[UPSIDE_DOWN]:.3f} mm, not 6. Run 4's largest angle equals its mean angle, and its E_rot alone "
+        f"demands at least {least[COPIED[0]]:.3f} deg (root mean square of the angles)."
     )
     return Computed(implied, bound, misprint, proof=proof)
 
@@ -212,8 +211,8 @@ def reaches():
         values,
         bound,
         proof=f"The elbow's limit is printed as 138 deg: half a degree of rounding moves this reach by {bound[3]:.1f} "
-        f"mm. All reaches are measured in the plane of "
-        f"the arm: with the shoulder offset the wrist gets {away:.1f} mm away from axis 1.",
+        f"mm. All reaches are measured in the plane of the arm: with the shoulder offset the wrist gets {away:.1f} mm "
+        "away from axis 1.",
     )
 
 
@@ -255,8 +254,8 @@ def mean_errors_in_motion():
         errors.append([e.translation.mean(), np.rad2deg(e.rotation.mean()), np.median(e.translation)])
     errors = np.array(errors)
     proof = (
-        f"Simulated with {100 * simulation.MOVING.nonsense * simulation.MOVING.burst:.0f} % nonsense: "
-        f"the means of slow, middle and fast are "
+        f"Simulated with {100 * simulation.MOVING.nonsense * simulation.MOVING.burst:.0f} % nonsense: the means of "
+        "slow, middle and fast are "
         + ", ".join(f"{mm:.0f} mm / {deg:.1f} deg" for mm, deg, _ in errors)
         + ", the medians "
         + ", ".join(f"{median:.1f} mm" for median in errors[:, 2])

@@ -21,8 +21,13 @@ UPSIDE_DOWN, COPIED = (2, COLUMNS.index("max_mm")), (3, COLUMNS.index("max_deg")
 class TableD(NamedTuple):
     """Appendix D as printed; columns as in `COLUMNS`, positions in m.
 
-    runs: array (6, 13). mean, variance: arrays (13,), the rows *Průměr* and *Rozptyl*. half_units: array (8, 13), half
-    a unit in the last printed digit of every entry.
+    Attributes
+    ----------
+    runs : array, shape (6, 13)
+    mean, variance : arrays, shape (13,)
+        The rows *Průměr* and *Rozptyl*.
+    half_units : array, shape (8, 13)
+        Half a unit in the last printed digit of every entry.
     """
 
     runs: np.ndarray

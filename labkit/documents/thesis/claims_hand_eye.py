@@ -144,9 +144,8 @@ def gauss_newton_end():
         bound=np.broadcast_to(bound, end.shape),
         proof=(
             "What is printed beyond the exact 5, 0, 5, 0, -90, 0 is rounding: translation and B to 1e-9, while A and "
-            "C are not determined "
-            f"one by one at B = -90 deg (the last singular value is {values[5] / values[0]:.0e} of the first), only "
-            f"their sum, which is {turn:.0e} deg in all ten runs."
+            f"C are not determined one by one at B = -90 deg (the last singular value is {values[5] / values[0]:.0e} "
+            f"of the first), only their sum, which is {turn:.0e} deg in all ten runs."
         ),
     )
 
@@ -216,10 +215,9 @@ def trust_region_failure():
         "found",
         proof=(
             f"From these starts our trust region arrives in {counts[4]}, {counts[6]} and {counts[9]} iterations. "
-            "Starts 4 and 6 cost "
-            f"{_start_cost(4):.1e} mm^2, less than the solver's tolerance 1e-6: it stops before the first step. "
-            "Start 9 costs "
-            f"{_start_cost(9):.0f} mm^2, and there the derivatives by A and C are parallel (B = -90.1 deg)."
+            f"Starts 4 and 6 cost {_start_cost(4):.1e} mm^2, less than the solver's tolerance 1e-6: it stops before "
+            f"the first step. Start 9 costs {_start_cost(9):.0f} mm^2, and there the derivatives by A and C are "
+            "parallel (B = -90.1 deg)."
         ),
     )
 
@@ -492,10 +490,9 @@ def _radius_proof():
     (R, std), (R4, std4) = radius_fit(), radius_fit((4,))
     return (
         f"With the radius as a tenth unknown the 31 corrected poses give {R:.3f} +- {std:.3f} mm (without pose 4, "
-        "which cuts next to the "
-        f"equator, {R4:.3f} +- {std4:.3f} mm): the certificate's 29.9725 mm and the listing's 30 mm lie within two "
-        "standard deviations, the "
-        f"coordinate machine's 30.2770 mm {(30.27705 - R) / std:.0f} (or {(30.27705 - R4) / std4:.0f}) away."
+        f"which cuts next to the equator, {R4:.3f} +- {std4:.3f} mm): the certificate's 29.9725 mm and the listing's "
+        f"30 mm lie within two standard deviations, the coordinate machine's 30.2770 mm {(30.27705 - R) / std:.0f} "
+        f"(or {(30.27705 - R4) / std4:.0f}) away."
     )
 
 
@@ -560,11 +557,10 @@ def end_pose():
     return Computed(
         np.array([*found[:3], *np.rad2deg(found[3:])]),
         proof=(
-            f"The least-squares pose of the printed data (decimal point of pose 2 repaired) lies {distance:.2f} mm and "
-            f"{np.rad2deg(angle):.2f} deg away and has an rms of {fit.rms:.2f} mm against "
-            f"{rms_at(end, target, measured):.2f} mm; of all sets of "
-            f"the seven corrections {nearest} comes nearest, {near_distance:.2f} mm and {np.rad2deg(near_angle):.2f} "
-            "deg: the run had other data."
+            f"The least-squares pose of the printed data (decimal point of pose 2 repaired) lies {distance:.2f} mm "
+            f"and {np.rad2deg(angle):.2f} deg away and has an rms of {fit.rms:.2f} mm against "
+            f"{rms_at(end, target, measured):.2f} mm; of all sets of the seven corrections {nearest} comes nearest, "
+            f"{near_distance:.2f} mm and {np.rad2deg(near_angle):.2f} deg: the run had other data."
         ),
     )
 
@@ -604,9 +600,8 @@ def validation():
         misprint=np.array([True, False, False, False]),
         proof=(
             f"Pose 1 gives ({residual[0]:.3f}, {residual[1]:.3f}, {residual[2]:.3f}) mm under the printed end pose, "
-            "rounding of the printed pose "
-            f"moves it by {bound[0]:.3f}; all other poses give residuals of more than 1.4 mm, so this is the one "
-            "used, and x has lost its sign."
+            f"rounding of the printed pose moves it by {bound[0]:.3f}; all other poses give residuals of more than "
+            "1.4 mm, so this is the one used, and x has lost its sign."
         ),
     )
 
@@ -619,8 +614,8 @@ def claim():
         float(hand_eye.rms_distance(hand_eye.sphere_residuals(data(2).T_BF, data(2).x_S, end, target))),
         proof=(
             f"Over the 31 poses (decimal point of pose 2 repaired) the end pose leaves {lengths.min():.2f} to "
-            f"{lengths.max():.1f} mm, rms "
-            f"{np.sqrt((lengths**2).mean()):.2f} mm: the one validated pose is the best of all."
+            f"{lengths.max():.1f} mm, rms {np.sqrt((lengths**2).mean()):.2f} mm: the one validated pose is the best "
+            "of all."
         ),
     )
 
@@ -640,8 +635,7 @@ def underdetermined():
         "no number of poses suffices",
         proof=(
             f"Four poses give 12 equations for 12 unknowns, but all 93 equations of the 31 poses have rank {rank}: "
-            "the plate's pose enters by the one "
-            "point T_BP x_P', so its three rotations stay free."
+            "the plate's pose enters by the one point T_BP x_P', so its three rotations stay free."
         ),
     )
 
@@ -702,7 +696,7 @@ def angle_names():
         misprint=True,
         proof=(
             "Section 6.1.2, (6-7), (6-9) and listing C2 turn about z by A and about x by C, formula (6-3) the other "
-            "way round; for A, B, C = 10, 20, 30 "
-            f"deg that is {angle:.0f} deg apart, and only the former gives the matrices of table 6-6."
+            f"way round; for A, B, C = 10, 20, 30 deg that is {angle:.0f} deg apart, and only the former gives the "
+            "matrices of table 6-6."
         ),
     )

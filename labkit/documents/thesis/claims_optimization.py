@@ -69,12 +69,11 @@ def extrema():
         value,
         misprint=wrong,
         proof=f"At the printed saddle (0.105, -0.205) f is {wells.value(printed):.3f}, as printed, but the gradient "
-        "has length "
-        f"{slope:.2f}, and the point is {_off_line(printed):.3f} off the line through both centers, which holds every "
-        f"stationary point; it vanishes at ({saddle.x[0]:.4f}, {saddle.x[1]:.4f}), f = {saddle.value:.3f}, with "
-        "Hessian eigenvalues "
-        f"{saddle.eigenvalues[0]:.1f} and {saddle.eigenvalues[1]:.1f}. The global minimum {lowest.value:.4f} cut "
-        f"after three decimals is the printed {_cut(lowest.value, 3):.3f}; rounded it is {lowest.value:.3f}.",
+        f"has length {slope:.2f}, and the point is {_off_line(printed):.3f} off the line through both centers, which "
+        f"holds every stationary point; it vanishes at ({saddle.x[0]:.4f}, {saddle.x[1]:.4f}), f = "
+        f"{saddle.value:.3f}, with Hessian eigenvalues {saddle.eigenvalues[0]:.1f} and {saddle.eigenvalues[1]:.1f}. "
+        f"The global minimum {lowest.value:.4f} cut after three decimals is the printed {_cut(lowest.value, 3):.3f}; "
+        f"rounded it is {lowest.value:.3f}.",
     )
 
 
@@ -117,8 +116,7 @@ def _entry(i, j, printed, right):
         text,
         misprint=wrong[i, j] > 1e-5 > good[i, j],
         proof=f"Against central differences of (6-17) on 169 points the printed entry is off by up to "
-        f"{wrong[i, j]:.0f}, the corrected one "
-        f"(as in the code of listing C9) by {good[i, j]:.1e}.",
+        f"{wrong[i, j]:.0f}, the corrected one (as in the code of listing C9) by {good[i, j]:.1e}.",
     )
 
 
@@ -168,9 +166,8 @@ def newton_equations():
         "H d = -grad f, x + d" if wrong else "as printed",
         misprint=wrong,
         proof=f"From (-0.9, -1.9), {np.linalg.norm(x - _minima()[1]):.2f} from the minimum, the printed pair ends "
-        f"{miss['printed']:.0f} away, "
-        f"without the inverse {miss['inverse dropped']:.2f} away, and H d = -grad f with x + d {miss['right']:.3f} "
-        "away.",
+        f"{miss['printed']:.0f} away, without the inverse {miss['inverse dropped']:.2f} away, and H d = -grad f with "
+        f"x + d {miss['right']:.3f} away.",
     )
 
 
@@ -234,8 +231,8 @@ def results():
         minima,
         misprint=np.abs(minima - printed) > 0.5e-4,
         proof=f"{minima[1, 0]:.6f} and {minima[1, 1]:.6f} cut after four decimals are the printed "
-        f"{_cut(minima[1, 0], 4):.4f} and "
-        f"{_cut(minima[1, 1], 4):.4f}; rounded they are {minima[1, 0]:.4f} and {minima[1, 1]:.4f}.",
+        f"{_cut(minima[1, 0], 4):.4f} and {_cut(minima[1, 1], 4):.4f}; rounded they are {minima[1, 0]:.4f} and "
+        f"{minima[1, 1]:.4f}.",
     )
 
 
@@ -267,8 +264,7 @@ def mu_is_accuracy():
     return Computed(
         "accuracy of the methods" if true > 1e-3 else "rounding of the ideal point",
         proof=f"mu is the printed point less an ideal point of two decimals. With the rule of listing C8 the iterate "
-        f"is within {max(true, 1e-16):.0e} of "
-        f"the minimum, mu says {printed['mu'][0].max():.1e}.",
+        f"is within {max(true, 1e-16):.0e} of the minimum, mu says {printed['mu'][0].max():.1e}.",
     )
 
 
@@ -350,10 +346,10 @@ def farthest_gauss_newton():
         bound=spread,
         simulated=True,
         proof=f"With the residuals of `wells.residual`, full steps fail from (4.3, 4.3) and reach the minima from at "
-        f"most {reach['gauss_newton'][0]:g} "
-        f"and {reach['gauss_newton'][1]:g} on the diagonal; damped (Levenberg-Marquardt) they reach them up to "
-        f"{reach['levenberg_marquardt'][0]:g} and {reach['levenberg_marquardt'][1]:g}, the end of the search. "
-        "Residuals and damping of the thesis are not published.",
+        f"most {reach['gauss_newton'][0]:g} and {reach['gauss_newton'][1]:g} on the diagonal; damped "
+        f"(Levenberg-Marquardt) they reach them up to {reach['levenberg_marquardt'][0]:g} and "
+        f"{reach['levenberg_marquardt'][1]:g}, the end of the search. Residuals and damping of the thesis are not "
+        "published.",
     )
 
 
@@ -365,8 +361,8 @@ def farthest_trust_region():
     return Computed(
         np.repeat(np.array(reach)[:, None], 2, axis=1),
         proof=f"There is no farthest start: along the diagonal up to (100, 100) the trust region always ends in a "
-        "minimum and changes from one to the "
-        f"other {changes} times; the last local start is {reach[0]:g}, the last global one {reach[1]:g}.",
+        f"minimum and changes from one to the other {changes} times; the last local start is {reach[0]:g}, the last "
+        f"global one {reach[1]:g}.",
     )
 
 
@@ -377,8 +373,8 @@ def start_distance():
     return Computed(
         far.max(),
         proof=f"The printed starts lie {np.abs(gaps).min():.2f} to {np.abs(gaps).max():.2f} from the minima in each "
-        f"coordinate, {far[0]:.2f} and {far[1]:.2f} "
-        "as a distance; 0.25 is their offset from the centers (1, 1) and (-1, -2) of the two terms.",
+        f"coordinate, {far[0]:.2f} and {far[1]:.2f} as a distance; 0.25 is their offset from the centers (1, 1) and "
+        "(-1, -2) of the two terms.",
     )
 
 
@@ -427,9 +423,8 @@ def saddle_newton():
     return Computed(
         "found" if share[2] > 0 else "no solution",
         proof=f"Newton ends in the saddle from {100 * share[2]:.1f} % of the starts in [-6, 6]^2 and in a minimum "
-        "from only "
-        f"{100 * (share[0] + share[1]):.1f} %; from (0, 0) in {steps} steps, and from (1.3, 1.3), 0.05 beyond the "
-        f"thesis's own start, it ends in the {wells.NAMES[thesis_line[0]]}.",
+        f"from only {100 * (share[0] + share[1]):.1f} %; from (0, 0) in {steps} steps, and from (1.3, 1.3), 0.05 "
+        f"beyond the thesis's own start, it ends in the {wells.NAMES[thesis_line[0]]}.",
     )
 
 

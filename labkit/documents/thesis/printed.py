@@ -24,8 +24,14 @@ SIMULATED_TURNS = {"z": 3, "y": 4, "x": 5}  # which KUKA angle a line of listing
 class Measurements:
     """31 robot poses with the sphere's center in each.
 
-    kuka_deg: array (31, 6), mm and deg. x_S: array (31, 3), mm, in the scanner. line: array (31,) of str, the pattern
-    line "x", "y", "z" or "none". angle_deg: array (31,).
+    Attributes
+    ----------
+    kuka_deg : array, shape (31, 6), mm and deg
+    x_S : array, shape (31, 3), mm
+        In the scanner.
+    line : array of str, shape (31,)
+        The pattern line "x", "y", "z" or "none".
+    angle_deg : array, shape (31,)
     """
 
     kuka_deg: np.ndarray
@@ -230,8 +236,13 @@ def centers_with_radius(x_S, R, printed_radius=30.0):
 class Simulation(NamedTuple):
     """The simulation model of the thesis.
 
-    T_BF: array (13, 4, 4), mm. x_S: array (13, 3), mm. target: array (3,), mm. scanner_deg: array (6,), the true pose
-    of the scanner, mm and deg.
+    Attributes
+    ----------
+    T_BF : array, shape (13, 4, 4), mm
+    x_S : array, shape (13, 3), mm
+    target : array, shape (3,), mm
+    scanner_deg : array, shape (6,), mm and deg
+        The true pose of the scanner.
     """
 
     T_BF: np.ndarray
