@@ -43,6 +43,8 @@ OVERRIDES = {
     "@jupyterlab/apputils-extension:notification": {"fetchNews": "false", "checkForUpdates": False},
     # a cell scrolled out of sight stays in the page, and with it the figure being dragged
     "@jupyterlab/notebook-extension:tracker": {"windowingMode": "none"},
+    # the state of widgets dies with the kernel: files hold pictures and words instead
+    "@jupyter-widgets/jupyterlab-manager:plugin": {"saveState": False},
 }
 OFFLINE = (
     "NewConnectionError",
@@ -322,6 +324,7 @@ def lab_command(python, ip, port, no_browser):
         f"--LabApp.default_url=/lab/tree/{FIRST_NOTEBOOK}",
         "--LabApp.extension_manager=readonly",
         "--ServerApp.kernel_websocket_connection_class=labkit.stage.connection.PromptConnection",
+        "--FileContentsManager.pre_save_hook=labkit.live.saving.keep_language",
         *(["--no-browser"] if no_browser else []),
     ]
 

@@ -145,9 +145,16 @@ class Line {
     if (this.flight !== null || Object.keys(this.pending).length === 0) return;
     this.flight = `${this.view}:${++this.count}`;
     this.sent = performance.now();
-    this.model.send({ ...this.pending, shown: this.shown, serial: this.flight });
-    this.pending = {};
     this.timer = setTimeout(() => { this.flight = null; this.onSilence(); this.flush(); }, PATIENCE);
+    const message = { ...this.pending, shown: this.shown, serial: this.flight };
+    this.pending = {};
+    this.send(message);
+  }
+
+  send(message) {
+    try {
+      this.model.send(message);
+    } catch { /* the line is cut: there will be no answer, and that is said */ }
   }
 
   /** Whether a message is the answer to the one in flight. */
@@ -162,10 +169,10 @@ class Line {
   /** A picture is on the screen. Python waits after three: every other one that is no answer is acknowledged. */
   seen(message) {
     this.shown = message.picture;
-    if (message.serial === null && this.idle && this.shown % 2 === 0) this.model.send({ shown: this.shown });
+    if (message.serial === null && this.idle && this.shown % 2 === 0) this.send({ shown: this.shown });
     this.flush();
     clearTimeout(this.resting);
-    if (this.idle) this.resting = setTimeout(() => this.model.send({ rest: true }), REST);
+    if (this.idle) this.resting = setTimeout(() => this.send({ rest: true }), REST);
   }
 
   close() {

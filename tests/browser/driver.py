@@ -15,6 +15,8 @@ import time
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from nbformat.v4 import new_code_cell, new_notebook
+
 from labkit.exercises import source
 from labkit.verbs import build
 
@@ -34,10 +36,25 @@ def notebook_copy(chapter, solved=False):
     """A chapter's notebook, blank or solved, as its source gives it: a copy below the checkout, named from its root."""
     path = source.find(chapter)
     notebook = build.solved_notebook(path) if solved else build.blank_notebook(path)
+    with written(notebook, path.stem) as copy:
+        yield copy
+
+
+@contextlib.contextmanager
+def notebook_of(*codes):
+    """A notebook of a few code cells, below the checkout, named from its root."""
+    cells = [new_code_cell(code, id=f"cell-{number}") for number, code in enumerate(codes)]
+    metadata = {"kernelspec": build.KERNEL, "language_info": {"name": "python"}}
+    with written(new_notebook(cells=cells, metadata=metadata), "cells") as copy:
+        yield copy
+
+
+@contextlib.contextmanager
+def written(notebook, stem):
     (ROOT / "build").mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory(dir=ROOT / "build", prefix="browser-") as folder:
-        copy = Path(folder) / f"{path.stem}.ipynb"
-        copy.write_text(build.as_text(notebook), encoding="utf-8")
+        copy = Path(folder) / f"{stem}.ipynb"
+        copy.write_text(build.as_text(notebook), encoding="utf-8", newline="\n")
         yield copy.relative_to(ROOT).as_posix()
 
 
@@ -158,6 +175,27 @@ def retype(page, cell, code):
     page.keyboard.press("ControlOrMeta+Enter")
     page.wait_for_timeout(300)
     wait_until_idle(page)
+
+
+def save(page, path):
+    """Save the notebook; the bytes of its file."""
+    before = (ROOT / path).stat().st_mtime_ns
+    page.evaluate("() => { window.jupyterapp.commands.execute('docmanager:save'); }")
+    deadline = time.monotonic() + 20
+    while (ROOT / path).stat().st_mtime_ns == before:
+        if time.monotonic() > deadline:
+            raise RuntimeError("the notebook was not saved")
+        page.wait_for_timeout(50)
+    page.wait_for_timeout(200)
+    return (ROOT / path).read_bytes()
+
+
+def with_kernel(page, action):
+    """Await `action(kernel)`, JavaScript, for the kernel of the notebook in front."""
+    page.evaluate(
+        f"async () => {{ const kernel = window.jupyterapp.shell.currentWidget.sessionContext.session.kernel; "
+        f"await ({action})(kernel); }}"
+    )
 
 
 def set_theme(page, dark):

@@ -3,15 +3,9 @@
 Runs against a copy of chapter 1 as the source gives it. Skipped where there is no Chromium, except in CI.
 """
 
-import os
-import sys
-
 import driver
 import pytest
 
-from labkit.exercises import source
-
-ROOT = source.ROOT
 WRONG = '''@ex.invert
 def invert(T):
     """Return the inverse of a rigid transform, shape (4, 4); nothing needs to be solved."""
@@ -21,27 +15,6 @@ def invert(T):
     return X
 '''
 RIGHT = WRONG.replace("-T[:3, 3]", "-T[:3, :3].T @ T[:3, 3]")
-
-
-def missing(reason):
-    """Skip, with the reason; in CI there is no excuse."""
-    (pytest.fail if os.environ.get("CI") else pytest.skip)(reason)
-
-
-@pytest.fixture(scope="module")
-def address():
-    """The address of a JupyterLab that `python lab.py` has started."""
-    if not driver.find_browser():
-        missing("no Chromium on this machine: the browser test needs one")
-    if not (ROOT / ".venv").exists():
-        missing("the browser test starts lab.py, whose set-up has not been made: run python lab.py test")
-    words = [sys.executable, str(ROOT / "lab.py"), "--no-browser", "--LabApp.expose_app_in_browser=True"]
-    with driver.server([*words, *(["--allow-root"] if as_root() else [])]) as found:
-        yield found
-
-
-def as_root():
-    return hasattr(os, "geteuid") and os.geteuid() == 0
 
 
 @pytest.fixture(scope="module")
