@@ -120,7 +120,7 @@ class Figure {
  *  so that a drag never queues up. Python answers each with one picture. */
 class Line {
   constructor(model, onSilence) {
-    Object.assign(this, { model, onSilence, pending: {}, flight: null, timer: 0, resting: 0, count: 0, shown: 0, took: 0 });
+    Object.assign(this, { model, onSilence, pending: {}, flight: null, silent: false, timer: 0, resting: 0, count: 0, shown: 0, took: 0 });
     this.view = Math.random().toString(36).slice(2); // two views of one Stage tell their answers apart
   }
 
@@ -145,7 +145,7 @@ class Line {
     if (this.flight !== null || Object.keys(this.pending).length === 0) return;
     this.flight = `${this.view}:${++this.count}`;
     this.sent = performance.now();
-    this.timer = setTimeout(() => { this.flight = null; this.onSilence(); this.flush(); }, PATIENCE);
+    this.timer = setTimeout(() => { this.flight = null; this.silent = true; this.onSilence(); this.flush(); }, PATIENCE);
     const message = { ...this.pending, shown: this.shown, serial: this.flight };
     this.pending = {};
     this.send(message);
@@ -161,6 +161,7 @@ class Line {
   hasAnswer(message) {
     if (message.serial === null || message.serial !== this.flight) return false;
     this.flight = null;
+    this.silent = false;
     clearTimeout(this.timer);
     this.took = performance.now() - this.sent;
     return true;
@@ -346,7 +347,7 @@ class Handle {
     if (!this.held) return;
     const [right, down] = fraction(this.place, event);
     const target = [right + this.held[0], down + this.held[1]];
-    if (!this.corrected) this.move(target);
+    if (!this.corrected && !this.line.silent) this.move(target);
     this.line.add("drag", (drag) => ({ ...drag, [this.name]: target }));
   }
 

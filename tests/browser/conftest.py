@@ -1,4 +1,4 @@
-"""One JupyterLab, started by `python lab.py`, for all browser tests. Skipped where there is no Chromium, but not in CI."""
+"""One JupyterLab, started by `python lab.py`, for all browser tests; skipped where no Chromium is, but not in CI."""
 
 import os
 import sys
