@@ -3,11 +3,11 @@
 #
 # **What you will do.** Build Newton, Gauss-Newton and the two decisions of a trust region on a surface you can look at, and check a published comparison of them.
 #
-# **What you will learn.** What a quadratic model is, why Newton climbs as willingly as it descends, what a sum of squares buys, how a gain ratio keeps a
+# **What you will learn.** What a quadratic model is, what Newton makes of a place where $f$ bends down, what a sum of squares buys, how a gain ratio keeps a
 # method honest, and why "reaches the minimum from far away" says little.
 #
 # **What you need.** Gradient, matrix, a little NumPy. Two sittings of about an hour, the second from
-# *Gauss-Newton needs a sum of squares* on. Chapter 5 uses all of it on real robot data.
+# *Gauss-Newton needs a sum of squares* on; what is marked *further* goes beyond them. Chapter 5 uses all of it on real robot data.
 
 # %% notation [markdown]
 # | letter | meaning |
@@ -104,7 +104,8 @@ def hessian(x):
 # ## Against the document: listing C7
 #
 # The thesis prints the Hessian twice, as formulas (listing C7) and as MATLAB code (C9). They differ. Who is right? The Hessian is the derivative of the
-# gradient, and a derivative can be *measured* by central differences.
+# gradient, and a derivative can be *measured* by central differences. (If you wrote your own Hessian by differences, the check took it, and rightly so. But now
+# it would be compared with itself: write the two formulas above first.)
 
 # %% compare-listing-c7
 x = np.array([0.3, -0.7])
@@ -129,6 +130,7 @@ def classify_extremum(g, H):
     """Return the kind of a point with gradient g, shape (2,), and Hessian H, shape (2, 2).
 
     It is one of these words: "minimum", "maximum", "saddle" or, where |g| > 1e-6, "not stationary".
+    No eigenvalue of H is 0.
     """
     ### BEGIN SOLUTION
     if np.linalg.norm(g) > 1e-6:
@@ -173,8 +175,8 @@ saddle = ex.saddle(saddle)
 # %% compare-extrema
 for name, printed, e in zip(wells.NAMES, ((0.979, 0.968), (-0.995, -1.992), (0.105, -0.205)), wells.extrema()):
     kind = classify_extremum(gradient(e.x), hessian(e.x))
-    slope = np.linalg.norm(gradient(np.array(printed)))
-    print(f"{name:15} printed {printed}, |g| there {slope:.3f}; computed {e.x}, f = {e.value:.3f}: {kind}")
+    slope, off = np.linalg.norm(gradient(np.array(printed))), np.linalg.norm(e.x - printed)
+    print(f"{name:15} printed {printed}, |g| there {slope:.3f}; the computed one is {off:.4f} away: {kind}")
 
 # %% saddle-statement [markdown]
 # ## "A saddle must be hit exactly"
@@ -200,7 +202,25 @@ ex.predict("neighborhood", guess, reveal=stages.saddle)
 #
 # $$f + 300 = |r|^2 \quad\text{with}\quad r = \left(\sqrt{\tfrac{100}{q_1}}\,(x - c_1),\ \sqrt{\tfrac{200}{q_2}}\,(x - c_2)\right),$$
 #
-# four residuals with the same minima and the same saddle. (2-32) prints the step with $J F$; with four residuals and two unknowns that product does not
+# four residuals with the same minima and the same saddle. Their Jacobian $J$ is what Gauss-Newton lives on: one row a residual, one column an unknown. For
+# one well, product rule and $\nabla q = 2(x - c)$ give $\sqrt{w/q}\,\left(I - (x-c)(x-c)^\top/q\right)$, two rows.
+
+# %% jacobian
+@ex.jacobian
+def jacobian(x):
+    """Return J, shape (4, 2), of the residuals at x, shape (2,): rows of the well at (1, 1) first."""
+    ### BEGIN SOLUTION
+    blocks = []
+    for w, c in ((100, np.array([1, 1])), (200, np.array([-1, -2]))):
+        d = x - c
+        q = d @ d + 1
+        blocks.append(np.sqrt(w / q) * (np.eye(2) - np.outer(d, d) / q))
+    return np.vstack(blocks)
+    ### END SOLUTION
+
+
+# %% step-text [markdown]
+# With $r$ and $J$ a step is a linear least-squares problem. The thesis's (2-32) prints its solution with $J F$; with four residuals and two unknowns that product does not
 # exist. A transpose is missing.
 
 # %% gauss_newton_step
@@ -208,7 +228,7 @@ ex.predict("neighborhood", guess, reveal=stages.saddle)
 def gauss_newton_step(r, J):
     """Return the step h, shape (n,), that minimizes |r + J h|; r has shape (m,), J (m, n), m >= n."""
     ### BEGIN SOLUTION
-    return -np.linalg.lstsq(J, r)[0]
+    return -np.linalg.lstsq(J, r, rcond=None)[0]
     ### END SOLUTION
 
 
@@ -268,7 +288,7 @@ def dogleg_step(g, B, radius):
 # %% assemble
 x, radius = np.array([10.0, 10.0]), 1.0
 for k in range(8):
-    r, J = wells.residual(x), wells.jacobian(x)
+    r, J = wells.residual(x), jacobian(x)
     g, B = J.T @ r, J.T @ J
     step = dogleg_step(g, B, radius)
     new_r = wells.residual(x + step)
@@ -282,7 +302,7 @@ for k in range(8):
 # ## Four paths on one map
 #
 # Now all four from the same start. Newton and the trust region (*Trust-Region-Verfahren*) use the true Hessian, Gauss-Newton and Levenberg-Marquardt the sum of squares. Blue lines are
-# the chosen method's model at the chosen iteration, the dashed circle its radius, the thick bar its step. Decide; then drag the start and the iteration.
+# the chosen method's model at the chosen iteration, the dashed circle its radius, the thick bar its step. Nobody works this out in the head, so guess; then drag the start and the iteration.
 
 # %% predict-four
 guess = ...  # your code here
@@ -292,12 +312,13 @@ guess = "one"
 ex.predict("four", guess, reveal=stages.four_paths)
 
 # %% table-text [markdown]
-# ## Against the document: table 7-1
+# ## Against the document: table 7-1 (*further*)
 #
 # Listing C8 stops once $|g_1| + |g_2| \le 10^{-10}$, with the gradient from *before* the last step. With that rule and the printed starts Newton should need 9 and
 # 7 iterations. For the other two methods nothing is published but listing C6, a screenshot of MATLAB's toolbox as set for the robot: *trust region*, derivatives *approximated by solver*. MATLAB's
 # documentation says that `fminunc` then runs a quasi-Newton method instead, because its trust region needs the gradient supplied. SciPy's BFGS is such a method.
-# So: where does each stand-in end, from the thesis's farthest starts?
+# Nobody knows which programs made the two columns. Five methods that may have been meant stand in for them below. Where does each of these *stand-ins* end, from the
+# thesis's farthest starts?
 
 # %% table-7-1
 for start in ((1.25, 1.25), (-1.25, -2.25)):
@@ -325,7 +346,7 @@ luck = ex.luck(luck)
 
 # %% luck-verdict [markdown]
 # So four landings are weak evidence, and two of the four starts are Gauss-Newton's. Together with the documented fallback of `fminunc` they *suggest* that the praised trust
-# region was a quasi-Newton method. The deviations $\mu$ of table 7-1 measure no accuracy either: they are an iterate with four digits minus an "ideal" one with two.
+# region was a quasi-Newton method. The deviations that table 7-1 prints beside its results, as $\mu$, measure no accuracy either: each is an iterate with four digits minus an "ideal" one with two.
 #
 # And "the farthest start"? Decide how much of the square leads Newton to a minimum, then rub it free for all four methods.
 
@@ -354,7 +375,8 @@ for method in wells.METHODS:
 # ## Break it
 #
 # A stopping rule can lie. Out on the plain the gradient fades, and "the gradient is small" is true and worthless. Ask for the place and the kind as well. Even
-# the kind can be fooled, when "vanishes" means an absolute $10^{-6}$: `opt.classify_extremum` compares $|g|$ with the curvature instead.
+# the kind can be fooled, when "vanishes" means an absolute $10^{-6}$: `opt.classify_extremum` compares $|g|$ with the curvature instead. And where an eigenvalue is 0, its
+# word is "degenerate": $x^4$ and $-x^4$ have the same $g$ and $H$ at 0, and only higher derivatives tell a minimum from a maximum.
 
 # %% break-it
 run = wells.run("newton", (3.0, 3.0))
@@ -366,7 +388,7 @@ print(f"your classify_extremum: {classify_extremum(g, H)}")
 print(f"opt.classify_extremum:  {opt.classify_extremum(g, H)}")
 
 # %% beyond [markdown]
-# ## Beyond the document: widen the wells
+# ## Beyond the document: widen the wells (*further*)
 #
 # Each term of $f$ is a *robust loss*: a pull toward a center that fades with distance, as one wants it for outliers. Its width is 1. Make it 8 and the two wells
 # merge into one; follow its minimum while the width shrinks. This is *graduated non-convexity*, and chapter 5 uses robust losses on real data.
@@ -392,7 +414,7 @@ print({name: ends.count(name) for name in wells.NAMES})
 # ## Three questions, to answer in words
 #
 # 1. Newton ends in the saddle more often than in both minima together. Why is a root of the gradient with mixed curvature no worse for it than a minimum?
-# 2. Gauss-Newton and Newton use different matrices for the same function. Where do the two matrices agree, and what does that say about residuals that are small at the solution?
+# 2. Gauss-Newton and Newton use different matrices for the same cost $\tfrac12|r|^2 = \tfrac12 f + 150$: $J^\top J$ and $\tfrac12 H$. Where do the two come close, and what does that say about residuals that are small at the solution?
 # 3. A colleague reports: "converged, gradient below 1e-10". Which two further numbers do you ask for, and why?
 
 # %% progress

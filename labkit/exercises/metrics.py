@@ -13,6 +13,7 @@ from ..geometry import frames
 
 MAX_ENTRIES = 10_000_000
 FLOAT32_TOLERANCE = 2e-5
+INTEGERS = (int, np.integer)
 ORTHONORMAL = 1e-5  # how far R'R may be from I, also where the angle may be off by much more
 
 
@@ -96,6 +97,12 @@ def _value(result):
         raise Refused("it returned `...`: the placeholder is still there")
     if inspect.isgenerator(result) or inspect.iscoroutine(result):
         raise Refused(f"it returned a {type(result).__name__}: use `return`, not `yield`")
+    if type(result) is tuple and len(result) == 4 and np.shape(result[0]) == shape and isinstance(result[2], INTEGERS):
+        raise Refused(
+            "`lstsq` returns four things in a tuple: x, sum of squares, rank, singular values. Take the first, [0]"
+        )
+    if hasattr(result, "x") and hasattr(result, "success"):
+        raise Refused("the optimizer returns a whole report; its solution is the attribute `.x`")
     for method in ("as_matrix", "toarray"):
         if hasattr(result, method) and not isinstance(result, type):
             result = getattr(result, method)()
@@ -123,7 +130,12 @@ def _real(array, result, wanted):
     if array.dtype.kind == "c":
         if np.abs(array.imag).max(initial=0.0) > 0:
             cause = "a root of a negative number, or is `np.angle` missing?"
-            raise Refused(f"{wanted} of real numbers, got complex ones: {cause}")
+            real = (
+                "expected a real number, got a complex one"
+                if shape == ()
+                else f"{wanted} of real numbers, got complex ones"
+            )
+            raise Refused(f"{real}: {cause}")
         array = array.real
     if array.dtype.kind == "b":
         raise Refused(f"{wanted}, got True or False: is there a comparison where a formula should be?")

@@ -92,6 +92,8 @@ def _pose_relation(metric, results, expected, holds):
     if all(map(_are_rounded, results, expected)):
         return "your result is rounded: hand over all digits"
     *turn, origin = (max(d, key=lambda d: d.amount) for d in zip(*map(metric.deviations, results, expected)))
+    if all(map(not_accurate_enough, (*turn, origin))):
+        return None
     if all(d.within for d in turn):
         return f"the rotation is right, the translation is not: it is off by {origin.amount:.3g} {origin.unit}"
     if origin.within:

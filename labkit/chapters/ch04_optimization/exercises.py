@@ -10,9 +10,18 @@ from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
 
 
-def place(rng):
+def place(rng, within=3.0):
     """A point around the two wells."""
-    return (rng.uniform(-3, 3, 2),)
+    return (rng.uniform(-within, within, 2),)
+
+
+def in_a_well(rng):
+    """The center of a well, to the last bit or a little beside it."""
+    return (wells.CENTERS[rng.integers(2)] + rng.choice((0.0, 1e-3)) * rng.normal(size=2),)
+
+
+PLACES = (place, functools.partial(place, within=30.0), place, in_a_well)
+TWO = "the surface has two unknowns, so that it can be drawn"
 
 
 def turned(eigenvalues, angle):
@@ -22,23 +31,32 @@ def turned(eigenvalues, angle):
     return V @ np.diag(eigenvalues) @ V.T
 
 
-def kind_of_point(rng, kind):
-    """Gradient and Hessian of one kind of point: minimum, maximum, a saddle whose diagonal is positive, one whose
-    diagonal is mixed, one whose diagonal is negative, and three places that are not stationary: with a gradient
-    of negative entries only, with entries of both signs and a negative sum, and of positive entries only.
-
-    At the stationary ones |g| is about 1e-7, as after an iteration.
-    """
-    small, large = rng.uniform(0.5, 1.0), rng.uniform(4.0, 8.0)
-    bowl = (small, large)
-    eigenvalues = (bowl, (-large, -small), (-small, large), (-small, large), (-large, small), bowl, bowl, bowl)
-    angle = rng.uniform(2, 8) if kind == 3 else rng.uniform(30, 60)
-    signs = {5: (-1, -1), 7: (1, 1)}.get(kind, (1, -3))
-    g = rng.uniform(0.5, 1.3, 2) * signs * (1 if kind > 4 else 4e-8)
-    return g, turned(eigenvalues[kind], np.deg2rad(angle))
+def classify_extremum(g, H):
+    """Kind of a point by the rule that the notebook states: |g| against 1e-6, then the eigenvalues of H."""
+    if np.linalg.norm(g) > 1e-6:
+        return "not stationary"
+    return _by(np.linalg.eigvalsh)(H)
 
 
-KINDS = tuple(functools.partial(kind_of_point, kind=k) for k in range(8))
+def kind_of_point(rng, bends, length, signs=(1, -3), angle_deg=(30, 60)):
+    """Gradient of this length and Hessian that bends up (1) or down (-1) a little and much along two turned axes."""
+    eigenvalues = np.array([rng.uniform(0.5, 1.0), rng.uniform(4.0, 8.0)]) * bends
+    g = rng.uniform(0.9, 1.1, 2) * signs
+    return rng.uniform(*length) * g / np.linalg.norm(g), turned(eigenvalues, np.deg2rad(rng.uniform(*angle_deg)))
+
+
+BOWL, DOME, SADDLE, DEEP_SADDLE = (1, 1), (-1, -1), (-1, 1), (1, -1)
+VANISHED, STEEP = (5e-8, 2e-7), (0.5, 3.0)  # |g|: as after an iteration, and as anywhere
+KINDS = (
+    *(functools.partial(kind_of_point, bends=bends, length=VANISHED) for bends in (BOWL, DOME, SADDLE, DEEP_SADDLE)),
+    functools.partial(kind_of_point, bends=SADDLE, length=VANISHED, angle_deg=(2, 8)),  # its diagonal is mixed
+    *(functools.partial(kind_of_point, bends=BOWL, length=STEEP, signs=s) for s in ((-1, -1), (1, -3), (1, 1))),
+    *(functools.partial(kind_of_point, bends=bends, length=STEEP) for bends in (DOME, SADDLE, DEEP_SADDLE)),
+    functools.partial(kind_of_point, bends=BOWL, length=(6e-7, 9e-7)),  # on both sides of the limit, and a little off
+    functools.partial(kind_of_point, bends=BOWL, length=(1.1e-6, 1.2e-6), signs=(1, -1)),  # each entry is below it
+    *(functools.partial(kind_of_point, bends=BOWL, length=l) for l in ((2e-6, 5e-6), (2e-5, 5e-5), (2e-4, 5e-4))),
+    functools.partial(kind_of_point, bends=BOWL, length=(2e-3, 5e-3)),
+)
 
 
 def gradient_and_hessian(rng, signs):
@@ -50,9 +68,13 @@ def gradient_and_hessian(rng, signs):
 MODELS = tuple(functools.partial(gradient_and_hessian, signs=s) for s in ((1, 1), (-1, 1), (-1, -1), (1, -1)))
 
 
-def residual_and_jacobian(rng):
-    """Six residuals of two unknowns."""
-    return rng.normal(size=6), rng.normal(scale=2, size=(6, 2))
+def residual_and_jacobian(rng, m, n):
+    """m residuals of n unknowns, and a Jacobian far from singular."""
+    columns, axes = (np.linalg.qr(rng.normal(size=(k, n)))[0] for k in (m, n))
+    return rng.normal(scale=3, size=m), columns * rng.uniform(1, 4, n) @ axes.T
+
+
+SIZES = ((6, 2), (7, 3), (4, 1), (3, 3), (9, 5))
 
 
 def tried_step(rng, shares):
@@ -66,16 +88,23 @@ def tried_step(rng, shares):
 TRIED_STEPS = tuple(functools.partial(tried_step, shares=s) for s in ((0.2, 1.2), (-0.8, -0.2)))
 
 
-def dogleg_case(rng, between):
+def dogleg_case(rng, between, length):
     """Gradient, positive definite curvature and a radius, `between` the corner (at 0) and the Newton point (at 1)."""
-    g, B = rng.normal(scale=4, size=2), turned((rng.uniform(0.4, 0.8), rng.uniform(3, 5)), rng.uniform(0.3, 1.2))
+    angle = rng.uniform(-np.pi, np.pi)
+    across = angle + np.deg2rad(rng.uniform(30, 60))  # along an axis of B the path has no bend
+    B = turned((rng.uniform(0.4, 0.8), rng.uniform(3, 5)), angle)
+    g = rng.uniform(*length) * np.array([np.cos(across), np.sin(across)])
     corner = np.linalg.norm(opt.cauchy_step(g, B, 1e9))
     full = np.linalg.norm(opt.newton_step(g, B))
     share = rng.uniform(*between)
     return g, B, float((1 + share) * corner if share < 0 else corner + share * (full - corner))
 
 
-DOGLEG_CASES = tuple(functools.partial(dogleg_case, between=b) for b in ((-0.7, -0.2), (0.2, 0.8), (1.3, 2.0)))
+DOGLEG_CASES = tuple(
+    functools.partial(dogleg_case, between=between, length=length)
+    for length in ((15, 40), (0.01, 0.05))  # squares of lengths are larger, then smaller than the lengths
+    for between in ((-0.7, -0.2), (0.2, 0.8), (1.3, 2.0))
+)
 
 
 # Wrong variants --------------------------------------------------------------------------------------------------------------------------
@@ -92,6 +121,11 @@ def _gradient(power=2, depths=wells.DEPTHS, **changes):
         return (2 * np.array(depths) / q**power) @ d
 
     return variant
+
+
+def _factors(x):
+    """What multiplies x - c of each well in the gradient."""
+    return 2 * wells.DEPTHS / _terms(x)[1] ** 2
 
 
 def _gradient_without_square(x):
@@ -124,6 +158,16 @@ def _hessian_with(unit=UNIT, product=np.outer, wells_seen=(0, 1)):
     return variant
 
 
+def _jacobian(less, depths=wells.DEPTHS):
+    """The blocks √(w/q) (I - less), with something else than the outer product over q."""
+
+    def variant(x):
+        d, q = _terms(x)
+        return np.vstack([np.sqrt(depths[k] / q[k]) * (np.eye(2) - less(d[k], q[k])) for k in range(2)])
+
+    return variant
+
+
 def _diagonal_only(x):
     return np.diag(np.diag(wells.hessian(x)))
 
@@ -140,6 +184,16 @@ def _by(signs):
     return lambda H: "minimum" if (signs(H) > 0).all() else "maximum" if (signs(H) < 0).all() else "saddle"
 
 
+def _kind_before_slope(early):
+    """The words `early` are handed out before the gradient has been looked at."""
+
+    def variant(g, H):
+        kind = _by(np.linalg.eigvalsh)(H)
+        return kind if kind in early else classify_extremum(g, H)
+
+    return variant
+
+
 def _second_order_only(g, H):
     return _by(np.linalg.eigvalsh)(H)
 
@@ -149,7 +203,8 @@ def _first_order_only(g, H):
 
 
 def _swapped(g, H):
-    return {"minimum": "maximum", "maximum": "minimum"}.get(opt.classify_extremum(g, H), opt.classify_extremum(g, H))
+    kind = classify_extremum(g, H)
+    return {"minimum": "maximum", "maximum": "minimum"}.get(kind, kind)
 
 
 def _all_positive(H):
@@ -216,10 +271,21 @@ def _past_newton(g, B, radius):
     return corner + (-b + np.sqrt(b * b - a * c)) / a * leg
 
 
+def _wrong_comparison(g, B, radius):
+    """The square of the Newton step's length compared with the radius."""
+    full = opt.newton_step(g, B)
+    return full if full @ full <= radius else _past_newton(g, B, radius)
+
+
 def _dogleg(
-    corner=lambda p: p, full=lambda n: n, rim=None, share=lambda a, b, c: (-b + np.sqrt(b * b - a * c)) / a, leg=None
+    corner=lambda p: p,
+    full=lambda n: n,
+    rim=None,
+    share=lambda a, b, c: (-b + np.sqrt(b * b - a * c)) / a,
+    leg=None,
+    rim_term=np.square,
 ):
-    """The whole path, one of its parts replaced: corner, Newton point, step to the rim, share of the leg, leg."""
+    """The whole path, one of its parts replaced: corner, Newton point, step to the rim, share of the leg, leg, radius²."""
 
     def variant(g, B, radius):
         n, p = full(opt.newton_step(g, B)), corner(-(g @ g) / (g @ B @ g) * g)
@@ -228,7 +294,7 @@ def _dogleg(
         if np.linalg.norm(p) >= radius:
             return rim(g, p, radius) if rim else -radius * g / np.linalg.norm(g)
         way = leg(n, p) if leg else n - p
-        return p + share(way @ way, p @ way, p @ p - radius**2) * way
+        return p + share(way @ way, p @ way, p @ p - rim_term(radius)) * way
 
     return variant
 
@@ -239,12 +305,14 @@ CHAPTER = Chapter(
         Exercise(
             "gradient",
             reference=wells.gradient,
-            draw=place,
-            metric=metrics.Numbers(1e-9),
+            draw=PLACES,
+            fixed={"x": TWO},
+            metric=metrics.Numbers(1e-6),  # central differences are right as well
             hints=(
                 "Each well is −w/q with q = |x − c|² + 1. Differentiate it by the chain rule, q first.",
                 "The derivative of −w/q is (w/q²) times the gradient of q, and the gradient of q is 2(x − c).",
-                "`d1, d2 = x - [1, 1], x - [-1, -2]`, `q1, q2 = d1 @ d1 + 1, d2 @ d2 + 1`, `return 200 / q1**2 * d1 + 400 / q2**2 * d2`.",
+                "`d1, d2 = x - [1, 1], x - [-1, -2]\nq1, q2 = d1 @ d1 + 1, d2 @ d2 + 1\n"
+                "return 200 / q1**2 * d1 + 400 / q2**2 * d2`",
             ),
             mistakes=[
                 Mistake(
@@ -286,6 +354,36 @@ CHAPTER = Chapter(
                     "The second well is subtracted: both terms are −w/q, so their gradients add up.",
                 ),
                 Mistake(_gradient(one=0.0), "The 1 in q = |x − c|² + 1 is missing from your denominators."),
+                Mistake(
+                    lambda x: np.full(2, (_factors(x) / 2).sum()),
+                    "The inner derivative is missing: w/q² still has to be multiplied by the gradient of q, 2(x − c).",
+                    id="gradient-inner",
+                ),
+                Mistake(
+                    lambda x: np.full(2, _factors(x).sum()),
+                    "2w/q² is a number for each well; multiply it by x − c, which tells the direction.",
+                    id="gradient-direction",
+                ),
+                Mistake(
+                    lambda x: _factors(x).sum() * x,
+                    "The gradient of q = |x − c|² + 1 is 2(x − c), not 2x: each well pulls toward its own center.",
+                    id="gradient-center",
+                ),
+                Mistake(
+                    lambda x: np.repeat(wells.gradient(x)[0], 2),
+                    "Both entries are the derivative by x1. The second one is by x2: was a line copied?",
+                    id="gradient-copied",
+                ),
+                Mistake(
+                    lambda x: wells.gradient(x)[::-1],
+                    "The two entries have changed places: the derivative by x1 comes first.",
+                    id="gradient-order",
+                ),
+                Mistake(
+                    lambda x: wells.value(x),
+                    "This is f itself. The gradient has two entries, its derivatives by x1 and x2.",
+                    id="gradient-value",
+                ),
             ],
         ),
         Prediction(
@@ -298,13 +396,15 @@ CHAPTER = Chapter(
         Exercise(
             "hessian",
             reference=wells.hessian,
-            draw=place,
-            metric=metrics.Numbers(1e-9),
+            draw=PLACES,
+            fixed={"x": TWO},
+            metric=metrics.Numbers(1e-6),
             hints=(
                 "Differentiate the gradient (2w/q²)(x − c) once more: the product rule gives two terms for each well.",
-                "One term is (2w/q²) I. The other one is (x − c) times the gradient of 2w/q², an outer product.",
-                "`d1, d2 = x - [1, 1], x - [-1, -2]`, `q1, q2 = d1 @ d1 + 1, d2 @ d2 + 1`, `one = 200 / q1**2 * np.eye(2) - 800 / q1**3 * np.outer(d1, d1)`, "
-                "`return one + 400 / q2**2 * np.eye(2) - 1600 / q2**3 * np.outer(d2, d2)`.",
+                "One term is (2w/q²) I. The other one is (x − c) times the gradient of 2w/q², an outer product: −(8w/q³) (x − c)(x − c)ᵀ. "
+                "A loop over the two wells adds up both terms, with `np.eye(2)` and `np.outer(d, d)`.",
+                "`H = np.zeros((2, 2))\nfor w, c in ((100, [1, 1]), (200, [-1, -2])):\n    d = x - np.array(c)\n    q = d @ d + 1\n"
+                "    H += 2 * w / q**2 * np.eye(2) - 8 * w / q**3 * np.outer(d, d)\nreturn H`",
             ),
             mistakes=[
                 Mistake(
@@ -324,6 +424,11 @@ CHAPTER = Chapter(
                 Mistake(
                     _hessian_with(product=np.dot),
                     "`d @ d` is a number and lowers all four entries alike. The matrix is `np.outer(d, d)`.",
+                ),
+                Mistake(
+                    _hessian_with(product=lambda a, b: np.dot(a, b) * np.eye(2)),
+                    "`d @ d.T` of a vector is the number |d|²: the part that bends down is `np.outer(d, d)`, a matrix.",
+                    id="hessian-number",
                 ),
                 Mistake(
                     _hessian_with(product=np.multiply),
@@ -349,6 +454,31 @@ CHAPTER = Chapter(
                     _hessian(depths=(200.0, 100.0)), "The depths are exchanged: w = 100 at (1, 1), w = 200 at (−1, −2)."
                 ),
                 Mistake(
+                    _hessian(depths=(100.0, 100.0)),
+                    "The well at (−1, −2) is twice as deep: w = 200 there.",
+                    id="hessian-one-depth",
+                ),
+                Mistake(
+                    _hessian(power=4),
+                    "Your outer product is divided by q⁴: the derivative of 1/q² has q³ below, times that of q.",
+                    id="hessian-q4",
+                ),
+                Mistake(
+                    lambda x: wells.hessian(x) / 2,
+                    "Half of the Hessian: the 2 of 2(x − c) is missing in both terms, or you took the Hessian of ½|r|², which is f/2 but for a constant.",
+                    id="hessian-half",
+                ),
+                Mistake(
+                    lambda x: wells.jacobian(x).T @ wells.jacobian(x),
+                    "This is JᵀJ, the matrix of Gauss-Newton. The Hessian also holds what the second derivatives add.",
+                    id="hessian-gauss-newton",
+                ),
+                Mistake(
+                    lambda x: 2 * wells.jacobian(x).T @ wells.jacobian(x),
+                    "This is 2JᵀJ, what Gauss-Newton takes for it. The Hessian also holds what the second derivatives add.",
+                    id="hessian-gauss-newton-2",
+                ),
+                Mistake(
                     _hessian(second=(1.0, 2.0)), "The second well sits at (−1, −2): its offsets are x1 + 1 and x2 + 2."
                 ),
                 Mistake(_hessian(one=0.0), "The 1 in q = |x − c|² + 1 is missing."),
@@ -360,20 +490,56 @@ CHAPTER = Chapter(
         ),
         Exercise(
             "classify_extremum",
-            reference=opt.classify_extremum,
+            reference=classify_extremum,
             draw=KINDS,
             metric=metrics.Exactly(),
-            draws=16,
+            draws=len(KINDS),
+            fixed={"g": TWO, "H": TWO},
             hints=(
                 "First order first: only a place where the gradient vanishes is a candidate at all.",
                 "Second order: the signs of the eigenvalues of H tell how f bends along its two main directions.",
-                '`if np.linalg.norm(g) > 1e-6: return "not stationary"`, `e = np.linalg.eigvalsh(H)`, '
-                '`return "minimum" if (e > 0).all() else "maximum" if (e < 0).all() else "saddle"`.',
+                '`if np.linalg.norm(g) > 1e-6:\n    return "not stationary"\ne = np.linalg.eigvalsh(H)\n'
+                'return "minimum" if (e > 0).all() else "maximum" if (e < 0).all() else "saddle"`',
             ),
             mistakes=[
                 Mistake(
                     _second_order_only,
                     "You judge places where the gradient is not zero: they are no extrema, whatever H says.",
+                ),
+                Mistake(
+                    _kind_before_slope(("saddle",)),
+                    "You look for the saddle before you look at g. Where the gradient does not vanish, the point is no saddle either, "
+                    'however f bends: "not stationary" comes first.',
+                    id="classify-order-saddle",
+                ),
+                *(
+                    Mistake(
+                        _kind_before_slope(early),
+                        "You look at H before you look at g. Where the gradient does not vanish, the signs of the eigenvalues decide "
+                        'nothing: "not stationary" comes first.',
+                        id=f"classify-order-{k}",
+                    )
+                    for k, early in enumerate(
+                        (("maximum",), ("minimum",), ("minimum", "maximum"), ("maximum", "saddle"))
+                    )
+                ),
+                Mistake(
+                    _stationary(_by(np.linalg.eigvalsh), lambda g: g @ g > 1e-6),
+                    "In effect your limit for |g| is 1e-3: `g @ g` is the square of the length. Take its root, and compare that with 1e-6.",
+                    id="classify-square",
+                ),
+                Mistake(
+                    _stationary(_by(np.linalg.eigvalsh), lambda g: (np.abs(g) > 1e-6).any()),
+                    "You compare each entry with 1e-6. Both may be smaller while |g|, the root of the sum of their squares, is larger.",
+                    id="classify-entries",
+                ),
+                *(
+                    Mistake(
+                        _stationary(_by(np.linalg.eigvalsh), lambda g, limit=limit: np.linalg.norm(g) > limit),
+                        "Right where |g| is large, and where it is tiny. But your limit is not the stated one, 1e-6.",
+                        id=f"classify-limit-{k}",
+                    )
+                    for k, limit in enumerate((1e-5, 1e-4, 1e-2))
                 ),
                 Mistake(_first_order_only, "A vanishing gradient is necessary, not sufficient: a saddle has one too."),
                 Mistake(
@@ -421,7 +587,7 @@ CHAPTER = Chapter(
                     "Positive and negative components of g cancel in a sum: use its norm.",
                 ),
                 Mistake(
-                    lambda g, H: opt.classify_extremum(g, H).replace("saddle", "saddle point"),
+                    lambda g, H: classify_extremum(g, H).replace("saddle", "saddle point"),
                     'The kinds are right; the word is "saddle", without "point".',
                 ),
                 Mistake(
@@ -434,11 +600,12 @@ CHAPTER = Chapter(
             "newton_step",
             reference=opt.newton_step,
             draw=MODELS,
+            fixed={"g": TWO, "H": TWO},
             metric=metrics.Numbers(1e-9),
             hints=(
                 "The quadratic model is stationary where its gradient g + H h vanishes.",
                 "Solve H h = −g for h. No inverse is needed, and no H⁻¹ as in equation (2-26) either.",
-                "`return -np.linalg.solve(H, g)`.",
+                "`return -np.linalg.solve(H, g)`",
             ),
             mistakes=[
                 Mistake(
@@ -451,6 +618,21 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda g, H: -g / np.diag(H),
                     "Dividing by the diagonal ignores the mixed derivatives: solve the system.",
+                ),
+                Mistake(
+                    lambda g, H: -g / H,
+                    "`g / H` divides entry by entry, a row of H at a time, and leaves a 2x2 array. H h = −g is a system: `np.linalg.solve`.",
+                    id="newton-divided",
+                ),
+                Mistake(
+                    lambda g, H: g / H,
+                    "`g / H` divides entry by entry, a row of H at a time, and leaves a 2x2 array. H h = −g is a system: `np.linalg.solve`.",
+                    id="newton-divided-plus",
+                ),
+                Mistake(
+                    lambda g, H: H @ g,
+                    "You multiplied by H, and the sign is missing: the step solves H h = −g.",
+                    id="newton-times",
                 ),
                 Mistake(lambda g, H: -g, "That is steepest descent: H is not used at all."),
                 Mistake(
@@ -474,7 +656,7 @@ CHAPTER = Chapter(
             hints=(
                 "Close to a place where the gradient vanishes Newton goes there, whatever its kind.",
                 "Start at (0, 0) and repeat x = x + newton_step(gradient(x), hessian(x)) until x stands still. If it runs away, start between the wells.",
-                "Ten rounds of `x = x + newton_step(gradient(x), hessian(x))` from `x = np.zeros(2)` are plenty.",
+                "`saddle = np.zeros(2)\nfor _ in range(10):\n    saddle = saddle + newton_step(gradient(saddle), hessian(saddle))`",
             ),
             mistakes=[
                 Mistake(
@@ -503,14 +685,91 @@ CHAPTER = Chapter(
             why="For Newton the saddle is a root of the gradient like any other, with a whole neighborhood that flows into it.",
         ),
         Exercise(
+            "jacobian",
+            reference=wells.jacobian,
+            draw=PLACES,
+            fixed={"x": TWO},
+            metric=metrics.Numbers(1e-6),
+            hints=(
+                "Each residual vector is √(w/q) times x − c, a product: two terms for each well, a 2x2 block.",
+                "√(w/q) times the derivative of x − c, which is I, plus (x − c) times the gradient of √(w/q), an outer product: "
+                "√(w/q) (I − (x − c)(x − c)ᵀ/q). The block of the well at (1, 1) comes first, the other beneath it.",
+                "`blocks = []\nfor w, c in ((100, [1, 1]), (200, [-1, -2])):\n    d = x - np.array(c)\n    q = d @ d + 1\n"
+                "    blocks.append(np.sqrt(w / q) * (np.eye(2) - np.outer(d, d) / q))\nreturn np.vstack(blocks)`",
+            ),
+            mistakes=[
+                Mistake(
+                    _jacobian(lambda d, q: 0 * np.outer(d, d)),
+                    "You differentiated only x − c. The factor √(w/q) depends on x as well: product rule.",
+                    id="jacobian-product-rule",
+                ),
+                Mistake(
+                    _jacobian(lambda d, q: -np.outer(d, d) / q),
+                    "The outer product has the wrong sign: √(w/q) shrinks as q grows.",
+                    id="jacobian-sign",
+                ),
+                Mistake(
+                    _jacobian(lambda d, q: 2 * np.outer(d, d) / q),
+                    "The outer product is twice too large: the root has the derivative ½ w/q² divided by √(w/q), times 2(x − c).",
+                    id="jacobian-twice",
+                ),
+                Mistake(
+                    _jacobian(lambda d, q: np.outer(d, d) / 2 / q),
+                    "The outer product is half of what it should be: the gradient of q is 2(x − c).",
+                    id="jacobian-half",
+                ),
+                Mistake(
+                    _jacobian(lambda d, q: np.outer(d, d)),
+                    "The outer product is to be divided by q: √(w/q) (I − (x − c)(x − c)ᵀ/q).",
+                    id="jacobian-no-q",
+                ),
+                Mistake(
+                    _jacobian(lambda d, q: d @ d / q * np.eye(2)),
+                    "`d @ d` is a number. The matrix is `np.outer(d, d)`.",
+                    id="jacobian-number",
+                ),
+                Mistake(
+                    _jacobian(lambda d, q: np.outer(d, d) / q, depths=(10000.0, 40000.0)),
+                    "The root of w is missing: the residuals hold √(w/q), so that their squares hold w/q.",
+                    id="jacobian-root",
+                ),
+                Mistake(
+                    _jacobian(lambda d, q: np.outer(d, d) / q, depths=(200.0, 100.0)),
+                    "The depths are exchanged: w = 100 at (1, 1), w = 200 at (−1, −2).",
+                    id="jacobian-depths",
+                ),
+                Mistake(
+                    lambda x: wells.jacobian(x)[[2, 3, 0, 1]],
+                    "The blocks have changed places: the rows of the well at (1, 1) come first.",
+                    id="jacobian-order",
+                ),
+                Mistake(
+                    lambda x: wells.jacobian(x).T,
+                    "This is the transpose: one row a residual, one column an unknown, shape (4, 2).",
+                    id="jacobian-transpose",
+                ),
+                Mistake(
+                    lambda x: wells.jacobian(x).reshape(2, 2, 2).sum(0),
+                    "You added the blocks of the two wells. The four residuals stay apart: one block beneath the other, `np.vstack`.",
+                    id="jacobian-added",
+                ),
+                Mistake(
+                    lambda x: 2 * wells.jacobian(x).T @ wells.residual(x),
+                    "This is the gradient of f, 2Jᵀr. J itself has four rows, one a residual.",
+                    id="jacobian-gradient",
+                ),
+            ],
+        ),
+        Exercise(
             "gauss_newton_step",
             reference=opt.gauss_newton_step,
-            draw=residual_and_jacobian,
+            draw=tuple(functools.partial(residual_and_jacobian, m=m, n=n) for m, n in SIZES),
             metric=metrics.Numbers(1e-8),
             hints=(
                 "Replace r(x + h) by r + J h and minimize its length.",
-                "That is linear least squares with matrix J and right-hand side −r; its normal equations are J'J h = −J'r.",
-                "`return -np.linalg.lstsq(J, r)[0]`. The normal equations are right as well; they lose twice the digits, as in chapter 3.",
+                "That is linear least squares with matrix J and right-hand side −r; its normal equations are JᵀJ h = −Jᵀr. "
+                "They are right as well, but lose twice the digits, as in chapter 3.",
+                "`return -np.linalg.lstsq(J, r, rcond=None)[0]`",
             ),
             mistakes=[
                 Mistake(
@@ -518,16 +777,16 @@ CHAPTER = Chapter(
                     "The sign is wrong: r + J h should become small, so h has to counter r.",
                 ),
                 Mistake(
-                    lambda r, J: -J.T @ r, "That is the gradient of the cost, downhill; the curvature J'J is missing."
+                    lambda r, J: -J.T @ r, "That is the gradient of the cost, downhill; the curvature JᵀJ is missing."
                 ),
-                Mistake(lambda r, J: -J.T @ J @ J.T @ r, "You multiplied by J'J instead of solving with it."),
+                Mistake(lambda r, J: -J.T @ J @ J.T @ r, "You multiplied by JᵀJ instead of solving with it."),
                 Mistake(
                     lambda r, J: -0.5 * np.linalg.lstsq(J, r)[0],
-                    "Half a step: cost 1/2 |r|² has gradient J'r and curvature J'J, both without a 2.",
+                    "Half a step: cost ½|r|² has gradient Jᵀr and curvature JᵀJ, both without a 2.",
                 ),
                 Mistake(
                     lambda r, J: -(J.T @ r) / (J * J).sum(0),
-                    "Only the diagonal of J'J is used: the columns of J are not perpendicular.",
+                    "Only the diagonal of JᵀJ is used: the columns of J are not perpendicular.",
                 ),
             ],
         ),
@@ -535,12 +794,13 @@ CHAPTER = Chapter(
             "gain_ratio",
             reference=opt.gain_ratio,
             draw=TRIED_STEPS,
+            fixed={"g": TWO, "B": TWO, "step": TWO},
             metric=metrics.Numbers(1e-8),
             draws=6,
             hints=(
                 "Compare what the step brought with what the model promised, equation (2-36).",
-                "Actual: cost − new_cost. Promised: m(0) − m(h) with m(h) = cost + g'h + 1/2 h'B h.",
-                "`return (cost - new_cost) / -(g @ step + 0.5 * step @ B @ step)`.",
+                "Actual: cost − new_cost. Promised: m(0) − m(h) with m(h) = cost + gᵀh + ½ hᵀB h.",
+                "`return (cost - new_cost) / -(g @ step + 0.5 * step @ B @ step)`",
             ),
             mistakes=[
                 Mistake(
@@ -553,7 +813,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda cost, new_cost, g, B, step: (cost - new_cost) / _predicted(g, B, step, half=0.0),
-                    "Only the linear term is promised here: the curvature 1/2 h'B h is missing.",
+                    "Only the linear term is promised here: the curvature ½ hᵀB h is missing.",
                 ),
                 Mistake(
                     lambda cost, new_cost, g, B, step: (new_cost - cost) / _predicted(g, B, step),
@@ -561,7 +821,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda cost, new_cost, g, B, step: (cost - new_cost) / _predicted(g, B, step, half=-0.5),
-                    "The promised decrease m(0) − m(h) changes the sign of both terms, of 1/2 h'B h too.",
+                    "The promised decrease m(0) − m(h) changes the sign of both terms, of ½ hᵀB h too.",
                 ),
                 Mistake(
                     lambda cost, new_cost, g, B, step: abs(cost - new_cost) / _predicted(g, B, step),
@@ -574,6 +834,26 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda cost, new_cost, g, B, step: new_cost / (cost - _predicted(g, B, step)),
                     "This compares values, new cost with m(h). The gain compares decreases.",
+                ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: (cost - new_cost) / cost,
+                    "You divide by the cost. The gain compares with what the model promised, m(0) − m(h).",
+                    id="gain-of-cost",
+                ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: (cost - new_cost) / _predicted(g, np.diag(np.diag(B)), step),
+                    "Only the diagonal of B is used, as by `B * step * step` or a sum of squares: the term is ½ hᵀB h, `step @ B @ step`.",
+                    id="gain-diagonal",
+                ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: (cost - new_cost) / (0.5 * step @ B @ step),
+                    "The linear term of the model is missing: it promises −gᵀh − ½ hᵀB h.",
+                    id="gain-no-slope",
+                ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: (cost - new_cost) / -(0.5 * step @ B @ step),
+                    "The linear term of the model is missing: it promises −gᵀh − ½ hᵀB h.",
+                    id="gain-no-slope-minus",
                 ),
                 Mistake(
                     lambda cost, new_cost, g, B, step: cost - new_cost,
@@ -594,13 +874,17 @@ CHAPTER = Chapter(
             reference=opt.dogleg_step,
             draw=DOGLEG_CASES,
             metric=metrics.Numbers(1e-8),
-            draws=9,
+            draws=12,
+            fixed={"g": TWO, "B": TWO},
             hints=(
-                "Three cases: the Newton point is inside; the corner is outside; the rim cuts the second leg.",
-                "The corner is −(g'g / g'Bg) g. On the second leg solve |corner + s (newton − corner)| = radius for s between 0 and 1.",
-                "`newton, corner = np.linalg.solve(B, -g), -(g @ g) / (g @ B @ g) * g`, `if np.linalg.norm(newton) <= radius: return newton`, "
-                "`if np.linalg.norm(corner) >= radius: return -radius * g / np.linalg.norm(g)`, `leg = newton - corner`, "
-                "`a, b, c = leg @ leg, corner @ leg, corner @ corner - radius**2`, `return corner + (-b + np.sqrt(b * b - a * c)) / a * leg`.",
+                "Three cases: the Newton point is inside; the corner is outside; the rim cuts the second leg. The corner is −(gᵀg / gᵀBg) g. "
+                "On the second leg solve |corner + s (newton − corner)| = radius for s between 0 and 1.",
+                "Compute `newton` and `corner` first. If |newton| ≤ radius, return newton. If |corner| ≥ radius, return the vector of length "
+                "radius along −g. Otherwise `leg = newton - corner`, and with a = legᵀleg, b = cornerᵀleg, c = cornerᵀcorner − radius² return "
+                "corner + s leg with s = (−b + √(b² − ac))/a.",
+                "`newton, corner = np.linalg.solve(B, -g), -(g @ g) / (g @ B @ g) * g\nif np.linalg.norm(newton) <= radius:\n    return newton\n"
+                "if np.linalg.norm(corner) >= radius:\n    return -radius * g / np.linalg.norm(g)\nleg = newton - corner\n"
+                "a, b, c = leg @ leg, corner @ leg, corner @ corner - radius**2\nreturn corner + (-b + np.sqrt(b * b - a * c)) / a * leg`",
             ),
             mistakes=[
                 Mistake(
@@ -609,6 +893,22 @@ CHAPTER = Chapter(
                 Mistake(
                     _cut_newton,
                     "You shorten the Newton step to the radius. The dogleg bends: first downhill, then toward Newton.",
+                ),
+                Mistake(
+                    _wrong_comparison,
+                    "You compare |newton|² with the radius: `newton @ newton` is the square of the length. Take the root, or square the radius.",
+                    id="dogleg-square",
+                ),
+                Mistake(
+                    _dogleg(rim_term=lambda radius: radius),
+                    "On the second leg the radius is to be squared: c = cornerᵀcorner − radius².",
+                    id="dogleg-root-of-radius",
+                ),
+                Mistake(
+                    _dogleg(share=lambda a, b, c: np.nan),
+                    "NaN on the second leg: is it the root of a negative number? It is b² − ac with c = cornerᵀcorner − radius², which is "
+                    "negative there, so that b² − ac is positive.",
+                    id="dogleg-nan",
                 ),
                 Mistake(
                     _uncut_newton,
@@ -652,7 +952,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _dogleg(share=lambda a, b, c: (-b - np.sqrt(b * b - a * c)) / a),
-                    "The other root leads backward, to s below 0: take the one with + before the square root.",
+                    "Your step leaves the corner backward, away from the Newton point: the root with − before the square root leads there, "
+                    "and so does a leg from newton to corner in place of newton − corner.",
                 ),
                 Mistake(
                     _dogleg(share=lambda a, b, c: (-b + np.sqrt(b * b - 4 * a * c)) / (2 * a)),
@@ -661,7 +962,7 @@ CHAPTER = Chapter(
                 Mistake(
                     _dogleg(leg=lambda n, p: n), "The second leg is newton − corner; yours is the whole Newton step."
                 ),
-                Mistake(_dogleg(corner=lambda p: -p), "Your corner lies uphill: it is −(g'g / g'Bg) g."),
+                Mistake(_dogleg(corner=lambda p: -p), "Your corner lies uphill: it is −(gᵀg / gᵀBg) g."),
                 Mistake(_dogleg(full=lambda n: -n), "Your Newton point has the wrong sign: it solves B h = −g."),
                 Mistake(_leg_from_zero, "The second leg starts at the corner: add corner to s times the leg."),
             ],
@@ -684,6 +985,21 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(lambda: 0.5**4, "That is one stand-in by itself. Five were tried."),
+                Mistake(
+                    lambda: 5 * 0.5**4 * (1 - 0.5**4) ** 4,
+                    "That is the probability that exactly one of the five is right. Two or more count as well.",
+                    id="luck-exactly-one",
+                ),
+                Mistake(
+                    lambda: 1 - 0.5**5,
+                    "That is one landing, tried five times. A stand-in must have all four landings right: p = ½⁴.",
+                    id="luck-one-landing",
+                ),
+                Mistake(
+                    lambda: 1 - (1 - 1 / 3**4) ** 5,
+                    "You gave each landing three outcomes. The toss has two, L or G.",
+                    id="luck-three-sides",
+                ),
                 Mistake(
                     lambda: 5 * 0.5**4,
                     "Adding up counts those cases several times where more than one stand-in is right.",

@@ -1,0 +1,110 @@
+"""Answers to chapter 4 that once passed by luck, or were told something untrue."""
+
+import numpy as np
+import pytest
+
+from labkit.chapters.ch04_optimization.exercises import CHAPTER
+from labkit.documents.thesis import wells
+from labkit.estimation import optimization as opt
+from labkit.exercises.engine import CORRECT, NOT_YET
+
+ITEMS = {item.id: item for item in CHAPTER.items}
+SEEDS = range(5)
+
+
+def judged(name, answer, seed=0):
+    return ITEMS[name].judge(answer, rng=np.random.default_rng(seed))
+
+
+def kind(H):
+    e = np.linalg.eigvalsh(H)
+    return "minimum" if e[0] > 0 else "maximum" if e[1] < 0 else "saddle"
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_slope_is_looked_at_before_the_kind(seed):
+    def saddle_first(g, H):
+        return "saddle" if kind(H) == "saddle" else "not stationary" if np.linalg.norm(g) > 1e-6 else kind(H)
+
+    outcome = judged("classify_extremum", saddle_first, seed)
+    assert outcome.status == NOT_YET and "saddle before you look at g" in outcome.text
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(
+    "moves, words",
+    [
+        (lambda g: g @ g > 1e-6, "square of the length"),
+        (lambda g: (abs(g) > 1e-6).any(), "each entry"),
+        (lambda g: np.linalg.norm(g) > 1e-3, "limit"),
+        (lambda g: np.linalg.norm(g) > 0.1, "limit"),
+    ],
+)
+def test_the_limit_is_the_stated_one(moves, words, seed):
+    outcome = judged("classify_extremum", lambda g, H: "not stationary" if moves(g) else kind(H), seed)
+    assert outcome.status == NOT_YET and words in outcome.text
+
+
+def test_break_it_shows_two_answers_also_to_whoever_has_not_solved_it():
+    """Out on the plain |g| < 1e-6, so the stated rule speaks of a kind, and the library's does not."""
+    run = wells.run("newton", (3.0, 3.0))
+    g, H = wells.gradient(run.solution), wells.hessian(run.solution)
+    assert ITEMS["classify_extremum"].reference(g, H) == "saddle"
+    assert opt.classify_extremum(g, H) == "not stationary"
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_gauss_newton_step_is_not_wired_to_two_unknowns(seed):
+    def two(r, J):
+        (a, b), (_, d) = J.T @ J
+        p, q = -J.T @ r
+        return np.array([d * p - b * q, a * q - b * p]) / (a * d - b * b)
+
+    assert judged("gauss_newton_step", two, seed).status != CORRECT
+    outcome = judged("gauss_newton_step", lambda r, J: np.linalg.lstsq(J, -r, rcond=None), seed)
+    assert outcome.status == NOT_YET and "[0]" in outcome.text
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_leg_taken_backward_is_no_matter_of_the_root_alone(seed):
+    def backward(g, B, radius):
+        newton, corner = np.linalg.solve(B, -g), -(g @ g) / (g @ B @ g) * g
+        if np.linalg.norm(newton) <= radius:
+            return newton
+        if np.linalg.norm(corner) >= radius:
+            return -radius * g / np.linalg.norm(g)
+        leg = corner - newton
+        a, b, c = leg @ leg, corner @ leg, corner @ corner - radius**2
+        return corner + (-b + np.sqrt(b * b - a * c)) / a * leg
+
+    assert "and so does a leg from newton to corner" in judged("dogleg_step", backward, seed).text
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_square_of_a_length_is_never_a_length(seed):
+    def squares(g, B, radius):
+        newton, corner = np.linalg.solve(B, -g), -(g @ g) / (g @ B @ g) * g
+        if newton @ newton <= radius:
+            return newton
+        return opt.dogleg_step(g, B, radius)
+
+    assert judged("dogleg_step", squares, seed).status == NOT_YET
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("h", [1e-5, 1e-6])
+def test_differences_are_a_right_way_to_a_derivative(h, seed):
+    def by_differences(function):
+        return lambda x: np.stack([(function(x + e) - function(x - e)) / (2 * h) for e in h * np.eye(2)], axis=-1)
+
+    assert judged("hessian", by_differences(wells.gradient), seed).status == CORRECT
+    assert judged("jacobian", by_differences(wells.residual), seed).status == CORRECT
+
+
+def test_what_question_2_compares():
+    """J'J belongs to half of f + 300, so its partner is H / 2, and both agree where the residuals vanish."""
+    deep = wells.extrema()[1].x
+    J, H = wells.jacobian(deep), wells.hessian(deep)
+    r = wells.residual(deep)
+    assert np.isclose(r @ r, wells.value(deep) + 300)
+    assert np.abs(J.T @ J - H / 2).max() < 0.05 * np.abs(H / 2).max()
