@@ -97,7 +97,7 @@ def _value(result):
         raise Refused("it returned `...`: the placeholder is still there")
     if inspect.isgenerator(result) or inspect.iscoroutine(result):
         raise Refused(f"it returned a {type(result).__name__}: use `return`, not `yield`")
-    if type(result) is tuple and len(result) == 4 and np.shape(result[0]) == shape and isinstance(result[2], INTEGERS):
+    if type(result) is tuple and len(result) == 4 and np.ndim(result[0]) and isinstance(result[2], INTEGERS):
         raise Refused(
             "`lstsq` returns four things in a tuple: x, sum of squares, rank, singular values. Take the first, [0]"
         )
@@ -131,9 +131,9 @@ def _real(array, result, wanted):
         if np.abs(array.imag).max(initial=0.0) > 0:
             cause = "a root of a negative number, or is `np.angle` missing?"
             real = (
-                "expected a real number, got a complex one"
-                if shape == ()
-                else f"{wanted} of real numbers, got complex ones"
+                f"{wanted} of real numbers, got complex ones"
+                if array.ndim
+                else "expected a real number, got a complex one"
             )
             raise Refused(f"{real}: {cause}")
         array = array.real
