@@ -19,6 +19,7 @@ from ..estimation.influence import inverse_normal, leave_out
 from ..geometry.frames import invert, pose_distance
 from ..geometry.lie import log_so3
 from . import advice
+from .ax_xb import calibrate_hand_eye
 from .own_data import (
     FrameModel,
     HandEyeModel,
@@ -226,8 +227,9 @@ class Comparison:
 
 
 def hand_eye(
-    robot, sensor, *, eye_to_hand=False, std_rot=None, std_trans=None, groups=None, length_unit="mm", judge_roles=True
-):
+    robot, sensor, *, eye_to_hand=False, std_rot=None, std_trans=None, groups=None, length_unit="mm", judge_roles=True,
+    solver=calibrate_hand_eye,
+):  # fmt: skip
     """Where a sensor sits on a flange, or beside the robot, from poses of both.
 
     Parameters
@@ -245,6 +247,8 @@ def hand_eye(
     length_unit : str
     judge_roles : bool
         Refuse data whose inverses fit far better.
+    solver : callable
+        Fits a mounting; `fast.ax_xb.calibrate_hand_eye` gives the same and is quick.
 
     Returns
     -------
@@ -257,14 +261,14 @@ def hand_eye(
         One sentence: poses that do not turn enough, roles that seem mixed up, no majority.
     """
     robot = as_transforms(robot, "robot")
-    model = HandEyeModel(invert(robot) if eye_to_hand else robot, sensor, (std_rot, std_trans))
+    model = HandEyeModel(invert(robot) if eye_to_hand else robot, sensor, (std_rot, std_trans), solver)
     advice.refuse_one_axis(model.T_BF)
     if judge_roles:
         advice.refuse_mixed_roles(model, eye_to_hand)
     solution, kept = majority(model)
     advice.refuse_open_loop(model.T_BF[kept], model.linearize(solution)[0][kept])
     frame = "base" if eye_to_hand else "flange"
-    plain = _attempt(lambda: model.fit(np.ones(model.n, bool)))
+    plain = _attempt(lambda: model.fitted(np.ones(model.n, bool)))
     found = _assembled(
         model, solution, kept, plain, groups, length_unit,
         kind="hand-eye", meaning=f"sensor in the {frame}", T=solution[0], T_target=solution[1], frame=frame,
@@ -293,7 +297,7 @@ def pivot(poses, *, groups=None, length_unit="mm"):
     model = PivotModel(poses)
     advice.refuse_one_axis(model.T_WF, "the tool")
     solution, kept = majority(model)
-    plain = _attempt(lambda: model.fit(np.ones(model.n, bool)))
+    plain = _attempt(lambda: model.fitted(np.ones(model.n, bool)))
     tip, point = solution
     T = np.eye(4)
     T[:3, 3] = tip
@@ -326,7 +330,7 @@ def sphere(robot, points, *, groups=None, length_unit="mm"):
     model = SphereModel(robot, points)
     advice.refuse_one_axis(model.T_BF)
     solution, kept = majority(model)
-    plain = _attempt(lambda: model.fit(np.ones(model.n, bool)))
+    plain = _attempt(lambda: model.fitted(np.ones(model.n, bool)))
     found = _assembled(
         model, solution, kept, plain, groups, length_unit,
         kind="sphere", meaning="sensor in the flange", T=solution[0], points={"center": solution[1]}, frame="flange",
@@ -368,14 +372,14 @@ def frame(points, nominal=None, *, std_trans=None, groups=None, length_unit="mm"
     if model.n < 3:
         raise ValueError(f"a frame needs at least 3 points, got {model.n}")
     solution, kept = majority(model)
-    plain = _attempt(lambda: model.fit(np.ones(model.n, bool)))
+    plain = _attempt(lambda: model.fitted(np.ones(model.n, bool)))
     return _assembled(
         model, solution, kept, plain, groups, length_unit,
         kind="frame", meaning="frame in the measuring system", T=solution[0], frame="frame",
     )  # fmt: skip
 
 
-def compare(time_a, a, time_b, b, *, length_unit="mm", max_offset=None, max_gap=None):
+def compare(time_a, a, time_b, b, *, length_unit="mm", max_offset=None, max_gap=None, solver=calibrate_hand_eye):
     """Two streams of poses of one motion on two clocks: mounting, clock offset, and the error of the second.
 
     Parameters
@@ -407,7 +411,7 @@ def compare(time_a, a, time_b, b, *, length_unit="mm", max_offset=None, max_gap=
         raise ValueError(f"only {int(known.sum())} samples of the second stream fall within the first")
     reference, seen, when = reference[known], b[known], when[known]
     rows = np.unique(np.linspace(0, len(seen) - 1, min(FIT_ROWS, len(seen))).astype(int))
-    found = hand_eye(reference[rows], invert(seen[rows]), length_unit=length_unit, judge_roles=False)
+    found = hand_eye(reference[rows], invert(seen[rows]), length_unit=length_unit, judge_roles=False, solver=solver)
     predicted = invert(found.T_target) @ reference @ found.T
     angle, distance = pose_distance(predicted, seen)
     step = np.maximum(np.gradient(when), 1e-9)
@@ -489,12 +493,12 @@ def _moved(model, kept):
     other = _attempt(lambda: model.fit(~kept))
     if other is None:
         return ()
-    r, _, std = model.whitened(model.fit(kept), kept)
+    r, _, std = model.whitened(model.fitted(kept), kept)
     again = model.linearize(other)[0][~kept] / np.repeat(std, model.channels)
     block = advice.moved_block(kept, np.median((again**2).sum(1)) < 4 * again.shape[1])
     if block is None:
         return ()
-    angle, distance = pose_distance(model.fit(kept)[0], other[0])
+    angle, distance = pose_distance(model.fitted(kept)[0], other[0])
     return (
         f"rows {block[0]} to {block[1]} agree among themselves, but with another mounting, {np.rad2deg(angle):.2g} deg "
         f"and {distance:.3g} away: did something slip before row {block[0]}?",

@@ -38,7 +38,14 @@ class Model:
     needed = 3
 
     def __init__(self, n, std):
-        self.n, self.std = n, std
+        self.n, self.std, self._fits = n, std, {}
+
+    def fitted(self, kept):
+        """The solution from some rows, remembered."""
+        key = np.asarray(kept, bool).tobytes()
+        if key not in self._fits:
+            self._fits[key] = self.fit(kept)
+        return self._fits[key]
 
     def fit(self, kept):
         """The solution from some rows."""
@@ -106,7 +113,7 @@ def majority(model):
             raise ValueError(
                 f"only {int(kept.sum())} of {model.n} rows agree with each other, so no majority can be followed"
             )
-        solution = model.fit(kept)
+        solution = model.fitted(kept)
         r, J, _ = model.whitened(solution, kept)
         dof = kept.sum() * r.shape[1] - J.shape[2] if None in model.std else 10**6
         fresh = squared_distances(r, J, kept) <= stretch * distance_limit(r.shape[1], dof)
@@ -114,7 +121,7 @@ def majority(model):
             break
         stretch, kept = 1.0, fresh
         seen.append(fresh)
-    return model.fit(kept), kept
+    return model.fitted(kept), kept
 
 
 def best_candidate(n, solve, misfit, seed=0):
@@ -209,20 +216,20 @@ class HandEyeModel(Model):
 
     channels = (3, 3)
 
-    def __init__(self, T_BF, T_ST, std=(None, None)):
+    def __init__(self, T_BF, T_ST, std=(None, None), solver=calibrate_hand_eye):
         T_BF, T_ST = as_transforms(T_BF, "robot"), as_transforms(T_ST, "sensor")
         if T_BF.ndim != 3 or T_BF.shape != T_ST.shape:
             raise ValueError(f"robot and sensor must be as many poses, (N, 4, 4), got {T_BF.shape} and {T_ST.shape}")
         if len(T_BF) < 3:
             raise ValueError(f"hand-eye calibration needs at least 3 poses, better 10, got {len(T_BF)}")
         super().__init__(len(T_BF), std)
-        self.T_BF, self.T_ST = T_BF, T_ST
+        self.T_BF, self.T_ST, self.solver = T_BF, T_ST, solver
 
     def size(self, channel):
         return 1.0 if channel == 0 else np.abs(self.T_BF[:, :3, 3]).max() + np.abs(self.T_ST[:, :3, 3]).max()
 
     def fit(self, kept):
-        found = calibrate_hand_eye(self.T_BF[kept], self.T_ST[kept], *self.std)
+        found = self.solver(self.T_BF[kept], self.T_ST[kept], *self.std)
         return found.T_FS, found.T_BT
 
     def linearize(self, solution):

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..calibration import calibrate
+from ..fast.ax_xb import calibrate_hand_eye
 from ..files.points import read_points
 from ..files.poses import FORMATS, read_pairs, read_poses, refuse_times
 from ..geometry.frames import kuka_from_matrix
@@ -120,6 +121,7 @@ def _hand_eye(options):
         std_trans=options.std_trans,
         groups=groups,
         length_unit=unit,
+        solver=calibrate_hand_eye,
     )
     return result, (robot.assumed, sensor.assumed)
 
@@ -160,7 +162,7 @@ def _compare(options):
     unit = _same_unit(options, a)
     result = calibrate.compare(
         a.time, a.in_unit(unit).T, b.time, b.in_unit(unit).T,
-        length_unit=unit, max_offset=options.max_offset, max_gap=options.max_gap,
+        length_unit=unit, max_offset=options.max_offset, max_gap=options.max_gap, solver=calibrate_hand_eye,
     )  # fmt: skip
     return result, (a.assumed, b.assumed)
 

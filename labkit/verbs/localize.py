@@ -17,7 +17,7 @@ from ..localization.path import LIMIT
 from . import report
 from .arguments import Parser, Refusal, run, write
 
-SHOWN_POSES, SHOWN_ELLIPSES, SHOWN_ROWS = 2000, 25, 40
+SHOWN_POSES, SHOWN_ELLIPSES, SHOWN_ROWS = 2000, 25, 20
 
 
 def main(arguments):

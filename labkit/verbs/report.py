@@ -12,7 +12,7 @@ from string import Template
 import numpy as np
 
 WIDTH, HEIGHT, LEFT, BOTTOM = 860, 190, 70, 30  # of a chart, in pixels
-MAX_MARKS = 600  # of a chart; more rows are thinned, the rejected ones always shown
+MAX_MARKS = 600  # of a chart, and as many rejected ones; more rows are thinned
 
 
 def page(title, sections):
@@ -66,7 +66,9 @@ def chart(values, kept, label, name="row", limit=None, alone=None):
     n = len(values)
     good = values[kept]
     top = 1.25 * max(np.max(good, initial=0.0), limit or 0.0, 1e-12)
-    rows = np.unique(np.concatenate([np.linspace(0, n - 1, min(n, MAX_MARKS)).astype(int), np.flatnonzero(~kept)]))
+    out = np.flatnonzero(~kept)
+    out = out[:: max(len(out) // MAX_MARKS, 1)]
+    rows = np.unique(np.concatenate([np.linspace(0, n - 1, min(n, MAX_MARKS)).astype(int), out]))
     across = lambda k: LEFT + (WIDTH - LEFT - 15) * (k + 0.5) / n  # noqa: E731
     up = lambda v: HEIGHT - BOTTOM - (HEIGHT - BOTTOM - 15) * min(v / top, 1.0)  # noqa: E731
     thick = max(1.0, min(14.0, 0.6 * (WIDTH - LEFT) / n))
