@@ -32,6 +32,7 @@ from .own_data import (
 
 POSE = ("rotation x", "rotation y", "rotation z", "translation x", "translation y", "translation z")
 MANY_REJECTED = 0.2  # of the rows
+LOOSE = 0.1  # of the spread of the positions: residuals as large are more than noise
 FIT_ROWS = 300  # of two streams, spread evenly: neighbors say the same
 FASTEST_BINS = 6
 
@@ -411,13 +412,21 @@ def compare(time_a, a, time_b, b, *, length_unit="mm", max_offset=None, max_gap=
         raise ValueError(f"only {int(known.sum())} samples of the second stream fall within the first")
     reference, seen, when = reference[known], b[known], when[known]
     rows = np.unique(np.linspace(0, len(seen) - 1, min(FIT_ROWS, len(seen))).astype(int))
-    found = hand_eye(reference[rows], invert(seen[rows]), length_unit=length_unit, judge_roles=False, solver=solver)
+    # B = Y^-1 A X is the loop of a sensor that stands still, Y, and reads the marker X on the flange A
+    model = HandEyeModel(invert(reference[rows]), seen[rows], solver=solver)
+    advice.refuse_one_axis(model.T_BF)
+    solution, kept = majority(model)
+    advice.refuse_open_loop(model.T_BF[kept], model.linearize(solution)[0][kept])
+    found = _assembled(
+        model, solution, kept, None, None, length_unit, kind="compare", meaning="marker in the flange",
+        T=solution[1], T_target=solution[0], frame="flange", part=slice(6, 12),
+    )  # fmt: skip
     predicted = invert(found.T_target) @ reference @ found.T
     angle, distance = pose_distance(predicted, seen)
     step = np.maximum(np.gradient(when), 1e-9)
     speed = np.linalg.norm(np.gradient(reference[:, :3, 3], axis=0), axis=1) / step
     return _with(
-        found, kind="compare", meaning="marker in the flange", time_offset=clocks, next_poses=None, next_std=None,
+        found, time_offset=clocks,
         comparison=Comparison(when, np.rad2deg(angle), distance, speed, _over_speed(angle, distance, speed),
                               int((~known).sum())),
     )  # fmt: skip
@@ -438,28 +447,29 @@ def _over_speed(angle, distance, speed):
 # --- what all kinds share --------------------------------------------------------------------------------------------
 
 
-def _assembled(model, solution, kept, plain, groups, length_unit, kind, meaning, T, frame, T_target=None, points=None):
+def _assembled(model, solution, kept, plain, groups, length_unit, kind, meaning, T, frame, T_target=None, points=None,
+               part=slice(0, 6)):  # fmt: skip
     r, J, std = model.whitened(solution, kept)
     residuals, _ = model.linearize(solution)
-    covariance = inverse_normal(J[kept])[:6, :6]
+    covariance = inverse_normal(J[kept])[part, part]
     alone, shifts = leave_out(r[kept], J[kept])
     everywhere = residuals.copy()
     everywhere[kept] = alone * np.repeat(std, model.channels)
     columns = J[kept].reshape(-1, J.shape[2])
     values = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), compute_uv=False)
     labels = None if groups is None else as_shape(groups, "groups", model.n)
-    by_group = {} if labels is None else _group_shifts(r[kept], J[kept], labels[kept])
+    by_group = {} if labels is None else _group_shifts(r[kept], J[kept], labels[kept], part)
     words = ("rotation_rad", "translation") if len(model.channels) == 2 else ("translation",)
     return Calibration(
         kind, meaning, length_unit, T, covariance, residuals, kept, values,
         dict(zip(words, map(float, std))), _plain(model, plain), points or {}, POSE, T_target, everywhere, by_group,
-        _sentences(kind, covariance, frame), _cautions(kept),
+        _sentences(kind, covariance, frame), _cautions(kept) + _loose(model, residuals[kept], length_unit),
     )  # fmt: skip
 
 
-def _group_shifts(r, J, labels):
+def _group_shifts(r, J, labels, part):
     """{group: how far the six parameters move without it}."""
-    return {float(g): s[:6] for g, s in zip(np.unique(labels), leave_out(r, J, labels)[1])}
+    return {float(g): s[part] for g, s in zip(np.unique(labels), leave_out(r, J, labels)[1])}
 
 
 def _sentences(kind, covariance, frame):
@@ -484,6 +494,19 @@ def _cautions(kept):
     if share > MANY_REJECTED:
         return (f"{100 * share:.0f} % of the rows disagree with the others: look at them before you trust the rest",)
     return ()
+
+
+def _loose(model, residuals, length_unit):
+    """A warning when even the rows that agree miss by much beside the way the poses cover."""
+    if model.way is None:
+        return ()
+    rms, way = _rms(residuals)[1], np.linalg.norm(np.std(model.way[:, :3, 3], axis=0))
+    if rms <= LOOSE * way:
+        return ()
+    return (
+        f"the rows that agree miss by {rms:.3g} {length_unit} (rms), {100 * rms / way:.0f} % of what the poses move: "
+        "are format, order of the angles and units right?",
+    )
 
 
 def _moved(model, kept):

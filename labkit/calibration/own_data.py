@@ -32,10 +32,12 @@ class Model:
 
     channels: how many numbers of a row share one standard deviation, such as (3, 3) for a rotation and a translation.
     std: standard deviations of the channels, None where they are to be estimated. needed: the fewest rows of a fit.
+    way: poses of the robot (n, 4, 4), or None.
     """
 
     channels = (3,)
     needed = 3
+    way = None
 
     def __init__(self, n, std):
         self.n, self.std, self._fits = n, std, {}
@@ -223,7 +225,7 @@ class HandEyeModel(Model):
         if len(T_BF) < 3:
             raise ValueError(f"hand-eye calibration needs at least 3 poses, better 10, got {len(T_BF)}")
         super().__init__(len(T_BF), std)
-        self.T_BF, self.T_ST, self.solver = T_BF, T_ST, solver
+        self.T_BF, self.T_ST, self.solver, self.way = T_BF, T_ST, solver, T_BF
 
     def size(self, channel):
         return 1.0 if channel == 0 else np.abs(self.T_BF[:, :3, 3]).max() + np.abs(self.T_ST[:, :3, 3]).max()
@@ -309,7 +311,7 @@ class PivotModel(Model):
         if T_WF.ndim != 3 or len(T_WF) < 3:
             raise ValueError(f"pivot calibration needs at least 3 poses, better 10, got {T_WF.shape[0]}")
         super().__init__(len(T_WF), std)
-        self.T_WF = T_WF
+        self.T_WF = self.way = T_WF
 
     def size(self, channel):
         return np.abs(self.T_WF[:, :3, 3]).max()
@@ -350,7 +352,7 @@ class SphereModel(Model):
         if len(T_BF) < 4:
             raise ValueError(f"calibration with a sphere needs at least 4 poses, better 10, got {len(T_BF)}")
         super().__init__(len(T_BF), std)
-        self.T_BF, self.x_S = T_BF, x_S
+        self.T_BF, self.x_S, self.way = T_BF, x_S, T_BF
 
     def size(self, channel):
         return np.abs(self.T_BF[:, :3, 3]).max() + np.abs(self.x_S).max()

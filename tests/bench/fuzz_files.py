@@ -31,6 +31,7 @@ FILES_OF_A_DRIVE = [
     *["localize", "--odometry", "odometry.txt", "--landmarks", "map.csv"],
     *["--measurements", "readings.csv"],
 ]
+NOISE_OF_A_DRIVE = ["--std-range", "0.05", "--std-bearing-deg", "1", "--std-way", "0.01", "--std-turn-deg", "0.5"]
 COMMANDS = {
     "hand-eye": ["calibrate", "hand-eye", "--robot", "robot.csv", "--sensor", "sensor.txt"],
     "pairs": ["calibrate", "hand-eye", "--robot", "pairs.json"],
@@ -38,7 +39,7 @@ COMMANDS = {
     "sphere": ["calibrate", "sphere", "--robot", "robot.csv", "--points", "points.csv"],
     "frame": ["calibrate", "frame", "points.csv", "--nominal", "nominal.csv"],
     "compare": ["calibrate", "compare", "--a", "a.txt", "--b", "b.txt"],
-    "localize": [*FILES_OF_A_DRIVE, *["--std-range", "0.05", "--std-bearing-deg", "1", "--std-way", "0.01", "--std-turn-deg", "0.5"]],
+    "localize": [*FILES_OF_A_DRIVE, *NOISE_OF_A_DRIVE],
     "fitted": FILES_OF_A_DRIVE,
 }
 NASTY = [

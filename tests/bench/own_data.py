@@ -4,9 +4,9 @@
 
 Error of sensor on flange over the Cramer-Rao bound of the good rows (rotation | translation), failed runs, and the
 median processor time of a run, for N = 10, 20, 100, noise of 0.1 and 0.5 deg, 0.1 and 1 mm, and 0, 10, 30 % outliers
-(tens of mm, about 20 deg). OpenCV takes part where `cv2` can be imported (opencv-python-headless below 5; a later one has no
-`calibrateHandEye`); it is no dependency of the workbook. Goals: 1.05 without outliers, 1.15 with 10 %, no failed run;
-mean NEES of 1000 runs within its 99 % band; 3000 poses in 1 s, 20 in 10 ms.
+(tens of mm, about 20 deg). OpenCV takes part where `cv2` can be imported (opencv-python-headless below 5; a later one
+has no `calibrateHandEye`); it is no dependency of the workbook. Goals: 1.05 without outliers, 1.15 with 10 %, no
+failed run; mean NEES of 1000 runs within its 99 % band; 3000 poses in 1 s, 20 in 10 ms.
 """
 
 import argparse
