@@ -3,6 +3,7 @@
 Use them where a figure drags ten thousand particles or a benchmark names a goal. To understand a method, read its
 twin in `estimation`, `calibration` or `localization`.
 
+rigid       rigid_rows: poses checked in few passes, their entries as rows
 pivot       calibrate_pivot: tip and pivot from sums over the poses
 hand_eye    calibrate_sphere_target: scanner and sphere from sums over the poses
 ax_xb       calibrate_hand_eye: sensor and target from sums over the poses

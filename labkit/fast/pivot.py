@@ -8,6 +8,7 @@ import numpy as np
 
 from ..calibration import pivot
 from ..calibration.pivot import PivotCalibration, as_poses, rank_tolerance, refuse_free_tip
+from .rigid import rigid_rows
 
 
 def calibrate_pivot(T_WF, std_rot=None, std_trans=None, robust=False, rng=None):
@@ -17,9 +18,10 @@ def calibrate_pivot(T_WF, std_rot=None, std_trans=None, robust=False, rng=None):
     """
     if robust or std_rot is not None or std_trans is not None:
         return pivot.calibrate_pivot(T_WF, std_rot, std_trans, robust, rng)
-    T = as_poses(T_WF, 3).copy()
-    n = len(T)
-    entries = T.reshape(n, 16).T[:12]
+    rows = rigid_rows(T_WF, "T_WF")
+    if rows is None or rows.shape[1] < 3:
+        rows = as_poses(T_WF, 3).reshape(-1, 16).T.copy()
+    n, entries, T = rows.shape[1], rows[:12], rows.T.reshape(-1, 4, 4)
     products, mean = entries @ entries.T, entries.mean(1).reshape(3, 4)
     gram = products[:4, :4] + products[4:8, 4:8] + products[8:, 8:] - n * (mean.T @ mean)
     tip = _tip(gram, T, rank_tolerance(None))

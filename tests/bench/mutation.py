@@ -141,6 +141,8 @@ ELSEWHERE = {  # modules whose tests stand in files of another name
     "machines/accuracy": ("machines/test_tracker.py",),
     "machines/simulation": ("machines/test_tracker.py",),
     "localization/ekf": ("estimation/test_kalman.py",),
+    "localization/locate": ("localization/test_path.py", "verbs/test_localize_command.py"),
+    "fast/path": ("localization/test_path.py",),
 }
 
 
