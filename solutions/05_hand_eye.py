@@ -25,7 +25,7 @@
 # %% setup
 import numpy as np
 
-from labkit.calibration import hand_eye, robust
+from labkit.calibration import hand_eye, planning, robust
 from labkit.calibration.literature import compare_methods, kim_linear, li_two_step
 from labkit.chapters.ch05_hand_eye import stages
 from labkit.documents import misprints
@@ -441,7 +441,7 @@ print(f"left out: rms {hand_eye.rms_distance(left_out):.2f} mm; in the fit: {fit
 print(fit)
 
 # %% known-spread
-anywhere = np.random.default_rng(0).uniform(*np.transpose(hand_eye.FIELD), size=(100_000, 3))
+anywhere = np.random.default_rng(0).uniform(*np.transpose(planning.FIELD), size=(100_000, 3))
 anywhere[:, 1] *= np.where(np.arange(len(anywhere)) % 2, 1, -1)  # on both sides of the scan plane
 print("standard deviation of x_S:", corrected.x_S.std(axis=0).round(1), "mm")
 print("all over the field:       ", anywhere.std(axis=0).round(1), "mm")
@@ -452,8 +452,8 @@ J = hand_eye.plate_jacobian(corrected.T_BF, corrected.x_S, p2, p3, thesis.point(
 print("rank of the thesis's second step:", np.linalg.matrix_rank(J, tol=1e-6), "of 12 unknowns")
 
 # %% design [markdown]
-# The pattern always aimed at the middle of the field. Use all of it: x within ±25 mm, |y| from 3 to 25, z from 190 to 290 (`hand_eye.FIELD`), line of sight at most 90° from straight
-# down. `hand_eye.poses_that_see(T_FS, target, R_BF, x_S)` gives the poses for chosen orientations and places. With 31 poses, reach 0.7 of the thesis's
+# The pattern always aimed at the middle of the field. Use all of it: x within ±25 mm, |y| from 3 to 25, z from 190 to 290 (`planning.FIELD`), line of sight at most 90° from straight
+# down. `planning.poses_that_see(T_FS, target, R_BF, x_S)` gives the poses for chosen orientations and places. With 31 poses, reach 0.7 of the thesis's
 # orientation error, and no more than its translation error.
 
 # %% design_poses
@@ -469,7 +469,7 @@ def design_poses(T_FS, target, rng):
     z = rng.choice([190, 290], 31)
     down = np.diag([1.0, -1.0, -1.0]) @ T_FS[:3, :3].T  # the scanner looks straight down
     turn = np.column_stack([rng.uniform(-0.8, 0.8, (31, 2)), rng.uniform(-3, 3, 31)])
-    return hand_eye.poses_that_see(T_FS, target, exp_so3(turn) @ down, np.column_stack([x, y, z]))
+    return planning.poses_that_see(T_FS, target, exp_so3(turn) @ down, np.column_stack([x, y, z]))
     ### END SOLUTION
 
 

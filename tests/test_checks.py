@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from labkit import checks
-from labkit.calibration import ax_xb, hand_eye, pivot, robust, sphere
+from labkit.calibration import ax_xb, hand_eye, pivot, planning, robust, sphere
 from labkit.calibration.literature import compare_methods, kim_linear, li_two_step
 from labkit.documents.lecture import printed as lecture
 from labkit.documents.lecture.examples import reconstruct_vehicle
@@ -133,9 +133,9 @@ REFUSED = [
     (lambda: hand_eye.fit_radius(POSES, np.array([[1.0, 0.0, 1.0]] * 5)), "off the scan plane"),
     (lambda: kim_linear(POSES, np.zeros((5, 3, 3)), np.zeros((4, 3))), r"points_S must have shape \(5, 4, 3\)"),
     (lambda: li_two_step(POSES[:1], np.zeros((1, 3))), "at least 2 poses"),
-    (lambda: hand_eye.predicted_covariance(POSES, I4, O3 + 1.0, 0.1), "undetermined"),
+    (lambda: planning.predicted_covariance(POSES, I4, O3 + 1.0, 0.1), "undetermined"),
     (lambda: compare_methods(0, 0.1, rng()), "repeats must be a whole number"),
-    (lambda: hand_eye.pattern(I4, O3, 0.1, [1.0, np.inf, 1.0]), "spread must be finite"),
+    (lambda: planning.pattern(I4, O3, 0.1, [1.0, np.inf, 1.0]), "spread must be finite"),
     (lambda: thesis.centers_with_radius([[1.0, np.nan, 1.0]], 30.0), "x_S must be finite"),
     (lambda: thesis.centers_with_radius(I3, -1.0), "R must be positive"),
     (lambda: ax_xb.kronecker_matrix(POSES * np.nan, POSES), "A must be finite"),

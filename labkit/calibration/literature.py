@@ -5,34 +5,11 @@ Source: thesis "Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", H
 
 import numpy as np
 
-from ..checks import as_count, as_matrices, as_points, as_positive_number, as_shape, as_transforms, shown
+from ..checks import as_count, as_matrices, as_positive_number, as_shape, as_transforms, shown
 from ..geometry.frames import invert, pose, transform
 from ..geometry.lie import exp_so3, nearest_rotation
-from .hand_eye import (
-    FIELD,
-    MIN_SPREAD,
-    as_sightings,
-    calibrate_sphere_target,
-    linear_start,
-    poses_that_see,
-    predicted_covariance,
-)
-
-
-def field_problem(x_S):
-    """What keeps the scanner from seeing a sphere at these places, as a sentence; None where all lie in its field."""
-    x_S = as_points(x_S, "x_S")
-    for axis, (low, high), values in zip("xyz", FIELD, (x_S[..., 0], np.abs(x_S[..., 1]), x_S[..., 2])):
-        bad = (values < low - 1e-9) | (values > high + 1e-9)
-        if bad.any():
-            name = "|y|" if axis == "y" else axis
-            first = values[bad].ravel()[0]
-            poses = "one pose" if bad.sum() == 1 else f"{bad.sum()} poses"
-            return f"in {poses} the sphere lies at {name} = {shown(first, '.1f')} mm, outside {low:g} to {high:g}."
-    return None
-
-
-# --- the calibrations of the literature ------------------------------------------------------------------------------
+from .hand_eye import MIN_SPREAD, as_sightings, calibrate_sphere_target, linear_start
+from .planning import poses_that_see, predicted_covariance
 
 
 def kim_linear(T_BF, points_S, points_W):

@@ -1,4 +1,4 @@
-"""Whether a stack of poses is certainly rigid, in few passes over it; where in doubt, `checks.as_transforms` decides."""
+"""Whether a stack of poses is beyond doubt rigid, in few passes over it; else `checks.as_transforms` decides."""
 
 import numpy as np
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from labkit.calibration import hand_eye
-from labkit.calibration.literature import compare_methods, field_problem, kim_linear, kim_matrix, li_two_step
+from labkit.calibration import hand_eye, planning
+from labkit.calibration.literature import compare_methods, kim_linear, kim_matrix, li_two_step
 from labkit.calibration.robust import tukey_weights
 from labkit.documents.thesis import printed as thesis
 from labkit.documents.thesis.listings import listing_cost, listing_gauss_newton
@@ -88,7 +88,7 @@ def test_error_reaches_the_bound():
     for seed in range(150):
         fit = hand_eye.calibrate_sphere_target(*scene(seed=seed))
         T_BF, _ = scene(seed=seed, std=0)
-        cov = hand_eye.predicted_covariance(T_BF, T_FS0, TARGET0, 0.1)
+        cov = planning.predicted_covariance(T_BF, T_FS0, TARGET0, 0.1)
         errors.append(
             (frames.rotation_angle(fit.T_FS[:3, :3].T @ T_FS0[:3, :3]), np.linalg.norm(fit.T_FS[:3, 3] - T_FS0[:3, 3]))
         )
@@ -354,23 +354,6 @@ def test_simulation_inputs_give_the_printed_coordinates():
     T_FS = frames.matrix_from_kuka(frames.kuka_from_degrees(scanner))
     T_BF, x_S, _, _ = thesis.simulation(printed=True)
     assert hand_eye.rms_distance(hand_eye.sphere_residuals(T_BF, x_S, T_FS, target)) > 10
-
-
-def test_poses_that_see_put_the_sphere_where_asked():
-    rng = np.random.default_rng(0)
-    x_S = rng.uniform(-20, 20, (5, 3)) + [0, 0, 240]
-    T_BF = hand_eye.poses_that_see(T_FS0, TARGET0, exp_so3(rng.uniform(-1, 1, (5, 3))), x_S)
-    seen = frames.transform(frames.invert(T_FS0), frames.transform(frames.invert(T_BF), TARGET0))
-    np.testing.assert_allclose(seen, x_S, atol=1e-9)
-
-
-def test_pattern_stays_in_the_field_and_within_the_tilt():
-    T_BF = hand_eye.pattern(T_FS0, TARGET0, 0.6, (25, 25, 50))
-    seen = frames.transform(frames.invert(T_FS0), frames.transform(frames.invert(T_BF), TARGET0))
-    assert field_problem(seen) is None
-    down = T_BF[:, :3, :3] @ T_FS0[:3, 2]
-    assert np.arccos(-down[:, 2]).max() <= 0.6 + 1e-9
-    assert "outside 190 to 290" in field_problem(seen + [0, 0, 200])
 
 
 def test_methods_of_the_literature_do_not_beat_the_bound():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labkit.calibration import hand_eye
+from labkit.calibration import hand_eye, planning
 from labkit.chapters.ch05_hand_eye import exercises
 from labkit.documents.thesis import printed as thesis
 from labkit.exercises.engine import CORRECT, NOT_YET
@@ -79,7 +79,7 @@ def test_a_pattern_must_fix_the_translation_too(tilt, told):
         y = rng.uniform(3, 25, 31) * rng.choice([-1, 1], 31)
         x_S = np.column_stack([rng.uniform(-25, 25, 31), y, rng.uniform(190, 290, 31)])
         turns = exp_so3(rng.uniform(-1, 1, (31, 3)) * tilt)
-        return hand_eye.poses_that_see(T_FS, target, turns @ np.diag([1, -1, -1]) @ T_FS[:3, :3].T, x_S)
+        return planning.poses_that_see(T_FS, target, turns @ np.diag([1, -1, -1]) @ T_FS[:3, :3].T, x_S)
 
     outcome = judged("design_poses", poses)
     assert outcome.status == NOT_YET and told in outcome.text

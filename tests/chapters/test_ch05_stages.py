@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from labkit.calibration import hand_eye
-from labkit.calibration.literature import field_problem
+from labkit.calibration.planning import field_problem
 from labkit.chapters.ch05_hand_eye import stages as w
 from labkit.documents.thesis.printed import corrections, measurements
 from labkit.geometry import frames

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from labkit.calibration import hand_eye as readable
+from labkit.calibration.planning import poses_that_see
 from labkit.fast import hand_eye as fast
 from labkit.geometry import frames
 from labkit.geometry.lie import exp_so3
@@ -23,7 +24,7 @@ def flat(n=12):
     """All spheres in one plane of the scanner, where the linear start says nothing."""
     rng = np.random.default_rng(5)
     x_S = np.column_stack([rng.uniform(-20, 20, n), rng.uniform(-15, 15, n), np.full(n, 240.0)])
-    return readable.poses_that_see(T_FS, TARGET, exp_so3(rng.uniform(-1, 1, (n, 3))), x_S), x_S
+    return poses_that_see(T_FS, TARGET, exp_so3(rng.uniform(-1, 1, (n, 3))), x_S), x_S
 
 
 def assert_same(one, two, atol=1e-6):
@@ -83,7 +84,7 @@ def test_nearly_one_axis_gives_the_same_scanner(tilt):
 def still(spread):
     rng = np.random.default_rng(0)
     x_S = np.array([3.0, 5.0, 240.0]) + rng.normal(size=(9, 1)) * np.array(spread)
-    return readable.poses_that_see(T_FS, TARGET, exp_so3(rng.uniform(-1, 1, (9, 3))), x_S), x_S
+    return poses_that_see(T_FS, TARGET, exp_so3(rng.uniform(-1, 1, (9, 3))), x_S), x_S
 
 
 @pytest.mark.parametrize(

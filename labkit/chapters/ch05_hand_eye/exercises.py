@@ -5,8 +5,7 @@ import functools
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ...calibration import hand_eye, robust, sphere
-from ...calibration.literature import field_problem
+from ...calibration import hand_eye, planning, robust, sphere
 from ...documents import misprints
 from ...documents.thesis import printed as thesis
 from ...estimation.differences import numeric_jacobian
@@ -411,7 +410,7 @@ def corrected_fit():
 def predicted_stds(T_BF):
     """Predicted standard deviations of the scanner's rotation (deg) and translation (mm) under these poses."""
     fit = corrected_fit()
-    cov = hand_eye.predicted_covariance(T_BF, fit.T_FS, fit.target, fit.std)
+    cov = planning.predicted_covariance(T_BF, fit.T_FS, fit.target, fit.std)
     return float(np.rad2deg(np.sqrt(np.trace(cov[:3, :3])))), float(np.sqrt(np.trace(cov[3:6, 3:6])))
 
 
@@ -422,7 +421,7 @@ def design_poses(T_FS, target, rng):
     )
     down = np.diag([1.0, -1.0, -1.0]) @ T_FS[:3, :3].T
     tilt = np.column_stack([rng.uniform(-0.8, 0.8, (31, 2)), rng.uniform(-3, 3, 31)])
-    return hand_eye.poses_that_see(T_FS, target, exp_so3(tilt) @ down, x_S)
+    return planning.poses_that_see(T_FS, target, exp_so3(tilt) @ down, x_S)
 
 
 def design_is_good(student, rng):
@@ -435,7 +434,7 @@ def design_is_good(student, rng):
         x_S = frames.transform(frames.invert(fit.T_FS), frames.transform(frames.invert(T_BF), fit.target))
     except ValueError as refusal:
         return f"{refusal}."
-    problem = field_problem(x_S)
+    problem = planning.field_problem(x_S)
     if problem:
         return problem
     down = T_BF[:, :3, :3] @ fit.T_FS[:3, 2]
@@ -911,7 +910,7 @@ CHAPTER = Chapter(
                 "Choose where the scanner should see the sphere, and how the flange should be turned; the flange's position then follows.",
                 "target = R_BF (R_FS x_S + t_FS) + t_BF: draw x_S over the whole field, tilt by up to 45 deg about all axes, solve for t_BF.",
                 "`x_S = np.column_stack([rng.uniform(-25, 25, 31), rng.uniform(3, 25, 31) * rng.choice([-1, 1], 31), rng.choice([190, 290], 31)]); turns = rng.uniform(-0.8, 0.8, (31, 3)); "
-                "return hand_eye.poses_that_see(T_FS, target, exp_so3(turns) @ np.diag([1, -1, -1]) @ T_FS[:3, :3].T, x_S)`",
+                "return planning.poses_that_see(T_FS, target, exp_so3(turns) @ np.diag([1, -1, -1]) @ T_FS[:3, :3].T, x_S)`",
             ),
         ),
     ],

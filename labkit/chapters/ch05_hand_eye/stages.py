@@ -6,7 +6,7 @@ import functools
 
 import numpy as np
 
-from ...calibration import hand_eye, sphere
+from ...calibration import hand_eye, planning, sphere
 from ...documents import misprints
 from ...documents.thesis import printed as thesis
 from ...estimation.differences import numeric_jacobian
@@ -388,19 +388,19 @@ def _corrected_fit():
 @functools.cache
 def _printed_pattern():
     fit = _corrected_fit()
-    return hand_eye.predicted_covariance(thesis.measurements(True).T_BF, fit.T_FS, fit.target, fit.std)
+    return planning.predicted_covariance(thesis.measurements(True).T_BF, fit.T_FS, fit.target, fit.std)
 
 
 def compute_pattern(state):
     """Predicted covariance of a designed pattern beside the thesis's: standard deviations, weakest direction, poses."""
     fit, x_mid, z_mid = _corrected_fit(), 0.0, 240.0
     spread = np.array([state["E"][0] - x_mid, state["across"], state["E"][1] - z_mid])
-    T_BF = hand_eye.pattern(fit.T_FS, fit.target, np.deg2rad(state["tilt_deg"]), spread)
+    T_BF = planning.pattern(fit.T_FS, fit.target, np.deg2rad(state["tilt_deg"]), spread)
     x_S = frames.transform(frames.invert(fit.T_FS), frames.transform(frames.invert(T_BF), fit.target))
-    unseen = hand_eye.unseen_changes(T_BF, fit.T_FS, fit.target)
+    unseen = planning.unseen_changes(T_BF, fit.T_FS, fit.target)
     determined = not (len(unseen.turns) or len(unseen.slides))
     if determined:
-        cov = hand_eye.predicted_covariance(T_BF, fit.T_FS, fit.target, fit.std)
+        cov = planning.predicted_covariance(T_BF, fit.T_FS, fit.target, fit.std)
         std = _three_stds(cov)
     else:
         cov, std = np.full((9, 9), np.nan), (np.inf,) * 3
@@ -446,7 +446,7 @@ def pattern_designer():
         found = space.ellipsoid(**style.look("estimate"))
         weak = space.line(color=style.ESTIMATE, linewidth=3)
         name = space.text("errors of the translation, x 40", offset=(0, 4), ha="center")
-        used, places = draw.field_of_view(right, hand_eye.FIELD)
+        used, places = draw.field_of_view(right, planning.FIELD)
 
         def update(state, result):
             target, T_BF = result["target"], result["T_BF"]
