@@ -297,7 +297,7 @@ def unchanged(files, scratch, jobs):
 
 def main(rooms, count, seed, jobs, module):
     os.chdir(ROOT)
-    os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", PYTHONDONTWRITEBYTECODE="1")
+    os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", PYTEST_DISABLE_PLUGIN_AUTOLOAD="1")
     for name in IMPORTED:
         import_module(name)
     modules = [p for room in rooms for p in sorted((ROOT / "labkit" / room).glob("*.py")) if tests_of(p)]
