@@ -65,7 +65,7 @@ def quarter_turn(p):
 # %% predict [markdown]
 # ## Predict, then touch
 #
-# Every figure has a question before it. Click an answer (`guess` may stay as it is): the first one is locked in, and the figure appears. Drag its round handles with mouse or finger; or select one with the Tab key and move it
+# Where a figure can surprise, a question stands before it. Click an answer (`guess` may stay as it is): the first one is locked in, and the figure appears. Drag its round handles with mouse or finger; or select one with the Tab key and move it
 # with the arrow keys (Shift makes ten steps at once). *Reset* brings the start back, *Make it fail* shows what goes wrong.
 
 # %% predict-twice
@@ -85,7 +85,7 @@ ex.predict("twice", guess, reveal=stages.quarter_turns)
 # | $T_{AF}$, `T_AF` | ${}^{A}T_{F}$ | $T_A^F$ | $T^A_F$ | pose of F, seen from A |
 # | $R_i$, $t_i$ | $R_i$, $P_i$ | rotation and last column of $T_A^F$ | $R$, $p$ | rotation, translation |
 #
-# **Units.** Lengths are mm in chapters 1 to 6 and m in chapters 7 to 9, as in the documents. Angles are radians inside; degrees appear only in names ending in `_deg`.
+# **Units.** Lengths are mm in chapters 1 to 6 and m in chapters 7 to 9, as in the documents; chapter 8 filters the tracker of chapter 6, in mm, at its end. Angles are radians inside; degrees appear only in names ending in `_deg`.
 
 # %% colors [markdown]
 # ## Colors
@@ -125,7 +125,7 @@ stages.colors()
 # ## Good to know
 #
 # - Save the notebook as usual. `python lab.py progress` shows all chapters; `python lab.py reset 01` brings back an empty chapter 1 and keeps your copy.
-# - A cell that runs forever is stopped in a check after two seconds. Elsewhere press the stop button of JupyterLab.
+# - A function that runs forever is stopped in a check: after two seconds of computing, or a few more where much has to be computed. Elsewhere press the stop button of JupyterLab.
 # - Every number the documents print stands in the ledger of chapter 10, with what we compute today. Some of the printed numbers are wrong, and you will find them.
 #
 # Now open `01_frames.ipynb`.

@@ -6,13 +6,13 @@
 # **What you will learn.** What a printed digit hides, how an error in print is *proved* rather than suspected, and what a document must publish so that
 # others can check it.
 #
-# **What you need.** Any of the chapters before. About 45 minutes.
+# **What you need.** Any of the chapters before. About 30 minutes, and as long as the table keeps you.
 
 # %% notation [markdown]
 # | word | meaning |
 # | --- | --- |
 # | reproduced | equal to the printed digits |
-# | rounding | off, but by no more than the rounding of the printed inputs allows: the *bound* |
+# | rounding | off, but by no more than half a unit of the last digit plus what the rounding of the printed inputs allows: the *bound* |
 # | misprint | the arithmetic around it proves another value |
 # | superseded | computable, and the document's claim does not hold |
 # | unpublished | the inputs were never published; a simulation of the stated setup stands beside it |
@@ -67,15 +67,15 @@ def half_unit(printed):
 #
 # The status is not an opinion. It follows from the printed number, the computed value, and what is known about it: a *bound*, by which rounding of the printed
 # inputs can move the value; whether a computed check proves a *misprint*; whether the value had to be *simulated*. A simulation that lands within bound
-# and half unit makes the row *unpublished*; one that does not shows the claim *superseded*. Otherwise the milder word wins: *reproduced* before *rounding*, *rounding*
-# before *misprint*, and *superseded* where nothing else is left.
+# and half unit together makes the row *unpublished*; one that does not shows the claim *superseded*. Otherwise the milder word wins: *reproduced* within the half unit, *rounding* within
+# half unit plus bound, *misprint* where one is proved, and *superseded* where nothing else is left. Printed numbers come as strings, some with a decimal comma.
 
 # %% status
 @ex.status
 def status(printed, value, bound, misprint, simulated):
     """Return the word for a printed string, a computed value and its bound; the other two are True or False."""
     ### BEGIN SOLUTION
-    half, off = half_unit(printed) + 1e-9, abs(value - float(printed))
+    half, off = half_unit(printed) + 1e-9, abs(value - float(printed.replace(",", ".")))
     if simulated:
         return "unpublished" if off <= half + bound else "superseded"
     if off <= half:

@@ -438,7 +438,7 @@ def _short(value):
         return words.replace("\n", "")
     if inspect.isfunction(value):
         return value.__name__
-    text = f"{value:.4g}" if isinstance(value, float) else repr(value)
+    text = f"{value:.6g}" if isinstance(value, float) else repr(value)
     return text if len(text) <= 60 else f"<{type(value).__name__}>"
 
 

@@ -26,6 +26,7 @@ CHAPTER = Chapter(
             "quarter_turn",
             reference=quarter_turn,
             draw=lambda rng: (rng.uniform(1, 9, 2) * rng.choice([-1, 1], 2),),
+            fixed={"p": "a point of the plane has two coordinates"},
             metric=metrics.Numbers(1e-9),
             hints=(
                 "Draw the point (1, 0) and where it goes.",
@@ -53,6 +54,22 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda p: np.array([p[0] - p[1], p[0] + p[1]]) / np.sqrt(2),
                     "You turn by 45 deg. A quarter of a full turn is 90 deg.",
+                ),
+                Mistake(
+                    lambda p: np.array([p[0] + p[1], p[1] - p[0]]) / np.sqrt(2),
+                    "You turn by 45 deg, and clockwise. A quarter of a full turn is 90 deg.",
+                ),
+                Mistake(
+                    lambda p: np.array([p[0], -p[1]]),
+                    "You mirrored the point in the x axis. A quarter turn exchanges the components.",
+                ),
+                Mistake(
+                    lambda p: -p[::-1],
+                    "Both signs are turned. That is a mirror image in the other diagonal: only the new x takes a minus.",
+                ),
+                Mistake(
+                    lambda p: np.array([np.hypot(*p), np.arctan2(p[1], p[0]) + np.pi / 2]),
+                    "These are distance and direction of the turned point. Return its coordinates x and y.",
                 ),
                 Mistake(lambda p: p, "You return the point as it came."),
             ],

@@ -3,31 +3,32 @@
 import functools
 import itertools
 
-import numpy as np
-
 from ...documents.ledger import Computed, Row, half_unit, judge
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction
 
-FORMS = ("1.010000", "12", "1,5", "-0,250", "3e-4", "2.50e2", "-1000", "97.3")
+FORMS = ("d.0d0000", "dd", "d,d", "-0,dd0", "de-k", "d.d0ek", "-d000", "dd.d")  # d: any digit but 0, k: up to 5
 
 
 def printed_number(rng, form):
-    """A number as a document prints it."""
-    return (form,)
+    """A number as a document prints it, with digits of its own."""
+    return ("".join(str(rng.integers(1, 10 if c == "d" else 6)) if c in "dk" else c for c in form),)
 
 
-def comparison(rng, off, bound, misprint, simulated):
+def comparison(rng, off, bound, misprint, simulated, comma):
     """printed, value, bound, misprint, simulated; `off` and `bound` in half units of the last printed digit."""
-    value, half = float(np.round(rng.uniform(1, 9), 2)), 0.005
-    return f"{value:.2f}", float(value + off * half * rng.choice([-1, 1])), bound * half, misprint, simulated
+    decimals = int(rng.integers(1, 4))
+    half, number = 0.5 * 10.0**-decimals, rng.uniform(1, 90) * rng.choice([-1, 1])
+    printed = f"{number:.{decimals}f}"
+    value = float(printed) + off * half * rng.choice([-1, 1])
+    return printed.replace(".", ",") if comma else printed, float(value), bound * half, misprint, simulated
 
 
 NUMBERS = tuple(functools.partial(printed_number, form=form) for form in FORMS)
 COMPARISONS = tuple(
-    functools.partial(comparison, off=off, bound=bound, misprint=misprint, simulated=simulated)
-    for off, bound, misprint, simulated in itertools.product(
-        (0.0, 0.4, 1.8, 60.0), (0.0, 1.5, 100.0), (False, True), (False, True)
+    functools.partial(comparison, off=off, bound=bound, misprint=misprint, simulated=simulated, comma=k % 5 == 3)
+    for k, (off, bound, misprint, simulated) in enumerate(
+        itertools.product((0.0, 0.4, 1.8, 2.7, 60.0), (0.0, 1.5, 100.0), (False, True), (False, True))
     )
 )
 
@@ -36,6 +37,10 @@ def status(printed, value, bound, misprint, simulated):
     """The word the ledger gives."""
     row = Row("x", "lecture", "", "", printed, "", "reproduced", "")
     return judge(row, Computed(value, bound=bound, misprint=misprint, simulated=simulated))
+
+
+def _number(printed):
+    return float(printed.replace(",", "."))
 
 
 def _decimals(printed):
@@ -64,11 +69,11 @@ def _other_sign(printed):
 
 
 def _through_float(printed):
-    return half_unit(str(float(printed.replace(",", "."))))
+    return half_unit(str(_number(printed)))
 
 
 def _of_the_value(printed):
-    return 0.005 * abs(float(printed.replace(",", ".")))
+    return 0.005 * abs(_number(printed))
 
 
 def _digits_left(strip):
@@ -105,7 +110,7 @@ def _judged(real, simulated=None):
     """
 
     def variant(printed, value, bound, misprint, is_simulated):
-        half, off = half_unit(printed) * (1 + 1e-6), abs(value - float(printed))
+        half, off = half_unit(printed) * (1 + 1e-6), abs(value - _number(printed))
         return ((simulated or _simulated_word) if is_simulated else real)(half, off, bound, misprint)
 
     return variant
@@ -122,16 +127,22 @@ def _real_word(half, off, bound, misprint):
 
 
 def _signed(printed, value, bound, misprint, simulated):
-    value = float(printed) if value < float(printed) else value
+    value = max(value, _number(printed))
     return status(printed, value, bound, misprint, simulated)
 
 
 def _within_a_unit(printed, value, bound, misprint, simulated):
     rule = _simulated_word if simulated else _real_word
-    return rule(2 * half_unit(printed) * (1 + 1e-6), abs(value - float(printed)), bound, misprint)
+    return rule(2 * half_unit(printed) * (1 + 1e-6), abs(value - _number(printed)), bound, misprint)
+
+
+def _without_reading_commas(printed, value, bound, misprint, simulated):
+    float(printed)
+    return status(printed, value, bound, misprint, simulated)
 
 
 STATUSES = (
+    (_without_reading_commas, "float() does not read a decimal comma: replace it by a point first."),
     (_judged(_real_word, _real_word), "`simulated` does not enter yet: without the inputs nothing is reproduced."),
     (
         _judged(_real_word, lambda h, o, b, m: "reproduced" if o <= h else "unpublished"),
@@ -189,6 +200,16 @@ STATUSES = (
         ),
         "Compare with half unit + bound: the printed number itself was rounded too.",
     ),
+    (
+        _judged(
+            lambda h, o, b, m: "reproduced" if o <= h else "rounding" if o <= b else "misprint" if m else "superseded"
+        ),
+        "Compare with half unit + bound: the printed number itself was rounded too.",
+    ),
+    (
+        lambda p, v, b, m, s: status(p, round(v, _decimals(p)), b, m, s),
+        "You rounded the value first, which moves it by up to half a unit more: compare it as it was computed.",
+    ),
     (_within_a_unit, "You compare with a whole unit of the last digit. Rounding hides half of it."),
     (_signed, "A value below the printed one is off as well: take the absolute difference."),
 )
@@ -199,7 +220,7 @@ def _status(order, careful=False):
 
     def variant(printed, value, bound, misprint, simulated):
         half = half_unit(printed)
-        off = abs(value - float(printed))
+        off = abs(value - _number(printed))
         within = off <= (half + bound) * (1 + 1e-6)
         tests = {
             "reproduced": off <= half * (1 + 1e-6) and not simulated,
@@ -232,7 +253,8 @@ CHAPTER = Chapter(
             hints=(
                 "Which digit was rounded? Half a unit of that digit can be hidden.",
                 "With d decimals it is 0.5 * 10**-d. An exponent, as in 3e-4, shifts that; a comma is a decimal point.",
-                "`number, _, exponent = printed.partition('e'); d = len(number.replace(',', '.').partition('.')[2]); "
+                "`number, _, exponent = printed.partition('e')\n"
+                "d = len(number.replace(',', '.').partition('.')[2])\n"
                 "return 0.5 * 10.0 ** (int(exponent or 0) - d)`",
             ),
             mistakes=[
@@ -291,9 +313,15 @@ CHAPTER = Chapter(
                 "Ask the questions in an order: was the input published at all? Does the value round to the printed one? ...",
                 "off = |value - printed| against half_unit(printed), then against half_unit(printed) + bound. A simulated value within "
                 "either of them is 'unpublished', outside 'superseded'.",
-                "`half, off = half_unit(printed) + 1e-9, abs(value - float(printed)); near = off <= half + bound; "
-                "sim, real = 'unpublished' if near else 'superseded', 'misprint' if misprint else 'superseded'; "
-                "return sim if simulated else 'reproduced' if off <= half else 'rounding' if near else real`",
+                "`half = half_unit(printed) + 1e-9\n"
+                "off = abs(value - float(printed.replace(',', '.')))\n"
+                "if simulated:\n"
+                "    return 'unpublished' if off <= half + bound else 'superseded'\n"
+                "if off <= half:\n"
+                "    return 'reproduced'\n"
+                "if off <= half + bound:\n"
+                "    return 'rounding'\n"
+                "return 'misprint' if misprint else 'superseded'`",
             ),
             mistakes=[
                 Mistake(
