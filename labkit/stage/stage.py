@@ -195,6 +195,21 @@ class Stage:
         """A copy of the state."""
         return dict(self._state)
 
+    @property
+    def figure(self):
+        """The matplotlib figure that is shown."""
+        return self._picture.fig
+
+    @property
+    def moving(self):
+        """The artists that move, as `scene` returned them."""
+        return list(self._picture.artists)
+
+    @property
+    def handles(self):
+        """{name: Handle}, a copy."""
+        return dict(self._handles)
+
     def set(self, **changes):
         """Change the state from Python, as if handles and controls had been moved. From any thread; the newest wins.
 

@@ -80,7 +80,7 @@ def test_y_stays_in_the_plane_of_the_triangle():
     stage = w.triangle_noise()
     view = stage.state["view"]
     aim = view.project((50, 40, 0))[:2]
-    at = stage._picture.fraction(stage._picture.fig.axes[0], aim)
+    at = stage._picture.fraction(stage.figure.axes[0], aim)
     stage.receive({"drag": {"Y": at}})
     assert stage.state["Y"] == pytest.approx([50, 40, 0], abs=1e-9)
     stage.set(view=View(0, 0, center=view.center), Y=(40, 30, 5))  # seen from the side: straight down

@@ -76,7 +76,7 @@ def test_two_loops_only_the_graph_closes_both():
 def inside(artist, stage):
     """Whether an artist lies within the picture of its Stage."""
     canvas = stage._picture.canvas
-    box, whole = artist.get_window_extent(canvas.get_renderer()), stage._picture.fig.bbox
+    box, whole = artist.get_window_extent(canvas.get_renderer()), stage.figure.bbox
     return whole.x0 <= box.x0 and box.x1 <= whole.x1 and whole.y0 <= box.y0 and box.y1 <= whole.y1
 
 
@@ -87,7 +87,7 @@ def test_growth_keeps_room_for_wide_numbers(width):
     stage.png()  # the layout is made for the numbers at the start
     stage.make_it_fail()
     stage.png()
-    left = stage._picture.fig.axes[0]
+    left = stage.figure.axes[0]
     label, renderer = left.yaxis.label, stage._picture.canvas.get_renderer()
     assert inside(label, stage)
     numbers = [tick.label1.get_window_extent(renderer) for tick in left.yaxis.get_major_ticks()]
@@ -101,7 +101,7 @@ def test_frames_of_the_open_loop_stay_in_the_picture_with_their_names(place):
         right, down = (1.0, 0.0) if place[0] > 0 else (0.0, 1.0)
         stage.receive({"drag": {name: (right, down)}})
     stage.png()
-    names = [text for text in stage._picture.fig.axes[0].texts if text.get_text() in ("K1", "K2", "K3", "P")]
+    names = [text for text in stage.figure.axes[0].texts if text.get_text() in ("K1", "K2", "K3", "P")]
     assert len(names) == 4 and all(inside(name, stage) for name in names)
     assert np.array_equal(stage.state["P"], (360, 190) if place[0] > 0 else (-440, -580))
 
@@ -117,7 +117,7 @@ def test_names_of_the_two_orders_keep_off_their_own_axes(A_deg, B_deg):
     stage = w.order_of_product()
     stage.set(A_deg=A_deg, B_deg=B_deg)
     result = w.compute_order(stage.state)
-    names = {text.get_text(): text for ax in stage._picture.fig.axes for text in ax.texts}
+    names = {text.get_text(): text for ax in stage.figure.axes for text in ax.texts}
     for key in ("A", "B", "AB", "BA"):
         aside = np.array(names[key].xyann) / np.hypot(*names[key].xyann)
         assert (result[key][:2, :2].T @ aside).max() < np.cos(np.deg2rad(40))

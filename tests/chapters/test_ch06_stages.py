@@ -73,8 +73,8 @@ def test_flange_and_tracker_stay_in_the_picture_with_their_letters(preset, width
     stage._picture.fit(width, 1000, 1.0, False)
     stage.press(preset)
     stage.png()
-    canvas, whole = stage._picture.canvas, stage._picture.fig.bbox
-    words = {text: text.get_window_extent(canvas.get_renderer()) for text in stage._picture.fig.axes[0].texts}
+    canvas, whole = stage._picture.canvas, stage.figure.bbox
+    words = {text: text.get_window_extent(canvas.get_renderer()) for text in stage.figure.axes[0].texts}
     assert {"B", "E", "F"} <= {text.get_text() for text in words}
     assert all(box.x0 >= 0 and box.x1 <= whole.x1 and box.y0 >= 0 and box.y1 <= whole.y1 for box in words.values())
     by_name = {text.get_text(): box for text, box in words.items() if text.get_text() in "EF"}
@@ -85,7 +85,7 @@ def test_names_of_tracker_and_world_are_apart_before_anything_arrives():
     stage = wr.live_tracker()
     stage.png()
     renderer = stage._picture.canvas.get_renderer()
-    boxes = {text.get_text(): text.get_window_extent(renderer) for text in stage._picture.fig.axes[0].texts}
+    boxes = {text.get_text(): text.get_window_extent(renderer) for text in stage.figure.axes[0].texts}
     assert not boxes["E"].overlaps(boxes["W"])
 
 

@@ -1,4 +1,4 @@
-"""What is drawn is what is meant: vertices of the artists beside closed forms and results, for the Stages of 1 to 8.
+"""What is drawn is what is meant: vertices of the artists beside closed forms and results, for the Stages of 1 to 9.
 
 One mechanism: `drawn` reads the vertices of all moving lines, `assert_drawn` wants one of them to hold exactly the
 expected ones, projected first where the Stage shows space.
@@ -6,8 +6,11 @@ expected ones, projected first where the Stage shows space.
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.image import PcolorImage
 from matplotlib.lines import Line2D
-from matplotlib.text import Annotation
+from matplotlib.patches import Wedge
+from matplotlib.text import Annotation, Text
 from scipy.spatial.transform import Rotation
 
 from labkit.chapters.ch01_frames import stages as ch01
@@ -19,14 +22,18 @@ from labkit.chapters.ch06_tracker import figures as ch06_figures
 from labkit.chapters.ch06_tracker import stages as ch06
 from labkit.chapters.ch07_dead_reckoning import stages as ch07
 from labkit.chapters.ch08_kalman import stages as ch08
+from labkit.chapters.ch09_monte_carlo import stages as ch09
+from labkit.documents.lecture.examples import load_building
 from labkit.documents.thesis import wells
+from labkit.machines import simulation, udp
+from labkit.machines.packet import POSITION, decode_packet
 
 GAP = [np.nan, np.nan]
 
 
 def drawn(stage):
     """Vertices (n, 2) of every moving line of a Stage, as its axes hold them."""
-    lines = (a for a in stage._picture.artists if isinstance(a, Line2D) and a.get_visible())
+    lines = (a for a in stage.moving if isinstance(a, Line2D) and a.get_visible())
     return [vertices for line in lines if len(vertices := line.get_xydata())]
 
 
@@ -64,9 +71,9 @@ WITH_HANDLES = (
 
 def gaps(stage):
     """How far each handle is from the nearest drawn vertex or name of its axes, as a share of their width."""
-    artists = stage._picture.artists
-    for key, handle in stage._handles.items():
-        place, ax = stage.state[key], stage._picture.fig.axes[handle.ax]
+    artists = stage.moving
+    for key, handle in stage.handles.items():
+        place, ax = stage.state[key], stage.figure.axes[handle.ax]
         here = stage.state["view"].project(place)[:2] if len(place) == 3 else place
         lines = [a.get_xydata() for a in artists if isinstance(a, Line2D) and a.axes is ax and len(a.get_xydata())]
         names = [np.array([a.xy]) for a in artists if isinstance(a, Annotation) and a.axes is ax]
@@ -81,8 +88,8 @@ def test_every_handle_lies_on_what_it_moves(make, move):
     if move == "made to fail":
         stage.make_it_fail()
     elif move == "moved":
-        for key, handle in stage._handles.items():
-            width = abs(np.subtract(*stage._picture.fig.axes[handle.ax].get_xlim()))
+        for key, handle in stage.handles.items():
+            width = abs(np.subtract(*stage.figure.axes[handle.ax].get_xlim()))
             stage.set(**{key: stage.state[key] - 0.03 * width})
     assert max(gap for _, gap in gaps(stage)) < 1e-3  # less than a pixel: circles are drawn as polygons
 
@@ -283,6 +290,14 @@ def test_used_field_and_flanges_of_a_pattern():
     np.testing.assert_allclose(places, np.tile(stage.result["target"], (len(places), 1)), atol=1e-8)
 
 
+def test_errors_of_differences_follow_their_orders():
+    """Where rounding does not matter yet, a step ten times as long errs ten times as much, or a hundred."""
+    short, long = at(ch05.difference_steps(), h=0.1), at(ch05.difference_steps(), h=1.0)
+    for scheme, factor in (("forward", 10.0), ("central", 100.0)):
+        assert long.result["at"][scheme] == pytest.approx(factor * short.result["at"][scheme], rel=0.02)
+        assert_drawn(long, [[1.0, long.result["at"][scheme]]])
+
+
 # --- chapter 6 --------------------------------------------------------------------------------------------------------
 
 UPRIGHT = [[0, 0, 0], [0, 0, 320], [0, 35, 320], [0, 35, 545], [0, 35, 770], [0, 35, 835]]
@@ -339,6 +354,18 @@ def test_trail_sorts_readings_by_the_gate():
     np.testing.assert_array_equal(trail.path.value, positions + 1)
 
 
+def test_live_picture_draws_what_arrived(monkeypatch):
+    packets = simulation.endless_packets(np.random.default_rng(3), lambda: True)
+    readings = np.array([decode_packet(next(packets)) for _ in range(300)])
+    monkeypatch.setattr(ch06.Link, "look", lambda *_: (readings, udp.Statistics(datagrams=300, good=300)))
+    stage = at(ch06.live_tracker(), t=0.02)
+    positions, used = 1000 * readings[:, POSITION], stage.result["used"]
+    assert 0 < np.count_nonzero(~used) < 30
+    assert_drawn(stage, positions[used], positions[~used], stage.result["filtered"])
+    words = next(a.get_text() for a in stage.moving if isinstance(a, Text) and "datagrams" in a.get_text())
+    assert f"of 300   {np.count_nonzero(~used)}\n" in words
+
+
 def test_rotation_axes_pass_through_the_middle():
     a, b = np.array([0.6, 0.0, 0.8]), np.array([0.0, 1.0, 0.0])
     stage = at(ch06.two_axes(), a=a, b=b)
@@ -374,6 +401,16 @@ def test_ellipses_of_six_runs_are_three_standard_deviations():
 
 
 # --- chapter 7 --------------------------------------------------------------------------------------------------------
+
+
+def test_methods_that_work_are_ticked_and_the_others_say_why():
+    stage = at(ch07.methods(), sensor="odometry", task="global")
+    names, verdicts = np.reshape([a.get_text() for a in stage.moving], (2, -1))
+    works = [verdict.endswith("works") for verdict in verdicts]
+    assert stage.result["usable"] == names[works].tolist()
+    assert all(why in verdict for why, verdict in zip(stage.result["verdicts"], verdicts))
+    heights = [a.get_position()[1] for a in stage.moving]
+    assert heights[: len(names)] == heights[len(names) :] == sorted(set(heights), reverse=True)
 
 
 def test_distance_circles_have_the_measured_radii():
@@ -447,3 +484,117 @@ def test_honesty_marks_the_chosen_number_of_iterations():
     stage = at(ch08.honesty(), iterations=3)
     r = stage.result
     assert_drawn(stage, r["positions"], r["ellipse"], [[3, r["curve"][2]]])
+
+
+# --- chapter 9 --------------------------------------------------------------------------------------------------------
+
+
+def upright(x, heights):
+    """Bars from 0 to their heights, as one broken line, (3 n, 2)."""
+    return np.array([row for a, b in zip(x, heights) for row in ((a, 0.0), (a, b), (a, np.nan))])
+
+
+def robot_mark(pose, radius):
+    """A circle about a pose, a gap, and a nose from its middle to 1.9 radii ahead, (28, 2)."""
+    turn = np.linspace(0, 2 * np.pi, 25) + pose[2]
+    ahead = np.array([np.cos(pose[2]), np.sin(pose[2])])
+    circle = pose[:2] + radius * np.column_stack([np.cos(turn), np.sin(turn)])
+    return [*circle, GAP, pose[:2], pose[:2] + 1.9 * radius * ahead]
+
+
+def rays(pose, ends):
+    return [row for end in ends for row in (pose[:2], end, GAP)]
+
+
+def test_corridor_stands_on_its_doors_and_particles():
+    stage = at(ch09.corridor(), D1=(1.0, 0.0), D2=(5.0, 0.0), D3=(10.0, 0.0), robot=(5.0, 1.0))
+    assert_drawn(stage, [row for x in (1, 5, 10) for row in ((x - 0.25, 0), (x + 0.25, 0), (np.nan, 0))])
+    for (x, height, truth), moved in zip(stage.result["shots"], (0, 0, 2, 2, 4), strict=True):
+        assert truth == 5.0 + moved  # two moves of 2 m
+        assert_drawn(stage, upright(x, height), [[truth, 1.0]])
+
+
+@pytest.mark.parametrize("form", ch09.FORMS)
+def test_one_form_of_the_map_is_shown_and_the_probe(form):
+    stage, b = at(ch09.map_forms(), form=form, probe=(3.0, 4.0)), load_building()
+    assert_drawn(stage, [[3.0, 4.0]])
+    shown = {
+        "lines": [row for wall in b.lines for row in (wall[:2], wall[2:], GAP)],
+        "points": b.points,
+        "graph": list(b.nodes.values()),
+    }
+    for name, points in shown.items():
+        found = [v for v in drawn(stage) if v.shape == np.shape(points) and np.allclose(v, points, equal_nan=True)]
+        assert len(found) == (name == form)
+
+
+def test_scan_starts_at_the_robot_in_both_pictures():
+    stage = at(ch09.field_against_beams(), robot=(8.0, 2.0), heading_deg=40)
+    pose, ends = np.array([8.0, 2.0, np.deg2rad(40)]), stage.result["ends"]
+    assert_drawn(stage, robot_mark(pose, 0.35), rays(pose, ends), ends)
+    assert sum(v.shape == ends.shape for v in drawn(stage)) == 2
+    walls = load_building().grid.distance
+    i, j = load_building().grid.cell_of(ends)
+    assert np.median(walls[i, j]) < 0.2  # what is drawn as seen lies on the walls: cells of 0.1 m, noise of the scanner
+    pictures = [stage.result[name] for name in ("beams", "field")]
+    images = [a for a in stage.moving if isinstance(a, PcolorImage)]
+    for image, weights in zip(images, pictures, strict=True):
+        assert np.nanmax(weights) == 0.0  # relative to the best place
+        assert np.array_equal(np.ma.filled(image.get_array(), np.nan).ravel(), weights.ravel(), equal_nan=True)
+
+
+def test_sectors_are_as_wide_as_the_weights_and_the_spokes_point_at_them():
+    stage = at(
+        ch09.wheel(), **{f"W{k + 1}": (k + 1, w) for k, w in enumerate((0.2, 0.4, 0.0, 0.4, 0.6, 0.4))}, turn=0.5
+    )
+    sectors = [a for a in stage.moving if isinstance(a, Wedge)]
+    assert [a.theta2 - a.theta1 for a in sectors] == pytest.approx([36, 72, 0, 72, 108, 72])
+    assert sectors[0].theta2 == pytest.approx(90) and sectors[1].theta2 == pytest.approx(54)  # clockwise from the top
+    places = 2 * np.pi * (np.arange(6) + 0.5) / 6
+    ends = 0.98 * np.column_stack([np.sin(places), np.cos(places)])
+    assert_drawn(stage, rays(np.zeros(2), ends), upright(range(1, 7), (0.2, 0.4, 0.0, 0.4, 0.6, 0.4)))
+    assert stage.result["counts"].tolist() == [1, 1, 0, 1, 2, 1]  # 30, 90, 150, 210, 270, 330 deg: by the sectors above
+
+
+def test_standing_clouds_are_what_is_left():
+    stage = at(ch09.standing(), rounds=40)
+    for method, left in stage.result["left"].items():
+        cloud = stage.result["clouds"][method]
+        assert len(cloud) == left[-1]
+        assert_drawn(stage, cloud, np.column_stack([range(41), left]))
+
+
+def test_picture_of_the_twelve():
+    stage = at(ch09.twelve_pictures(), particles=200, t=2.0)
+    r = stage.result
+    assert r["number"] == 5 and len(r["path"]) == 5
+    assert_drawn(stage, r["states"][:, :2], robot_mark(r["truth"], 0.35), robot_mark(r["estimate"], 0.35), r["path"])
+    np.testing.assert_array_equal(r["path"][-1], r["truth"][:2])
+
+
+def test_soccer_robot_looks_at_the_landmark_it_sees():
+    stage = ch09.soccer()
+    seen = next(t for t in np.arange(0, 40, 0.4) if at(stage, t=t).result["seen"] >= 0)
+    r = at(stage, t=seen).result
+    robot = r["truth"][-1]
+    assert_drawn(stage, [robot[:2], r["landmarks"][r["seen"]]], robot_mark(robot, 0.12), r["states"][:, :2])
+    assert_drawn(stage, r["truth"][:, :2], r["odometry"][:, :2], r["estimates"][:, :2])
+    toward = r["landmarks"][r["seen"]] - robot[:2]
+    off = np.arctan2(toward[1], toward[0]) - robot[2]
+    assert abs((off + np.pi) % (2 * np.pi) - np.pi) < np.deg2rad(28)  # within the camera's view
+
+
+def test_arena_draws_robot_estimate_scan_and_errors():
+    stage = at(ch09.arena(), particles=500, t=1.5)
+    r = stage.result
+    assert len(r["errors"]) == 3
+    assert_drawn(stage, r["states"][:, :2], robot_mark(r["pose"], 0.35), robot_mark(r["estimate"], 0.35))
+    assert_drawn(stage, r["ends"], rays(r["pose"], r["ends"]), np.column_stack([range(3), r["errors"]]))
+
+
+def test_obstacles_are_circles_about_their_places():
+    disks = ch09.draw.Disks(Figure().subplots())
+    disks.set(np.array([[2.0, 3.0, 0.15], [7.0, 1.0, 0.4]]))
+    for outline, (x, y, radius) in zip(disks.line.get_xydata().reshape(2, -1, 2), [(2, 3, 0.15), (7, 1, 0.4)]):
+        assert np.isnan(outline[-1]).all()
+        np.testing.assert_allclose(np.linalg.norm(outline[:-1] - (x, y), axis=1), radius)

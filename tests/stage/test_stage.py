@@ -247,7 +247,7 @@ def test_text_is_constant_and_what_is_stored_needs_no_kernel():
 def test_a_small_picture_shows_the_rings_of_the_handles():
     stage = segment(handles={"P": Handle((1, 1)), "Q": Handle((4, 2), color=style.MEASUREMENT)})
     image = np.asarray(Image.open(io.BytesIO(stage.small_png())).convert("RGB")).astype(int)
-    right, down = stage._picture.fraction(stage._picture.fig.axes[0], (4, 2))
+    right, down = stage._picture.fraction(stage.figure.axes[0], (4, 2))
     near = image[round(420 * down) - 12 : round(420 * down) + 12, round(700 * right) - 12 : round(700 * right) + 12]
     orange = np.abs(near - 255 * np.array(to_rgb(style.MEASUREMENT))).max(-1) < 60
     assert orange.sum() > 40 and len(stage.small_png()) < 20_000
@@ -360,7 +360,7 @@ def test_set_from_many_threads(wired):
 def test_click_and_brush():
     stage, sent = wire(nothing(click=True, brush=True, compute=lambda state: (state["click"], state["brush"])))
     assert stage.state["click"] is None and stage.state["brush"].shape == (0, 2)
-    ax = stage._picture.fig.axes[0]
+    ax = stage.figure.axes[0]
     at = [stage._picture.fraction(ax, xy) for xy in ((2, 2), (4, 3), (6, 3))]
     stage.receive({"click": at[0], "serial": "a:2"})
     assert stage.result[0] == pytest.approx([2, 2])
@@ -430,7 +430,7 @@ def test_memory_follows_ticks_keys_and_clicks():
     assert stage.declaration()["keys"] is True and sent[-1][0]["time"]["at"] == 0
     stage.receive({"time": {"at": 2, "epoch": 0}, "serial": "a:1"})
     stage.receive({"arrows": ["up", "left"], "serial": "a:2"})
-    stage.receive({"click": stage._picture.fraction(stage._picture.fig.axes[0], (1, 1)), "serial": "a:3"})
+    stage.receive({"click": stage._picture.fraction(stage.figure.axes[0], (1, 1)), "serial": "a:3"})
     assert stage.result == ["tick", "tick", "up", "left", "click"]
     stage.set(t=0.1)  # back in time: from the start
     assert stage.result == ["tick"]
@@ -477,7 +477,7 @@ def test_a_point_in_space_is_dragged_in_the_plane_of_the_screen():
     stage.receive({"step": {"P": (2, 1)}, "serial": "a:2"})
     shift = view.project(stage.state["P"]) - view.project(before)
     assert shift == pytest.approx([2, 1, 0])
-    at = stage._picture.fraction(stage._picture.fig.axes[0], (-3, 4))
+    at = stage._picture.fraction(stage.figure.axes[0], (-3, 4))
     stage.receive({"drag": {"P": at}, "serial": "a:3"})
     assert view.project(stage.state["P"])[:2] == pytest.approx([-3, 4])
     assert sent[-1][0]["handles"]["P"]["at"] == pytest.approx(at)
@@ -529,14 +529,14 @@ def test_the_picture_takes_its_room_sharply_and_letters_keep_their_size(room, ra
     stage = segment()
     stage._picture.fit(*room, ratio, False)
     assert np.abs(np.subtract(Image.open(io.BytesIO(stage.png())).size, expected)).max() <= 1
-    letters = stage._picture.fig.dpi / (expected[0] / stage._picture.width) / canvas.CSS_DPI
+    letters = stage.figure.dpi / (expected[0] / stage._picture.width) / canvas.CSS_DPI
     assert letters == pytest.approx(min(1, room[0] / (0.85 * 700), room[1] / (0.85 * 420)), abs=0.01)
 
 
 def test_letters_grow_with_those_around():
     stage = segment()
     stage._picture.fit(1400, 840, 1, False, letters=2.0)
-    assert stage._picture.fig.get_size_inches() == pytest.approx([7.0, 4.2]) and stage._picture.fig.dpi == 200
+    assert stage.figure.get_size_inches() == pytest.approx([7.0, 4.2]) and stage.figure.dpi == 200
 
 
 def test_dark_theme_exchanges_paper_and_ink_only():
@@ -577,7 +577,7 @@ def test_background_is_drawn_only_when_it_changes(monkeypatch):
         stage.set(P=(k, 1))
         stage.png()
     assert not draws
-    stage._picture.fig.axes[0].set_xlim(0, 20)
+    stage.figure.axes[0].set_xlim(0, 20)
     stage.png()
     assert len(draws) == 1
     stage._picture.fit(500, 900, 1, False)
