@@ -273,6 +273,19 @@ def test_the_readme_lists_every_chapter(path):
     assert f"| {int(path.stem[:2])} | `{path.stem}` |" in (ROOT / "README.md").read_text(encoding="utf-8")
 
 
+ROOMS = sorted(folder for folder in (ROOT / "labkit").iterdir() if (folder / "__init__.py").exists())
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=lambda room: room.name)
+def test_the_readme_shows_every_room(room):
+    """The tree of the README names each room of labkit; of the mathematics and of `files` every module as well."""
+    tree = (ROOT / "README.md").read_text(encoding="utf-8").partition("## The house")[2]
+    (row,) = re.findall(rf"^      {room.name}/ +(.+)$", tree, re.M)
+    if room.name in (*MATHEMATICS, "files") and room.name != "fast":
+        modules = {path.stem for path in room.glob("*.py")} - {"__init__"}
+        assert modules == set(re.findall(r"[a-z_]+", row.partition(":")[0]))
+
+
 @pytest.mark.parametrize("arguments", (["check", "--output-format=concise"], ["format", "--check"]), ids=" ".join)
 def test_ruff_is_content(arguments):
     ruff = subprocess.run([sys.executable, "-m", "ruff", *arguments, "."], cwd=ROOT, capture_output=True, text=True)

@@ -3,6 +3,8 @@
 session     `course("01-frames")`, as a notebook meets it
 engine      exercises, values, predictions, and the verdict on an answer
 metrics     how far two results are apart, in degrees and millimeters
+relations   what a wrong result has to do with the right one
+scope       what a checked function sees besides its arguments
 guard       running a student's code without harm
 feedback    what appears beneath a cell
 progress    what has been solved

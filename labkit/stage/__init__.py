@@ -5,6 +5,7 @@ controls    what one may declare: handles, sliders, choices, toggles, time
 stage.js    the front end, the same in notebooks and on any other page
 front       a Stage in a notebook
 canvas      pictures drawn, compared and sent
+renderer    how it is drawn: words kept, colors for the dark theme
 scene3d     points, lines and triads in space
 style       colors and letters by role
 marks       small things that several chapters draw
