@@ -161,11 +161,15 @@ class Toggle:
 
 @dataclass(frozen=True)
 class Play:
-    """A control of time: `state["t"]` from 0 to t_max in steps of dt (s), `rate` times as fast as real time."""
+    """A control of time: `state["t"]` from 0 to t_max in steps of dt (s), `rate` times as fast as real time.
+
+    start : where it stands at first and after Reset (s), so that no picture begins empty.
+    """
 
     t_max: float
     dt: float = 0.05
     rate: float = 1.0
+    start: float = 0.0
 
     @property
     def steps(self):

@@ -128,7 +128,7 @@ class Stage:
         self._state = {
             **{key: handle.at for key, handle in self._handles.items()},
             **{key: control.value for key, control in self._controls.items()},
-            **({"t": 0.0} if play else {}),
+            **({"t": play.start} if play else {}),
             **({"view": view} if view else {}),
             **({"click": None} if click is not None else {}),
             **({"brush": np.empty((0, 2))} if brush is not None else {}),
@@ -150,6 +150,7 @@ class Stage:
             for key, changes in {"Reset": {}, "Make it fail": fail, **(presets or {})}.items()
         }
         self._restart()
+        self._go_on(self._ticks(0.0))
         self._recompute()
         self._picture.draw()
         self._text = f"[stage: {name}] {self.caption}".rstrip()
@@ -259,11 +260,7 @@ class Stage:
                 if restart or (self._advance and after < before - 1e-9):
                     self._restart()
                     before = 0.0
-                if self._advance and self._play:
-                    ticks = round(after / self._play.dt) - round(before / self._play.dt)
-                    events = [*["tick"] * ticks, *events]
-                for event in events:
-                    self._state = {**self._state, "memory": self._advance(self.state, event)}
+                self._go_on([*self._ticks(before), *events])
                 self._recompute()
             except Exception as error:
                 self.status = str(error) if type(error) is ValueError else f"{type(error).__name__}: {error}"
@@ -281,6 +278,16 @@ class Stage:
         if self._start:
             self._state = {**self._state, "memory": None}
             self._state["memory"] = self._start(self.state)
+
+    def _ticks(self, before):
+        """The steps of a simulation from a time until now, as events."""
+        if not (self._advance and self._play):
+            return []
+        return ["tick"] * (round(self._state["t"] / self._play.dt) - round(before / self._play.dt))
+
+    def _go_on(self, events):
+        for event in events:
+            self._state = {**self._state, "memory": self._advance(self.state, event)}
 
     def _recompute(self):
         result = self._compute(self.state)

@@ -55,6 +55,7 @@ def test_arena_is_honest_until_it_forgets_to_wrap():
 
 def test_arena_takes_keys_and_dragged_landmarks():
     stage = stages.arena()
+    stage.set(t=0.0)
     for key in ("up", "left", "up", "right", "down"):
         stage._apply({}, [key])
     stage.set(L1=(3.0, 6.0))
@@ -78,9 +79,20 @@ def test_bells_start_as_the_prediction_says_equally_sure_and_2_m_apart():
 
 def test_arena_says_when_the_robot_has_left_the_picture():
     stage = stages.arena()
+    stage.set(t=0.0)
     for _ in range(16):
         stage._apply({}, ["up"])
     assert "left the picture" not in stage.caption
     for _ in range(3):
         stage._apply({}, ["up"])
     assert "left the picture" in stage.caption
+
+
+def test_making_the_arena_fail_fails_at_once_and_says_why():
+    stage = stages.arena()
+    assert len(stage.result["nees"]) == 60 and stage.result["error"] < 0.1
+    stage.make_it_fail()
+    assert stage.result["error"] > 0.4 and stage.result["nees"].max() > 500
+    assert "jumped by a whole turn" in stage.caption
+    stage.reset()
+    assert "jumped" not in stage.caption and len(stage.result["nees"]) == 60

@@ -299,11 +299,11 @@ def drive():
         scene=scene,
         compute=compute_drive,
         controls={"factor": Slider(0.2, 3.0, 1.0, step=0.1, label="noise, times the lecture's")},
-        play=Play(lecture.circle_drive().dt * 140, dt=0.1, rate=2.0),
+        play=Play(lecture.circle_drive().dt * 140, dt=0.1, rate=2.0, start=6.0),
         keys=True,
         start=_start_drive,
         advance=_advance_drive,
-        fail={"factor": 3.0},
+        fail={"factor": 3.0, "t": 14.0},
         describe=_drive_sentence,
     )
 

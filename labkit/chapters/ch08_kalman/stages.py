@@ -220,6 +220,7 @@ def compute_arena(state):
         "seen": memory["seen"],
         "nees": np.array(memory["nees"]),
         "error": float(np.linalg.norm((truth[-1] - estimate[-1])[:2])),
+        "wrap": state["wrap"],
     }
 
 
@@ -229,6 +230,8 @@ def _arena_sentence(result):
     over = float((result["nees"] > chi2.ppf(0.995, 3)).mean())
     text = f"The filter is {100 * result['error']:.0f} cm off; NEES now {result['nees'][-1]:.3g}, expected 3."
     text += strayed(result["truth"][-1], ARENA)
+    if not result["wrap"] and result["nees"].max() > 100:
+        text += " A bearing near 180 deg jumped by a whole turn, and the correction took it at its word."
     return text + (f" Above the upper limit in {100 * over:.0f} % of the steps, expected 0.5 %." if over > 0.02 else "")
 
 
@@ -266,11 +269,11 @@ def arena():
             "factor": Slider(0.1, 5.0, 1.0, label="believed sensor noise, times the true one", log=True),
             "wrap": Toggle(True, label="wrap the bearing innovation"),
         },
-        play=Play(30.0, dt=0.1, rate=2.0),
+        play=Play(30.0, dt=0.1, rate=2.0, start=6.0),
         keys=True,
         start=_start_arena,
         advance=_advance_arena,
-        fail={"wrap": False, "count": 2},
+        fail={"wrap": False, "count": 2, "t": 13.0},
         presets={"Sensor believed too good": {"factor": 0.2}},
         describe=_arena_sentence,
     )

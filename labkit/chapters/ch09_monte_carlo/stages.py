@@ -21,6 +21,7 @@ DT = 0.5  # s, one step of the arena and of the twelve pictures
 HISTORY = 120  # steps of the arena's error curve
 HEAT_DEPTH = -250.0  # log weights below the best one by more look alike
 DISK = 0.15  # m, radius of the mouse's pen
+FEW, SETTLED = 500, 20  # particles, steps: the arena then says why it fails
 
 
 @functools.cache
@@ -681,6 +682,8 @@ def _arena_sentence(result):
         return "The particles are everywhere. Press play, or click the picture and use the arrow keys."
     step = result["step"]
     words = f"Off by {result['off']:.2f} m; {step.n_particles} particles worth {step.effective:.0f} equal ones"
+    if step.n_particles <= FEW and len(result["errors"]) > SETTLED and result["off"] > 1:
+        return f"{words}. So few at the start seldom hold one near the robot, and copies of a wrong one stay wrong."
     if step.all_zero:
         return f"{words}; no particle explains the scan: all weights are zero."
     return f"{words}; {step.injected} random poses put in." if step.injected else f"{words}."
@@ -725,7 +728,7 @@ def arena():
         advance=advance_arena,
         brush=True,
         keys=True,
-        fail={"particles": 100},
+        fail={"particles": 100, "t": 20.0},
         describe=_arena_sentence,
         size=(7.0, 5.8),
     )
