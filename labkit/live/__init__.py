@@ -37,6 +37,7 @@ class Live(anywidget.AnyWidget):
     """
 
     _esm = Path(__file__).with_name("live.js")
+    _css = Path(__file__).with_name("live.css")
     place = traitlets.Unicode().tag(sync=True)
     child = traitlets.Unicode().tag(sync=True)
 

@@ -108,6 +108,19 @@ def look(page, stage):
     return page.evaluate("(node) => node.querySelector('canvas').toDataURL()", stage.element_handle())
 
 
+def test_a_wide_formula_scrolls_and_is_not_cut(page):
+    page.set_viewport_size({"width": 853, "height": 480})
+    page.wait_for_timeout(500)
+    formulas = page.evaluate("""() => {
+        const seen = document.querySelector(".jp-Notebook .jp-WindowedPanel-outer").getBoundingClientRect();
+        return [...document.querySelectorAll('.jp-Notebook mjx-container[display="true"]')].map((node) =>
+            [node.getBoundingClientRect().right <= seen.right, node.scrollWidth > node.clientWidth + 5]);
+    }""")
+    page.set_viewport_size({"width": 1280, "height": 900})
+    assert all(inside for inside, _ in formulas)
+    assert any(scrolls for _, scrolls in formulas), "chapter 1 has formulas wider than this window"
+
+
 def test_no_other_host_was_called_and_the_console_is_quiet(page):
     """Last in this file: it looks at all that happened above."""
     assert page.hosts <= {"localhost", "127.0.0.1", None}, "None stands for pictures the page makes itself"
