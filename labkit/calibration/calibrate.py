@@ -276,7 +276,7 @@ def hand_eye(
     )  # fmt: skip
     proposals, course = next_poses(model, solution, kept)
     proposals = invert(proposals) if eye_to_hand else proposals
-    warnings = found.warnings + _moved(model, kept)
+    warnings = found.warnings + _moved(model, kept, length_unit)
     return _with(found, next_poses=proposals, next_std=course, warnings=warnings, poses=robot)
 
 
@@ -509,7 +509,7 @@ def _loose(model, residuals, length_unit):
     )
 
 
-def _moved(model, kept):
+def _moved(model, kept, length_unit):
     """A warning when the rejected rows are one block that fits another mounting: something slipped."""
     if (~kept).sum() < 4:
         return ()
@@ -524,7 +524,7 @@ def _moved(model, kept):
     angle, distance = pose_distance(model.fitted(kept)[0], other[0])
     return (
         f"rows {block[0]} to {block[1]} agree among themselves, but with another mounting, {np.rad2deg(angle):.2g} deg "
-        f"and {distance:.3g} away: did something slip before row {block[0]}?",
+        f"and {distance:.3g} {length_unit} away: did something slip before row {block[0]}?",
     )
 
 

@@ -101,15 +101,17 @@ def chart(values, kept, label, name="row", limit=None, alone=None):
 
 
 def curve(x, y, x_label, y_label):
-    """A line through points, SVG; at most 600 of them."""
+    """A line through points, SVG; at most 600 of them, and none across a gap of the data."""
     x, y = np.asarray(x, float), np.asarray(y, float)
+    usual = np.median(np.diff(x)) if len(x) > 1 else 0.0
     pick = np.unique(np.linspace(0, len(x) - 1, min(len(x), MAX_MARKS)).astype(int))
     x, y = x[pick], y[pick]
     top, span = 1.1 * max(y.max(initial=0.0), 1e-12), max(np.ptp(x), 1e-12)
     up = lambda v: HEIGHT - BOTTOM - (HEIGHT - BOTTOM - 15) * v / top  # noqa: E731
     across = LEFT + (WIDTH - LEFT - 15) * (x - x[0]) / span
-    way = "L".join(f"{a:.1f} {up(b):.1f}" for a, b in zip(across, y))
-    parts = [_axis(top, y_label, up), f'<path d="M{way}" fill="none" stroke="var(--estimate)" stroke-width="1.5"/>']
+    far = np.concatenate([[True], np.diff(x) > 5 * max(usual, span / MAX_MARKS)])
+    way = "".join(f"{'M' if new else 'L'}{a:.1f} {up(b):.1f}" for a, b, new in zip(across, y, far))
+    parts = [_axis(top, y_label, up), f'<path d="{way}" fill="none" stroke="var(--estimate)" stroke-width="1.5"/>']
     for share in (0, 0.5, 1):
         place = LEFT + (WIDTH - LEFT - 15) * share
         parts.append(f'<text x="{place:.1f}" y="{HEIGHT - 12}" text-anchor="middle">{x[0] + share * span:.4g}</text>')
