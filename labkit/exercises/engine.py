@@ -45,12 +45,14 @@ class Mistake:
     """A wrong variant of the reference, with the same arguments, and what to tell who made it.
 
     `id` is the same in every term and in every list, so that two classes can be compared. Left out, it follows from
-    the exercise and the sentence; whoever only improves the sentence writes the old id down.
+    the exercise and the sentence; whoever only improves the sentence writes the old id down. `within` is for a Value
+    that comes from a search: how far, in the Value's unit, an answer may be from the wrong one and still be it.
     """
 
     variant: object
     text: str
     id: str = ""
+    within: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -401,13 +403,14 @@ def _equal_as_written(metric, result, wrong):
 def _equal_arrays(a, b):
     if isinstance(b, tuple):
         return isinstance(a, tuple | list) and len(a) == len(b) and all(map(_equal_arrays, a, b))
-    a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
-    return a.shape == b.shape and np.allclose(a, b, rtol=1e-9, atol=1e-12, equal_nan=True)
+    a, b = np.asarray(a), np.asarray(b)
+    rtol = metrics.FLOAT32_TOLERANCE if metrics._is_single(a) or metrics._is_single(b) else 1e-9
+    return a.shape == b.shape and np.allclose(a.astype(float), b.astype(float), rtol=rtol, atol=1e-12, equal_nan=True)
 
 
 ADVICE = {  # what NumPy means
     "must be square": "`solve` and `inv` need as many equations as unknowns; `lstsq` takes more.",
-    "Singular matrix": "The equations do not determine all unknowns: is one missing, or there twice?",
+    "Singular matrix": "The equations do not determine all unknowns: is one missing, or there twice? Has a loop run off?",
     "Incompatible dimensions": "`lstsq` needs one right side a row of the matrix: is `.ravel()` missing?",
     "mismatch in its core dimension": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",
     "not aligned": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",
@@ -505,10 +508,11 @@ class Value(Item):
             return Outcome(NOT_YET, f"expected a number{self._in_unit()}, got {metrics._describe(answer)}.")
         return self._compare(metric, run.result, expected)
 
-    def _mistake(self, answer, is_it):
-        """The first mistake whose value `is_it` finds in the answer."""
+    def _mistake(self, answer, is_it, near=False):
+        """The first mistake whose value `is_it` finds in the answer, or which the answer is near enough to."""
         for k, mistake in enumerate(self.mistakes):
-            if is_it(answer, mistake.variant()):
+            wrong = mistake.variant()
+            if is_it(answer, wrong) or near and mistake.within and abs(answer - wrong) <= mistake.within:
                 return Outcome(NOT_YET, mistake.text, k)
         return None
 
@@ -544,7 +548,9 @@ class Value(Item):
         digits = 0 if _is_whole(expected) else relations.significant_digits(answer, expected)
         if is_right or digits >= self.digits:
             return Outcome(CORRECT)
-        named = self._mistake(answer, lambda a, w: relations.significant_digits(a, w) >= max(self.digits, digits + 1))
+        named = self._mistake(
+            answer, lambda a, w: relations.significant_digits(a, w) >= max(self.digits, digits + 1), near=True
+        )
         if named:
             return named
         if digits > 1:

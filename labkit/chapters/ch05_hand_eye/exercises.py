@@ -3,6 +3,7 @@
 import functools
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 
 from ...calibration import hand_eye, planning, robust, sphere
@@ -15,6 +16,7 @@ from ...geometry import frames, lie
 from ...geometry.chaining import orthonormality_error
 from ...geometry.lie import exp_so3, skew
 
+POSE, POINT = "a pose is always 4 x 4", "a point is always three numbers"
 SUBSTITUTES = {("C14", 12, "A_deg"): ("C14", 12, "C_deg")}  # only A - C counts there: either answer is right
 
 
@@ -30,8 +32,9 @@ def random_scanner(rng):
     return frames.pose(random_rotation(rng, 2.5), rng.uniform(-150, 150, 3))
 
 
-def scene(rng, n=8, std=0.0):
-    """Scanner, robot poses, sphere centers and target of a small calibration."""
+def scene(rng, n=None, std=0.0):
+    """Scanner, robot poses, sphere centers and target of a small calibration; their number differs, it is never 6."""
+    n = n or int(rng.integers(9, 14))
     T_FS, target = random_scanner(rng), rng.uniform(-900, 900, 3)
     R = exp_so3(rng.uniform(-1.2, 1.2, (n, 3)))
     x_S = np.column_stack([rng.uniform(-25, 25, n), rng.uniform(-20, 20, n), rng.uniform(190, 290, n)])
@@ -70,22 +73,25 @@ def pose_off(rng):
 
 
 def smooth_function(rng):
-    """A curved function of three variables, a place and a step large enough to tell the schemes apart."""
-    M, c = rng.normal(size=(4, 3)), rng.normal(size=4)
-    return (lambda x: np.sin(M @ x) + c * (x @ x)), rng.normal(size=3), 0.05
+    """A curved function of some variables, a place and a step large enough to tell the schemes apart."""
+    m, n = rng.choice(np.arange(2, 6), 2, replace=False)
+    M, c = rng.normal(size=(m, n)), rng.normal(size=m)
+    return (lambda x: np.sin(M @ x) + c * (x @ x)), rng.normal(size=n), float(rng.uniform(0.03, 0.08))
 
 
 def arc(rng, std=0.0):
     """A scan line: points of a circle, 60 to 120 deg of it."""
-    angle = np.linspace(-1, 1, 60) * rng.uniform(0.55, 1.0)
-    r = rng.uniform(20, 30) + std * rng.normal(size=60)
+    n = int(rng.integers(50, 90))
+    angle = np.linspace(-1, 1, n) * rng.uniform(0.55, 1.0)
+    r = rng.uniform(20, 30) + std * rng.normal(size=n)
     return rng.uniform(-20, 20) + r * np.sin(angle), rng.uniform(200, 280) - r * np.cos(angle)
 
 
-def profile(rng):
-    radius, side = 30.0, int(rng.choice([-1, 1]))
+def profile(rng, side):
+    """A scan line of a sphere of some radius whose center lies on this side of the scan plane."""
+    radius = float(rng.uniform(25, 35))
     center = np.array([rng.uniform(4, 20), side * rng.uniform(6, 20), rng.uniform(200, 280)])
-    return *sphere.scan_line(center, radius, rng.uniform(0.6, 1.0), 50), radius, side
+    return *sphere.scan_line(center, radius, rng.uniform(0.6, 1.0), int(rng.integers(40, 70))), radius, side
 
 
 def increments(rng):
@@ -95,9 +101,10 @@ def increments(rng):
 
 
 def residuals_with_outliers(rng):
-    """Residual vectors of 20 poses, four of them gross, and their odd-sized noise."""
-    e = rng.uniform(0.1, 2.0) * rng.normal(size=(21, 3))
-    e[rng.choice(21, 4, replace=False)] *= rng.uniform(5, 40, (4, 1))
+    """Residual vectors of some twenty poses, four of them gross, and their odd-sized noise."""
+    n = int(rng.integers(18, 30))
+    e = rng.uniform(0.1, 2.0) * rng.normal(size=(n, 3))
+    e[rng.choice(n, 4, replace=False)] *= rng.uniform(5, 40, (4, 1))
     return (e,)
 
 
@@ -293,7 +300,7 @@ def _linear_without_rotation(T_BF, x_S):
 
 
 def _linear_without_turning_back(T_BF, x_S):
-    """Writes the equations with R_BF where R_BF' belongs."""
+    """Writes the equations with R_BF where R_BF^T belongs."""
     R, n = T_BF[:, :3, :3], len(T_BF)
     D = np.concatenate([np.kron(x_S[:, None], np.eye(3)[None]).reshape(n, 3, 9), np.tile(np.eye(3), (n, 1, 1)), -R], 2)
     u = np.linalg.lstsq(D.reshape(-1, 15), -(R @ T_BF[:, :3, 3, None]).ravel(), rcond=None)[0]
@@ -407,10 +414,9 @@ def corrected_fit():
     return hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S)
 
 
-def predicted_stds(T_BF):
+def predicted_stds(T_BF, T_FS, target):
     """Predicted standard deviations of the scanner's rotation (deg) and translation (mm) under these poses."""
-    fit = corrected_fit()
-    cov = planning.predicted_covariance(T_BF, fit.T_FS, fit.target, fit.std)
+    cov = planning.predicted_covariance(T_BF, T_FS, target, corrected_fit().std)
     return float(np.rad2deg(np.sqrt(np.trace(cov[:3, :3])))), float(np.sqrt(np.trace(cov[3:6, 3:6])))
 
 
@@ -424,28 +430,50 @@ def design_poses(T_FS, target, rng):
     return planning.poses_that_see(T_FS, target, exp_so3(tilt) @ down, x_S)
 
 
-def design_is_good(student, rng):
-    """What the poses of the exercise must fulfil; a sentence when they do not."""
+def scanner_and_sphere(rng):
+    """A scanner and a sphere near the thesis's own, and a generator."""
     fit = corrected_fit()
-    T_BF = np.asarray(student(fit.T_FS, fit.target, np.random.default_rng(int(rng.integers(1 << 30)))), dtype=float)
+    R, t = fit.T_FS[:3, :3], fit.T_FS[:3, 3]
+    T_FS = frames.pose(exp_so3(rng.uniform(-0.3, 0.3, 3)) @ R, t + rng.uniform(-40, 40, 3))
+    return T_FS, fit.target + rng.uniform(-80, 80, 3), np.random.default_rng(int(rng.integers(1 << 30)))
+
+
+def design_is_good(student, rng):
+    """What the poses of the exercise must fulfil, for three scanners; a sentence when they do not."""
+    for _ in range(3):
+        T_FS, target, chance = scanner_and_sphere(rng)
+        problem = _problem_of_design(np.asarray(student(T_FS.copy(), target.copy(), chance), dtype=float), T_FS, target)
+        if problem:
+            return problem
+    return None
+
+
+def _problem_of_design(T_BF, T_FS, target):
     if T_BF.shape != (31, 4, 4):
         return f"31 poses are wanted, shape (31, 4, 4); got {T_BF.shape}."
     try:
-        x_S = frames.transform(frames.invert(fit.T_FS), frames.transform(frames.invert(T_BF), fit.target))
+        x_S = frames.transform(frames.invert(T_FS), frames.transform(frames.invert(T_BF), target))
     except ValueError as refusal:
         return f"{refusal}."
-    problem = planning.field_problem(x_S)
-    if problem:
-        return problem
-    down = T_BF[:, :3, :3] @ fit.T_FS[:3, 2]
+    return planning.field_problem(x_S) or _looks_up(T_BF, T_FS) or _too_uncertain(T_BF, T_FS, target, x_S)
+
+
+def _looks_up(T_BF, T_FS):
+    down = T_BF[:, :3, :3] @ T_FS[:3, 2]
     steepest = np.rad2deg(np.arccos(np.clip(-down[:, 2], -1, 1))).max()
     if steepest > 91:
         return f"one pose looks up at the sphere, {steepest:.0f} deg from straight down: the table is in the way (90 at most)."
+    return None
+
+
+def _too_uncertain(T_BF, T_FS, target, x_S):
     try:
         hand_eye.calibrate_sphere_target(T_BF, x_S)
     except ValueError as refusal:  # a motion is missing: it says which
         return f"{refusal}."
-    (turn, shift), (printed_turn, printed_shift) = predicted_stds(T_BF), predicted_stds(thesis.measurements(True).T_BF)
+    fit = corrected_fit()
+    printed_turn, printed_shift = predicted_stds(thesis.measurements(True).T_BF, fit.T_FS, fit.target)
+    turn, shift = predicted_stds(T_BF, T_FS, target)
     if not turn < 0.7 * printed_turn:
         return f"the rotation would be known to {turn:.2g} deg; the thesis's pattern gives {printed_turn:.2g}, and 0.7 of that is asked for."
     if not shift < printed_shift:
@@ -482,10 +510,40 @@ def _joint_rms(*fixed):
     return hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S).rms
 
 
+def _robust_fit():
+    measured = thesis.measurements(True)
+    return hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S, robust=True)
+
+
+def _rms_without_the_seven():
+    measured, good = thesis.measurements(True), ~np.isin(np.arange(1, 32), ALL_FIXED)
+    return hand_eye.calibrate_sphere_target(measured.T_BF[good], measured.x_S[good]).rms
+
+
+def _rms_left_out():
+    measured = thesis.measurements(True)
+    return float(hand_eye.rms_distance(hand_eye.leave_one_out(measured.T_BF, measured.x_S)))
+
+
+def _mean_distance():
+    return float(np.linalg.norm(corrected_fit().residuals, axis=1).mean())
+
+
 GROWS_BEYOND = (
     "Below u = 1 the weight is (1 - u^2)^2, beyond it 0. Yours grows there, and the worst poses get the most say."
 )
 ALL_FIXED = (2, 3, 4, 7, 12, 21, 30)
+
+
+def _rms_with_radius(R):
+    measured = thesis.measurements(True)
+    return hand_eye.calibrate_sphere_target(measured.T_BF, thesis.centers_with_radius(measured.x_S, R)).rms
+
+
+@functools.cache
+def _shallower_radius():
+    """The second minimum of the rms, where the circle of pose 4 is larger than the sphere."""
+    return float(minimize_scalar(_rms_with_radius, bounds=(29.9, 29.97), method="bounded").x)
 
 
 @functools.cache
@@ -504,13 +562,14 @@ CHAPTER = Chapter(
             draw=arc,
             metric=metrics.Several(metrics.Numbers(1e-6, "mm"), metrics.Numbers(1e-6, "mm"), metrics.Numbers(1e-6, "mm"),
                                    names=("center x", "center z", "radius")),
-            noisy=3 * ((lambda rng: arc(rng, 0.02), metrics.Several(
-                metrics.Numbers(2e-3, "mm"), metrics.Numbers(1e-4, "mm"), metrics.Numbers(1e-3, "mm"),
+            noisy=5 * ((lambda rng: arc(rng, 0.01), metrics.Several(
+                metrics.Numbers(1e-3, "mm"), metrics.Numbers(3e-5, "mm"), metrics.Numbers(3e-4, "mm"),
                 names=("center x", "center z", "radius"))),),
             hints=(
                 "A circle is linear in the right unknowns: multiply (x - xc)^2 + (z - zc)^2 = r^2 out.",
                 "x^2 + z^2 + a1 x + a2 z + a3 = 0 with a1 = -2 xc, a2 = -2 zc, a3 = xc^2 + zc^2 - r^2: one equation a point.",
-                "`a = np.linalg.lstsq(np.column_stack([x, z, np.ones(len(x))]), -(x**2 + z**2), rcond=None)[0]; return -a[0]/2, -a[1]/2, np.sqrt(a[0]**2/4 + a[1]**2/4 - a[2])`",
+                "`a = np.linalg.lstsq(np.column_stack([x, z, np.ones(len(x))]), -(x**2 + z**2), rcond=None)[0]\n"
+                "return -a[0]/2, -a[1]/2, np.sqrt(a[0]**2/4 + a[1]**2/4 - a[2])`",
             ),
             mistakes=[
                 Mistake(_circle(lambda x, z, r: (-x, -z, r)), "Your center has the opposite sign: a1 = -2 xc, so xc = -a1/2."),
@@ -539,13 +598,13 @@ CHAPTER = Chapter(
         Exercise(
             "sphere_center_from_profile",
             reference=sphere.sphere_center_from_profile,
-            draw=profile,
-            draws=10,  # both sides must occur
+            draw=tuple(functools.partial(profile, side=side) for side in (-1, 1)),
             metric=metrics.Numbers(1e-6, "mm"),
             hints=(
                 "The scan line gives a circle in the plane y = 0; the center of the sphere lies straight before or behind its center.",
                 "Pythagoras: R^2 = r^2 + d^2, and side says whether y is +d or -d.",
-                "`xc, zc, r = fit_circle(x, z); return np.array([xc, side * np.sqrt(radius**2 - r**2), zc])`",
+                "`xc, zc, r = fit_circle(x, z)\n"
+                "return np.array([xc, side * np.sqrt(radius**2 - r**2), zc])`",
             ),
             mistakes=[
                 Mistake(_center(lambda x, z, r, R, s: np.array([x, -s * np.sqrt(R * R - r * r), z])),
@@ -555,6 +614,8 @@ CHAPTER = Chapter(
                 Mistake(_center(lambda x, z, r, R, s: np.array([x, s * np.sqrt(R * R + r * r), z])),
                         "R is the hypotenuse: d^2 = R^2 - r^2, with a minus."),
                 Mistake(_center(lambda x, z, r, R, s: np.array([x, s * (R - r), z])), "You took R - r for the distance from the plane: the three form a right triangle."),
+                Mistake(_center(lambda x, z, r, R, s: np.array([x, s * np.sqrt(900 - r * r), z])),
+                        "You took R = 30 mm, as listing C16 does. Which R it is will be asked later: use the argument `radius`."),
                 Mistake(_center(lambda x, z, r, R, s: np.array([x, np.sqrt(R * R - r * r), z])),
                         "You always take the positive root, but the center may lie on either side: multiply by side."),
                 Mistake(_center(lambda x, z, r, R, s: np.array([x, -np.sqrt(R * R - r * r), z])),
@@ -577,6 +638,7 @@ CHAPTER = Chapter(
             "kuka_residual",
             reference=lambda p2, T_BF, x_S, target: _residual(frames.matrix_from_kuka(p2), T_BF, x_S, target),
             draw=kuka_scene,
+            fixed={"p2": "a KUKA pose is always six numbers", "target": POINT},
             metric=metrics.Numbers(1e-9, "mm"),
             hints=(
                 "Follow the point from the scanner outward: which transform comes first?",
@@ -597,6 +659,14 @@ CHAPTER = Chapter(
                 Mistake(_kuka_degrees, "You converted the angles from degrees, but p2 holds radians here."),
                 Mistake(lambda p2, T, x, c: _residual(frames.matrix_from_kuka(np.deg2rad(p2)), T, x, c),
                         "You converted all of p2 from degrees, but it holds millimeters and radians."),
+                Mistake(lambda p2, T, x, c: frames.transform(T, x @ frames.matrix_from_kuka(p2)[:3, :3] + p2[:3]) - c,
+                        "You turned x_S by the transpose of R_FS. For points in rows, R x is `x @ R.T`."),
+                Mistake(lambda p2, T, x, c: frames.transform(T, x @ frames.matrix_from_kuka(p2)[:3, :3].T) - c,
+                        "The translation of T_FS is missing, or the fourth coordinate of x_S is 0: a point has 1 there."),
+                Mistake(lambda p2, T, x, c: frames.transform(T, frames.transform(frames.matrix_from_kuka(p2), x) - c),
+                        "You subtracted the target in the flange's frame. It is written in B: subtract it last."),
+                Mistake(lambda p2, T, x, c: frames.transform(T, frames.transform(frames.matrix_from_kuka(p2), x - c)),
+                        "You subtracted the target from x_S. They are written in different frames: subtract it last, in B."),
                 Mistake(_kuka_directions, "The flange's own position is missing: use the whole T_BF, not its rotation alone."),
             ],
         ),
@@ -615,12 +685,17 @@ CHAPTER = Chapter(
             hints=(
                 "The residuals of all 31 poses under the thesis's end pose and its printed sphere center.",
                 "rms distance: the root of the mean of the squared lengths, one length per pose.",
-                "`np.sqrt((e**2).sum(axis=1).mean()) with e = kuka_residual(p2_end, repaired.T_BF, repaired.x_S, target)`",
+                "`residuals = kuka_residual(p2_end, repaired.T_BF, repaired.x_S, target)\n"
+                "rms_before = np.sqrt((residuals**2).sum(axis=1).mean())`",
             ),
             mistakes=[
                 Mistake(lambda: _per_axis(_rms_of_end_pose(2)), "This is the rms of one coordinate, sqrt(3) smaller. Sum the squares of a pose first."),
                 Mistake(_rms_of_end_pose, "This includes the 2237 mm of pose 2. Use the measurements with that one entry repaired."),
                 Mistake(lambda: _rms_of_end_pose(*ALL_FIXED), "This uses all corrections. At this point only pose 2 is repaired."),
+                Mistake(lambda: _per_axis(_rms_of_end_pose()),
+                        "This is the rms of one coordinate, and it includes the 2237 mm of pose 2. Use `repaired`, and sum the squares of a pose first."),
+                Mistake(lambda: _joint_rms(2), "This is a fit. Asked for are the residuals under the thesis's own end pose and its printed center."),
+                Mistake(lambda: float(_lengths_of_end_pose().max()), "This is the worst pose. Asked for is the rms over all 31."),
                 Mistake(lambda: float(_lengths_of_end_pose().mean()), "This is the mean length: square before you take the mean, then take the root."),
                 Mistake(lambda: float(np.median(_lengths_of_end_pose())), "This is the median length. Asked for is the rms, in which the worst poses count."),
                 Mistake(lambda: _rms_of_end_pose(2) ** 2, "This is the mean square: take its root."),
@@ -664,16 +739,24 @@ CHAPTER = Chapter(
             "analytic_jacobian",
             reference=analytic_jacobian,
             draw=lambda rng: pose_off(rng)[:3],
-            metric=metrics.Numbers(1e-9),
+            fixed={"T_FS": POSE},
+            metric=metrics.Numbers(1e-6),  # good differences are right as well
             hints=(
                 "Insert T_FS exp(phi) into the residual and keep what is linear in phi and in the translation.",
                 "R_BF R_FS exp(phi) x = R_BF R_FS (x + phi x x) = ... - R_BF R_FS [x] phi; the translation enters through R_BF alone.",
-                "`R_BF, R_FS = T_BF[:, :3, :3], T_FS[:3, :3]; return np.concatenate([-R_BF @ R_FS @ skew(x_S), R_BF], axis=2).reshape(-1, 6)`",
+                "`R_BF, R_FS = T_BF[:, :3, :3], T_FS[:3, :3]\n"
+                "return np.concatenate([-R_BF @ R_FS @ skew(x_S), R_BF], axis=2).reshape(-1, 6)`",
             ),
             mistakes=[
                 Mistake(functools.partial(_jacobian, sign=1.0), "The first three columns have the wrong sign: phi x x = -[x] phi."),
                 Mistake(lambda T, B, x: _jacobian(T, B, frames.transform(T, x), left=True),
                         "Your arm is T_FS x_S: the rotation would turn about the flange's origin, translation included. Only x_S itself is turned."),
+                Mistake(lambda T, B, x: _jacobian(T, B, frames.transform(T, x)),
+                        "Your arm is T_FS x_S, turned by R_FS once more. phi turns x_S itself, in the scanner's axes: R_BF R_FS [x_S]."),
+                Mistake(lambda T, B, x: analytic_jacobian(T, B, x).reshape(-1, 3, 6).swapaxes(0, 1).reshape(-1, 6),
+                        "The rows stand all x, all y, all z; wanted is x, y, z of pose 1, then of pose 2, ..."),
+                Mistake(lambda T, B, x: analytic_jacobian(T, B, x).reshape(-1, 3, 6),
+                        "The blocks are right; stack them into one matrix of 3 N rows, `.reshape(-1, 6)`."),
                 Mistake(lambda T, B, x: _jacobian(T, B, x @ T[:3, :3].T, left=True),
                         "You turned about the axes of F, exp(phi) R_FS. Here the increment stands on the right, R_FS exp(phi)."),
                 Mistake(_jacobian_without_base, "R_BF is missing: the residual is written in the base."),
@@ -696,15 +779,25 @@ CHAPTER = Chapter(
             "gauss_newton_on_pose",
             reference=gauss_newton_on_pose,
             draw=pose_off,
+            fixed={"T_FS": POSE, "target": POINT},
             metric=metrics.Poses(1e-6, 1e-6),
             hints=(
                 "Solve the linearized problem for the step, then move the pose by it.",
                 "step = argmin |J step + e|; the first three entries are a rotation vector on the right of R_FS, the last three a translation.",
-                "`J = analytic_jacobian(T_FS, T_BF, x_S); e = frames.transform(T_BF, frames.transform(T_FS, x_S)) - target; step = np.linalg.lstsq(J, -e.ravel(), rcond=None)[0]; "
+                "`J = analytic_jacobian(T_FS, T_BF, x_S)\n"
+                "e = frames.transform(T_BF, frames.transform(T_FS, x_S)) - target\n"
+                "step = np.linalg.lstsq(J, -e.ravel(), rcond=None)[0]\n"
                 "return frames.pose(T_FS[:3, :3] @ exp_so3(step[:3]), T_FS[:3, 3] + step[3:])`",
             ),
             mistakes=[
                 Mistake(_iterated, "You iterated to the end. Asked for is one step."),
+                Mistake(lambda *a: gauss_newton_on_pose(gauss_newton_on_pose(*a), *a[1:]), "You took two steps. Asked for is one."),
+                Mistake(_stepped(lambda T, s: s), "You return the step. Move the pose by it: R_FS exp(phi) and t_FS + tau."),
+                Mistake(_stepped(lambda T, s: frames.pose(exp_so3(s[:3]), s[3:]) @ T),
+                        "You moved the pose from the left as a whole. Turn it on the right, R_FS exp(phi), and add tau to t_FS."),
+                Mistake(_stepped(lambda T, s: T @ frames.pose(exp_so3(s[:3]), s[3:])),
+                        "You moved the pose from the right as a whole, so tau is turned by R_FS. It is written in F: add it to t_FS."),
+                Mistake(_stepped(lambda T, s: _applied(T, s / 2)), "You took half of the step. Gauss-Newton takes the whole."),
                 Mistake(_step_without_target, "The target is missing from your residual: the step leads to the base's origin."),
                 Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3] @ exp_so3(s[3:]), T[:3, 3] + s[:3])),
                         "Rotation and translation have changed places: the first three entries of the step are phi."),
@@ -720,9 +813,7 @@ CHAPTER = Chapter(
                         "I + [phi] is only nearly a rotation. Use exp_so3, or the error grows with every step."),
                 Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3], T[:3, 3] + s[3:])), "The rotation has not been moved."),
                 Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3] @ exp_so3(s[:3]), T[:3, 3])), "The translation has not been moved."),
-                Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3] @ exp_so3(s[:3]), T[:3, 3] + T[:3, :3] @ s[3:])),
-                        "Your translation step is turned by R_FS; in this Jacobian it is already written in F."),
-                Mistake(_gradient_step, "You went along the gradient. Gauss-Newton solves with J'J as well."),
+                Mistake(_gradient_step, "You went along the gradient. Gauss-Newton solves with J^T J as well."),
             ],
         ),
         Prediction(
@@ -735,38 +826,41 @@ CHAPTER = Chapter(
         Exercise(
             "linear_start",
             reference=hand_eye.linear_start,
-            draw=lambda rng: scene(rng, n=9)[1:3],
+            draw=lambda rng: scene(rng)[1:3],
             metric=metrics.Several(metrics.Poses(1e-5, 1e-4), metrics.Numbers(1e-7, "mm"), names=("T_FS", "target")),
             noisy=(noisy_scene,  # t_FS solved anew, or a refined answer, is right as well
                    metrics.Several(metrics.Poses(0.5, 2.5), metrics.Numbers(2e-3, "mm"), names=("T_FS", "target")),
                    "exact on clean data, but on noisy data"),
             hints=(
                 "Forget for a moment that R_FS is a rotation: then all unknowns enter linearly.",
-                "R_FS x + t_FS - R_BF' target = -R_BF' t_BF. Fifteen unknowns: nine of R_FS, three of t_FS, three of the target.",
-                "`A = np.vstack([np.hstack([np.kron(np.eye(3), x), np.eye(3), -T[:3, :3].T]) for T, x in zip(T_BF, x_S)])`, "
-                "`b = np.concatenate([-T[:3, :3].T @ T[:3, 3] for T in T_BF])`, `u = np.linalg.lstsq(A, b, rcond=None)[0]`, "
-                "`return frames.pose(nearest_rotation(u[:9].reshape(3, 3)), u[9:12]), u[12:]`",
+                "R_FS x + t_FS - R_BF^T target = -R_BF^T t_BF. Fifteen unknowns: nine of R_FS, three of t_FS, three of the target.",
+                "`A = np.vstack([np.hstack([np.kron(np.eye(3), x), np.eye(3), -T[:3, :3].T]) for T, x in zip(T_BF, x_S)])\n"
+                "b = np.concatenate([-T[:3, :3].T @ T[:3, 3] for T in T_BF])\n"
+                "u = np.linalg.lstsq(A, b, rcond=None)[0]\n"
+                "return frames.pose(nearest_rotation(u[:9].reshape(3, 3)), u[9:12]), u[12:]`",
             ),
             mistakes=[
                 Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3].T, T[:3, 3]), c)),
                         "Your rotation is the transpose: the nine unknowns came back in the other order (rows and columns)."),
-                Mistake(_linear(lambda T, c: (T, -c)), "The target has the wrong sign: it stands on the other side of the equation, with -R_BF'."),
+                Mistake(_linear(lambda T, c: (T, -c)), "The target has the wrong sign: it stands on the other side of the equation, with -R_BF^T."),
                 Mistake(_linear_without_rotation, "On noisy data your nine numbers are not a rotation: take the nearest one."),
                 Mistake(_linear(lambda T, c: (frames.invert(T), c)), "Your pose is the inverse, T_SF."),
                 Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3], -T[:3, 3]), c)), "The translation of T_FS has the wrong sign."),
-                Mistake(_linear_with_unturned_right_side, "Your right side is -t_BF. It is to be turned into the flange frame as well: -R_BF' t_BF."),
-                Mistake(_linear_without_turning_back, "You multiplied by R_BF where R_BF' is needed: bring everything into the flange frame."),
+                Mistake(_linear_with_unturned_right_side, "Your right side is -t_BF. It is to be turned into the flange frame as well: -R_BF^T t_BF."),
+                Mistake(_linear_without_turning_back, "You multiplied by R_BF where R_BF^T is needed: bring everything into the flange frame."),
             ],
         ),
         Exercise(
             "joint_residual",
             reference=joint_residual,
             draw=increments,
+            fixed={"u": "nine unknowns", "T0": POSE},
             metric=metrics.Numbers(1e-9, "mm"),
             hints=(
                 "Six of the nine unknowns move the scanner, three are the sphere's center itself.",
                 "T_FS = (R0 exp(phi), t0 + dt) with phi = u[:3], dt = u[3:6]; the center is u[6:].",
-                "`T_FS = frames.pose(T0[:3, :3] @ exp_so3(u[:3]), T0[:3, 3] + u[3:6]); return (frames.transform(T_BF, frames.transform(T_FS, x_S)) - u[6:]).ravel()`",
+                "`T_FS = frames.pose(T0[:3, :3] @ exp_so3(u[:3]), T0[:3, 3] + u[3:6])\n"
+                "return (frames.transform(T_BF, frames.transform(T_FS, x_S)) - u[6:]).ravel()`",
             ),
             mistakes=[
                 Mistake(lambda u, T, B, x: _residual(frames.pose(exp_so3(u[:3]) @ T[:3, :3], T[:3, 3] + u[3:6]), B, x, u[6:]).ravel(),
@@ -779,6 +873,10 @@ CHAPTER = Chapter(
                 Mistake(lambda u, T, B, x: _residual(_applied(T, u[:6]), B, x, np.zeros(3)).ravel(), "The center u[6:] is missing."),
                 Mistake(lambda u, T, B, x: _residual(frames.pose(T[:3, :3] @ exp_so3(u[3:6]), T[:3, 3] + u[:3]), B, x, u[6:]).ravel(),
                         "Rotation and translation have changed places: phi comes first."),
+                Mistake(lambda u, T, B, x: _residual(_applied(T, np.r_[-u[:3], u[3:6]]), B, x, u[6:]).ravel(), "You turned by exp(-phi), backward."),
+                Mistake(lambda u, T, B, x: -_residual(_applied(T, u[:6]), B, x, u[6:]).ravel(), "The sign is reversed: the center is subtracted from what is measured."),
+                Mistake(lambda u, T, B, x: (frames.transform(_applied(T, u[:6]), x) - frames.transform(frames.invert(B), u[6:])).ravel(),
+                        "Your residual is written in the flange's frame: bring the measured point to B, and subtract the center there."),
                 Mistake(lambda u, T, B, x: _residual(T, B, x, u[6:]).ravel(), "T0 has not been moved by u[:6]."),
                 Mistake(lambda u, T, B, x: _residual(frames.pose(exp_so3(u[:3]), u[3:6]), B, x, u[6:]).ravel(),
                         "T0 is missing: u[:6] is a change of T0, not a pose of its own."),
@@ -800,7 +898,9 @@ CHAPTER = Chapter(
             hints=(
                 "First a scale that outliers cannot spoil, then a weight that falls to zero.",
                 "std = median length / 1.538; u = length / (5 std); the weight is (1 - u^2)^2 below u = 1 and 0 above.",
-                "`r = np.linalg.norm(residuals, axis=1); u = r / (5 * np.median(r) / robust.MEDIAN_CHI3); return np.where(u < 1, (1 - u**2)**2, 0)`",
+                "`r = np.linalg.norm(residuals, axis=1)\n"
+                "u = r / (5 * np.median(r) / robust.MEDIAN_CHI3)\n"
+                "return np.where(u < 1, (1 - u**2)**2, 0)`",
             ),
             mistakes=[
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.sqrt((r**2).mean() / 3)))), "Your scale is the rms: the outliers themselves stretch it. Take the median."),
@@ -815,7 +915,13 @@ CHAPTER = Chapter(
                 Mistake(_weights(lambda r: np.where(r < 5 * np.median(r) / robust.MEDIAN_CHI3, 0, (1 - (r / (5 * np.median(r) / robust.MEDIAN_CHI3)) ** 2) ** 2)),
                         GROWS_BEYOND),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r)))), "The median length of a 3-vector is 1.538 standard deviations: divide by it."),
-                Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r) / 0.6745))), "0.6745 belongs to single numbers. The length of a 3-vector has the median 1.538."),
+                Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r) / 0.6745))), "1.4826 (= 1/0.6745) belongs to single numbers. The length of a 3-vector has the median 1.538: divide by that."),
+                Mistake(_weights(lambda r: _tukey(r / (5 * np.std(r)))), "Your scale is the standard deviation of the lengths: the outliers stretch it. Take the median length / 1.538."),
+                Mistake(_weights(lambda r: _tukey(r / (5 * 1.4826 * np.median(np.abs(r - np.median(r)))))),
+                        "Your scale is the median distance of the lengths from their median (MAD). A length is itself a distance, from 0: take its median / 1.538."),
+                Mistake(_weights(lambda r: 1 - _tukey(r / (5 * np.median(r) / robust.MEDIAN_CHI3))), "Turned around: good poses get weight 1, gross ones 0."),
+                Mistake(_weights(lambda r: np.clip(1 - r / (5 * np.median(r) / robust.MEDIAN_CHI3), 0, None) ** 2), "Inside the bracket u is squared: (1 - u^2)^2."),
+                Mistake(_weights(lambda r: np.minimum(1, np.median(r) / robust.MEDIAN_CHI3 * 1.345 / r)), "These are Huber's weights, which never reach zero. Tukey's do: (1 - u^2)^2 below u = 1, else 0."),
                 Mistake(_weights(lambda r: _tukey(r * robust.MEDIAN_CHI3 / np.median(r))), "The factor 5 is missing: u = length / (5 s)."),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r) * robust.MEDIAN_CHI3))), "You multiplied by 1.538: divide the median by it."),
                 Mistake(_weights(lambda r: np.sqrt(_tukey(r / (5 * np.median(r) / robust.MEDIAN_CHI3)))), "The bracket is squared: (1 - u^2)^2."),
@@ -841,10 +947,11 @@ CHAPTER = Chapter(
             hints=(
                 "Two questions: which rows do not fit a robust calibration, and which single slip explains each of them?",
                 "`misprints.explanations(entries, pose, T_FS, target, std)` tries every slip of a row and puts the most credible first.",
-                "`m = thesis.measurements_from(entries); fit = hand_eye.calibrate_sphere_target(m.T_BF, m.x_S, robust=True)`, "
-                "`bad = np.flatnonzero(np.linalg.norm(fit.residuals, axis=1) > 6 * fit.std)`, "
-                "`best = [misprints.explanations(entries, int(i) + 1, fit.T_FS, fit.target, fit.std)[0] for i in bad]`, "
-                "`return {(e.table, e.pose, e.column) for e in best}`",
+                "`m = thesis.measurements_from(entries)\n"
+                "fit = hand_eye.calibrate_sphere_target(m.T_BF, m.x_S, robust=True)\n"
+                "bad = np.flatnonzero(np.linalg.norm(fit.residuals, axis=1) > 6 * fit.std)\n"
+                "best = [misprints.explanations(entries, int(i) + 1, fit.T_FS, fit.target, fit.std)[0] for i in bad]\n"
+                "return {(e.table, e.pose, e.column) for e in best}`",
             ),
             mistakes=[
                 Mistake(_by_plain_least_squares, "This is all that a plain least-squares fit shows: its grossest slip bends it so far that the others hide. Fit robustly."),
@@ -864,10 +971,14 @@ CHAPTER = Chapter(
             hints=(
                 "Scanner and center together, all 31 poses, all seven corrections.",
                 "`hand_eye.calibrate_sphere_target` on the corrected measurements; no pose is dropped.",
-                "`corrected = thesis.measurements(True); hand_eye.calibrate_sphere_target(corrected.T_BF, corrected.x_S).rms`",
+                "`rms_after = hand_eye.calibrate_sphere_target(corrected.T_BF, corrected.x_S).rms`",
             ),
             mistakes=[
                 Mistake(lambda: _per_axis(_joint_rms(*ALL_FIXED)), "This is the rms of one coordinate. Sum the squares of a pose first."),
+                Mistake(lambda: _robust_fit().rms, "This is a robust fit, which hears some poses less. The tables are corrected: all 31 count alike, `robust=False`."),
+                Mistake(_rms_without_the_seven, "Here the seven corrected poses are left out. They are good now: let them count."),
+                Mistake(_rms_left_out, "This is the rms with each pose left out in turn, a good question for later. Asked for is the rms of the fit to all 31."),
+                Mistake(_mean_distance, "This is the mean length: square before you take the mean, then take the root."),
                 Mistake(lambda: _joint_rms(2, 3, 4, 7, 21, 30), "Pose 12 is not corrected yet: one degree is missing there."),
                 Mistake(_rms_with_printed_target, "Here the thesis's sphere center was held fixed. Free it."),
                 Mistake(lambda: _joint_rms(2), "Only pose 2 is repaired in this fit. Use all corrections."),
@@ -889,6 +1000,11 @@ CHAPTER = Chapter(
                 Mistake(lambda: thesis.radius("certificate"), "This is the certificate's radius. Ask the 31 poses instead."),
                 Mistake(lambda: thesis.radius("coordinate machine"), "This is the coordinate machine's radius, and the data exclude it. Fit it."),
                 Mistake(lambda: thesis.radius("listing"), "This is what listing C16 assumes; if your search gave it, its steps are too coarse. Go to 0.01 mm or finer."),
+                Mistake(_shallower_radius,
+                        "This is a second, shallower minimum of the rms: below 29.977 mm the circle of pose 4 is larger than the sphere, and its y' is "
+                        "pressed flat to 0. Search from 29.98 to 30.02.", within=0.01),
+                Mistake(lambda: np.sqrt(2 * 30.0**2 - _fitted_radius() ** 2),
+                        "The sign under the root is reversed: y'^2 = y^2 + R^2 - 30^2, so a larger sphere means a larger y'.", within=0.002),
                 Mistake(lambda: 2 * _fitted_radius(),
                         "This is a diameter: half of it."),
             ],
@@ -903,13 +1019,15 @@ CHAPTER = Chapter(
         Exercise(
             "design_poses",
             reference=design_poses,
-            draw=lambda rng: (corrected_fit().T_FS, corrected_fit().target, np.random.default_rng(int(rng.integers(1 << 30)))),
+            draw=scanner_and_sphere,
+            fixed={"T_FS": POSE, "target": POINT},
             properties=(design_is_good,),
             draws=1,
             hints=(
                 "Choose where the scanner should see the sphere, and how the flange should be turned; the flange's position then follows.",
-                "target = R_BF (R_FS x_S + t_FS) + t_BF: draw x_S over the whole field, tilt by up to 45 deg about all axes, solve for t_BF.",
-                "`x_S = np.column_stack([rng.uniform(-25, 25, 31), rng.uniform(3, 25, 31) * rng.choice([-1, 1], 31), rng.choice([190, 290], 31)]); turns = rng.uniform(-0.8, 0.8, (31, 3)); "
+                "The scanner's orientation in the base is R_BS = R_BF R_FS, so R_BF = R_BS R_FS.T. Looking straight down is R_BS = diag(1, -1, -1); turn that by up to 45 deg about all axes. `planning.poses_that_see` finds t_BF.",
+                "`x_S = np.column_stack([rng.uniform(-25, 25, 31), rng.uniform(3, 25, 31) * rng.choice([-1, 1], 31), rng.choice([190, 290], 31)])\n"
+                "turns = rng.uniform(-0.8, 0.8, (31, 3))\n"
                 "return planning.poses_that_see(T_FS, target, exp_so3(turns) @ np.diag([1, -1, -1]) @ T_FS[:3, :3].T, x_S)`",
             ),
         ),

@@ -12,7 +12,7 @@ from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
 from ...geometry import lie
 from ...geometry.frames import invert, pose, relative, unit_vector
 from ...geometry.lie import exp_so3
-from ...machines import packet
+from ...machines import packet, simulation
 from ...machines.accuracy import time_offset
 from ...machines.arm import TX40, dh_matrix, forward_kinematics
 from ...machines.log import average_stops, reject_outliers
@@ -38,9 +38,9 @@ def _packet(rng):
     return (encode_packet(values),)
 
 
-def _fields(change=lambda v: v, dtype="<f8", time=1, position=2, quaternion=11, scale=1000.0):
+def _fields(change=lambda v: v, dtype="<f8", time=1, position=2, quaternion=11, scale=1000.0, double=float):
     def variant(data):
-        v = change(np.frombuffer(data, dtype).astype(float))
+        v = change(np.frombuffer(data, dtype).astype(double))
         return v[time], scale * v[position : position + 3], v[quaternion : quaternion + 4]
 
     return variant
@@ -101,7 +101,9 @@ def _without(*steps):
 
 
 def joint_angles(rng):
-    return TX40.dh, rng.uniform(TX40.q_min, TX40.q_max)
+    """A robot whose parameters are all off those of the TX40, and angles of its joints."""
+    dh = TX40.dh + rng.uniform(0.1, 0.3, (6, 4)) * rng.choice([-1, 1], (6, 4)) * [1, 100, 100, 1]
+    return dh, rng.uniform(TX40.q_min, TX40.q_max)
 
 
 def _links(dh, q):
@@ -110,6 +112,17 @@ def _links(dh, q):
 
 def _without_offsets(dh, q):
     return functools.reduce(np.matmul, dh_matrix(q, dh[:, 1], dh[:, 2], dh[:, 3]))
+
+
+class SameEquations(metrics.Numbers):
+    """Blocks of linear equations, compared by M^T M: however a rotation mixes its rows, and whatever its sign, a block
+    has the same solutions and the same singular values.
+    """
+
+    def deviations(self, result, expected):
+        expected = np.asarray(expected, dtype=float)
+        off = super().deviations(result.T @ result, expected.T @ expected)[0]
+        return [metrics.Deviation("the largest entry of M^T M, M your block,", off.amount, "", off.tolerance)]
 
 
 # A X = X B -------------------------------------------------------------------------------------------------------------------
@@ -131,22 +144,25 @@ def one_motion(rng):
 
 
 def kron_row(A, B):
-    """The block m_i of one motion, shape (9, 9): I kron A - B' kron I."""
+    """The block m_i of one motion, shape (9, 9): I kron A - B^T kron I."""
     return np.kron(np.eye(3), A) - np.kron(B.T, np.eye(3))
 
 
-def stacked(rng, sign):
+def stacked(rng, sign, first=None):
     """The Kronecker matrix of noisy motions, so noisy that its null vector is visibly no rotation, and with this sign
-    of the null vector's determinant.
+    of the null vector's determinant, and of the rotation's first entry.
     """
     while True:
         M = ax_xb.kronecker_matrix(*motions(rng, std_deg=8.0))
         X = _null(M).reshape(3, 3)
+        if first and sign * first * X[0, 0] < 0.05:
+            continue
         if sign * np.linalg.det(X) > 0 and np.abs(3 * X @ X.T - np.eye(3)).max() > 0.01:
             return (M,)
 
 
 BOTH_SIGNS = tuple(functools.partial(stacked, sign=sign) for sign in (1, -1))
+ALL_SIGNS = tuple(functools.partial(stacked, sign=sign, first=first) for sign in (1, -1) for first in (1, -1))
 
 
 def rotation_from_nullvector(M):
@@ -160,6 +176,10 @@ def _null(M, row=-1):
 
 def _signed(X):
     return X * np.sign(np.linalg.det(X))
+
+
+def _first_positive(v):
+    return v * np.sign(v[0])
 
 
 def _orthonormal(X):
@@ -218,11 +238,21 @@ def spoiled(rng, factor):
     """Values about 50, and more on both sides at certain shares of the limit: every other rule draws its line between
     two of them, the rule itself where none is near.
     """
-    core = np.r_[np.linspace(-1, 1, 121), np.zeros(4)] + 0.01 * rng.normal(size=125)
+    n = 2 * int(rng.integers(55, 66)) + 1
+    core = np.r_[np.linspace(-1, 1, n), np.zeros(4)] + 0.01 * rng.normal(size=n + 4)
     tail = np.r_[SHARES, SHARES[9:], -SHARES[:9]]
     limit = factor * 1.4826 * _mad(np.r_[core, 99 * np.sign(tail)])
     values = np.r_[core, np.median(np.r_[core, 99 * np.sign(tail)]) + limit * tail]
     return rng.permutation(50 + rng.uniform(0.5, 2) * values), factor
+
+
+class KeptOrNot(metrics.Exactly):
+    """True or False for each value; says how many are kept or refused wrongly."""
+
+    def deviations(self, result, expected):
+        kept, refused = int((result & ~expected).sum()), int((~result & expected).sum())
+        words = f"of {len(expected)} values you keep {kept} that should go, and refuse {refused} that should stay"
+        return [metrics.Deviation("", float(kept + refused), "", 0.5, words=words)]
 
 
 def _keep(center, scale, above=False):
@@ -244,9 +274,9 @@ def _mad(values):
 
 def speed_curves(rng, sign):
     """Angular speeds of a robot and of a tracker that lags (sign 1), or leads (-1), by a fraction of a sample."""
-    time = np.arange(600) / 100
-    phase = rng.uniform(0, 6, 3)
-    lag = sign * (rng.integers(7, 15) + rng.choice([0.35, 0.42, 0.58, 0.65])) / 100
+    step = float(rng.choice([0.008, 0.01]))
+    time, phase = step * np.arange(int(rng.integers(550, 700))), rng.uniform(0, 6, 3)
+    lag = sign * (rng.integers(7, 15) + rng.choice([0.35, 0.42, 0.58, 0.65])) * step
 
     def curve(t):
         return (
@@ -256,44 +286,47 @@ def speed_curves(rng, sign):
             + 0.15 * np.sin(5.9 * t + phase[2])
         )
 
-    return time, curve(time), curve(time - lag), 0.2
+    return time, curve(time), curve(time - lag), step * int(rng.integers(18, 26))
 
 
-def _overlap(reference, delayed):
+def _overlap(reference, delayed, n):
     """Sums of products over the overlap for every shift: the correlation NumPy calls "full", and the shifts."""
     return -np.correlate(delayed, reference, "full"), np.arange(1 - len(reference), len(delayed))
 
 
-def _centered_overlap(reference, delayed):
-    return _overlap(reference - reference.mean(), delayed - delayed.mean())
+def _centered_overlap(reference, delayed, n):
+    return _overlap(reference - reference.mean(), delayed - delayed.mean(), n)
 
 
-def _around(reference, delayed):
+def _around(reference, delayed, n):
     """Costs of shifts that bring the end of the curve back in at its beginning."""
-    shifts = np.arange(-20, 21)
+    shifts = np.arange(-n, n + 1)
     return np.array([np.mean((np.roll(reference, s) - delayed) ** 2) for s in shifts]), shifts
 
 
-def _shifted(cost, reference, delayed, first=-20):
-    """Costs of the shifts from `first` to 20 samples over the part both curves share, and the shifts."""
-    n, shifts = len(reference), np.arange(first, 21)
-    parts = [(reference[max(0, -s) : n - max(0, s)], delayed[max(0, s) : n + min(0, s)]) for s in shifts]
+def _shifted(cost, reference, delayed, shifts):
+    """Costs of the shifts over the part both curves share, and the shifts."""
+    m = len(reference)
+    parts = [(reference[max(0, -s) : m - max(0, s)], delayed[max(0, s) : m + min(0, s)]) for s in shifts]
     return np.array([cost(r, d) for r, d in parts]), shifts
 
 
-def _squares(reference, delayed, first=-20):
-    return _shifted(lambda r, d: np.mean((d - r) ** 2), reference, delayed, first)
+def _forward_only(reference, delayed, n):
+    return _shifted(lambda r, d: np.mean((d - r) ** 2), reference, delayed, np.arange(n + 1))
 
 
-def _products(reference, delayed):
+def _distances(reference, delayed, n):
+    return _shifted(lambda r, d: np.mean(np.abs(d - r)), reference, delayed, np.arange(-n, n + 1))
+
+
+def _products(reference, delayed, n):
     """Sums of products over a core of constant length: the amount still varies with what the shift brings in."""
-    core = slice(20, -20)
-    shifts = np.arange(-20, 21)
+    core, shifts = slice(n, -n), np.arange(-n, n + 1)
     return np.array([-(reference[core] * np.roll(delayed, -s)[core]).sum() for s in shifts]), shifts
 
 
-def _plain_differences(reference, delayed):
-    core, shifts = slice(20, -20), np.arange(-20, 21)
+def _plain_differences(reference, delayed, n):
+    core, shifts = slice(n, -n), np.arange(-n, n + 1)
     return np.array([np.mean(reference[core] - np.roll(delayed, -s)[core]) for s in shifts]), shifts
 
 
@@ -301,13 +334,14 @@ def _least(costs, between):
     """A time offset from costs of shifts, by whole samples or between them."""
 
     def variant(time, reference, delayed, max_offset):
-        cost, shifts = costs(reference, delayed)
+        step = time[1] - time[0]
+        cost, shifts = costs(reference, delayed, round(max_offset / step))
         k = np.clip(np.argmin(cost), 1, len(cost) - 2) if between else np.argmin(cost)
         part = 0.0
         if between:
             left, middle, right = cost[k - 1 : k + 2]
             part = 0.5 * (left - right) / (left - 2 * middle + right)
-        return (shifts[k] + part) * (time[1] - time[0])
+        return (shifts[k] + part) * step
 
     return variant
 
@@ -334,6 +368,18 @@ def _against_the_readings():
     kept = calibrate_mounting(T_BF, T_WE).kept
     A, B = relative(T_BF[0], T_BF)[kept][1:], relative(T_WE[0], T_WE)[kept][1:]
     return ax_xb.solve_ax_xb(B, A)
+
+
+def _maximum_likelihood():
+    T_BF, T_WE = _run_1()
+    return ax_xb.calibrate_hand_eye(T_BF, T_WE, robust=True, eye="to hand").T_FT
+
+
+def _from_pose_to_pose():
+    T_BF, T_WE = _run_1()
+    kept = calibrate_mounting(T_BF, T_WE).kept
+    F, E = T_BF[kept], T_WE[kept]
+    return ax_xb.solve_ax_xb(relative(F[:-1], F[1:]), relative(E[:-1], E[1:]))
 
 
 @functools.cache
@@ -365,7 +411,7 @@ CHAPTER = Chapter(
             hints=(
                 "Read all 184 bytes as 23 numbers of 8 bytes, then pick by the order of table 1.",
                 '`np.frombuffer(data, "<f8")` gives 23 little-endian doubles; number 0 is the device.',
-                "`v = np.frombuffer(data, '<f8'); return v[1], 1000 * v[2:5], v[11:15]`",
+                "`v = np.frombuffer(data, '<f8')\nreturn v[1], 1000 * v[2:5], v[11:15]`",
             ),
             mistakes=[
                 Mistake(
@@ -381,6 +427,10 @@ CHAPTER = Chapter(
                     "These are the linear velocities (bytes 40 to 63). The position starts at byte 16.",
                 ),
                 Mistake(
+                    _fields(quaternion=8),
+                    "You skipped the three accelerations: the quaternion comes behind them, numbers 11 to 14.",
+                ),
+                Mistake(
                     _fields(quaternion=15),
                     "These are angular velocities. The quaternion starts at byte 88, which is number 11.",
                 ),
@@ -393,9 +443,12 @@ CHAPTER = Chapter(
                     Mistake(_fields(quaternion=k), "The quaternion is shifted by one field: it is numbers 11 to 14.")
                     for k in (10, 12)
                 ),
-                Mistake(
-                    _fields(dtype="<f4"),
-                    "You read 46 numbers of 4 bytes. The fields have 8 bytes each: 23 doubles, `<f8`.",
+                *(
+                    Mistake(
+                        _fields(dtype="<f4", double=kind),
+                        "You read 46 numbers of 4 bytes. The fields have 8 bytes each: 23 doubles, `<f8`.",
+                    )
+                    for kind in (np.float32, np.float64)
                 ),
                 Mistake(
                     _integers,
@@ -414,7 +467,7 @@ CHAPTER = Chapter(
         ),
         Prediction(
             "fold",
-            question="Upper arm and forearm are 225 mm each, the elbow bends by up to 138 deg from straight. How close can the wrist come to axis 2?",
+            question="Upper arm and forearm are 225 mm each, the elbow bends by up to 138 deg from straight. How close can the wrist come to axis 2 (mm)?",
             answer=161.3,
             unit="mm",
             within=0.03,
@@ -428,7 +481,7 @@ CHAPTER = Chapter(
             hints=(
                 "Four elementary transforms in a row: turn about z, go along z, go along the new x, turn about the new x.",
                 "Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha): the last column is (a cos theta, a sin theta, d).",
-                "`c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha); "
+                "`c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)\n"
                 "return np.array([[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]])`",
             ),
             mistakes=[
@@ -474,16 +527,23 @@ CHAPTER = Chapter(
             "forward_kinematics",
             reference=forward_kinematics,
             draw=joint_angles,
+            fixed={"dh": "six joints, four parameters each", "q": "six joints"},
             metric=metrics.Poses(1e-6, 1e-6),
             hints=(
                 "Each link's frame is given in the frame before it, so neighboring letters cancel from the base to the flange.",
                 "T_BF = T_01 T_12 ... T_56, and the angle of a link is its offset plus the joint's angle.",
-                "`T = np.eye(4); for (offset, d, a, alpha), angle in zip(dh, q): T = T @ dh_matrix(offset + angle, d, a, alpha); return T`",
+                "`T = np.eye(4)\n"
+                "for (offset, d, a, alpha), angle in zip(dh, q): T = T @ dh_matrix(offset + angle, d, a, alpha)\n"
+                "return T`",
             ),
             mistakes=[
                 Mistake(
+                    lambda dh, q: forward_kinematics(TX40.dh, q),
+                    "You took the table of the TX40. Any robot may come in: use the argument `dh`.",
+                ),
+                Mistake(
                     _without_offsets,
-                    "The offsets in the first column of dh are missing: the zero position of the TX40 is upright.",
+                    "The offsets in the first column of dh are missing: the angle of a link is its offset plus the joint's angle.",
                 ),
                 Mistake(
                     lambda dh, q: functools.reduce(np.matmul, _links(dh, q)[::-1]),
@@ -561,41 +621,47 @@ CHAPTER = Chapter(
             "kron_row",
             reference=kron_row,
             draw=one_motion,
-            metric=metrics.UpToSign(1e-9),
+            metric=SameEquations(1e-9),
+            fixed=dict.fromkeys("AB", "a rotation is always 3 x 3"),
             hints=(
                 "Bring A X - X B = 0 into the form M vec(X) = 0, with the columns of X stacked.",
-                "For stacked columns, vec(P X Q) = (Q' kron P) vec(X). Once P = A, Q = I, once P = I, Q = B.",
+                "For stacked columns, vec(P X Q) = (Q^T kron P) vec(X). Once P = A, Q = I, once P = I, Q = B.",
                 "`return np.kron(np.eye(3), A) - np.kron(B.T, np.eye(3))`",
             ),
-            mistakes=[
-                Mistake(
-                    lambda A, B: np.kron(A, np.eye(3)) - np.kron(np.eye(3), B.T),
-                    "This is the matrix for rows stacked (NumPy's ravel). The report stacks columns, as Matlab does: exchange the factors.",
+            mistakes=[  # what has the same M^T M says the same, so it shares a text
+                *(
+                    Mistake(
+                        variant,
+                        "For stacked columns this says B X = X A. Either the rows are stacked (NumPy's ravel), where the report stacks "
+                        "columns, as Matlab does; or A and B have changed places: in the report A is the tracker's motion, here the flange's.",
+                    )
+                    for variant in (
+                        lambda A, B: np.kron(A, np.eye(3)) - np.kron(np.eye(3), B.T),
+                        lambda A, B: np.kron(np.eye(3), B) - np.kron(A.T, np.eye(3)),
+                    )
                 ),
-                Mistake(
-                    lambda A, B: np.kron(np.eye(3), A) - np.kron(B, np.eye(3)),
-                    "B must be transposed: vec(X B) = (B' kron I) vec(X).",
-                ),
-                Mistake(
-                    lambda A, B: np.kron(np.eye(3), B) - np.kron(A.T, np.eye(3)),
-                    "A and B have changed places: in the report A is the tracker's motion, here it is the flange's.",
+                *(
+                    Mistake(
+                        variant,
+                        "For stacked columns this says A X = X B^T: B must be transposed in the product, vec(X B) = (B^T kron I) vec(X).",
+                    )
+                    for variant in (
+                        lambda A, B: np.kron(np.eye(3), A) - np.kron(B, np.eye(3)),
+                        lambda A, B: np.kron(B.T, A) - np.eye(9),
+                    )
                 ),
                 Mistake(
                     lambda A, B: np.kron(np.eye(3), A) + np.kron(B.T, np.eye(3)),
                     "The sign between the two products is a minus: A X - X B = 0.",
                 ),
                 Mistake(
-                    lambda A, B: np.kron(np.eye(3), A.T) - np.kron(B, np.eye(3)),
-                    "Both matrices are transposed: this is the equation of the inverse motions.",
-                ),
-                Mistake(
                     lambda A, B: np.kron(A, np.eye(3)) - np.kron(np.eye(3), B),
-                    "vec(P X Q) = (Q' kron P) vec(X): P stands on the right of the product, Q on the left and transposed. A is a P, B is a Q.",
+                    "vec(P X Q) = (Q^T kron P) vec(X): P stands on the right of the product, Q on the left and transposed. A is a P, B is a Q.",
                 ),
                 *(
                     Mistake(
                         variant,
-                        "One of the two factors stands on the wrong side: vec(A X) = (I kron A) vec(X), vec(X B) = (B' kron I) vec(X).",
+                        "One of the two factors stands on the wrong side: vec(A X) = (I kron A) vec(X), vec(X B) = (B^T kron I) vec(X).",
                     )
                     for variant in (
                         lambda A, B: np.kron(np.eye(3), A) - np.kron(np.eye(3), B.T),
@@ -605,20 +671,12 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         variant,
-                        "This belongs to the product A X B. Here two products are subtracted, A X - X B: each has its own kron, with I.",
+                        "This is one product alone. The block of A X - X B = 0 is a difference of two, each with its own kron, and with I.",
                     )
                     for variant in (
                         lambda A, B: np.kron(B.T, A),
-                        lambda A, B: np.kron(B.T, A) - np.eye(9),
                         lambda A, B: np.kron(A, B.T),
                         lambda A, B: np.kron(A, B),
-                    )
-                ),
-                *(
-                    Mistake(
-                        variant, "Only one of the two products is here: the block of A X - X B = 0 is a difference."
-                    )
-                    for variant in (
                         lambda A, B: np.kron(np.eye(3), A),
                         lambda A, B: np.kron(B.T, np.eye(3)),
                     )
@@ -628,12 +686,16 @@ CHAPTER = Chapter(
         Exercise(
             "rotation_from_nullvector",
             reference=rotation_from_nullvector,
-            draw=BOTH_SIGNS,
+            draw=ALL_SIGNS,
             metric=metrics.Rotations(1e-5),
             hints=(
                 "The singular vector of the smallest singular value, put back into a 3 x 3 matrix column by column.",
                 'Vt[-1].reshape(3, 3, order="F"); its sign is free, so make the determinant positive; then the nearest rotation by a second SVD.',
-                "`Vt = np.linalg.svd(M)[2]; X = Vt[-1].reshape(3, 3, order='F'); X *= np.sign(np.linalg.det(X)); U, _, Wt = np.linalg.svd(X); return U @ Wt`",
+                "`Vt = np.linalg.svd(M)[2]\n"
+                "X = Vt[-1].reshape(3, 3, order='F')\n"
+                "X *= np.sign(np.linalg.det(X))\n"
+                "U, _, Wt = np.linalg.svd(X)\n"
+                "return U @ Wt`",
             ),
             mistakes=[
                 Mistake(
@@ -655,6 +717,13 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda M: _orthonormal(_null(M).reshape(3, 3, order="F")),
                     "The sign is missing: the null vector may come out as -X, and then your matrix is a reflection. Turn it so that the determinant is positive.",
+                ),
+                *(
+                    Mistake(
+                        lambda M, nearest=nearest: nearest(_first_positive(_null(M)).reshape(3, 3, order="F")),
+                        "You made the first entry positive, but R[0, 0] may well be negative. The sign that a rotation needs is that of its determinant.",
+                    )
+                    for nearest in (lie.nearest_rotation, _orthonormal)
                 ),
                 Mistake(
                     lambda M: lie.nearest_rotation(_null(M).reshape(3, 3, order="F")),
@@ -717,11 +786,14 @@ CHAPTER = Chapter(
             "translation_lsq",
             reference=translation_lsq,
             draw=translation_problem,
+            fixed={"R": "a rotation is always 3 x 3"},
             metric=metrics.Numbers(1e-7, "mm"),
             hints=(
                 "Write out the last column of A X = X B. It is linear in the translation t once R is known.",
                 "R_A t + t_A = R t_B + t, so (I - R_A) t = t_A - R t_B: three rows per motion, stacked.",
-                "`K1 = np.eye(3) - A[:, :3, :3]; K2 = A[:, :3, 3] - B[:, :3, 3] @ R.T; return np.linalg.lstsq(K1.reshape(-1, 3), K2.ravel())[0]`",
+                "`K1 = np.eye(3) - A[:, :3, :3]\n"
+                "K2 = A[:, :3, 3] - B[:, :3, 3] @ R.T\n"
+                "return np.linalg.lstsq(K1.reshape(-1, 3), K2.ravel())[0]`",
             ),
             mistakes=[
                 Mistake(
@@ -734,7 +806,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _translation(_k1, lambda A, B, R: A[:, :3, 3] - B[:, :3, 3] @ R),
-                    "You turned the tracker's translations by R' instead of R. For rows, R t is `t @ R.T`.",
+                    "You turned the tracker's translations by R^T instead of R. For rows, R t is `t @ R.T`.",
                 ),
                 Mistake(
                     _translation(lambda A: np.eye(3) - np.swapaxes(A[:, :3, :3], 1, 2), _k2),
@@ -785,9 +857,9 @@ CHAPTER = Chapter(
             draw=BOTH_SIGNS,
             metric=metrics.Numbers(1e-9),
             hints=(
-                "Equation (13), taken at its word: the norm of M'M v, divided by N - 1. v is the null vector, of length 1.",
+                "Equation (13), taken at its word: the norm of M^T M v, divided by N - 1. v is the null vector, of length 1.",
                 "M has 9 rows per motion, so N = len(M) / 9.",
-                "`v = np.linalg.svd(M)[2][-1]; return np.linalg.norm(M.T @ (M @ v)) / (len(M) / 9 - 1)`",
+                "`v = np.linalg.svd(M)[2][-1]\nreturn np.linalg.norm(M.T @ (M @ v)) / (len(M) / 9 - 1)`",
             ),
             mistakes=[
                 Mistake(
@@ -795,8 +867,16 @@ CHAPTER = Chapter(
                     "You divide by N. The report divides by N - 1.",
                 ),
                 Mistake(
-                    lambda M: np.linalg.norm(M @ _null(M)) / (len(M) / 9 - 1),
-                    "This is the norm of M v. The report writes M'M v, which is the smallest singular value once more: its square.",
+                    lambda M: e_rot(M) * np.sqrt(len(M) / 9 - 1),
+                    "You divide by the root of N - 1. In equation (13) no root stands there.",
+                ),
+                Mistake(
+                    lambda M: e_rot(M) * (len(M) / 9 - 1) / 19,
+                    "N = 20 is the report's number of motions. Here it is len(M) / 9.",
+                ),
+                Mistake(
+                    lambda M: np.linalg.svd(M)[1][-1] / (len(M) / 9 - 1),
+                    "This is the norm of M v, the smallest singular value. The report writes M^T M v, which brings it in once more: its square.",
                 ),
                 Mistake(
                     lambda M: np.sqrt(3) * e_rot(M),
@@ -820,7 +900,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda M: (e_rot(M) * (len(M) / 9 - 1)) ** 2 / (len(M) / 9 - 1),
-                    "You squared the norm. Equation (13) does not square it; M'M contains the squares already.",
+                    "You squared the norm. Equation (13) does not square it; M^T M contains the squares already.",
                 ),
                 Mistake(
                     lambda M: np.linalg.norm(M.T @ M @ np.linalg.svd(M)[2][:, -1]) / (len(M) / 9 - 1),
@@ -835,9 +915,20 @@ CHAPTER = Chapter(
                     )
                     for order in "FC"
                 ),
+                *(
+                    Mistake(
+                        lambda M, order=order: (
+                            np.linalg.norm(M.T @ M @ rotation_from_nullvector(M).ravel(order))
+                            / np.sqrt(3)
+                            / (len(M) / 9 - 1)
+                        ),
+                        "You put in the projected rotation, brought to length 1. Equation (13) takes the null vector v itself: the projection has moved it.",
+                    )
+                    for order in "FC"
+                ),
                 Mistake(
                     lambda M: np.linalg.norm(M.T @ M) / (len(M) / 9 - 1),
-                    "v is missing: this is the norm of the whole matrix M'M, not of M'M v.",
+                    "v is missing: this is the norm of the whole matrix M^T M, not of M^T M v.",
                 ),
             ],
         ),
@@ -912,16 +1003,29 @@ CHAPTER = Chapter(
             "reject_outliers",
             reference=reject_outliers,
             draw=tuple(functools.partial(spoiled, factor=factor) for factor in (4.0, 3.0, 5.0)),
-            metric=metrics.Exactly(),
+            metric=KeptOrNot(),
             hints=(
                 "Measure how far each value is from the middle, in units of a spread. Outliers must move neither of the two.",
                 "Middle: the median. Spread: 1.4826 times the median of the distances from it; for normal noise that is a standard deviation.",
-                "`d = np.abs(values - np.median(values)); return d <= factor * 1.4826 * np.median(d)`",
+                "`d = np.abs(values - np.median(values))\nreturn d <= factor * 1.4826 * np.median(d)`",
             ),
             mistakes=[
                 Mistake(
                     _keep(np.mean, np.std),
                     "Mean and standard deviation are moved by the very values you want to find: the nonsense hides itself.",
+                ),
+                Mistake(
+                    _keep(np.median, np.std),
+                    "You measure from the median, as you should, but in standard deviations, which the nonsense stretches. Take 1.4826 times the "
+                    "median distance.",
+                ),
+                Mistake(
+                    lambda v, f: np.abs(v) <= f * 1.4826 * np.median(np.abs(v)),
+                    "You measure the values themselves, from 0. Subtract the median first.",
+                ),
+                Mistake(
+                    _keep(np.median, lambda v: 1.4826 * np.abs(v - np.median(v)).mean()),
+                    "You took 1.4826 times the mean of the distances. Gross values blow it up; take their median.",
                 ),
                 Mistake(
                     _keep(np.median, _mad),
@@ -988,15 +1092,31 @@ CHAPTER = Chapter(
             unit="mm",
             metric=metrics.Poses(0.002, 0.02),
             hints=(
-                "Put your own functions in a row: blocks, rotation, translation. Pose 13 of this run is nonsense and must not take part.",
+                "Put your own functions in a row: blocks, rotation, translation. A pose that `kept` excludes must not take part.",
                 "A_kept, B_kept = A[kept][1:], B[kept][1:] are the motions that take part: kept poses, without the reference itself.",
-                "`M = np.concatenate([kron_row(a[:3, :3], b[:3, :3]) for a, b in zip(A_kept, B_kept)]); R = rotation_from_nullvector(M); "
-                "mounting = np.eye(4); mounting[:3, :3] = R; mounting[:3, 3] = translation_lsq(A_kept, B_kept, R)`",
+                "`A_kept, B_kept = A[kept][1:], B[kept][1:]\n"
+                "M = np.concatenate([kron_row(a[:3, :3], b[:3, :3]) for a, b in zip(A_kept, B_kept)])\n"
+                "R = rotation_from_nullvector(M)\n"
+                "mounting = np.eye(4)\n"
+                "mounting[:3, :3] = R\n"
+                "mounting[:3, 3] = translation_lsq(A_kept, B_kept, R)`",
             ),
             mistakes=[
                 Mistake(
                     lambda: _mounting(gate=1e9),
                     "The stop at which the tracker talked nonsense is still in: leave out what `kept` excludes.",
+                ),
+                Mistake(
+                    lambda: simulation.T_FE,
+                    "This is the truth that the simulation started from. Asked for is what the readings say: it is 1.5 mm off.",
+                ),
+                Mistake(
+                    _maximum_likelihood,
+                    "This is the maximum likelihood solution, which comes later. Here the report's method is asked for: your own three functions.",
+                ),
+                Mistake(
+                    _from_pose_to_pose,
+                    "You used the motions from each pose to the next. They are shorter, and the report takes all from pose 0.",
                 ),
                 Mistake(lambda: invert(_mounting()), "This is the flange seen from the tracker: the inverse."),
                 Mistake(
@@ -1066,18 +1186,18 @@ CHAPTER = Chapter(
         ),
         Prediction(
             "methods",
-            question="Rotations are noisy (0.5 deg), translations good (0.1 mm). What is best?",
-            choices=("all methods alike", "rotation first, then translation", "both together, weighed by their noise"),
-            answer="both together, weighed by their noise",
+            question="Rotations are noisy (0.5 deg), translations good (0.1 mm). Which way finds the mounting's rotation best?",
+            choices=("from the rotations alone", "from rotations and translations at once", "both alike"),
+            answer="from rotations and translations at once",
             why="Good translations at a distance know the rotation better than the rotations do. Methods that solve the rotation first throw that away.",
         ),
         Prediction(
             "motion",
-            question="A robot moves at 1 m/s, the tracker lags 20 ms behind. How large is the error of the position?",
-            answer=20.0,
+            question="A robot moves at 1.4 m/s and the tracker lags 8 ms behind. How large is the error of the position (mm)? The report found 15.",
+            answer=11.2,
             unit="mm",
             within=0.05,
-            why="1000 mm/s times 0.02 s = 20 mm: accuracy in motion is a matter of time first.",
+            why="1400 mm/s times 0.008 s = 11.2 mm: accuracy in motion is a matter of time first. But such an error shrinks with the speed, and the report's does not.",
         ),
         Exercise(
             "time_offset",
@@ -1087,9 +1207,12 @@ CHAPTER = Chapter(
             hints=(
                 "Shift one curve against the other, sample by sample, and find where they differ least. Then look between the samples.",
                 "Cost of a shift s: mean of (delayed[k + s] - reference[k])^2 over the common part. A parabola through the best three has its vertex at the offset.",
-                "`step = time[1] - time[0]; n = round(max_offset / step); core = reference[n:-n]; "
-                "cost = [np.mean((delayed[n + s : len(time) - n + s] - core) ** 2) for s in range(-n, n + 1)]; "
-                "k = np.clip(np.argmin(cost), 1, 2 * n - 1); l, m, r = cost[k - 1 : k + 2]; "
+                "`step = time[1] - time[0]\n"
+                "n = round(max_offset / step)\n"
+                "core = reference[n:-n]\n"
+                "cost = [np.mean((delayed[n + s : len(time) - n + s] - core) ** 2) for s in range(-n, n + 1)]\n"
+                "k = np.clip(np.argmin(cost), 1, 2 * n - 1)\n"
+                "l, m, r = cost[k - 1 : k + 2]\n"
                 "return (k - n + 0.5 * (l - r) / (l - 2 * m + r)) * step`",
             ),
             mistakes=[
@@ -1120,11 +1243,36 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         _least(costs, between),
-                        "A sum of products counts how many samples overlap as well as how alike they are, so its peak is pulled aside. "
-                        "Take the mean of the squared differences over the part both curves share.",
+                        "Your offset is 0, or pulled toward it. A sum of products does that (`np.correlate`): it counts how many samples overlap as "
+                        "well as how alike they are. Take the mean of the squared differences over the part both curves share.",
                     )
-                    for costs in (_overlap, _centered_overlap, _products)
+                    for costs in (_overlap, _centered_overlap)
                     for between in (True, False)
+                ),
+                *(
+                    Mistake(
+                        lambda t, r, d, m, between=between: -_least(_centered_overlap, between)(t, r, d, m),
+                        "You correlate, with the sign reversed: positive means that the tracker lags behind. And a sum of products pulls its peak "
+                        "toward 0: take the mean of the squared differences over the part both curves share.",
+                    )
+                    for between in (True, False)
+                ),
+                *(
+                    Mistake(
+                        _least(_products, between),
+                        "A sum of products also grows with the speeds that a shift brings in, so its peak is pulled aside. Take the mean of the "
+                        "squared differences.",
+                    )
+                    for between in (True, False)
+                ),
+                Mistake(
+                    lambda *a: abs(time_offset(*a)),
+                    "No absolute value: a tracker that leads has a negative offset.",
+                ),
+                Mistake(
+                    _least(_distances, True),
+                    "The mean absolute difference has a corner at its least, and a parabola does not fit a corner: the result is off by a part of a "
+                    "sample. Square the differences.",
                 ),
                 Mistake(
                     lambda t, r, d, m: time_offset(t, r, d, m) + m,
@@ -1136,7 +1284,7 @@ CHAPTER = Chapter(
                 ),
                 *(
                     Mistake(
-                        _least(functools.partial(_squares, first=0), between),
+                        _least(_forward_only, between),
                         "You try shifts in one direction only. The tracker may also lead: from -max_offset to max_offset.",
                     )
                     for between in (True, False)

@@ -37,6 +37,15 @@ def several_circles(rng):
     return landmarks, np.linalg.norm(landmarks - position, axis=1) * (1 + off), position
 
 
+def from_afar(rng, left):
+    """Two landmarks and a start so far off that a few steps, or the Jacobian of the start alone, do not arrive."""
+    landmarks, distances, _ = two_circles(rng, left=left)
+    line = landmarks[1] - landmarks[0]
+    across = (1 if left else -1) * np.array([-line[1], line[0]])
+    robot = max(lateration.circle_intersections(landmarks, distances), key=lambda p: across @ (p - landmarks[0]))
+    return landmarks, distances, robot + rng.uniform(6, 12) * across
+
+
 CIRCLES = tuple(
     functools.partial(two_circles, left=left, up=up, with_origin=left == up)
     for up in (True, False)
@@ -53,14 +62,23 @@ def two_wheels(rng, faster_right=True):
 WHEELS = (two_wheels, functools.partial(two_wheels, faster_right=False))
 
 
-def pose_control_step(rng, side=None):
-    """A pose, a control that turns to this side (1 left, -1 right), and a time step that tells the models apart."""
+def pose_control_step(rng, side=1, gear=1):
+    """A pose, a control that turns to this side (1 left, -1 right) in this gear (1 forward, -1 reverse), and a time
+    step that tells the models apart.
+    """
     x = np.array([*rng.uniform(-5, 5, 2), rng.uniform(-3, 3)])
-    omega = rng.uniform(0.4, 1.5) * (side or rng.choice([-1, 1]))
-    return x, np.array([rng.uniform(0.5, 2), omega]), rng.uniform(0.3, 0.9)
+    u = np.array([gear * rng.uniform(0.5, 2), side * rng.uniform(0.4, 1.5)])
+    return x, u, rng.uniform(0.3, 0.9)
 
 
-EITHER_SIDE = (functools.partial(pose_control_step, side=1), functools.partial(pose_control_step, side=-1))
+EITHER_WAY = tuple(functools.partial(pose_control_step, side=side, gear=gear) for gear in (1, -1) for side in (1, -1))
+PLANAR = {"x": "a planar pose is always (x, y, theta)", "u": "a control is always (v, omega)"}
+
+
+def gentle_curve(rng, omega):
+    """A pose, a control that turns slowly to one side, and a time step."""
+    x, u, dt = pose_control_step(rng)
+    return x, np.array([u[0], omega * rng.choice([-1, 1])]), dt
 
 
 def noisy_control(rng, signs):
@@ -72,9 +90,9 @@ def noisy_control(rng, signs):
 NOISY_CONTROLS = tuple(functools.partial(noisy_control, signs=signs) for signs in ((-1, 1), (1, -1), (-1, -1)))
 
 
-def pose_and_covariances(rng):
+def pose_and_covariances(rng, side=1, gear=1):
     """Pose, its covariance, control, time step, covariance of the control."""
-    x, u, dt = pose_control_step(rng)
+    x, u, dt = pose_control_step(rng, side, gear)
     M, N = rng.normal(size=(3, 3)), rng.normal(size=(2, 2))
     return x, 0.1 * M @ M.T, u, dt, 0.05 * N @ N.T
 
@@ -102,6 +120,13 @@ def _newton(change, steps=20):
         return x
 
     return variant
+
+
+def _newton_with_one_jacobian(landmarks, distances, start):
+    x, J = np.array(start, dtype=float), 2 * (start - landmarks)
+    for _ in range(20):
+        x = x - np.linalg.solve(J, lateration_residual(landmarks, distances, x))
+    return x
 
 
 def _mirrored(landmarks, distances, start):
@@ -208,6 +233,14 @@ def _slips_of_the_sum(step, angle):
         Mistake(
             lambda x, u, dt: step(x, u, dt) * [1, 1, np.degrees(1)], "The heading is in degrees: leave it in radians."
         ),
+        Mistake(
+            lambda x, u, dt: step(x, np.array([abs(u[0]), u[1]]), dt),
+            "You take |v|. A robot may reverse: then v is negative, and it drives backward along its heading.",
+        ),
+        Mistake(
+            lambda x, u, dt: step(x, np.array([u[0], abs(u[1])]), dt),
+            "You take |omega|. A turn to the right has omega < 0.",
+        ),
         Mistake(lambda x, u, dt: step(x, u[::-1], dt), "v and omega have changed places: u = (v, omega)."),
         Mistake(
             lambda x, u, dt: step(x, u, dt) * [1, -1, 1] + 2 * x * [0, 1, 0],
@@ -250,21 +283,39 @@ def _arc_y_sign(x, u, dt):
     return np.array([x[0] + r * (np.sin(after) - np.sin(x[2])), x[1] + r * (np.cos(after) - np.cos(x[2])), after])
 
 
+GENTLE = "right in sharp curves, but not in gentle ones, where omega is 0.1 or 0.01 rad/s:"
+ROUNDED_WHEELS = 1.1e-16  # rad/s: wheels at 0.3 and at 0.1 + 0.2 m/s turn the robot so fast, on paper
+
+
 def _straight_line_works(function, rng):
-    """The limit omega -> 0: exactly straight, and near it without a jump."""
-    x, u, dt = np.array([1.0, 2.0, rng.uniform(-3, 3)]), np.array([1.5, 0.0]), 0.8
-    expected = odometry.step(x, u, dt, "arc")
-    for omega in (0.0, 1e-9):
-        with np.errstate(all="ignore"):
-            try:
-                result = np.asarray(function(x, np.array([1.5, omega]), dt), dtype=float)
-            except ZeroDivisionError:
-                result = np.full(3, np.nan)
-        if result.shape != (3,) or not np.isfinite(result).all():
-            return f"right on curves, but with omega = {omega:g} the result is not finite: the radius v / omega has no value there."
-        if not metrics.PlanarPoses(1e-6).equal(result, expected):
-            return f"right on curves, but with omega = {omega:g} the robot should drive straight on; the result is off."
+    """The limit omega -> 0: exactly straight, and near it without a jump, forward and in reverse."""
+    x, dt = np.array([1.0, 2.0, rng.uniform(-3, 3)]), 0.8
+    for v in (1.5, -1.5):
+        expected = odometry.step(x, np.array([v, 0.0]), dt, "arc")
+        for omega in (0.0, 1e-9, ROUNDED_WHEELS):
+            problem = _not_straight(function, x, np.array([v, omega]), dt, expected)
+            if problem:
+                return problem
     return None
+
+
+def _not_straight(function, x, u, dt, expected):
+    with np.errstate(all="ignore"):
+        try:
+            result = np.asarray(function(x, u, dt), dtype=float)
+        except ZeroDivisionError:
+            result = np.full(3, np.nan)
+    given = f"with omega = {u[1]:g}"
+    if result.shape != (3,) or not np.isfinite(result).all():
+        return f"right on curves, but {given} the result is not finite: the radius v / omega has no value there."
+    if metrics.PlanarPoses(1e-6).equal(result, expected):
+        return None
+    if u[1] == ROUNDED_WHEELS:
+        return (
+            f"right on curves and for omega = 0, but {given} (wheels at 0.3 and 0.1 + 0.2 m/s give that) the robot should drive "
+            "straight on. A radius of 10^16 m has no digits left for the difference of two sines: take the chord."
+        )
+    return f"right on curves, but {given} the robot should drive straight on; the result is off."
 
 
 def jacobian_state(x, u, dt):
@@ -378,6 +429,7 @@ CHAPTER = Chapter(
             "lateration_residual",
             reference=lateration_residual,
             draw=several_circles,
+            fixed={"position": "a place in the plane"},
             metric=metrics.Numbers(1e-9),
             hints=(
                 "Each landmark gives one equation that is zero when the position lies on its circle.",
@@ -442,20 +494,28 @@ CHAPTER = Chapter(
         ),
         Prediction(
             "roots",
-            question="Two landmarks, two exact distances. In how many points of the plane can the robot stand?",
-            choices=("one", "two", "infinitely many"),
-            answer="two",
-            why="Two circles meet in two points, mirror images in the line through the landmarks. Which one Newton finds is decided by the start.",
+            question="A robot stands on the line between two landmarks, and both measured distances come out 1 % short. In how many points do the circles meet?",
+            choices=("none", "one", "two"),
+            answer="none",
+            why="The two distances no longer add up to the way between the landmarks. Off the line the circles meet in two points, mirror images of each other, and the start decides which one Newton finds.",
         ),
         Exercise(
             "newton_lateration",
             reference=newton_lateration,
-            draw=CIRCLES,
+            draw=(*CIRCLES, functools.partial(from_afar, left=True), functools.partial(from_afar, left=False)),
+            draws=6,
+            fixed={
+                "landmarks": "with two of them the two equations can be solved",
+                "distances": "one for each landmark",
+                "start": "a place in the plane",
+            },
             metric=metrics.Numbers(1e-8, "m"),
             hints=(
                 "Replace the residuals by their tangent planes, go to where those are zero, repeat.",
                 "Row i of the Jacobian is 2 (position - landmark_i). The step solves J step = -residual.",
-                "Three lines: `position = start`, `for _ in range(20): position = position - np.linalg.solve(2 * (position - landmarks), lateration_residual(landmarks, distances, position))`, `return position`",
+                "`position = start\n"
+                "for _ in range(20): position = position - np.linalg.solve(2 * (position - landmarks), lateration_residual(landmarks, distances, position))\n"
+                "return position`",
             ),
             mistakes=[
                 Mistake(
@@ -489,9 +549,16 @@ CHAPTER = Chapter(
                 Mistake(
                     _mirrored, "This is the mirror image: it also fits, but the given start is nearer to the other one."
                 ),
+                *(
+                    Mistake(
+                        _newton(lambda J, f, d: (J, f), steps=steps),
+                        "Newton is right, but so few steps do not arrive from a start farther off: take about twenty.",
+                    )
+                    for steps in (2, 3, 4, 5)
+                ),
                 Mistake(
-                    _newton(lambda J, f, d: (J, f), steps=2),
-                    "Newton is right, but two steps are too few: take about twenty.",
+                    _newton_with_one_jacobian,
+                    "Your Jacobian is that of the start. From a start farther off twenty such steps do not arrive: compute it anew at each position.",
                 ),
                 Mistake(
                     lambda L, d, s: newton_lateration(L, d, np.zeros(2)),
@@ -573,7 +640,8 @@ CHAPTER = Chapter(
         Exercise(
             "step_euler",
             reference=step_euler,
-            draw=EITHER_SIDE,
+            draw=EITHER_WAY,
+            fixed=PLANAR,
             metric=metrics.PlanarPoses(),
             hints=(
                 "Drive the way v T along the old heading, then turn.",
@@ -599,15 +667,21 @@ CHAPTER = Chapter(
         Exercise(
             "step_midpoint",
             reference=step_midpoint,
-            draw=EITHER_SIDE,
+            draw=EITHER_WAY,
+            fixed=PLANAR,
             metric=metrics.PlanarPoses(),
             hints=(
                 "While it drives the robot turns by omega T; on average it looked half of that aside.",
                 "As before, with theta + omega T / 2 inside cosine and sine.",
-                "`a = x[2] + u[1] * dt / 2; return np.array([x[0] + u[0] * dt * np.cos(a), x[1] + u[0] * dt * np.sin(a), x[2] + u[1] * dt])`",
+                "`a = x[2] + u[1] * dt / 2\n"
+                "return np.array([x[0] + u[0] * dt * np.cos(a), x[1] + u[0] * dt * np.sin(a), x[2] + u[1] * dt])`",
             ),
             mistakes=[
                 Mistake(step_euler, "This is the simplified model: omega T / 2 is missing inside cosine and sine."),
+                Mistake(
+                    step_arc,
+                    "This is the exact arc, whose chord is shorter than v T. The midpoint model drives all of v T.",
+                ),
                 Mistake(
                     _straight(_way, _new, _turn),
                     "You drive along the new heading: only half of the turn belongs there.",
@@ -633,13 +707,21 @@ CHAPTER = Chapter(
         Exercise(
             "step_arc",
             reference=step_arc,
-            draw=EITHER_SIDE,
-            metric=metrics.PlanarPoses(),
+            draw=EITHER_WAY,
+            fixed=PLANAR,
+            metric=metrics.PlanarPoses(1e-7),  # thousands of short steps are right as well
+            noisy=tuple(
+                (functools.partial(gentle_curve, omega=omega), metrics.PlanarPoses(1e-6), GENTLE)
+                for omega in (0.1, 0.01)
+            ),
             properties=(_straight_line_works,),
             hints=(
                 "The robot turns about the center (ICR) at distance r = v / omega to its left. Where is it after turning by omega T?",
                 "The chord of the arc points along theta + h with h = omega T / 2, and its length is v T sin(h) / h.",
-                "np.sinc(t) is sin(pi t) / (pi t), and 1 at t = 0: `h = u[1] * dt / 2; d = u[0] * dt * np.sinc(h / np.pi); return np.array([x[0] + d * np.cos(x[2] + h), x[1] + d * np.sin(x[2] + h), x[2] + 2 * h])`",
+                "np.sinc(t) is sin(pi t) / (pi t), and 1 at t = 0:\n"
+                "`h = u[1] * dt / 2\n"
+                "d = u[0] * dt * np.sinc(h / np.pi)\n"
+                "return np.array([x[0] + d * np.cos(x[2] + h), x[1] + d * np.sin(x[2] + h), x[2] + 2 * h])`",
             ),
             mistakes=[
                 Mistake(
@@ -647,6 +729,10 @@ CHAPTER = Chapter(
                     "This is the midpoint model: its way is the length of the arc, but the chord is shorter, by sin(h) / h.",
                 ),
                 Mistake(step_euler, "This is the simplified model: no curve in it yet."),
+                Mistake(
+                    _straight(lambda th, v, w, dt: v * dt * np.sinc(w * dt / np.pi), _new, _turn),
+                    "You put h = omega T. h is half the turn, omega T / 2.",
+                ),
                 Mistake(
                     _straight(lambda th, v, w, dt: v * dt * np.sinc(w * dt / 2), _half, _turn),
                     "`np.sinc(t)` is sin(pi t) / (pi t): give it h / pi.",
@@ -725,12 +811,16 @@ CHAPTER = Chapter(
         Exercise(
             "jacobian_state",
             reference=jacobian_state,
-            draw=pose_control_step,
+            draw=EITHER_WAY,
+            fixed=PLANAR,
             metric=metrics.Numbers(1e-5),
             hints=(
                 "Change x, y or theta a little: what does it change in the pose after the step?",
                 "A shift of x or y is passed on as it is. A turn of theta swings the way v T sideways.",
-                "`F_x = np.eye(3); F_x[0, 2] = -u[0] * dt * np.sin(x[2]); F_x[1, 2] = u[0] * dt * np.cos(x[2]); return F_x`",
+                "`F_x = np.eye(3)\n"
+                "F_x[0, 2] = -u[0] * dt * np.sin(x[2])\n"
+                "F_x[1, 2] = u[0] * dt * np.cos(x[2])\n"
+                "return F_x`",
             ),
             mistakes=[
                 Mistake(
@@ -760,6 +850,14 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda x, u, t: odometry.step_jacobians(x, u, t, "midpoint")[0],
                     "This belongs to the midpoint model. The lecture derives the simplified one.",
+                ),
+                Mistake(
+                    lambda x, u, t: odometry.step_jacobians(x, u, t, "arc")[0],
+                    "This belongs to the exact arc. The lecture derives the simplified model.",
+                ),
+                Mistake(
+                    lambda x, u, t: jacobian_state(x, np.abs(u), t),
+                    "You take |v|. In reverse v is negative, and the signs of both entries in the last column turn with it.",
                 ),
                 Mistake(
                     lambda x, u, dt: jacobian_state(x, u, dt) - np.eye(3),
@@ -806,7 +904,8 @@ CHAPTER = Chapter(
         Exercise(
             "jacobian_control",
             reference=jacobian_control,
-            draw=pose_control_step,
+            draw=EITHER_WAY,
+            fixed=PLANAR,
             metric=metrics.Numbers(1e-5),
             hints=(
                 "Three rows (x, y, theta), two columns (v, omega).",
@@ -829,6 +928,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda x, u, t: odometry.step_jacobians(x, u, t, "midpoint")[1],
                     "This belongs to the midpoint model. The lecture derives the simplified one.",
+                ),
+                Mistake(
+                    lambda x, u, t: odometry.step_jacobians(x, u, t, "arc")[1],
+                    "This belongs to the exact arc. The lecture derives the simplified model.",
                 ),
                 Mistake(
                     _control_entries(lambda x, t: t * np.cos(x[2]), lambda x, t: t * np.sin(x[2]), lambda t: 1.0),
@@ -880,11 +983,12 @@ CHAPTER = Chapter(
             "control_covariance",
             reference=odometry.control_covariance,
             draw=NOISY_CONTROLS,
+            fixed={"u": PLANAR["u"]},
             metric=metrics.Numbers(1e-9),
             hints=(
                 "A diagonal matrix: the variance of v and the variance of omega.",
                 "sigma_v^2 = k_d |v| / T and sigma_omega^2 = (k_theta |omega| + k_drift |v|) / T.",
-                "`v, omega = np.abs(u); return np.diag([k_d * v / dt, (k_theta * omega + k_drift * v) / dt])`",
+                "`v, omega = np.abs(u)\nreturn np.diag([k_d * v / dt, (k_theta * omega + k_drift * v) / dt])`",
             ),
             mistakes=[
                 Mistake(
@@ -1041,12 +1145,14 @@ CHAPTER = Chapter(
         Exercise(
             "propagate",
             reference=propagate,
-            draw=pose_and_covariances,
+            draw=tuple(functools.partial(pose_and_covariances, side=s, gear=g) for g in (1, -1) for s in (1, -1)),
+            fixed=PLANAR | {"cov": "the covariance of a planar pose", "cov_u": "the covariance of v and omega"},
             metric=metrics.Several(metrics.PlanarPoses(), metrics.Numbers(1e-9), names=("pose", "covariance")),
             hints=(
                 "The pose takes the step. The covariance takes the old uncertainty along and adds that of the control.",
-                "cov' = F_x cov F_x' + F_u cov_u F_u', with both Jacobians at the old pose.",
-                "`F_x, F_u = jacobian_state(x, u, dt), jacobian_control(x, u, dt); return step_euler(x, u, dt), F_x @ cov @ F_x.T + F_u @ cov_u @ F_u.T`",
+                "cov' = F_x cov F_x^T + F_u cov_u F_u^T, with both Jacobians at the old pose.",
+                "`F_x, F_u = jacobian_state(x, u, dt), jacobian_control(x, u, dt)\n"
+                "return step_euler(x, u, dt), F_x @ cov @ F_x.T + F_u @ cov_u @ F_u.T`",
             ),
             mistakes=[
                 Mistake(
@@ -1059,7 +1165,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _propagated(lambda F, G, P, Q: F.T @ P @ F + G @ Q @ G.T),
-                    "F_x is on the wrong side: F cov F', not F' cov F.",
+                    "F_x is on the wrong side: F cov F^T, not F^T cov F.",
                 ),
                 Mistake(
                     lambda x, P, u, t, Q: (x, propagate(x, P, u, t, Q)[1]),
@@ -1083,14 +1189,14 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _propagated(lambda F, G, P, Q: G @ Q @ G.T),
-                    "The old covariance is missing: F_x cov F_x' is to be added.",
+                    "The old covariance is missing: F_x cov F_x^T is to be added.",
                 ),
                 Mistake(
                     _propagated(lambda F, G, P, Q: F @ P @ F.T - G @ Q @ G.T), "Uncertainties add: there is no minus."
                 ),
                 Mistake(
                     _propagated(lambda F, G, P, Q: F @ P + G @ Q @ G.T),
-                    "A covariance is multiplied from both sides: F_x cov F_x'.",
+                    "A covariance is multiplied from both sides: F_x cov F_x^T.",
                 ),
                 Mistake(
                     _propagated(lambda F, G, P, Q: F @ P @ F.T + G @ G.T),
@@ -1106,7 +1212,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _propagated(lambda F, G, P, Q: F @ (P + G @ Q @ G.T) @ F.T),
-                    "The control's noise comes in during this step: it is added after F_x cov F_x', not carried along with it.",
+                    "The control's noise comes in during this step: it is added after F_x cov F_x^T, not carried along with it.",
                 ),
                 Mistake(
                     _propagated(lambda F, G, P, Q: F @ np.diag(np.diag(P)) @ F.T + G @ Q @ G.T),
@@ -1145,7 +1251,7 @@ CHAPTER = Chapter(
             hints=(
                 "Start at (0, 0, 0) and take all 140 steps with the simplified model.",
                 "Loop over drive.controls with your `step_euler`: the pose after one step is the start of the next.",
-                "Two lines: `end_pose = np.zeros(3)`, `for u in drive.controls: end_pose = step_euler(end_pose, u, drive.dt)`",
+                "`end_pose = np.zeros(3)\nfor u in drive.controls: end_pose = step_euler(end_pose, u, drive.dt)`",
             ),
             mistakes=[
                 Mistake(
@@ -1159,6 +1265,14 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda: odometry.drive(np.zeros(3), lecture.circle_drive().controls[:-1], 0.1, "euler")[-1],
                     "One step is missing: there are 140.",
+                ),
+                Mistake(
+                    lambda: step_euler(_circle()[0], lecture.circle_drive().controls[-1], 0.1),
+                    "One step too many: there are 140.",
+                ),
+                Mistake(
+                    lambda: step_euler(np.zeros(3), lecture.circle_drive().controls[0], 14.0),
+                    "This is one step of 14 s, straight along the first heading. Take 140 steps of 0.1 s.",
                 ),
                 Mistake(
                     lambda: _circle()[0] * [1, 1, np.degrees(1)],
@@ -1188,7 +1302,8 @@ CHAPTER = Chapter(
             hints=(
                 "The same loop as for the pose, with `propagate` in place of the step: it hands on pose and covariance.",
                 "The control's covariance is `control_covariance(u, drive.dt, **drive.noise)`; the pose's starts as zeros.",
-                "Two lines: `x, end_cov = np.zeros(3), np.zeros((3, 3))`, `for u in drive.controls: x, end_cov = propagate(x, end_cov, u, drive.dt, control_covariance(u, drive.dt, **drive.noise))`",
+                "`x, end_cov = np.zeros(3), np.zeros((3, 3))\n"
+                "for u in drive.controls: x, end_cov = propagate(x, end_cov, u, drive.dt, control_covariance(u, drive.dt, **drive.noise))`",
             ),
             mistakes=[
                 Mistake(lambda: _circle(k_drift=0.0)[1], "The drift is missing from the control's covariance."),
@@ -1198,7 +1313,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _without_carrying,
-                    "You added up the noise of the steps. Earlier heading errors also move all later positions: F_x cov F_x'.",
+                    "You added up the noise of the steps. Earlier heading errors also move all later positions: F_x cov F_x^T.",
                 ),
                 Mistake(
                     lambda: _circle("midpoint")[1],
@@ -1223,6 +1338,14 @@ CHAPTER = Chapter(
                     "This is one step's covariance: it has to be handed on from step to step.",
                 ),
                 Mistake(
+                    lambda: np.sqrt(np.diag(_circle()[1])),
+                    "These are the standard deviations. Asked for is the covariance matrix, shape (3, 3).",
+                ),
+                Mistake(
+                    lambda: np.diag(np.sqrt(np.diag(_circle()[1]))),
+                    "These are standard deviations on the diagonal. Asked for is the covariance matrix as `propagate` gives it.",
+                ),
+                Mistake(
                     lambda: np.diag(np.diag(_circle()[1])),
                     "The diagonal is right. Hand in the whole matrix, correlations included.",
                 ),
@@ -1230,7 +1353,7 @@ CHAPTER = Chapter(
                     lambda: _circle()[1] * np.outer([1, 1, np.degrees(1)], [1, 1, np.degrees(1)]),
                     "The heading is in degrees: leave it in radians.",
                 ),
-                Mistake(lambda: _loop(_wrong_side)[1], "F_x is on the wrong side: F cov F', not F' cov F."),
+                Mistake(lambda: _loop(_wrong_side)[1], "F_x is on the wrong side: F cov F^T, not F^T cov F."),
                 Mistake(
                     lambda: _loop(_at_new_pose)[1],
                     "Your Jacobians are taken at the new pose: compute them before the pose moves.",
@@ -1243,9 +1366,9 @@ CHAPTER = Chapter(
         ),
         Prediction(
             "banana",
-            question="The ellipse of error propagation is said to hold 95 % of the poses. How many of the true ends does it hold after 14 m?",
-            choices=("about 95 %", "fewer", "more"),
-            answer="fewer",
+            question="The ellipse of error propagation is said to hold 95 % of the poses. What share of the true ends does it hold after 14 m straight on?",
+            choices=("about 60 %", "about 85 %", "about 95 %"),
+            answer="about 85 %",
             why="The true ends lie on a bent band, because a wrong heading swings the way around. An ellipse cannot bend.",
         ),
     ],
