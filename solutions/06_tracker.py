@@ -60,7 +60,8 @@ def decode_packet(data):
 # %% stream [markdown]
 # ## A stream
 #
-# The tracker sends 250 packets per second by UDP, and UDP promises nothing. Decide first. Then press play: these are real packets between two threads on
+# The tracker sends 250 packets per second by UDP, and UDP promises nothing. The packet has no sequence number and no checksum. **How can a receiver
+# know that one was lost**: it cannot, from gaps in the time stamps, or because UDP reports it? Decide first. Then press play: these are real packets between two threads on
 # your machine. Raise the loss, switch on the nonsense (the report's *nesmyslné hodnoty*), watch the counters.
 
 # %% predict-loss
@@ -91,7 +92,8 @@ print("reasons:", sorted(seen.bad))
 #
 # The robot knows where its flange is, if we know the robot. A link in the Denavit-Hartenberg convention is four elementary transforms:
 # $T = R_z(\theta)\,D_z(d)\,D_x(a)\,R_x(\alpha)$. The data sheet (appendix B) prints reaches, and these fix the lengths: forearm $R_b = 225$, upper arm
-# $450 - 225$, wrist to flange $515 - 450 = 65$ mm. Predict one more reach, then drag the flange.
+# $450 - 225$, wrist to flange $515 - 450 = 65$ mm. The elbow bends
+# by up to 138° from straight: **how close can the wrist come to axis 2, in mm?** Predict, then drag the flange.
 
 # %% predict-fold
 guess = ...  # your code here
@@ -129,7 +131,8 @@ def forward_kinematics(dh, q):
 # The reading is relative to a frame nobody knows. Motions get rid of it (equations 2 to 4): from the first pose to the $i$-th, the flange moves by
 # $A_i = T_{BF_0}^{-1} T_{BF_i}$, the tracker by $B_i = T_{WE_0}^{-1} T_{WE_i}$, and both are the same motion seen through the mounting: $A_i X = X B_i$.
 #
-# Drag the two rotation axes; the colored dots are axes of many mountings found from noisy readings. Press *small motions* as well: noise divided by a small
+# If all motions turn about one and the same axis, **what do the residuals look like, and what the mounting?** Decide, then
+# drag the two rotation axes; the colored dots are axes of many mountings found from noisy readings. Press *small motions* as well: noise divided by a small
 # angle is a large error, which is why more poses close together can make a calibration worse.
 
 # %% predict-axes
@@ -143,13 +146,14 @@ ex.predict("axes", guess, reveal=stages.two_axes)
 # ## The rotation as a null vector
 #
 # Stack the **columns** of $X$ into $\operatorname{vec} X$. Then $\operatorname{vec}(PXQ) = (Q^\top \otimes P)\operatorname{vec} X$, and $R_A X - X R_B = 0$ becomes nine
-# linear equations per motion (equations 7 to 9): $\;m_i \operatorname{vec} X = 0$, stacked over all motions $M \operatorname{vec} X = 0$.
+# linear equations per motion (equations 7 to 9): $\;m_i \operatorname{vec} X = 0$, stacked over all motions $M \operatorname{vec} X = 0$. The order of the nine, and whatever rotation mixes
+# them, changes neither the solutions nor $m_i^\top m_i$.
 
 # %% kron_row
 @ex.kron_row
 def kron_row(A, B):
     """Return the block of one motion, shape (9, 9), from the rotations A of the flange and B of the tracker,
-    shape (3, 3) each; its sign is free."""
+    shape (3, 3) each; its sign and the order of its rows are free."""
     ### BEGIN SOLUTION
     return np.kron(np.eye(3), A) - np.kron(B.T, np.eye(3))
     ### END SOLUTION
@@ -256,8 +260,8 @@ mounting[:3, 3] = translation_lsq(A_kept, B_kept, mounting[:3, :3])
 mounting = ex.mounting(mounting)
 
 # %% spread-text [markdown]
-# Six runs over the same poses give six mountings: `mountings`, shape (6, 4, 4), in mm. Appendix D prints the variance over its runs (*Rozptyl*), divided by 6. Divide as it
-# does: what is the standard deviation of the height z over our six, in mm?
+# Six runs over the same poses give six mountings: `mountings`, shape (6, 4, 4), in mm. Appendix D prints a variance over its runs (*Rozptyl*): the sum of the squared deviations from the mean,
+# divided by 6, not by 5. Do the same: what is the standard deviation of the height z over our six, in mm?
 
 # %% spread
 mountings = np.array([run.T_FE for run in synthetic_mountings()])
@@ -271,7 +275,8 @@ spread = ex.spread(spread)
 # ## Against the document
 #
 # Appendix D checks itself: six times an average less five entries is the sixth. And since the mean $\bar e$ of $N$ distances never exceeds their root mean square,
-# $E_{trans} \ge \bar e \sqrt{N} / (N - 1)$ with $\bar e = 2.67$ mm and $N = 20$.
+# $E_{trans} \ge \bar e \sqrt{N} / (N - 1)$ with $\bar e = 2.67$ mm and $N = 20$: a row of $K_1 t - K_2$ and the translation error of a motion differ by a rotation only, so they are equally long.
+# (The report left out some poses, and does not say how many; with $N = 19$ the bound is 3 % higher.)
 
 # %% compare-appendix-d
 runs, mean, variance, _ = report.table_d()
@@ -293,7 +298,7 @@ for name, average, rozptyl in (("report", mean, variance), ("ours", ours.mean(0)
 # ## Break it: repeat the same mistake
 #
 # The runs agree within 0.2 mm while a single pose is off by 2.5 mm. If these errors were random, 20 poses would scatter the mounting by more than half a
-# millimeter. So?
+# millimeter. So **how far from the truth is the mean of the six**: 0.1 mm (the spread over $\sqrt 6$), 0.2 mm (the spread), or can the runs alone not tell?
 
 # %% predict-runs
 guess = ...  # your code here
@@ -306,12 +311,13 @@ ex.predict("runs", guess, reveal=stages.six_runs)
 # ## Beyond the document: can it be done better?
 #
 # The report solves the rotation first, then the translation; so do most methods of OpenCV. The figure shows seven methods beside the Cramér-Rao bound, which no unbiased method can beat
-# (stored results of 400 trials a case, so the ratios themselves scatter by about 2 %). Choose the noise.
+# (stored results of 400 trials a case, so the ratios themselves scatter by about 2 %). With noisy rotations (0.5°) and good translations (0.1 mm), **which way finds the rotation best**: from the rotations alone,
+# from rotations and translations at once, or both alike? Decide, then choose the noise.
 
 # %% predict-methods
 guess = ...  # your code here
 ### BEGIN SOLUTION
-guess = "both together, weighed by their noise"
+guess = "from rotations and translations at once"
 ### END SOLUTION
 ex.predict("methods", guess, reveal=stages.methods)
 
@@ -323,26 +329,28 @@ ex.predict("methods", guess, reveal=stages.methods)
 # %% maximum-likelihood
 best = ax_xb.calibrate_hand_eye(T_BF, T_WE, robust=True, eye="to hand")  # the tracker is the target, T_FT
 for name, T in (("truth", simulation.T_FE), ("report's method", mounting), ("maximum likelihood", best.T_FT)):
-    print(f"{name:19}", *T[:3, 3].round(2), "mm")
+    print(f"{name:19}", T[:3, 3], "mm")
 print("standard deviation ", *best.std_of("T_FT.translation").round(2), "mm")
 print("ignored poses:", np.flatnonzero(best.weights < 0.01))
 
 # %% motion [markdown]
 # ## In motion
 #
-# Section 3.2 moves the robot through the same points slowly, faster, fast, and finds mean errors of ±15 mm and ±1° that hardly depend on speed. Work out what a lag costs, then
-# try speed, latency and nonsense. Which of the four summaries would you print?
+# Section 3.2 moves the robot through the same points slowly, faster, fast, and finds mean errors of ±15 mm and ±1° that hardly depend on speed. **A robot moves at 1.4 m/s and the tracker lags 8 ms behind: how many mm is the
+# position off?** Work it out, then try speed, latency and nonsense. Which of the four summaries would you print?
 
 # %% predict-motion
 guess = ...  # your code here
 ### BEGIN SOLUTION
-guess = 20
+guess = 11
 ### END SOLUTION
 ex.predict("motion", guess, reveal=stages.dynamic_errors)
 
 # %% offset [markdown]
 # A few percent of nonsense are enough to make the mean 15 mm at every speed and to hide a lag of 8 ms. The lag itself is easy to find: the **norm** of the angular velocity is the same in
-# every frame and at every point of the body, so it needs no calibration at all. Shift one curve against the other until they match.
+# every frame and at every point of the body, so it needs no calibration at all. Shift one curve against the other until they match: where the mean of the
+# squared differences over the shared part is least. Then look between the samples; near its least the cost is a parabola, and three values fix its vertex. (Sums of products, `np.correlate`, mislead here: they
+# also count how many samples overlap, which pulls the peak toward 0.)
 
 # %% time_offset
 @ex.time_offset

@@ -34,7 +34,8 @@ np.set_printoptions(precision=4, suppress=True)
 #
 # A robot drives through a hall. **Where is it?** The lecture *Lokalisierung* sorts the task (page "Varianten"): tracking from a known start, finding
 # oneself anywhere, and surviving being carried off. Some sensors look inward (wheel counters, gyroscopes), some outward (lasers, cameras). Its table
-# "Übersicht über Lokalisierungsverfahren" then names four methods. Decide first; then change task, sensors and map, and see which methods still work.
+# "Übersicht über Lokalisierungsverfahren" then names four methods. A robot wakes up somewhere in a known hall and has nothing but wheel odometry. **Which method finds out where it is**:
+# dead reckoning, the Kalman filter, the particle filter, none of them? Decide first; then change task, sensors and map, and see which methods still work.
 
 # %% predict-method
 guess = ...  # your code here
@@ -78,15 +79,15 @@ def newton_lateration(landmarks, distances, start):
 
 
 # %% geometry [markdown]
-# ## Two circles, and a third
+# ## What the circles tell
 #
-# Drag landmarks, robot and the start of the search. The dashed ellipse holds 95 % of what any unbiased method can promise; the dotted line is the
+# A robot stands on the line between two landmarks, and both measured distances come out 1 % short. **In how many points do the circles meet?** Decide. Then drag landmarks, robot and the start of the search. The dashed ellipse holds 95 % of what any unbiased method can promise; the dotted line is the
 # direction the distances see worst. Then press *Make it fail* and look at the singular values: they know of the trouble before the estimate does.
 
 # %% predict-roots
 guess = ...  # your code here
 ### BEGIN SOLUTION
-guess = "two"
+guess = "none"
 ### END SOLUTION
 ex.predict("roots", guess, reveal=stages.circles)
 
@@ -131,6 +132,8 @@ def wheel_to_twist(v_left, v_right, track):
 # *arc* is exact: the robot turns about the ICR by $\omega T = 2h$. The chord of that arc points along $\theta + h$, and its length is
 # $v T \sin(h)/h$. Write it so that driving straight on needs no division by zero.
 # Whole turns in $\theta$ do not matter: leave it as it adds up, or wrap it.
+#
+# The lecture drives with the midpoint model. It propagates *errors* with the simplified one, whose Jacobians are shorter; so do the exercises below.
 
 # %% step_euler
 @ex.step_euler
@@ -162,6 +165,9 @@ def step_arc(x, u, dt):
     return np.array([x[0] + chord * np.cos(direction), x[1] + chord * np.sin(direction), x[2] + u[1] * dt])
     ### END SOLUTION
 
+
+# %% half-the-step [markdown]
+# You halve the time step. **What becomes of the midpoint model's error at the end of a drive**: it halves, it becomes a quarter, it stays? Decide, then compare the three.
 
 # %% predict-order
 guess = ...  # your code here
@@ -234,7 +240,8 @@ def propagate(x, cov, u, dt, cov_u):
 # ## Drive it
 #
 # Click the picture and use the arrow keys, or press play: that is the lecture's circle (page "Simulation"), 1 m/s and 24°/s in 140 steps of 0.1 s. The *true path* is where
-# the robot really goes, *dead reckoning* what it believes. Watch which way the ellipses grow.
+# the robot really goes, *dead reckoning* what it believes. After 14 m straight on by odometry alone,
+# **where does its true position most likely differ**: ahead or behind, to the left or right, or all around alike? Decide; then watch which way the ellipses grow.
 
 # %% predict-spread
 guess = ...  # your code here
@@ -277,7 +284,8 @@ end_cov = ex.end_cov(end_cov)
 # ## What $k_d$ is, and what it is not
 #
 # $k_d$ has the unit m²/m. That is why it survives a change of the time step: cut the same 14 s into other steps and the end stays as uncertain. A speed noise that
-# is *constant per step*, a frequent shortcut, promises more the finer you cut. Compare the heading, and mind the last column.
+# is *constant per step*, a frequent shortcut, promises more the finer you cut. Compare the heading, and mind the last column. (`drive_with_covariance` takes midpoint steps, so
+# the drive ends elsewhere than yours above; the uncertainty is the same to the printed digits.)
 
 # %% what-k-means-code
 for dt in (0.5, 0.1, 0.02):
@@ -289,14 +297,15 @@ for dt in (0.5, 0.1, 0.02):
     print(f"T = {dt:4} s: position {position:.3f} m, heading {heading:.2f} deg; shortcut {np.degrees(wrong):5.2f} deg")
 
 # %% banana [markdown]
-# ## Where the Gaussian lies
+# ## A promise, tested
 #
-# The ellipse is a first-order promise. Let 1500 robots with the same commands and their own noise drive, and look where they end.
+# The ellipse of 95 % is a first-order promise. Let 1500 robots with the same commands and their own noise drive 14 m straight on, and look where they end. **What share of the ends does the ellipse
+# hold**, about 60, 85 or 95 %?
 
 # %% predict-banana
 guess = ...  # your code here
 ### BEGIN SOLUTION
-guess = "fewer"
+guess = "about 85 %"
 ### END SOLUTION
 ex.predict("banana", guess, reveal=stages.banana)
 

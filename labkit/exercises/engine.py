@@ -410,7 +410,7 @@ def _equal_arrays(a, b):
 
 ADVICE = {  # what NumPy means
     "must be square": "`solve` and `inv` need as many equations as unknowns; `lstsq` takes more.",
-    "Singular matrix": "The equations do not determine all unknowns: is one missing, or there twice? Has a loop run off?",
+    "Singular matrix": "The equations do not fix all unknowns: is one missing, or there twice? Has a loop run off?",
     "Incompatible dimensions": "`lstsq` needs one right side a row of the matrix: is `.ravel()` missing?",
     "mismatch in its core dimension": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",
     "not aligned": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",
@@ -639,7 +639,7 @@ class Chapter:
         object.__setattr__(self, "title", self.title or self.name.partition("-")[2].replace("-", " ").capitalize())
         ids = [item.id for item in self.items]
         double = {i for i in ids if ids.count(i) > 1}
-        taken = {"predict", "progress", "chapter"} & set(ids)
+        taken = {"predict", "progress", "chapter", "after"} & set(ids)
         if double or taken:
             raise ValueError(f"chapter {self.name}: the exercise id {min(double | taken)!r} is taken")
 

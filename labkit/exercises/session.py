@@ -90,6 +90,17 @@ class Course:
             raise AttributeError(f"chapter {self._chapter.name} has no prediction {id!r}; there are {known}") from None
         ask(self._chapter, item, answer, reveal)
 
+    def after(self, *ids):
+        """Whether these exercises are solved; where not, a line says what the cell waits for. For cells whose output
+        would give an answer away.
+        """
+        done = progress.solved()
+        open_ = [id for id in ids if (self._chapter.name, self._chapter[id].id) not in done]
+        if open_ and not is_strict():
+            feedback.show(Panel(f"this cell waits for {', '.join(open_)}: it would give the answer away", (), TO_DO))
+            return False
+        return True
+
     def progress(self):
         """Show what is solved in this chapter."""
         feedback.show(chapter_panel(self._chapter))

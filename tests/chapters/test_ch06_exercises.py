@@ -1,11 +1,14 @@
 """Answers of students to chapter 6 that were once judged wrongly."""
 
+import functools
+
 import numpy as np
 import pytest
 
 from labkit.chapters.ch06_tracker import exercises as ch06
 from labkit.exercises.engine import CORRECT, NOT_YET
-from labkit.machines import log
+from labkit.geometry import frames
+from labkit.machines import arm, log
 
 ITEMS = {item.id: item for item in ch06.CHAPTER.items}
 SEEDS = range(4)
@@ -55,3 +58,58 @@ def test_a_tracker_that_leads_is_asked_for_at_every_check():
         return (k + 0.5 * (left - right) / (left - 2 * middle + right)) * step
 
     assert "one direction" in texts("time_offset", lags_only).pop()
+
+
+@pytest.mark.parametrize(
+    "block",
+    [
+        lambda A, B: np.kron(B, A) - np.eye(9),
+        lambda A, B: np.eye(9) - np.kron(B.T, A.T),
+        lambda A, B: np.kron(np.eye(3), A.T) - np.kron(B, np.eye(3)),
+        lambda A, B: (np.kron(np.eye(3), A) - np.kron(B.T, np.eye(3)))[[0, 3, 6, 1, 4, 7, 2, 5, 8]],
+    ],
+)
+def test_other_blocks_with_the_same_solutions_and_singular_values_are_right(block):
+    texts("kron_row", block, CORRECT)
+    A, B = ch06.one_motion(np.random.default_rng(3))
+    plain = np.linalg.svd(ch06.kron_row(A, B))[1]
+    np.testing.assert_allclose(np.linalg.svd(block(A, B))[1], plain, atol=1e-12)
+
+
+def test_the_robot_by_heart_is_refused():
+    def flange(dh, q):
+        return functools.reduce(np.matmul, [arm.dh_matrix(o + x, d, a, al) for (o, d, a, al), x in zip(arm.TX40.dh, q)])
+
+    told = texts("forward_kinematics", flange)
+    assert all("use the argument `dh`" in text for text in told)
+
+
+def test_the_sign_of_the_first_entry_is_not_the_sign_of_the_determinant():
+    def rotation(M):
+        v = np.linalg.svd(M)[2][-1]
+        U, _, Vt = np.linalg.svd((v * np.sign(v[0])).reshape(3, 3, order="F"))
+        return U @ Vt
+
+    assert all("R[0, 0] may well be negative" in text for text in texts("rotation_from_nullvector", rotation))
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_four_byte_numbers_are_named_whatever_they_hold(seed):
+    def decode(data):
+        values = np.frombuffer(data, "<f4")
+        return values[1], 1000 * values[2:5], values[11:15]
+
+    outcome = ITEMS["decode_packet"].judge(decode, rng=np.random.default_rng(seed))
+    assert "46 numbers of 4 bytes" in outcome.text
+
+
+def test_a_bound_of_e_trans_holds_since_both_errors_are_equally_long():
+    """K1 t - K2 and the translation error of a motion differ by a rotation; the mean never exceeds the rms."""
+    A, B, R = ch06.translation_problem(np.random.default_rng(2))
+    t = ch06.translation_lsq(A, B, R)
+    X = frames.pose(R, t)
+    error = frames.invert(A @ X) @ X @ B
+    rows = (np.eye(3) - A[:, :3, :3]) @ t - (A[:, :3, 3] - B[:, :3, 3] @ R.T)
+    lengths = np.linalg.norm(error[:, :3, 3], axis=1)
+    np.testing.assert_allclose(lengths, np.linalg.norm(rows, axis=1), rtol=1e-9)
+    assert ch06.e_trans(rows) >= lengths.mean() * np.sqrt(len(A)) / (len(A) - 1)

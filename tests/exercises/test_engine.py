@@ -791,6 +791,17 @@ def test_progress_is_counted_and_started_over():
     assert ("01-frames", "invert") not in progress.solved()
 
 
+def test_a_cell_that_would_give_an_answer_away_waits_for_it(monkeypatch, capsys):
+    ex = session.course("01-frames")
+    assert not ex.after("invert", "distance") and "waits for invert, distance" in capsys.readouterr().out
+    progress.record("01-frames", "invert", "correct")
+    assert ex.after("invert") and not capsys.readouterr().out
+    with pytest.raises(KeyError):
+        ex.after("invented")
+    monkeypatch.setenv("LABKIT_STRICT", "1")
+    assert ex.after("distance")
+
+
 def test_progress_survives_broken_lines_and_two_writers():
     progress.record("c", "a", "correct")
     with open(progress.path(), "a", encoding="utf-8") as file:

@@ -1108,7 +1108,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: simulation.T_FE,
-                    "This is the truth that the simulation started from. Asked for is what the readings say: it is 1.5 mm off.",
+                    "This is the truth that the simulation started from. Asked for is what the readings say, which is something else: they err.",
                 ),
                 Mistake(
                     _maximum_likelihood,

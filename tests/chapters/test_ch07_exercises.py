@@ -1,0 +1,86 @@
+"""Answers of students to chapter 7 that were once judged wrongly, and sentences of its notebook."""
+
+import numpy as np
+import pytest
+
+from labkit.chapters.ch07_dead_reckoning import exercises as ch07
+from labkit.chapters.ch07_dead_reckoning import stages
+from labkit.exercises.engine import CORRECT, NOT_YET
+from labkit.localization import lateration, odometry
+
+ITEMS = {item.id: item for item in ch07.CHAPTER.items}
+SEEDS = range(6)
+
+
+def texts(name, answer, status=NOT_YET):
+    outcomes = [ITEMS[name].judge(answer, rng=np.random.default_rng(seed)) for seed in SEEDS]
+    assert all(outcome.status == status for outcome in outcomes), [o.text for o in outcomes]
+    return {outcome.text for outcome in outcomes}
+
+
+def arc(x, u, dt, straight_below):
+    theta, (v, omega) = x[2], u
+    if abs(omega) <= straight_below:
+        return np.array([x[0] + v * dt * np.cos(theta), x[1] + v * dt * np.sin(theta), theta + omega * dt])
+    r, after = v / omega, theta + omega * dt
+    return np.array([x[0] + r * (np.sin(after) - np.sin(theta)), x[1] - r * (np.cos(after) - np.cos(theta)), after])
+
+
+@pytest.mark.parametrize(
+    "straight_below, told", [(0.3, "gentle"), (0.05, "gentle"), (1e-6, None), (1e-9, None), (0.0, "0.1 + 0.2")]
+)
+def test_where_an_arc_becomes_straight(straight_below, told):
+    found = texts("step_arc", lambda x, u, dt: arc(x, u, dt, straight_below), NOT_YET if told else CORRECT)
+    assert not told or all(told in text for text in found)
+
+
+def test_wheels_that_rounding_alone_makes_unequal_turn_the_robot_that_fast():
+    assert abs(odometry.wheel_to_twist(0.3, 0.1 + 0.2, 0.5)[1]) == pytest.approx(ch07.ROUNDED_WHEELS, rel=0.02)
+
+
+def test_many_short_steps_are_an_arc():
+    def short_steps(x, u, dt, n=1000):
+        for _ in range(n):
+            x = odometry.step(x, u, dt / n, "midpoint")
+        return x
+
+    assert ITEMS["step_arc"].judge(short_steps, rng=np.random.default_rng(0)).status == CORRECT
+
+
+@pytest.mark.parametrize("name", ["step_euler", "step_midpoint", "step_arc", "jacobian_state"])
+def test_a_robot_that_cannot_reverse_is_told_so(name):
+    reference = ITEMS[name].reference
+    found = texts(name, lambda x, u, dt: reference(x, np.array([abs(u[0]), u[1]]), dt))
+    assert all("|v|" in text for text in found)
+
+
+def test_a_jacobian_computed_once_and_too_few_steps_never_pass():
+    def once(landmarks, distances, start):
+        return ch07._newton_with_one_jacobian(landmarks, distances, start)
+
+    assert all("that of the start" in text for text in texts("newton_lateration", once))
+    for steps in (2, 3, 4, 5):
+        told = texts("newton_lateration", lambda *given, n=steps: ch07._newton(lambda J, f, d: (J, f), n)(*given))
+        assert all("few steps" in text for text in told)
+
+
+def test_on_the_line_distances_that_are_short_leave_no_point_and_off_it_two():
+    landmarks = np.array([[0.0, 0.0], [6.0, 0.0]])
+    for robot, points in (([2.0, 0.0], 0), ([2.0, 2.0], 2)):
+        short = 0.99 * np.linalg.norm(landmarks - robot, axis=1)
+        reach, base = short.sum(), 6.0
+        meet = 2 if abs(short[0] - short[1]) < base < reach else 0
+        assert meet == points
+        if points:
+            roots = lateration.circle_intersections(landmarks, short)
+            np.testing.assert_allclose(np.linalg.norm(roots[:, None] - landmarks, axis=-1), [short, short], atol=1e-9)
+
+
+def test_the_share_that_is_to_be_predicted():
+    share = stages.compute_banana({"path": "straight", "factor": 1.0, "region": "ellipse"})["share"]
+    assert 0.8 < share < 0.9
+
+
+def test_midpoint_and_simplified_model_are_equally_sure_of_their_end():
+    sure = [np.sqrt(np.trace(ch07._circle(model)[1][:2, :2])) for model in ("euler", "midpoint")]
+    assert abs(sure[0] - sure[1]) < 1e-4
