@@ -251,11 +251,19 @@ def _is_solved(path, source_path):
         return False
     stored = nbformat.read(path, as_version=4)
     counts = [cell.execution_count for cell in stored.cells if cell.cell_type == "code"]
+    if any(_lacks_picture(output) for cell in stored.cells for output in cell.get("outputs", [])):
+        return False
     for cell in stored.cells:
         if cell.cell_type == "code":
             cell.outputs, cell.execution_count = [], None
     bare = nbformat.writes(stored, version=4) + "\n"
     return bare == as_text(solved_notebook(source_path)) and counts == list(range(1, len(counts) + 1))
+
+
+def _lacks_picture(output):
+    """Whether a stored output is a Stage in words alone."""
+    data = output.get("data", {})
+    return data.get("text/plain", "").startswith("[stage: ") and "image/png" not in data
 
 
 def reset(path, notebooks):

@@ -1,9 +1,13 @@
 """One source, two notebooks: the same bytes each time, nothing of one machine in them, stale and broken ones named."""
 
+import base64
+import io
 import json
 import textwrap
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from labkit.verbs import build
 
@@ -177,3 +181,53 @@ def test_malformed_sources_and_unknown_chapters_are_refused_in_one_sentence(hous
     assert capsys.readouterr().err == "02_broken.py, line 3: the cell id 'a' is already used in line 1\n"
     assert build.main(["9"], house) == 1
     assert "there are: 01_small, 02_broken" in capsys.readouterr().err
+
+
+STAGE = """# %% figure
+from IPython.display import display
+
+picture = {"text/plain": "[stage: a dot] It is gray.", "image/png": "PNG"}
+display(picture, metadata={"image/png": {"alt": "a dot"}}, raw=True)
+"""
+
+
+def png(shade, corner):
+    """A gray picture of 20 x 20 pixels with one corner of another shade, in base64."""
+    pixels = np.full((20, 20), shade, np.uint8)
+    pixels[:2, :2] = corner
+    file = io.BytesIO()
+    Image.fromarray(pixels).save(file, "png")
+    return base64.b64encode(file.getvalue()).decode()
+
+
+def test_a_stages_picture_is_stored_and_stays_until_another_would_look_different(house):
+    def stored(*picture):
+        (house / "solutions" / "01_small.py").write_text(STAGE.replace("PNG", png(*picture)), encoding="utf-8")
+        assert build.main([], house) == 0
+        (output,) = cells((house / "solutions" / "01_small.ipynb").read_bytes())["figure"]["outputs"]
+        assert output["metadata"] == {"image/png": {"alt": "a dot"}}
+        return output["data"]["image/png"].strip()
+
+    first = stored(120, 120)
+    assert first == png(120, 120)
+    assert stored(121, 121) == first
+    assert stored(120, 255) == png(120, 255)
+
+
+def test_a_stage_in_words_alone_is_stale(house, capsys):
+    (house / "solutions" / "01_small.py").write_text(STAGE.replace("PNG", png(9, 9)), encoding="utf-8")
+    assert build.main([], house) == 0 and build.main(["--check"], house) == 0
+    path = house / "solutions" / "01_small.ipynb"
+    content = json.loads(path.read_text(encoding="utf-8"))
+    del content["cells"][0]["outputs"][0]["data"]["image/png"]
+    path.write_text(json.dumps(content), encoding="utf-8")
+    assert build.main(["--check"], house) == 1
+    assert "solutions/01_small.ipynb is not what" in capsys.readouterr().out
+
+
+def test_of_outputs_that_differ_each_time_only_a_stages_picture_and_name_are_stored(house):
+    source = STAGE.replace("# %% figure", '# %% figure tags=["nbval-ignore-output"]') + "print(1)\n"
+    (house / "solutions" / "01_small.py").write_text(source.replace("PNG", png(9, 9)), encoding="utf-8")
+    assert build.main([], house) == 0
+    (output,) = cells((house / "solutions" / "01_small.ipynb").read_bytes())["figure"]["outputs"]
+    assert output["data"]["text/plain"] == ["[stage: a dot]"] and "image/png" in output["data"]
