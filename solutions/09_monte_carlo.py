@@ -143,9 +143,8 @@ while p > 0:
 ex.beams_to_zero(beams_to_zero)
 
 # %% beams [markdown]
-# A scan has 541. With all weights zero there is nothing to draw from. A sum of logarithms never gets there, and
-# subtracting the largest one first makes
-# the best particle weigh $e^0 = 1$ (`particles.normalize_weights`).
+# A scan has 541. With all weights zero there is nothing to draw from. A sum of *log densities*, each from its formula, stays finite (the logarithm of a density that has become zero does not:
+# it is $-\infty$). Subtracting the largest sum first makes the best particle weigh $e^0 = 1$ (`particles.normalize_weights`).
 #
 # ## Weighing by beams
 #
@@ -157,7 +156,7 @@ ex.beams_to_zero(beams_to_zero)
 def cast_ray(grid, pose, bearing, r_max):
     """Return the distance (m) to the first occupied cell along a beam, r_max if there is none.
 
-    grid.at([x, y]) is maps.OCCUPIED there; a cell is grid.resolution wide (m).
+    grid.at([x, y]) is maps.OCCUPIED there; maps.FREE and maps.UNKNOWN do not stop it. A cell is grid.resolution wide (m).
     """
     ### BEGIN SOLUTION
     angle = pose[2] + bearing
@@ -190,7 +189,8 @@ def beam_weight(ranges, expected, std):
 def distance_field_weight(grid, pose, ranges, bearings, std):
     """Return log p: the sum of log N(0, std^2) over the distances of the end points.
 
-    grid.cell_of(points), points of shape (B, 2), gives the rows and columns of their cells in grid.distance.
+    grid.cell_of(points), points of shape (B, 2), gives the rows and columns of their cells in grid.distance (m).
+    All end points of the checks lie on the map.
     """
     ### BEGIN SOLUTION
     x = pose[0] + ranges * np.cos(pose[2] + bearings)
@@ -352,7 +352,7 @@ ex.predict("kidnap", guess, reveal=stages.arena)
 # %% recover
 @ex.recover
 def recover(w_mean, w_slow, w_fast, alpha_slow, alpha_fast):
-    """Return the share of random particles, and both averages brought up to date: w += alpha * (w_mean - w)."""
+    """Return three numbers: the share of random particles, then w_slow and w_fast, w += alpha * (w_mean - w) each."""
     ### BEGIN SOLUTION
     w_slow = w_slow + alpha_slow * (w_mean - w_slow)
     w_fast = w_fast + alpha_fast * (w_mean - w_fast)
@@ -380,7 +380,7 @@ for task, model, good, low, high, steps in zip(*(table[name] for name in columns
 # (1)*, *(2)*): 5 cm per meter, 5° per turn, 2° per meter. The circle of chapters 7 and 8 has its simulation's 2 cm.
 #
 # A converged cloud needs no 5000 particles. KLD sampling counts the bins (0.5 m by 0.5 m by 15°) the cloud occupies and
-# keeps as many particles as a chi-square bound asks for, `n_min` at least.
+# keeps as many particles as a chi-square bound asks for: with $k$ bins $n = \chi^2_{k-1} / (2\varepsilon)$, its 99 % quantile, and `n_min` at least.
 # The price: a cloud that shrinks onto the wrong place has nobody left elsewhere, and then all hangs on the recovery.
 # Compare the rows *adaptive* and *global*: which model pays it, and why that one? Then run the cell with
 # `recovery=False` and other seeds.
@@ -405,7 +405,7 @@ print("found" if error < 0.3 and turn < np.deg2rad(10) else "lost", "at the end"
 # no names. None raises an error on
 # friendly input, and all look fine in a plot. **Write the test that catches it**: a function that returns True for
 # what is correct and False for the specimen.
-# It answers with `return`, not with `assert`. It is tried on correct functions too, and must not reject them.
+# It answers with `return`, not with `assert`. It is tried several times, on correct functions too, which it must not reject, and on wrong ones that are not shown, which it must catch.
 
 # %% hunt_1
 print(inspect.getsource(specimens.specimen_1))
@@ -441,7 +441,10 @@ print(inspect.getsource(specimens.specimen_3))
 
 @ex.hunt_3
 def hunt_3(resample, rng):
-    """Return True if weights whose sum is rounded a little below 1 do no harm, False otherwise."""
+    """Return True if weights whose sum is rounded a little below 1 do no harm, False otherwise.
+
+    Harm is an IndexError, which your test has to catch, or an index beyond the last particle.
+    """
     ### BEGIN SOLUTION
     try:
         return all(resample(np.full(1000, 0.000999), rng).max() < 1000 for _ in range(20))

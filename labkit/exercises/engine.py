@@ -419,6 +419,7 @@ ADVICE = {  # what NumPy means
     "truth value of an array": "`if` takes one truth value; `np.where` chooses entry by entry.",
     "bitwise_xor": "`^` is no power in Python: write `**`.",
     "for ^: ": "`^` is no power in Python: write `**`.",
+    "is out of bounds for axis": "Indices count from 0, the row comes first: [row, column].",
     "math domain error": "A root of a negative number, or an arccosine beyond 1, perhaps by rounding: see `np.clip`.",
     "could not be broadcast": "Entry by entry these shapes do not fit: is `@` meant, is a sum over an axis missing?",
 }

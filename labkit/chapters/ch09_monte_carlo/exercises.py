@@ -1,7 +1,9 @@
 """Chapter 9: particles, maps, resampling, recovery, and four bugs to hunt."""
 
 import functools
+import inspect
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +16,7 @@ from ...localization.sensors import weigh_landmarks
 from . import specimens
 
 R_MAX = 18.0
+POSE = "a planar pose has three numbers"
 IMPORTS = 6.0  # seconds a call may take where students use scipy.stats: its import alone can take two, and it is slow
 
 
@@ -26,9 +29,9 @@ def building():
 # Draws ---------------------------------------------------------------------------------------------------------------
 
 
-def scan_at_a_pose(rng, count=12):
+def scan_at_a_pose(rng, count=None):
     """grid, pose near the truth, ranges, bearings, std; all end points lie on the map, whatever the heading."""
-    grid = building().grid
+    grid, count = building().grid, count or int(rng.integers(8, 16))
     pose = np.array([rng.uniform(5, 12), rng.uniform(4.6, 5.3), rng.uniform(-3, 3)])
     bearings = np.linspace(-2.3, 2.3, count)
     ranges = grid.cast(pose, bearings, R_MAX).astype(float)
@@ -37,19 +40,30 @@ def scan_at_a_pose(rng, count=12):
     return grid, near, short, bearings, float(rng.uniform(0.15, 0.4))
 
 
-def landmarks_at_a_pose(rng):
-    """pose, z, landmarks, both standard deviations; one bearing in three lies across the seam at 180 deg."""
+def landmarks_at_a_pose(rng, astray=0.0):
+    """pose, z, landmarks, both standard deviations; one bearing lies across the seam at 180 deg.
+
+    astray: how far the measured ranges are off beyond their noise (m), as seen from a particle in a wrong room.
+    """
+    m = int(rng.integers(3, 6))
     pose = np.array([*rng.uniform(-2, 2, 2), rng.uniform(-3, 3)])
-    phi = np.array([math.pi - 0.02, rng.uniform(-2, 2), rng.uniform(-2, 2)])
-    r = rng.uniform(2, 6, 3)
+    phi = np.array([math.pi - 0.02, *rng.uniform(-2, 2, m - 1)])
+    r = rng.uniform(2, 6, m)
     angle = pose[2] + phi
     landmarks = pose[:2] + r[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-    z = np.column_stack([r + 0.1 * rng.normal(size=3), planar.wrap_angle(phi + (0.05, *0.03 * rng.normal(size=2)))])
+    off = planar.wrap_angle(phi + (0.05, *0.03 * rng.normal(size=m - 1)))
+    z = np.column_stack([r + astray + 0.1 * rng.normal(size=m), off])
     return pose, z, landmarks, float(rng.uniform(0.15, 0.4)), float(rng.uniform(0.03, 0.08))
 
 
-def beams_at_a_pose(rng, count=20):
+def landmarks_from_a_wrong_room(rng):
+    """The same with ranges that are 12 m off: their density is zero in float64, its logarithm is not."""
+    return landmarks_at_a_pose(rng, astray=12.0)
+
+
+def beams_at_a_pose(rng, count=None):
     """Measured and expected ranges, std."""
+    count = count or int(rng.integers(15, 25))
     expected = rng.uniform(1, 10, count)
     return expected + 0.2 * rng.normal(size=count), expected, float(rng.uniform(0.15, 0.4))
 
@@ -101,15 +115,26 @@ def short_ray(rng):
     return grid, pose, bearing, 0.6 * maps.walk_ray(grid, pose, bearing, r_max)
 
 
+def ray_past_the_unknown(rng):
+    """A ray that crosses cells that nobody has seen before it meets a wall; they are no obstacle that is known."""
+    cells, start = np.full((60, 60), maps.FREE), rng.uniform(1.0, 1.5)
+    cells[:, 25:35] = maps.UNKNOWN
+    cells[:, 50:] = maps.OCCUPIED
+    theta = rng.uniform(-0.3, 0.3)
+    return maps.OccupancyGrid(cells, 0.1), np.array([start, rng.uniform(2.8, 3.2), theta]), float(-theta), R_MAX
+
+
 def motion(rng):
     """states, u, dt, standard deviations of v and omega, rng."""
-    states = np.column_stack([rng.uniform(-5, 5, (6, 2)), rng.uniform(-3, 3, 6)])
-    return states, np.array([0.8, 0.4]), 0.5, np.array([0.2, 0.3]), np.random.default_rng(rng.integers(2**32))
+    m, u = int(rng.integers(4, 9)), np.array([rng.uniform(0.5, 1), rng.uniform(0.2, 0.6)]) * rng.choice([-1, 1], 2)
+    states = np.column_stack([rng.uniform(-5, 5, (m, 2)), rng.uniform(-3, 3, m)])
+    stds, dt = rng.uniform(0.1, 0.2, 2) + (0, 0.15), float(rng.uniform(0.2, 0.8))
+    return states, u, dt, stds, np.random.default_rng(rng.integers(2**32))
 
 
 def wheel(rng, power):
     """Weights whose sum is well above 1, the more alike the smaller the power, and an rng."""
-    w = rng.uniform(0.1, 1, size=12) ** power
+    w = rng.uniform(0.1, 1, size=rng.integers(10, 16)) ** power
     return w / w.sum() * rng.uniform(2, 5), np.random.default_rng(rng.integers(2**32))
 
 
@@ -118,7 +143,7 @@ WHEELS = tuple(functools.partial(wheel, power=power) for power in (4, 0.5))
 
 def cloud_weights(rng):
     """Weights of any sum."""
-    return (rng.exponential(size=30) ** rng.uniform(0.2, 3) * 50 ** rng.uniform(-2, 1),)
+    return (rng.exponential(size=rng.integers(20, 40)) ** rng.uniform(0.2, 3) * 50 ** rng.uniform(-2, 1),)
 
 
 def cloud_and_threshold(rng, slip):
@@ -132,13 +157,20 @@ def cloud_and_threshold(rng, slip):
 def averages(rng):
     """w_mean, w_slow, w_fast, alpha_slow, alpha_fast: a drop as often as a rise."""
     slow = rng.uniform(0.2, 0.8)
-    return slow * rng.uniform(0.1, 1.9), slow, slow * rng.uniform(0.6, 1.2), 0.05, 0.3
+    return (
+        slow * rng.uniform(0.1, 1.9),
+        slow,
+        slow * rng.uniform(0.6, 1.2),
+        rng.uniform(0.02, 0.1),
+        rng.uniform(0.2, 0.5),
+    )
 
 
-def headings(rng):
-    """angles about a direction near the seam, and weights."""
-    angles = planar.wrap_angle(math.pi + rng.uniform(-0.3, 0.3) + 0.4 * rng.normal(size=20))
-    return angles, rng.exponential(size=20)
+def headings(rng, about=math.pi):
+    """angles about a direction, near the seam by default, and weights."""
+    n = int(rng.integers(15, 25))
+    angles = planar.wrap_angle(about + rng.uniform(-0.3, 0.3) + 0.4 * rng.normal(size=n))
+    return angles, rng.exponential(size=n)
 
 
 # References that the library has in another form ---------------------------------------------------------------------
@@ -313,6 +345,17 @@ def _landmarks(
     return variant
 
 
+def _landmark_plain_product(pose, z, landmarks, std_range, std_bearing):
+    one = [landmark_weight(pose, z[k : k + 1], landmarks[k : k + 1], std_range, std_bearing) for k in range(len(z))]
+    return _log_of_the_product(np.array(one))
+
+
+def _ranges_wrapped(pose, z, landmarks, std_range, std_bearing):
+    expected = np.hypot(*(landmarks - pose[:2]).T)
+    z = np.column_stack([expected + planar.wrap_angle(z[:, 0] - expected), z[:, 1]])
+    return landmark_weight(pose, z, landmarks, std_range, std_bearing)
+
+
 def _products_added(pose, z, landmarks, std_range, std_bearing):
     one = [landmark_weight(pose, z[k : k + 1], landmarks[k : k + 1], std_range, std_bearing) for k in range(len(z))]
     return _logarithm(np.exp(one).sum())
@@ -388,6 +431,10 @@ def _field_probability(grid, pose, ranges, bearings, std):
 def _field_no_peak(grid, pose, ranges, bearings, std):
     d = grid.distance[grid.cell_of(_end_points(pose, ranges, bearings))]
     return float((-0.5 * np.square(d / std)).sum())
+
+
+def _ray_to_what_is_not_free(grid, pose, bearing, r_max):
+    return maps.walk_ray(replace(grid, cells=np.where(grid.cells == maps.FREE, 0, maps.OCCUPIED)), pose, bearing, r_max)
 
 
 def _ray_in_cells(grid, pose, bearing, r_max):
@@ -622,7 +669,7 @@ def _spins_are_independent(resample, rng):
             "binomial). Each spin needs its own."
         )
     half = float(counts[:, :5].sum(1).var())
-    if half < 1.9:
+    if half < 1.8:
         return (
             f"the spins are not independent: the draws from one half of the wheel vary by {half:.1f} instead of 2.5. "
             "Does each spin start where the last one ended?"
@@ -650,32 +697,53 @@ def _equal_weights_stay(resample, rng):
     return None
 
 
+class _LateSpin(np.random.Generator):
+    """Its uniform numbers are nearly 1, as one in a thousand million is."""
+
+    LATE = 1 - 1e-9
+
+    def random(self, size=None, *args, **kwargs):
+        return self.LATE if size is None else np.full(size, self.LATE)
+
+    def uniform(self, low=0.0, high=1.0, size=None):
+        return low + (high - low) * self.random(size)
+
+
 def _survives_rounding(resample, rng):
-    for _ in range(30):
-        weights = rng.exponential(size=200).astype(np.float32)
-        index = resample(weights / weights.sum() * np.float32(0.999999), rng)
-        if np.max(index) >= 200 or len(index) != 200:
-            return "with weights whose sum is rounded below 1 an index beyond the last particle comes out."
+    """The last spoke against weights in single precision whose running sum, after a division, ends below 1."""
+    for seed in range(20):
+        weights = np.random.default_rng(seed).exponential(size=200).astype(np.float32)
+        if np.cumsum(weights / weights.sum())[-1] < 1 - 1e-7:
+            try:
+                index = resample(weights, _LateSpin(np.random.PCG64(seed)))
+            except IndexError:
+                return "with weights whose running sum is rounded below 1 the last spoke meets nothing: an IndexError."
+            if np.max(index) >= 200 or len(index) != 200:
+                return "with weights whose running sum is rounded below 1 an index beyond the last particle comes out."
     return None
 
 
 def _noise_is_right(move, rng):
     """Mean and spread of one step of 4000 particles against first-order propagation."""
-    states, u, std_u = np.zeros((4000, 3)), np.array([1.0, 0.0]), np.array([0.1, 0.2])
-    moved = np.asarray(move(states.copy(), u, 0.5, std_u, rng))
+    states, u = np.zeros((4000, 3)), np.array([1.0, 0.0])
+    std_u, dt = np.round(rng.uniform((0.08, 0.15), (0.15, 0.3)), 2), float(np.round(rng.uniform(0.3, 0.5), 2))
+    moved = np.asarray(move(states.copy(), u, dt, std_u, rng))
     if moved.shape != states.shape:
         return f"expected an array of shape (4000, 3), got {moved.shape}."
     found = moved.std(0)
-    for name, unit, amount, wanted in (("x", "m", found[0], 0.05), ("theta", "rad", found[2], 0.1)):
+    for name, unit, amount, wanted in (("x", "m", found[0], dt * std_u[0]), ("theta", "rad", found[2], dt * std_u[1])):
         if abs(amount - wanted) > 0.1 * wanted:
             return (
-                f"4000 particles spread by {amount:.3f} {unit} (standard deviation) in {name} after one step of 0.5 s with "
-                f"std_u = [0.1, 0.2], expected {wanted:.3f} {unit}."
+                f"4000 particles spread by {amount:.3f} {unit} (standard deviation) in {name} after one step of {dt} s with "
+                f"std_u = {std_u.tolist()}, expected {wanted:.3f} {unit}."
             )
+    beyond = int((np.abs(moved[:, 2]) > 2 * dt * std_u[1]).sum())
+    if not 100 < beyond < 280:  # 182 of a normal distribution, six standard deviations to either side
+        return f"{beyond} of 4000 particles lie beyond two standard deviations, of normal noise about 182 would."
     if abs(np.corrcoef(moved[:, 0], moved[:, 2])[0, 1]) > 0.2:
         return "v and omega of a particle got the same random number: each needs its own."
-    if np.abs(moved.mean(0) - (0.5, 0, 0)).max() > 0.01:
-        return f"on average the particles move by {np.round(moved.mean(0), 3).tolist()}, expected [0.5, 0, 0]."
+    if np.abs(moved.mean(0) - (dt, 0, 0)).max() > 0.02:
+        return f"on average the particles move by {np.round(moved.mean(0), 3).tolist()}, expected [{dt}, 0, 0]."
     return None
 
 
@@ -739,28 +807,60 @@ def _on_show(specimen):
     return resample  # under a name that gives nothing away
 
 
-def _catches(specimen, good, extra=()):
-    """Properties of a property test: False for the specimen, True for what is correct."""
+RUNS = 3  # how often a property test is tried on each function: what passes by luck does so once
 
-    def rejects(test, rng):
-        verdict = test(specimen, *((rng,) if extra else ()))
-        if not isinstance(verdict, bool | np.bool_):
-            return f"a test answers True (passed) or False (caught), got {type(verdict).__name__}."
-        return (
-            "your test sometimes lets the specimen pass: give it more runs, or weights it fails on clearly."
-            if verdict
-            else None
-        )
 
-    def accepts(function):
+def _catches(specimen, good, others, extra=()):
+    """Properties of a property test: False for the specimen and the other wrong ones, True for what is correct."""
+
+    def rejects(wrong, words):
         def check(test, rng):
-            if not test(function, *((rng,) if extra else ())):
-                return f"your test also rejects a correct function ({GOOD_WORDS[function]}): it asks for more than must hold."
+            for _ in range(RUNS):
+                verdict = test(wrong, *((rng,) if extra else ()))
+                if not isinstance(verdict, bool | np.bool_):
+                    return f"a test answers True (passed) or False (caught), got {type(verdict).__name__}."
+                if verdict:
+                    return words
             return None
 
         return check
 
-    return (rejects, *(accepts(function) for function in good))
+    def accepts(function):
+        def check(test, rng):
+            for _ in range(RUNS):
+                if not test(function, *((rng,) if extra else ())):
+                    return f"your test also rejects a correct function ({GOOD_WORDS[function]}): it asks for more than must hold."
+            return None
+
+        return check
+
+    sometimes = "your test sometimes lets the specimen pass: give it more runs, or weights it fails on clearly."
+    return (
+        rejects(specimen, sometimes),
+        *(accepts(function) for function in good),
+        *(rejects(wrong, f"your test lets another wrong function pass, one that {words}.") for wrong, words in others),
+    )
+
+
+def _squared(weights, rng):
+    return particles.resample_roulette(np.square(weights), rng)
+
+
+def _specimen_2_of_many(weights, rng):
+    return (specimens.specimen_2 if len(weights) > 6 else particles.resample_roulette)(weights, rng)
+
+
+def _beyond_the_last(weights, rng):
+    return np.searchsorted(np.cumsum(weights), (rng.random() + np.arange(len(weights))) / len(weights))
+
+
+def _mean_of_logarithms(states, ranges, landmarks, std):
+    d = np.hypot(*np.moveaxis(landmarks - states[:, None, :2], -1, 0))
+    return particles.normalize_weights((-0.5 * np.square((ranges - d) / std)).mean(1))
+
+
+SQUARED = (_squared, "draws in proportion to the squared weights")
+UNIFORM = (lambda weights, rng: _uniform_choice(weights, rng), "draws all indices alike, whatever they weigh")
 
 
 def hunt_1(resample, rng):
@@ -794,16 +894,20 @@ def hunt_4(weigh):
     return bool(np.isclose(twice[0] / twice[1], (once[0] / once[1]) ** 2))
 
 
-def _hunt(id, reference, specimen, why, hints, good=GOOD, extra=("rng",)):
+def _hunt(id, reference, specimen, why, hints, others, good=GOOD, extra=("rng",)):
     specimen = _on_show(specimen)
     return Exercise(
         id,
         reference=reference,
         draw=lambda rng: (specimen, *((np.random.default_rng(rng.integers(2**32)),) if extra else ())),
-        properties=_catches(specimen, good, extra),
+        properties=_catches(specimen, good, others, extra),
+        fixed={next(iter(inspect.signature(reference).parameters)): "it is the specimen that is shown"},
         hints=hints,
         mistakes=[
-            Mistake(lambda *_: True, f"Your test passes the specimen. {why}"),
+            Mistake(
+                lambda *_: True,
+                f"Your test says True of the specimen, which means correct (if you meant it to say caught: that is False). {why}",
+            ),
             Mistake(lambda *_: None, "Your test returned None: it has to return True (passed) or False (caught)."),
         ],
         draws=1,
@@ -827,11 +931,12 @@ CHAPTER = Chapter(
             "sample_motion",
             reference=sample_motion,
             draw=motion,
+            fixed={"u": "the control is a speed and a turn rate", "std_u": "one for the speed, one for the turn rate"},
             properties=(_noise_off_is_reckoning, _noise_is_right, _moved_by_the_rng),
             hints=(
                 "The noise belongs to the control, not to the pose, and each particle gets its own.",
                 "Draw one pair of standard normal numbers per particle, scale them by std_u, and add them to u.",
-                "`noisy = u + std_u * rng.standard_normal((len(states), 2)); return odometry.step(states, noisy, dt)`",
+                "`noisy = u + std_u * rng.standard_normal((len(states), 2))\nreturn odometry.step(states, noisy, dt)`",
             ),
             mistakes=[
                 Mistake(
@@ -857,6 +962,9 @@ CHAPTER = Chapter(
                     lambda x, u, dt, s, rng: odometry.step(x, u + s * rng.standard_normal((len(x), 1)), dt),
                     "v and omega of a particle got the same random number: each needs its own.",
                 ),
+                Mistake(
+                    _motion(lambda s: s[::-1]), "The two standard deviations have changed places: first v, then omega."
+                ),
                 Mistake(_motion(np.sqrt), "You took the root of std_u. It is a standard deviation, not a variance."),
                 Mistake(
                     _motion(on_pose=True),
@@ -868,15 +976,17 @@ CHAPTER = Chapter(
         Exercise(
             "landmark_weight",
             reference=landmark_weight,
-            draw=landmarks_at_a_pose,
+            draw=(landmarks_at_a_pose, landmarks_from_a_wrong_room),
+            fixed={"pose": POSE},
             metric=metrics.Numbers(1e-8),
             limit=IMPORTS,
             hints=(
                 "What range and what bearing would a robot at this pose expect? Compare them with z.",
                 "The bearing is atan2(dy, dx) - theta. Wrap the *difference*, then add the logarithms of both normal densities.",
-                "`dx, dy = (landmarks - pose[:2]).T; e = z[:, 0] - np.hypot(dx, dy); "
-                "f = planar.wrap_angle(z[:, 1] - np.arctan2(dy, dx) + pose[2]); "
-                "log_p = -0.5 * (e / std_range) ** 2 - 0.5 * (f / std_bearing) ** 2; "
+                "`dx, dy = (landmarks - pose[:2]).T\n"
+                "e = z[:, 0] - np.hypot(dx, dy)\n"
+                "f = planar.wrap_angle(z[:, 1] - np.arctan2(dy, dx) + pose[2])\n"
+                "log_p = -0.5 * (e / std_range) ** 2 - 0.5 * (f / std_bearing) ** 2\n"
                 "return np.sum(log_p - np.log(2 * np.pi * std_range * std_bearing))`",
             ),
             mistakes=[
@@ -899,6 +1009,14 @@ CHAPTER = Chapter(
                 Mistake(_landmarks(parts=(1, 0)), "The bearings are missing: both densities are multiplied."),
                 Mistake(_landmarks(parts=(0, 1)), "The ranges are missing: both densities are multiplied."),
                 *_density_mistakes(_landmarks, "readings"),
+                Mistake(
+                    _landmark_plain_product,
+                    "Right near the robot. Far from it the product is zero before you take its logarithm: add logarithms.",
+                ),
+                Mistake(
+                    _ranges_wrapped,
+                    "You wrapped the range error too. Only the bearing is an angle: a range that is 12 m off stays 12 m off.",
+                ),
                 Mistake(_products_added, "You added over the landmarks what must be multiplied: add *logarithms*."),
                 Mistake(
                     _landmarks(wrap="positive"),
@@ -977,17 +1095,24 @@ CHAPTER = Chapter(
         Exercise(
             "cast_ray",
             reference=maps.walk_ray,
-            draw=plain_ray,
+            draw=(plain_ray, ray_past_the_unknown),
+            fixed={"pose": POSE},
             metric=metrics.Numbers(0.16, "m"),
             noisy=[(short_ray, metrics.Numbers(0.16, "m"), "Right where something is hit, but not where nothing is:")],
             hints=(
                 "Walk along the ray in steps smaller than a cell, and stop in the first occupied one.",
                 "The direction is theta + bearing. grid.at([x, y]) says what is there; maps.OCCUPIED is an obstacle.",
-                "`a = pose[2] + bearing; r = np.arange(0, r_max, grid.resolution / 2); "
-                "xy = pose[:2] + r[:, None] * [np.cos(a), np.sin(a)]; "
-                "hits = r[grid.at(xy) == maps.OCCUPIED]; return hits[0] if len(hits) else r_max`",
+                "`a = pose[2] + bearing\n"
+                "r = np.arange(0, r_max, grid.resolution / 2)\n"
+                "xy = pose[:2] + r[:, None] * [np.cos(a), np.sin(a)]\n"
+                "hits = r[grid.at(xy) == maps.OCCUPIED]\n"
+                "return hits[0] if len(hits) else r_max`",
             ),
             mistakes=[
+                Mistake(
+                    lambda grid, x, b, r_max: _ray_to_what_is_not_free(grid, x, b, r_max),
+                    "Unknown cells stop your ray. Nobody has seen an obstacle there: only maps.OCCUPIED ends it.",
+                ),
                 Mistake(_ray_in_cells, "You counted in cells. One cell is grid.resolution meters long."),
                 Mistake(_ray_without_heading, "The heading is missing: the beam points to theta + bearing on the map."),
                 Mistake(_ray_without_bearing, "The bearing is missing: you looked straight ahead."),
@@ -1021,7 +1146,7 @@ CHAPTER = Chapter(
             reference=beam_weight,
             draw=beams_at_a_pose,
             metric=metrics.Numbers(1e-9),
-            noisy=[(whole_scan(beams_at_a_pose), metrics.Numbers(1e-6), "Right for 20 beams, but not for 541:")],
+            noisy=[(whole_scan(beams_at_a_pose), metrics.Numbers(1e-6), "Right for few beams, but not for 541:")],
             limit=IMPORTS,
             hints=(
                 "Each beam is a normal density of measured minus expected range. A product turns into a sum of logarithms.",
@@ -1034,7 +1159,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda r, e, s: _log_of_the_product(_normal_log(r - e, s)),
-                    "Right for 20 beams. With 541 the product is zero before you take its logarithm: sum up logarithms.",
+                    "Right for few beams. With 541 the product is zero before you take its logarithm: sum up logarithms.",
                 ),
                 Mistake(
                     lambda r, e, s: float((-0.5 * np.square((r - e) / s)).sum() - np.log(s * math.sqrt(2 * math.pi))),
@@ -1069,13 +1194,15 @@ CHAPTER = Chapter(
             "distance_field_weight",
             reference=distance_field_weight,
             draw=scan_at_a_pose,
+            fixed={"grid": "the chapter has one building", "pose": POSE},
             metric=metrics.Numbers(1e-6),
-            noisy=[(whole_scan(scan_at_a_pose), metrics.Numbers(1e-6), "Right for 12 beams, but not for 541:")],
+            noisy=[(whole_scan(scan_at_a_pose), metrics.Numbers(1e-6), "Right for few beams, but not for 541:")],
             hints=(
                 "Put the end point of each beam on the map and ask how far the nearest obstacle is.",
                 "End point: x + r cos(theta + b), y + r sin(theta + b). The distance stands in grid.distance at grid.cell_of(point).",
-                "`a = pose[2] + bearings; xy = pose[:2] + np.column_stack([ranges * np.cos(a), ranges * np.sin(a)]); "
-                "d = grid.distance[grid.cell_of(xy)]; "
+                "`a = pose[2] + bearings\n"
+                "xy = pose[:2] + np.column_stack([ranges * np.cos(a), ranges * np.sin(a)])\n"
+                "d = grid.distance[grid.cell_of(xy)]\n"
                 "return np.sum(-0.5 * (d / std) ** 2 - np.log(std * np.sqrt(2 * np.pi)))`",
             ),
             mistakes=[
@@ -1089,7 +1216,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _field_plain_product,
-                    "Right for 12 beams. With 541 the product is zero before you take its logarithm: sum up logarithms.",
+                    "Right for few beams. With 541 the product is zero before you take its logarithm: sum up logarithms.",
                 ),
                 *_density_mistakes(_field_with, "beams"),
                 Mistake(_field_straight_ahead, "The bearings are missing: each beam points to theta + bearing."),
@@ -1124,7 +1251,8 @@ CHAPTER = Chapter(
             hints=(
                 "Each weight owns an interval as wide as itself. Where does a random number fall?",
                 "np.cumsum(weights) are the ends of the intervals, np.searchsorted finds the interval by bisection.",
-                "`ends = np.cumsum(weights); return np.searchsorted(ends, rng.random(len(weights)) * ends[-1], side='right')`",
+                "`ends = np.cumsum(weights)\n"
+                "return np.searchsorted(ends, rng.random(len(weights)) * ends[-1], side='right')`",
             ),
             mistakes=[
                 Mistake(_largest, "You always took the heaviest particle. It should be drawn most often, not always."),
@@ -1156,6 +1284,10 @@ CHAPTER = Chapter(
                     lambda w, rng: np.searchsorted(w, rng.random(len(w))),
                     "You searched in the weights. Search in their running sum, np.cumsum(weights).",
                 ),
+                Mistake(
+                    lambda w, rng: np.searchsorted(np.cumsum(np.sort(w)), rng.random(len(w)) * w.sum()),
+                    "You sorted the weights: then an index no longer belongs to its particle.",
+                ),
             ],
             draws=8,
             limit=IMPORTS,
@@ -1175,7 +1307,8 @@ CHAPTER = Chapter(
             hints=(
                 "One random number turns the whole wheel. Its M spokes are W / M apart.",
                 "Spokes: (rng.random() + np.arange(M)) * W / M. Then search them in the running sum, as before.",
-                "`ends, M = np.cumsum(weights), len(weights); spokes = (rng.random() + np.arange(M)) * ends[-1] / M; "
+                "`ends, M = np.cumsum(weights), len(weights)\n"
+                "spokes = (rng.random() + np.arange(M)) * ends[-1] / M\n"
                 "return np.minimum(np.searchsorted(ends, spokes), M - 1)`",
             ),
             mistakes=[
@@ -1193,6 +1326,16 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda w, rng: _turn(w, 1 + rng.random()),
                     "Off by one: the first spoke lies between 0 and W / M, yours between W / M and 2 W / M.",
+                ),
+                Mistake(
+                    lambda w, rng: np.searchsorted(np.cumsum(w), (rng.random() + np.arange(len(w)) / len(w)) * w.sum()),
+                    "You turn the wheel by up to W. One gap is enough, up to W / M: (rng.random() + np.arange(M)) / M.",
+                ),
+                Mistake(
+                    lambda w, rng: np.minimum(
+                        np.searchsorted(np.cumsum(w), (rng.random() + np.arange(len(w)) / len(w)) * w.sum()), len(w) - 1
+                    ),
+                    "You turn the wheel by up to W. One gap is enough, up to W / M: (rng.random() + np.arange(M)) / M.",
                 ),
                 Mistake(_spin, "These are M independent spins, the roulette. Here one random number turns all spokes."),
                 Mistake(lambda w, rng: _turn(w, 0.0), "The wheel has not been turned: start with one random number."),
@@ -1296,7 +1439,7 @@ CHAPTER = Chapter(
         Exercise(
             "circular_mean",
             reference=circular_mean,
-            draw=headings,
+            draw=(headings, functools.partial(headings, about=0.0)),
             metric=metrics.Angles(1e-9),
             hints=(
                 "The mean of 179 deg and -179 deg should be 180 deg. What could be averaged instead of angles?",
@@ -1314,7 +1457,15 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a, w: float(w @ (a % (2 * math.pi)) / w.sum()),
-                    "You moved the seam to 0, where it bites other headings. Average directions: their cosines and sines.",
+                    "You averaged the numbers, only with their seam elsewhere, between 0 and 2 pi: there it bites other headings. Average directions: their cosines and sines.",
+                ),
+                Mistake(
+                    lambda a, w: float(planar.wrap_angle(w @ np.unwrap(a) / w.sum())),
+                    "Unrolled angles have an arithmetic mean, which is near, but it is not the direction of the mean vector: average cosines and sines.",
+                ),
+                Mistake(
+                    lambda a, w: float(planar.wrap_angle(a[0] + w @ planar.wrap_angle(a - a[0]) / w.sum())),
+                    "Unrolled angles have an arithmetic mean, which is near, but it is not the direction of the mean vector: average cosines and sines.",
                 ),
                 Mistake(
                     lambda a, w: math.degrees(particles.circular_mean(np.radians(a), w)),
@@ -1388,7 +1539,8 @@ CHAPTER = Chapter(
             hints=(
                 "When the recent weights are worse than usual, something is wrong. Two averages, one quick and one slow, tell it.",
                 "Bring both up to date first: w += alpha (w_mean - w). The share is 1 - w_fast / w_slow, never below 0.",
-                "`w_slow += alpha_slow * (w_mean - w_slow); w_fast += alpha_fast * (w_mean - w_fast); "
+                "`w_slow += alpha_slow * (w_mean - w_slow)\n"
+                "w_fast += alpha_fast * (w_mean - w_fast)\n"
                 "return max(0, 1 - w_fast / w_slow), w_slow, w_fast`",
             ),
             mistakes=[
@@ -1447,6 +1599,10 @@ CHAPTER = Chapter(
                 ),
                 *RECOVERIES,
                 Mistake(
+                    lambda m, s, f, a, b: mcl.recover(m, s, f, 0.05, 0.3),
+                    "Your alphas are numbers of your own. They come as arguments: alpha_slow, alpha_fast.",
+                ),
+                Mistake(
                     lambda m, s, f, a, b: mcl.recover(m, s, f, a, b)[:1] + (s, f),
                     "You returned the old averages: the next step needs the new ones.",
                 ),
@@ -1461,9 +1617,11 @@ CHAPTER = Chapter(
             (
                 "What must hold for a resampler on average?",
                 "Count how often each index comes out in many runs, and compare with its weight.",
-                "`w = np.array([0.1, 0.7, 0.1, 0.1]); index = np.concatenate([resample(w, rng) for _ in range(1000)]); "
+                "`w = np.array([0.1, 0.7, 0.1, 0.1])\n"
+                "index = np.concatenate([resample(w, rng) for _ in range(1000)])\n"
                 "return np.abs(np.bincount(index, minlength=4) / len(index) - w).max() < 0.05`",
             ),
+            others=(SQUARED, UNIFORM),
         ),
         _hunt(
             "hunt_2",
@@ -1473,8 +1631,14 @@ CHAPTER = Chapter(
             (
                 "Does your first test catch it? If not: which weights did it not try?",
                 "Use many light particles whose share M w is below 1, next to a heavy one.",
-                "`w = np.array([0.5] + 10 * [0.05]); index = np.concatenate([resample(w, rng) for _ in range(1000)]); "
+                "`w = np.array([0.5] + 10 * [0.05])\n"
+                "index = np.concatenate([resample(w, rng) for _ in range(1000)])\n"
                 "return np.abs(np.bincount(index, minlength=11) / len(index) - w).max() < 0.02`",
+            ),
+            others=(
+                SQUARED,
+                UNIFORM,
+                (_specimen_2_of_many, "has the same defect, but among more than six particles only"),
             ),
         ),
         _hunt(
@@ -1485,9 +1649,12 @@ CHAPTER = Chapter(
             (
                 "On average it is right. What does it take for granted about the weights?",
                 "Floating-point weights need not add up to 1. Try a sum a little below 1, several times.",
-                "Two lines: `try: return all(resample(np.full(1000, 0.000999), rng).max() < 1000 for _ in range(20))` and "
-                "`except IndexError: return False`",
+                "`try:\n"
+                "    return all(resample(np.full(1000, 0.000999), rng).max() < 1000 for _ in range(20))\n"
+                "except IndexError:\n"
+                "    return False`",
             ),
+            others=((_beyond_the_last, "raises nothing, but hands out an index beyond the last particle"),),
         ),
         _hunt(
             "hunt_4",
@@ -1497,8 +1664,16 @@ CHAPTER = Chapter(
             (
                 "Independent readings multiply. What must happen when the same reading comes twice?",
                 "The ratio of two particles' weights must be squared.",
-                "`x, mark = np.array([[0.0, 0, 0], [0.3, 0, 0]]), np.array([[2.0, 0]]); a, b = weigh(x, np.array([2.0]), mark, 0.3); "
-                "c, d = weigh(x, np.array([2.0, 2.0]), np.vstack([mark, mark]), 0.3); return np.isclose(c / d, (a / b) ** 2)`",
+                "`x, mark = np.array([[0.0, 0, 0], [0.3, 0, 0]]), np.array([[2.0, 0]])\n"
+                "a, b = weigh(x, np.array([2.0]), mark, 0.3)\n"
+                "c, d = weigh(x, np.array([2.0, 2.0]), np.vstack([mark, mark]), 0.3)\n"
+                "return np.isclose(c / d, (a / b) ** 2)`",
+            ),
+            others=(
+                (
+                    _mean_of_logarithms,
+                    "takes the geometric mean of the densities, so that a second reading adds nothing",
+                ),
             ),
             good=(_weights_multiplied,),
             extra=(),
