@@ -12,7 +12,8 @@ from ..geometry import frames
 from ..geometry.lie import log_so3
 from .metrics import Exactly, Numbers, Poses, Rotations, Several, Through
 
-CLOSE = 1e4  # tolerances: an answer nearer than this is right in kind, but not accurate enough
+CLOSE = 1e4  # tolerances: an answer nearer than this is right in kind, but not accurate enough ...
+FAR = 1e-2  # ... unless it is off by more than this: a coarse tolerance leaves no room for less accurate answers
 LONGEST = 12  # entries along the last axis that are tried one by one
 FACTORS = {"pi": np.pi, "2 pi": 2 * np.pi, "the root of 2": np.sqrt(2.0), "the root of 3": np.sqrt(3.0)}
 
@@ -297,7 +298,7 @@ def significant_digits(answer, expected):
 
 def not_accurate_enough(deviation):
     """What to say of an answer that is right in kind; None for one that is farther off."""
-    if deviation.words or deviation.amount > CLOSE * deviation.tolerance:
+    if deviation.words or deviation.amount > min(CLOSE * deviation.tolerance, FAR):
         return None
     return (
         f"{deviation}: right in kind, but not accurate enough. Too few iterations, a step of differences too large, or "

@@ -154,6 +154,12 @@ def cloud_and_threshold(rng, slip):
             return w, threshold
 
 
+def near_the_threshold(rng, side):
+    """Weights and a threshold that their effective size misses by 2 %, to this side."""
+    w = rng.uniform(0.2, 1.0, size=rng.integers(20, 40)) * 50 ** rng.uniform(-2, 1)
+    return w, float(particles.effective_size(w) / len(w) * (1 + 0.02 * side))
+
+
 def averages(rng):
     """w_mean, w_slow, w_fast, alpha_slow, alpha_fast: a drop as often as a rise."""
     slow = rng.uniform(0.2, 0.8)
@@ -737,9 +743,10 @@ def _noise_is_right(move, rng):
                 f"4000 particles spread by {amount:.3f} {unit} (standard deviation) in {name} after one step of {dt} s with "
                 f"std_u = {std_u.tolist()}, expected {wanted:.3f} {unit}."
             )
-    beyond = int((np.abs(moved[:, 2]) > 2 * dt * std_u[1]).sum())
-    if not 100 < beyond < 280:  # 182 of a normal distribution, six standard deviations to either side
-        return f"{beyond} of 4000 particles lie beyond two standard deviations, of normal noise about 182 would."
+    kurtosis = float((((moved[:, 2] - moved[:, 2].mean()) / found[2]) ** 4).mean())
+    if abs(kurtosis - 3) > 0.7:  # nine standard deviations of what 4000 normal numbers give
+        tails = "light" if kurtosis < 3 else "heavy"
+        return f"the noise has the right spread, but too {tails} tails: draw normal numbers, rng.standard_normal."
     if abs(np.corrcoef(moved[:, 0], moved[:, 2])[0, 1]) > 0.2:
         return "v and omega of a particle got the same random number: each needs its own."
     if np.abs(moved.mean(0) - (dt, 0, 0)).max() > 0.02:
@@ -1426,7 +1433,10 @@ CHAPTER = Chapter(
         Exercise(
             "should_resample",
             reference=should_resample,
-            draw=tuple(functools.partial(cloud_and_threshold, slip=slip) for slip, _ in RESAMPLING_SLIPS),
+            draw=(
+                *(functools.partial(cloud_and_threshold, slip=slip) for slip, _ in RESAMPLING_SLIPS),
+                *(functools.partial(near_the_threshold, side=side) for side in (1, -1)),
+            ),
             metric=metrics.Exactly(),
             hints=(
                 "Resampling costs diversity. When is it worth its price?",
