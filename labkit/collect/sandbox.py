@@ -17,6 +17,8 @@ from pathlib import Path
 from ..tables import DATA
 
 PACKAGE = Path(__file__).resolve().parents[1]
+WORKER = PACKAGE / "collect" / "worker.py"
+ARITHMETIC = ("OPENBLAS_", "MKL_", "NPY_")  # both sides of the border compute alike, to the last bit
 HIDDEN = ("exercises.py", "__pycache__")  # in every chapter: references, draws and mistakes
 SYSTEM = ("/usr", "/lib", "/lib32", "/lib64", "/bin", "/sbin", "/etc/alternatives", "/etc/ld.so.cache", "/etc/fonts")
 MEMORY, FILES, PROCESSES, CPU = 3 << 30, 8 << 20, 256, 240  # bytes, bytes, number, seconds
@@ -57,7 +59,7 @@ def worker(cpu=CPU):
     """A started worker process, and the folder it may write to; both are gone afterwards, with all it started."""
     path, _ = bubblewrap()
     with tempfile.TemporaryDirectory(prefix="labkit-collect-", ignore_cleanup_errors=True) as folder:
-        words = [sys.executable, "-s", "-P", str(PACKAGE / "collect" / "worker.py"), str(PACKAGE.parent), str(cpu)]
+        words = [sys.executable, "-s", "-P", str(WORKER), str(PACKAGE.parent), str(cpu)]
         process = subprocess.Popen(
             [*(_wrapped(path, folder) if path else ()), *words, *([] if path else [folder])],
             stdin=subprocess.PIPE,
@@ -109,6 +111,7 @@ def hidden():
 
 def _environment(home):
     kept = {name: os.environ[name] for name in ("PATH", "SYSTEMROOT", "LANG", "LC_ALL") if name in os.environ}
+    kept |= {name: value for name, value in os.environ.items() if name.startswith(ARITHMETIC)}
     one = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     places = dict.fromkeys(("HOME", "USERPROFILE", "IPYTHONDIR", "MPLCONFIGDIR", "TMPDIR", "TEMP", "TMP"), home)
     return {
