@@ -78,10 +78,10 @@ def _chapter(name, rows):
         f"<p>{len(rows)} handed in.</p>",
         _take_up(found),
     ]
-    parts += ["<h3>Who solved what</h3>", _map(chapter, rows, name)]
     parts += [_exercise(exercise) for exercise in found]
     asked = [item for item in chapter.items if isinstance(item, Prediction)]
     parts += [_prediction(item, [result["items"][item.id] for result in results]) for item in asked]
+    parts += ["<h3>Who solved what</h3>", _map(chapter, rows, name)]
     return "\n".join(parts)
 
 
@@ -121,13 +121,13 @@ def _exercise(exercise):
     order = ("wrong", "raised", "library", "unfinished", "not reached")
     others = ", ".join(f"{exercise.statuses[s]} {s}" for s in order if exercise.statuses[s])
     time = f"; half of the class took {statistics.median(exercise.minutes):.0f} min or less" if exercise.minutes else ""
-    words = f"{solved} of {total} solved it{': ' + others if others else ''}{time}."
+    words = f"{solved} of {total} solved it{'; the others: ' + others if others else ''}{time}."
     parts = [
         f"<h3><code>{exercise.id}</code> {_bar(solved / max(1, total))} {round(100 * solved / max(1, total))} %</h3>"
     ]
     parts.append(f'<p class="soft">{words}</p>')
     for count, text, ids in exercise.mistakes:
-        shown = f'{marked(text)} <span class="soft">{", ".join(ids)}</span>'
+        shown = f'{marked(text)} <span class="id">{", ".join(ids)}</span>'
         parts.append(f'<div class="row"><span class="count">{count}</span><span>{shown}</span></div>')
     if exercise.alike:
         parts.append("<p>Alike, and no mistake names them:</p>")

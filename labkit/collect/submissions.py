@@ -60,7 +60,7 @@ class Notebook:
 
 
 def students(paths, problems):
-    """The `Student`s found in folders and zip files, by key; what cannot be opened goes to `problems` as (key, why)."""
+    """The `Student`s in folders and zip files, by key; what cannot be opened goes to `problems` as (place, why)."""
     found = {}
     for path in map(Path, paths):
         files = []

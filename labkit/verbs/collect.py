@@ -83,7 +83,7 @@ def _collect(options):
     read, files = _read(students, problems)
     failed = {} if options.merge else batch.judge_all(files.items(), seed, out, options.jobs, _say)
     rows, gripes = _rows(students, read, failed, seed, out, weights, names, options.names == "folders")
-    gripes = [(report.pseudonym(key, seed), "", why) for key, why in problems] + gripes
+    gripes = [("", place, why) for place, why in problems] + gripes
     _write(out, rows, gripes, weights, seed)
     print(
         f"{len(rows)} students, {len(gripes)} problems: {out / 'report.csv'}, {out / 'class.html'}, {out / 'feedback'}"
@@ -187,11 +187,9 @@ def _file_name(row, rows):
 
 
 def _say(done, total, left):
-    """A line that is written over: how far it is, and how long it will take."""
+    """A line that is written over: how far it is, and how long it will take; into a file the end alone."""
+    if done < total and not sys.stderr.isatty():
+        return
     bar = "#" * round(30 * done / total)
-    print(
-        f"\r[{bar:30}] {done} of {total}, {left / 60:.0f} min left ",
-        end="" if done < total else "\n",
-        file=sys.stderr,
-        flush=True,
-    )
+    words = f"\r[{bar:30}] {done} of {total}, {left / 60:.0f} min left "
+    print(words, end="" if done < total else "\n", file=sys.stderr, flush=True)

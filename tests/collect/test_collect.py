@@ -196,6 +196,14 @@ def test_a_prediction_an_unfinished_exercise_and_a_missing_cell_are_told_apart()
     assert result["items"]["flat"] == {"status": "predicted", "choice": "a height twice as large", "right": True}
 
 
+def test_reordered_cells_and_double_ids_cost_only_what_they_break():
+    first, *rest = solved_cells()
+    result = batch.judged(notebook_text([first, *(("x", text) for _, text in reversed(rest))]).encode(), 1)
+    functions = [item.id for item in library.load(CHAPTER).items if hasattr(item, "draw")]
+    assert {result["items"][id]["status"] for id in functions} == {"correct"}
+    assert result["items"]["distance"]["text"].startswith("its cell raised NameError")
+
+
 def test_without_bubblewrap_the_report_says_so(monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda name: None)
     sandbox.bubblewrap.cache_clear()

@@ -1,0 +1,116 @@
+"""What crosses the border arrives as it was; what is nonsense is refused."""
+
+import json
+
+import numpy as np
+import pytest
+
+from labkit.collect import border, library, wire
+from labkit.exercises import guard
+from labkit.localization.maps import OccupancyGrid
+
+
+def across(value):
+    parcel = []
+    return wire.decode(
+        json.loads(json.dumps(wire.encode(value, parcel, []))), parcel, lambda k, name, names: (name, names)
+    )
+
+
+def same(a, b):
+    if isinstance(a, np.ndarray):
+        return isinstance(b, np.ndarray) and a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
+    if isinstance(a, list | tuple):
+        return type(a) is type(b) and len(a) == len(b) and all(map(same, a, b))
+    if isinstance(a, dict):
+        return a.keys() == b.keys() and all(same(a[key], b[key]) for key in a)
+    return type(a) is type(b) and (a == b or (a != a and b != b))
+
+
+PLAIN = [
+    *(None, True, 3, -(2**70), 0.1, float("nan"), float("inf"), -0.0, "ü\ud800", b"\x00\xff", 2 - 3j),
+    *(np.float64(0.1), np.int32(7), np.bool_(True), np.float32(0.1)),
+    *(
+        np.zeros((0, 3)),
+        np.arange(12.0).reshape(3, 4).T,
+        np.array(["a", "bc"]),
+        np.ones((2, 2), bool),
+        np.zeros((), ">i2"),
+    ),
+    *((1, [2.0, (3, "x")]), {"a": [1], 2: np.eye(2)}, {1, 2}, frozenset("ab"), ...),
+]
+
+
+@pytest.mark.parametrize("value", PLAIN, ids=range(len(PLAIN)))
+def test_plain_data_arrive_bit_by_bit(value):
+    assert same(value, across(value))
+
+
+def test_generators_records_types_and_functions_arrive_as_what_they_are():
+    rng = np.random.default_rng(3)
+    rng.normal()
+    assert across(rng).normal(size=3).tolist() == np.random.default_rng(3).normal(size=4).tolist()[1:]
+    grid = across(OccupancyGrid(np.eye(4, dtype=np.uint8), 0.5, (1.0, 2.0)))
+    assert isinstance(grid, OccupancyGrid) and grid.resolution == 0.5 and (grid.cells == np.eye(4)).all()
+    assert across(np.float64) is np.float64
+    assert across(lambda a, b: a) == ("<lambda>", ["a", "b"])
+
+
+def test_what_cannot_cross_keeps_the_name_of_its_type_alone():
+    class Evil:
+        def __reduce__(self):
+            return eval, ("1 / 0",)
+
+    stranger = across(Evil())
+    assert type(stranger).__name__ == "Evil" and isinstance(stranger, wire.Stranger)
+
+
+@pytest.mark.parametrize(
+    "word",
+    [
+        {},
+        {"plain": 1, "list": []},
+        {"array": ["O", [1], 0]},
+        {"array": ["f8", [10**9], 0]},
+        {"record": ["os:system", {}]},
+        {"record": ["labkit.geometry.frames:invert", {}]},
+        {"record": ["labkit.collect.judge:Plan", {}]},
+        {"generator": ["Generator", {"plain": 1}]},
+        {"pickle": "x"},
+        {"set": [{"list": []}]},
+        [],
+    ],
+    ids=range(11),
+)
+def test_nonsense_is_refused(word):
+    with pytest.raises(Exception):  # noqa: B017 (of any kind: the border answers them all alike)
+        wire.decode(word, [b"12345678"])
+
+
+def test_what_is_too_large_or_too_deep_is_refused():
+    deep = []
+    for _ in range(100):
+        deep = [deep]
+    for value in (deep, np.zeros(wire.LARGEST // 8 + 1)):
+        with pytest.raises(wire.BorderError):
+            across(value)
+
+
+def test_errors_are_rebuilt_with_their_name_and_their_kin():
+    error = border.rebuilt([["LinAlgError", "ValueError", "Exception"], "Singular matrix", "line 2: x", None])
+    assert isinstance(error, np.linalg.LinAlgError) and str(error) == "Singular matrix"
+    assert guard._student_line(error, None) == "line 2: x"
+    own = border.rebuilt([["MyError", "KeyError", "LookupError", "Exception"], "'a'", "", None])
+    assert isinstance(own, KeyError) and type(own).__name__ == "MyError" and str(own) == "'a'"
+    missing = border.rebuilt([["NameError", "Exception"], "name 'q' is not defined", "", "q"])
+    assert missing.name == "q"
+    assert isinstance(border.rebuilt([["TimeLimit"], "", "", None]), guard.TimeLimit)
+    assert type(border.rebuilt([["no name!"], "x", "", None])).__name__ == "Exception"
+
+
+def test_the_librarys_answers_are_found_and_its_tools_are_not():
+    assert library.answers("01-frames")["invert"] == ["labkit.geometry.frames._invert", "labkit.geometry.frames.invert"]
+    tracker = library.answers("06-tracker")
+    assert "labkit.calibration.ax_xb.rotation_from_kronecker" in tracker["rotation_from_nullvector"]
+    assert "labkit.geometry.lie.nearest_rotation" not in tracker["rotation_from_nullvector"]
+    assert "labkit.estimation.optimization.cauchy_step" not in library.answers("04-optimization")["dogleg_step"]
