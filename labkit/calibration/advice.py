@@ -102,7 +102,8 @@ def refuse_mixed_roles(model, eye_to_hand):
     better, sentence = max(found)
     if better > CLEARLY:
         other = "no --eye-to-hand" if eye_to_hand else "--eye-to-hand"
-        raise ValueError(f"{sentence.format(other=other)}: so taken, the loop closes {better:.0f} times better")
+        times = f"{better:.0f}" if better < 1000 else "over 1000"
+        raise ValueError(f"{sentence.format(other=other)}: so taken, the loop closes {times} times better")
 
 
 def refuse_open_loop(T, residuals):

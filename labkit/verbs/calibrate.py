@@ -8,12 +8,15 @@ labkit calibrate compare --a A --b B
 """
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ..calibration import calibrate
+from ..estimation.clocks import sample_stream
 from ..fast.ax_xb import calibrate_hand_eye
+from ..files.bags import read_bag
 from ..files.points import read_points
 from ..files.poses import FORMATS, read_pairs, read_poses, refuse_times
 from ..geometry.frames import kuka_from_matrix
@@ -71,6 +74,9 @@ def _parser():
             one.add_argument("--std-trans", type=float, help="noise of a reading, length unit")
         if name == "hand-eye":
             one.add_argument("--std-rot-deg", type=float, help="noise of a reading, deg")
+            one.add_argument("--bag", type=Path, help="a ROS recording in place of the two files")
+            one.add_argument("--robot-topic", help="topic of the flange, or frames BASE:FLANGE of tf")
+            one.add_argument("--sensor-topic", help="topic of the target, or frames SENSOR:TARGET of tf")
         one.set_defaults(robot_name={"pivot": "tool"}.get(name, "flange"))
     return parser
 
@@ -100,7 +106,9 @@ def _same_rows(first, second):
 
 
 def _hand_eye(options):
-    if options.robot and not options.sensor and options.robot.suffix.lower() == ".json":
+    if options.bag:
+        robot, sensor = _from_bag(options)
+    elif options.robot and not options.sensor and options.robot.suffix.lower() == ".json":
         robot, sensor = read_pairs(options.robot, options.length, options.any_size)
     elif not options.robot or not options.sensor:
         raise Refusal("labkit calibrate hand-eye needs --robot and --sensor (or one JSON file of pairs as --robot)")
@@ -124,6 +132,24 @@ def _hand_eye(options):
         solver=calibrate_hand_eye,
     )
     return result, (robot.assumed, sensor.assumed)
+
+
+def _from_bag(options):
+    """Robot and sensor of a recording: the robot where it was when the sensor saw the target, gaps left out."""
+    if not options.robot_topic or not options.sensor_topic:
+        raise Refusal("--bag needs --robot-topic and --sensor-topic (or frames of tf, such as base:tool0)")
+    robot, sensor = read_bag(options.bag, [options.robot_topic, options.sensor_topic])
+    if len(robot) < 2:
+        raise Refusal(f"{robot.name}: {options.robot_topic} holds one pose only")
+    poses, known = sample_stream(robot.time, robot.T, sensor.time)
+    rows = np.flatnonzero(known)
+    if len(rows) > calibrate.FIT_ROWS:  # spread evenly
+        rows = rows[np.linspace(0, len(rows) - 1, calibrate.FIT_ROWS).astype(int)]
+    places = tuple(sensor.places[k] for k in rows)
+    return (
+        replace(robot, T=poses[rows], time=sensor.time[rows], places=places),
+        replace(sensor, T=sensor.T[rows], time=sensor.time[rows], places=places),
+    )
 
 
 def _pivot(options):
