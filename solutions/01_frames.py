@@ -3,7 +3,7 @@
 #
 # **What you will do.** Build coordinate frames from measured points, find how two frames lie to each other, and take a robot pose apart.
 #
-# **What you will learn.** Why the first measured edge is trusted, why the inverse of a pose needs no solver, why a flat triangle makes a bad
+# **What you will learn.** Which measurements a frame trusts, why the inverse of a pose needs no solver, why a flat triangle makes a bad
 # frame, what happens at B = 90°, and what a wrong convention costs in millimeters.
 #
 # **What you need.** Vectors, matrices, a little NumPy. About 90 minutes.
@@ -193,14 +193,8 @@ ex.distance(distance)
 # %% noise [markdown]
 # ## How good is a frame?
 #
-# Repeat the measurement a thousand times and you get a cloud of frames. Put the origin at 0, x_point at $(c, 0, 0)$ and y_point at $(u, h, 0)$. To first order, with
-# $e$ the noise of each point:
-#
-# | turn about | error | governed by |
-# | --- | --- | --- |
-# | x | $\left(e_{y,z} - e_{o,z} - \tfrac{u}{c}(e_{x,z} - e_{o,z})\right)/h$ | the height $h$ |
-# | y | $-(e_{x,z} - e_{o,z})/c$ | the base $c$ |
-# | z | $(e_{x,y} - e_{o,y})/c$ | the base $c$ |
+# Repeat the measurement a thousand times and you get a cloud of frames. Put the origin at 0, x_point at $(\ell, 0, 0)$ and y_point at $(u, h, 0)$:
+# the triangle is $\ell$ long and $h$ high, and y_point stands above the place $u$ of its base. Which of these lengths is worth how much?
 
 # %% predict-flat
 guess = ...  # your code here
@@ -208,6 +202,18 @@ guess = ...  # your code here
 guess = "a height twice as large"
 ### END SOLUTION
 ex.predict("flat", guess, reveal=stages.triangle_noise)
+
+# %% noise-law [markdown]
+# To first order, with $e_{o}$, $e_{x}$, $e_{y}$ the noise of origin, x_point and y_point, and its coordinate as the second index:
+#
+# | turn about | error |
+# | --- | --- |
+# | x | $\left(e_{y,z} - e_{o,z} - \tfrac{u}{\ell}(e_{x,z} - e_{o,z})\right)/h$ |
+# | y | $-(e_{x,z} - e_{o,z})/\ell$ |
+# | z | $(e_{x,y} - e_{o,y})/\ell$ |
+#
+# Only the ratio $u/\ell$ enters the turn about x. With y_point above the middle it is ½ for every base. With y_point left at $u = 50$ mm a base of 200 mm in place of 100 mm makes
+# the turn about x a little worse (0.365° in place of 0.351° at noise of 0.05 mm and $h = 10$ mm), with $u = 100$ mm it makes it better (0.351° in place of 0.405°).
 
 # %% kuka [markdown]
 # ## Poses as a robot displays them
@@ -238,7 +244,7 @@ def matrix_from_kuka(xyzabc):
 # %% gimbal [markdown]
 # ## The pole
 #
-# Three rings carry the flange. At B = ±90° the outer and the inner ring lie in one plane and turn about the same line: one degree of freedom is lost
+# Three rings carry the flange, the plate on which a robot holds its tool. At B = ±90° the outer and the inner ring lie in one plane and turn about the same line: one degree of freedom is lost
 # (*gimbal lock*). The figure also shows singular values: how strongly the pose answers to the best and the worst combination of changes of A, B, C. A zero among them means that one
 # combination, the "weakest change", moves nothing. Decide first, then move the sliders, or press *Make it fail* to go to the pole.
 
@@ -304,10 +310,10 @@ for y_point in (np.array([50.0, 1e-4, 0]), o, np.array([50.0, np.nan, 0]), np.ar
         print(refusal)
 
 # %% beyond [markdown]
-# ## Beyond the document: trust all points alike
+# ## Beyond the document: trust all points alike (*further*)
 #
 # If the drawing of the part says where the three points *should* be, the best frame minimizes the sum of squared distances. The SVD solves it in one step (Kabsch,
-# `frames.fit_frame`). Noise limits every method: how far an unbiased one can get depends only on how widely the points lie around each axis, that is, on their moments of inertia.
+# `frames.fit_frame`). Noise limits every method: how far an unbiased one can get depends only on how widely the points lie around each axis, that is, on the sum of their squared distances from it.
 # The black bars in the figure show this bound. Gram-Schmidt does not use the drawing. How much does it lose?
 
 # %% predict-svd
@@ -329,7 +335,7 @@ ex.predict("svd", guess, reveal=stages.svd_against_gram_schmidt)
 # ## Three questions, to answer in words
 #
 # 1. Two students measure the same part. One exchanges the roles of x_point and y_point and renames the axes afterwards. Why do their frames still differ?
-# 2. Why does a longer base not improve the turn about x, although it makes the triangle larger?
+# 2. Why does a longer base not improve the turn about x while y_point stands above its middle? Where would y_point have to stand for it to help?
 # 3. A program logs A, B, C once a second while the flange turns evenly through the pole. What does the plot of A look like, and what really happens?
 
 # %% progress

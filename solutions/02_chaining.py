@@ -20,6 +20,7 @@
 
 # %% setup
 import numpy as np
+import scipy.linalg
 
 from labkit.chapters.ch02_chaining import stages
 from labkit.documents.lab_sheet import printed as lab_sheet
@@ -37,6 +38,7 @@ np.set_printoptions(precision=6, suppress=True)
 # A measuring arm reaches only so far, and the work piece is larger. So the arm is moved: from stand 1 it measures the frames $K_0$ and $K_1$, from stand 2 $K_1$ and
 # $K_2$, and so on, until stand 4 measures $K_3$ and again $K_0$. **Where does the chain end, and what does the gap tell?** This is section 2 of the lab sheet
 # (*Verkettung von Transformationen*). The eight frames that its program read were never published; listing 7 prints four transforms, each from one pair of frames, and their product. (The sheet's prose counts the stands a little differently; four pairs mean four stands.)
+# The cell below says of each link by what angle it turns and how far it goes; `closure_error`, which reads both from a matrix, you will write yourself further down.
 # To have something to measure, `data/chaining` holds eight synthetic frames (labeled so) that round to the printed digits.
 
 # %% the-links
@@ -63,14 +65,15 @@ ex.predict("order", guess, reveal=stages.order_of_product)
 # %% sum-or-product [markdown]
 # ## A sum sign
 #
-# Above its listing the sheet writes $K_0 \cdot \sum_{i=1}^{n} {}^{i}T_{i+1} = K_0 \cdot E$. The result it prints is this:
+# Above its listing the sheet writes $K_0 \cdot \sum_{i=1}^{n} {}^{i}T_{i+1} = K_0 \cdot E$. The result it prints begins with these three rows:
 #
 # | | | | |
 # | ---: | ---: | ---: | ---: |
 # | 0.999905 | −0.012206 | 0.006358 | −1.205218 |
 # | 0.012191 | 0.999923 | 0.002337 | 1.215314 |
 # | −0.006386 | −0.002259 | 0.999977 | −0.128655 |
-# | 0.000000 | 0.000000 | 0.000000 | 1.000000 |
+#
+# Decide from what you know of rotations.
 
 # %% predict-operator
 guess = ...  # your code here
@@ -150,7 +153,7 @@ ex.closure_distance(closure_distance)
 # $|T p - p|$, and what the angle adds to this grows with the distance from the axis of the closure motion.
 
 # %% at-the-work-piece
-for x in (0, 100, 300, 1000):
+for x in (100, 300, 1000):
     points = x * np.vstack([np.eye(3), -np.eye(3)])
     d = chaining.displacement(product, points)
     print(f"{x:5} mm from the origin of K0: {d.min():5.2f} to {d.max():5.2f} mm, along the axes")
@@ -194,7 +197,7 @@ angle, distance = chaining.closure_error(product)
 std_rot = angle / np.sqrt(3 * len(printed))
 expected = chaining.expected_closure(printed, std_rot, 0.0)[1]
 print(f"noise of a link: {np.rad2deg(std_rot):.2f} deg a component, {100 * std_rot:.2f} mm on a triangle of 100 mm")
-print(f"closure distance it predicts: {expected:.1f} mm; found: {distance:.1f} mm")
+print(f"closure distance it predicts: {expected:.1f} mm; found: {distance / expected:.1f} times that")
 
 # %% drift [markdown]
 # ## Right angles wear off
@@ -221,16 +224,22 @@ for rounds in range(1, 1001):
     repaired = orthonormalize(repaired @ product)
     if rounds in (1, 10, 100, 1000):
         defect, kept = chaining.orthonormality_error(worn), chaining.orthonormality_error(repaired)
-        print(f"{rounds:5} rounds: R'R differs from I by {defect:.1e}; repaired, below 1e-12: {kept < 1e-12}")
+        print(f"{rounds:5} rounds: RᵀR differs from I by {defect:.1e}; repaired, below 1e-12: {kept < 1e-12}")
 
 # %% sharing [markdown]
 # ## Sharing out the error
 #
-# `log_se3` takes a motion apart into its twist, `exp_se3` puts it together again, and half a twist is half the motion:
+# Every rigid motion is a screw: a turn about some axis, with a slide along it. Its twist $\xi = (\varphi, \rho)$ tells what to do per unit of time so that the
+# motion is complete at time 1: $\exp(\xi)$ is the exponential of the 4×4 matrix with $[\varphi]_\times$ as its block, $\rho$ as its column and zeros below. `exp_se3` computes it, `log_se3` goes
+# the way back, and half a twist is half the motion:
 
 # %% half-a-motion
 half = exp_se3(0.5 * log_se3(measured[0]))
 print("half a link, twice, is the link:", np.allclose(half @ half, measured[0]))
+twist = np.zeros((4, 4))
+(a, b, c), twist[:3, 3] = log_se3(measured[0])[:3], log_se3(measured[0])[3:]
+twist[:3, :3] = [[0, -c, b], [c, 0, -a], [-b, a, 0]]
+print("a matrix exponential:", np.allclose(scipy.linalg.expm(twist), measured[0]))
 print("half the shift is not half the way:", half[:3, 3].round(1), "against", (0.5 * measured[0][:3, 3]).round(1), "mm")
 
 # %% sharing-derivation [markdown]
@@ -257,7 +266,7 @@ def distribute_closure(transforms):
 links = np.array([orthonormalize(T) for T in printed])
 corrected = distribute_closure(links)
 gaps = [chaining.closure_error(chain(loop))[1] for loop in (links, corrected)]
-print(f"closure before: {gaps[0]:.3f} mm, after: below 1e-9 mm: {gaps[1] < 1e-9}")
+print(f"closed: {gaps[1] < 1e-9}, by a factor of more than a million: {gaps[0] > 1e6 * gaps[1]}")
 for k, (before, after) in enumerate(zip(links, corrected)):
     angle, distance = chaining.closure_error(relative(before, after))
     print(f"link {k + 1}: turned by {np.rad2deg(angle):.4f} deg, its end moved by {distance:.3f} mm")
@@ -281,7 +290,7 @@ except ValueError as refusal:
     print(refusal)
 
 # %% beyond [markdown]
-# ## Beyond the document: a pose graph
+# ## Beyond the document: a pose graph (*further*)
 #
 # Better than equal shares: let the frames be unknowns, and let every measured link pull at its two frames with the strength of its precision. The sum of the weighted squares of
 # $\log(Z_{ij}^{-1} X_i^{-1} X_j)$ over all links is least at the most likely poses (`scipy.optimize.least_squares` finds them). On one loop it closes as exactly as you just did, but
@@ -318,7 +327,7 @@ ex.predict("two_loops", guess, reveal=stages.two_loops)
 # ## Three questions, to answer in words
 #
 # 1. All four links are too long by one percent, and the loop still closes. How is that possible, and what measurement would show it?
-# 2. Why does an error in the last link turn the loop's end, but hardly move it?
+# 2. Why does a turning error of the last link turn the loop's end, but not move it? And what does an error of that link's translation do?
 # 3. The closure angle is the same whether you start the loop at $K_0$ or at $K_2$; the closure distance is not. Why?
 
 # %% progress

@@ -141,14 +141,14 @@ ex.s0(s0)
 # %% three-numbers
 squares, n = (residuals**2).sum(), len(poses)
 std = np.sqrt(squares / (3 * n - 6))
-print(f"{np.sqrt(squares / n):.3f} mm  s0, rms distance in space (divided by {n} poses)")
+print(f"s0, rms distance in space (divided by {n} poses): as you found it above")
 print(f"{np.sqrt(squares / (3 * n)):.3f} mm  rms of a coordinate (divided by {3 * n} equations)")
 print(f"{std:.3f} mm  std of a coordinate, unbiased (divided by {3 * n - 6})")
 print(f"{np.rad2deg(std / np.linalg.norm(x[:3])):.2f} deg turn of the flange that moves the tip as far")
 
 # %% ten-others
 # the sheet prints s0 of all twelve poses, and the residuals of two
-s0_printed = 0.443922
+s0_printed = lab_sheet.S0_LISTING_10
 sum_of_all, sum_of_two = n * s0_printed**2, (listings**2).sum()
 print(f"{np.sqrt(sum_of_two / 2):.3f} mm  rms distance in the two poses printed")
 print(f"{np.sqrt((sum_of_all - sum_of_two) / (n - 2)):.3f} mm  in the ten others")
@@ -205,6 +205,10 @@ guess = ...  # your code here
 guess = "6 poses within 20 deg"
 ### END SOLUTION
 ex.predict("cone", guess, reveal=stages.pose_designer)
+
+# %% cone-text [markdown]
+# The same in numbers. `pivot.cone(n, angle)` gives $n$ orientations of a tool led once around a cone, tilted by that angle; `pivot.touching_poses` moves the flange
+# to where the tip then touches the point. The flange, the plate that carries the tool, is a *lever* of 100 mm away from the tip.
 
 # %% cone-angle
 tip = np.array([0.0, 0.0, -100.0])

@@ -9,12 +9,13 @@ import scipy.optimize
 from numpy.linalg import lstsq
 
 from labkit.calibration import pivot
+from labkit.chapters.ch01_frames import exercises as ch01_exercises
 from labkit.chapters.ch02_chaining import exercises
 from labkit.chapters.ch03_quirlen import exercises as ch03_exercises
 from labkit.documents.lab_sheet import printed as lab_sheet
 from labkit.exercises import source
 from labkit.exercises.engine import CORRECT, NOT_YET, Exercise, Value
-from labkit.geometry import chaining
+from labkit.geometry import chaining, frames
 from labkit.geometry.frames import relative
 from labkit.geometry.lie import exp_se3, log_se3
 
@@ -162,3 +163,84 @@ def test_an_arccosine_of_more_than_1_names_its_argument(cosine):
     with np.errstate(invalid="ignore"):
         outcome = judged("closure_error", lambda T: (np.arccos(cosine(T)), np.linalg.norm(T[:3, 3])))
     assert "(trace - 1) / 2" in outcome.text
+
+
+library_angles = frames.kuka_from_matrix  # by this name a checked function may call it
+FRAMES = {item.id: item for item in ch01_exercises.CHAPTER.items}
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_b_keeps_between_the_poles(seed):
+    """The same pose with A half a turn on has B beyond 90 deg; whole turns of A and C change nothing."""
+
+    def half_a_turn_on(T):
+        xyz, (a, b, c) = T[:3, 3], library_angles(T)[3:]
+        return np.array([*xyz, a + np.pi, np.pi - b, c + np.pi])
+
+    def whole_turns_on(T):
+        return library_angles(T) + 2 * np.pi * np.array([0, 0, 0, 1, 0, -1])
+
+    rng = np.random.default_rng(seed)
+    outcome = FRAMES["kuka_from_matrix"].judge(half_a_turn_on, rng=rng)
+    assert outcome.status == NOT_YET and "B leaves the range" in outcome.text
+    assert FRAMES["kuka_from_matrix"].judge(whole_turns_on, rng=rng).status == CORRECT
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_an_arcsine_fails_at_the_pole_in_every_check(seed):
+    def by_arcsine(cut):
+        def angles(T):
+            xyzabc = library_angles(T)
+            xyzabc[4] = np.arcsin(cut(-T[2, 0]))
+            return xyzabc
+
+        return angles
+
+    def judge(cut):
+        return FRAMES["kuka_from_matrix"].judge(by_arcsine(cut), rng=np.random.default_rng(seed))
+
+    with np.errstate(invalid="ignore"):
+        assert "np.clip" in judge(lambda sine: sine).text
+    assert judge(lambda sine: np.clip(sine, -1, 1)).status == CORRECT
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_an_angle_of_more_than_90_deg_and_no_angle_at_all(seed):
+    def distance(T):
+        return np.linalg.norm(T[:3, 3])
+
+    def cosine(T):
+        return (np.trace(T[:3, :3]) - 1) / 2
+
+    def by_arcsine(T):
+        R = T[:3, :3]
+        return np.arcsin(min(np.linalg.norm(R - R.T) / np.sqrt(8), 1)), distance(T)
+
+    assert "60 deg from 120 deg" in judged("closure_error", by_arcsine, seed).text
+    with np.errstate(invalid="ignore"):
+        assert "np.clip" in judged("closure_error", lambda T: (np.arccos(cosine(T)), distance(T)), seed).text
+    cut = judged("closure_error", lambda T: (np.arccos(np.clip(cosine(T), -1, 1)), distance(T)), seed)
+    assert cut.status == CORRECT
+
+
+def test_what_a_longer_base_does_to_the_turn_about_x():
+    """The sentences of chapter 1: only the ratio of u to the base counts, by the first-order law and by Monte Carlo."""
+    rng, law, found = np.random.default_rng(0), {}, {}
+    for base, u in ((100, 50), (200, 50), (100, 100), (200, 100)):
+        law[base, u] = np.rad2deg(np.sqrt(frames.gram_schmidt_covariance(base, u, 10, 0.05)[0, 0]))
+        noise = 0.05 * rng.normal(size=(3, 40_000, 3))
+        T = frames.frame_from_points(*(np.array([[0, 0, 0], [base, 0, 0], [u, 10, 0]])[:, None] + noise))
+        found[base, u] = np.rad2deg(T[:, 2, 1].std())
+    rounded = {key: round(float(value), 3) for key, value in law.items()}
+    assert rounded == {(100, 50): 0.351, (200, 50): 0.365, (100, 100): 0.405, (200, 100): 0.351}
+    assert all(abs(found[key] / law[key] - 1) < 0.03 for key in law)  # eight standard deviations of a sample of 40 000
+
+
+def test_zeros_are_not_taken_for_the_last_row_alone():
+    assert "nothing was filled in" in judged("pivot_rhs", lambda T: np.zeros(3 * len(T))).text
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_small_singular_values_count(seed):
+    outcome = judged("solve_pivot", lambda A, b: np.linalg.pinv(A, rcond=0.1) @ b, seed)
+    assert outcome.status == NOT_YET and "drop singular values" in outcome.text

@@ -1,6 +1,7 @@
 """Chapter 1: frames from three points, rigid transforms, KUKA angles."""
 
 import functools
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -45,9 +46,39 @@ def either_angle(draw):
     return tuple(functools.partial(draw, between=between) for between in (ACUTE, OBTUSE))
 
 
-def kuka_pose(rng):
+def scaled_direction(rng, scale):
+    """A vector of random direction, tiny or long."""
+    return (scale * random_direction(rng),)
+
+
+def kuka_pose(rng, A_deg=(-170, 170)):
     """A KUKA pose well away from the gimbal lock."""
-    return (np.concatenate([rng.uniform(-800, 800, 3), np.deg2rad(rng.uniform((-170, -80, -170), (170, 80, 170)))]),)
+    low, high = (A_deg[0], -80, -170), (A_deg[1], 80, 170)
+    return (np.concatenate([rng.uniform(-800, 800, 3), np.deg2rad(rng.uniform(low, high))]),)
+
+
+A_RANGES = ((-80, 80), (100, 170), (-170, -100))  # deg: both signs of r00, and of r10
+POINT = "a point has three coordinates"
+POSE = "one pose is one 4x4 matrix"
+
+
+@dataclass(frozen=True)
+class _KukaAngles(metrics.Through):
+    """Angles of the right pose, and B on the promised side of the poles."""
+
+    def deviations(self, result, expected):
+        beyond = np.rad2deg([_beyond_the_poles(result[4]), _beyond_the_poles(expected[4])])
+        words = f"{np.rad2deg(float(result[4])):.1f} deg is not between -90 and 90 deg; the pose has other angles too, with such a B"
+        outside = metrics.Deviation("B", float(abs(beyond[0] - beyond[1])), "deg", 1e-3, words)
+        return [*super().deviations(result, expected), outside]
+
+
+def _beyond_the_poles(B):
+    return max(0.0, abs(float(B)) - np.pi / 2)
+
+
+def _read_by_kuka(deg):
+    return _KukaAngles(frames.matrix_from_kuka, metrics.Poses(deg, 1e-6))
 
 
 # Wrong variants of Gram-Schmidt, of frames and of transforms -----------------------------------------------------------------
@@ -86,6 +117,23 @@ def _added(a, b):
 
 def _not_rejected(a, b):
     x, y = a / np.linalg.norm(a), b / np.linalg.norm(b)
+    return _columns(x, y, np.cross(x, y))
+
+
+def _long_z(a, b):
+    R = frames.gram_schmidt(a, b)
+    return _columns(R[:, 0], R[:, 1], np.cross(a, b))
+
+
+def _normalized_too_early(a, b):
+    x, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
+    y = b - (b @ x) * x
+    return _columns(x, y, np.cross(x, y))
+
+
+def _projected_on_all_of_a(a, b):
+    x, y = a / np.linalg.norm(a), b - (b @ a) * a
+    y /= np.linalg.norm(y)
     return _columns(x, y, np.cross(x, y))
 
 
@@ -141,13 +189,12 @@ def _with(T, R=None, t=None):
 
 
 def _kuka(order, angles=(3, 4, 5)):
-    """Rotation by the elementary turns in another order, e.g. "xyz" for Rx Ry Rz, fed with the entries `angles` of the pose."""
+    """Turns about other axes, or in another order: `order[k]` by the entry `angles[k]` of the pose."""
 
     def variant(xyzabc):
-        turns = {"z": xyzabc[angles[0]], "y": xyzabc[angles[1]], "x": xyzabc[angles[2]]}
         R = np.eye(3)
-        for axis in order:
-            R = R @ _turn(axis, turns[axis])
+        for axis, k in zip(order, angles):
+            R = R @ _turn(axis, xyzabc[k])
         return frames.pose(R, xyzabc[:3])
 
     return variant
@@ -192,6 +239,34 @@ def _angles_by_quotients(T):
     return np.array([*T[:3, 3], a, np.arcsin(-T[2, 0]), c])
 
 
+def _arcsine_of_too_much(T):
+    """A and C as they should be, B by an arcsine that rounding can break."""
+    xyzabc = frames.kuka_from_matrix(T)
+    return np.array([*xyzabc[:4], np.arcsin(-T[2, 0]), xyzabc[5]])
+
+
+def _undone(a_of, b_of=None, turn=lambda a: _turn("z", a).T):
+    """The route of the notebook, with another A, another B, or A undone by something else."""
+
+    def variant(T):
+        R = T[:3, :3]
+        with np.errstate(all="ignore"):
+            a = a_of(R)
+        b = b_of(R, a) if b_of else np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))
+        rest = turn(a) @ R
+        return np.array([*T[:3, 3], a, b, np.arctan2(-rest[1, 2], rest[1, 1])])
+
+    return variant
+
+
+def _right_A(R):
+    return np.arctan2(R[1, 0], R[0, 0])
+
+
+def _B_along(R, a):
+    return np.arctan2(-R[2, 0], np.cos(a) * R[0, 0] + np.sin(a) * R[1, 0])
+
+
 def _angles_one_by_one(T):
     b = np.arctan2(-T[2, 0], np.hypot(T[0, 0], T[1, 0]))
     return np.array([*T[:3, 3], np.arctan2(T[1, 0], T[0, 0]), b, np.arctan2(T[2, 1], T[2, 2])])
@@ -204,7 +279,9 @@ def at_the_pole(sign):
         xyzabc = kuka_pose(rng)[0]
         xyzabc[4] = sign * np.pi / 2
         turn = random_pose(rng)
-        return (frames.invert(turn) @ (turn @ frames.matrix_from_kuka(xyzabc)),)
+        T = frames.invert(turn) @ (turn @ frames.matrix_from_kuka(xyzabc))
+        T[2, 0] = -sign * (1 + 2**-52)  # the least number above 1, as rounding may leave it
+        return (T,)
 
     return draw
 
@@ -229,7 +306,8 @@ CHAPTER = Chapter(
         Exercise(
             "normalize",
             reference=frames.unit_vector,
-            draw=lambda rng: (random_direction(rng),),
+            draw=tuple(functools.partial(scaled_direction, scale=s) for s in (1.0, 1e-4, 1e3)),
+            fixed={"v": POINT},
             metric=metrics.Numbers(1e-9),
             hints=(
                 "A direction keeps its direction when it is divided by a positive number.",
@@ -240,6 +318,11 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda v: v / ((v @ v) / 2),
                     "`**1/2` is read as (...**1)/2, so no root is taken. Write `**0.5` or np.sqrt.",
+                ),
+                Mistake(
+                    lambda v: v / (v @ v) / 2,
+                    "`**1/2` is read as (...**1)/2, so no root is taken. Write `**0.5` or np.sqrt.",
+                    id="normalize-half-inline",
                 ),
                 Mistake(lambda v: v / (v @ v), "You divide by the squared length. The root is missing."),
                 Mistake(
@@ -287,11 +370,12 @@ CHAPTER = Chapter(
             "gram_schmidt",
             reference=frames.gram_schmidt,
             draw=either_angle(two_directions),
+            fixed={"a": POINT, "b": POINT},
             metric=metrics.Rotations(1e-7),
             hints=(
                 "x takes the direction of a. y may only use what b has across x.",
                 "Remove from b its part along x: b - (b . x) x, with x of length 1. Then normalize. z follows from the right-hand rule.",
-                "`x = normalize(a); y = normalize(b - (b @ x) * x); z = np.cross(x, y); return np.column_stack([x, y, z])`",
+                "`x = normalize(a)\ny = normalize(b - (b @ x) * x)\nz = np.cross(x, y)\nreturn np.column_stack([x, y, z])`",
             ),
             mistakes=[
                 Mistake(
@@ -309,6 +393,21 @@ CHAPTER = Chapter(
                 Mistake(
                     _projected_without_square,
                     "The part along a is (b . a)/(a . a) a. You divide by the length of a once, it takes the square (or a normalized a).",
+                ),
+                Mistake(
+                    _long_z,
+                    "x and y are right, but your z is a cross b, whose length is the area between the edges: take x cross y, or normalize.",
+                    id="gram-schmidt-long-z",
+                ),
+                Mistake(
+                    _normalized_too_early,
+                    "You normalized b before its part along x was removed; what is left of it, y, has to be normalized afterwards (and z inherits its length).",
+                    id="gram-schmidt-early",
+                ),
+                Mistake(
+                    _projected_on_all_of_a,
+                    "You removed (b . a) a, with an a that is not of length 1: take x, or divide by a . a.",
+                    id="gram-schmidt-whole-a",
                 ),
                 Mistake(
                     _second_edge_first,
@@ -344,11 +443,12 @@ CHAPTER = Chapter(
             "frame_from_points",
             reference=frames.frame_from_points,
             draw=either_angle(three_points),
+            fixed={"origin": POINT, "x_point": POINT, "y_point": POINT},
             metric=metrics.Poses(1e-6, 1e-6),
             hints=(
                 "A pose is a rotation (which way the axes point) and a translation (where the origin is).",
                 "The two directions are x_point - origin and y_point - origin; gram_schmidt makes axes of them.",
-                "`T = np.eye(4); T[:3, :3] = gram_schmidt(x_point - origin, y_point - origin); T[:3, 3] = origin; return T`",
+                "`T = np.eye(4)\nT[:3, :3] = gram_schmidt(x_point - origin, y_point - origin)\nT[:3, 3] = origin\nreturn T`",
             ),
             mistakes=[
                 Mistake(
@@ -396,11 +496,12 @@ CHAPTER = Chapter(
             "invert",
             reference=frames.invert,
             draw=lambda rng: (random_pose(rng),),
+            fixed={"T": POSE},
             metric=metrics.Poses(1e-6, 1e-6),
             hints=(
                 "Solve p_W = R p_F + t for p_F.",
-                "p_F = R' (p_W - t) = R' p_W - R' t: the rotation is R', the translation is -R' t.",
-                "`R, t = T[:3, :3], T[:3, 3]; X = np.eye(4); X[:3, :3] = R.T; X[:3, 3] = -R.T @ t; return X`",
+                "p_F = Rᵀ (p_W - t) = Rᵀ p_W - Rᵀ t: the rotation is Rᵀ, the translation is -Rᵀ t.",
+                "`R, t = T[:3, :3], T[:3, 3]\nX = np.eye(4)\nX[:3, :3] = R.T\nX[:3, 3] = -R.T @ t\nreturn X`",
             ),
             mistakes=[
                 Mistake(
@@ -409,27 +510,27 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda T: _with(T, R=T[:3, :3].T),
-                    "You transposed the rotation but left the translation as it was. It becomes -R' t.",
+                    "You transposed the rotation but left the translation as it was. It becomes -Rᵀ t.",
                 ),
                 Mistake(
                     lambda T: _with(T, R=T[:3, :3].T, t=-T[:3, 3]),
-                    "You negated the translation but did not rotate it: seen from the frame, W lies at -R' t, not at -t.",
+                    "You negated the translation but did not rotate it: seen from the frame, W lies at -Rᵀ t, not at -t.",
                 ),
                 Mistake(
                     lambda T: _with(T, R=T[:3, :3].T, t=T[:3, :3].T @ T[:3, 3]),
-                    "You rotated the translation but kept its sign: it is -R' t.",
+                    "You rotated the translation but kept its sign: it is -Rᵀ t.",
                 ),
                 Mistake(
                     lambda T: _with(T, R=T[:3, :3].T, t=-T[:3, :3] @ T[:3, 3]),
-                    "You rotated the translation by R. On the way back everything turns by R'.",
+                    "You rotated the translation by R. On the way back everything turns by Rᵀ.",
                 ),
                 Mistake(
                     lambda T: _with(T, t=-T[:3, 3]),
-                    "You negated the translation, but the rotation has to be undone as well: use R'.",
+                    "You negated the translation, but the rotation has to be undone as well: use Rᵀ.",
                 ),
                 Mistake(
                     lambda T: _with(T, R=T[:3, :3].T, t=np.zeros(3)),
-                    "The rotation is undone, the translation is missing: it is -R' t.",
+                    "The rotation is undone, the translation is missing: it is -Rᵀ t.",
                 ),
                 Mistake(lambda T: T, "This is T itself. The inverse maps the other way."),
             ],
@@ -438,6 +539,7 @@ CHAPTER = Chapter(
             "relative",
             reference=frames.relative,
             draw=lambda rng: (random_pose(rng), random_pose(rng)),
+            fixed={"T_WA": POSE, "T_WB": POSE},
             metric=metrics.Poses(1e-6, 1e-6),
             hints=(
                 "Neighboring letters cancel: which two transforms give T_AB when W stands between them?",
@@ -475,7 +577,7 @@ CHAPTER = Chapter(
                 Mistake(lambda A, B: A.T @ B, "The transpose of a 4x4 pose is not its inverse: use your `invert`."),
                 Mistake(
                     lambda A, B: frames.pose(A[:3, :3].T @ B[:3, :3], B[:3, 3] - A[:3, 3]),
-                    "The rotation is right. The vector from A to B is still written in W: turn it into A with R_WA'.",
+                    "The rotation is right. The vector from A to B is still written in W: turn it into A with R_WAᵀ.",
                 ),
             ],
         ),
@@ -496,7 +598,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: np.rad2deg(np.arccos(np.clip(np.trace(_K0_T_K1()) / 2 - 0.5, -1, 1))),
-                    "You took the trace of the 4x4 matrix; the 1 in its corner is no part of the rotation.",
+                    "You took the trace of the 4x4 matrix, whose corner is no part of the rotation, or forgot the - 1: the cosine is "
+                    "(trace(R) - 1) / 2, of the 3x3 block.",
                 ),
                 Mistake(
                     lambda: np.rad2deg(np.arccos(np.trace(_K0_T_K1()[:3, :3]) - 1)),
@@ -523,6 +626,16 @@ CHAPTER = Chapter(
                     lambda: np.linalg.norm(_K0_T_K1()[:, 3]),
                     "Your column still holds the 1 of the last row: take its first three entries.",
                 ),
+                Mistake(
+                    lambda: _K0_T_K1()[:3, 3].sum(),
+                    "You added the components, and they cancel. The distance is the root of the sum of squares.",
+                    id="distance-sum-signed",
+                ),
+                Mistake(
+                    lambda: abs(_K0_T_K1()[0, 3]),
+                    "This is the x component alone. The distance is the root of the sum of all three squares.",
+                    id="distance-x",
+                ),
                 Mistake(lambda: _distance() ** 2, "This is the squared distance."),
                 Mistake(
                     lambda: np.abs(_K0_T_K1()[:3, 3]).sum(),
@@ -533,22 +646,25 @@ CHAPTER = Chapter(
         ),
         Prediction(
             "flat",
-            question="The triangle is 100 mm long and 10 mm high; the noise is 0.05 mm. What helps the rotation about x most?",
+            question="The triangle is 100 mm long and 10 mm high, y_point above the middle of the base; the noise is 0.05 mm. What helps the rotation about x most?",
             choices=("a base twice as long", "a height twice as large", "both help alike"),
             answer="a height twice as large",
-            why="About x, the frame turns by noise over height. A longer base only helps the two other angles.",
+            why="About x, the frame turns by noise over height. A base twice as long, y_point above its middle as before, leaves that as it is: "
+            "it helps the two other angles.",
         ),
         Exercise(
             "matrix_from_kuka",
             reference=frames.matrix_from_kuka,
             draw=kuka_pose,
+            fixed={"xyzabc": "a pose has six numbers"},
             metric=metrics.Poses(1e-6, 1e-6),
             hints=(
                 "Three elementary turns, multiplied in the order the controller names them, and a translation.",
-                "R = Rz(A) Ry(B) Rx(C). The angles arrive in radians, in the order A, B, C.",
-                "`(cA, cB, cC), (sA, sB, sC) = np.cos(xyzabc[3:]), np.sin(xyzabc[3:])`, `Rz = np.array([[cA, -sA, 0], [sA, cA, 0], [0, 0, 1]])`, "
-                "`Ry = np.array([[cB, 0, sB], [0, 1, 0], [-sB, 0, cB]])`, `Rx = np.array([[1, 0, 0], [0, cC, -sC], [0, sC, cC]])`, "
-                "`T = np.eye(4); T[:3, :3] = Rz @ Ry @ Rx; T[:3, 3] = xyzabc[:3]; return T`",
+                "R = Rz(A) Ry(B) Rx(C). Write each turn as a 3x3 array, with the cosines and sines of A, B, C (radians, in this order), multiply "
+                "them with @, and fill the 4x4 identity with R and x, y, z.",
+                "`(cA, cB, cC), (sA, sB, sC) = np.cos(xyzabc[3:]), np.sin(xyzabc[3:])\nRz = np.array([[cA, -sA, 0], [sA, cA, 0], [0, 0, 1]])\n"
+                "Ry = np.array([[cB, 0, sB], [0, 1, 0], [-sB, 0, cB]])\nRx = np.array([[1, 0, 0], [0, cC, -sC], [0, sC, cC]])\n"
+                "T = np.eye(4)\nT[:3, :3] = Rz @ Ry @ Rx\nT[:3, 3] = xyzabc[:3]\nreturn T`",
             ),
             mistakes=[
                 Mistake(
@@ -557,7 +673,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(_kuka_entry_by_entry, "You multiplied entry by entry. Matrices multiply with @."),
                 Mistake(
-                    _kuka("xyz"),
+                    _kuka("xyz", (5, 4, 3)),
                     "You multiplied Rx(C) Ry(B) Rz(A). KUKA turns about z first, then about the new y and the new x: Rz(A) Ry(B) Rx(C).",
                 ),
                 Mistake(
@@ -565,7 +681,7 @@ CHAPTER = Chapter(
                     'A and C have changed places: A belongs to z, B to y, C to x. (SciPy means that by from_euler("ZYX", [A, B, C]).)',
                 ),
                 Mistake(
-                    _kuka("xyz", (5, 4, 3)),
+                    _kuka("xyz"),
                     "You read A, B, C as turns about x, y, z. At KUKA, A turns about z, B about y, C about x.",
                 ),
                 Mistake(_kuka("zyz"), "You turned about z, y, z. KUKA's third turn is about x: Rz(A) Ry(B) Rx(C)."),
@@ -601,27 +717,67 @@ CHAPTER = Chapter(
         Exercise(
             "kuka_from_matrix",
             reference=frames.kuka_from_matrix,
-            draw=lambda rng: (frames.matrix_from_kuka(kuka_pose(rng)[0]),),
-            metric=metrics.Through(frames.matrix_from_kuka, metrics.Poses(1e-6, 1e-6)),
+            draw=tuple(
+                lambda rng, A_deg=A_deg: (frames.matrix_from_kuka(kuka_pose(rng, A_deg)[0]),) for A_deg in A_RANGES
+            ),
+            fixed={"T": POSE},
+            metric=_read_by_kuka(1e-6),
             noisy=[
-                (at_the_pole(sign), metrics.Through(frames.matrix_from_kuka, metrics.Poses(1e-4, 1e-6)), words)
+                (at_the_pole(sign), _read_by_kuka(1e-4), words)
                 for sign, words in (
                     (1, "right away from the pole, but at B = 90 deg"),
                     (-1, "right, but at B = -90 deg"),
                 )
             ],
             hints=(
-                "Compare the entries of Rz(A) Ry(B) Rx(C) that hold few terms: the first column and the last row.",
-                "B and A come from the first column, with `np.arctan2`. Then undo A: Rz(A)' R = Ry(B) Rx(C), whose middle row is 0, cos C, -sin C.",
-                "`R = T[:3, :3]; A = np.arctan2(R[1, 0], R[0, 0]); B = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0])); "
-                "C = np.arctan2(np.sin(A) * R[0, 2] - np.cos(A) * R[1, 2], np.cos(A) * R[1, 1] - np.sin(A) * R[0, 1]); "
-                "return np.array([*T[:3, 3], A, B, C])`",
+                "Compare the entries of Rz(A) Ry(B) Rx(C) that hold few terms: the first column gives A and B. Then undo A: "
+                "Rz(A)ᵀ R = Ry(B) Rx(C), whose middle row is 0, cos C, -sin C.",
+                "A by `np.arctan2` of r10 and r00. B by `np.arctan2` of -r20 and the root of r00² + r10², which rounding cannot break, as it "
+                "does an arcsine. The middle row of Rz(A)ᵀ R is -sin A times the first row of R plus cos A times the second: read C from it.",
+                "`R = T[:3, :3]\nA = np.arctan2(R[1, 0], R[0, 0])\nB = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))\n"
+                "row = np.cos(A) * R[1] - np.sin(A) * R[0]\nreturn np.array([*T[:3, 3], A, B, np.arctan2(-row[2], row[1])])`",
             ),
             mistakes=[
                 Mistake(
                     _angles_one_by_one,
                     "Right except at the pole: there r10, r00, r21, r22 are rounding noise, and A and C, read one by one, do not fit "
                     "each other. Take A first, undo it, and read C from what is left.",
+                ),
+                Mistake(
+                    _arcsine_of_too_much,
+                    "Right except at the pole: there rounding can push r20 a hair beyond 1, and its arcsine is NaN. Cut it with "
+                    "`np.clip(..., -1, 1)`, or take arctan2 of -r20 and the root of r00² + r10².",
+                    id="kuka-arcsine",
+                ),
+                Mistake(
+                    _undone(lambda R: np.arctan(R[1, 0] / R[0, 0]), _B_along),
+                    "The pose is right, but B leaves the range from -90 to 90 deg: the quotient r10/r00 loses the quadrant of A. Use np.arctan2(r10, r00).",
+                    id="kuka-quotient-undone",
+                ),
+                Mistake(
+                    _undone(lambda R: np.arctan(R[1, 0] / R[0, 0])),
+                    "A quotient loses the quadrant: A = np.arctan2(r10, r00).",
+                    id="kuka-quotient-A",
+                ),
+                Mistake(
+                    _undone(lambda R: _right_A(R) + np.pi, _B_along),
+                    "The pose is right, but A is half a turn away, so that B leaves the range from -90 to 90 deg.",
+                    id="kuka-half-turn",
+                ),
+                Mistake(
+                    _undone(lambda R: np.arctan2(R[0, 0], R[1, 0])),
+                    "np.arctan2 takes y first, then x: A = np.arctan2(r10, r00). All that follows from A is wrong with it.",
+                    id="kuka-swapped-A",
+                ),
+                Mistake(
+                    _undone(_right_A, turn=lambda a: _turn("z", a)),
+                    "A and B are right. To undo A, multiply by Rz(A)ᵀ from the left: Rz(A) itself turns by A once more.",
+                    id="kuka-not-undone",
+                ),
+                Mistake(
+                    _angles(lambda abc: abc * (1, 1, -1)),
+                    "C has the wrong sign: after A is undone the middle row is 0, cos C, -sin C.",
+                    id="kuka-sign-C",
                 ),
                 Mistake(
                     _angles_by_quotients,
@@ -653,11 +809,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(_angles(lambda abc: abc * (1, -1, 1)), "B has the wrong sign: the entry r20 is -sin B."),
                 Mistake(
-                    _angles(lambda abc: -abc), "All three angles have the wrong sign: you read the transposed matrix."
+                    lambda T: frames.kuka_from_matrix(_with(T, R=T[:3, :3].T)),
+                    "You read the angles from the transposed rotation: rows and columns have changed places.",
+                    id="kuka-transposed",
                 ),
                 Mistake(
                     lambda T: frames.kuka_from_matrix(frames.invert(T)),
-                    "This is the pose of the inverse: you read T' instead of T.",
+                    "This is the pose of the inverse: F seen from W has become W seen from F.",
                 ),
             ],
         ),

@@ -1,5 +1,7 @@
 """Chapter 2: chained transforms, the closure error of a loop, and what to do with it."""
 
+import functools
+
 import numpy as np
 
 from ...documents.lab_sheet import printed as lab_sheet
@@ -14,15 +16,27 @@ def random_pose(rng):
     return frames.pose(frames.matrix_from_quaternion(rng.normal(size=4)), rng.uniform(-400, 400, 3))
 
 
-def random_links(rng):
-    """Three to five random transforms, stacked."""
-    return (np.array([random_pose(rng) for _ in range(rng.integers(3, 6))]),)
+def random_links(rng, count):
+    """Random transforms, stacked."""
+    return (np.array([random_pose(rng) for _ in range(count)]),)
 
 
-def loop_product(rng):
-    """The product of a loop that nearly closes: some degrees and millimeters off."""
-    turn = frames.unit_vector(rng.normal(size=3)) * np.deg2rad(rng.uniform(2, 8))  # a sine is no longer its angle
+def loop_product(rng, between_deg):
+    """The product of a loop that misses itself by some degrees or by many, and by millimeters."""
+    turn = frames.unit_vector(rng.normal(size=3)) * np.deg2rad(rng.uniform(*between_deg))
     return (exp_se3(np.concatenate([turn, rng.uniform(0.5, 20) * rng.normal(size=3)])),)
+
+
+def no_turn(rng):
+    """No turn at all, but for rounding that makes (trace - 1) / 2 a hair more than 1, as in T @ inv(T)."""
+    T = frames.pose(np.eye(3), rng.normal(size=3))
+    k = rng.integers(3)
+    T[k, k] += 2**-51
+    return (T,)
+
+
+SMALL, LARGE = (2, 8), (100, 170)  # deg: a sine is no longer its angle, and two angles have the same one
+ONE_POSE = "one pose is one 4x4 matrix"
 
 
 def worn_pose(rng):
@@ -32,9 +46,9 @@ def worn_pose(rng):
     return (T,)
 
 
-def open_loop(rng):
-    """Links of a loop of three to five frames that does not quite close."""
-    links = random_links(rng)[0]
+def open_loop(rng, count):
+    """Links of a loop of `count` frames that does not quite close."""
+    links = random_links(rng, count)[0]
     links[-1] = frames.relative(chaining.chain(links[:-1]), np.eye(4))
     return (links @ exp_se3(rng.normal(size=(len(links), 6)) * np.repeat([0.02, 2.0], 3)),)
 
@@ -87,6 +101,16 @@ def _distance(distance):
 def _twice_sine(T):
     R = T[:3, :3]
     return np.linalg.norm([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+
+
+def _arccos(cosine, clipped):
+    """The angle by an arccosine of something else than (trace - 1) / 2."""
+
+    def angle(T):
+        value = cosine(T)
+        return np.arccos(np.clip(value, -1, 1) if clipped else value)
+
+    return _closure(angle)
 
 
 def _trace_angle(R):
@@ -258,6 +282,8 @@ def _angle_deg(wrong=None):
     return np.rad2deg(chaining.closure_error(_sheet())[0] if wrong is None else wrong(_sheet()))
 
 
+CLOSURE = metrics.Several(metrics.Angles(1e-6), metrics.Numbers(1e-9, "mm"), names=("angle", "distance"))
+
 CHAPTER = Chapter(
     "02-chaining",
     title="Chaining and closing the loop",
@@ -275,15 +301,16 @@ CHAPTER = Chapter(
             question="The sheet writes the sum of the transforms, and prints one result. Which of the two did its program compute?",
             choices=("the sum", "the product", "neither"),
             answer="the product",
-            why="A 1 in the last corner settles it: the sum of four transforms has a 4 there. Listing 6 multiplies (`T *= myT`).",
+            why="Each row of the 3x3 block has length 1, as in a rotation; the sum of four rotations almost never has. The row left out "
+            "settles it: it ends in 1, where the sum has a 4. Listing 6 multiplies (`T *= myT`).",
         ),
         Exercise(
             "chain",
             reference=chaining.chain,
-            draw=random_links,
+            draw=tuple(functools.partial(random_links, count=n) for n in (3, 2, 5, 4)),
             metric=metrics.Poses(1e-6, 1e-6),
             hints=(
-                "Neighboring letters cancel: T_AB T_BC T_CD = T_AD. What does an empty chain do?",
+                "Neighboring letters cancel: T_AB T_BC T_CD = T_AD. Where does a link that has just been measured go, to the left or to the right?",
                 "Start with the identity and multiply each link from the right, in the order given.",
                 "`T = np.eye(4)\nfor link in transforms:\n    T = T @ link\nreturn T`",
             ),
@@ -315,6 +342,11 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda Ts: chaining.chain(Ts[:-1]),
                     "The last link is missing from your product.",
+                ),
+                Mistake(
+                    lambda Ts: Ts[-1] @ Ts[-1],
+                    "This is the last link times itself: the loop variable and the product have the same name. Give the product one of its own.",
+                    id="chain-same-name",
                 ),
                 Mistake(
                     _blocks_apart,
@@ -377,12 +409,18 @@ CHAPTER = Chapter(
         Exercise(
             "closure_error",
             reference=chaining.closure_error,
-            draw=loop_product,
-            metric=metrics.Several(metrics.Angles(1e-6), metrics.Numbers(1e-9, "mm"), names=("angle", "distance")),
+            draw=tuple(functools.partial(loop_product, between_deg=between) for between in (SMALL, LARGE)),
+            fixed={"T": ONE_POSE},
+            metric=CLOSURE,
+            noisy=[
+                (lambda rng: (np.eye(4),), CLOSURE, "right, but not of the identity itself:"),
+                (no_turn, CLOSURE, "right, but not where T does not turn at all:"),
+            ],
             hints=(
                 "How far is T from the identity? One number for the turn, one for the shift.",
-                "The trace of the 3x3 rotation block is 1 + 2 cos of the angle (NaN means an arccosine of more than 1), R - R' has the Frobenius norm 2 sqrt(2) sin; the distance is the length of the translation.",
-                "`R = T[:3, :3]; twice_sine = np.linalg.norm(R - R.T) / np.sqrt(2); "
+                "The trace of the 3x3 rotation block is 1 + 2 cos of the angle (NaN means an arccosine of more than 1, by rounding perhaps: "
+                "`np.clip`), R - Rᵀ has the Frobenius norm 2 sqrt(2) sin; the distance is the length of the translation.",
+                "`R = T[:3, :3]\ntwice_sine = np.linalg.norm(R - R.T) / np.sqrt(2)\n"
                 "return np.arctan2(twice_sine, np.trace(R) - 1), np.linalg.norm(T[:3, 3])`",
             ),
             mistakes=[
@@ -390,13 +428,43 @@ CHAPTER = Chapter(
                     _closure(lambda T: np.rad2deg(chaining.closure_error(T)[0])),
                     "Your angle is in degrees. Inside the workbook angles are radians.",
                 ),
-                Mistake(
-                    _closure(lambda T: np.arccos(np.clip(np.trace(T) / 2 - 0.5, -1, 1))),
-                    "You took the trace of the 4x4 matrix; the 1 in its corner is no part of the rotation.",
+                *(
+                    Mistake(
+                        _arccos(lambda T: (np.trace(T) - 1) / 2, clipped),
+                        "You took the trace of the 4x4 matrix, whose corner is no part of the rotation, or forgot the - 1. The argument is "
+                        "(trace - 1) / 2, with the trace of the 3x3 block.",
+                        id=f"closure-trace-4x4-{clipped}",
+                    )
+                    for clipped in (False, True)
+                ),
+                *(
+                    Mistake(
+                        _arccos(cosine, clipped),
+                        "The argument of your arccosine is not the cosine of the angle, and for small turns it is more than 1. It is "
+                        "(trace - 1) / 2, parentheses included, with the trace of the 3x3 block.",
+                        id=f"closure-cosine-{name}-{clipped}",
+                    )
+                    for name, cosine in (
+                        ("parentheses", lambda T: np.trace(T[:3, :3]) - 1 / 2),
+                        ("half", lambda T: np.trace(T[:3, :3]) - 1),
+                        ("plus", lambda T: (np.trace(T[:3, :3]) + 1) / 2),
+                        ("trace", lambda T: np.trace(T[:3, :3])),
+                        ("parentheses-4x4", lambda T: np.trace(T) - 1 / 2),
+                        ("half-4x4", lambda T: np.trace(T) - 1),
+                    )
+                    for clipped in (False, True)
                 ),
                 Mistake(
-                    _closure(lambda T: np.nan),
-                    "Your arccosine got more than 1. Its argument is (trace - 1) / 2, parentheses included, with the trace of the 3x3 block: the 1 in the corner of T is no part of the rotation.",
+                    _arccos(lambda T: (np.trace(T[:3, :3]) - 1) / 2, False),
+                    "Right, but rounding can push (trace - 1) / 2 a hair over 1, as in T @ inv(T), and then arccos gives NaN. Cut it with "
+                    "`np.clip(..., -1, 1)`, or read sine and cosine with arctan2.",
+                    id="closure-clip",
+                ),
+                Mistake(
+                    _closure(lambda T: np.arcsin(np.clip(_twice_sine(T) / 2, -1, 1))),
+                    "The arcsine cannot tell 60 deg from 120 deg: both have the same sine. The cosine, (trace - 1) / 2, can; "
+                    "np.arctan2 takes both.",
+                    id="closure-arcsine",
                 ),
                 Mistake(
                     _closure(lambda T: np.arccos(np.trace(T[:3, :3]) / 3)),
@@ -408,11 +476,11 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _closure(lambda T: _twice_sine(T) / 2),
-                    "This is the sine of the angle: its arcsine is missing.",
+                    "This is the sine of the angle. The angle itself is np.arctan2(sine, cosine), with the cosine (trace - 1) / 2.",
                 ),
                 Mistake(
                     _closure(_twice_sine),
-                    "The length of the vector from R - R' is twice the sine of the angle: halve it and take the arcsine.",
+                    "The length of the vector from R - Rᵀ is twice the sine of the angle. Twice the cosine is trace - 1: np.arctan2 takes both.",
                 ),
                 Mistake(
                     _closure(lambda T: np.linalg.norm(frames.kuka_from_matrix(T)[3:])),
@@ -420,7 +488,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _closure(lambda T: np.abs(frames.kuka_from_matrix(T)[3:]).max()),
-                    "This is the largest of three Euler angles. The angle of the whole rotation is larger; the trace gives it.",
+                    "This is the largest of three Euler angles. The angle of the whole rotation is another one; the trace gives it.",
                 ),
                 Mistake(
                     _distance(lambda T: T[:3, 3]),
@@ -496,6 +564,18 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(lambda: chaining.closure_error(_sheet())[0], "This is the angle in radians."),
+                Mistake(
+                    lambda: 0.0,
+                    "0 would be a perfect loop, and this one turns. (A clipped arccosine gives 0 where its argument is more than 1: it is "
+                    "(trace - 1) / 2, of the 3x3 block.)",
+                    id="closure-angle-zero",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_sheet() - np.eye(4)),
+                    "This is the norm of T - I, which adds millimeters to numbers without a unit, or the distance, which is much the same "
+                    "number here. The angle is the first of the two results.",
+                    id="closure-angle-norm",
+                ),
                 Mistake(
                     lambda: _angle_deg(lambda T: np.arctan2(T[1, 0], T[0, 0])),
                     "You read the turn about z alone. The loop also tilts by some tenths of a degree.",
@@ -614,11 +694,12 @@ CHAPTER = Chapter(
             "orthonormalize",
             reference=chaining.orthonormalize,
             draw=worn_pose,
+            fixed={"T": ONE_POSE},
             metric=metrics.Poses(1e-6, 1e-6),
             hints=(
                 "Which rotation lies nearest to a matrix that is almost one? The translation stays.",
-                "With R = U S V', the nearest rotation is U V': the SVD with its singular values set to 1.",
-                "`U, _, Vt = np.linalg.svd(T[:3, :3]); X = T.copy(); X[:3, :3] = U @ Vt; return X`",
+                "With R = U S Vᵀ, the nearest rotation is U Vᵀ: the SVD with its singular values set to 1.",
+                "`U, _, Vt = np.linalg.svd(T[:3, :3])\nX = T.copy()\nX[:3, :3] = U @ Vt\nreturn X`",
             ),
             mistakes=[
                 Mistake(
@@ -668,15 +749,15 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _svd_variant(lambda U, s, Vt: U @ np.diag(s) @ Vt),
-                    "This is R, as worn as before: U S V' puts it together again. Leave the singular values out.",
+                    "This is R, as worn as before: U S Vᵀ puts it together again. Leave the singular values out.",
                 ),
                 Mistake(
                     _svd_variant(lambda U, s, Vt: Vt @ U),
-                    "The factors have changed places: U V' is not V' U.",
+                    "The factors have changed places: U Vᵀ is not Vᵀ U.",
                 ),
                 Mistake(
                     _svd_variant(lambda U, s, Vt: Vt.T @ U.T),
-                    "This is the transpose of the nearest rotation, V U' instead of U V'.",
+                    "This is the transpose of the nearest rotation, V Uᵀ instead of U Vᵀ.",
                 ),
                 Mistake(
                     _whole_matrix,
@@ -710,11 +791,13 @@ CHAPTER = Chapter(
         Exercise(
             "distribute_closure",
             reference=chaining.distribute_closure,
-            draw=open_loop,
+            draw=tuple(functools.partial(open_loop, count=n) for n in (3, 4, 5)),
             metric=metrics.Poses(1e-5, 1e-5),
             hints=(
-                "The product is exp(xi). Going back by all of xi at the end closes the loop; how far back should the pose after link k go?",
-                "The pose after k links, P_k, becomes exp(-k/N xi) P_k. The corrected links are the relative poses of neighbors.",
+                "The product is exp(xi). Going back by all of xi at the end closes the loop; how far back should the pose after link k go? "
+                "P_k, the pose after k links, becomes exp(-k/N xi) P_k.",
+                "Collect P_0 = I, P_1, ... P_N in a list of N + 1 poses, and take xi from the last. Multiply each from the left by its "
+                "exp_se3(-k / N * xi). The corrected links are `relative(A, B)` of each pose and the next.",
                 "`poses = chaining.stations(transforms)\nN = len(transforms)\nxi = log_se3(poses[-1])\n"
                 "moved = [exp_se3(-k / N * xi) @ P for k, P in enumerate(poses)]\nreturn np.array([relative(A, B) for A, B in zip(moved, moved[1:])])`",
             ),

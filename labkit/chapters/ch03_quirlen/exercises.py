@@ -1,5 +1,7 @@
 """Chapter 3: tip and pivot from poses that touch one point."""
 
+import functools
+
 import numpy as np
 
 from ...calibration import pivot, robust
@@ -10,23 +12,33 @@ from ...geometry import frames
 from ...geometry.lie import exp_so3
 
 
-def turns(rng, n):
-    """n rotations of 10 to 40 deg about random axes."""
+def turns(rng, n, between_deg=(10, 40)):
+    """n rotations by such angles about random axes."""
     axis = rng.normal(size=(n, 3))
-    axis *= np.deg2rad(rng.uniform(10, 40, (n, 1))) / np.linalg.norm(axis, axis=1, keepdims=True)
+    axis *= np.deg2rad(rng.uniform(*between_deg, (n, 1))) / np.linalg.norm(axis, axis=1, keepdims=True)
     return exp_so3(axis)
 
 
-def poses(rng, std_trans=0.0):
+def poses(rng, std_trans=0.0, between_deg=(10, 40)):
     """Four to eight poses that touch one point, positions off by noise."""
     tip, point = rng.uniform(-50, 50, 3) - (0, 0, 90), rng.uniform(-300, 300, 3)
-    return pivot.touching_poses(turns(rng, rng.integers(4, 9)), tip, point, 0.0, std_trans, rng)
+    return pivot.touching_poses(turns(rng, rng.integers(4, 9), between_deg), tip, point, 0.0, std_trans, rng)
 
 
 def system(rng, std_trans=0.0):
     """Stacked matrix and right-hand side."""
     T = poses(rng, std_trans)
     return pivot.pivot_matrix(T), pivot.pivot_rhs(T)
+
+
+def narrow_system(rng):
+    """The same, of a narrow set: its least singular value is a little below a tenth of the largest, and counts."""
+    while True:
+        T = poses(rng, between_deg=(10, 25))
+        A = pivot.pivot_matrix(T)
+        s = np.linalg.svd(A, compute_uv=False)
+        if 0.075 < s[5] / s[0] < 0.095:
+            return A, pivot.pivot_rhs(T)
 
 
 def poses_and_result(rng):
@@ -42,17 +54,17 @@ def matrix_and_residuals(rng):
     return pivot.pivot_matrix(T), pivot.calibrate_pivot(T).residuals
 
 
-def near_first(rng):
+def near_first(rng, count):
     """Distances, one of them far below the scale and some beyond the cutoff, and a scale; the nearest leads."""
     scale = rng.uniform(0.1, 0.6)
     near, far = rng.uniform(0.02, 0.13, 1), rng.uniform(1.1, 6, 3) * pivot.TUKEY
-    middle = rng.uniform(0.2, 0.95, 7) * pivot.TUKEY
+    middle = rng.uniform(0.2, 0.95, count - 4) * pivot.TUKEY
     return scale * np.concatenate([near, rng.permutation(np.concatenate([middle, far]))]), scale
 
 
-def far_first(rng):
+def far_first(rng, count):
     """The same, one beyond the cutoff leading: a 0 for it must not make whole numbers of all weights."""
-    d, scale = near_first(rng)
+    d, scale = near_first(rng, count)
     return np.sort(d)[::-1].copy(), scale
 
 
@@ -142,7 +154,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _blocks(lambda R: R.T, -np.eye(3)),
-                    "You took R' instead of R: the tip is given in the tool frame, and R turns it into the world.",
+                    "You took Rᵀ instead of R: the tip is given in the tool frame, and R turns it into the world.",
                 ),
                 Mistake(
                     _blocks(lambda R: -R, np.eye(3)),
@@ -161,6 +173,11 @@ CHAPTER = Chapter(
                     "You set the poses side by side. Each pose adds equations, not unknowns: stack them beneath each other.",
                 ),
                 Mistake(
+                    lambda T_WF: pivot.pivot_matrix(T_WF).reshape(-1, 3, 6).swapaxes(0, 1).reshape(-1, 6),
+                    "Your rows are sorted by axis, all of x first. The three rows of a pose stand together, pose after pose.",
+                    id="pivot-matrix-by-axis",
+                ),
+                Mistake(
                     _rows_overlap,
                     "The blocks overwrite each other: each pose takes three rows, so block i begins in row 3 * i.",
                 ),
@@ -170,7 +187,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _blocks(lambda R: R.T, np.eye(3)),
-                    "Two slips: you took R' instead of R, and the pivot enters with -I.",
+                    "Two slips: you took Rᵀ instead of R, and the pivot enters with -I.",
                 ),
                 Mistake(
                     _blocks(lambda R: -R, -np.eye(3)),
@@ -229,7 +246,7 @@ CHAPTER = Chapter(
                 Mistake(lambda T: -T[:, :3, 3], "The numbers are right; flatten them into one vector, pose by pose."),
                 Mistake(
                     lambda T: -T[:, 3, :3].ravel(),
-                    "You took the last row of each pose. The position stands in the last column.",
+                    "All zeros: nothing was filled in, or you took the last row of each pose. The position stands in the last column.",
                 ),
                 Mistake(
                     lambda T: -T[:, :, 3].ravel(),
@@ -237,7 +254,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda T: -np.einsum("nji,nj->ni", T[:, :3, :3], T[:, :3, 3]).ravel(),
-                    "You turned the positions into the tool frame (R'p). The equations are written in the world.",
+                    "You turned the positions into the tool frame (Rᵀp). The equations are written in the world.",
                 ),
                 Mistake(
                     lambda T: -np.einsum("nij,nj->ni", T[:, :3, :3], T[:, :3, 3]).ravel(),
@@ -272,12 +289,12 @@ CHAPTER = Chapter(
         Exercise(
             "solve_pivot",
             reference=pivot.solve_pivot,
-            draw=lambda rng: system(rng),
+            draw=(system, narrow_system),
             metric=metrics.Numbers(1e-6, "mm"),  # a general minimizer stops some 1e-5 mm away
             noisy=(lambda rng: system(rng, 1.0), metrics.Numbers(1e-6, "mm")),
             hints=(
                 "More equations than unknowns: no x fulfills them all. Which x makes the sum of squares of A x - b least?",
-                "The sheet: x = (A'A)^-1 A'b. Better conditioned, and shorter: `np.linalg.lstsq`.",
+                "The sheet: x = (AᵀA)⁻¹ Aᵀb. Better conditioned, and shorter: `np.linalg.lstsq`.",
                 "`return np.linalg.lstsq(A, b, rcond=None)[0]`",
             ),
             mistakes=[
@@ -290,8 +307,13 @@ CHAPTER = Chapter(
                     "You used the first two poses alone. Use all equations.",
                 ),
                 Mistake(
+                    lambda A, b: np.linalg.pinv(A, rcond=0.1) @ b,
+                    "You drop singular values below a tenth of the largest. Narrow poses have such small ones, and they count.",
+                    id="solve-cut",
+                ),
+                Mistake(
                     lambda A, b: A.T @ b,
-                    "A'b alone is not the solution: (A'A)^-1 is missing in front of it.",
+                    "Aᵀb alone is not the solution: (AᵀA)⁻¹ is missing in front of it.",
                 ),
                 Mistake(
                     lambda A, b: np.linalg.lstsq(A, b, rcond=None)[1],
@@ -315,7 +337,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda A, b: A.T @ A @ (A.T @ b),
-                    "The inverse is missing: x = (A'A)^-1 A'b, `np.linalg.solve(A.T @ A, A.T @ b)`.",
+                    "The inverse is missing: x = (AᵀA)⁻¹ Aᵀb, `np.linalg.solve(A.T @ A, A.T @ b)`.",
                 ),
                 Mistake(
                     lambda A, b: (A.T @ A) ** -1.0 @ A.T @ b,
@@ -371,6 +393,21 @@ CHAPTER = Chapter(
                     "You took x and y alone, the distance from the flange's z axis: the slice x[:2] holds two entries.",
                 ),
                 Mistake(
+                    lambda: np.hypot(np.linalg.norm(_kreisel().tip), _kreisel().pivot[0]),
+                    "You took four entries: x[3] is the first coordinate of the pivot. The tip is x[:3].",
+                    id="tip-four",
+                ),
+                Mistake(
+                    lambda: np.abs(_kreisel().tip).mean(),
+                    "This is the mean of the three components. The length is the root of the sum of their squares.",
+                    id="tip-mean",
+                ),
+                Mistake(
+                    lambda: (_kreisel().tip ** 2).sum(),
+                    "This is the squared length, in mm²: the root is missing.",
+                    id="tip-squared",
+                ),
+                Mistake(
                     lambda: np.linalg.norm(_kreisel().tip - _kreisel().pivot),
                     "You subtracted two points of different frames: the tip is seen from the flange, the pivot from the world.",
                 ),
@@ -384,6 +421,7 @@ CHAPTER = Chapter(
             "pivot_residuals",
             reference=lambda T_WF, tip, point: pivot.pivot_residuals(T_WF, tip, point),
             draw=poses_and_result,
+            fixed={"tip": "a point has three coordinates", "point": "a point has three coordinates"},
             metric=metrics.Numbers(1e-9, "mm"),
             hints=(
                 "Where is the tip in each pose, and where should it be?",
@@ -397,7 +435,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda T, tip, point: np.einsum("nji,j->ni", T[:, :3, :3], tip) + T[:, :3, 3] - point,
-                    "You turned the tip by R'. R takes it from the tool frame to the world.",
+                    "You turned the tip by Rᵀ. R takes it from the tool frame to the world.",
                 ),
                 Mistake(
                     lambda T, tip, point: pivot.pivot_residuals(T, tip, np.zeros(3)),
@@ -484,7 +522,7 @@ CHAPTER = Chapter(
             rtol=1e-3,
             hints=(
                 "The sheet's formula, listing 8: the root of the sum of squares over n.",
-                "n is the number of poses, not of equations; r'r is the sum of the squares of all 3n numbers.",
+                "n is the number of poses, not of equations; rᵀr is the sum of the squares of all 3n numbers.",
                 "`s0 = np.sqrt((residuals**2).sum() / len(poses))`",
             ),
             mistakes=[
@@ -505,8 +543,8 @@ CHAPTER = Chapter(
                     lambda: np.sqrt(_squares()) / 12,
                     "The n belongs under the root: you divided after it.",
                 ),
-                Mistake(lambda: _squares() / 12, "The root is missing: this is a variance, in mm^2."),
-                Mistake(lambda: _squares(), "This is r'r. Divide it by n and take the root."),
+                Mistake(lambda: _squares() / 12, "The root is missing: this is a variance, in mm²."),
+                Mistake(lambda: _squares(), "This is rᵀr. Divide it by n and take the root."),
                 Mistake(
                     lambda: _squares() / 36,
                     "The root is missing, and you divided by the 36 equations instead of the 12 poses.",
@@ -566,9 +604,9 @@ CHAPTER = Chapter(
             draw=matrix_and_residuals,
             metric=metrics.Numbers(1e-6, "mm^2"),
             hints=(
-                "Noise in b goes through the solution x = (A'A)^-1 A'b. What does it do to x?",
-                "cov = std^2 (A'A)^-1, with the unbiased std^2 = r'r / (3n - 6).",
-                "`r = residuals.ravel(); return r @ r / (len(r) - 6) * np.linalg.inv(A.T @ A)`",
+                "Noise in b goes through the solution x = (AᵀA)⁻¹ Aᵀb. What does it do to x?",
+                "cov = std² (AᵀA)⁻¹, with the unbiased std² = rᵀr / (3n - 6).",
+                "`r = residuals.ravel()\nreturn r @ r / (len(r) - 6) * np.linalg.inv(A.T @ A)`",
             ),
             mistakes=[
                 Mistake(
@@ -585,15 +623,40 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _covariance(lambda r, n: 1.0),
-                    "This is (A'A)^-1 for noise of 1 mm. Scale it by the variance of the residuals.",
+                    "This is (AᵀA)⁻¹ for noise of 1 mm. Scale it by the variance of the residuals.",
                 ),
                 Mistake(
                     lambda A, r: np.vdot(r, r) / (r.size - 6) * (A.T @ A),
-                    "You forgot the inverse: A'A is the information, and its inverse the covariance.",
+                    "You forgot the inverse: AᵀA is the information, and its inverse the covariance.",
                 ),
                 Mistake(
                     lambda A, r: np.sqrt(np.diag(pivot.pivot_covariance(A, r))),
                     "These are the six standard deviations. The whole matrix is wanted, shape (6, 6).",
+                ),
+                Mistake(
+                    _covariance(lambda r, n: r @ r / (n - 2)),
+                    "You took two off the number of poses, as two points are unknown. Counted in numbers, 3n - 6 remain: you have three times that.",
+                    id="covariance-n-2",
+                ),
+                Mistake(
+                    lambda A, r: np.vdot(r, r) / (r.size - 6) * np.linalg.inv(A.T @ A) @ np.linalg.inv(A.T @ A),
+                    "The inverse of AᵀA is in your result twice. It stands there once: std² (AᵀA)⁻¹.",
+                    id="covariance-inverse-twice",
+                ),
+                Mistake(
+                    _covariance(lambda r, n: (3 * n - 6) / (r @ r)),
+                    "You divided by the variance. More noise makes the result less sure: multiply by it.",
+                    id="covariance-divided",
+                ),
+                Mistake(
+                    lambda A, r: np.sqrt(pivot.pivot_covariance(A, r)),
+                    "A root of every entry makes no standard deviations of a matrix, and NaN where an entry is negative. The covariance itself is wanted.",
+                    id="covariance-root",
+                ),
+                Mistake(
+                    lambda A, r: np.cov(r.T),
+                    "This is how the residuals scatter in x, y, z. What is wanted is what such noise does to the six unknowns: std² (AᵀA)⁻¹.",
+                    id="covariance-of-residuals",
                 ),
                 Mistake(
                     _covariance(lambda r, n: r @ r / (n - 6)),
@@ -613,7 +676,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _covariance(lambda r, n: r @ r),
-                    "r'r grows with the number of poses. The variance of one coordinate is r'r / (3n - 6).",
+                    "rᵀr grows with the number of poses. The variance of one coordinate is rᵀr / (3n - 6).",
                 ),
                 Mistake(
                     _covariance(lambda r, n: np.sqrt(r @ r / (3 * n))),
@@ -621,7 +684,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _covariance(lambda r, n: np.sqrt(r @ r / n)),
-                    "This is the sheet's s0 times (A'A)^-1. What belongs there is the variance of one coordinate, r'r / (3n - 6).",
+                    "This is the sheet's s0 times (AᵀA)⁻¹. What belongs there is the variance of one coordinate, rᵀr / (3n - 6).",
                 ),
                 Mistake(
                     lambda A, r: np.diag(pivot.pivot_covariance(A, r)),
@@ -644,12 +707,12 @@ CHAPTER = Chapter(
         Exercise(
             "robust_weights",
             reference=_tukey_weights,
-            draw=(near_first, far_first),
+            draw=tuple(functools.partial(draw, count=n) for n in (11, 6) for draw in (near_first, far_first)),
             metric=metrics.Numbers(1e-9),
             hints=(
                 "Near poses keep their weight, far ones lose it all, smoothly.",
                 "Tukey: with q = d / (7 scale), w = (1 - q^2)^2, and 0 where q > 1.",
-                "`q = distances / (7 * scale); return np.where(q < 1, (1 - q**2) ** 2, 0.0)`",
+                "`q = distances / (7 * scale)\nreturn np.where(q < 1, (1 - q**2) ** 2, 0.0)`",
             ),
             mistakes=[
                 Mistake(

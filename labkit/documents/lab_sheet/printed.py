@@ -9,6 +9,7 @@ from ...calibration.pivot import poses_from_euler
 from ...tables import read_table
 
 HALF_DIGIT = 0.5e-6  # half a unit in the last of the six decimals of listing 7
+S0_LISTING_10 = 0.443922  # mm
 POSE_COLUMNS = ("x", "y", "z", "a_deg", "b_deg", "c_deg")
 
 
