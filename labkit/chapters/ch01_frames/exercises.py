@@ -67,14 +67,14 @@ class _KukaAngles(metrics.Through):
     """Angles of the right pose, and B on the promised side of the poles."""
 
     def deviations(self, result, expected):
-        beyond = np.rad2deg([_beyond_the_poles(result[4]), _beyond_the_poles(expected[4])])
-        words = f"{np.rad2deg(float(result[4])):.1f} deg is not between -90 and 90 deg; the pose has other angles too, with such a B"
-        outside = metrics.Deviation("B", float(abs(beyond[0] - beyond[1])), "deg", 1e-3, words)
-        return [*super().deviations(result, expected), outside]
+        same_side = _is_beyond_the_poles(result[4]) == _is_beyond_the_poles(expected[4])
+        B_deg = np.rad2deg(float(result[4]))
+        words = f"{B_deg:.1f} deg is not between -90 and 90 deg; the pose has other angles too, with such a B"
+        return [*super().deviations(result, expected), metrics.Deviation("B", float(not same_side), "", 0.5, words)]
 
 
-def _beyond_the_poles(B):
-    return max(0.0, abs(float(B)) - np.pi / 2)
+def _is_beyond_the_poles(B):
+    return abs(float(B)) > np.pi / 2 + 1e-5
 
 
 def _read_by_kuka(deg):
