@@ -208,3 +208,31 @@ def test_both_steps_of_the_report_are_exact_on_exact_motions():
     t, gaps = ax_xb.translation_from_motions(A, B, R)
     np.testing.assert_allclose(t, T_FS[:3, 3], atol=1e-9)
     np.testing.assert_allclose(gaps, 0, atol=1e-9)
+
+
+def whitened(result):
+    by_turns, by_gaps = ax_xb.loop_jacobians(result.T_BF, result.T_FS, result.T_BT, result.T_ST)
+    return np.concatenate([by_turns / result.std[0], by_gaps / result.std[3]])
+
+
+@pytest.mark.parametrize("std_rot, std_trans", [(2e-3, 0.1), (1e-4, 3.0)])
+def test_each_noise_level_pays_for_the_unknowns_it_determines(std_rot, std_trans):
+    result = ax_xb.calibrate_hand_eye(*setup(np.random.default_rng(31), 5, std_rot, std_trans))
+    J = whitened(result)
+    paid = np.diagonal(J @ np.linalg.pinv(J)).reshape(2, -1).sum(1)  # traces of the hat matrix: what each kind fits
+    squares = (result.residuals**2).reshape(-1, 2, 3).sum((0, 2))
+    np.testing.assert_allclose(result.std[[0, 3]] ** 2, squares / (15 - paid), rtol=0.02)
+
+
+def test_singular_values_are_those_of_the_whitened_jacobian_with_columns_of_length_one():
+    result = ax_xb.calibrate_hand_eye(*setup(np.random.default_rng(32), 8, 2e-3, 0.1))
+    J = whitened(result)
+    values = np.linalg.svd(J / np.linalg.norm(J, axis=0), compute_uv=False)
+    np.testing.assert_allclose(result.singular_values, values, atol=1e-7)
+
+
+def test_robust_weights_are_shares():
+    T_BF, T_ST = setup(np.random.default_rng(33), 20, 2e-3, 0.5)
+    T_ST[3, 0, 3] += 100.0
+    weights = ax_xb.calibrate_hand_eye(T_BF, T_ST, robust=True).weights
+    assert weights[3] == 0 and weights.min() >= 0 and 0.9 < weights.max() <= 1.0

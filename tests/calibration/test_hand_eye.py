@@ -365,3 +365,12 @@ def test_methods_of_the_literature_do_not_beat_the_bound():
 def test_the_tukey_weights_fall_smoothly_to_zero_at_the_cut():
     lengths = np.array([0.0, 1.0, 5.0, 10.0, 11.0, 1e9])
     np.testing.assert_allclose(tukey_weights(lengths, 2.0, 5.0), [1, 0.99**2, 0.75**2, 0, 0, 0])
+
+
+def test_singular_values_of_an_iterate_are_millimeters_per_millimeter():
+    T_BF, x_S = scene()
+    start = frames.kuka_from_matrix(T_FS0)
+    found = hand_eye.gauss_newton_pose(start, T_BF, x_S, TARGET0, "se3", max_steps=0).singular_values[0]
+    reach = np.sqrt((x_S**2).sum(1).mean())
+    J = hand_eye.joint_jacobian(T_BF, x_S, T_FS0, target_free=False) / [reach, reach, reach, 1, 1, 1]
+    np.testing.assert_allclose(found, np.linalg.svd(J, compute_uv=False), rtol=1e-9)

@@ -1,33 +1,22 @@
-"""Normal distributions: noise that repeats, covariances cut to fit a picture."""
+"""Outlines of Gaussian clouds against the ellipse that they become when nothing bends."""
 
 import numpy as np
-import pytest
-from scipy.spatial.transform import Rotation
-from scipy.stats import kstest
+from scipy.stats import chi2
 
 from labkit.estimation import gaussian
+from labkit.geometry.planar import compose_pose
 
 
-def test_unit_noise_is_the_same_for_a_shape_and_a_seed():
-    noise = gaussian.unit_noise((40, 3), seed=5)
-    assert noise.shape == (40, 3) and gaussian.unit_noise((40, 3), seed=5) is noise
-    np.testing.assert_array_equal(noise, np.random.default_rng(5).standard_normal((40, 3)))
-    assert np.abs(gaussian.unit_noise((40, 3), seed=6) - noise).min() > 0
-    assert kstest(gaussian.unit_noise((4000,), seed=5), "norm").pvalue > 1e-6
-
-
-def test_nobody_can_write_into_unit_noise():
-    with pytest.raises(ValueError, match="read-only"):
-        gaussian.unit_noise((3,), seed=1)[0] = 0.0
-
-
-def test_cut_axes_keeps_directions_and_short_axes():
-    R = Rotation.from_rotvec([[0.3, -0.5, 0.4], [1.0, 2.0, -0.7]]).as_matrix()
-    std = np.array([0.2, 0.9, 7.0])
-    cut = gaussian.cut_axes((R * std**2) @ np.swapaxes(R, 1, 2), 1.5)
-    np.testing.assert_allclose(cut, (R * [0.04, 0.81, 2.25]) @ np.swapaxes(R, 1, 2), atol=1e-12)
-
-
-def test_cut_axes_refuses_a_limit_of_zero():
-    with pytest.raises(ValueError, match="longest must be positive"):
-        gaussian.cut_axes(np.eye(2), 0.0)
+def test_a_bent_region_of_straight_poses_is_the_ellipse():
+    rng = np.random.default_rng(0)
+    pose = np.array([3.0, -2.0, 0.7])
+    ends = compose_pose(pose, rng.normal(size=(300, 3)) * [0.5, 0.2, 1e-7] + [4.0, 1.0, 0.0])
+    outline = gaussian.bent_region(pose, ends, 0.9, 181).outline
+    mean, cov = ends[:, :2].mean(0), np.cov(ends[:, :2].T)
+    offsets = outline - mean
+    distances = np.einsum("ni,ij,nj->n", offsets, np.linalg.inv(cov), offsets)
+    np.testing.assert_allclose(distances, chi2.ppf(0.9, 2), rtol=1e-4)
+    np.testing.assert_allclose(outline[0], outline[-1], atol=1e-9)  # closed, once around
+    x, y = offsets.T
+    area = 0.5 * abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]))
+    np.testing.assert_allclose(area, np.pi * chi2.ppf(0.9, 2) * np.sqrt(np.linalg.det(cov)), rtol=1e-3)

@@ -260,3 +260,11 @@ def test_pose_graph_refuses_an_island():
 def test_bad_input_is_refused_in_words(call, text):
     with pytest.raises(ValueError, match=text):
         call()
+
+
+@pytest.mark.parametrize("n", [3, 7])
+def test_polygon_stands_on_a_circle_of_its_size(n):
+    links = chaining.polygon_loop(n, 300.0)
+    origins = np.array([chaining.chain(links[:k])[:3, 3] for k in range(1, n + 1)])
+    np.testing.assert_allclose(np.linalg.norm(origins - origins.mean(0), axis=1), 150.0, rtol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(np.diff(origins, axis=0), axis=1), 300 * np.sin(np.pi / n), rtol=1e-12)

@@ -1,5 +1,7 @@
 """Exponential and logarithm against SciPy and scipy.linalg.expm."""
 
+import math
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -83,3 +85,11 @@ def test_left_jacobian_is_the_mean_of_the_rotations_on_the_way(angle):
     nodes, weights = np.polynomial.legendre.leggauss(20)
     way = Rotation.from_rotvec(0.5 * (1 + nodes)[:, None] * phi).as_matrix()
     np.testing.assert_allclose(lie.left_jacobian_so3(phi), np.tensordot(weights / 2, way, 1), rtol=0, atol=3e-14)
+
+
+@pytest.mark.parametrize("angle", [1e-7, 3e-4, 0.99e-3, 1.01e-3, 0.02])
+def test_series_and_closed_forms_of_small_angles_are_the_taylor_sums(angle):
+    found = [float(c[0, 0]) for c in lie._coefficients(np.array(angle**2))]
+    for first, value, rtol in zip((1, 2, 3), found, (1e-14, 1e-14, 1e-9)):  # t - sin t loses digits above the limit
+        terms = [(-1) ** k * angle ** (2 * k) / math.factorial(2 * k + first) for k in range(6)]
+        np.testing.assert_allclose(value, math.fsum(terms), rtol=rtol)

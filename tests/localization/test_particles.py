@@ -195,3 +195,17 @@ def test_kld_takes_few_of_a_narrow_cloud_and_many_of_a_wide_one():
     rng = np.random.default_rng(13)
     narrow, wide = rng.normal(0.25, 0.02, (5000, 3)), rng.uniform(-8, 8, (5000, 3))
     assert pt.KldSampling(n_min=100).enough(narrow) < 200 < 4000 < pt.KldSampling().enough(wide)
+
+
+def test_uniform_states_fill_each_free_cell_and_no_other():
+    cells = np.full((2, 3), OCCUPIED)
+    cells[1, 2] = cells[0, 0] = 0
+    grid = OccupancyGrid(cells, 0.5, (10.0, 20.0))
+    states = pt.uniform_states(grid, 400, np.random.default_rng(0))
+    i, j = np.nonzero(grid.free)
+    offsets = states[:, None, :2] - grid.center_of(i, j)
+    which = np.abs(offsets).max(-1).argmin(1)
+    own = offsets[np.arange(400), which]
+    assert np.abs(own).max() <= 0.25 and (own.min(0) < -0.24).all() and (own.max(0) > 0.24).all()
+    assert np.bincount(which).min() > 140  # of 200 each; six standard deviations
+    assert states[:, 2].min() < -3.0 and states[:, 2].max() > 3.0

@@ -183,3 +183,13 @@ def test_three_joints_reach_a_position_and_leave_the_wrist_alone():
     q = reach_position(TX40, goal, HOME)
     np.testing.assert_allclose(arm_points(TX40, q)[-1], goal, atol=1e-5)
     np.testing.assert_array_equal(q[3:], HOME[3:])
+
+
+def test_samples_of_a_motion_are_even_and_end_with_it():
+    time, _ = smooth_motion(HOME + np.linspace(0, 0.2, 3)[:, None], 4.0, 100)
+    np.testing.assert_allclose(time, np.linspace(0.0, 4.0, 401), atol=1e-12)
+
+
+def test_one_instant_out_of_order_is_enough():
+    with pytest.raises(ValueError, match="time must hold at least two instants and increase"):
+        joint_speeds([0.0, 1.0, 0.5, 2.0], np.zeros((4, 6)))

@@ -393,3 +393,10 @@ def test_hand_eye_with_the_tracker_on_the_flange():
     angle, distance = pose_distance(result.T_FT, T_FE)
     assert angle < 4 * np.linalg.norm(result.std_of("T_FT.rotation"))
     assert distance < 4 * np.linalg.norm(result.std_of("T_FT.translation"))
+
+
+def test_one_uneven_step_of_time_is_enough():
+    time = np.arange(100) / 250
+    time[50:] += 0.001
+    with pytest.raises(ValueError, match="even steps"):
+        time_offset(time, np.ones(100), np.ones(100), 0.05)
