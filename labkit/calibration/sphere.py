@@ -25,7 +25,7 @@ from ..checks import (
 from .result import Parameter, Result, point_parameters, result_class
 
 MIN_SAGITTA = 1e-6  # an arc flatter than this, relative to its length, fixes no circle: the points are collinear
-MAX_STEPS = 50
+MAX_STEPS = 200  # five are usual; where the noise is as large as the arc, each step gains a digit or less
 
 
 @result_class
@@ -186,7 +186,7 @@ def fit_circle(x, z, std=None):
     Raises
     ------
     ValueError
-        When fewer than three points come, or they are collinear.
+        When fewer than three points come, they are collinear, or the fit does not settle.
 
     Source: thesis, section 6.4.3, which uses the algebraic circle; the geometric one is the maximum-likelihood
     estimate.
@@ -216,7 +216,7 @@ def fit_sphere(points, std=None):
     Raises
     ------
     ValueError
-        When fewer than four points come, or they lie in one plane.
+        When fewer than four points come, they lie in one plane, or the fit does not settle.
     """
     points = as_points(points, "points")
     if points.ndim != 2 or len(points) < 4:
@@ -430,4 +430,9 @@ def _geometric(points, start):
         q, r, J = q + step, r_new, J_new
         if np.abs(step).max() <= 1e-12 * np.abs(q).max():
             break
+    else:
+        raise ValueError(
+            f"the fit does not settle: after {MAX_STEPS} steps the radius is {shown(q[-1], '.6g')} and the last step "
+            f"was {shown(np.abs(step).max(), '.2g')}; is the noise as large as the arc?"
+        )
     return q, r, J

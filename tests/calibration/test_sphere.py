@@ -142,3 +142,20 @@ def test_fits_do_not_depend_on_the_unit_of_length(unit):
     x, z = arc((3.0, 200.0), 20.0, 1.0, 30, std=0.5)
     circle, scaled = sphere.fit_circle(x, z), sphere.fit_circle(unit * x, unit * z)
     np.testing.assert_allclose(scaled.center / unit, circle.center, rtol=1e-9)
+
+
+def test_an_uncertain_radius_moves_the_center_across_the_scan_plane():
+    circle = sphere.fit_circle(*arc([2.0, 240.0], 20.0, 1.0, 60, 0.05), std=0.05)
+    step = 1e-5
+    by_R = (
+        (sphere.center_offset(30.0 + step, circle.radius) - sphere.center_offset(30.0 - step, circle.radius)) / 2 / step
+    )
+    more = sphere.profile_center_covariance(30.0, circle, 1, 0.3) - sphere.profile_center_covariance(30.0, circle, 1)
+    np.testing.assert_allclose(more, np.diag([0.0, (0.3 * by_R) ** 2, 0.0]), rtol=1e-6, atol=1e-12)
+
+
+def test_a_fit_that_does_not_settle_says_so(monkeypatch):
+    monkeypatch.setattr(sphere, "MAX_STEPS", 1)
+    x, z = arc([2.0, 240.0], 20.0, 0.5, 30, 0.2)
+    with pytest.raises(ValueError, match="does not settle: after 1 steps the radius is"):
+        sphere.fit_circle(x, z)

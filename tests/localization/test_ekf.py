@@ -223,3 +223,11 @@ def on_landmark(**more):
 def test_bad_input_is_refused_in_words(call, words):
     with pytest.raises(ValueError, match=words):
         call()
+
+
+@pytest.mark.parametrize("off", [(0.1, 0.0), (0.0, 0.02)])
+def test_gate_of_the_association_is_the_quantile_of_the_noise(off):
+    limit = np.sqrt(stats.chi2.ppf(0.95, 2))
+    z = np.array([10.0, 0.0]) + np.outer([0.99 * limit, 1.01 * limit], off)
+    found = ekf.associate(np.zeros(3), np.zeros((3, 3)), z, [[10.0, 0.0]], 0.1, 0.02, probability=0.95)
+    assert found.tolist() == [0, -1]
