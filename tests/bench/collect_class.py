@@ -69,14 +69,16 @@ def main(folder, students=300, damaged=15, jobs=2):
     wrong = 0
     for student in submissions.students([folder / "class"], []):
         truth = planted[student.key]
-        digest = submissions.digest(student.files[0].read())
-        path = out / "judged" / f"{digest[:20]}.json"
-        result = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
         if not isinstance(truth, str):
+            digest = submissions.digest(student.files[0].read())
+            path = out / "judged" / f"{digest[:20]}.json"
+            result = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"items": {}}
             found = {id: (v["status"], v.get("mistake")) for id, v in result["items"].items() if id in truth}
             wrong += found != truth
             if found != truth:
-                print(f"  {student.key}: {[(id, found[id], truth[id]) for id in truth if found[id] != truth[id]]}")
+                print(
+                    f"  {student.key}: {[(id, found.get(id), truth[id]) for id in truth if found.get(id) != truth[id]]}"
+                )
     print(f"{wrong} of {len(planted) - int(damaged)} students judged otherwise than planted")
 
 
