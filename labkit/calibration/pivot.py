@@ -380,7 +380,8 @@ def _reweighted(T, noise, rng):
         W = _whitening(T, x[:3], noise)
         d = np.linalg.norm((W @ pivot_residuals(T, x[:3], x[3:])[..., None])[..., 0], axis=1)
         if k < 3:  # the scale settles first; afterwards it stays, so that the steps converge
-            scale = max(median_std(d), 1e-12)
+            rounding = 100 * np.finfo(float).eps * np.abs(T[:, :3, 3]).max() * np.abs(W).max()
+            scale = max(median_std(d), rounding)  # of exact poses, residuals are nothing else
         last, weights = weights, tukey_weights(d, scale, TUKEY)
         x = _weighted_solution(T, weights, W)
         if k >= 3 and np.abs(weights - last).max() < 1e-4:
