@@ -130,3 +130,10 @@ def test_an_answer_that_has_not_converged_is_told_so():
     deviation = metrics.Numbers(1e-9, "m").deviations(np.array(1.0 + 1e-7), 1.0)[0]
     assert "not accurate enough" in relations.not_accurate_enough(deviation)
     assert relations.not_accurate_enough(metrics.Numbers(1e-9).deviations(np.array(1.1), 1.0)[0]) is None
+
+
+def test_a_coarse_tolerance_makes_no_wrong_answer_right_in_kind():
+    deviation = metrics.Numbers(1e-3).deviations(np.array([0.5, 0.93]), np.array([0.5, 1.0]))[0]
+    assert relations.not_accurate_enough(deviation) is None
+    near = metrics.Numbers(1e-6).deviations(np.array([0.5, 0.9995]), np.array([0.5, 1.0]))[0]
+    assert "not accurate enough" in relations.not_accurate_enough(near)

@@ -250,6 +250,8 @@ class KeptOrNot(metrics.Exactly):
     """True or False for each value; says how many are kept or refused wrongly."""
 
     def deviations(self, result, expected):
+        if np.asarray(expected).dtype != bool:
+            return super().deviations(result, expected)
         kept, refused = int((result & ~expected).sum()), int((~result & expected).sum())
         words = f"of {len(expected)} values you keep {kept} that should go, and refuse {refused} that should stay"
         return [metrics.Deviation("", float(kept + refused), "", 0.5, words=words)]
@@ -274,9 +276,9 @@ def _mad(values):
 
 def speed_curves(rng, sign):
     """Angular speeds of a robot and of a tracker that lags (sign 1), or leads (-1), by a fraction of a sample."""
-    step = float(rng.choice([0.008, 0.01]))
+    step = float(rng.choice([0.01, 0.0125]))
     time, phase = step * np.arange(int(rng.integers(550, 700))), rng.uniform(0, 6, 3)
-    lag = sign * (rng.integers(7, 15) + rng.choice([0.35, 0.42, 0.58, 0.65])) * step
+    lag = sign * (rng.integers(7, 15) + rng.choice([0.27, 0.33, 0.67, 0.73])) * step
 
     def curve(t):
         return (
@@ -1010,14 +1012,13 @@ CHAPTER = Chapter(
                 "`d = np.abs(values - np.median(values))\nreturn d <= factor * 1.4826 * np.median(d)`",
             ),
             mistakes=[
-                Mistake(
-                    _keep(np.mean, np.std),
-                    "Mean and standard deviation are moved by the very values you want to find: the nonsense hides itself.",
-                ),
-                Mistake(
-                    _keep(np.median, np.std),
-                    "You measure from the median, as you should, but in standard deviations, which the nonsense stretches. Take 1.4826 times the "
-                    "median distance.",
+                *(
+                    Mistake(
+                        _keep(middle, np.std),
+                        "The standard deviation, like the mean, is moved by the very values you want to find: the nonsense hides itself. Take the "
+                        "median, and 1.4826 times the median distance.",
+                    )
+                    for middle in (np.mean, np.median)
                 ),
                 Mistake(
                     lambda v, f: np.abs(v) <= f * 1.4826 * np.median(np.abs(v)),
@@ -1271,7 +1272,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _least(_distances, True),
-                    "The mean absolute difference has a corner at its least, and a parabola does not fit a corner: the result is off by a part of a "
+                    "An absolute difference has a corner at its least, and a parabola does not fit a corner: the result is off by a part of a "
                     "sample. Square the differences.",
                 ),
                 Mistake(

@@ -1338,10 +1338,6 @@ CHAPTER = Chapter(
                     "This is one step's covariance: it has to be handed on from step to step.",
                 ),
                 Mistake(
-                    lambda: np.sqrt(np.diag(_circle()[1])),
-                    "These are the standard deviations. Asked for is the covariance matrix, shape (3, 3).",
-                ),
-                Mistake(
                     lambda: np.diag(np.sqrt(np.diag(_circle()[1]))),
                     "These are standard deviations on the diagonal. Asked for is the covariance matrix as `propagate` gives it.",
                 ),
