@@ -71,10 +71,10 @@ class Rails:
 
     def may_read(self, path):
         where = os.path.realpath(path)
-        if where.startswith(self.own):
-            return True
         folder = where + os.sep
-        return not folder.startswith(self.secret) and (folder.startswith(self.readable) or where.startswith(PLACES))
+        if folder.startswith(self.secret):  # also where the checkout lies in /tmp, the own folder under bubblewrap
+            return False
+        return folder.startswith((self.own, *self.readable)) or where.startswith(PLACES)
 
     def may_write(self, path):
         return f"{os.path.realpath(path)}{os.sep}".startswith((self.own, os.devnull))

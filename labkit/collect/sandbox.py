@@ -91,6 +91,7 @@ def end(process):
 def _wrapped(bwrap, folder):
     """The command line of bubblewrap, up to the command it runs."""
     words = [bwrap, "--unshare-all", "--die-with-parent", "--new-session"]
+    words += ["--proc", "/proc", "--dev", "/dev", "--tmpfs", "/tmp"]  # first: a checkout may itself lie in /tmp
     for place in dict.fromkeys((*SYSTEM, sys.base_prefix, sys.prefix)):
         if os.path.islink(place):
             words += ["--symlink", os.readlink(place), place]
@@ -101,7 +102,7 @@ def _wrapped(bwrap, folder):
         words += ["--ro-bind", str(DATA), str(DATA)]
     for place in hidden():
         words += ["--tmpfs", str(place)] if place.is_dir() else ["--ro-bind", os.devnull, str(place)]
-    return [*words, "--proc", "/proc", "--dev", "/dev", "--tmpfs", "/tmp", "--chdir", "/tmp"]
+    return [*words, "--chdir", "/tmp"]
 
 
 def hidden():

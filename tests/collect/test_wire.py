@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from labkit.collect import border, library, wire
+from labkit.collect import border, library, rails, wire
 from labkit.exercises import guard
 from labkit.localization.maps import OccupancyGrid
 
@@ -114,3 +114,10 @@ def test_the_librarys_answers_are_found_and_its_tools_are_not():
     assert "labkit.calibration.ax_xb.rotation_from_kronecker" in tracker["rotation_from_nullvector"]
     assert "labkit.geometry.lie.nearest_rotation" not in tracker["rotation_from_nullvector"]
     assert "labkit.estimation.optimization.cauchy_step" not in library.answers("04-optimization")["dogleg_step"]
+
+
+def test_a_secret_is_one_also_within_the_own_folder(tmp_path):
+    """Under bubblewrap the own folder is /tmp, where a checkout may lie."""
+    secret, notes = tmp_path / "labkit" / "frames.py", tmp_path / "notes.txt"
+    laid = rails.Rails([tmp_path / "labkit"], [secret], tmp_path)
+    assert not laid.may_read(secret) and laid.may_read(notes) and laid.may_write(notes)
