@@ -317,11 +317,12 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     lambda v: v / ((v @ v) / 2),
-                    "`**1/2` is read as (...**1)/2, so no root is taken. Write `**0.5` or np.sqrt.",
+                    "No root of the sum of squares is taken, and a factor 2 is in its place. If you wrote `**1/2`, Python reads it as (...**1)/2: write `**0.5` or np.sqrt.",
+                    id="normalize-41c4ee",
                 ),
                 Mistake(
                     lambda v: v / (v @ v) / 2,
-                    "`**1/2` is read as (...**1)/2, so no root is taken. Write `**0.5` or np.sqrt.",
+                    "No root of the sum of squares is taken, and a factor 2 is in its place. If you wrote `**1/2`, Python reads it as (...**1)/2: write `**0.5` or np.sqrt.",
                     id="normalize-half-inline",
                 ),
                 Mistake(lambda v: v / (v @ v), "You divide by the squared length. The root is missing."),
