@@ -145,8 +145,8 @@ def classify_extremum(g, H):
 # %% newton-text [markdown]
 # ## Newton's step
 #
-# The model $m(h) = f + g^\top h + \tfrac12 h^\top H h$ is stationary where its gradient $g + H h$ vanishes. The thesis prints this system as (2-26) with an
-# inverse too many and then subtracts the step (2-27). Take those two literally from $(-0.9, -1.9)$ and you land 17 700 away.
+# The model $m(h) = f + g^\top h + \tfrac12 h^\top H h$ is stationary where its gradient $g + H h$ vanishes. The thesis has it right in (2-24),
+# and its (2-27) subtracts the $d$ of (2-25); only (2-26), in our text of it, has an inverse too many and a minus sign. Take (2-26) literally from $(-0.9, -1.9)$ and you land 17 700 away.
 
 # %% newton_step
 @ex.newton_step

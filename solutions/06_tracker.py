@@ -299,9 +299,9 @@ for name, averages, variances in (("report", table.mean, table.variance), ("ours
     print(f"{'':6} {mean['mean_deg']:.3f} deg, E_trans {1000 * mean['E_trans']:.2f} mm, E_rot {mean['E_rot']:.1e}")
 
 # %% contradictions [markdown]
-# More does not fit. Section 3.1 and the table put the origin 49.17 mm below, the conclusion 65.3 mm. The text speaks of a half turn about z, the printed
-# quaternion of 0.8°; with that half turn, x and y change sign as the conclusion has them, but not z. And ±5 rad/s as a mean error would exceed the fastest motion, 3.7 rad/s:
-# degrees are meant. Chapter 10 lists them all.
+# More does not fit. Section 3.1 and the table put the origin 49.17 mm below, the conclusion 65.3 mm. (The text's half turn about z
+# and the printed quaternion of 0.8° need not disagree, the flange frame may contain the half turn; with it x and y change sign as the conclusion has them, z does not.) And ±5 rad/s as a mean error
+# would exceed the fastest motion, 3.7 rad/s. Was 5 deg/s meant, or 0.05 rad/s, which is the conclusion's 3 deg/s? The report does not tell, and a digit may have been lost on the way to our text. Chapter 10 lists them all.
 #
 # ## Break it: repeat the same mistake
 #

@@ -603,8 +603,10 @@ def gauss_newton_pose(start, T_BF, x_S, target=None, parameters="euler", max_ste
     return PoseIterates(np.array(poses), np.array(rms), np.array(values), converged)
 
 
-def leave_one_out(T_BF, x_S, robust=False):
+def leave_one_out(T_BF, x_S, robust=False, groups=None):
     """Residual vector of each pose under the calibration from the others: what it is worth elsewhere.
+
+    Poses of one line of motion are alike, and vouch for each other; with `groups` the whole line is left out at once.
 
     Parameters
     ----------
@@ -612,17 +614,28 @@ def leave_one_out(T_BF, x_S, robust=False):
     x_S : array-like, shape (N, 3), mm
     robust : bool
         As in `calibrate_sphere_target`.
+    groups : array-like, shape (N,), optional
+        Which poses go together, such as the names of their lines; None leaves out one pose at a time.
 
     Returns
     -------
     residuals : array, shape (N, 3), mm
+
+    Raises
+    ------
+    ValueError
+        When `groups` does not name a group for each pose.
     """
     T_BF, x_S = as_sightings(T_BF, x_S)
-    found = []
-    for i in range(len(T_BF)):
-        fit = calibrate_sphere_target(np.delete(T_BF, i, 0), np.delete(x_S, i, 0), robust=robust)
-        found.append(sphere_residuals(T_BF[i], x_S[i], fit.T_FS, fit.target))
-    return np.array(found)
+    groups = np.arange(len(T_BF)) if groups is None else np.asarray(groups)
+    if groups.shape != (len(T_BF),):
+        raise ValueError(f"groups must name one group a pose, shape ({len(T_BF)},), got {groups.shape}")
+    found = np.empty_like(x_S)
+    for group in dict.fromkeys(groups.tolist()):
+        out = groups == group
+        fit = calibrate_sphere_target(T_BF[~out], x_S[~out], robust=robust)
+        found[out] = sphere_residuals(T_BF[out], x_S[out], fit.T_FS, fit.target)
+    return found
 
 
 def fit_radius(T_BF, x_S, printed_radius=30.0):

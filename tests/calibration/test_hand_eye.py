@@ -295,6 +295,17 @@ def test_corrections_change_one_entry_each_and_bring_the_fit_below_the_goal():
     assert hand_eye.calibrate_sphere_target(six.T_BF, six.x_S).rms < 0.78
 
 
+def test_leaving_out_a_line_is_harder_than_leaving_out_a_pose():
+    measured = thesis.measurements(True)
+    one, line = (
+        hand_eye.rms_distance(hand_eye.leave_one_out(measured.T_BF, measured.x_S, groups=groups))
+        for groups in (None, measured.line)
+    )
+    assert one == pytest.approx(0.6252, abs=1e-4) and line == pytest.approx(0.715, abs=5e-4)
+    with pytest.raises(ValueError, match="one group a pose"):
+        hand_eye.leave_one_out(measured.T_BF, measured.x_S, groups=["x"])
+
+
 def test_leave_one_out_is_a_real_refit():
     measured = thesis.measurements(True)
     left = hand_eye.leave_one_out(measured.T_BF, measured.x_S)
