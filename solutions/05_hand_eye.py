@@ -378,8 +378,8 @@ def find_misprints(entries):
 
 
 # %% corrections [markdown]
-# The corrections stand in `data/hand_eye/corrections.csv`, with reasons, beside the untouched tables. (Table 6-6 prints pose 3 with the same slip: it was made before the tables
-# were set.) Fit scanner *and* center to the corrected data and give the rms over all 31, none dropped.
+# The corrections stand in `data/hand_eye/corrections.csv`, with reasons, beside the untouched tables. (Table 6-6 prints pose 3 with the same slip. Where the others were made,
+# by a person or when the PDF became the text we have, nobody knows, and nobody is blamed.) Fit scanner *and* center to the corrected data and give the rms over all 31, none dropped.
 
 # %% rms_after
 corrected = thesis.measurements(True)
@@ -525,7 +525,7 @@ print(f"{'bound for one sphere':24} {bound:.2f} mm")
 # ## In practice
 #
 # - Never validate on the pose that fits best. Show all residuals, per pose.
-# - Record poses by machine, and publish the file. Seven entries of these tables are off by one slip each, four by two swapped digits; whether they slipped at the robot, in the typing or when the PDF became our text, nobody can tell.
+# - Record poses by machine, and publish the file. Seven entries of these tables are off by one slip each, four by two swapped digits.
 # - Free what you cannot touch to the accuracy you want.
 # - Use the whole field of the sensor; a small residual at one place says nothing about orientation.
 # - Cut spheres off their equator, and note the side.
