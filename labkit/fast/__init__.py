@@ -12,5 +12,5 @@ ekf         ekf_localize: the landmark filter along a drive, one robot or many
 path        filter_path: a log with one step per reading, however many rows lie between
 maps        cast_rays: rays through a map from thousands of poses; RangeTable: looked up
 sensors     weigh_landmarks, weigh_beams, LikelihoodField, SensorSuite for thousands of particles
-particles   resample_systematic without a search
+particles   sample_motion on one coordinate after the other, resample_systematic without a search
 """

@@ -1,9 +1,30 @@
-"""Systematic resampling without a search; equals `localization.particles.resample_systematic`."""
+"""Clouds of ten thousand particles moved and drawn anew; each equals its namesake in `localization.particles`."""
 
 import numpy as np
 
-from ..checks import as_count
-from ..localization.particles import as_weights
+from ..checks import as_count, as_positive
+from ..localization import odometry
+from ..localization.particles import as_noisy_control, as_weights
+
+
+def sample_motion(states, u, dt, rng, cov_u, model="midpoint"):
+    """As `localization.particles.sample_motion`, of the same random numbers, on one coordinate after the other.
+
+    Sine and cosine of the direction come from one tangent of half of it: t gives 2 t / (1 + t^2) and (1 - t^2) / (1 + t^2).
+    """
+    states, u, root = as_noisy_control(states, u, cov_u)
+    dt, model = as_positive(dt, "dt"), odometry.as_model(model)
+    noise = rng.standard_normal((*states.shape[:-1], 2))
+    v, omega = (u[k] + noise @ row for k, row in enumerate(root))
+    length, turn = odometry.chord(v, omega, dt, model)
+    t = np.tan(0.5 * (states[..., 2] + turn))
+    square = t * t
+    length /= 1 + square
+    moved = np.empty(states.shape)
+    moved[..., 0] = states[..., 0] + length * (1 - square)
+    moved[..., 1] = states[..., 1] + 2 * length * t
+    moved[..., 2] = states[..., 2] + omega * dt
+    return moved
 
 
 def resample_systematic(weights, rng, size=None):

@@ -21,18 +21,22 @@ def weigh_landmarks(z, landmarks, std_range=None, std_bearing=None):
     best = -len(z) * sum(math.log(std * math.sqrt(2 * math.pi)) for std in stds if std is not None)
 
     def weigh(states):
-        states = as_points(states, "states")
-        x, y, theta = (states[..., k].copy() for k in range(3))
-        c, s = np.cos(theta), np.sin(theta)
+        x, y, theta = np.moveaxis(as_points(states, "states"), -1, 0).copy()
         misfit = np.zeros(x.shape)
         for (r, phi), (mark_x, mark_y) in zip(z, landmarks):
             dx, dy = mark_x - x, mark_y - y
+            if std_bearing is not None:
+                turns = np.arctan2(dy, dx)
+                turns -= theta
+                turns -= phi
+                turns *= 1 / math.tau
+                turns -= np.rint(turns)
+                misfit += np.square(turns * (math.tau / std_bearing))
             if std_range is not None:
-                misfit += np.square((r - np.sqrt(dx * dx + dy * dy)) * (1 / std_range))
-            if std_bearing is not None:  # turned into the measured direction, the difference needs no wrapping
-                ahead, left = c * dx + s * dy, c * dy - s * dx
-                cos, sin = math.cos(phi), math.sin(phi)
-                misfit += np.square(np.arctan2(cos * left - sin * ahead, cos * ahead + sin * left) * (1 / std_bearing))
+                dx *= dx
+                dy *= dy
+                dx += dy
+                misfit += np.square((np.sqrt(dx) - r) * (1 / std_range))
         return best - 0.5 * misfit
 
     return Weighting(weigh, best)

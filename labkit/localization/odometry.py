@@ -68,17 +68,23 @@ def twist_to_wheel(u, track):
 
 
 def _inputs(x, u, dt, model):
-    if model not in MODELS:
-        raise ValueError(f"model must be one of {', '.join(MODELS)}, got {model!r}")
+    as_model(model)
     x, u, dt = as_points(x, "x", 3), as_points(u, "u", 2), as_positive(dt, "dt")
     fit_together(x=x.shape[:-1], u=u.shape[:-1], dt=dt.shape)
     return x, u, dt
 
 
-def _chord(u, dt, model):
+def as_model(model):
+    """`model`, one of `MODELS`."""
+    if model not in MODELS:
+        raise ValueError(f"model must be one of {', '.join(MODELS)}, got {model!r}")
+    return model
+
+
+def chord(v, omega, dt, model):
     """Length (m) and direction relative to the heading (rad) of the straight line a step is replaced by."""
-    half_turn = 0.5 * u[..., 1] * dt
-    length = u[..., 0] * dt
+    half_turn = 0.5 * omega * dt
+    length = v * dt
     if model == "euler":
         return length, np.zeros_like(half_turn)
     if model == "arc":
@@ -114,7 +120,7 @@ def step(x, u, dt, model="midpoint"):
     Source: lecture, "Koppelnavigation fuer Radfahrzeuge (2)" (midpoint) and "Bemerkungen" (euler, arc).
     """
     x, u, dt = _inputs(x, u, dt, model)
-    length, turn = _chord(u, dt, model)
+    length, turn = chord(u[..., 0], u[..., 1], dt, model)
     direction = x[..., 2] + turn
     parts = np.broadcast_arrays(
         x[..., 0] + length * np.cos(direction), x[..., 1] + length * np.sin(direction), x[..., 2] + u[..., 1] * dt
@@ -132,7 +138,7 @@ def step_jacobians(x, u, dt, model="midpoint"):
     Source: lecture, "Berechnung der Jacobi-Matrizen" (for the model "euler"); the others by the product rule.
     """
     x, u, dt = _inputs(x, u, dt, model)
-    length, turn = _chord(u, dt, model)
+    length, turn = chord(u[..., 0], u[..., 1], dt, model)
     length, turn, v, omega, theta, dt = np.broadcast_arrays(length, turn, u[..., 0], u[..., 1], x[..., 2], dt)
     cos, sin = np.cos(theta + turn), np.sin(theta + turn)
     F_x = np.zeros((*cos.shape, 3, 3))

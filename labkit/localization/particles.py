@@ -57,14 +57,21 @@ def sample_motion(states, u, dt, rng, cov_u, model="midpoint"):
     See Also
     --------
     odometry_motion
+    labkit.fast.particles.sample_motion : the same for thousands of particles
 
     Source: lecture, "Bewegungsmodell": noise of covariance Sigma_u is added to the control, then f is applied.
     """
+    states, u, root = as_noisy_control(states, u, cov_u)
+    noise = rng.standard_normal((*states.shape[:-1], 2)) @ root.T
+    return odometry.step(states, u + noise, dt, model)
+
+
+def as_noisy_control(states, u, cov_u):
+    """States and control of `sample_motion`, checked, and a root of `cov_u` (root root' = cov_u)."""
     states, u, cov_u = as_points(states, "states"), as_points(u, "u", dim=2), as_covariances(cov_u, "cov_u", 2)
     if u.shape != (2,) or cov_u.shape != (2, 2):
         raise ValueError(f"u and cov_u must have shapes (2,) and (2, 2), got {u.shape} and {cov_u.shape}")
-    noise = rng.standard_normal((*states.shape[:-1], 2)) @ _root(cov_u).T
-    return odometry.step(states, u + noise, dt, model)
+    return states, u, _root(cov_u)
 
 
 def odometry_motion(k_d, k_theta, k_drift, model="midpoint"):

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from labkit.fast.maps import cast_rays
-from labkit.fast.particles import resample_systematic
+from labkit.fast.particles import resample_systematic, sample_motion
 from labkit.fast.sensors import LikelihoodField, weigh_landmarks
 from labkit.localization import particles
 from labkit.localization.maps import OccupancyGrid
@@ -20,7 +20,7 @@ _maps = {}
 
 def pf_update(p, u, z, marks, rng):
     """Move, weigh by four landmarks and resample, with the benchmark's noises."""
-    moved = particles.sample_motion(p, u, 0.1, rng, cov_u=np.diag([0.1**2, 0.05**2]), model="euler")
+    moved = sample_motion(p, u, 0.1, rng, cov_u=np.diag([0.1**2, 0.05**2]), model="euler")
     weigh = weigh_landmarks(z, marks, 0.2, 0.05)
     return moved.take(resample_systematic(particles.normalize_weights(weigh(moved)), rng), axis=0)
 

@@ -1,9 +1,10 @@
-"""Systematic resampling without a search draws what the textbook's draws."""
+"""Clouds of many particles move and are drawn anew as the textbook's are, of the same random numbers."""
 
 import numpy as np
 import pytest
 
 from labkit.fast import particles as fast
+from labkit.localization import odometry
 from labkit.localization import particles as plain
 
 
@@ -18,3 +19,31 @@ def test_both_draw_the_same(dtype, size):
         b = plain.resample_systematic(weights, np.random.default_rng(2), size)
         assert a.shape == b.shape and np.abs(a - b).sum() <= 1
         assert (weights[a] > 0).all() and (weights[b] > 0).all()
+
+
+@pytest.mark.parametrize("dtype", [float, np.float32])
+@pytest.mark.parametrize("model", odometry.MODELS)
+def test_both_move_alike(dtype, model):
+    """All directions, the half turn and many turns included; singular and full covariances; a single state."""
+    rng = np.random.default_rng(4)
+    turns = np.append(rng.uniform(-40, 40, 300), np.pi * np.array([1, -1, 3, 0.5, 0, 2, -7]))
+    states = np.column_stack([rng.uniform(-9, 9, (307, 2)), turns]).astype(dtype)
+    for cov in (np.zeros((2, 2)), np.diag([0.04, 0.0]), [[0.04, 0.01], [0.01, 0.09]], np.full((2, 2), 0.04)):
+        for u, shape in (([1.5, -0.4], (307, 3)), ([-2.0, 0.0], (307, 1, 3)), ([0.0, 5.0], (307, 3))):
+            a, b = (
+                module.sample_motion(states.reshape(shape), u, 0.3, np.random.default_rng(5), cov, model)
+                for module in (fast, plain)
+            )
+            np.testing.assert_allclose(a, b, rtol=0, atol=1e-13)
+    assert fast.sample_motion(states[0], [1, 0], 0.1, rng, np.eye(2), model).shape == (3,)
+
+
+def test_what_the_textbook_refuses_is_refused():
+    good = {"states": np.zeros((4, 3)), "u": [1.0, 0.1], "dt": 0.1, "cov_u": np.eye(2), "model": "euler"}
+    for wrong in ({"dt": 0.0}, {"model": "straight"}, {"u": [1.0]}, {"cov_u": -np.eye(2)}, {"states": np.zeros(4)}):
+        said = []
+        for module in (fast, plain):
+            with pytest.raises(ValueError) as refusal:
+                module.sample_motion(rng=np.random.default_rng(1), **{**good, **wrong})
+            said.append(str(refusal.value))
+        assert said[0] == said[1]
