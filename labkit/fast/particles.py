@@ -10,7 +10,7 @@ from ..localization.particles import as_noisy_control, as_weights
 def sample_motion(states, u, dt, rng, cov_u, model="midpoint"):
     """As `localization.particles.sample_motion`, of the same random numbers, on one coordinate after the other.
 
-    Sine and cosine of the direction come from one tangent of half of it: t gives 2 t / (1 + t^2) and (1 - t^2) / (1 + t^2).
+    Sine and cosine of the direction come from t, the tangent of half of it: 2 t / (1 + t^2) and (1 - t^2) / (1 + t^2).
     """
     states, u, root = as_noisy_control(states, u, cov_u)
     dt, model = as_positive(dt, "dt"), odometry.as_model(model)
