@@ -469,7 +469,7 @@ print("rank of the thesis's second step:", np.linalg.matrix_rank(J, tol=1e-6), "
 # %% design [markdown]
 # The pattern always aimed at the middle of the field. Use all of it: x within ±25 mm, |y| from 3 to 25, z from 190 to 290 (`planning.FIELD`), line of sight (the scanner's z axis) at most 90° from straight
 # down. `planning.poses_that_see(T_FS, target, R_BF, x_S)` gives the poses for chosen orientations and places. With 31 poses, reach 0.7 of the thesis's
-# orientation error (0.44°, so 0.31°), and no more than its translation error (1.2 mm). `planning.predicted_covariance(poses, T_FS, target, std)`, with `fit.std`, tells your own: the root of the
+# orientation error (0.44°, so 0.31°), and no more than its translation error (1.2 mm). `planning.predicted_sphere_covariance(poses, T_FS, target, std)`, with `fit.std`, tells your own: the root of the
 # trace of its first 3 × 3 block is the orientation (rad), of the second the translation.
 
 # %% design_poses

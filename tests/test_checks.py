@@ -133,7 +133,7 @@ REFUSED = [
     (lambda: hand_eye.fit_radius(POSES, np.array([[1.0, 0.0, 1.0]] * 5)), "off the scan plane"),
     (lambda: kim_linear(POSES, np.zeros((5, 3, 3)), np.zeros((4, 3))), r"points_S must have shape \(5, 4, 3\)"),
     (lambda: li_two_step(POSES[:1], np.zeros((1, 3))), "at least 2 poses"),
-    (lambda: planning.predicted_covariance(POSES, I4, O3 + 1.0, 0.1), "undetermined"),
+    (lambda: planning.predicted_sphere_covariance(POSES, I4, O3 + 1.0, 0.1), "undetermined"),
     (lambda: compare_methods(0, 0.1, rng()), "repeats must be a whole number"),
     (lambda: planning.pattern(I4, O3, 0.1, [1.0, np.inf, 1.0]), "spread must be finite"),
     (lambda: thesis.centers_with_radius([[1.0, np.nan, 1.0]], 30.0), "x_S must be finite"),

@@ -9,7 +9,7 @@ from ..checks import as_count, as_matrices, as_positive_number, as_shape, as_tra
 from ..geometry.frames import invert, pose, transform
 from ..geometry.lie import exp_so3, nearest_rotation
 from .hand_eye import MIN_SPREAD, as_sightings, calibrate_sphere_target, linear_start
-from .planning import poses_that_see, predicted_covariance
+from .planning import poses_that_see, predicted_sphere_covariance
 
 
 def kim_linear(T_BF, points_S, points_W):
@@ -186,5 +186,5 @@ def compare_methods(repeats, std, rng):
         }
         for name, T in found.items():
             errors.setdefault(name, []).append(np.linalg.norm(T[:3, 3] - T_FS[:3, 3]))
-        bounds.append(np.trace(predicted_covariance(T_BF, T_FS, target, std)[3:6, 3:6]))
+        bounds.append(np.trace(predicted_sphere_covariance(T_BF, T_FS, target, std)[3:6, 3:6]))
     return {name: float(np.sqrt(np.mean(np.square(e)))) for name, e in errors.items()}, float(np.sqrt(np.mean(bounds)))

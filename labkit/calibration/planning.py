@@ -56,7 +56,7 @@ def field_problem(x_S):
     return None
 
 
-def predicted_covariance(T_BF, T_FS, target, std):
+def predicted_sphere_covariance(T_BF, T_FS, target, std):
     """Covariance of phi, translation and target that a set of poses would give, before anything is measured.
 
     The sphere centers follow from the poses: x_S = T_FS^-1 T_BF^-1 target. This is the Cramer-Rao bound.
@@ -125,7 +125,7 @@ def unseen_changes(T_BF, T_FS, target, tolerance=1e-3):
 
     See Also
     --------
-    predicted_covariance : how well the poses determine what they see.
+    predicted_sphere_covariance : how well the poses determine what they see.
     """
     x_S = transform(invert(T_FS), transform(invert(T_BF), target))
     distance = math.sqrt((x_S**2).sum(-1).mean())

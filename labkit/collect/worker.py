@@ -77,7 +77,7 @@ class Worker:
         for name in library:
             self._take_away(name)
         session = sys.modules["labkit.exercises"]
-        session.course = lambda name: Course(self, chapter, exercises, name)
+        session.course = lambda name: Handover(self, chapter, exercises, name)
         session.course_map = session.progress_text = lambda: Dull()
         DullModule.constant = lambda module, name: self.border.ask("constant", module=module, name=name)["value"]
         from IPython.core.interactiveshell import InteractiveShell
@@ -151,8 +151,8 @@ def _text(error):
         return "(its message cannot be shown)"
 
 
-class Course:
-    """`ex`, as a notebook has it."""
+class Handover:
+    """What a notebook finds under `ex`: every answer is handed across the border."""
 
     def __init__(self, worker, chapter, exercises, name):
         if str(name).replace("_", "-") != chapter:

@@ -82,7 +82,13 @@ def as_model(model):
 
 
 def chord(v, omega, dt, model):
-    """Length (m) and direction relative to the heading (rad) of the straight line a step is replaced by."""
+    """The straight line a step is replaced by, its direction relative to the heading; v, omega, dt, model as in `step`.
+
+    Returns
+    -------
+    length, turn : arrays, shape (...)
+        In m and rad.
+    """
     half_turn = 0.5 * omega * dt
     length = v * dt
     if model == "euler":

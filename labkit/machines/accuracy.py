@@ -130,6 +130,10 @@ def time_offset(time, reference, delayed, max_offset=0.2):
     ------
     ValueError
         Signals of different length, an uneven clock, fewer samples than three times the largest offset.
+
+    See Also
+    --------
+    labkit.estimation.clocks.clock_offset : two streams of poses of different rate, with the standard deviation
     """
     time, reference, delayed = as_finite(time, "time"), as_finite(reference, "reference"), as_finite(delayed, "delayed")
     if time.ndim != 1 or not time.shape == reference.shape == delayed.shape:
@@ -176,6 +180,10 @@ def shift_time(time, T, offset):
     ------
     ValueError
         Wrong shapes, fewer than two samples, a time that does not increase.
+
+    See Also
+    --------
+    labkit.estimation.clocks.sample_stream : at any times, gaps left open
     """
     time, T, offset = as_finite(time, "time"), as_transforms(T, "T"), as_number(offset, "offset")
     if T.ndim != 3 or len(T) < 2 or time.shape != T.shape[:1]:

@@ -88,7 +88,7 @@ def test_error_reaches_the_bound():
     for seed in range(150):
         fit = hand_eye.calibrate_sphere_target(*scene(seed=seed))
         T_BF, _ = scene(seed=seed, std=0)
-        cov = planning.predicted_covariance(T_BF, T_FS0, TARGET0, 0.1)
+        cov = planning.predicted_sphere_covariance(T_BF, T_FS0, TARGET0, 0.1)
         errors.append(
             (frames.rotation_angle(fit.T_FS[:3, :3].T @ T_FS0[:3, :3]), np.linalg.norm(fit.T_FS[:3, 3] - T_FS0[:3, 3]))
         )

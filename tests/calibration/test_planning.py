@@ -80,7 +80,7 @@ def test_predicted_covariance_inverts_the_numeric_information():
         return hand_eye.sphere_residuals(T_BF, x_S, T_FS, TARGET0 + change[6:]).ravel()
 
     J = numeric_jacobian(residuals, np.zeros(9), np.array([1e-6] * 3 + [1e-3] * 6), "central")
-    predicted = planning.predicted_covariance(T_BF, T_FS0, TARGET0, 0.3)
+    predicted = planning.predicted_sphere_covariance(T_BF, T_FS0, TARGET0, 0.3)
     np.testing.assert_allclose(predicted @ (J.T @ J), 0.09 * np.eye(9), atol=1e-6 * np.abs(J.T @ J).max() * 1e-3)
     scale = np.sqrt(np.diagonal(predicted))
     np.testing.assert_allclose(predicted, 0.09 * np.linalg.inv(J.T @ J), atol=1e-6 * scale.max() ** 2)
@@ -89,7 +89,7 @@ def test_predicted_covariance_inverts_the_numeric_information():
 @pytest.mark.parametrize("n, about", [(2, turns(2)), (9, np.zeros((9, 3))), (9, np.outer(np.arange(9), [0, 0, 0.3]))])
 def test_poses_that_leave_something_free_have_no_covariance(n, about):
     with pytest.raises(ValueError, match="undetermined: too few, or turned about one axis only"):
-        planning.predicted_covariance(poses_at(places(n), about), T_FS0, TARGET0, 0.3)
+        planning.predicted_sphere_covariance(poses_at(places(n), about), T_FS0, TARGET0, 0.3)
 
 
 def test_good_poses_leave_nothing_unseen_and_the_weakest_change_is_what_it_says():

@@ -416,7 +416,7 @@ def corrected_fit():
 
 def predicted_stds(T_BF, T_FS, target):
     """Predicted standard deviations of the scanner's rotation (deg) and translation (mm) under these poses."""
-    cov = planning.predicted_covariance(T_BF, T_FS, target, corrected_fit().std)
+    cov = planning.predicted_sphere_covariance(T_BF, T_FS, target, corrected_fit().std)
     return float(np.rad2deg(np.sqrt(np.trace(cov[:3, :3])))), float(np.sqrt(np.trace(cov[3:6, 3:6])))
 
 

@@ -388,7 +388,7 @@ def _corrected_fit():
 @functools.cache
 def _printed_pattern():
     fit = _corrected_fit()
-    return planning.predicted_covariance(thesis.measurements(True).T_BF, fit.T_FS, fit.target, fit.std)
+    return planning.predicted_sphere_covariance(thesis.measurements(True).T_BF, fit.T_FS, fit.target, fit.std)
 
 
 def compute_pattern(state):
@@ -400,7 +400,7 @@ def compute_pattern(state):
     unseen = planning.unseen_changes(T_BF, fit.T_FS, fit.target)
     determined = not (len(unseen.turns) or len(unseen.slides))
     if determined:
-        cov = planning.predicted_covariance(T_BF, fit.T_FS, fit.target, fit.std)
+        cov = planning.predicted_sphere_covariance(T_BF, fit.T_FS, fit.target, fit.std)
         std = _three_stds(cov)
     else:
         cov, std = np.full((9, 9), np.nan), (np.inf,) * 3
