@@ -32,6 +32,7 @@ from .own_data import (
 
 POSE = ("rotation x", "rotation y", "rotation z", "translation x", "translation y", "translation z")
 MANY_REJECTED = 0.2  # of the rows
+FEW_FREEDOM = 8.0  # degrees of freedom of an estimated noise: with fewer it is off by a quarter and more
 LOOSE = 0.1  # of the spread of the positions: residuals as large are more than noise
 FIT_ROWS = 300  # of two streams, spread evenly: neighbors say the same
 FASTEST_BINS = 6
@@ -51,10 +52,11 @@ class Calibration:
     """What one's own data say.
 
     kind: hand-eye, pivot, sphere, frame or compare. meaning: what T is, in words. T: (4, 4). points: named points such
-    as tip, pivot, center. T_target: (4, 4) or None. covariance: (6, 6), in the order `parameters`. noise: estimated
-    standard deviations of a reading. residuals: (n, k), rotation vector (rad) before translation. kept: bool (n,).
-    distances: how far each row lies from what the others predict, in standard deviations. alone: residuals (n, k) of
-    each row under the fit to the other kept rows. group_shifts: {group: how far the estimate moves without it (6,)}.
+    as tip, pivot, center. T_target: (4, 4) or None. covariance: (6, 6), in the order `parameters`; where the noise is
+    estimated it is that of Student's law. noise: standard deviations of a reading, told or estimated; noise_freedom:
+    the degrees of freedom of that estimate, infinite where told. residuals: (n, k), rotation vector (rad) before
+    translation. kept: bool (n,). alone: residuals (n, k) of each row under the fit to the other kept rows.
+    group_shifts: {group: how far the estimate moves without it (6,)}.
     """
 
     kind: str
@@ -79,6 +81,7 @@ class Calibration:
     time_offset: object = None
     comparison: object = None
     poses: np.ndarray | None = None
+    noise_freedom: dict = field(default_factory=dict)
 
     @property
     def rows(self):
@@ -120,6 +123,7 @@ class Calibration:
             "rms_rotation_deg": self.rms_rotation_deg,
             "rms_translation": self.rms_translation,
             "noise": self.noise,
+            "noise_freedom": self.noise_freedom,
             "rows": self.rows,
             "rejected": self.rejected,
             "singular_values": self.singular_values,
@@ -449,21 +453,24 @@ def _over_speed(angle, distance, speed):
 
 def _assembled(model, solution, kept, plain, groups, length_unit, kind, meaning, T, frame, T_target=None, points=None,
                part=slice(0, 6)):  # fmt: skip
-    r, J, std = model.whitened(solution, kept)
-    residuals, _ = model.linearize(solution)
-    covariance = inverse_normal(J[kept])[part, part]
-    alone, shifts = leave_out(r[kept], J[kept])
+    r, J, noise = model.whitened(solution, kept)
+    scale = np.repeat(noise.std, model.channels)
+    residuals = r * scale
+    covariance = inverse_normal(model.widened(J[kept], noise))[part, part]
+    alone, _ = leave_out(r[kept], J[kept])
     everywhere = residuals.copy()
-    everywhere[kept] = alone * np.repeat(std, model.channels)
+    everywhere[kept] = alone * scale
     columns = J[kept].reshape(-1, J.shape[2])
     values = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), compute_uv=False)
     labels = None if groups is None else as_shape(groups, "groups", model.n)
     by_group = {} if labels is None else _group_shifts(r[kept], J[kept], labels[kept], part)
     words = ("rotation_rad", "translation") if len(model.channels) == 2 else ("translation",)
+    std, freedom = (dict(zip(words, map(float, values))) for values in noise)
     return Calibration(
         kind, meaning, length_unit, T, covariance, residuals, kept, values,
-        dict(zip(words, map(float, std))), _plain(model, plain), points or {}, POSE, T_target, everywhere, by_group,
-        _sentences(kind, covariance, frame), _cautions(kept) + _loose(model, residuals[kept], length_unit),
+        std, _plain(model, plain), points or {}, POSE, T_target, everywhere, by_group,
+        _sentences(kind, covariance, frame), _cautions(kept, noise) + _loose(model, residuals[kept], length_unit),
+        noise_freedom=freedom,
     )  # fmt: skip
 
 
@@ -489,11 +496,16 @@ def _sentences(kind, covariance, frame):
     return tuple(out)
 
 
-def _cautions(kept):
-    share = 1 - kept.mean()
+def _cautions(kept, noise):
+    share, freedom, said = 1 - kept.mean(), noise.freedom.min(), ()
     if share > MANY_REJECTED:
-        return (f"{100 * share:.0f} % of the rows disagree with the others: look at them before you trust the rest",)
-    return ()
+        said += (f"{100 * share:.0f} % of the rows disagree with the others: look at them before you trust the rest",)
+    if freedom < FEW_FREEDOM:
+        said += (
+            f"so few rows leave {freedom:.1f} degrees of freedom for the noise: every standard deviation may be off by "
+            f"{100 / np.sqrt(2 * max(freedom, 0.5)):.0f} %",
+        )
+    return said
 
 
 def _loose(model, residuals, length_unit):
@@ -516,8 +528,8 @@ def _moved(model, kept, length_unit):
     other = _attempt(lambda: model.fit(~kept))
     if other is None:
         return ()
-    r, _, std = model.whitened(model.fitted(kept), kept)
-    again = model.linearize(other)[0][~kept] / np.repeat(std, model.channels)
+    _, _, noise = model.whitened(model.fitted(kept), kept)
+    again = model.linearize(other)[0][~kept] / np.repeat(noise.std, model.channels)
     block = advice.moved_block(kept, np.median((again**2).sum(1)) < 4 * again.shape[1])
     if block is None:
         return ()

@@ -8,6 +8,7 @@ Parameters begin with the rotation vector in the moving frame (rad) and the tran
 
 import functools
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,6 +26,27 @@ ROUNDS = 12  # of fitting, looking at distances, and choosing again
 FIRST_STRETCH = 3.0  # on the limit of the first round: its noise comes from the best rows alone
 FLOOR = 1e-9  # of the lengths, and rad: noise-free data must not divide by zero
 TILT = np.deg2rad(30.0)  # of a proposed pose against one that was measured
+LEAST_FREEDOM = 3.0  # below, Student's law has hardly a standard deviation: it is told as if there were so many
+
+
+class Noise(NamedTuple):
+    """What a reading scatters, channel by channel.
+
+    std: standard deviations, (c,). freedom: degrees of freedom each was estimated from, (c,), infinite where given.
+    """
+
+    std: np.ndarray
+    freedom: np.ndarray
+
+    @property
+    def widening(self):
+        """Factor (c,) on what the noise does to an estimate, because the noise is itself an estimate.
+
+        An error divided by an estimated standard deviation follows Student's law, whose standard deviation is
+        sqrt(f / (f - 2)).
+        """
+        f = np.maximum(self.freedom, LEAST_FREEDOM)
+        return np.sqrt(1 / (1 - 2 / f))
 
 
 class Model:
@@ -66,7 +88,7 @@ class Model:
         raise NotImplementedError
 
     def noise(self, r, J, kept):
-        """Standard deviation of each channel from the kept rows, each charged the share of the parameters it fixes."""
+        """`Noise` of the kept rows, each channel charged the share of the parameters that it fixes."""
         edges = np.cumsum((0, *self.channels))
         parts = [slice(a, b) for a, b in zip(edges, edges[1:])]
         p, count = J.shape[2], kept.sum()
@@ -77,23 +99,27 @@ class Model:
         normals = np.array([flat.T @ flat for flat in rows])
         squares = [(r[kept, part] ** 2).sum() for part in parts]
         for _ in range(4):
+            freedom = np.maximum(count * np.array(self.channels) - shares, 1e-9)
             for c in range(len(parts)):
-                dof = count * self.channels[c] - shares[c]
-                std[c] = self.std[c] or max(np.sqrt(squares[c] / max(dof, 1e-9)), floors[c])
+                std[c] = self.std[c] or max(np.sqrt(squares[c] / freedom[c]), floors[c])
             weighted = normals / (std**2)[:, None, None]
             shares = np.einsum("ij,cij->c", invert_normal(weighted.sum(0)), weighted)
-        return std
+        return Noise(std, np.where([given is None for given in self.std], freedom, np.inf))
 
     def size(self, channel):
         """Size of the numbers of a channel, beside which a residual is nothing."""
         return 1.0
 
     def whitened(self, solution, kept):
-        """(residuals, derivative, standard deviations of the channels), the first two in units of the noise."""
+        """(residuals, derivative, `Noise`), the first two in units of the noise."""
         r, J = self.linearize(solution)
-        std = self.noise(r, J, kept)
-        per_number = np.repeat(std, self.channels)
-        return r / per_number, J / per_number[:, None], std
+        noise = self.noise(r, J, kept)
+        per_number = np.repeat(noise.std, self.channels)
+        return r / per_number, J / per_number[:, None], noise
+
+    def widened(self, J, noise):
+        """A whitened derivative in units of what is known of the noise: `inverse_normal` of it is the covariance."""
+        return J / np.repeat(noise.widening, self.channels)[:, None]
 
 
 def majority(model):
@@ -187,10 +213,10 @@ def next_poses(model, solution, kept, count=3):
     std : array, shape (count + 1, 6)
         Predicted standard deviations now and after each of them, for noise as found.
     """
-    _, J, std = model.whitened(solution, kept)
+    _, J, noise = model.whitened(solution, kept)
     poses, candidates = model.proposals(solution)
-    candidates = candidates / np.repeat(std, model.channels)[:, None]
-    covariance = inverse_normal(J[kept])
+    candidates = model.widened(candidates / np.repeat(noise.std, model.channels)[:, None], noise)
+    covariance = inverse_normal(model.widened(J[kept], noise))
     now, chosen, course = np.diag(covariance)[:6], [], [np.sqrt(np.diag(covariance)[:6])]
     for _ in range(count):
         CJ = candidates @ covariance
@@ -236,17 +262,21 @@ class HandEyeModel(Model):
 
     def linearize(self, solution):
         X, Y = solution
-        R, S = self.T_BF[:, :3, :3], self.T_ST
         predicted = invert(self.T_BF @ X) @ Y  # the reading without noise
-        turn = log_so3(np.swapaxes(predicted[:, :3, :3], 1, 2) @ S[:, :3, :3])
-        gap = S[:, :3, 3] - predicted[:, :3, 3]
-        J = np.zeros((len(R), 6, 12))
+        turn = log_so3(np.swapaxes(predicted[:, :3, :3], 1, 2) @ self.T_ST[:, :3, :3])
+        gap = self.T_ST[:, :3, 3] - predicted[:, :3, 3]
+        return np.concatenate([turn, gap], 1), self._derivative(self.T_BF, predicted, X)
+
+    @staticmethod
+    def _derivative(T_BF, predicted, X):
+        """Derivative (n, 6, 12) of residuals at flange poses and the readings that are predicted there."""
+        J = np.zeros((len(T_BF), 6, 12))
         J[:, :3, :3] = np.swapaxes(predicted[:, :3, :3], 1, 2)
         J[:, :3, 6:9] = -np.eye(3)
         J[:, 3:, :3] = -skew(predicted[:, :3, 3])
         J[:, 3:, 3:6] = X[:3, :3].T
-        J[:, 3:, 9:] = -X[:3, :3].T @ np.swapaxes(R, 1, 2)
-        return np.concatenate([turn, gap], 1), J
+        J[:, 3:, 9:] = -X[:3, :3].T @ np.swapaxes(T_BF[:, :3, :3], 1, 2)
+        return J
 
     def start(self):
         return self._candidate[0]
@@ -300,7 +330,7 @@ class HandEyeModel(Model):
         readings = np.repeat(some, 18, axis=0)
         readings[:, :3, :3] = np.tile(turned_both_ways(), (len(some), 1, 1)) @ readings[:, :3, :3]
         flange = Y @ invert(readings) @ invert(X)
-        return flange, HandEyeModel(flange, readings, self.std).linearize(solution)[1]
+        return flange, self._derivative(flange, readings, X)
 
 
 class PivotModel(Model):

@@ -355,7 +355,7 @@ def _from_folder(path):
 def _from_json(path):
     """One `Poses`, or two when the file holds pairs."""
     try:
-        content = json.loads(read_text(path))
+        content = json.loads(read_text(path), parse_int=float)  # a number of any length: too large ones are infinite
     except (json.JSONDecodeError, RecursionError) as error:
         line = f", line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
         raise FileError(f"{path.name}{line}: this is not JSON") from None

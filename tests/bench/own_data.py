@@ -141,21 +141,31 @@ def compare(method, n, std_rot, std_trans, share, runs):
 
 
 def honesty(runs):
-    """Print the mean NEES, noise told and estimated, with the 99 % band of a perfect covariance."""
-    for n in (10, 20, 100):
-        told, own = [], []
+    """Print the mean NEES with the 99 % band of a perfect covariance, and how often it passes the 99 % of its law.
+
+    With the noise told NEES is chi-square with 6 degrees of freedom. With the noise estimated from f of them it is
+    6 (f - 2) / f F(6, f) where the covariance is that of Student's law: again 6 on average, with longer tails.
+    """
+    for n in (4, 10, 20, 100):
+        scores, freedom = {"told": [], "estimated": []}, []
         for run in range(runs):
             robot, sensor, truth, _ = cell(np.random.default_rng([7, n, run]), n, np.deg2rad(0.1), 0.1, 0.0)
-            for scores, options in ((told, {"std_rot": np.deg2rad(0.1), "std_trans": 0.1}), (own, {})):
+            for name, options in (("told", {"std_rot": np.deg2rad(0.1), "std_trans": 0.1}), ("estimated", {})):
                 found = calibrate.hand_eye(robot, sensor, solver=calibrate_hand_eye, **options)
                 e = error(found.T, truth[0])
-                scores.append(e @ np.linalg.solve(found.covariance, e))
-        low, high = stats.chi2.ppf([0.005, 0.995], 6 * runs) / runs
-        print(
-            f"N = {n}: mean NEES {np.mean(told):.2f} with the noise told, {np.mean(own):.2f} with it estimated, "
-            f"99 % band {low:.2f} to {high:.2f}",
-            flush=True,
-        )
+                scores[name].append(e @ np.linalg.solve(found.covariance, e))
+            freedom.append(min(found.noise_freedom.values()))
+        f = max(float(np.median(freedom)), 5.0)  # below, the law has no variance
+        laws = {"told": stats.chi2(6), "estimated": stats.f(6, f, scale=6 * (f - 2) / f)}
+        for name, law in laws.items():
+            half = 2.576 * law.std() / np.sqrt(runs)
+            beyond = np.mean(np.array(scores[name]) > law.ppf(0.99))
+            words = "" if name == "told" else f" from {f:.0f} degrees of freedom"
+            print(
+                f"N = {n}, noise {name}{words}: mean NEES {np.mean(scores[name]):.2f}, 99 % band {6 - half:.2f} to "
+                f"{6 + half:.2f}; {100 * beyond:.1f} % beyond the law's 99 %",
+                flush=True,
+            )
 
 
 def times():

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from labkit.calibration import advice, calibrate
 from labkit.calibration.own_data import FrameModel, HandEyeModel, PivotModel, SphereModel, majority
 from labkit.estimation.differences import numeric_jacobian
+from labkit.fast.ax_xb import calibrate_hand_eye
 from labkit.geometry.frames import invert, pose
 from labkit.geometry.lie import exp_so3, log_so3
 
@@ -77,6 +78,22 @@ def test_the_covariance_is_honest():
         score(calibrate.hand_eye(*cell(seed, n=30)[:2], std_rot=STD_ROT, std_trans=STD_TRANS)) for seed in range(100)
     )
     assert stats.chi2.ppf(5e-7, 600) < total < stats.chi2.ppf(1 - 5e-7, 600)
+
+
+def test_the_covariance_is_honest_where_the_noise_is_estimated_from_few_poses():
+    """NEES of 120 runs of ten poses: its mean is that of 6 (f - 2) / f F(6, f), which is 6; f is at least 18 - 2, the
+    band for odds of 1e-6 is the normal one of the mean; fixed seeds."""
+    scores = [score(calibrate.hand_eye(*cell(seed, n=10)[:2], solver=calibrate_hand_eye)) for seed in range(120)]
+    spread = 6 * (16 - 2) / 16 * stats.f(6, 16).std() / np.sqrt(120)
+    assert abs(np.mean(scores) - 6) < 4.9 * spread
+    told = calibrate.hand_eye(*cell(0, n=10)[:2], std_rot=STD_ROT, std_trans=STD_TRANS)
+    assert told.as_dict()["noise_freedom"] == {"rotation_rad": None, "translation": None}
+
+
+def test_few_rows_are_told_to_leave_the_noise_open():
+    few = calibrate.hand_eye(*cell(3, n=4)[:2])
+    assert any("degrees of freedom for the noise" in warning for warning in few.warnings)
+    assert not calibrate.hand_eye(*cell(3, n=10)[:2]).warnings
 
 
 def test_eye_to_hand_is_the_same_problem_with_the_robot_inverted():

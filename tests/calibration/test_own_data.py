@@ -1,6 +1,7 @@
 """The models behind the calibration of one's own data: derivatives by differences, noise beside the plain fit."""
 
 import numpy as np
+from scipy import stats
 
 from labkit.calibration import ax_xb, own_data
 from labkit.estimation.differences import numeric_jacobian
@@ -40,4 +41,30 @@ def test_noise_of_all_rows_is_that_of_the_plain_fit():
     T_BF, T_ST = readings(5)
     model, plain = own_data.HandEyeModel(T_BF, T_ST), ax_xb.calibrate_hand_eye(T_BF, T_ST)
     r, J = model.linearize((plain.T_FS, plain.T_BT))
-    np.testing.assert_allclose(model.noise(r, J, np.ones(5, bool)), plain.std[[0, 3]], rtol=0.05)
+    noise = model.noise(r, J, np.ones(5, bool))
+    np.testing.assert_allclose(noise.std, plain.std[[0, 3]], rtol=0.05)
+    np.testing.assert_allclose(noise.freedom.sum(), 5 * 6 - 12, rtol=1e-9)  # all parameters are paid for
+
+
+def test_an_error_over_an_estimated_noise_follows_the_law_of_hotelling():
+    """Four touches of a tip are a linear problem with f = 12 - 6 degrees of freedom, so NEES f / (f - 2) / 6 follows
+    F(6, f) exactly; 800 fixed draws beside it by the test of Kolmogorov and Smirnov, at odds of 1e-6."""
+    rng, R, scores = np.random.default_rng(4), exp_so3(np.random.default_rng(3).uniform(-0.7, 0.7, (4, 3))), []
+    tip, point = np.array([10.0, -20.0, 150.0]), np.array([500.0, 0.0, 30.0])
+    for _ in range(800):
+        model = own_data.PivotModel(pose(R, point - R @ tip + 0.1 * rng.normal(size=(4, 3))))
+        found, every = model.fitted(np.ones(4, bool)), np.ones(4, bool)
+        _, J, noise = model.whitened(found, every)
+        e = np.concatenate([found[0] - tip, found[1] - point])
+        N = np.einsum("nki,nkj->ij", *2 * [model.widened(J, noise)])
+        scores.append(e @ N @ e)
+    np.testing.assert_allclose(noise.freedom, 6.0)
+    assert stats.kstest(np.array(scores) * 6 / 4 / 6, stats.f(6, 6).cdf).pvalue > 1e-6
+    assert stats.kstest(np.array(scores) / 6, stats.f(6, 6).cdf).pvalue < 1e-6  # without the widening it would not
+
+
+def test_noise_that_is_told_widens_nothing():
+    model = own_data.HandEyeModel(*readings(5), std=(2e-3, 0.3))
+    solution = model.fitted(np.ones(5, bool))
+    _, J, noise = model.whitened(solution, np.ones(5, bool))
+    assert np.isinf(noise.freedom).all() and (model.widened(J, noise) == J).all()

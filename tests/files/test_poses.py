@@ -169,6 +169,8 @@ JSON_FAULTS = {
     "{}": "p.json: expected a list of 4 x 4 matrices, or of pairs of them",
     "[[1, 2, 3]]": "p.json, entry 1: expected a 4 x 4 matrix or a pair of them, got an array of shape (3,)",
     '["a"]': "p.json, entry 1: expected a 4 x 4 matrix or a pair of them, got 'a'",
+    f"[[{'9' * 400}, {'1, ' * 14}1]]": "p.json, entry 1: expected finite numbers, got inf",
+    f"[[{'9' * 5000}, {'1, ' * 14}1]]": "p.json, entry 1: expected finite numbers, got inf",
     json.dumps([np.diag([1, 1, -1, 1]).tolist()]): "p.json, entry 1: the matrix is left-handed",
     json.dumps([np.eye(4).tolist(), [np.eye(4).tolist()] * 2]): "p.json, entry 2: expected 1 matrices as in entry 1",
 }
