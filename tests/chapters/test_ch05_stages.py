@@ -10,7 +10,7 @@ from labkit.documents.thesis.printed import corrections, measurements
 from labkit.geometry import frames
 from labkit.geometry.lie import exp_so3
 
-ALL = (w.scan_line, w.difference_steps, w.convergence, w.thirty_one_poses, w.pattern_designer)
+ALL = (w.scan_line, w.difference_steps, w.convergence, w.two_methods, w.thirty_one_poses, w.pattern_designer)
 
 
 @pytest.mark.parametrize("make", ALL)
@@ -45,6 +45,26 @@ def test_steps_on_the_pose_need_no_detour():
     assert result["euler"]["steps"] > 2 * result["se3"]["steps"]
     assert result["euler"]["turned_deg"] > 4 * result["se3"]["turned_deg"]
     assert result["se3"]["path"][0] == pytest.approx([-54, -30], abs=1e-9)
+
+
+def test_two_methods_from_the_dragged_start_and_from_a_printed_one():
+    state = {"P": np.array([70.0, 60.0]), "number": 0, "radius": 10.0, "B_deg": -90.0}
+    result = w.compute_methods(state)
+    for path in result["paths"].values():
+        assert path[0] == pytest.approx([70.0, 60.0]) and path[-1] == pytest.approx([0, 0], abs=1e-4)
+    printed = w.compute_methods({**state, "number": 5})
+    assert printed["paths"]["trust region"][0] == pytest.approx([0.0, 0.1], abs=1e-9)
+
+
+def test_taking_a_printed_start_moves_the_handle_and_dragging_lets_go_of_it():
+    stage = w.two_methods()
+    stage.set(number=9)
+    assert stage.state["P"] == pytest.approx([np.sqrt(70**2 + 75**2 + 50**2), 0.102], abs=1e-3)
+    assert stage.caption.startswith("From start 9")
+    stage.set(P=(40, 30))
+    assert stage.state["number"] == 0 and stage.caption.startswith("From the dragged start")
+    stage.make_it_fail()
+    assert "of them uphill. Trust region" in stage.caption and "steps, never uphill" in stage.caption
 
 
 def test_residuals_of_the_31_poses_follow_the_edits():

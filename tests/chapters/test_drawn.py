@@ -65,7 +65,8 @@ def plane(angle_deg):
 WITH_HANDLES = (
     ch01.three_points, ch01.triangle_noise, ch01.svd_against_gram_schmidt, ch02.order_of_product, ch02.open_loop,
     ch03.pose_designer, ch03.outliers, ch04.line, ch04.four_paths, ch04.saddle, ch04.basins, ch05.scan_line,
-    ch05.convergence, ch05.pattern_designer, ch06.tx40, ch06.two_axes, ch07.circles, ch08.bells, ch08.arena,
+    ch05.convergence, ch05.two_methods, ch05.pattern_designer, ch06.tx40, ch06.two_axes, ch07.circles, ch08.bells,
+    ch08.arena,
 )  # fmt: skip
 
 
@@ -267,6 +268,16 @@ def test_paths_of_both_parametrizations_start_at_the_handle():
         run = stage.result[name]
         assert run["path"][0] == pytest.approx([-2.0, 20.0], abs=1e-9)
         assert_drawn(stage, run["path"], np.column_stack([np.arange(len(run["rms"])), run["rms"]]))
+
+
+def test_both_methods_start_at_the_handle_and_what_is_taken_back_is_crossed():
+    stage = at(ch05.two_methods(), P=(0.0, 175.0), B_deg=-88.0)
+    for name, run in stage.result["runs"].items():
+        path = stage.result["paths"][name]
+        assert path[0] == pytest.approx([0.0, 175.0], abs=1e-6)
+        assert_drawn(stage, path, np.column_stack([np.arange(len(run.rms)), np.maximum(run.rms, 1e-9)]))
+    back = np.flatnonzero(np.diff(stage.result["runs"]["trust region"].rms) == 0) + 1
+    assert len(back) and set(back) == set(stage.moving[-1].get_xdata())
 
 
 def test_the_chosen_pose_sees_the_sphere_where_its_residual_ends():

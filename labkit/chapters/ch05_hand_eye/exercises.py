@@ -823,6 +823,13 @@ CHAPTER = Chapter(
             answer="they take detours",
             why="Near the pole A and C turn about one line: their steps become huge and nearly cancel. The pose often arrives all the same, after two or three times the steps.",
         ),
+        Prediction(
+            "trust_arrives",
+            question="From how many of the ten starts of table 7-2 does the trust region of chapter 4 arrive?",
+            choices=("seven", "nine", "all ten"),
+            answer="all ten",
+            why="The residuals are linear in the translation and nearly so in these small turns: the model is good, no step is taken back, and only the radius makes it slower.",
+        ),
         Exercise(
             "linear_start",
             reference=hand_eye.linear_start,

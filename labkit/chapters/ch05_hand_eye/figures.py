@@ -77,6 +77,29 @@ def iterations(ax, steps=30):
     return euler, se3
 
 
+def start_plane(ax, places, far=125.0):
+    """Plane of a start's distance and turn off the truth, the printed starts marked. Returns (first path, second)."""
+    style.axes(ax, "distance off the truth (mm)", "turn off the truth (deg)", "drag the start")
+    ax.set(xlim=(-4, far), ylim=(-6, 184))
+    ax.set_yticks([0, 45, 90, 135, 180])
+    ax.plot(*np.transpose(places), color=style.INK, marker="x", markersize=8, linestyle="none", clip_on=False)
+    ax.annotate("crosses: the starts of table 7-2", (0.98, 0.07), xycoords="axes fraction", ha="right")
+    (first,) = ax.plot([], [], **style.look("estimate", marker="D", markersize=5))
+    (second,) = ax.plot([], [], **style.look("prediction", marker="o", markersize=5))
+    return first, second
+
+
+def descents(ax, names, steps, low, high):
+    """Rms distance over the steps of two methods, those taken back as crosses. Returns (first, second, taken back)."""
+    style.axes(ax, "step", "rms distance (mm)", "how fast")
+    ax.set(yscale="log", xlim=(0, steps), ylim=(low, high))
+    (first,) = ax.plot([], [], label=names[0], **style.look("estimate", marker="D", markersize=5))
+    (second,) = ax.plot([], [], label=names[1], **style.look("prediction", marker="o", markersize=5))
+    (back,) = ax.plot([], [], label="taken back", **style.look("rejected", markersize=8, color=style.INK))
+    ax.legend(loc="upper right")
+    return first, second, back
+
+
 def residual_bars(ax, n, top=3000.0):
     """Residual length of each pose on a logarithmic scale; returns (stems, chosen, yardstick)."""
     style.axes(ax, "pose (click one)", "residual (mm)")

@@ -1,5 +1,5 @@
-"""Stages of chapter 5: scan line and sphere, difference steps, iterations at the pole, the 31 poses, a measuring
-pattern.
+"""Stages of chapter 5: scan line and sphere, difference steps, iterations at the pole, two methods, the 31 poses, a
+measuring pattern.
 """
 
 import functools
@@ -8,6 +8,7 @@ import numpy as np
 
 from ...calibration import hand_eye, planning, sphere
 from ...documents import misprints
+from ...documents.thesis import comparison
 from ...documents.thesis import printed as thesis
 from ...estimation.differences import numeric_jacobian
 from ...estimation.gaussian import unit_noise
@@ -239,6 +240,85 @@ def convergence():
         controls={"B_deg": Choice({"B = -88 deg": -88.0, "B = -30 deg": -30.0}, -88.0, label="scanner at")},
         fail={"P": (-54.0, -30.0), "B_deg": -30.0},
         describe=_iterations_sentence,
+    )
+
+
+# --- two methods -----------------------------------------------------------------------------------------------------
+
+STEPS_SHOWN = 30
+
+
+@functools.lru_cache(maxsize=64)
+def _descents(start_deg, radius, B_deg):
+    return {m: comparison.run(m, start_deg, "A, B, C", radius, B_deg, STEPS_SHOWN) for m in comparison.METHODS}
+
+
+def compute_methods(state):
+    """Gauss-Newton and the trust region from the dragged start or from one of table 7-2: their runs and their paths.
+
+    A path is the distance (mm) and the turn (deg) off the truth after each step.
+    """
+    B, number = state["B_deg"], state["number"]
+    start = thesis.start_poses_deg()[0][number] if number else comparison.start_at(*state["P"], B)
+    runs = _descents(tuple(start.tolist()), state["radius"], B)
+    paths = {method: comparison.errors(run.poses, B) for method, run in runs.items()}
+    return {"runs": runs, "paths": paths, "number": number, "radius": state["radius"]}
+
+
+def _methods_sentence(result):
+    def told(method):
+        run = result["runs"][method]
+        steps = "1 step" if run.steps == 1 else f"{run.steps} steps"
+        climbs = {0: "never uphill", 1: "1 of them uphill"}.get(run.climbs, f"{run.climbs} of them uphill")
+        name = method[0].upper() + method[1:]
+        return f"{name}: {steps}, {climbs}" if run.arrived else f"{name}: not there after {run.steps} steps"
+
+    where = f"start {result['number']} of table 7-2" if result["number"] else "the dragged start"
+    newton, trust = (told(method) for method in comparison.METHODS)
+    return f"From {where}. {newton}. {trust}, {result['runs']['trust region'].taken_back} taken back."
+
+
+def two_methods():
+    """Drag the start, or take one of table 7-2: Gauss-Newton against a trust region on the scanner's pose."""
+    names = comparison.METHODS
+
+    def places(B_deg):
+        return comparison.errors(frames.matrix_from_kuka(frames.kuka_from_degrees(thesis.start_poses_deg()[0])), B_deg)
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2)
+        paths = draw.start_plane(left, places(-90.0)[1:])
+        *curves, back = draw.descents(right, names, STEPS_SHOWN, 1e-9, 1e3)
+
+        def update(state, result):
+            for path, curve, name in zip(paths, curves, names):
+                rms = result["runs"][name].rms
+                path.set_data(*result["paths"][name].T)
+                curve.set_data(np.arange(len(rms)), np.maximum(rms, 1e-9))
+            run = result["runs"]["trust region"]
+            rejected = np.flatnonzero(~run.accepted[: run.steps])
+            back.set_data(rejected + 1, np.maximum(run.rms[rejected + 1], 1e-9))
+
+        return [*paths, *curves, back], update
+
+    def follow(state, moved):
+        if "number" in moved and state["number"]:
+            return {"P": places(state["B_deg"])[state["number"]]}
+        return {"number": 0} if "P" in moved else {}
+
+    return Stage(
+        "Gauss-Newton against trust region",
+        scene=scene,
+        compute=compute_methods,
+        handles={"P": Handle((70.0, 60.0), step=1.0, bounds=((0, 120), (0, 179)), label="start, distance and turn")},
+        constrain=follow,
+        controls={
+            "number": Slider(0, 9, 0, step=1, label="start of table 7-2 (0: yours)"),
+            "radius": Slider(0.1, 1000.0, 10.0, log=True, label="first radius (mm)"),
+            "B_deg": Choice({"B = -90 deg": -90.0, "B = -88 deg": -88.0}, -90.0, label="scanner at"),
+        },
+        fail={"P": (70.0, 175.0), "B_deg": -88.0},
+        describe=_methods_sentence,
     )
 
 

@@ -303,6 +303,39 @@ def start_poses_deg():
     return np.column_stack([data[c] for c in POSE_COLUMNS]), data["name"]
 
 
+def iterations_7_3():
+    """Iterations that the thesis counts from the ten start poses.
+
+    Returns
+    -------
+    iterations : dict
+        {"Gauss-Newton", "trust region": array (10,)}; NaN where it found no minimum. The trust region's entry 8 belongs
+        to a start turned by 0.001 deg about z and x, as the footnote says, and not by 0.005 deg as in table 7-2.
+
+    Source: thesis, table 7-3.
+    """
+    table = read_table("hand_eye/table_7_3.csv", text=("gauss_newton", "trust_region", "remark"))
+    columns = {"Gauss-Newton": "gauss_newton", "trust region": "trust_region"}
+    return {
+        method: np.array([np.nan if entry == "-" else float(entry) for entry in table[column]])
+        for method, column in columns.items()
+    }
+
+
+def footnote_start_deg():
+    """The start pose of row 8 of table 7-3 for the trust region, as its footnote changes it.
+
+    Returns
+    -------
+    pose : array, shape (6,), mm and deg
+
+    Source: thesis, footnote of table 7-3.
+    """
+    start = start_poses_deg()[0][8].copy()
+    start[[3, 5]] = 0.001
+    return start
+
+
 def table_7_1(method):
     """Results of one method on the surface with two minima, local minimum first.
 
