@@ -26,7 +26,7 @@ from labkit.documents.report import printed as report
 from labkit.documents.report.reconstruction import synthetic_mountings, synthetic_table
 from labkit.exercises import course
 from labkit.geometry.frames import relative
-from labkit.machines import accuracy, arm, simulation, udp
+from labkit.machines import accuracy, arm, simulation, stations, udp
 from labkit.machines.log import average_stops, read_csv
 from labkit.machines.mounting import calibrate_mounting
 from labkit.tables import DATA, read_table
@@ -314,6 +314,95 @@ guess = ...  # your code here
 guess = "the runs alone cannot tell"
 ### END SOLUTION
 ex.predict("runs", guess, reveal=stages.six_runs)
+
+# %% sweeps [markdown]
+# ## Break it again: a station that moves (*further*)
+#
+# How does the tracker know where it is? Two *base stations* stand in the room
+# (section 1 of the report). A station flashes, and with the flash a plane of light
+# begins to turn about its axis $y$; later another one turns about its axis $x$. A
+# photodiode on the tracker sees the flash, then the plane: **the time between them is
+# an angle**. A plane starts at $-90°$ and needs $1/\mathrm{rate}$ for a whole turn. For a
+# diode at $(x, y, z)$ in the station's frame, $z$ pointing into the room,
+#
+# $$\alpha = \operatorname{atan2}(x, z), \qquad \beta = \operatorname{atan2}(y, z).$$
+#
+# The report prints no rate; 60 turns per second are our assumption.
+# **How far does the plane move in a microsecond, 3 m from the station?**
+
+# %% predict-sweep
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = 1.1
+### END SOLUTION
+ex.predict("sweep", guess, reveal=stages.sweeps)
+
+# %% ray_direction
+@ex.ray_direction
+def ray_direction(delays, rate):
+    """Return the direction, shape (3,), of length 1, in the station's frame, of a diode
+    that the planes about y and x hit delays, shape (2,), s, after their flashes;
+    rate is in turns per second."""
+    ### BEGIN SOLUTION
+    alpha, beta = 2 * np.pi * rate * np.asarray(delays) - np.pi / 2
+    d = np.array([np.tan(alpha), np.tan(beta), 1.0])
+    return d / np.linalg.norm(d)
+    ### END SOLUTION
+
+
+# %% place [markdown]
+# One station knows a direction and no distance. Two rays should meet in the diode;
+# with noise they pass each other, and the place is where the sum of the squared
+# distances to the rays is least. Push the stations together in the figure above to see
+# what it is worth.
+
+# %% nearest_to_rays
+@ex.nearest_to_rays
+def nearest_to_rays(origins, directions):
+    """Return the point, shape (3,), mm, with the least sum of squared distances to rays
+    from origins, shape (n, 3), along directions, shape (n, 3), of any length; n >= 2."""
+    ### BEGIN SOLUTION
+    d = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    across = np.eye(3) - d[:, :, None] * d[:, None, :]
+    b = (across @ origins[:, :, None]).sum(axis=0)[:, 0]
+    return np.linalg.solve(across.sum(axis=0), b)
+    ### END SOLUTION
+
+
+# %% six-degrees [markdown]
+# Several diodes on a rigid body fix its whole pose: least squares on all angles. With
+# nine diodes even a single station suffices, in principle. Compare the depth:
+
+# %% one-or-two-stations
+held = arm.tool_pose(arm.TX40, joints[3], simulation.T_FE)
+for n in (1, 2):
+    L = stations.STATIONS[:n]
+    angles = stations.body_angles(L, stations.DIODES, held)
+    noise = 5e-5 * np.random.default_rng(1).normal(size=angles.shape)
+    seen = stations.sight(L, stations.DIODES, angles + noise, held)
+    turn, off = np.rad2deg(seen.std_of("T_WE.rotation")), seen.std_of("T_WE.translation")
+    print(f"{n} station{'s' * (n > 1)}: std", off.round(2), "mm,", turn.round(2), "deg")
+
+# %% moved [markdown]
+# All this holds while the stations stand where the software believes. The conclusion of
+# the report asks for firm clamps: vibration, from the very motors that turn the planes,
+# made the readings worse by an order of magnitude. Suppose a station is knocked by
+# 0.1° and nobody notices. **When does that spoil the calibration of the mounting more:
+# before the run, or after its tenth stop?**
+
+# %% predict-moved
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "after its tenth stop"
+### END SOLUTION
+ex.predict("moved", guess, reveal=stages.moved_station)
+
+# %% moved-then [markdown]
+# A station that stood askew from the beginning turns the whole world a little, and the
+# reset into $W$ takes that up: $E_{trans}$ stays near the noise. One that moves during
+# the run makes two worlds, and no mounting fits both. Turn the knob until the mean error
+# is the report's, and read off how few milliradians that takes. A rocking station does
+# it at every stop. $E_{trans}$ sees what changes *within* a run, and nothing else.
 
 # %% beyond [markdown]
 # ## Beyond the document: can it be done better?

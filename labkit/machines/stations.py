@@ -21,18 +21,36 @@ from ..geometry.lie import exp_so3, skew
 
 TURN_RATE = 60.0  # turns per second, of a station of the first generation: assumed, see above
 MAX_STEPS, STEP_TOLERANCE = 30, 1e-10  # Gauss-Newton; rad, and mm divided by the distance
+MIN_PARALLAX = 1e-6  # smallest singular value of a place beside the largest: below, all rays are one line
 DIODES = 45.0 * unit_vector(
     np.array(
         [[1, 0, 0.2], [0.3, 0.95, 0.2], [-0.8, 0.6, 0.2], [-0.8, -0.6, 0.2], [0.3, -0.95, 0.2]]
         + [[0.5, 0.4, 0.8], [-0.6, 0.1, 0.8], [0.2, -0.6, 0.8], [0, 0, 1]]
     )
 )  # mm in E: nine on a dome of 90 mm; the report prints the body's size (102 x 88 x 98 mm), not where its diodes sit
+
+
+def looking(position, at):
+    """Pose of a station that looks at a point, its x axis level and its y axis pointing down.
+
+    Parameters
+    ----------
+    position, at : array-like, shape (3,), mm
+        In W, whose z axis points up; the line between them must not be vertical.
+
+    Returns
+    -------
+    T_WL : array, shape (4, 4)
+    """
+    position, at = as_shape(position, "position", 3), as_shape(at, "at", 3)
+    z = unit_vector(at - position)
+    x = unit_vector(np.cross(z, [0.0, 0.0, 1.0]))
+    return pose(np.column_stack([x, np.cross(z, x), z]), position)
+
+
 STATIONS = np.array(
-    [
-        pose(exp_so3([0, 0, yaw]) @ exp_so3([0, np.pi / 2 + 0.45, 0]) @ exp_so3([0, 0, np.pi / 2]), at)
-        for yaw, at in ((np.deg2rad(135.0), (1800.0, -1900.0, 1700.0)), (np.deg2rad(-135.0), (1900.0, 1700.0, 1700.0)))
-    ]
-)  # T_WL of two stations on a wall, 3.6 m apart, both looking down at a robot at the origin of W
+    [looking(position, (250.0, 0.0, 450.0)) for position in ((1800.0, -1900.0, 1700.0), (1900.0, 1700.0, 1700.0))]
+)  # T_WL of two stations 3.6 m apart that look down at a robot in the origin of W
 
 
 # ---- a sweep, a ray, a place -----------------------------------------------------------------------------------------
@@ -197,8 +215,17 @@ def place_covariance(T_WL, point, std_angle):
     Returns
     -------
     covariance : array, shape (3, 3), mm^2
+
+    Raises
+    ------
+    ValueError
+        When all stations see the point along one line.
     """
-    J = angle_jacobian(as_shape(T_WL, "T_WL", "n", 4, 4), as_shape(point, "point", 3)).reshape(-1, 3)
+    T_WL, point = as_shape(T_WL, "T_WL", "n", 4, 4), as_shape(point, "point", 3)
+    J = angle_jacobian(T_WL, point).reshape(-1, 3)
+    values = np.linalg.svd(J, compute_uv=False)
+    if len(values) < 3 or values[2] < MIN_PARALLAX * values[0]:
+        raise ValueError("the stations see the point along one line: its distance is not determined")
     return as_positive_number(std_angle, "std_angle") ** 2 * np.linalg.inv(J.T @ J)
 
 

@@ -6,9 +6,10 @@ import time
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
 
 from labkit.chapters.ch06_tracker import stages as wr
-from labkit.machines import simulation, udp
+from labkit.machines import simulation, stations, udp
 from labkit.machines.arm import (
     BASE_HEIGHT,
     HOME,
@@ -21,7 +22,7 @@ from labkit.machines.arm import (
 from labkit.machines.packet import POSITION, decode_packet
 from labkit.tables import read_table
 
-ALL = (wr.tx40, wr.live_tracker, wr.two_axes, wr.dynamic_errors, wr.methods, wr.six_runs)
+ALL = (wr.tx40, wr.live_tracker, wr.two_axes, wr.dynamic_errors, wr.methods, wr.six_runs, wr.sweeps, wr.moved_station)
 
 
 @pytest.mark.parametrize("make", ALL)
@@ -186,3 +187,47 @@ def test_repeating_does_not_show_the_systematic_error():
     assert none["off"] < 2 * none["std"] and some["off"] > 5 * some["std"]
     e = some["single"] - simulation.T_FE[:3, 3]
     assert e @ np.linalg.solve(some["claim"], e) < 16.27  # 99.9 % of a chi-square with 3 degrees of freedom
+
+
+# ---- base stations
+
+
+def sweeps_state(A=(-1700.0, -1500.0), B=(1700.0, -1500.0), P=(300.0, 700.0), jitter=20.0):
+    return {"A": np.array(A), "B": np.array(B), "P": np.array(P), "jitter": jitter}
+
+
+def test_the_found_places_scatter_as_the_ellipse_says():
+    """Sum of squares over 40 places, in standard deviations: chi-square with 80 degrees of freedom."""
+    result = wr.compute_sweeps(sweeps_state())
+    off = result["found"] - result["place"]
+    total = np.einsum("ni,ij,nj->", off, np.linalg.inv(result["covariance"]), off)
+    assert 1e-4 < chi2.cdf(total, 80) < 1 - 1e-4
+    turns = 2 * np.pi * 60 * result["delays"] - np.pi / 2
+    np.testing.assert_allclose(turns, result["angles"])
+
+
+def test_stations_side_by_side_know_no_distance():
+    """Closed form for a diode on the middle line: the uncertainty along it grows with 1 / base."""
+    wide, narrow = (
+        wr.compute_sweeps(sweeps_state((-b, -2000.0), (b, -2000.0), (0.0, 0.0)))["std"][0] for b in (400.0, 100.0)
+    )
+    r2 = np.array([400.0, 100.0]) ** 2 + 2000.0**2
+    assert narrow / wide == pytest.approx(4 * r2[1] / r2[0], rel=1e-6)
+
+
+def moved(tilt, when):
+    return wr.compute_moved_station({"tilt": tilt, "when": when})
+
+
+def test_a_moved_station_shows_in_e_trans_only_if_it_moves_during_the_run():
+    still, before, during = moved(0.0, "before the run"), moved(2.0, "before the run"), moved(2.0, "after stop 10")
+    assert during["E_trans"] > 15 * before["E_trans"] and during["off"] > 10 * before["off"]
+    assert still["mean"] < 0.1 and moved(2.0, "at every stop")["E_trans"] > during["E_trans"]
+    np.testing.assert_allclose(during["E_trans"], moved(4.0, "after stop 10")["E_trans"] / 2, rtol=0.03)
+
+
+def test_the_stations_of_the_room_see_the_robot_within_the_makers_distance():
+    """Section 1: 0.7 to 5 m from both stations, which are at most 5 m apart."""
+    away = np.linalg.norm(stations.STATIONS[:, None, :3, 3] - wr._stops()[1][:, :3, 3], axis=-1)
+    assert away.min() > 700 and away.max() < 5000
+    assert np.linalg.norm(np.subtract(*stations.STATIONS[:, :3, 3])) < 5000

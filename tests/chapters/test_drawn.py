@@ -65,8 +65,8 @@ def plane(angle_deg):
 WITH_HANDLES = (
     ch01.three_points, ch01.triangle_noise, ch01.svd_against_gram_schmidt, ch02.order_of_product, ch02.open_loop,
     ch03.pose_designer, ch03.outliers, ch04.line, ch04.four_paths, ch04.saddle, ch04.basins, ch05.scan_line,
-    ch05.convergence, ch05.two_methods, ch05.pattern_designer, ch06.tx40, ch06.two_axes, ch07.circles, ch08.bells,
-    ch08.arena,
+    ch05.convergence, ch05.two_methods, ch05.pattern_designer, ch06.tx40, ch06.two_axes, ch06.sweeps,
+    ch07.circles, ch08.bells, ch08.arena,
 )  # fmt: skip
 
 
@@ -329,6 +329,17 @@ def test_the_arm_keeps_its_lengths_in_every_position():
     left = [-np.sin(np.deg2rad(35)), np.cos(np.deg2rad(35)), 0]
     np.testing.assert_allclose(points[2] - points[1], 35.0 * np.array(left), atol=1e-9)
     assert points[5] == pytest.approx(stage.state["flange"], abs=1e-9)
+
+
+def test_rays_lead_from_the_stations_to_the_diode():
+    A, B, P = (-1200.0, -1800.0), (900.0, -2000.0), (200.0, 400.0)
+    stage = at(ch06.sweeps(), A=A, B=B, P=P)
+    assert_drawn(stage, [A, P, GAP, B, P], [A, B], [P], stage.result["found"])
+
+
+def test_the_error_of_each_stop_after_the_first_is_drawn():
+    stage = at(ch06.moved_station(), tilt=3.0, when="after stop 10")
+    assert_drawn(stage, np.column_stack([np.arange(1, 21), stage.result["errors"][1:]]))
 
 
 class OneTrail:

@@ -76,8 +76,20 @@ def test_jacobian_of_the_angles_is_that_of_finite_differences():
 
 
 def level(x, y):
-    """A station at height 0 that looks along +y of W, its own y axis pointing down."""
-    return pose(np.column_stack([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), [x, y, 0.0])
+    """A station at height 0 that looks along +y of W."""
+    return stations.looking([x, y, 0.0], [x, y + 100.0, 0.0])
+
+
+def test_a_station_looks_where_it_should():
+    np.testing.assert_allclose(level(0, 0)[:3, :3], [[1, 0, 0], [0, 0, 1], [0, -1, 0]], atol=1e-15)
+    at = np.array([250.0, 0.0, 450.0])
+    np.testing.assert_allclose(stations.station_angles(stations.STATIONS, at), 0, atol=1e-12)
+    np.testing.assert_allclose(stations.STATIONS[:, 2, 0], 0, atol=1e-15)
+
+
+def test_places_on_the_line_of_both_stations_are_refused():
+    with pytest.raises(ValueError, match="along one line"):
+        stations.place_covariance([level(0, 0), level(0, -500)], [0, 900, 0], 1e-4)
 
 
 @pytest.mark.parametrize("half_base, depth", [(1000.0, 2000.0), (200.0, 3000.0)])

@@ -18,6 +18,7 @@ from ...machines.arm import TX40, dh_matrix, forward_kinematics
 from ...machines.log import average_stops, reject_outliers
 from ...machines.mounting import calibrate_mounting, e_rot, e_trans
 from ...machines.packet import POSITION, QUATERNION, TIME, encode_packet, packet_from_pose
+from . import beyond
 
 # Packets ---------------------------------------------------------------------------------------------------------------------
 
@@ -1185,6 +1186,7 @@ CHAPTER = Chapter(
             answer="the runs alone cannot tell",
             why="An error that depends on the place repeats with the poses. Repeating shows the random part only; here the mean is off by more than 1 mm.",
         ),
+        *beyond.STATIONS,
         Prediction(
             "methods",
             question="Rotations are noisy (0.5 deg), translations good (0.1 mm). Which way finds the mounting's rotation best?",

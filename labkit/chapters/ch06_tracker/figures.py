@@ -183,3 +183,41 @@ class Repeated:
         self.runs.set_data(*results.T)
         self.spread.set_data(*spread.T)
         self.claim.set_data(*claim.T)
+
+
+class Plan:
+    """Two base stations on a plan of the room, their rays to a diode, the places found from noisy times."""
+
+    def __init__(self, ax, half_width):
+        style.axes(ax, "x (mm)", "y (mm)", "plan of the room", equal=True)
+        ax.set(xlim=(-half_width, half_width), ylim=(-half_width, half_width))
+        (self.rays,) = ax.plot([], [], **style.look("measurement", marker="", linestyle="-", linewidth=1.0))
+        (self.stations,) = ax.plot([], [], **style.look("truth", linestyle="none", marker="s", markersize=8))
+        (self.found,) = ax.plot([], [], **style.look("estimates", markersize=3, markeredgewidth=0, alpha=0.7))
+        (self.region,) = ax.plot([], [], **style.look("prediction"))
+        (self.diode,) = ax.plot([], [], **style.look("truth", linestyle="none", marker="+", markersize=12))
+        self.names = [
+            ax.annotate(name, (0, 0), xytext=(8, -14), textcoords="offset points", fontweight="bold") for name in "AB"
+        ]
+        self.artists = [self.rays, self.stations, self.found, self.region, self.diode, *self.names]
+
+    def set(self, stations, diode, found, region):
+        """Stations (2, 2), the diode (2,), places found (n, 2), outline of the region (m, 2)."""
+        gap = [np.nan, np.nan]
+        self.rays.set_data(*np.transpose([stations[0], diode, gap, stations[1], diode]))
+        self.stations.set_data(*stations.T)
+        self.diode.set_data(*diode[:, None])
+        self.found.set_data(*found.T)
+        self.region.set_data(*region.T)
+        for name, place in zip(self.names, stations):
+            name.xy = tuple(place)
+
+
+def error_by_stop(ax, stops, printed):
+    """Error of each stop of a calibration run after the first, logarithmic, and the printed mean. Returns the line."""
+    style.axes(ax, "stop", "error of the position (mm)", "A X against X B")
+    ax.set(xlim=(0.3, stops - 0.3), ylim=(0.02, 60), yscale="log", xticks=range(5, stops, 5))
+    ax.axhline(printed, **style.look("guide"))
+    ax.text(stops - 0.5, 1.08 * printed, "mean in the report", ha="right", va="bottom", color=style.MUTED, fontsize=9)
+    (line,) = ax.plot([], [], **style.look("measurement", linestyle=":", linewidth=1.0))
+    return line

@@ -8,14 +8,16 @@ import numpy as np
 from scipy.stats import chi2
 
 from ...calibration import ax_xb
-from ...estimation.gaussian import ellipse, unit_noise
+from ...documents.report.printed import COLUMNS, table_d
+from ...estimation.gaussian import cut_axes, ellipse, unit_noise
 from ...fast.ax_xb import calibrate_hand_eye, solve_ax_xb
 from ...geometry.frames import invert, matrix_from_quaternion, pose, pose_distance, unit_vector
 from ...geometry.lie import exp_so3
-from ...machines import simulation, udp
+from ...machines import simulation, stations, udp
 from ...machines.accuracy import filter_positions, shift_time, speeds, summarize, time_offset
 from ...machines.arm import HOME, TX40, arm_points, forward_kinematics, jacobian, reach_position, tool_pose
 from ...machines.log import reject_outliers
+from ...machines.mounting import calibrate_mounting
 from ...machines.packet import POSITION, QUATERNION, TIME, packet_from_pose
 from ...machines.simulation import T_FE, Tracker
 from ...stage import Choice, Handle, Play, Slider, Stage, Toggle, style
@@ -506,4 +508,140 @@ def six_runs():
         describe=lambda r: (
             f"The six runs agree within {r['std']:.2f} mm; their mean is {r['off']:.2f} mm off the truth."
         ),
+    )
+
+
+# ---- base stations ---------------------------------------------------------------------------------------------------
+
+SWEEPS = 40  # simulated readings of one place
+FLOOR = 2600.0  # mm, half the width of the room that is drawn
+
+
+def _flat(place):
+    """A place on the plan as a point in space, at the height of the stations."""
+    return np.append(place, 0.0)
+
+
+def compute_sweeps(state):
+    """Two stations in a plane and a diode: what they measure, where the rays meet, how sure the place is.
+
+    Returns a dictionary: angles (2,) rad, delays (2,) s, covariance (2, 2) mm^2, outline (n, 2), found (n, 2),
+    std (2,) mm, the larger first.
+    """
+    T_WL = np.array([stations.looking(_flat(state[name]), np.zeros(3)) for name in "AB"])
+    std = 2 * np.pi * stations.TURN_RATE * 1e-6 * state["jitter"]
+    place = _flat(state["P"])
+    angles = stations.station_angles(T_WL, place)
+    cov = stations.place_covariance(T_WL, place, std)[:2, :2]
+    noisy = angles + std * unit_noise((SWEEPS, 2, 1), seed=61) * [1.0, 0.0]
+    directions = (T_WL[:, :3, :3] @ stations.ray_direction(noisy)[..., None])[..., 0]
+    found = np.array([stations.nearest_to_rays(T_WL[:, :3, 3], d)[:2] for d in directions])
+    return {
+        "angles": angles[:, 0], "delays": stations.sweep_delay(angles[:, 0]), "covariance": cov,
+        "outline": ellipse(place[:2], cut_axes(cov, FLOOR), THREE_STD), "found": found,
+        "std": np.sqrt(np.linalg.eigvalsh(cov)[::-1]), "stations": T_WL[:, :2, 3], "place": place[:2],
+    }  # fmt: skip
+
+
+def _sweeps_sentence(result):
+    longer, shorter = result["std"]
+    return f"The place is uncertain by {longer:.0f} mm in one direction and by {shorter:.0f} mm across it."
+
+
+def sweeps():
+    """Two base stations and a diode on a plan: delays, rays, and the ellipse of the place."""
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2, width_ratios=(1.5, 1))
+        picture = draw.Plan(left, FLOOR)
+        style.bare(right)
+        words = right.text(0.0, 0.92, "", transform=right.transAxes, va="top", linespacing=1.6)
+
+        def update(state, result):
+            picture.set(result["stations"], result["place"], result["found"], result["outline"])
+            lines = [
+                f"{name}: {1000 * delay:.3f} ms after its flash\n    {np.rad2deg(angle):.1f} deg"
+                for name, delay, angle in zip("AB", result["delays"], result["angles"])
+            ]
+            words.set_text(
+                "\n".join(lines) + f"\n\nstandard deviation\n{result['std'][0]:.1f} mm and {result['std'][1]:.1f} mm"
+            )
+
+        return [*picture.artists, words], update
+
+    reach = ((-FLOOR, FLOOR), (-FLOOR, FLOOR))
+    return Stage(
+        "two sweeps, one place",
+        scene=scene,
+        compute=compute_sweeps,
+        handles={
+            "A": Handle((-1700.0, -1500.0), step=50, bounds=reach, label="station A"),
+            "B": Handle((1700.0, -1500.0), step=50, bounds=reach, label="station B"),
+            "P": Handle((300.0, 700.0), step=50, bounds=reach, label="diode"),
+        },
+        controls={"jitter": Slider(1.0, 50.0, 20.0, step=1.0, label="error of a time (us)")},
+        fail={"A": (-1900.0, -1500.0), "B": (-1500.0, -1300.0)},
+        describe=_sweeps_sentence,
+    )
+
+
+STD_ANGLE = 2e-5  # rad: white noise of an angle averaged over a stop, a twentieth of a millimeter at 2.5 m
+KEEP_ALL = 1e9  # no stop is left out: what one moved station does to the fit is the question
+KNOCK = {"before the run": 0, "after stop 10": 11, "at every stop": None}
+
+
+@functools.cache
+def _believed():
+    T_BF, T_BE = _stops()
+    return T_BF, T_BE, np.repeat(stations.STATIONS[None], len(T_BE), axis=0)
+
+
+def compute_moved_station(state):
+    """A calibration run whose second station turns by `tilt` mrad: errors of the stops, figures of merit, mounting.
+
+    Returns a dictionary: errors (21,) mm, E_trans (mm), mean (mm), off (mm): of the mounting from the truth.
+    """
+    T_BF, T_BE, actual = _believed()
+    actual, tilt, since = actual.copy(), 1e-3 * state["tilt"], KNOCK[state["when"]]
+    if since is None:
+        actual[:, 1] = stations.tilted(actual[:, 1], tilt * unit_noise((len(T_BE), 3), seed=9))
+    else:
+        actual[since:, 1] = stations.tilted(actual[since:, 1], [0.0, tilt, 0.0])
+    read = stations.read_poses(T_BE, stations.STATIONS, actual, np.random.default_rng(5), STD_ANGLE)
+    found = calibrate_mounting(T_BF, invert(read[0]) @ read, factor=KEEP_ALL)
+    return {
+        "errors": found.translation, "E_trans": found.E_trans, "mean": float(found.translation[1:].mean()),
+        "off": float(np.linalg.norm(found.T_FE[:3, 3] - T_FE[:3, 3])),
+    }  # fmt: skip
+
+
+def moved_station():
+    """The run of section 3.1 with a station that moves: error of each stop, E_trans, and the mounting's own error."""
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2, width_ratios=(1.7, 1))
+        errors = draw.error_by_stop(left, simulation.STOPS, table_d().mean[COLUMNS.index("mean_mm")])
+        style.bare(right)
+        words = right.text(0.0, 0.92, "", transform=right.transAxes, va="top", linespacing=1.6)
+
+        def update(state, result):
+            errors.set_data(np.arange(1, simulation.STOPS), result["errors"][1:])
+            words.set_text(
+                f"E_trans\n{result['E_trans']:.2f} mm\n\nmean error of a stop\n{result['mean']:.2f} mm\n\n"
+                f"mounting off the truth\n{result['off']:.2f} mm"
+            )
+
+        return [errors, words], update
+
+    return Stage(
+        "a station that moves",
+        scene=scene,
+        compute=compute_moved_station,
+        controls={
+            "tilt": Slider(0.0, 6.0, 1.7, step=0.1, label="turn of station 2 (mrad)"),
+            "when": Choice(list(KNOCK), "before the run", label="it moves"),
+        },
+        fail={"tilt": 4.0, "when": "at every stop"},
+        presets={"after stop 10": {"when": "after stop 10"}},
+        describe=lambda r: f"E_trans is {r['E_trans']:.2f} mm, and the mounting is {r['off']:.2f} mm off the truth.",
     )
