@@ -158,7 +158,7 @@ def place_readings(odometry_time, starts, reading_time):
         fell = t < last - usual
         later = [p for p in range(part + fell, len(starts)) if low[p] <= t < high[p]]
         if not later:
-            later = [p for p in range(part + 1) if low[p] <= t < high[p]]
+            later = [p for p in range(part, -1, -1) if low[p] <= t < high[p]]
         last = t
         if later:
             part = max(part, later[0])
@@ -226,17 +226,18 @@ def global_start(log, noise, rng):
 
 def _ways(log, count):
     """Where dead reckoning has carried the robot at each of the first readings, seen from the first row, (count, 3)."""
-    last = int(log.row[count - 1]) + 1
-    rows = np.zeros((1, 3))
-    if last > 1:
-        dt = np.maximum(np.diff(log.time[:last]), 1e-12)
-        u = log.u[: last - 1]
-        heading = np.concatenate([[0.0], np.cumsum(dt * u[:, 1])])
-        middle = heading[:-1] + 0.5 * dt * u[:, 1]
-        steps = (dt * u[:, 0])[:, None] * np.stack([np.cos(middle), np.sin(middle)], 1)
-        rows = np.column_stack([np.concatenate([np.zeros((1, 2)), np.cumsum(steps, 0)]), heading])
     at = log.row[:count]
+    rows = _reckoned(log, int(at[-1]) + 1)
     return odometry.step(rows[at], log.u[at], np.maximum(log.lag[:count], 1e-12), "midpoint")
+
+
+def _reckoned(log, count):
+    """Poses at the first rows by dead reckoning (midpoint), seen from the first, (count, 3)."""
+    dt, u = np.diff(log.time[:count]), log.u[: count - 1]
+    heading = np.concatenate([[0.0], np.cumsum(dt * u[:, 1])])
+    middle = heading[:-1] + 0.5 * dt * u[:, 1]
+    steps = (dt * u[:, 0])[:, None] * np.stack([np.cos(middle), np.sin(middle)], 1)
+    return np.column_stack([np.concatenate([np.zeros((1, 2)), np.cumsum(steps, 0)]), heading])
 
 
 def _around(log, j, way, rng):
@@ -409,17 +410,11 @@ def _with_restarts(log, x0, cov0, first, noise, rng, filter_path):
         restarts.append(start)
         said.append(f"the robot was lost and found again at row {start + 1}: was it carried, or did the log pause?")
     if first:
-        back = relative_pose(x[first], np.zeros(3))
-        x[:first] = compose_pose(x[first], compose_pose(np.zeros(3), _rows_before(log, first, back)))
+        way = _reckoned(log, first + 1)
+        x[:first] = compose_pose(x[first], relative_pose(way[-1], way[:-1]))
         cov[:first] = cov[first] + np.diag([1.0, 1.0, 0.1])
         said.append(f"the first {first} rows have no readings that agree: they are dead reckoning, backwards")
     return path.Path(x, cov, nis, log_det, used, landmark), tuple(restarts), tuple(said)
-
-
-def _rows_before(log, first, back):
-    """Poses of the rows before `first`, seen from it, by dead reckoning."""
-    way = odometry.drive(np.zeros(3), log.u[:first], np.maximum(np.diff(log.time[: first + 1]), 1e-12), "midpoint")
-    return relative_pose(way[-1], way[:-1])
 
 
 def _tail(log, start):

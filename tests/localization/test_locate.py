@@ -1,0 +1,237 @@
+"""A robot found from its own log: clocks, a global start, errors and restarts beside a simulated truth."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from labkit.estimation.differences import numeric_jacobian
+from labkit.fast.path import filter_path
+from labkit.geometry.planar import wrap_angle
+from labkit.localization import locate as room
+from labkit.localization import odometry, path
+from labkit.localization.path import Log, Noise
+
+MARKS = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 8.0], [0.0, 8.0], [5.0, 11.0], [-4.0, 5.0]])
+NAMES = list("abcdef")
+NOISE = {"std_range": 0.05, "std_bearing": 0.02, "std_way": 0.03, "std_turn": 0.02}
+DT = 0.1
+
+
+def course(n=300, seed=1, noise=1.0):
+    """(time, u, truth, rows and times of the readings, ids, z): every third row a reading, some between two rows."""
+    rng = np.random.default_rng(seed)
+    time = 5.0 + DT * np.arange(n)
+    u = np.stack([0.6 + 0.2 * np.sin(0.05 * np.arange(n)), 0.3 * np.cos(0.03 * np.arange(n))], 1)
+    driven = u + noise * rng.normal(size=u.shape) * [0.03, 0.02] / np.sqrt(DT)
+    truth = odometry.drive(np.array([4.0, 3.0, 2.8]), driven[:-1], DT, "midpoint")
+    rows, late = np.arange(1, n - 1, 3), np.where(np.arange(1, n - 1, 3) % 2, 0.04, 0.0)
+    at = np.array([odometry.step(truth[k], driven[k], lag, "midpoint") if lag else truth[k] for k, lag in zip(rows, late)])
+    ids = rng.integers(len(MARKS), size=len(rows))
+    z = np.array([path.measurement(x, MARKS[m : m + 1])[0] for x, m in zip(at, ids)])
+    z += noise * rng.normal(size=z.shape) * [0.05, 0.02]
+    return time, u, truth, rows, time[rows] + late, ids, z
+
+
+def as_log(time, u, rows, when, ids, z):
+    return Log(time, u, z, rows, when - time[rows], ids, MARKS)
+
+
+def located(time, u, when, ids, z, **more):
+    names = [None if m < 0 else NAMES[m] for m in ids]
+    given = {"noise": NOISE, "filter_path": filter_path, **more}
+    return room.locate(time, u, when, names, z, NAMES, MARKS, **given)
+
+
+# --- clocks ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_clock_that_was_set_goes_on_by_a_usual_step():
+    steps = np.array([0.1, 0.1, 0.4, 0.1, -3.0, 0.1, 0.0, 0.1, 7.0, 0.1])  # 0.4 s is a pause, 7 s a jump
+    clean, starts, said = room.mend_clock(2.0 + np.concatenate([[0.0], np.cumsum(steps)]))
+    usual = np.where((steps < 0) | (steps > 5), 0.1, steps)
+    np.testing.assert_allclose(clean, np.concatenate([[0.0], np.cumsum(usual)]), atol=1e-12)
+    assert starts.tolist() == [0, 5, 9]
+    assert "jumps by -3 s before row 6; a step of 0.1 s" in said[0] and "jumps by +7 s before row 10" in said[1]
+
+
+def test_a_slow_clock_may_pause_for_ten_of_its_steps():
+    for gap, starts in ((9.9, [0]), (10.1, [0, 3])):
+        assert room.mend_clock(np.cumsum([0, 1.0, 1.0, gap, 1.0, 1.0]))[1].tolist() == starts
+
+
+@pytest.mark.parametrize(("jumps", "lines"), [(5, 5), (6, 6), (9, 6)])
+def test_many_jumps_are_counted(jumps, lines):
+    said = room.mend_clock(np.tile(0.1 * np.arange(4), jumps + 1))[2]
+    assert len(said) == lines and (lines == 5 or said[-1] == f"and {jumps - 5} jumps more")
+
+
+def test_a_clock_that_stands_is_refused():
+    with pytest.raises(ValueError, match="never increases"):
+        room.mend_clock(np.ones(5))
+
+
+def test_readings_fall_into_the_last_row_before_them():
+    time = np.array([1.0, 1.1, 1.2, 1.3])
+    row, lag = room.place_readings(time, np.array([0]), np.array([0.99, 1.0, 1.15, 1.3, 1.36, 1.41]))
+    assert row.tolist() == [-1, 0, 1, 3, 3, -1]
+    np.testing.assert_allclose(lag, [0.0, 0.0, 0.05, 0.0, 0.06, 0.0], atol=1e-12)
+
+
+def test_times_that_come_twice_belong_to_the_part_their_order_tells():
+    time = np.concatenate([0.1 * np.arange(10), 0.1 * np.arange(10), 0.5 + 0.1 * np.arange(10)])
+    readings = np.array([0.32, 0.72, 0.12, 0.62, 1.32, 0.72])
+    row, lag = room.place_readings(time, np.array([0, 10, 20]), readings)
+    assert row.tolist() == [3, 7, 11, 16, 28, 22]
+    np.testing.assert_allclose(lag, 0.02, atol=1e-9)
+
+
+# --- a global start --------------------------------------------------------------------------------------------------
+
+
+def test_exact_readings_name_the_first_pose():
+    time, u, truth, rows, when, ids, z = course(120, noise=0.0)
+    x0, cov0 = room.global_start(as_log(time, u, rows, when, ids, z), Noise(**NOISE), np.random.default_rng(0))
+    np.testing.assert_allclose(x0[:2], truth[0, :2], atol=1e-5)
+    assert abs(wrap_angle(x0[2] - truth[0, 2])) < 1e-5
+
+    def predicted(x):
+        way = odometry.drive(x, u[:119], DT, "midpoint")
+        at = [odometry.step(way[k], u[k], lag, "midpoint") if lag > 1e-9 else way[k] for k, lag in zip(rows, when - time[rows])]
+        z = np.array([path.measurement(p, MARKS[m : m + 1])[0] for p, m in zip(at, ids)])[: room.WINDOW]
+        return (z / [3 * NOISE["std_range"], 3 * NOISE["std_bearing"]]).ravel()
+
+    J = numeric_jacobian(predicted, truth[0], np.full(3, 1e-6))
+    np.testing.assert_allclose(cov0, room.WEAK_PRIOR * np.linalg.inv(J.T @ J), rtol=1e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_spurious_and_nameless_readings_do_not_mislead(named):
+    time, u, truth, rows, when, ids, z = course(150, seed=4)
+    z[2], z[7], z[11] = [3.0, 2.0], [9.0, -1.0], [1.0, 0.3]
+    ids = ids if named else np.where(np.arange(len(ids)) % 3 == 0, -1, ids)
+    x0, cov0 = room.global_start(as_log(time, u, rows, when, ids, z), Noise(**NOISE), np.random.default_rng(0))
+    assert np.hypot(*(x0 - truth[0])[:2]) < 0.15 and abs(wrap_angle(x0[2] - truth[0, 2])) < 0.05
+    assert np.linalg.eigvalsh(cov0).min() > 0
+
+
+def test_a_start_that_nothing_explains_is_refused():
+    time, u, _, rows, when, ids, z = course(120)
+    log = as_log(time, u, rows, when, ids, z)
+    with pytest.raises(ValueError, match="at least 4 readings, got 3"):
+        room.global_start(log.readings(slice(0, 3)), Noise(**NOISE), np.random.default_rng(0))
+    wild = dataclasses.replace(log, z=np.random.default_rng(2).uniform([1, -3], [12, 3], log.z.shape))
+    with pytest.raises(ValueError, match=r"fits \d+ of the first 30"):
+        room.global_start(wild, Noise(**NOISE), np.random.default_rng(0))
+
+
+# --- the whole -------------------------------------------------------------------------------------------------------
+
+
+def test_errors_and_figures_against_the_truth():
+    time, u, truth, _, when, ids, z = course()
+    found = located(time, u, when, ids, z, truth=(time[20:250], truth[20:250]))
+    e = found.x - truth
+    e[:, 2] = wrap_angle(e[:, 2])
+    inside = np.zeros(len(time), bool)
+    inside[20:250] = True
+    assert np.isnan(found.errors[~inside]).all() and np.isnan(found.nees[~inside]).all()
+    np.testing.assert_allclose(found.errors[inside], e[inside], atol=1e-9)
+    nees = [d @ np.linalg.inv(cov) @ d for d, cov in zip(e, found.cov)]
+    np.testing.assert_allclose(found.nees[inside], np.array(nees)[inside], rtol=1e-6)
+    told = found.as_dict()
+    assert told["rms_position"] == pytest.approx(np.sqrt((e[inside, :2] ** 2).sum(1).mean()))
+    assert told["rms_heading_deg"] == pytest.approx(np.rad2deg(np.sqrt((e[inside, 2] ** 2).mean())))
+    assert told["mean_nees"] == pytest.approx(np.mean(nees, where=inside))
+    assert told["rms_position"] < 0.1 and told["mean_nis"] == pytest.approx(found.nis[found.used].mean())
+    assert 1.0 < told["mean_nis"] < 3.5 and told["mean_nis_band"][0] < 2 < told["mean_nis_band"][1]
+    assert told["fitted"] == [] and told["noise"] == NOISE
+
+
+def test_between_the_samples_of_the_truth_the_way_is_straight():
+    time, u, truth, _, when, ids, z = course()
+    found = located(time, u, when, ids, z, truth=(time[::2], truth[::2]))
+    middle = 0.5 * (truth[0:-2:2] + truth[2::2])
+    d = found.x[1:-1:2] - middle
+    d[:, 2] = wrap_angle(d[:, 2])
+    np.testing.assert_allclose(found.errors[1:-1:2], d, atol=1e-9)
+
+
+def test_the_path_is_the_filter_s_from_the_same_start():
+    time, u, _, rows, when, ids, z = course()
+    found = located(time, u, when, ids, z)
+    clean = room.mend_clock(time)[0]
+    log = Log(clean, u, z, rows, when - time[rows], ids, MARKS)
+    x0, cov0 = room.global_start(log.rows(0, len(time) - 1), Noise(**NOISE), np.random.default_rng(0))
+    plain = path.filter_path(log, x0, cov0, Noise(**NOISE))
+    np.testing.assert_allclose(found.x, plain.x, atol=1e-6)
+    np.testing.assert_allclose(found.cov, plain.cov, atol=1e-8)
+    np.testing.assert_allclose(found.nis, plain.nis, rtol=1e-4, atol=1e-6)
+
+
+def test_why_a_reading_was_not_used():
+    time, u, _, _, when, ids, z = course()
+    z[40] += [4.0, 1.0]
+    when = np.append(when, time[-1] + 50)
+    names = [*(NAMES[m] for m in ids), "a"]
+    names[10] = "unknown"
+    found = room.locate(
+        time, u, when, names, np.vstack([z, [3.0, 0.0]]), NAMES, MARKS, noise=NOISE, filter_path=filter_path
+    )
+    assert found.why[10] == "its id is not in the map" and found.why[-1] == "no odometry at its time"
+    assert found.why[40] == "beyond the gate"
+    assert not found.used[[10, 40, -1]].any() and np.isnan(found.nis[[10, -1]]).all()
+    rejected = {row["reading"]: row["why"] for row in found.as_dict()["rejected"]}
+    assert rejected[11] == found.why[10] and rejected[41] == found.why[40] and rejected[len(z) + 1] == found.why[-1]
+
+
+def test_a_carried_robot_is_found_again():
+    time, u, truth, rows, when, ids, z = course(400, seed=6)
+    n = 200
+    moved = odometry.drive(np.array([7.0, 6.0, -2.0]), u[n:-1], DT, "midpoint")
+    for k in np.flatnonzero(rows >= n):
+        at = odometry.step(moved[rows[k] - n], u[rows[k]], max(when[k] - time[rows[k]], 1e-9), "midpoint")
+        z[k] = path.measurement(at, MARKS[ids[k] : ids[k] + 1])[0]
+    found = located(time, u, when, ids, z)
+    assert len(found.restarts) == 1 and n <= found.restarts[0] <= n + 6
+    assert "lost and found again at row" in found.warnings[-1]
+    assert found.as_dict()["restarts"] == [found.restarts[0] + 1]
+    after = slice(found.restarts[0], None)
+    np.testing.assert_allclose(found.x[after, :2], moved[found.restarts[0] - n :, :2], atol=0.1)
+    before = slice(0, n)
+    assert np.hypot(*(found.x - truth)[before, :2].T).max() < 0.3
+
+
+def test_rows_before_the_first_readings_that_agree_are_dead_reckoning():
+    time, u, truth, rows, when, ids, z = course(400, seed=7, noise=0.0)
+    wild = np.random.default_rng(8).uniform([1, -3], [12, 3], z.shape)
+    early = rows < 100
+    z[early] = wild[early]
+    found = located(time, u, when, ids, z)
+    assert "first" in " ".join(found.warnings) and "backwards" in " ".join(found.warnings)
+    first = int(next(w for w in found.warnings if "backwards" in w).split()[2])
+    np.testing.assert_allclose(found.x[:first, :2], truth[:first, :2], atol=0.05)
+    np.testing.assert_allclose(wrap_angle(found.x[:first, 2] - truth[:first, 2]), 0, atol=0.02)
+    np.testing.assert_allclose(found.cov[0], found.cov[first] + np.diag([1.0, 1.0, 0.1]))
+
+
+def test_behind_a_jump_of_the_clock_no_error_is_told():
+    time, u, truth, _, when, ids, z = course()
+    jumped, late = time.copy(), when.copy()
+    jumped[150:] += 100.0
+    late[when >= time[150] - 1e-9] += 100.0
+    found = located(jumped, u, late, ids, z, truth=(jumped, truth))
+    assert np.isfinite(found.nees[:150]).all() and np.isnan(found.nees[150:]).all()
+    assert "jumps" in found.warnings[0] and np.hypot(*(found.x - truth)[:, :2].T).max() < 0.3
+
+
+def test_noise_that_is_fitted_is_near_what_was_drawn():
+    """Over 100 readings a standard deviation of readings is known within 10 %, of odometry within 30 %: three of each."""
+    time, u, _, _, when, ids, z = course(600, seed=9)
+    found = located(time, u, when, ids, z, noise=None)
+    assert found.fitted == room.NAMES
+    for name, share in zip(room.NAMES, (0.3, 0.3, 0.9, 0.9)):
+        assert abs(getattr(found.noise, name) / NOISE[name] - 1) < share
+    some = located(time, u, when, ids, z, noise={"std_range": 0.05})
+    assert some.noise.std_range == 0.05 and some.fitted == room.NAMES[1:]
+    assert "std_range 0.05 m," in some.lines()[1] and "(fitted)" in some.lines()[1]
