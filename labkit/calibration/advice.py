@@ -12,9 +12,9 @@ CLEARLY = 10.0  # times better, in angle or distance, that another role must fit
 PLAIN = 0.02  # of the turn about the second axis: a loop that closes this well has its roles right
 OPEN = 0.3  # of the turn about the second axis: residuals as large are no noise
 AXES = "xyz"
-HYPOTHESES = (  # robot inverted, sensor inverted, what it means; with both, or files exchanged, the loop closes alike
-    (False, True, "it seems that the sensor file holds the sensor in the target, not the target in the sensor"),
-    (True, False, "it seems that the robot file holds the base in the flange, or that {other} was meant"),
+MIXED_UP = (  # a loop whose robot is inverted closes as well as one whose sensor is: nothing tells them apart
+    "it seems that the sensor file holds the sensor in the target, not the target in the sensor "
+    "(or the robot file the base in the flange, or {other} was meant): so taken, the loop closes {times} times better"
 )
 
 
@@ -89,21 +89,16 @@ def refuse_one_axis(T, name="the flange"):
 
 
 def refuse_mixed_roles(model, eye_to_hand):
-    """Refuse poses whose inverses close the loop far better: (robot or sensor) files that mean something else."""
+    """Refuse poses whose inverses close the loop far better: a file that holds something else."""
     turn, reach = axis_spread(model.T_BF)[0][1], np.linalg.norm(model.T_ST[:, :3, 3], axis=1).max()
     if model.misfit[0] < PLAIN * turn and model.misfit[1] < PLAIN * turn * reach:
         return  # wrong roles miss by as much as the poses turn
-    found = []
-    for robot, sensor, sentence in HYPOTHESES:
-        T_BF, T_ST = (invert(T) if inverse else T for T, inverse in ((model.T_BF, robot), (model.T_ST, sensor)))
-        angle, distance = HandEyeModel(T_BF, T_ST).misfit
-        ratios = model.misfit[0] / (angle + 1e-12), model.misfit[1] / (distance + 1e-12)
-        found.append((max(ratios) if min(ratios) > 0.5 else 0.0, sentence))
-    better, sentence = max(found)
-    if better > CLEARLY:
+    angle, distance = HandEyeModel(model.T_BF, invert(model.T_ST)).misfit
+    ratios = model.misfit[0] / (angle + 1e-12), model.misfit[1] / (distance + 1e-12)
+    if max(ratios) > CLEARLY and min(ratios) > 0.5:
         other = "no --eye-to-hand" if eye_to_hand else "--eye-to-hand"
-        times = f"{better:.0f}" if better < 1000 else "over 1000"
-        raise ValueError(f"{sentence.format(other=other)}: so taken, the loop closes {times} times better")
+        times = f"{max(ratios):.0f}" if max(ratios) < 1000 else "over 1000"
+        raise ValueError(MIXED_UP.format(other=other, times=times))
 
 
 def refuse_open_loop(T, residuals):

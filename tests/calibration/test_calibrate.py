@@ -104,14 +104,11 @@ def test_eye_to_hand_is_the_same_problem_with_the_robot_inverted():
     assert np.allclose(one.next_poses, invert(other.next_poses))
 
 
-@pytest.mark.parametrize(
-    "robot_inverse, sensor_inverse, words",
-    [(0, 1, "holds the sensor in the target"), (1, 0, "--eye-to-hand was meant")],
-)
-def test_mixed_up_roles_are_named(robot_inverse, sensor_inverse, words):
+@pytest.mark.parametrize("robot_inverse, sensor_inverse", [(0, 1), (1, 0)])
+def test_mixed_up_roles_are_named(robot_inverse, sensor_inverse):
     robot, sensor, _ = cell(outliers=2)
     robot, sensor = (invert(T) if inverse else T for T, inverse in ((robot, robot_inverse), (sensor, sensor_inverse)))
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises(ValueError, match="holds the sensor in the target.*or --eye-to-hand was meant"):
         calibrate.hand_eye(robot, sensor)
 
 

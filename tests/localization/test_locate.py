@@ -26,7 +26,9 @@ def course(n=300, seed=1, noise=1.0):
     driven = u + noise * rng.normal(size=u.shape) * [0.03, 0.02] / np.sqrt(DT)
     truth = odometry.drive(np.array([4.0, 3.0, 2.8]), driven[:-1], DT, "midpoint")
     rows, late = np.arange(1, n - 1, 3), np.where(np.arange(1, n - 1, 3) % 2, 0.04, 0.0)
-    at = np.array([odometry.step(truth[k], driven[k], lag, "midpoint") if lag else truth[k] for k, lag in zip(rows, late)])
+    at = np.array(
+        [odometry.step(truth[k], driven[k], lag, "midpoint") if lag else truth[k] for k, lag in zip(rows, late)]
+    )
     ids = rng.integers(len(MARKS), size=len(rows))
     z = np.array([path.measurement(x, MARKS[m : m + 1])[0] for x, m in zip(at, ids)])
     z += noise * rng.normal(size=z.shape) * [0.05, 0.02]
@@ -97,7 +99,10 @@ def test_exact_readings_name_the_first_pose():
 
     def predicted(x):
         way = odometry.drive(x, u[:119], DT, "midpoint")
-        at = [odometry.step(way[k], u[k], lag, "midpoint") if lag > 1e-9 else way[k] for k, lag in zip(rows, when - time[rows])]
+        at = [
+            odometry.step(way[k], u[k], lag, "midpoint") if lag > 1e-9 else way[k]
+            for k, lag in zip(rows, when - time[rows])
+        ]
         z = np.array([path.measurement(p, MARKS[m : m + 1])[0] for p, m in zip(at, ids)])[: room.WINDOW]
         return (z / [3 * NOISE["std_range"], 3 * NOISE["std_bearing"]]).ravel()
 
@@ -226,7 +231,7 @@ def test_behind_a_jump_of_the_clock_no_error_is_told():
 
 
 def test_noise_that_is_fitted_is_near_what_was_drawn():
-    """Over 100 readings a standard deviation of readings is known within 10 %, of odometry within 30 %: three of each."""
+    """Of 200 readings the noise is known within 10 %, that of the odometry within 30 %: three times that."""
     time, u, _, _, when, ids, z = course(600, seed=9)
     found = located(time, u, when, ids, z, noise=None)
     assert found.fitted == room.NAMES
