@@ -70,7 +70,6 @@ def test_noise_that_is_told_widens_nothing():
     solution = model.fitted(np.ones(5, bool))
     _, J, noise = model.whitened(solution, np.ones(5, bool))
     assert np.isinf(noise.freedom).all() and (model.widened(J, noise) == J).all()
-    np.testing.assert_allclose(model.noise(r, J, np.ones(5, bool)), plain.std[[0, 3]], rtol=0.05)
 
 
 # --- the other kinds -------------------------------------------------------------------------------------------------
@@ -214,12 +213,12 @@ def test_the_misfit_of_a_mounting_is_its_chord_and_its_gap():
 def test_the_noise_is_what_the_degrees_of_freedom_say():
     model = pivot_model()
     r, J = model.linearize(model.fit(np.ones(14, bool)))
-    assert model.noise(r, J, np.ones(14, bool))[0] == pytest.approx(np.sqrt((r**2).sum() / (3 * 14 - 6)))
+    assert model.noise(r, J, np.ones(14, bool)).std[0] == pytest.approx(np.sqrt((r**2).sum() / (3 * 14 - 6)))
     given = own_data.PivotModel(model.T_WF, (0.7,))
-    assert given.noise(r, J, np.ones(14, bool)).tolist() == [0.7]
+    assert given.noise(r, J, np.ones(14, bool)).std.tolist() == [0.7]
     exact = pivot_model(std=0.0)
     r, J = exact.linearize((TIP, PIVOT))
-    assert exact.noise(0 * r, J, np.ones(14, bool))[0] == pytest.approx(1e-9 * np.abs(exact.T_WF[:, :3, 3]).max())
+    assert exact.noise(0 * r, J, np.ones(14, bool)).std[0] == pytest.approx(1e-9 * np.abs(exact.T_WF[:, :3, 3]).max())
 
 
 # --- what to measure next --------------------------------------------------------------------------------------------
@@ -269,9 +268,9 @@ def test_the_next_pose_is_the_one_that_helps_most(make, truth):
     model = make(8)
     kept = np.arange(8) != 3
     poses, course = own_data.next_poses(model, truth, kept, count=2)
-    _, J, std = model.whitened(truth, kept)
+    _, J, noise = model.whitened(truth, kept)
     candidates, C = model.proposals(truth)
-    C = C / np.repeat(std, model.channels)[:, None]
+    J, C = model.widened(J, noise), model.widened(C / np.repeat(noise.std, model.channels)[:, None], noise)
     N = np.einsum("nkp,nkq->pq", J[kept], J[kept])
     np.testing.assert_allclose(course[0], np.sqrt(np.diag(np.linalg.inv(N)))[:6], rtol=1e-6)
     for k in range(2):
