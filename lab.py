@@ -3,31 +3,21 @@
 
     python lab.py                   set up if need be, and open JupyterLab on the first notebook
     python lab.py test              set up if need be, and run every test
-    python lab.py reset NN          a fresh chapter NN; your copy of it is kept beside it
-    python lab.py progress          what you have solved
-    python lab.py calibrate ...     your own poses in, a calibration with covariance, outliers and advice out
-    python lab.py localize ...      your own log in, the path with its covariance out
-    python lab.py collect ...       for lecturers: submitted notebooks in, marks and a page on the class out
-    python lab.py ledger            every number the four documents print, recomputed
-    python lab.py build [NN ...]    for authors: write the notebooks from solutions/NN_name.py
-    python lab.py build --check     for authors: say which notebooks are stale
 
 Options of the first: --no-browser, --port N, --ip ADDRESS; any other option goes to JupyterLab as it is.
 Behind `test` you may name what pytest shall run, as in: python lab.py test tests/geometry/test_frames.py -k invert
 `test --last-bits SEED` runs unit tests and solved notebooks with last bits as another processor would compute them.
 
-The set-up is a virtual environment in .venv with the packages of constraints.txt. It is repeated only when
-pyproject.toml, constraints.txt, the place of this folder or the version of Python has changed.
+The set-up is a virtual environment in .venv with the packages of constraints.txt; those that only tests need follow
+when tests are run. It is repeated only when pyproject.toml, constraints.txt, hatch_build.py, the folder jupyter/, the
+place of this folder or the version of Python has changed.
 """
 
-import argparse
 import contextlib
-import errno
 import hashlib
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -35,17 +25,14 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent
 OLDEST = (3, 11)
-FIRST_NOTEBOOK = "notebooks/00_start_here.ipynb"
-FIRST_PORT, PORTS = 8888, 50
-ON_OWN_FILES = ("calibrate", "localize", "collect")  # verbs whose files are named from the folder one stands in
-OVERRIDES = {
-    # neither news nor a look for updates: nothing is asked, and no other host is called
-    "@jupyterlab/apputils-extension:notification": {"fetchNews": "false", "checkForUpdates": False},
-    # a cell scrolled out of sight stays in the page, and with it the figure being dragged
-    "@jupyterlab/notebook-extension:tracker": {"windowingMode": "none"},
-    # the state of widgets dies with the kernel: files hold pictures and words instead
-    "@jupyter-widgets/jupyterlab-manager:plugin": {"saveState": False},
-}
+if sys.version_info >= OLDEST:  # an older one gets as far as the sentence that says so
+    sys.path.insert(0, str(ROOT))
+    from labkit.verbs import VERBS, processes, table
+    from labkit.verbs.arguments import Refusal, run
+    from labkit.verbs.jupyter import refuse_root
+
+ASKED_FOR = ("pyproject.toml", "constraints.txt", "hatch_build.py", "jupyter/settings.json", "jupyter/server.json")
+FULL = "The disk is full: the packages need about a gigabyte while they are installed."
 OFFLINE = (
     "NewConnectionError",
     "NameResolutionError",
@@ -59,30 +46,27 @@ OFFLINE = (
 )
 
 
-class Refusal(Exception):
-    """A reason to stop, said in one or two sentences."""
-
-
 def main(arguments):
     """Run one verb; returns the exit code."""
-    try:
-        if sys.version_info < OLDEST:
-            raise Refusal(too_old(sys.version_info))
-        verb, rest = split(arguments)
-        if verb == "help":
-            print(__doc__.strip())
-            return 0
-        options = lab_options(rest) if verb == "lab" else None
-        python = set_up(ROOT)
-        if verb == "lab":
-            return start_lab(python, *options)
-        return call(command(verb, python, rest), Path.cwd() if verb in ON_OWN_FILES else ROOT)
-    except Refusal as reason:
-        print(reason, file=sys.stderr)
+    if sys.version_info < OLDEST:
+        print(too_old(sys.version_info), file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
-        print("\nInterrupted. What was begun is redone the next time.", file=sys.stderr)
-        return 130
+    return run(work, list(arguments))
+
+
+def work(arguments):
+    """What `main` does, with exceptions; returns the exit code."""
+    if arguments[:1] and arguments[0] in ("-h", "--help", "help"):
+        print(__doc__.strip(), table("python lab.py", without=("start",)), sep="\n\n")
+        return 0
+    verb, rest = split(arguments)
+    if verb == "test":
+        return processes.call([set_up(ROOT, "test"), str(ROOT / "tests" / "run.py"), *rest])
+    if verb not in VERBS:
+        raise Refusal(f"There is no command {verb!r}. There are test, {', '.join(VERBS)}; see: python lab.py --help")
+    if verb == "start":
+        refuse_root(rest)
+    return processes.call([set_up(ROOT), "-m", "labkit", verb, *rest])
 
 
 def too_old(version):
@@ -93,84 +77,63 @@ def too_old(version):
 
 
 def split(arguments):
-    """(verb, remaining arguments); options alone belong to the verb "lab"."""
-    if any(word in ("-h", "--help", "help") for word in arguments[:1]):
-        return "help", []
+    """(verb, remaining arguments); options alone belong to the verb "start"."""
     if not arguments or arguments[0].startswith("-"):
-        return "lab", list(arguments)
-    verb, rest = arguments[0], list(arguments[1:])
-    verbs = ("test", "build", "reset", "progress", "ledger", *ON_OWN_FILES)
-    if verb not in verbs:
-        raise Refusal(f"There is no command {verb!r}. There are {', '.join(verbs)}; see: python lab.py --help")
-    if verb == "reset" and not rest:
-        raise Refusal("Which chapter? For example: python lab.py reset 01")
-    return verb, rest
-
-
-def command(verb, python, rest):
-    """The command line behind every verb but the first."""
-    if verb in ON_OWN_FILES:
-        return [python, "-m", "labkit", verb, *rest]
-    return {
-        "test": [python, str(ROOT / "tests" / "run.py"), *rest],
-        "build": [python, "-m", "labkit.verbs.build", *rest],
-        "reset": [python, "-m", "labkit.verbs.build", "--reset", *rest],
-        "progress": [python, "-c", "from labkit.exercises import progress_text; print(progress_text())"],
-        "ledger": [python, "-c", "from labkit.documents import ledger; print(ledger.as_text())"],
-    }[verb]
+        return "start", list(arguments)
+    return arguments[0], list(arguments[1:])
 
 
 # --- the set-up -----------------------------------------------------------------------------------------------------
 
 
-def set_up(root):
-    """The Python of `.venv`, made ready; does nothing when the stamp says that it is.
+def set_up(root, extra=""):
+    """The Python of `.venv`, made ready, with the packages of an extra ("test"); does nothing when the stamp says so.
 
-    Without any stamp (interrupted, or of another Python) the environment is made anew. When pip gives up, as it does
-    before it changes anything, the environment stays and the next run installs into it.
+    Without any stamp (interrupted, or of another Python) the environment is made anew. When an installation fails, as
+    it does before it changes anything, the environment stays and the next run installs into it.
     """
     folder = root / ".venv"
     python = venv_python(folder)
     stamp_file = folder / "labkit-stamp.json"
-    if is_ready(root, python, stamp_file):
+    if is_ready(root, python, stamp_file, extra):
         return str(python)
-    with only_one(root / ".lab" / "setup.lock"):
-        if not is_ready(root, python, stamp_file):
-            make_ready(root, python, stamp_file)
+    with only_one(root / ".lab" / "setup.lock") as held:
+        if not is_ready(root, python, stamp_file, extra):
+            make_ready(root, python, stamp_file, extra, held)
     return str(python)
 
 
-def is_ready(root, python, stamp_file):
-    """Whether the environment is what pyproject.toml and constraints.txt ask for."""
-    version = version_of(python)
-    return version is not None and read_stamp(stamp_file) == stamp(root, version)
+def is_ready(root, python, stamp_file, extra):
+    """Whether the environment is what pyproject.toml and constraints.txt ask for; one with more packages is, too."""
+    version, stored = version_of(python), read_stamp(stamp_file)
+    enough = not extra or stored.get("extra") == extra
+    return version is not None and enough and {**stored, "extra": extra} == stamp(root, version, extra)
 
 
-def make_ready(root, python, stamp_file):
+def make_ready(root, python, stamp_file, extra, held):
     folder = root / ".venv"
-    version = version_of(python)
-    if (
-        version is None
-        or read_stamp(stamp_file).get("python") != version
-        or not works(python, "-m", "pip", "--version")
-    ):
+    version, before = version_of(python), read_stamp(stamp_file)
+    if version is None or before.get("python") != version or not works(python, "-m", "pip", "--version"):
         make_venv(folder)
+        before = {}
+    extra = extra or before.get("extra", "")
     if stamp_file.exists():
         stamp_file.unlink()
     try:
-        install(python, root)
+        install(python, root, extra, held)
     except Refusal:
-        stamp_file.write_text(json.dumps({"python": version_of(python)}), encoding="utf-8")
+        with contextlib.suppress(OSError):  # on a full disk the next run begins anew
+            stamp_file.write_text(json.dumps({"python": version_of(python)}), encoding="utf-8")
         raise
-    settings = folder / "share" / "jupyter" / "lab" / "settings"
-    settings.mkdir(parents=True, exist_ok=True)
-    (settings / "overrides.json").write_text(json.dumps(OVERRIDES, indent=1) + "\n", encoding="utf-8")
-    stamp_file.write_text(json.dumps(stamp(root, version_of(python))), encoding="utf-8")
+    stamp_file.write_text(json.dumps(stamp(root, version_of(python), extra)), encoding="utf-8")
 
 
 @contextlib.contextmanager
 def only_one(path):
-    """Two set-ups at once would ruin each other: the second waits. The lock falls when its process ends, however."""
+    """Two set-ups at once would ruin each other: the second waits. Yields the open file that holds the lock.
+
+    The lock falls when this process ends, however, and the programs that inherit the file.
+    """
     path.parent.mkdir(exist_ok=True)
     with path.open("a+b") as file:
         try:
@@ -178,7 +141,7 @@ def only_one(path):
         except OSError:
             print("Another window is setting up; waiting for it ...", flush=True)
             lock(file, wait=True)
-        yield
+        yield file
 
 
 def lock(file, wait):
@@ -204,13 +167,13 @@ def venv_python(folder, windows=os.name == "nt"):
     return folder / ("Scripts" if windows else "bin") / ("python.exe" if windows else "python")
 
 
-def stamp(root, version):
-    """What a set-up depends on: the packages asked for, the version of Python, the place, the settings."""
+def stamp(root, version, extra):
+    """What a set-up depends on: the packages and settings asked for, the version of Python, the place."""
     digest = hashlib.sha256()
-    for name in ("pyproject.toml", "constraints.txt"):
-        digest.update((root / name).read_bytes())
-    digest.update(json.dumps(OVERRIDES).encode())
-    return {"python": version, "place": str(root), "packages": digest.hexdigest()}
+    for name in ASKED_FOR:
+        if (root / name).exists():
+            digest.update((root / name).read_bytes())
+    return {"python": version, "place": str(root), "packages": digest.hexdigest(), "extra": extra}
 
 
 def read_stamp(path):
@@ -256,31 +219,76 @@ def venv_advice(output):
             "Python's module for virtual environments is missing. On Debian and Ubuntu it comes with: "
             "sudo apt install python3-venv   Then run this again."
         )
+    if "No space left on device" in said:
+        return FULL
     return "The environment .venv could not be made: " + last_line(output)
 
 
-def install(python, root):
-    """Install the pinned packages; the whole story goes to `.lab/setup.log`."""
-    log = root / ".lab" / "setup.log"
-    log.parent.mkdir(exist_ok=True)
-    print("Installing the packages, once: about a minute, half a gigabyte ...", flush=True)
-    words = [python, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--retries", "2"]
-    with log.open("wb") as file:
-        pip = subprocess.run(
-            [*map(str, words), "-c", "constraints.txt", "-e", ".[test]"],
-            cwd=str(root),
-            stdout=file,
-            stderr=subprocess.STDOUT,
-        )
-    if pip.returncode:
-        raise Refusal(install_advice(log.read_text(encoding="utf-8", errors="replace")))
+def install(python, root, extra="", held=None):
+    """Install the pinned packages, with uv where it can be had and else with pip, which takes three times as long.
+
+    The whole story goes to `.lab/setup.log`.
+    """
+    path = root / ".lab" / "setup.log"
+    path.parent.mkdir(exist_ok=True)
+    print("Installing the packages, once: half a minute to two, half a gigabyte ...", flush=True)
+    wanted = ["-c", "constraints.txt", "-e", f".[{extra}]" if extra else "."]
+    pip = [str(python), "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--retries", "2"]
+    uv = [str(python), "-m", "uv", "pip", "install", "--quiet", "--python", str(python)]
+    path.write_bytes(b"")
+    with path.open("ab+") as log:
+        failed = logged([*pip, "--quiet", "-c", "constraints.txt", "uv"], root, log, held)
+        if failed and any(word in said(log) for word in OFFLINE):
+            raise Refusal(install_advice(said(log)))
+        failed = failed or logged([*uv, *wanted], root, log, held)
+        if failed:
+            log.truncate(0)
+            failed = logged([*pip, *wanted], root, log, held)
+        if failed:
+            raise Refusal(install_advice(said(log)))
+
+
+def said(log):
+    """What stands in a log so far."""
+    log.seek(0)
+    return log.read().decode(errors="replace")
+
+
+def logged(words, folder, log, held=None):
+    """Exit code of a program that writes into a log; it ends with this one, and where it survives keeps the lock."""
+    shared = [held.fileno()] if held is not None and os.name != "nt" else []
+    process = subprocess.Popen(
+        words, cwd=str(folder), stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, pass_fds=shared
+    )
+    with ended_with_this(process):
+        return process.wait()
+
+
+@contextlib.contextmanager
+def ended_with_this(process):
+    """While a program runs, what ends this one ends it first."""
+
+    def end(number, frame):
+        sys.exit(128 + number)
+
+    names = [name for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    before = {name: signal.signal(getattr(signal, name), end) for name in names}
+    try:
+        yield
+    except BaseException:
+        process.terminate()
+        process.wait()
+        raise
+    finally:
+        for name, handler in before.items():
+            signal.signal(getattr(signal, name), handler)
 
 
 def install_advice(output):
     if any(word in output for word in OFFLINE):
         reason = "The packages could not be fetched: no connection to the package index. Is the network away?"
     elif "No space left on device" in output:
-        reason = "The disk is full: the packages need about a gigabyte while they are installed."
+        reason = FULL
     else:
         reason = "The packages could not be installed: " + last_line(output)
     return reason + "\nRun this again when that is mended; what pip said is in .lab/setup.log."
@@ -290,91 +298,6 @@ def last_line(output):
     errors = [line for line in output.splitlines() if line.startswith(("ERROR", "error"))]
     lines = errors or [line for line in output.splitlines() if line.strip()] or ["no reason was given"]
     return lines[-1].strip()
-
-
-# --- JupyterLab -----------------------------------------------------------------------------------------------------
-
-
-def lab_options(arguments):
-    """(options for us, options for JupyterLab)."""
-    parser = argparse.ArgumentParser(prog="lab.py", add_help=False, allow_abbrev=False)
-    parser.add_argument("--no-browser", action="store_true")
-    parser.add_argument("--port", type=int)
-    parser.add_argument("--ip", default="localhost")
-    return parser.parse_known_args(arguments)
-
-
-def start_lab(python, options, passed_on):
-    """Open JupyterLab on the first notebook and wait until it ends."""
-    port = choose_port(options.ip, options.port)
-    words = lab_command(python, options.ip, port, options.no_browser) + passed_on
-    print(f"JupyterLab opens at port {port}; stop it with Ctrl-C in this window.", flush=True)
-    return call(words, JUPYTERLAB_WORKSPACES_DIR=str(ROOT / ".lab" / "workspaces"), JUPYTER_PREFER_ENV_PATH="1")
-
-
-def lab_command(python, ip, port, no_browser):
-    """The command line that opens JupyterLab on the first notebook; the token stays on."""
-    return [
-        python,
-        "-m",
-        "jupyterlab",
-        f"--ServerApp.root_dir={ROOT}",
-        f"--ServerApp.ip={ip}",
-        f"--ServerApp.port={port}",
-        f"--LabApp.default_url=/lab/tree/{FIRST_NOTEBOOK}",
-        "--LabApp.extension_manager=readonly",
-        "--ServerApp.kernel_websocket_connection_class=labkit.stage.connection.PromptConnection",
-        "--FileContentsManager.pre_save_hook=labkit.live.saving.keep_language",
-        *(["--no-browser"] if no_browser else []),
-    ]
-
-
-def choose_port(ip, wanted=None):
-    """The wanted port, or the first free one from 8888 on; says so when it is another."""
-    if wanted is not None:
-        if not 0 < wanted < 65536:
-            raise Refusal(f"A port is a number from 1 to 65535, and {wanted} is none.")
-        if not is_free(ip, wanted):
-            raise Refusal(f"Port {wanted} is taken. Choose another with --port, or leave the option out.")
-        return wanted
-    for port in range(FIRST_PORT, FIRST_PORT + PORTS):
-        if is_free(ip, port):
-            if port != FIRST_PORT:
-                print(f"Port {FIRST_PORT} is taken (another JupyterLab?), so this one takes {port}.")
-            return port
-    raise Refusal(f"The ports {FIRST_PORT} to {FIRST_PORT + PORTS - 1} are all taken. Choose another with --port.")
-
-
-def is_free(ip, port):
-    """Whether a server may listen there, at every address a name stands for; refuses one this machine does not have."""
-    own = False
-    with contextlib.suppress(socket.gaierror):
-        for family, kind, protocol, _, address in socket.getaddrinfo(ip, port, type=socket.SOCK_STREAM):
-            try:
-                with socket.socket(family, kind, protocol) as probe:
-                    if os.name != "nt":
-                        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-                    probe.bind(address)
-            except OSError as error:
-                if error.errno in (errno.EADDRINUSE, errno.EACCES):
-                    return False
-                continue  # such as ::1 on a machine without IPv6
-            own = True
-    if not own:
-        raise Refusal(f"{ip} is no address of this machine. Leave --ip out to listen on localhost.")
-    return True
-
-
-def call(words, folder=ROOT, **environment):
-    """Run a command in a folder (this one by default) until it ends, handing signals on; returns its exit code."""
-    process = subprocess.Popen(words, cwd=str(folder), env={"PYTHONUTF8": "1", **environment, **os.environ})
-    if hasattr(signal, "SIGTERM"):
-        signal.signal(signal.SIGTERM, lambda number, frame: process.terminate())
-    while True:
-        try:
-            return process.wait()
-        except KeyboardInterrupt:
-            continue  # the command has received it too, and decides
 
 
 if __name__ == "__main__":

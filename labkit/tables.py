@@ -1,11 +1,10 @@
 """Reading the tables in `data/`: CSV with a header, refused with the file and the line when something is missing."""
 
 import csv
-from pathlib import Path
 
 import numpy as np
 
-DATA = Path(__file__).resolve().parent.parent / "data"
+from .places import DATA
 
 
 def read_table(name, text=()):

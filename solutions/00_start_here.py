@@ -37,7 +37,7 @@ course_map()
 # | ! | your code raised … | the error, your line, and the call that led there |
 #
 # Stuck? Press *Hint*, three times if you like. *Solution* shows one way, *Start over* the empty cell. In code: `ex.name.hint()`,
-# `.solution()`, `.starter()`. What you have solved is remembered in the folder `.lab` beside the notebooks, and nowhere else.
+# `.solution()`, `.starter()`. What you have solved is remembered in a file of your home folder, and nowhere else.
 
 # %% mistake [markdown]
 # ## A deliberate mistake
@@ -124,8 +124,11 @@ stages.colors()
 # %% after-work [markdown]
 # ## Good to know
 #
-# - Save the notebook as usual. `python lab.py progress` shows all chapters; `python lab.py reset 01` brings back an empty chapter 1 and keeps your copy.
+# - Save the notebook as usual. In a terminal, `python lab.py progress` shows all chapters, and `python lab.py reset 01` brings back an empty chapter 1 and
+#   keeps your copy. Where the course was installed with pip, as on a course server, the commands are `labkit progress` and `labkit reset 01`.
 # - A function that runs forever is stopped in a check: after two seconds of computing, or a few more where much has to be computed. Elsewhere press the stop button of JupyterLab.
+#   If the cell still shows `[*]`, the code sits inside one single call that Python cannot interrupt, such as `sum(itertools.repeat(1))`: choose
+#   *Kernel > Restart Kernel*. What you have solved stays remembered; then run the cells above the place where you go on.
 # - Every number the documents print stands in the ledger of chapter 10, with what we compute today. Some of the printed numbers are wrong, and you will find them.
 #
 # Now open `01_frames.ipynb`.

@@ -102,7 +102,7 @@ def imported(path):
             yield from (f"{module}.{alias.name}" for alias in node.names)
 
 
-GROUND_FLOOR = {"checks": "checks", "tables": "checks", "__init__": "checks"}
+GROUND_FLOOR = {"checks": "checks", "tables": "checks", "places": "checks", "__init__": "checks"}
 MATHEMATICS = ("geometry", "estimation", "calibration", "machines", "localization", "fast")
 MAY_IMPORT = {  # besides itself
     "checks": (),
@@ -290,3 +290,13 @@ def test_the_readme_shows_every_room(room):
 def test_ruff_is_content(arguments):
     ruff = subprocess.run([sys.executable, "-m", "ruff", *arguments, "."], cwd=ROOT, capture_output=True, text=True)
     assert not ruff.returncode, ruff.stdout + ruff.stderr
+
+
+def test_version_change_log_and_citation_agree():
+    """One version: the newest section of the change log, the citation, and what is built."""
+    version = re.search(r'^version = "(\d+\.\d+\.\d+)"$', (ROOT / "pyproject.toml").read_text(encoding="utf-8"), re.M)[
+        1
+    ]
+    newest = re.search(r"^## (\S+)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.M)[1]
+    cited = re.search(r"^version: (\S+)$", (ROOT / "CITATION.cff").read_text(encoding="utf-8"), re.M)[1]
+    assert version == newest == cited

@@ -1,18 +1,20 @@
 """The one command: what it does in which situation, and the words it finds when something is missing. No network."""
 
 import ast
+import errno
 import json
 import os
-import socket
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 import lab
 from labkit.exercises import source
-from labkit.verbs import build
+from labkit.verbs import processes
 
 
 @pytest.fixture
@@ -34,13 +36,13 @@ def fake_set_up(monkeypatch, checkout):
         python.write_text("", encoding="utf-8")
 
     monkeypatch.setattr(lab, "make_venv", make_venv)
-    monkeypatch.setattr(lab, "install", lambda python, root: done.append("packages"))
+    monkeypatch.setattr(lab, "install", lambda python, root, extra, held: done.append(extra or "packages"))
     monkeypatch.setattr(lab, "version_of", lambda path: "3.11" if Path(path).exists() else None)
     monkeypatch.setattr(lab, "works", lambda *words: Path(words[0]).exists())
 
-    def set_up():
+    def set_up(extra=""):
         done.clear()
-        assert lab.set_up(checkout) == str(python)
+        assert lab.set_up(checkout, extra) == str(python)
         return list(done)
 
     return set_up
@@ -49,13 +51,20 @@ def fake_set_up(monkeypatch, checkout):
 def test_set_up_runs_once(fake_set_up, checkout):
     assert fake_set_up() == ["venv", "packages"]
     assert fake_set_up() == []
-    written = checkout / ".venv" / "share" / "jupyter" / "lab" / "settings" / "overrides.json"
-    assert json.loads(written.read_text(encoding="utf-8")) == lab.OVERRIDES
 
 
-@pytest.mark.parametrize("name", ["pyproject.toml", "constraints.txt"])
+def test_what_only_tests_need_comes_with_the_first_test_and_stays(fake_set_up, checkout):
+    fake_set_up()
+    assert fake_set_up("test") == ["test"]
+    assert fake_set_up("test") == fake_set_up() == []
+    (checkout / "constraints.txt").write_text("changed", encoding="utf-8")
+    assert fake_set_up() == ["test"]
+
+
+@pytest.mark.parametrize("name", lab.ASKED_FOR)
 def test_changed_requirements_are_installed_into_the_same_environment(fake_set_up, checkout, name):
     fake_set_up()
+    (checkout / name).parent.mkdir(exist_ok=True)
     (checkout / name).write_text("changed", encoding="utf-8")
     assert fake_set_up() == ["packages"]
     assert fake_set_up() == []
@@ -80,7 +89,7 @@ def test_a_moved_checkout_is_installed_again(fake_set_up, checkout):
     ("stopped_by", "redone"), [(KeyboardInterrupt, ["venv", "packages"]), (lab.Refusal, ["packages"])]
 )
 def test_an_unfinished_set_up_is_redone(fake_set_up, checkout, monkeypatch, stopped_by, redone):
-    def stop(python, root):
+    def stop(*_):
         raise stopped_by
 
     with monkeypatch.context() as patch:
@@ -164,112 +173,140 @@ def test_a_failed_installation_is_explained(output, words):
     assert words in advice and ".lab/setup.log" in advice
 
 
-@pytest.mark.parametrize(("code", "refused"), [(0, False), (1, True)])
-def test_what_pip_says_goes_to_the_log_and_its_failure_into_a_sentence(checkout, monkeypatch, code, refused):
-    real, said = subprocess.run, f"print('NewConnectionError: no route'); raise SystemExit({code})"
-    asked = []
+@pytest.fixture
+def programs(monkeypatch):
+    """Programs that are not run but answer as told: `answers` are (exit code, words), `asked` the commands."""
 
-    def run(words, **options):
-        asked.extend(words)
-        return real([sys.executable, "-c", said], **options)
+    class Programs:
+        answers, asked = [], []
 
-    monkeypatch.setattr(lab.subprocess, "run", run)
-    if refused:
-        with pytest.raises(lab.Refusal, match="Is the network away"):
-            lab.install("python", checkout)
-    else:
+    def logged(words, folder, log, held=None):
+        Programs.asked.append(words)
+        code, said = Programs.answers.pop(0)
+        log.write(said.encode())
+        return code
+
+    Programs.asked = []
+    monkeypatch.setattr(lab, "logged", logged)
+    return Programs
+
+
+def test_uv_installs_where_it_can_be_had(checkout, programs):
+    programs.answers = [(0, "uv is here"), (0, "all is here")]
+    lab.install("python", checkout, "test")
+    assert programs.asked[0][-3:] == ["-c", "constraints.txt", "uv"] and programs.asked[1][1:3] == ["-m", "uv"]
+    assert programs.asked[1][-4:] == ["-c", "constraints.txt", "-e", ".[test]"]
+    assert "all is here" in (checkout / ".lab" / "setup.log").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("before", [[(1, "no uv for this machine")], [(0, ""), (2, "uv: index unknown to me")]])
+def test_pip_does_it_where_uv_cannot(checkout, programs, before):
+    programs.answers = [*before, (0, "")]
+    lab.install("python", checkout)
+    assert programs.asked[-1][1:4] == ["-m", "pip", "install"] and programs.asked[-1][-2:] == ["-e", "."]
+    programs.answers = [*before, (1, "ERROR: ResolutionImpossible")]
+    with pytest.raises(lab.Refusal, match="could not be installed: ERROR: ResolutionImpossible"):
         lab.install("python", checkout)
-    assert asked[-4:] == ["-c", "constraints.txt", "-e", ".[test]"]
-    assert "NewConnectionError" in (checkout / ".lab" / "setup.log").read_text(encoding="utf-8")
 
 
-def test_verbs_and_options():
-    assert lab.split([]) == ("lab", [])
-    assert lab.split(["--port", "9000"]) == ("lab", ["--port", "9000"])
+def test_without_a_network_one_attempt_is_enough(checkout, programs):
+    programs.answers = [(1, "NewConnectionError: no route")]
+    with pytest.raises(lab.Refusal, match="Is the network away"):
+        lab.install("python", checkout)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="file locks are inherited on POSIX alone")
+@pytest.mark.parametrize(("number", "ends"), [(signal.SIGTERM, True), (signal.SIGHUP, True), (signal.SIGKILL, False)])
+def test_an_installation_ends_with_lab_py_or_keeps_its_lock(tmp_path, number, ends):
+    """The program that installs is told to end; where it cannot be told, a second set-up waits until it has."""
+    path, shown = tmp_path / "lock", tmp_path / "log"
+    child = "import os, time; print(os.getpid(), flush=True); time.sleep(60)"
+    code = f"""import lab, pathlib, sys
+with lab.only_one(pathlib.Path({str(path)!r})) as held, open({str(shown)!r}, 'ab') as log:
+    lab.logged([sys.executable, '-c', {child!r}], '.', log, held)"""
+    parent = subprocess.Popen([sys.executable, "-c", code], cwd=source.ROOT)
+    while not (shown.exists() and shown.read_text().endswith("\n")):
+        time.sleep(0.02)
+    pid = int(shown.read_text())
+    parent.send_signal(number)
+    parent.wait(10)
+    with path.open("a+b") as file:
+        if ends:
+            lab.lock(file, wait=False)
+        else:
+            with pytest.raises(OSError):
+                lab.lock(file, wait=False)
+            os.kill(pid, signal.SIGKILL)
+            lab.lock(file, wait=True)
+
+
+@pytest.mark.parametrize("error", [errno.ENOSPC, errno.EROFS, errno.EACCES])
+def test_a_disk_that_takes_nothing_gets_a_sentence(checkout, monkeypatch, capsys, error):
+    """Full, read-only or another user's: wherever the set-up writes first."""
+
+    def refuse(path, *_, **__):
+        raise OSError(error, os.strerror(error), str(path))
+
+    monkeypatch.setattr(lab, "ROOT", checkout)
+    monkeypatch.setattr(lab.Path, "mkdir", refuse)
+    assert lab.main(["progress"]) == 1
+    told = capsys.readouterr()
+    assert told.err.count("\n") == 1 and str(checkout / ".lab") in told.err
+
+
+def test_a_disk_that_fills_up_meanwhile_gets_one_sentence(checkout, monkeypatch, capsys):
+    """Not even the stamp of what was begun can be written then."""
+
+    def install(*_):
+        raise lab.Refusal(lab.FULL)
+
+    def refuse(path, *_, **__):
+        raise OSError(errno.ENOSPC, "No space left on device", str(path))
+
+    monkeypatch.setattr(lab, "ROOT", checkout)
+    monkeypatch.setattr(lab, "make_venv", lambda folder: folder.mkdir())
+    monkeypatch.setattr(lab, "install", install)
+    monkeypatch.setattr(lab.Path, "write_text", refuse)
+    assert lab.main(["progress"]) == 1
+    assert capsys.readouterr().err == lab.FULL + "\n"
+
+
+def test_verbs():
+    assert lab.split([]) == ("start", [])
+    assert lab.split(["--port", "9000"]) == ("start", ["--port", "9000"])
     assert lab.split(["test", "-k", "invert"]) == ("test", ["-k", "invert"])
-    assert lab.split(["--help"]) == ("help", [])
-    assert lab.split(["calibrate", "--help"]) == ("calibrate", ["--help"])
-    assert lab.command("calibrate", "py", ["pivot", "p.csv"]) == ["py", "-m", "labkit", "calibrate", "pivot", "p.csv"]
-    with pytest.raises(lab.Refusal, match="no command 'tset'. There are test, build, reset, progress, ledger"):
-        lab.split(["tset"])
-    with pytest.raises(lab.Refusal, match="Which chapter"):
-        lab.split(["reset"])
-    options, passed_on = lab.lab_options(["--no-browser", "--port", "9000", "--allow-root"])
-    assert (options.no_browser, options.port, options.ip, passed_on) == (True, 9000, "localhost", ["--allow-root"])
 
 
-def test_each_verb_has_a_command():
-    for verb in ("test", "build", "reset", "progress", "ledger"):
-        words = lab.command(verb, "python", ["01"])
-        assert words[0] == "python"
-        assert (words[-1] == "01") == (verb in ("test", "build", "reset"))
-
-
-def test_help_names_every_verb(capsys):
+def test_what_is_no_verb_is_refused_before_anything_is_set_up(monkeypatch, capsys):
+    monkeypatch.setattr(lab, "set_up", None)
+    assert lab.main(["tset"]) == 1
+    assert "no command 'tset'. There are test, start, update" in capsys.readouterr().err
+    monkeypatch.setattr(lab.processes, "call", None)
     assert lab.main(["--help"]) == 0
     printed = capsys.readouterr().out
-    assert all(f"lab.py {verb}" in printed for verb in ("test", "build", "reset", "progress", "ledger"))
+    assert "python lab.py test" in printed and "python lab.py collect" in printed
 
 
-def test_jupyterlab_listens_on_this_machine_alone_and_keeps_its_token():
-    words = " ".join(lab.lab_command("python", "localhost", 8888, no_browser=False))
-    assert "--ServerApp.ip=localhost" in words and "token" not in words and "password" not in words
-    assert lab.FIRST_NOTEBOOK in words and "--no-browser" not in words
-    assert (source.ROOT / "solutions" / Path(lab.FIRST_NOTEBOOK).with_suffix(".py").name).exists()
-
-
-def test_a_taken_port_is_avoided_or_named(monkeypatch, capsys):
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        with pytest.raises(lab.Refusal, match=f"Port {port} is taken. Choose another with --port"):
-            lab.choose_port("127.0.0.1", port)
-        monkeypatch.setattr(lab, "FIRST_PORT", port)
-        found = lab.choose_port("127.0.0.1")
-        assert found > port
-        assert f"Port {port} is taken (another JupyterLab?), so this one takes {found}." in capsys.readouterr().out
-        monkeypatch.setattr(lab, "PORTS", 1)
-        with pytest.raises(lab.Refusal, match="all taken"):
-            lab.choose_port("127.0.0.1")
-    with pytest.raises(lab.Refusal, match="from 1 to 65535, and 99999 is none"):
-        lab.choose_port("localhost", 99999)
-    for ip in ("no.such.host.invalid", "192.0.2.1"):
-        with pytest.raises(lab.Refusal, match="no address of this machine"):
-            lab.choose_port(ip)
-
-
-def test_localhost_is_taken_when_any_of_its_addresses_is():
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        assert not lab.is_free("localhost", taken.getsockname()[1])
+def test_each_verb_is_handed_on(monkeypatch):
+    calls = []
+    monkeypatch.setattr(lab, "set_up", lambda root, extra="": f"python{extra}")
+    monkeypatch.setattr(lab.processes, "call", lambda words: calls.append(words) or 3)
+    assert lab.main(["calibrate", "pivot", "p.csv"]) == 3
+    assert lab.main(["--allow-root", "--port", "9"]) == lab.main(["test", "-k", "x"]) == 3
+    assert calls[0] == ["python", "-m", "labkit", "calibrate", "pivot", "p.csv"]
+    assert calls[1] == ["python", "-m", "labkit", "start", "--allow-root", "--port", "9"]
+    assert calls[2] == ["pythontest", str(source.ROOT / "tests" / "run.py"), "-k", "x"]
 
 
 def test_signals_and_exit_codes_are_handed_on():
-    assert lab.call([sys.executable, "-c", "raise SystemExit(7)"]) == 7
+    assert processes.call([sys.executable, "-c", "raise SystemExit(7)"]) == 7
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals are POSIX")
 def test_stopping_lab_py_stops_what_it_started():
-    code = "import lab, sys; lab.call([sys.executable, '-c', 'import time; print(1, flush=True); time.sleep(60)'])"
+    child = "import time; print(1, flush=True); time.sleep(60)"
+    code = f"import sys; from labkit.verbs import processes; processes.call([sys.executable, '-c', {child!r}])"
     process = subprocess.Popen([sys.executable, "-c", code], cwd=source.ROOT, stdout=subprocess.PIPE)
     process.stdout.readline()
     process.terminate()
     assert process.wait(10) is not None
-
-
-def test_reset_keeps_the_students_copy(tmp_path):
-    path = tmp_path / "solutions" / "01_small.py"
-    path.parent.mkdir()
-    path.write_text("# %% a\nx = 1\n", encoding="utf-8")
-    notebooks = tmp_path / "notebooks"
-    assert build.main(["--reset", "01"], tmp_path) == 0
-    fresh = (notebooks / "01_small.ipynb").read_text(encoding="utf-8")
-    assert "already" in build.reset(path, notebooks)
-    for number in (1, 2):
-        (notebooks / "01_small.ipynb").write_text(f"my work {number}", encoding="utf-8")
-        said = build.reset(path, notebooks)
-        assert said.endswith(f"yours is kept as notebooks/01_small.my-copy-{number}.ipynb")
-        assert (notebooks / f"01_small.my-copy-{number}.ipynb").read_text(encoding="utf-8") == f"my work {number}"
-        assert (notebooks / "01_small.ipynb").read_text(encoding="utf-8") == fresh

@@ -14,7 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from ..tables import DATA
+from ..places import DATA, ROOT
 
 PACKAGE = Path(__file__).resolve().parents[1]
 WORKER = PACKAGE / "collect" / "worker.py"
@@ -107,7 +107,8 @@ def _wrapped(bwrap, folder):
 
 def hidden():
     """What of the package a submission must not read."""
-    return [path for name in HIDDEN for path in sorted((PACKAGE / "chapters").glob(f"*/{name}"))]
+    shipped = [path for path in (ROOT / "solutions",) if path.is_dir() and path.is_relative_to(PACKAGE)]
+    return shipped + [path for name in HIDDEN for path in sorted((PACKAGE / "chapters").glob(f"*/{name}"))]
 
 
 def _environment(home):

@@ -3,6 +3,7 @@
 import difflib
 import html
 import importlib
+import json
 import os
 import pkgutil
 import re
@@ -10,13 +11,13 @@ import re
 import ipywidgets
 import numpy as np
 
-from ..tables import DATA
+from ..places import ROOT
 from . import engine, feedback, guard, progress, source
 from .engine import CORRECT, NOT_YET, RAISED, TO_DO, Prediction, Value
 from .feedback import Named, Panel
 
 CHAPTERS = "labkit.chapters"  # found by name: the engine imports no chapter
-SOLUTIONS = DATA.parent / "solutions"
+SOLUTIONS = ROOT / "solutions"
 
 
 class NotCorrect(AssertionError):
@@ -112,6 +113,7 @@ class Bound:
     def __init__(self, chapter, item):
         self._chapter, self._item = chapter, item
         self._hints_seen = 0
+        self._call = re.compile(rf"(^|[^\w.])ex\.{item.id}\b")
 
     def __repr__(self):
         name = self._item.id
@@ -179,9 +181,8 @@ class Bound:
         path = SOLUTIONS / f"{self._chapter.notebook}.py"
         if not path.exists():
             return None
-        call = re.compile(rf"(^|[^\w.])ex\.{self._item.id}\b")
         cells = (cell.text for cell in source.read(path) if cell.kind == "code")
-        return next((text for text in cells if call.search(text) and source.region(text)), None)
+        return next((text for text in cells if self._call.search(text) and source.region(text)), None)
 
     def _solution(self):
         cell = self._cell()
@@ -192,9 +193,15 @@ class Bound:
 
     def _starter(self):
         cell = self._cell()
-        if cell is None:
-            return Panel(f"{self._item.id}: no starter is stored in this edition")
-        return Panel(f"{self._item.id}: the cell as it was, to be copied", code=source.blank(cell))
+        code = source.blank(cell) if cell else self._blank_cell()
+        return Panel(f"{self._item.id}: the cell as it was, to be copied", code=code)
+
+    def _blank_cell(self):
+        """The cell of the blank notebook, for an edition without solutions."""
+        path = ROOT / "notebooks" / f"{self._chapter.notebook}.ipynb"
+        cells = json.loads(path.read_text(encoding="utf-8"))["cells"] if path.exists() else []
+        texts = ("".join(cell["source"]) for cell in cells if cell["cell_type"] == "code")
+        return next((text for text in texts if self._call.search(text) and source.STUB in text), "")
 
     def _start_over(self):
         progress.record(self._chapter.name, self._item.id, "reset")

@@ -5,7 +5,7 @@ the solved notebook only), `tags=["student"]` (in the blank one only) or nbval's
 `### END SOLUTION` enclose what becomes `...  # your code here` in the blank notebook; where such lines already stand
 directly above the region, as in `angle_deg = ...  # your code here`, they are kept instead, and the solved notebook
 drops them.
-Standard library only: the build, `lab.py reset` and the exercises' `.solution()` and `.starter()` all read with it.
+The build, `lab.py reset` and the exercises' `.solution()` and `.starter()` all read with it.
 """
 
 import ast
@@ -15,7 +15,8 @@ import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+from ..places import ROOT
+
 STUB = "...  # your code here"
 BUILD_TAGS = frozenset(("solution", "student"))
 TAGS = BUILD_TAGS | {"nbval-ignore-output", "nbval-check-output"}

@@ -2,8 +2,7 @@
 
 JupyterLab's server leaves Nagle's algorithm on. A picture then waits until the browser has acknowledged the short
 message before it ("the kernel is busy"), and browsers put acknowledgments off: 40 ms are lost on most pictures.
-`python lab.py` starts the server with
-`--ServerApp.kernel_websocket_connection_class=labkit.stage.connection.PromptConnection`; nothing else changes.
+`labkit.server` puts this class in its place; nothing else changes.
 """
 
 from jupyter_server.services.kernels.connection.channels import ZMQChannelsWebsocketConnection

@@ -1,35 +1,74 @@
 """Command lines that refuse in one sentence: no usage dump, no traceback, exit code 1."""
 
 import argparse
+import errno
 import json
+import os
 import sys
+
+from ..places import IS_CHECKOUT
+
+COMMAND = "python lab.py" if IS_CHECKOUT else "labkit"  # what a reader types before a verb
+REASONS = {
+    errno.ENOSPC: "the disk is full",
+    errno.EDQUOT: "your share of the disk is full",
+    errno.EROFS: "the disk is read-only",
+    errno.EACCES: "you have no permission",
+    errno.EPERM: "you have no permission",
+    errno.ENOENT: "there is no such file or folder",
+    errno.EISDIR: "it is a folder",
+    errno.ENOTDIR: "it is, or lies in, a file and not a folder",
+    errno.EMFILE: "too many files are open",
+    errno.ENAMETOOLONG: "the name is too long",
+}
 
 
 class Refusal(Exception):
-    """A reason to stop, said in one sentence."""
+    """A reason to stop, said in one or two sentences."""
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser whose faults are one sentence."""
+    """The argument parser of a verb; its faults are one sentence."""
+
+    def __init__(self, verb="", prog=None, **options):
+        super().__init__(prog=prog or f"{COMMAND} {verb}", **options)
 
     def error(self, message):
         raise Refusal(f"{self.prog}: {message}; see: {self.prog} --help")
 
 
 def run(work, arguments=None):
-    """Exit code of `work(arguments)`: 0, or 1 with what it refused on standard error."""
+    """Exit code of `work(arguments)`: what it returns, or 1 with what it refused on standard error."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")  # a console that has no letter for it stops nothing
     try:
-        work(sys.argv[1:] if arguments is None else arguments)
+        code = work(sys.argv[1:] if arguments is None else arguments) or 0
+        sys.stdout.flush()
+        return code
     except (Refusal, ValueError) as reason:
-        print(" ".join(str(reason).split()), file=sys.stderr)
-        return 1
+        return _refuse("\n".join(" ".join(line.split()) for line in str(reason).splitlines()))
     except MemoryError:
-        print("the data are too large for this machine's memory", file=sys.stderr)
+        return _refuse("The data are too large for this machine's memory.")
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # whoever read has seen enough
         return 1
     except OSError as error:
-        print(f"{error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
-        return 1
-    return 0
+        return _refuse(sentence(error))
+    except KeyboardInterrupt:
+        _refuse("\nInterrupted. What was begun is redone the next time.")
+        return 130
+
+
+def _refuse(words):
+    print(words, file=sys.stderr)
+    return 1
+
+
+def sentence(error):
+    """What the operating system refused, in a sentence that names the file."""
+    reason = REASONS.get(error.errno) or error.strerror or str(error)
+    return f"{error.filename or 'A file'}: {reason}."
 
 
 def write(folder, **files):

@@ -7,7 +7,6 @@ or paths of one machine; a stored picture stays until another would look differe
 `python lab.py build` runs `main`.
 """
 
-import argparse
 import asyncio
 import base64
 import io
@@ -25,6 +24,9 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from PIL import Image
 
 from ..exercises import source
+from ..places import IS_CHECKOUT
+from .arguments import Parser, Refusal
+from .edition import write
 
 KERNEL = {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"}
 SECONDS_A_CELL = 60
@@ -191,7 +193,7 @@ def build(paths, notebooks, solutions):
     Every chapter is tried; the `BuildError`s of those that failed are raised together at the end.
     """
     for path in paths:
-        _write(notebooks / f"{path.stem}.ipynb", as_text(blank_notebook(path)))
+        write(notebooks / f"{path.stem}.ipynb", as_text(blank_notebook(path)))
     failed = [str(error) for error in asyncio.run(_build_solved(paths, solutions)) if error]
     if failed:
         raise BuildError("\n".join(failed))
@@ -203,7 +205,7 @@ async def _build_solved(paths, solutions):
     async def one(path):
         async with kernels:
             try:
-                _write(solutions / f"{path.stem}.ipynb", await executed_text(path, solutions))
+                write(solutions / f"{path.stem}.ipynb", await executed_text(path, solutions))
             except BuildError as error:
                 return error
 
@@ -215,13 +217,6 @@ async def executed_text(path, solutions):
     notebook = solved_notebook(path)
     await execute(notebook, path.stem, path.parent)
     return as_text(keep_pictures(clean(notebook, path.stem), solutions / f"{path.stem}.ipynb"))
-
-
-def _write(path, text):
-    path.parent.mkdir(exist_ok=True)
-    partial = path.with_suffix(".partial")
-    partial.write_text(text, encoding="utf-8", newline="\n")
-    os.replace(partial, path)
 
 
 def stale(paths, notebooks, solutions, rerun=False):
@@ -266,21 +261,6 @@ def _lacks_picture(output):
     return data.get("text/plain", "").startswith("[stage: ") and "image/png" not in data
 
 
-def reset(path, notebooks):
-    """Give the student a fresh blank notebook; a copy that differs from it is kept beside it. Returns what was done."""
-    notebook, fresh = notebooks / f"{path.stem}.ipynb", as_text(blank_notebook(path))
-    if _text(notebook) == fresh:
-        return f"notebooks/{notebook.name} is as in the beginning already"
-    kept = ""
-    if notebook.exists():
-        numbers = (k for k in range(1, 10**6) if not (notebooks / f"{path.stem}.my-copy-{k}.ipynb").exists())
-        copy = notebooks / f"{path.stem}.my-copy-{next(numbers)}.ipynb"
-        os.replace(notebook, copy)
-        kept = f"; yours is kept as notebooks/{copy.name}"
-    _write(notebook, fresh)
-    return f"notebooks/{notebook.name} is as in the beginning{kept}"
-
-
 def orphans(notebooks, solutions):
     """Generated notebooks whose source is gone, one sentence each."""
     known = {path.stem for path in source.sources(solutions)}
@@ -294,7 +274,7 @@ def orphans(notebooks, solutions):
 
 def main(arguments=None, root=source.ROOT):
     """`python lab.py build [NN ...] [--check [--execute]]`; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="lab.py build", description="Write the notebooks from their sources.")
+    parser = Parser("build", description="Write the notebooks from their sources.")
     parser.add_argument(
         "chapters", nargs="*", metavar="NN", help="number or name of a chapter; all of them if none is given"
     )
@@ -302,16 +282,12 @@ def main(arguments=None, root=source.ROOT):
     parser.add_argument(
         "--execute", action="store_true", help="with --check: execute the solved notebooks again as well"
     )
-    parser.add_argument(
-        "--reset", action="store_true", help="give the student fresh notebooks, keeping the old as copies"
-    )
     options = parser.parse_args(arguments)
+    if not (IS_CHECKOUT or root != source.ROOT):
+        raise Refusal("Notebooks are built where their sources are written: in a checkout of the repository.")
     notebooks, solutions = root / "notebooks", root / "solutions"
     try:
         paths = [source.find(chapter, solutions) for chapter in options.chapters] or source.sources(solutions)
-        if options.reset:
-            print("\n".join(reset(path, notebooks) for path in paths))
-            return 0
         if options.check:
             found = stale(paths, notebooks, solutions, options.execute) + orphans(notebooks, solutions)
             numbers = " ".join(sorted({sentence[:2] for sentence in found}))

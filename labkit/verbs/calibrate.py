@@ -43,7 +43,7 @@ def main(arguments):
 
 
 def _parser():
-    parser = Parser(prog="labkit calibrate", description="Calibrate from your own poses.")
+    parser = Parser("calibrate", description="Calibrate from your own poses.")
     kinds = parser.add_subparsers(dest="kind", required=True, parser_class=Parser, metavar="KIND")
     hand_eye = kinds.add_parser("hand-eye", help="a sensor on a flange, or beside the robot")
     hand_eye.add_argument("--robot", type=Path, help="flange in base")

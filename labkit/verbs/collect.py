@@ -30,9 +30,7 @@ def main(arguments=None):
 
 
 def _parser():
-    parser = Parser(
-        prog="lab.py collect", description="Judge submitted notebooks, and show what the class made of them."
-    )
+    parser = Parser("collect", description="Judge submitted notebooks, and show what the class made of them.")
     parser.add_argument("folders", nargs="*", metavar="FOLDER_OR_ZIP", help="as Moodle, ILIAS or nbgitpuller give them")
     parser.add_argument("--out", default="collected", metavar="DIR", help="where the report goes (collected)")
     parser.add_argument(

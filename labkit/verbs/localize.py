@@ -51,7 +51,7 @@ def main(arguments):
 
 
 def _parser():
-    parser = Parser(prog="labkit localize", description="The path of a robot from its own log.")
+    parser = Parser("localize", description="The path of a robot from its own log.")
     parser.add_argument("--odometry", type=Path, required=True, help="t v omega: s, m/s, rad/s")
     parser.add_argument("--landmarks", type=Path, required=True, help="id x y: m")
     parser.add_argument("--measurements", type=Path, required=True, help="t id range bearing: s, m, rad")

@@ -27,6 +27,8 @@ ELSEWHERE = (
     "C:/Program Files/Google/Chrome/Application/chrome.exe",
     "C:/Program Files (x86)/Microsoft/Edge/Application/msedge.exe",
 )
+SETTINGS = json.loads((ROOT / "jupyter" / "settings.json").read_text(encoding="utf-8"))
+UNINSTALLED = ["--ServerApp.jpserver_extensions=labkit.server=True"]  # what an installation's etc/jupyter would say
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"]
 FLAGS += ["--disable-component-update", "--disable-sync"]
 

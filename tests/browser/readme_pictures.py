@@ -14,16 +14,18 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "browser")]
 import driver  # noqa: E402
 import test_jupyterlab  # noqa: E402
 
-import lab  # noqa: E402
+from labkit.verbs import jupyter  # noqa: E402
 
 
 def main():
-    words = lab.lab_command(sys.executable, "localhost", lab.choose_port("localhost"), no_browser=True)
-    words += ["--LabApp.expose_app_in_browser=True", "--allow-root"]
+    words = jupyter.lab_command(
+        sys.executable, ROOT, "notebooks/00_start_here.ipynb", "localhost", jupyter.choose_port("localhost"), True
+    )
+    words += [*driver.UNINSTALLED, "--LabApp.expose_app_in_browser=True", "--allow-root"]
     with tempfile.TemporaryDirectory() as folder, driver.notebook_copy("01") as copy:
         settings = {"PYTHONPATH": str(ROOT), "LABKIT_PROGRESS": str(Path(folder) / "progress.jsonl")}
         with (
-            driver.server(words, settings=lab.OVERRIDES, **settings) as address,
+            driver.server(words, settings=driver.SETTINGS, **settings) as address,
             driver.page_of(driver.find_browser(), False, 1000, 1400, scale=2) as page,
         ):
             driver.open_notebook(page, address, copy)

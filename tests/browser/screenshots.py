@@ -14,7 +14,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "browser")]
 
 import driver  # noqa: E402
 
-import lab  # noqa: E402
+from labkit.verbs import jupyter  # noqa: E402
 
 PAGE = 1600  # CSS pixels a picture
 
@@ -35,12 +35,14 @@ def main(arguments=None):
 
 
 def take(notebook, stem, options):
-    words = lab.lab_command(sys.executable, "localhost", lab.choose_port("localhost"), no_browser=True)
-    words += ["--LabApp.expose_app_in_browser=True", "--allow-root"]
+    words = jupyter.lab_command(
+        sys.executable, ROOT, "notebooks/00_start_here.ipynb", "localhost", jupyter.choose_port("localhost"), True
+    )
+    words += [*driver.UNINSTALLED, "--LabApp.expose_app_in_browser=True", "--allow-root"]
     paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
     name = f"{stem}-{'solved' if options.solved else 'blank'}-{'dark' if options.dark else 'light'}"
     with (
-        driver.server(words, settings=lab.OVERRIDES, PYTHONPATH=paths) as address,
+        driver.server(words, settings=driver.SETTINGS, PYTHONPATH=paths) as address,
         driver.page_of(driver.find_browser(), options.dark, options.width) as page,
     ):
         driver.open_notebook(page, address, notebook)

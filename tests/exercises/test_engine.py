@@ -763,6 +763,15 @@ def test_solution_and_starter_come_from_the_source(capsys):
     assert "def invert" in shown and "your code here" in shown
 
 
+def test_an_edition_for_exams_has_starters_and_no_solutions(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(session, "SOLUTIONS", tmp_path)
+    ex = session.course("01-frames")
+    ex.invert.solution()
+    assert "no solution is stored in this edition" in capsys.readouterr().out
+    ex.invert.starter()
+    assert "def invert" in capsys.readouterr().out
+
+
 def test_a_mistake_keeps_its_id_when_others_come_before_it_or_its_sentence_is_improved():
     def ids(*mistakes):
         hints = ("a", "b", "c")

@@ -644,7 +644,6 @@ def test_pictures_leave_the_server_at_once(monkeypatch):
     connection._trait_values["websocket_handler"] = Handler()
     connection.connect()
     assert calls == [True, "connect"]
-    assert f"{PromptConnection.__module__}.{PromptConnection.__name__}" in (ROOT / "lab.py").read_text(encoding="utf-8")
 
 
 def test_going_back_to_a_width_moves_no_axes():

@@ -100,7 +100,7 @@ REFUSED = [
     ),
     (["frame", "points.csv"], "points.csv: a frame through points needs 3 of them, got 15"),
     (["compare", "--a", "robot.csv", "--b", "sensor.txt"], "robot.csv: a stream needs a time in every row"),
-    (["pivot"], "the following arguments are required: poses; see: labkit calibrate pivot --help"),
+    (["pivot"], "the following arguments are required: poses; see: python lab.py calibrate pivot --help"),
     (["eye"], "invalid choice: 'eye'"),
     ([], "the following arguments are required: KIND"),
 ]

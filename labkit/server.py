@@ -1,0 +1,24 @@
+"""What Jupyter's server does differently where labkit is installed; `etc/jupyter/` of the environment loads this.
+
+Pictures leave at once (`stage.connection`), and a notebook that was looked at stays as it is (`live.saving`). A server
+that was told to use another connection keeps it.
+"""
+
+from jupyter_server.services.kernels.connection.channels import ZMQChannelsWebsocketConnection
+
+from .live.saving import keep_language
+from .stage.connection import PromptConnection
+
+CONNECTION = "kernel_websocket_connection_class"
+
+
+def _load_jupyter_server_extension(serverapp):
+    """Called by Jupyter's server as it starts."""
+    settings = serverapp.web_app.settings
+    if settings.get(CONNECTION) is ZMQChannelsWebsocketConnection:
+        settings[CONNECTION] = PromptConnection
+    serverapp.contents_manager.register_pre_save_hook(keep_language)
+
+
+def _jupyter_server_extension_points():
+    return [{"module": "labkit.server"}]

@@ -1,0 +1,152 @@
+"""The blank notebooks of this edition: given to a folder, reset, and updated without touching what was written.
+
+What a folder was given is remembered in its `.labkit.json`, a digest for every cell. A cell that is still as it was
+given takes the text of a new edition; a cell in which something was written stays, with its output.
+"""
+
+import hashlib
+import itertools
+import json
+import os
+from pathlib import Path
+
+from ..exercises import source
+from ..places import ROOT
+from .arguments import Refusal
+
+GIVEN = ".labkit.json"
+
+
+def notebooks():
+    """{name: text} of the blank notebooks; from the sources where this edition has them."""
+    if source.sources():
+        from . import build
+
+        return {f"{path.stem}.ipynb": build.as_text(build.blank_notebook(path)) for path in source.sources()}
+    return {path.name: path.read_text(encoding="utf-8") for path in sorted((ROOT / "notebooks").glob("[0-9]*.ipynb"))}
+
+
+def give(folder):
+    """Copy those notebooks into a folder that it does not hold yet; returns their names."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    new = {name: text for name, text in notebooks().items() if not (folder / name).exists()}
+    for name, text in new.items():
+        write(folder / name, text)
+    _remember(folder, new)
+    return list(new)
+
+
+def update(folder):
+    """Bring the notebooks of a folder to this edition; returns a sentence for each that changed or could not be read.
+
+    Raises
+    ------
+    Refusal
+        When the folder holds no notebook of the course.
+    """
+    folder, said = Path(folder), []
+    fresh, given = notebooks(), _given(folder)
+    if not any((folder / name).exists() for name in fresh):
+        raise Refusal(f"{folder} holds no notebook of the course. New ones come with: labkit start {folder}")
+    for name, text in fresh.items():
+        if not (folder / name).exists():
+            write(folder / name, text)
+            said.append(f"{name} is new")
+            continue
+        try:
+            merged, kept = merge(_read(folder / name), json.loads(text), given.get(name, {}))
+        except (ValueError, KeyError, TypeError):
+            said.append(f"{name} cannot be read as a notebook and is left as it is")
+            fresh = {other: words for other, words in fresh.items() if other != name}
+            continue
+        if merged is not None:
+            write(folder / name, json.dumps(merged, indent=1, ensure_ascii=False) + "\n")
+            own = f"; {kept} of its cells stay as you wrote them" if kept else ""
+            said.append(f"{name} is brought to this edition{own}")
+    _remember(folder, fresh)
+    return said
+
+
+def merge(mine, theirs, given):
+    """(the notebook `mine` with the cells of `theirs` where nothing was written, number of cells that were kept).
+
+    `given` are the digests of the cells that `mine` began with. The notebook is None when nothing changes. A cell that
+    was deleted stays away; one's own cells, and those the new edition has dropped, stay behind the cell they followed.
+    """
+    own = {}
+    for cell in mine["cells"]:
+        own.setdefault(cell.get("id"), cell)
+    written = [c for c in mine["cells"] if own[c.get("id")] is not c or given.get(c.get("id")) != digest(c)]
+    cells = []
+    for cell in theirs["cells"]:
+        old = own.get(cell["id"])
+        if old is None and cell["id"] not in given:
+            cells.append(cell)
+        elif old is not None:
+            cells.append(old if _is_in(old, written) or digest(old) == digest(cell) else cell)
+    place = 0
+    for cell in mine["cells"]:
+        found = next((k for k, other in enumerate(cells) if other.get("id") == cell.get("id") is not None), None)
+        if _is_in(cell, written) and not _is_in(cell, cells):
+            cells.insert(place, cell)
+            place += 1
+        elif found is not None:
+            place = found + 1
+    same = [digest(cell) for cell in cells] == [digest(cell) for cell in mine["cells"]]
+    return (None, 0) if same else ({**mine, "cells": cells}, len(written))
+
+
+def _is_in(cell, cells):
+    return any(cell is other for other in cells)
+
+
+def digest(cell):
+    """A few characters that change with what a cell says."""
+    words = "".join(cell["source"]) if isinstance(cell["source"], list) else cell["source"]
+    return hashlib.sha256(f"{cell['cell_type']}\n{words}".encode("utf-8", "surrogatepass")).hexdigest()[:16]
+
+
+def fresh_copy(path, text, shown):
+    """Put a notebook's beginning in place; one that differs is kept beside it. Returns what was done."""
+    if path.exists() and path.read_text(encoding="utf-8", errors="replace") == text:
+        return f"{shown} is as in the beginning already"
+    kept = ""
+    if path.exists():
+        copies = (path.with_name(f"{path.stem}.my-copy-{k}.ipynb") for k in itertools.count(1))
+        copy = next(copy for copy in copies if not copy.exists())
+        os.replace(path, copy)
+        kept = f"; yours is kept as {shown[: -len(path.name)]}{copy.name}"
+    write(path, text)
+    return f"{shown} is as in the beginning{kept}"
+
+
+def write(path, text):
+    """Write a file whole or not at all."""
+    path.parent.mkdir(exist_ok=True)
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        partial.write_text(text, encoding="utf-8", newline="\n")
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _read(path):
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def _given(folder):
+    try:
+        found = _read(folder / GIVEN)
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _remember(folder, texts):
+    """Note what the cells of these notebooks begin with from now on."""
+    cells = {name: {cell["id"]: digest(cell) for cell in json.loads(text)["cells"]} for name, text in texts.items()}
+    given = {**_given(folder), **cells}
+    if given != _given(folder):
+        write(folder / GIVEN, json.dumps(given, indent=1) + "\n")

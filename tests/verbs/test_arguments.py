@@ -1,0 +1,73 @@
+"""What the command line answers when something cannot be done: one sentence, no traceback."""
+
+import errno
+import os
+import subprocess
+import sys
+
+import pytest
+
+from labkit import __main__ as command
+from labkit.verbs import VERBS, arguments
+
+ROOT = command.__file__ and os.path.dirname(os.path.dirname(os.path.abspath(command.__file__)))
+
+
+def raising(error):
+    def work(_):
+        raise error
+
+    return work
+
+
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [
+        (errno.ENOSPC, "x.csv: the disk is full."),
+        (errno.EROFS, "x.csv: the disk is read-only."),
+        (errno.EACCES, "x.csv: you have no permission."),
+        (errno.EPERM, "x.csv: you have no permission."),
+        (errno.ENOENT, "x.csv: there is no such file or folder."),
+        (errno.EIO, "x.csv: Input/output error."),
+    ],
+)
+def test_what_the_system_refuses_is_a_sentence(number, said, capsys):
+    assert arguments.run(raising(OSError(number, os.strerror(number), "x.csv")), []) == 1
+    assert capsys.readouterr().err == said + "\n"
+
+
+def test_other_ends(capsys):
+    assert arguments.run(raising(arguments.Refusal("so\nand  so")), []) == 1
+    assert arguments.run(raising(KeyboardInterrupt()), []) == 130
+    assert arguments.run(lambda words: 7 if words == ["a"] else None, ["a"]) == 7
+    assert capsys.readouterr().err.startswith("so\nand so\n")
+
+
+def test_every_verb_has_its_module_and_its_line_of_help(capsys):
+    assert command.main(["--help"]) == 0
+    printed = capsys.readouterr().out
+    for verb in VERBS:
+        assert f"python lab.py {verb}" in printed
+        module = __import__(f"labkit.verbs.{verb}", fromlist=["main"])
+        assert callable(module.main)
+    assert command.main(["tset"]) == 1
+    assert "There is no verb 'tset'. There are start, update" in capsys.readouterr().err
+
+
+def test_a_console_without_the_letters_gets_others_and_no_traceback():
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
+    words = [sys.executable, "-c", "from labkit.verbs.arguments import run; run(lambda _: print('✓ ü'), [])"]
+    told = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert told.stdout == "\\u2713 \\xfc\n" and told.stderr == ""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="pipes end otherwise on Windows")
+def test_a_reader_who_has_seen_enough_is_no_error():
+    code = "from labkit.verbs.arguments import run; run(lambda _: print('x\\n' * 10**6), [])"
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    process.stdout.readline()
+    process.stdout.close()
+    assert process.stderr.read() == "" and process.wait(10) is not None
+    process.stderr.close()
