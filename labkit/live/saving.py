@@ -1,7 +1,7 @@
 """The server's side of a notebook that stays as it is: looking at it and saving it changes no byte.
 
-JupyterLab writes the kernel's version into a notebook as soon as it is opened. `labkit.server` registers this hook: what
-the file says of its language then stays.
+JupyterLab writes the kernel's version into a notebook as soon as it is opened. `labkit.server` registers this hook:
+what the file says of its language then stays.
 """
 
 import json
