@@ -42,6 +42,8 @@ class HandEye(Result):
         (std_rot, std_trans) as given, None for what was estimated.
     history : array, shape (steps, 3)
         std_rot (rad), std_trans (mm) and the size of the step (rad) in each iteration.
+    converged : bool
+        Whether the last step was too small to matter; False where the steps ran out.
     residuals : array, shape (N, 6)
         Rotation vector (rad, in T) and translation (mm, in S) of the reading against the prediction.
     std : array, shape (6,)
@@ -57,6 +59,10 @@ class HandEye(Result):
     def _loop(self):
         """(robot, sensor, target) with robot @ sensor @ T_ST = target."""
         return self.T_BF, self.T_FS, self.T_BT
+
+    @property
+    def converged(self):
+        return bool(self.history[-1, 2] < STEP_TOLERANCE)
 
     @cached_property
     def residuals(self):

@@ -424,8 +424,15 @@ def pose_bins(states, cell=0.5, turn=_BIN_TURN):
     Returns
     -------
     array of int, shape (...)
+
+    Raises
+    ------
+    ValueError
+        More than 65,536 bins to a turn.
     """
     states, cell, turn = as_points(states, "states"), as_positive_number(cell, "cell"), as_positive_number(turn, "turn")
+    if turn < 1e-4:
+        raise ValueError(f"turn must be at least 1e-4 rad, got {shown(turn)}")
     i, j = np.floor(states[..., 0] / cell).astype(np.int64), np.floor(states[..., 1] / cell).astype(np.int64)
     heading = states[..., 2] % (2 * np.pi) % (2 * np.pi)  # the remainder of -1e-17 is a whole turn; its own is 0
     k = np.floor(heading / turn).astype(np.int64)

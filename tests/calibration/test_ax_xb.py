@@ -7,6 +7,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from labkit.calibration import ax_xb
+from labkit.fast import ax_xb as fast_ax_xb
 from labkit.geometry.frames import invert, pose, pose_distance
 from labkit.geometry.lie import exp_so3, skew
 
@@ -236,3 +237,11 @@ def test_robust_weights_are_shares():
     T_ST[3, 0, 3] += 100.0
     weights = ax_xb.calibrate_hand_eye(T_BF, T_ST, robust=True).weights
     assert weights[3] == 0 and weights.min() >= 0 and 0.9 < weights.max() <= 1.0
+
+
+@pytest.mark.parametrize("room", [ax_xb, fast_ax_xb])
+def test_a_fit_that_runs_out_of_steps_says_so(room, monkeypatch):
+    T_BF, T_ST = setup(np.random.default_rng(34), 8, 0.05, 20.0)
+    assert room.calibrate_hand_eye(T_BF, T_ST).converged and room.calibrate_hand_eye(T_BF, T_ST, robust=True).converged
+    monkeypatch.setattr(room, "MAX_STEPS", 1)
+    assert not room.calibrate_hand_eye(T_BF, T_ST).converged

@@ -270,6 +270,13 @@ def test_dogleg_without_a_bound_is_newton_and_with_a_tight_one_steepest_descent(
     assert np.linalg.norm(opt.dogleg_step(g, B, middle)) == pytest.approx(middle)
 
 
+@pytest.mark.parametrize("least", [0.0, 1e-16, -1e-3])
+def test_dogleg_goes_down_the_gradient_where_nothing_bends_up_for_sure(least):
+    g, B = np.array([1.0, -1.0]), np.diag([1.0, least])
+    np.testing.assert_allclose(opt.dogleg_step(g, B, 5.0), opt.cauchy_step(g, B, 5.0))
+    assert np.linalg.norm(opt.dogleg_step(g, np.diag([1.0, 1e-12]), 5.0)) == pytest.approx(5.0)
+
+
 def test_exact_step_minimizes_the_model_on_the_disk_also_when_indefinite():
     angle, share = np.meshgrid(np.linspace(0, 2 * np.pi, 721), np.linspace(0, 1, 101))
     disk = np.stack([share * np.cos(angle), share * np.sin(angle)], axis=-1)

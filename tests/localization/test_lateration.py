@@ -160,3 +160,13 @@ def test_square_jacobian_is_the_derivative_of_the_lectures_equations():
     for k, e in enumerate(h * np.eye(2)):
         ahead, behind = (lateration.square_residuals(FOUR, d, position + s * e) for s in (1, -1))
         np.testing.assert_allclose(J[:, k], (ahead - behind) / (2 * h), rtol=1e-8)
+
+
+def test_the_search_stops_after_so_many_steps():
+    d = distances(FOUR, [3.0, 4.0])
+    far = np.array([80.0, -60.0])
+    ends = [lateration.laterate(FOUR, d, far, steps=steps) for steps in (1, 2, 3, 50)]
+    assert [end.iterations for end in ends[:3]] == [1, 2, 3] and not any(end.converged for end in ends[:3])
+    away = [np.hypot(*(end.position - [3.0, 4.0])) for end in ends]
+    assert away[0] > away[1] > away[2] > away[3] and ends[3].converged and 3 < ends[3].iterations < 50
+    assert away[0] < np.hypot(*(far - [3.0, 4.0]))

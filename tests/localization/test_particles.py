@@ -184,6 +184,18 @@ def test_bins_tell_poses_apart():
     assert bins[0] == bins[1] and len(set(bins.tolist())) == 5
 
 
+def test_headings_fall_into_24_bins_around_the_circle():
+    middles = np.deg2rad(7.5 + 15 * np.arange(24))
+    poses = np.column_stack([np.full((24, 2), 0.2), middles])
+    bins = pt.pose_bins(poses)
+    assert len(set(bins.tolist())) == 24 and (np.diff(bins) == 1).all()
+    for turns in (-3, 1, 40):
+        np.testing.assert_array_equal(pt.pose_bins(poses + [0, 0, 2 * np.pi * turns]), bins)
+    assert pt.pose_bins([0.2, 0.2, -1e-17]) == bins[0]
+    with pytest.raises(ValueError, match="turn must be at least 1e-4 rad"):
+        pt.pose_bins(poses, turn=9e-5)
+
+
 def test_kld_size_against_the_chi_square_quantile():
     for bins in (5, 20, 100):
         exact = stats.chi2.ppf(stats.norm.cdf(2.326), bins - 1) / (2 * 0.05)

@@ -3,6 +3,7 @@
 import socket
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -142,3 +143,19 @@ def test_memory_stays_bounded():
         send(listener.port, *packets(120))
         assert wait(lambda: listener.statistics().good == 120)
         assert len(listener.readings()) == 50 and len(listener._seen) <= udp.MEMORY
+
+
+@pytest.mark.parametrize(("seen", "arrived"), [([18, 19, 20], True), ([18, 19], False)])
+def test_a_flush_waits_for_what_is_still_on_its_way(seen, arrived):
+    """20 datagrams were sent, two more lost or refused; the listener counts one more whenever it is asked."""
+    counts = iter(seen)
+    last = [0]
+
+    def statistics():
+        last[0] = next(counts, last[0])
+        return SimpleNamespace(datagrams=last[0])
+
+    with udp.listen() as real, udp.Sender(iter([]), real.port) as sender:
+        assert sender.finished.wait(3)
+        sender.sent.update({"good": 18, "stale": 2, "lost": 1, "refused": 1})
+        assert sender.flush(SimpleNamespace(statistics=statistics), seconds=0.05 if not arrived else 3.0) is arrived
