@@ -1,0 +1,545 @@
+"""One cell from beginning to end: frames, tip, scanner and tracker together find a part and send the tip to it.
+
+The part P stands on a trolley that also carries the tracker E. Once it is *learned*: from three flange poses its marks
+are seen by the scanner S, or touched with the tip, and the frame through them is T_BP0, while the tracker reads T_WE0.
+Later the trolley stands elsewhere and the tracker reads T_WE1. Nothing has moved between tracker and part, so
+
+    T_BP = T_BW T_WE1 (T_BW T_WE0)^-1 T_BP0,
+
+and the tip is sent to a hole of the part: the flange goes where R tip + t is the hole as it was found. Three
+calibrations enter: the tip (chapter 3), T_FS (chapter 5), T_BW (chapter 6). The arm itself counts as exact, as in the
+report (section 3). Lengths mm, angles rad; errors of transforms as in `geometry.propagation`.
+
+A *source* of error is what is measured independently of the rest: each calibration, the three marks, each reading.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..calibration.ax_xb import calibrate_hand_eye
+from ..calibration.hand_eye import calibrate_sphere_target
+from ..calibration.pivot import calibrate_pivot, cone, touching_poses
+from ..calibration.planning import pattern
+from ..checks import as_count, as_shape
+from ..geometry.frames import frame_from_points, invert, pose, transform
+from ..geometry.lie import exp_so3
+from ..geometry.propagation import (
+    chain_jacobians,
+    disturb,
+    error_budget,
+    inverse_jacobian,
+    point_jacobians,
+    product_jacobians,
+    three_point_jacobian,
+)
+from . import simulation
+from .arm import TX40, tool_pose
+
+SOURCES = ("tip", "scanner", "tracker", "marks", "first reading", "second reading")
+DOWN = np.diag([1.0, -1.0, -1.0])  # orientation of a flange whose z axis points down
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """The calibrations of a cell, each with its covariance.
+
+    Attributes
+    ----------
+    tip : array, shape (3,)
+        In F (mm).
+    T_FS, T_BW : arrays, shape (4, 4)
+        The scanner on the flange; the tracker's world in the base (mm).
+    cov_tip : array, shape (3, 3)
+    cov_FS, cov_BW : arrays, shape (6, 6)
+        Rotation vector (rad, about the axes of the second frame), then translation (mm, in the first).
+    """
+
+    tip: np.ndarray
+    T_FS: np.ndarray
+    T_BW: np.ndarray
+    cov_tip: np.ndarray
+    cov_FS: np.ndarray
+    cov_BW: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """A part that was learned once and is found again.
+
+    Attributes
+    ----------
+    T_BF : array, shape (3, 4, 4)
+        Flange poses at the marks: origin, a point on x, a point on the side of y of the part's frame.
+    marks : array, shape (3, 3)
+        The marks as measured there: in S when seen by the scanner, in F when touched.
+    T_WE0, T_WE1 : arrays, shape (4, 4)
+        The tracker's readings when the part was learned, and now.
+    hole : array, shape (3,)
+        In P (mm).
+    R_tool : array, shape (3, 3)
+        How the flange is turned when the tip goes to the hole.
+    touched : bool
+        Whether the marks were touched with the tip instead of seen by the scanner.
+    std_mark : float
+        Of each coordinate of a mark (mm).
+    std_reading : tuple
+        Of each component of a reading, (rad, mm).
+    """
+
+    T_BF: np.ndarray
+    marks: np.ndarray
+    T_WE0: np.ndarray
+    T_WE1: np.ndarray
+    hole: np.ndarray
+    R_tool: np.ndarray
+    touched: bool = False
+    std_mark: float = 0.1
+    std_reading: tuple = (np.deg2rad(0.02), 0.12)
+
+
+def cell_from(tip, scanner, tracker):
+    """The cell that three calibrations describe.
+
+    Parameters
+    ----------
+    tip : calibration.pivot.PivotCalibration
+    scanner : calibration.hand_eye.SphereHandEye
+    tracker : calibration.ax_xb.EyeToHand
+        Its sensor frame S is the tracker's world W.
+
+    Returns
+    -------
+    Cell
+    """
+    return Cell(
+        tip.tip, scanner.T_FS, tracker.T_BS,
+        tip.covariance_of("tip"), scanner.covariance_of("T_FS"), tracker.covariance_of("T_BS"),
+    )  # fmt: skip
+
+
+# ---- from the marks to the tip ---------------------------------------------------------------------------------------
+
+
+def marks_in_base(cell, job):
+    """The three marks of the part in the base, where it was learned.
+
+    Parameters
+    ----------
+    cell : Cell
+    job : Job
+
+    Returns
+    -------
+    marks : array, shape (..., 3, 3), mm
+    """
+    on_flange = job.marks if job.touched else transform(cell.T_FS[..., None, :, :], job.marks)
+    return transform(job.T_BF, on_flange)
+
+
+def learned_pose(cell, job):
+    """T_BP0, the frame through the marks: chapter 1.
+
+    Parameters
+    ----------
+    cell : Cell
+    job : Job
+
+    Returns
+    -------
+    T_BP : array, shape (..., 4, 4)
+    """
+    return frame_from_points(*np.moveaxis(marks_in_base(cell, job), -2, 0))
+
+
+def part_pose(cell, job):
+    """T_BP, where the part is now: chapter 2's chain around the tracker.
+
+    Parameters
+    ----------
+    cell : Cell
+    job : Job
+
+    Returns
+    -------
+    T_BP : array, shape (..., 4, 4)
+    """
+    return cell.T_BW @ job.T_WE1 @ invert(cell.T_BW @ job.T_WE0) @ learned_pose(cell, job)
+
+
+def hole_in_base(cell, job):
+    """Where the hole is found.
+
+    Parameters
+    ----------
+    cell : Cell
+    job : Job
+
+    Returns
+    -------
+    hole : array, shape (..., 3), mm
+    """
+    return transform(part_pose(cell, job), job.hole)
+
+
+def flange_at_hole(cell, job):
+    """Flange pose that brings the tip to the hole as it was found.
+
+    Parameters
+    ----------
+    cell : Cell
+    job : Job
+
+    Returns
+    -------
+    T_BF : array, shape (..., 4, 4)
+    """
+    return pose(job.R_tool, hole_in_base(cell, job) - (job.R_tool @ cell.tip[..., None])[..., 0])
+
+
+def miss(truth, cell, job):
+    """How far the tip misses the hole when everything is computed with a cell and is really as in another.
+
+    Parameters
+    ----------
+    truth : Cell
+        What the true cell would be; its readings and marks are those of `job`, taken as exact.
+    cell : Cell
+        The calibrated cell.
+    job : Job
+
+    Returns
+    -------
+    miss : array, shape (..., 3), mm
+        Tip less hole, in the base.
+    """
+    return transform(flange_at_hole(cell, job), truth.tip) - hole_in_base(truth, job)
+
+
+# ---- how sure it is --------------------------------------------------------------------------------------------------
+
+
+def source_covariances(cell, job):
+    """Covariance of each source.
+
+    Parameters
+    ----------
+    cell : Cell
+    job : Job
+
+    Returns
+    -------
+    covariances : dict
+        {source: array}, (3, 3) for the tip, (9, 9) for the marks, (6, 6) for all others.
+    """
+    reading = np.diag(np.repeat(job.std_reading, 3) ** 2)
+    return dict(zip(SOURCES, (cell.cov_tip, cell.cov_FS, cell.cov_BW, job.std_mark**2 * np.eye(9), reading, reading)))
+
+
+def _mark_jacobians(cell, job):
+    """How the marks in the base, (9,), move with tip, scanner and marks."""
+    R = job.T_BF[:, :3, :3]
+    if job.touched:
+        by_mark = R
+        by_tip, by_scanner = R.reshape(9, 3), np.zeros((9, 6))
+    else:
+        by_frame, by_point = point_jacobians(cell.T_FS, job.marks)
+        by_mark = R @ by_point
+        by_tip, by_scanner = np.zeros((9, 3)), (R @ by_frame).reshape(9, 6)
+    every = np.zeros((3, 3, 3, 3))
+    every[range(3), :, range(3), :] = by_mark
+    return {"tip": by_tip, "scanner": by_scanner, "marks": every.reshape(9, 9)}
+
+
+def part_jacobians(cell, job):
+    """How the part's pose T_BP moves with each source.
+
+    Parameters
+    ----------
+    cell : Cell
+    job : Job
+
+    Returns
+    -------
+    jacobians : dict
+        {source: array, shape (6, n)}.
+    """
+    marks = marks_in_base(cell, job)
+    chain = (cell.T_BW, job.T_WE1, invert(job.T_WE0), invert(cell.T_BW), frame_from_points(*marks))
+    _, (world, now, then, back, part) = chain_jacobians(chain)
+    by_marks = part @ three_point_jacobian(*marks)
+    return {name: by_marks @ J for name, J in _mark_jacobians(cell, job).items()} | {
+        "tracker": world + back @ inverse_jacobian(cell.T_BW),
+        "first reading": then @ inverse_jacobian(job.T_WE0),
+        "second reading": now,
+    }
+
+
+def miss_jacobians(cell, job):
+    """How the tip's miss of the hole moves with each source; the tip may enter twice, and cancel.
+
+    Parameters
+    ----------
+    cell : Cell
+    job : Job
+
+    Returns
+    -------
+    jacobians : dict
+        {source: array, shape (3, n)}: by an error of the source as it is used; the miss is of the opposite sign for
+        an error of the truth.
+    """
+    by_part = point_jacobians(part_pose(cell, job), job.hole)[0]
+    jacobians = {name: by_part @ J for name, J in part_jacobians(cell, job).items()}
+    jacobians["tip"] = jacobians["tip"] - job.R_tool
+    return jacobians
+
+
+def part_covariance(cell, job):
+    """Covariance of T_BP to first order.
+
+    Parameters
+    ----------
+    cell : Cell
+    job : Job
+
+    Returns
+    -------
+    covariance : array, shape (6, 6)
+        Rotation vector (rad, about the axes of P), then translation (mm).
+    """
+    return sum(error_budget(part_jacobians(cell, job), source_covariances(cell, job)).values())
+
+
+def miss_budget(cell, job):
+    """What each source contributes to the covariance of the miss.
+
+    Parameters
+    ----------
+    cell : Cell
+    job : Job
+
+    Returns
+    -------
+    shares : dict
+        {source: array, shape (3, 3), mm^2}; their sum is the covariance.
+    """
+    return error_budget(miss_jacobians(cell, job), source_covariances(cell, job))
+
+
+def with_errors(cell, job, errors):
+    """The cell and the job as they would be with errors in their sources.
+
+    Parameters
+    ----------
+    cell : Cell
+    job : Job
+    errors : dict
+        {source: array, shape (..., n)}; what is not named stays.
+
+    Returns
+    -------
+    cell : Cell
+    job : Job
+    """
+    e = {name: np.zeros(9 if name == "marks" else 3 if name == "tip" else 6) for name in SOURCES} | errors
+    marks = job.marks + e["marks"].reshape(*e["marks"].shape[:-1], 3, 3)
+    if job.touched:
+        marks = marks + e["tip"][..., None, :]
+    return (
+        replace(cell, tip=cell.tip + e["tip"], T_FS=disturb(cell.T_FS, e["scanner"]),
+                T_BW=disturb(cell.T_BW, e["tracker"])),
+        replace(job, marks=marks, T_WE0=disturb(job.T_WE0, e["first reading"]),
+                T_WE1=disturb(job.T_WE1, e["second reading"])),
+    )  # fmt: skip
+
+
+def simulate_misses(cell, job, rng, n=10_000):
+    """The miss of the hole in many simulated cells, all sources drawn from their covariances; nothing is linearized.
+
+    Parameters
+    ----------
+    cell : Cell
+        The center of the draws, taken as the truth.
+    job : Job
+    rng : numpy.random.Generator
+    n : int
+
+    Returns
+    -------
+    misses : array, shape (n, 3), mm
+    """
+    n = as_count(n, "n")
+    errors = {
+        name: rng.multivariate_normal(np.zeros(len(cov)), cov, n, method="svd")
+        for name, cov in source_covariances(cell, job).items()
+    }
+    drawn_cell, drawn_job = with_errors(cell, job, errors)
+    return transform(flange_at_hole(drawn_cell, drawn_job), cell.tip) - hole_in_base(cell, job)
+
+
+def frames_in_base(cell, job):
+    """Every frame of the cell as it stands in the base when the tip goes to the hole, each with its covariance.
+
+    Parameters
+    ----------
+    cell : Cell
+    job : Job
+
+    Returns
+    -------
+    frames : dict
+        {name: (T, covariance)}, shapes (4, 4) and (6, 6): W, the tracker E now, the part P as it was learned (P0) and
+        now (P), the flange F, which counts as exact, and the scanner S on it.
+    """
+    J0 = three_point_jacobian(*marks_in_base(cell, job))
+    cov = source_covariances(cell, job)
+    by_marks = {name: J0 @ J for name, J in _mark_jacobians(cell, job).items()}
+    learned = sum(error_budget(by_marks, {name: cov[name] for name in by_marks}).values())
+    T_BF = flange_at_hole(cell, job)
+    by_world, by_reading = product_jacobians(cell.T_BW, job.T_WE1)
+    reading = cov["second reading"]
+    turned = product_jacobians(T_BF, cell.T_FS)[1]
+    return {
+        "W": (cell.T_BW, cell.cov_BW),
+        "E": (cell.T_BW @ job.T_WE1, by_world @ cell.cov_BW @ by_world.T + by_reading @ reading @ by_reading.T),
+        "P0": (learned_pose(cell, job), learned),
+        "P": (part_pose(cell, job), part_covariance(cell, job)),
+        "F": (T_BF, np.zeros((6, 6))),
+        "S": (T_BF @ cell.T_FS, turned @ cell.cov_FS @ turned.T),
+    }
+
+
+# ---- a simulated cell ------------------------------------------------------------------------------------------------
+
+MARKS = np.array([[0.0, 0, 0], [110.0, 0, 0], [25.0, 80, 0]])  # in P
+HOLE = np.array([80.0, 55.0, 0.0])  # in P
+T_PE = pose(exp_so3([0.0, 0.0, 0.4]), [-70.0, 40.0, 60.0])  # the tracker on the trolley
+TABLE = 100.0  # mm, height of the part over the robot's foot
+TRUTH = Cell(
+    np.array([0.0, 30.0, 130.0]),
+    pose(exp_so3([0.1, -0.08, 0.3]), [45.0, -15.0, 50.0]),
+    tool_pose(TX40, simulation.measuring_joints()[0], simulation.T_FE),
+    np.zeros((3, 3)), np.zeros((6, 6)), np.zeros((6, 6)),
+)  # fmt: skip
+STD_TOUCH, STD_CENTER = 0.15, 0.33  # mm per axis: a tip on its point; a sphere's center, 0.57 mm in space (chapter 5)
+STD_STOP = (np.deg2rad(0.1), 0.6)  # rad and mm per axis: a reading at the short stops of the tracker's calibration
+LEARNED = (190.0, -180.0, 0.3)  # x, y (mm) and turn (rad) of the part when it is learned
+
+
+def calibrate_tip(rng, n=24, half_angle=0.5):
+    """The tip by *Quirlen*, as in chapter 3.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    n : int
+        Number of poses.
+    half_angle : float, rad
+        Of the cone on which the tool is led.
+
+    Returns
+    -------
+    calibration.pivot.PivotCalibration
+    """
+    R = DOWN @ cone(n, half_angle, turns=0.5)
+    return calibrate_pivot(touching_poses(R, TRUTH.tip, [300.0, 50.0, 200.0], 0.0, STD_TOUCH, rng))
+
+
+def calibrate_scanner(rng, n=31, tilt=0.35):
+    """The scanner from a sphere, as in chapter 5.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    n : int
+        Number of poses.
+    tilt : float, rad
+        Largest angle between the line of sight and straight down.
+
+    Returns
+    -------
+    calibration.hand_eye.SphereHandEye
+    """
+    target = np.array([240.0, 0.0, 110.0])
+    T_BF = pattern(TRUTH.T_FS, target, tilt, (20.0, 20.0, 20.0), n)
+    x_S = transform(invert(T_BF @ TRUTH.T_FS), target)
+    return calibrate_sphere_target(T_BF, x_S + STD_CENTER * rng.normal(size=x_S.shape))
+
+
+def calibrate_tracker(rng, n=21):
+    """Where the tracker's world is, with the tracker still on the flange, as in chapter 6.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    n : int
+        Number of stops, at most 21.
+
+    Returns
+    -------
+    calibration.ax_xb.EyeToHand
+    """
+    q = simulation.measuring_joints()[: as_count(n, "n", at_least=3)]
+    noise = rng.normal(size=(len(q), 6)) * np.repeat(STD_STOP, 3)
+    T_WE = disturb(invert(TRUTH.T_BW) @ tool_pose(TX40, q, simulation.T_FE), noise)
+    return calibrate_hand_eye(simulation.flange_poses(q), T_WE, *STD_STOP, eye="to hand")
+
+
+def calibrated_cell(rng):
+    """A cell whose three calibrations were simulated, one after the other.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    Cell
+    """
+    return cell_from(calibrate_tip(rng), calibrate_scanner(rng), calibrate_tracker(rng))
+
+
+def place_on_table(x, y, turn):
+    """Pose of a part on the table, shape (4, 4).
+
+    Parameters
+    ----------
+    x, y : float, mm
+    turn : float, rad
+
+    Returns
+    -------
+    T_BP : array, shape (4, 4)
+    """
+    return pose(exp_so3([0.0, 0.0, turn]), [x, y, TABLE])
+
+
+def simulated_job(now, learned=LEARNED, touched=False):
+    """The job of a part, without noise: what the true cell would measure.
+
+    Parameters
+    ----------
+    now, learned : array-like, shape (3,)
+        Where the part stands and where it was learned: x, y (mm) and turn (rad) on the table.
+    touched : bool
+        Whether its marks were touched with the tip, the flange turned as later at the hole.
+
+    Returns
+    -------
+    Job
+    """
+    now, learned = as_shape(now, "now", 3), as_shape(learned, "learned", 3)
+    T_BP0, T_BP1 = place_on_table(*learned), place_on_table(*now)
+    R_tool = exp_so3([0.0, 0.0, learned[2]]) @ DOWN
+    marks_B = transform(T_BP0, MARKS)
+    if touched:
+        marks, R_BF = np.tile(TRUTH.tip, (3, 1)), np.broadcast_to(R_tool, (3, 3, 3))
+        arms = marks
+    else:
+        marks = np.array([[6.0, 5.0, 215.0], [-8.0, -6.0, 230.0], [4.0, 7.0, 220.0]])
+        tilts = exp_so3(np.deg2rad([[8.0, 0, 0], [-6.0, -6.0, 20.0], [0, -8.0, -20.0]]))
+        R_BF, arms = tilts @ R_tool @ TRUTH.T_FS[:3, :3].T, transform(TRUTH.T_FS, marks)
+    T_BF = pose(R_BF, marks_B - (R_BF @ arms[..., None])[..., 0])
+    T_WE0, T_WE1 = (invert(TRUTH.T_BW) @ T @ T_PE for T in (T_BP0, T_BP1))
+    return Job(T_BF, marks, T_WE0, T_WE1, HOLE, R_tool, touched)
