@@ -25,6 +25,7 @@
 import numpy as np
 
 from labkit.chapters.ch04_optimization import stages
+from labkit.documents.thesis import printed as thesis
 from labkit.documents.thesis import wells
 from labkit.documents.thesis.wells import stand_ins
 from labkit.estimation import optimization as opt
@@ -60,6 +61,33 @@ def gradient(x):
     return 200 / q1**2 * d1 + 400 / q2**2 * d2
     ### END SOLUTION
 
+
+# %% measured-text [markdown]
+# ## Measure it
+#
+# Nobody needs a second derivation to check a derivative. Step a little to each side along one unknown, and divide the difference by the distance:
+#
+# $$\frac{\partial f}{\partial x_k} \approx \frac{f(x + h\,e_k) - f(x - h\,e_k)}{2h} \qquad \text{(central difference, } e_k \text{ a unit vector)}$$
+#
+# Its error shrinks with $h^2$, until $h$ is so small that rounding takes over; chapter 5 looks for the best step. It works for every function, so write it for any number of unknowns.
+
+# %% measured_gradient
+@ex.measured_gradient
+def measured_gradient(f, x, h):
+    """Return the gradient of f at x, shape (n,), by central differences.
+
+    f: takes an array of shape (n,), returns a number; x: shape (n,); h: the step.
+    """
+    ### BEGIN SOLUTION
+    return np.array([(f(x + e) - f(x - e)) / (2 * h) for e in h * np.eye(len(x))])
+    ### END SOLUTION
+
+
+# %% compare-gradient
+x = np.array([0.3, -0.7])
+off = np.abs(gradient(x) - measured_gradient(wells.value, x, 1e-4)).max()
+print(f"your gradient at {x}: {gradient(x)}")
+print("within 1e-4 of the measured one:", off < 1e-4)
 
 # %% one-line [markdown]
 # ## Everything happens on one line
@@ -103,18 +131,16 @@ def hessian(x):
 # %% listing-c7 [markdown]
 # ## Against the document: listing C7
 #
-# The thesis prints the Hessian twice, as formulas (listing C7) and as MATLAB code (C9). They differ. Who is right? The Hessian is the derivative of the
-# gradient, and a derivative can be *measured* by central differences. (If you wrote your own Hessian by differences, the check took it, and rightly so. But now
+# The thesis prints the Hessian twice, as formulas (listing C7) and as MATLAB code (C9). They differ. Who is right? Row $k$ of the Hessian is the gradient of component $k$ of the
+# gradient, and a gradient can be *measured*. (If you wrote your own Hessian by differences, the check took it, and rightly so. But now
 # it would be compared with itself: write the two formulas above first.)
 
 # %% compare-listing-c7
-x = np.array([0.3, -0.7])
-h = 1e-6
-columns = [(gradient(x + e) - gradient(x - e)) / (2 * h) for e in h * np.eye(2)]
-measured = np.column_stack(columns)
+rows = [measured_gradient(lambda y, k=k: gradient(y)[k], x, 1e-5) for k in (0, 1)]
+measured = np.array(rows)
 for name, H in (("yours", hessian(x)), ("listing C7", wells.printed_hessian(x))):
-    print(f"{name:10}  H11 {H[0, 0]:8.3f}  H12 {H[0, 1]:8.3f}  H22 {H[1, 1]:8.3f}", end="")
-    print(f"   off by {np.abs(H - measured).max():.3f}")
+    entries = f"H11 {H[0, 0]:8.3f}  H12 {H[0, 1]:8.3f}  H22 {H[1, 1]:8.3f}"
+    print(f"{name:10}  {entries}   off by {np.abs(H - measured).max():.3f}")
 
 # %% listing-c7-verdict [markdown]
 # Listing C7 is wrong on the diagonal: $H_{11}$ ends in $-(-1600(x_1-1)^2)$ where $-1600(x_1+1)^2$ belongs, and $H_{22}$ repeats $H_{11}$ instead of using $x_2$.
@@ -127,10 +153,10 @@ for name, H in (("yours", hessian(x)), ("listing C7", wells.printed_hessian(x)))
 # %% classify_extremum
 @ex.classify_extremum
 def classify_extremum(g, H):
-    """Return the kind of a point with gradient g, shape (2,), and Hessian H, shape (2, 2).
+    """Return the kind of a point with gradient g (2,) and Hessian H (2, 2).
 
-    It is one of these words: "minimum", "maximum", "saddle" or, where |g| > 1e-6, "not stationary".
-    No eigenvalue of H is 0.
+    It is one of these words: "minimum", "maximum", "saddle" or, where |g| > 1e-6,
+    "not stationary". No eigenvalue of H is 0.
     """
     ### BEGIN SOLUTION
     if np.linalg.norm(g) > 1e-6:
@@ -151,7 +177,10 @@ def classify_extremum(g, H):
 # %% newton_step
 @ex.newton_step
 def newton_step(g, H):
-    """Return the step h, shape (2,), to where the model is stationary; g has shape (2,), H (2, 2)."""
+    """Return the step h, shape (2,), to where the model is stationary.
+
+    g: shape (2,); H: shape (2, 2).
+    """
     ### BEGIN SOLUTION
     return np.linalg.solve(H, -g)
     ### END SOLUTION
@@ -173,10 +202,13 @@ for _ in range(10):
 saddle = ex.saddle(saddle)
 
 # %% compare-extrema
-for name, printed, e in zip(wells.NAMES, ((0.979, 0.968), (-0.995, -1.992), (0.105, -0.205)), wells.extrema()):
+places = (0.979, 0.968), (-0.995, -1.992), (0.105, -0.205)
+for name, printed, e in zip(wells.NAMES, places, wells.extrema()):
     kind = classify_extremum(gradient(e.x), hessian(e.x))
-    slope, off = np.linalg.norm(gradient(np.array(printed))), np.linalg.norm(e.x - printed)
-    print(f"{name:15} printed {printed}, |g| there {slope:.3f}; the computed one is {off:.4f} away: {kind}")
+    slope = np.linalg.norm(gradient(np.array(printed)))
+    off = np.linalg.norm(e.x - printed)
+    there = f"printed {printed}, |g| there {slope:.3f}"
+    print(f"{name:15} {there}; the computed one is {off:.4f} away: {kind}")
 
 # %% saddle-statement [markdown]
 # ## "A saddle must be hit exactly"
@@ -194,6 +226,54 @@ guess = "within 0.7 of it"
 ### END SOLUTION
 ex.predict("neighborhood", guess, reveal=stages.saddle)
 
+# %% convex-text [markdown]
+# ## Where is f convex? (*further*)
+#
+# Were $f$ **convex**, none of this could happen: a convex function on a convex set has no local minimum but the global one (section 2.4.2). The thesis gives two tests. By the *chord*:
+#
+# $$f\big((1-\lambda)x + \lambda y\big) \le (1-\lambda)\,f(x) + \lambda\,f(y) \qquad \text{for all } x, y \text{ in the set and } 0 \le \lambda \le 1,$$
+#
+# and by the *Hessian*, which must have no negative eigenvalue anywhere in it. The first asks about pairs of places, the second about one place at a time, but at all of them.
+#
+# Decide how much of the square passes the second, then drag P and Q. Where is $H$ positive definite? Does it help that it is, at P and at Q? And what does the other matrix say, $2J^\top J$ of the next section?
+
+# %% predict-convex_share
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "about 1 %"
+### END SOLUTION
+ex.predict("convex_share", guess, reveal=stages.convexity)
+
+# %% chord-text [markdown]
+# $2J^\top J$ is positive definite everywhere: every Gauss-Newton step leads downhill. That does not make $f$ convex; it only makes each *model* so, and the wells stay two.
+#
+# The chord needs no derivative at all. Write the test.
+
+# %% rise_above_chord
+@ex.rise_above_chord
+def rise_above_chord(f, x, y, n):
+    """Return by how much f rises above its chord from x to y at most, a number.
+
+    f: takes shape (d,), returns a number; x, y: shape (d,); n: how many evenly spaced
+    places are looked at, both ends included, so that the result is never below 0.
+    """
+    ### BEGIN SOLUTION
+    shares = np.linspace(0, 1, n)
+    values = np.array([f((1 - t) * x + t * y) for t in shares])
+    return (values - ((1 - shares) * f(x) + shares * f(y))).max()
+    ### END SOLUTION
+
+
+# %% chords
+L, G, S = (e.x for e in wells.extrema())
+rng = np.random.default_rng(1)
+disks = ("L", L, 0.4), ("L", L, 1.0), ("G", G, 0.4), ("S", S, 0.4)
+for name, center, radius in disks:
+    ends = center + radius * rng.uniform(-1, 1, (300, 2, 2)) / np.sqrt(2)
+    rises = np.array([rise_above_chord(wells.value, x, y, 21) for x, y in ends])
+    above = (rises > 1e-9).sum()
+    print(f"disk of {radius} around {name}: f rises above {above:3} of 300 chords")
+
 # %% squares-text [markdown]
 # ## Gauss-Newton needs a sum of squares
 #
@@ -208,7 +288,10 @@ ex.predict("neighborhood", guess, reveal=stages.saddle)
 # %% jacobian
 @ex.jacobian
 def jacobian(x):
-    """Return J, shape (4, 2), of the residuals at x, shape (2,): rows of the well at (1, 1) first."""
+    """Return J, shape (4, 2), of the residuals at x, shape (2,).
+
+    The rows of the well at (1, 1) come first.
+    """
     ### BEGIN SOLUTION
     blocks = []
     for w, c in ((100, np.array([1, 1])), (200, np.array([-1, -2]))):
@@ -226,7 +309,10 @@ def jacobian(x):
 # %% gauss_newton_step
 @ex.gauss_newton_step
 def gauss_newton_step(r, J):
-    """Return the step h, shape (n,), that minimizes |r + J h|; r has shape (m,), J (m, n), m >= n."""
+    """Return the step h, shape (n,), that minimizes |r + J h|.
+
+    r: shape (m,); J: shape (m, n), m >= n.
+    """
     ### BEGIN SOLUTION
     return -np.linalg.lstsq(J, r, rcond=None)[0]
     ### END SOLUTION
@@ -244,7 +330,8 @@ def gauss_newton_step(r, J):
 def gain_ratio(cost, new_cost, g, B, step):
     """Return actual over predicted decrease, a number, negative where the cost rose.
 
-    cost and new_cost: numbers, before and after the step; g, step: shape (2,); B: shape (2, 2).
+    cost and new_cost: numbers, before and after the step; g, step: shape (2,);
+    B: shape (2, 2).
     """
     ### BEGIN SOLUTION
     predicted = -(g @ step) - 0.5 * step @ B @ step
@@ -280,23 +367,41 @@ def dogleg_step(g, B, radius):
 
 
 # %% assemble-text [markdown]
-# ## Your parts, assembled
+# ## Your parts, assembled (*further*)
 #
-# This loop is all there is to a trust region. It uses your functions on the residuals of the two wells, with $B = J^\top J$, far out. Watch $\rho$ and the radius:
-# which step is taken back, and what does the next one do better? The workbook's `opt.trust_region` is the same loop with more care.
+# A trust region is a loop around the two. In each round: $g = J^\top r$ and $B = J^\top J$ where you stand, a dogleg step, and $\rho$ of the cost $\tfrac12 r^\top r$. Then two decisions:
+#
+# - The step is *taken* where $\rho > 0.1$; otherwise $x$ stays.
+# - The *radius* becomes a quarter of the step's length where $\rho < \tfrac14$. It doubles where $\rho > \tfrac34$ and the step is longer than 0.999 of it. Otherwise it stays.
+
+# %% trust_region
+@ex.trust_region
+def trust_region(residual, jacobian, x, radius, steps):
+    """Return x, shape (n,), and the radius, a number, after `steps` rounds, taken or not.
+
+    residual(x): shape (m,); jacobian(x): shape (m, n); x, radius: those of the start."""
+    ### BEGIN SOLUTION
+    for _ in range(steps):
+        r, J = residual(x), jacobian(x)
+        g, B = J.T @ r, J.T @ J
+        step = dogleg_step(g, B, radius)
+        new, length = residual(x + step), np.linalg.norm(step)
+        rho = gain_ratio(r @ r / 2, new @ new / 2, g, B, step)
+        x = x + step if rho > 0.1 else x
+        wider = 2 * radius if rho > 0.75 and length > 0.999 * radius else radius
+        radius = length / 4 if rho < 0.25 else wider
+    return x, radius
+    ### END SOLUTION
+
 
 # %% assemble
-x, radius = np.array([10.0, 10.0]), 1.0
-for k in range(8):
-    r, J = wells.residual(x), jacobian(x)
-    g, B = J.T @ r, J.T @ J
-    step = dogleg_step(g, B, radius)
-    new_r = wells.residual(x + step)
-    rho = gain_ratio(r @ r / 2, new_r @ new_r / 2, g, B, step)
-    print(f"{k}: x = {x}, radius {radius:.3f}, rho {rho:6.2f}, f = {r @ r - 300:.2f}")
-    x = x + step if rho > 0.1 else x
-    at_rim = np.linalg.norm(step) > 0.999 * radius
-    radius = np.linalg.norm(step) / 4 if rho < 0.25 else 2 * radius if rho > 0.75 and at_rim else radius
+start = np.array([10.0, 10.0])
+for steps in range(9):
+    x, radius = trust_region(wells.residual, jacobian, start, 1.0, steps)
+    print(f"{steps} rounds: x = {x}, radius {radius:.3f}, f = {wells.value(x):.2f}")
+
+# %% assembled [markdown]
+# Which round took no step, and what did the next one do better? `opt.trust_region` is the same loop with more care: units, stopping rules, poses in place of vectors.
 
 # %% four-text [markdown]
 # ## Four paths on one map
@@ -325,8 +430,9 @@ for start in ((1.25, 1.25), (-1.25, -2.25)):
     run = wells.run("newton", start, stop=opt.small_gradient_before(1e-10))
     print(f"Newton from {start}: {run.iterations} iterations to {run.solution}")
 print("printed: 9 to (0.9789, 0.9684), 7 to (-0.9948, -1.9922)\n")
-claims = ((4.3, "GN: local"), (35, "GN: global"), (4.5, "TR: local"), (45, "TR: global"))
-names = {"GN": "Gauss-Newton", "LM": "Levenberg-M.", "dogleg": "TR, dogleg", "exact": "TR, exact", "BFGS": "BFGS"}
+claims = (4.3, "GN: local"), (35, "GN: global"), (4.5, "TR: local"), (45, "TR: global")
+names = {"GN": "Gauss-Newton", "LM": "Levenberg-M.", "dogleg": "TR, dogleg"}
+names |= {"exact": "TR, exact", "BFGS": "BFGS"}
 print(f"{'start':12}{'thesis':22}", *(f"{name:13}" for name in names.values()))
 for s, claim in claims:
     ends = stand_ins((s, s))
@@ -371,6 +477,46 @@ for method in wells.METHODS:
     share = (ends_in_square < 2).mean()
     print(f"{method:20}", "".join(letters[ends]), f"{100 * share:5.1f} % of the square")
 
+# %% classes [markdown]
+# ## Which problem, which solver? (*further*)
+#
+# Before the method comes the problem. The thesis writes it as: minimize $f(x)$, subject to $g_i(x) = 0$ and $h_i(x) \le 0$ (2-13 to 2-15), and sorts by what these are (table 2-2).
+#
+# | problem | what is special | solver, for instance in SciPy |
+# | --- | --- | --- |
+# | linear | $f$, $g$, $h$ linear: convex, the minimum in a corner | `linprog` |
+# | quadratic | $f$ quadratic, $g$, $h$ linear; convex where $B$ has no negative eigenvalue | `lstsq`, `lsq_linear` |
+# | nonlinear, a sum of squares | residuals at hand: $J$ is enough | `least_squares`: Gauss-Newton's relatives |
+# | nonlinear, smooth | local minima, saddles | `minimize`: trust region, BFGS |
+# | integer | variables in steps | `milp` |
+#
+# Calibrating a scanner is the third kind: residuals, six unknowns, no condition. It could also be written with the nine entries of a rotation matrix and the condition $R^\top R = I$. Drop
+# that condition and the rest is the second kind, convex and solved at once: this is how chapter 5 finds a start without a guess.
+#
+# Section 4.1 chooses *what to look at* by adding up points, section 5.2 the method by words in four levels. Recompute both.
+
+# %% tables-4-1-and-5-2
+for name, row in thesis.table_4_1().items():
+    points = row["points"].astype(int)
+    printed, most = f"{row['sum']:.0f}/{row['of']:.0f}", 10 * len(points)
+    print(f"{name:14} {points} printed {printed}, computed {points.sum()}/{most}")
+for name, levels in thesis.table_5_2().items():
+    print(f"{name:35} {levels}  {levels.sum()} of 16")
+
+# %% tipping-text [markdown]
+# The sums are right; the "/50" is not: four criteria of at most 10 points make 40. (A fifth criterion may have been dropped, or lost on its way to our text.) In table 5-2, Gauss-Newton and
+# Levenberg-Marquardt have full marks, and the trust region, which is chosen, four less: the text weighs three things above the rest and does not say how much.
+#
+# Such sums hide weights of 1. Suppose that *solving*, the last criterion of table 4-1, counts $w$ times and the other three once. **From which $w$ on does the cube win over the sphere?**
+
+# %% tipping_weight
+tipping_weight = ...  # your code here
+### BEGIN SOLUTION
+sphere, cube = (thesis.table_4_1()[name]["points"] for name in ("sphere", "cube"))
+tipping_weight = (sphere[:3].sum() - cube[:3].sum()) / (cube[3] - sphere[3])
+### END SOLUTION
+tipping_weight = ex.tipping_weight(tipping_weight)
+
 # %% break-it-text [markdown]
 # ## Break it
 #
@@ -382,7 +528,8 @@ for method in wells.METHODS:
 run = wells.run("newton", (3.0, 3.0))
 print(f"{run.reason} after {run.iterations} steps: converged = {run.converged}")
 g, H = gradient(run.solution), hessian(run.solution)
-print(f"|x| = {np.linalg.norm(run.solution):.0f}, f = {run.cost[-1]:.1e}, |g| = {np.linalg.norm(g):.0e}")
+far, slope = np.linalg.norm(run.solution), np.linalg.norm(g)
+print(f"|x| = {far:.0f}, f = {run.cost[-1]:.1e}, |g| = {slope:.0e}")
 print(f"largest curvature {np.abs(np.linalg.eigvalsh(H)).max():.0e}")
 print(f"your classify_extremum: {classify_extremum(g, H)}")
 print(f"opt.classify_extremum:  {opt.classify_extremum(g, H)}")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from labkit.chapters.ch04_optimization import descent
 from labkit.chapters.ch04_optimization.exercises import CHAPTER
 from labkit.documents.thesis import wells
 from labkit.estimation import optimization as opt
@@ -108,3 +109,50 @@ def test_what_question_2_compares():
     r = wells.residual(deep)
     assert np.isclose(r @ r, wells.value(deep) + 300)
     assert np.abs(J.T @ J - H / 2).max() < 0.05 * np.abs(H / 2).max()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_loop_of_the_exercise_is_the_librarys_trust_region(seed):
+    for draw in ITEMS["trust_region"].cases:
+        residual, jacobian, x, radius, steps = draw(np.random.default_rng(seed))
+        trace = opt.trust_region(residual, jacobian, x, radius=radius, max_iterations=steps, stop=lambda *_: "")
+        found, last = descent.trust_region(residual, jacobian, x, radius, steps)
+        assert found == pytest.approx(trace.solution, abs=1e-9)
+        longer = opt.trust_region(residual, jacobian, x, radius=radius, max_iterations=steps + 1, stop=lambda *_: "")
+        inside = np.linalg.norm(longer.step[-1]) < 0.999 * last
+        assert inside or np.linalg.norm(longer.step[-1]) == pytest.approx(last)
+
+
+def test_the_bare_dogleg_is_the_librarys():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        n = int(rng.integers(2, 5))
+        A, g = rng.normal(size=(n + 1, n)), rng.normal(size=n)
+        radius = float(rng.uniform(0.05, 3))
+        assert descent.bare_dogleg(g, A.T @ A, radius) == pytest.approx(opt.dogleg_step(g, A.T @ A, radius), abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_gradient_by_smaller_steps_is_not_the_central_difference_asked_for(seed):
+    def richardson(f, x, h):
+        wide, narrow = (descent.measured_gradient(f, x, step) for step in (h, h / 2))
+        return (4 * narrow - wide) / 3
+
+    assert judged("measured_gradient", richardson, seed).status == NOT_YET
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_chord_is_judged_however_it_is_walked(seed):
+    def by_loop(f, x, y, n):
+        rise = 0.0
+        for k in range(n):
+            t = k / (n - 1)
+            rise = max(rise, f(x + t * (y - x)) - (f(x) + t * (f(y) - f(x))))
+        return rise
+
+    assert judged("rise_above_chord", by_loop, seed).status == CORRECT
+
+
+def test_the_tipping_weight_draws_level():
+    w = descent.tipping_weight()
+    assert 9 + 8 + 6 + 3 * w == pytest.approx(3 + 3 + 8 + 8 * w)

@@ -7,7 +7,7 @@ from labkit.chapters.ch04_optimization import stages
 from labkit.documents.thesis import wells
 from labkit.estimation import optimization as opt
 
-FUNCTIONS = (stages.line, stages.four_paths, stages.saddle, stages.basins)
+FUNCTIONS = (stages.line, stages.four_paths, stages.saddle, stages.convexity, stages.basins)
 
 
 @pytest.mark.parametrize("function", FUNCTIONS, ids=lambda f: f.__name__)
@@ -106,3 +106,21 @@ def test_no_sentence_of_a_caption_begins_in_lower_case(method):
 def test_the_first_prediction_comes_true():
     result = stages.walk({"start": np.array([0.2, 0.0])})
     assert result["bend"] < 0 and result["end"] == "saddle"
+
+
+def test_a_chord_between_the_wells_lies_below_f_though_both_ends_are_convex():
+    L, G, _ = (e.x for e in wells.extrema())
+    result = stages.chord_between({"P": L, "Q": G, "matrix": "H"})
+    assert result["positive"][0] and result["positive"][-1] and not result["positive"].all()
+    top = max(wells.value((1 - t) * L + t * G) - (1 - t) * wells.value(L) - t * wells.value(G) for t in result["share"])
+    assert result["rise"] == pytest.approx(top) and 85 < top < 95
+    assert stages.chord_between({"P": L, "Q": G, "matrix": "J"})["positive"].all()
+
+
+def test_where_the_hessian_is_positive_definite_no_chord_is_crossed():
+    rng, inside = np.random.default_rng(0), 0
+    for P, Q in wells.CENTERS[0] + rng.uniform(-0.7, 0.7, (40, 2, 2)):
+        result = stages.chord_between({"P": P, "Q": Q, "matrix": "H"})
+        inside += result["positive"].all()
+        assert result["rise"] < 1e-9 or not result["positive"].all()
+    assert 5 < inside < 35

@@ -64,7 +64,8 @@ def plane(angle_deg):
 
 WITH_HANDLES = (
     ch01.three_points, ch01.triangle_noise, ch01.svd_against_gram_schmidt, ch02.order_of_product, ch02.open_loop,
-    ch03.pose_designer, ch03.outliers, ch04.line, ch04.four_paths, ch04.saddle, ch04.basins, ch05.scan_line,
+    ch03.pose_designer, ch03.outliers, ch04.line, ch04.four_paths, ch04.saddle, ch04.convexity,
+    ch04.basins, ch05.scan_line,
     ch05.convergence, ch05.two_methods, ch05.pattern_designer, ch06.tx40, ch06.two_axes, ch06.sweeps,
     ch07.circles, ch08.bells, ch08.arena,
 )  # fmt: skip

@@ -5,9 +5,11 @@ import functools
 import numpy as np
 
 from ...documents.thesis import wells
+from ...estimation import convexity
 from ...estimation import optimization as opt
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from . import descent
 
 
 def place(rng, within=3.0):
@@ -386,6 +388,69 @@ CHAPTER = Chapter(
                 ),
             ],
         ),
+        Exercise(
+            "measured_gradient",
+            reference=descent.measured_gradient,
+            draw=descent.function_and_step,
+            metric=metrics.Numbers(1e-9),
+            hints=(
+                "Move one unknown at a time, a step to each side, and leave the others where they are.",
+                "Component k is (f(x + h e) − f(x − h e)) / (2h), where e is the unit vector of unknown k: a row of `np.eye(len(x))`.",
+                "`return np.array([(f(x + e) - f(x - e)) / (2 * h) for e in h * np.eye(len(x))])`",
+            ),
+            mistakes=[
+                Mistake(
+                    descent.differences(lambda f, x, e, h: (f(x + e) - f(x)) / h),
+                    "These are forward differences, off by ½h times the curvature. Step to both sides: f(x + h e) − f(x − h e).",
+                    id="measured-forward",
+                ),
+                Mistake(
+                    descent.differences(lambda f, x, e, h: (f(x) - f(x - e)) / h),
+                    "These are backward differences, off by ½h times the curvature. Step to both sides: f(x + h e) − f(x − h e).",
+                    id="measured-backward",
+                ),
+                Mistake(
+                    descent.differences(lambda f, x, e, h: (f(x + e) - f(x - e)) / h),
+                    "Twice too large: the two places are 2h apart.",
+                    id="measured-twice",
+                ),
+                Mistake(
+                    descent.differences(lambda f, x, e, h: (f(x + e) - f(x - e)) / 2 * h),
+                    "`/ 2 * h` divides by 2 and then multiplies by h: write `/ (2 * h)`.",
+                    id="measured-times-h",
+                ),
+                Mistake(
+                    descent.differences(lambda f, x, e, h: f(x + e) - f(x - e)),
+                    "These are differences, not slopes: divide by the distance of the two places, 2h.",
+                    id="measured-undivided",
+                ),
+                Mistake(
+                    descent.differences(lambda f, x, e, h: (f(x + e / 2) - f(x - e / 2)) / h),
+                    "You go half a step to each side. That is a central difference too, with the step ½h: take h.",
+                    id="measured-half-step",
+                ),
+                Mistake(
+                    descent.differences(lambda f, x, e, h: (f(x - e) - f(x + e)) / (2 * h)),
+                    "The sign is reversed: ahead minus behind.",
+                    id="measured-sign",
+                ),
+                Mistake(
+                    descent.differences(lambda f, x, e, h: (f(x + e) - 2 * f(x) + f(x - e)) / h**2),
+                    "That is the second difference, the curvature along each axis. The slope is (ahead − behind) / (2h).",
+                    id="measured-second",
+                ),
+                Mistake(
+                    lambda f, x, h: np.full(len(x), (f(x + h) - f(x - h)) / (2 * h)),
+                    "`x + h` moves all unknowns at once. Move one at a time: h times a row of `np.eye(len(x))`.",
+                    id="measured-all",
+                ),
+                Mistake(
+                    descent.not_put_back,
+                    "Only the first component is right: put each unknown back before you move the next one.",
+                    id="measured-not-restored",
+                ),
+            ],
+        ),
         Prediction(
             "top",
             question="The start lies a fifth of the way from (1, 1) to (-1, -2), where f bends downward. Where does Newton end?",
@@ -684,6 +749,86 @@ CHAPTER = Chapter(
             answer="within 0.7 of it",
             why="For Newton the saddle is a root of the gradient like any other, with a whole neighborhood that flows into it.",
         ),
+        Prediction(
+            "convex_share",
+            question="In what share of the square from −6 to 6 is the Hessian of f positive definite?",
+            choices=("about 1 %", "about 20 %", "about half"),
+            answer="about 1 %",
+            why="Only in two small patches around L and G, half a unit in radius. f has two minima and is convex nearly nowhere.",
+        ),
+        Exercise(
+            "rise_above_chord",
+            reference=convexity.rise_above_chord,
+            draw=(
+                functools.partial(descent.hilly, falls=True),
+                descent.bowl,
+                functools.partial(descent.hilly, falls=False),
+            ),
+            metric=metrics.Numbers(1e-9),
+            hints=(
+                "Walk from x to y, and at each place compare f with the straight line between its two ends.",
+                "At share t the place is (1 − t) x + t y, and the chord stands at (1 − t) f(x) + t f(y). Of the differences f − chord take the largest.",
+                "`t = np.linspace(0, 1, n)\nvalues = np.array([f((1 - s) * x + s * y) for s in t])\n"
+                "return (values - ((1 - t) * f(x) + t * f(y))).max()`",
+            ),
+            mistakes=[
+                Mistake(
+                    descent.chords(lambda t, v, c: (v - c[::-1]).max()),
+                    "Your chord has its ends exchanged: at share t the place is (1 − t) x + t y, and its height (1 − t) f(x) + t f(y).",
+                    id="chord-ends",
+                ),
+                Mistake(
+                    descent.chords(lambda t, v, c: (c - v).max()),
+                    "That is how far f sags below its chord. It should do that; asked for is how far it rises above, f − chord.",
+                    id="chord-below",
+                ),
+                Mistake(
+                    descent.chords(lambda t, v, c: abs(v - c).max()),
+                    "Without its sign the difference also counts where f lies below its chord, and there it may: no absolute value.",
+                    id="chord-absolute",
+                ),
+                Mistake(
+                    lambda f, x, y, n: max(0.0, f((x + y) / 2) - (f(x) + f(y)) / 2),
+                    "You looked at the middle alone. f can rise above its chord elsewhere: compare all n places.",
+                    id="chord-middle",
+                ),
+                Mistake(
+                    lambda f, x, y, n: f((x + y) / 2) - (f(x) + f(y)) / 2,
+                    "You looked at the middle alone. f can rise above its chord elsewhere: compare all n places.",
+                    id="chord-middle-signed",
+                ),
+                Mistake(
+                    descent.chords(lambda t, v, c: (v - c).mean()),
+                    "That is the mean difference, in which rising and sagging cancel: take the largest.",
+                    id="chord-mean",
+                ),
+                Mistake(
+                    descent.chords(lambda t, v, c: (v - max(v[0], v[-1])).max()),
+                    "You compare with the higher end. The chord is the straight line between both ends.",
+                    id="chord-higher-end",
+                ),
+                Mistake(
+                    descent.chords(lambda t, v, c: (v - v[0]).max()),
+                    "You compare with f(x) alone. The chord goes on to f(y): (1 − t) f(x) + t f(y).",
+                    id="chord-first-end",
+                ),
+                Mistake(
+                    descent.chords(lambda t, v, c: v.max()),
+                    "That is the highest value of f on the way: subtract the chord at each place first.",
+                    id="chord-highest",
+                ),
+                Mistake(
+                    descent.chords(lambda t, v, c: (v - c)[1:-1].max()),
+                    "Both ends count among the n places: f and chord meet there, so that the rise is never below 0.",
+                    id="chord-inside",
+                ),
+                Mistake(
+                    descent.chords(lambda t, v, c: t[np.argmax(v - c)]),
+                    "That is the share t at which f rises most: return the rise there.",
+                    id="chord-share",
+                ),
+            ],
+        ),
         Exercise(
             "jacobian",
             reference=wells.jacobian,
@@ -967,6 +1112,103 @@ CHAPTER = Chapter(
                 Mistake(_leg_from_zero, "The second leg starts at the corner: add corner to s times the leg."),
             ],
         ),
+        Exercise(
+            "trust_region",
+            reference=descent.trust_region,
+            draw=descent.RUNS,
+            metric=metrics.Several(metrics.Numbers(1e-7), metrics.Numbers(1e-7), names=("x", "radius")),
+            draws=4,
+            hints=(
+                "Each round: residuals and Jacobian where you stand, a dogleg step, its gain ratio; then decide twice, whether to take the step and what the radius becomes.",
+                "g = Jᵀr and B = JᵀJ, with the cost ½ rᵀr before and after. Take the step where ρ > 0.1. The radius becomes a quarter of the step's length where ρ < ¼, "
+                "doubles where ρ > ¾ and the step is longer than 0.999 of it, and stays otherwise, whether or not the step was taken.",
+                "`for _ in range(steps):\n    r, J = residual(x), jacobian(x)\n    g, B = J.T @ r, J.T @ J\n    step = dogleg_step(g, B, radius)\n"
+                "    new, length = residual(x + step), np.linalg.norm(step)\n    rho = gain_ratio(r @ r / 2, new @ new / 2, g, B, step)\n"
+                "    if rho > 0.1:\n        x = x + step\n    if rho < 0.25:\n        radius = length / 4\n"
+                "    elif rho > 0.75 and length > 0.999 * radius:\n        radius = 2 * radius\nreturn x, radius`",
+            ),
+            mistakes=[
+                Mistake(
+                    descent.loop(keep=lambda rho: True),
+                    "You take every step. Where ρ is not above 0.1 the step is taken back: x stays, and only the radius changes.",
+                    id="region-always",
+                ),
+                Mistake(
+                    descent.loop(keep=lambda rho: rho > 0),
+                    "You take every step that lowers the cost. The rule asks for more: ρ > 0.1.",
+                    id="region-any-decrease",
+                ),
+                Mistake(
+                    descent.loop(keep=lambda rho: rho > descent.POOR),
+                    "You take a step only above ¼. Between 0.1 and ¼ it is taken, and the radius shrinks all the same.",
+                    id="region-quarter",
+                ),
+                Mistake(
+                    descent.loop(follow=lambda radius, length, rho: radius),
+                    "Your radius never changes: a quarter of the step's length below ¼, twice the radius above ¾ at the rim.",
+                    id="region-fixed",
+                ),
+                Mistake(
+                    descent.loop(
+                        follow=lambda radius, length, rho: (
+                            radius / 4 if rho < descent.POOR else descent.rule(radius, length, rho)
+                        )
+                    ),
+                    "After a poor step the radius becomes a quarter of the step's length. A quarter of the radius may still be longer than that step.",
+                    id="region-quarter-of-radius",
+                ),
+                Mistake(
+                    descent.loop(
+                        follow=lambda radius, length, rho: (
+                            length / 4 if rho < descent.POOR else 2 * radius if rho > descent.GOOD else radius
+                        )
+                    ),
+                    "You double the radius after every good step. A step that ended inside says nothing about the rim: ask for its length as well.",
+                    id="region-no-rim",
+                ),
+                Mistake(
+                    descent.loop(
+                        follow=lambda radius, length, rho: (
+                            length / 4 if rho < descent.ACCEPT else descent.rule(radius, length, max(rho, descent.POOR))
+                        )
+                    ),
+                    "Your radius shrinks only where the step is taken back. It shrinks below ¼, after steps that were taken too.",
+                    id="region-shrinks-late",
+                ),
+                Mistake(
+                    descent.loop(weight=1.0),
+                    "Your gain ratios are twice too large: g = Jᵀr and B = JᵀJ belong to the cost ½ rᵀr. Hand `gain_ratio` half of r @ r.",
+                    id="region-cost",
+                ),
+                Mistake(
+                    descent.loop(stale=True),
+                    "J is computed once, at the start. It belongs to where you stand: compute it in every round.",
+                    id="region-stale",
+                ),
+                Mistake(
+                    descent.loop(step_of=opt.cauchy_step),
+                    "Your steps end at the Cauchy point, on the way down the gradient. Take `dogleg_step`, both legs.",
+                    id="region-cauchy",
+                ),
+                Mistake(
+                    descent.loop(step_of=lambda g, B, radius: opt.newton_step(g, B)),
+                    "Your steps ignore the radius: take `dogleg_step(g, B, radius)`.",
+                    id="region-newton",
+                ),
+                Mistake(
+                    lambda residual, jacobian, x, radius, steps: descent.descend(
+                        residual, jacobian, x, radius, steps + 1
+                    ),
+                    "You try one step too many: `steps` counts those taken back as well.",
+                    id="region-one-more",
+                ),
+                Mistake(
+                    lambda residual, jacobian, x, radius, steps: descent.descend(residual, jacobian, x, radius, 1),
+                    "This is where the first round ends: is the `return` inside the loop?",
+                    id="region-one-round",
+                ),
+            ],
+        ),
         Prediction(
             "four",
             question="All four methods start at (3, 3). How many of them reach the global minimum?",
@@ -1020,6 +1262,48 @@ CHAPTER = Chapter(
             choices=("less than 1 %", "about 10 %", "about half"),
             answer="less than 1 %",
             why="0.7 % end in a minimum, 2.8 % in the saddle, all others run away across the plain.",
+        ),
+        Value(
+            "tipping_weight",
+            reference=descent.tipping_weight,
+            rtol=2e-3,
+            hints=(
+                "Write both sums with w in front of the last criterion; the first three count once.",
+                "9 + 8 + 6 + 3 w = 3 + 3 + 8 + 8 w. Solve for w.",
+                "`tipping_weight = ((9 + 8 + 6) - (3 + 3 + 8)) / (8 - 3)`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda: descent.tipping_weight() - 1,
+                    "That is by how much the weight must grow. Asked for is the weight itself, 1 in the printed sum.",
+                    id="tipping-growth",
+                ),
+                Mistake(
+                    lambda: 1 / descent.tipping_weight(),
+                    "Upside down: that is the weight of the other three, when solving counts once.",
+                    id="tipping-inverse",
+                ),
+                Mistake(
+                    lambda: descent.tipping_weight("sphere", "laser tracker"),
+                    "That is where the laser tracker draws level with the sphere. Asked for is the cube.",
+                    id="tipping-tracker",
+                ),
+                Mistake(
+                    lambda: descent.tipping_weight(criteria=(2, 3)),
+                    "You weighted taking the data as well. Only solving, the last criterion, counts w times.",
+                    id="tipping-both",
+                ),
+                Mistake(
+                    lambda: descent.tipping_weight(criteria=(2,)),
+                    "You weighted taking the data, the third criterion. Solving is the last one.",
+                    id="tipping-third",
+                ),
+                Mistake(
+                    lambda: 26 / 22,
+                    "That is the ratio of the sums. The weight stands in front of one criterion, on both sides.",
+                    id="tipping-ratio",
+                ),
+            ],
         ),
     ],
     title="Optimization",

@@ -108,3 +108,26 @@ def indefinite(ax, x, y, lowest):
     """Shade where the smallest eigenvalue of the Hessian is negative, and say so. Returns the contour set."""
     ax.text(0.015, 0.975, "gray: the Hessian is indefinite", transform=ax.transAxes, va="top", fontsize=9)
     return ax.contourf(x, y, lowest, levels=[-1e9, 0], colors=[style.FAINT], zorder=0)
+
+
+def not_positive_definite(ax, x, y, lowest):
+    """Shade where the smallest eigenvalue of a curvature is not positive. Returns the contour set."""
+    return ax.contourf(x, y, lowest, levels=[-1e9, 0], colors=[style.GRID], alpha=0.55, zorder=0)
+
+
+def chord_on_map(ax):
+    """The chord between two handles, seen from above. Returns the line."""
+    (line,) = ax.plot([], [], color=style.ESTIMATE, linewidth=2.2, zorder=4)
+    return line
+
+
+def chord_profile(ax, low, high):
+    """f along a chord, the chord, and where f rises above it. Returns (f, chord, above, positive)."""
+    style.axes(ax, "from P (0) to Q (1)", "$f$")
+    ax.set(xlim=(0, 1), ylim=(low, high))
+    (curve,) = ax.plot([], [], label="f", **style.look("truth"))
+    (straight,) = ax.plot([], [], label="chord", **style.look("estimate"))
+    (above,) = ax.plot([], [], color=style.AXIS_X, linewidth=5, alpha=0.45, zorder=1, label="f above it")
+    (positive,) = ax.plot([], [], color=style.AXIS_Y, linewidth=5, solid_capstyle="butt", label="positive definite")
+    ax.legend(loc="upper right", fontsize=8)
+    return curve, straight, above, positive

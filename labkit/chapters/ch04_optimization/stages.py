@@ -1,4 +1,4 @@
-"""Chapter 4: the walk along the line, four paths on one map, Newton near the saddle, basins to rub free."""
+"""Chapter 4: the walk along the line, four paths on one map, Newton near the saddle, chords, basins to rub free."""
 
 from functools import cache, lru_cache
 
@@ -7,6 +7,7 @@ import numpy as np
 
 from ...documents.thesis import wells
 from ...estimation import optimization as opt
+from ...estimation.convexity import chord, positive_definite
 from ...stage import Choice, Handle, Slider, Stage, Toggle, style
 from . import figures as draw
 
@@ -263,6 +264,84 @@ def saddle():
         fail={"start": (0.9, 0.35)},
         describe=_saddle_caption,
         size=(7.0, 4.6),
+    )
+
+
+# --- Convexity ---
+
+PLACES = 101  # on a chord
+LOWEST = -225.0  # of the profile
+
+
+def _curvature(matrix, x):
+    """H of f, or 2 J'J, at places (..., 2)."""
+    if matrix == "H":
+        return wells.hessian(x)
+    J = wells.jacobian(x)
+    return 2 * np.swapaxes(J, -1, -2) @ J
+
+
+def chord_between(state):
+    """f and its chord from P to Q, and where the chosen matrix is positive definite on the way."""
+    P, Q = state["P"], state["Q"]
+    share, values, heights = chord(wells.value, P, Q, PLACES)
+    positive = positive_definite(_curvature(state["matrix"], P + share[:, None] * (Q - P)))
+    gap = values - heights
+    return {
+        "share": share, "values": values, "heights": heights, "positive": positive, "matrix": state["matrix"],
+        "rise": max(float(gap.max()), 0.0), "above": gap > 1e-9 * np.abs(values).max(),
+    }  # fmt: skip
+
+
+def _chord_caption(result):
+    words = {"H": "H", "J": "2 JᵀJ"}[result["matrix"]]
+    ends = int(result["positive"][0]) + int(result["positive"][-1])
+    where = ("at neither end", "at one end", "at both ends")[ends]
+    rises = (
+        f"f rises up to {result['rise']:.1f} above its chord" if result["above"].any() else "f stays below its chord"
+    )
+    share = 100 * result["positive"].mean()
+    return f"From P to Q {rises}. {words} is positive definite {where} and on {share:.0f} % of the way."
+
+
+def convexity():
+    """Drag both ends of a chord: does it lie above f, and is the curvature positive definite on the way?"""
+
+    def scene(fig):
+        ax, beside = fig.subplots(1, 2, width_ratios=(1.15, 1))
+        x, y = (-3.2, 3.0), (-4.0, 3.0)
+        _map(ax, x, y)
+        grid = _grid(x, y, 141)
+        shades = draw.not_positive_definite(
+            ax, grid[..., 0], grid[..., 1], np.linalg.eigvalsh(_curvature("H", grid))[..., 0]
+        )
+        ax.set_title("gray: not positive definite")
+        line = draw.chord_on_map(ax)
+        curve, straight, above, positive = draw.chord_profile(beside, LOWEST - 8, 5)
+
+        def update(state, result):
+            shades.set_visible(result["matrix"] == "H")
+            line.set_data(*np.transpose([state["P"], state["Q"]]))
+            share = result["share"]
+            curve.set_data(share, result["values"])
+            straight.set_data(share, result["heights"])
+            above.set_data(share, np.where(result["above"], result["values"], np.nan))
+            positive.set_data(share, np.where(result["positive"], LOWEST, np.nan))
+
+        return [shades, line, curve, straight, above, positive], update
+
+    return Stage(
+        "where f is convex",
+        scene=scene,
+        compute=chord_between,
+        handles={
+            "P": Handle((0.8, 0.7), step=0.05, label="P, one end of the chord"),
+            "Q": Handle((1.2, 1.1), step=0.05, label="Q, the other end"),
+        },
+        controls={"matrix": Choice({"H": "H", "2 JᵀJ": "J"}, "H", label="matrix")},
+        fail={"P": (1.0, 1.0), "Q": (-1.0, -2.0)},
+        describe=_chord_caption,
+        size=(7.6, 4.4),
     )
 
 

@@ -358,6 +358,46 @@ def table_7_1(method):
     return pairs | {"iterations": table["iterations"][rows]}
 
 
+LEVELS = {"schlecht": 1, "sehr aufwändig": 1, "aufwändig": 2, "ausreichend": 2, "gut": 3, "sehr gut": 4}
+CRITERIA_5_2 = ("implementation", "stability", "adaptation", "accuracy")
+
+
+def table_4_1():
+    """Three ways to calibrate, rated from 1 to 10 under four criteria.
+
+    Returns
+    -------
+    approaches : dict
+        {"cube", "sphere", "laser tracker": {"points": array (4,), "sum": float, "of": float}}; the criteria are the
+        body, placing it, taking the data, and solving.
+
+    Source: thesis, table 4-1.
+    """
+    table = read_table("optimization/table_4_1.csv", text=("approach", "criterion"))
+    found = {}
+    for name in dict.fromkeys(table["approach"].tolist()):
+        rows = table["approach"] == name
+        total, most = ({float(entry) for entry in table[column][rows]} for column in ("sum", "of"))
+        found[name] = {"points": table["points"][rows], "sum": total.pop(), "of": most.pop()}
+    return found
+
+
+def table_5_2():
+    """Methods of minimization, rated in four levels under four criteria.
+
+    Returns
+    -------
+    methods : dict
+        {"group, method": array (4,)}, 1 for the worst level and 4 for the best, in the order of `CRITERIA_5_2`.
+
+    Source: thesis, table 5-2; the words of each level stand below it.
+    """
+    table = read_table("optimization/table_5_2.csv", text=("group", "method", *CRITERIA_5_2))
+    names = [f"{group}, {method}" for group, method in zip(table["group"], table["method"])]
+    levels = np.array([[LEVELS[word] for word in table[criterion]] for criterion in CRITERIA_5_2]).T
+    return dict(zip(names, levels))
+
+
 def extrema():
     """The stationary points of function (6-16).
 

@@ -1,0 +1,215 @@
+"""Draws and wrong variants of three exercises of chapter 4: the measured gradient, the chord, the trust-region loop."""
+
+import functools
+
+import numpy as np
+
+from ...documents.thesis import printed as thesis
+from ...documents.thesis import wells
+from ...estimation.convexity import chord
+from ...estimation.differences import numeric_jacobian
+
+# --- a measured gradient ---
+
+
+def wavy(rng, n=None):
+    """A curved function of some variables, their number, and a place."""
+    n = n or int(rng.integers(2, 6))
+    M, c = rng.normal(size=(3, n)), rng.normal(size=n)
+    return (lambda x: float(np.sin(M @ x).sum() + c @ x**2)), rng.normal(size=n)
+
+
+def function_and_step(rng):
+    """A function, a place, and a step large enough to tell the schemes apart."""
+    return *wavy(rng), float(rng.uniform(0.03, 0.08))
+
+
+def measured_gradient(f, x, h):
+    """Reference of the exercise: central differences, one variable after the other."""
+    return numeric_jacobian(lambda y: np.atleast_1d(f(y)), x, h)[0]
+
+
+def differences(difference):
+    """A gradient by some other difference of f, x and one step e along an axis."""
+
+    def variant(f, x, h):
+        return np.array([difference(f, x, e, h) for e in h * np.eye(len(x))])
+
+    return variant
+
+
+def not_put_back(f, x, h):
+    """Leaves each step in place when the next variable is moved."""
+    here, slopes = x.copy(), []
+    for k in range(len(x)):
+        here[k] += h
+        ahead = f(here)
+        here[k] -= 2 * h
+        slopes.append((ahead - f(here)) / (2 * h))
+    return np.array(slopes)
+
+
+# --- a chord ---
+
+
+def bowl(rng):
+    """A convex function and the two ends of a chord."""
+    n = int(rng.integers(2, 5))
+    A, c = rng.normal(size=(n + 1, n)), rng.normal(size=n)
+    return (lambda x: float(((A @ (x - c)) ** 2).sum())), *rng.normal(scale=2.0, size=(2, n)), int(rng.integers(5, 40))
+
+
+def hilly(rng, falls):
+    """A function that rises above its chord off the middle, from its higher end or to it, and sags elsewhere, more than
+    it rises where it falls.
+    """
+    while True:
+        f, x = wavy(rng)
+        y, n = x + rng.normal(scale=1.5, size=len(x)), int(rng.integers(6, 40))
+        _, values, heights = chord(f, x, y, n)
+        gap = values - heights
+        off_middle = gap.max() - gap[n // 2] > 0.05 * gap.max() and 1 < np.argmax(gap) < n - 2
+        deeper = -gap.min() > 1.2 * gap.max() if falls else 0.05 < -gap.min() < 0.8 * gap.max()
+        if gap.max() > 0.2 and off_middle and deeper and (values[0] > values[-1]) == falls:
+            return f, x, y, n
+
+
+def chords(rise):
+    """Something else made of share, values and heights of a chord."""
+    return lambda f, x, y, n: float(rise(*chord(f, x, y, n)))
+
+
+# --- the trust-region loop ---
+
+ACCEPT, POOR, GOOD, RIM = 0.1, 0.25, 0.75, 0.999
+
+
+def rule(radius, length, rho):
+    """The radius after a tried step."""
+    if rho < POOR:
+        return length / 4
+    return 2 * radius if rho > GOOD and length > RIM * radius else radius
+
+
+def bare_dogleg(g, B, radius):
+    """`opt.dogleg_step` on a positive definite B without its checks: a draw tries hundreds of steps."""
+    newton, corner = np.linalg.solve(B, -g), -(g @ g) / (g @ B @ g) * g
+    if newton @ newton <= radius**2:
+        return newton
+    if corner @ corner >= radius**2:
+        return -radius * g / np.sqrt(g @ g)
+    leg = newton - corner
+    a, b, c = leg @ leg, corner @ leg, corner @ corner - radius**2
+    return corner + (-b + np.sqrt(b * b - a * c)) / a * leg
+
+
+def descend(residual, jacobian, x, radius, steps, *, keep=lambda rho: rho > ACCEPT, follow=rule, weight=0.5,
+            step_of=bare_dogleg, stale=False, seen=None):  # fmt: skip
+    """The loop of the exercise with one of its parts replaced; `seen` collects (rho, length, radius) of each step."""
+    r, J = residual(x), jacobian(x)
+    for _ in range(steps):
+        r, J = residual(x), (J if stale else jacobian(x))
+        g, B = J.T @ r, J.T @ J
+        step = step_of(g, B, radius)
+        new = residual(x + step)
+        length = float(np.linalg.norm(step))
+        rho = float(weight * (r @ r - new @ new) / -(g @ step + 0.5 * step @ B @ step))
+        if seen is not None:
+            seen.append((rho, length, radius))
+        x = x + step if keep(rho) else x
+        radius = follow(radius, length, rho)
+    return x, radius
+
+
+def trust_region(residual, jacobian, x, radius, steps):
+    """Reference of the exercise."""
+    return descend(residual, jacobian, x, radius, steps)
+
+
+def loop(**changes):
+    """The loop with some part replaced, as a variant of the exercise."""
+    return lambda residual, jacobian, x, radius, steps: descend(residual, jacobian, x, radius, steps, **changes)
+
+
+def _problem(rng):
+    """Residuals and their Jacobian: the two wells, or waves in two to four unknowns; and a start."""
+    if rng.random() < 0.3:
+        return wells.residual, wells.jacobian, rng.uniform(-8, 8, 2)
+    n = int(rng.integers(2, 5))
+    M, a, b = 1.5 * rng.normal(size=(n + 1, n)), rng.normal(size=n), 2 * rng.normal(size=n + 1)
+
+    def residual(x):
+        return np.concatenate([2 * np.sin(M @ x) - b, 0.5 * (x - a)])
+
+    def jacobian(x):
+        return np.vstack([2 * np.cos(M @ x)[:, None] * M, 0.5 * np.eye(n)])
+
+    return residual, jacobian, rng.uniform(-4, 4, n)
+
+
+def run_with(rng, wanted, first=None):
+    """A run in which what is wanted of its steps happens, far from every limit of the rule.
+
+    `wanted(rho, inside)` sees all steps of a run; `first` is a gain ratio that its first step shall have.
+    """
+    while True:
+        residual, jacobian, x = _problem(rng)
+        radius = (
+            float(rng.uniform(0.3, 3.0)) if first is None else _radius_for(rng.uniform(*first), residual, jacobian, x)
+        )
+        seen = []
+        descend(residual, jacobian, x, radius, 9, seen=seen)
+        rho, length, radii = np.array(seen).T
+        clear = (np.abs(rho[:, None] - [ACCEPT, POOR, GOOD]).min(1) > 0.01) & (rho < 3) & (length > 1e-3)
+        counts = [n for n in range(4, 10) if clear[:n].all() and wanted(rho[:n], length[:n] < RIM * radii[:n])]
+        if counts:
+            return residual, jacobian, x, radius, int(rng.choice(counts))
+
+
+def _radius_for(rho, residual, jacobian, x):
+    """A radius whose first step has about this gain ratio, between one that is too short and one that is too long."""
+    low, high, seen = 0.05, 20.0, []
+    for _ in range(7):
+        middle = np.sqrt(low * high)
+        descend(residual, jacobian, x, middle, 1, seen=seen)
+        low, high = (middle, high) if seen[-1][0] > rho else (low, middle)
+    return float(np.sqrt(low * high))
+
+
+def poor_inside(rho, inside):
+    """A step taken back, then more; a poor one inside the rim; one doubled."""
+    return (rho[:-1] < 0).any() and ((rho < POOR) & inside).any() and ((rho > GOOD) & ~inside).any()
+
+
+def barely(rho, inside):
+    """A step that lowers the cost and is taken back all the same."""
+    return ((rho > 0) & (rho < ACCEPT))[:-1].any()
+
+
+def halfway(rho, inside):
+    """A step that is taken although the radius shrinks after it."""
+    return ((rho > ACCEPT) & (rho < POOR))[:-1].any()
+
+
+def well_inside(rho, inside):
+    """A good step that ended inside, as the last."""
+    return rho[-1] > GOOD and inside[-1]
+
+
+RUNS = (
+    functools.partial(run_with, wanted=poor_inside),
+    functools.partial(run_with, wanted=barely, first=(0.02, 0.08)),
+    functools.partial(run_with, wanted=halfway, first=(0.13, 0.22)),
+    functools.partial(run_with, wanted=well_inside),
+)
+
+
+# --- the choice of a way to calibrate ---
+
+
+def tipping_weight(first="sphere", second="cube", criteria=(3,)):
+    """The weight of some criteria of table 4-1, all others counting 1, at which two ways draw level."""
+    points = {name: thesis.table_4_1()[name]["points"] for name in (first, second)}
+    gap = points[first] - points[second]
+    weighted = np.isin(np.arange(len(gap)), criteria)
+    return float(-gap[~weighted].sum() / gap[weighted].sum())
