@@ -126,6 +126,12 @@ class Picture:
             self.draw_seconds = monotonic() - start
             return np.asarray(renderer.buffer_rgba())
 
+    def forget_pixels(self):
+        """Let go of all pixels, 12 bytes and more a pixel; the next picture is drawn from nothing."""
+        with DRAWING:
+            self._background = self._sent = None
+            self.canvas.forget()
+
     def png(self):
         """The picture as PNG bytes."""
         with DRAWING:

@@ -150,3 +150,7 @@ class Canvas(FigureCanvasAgg):
             self.renderer = self.renderers[bool(self.dark)](*drawn_as[:3])
             self._drawn_as = drawn_as
         return self.renderer
+
+    def forget(self):
+        """Let go of the renderer and its pixels; the next drawing makes another."""
+        self.renderer = self._drawn_as = None

@@ -3,6 +3,7 @@
 // Whoever shows it (a notebook, a demo page, a reading edition) hands `render` an element and a model of four functions:
 //
 //   get("declaration")       what does not change: Stage.declaration() of labkit/stage/stage.py, as JSON
+//   get("silence")           what to say when Python does not answer, where it is no notebook's
 //   on("msg:custom", hear)   from now on hear(message, buffers) is called with what Stage sends; buffers are DataViews
 //   off("msg:custom", hear)  no more
 //   send(message)            to Stage.receive(message), as JSON
@@ -102,7 +103,7 @@ class Figure {
 
   /** Python does not answer: that is said, and nothing pretends to move. */
   silent() {
-    this.words.notice(SILENT);
+    this.words.notice(this.model.get("silence") ?? SILENT);
     this.clock?.stop();
     this.handles.goBack();
     this.controls.goBack();

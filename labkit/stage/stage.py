@@ -333,6 +333,12 @@ class Stage:
         """From now on pictures go to `send(message, buffers)`: a dict for JSON, and a list of bytes."""
         self._send, self._attached = send, False
 
+    def forget_pixels(self):
+        """Let go of the picture while no page shows it; a page that shows it again begins with a `look`."""
+        with DRAWING:
+            self._attached = False
+            self._picture.forget_pixels()
+
     def receive(self, message):
         """One message of the page: everything that happened since the last one, merged."""
         with DRAWING:
