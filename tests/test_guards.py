@@ -119,7 +119,19 @@ MAY_IMPORT = {  # besides itself
     "stage": ("checks", "live"),
     "chapters": ("checks", "files", *MATHEMATICS, "documents", "live", "exercises", "stage"),
     "collect": ("checks", "exercises"),  # chapters are found by name
-    "verbs": ("checks", "files", *MATHEMATICS, "documents", "live", "exercises", "stage", "chapters", "collect"),
+    "demo": ("checks", "exercises", "stage"),  # as well
+    "verbs": (
+        "checks",
+        "files",
+        *MATHEMATICS,
+        "documents",
+        "live",
+        "exercises",
+        "stage",
+        "chapters",
+        "collect",
+        "demo",
+    ),
 }
 NEEDS_NO_FRONT_END = ("checks", "files", *MATHEMATICS, "documents")
 MODULES = sorted((ROOT / "labkit").rglob("*.py"))

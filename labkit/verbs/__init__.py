@@ -8,6 +8,7 @@ VERBS = {
     "calibrate": ("...", "your own poses in, a calibration with covariance, outliers and advice out"),
     "localize": ("...", "your own log in, the path with its covariance out"),
     "collect": ("...", "for lecturers: submitted notebooks in, marks and a page on the class out"),
+    "demo": ("[NN ...]", "for lecturers: Stages full window, questions first; --vote lets phones answer"),
     "ledger": ("", "every number the four documents print, recomputed"),
     "build": ("[NN ...]", "for authors: write the notebooks from solutions/NN_name.py; --check names the stale ones"),
 }

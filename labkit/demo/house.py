@@ -1,0 +1,129 @@
+"""The Stages while they live: made when first shown or a step ahead, moved in one thread, small while nobody looks.
+
+All that Stages compute and draw happens in one worker thread, so that votes are answered meanwhile; what they send
+comes back to the thread of the server. A Stage keeps its state until the demo ends. Its pixels, some 25 MB in a large
+window, are let go when neither it nor a neighbor is shown.
+"""
+
+import asyncio
+import json
+import struct
+from concurrent.futures import ThreadPoolExecutor
+
+AHEAD_AFTER = 0.25  # s without a message of a page until the next Stage is made: nobody is dragging then
+
+
+class House:
+    """The Stages of a program.
+
+    Parameters
+    ----------
+    makers : {key: function() -> Stage}
+    send : function(key, frame)
+        Called in the server's thread with each message of a Stage, as `framed` packs it.
+    complain : function(sentence)
+        Called in the server's thread with what went wrong beyond what a Stage says itself.
+    """
+
+    def __init__(self, makers, send, complain):
+        self.makers, self.send, self.complain = makers, send, complain
+        self.stages, self.faults = {}, {}
+        self.worker = ThreadPoolExecutor(1, thread_name_prefix="stages")
+        self.loop = asyncio.get_running_loop()
+        self._waiting, self._look, self._timer = [], None, None
+
+    async def get(self, key):
+        """(Stage, "") or (None, why it could not be made)."""
+        if key not in self.stages and key not in self.faults:
+            await self._run(self._make, key)
+        return self.stages.get(key), self.faults.get(key, "")
+
+    def receive(self, key, message):
+        """One message of a page to a Stage; it answers by `send`. Returns the work under way."""
+        self._look = message.get("look", self._look) if isinstance(message, dict) else self._look
+        self._later()
+        return self._submit(self._receive, key, message)
+
+    def prepare(self, keys, shown):
+        """From now on these are likely next; of the others but `shown`, the pixels are let go."""
+        self._waiting = [key for key in keys if key not in self.stages and key not in self.faults]
+        self._later()
+        return self._submit(self._forget, {*keys, *shown})
+
+    def start_again(self):
+        """All Stages as they were in the beginning."""
+        return self._submit(self._reset)
+
+    def close(self):
+        """No more work; what is under way ends."""
+        if self._timer:
+            self._timer.cancel()
+        self.worker.shutdown(wait=False, cancel_futures=True)
+
+    def _later(self):
+        if self._timer:
+            self._timer.cancel()
+        self._timer = self.loop.call_later(AHEAD_AFTER, self._ahead) if self._waiting else None
+
+    def _ahead(self):
+        self._timer = None
+        key = self._waiting.pop(0)
+        self._submit(self._make, key, self._look)
+        self._later()
+
+    def _submit(self, work, *words):
+        """Hand work to the worker; whatever it raises becomes one sentence."""
+
+        def safely():
+            try:
+                work(*words)
+            except Exception as error:  # a Stage may raise anything; the others go on
+                self._in_loop(self.complain, f"{type(error).__name__}: {error}")
+
+        return self.worker.submit(safely)
+
+    async def _run(self, work, *words):
+        await asyncio.wrap_future(self._submit(work, *words))
+
+    def _in_loop(self, call, *words):
+        if not self.loop.is_closed():
+            self.loop.call_soon_threadsafe(call, *words)
+
+    # -- in the worker's thread
+
+    def _make(self, key, look=None):
+        if key in self.stages or key in self.faults:
+            return
+        try:
+            stage = self.makers[key]()
+            stage.connect(lambda message, buffers: self._in_loop(self.send, key, framed(message, buffers)))
+        except Exception as error:  # whatever its compute raises
+            self.faults[key] = f"This Stage could not be made: {_sentence(error)}"
+            return
+        self.stages[key] = stage
+        if look:
+            stage.receive({"look": look})  # drawn in the window's size, for nobody yet
+
+    def _receive(self, key, message):
+        if key in self.stages:
+            self.stages[key].receive(message)
+
+    def _forget(self, kept):
+        for key, stage in self.stages.items():
+            if key not in kept:
+                stage.forget_pixels()
+
+    def _reset(self):
+        for stage in self.stages.values():
+            stage.reset()
+
+
+def _sentence(error):
+    words = " ".join(str(error).split())
+    return words if type(error) is ValueError else f"{type(error).__name__}: {words}".rstrip(": ")
+
+
+def framed(message, buffers=()):
+    """A message with its buffers as bytes: number of parts, length of each (uint32), then the parts, JSON first."""
+    parts = [json.dumps(message).encode(), *(memoryview(b).cast("B") if len(b) else b"" for b in buffers)]
+    return b"".join([struct.pack(f"<{1 + len(parts)}I", len(parts), *map(len, parts)), *parts])

@@ -1,0 +1,118 @@
+"""A demo from its first listener to its end."""
+
+import asyncio
+import contextlib
+import logging
+import signal
+import webbrowser
+
+from . import room as rooms
+from . import server
+from .session import Session
+
+TELL_EVERY = 0.1  # s: votes that arrive together are one message to the wall
+OPEN_FILES = 4096  # three hundred phones are as many connections; some systems begin with 256
+
+
+class Demo:
+    """The listeners of one demo; made within a running event loop.
+
+    Parameters
+    ----------
+    program : Program
+    ip, port : where the lecturer's pages are; without a port the first free one.
+    counts : {mistake id: count}, of a class that was judged.
+    """
+
+    def __init__(self, program, ip="127.0.0.1", port=None, counts=None):
+        for name in ("tornado.access", "tornado.general", "tornado.application"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # malformed requests are answered, not told
+        self.session = Session(program, counts)
+        self.application = server.Application(self.session)
+        self.server, self.port = server.listen(self.application, ip, port)
+        self.host = "127.0.0.1" if ip in ("", "0.0.0.0") else "[::1]" if ip == "::" else f"[{ip}]" if ":" in ip else ip
+        self.phones, self._telling = None, None
+
+    @property
+    def address(self):
+        """What the lecturer's browser opens."""
+        return f"http://{self.host}:{self.port}/?token={self.application.token}"
+
+    def let_vote(self, ip=None):
+        """Open the second listener; phones reach it at `ip`, or at what this machine is called in its network."""
+        raise_open_files()
+        room = rooms.Room(self.session.votes, self._counted)
+        room.host = ip or rooms.own_address()
+        self.phones, room.port = server.listen(
+            rooms.application(room), ip or "0.0.0.0", first=self.port + 1, **rooms.LISTENING
+        )
+        self.session.room = room
+        return room
+
+    def _counted(self):
+        if self._telling is None:
+            self._telling = asyncio.get_running_loop().call_later(TELL_EVERY, self._tell)
+
+    def _tell(self):
+        self._telling = None
+        self.session.tell()
+
+    def close(self):
+        """Both listeners end, and the Stages' thread."""
+        for listener in filter(None, (self.server, self.phones)):
+            listener.stop()
+        self.session.house.close()
+
+
+def raise_open_files():
+    """Let this process hold as many connections as a full room makes, where the system has such a limit."""
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource
+
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        wanted = OPEN_FILES if hard == resource.RLIM_INFINITY else min(OPEN_FILES, hard)
+        if soft < wanted:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+
+
+async def run(program, options, counts):
+    """Show a program until Ctrl-C; `options` are those of the verb."""
+    demo = Demo(program, options.ip, options.port, counts)
+    stages = sum(bool(card.make) for card in program.cards)
+    print(f"{stages} Stages at {demo.address}\nStop with Ctrl-C in this window.", flush=True)
+    if options.vote:
+        _tell_of(demo.let_vote(options.vote_ip))
+    start = demo.session.house.get(program.cards[0].stage) if program.cards[0].stage else None
+    if not options.no_browser:
+        await asyncio.to_thread(_open_browser, demo.address)
+    if start:
+        await start
+    ended = asyncio.Event()
+    with contextlib.suppress(NotImplementedError, ValueError):  # Windows ends the process itself
+        for number in (signal.SIGINT, signal.SIGTERM):
+            asyncio.get_running_loop().add_signal_handler(number, ended.set)
+    await ended.wait()
+    demo.close()
+    lost = [key for key, ballot in demo.session.votes.ballots.items() if ballot.rounds]
+    print(f"\nThe demo has ended{f'; the votes on {len(lost)} questions are gone with it' if lost else ''}.")
+
+
+def _open_browser(address):
+    try:
+        opened = webbrowser.open(address)
+    except webbrowser.Error:
+        opened = False
+    if not opened:
+        print("No browser could be opened from here: open the address above in one.", flush=True)
+
+
+def _tell_of(room):
+    if room.invitation()["reachable"]:
+        print(
+            f"Phones vote at {room.address} . If none gets there, the network keeps devices apart (guest networks do) "
+            "or the firewall of this machine does; then open a hotspot with a phone and join it with this machine, "
+            "or ask for hands.",
+            flush=True,
+        )
+    else:
+        print(f"This machine is in no network that phones could share: they can vote at {room.address} on it alone.")

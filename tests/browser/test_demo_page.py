@@ -1,0 +1,209 @@
+"""The lecturer's page in Chromium: every Stage by key, addresses, reload, votes of three phones."""
+
+import contextlib
+import os
+import re
+import subprocess
+import sys
+
+import driver
+import pytest
+
+from conftest import missing
+
+FIRST = "01/three-points"
+
+
+@contextlib.contextmanager
+def demo(*words):
+    """(process, address with its token, address for phones) of `python -m labkit demo`."""
+    words = [sys.executable, "-u", "-m", "labkit", "demo", "--no-browser", *words]
+    given = {"cwd": driver.ROOT, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    with subprocess.Popen(words, env={**os.environ, "OMP_NUM_THREADS": "1"}, **given) as process:
+        try:
+            said = process.stdout.readline() + process.stdout.readline()
+            said += process.stdout.readline() if "--vote" in words else ""
+            found = re.findall(r"http://\S+", said)
+            assert found, said
+            yield process, found[0], found[-1]
+        finally:
+            process.terminate()
+            process.wait(20)
+
+
+@pytest.fixture(scope="module")
+def browser_path():
+    if not driver.find_browser():
+        missing("no Chromium on this machine: the browser test needs one")
+    return driver.find_browser()
+
+
+@pytest.fixture(scope="module")
+def wall(browser_path):
+    with demo("--vote") as (process, address, phones), driver.page_of(browser_path, width=1280, height=720) as page:
+        page.phones, page.process = phones, process
+        page.goto(address)
+        page.wait_for_selector("#place .labkit-stage[data-picture]", state="attached")
+        yield page
+        assert page.hosts == {"127.0.0.1"}
+
+
+def show(page, key):
+    """Go to a card by its address, up to its figure; the number of its picture."""
+    page.evaluate("(key) => { location.hash = key; }", key)
+    page.wait_for_function("(key) => wall.card.key === key && wall.now?.key === key", arg=key)
+    page.wait_for_selector("#place .labkit-stage[data-picture]", state="attached")
+    if page.evaluate("() => wall.step") == "question":
+        page.keyboard.press("a")
+    page.wait_for_function("() => document.querySelector('#cover').hidden")
+
+
+def rest(page):
+    """Wait until the figure is drawn and nothing is on its way; its pixels."""
+    return page.evaluate(
+        """async () => {
+            const root = document.querySelector("#place .labkit-stage");
+            for (let calm = 0, last = ""; calm < 3; ) {
+                await new Promise((go) => setTimeout(go, 60));
+                calm = root.dataset.picture === last ? calm + 1 : 0;
+                last = root.dataset.picture;
+            }
+            return root.querySelector("canvas").toDataURL().length + ":" + root.querySelector(".caption").textContent;
+        }"""
+    )
+
+
+def moved(page, press):
+    """Whether the picture changes after `press()`, however busy the machine is."""
+    before = page.get_attribute("#place .labkit-stage", "data-picture")
+    press()
+    changed = "(before) => document.querySelector('#place .labkit-stage').dataset.picture !== before"
+    page.wait_for_function(changed, arg=before, timeout=15_000)
+
+
+# one a chapter, of every kind: points, turned views, a list, play, keys, a brush; `tests/bench/demo_sweep.py` opens all
+KINDS = ("00/quarter-turns", "01/triangle-noise", "02/growth", "03/swirl", "04/basins", "05/thirty-one-poses",
+         "06/methods", "07/drive", "08/bells", "09/arena")  # fmt: skip
+
+
+@pytest.mark.parametrize("key", KINDS)
+def test_a_stage_fails_resets_plays_and_is_moved_by_key(wall, key):
+    show(wall, key)
+    moved(wall, lambda: wall.keyboard.press("f"))
+    moved(wall, lambda: wall.keyboard.press("r"))
+    if wall.locator("#place .play").count():
+        moved(wall, lambda: wall.keyboard.press("p"))
+        wall.keyboard.press("p")
+    moved(wall, lambda: wall.keyboard.press("ArrowRight"))
+    inside = "() => document.querySelector('#place .labkit-stage').getBoundingClientRect().bottom <= innerHeight + 1"
+    wall.wait_for_function(inside)
+    assert wall.locator("#place .status").inner_text() == ""
+
+
+def test_a_stage_is_where_it_was_left_and_all_go_back_by_one_key(wall):
+    show(wall, FIRST)
+    wall.keyboard.press("r")
+    start = rest(wall)
+    wall.keyboard.press("f")
+    failed = rest(wall)
+    assert failed != start
+    wall.keyboard.press("PageDown")
+    wall.wait_for_function("() => wall.card.key === '01/triangle-noise'")
+    wall.keyboard.press("PageUp")
+    show(wall, FIRST)
+    assert rest(wall) == failed
+    wall.reload()
+    wall.wait_for_selector("#place .labkit-stage[data-picture]", state="attached")
+    assert wall.evaluate("() => [wall.card.key, location.hash]") == [FIRST, f"#{FIRST}"]
+    assert rest(wall) == failed
+    wall.keyboard.press("Shift+R")
+    wall.wait_for_function("() => wall.step === 'question'")
+    assert rest(wall) == start
+
+
+def test_question_first_then_the_figure_then_what_happened(wall):
+    show(wall, "05/scan-line")
+    wall.keyboard.press("Shift+R")
+    wall.wait_for_function("() => wall.step === 'question'")
+    assert "least about how far away" in wall.locator("#cover .question").inner_text()
+    assert not wall.locator("#cover .happened").is_visible()
+    wall.keyboard.press("Enter")
+    wall.wait_for_selector("#cover", state="hidden")
+    assert not wall.locator("#bar .happened").is_visible()
+    wall.keyboard.press("Enter")
+    wall.wait_for_selector("#bar.answered")
+    assert "There the circle is largest" in wall.locator("#bar .happened").inner_text()
+    assert wall.locator("#bar .right").inner_text().endswith("through the center")
+
+
+def test_digits_chapters_overview_theme_and_what_is_not_there(wall):
+    show(wall, "05/scan-line")
+    wall.keyboard.press("4")
+    wall.wait_for_function("() => wall.card.key === '05/convergence'")
+    wall.keyboard.press("Shift+PageDown")
+    wall.wait_for_function("() => wall.card.key === '06/live-tracker'")
+    wall.keyboard.press("9")
+    wall.wait_for_function("() => document.querySelector('#said').textContent.includes('numbers 1 to 6')")
+    wall.evaluate("() => { location.hash = '05/none'; }")
+    wall.wait_for_function("() => document.querySelector('#said').textContent.includes('There is no 05/none')")
+    dark = wall.evaluate("() => getComputedStyle(document.body).backgroundColor")
+    wall.keyboard.press("d")
+    assert wall.evaluate("() => getComputedStyle(document.body).backgroundColor") != dark
+    wall.keyboard.press("d")
+    wall.keyboard.press("o")
+    assert wall.locator("#overview .cards button").count() == 48
+    wall.wait_for_function(
+        "() => [...document.querySelectorAll('#overview img')].slice(30, 34).every((i) => i.naturalWidth)"
+    )
+    wall.keyboard.press("ArrowRight")
+    wall.keyboard.press("Enter")
+    wall.wait_for_function("() => wall.card.key === '06/tx40'")
+
+
+def test_three_phones_vote_in_two_rounds(wall):
+    show(wall, "05/scan-line")
+    wall.keyboard.press("Shift+R")
+    wall.wait_for_function("() => wall.step === 'question'")
+    browser = wall.context.browser
+    phones = [browser.new_context(viewport={"width": 390, "height": 780}).new_page() for _ in range(3)]
+    for phone in phones:
+        phone.goto(wall.phones)
+    for number, answers in ((1, (0, 1, 2)), (2, (0, 0, 2))):
+        wall.keyboard.press("v")
+        for phone, answer in zip(phones, answers):
+            phone.wait_for_function("(n) => now.open && now.round === n", arg=number)
+            phone.locator("#answers button").nth(answer).click()
+            phone.wait_for_function("() => document.querySelector('#said').textContent.includes('Counted')")
+        wall.wait_for_function("() => wall.now.ballot.counts.at(-1) === 3")
+        assert wall.locator("#cover .bar.second").count() == 0
+        assert wall.locator("#cover .bar.first").count() == (3 if number == 2 else 0)
+        wall.keyboard.press("v")
+        wall.wait_for_function("() => !wall.now.ballot.open")
+        assert not phones[0].locator("#answers button").first.is_enabled() or phones[0].wait_for_function(
+            "() => !now.open"
+        )
+    shares = [row.inner_text() for row in wall.locator("#cover .bar").all()]
+    assert shares[:2] == ["33 % (1)", "67 % (2) second round"]
+    with wall.expect_download() as saved:
+        wall.keyboard.press("s")
+    assert "05/scan-line" in saved.value.path().read_text(encoding="utf-8")
+    for phone in phones:
+        phone.context.close()
+
+
+def test_the_notes_follow_in_a_second_window(wall):
+    show(wall, "05/scan-line")
+    with wall.expect_popup() as opened:
+        wall.keyboard.press("n")
+    notes = opened.value
+    notes.wait_for_function("() => document.body.innerText.includes('05/scan-line')")
+    show(wall, "05/convergence")
+    notes.wait_for_function("() => document.querySelector('h1').innerText.includes('05/convergence')")
+    notes.close()
+
+
+def test_a_page_whose_server_is_gone_says_so(wall):
+    assert wall.complaints == []
+    wall.process.terminate()
+    wall.wait_for_function("() => document.querySelector('#said').textContent.includes('The line to Python is cut')")
+    wall.complaints.clear()  # of the lines that are tried
