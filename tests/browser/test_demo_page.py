@@ -151,7 +151,7 @@ def test_digits_chapters_overview_theme_and_what_is_not_there(wall):
     assert wall.evaluate("() => getComputedStyle(document.body).backgroundColor") != dark
     wall.keyboard.press("d")
     wall.keyboard.press("o")
-    assert wall.locator("#overview .cards button").count() == 48
+    assert wall.locator("#overview .cards button").count() == wall.evaluate("() => wall.cards.length") >= 48
     wall.wait_for_function(
         "() => [...document.querySelectorAll('#overview img')].slice(30, 34).every((i) => i.naturalWidth)"
     )
