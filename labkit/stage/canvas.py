@@ -61,15 +61,32 @@ class Picture:
             artist.set_in_layout(False)  # what moves must not push the axes about
         self._background = self._sent = None
         self.draw_seconds = 0.0
+        self.spaces = [ax.space for ax in self.fig.axes if hasattr(ax, "space")]
+        self._in_space = {id(artist) for space in self.spaces for artist in space.artists}
 
     @property
     def dark(self):
         return self.canvas.dark
 
-    def fit(self, width, height, ratio, dark, letters=1.0):
-        """Adopt a room of width x height (CSS pixels), the device's pixel ratio, the theme, and the size of the letters
-        around, as a multiple of the designed one.
+    @property
+    def painted(self):
+        """Whether the scenes in space are drawn here, too; else the page draws them."""
+        return all(space.painted for space in self.spaces)
+
+    def paint(self, on):
+        """Draw the scenes in space here, too, or leave them to the page; returns what was done before."""
+        before = self.painted
+        for space in self.spaces:
+            if space.painted != on:
+                space.painted = on
+                space.redraw()
+        return before
+
+    def fit(self, width, height, ratio, dark, letters=1.0, space=False):
+        """Adopt a room of width x height (CSS pixels), the device's pixel ratio, the theme, the size of the letters
+        around, as a multiple of the designed one, and whether the page draws scenes in space itself.
         """
+        self.paint(not space)
         if bool(dark) != self.dark:
             self.canvas.dark, self._background = bool(dark), None
         room = max(float(width), 120.0), max(float(height), 120.0), float(ratio), float(letters)
@@ -121,7 +138,8 @@ class Picture:
                 self._draw_background()
             renderer = self.canvas.get_renderer()
             renderer.restore_region(self._background)
-            for artist in sorted(self.artists, key=lambda a: a.zorder):
+            hidden = set() if self.painted else self._in_space
+            for artist in sorted((a for a in self.artists if id(a) not in hidden), key=lambda a: a.zorder):
                 artist.draw(renderer)
             self.draw_seconds = monotonic() - start
             return np.asarray(renderer.buffer_rgba())
@@ -135,12 +153,17 @@ class Picture:
     def png(self):
         """The picture as PNG bytes."""
         with DRAWING:
-            return encode_png(self.draw(), self.fig.dpi)
+            before = self.paint(True)
+            png = encode_png(self.draw(), self.fig.dpi)
+            self.paint(before)
+            return png
 
     def small_png(self, rings=()):
         """The picture in few colors, with rings at (fraction, color): some 20 kB."""
         with DRAWING:
+            before = self.paint(True)
             self.draw()
+            self.paint(before)
             renderer = self.canvas.get_renderer()
             for (right, down), color in rings:
                 x, y = right * self.fig.bbox.width, (1 - down) * self.fig.bbox.height
@@ -169,6 +192,15 @@ class Picture:
         """Fractions (right, down) of the picture at data coordinates `xy` of an axes."""
         x, y = ax.transData.transform(xy)
         return float(x / self.fig.bbox.width), float(1 - y / self.fig.bbox.height)
+
+    def place(self, ax):
+        """Where a scene in space may be drawn, (left, top, width, height) in fractions of the picture, and how many of
+        its units the whole picture is wide. The axes lie in the middle of the place.
+        """
+        left, bottom, width, height = ax.get_position(original=True).bounds
+        low, high = ax.get_xlim()
+        units = (high - low) * self.fig.bbox.width / ax.bbox.width
+        return [float(v) for v in (left, 1 - bottom - height, width, height, units)]
 
     def data(self, ax, fraction):
         """Data coordinates of an axes at fractions (right, down) of the picture; (..., 2) -> (..., 2)."""

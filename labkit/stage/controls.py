@@ -24,6 +24,7 @@ class Handle:
     bounds : ((x_low, x_high), (y_low, y_high)[, (z_low, z_high)]); equal ends fix a coordinate. Drags end at the axes'
         limits anyway.
     label : what a screen reader calls it (default: its name); color : of its ring, one of `stage.style`.
+    way : how it moves in space, one of `stage.scene3d_handles`; by default in the plane of the screen.
     """
 
     at: tuple
@@ -32,6 +33,7 @@ class Handle:
     ax: int = 0
     label: str = ""
     color: str = style.INK
+    way: object = None
 
 
 @dataclass(frozen=True)

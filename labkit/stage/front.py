@@ -10,6 +10,8 @@ from IPython.display import display
 
 from .. import live
 
+SPACE = Path(__file__).with_name("space.js")  # the drawing in space, which the first Stage of a page asks for
+
 
 class Front(anywidget.AnyWidget):
     """`stage.js` with its model: the declaration, and messages both ways."""

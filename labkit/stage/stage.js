@@ -8,6 +8,9 @@
 //   off("msg:custom", hear)  no more
 //   send(message)            to Stage.receive(message), as JSON
 //
+// Scenes in space are drawn by `space.js`. The first Stage of a page that has one asks Python for it; a page without
+// Python sets globalThis[Symbol.for("labkit.space")] = { load: () => import("./space.js") } before.
+//
 // A model may also announce "comm_live_update": the line to Python was cut or mended. `render` returns a function that
 // takes everything down again. Nothing here knows what a value means: sliders and words speak in positions.
 
@@ -24,6 +27,9 @@ const LETTERS = 13; // CSS pixels of the words around, at which the picture's le
 const LARGEST = 2.4; // times as large letters may become in the whole window
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const NAMES = { ArrowLeft: "left", ArrowRight: "right", ArrowUp: "up", ArrowDown: "down" };
+const TURNING = "Arrow keys turn the view; drawn in space, Shift moves it, + and - zoom, x y z and Home look from there.";
+const ASK_AGAIN = 10000; // ms until a page that lacks the drawing in space asks for it again
+const LOOK_AGAIN = 100; // ms until a Stage looks whether another one has got it
 const SILENT = "Python does not answer. It is busy with another cell, or it was restarted: then Run All makes the figure live again.";
 
 function render({ model, el }) {
@@ -65,11 +71,15 @@ class Figure {
     this.screen = new Screen(this.picture, (message) => this.show(message), () => this.room.look(true));
     this.space = new Space(this.picture, this.screen.canvas, declared, this.line);
     this.handles = new Handles(this.picture, declared.handles, this.line);
+    this.scenes = new Scenes(this, declared.spaces ?? [], model);
+    this.line.where = () => this.scenes.news();
+    this.space.scenes = this.scenes;
     this.words = new Words();
     this.clock = declared.play ? new Clock(declared.play, this.line) : null;
     this.controls = new Controls(declared.controls, this.line);
     this.buttons = buttonRow(declared.buttons, (key) => { this.clock?.stop(); this.line.press(key); });
     this.room = new Room(this.root, this.picture, declared.size, this.line, this.buttons);
+    this.room.canDraw = () => this.scenes.able;
     this.root.append(this.picture, ...this.words.nodes, ...(this.clock ? [this.clock.row] : []), this.controls.row, this.buttons);
     // JupyterLab's shortcuts (arrow keys fold headings, letters cut cells) stay away from whatever has the focus here
     for (const node of this.root.querySelectorAll("input, select, button, canvas, .handle")) node.dataset.lmSuppressShortcuts = "true";
@@ -78,11 +88,15 @@ class Figure {
     model.on("msg:custom", this.hear);
     model.on("comm_live_update", this.probe);
     this.model = model;
+    this.scenes.ask();
     this.room.look();
   }
 
   receive(message, buffers) {
+    if (message.module === "space") this.scenes.load(buffers[0]);
     if (message.picture === undefined) return;
+    if (message.space) buffers = this.scenes.receive(message.space, buffers, this.room.dark);
+    else this.scenes.rest();
     if (this.line.hasAnswer(message)) this.root.dataset.answer = this.line.took.toFixed(1); // ms, for the benchmark
     this.screen.receive(message, buffers);
   }
@@ -93,12 +107,18 @@ class Figure {
     this.picture.style.aspectRatio = `${message.width} / ${message.height}`;
     this.screen.canvas.setAttribute("aria-label", [this.name, message.caption].filter(Boolean).join(": "));
     this.words.show(message);
-    this.handles.show(message.handles);
+    this.handles.show((this.places = this.scenes.placed(message.handles)));
     this.controls.show(message.controls);
     this.clock?.show(message.time);
     this.root.dataset.python = message.milliseconds;
     this.root.dataset.picture = message.picture;
     this.line.seen(message);
+  }
+
+  /** One looks from elsewhere: the handles go along, and Python hears of it with the next message, or at rest. */
+  turned() {
+    if (this.places) this.handles.show(this.scenes.placed(this.places));
+    this.line.rest();
   }
 
   /** Python does not answer: that is said, and nothing pretends to move. */
@@ -112,7 +132,7 @@ class Figure {
   close() {
     this.model.off("msg:custom", this.hear);
     this.model.off("comm_live_update", this.probe);
-    for (const part of [this.line, this.words, this.clock, this.room]) part?.close();
+    for (const part of [this.line, this.words, this.clock, this.room, this.scenes]) part?.close();
     this.root.remove();
   }
 }
@@ -147,7 +167,7 @@ class Line {
     this.flight = `${this.view}:${++this.count}`;
     this.sent = performance.now();
     this.timer = setTimeout(() => { this.flight = null; this.silent = true; this.onSilence(); this.flush(); }, PATIENCE);
-    const message = { ...this.pending, shown: this.shown, serial: this.flight };
+    const message = { ...this.pending, ...this.where?.(), shown: this.shown, serial: this.flight };
     this.pending = {};
     this.send(message);
   }
@@ -173,13 +193,95 @@ class Line {
     this.shown = message.picture;
     if (message.serial === null && this.idle && this.shown % 2 === 0) this.send({ shown: this.shown });
     this.flush();
+    this.rest();
+  }
+
+  rest() {
     clearTimeout(this.resting);
-    if (this.idle) this.resting = setTimeout(() => this.send({ rest: true }), REST);
+    if (this.idle) this.resting = setTimeout(() => this.send({ ...this.where?.(), rest: true }), REST);
   }
 
   close() {
     clearTimeout(this.timer);
     clearTimeout(this.resting);
+  }
+}
+
+/** Scenes in space: drawn by the page once it has the module, by Python until then and where the page cannot. */
+class Scenes {
+  constructor(figure, declared, model) {
+    Object.assign(this, { figure, declared, model, view: null, timer: 0, closed: declared.length === 0 });
+    this.page = globalThis[Symbol.for("labkit.space")] ??= { asked: -Infinity };
+  }
+
+  get able() {
+    return this.view !== null && this.page.module.works();
+  }
+
+  get live() {
+    return this.view?.shown ?? false;
+  }
+
+  /** Ask for the module unless another Stage of the page has done so; open the view as soon as it is there. */
+  ask() {
+    if (this.closed || this.view) return;
+    const { page } = this;
+    if (page.module) return this.open();
+    if (performance.now() - (page.asked ?? -Infinity) > ASK_AGAIN) {
+      page.asked = performance.now();
+      if (page.load) page.load().then((module) => { page.module = module; }, () => {});
+      else this.figure.line.send({ need: "space" });
+    }
+    this.timer = setTimeout(() => this.ask(), LOOK_AGAIN);
+  }
+
+  async load(source) {
+    const url = URL.createObjectURL(new Blob([source], { type: "text/javascript" }));
+    try {
+      this.page.module ??= await import(url);
+    } catch (error) {
+      console.warn("stage: no drawing in space, Python draws it", error);
+    }
+    URL.revokeObjectURL(url);
+  }
+
+  open() {
+    if (!this.page.module.works()) return;
+    const hooks = { onMove: () => this.figure.turned(), onAble: () => this.figure.room.look(true) };
+    this.view = new this.page.module.View(this.figure.picture, this.figure.screen.canvas, this.declared, hooks);
+    this.view.show(false);
+    this.figure.room.look(true);
+  }
+
+  /** The numbers are the last of the buffers; returns the others. */
+  receive(space, buffers, dark) {
+    const view = buffers[buffers.length - 1];
+    const copy = view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength);
+    this.view?.receive(space, new Float32Array(copy), dark);
+    return buffers.slice(0, -1);
+  }
+
+  /** Python draws. */
+  rest() {
+    if (this.live) this.view.show(false);
+  }
+
+  news() {
+    const view = this.live ? this.view.news() : undefined;
+    return view && { view };
+  }
+
+  /** Places of the handles, as one looks now. */
+  placed(places) {
+    if (!this.live) return places;
+    const seen = ([name, place]) => [name, place.point ? { ...place, at: this.view.fraction(place.point, place.scene) } : place];
+    return Object.fromEntries(Object.entries(places).map(seen));
+  }
+
+  close() {
+    this.closed = true;
+    clearTimeout(this.timer);
+    this.view?.close();
   }
 }
 
@@ -429,7 +531,7 @@ class Space {
   }
 
   keysInWords() {
-    const arrows = this.keys ? "Arrow keys drive." : this.empty === "turn" ? "Arrow keys turn the view." : "";
+    const arrows = this.keys ? "Arrow keys drive." : this.empty === "turn" ? TURNING : "";
     if (!this.points) return arrows;
     const mode = arrows ? "Enter: a cursor for the arrow keys; " : "Arrow keys move a cursor; ";
     return `${arrows} ${mode}${this.empty === "draw" ? "Space puts the pen down and lifts it" : "Space clicks"}.`.trim();
@@ -477,7 +579,8 @@ class Space {
   }
 
   turn(right, down) {
-    this.line.add("orbit", ([a, b] = [0, 0]) => [a + right, b + down]);
+    if (this.scenes?.live) this.scenes.view.turn(right, down);
+    else this.line.add("orbit", ([a, b] = [0, 0]) => [a + right, b + down]);
   }
 
   begin(at) {
@@ -720,7 +823,9 @@ class Room {
     const look = {
       width: Math.floor(width - parseFloat(style.paddingLeft) - parseFloat(style.paddingRight)), height,
       ratio: window.devicePixelRatio || 1, dark: isLight(style.color), letters: parseFloat(style.fontSize) / LETTERS,
+      space: this.canDraw?.() ?? false,
     };
+    this.dark = look.dark;
     const words = JSON.stringify(look);
     if (words === this.last && !again) return;
     this.last = words;

@@ -45,9 +45,11 @@ constrain : handles that must follow a rule beyond `bounds`. `constrain(state, m
     correct, before anything is computed; `moved` is the set of names that changed (all names at the start). The
     picture's handle goes where it returns.
 Handle((x, y, z)) : a point of a 3D scene; needs `view`. It is drawn where `state["view"].project` puts it in the axes,
-    and dragged in the plane of the screen.
+    and dragged in the plane of the screen, or as its `way` says: along a line, on a plane or a sphere (see
+    `stage.scene3d_handles`). `Dial` is an angle: a joint that is turned by a point on its circle.
 view=View(azimuth_deg, elevation_deg) : dragging empty space (or arrow keys on the picture) turns `state["view"]`; see
-    `stage.scene3d`.
+    `stage.scene3d`. Where the browser draws the scene it turns it without Python, and tells where one looks from with
+    its next message.
 play=Play(t_max, dt) : play, pause and a slider of time; `state["t"]` runs from 0 to t_max (s).
 click=True (or the number of the axes) : `state["click"]` is the place clicked last, None at first.
 brush=True (or the number of the axes) : `state["brush"]` is the path of the stroke being drawn in empty space (the
@@ -74,6 +76,7 @@ from .. import live
 from ..checks import as_finite
 from . import front, style
 from .canvas import CSS_DPI, DRAWING, Picture
+from .scene3d_handles import Dial, stepped
 
 MAX_CONTROLS = 3
 ORBIT_DEG_PER_PIXEL = 0.5
@@ -140,9 +143,11 @@ class Stage:
         self._sent, self._shown, self._waiting, self._attached, self._epoch = 0, 0, False, False, 0
         self._cursor = ""
         self._whole = True  # the page needs a whole picture, not only what changed
+        self._told_view = None  # where the page knows one looks from
         self._received = monotonic()
         self._picture = Picture(scene, size)
         self._check_axes()
+        self._spaces = self._picture.spaces
         self._correct(set(self._state))
         self.initial = dict(self._state)
         self._presets = {
@@ -152,6 +157,9 @@ class Stage:
         self._restart()
         self._go_on(self._ticks(0.0))
         self._recompute()
+        for space in self._spaces:
+            if unset := space.unset():
+                raise ValueError(f"Stage {name!r}: update gives no place to {unset[0]}: set it, or show(False)")
         self._picture.draw()
         self._text = f"[stage: {name}] {self.caption}".rstrip()
 
@@ -166,6 +174,8 @@ class Stage:
             if names.count(key) > 1 or key in RESERVED:
                 raise ValueError(f"{where}: the name {key!r} is used twice or reserved ({', '.join(RESERVED)})")
         for key, handle in self._handles.items():
+            if isinstance(handle, Dial):
+                continue
             if len(handle.at) not in (2, 3) or (len(handle.at) == 3 and view is None):
                 raise ValueError(
                     f"{where}: handle {key!r} must have 2 coordinates, or 3 and the Stage a view; got {handle.at}"
@@ -207,6 +217,11 @@ class Stage:
         return list(self._picture.artists)
 
     @property
+    def spaces(self):
+        """The scenes in space, `scene3d.Scene`."""
+        return list(self._spaces)
+
+    @property
     def handles(self):
         """{name: Handle}, a copy."""
         return dict(self._handles)
@@ -230,6 +245,8 @@ class Stage:
         """A value as the state holds it, or a ValueError that names it."""
         if key in self._controls:
             return self._controls[key].check(key, value)
+        if isinstance(self._handles.get(key), Dial):
+            return self._handles[key].check(key, value)
         if key in self._handles:
             value = np.array(as_finite(value, key))
             count = len(self._handles[key].at)
@@ -246,7 +263,9 @@ class Stage:
         return value
 
     def _bounded(self, key, value):
-        bounds = self._handles[key].bounds
+        bounds, way = self._handles[key].bounds, self._handles[key].way
+        if way is not None:
+            value = way.keep(value)
         return value if bounds is None else np.clip(value, *np.transpose(as_finite(bounds, f"bounds of {key}")))
 
     def _apply(self, changes, events=(), restart=False, reply=None):
@@ -327,6 +346,7 @@ class Stage:
             "empty": "turn" if "view" in self._state else "draw" if self._brush is not None else "",
             "keys": self._keys,
             "click": self._click is not None,
+            "spaces": [space.describe() for space in self._spaces],
         }
 
     def connect(self, send):
@@ -344,8 +364,14 @@ class Stage:
         with DRAWING:
             self._received = monotonic()
             self._shown = max(self._shown, message.get("shown", 0))
+            if "need" in message:
+                self._send({"module": "space"}, [front.SPACE.read_bytes()])
+            if "view" in message and "view" in self._state:
+                self._state["view"] = self._told_view = self._state["view"].seen(message["view"])
+                for space in self._spaces:
+                    space.draw(self._told_view)
             if "look" in message:
-                self._attached, self._shown, self._whole = True, self._sent, True
+                self._attached, self._shown, self._whole, self._told_view = True, self._sent, True, None
                 self._picture.fit(**message["look"])
             if "cursor" in message:
                 self._cursor = self._place_in_words(message["cursor"])
@@ -399,9 +425,12 @@ class Stage:
         """Where a handle goes: dragged to a fraction of the picture, or by steps (right, up); in axes and bounds."""
         handle, at = self._handles[key], self._state[key]
         ax = self._picture.fig.axes[handle.ax]
+        (left, right), (bottom, top) = np.sort(ax.get_xlim()), np.sort(ax.get_ylim())
+        if isinstance(handle, Dial) or handle.way is not None:
+            there = None if to is None else self._picture.data(ax, to)
+            return self._moved_in_space(handle, at, there, steps, (right - left) / 100)
         view = self._state.get("view")
         here = view.project(at)[:2] if len(at) == 3 else at
-        (left, right), (bottom, top) = np.sort(ax.get_xlim()), np.sort(ax.get_ylim())
         if to is None:
             step = handle.step or (right - left) / 100
             there = here + step * np.array(steps, dtype=float)
@@ -409,6 +438,17 @@ class Stage:
             there = self._picture.data(ax, to)
         there = np.clip(there, (left, bottom), (right, top))
         return self._bounded(key, there if len(at) == 2 else at + view.unproject(there - here))
+
+    def _moved_in_space(self, handle, at, there, steps, step):
+        view = self._state["view"]
+        if there is None and isinstance(handle, Dial):
+            return handle.stepped(at, steps)
+        if there is None:
+            return stepped(handle.way, at, steps, view.axes, handle.step or step)
+        eye, ray = view.ray(*there)
+        if isinstance(handle, Dial):
+            return handle.pull(at, self.result, eye, ray)
+        return handle.way.pull(at, eye, ray, view.axes[2])
 
     def _show_picture(self, reply=None):
         """One picture to the browser; one that has not yet shown the last three gets the newest as soon as it has."""
@@ -422,10 +462,13 @@ class Stage:
         if reply is not None:
             self._shown = self._sent  # the page waits for this one
         buffers = self._picture.news(self._whole)
+        on = self._sent - 1 if len(buffers) == 2 else None
+        space = self._space(buffers) if self._spaces and not self._picture.painted else None
         self._whole = False
         message = {
             "picture": self._sent,
-            "on": self._sent - 1 if len(buffers) == 2 else None,
+            "on": on,
+            "space": space,
             "serial": reply,
             "width": round(self._picture.width),
             "height": round(self._picture.height),
@@ -438,6 +481,19 @@ class Stage:
             "milliseconds": round(1e3 * (monotonic() - self._received), 1),
         }
         self._send(message, buffers)
+
+    def _space(self, buffers):
+        """What changed in the scenes the page draws itself; the numbers go to the buffers, as the last of them."""
+        news = [space.news(self._whole) for space in self._spaces]
+        buffers.append(np.concatenate([numbers for _, numbers in news]).tobytes())
+        view = self._state.get("view")
+        told = None if view is self._told_view or view is None else view.describe()
+        self._told_view = view
+        return {
+            "places": [self._picture.place(space.ax) for space in self._spaces],
+            "rows": [rows for rows, _ in news],
+            "view": told,
+        }
 
     def _shown_control(self, key):
         control, value = self._controls[key], self._state[key]
@@ -452,13 +508,20 @@ class Stage:
     def _places(self):
         """Where the browser puts the handles, and what it says of them."""
         places = {}
+        scenes = {self._picture.fig.axes.index(space.ax): k for k, space in enumerate(self._spaces)}
         for key, handle in self._handles.items():
             at = self._state[key]
-            here = self._state["view"].project(at)[:2] if len(at) == 3 else at
+            point = handle.point(at, self.result) if isinstance(handle, Dial) else at
+            here = self._state["view"].project(point)[:2] if len(point) == 3 else point
+            values = [at] if isinstance(handle, Dial) else at
+            letters = [""] if isinstance(handle, Dial) else ["x ", "y ", "z "]
             places[key] = {
                 "at": self._picture.fraction(self._picture.fig.axes[handle.ax], here),
-                "value": ", ".join(f"{letter} {value:.4g}" for letter, value in zip("xyz", at)),
-                "now": float(at[0]),
+                "point": [float(v) for v in point] if len(point) == 3 else None,
+                "scene": scenes.get(handle.ax, 0),
+                "value": ", ".join(f"{letter}{value:.4g}" for letter, value in zip(letters, values))
+                + (" deg" if isinstance(handle, Dial) else ""),
+                "now": float(values[0]),
                 "color": style.themed(handle.color, self._picture.dark),
             }
         return places

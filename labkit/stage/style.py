@@ -27,6 +27,8 @@ ESTIMATE = "#cc79a7"
 REJECTED = MUTED
 AXIS_X, AXIS_Y, AXIS_Z = "#d55e00", "#009e73", "#0072b2"
 AXES = (AXIS_X, AXIS_Y, AXIS_Z)
+SHELL, STEEL = "#c3c9d2", "#7f8894"  # bodies of machines, and their joints and tools
+LASER = "#c8324b"
 HEAT = "viridis"  # values over an area: costs, grids, densities
 WORD_PAD = 13  # points from an axis down to the baseline of words
 
@@ -37,6 +39,9 @@ DARK = {
     GRID: "#383838",
     FAINT: "#242424",
     AXIS_Z: "#4a8fd9",
+    SHELL: "#a9b0bb",
+    STEEL: "#68717d",
+    LASER: "#ff5c78",
 }
 
 LOOKS = {

@@ -122,7 +122,7 @@ def test_keys_draw_as_a_mouse_does(page):
     """The surface of the basins is covered until one rubs: by pointer, or with the keyboard's cursor and its pen."""
     stage = figure(page, BASINS)
     before = pixels(page, stage)
-    stage.locator("canvas").focus()
+    stage.locator("canvas:not(.space)").focus()
     page.keyboard.press("Enter")
     assert stage.locator(".cursor").is_visible()
     page.keyboard.press("Space")
@@ -184,17 +184,17 @@ def is_whole(page, stage, must_fit):
     inside = all(
         box["x"] >= inner["x"] - 1 and box["x"] + box["width"] <= inner["x"] + inner["width"] + 1 for box in boxes
     )
-    sharp = abs(stage.locator("canvas").evaluate("node => node.width / node.clientWidth") - 1) < 0.02
+    sharp = abs(stage.locator("canvas:not(.space)").evaluate("node => node.width / node.clientWidth") - 1) < 0.02
     return inside and sharp and (not must_fit or inner["height"] <= seen["height"])
 
 
 def test_enlarged_it_fills_the_window_and_escape_leads_back(page):
     stage = figure(page, GIMBAL)
-    small = stage.locator("canvas").bounding_box()
+    small = stage.locator("canvas:not(.space)").bounding_box()
     stage.get_by_role("button", name="Enlarge").click()
 
     def size():
-        box = stage.locator("canvas").bounding_box()
+        box = stage.locator("canvas:not(.space)").bounding_box()
         return box["width"] * box["height"]
 
     assert soon(page, lambda: size() > 1.2 * small["width"] * small["height"])
@@ -203,7 +203,7 @@ def test_enlarged_it_fills_the_window_and_escape_leads_back(page):
         place = part.bounding_box()
         assert place["y"] + place["height"] <= 900 and place["x"] + place["width"] <= 1280
     page.keyboard.press("Escape")
-    assert soon(page, lambda: stage.locator("canvas").bounding_box()["width"] == pytest.approx(small["width"], abs=1))
+    assert soon(page, lambda: stage.locator("canvas:not(.space)").bounding_box()["width"] == pytest.approx(small["width"], abs=1))
     assert stage.get_by_role("button", name="Enlarge").is_visible()
 
 

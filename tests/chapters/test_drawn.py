@@ -26,7 +26,9 @@ from labkit.chapters.ch09_monte_carlo import stages as ch09
 from labkit.documents.lecture.examples import load_building
 from labkit.documents.thesis import wells
 from labkit.machines import simulation, udp
+from labkit.machines.arm import TX40, link_frames
 from labkit.machines.packet import POSITION, decode_packet
+from labkit.stage.scene3d_handles import Dial
 
 GAP = [np.nan, np.nan]
 
@@ -76,6 +78,7 @@ def gaps(stage):
     artists = stage.moving
     for key, handle in stage.handles.items():
         place, ax = stage.state[key], stage.figure.axes[handle.ax]
+        place = handle.point(place, stage.result) if isinstance(handle, Dial) else place
         here = stage.state["view"].project(place)[:2] if len(place) == 3 else place
         lines = [a.get_xydata() for a in artists if isinstance(a, Line2D) and a.axes is ax and len(a.get_xydata())]
         names = [np.array([a.xy]) for a in artists if isinstance(a, Annotation) and a.axes is ax]
@@ -312,24 +315,69 @@ def test_errors_of_differences_follow_their_orders():
 
 # --- chapter 6 --------------------------------------------------------------------------------------------------------
 
-UPRIGHT = [[0, 0, 0], [0, 0, 320], [0, 35, 320], [0, 35, 545], [0, 35, 770], [0, 35, 835]]
-
 
 def test_the_arm_upright_has_its_shoulder_on_the_left():
     """The drawing's convention at zero: everything above the shoulder, which is offset along the second axis, +y."""
-    stage = at(ch06.tx40(), q1=0.0, q2=0.0, q3=0.0)
-    wrist = Rotation.from_euler("y", -70, degrees=True).as_matrix() @ [0, 0, 65]  # HOME bends joint 5
-    assert_drawn(stage, [*UPRIGHT[:5], UPRIGHT[4] + wrist])
+    stage = at(ch06.tx40(), q1=0.0, q2=0.0, q3=0.0, q4=0.0, q5=0.0, q6=0.0)
+    plate = stage.spaces[0].named("flange plate").corners().reshape(-1, 3)
+    assert plate[:, 2].max() == pytest.approx(835) and plate[plate[:, 2] > 834.9].mean(0) == pytest.approx([0, 35, 835])
+    bar = stage.spaces[0].named("upper arm").corners().reshape(-1, 3)
+    assert [bar[:, 2].min(), bar[:, 2].max()] == pytest.approx([320 - 62, 545 + 48], abs=1.5)  # round both joints
+    assert bar[:, 1].min() == pytest.approx(35 + 12)  # beside the plane of the forearm
 
 
-def test_the_arm_keeps_its_lengths_in_every_position():
-    stage = at(ch06.tx40(), q1=35.0, q2=-20.0, q3=70.0)
-    points = stage.result["points"]
-    assert_drawn(stage, points)
-    np.testing.assert_allclose(np.linalg.norm(np.diff(points, axis=0), axis=1), [320, 35, 225, 225, 65], atol=1e-9)
-    left = [-np.sin(np.deg2rad(35)), np.cos(np.deg2rad(35)), 0]
-    np.testing.assert_allclose(points[2] - points[1], 35.0 * np.array(left), atol=1e-9)
-    assert points[5] == pytest.approx(stage.state["flange"], abs=1e-9)
+def test_the_arms_bodies_follow_its_joints():
+    """Base, shoulder, elbow and wrist by elementary rotations: each body holds the joint it turns about."""
+    q = dict(q1=35.0, q2=-20.0, q3=70.0, q4=25.0, q5=40.0, q6=-60.0)
+    stage = at(ch06.tx40(), **q)
+    turn = Rotation.from_euler("z", 35, degrees=True)
+    lean = turn * Rotation.from_euler("y", -20, degrees=True)
+    fold = turn * Rotation.from_euler("y", 50, degrees=True)
+    shoulder = np.array([0, 0, 320.0]) + turn.apply([0, 35, 0])
+    elbow = shoulder + lean.apply([0, 0, 225])
+    wrist = elbow + fold.apply([0, 0, 225])
+    hand = fold * Rotation.from_euler("ZYZ", [25, 40, -60], degrees=True)
+    flange = wrist + hand.apply([0, 0, 65])
+    assert flange == pytest.approx(stage.state["flange"], abs=1e-9)
+    bar = stage.spaces[0].named("upper arm").corners().reshape(-1, 3)
+    along = (bar - shoulder) @ lean.apply([0, 0, 1])
+    assert [along.min(), along.max()] == pytest.approx([-62, 225 + 48], abs=1.5)
+    forearm = stage.spaces[0].named("forearm").corners().reshape(-1, 3)
+    assert ((forearm - elbow) @ fold.apply([0, 0, 1])).max() == pytest.approx(225 + 30, abs=1.0)
+    off = np.linalg.norm(np.cross(forearm - wrist, fold.apply([0, 0, 1])), axis=1)  # from its own axis
+    assert off.max() == pytest.approx(np.hypot(34, 30), abs=1e-6)  # the ends of the joint across it
+    plate = stage.spaces[0].named("flange plate").corners().reshape(-1, 3)
+    face = plate[(plate - flange) @ hand.apply([0, 0, 1]) > -1e-6]
+    assert len(face) and face.mean(0) == pytest.approx(flange, abs=1e-6)
+    rings = [item.value for item in stage.spaces[0].items if item.called == "a path"]
+    spun = fold * Rotation.from_euler("Z", 25, degrees=True)
+    axes = fold.apply([0, 0, 1]), spun.apply([0, 1, 0]), hand.apply([0, 0, 1])
+    for axis, radius in zip(axes, (112, 92, 72)):
+        assert any(
+            len(ring) == 85 and np.allclose((ring - wrist) @ axis, 0, atol=1e-6)
+            and np.allclose(np.linalg.norm(ring - wrist, axis=1), radius) for ring in rings
+        )  # fmt: skip
+
+
+def test_dials_of_the_joints_lie_on_what_they_turn():
+    stage = at(ch06.tx40(), q1=35.0, q2=-20.0, q3=70.0, q4=25.0, q5=40.0)
+    dials, result = stage.handles, stage.result
+    frames = result["frames"]
+    assert dials["q2"].point(-20.0, result) == pytest.approx(frames[2, :3, 3], abs=1e-9)  # the elbow
+    elbow, wrist = frames[2, :3, 3], frames[4, :3, 3]
+    assert dials["q3"].point(70.0, result) == pytest.approx(elbow + (wrist - elbow) * 110 / 225, abs=1e-9)
+    for k, name in enumerate(ch06.WRIST):
+        off = dials[name].point(stage.state[name], result) - wrist
+        assert off @ frames[3 + k, :3, 2] == pytest.approx(0, abs=1e-9)
+
+
+def test_the_reach_is_that_of_the_stretched_arm():
+    """Where forward kinematics brings the wrist with the elbow straight lies on the shell, for every q1 and q2."""
+    stage = at(ch06.tx40(), reach=True)
+    profile = np.array(stage.spaces[0].named("reach").parts[0].shape["profile"])
+    for q2 in np.linspace(0, 125, 25):
+        wrist = link_frames(TX40.dh, np.deg2rad([77.0, q2, 0, 0, 0, 0]))[4, :3, 3]
+        assert np.hypot(profile[:, 0] - np.hypot(*wrist[:2]), profile[:, 1] - wrist[2]).min() < 1e-3
 
 
 def test_rays_lead_from_the_stations_to_the_diode():

@@ -1,36 +1,38 @@
-"""Figures of chapter 6: a serial arm as a stick figure with its flange and its tool."""
+"""Figures of chapter 6: the arm with its tracker, readings in space, axes, errors and methods."""
 
 import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
 from ...stage import style
-
-GROUND = np.linspace(0, 2 * np.pi, 49)
+from . import bodies
 
 
 class ArmPicture:
-    """The links of a robot, its joints, and the frames of flange and tool, in a 3D scene."""
+    """The robot with its tracker, the dials of its joints, its reach, and the frames of base, flange and tracker."""
 
     def __init__(self, scene, triad=110.0):
-        floor = np.column_stack([np.cos(GROUND), np.sin(GROUND), 0 * GROUND])
-        for radius in (120.0, 240.0):
-            scene.fixed(scene.line(**style.look("guide")), radius * floor)
-        self.links = scene.line(color=style.MUTED, linewidth=7, solid_joinstyle="round")
-        self.core = scene.line(color=style.INK, linewidth=1.4)
-        self.joints = scene.points(color=style.INK, linestyle="none", marker="o", markersize=6)
-        self.base = scene.triad("B", triad)
+        self.robot, self.dials = bodies.Tx40(scene), bodies.Dials(scene)
+        self.puck = scene.body(*bodies.puck(), name="puck")
+        self.mount = scene.rod(8.0, name="mount")
+        self.reach = scene.body(bodies.reach(), name="reach")
+        self.base = scene.triad("B", 2 * triad)
         self.flange = scene.triad("F", triad, linestyle=(0, (3, 1.5)))
         self.tool = scene.triad("E", triad)
         self.flange.name_at(-14, 1)
         self.tool.name_at(-8, 11)
         scene.fixed(self.base, np.eye(4))
+        scene.fixed(self.reach, np.eye(4))
 
-    def set(self, points, T_BF, T_BE):
-        """`points`: where the arm goes along, shape (6, 3), mm; the poses of flange and tool."""
-        for line in (self.links, self.core, self.joints):
-            line.set(points)
-        self.flange.set(T_BF)
+    def set(self, frames, T_BE, circles, q):
+        """`frames`: of base and links, shape (7, 4, 4), mm; the pose of the tracker; where the dials are, and the joint
+        angles (rad).
+        """
+        self.robot.set(frames)
+        self.dials.set(circles, q)
+        self.puck.set(T_BE)
+        self.mount.set(frames[6, :3, 3], T_BE[:3, 3])
+        self.flange.set(frames[6])
         self.tool.set(T_BE)
 
 

@@ -1,4 +1,4 @@
-"""Stages of chapter 6: the TX40 with joint sliders and a flange to drag."""
+"""Stages of chapter 6: the TX40 with joints to turn, a live tracker, A X = X B, errors in motion, repeated runs."""
 
 import functools
 import threading
@@ -15,38 +15,57 @@ from ...geometry.frames import invert, matrix_from_quaternion, pose, pose_distan
 from ...geometry.lie import exp_so3
 from ...machines import simulation, stations, udp
 from ...machines.accuracy import filter_positions, shift_time, speeds, summarize, time_offset
-from ...machines.arm import HOME, TX40, arm_points, forward_kinematics, jacobian, reach_position, tool_pose
+from ...machines.arm import (
+    HOME,
+    REACH_FOREARM,
+    REACH_WRIST,
+    SHOULDER_OFFSET,
+    TX40,
+    forward_kinematics,
+    jacobian,
+    link_frames,
+    reach_position,
+    tool_pose,
+)  # fmt: skip
 from ...machines.log import reject_outliers
 from ...machines.mounting import calibrate_mounting
 from ...machines.packet import POSITION, QUATERNION, TIME, packet_from_pose
 from ...machines.simulation import T_FE, Tracker
 from ...stage import Choice, Handle, Play, Slider, Stage, Toggle, style
 from ...stage.scene3d import Scene, View
+from ...stage.scene3d_handles import Dial, Free
 from ...tables import read_table
 from . import figures as draw
+from .bodies import RINGS
 
-ARM = ("q1", "q2", "q3")
+ARM, WRIST = ("q1", "q2", "q3"), ("q4", "q5", "q6")
 NEARLY_SINGULAR = 25.0  # mm per rad: below it, turning the arm's joints hardly moves the flange in some direction
+NEARLY_ALIGNED = 5.0  # deg between the axes 4 and 6, below which the caption speaks of the wrist
+# dials of the arm: link, angle from its x axis (deg), radius and height above it (mm); the second is the elbow itself
+GRIPS = ((0, 0.0, 128.0, 250.0), (1, -90.0, REACH_WRIST - REACH_FOREARM, SHOULDER_OFFSET), (2, 0.0, 110.0, 0.0))
 
 
 def joints(state):
-    """Joint angles, rad, shape (6,): the arm from the sliders (deg), the wrist as at home."""
-    return np.concatenate([np.deg2rad([state[name] for name in ARM]), HOME[3:]])
+    """Joint angles, rad, shape (6,), from the dials (deg)."""
+    return np.deg2rad([state[name] for name in (*ARM, *WRIST)])
 
 
 def compute_tx40(state):
-    """Arm, poses of flange and tracker, and what the first three joints can do at the flange: singular values, mm per
-    rad."""
+    """Frames of the links, poses of flange and tracker, and what the first three joints can do at the flange: singular
+    values, mm per rad."""
     q = joints(state)
-    T_BF = forward_kinematics(TX40.dh, q)
+    frames = link_frames(TX40.dh, q)
     values = np.linalg.svd(jacobian(TX40.dh, q)[3:, :3], compute_uv=False)
-    return {"q": q, "points": arm_points(TX40, q), "T_BF": T_BF, "T_BE": T_BF @ T_FE, "singular_values": values}
+    return {
+        "q": q, "frames": frames, "T_BF": frames[6], "T_BE": frames[6] @ T_FE, "singular_values": values,
+        "reach": state["reach"],
+    }  # fmt: skip
 
 
 def follow(state, moved):
     """Dragging the flange turns the arm, turning the arm moves the flange."""
     q = joints(state)
-    if "flange" in moved and not moved & set(ARM):
+    if "flange" in moved and not moved & {*ARM, *WRIST}:
         q = reach_position(TX40, state["flange"], q)
     at = forward_kinematics(TX40.dh, q)[:3, 3]
     return {"flange": at, **{name: float(np.rad2deg(q[k])) for k, name in enumerate(ARM)}}
@@ -59,49 +78,78 @@ def _sentence(result):
             f"A singular arm: in one direction the flange moves only {result['singular_values'][-1]:.0f} mm per rad. "
             "Stretched out, no joint can push it farther."
         )
+    if abs(np.rad2deg(result["q"][4])) < NEARLY_ALIGNED:
+        return "The rings of joints 4 and 6 lie on each other: both turn the flange about one line, and one is wasted."
     off = np.linalg.norm(T_FE[:3, 3])
     return f"The tracker E is at ({x:.0f}, {y:.0f}, {z:.0f}) mm in the base, {off:.0f} mm off the flange F."
 
 
+def _grip(joint):
+    """Where the dial of a joint has its circle: about its axis; of the arm on the link it turns, of the wrist on its
+    ring."""
+
+    def where(result):
+        frames = result["frames"]
+        if joint >= 3:
+            T = frames[joint].copy()
+            T[:3, 3] = frames[4, :3, 3]
+            return T, RINGS[joint - 3]
+        link, angle, radius, height = GRIPS[joint]
+        return frames[link] @ pose(exp_so3([0, 0, np.deg2rad(angle)]), [0, 0, height]), radius
+
+    return where
+
+
 def tx40():
-    """The TX40: sliders for the arm's joints, the flange to drag; F is the flange, E the tracker mounted on it."""
+    """The TX40: grab a joint and turn it, or the flange and pull; F is the flange, E the tracker mounted on it."""
+
+    grips = [_grip(k) for k in range(6)]
 
     def scene(fig):
-        left, right = fig.subplots(1, 2, width_ratios=(1.7, 1))
-        space = Scene(left, radius=530)
+        left, right = fig.subplots(1, 2, width_ratios=(2.9, 1))
+        space = Scene(left, radius=530, half_width=560, floor=0.0, unit="mm")
         arm = draw.ArmPicture(space)
         style.bare(right)
         words = right.text(0.0, 0.95, "", transform=right.transAxes, va="top", linespacing=1.7)
 
         def update(state, result):
-            arm.set(result["points"], result["T_BF"], result["T_BE"])
+            arm.set(result["frames"], result["T_BE"], [grip(result) for grip in grips], result["q"])
+            arm.reach.show(result["reach"])
             space.draw(state["view"])
             angles = "\n".join(f"joint {k + 1}   {np.rad2deg(a):6.0f} deg" for k, a in enumerate(result["q"]))
             x, y, z = result["T_BF"][:3, 3]
             low = result["singular_values"][-1]
-            words.set_text(f"{angles}\n\nF at {x:.0f}, {y:.0f}, {z:.0f} mm\nleast mobility\n{low:.0f} mm per rad")
+            words.set_text(f"{angles}\n\nF at {x:.0f},\n{y:.0f}, {z:.0f} mm\nleast mobility\n{low:.0f} mm per rad")
 
         return [*space.artists, words], update
 
-    limits = np.rad2deg([TX40.q_min[:3], TX40.q_max[:3]])
-    start = np.rad2deg(HOME[:3])
+    low, high = np.rad2deg([TX40.q_min, TX40.q_max])
+    start = np.round(np.rad2deg(HOME))
+    colors = (style.INK,) * 3 + style.AXES[::-1]
     return Stage(
         "TX40 with a tracker on its flange",
         scene=scene,
         compute=compute_tx40,
-        handles={"flange": Handle(tuple(forward_kinematics(TX40.dh, HOME)[:3, 3]), step=10, label="flange")},
-        controls={
-            name: Slider(
-                float(limits[0, k]), float(limits[1, k]), float(round(start[k])), step=1.0, label=f"joint {k + 1} (deg)"
-            )
-            for k, name in enumerate(ARM)
+        handles={
+            **{
+                name: Dial(start[k], low[k], high[k], grips[k], label=f"joint {k + 1}", color=colors[k])
+                for k, name in enumerate((*ARM, *WRIST))
+            },
+            "flange": Handle(
+                tuple(forward_kinematics(TX40.dh, HOME)[:3, 3]), step=10, label="flange", way=Free(),
+                color=style.ESTIMATE,
+            ),
         },
+        controls={"reach": Toggle(False, "where the wrist can get")},
         constrain=follow,
-        view=View(-60, 18, center=(120, 0, 440)),
-        fail={"q1": 30.0, "q2": 60.0, "q3": 14.0},
-        presets={"arm upright": {"q1": 0.0, "q2": 0.0, "q3": 0.0}},
+        view=View(-60, 18, center=(120, 0, 440), eye=3200),
+        fail={"q1": 30.0, "q2": 60.0, "q3": 14.0, "reach": True},
+        presets={
+            "arm upright": {"q1": 0.0, "q2": 0.0, "q3": 0.0},
+            "wrist in line": {"q4": 40.0, "q5": 0.0, "q6": -40.0},
+        },
         describe=_sentence,
-    )
+    )  # fmt: skip
 
 
 # ---- live ------------------------------------------------------------------------------------------------------------
