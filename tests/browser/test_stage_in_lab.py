@@ -203,7 +203,8 @@ def test_enlarged_it_fills_the_window_and_escape_leads_back(page):
         place = part.bounding_box()
         assert place["y"] + place["height"] <= 900 and place["x"] + place["width"] <= 1280
     page.keyboard.press("Escape")
-    assert soon(page, lambda: stage.locator("canvas:not(.space)").bounding_box()["width"] == pytest.approx(small["width"], abs=1))
+    picture = stage.locator("canvas:not(.space)")
+    assert soon(page, lambda: picture.bounding_box()["width"] == pytest.approx(small["width"], abs=1))
     assert stage.get_by_role("button", name="Enlarge").is_visible()
 
 
