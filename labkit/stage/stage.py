@@ -157,9 +157,7 @@ class Stage:
         self._restart()
         self._go_on(self._ticks(0.0))
         self._recompute()
-        for space in self._spaces:
-            if unset := space.unset():
-                raise ValueError(f"Stage {name!r}: update gives no place to {unset[0]}: set it, or show(False)")
+        self._check_places()
         self._picture.draw()
         self._text = f"[stage: {name}] {self.caption}".rstrip()
 
@@ -198,6 +196,11 @@ class Stage:
                 raise ValueError(
                     f"Stage {self.name!r}: {key} wants axes {ax}, but the scene has {count}, counted from 0"
                 )
+
+    def _check_places(self):
+        for space in self._spaces:
+            if unset := space.unset():
+                raise ValueError(f"Stage {self.name!r}: update gives no place to {unset[0]}: set it, or show(False)")
 
     # -- state
 
