@@ -3,6 +3,8 @@
 Source: thesis "Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", HAW Hamburg 2019, section 2.6.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..checks import as_count, as_matrices, as_positive_number, as_shape, as_transforms, shown
@@ -10,6 +12,8 @@ from ..geometry.frames import invert, pose, transform
 from ..geometry.lie import exp_so3, nearest_rotation
 from .hand_eye import MIN_SPREAD, as_sightings, calibrate_sphere_target, linear_start
 from .planning import poses_that_see, predicted_sphere_covariance
+
+CUBE = 60.0 * (np.indices((2, 2, 2)).reshape(3, 8).T - 0.5)  # mm, corners
 
 
 def kim_linear(T_BF, points_S, points_W):
@@ -90,12 +94,80 @@ def kim_matrix(A, B):
     return (left - right).reshape(*A.shape[:-2], 12, 12), F.reshape(*A.shape[:-2], 12)
 
 
+def li_rotation(T_BF, x_S):
+    """R_FS from poses that are translated only, step 1 of Li et al.
+
+    Two poses of the same orientation see the sphere shifted, R_BF R_FS (x_q - x_p) = t_p - t_q; the thesis prints the
+    right side with the sign reversed. The shifts are taken from their means, and the directions fitted by SVD.
+
+    Parameters
+    ----------
+    T_BF : array-like, shape (N, 4, 4), N >= 3
+        Robot poses that all have the orientation of the first.
+    x_S : array-like, shape (N, 3)
+        The sphere's center in the scanner (mm).
+
+    Returns
+    -------
+    R_FS : array, shape (3, 3)
+
+    Raises
+    ------
+    ValueError
+        When the translations lie along one line: the rotation about it stays free.
+
+    Source: thesis, formula (2-41), after Li et al. (2011).
+    """
+    T_BF, x_S = as_sightings(T_BF, x_S)
+    seen = x_S - x_S.mean(0)
+    moved = -(T_BF[:, :3, 3] - T_BF[:, :3, 3].mean(0)) @ T_BF[0, :3, :3]
+    return _fitted_rotation(moved, seen)
+
+
+def _fitted_rotation(moved, seen):
+    """The rotation that turns the shifts seen into those moved, row by row."""
+    values = np.linalg.svd(moved, compute_uv=False)
+    if len(values) < 2 or values[1] <= MIN_SPREAD * values[0]:
+        raise ValueError("the translations must not all lie along one line: the rotation about it stays free")
+    return nearest_rotation(moved.T @ seen)
+
+
+def li_translation(T_BF, x_S, R_FS):
+    """t_FS and target once R_FS is known, step 2 of Li et al.: R_BF t_FS - target = -(t_BF + R_BF R_FS x_S).
+
+    Parameters
+    ----------
+    T_BF : array-like, shape (N, 4, 4), N >= 2
+        Robot poses that turn about two axes.
+    x_S : array-like, shape (N, 3)
+        The sphere's center in the scanner (mm).
+    R_FS : array-like, shape (3, 3)
+
+    Returns
+    -------
+    t_FS, target : arrays, shape (3,), mm
+
+    Raises
+    ------
+    ValueError
+        When the poses turn about one axis only.
+
+    Source: thesis, formulas (2-40) and (2-42), after Li et al. (2011).
+    """
+    (T_BF, x_S), R_FS = as_sightings(T_BF, x_S), as_shape(R_FS, "R_FS", 3, 3)
+    R, t = T_BF[:, :3, :3], T_BF[:, :3, 3]
+    design = np.concatenate([R, np.tile(-np.eye(3), (len(R), 1, 1))], axis=2).reshape(-1, 6)
+    right = -(t + (R @ (x_S @ R_FS.T)[..., None])[..., 0])
+    u, _, rank, _ = np.linalg.lstsq(design, right.ravel(), rcond=1e-9)
+    if rank < 6:
+        raise ValueError(f"the rotations must turn about two axes: step 2 has rank {rank}, not 6")
+    return u[:3], u[3:]
+
+
 def li_two_step(T_BF, x_S, max_turn_deg=0.01):
     """T_FS and target by the two steps of Li et al.: rotation from pure translations, then translation.
 
-    Step 1: two poses of the same orientation see the sphere shifted, R_BF R_FS (x_q - x_p) = t_p - t_q (the thesis
-    prints the right side of (2-41) with the sign reversed); the directions are fitted by SVD. Step 2: with R_FS known,
-    R_BF t_FS - target = -(t_BF + R_BF R_FS x_S) is linear in t_FS and target.
+    Step 1 is that of `li_rotation` for all pairs of poses with the same orientation, step 2 `li_translation`.
 
     Parameters
     ----------
@@ -129,27 +201,80 @@ def li_two_step(T_BF, x_S, max_turn_deg=0.01):
             "step 1 needs the robot to translate without turning"
         )
     p, q = p[same], q[same]
-    seen = x_S[q] - x_S[p]
     moved = (np.swapaxes(R[p], 1, 2) @ (t[p] - t[q])[..., None])[..., 0]
-    values = np.linalg.svd(moved, compute_uv=False)
-    if len(values) < 2 or values[1] <= MIN_SPREAD * values[0]:
-        raise ValueError("the translations must not all lie along one line: the rotation about it stays free")
-    R_FS = nearest_rotation(moved.T @ seen)
-    design = np.concatenate([R, np.tile(-np.eye(3), (len(R), 1, 1))], axis=2).reshape(-1, 6)
-    right = -(t + (R @ (x_S @ R_FS.T)[..., None])[..., 0])
-    u, _, rank, _ = np.linalg.lstsq(design, right.ravel(), rcond=1e-9)
-    if rank < 6:
-        raise ValueError(f"the rotations must turn about two axes: step 2 has rank {rank}, not 6")
-    T_FS = np.eye(4)
-    T_FS[:3, :3], T_FS[:3, 3] = R_FS, u[:3]
-    return T_FS, u[3:]
+    R_FS = _fitted_rotation(moved, x_S[q] - x_S[p])
+    t_FS, target = li_translation(T_BF, x_S, R_FS)
+    return pose(R_FS, t_FS), target
 
 
-def compare_methods(repeats, std, rng):
-    """Errors of the literature's methods and of the joint fit, on simulated poses that suit all of them.
+@dataclass(frozen=True, eq=False)
+class SuitableScene:
+    """Poses that suit the methods of the literature as well, and what is seen in them.
 
-    Each repeat draws a scanner, twelve poses turned about all axes and four that only translate the first, with a
-    sphere in the scanner's field; Kim's method gets the eight corners of a 60 mm cube in place of the sphere.
+    Attributes
+    ----------
+    T_FS : array, shape (4, 4)
+        The true scanner (mm).
+    target : array, shape (3,)
+        The true sphere, and the middle of the cube (mm).
+    T_BF : array, shape (16, 4, 4)
+        Twelve poses turned about all axes, and four that only translate the first.
+    x_S : array, shape (16, 3)
+        The sphere's center as measured (mm).
+    cube_S : array, shape (16, 8, 3)
+        The corners of a cube as measured (mm).
+    cube_W : array, shape (8, 3)
+        The same corners in the cube's own frame (mm).
+    """
+
+    T_FS: np.ndarray
+    target: np.ndarray
+    T_BF: np.ndarray
+    x_S: np.ndarray
+    cube_S: np.ndarray
+    cube_W: np.ndarray
+
+    @property
+    def translated(self):
+        """Numbers of the poses that share one orientation."""
+        return np.array([0, 12, 13, 14, 15])
+
+
+def suitable_scene(std, rng):
+    """A random scanner, a sphere and a 60 mm cube, seen from poses that suit all methods.
+
+    Parameters
+    ----------
+    std : float
+        Noise of each coordinate (mm).
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    SuitableScene
+    """
+    std = as_positive_number(std, "std")
+    T_FS, target = pose(exp_so3(rng.uniform(-1, 1, 3)), rng.uniform(-100, 100, 3)), rng.uniform(-500, 500, 3)
+    places = np.column_stack([rng.uniform(-25, 25, 12), rng.uniform(-20, 20, 12), rng.uniform(190, 290, 12)])
+    T_BF = poses_that_see(T_FS, target, exp_so3(rng.uniform(-1, 1, (12, 3))), places)
+    shifts = np.concatenate([30 * np.eye(3), [[-30.0, 20.0, 10.0]]])
+    T_BF = np.concatenate([T_BF, T_BF[:1] @ pose(np.tile(np.eye(3), (4, 1, 1)), shifts)])
+    exact = transform(invert(T_FS), transform(invert(T_BF), target))
+    seen = exact + std * rng.normal(size=exact.shape)
+    cube = transform(invert(T_BF @ T_FS)[:, None], CUBE + target)
+    return SuitableScene(T_FS, target, T_BF, seen, cube + std * rng.normal(size=cube.shape), CUBE)
+
+
+METHODS = {
+    "joint fit (sphere)": lambda scene: calibrate_sphere_target(scene.T_BF, scene.x_S).T_FS,
+    "linear start (sphere)": lambda scene: linear_start(scene.T_BF, scene.x_S)[0],
+    "Li et al. (sphere)": lambda scene: li_two_step(scene.T_BF, scene.x_S)[0],
+    "Kim, Cho, Kim (cube)": lambda scene: kim_linear(scene.T_BF, scene.cube_S, scene.cube_W),
+}
+
+
+def compare_methods(repeats, std, rng, methods=METHODS):
+    """Errors of several methods on scenes that suit all of them, and the bound for one sphere.
 
     Parameters
     ----------
@@ -157,6 +282,8 @@ def compare_methods(repeats, std, rng):
     std : float
         Noise of each coordinate (mm).
     rng : numpy.random.Generator
+    methods : dict, optional
+        {name: function of a `SuitableScene` that returns T_FS}; those of the literature and the joint fit by default.
 
     Returns
     -------
@@ -166,25 +293,11 @@ def compare_methods(repeats, std, rng):
         The Cramer-Rao bound of one sphere (mm), rms over the repeats.
     """
     repeats, std = as_count(repeats, "repeats"), as_positive_number(std, "std")
-    errors, bounds = {}, []
-    corners = 60.0 * (np.indices((2, 2, 2)).reshape(3, 8).T - 0.5)
+    squares, bounds = {name: [] for name in methods}, []
     for _ in range(repeats):
-        T_FS, target = pose(exp_so3(rng.uniform(-1, 1, 3)), rng.uniform(-100, 100, 3)), rng.uniform(-500, 500, 3)
-        places = np.column_stack([rng.uniform(-25, 25, 12), rng.uniform(-20, 20, 12), rng.uniform(190, 290, 12)])
-        T_BF = poses_that_see(T_FS, target, exp_so3(rng.uniform(-1, 1, (12, 3))), places)
-        shifts = np.concatenate([30 * np.eye(3), [[-30.0, 20.0, 10.0]]])
-        T_BF = np.concatenate([T_BF, T_BF[:1] @ pose(np.tile(np.eye(3), (4, 1, 1)), shifts)])
-        exact = transform(invert(T_FS), transform(invert(T_BF), target))
-        seen = exact + std * rng.normal(size=exact.shape)
-        cube = transform(invert(T_BF @ T_FS)[:, None], corners + target)
-        cube = cube + std * rng.normal(size=cube.shape)
-        found = {
-            "joint fit (sphere)": calibrate_sphere_target(T_BF, seen).T_FS,
-            "linear start (sphere)": linear_start(T_BF, seen)[0],
-            "Li et al. (sphere)": li_two_step(T_BF, seen)[0],
-            "Kim, Cho, Kim (cube)": kim_linear(T_BF, cube, corners),
-        }
-        for name, T in found.items():
-            errors.setdefault(name, []).append(np.linalg.norm(T[:3, 3] - T_FS[:3, 3]))
-        bounds.append(np.trace(predicted_sphere_covariance(T_BF, T_FS, target, std)[3:6, 3:6]))
-    return {name: float(np.sqrt(np.mean(np.square(e)))) for name, e in errors.items()}, float(np.sqrt(np.mean(bounds)))
+        scene = suitable_scene(std, rng)
+        for name, method in methods.items():
+            squares[name].append(((method(scene)[:3, 3] - scene.T_FS[:3, 3]) ** 2).sum())
+        covariance = predicted_sphere_covariance(scene.T_BF, scene.T_FS, scene.target, std)
+        bounds.append(np.trace(covariance[3:6, 3:6]))
+    return {name: float(np.sqrt(np.mean(square))) for name, square in squares.items()}, float(np.sqrt(np.mean(bounds)))

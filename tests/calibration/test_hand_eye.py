@@ -5,8 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
-from labkit.calibration import hand_eye, planning
+from labkit.calibration import hand_eye, literature, planning
 from labkit.calibration.literature import compare_methods, kim_linear, kim_matrix, li_two_step
 from labkit.calibration.robust import tukey_weights
 from labkit.documents.thesis import printed as thesis
@@ -264,6 +265,35 @@ def test_kim_matrix_is_the_printed_one():
     np.testing.assert_allclose(
         D[0, :6], [A[0, 0] - B[0, 0], -B[1, 0], -B[2, 0], -B[3, 0], A[0, 1], 0]
     )  # first row of appendix A
+
+
+def test_the_two_steps_of_li_one_by_one():
+    scene = literature.suitable_scene(1e-9, np.random.default_rng(3))
+    same = scene.translated
+    R_FS = literature.li_rotation(scene.T_BF[same], scene.x_S[same])
+    aligned = Rotation.align_vectors(-np.diff(scene.T_BF[same, :3, 3], axis=0) @ scene.T_BF[0, :3, :3],
+                                     np.diff(scene.x_S[same], axis=0))[0].as_matrix()  # fmt: skip
+    assert pytest.approx(aligned, abs=1e-8) == R_FS and pytest.approx(scene.T_FS[:3, :3], abs=1e-8) == R_FS
+    t_FS, target = literature.li_translation(scene.T_BF, scene.x_S, R_FS)
+    assert t_FS == pytest.approx(scene.T_FS[:3, 3], abs=1e-6) and target == pytest.approx(scene.target, abs=1e-6)
+    with pytest.raises(ValueError, match="one line"):
+        literature.li_rotation(scene.T_BF[[0, 12]], scene.x_S[[0, 12]])
+    with pytest.raises(ValueError, match="two axes"):
+        literature.li_translation(scene.T_BF[same], scene.x_S[same], R_FS)
+
+
+def test_the_printed_sign_of_2_41_gives_no_scanner():
+    """R_0 R_s (X_l2 - X_l1) = T_02 - T_01 holds for no pose: with the sign reversed it holds for all."""
+    scene = literature.suitable_scene(1e-9, np.random.default_rng(5))
+    p, q = scene.translated[:2]
+    seen = scene.T_BF[p, :3, :3] @ scene.T_FS[:3, :3] @ (scene.x_S[q] - scene.x_S[p])
+    moved = scene.T_BF[q, :3, 3] - scene.T_BF[p, :3, 3]
+    assert seen == pytest.approx(-moved, abs=1e-6) and np.linalg.norm(seen - moved) > 10
+
+
+def test_methods_of_ones_own_are_compared_as_well():
+    found, bound = literature.compare_methods(3, 0.1, np.random.default_rng(0), {"truth": lambda scene: scene.T_FS})
+    assert found == {"truth": 0.0} and bound > 0.1
 
 
 def test_li_two_steps_and_their_missing_motion():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labkit.chapters.ch04_optimization import descent
+from labkit.chapters.ch04_optimization import beyond
 from labkit.chapters.ch04_optimization.exercises import CHAPTER
 from labkit.documents.thesis import wells
 from labkit.estimation import optimization as opt
@@ -116,7 +116,7 @@ def test_the_loop_of_the_exercise_is_the_librarys_trust_region(seed):
     for draw in ITEMS["trust_region"].cases:
         residual, jacobian, x, radius, steps = draw(np.random.default_rng(seed))
         trace = opt.trust_region(residual, jacobian, x, radius=radius, max_iterations=steps, stop=lambda *_: "")
-        found, last = descent.trust_region(residual, jacobian, x, radius, steps)
+        found, last = beyond.trust_region(residual, jacobian, x, radius, steps)
         assert found == pytest.approx(trace.solution, abs=1e-9)
         longer = opt.trust_region(residual, jacobian, x, radius=radius, max_iterations=steps + 1, stop=lambda *_: "")
         inside = np.linalg.norm(longer.step[-1]) < 0.999 * last
@@ -129,13 +129,13 @@ def test_the_bare_dogleg_is_the_librarys():
         n = int(rng.integers(2, 5))
         A, g = rng.normal(size=(n + 1, n)), rng.normal(size=n)
         radius = float(rng.uniform(0.05, 3))
-        assert descent.bare_dogleg(g, A.T @ A, radius) == pytest.approx(opt.dogleg_step(g, A.T @ A, radius), abs=1e-9)
+        assert beyond.bare_dogleg(g, A.T @ A, radius) == pytest.approx(opt.dogleg_step(g, A.T @ A, radius), abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_gradient_by_smaller_steps_is_not_the_central_difference_asked_for(seed):
     def richardson(f, x, h):
-        wide, narrow = (descent.measured_gradient(f, x, step) for step in (h, h / 2))
+        wide, narrow = (beyond.measured_gradient(f, x, step) for step in (h, h / 2))
         return (4 * narrow - wide) / 3
 
     assert judged("measured_gradient", richardson, seed).status == NOT_YET
@@ -154,5 +154,5 @@ def test_a_chord_is_judged_however_it_is_walked(seed):
 
 
 def test_the_tipping_weight_draws_level():
-    w = descent.tipping_weight()
+    w = beyond.tipping_weight()
     assert 9 + 8 + 6 + 3 * w == pytest.approx(3 + 3 + 8 + 8 * w)

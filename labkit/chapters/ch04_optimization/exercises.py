@@ -9,7 +9,7 @@ from ...estimation import convexity
 from ...estimation import optimization as opt
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
-from . import descent
+from . import beyond
 
 
 def place(rng, within=3.0):
@@ -390,8 +390,8 @@ CHAPTER = Chapter(
         ),
         Exercise(
             "measured_gradient",
-            reference=descent.measured_gradient,
-            draw=descent.function_and_step,
+            reference=beyond.measured_gradient,
+            draw=beyond.function_and_step,
             metric=metrics.Numbers(1e-9),
             hints=(
                 "Move one unknown at a time, a step to each side, and leave the others where they are.",
@@ -400,42 +400,42 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(
-                    descent.differences(lambda f, x, e, h: (f(x + e) - f(x)) / h),
+                    beyond.differences(lambda f, x, e, h: (f(x + e) - f(x)) / h),
                     "These are forward differences, off by ½h times the curvature. Step to both sides: f(x + h e) − f(x − h e).",
                     id="measured-forward",
                 ),
                 Mistake(
-                    descent.differences(lambda f, x, e, h: (f(x) - f(x - e)) / h),
+                    beyond.differences(lambda f, x, e, h: (f(x) - f(x - e)) / h),
                     "These are backward differences, off by ½h times the curvature. Step to both sides: f(x + h e) − f(x − h e).",
                     id="measured-backward",
                 ),
                 Mistake(
-                    descent.differences(lambda f, x, e, h: (f(x + e) - f(x - e)) / h),
+                    beyond.differences(lambda f, x, e, h: (f(x + e) - f(x - e)) / h),
                     "Twice too large: the two places are 2h apart.",
                     id="measured-twice",
                 ),
                 Mistake(
-                    descent.differences(lambda f, x, e, h: (f(x + e) - f(x - e)) / 2 * h),
+                    beyond.differences(lambda f, x, e, h: (f(x + e) - f(x - e)) / 2 * h),
                     "`/ 2 * h` divides by 2 and then multiplies by h: write `/ (2 * h)`.",
                     id="measured-times-h",
                 ),
                 Mistake(
-                    descent.differences(lambda f, x, e, h: f(x + e) - f(x - e)),
+                    beyond.differences(lambda f, x, e, h: f(x + e) - f(x - e)),
                     "These are differences, not slopes: divide by the distance of the two places, 2h.",
                     id="measured-undivided",
                 ),
                 Mistake(
-                    descent.differences(lambda f, x, e, h: (f(x + e / 2) - f(x - e / 2)) / h),
+                    beyond.differences(lambda f, x, e, h: (f(x + e / 2) - f(x - e / 2)) / h),
                     "You go half a step to each side. That is a central difference too, with the step ½h: take h.",
                     id="measured-half-step",
                 ),
                 Mistake(
-                    descent.differences(lambda f, x, e, h: (f(x - e) - f(x + e)) / (2 * h)),
+                    beyond.differences(lambda f, x, e, h: (f(x - e) - f(x + e)) / (2 * h)),
                     "The sign is reversed: ahead minus behind.",
                     id="measured-sign",
                 ),
                 Mistake(
-                    descent.differences(lambda f, x, e, h: (f(x + e) - 2 * f(x) + f(x - e)) / h**2),
+                    beyond.differences(lambda f, x, e, h: (f(x + e) - 2 * f(x) + f(x - e)) / h**2),
                     "That is the second difference, the curvature along each axis. The slope is (ahead − behind) / (2h).",
                     id="measured-second",
                 ),
@@ -445,7 +445,7 @@ CHAPTER = Chapter(
                     id="measured-all",
                 ),
                 Mistake(
-                    descent.not_put_back,
+                    beyond.not_put_back,
                     "Only the first component is right: put each unknown back before you move the next one.",
                     id="measured-not-restored",
                 ),
@@ -760,9 +760,9 @@ CHAPTER = Chapter(
             "rise_above_chord",
             reference=convexity.rise_above_chord,
             draw=(
-                functools.partial(descent.hilly, falls=True),
-                descent.bowl,
-                functools.partial(descent.hilly, falls=False),
+                functools.partial(beyond.hilly, falls=True),
+                beyond.bowl,
+                functools.partial(beyond.hilly, falls=False),
             ),
             metric=metrics.Numbers(1e-9),
             hints=(
@@ -773,17 +773,17 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(
-                    descent.chords(lambda t, v, c: (v - c[::-1]).max()),
+                    beyond.chords(lambda t, v, c: (v - c[::-1]).max()),
                     "Your chord has its ends exchanged: at share t the place is (1 − t) x + t y, and its height (1 − t) f(x) + t f(y).",
                     id="chord-ends",
                 ),
                 Mistake(
-                    descent.chords(lambda t, v, c: (c - v).max()),
+                    beyond.chords(lambda t, v, c: (c - v).max()),
                     "That is how far f sags below its chord. It should do that; asked for is how far it rises above, f − chord.",
                     id="chord-below",
                 ),
                 Mistake(
-                    descent.chords(lambda t, v, c: abs(v - c).max()),
+                    beyond.chords(lambda t, v, c: abs(v - c).max()),
                     "Without its sign the difference also counts where f lies below its chord, and there it may: no absolute value.",
                     id="chord-absolute",
                 ),
@@ -798,32 +798,32 @@ CHAPTER = Chapter(
                     id="chord-middle-signed",
                 ),
                 Mistake(
-                    descent.chords(lambda t, v, c: (v - c).mean()),
+                    beyond.chords(lambda t, v, c: (v - c).mean()),
                     "That is the mean difference, in which rising and sagging cancel: take the largest.",
                     id="chord-mean",
                 ),
                 Mistake(
-                    descent.chords(lambda t, v, c: (v - max(v[0], v[-1])).max()),
+                    beyond.chords(lambda t, v, c: (v - max(v[0], v[-1])).max()),
                     "You compare with the higher end. The chord is the straight line between both ends.",
                     id="chord-higher-end",
                 ),
                 Mistake(
-                    descent.chords(lambda t, v, c: (v - v[0]).max()),
+                    beyond.chords(lambda t, v, c: (v - v[0]).max()),
                     "You compare with f(x) alone. The chord goes on to f(y): (1 − t) f(x) + t f(y).",
                     id="chord-first-end",
                 ),
                 Mistake(
-                    descent.chords(lambda t, v, c: v.max()),
+                    beyond.chords(lambda t, v, c: v.max()),
                     "That is the highest value of f on the way: subtract the chord at each place first.",
                     id="chord-highest",
                 ),
                 Mistake(
-                    descent.chords(lambda t, v, c: (v - c)[1:-1].max()),
+                    beyond.chords(lambda t, v, c: (v - c)[1:-1].max()),
                     "Both ends count among the n places: f and chord meet there, so that the rise is never below 0.",
                     id="chord-inside",
                 ),
                 Mistake(
-                    descent.chords(lambda t, v, c: t[np.argmax(v - c)]),
+                    beyond.chords(lambda t, v, c: t[np.argmax(v - c)]),
                     "That is the share t at which f rises most: return the rise there.",
                     id="chord-share",
                 ),
@@ -1114,8 +1114,8 @@ CHAPTER = Chapter(
         ),
         Exercise(
             "trust_region",
-            reference=descent.trust_region,
-            draw=descent.RUNS,
+            reference=beyond.trust_region,
+            draw=beyond.RUNS,
             metric=metrics.Several(metrics.Numbers(1e-7), metrics.Numbers(1e-7), names=("x", "radius")),
             draws=4,
             hints=(
@@ -1129,81 +1129,81 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(
-                    descent.loop(keep=lambda rho: True),
+                    beyond.loop(keep=lambda rho: True),
                     "You take every step. Where ρ is not above 0.1 the step is taken back: x stays, and only the radius changes.",
                     id="region-always",
                 ),
                 Mistake(
-                    descent.loop(keep=lambda rho: rho > 0),
+                    beyond.loop(keep=lambda rho: rho > 0),
                     "You take every step that lowers the cost. The rule asks for more: ρ > 0.1.",
                     id="region-any-decrease",
                 ),
                 Mistake(
-                    descent.loop(keep=lambda rho: rho > descent.POOR),
+                    beyond.loop(keep=lambda rho: rho > beyond.POOR),
                     "You take a step only above ¼. Between 0.1 and ¼ it is taken, and the radius shrinks all the same.",
                     id="region-quarter",
                 ),
                 Mistake(
-                    descent.loop(follow=lambda radius, length, rho: radius),
+                    beyond.loop(follow=lambda radius, length, rho: radius),
                     "Your radius never changes: a quarter of the step's length below ¼, twice the radius above ¾ at the rim.",
                     id="region-fixed",
                 ),
                 Mistake(
-                    descent.loop(
+                    beyond.loop(
                         follow=lambda radius, length, rho: (
-                            radius / 4 if rho < descent.POOR else descent.rule(radius, length, rho)
+                            radius / 4 if rho < beyond.POOR else beyond.rule(radius, length, rho)
                         )
                     ),
                     "After a poor step the radius becomes a quarter of the step's length. A quarter of the radius may still be longer than that step.",
                     id="region-quarter-of-radius",
                 ),
                 Mistake(
-                    descent.loop(
+                    beyond.loop(
                         follow=lambda radius, length, rho: (
-                            length / 4 if rho < descent.POOR else 2 * radius if rho > descent.GOOD else radius
+                            length / 4 if rho < beyond.POOR else 2 * radius if rho > beyond.GOOD else radius
                         )
                     ),
                     "You double the radius after every good step. A step that ended inside says nothing about the rim: ask for its length as well.",
                     id="region-no-rim",
                 ),
                 Mistake(
-                    descent.loop(
+                    beyond.loop(
                         follow=lambda radius, length, rho: (
-                            length / 4 if rho < descent.ACCEPT else descent.rule(radius, length, max(rho, descent.POOR))
+                            length / 4 if rho < beyond.ACCEPT else beyond.rule(radius, length, max(rho, beyond.POOR))
                         )
                     ),
                     "Your radius shrinks only where the step is taken back. It shrinks below ¼, after steps that were taken too.",
                     id="region-shrinks-late",
                 ),
                 Mistake(
-                    descent.loop(weight=1.0),
+                    beyond.loop(weight=1.0),
                     "Your gain ratios are twice too large: g = Jᵀr and B = JᵀJ belong to the cost ½ rᵀr. Hand `gain_ratio` half of r @ r.",
                     id="region-cost",
                 ),
                 Mistake(
-                    descent.loop(stale=True),
+                    beyond.loop(stale=True),
                     "J is computed once, at the start. It belongs to where you stand: compute it in every round.",
                     id="region-stale",
                 ),
                 Mistake(
-                    descent.loop(step_of=opt.cauchy_step),
+                    beyond.loop(step_of=opt.cauchy_step),
                     "Your steps end at the Cauchy point, on the way down the gradient. Take `dogleg_step`, both legs.",
                     id="region-cauchy",
                 ),
                 Mistake(
-                    descent.loop(step_of=lambda g, B, radius: opt.newton_step(g, B)),
+                    beyond.loop(step_of=lambda g, B, radius: opt.newton_step(g, B)),
                     "Your steps ignore the radius: take `dogleg_step(g, B, radius)`.",
                     id="region-newton",
                 ),
                 Mistake(
-                    lambda residual, jacobian, x, radius, steps: descent.descend(
+                    lambda residual, jacobian, x, radius, steps: beyond.descend(
                         residual, jacobian, x, radius, steps + 1
                     ),
                     "You try one step too many: `steps` counts those taken back as well.",
                     id="region-one-more",
                 ),
                 Mistake(
-                    lambda residual, jacobian, x, radius, steps: descent.descend(residual, jacobian, x, radius, 1),
+                    lambda residual, jacobian, x, radius, steps: beyond.descend(residual, jacobian, x, radius, 1),
                     "This is where the first round ends: is the `return` inside the loop?",
                     id="region-one-round",
                 ),
@@ -1265,7 +1265,7 @@ CHAPTER = Chapter(
         ),
         Value(
             "tipping_weight",
-            reference=descent.tipping_weight,
+            reference=beyond.tipping_weight,
             rtol=2e-3,
             hints=(
                 "Write both sums with w in front of the last criterion; the first three count once.",
@@ -1274,27 +1274,27 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(
-                    lambda: descent.tipping_weight() - 1,
+                    lambda: beyond.tipping_weight() - 1,
                     "That is by how much the weight must grow. Asked for is the weight itself, 1 in the printed sum.",
                     id="tipping-growth",
                 ),
                 Mistake(
-                    lambda: 1 / descent.tipping_weight(),
+                    lambda: 1 / beyond.tipping_weight(),
                     "Upside down: that is the weight of the other three, when solving counts once.",
                     id="tipping-inverse",
                 ),
                 Mistake(
-                    lambda: descent.tipping_weight("sphere", "laser tracker"),
+                    lambda: beyond.tipping_weight("sphere", "laser tracker"),
                     "That is where the laser tracker draws level with the sphere. Asked for is the cube.",
                     id="tipping-tracker",
                 ),
                 Mistake(
-                    lambda: descent.tipping_weight(criteria=(2, 3)),
+                    lambda: beyond.tipping_weight(criteria=(2, 3)),
                     "You weighted taking the data as well. Only solving, the last criterion, counts w times.",
                     id="tipping-both",
                 ),
                 Mistake(
-                    lambda: descent.tipping_weight(criteria=(2,)),
+                    lambda: beyond.tipping_weight(criteria=(2,)),
                     "You weighted taking the data, the third criterion. Solving is the last one.",
                     id="tipping-third",
                 ),

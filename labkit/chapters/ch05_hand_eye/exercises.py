@@ -15,6 +15,7 @@ from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
 from ...geometry import frames, lie
 from ...geometry.chaining import orthonormality_error
 from ...geometry.lie import exp_so3, skew
+from . import beyond
 
 POSE, POINT = "a pose is always 4 x 4", "a point is always three numbers"
 SUBSTITUTES = {("C14", 12, "A_deg"): ("C14", 12, "C_deg")}  # only A - C counts there: either answer is right
@@ -1038,6 +1039,14 @@ CHAPTER = Chapter(
                 "return planning.poses_that_see(T_FS, target, exp_so3(turns) @ np.diag([1, -1, -1]) @ T_FS[:3, :3].T, x_S)`",
             ),
         ),
+        Prediction(
+            "price_of_two_steps",
+            question="Li's method fits the rotation first and then the translation, from the same sixteen poses as the joint fit. How much larger are its errors of the translation?",
+            choices=("hardly", "about three times", "about thirty times"),
+            answer="about three times",
+            why="Step 1 hears only the five poses of one orientation, and what it errs is multiplied by the distance of the sphere in step 2. The joint fit lets all poses speak on both.",
+        ),
+        *beyond.LITERATURE,
     ],
 )  # fmt: skip
 

@@ -1,0 +1,319 @@
+"""Exercises of chapter 5 on the methods of Li et al. and of Kim, Cho, Kim: draws, wrong variants, texts."""
+
+import functools
+
+import numpy as np
+
+from ...calibration import literature
+from ...calibration.planning import poses_that_see
+from ...exercises import metrics
+from ...exercises.engine import Exercise, Mistake
+from ...geometry import frames
+from ...geometry.lie import exp_so3, nearest_rotation
+
+POSE, ROTATION = "a pose is always 4 x 4", "a rotation is always 3 x 3"
+
+# --- draws ---
+
+
+def scanner(rng):
+    """Some scanner on the flange, and where the sphere is."""
+    T_FS = frames.pose(
+        exp_so3(rng.uniform(0.5, 2.5) * frames.unit_vector(rng.normal(size=3))), rng.uniform(-150, 150, 3)
+    )
+    return T_FS, rng.uniform(-900, 900, 3)
+
+
+def translated_poses(rng, directions=3, std=0.0):
+    """Poses of one orientation, shifted in so many directions, and the sphere as each sees it."""
+    T_FS, target = scanner(rng)
+    n = int(rng.integers(directions + 1, 9))
+    shifts = rng.uniform(-40, 40, (n, directions)) @ np.linalg.qr(rng.normal(size=(3, 3)))[0][:directions]
+    T_BF = poses_that_see(T_FS, target, exp_so3(rng.uniform(-1.5, 1.5, 3))[None], np.array([[0.0, 0.0, 240.0]]))
+    T_BF = T_BF @ frames.pose(np.tile(np.eye(3), (n, 1, 1)), shifts)
+    return T_BF, seen_from(T_BF, T_FS, target) + std * rng.normal(size=(n, 3))
+
+
+def nearly_in_a_plane(rng):
+    """Noisy poses shifted nearly in one plane, whose sum of outer products has a negative determinant: without a look at
+    it the nearest orthogonal matrix is a reflection.
+    """
+    while True:
+        T_BF, x_S = translated_poses(rng, directions=2, std=0.05)
+        T_BF[:, :3, 3] += 0.05 * rng.normal(size=(len(x_S), 3))
+        M = _rotation(lambda R, t, x: (-t @ R).T @ x)(T_BF, x_S)
+        values = np.linalg.svd(M, compute_uv=False)
+        if np.linalg.det(M) < 0 and values[2] > 1e-9 * values[0]:
+            return T_BF, x_S
+
+
+def turned_poses(rng):
+    """Poses that turn about all axes, the sphere as each sees it, and the scanner's rotation."""
+    T_FS, target = scanner(rng)
+    n = int(rng.integers(4, 10))
+    x_S = np.column_stack([rng.uniform(-25, 25, n), rng.uniform(-20, 20, n), rng.uniform(190, 290, n)])
+    return poses_that_see(T_FS, target, exp_so3(rng.uniform(-1.2, 1.2, (n, 3))), x_S), x_S, T_FS[:3, :3].copy()
+
+
+def seen_from(T_BF, T_FS, target):
+    return frames.transform(frames.invert(T_FS), frames.transform(frames.invert(T_BF), target))
+
+
+def two_motions(rng):
+    """A motion of the flange and the same motion of the scanner."""
+    X, A = (frames.pose(exp_so3(rng.uniform(-1, 1, 3)), rng.uniform(-2, 2, 3)) for _ in range(2))
+    return A, frames.invert(X) @ A @ X
+
+
+# --- wrong variants ---
+
+
+def _rotation(change):
+    """The fit of moved to seen shifts with something else for one of them, or for what is made of their product."""
+
+    def variant(T_BF, x_S):
+        return change(T_BF[0, :3, :3], T_BF[:, :3, 3] - T_BF[:, :3, 3].mean(0), x_S - x_S.mean(0))
+
+    return variant
+
+
+def _without_det(R, t, x):
+    U, _, Vt = np.linalg.svd(-(t @ R).T @ x)
+    return U @ Vt
+
+
+def _fit(moved, seen):
+    return nearest_rotation(moved.T @ seen)
+
+
+def _translation(right=None, unknown=None, arrange=lambda u: (u[:3], u[3:])):
+    """Step 2 with another right side, another matrix, or what is found arranged otherwise."""
+
+    def variant(T_BF, x_S, R_FS):
+        R, t = T_BF[:, :3, :3], T_BF[:, :3, 3]
+        arm = (R @ (x_S @ R_FS.T)[..., None])[..., 0]
+        design = unknown(R) if unknown else np.concatenate([R, np.tile(-np.eye(3), (len(R), 1, 1))], 2)
+        b = right(R, t, arm, x_S, R_FS) if right else -(t + arm)
+        return arrange(np.linalg.lstsq(design.reshape(-1, 6), b.ravel(), rcond=None)[0])
+
+    return variant
+
+
+def _kim(left, right, F):
+    """D = left - right and F, from A and B."""
+    return lambda A, B: (left(A) - right(B), F(A))
+
+
+def _rows(A):
+    return np.kron(A[:3, :3], np.eye(4))
+
+
+def _turned_back(B):
+    return np.kron(np.eye(3), B.T)
+
+
+def _moved(A, sign=-1.0):
+    F = np.zeros((3, 4))
+    F[:, 3] = sign * A[:3, 3]
+    return F.ravel()
+
+
+def _by_columns(A, B):
+    """The same equations for the columns of X one after another."""
+    order = np.arange(12).reshape(3, 4).T.ravel()
+    D, F = literature.kim_matrix(A, B)
+    return D[np.ix_(order, order)], F[order]
+
+
+LITERATURE = [
+    Exercise(
+        "li_rotation",
+        reference=literature.li_rotation,
+        draw=(translated_poses, functools.partial(translated_poses, directions=2)),
+        metric=metrics.Rotations(1e-6),
+        noisy=(
+            (functools.partial(translated_poses, std=0.01), metrics.Rotations(0.2)),
+            (
+                nearly_in_a_plane,
+                metrics.Rotations(1.0),
+                "right where the moves fill space; where they lie nearly in a plane",
+            ),
+        ),
+        hints=(
+            "Subtract the equations of two poses: target and t_FS drop out, and R_FS alone is left.",
+            "In the flange's frame it reads R_FS (x_q − x_p) = −R_BFᵀ (t_q − t_p). Sum the outer products (right side)(left side)ᵀ over all poses, both "
+            "sides taken from their means, and take the nearest rotation.",
+            "`R_BF = T_BF[0, :3, :3]\nseen = x_S - x_S.mean(axis=0)\nmoved = -(T_BF[:, :3, 3] - T_BF[:, :3, 3].mean(axis=0)) @ R_BF\n"
+            "return nearest_rotation(moved.T @ seen)`",
+        ),
+        mistakes=[
+            Mistake(
+                _rotation(lambda R, t, x: _fit(t @ R, x)),
+                "You took (2-41) as it is printed. If the flange moves one way, the sphere moves the other way in the scanner: the right side is T_01 − T_02.",
+                id="li-sign",
+            ),
+            Mistake(
+                _rotation(lambda R, t, x: _fit(-t, x)),
+                "This is R_BF R_FS: the robot's orientation is still in it. Bring the moves of the flange into its own frame, R_BFᵀ (t_p − t_q).",
+                id="li-in-base",
+            ),
+            Mistake(
+                _rotation(lambda R, t, x: _fit(-t @ R.T, x)),
+                "You turned the moves by R_BF. They are given in the base: R_BFᵀ brings them into the flange.",
+                id="li-untransposed",
+            ),
+            Mistake(
+                _rotation(lambda R, t, x: _fit(-t @ R, x).T),
+                "This is the transpose: it turns from the flange into the scanner. Sum (moved)(seen)ᵀ, not (seen)(moved)ᵀ.",
+                id="li-transposed",
+            ),
+            Mistake(
+                _rotation(_without_det),
+                "Where all moves lie in one plane, U Vᵀ can be a reflection. `nearest_rotation` looks at the determinant.",
+                id="li-reflection",
+            ),
+            Mistake(
+                _rotation(lambda R, t, x: (-t @ R).T @ x),
+                "The sum of the outer products is no rotation yet: take the nearest one.",
+                id="li-sum",
+            ),
+            Mistake(
+                lambda T, x: _fit(-T[:, :3, 3] @ T[0, :3, :3], x),
+                "You used positions. Only their differences tell of R_FS: take both sides from their means.",
+                id="li-positions",
+            ),
+            Mistake(
+                lambda T, x: _fit(-(T[1:2, :3, 3] - T[:1, :3, 3]) @ T[0, :3, :3], x[1:2] - x[:1]),
+                "One move leaves the turn about its direction free. Use all poses.",
+                id="li-one-move",
+            ),
+        ],
+    ),
+    Exercise(
+        "li_translation",
+        reference=literature.li_translation,
+        draw=turned_poses,
+        fixed={"R_FS": ROTATION},
+        metric=metrics.Several(metrics.Numbers(1e-6, "mm"), metrics.Numbers(1e-6, "mm"), names=("t_FS", "target")),
+        hints=(
+            "With R_FS known, (2-40) is linear in what is left: t_FS and the target, six numbers.",
+            "Each pose gives R_BF t_FS − target = −(t_BF + R_BF R_FS x_S), three rows: R_BF beside −I.",
+            "`R, t = T_BF[:, :3, :3], T_BF[:, :3, 3]\nrows = np.vstack([np.hstack([R_i, -np.eye(3)]) for R_i in R])\n"
+            "right = np.concatenate([-(t_i + R_i @ R_FS @ x) for R_i, t_i, x in zip(R, t, x_S)])\n"
+            "u = np.linalg.lstsq(rows, right, rcond=None)[0]\nreturn u[:3], u[3:]`",
+        ),
+        mistakes=[
+            Mistake(
+                _translation(right=lambda R, t, arm, x, R_FS: t + arm),
+                "Both results have the wrong sign: t_BF and R_BF R_FS x_S go to the right side with a minus.",
+                id="step2-sign",
+            ),
+            Mistake(
+                _translation(right=lambda R, t, arm, x, R_FS: -t),
+                "The sphere as the scanner sees it is missing: the right side is −(t_BF + R_BF R_FS x_S).",
+                id="step2-no-sphere",
+            ),
+            Mistake(
+                _translation(right=lambda R, t, arm, x, R_FS: -arm),
+                "The flange's own position is missing: the right side is −(t_BF + R_BF R_FS x_S).",
+                id="step2-no-flange",
+            ),
+            Mistake(
+                _translation(right=lambda R, t, arm, x, R_FS: arm - t),
+                "t_BF and R_BF R_FS x_S go to the right side together, both with a minus.",
+                id="step2-one-sign",
+            ),
+            Mistake(
+                _translation(right=lambda R, t, arm, x, R_FS: -(t + x @ R_FS.T)),
+                "R_FS x_S is written in the flange. R_BF brings it into the base.",
+                id="step2-in-flange",
+            ),
+            Mistake(
+                _translation(right=lambda R, t, arm, x, R_FS: -(t + (R @ x[..., None])[..., 0])),
+                "x_S is written in the scanner: R_FS is missing between R_BF and x_S.",
+                id="step2-no-rotation",
+            ),
+            Mistake(
+                _translation(right=lambda R, t, arm, x, R_FS: -(t + (R @ (x @ R_FS)[..., None])[..., 0])),
+                "R_FS enters transposed: `x_S @ R_FS` turns the rows back. Write `R_FS @ x` for one, `x_S @ R_FS.T` for all.",
+                id="step2-transposed",
+            ),
+            Mistake(
+                _translation(
+                    unknown=lambda R: np.concatenate([np.swapaxes(R, 1, 2), np.tile(-np.eye(3), (len(R), 1, 1))], 2)
+                ),
+                "Your rows hold R_BFᵀ. t_FS is written in the flange, and R_BF brings it into the base.",
+                id="step2-rows",
+            ),
+            Mistake(
+                _translation(arrange=lambda u: (u[:3], -u[3:])),
+                "The target has the wrong sign: it stands with −I on the left.",
+                id="step2-target-sign",
+            ),
+            Mistake(
+                _translation(arrange=lambda u: (u[3:], u[:3])),
+                "The two results have changed places: t_FS comes first.",
+                id="step2-order",
+            ),
+        ],
+    ),
+    Exercise(
+        "kim_system",
+        reference=literature.kim_matrix,
+        draw=two_motions,
+        fixed={"A": POSE, "B": POSE},
+        metric=metrics.Several(metrics.Numbers(1e-9), metrics.Numbers(1e-9), names=("D", "F")),
+        hints=(
+            "Write entry (1, 1) of A X and of X B out, then (1, 2): which u's appear, with which factors? X's last row is 0 0 0 1.",
+            "With the rows of X one after another, A X is (A₃ₓ₃ ⊗ I₄) u plus the last column of A, which has no u and goes to F; X B is (I₃ ⊗ Bᵀ) u.",
+            "`D = np.kron(A[:3, :3], np.eye(4)) - np.kron(np.eye(3), B.T)\nF = np.zeros(12)\nF[3::4] = -A[:3, 3]\nreturn D, F`",
+        ),
+        mistakes=[
+            Mistake(
+                lambda A, B: (_rows(A) - _rows(B), _moved(A) - _moved(B)),
+                "These are the equations of A X = B X, as (2-43) prints it. (2-44) and the appendix have A X = X B.",
+                id="kim-as-printed",
+            ),
+            Mistake(
+                lambda A, B: (_rows(A) - _rows(B), _moved(A)),
+                "These are the equations of A X = B X, as (2-43) prints it. (2-44) and the appendix have A X = X B.",
+                id="kim-as-printed-left",
+            ),
+            Mistake(
+                _kim(_rows, lambda B: np.kron(np.eye(3), B), _moved),
+                "B enters transposed: row i of X B is Bᵀ times row i of X, so the blocks on the diagonal hold Bᵀ.",
+                id="kim-untransposed",
+            ),
+            Mistake(
+                _kim(_rows, _turned_back, lambda A: _moved(A, 1.0)),
+                "F has the wrong sign: the last column of A stands on the left, and goes to the right with a minus.",
+                id="kim-sign",
+            ),
+            Mistake(
+                _kim(_rows, _turned_back, lambda A: np.zeros(12)),
+                "F is zero, but the 1 in X's last row leaves the last column of A without a u: −a14, −a24, −a34.",
+                id="kim-no-right-side",
+            ),
+            Mistake(
+                _kim(_rows, _turned_back, lambda A: np.concatenate([np.zeros(9), -A[:3, 3]])),
+                "F has its entries at the end. They belong to the fourth equation of each row of X: places 4, 8, 12.",
+                id="kim-places",
+            ),
+            Mistake(
+                _by_columns,
+                "These are the columns of X one after another. Appendix A takes the rows: u1 to u4 are x11 to x14.",
+                id="kim-columns",
+            ),
+            Mistake(
+                lambda A, B: tuple(-part for part in literature.kim_matrix(A, B)),
+                "This is X B − A X, the same solutions with all signs reversed. Appendix A has A X − X B.",
+                id="kim-reversed",
+            ),
+            Mistake(
+                lambda A, B: (np.kron(A, np.eye(4)) - np.kron(np.eye(4), B.T), np.zeros(16)),
+                "Sixteen equations: the last row of X is known, 0 0 0 1. Leave it out, and its 1 fills F.",
+                id="kim-sixteen",
+            ),
+        ],
+    ),
+]
