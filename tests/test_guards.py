@@ -120,6 +120,7 @@ MAY_IMPORT = {  # besides itself
     "chapters": ("checks", "files", *MATHEMATICS, "documents", "live", "exercises", "stage"),
     "collect": ("checks", "exercises"),  # chapters are found by name
     "demo": ("checks", "exercises", "stage"),  # as well
+    "book": ("exercises", "stage"),  # chapters are found by name
     "verbs": (
         "checks",
         "files",
@@ -131,6 +132,7 @@ MAY_IMPORT = {  # besides itself
         "chapters",
         "collect",
         "demo",
+        "book",
     ),
 }
 NEEDS_NO_FRONT_END = ("checks", "files", *MATHEMATICS, "documents")

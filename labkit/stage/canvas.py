@@ -59,7 +59,7 @@ class Picture:
         for artist in self.artists:
             artist.set_animated(True)
             artist.set_in_layout(False)  # what moves must not push the axes about
-        self._background = self._sent = None
+        self._backgrounds, self._sent = {}, None  # a background a theme
         self.draw_seconds = 0.0
         self.spaces = [ax.space for ax in self.fig.axes if hasattr(ax, "space")]
         self._in_space = {id(artist) for space in self.spaces for artist in space.artists}
@@ -87,8 +87,7 @@ class Picture:
         around, as a multiple of the designed one, and whether the page draws scenes in space itself.
         """
         self.paint(not space)
-        if bool(dark) != self.dark:
-            self.canvas.dark, self._background = bool(dark), None
+        self.canvas.dark = bool(dark)
         room = max(float(width), 120.0), max(float(height), 120.0), float(ratio), float(letters)
         if room == self._room:
             return
@@ -103,13 +102,13 @@ class Picture:
         self.fig.set_dpi(self.width * ratio / inches[0])
         self.fig.set_size_inches(*inches)
         self.fig.set_layout_engine("constrained")
-        self._background = None
+        self._backgrounds = {}
 
     def _draw_background(self):
         with style.rc():
             self._lay_out()
             self.canvas.draw()
-        self._background = self.canvas.copy_from_bbox(self.fig.bbox)
+        self._backgrounds[self.dark] = self.canvas.copy_from_bbox(self.fig.bbox)
         self.fig.stale = False
 
     def _lay_out(self):
@@ -134,10 +133,12 @@ class Picture:
         """Draw, anew only what has to be; returns the pixels, array of shape (height, width, 4)."""
         with DRAWING:
             start = monotonic()
-            if self._background is None or self.fig.stale:
+            if self.fig.stale:
+                self._backgrounds = {}
+            if self.dark not in self._backgrounds:
                 self._draw_background()
             renderer = self.canvas.get_renderer()
-            renderer.restore_region(self._background)
+            renderer.restore_region(self._backgrounds[self.dark])
             hidden = set() if self.painted else self._in_space
             for artist in sorted((a for a in self.artists if id(a) not in hidden), key=lambda a: a.zorder):
                 artist.draw(renderer)
@@ -147,8 +148,17 @@ class Picture:
     def forget_pixels(self):
         """Let go of all pixels, 12 bytes and more a pixel; the next picture is drawn from nothing."""
         with DRAWING:
-            self._background = self._sent = None
+            self._backgrounds, self._sent = {}, None
             self.canvas.forget()
+
+    def in_both_themes(self):
+        """The pixels on light and on dark paper, each of shape (height, width, 4)."""
+        with DRAWING:
+            here, both = self.dark, []
+            for self.canvas.dark in (False, True):
+                both.append(self.draw().copy())
+            self.canvas.dark = here
+            return tuple(both)
 
     def png(self):
         """The picture as PNG bytes."""

@@ -142,15 +142,17 @@ class Canvas(FigureCanvasAgg):
 
     dark = False
     renderers = renderers(can_keep_words())
-    _drawn_as = None
+    _drawn_as, _made = None, {}
 
     def get_renderer(self):
-        drawn_as = *self.get_width_height(physical=True), self.figure.dpi, self.dark
+        drawn_as = *self.get_width_height(physical=True), self.figure.dpi
         if drawn_as != self._drawn_as:
-            self.renderer = self.renderers[bool(self.dark)](*drawn_as[:3])
-            self._drawn_as = drawn_as
+            self._drawn_as, self._made = drawn_as, {}
+        if self.dark not in self._made:
+            self._made[self.dark] = self.renderers[self.dark](*drawn_as)
+        self.renderer = self._made[self.dark]
         return self.renderer
 
     def forget(self):
         """Let go of the renderer and its pixels; the next drawing makes another."""
-        self.renderer = self._drawn_as = None
+        self.renderer, self._drawn_as, self._made = None, None, {}

@@ -4,7 +4,8 @@
 //
 //   get("declaration")       what does not change: Stage.declaration() of labkit/stage/stage.py, as JSON
 //   get("silence")           what to say when Python does not answer, where it is no notebook's
-//   on("msg:custom", hear)   from now on hear(message, buffers) is called with what Stage sends; buffers are DataViews
+//   on("msg:custom", hear)   from now on hear(message, buffers) is called with what Stage sends; buffers are DataViews;
+//                            a model that has pixels, not files, sends message.pixels, [width, height], and RGBA
 //   off("msg:custom", hear)  no more
 //   send(message)            to Stage.receive(message), as JSON
 //
@@ -303,7 +304,8 @@ class Screen {
   draw() {
     while (this.queue.length && !this.decoding) {
       const { message, buffers } = this.queue.shift();
-      if (message.on === null) this.decode(message, buffers[0]);
+      if (message.pixels) this.paint(message, buffers[0]);
+      else if (message.on === null) this.decode(message, buffers[0]);
       else if (message.on === this.number && this.image) this.change(message, ...buffers.map(numbers));
       else this.lost(); // a picture is missing: a whole one is needed
     }
@@ -324,6 +326,14 @@ class Screen {
     }
     this.decoding = false;
     this.draw();
+  }
+
+  /** A whole picture that needs no decoding. */
+  paint(message, rgba) {
+    const [width, height] = message.pixels;
+    if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
+    this.paper.putImageData(new ImageData(new Uint8ClampedArray(rgba.buffer, rgba.byteOffset, 4 * width * height), width, height), 0, 0);
+    this.show(message);
   }
 
   /** runs: first place and length of each run of changed pixels; colors: theirs, one after the other. */

@@ -546,6 +546,10 @@ class Stage:
         """The picture as PNG bytes."""
         return self._picture.png()
 
+    def in_both_themes(self):
+        """The pixels on light and on dark paper, each of shape (height, width, 4)."""
+        return self._picture.in_both_themes()
+
     def small_png(self):
         """The picture with the rings of its handles, at its own size and in few colors: for files."""
         return self._picture.small_png([(place["at"], place["color"]) for place in self._places().values()])

@@ -9,6 +9,7 @@ VERBS = {
     "localize": ("...", "your own log in, the path with its covariance out"),
     "collect": ("...", "for lecturers: submitted notebooks in, marks and a page on the class out"),
     "demo": ("[NN ...]", "for lecturers: Stages full window, questions first; --vote lets phones answer"),
+    "book": ("[NN ...]", "the reading edition: a static site whose figures still move"),
     "ledger": ("", "every number the four documents print, recomputed"),
     "build": ("[NN ...]", "for authors: write the notebooks from solutions/NN_name.py; --check names the stale ones"),
 }

@@ -9,18 +9,13 @@ import pytest
 ROOT = driver.ROOT
 
 
-def missing(reason):
-    """Skip, with the reason; in CI there is no excuse."""
-    (pytest.fail if os.environ.get("CI") else pytest.skip)(reason)
-
-
 @pytest.fixture(scope="session")
 def address():
     """The address of a JupyterLab that `python lab.py` has started."""
     if not driver.find_browser():
-        missing("no Chromium on this machine: the browser test needs one")
+        driver.missing("no Chromium on this machine: the browser test needs one")
     if not (ROOT / ".venv").exists():
-        missing("the browser test starts lab.py, whose set-up has not been made: run python lab.py test")
+        driver.missing("the browser test starts lab.py, whose set-up has not been made: run python lab.py test")
     words = [sys.executable, str(ROOT / "lab.py"), "--no-browser", "--LabApp.expose_app_in_browser=True"]
     as_root = hasattr(os, "geteuid") and os.geteuid() == 0
     with driver.server([*words, *(["--allow-root"] if as_root else [])]) as found:

@@ -60,6 +60,13 @@ def written(notebook, stem):
         yield copy.relative_to(ROOT).as_posix()
 
 
+def missing(reason):
+    """Skip, with the reason; in CI there is no excuse."""
+    import pytest
+
+    (pytest.fail if os.environ.get("CI") else pytest.skip)(reason)
+
+
 def find_browser():
     """The path of a Chromium, or None."""
     found = [shutil.which(name) for name in BROWSERS] + [path for path in ELSEWHERE if Path(path).exists()]

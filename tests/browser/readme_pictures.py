@@ -1,19 +1,25 @@
-"""The two pictures of the README, taken from chapter 1: `python tests/browser/readme_pictures.py`.
+"""The pictures of the README: `python tests/browser/readme_pictures.py`, and `... --moving` for the one that moves.
 
-A Stage being used, and an exercise that has just named a mistake, both in JupyterLab; written to docs/.
+A Stage being used, and an exercise that has just named a mistake, both in JupyterLab and from chapter 1; a Stage of
+chapter 7 recorded, as the reading edition shows it. Written to docs/.
 """
 
 import os
 import sys
 import tempfile
+import zlib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "browser")]
 
 import driver  # noqa: E402
+import numpy as np  # noqa: E402
 import test_jupyterlab  # noqa: E402
+from PIL import Image  # noqa: E402
 
+from labkit.chapters.ch07_dead_reckoning import stages  # noqa: E402
+from labkit.stage import film  # noqa: E402
 from labkit.verbs import jupyter  # noqa: E402
 
 
@@ -60,6 +66,20 @@ def feedback(page):
     cell.screenshot(path=ROOT / "docs" / "feedback.png")
 
 
+def moving():
+    """A drive that spreads, as an animated picture."""
+    made = film.record(stages.drive())
+    width, height = made.size
+    change = np.frombuffer(zlib.decompress(made.tracks["play"].reel), np.uint8).reshape(-1, height, width)
+    frames = []
+    for picture in np.bitwise_xor.accumulate(change, axis=0):
+        frames.append(Image.fromarray(made.palettes[0][picture]))
+    times = [90] * (len(frames) - 1) + [2000]
+    frames[0].save(
+        ROOT / "docs" / "drive.webp", save_all=True, append_images=frames[1:], duration=times, loop=0, quality=70
+    )
+
+
 if __name__ == "__main__":
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    main()
+    moving() if "--moving" in sys.argv else main()

@@ -1,0 +1,348 @@
+"""A Stage recorded: what it shows along its first handle, its first control, its failure and its play.
+
+For pages without Python. A film is made by playing the page: messages go to `Stage.receive`, and what it would show is
+kept, picture and words.
+All pictures of a film share one list of at most 256 colors, each with its twin on dark paper, so that one recording
+serves both themes. A picture is then one byte a pixel; each is stored as what differs from the one before (XOR), and
+all together deflated: 3 to 10 kB a picture. `stage.js` shows a film as it shows a living Stage; `film.js` answers it.
+"""
+
+import base64
+import copy
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import style
+
+ROOM, RATIO = 600, 1.25  # CSS pixels of the recorded picture's width; pixels a CSS pixel
+AROUND, ALONG, TURNS = 36, 24, 36  # pictures around a loop, along a control, around a view
+PLAYED, FAILED = 48, 32  # pictures of a play, and of a play that goes wrong
+QUICKEST, SLOWEST = 60, 160  # ms from picture to picture
+REACH = 0.17  # half axes of a handle's loop, as a share of its axes
+MOVED = 0.004  # share of the picture a handle must move to count as moved
+ORBIT_PIXELS = 20  # pixels of dragging from picture to picture of a view: 10 degrees
+COLORS = 256
+LARGEST, FEWEST = 400_000, 12  # bytes of a track; a larger one loses every second picture, down to so many
+FAIL = "Make it fail"
+PLAYS = ("play", FAIL)
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """What was recorded of one Stage.
+
+    declaration : dict
+        What `stage.js` must know, less what was not recorded.
+    size : (width, height)
+        In pixels of the recording.
+    palettes : (light, dark)
+        Colors, each of shape (n, 3), uint8.
+    tracks : dict
+        {name: Track}: "start", "handle", "control", "view", "play", and one of each further button's name.
+    """
+
+    declaration: dict
+    size: tuple
+    palettes: tuple
+    tracks: dict
+
+    def as_data(self):
+        """The film for `film.js`, as data for JSON."""
+        palettes = [palette.ravel().tolist() for palette in self.palettes]
+        tracks = {
+            name: {"notes": track.notes, "entry": track.entry, "pictures": base64.b64encode(track.reel).decode()}
+            for name, track in self.tracks.items()
+        }
+        return {"declaration": self.declaration, "size": self.size, "palettes": palettes, "tracks": tracks}
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Pictures one after the other.
+
+    notes : list of dict
+        What the message of each picture says besides.
+    reel : bytes
+        The pictures, `deflated`.
+    entry : int
+        The picture one comes in at.
+    """
+
+    notes: list
+    reel: bytes
+    entry: int = 0
+
+
+def deflated(pictures):
+    """Pictures of one byte a pixel, shape (n, height, width), each as XOR with the one before, deflated."""
+    change = pictures.copy()
+    change[1:] ^= pictures[:-1]
+    return zlib.compress(change.tobytes(), 9)
+
+
+def record(stage):
+    """The film of a Stage, which is at its start again afterwards."""
+    return _Camera(stage).film()
+
+
+class _Camera:
+    """Plays the page of one Stage, and keeps what it would show."""
+
+    def __init__(self, stage):
+        self.stage, self.heard, self.serial = stage, None, 0
+        self.declared = stage.declaration()
+        self.negatives, self.shots, self.entries = _Negatives(), {}, {}
+        stage.connect(lambda message, buffers: setattr(self, "heard", message))
+        self.tell(look={"width": ROOM, "height": 4 * ROOM, "ratio": RATIO, "dark": False})
+
+    def tell(self, **message):
+        """One message to the Stage; what it answers."""
+        self.serial += 1
+        self.stage.receive({**message, "serial": self.serial})
+        return self.heard
+
+    def shoot(self, name):
+        """Add what is shown now to a track."""
+        heard = self.heard
+        notes, pictures = self.shots.setdefault(name, ([], []))
+        handles = {
+            key: {
+                "at": [round(x, 4) for x in place["at"]],
+                "value": place["value"],
+                "now": place["now"],
+                "color": [style.themed(self.stage.handles[key].color, dark) for dark in (False, True)],
+            }
+            for key, place in heard["handles"].items()
+        }
+        notes.append({key: heard[key] for key in ("caption", "status", "controls", "time")} | {"handles": handles})
+        pictures.append(self.negatives.develop(*self.stage.in_both_themes()))
+
+    def film(self):
+        self.tell(button="Reset")
+        self.shoot("start")
+        shown = {"handles": self._handle(), "controls": self._control()}
+        self._view()
+        self._play()
+        for button in self.declared["buttons"][1:]:
+            if button not in self.shots:
+                self.tell(button=button)
+                self.shoot(button)
+        self.tell(button="Reset")
+        palettes, chosen = self.negatives.colors()
+        tracks = {
+            name: self._track(name, chosen[np.array(pictures)], shown) for name, (_, pictures) in self.shots.items()
+        }
+        _renumber(tracks, shown["controls"])
+        height, width = self.shots["start"][1][0].shape
+        return Film(self._declaration(shown, tracks), (width, height), palettes, tracks)
+
+    def _track(self, name, pictures, shown):
+        """A track no larger than it may be: with every second picture of what is larger; the ends stay."""
+        notes, places = self.shots[name][0], np.arange(len(pictures))
+        reel = deflated(pictures)
+        words = name == "control" and self.declared["controls"][shown["controls"][0]]["kind"] != "slider"
+        while len(reel) > LARGEST and len(places) > FEWEST and not words:
+            places = np.unique(np.append(places[::2], places[-1]))
+            reel = deflated(pictures[places])
+        notes = [self._note(notes[k], shown) for k in places]
+        entry = int(np.abs(places - self.entries.get(name, 0)).argmin())
+        return Track(notes, reel, entry)
+
+    def _note(self, note, shown):
+        chosen = {key: _only(note[key], names) for key, names in shown.items()}
+        return copy.deepcopy({**note, **chosen})
+
+    def _declaration(self, shown, tracks):
+        declared = copy.deepcopy({**self.declared, **{key: _only(self.declared[key], shown[key]) for key in shown}})
+        for name in shown["controls"]:
+            control, last = declared["controls"][name], len(tracks["control"].notes) - 1
+            if control["kind"] == "slider":
+                control["positions"] = last
+        if declared["play"]:
+            interval = declared["play"]["interval"] * declared["play"]["steps"] / declared["play"]["stride"]
+            steps = len(tracks["play"].notes) - 1
+            interval = round(min(max(interval / steps, QUICKEST), SLOWEST))
+            declared["play"] = {"steps": steps, "interval": interval, "stride": 1, "seekable": True}
+        empty = "turn" if "view" in tracks else ""
+        none = {"keys": False, "click": False, "spaces": []}  # pictures hold what is drawn in space, too
+        return {**declared, **none, "buttons": list(declared["buttons"]), "empty": empty}
+
+    # -- the tracks
+
+    def _handle(self):
+        """Along a loop through its start, or to and fro where it can go one way only; the names of what moves."""
+        for name in self.declared["handles"]:
+            self.tell(button="Reset")
+            path = self._path(name)
+            if path is None:
+                continue
+            self.tell(button="Reset")
+            for at in path:
+                self.tell(drag={name: at})
+                self.shoot("handle")
+            self.tell(button="Reset")
+            return [name]
+        return []
+
+    def _path(self, name):
+        """Fractions of the picture to drag a handle along; None if it does not move."""
+        axes = self.stage.figure.axes[self.stage.handles[name].ax].get_position()
+        middle = np.array([axes.x0 + axes.width / 2, 1 - axes.y0 - axes.height / 2])
+        reach = REACH * np.array([axes.width, axes.height])
+        start = np.array(self.heard["handles"][name]["at"])
+        goes = np.array([self._goes(name, start, step) for step in np.diag(np.where(middle < start, -reach, reach))])
+        if not goes.any():
+            return None
+        if goes.all():
+            inward = (middle - start) / np.array([axes.width, axes.height])
+            away = np.arctan2(-inward[1], -inward[0]) if np.hypot(*inward) > 0.05 else np.pi
+            angles = away + np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
+            ring = np.column_stack([np.cos(angles), np.sin(angles)])
+            return start + reach * (ring - ring[0])
+        half = np.array([axes.width, axes.height]) / 2 * goes
+        share = np.linspace(-0.97, 0.97, AROUND)[:, None]
+        return np.where(goes, middle + share * half, start)
+
+    def _goes(self, name, start, step):
+        """Whether a handle follows a step at least half way."""
+        self.tell(button="Reset")
+        moved = np.array(self.tell(drag={name: start + step})["handles"][name]["at"]) - start
+        return abs(moved @ step) > max(0.5 * step @ step, MOVED**2)
+
+    def _control(self):
+        """Through all positions of the first control, at most ALONG of them; its name in a list."""
+        for name, declared in self.declared["controls"].items():
+            last = declared.get("positions", len(declared.get("words", ["off", "on"])) - 1)
+            at = np.unique(np.linspace(0, last, min(last + 1, ALONG)).round().astype(int))
+            start = self.heard["controls"][name]["at"]
+            at = np.unique([*at, start])
+            for position in at.tolist():
+                self.tell(button="Reset")
+                self.tell(control={name: position})
+                self.shoot("control")
+            self.entries["control"] = at.tolist().index(start)
+            self.tell(button="Reset")
+            return [name]
+        return []
+
+    def _view(self):
+        if self.declared["empty"] != "turn":
+            return
+        for turn in range(TURNS):
+            if turn:
+                self.tell(orbit=[ORBIT_PIXELS, 0])
+            self.shoot("view")
+        self.tell(button="Reset")
+
+    def _play(self):
+        if not self.declared["play"]:
+            return
+        steps = self.declared["play"]["steps"]
+        for button, name, count in (("Reset", "play", PLAYED), (FAIL, FAIL, FAILED)):
+            begun = self.tell(button=button)["time"]["at"]
+            at = np.unique(np.linspace(0, steps, count + 1).round().astype(int))
+            self.entries[name] = int(np.abs(at - begun).argmin())
+            for step in at.tolist():
+                self.tell(time={"at": step, "epoch": self.heard["time"]["epoch"]})
+                self.shoot(name)
+
+
+def _renumber(tracks, controls):
+    """Positions of a control, and times, counted among the recorded ones."""
+    for name in controls:
+        recorded = np.array([note["controls"][name]["at"] for note in tracks["control"].notes])
+        for track in tracks.values():
+            for note in track.notes:
+                place = note["controls"][name]
+                place["at"] = int(np.abs(recorded - place["at"]).argmin())
+    for name in PLAYS:
+        for number, note in enumerate(tracks[name].notes if name in tracks else ()):
+            if note["time"]:
+                note["time"]["at"] = number
+
+
+def _only(table, names):
+    return {key: value for key, value in table.items() if key in names}
+
+
+class _Negatives:
+    """Pictures as numbers of colors, each color of light paper together with its twin on dark paper.
+
+    New colors are looked for only where a picture differs from the one before.
+    """
+
+    def __init__(self):
+        self.known, self.numbers, self.counts = np.empty(0, np.int64), np.empty(0, np.uint16), np.empty(0)
+        self.before = None
+
+    def develop(self, light, dark):
+        """The numbers of a picture's colors, shape (height, width), uint16."""
+        pair = [theme[..., :3].astype(np.int64) @ [65536, 256, 1] for theme in (light, dark)]
+        keys = (pair[0] << 24) | pair[1]
+        if self.before is None:
+            self.before = np.full_like(keys, -1), np.zeros(keys.shape, np.uint16)
+        changed = keys != self.before[0]
+        found, inverse, counts = np.unique(keys[changed], return_inverse=True, return_counts=True)
+        picture = self.before[1].copy()
+        picture[changed] = self._numbered(found, counts)[inverse]
+        self.before = keys, picture
+        return picture
+
+    def _numbered(self, found, counts):
+        """The numbers of colors, given in order; new ones get the next."""
+        new = np.setdiff1d(found, self.known, assume_unique=True)
+        if len(self.known) + len(new) > 65536:
+            raise ValueError("a Stage has more than 65536 pairs of colors, which is too many for a film")
+        numbers = np.concatenate(
+            [self.numbers, np.arange(len(self.known), len(self.known) + len(new), dtype=np.uint16)]
+        )
+        known = np.concatenate([self.known, new])
+        order = np.argsort(known)
+        self.known, self.numbers = known[order], numbers[order]
+        self.counts = np.concatenate([self.counts, np.zeros(len(new))])
+        at = self.numbers[np.searchsorted(self.known, found)]
+        self.counts[at] += counts
+        return at
+
+    def colors(self):
+        """((light, dark), chosen): at most COLORS pairs of colors, each theme of shape (n, 3), uint8, and which of them
+        stands for each number.
+        """
+        keys = np.empty(len(self.known), np.int64)
+        keys[self.numbers] = self.known
+        rgb = np.stack([(keys >> shift) & 255 for shift in (40, 32, 24, 16, 8, 0)], -1).astype(float)
+        chosen = _grouped(rgb, self.counts, COLORS)
+        weights = np.bincount(chosen, self.counts)[:, None]
+        mean = np.stack([np.bincount(chosen, self.counts * rgb[:, k]) for k in range(6)], -1) / weights
+        mean = mean.round().astype(np.uint8)
+        return (mean[:, :3], mean[:, 3:]), chosen.astype(np.uint8)
+
+
+def _grouped(points, weights, count):
+    """Groups 0, 1, ... of points, shape (n, d), at most `count`: again and again the group that is widest, counted with
+    the roots of its weights, is cut through its mean.
+    """
+    group, weights = np.zeros(len(points), int), np.sqrt(weights)
+    spreads = [_spread(points, weights)]
+    for new in range(1, count):
+        widest = int(np.argmax([spread for spread, _ in spreads]))
+        spread, axis = spreads[widest]
+        if spread == 0:
+            break
+        members = np.flatnonzero(group == widest)
+        along = points[members, axis]
+        group[members[along > np.average(along, weights=weights[members])]] = new
+        spreads[widest] = _spread(points[group == widest], weights[group == widest])
+        spreads.append(_spread(points[group == new], weights[group == new]))
+    return group
+
+
+def _spread(points, weights):
+    """The largest weighted sum of squares about the mean, and its axis."""
+    mean = np.average(points, axis=0, weights=weights)
+    squares = weights @ (points - mean) ** 2
+    axis = int(squares.argmax())
+    low, high = points[:, axis].min(), points[:, axis].max()
+    return (float(squares[axis]) if high > low else 0.0), axis

@@ -1,0 +1,128 @@
+"""The reading edition, opened from its folder: no server, no other host; figures scrubbed by mouse, finger and keys."""
+
+import driver
+import nbformat
+import pytest
+
+from labkit.book import figures, notebook, site
+from labkit.exercises import source
+from labkit.stage import film
+
+STEM = "07_dead_reckoning"
+SHORTER = {"AROUND": 12, "ALONG": 9, "PLAYED": 40, "FAILED": 4}  # films, so that the test is quick
+PIXELS = """canvas => {
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    return data.reduce((sum, value, k) => (sum * 31 + value * (k % 97)) % 1e9, 7);
+}"""
+
+
+@pytest.fixture(scope="module")
+def book(tmp_path_factory):
+    """One chapter as a book."""
+    if not driver.find_browser():
+        driver.missing("no Chromium on this machine: the browser test needs one")
+    folder = tmp_path_factory.mktemp("book")
+    (folder / figures.FOLDER).mkdir()
+    solved = nbformat.read(source.find(STEM).with_suffix(".ipynb"), as_version=4)
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in SHORTER.items():
+            patch.setattr(film, name, value)
+        made = {name: figures.record(STEM, name, folder) for name in notebook.stages_of(solved).values()}
+    site.write([site.Chapter(STEM, solved, made)], [], folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def page(book):
+    with driver.page_of(driver.find_browser(), width=360, height=740) as page:
+        page.goto((book / f"{STEM}.html").as_uri())
+        yield page
+
+
+def figure(page, name):
+    """A figure in its opened prediction, once its film runs."""
+    found = page.locator(f'figure[data-film="{STEM}-{name}"]')
+    found.evaluate("node => { const closed = node.closest('details'); if (closed) closed.open = true; }")
+    found.scroll_into_view_if_needed()
+    found.locator(".labkit-stage[data-picture]").wait_for(timeout=20_000)
+    return found
+
+
+def shown(found):
+    """(a number that stands for the pixels, the caption) of a figure once it has come to rest."""
+    found.page.wait_for_timeout(150)
+    return found.locator("canvas").evaluate(PIXELS), found.locator(".caption").inner_text()
+
+
+def test_an_answer_opens_the_figure(page):
+    question = page.locator("#predict-method")
+    assert not question.locator("figure").is_visible()
+    question.get_by_role("button", name="none of them").click()
+    assert question.locator("figure").is_visible()
+    assert question.locator("summary").inner_text() == "That is what happens"
+
+
+def test_a_handle_follows_the_finger_along_its_line_and_the_arrow_keys(page):
+    found = figure(page, "circles")
+    start, handle = shown(found), found.locator(".handle")
+    line = found.locator("polyline").get_attribute("points").split(",")
+    area = found.locator(".picture").bounding_box()
+    x, y = (float(word) for word in line[len(line) // 2].split())
+    box = handle.bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(area["x"] + x * area["width"], area["y"] + y * area["height"], steps=4)
+    page.mouse.up()
+    dragged = shown(found)
+    assert dragged[0] != start[0] and dragged[1] != start[1]
+    box = handle.bounding_box()
+    assert abs(box["x"] + box["width"] / 2 - area["x"] - x * area["width"]) < 4
+    handle.focus()
+    stepped = set()
+    for key in ("ArrowUp", "ArrowLeft", "ArrowDown", "ArrowRight"):
+        page.keyboard.press(key)
+        stepped.add(shown(found)[0])
+    assert len(stepped - {dragged[0]}) >= 1
+    found.get_by_role("button", name="Reset").click()
+    assert shown(found) == start
+
+
+def test_a_slider_scrubs_and_a_failure_is_shown(page):
+    found = figure(page, "models")
+    slider, seen = found.locator(".controls input[type=range]"), set()
+    slider.focus()
+    for _ in range(4):
+        page.keyboard.press("ArrowRight")
+        seen.add(shown(found))
+    assert len(seen) == 4
+    found.get_by_role("button", name="Make it fail").click()
+    assert shown(found) not in seen
+
+
+def test_time_runs_can_be_scrubbed_backward_and_follows_the_theme(page):
+    found = figure(page, "drive")
+    time = found.get_by_role("slider", name="time", exact=True)
+    time.fill("30")
+    late = shown(found)
+    time.fill("8")
+    early = shown(found)
+    assert early != late
+    time.fill("30")
+    assert shown(found) == late
+    found.get_by_role("button", name="Play").click()
+    page.wait_for_timeout(600)
+    found.get_by_role("button", name="Pause").click()
+    assert int(time.input_value()) > 30
+    before = shown(found)[0]
+    page.locator("button.theme").click()
+    page.wait_for_timeout(400)
+    assert shown(found)[0] != before
+    page.locator("button.theme").click()
+
+
+def test_nothing_is_wider_than_a_phone_and_no_other_host_is_called(page, book):
+    for name in (f"{STEM}.html", "index.html", "figures.html", "ledger.html"):
+        page.goto((book / name).as_uri())
+        page.wait_for_timeout(200)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 360, name
+    assert page.hosts == {None} and page.complaints == []
