@@ -109,6 +109,62 @@ def summarize(errors):
     }
 
 
+def static_error_and_lag(speed, error):
+    """What does not depend on the speed, and what a lag adds to it: error^2 = e0^2 + (lag speed)^2.
+
+    Errors that know nothing of each other add as squares. In the squares the law is a line; it is fitted by least
+    squares, and a negative intercept or slope counts as 0.
+
+    Parameters
+    ----------
+    speed, error : array-like, shape (n,)
+        mm/s and mm (or rad/s and rad), n >= 2 readings of a motion.
+
+    Returns
+    -------
+    e0 : float
+        In the unit of the error.
+    lag : float, s
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, or speeds that are all the same.
+    """
+    speed, error = as_finite(speed, "speed"), as_finite(error, "error")
+    if speed.ndim != 1 or speed.shape != error.shape or len(speed) < 2:
+        raise ValueError(f"speed and error must have the same shape (n,), n >= 2, got {speed.shape}, {error.shape}")
+    x = speed**2
+    spread = x - x.mean()
+    if not (spread**2).sum() > (1e-9 * np.abs(x).max()) ** 2:
+        raise ValueError(f"the speeds must differ to tell a lag from what stays, got {shown(speed[0])} throughout")
+    slope = (spread @ error**2) / (spread @ spread)
+    return tuple(float(np.sqrt(max(v, 0.0))) for v in ((error**2).mean() - slope * x.mean(), slope))
+
+
+def median_over_speed(speed, error, edges):
+    """Median error between the edges of intervals of speed.
+
+    Parameters
+    ----------
+    speed, error : array-like, shape (n,)
+    edges : array-like, shape (m + 1,)
+        Increasing, in the unit of the speed.
+
+    Returns
+    -------
+    median : array, shape (m,)
+        NaN where no reading falls.
+    """
+    speed, error, edges = as_finite(speed, "speed"), as_finite(error, "error"), as_finite(edges, "edges")
+    return np.array(
+        [
+            np.median(error[inside]) if (inside := (speed >= low) & (speed < high)).any() else np.nan
+            for low, high in zip(edges[:-1], edges[1:])
+        ]
+    )
+
+
 def time_offset(time, reference, delayed, max_offset=0.2):
     """How much later a signal comes than its reference (s): best match of two speed curves, to a fraction of a sample.
 

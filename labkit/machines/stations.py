@@ -249,8 +249,10 @@ class Sighting(Result):
         Measured less predicted.
     weights : array, shape (2 n m,)
         1 for each angle.
+    given : float or None
+        Standard deviation of an angle (rad), where it was given.
     std : float, rad
-        Standard deviation of an angle, unbiased.
+        The same, as given or as the residuals have it, unbiased.
     covariance : array, shape (6, 6)
         Of the rotation vector (rad, about the axes of E) and the translation (mm, in W).
     singular_values : array, shape (6,)
@@ -261,6 +263,7 @@ class Sighting(Result):
     T_WL: np.ndarray
     diodes: np.ndarray
     angles: np.ndarray
+    given: float | None = None
 
     parameters = pose_parameters("T_WE")
 
@@ -278,7 +281,7 @@ class Sighting(Result):
 
     @cached_property
     def std(self):
-        return float(np.sqrt((self.residuals**2).sum() / max(self.angles.size - 6, 1)))
+        return self.given or float(np.sqrt((self.residuals**2).sum() / max(self.angles.size - 6, 1)))
 
     @cached_property
     def covariance(self):
@@ -360,21 +363,23 @@ def poses_from_angles(T_WL, diodes, angles, start):
     raise ValueError(f"the pose did not settle within {MAX_STEPS} steps: is the start too far off?")
 
 
-def sight(T_WL, diodes, angles, start):
+def sight(T_WL, diodes, angles, start, std=None):
     """One pose with its covariance; the parameters are those of `poses_from_angles`, for a single body.
 
     Parameters
     ----------
     T_WL, diodes, angles, start : arrays, shapes (n, 4, 4), (m, 3), (n, m, 2), (4, 4)
+    std : float, rad, optional
+        Standard deviation of an angle; estimated from the residuals unless given.
 
     Returns
     -------
     Sighting
     """
     T = poses_from_angles(T_WL, diodes, angles, start)
-    return Sighting(
-        T, as_shape(T_WL, "T_WL", "n", 4, 4), as_shape(diodes, "diodes", "m", 3), as_finite(angles, "angles")
-    )
+    given = None if std is None else as_positive_number(std, "std")
+    T_WL, diodes = as_shape(T_WL, "T_WL", "n", 4, 4), as_shape(diodes, "diodes", "m", 3)
+    return Sighting(T, T_WL, diodes, as_finite(angles, "angles"), given)
 
 
 # ---- stations that do not stay ---------------------------------------------------------------------------------------

@@ -22,7 +22,17 @@ from labkit.machines.arm import (
 from labkit.machines.packet import POSITION, decode_packet
 from labkit.tables import read_table
 
-ALL = (wr.tx40, wr.live_tracker, wr.two_axes, wr.dynamic_errors, wr.methods, wr.six_runs, wr.sweeps, wr.moved_station)
+ALL = (
+    wr.tx40,
+    wr.live_tracker,
+    wr.two_axes,
+    wr.dynamic_errors,
+    wr.methods,
+    wr.six_runs,
+    wr.sweeps,
+    wr.moved_station,
+    wr.over_speed,
+)
 
 
 @pytest.mark.parametrize("make", ALL)
@@ -231,3 +241,36 @@ def test_the_stations_of_the_room_see_the_robot_within_the_makers_distance():
     away = np.linalg.norm(stations.STATIONS[:, None, :3, 3] - wr._stops()[1][:, :3, 3], axis=-1)
     assert away.min() > 700 and away.max() < 5000
     assert np.linalg.norm(np.subtract(*stations.STATIONS[:, :3, 3])) < 5000
+
+
+# ---- errors over speed
+
+
+def over_speed(of="position", latency=8.0, nonsense=False):
+    return wr.compute_over_speed({"of": of, "latency": latency, "nonsense": nonsense})
+
+
+@pytest.mark.parametrize("latency", [8.0, 20.0, 40.0])
+@pytest.mark.parametrize("of", ["position", "rotation"])
+def test_the_law_of_squares_finds_the_lag(of, latency):
+    assert 1000 * over_speed(of, latency)["lag"] == pytest.approx(latency, abs=1.0)
+
+
+def test_twice_the_tempo_doubles_the_error_of_a_lag_in_position_and_quadruples_it_in_speed(monkeypatch):
+    """A tracker with a lag and nothing else: means over middle and fast, the same path in half the time."""
+    monkeypatch.setattr(wr, "Tracker", lambda latency, **_: simulation.Tracker(0, 0, 0, 0, 0, 0, 0, 0, latency=latency))
+    for of, factor in (("position", 2.0), ("rotation", 2.0), ("speed", 4.0), ("angular speed", 4.0)):
+        slow, middle, _ = (e.mean() for e in over_speed(of, 4.0)["error"])
+        assert middle / slow == pytest.approx(factor, rel=0.03)
+
+
+def test_nonsense_moves_the_mean_and_leaves_the_medians():
+    calm, wild = over_speed(), over_speed(nonsense=True)
+    assert wild["mean"] > 2.5 * calm["mean"]
+    np.testing.assert_allclose(wild["median"], calm["median"], rtol=0.35)
+
+
+def test_printed_levels_stand_where_the_unit_is_the_same():
+    assert over_speed()["printed"] == [15.0, 25.0]
+    mean, largest = over_speed("angular speed")["printed"]
+    assert np.isnan(mean) and largest == 3.0

@@ -139,7 +139,9 @@ def test_covariance_of_a_pose_is_that_of_many_trials():
             for f in found
         ]
     )
-    cov = found[0].covariance * (std / found[0].std) ** 2
+    known = stations.sight(stations.STATIONS, stations.DIODES, found[0].angles, T_BE[3], std=std)
+    cov = known.covariance
+    np.testing.assert_allclose(cov, found[0].covariance * (std / found[0].std) ** 2)
     total = np.einsum("ni,ij,nj->", errors, np.linalg.inv(cov), errors)
     assert 1e-4 < chi2.cdf(total, 1200) < 1 - 1e-4
     assert np.mean([f.std for f in found]) == pytest.approx(std, rel=0.05)

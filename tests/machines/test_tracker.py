@@ -13,7 +13,16 @@ from labkit.documents.report.reconstruction import synthetic_mountings
 from labkit.geometry.frames import invert, pose, pose_distance
 from labkit.geometry.lie import exp_so3, log_so3
 from labkit.machines import simulation
-from labkit.machines.accuracy import filter_positions, shift_time, speeds, summarize, time_offset, tracking_errors
+from labkit.machines.accuracy import (
+    filter_positions,
+    median_over_speed,
+    shift_time,
+    speeds,
+    static_error_and_lag,
+    summarize,
+    time_offset,
+    tracking_errors,
+)
 from labkit.machines.arm import TX40, forward_kinematics
 from labkit.machines.log import Log, average_stops, mean_pose, read_csv, reject_outliers, write_csv
 from labkit.machines.mounting import calibrate_mounting, e_rot, e_trans
@@ -400,3 +409,21 @@ def test_one_uneven_step_of_time_is_enough():
     time[50:] += 0.001
     with pytest.raises(ValueError, match="even steps"):
         time_offset(time, np.ones(100), np.ones(100), 0.05)
+
+
+def test_squares_of_independent_errors_lie_on_a_line():
+    """Against numpy's own line, and exactly where there is no scatter."""
+    rng = np.random.default_rng(8)
+    speed = rng.uniform(10, 1500, 60)
+    assert static_error_and_lag(speed, np.hypot(4.0, 0.012 * speed)) == pytest.approx((4.0, 0.012), rel=1e-9)
+    error = np.abs(np.hypot(4.0, 0.012 * speed) + rng.normal(size=60))
+    slope, intercept = np.polyfit(speed**2, error**2, 1)
+    assert static_error_and_lag(speed, error) == pytest.approx((np.sqrt(intercept), np.sqrt(slope)), rel=1e-7)
+    assert static_error_and_lag([1.0, 2.0], [2.0, 1.0])[1] == 0.0
+    with pytest.raises(ValueError, match="speeds must differ"):
+        static_error_and_lag([5.0, 5.0, 5.0], [1.0, 2.0, 3.0])
+
+
+def test_medians_of_intervals():
+    medians = median_over_speed([0.1, 0.2, 0.3, 1.1], [1.0, 5.0, 3.0, 7.0], [0.0, 1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(medians, [3.0, 7.0, np.nan])

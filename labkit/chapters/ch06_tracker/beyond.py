@@ -6,6 +6,7 @@ from ...exercises import metrics
 from ...exercises.engine import Exercise, Mistake, Prediction
 from ...geometry.frames import unit_vector
 from ...machines import stations
+from ...machines.accuracy import static_error_and_lag
 
 # Base stations ---------------------------------------------------------------------------------------------------------------
 
@@ -60,6 +61,30 @@ def _along(d):
 
 def _across(d):
     return np.eye(3) - _along(d)
+
+
+# Errors over speed -----------------------------------------------------------------------------------------------------------
+
+
+def readings_in_motion(rng):
+    """Speeds, mm/s, and errors, mm, of a motion whose tracker lags; the squares scatter about their line."""
+    speed = rng.uniform(20, rng.uniform(900, 1800), int(rng.integers(30, 60)))
+    squares = rng.uniform(3, 9) ** 2 + (rng.uniform(0.008, 0.03) * speed) ** 2
+    return speed, np.sqrt(squares * (1 + 0.1 * rng.uniform(-1, 1, len(speed))))
+
+
+def _line(x, y, end=lambda intercept, slope: (np.sqrt(intercept), np.sqrt(slope))):
+    """Another line through other powers of speed and error; `end` makes the answer of its intercept and slope."""
+
+    def variant(speed, error):
+        slope, intercept = np.polyfit(x(speed), y(error), 1)
+        return tuple(map(float, end(intercept, slope)))
+
+    return variant
+
+
+def _square(v):
+    return v**2
 
 
 STATIONS = [
@@ -197,5 +222,73 @@ STATIONS = [
         choices=("before the run begins", "after its tenth stop", "both alike"),
         answer="after its tenth stop",
         why="Before the run, nearly all of it is one rigid motion of the whole world, and W takes that up. In the middle there are two worlds, and no mounting fits both.",
+    ),
+]
+
+SPEEDS = [
+    Prediction(
+        "tempo",
+        question="The same path in half the time, and a tracker with a constant lag. By which factors do its errors of position and of speed grow?",
+        choices=("2 and 2", "2 and 4", "4 and 4"),
+        answer="2 and 4",
+        why="The position is off by speed times lag, and the speed doubles. The speed is off by acceleration times lag, and the acceleration is four times as large.",
+    ),
+    Exercise(
+        "static_error_and_lag",
+        reference=static_error_and_lag,
+        draw=readings_in_motion,
+        metric=metrics.Several(metrics.Numbers(1e-6, "mm"), metrics.Numbers(1e-9, "s"), names=("e0", "lag")),
+        hints=(
+            "The law bends in speed and error. In which two quantities is it a straight line?",
+            "error^2 against speed^2: the intercept is e0^2, the slope lag^2. Two unknowns, `np.polyfit` or `lstsq`.",
+            "`slope, intercept = np.polyfit(speed**2, error**2, 1)\nreturn np.sqrt(intercept), np.sqrt(slope)`",
+        ),
+        mistakes=[
+            Mistake(
+                _line(_square, _square, lambda i, s: (np.sqrt(s), np.sqrt(i))),
+                "The two have changed places: `np.polyfit` gives the slope first.",
+                id="static_error_and_lag-swapped",
+            ),
+            Mistake(
+                _line(_square, _square, lambda i, s: (i, s)),
+                "These are e0^2 and lag^2, in mm^2 and s^2. Take the roots.",
+                id="static_error_and_lag-squares",
+            ),
+            Mistake(
+                _line(lambda v: v, lambda e: e, lambda i, s: (i, s)),
+                "You laid a line through errors and speeds themselves, as if the errors simply added. Independent errors add as squares.",
+                id="static_error_and_lag-plain",
+            ),
+            Mistake(
+                _line(lambda v: v, _square, lambda i, s: (np.sqrt(max(i, 0)), np.sqrt(s))),
+                "You squared the errors, but not the speeds: error^2 = e0^2 + lag^2 speed^2.",
+                id="static_error_and_lag-speed",
+            ),
+            Mistake(
+                _line(_square, lambda e: e, lambda i, s: (i, np.sqrt(s))),
+                "You squared the speeds, but not the errors: error^2 = e0^2 + lag^2 speed^2.",
+                id="static_error_and_lag-error",
+            ),
+            Mistake(
+                _line(_square, _square, lambda i, s: (np.sqrt(i), 1000 * np.sqrt(s))),
+                "The lag is in milliseconds; wanted are seconds.",
+                id="static_error_and_lag-milliseconds",
+            ),
+            Mistake(
+                _line(_square, _square, lambda i, s: (np.sqrt(i), s)),
+                "The slope is lag^2: take its root as well.",
+                id="static_error_and_lag-root",
+            ),
+            Mistake(
+                lambda speed, error: (0.0, float(np.sqrt((speed**2 @ error**2) / (speed**2 @ speed**2)))),
+                "Your line passes through the origin: what is there at rest, e0, counts as lag.",
+                id="static_error_and_lag-origin",
+            ),
+            Mistake(
+                lambda speed, error: (float(error.min()), static_error_and_lag(speed, error)[1]),
+                "The smallest error of all is the luckiest reading, not what stays at rest: take the intercept of the line.",
+                id="static_error_and_lag-smallest",
+            ),
+        ],
     ),
 ]

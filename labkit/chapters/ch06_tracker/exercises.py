@@ -199,6 +199,28 @@ def _by_qr(M, signed):
     return Q * np.sign(np.diag(R)) if signed else Q
 
 
+def singular_value_ratio(M):
+    """Second smallest singular value of the stacked blocks M over the largest: near 0, a second mounting fits as well."""
+    values = _values(M)
+    return values[-2] / values[0]
+
+
+def _values(M):
+    return np.linalg.svd(M)[1]
+
+
+def stacks(rng):
+    """Stacked blocks of motions about axes that lie within a cone of 5 to 90 deg, with noise; 3 motions and more."""
+    n, width = int(rng.integers(3, 15)), np.deg2rad(rng.uniform(5, 90))
+    tilt = exp_so3(
+        rng.uniform(-width, width, (n, 1)) * unit_vector(np.r_["1", rng.normal(size=(n, 2)), np.zeros((n, 1))])
+    )
+    A = exp_so3(rng.uniform(0.2, 2.0, (n, 1)) * (tilt @ [0.0, 0.0, 1.0]))
+    X = exp_so3(rng.normal(size=3))
+    B = X.T @ A @ X @ exp_so3(0.003 * rng.normal(size=(n, 3)))
+    return (ax_xb.kronecker_matrix(A, B),)
+
+
 def translation_problem(rng):
     A, B = motions(rng)
     return A, B, ax_xb.rotation_from_kronecker(ax_xb.kronecker_matrix(A, B))[0]
@@ -786,6 +808,63 @@ CHAPTER = Chapter(
             ],
         ),
         Exercise(
+            "singular_value_ratio",
+            reference=singular_value_ratio,
+            draw=stacks,
+            metric=metrics.Numbers(1e-9),
+            hints=(
+                "The smallest singular value belongs to the answer itself, the null vector. Which one says how nearly there is a second answer?",
+                "`np.linalg.svd` gives the singular values largest first; `[-2]` is the second smallest.",
+                "`values = np.linalg.svd(M)[1]\nreturn values[-2] / values[0]`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda M: _values(M)[-1] / _values(M)[0],
+                    "The smallest one is near 0 for every good set of motions: it belongs to the mounting itself. The second smallest tells whether "
+                    "there is another.",
+                    id="singular_value_ratio-smallest",
+                ),
+                Mistake(
+                    lambda M: _values(M)[1] / _values(M)[0],
+                    "This is the second largest. NumPy sorts them from large to small: `[-2]`.",
+                    id="singular_value_ratio-second-largest",
+                ),
+                *(
+                    Mistake(
+                        lambda M, k=k: _values(M)[0] / _values(M)[k],
+                        "This is largest over small, a condition number. Asked for is small over largest.",
+                        id=f"singular_value_ratio-inverse{k}",
+                    )
+                    for k in (-2, -1)
+                ),
+                Mistake(
+                    lambda M: _values(M)[-2] / _values(M)[-1],
+                    "You divided by the smallest, which is noise. Divide by the largest.",
+                    id="singular_value_ratio-by-noise",
+                ),
+                Mistake(
+                    lambda M: (_values(M)[-2] / _values(M)[0]) ** 2,
+                    "These are the eigenvalues of M^T M, which are the squares of the singular values of M.",
+                    id="singular_value_ratio-squares",
+                ),
+                Mistake(
+                    lambda M: _values(M)[-2],
+                    "The second smallest itself grows with the number of motions: divide by the largest.",
+                    id="singular_value_ratio-undivided",
+                ),
+                Mistake(
+                    lambda M: _values(M)[-3] / _values(M)[0],
+                    "This is the third smallest.",
+                    id="singular_value_ratio-third",
+                ),
+                Mistake(
+                    lambda M: _values(M[:9])[-2] / _values(M[:9])[0],
+                    "You looked at one motion alone, which never fixes the rotation. Take all rows of M.",
+                    id="singular_value_ratio-one-motion",
+                ),
+            ],
+        ),
+        Exercise(
             "translation_lsq",
             reference=translation_lsq,
             draw=translation_problem,
@@ -1298,5 +1377,6 @@ CHAPTER = Chapter(
                 ),
             ],
         ),
+        *beyond.SPEEDS,
     ],
 )

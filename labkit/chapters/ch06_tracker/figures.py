@@ -223,3 +223,43 @@ def error_by_stop(ax, stops, printed):
     ax.text(stops - 0.5, 1.08 * printed, "mean in the report", ha="right", va="bottom", color=style.MUTED, fontsize=9)
     (line,) = ax.plot([], [], **style.look("measurement", linestyle=":", linewidth=1.0))
     return line
+
+
+class OverSpeed:
+    """Errors of several motions over their speed, medians of intervals, a law through them, and two printed levels."""
+
+    def __init__(self, ax, edges):
+        style.axes(ax, "speed, share of the fastest printed (1.4 m/s or 3.7 rad/s)", "error", "same path, three speeds")
+        ax.set(xlim=(0, edges[-1]), ylim=(0.05, 2000), yscale="log")
+        self.x = 0.5 * (edges[1:] + edges[:-1])
+        self.dots = [
+            ax.plot([], [], **style.look("measurement", marker=marker, markersize=3, alpha=0.55), label=name)[0]
+            for marker, name in ((".", "slow"), ("^", "middle"), ("s", "fast"))
+        ]
+        (self.nonsense,) = ax.plot([], [], **style.look("rejected", markersize=5), label="nonsense")
+        (self.medians,) = ax.plot([], [], **style.look("estimates", markersize=6), label="median")
+        (self.law,) = ax.plot([], [], **style.look("prediction"), label="squares add")
+        self.levels = [ax.plot([], [], **style.look("guide", linewidth=1.6))[0] for _ in range(2)]
+        self.names = [
+            ax.annotate(
+                text, (edges[-1], 1.0), xytext=(-2, -11 if k == 0 else 3), textcoords="offset points", ha="right",
+                color=style.MUTED, fontsize=9,
+            )
+            for k, text in enumerate(("printed mean", "printed largest"))
+        ]  # fmt: skip
+        ax.legend(loc="upper left", ncols=3, fontsize=8)
+        self.artists = [*self.dots, self.nonsense, self.medians, self.law, *self.levels, *self.names]
+
+    def set(self, result):
+        """Draw the result of `stages.compute_over_speed`."""
+        for line, x, y, bad in zip(self.dots, result["share"], result["error"], result["bad"]):
+            line.set_data(x[~bad], y[~bad])
+        x, y, bad = (np.concatenate(result[key]) for key in ("share", "error", "bad"))
+        self.nonsense.set_data(x[bad], y[bad])
+        self.medians.set_data(self.x, result["median"])
+        self.law.set_data(self.x, np.hypot(result["e0"], result["growth"] * self.x))
+        for line, name, level in zip(self.levels, self.names, result["printed"]):
+            line.set_data([0, 2], [level, level])
+            line.set_visible(bool(np.isfinite(level)))
+            name.xy = (name.xy[0], level if np.isfinite(level) else 1.0)
+            name.set_visible(bool(np.isfinite(level)))

@@ -8,13 +8,22 @@ import numpy as np
 from scipy.stats import chi2
 
 from ...calibration import ax_xb
-from ...documents.report.printed import COLUMNS, table_d
+from ...documents.report.printed import COLUMNS, FASTEST, MOTION_ERRORS, table_d
 from ...estimation.gaussian import cut_axes, ellipse, unit_noise
 from ...fast.ax_xb import calibrate_hand_eye, solve_ax_xb
 from ...geometry.frames import invert, matrix_from_quaternion, pose, pose_distance, unit_vector
 from ...geometry.lie import exp_so3
 from ...machines import simulation, stations, udp
-from ...machines.accuracy import filter_positions, shift_time, speeds, summarize, time_offset
+from ...machines.accuracy import (
+    filter_positions,
+    median_over_speed,
+    shift_time,
+    speeds,
+    static_error_and_lag,
+    summarize,
+    time_offset,
+    tracking_errors,
+)
 from ...machines.arm import (
     HOME,
     REACH_FOREARM,
@@ -692,4 +701,93 @@ def moved_station():
         fail={"tilt": 4.0, "when": "at every stop"},
         presets={"after stop 10": {"when": "after stop 10"}},
         describe=lambda r: f"E_trans is {r['E_trans']:.2f} mm, and the mounting is {r['off']:.2f} mm off the truth.",
+    )
+
+
+# ---- errors over speed -----------------------------------------------------------------------------------------------
+
+SHARES = np.linspace(0.0, 1.25, 11)  # edges of the intervals of speed
+OVER = {  # quantity: its place in `TrackingErrors`, its unit, and the speed it is drawn over
+    "position": ("translation", "mm", 0),
+    "rotation": ("rotation", "deg", 1),
+    "speed": ("speed", "mm/s", 0),
+    "angular speed": ("angular_speed", "deg/s", 1),
+}
+
+
+def _printed(quantity, unit):
+    """Mean and largest error as the report prints them, NaN where it prints another unit."""
+    return [value if theirs == unit else np.nan for value, theirs in MOTION_ERRORS[quantity]]
+
+
+@functools.cache
+def _motion_path(name):
+    time, q = simulation.robot_motion(name, 50.0)
+    T = tool_pose(TX40, q, T_FE)
+    return time, T, speeds(time, T)
+
+
+def compute_over_speed(state):
+    """Errors of the slow, middle and fast motion over the speed, figures 10 to 15 of the report.
+
+    Returns a dictionary: share (3 arrays) of the fastest speed, error (3 arrays) in the unit, bad (3 bool arrays),
+    median (10,), e0 and lag (s): what stays and what grows with the speed, nonsense left out; mean and largest error,
+    as they are; unit, printed (2,).
+    """
+    field, unit, kind = OVER[state["of"]]
+    follower = Tracker(nonsense=0.015 if state["nonsense"] else 0.0, burst=2.0, latency=state["latency"] / 1000)
+    share, error, bad = [], [], []
+    for k, name in enumerate(simulation.MOTIONS):
+        time, T, v = _motion_path(name)
+        read, *velocities, wrong = simulation.follow_path(time, T, follower, np.random.default_rng([32, k]))
+        e = getattr(tracking_errors(time, T, read, velocities), field)
+        share.append(v[kind] / FASTEST[kind])
+        error.append(np.rad2deg(e) if kind else e)
+        bad.append(wrong)
+    x, y, good = (np.concatenate(part) for part in (share, error, bad))
+    good = ~good
+    e0, slope = static_error_and_lag(x[good], y[good])
+    return {
+        "share": share, "error": error, "bad": bad, "unit": unit, "printed": _printed(state["of"], unit),
+        "median": median_over_speed(x[good], y[good], SHARES), "e0": e0, "growth": slope,
+        "mean": float(y.mean()), "largest": float(y[good].max()),
+        "lag": slope / (FASTEST[0], np.rad2deg(FASTEST[1]))[kind] if "speed" not in field else None,
+    }  # fmt: skip
+
+
+def over_speed():
+    """Error against speed for three motions through the same points, with what the report prints."""
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2, width_ratios=(1.8, 1))
+        picture = draw.OverSpeed(left, SHARES)
+        style.bare(right)
+        words = right.text(0.0, 0.95, "", transform=right.transAxes, va="top", linespacing=1.6)
+
+        def update(state, result):
+            picture.set(result)
+            lag = "" if result["lag"] is None else f"\nas of a lag of {1000 * result['lag']:.1f} ms"
+            words.set_text(
+                f"{state['of']}, {result['unit']}\n\nat rest {result['e0']:.2g}\n"
+                f"at the fastest {np.hypot(result['e0'], result['growth']):.2g}{lag}\n\n"
+                f"mean of all {result['mean']:.2g}\nlargest but nonsense {result['largest']:.2g}"
+            )
+
+        return [*picture.artists, words], update
+
+    return Stage(
+        "error over speed",
+        scene=scene,
+        compute=compute_over_speed,
+        controls={
+            "of": Choice(list(OVER), "position", label="error of"),
+            "latency": Slider(0.0, 40.0, 8.0, step=1.0, label="latency (ms)"),
+            "nonsense": Toggle(False, "nonsense"),
+        },
+        fail={"of": "position", "latency": 40.0, "nonsense": True},
+        presets={"no lag": {"latency": 0.0}, "speed": {"of": "speed"}},
+        describe=lambda r: (
+            f"At rest {r['e0']:.2g} {r['unit']}, at the fastest {np.hypot(r['e0'], r['growth']):.2g} {r['unit']}; "
+            f"the mean of all readings is {r['mean']:.2g}."
+        ),
     )

@@ -15,6 +15,13 @@ from ..ledger import half_unit
 COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw", "E_trans", "E_rot", "mean_mm", "mean_deg", "max_mm", "max_deg")
 RUNS = 6
 POSES = 20  # measuring poses of a run besides the reference (21 in all)
+MOTION_ERRORS = {  # in motion: mean (section 3.2, summary) and largest (conclusion), each with its unit
+    "position": ((15.0, "mm"), (25.0, "mm")),
+    "rotation": ((1.0, "deg"), (3.0, "deg")),
+    "speed": ((10.0, "mm/s"), (40.0, "mm/s")),
+    "angular speed": ((5.0, "rad/s"), (3.0, "deg/s")),
+}
+FASTEST = (1400.0, 3.7)  # mm/s and rad/s: the highest of motion 3, section 3.2
 UPSIDE_DOWN, COPIED = (2, COLUMNS.index("max_mm")), (3, COLUMNS.index("max_deg"))
 
 
