@@ -28,8 +28,7 @@ from labkit.documents.report import printed as report
 from labkit.documents.report.reconstruction import synthetic_mountings, synthetic_table
 from labkit.exercises import course
 from labkit.geometry.frames import relative, rotation_angle
-from labkit.geometry.lie import log_so3
-from labkit.machines import accuracy, arm, simulation, stations, udp
+from labkit.machines import accuracy, arm, simulation, udp
 from labkit.machines.log import average_stops, read_csv
 from labkit.machines.mounting import calibrate_mounting
 from labkit.tables import DATA, read_table
@@ -286,6 +285,8 @@ mounting = ex.mounting(mounting)
 # the true one.
 
 # %% ratio-of-motions
+from labkit.geometry.lie import log_so3
+
 A_k, B_k = A[kept][1:, :3, :3], B[kept][1:, :3, :3]
 axes = log_so3(A_k) / np.linalg.norm(log_so3(A_k), axis=1, keepdims=True)
 alike = np.argsort(np.abs(axes @ np.linalg.svd(axes)[2][0]))
@@ -417,6 +418,8 @@ def nearest_to_rays(origins, directions):
 # nine diodes even a single station suffices, in principle. Compare the depth:
 
 # %% one-or-two-stations
+from labkit.machines import stations
+
 held = arm.tool_pose(arm.TX40, joints[3], simulation.T_FE)
 for n in (1, 2):
     L = stations.STATIONS[:n]
