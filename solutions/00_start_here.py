@@ -85,7 +85,7 @@ ex.predict("twice", guess, reveal=stages.quarter_turns)
 # | $T_{AF}$, `T_AF` | ${}^{A}T_{F}$ | $T_A^F$ | $T^A_F$ | pose of F, seen from A |
 # | $R_i$, $t_i$ | $R_i$, $P_i$ | rotation and last column of $T_A^F$ | $R$, $p$ | rotation, translation |
 #
-# **Units.** Lengths are mm in chapters 1 to 6 and m in chapters 7 to 9, as in the documents; chapter 8 filters the tracker of chapter 6, in mm, at its end. Angles are radians inside; degrees appear only in names ending in `_deg`.
+# **Units.** Lengths are mm in chapters 1 to 6 and 11, and m in chapters 7 to 9, as in the documents; chapter 8 filters the tracker of chapter 6, in mm, at its end. Angles are radians inside; degrees appear only in names ending in `_deg`.
 
 # %% colors [markdown]
 # ## Colors

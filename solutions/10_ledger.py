@@ -142,6 +142,8 @@ for row in rows:
 # 1. Why is *misprint* allowed only with a computed proof, and what do we call a number that merely looks odd?
 # 2. A row is *rounding* with a bound of 0.4 mm. What would you ask the authors for?
 # 3. Pick one *unpublished* row. Which is the smallest file that would have made it checkable?
+#
+# Chapter 11 asks the same of data of your own.
 
 # %% progress
 ex.progress()

@@ -21,27 +21,18 @@ sys.path.insert(0, str(HERE.parent.parent))
 
 from labkit.geometry.frames import invert, kuka_from_matrix, pose
 from labkit.geometry.lie import exp_so3
+from labkit.machines.sensor_cell import CELL
 
 SEED = 11
-T_FS = pose(exp_so3([0.1, -0.3, 1.2]), [42.0, -18.0, 96.0])  # the sensor on the flange, mm
-T_BT = pose(exp_so3([0.2, 3.0, 0.1]), [850.0, 120.0, 60.0])  # the target in the base
-STD_ROT, STD_TRANS = np.deg2rad(0.08), 0.15  # of a reading, per axis: rad and mm
+T_FS, T_BT, STD_ROT, STD_TRANS = CELL.T_FS, CELL.T_BT, CELL.std_rot, CELL.std_trans
 SLIP, SLIP_AFTER = pose(exp_so3(np.deg2rad([0.0, 0.6, 0.0])), [0.0, 1.5, -2.0]), 14
 CLOCK, PAUSE = -0.084, (14.0, 15.5)  # s
-
-
-def readings(rng, robot, mounting):
-    """The target as the sensor sees it, with noise."""
-    seen, n = invert(robot @ mounting) @ T_BT, len(robot)
-    seen[:, :3, 3] += STD_TRANS * rng.normal(size=(n, 3))
-    return pose(seen[:, :3, :3] @ exp_so3(STD_ROT * rng.normal(size=(n, 3))), seen[:, :3, 3])
 
 
 def looking(rng, n):
     """Flange poses from which the sensor sees the target from half a meter, tilted up to 30 deg."""
     tilt = np.deg2rad(30) * rng.uniform(-1, 1, (n, 3))
-    seen = pose(exp_so3(tilt), np.column_stack([rng.uniform(-60, 60, (n, 2)), rng.uniform(420, 580, n)]))
-    return T_BT @ invert(seen) @ invert(T_FS)
+    return CELL.looking(tilt, np.column_stack([rng.uniform(-60, 60, (n, 2)), rng.uniform(420, 580, n)]))
 
 
 def quaternions(T):
@@ -51,7 +42,7 @@ def quaternions(T):
 def swapped_role(rng):
     """{file: lines}: the sensor's poses are inverted."""
     robot = looking(rng, 18)
-    sensor = invert(readings(rng, robot, T_FS))
+    sensor = invert(CELL.read(robot, rng))
     kuka = kuka_from_matrix(robot)
     kuka[:, 3:] = np.rad2deg(kuka[:, 3:])
     sensor[:, :3, 3] /= 1000
@@ -66,7 +57,7 @@ def slipped_screw(rng):
     """{file: lines}: the bracket moves after row 14."""
     robot = looking(rng, 24)
     mounting = np.where((np.arange(24) < SLIP_AFTER)[:, None, None], T_FS, T_FS @ SLIP)
-    for name, T in (("robot.csv", robot), ("sensor.csv", readings(rng, robot, mounting))):
+    for name, T in (("robot.csv", robot), ("sensor.csv", CELL.read(robot, rng, mounting))):
         q = np.roll(quaternions(T), 1, axis=1)
         rows = np.column_stack([T[:, :3, 3] / 1000, q])
         yield name, ["x [m];y [m];z [m];qw;qx;qy;qz", *(";".join(f"{v:.7f}" for v in row) for row in rows)]

@@ -80,11 +80,14 @@ def refuse_one_axis(T, name="the flange"):
     """Refuse poses that turn about one axis only, or not at all: they leave a direction free."""
     spread, axes = axis_spread(T)
     if spread[0] < LEAST_TURN:
-        raise ValueError(f"{name} does not turn, by {np.rad2deg(spread[0]):.2g} deg (rms): nothing can be calibrated")
-    if spread[1] < LEAST_TURN:
         raise ValueError(
-            f"{name} turns about one axis only, {axis_name(axes[:, 0], 'flange')}, by {np.rad2deg(spread[0]):.3g} deg, "
-            f"and by {np.rad2deg(spread[1]):.2g} deg across it: one direction stays free, tilt it about a second axis"
+            f"{name} does not turn, by {round(np.rad2deg(spread[0]), 3):.2g} deg (rms): nothing can be calibrated"
+        )
+    if spread[1] < LEAST_TURN:
+        along, across = np.rad2deg(spread[0]), round(np.rad2deg(spread[1]), 3)
+        raise ValueError(
+            f"{name} turns about one axis only, {axis_name(axes[:, 0], 'flange')}, by {along:.3g} deg, and by "
+            f"{across:.2g} deg across it: one direction stays free, tilt it about a second axis"
         )
 
 

@@ -500,10 +500,12 @@ def _cautions(kept, noise):
     share, freedom, said = 1 - kept.mean(), noise.freedom.min(), ()
     if share > MANY_REJECTED:
         said += (f"{100 * share:.0f} % of the rows disagree with the others: look at them before you trust the rest",)
-    if freedom < FEW_FREEDOM:
+    if freedom < 1:
+        said += ("so few rows leave nothing to estimate the noise from: no standard deviation can be trusted",)
+    elif freedom < FEW_FREEDOM:
         said += (
             f"so few rows leave {freedom:.1f} degrees of freedom for the noise: every standard deviation may be off by "
-            f"{100 / np.sqrt(2 * max(freedom, 0.5)):.0f} %",
+            f"{100 / np.sqrt(2 * freedom):.0f} %",
         )
     return said
 

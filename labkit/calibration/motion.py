@@ -1,10 +1,87 @@
-"""What the robot has to do so that a calibration is determined, and the refusal that names what is missing."""
+"""Motions of robot and sensor: what no mounting can change of them, and what they must do so that a calibration is
+determined.
+
+A X = X B makes B the same screw as A, seen from elsewhere: both turn by the same angle and shift by the same length
+along their axes. Source: Chen, "A screw motion approach to uniqueness analysis of head-eye geometry", CVPR 1991.
+"""
 
 import numpy as np
 
-from ..checks import shown
+from ..checks import as_transforms, shown
+from ..geometry.frames import invert
+from ..geometry.lie import log_so3
 
 MIN_TURN = 1e-3  # rad: poses turned by less than this about an axis do not fix what is shifted along the other
+
+
+def motions(T_BF, T_ST):
+    """Motions of flange and sensor from each row to the next, A X = X B with X = T_FS.
+
+    Parameters
+    ----------
+    T_BF : array-like, shape (n, 4, 4)
+        Flange in base.
+    T_ST : array-like, shape (n, 4, 4)
+        Target in sensor.
+
+    Returns
+    -------
+    A, B : arrays, shape (n - 1, 4, 4)
+
+    Raises
+    ------
+    ValueError
+        Fewer than two rows, or not as many of both.
+    """
+    T_BF, T_ST = as_transforms(T_BF, "T_BF"), as_transforms(T_ST, "T_ST")
+    if T_BF.ndim != 3 or T_BF.shape != T_ST.shape or len(T_BF) < 2:
+        raise ValueError(f"T_BF and T_ST must have shape (n, 4, 4), n at least 2, got {T_BF.shape} and {T_ST.shape}")
+    return invert(T_BF[:-1]) @ T_BF[1:], T_ST[:-1] @ invert(T_ST[1:])
+
+
+def screw(T):
+    """Angle of a motion and its shift along the axis: the same for A and B whatever the mounting.
+
+    Parameters
+    ----------
+    T : array-like, shape (..., 4, 4)
+
+    Returns
+    -------
+    angle : array, shape (...)
+        Between 0 and pi (rad).
+    shift : array, shape (...)
+        In the unit of the positions, along the axis about which the angle is positive; where nothing turns, the length
+        of the translation.
+    """
+    T = as_transforms(T, "T")
+    phi, t = log_so3(T[..., :3, :3]), T[..., :3, 3]
+    angle = np.linalg.norm(phi, axis=-1)
+    turns = angle > 0
+    along = (phi * t).sum(-1) / np.where(turns, angle, 1.0)
+    return angle, np.where(turns, along, np.linalg.norm(t, axis=-1))
+
+
+def between_axes(T, apart=1):
+    """Angles between the axes of motions: the same for A and B whatever the mounting.
+
+    Motions that share a row keep this angle even where one file holds the inverse poses; two apart they do not.
+
+    Parameters
+    ----------
+    T : array-like, shape (n, 4, 4)
+        Motions that turn.
+    apart : int
+        Each is compared with the one so many further on.
+
+    Returns
+    -------
+    angles : array, shape (n - apart,)
+        Between 0 and pi (rad).
+    """
+    phi = log_so3(as_transforms(T, "T")[:, :3, :3])
+    axes = phi / np.linalg.norm(phi, axis=1, keepdims=True)
+    return np.arccos(np.clip((axes[apart:] * axes[:-apart]).sum(1), -1, 1))
 
 
 def turning(R, weights):

@@ -265,18 +265,7 @@ class HandEyeModel(Model):
         predicted = invert(self.T_BF @ X) @ Y  # the reading without noise
         turn = log_so3(np.swapaxes(predicted[:, :3, :3], 1, 2) @ self.T_ST[:, :3, :3])
         gap = self.T_ST[:, :3, 3] - predicted[:, :3, 3]
-        return np.concatenate([turn, gap], 1), self._derivative(self.T_BF, predicted, X)
-
-    @staticmethod
-    def _derivative(T_BF, predicted, X):
-        """Derivative (n, 6, 12) of residuals at flange poses and the readings that are predicted there."""
-        J = np.zeros((len(T_BF), 6, 12))
-        J[:, :3, :3] = np.swapaxes(predicted[:, :3, :3], 1, 2)
-        J[:, :3, 6:9] = -np.eye(3)
-        J[:, 3:, :3] = -skew(predicted[:, :3, 3])
-        J[:, 3:, 3:6] = X[:3, :3].T
-        J[:, 3:, 9:] = -X[:3, :3].T @ np.swapaxes(T_BF[:, :3, :3], 1, 2)
-        return J
+        return np.concatenate([turn, gap], 1), hand_eye_derivative(self.T_BF, predicted, X)
 
     def start(self):
         return self._candidate[0]
@@ -330,7 +319,32 @@ class HandEyeModel(Model):
         readings = np.repeat(some, 18, axis=0)
         readings[:, :3, :3] = np.tile(turned_both_ways(), (len(some), 1, 1)) @ readings[:, :3, :3]
         flange = Y @ invert(readings) @ invert(X)
-        return flange, self._derivative(flange, readings, X)
+        return flange, hand_eye_derivative(flange, readings, X)
+
+
+def hand_eye_derivative(T_BF, predicted, T_FS):
+    """Derivative of the residuals of hand-eye readings by the poses of sensor and target.
+
+    Parameters
+    ----------
+    T_BF : array, shape (n, 4, 4)
+        Flange poses.
+    predicted : array, shape (n, 4, 4)
+        The readings that are predicted there, T_ST without noise.
+    T_FS : array, shape (4, 4)
+
+    Returns
+    -------
+    J : array, shape (n, 6, 12)
+        Rows: rotation vector, translation. Columns: those of T_FS, then of T_BT.
+    """
+    J, R = np.zeros((len(T_BF), 6, 12)), T_FS[:3, :3]
+    J[:, :3, :3] = np.swapaxes(predicted[:, :3, :3], 1, 2)
+    J[:, :3, 6:9] = -np.eye(3)
+    J[:, 3:, :3] = -skew(predicted[:, :3, 3])
+    J[:, 3:, 3:6] = R.T
+    J[:, 3:, 9:] = -R.T @ np.swapaxes(T_BF[:, :3, :3], 1, 2)
+    return J
 
 
 class PivotModel(Model):

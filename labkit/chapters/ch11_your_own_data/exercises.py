@@ -1,0 +1,423 @@
+"""Chapter 11: what no mounting can change, what each row says, an honest covariance, and the next pose."""
+
+import functools
+
+import numpy as np
+
+from ...calibration import calibrate, motion
+from ...calibration.own_data import Noise
+from ...estimation import influence
+from ...exercises import metrics
+from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...files.poses import read_poses
+from ...files.samples import sample_cell
+from ...geometry.frames import invert, pose
+from ...geometry.lie import exp_so3, log_so3
+
+# --- draws -----------------------------------------------------------------------------------------------------------
+
+
+def rows_of_a_cell(rng):
+    """Flange poses and exact readings of some rows, from random places."""
+    n = int(rng.integers(4, 10))
+    T_BF = pose(exp_so3(rng.uniform(-1, 1, (n, 3))), rng.uniform(-400, 400, (n, 3)))
+    X = pose(exp_so3(rng.uniform(-1, 1, 3)), rng.uniform(-150, 150, 3))
+    Y = pose(exp_so3(rng.uniform(-1, 1, 3)), rng.uniform(-900, 900, 3))
+    return T_BF, invert(T_BF @ X) @ Y
+
+
+def some_motions(rng, apart):
+    """Motions that turn by 10 to 120 deg about axes in all directions, and how far apart they are compared."""
+    n = int(rng.integers(5, 10))
+    while True:
+        axes = rng.normal(size=(n, 3))
+        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+        cosines = (axes[apart:] * axes[:-apart]).sum(1)
+        if np.abs(cosines).max() < 0.95 and cosines.min() < -0.2:
+            break
+    return pose(exp_so3(rng.uniform(0.2, 2.0, (n, 1)) * axes), rng.uniform(-300, 300, (n, 3))), apart
+
+
+def fitted_line(rng):
+    """Residuals of a linear fit of p parameters to n numbers, and its derivative."""
+    p = int(rng.integers(2, 5))
+    n = p + int(rng.integers(4, 9))
+    J, noise = rng.normal(size=(n, p)) * rng.uniform(0.3, 3.0), rng.uniform(0.2, 4.0) * rng.normal(size=n)
+    return noise - J @ np.linalg.lstsq(J, noise, rcond=None)[0], J
+
+
+def information(rng, p=None):
+    """A covariance (p, p) of parameters of very different size."""
+    p = p or int(rng.integers(3, 7))
+    M = rng.normal(size=(p, p + 2)) * rng.uniform(0.02, 3.0, (p, 1))
+    return M @ M.T + 1e-3 * np.diag(rng.uniform(0.5, 1.5, p))
+
+
+def covariance_and_reading(rng):
+    """A covariance, and the derivative of one more reading of k numbers."""
+    C = information(rng)
+    return C, rng.normal(size=(int(rng.integers(1, len(C))), len(C))) * rng.uniform(0.3, 2.0)
+
+
+def covariance_and_candidates(rng):
+    """A covariance and derivatives of possible readings among which every wrong rule picks another one."""
+    while True:
+        C, m = information(rng), int(rng.integers(7, 13))
+        candidates = rng.normal(size=(m, int(rng.integers(2, 4)), len(C))) * rng.uniform(0.2, 2.0, (m, 1, 1))
+        picks = [rule(C, candidates) for rule in (next_pose, *WRONG_RULES)]
+        if len({*picks, picks[0] + 1}) == len(picks) + 1:
+            return C, candidates
+
+
+def shares_of_a_fit(rng):
+    """Whitened derivative, noise of a number, and how many standard deviations are taken as seen."""
+    _, J = fitted_line(rng)
+    return J, float(rng.uniform(0.05, 3.0)), float(rng.uniform(3.0, 6.0))
+
+
+# --- references and wrong variants -----------------------------------------------------------------------------------
+
+
+def _changed(change):
+    def variant(T, apart):
+        return change(motion.between_axes(T, apart))
+
+    return variant
+
+
+def _angles(T):
+    return np.linalg.norm(log_so3(T[:, :3, :3]), axis=1)
+
+
+def _axes(T):
+    return log_so3(T[:, :3, :3]) / _angles(T)[:, None]
+
+
+def _angle_between(a, b):
+    return np.arccos(np.clip((a * b).sum(1) / np.linalg.norm(a, axis=1) / np.linalg.norm(b, axis=1), -1, 1))
+
+
+def left_out(r, J):
+    """Reference of the exercise: residuals of each number under the fit to the others, shape (n,)."""
+    return influence.leave_out(r[:, None], J[:, None])[0][:, 0]
+
+
+def _shares(J):
+    return np.einsum("ni,ij,nj->n", J, np.linalg.inv(J.T @ J), J)
+
+
+def honest_covariance(r, J):
+    """Reference of the exercise: covariance of a fit whose noise is estimated from its residuals, (p, p)."""
+    freedom = float(len(r) - J.shape[1])
+    noise = Noise(np.array([np.sqrt(r @ r / freedom)]), np.array([freedom]))
+    return (noise.std * noise.widening)[0] ** 2 * np.linalg.inv(J.T @ J)
+
+
+def _covariance(factor):
+    """r'r times a factor of n and p, times the inverse of J'J."""
+
+    def variant(r, J):
+        n, p = J.shape
+        return factor(r @ r, n, n - p) * np.linalg.inv(J.T @ J)
+
+    return variant
+
+
+def with_one_more(C, J):
+    """Reference of the exercise: covariance after one more reading, whitened derivative J (k, p)."""
+    return np.linalg.inv(np.linalg.inv(C) + J.T @ J)
+
+
+def _volumes(C, candidates):
+    return np.array([np.linalg.det(with_one_more(C, J)) for J in candidates])
+
+
+def next_pose(C, candidates):
+    """Reference of the exercise: number of the candidate that leaves the smallest determinant."""
+    return int(np.argmin(_volumes(C, candidates)))
+
+
+def _smallest_trace(C, candidates):
+    return int(np.argmin([np.trace(with_one_more(C, J)) for J in candidates]))
+
+
+def _largest_derivative(C, candidates):
+    return int(np.argmax([(J**2).sum() for J in candidates]))
+
+
+def _largest_volume(C, candidates):
+    return int(np.argmax(_volumes(C, candidates)))
+
+
+def _least_certain(C, candidates):
+    return int(np.argmax([np.trace(J @ C @ J.T) for J in candidates]))
+
+
+WRONG_RULES = (_smallest_trace, _largest_derivative, _largest_volume, _least_certain)
+
+
+def visible(J, std, times):
+    """Reference of the exercise: the error of each number that the fit shows, shape (n,)."""
+    return std * influence.visible_errors(J, times)
+
+
+# --- the planted faults ----------------------------------------------------------------------------------------------
+
+
+@functools.cache
+def slipped():
+    """The calibration of the cell whose screw slipped."""
+    robot, sensor = (read_poses(path).in_unit("mm") for path in sample_cell("slipped_screw"))
+    return calibrate.hand_eye(robot.T, sensor.T)
+
+
+def first_slipped():
+    """The first row that fits the other mounting."""
+    return slipped().rejected[0]
+
+
+CHAPTER = Chapter(
+    "11-your-own-data",
+    title="Your own data",
+    items=[
+        Exercise(
+            "motions",
+            reference=motion.motions,
+            draw=rows_of_a_cell,
+            metric=metrics.Several(metrics.Poses(1e-6, 1e-6), metrics.Poses(1e-6, 1e-6), names=("A", "B")),
+            hints=(
+                "Write the loop for row i and for row i + 1. Both equal T_BT, so they equal each other.",
+                "T_BF[i] X T_ST[i] = T_BF[i+1] X T_ST[i+1]: bring all of the robot to the left, all of the sensor to the right.",
+                "`return invert(T_BF[:-1]) @ T_BF[1:], T_ST[:-1] @ invert(T_ST[1:])`",
+            ),
+            mistakes=[
+                Mistake(lambda F, S: (invert(F[:-1]) @ F[1:], S[1:] @ invert(S[:-1])),
+                        "Your B leads back, from row i + 1 to row i, while A leads on: B = T_ST[i] inv(T_ST[i+1])."),
+                Mistake(lambda F, S: (invert(F[:-1]) @ F[1:], invert(S[:-1]) @ S[1:]),
+                        "You built B like A. The target stands on the other side of the sensor: B = T_ST[i] inv(T_ST[i+1])."),
+                Mistake(lambda F, S: (F[1:] @ invert(F[:-1]), S[:-1] @ invert(S[1:])),
+                        "Your A is the motion as the base sees it. X stands at the flange: A = inv(T_BF[i]) T_BF[i+1]."),
+                Mistake(lambda F, S: (F[:-1] @ invert(F[1:]), S[:-1] @ invert(S[1:])),
+                        "You built A like B. The base stands on the other side of the flange: A = inv(T_BF[i]) T_BF[i+1]."),
+                Mistake(lambda F, S: (invert(F[1:]) @ F[:-1], S[1:] @ invert(S[:-1])),
+                        "Both motions lead from each row back to the one before. Asked for is from each row to the next."),
+                Mistake(lambda F, S: (invert(F[1:]) @ F[:-1], S[:-1] @ invert(S[1:])),
+                        "Your A leads back, from row i + 1 to row i, while B leads on: A = inv(T_BF[i]) T_BF[i+1]."),
+                Mistake(lambda F, S: (S[:-1] @ invert(S[1:]), invert(F[:-1]) @ F[1:]),
+                        "A and B have changed places: A is the flange's motion."),
+                Mistake(lambda F, S: (invert(F[:1]) @ F[1:], S[:1] @ invert(S[1:])),
+                        "You always start from the first row. Asked for is from each row to the next."),
+                Mistake(lambda F, S: (F[:-1] @ F[1:], S[:-1] @ S[1:]),
+                        "You multiplied the two poses without inverting one: that is no motion from one to the other."),
+                Mistake(lambda F, S: (np.swapaxes(F[:-1], 1, 2) @ F[1:], S[:-1] @ np.swapaxes(S[1:], 1, 2)),
+                        "The transpose of a 4 x 4 pose is not its inverse. Use `invert`."),
+                Mistake(lambda F, S: (invert(F) @ np.roll(F, -1, 0), S @ invert(np.roll(S, -1, 0))),
+                        "You closed the circle from the last row to the first: n rows make n - 1 motions."),
+            ],
+        ),
+        Prediction(
+            "inverted",
+            question="One of the two files holds the inverse poses. What of the motions from row to row changes?",
+            choices=("the angles", "the angles and the shifts along the axes", "neither of them"),
+            answer="neither of them",
+            why="The inverse motion turns by the same angle and shifts as far. What changes is how the axes of two motions that share no row stand to one another.",
+        ),
+        Exercise(
+            "between_axes",
+            reference=motion.between_axes,
+            draw=tuple(functools.partial(some_motions, apart=k) for k in (2, 1, 3)),
+            metric=metrics.Numbers(1e-7, "rad"),
+            hints=(
+                "The rotation vector of a motion points along its axis. Its length is the angle, which should not matter here.",
+                "Bring the rotation vectors to length 1; the scalar product of two of them is the cosine of the angle between.",
+                "`phi = log_so3(T[:, :3, :3])\n"
+                "axes = phi / np.linalg.norm(phi, axis=1, keepdims=True)\n"
+                "return np.arccos(np.clip((axes[apart:] * axes[:-apart]).sum(axis=1), -1, 1))`",
+            ),
+            mistakes=[
+                Mistake(_changed(np.rad2deg), "These are degrees. Inside, angles are radians."),
+                Mistake(_changed(np.cos), "These are the cosines: np.arccos is missing."),
+                Mistake(_changed(lambda a: np.arccos(np.abs(np.cos(a)))),
+                        "Your angles end at 90 deg. An axis has a direction, the one about which the angle is positive, so two may stand at up to 180."),
+                Mistake(_changed(lambda a: np.pi - a), "One of your axes points the other way in each pair."),
+                Mistake(lambda T, k: np.linalg.norm(log_so3(np.swapaxes(T[:-k, :3, :3], 1, 2) @ T[k:, :3, :3]), axis=1),
+                        "This is the angle of the turn between two motions. Asked for is the angle between their axes."),
+                Mistake(lambda T, k: np.abs(_angles(T)[k:] - _angles(T)[:-k]),
+                        "This compares how far two motions turn. Asked for is the angle between their axes."),
+                Mistake(lambda T, k: np.arccos(np.clip((log_so3(T[k:, :3, :3]) * log_so3(T[:-k, :3, :3])).sum(1), -1, 1)),
+                        "Your rotation vectors have the length of the angle. Bring them to length 1 before the scalar product."),
+                Mistake(lambda T, k: np.arccos(np.clip((_axes(T)[k:] * _axes(T)[:1]).sum(1), -1, 1)),
+                        "You compare every axis with the first. Asked for is each with the one `apart` further on."),
+                Mistake(lambda T, k: motion.between_axes(T, 1), "You compare neighbors whatever `apart` says."),
+                Mistake(lambda T, k: np.arccos(np.clip((_axes(T) * np.roll(_axes(T), -k, 0)).sum(1), -1, 1)),
+                        "You closed the circle from the last motions to the first: n motions make n - apart pairs."),
+                Mistake(lambda T, k: _angle_between(T[k:, :3, 3], T[:-k, :3, 3]),
+                        "You took the translations. The axis of a motion is that of its rotation."),
+            ],
+        ),
+        Value(
+            "slip_row",
+            reference=first_slipped,
+            unit="",
+            rtol=0.0,
+            atol=0.2,
+            hints=(
+                "The report says which rows it rejected, and whether they agree among themselves.",
+                "`slipped.rejected` lists the rows, counted from 1. Something happened before the first of them.",
+                "`slip_row = slipped.rejected[0]`",
+            ),
+            mistakes=[
+                Mistake(lambda: first_slipped() - 1, "This is the last row before the slip, or the row counted from 0. Asked for is the first one after it, counted from 1."),
+                Mistake(lambda: slipped().rejected[-1], "This is the last row of the file, rejected like those before it. Asked for is the first of them."),
+                Mistake(lambda: len(slipped().rejected), "This is how many rows were rejected. Asked for is the number of the first."),
+            ],
+        ),
+        Exercise(
+            "left_out",
+            reference=left_out,
+            draw=fitted_line,
+            metric=metrics.Numbers(1e-7),
+            hints=(
+                "A number that is fitted pulls the fit toward itself. Its share is h = j' (J'J)^-1 j, with j its row of J.",
+                "Of its own error only 1 - h is left in the residual: divide by that.",
+                "`h = np.einsum('ni,ij,nj->n', J, np.linalg.inv(J.T @ J), J)\n"
+                "return r / (1 - h)`",
+            ),
+            mistakes=[
+                Mistake(lambda r, J: r * (1 - _shares(J)), "You multiplied by 1 - h. The residual is what the fit has already reduced: divide."),
+                Mistake(lambda r, J: r / np.sqrt(1 - _shares(J)),
+                        "Divided by the root of 1 - h the residuals are comparable with each other. Under the fit to the others they are r / (1 - h)."),
+                Mistake(lambda r, J: r / _shares(J), "You divided by the share h itself. What is left of an error is 1 - h."),
+                Mistake(lambda r, J: r / (1 + _shares(J)), "1 + h belongs to a number that was not fitted. These were: 1 - h."),
+                Mistake(lambda r, J: _shares(J), "These are the shares h. Divide the residuals by 1 - h."),
+                Mistake(lambda r, J: 1 - _shares(J), "These are 1 - h. Divide the residuals by them."),
+                Mistake(lambda r, J: r, "You return the residuals of the fit to all. Each number has pulled the fit toward itself."),
+                Mistake(lambda r, J: r / (1 - J.shape[1] / len(r)),
+                        "You gave every number the mean share p / n. Each row of J has a share of its own."),
+                Mistake(lambda r, J: r / (1 - (J**2).sum(1)), "(J'J)^-1 is missing between the two rows of J."),
+            ],
+        ),
+        Prediction(
+            "drop",
+            question="Ten poses: nine turn the flange about one axis, one is tilted across. Which one can you least afford to lose?",
+            choices=("the one with the largest residual", "the one tilted across", "any one, a tenth of the data"),
+            answer="the one tilted across",
+            why="It alone fixes what the nine leave free. Its residual is small for that very reason: nobody contradicts it.",
+        ),
+        Exercise(
+            "honest_covariance",
+            reference=honest_covariance,
+            draw=fitted_line,
+            metric=metrics.Numbers(1e-8),
+            hints=(
+                "First the noise: r'r, divided by the number of residuals less the number of parameters, f.",
+                "C = s^2 (J'J)^-1 would be right if s were known. It is an estimate as well: the variance of Student's law is f / (f - 2).",
+                "`f = len(r) - J.shape[1]\n"
+                "s2 = r @ r / f\n"
+                "return s2 * f / (f - 2) * np.linalg.inv(J.T @ J)`",
+            ),
+            mistakes=[
+                Mistake(_covariance(lambda rr, n, f: rr / n),
+                        "You divided by the number of residuals. The parameters have taken their part: f = n - p. And Student's f / (f - 2) is missing."),
+                Mistake(_covariance(lambda rr, n, f: rr / n * n / (n - 2)),
+                        "Your f is n, the number of residuals. The parameters have taken their part: f = n - p."),
+                Mistake(_covariance(lambda rr, n, f: rr / n * f / (f - 2)),
+                        "Student's factor is right, but the noise is not: divide r'r by f = n - p, not by n."),
+                Mistake(_covariance(lambda rr, n, f: rr / f),
+                        "This is the covariance for a noise that is known. Yours is estimated: Student's factor f / (f - 2) is missing."),
+                Mistake(_covariance(lambda rr, n, f: 1.0), "The noise is missing: this is the covariance for readings of standard deviation 1."),
+                Mistake(_covariance(lambda rr, n, f: np.sqrt(rr / f) * f / (f - 2)), "You multiplied by s. A covariance takes its square."),
+                Mistake(_covariance(lambda rr, n, f: rr / f * np.sqrt(f / (f - 2))),
+                        "sqrt(f / (f - 2)) is the factor of a standard deviation. A covariance takes f / (f - 2)."),
+                Mistake(_covariance(lambda rr, n, f: rr / f * (f - 2) / f), "Student's factor stands upside down: f / (f - 2) is larger than 1."),
+                Mistake(_covariance(lambda rr, n, f: rr * f / (f - 2)), "r'r is the sum of squares. The variance is r'r / f."),
+                Mistake(_covariance(lambda rr, n, f: rr / (f - 1) * f / (f - 2)),
+                        "You took one degree of freedom too many away: with p parameters f = n - p, not n - p - 1."),
+            ],
+        ),
+        Prediction(
+            "coverage",
+            question="Four poses, noise estimated from their residuals, no factor of Student. How often does the truth lie farther away than two of the standard deviations so told?",
+            choices=("1 time in 20", "1 time in 10", "1 time in 3"),
+            answer="1 time in 10",
+            why="With six degrees of freedom the noise itself is off by a third, and where it came out too small the truth lies outside.",
+        ),
+        Exercise(
+            "with_one_more",
+            reference=with_one_more,
+            draw=covariance_and_reading,
+            metric=metrics.Numbers(1e-7),
+            hints=(
+                "What is known adds up, not what is unknown: information is the inverse of a covariance.",
+                "The reading brings the information J'J. Add it to the inverse of C, and invert the sum.",
+                "`return np.linalg.inv(np.linalg.inv(C) + J.T @ J)`",
+            ),
+            mistakes=[
+                Mistake(lambda C, J: np.linalg.inv(C) + J.T @ J, "This is the information. Invert it: asked for is the covariance."),
+                Mistake(lambda C, J: C + J.T @ J, "You added information to a covariance. Invert C first, and the sum in the end."),
+                Mistake(lambda C, J: np.linalg.inv(C + J.T @ J), "You added information to a covariance: the inverse of C is missing inside."),
+                Mistake(lambda C, J: C, "Nothing has changed: the reading is missing."),
+                Mistake(lambda C, J: C - C @ J.T @ np.linalg.solve(J @ C @ J.T, J @ C),
+                        "You took the reading as free of noise. Whitened, its covariance is I: J C J' + I."),
+                Mistake(lambda C, J: C - C @ J.T @ J @ C, "This is the first step toward it. The change is not small: (C^-1 + J'J)^-1, or J C J' + I between."),
+                Mistake(lambda C, J: np.linalg.inv(np.linalg.inv(C) + 2 * J.T @ J), "You counted the reading twice."),
+                Mistake(lambda C, J: np.linalg.inv(2 * np.linalg.inv(C) + J.T @ J), "You counted the data you have twice."),
+                Mistake(lambda C, J: C @ J.T @ np.linalg.solve(J @ C @ J.T + np.eye(len(J)), J @ C),
+                        "This is what the reading takes away. Subtract it from C."),
+            ],
+        ),
+        Prediction(
+            "more",
+            question="Nine poses turn the flange about one axis, and hardly about the others. What makes the worst known direction better: ninety more of the kind, or a single one tilted across by 20 deg?",
+            choices=("ninety more of the kind", "the single one across", "both alike"),
+            answer="the single one across",
+            why="Ninety more divide every standard deviation by the root of eleven. The one across adds what the nine do not have.",
+        ),
+        Exercise(
+            "next_pose",
+            reference=next_pose,
+            draw=covariance_and_candidates,
+            metric=metrics.Exactly(),
+            hints=(
+                "Compute what each candidate would leave, and compare one number of it.",
+                "Angles and lengths have different units, so a trace would add square radians to square millimeters. The determinant, the volume of the ellipsoid squared, needs no common unit.",
+                "`left = [np.linalg.det(with_one_more(C, J)) for J in candidates]\n"
+                "return int(np.argmin(left))`",
+            ),
+            mistakes=[
+                Mistake(_smallest_trace, "You compared the traces. They add squares of different units, and the largest unit decides alone: compare determinants."),
+                Mistake(_largest_derivative, "You took the candidate with the largest derivative. It may well tell what is known already: compute what it leaves."),
+                Mistake(_largest_volume, "You took the candidate that leaves most unknown: the smallest determinant is the best."),
+                Mistake(_least_certain, "You took the reading that can be predicted least. Its numbers may all say the same: compare the determinants of what is left."),
+                Mistake(lambda C, c: next_pose(C, c) + 1, "Candidates count from 0."),
+                Mistake(lambda C, c: c[next_pose(C, c)], "This is the candidate's derivative. Asked for is its number."),
+                Mistake(lambda C, c: float(_volumes(C, c).min()), "This is the determinant it leaves. Asked for is the candidate's number."),
+            ],
+        ),
+        Exercise(
+            "visible",
+            reference=visible,
+            draw=shares_of_a_fit,
+            metric=metrics.Numbers(1e-8),
+            hints=(
+                "An error d of one number leaves (1 - h) d in its own residual. How large is the noise of that residual?",
+                "The standard deviation of the residual is std sqrt(1 - h). The error is seen when (1 - h) d is `times` as large.",
+                "`h = np.einsum('ni,ij,nj->n', J, np.linalg.inv(J.T @ J), J)\n"
+                "return times * std / np.sqrt(1 - h)`",
+            ),
+            mistakes=[
+                Mistake(lambda J, s, k: k * s / (1 - _shares(J)), "The noise of a residual shrinks as well, by the root of 1 - h: one root is left in the denominator."),
+                Mistake(lambda J, s, k: k * s * np.sqrt(1 - _shares(J)),
+                        "This is how large the residual is. The error behind it is larger, by 1 / (1 - h)."),
+                Mistake(lambda J, s, k: k * s * (1 - _shares(J)), "A number with a large share hides its error better, not worse: divide by the root of 1 - h."),
+                Mistake(lambda J, s, k: np.full(len(J), k * s), "This holds for a number that the fit does not use. Each fitted number hides part of its error: its share h is missing."),
+                Mistake(lambda J, s, k: k * s / np.sqrt(_shares(J)), "You divided by the root of the share h. What the others check is 1 - h."),
+                Mistake(lambda J, s, k: k / np.sqrt(1 - _shares(J)), "The noise is missing: these are standard deviations, not the unit of the readings."),
+                Mistake(lambda J, s, k: s / np.sqrt(1 - _shares(J)), "`times` is missing: an error of one standard deviation is not seen."),
+                Mistake(lambda J, s, k: k * s**2 / np.sqrt(1 - _shares(J)), "You took the variance of the noise. Its standard deviation belongs here."),
+                Mistake(lambda J, s, k: np.full(len(J), k * s / np.sqrt(1 - J.shape[1] / len(J))),
+                        "You gave every number the mean share p / n. Each row of J has a share of its own."),
+            ],
+        ),
+    ],
+)  # fmt: skip

@@ -1,0 +1,72 @@
+"""A synthetic cell: a sensor on a flange that looks at one target, to be measured as often as one likes.
+
+The files of `data/own_data` were measured in `CELL`; a calibration of them can be held against its truth, and a pose
+that seems worth measuring can be measured.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry.frames import invert, pose
+from ..geometry.lie import exp_so3
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """Where things are, and how well the sensor reads.
+
+    Attributes
+    ----------
+    T_FS, T_BT : array, shape (4, 4)
+        Sensor on the flange and target in the base (mm).
+    std_rot, std_trans : float
+        Noise of a reading per axis (rad, mm).
+    """
+
+    T_FS: np.ndarray
+    T_BT: np.ndarray
+    std_rot: float
+    std_trans: float
+
+    def read(self, T_BF, rng, T_FS=None):
+        """The target as the sensor sees it from flange poses, with noise.
+
+        Parameters
+        ----------
+        T_BF : array, shape (n, 4, 4)
+        rng : numpy.random.Generator
+        T_FS : array, shape (4, 4) or (n, 4, 4), optional
+            Where the sensor sits, when it has moved.
+
+        Returns
+        -------
+        T_ST : array, shape (n, 4, 4)
+        """
+        seen, n = invert(T_BF @ (self.T_FS if T_FS is None else T_FS)) @ self.T_BT, len(T_BF)
+        seen[:, :3, 3] += self.std_trans * rng.normal(size=(n, 3))
+        return pose(seen[:, :3, :3] @ exp_so3(self.std_rot * rng.normal(size=(n, 3))), seen[:, :3, 3])
+
+    def looking(self, tilt, place):
+        """Flange poses from which the target appears turned and placed so in the sensor.
+
+        Parameters
+        ----------
+        tilt : array-like, shape (n, 3)
+            Rotation vectors (rad).
+        place : array-like, shape (n, 3)
+            In the sensor's frame (mm).
+
+        Returns
+        -------
+        T_BF : array, shape (n, 4, 4)
+        """
+        return self.T_BT @ invert(pose(exp_so3(tilt), place)) @ invert(self.T_FS)
+
+
+CELL = Cell(
+    pose(exp_so3([0.1, -0.3, 1.2]), [42.0, -18.0, 96.0]),
+    pose(exp_so3([0.2, 3.0, 0.1]), [850.0, 120.0, 60.0]),
+    np.deg2rad(0.08),
+    0.15,
+)
