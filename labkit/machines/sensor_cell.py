@@ -13,7 +13,7 @@ from ..geometry.lie import exp_so3
 
 
 @dataclass(frozen=True, eq=False)
-class Cell:
+class SensorCell:
     """Where things are, and how well the sensor reads.
 
     Attributes
@@ -29,7 +29,7 @@ class Cell:
     std_rot: float
     std_trans: float
 
-    def read(self, T_BF, rng, T_FS=None):
+    def read(self, T_BF, rng, T_FS=None, std=1.0):
         """The target as the sensor sees it from flange poses, with noise.
 
         Parameters
@@ -38,14 +38,18 @@ class Cell:
         rng : numpy.random.Generator
         T_FS : array, shape (4, 4) or (n, 4, 4), optional
             Where the sensor sits, when it has moved.
+        std : float
+            How many times the cell's noise; with 0 no generator is needed.
 
         Returns
         -------
         T_ST : array, shape (n, 4, 4)
         """
         seen, n = invert(T_BF @ (self.T_FS if T_FS is None else T_FS)) @ self.T_BT, len(T_BF)
-        seen[:, :3, 3] += self.std_trans * rng.normal(size=(n, 3))
-        return pose(seen[:, :3, :3] @ exp_so3(self.std_rot * rng.normal(size=(n, 3))), seen[:, :3, 3])
+        if not std:
+            return seen
+        seen[:, :3, 3] += std * self.std_trans * rng.normal(size=(n, 3))
+        return pose(seen[:, :3, :3] @ exp_so3(std * self.std_rot * rng.normal(size=(n, 3))), seen[:, :3, 3])
 
     def looking(self, tilt, place):
         """Flange poses from which the target appears turned and placed so in the sensor.
@@ -64,7 +68,7 @@ class Cell:
         return self.T_BT @ invert(pose(exp_so3(tilt), place)) @ invert(self.T_FS)
 
 
-CELL = Cell(
+CELL = SensorCell(
     pose(exp_so3([0.1, -0.3, 1.2]), [42.0, -18.0, 96.0]),
     pose(exp_so3([0.2, 3.0, 0.1]), [850.0, 120.0, 60.0]),
     np.deg2rad(0.08),

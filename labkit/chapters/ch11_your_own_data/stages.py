@@ -112,7 +112,7 @@ def _ten(kind):
 
 
 def compute_without(state):
-    """Covariances with all ten poses and without one, the weakest direction of the rest, and each pose's share."""
+    """Covariances with all ten poses and without one, what the rest leave free, and each pose's share."""
     J, T_BF = _derivatives(_ten(state["kind"]))
     kept = np.arange(10) != state["drop"] - 1
     everything = invert_normal(_normal(J))
@@ -123,23 +123,24 @@ def compute_without(state):
     T_BS = T_BF[0] @ CELL.T_FS
     if determined:
         C = invert_normal(N)
-        _, axes = np.linalg.eigh(C[3:6, 3:6])
-        weak, shares = axes[:, 2], np.einsum("nki,ij,nkj->n", J, C, J) * kept
+        slide, shares = np.zeros(3), np.einsum("nki,ij,nkj->n", J, C, J) * kept
     else:
-        C, weak = None, (vectors[:, 0] / scale)[3:6]
-        weak, shares = weak / np.linalg.norm(weak), np.zeros(10)
+        C, shares = None, np.zeros(10)
+        free = vectors[:, values <= FREE**2 * values[-1]] / scale[:, None]
+        slide = (free @ np.linalg.svd(free[:3])[2][-1])[3:6]  # of what is free, the part that turns nothing
+        slide /= np.linalg.norm(slide)
     std = [float(np.sqrt(np.trace(c[3:6, 3:6]))) if c is not None else np.inf for c in (everything, C)]
     return {
         "T_BF": T_BF, "T_BS": T_BS, "kept": kept, "drop": state["drop"], "everything": everything, "covariance": C,
-        "weak": T_BF[0, :3, :3] @ weak, "shares": shares, "std": std, "determined": determined,
+        "slide": T_BF[0, :3, :3] @ slide, "shares": shares, "std": std, "determined": determined,
     }  # fmt: skip
 
 
 def _without_sentence(result):
     if not result["determined"]:
         return (
-            f"Without pose {result['drop']} the smallest singular value is less than {FREE:g} of the largest: sensor "
-            "and target can slide together along the line drawn."
+            f"Without pose {result['drop']} two singular values are less than {FREE:g} of the largest: the sensor can "
+            "slide along the line through the target, and turn about it, unseen."
         )
     told = f"the sensor's place is known to {result['std'][1]:.2f} mm"
     if not result["drop"]:
@@ -175,8 +176,7 @@ def pose_left_out():
             full.set(at, 60**2 * R @ result["everything"][block, block] @ R.T)
             C = result["covariance"]
             found.set(at, np.zeros((3, 3)) if C is None else 60**2 * R @ C[block, block] @ R.T)
-            length = 0 if result["determined"] else 250
-            weak.set(at + np.outer([-length, length], result["weak"]))
+            weak.set(CELL.T_BT[:3, 3] + np.outer([-250, 250], result["slide"]))
             space.draw(state["view"])
             draw.set_bars(bars, result["shares"])
             cross.set_data([result["drop"]] if result["drop"] else [], [0.3] if result["drop"] else [])
