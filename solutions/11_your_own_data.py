@@ -22,8 +22,7 @@
 import numpy as np
 from IPython.display import display
 
-from labkit.calibration import calibrate
-from labkit.calibration.motion import screw
+from labkit.calibration import calibrate, motion
 from labkit.chapters.ch11_your_own_data import stages
 from labkit.documents import redundancy
 from labkit.exercises import course
@@ -76,7 +75,7 @@ def motions(T_BF, T_ST):
 
 # %% screws-code
 A, B = motions(robot.T, sensor.T)
-(angle_A, shift_A), (angle_B, shift_B) = screw(A), screw(B)
+(angle_A, shift_A), (angle_B, shift_B) = motion.screw(A), motion.screw(B)
 angles, shifts = np.rad2deg(angle_A - angle_B), shift_A - shift_B
 for i in range(0, 23, 3):
     off = f"{angles[i]:6.3f} deg, shifts by {shifts[i]:6.3f} mm"
