@@ -6,7 +6,8 @@
 # **What you will learn.** How a start decides what a search finds, why geometry can matter more than the sensor, what the time step does to a motion model, and why
 # odometry that errs by two centimeters in its first meter is a meter off after fourteen.
 #
-# **What you need.** Derivatives, matrices, covariances; chapter 4 helps with Newton. About 80 minutes.
+# **What you need.** Derivatives, matrices, covariances; chapter 4 helps with Newton. About 80
+# minutes; what is marked *further* goes beyond them.
 
 # %% notation [markdown]
 # | letter | meaning |
@@ -325,6 +326,99 @@ bent = gaussian.bent_region(poses[-1], ends)
 print(f"inside the 95 % ellipse:      {100 * gaussian.share_inside(ends, poses[-1], covs[-1]):.0f} %")
 print(f"inside the 95 % bent region:  {100 * gaussian.share_inside(bent.twists, bent.mean, bent.cov):.0f} %")
 print(f"mean of the ends lags behind: {100 * (poses[-1] - ends.mean(0))[0]:.0f} cm")
+
+# %% unlike-wheels [markdown]
+# ## Wheels that are not alike (*further*)
+#
+# The right wheel is a little larger than the software believes, by `excess` (0.01 is 1 %).
+# The robot counts its way straight on, by the believed radius, and really drives a circle.
+# **How far to the left does it end?** Write the exact answer, then compare: a drift of the
+# lecture's kind and a wheel 1 % too large, after 2, 14 and 50 m.
+
+# %% wheel_offset
+@ex.wheel_offset
+def wheel_offset(way, excess, track):
+    """Return how far to the left (m) the robot ends that counted `way` (m) straight on."""
+    ### BEGIN SOLUTION
+    turn = way * excess / track
+    middle = way * (1 + excess / 2)
+    return middle / turn * (1 - np.cos(turn))
+    ### END SOLUTION
+
+
+# %% unlike-wheels-code
+k_drift = drive.noise["k_drift"]
+for way in (2.0, 14.0, 50.0):
+    std = np.sqrt(k_drift * way**3 / 3)  # of the place, to first order
+    aside = wheel_offset(way, 0.01, 0.5)
+    print(f"{way:4.0f} m: drift {std:5.2f} m (one sigma), wheel {aside:6.2f} m")
+
+# %% unlike-wheels-said [markdown]
+# Noise that changes from meter to meter partly cancels: its mark grows with the power 1.5 of
+# the way. A wrong radius never cancels: it grows with the square, until the circle closes.
+# Nothing in $\Sigma_x$ tells of it. The remedy is to measure it: drive a long line, look
+# where you are, correct the radius (question 2 below asks what you would see).
+
+# %% other-wheels [markdown]
+# ## Other wheels (*further*)
+#
+# "Ackermann- und Mecanumantrieb werden analog behandelt", says the lecture, and leaves it to
+# you. The integration stays; only the way from the wheels to the body's velocity is new.
+#
+# A **car** (*Ackermann*) steers its front wheels by an angle $\delta$. All wheels roll about
+# one point, on the line of the rear axle. The robot's origin is the middle of that axle,
+# $v$ its speed, $L$ the distance between the axles.
+
+# %% ackermann_twist
+@ex.ackermann_twist
+def ackermann_twist(speed, steering, wheelbase):
+    """Return (v, omega) of the rear axle's middle; steering in rad, to the left positive."""
+    ### BEGIN SOLUTION
+    return np.array([speed, speed * np.tan(steering) / wheelbase])
+    ### END SOLUTION
+
+
+# %% mecanum [markdown]
+# A **Mecanum** wheel carries rollers at 45°. Four of them let a robot drive sideways. With
+# half length $a$ and half width $b$ of the robot, the rims run at
+#
+# $$\begin{aligned}
+# w_\mathrm{FL} &= v_x - v_y - (a + b)\,\omega, &
+# w_\mathrm{FR} &= v_x + v_y + (a + b)\,\omega, \\
+# w_\mathrm{RL} &= v_x + v_y - (a + b)\,\omega, &
+# w_\mathrm{RR} &= v_x - v_y + (a + b)\,\omega .
+# \end{aligned}$$
+#
+# Turn it around. The wheels slip, so the four numbers never fit exactly: take what fits best.
+
+# %% mecanum_twist
+@ex.mecanum_twist
+def mecanum_twist(speeds, half_length, half_width):
+    """Return (v_x, v_y, omega) from the rim speeds FL, FR, RL, RR (m/s), shape (4,)."""
+    ### BEGIN SOLUTION
+    lever = half_length + half_width
+    M = np.array([[1, -1, -lever], [1, 1, lever], [1, 1, -lever], [1, -1, lever]])
+    return np.linalg.lstsq(M, speeds, rcond=None)[0]
+    ### END SOLUTION
+
+
+# %% reach [markdown]
+# One command, held for two seconds, from where the gray robot stands. A differential drive
+# turns up to 100°/s, the car steers up to 35° (1 m between its axles), all reach 1 m/s.
+# **A spot one meter to the left, the same heading: which drive gets there?**
+
+# %% predict-reach
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "only Mecanum"
+### END SOLUTION
+ex.predict("reach", guess, reveal=stages.reach)
+
+# %% reach-said [markdown]
+# Press *Make it fail*. The differential drive and the car have two controls for three
+# coordinates: one command reaches a surface of poses, no more. Then *U-turn*: who turns on
+# the spot, and who needs the street? The step of all three is `wheels.step_twist`, with its
+# Jacobians; for $v_y = 0$ it is your `step_arc`.
 
 # %% break-it [markdown]
 # ## Break it

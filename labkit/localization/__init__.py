@@ -2,6 +2,7 @@
 
 lateration  from distances to landmarks
 odometry    by dead reckoning (Koppelnavigation)
+wheels      car and Mecanum wheels: what they make of the body, and its step
 ekf         with landmarks, by an extended Kalman filter
 path        from one's own log: odometry and readings whenever they came
 locate      the same from nothing: clocks mended, a global start, noise fitted

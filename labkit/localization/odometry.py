@@ -153,7 +153,7 @@ def step_jacobians(x, u, dt, model="midpoint"):
 
     by_v = dt * np.sinc(turn / np.pi) if model == "arc" else dt
     turn_by_omega = 0.0 if model == "euler" else dt / 2
-    length_by_omega = v * dt * _sinc_slope(turn) * turn_by_omega if model == "arc" else 0.0
+    length_by_omega = v * dt * sinc_slope(turn) * turn_by_omega if model == "arc" else 0.0
     F_u = np.zeros((*cos.shape, 3, 2))
     F_u[..., 0, 0], F_u[..., 1, 0], F_u[..., 2, 1] = by_v * cos, by_v * sin, dt
     F_u[..., 0, 1] = length_by_omega * cos - length * sin * turn_by_omega
@@ -161,8 +161,17 @@ def step_jacobians(x, u, dt, model="midpoint"):
     return F_x, F_u
 
 
-def _sinc_slope(h):
-    """Derivative of sin(h) / h, with its series where h is small."""
+def sinc_slope(h):
+    """Derivative of sin(h) / h, with its series where h is small.
+
+    Parameters
+    ----------
+    h : array, any shape
+
+    Returns
+    -------
+    array of the same shape
+    """
     small = np.abs(h) < 1e-2
     safe = np.where(small, 1.0, h)
     return np.where(small, h * (-1 / 3 + h**2 * (1 / 30 - h**2 / 840)), (np.cos(safe) - np.sin(safe) / safe) / safe)

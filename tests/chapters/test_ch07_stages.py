@@ -12,7 +12,9 @@ LAYOUT = {
 
 
 @pytest.mark.parametrize(
-    "make", [drives.methods, drives.circles, drives.models, drives.drive, drives.banana], ids=lambda f: f.__name__
+    "make",
+    [drives.methods, drives.circles, drives.models, drives.drive, drives.banana, drives.reach],
+    ids=lambda f: f.__name__,
 )
 def test_stage_moves_fails_and_comes_back(make):
     stage = make()
@@ -102,3 +104,28 @@ def test_fourteen_meters_straight_on_stay_in_the_picture_and_more_do_not():
     for _ in range(5):
         stage._apply({}, ["up"])
     assert "left the picture" in stage.caption
+
+
+def test_only_mecanum_wheels_park_sideways():
+    found = drives.compute_reach({"G": (0.0, 1.0), "heading_deg": 0.0})["drives"]
+    assert found["Mecanum"]["away"] < 1e-6 and found["Mecanum"]["turned_deg"] < 1e-3
+    assert all(found[drive]["away"] + found[drive]["turned_deg"] / 100 > 0.5 for drive in ("differential", "Ackermann"))
+
+
+def test_only_the_car_cannot_turn_on_the_spot():
+    found = drives.compute_reach({"G": (0.0, 0.0), "heading_deg": 180.0})["drives"]
+    assert [drive for drive in drives.DRIVES if found[drive]["turned_deg"] > 1] == ["Ackermann"]
+
+
+@pytest.mark.parametrize("drive", drives.DRIVES)
+def test_a_spot_that_one_command_reaches_is_reached(drive):
+    """Poses the drive itself ends in; and no command drawn or found exceeds its limits."""
+    commands, ends = drives._reached(drive)
+    for k in (3, len(ends) // 3, len(ends) - 7):
+        spot = ends[k]
+        found = drives.compute_reach({"G": tuple(spot[:2]), "heading_deg": np.degrees(spot[2])})["drives"][drive]
+        assert found["away"] < 0.01 and found["turned_deg"] < 1
+        np.testing.assert_allclose(found["path"][0], 0)
+    lengths = np.linalg.norm(np.diff(drives.fan(drive), axis=1), axis=2).sum(1)
+    assert lengths.max() <= drives.HELD * drives.LIMITS["v"] + 1e-9
+    assert np.abs(commands[:, :2]).max() <= 1.0 and np.abs(commands[:, 2]).max() <= drives.LIMITS["omega"] + 1e-9

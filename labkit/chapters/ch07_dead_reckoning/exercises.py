@@ -7,7 +7,7 @@ import numpy as np
 from ...documents.lecture import printed as lecture
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
-from ...localization import lateration, odometry
+from ...localization import lateration, odometry, wheels
 
 # Draws -----------------------------------------------------------------------
 
@@ -97,6 +97,36 @@ def pose_and_covariances(rng, side=1, gear=1):
     return x, 0.1 * M @ M.T, u, dt, 0.05 * N @ N.T
 
 
+def car(rng, left=True, gear=1):
+    """Speed, steering angle to this side, and wheelbase of a car."""
+    steering = (1 if left else -1) * rng.uniform(0.1, 0.9)
+    return gear * rng.uniform(0.3, 3), steering, rng.choice([-1, 1]) * rng.uniform(0.2, 0.6) + rng.uniform(1.2, 3)
+
+
+CARS = tuple(functools.partial(car, left=left, gear=gear) for gear in (1, -1) for left in (True, False))
+
+
+def rolling(rng):
+    """Rim speeds of four Mecanum wheels that slip a little, and half length and half width of the robot."""
+    half_length, half_width = rng.uniform(0.15, 0.3), rng.uniform(0.32, 0.5)
+    twist = rng.uniform(0.3, 1.2, 3) * rng.choice([-1, 1], 3)
+    slip = rng.uniform(0.03, 0.1, 4) * rng.choice([-1, 1], 4)
+    return wheels.mecanum_matrix(half_length, half_width) @ twist + slip, half_length, half_width
+
+
+def unequal_wheels(rng, larger=True, turns=None):
+    """Way that was counted, excess of the right wheel over what is believed, and track; `turns`: how far it is led."""
+    excess, track = (1 if larger else -1) * rng.uniform(0.005, 0.05), rng.uniform(0.2, 0.8)
+    way = rng.uniform(3, 20) if turns is None else turns * track / abs(excess)
+    return way, excess, track
+
+
+UNEQUAL = (
+    unequal_wheels,
+    functools.partial(unequal_wheels, larger=False),
+    functools.partial(unequal_wheels, turns=2.5),
+)
+
 # References and wrong variants ------------------------------------------------
 
 
@@ -132,6 +162,38 @@ def _newton_with_one_jacobian(landmarks, distances, start):
 def _mirrored(landmarks, distances, start):
     roots = lateration.circle_intersections(landmarks, distances)
     return roots[np.argmax(np.linalg.norm(roots - start, axis=1))]
+
+
+def ackermann_twist(speed, steering, wheelbase):
+    return wheels.ackermann_to_twist([speed, steering], wheelbase)
+
+
+def mecanum_twist(speeds, half_length, half_width):
+    return wheels.mecanum_to_twist(speeds, half_length, half_width)[0]
+
+
+def _three_wheels(speeds, half_length, half_width):
+    return np.linalg.solve(wheels.mecanum_matrix(half_length, half_width)[:3], speeds[:3])
+
+
+def _mecanum(lever=lambda a, b: a + b, signs=((1, 1, 1, 1), (-1, 1, 1, -1), (-1, 1, -1, 1)), shares=(4, 4, 4)):
+    """Twist as three signed sums of the four speeds, each divided by its share, the last by the lever as well."""
+
+    def variant(speeds, half_length, half_width):
+        x, y, turn = np.asarray(signs) @ speeds / shares
+        return np.array([x, y, turn / lever(half_length, half_width)])
+
+    return variant
+
+
+def wheel_offset(way, excess, track):
+    turn = way * excess / track
+    return odometry.step([0, 0, 0], [way * (1 + excess / 2), turn], 1.0, "arc")[1]
+
+
+def _offset(of):
+    """A variant from (way of the middle, angle turned, the way counted)."""
+    return lambda way, excess, track: of(way * (1 + excess / 2), way * excess / track, way)
 
 
 def step_euler(x, u, dt):
@@ -1366,6 +1428,208 @@ CHAPTER = Chapter(
             choices=("about 60 %", "about 85 %", "about 95 %"),
             answer="about 85 %",
             why="The true ends lie on a bent band, because a wrong heading swings the way around. An ellipse cannot bend.",
+        ),
+        Exercise(
+            "wheel_offset",
+            reference=wheel_offset,
+            draw=UNEQUAL,
+            metric=metrics.Numbers(1e-6, "m"),
+            hints=(
+                "The larger wheel goes farther than it is believed to: by how much does the robot turn, and how long is the way of its middle?",
+                "It turns by delta = way * excess / track over d = way * (1 + excess / 2), on a circle of radius d / delta. How far aside is its end?",
+                "`turn = way * excess / track\n"
+                "middle = way * (1 + excess / 2)\n"
+                "return middle / turn * (1 - np.cos(turn))`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda way, excess, track: way * excess,
+                    "This is by how much farther the right wheel goes. Divided by the track it is an angle.",
+                ),
+                Mistake(
+                    _offset(lambda d, turn, way: d * turn),
+                    "You take the last heading for the whole way. It grows from 0: to first order half of it counts.",
+                ),
+                Mistake(
+                    _offset(lambda d, turn, way: d * np.sin(turn)),
+                    "You take the last heading for the whole way. It grows from 0 on.",
+                ),
+                Mistake(
+                    _offset(lambda d, turn, way: d * turn / 2),
+                    "Right to first order. Over a long way the arc bends: use the circle itself.",
+                ),
+                Mistake(
+                    _offset(lambda d, turn, way: d * np.sin(turn / 2)),
+                    "The direction of the chord is right. The chord is shorter than the arc: times sin(h) / h, h half the turn.",
+                ),
+                Mistake(
+                    _offset(lambda d, turn, way: way / turn * (1 - np.cos(turn))),
+                    "You let the middle of the robot go the way that was counted. One wheel goes farther: way (1 + excess / 2).",
+                ),
+                Mistake(
+                    lambda way, excess, track: wheel_offset(way, excess, track) * (1 + excess) / (1 + excess / 2),
+                    "You let the middle of the robot go as far as its right wheel.",
+                ),
+                Mistake(
+                    _offset(lambda d, turn, way: d / turn * np.sin(turn)),
+                    "This is how far ahead it ends. Asked is how far to the left.",
+                ),
+                Mistake(
+                    lambda way, excess, track: -wheel_offset(way, excess, track),
+                    "The larger right wheel goes farther, so the robot turns to the left: the sign.",
+                ),
+                Mistake(
+                    lambda way, excess, track: wheel_offset(way, 2 * excess, track) * (1 + excess / 2) / (1 + excess),
+                    "Your turn is twice too large: the difference of the ways is divided by the whole track, not by half of it.",
+                ),
+                Mistake(
+                    lambda way, excess, track: way * excess / track,
+                    "This is the angle by which it turns (rad). Asked is how far aside it ends.",
+                ),
+                Mistake(
+                    lambda way, excess, track: abs(wheel_offset(way, excess, track)),
+                    "Where the right wheel is smaller the robot ends on its right: no absolute value.",
+                ),
+            ],
+        ),
+        Exercise(
+            "ackermann_twist",
+            reference=ackermann_twist,
+            draw=CARS,
+            metric=metrics.Numbers(1e-9),
+            hints=(
+                "All wheels turn about one point on the line of the rear axle. How far aside is it?",
+                "The front wheel looks across the line to that point, so tan(steering) = wheelbase / radius, and omega = v / radius.",
+                "`return np.array([speed, speed * np.tan(steering) / wheelbase])`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda v, d, L: np.array([v, v * np.sin(d) / L]),
+                    "With the sine, v would be the speed of the front wheel. It is that of the rear axle: the tangent.",
+                ),
+                Mistake(
+                    lambda v, d, L: np.array([v * np.cos(d), v * np.sin(d) / L]),
+                    "You take the speed for that of the front wheel. It is that of the middle of the rear axle.",
+                ),
+                Mistake(
+                    lambda v, d, L: np.array([v, v * d / L]), "Right for small angles only: the tangent is missing."
+                ),
+                Mistake(
+                    lambda v, d, L: np.array([v, v * np.tan(d) * L]),
+                    "The wheelbase divides: a longer car turns more slowly.",
+                ),
+                Mistake(
+                    lambda v, d, L: np.array([v, v / (L * np.tan(d))]),
+                    "The tangent is upside down: with straight wheels your car would spin.",
+                ),
+                Mistake(
+                    lambda v, d, L: np.array([v, v * np.tan(d)]),
+                    "The wheelbase is missing: omega is per second, v tan / wheelbase.",
+                ),
+                Mistake(
+                    lambda v, d, L: np.array([v, np.tan(d) / L]),
+                    "This is the curvature, 1 / radius. Times v it is the turn rate.",
+                ),
+                Mistake(
+                    lambda v, d, L: np.array([v, d]),
+                    "The steering angle is no turn rate: a car that stands does not turn.",
+                ),
+                Mistake(
+                    lambda v, d, L: np.array([v, -v * np.tan(d) / L]),
+                    "A sign: wheels turned to the left, driven forward, turn the car to the left.",
+                ),
+                Mistake(
+                    lambda v, d, L: np.array([v, abs(v) * np.tan(d) / L]),
+                    "In reverse the car turns the other way: no absolute value of v.",
+                ),
+                Mistake(
+                    lambda v, d, L: np.array([v, v * np.tan(np.radians(d)) / L]),
+                    "The steering angle is in radians already.",
+                ),
+                Mistake(
+                    lambda v, d, L: np.array([v, 2 * v * np.tan(d) / L]),
+                    "Half the wheelbase would be right for a car whose rear wheels steer as well.",
+                ),
+                Mistake(
+                    lambda v, d, L: np.array([v, v * np.cos(d) / L]),
+                    "The tangent belongs here, not the cosine: with straight wheels a car does not turn.",
+                ),
+                Mistake(lambda v, d, L: ackermann_twist(v, d, L)[::-1], "The order is v, omega."),
+            ],
+        ),
+        Exercise(
+            "mecanum_twist",
+            reference=mecanum_twist,
+            draw=rolling,
+            fixed={"speeds": "a Mecanum robot has four wheels"},
+            metric=metrics.Numbers(1e-9),
+            hints=(
+                "Four equations, three unknowns: write them as speeds = M @ (v_x, v_y, omega) and solve by least squares.",
+                "The columns of M are orthogonal, so least squares is three signed means: v_x is the mean of the four speeds, "
+                "v_y and omega the means with the signs of their columns, omega divided by the lever as well.",
+                "`lever = half_length + half_width\n"
+                "M = np.array([[1, -1, -lever], [1, 1, lever], [1, 1, -lever], [1, -1, lever]])\n"
+                "return np.linalg.lstsq(M, speeds, rcond=None)[0]`",
+            ),
+            mistakes=[
+                Mistake(
+                    _three_wheels,
+                    "You solved the first three equations: the fourth wheel knows something too. Least squares uses all.",
+                ),
+                Mistake(_mecanum(shares=(1, 1, 1)), "Sums instead of means: divide by 4."),
+                Mistake(_mecanum(shares=(2, 2, 2)), "Divided by 2. There are four wheels."),
+                Mistake(_mecanum(shares=(4, 4, 1)), "v is right. omega lacks the 4."),
+                Mistake(
+                    _mecanum(lever=lambda a, b: b),
+                    "The lever of the turn is half length plus half width: the rollers stand at 45 degrees.",
+                ),
+                Mistake(
+                    _mecanum(lever=lambda a, b: a),
+                    "The lever of the turn is half length plus half width: the rollers stand at 45 degrees.",
+                ),
+                Mistake(
+                    _mecanum(lever=np.hypot),
+                    "The lever is the sum of half length and half width, not the distance of the wheel.",
+                ),
+                Mistake(
+                    _mecanum(lever=lambda a, b: 2 * (a + b)),
+                    "Half length and half width are given: do not double them.",
+                ),
+                Mistake(
+                    _mecanum(lever=lambda a, b: 1.0),
+                    "omega is still a speed at the rim: divide by half length plus half width.",
+                ),
+                Mistake(_mecanum(lever=lambda a, b: 1 / (a + b)), "The lever divides."),
+                Mistake(
+                    _mecanum(signs=((1, 1, 1, 1), (1, -1, -1, 1), (-1, 1, -1, 1))),
+                    "v_y has the wrong sign: it counts to the left.",
+                ),
+                Mistake(
+                    _mecanum(signs=((1, 1, 1, 1), (-1, 1, 1, -1), (1, -1, 1, -1))),
+                    "omega has the wrong sign: it counts to the left.",
+                ),
+                Mistake(
+                    _mecanum(signs=((1, 1, 1, 1), (-1, 1, -1, 1), (-1, 1, 1, -1)), lever=lambda a, b: a + b),
+                    "The signs of v_y and omega are exchanged.",
+                ),
+                Mistake(
+                    lambda w, a, b: mecanum_twist(w[[0, 1, 3, 2]], a, b),
+                    "The order of the wheels is front left, front right, rear left, rear right.",
+                ),
+                Mistake(
+                    lambda w, a, b: np.array([w.mean(), 0.0, mecanum_twist(w, a, b)[2]]),
+                    "This robot can drive sideways: v_y is missing.",
+                ),
+                Mistake(lambda w, a, b: mecanum_twist(w, a, b)[[1, 0, 2]], "v_x and v_y are exchanged."),
+            ],
+        ),
+        Prediction(
+            "reach",
+            question="A spot one meter to your left, the same heading. Which drive gets there with one command held for two seconds?",
+            choices=("all three", "differential and Mecanum", "only Mecanum", "none"),
+            answer="only Mecanum",
+            why="The wheels of the others do not slip sideways: each of their commands leads along a circle that leaves straight "
+            "ahead. They reach the spot too, by more than one command, as everyone knows who has parked a car.",
         ),
     ],
 )

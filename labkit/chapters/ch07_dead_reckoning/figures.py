@@ -162,3 +162,22 @@ class Banana:
         self.outline.set_data(*outline.T)
         self.mean.set_data(*path[-1:, :2].T)
         self.center.set_data(*ends[:, :2].mean(0)[:, None])
+
+
+class Reach:
+    """What one command reaches: a fan of paths, the best one, the robot at its end, and the spot."""
+
+    def __init__(self, ax, paths):
+        gap = np.full((len(paths), 1, 2), np.nan)
+        ax.plot(*np.concatenate([paths, gap], axis=1).reshape(-1, 2).T, color=style.GRID, linewidth=1.1)
+        ax.fill(*robot_outline(np.zeros(3), 0.16).T, facecolor=style.FAINT, edgecolor=style.MUTED)
+        (self.spot,) = ax.plot([], [], **style.look("prediction"))
+        (self.path,) = ax.plot([], [], **style.look("estimate"))
+        (self.robot,) = ax.plot([], [], color=style.ESTIMATE, linewidth=1.6)
+        self.artists = [self.spot, self.path, self.robot]
+
+    def set(self, spot, path):
+        """`spot`: pose (3,); `path`: poses (n, 3)."""
+        self.spot.set_data(*robot_outline(spot, 0.2).T)
+        self.path.set_data(*path[:, :2].T)
+        self.robot.set_data(*robot_outline(path[-1], 0.16).T)

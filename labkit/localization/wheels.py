@@ -1,0 +1,187 @@
+"""Wheels other than the differential drive's: from what they do to how the body moves, and the step it takes.
+
+Body velocities are along the robot's own axes: x ahead, y to the left, omega to the left (m/s, m/s, rad/s).
+Source: lecture "Lokalisierung", "Koppelnavigation fuer Radfahrzeuge (1)", which leaves both drives to the
+reader: "Ackermann- und Mecanumantrieb werden analog behandelt".
+"""
+
+import numpy as np
+
+from ..checks import as_points, as_positive, as_positive_number, fit_together
+from .odometry import sinc_slope
+
+
+def ackermann_to_twist(u, wheelbase):
+    """Control (v, omega) of a car from its speed and the angle of its front wheels.
+
+    The axes of all wheels meet in the instantaneous center of rotation, wheelbase / tan(steering) beside the middle of
+    the rear axle. That middle is the robot's origin: it never slides sideways.
+
+    Parameters
+    ----------
+    u : array-like, shape (..., 2)
+        Speed of the middle of the rear axle (m/s), and steering angle of a front wheel in the middle (rad), positive
+        to the left, less than a right angle.
+    wheelbase : float
+        From the rear axle to the front axle (m).
+
+    Returns
+    -------
+    control : array, shape (..., 2)
+        v and omega, as `odometry.step` takes them.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, a wheelbase that is not positive, wheels turned by a right angle or more.
+
+    See Also
+    --------
+    ackermann_jacobian : its derivative by speed and steering angle
+    """
+    u, wheelbase = _as_steering(u), as_positive_number(wheelbase, "wheelbase")
+    return np.stack([u[..., 0], u[..., 0] * np.tan(u[..., 1]) / wheelbase], axis=-1)
+
+
+def ackermann_jacobian(u, wheelbase):
+    """Derivative of `ackermann_to_twist`, which has the parameters, by speed and steering angle.
+
+    Returns
+    -------
+    J : array, shape (..., 2, 2)
+    """
+    u, wheelbase = _as_steering(u), as_positive_number(wheelbase, "wheelbase")
+    J = np.zeros((*u.shape[:-1], 2, 2))
+    J[..., 0, 0] = 1.0
+    J[..., 1, 0] = np.tan(u[..., 1]) / wheelbase
+    J[..., 1, 1] = u[..., 0] / (wheelbase * np.cos(u[..., 1]) ** 2)
+    return J
+
+
+def _as_steering(u):
+    u = as_points(u, "u", 2)
+    if (np.abs(u[..., 1]) >= np.pi / 2).any():
+        raise ValueError("the steering angle must be less than a right angle")
+    return u
+
+
+def mecanum_matrix(half_length, half_width):
+    """Rim speeds of four Mecanum wheels per body velocity: rows front left, front right, rear left, rear right.
+
+    The rollers of a wheel stand at 45 degrees; those that touch the floor form an X, seen through the robot from above.
+
+    Parameters
+    ----------
+    half_length, half_width : float
+        From the robot's center to an axle and to the middle of a wheel (m).
+
+    Returns
+    -------
+    M : array, shape (4, 3)
+        speeds = M @ (v_x, v_y, omega). Its columns are orthogonal.
+
+    Raises
+    ------
+    ValueError
+        Lengths that are not positive.
+    """
+    lever = as_positive_number(half_length, "half_length") + as_positive_number(half_width, "half_width")
+    return np.array([[1.0, -1.0, -lever], [1.0, 1.0, lever], [1.0, 1.0, -lever], [1.0, -1.0, lever]])
+
+
+def mecanum_to_twist(wheels, half_length, half_width):
+    """Body velocity that fits four Mecanum wheels best: least squares, as there is one wheel more than unknowns.
+
+    Parameters
+    ----------
+    wheels : array-like, shape (..., 4)
+        Rim speeds (m/s): front left, front right, rear left, rear right.
+    half_length, half_width : float
+        As for `mecanum_matrix`.
+
+    Returns
+    -------
+    twist : array, shape (..., 3)
+        v_x, v_y (m/s) and omega (rad/s).
+    slip : array, shape (...)
+        What the wheels disagree by (m/s): (front left + front right - rear left - rear right) / 4, zero while all
+        rollers grip.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, lengths that are not positive.
+    """
+    wheels = as_points(wheels, "wheels", 4)
+    twist = wheels @ np.linalg.pinv(mecanum_matrix(half_length, half_width)).T
+    return twist, wheels @ np.array([0.25, 0.25, -0.25, -0.25])
+
+
+def step_twist(x, twist, dt):
+    """Pose after a body velocity was held for dt: the exact arc, also for a robot that drives sideways.
+
+    A velocity that turns with the robot leads along a chord, which is sin(h) / h as long as the way and looks h = omega
+    dt / 2 aside; with v_y = 0 this is the model "arc" of `odometry.step`.
+
+    Parameters
+    ----------
+    x : array-like, shape (..., 3)
+        Pose (m, m, rad).
+    twist : array-like, shape (..., 3)
+        v_x, v_y (m/s) and omega (rad/s).
+    dt : array-like, shape (...)
+        Time step (s).
+
+    Returns
+    -------
+    x : array, shape (..., 3)
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, numbers that are not finite, a time step that is not positive.
+
+    See Also
+    --------
+    step_twist_jacobians : its derivatives
+    """
+    x, twist, dt = _as_step(x, twist, dt)
+    half = 0.5 * twist[..., 2] * dt
+    way = (np.sinc(half / np.pi) * dt)[..., None] * _turned(x[..., 2] + half, twist[..., :2])
+    heading = x[..., 2] + 2 * half
+    return np.concatenate([x[..., :2] + way, heading[..., None]], axis=-1)
+
+
+def step_twist_jacobians(x, twist, dt):
+    """Derivatives of `step_twist`, which has the parameters, by the pose and by the body velocity.
+
+    Returns
+    -------
+    F_x, F_u : arrays, shape (..., 3, 3)
+    """
+    x, twist, dt = _as_step(x, twist, dt)
+    half = 0.5 * twist[..., 2] * dt
+    chord = np.sinc(half / np.pi) * dt
+    along = _turned(x[..., 2] + half, twist[..., :2])
+    across = np.stack([-along[..., 1], along[..., 0]], axis=-1)  # its derivative by the angle
+    F_x, F_u = np.zeros((2, *chord.shape, 3, 3))
+    F_x[...] = np.eye(3)
+    F_x[..., :2, 2] = chord[..., None] * across
+    axes = np.stack([_turned(x[..., 2] + half, axis) for axis in np.eye(2)], axis=-1)
+    F_u[..., :2, :2] = chord[..., None, None] * axes
+    slope = sinc_slope(half) * dt
+    F_u[..., :2, 2] = 0.5 * dt[..., None] * (slope[..., None] * along + chord[..., None] * across)
+    F_u[..., 2, 2] = dt
+    return F_x, F_u
+
+
+def _as_step(x, twist, dt):
+    x, twist, dt = as_points(x, "x", 3), as_points(twist, "twist", 3), as_positive(dt, "dt")
+    shape = fit_together(x=x.shape[:-1], twist=twist.shape[:-1], dt=dt.shape)
+    return np.broadcast_to(x, (*shape, 3)), np.broadcast_to(twist, (*shape, 3)), np.broadcast_to(dt, shape)
+
+
+def _turned(angle, v):
+    """Vectors (..., 2) turned by an angle to the left."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * v[..., 0] - s * v[..., 1], s * v[..., 0] + c * v[..., 1]], axis=-1)
