@@ -27,6 +27,7 @@ from labkit.verbs import build
 
 ROOT = source.ROOT
 SECONDS_A_JOB = 900
+APART = ("browser", "hub")  # folders of tests that are jobs of their own
 COUNTED = ("passed", "failed", "error", "skipped", "xfailed")
 
 
@@ -80,12 +81,12 @@ def scratch_folder():
 
 def all_jobs(scratch):
     """{name: arguments of pytest}, the longest first."""
-    units = sorted(str(path) for path in (ROOT / "tests").glob("**/test_*.py") if path.parent.name != "browser")
+    units = sorted(str(path) for path in (ROOT / "tests").glob("**/test_*.py") if path.parent.name not in APART)
     solved = sorted(str(path) for path in (ROOT / "solutions").glob("[0-9][0-9]_*.ipynb"))
     jobs = {
         "unit tests 1": units[0::2],
         "unit tests 2": units[1::2],
-        "browser": [str(ROOT / "tests" / "browser")],
+        **{name: [str(ROOT / "tests" / name)] for name in APART},
         "solved notebooks 1": ["--nbval", *solved[0::2]],
         "solved notebooks 2": ["--nbval", *solved[1::2]],
     }

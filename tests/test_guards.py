@@ -115,6 +115,7 @@ MAY_IMPORT = {  # besides itself
     "fast": ("checks", *MATHEMATICS),
     "documents": ("checks", *MATHEMATICS),
     "live": (),
+    "server": (),
     "exercises": ("checks", "geometry", "live"),
     "stage": ("checks", "live"),
     "chapters": ("checks", "files", *MATHEMATICS, "documents", "live", "exercises", "stage"),

@@ -46,10 +46,10 @@ def test_the_last_line_is_the_sum(tmp_path, capsys):
 def test_every_test_file_and_notebook_is_in_exactly_one_job(tmp_path):
     words = [word for job in run.all_jobs(tmp_path).values() for word in job if not word.startswith("-")]
     assert len(set(words)) == len(words)
-    files = {str(path) for path in (source.ROOT / "tests").glob("**/test_*.py") if path.parent.name != "browser"}
+    files = {str(path) for path in (source.ROOT / "tests").glob("**/test_*.py") if path.parent.name not in run.APART}
     files |= {str(path) for path in (source.ROOT / "tests").glob("test_*.py")}
     files |= {str(path) for path in (source.ROOT / "solutions").glob("*.ipynb")}
-    assert files | {str(source.ROOT / "tests" / "browser")} <= set(words)
+    assert files | {str(source.ROOT / "tests" / name) for name in run.APART} <= set(words)
     assert len([word for word in words if word.endswith(".ipynb")]) == 2 * len(source.sources())
 
 

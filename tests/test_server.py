@@ -2,6 +2,8 @@
 
 import importlib
 import json
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import pytest
@@ -9,8 +11,8 @@ from jupyter_server.services.kernels.connection.channels import ZMQChannelsWebso
 
 from labkit import server
 from labkit.exercises import source
-from labkit.live.saving import keep_language
-from labkit.stage.connection import PromptConnection
+from labkit.server.connection import PromptConnection
+from labkit.server.saving import keep_language
 
 FOLDER = source.ROOT / "jupyter"
 
@@ -38,3 +40,23 @@ def test_nothing_is_asked_and_the_figure_being_dragged_stays_in_the_page():
     settings = json.loads((FOLDER / "settings.json").read_text(encoding="utf-8"))
     assert settings["@jupyterlab/apputils-extension:notification"]["checkForUpdates"] is False
     assert settings["@jupyterlab/notebook-extension:tracker"]["windowingMode"] == "none"
+
+
+def test_pictures_leave_the_server_at_once(monkeypatch):
+    calls = []
+
+    class Handler:
+        def set_nodelay(self, on):
+            calls.append(on)
+
+    monkeypatch.setattr(ZMQChannelsWebsocketConnection, "connect", lambda self: calls.append("connect"))
+    connection = PromptConnection.__new__(PromptConnection)
+    connection._trait_values["websocket_handler"] = Handler()
+    connection.connect()
+    assert calls == [True, "connect"]
+
+
+def test_a_students_server_carries_no_figures():
+    """Three hundred servers need not hold what kernels alone use."""
+    code = "import sys, labkit.server; print({'matplotlib', 'anywidget', 'scipy', 'numpy'} & set(sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], cwd=source.ROOT, capture_output=True).stdout == b"set()\n"

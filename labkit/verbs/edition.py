@@ -10,16 +10,16 @@ import json
 import os
 from pathlib import Path
 
-from ..exercises import source
-from ..places import ROOT
+from ..places import IS_CHECKOUT, ROOT
 from .arguments import Refusal
 
 GIVEN = ".labkit.json"
 
 
 def notebooks():
-    """{name: text} of the blank notebooks; from the sources where this edition has them."""
-    if source.sources():
+    """{name: text} of the blank notebooks; in a checkout, where those in place may be worked in, from their sources."""
+    if IS_CHECKOUT:
+        from ..exercises import source
         from . import build
 
         return {f"{path.stem}.ipynb": build.as_text(build.blank_notebook(path)) for path in source.sources()}
@@ -43,12 +43,12 @@ def update(folder):
     Raises
     ------
     Refusal
-        When the folder holds no notebook of the course.
+        When the folder holds other things and no notebook of the course.
     """
     folder, said = Path(folder), []
     fresh, given = notebooks(), _given(folder)
-    if not any((folder / name).exists() for name in fresh):
-        raise Refusal(f"{folder} holds no notebook of the course. New ones come with: labkit start {folder}")
+    if not any((folder / name).exists() for name in fresh) and folder.exists() and any(folder.iterdir()):
+        raise Refusal(f"{folder} holds no notebook of the course, but other things: name a folder of its own.")
     for name, text in fresh.items():
         if not (folder / name).exists():
             write(folder / name, text)
@@ -123,7 +123,7 @@ def fresh_copy(path, text, shown):
 
 def write(path, text):
     """Write a file whole or not at all."""
-    path.parent.mkdir(exist_ok=True)
+    path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.name}.partial")
     try:
         partial.write_text(text, encoding="utf-8", newline="\n")

@@ -132,7 +132,7 @@ class Lab:
             [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", f"--port={port}", "--port-retries=0",
              f"--ServerApp.root_dir={folder}", f"--IdentityProvider.token={token}",
              "--LabApp.expose_app_in_browser=True",
-             "--ServerApp.kernel_websocket_connection_class=labkit.stage.connection.PromptConnection"],
+             "--ServerApp.kernel_websocket_connection_class=labkit.server.connection.PromptConnection"],
             env=env, cwd=folder, stdout=self.log, stderr=self.log,
         )  # fmt: skip
         self.url = f"http://127.0.0.1:{port}/lab/tree/stages.ipynb?token={token}"

@@ -15,7 +15,6 @@ from PIL import Image
 
 from labkit.chapters.ch08_kalman import stages
 from labkit.stage import Choice, Handle, Play, Slider, Stage, Toggle, canvas, style
-from labkit.stage.connection import PromptConnection
 from labkit.stage.renderer import Canvas
 from labkit.stage.scene3d import Scene, View
 
@@ -628,22 +627,6 @@ def test_colors_stand_out_from_the_paper(dark):
     assert contrast(style.INK) > 12 and contrast(style.MUTED) > 4.5  # words
     for color in (*style.AXES, style.MEASUREMENT, style.PREDICTION, style.ESTIMATE):
         assert contrast(color) > (4 if dark else 2.2)
-
-
-def test_pictures_leave_the_server_at_once(monkeypatch):
-    from jupyter_server.services.kernels.connection.channels import ZMQChannelsWebsocketConnection
-
-    calls = []
-
-    class Handler:
-        def set_nodelay(self, on):
-            calls.append(on)
-
-    monkeypatch.setattr(ZMQChannelsWebsocketConnection, "connect", lambda self: calls.append("connect"))
-    connection = PromptConnection.__new__(PromptConnection)
-    connection._trait_values["websocket_handler"] = Handler()
-    connection.connect()
-    assert calls == [True, "connect"]
 
 
 def test_going_back_to_a_width_moves_no_axes():

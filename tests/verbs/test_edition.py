@@ -102,9 +102,12 @@ def test_update_leaves_what_it_cannot_read_and_tries_again_the_next_time(folder)
     assert sources(folder / "01_a.ipynb") == ["new", "2"]
 
 
-def test_update_refuses_a_folder_without_notebooks(tmp_path):
+def test_update_fills_an_empty_folder_and_refuses_one_of_other_things(folder, tmp_path):
+    assert edition.update(tmp_path / "new") == ["01_a.ipynb is new", "02_b.ipynb is new"]
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "draft.txt").touch()
     with pytest.raises(Refusal, match="holds no notebook of the course"):
-        edition.update(tmp_path)
+        edition.update(tmp_path / "thesis")
 
 
 def test_reset_keeps_the_students_copy(tmp_path):

@@ -1,13 +1,13 @@
 """What Jupyter's server does differently where labkit is installed; `etc/jupyter/` of the environment loads this.
 
-Pictures leave at once (`stage.connection`), and a notebook that was looked at stays as it is (`live.saving`). A server
+Pictures leave at once (`connection`), and a notebook that was looked at stays as it is (`saving`). A server
 that was told to use another connection keeps it.
 """
 
 from jupyter_server.services.kernels.connection.channels import ZMQChannelsWebsocketConnection
 
-from .live.saving import keep_language
-from .stage.connection import PromptConnection
+from .connection import PromptConnection
+from .saving import keep_language
 
 CONNECTION = "kernel_websocket_connection_class"
 
