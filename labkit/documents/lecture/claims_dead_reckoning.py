@@ -1,47 +1,23 @@
-"""Lecture, lateration and dead reckoning: what the printed constants mean, and the entries of the printed Jacobians."""
+"""Lecture, lateration and dead reckoning: the entries of the printed Jacobians, and what the pages claim."""
+
+import functools
 
 import numpy as np
 
 from ...localization import lateration, odometry
+from .. import rounding
 from ..ledger import Computed, computes
 from . import printed as lecture
 
 NOTEBOOK = "07_dead_reckoning"
 
 
-def _std_after(u, duration, noise):
-    """Standard deviations (x, y, theta) after driving u for `duration` in the lecture's time steps."""
-    dt = lecture.constants("circle_drive")["dt"]
-    controls = np.tile(u, (round(duration / dt), 1))
-    cov = odometry.drive_with_covariance(np.zeros(3), np.zeros((3, 3)), controls, dt, **noise, model="euler")[1][-1]
-    return np.sqrt(np.diag(cov))
+POSES_TRIED = (([0.3, -1.2, 0.8], [0.7, 0.4], 0.1), ([2.0, 0.4, -2.1], [1.3, -0.6], 0.25))  # pose, control, time step
 
 
-@computes("odometry.std_distance_1m")
-def distance_after_one_meter():
-    noise = lecture.circle_drive().noise | {"k_theta": 0.0, "k_drift": 0.0}
-    return Computed(_std_after([1.0, 0.0], 1.0, noise)[0])
-
-
-@computes("odometry.std_distance_1m_example")
-def distance_after_one_meter_example():
-    k_d = lecture.constants("circle_drive")["std_distance_per_meter_example"] ** 2
-    return Computed(_std_after([1.0, 0.0], 1.0, {"k_d": k_d, "k_theta": 0.0, "k_drift": 0.0})[0])
-
-
-@computes("odometry.std_heading_turn_deg")
-def heading_after_one_turn():
-    return Computed(np.degrees(_std_after([0.0, np.pi / 5], 10.0, lecture.circle_drive().noise)[2]))
-
-
-@computes("odometry.std_heading_1m_deg")
-def heading_after_one_meter():
-    return Computed(np.degrees(_std_after([1.0, 0.0], 1.0, lecture.circle_drive().noise)[2]))
-
-
-def _numeric_jacobians():
-    """F_x and F_u of the simplified step by central differences at an arbitrary pose and control."""
-    x, u, dt, h = np.array([0.3, -1.2, 0.8]), np.array([0.7, 0.4]), 0.1, 1e-6
+def _numeric_jacobians(x, u, dt):
+    """F_x and F_u of the simplified step by central differences at a pose and a control."""
+    x, u, h = np.array(x), np.array(u), 1e-6
 
     def slope(dx, du):
         return (odometry.step(x + dx, u + du, dt, "euler") - odometry.step(x - dx, u - du, dt, "euler")) / (2 * h)
@@ -52,12 +28,41 @@ def _numeric_jacobians():
 
 @computes("odometry.F_x")
 def jacobian_by_state():
-    return Computed(_numeric_jacobians()[0])
+    return Computed(_numeric_jacobians(*POSES_TRIED[0])[0], proof="0 or 1 whatever is driven: the state enters the step by addition.")
 
 
 @computes("odometry.F_u")
 def jacobian_by_control():
-    return Computed(_numeric_jacobians()[1])
+    return Computed(_numeric_jacobians(*POSES_TRIED[0])[1], proof="0 whatever is driven: this control does not move this coordinate.")
+
+
+def _expression(by, row, column):
+    """The one among six simple expressions that agrees with the numeric derivative at two poses and controls."""
+    agreeing = None
+    for x, u, dt in POSES_TRIED:
+        v, theta = u[0], x[2]
+        tried = {
+            "T cos θ_k": dt * np.cos(theta),
+            "T sin θ_k": dt * np.sin(theta),
+            "T": dt,
+            "-T v_k sin θ_k": -dt * v * np.sin(theta),
+            "T v_k cos θ_k": dt * v * np.cos(theta),
+            "T v_k sin θ_k": dt * v * np.sin(theta),
+        }
+        numeric = _numeric_jacobians(x, u, dt)[by][row, column]
+        right = {name for name, value in tried.items() if abs(value - numeric) < 1e-8}
+        agreeing = right if agreeing is None else agreeing & right
+    return Computed(" or ".join(sorted(agreeing)), proof="Compared with central differences at two poses and controls.")
+
+
+for _id, _entry in {
+    "F_x_13": (0, 0, 2),
+    "F_x_23": (0, 1, 2),
+    "F_u_11": (1, 0, 0),
+    "F_u_21": (1, 1, 0),
+    "F_u_32": (1, 2, 1),
+}.items():
+    computes(f"odometry.{_id}")(functools.partial(_expression, *_entry))
 
 
 @computes("odometry.without_half_turn")
@@ -110,5 +115,10 @@ def scan_rate():
 @computes("lateration.xtion_vertical")
 def vertical_field_of_view():
     given = lecture.constants("sensors")
-    half = np.tan(np.radians(given["xtion_horizontal_deg"] / 2)) * given["xtion_rows"] / given["xtion_columns"]
-    return Computed(np.degrees(2 * np.arctan(half)))
+    shape = given["xtion_rows"] / given["xtion_columns"]
+
+    def vertical(horizontal):
+        return np.degrees(2 * np.arctan(np.tan(np.radians(horizontal / 2)) * shape))
+
+    value, bound = rounding.propagate(vertical, rounding.read(f"{given['xtion_horizontal_deg']:.0f}"))
+    return Computed(value, bound=bound)

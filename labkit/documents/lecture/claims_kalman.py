@@ -1,9 +1,13 @@
 """Lecture, Kalman filter: the fusion of two measurements and the correction of the vehicle at k = 50."""
 
+from functools import cache
+
 import numpy as np
 
 from ...estimation import kalman
+from .. import rounding
 from ..ledger import Computed, computes
+from ..slips import HERE, explained_by, single_slips
 from . import printed as lecture
 from .examples import predict_vehicle, reconstruct_vehicle
 
@@ -13,28 +17,50 @@ NOTEBOOK = "08_kalman"
 @computes("kalman.fusion_x")
 def fused_position():
     given = lecture.example("fusion")
-    x, rounding = _fusion(given)
-    flat = _fusion(given | {"var0": 1e12})[0]
-    std = _fusion(given | {"var0": given["var0"] ** 2})[0]
+    x, bound = rounding.propagate(lambda z: _fusion(given | {"z1": z[0], "z2": z[1]}).x[0], _two_measurements())
+    flat = float(_fusion(given | {"var0": 1e12}).x[0])
+    std = float(_fusion(given | {"var0": given["var0"] ** 2}).x[0])
     proof = (
         f"48.2 / 5.05 = {x:.4f}, {9.55 - x:.4f} below what rounds to 9.6; rounding the two measurements moves it "
-        f"by up to {rounding:.4f}. Without a prior it is {flat:.4f}, with a standard deviation of 20 {std:.4f}."
+        f"by up to {bound:.4f}. Without a prior it is {flat:.4f}, with a standard deviation of 20 {std:.4f}."
     )
-    return Computed(x, bound=rounding, proof=proof)
+    return Computed(x, bound=bound, proof=proof)
+
+
+def _two_measurements():
+    """Both measured positions as printed, with one decimal; variances are settings of the example, and exact."""
+    given = lecture.example("fusion")
+    return rounding.read([f"{given[name]:.1f}" for name in ("z1", "z2")])
 
 
 def _fusion(given):
-    """Fused position, and how far rounding of the two printed measurements (one decimal) can move it."""
+    """The update of the printed prior with the two printed measurements."""
     C, cov_z = np.ones((2, 1)), np.diag([given["std1"] ** 2, given["std2"] ** 2])
-    result = kalman.update([given["x0"]], [[given["var0"]]], [given["z1"], given["z2"]], C, cov_z)
-    return float(result.x[0]), 0.05 * float(np.abs(result.gain).sum())
+    return kalman.update([given["x0"]], [[given["var0"]]], [given["z1"], given["z2"]], C, cov_z)
 
 
 @computes("kalman.fusion_var")
 def fused_variance():
+    return Computed(_fusion(lecture.example("fusion")).cov[0, 0])
+
+
+@computes("kalman.fusion_var_index")
+def index_of_the_variance():
+    """Which of the two variances the printed 0.2 is; a slip in the printed prior is tried as well."""
     given = lecture.example("fusion")
-    cov_z = np.diag([given["std1"] ** 2, given["std2"] ** 2])
-    return Computed(kalman.update([0.0], [[given["var0"]]], [0.0, 0.0], np.ones((2, 1)), cov_z).cov[0, 0])
+
+    def holds(d):
+        result = _fusion(given | {"var0": float(d["prior"])})
+        variance = {"Σ_0": float(d["prior"]), "Σ_1": float(result.cov[0, 0])}[d[HERE]]
+        return abs(variance - given["var1"]) <= 0.05 and abs(float(result.x[0]) - given["x1"]) <= 0.1
+
+    printed = {HERE: "Σ_0", "prior": f"{given['var0']:.0f}"}
+    found = explained_by(printed, holds, lambda text: ("Σ_1",) if text == "Σ_0" else single_slips(text))
+    proof = (
+        f"The prior's variance is printed as {given['var0']:.0f} above; {_fusion(given).cov[0, 0]:.4f} is the one after "
+        "the correction, which the algorithm calls Σ_1. No single slip in the prior makes 0.2 the prior's."
+    )
+    return Computed("Σ_0" if holds(printed) else found[HERE][0], slips=found, proof=proof)
 
 
 def _vehicle():
@@ -50,33 +76,88 @@ def reconstructed():
     return predict_vehicle(51, 0.1, *np.round(reconstruct_vehicle(cov, 51, 0.1), 3))
 
 
+DIGITS = {"prior_x": 1, "prior_v": 1, "z": 2, "posterior_x": 2, "posterior_v": 2}  # decimals printed; the others have 4
+
+
+def _text(name):
+    return f"{lecture.example('vehicle')[name]:.{DIGITS.get(name, 4)}f}"
+
+
+def _needed(posterior, z, cov, var_z):
+    """The prediction that a printed correction presupposes: x+ = x + K (z - x) solved for x, then for v."""
+    gain = np.array(cov) / (cov[0] + var_z)
+    x = (posterior[0] - gain[0] * z) / (1 - gain[0])
+    return np.array([x, posterior[1] + gain[1] * (x - z)])
+
+
+@cache
+def needed_prediction():
+    """That prediction from the printed numbers, and how far their rounding can move it."""
+    posterior, z, cov = (
+        rounding.read([_text(name) for name in names])
+        for names in (("posterior_x", "posterior_v"), ("z",), ("prior_cov_xx", "prior_cov_xv"))
+    )
+    var_z = lecture.example("vehicle")["var_z"]
+    return rounding.propagate(lambda p, z, cov: _needed(p, z[0], cov, var_z), posterior, z, cov)
+
+
+def _agrees(d):
+    """Whether printed numbers agree: the correction of the state, that of the covariance, and the model's v = a t.
+
+    The covariance needs 51 steps of 0.1 s; from rest x = a T^2 n (n - 1) / 2 and v = a T n, so that v = 2 x / (T (n -
+    1)).
+    """
+    n = {name: float(text) for name, text in d.items()}
+    gain = np.array([n["prior_cov_xx"], n["prior_cov_xv"]]) / (n["prior_cov_xx"] + n["var_z"])
+    corrected = np.array([n["prior_x"], n["prior_v"]]) + gain * (n["z"] - n["prior_x"])
+    variance = n["prior_cov_xx"] * (1 - gain[0])
+    state = all(
+        abs(value - n[name]) <= 0.01 or rounding.is_cut_off(d[name], value)
+        for name, value in zip(("posterior_x", "posterior_v"), corrected)
+    )
+    model = abs(n["prior_v"] - 2 * n["prior_x"] / (0.1 * 50)) <= 0.05
+    return state and abs(variance - n["posterior_cov_xx"]) <= 1e-4 and model
+
+
 @computes("kalman.vehicle_prior")
 def predicted_state():
-    """The prediction that the printed correction presupposes: x+ = x + K (z - x) solved for x, then for v."""
-    given, _, gain = _vehicle()
-    x = (given["posterior_x"] - gain[0] * given["z"]) / (1 - gain[0])
-    v = given["posterior_v"] + gain[1] * (x - given["z"])
-    slack_x = (0.005 + gain[0] * 0.005) / (1 - gain[0])
-    bound = np.array([slack_x, 0.005 + gain[1] * (slack_x + 0.005)])
+    value, bound = needed_prediction()
+    names = (
+        "prior_x",
+        "prior_v",
+        "prior_cov_xx",
+        "prior_cov_xv",
+        "z",
+        "posterior_x",
+        "posterior_v",
+        "posterior_cov_xx",
+    )
+    printed = {name: _text(name) for name in names} | {"var_z": f"{lecture.example('vehicle')['var_z']:.2f}"}
+    other = {"prior_x": f"{value[0]:.2f}", "prior_v": f"{reconstructed()[0][1]:.2f}"}  # the one beside it put right
+    slips = {}
+    for k, name in enumerate(("prior_x", "prior_v")):
+        found = explained_by(printed | {key: text for key, text in other.items() if key != name}, _agrees)
+        slips[k,] = {HERE if key == name else key for key in found}
     model = reconstructed()[0]
     proof = (
-        f"The printed correction (11.90, 4.98) of 11.79 needs ({x:.3f} +- {bound[0]:.3f}, {v:.3f} +- {bound[1]:.3f})"
-        f" before it; 51 predictions from rest give ({model[0]:.2f}, {model[1]:.2f}). 12.5 and 5.0 are a t^2/2 and "
-        f"a t at t = 5 s."
+        f"The printed correction (11.90, 4.98) of 11.79 needs ({value[0]:.3f} +- {bound[0]:.3f}, {value[1]:.3f} +- "
+        f"{bound[1]:.3f}) before it; 51 predictions from rest give ({model[0]:.2f}, {model[1]:.2f}). 12.5 and 5.0 are a "
+        f"t^2/2 and a t at t = 5 s. Of all single slips in the {len(printed)} printed numbers only those in the prediction "
+        "make correction, covariance and model agree."
     )
-    return Computed(np.array([x, v]), bound=bound, misprint=True, proof=proof)
+    return Computed(value, bound=bound, slips=slips, proof=proof)
 
 
 @computes("kalman.vehicle_B")
 def input_matrix():
     """Which of two input matrices leads to the prediction that the printed correction needs (their velocity agrees)."""
-    needed, time = predicted_state(), 5.1  # s, 51 steps of 0.1 s
+    (needed, bound), time = needed_prediction(), 5.1  # s, 51 steps of 0.1 s
     states = {"(0, T)": reconstructed()[0], "(T^2/2, T)": np.array([time**2 / 2, time])}  # at 1 m/s^2
-    hits = [name for name, state in states.items() if (np.abs(state - needed.value) <= needed.bound).all()]
+    hits = [name for name, state in states.items() if (np.abs(state - needed) <= bound).all()]
     euler, exact = (state[0] for state in states.values())
     proof = (
         "A constant acceleration a also moves the position, by a T^2/2 in a step. The printed correction needs "
-        f"({needed.value[0]:.3f} +- {needed.bound[0]:.3f}) m before it: 51 steps with (0, T) give {euler:.2f} m, with "
+        f"({needed[0]:.3f} +- {bound[0]:.3f}) m before it: 51 steps with (0, T) give {euler:.2f} m, with "
         f"(T^2/2, T) {exact:.3f} m. The simulation leaves the term out, as the formula does."
     )
     return Computed(" or ".join(hits), proof=proof)
@@ -90,7 +171,7 @@ def covariance_after_prediction():
         f"and 0.01, acceleration noise 0.4 give {cov[0, 0]:.4f}, {cov[0, 1]:.4f}, {cov[1, 1]:.4f}; with T = 0.1 s no "
         "number of steps near 50 but 51 gives round parameters."
     )
-    return Computed(cov, bound=0.0, simulated=True, proof=proof)
+    return Computed(cov, simulated=True, proof=proof)
 
 
 @computes("kalman.vehicle_posterior")
@@ -98,16 +179,25 @@ def corrected_state():
     """The correction of the reconstructed prediction; from the printed one neither number comes out."""
     given, cov, _ = _vehicle()
     C, cov_z = [[1.0, 0.0]], [[given["var_z"]]]
-    x, v = kalman.update(*reconstructed(), [given["z"]], C, cov_z).x
+    (x, v), bound = rounding.propagate(
+        lambda z: kalman.update(*reconstructed(), z, C, cov_z).x, rounding.read([_text("z")])
+    )
     printed = kalman.update([given["prior_x"], given["prior_v"]], cov, [given["z"]], C, cov_z).x
     proof = (
         f"The reconstructed prediction gives ({x:.4f}, {v:.4f}): 11.90 comes out, 4.98 is {v:.4f} cut off instead of "
-        f"rounded (z moves it by 0.0006 at most). From the printed one follows ({printed[0]:.3f}, {printed[1]:.3f})."
+        f"rounded (z moves it by {bound[1]:.4f} at most). From the printed one follows ({printed[0]:.3f}, {printed[1]:.3f})."
     )
-    return Computed(np.array([x, v]), misprint=np.array([False, True]), proof=proof)
+    return Computed(np.array([x, v]), bound=bound, simulated=True, proof=proof)
 
 
 @computes("kalman.vehicle_posterior_cov")
 def corrected_covariance():
-    given, cov, _ = _vehicle()
-    return Computed(kalman.update([0.0, 0.0], cov, [0.0], [[1.0, 0.0]], [[given["var_z"]]]).cov)
+    var_z = lecture.example("vehicle")["var_z"]
+
+    def corrected(entries):
+        cov = entries[[[0, 1], [1, 2]]]
+        return kalman.update([0.0, 0.0], cov, [0.0], [[1.0, 0.0]], [[var_z]]).cov
+
+    names = ("prior_cov_xx", "prior_cov_xv", "prior_cov_vv")
+    value, bound = rounding.propagate(corrected, rounding.read([_text(name) for name in names]))
+    return Computed(value, bound=bound)

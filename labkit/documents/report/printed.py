@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...tables import read_table
-from ..ledger import half_unit
+from .. import rounding
 
 COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw", "E_trans", "E_rot", "mean_mm", "mean_deg", "max_mm", "max_deg")
 RUNS = 6
@@ -55,7 +55,35 @@ def table_d():
     printed = read_table("tracker/table_d.csv", text=("run", *COLUMNS))
     words = np.column_stack([printed[c] for c in COLUMNS])
     values = words.astype(float)
-    return TableD(values[:RUNS], values[RUNS], values[RUNS + 1], np.vectorize(half_unit)(words))
+    return TableD(values[:RUNS], values[RUNS], values[RUNS + 1], np.vectorize(rounding.half_unit)(words))
+
+
+def table_d_texts():
+    """Appendix D digit by digit.
+
+    Returns
+    -------
+    texts : array of str, shape (8, 13)
+        Six runs, *Průměr*, *Rozptyl*; columns as in `COLUMNS`.
+
+    Source: report, appendix D.
+    """
+    printed = read_table("tracker/table_d.csv", text=("run", *COLUMNS))
+    return np.column_stack([printed[c] for c in COLUMNS])
+
+
+def statements():
+    """Numbers that the report states in sentences: guarantees, mean and largest errors, the offset.
+
+    Returns
+    -------
+    statements : dict
+        {name: number}; the units stand in data/tracker/statements.csv.
+
+    Source: report, introduction, end of section 3.2, conclusion.
+    """
+    table = read_table("tracker/statements.csv", text=("name", "unit"))
+    return dict(zip(table["name"].tolist(), table["value"].tolist()))
 
 
 def corrected_runs():

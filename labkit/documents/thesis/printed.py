@@ -14,6 +14,7 @@ import numpy as np
 from ...checks import as_points, as_positive_number
 from ...geometry import frames
 from ...tables import read_table
+from .. import rounding
 
 POSE_COLUMNS = ("x", "y", "z", "A_deg", "B_deg", "C_deg")
 CENTER_COLUMNS = ("x", "y", "z")
@@ -153,6 +154,22 @@ def kuka_pose_deg(name):
     return _row(data, name, POSE_COLUMNS)
 
 
+def pose_digits(name):
+    """The same with the half units of its digits.
+
+    Parameters
+    ----------
+    name : str
+        As in `kuka_pose_deg`.
+
+    Returns
+    -------
+    pose : rounding.Printed
+        Arrays of shape (6,), mm and deg.
+    """
+    return rounding.read(_row(read_table("hand_eye/frames.csv", text=("name", "place", *POSE_COLUMNS)), name, POSE_COLUMNS))
+
+
 def frame(name):
     """The same as a transform.
 
@@ -180,6 +197,36 @@ def point(name):
         For an unknown name, with all known ones.
     """
     return _row(read_table("hand_eye/points.csv", text=("name", "place")), name, CENTER_COLUMNS)
+
+
+def point_digits(name):
+    """The same with the half units of its digits.
+
+    Parameters
+    ----------
+    name : str
+        As in `point`.
+
+    Returns
+    -------
+    point : rounding.Printed
+        Arrays of shape (3,), mm.
+    """
+    return rounding.read(_row(read_table("hand_eye/points.csv", text=("name", "place", *CENTER_COLUMNS)), name, CENTER_COLUMNS))
+
+
+def measuring_protocol():
+    """What the coordinate machine reports of the calibration body.
+
+    Returns
+    -------
+    protocol : dict
+        {column: array of str, shape (12,)}: feature, nominal, tolerance, actual, deviation (mm), percent.
+
+    Source: thesis, listing C13.
+    """
+    columns = ("feature", "nominal", "tolerance", "actual", "deviation", "percent")
+    return read_table("hand_eye/cmm.csv", text=columns)
 
 
 def radius(source):
@@ -334,6 +381,31 @@ def footnote_start_deg():
     start = start_poses_deg()[0][8].copy()
     start[[3, 5]] = 0.001
     return start
+
+
+def matrices_66():
+    """Rotation parts of the four matrices of table 6-6.
+
+    Returns
+    -------
+    R : array, shape (4, 3, 3)
+
+    Source: thesis, table 6-6, lines x, y, x*, y*.
+    """
+    table = read_table("hand_eye/table_6_6.csv", text=("line",))
+    return np.column_stack([table[c] for c in ("c1", "c2", "c3")]).reshape(4, 3, 3)
+
+
+def roundness_um():
+    """Roundness deviations of the sphere in three planes, micrometers.
+
+    Returns
+    -------
+    deviations : array, shape (3,)
+
+    Source: thesis, listing C11, certificate.
+    """
+    return read_table("hand_eye/roundness.csv", text=("plane",))["deviation"]
 
 
 def table_7_1(method):
