@@ -129,6 +129,6 @@ stages.colors()
 # - A function that runs forever is stopped in a check: after two seconds of computing, or a few more where much has to be computed. Elsewhere press the stop button of JupyterLab.
 #   If the cell still shows `[*]`, the code sits inside one single call that Python cannot interrupt, such as `sum(itertools.repeat(1))`: choose
 #   *Kernel > Restart Kernel*. What you have solved stays remembered; then run the cells above the place where you go on.
-# - Every number the documents print stands in the ledger of chapter 10, with what we compute today. Some of the printed numbers are wrong, and you will find them.
+# - What the documents print as results and claims stands in the ledger of chapter 10, with what we compute today. Some of it does not fit, and you will find where.
 #
 # Now open `01_frames.ipynb`.

@@ -282,7 +282,7 @@ def should_resample(weights, threshold):
 #
 # The lecture shows a global localization in twelve pictures without numbers (slides *Beispiel (1)* to *(12)*). This
 # is its counterpart in our building, simulated:
-# the ledger calls it *unpublished*. Play it. Where is the estimate wrong, and which picture corrects it?
+# the ledger has no row for them. Play it. Where is the estimate wrong, and which picture corrects it?
 
 # %% twelve
 stages.twelve_pictures()

@@ -19,7 +19,17 @@ from .. import tables
 from .ledger import COUNTED, base_of, compute, rows
 from .rounding import half_unit, number
 
-KEYS = ("pose", "run", "line", "row", "link", "angle_deg", "criterion", "steps", "iterations")  # name rows, count things
+KEYS = (
+    "pose",
+    "run",
+    "line",
+    "row",
+    "link",
+    "angle_deg",
+    "criterion",
+    "steps",
+    "iterations",
+)  # name rows, count things
 LONGEST_TABLE = 100  # lines; longer ones are simulated logs, which no document prints
 AGREEING = ("reproduced", "rounding", "cut off", "consistent")
 _PLAIN = re.compile(r"([-+]?\d+(?:\.\d*)?)([eE][-+]?\d+)?")

@@ -70,7 +70,7 @@ def read(texts):
     texts = np.asarray(texts)
     strange = [text for text in texts.ravel() if half_unit(str(text)) is None]
     if strange:
-        raise ValueError(f"expected printed numbers such as 1.250, 1,5 or 3e-4, got {strange[0]!r}")
+        raise ValueError(f"expected printed numbers such as 1.250, 1,5 or 3e-4, got {str(strange[0])!r}")
     values, halves = (np.reshape([of(str(t)) for t in texts.ravel()], texts.shape) for of in (number, half_unit))
     return Printed(values, halves)
 

@@ -10,7 +10,7 @@ VERBS = {
     "collect": ("...", "for lecturers: submitted notebooks in, marks and a page on the class out"),
     "demo": ("[NN ...]", "for lecturers: Stages full window, questions first; --vote lets phones answer"),
     "book": ("[NN ...]", "the reading edition: a static site whose figures still move"),
-    "ledger": ("", "every number the four documents print, recomputed"),
+    "ledger": ("", "what the four documents print, recomputed; --strict counts results and claims alone"),
     "build": ("[NN ...]", "for authors: write the notebooks from solutions/NN_name.py; --check names the stale ones"),
 }
 

@@ -1,10 +1,17 @@
-"""The ledger keeps its word: every row has a computation, and the status it states is the one the numbers give."""
+"""The ledger keeps its word: every row is computed, states the status the numbers give, and reads no printed answer."""
 
+import ast
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
 import pytest
 
-from labkit.documents import ledger
+from labkit.documents import circular, ledger, strict
+from labkit.documents.ledger import Computed, Row
 
 ROWS = ledger.rows()
+CLAIMS = sorted((Path(ledger.__file__).parent).glob("*/claims_*.py"))
 
 
 @pytest.mark.parametrize("row", ROWS, ids=[row.id for row in ROWS])
@@ -19,3 +26,73 @@ def test_every_computation_has_a_row():
     ledger._load_claims()
     used = {row.id.split("[")[0] for row in ROWS}
     assert set(ledger._functions) == used
+
+
+def a_row(printed, kind="result"):
+    return Row("x", "thesis", "", "", printed, "", kind, "reproduced", "")
+
+
+@pytest.mark.parametrize(
+    ("printed", "computed", "status"),
+    [
+        ("1.25", Computed(1.2549), "reproduced"),
+        ("1.25", Computed(1.257, bound=0.004), "rounding"),
+        ("1.25", Computed(1.257, bound=0.001), "cut off"),
+        ("-1.25", Computed(-1.257), "cut off"),
+        ("1.25", Computed(1.243), "contradiction"),
+        ("1.25", Computed(1.243, slips=("here",)), "misprint"),
+        ("1.25", Computed(1.243, slips=()), "misprint"),
+        ("1.25", Computed(1.243, slips=("here", "elsewhere")), "contradiction"),
+        ("1.25", Computed(1.9, bound=0.8), "not computable"),
+        ("1.25", Computed(1.9, bound=0.8, simulated=True), "not computable"),
+        ("1.25", Computed(1.30, bound=0.1, simulated=True), "consistent"),
+        ("1.25", Computed(2.0, bound=0.1, simulated=True), "not computable"),
+        ("1.25", Computed(None), "not computable"),
+        ("1.25", Computed(np.nan), "not computable"),
+        ("x + h", Computed("x + h"), "reproduced"),
+        ("x + h", Computed("x - h"), "contradiction"),
+        ("x + h", Computed("x + h", simulated=True), "consistent"),
+    ],
+)
+def test_the_status_follows_from_the_numbers(printed, computed, status):
+    assert ledger.judge(a_row(printed), computed) == status
+
+
+def test_a_claim_that_fails_is_refuted():
+    assert ledger.judge(a_row("none", "claim"), Computed("some")) == "refuted"
+    assert ledger.judge(a_row("0.5", "claim"), Computed(0.2)) == "refuted"
+
+
+def test_no_result_reads_its_own_printed_answer():
+    assert [row.id for row in circular.followers(ROWS)] == []
+
+
+def test_a_row_that_reads_its_answer_is_found():
+    restated = [replace(row, kind="result") for row in ROWS if row.id in ("frames.W_T_K0[0,3]", "tracker.block[0]")]
+    computed = [row for row in ROWS if row.id in ("tracker.average[0]", "chaining.product[0,3]")]
+    assert circular.followers(restated + computed) == restated
+
+
+@pytest.mark.parametrize("path", CLAIMS, ids=lambda path: path.stem)
+def test_no_verdict_is_typed(path):
+    """No claim hands over a fixed value, a bound or a set of slips that is written down instead of computed."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Computed":
+            given = {"value": node.args[0]} if node.args else {}
+            given |= {"bound": node.args[1]} if len(node.args) > 1 else {}
+            given |= {word.arg: word.value for word in node.keywords}
+            for name in ("value", "bound", "slips"):
+                fixed = not any(isinstance(n, (ast.Name, ast.Call)) for n in ast.walk(given.get(name, ast.Name())))
+                nothing = isinstance(given.get(name), ast.Constant) and given[name].value is None
+                assert nothing or not fixed, f"{path.name}, line {node.lineno}: {name} is typed"
+
+
+def test_strict_text_counts_results_and_claims():
+    text = strict.counts_text(ROWS)
+    counted = [row for row in ROWS if row.kind in ledger.COUNTED]
+    assert text.splitlines()[5].split()[-1] == str(len(counted)) and "check" in text
+
+
+def test_each_row_shows_its_lines():
+    place, code = ledger.code_of(next(row for row in ROWS if row.id == "chaining.product[0,3]"))
+    assert place.startswith("labkit/documents/lab_sheet/claims_chaining.py, line") and "def product" in code

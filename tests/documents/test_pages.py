@@ -9,12 +9,15 @@ from labkit.documents import ledger, pages
 
 
 def entry(**changes):
-    row = ledger.Row("pivot.tip", "thesis", "table 3", "tip, x", "1.25", "mm", "misprint", "a note")
+    row = ledger.Row("pivot.tip", "thesis", "table 3", "tip, x", "1.25", "mm", "result", "misprint", "a note")
     given = {
         "value": "1.521",
         "status": "misprint",
         "proof": "The mean of the rows above is 1.521.",
         "notebook": "03_quirlen.ipynb",
+        "bound": "",
+        "place": "",
+        "code": "",
     }
     row = replace(row, **{k: v for k, v in changes.items() if k in ledger.COLUMNS and k != "status"})
     return pages.Entry(row, **{**given, **{k: v for k, v in changes.items() if k in given}})
@@ -24,7 +27,7 @@ SOME = [
     entry(),
     entry(id="pivot.tip[1]", quantity="tip, y", printed="2.5", value="5.20"),
     entry(document="lecture", status="reproduced", proof="", quantity="<script>", place="Übersicht"),
-    entry(document="report", status="unpublished", proof="Simulated: 3 mm."),
+    entry(document="report", status="consistent", proof="Simulated: 3 mm.", kind="claim"),
 ]
 
 
@@ -33,12 +36,12 @@ def test_readme_shows_the_totals():
     assert text == pages.with_totals(text, ledger.rows()), "run: python -m labkit.documents.pages"
 
 
-def test_totals_add_up():
+def test_totals_count_results_and_claims():
     rows = ledger.rows()
-    counts = pages.totals_by_document(rows)
-    assert sum(sum(count.values()) for count in counts.values()) == len(rows)
+    counted = [row for row in rows if row.kind in ("result", "claim")]
+    assert sum(sum(count.values()) for count in ledger.counts(rows).values()) == len(counted) < len(rows)
     last = pages.totals_markdown(rows).splitlines()[-1]
-    assert last.startswith("| all four |") and last.endswith(f"| {len(rows)} |")
+    assert last.startswith("| all four |") and last.endswith(f"| {len(counted)} |")
 
 
 def test_totals_need_their_marks():
@@ -63,6 +66,11 @@ def test_values_show_one_digit_more_than_is_printed(printed, value, text):
     assert pages.value_text(entry(printed=printed).row, value) == text
 
 
+def test_what_is_not_computed_is_a_dash():
+    assert pages.value_text(entry().row, None) == pages.value_text(entry().row, float("nan")) == "-"
+    assert pages.bound_text(None) == "" and pages.bound_text(0.00123) == "1.2e-03"
+
+
 def test_counts_are_shown_as_counts():
     assert pages.value_text(entry(printed="31", unit="1").row, 24.0) == "24"
     assert pages.value_text(entry(printed="31", unit="mm").row, 24.0) == "24.0"
@@ -73,7 +81,8 @@ def test_rows_with_one_argument_make_one_finding():
     assert len(found) == 1 and len(found[0].entries) == 2 and found[0].places == ["table 3"]
     page = pages.findings_html(SOME, pages.WRONG)
     assert "1.521" in page and "The mean of the rows above" in page and "03_quirlen" in page and "report" not in page
-    assert "Simulated: 3 mm." in pages.findings_html(SOME, pages.UNPUBLISHED)
+    assert "Simulated: 3 mm." in pages.findings_html(SOME, pages.OPEN)
+    assert pages.findings([entry(kind="consequence")], pages.WRONG) == []
     assert "<script>" not in pages.findings_html(SOME, ("reproduced",)) + widget.table_html(SOME)
 
 
@@ -94,7 +103,9 @@ def test_pages_go_chapter_by_chapter(monkeypatch):
 def test_arguments_open_without_a_mouse_and_no_hit_is_said():
     page = widget.table_html(SOME)
     assert page.count("<details>") == len(SOME) and "<summary" in page
-    assert widget.table_html([entry(proof="", note="")]).count("<details>") == 0
+    shown = widget.table_html([entry(proof="", note="", bound="1.0e-03", place="a.py, line 3", code="def f(): <b>")])
+    assert "bound 1.0e-03" in shown and "half a unit of the last digit 5.0e-03" in shown
+    assert "a.py, line 3" in shown and "def f(): &lt;b&gt;" in shown
     assert "no row" in widget.table_html([]) and "<table" not in widget.table_html([])
 
 
@@ -109,6 +120,8 @@ def test_arguments_open_without_a_mouse_and_no_hit_is_said():
         ({"text": "mean rows", "status": "misprint"}, 2),
         ({"text": "nothing like it"}, 0),
         ({"document": "lab sheet"}, 0),
+        ({"kind": "claim"}, 1),
+        ({"kind": widget.COUNTED}, 4),
     ],
 )
 def test_search(search, count):
@@ -125,4 +138,4 @@ def test_table_follows_its_controls_and_its_text_is_constant():
 
 def test_long_tables_are_cut():
     many = widget.table_html(SOME * 100)
-    assert many.count("<tr title") == widget.SHOWN and "400 rows, the first 150" in many
+    assert many.count('<tr style="vertical') == widget.SHOWN and "400 rows, the first 150" in many

@@ -198,14 +198,18 @@ STATUSES = (
     ),
     (
         _judged(
-            lambda h, o, b, m: "reproduced" if o <= h else "rounding" if o <= b else "misprint" if m else "contradiction",
+            lambda h, o, b, m: (
+                "reproduced" if o <= h else "rounding" if o <= b else "misprint" if m else "contradiction"
+            ),
             lambda h, o, b, m: "consistent" if o <= b else "not computable",
         ),
         "Compare with half unit + bound: the printed number itself was rounded too.",
     ),
     (
         _judged(
-            lambda h, o, b, m: "reproduced" if o <= h else "rounding" if o <= b else "misprint" if m else "contradiction"
+            lambda h, o, b, m: (
+                "reproduced" if o <= h else "rounding" if o <= b else "misprint" if m else "contradiction"
+            )
         ),
         "Compare with half unit + bound: the printed number itself was rounded too.",
     ),

@@ -64,7 +64,13 @@ def _row_html(entry):
     row = entry.row
     chapter = entry.notebook.removesuffix(".ipynb")
     link = f'<a href="{entry.notebook}" target="_blank" style="{LINK}">{chapter[:2]}</a>'
-    cells = (f"{row.document}, {row.place}", row.quantity, row.printed, entry.value, "" if row.unit == "1" else row.unit)
+    cells = (
+        f"{row.document}, {row.place}",
+        row.quantity,
+        row.printed,
+        entry.value,
+        "" if row.unit == "1" else row.unit,
+    )
     told = [html.escape(cell) for cell in cells]
     told[1] += _argument_html(entry)
     text = "".join(f'<td style="{WRAP if k != 4 else NOWRAP}">{cell}</td>' for k, cell in enumerate(told))
@@ -93,7 +99,7 @@ def code_html(code):
 
 
 class LedgerTable(ipywidgets.VBox):
-    """A search field and three choices over a table of ledger entries; works offline, and its text output never changes.
+    """A search field and three choices over a table of ledger entries; works offline, its text output never changes.
 
     entries: objects with `row`, `value`, `status`, `proof`, `notebook`, as `labkit.documents.pages.entries` gives them.
     """

@@ -1,5 +1,7 @@
 """Lab sheet, section 2: four printed transforms, their product, and what rounding and the sum sign explain."""
 
+import functools
+
 import numpy as np
 
 from ...geometry import chaining
@@ -70,6 +72,7 @@ def ideal():
     return Computed(chaining.chain(chaining.distribute_closure(lab_sheet.printed_transforms())), proof=proof)
 
 
+@functools.cache
 def _combined(how):
     links = lab_sheet.printed_transforms()
     return links.sum(0) if how == "sum" else chaining.chain(links)

@@ -22,7 +22,8 @@ def _simulated(value):
     deviation = np.sqrt(np.diag(result.covariance))
     proof = (
         f"Kreisel.txt was never published. The listing's line numbers leave room for "
-        f"{lab_sheet.poses_in_listing()} poses; with as many synthetic ones, drawn so that the printed results come out, "
+        f"{lab_sheet.poses_in_listing()} poses; with as many synthetic ones, drawn so that the printed results "
+        "come out, "
         "the calibration gives this value, with a "
         f"standard deviation of {deviation[:3].max():.2f} mm for the worst component of the tip: s0 means noise of "
         f"{result.std:.3f} mm per coordinate, with {3 * len(result.residuals) - 6} degrees of freedom."
@@ -77,7 +78,8 @@ def least_number():
     proof = (
         "The sheet says at least (mindestens), and six unknowns do ask for two poses of three equations. They do not"
         " suffice: R_1 - R_2 maps the axis of the turn between them to zero; in 1000 random pairs the smallest singular"
-        f" value never exceeds {ratio[2].max():.0e} of the largest. From {enough} poses on the system can be solved (median"
+        f" value never exceeds {ratio[2].max():.0e} of the largest. From {enough} poses on the system can be "
+        "solved (median"
         f" {np.median(ratio[3]):.2f})."
     )
     return Computed(-(-A.shape[2] // 3), proof=proof)

@@ -28,12 +28,18 @@ def _numeric_jacobians(x, u, dt):
 
 @computes("odometry.F_x")
 def jacobian_by_state():
-    return Computed(_numeric_jacobians(*POSES_TRIED[0])[0], proof="0 or 1 whatever is driven: the state enters the step by addition.")
+    return Computed(
+        _numeric_jacobians(*POSES_TRIED[0])[0],
+        proof="0 or 1 whatever is driven: the state enters the step by addition.",
+    )
 
 
 @computes("odometry.F_u")
 def jacobian_by_control():
-    return Computed(_numeric_jacobians(*POSES_TRIED[0])[1], proof="0 whatever is driven: this control does not move this coordinate.")
+    return Computed(
+        _numeric_jacobians(*POSES_TRIED[0])[1],
+        proof="0 whatever is driven: this control does not move this coordinate.",
+    )
 
 
 def _expression(by, row, column):

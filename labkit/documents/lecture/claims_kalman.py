@@ -57,7 +57,8 @@ def index_of_the_variance():
     printed = {HERE: "Σ_0", "prior": f"{given['var0']:.0f}"}
     found = explained_by(printed, holds, lambda text: ("Σ_1",) if text == "Σ_0" else single_slips(text))
     proof = (
-        f"The prior's variance is printed as {given['var0']:.0f} above; {_fusion(given).cov[0, 0]:.4f} is the one after "
+        f"The prior's variance is printed as {given['var0']:.0f} above; {_fusion(given).cov[0, 0]:.4f} is the "
+        "one after "
         "the correction, which the algorithm calls Σ_1. No single slip in the prior makes 0.2 the prior's."
     )
     return Computed("Σ_0" if holds(printed) else found[HERE][0], slips=found, proof=proof)
@@ -141,8 +142,10 @@ def predicted_state():
     model = reconstructed()[0]
     proof = (
         f"The printed correction (11.90, 4.98) of 11.79 needs ({value[0]:.3f} +- {bound[0]:.3f}, {value[1]:.3f} +- "
-        f"{bound[1]:.3f}) before it; 51 predictions from rest give ({model[0]:.2f}, {model[1]:.2f}). 12.5 and 5.0 are a "
-        f"t^2/2 and a t at t = 5 s. Of all single slips in the {len(printed)} printed numbers only those in the prediction "
+        f"{bound[1]:.3f}) before it; 51 predictions from rest give ({model[0]:.2f}, {model[1]:.2f}). 12.5 and "
+        "5.0 are a "
+        f"t^2/2 and a t at t = 5 s. Of all single slips in the {len(printed)} printed numbers only those in the "
+        "prediction "
         "make correction, covariance and model agree."
     )
     return Computed(value, bound=bound, slips=slips, proof=proof)
@@ -185,7 +188,8 @@ def corrected_state():
     printed = kalman.update([given["prior_x"], given["prior_v"]], cov, [given["z"]], C, cov_z).x
     proof = (
         f"The reconstructed prediction gives ({x:.4f}, {v:.4f}): 11.90 comes out, 4.98 is {v:.4f} cut off instead of "
-        f"rounded (z moves it by {bound[1]:.4f} at most). From the printed one follows ({printed[0]:.3f}, {printed[1]:.3f})."
+        f"rounded (z moves it by {bound[1]:.4f} at most). From the printed one follows ({printed[0]:.3f}, "
+        f"{printed[1]:.3f})."
     )
     return Computed(np.array([x, v]), bound=bound, simulated=True, proof=proof)
 

@@ -34,7 +34,8 @@ def mcl_first_line():
     return Computed(
         found[HERE][0] if HERE in found else printed[HERE],
         slips=found,
-        proof=f"Executed as printed, the first line empties the input: of 1000 particles {left} come back. The sets filled "
+        proof=f"Executed as printed, the first line empties the input: of 1000 particles {left} come back. The "
+        "sets filled "
         "below are those of step k + 1; no other set for the loop to read helps.",
     )
 
@@ -128,7 +129,8 @@ def field_speed():
     return Computed(
         "wesentlich beschleunigt" if search > 100 * table else f"{search / table:.1f} times faster",
         simulated=True,
-        proof=f"On our building: {search / table:.0f} times fewer distances for one scan of 541 beams and 1000 particles.",
+        proof=f"On our building: {search / table:.0f} times fewer distances for one scan of 541 beams and 1000 "
+        "particles.",
     )
 
 

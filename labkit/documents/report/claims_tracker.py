@@ -65,7 +65,8 @@ def entries():
     value[COPIED] = _rms_angle_deg(float(run["E_rot"]))
     proof = (
         "Six times the average less the five others gives run 3's largest error: "
-        f"{value[UPSIDE_DOWN]:.3f} mm, not 6; of all single slips in the column, its average and its variance only this "
+        f"{value[UPSIDE_DOWN]:.3f} mm, not 6; of all single slips in the column, its average and its variance "
+        "only this "
         "entry's explains it. Run 4's largest angle equals its mean angle, and its E_rot alone demands at least "
         f"{value[COPIED]:.3f} deg (root mean square of the angles); no slip in mean or E_rot helps."
     )
@@ -108,14 +109,16 @@ def results_block():
 
     found = explained_by({HERE: "2.667", "average": texts["mean_mm"]}, holds)
     proof = (
-        f"The printed average is {value[7]:.9f} mm, which the six runs give to the last digit, as in all other columns; it "
+        f"The printed average is {value[7]:.9f} mm, which the six runs give to the last digit, as in all other "
+        "columns; it "
         f"rounds to {value[7]:.3f}."
     )
     return Computed(value, bound, slips={(7,): found}, proof=proof)
 
 
 def _e_trans_range(scale):
-    """What equation (17) can be, in mm, for the printed mean and largest errors: mean <= root mean square <= largest."""
+    """What equation (17) can be, in mm, for the printed mean and largest errors: mean <= root mean square <= "
+    "largest."""
     mean = dict(zip(COLUMNS, table_d().mean))
     return scale * mean["mean_mm"], scale * mean["max_mm"]
 
@@ -135,7 +138,8 @@ def unit_of_e_trans():
     return Computed(
         "mm" if holds(printed) else found[HERE][0],
         slips=found,
-        proof=f"Mean and largest errors of 2.666 and 9.468 mm over {POSES} poses keep equation (17) between {least:.2f} "
+        proof=f"Mean and largest errors of 2.666 and 9.468 mm over {POSES} poses keep equation (17) between "
+        f"{least:.2f} "
         f"and {most:.2f} mm. The printed {average:.6f} is {1000 * average:.2f} mm when read in m, and 800 times too "
         "small in mm; a slip in one entry would not move the six others.",
     )
@@ -171,7 +175,8 @@ def unit_of_e_rot():
         "deg" if holds(printed) else found[HERE][0],
         slips=found,
         proof=f"Without a unit, as the block of section 3.1 prints it, {float(E_rot[RUNS]):.3e} means an rms angle of "
-        f"{angle:.3f} deg, between the printed mean of {mean[RUNS]} and the printed largest of {largest[RUNS]} deg, and "
+        f"{angle:.3f} deg, between the printed mean of {mean[RUNS]} and the printed largest of {largest[RUNS]} "
+        "deg, and "
         "so in each run; read in degrees it is far below the mean.",
     )
 
@@ -185,7 +190,8 @@ def _mounting_angle_deg():
 def half_turn():
     return Computed(
         None,
-        proof=f"The printed quaternion turns by {_mounting_angle_deg():.2f} deg; a half turn about z would read (0, 0, 1, "
+        proof=f"The printed quaternion turns by {_mounting_angle_deg():.2f} deg; a half turn about z would read "
+        "(0, 0, 1, "
         "0). The flange frame may include it already: the report does not say, so nothing is refuted.",
     )
 
@@ -208,7 +214,8 @@ def offset_after_half_turn():
     value, bound = rounding.propagate(lambda m: 1000 * m * [-1, -1, 1], mean)
     proof = (
         f"Appendix D and section 3.1 give ({-value[0]:.2f}, {-value[1]:.2f}, {value[2]:.2f}) mm. With the half turn of "
-        f"the text x and y come out; the conclusion's 65.3 mm is {65.3 - value[2]:.1f} mm more than z, which a half turn "
+        f"the text x and y come out; the conclusion's 65.3 mm is {65.3 - value[2]:.1f} mm more than z, which a "
+        "half turn "
         "about z leaves alone."
     )
     return Computed(value, bound, proof=proof)
@@ -221,7 +228,8 @@ def mean_angular_speed():
     largest = np.deg2rad(said["largest_angular_speed"])
     return Computed(
         largest,
-        proof=f"A mean of 5 rad/s exceeds the fastest motion, {fastest} rad/s, and the {largest:.3f} rad/s (3 deg/s) that "
+        proof=f"A mean of 5 rad/s exceeds the fastest motion, {fastest} rad/s, and the {largest:.3f} rad/s (3 "
+        "deg/s) that "
         "the conclusion calls the largest error. 5 deg/s would still exceed it; 0.05 rad/s, which is 2.9 deg/s, would "
         "not. The report does not tell which is meant.",
     )
@@ -235,7 +243,8 @@ def exceeds_guarantee():
     )
     return Computed(
         "překračují" if beyond else "nepřekračují",
-        proof=f"{said['largest_position']:.0f} mm and {said['largest_orientation']:.0f} deg against the maker's precision "
+        proof=f"{said['largest_position']:.0f} mm and {said['largest_orientation']:.0f} deg against the maker's "
+        "precision "
         f"of {said['precision']:.0f} mm and {said['orientation_precision']:.0f} deg; against its accuracy of "
         f"{said['accuracy']:.0f} mm as well.",
     )
@@ -244,7 +253,8 @@ def exceeds_guarantee():
 def _unpublished():
     return Computed(
         None,
-        proof="The logs of section 3.2 were never published, and no printed number leads to this one. Chapter 6 simulates "
+        proof="The logs of section 3.2 were never published, and no printed number leads to this one. Chapter "
+        "6 simulates "
         "such a run; what comes out there depends on the noise that is put in.",
     )
 

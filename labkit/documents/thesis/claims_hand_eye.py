@@ -19,6 +19,7 @@ from . import printed as thesis
 
 NOTEBOOK = "05_hand_eye"
 
+
 @functools.cache
 def data(*corrected):
     return thesis.measurements(corrected)
@@ -47,9 +48,15 @@ SIMULATED = {  # what the inputs of the simulation are printed as: table 6-2, li
 }  # fmt: skip
 
 
+@functools.cache
+def _model():
+    """The simulation model, and its 39 coordinates as printed."""
+    return thesis.simulation(), thesis.simulation(exact=False).x_S
+
+
 def _centers(d, table):
     """The 39 sensor coordinates that one table's inputs give."""
-    T_BF, _, target, scanner = thesis.simulation()
+    T_BF, _, target, scanner = _model()[0]
     flange, pose, target = T_BF.copy(), scanner.copy(), target.copy()
     flange[:, 1, 3], flange[:, 2, 3] = float(d["flange y"]), float(d[f"{table} flange z"])
     pose[1], pose[4] = float(d["P2 y"]), float(d[f"{table} P2 B"])
@@ -61,7 +68,7 @@ def _centers(d, table):
 @functools.cache
 def _misses(entries, table):
     """How far the 39 coordinates of a table's inputs are from the printed ones, mm."""
-    return float(np.abs(_centers(dict(entries), table) - thesis.simulation(exact=False).x_S).max())
+    return float(np.abs(_centers(dict(entries), table) - _model()[1]).max())
 
 
 def _follow(d):
@@ -74,7 +81,7 @@ def _solved_inputs():
     """Flange z, B and the sphere's y against the flange, from the 39 printed coordinates by least squares, and how far
     two decimals that may be cut off leave them open.
     """
-    printed = thesis.simulation(exact=False).x_S.ravel()
+    printed = _model()[1].ravel()
 
     def centers(p):
         z, B, y = (repr(float(x)) for x in p)
@@ -90,9 +97,11 @@ def _solved(which, name, other):
     found = explained_by(SIMULATED | other, _follow)
     wrong, right = SIMULATED | other, SIMULATED | other | {key: texts[0] for key, texts in found.items() if key == name}
     proof = (
-        f"Solved for height, B and y the 39 printed coordinates of C10 give {value:.3f} +- {bound:.3f}. As printed they "
+        f"Solved for height, B and y the 39 printed coordinates of C10 give {value:.3f} +- {bound:.3f}. As "
+        "printed they "
         f"miss by up to {max(_misses(tuple(wrong.items()), t) for t in ('6-2', 'C10')):.1f} mm, put right by "
-        f"{max(_misses(tuple(right.items()), t) for t in ('6-2', 'C10')):.4f} mm. Of all single slips in both tables these "
+        f"{max(_misses(tuple(right.items()), t) for t in ('6-2', 'C10')):.4f} mm. Of all single slips in both "
+        "tables these "
         f"make them follow: {'; '.join(f'{key} {texts[0]}' for key, texts in found.items())}."
     )
     return Computed(value, bound, slips={HERE if key == name else key for key in found}, proof=proof)
@@ -157,8 +166,10 @@ def gauss_newton_end():
     return Computed(
         end,
         proof=(
-            f"From the 39 coordinates as printed, with two decimals. At B = -90 deg A and C are not determined one by one "
-            f"(the last singular value is {values[5] / values[0]:.0e} of the first), only their sum; what the table prints "
+            "From the 39 coordinates as printed, with two decimals. At B = -90 deg A and C are not determined "
+            "one by one "
+            f"(the last singular value is {values[5] / values[0]:.0e} of the first), only their sum; what the "
+            "table prints "
             "of them and of y is noise of the solver and has no rows."
         ),
     )
@@ -172,7 +183,8 @@ def gauss_newton_sign():
     return Computed(
         -float(printed["A"]),
         slips=found,
-        proof="The pose depends on A + C, which is 0 at the minimum; nine of the ten printed rows have opposite signs, this "
+        proof="The pose depends on A + C, which is 0 at the minimum; nine of the ten printed rows have "
+        "opposite signs, this "
         f"one has A = C = 4e-4: a sign is missing, in {' or '.join(sorted('C' if k == HERE else k for k in found))}.",
     )
 
@@ -229,8 +241,10 @@ def trust_region_failure():
         None,
         proof=(
             f"From these starts the trust region of chapter 4 arrives in {counts[4]}, {counts[6]} and {counts[9]} "
-            f"iterations; what the thesis's solver did was not published. Starts 4 and 6 cost {_start_cost(4):.1e} mm^2, "
-            f"less than its tolerance 1e-6; start 9 costs {_start_cost(9):.0f} mm^2, and there the derivatives by A and C "
+            "iterations; what the thesis's solver did was not published. Starts 4 and 6 cost "
+            f"{_start_cost(4):.1e} mm^2, "
+            f"less than its tolerance 1e-6; start 9 costs {_start_cost(9):.0f} mm^2, and there the derivatives "
+            "by A and C "
             "are parallel (B = -90.1 deg)."
         ),
     )
@@ -243,8 +257,10 @@ def trust_region_end():
         _from_two_decimals(),
         simulated=True,
         proof=(
-            f"The minimum of the 39 coordinates as printed. The trust region of chapter 4 finds it from all ten starts, in "
-            f"{int(counts.min())} to {int(counts.max())} iterations. Where the thesis's own solver stopped short of it, "
+            "The minimum of the 39 coordinates as printed. The trust region of chapter 4 finds it from all ten "
+            "starts, in "
+            f"{int(counts.min())} to {int(counts.max())} iterations. Where the thesis's own solver stopped "
+            "short of it, "
             "nothing published says why."
         ),
     )
@@ -301,11 +317,14 @@ def start_names():
     axes = {3: "z", 4: "y", 5: "x"}  # KUKA: A about z, B about y, C about x
     turned = [axes[int(np.flatnonzero(starts[i] != original)[0])] for i in (4, 6)]
     printed = {HERE: "x", "row's own words": "z"}
-    slips = explained_by(printed, lambda d: set(d.values()) == {turned[0]}, {HERE: ("z", "y"), "row's own words": ("x", "y")})
+    slips = explained_by(
+        printed, lambda d: set(d.values()) == {turned[0]}, {HERE: ("z", "y"), "row's own words": ("x", "y")}
+    )
     return Computed(
         np.array([f"p_2,{axis}-rot" for axis in turned]),
         slips=slips,
-        proof="Row 4 is called a turn about z and changes A, row 6 a turn about x and changes C, as the pose convention has "
+        proof="Row 4 is called a turn about z and changes A, row 6 a turn about x and changes C, as the pose "
+        "convention has "
         "it; their symbols name the other axis each.",
     )
 
@@ -344,13 +363,16 @@ def _predicted(pose, table, column):
 
 
 def _slips_in_table(pose):
-    """Columns whose single slip explains a row and, where the pattern speaks, keeps it halfway between its neighbors."""
+    """Columns whose single slip explains a row and, where the pattern speaks, keeps it halfway between its "
+    "neighbors."""
     explained = _suspects()[pose]
     credible = [e for e in explained if not e.turn > misprints.TURNED] or explained
     steps = misprints.neighbor_offsets(corrected_data())
     found = {}
     for e in credible:
-        trial = thesis.printed_entries() | {(r["table"], r["pose"], r["column"]): r["corrected"] for r in thesis.corrections() if r["pose"] != pose}
+        trial = thesis.printed_entries() | {
+            (r["table"], r["pose"], r["column"]): r["corrected"] for r in thesis.corrections() if r["pose"] != pose
+        }
         trial[e.table, pose, e.column] = e.corrected
         off = np.abs(misprints.neighbor_offsets(misprints.measurements_from(trial))[pose - 1])
         if off <= np.abs(steps).max():
@@ -362,12 +384,15 @@ def _misprint(pose):
     row = next(row for row in thesis.corrections() if row["pose"] == pose)
     value, bound = _predicted(pose, row["table"], row["column"])
     found = _slips_in_table(pose)
-    named = "; ".join(f"{e.column} {e.printed} -> {e.corrected} ({e.slip}, leaves {e.after:.2f} mm)" for e in found.values())
+    named = "; ".join(
+        f"{e.column} {e.printed} -> {e.corrected} ({e.slip}, leaves {e.after:.2f} mm)" for e in found.values()
+    )
     return Computed(
         value,
         bound,
         slips={HERE if key == (row["table"], row["column"]) else key for key in found},
-        proof=f"The rest of the row and a calibration without it put this entry at {value:.2f} +- {bound:.2f}. Single slips "
+        proof=f"The rest of the row and a calibration without it put this entry at {value:.2f} +- {bound:.2f}. "
+        "Single slips "
         f"that explain the row, among all in its nine entries: {named}. {row['reason']}",
     )
 
@@ -402,7 +427,8 @@ def pattern_step():
         bound=spread,
         slips=explained_by({HERE: "67.7", "step": "22.5"}, holds),
         proof=(
-            f"The poses of this column are turned by {mean - 45:.2f} deg against those of the 45 deg column (four lines, "
+            f"The poses of this column are turned by {mean - 45:.2f} deg against those of the 45 deg column "
+            "(four lines, "
             f"{spread:.2f} deg apart); with steps of 22.5 deg (6-22) the column is 67.5 deg."
         ),
     )
@@ -439,7 +465,8 @@ def _table66_pose(name, pose):
         again.values,
         bound=again.halves,
         proof=(
-            f"C14 prints {again.values} for the same pose: where they differ by one in the last digit, it is cut off in one "
+            f"C14 prints {again.values} for the same pose: where they differ by one in the last digit, it is "
+            "cut off in one "
             "table and rounded in the other."
         ),
     )
@@ -492,7 +519,8 @@ def start_text():
     other = frames.matrix_from_kuka(frames.kuka_from_degrees([0, 0, 0, 180.0, -B, 0]))
     return Computed(
         B,
-        proof=f"Pose and matrix of table 6-7 have B = {B:.0f} deg and T[0, 2] = {T[0, 2]:.0f}. With alpha = 180 and beta = 90 "
+        proof=f"Pose and matrix of table 6-7 have B = {B:.0f} deg and T[0, 2] = {T[0, 2]:.0f}. With alpha = 180 "
+        "and beta = 90 "
         f"deg in the order of (6-3) T[0, 2] would be {other[0, 2]:.0f}; the words do not say in which order they turn.",
     )
 
@@ -607,8 +635,10 @@ def form_deviation():
     certificate = thesis.roundness_um() / 1000
     return Computed(
         certificate.max(),
-        proof=f"The certificate of the same sphere (C11) prints roundness deviations of {1000 * certificate.min():.3f} to "
-        f"{1000 * certificate.max():.3f} um, with an uncertainty of 0.04 um; the machine reports 67.4 um, 250 times as much. "
+        proof="The certificate of the same sphere (C11) prints roundness deviations of "
+        f"{1000 * certificate.min():.3f} to "
+        f"{1000 * certificate.max():.3f} um, with an uncertainty of 0.04 um; the machine reports 67.4 um, 250 "
+        "times as much. "
         "Whatever it touched, its diameter of 60.5541 mm is not the sphere's.",
     )
 
@@ -711,8 +741,10 @@ def end_pose():
             f"The least-squares pose of the printed data (decimal point of pose 2 repaired) lies {distance:.2f} mm "
             f"and {np.rad2deg(angle):.2f} deg away and has an rms of {fit.rms:.2f} mm against "
             f"{rms_at(end, target, measured):.2f} mm; of all sets of the seven corrections {nearest} comes nearest, "
-            f"{near_distance:.2f} mm and {np.rad2deg(near_angle):.2f} deg. Tables and end pose exclude each other; which "
-            "of them the run did not have, the thesis does not show. A and C are hardly determined one by one so close to "
+            f"{near_distance:.2f} mm and {np.rad2deg(near_angle):.2f} deg. Tables and end pose exclude each "
+            "other; which "
+            "of them the run did not have, the thesis does not show. A and C are hardly determined one by one "
+            "so close to "
             "B = -90 deg."
         ),
     )
@@ -734,8 +766,10 @@ def end_iterations():
         bound=np.abs(counts - middle).max(),
         simulated=True,
         proof=(
-            f"At the start B = -90 deg the first step of the listing is undetermined: {len(counts)} starts within 0.1 deg "
-            f"of it take {min(counts):.0f} to {max(counts):.0f} iterations on the printed data, half of them {middle:.0f} "
+            f"At the start B = -90 deg the first step of the listing is undetermined: {len(counts)} starts "
+            "within 0.1 deg "
+            f"of it take {min(counts):.0f} to {max(counts):.0f} iterations on the printed data, half of them "
+            f"{middle:.0f} "
             "or more. That excludes nothing."
         ),
     )
@@ -743,7 +777,8 @@ def end_iterations():
 
 @computes("handeye.validation")
 def validation():
-    """Residual of the best pose under the printed end pose; which pose the thesis took, and its center, it does not say."""
+    """Residual of the best pose under the printed end pose; which pose the thesis took, and its center, it "
+    "does not say."""
     target = thesis.printed_target()
 
     def residuals(pose_deg):
@@ -759,8 +794,10 @@ def validation():
         bound=np.append(bound[best], 0.0),
         simulated=True,
         proof=(
-            f"The pose is not named and its center came from a sphere fit of its own (radius 30.198 mm). Pose {best + 1} "
-            f"gives ({signed[0]:.3f}, {signed[1]:.3f}, {signed[2]:.3f}) mm, {lengths[best]:.3f} mm long, pose {second + 1} "
+            "The pose is not named and its center came from a sphere fit of its own (radius 30.198 mm). Pose "
+            f"{best + 1} "
+            f"gives ({signed[0]:.3f}, {signed[1]:.3f}, {signed[2]:.3f}) mm, {lengths[best]:.3f} mm long, pose "
+            f"{second + 1} "
             f"{lengths[second]:.3f} mm; y and z fit pose {best + 1}, and x would, had it lost its sign."
         ),
     )
@@ -775,8 +812,10 @@ def claim():
     return Computed(
         np.array([printed.min(), printed.max()]),
         proof=(
-            f"Table 7-5 prints deviations from {printed.min():.2f} to {printed.max():.2f} mm, at one pose. Over the 31 poses "
-            f"of the corrected tables the end pose leaves {corrected:.2f} mm (rms), a fit with the center free {joint:.3f} "
+            f"Table 7-5 prints deviations from {printed.min():.2f} to {printed.max():.2f} mm, at one pose. Over "
+            "the 31 poses "
+            f"of the corrected tables the end pose leaves {corrected:.2f} mm (rms), a fit with the center free "
+            f"{joint:.3f} "
             f"mm: {corrected / joint:.1f} times less. The sentence itself speaks of the one pose."
         ),
     )
@@ -799,7 +838,8 @@ def underdetermined():
     return Computed(
         names.get(enough[0], str(enough[0])) if enough else "no number of poses suffices",
         proof=(
-            f"Four poses give 12 equations for {J.shape[1]} unknowns, but all {len(J)} equations of the 31 poses have rank "
+            f"Four poses give 12 equations for {J.shape[1]} unknowns, but all {len(J)} equations of the 31 "
+            "poses have rank "
             f"{ranks[-1]}: the plate's pose enters by the one point T_BP x_P', so its three rotations stay free."
         ),
     )
@@ -812,7 +852,8 @@ def independent_measurements():
     poses = {(line if n else None, int(n)) for line in range(lines) for n in angles}
     return Computed(
         float(lines * len(angles)),
-        proof=f"(6-22) to (6-25) define {lines} x {len(angles)} = {lines * len(angles)} measurements; n = 0 is the same "
+        proof=f"(6-22) to (6-25) define {lines} x {len(angles)} = {lines * len(angles)} measurements; n = 0 is "
+        "the same "
         f"direction on all four lines, which leaves {len(poses)} directions of view. 31 were taken.",
     )
 
@@ -870,8 +911,10 @@ def li_sign():
         found[HERE][0],
         slips=found,
         proof=(
-            f"A flange moved by +10 mm along x sees the sphere shifted by {left[0]:.0f} mm there: X_b = R0 (R_s X_l + T_s) "
-            "+ T_0 being constant, the right side of (2-41) is T_01 - T_02, or the left one has the other order; (2-40) is "
+            f"A flange moved by +10 mm along x sees the sphere shifted by {left[0]:.0f} mm there: X_b = R0 (R_s "
+            "X_l + T_s) "
+            "+ T_0 being constant, the right side of (2-41) is T_01 - T_02, or the left one has the other "
+            "order; (2-40) is "
             "right."
         ),
     )
@@ -886,7 +929,9 @@ def kim_equation():
     u, D, F = X[:3].ravel(), _appendix_d(A, B), _appendix_f(A)
     other = frames.pose(exp_so3(rng.normal(size=3)), rng.normal(size=3))
     forms = {"AX = BX": other @ X - B @ X, "AX = XB": A @ X - X @ B}
-    holds = {name: float(np.abs(D @ u - F).max()) < 1e-9 and float(np.abs(off).max()) < 1e-9 for name, off in forms.items()}
+    holds = {
+        name: float(np.abs(D @ u - F).max()) < 1e-9 and float(np.abs(off).max()) < 1e-9 for name, off in forms.items()
+    }
     printed = {HERE: "AX = BX", "section 4.1": "AX = XB"}
     found = explained_by(
         printed, lambda d: d[HERE] == d["section 4.1"] and holds[d[HERE]], lambda text: [n for n in forms if n != text]
@@ -894,7 +939,8 @@ def kim_equation():
     return Computed(
         found[HERE][0],
         slips=found,
-        proof=f"Appendix A's D U = F holds for motions with A X = X B (off by {np.abs(D @ u - F).max():.0e}), and (2-44) and "
+        proof=f"Appendix A's D U = F holds for motions with A X = X B (off by {np.abs(D @ u - F).max():.0e}), "
+        "and (2-44) and "
         "section 4.1 print that order; A X = B X would leave nothing but A = B.",
     )
 
@@ -922,7 +968,8 @@ def rating_scale():
     criteria = max(len(approach["points"]) for approach in thesis.table_4_1().values())
     return Computed(
         10 * criteria,
-        proof=f"Each approach is rated under {criteria} criteria from 1 to 10: no sum can exceed {10 * criteria}. Either a "
+        proof=f"Each approach is rated under {criteria} criteria from 1 to 10: no sum can exceed "
+        f"{10 * criteria}. Either a "
         "fifth criterion is missing from the table or the scale is wrong.",
     )
 
@@ -948,8 +995,10 @@ def angle_names():
         found[HERE][0],
         slips=found,
         proof=(
-            "Section 6.1.2, (6-7), (6-9) and listing C2 turn about z by A and about x by C, formula (6-3) the other way "
-            f"round. The matrices of table 6-6 follow from their poses within {off['Rz(A) Ry(B) Rx(C)']:.0e} by the former, "
+            "Section 6.1.2, (6-7), (6-9) and listing C2 turn about z by A and about x by C, formula (6-3) the "
+            "other way "
+            f"round. The matrices of table 6-6 follow from their poses within {off['Rz(A) Ry(B) Rx(C)']:.0e} by "
+            "the former, "
             f"and are missed by {off['Rz(C) Ry(B) Rx(A)']:.1f} by the latter."
         ),
     )
@@ -959,6 +1008,7 @@ def angle_names():
 def angle_names_of_chapter_2():
     return Computed(
         ORDERS and angle_names().value,
-        proof="Section 2.1.2 turns about z by C and about x by A, section 6.1.2, listing C2 and the tables about z by A and "
+        proof="Section 2.1.2 turns about z by C and about x by A, section 6.1.2, listing C2 and the tables "
+        "about z by A and "
         "about x by C. Each is a convention; together they exchange A and C.",
     )

@@ -68,10 +68,12 @@ def _saddle_proof():
     saddle, printed = wells.extrema()[2], thesis.extrema()["saddle"][1:]
     return (
         f"At the printed saddle (0.105, -0.205) f is {wells.value(printed):.3f}, as printed, but the gradient "
-        f"has length {np.linalg.norm(wells.gradient(printed)):.2f}, and the point is {_off_line(printed):.3f} off the line "
+        f"has length {np.linalg.norm(wells.gradient(printed)):.2f}, and the point is {_off_line(printed):.3f} "
+        "off the line "
         "through both centers, which holds every stationary point; it vanishes at "
         f"({saddle.x[0]:.4f}, {saddle.x[1]:.4f}), f = {saddle.value:.3f}, with Hessian eigenvalues "
-        f"{saddle.eigenvalues[0]:.1f} and {saddle.eigenvalues[1]:.1f}. No single slip in (6-16) makes the printed point "
+        f"{saddle.eigenvalues[0]:.1f} and {saddle.eigenvalues[1]:.1f}. No single slip in (6-16) makes the "
+        "printed point "
         "stationary."
     )
 
@@ -138,7 +140,10 @@ def _hessian_errors():
     """Largest deviation from central differences of the gradient over a grid: of the Hessian of listing C7 and of
     `wells.hessian`, which is the code of listing C9."""
     numeric = np.array([numeric_jacobian(wells.gradient, p) for p in _grid()])
-    return {"C7": np.abs(wells.printed_hessian(_grid()) - numeric).max(0), "C9": np.abs(wells.hessian(_grid()) - numeric).max(0)}
+    return {
+        "C7": np.abs(wells.printed_hessian(_grid()) - numeric).max(0),
+        "C9": np.abs(wells.hessian(_grid()) - numeric).max(0),
+    }
 
 
 def _entry(i, j, printed, right):
@@ -195,7 +200,8 @@ def newton_rule():
     return Computed(
         found[HERE][0],
         slips=found,
-        proof=f"|f| is {size[printed[HERE]]:.1f} or more in both minima, so the printed loop runs on to i_max; the gradient "
+        proof=f"|f| is {size[printed[HERE]]:.1f} or more in both minima, so the printed loop runs on to i_max; "
+        "the gradient "
         f"is {size[gradient]:.0e} there, and listing C8 tests the gradient.",
     )
 
@@ -239,8 +245,10 @@ def newton_system():
     return Computed(
         found["(2-26)"][0],
         slips={HERE if name == "(2-26)" else name for name in found},
-        proof=f"(2-24), (2-25) and (2-27) agree on x - d with d = H^-1 grad f. From (-0.9, -1.9), taken literally, (2-26) "
-        f"ends {far:.0f} away from the minimum; its inverse and its minus sign both have to go, and no change of (2-25) or "
+        proof="(2-24), (2-25) and (2-27) agree on x - d with d = H^-1 grad f. From (-0.9, -1.9), taken "
+        "literally, (2-26) "
+        f"ends {far:.0f} away from the minimum; its inverse and its minus sign both have to go, and no change "
+        "of (2-25) or "
         "(2-27) makes the three agree.",
     )
 
@@ -295,7 +303,8 @@ def gauss_newton_equation():
     return Computed(
         found[HERE][0],
         slips=found,
-        proof=f"J has shape {J.shape} and F {r.shape}: the printed product J F does not exist. With the transpose (2-32) is "
+        proof=f"J has shape {J.shape} and F {r.shape}: the printed product J F does not exist. With the "
+        "transpose (2-32) is "
         "the solution (2-31), and listing C5 has it.",
     )
 
@@ -315,7 +324,8 @@ def trust_region_update():
     return Computed(
         found[HERE][0],
         slips=found,
-        proof=f"From (0.5, 0.5) with radius 0.2, f goes from {wells.value(x):.1f} to {ends['x + h']:.1f} at x + h, as (2-36) "
+        proof=f"From (0.5, 0.5) with radius 0.2, f goes from {wells.value(x):.1f} to {ends['x + h']:.1f} at x + "
+        "h, as (2-36) "
         f"takes it, but to {ends['x - h']:.1f} at x - h.",
     )
 
@@ -459,7 +469,8 @@ def farthest_trust_region():
     return Computed(
         np.repeat(np.array(reach)[:, None], 2, axis=1),
         simulated=True,
-        proof=f"Solver and settings are MATLAB's. The trust region of chapter 4 ends in a minimum from everywhere on the "
+        proof="Solver and settings are MATLAB's. The trust region of chapter 4 ends in a minimum from "
+        "everywhere on the "
         f"diagonal up to (100, 100), where the search ends, and changes from one to the other {changes} times: with it "
         "there is no farthest start.",
     )
@@ -505,7 +516,8 @@ def _saddle_of(method):
     return Computed(
         "no solution" if share[2] == 0 else "found",
         simulated=True,
-        proof=f"A stand-in for the thesis's method, whose residuals or settings are not published, ends in the saddle from "
+        proof="A stand-in for the thesis's method, whose residuals or settings are not published, ends in the "
+        "saddle from "
         f"{100 * share[2]:.1f} % of the starts in [-6, 6]^2.",
     )
 

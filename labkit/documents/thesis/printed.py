@@ -167,7 +167,9 @@ def pose_digits(name):
     pose : rounding.Printed
         Arrays of shape (6,), mm and deg.
     """
-    return rounding.read(_row(read_table("hand_eye/frames.csv", text=("name", "place", *POSE_COLUMNS)), name, POSE_COLUMNS))
+    return rounding.read(
+        _row(read_table("hand_eye/frames.csv", text=("name", "place", *POSE_COLUMNS)), name, POSE_COLUMNS)
+    )
 
 
 def frame(name):
@@ -212,7 +214,9 @@ def point_digits(name):
     point : rounding.Printed
         Arrays of shape (3,), mm.
     """
-    return rounding.read(_row(read_table("hand_eye/points.csv", text=("name", "place", *CENTER_COLUMNS)), name, CENTER_COLUMNS))
+    return rounding.read(
+        _row(read_table("hand_eye/points.csv", text=("name", "place", *CENTER_COLUMNS)), name, CENTER_COLUMNS)
+    )
 
 
 def measuring_protocol():
