@@ -34,6 +34,7 @@ from labkit.documents.thesis.listings import listing_cost, listing_gauss_newton
 from labkit.exercises import course
 from labkit.geometry import frames
 from labkit.geometry.lie import exp_so3, nearest_rotation, skew
+from labkit.machines import triangulation
 
 ex = course("05-hand-eye")
 np.set_printoptions(precision=3, suppress=True, linewidth=110)
@@ -57,11 +58,64 @@ p2_end = frames.kuka_from_degrees(thesis.kuka_pose_deg("scanner_end"))
 target = thesis.printed_target()
 print("the thesis's sphere center (tables 6-4 and 6-5):", target)
 
+# %% triangulation [markdown]
+# ## Height from two angles (*further*)
+#
+# How does the scanner see depth? It *triangulates* (section 2.2): a laser at one end of a base $L$ lights a spot, a camera at the other end looks at it. Seen from both ends the spot
+# stands at the angles $\alpha$ and $\beta$ against the base, and its height $H$ cuts the base in two: $L = H/\tan\alpha + H/\tan\beta$ (2-11).
+#
+# Angles err. **The object moves twice as far away: how does the error of $H$ grow?** Decide, then drag it. *Make it fail* shortens the base.
+
+# %% predict-twice_as_far
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "nearly four times"
+### END SOLUTION
+ex.predict("twice_as_far", guess, reveal=stages.triangle)
+
+# %% height_from_angles
+@ex.height_from_angles
+def height_from_angles(alpha, beta, base):
+    """Return the height H (mm) from both angles (rad), in the unit of the base (mm)."""
+    ### BEGIN SOLUTION
+    return base / (1 / np.tan(alpha) + 1 / np.tan(beta))
+    ### END SOLUTION
+
+
+# %% height_std
+@ex.height_std
+def height_std(alpha, beta, base, std):
+    """Return the standard deviation of H (mm) to first order.
+
+    alpha, beta: rad, both with independent errors of standard deviation std (rad);
+    base: mm.
+    """
+    ### BEGIN SOLUTION
+    H = height_from_angles(alpha, beta, base)
+    by_alpha, by_beta = (H**2 / (base * np.sin(a) ** 2) for a in (alpha, beta))
+    return std * np.hypot(by_alpha, by_beta)
+    ### END SOLUTION
+
+
+# %% over-the-range [markdown]
+# The data sheet (B1) promises $\pm 0.16\,\%$ of a range of 100 mm, as three standard deviations, from 190 to 290 mm. It does not print the base. With a base of 100 mm, which
+# noise of the angles would that be, and how is it shared out over the range? (Height above the laser, so $\alpha = 90°$.)
+
+# %% over-the-range-code
+base, promised = 100.0, triangulation.LINEARITY
+at = {H: triangulation.angles_to([0.0, H], base) for H in (125, 190, 240, 290, 390)}
+std = promised / height_std(*at[240], base, 1.0)
+print(f"{np.rad2deg(std):.4f} deg give {promised:.3f} mm in the middle of the range")
+for H, angles in at.items():
+    print(f"H = {H} mm: {height_std(*angles, base, std):.3f} mm")
+
+# %% over-the-range-verdict [markdown]
+# From the near end of its range to the far one the error doubles, whatever single number a data sheet prints. Go near, where the part allows it.
+
 # %% circle [markdown]
 # ## One scan line, one circle
 #
-# The scanner triangulates: from the angles at both ends of its base $L$ follows the height $H = L\,\tan\alpha\tan\beta/(\tan\alpha+\tan\beta)$ (2-12), for a
-# whole line of points at once, all in its plane $y = 0$. The plane cuts the sphere in a circle. Multiply $(x-x_c)^2 + (z-z_c)^2 = r^2$ out and it is
+# A line scanner triangulates a whole line of points at once ((2-12): $H = L\,\tan\alpha\tan\beta/(\tan\alpha+\tan\beta)$), all in its plane $y = 0$. The plane cuts the sphere in a circle. Multiply $(x-x_c)^2 + (z-z_c)^2 = r^2$ out and it is
 # *linear* in $a_1 = -2x_c$, $a_2 = -2z_c$, $a_3 = x_c^2 + z_c^2 - r^2$: that is listing C15. Keep the residuals small by any means you like.
 
 # %% fit_circle

@@ -10,12 +10,32 @@ from labkit.documents.thesis.printed import corrections, measurements
 from labkit.geometry import frames
 from labkit.geometry.lie import exp_so3
 
-ALL = (w.scan_line, w.difference_steps, w.convergence, w.two_methods, w.thirty_one_poses, w.pattern_designer)
+ALL = (
+    w.triangle,
+    w.scan_line,
+    w.difference_steps,
+    w.convergence,
+    w.two_methods,
+    w.thirty_one_poses,
+    w.pattern_designer,
+)
 
 
 @pytest.mark.parametrize("make", ALL)
 def test_draws_fails_and_recovers(make, draws_fails_and_recovers):
     draws_fails_and_recovers(make)
+
+
+def test_the_triangle_spreads_as_far_as_it_says_and_loses_rays_far_away():
+    state = {"P": np.array([0.0, 240.0]), "base": 100, "std_deg": 0.05}
+    result = w.compute_triangle(state)
+    assert result["recovered"][:, 1].mean() == pytest.approx(240, abs=0.4)
+    assert result["recovered"][:, 1].std() == pytest.approx(result["std"], rel=0.35)
+    assert np.interp(240, w.HEIGHTS, result["errors"]) == pytest.approx(result["std"], rel=0.01)
+    assert result["meet_deg"] == pytest.approx(np.rad2deg(np.arctan(100 / 240))) and result["lost"] == 0
+    stage = w.triangle()
+    stage.make_it_fail()
+    assert stage.result["lost"] and "do not even meet" in stage.caption
 
 
 def test_scan_line_recovers_the_center_and_its_spread():

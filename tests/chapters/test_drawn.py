@@ -67,7 +67,7 @@ def plane(angle_deg):
 WITH_HANDLES = (
     ch01.three_points, ch01.triangle_noise, ch01.svd_against_gram_schmidt, ch02.order_of_product, ch02.open_loop,
     ch03.pose_designer, ch03.outliers, ch04.line, ch04.four_paths, ch04.saddle, ch04.convexity,
-    ch04.basins, ch05.scan_line,
+    ch04.basins, ch05.triangle, ch05.scan_line,
     ch05.convergence, ch05.two_methods, ch05.pattern_designer, ch06.tx40, ch06.two_axes, ch06.sweeps,
     ch07.circles, ch08.bells, ch08.arena,
 )  # fmt: skip
@@ -272,6 +272,11 @@ def test_paths_of_both_parametrizations_start_at_the_handle():
         run = stage.result[name]
         assert run["path"][0] == pytest.approx([-2.0, 20.0], abs=1e-9)
         assert_drawn(stage, run["path"], np.column_stack([np.arange(len(run["rms"])), run["rms"]]))
+
+
+def test_both_rays_meet_where_the_object_is():
+    stage = at(ch05.triangle(), P=(30.0, 200.0), base=80)
+    assert_drawn(stage, [[0, 0], [80, 0]], [[0, 0], [30, 200], [80, 0]], [[200, stage.result["std"]]])
 
 
 def test_both_methods_start_at_the_handle_and_what_is_taken_back_is_crossed():

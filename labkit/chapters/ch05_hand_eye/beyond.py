@@ -1,4 +1,4 @@
-"""Exercises of chapter 5 on the methods of Li et al. and of Kim, Cho, Kim: draws, wrong variants, texts."""
+"""Exercises of chapter 5 beyond its core: triangulation, the methods of Li et al. and of Kim, Cho, Kim."""
 
 import functools
 
@@ -10,6 +10,7 @@ from ...exercises import metrics
 from ...exercises.engine import Exercise, Mistake
 from ...geometry import frames
 from ...geometry.lie import exp_so3, nearest_rotation
+from ...machines import triangulation
 
 POSE, ROTATION = "a pose is always 4 x 4", "a rotation is always 3 x 3"
 
@@ -65,7 +66,42 @@ def two_motions(rng):
     return A, frames.invert(X) @ A @ X
 
 
+def triangle(rng, right_angle=False):
+    """Both angles at a base, one of them perhaps a right one, and the base."""
+    alpha = np.pi / 2 if right_angle else np.deg2rad(rng.uniform(35, 80))
+    return float(alpha), float(np.deg2rad(rng.uniform(45, 75))), float(rng.uniform(30, 200))
+
+
+def obtuse_triangle(rng):
+    """The object stands beside the base."""
+    return float(np.deg2rad(rng.uniform(95, 110))), float(np.deg2rad(rng.uniform(35, 60))), float(rng.uniform(30, 200))
+
+
+def noisy_triangle(rng):
+    return *triangle(rng), float(np.deg2rad(rng.uniform(0.01, 1.0)))
+
+
+def noisy_right_triangle(rng):
+    return *triangle(rng, right_angle=True), float(np.deg2rad(rng.uniform(0.01, 1.0)))
+
+
 # --- wrong variants ---
+
+
+def _height(change):
+    """Something else made of the tangents of both angles and the base."""
+    return lambda alpha, beta, base: change(np.tan(alpha), np.tan(beta), base)
+
+
+def _std(change):
+    """Something else made of both derivatives and the noise."""
+    return lambda alpha, beta, base, std: change(*triangulation.height_derivatives(alpha, beta, base), std)
+
+
+def _by_angles(alpha, beta, base, power=2, share=1.0):
+    """Derivatives with another power of the height or another share of the base."""
+    H = triangulation.height_from_angles(alpha, beta, base)
+    return H**power / share / np.sin(alpha) ** 2, H**power / share / np.sin(beta) ** 2
 
 
 def _rotation(change):
@@ -124,6 +160,138 @@ def _by_columns(A, B):
     D, F = literature.kim_matrix(A, B)
     return D[np.ix_(order, order)], F[order]
 
+
+TRIANGULATION = [
+    Exercise(
+        "height_from_angles",
+        reference=triangulation.height_from_angles,
+        draw=(triangle, functools.partial(triangle, right_angle=True), obtuse_triangle),
+        metric=metrics.Numbers(1e-9, "mm"),
+        hints=(
+            "Drop the height: it cuts the base in two parts, and each belongs to a right triangle.",
+            "L = H / tan α + H / tan β. Solve for H.",
+            "`return base / (1 / np.tan(alpha) + 1 / np.tan(beta))`",
+        ),
+        mistakes=[
+            Mistake(
+                _height(lambda a, b, L: L * (1 / a + 1 / b)),
+                "You multiplied by the sum of 1/tan: L = H (1/tan α + 1/tan β), so H is L divided by it.",
+                id="height-inverse",
+            ),
+            Mistake(
+                _height(lambda a, b, L: L / (a + b)),
+                "The tangents stand in the denominators: L = H/tan α + H/tan β, not H tan α + H tan β.",
+                id="height-tangents",
+            ),
+            Mistake(
+                _height(lambda a, b, L: (a + b) / (a * b * L)),
+                "This is 1/H, upside down: (2-12) is L tan α tan β over the sum of the tangents.",
+                id="height-upside-down",
+            ),
+            Mistake(
+                _height(lambda a, b, L: L * a * b / (b - a)),
+                "You subtracted. The two parts of the base add up to L, so 1/tan α and 1/tan β are added.",
+                id="height-minus",
+            ),
+            Mistake(
+                _height(lambda a, b, L: L * b),
+                "This takes α for a right angle. Its part of the base, H/tan α, counts as well.",
+                id="height-right-angle",
+            ),
+            Mistake(
+                lambda alpha, beta, base: triangulation.height_from_angles(np.deg2rad(alpha), np.deg2rad(beta), base),
+                "The angles are in rad already: `np.tan` takes them as they are.",
+                id="height-degrees",
+            ),
+            Mistake(
+                lambda alpha, beta, base: base * np.sin(alpha) * np.sin(beta) / (np.sin(alpha) + np.sin(beta)),
+                "With sines in place of tangents the sum is another one: it is sin(α + β) then, or take tangents.",
+                id="height-sines",
+            ),
+            Mistake(
+                lambda alpha, beta, base: base * np.sin(beta) / np.sin(alpha + beta),
+                "This is the length of the ray from the end at α to the object. Its height is sin α times that.",
+                id="height-ray",
+            ),
+            Mistake(
+                lambda alpha, beta, base: base * np.sin(alpha) / np.sin(alpha + beta),
+                "This is the length of the ray from the end at β to the object. Its height is sin β times that.",
+                id="height-other-ray",
+            ),
+        ],
+    ),
+    Exercise(
+        "height_std",
+        reference=triangulation.height_std,
+        draw=(noisy_triangle, noisy_right_triangle),
+        metric=metrics.Numbers(1e-5, "mm"),
+        hints=(
+            "How much does H change when one angle changes a little? Differentiate L = H (cot α + cot β), with L fixed.",
+            "The derivative of cot α is −1/sin² α, so ∂H/∂α = H²/(L sin² α), and alike for β. Independent errors add up in their squares.",
+            "`H = height_from_angles(alpha, beta, base)\nby_alpha, by_beta = (H**2 / (base * np.sin(a) ** 2) for a in (alpha, beta))\n"
+            "return std * np.hypot(by_alpha, by_beta)`",
+        ),
+        mistakes=[
+            Mistake(
+                _std(lambda a, b, s: s * (a + b)),
+                "You added the two effects as if both angles erred alike. Independent errors add up in their squares.",
+                id="std-sum",
+            ),
+            Mistake(
+                _std(lambda a, b, s: s**2 * (a * a + b * b)),
+                "This is the variance: take the root.",
+                id="std-variance",
+            ),
+            Mistake(
+                _std(lambda a, b, s: s * (a * a + b * b)),
+                "The root covers the derivatives as well: std √((∂H/∂α)² + (∂H/∂β)²).",
+                id="std-root",
+            ),
+            Mistake(
+                _std(lambda a, b, s: s * b),
+                "Only β errs here. Both angles do.",
+                id="std-beta",
+            ),
+            Mistake(
+                _std(lambda a, b, s: s * a),
+                "Only α errs here. Both angles do.",
+                id="std-alpha",
+            ),
+            Mistake(
+                lambda alpha, beta, base, std: std * np.hypot(*_by_angles(alpha, beta, base)),
+                "The base is missing: ∂H/∂α = H²/(L sin² α). A longer base makes the height better.",
+                id="std-no-base",
+            ),
+            Mistake(
+                lambda alpha, beta, base, std: std * np.hypot(*_by_angles(alpha, beta, base, 1)),
+                "H enters squared, and L divides: ∂H/∂α = H²/(L sin² α).",
+                id="std-linear",
+            ),
+            Mistake(
+                lambda alpha, beta, base, std: (
+                    std
+                    * triangulation.height_from_angles(alpha, beta, base) ** 2
+                    / base
+                    * np.hypot(1 / np.sin(alpha), 1 / np.sin(beta))
+                ),
+                "The sines enter squared: the derivative of cot α is −1/sin² α.",
+                id="std-sine",
+            ),
+            Mistake(
+                lambda alpha, beta, base, std: (
+                    np.deg2rad(std) * np.hypot(*triangulation.height_derivatives(alpha, beta, base))
+                ),
+                "std is in rad already.",
+                id="std-degrees",
+            ),
+            Mistake(
+                _std(lambda a, b, s: s * np.hypot(a, b) / 2),
+                "Half of it: the two effects are no mean, each angle moves the height by itself.",
+                id="std-mean",
+            ),
+        ],
+    ),
+]
 
 LITERATURE = [
     Exercise(

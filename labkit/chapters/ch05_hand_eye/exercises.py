@@ -557,6 +557,14 @@ CHAPTER = Chapter(
     "05-hand-eye",
     title="Hand-eye calibration on 31 real poses",
     items=[
+        Prediction(
+            "twice_as_far",
+            question="An object stands twice as far from the scanner, both angles err as before. How does the error of its height grow?",
+            choices=("not at all", "twice", "nearly four times"),
+            answer="nearly four times",
+            why="H²/(L sin²) grows with the square of the distance, once it is larger than the base: the rays meet at an ever smaller angle.",
+        ),
+        *beyond.TRIANGULATION,
         Exercise(
             "fit_circle",
             reference=fit_circle,

@@ -42,6 +42,33 @@ def set_circle(line, x, z, radius):
     line.set_data(x + radius * np.cos(CIRCLE), z + radius * np.sin(CIRCLE))
 
 
+def triangle(ax, limits, measures):
+    """Base, rays and object of a triangulating sensor seen from the side, the base on top.
+
+    Returns
+    -------
+    (base, rays, cloud, spread) : the base, both rays, recovered places, one standard deviation of the height.
+    """
+    style.axes(ax, "along the base (mm)", "height H (mm)", "drag the object", equal=True)
+    ax.set(xlim=limits[0], ylim=limits[1][::-1])
+    ax.axhspan(*measures, color=style.FAINT, zorder=0)
+    (base,) = ax.plot([], [], color=style.INK, linewidth=5, solid_capstyle="butt")
+    (rays,) = ax.plot([], [], **style.look("measurement", linestyle="-", linewidth=1.4, marker=""))
+    (spread,) = ax.plot([], [], color=style.PREDICTION, linewidth=6, alpha=0.6, solid_capstyle="butt")
+    (cloud,) = ax.plot([], [], **style.look("estimates", markersize=3.5, alpha=0.7))
+    return base, rays, cloud, spread
+
+
+def error_over_range(ax, measures, limits):
+    """Standard deviation of the height over the distance. Returns (curve, here)."""
+    style.axes(ax, "height H (mm)", "error of the height (mm)", "gray: the scanner's range")
+    ax.set(yscale="log", xlim=limits[0], ylim=limits[1])
+    ax.axvspan(*measures, color=style.FAINT, zorder=0)
+    (curve,) = ax.plot([], [], **style.look("prediction"))
+    (here,) = ax.plot([], [], **style.look("estimates", markersize=9))
+    return curve, here
+
+
 def error_against_step(ax, steps, curves):
     """Error of finite differences over the step. `curves`: {label: errors}. Returns the markers, one per curve."""
     style.axes(ax, "step h (deg)", "largest error (mm per deg)", "error of the derivative by A")

@@ -1,5 +1,5 @@
-"""Stages of chapter 5: scan line and sphere, difference steps, iterations at the pole, two methods, the 31 poses, a
-measuring pattern.
+"""Stages of chapter 5: height from two angles, scan line and sphere, difference steps, iterations at the pole, two
+methods, the 31 poses, a measuring pattern.
 """
 
 import functools
@@ -15,6 +15,7 @@ from ...estimation.gaussian import unit_noise
 from ...fast.hand_eye import calibrate_sphere_target
 from ...geometry import frames
 from ...geometry.lie import exp_so3, log_so3
+from ...machines import triangulation
 from ...stage import Choice, Handle, Slider, Stage, style
 from ...stage.scene3d import Scene, View
 from . import figures as draw
@@ -25,6 +26,72 @@ POINTS = 60  # of one scan line
 SLIPS_SHOWN = 6
 SHOWN_RESIDUAL = 60.0  # mm: a residual vector is drawn no longer than this
 REST_MM = 1e-13  # what is left of a residual at the end, on the logarithmic axis
+
+
+# --- height from two angles ------------------------------------------------------------------------------------------
+
+HEIGHTS = np.linspace(40.0, 420.0, 77)
+RECOVERIES = 80
+
+
+def compute_triangle(state):
+    """Places recovered from two noisy angles, the error of the height, and that error over the distance."""
+    place, base, std = state["P"], state["base"], np.deg2rad(state["std_deg"])
+    alpha, beta = triangulation.angles_to(place, base)
+    noise = std * unit_noise((2, RECOVERIES), seed=3)
+    noisy = np.clip(alpha + noise[0], 1e-3, None), np.clip(beta + noise[1], 1e-3, None)
+    meets = noisy[0] + noisy[1] < np.pi - 1e-3
+    recovered = triangulation.place_from_angles(noisy[0][meets], noisy[1][meets], base)
+    below = np.column_stack([np.full(len(HEIGHTS), place[0]), HEIGHTS])
+    errors = triangulation.height_std(*triangulation.angles_to(below, base), base, std)
+    return {
+        "recovered": recovered, "lost": int((~meets).sum()), "errors": errors, "place": place, "base": base,
+        "std": float(triangulation.height_std(alpha, beta, base, std)),
+        "meet_deg": float(np.rad2deg(np.pi - alpha - beta)),
+    }  # fmt: skip
+
+
+def _triangle_sentence(result):
+    known = f"{result['std']:.2g}" if result["std"] < 10 else f"{result['std']:.0f}"
+    lost = f" {result['lost']} of {RECOVERIES} pairs of rays do not even meet." if result["lost"] else ""
+    return (
+        f"At H = {result['place'][1]:.0f} mm the rays meet at {result['meet_deg']:.0f} deg, and the height is known to "
+        f"{known} mm, {100 * result['std'] / result['place'][1]:.2g} % of it.{lost}"
+    )
+
+
+def triangle():
+    """Drag the object before a triangulating sensor and watch the error of its height grow with the distance."""
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2, width_ratios=(1, 1.1))
+        measures = triangulation.RANGE
+        base, rays, cloud, spread = draw.triangle(left, ((-60, 260), (-15, 430)), measures)
+        curve, here = draw.error_over_range(right, measures, ((0, 430), (1e-3, 300)))
+
+        def update(state, result):
+            (x, z), L = result["place"], result["base"]
+            base.set_data([0, L], [0, 0])
+            rays.set_data([0, x, L], [0, z, 0])
+            cloud.set_data(*result["recovered"].T)
+            spread.set_data([x, x], [z - result["std"], z + result["std"]])
+            curve.set_data(HEIGHTS, result["errors"])
+            here.set_data([z], [result["std"]])
+
+        return [spread, base, rays, cloud, curve, here], update
+
+    return Stage(
+        "height from two angles",
+        scene=scene,
+        compute=compute_triangle,
+        handles={"P": Handle((0.0, 240.0), step=2.0, bounds=((-40, 200), (40, 400)), label="object")},
+        controls={
+            "base": Slider(10, 200, 100, step=2, label="base (mm)"),
+            "std_deg": Slider(0.002, 1.0, 0.2, log=True, label="noise of each angle (deg)"),
+        },
+        fail={"P": (0.0, 400.0), "base": 20, "std_deg": 1.0},
+        describe=_triangle_sentence,
+    )
 
 
 # --- one scan line ---------------------------------------------------------------------------------------------------
