@@ -128,7 +128,6 @@ def _operator(text, sign, left, right, at):
 
 ELSEWHERE = {  # modules whose tests stand in files of another name
     "geometry/planar": ("localization/test_odometry.py",),
-    "estimation/differences": ("estimation/test_optimization.py",),
     "estimation/gaussian": ("localization/test_odometry.py", "estimation/test_kalman.py"),
     "calibration/advice": ("calibration/test_calibrate.py", "verbs/test_calibrate_command.py"),
     "calibration/literature": ("calibration/test_hand_eye.py",),

@@ -283,3 +283,18 @@ def test_no_minority_is_followed():
     model.fit = lambda kept: pytest.fail("four of twelve rows are no majority")
     with pytest.raises(ValueError, match="only 4 of 12 rows agree with each other, so no majority can be followed"):
         majority(model)
+
+
+def test_the_table_over_speed_counts_every_sample_once():
+    rng = np.random.default_rng(6)
+    speed, angle, distance = rng.uniform(0, 90, 400), rng.uniform(0, 0.01, 400), rng.uniform(0, 2, 400)
+    table = calibrate._over_speed(angle, distance, speed)
+    assert sum(row[2] for row in table) == 400 and [row[0] for row in table[1:]] == [row[1] for row in table[:-1]]
+    for low, high, n, rms_angle, rms in table:
+        inside = (speed >= low) & ((speed < high) | (high == speed.max()))
+        assert n == inside.sum()
+        assert rms_angle == pytest.approx(np.rad2deg(np.sqrt((angle[inside] ** 2).mean())))
+        assert rms == pytest.approx(np.sqrt((distance[inside] ** 2).mean()))
+    lines = calibrate.Comparison(np.arange(400.0), angle, distance, speed, table, 7).lines("mm")
+    assert lines[0].startswith("400 samples compared, 7 of the second stream") and len(lines) == 1 + len(table)
+    assert f"{table[0][2]:6d} samples" in lines[1] and "mm/s" in lines[1]

@@ -295,3 +295,15 @@ def test_the_covariance_of_three_points_is_carried_through():
     J = numeric_jacobian(change, points.ravel(), np.full(9, 1e-3))
     np.testing.assert_allclose(cov, 0.09 * J @ J.T, rtol=1e-4, atol=1e-9)
     assert own_data.three_point_frame(points, None)[1] is None
+
+
+@each_kind
+def test_the_size_of_a_channel_is_the_largest_length_in_it(make, truth):
+    """Residuals are nothing beside a billionth of it."""
+    model, largest = make(), {"T_BF": 0.0, "T_WF": 0.0, "T_ST": 0.0, "x_S": 0.0, "measured": 0.0}
+    for name in largest:
+        array = getattr(model, name, None)
+        if array is not None:
+            largest[name] = np.abs(array[:, :3, 3] if array.shape[1:] == (4, 4) else array).max()
+    assert model.size(len(model.channels) - 1) == pytest.approx(sum(largest.values()))
+    assert len(model.channels) == 1 or model.size(0) == 1.0

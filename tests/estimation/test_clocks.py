@@ -78,3 +78,11 @@ def test_what_cannot_be_aligned_is_refused():
         clock_offset(time_a[:9], T_a[:9], time_b, T_b)
     with pytest.raises(ValueError, match="do not overlap enough"):
         clock_offset(time_a, T_a, time_b + 100, T_b, max_offset=10)
+
+
+def test_each_stream_may_begin_at_any_time_of_its_clock():
+    time_a, T_a, time_b, T_b = streams(2, 0.2)
+    found = clock_offset(time_a + 100.0, T_a, time_b + 40.0, T_b)
+    assert abs(found.offset - (0.2 + 40.0 - 100.0)) < 5 * found.std
+    part = clock_offset(time_a[300:], T_a[300:], time_b[120:], T_b[120:])
+    assert abs(part.offset - 0.2) < 5 * part.std

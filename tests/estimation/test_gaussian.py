@@ -1,6 +1,7 @@
 """Outlines of Gaussian clouds against the ellipse that they become when nothing bends."""
 
 import numpy as np
+import pytest
 from scipy.stats import chi2
 
 from labkit.estimation import gaussian
@@ -20,3 +21,13 @@ def test_a_bent_region_of_straight_poses_is_the_ellipse():
     x, y = offsets.T
     area = 0.5 * abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]))
     np.testing.assert_allclose(area, np.pi * chi2.ppf(0.9, 2) * np.sqrt(np.linalg.det(cov)), rtol=1e-3)
+
+
+def test_an_ellipse_runs_once_around_at_one_distance():
+    cov = np.array([[4.0, 1.5], [1.5, 1.0]])
+    outline = gaussian.ellipse([3.0, -2.0], cov, 0.9, points=73)
+    off = outline - [3.0, -2.0]
+    np.testing.assert_allclose(np.einsum("ni,ij,nj->n", off, np.linalg.inv(cov), off), chi2.ppf(0.9, 2))
+    np.testing.assert_allclose(outline[0], outline[-1])
+    turned = np.unwrap(np.arctan2(off[:, 1], off[:, 0]))
+    assert abs(turned[-1] - turned[0]) == pytest.approx(2 * np.pi) and np.abs(np.diff(turned)).max() < 0.4

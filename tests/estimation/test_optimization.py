@@ -1,5 +1,7 @@
 """The optimizers against SciPy, finite differences and closed forms; the two wells against the thesis's own code."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares, minimize, rosen, rosen_der, rosen_hess
@@ -388,3 +390,36 @@ def test_the_radius_follows_the_scheme_of_the_thesis():
     lengths = np.array([1.0, 0.4, 1.0, 0.5, 1.0, 1.0])
     limits = np.array([9.0, 9.0, 9.0, 9.0, 9.0, 1.5])
     np.testing.assert_allclose(opt.next_radius(1.0, lengths, gains, limits), [0.25, 0.1, 1.0, 1.0, 2.0, 1.5])
+
+
+# --- when to stop ----------------------------------------------------------------------------------------------------
+
+
+def at(x=(0.0,), cost=0.0, gradient=(1.0, 1.0), residual=None, jacobian=None):
+    arrays = {"x": x, "gradient": gradient, "residual": residual, "jacobian": jacobian}
+    return SimpleNamespace(cost=cost, **{k: None if v is None else np.array(v, float) for k, v in arrays.items()})
+
+
+def test_the_rules_of_the_listings_look_at_what_they_name():
+    change, small, before = opt.small_change(1e-3), opt.small_gradient(1e-3), opt.small_gradient_before(1e-3)
+    assert change(at(cost=5.0), at(cost=5.0005)) and change(at(cost=5.0005), at(cost=5.0))
+    assert not change(at(cost=5.0), at(cost=4.99)) and not change(at(cost=4.99), at(cost=5.0))
+    flat, steep = at(gradient=[4e-4, -4e-4]), at(gradient=[6e-4, -6e-4])
+    assert small(steep, flat) and not small(flat, steep) and before(flat, steep) and not before(steep, flat)
+
+
+def test_settled_is_a_short_step_or_a_residual_at_right_angles_to_every_column():
+    rule, J, r = opt.settled(1e-6), [[3.0, 0.0], [0.0, 0.2], [0.0, 0.0]], [0.0, 0.0, 5.0]
+    far = {"x": [1.0, 2.0]}
+    assert rule(at([1.0, 2.0]), at([1.0, 2.0 + 1e-7])) == "the step is small"
+    assert not rule(at([1.0, 2.0]), at([1.0, 2.1]))
+    for gradient, said in (([1e-6, 1e-7], True), ([1e-6, 1e-4], False), ([1e-4, 1e-7], False), ([1.4e-5, 9e-7], True)):
+        assert bool(rule(at([0.0, 0.0]), at(**far, gradient=gradient, residual=r, jacobian=J))) is said
+
+
+def test_dogleg_s_doubt_grows_with_the_matrix():
+    g = np.array([1.0, -1.0])
+    np.testing.assert_allclose(
+        opt.dogleg_step(g, np.diag([1e6, 1e-10]), 5.0), opt.cauchy_step(g, np.diag([1e6, 1e-10]), 5.0)
+    )
+    assert np.linalg.norm(opt.dogleg_step(g, np.diag([1e-6, 1e-15]), 5.0)) == pytest.approx(5.0)

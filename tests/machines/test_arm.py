@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from labkit.geometry.frames import pose, pose_distance
@@ -193,3 +194,38 @@ def test_samples_of_a_motion_are_even_and_end_with_it():
 def test_one_instant_out_of_order_is_enough():
     with pytest.raises(ValueError, match="time must hold at least two instants and increase"):
         joint_speeds([0.0, 1.0, 0.5, 2.0], np.zeros((4, 6)))
+
+
+def test_every_coordinate_of_a_measuring_pose_is_inside_the_box():
+    box = np.array([[0.0, -150.0, 100.0], [500.0, 150.0, 700.0]])
+    joints = measuring_poses(TX40, np.random.default_rng(8), count=25, box=box)
+    places = forward_kinematics(TX40.dh, joints[1:])[:, :3, 3]  # the first is the center, as given
+    assert (places >= box[0]).all() and (places <= box[1]).all()
+
+
+def test_a_place_out_of_reach_is_approached_as_far_as_the_arm_goes():
+    """Beside a search over the three joints that may move."""
+    goal = np.array([700.0, 300.0, 500.0])
+
+    def gap(joints):
+        q = HOME.copy()
+        q[:3] = joints
+        return forward_kinematics(TX40.dh, q)[:3, 3] - goal
+
+    best = min(
+        np.linalg.norm(least_squares(gap, start, bounds=(TX40.q_min[:3], TX40.q_max[:3])).fun)
+        for start in np.random.default_rng(9).uniform(-1, 1, (8, 3))
+    )
+    q = reach_position(TX40, goal, HOME, iterations=200)
+    assert np.linalg.norm(gap(q[:3])) == pytest.approx(best, rel=0.02) and best > 100
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_place_within_reach_is_reached(seed):
+    rng = np.random.default_rng(seed)
+    q = HOME.copy()
+    q[:3] += rng.uniform(-0.4, 0.4, 3)
+    goal = forward_kinematics(TX40.dh, q)[:3, 3]
+    found = reach_position(TX40, goal, HOME)
+    np.testing.assert_allclose(forward_kinematics(TX40.dh, found)[:3, 3], goal, atol=1e-5)
+    np.testing.assert_array_equal(found[3:], HOME[3:])

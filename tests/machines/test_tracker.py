@@ -317,6 +317,33 @@ def test_filter_rejects_nonsense_and_follows_the_motion():
     assert smooth.mean() < 0.6 * raw.mean() and smooth.max() < 0.1 * raw.max()
 
 
+def test_the_filter_of_positions_is_the_linear_filter_of_chapter_8():
+    """Constant velocity with the acceleration as noise, one axis at a time, at uneven times."""
+    rng = np.random.default_rng(12)
+    time = np.cumsum(rng.uniform(0.002, 0.01, 80))
+    z = np.stack([300 * np.sin(3 * time), 500 * time, np.zeros(80)], 1) + 3.0 * rng.normal(size=(80, 3))
+    filtered, used = filter_positions(time, z, std_position=3.0, std_acceleration=4000.0, gate=1e9)
+    assert used.all()
+    for axis in range(3):
+        x, P = np.array([np.median(z[:5, axis]), 0.0]), np.diag([9.0, 1e6])
+        for k in range(80):
+            dt = time[k] - time[max(k - 1, 0)]
+            F, g = np.array([[1, dt], [0, 1]]), np.array([dt**2 / 2, dt])
+            x, P = F @ x, F @ P @ F.T + 4000.0**2 * np.outer(g, g)
+            gain = P[:, 0] / (P[0, 0] + 9.0)
+            x, P = x + gain * (z[k, axis] - x[0]), P - np.outer(gain, P[0])
+            assert filtered[k, axis] == pytest.approx(x[0], abs=1e-6)
+
+
+def test_a_clock_may_be_uneven_by_a_hundredth_of_a_step():
+    time = 0.01 * np.arange(200)
+    time[100] += 0.009 * 0.01
+    assert abs(time_offset(time, np.sin(9 * time), np.sin(9 * time), 0.1)) < 1e-3
+    time[100] += 0.006 * 0.01
+    with pytest.raises(ValueError, match="even steps"):
+        time_offset(time, np.sin(9 * time), np.sin(9 * time), 0.1)
+
+
 def test_motions_keep_joint_limits_and_speeds():
     for name in ("slow", "middle", "fast", "rotation"):
         time, q = simulation.robot_motion(name, 100)
