@@ -143,15 +143,20 @@ display(slipped)
 
 # %% report-text [markdown]
 # In a terminal, `python lab.py calibrate hand-eye --robot R --sensor S --out report` writes the same as a page with charts, and a view you can turn. Read it from the top: how many rows agree, what disagrees, and how. A few rejected rows here and there are bad readings.
-# A block of them that agrees with itself is a second mounting. **In which row, counted from 1, did the sensor first sit elsewhere?**
+# A block of them that agrees with itself is a second mounting. Suppose nobody had looked, and all 24 rows had been fitted: the result keeps that fit as `slipped.plain`. **How far from the right place would it have put the sensor, in mm?**
 
-# %% slip_row
-print(*slipped.warnings, sep="\n")
-slip_row = ...  # your code here
+# %% slip_cost
+slip_cost = ...  # your code here
 ### BEGIN SOLUTION
-slip_row = slipped.rejected[0]
+slip_cost = np.linalg.norm(slipped.plain.T[:3, 3] - slipped.T[:3, 3])
 ### END SOLUTION
-ex.slip_row(slip_row)
+ex.slip_cost(slip_cost)
+
+# %% slip-std
+if ex.after("slip_cost"):
+    alone, both = slipped.rms_translation, slipped.plain.rms_translation
+    print(f"rms of the residuals: {alone:.2f} mm in the rows that agree, {both:.2f} mm in all")
+    print("standard deviations told of the place:", slipped.std[3:], "mm")
 
 # %% clock-text [markdown]
 # The third cell has two clocks. The angular speed of a body is the same for every sensor on it, so two curves of it tell how far the clocks are apart before anything is calibrated. (Planted: 84 ms behind.)

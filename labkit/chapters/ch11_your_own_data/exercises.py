@@ -171,9 +171,19 @@ def slipped():
     return calibrate.hand_eye(robot.T, sensor.T)
 
 
-def first_slipped():
-    """The first row that fits the other mounting."""
-    return slipped().rejected[0]
+def _apart(a, b):
+    return float(np.linalg.norm(a[:3, 3] - b[:3, 3]))
+
+
+def slip_cost():
+    """How far the fit to all rows puts the sensor from the fit to those that agree (mm)."""
+    return _apart(slipped().plain.T, slipped().T)
+
+
+def _fit_to_the_rejected():
+    """The mounting that the rejected rows have among themselves."""
+    robot, sensor = (read_poses(path).in_unit("mm") for path in sample_cell("slipped_screw"))
+    return calibrate.hand_eye(robot.T[~slipped().kept], sensor.T[~slipped().kept]).T
 
 
 CHAPTER = Chapter(
@@ -256,20 +266,28 @@ CHAPTER = Chapter(
             ],
         ),
         Value(
-            "slip_row",
-            reference=first_slipped,
-            unit="",
-            rtol=0.0,
-            atol=0.2,
+            "slip_cost",
+            reference=slip_cost,
+            unit="mm",
+            rtol=1e-3,
             hints=(
-                "The report says which rows it rejected, and whether they agree among themselves.",
-                "`slipped.rejected` lists the rows, counted from 1. Something happened before the first of them.",
-                "`slip_row = slipped.rejected[0]`",
+                "The report holds two fits: one to the rows that agree, and beside it one to all of them.",
+                "`slipped.T` and `slipped.plain.T` are the two mountings; the distance is that of their last columns.",
+                "`slip_cost = np.linalg.norm(slipped.plain.T[:3, 3] - slipped.T[:3, 3])`",
             ),
             mistakes=[
-                Mistake(lambda: first_slipped() - 1, "This is the last row before the slip, or the row counted from 0. Asked for is the first one after it, counted from 1."),
-                Mistake(lambda: slipped().rejected[-1], "This is the last row of the file, rejected like those before it. Asked for is the first of them."),
-                Mistake(lambda: len(slipped().rejected), "This is how many rows were rejected. Asked for is the number of the first."),
+                Mistake(lambda: _apart(_fit_to_the_rejected(), slipped().T),
+                        "This is how far the sensor slipped. A fit to all rows ends up between the two mountings: how far from the first?"),
+                Mistake(lambda: float(np.abs(slipped().plain.T[:3, 3] - slipped().T[:3, 3]).max()),
+                        "This is the largest of the three coordinates. Asked for is the distance."),
+                Mistake(lambda: float(np.abs(slipped().plain.T[:3, 3] - slipped().T[:3, 3]).sum()),
+                        "You added the three coordinates. A distance is the root of the sum of their squares."),
+                Mistake(lambda: slip_cost() ** 2, "This is the squared distance: a root is missing."),
+                Mistake(lambda: slipped().plain.rms_translation, "This is the rms of the fit to all rows, not where it puts the sensor."),
+                Mistake(lambda: slipped().plain.rms_translation - slipped().rms_translation,
+                        "This is by how much the residuals grow. Asked for is by how much the result moves."),
+                Mistake(lambda: _apart(invert(slipped().plain.T), invert(slipped().T)),
+                        "You compared the inverse matrices: where the flange sits, seen from the sensor."),
             ],
         ),
         Exercise(

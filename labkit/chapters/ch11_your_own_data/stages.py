@@ -160,7 +160,7 @@ def pose_left_out():
         target = space.fixed(space.triad("target", length=70), CELL.T_BT)
         full, found = space.ellipsoid(**style.look("guide", linewidth=2.0)), space.ellipsoid(**style.look("estimate"))
         weak = space.line(color=style.ESTIMATE, linewidth=3)
-        space.text("errors x 60", offset=(0, -40), ha="center").set(CELL.T_BT[:3, 3])
+        style.bare(left, "where the sensor sits, errors x 60")
         bars, cross = draw.shares(right, 10)
         target.name_at(-14, 12)
 
