@@ -590,6 +590,151 @@ for name, chosen in (("all readings", sound | ~sound), ("without nonsense", soun
 # - Calibrate over the space you will work in. Repeat at *other* poses: same poses repeat their error.
 # - Synchronize first. Then print median and 95 % beside the mean, and say what happened to the outliers.
 
+# %% whole [markdown]
+# ## From beginning to end: one cell (*further*, 30 minutes)
+#
+# A part on a trolley is to be found and touched. Its frame $P$ comes from three marks
+# (chapter 1), which the scanner $S$ on the flange has seen (chapter 5). A tracker $E$
+# rides on the trolley, and its world $W$ has been calibrated in the base (this chapter).
+# The trolley is pushed elsewhere, a chain around the tracker says where (chapter 2), and
+# the tip (chapter 3) goes to a hole of the part. All of it is simulated, each calibration
+# from its own noisy readings.
+
+# %% calibrate-all
+from labkit.machines import cell as cells
+
+rng = np.random.default_rng(6)
+tip, scanner = cells.calibrate_tip(rng), cells.calibrate_scanner(rng)
+tracker = cells.calibrate_tracker(rng)
+cell, job = cells.cell_from(tip, scanner, tracker), cells.simulated_job(cells.FAR)
+T_BP0 = cells.learned_pose(cell, job)
+print("std of the tip    ", tip.std_of("tip").round(2), "mm")
+for name, found, frame in (("scanner", scanner, "T_FS"), ("tracker", tracker, "T_BS")):
+    turn = np.rad2deg(found.std_of(f"{frame}.rotation")).round(2)
+    print(f"std of the {name}", found.std_of(f"{frame}.translation").round(2), "mm", turn, "deg")
+
+# %% moved-text [markdown]
+# Between tracker and part nothing has moved, so what was true when the part was learned
+# is true now. The readings are $T_{WE_0}$ and $T_{WE_1}$.
+
+# %% moved_part
+@ex.moved_part
+def moved_part(T_BW, T_WE0, T_WE1, T_BP0):
+    """Return T_BP, shape (4, 4), of a part now, from the tracker's world, its readings when
+    the part was learned and now, and the part as it was learned; mm."""
+    ### BEGIN SOLUTION
+    T_EP = np.linalg.inv(T_BW @ T_WE0) @ T_BP0
+    return T_BW @ T_WE1 @ T_EP
+    ### END SOLUTION
+
+
+# %% common-errors [markdown]
+# Two questions before any number. **The marks are touched with the very tip that later
+# goes to the hole, the flange turned alike, and the tip's calibration is 1 mm off. By how
+# much does it miss the hole, if the trolley has not moved?** And: **the trolley comes back
+# exactly to where the part was learned. What does the error of $T_{BW}$ do to the part's
+# place now?**
+
+# %% predict-touch
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "not at all"
+### END SOLUTION
+ex.predict("touch", guess)
+
+# %% predict-returns
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "nothing"
+### END SOLUTION
+ex.predict("returns", guess, reveal=stages.whole_cell)
+
+# %% lever [markdown]
+# ### How an error travels
+#
+# Every result of the workbook gives the error of a transform $T_{AB} = (R, t)$ as a
+# rotation vector $\varphi$ about the axes of $B$ and a shift $d$ in $A$. The true point is
+# then $R\exp(\varphi)\,p + t + d$. To first order that is $R\,p + t - R\,[p]\,\varphi + d$, with
+# $[p]$ the matrix of the cross product: a rotation acts by its lever. For
+# $e_A = J e$ the covariance is $J\,\Sigma\,J^\top$.
+
+# %% point_covariance
+@ex.point_covariance
+def point_covariance(T, cov_T, p, cov_p):
+    """Return the covariance, shape (3, 3), mm^2, of the point p of B seen from A.
+
+    T = T_AB, cov_T, shape (6, 6), of (phi, d) as above (rad, mm), and cov_p, shape (3, 3),
+    of p along the axes of B; both errors are independent."""
+    ### BEGIN SOLUTION
+    R, (x, y, z) = T[:3, :3], p
+    lever = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    J = np.hstack([-R @ lever, np.eye(3)])
+    return J @ cov_T @ J.T + R @ cov_p @ R.T
+    ### END SOLUTION
+
+
+# %% correlated
+x_S = job.marks[0]  # the first mark, as the scanner sees it
+joint = point_covariance(cell.T_FS, cell.cov_FS, x_S, np.zeros((3, 3)))
+alone = np.diag(np.diag(cell.cov_FS))
+apart = point_covariance(cell.T_FS, alone, x_S, np.zeros((3, 3)))
+for name, cov in (("with its correlations", joint), ("its variances alone", apart)):
+    print(f"a mark through the scanner's calibration, {name}:", np.sqrt(np.trace(cov)).round(2), "mm")
+
+# %% budget-text [markdown]
+# The scanner sits where it sits to 1 mm only, and yet it sees a mark to a fraction of
+# that: turn and shift come from one fit, and at the distance of the calibrating sphere
+# they make up for each other. What one calibration estimates together stays together.
+#
+# ### The budget
+#
+# Six sources know nothing of each other: three calibrations, the marks, two readings.
+# `jacobians` says how the tip's miss moves with each of them, all ways by which a source
+# enters added up; $T_{BW}$ enters twice. Write down what each contributes.
+
+# %% shares
+@ex.shares
+def shares(jacobians, covariances):
+    """Return for each source the standard deviation in space, mm, that it contributes:
+    the root of the trace of its share. jacobians: list of (3, n); covariances: of (n, n)."""
+    ### BEGIN SOLUTION
+    pairs = zip(jacobians, covariances)
+    return np.array([np.sqrt(np.trace(J @ C @ J.T)) for J, C in pairs])
+    ### END SOLUTION
+
+
+# %% budget
+jacobians, covariances = cells.miss_jacobians(cell, job), cells.source_covariances(cell, job)
+names = list(cells.SOURCES)
+found = shares([jacobians[name] for name in names], [covariances[name] for name in names])
+sizes, total = dict(zip(names, found)), np.linalg.norm(found)
+for name, size in sizes.items():
+    print(f"{name:15} {size:.3f} mm   {100 * (size / total) ** 2:3.0f} % of the variance")
+misses = cells.simulate_misses(cell, job, np.random.default_rng(1), 20_000)
+simulated = np.sqrt((misses**2).sum(axis=1).mean())
+print(f"first order {total:.2f} mm, 20,000 simulated cells {simulated:.2f} mm")
+off = np.linalg.norm(cells.miss(cells.TRUTH, cell, job))
+print(f"the calibrations of this very cell make it miss by {off:.2f} mm")
+
+# %% halved-text [markdown]
+# **The largest contributor is calibrated again, four times as long, and its standard
+# deviation is halved. What is the total then, in mm?** Decide first whether it is worth it.
+
+# %% halved
+halved = ...  # your code here
+### BEGIN SOLUTION
+largest = max(sizes.values())
+halved = np.sqrt(total**2 - 0.75 * largest**2)
+### END SOLUTION
+halved = ex.halved(halved)
+
+# %% what-a-budget-knows [markdown]
+# Now make the figure above fail, and push the part about. One calibration is wrong by
+# more than it admits, the tip misses by millimeters, and the budget has not changed:
+# it repeats what the calibrations say of themselves. It says where to work next, and
+# whether a miss is too large to be chance. It never says that nothing is wrong; a part
+# measured twice, by different ways, does.
+
 # %% questions [markdown]
 # ## Three questions, to answer in words
 #

@@ -94,6 +94,25 @@ def point_jacobians(T_AB, p_B):
     return np.concatenate([lever, shift], axis=-1), T_AB[..., :3, :3]
 
 
+def point_covariance(T_AB, cov_AB, p_B, cov_B):
+    """Covariance of a point seen from A, when the transform and the point have independent errors.
+
+    Parameters
+    ----------
+    T_AB : array-like, shape (..., 4, 4)
+    cov_AB : array-like, shape (..., 6, 6)
+        Rotation vector about the axes of B (rad), shift in A (mm).
+    p_B : array-like, shape (..., 3), mm
+    cov_B : array-like, shape (..., 3, 3), mm^2
+
+    Returns
+    -------
+    cov_A : array, shape (..., 3, 3), mm^2
+    """
+    J_T, J_p = point_jacobians(T_AB, p_B)
+    return J_T @ cov_AB @ np.swapaxes(J_T, -1, -2) + J_p @ cov_B @ np.swapaxes(J_p, -1, -2)
+
+
 def chain_jacobians(links):
     """Product of a chain, and where the error of each of its links arrives in it.
 

@@ -72,7 +72,8 @@ class Job:
     T_BF : array, shape (3, 4, 4)
         Flange poses at the marks: origin, a point on x, a point on the side of y of the part's frame.
     marks : array, shape (3, 3)
-        The marks as measured there: in S when seen by the scanner, in F when touched.
+        The marks as measured there: in S when seen by the scanner; when touched, how far from the tip, in F: 0 but
+        for the touch's own error.
     T_WE0, T_WE1 : arrays, shape (4, 4)
         The tracker's readings when the part was learned, and now.
     hole : array, shape (3,)
@@ -133,8 +134,9 @@ def marks_in_base(cell, job):
     -------
     marks : array, shape (..., 3, 3), mm
     """
-    on_flange = job.marks if job.touched else transform(cell.T_FS[..., None, :, :], job.marks)
-    return transform(job.T_BF, on_flange)
+    if job.touched:
+        return transform(job.T_BF, cell.tip[..., None, :] + job.marks)
+    return transform(job.T_BF, transform(cell.T_FS[..., None, :, :], job.marks))
 
 
 def learned_pose(cell, job):
@@ -152,8 +154,28 @@ def learned_pose(cell, job):
     return frame_from_points(*np.moveaxis(marks_in_base(cell, job), -2, 0))
 
 
+def moved_part(T_BW, T_WE0, T_WE1, T_BP0):
+    """Where a part stands after its tracker has moved with it: chapter 2's chain around the tracker.
+
+    Parameters
+    ----------
+    T_BW : array-like, shape (..., 4, 4)
+        The tracker's world in the base (mm).
+    T_WE0, T_WE1 : array-like, shape (..., 4, 4)
+        Its readings when the part was learned, and now.
+    T_BP0 : array-like, shape (..., 4, 4)
+        The part as it was learned.
+
+    Returns
+    -------
+    T_BP : array, shape (..., 4, 4)
+    """
+    T_BE0, T_BE1 = T_BW @ T_WE0, T_BW @ T_WE1
+    return T_BE1 @ invert(T_BE0) @ T_BP0
+
+
 def part_pose(cell, job):
-    """T_BP, where the part is now: chapter 2's chain around the tracker.
+    """T_BP, where the part is now.
 
     Parameters
     ----------
@@ -164,7 +186,7 @@ def part_pose(cell, job):
     -------
     T_BP : array, shape (..., 4, 4)
     """
-    return cell.T_BW @ job.T_WE1 @ invert(cell.T_BW @ job.T_WE0) @ learned_pose(cell, job)
+    return moved_part(cell.T_BW, job.T_WE0, job.T_WE1, learned_pose(cell, job))
 
 
 def hole_in_base(cell, job):
@@ -327,6 +349,22 @@ def miss_budget(cell, job):
     return error_budget(miss_jacobians(cell, job), source_covariances(cell, job))
 
 
+def sizes(shares):
+    """Standard deviation in space that each share stands for, the root of its trace.
+
+    Parameters
+    ----------
+    shares : dict
+        {source: array, shape (3, 3), mm^2}, as `miss_budget` gives them.
+
+    Returns
+    -------
+    sizes : dict
+        {source: float, mm}.
+    """
+    return {name: float(np.sqrt(np.trace(share))) for name, share in shares.items()}
+
+
 def with_errors(cell, job, errors):
     """The cell and the job as they would be with errors in their sources.
 
@@ -344,8 +382,6 @@ def with_errors(cell, job, errors):
     """
     e = {name: np.zeros(9 if name == "marks" else 3 if name == "tip" else 6) for name in SOURCES} | errors
     marks = job.marks + e["marks"].reshape(*e["marks"].shape[:-1], 3, 3)
-    if job.touched:
-        marks = marks + e["tip"][..., None, :]
     return (
         replace(cell, tip=cell.tip + e["tip"], T_FS=disturb(cell.T_FS, e["scanner"]),
                 T_BW=disturb(cell.T_BW, e["tracker"])),
@@ -425,6 +461,7 @@ TRUTH = Cell(
 STD_TOUCH, STD_CENTER = 0.15, 0.33  # mm per axis: a tip on its point; a sphere's center, 0.57 mm in space (chapter 5)
 STD_STOP = (np.deg2rad(0.1), 0.6)  # rad and mm per axis: a reading at the short stops of the tracker's calibration
 LEARNED = (190.0, -180.0, 0.3)  # x, y (mm) and turn (rad) of the part when it is learned
+FAR = (60.0, 250.0, 1.5)  # and somewhere else
 
 
 def calibrate_tip(rng, n=24, half_angle=0.5):
@@ -534,8 +571,8 @@ def simulated_job(now, learned=LEARNED, touched=False):
     R_tool = exp_so3([0.0, 0.0, learned[2]]) @ DOWN
     marks_B = transform(T_BP0, MARKS)
     if touched:
-        marks, R_BF = np.tile(TRUTH.tip, (3, 1)), np.broadcast_to(R_tool, (3, 3, 3))
-        arms = marks
+        marks, R_BF = np.zeros((3, 3)), np.broadcast_to(R_tool, (3, 3, 3))
+        arms = np.tile(TRUTH.tip, (3, 1))
     else:
         marks = np.array([[6.0, 5.0, 215.0], [-8.0, -6.0, 230.0], [4.0, 7.0, 220.0]])
         tilts = exp_so3(np.deg2rad([[8.0, 0, 0], [-6.0, -6.0, 20.0], [0, -8.0, -20.0]]))

@@ -274,3 +274,50 @@ def test_printed_levels_stand_where_the_unit_is_the_same():
     assert over_speed()["printed"] == [15.0, 25.0]
     mean, largest = over_speed("angular speed")["printed"]
     assert np.isnan(mean) and largest == 3.0
+
+
+# ---- the whole cell
+
+
+def whole_cell(P=wr.cell.FAR[:2], turn=86.0, marks="seen by the scanner", spoiled="as calibrated"):
+    return wr.compute_whole_cell({"P": np.array(P), "turn": turn, "marks": marks, "spoiled": spoiled})
+
+
+HOME_AGAIN = {"P": wr.cell.LEARNED[:2], "turn": np.rad2deg(wr.cell.LEARNED[2])}
+
+
+def test_the_answers_of_both_questions_about_common_errors():
+    touched = whole_cell(**HOME_AGAIN, marks="touched with the tip", spoiled="tip 2 mm off")
+    assert np.linalg.norm(touched["miss"]) < 1e-9
+    assert touched["sizes"]["tip"] < 1e-9 and touched["sizes"]["tracker"] < 1e-9
+    bent = [
+        np.linalg.norm(whole_cell(**HOME_AGAIN, spoiled=how)["miss"])
+        for how in ("as calibrated", "tracker's world turned 0.5 deg")
+    ]
+    assert bent[0] == pytest.approx(bent[1], abs=1e-9)
+
+
+@pytest.mark.parametrize("how", [how for how in wr.SPOILED if how != "as calibrated"])
+def test_a_spoiled_calibration_moves_the_result_and_hardly_the_budget(how):
+    good, bad = whole_cell(), whole_cell(spoiled=how)
+    assert np.linalg.norm(bad["miss"] - good["miss"]) > 1.5
+    assert bad["total"] == pytest.approx(good["total"], rel=0.03)
+
+
+def test_simulated_cells_lie_as_the_outline_says():
+    """Of 400 cells, 98.9 % are expected within three standard deviations in the plane."""
+    result = whole_cell()
+    cov = wr.cell.miss_budget(result["cell"], result["job"])
+    cov = sum(cov.values())[:2, :2]
+    d2 = np.einsum("ni,ij,nj->n", result["cloud"], np.linalg.inv(cov), result["cloud"])
+    assert 0.97 < (d2 < 9).mean() < 1.0
+    assert result["total"] == pytest.approx(np.linalg.norm(list(result["sizes"].values())))
+
+
+def test_the_failing_cell_says_that_it_misses_by_more_than_admitted():
+    stage = wr.whole_cell()
+    assert "Far more" not in stage.caption
+    stage.make_it_fail()
+    assert "Far more than the budget admits" in stage.caption
+    stage.press("back where it was learned")
+    np.testing.assert_allclose(stage.result["part"][:2, 3], wr.cell.LEARNED[:2])

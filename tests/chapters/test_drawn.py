@@ -68,7 +68,7 @@ WITH_HANDLES = (
     ch01.three_points, ch01.triangle_noise, ch01.svd_against_gram_schmidt, ch02.order_of_product, ch02.open_loop,
     ch03.pose_designer, ch03.outliers, ch04.line, ch04.four_paths, ch04.saddle, ch04.convexity,
     ch04.basins, ch05.triangle, ch05.scan_line,
-    ch05.convergence, ch05.two_methods, ch05.pattern_designer, ch06.tx40, ch06.two_axes, ch06.sweeps,
+    ch05.convergence, ch05.two_methods, ch05.pattern_designer, ch06.tx40, ch06.two_axes, ch06.sweeps, ch06.whole_cell,
     ch07.circles, ch08.bells, ch08.arena,
 )  # fmt: skip
 
@@ -394,6 +394,14 @@ def test_rays_lead_from_the_stations_to_the_diode():
 def test_the_error_of_each_stop_after_the_first_is_drawn():
     stage = at(ch06.moved_station(), tilt=3.0, when="after stop 10")
     assert_drawn(stage, np.column_stack([np.arange(1, 21), stage.result["errors"][1:]]))
+
+
+def test_the_part_and_the_enlarged_miss_stand_on_the_plan():
+    stage = at(ch06.whole_cell(), P=(100.0, 200.0), turn=90.0, spoiled="tip 2 mm off")
+    assert_drawn(stage, [[100, 200], [100, 310], [20, 225], [100, 200]])
+    hole = np.array([100 - 55.0, 200 + 80.0])
+    assert_drawn(stage, [hole], [hole, hole + ch06.ENLARGED * stage.result["miss"][:2]])
+    assert_drawn(stage, hole + ch06.ENLARGED * stage.result["cloud"], hole + ch06.ENLARGED * stage.result["outline"])
 
 
 class OneTrail:

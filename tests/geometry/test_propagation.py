@@ -50,6 +50,19 @@ def test_the_error_of_an_inverse_and_of_a_point(seed):
     np.testing.assert_allclose(J_p, differences(lambda e: transform(T, p + e), 3), atol=1e-6)
 
 
+def test_covariance_of_a_point_is_that_of_many_draws():
+    """20,000 draws: each variance is known to 1 %."""
+    rng = np.random.default_rng(7)
+    T, p = random_pose(rng), rng.uniform(-100, 100, 3)
+    scale = np.repeat([1e-3, 0.2], 3)
+    roots = rng.normal(size=(6, 6)) * scale[:, None], 0.1 * rng.normal(size=(3, 3))
+    cov_T, cov_p = (root @ root.T for root in roots)
+    e, d = (rng.normal(size=(20_000, len(root))) @ root.T for root in roots)
+    points = transform(propagation.disturb(T, e), p + d)
+    values, axes = np.linalg.eigh(propagation.point_covariance(T, cov_T, p, cov_p))
+    np.testing.assert_allclose((points @ axes).var(0), values, rtol=0.06)
+
+
 def test_each_link_of_a_chain():
     rng = np.random.default_rng(4)
     links = [random_pose(rng) for _ in range(4)]

@@ -1,5 +1,7 @@
 """The whole cell: its chain against the truth, its Jacobians against differences, its budget against Monte Carlo."""
 
+import functools
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -58,14 +60,19 @@ def test_the_budget_is_the_covariance_of_many_simulated_cells(touched):
     np.testing.assert_allclose((misses @ axes).var(0), values, rtol=0.12)
 
 
-def test_the_budget_of_the_calibrations_is_that_of_measuring_them_anew():
+@functools.cache
+def calibrated_anew():
+    return [cells.calibrated_cell(np.random.default_rng([7, seed])) for seed in range(80)]
+
+
+@HOW
+def test_the_budget_of_the_calibrations_is_that_of_measuring_them_anew(touched):
     """80 times all three calibrations from their raw readings; squared misses, in standard deviations: chi-square.
 
     Marks and readings are exact here; tests/bench/cell_budget.py does the same with thousands of cells and all noise.
     """
-    there, total = job(), 0.0
-    for seed in range(80):
-        found = cells.calibrated_cell(np.random.default_rng([7, seed]))
+    there, total = job(touched=touched), 0.0
+    for found in calibrated_anew():
         shares = cells.miss_budget(found, there)
         cov = sum(shares[name] for name in ("tip", "scanner", "tracker"))
         off = cells.miss(cells.TRUTH, found, there)

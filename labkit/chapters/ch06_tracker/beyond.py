@@ -1,11 +1,15 @@
 """Chapter 6, its parts beyond the core path: base stations, errors over speed, the whole cell; items of its chapter."""
 
+import functools
+
 import numpy as np
 
 from ...exercises import metrics
-from ...exercises.engine import Exercise, Mistake, Prediction
-from ...geometry.frames import unit_vector
-from ...machines import stations
+from ...exercises.engine import Exercise, Mistake, Prediction, Value
+from ...geometry.frames import invert, pose, unit_vector
+from ...geometry.lie import exp_so3, skew
+from ...geometry.propagation import error_budget, point_covariance
+from ...machines import cell, stations
 from ...machines.accuracy import static_error_and_lag
 
 # Base stations ---------------------------------------------------------------------------------------------------------------
@@ -85,6 +89,80 @@ def _line(x, y, end=lambda intercept, slope: (np.sqrt(intercept), np.sqrt(slope)
 
 def _square(v):
     return v**2
+
+
+# The whole cell --------------------------------------------------------------------------------------------------------------
+
+
+def trolley(rng):
+    """The tracker's world, two readings and a learned part, all of them turned and shifted at random."""
+    return tuple(pose(exp_so3(rng.normal(size=3)), rng.uniform(-600, 600, 3)) for _ in range(4))
+
+
+def uncertain_point(rng):
+    """A pose and a point, with full covariances of rad and mm of like weight."""
+    T, p = (
+        pose(exp_so3(rng.normal(size=3)), rng.uniform(-300, 300, 3)),
+        rng.uniform(60, 200, 3) * rng.choice([-1, 1], 3),
+    )
+    turn, point = rng.normal(size=(6, 6)), rng.normal(size=(3, 3)) * rng.uniform(0.1, 0.4)
+    turn = np.repeat([2e-3, 0.2], 3)[:, None] * turn * rng.uniform(0.5, 2)
+    return T, turn @ turn.T, p, point @ point.T
+
+
+def _carried(
+    lever=lambda R, p: -R @ skew(p), shift=lambda R: np.eye(3), turn=lambda R: R, part=slice(None), cov=lambda c: c
+):
+    """The covariance of a point with other Jacobians, or with a part of the pose's covariance."""
+
+    def variant(T, cov_T, p, cov_p):
+        R = T[:3, :3]
+        J = np.hstack([lever(R, p), shift(R)])[:, part]
+        return J @ cov(cov_T)[part, part] @ J.T + turn(R) @ cov_p @ turn(R).T
+
+    return variant
+
+
+def _swapped(cov):
+    order = [3, 4, 5, 0, 1, 2]
+    return cov[np.ix_(order, order)]
+
+
+def _variances(cov):
+    return np.diag(np.diag(cov))
+
+
+def sources_of_error(rng):
+    """Jacobians and covariances of 2 to 6 sources, of 3, 6 or 9 parameters each."""
+    sizes = rng.choice([3, 6, 9], int(rng.integers(2, 7)))
+    roots = [rng.normal(size=(n, n)) * rng.uniform(0.05, 0.3) for n in sizes]
+    return [rng.normal(size=(3, n)) for n in sizes], [root @ root.T for root in roots]
+
+
+def shares(jacobians, covariances):
+    """Standard deviation in space, mm, that each source contributes."""
+    named = dict(enumerate(jacobians)), dict(enumerate(covariances))
+    return np.array(list(cell.sizes(error_budget(*named)).values()))
+
+
+def _each(of):
+    def variant(jacobians, covariances):
+        return np.array([of(J, C) for J, C in zip(jacobians, covariances)])
+
+    return variant
+
+
+@functools.cache
+def budget():
+    """The sizes of the notebook's budget, and their total."""
+    found = cell.sizes(cell.miss_budget(cell.calibrated_cell(np.random.default_rng(6)), cell.simulated_job(cell.FAR)))
+    return found, float(np.sqrt(sum(size**2 for size in found.values())))
+
+
+def _improved(factor, source="tracker"):
+    """The total when one source's share is multiplied by a factor."""
+    found, total = budget()
+    return float(np.sqrt(total**2 - (1 - factor**2) * found[source] ** 2))
 
 
 STATIONS = [
@@ -290,5 +368,254 @@ SPEEDS = [
                 id="static_error_and_lag-smallest",
             ),
         ],
+    ),
+]
+
+CELL = [
+    Exercise(
+        "moved_part",
+        reference=cell.moved_part,
+        draw=trolley,
+        metric=metrics.Poses(1e-6, 1e-6),
+        fixed=dict.fromkeys(("T_BW", "T_WE0", "T_WE1", "T_BP0"), "a pose is 4 x 4"),
+        hints=(
+            "Tracker and part ride on one trolley: T_EP, the part seen from the tracker, is the same then and now. Find it from then, use it now.",
+            "Then: T_BP0 = T_BW T_WE0 T_EP. Now: T_BP = T_BW T_WE1 T_EP.",
+            "`T_EP = np.linalg.inv(T_BW @ T_WE0) @ T_BP0\nreturn T_BW @ T_WE1 @ T_EP`",
+        ),
+        mistakes=[
+            Mistake(
+                lambda W, E0, E1, P: cell.moved_part(W, E1, E0, P),
+                "You moved the part backward: first and second reading have changed places.",
+                id="moved_part-backward",
+            ),
+            Mistake(
+                lambda W, E0, E1, P: E1 @ invert(E0) @ P,
+                "The readings are given in W, the part in B: the motion must be carried over by T_BW, before and after.",
+                id="moved_part-world",
+            ),
+            Mistake(
+                lambda W, E0, E1, P: W @ E1 @ invert(E0) @ P,
+                "T_BW stands at one end alone. From B into W you need its inverse as well: T_BE0 is T_BW T_WE0, as a whole inverted.",
+                id="moved_part-one-end",
+            ),
+            Mistake(
+                lambda W, E0, E1, P: P @ invert(E0) @ E1,
+                "You applied the tracker's own motion, E0 to E1, to the part's frame. The two frames are not one: go through T_EP.",
+                id="moved_part-own-motion",
+            ),
+            Mistake(
+                lambda W, E0, E1, P: W @ E1,
+                "This is where the tracker is. The part sits beside it, by T_EP.",
+                id="moved_part-tracker",
+            ),
+            Mistake(
+                lambda W, E0, E1, P: W @ E1 @ P,
+                "T_BP0 is seen from the base, not from the tracker: T_EP has to be found first.",
+                id="moved_part-part-on-tracker",
+            ),
+            Mistake(
+                lambda W, E0, E1, P: invert(W) @ E1 @ invert(E0) @ W @ P,
+                "T_BW and its inverse have changed places.",
+                id="moved_part-inverse",
+            ),
+            Mistake(
+                lambda W, E0, E1, P: invert(W @ E0) @ P,
+                "This is T_EP, the part seen from the tracker. One step is left: where the tracker is now.",
+                id="moved_part-half-way",
+            ),
+        ],
+    ),
+    Prediction(
+        "returns",
+        question="The trolley comes back exactly to where the part was learned. What does the error of T_BW do to the part's place now?",
+        choices=("nothing", "as much as anywhere", "twice as much: it enters twice"),
+        answer="nothing",
+        why="T_BW enters once forward and once backward. Where both readings are equal, the two cancel, whatever its error. The farther the trolley goes and the more it turns, the less they do.",
+    ),
+    Exercise(
+        "point_covariance",
+        reference=point_covariance,
+        draw=uncertain_point,
+        metric=metrics.Numbers(1e-9, "mm^2"),
+        fixed={
+            "T_AB": "a pose is 4 x 4",
+            "cov_AB": "a pose has six parameters",
+            **dict.fromkeys(("p_B", "cov_B"), "a point in space"),
+        },
+        hints=(
+            "What does a small rotation phi about the axes of B do to the point R p + t? And a small error of p itself? Two Jacobians, two terms.",
+            "R exp(phi) p is R p - R [p] phi to first order, with [p] = skew(p): J = (-R [p], I), and cov = J cov_T J^T + R cov_p R^T.",
+            "`R = T[:3, :3]\nx, y, z = p\nlever = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])\nJ = np.hstack([-R @ lever, np.eye(3)])\nreturn J @ cov_T @ J.T + R @ cov_p @ R.T`",
+        ),
+        mistakes=[
+            Mistake(
+                _carried(turn=lambda R: np.eye(3)),
+                "cov_p is given along the axes of B: turn it into A, R cov_p R^T.",
+                id="point_covariance-unturned",
+            ),
+            Mistake(
+                _carried(turn=lambda R: R.T),
+                "R takes B to A: the point's part is R cov_p R^T, not R^T cov_p R.",
+                id="point_covariance-transposed",
+            ),
+            Mistake(
+                _carried(part=slice(3, 6)),
+                "A pose that is turned a little moves the point by its lever, which is the largest part here. Use all six rows of cov_T.",
+                id="point_covariance-no-lever",
+            ),
+            Mistake(
+                lambda T, cov_T, p, cov_p: _carried()(T, cov_T, p, 0 * cov_p),
+                "The error of the point itself is missing: + R cov_p R^T.",
+                id="point_covariance-no-point",
+            ),
+            Mistake(
+                _carried(lever=lambda R, p: -skew(p)),
+                "The lever is turned along with the pose: -R [p], not -[p].",
+                id="point_covariance-lever-in-B",
+            ),
+            Mistake(
+                _carried(lever=lambda R, p: -skew(R @ p)),
+                "You took the rotation vector about the axes of A. Here it is about those of B, as all results of the workbook have it: -R [p].",
+                id="point_covariance-axes-of-A",
+            ),
+            Mistake(
+                _carried(lever=lambda R, p: R @ skew(p)),
+                "The lever has the wrong sign: phi x p is -[p] phi. It matters wherever rotation and translation are correlated.",
+                id="point_covariance-sign",
+            ),
+            Mistake(
+                _carried(shift=lambda R: R),
+                "The translation of T is given along the axes of A already: its Jacobian is I, not R.",
+                id="point_covariance-shift",
+            ),
+            Mistake(
+                _carried(cov=_swapped),
+                "You took the translation first. The covariance holds the rotation vector first, then the translation.",
+                id="point_covariance-order",
+            ),
+            Mistake(
+                _carried(cov=_variances),
+                "You used the variances of the pose alone. Rotation and translation of one calibration are correlated, and here it is felt.",
+                id="point_covariance-variances",
+            ),
+        ],
+    ),
+    Exercise(
+        "shares",
+        reference=shares,
+        draw=sources_of_error,
+        metric=metrics.Numbers(1e-9, "mm"),
+        hints=(
+            "To first order each source moves the result by J e. What covariance does that make, and what is its size in space?",
+            "J cov J^T, shape (3, 3). Its trace is the mean squared distance; the root of it a length.",
+            "`return np.array([np.sqrt(np.trace(J @ C @ J.T)) for J, C in zip(jacobians, covariances)])`",
+        ),
+        mistakes=[
+            Mistake(
+                _each(lambda J, C: np.trace(J @ C @ J.T)),
+                "These are variances, in mm^2: take the root.",
+                id="shares-variance",
+            ),
+            Mistake(
+                _each(lambda J, C: np.sqrt(np.diag(J @ C @ J.T)).sum()),
+                "You added the standard deviations of the three axes. Squares add: the root of the trace.",
+                id="shares-linear",
+            ),
+            Mistake(
+                _each(lambda J, C: np.sqrt(np.trace(J @ _variances(C) @ J.T))),
+                "You used the variances of the parameters alone. Those of one calibration are correlated: take all of its covariance.",
+                id="shares-variances-only",
+            ),
+            Mistake(
+                _each(lambda J, C: np.sqrt(np.linalg.eigvalsh(J @ C @ J.T)[-1])),
+                "This is the standard deviation in the worst direction. Asked for is the one in space: the root of the trace.",
+                id="shares-worst",
+            ),
+            Mistake(
+                _each(lambda J, C: np.sqrt(np.trace(J @ C @ J.T) / 3)),
+                "You divided by 3: that is the root mean square per axis. The distance in space is the root of the whole trace.",
+                id="shares-per-axis",
+            ),
+            Mistake(
+                _each(lambda J, C: np.sqrt(np.trace(C))),
+                "The covariance of a source is in its own units. The Jacobian carries it to the result: J cov J^T.",
+                id="shares-no-jacobian",
+            ),
+            Mistake(
+                _each(lambda J, C: np.linalg.norm(J @ C @ J.T)),
+                "The norm of the covariance is no length: take the root of its trace.",
+                id="shares-norm",
+            ),
+            Mistake(
+                lambda jacobians, covariances: (own := shares(jacobians, covariances) ** 2) / own.sum(),
+                "These are shares of the variance, which add up to 1. Asked for are lengths in mm.",
+                id="shares-fractions",
+            ),
+            Mistake(
+                lambda jacobians, covariances: float(np.linalg.norm(shares(jacobians, covariances))),
+                "This is the total. Asked for is one number a source.",
+                id="shares-total",
+            ),
+        ],
+    ),
+    Value(
+        "halved",
+        reference=lambda: _improved(0.5),
+        unit="mm",
+        rtol=2e-3,
+        hints=(
+            "Which source is the largest? Only its share changes, and squares add.",
+            "total^2 is the sum of the squares. Half of a standard deviation is a quarter of a variance.",
+            "`largest = max(sizes.values())\nhalved = np.sqrt(total**2 - 0.75 * largest**2)`",
+        ),
+        mistakes=[
+            Mistake(
+                lambda: budget()[1] / 2,
+                "You halved the whole. Only one of six sources gets better.",
+                id="halved-all",
+            ),
+            Mistake(
+                lambda: budget()[1] - budget()[0]["tracker"] / 2,
+                "You subtracted half of the share. Standard deviations do not add, their squares do.",
+                id="halved-linear",
+            ),
+            Mistake(
+                lambda: _improved(np.sqrt(0.5)),
+                "You halved the variance. Half the standard deviation leaves a quarter of the variance.",
+                id="halved-variance",
+            ),
+            Mistake(
+                lambda: _improved(0.0),
+                "You left the source out. Half of its standard deviation remains.",
+                id="halved-removed",
+            ),
+            *(
+                Mistake(
+                    lambda source=source: _improved(0.5, source),
+                    "You improved a source that is not the largest.",
+                    id=f"halved-{source.replace(' ', '-')}",
+                )
+                for source in ("scanner", "tip", "marks", "first reading")
+            ),
+            Mistake(lambda: budget()[1], "This is the total as it is.", id="halved-not"),
+            Mistake(
+                lambda: budget()[0]["tracker"] / 2,
+                "This is the improved share alone. The other five remain: add the squares.",
+                id="halved-alone",
+            ),
+            Mistake(
+                lambda: _improved(0.5) ** 2,
+                "This is the variance, in mm^2. Take the root.",
+                id="halved-squared",
+            ),
+        ],
+    ),
+    Prediction(
+        "touch",
+        question="Instead of seen by the scanner, the marks are touched with the same tip, the flange turned as later at the hole. The tip's calibration is 1 mm off. By how much does the tip miss the hole, if the trolley has not moved?",
+        choices=("not at all", "by 1 mm", "by 2 mm"),
+        answer="not at all",
+        why="The tip is wrong by the same vector when it measures and when it is used, and the two cancel. An error that is common to both needs no calibration; turn the part, and it comes back.",
     ),
 ]

@@ -1378,5 +1378,6 @@ CHAPTER = Chapter(
             ],
         ),
         *beyond.SPEEDS,
+        *beyond.CELL,
     ],
 )

@@ -263,3 +263,65 @@ class OverSpeed:
             line.set_visible(bool(np.isfinite(level)))
             name.xy = (name.xy[0], level if np.isfinite(level) else 1.0)
             name.set_visible(bool(np.isfinite(level)))
+
+
+class CellPlan:
+    """The cell from above: the robot's foot, the part as learned and as it stands, and, enlarged about its hole, the
+    misses of simulated cells, the budget's ellipse and the miss of this cell."""
+
+    def __init__(self, ax, marks, enlarged):
+        self.marks, self.enlarged = marks, enlarged
+        style.axes(ax, "x (mm)", "y (mm)", f"plan; misses enlarged {enlarged:.0f} times", equal=True)
+        ax.set(xlim=(-260, 420), ylim=(-330, 420))
+        ax.plot(0, 0, color=style.MUTED, marker="o", markersize=30, markerfacecolor="none", markeredgewidth=5)
+        ax.text(0, 0, "B", ha="center", va="center", fontweight="bold")
+        self.parts = [
+            ax.plot([], [], **style.look("guide", linewidth=1.8), label="learned")[0],
+            ax.plot([], [], **style.look("truth", linewidth=2.0), label="part")[0],
+        ]
+        (self.cloud,) = ax.plot([], [], **style.look("measurement", markersize=2, markeredgewidth=0, alpha=0.6))
+        self.cloud.set_label("simulated cells")
+        (self.region,) = ax.plot([], [], **style.look("prediction"), label="budget, 3 std")
+        (self.hole,) = ax.plot([], [], **style.look("truth", linestyle="none", marker="+", markersize=11))
+        (self.miss,) = ax.plot([], [], **style.look("estimate", marker="D", markersize=5, markevery=[1]))
+        self.miss.set_label("this cell")
+        self.letter = ax.annotate("P", (0, 0), xytext=(-12, -12), textcoords="offset points", fontweight="bold")
+        ax.legend(loc="upper right", fontsize=8)
+        self.artists = [*self.parts, self.cloud, self.region, self.hole, self.miss, self.letter]
+
+    def set(self, result):
+        """Draw the result of `stages.compute_whole_cell`."""
+        for line, T in zip(self.parts, (result["learned"], result["part"])):
+            corners = self.marks @ T[:2, :2].T + T[:2, 3]
+            line.set_data(*corners[[0, 1, 2, 0]].T)
+        hole = result["hole"]
+        self.hole.set_data(*hole[:, None])
+        self.cloud.set_data(*(hole + self.enlarged * result["cloud"]).T)
+        self.region.set_data(*(hole + self.enlarged * result["outline"]).T)
+        self.miss.set_data(*np.transpose([hole, hole + self.enlarged * result["miss"][:2]]))
+        self.letter.xy = tuple(result["part"][:2, 3])
+
+
+class Budget:
+    """What each source contributes, as bars with their numbers, and the total."""
+
+    def __init__(self, ax, sources, longest=1.4):
+        self.sources, self.longest = sources, longest
+        style.axes(ax, "standard deviation (mm)", "", "whose error is it?")
+        ax.set(xlim=(0, longest), ylim=(len(sources) + 0.6, -0.6))
+        ax.set_yticks(range(len(sources) + 1), [*sources, "total"])
+        ax.grid(axis="y", visible=False)
+        (self.bars,) = ax.plot([], [], color=style.PREDICTION, linewidth=9, solid_capstyle="butt")
+        (self.total,) = ax.plot([], [], color=style.INK, linewidth=9, solid_capstyle="butt")
+        self.numbers = [ax.text(0, k, "", va="center", fontsize=9) for k in range(len(sources) + 1)]
+        self.artists = [self.bars, self.total, *self.numbers]
+
+    def set(self, sizes, total):
+        """Sizes {source: mm} and their total."""
+        lengths = [*(sizes[name] for name in self.sources), total]
+        gap = [np.nan, np.nan]
+        self.bars.set_data(*np.concatenate([[[0, k], [v, k], gap] for k, v in enumerate(lengths[:-1])]).T)
+        self.total.set_data([0, total], [len(self.sources)] * 2)
+        for text, length in zip(self.numbers, lengths):
+            text.set_text(f"{length:.2f}")
+            text.set_x(min(length, 0.82 * self.longest) + 0.03 * self.longest)

@@ -11,9 +11,9 @@ from ...calibration import ax_xb
 from ...documents.report.printed import COLUMNS, FASTEST, MOTION_ERRORS, table_d
 from ...estimation.gaussian import cut_axes, ellipse, unit_noise
 from ...fast.ax_xb import calibrate_hand_eye, solve_ax_xb
-from ...geometry.frames import invert, matrix_from_quaternion, pose, pose_distance, unit_vector
+from ...geometry.frames import invert, matrix_from_quaternion, pose, pose_distance, transform, unit_vector
 from ...geometry.lie import exp_so3
-from ...machines import simulation, stations, udp
+from ...machines import cell, simulation, stations, udp
 from ...machines.accuracy import (
     filter_positions,
     median_over_speed,
@@ -790,4 +790,86 @@ def over_speed():
             f"At rest {r['e0']:.2g} {r['unit']}, at the fastest {np.hypot(r['e0'], r['growth']):.2g} {r['unit']}; "
             f"the mean of all readings is {r['mean']:.2g}."
         ),
+    )
+
+
+# ---- the whole cell --------------------------------------------------------------------------------------------------
+
+ENLARGED = 30.0  # how much larger than the plan what is uncertain is drawn
+CLOUD = 400  # simulated cells
+SPOILED = {
+    "as calibrated": {},
+    "tip 2 mm off": {"tip": np.array([2.0, 0.0, 0.0])},
+    "scanner turned 1 deg": {"scanner": np.array([0.0, np.deg2rad(1.0), 0.0, 0.0, 0.0, 0.0])},
+    "tracker's world turned 0.5 deg": {"tracker": np.array([np.deg2rad(-0.5), 0.0, 0.0, 0.0, 0.0, 0.0])},
+}
+CELL_SEED = 6
+
+
+@functools.cache
+def _calibrated():
+    return cell.calibrated_cell(np.random.default_rng(CELL_SEED))
+
+
+def compute_whole_cell(state):
+    """A part that was learned and is found again with all calibrations of the cell, one of them spoiled.
+
+    Returns a dictionary: cell and job, part (4, 4) and learned (4, 4) as they truly stand, hole (2,) on the plan, miss
+    (3,) mm of the tip, sizes {source: mm} and their total, outline (n, 2) and cloud (m, 2) of the miss to be expected,
+    mm.
+    """
+    now = (*state["P"], np.deg2rad(state["turn"]))
+    job = cell.simulated_job(now, touched=state["marks"] == "touched with the tip")
+    used, _ = cell.with_errors(_calibrated(), job, SPOILED[state["spoiled"]])
+    shares = cell.miss_budget(used, job)
+    cov = sum(shares.values())
+    cloud = cell.simulate_misses(used, job, np.random.default_rng(62), CLOUD)
+    part = cell.place_on_table(*now)
+    return {
+        "cell": used, "job": job, "part": part, "learned": cell.place_on_table(*cell.LEARNED),
+        "hole": transform(part, cell.HOLE)[:2], "miss": cell.miss(cell.TRUTH, used, job),
+        "sizes": cell.sizes(shares), "total": float(np.sqrt(np.trace(cov))),
+        "outline": ellipse(np.zeros(2), cov[:2, :2], THREE_STD), "cloud": cloud[:, :2],
+    }  # fmt: skip
+
+
+def _cell_sentence(result):
+    largest = max(result["sizes"], key=result["sizes"].get)
+    miss = np.linalg.norm(result["miss"])
+    verdict = " Far more than the budget admits." if miss > 4 * result["total"] else ""
+    return (
+        f"The tip misses by {miss:.1f} mm; {result['total']:.2f} mm is to be expected, "
+        f"most of it from the {largest}.{verdict}"
+    )
+
+
+def whole_cell():
+    """One cell from beginning to end: move the part, spoil a calibration, watch budget and miss."""
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2, width_ratios=(1.45, 1))
+        plan = draw.CellPlan(left, cell.MARKS[:, :2], ENLARGED)
+        bars = draw.Budget(right, cell.SOURCES)
+
+        def update(state, result):
+            plan.set(result)
+            bars.set(result["sizes"], result["total"])
+
+        return [*plan.artists, *bars.artists], update
+
+    return Stage(
+        "the whole cell",
+        scene=scene,
+        compute=compute_whole_cell,
+        handles={"P": Handle(cell.FAR[:2], step=20, bounds=((-120.0, 260.0), (-260.0, 280.0)), label="part")},
+        controls={
+            "turn": Slider(-45.0, 120.0, 86.0, step=1.0, label="turn of the part (deg)"),
+            "marks": Choice(["seen by the scanner", "touched with the tip"], "seen by the scanner", label="marks"),
+            "spoiled": Choice(list(SPOILED), "as calibrated", label="calibrations"),
+        },
+        fail={"spoiled": "tracker's world turned 0.5 deg"},
+        presets={
+            "back where it was learned": {"P": cell.LEARNED[:2], "turn": float(np.rad2deg(cell.LEARNED[2]).round())}
+        },
+        describe=_cell_sentence,
     )
