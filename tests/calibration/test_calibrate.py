@@ -259,6 +259,27 @@ def test_streams_are_compared_across_clocks_and_gaps():
     assert all(0.3 < row[4] < 1.2 for row in result.comparison.table)  # 0.3 mm on each of three axes, and the clock
 
 
+def test_samples_that_share_their_errors_widen_the_covariance():
+    """Errors that last for 2 s, in a stream of 40 s at 10 Hz: twenty samples are worth one."""
+
+    def robot_at(t):
+        phi = np.stack([np.sin(0.9 * t), 0.7 * np.sin(1.7 * t + 1), 0.5 * np.sin(0.4 * t)], -1)
+        return pose(exp_so3(phi), 300 * np.stack([np.cos(0.5 * t), np.sin(0.8 * t), np.cos(1.1 * t)], -1))
+
+    time = 0.1 * np.arange(400)
+    found = {}
+    for lasting in (1, 20):
+        rng = np.random.default_rng(3)
+        shake = np.repeat(rng.normal(size=(400 // lasting, 6)), lasting, axis=0)
+        b = invert(Y) @ robot_at(time) @ X
+        b[:, :3, 3] += 0.3 * shake[:, :3]
+        b[:, :3, :3] = b[:, :3, :3] @ exp_so3(1e-3 * shake[:, 3:])
+        found[lasting] = calibrate.compare(time, robot_at(time), time, b)
+    assert not found[1].warnings and "neighboring samples share their errors" in found[20].warnings[-1]
+    assert (found[20].std > 2 * found[1].std).all()
+    assert error(found[20]) @ np.linalg.solve(found[20].covariance, error(found[20])) < 40
+
+
 # --- what is shown ---------------------------------------------------------------------------------------------------
 
 
