@@ -34,7 +34,7 @@ from labkit.documents.thesis.listings import listing_cost, listing_gauss_newton
 from labkit.exercises import course
 from labkit.geometry import frames
 from labkit.geometry.lie import exp_so3, nearest_rotation, skew
-from labkit.machines import triangulation
+from labkit.machines import robot_accuracy, triangulation
 
 ex = course("05-hand-eye")
 np.set_printoptions(precision=3, suppress=True, linewidth=110)
@@ -704,6 +704,102 @@ for name, error in errors.items():
 # %% literature-verdict [markdown]
 # Splitting a problem in two is convenient, and costs accuracy: what step 1 errs nobody corrects in step 2. Kim's cube has eight points in place of one, so that the bound for one sphere is not
 # its own; it forgets instead that $X$ is a rigid motion and divides noisy matrices by each other. (Fewer points make it worse, and a sphere alone gives a matrix of rank 1: *Break it* showed the refusal.)
+
+# %% accuracy [markdown]
+# ## Accurate, or only repeatable? (*further*)
+#
+# What is a calibrated scanner worth on a robot that errs itself? The thesis (section 2.1.1) tells two kinds of error apart. *Absolute accuracy* (*Absolutgenauigkeit*) is the difference between
+# where the robot was sent and the mean of where it arrives; *repeatability* (*Wiederholgenauigkeit*) is how its arrivals differ among themselves. ISO 9283 makes numbers of them: the distance of
+# the mean from the command, and, with $l$ the distances of the arrivals from their mean, $\bar l + 3\,s_l$. For a path the same is asked instant by instant, and the worst counts.
+#
+# Decide, then drag what is always wrong (the ring). Then let the robot arrive from all around, and faster around the corner.
+
+# %% predict-repeats
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "it stays"
+### END SOLUTION
+ex.predict("repeats", guess, reveal=stages.accuracy_kinds)
+
+# %% position_accuracy
+@ex.position_accuracy
+def position_accuracy(command, reached):
+    """Return the accuracy (mm): how far the mean of the arrivals is from the command.
+
+    command: shape (d,); reached: shape (n, d), mm.
+    """
+    ### BEGIN SOLUTION
+    return np.linalg.norm(reached.mean(axis=0) - command)
+    ### END SOLUTION
+
+
+# %% repeatability
+@ex.repeatability
+def repeatability(reached):
+    """Return the repeatability (mm) of arrivals, shape (n, d), n - 1 below the root."""
+    ### BEGIN SOLUTION
+    distances = np.linalg.norm(reached - reached.mean(axis=0), axis=1)
+    return distances.mean() + 3 * distances.std(ddof=1)
+    ### END SOLUTION
+
+
+# %% kinds
+rng, sent = np.random.default_rng(0), np.zeros(3)
+robot = robot_accuracy.RobotErrors(np.array([1.5, -0.8, 0.4]), backlash=0.3, std=0.05)
+around = rng.normal(size=(30, 3))
+around /= np.linalg.norm(around, axis=1)[:, None]
+for name, ways in (("one side", np.tile([1.0, 0, 0], (30, 1))), ("all around", around)):
+    reached = robot_accuracy.arrive(sent, ways, robot, rng)
+    numbers = position_accuracy(sent, reached), repeatability(reached)
+    print("from {}: accuracy {:.2f} mm, repeatability {:.2f} mm".format(name, *numbers))
+robot = robot_accuracy.RobotErrors(np.zeros(2), std=0.05, lag=0.03)
+for speed in (50, 200, 800):
+    command, dt = robot_accuracy.corner(speed)
+    paths = robot_accuracy.drive(command, dt, robot, rng, n=10)
+    print(f"{speed} mm/s: path accuracy {robot_accuracy.path_accuracy(command, paths):.1f} mm")
+
+# %% use [markdown]
+# What data sheets of robots print is mostly repeatability; it is what counts for poses that were taught by hand. As soon as poses are computed, from CAD or from a scanner, accuracy counts.
+#
+# ## What the pose is for (*further*)
+#
+# The thesis ends with what a calibrated scanner allows (chapter 8): keep the height of a nozzle over a growing part, find deviations of form, locate a part in the robot's base and
+# move the path with it. All of them are $T_{BF}\,T_{FS}\,x_S$. So mount the scanner (simulated, where the corrected data say it is), and measure a gauge: two marks 100 mm apart, once with the CAD pose, 32 mm
+# off, and once with the calibrated one. First both marks from one orientation of the flange. **By how much is the CAD length wrong?**
+
+# %% predict-same_orientation
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "not at all"
+### END SOLUTION
+ex.predict("same_orientation", guess)
+
+# %% gauge
+cad, marks = thesis.frame("scanner_start"), np.array([[1500.0, -650, 1100], [1500, -550, 1100]])
+alike, seen = robot_accuracy.looking_down_at(marks, fit.T_FS, turns=np.array([0.0, 0.0]))
+turned, seen = robot_accuracy.looking_down_at(marks, fit.T_FS, turns=np.array([0.0, np.pi]))
+for name, T_FS in (("CAD", cad), ("calibrated", fit.T_FS)) if ex.after("same_orientation") else ():
+    p, q = frames.transform(alike, frames.transform(T_FS, seen))
+    off = (p - marks[0]).round(2) + 0.0
+    print(f"{name:10} length {np.linalg.norm(q - p):6.2f} mm, first mark off by {off} mm")
+
+# %% cad-length-text [markdown]
+# The length is right and the place is wrong: the first mark lies 31 mm too high, and a nozzle sent there runs into the air. Now the flange makes half a turn between the marks (poses
+# `turned`, marks as `seen`). What length does the CAD pose give?
+
+# %% cad_length
+cad_length = ...  # your code here
+### BEGIN SOLUTION
+p, q = frames.transform(turned, frames.transform(cad, seen))
+cad_length = np.linalg.norm(q - p)
+### END SOLUTION
+ex.cad_length(cad_length)
+
+# %% all-lengths
+poses = {"CAD": cad, "thesis's end pose": thesis.frame("scanner_end"), "calibrated": fit.T_FS}
+for name, T_FS in poses.items() if ex.after("cad_length") else ():
+    p, q = frames.transform(turned, frames.transform(T_FS, seen))
+    print(f"{name:17} length {np.linalg.norm(q - p):6.2f} mm")
 
 # %% in-practice [markdown]
 # ## In practice

@@ -183,3 +183,13 @@ def test_caption_of_a_pose_says_what_would_explain_it():
 def test_captions_of_both_ways_to_converge_say_the_same_things():
     caption = w.convergence().caption
     assert caption.count("turning") == 2 and caption.count("of the largest") == 2
+
+
+def test_what_is_always_wrong_changes_accuracy_alone():
+    state = {"M": np.array([1.0, 0.5]), "backlash": 0.4, "around": False, "speed": 100}
+    here, there = w.compute_accuracy(state), w.compute_accuracy({**state, "M": np.array([-1.5, 0.0])})
+    assert here["repeatability"] == pytest.approx(there["repeatability"], rel=1e-9)
+    assert there["accuracy"] - here["accuracy"] > 0.5
+    around = w.compute_accuracy({**state, "around": True})
+    assert around["repeatability"] > 2 * here["repeatability"]
+    assert w.compute_accuracy({**state, "speed": 400})["path_accuracy"] > 2 * here["path_accuracy"]

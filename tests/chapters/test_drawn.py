@@ -68,7 +68,8 @@ WITH_HANDLES = (
     ch01.three_points, ch01.triangle_noise, ch01.svd_against_gram_schmidt, ch02.order_of_product, ch02.open_loop,
     ch03.pose_designer, ch03.outliers, ch04.line, ch04.four_paths, ch04.saddle, ch04.convexity,
     ch04.basins, ch05.triangle, ch05.scan_line,
-    ch05.convergence, ch05.two_methods, ch05.pattern_designer, ch06.tx40, ch06.two_axes, ch06.sweeps, ch06.whole_cell,
+    ch05.convergence, ch05.two_methods, ch05.pattern_designer, ch05.accuracy_kinds,
+    ch06.tx40, ch06.two_axes, ch06.sweeps, ch06.whole_cell,
     ch07.circles, ch08.bells, ch08.arena,
 )  # fmt: skip
 
@@ -277,6 +278,17 @@ def test_paths_of_both_parametrizations_start_at_the_handle():
 def test_both_rays_meet_where_the_object_is():
     stage = at(ch05.triangle(), P=(30.0, 200.0), base=80)
     assert_drawn(stage, [[0, 0], [80, 0]], [[0, 0], [30, 200], [80, 0]], [[200, stage.result["std"]]])
+
+
+def test_the_circle_of_repeatability_stands_around_the_mean_of_the_arrivals():
+    stage = at(ch05.accuracy_kinds(), M=(-1.0, 0.5), around=True)
+    reached = stage.result["reached"]
+    distances = np.linalg.norm(reached - reached.mean(0), axis=1)
+    angle = np.linspace(0, 2 * np.pi, 121)
+    circle = reached.mean(0) + (distances.mean() + 3 * distances.std(ddof=1)) * np.column_stack(
+        [np.cos(angle), np.sin(angle)]
+    )
+    assert_drawn(stage, circle, [[0, 0], reached.mean(0)], reached)
 
 
 def test_both_methods_start_at_the_handle_and_what_is_taken_back_is_crossed():

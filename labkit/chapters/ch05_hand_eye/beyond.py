@@ -1,16 +1,17 @@
-"""Exercises of chapter 5 beyond its core: triangulation, the methods of Li et al. and of Kim, Cho, Kim."""
+"""Exercises of chapter 5 beyond its core: kinds of accuracy, triangulation, the methods of Li et al. and of Kim."""
 
 import functools
 
 import numpy as np
 
-from ...calibration import literature
+from ...calibration import hand_eye, literature
 from ...calibration.planning import poses_that_see
+from ...documents.thesis import printed as thesis
 from ...exercises import metrics
-from ...exercises.engine import Exercise, Mistake
+from ...exercises.engine import Exercise, Mistake, Value
 from ...geometry import frames
 from ...geometry.lie import exp_so3, nearest_rotation
-from ...machines import triangulation
+from ...machines import robot_accuracy, triangulation
 
 POSE, ROTATION = "a pose is always 4 x 4", "a rotation is always 3 x 3"
 
@@ -85,7 +86,33 @@ def noisy_right_triangle(rng):
     return *triangle(rng, right_angle=True), float(np.deg2rad(rng.uniform(0.01, 1.0)))
 
 
+def arrivals(rng):
+    """Where a robot was sent, and where it arrived, in the plane or in space."""
+    d, n = int(rng.integers(2, 4)), int(rng.integers(5, 40))
+    command = rng.uniform(-500, 500, d)
+    return command, command + rng.uniform(-3, 3, d) + rng.uniform(0.1, 1.0) * rng.normal(size=(n, d))
+
+
+def only_arrivals(rng):
+    return arrivals(rng)[1:]
+
+
 # --- wrong variants ---
+
+
+def _spread(change):
+    """Something else made of the distances of arrivals from their mean."""
+    return lambda reached: float(change(np.linalg.norm(reached - reached.mean(0), axis=1)))
+
+
+def length_with(name, turn_deg=180.0):
+    """Length of the gauge of the notebook (mm) with some pose of the scanner, the flange turned in between."""
+    measured = thesis.measurements(True)
+    truth = hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S).T_FS
+    T_BF, x_S = robot_accuracy.looking_down_at(GAUGE, truth, np.deg2rad([0.0, turn_deg]))
+    T_FS = truth if name == "calibrated" else thesis.frame(name)
+    p, q = frames.transform(T_BF, frames.transform(T_FS, x_S))
+    return float(np.linalg.norm(q - p))
 
 
 def _height(change):
@@ -160,6 +187,141 @@ def _by_columns(A, B):
     D, F = literature.kim_matrix(A, B)
     return D[np.ix_(order, order)], F[order]
 
+
+ACCURACY = [
+    Exercise(
+        "position_accuracy",
+        reference=robot_accuracy.position_accuracy,
+        draw=arrivals,
+        metric=metrics.Numbers(1e-9, "mm"),
+        hints=(
+            "First where the robot arrives on average, then how far that is from where it was sent.",
+            "|mean of the arrivals − command|, one vector and its length.",
+            "`return np.linalg.norm(reached.mean(axis=0) - command)`",
+        ),
+        mistakes=[
+            Mistake(
+                lambda command, reached: np.linalg.norm(reached - command, axis=1).mean(),
+                "You took the mean of the distances, in which the scatter counts too. Take the distance of the mean.",
+                id="accuracy-mean-distance",
+            ),
+            Mistake(
+                lambda command, reached: np.sqrt(((reached - command) ** 2).sum(1).mean()),
+                "This is the rms distance of the arrivals, scatter included. Take the distance of their mean.",
+                id="accuracy-rms",
+            ),
+            Mistake(
+                lambda command, reached: np.linalg.norm(reached - command, axis=1).max(),
+                "This is the worst arrival. Accuracy is about their mean.",
+                id="accuracy-worst",
+            ),
+            Mistake(
+                lambda command, reached: np.abs(reached.mean(0) - command).sum(),
+                "You added the absolute values of the parts. A distance is the root of the sum of squares.",
+                id="accuracy-sum",
+            ),
+            Mistake(
+                lambda command, reached: np.linalg.norm(np.median(reached, axis=0) - command),
+                "You took the median of each coordinate. The mean is meant.",
+                id="accuracy-median",
+            ),
+            Mistake(
+                lambda command, reached: np.linalg.norm(reached[0] - command),
+                "One arrival is no average: use all of them.",
+                id="accuracy-first",
+            ),
+            Mistake(
+                lambda command, reached: np.linalg.norm(reached.mean() - command),
+                "`reached.mean()` averages over the coordinates as well. Write `reached.mean(axis=0)`.",
+                id="accuracy-axis",
+            ),
+        ],
+    ),
+    Exercise(
+        "repeatability",
+        reference=robot_accuracy.repeatability,
+        draw=only_arrivals,
+        metric=metrics.Numbers(1e-9, "mm"),
+        hints=(
+            "Where the robot was sent does not matter here: compare the arrivals with their own mean.",
+            "l = distances of the arrivals from their mean; mean of l plus three standard deviations of l, the latter with n − 1 below the root.",
+            "`l = np.linalg.norm(reached - reached.mean(axis=0), axis=1)\nreturn l.mean() + 3 * l.std(ddof=1)`",
+        ),
+        mistakes=[
+            Mistake(
+                _spread(lambda l: l.mean() + 3 * l.std()),
+                "Your standard deviation divides by n: with n − 1 it is `l.std(ddof=1)`.",
+                id="repeat-n",
+            ),
+            Mistake(
+                _spread(lambda l: 3 * l.std(ddof=1)),
+                "The mean of the distances is missing: mean + 3 standard deviations.",
+                id="repeat-no-mean",
+            ),
+            Mistake(
+                _spread(lambda l: l.mean()),
+                "That is the mean distance alone. Three standard deviations come on top.",
+                id="repeat-mean",
+            ),
+            Mistake(
+                _spread(lambda l: l.mean() + l.std(ddof=1)),
+                "One standard deviation on top of the mean; the definition takes three.",
+                id="repeat-one",
+            ),
+            Mistake(
+                _spread(lambda l: l.max()),
+                "That is the farthest arrival. It grows with the number of arrivals; the definition takes mean + 3 standard deviations.",
+                id="repeat-worst",
+            ),
+            Mistake(
+                _spread(lambda l: l.mean() + 3 * np.sqrt((l**2).sum() / (len(l) - 1))),
+                "Your standard deviation is taken from 0. It is that of the distances from their own mean.",
+                id="repeat-from-zero",
+            ),
+            Mistake(
+                lambda reached: float(np.linalg.norm(reached.std(axis=0, ddof=1)) * 3),
+                "You took standard deviations of the coordinates. First the distances from the mean, one number an arrival.",
+                id="repeat-coordinates",
+            ),
+        ],
+    ),
+]
+
+GAUGE = np.array([[1500.0, -650.0, 1100.0], [1500.0, -550.0, 1100.0]])  # mm, two marks 100 mm apart
+
+CAD_LENGTH = Value(
+    "cad_length",
+    reference=lambda: length_with("scanner_start"),
+    unit="mm",
+    rtol=1e-3,
+    hints=(
+        "Bring both marks into the base with the CAD pose, and take their distance.",
+        "p = T_BF T_FS x_S, mark by mark: `frames.transform` twice, with `cad` for T_FS and the poses `turned`.",
+        "`p, q = frames.transform(turned, frames.transform(cad, seen))\ncad_length = np.linalg.norm(q - p)`",
+    ),
+    mistakes=[
+        Mistake(
+            lambda: length_with("calibrated"),
+            "This is the length with the calibrated pose. Take `cad`.",
+            id="length-calibrated",
+        ),
+        Mistake(
+            lambda: length_with("scanner_end"),
+            "This is the length with the thesis's end pose. Take `cad`, the pose it started from.",
+            id="length-end-pose",
+        ),
+        Mistake(
+            lambda: length_with("scanner_start") - 100.0,
+            "This is by how much the length is wrong. Asked for is the length.",
+            id="length-difference",
+        ),
+        Mistake(
+            lambda: length_with("scanner_start", 90.0),
+            "This is the length after a quarter turn. The poses `turned` differ by half a turn.",
+            id="length-quarter",
+        ),
+    ],
+)
 
 TRIANGULATION = [
     Exercise(

@@ -1055,6 +1055,22 @@ CHAPTER = Chapter(
             why="Step 1 hears only the five poses of one orientation, and what it errs is multiplied by the distance of the sphere in step 2. The joint fit lets all poses speak on both.",
         ),
         *beyond.LITERATURE,
+        Prediction(
+            "repeats",
+            question="A robot is recalibrated, and the mean of its arrivals moves onto the cross. What happens to its repeatability?",
+            choices=("it gets better", "it stays", "it gets worse"),
+            answer="it stays",
+            why="Repeatability compares the arrivals with one another. Backlash and noise spoil it, and no calibration of lengths and zeros touches them.",
+        ),
+        *beyond.ACCURACY,
+        Prediction(
+            "same_orientation",
+            question="The scanner's CAD pose is 32 mm off. Two marks are seen from the same flange orientation. By how much is their distance wrong?",
+            choices=("not at all", "by 3 mm or so", "by 32 mm or so"),
+            answer="not at all",
+            why="As long as the flange does not turn and each mark is seen at the same place of the field, the wrong pose shifts both marks alike.",
+        ),
+        beyond.CAD_LENGTH,
     ],
 )  # fmt: skip
 

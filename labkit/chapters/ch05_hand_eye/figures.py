@@ -69,6 +69,31 @@ def error_over_range(ax, measures, limits):
     return curve, here
 
 
+def target_board(ax, half, hits):
+    """Where a robot was sent (a cross) and where it arrived. Returns (ring, hits, mean, accuracy, circle)."""
+    style.axes(ax, "x (mm)", "y (mm)", f"{hits} arrivals at the cross", equal=True)
+    ax.set(xlim=(-half, half), ylim=(-half, half))
+    ax.plot([0], [0], color=style.TRUTH, marker="+", markersize=18, markeredgewidth=2, linestyle="none")
+    (accuracy,) = ax.plot([], [], label="accuracy", **style.look("estimate"))
+    (circle,) = ax.plot([], [], label="repeatability", **style.look("prediction"))
+    (ring,) = ax.plot([], [], color=style.INK, marker="o", markersize=12, markerfacecolor="none", linestyle="none")
+    (dots,) = ax.plot([], [], **style.look("measurement", markersize=4))
+    (mean,) = ax.plot([], [], **style.look("estimates", markersize=8))
+    ax.legend(loc="upper left")
+    return ring, dots, mean, accuracy, circle
+
+
+def driven_corner(ax, half):
+    """A commanded path around a corner and the driven one. Returns (commanded, driven, worst)."""
+    style.axes(ax, "x (mm)", "y (mm)", "once around a corner", equal=True)
+    ax.set(xlim=(-half, 0.35 * half), ylim=(-0.35 * half, half))
+    (commanded,) = ax.plot([], [], label="commanded", **style.look("truth"))
+    (driven,) = ax.plot([], [], label="driven", **style.look("measurement", linestyle="-", marker=""))
+    (worst,) = ax.plot([], [], label="path accuracy", **style.look("estimate"))
+    ax.legend(loc="lower left")
+    return commanded, driven, worst
+
+
 def error_against_step(ax, steps, curves):
     """Error of finite differences over the step. `curves`: {label: errors}. Returns the markers, one per curve."""
     style.axes(ax, "step h (deg)", "largest error (mm per deg)", "error of the derivative by A")

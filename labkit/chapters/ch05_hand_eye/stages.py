@@ -1,5 +1,5 @@
 """Stages of chapter 5: height from two angles, scan line and sphere, difference steps, iterations at the pole, two
-methods, the 31 poses, a measuring pattern.
+methods, the 31 poses, a measuring pattern, kinds of accuracy.
 """
 
 import functools
@@ -15,7 +15,7 @@ from ...estimation.gaussian import unit_noise
 from ...fast.hand_eye import calibrate_sphere_target
 from ...geometry import frames
 from ...geometry.lie import exp_so3, log_so3
-from ...machines import triangulation
+from ...machines import robot_accuracy, triangulation
 from ...stage import Choice, Handle, Slider, Stage, style
 from ...stage.scene3d import Scene, View
 from . import figures as draw
@@ -91,6 +91,76 @@ def triangle():
         },
         fail={"P": (0.0, 400.0), "base": 20, "std_deg": 1.0},
         describe=_triangle_sentence,
+    )
+
+
+# --- kinds of accuracy -----------------------------------------------------------------------------------------------
+
+ARRIVALS = 30
+BOARD = 3.0  # mm, half the width of the target board
+STD, LAG = 0.08, 0.03  # mm and s, of the simulated robot
+
+
+def compute_accuracy(state):
+    """Arrivals of a simulated robot with their accuracy and repeatability, and a corner it drives around."""
+    angle = np.linspace(0, 2 * np.pi, ARRIVALS, endpoint=False) if state["around"] else np.zeros(ARRIVALS)
+    directions = np.column_stack([np.cos(angle), np.sin(angle)])
+    errors = robot_accuracy.RobotErrors(np.asarray(state["M"]), state["backlash"], STD, LAG)
+    reached = robot_accuracy.arrive(np.zeros(2), directions, errors, np.random.default_rng(2))
+    command, dt = robot_accuracy.corner(state["speed"])
+    path = robot_accuracy.drive(
+        command, dt, robot_accuracy.RobotErrors(np.zeros(2), lag=LAG), np.random.default_rng(0)
+    )[0]
+    worst = int(np.argmax(np.linalg.norm(path - command, axis=1)))
+    return {
+        "reached": reached, "mean": reached.mean(0), "around": state["around"],
+        "accuracy": robot_accuracy.position_accuracy(np.zeros(2), reached),
+        "repeatability": robot_accuracy.repeatability(reached),
+        "command": command, "path": path, "worst": np.array([command[worst], path[worst]]),
+        "path_accuracy": robot_accuracy.path_accuracy(command, path[None]),
+    }  # fmt: skip
+
+
+def _accuracy_sentence(result):
+    way = "from all around" if result["around"] else "from one side"
+    return (
+        f"Arriving {way}: accuracy {result['accuracy']:.2f} mm, repeatability {result['repeatability']:.2f} mm. "
+        f"Around the corner the path is off by up to {result['path_accuracy']:.1f} mm."
+    )
+
+
+def accuracy_kinds():
+    """Drag what is always wrong: accuracy changes, repeatability does not; backlash shows from all around only."""
+
+    def scene(fig):
+        left, right = fig.subplots(1, 2)
+        ring, dots, mean, accuracy, circle = draw.target_board(left, BOARD, ARRIVALS)
+        commanded, driven, worst = draw.driven_corner(right, 62)
+
+        def update(state, result):
+            ring.set_data(*state["M"][:, None])
+            dots.set_data(*result["reached"].T)
+            mean.set_data(*result["mean"][:, None])
+            accuracy.set_data(*np.transpose([np.zeros(2), result["mean"]]))
+            draw.set_circle(circle, *result["mean"], result["repeatability"])
+            commanded.set_data(*result["command"].T)
+            driven.set_data(*result["path"].T)
+            worst.set_data(*result["worst"].T)
+
+        return [accuracy, circle, ring, dots, mean, commanded, driven, worst], update
+
+    return Stage(
+        "kinds of accuracy",
+        scene=scene,
+        compute=compute_accuracy,
+        handles={"M": Handle((1.2, 0.8), step=0.05, bounds=((-2, 2), (-2, 2)), label="what is always wrong")},
+        controls={
+            "backlash": Slider(0.0, 1.0, 0.4, step=0.05, label="backlash (mm)"),
+            "around": Choice({"one side": False, "all around": True}, False, label="arriving from"),
+            "speed": Slider(10, 600, 100, step=10, label="speed (mm/s)"),
+        },
+        fail={"backlash": 1.0, "around": True, "speed": 600},
+        describe=_accuracy_sentence,
     )
 
 
