@@ -85,7 +85,8 @@ ex.predict("edges", guess, reveal=stages.three_points)
 # %% gram_schmidt
 @ex.gram_schmidt
 def gram_schmidt(a, b):
-    """Return R, shape (3, 3), from two edges a, b, shape (3,), in mm: columns x (along a), y (in their plane), z."""
+    """Return R, shape (3, 3), from two edges a, b, shape (3,), in mm: columns x (along
+    a), y (in their plane), z."""
     ### BEGIN SOLUTION
     x = normalize(a)
     y = normalize(b - (b @ x) * x)
@@ -102,7 +103,8 @@ def gram_schmidt(a, b):
 # %% frame_from_points
 @ex.frame_from_points
 def frame_from_points(origin, x_point, y_point):
-    """Return T_WF, shape (4, 4), of the frame through three measured points, each of shape (3,), in mm."""
+    """Return T_WF, shape (4, 4), of the frame through three measured points, each of
+    shape (3,), in mm."""
     ### BEGIN SOLUTION
     T_WF = np.eye(4)
     T_WF[:3, :3] = gram_schmidt(x_point - origin, y_point - origin)
@@ -120,7 +122,8 @@ def frame_from_points(origin, x_point, y_point):
 # %% invert
 @ex.invert
 def invert(T):
-    """Return the inverse of a rigid transform, shape (4, 4); nothing needs to be solved."""
+    """Return the inverse of a rigid transform, shape (4, 4); nothing needs to be
+    solved."""
     ### BEGIN SOLUTION
     X = np.eye(4)
     X[:3, :3] = T[:3, :3].T
@@ -142,7 +145,8 @@ flat = frame_from_points(*measured["K1"])
 flat[:3, 2] = 0
 for name, T in (("mistyped", typo), ("axis missing", flat)):
     back = np.linalg.pinv(T) @ T
-    print(f"{name}: pinv says nothing; pinv(T) T differs from I by {np.abs(back - np.eye(4)).max():.2f}")
+    print(f"{name}: pinv says nothing; pinv(T) T differs from I by "
+          f"{np.abs(back - np.eye(4)).max():.2f}")
     try:
         frames.invert(T)
     except ValueError as refusal:
@@ -156,7 +160,8 @@ for name, T in (("mistyped", typo), ("axis missing", flat)):
 # %% relative
 @ex.relative
 def relative(T_WA, T_WB):
-    """Return T_AB, shape (4, 4): the pose of B seen from A, given T_WA and T_WB, shape (4, 4)."""
+    """Return T_AB, shape (4, 4): the pose of B seen from A, given T_WA and T_WB, shape
+    (4, 4)."""
     ### BEGIN SOLUTION
     return invert(T_WA) @ T_WB
     ### END SOLUTION
@@ -168,10 +173,13 @@ def relative(T_WA, T_WB):
 # Listing 4 prints $T_{K_0K_1}$ with six digits after the point. Compare yours with it, entry by entry.
 
 # %% compare-listing-4
-T_K0K1 = relative(frame_from_points(*measured["K0"]), frame_from_points(*measured["K1"]))
-listing_4 = np.array([[0.010000, -0.999950, 0, 0.99], [0.999950, 0.010000, 0, -1], [0, 0, 1, 0], [0, 0, 0, 1]])
+T_K0K1 = relative(frame_from_points(*measured["K0"]),
+                  frame_from_points(*measured["K1"]))
+listing_4 = np.array([[0.010000, -0.999950, 0, 0.99], [0.999950, 0.010000, 0, -1],
+                      [0, 0, 1, 0], [0, 0, 0, 1]])
 print(T_K0K1 + 0.0)
-print(f"largest difference from listing 4: {np.abs(T_K0K1 - listing_4).max():.1e} (half a printed digit is 5.0e-07)")
+print(f"largest difference from listing 4: {np.abs(T_K0K1 - listing_4).max():.1e} "
+      "(half a printed digit is 5.0e-07)")
 
 # %% angle [markdown]
 # Now put it in two numbers. By what angle is $K_1$ turned against $K_0$? The drawing says 90°, but the points were moved by 0.01 on purpose.
@@ -228,7 +236,8 @@ ex.predict("flat", guess, reveal=stages.triangle_noise)
 # %% matrix_from_kuka
 @ex.matrix_from_kuka
 def matrix_from_kuka(xyzabc):
-    """Return T, shape (4, 4), of a KUKA pose xyzabc, shape (6,): x, y, z (mm), A, B, C (rad)."""
+    """Return T, shape (4, 4), of a KUKA pose xyzabc, shape (6,): x, y, z (mm), A, B, C
+    (rad)."""
     ### BEGIN SOLUTION
     x, y, z, A, B, C = xyzabc
     rot_z = np.array([[np.cos(A), -np.sin(A), 0], [np.sin(A), np.cos(A), 0], [0, 0, 1]])
@@ -263,7 +272,8 @@ ex.predict("pole", guess, reveal=stages.kuka_gimbal)
 # %% kuka_from_matrix
 @ex.kuka_from_matrix
 def kuka_from_matrix(T):
-    """Return x, y, z (mm), A, B, C (rad) of a pose, shape (6,), with B between -pi/2 and pi/2."""
+    """Return x, y, z (mm), A, B, C (rad) of a pose, shape (6,), with B between -pi/2
+    and pi/2."""
     ### BEGIN SOLUTION
     R = T[:3, :3]
     A = np.arctan2(R[1, 0], R[0, 0])
@@ -303,7 +313,8 @@ for name, pose in readings.items():
 
 # %% break-it-code
 o, px = np.zeros(3), np.array([100.0, 0, 0])
-for y_point in (np.array([50.0, 1e-4, 0]), o, np.array([50.0, np.nan, 0]), np.array([50.0, 10.0])):
+for y_point in (np.array([50.0, 1e-4, 0]), o, np.array([50.0, np.nan, 0]),
+                np.array([50.0, 10.0])):
     try:
         frames.frame_from_points(o, px, y_point)
     except ValueError as refusal:

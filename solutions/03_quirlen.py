@@ -58,7 +58,8 @@ print("...", len(poses), "synthetic poses in all")
 # %% pivot_matrix
 @ex.pivot_matrix
 def pivot_matrix(T_WF):
-    """Return A, shape (3n, 6), from poses T_WF of shape (n, 4, 4), in mm: three rows per pose, pose after pose."""
+    """Return A, shape (3n, 6), from poses T_WF of shape (n, 4, 4), in mm: three rows
+    per pose, pose after pose."""
     ### BEGIN SOLUTION
     return np.vstack([np.hstack([T[:3, :3], -np.eye(3)]) for T in T_WF])
     ### END SOLUTION
@@ -67,7 +68,8 @@ def pivot_matrix(T_WF):
 # %% pivot_rhs
 @ex.pivot_rhs
 def pivot_rhs(T_WF):
-    """Return b, shape (3n,) in mm, from poses T_WF of shape (n, 4, 4): three numbers per pose, pose after pose."""
+    """Return b, shape (3n,) in mm, from poses T_WF of shape (n, 4, 4): three numbers
+    per pose, pose after pose."""
     ### BEGIN SOLUTION
     return -T_WF[:, :3, 3].ravel()
     ### END SOLUTION
@@ -83,7 +85,8 @@ def pivot_rhs(T_WF):
 # %% solve_pivot
 @ex.solve_pivot
 def solve_pivot(A, b):
-    """Return x = (tip, point), shape (6,) in mm, with the least sum of squares of A x - b; A is (3n, 6), b is (3n,)."""
+    """Return x = (tip, point), shape (6,) in mm, with the least sum of squares of A x -
+    b; A is (3n, 6), b is (3n,)."""
     ### BEGIN SOLUTION
     return np.linalg.lstsq(A, b, rcond=None)[0]
     ### END SOLUTION
@@ -92,9 +95,11 @@ def solve_pivot(A, b):
 # %% compare-listing-9
 A, b = pivot_matrix(poses), pivot_rhs(poses)
 x = solve_pivot(A, b)
-listing_9 = np.array([-1.747805, 44.586360, -87.648108, -253.032904, 107.040686, -3.215224])
+listing_9 = np.array([-1.747805, 44.586360, -87.648108, -253.032904, 107.040686,
+                      -3.215224])
 print("tip  ", x[:3], "mm\npoint", x[3:], "mm")
-print(f"off listing 9 by {np.abs(x - listing_9).max():.1e} mm (half a printed digit is 5.0e-07)")
+print(f"off listing 9 by {np.abs(x - listing_9).max():.1e} mm (half a printed digit is "
+      "5.0e-07)")
 
 # %% tip_length
 # how long is the tool, from the flange to the tip, in mm?
@@ -115,7 +120,8 @@ ex.tip_length(tip_length)
 # %% pivot_residuals
 @ex.pivot_residuals
 def pivot_residuals(T_WF, tip, point):
-    """Return R_i tip + p_i - point (mm) of every pose, shape (n, 3); T_WF is (n, 4, 4), tip and point are (3,)."""
+    """Return R_i tip + p_i - point (mm) of every pose, shape (n, 3); T_WF is (n, 4, 4),
+    tip and point are (3,)."""
     ### BEGIN SOLUTION
     return np.array([T[:3, :3] @ tip + T[:3, 3] - point for T in T_WF])
     ### END SOLUTION
@@ -124,8 +130,10 @@ def pivot_residuals(T_WF, tip, point):
 # %% s0
 residuals = pivot_residuals(poses, x[:3], x[3:])
 print("first P_test", residuals[0], "\nlast P_test ", residuals[-1])
-listings = np.array([[-0.106450, 0.191828, -0.098577], [0.043934, -0.236217, -0.109208]])
-print("as in listings 9 and 10, to half a digit:", bool((np.abs(residuals[[0, -1]] - listings) < 5e-7).all()))
+listings = np.array([[-0.106450, 0.191828, -0.098577],
+                     [0.043934, -0.236217, -0.109208]])
+print("as in listings 9 and 10, to half a digit:",
+      bool((np.abs(residuals[[0, -1]] - listings) < 5e-7).all()))
 s0 = ...  # your code here
 ### BEGIN SOLUTION
 s0 = np.sqrt((residuals**2).sum() / len(poses))
@@ -142,9 +150,11 @@ ex.s0(s0)
 squares, n = (residuals**2).sum(), len(poses)
 std = np.sqrt(squares / (3 * n - 6))
 print(f"s0, rms distance in space (divided by {n} poses): as you found it above")
-print(f"{np.sqrt(squares / (3 * n)):.3f} mm  rms of a coordinate (divided by {3 * n} equations)")
+print(f"{np.sqrt(squares / (3 * n)):.3f} mm  rms of a coordinate (divided by {3 * n} "
+      "equations)")
 print(f"{std:.3f} mm  std of a coordinate, unbiased (divided by {3 * n - 6})")
-print(f"{np.rad2deg(std / np.linalg.norm(x[:3])):.2f} deg turn of the flange that moves the tip as far")
+print(f"{np.rad2deg(std / np.linalg.norm(x[:3])):.2f} deg turn of the flange that "
+      "moves the tip as far")
 
 # %% ten-others
 # the sheet prints s0 of all twelve poses, and the residuals of two
@@ -181,13 +191,17 @@ ex.predict("two_poses", guess)
 # %% count-the-rank
 for n in (2, 3, 4, 12):
     s = np.linalg.svd(pivot_matrix(poses[:n]), compute_uv=False)
-    print(f"{n:2} poses: {3 * n:2} equations, s6/s1 = {s[5] / s[0]:.4f}, rank {np.sum(s > 1e-9 * s[0])}")
+    print(f"{n:2} poses: {3 * n:2} equations, s6/s1 = {s[5] / s[0]:.4f}, rank "
+          f"{np.sum(s > 1e-9 * s[0])}")
 turn = poses[0, :3, :3].T @ poses[1, :3, :3]
-axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0],
+                 turn[1, 0] - turn[0, 1]])
 axis /= np.linalg.norm(axis)
-shifted = pivot_residuals(poses[:2], x[:3] + 50 * axis, x[3:] + 50 * poses[0, :3, :3] @ axis)
+point = x[3:] + 50 * poses[0, :3, :3] @ axis
+shifted = pivot_residuals(poses[:2], x[:3] + 50 * axis, point)
 change = np.abs(shifted - residuals[:2]).max()
-print(f"tip shifted by 50 mm along the axis of the turn: residuals change by less than 1e-9 mm: {change < 1e-9}")
+print("tip shifted by 50 mm along the axis of the turn: residuals change by less than "
+      f"1e-9 mm: {change < 1e-9}")
 
 # %% why-three [markdown]
 # Two poses suffice only with knowledge from elsewhere: if the component along the axis of the turn is known, say because the tool was measured with a ruler. Three poses
@@ -215,24 +229,28 @@ tip = np.array([0.0, 0.0, -100.0])
 print("poses    cone  condition   squared  tip across    along")
 for n, half_angle_deg in ((60, 1), (60, 2), (6, 20), (60, 20), (60, 45)):
     R = pivot.cone(n, np.deg2rad(half_angle_deg))
-    s = np.linalg.svd(pivot.pivot_matrix(pivot.touching_poses(R, tip, np.zeros(3))), compute_uv=False)
+    s = np.linalg.svd(pivot.pivot_matrix(pivot.touching_poses(R, tip, np.zeros(3))),
+                      compute_uv=False)
     cov = pivot.predicted_covariance(R, tip, std_rot=0.0, std_trans=0.2)
     condition = s[0] / s[5]
     across, along = np.sqrt(cov[0, 0]), np.sqrt(cov[2, 2])
-    print(f"{n:5}  {half_angle_deg:2} deg  {condition:9.0f}  {condition**2:8.0f}  {across:7.2f} mm  {along:.2f} mm")
+    print(f"{n:5}  {half_angle_deg:2} deg  {condition:9.0f}  {condition**2:8.0f}  "
+          f"{across:7.2f} mm  {along:.2f} mm")
 
 # %% squared [markdown]
 # The column "squared" is what the normal equations work with, and every power of ten in it costs one of the 16 digits a computer has. Try it with exact poses on very narrow cones.
 
 # %% normal-equations
 for half_angle_deg in (0.1, 0.001):
-    T = pivot.touching_poses(pivot.cone(60, np.deg2rad(half_angle_deg)), tip, [300.0, 200.0, 100.0])
+    T = pivot.touching_poses(pivot.cone(60, np.deg2rad(half_angle_deg)), tip,
+                             [300.0, 200.0, 100.0])
     A_cone, b_cone = pivot.pivot_matrix(T), pivot.pivot_rhs(T)
     by_normal = np.linalg.inv(A_cone.T @ A_cone) @ A_cone.T @ b_cone
     by_svd = np.linalg.lstsq(A_cone, b_cone, rcond=None)[0]
     worse = np.linalg.norm(by_normal[:3] - tip) / np.linalg.norm(by_svd[:3] - tip)
     left = 16 - np.log10(np.linalg.cond(A_cone)) * np.array([1, 2])
-    words = f"cone {half_angle_deg:5} deg: {left[0]:2.0f} digits left by SVD, {left[1]:2.0f} by normal equations,"
+    words = f"cone {half_angle_deg:5} deg: {left[0]:2.0f} digits left by SVD,"
+    words += f" {left[1]:2.0f} by normal equations,"
     print(words, f"at least 100 times worse: {worse > 100}")
 
 # %% covariance [markdown]
@@ -244,7 +262,8 @@ for half_angle_deg in (0.1, 0.001):
 # %% pivot_covariance
 @ex.pivot_covariance
 def pivot_covariance(A, residuals):
-    """Return the covariance of x (mm^2), shape (6, 6), from A of shape (3n, 6) and residuals (mm) of shape (n, 3)."""
+    """Return the covariance of x (mm^2), shape (6, 6), from A of shape (3n, 6) and
+    residuals (mm) of shape (n, 3)."""
     ### BEGIN SOLUTION
     r = residuals.ravel()
     return r @ r / (len(r) - 6) * np.linalg.inv(A.T @ A)
@@ -253,12 +272,15 @@ def pivot_covariance(A, residuals):
 
 # %% tip-with-its-uncertainty
 cov = pivot_covariance(A, residuals)
-print("tip", x[:3].round(2), "+-", np.sqrt(np.diag(cov))[:3].round(2), "mm; the sheet prints six decimals")
+print("tip", x[:3].round(2), "+-", np.sqrt(np.diag(cov))[:3].round(2),
+      "mm; the sheet prints six decimals")
 for half_angle_deg in (5, 10, 20, 45):
     R = pivot.cone(12, np.deg2rad(half_angle_deg))
-    worst = np.sqrt(np.linalg.eigvalsh(pivot.predicted_covariance(R, x[:3], 0.0, std)[:3, :3]).max())
+    predicted = pivot.predicted_covariance(R, x[:3], 0.0, std)[:3, :3]
+    worst = np.sqrt(np.linalg.eigvalsh(predicted).max())
     poses_needed = np.ceil(12 * (worst / 0.1) ** 2)
-    print(f"0.1 mm in the worst direction, cone {half_angle_deg:2} deg: about {poses_needed:4.0f} poses")
+    print(f"0.1 mm in the worst direction, cone {half_angle_deg:2} deg: about "
+          f"{poses_needed:4.0f} poses")
 
 # %% break-it [markdown]
 # ## Break it
@@ -270,13 +292,16 @@ for half_angle_deg in (5, 10, 20, 45):
 spin = pivot.cone(40, 0.0, turns=1)
 meters = pivot.touching_poses(spin, tip / 1000, np.zeros(3))
 exact = pivot.touching_poses(spin, tip, np.zeros(3))
-noisy = pivot.touching_poses(spin, tip, np.zeros(3), np.deg2rad(0.2), 0.1, np.random.default_rng(1))
+noisy = pivot.touching_poses(spin, tip, np.zeros(3), np.deg2rad(0.2), 0.1,
+                             np.random.default_rng(1))
 known = {"std_rot": np.deg2rad(0.2), "std_trans": 0.1}
-for words, T, noise in (("exact", exact, {}), ("meters", meters, {}), ("noisy", noisy, {}), ("noise known", noisy, known)):
+for words, T, noise in (("exact", exact, {}), ("meters", meters, {}),
+                        ("noisy", noisy, {}), ("noise known", noisy, known)):
     try:
         result = pivot.calibrate_pivot(T, **noise)
         error = np.linalg.norm(result.tip - tip)
-        print(f"{words}: accepted, s0 = {result.s0:.2f} mm, and the tip is off by {error:.0f} mm")
+        print(f"{words}: accepted, s0 = {result.s0:.2f} mm, and the tip is off by "
+              f"{error:.0f} mm")
     except ValueError as refusal:
         print(f"{words}: {refusal}")
 
@@ -290,7 +315,8 @@ for words, T, noise in (("exact", exact, {}), ("meters", meters, {}), ("noisy", 
 # %% robust_weights
 @ex.robust_weights
 def robust_weights(distances, scale):
-    """Return Tukey's weights, shape (n,), from distances (mm) and the scale (the noise, mm), with the cutoff at 7 scales."""
+    """Return Tukey's weights, shape (n,), from distances (mm) and the scale (the noise,
+    mm), with the cutoff at 7 scales."""
     ### BEGIN SOLUTION
     q = distances / (7 * scale)
     return np.where(q < 1, (1 - q**2) ** 2, 0.0)
@@ -310,19 +336,20 @@ ex.predict("outliers", guess, reveal=stages.outliers)
 
 # %% against-the-bound
 rng, tip, squares = np.random.default_rng(3), np.array([12.0, -8.0, 150.0]), {}
-R, noise = exp_so3(rng.uniform(-0.6, 0.6, (50, 3))), {"std_rot": np.deg2rad(0.3), "std_trans": 0.1}
+R = exp_so3(rng.uniform(-0.6, 0.6, (50, 3)))
+noise = {"std_rot": np.deg2rad(0.3), "std_trans": 0.1}
 for _ in range(200):
     good = pivot.touching_poses(R, tip, np.zeros(3), **noise, rng=rng)
     bad = good.copy()
     bad[:5, :3, 3] += 30 * rng.normal(size=(5, 3))
-    cases = {"plain": (good, {}), "weighted": (good, noise), "plain, 10 % bad poses": (bad, {})}
-    cases["robust and weighted, 10 % bad poses"] = (bad, {**noise, "robust": True})
+    cases = {"plain": (good, {}), "weighted": (good, noise), "10 % bad": (bad, {}),
+             "10 % bad, robust and weighted": (bad, {**noise, "robust": True})}
     for words, (T, options) in cases.items():
         error = pivot.calibrate_pivot(T, **options).tip - tip
-        squares.setdefault(words, []).append(error @ error)
+        squares[words] = squares.get(words, 0) + error @ error / 200
 bound = np.sqrt(np.trace(pivot.predicted_covariance(R, tip, **noise)[:3, :3]))
-for words, values in squares.items():
-    print(f"{words:36} {np.sqrt(np.mean(values)):5.2f} mm = {np.sqrt(np.mean(values)) / bound:5.2f} x bound")
+for words, square in squares.items():
+    print(f"{words:30} {square**0.5:5.2f} mm = {square**0.5 / bound:5.2f} x bound")
 
 # %% in-practice [markdown]
 # ## In practice

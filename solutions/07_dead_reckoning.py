@@ -56,7 +56,8 @@ ex.predict("method", guess, reveal=stages.methods)
 # %% lateration_residual
 @ex.lateration_residual
 def lateration_residual(landmarks, distances, position):
-    """Return f, shape (n,) in m^2, for landmarks (n, 2), distances (n,) and a position (2,)."""
+    """Return f, shape (n,) in m^2, for landmarks (n, 2), distances (n,) and a position
+    (2,)."""
     ### BEGIN SOLUTION
     return ((landmarks - position) ** 2).sum(axis=1) - distances**2
     ### END SOLUTION
@@ -69,12 +70,14 @@ def lateration_residual(landmarks, distances, position):
 # %% newton_lateration
 @ex.newton_lateration
 def newton_lateration(landmarks, distances, start):
-    """Return the position, shape (2,), that Newton's method finds from `start` (2,), with landmarks (2, 2)."""
+    """Return the position, shape (2,), that Newton's method finds from `start` (2,),
+    with landmarks (2, 2)."""
     ### BEGIN SOLUTION
     position = np.array(start, dtype=float)
     for _ in range(20):
         J = 2 * (position - landmarks)
-        position = position - np.linalg.solve(J, lateration_residual(landmarks, distances, position))
+        f = lateration_residual(landmarks, distances, position)
+        position = position - np.linalg.solve(J, f)
     return position
     ### END SOLUTION
 
@@ -106,10 +109,13 @@ robot, std = np.array([8.0, 8.0]), 0.5
 true = np.linalg.norm(landmarks - robot, axis=1)
 measured = true + std * np.random.default_rng(1).standard_normal((20_000, 4))
 bound = np.sqrt(np.trace(std**2 * lateration.dilution(landmarks, robot)))
-for name, cost in (("squares, as in the lecture", "squares"), ("distances", "distance")):
+for name, cost in (("squares, as in the lecture", "squares"),
+                   ("distances", "distance")):
     off = lateration.laterate(landmarks, measured, cost=cost).position - robot
-    bias, spread = 1000 * np.linalg.norm(off.mean(0)), 1000 * np.sqrt((off**2).sum(1).mean())
-    print(f"{name:27} bias {bias:3.0f} mm, RMS {spread:3.0f} mm, {spread / 1000 / bound:.2f} times the bound")
+    bias = 1000 * np.linalg.norm(off.mean(0))
+    spread = 1000 * np.sqrt((off**2).sum(1).mean())
+    print(f"{name:27} bias {bias:3.0f} mm, RMS {spread:3.0f} mm, "
+          f"{spread / 1000 / bound:.2f} times the bound")
 
 # %% wheels [markdown]
 # ## Dead reckoning (*Koppelnavigation*)
@@ -120,7 +126,8 @@ for name, cost in (("squares, as in the lecture", "squares"), ("distances", "dis
 # %% wheel_to_twist
 @ex.wheel_to_twist
 def wheel_to_twist(v_left, v_right, track):
-    """Return u = (v, omega), shape (2,), from the wheel speeds (m/s) and the track width (m)."""
+    """Return u = (v, omega), shape (2,), from the wheel speeds (m/s) and the track
+    width (m)."""
     ### BEGIN SOLUTION
     return np.array([(v_right + v_left) / 2, (v_right - v_left) / track])
     ### END SOLUTION
@@ -139,19 +146,23 @@ def wheel_to_twist(v_left, v_right, track):
 # %% step_euler
 @ex.step_euler
 def step_euler(x, u, dt):
-    """Return the pose (x, y, theta) after one step of the simplified model; x (3,), u = (v, omega), dt in s."""
+    """Return the pose (x, y, theta) after one step of the simplified model; x (3,), u =
+    (v, omega), dt in s."""
     ### BEGIN SOLUTION
-    return np.array([x[0] + u[0] * dt * np.cos(x[2]), x[1] + u[0] * dt * np.sin(x[2]), x[2] + u[1] * dt])
+    return np.array([x[0] + u[0] * dt * np.cos(x[2]), x[1] + u[0] * dt * np.sin(x[2]),
+                     x[2] + u[1] * dt])
     ### END SOLUTION
 
 
 # %% step_midpoint
 @ex.step_midpoint
 def step_midpoint(x, u, dt):
-    """Return the pose (x, y, theta) after one step along the heading of half the turn."""
+    """Return the pose (x, y, theta) after one step along the heading of half the
+    turn."""
     ### BEGIN SOLUTION
     direction = x[2] + u[1] * dt / 2
-    return np.array([x[0] + u[0] * dt * np.cos(direction), x[1] + u[0] * dt * np.sin(direction), x[2] + u[1] * dt])
+    return np.array([x[0] + u[0] * dt * np.cos(direction),
+                     x[1] + u[0] * dt * np.sin(direction), x[2] + u[1] * dt])
     ### END SOLUTION
 
 
@@ -163,7 +174,8 @@ def step_arc(x, u, dt):
     half_turn = u[1] * dt / 2
     chord = u[0] * dt * np.sinc(half_turn / np.pi)
     direction = x[2] + half_turn
-    return np.array([x[0] + chord * np.cos(direction), x[1] + chord * np.sin(direction), x[2] + u[1] * dt])
+    return np.array([x[0] + chord * np.cos(direction), x[1] + chord * np.sin(direction),
+                     x[2] + u[1] * dt])
     ### END SOLUTION
 
 
@@ -230,7 +242,8 @@ def control_covariance(u, dt, k_d, k_theta, k_drift):
 # %% propagate
 @ex.propagate
 def propagate(x, cov, u, dt, cov_u):
-    """Return pose (3,) and covariance (3, 3) after one step of the simplified model; cov (3, 3), cov_u (2, 2)."""
+    """Return pose (3,) and covariance (3, 3) after one step of the simplified model;
+    cov (3, 3), cov_u (2, 2)."""
     ### BEGIN SOLUTION
     F_x, F_u = jacobian_state(x, u, dt), jacobian_control(x, u, dt)
     return step_euler(x, u, dt), F_x @ cov @ F_x.T + F_u @ cov_u @ F_u.T
@@ -291,11 +304,14 @@ end_cov = ex.end_cov(end_cov)
 # %% what-k-means-code
 for dt in (0.5, 0.1, 0.02):
     cut = lecture.circle_drive(dt)
-    poses, covs = odometry.drive_with_covariance(np.zeros(3), np.zeros((3, 3)), cut.controls, dt, **cut.noise)
+    poses, covs = odometry.drive_with_covariance(np.zeros(3), np.zeros((3, 3)),
+                                                 cut.controls, dt, **cut.noise)
     fixed = control_covariance(cut.controls[0], 0.1, **cut.noise)
     wrong = np.sqrt(len(cut.controls) * dt**2 * fixed[1, 1])
-    position, heading = np.sqrt(np.trace(covs[-1][:2, :2])), np.degrees(np.sqrt(covs[-1][2, 2]))
-    print(f"T = {dt:4} s: position {position:.3f} m, heading {heading:.2f} deg; shortcut {np.degrees(wrong):5.2f} deg")
+    position = np.sqrt(np.trace(covs[-1][:2, :2]))
+    heading = np.degrees(np.sqrt(covs[-1][2, 2]))
+    print(f"T = {dt:4} s: position {position:.3f} m, heading {heading:.2f} deg; "
+          f"shortcut {np.degrees(wrong):5.2f} deg")
 
 # %% banana [markdown]
 # ## A promise, tested
@@ -319,12 +335,16 @@ ex.predict("banana", guess, reveal=stages.banana)
 
 # %% bend-code
 controls = drive.controls * [1.0, 0.0]
-poses, covs = odometry.drive_with_covariance(np.zeros(3), np.zeros((3, 3)), controls, drive.dt, **drive.noise)
+poses, covs = odometry.drive_with_covariance(np.zeros(3), np.zeros((3, 3)), controls,
+                                             drive.dt, **drive.noise)
 rng = np.random.default_rng(5)
-ends = odometry.sample_drives(np.zeros(3), controls, drive.dt, **drive.noise, rng=rng, runs=10_000)[-1]
+ends = odometry.sample_drives(np.zeros(3), controls, drive.dt, **drive.noise, rng=rng,
+                              runs=10_000)[-1]
 bent = gaussian.bent_region(poses[-1], ends)
-print(f"inside the 95 % ellipse:      {100 * gaussian.share_inside(ends, poses[-1], covs[-1]):.0f} %")
-print(f"inside the 95 % bent region:  {100 * gaussian.share_inside(bent.twists, bent.mean, bent.cov):.0f} %")
+straight = gaussian.share_inside(ends, poses[-1], covs[-1])
+curved = gaussian.share_inside(bent.twists, bent.mean, bent.cov)
+print(f"inside the 95 % ellipse:      {100 * straight:.0f} %")
+print(f"inside the 95 % bent region:  {100 * curved:.0f} %")
 print(f"mean of the ends lags behind: {100 * (poses[-1] - ends.mean(0))[0]:.0f} cm")
 
 # %% unlike-wheels [markdown]
@@ -338,7 +358,8 @@ print(f"mean of the ends lags behind: {100 * (poses[-1] - ends.mean(0))[0]:.0f} 
 # %% wheel_offset
 @ex.wheel_offset
 def wheel_offset(way, excess, track):
-    """Return how far to the left (m) the robot ends that counted `way` (m) straight on."""
+    """Return how far to the left (m) the robot ends that counted `way` (m) straight
+    on."""
     ### BEGIN SOLUTION
     turn = way * excess / track
     middle = way * (1 + excess / 2)
@@ -372,7 +393,8 @@ for way in (2.0, 14.0, 50.0):
 # %% ackermann_twist
 @ex.ackermann_twist
 def ackermann_twist(speed, steering, wheelbase):
-    """Return (v, omega) of the rear axle's middle; steering in rad, to the left positive."""
+    """Return (v, omega) of the rear axle's middle; steering in rad, to the left
+    positive."""
     ### BEGIN SOLUTION
     return np.array([speed, speed * np.tan(steering) / wheelbase])
     ### END SOLUTION
@@ -431,7 +453,8 @@ pair, robot = np.array([[0.0, 0.0], [6.0, 0.0]]), np.array([3.0, 2.0])
 distances = np.linalg.norm(pair - robot, axis=1)
 for start in ([4.0, 0.0], [4.0, 0.001], [4.0, -0.001]):
     search = lateration.newton_lateration(pair, distances, start)
-    print(f"from {start}: {search.position} after {len(search.path) - 1} steps. {search.reason}")
+    print(f"from {start}: {search.position} after {len(search.path) - 1} steps. "
+          f"{search.reason}")
 print(lateration.newton_lateration(pair, [1.0, 1.0], [3.0, 1.0]).reason)
 try:
     lateration.laterate(pair, distances)

@@ -24,7 +24,8 @@
 import numpy as np
 
 from labkit.chapters.ch08_kalman import stages
-from labkit.documents.lecture.examples import circle_course, predict_vehicle, reconstruct_vehicle
+from labkit.documents.lecture.examples import circle_course, predict_vehicle
+from labkit.documents.lecture.examples import reconstruct_vehicle
 from labkit.estimation import kalman
 from labkit.exercises import course
 from labkit.localization import ekf, odometry
@@ -45,7 +46,8 @@ np.set_printoptions(precision=4, suppress=True)
 # %% predict_state
 @ex.predict_state
 def predict_state(x, cov, A, B, u, cov_u):
-    """Return state (n,) and covariance (n, n) one time step later; u (k,), cov_u (k, k), B (n, k)."""
+    """Return state (n,) and covariance (n, n) one time step later; u (k,), cov_u (k,
+    k), B (n, k)."""
     ### BEGIN SOLUTION
     return A @ x + B @ u, A @ cov @ A.T + B @ cov_u @ B.T
     ### END SOLUTION
@@ -60,7 +62,8 @@ def predict_state(x, cov, A, B, u, cov_u):
 # %% update
 @ex.update
 def update(x, cov, z, C, cov_z):
-    """Return state and covariance after the measurement z, shape (m,), with C (m, n) and cov_z (m, m)."""
+    """Return state and covariance after the measurement z, shape (m,), with C (m, n)
+    and cov_z (m, m)."""
     ### BEGIN SOLUTION
     K = cov @ C.T @ np.linalg.inv(C @ cov @ C.T + cov_z)
     return x + K @ (z - C @ x), (np.eye(len(x)) - K @ C) @ cov
@@ -89,7 +92,8 @@ ex.predict("bell", guess, reveal=stages.bells)
 # %% fuse_two_sensors
 @ex.fuse_two_sensors
 def fuse_two_sensors(x0, var0, z, stds):
-    """Return position and variance from a prior (x0, var0), two measurements z (2,) and their stds (2,)."""
+    """Return position and variance from a prior (x0, var0), two measurements z (2,) and
+    their stds (2,)."""
     ### BEGIN SOLUTION
     weights = np.array([1 / var0, *(1 / stds**2)])
     return weights @ [x0, *z] / weights.sum(), 1 / weights.sum()
@@ -113,7 +117,8 @@ ex.fused(fused)
 # %% fused-readings
 z, stds = np.array([9.4, 10.6]), np.array([0.5, 1.0])
 readings = {"20 is a standard deviation": (0, 20**2, z), "no prior": (0, 1e12, z)}
-readings |= {"prior mean 10": (10, 20, z), "z[0] was 9.407, printed 9.4": (0, 20, z + [0.007, 0])}
+readings |= {"prior mean 10": (10, 20, z),
+             "z[0] was 9.407, printed 9.4": (0, 20, z + [0.007, 0])}
 for name, (x0, var0, values) in readings.items():
     x, var = fuse_two_sensors(x0, var0, values, stds)
     print(f"{name:28} x = {x:.4f}, rounds to {x:.1f}; variance {var:.3f}")
@@ -186,7 +191,8 @@ ex.corrected(corrected)
 # %% detective-code
 for n in (49, 50, 51, 52):
     var_x0, var_v0, var_a = reconstruct_vehicle(prior_cov, n, 0.1)
-    print(f"{n} steps of 0.1 s: starting variances {var_x0:.4f} and {var_v0:.4f}, acceleration {var_a:.4f}")
+    print(f"{n} steps of 0.1 s: starting variances {var_x0:.4f} and {var_v0:.4f}, "
+          f"acceleration {var_a:.4f}")
 x_51, cov_51 = predict_vehicle(51, 0.1, 1.0, 0.01, 0.16)
 result = kalman.update(x_51, cov_51, [11.79], [[1.0, 0.0]], [[0.25]])
 print("prediction after 51 steps at 1 m/s^2:", x_51, " corrected:", result.x)
@@ -217,7 +223,8 @@ def wrap_angle(angle):
 # %% measurement
 @ex.measurement
 def measurement(x, landmark):
-    """Return (distance, bearing), shape (2,), from the pose x (3,) to a landmark (2,); the bearing wrapped."""
+    """Return (distance, bearing), shape (2,), from the pose x (3,) to a landmark (2,);
+    the bearing wrapped."""
     ### BEGIN SOLUTION
     dx, dy = landmark - x[:2]
     return np.array([np.hypot(dx, dy), wrap_angle(np.arctan2(dy, dx) - x[2])])
@@ -246,7 +253,8 @@ def measurement_jacobian(x, landmark):
 # %% motion_jacobians
 @ex.motion_jacobians
 def motion_jacobians(x, u, dt):
-    """Return G_x (3, 3) and G_u (3, 2), the derivatives of the motion above by pose and control; u = (v, omega)."""
+    """Return G_x (3, 3) and G_u (3, 2), the derivatives of the motion above by pose and
+    control; u = (v, omega)."""
     ### BEGIN SOLUTION
     c, s = np.cos(x[2]), np.sin(x[2])
     G_x = np.array([[1, 0, -u[0] * dt * s], [0, 1, u[0] * dt * c], [0, 0, 1]])
@@ -261,22 +269,24 @@ def motion_jacobians(x, u, dt):
 # %% numeric-check-code
 def slopes(function, x, h=1e-6):
     """Central differences of function(x) by x, one column per coordinate."""
-    return np.column_stack([(function(x + h * e) - function(x - h * e)) / (2 * h) for e in np.eye(len(x))])
+    return np.column_stack([(function(x + h * e) - function(x - h * e)) / (2 * h)
+                            for e in np.eye(len(x))])
 
 
 x, u, landmark = np.array([0.5, -1.0, 2.0]), np.array([1.0, 0.4]), np.array([3.0, 2.0])
-pairs = {
-    "H": (measurement_jacobian(x, landmark), slopes(lambda x: measurement(x, landmark), x)),
-    "G_x": (motion_jacobians(x, u, 0.1)[0], slopes(lambda x: odometry.step(x, u, 0.1, "euler"), x)),
-    "G_u": (motion_jacobians(x, u, 0.1)[1], slopes(lambda u: odometry.step(x, u, 0.1, "euler"), u)),
-}
+H, (G_x, G_u) = measurement_jacobian(x, landmark), motion_jacobians(x, u, 0.1)
+pairs = {"H": (H, slopes(lambda x: measurement(x, landmark), x)),
+         "G_x": (G_x, slopes(lambda x: odometry.step(x, u, 0.1, "euler"), x)),
+         "G_u": (G_u, slopes(lambda u: odometry.step(x, u, 0.1, "euler"), u))}
 for name, (by_hand, numeric) in pairs.items():
-    print(f"{name:3} agrees with central differences to eight digits:", bool(np.abs(by_hand - numeric).max() < 1e-8))
+    print(f"{name:3} agrees with central differences to eight digits:",
+          bool(np.abs(by_hand - numeric).max() < 1e-8))
 
 # %% ekf_step
 @ex.ekf_step
 def ekf_step(x, cov, u, dt, cov_u, z, landmark, cov_z):
-    """Return pose and covariance after a step of the simplified model with u = (v, omega), and z = (distance, bearing).
+    """Return pose and covariance after a step of the simplified model with u = (v,
+    omega), and z = (distance, bearing).
 
     x (3,), cov (3, 3), cov_u (2, 2) of the control, landmark (2,), cov_z (2, 2) of z.
     """
@@ -315,7 +325,8 @@ ex.predict("wrapping", guess, reveal=stages.arena)
 # %% nees
 @ex.nees
 def nees(truth, x, cov):
-    """Return the normalized estimation error squared of a pose x (3,) with cov (3, 3); wrap the heading error."""
+    """Return the normalized estimation error squared of a pose x (3,) with cov (3, 3);
+    wrap the heading error."""
     ### BEGIN SOLUTION
     e = truth - x
     e[2] = wrap_angle(e[2])
@@ -328,7 +339,8 @@ four = circle_course(marks=4)
 drives = four.simulate(np.random.default_rng(1), runs=200)
 beliefs = {"as it is": {}, "bearing not wrapped": {"wrap": False}}
 beliefs["drive believed 3 times too good"] = {"cov_u": four.cov_u / 9}
-beliefs["sensor believed 3 times too good"] = {"std_range": four.std_range / 3, "std_bearing": four.std_bearing / 3}
+beliefs["sensor believed 3 times too good"] = {"std_range": four.std_range / 3,
+                                               "std_bearing": four.std_bearing / 3}
 low, high = kalman.mean_band(3, 200)
 print(f"mean NEES of 200 runs after 30 s; honest between {low:.2f} and {high:.2f}")
 for name, belief in beliefs.items():
@@ -358,13 +370,16 @@ ex.predict("precise", guess, reveal=stages.honesty)
 marks, std_range, std_bearing = stages.TWO_MARKS, 0.01, np.radians(0.2)
 cov, rng = np.diag([1.0, 1.0, np.radians(10) ** 2]), np.random.default_rng(4)
 prior = rng.standard_normal((200, 3)) * np.sqrt(np.diag(cov))
-z = ekf.measurement(np.zeros(3), marks) + rng.standard_normal((200, 2, 2)) * [std_range, std_bearing]
+noise = rng.standard_normal((200, 2, 2)) * [std_range, std_bearing]
+z = ekf.measurement(np.zeros(3), marks) + noise
 given = (prior, np.broadcast_to(cov, (200, 3, 3)), z, marks, std_range, std_bearing)
-filters = {"extended": ekf.ekf_update(*given), "unscented": ekf.unscented_update(*given)}
+filters = {"extended": ekf.ekf_update(*given),
+           "unscented": ekf.unscented_update(*given)}
 filters["iterated"] = ekf.ekf_update(*given, iterations=10)
 for name, step in filters.items():
     rms = 1000 * np.sqrt((step.x[:, :2] ** 2).sum(1).mean())
-    print(f"{name:10} RMS {rms:4.0f} mm, mean NEES {kalman.nees(np.zeros(3), step.x, step.cov, angle=2).mean():7.3g}")
+    print(f"{name:10} RMS {rms:4.0f} mm, mean NEES "
+          f"{kalman.nees(np.zeros(3), step.x, step.cov, angle=2).mean():7.3g}")
 
 # %% unscented-verdict [markdown]
 # Only the iterated filter is: accurate, and its NEES near 3. The unscented one is even farther off than the extended, but claims less: its points lie 1.7 standard deviations of a wide prior from the middle, too
@@ -381,7 +396,8 @@ for name, step in filters.items():
 # %% gate
 @ex.gate
 def gate(innovation, cov_innovation, limit):
-    """Return True where the innovation (m,) is plausible: its NIS, with the covariance (m, m), is below the limit."""
+    """Return True where the innovation (m,) is plausible: its NIS, with the covariance
+    (m, m), is below the limit."""
     ### BEGIN SOLUTION
     return bool(innovation @ np.linalg.solve(cov_innovation, innovation) <= limit)
     ### END SOLUTION
@@ -389,13 +405,16 @@ def gate(innovation, cov_innovation, limit):
 
 # %% association
 marks = np.array([[10.0, 0.0], [8.7, 1.6]])
-truth, cov = np.array([0.0, 0.0, np.radians(-8)]), np.diag([1e-4, 1e-4, np.radians(8) ** 2])
+truth = np.array([0.0, 0.0, np.radians(-8)])
+cov = np.diag([1e-4, 1e-4, np.radians(8) ** 2])
 z = ekf.measurement(truth, marks)
 believed = np.zeros(3)  # the filter thinks the robot looks straight ahead
 for by in ("nearest", "mahalanobis"):
-    print(f"{by:12} landmarks 0 and 1 are taken for", ekf.associate(believed, cov, z, marks, 0.05, 0.01, by=by))
+    print(f"{by:12} landmarks 0 and 1 are taken for",
+          ekf.associate(believed, cov, z, marks, 0.05, 0.01, by=by))
 stray = np.array([[4.0, 1.0]])
-print("a chair at 4 m is taken for", ekf.associate(believed, cov, stray, marks, 0.05, 0.01), "(-1: for nothing)")
+taken = ekf.associate(believed, cov, stray, marks, 0.05, 0.01)
+print("a chair at 4 m is taken for", taken, "(-1: for nothing)")
 
 # %% tracker [markdown]
 # ## Further: the tracker of chapter 6, filtered
@@ -407,7 +426,8 @@ print("a chair at 4 m is taken for", ekf.associate(believed, cov, stray, marks, 
 motion = simulation.simulate_motion("middle", np.random.default_rng(5))
 read, dt = motion.T_read[:, :3, 3], motion.time[1] - motion.time[0]
 truth = shift_time(motion.time, motion.T_true, -simulation.MOVING.latency)[:, :3, 3]
-A, B, C = (np.kron(M, np.eye(3)) for M in ([[1, dt], [0, 1]], [[dt**2 / 2], [dt]], [[1, 0]]))
+A, B, C = (np.kron(M, np.eye(3)) for M in ([[1, dt], [0, 1]], [[dt**2 / 2], [dt]],
+                                           [[1, 0]]))
 cov_z = 9.0 * np.eye(3)
 for std_a in (4000.0, 400.0):
     x, cov, off = np.array([*read[0], 0, 0, 0]), np.diag([9.0] * 3 + [1e6] * 3), []
@@ -416,7 +436,8 @@ for std_a in (4000.0, 400.0):
         if gate(z - C @ x, C @ cov @ C.T + cov_z, 16.27):
             x, cov = update(x, cov, z, C, cov_z)
         off.append(np.linalg.norm(x[:3] - position))
-    print(f"believed {std_a:4.0f} mm/s^2: median error {np.median(off):5.1f} mm, largest {max(off):5.0f} mm")
+    print(f"believed {std_a:4.0f} mm/s^2: median error {np.median(off):5.1f} mm, "
+          f"largest {max(off):5.0f} mm")
 
 # %% tracker-compare [markdown]
 # Unfiltered, the same readings are off by a median of 4 mm and by up to 500 mm. The honest filter keeps the median, which is systematic and which no filter sees, and removes the jumps. The
@@ -433,9 +454,11 @@ for dtype in (np.float64, np.float32):
     for form in ("short", "joseph"):
         P = np.array([[1e6]])
         for _ in range(2):
-            P = kalman.update([0.0], P, [0.0], [[1.0]], [[1e-3]], form=form, dtype=dtype).cov
+            P = kalman.update([0.0], P, [0.0], [[1.0]], [[1e-3]], form=form,
+                              dtype=dtype).cov
         right = abs(P[0, 0] - 0.0005) < 1e-6  # two readings: half the sensor's variance
-        print(f"{dtype.__name__} {form:7}", "variance 0.0005" if right else "what rounding left")
+        print(f"{dtype.__name__} {form:7}", "variance 0.0005" if right
+              else "what rounding left")
 
 # %% in-practice [markdown]
 # ## In practice

@@ -76,7 +76,8 @@ scanner = sensors.Scanner()
 pose = np.array([8.4, 2.4, 0.3])
 ranges, bearings = scanner.scan(grid, pose, np.random.default_rng(1), every=9)
 without_echo = np.sum(ranges == scanner.r_max)
-print(f"{len(scanner.bearings)} beams in a scan, {len(ranges)} of them used, {without_echo} without an echo")
+print(f"{len(scanner.bearings)} beams in a scan, {len(ranges)} of them used, "
+      f"{without_echo} without an echo")
 print(f"nearest obstacle {ranges.min():.2f} m, median {np.median(ranges):.2f} m")
 
 # %% algorithm [markdown]
@@ -95,7 +96,8 @@ print(f"nearest obstacle {ranges.min():.2f} m, median {np.median(ranges):.2f} m"
 # %% sample_motion
 @ex.sample_motion
 def sample_motion(states, u, dt, std_u, rng):
-    """Return states, shape (M, 3), moved by odometry.step(x, u, dt), each with its own noisy copy of u.
+    """Return states, shape (M, 3), moved by odometry.step(x, u, dt), each with its own
+    noisy copy of u.
 
     std_u, shape (2,): standard deviations of v and omega. Draw from rng.
     """
@@ -117,7 +119,8 @@ def sample_motion(states, u, dt, std_u, rng):
 # %% landmark_weight
 @ex.landmark_weight
 def landmark_weight(pose, z, landmarks, std_range, std_bearing):
-    """Return log p of z, shape (m, 2), ranges (m) and bearings (rad) to landmarks, shape (m, 2), seen from pose."""
+    """Return log p of z, shape (m, 2), ranges (m) and bearings (rad) to landmarks,
+    shape (m, 2), seen from pose."""
     ### BEGIN SOLUTION
     dx, dy = (landmarks - pose[:2]).T
     error_r = z[:, 0] - np.hypot(dx, dy)
@@ -154,14 +157,17 @@ ex.beams_to_zero(beams_to_zero)
 # %% cast_ray
 @ex.cast_ray
 def cast_ray(grid, pose, bearing, r_max):
-    """Return the distance (m) to the first occupied cell along a beam, r_max if there is none.
+    """Return the distance (m) to the first occupied cell along a beam, r_max if there
+    is none.
 
-    grid.at([x, y]) is maps.OCCUPIED there; maps.FREE and maps.UNKNOWN do not stop it. A cell is grid.resolution wide (m).
+    grid.at([x, y]) is maps.OCCUPIED there; maps.FREE and maps.UNKNOWN do not stop it. A
+    cell is grid.resolution wide (m).
     """
     ### BEGIN SOLUTION
     angle = pose[2] + bearing
     for r in np.arange(0, r_max, grid.resolution / 2):
-        if grid.at([pose[0] + r * np.cos(angle), pose[1] + r * np.sin(angle)]) == maps.OCCUPIED:
+        if grid.at([pose[0] + r * np.cos(angle),
+                    pose[1] + r * np.sin(angle)]) == maps.OCCUPIED:
             return r
     return r_max
     ### END SOLUTION
@@ -170,9 +176,11 @@ def cast_ray(grid, pose, bearing, r_max):
 # %% beam_weight
 @ex.beam_weight
 def beam_weight(ranges, expected, std):
-    """Return log p of measured ranges, shape (B,), given the expected ones: the product of N(0, std^2)(d - d*)."""
+    """Return log p of measured ranges, shape (B,), given the expected ones: the product
+    of N(0, std^2)(d - d*)."""
     ### BEGIN SOLUTION
-    return np.sum(-0.5 * ((ranges - expected) / std) ** 2 - np.log(std * np.sqrt(2 * np.pi)))
+    return np.sum(-0.5 * ((ranges - expected) / std) ** 2
+                  - np.log(std * np.sqrt(2 * np.pi)))
     ### END SOLUTION
 
 
@@ -189,7 +197,8 @@ def beam_weight(ranges, expected, std):
 def distance_field_weight(grid, pose, ranges, bearings, std):
     """Return log p: the sum of log N(0, std^2) over the distances of the end points.
 
-    grid.cell_of(points), points of shape (B, 2), gives the rows and columns of their cells in grid.distance (m).
+    grid.cell_of(points), points of shape (B, 2), gives the rows and columns of their
+    cells in grid.distance (m).
     All end points of the checks lie on the map.
     """
     ### BEGIN SOLUTION
@@ -221,7 +230,8 @@ ex.predict("field", guess, reveal=stages.field_against_beams)
 # %% resample_roulette
 @ex.resample_roulette
 def resample_roulette(weights, rng):
-    """Return M indices, each drawn independently with probability w / W; weights, shape (M,), have any sum W."""
+    """Return M indices, each drawn independently with probability w / W; weights, shape
+    (M,), have any sum W."""
     ### BEGIN SOLUTION
     ends = np.cumsum(weights)
     return np.searchsorted(ends, rng.random(len(weights)) * ends[-1], side="right")
@@ -231,7 +241,8 @@ def resample_roulette(weights, rng):
 # %% resample_systematic
 @ex.resample_systematic
 def resample_systematic(weights, rng):
-    """Return M indices by one random turn of a wheel with M evenly spaced spokes; weights, shape (M,), have any sum."""
+    """Return M indices by one random turn of a wheel with M evenly spaced spokes;
+    weights, shape (M,), have any sum."""
     ### BEGIN SOLUTION
     ends, M = np.cumsum(weights), len(weights)
     spokes = (rng.random() + np.arange(M)) * ends[-1] / M
@@ -262,7 +273,8 @@ ex.predict("standing", guess, reveal=stages.standing)
 # %% effective_size
 @ex.effective_size
 def effective_size(weights):
-    """Return how many equal weights these weights, shape (M,), of any sum, are worth."""
+    """Return how many equal weights these weights, shape (M,), of any sum, are
+    worth."""
     ### BEGIN SOLUTION
     return weights.sum() ** 2 / (weights**2).sum()
     ### END SOLUTION
@@ -271,7 +283,8 @@ def effective_size(weights):
 # %% should_resample
 @ex.should_resample
 def should_resample(weights, threshold):
-    """Return True when the effective size is below the share `threshold` of the number of particles."""
+    """Return True when the effective size is below the share `threshold` of the number
+    of particles."""
     ### BEGIN SOLUTION
     return effective_size(weights) < threshold * len(weights)
     ### END SOLUTION
@@ -299,20 +312,25 @@ stages.twelve_pictures()
 # %% circular_mean
 @ex.circular_mean
 def circular_mean(angles, weights):
-    """Return the weighted mean direction (rad) of angles (rad), shape (n,), with weights, shape (n,), of any sum."""
+    """Return the weighted mean direction (rad) of angles (rad), shape (n,), with
+    weights, shape (n,), of any sum."""
     ### BEGIN SOLUTION
-    return np.arctan2(np.sum(weights * np.sin(angles)), np.sum(weights * np.cos(angles)))
+    return np.arctan2(np.sum(weights * np.sin(angles)),
+                      np.sum(weights * np.cos(angles)))
     ### END SOLUTION
 
 
 # %% mean-in-the-wall
 rng = np.random.default_rng(2)
 rooms = np.array([[10.0, 1.5, 0.0], [12.0, 1.5, 0.0]])
-cloud = np.concatenate([rooms[0] + rng.normal(0, 0.2, (600, 3)), rooms[1] + rng.normal(0, 0.2, (600, 3))])
+cloud = np.concatenate([rooms[0] + rng.normal(0, 0.2, (600, 3)),
+                        rooms[1] + rng.normal(0, 0.2, (600, 3))])
 mean, mode = particles.estimate(cloud).pose, particles.estimate_mode(cloud).pose
 words = ("free", "occupied", "unknown")
-print(f"mean of all          x = {mean[0]:.1f}, y = {mean[1]:.1f}, cell {words[int(grid.at(mean[:2]))]}")
-print(f"heaviest cluster     x = {mode[0]:.1f}, y = {mode[1]:.1f}, cell {words[int(grid.at(mode[:2]))]}")
+print(f"mean of all          x = {mean[0]:.1f}, y = {mean[1]:.1f}, cell "
+      f"{words[int(grid.at(mean[:2]))]}")
+print(f"heaviest cluster     x = {mode[0]:.1f}, y = {mode[1]:.1f}, cell "
+      f"{words[int(grid.at(mode[:2]))]}")
 
 # %% soccer [markdown]
 # ## Against the document: the soccer field
@@ -352,7 +370,8 @@ ex.predict("kidnap", guess, reveal=stages.arena)
 # %% recover
 @ex.recover
 def recover(w_mean, w_slow, w_fast, alpha_slow, alpha_fast):
-    """Return three numbers: the share of random particles, then w_slow and w_fast, w += alpha * (w_mean - w) each."""
+    """Return three numbers: the share of random particles, then w_slow and w_fast, w +=
+    alpha * (w_mean - w) each."""
     ### BEGIN SOLUTION
     w_slow = w_slow + alpha_slow * (w_mean - w_slow)
     w_fast = w_fast + alpha_fast * (w_mean - w_fast)
@@ -371,7 +390,8 @@ table = read_table("monte_carlo/success.csv", text=("task", "model"))
 columns = ("task", "model", "successes", "low", "high", "median_steps")
 for task, model, good, low, high, steps in zip(*(table[name] for name in columns)):
     interval = f"95 % interval {100 * low:3.0f} to {100 * high:3.0f} %"
-    print(f"{task:10} {model:17} {good:3.0f} of 100 found   {interval}   median {steps:4.1f} steps")
+    print(f"{task:10} {model:17} {good:3.0f} of 100 found   {interval}   median "
+          f"{steps:4.1f} steps")
 
 # %% beyond [markdown]
 # ## Beyond the document: fewer particles when fewer will do
@@ -392,9 +412,11 @@ drive = drives.random_drive(building, noise, 30, rng, start="hall")
 motion = particles.odometry_motion(**noise)
 kld = particles.KldSampling(n_min=2000, epsilon=0.005)
 robot = mcl.localizer(grid, motion, 5000, rng, adaptive=kld)
-run = mcl.record(robot, drive, lambda pose, k: suite.measure("likelihood field", pose, rng), rng)
+run = mcl.record(robot, drive, lambda pose, k: suite.measure("likelihood field", pose,
+                                                             rng), rng)
 error = np.hypot(*(run[-1].estimate - run[-1].truth)[:2])
-print("particles before steps 1, 2, 5, 10, 30:", [len(run[k].states) for k in (0, 1, 4, 9, 29)])
+print("particles before steps 1, 2, 5, 10, 30:",
+      [len(run[k].states) for k in (0, 1, 4, 9, 29)])
 turn = abs(planar.wrap_angle(run[-1].estimate[2] - run[-1].truth[2]))
 print("found" if error < 0.3 and turn < np.deg2rad(10) else "lost", "at the end")
 
@@ -413,7 +435,8 @@ print(inspect.getsource(specimens.specimen_1))
 
 @ex.hunt_1
 def hunt_1(resample, rng):
-    """Return True if resample(weights, rng) draws each index in proportion to its weight, False otherwise."""
+    """Return True if resample(weights, rng) draws each index in proportion to its
+    weight, False otherwise."""
     ### BEGIN SOLUTION
     weights = np.array([0.1, 0.7, 0.1, 0.1])
     index = np.concatenate([resample(weights, rng) for _ in range(1000)])
@@ -427,7 +450,8 @@ print(inspect.getsource(specimens.specimen_2))
 
 @ex.hunt_2
 def hunt_2(resample, rng):
-    """Return True if even the lightest of many particles get their share, False otherwise."""
+    """Return True if even the lightest of many particles get their share, False
+    otherwise."""
     ### BEGIN SOLUTION
     weights = np.array([0.5, 0.25, 0.05, 0.05, 0.03, 0.03, 0.03, 0.02, 0.02, 0.02])
     index = np.concatenate([resample(weights, rng) for _ in range(1000)])
@@ -441,13 +465,15 @@ print(inspect.getsource(specimens.specimen_3))
 
 @ex.hunt_3
 def hunt_3(resample, rng):
-    """Return True if weights whose sum is rounded a little below 1 do no harm, False otherwise.
+    """Return True if weights whose sum is a little below 1 do no harm, else False.
 
-    Harm is an IndexError, which your test has to catch, or an index beyond the last particle.
+    Harm is an IndexError, which your test has to catch, or an index beyond the last
+    particle.
     """
     ### BEGIN SOLUTION
     try:
-        return all(resample(np.full(1000, 0.000999), rng).max() < 1000 for _ in range(20))
+        return all(resample(np.full(1000, 0.000999), rng).max() < 1000
+                   for _ in range(20))
     except IndexError:
         return False
     ### END SOLUTION
@@ -459,7 +485,8 @@ print(inspect.getsource(specimens.specimen_4))
 
 @ex.hunt_4
 def hunt_4(weigh):
-    """Return True if weigh(states, ranges, landmarks, std) treats two readings as independent, False otherwise.
+    """Return True if weigh(states, ranges, landmarks, std) treats two readings as
+    independent, False otherwise.
 
     Only ratios of weights count: a common factor is no fault.
     """
@@ -481,12 +508,14 @@ def hunt_4(weigh):
 # %% break-it-code
 lost = ranges.copy()
 lost[0] = scanner.r_max
-plain = sensors.weigh_beams(suite.ranges, lost, bearings, 0.2, scanner.r_max, shares=(1, 0, 0, 0))
+plain = sensors.weigh_beams(suite.ranges, lost, bearings, 0.2, scanner.r_max,
+                            shares=(1, 0, 0, 0))
 mixture = sensors.weigh_beams(suite.ranges, lost, bearings, 0.2, scanner.r_max)
 for name, weigh in (("plain", plain), ("mixture", mixture)):
     near = mcl.MonteCarloLocalizer(pose + rng.normal(0, 0.05, (500, 3)), motion)
     step = near.correct(weigh, rng)
-    print(f"{name:8} all weights zero: {step.all_zero}   scan used: {not step.all_zero}")
+    print(f"{name:8} all weights zero: {step.all_zero}   scan used: "
+          f"{not step.all_zero}")
 try:
     particles.normalize_weights(np.full(5, -np.inf))
 except ValueError as refusal:

@@ -59,7 +59,8 @@ ex.predict("digits", guess, reveal=partial(LedgerTable, found))
 # %% half_unit
 @ex.half_unit
 def half_unit(printed):
-    """Return half a unit in the last digit of a printed number, a string such as "1.010000", "-0,5", "12" or "3e-4"."""
+    """Return half a unit in the last digit of a printed number, a string such as
+    "1.010000", "-0,5", "12" or "3e-4"."""
     ### BEGIN SOLUTION
     number, _, exponent = printed.partition("e")
     decimals = len(number.replace(",", ".").partition(".")[2])
@@ -79,7 +80,8 @@ def half_unit(printed):
 # %% status
 @ex.status
 def status(printed, value, bound, misprint, simulated):
-    """Return the word for a printed string, a computed value and its bound; the other two are True or False."""
+    """Return the word for a printed string, a computed value and its bound; the other
+    two are True or False."""
     ### BEGIN SOLUTION
     half, off = half_unit(printed) + 1e-9, abs(value - float(printed.replace(",", ".")))
     if simulated:
@@ -127,12 +129,15 @@ HTML(pages.findings_html(found, pages.OPEN))
 # %% break-it-code
 from dataclasses import replace
 
-rows = [entry.row for entry in found if entry.status == "reproduced" and entry.row.printed.startswith("0.99")][:3]
+rows = [entry.row for entry in found if entry.status == "reproduced"]
+rows = [row for row in rows if row.printed.startswith("0.99")][:3]
 for row in rows:
-    other = replace(row, printed=row.printed[:-1] + str((int(row.printed[-1]) + 5) % 10))
+    other = replace(row, printed=row.printed[:-1]
+                    + str((int(row.printed[-1]) + 5) % 10))
     computed = ledger.compute(row)
     words = ledger.judge(row, computed), ledger.judge(other, computed)
-    print(f"{row.id:20} printed {row.printed}: {words[0]}, if it were {other.printed}: {words[1]}")
+    print(f"{row.id:20} printed {row.printed}: {words[0]}, if it were {other.printed}: "
+          f"{words[1]}")
 
 # %% in-practice [markdown]
 # ## In practice

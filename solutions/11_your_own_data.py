@@ -322,7 +322,8 @@ for measured, added in redundancy.checks():
 # %% documents-seen-code
 sizes, limit = redundancy.misprints_seen()
 seen = sum(size > limit for size in sizes.values())
-print(f"thesis: {seen} of {len(sizes)} wrong rows lie beyond {limit:.1f} std from the others,")
+print(f"thesis: {seen} of {len(sizes)} wrong rows lie beyond {limit:.1f} std from "
+      "the others,")
 print(f"  the least of them at {min(sizes.values()):.0f}")
 by_runs, by_average = redundancy.averages_seen()
 print(f"report: the wrong entry of run 3 lies {by_runs:.0f} std from the other runs;")

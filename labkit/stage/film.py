@@ -23,7 +23,7 @@ QUICKEST, SLOWEST = 60, 160  # ms from picture to picture
 REACH = 0.17  # half axes of a handle's loop, as a share of its axes
 MOVED = 0.004  # share of the picture a handle must move to count as moved
 ORBIT_PIXELS = 20  # pixels of dragging from picture to picture of a view: 10 degrees
-COLORS = 256
+COLORS, NEAR = 256, 4
 LARGEST, FEWEST = 400_000, 12  # bytes of a track; a larger one loses every second picture, down to so many
 FAIL = "Make it fail"
 PLAYS = ("play", FAIL)
@@ -270,54 +270,60 @@ def _only(table, names):
 class _Negatives:
     """Pictures as numbers of colors, each color of light paper together with its twin on dark paper.
 
-    New colors are looked for only where a picture differs from the one before.
+    New colors are looked for only where a picture differs from the one before; those nearer than NEAR have one number,
+    and the mean of their pixels.
     """
 
     def __init__(self):
-        self.known, self.numbers, self.counts = np.empty(0, np.int64), np.empty(0, np.uint16), np.empty(0)
+        self.known, self.numbers = np.empty(0, np.int64), np.empty(0, np.uint32)
+        self.counts, self.sums = np.empty(0), np.empty((0, 6))
         self.before = None
 
     def develop(self, light, dark):
-        """The numbers of a picture's colors, shape (height, width), uint16."""
-        pair = [theme[..., :3].astype(np.int64) @ [65536, 256, 1] for theme in (light, dark)]
-        keys = (pair[0] << 24) | pair[1]
+        """The numbers of a picture's colors, shape (height, width)."""
+        keys = _packed(np.concatenate([light[..., :3], dark[..., :3]], -1))
         if self.before is None:
-            self.before = np.full_like(keys, -1), np.zeros(keys.shape, np.uint16)
+            self.before = np.full_like(keys, -1), np.zeros(keys.shape, np.uint32)
         changed = keys != self.before[0]
         found, inverse, counts = np.unique(keys[changed], return_inverse=True, return_counts=True)
         picture = self.before[1].copy()
-        picture[changed] = self._numbered(found, counts)[inverse]
+        picture[changed] = self._numbered(_unpacked(found), counts)[inverse]
         self.before = keys, picture
         return picture
 
-    def _numbered(self, found, counts):
-        """The numbers of colors, given in order; new ones get the next."""
-        new = np.setdiff1d(found, self.known, assume_unique=True)
-        if len(self.known) + len(new) > 65536:
-            raise ValueError("a Stage has more than 65536 pairs of colors, which is too many for a film")
-        numbers = np.concatenate(
-            [self.numbers, np.arange(len(self.known), len(self.known) + len(new), dtype=np.uint16)]
-        )
+    def _numbered(self, colors, counts):
+        """The numbers of colors, shape (n, 6); new ones get the next."""
+        coarse = _packed((colors + NEAR // 2) // NEAR)
+        new = np.setdiff1d(coarse, self.known)
         known = np.concatenate([self.known, new])
         order = np.argsort(known)
-        self.known, self.numbers = known[order], numbers[order]
+        numbers = np.arange(len(self.known), len(known), dtype=np.uint32)
+        self.known, self.numbers = known[order], np.concatenate([self.numbers, numbers])[order]
         self.counts = np.concatenate([self.counts, np.zeros(len(new))])
-        at = self.numbers[np.searchsorted(self.known, found)]
-        self.counts[at] += counts
+        self.sums = np.concatenate([self.sums, np.zeros((len(new), 6))])
+        at = self.numbers[np.searchsorted(self.known, coarse)]
+        np.add.at(self.counts, at, counts)
+        np.add.at(self.sums, at, counts[:, None] * colors)
         return at
 
     def colors(self):
         """((light, dark), chosen): at most COLORS pairs of colors, each theme of shape (n, 3), uint8, and which of them
         stands for each number.
         """
-        keys = np.empty(len(self.known), np.int64)
-        keys[self.numbers] = self.known
-        rgb = np.stack([(keys >> shift) & 255 for shift in (40, 32, 24, 16, 8, 0)], -1).astype(float)
-        chosen = _grouped(rgb, self.counts, COLORS)
+        chosen = _grouped(self.sums / self.counts[:, None], self.counts, COLORS)
         weights = np.bincount(chosen, self.counts)[:, None]
-        mean = np.stack([np.bincount(chosen, self.counts * rgb[:, k]) for k in range(6)], -1) / weights
+        mean = np.stack([np.bincount(chosen, sums) for sums in self.sums.T], -1) / weights
         mean = mean.round().astype(np.uint8)
         return (mean[:, :3], mean[:, 3:]), chosen.astype(np.uint8)
+
+
+def _packed(colors):
+    """Colors, shape (..., 6), as one number each."""
+    return sum(colors[..., k].astype(np.int64) << shift for k, shift in enumerate((40, 32, 24, 16, 8, 0)))
+
+
+def _unpacked(keys):
+    return np.stack([(keys >> shift) & 255 for shift in (40, 32, 24, 16, 8, 0)], -1)
 
 
 def _grouped(points, weights, count):

@@ -1,0 +1,157 @@
+"""Every Stage in four sizes and two themes: `python tests/browser/contact_sheets.py OUT [NN ...] [--fail]`.
+
+Writes OUT/NN-light.png and OUT/NN-dark.png, a row a Stage and a column a size, and names what is cut or does not fit.
+The page is `stage.js` with Python behind it, as everywhere; it needs a Chromium, no JupyterLab.
+"""
+
+import argparse
+import base64
+import importlib
+import io
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "browser")]
+
+import driver  # noqa: E402
+import nbformat  # noqa: E402
+from PIL import Image, ImageDraw  # noqa: E402
+
+from labkit.book.notebook import stages_of  # noqa: E402
+from labkit.exercises import source  # noqa: E402
+
+SIZES = {  # width and height in CSS pixels, device pixels a CSS pixel
+    "a cell at 1440x900": (1150, 780, 1),
+    "1280x720 at 150 %": (700, 359, 1.5),
+    "half a screen, 900 px": (620, 650, 1),
+    "a phone": (360, 640, 2),
+}
+COLUMN, GAP, HEAD = 560, 12, 26  # pixels of a sheet
+COLORS = {False: ("#ffffff", "#1a1a1a"), True: ("#111111", "#e8e8e8")}
+MODEL = """
+window.show = (declaration) => {
+  const hears = new Set();
+  const model = {
+    get: (key) => (key === "declaration" ? declaration : undefined),
+    on: (kind, hear) => { if (kind === "msg:custom") hears.add(hear); },
+    off: (kind, hear) => hears.delete(hear),
+    send: async (message) => {
+      for (const [said, files] of await window.toPython(message)) {
+        const buffers = files.map((file) => new DataView(Uint8Array.from(atob(file), (c) => c.charCodeAt(0)).buffer));
+        for (const hear of hears) hear(said, buffers);
+      }
+    },
+  };
+  document.body.replaceChildren();
+  window.close_?.();
+  window.close_ = render({ model, el: document.body });
+};
+"""
+CUT = """() => {
+  const stage = document.querySelector(".labkit-stage");
+  const box = stage.getBoundingClientRect();
+  const said = [];
+  if (box.height > innerHeight + 1) said.push(`${Math.round(box.height - innerHeight)} px too high`);
+  for (const node of stage.querySelectorAll("*")) {
+    const its = node.getBoundingClientRect();
+    if (its.width && its.right > box.right + 1 && !node.matches(".handle, .spoken, .hint")) said.push(`${node.className || node.tagName} sticks out`);
+  }
+  return [...new Set(said)];
+}"""  # fmt: skip # noqa: E501
+
+
+class Bridge:
+    """A Stage behind a page: messages of the page in, what it sends back out."""
+
+    def __init__(self):
+        self.stage, self.said = None, []
+
+    def show(self, page, stage):
+        self.stage = stage
+        stage.connect(lambda message, buffers: self.said.append((message, buffers)))
+        page.evaluate("declaration => window.show(declaration)", stage.declaration())
+        page.locator(".labkit-stage[data-picture]").wait_for(timeout=20_000)
+        page.wait_for_timeout(450)
+
+    def __call__(self, message):
+        self.stage.receive(message)
+        said, self.said = self.said, []
+        return [[told, [base64.b64encode(file).decode() for file in files]] for told, files in said]
+
+
+def stages(numbers):
+    """{stem: [names]} of the Stages that the solved notebooks show."""
+    found = {}
+    for path in [source.find(number) for number in numbers] or source.sources():
+        names = list(stages_of(nbformat.read(path.with_suffix(".ipynb"), as_version=4)).values())
+        if names:
+            found[path.stem] = names
+    return found
+
+
+def shots(found, dark, size, fail):
+    """{(stem, name): (picture, what is cut)} in one theme and size."""
+    width, height, ratio = SIZES[size]
+    script = (ROOT / "labkit" / "stage" / "stage.js").read_text(encoding="utf-8").replace("export default", "//")
+    paper, words = COLORS[dark]
+    made, bridge = {}, Bridge()
+    with driver.page_of(driver.find_browser(), dark, width, height, ratio) as page:
+        page.expose_function("toPython", bridge)
+        page.set_content("<!DOCTYPE html><title>sheets</title><body></body>")
+        look = f"body {{ margin: 0; background: {paper}; color: {words}; --words: {words}; --paper: {paper}; }}"
+        theme = f":root {{ color-scheme: {'dark' if dark else 'light'}; --jp-content-font-color1: {words}; }}"
+        page.add_style_tag(content=(ROOT / "labkit/stage/stage.css").read_text(encoding="utf-8") + look + theme)
+        page.add_script_tag(content=f"{{{script}{MODEL}}}")
+        for stem, names in found.items():
+            module = importlib.import_module(f"labkit.chapters.ch{stem}.stages")
+            for name in names:
+                stage = getattr(module, name)()
+                if fail:
+                    stage.make_it_fail()
+                bridge.show(page, stage)
+                picture = page.locator(".labkit-stage").screenshot()
+                made[stem, name] = Image.open(io.BytesIO(picture)).convert("RGB"), page.evaluate(CUT)
+        if page.complaints:
+            print("console:", *page.complaints, sep="\n  ")
+    return made
+
+
+def sheet(rows):
+    """One picture of [(title, [pictures])], a row each."""
+    small = [
+        (title, [p.resize((COLUMN, round(p.height * COLUMN / p.width)), Image.LANCZOS) for p in pictures])
+        for title, pictures in rows
+    ]
+    heights = [HEAD + max(p.height for p in pictures) + GAP for _, pictures in small]
+    whole = Image.new("RGB", (len(SIZES) * (COLUMN + GAP), sum(heights)), "#808080")
+    pen, top = ImageDraw.Draw(whole), 0
+    for (title, pictures), height in zip(small, heights):
+        for column, picture in enumerate(pictures):
+            pen.text((column * (COLUMN + GAP) + 4, top + 6), f"{title}: {list(SIZES)[column]}", fill="white")
+            whole.paste(picture, (column * (COLUMN + GAP), top + HEAD))
+        top += height
+    return whole
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("chapters", nargs="*")
+    parser.add_argument("--fail", action="store_true", help='after "Make it fail"')
+    options = parser.parse_args()
+    options.folder.mkdir(parents=True, exist_ok=True)
+    found = stages(options.chapters)
+    for dark in (False, True):
+        made = {size: shots(found, dark, size, options.fail) for size in SIZES}
+        for stem, names in found.items():
+            rows = [(name, [made[size][stem, name][0] for size in SIZES]) for name in names]
+            sheet(rows).save(options.folder / f"{stem[:2]}-{'dark' if dark else 'light'}.png")
+            for size in SIZES:
+                for name in names:
+                    for said in made[size][stem, name][1]:
+                        print(f"{stem} {name}, {size}: {said}")
+
+
+if __name__ == "__main__":
+    main()
