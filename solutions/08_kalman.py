@@ -24,8 +24,8 @@
 import numpy as np
 
 from labkit.chapters.ch08_kalman import stages
-from labkit.documents.lecture.examples import circle_course, predict_vehicle
-from labkit.documents.lecture.examples import reconstruct_vehicle
+from labkit.documents.lecture.examples import (circle_course, predict_vehicle,
+                                               reconstruct_vehicle)
 from labkit.estimation import kalman
 from labkit.exercises import course
 from labkit.localization import ekf, odometry
