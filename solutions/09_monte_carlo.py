@@ -145,6 +145,21 @@ while p > 0:
 ### END SOLUTION
 ex.beams_to_zero(beams_to_zero)
 
+# %% in-logarithms [markdown]
+# The remedy: keep logarithms and add. Only at the end weights are wanted, and there the sum
+# of exponentials must not underflow either. Write it so that it survives logarithms about
+# −2000 and +900, and particles that are impossible (−∞).
+
+# %% log_sum_exp
+@ex.log_sum_exp
+def log_sum_exp(log_weights):
+    """Return log(sum(exp(log_weights))), log_weights of shape (M,)."""
+    ### BEGIN SOLUTION
+    top = log_weights.max()
+    return top + np.log(np.exp(log_weights - top).sum())
+    ### END SOLUTION
+
+
 # %% beams [markdown]
 # A scan has 541. With all weights zero there is nothing to draw from. A sum of *log densities*, each from its formula, stays finite (the logarithm of a density that has become zero does not:
 # it is $-\infty$). Subtracting the largest sum first makes the best particle weigh $e^0 = 1$ (`particles.normalize_weights`).
@@ -290,6 +305,45 @@ def should_resample(weights, threshold):
     ### END SOLUTION
 
 
+# %% every-nth [markdown]
+# ### In every $N$-th step (*further*)
+#
+# The slide's own remedy: resample in every $N$-th step only. In between "werden die Gewichte
+# je Partikel nur aufmultipliziert", and the resampling draws by the product.
+
+# %% multiply_weights
+@ex.multiply_weights
+def multiply_weights(weights, likelihood, step, n):
+    """Return (weights, resample): after this measurement, sum 1; True in every n-th step.
+
+    weights, likelihood: shape (M,); step counts from 1.
+    """
+    ### BEGIN SOLUTION
+    product = weights * likelihood
+    return product / product.sum(), step % n == 0
+    ### END SOLUTION
+
+
+# %% every-nth-code [markdown]
+# A robot stands still for 120 steps, its sensor tells nothing: all likelihoods are equal. How
+# many of 500 particles have descendants left? **Guess before you run it**, for $N$ = 1, 10, 40.
+
+# %% descendants
+for n in (1, 10, 40):
+    rng, alive = np.random.default_rng(3), np.arange(500)
+    weights = np.full(500, 1 / 500)
+    for step in range(1, 121):
+        weights, resample = multiply_weights(weights, np.ones(500), step, n)
+        if resample:
+            alive = alive[resample_roulette(weights, rng)]
+            weights = np.full(500, 1 / 500)
+    print(f"N = {n:2}: descendants of {len(set(alive.tolist())):3} particles are left")
+
+# %% every-nth-said [markdown]
+# Fewer draws, fewer losses. And the price: between two resamplings the weight gathers on few
+# particles, while the others are moved and weighed for nothing. The filter of the arena
+# composes both: `mcl.every(n) & mcl.when_effective_below(share)`.
+
 # %% together [markdown]
 # ## All together: twelve pictures
 #
@@ -392,6 +446,42 @@ for task, model, good, low, high, steps in zip(*(table[name] for name in columns
     interval = f"95 % interval {100 * low:3.0f} to {100 * high:3.0f} %"
     print(f"{task:10} {model:17} {good:3.0f} of 100 found   {interval}   median "
           f"{steps:4.1f} steps")
+
+# %% camera [markdown]
+# ## With a depth camera instead (*further*)
+#
+# The lecture's other sensor is an RGBD camera (*RGBD-Kamera*, Asus Xtion): 640 columns over
+# 58°, depths from 0.8 to 3.5 m. One row of its picture is a scan, once two things are
+# mended. A depth counts along the optical axis, not along the ray; and columns are evenly
+# spaced on the picture, not in angle. Of $n$ columns number $k$, counted from 0, reaches from
+# $k/n$ to $(k + 1)/n$ of the picture's width, from the left; its bearing is that of its middle.
+
+# %% scan_from_depth
+@ex.scan_from_depth
+def scan_from_depth(depth, field_of_view, near, far):
+    """Return (ranges, bearings) of the columns seen, depth of shape (n,) from left to right.
+
+    A column is seen when its depth is from near to far. Bearings are positive to the left.
+    """
+    ### BEGIN SOLUTION
+    n = len(depth)
+    u = (n / 2 - 0.5 - np.arange(n)) / (n / 2)
+    bearings = np.arctan(u * np.tan(field_of_view / 2))
+    seen = (depth >= near) & (depth <= far)
+    return (depth / np.cos(bearings))[seen], bearings[seen]
+    ### END SOLUTION
+
+
+# %% camera-code
+poses = particles.uniform_states(grid, 400, np.random.default_rng(2))
+for name, one in (("laser", sensors.Scanner()), ("camera", sensors.XTION)):
+    echo = grid.cast(poses, one.bearings[::9], one.r_max) < one.r_max
+    print(f"{name}: {100 * echo.mean():.0f} % of the beams meet a wall")
+
+# %% camera-said [markdown]
+# In the table above the rows *camera* are the global localization with it: the same filter,
+# the same particles, the same 60 steps. **Where does the difference come from**, from the
+# reach or from the opening angle? Make a `sensors.Scanner` that has one of both, and look.
 
 # %% beyond [markdown]
 # ## Beyond the document: fewer particles when fewer will do

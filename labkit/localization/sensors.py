@@ -453,6 +453,47 @@ class Scanner:
         return np.clip(ranges, 0.0, self.r_max), bearings
 
 
+XTION = Scanner(r_max=3.5, field_of_view_deg=58.0, resolution_deg=58.0 / 640)  # lecture, "RGBD-Kamera": one row of it
+
+
+def scan_from_depth(depth, field_of_view, near=0.8, far=3.5):
+    """Ranges and bearings that a row of a depth camera holds; the defaults are those the lecture gives for the Xtion.
+
+    A depth is measured along the optical axis, so the range of a column is depth / cos(bearing); columns are evenly
+    spaced on the picture, f tan(bearing) from its middle, not in angle.
+
+    Parameters
+    ----------
+    depth : array-like, shape (n,)
+        Of each column, from left to right (m); 0 where the camera saw nothing.
+    field_of_view : float
+        Opening angle of the whole row (rad), below pi.
+    near, far : float
+        Depths that the camera measures (m); other columns are left out.
+
+    Returns
+    -------
+    ranges, bearings : arrays, shape (m,)
+        m and rad, positive to the left.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, an opening angle of a half turn or more, limits that are not ordered.
+
+    Source: lecture, "RGBD-Kamera": 640 columns, 58 deg, 0.8 to 3.5 m.
+    """
+    depth, field_of_view = as_shape(depth, "depth", "n"), as_positive_number(field_of_view, "field_of_view")
+    near, far = as_positive_number(near, "near"), as_positive_number(far, "far")
+    if field_of_view >= math.pi or near >= far:
+        raise ValueError("field_of_view must be less than pi, and near less than far")
+    n = len(depth)
+    offset = (n / 2 - 0.5 - np.arange(n)) / (n / 2)  # of the columns' middles, 1 at the left edge
+    bearings = np.arctan(offset * math.tan(field_of_view / 2))
+    seen = (depth >= near) & (depth <= far)
+    return (depth / np.cos(bearings))[seen], bearings[seen]
+
+
 class SensorSuite:
     """The three sensor models in one building: measures in the world, weighs by the robot's map.
 

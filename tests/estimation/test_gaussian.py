@@ -31,3 +31,10 @@ def test_an_ellipse_runs_once_around_at_one_distance():
     np.testing.assert_allclose(outline[0], outline[-1])
     turned = np.unwrap(np.arctan2(off[:, 1], off[:, 0]))
     assert abs(turned[-1] - turned[0]) == pytest.approx(2 * np.pi) and np.abs(np.diff(turned)).max() < 0.4
+
+
+def test_axes_that_are_too_long_are_cut_and_the_others_left():
+    R = np.array([[0.6, -0.8], [0.8, 0.6]])
+    cov = R @ np.diag([9.0, 0.25]) @ R.T
+    np.testing.assert_allclose(gaussian.cut_axes(cov, 2.0), R @ np.diag([4.0, 0.25]) @ R.T, atol=1e-12)
+    np.testing.assert_allclose(gaussian.cut_axes(cov, 5.0), cov, atol=1e-12)

@@ -423,3 +423,11 @@ def test_dogleg_s_doubt_grows_with_the_matrix():
         opt.dogleg_step(g, np.diag([1e6, 1e-10]), 5.0), opt.cauchy_step(g, np.diag([1e6, 1e-10]), 5.0)
     )
     assert np.linalg.norm(opt.dogleg_step(g, np.diag([1e-6, 1e-15]), 5.0)) == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize(("gradient", "converged"), [(1e-9, True), (1e-3, False)])
+def test_a_search_that_is_stuck_has_arrived_only_where_nothing_is_promised(gradient, converged):
+    """Half g^2 / B beside rounding of the cost: 5e-19 of 1 is nothing, 5e-7 is not."""
+    point = SimpleNamespace(x=np.array([1.0]), cost=1.0, gradient=np.array([gradient]), curvature=np.array([[1.0]]))
+    assert opt._stuck(point, np.array([1e-17])) == ("no step lowers the cost, down to rounding", converged)
+    assert opt._stuck(point, np.array([1e-3])) == ("", False)

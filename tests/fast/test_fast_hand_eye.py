@@ -106,3 +106,11 @@ def test_both_refuse_with_the_same_words(data, words):
             module.calibrate_sphere_target(*data)
         found.append(str(refused.value))
     assert found[0] == found[1]
+
+
+def test_the_history_ends_with_the_rms_of_the_result():
+    T_BF, x_S = scene(12, std=0.5)
+    for room in (readable, fast):
+        result = room.calibrate_sphere_target(T_BF, x_S)
+        assert result.history[-1] == pytest.approx(result.rms, rel=1e-6)
+        assert (np.diff(result.history) <= 1e-9).all()

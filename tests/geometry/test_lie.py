@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
+from scipy.linalg import expm, logm
 from scipy.spatial.transform import Rotation
 
 from labkit.geometry import lie
@@ -93,3 +93,13 @@ def test_series_and_closed_forms_of_small_angles_are_the_taylor_sums(angle):
     for first, value, rtol in zip((1, 2, 3), found, (1e-14, 1e-14, 1e-9)):  # t - sin t loses digits above the limit
         terms = [(-1) ** k * angle ** (2 * k) / math.factorial(2 * k + first) for k in range(6)]
         np.testing.assert_allclose(value, math.fsum(terms), rtol=rtol)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+def test_interpolation_is_a_share_of_the_twist_between_both(share):
+    rng = np.random.default_rng(6)
+    T0, T1 = lie.exp_se3(rng.uniform(-1.5, 1.5, (2, 5, 6)) * [1, 1, 1, 100, 100, 100])
+    found = lie.interpolate(T0, T1, np.full(5, share))
+    for k in range(5):
+        twist = np.real(logm(np.linalg.inv(T0[k]) @ T1[k]))
+        np.testing.assert_allclose(found[k], T0[k] @ expm(share * twist), atol=1e-8)

@@ -240,3 +240,11 @@ def test_noise_that_is_fitted_is_near_what_was_drawn():
     some = located(time, u, when, ids, z, noise={"std_range": 0.05})
     assert some.noise.std_range == 0.05 and some.fitted == room.NAMES[1:]
     assert "std_range 0.05 m," in some.lines()[1] and "(fitted)" in some.lines()[1]
+
+
+def test_a_notebook_shows_the_lines_as_a_list():
+    time, u, _, _, when, ids, z = course(120)
+    found = located(time, u, when, ids, z)
+    shown = dataclasses.replace(found, warnings=("a < b",))._repr_html_()
+    assert shown.startswith("<ul><li>120 poses from") and shown.endswith("<li>warning: a &lt; b</li></ul>")
+    assert shown.count("<li>") == len(found.lines()) + 1 and repr(found) == "\n".join(found.lines())

@@ -16,6 +16,7 @@ from labkit.localization.sensors import (
     LikelihoodField,
     Scanner,
     beam_density,
+    scan_from_depth,
     see_landmarks,
     weigh_beams,
     weigh_doors,
@@ -195,3 +196,27 @@ def test_bad_input_is_named(call, words):
     with pytest.raises(ValueError) as error:
         call()
     assert words in str(error.value)
+
+
+def test_a_row_of_depths_becomes_a_scan():
+    """A wall straight ahead at 2 m: one depth, ranges that grow to the sides; columns project evenly."""
+    ranges, bearings = scan_from_depth(np.full(640, 2.0), np.radians(58))
+    np.testing.assert_allclose(ranges * np.cos(bearings), 2.0)
+    across = ranges * np.sin(bearings)
+    np.testing.assert_allclose(np.diff(across), np.diff(across)[0])
+    edge = 2.0 * np.tan(np.radians(29))
+    assert across[0] == pytest.approx(edge * 639 / 640) and across[-1] == -pytest.approx(edge * 639 / 640)
+    assert bearings[0] > 0 > bearings[-1] and abs(bearings).max() < np.radians(29)
+
+
+def test_columns_without_a_depth_are_left_out():
+    depth = np.array([0.0, 0.79, 0.8, 2.0, 3.5, 3.51])
+    ranges, bearings = scan_from_depth(depth, 1.0)
+    np.testing.assert_allclose(ranges * np.cos(bearings), [0.8, 2.0, 3.5])
+    np.testing.assert_allclose(np.tan(bearings), np.tan(0.5) * np.array([0.5, -0.5, -1.5]) / 3)
+
+
+@pytest.mark.parametrize(("field_of_view", "near"), [(np.pi, 0.8), (1.0, 3.5)])
+def test_a_camera_that_cannot_be_is_refused(field_of_view, near):
+    with pytest.raises(ValueError, match="field_of_view must be less than pi, and near less than far"):
+        scan_from_depth(np.ones(4), field_of_view, near)

@@ -6,13 +6,14 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import logsumexp
 
 from ...documents.lecture.examples import load_building
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
 from ...geometry import planar
 from ...localization import maps, mcl, odometry, particles
-from ...localization.sensors import weigh_landmarks
+from ...localization.sensors import scan_from_depth, weigh_landmarks
 from . import specimens
 
 R_MAX = 18.0
@@ -144,6 +145,32 @@ WHEELS = tuple(functools.partial(wheel, power=power) for power in (4, 0.5))
 def cloud_weights(rng):
     """Weights of any sum."""
     return (rng.exponential(size=rng.integers(20, 40)) ** rng.uniform(0.2, 3) * 50 ** rng.uniform(-2, 1),)
+
+
+def log_weights(rng, level):
+    """Logarithms of weights about this level, one or two of them impossible (-inf)."""
+    logs = level + rng.normal(0, 2, rng.integers(6, 15))
+    logs[rng.choice(len(logs), rng.integers(1, 3), replace=False)] = -np.inf
+    return (logs,)
+
+
+LOG_WEIGHTS = tuple(functools.partial(log_weights, level=level) for level in (-2000.0, -1.0, 900.0))
+
+
+def cycle_of_weights(rng, due):
+    """Weights, a likelihood for each particle, the number of the step, and the length of a cycle; due: at its end."""
+    m, n = rng.integers(5, 12), int(rng.integers(3, 7))
+    step = n * int(rng.integers(2, 6)) + (0 if due else int(rng.integers(1, n)))
+    weights = rng.uniform(0.1, 1, m)
+    return weights / weights.sum(), rng.uniform(0.01, 3, m), step, n
+
+
+def row_of_depths(rng):
+    """Depths of a row of columns, some too near, too far or missing; opening angle and limits."""
+    n, near, far = int(rng.integers(12, 24)), float(rng.uniform(0.4, 1.0)), float(rng.uniform(3.0, 5.0))
+    depth = rng.uniform(1.1 * near, 0.95 * far, n)
+    depth[rng.choice(n, 4, replace=False)] = 0.0, 0.6 * near, 1.2 * far, 1.5 * far
+    return depth, float(rng.uniform(0.7, 1.6)), near, far
 
 
 def cloud_and_threshold(rng, slip):
@@ -294,6 +321,33 @@ def resample_roulette(weights, rng):
 def resample_systematic(weights, rng):
     """Indices by one turn of the spoke wheel."""
     return particles.resample_systematic(weights, rng)
+
+
+def log_sum_exp(log_weights):
+    return float(logsumexp(log_weights))
+
+
+def multiply_weights(weights, likelihood, step, n):
+    product = weights * likelihood
+    return product / product.sum(), step % n == 0
+
+
+def _cycle(weights=lambda w, p, k, n: w * p, due=lambda k, n: k % n == 0, share=lambda w: w / w.sum()):
+    """A variant of `multiply_weights` in one of its parts."""
+    return lambda w, p, k, n: (share(weights(w, p, k, n)), bool(due(k, n)))
+
+
+def _depth(angle=None, of=lambda depth, b: depth / np.cos(b), seen=lambda d, near, far: (d >= near) & (d <= far)):
+    """A variant of `scan_from_depth` in one of its parts; angle(offset, field of view), offset 1 at the left edge."""
+    angle = angle or (lambda offset, fov: np.arctan(offset * math.tan(fov / 2)))
+
+    def variant(depth, field_of_view, near, far):
+        n = len(depth)
+        b = angle((n / 2 - 0.5 - np.arange(n)) / (n / 2), field_of_view)
+        kept = seen(depth, near, far)
+        return of(depth, b)[kept], b[kept]
+
+    return variant
 
 
 def should_resample(weights, threshold):
@@ -1100,6 +1154,41 @@ CHAPTER = Chapter(
             ],
         ),
         Exercise(
+            "log_sum_exp",
+            reference=log_sum_exp,
+            draw=LOG_WEIGHTS,
+            metric=metrics.Numbers(1e-9),
+            hints=(
+                "exp(-2000) is zero, exp(900) is infinite. Which number may be taken out of all logarithms first?",
+                "log sum exp(l) = top + log sum exp(l - top), with top the largest: then the largest term is exp(0) = 1.",
+                "`top = log_weights.max()\nreturn top + np.log(np.exp(log_weights - top).sum())`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda l: np.log(np.exp(l - l.max()).sum()),
+                    "The largest logarithm was taken out: add it again at the end.",
+                ),
+                Mistake(lambda l: l.max() + np.exp(l - l.max()).sum(), "The logarithm of the sum is missing."),
+                Mistake(lambda l: l.max(), "That is the largest alone. The others add to it."),
+                Mistake(
+                    lambda l: l.max() + np.log(np.exp(l - l.max()).mean()),
+                    "You averaged. The sum is asked for.",
+                ),
+                Mistake(
+                    lambda l: l.max() + np.log10(np.exp(l - l.max()).sum()),
+                    "The logarithm is the natural one, np.log.",
+                ),
+                Mistake(
+                    lambda l: l.max() * np.log(np.exp(l - l.max()).sum()),
+                    "A factor exp(top) in front of the sum becomes a summand in its logarithm.",
+                ),
+                Mistake(
+                    lambda l: l.max() - np.log(np.exp(l - l.max()).sum()), "A sign: the logarithm of the sum is added."
+                ),
+                Mistake(lambda l: float(np.logaddexp.reduce(l[np.isfinite(l)][:2])), "You summed the first two only."),
+            ],
+        ),
+        Exercise(
             "cast_ray",
             reference=maps.walk_ray,
             draw=(plain_ray, ray_past_the_unknown),
@@ -1445,6 +1534,138 @@ CHAPTER = Chapter(
             ),
             mistakes=[Mistake(slip, text) for slip, text in RESAMPLING_SLIPS],
             draws=30,
+        ),
+        Exercise(
+            "multiply_weights",
+            reference=multiply_weights,
+            draw=tuple(functools.partial(cycle_of_weights, due=due) for due in (True, False)),
+            metric=metrics.Several(metrics.Numbers(1e-9), metrics.Exactly(), names=("weights", "resample")),
+            hints=(
+                "Between two resamplings a particle collects the likelihoods of all measurements. How do they combine?",
+                "New weight = old weight times likelihood, divided by the sum. Resample when step is a multiple of n.",
+                "`product = weights * likelihood\nreturn product / product.sum(), step % n == 0`",
+            ),
+            mistakes=[
+                Mistake(
+                    _cycle(weights=lambda w, p, k, n: p),
+                    "The old weights are gone: what the earlier measurements said is forgotten. Multiply.",
+                ),
+                Mistake(
+                    _cycle(weights=lambda w, p, k, n: p if (k - 1) % n else w * p),
+                    "The old weights are gone in between: only a resampling makes them equal again.",
+                ),
+                Mistake(
+                    _cycle(weights=lambda w, p, k, n: w + p), "Independent measurements multiply, they do not add."
+                ),
+                Mistake(
+                    _cycle(weights=lambda w, p, k, n: w if k % n else w * p),
+                    "Every measurement counts, also those after which nothing is resampled.",
+                ),
+                Mistake(
+                    _cycle(weights=lambda w, p, k, n: np.ones_like(w) if k % n == 0 else w * p),
+                    "You made the weights equal already. The resampling comes first: it draws by this product.",
+                ),
+                Mistake(_cycle(weights=lambda w, p, k, n: w * p ** (1 / n)), "Each likelihood counts fully: no root."),
+                Mistake(_cycle(share=lambda w: w), "The weights do not add up to 1: divide by their sum."),
+                Mistake(_cycle(share=lambda w: w / w.max()), "Divide by the sum of the weights, not by the largest."),
+                Mistake(_cycle(share=lambda w: w / len(w)), "Divide by the sum of the weights, not by their number."),
+                Mistake(
+                    _cycle(due=lambda k, n: k % n != 0),
+                    "The weights are right. Resample in every n-th step, not in all others.",
+                ),
+                Mistake(_cycle(due=lambda k, n: True), "The weights are right. You resample in every step."),
+                Mistake(_cycle(due=lambda k, n: False), "The weights are right. You never resample."),
+                Mistake(
+                    _cycle(due=lambda k, n: k >= n), "The weights are right. From step n on you resample in every step."
+                ),
+                Mistake(
+                    _cycle(due=lambda k, n: k == n),
+                    "The weights are right. You resample once, in step n: every n-th is meant.",
+                ),
+                Mistake(
+                    _cycle(due=lambda k, n: k % n == 1), "The weights are right. You resample one step after the n-th."
+                ),
+                Mistake(
+                    _cycle(due=lambda k, n: (k + 1) % n == 0),
+                    "The weights are right. You resample one step before the n-th.",
+                ),
+                Mistake(lambda w, p, k, n: multiply_weights(w, p, k, n)[::-1], "The order is weights, resample."),
+            ],
+        ),
+        Exercise(
+            "scan_from_depth",
+            reference=scan_from_depth,
+            draw=row_of_depths,
+            metric=metrics.Several(
+                metrics.Numbers(1e-9, "m"), metrics.Numbers(1e-9, "rad"), names=("ranges", "bearings")
+            ),
+            hints=(
+                "Where on the picture is column k? Half the picture's width belongs to tan(field_of_view / 2).",
+                "With u = (n / 2 - 0.5 - k) / (n / 2): bearing = arctan(u tan(field_of_view / 2)), range = depth / cos(bearing).",
+                "`n = len(depth)\n"
+                "u = (n / 2 - 0.5 - np.arange(n)) / (n / 2)\n"
+                "bearings = np.arctan(u * np.tan(field_of_view / 2))\n"
+                "seen = (depth >= near) & (depth <= far)\n"
+                "return (depth / np.cos(bearings))[seen], bearings[seen]`",
+            ),
+            mistakes=[
+                Mistake(
+                    _depth(of=lambda d, b: d),
+                    "The bearings are right. A depth counts along the optical axis: to the sides the range is longer.",
+                ),
+                Mistake(
+                    _depth(of=lambda d, b: d * np.cos(b)),
+                    "The bearings are right. The cosine divides: the range is longer than the depth.",
+                ),
+                Mistake(
+                    _depth(of=lambda d, b: d / np.sin(b)),
+                    "The bearings are right. The depth is the side along the axis: the cosine.",
+                ),
+                Mistake(
+                    _depth(angle=lambda u, fov: u * fov / 2),
+                    "Columns are evenly spaced on the picture, not in angle: the arctangent is missing.",
+                ),
+                Mistake(
+                    _depth(angle=lambda u, fov: -np.arctan(u * math.tan(fov / 2))),
+                    "Left and right are exchanged: column 0 is on the left, where bearings are positive.",
+                ),
+                Mistake(
+                    _depth(angle=lambda u, fov: np.arctan(u * math.tan(fov))),
+                    "Half of the opening angle lies on each side: tan(field_of_view / 2).",
+                ),
+                Mistake(
+                    _depth(angle=lambda u, fov: np.arctan(u / math.tan(fov / 2))),
+                    "The tangent is upside down: the edge of the picture is at field_of_view / 2.",
+                ),
+                Mistake(
+                    _depth(angle=lambda u, fov: np.arctan(np.linspace(1, -1, len(u)) * math.tan(fov / 2))),
+                    "A column has its bearing in its middle: the outermost ones lie half a column inside.",
+                ),
+                Mistake(
+                    _depth(angle=lambda u, fov: np.arctan((u - 1 / len(u)) * math.tan(fov / 2))),
+                    "Half a column aside: the middle of column k is at k + 0.5.",
+                ),
+                Mistake(
+                    _depth(angle=lambda u, fov: np.arctan((u + 1 / len(u)) * math.tan(fov / 2))),
+                    "Half a column aside: the middle of column k is at k + 0.5.",
+                ),
+                Mistake(
+                    _depth(seen=lambda d, near, far: d > 0), "Depths outside of near and far are no readings either."
+                ),
+                Mistake(
+                    _depth(seen=lambda d, near, far: d <= far), "What is nearer than `near`, also 0, is no reading."
+                ),
+                Mistake(_depth(seen=lambda d, near, far: d >= near), "What is farther than `far` is no reading."),
+                Mistake(
+                    _depth(seen=lambda d, near, far: np.ones(len(d), bool)),
+                    "Columns without a depth between near and far are to be left out.",
+                ),
+                Mistake(lambda *a: scan_from_depth(*a)[::-1], "The order is ranges, bearings."),
+                Mistake(
+                    lambda *a: (scan_from_depth(*a)[0], np.degrees(scan_from_depth(*a)[1])),
+                    "The ranges are right. The bearings are in degrees: leave them in radians.",
+                ),
+            ],
         ),
         Exercise(
             "circular_mean",
