@@ -205,7 +205,7 @@ def test_a_row_of_depths_becomes_a_scan():
     across = ranges * np.sin(bearings)
     np.testing.assert_allclose(np.diff(across), np.diff(across)[0])
     edge = 2.0 * np.tan(np.radians(29))
-    assert across[0] == pytest.approx(edge * 639 / 640) and across[-1] == -pytest.approx(edge * 639 / 640)
+    assert across[0] == pytest.approx(edge * 639 / 640) and across[-1] == pytest.approx(-edge * 639 / 640)
     assert bearings[0] > 0 > bearings[-1] and abs(bearings).max() < np.radians(29)
 
 
