@@ -1,14 +1,16 @@
 # %% title [markdown]
 # # 6 · A tracker on a robot flange
 #
-# **What you will do.** Read the packets of a tracker, mount it on a simulated robot, find where it sits, and judge how well it follows a motion.
+# **What you will do.** Read the packets of a tracker, mount it on a simulated robot,
+# find where it sits, and judge how well it follows a motion.
 #
-# **What you will learn.** What a receiver can know of a stream, why two rotation axes are needed, what a null vector hides, why six runs that agree may all be
-# wrong, and why accuracy in motion is a matter of time first.
+# **What you will learn.** What a receiver can know of a stream, why two rotation axes
+# are needed, what a null vector hides, why six runs that agree may all be wrong, and
+# why accuracy in motion is a matter of time first.
 #
-# **What you need.** Chapter 1, the singular value decomposition by name. About 90 minutes; the parts
-# marked *further* come on top: stations that move and errors over speed, 25 minutes each, and the
-# whole cell at the end, 30 minutes.
+# **What you need.** Chapter 1, the singular value decomposition by name. About 90
+# minutes; the parts marked *further* come on top: stations that move and errors over
+# speed, 25 minutes each, and the whole cell at the end, 30 minutes.
 
 # %% notation [markdown]
 # | letter | meaning |
@@ -39,15 +41,18 @@ np.set_printoptions(precision=4, suppress=True)
 # %% the-question [markdown]
 # ## The question
 #
-# Can a game controller's tracker follow a painter's spray gun? The report *Kalibrace a testování systému OTUS tracker* (Západočeská univerzita v Plzni, 2018) bolts
-# one to a Stäubli TX40 and compares. Its logs were never published, so here a simulated tracker stands in; where the report prints numbers,
-# they are checked.
+# Can a game controller's tracker follow a painter's spray gun? The report *Kalibrace a
+# testování systému OTUS tracker* (Západočeská univerzita v Plzni, 2018) bolts one to a
+# Stäubli TX40 and compares. Its logs were never published, so here a simulated tracker
+# stands in; where the report prints numbers, they are checked.
 
 # %% packets [markdown]
 # ## A packet
 #
-# Table 1 of the report gives 23 fields of 8 bytes: device, time stamp, position, velocity, acceleration, quaternion (x, y, z, w), angular velocity and acceleration, two
-# buttons. It gives **no types**. Our assumption, in one place of `machines/packet.py`: little-endian doubles, meters, seconds.
+# Table 1 of the report gives 23 fields of 8 bytes: device, time stamp, position,
+# velocity, acceleration, quaternion (x, y, z, w), angular velocity and acceleration,
+# two buttons. It gives **no types**. Our assumption, in one place of
+# `machines/packet.py`: little-endian doubles, meters, seconds.
 
 # %% decode_packet
 @ex.decode_packet
@@ -62,9 +67,11 @@ def decode_packet(data):
 # %% stream [markdown]
 # ## A stream
 #
-# The tracker sends 250 packets per second by UDP, and UDP promises nothing. The packet has no sequence number and no checksum. **How can a receiver
-# know that one was lost**: it cannot, from gaps in the time stamps, or because UDP reports it? Decide first. Then press play: these are real packets between two threads on
-# your machine. Raise the loss, switch on the nonsense (the report's *nesmyslné hodnoty*), watch the counters.
+# The tracker sends 250 packets per second by UDP, and UDP promises nothing. The packet
+# has no sequence number and no checksum. **How can a receiver know that one was lost**:
+# it cannot, from gaps in the time stamps, or because UDP reports it? Decide first. Then
+# press play: these are real packets between two threads on your machine. Raise the
+# loss, switch on the nonsense (the report's *nesmyslné hodnoty*), watch the counters.
 
 # %% predict-loss
 guess = ...  # your code here
@@ -74,7 +81,8 @@ guess = "from gaps in the time stamps"
 ex.predict("loss", guess, reveal=stages.live_tracker)
 
 # %% books [markdown]
-# A receiver is honest when its counts agree with the sender's, whatever the order of arrival. Two seconds of stream, sent at ten times the speed:
+# A receiver is honest when its counts agree with the sender's, whatever the order of
+# arrival. Two seconds of stream, sent at ten times the speed:
 
 # %% balance-the-books
 faults = udp.Faults(loss=0.05, duplicate=0.03, reorder=0.05, malformed=0.02, foreign=0.02)
@@ -92,10 +100,12 @@ print("reasons:", sorted(seen.bad))
 # %% arm [markdown]
 # ## The reference: a robot
 #
-# The robot knows where its flange is, if we know the robot. A link in the Denavit-Hartenberg convention is four elementary transforms:
-# $T = R_z(\theta)\,D_z(d)\,D_x(a)\,R_x(\alpha)$. The data sheet (appendix B) prints reaches, and these fix the lengths: forearm $R_b = 225$, upper arm
-# $450 - 225$, wrist to flange $515 - 450 = 65$ mm. The elbow bends
-# by up to 138° from straight: **how close can the wrist come to axis 2, in mm?** Predict, then drag the flange.
+# The robot knows where its flange is, if we know the robot. A link in the
+# Denavit-Hartenberg convention is four elementary transforms:
+# $T = R_z(\theta)\,D_z(d)\,D_x(a)\,R_x(\alpha)$. The data sheet (appendix B) prints
+# reaches, and these fix the lengths: forearm $R_b = 225$, upper arm $450 - 225$, wrist
+# to flange $515 - 450 = 65$ mm. The elbow bends by up to 138° from straight: **how
+# close can the wrist come to axis 2, in mm?** Predict, then drag the flange.
 
 # %% predict-fold
 guess = ...  # your code here
@@ -130,12 +140,16 @@ def forward_kinematics(dh, q):
 # %% equation [markdown]
 # ## A X = X B
 #
-# The reading is relative to a frame nobody knows. Motions get rid of it (equations 2 to 4): from the first pose to the $i$-th, the flange moves by
-# $A_i = T_{BF_0}^{-1} T_{BF_i}$, the tracker by $B_i = T_{WE_0}^{-1} T_{WE_i}$, and both are the same motion seen through the mounting: $A_i X = X B_i$.
+# The reading is relative to a frame nobody knows. Motions get rid of it (equations 2 to
+# 4): from the first pose to the $i$-th, the flange moves by
+# $A_i = T_{BF_0}^{-1} T_{BF_i}$, the tracker by $B_i = T_{WE_0}^{-1} T_{WE_i}$, and
+# both are the same motion seen through the mounting: $A_i X = X B_i$.
 #
-# If all motions turn about one and the same axis, **what do the residuals look like, and what the mounting?** Decide, then
-# drag the two rotation axes; the colored dots are axes of many mountings found from noisy readings. Press *small motions* as well: noise divided by a small
-# angle is a large error, which is why more poses close together can make a calibration worse.
+# If all motions turn about one and the same axis, **what do the residuals look like,
+# and what the mounting?** Decide, then drag the two rotation axes; the colored dots are
+# axes of many mountings found from noisy readings. Press *small motions* as well: noise
+# divided by a small angle is a large error, which is why more poses close together can
+# make a calibration worse.
 
 # %% predict-axes
 guess = ...  # your code here
@@ -147,9 +161,12 @@ ex.predict("axes", guess, reveal=stages.two_axes)
 # %% vec [markdown]
 # ## The rotation as a null vector
 #
-# Stack the **columns** of $X$ into $\operatorname{vec} X$. Then $\operatorname{vec}(PXQ) = (Q^\top \otimes P)\operatorname{vec} X$, and $R_A X - X R_B = 0$ becomes nine
-# linear equations per motion (equations 7 to 9): $\;m_i \operatorname{vec} X = 0$, stacked over all motions $M \operatorname{vec} X = 0$. The order of the nine, and whatever rotation mixes
-# them, changes neither the solutions nor $m_i^\top m_i$.
+# Stack the **columns** of $X$ into $\operatorname{vec} X$. Then
+# $\operatorname{vec}(PXQ) = (Q^\top \otimes P)\operatorname{vec} X$, and
+# $R_A X - X R_B = 0$ becomes nine linear equations per motion (equations 7 to 9):
+# $\;m_i \operatorname{vec} X = 0$, stacked over all motions
+# $M \operatorname{vec} X = 0$. The order of the nine, and whatever rotation mixes them,
+# changes neither the solutions nor $m_i^\top m_i$.
 
 # %% kron_row
 @ex.kron_row
@@ -162,8 +179,10 @@ def kron_row(A, B):
 
 
 # %% null-vector [markdown]
-# With noise nothing is exactly zero, so the singular vector of the smallest singular value must do (equations 10 to 12). Three traps wait: its **sign** is arbitrary, its
-# **length** is 1, and its matrix is only nearly orthonormal. The report names the first and accepts the last; we project to the nearest rotation.
+# With noise nothing is exactly zero, so the singular vector of the smallest singular
+# value must do (equations 10 to 12). Three traps wait: its **sign** is arbitrary, its
+# **length** is 1, and its matrix is only nearly orthonormal. The report names the first
+# and accepts the last; we project to the nearest rotation.
 
 # %% rotation_from_nullvector
 @ex.rotation_from_nullvector
@@ -177,9 +196,9 @@ def rotation_from_nullvector(M):
 
 
 # %% second-smallest [markdown]
-# How nearly is there a *second* null vector, another mounting that fits as well? That is
-# the singular value next to the smallest. Beside the largest it says what the motions
-# are worth, before any residual is looked at.
+# How nearly is there a *second* null vector, another mounting that fits as well? That
+# is the singular value next to the smallest. Beside the largest it says what the
+# motions are worth, before any residual is looked at.
 
 # %% singular_value_ratio
 @ex.singular_value_ratio
@@ -195,8 +214,10 @@ def singular_value_ratio(M):
 # %% translation [markdown]
 # ## The translation by least squares
 #
-# With the rotation $R$ known, the last column of $A_i X = X B_i$ is linear in $t$ (equations 14 to 16): $(I - R_{A_i})\,t = t_{A_i} - R\,t_{B_i}$, stacked $K_1 t = K_2$. One motion leaves the part of
-# $t$ along its axis free, so two directions are needed again.
+# With the rotation $R$ known, the last column of $A_i X = X B_i$ is linear in $t$
+# (equations 14 to 16): $(I - R_{A_i})\,t = t_{A_i} - R\,t_{B_i}$, stacked
+# $K_1 t = K_2$. One motion leaves the part of $t$ along its axis free, so two
+# directions are needed again.
 
 # %% translation_lsq
 @ex.translation_lsq
@@ -212,8 +233,11 @@ def translation_lsq(A, B, R):
 # %% errors [markdown]
 # ## Two errors, taken at their word
 #
-# With $v$ the null vector (of length 1) and $N$ the number of motions, the report measures its fit by $E_{rot} = \frac{1}{N-1}\lVert M^\top M\,v \rVert$ (13) and $E_{trans} = \frac{1}{N-1}\lVert K_1 t - K_2 \rVert$ (17). Write them exactly so. One contains the
-# squares of small angles and hardly changes with $N$; the other has no square at all and shrinks like $1/\sqrt{N}$, however bad the fit.
+# With $v$ the null vector (of length 1) and $N$ the number of motions, the report
+# measures its fit by $E_{rot} = \frac{1}{N-1}\lVert M^\top M\,v \rVert$ (13) and
+# $E_{trans} = \frac{1}{N-1}\lVert K_1 t - K_2 \rVert$ (17). Write them exactly so. One
+# contains the squares of small angles and hardly changes with $N$; the other has no
+# square at all and shrinks like $1/\sqrt{N}$, however bad the fit.
 
 # %% e_rot
 @ex.e_rot
@@ -237,9 +261,11 @@ def e_trans(residuals):
 # %% outliers [markdown]
 # ## A rule, before looking
 #
-# At each of 21 poses the robot rests and 4 s of readings are averaged. "Evidently wrong" values were left out by eye. A rule fixed beforehand is fair: keep what
-# lies within some standard deviations of the median. Estimate this standard deviation as 1.4826 times the median of the distances from the median: for normal noise it is
-# the same, and a few outliers hardly move it.
+# At each of 21 poses the robot rests and 4 s of readings are averaged. "Evidently
+# wrong" values were left out by eye. A rule fixed beforehand is fair: keep what lies
+# within some standard deviations of the median. Estimate this standard deviation as
+# 1.4826 times the median of the distances from the median: for normal noise it is the
+# same, and a few outliers hardly move it.
 
 # %% reject_outliers
 @ex.reject_outliers
@@ -254,8 +280,10 @@ def reject_outliers(values, factor=4.0):
 # %% the-log [markdown]
 # ## Calibrate
 #
-# `run_1.csv` is a synthetic log of such a run, its true mounting the report's result. The stops are averaged for you, `A` and `B` are the motions since pose 0, and `kept`
-# says which pose has to go (pose 0 itself is no motion). Put your functions in a row; the result is a matrix, in mm.
+# `run_1.csv` is a synthetic log of such a run, its true mounting the report's result.
+# The stops are averaged for you, `A` and `B` are the motions since pose 0, and `kept`
+# says which pose has to go (pose 0 itself is no motion). Put your functions in a row;
+# the result is a matrix, in mm.
 
 # %% read-the-log
 poses = read_table("tracker/poses.csv")
@@ -279,10 +307,10 @@ mounting[:3, 3] = translation_lsq(A_kept, B_kept, mounting[:3, :3])
 mounting = ex.mounting(mounting)
 
 # %% which-motions [markdown]
-# **Four motions must do: four whose axes are nearly alike, or four whose axes differ. Which
-# four agree better among themselves, and which find the truer rotation?** Decide. The
-# cell prints the ratio, the mean residual angle, and how far the rotation found is from
-# the true one.
+# **Four motions must do: four whose axes are nearly alike, or four whose axes differ.
+# Which four agree better among themselves, and which find the truer rotation?** Decide.
+# The cell prints the ratio, the mean residual angle, and how far the rotation found is
+# from the true one.
 
 # %% ratio-of-motions
 from labkit.geometry.lie import log_so3
@@ -300,8 +328,10 @@ for name, four in (("alike", alike[-4:]), ("different", alike[:4]), ("all 19", a
     print(f"{name:9} ratio {singular_value_ratio(M_4):.2f}, {degrees}")
 
 # %% spread-text [markdown]
-# Six runs over the same poses give six mountings: `mountings`, shape (6, 4, 4), in mm. Appendix D prints a variance over its runs (*Rozptyl*): the sum of the squared deviations from the mean,
-# divided by 6, not by 5. Do the same: what is the standard deviation of the height z over our six, in mm?
+# Six runs over the same poses give six mountings: `mountings`, shape (6, 4, 4), in mm.
+# Appendix D prints a variance over its runs (*Rozptyl*): the sum of the squared
+# deviations from the mean, divided by 6, not by 5. Do the same: what is the standard
+# deviation of the height z over our six, in mm?
 
 # %% spread
 mountings = np.array([run.T_FE for run in synthetic_mountings()])
@@ -314,9 +344,12 @@ spread = ex.spread(spread)
 # %% compare [markdown]
 # ## Against the document
 #
-# Appendix D checks itself: six times an average less five entries is the sixth. And since the mean $\bar e$ of $N$ distances never exceeds their root mean square,
-# $E_{trans} \ge \bar e \sqrt{N} / (N - 1)$ with $\bar e = 2.67$ mm and $N = 20$: a row of $K_1 t - K_2$ and the translation error of a motion differ by a rotation only, so they are equally long.
-# (The report left out some poses, and does not say how many; with $N = 19$ the bound is 3 % higher.)
+# Appendix D checks itself: six times an average less five entries is the sixth. And
+# since the mean $\bar e$ of $N$ distances never exceeds their root mean square,
+# $E_{trans} \ge \bar e \sqrt{N} / (N - 1)$ with $\bar e = 2.67$ mm and $N = 20$: a row
+# of $K_1 t - K_2$ and the translation error of a motion differ by a rotation only, so
+# they are equally long. (The report left out some poses, and does not say how many;
+# with $N = 19$ the bound is 3 % higher.)
 
 # %% compare-appendix-d
 table = report.table_d()
@@ -339,18 +372,20 @@ for name, averages, variances in (("report", table.mean, table.variance), ("ours
     print(f"{'':6} {mean['mean_deg']:.3f} deg, E_trans {1000 * mean['E_trans']:.2f} mm, E_rot {mean['E_rot']:.1e}")
 
 # %% contradictions [markdown]
-# Two things exclude each other. Section 3.1 and the table put the origin 49.17 mm below,
-# the conclusion 65.3 mm. (The half turn about z that the text speaks of would change the
-# signs of x and y as the conclusion has them, but not z.) And a mean error of ±5 rad/s
-# would exceed the fastest motion, 3.7 rad/s, and the conclusion's largest error, 3 deg/s:
-# perhaps 5 deg/s was meant, perhaps 0.05 rad/s, which is 2.9 deg/s. The page does not
-# tell. A digit may also have been lost when the document was converted to text.
-# Chapter 10 lists them all.
+# Two things exclude each other. Section 3.1 and the table put the origin 49.17 mm
+# below, the conclusion 65.3 mm. (The half turn about z that the text speaks of would
+# change the signs of x and y as the conclusion has them, but not z.) And a mean error
+# of ±5 rad/s would exceed the fastest motion, 3.7 rad/s, and the conclusion's largest
+# error, 3 deg/s: 0.05 rad/s, which is 2.9 deg/s, would not; what was meant, the page
+# does not tell. A digit may also have been lost when the document was converted to
+# text. Chapter 10 lists them all.
 #
 # ## Break it: repeat the same mistake
 #
-# The runs agree within 0.2 mm while a single pose is off by 2.5 mm. If these errors were random, 20 poses would scatter the mounting by more than half a
-# millimeter. So **how far from the truth is the mean of the six**: 0.1 mm (the spread over $\sqrt 6$), 0.2 mm (the spread), or can the runs alone not tell?
+# The runs agree within 0.2 mm while a single pose is off by 2.5 mm. If these errors
+# were random, 20 poses would scatter the mounting by more than half a millimeter. So
+# **how far from the truth is the mean of the six**: 0.1 mm (the spread over $\sqrt 6$),
+# 0.2 mm (the spread), or can the runs alone not tell?
 
 # %% predict-runs
 guess = ...  # your code here
@@ -362,17 +397,17 @@ ex.predict("runs", guess, reveal=stages.six_runs)
 # %% sweeps [markdown]
 # ## Break it again: a station that moves (*further*)
 #
-# How does the tracker know where it is? Two *base stations* stand in the room
-# (section 1 of the report). A station flashes, and with the flash a plane of light
-# begins to turn about its axis $y$; later another one turns about its axis $x$. A
-# photodiode on the tracker sees the flash, then the plane: **the time between them is
-# an angle**. A plane starts at $-90°$ and needs $1/\mathrm{rate}$ for a whole turn. For a
-# diode at $(x, y, z)$ in the station's frame, $z$ pointing into the room,
+# How does the tracker know where it is? Two *base stations* stand in the room (section
+# 1 of the report). A station flashes, and with the flash a plane of light begins to
+# turn about its axis $y$; later another one turns about its axis $x$. A photodiode on
+# the tracker sees the flash, then the plane: **the time between them is an angle**. A
+# plane starts at $-90°$ and needs $1/\mathrm{rate}$ for a whole turn. For a diode at
+# $(x, y, z)$ in the station's frame, $z$ pointing into the room,
 #
 # $$\alpha = \operatorname{atan2}(x, z), \qquad \beta = \operatorname{atan2}(y, z).$$
 #
-# The report prints no rate; 60 turns per second are our assumption.
-# **How far does the plane move in a microsecond, 3 m from the station?**
+# The report prints no rate; 60 turns per second are our assumption. **How far does the
+# plane move in a microsecond, 3 m from the station?**
 
 # %% predict-sweep
 guess = ...  # your code here
@@ -395,10 +430,10 @@ def ray_direction(delays, rate):
 
 
 # %% place [markdown]
-# One station knows a direction and no distance. Two rays should meet in the diode;
-# with noise they pass each other, and the place is where the sum of the squared
-# distances to the rays is least. Push the stations together in the figure above to see
-# what it is worth.
+# One station knows a direction and no distance. Two rays should meet in the diode; with
+# noise they pass each other, and the place is where the sum of the squared distances to
+# the rays is least. Push the stations together in the figure above to see what it is
+# worth.
 
 # %% nearest_to_rays
 @ex.nearest_to_rays
@@ -432,8 +467,8 @@ for n in (1, 2):
 # %% moved [markdown]
 # All this holds while the stations stand where the software believes. The conclusion of
 # the report asks for firm clamps: vibration, from the very motors that turn the planes,
-# made the readings worse by an order of magnitude. Suppose a station is knocked by
-# 0.1° and nobody notices. **When does that spoil the calibration of the mounting more:
+# made the readings worse by an order of magnitude. Suppose a station is knocked by 0.1°
+# and nobody notices. **When does that spoil the calibration of the mounting more:
 # before the run, or after its tenth stop?**
 
 # %% predict-moved
@@ -446,16 +481,19 @@ ex.predict("moved", guess, reveal=stages.moved_station)
 # %% moved-then [markdown]
 # A station that stood askew from the beginning turns the whole world a little, and the
 # reset into $W$ takes that up: $E_{trans}$ stays near the noise. One that moves during
-# the run makes two worlds, and no mounting fits both. Turn the knob until the mean error
-# is the report's, and read off how few milliradians that takes. A rocking station does
-# it at every stop. $E_{trans}$ sees what changes *within* a run, and nothing else.
+# the run makes two worlds, and no mounting fits both. Turn the knob until the mean
+# error is the report's, and read off how few milliradians that takes. A rocking station
+# does it at every stop. $E_{trans}$ sees what changes *within* a run, and nothing else.
 
 # %% beyond [markdown]
 # ## Beyond the document: can it be done better?
 #
-# The report solves the rotation first, then the translation; so do most methods of OpenCV. The figure shows seven methods beside the Cramér-Rao bound, which no unbiased method can beat
-# (stored results of 400 trials a case, so the ratios themselves scatter by about 2 %). With noisy rotations (0.5°) and good translations (0.1 mm), **which way finds the rotation best**: from the rotations alone,
-# from rotations and translations at once, or both alike? Decide, then choose the noise.
+# The report solves the rotation first, then the translation; so do most methods of
+# OpenCV. The figure shows seven methods beside the Cramér-Rao bound, which no unbiased
+# method can beat (stored results of 400 trials a case, so the ratios themselves scatter
+# by about 2 %). With noisy rotations (0.5°) and good translations (0.1 mm), **which way
+# finds the rotation best**: from the rotations alone, from rotations and translations
+# at once, or both alike? Decide, then choose the noise.
 
 # %% predict-methods
 guess = ...  # your code here
@@ -465,9 +503,13 @@ guess = "from rotations and translations at once"
 ex.predict("methods", guess, reveal=stages.methods)
 
 # %% everything-at-once [markdown]
-# Rotation first means: translations may not help the rotation. Maximum likelihood weighs both by their noise; `ax_xb.calibrate_hand_eye` does, and returns a covariance. It treats the
-# first pose like any other, and so needs one more unknown, here $T_{BW}$. For it the eye stands still, at W, and looks *to the hand*; the tracker is what it sees. On our log it gains little, since the systematic error is nobody's noise model,
-# though `robust` sets aside the worst stop left, pose 4. But its standard deviation says how far off it may be; six equal runs do not.
+# Rotation first means: translations may not help the rotation. Maximum likelihood
+# weighs both by their noise; `ax_xb.calibrate_hand_eye` does, and returns a covariance.
+# It treats the first pose like any other, and so needs one more unknown, here $T_{BW}$.
+# For it the eye stands still, at W, and looks *to the hand*; the tracker is what it
+# sees. On our log it gains little, since the systematic error is nobody's noise model,
+# though `robust` sets aside the worst stop left, pose 4. But its standard deviation
+# says how far off it may be; six equal runs do not.
 
 # %% maximum-likelihood
 best = ax_xb.calibrate_hand_eye(T_BF, T_WE, robust=True, eye="to hand")  # the tracker is the target, T_FT
@@ -479,8 +521,10 @@ print("ignored poses:", np.flatnonzero(best.weights < 0.01))
 # %% motion [markdown]
 # ## In motion
 #
-# Section 3.2 moves the robot through the same points slowly, faster, fast, and finds mean errors of ±15 mm and ±1° that hardly depend on speed. **A robot moves at 1.4 m/s and the tracker lags 8 ms behind: how many mm is the
-# position off?** Work it out, then try speed, latency and nonsense. Which of the four summaries would you print?
+# Section 3.2 moves the robot through the same points slowly, faster, fast, and finds
+# mean errors of ±15 mm and ±1° that hardly depend on speed. **A robot moves at 1.4 m/s
+# and the tracker lags 8 ms behind: how many mm is the position off?** Work it out, then
+# try speed, latency and nonsense. Which of the four summaries would you print?
 
 # %% predict-motion
 guess = ...  # your code here
@@ -490,10 +534,14 @@ guess = 11
 ex.predict("motion", guess, reveal=stages.dynamic_errors)
 
 # %% offset [markdown]
-# A few percent of nonsense are enough to make the mean 15 mm at every speed and to hide a lag of 8 ms. The lag itself is easy to find: the **norm** of the angular velocity is the same in
-# every frame and at every point of the body, so it needs no calibration at all. Shift one curve against the other until they match: where the mean of the
-# squared differences over the shared part is least. Then look between the samples; near its least the cost is a parabola, and three values fix its vertex. (Sums of products, `np.correlate`, mislead here: they
-# also count how many samples overlap, which pulls the peak toward 0.)
+# A few percent of nonsense are enough to make the mean 15 mm at every speed and to hide
+# a lag of 8 ms. The lag itself is easy to find: the **norm** of the angular velocity is
+# the same in every frame and at every point of the body, so it needs no calibration at
+# all. Shift one curve against the other until they match: where the mean of the squared
+# differences over the shared part is least. Then look between the samples; near its
+# least the cost is a parabola, and three values fix its vertex. (Sums of products,
+# `np.correlate`, mislead here: they also count how many samples overlap, which pulls
+# the peak toward 0.)
 
 # %% time_offset
 @ex.time_offset
@@ -528,11 +576,11 @@ for name in ("slow", "middle", "fast", "rotation"):
 #
 # Figures 10 to 17 of the report show four errors of each motion: of position, rotation,
 # speed and angular speed. Its summary says that all hardly depend on the speed, with
-# means of ±15 mm, ±1° and ±10 mm/s; the conclusion adds that they stay below about 25 mm,
-# 3°, 40 mm/s and 3 deg/s. The figures themselves are lost, so the simulated tracker goes
-# through the same points in 10, 5 and 2.5 s. **Suppose it lags by a constant time. The
-# same path in half the time: by which factors do the errors of position and of speed
-# grow?** Decide, then try the lag, and all four errors.
+# means of ±15 mm, ±1° and ±10 mm/s; the conclusion adds that they stay below about 25
+# mm, 3°, 40 mm/s and 3 deg/s. The figures themselves are lost, so the simulated tracker
+# goes through the same points in 10, 5 and 2.5 s. **Suppose it lags by a constant time.
+# The same path in half the time: by which factors do the errors of position and of
+# speed grow?** Decide, then try the lag, and all four errors.
 
 # %% predict-tempo
 guess = ...  # your code here
@@ -543,8 +591,8 @@ ex.predict("tempo", guess, reveal=stages.over_speed)
 
 # %% squares-add [markdown]
 # What a tracker errs at rest knows nothing of the direction in which it is carried, and
-# independent errors add as squares: $e^2 = e_0^2 + (\tau v)^2$ with the lag $\tau$. So a
-# log of errors and speeds tells both apart, without any time stamp of the robot.
+# independent errors add as squares: $e^2 = e_0^2 + (\tau v)^2$ with the lag $\tau$. So
+# a log of errors and speeds tells both apart, without any time stamp of the robot.
 
 # %% static_error_and_lag
 @ex.static_error_and_lag
@@ -571,34 +619,41 @@ for name, chosen in (("all readings", sound | ~sound), ("without nonsense", soun
     print(f"{name:17} at rest {e0:5.1f} mm, lag {1000 * lag:4.1f} ms")
 
 # %% against-the-maker [markdown]
-# The maker prints a latency below 4 ms (appendix A). That is up to 5.6 mm at 1.4 m/s, and
-# 1.4 mm at 0.35 m/s: beside a mean error of 15 mm a lag may well pass unnoticed, if
+# The maker prints a latency below 4 ms (appendix A). That is up to 5.6 mm at 1.4 m/s,
+# and 1.4 mm at 0.35 m/s: beside a mean error of 15 mm a lag may well pass unnoticed, if
 # something larger that does not grow with the speed makes the mean. The nonsense would
 # do: a few percent of it suffice. The claims are rows of the ledger. Computable of them
 # is that 25 mm and 3° exceed the guaranteed repeatability of 1 mm and 1°. Whether the
-# readings *drift* ("not significantly") is seen in no printed number but the six runs of
-# appendix D, taken within half an hour: no column has a trend that chance would not make.
+# readings *drift* ("not significantly") is seen in no printed number but the six runs
+# of appendix D, taken within half an hour: no column has a trend that chance would not
+# make.
 
 # %% in-practice [markdown]
-# The report asks for "advanced filtering" in its conclusion. The last lines did it in two steps: a gate refuses what cannot follow from the motion so far, a Kalman filter with
-# constant velocity smooths the rest. What remains is the systematic error, which no filter sees. Chapter 8 builds this filter.
+# The report asks for "advanced filtering" in its conclusion. The last lines did it in
+# two steps: a gate refuses what cannot follow from the motion so far, a Kalman filter
+# with constant velocity smooths the rest. What remains is the systematic error, which
+# no filter sees. Chapter 8 builds this filter.
 #
 # ## In practice
 #
-# - Bind a receiver to the address you mean, count what you throw away, and never let it block.
-# - Turn far, about axes far apart. Look at the second smallest singular value before you look at the residual.
-# - Calibrate over the space you will work in. Repeat at *other* poses: same poses repeat their error.
-# - Synchronize first. Then print median and 95 % beside the mean, and say what happened to the outliers.
+# - Bind a receiver to the address you mean, count what you throw away, and never let it
+#   block.
+# - Turn far, about axes far apart. Look at the second smallest singular value before
+#   you look at the residual.
+# - Calibrate over the space you will work in. Repeat at *other* poses: same poses
+#   repeat their error.
+# - Synchronize first. Then print median and 95 % beside the mean, and say what happened
+#   to the outliers.
 
 # %% whole [markdown]
 # ## From beginning to end: one cell (*further*, 30 minutes)
 #
 # A part on a trolley is to be found and touched. Its frame $P$ comes from three marks
 # (chapter 1), which the scanner $S$ on the flange has seen (chapter 5). A tracker $E$
-# rides on the trolley, and its world $W$ has been calibrated in the base (this chapter).
-# The trolley is pushed elsewhere, a chain around the tracker says where (chapter 2), and
-# the tip (chapter 3) goes to a hole of the part. All of it is simulated, each calibration
-# from its own noisy readings.
+# rides on the trolley, and its world $W$ has been calibrated in the base (this
+# chapter). The trolley is pushed elsewhere, a chain around the tracker says where
+# (chapter 2), and the tip (chapter 3) goes to a hole of the part. All of it is
+# simulated, each calibration from its own noisy readings.
 
 # %% calibrate-all
 from labkit.machines import cell as cells
@@ -630,10 +685,10 @@ def moved_part(T_BW, T_WE0, T_WE1, T_BP0):
 
 # %% common-errors [markdown]
 # Two questions before any number. **The marks are touched with the very tip that later
-# goes to the hole, the flange turned alike, and the tip's calibration is 1 mm off. By how
-# much does it miss the hole, if the trolley has not moved?** And: **the trolley comes back
-# exactly to where the part was learned. What does the error of $T_{BW}$ do to the part's
-# place now?**
+# goes to the hole, the flange turned alike, and the tip's calibration is 1 mm off. By
+# how much does it miss the hole, if the trolley has not moved?** And: **the trolley
+# comes back exactly to where the part was learned. What does the error of $T_{BW}$ do
+# to the part's place now?**
 
 # %% predict-touch
 guess = ...  # your code here
@@ -653,10 +708,10 @@ ex.predict("returns", guess, reveal=stages.whole_cell)
 # ### How an error travels
 #
 # Every result of the workbook gives the error of a transform $T_{AB} = (R, t)$ as a
-# rotation vector $\varphi$ about the axes of $B$ and a shift $d$ in $A$. The true point is
-# then $R\exp(\varphi)\,p + t + d$. To first order that is $R\,p + t - R\,[p]\,\varphi + d$, with
-# $[p]$ the matrix of the cross product: a rotation acts by its lever. For
-# $e_A = J e$ the covariance is $J\,\Sigma\,J^\top$.
+# rotation vector $\varphi$ about the axes of $B$ and a shift $d$ in $A$. The true point
+# is then $R\exp(\varphi)\,p + t + d$. To first order that is
+# $R\,p + t - R\,[p]\,\varphi + d$, with $[p]$ the matrix of the cross product: a
+# rotation acts by its lever. For $e_A = J e$ the covariance is $J\,\Sigma\,J^\top$.
 
 # %% point_covariance
 @ex.point_covariance
@@ -689,8 +744,8 @@ for name, cov in (("with its correlations", joint), ("its variances alone", apar
 # ### The budget
 #
 # Six sources know nothing of each other: three calibrations, the marks, two readings.
-# `jacobians` says how the tip's miss moves with each of them, all ways by which a source
-# enters added up; $T_{BW}$ enters twice. Write down what each contributes.
+# `jacobians` says how the tip's miss moves with each of them, all ways by which a
+# source enters added up; $T_{BW}$ enters twice. Write down what each contributes.
 
 # %% shares
 @ex.shares
@@ -718,7 +773,8 @@ print(f"the calibrations of this very cell make it miss by {off:.2f} mm")
 
 # %% halved-text [markdown]
 # **The largest contributor is calibrated again, four times as long, and its standard
-# deviation is halved. What is the total then, in mm?** Decide first whether it is worth it.
+# deviation is halved. What is the total then, in mm?** Decide first whether it is worth
+# it.
 
 # %% halved
 halved = ...  # your code here
@@ -730,17 +786,19 @@ halved = ex.halved(halved)
 
 # %% what-a-budget-knows [markdown]
 # Now make the figure above fail, and push the part about. One calibration is wrong by
-# more than it admits, the tip misses by millimeters, and the budget has not changed:
-# it repeats what the calibrations say of themselves. It says where to work next, and
+# more than it admits, the tip misses by millimeters, and the budget has not changed: it
+# repeats what the calibrations say of themselves. It says where to work next, and
 # whether a miss is too large to be chance. It never says that nothing is wrong; a part
 # measured twice, by different ways, does.
 
 # %% questions [markdown]
 # ## Three questions, to answer in words
 #
-# 1. The mounting adapter is printed anew. Which figures of appendix D change, which do not?
+# 1. The mounting adapter is printed anew. Which figures of appendix D change, which do
+#    not?
 # 2. Why does the angular speed need no calibration, while the linear speed does?
-# 3. A colleague halves the error by averaging 40 s instead of 4 s at each pose. What has improved, and what has not?
+# 3. A colleague halves the error by averaging 40 s instead of 4 s at each pose. What
+#    has improved, and what has not?
 
 # %% progress
 ex.progress()

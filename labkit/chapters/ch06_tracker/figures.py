@@ -168,7 +168,7 @@ class Repeated:
     """Repeated calibrations in two coordinates: each result, the ellipse of their spread, the ellipse a single run
     claims, the truth."""
 
-    def __init__(self, ax, truth, half_width=4.2):
+    def __init__(self, ax, truth, half_width=6.5):
         style.axes(ax, "y of the mounting (mm)", "z of the mounting (mm)", "six runs, each 21 poses")
         ax.set(xlim=(truth[1] - half_width, truth[1] + half_width), ylim=(truth[2] - half_width, truth[2] + half_width))
         ax.plot(

@@ -15,13 +15,6 @@ from .. import rounding
 COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw", "E_trans", "E_rot", "mean_mm", "mean_deg", "max_mm", "max_deg")
 RUNS = 6
 POSES = 20  # measuring poses of a run besides the reference (21 in all)
-MOTION_ERRORS = {  # in motion: mean (section 3.2, summary) and largest (conclusion), each with its unit
-    "position": ((15.0, "mm"), (25.0, "mm")),
-    "rotation": ((1.0, "deg"), (3.0, "deg")),
-    "speed": ((10.0, "mm/s"), (40.0, "mm/s")),
-    "angular speed": ((5.0, "rad/s"), (3.0, "deg/s")),
-}
-FASTEST = (1400.0, 3.7)  # mm/s and rad/s: the highest of motion 3, section 3.2
 UPSIDE_DOWN, COPIED = (2, COLUMNS.index("max_mm")), (3, COLUMNS.index("max_deg"))
 
 
@@ -58,6 +51,21 @@ def table_d():
     return TableD(values[:RUNS], values[RUNS], values[RUNS + 1], np.vectorize(rounding.half_unit)(words))
 
 
+def run_minutes():
+    """When the six runs of appendix D were taken, as their file names say, in minutes after the first.
+
+    Returns
+    -------
+    minutes : array, shape (6,)
+
+    Source: report, appendix D, *Zdrojový soubor dat měření*.
+    """
+    names = read_table("tracker/table_d.csv", text=("run", *COLUMNS))["run"][:RUNS].tolist()
+    clock = [name.removesuffix(".csv").rpartition("_")[2] for name in names]
+    minutes = np.array([60.0 * int(time[:2]) + int(time[2:]) for time in clock])
+    return minutes - minutes[0]
+
+
 def table_d_texts():
     """Appendix D digit by digit.
 
@@ -73,14 +81,14 @@ def table_d_texts():
 
 
 def statements():
-    """Numbers that the report states in sentences: guarantees, mean and largest errors, the offset.
+    """Numbers that the report states in sentences: guarantees, mean and largest errors, the offset, the latency.
 
     Returns
     -------
     statements : dict
         {name: number}; the units stand in data/tracker/statements.csv.
 
-    Source: report, introduction, end of section 3.2, conclusion.
+    Source: report, introduction, end of section 3.2, conclusion; the latency from appendix A.
     """
     table = read_table("tracker/statements.csv", text=("name", "unit"))
     return dict(zip(table["name"].tolist(), table["value"].tolist()))
