@@ -16,9 +16,9 @@
 # | letter | meaning |
 # | --- | --- |
 # | $B$, $F$ | base and flange of the robot; $T_{BF}$ comes from the joints |
-# | $E$, $W$ | the tracker, and the frame it reports in: its own pose when it was reset. A reading is $T_{WE}$ |
+# | $E$, $W$ | the tracker, and its own pose at reset, in which it reports $T_{WE}$ |
 # | $T_{FE}$ | the mounting, called $X$ while it is unknown |
-# | $A_i$, $B_i$ | motions of flange and tracker since the first pose, $A_i X = X B_i$. The report exchanges the two letters |
+# | $A_i$, $B_i$ | motions since the first pose, $A_i X = X B_i$ (report: $B$, $A$) |
 # | mm, s, rad | inside; packets and logs carry meters |
 
 # %% setup
@@ -57,7 +57,8 @@ np.set_printoptions(precision=4, suppress=True)
 # %% decode_packet
 @ex.decode_packet
 def decode_packet(data):
-    """Return time (s), position (mm), shape (3,), and quaternion x, y, z, w, shape (4,), of a packet of 184 bytes."""
+    """Return time (s), position (mm), shape (3,), and quaternion x, y, z, w, shape
+    (4,), of a packet of 184 bytes."""
     ### BEGIN SOLUTION
     values = np.frombuffer(data, "<f8")
     return values[1], 1000 * values[2:5], values[11:15]
@@ -85,8 +86,9 @@ ex.predict("loss", guess, reveal=stages.live_tracker)
 # arrival. Two seconds of stream, sent at ten times the speed:
 
 # %% balance-the-books
-faults = udp.Faults(loss=0.05, duplicate=0.03, reorder=0.05, malformed=0.02, foreign=0.02)
-packets = (packet for packet, _ in zip(simulation.endless_packets(np.random.default_rng(0)), range(500)))
+faults = udp.Faults(0.05, duplicate=0.03, reorder=0.05, malformed=0.02, foreign=0.02)
+endless = simulation.endless_packets(np.random.default_rng(0))
+packets = (packet for packet, _ in zip(endless, range(500)))
 with udp.listen() as listener:
     stream = udp.stream(packets, 250.0, faults, np.random.default_rng(1))
     with udp.Sender(stream, listener.port, speed=10.0) as sender:
@@ -94,7 +96,8 @@ with udp.listen() as listener:
         sender.flush(listener)
     seen, sent = listener.statistics(), sender.sent
 print("every good packet counted once:", seen.good == sent["good"])
-print("every bad one reported:        ", sum(seen.bad.values()) == sent["malformed"] + sent["foreign"])
+reported = sum(seen.bad.values()) == sent["malformed"] + sent["foreign"]
+print("every bad one reported:        ", reported)
 print("reasons:", sorted(seen.bad))
 
 # %% arm [markdown]
@@ -120,15 +123,16 @@ def dh_matrix(theta, d, a, alpha):
     """Return the transform of one link, shape (4, 4); rad and mm."""
     ### BEGIN SOLUTION
     c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
-    return np.array([[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]])
+    x, y = [c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s]
+    return np.array([x, y, [0, sa, ca, d], [0, 0, 0, 1]])
     ### END SOLUTION
 
 
 # %% forward_kinematics
 @ex.forward_kinematics
 def forward_kinematics(dh, q):
-    """Return T_BF, shape (4, 4); rows of dh, shape (6, 4), are theta offset, d, a, alpha;
-    q, shape (6,), are the joint angles (rad)."""
+    """Return T_BF, shape (4, 4); rows of dh, shape (6, 4), are theta offset, d, a,
+    alpha; q, shape (6,), are the joint angles (rad)."""
     ### BEGIN SOLUTION
     T = np.eye(4)
     for (offset, d, a, alpha), angle in zip(dh, q):
@@ -171,8 +175,8 @@ ex.predict("axes", guess, reveal=stages.two_axes)
 # %% kron_row
 @ex.kron_row
 def kron_row(A, B):
-    """Return the block of one motion, shape (9, 9), from the rotations A of the flange and B of the tracker,
-    shape (3, 3) each; its sign and the order of its rows are free."""
+    """Return the block of one motion, shape (9, 9), from the rotations A of the flange
+    and B of the tracker, shape (3, 3) each; its sign and its order of rows are free."""
     ### BEGIN SOLUTION
     return np.kron(np.eye(3), A) - np.kron(B.T, np.eye(3))
     ### END SOLUTION
@@ -187,7 +191,8 @@ def kron_row(A, B):
 # %% rotation_from_nullvector
 @ex.rotation_from_nullvector
 def rotation_from_nullvector(M):
-    """Return the rotation, shape (3, 3), that the stacked blocks M, shape (9 N, 9), determine."""
+    """Return the rotation, shape (3, 3), that the stacked blocks M, shape (9 N, 9),
+    determine."""
     ### BEGIN SOLUTION
     X = np.linalg.svd(M)[2][-1].reshape(3, 3, order="F")
     U, _, Vt = np.linalg.svd(X * np.sign(np.linalg.det(X)))
@@ -203,8 +208,8 @@ def rotation_from_nullvector(M):
 # %% singular_value_ratio
 @ex.singular_value_ratio
 def singular_value_ratio(M):
-    """Return the second smallest singular value of the stacked blocks M, shape (9 N, 9),
-    divided by the largest: 0 where a second mounting fits as well."""
+    """Return the second smallest singular value of the stacked blocks M, shape
+    (9 N, 9), divided by the largest: 0 where a second mounting fits as well."""
     ### BEGIN SOLUTION
     values = np.linalg.svd(M)[1]
     return values[-2] / values[0]
@@ -222,7 +227,8 @@ def singular_value_ratio(M):
 # %% translation_lsq
 @ex.translation_lsq
 def translation_lsq(A, B, R):
-    """Return t, shape (3,), mm, from motions A, B, shape (N, 4, 4), and the rotation R of the mounting."""
+    """Return t, shape (3,), mm, from motions A, B, shape (N, 4, 4), and the rotation R
+    of the mounting."""
     ### BEGIN SOLUTION
     K1 = np.eye(3) - A[:, :3, :3]
     K2 = A[:, :3, 3] - B[:, :3, 3] @ R.T
@@ -270,7 +276,8 @@ def e_trans(residuals):
 # %% reject_outliers
 @ex.reject_outliers
 def reject_outliers(values, factor=4.0):
-    """Return a bool array, shape (n,): True where values lie within factor robust standard deviations of the median."""
+    """Return a bool array, shape (n,): True where values lie within factor robust
+    standard deviations of the median."""
     ### BEGIN SOLUTION
     distance = np.abs(values - np.median(values))
     return distance <= factor * 1.4826 * np.median(distance)
@@ -324,8 +331,9 @@ for name, four in (("alike", alike[-4:]), ("different", alike[:4]), ("all 19", a
     R_4 = rotation_from_nullvector(M_4)
     residual = rotation_angle((R_4 @ B_4).swapaxes(1, 2) @ A_4 @ R_4).mean()
     off = rotation_angle(R_4.T @ simulation.T_FE[:3, :3])
-    degrees = f"residual {np.rad2deg(residual):.2f} deg, off by {np.rad2deg(off):.2f} deg"
-    print(f"{name:9} ratio {singular_value_ratio(M_4):.2f}, {degrees}")
+    residual, off = np.rad2deg([residual, off])
+    print(f"{name:9} ratio {singular_value_ratio(M_4):.2f},", end=" ")
+    print(f"residual {residual:.2f} deg, off by {off:.2f} deg")
 
 # %% spread-text [markdown]
 # Six runs over the same poses give six mountings: `mountings`, shape (6, 4, 4), in mm.
@@ -353,23 +361,29 @@ spread = ex.spread(spread)
 
 # %% compare-appendix-d
 table = report.table_d()
-runs, mean = dict(zip(report.COLUMNS, table.runs.T)), dict(zip(report.COLUMNS, table.mean))
-
+runs = dict(zip(report.COLUMNS, table.runs.T))
+mean = dict(zip(report.COLUMNS, table.mean))
 others = np.delete(runs["max_mm"], 2)  # the largest errors of all runs but the third
-print(f"run 3, largest error, printed {runs['max_mm'][2]:g}; from the average: {6 * mean['max_mm'] - others.sum():.3f} mm")
-print("run 4, mean and largest angle, printed:", runs["mean_deg"][3], runs["max_deg"][3], "deg")
-print(f"Rozptyl of x: {table.variance[0]}, divided by 6: {runs['x'].var():.2e}, by 5: {runs['x'].var(ddof=1):.2e}")
-
+print("run 3, largest error, printed", runs["max_mm"][2], "mm,", end=" ")
+print(f"from the average: {6 * mean['max_mm'] - others.sum():.3f} mm")
+print("run 4, angles: mean", runs["mean_deg"][3], "deg, largest", runs["max_deg"][3])
+by_6, by_5 = runs["x"].var(), runs["x"].var(ddof=1)
+print(f"Rozptyl of x: {table.variance[0]}, divided by 6: {by_6:.2e}, by 5: {by_5:.2e}")
 N = report.POSES
 least = mean["mean_mm"] * np.sqrt(N) / (N - 1)
-print(f"E_trans, printed {mean['E_trans']:.6f} 'mm': at least {least:.2f} mm, so it is meters: {1000 * mean['E_trans']:.2f} mm")
+printed = mean["E_trans"]
+print(f"E_trans, printed {printed:.6f} 'mm', but at least {least:.2f} mm:", end=" ")
+print(f"it is meters, {1000 * printed:.2f} mm")
 
 # %% compare-simulated-table
 ours = synthetic_table()
-for name, averages, variances in (("report", table.mean, table.variance), ("ours", ours.mean(0), ours.var(0))):
-    mean, rozptyl = dict(zip(report.COLUMNS, averages)), dict(zip(report.COLUMNS, variances))
-    print(f"{name:6} z {1000 * mean['z']:.2f} mm, Rozptyl {rozptyl['z']:.1e} m^2, mean error {mean['mean_mm']:.2f} mm")
-    print(f"{'':6} {mean['mean_deg']:.3f} deg, E_trans {1000 * mean['E_trans']:.2f} mm, E_rot {mean['E_rot']:.1e}")
+both = ("report", table.mean, table.variance), ("ours", ours.mean(0), ours.var(0))
+for name, averages, variances in both:
+    mean = dict(zip(report.COLUMNS, averages))
+    rozptyl = dict(zip(report.COLUMNS, variances))["z"]
+    print(f"{name:6} z {1000 * mean['z']:.2f} mm, Rozptyl {rozptyl:.1e} m^2,", end=" ")
+    print(f"mean error {mean['mean_mm']:.2f} mm, {mean['mean_deg']:.3f} deg")
+    print(f"{'':6} E_trans {1000 * mean['E_trans']:.2f} mm, E_rot {mean['E_rot']:.1e}")
 
 # %% contradictions [markdown]
 # Two things exclude each other. Section 3.1 and the table put the origin 49.17 mm
@@ -439,7 +453,7 @@ def ray_direction(delays, rate):
 @ex.nearest_to_rays
 def nearest_to_rays(origins, directions):
     """Return the point, shape (3,), mm, with the least sum of squared distances to rays
-    from origins, shape (n, 3), along directions, shape (n, 3), of any length; n >= 2."""
+    from origins, shape (n, 3), along directions, shape (n, 3), of any length; n > 1."""
     ### BEGIN SOLUTION
     d = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     across = np.eye(3) - d[:, :, None] * d[:, None, :]
@@ -461,7 +475,8 @@ for n in (1, 2):
     angles = stations.body_angles(L, stations.DIODES, held)
     noise = 5e-5 * np.random.default_rng(1).normal(size=angles.shape)
     seen = stations.sight(L, stations.DIODES, angles + noise, held, std=5e-5)
-    turn, off = np.rad2deg(seen.std_of("T_WE.rotation")), seen.std_of("T_WE.translation")
+    off = seen.std_of("T_WE.translation")
+    turn = np.rad2deg(seen.std_of("T_WE.rotation"))
     print(f"{n} station{'s' * (n > 1)}: std", off.round(2), "mm,", turn.round(2), "deg")
 
 # %% moved [markdown]
@@ -512,8 +527,10 @@ ex.predict("methods", guess, reveal=stages.methods)
 # says how far off it may be; six equal runs do not.
 
 # %% maximum-likelihood
-best = ax_xb.calibrate_hand_eye(T_BF, T_WE, robust=True, eye="to hand")  # the tracker is the target, T_FT
-for name, T in (("truth", simulation.T_FE), ("report's method", mounting), ("maximum likelihood", best.T_FT)):
+best = ax_xb.calibrate_hand_eye(T_BF, T_WE, robust=True, eye="to hand")
+found = {"truth": simulation.T_FE, "report's method": mounting}
+found["maximum likelihood"] = best.T_FT  # the tracker is the target
+for name, T in found.items():
     print(f"{name:19}", T[:3, 3], "mm")
 print("standard deviation ", *best.std_of("T_FT.translation").round(2), "mm")
 print("ignored poses:", np.flatnonzero(best.weights < 0.01))
@@ -546,14 +563,16 @@ ex.predict("motion", guess, reveal=stages.dynamic_errors)
 # %% time_offset
 @ex.time_offset
 def time_offset(time, reference, delayed, max_offset=0.2):
-    """Return by how many seconds, at most +-max_offset, `delayed` lags behind `reference`; finer than a sample.
+    """Return by how many seconds, at most +-max_offset, `delayed` lags behind
+    `reference`; finer than a sample.
 
-    Both are angular speeds (rad/s), shape (n,), at the same equally spaced times (s)."""
+    Both are angular speeds (rad/s), shape (n,), at the same equally spaced times."""
     ### BEGIN SOLUTION
     step = time[1] - time[0]
     n = round(max_offset / step)
     core = reference[n:-n]
-    cost = np.array([((delayed[n + s : len(time) - n + s] - core) ** 2).mean() for s in range(-n, n + 1)])
+    parts = [delayed[n + s : len(time) - n + s] for s in range(-n, n + 1)]
+    cost = ((np.array(parts) - core) ** 2).mean(axis=1)
     best = np.clip(np.argmin(cost), 1, 2 * n - 1)
     left, middle, right = cost[best - 1 : best + 2]
     return (best - n + 0.5 * (left - right) / (left - 2 * middle + right)) * step
@@ -564,12 +583,15 @@ def time_offset(time, reference, delayed, max_offset=0.2):
 for name in ("slow", "middle", "fast", "rotation"):
     m = simulation.simulate_motion(name, np.random.default_rng(5))
     lag = time_offset(m.time, accuracy.speeds(m.time, m.T_true)[1], m.w_read)
-    raw = accuracy.summarize(accuracy.tracking_errors(m.time, m.T_true, m.T_read).translation)
+    errors = accuracy.tracking_errors(m.time, m.T_true, m.T_read)
+    raw = accuracy.summarize(errors.translation)
     then = accuracy.shift_time(m.time, m.T_true, -lag)
     smooth, gate = accuracy.filter_positions(m.time, m.T_read[:, :3, 3])
     left = accuracy.summarize(np.linalg.norm(smooth - then[:, :3, 3], axis=1))
-    print(f"{name:9} lag {1000 * lag:4.0f} ms   raw:", ", ".join(f"{k} {v:.0f}" for k, v in raw.items()), "mm")
-    print(f"{'':21} gated: mean {left['mean']:.1f}, max {left['max']:.1f} mm, {100 * (1 - gate.mean()):.0f} % refused")
+    words = ", ".join(f"{k} {v:.0f}" for k, v in raw.items())
+    print(f"{name:9} lag {1000 * lag:4.0f} ms   raw: {words} mm")
+    print(f"{'':21} gated: mean {left['mean']:.1f}, max {left['max']:.1f} mm,", end=" ")
+    print(f"{100 * (1 - gate.mean()):.0f} % refused")
 
 # %% over-speed [markdown]
 # ## Errors over speed (*further*)
@@ -597,8 +619,8 @@ ex.predict("tempo", guess, reveal=stages.over_speed)
 # %% static_error_and_lag
 @ex.static_error_and_lag
 def static_error_and_lag(speed, error):
-    """Return e0 (mm) and the lag (s) of the law error^2 = e0^2 + (lag speed)^2, fitted by
-    least squares of the squares; speed (mm/s) and error (mm), shape (n,)."""
+    """Return e0 (mm) and the lag (s) of the law error^2 = e0^2 + (lag speed)^2, fitted
+    by least squares of the squares; speed (mm/s) and error (mm), shape (n,)."""
     ### BEGIN SOLUTION
     slope, intercept = np.polyfit(speed**2, error**2, 1)
     return np.sqrt(intercept), np.sqrt(slope)
@@ -666,7 +688,8 @@ T_BP0 = cells.learned_pose(cell, job)
 print("std of the tip    ", tip.std_of("tip").round(2), "mm")
 for name, found, frame in (("scanner", scanner, "T_FS"), ("tracker", tracker, "T_BS")):
     turn = np.rad2deg(found.std_of(f"{frame}.rotation")).round(2)
-    print(f"std of the {name}", found.std_of(f"{frame}.translation").round(2), "mm", turn, "deg")
+    shift = found.std_of(f"{frame}.translation").round(2)
+    print(f"std of the {name}", shift, "mm", turn, "deg")
 
 # %% moved-text [markdown]
 # Between tracker and part nothing has moved, so what was true when the part was learned
@@ -675,8 +698,8 @@ for name, found, frame in (("scanner", scanner, "T_FS"), ("tracker", tracker, "T
 # %% moved_part
 @ex.moved_part
 def moved_part(T_BW, T_WE0, T_WE1, T_BP0):
-    """Return T_BP, shape (4, 4), of a part now, from the tracker's world, its readings when
-    the part was learned and now, and the part as it was learned; mm."""
+    """Return T_BP, shape (4, 4), of a part now, from the tracker's world, its readings
+    when the part was learned and now, and the part as it was learned; mm."""
     ### BEGIN SOLUTION
     T_EP = np.linalg.inv(T_BW @ T_WE0) @ T_BP0
     return T_BW @ T_WE1 @ T_EP
@@ -718,8 +741,8 @@ ex.predict("returns", guess, reveal=stages.whole_cell)
 def point_covariance(T, cov_T, p, cov_p):
     """Return the covariance, shape (3, 3), mm^2, of the point p of B seen from A.
 
-    T = T_AB, cov_T, shape (6, 6), of (phi, d) as above (rad, mm), and cov_p, shape (3, 3),
-    of p along the axes of B; both errors are independent."""
+    T = T_AB, cov_T, shape (6, 6), of (phi, d) as above (rad, mm), and cov_p, shape
+    (3, 3), of p along the axes of B; both errors are independent."""
     ### BEGIN SOLUTION
     R, (x, y, z) = T[:3, :3], p
     lever = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -734,7 +757,7 @@ joint = point_covariance(cell.T_FS, cell.cov_FS, x_S, np.zeros((3, 3)))
 alone = np.diag(np.diag(cell.cov_FS))
 apart = point_covariance(cell.T_FS, alone, x_S, np.zeros((3, 3)))
 for name, cov in (("with its correlations", joint), ("its variances alone", apart)):
-    print(f"a mark through the scanner's calibration, {name}:", np.sqrt(np.trace(cov)).round(2), "mm")
+    print(f"a mark, scanner {name}: {np.sqrt(np.trace(cov)):.2f} mm")
 
 # %% budget-text [markdown]
 # The scanner sits where it sits to 1 mm only, and yet it sees a mark to a fraction of
@@ -751,7 +774,7 @@ for name, cov in (("with its correlations", joint), ("its variances alone", apar
 @ex.shares
 def shares(jacobians, covariances):
     """Return for each source the standard deviation in space, mm, that it contributes:
-    the root of the trace of its share. jacobians: list of (3, n); covariances: of (n, n)."""
+    the root of the trace of its share; jacobians, each (3, n), covariances (n, n)."""
     ### BEGIN SOLUTION
     pairs = zip(jacobians, covariances)
     return np.array([np.sqrt(np.trace(J @ C @ J.T)) for J, C in pairs])
@@ -759,12 +782,13 @@ def shares(jacobians, covariances):
 
 
 # %% budget
-jacobians, covariances = cells.miss_jacobians(cell, job), cells.source_covariances(cell, job)
-names = list(cells.SOURCES)
-found = shares([jacobians[name] for name in names], [covariances[name] for name in names])
-sizes, total = dict(zip(names, found)), np.linalg.norm(found)
+jacobians = cells.miss_jacobians(cell, job)
+covariances = cells.source_covariances(cell, job)
+in_order = ([by[n] for n in cells.SOURCES] for by in (jacobians, covariances))
+found = shares(*in_order)
+sizes, total = dict(zip(cells.SOURCES, found)), np.linalg.norm(found)
 for name, size in sizes.items():
-    print(f"{name:15} {size:.3f} mm   {100 * (size / total) ** 2:3.0f} % of the variance")
+    print(f"{name:15} {size:.3f} mm, {(size / total) ** 2:4.0%} of the variance")
 misses = cells.simulate_misses(cell, job, np.random.default_rng(1), 20_000)
 simulated = np.sqrt((misses**2).sum(axis=1).mean())
 print(f"first order {total:.2f} mm, 20,000 simulated cells {simulated:.2f} mm")
