@@ -177,8 +177,8 @@ class Play:
     def steps(self):
         return round(self.t_max / self.dt)
 
-    def declare(self, seekable):
-        """`interval` (ms) from picture to picture, `stride` steps each; `seekable` if any moment can be asked for."""
+    def declare(self, patient):
+        """`interval` (ms) from picture to picture, `stride` steps each; `patient` if none may be left out."""
         interval = max(20, round(1000 * self.dt / self.rate))
         stride = max(1, round(interval * self.rate / (1000 * self.dt)))
-        return {"steps": self.steps, "interval": interval, "stride": stride, "seekable": seekable}
+        return {"steps": self.steps, "interval": interval, "stride": stride, "patient": patient}

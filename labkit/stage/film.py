@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import style
+from .stage import FAIL
 
 ROOM, RATIO = 600, 1.25  # CSS pixels of the recorded picture's width; pixels a CSS pixel
 AROUND, ALONG, TURNS = 36, 24, 36  # pictures around a loop, along a control, around a view
@@ -25,7 +26,6 @@ MOVED = 0.004  # share of the picture a handle must move to count as moved
 ORBIT_PIXELS = 20  # pixels of dragging from picture to picture of a view: 10 degrees
 COLORS, NEAR = 256, 4
 LARGEST, FEWEST = 400_000, 12  # bytes of a track; a larger one loses every second picture, down to so many
-FAIL = "Make it fail"
 PLAYS = ("play", FAIL)
 
 
@@ -164,7 +164,7 @@ class _Camera:
             interval = declared["play"]["interval"] * declared["play"]["steps"] / declared["play"]["stride"]
             steps = len(tracks["play"].notes) - 1
             interval = round(min(max(interval / steps, QUICKEST), SLOWEST))
-            declared["play"] = {"steps": steps, "interval": interval, "stride": 1, "seekable": True}
+            declared["play"] = {"steps": steps, "interval": interval, "stride": 1, "patient": False}
         empty = "turn" if "view" in tracks else ""
         none = {"keys": False, "click": False, "spaces": []}  # pictures hold what is drawn in space, too
         return {**declared, **none, "buttons": list(declared["buttons"]), "empty": empty}

@@ -730,23 +730,20 @@ function buttonRow(keys, press) {
   return row;
 }
 
-/** Play, pause, and a slider of time where any moment can be asked for. The page beats the time; Python says what it is. */
+/** Play, pause, and a slider of time; any moment can be asked for. The page beats the time; Python says what it is. */
 class Clock {
-  constructor({ steps, interval, stride, seekable }, line) {
+  constructor({ steps, interval, stride, patient }, line) {
     const calm = window.matchMedia?.("(prefers-reduced-motion: reduce)").matches;
     const slower = calm ? Math.max(1, Math.round(CALM_INTERVAL / interval)) : 1;
-    Object.assign(this, { steps, line, interval: interval * slower, stride: stride * slower, patient: !seekable });
+    Object.assign(this, { steps, line, interval: interval * slower, stride: stride * slower, patient });
     Object.assign(this, { at: 0, epoch: 0, timer: 0, playing: false });
     this.button = element("button", "play", { type: "button" });
     this.button.addEventListener("click", () => (this.playing ? this.stop() : this.start()));
     this.number = element("output", "", { "aria-hidden": "true" });
     this.row = element("div", "row time", {}, [this.button]);
-    if (seekable) {
-      this.slider = element("input", "", { type: "range", min: 0, max: steps, step: 1, "aria-label": "time" });
-      this.slider.addEventListener("input", () => { this.stop(); this.ask(Number(this.slider.value)); });
-      this.row.append(this.slider);
-    }
-    this.row.append(this.number);
+    this.slider = element("input", "", { type: "range", min: 0, max: steps, step: 1, "aria-label": "time" });
+    this.slider.addEventListener("input", () => { this.stop(); this.ask(Number(this.slider.value)); });
+    this.row.append(this.slider, this.number);
     this.stop();
   }
 
@@ -788,7 +785,6 @@ class Clock {
     this.number.textContent = text;
     if (this.line.pending.time !== undefined) return;
     this.at = at;
-    if (!this.slider) return;
     this.slider.value = at;
     this.slider.setAttribute("aria-valuetext", text);
   }

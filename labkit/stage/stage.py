@@ -58,7 +58,8 @@ keys=True : arrow keys on the focused picture are events "up", "down", "left", "
 start, advance : simulations that go on from what was. `start(state)` returns the memory (at the start, at Reset and at
     a preset), `advance(state, event)` returns the next one: event is "tick" (each dt of `play`), "up" ... "right",
     "click" or "brush". Both functions see the memory so far as `state["memory"]` and return a new one, or the old one
-    changed; draw random numbers from an rng in it.
+    changed; draw random numbers from an rng in it. What it was is kept: time can be scrubbed backward, and forward
+    again to what happened then, until something is touched in between.
 stage.set(**changes) : the same from Python, from any thread or asyncio task; a few dozen times a second are fine, the
 newest wins.
 
@@ -77,6 +78,7 @@ from ..checks import as_finite
 from . import front, style
 from .canvas import CSS_DPI, DRAWING, Picture
 from .scene3d_handles import Dial, stepped
+from .tape import Tape
 
 MAX_CONTROLS = 3
 ORBIT_DEG_PER_PIXEL = 0.5
@@ -84,6 +86,8 @@ ORBIT_DEG_PER_PIXEL = 0.5
 # and then only the newest is drawn
 MAX_UNSEEN = 3
 RESERVED = ("t", "view", "click", "brush", "memory")
+FAIL = "Make it fail"
+MAX_WAIT = 1.5  # s a page waits for steps of a simulation; the slider of time then goes back to what was reached
 
 
 class Stage:
@@ -101,6 +105,8 @@ class Stage:
         {name: Handle}, {name: Slider | Choice | Toggle}; at most three controls.
     fail : dict
         What "Make it fail" changes on top of the initial state.
+    because : str, optional
+        What "Make it fail" has done and why that fails: the sentence before the caption until something is touched.
     presets : dict, optional
         {button text: changes} for further buttons.
     describe : function(result) -> str, optional
@@ -117,8 +123,9 @@ class Stage:
     """
 
     def __init__(
-        self, name, *, scene, compute, fail, handles=None, controls=None, presets=None, describe=None, size=(7.0, 4.2),
-        play=None, view=None, constrain=None, click=None, brush=None, keys=False, start=None, advance=None,
+        self, name, *, scene, compute, fail, handles=None, controls=None, presets=None, describe=None, because="",
+        size=(7.0, 4.2), play=None, view=None, constrain=None, click=None, brush=None, keys=False, start=None,
+        advance=None,
     ):  # fmt: skip
         self.name = name
         self._handles, self._controls, self._play, self._presets = handles or {}, controls or {}, play, {}
@@ -141,6 +148,7 @@ class Stage:
         self.result, self.status, self.caption = None, "", ""
         self._send, self._widget, self.at_rest = None, None, []
         self._sent, self._shown, self._waiting, self._attached, self._epoch = 0, 0, False, False, 0
+        self._because, self._said, self._tape = because, "", None
         self._cursor = ""
         self._whole = True  # the page needs a whole picture, not only what changed
         self._told_view = None  # where the page knows one looks from
@@ -152,10 +160,11 @@ class Stage:
         self.initial = dict(self._state)
         self._presets = {
             key: {k: self._checked(k, v) for k, v in changes.items()}
-            for key, changes in {"Reset": {}, "Make it fail": fail, **(presets or {})}.items()
+            for key, changes in {"Reset": {}, FAIL: fail, **(presets or {})}.items()
         }
-        self._restart()
-        self._go_on(self._ticks(0.0))
+        if advance:
+            self._restart()
+            self._simulate(0, ())
         self._recompute()
         self._check_places()
         self._picture.draw()
@@ -242,7 +251,7 @@ class Stage:
 
     def make_it_fail(self):
         """What the button "Make it fail" does."""
-        self._press("Make it fail")
+        self._press(FAIL)
 
     def _checked(self, key, value):
         """A value as the state holds it, or a ValueError that names it."""
@@ -274,15 +283,19 @@ class Stage:
     def _apply(self, changes, events=(), restart=False, reply=None):
         """Change the state, let the rules correct it, advance the memory, compute, update the picture, send it."""
         with DRAWING:
-            before = self._state.get("t", 0.0)
+            before = self._step
             self._state = {**self._state, **changes}
+            if set(changes) - {"t", "view"} and not restart:
+                self._said = ""
             try:
                 self._correct(set(changes))
-                after = self._state.get("t", 0.0)
-                if restart or (self._advance and after < before - 1e-9):
+                if self._advance and restart:
                     self._restart()
-                    before = 0.0
-                self._go_on([*self._ticks(before), *events])
+                    before = 0
+                elif self._tape and set(changes) - {"t", "view", "click", "brush"}:
+                    self._tape.cut(before)
+                if self._advance:
+                    self._simulate(before, events, until=None if restart or reply is None else monotonic() + MAX_WAIT)
                 self._recompute()
             except Exception as error:
                 self.status = str(error) if type(error) is ValueError else f"{type(error).__name__}: {error}"
@@ -297,26 +310,45 @@ class Stage:
             self._state = {**self._state, **{key: self._checked(key, value) for key, value in corrections.items()}}
 
     def _restart(self):
-        if self._start:
-            self._state = {**self._state, "memory": None}
-            self._state["memory"] = self._start(self.state)
+        self._state = {**self._state, "memory": None}
+        self._state["memory"] = self._start(self.state)
+        if self._play:
+            self._tape = Tape(self._play.steps)
+            self._tape.keep(0, self._state["memory"])
 
-    def _ticks(self, before):
-        """The steps of a simulation from a time until now, as events."""
-        if not (self._advance and self._play):
-            return []
-        return ["tick"] * (round(self._state["t"] / self._play.dt) - round(before / self._play.dt))
+    @property
+    def _step(self):
+        """The number of the step that time stands at."""
+        return round(self._state["t"] / self._play.dt) if self._play else 0
 
-    def _go_on(self, events):
+    def _simulate(self, at, events, until=None):
+        """Bring the memory from step `at` to the time of the state, from the tape as far as it goes, then to what
+        happened there. The steps end early when the clock shows `until` (s), and time stands there.
+        """
+        wanted = self._step
+        place, memory = self._tape.at(wanted) if self._tape and wanted != at else (at, None)
+        if wanted < at or place > at:
+            at, self._state = place, {**self._state, "memory": memory}
+        while at < wanted and (until is None or monotonic() < until):
+            at += 1
+            self._state = {**self._state, "t": at * self._play.dt}
+            self._advance_by("tick")
+            self._tape.keep(at, self._state["memory"])
         for event in events:
-            self._state = {**self._state, "memory": self._advance(self.state, event)}
+            self._advance_by(event)
+        if events and self._tape:
+            self._tape.cut(at)
+            self._tape.keep(at, self._state["memory"], always=True)
+
+    def _advance_by(self, event):
+        self._state = {**self._state, "memory": self._advance(self.state, event)}
 
     def _recompute(self):
         result = self._compute(self.state)
         with DRAWING:
             self._picture.update(self.state, result)
         self.result, self.status = result, ""
-        self.caption = str(self._describe(result)) if self._describe else ""
+        self.caption = " ".join(filter(None, [self._said, str(self._describe(result)) if self._describe else ""]))
 
     @property
     def buttons(self):
@@ -333,6 +365,7 @@ class Stage:
             raise ValueError(f"Stage {self.name!r} has no button {button!r}, only {', '.join(self._presets)}")
         kept = {} if button == "Reset" else {k: v for k, v in self._state.items() if k == "view"}
         self._epoch += 1
+        self._said = self._because if button == FAIL else ""
         self._apply({**self.initial, **kept, **self._presets[button]}, restart=True, reply=reply)
 
     # -- the page: one message in flight, the newest wins
@@ -344,7 +377,7 @@ class Stage:
             "size": [self._picture.size[0] * CSS_DPI, self._picture.size[1] * CSS_DPI],
             "handles": {key: handle.label or key for key, handle in self._handles.items()},
             "controls": {key: control.declare(key) for key, control in self._controls.items()},
-            "play": self._play.declare(seekable=self._advance is None) if self._play else None,
+            "play": self._play.declare(patient=self._advance is not None) if self._play else None,
             "buttons": self.buttons,
             "empty": "turn" if "view" in self._state else "draw" if self._brush is not None else "",
             "keys": self._keys,

@@ -384,7 +384,7 @@ def test_play():
     assert sent[-1][0]["time"] == {"at": 7, "text": "t = 0.70 s", "epoch": 0}
     stage.set(t=99)
     assert stage.result == 2.0
-    assert stage.declaration()["play"] == {"steps": 20, "interval": 100, "stride": 1, "seekable": True}
+    assert stage.declaration()["play"] == {"steps": 20, "interval": 100, "stride": 1, "patient": False}
 
 
 def test_reset_wins_against_a_step_of_time_that_was_under_way():
@@ -431,10 +431,75 @@ def test_memory_follows_ticks_keys_and_clicks():
     stage.receive({"arrows": ["up", "left"], "serial": "a:2"})
     stage.receive({"click": stage._picture.fraction(stage.figure.axes[0], (1, 1)), "serial": "a:3"})
     assert stage.result == ["tick", "tick", "up", "left", "click"]
-    stage.set(t=0.1)  # back in time: from the start
+    stage.set(t=0.1)  # back in time
     assert stage.result == ["tick"]
     stage.reset()
     assert stage.result == [] and stage.state["t"] == 0.0
+
+
+def wandering(**options):
+    """A simulation that draws a random number a step and remembers clicks."""
+
+    def advance(state, event):
+        memory = state["memory"]
+        if event == "tick":
+            memory["x"] += memory["rng"].standard_normal()
+        else:
+            memory["x"] += 100.0
+        return memory
+
+    return nothing(
+        start=lambda state: {"x": 0.0, "rng": np.random.default_rng(5)}, advance=advance,
+        compute=lambda state: (round(state["t"], 6), state["memory"]["x"]), **options,
+    )  # fmt: skip
+
+
+def test_time_is_scrubbed_backward_and_forward_again_to_what_happened():
+    stage, _ = wire(wandering(play=Play(40.0, 0.1), click=True))
+
+    def at(step):
+        stage.receive({"time": {"at": step, "epoch": 0}, "serial": f"a:{step}"})
+        return stage.result
+
+    seen = {step: at(step) for step in range(0, 301, 7)}
+    stage.receive({"click": stage._picture.fraction(stage.figure.axes[0], (1, 1)), "serial": "a:c"})
+    clicked, after = stage.result, at(330)
+    assert clicked[1] == pytest.approx(seen[294][1] + 100)
+    for step in (7, 203, 105, 287):
+        assert at(step) == seen[step]
+    assert at(294) == clicked and at(330) == after
+    at(105)
+    stage.receive({"click": stage._picture.fraction(stage.figure.axes[0], (1, 1)), "serial": "a:d"})
+    assert at(112)[1] == pytest.approx(seen[112][1] + 100)  # from here on something else happened
+    assert at(98) == seen[98]
+
+
+def test_a_page_waits_no_longer_for_steps_than_it_may(monkeypatch):
+    stage, _ = wire(wandering(play=Play(40.0, 0.1)))
+    clock = iter(range(10_000))
+    monkeypatch.setattr("labkit.stage.stage.monotonic", lambda: next(clock))
+    monkeypatch.setattr("labkit.stage.stage.MAX_WAIT", 10)
+    stage.receive({"time": {"at": 300, "epoch": 0}, "serial": "a:1"})
+    assert 0 < stage.state["t"] < 3.0
+    stage.set(t=30.0)
+    assert stage.state["t"] == 30.0
+
+
+def test_make_it_fail_says_why_until_something_is_touched():
+    stage = nothing(
+        controls={"n": Slider(0, 9, 1)}, fail={"n": 9}, because="It is nine.", describe=lambda result: "Words.",
+        play=Play(1.0, 0.1),
+    )  # fmt: skip
+    assert stage.caption == "Words."
+    stage.make_it_fail()
+    assert stage.caption == "It is nine. Words."
+    stage.set(t=0.5)
+    assert stage.caption == "It is nine. Words."
+    stage.set(n=4)
+    assert stage.caption == "Words."
+    stage.make_it_fail()
+    stage.reset()
+    assert stage.caption == "Words."
 
 
 # -- space

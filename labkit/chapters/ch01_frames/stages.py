@@ -178,6 +178,7 @@ def triangle_noise():
         view=View(-65, 35, center=(32, 25, 15)),
         constrain=_stay_in_plane,
         fail={"Y": (60.0, 2.0, 0.0)},
+        because="Y lies 2 mm from the x axis: its noise now turns the plane of the three points.",
         describe=_noise_sentence,
     )  # fmt: skip
 

@@ -97,6 +97,7 @@ def order_of_product():
         },
         presets={"No turns": {"A_deg": 0, "B_deg": 0}},
         fail={"A_deg": 180, "B_deg": 180},
+        because="Each move turns by 180 deg, and sends the move after it the opposite way.",
         describe=lambda result: (
             f"The two ends lie {result['gap']:.0f} mm apart. Hollow cross: where the other order ends."
             if result["gap"] > 0.5
@@ -275,6 +276,9 @@ def growth():
             "layout": Choice(LAYOUTS, "row", label="frames"),
         },
         fail={"n": 64, "std_rot_deg": 1.0},
+        because=(
+            "Eight times the links, each turned ten times as wrongly: a turn acts on all the links that follow it."
+        ),
         describe=lambda result: (
             f"{result['n']} links {'in a row' if result['layout'] == 'row' else 'on a loop'}: the chain ends "
             f"{_mm(result['here'])} off (rms of {RUNS} runs); the law says {_mm(result['expected'])}."
@@ -356,5 +360,6 @@ def two_loops():
             "std_rot_deg": Slider(0.01, 0.4, 0.2, step=0.01, label="error of a link (deg)"),
         },
         fail={"run": 7, "std_rot_deg": 0.4},
+        because="Another measurement, with twice the error: closing B opens A wider than it was before.",
         describe=sentence,
     )

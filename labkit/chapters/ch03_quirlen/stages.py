@@ -275,6 +275,7 @@ def outliers():
         },
         presets={"All in place": {f"pose {k + 1}": _where_tip(k) for k in DRAGGED}},
         fail={"pose 2": (12.0, 9.0), "pose 6": (13.0, 6.0), "pose 9": (10.0, 11.0)},
+        because="The three bad poses lie to one side: what they do to the plain estimate adds up.",
         describe=lambda result: (
             f"Tip error: plain {result['error_plain']:.2f} mm, robust {result['error_robust']:.2f} mm, "
             f"bound {result['bound']:.2f} mm (rms). "

@@ -91,6 +91,7 @@ def line():
         handles={"start": Handle((0.2, -90.0), step=0.01)},
         constrain=follow,
         fail={"start": (0.84, -160.0)},
+        because="Here the curve hardly bends: the vertex of its parabola lies far outside.",
         describe=_walk_caption,
         size=(7.0, 3.6),
     )
@@ -194,6 +195,7 @@ def four_paths():
             "k": Slider(0, SHOWN - 1, 0, label="iteration"),
         },
         fail={"start": (1.3, 1.3), "method": "newton", "k": 2},
+        because="Newton looks for a place without slope, and a saddle is one: from this start it ends there.",
         describe=_four_caption,
         size=(7.6, 4.6),
     )
@@ -262,6 +264,7 @@ def saddle():
         handles={"start": Handle((0.6, 0.2), step=0.02)},
         controls={"method": Choice({"Newton": "newton", "trust region": "trust_region"}, "newton", label="method")},
         fail={"start": (0.9, 0.35)},
+        because="Farther from S the steps no longer lead to it.",
         describe=_saddle_caption,
         size=(7.0, 4.6),
     )
@@ -421,6 +424,9 @@ def basins():
         start=covered_at_first,
         advance=rub,
         fail={"method": "gauss_newton", "all": True, "start": (4.0, 4.0)},
+        because=(
+            "From part of the square Gauss-Newton arrives nowhere, and from much of the rest not at the lower minimum."
+        ),
         describe=_basin_caption,
         size=(7.0, 5.0),
     )

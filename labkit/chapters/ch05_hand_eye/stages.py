@@ -292,6 +292,7 @@ def difference_steps():
         compute=compute_steps,
         controls={"h": Slider(1e-13, 10.0, 5e-7, log=True, label="step (deg)")},
         fail={"h": 1e-13},
+        because="So small a step drowns in the last digits of the numbers.",
         describe=lambda result: (
             f"Step {result['h']:.1e} deg: forward is off by {result['at']['forward']:.1e}, central by "
             f"{result['at']['central']:.1e} mm per deg. Best steps: {result['best']['forward']:.0e} and "
@@ -376,6 +377,7 @@ def convergence():
         handles={"P": Handle((-1.0, 30.0), step=0.5, bounds=((-68, 68), (-68, 68)), label="start, tilt and yaw")},
         controls={"B_deg": Choice({"B = -88 deg": -88.0, "B = -30 deg": -30.0}, -88.0, label="scanner at")},
         fail={"P": (-54.0, -30.0), "B_deg": -30.0},
+        because="In the three angles this start is a long way from the goal, in the pose a short one.",
         describe=_iterations_sentence,
     )
 
@@ -587,6 +589,7 @@ def thirty_one_poses():
         click=1,
         view=View(-60, 20, center=(1500.0, -600.0, 1300.0)),
         fail={"fit": "least squares"},
+        because="Least squares over all 31 as printed: the few wrong rows pull the fit away from all the others.",
         presets={"All corrected": {"others": True, "slip": 1, "fit": "least squares"}},
         describe=_poses_sentence,
         size=(7.6, 4.4),

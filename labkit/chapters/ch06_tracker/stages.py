@@ -438,6 +438,7 @@ def dynamic_errors():
             "nonsense": Toggle(True, "nonsense"),
         },
         fail={"speed": 1.4, "latency": 60.0},
+        because="Fast, and 60 ms late: a reading shows where the tracker was, not where it is.",
         presets={"fast, no nonsense": {"speed": 1.4, "latency": 20.0, "nonsense": False}},
         describe=sentence,
     )
@@ -496,6 +497,7 @@ def methods():
         compute=compute_methods,
         controls={"case": Choice(list(CASES), "0.1 deg, 1 mm", label="noise")},
         fail={"case": "0.5 deg, 0.1 mm"},
+        because="The noise is 0.5 deg, yet only 0.1 mm: a method that does not weigh the two apart pays for it.",
         describe=sentence,
         size=(7.0, 3.6),
     )

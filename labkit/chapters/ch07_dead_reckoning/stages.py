@@ -230,6 +230,7 @@ def models():
             "omega_deg": Slider(-60.0, 60.0, 40.0, step=2.0, label="turn rate (deg/s)"),
         },
         fail={"count": 3, "omega_deg": 60.0},
+        because=("In three steps, each turning by 100 deg: the simplified model drives straight through every one."),
         describe=_models_sentence,
     )
 
@@ -305,6 +306,7 @@ def drive():
         start=_start_drive,
         advance=_advance_drive,
         fail={"factor": 3.0, "t": 14.0},
+        because=("Three times the noise, and no landmark to correct it: what the robot does not know can only grow."),
         describe=_drive_sentence,
     )
 
@@ -359,6 +361,7 @@ def banana():
             "region": Choice(["ellipse", "bent"], "ellipse", label="region"),
         },
         fail={"factor": 4.0},
+        because="Four times the noise: the headings differ so much that the cloud bends.",
         describe=lambda result: (
             f"{100 * result['share']:.0f} % of the poses lie in the region said to hold 95 %. "
             f"On average the robots end {result['lag']:.2f} m from the computed end."
@@ -506,6 +509,7 @@ def reach():
         handles={"G": Handle((1.2, 0.6), step=0.1, label="the spot, in the first picture")},
         controls={"heading_deg": Slider(-180.0, 180.0, 50.0, step=5.0, label="heading on the spot (deg)")},
         fail={"G": (0.0, 1.0), "heading_deg": 0.0},
+        because="The goal lies straight beside the robot, and wheels that roll do not go sideways.",
         presets={"U-turn": {"G": (0.0, 0.0), "heading_deg": 180.0}},
         size=(7.0, 3.0),
         describe=_reach_sentence,

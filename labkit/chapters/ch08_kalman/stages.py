@@ -155,6 +155,7 @@ def vehicle():
             "dropout": Toggle(False, label="no measurements from 4.5 to 7.5 s"),
         },
         fail={"std_z": 0.15, "std_a": 0.04},
+        because="The filter is told of less noise than there is: it trusts itself too much.",
         describe=_vehicle_sentence,
     )
 

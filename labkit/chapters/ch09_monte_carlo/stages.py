@@ -103,6 +103,7 @@ def corridor():
             "std": Slider(0.0, 0.6, 0.1, step=0.05, label="noise of a move (m)"),
         },
         fail={"D3": (6.0, 0.0)},
+        because="The doors stand as far apart as the robot moves: a second door fits two places alike.",
         size=(7.0, 5.4),
         describe=lambda result: (
             f"After (e), {100 * result['near']:.0f} % of the particles lie within 0.6 m of the robot."
@@ -166,6 +167,7 @@ def map_forms():
         handles={"probe": Handle((8.4, 2.4), step=0.1, label="probe", color=style.ESTIMATE)},
         controls={"form": Choice(FORMS, FORMS[0], label="map")},
         fail={"probe": (15.6, 9.8)},
+        because="The probe stands where nothing was ever measured.",
         describe=_maps_sentence,
         size=(7.0, 4.6),
     )
@@ -267,6 +269,7 @@ def field_against_beams():
             "beams": Choice(("mixture", "plain"), "mixture", label="beam model"),
         },
         fail={"scan": "something in the way", "beams": "plain"},
+        because="Something that is not in the map stands in the way, and the plain beam model forgives nothing.",
         describe=_heat_sentence,
         size=(6.0, 7.2),
     )
@@ -363,6 +366,7 @@ def wheel():
             "turn": Slider(0.0, 0.995, 0.3, step=0.005, label="turn of the wheel"),
         },
         fail={"method": "roulette", **{f"W{k + 1}": (k + 1, 0.5) for k in range(SECTORS)}},
+        because="All weights are equal: nothing needs to be drawn, and roulette draws all the same.",
         describe=_wheel_sentence,
     )
 
@@ -419,6 +423,7 @@ def standing():
         compute=compute_standing,
         controls={"rounds": Slider(0, 200, 0, step=1, label="rounds of resampling")},
         fail={"rounds": 200},
+        because="Nothing was learned in 200 rounds: what is lost was lost by drawing alone.",
         describe=lambda result: (
             f"After {result['rounds']} rounds {result['left']['roulette'][-1]} of 1000 first particles have "
             f"descendants under roulette, {result['left']['spoke wheel'][-1]} under the spoke wheel."
@@ -479,6 +484,7 @@ def twelve_pictures():
         controls={"particles": Choice((200, 1000, 5000), 5000, label="particles")},
         play=Play(t_max=11 * DT, dt=DT, rate=1.5 * DT),
         fail={"particles": 200, "t": 11 * DT},
+        because="With so few particles none need lie near the robot, and copies of a wrong one stay wrong.",
         describe=lambda result: f"Picture {result['number']}: the estimate is off by {result['error']:.2f} m.",
         size=(7.0, 4.6),
     )
@@ -534,6 +540,7 @@ def soccer():
         controls={"reads": Choice(tuple(READINGS), "range and bearing", label="the camera reads")},
         play=Play(t_max=47.6, dt=0.4, rate=4.0),
         fail={"reads": "nothing", "t": 47.6},
+        because="No landmark is read: the particles count steps as odometry does, and drift as it does.",
         presets={"At the end": {"t": 47.6}},
         describe=lambda result: (
             f"MCL is off by {result['errors'][0]:.2f} m, odometry by {result['errors'][1]:.2f} m; "
