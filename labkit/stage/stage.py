@@ -135,16 +135,7 @@ class Stage:
             None if a is None or a is False else int(a is not True and a) for a in (click, brush)
         )
         self._check_options(view)
-        self._state = {
-            **{key: handle.at for key, handle in self._handles.items()},
-            **{key: control.value for key, control in self._controls.items()},
-            **({"t": play.start} if play else {}),
-            **({"view": view} if view else {}),
-            **({"click": None} if click is not None else {}),
-            **({"brush": np.empty((0, 2))} if brush is not None else {}),
-            **({"memory": None} if advance else {}),
-        }
-        self._state = {key: self._checked(key, value) for key, value in self._state.items()}
+        self._state = self._first_state(view)
         self.result, self.status, self.caption = None, "", ""
         self._send, self._widget, self.at_rest = None, None, []
         self._sent, self._shown, self._waiting, self._attached, self._epoch = 0, 0, False, False, 0
@@ -169,6 +160,19 @@ class Stage:
         self._check_places()
         self._picture.draw()
         self._text = f"[stage: {name}] {self.caption}".rstrip()
+
+    def _first_state(self, view):
+        first = {
+            **{key: handle.at for key, handle in self._handles.items()},
+            **{key: control.value for key, control in self._controls.items()},
+            **({"t": self._play.start} if self._play else {}),
+            **({"view": view} if view else {}),
+            **({"click": None} if self._click is not None else {}),
+            **({"brush": np.empty((0, 2))} if self._brush is not None else {}),
+            **({"memory": None} if self._advance else {}),
+        }
+        self._state = first  # what may be in it
+        return {key: self._checked(key, value) for key, value in first.items()}
 
     def _check_options(self, view):
         where = f"Stage {self.name!r}"
