@@ -99,13 +99,13 @@ export class Renderer {
       this.prepare();
       onBack();
     });
-    const options = { alpha: true, premultipliedAlpha: true, stencil: true, depth: true, powerPreference: "low-power" };
+    const options = { alpha: true, premultipliedAlpha: true, stencil: true, depth: true, preserveDrawingBuffer: false, powerPreference: "low-power" };
     const probe = document.createElement("canvas").getContext("webgl2");
     if (!probe) throw new Error("no WebGL 2");
     const named = probe.getExtension("WEBGL_debug_renderer_info");
     this.software = /swiftshader|llvmpipe|software|basic render/i.test(named ? probe.getParameter(named.UNMASKED_RENDERER_WEBGL) : "");
     probe.getExtension("WEBGL_lose_context")?.loseContext();
-    this.gl = this.canvas.getContext("webgl2", { ...options, antialias: !this.software });
+    this.gl = this.canvas.getContext("webgl2", { ...options, antialias: false });
     if (!this.gl) throw new Error("no WebGL 2");
     this.prepare();
   }
@@ -114,6 +114,7 @@ export class Renderer {
     const { gl } = this;
     this.lost = false;
     this.meshes = new Map();
+    this.smooth = null;
     this.age = (this.age ?? 0) + 1; // whoever holds buffers makes them anew when it has changed
     this.solid = createProgramInfo(gl, [SOLID_VERTEX, SOLID_FRAGMENT]);
     this.shade = createProgramInfo(gl, [SOLID_VERTEX, SHADOW_FRAGMENT]);
@@ -186,18 +187,32 @@ export class Renderer {
     if (info.corners) this.gl.deleteBuffer(info.corners);
   }
 
-  /** Draw one scene, width x height device pixels, in the lower left corner of the canvas.
+  /** Where edges are smoothed: four samples a pixel, copied onto the canvas in the end. */
+  smoothTarget(width, height) {
+    const { gl } = this;
+    this.smooth ??= { frame: gl.createFramebuffer(), color: gl.createRenderbuffer(), depth: gl.createRenderbuffer(), size: "" };
+    const { frame, color, depth } = this.smooth;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+    if (this.smooth.size !== `${width}x${height}`) {
+      this.smooth.size = `${width}x${height}`;
+      for (const [buffer, format, place] of [[color, gl.RGBA8, gl.COLOR_ATTACHMENT0], [depth, gl.DEPTH24_STENCIL8, gl.DEPTH_STENCIL_ATTACHMENT]]) {
+        gl.bindRenderbuffer(gl.RENDERBUFFER, buffer);
+        gl.renderbufferStorageMultisample(gl.RENDERBUFFER, 4, format, width, height);
+        gl.framebufferRenderbuffer(gl.FRAMEBUFFER, place, gl.RENDERBUFFER, buffer);
+      }
+    }
+    return frame;
+  }
+
+  /** Draw one scene, width x height device pixels, which the canvas takes on; `smooth` edges cost a processor much.
    *  lens: {axes (9 numbers, columns), center, scale [x, y], eye, perUnit (device pixels), reach (how deep the scene is)}.
    *  solids: [{mesh, pose, turn, color, shadow}], paths: [{line, points, color, width, dash, size, marker, hollow}] */
-  draw(width, height, lens, { solids, paths, floor, shadow }) {
+  draw(width, height, lens, { solids, paths, floor, shadow }, smooth) {
     const { gl, canvas } = this;
-    if (canvas.width < width || canvas.height < height) {
-      canvas.width = Math.max(canvas.width, width);
-      canvas.height = Math.max(canvas.height, height);
-    }
+    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+    const frame = smooth ? this.smoothTarget(width, height) : null;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
     gl.viewport(0, 0, width, height);
-    gl.enable(gl.SCISSOR_TEST);
-    gl.scissor(0, 0, width, height);
     gl.depthMask(true);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
@@ -223,6 +238,11 @@ export class Renderer {
     gl.depthFunc(gl.GREATER); // what lies behind a body shines through a little
     this.drawPaths(paths, common, 0.22);
     gl.bindVertexArray(null);
+    if (!frame) return;
+    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, frame);
+    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
+    gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
   }
 
   drawSolids(solids, common) {

@@ -12,7 +12,7 @@ const ZOOM = [0.2, 12];
 const MAX_PIXELS = 3e6;
 const SLOW = 30; // ms a picture may take until it is drawn coarser while it moves
 const CALM = 160; // ms of rest until it is drawn as sharply as it can be
-const COARSEST = 0.5;
+const SCALES = [1, 0.75, 0.5];
 const AXIS_VIEWS = { x: [0, 0], y: [90, 0], z: [-90, 90] };
 const LETTER = 12; // CSS pixels
 
@@ -50,7 +50,7 @@ export class View {
   /** place: the element with the picture; target: what has the focus and the pointer; onMove(): handles follow;
    *  onAble(): whether this page can draw has changed. */
   constructor(place, target, spaces, { onMove, onAble }) {
-    Object.assign(this, { place, target, onMove, onAble, shown: false, dirty: false, frame: 0, calm: 0, scale: 1, moving: false, told: true });
+    Object.assign(this, { place, target, onMove, onAble, shown: false, dirty: false, frame: 0, calm: 0, coarse: 0, slow: 0, moving: false, told: true });
     this.scenes = spaces.map((space) => new Scene(space, this));
     this.home = this.state = null;
     this.dark = false;
@@ -247,12 +247,20 @@ export class View {
     if (!this.shown || !this.state || renderer.lost) return;
     this.dirty = false;
     const start = performance.now();
-    const scale = this.moving ? this.scale : 1;
+    const scale = this.moving ? SCALES[this.coarse] : 1;
     for (const scene of this.scenes) scene.draw(scale);
     const took = performance.now() - start;
-    if (this.moving) this.scale = clip(this.scale * (took > SLOW ? 0.85 : took < SLOW / 2 ? 1.1 : 1), COARSEST, 1);
+    if (this.moving) this.adapt(took);
     this.place.dataset.pictures = Number(this.place.dataset.pictures ?? 0) + 1; // for benchmarks and tests
+    this.place.dataset.triangles = this.scenes.reduce((sum, scene) => sum + scene.triangles, 0);
     this.place.dataset.took = took.toFixed(1);
+  }
+
+  /** Coarser after several slow pictures, finer after many quick ones. */
+  adapt(took) {
+    this.slow = took > SLOW ? Math.max(1, this.slow + 1) : took < SLOW / 3 ? Math.min(-1, this.slow - 1) : 0;
+    if (this.slow >= 3) [this.coarse, this.slow] = [Math.min(this.coarse + 1, SCALES.length - 1), 0];
+    else if (this.slow <= -20) [this.coarse, this.slow] = [Math.max(this.coarse - 1, 0), 0];
   }
 
   close() {
@@ -299,9 +307,7 @@ class Scene {
     const ratio = Math.min(window.devicePixelRatio || 1, Math.sqrt(MAX_PIXELS / (cssWidth * cssHeight)));
     const [w, h] = [Math.round(cssWidth * ratio), Math.round(cssHeight * ratio)];
     if (this.canvas.width !== w || this.canvas.height !== h) Object.assign(this.canvas, { width: w, height: h });
-    // a processor that draws without a graphics card smooths edges at rest alone, by drawing larger
-    const sharp = renderer.software && scale === 1 && !this.view.moving ? Math.min(2, Math.sqrt((2 * MAX_PIXELS) / (w * h))) : scale;
-    const [dw, dh] = [Math.round(w * sharp), Math.round(h * sharp)];
+    const [dw, dh] = [Math.round(w * scale), Math.round(h * scale)];
     const { zoom, eye, center } = this.view.state;
     const [x, y, z] = this.view.axes();
     const pixels = (zoom * room.clientWidth) / units; // CSS pixels a unit, at the center
@@ -314,11 +320,12 @@ class Scene {
     const solids = [];
     const paths = [];
     for (const item of this.items) if (item.shown) item.give(solids, paths, { dark: this.view.dark, ratio: dot_, turn: [x, y, z] });
+    this.triangles = solids.reduce((sum, { mesh }) => sum + mesh.triangles, 0);
     const shadow = z[2] > 0 ? (this.view.dark ? [0, 0, 0, 0.5] : [0, 0, 0, 0.16]) : null;
-    renderer.draw(dw, dh, lens, { solids, paths, floor: this.floor, shadow });
+    renderer.draw(dw, dh, lens, { solids, paths, floor: this.floor, shadow }, !(renderer.software && this.view.moving));
     this.paper.clearRect(0, 0, w, h);
     this.paper.imageSmoothingQuality = "high";
-    this.paper.drawImage(renderer.canvas, 0, renderer.canvas.height - dh, dw, dh, 0, 0, w, h);
+    this.paper.drawImage(renderer.canvas, 0, 0, dw, dh, 0, 0, w, h);
     this.write(w / cssWidth, cssWidth, cssHeight, pixels);
   }
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ...stage import scene3d_solids as solids
 from ...stage import style
 
 GRATICULE = np.linspace(0, 2 * np.pi, 49)
@@ -20,15 +21,35 @@ def graticule(scene, latitudes_deg=(0, 30, 60), meridians=6):
         scene.fixed(scene.line(fade=True, color=style.GRID, linewidth=1.0), points)
 
 
-class Spokes:
-    """Lines from one center to many points, as one artist of a scene."""
+def dome():
+    """The upper half of the unit sphere on which tool directions lie."""
+    half = np.linspace(0, np.pi / 2, 13)
+    return solids.turned(np.column_stack([np.cos(half), np.sin(half)])).looks(style.FAINT, 0.18)
 
-    def __init__(self, scene, **looks):
-        self.line = scene.line(**looks)
 
-    def set(self, center, points):
-        center = np.broadcast_to(center, np.shape(points))
-        self.line.set(np.stack([center, points, np.full_like(center, np.nan)], axis=1).reshape(-1, 3))
+def tool(length, radius):
+    """A straight tool in its frame: the tip at -length along z, the flange's plate at z = 0."""
+    tip = min(10 * radius, 0.35 * length)
+    return (
+        solids.turned([(0, -length), (radius, tip - length), (radius, -0.08 * length), (0, -0.08 * length)]).looks(
+            style.STEEL
+        ),
+        solids.cylinder(2.2 * radius, -0.08 * length, 0.0).looks(style.SHELL),
+    )
+
+
+def anvil():
+    """What holds the pivot: a low cone whose tip is the origin."""
+    return solids.turned([(0, -12), (16, -12), (16, -9), (2, -0.5), (0, 0)]).looks(style.SHELL), solids.sphere(
+        1.6, 8
+    ).looks(style.TRUTH)
+
+
+def touching(R, direction):
+    """The pose of a tool turned by R whose flange's plate is at `direction`, so that its tip touches the origin."""
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = R, direction
+    return T
 
 
 def singular_value_axes(ax):

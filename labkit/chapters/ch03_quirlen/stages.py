@@ -10,6 +10,7 @@ from ...fast.pivot import calibrate_pivot
 from ...geometry.lie import exp_so3, nearest_rotation
 from ...stage import Handle, Play, Slider, Stage, style
 from ...stage.scene3d import Scene, View
+from ...stage.scene3d_handles import OnSphere
 from . import figures as draw
 
 TIP = np.array([0.0, 0.0, -100.0])  # mm: a straight tool that points down, as long as the lab sheet's
@@ -43,6 +44,7 @@ def compute_pose_designer(state):
     seen = mean @ null
     return {
         "directions": directions,
+        "R": R,
         "singular_values": values,
         "floor": float(floor),
         "null": null,
@@ -59,25 +61,15 @@ def _in_scene(covariance, mean):
     return R @ cut_axes(covariance, LONGEST) @ R.T
 
 
-def _on_sphere(state, moved):
-    """Tool directions stay on the upper half of the sphere."""
-    corrections = {}
-    for name in moved:
-        if name.startswith("D"):
-            d = state[name].copy()
-            d[2] = max(d[2], 0.02)
-            corrections[name] = d / np.linalg.norm(d)
-    return corrections
-
-
 def pose_designer():
     """Drag six tool directions on the sphere and see, before measuring, what they will say about the tip."""
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.35, 1))
-        space = Scene(left, radius=1.12)
+        space = Scene(left, radius=1.12, floor=0.0)
         draw.graticule(space)
-        shafts = draw.Spokes(space, color=style.MEASUREMENT, linewidth=2)
+        space.fixed(space.body(draw.dome(), name="dome"), np.eye(4))
+        tools = [space.body(*draw.tool(1.0, 0.035), name=f"tool {k}") for k in range(1, 7)]
         heads = space.points(**style.look("measurement", markersize=7))
         ellipsoid = space.ellipsoid(**style.look("estimate"))
         null = space.line(color=style.TRUTH, linewidth=2.2, linestyle=(0, (2, 1.5)))
@@ -85,7 +77,8 @@ def pose_designer():
         markers, floor = draw.singular_value_axes(right)
 
         def update(state, result):
-            shafts.set(np.zeros(3), result["directions"])
+            for tool, direction, R in zip(tools, result["directions"], result["R"]):
+                tool.set(draw.touching(R, direction))
             heads.set(result["directions"])
             ellipsoid.set(np.zeros(3), result["covariance_seen"])
             far = result["null_seen"] * (1.15 if result["undetermined"] else 0.0)
@@ -113,15 +106,16 @@ def pose_designer():
         scene=scene,
         compute=compute_pose_designer,
         handles={
-            f"D{k}": Handle(tuple(d), step=0.02, label=f"tool direction {k}", color=style.MEASUREMENT)
+            f"D{k}": Handle(
+                tuple(d), step=0.05, label=f"tool direction {k}", color=style.MEASUREMENT, way=OnSphere(upper=True)
+            )
             for k, d in enumerate(_ring(30.0), start=1)
         },
         controls={
             "spin_deg": Slider(0, 60, 0, step=5, label="spin between poses (deg)"),
             "std_rot_deg": Slider(0.0, 0.5, 0.1, step=0.05, label="orientation noise (deg)"),
         },
-        view=View(-60, 30, center=(0, 0, 0.25)),
-        constrain=_on_sphere,
+        view=View(-60, 30, center=(0, 0, 0.4), eye=6.0),
         presets={"Narrow cone": {f"D{k}": tuple(d) for k, d in enumerate(_ring(3.0), start=1)}},
         fail={"spin_deg": 60, **{f"D{k}": (0.0, 0.0, 1.0) for k in range(1, 7)}},
         describe=sentence,
@@ -163,9 +157,10 @@ def swirl():
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.2, 1))
-        space = Scene(left, radius=95, half_width=95)
+        space = Scene(left, radius=95, half_width=95, floor=-12.0, unit="mm")
+        space.fixed(space.body(*draw.anvil(), name="anvil"), np.eye(4))
         trail = space.points(**style.look("measurement", markersize=4))
-        shaft = space.line(color=style.TRUTH, linewidth=3)
+        tool = space.body(*draw.tool(100.0, 4.0), name="tool")
         frame = space.triad("F", 35)
         point = space.points(color=style.TRUTH, linestyle="none", marker="o", markersize=9)
         space.fixed(point, np.zeros(3))
@@ -177,7 +172,7 @@ def swirl():
 
         def update(state, result):
             trail.set(result["trail"])
-            shaft.set(np.array([result["T"][:3, 3], np.zeros(3)]))
+            tool.set(result["T"])
             frame.set(result["T"])
             tip.set(result["tip_seen"])
             space.draw(state["view"])
@@ -194,7 +189,7 @@ def swirl():
             "std_trans": Slider(0.0, 1.0, 0.2, step=0.05, label="noise (mm)"),
         },
         play=Play(5.7, 0.1),
-        view=View(-60, 15, center=(0, 0, 50)),
+        view=View(-60, 18, center=(0, 0, 50), eye=600.0),
         fail={"cone_deg": 0.0, "t": 5.7},
         describe=_swirl_sentence,
     )

@@ -1,0 +1,182 @@
+"""Scenes in space in real JupyterLab, in headless Chromium: how fast they open, turn and follow, and what ten of them
+cost.
+
+    python tests/bench/scene_rate.py [--seconds 3] [--drags 60]
+
+A scene of 60 bodies (about 15,000 triangles) and 2,000 points is turned by the mouse: pictures per second, which the
+page draws without the kernel. The TX40's flange is dragged: from the pointer's event to the picture drawn with what
+Python computed. Opening: from running the cell to the first picture drawn in space, the first on the page (which loads
+the drawing) and the next. Memory: what ten Stages add to the page's own heap and to the browser's renderer process.
+P is the time of 1000 products of two 3x3 matrices, as in peers.py: others have the machine where it is large.
+"""
+
+import argparse
+import statistics
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "browser")]
+
+import driver
+
+CROWD = """
+import numpy as np
+from labkit.stage import Slider, Stage, View, scene3d_solids as solids, style
+from labkit.stage.scene3d import Scene
+def scene(fig):
+    space = Scene(fig.subplots(), radius=500, floor=-100, unit="mm")
+    balls = [space.body(solids.sphere(30, 8)) for _ in range(34)]
+    balls += [space.body(solids.cylinder(15, 0, 60), solids.sphere(6, 3)) for _ in range(26)]
+    cloud = space.points(**style.look("measurement"))
+    rng = np.random.default_rng(0)
+    cloud.set(rng.uniform(-400, 400, (2000, 3)))
+    places = rng.uniform(-350, 350, (60, 3))
+    def update(state, result):
+        for ball, place in zip(balls, places):
+            T = np.eye(4)
+            T[:3, 3] = place + (0, 0, state["up"])
+            ball.set(T)
+        space.draw(state["view"])
+    return space.artists, update
+Stage("crowd", scene=scene, compute=lambda state: None, fail={"up": 50.0},
+      controls={"up": Slider(0.0, 100.0, 0.0)}, view=View(eye=3000))
+"""
+ARM = "from labkit.chapters.ch06_tracker import stages\nstages.tx40()"
+DRAWN = "number => document.querySelectorAll('.labkit-stage .picture[data-pictures]').length > number"
+OPENING = """async (number) => {
+    const start = performance.now();
+    window.jupyterapp.commands.execute("notebook:run-cell-and-select-next");
+    while (document.querySelectorAll(".labkit-stage .picture[data-pictures]").length <= number)
+    {
+        document.querySelectorAll(".labkit-stage")[number]?.scrollIntoView({block: "nearest"});
+        await new Promise(resolve => setTimeout(resolve, 5));
+    }
+    return performance.now() - start;
+}"""
+WATCH = """(node) => {
+    window.__sent = null; window.__late = []; let answered = 0;
+    const picture = node.querySelector(".picture");
+    window.addEventListener("pointermove", () => { window.__sent ??= performance.now(); }, true);
+    new MutationObserver(() => { answered = performance.now(); }).observe(node, {attributes: true, attributeFilter: ["data-picture"]});
+    new MutationObserver(() => {
+        if (window.__sent === null || answered < window.__sent) return;
+        window.__late.push(performance.now() - window.__sent); window.__sent = null;
+    }).observe(picture, {attributes: true, attributeFilter: ["data-pictures"]});
+}"""
+
+
+def products():
+    a, b = np.random.default_rng(0).normal(size=(2, 3, 3))
+    start = time.perf_counter()
+    for _ in range(1000):
+        a @ b
+    return 1e3 * (time.perf_counter() - start)
+
+
+def renderer_megabytes():
+    """Resident memory of Chromium's renderer processes."""
+    sizes = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            if b"--type=renderer" in (folder / "cmdline").read_bytes():
+                sizes.append(int((folder / "statm").read_text().split()[1]) * 4096 / 1e6)
+        except OSError:
+            pass
+    return sum(sizes)
+
+
+def heap_megabytes(page, session):
+    session.send("HeapProfiler.collectGarbage")
+    return session.send("Runtime.getHeapUsage")["usedSize"] / 1e6
+
+
+def drag(page, box, seconds, at=(0.3, 0.2)):
+    x, y = box["x"] + at[0] * box["width"], box["y"] + at[1] * box["height"]
+    page.mouse.move(x, y)
+    page.mouse.down()
+    start, k = time.perf_counter(), 0
+    while time.perf_counter() - start < seconds:
+        k += 1
+        page.mouse.move(x + 80 * np.sin(k / 15), y + 25 * np.sin(k / 22))
+        page.wait_for_timeout(6)
+    page.mouse.up()
+    return time.perf_counter() - start
+
+
+def turning(page, stage, seconds):
+    """Pictures per second while the mouse turns the view."""
+    picture = stage.locator(".picture")
+    count = lambda: int(picture.get_attribute("data-pictures"))  # noqa: E731
+    drag(page, picture.bounding_box(), 1.0)
+    before = count()
+    took = drag(page, picture.bounding_box(), seconds)
+    return (count() - before) / took
+
+
+def following(page, stage, drags):
+    """Milliseconds from the pointer's event to the picture in space with what Python computed."""
+    stage.evaluate(WATCH)
+    box = stage.locator("[data-handle=flange]").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for k in range(drags):
+        page.mouse.move(x - 60 * np.sin(k / 9), y - 40 * np.sin(k / 13))
+        page.wait_for_timeout(90)
+    page.mouse.up()
+    return page.evaluate("() => window.__late")[3:]
+
+
+def server():
+    words = [sys.executable, "-m", "jupyterlab", "--no-browser", "--LabApp.expose_app_in_browser=True", "--ServerApp.port=0",
+             "--ServerApp.kernel_websocket_connection_class=labkit.stage.connection.PromptConnection"]  # fmt: skip
+    return driver.server([*words, "--allow-root"], PYTHONPATH=str(ROOT))
+
+
+def main():
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--seconds", type=float, default=3.0)
+    options.add_argument("--drags", type=int, default=60)
+    chosen = options.parse_args()
+    print(f"P = {products():.2f} ms")
+    cells = ["from labkit.chapters.ch06_tracker import stages", CROWD.strip(), ARM, *[ARM] * 9]
+    with driver.notebook_of(*cells) as notebook, server() as address, driver.page_of(driver.find_browser()) as page:
+        driver.open_notebook(page, address, notebook)
+        session = page.context.new_cdp_session(page)
+        page.locator(".jp-Notebook:visible .jp-CodeCell").first.click()
+        page.keyboard.press("Shift+Enter")
+        driver.wait_until_idle(page)
+        before = heap_megabytes(page, session), renderer_megabytes()
+        times = []
+        for k in range(11):
+            times.append(page.evaluate(OPENING, k))
+            if k in (0, 1):
+                stage = page.locator(".labkit-stage").nth(k)
+                stage.scroll_into_view_if_needed()
+                page.wait_for_timeout(1500)
+                if k == 0:
+                    print(f"triangles: {stage.locator('.picture').get_attribute('data-triangles')}")
+                    print(f"turning 60 bodies and 2,000 points: {turning(page, stage, chosen.seconds):.0f} pictures/s")
+                else:
+                    print(f"turning the TX40: {turning(page, stage, chosen.seconds):.0f} pictures/s")
+                    late = following(page, stage, chosen.drags)
+                    print(f"flange to picture: median {statistics.median(late):.0f} ms, 95 % {np.percentile(late, 95):.0f} ms "
+                          f"({len(late)} pictures)")  # fmt: skip
+                    page.wait_for_timeout(1500)
+                    first = heap_megabytes(page, session), renderer_megabytes()
+        page.wait_for_timeout(2500)
+        after = heap_megabytes(page, session), renderer_megabytes()
+        print(
+            f"opening: the first {times[0]:.0f} ms, the next {statistics.median(times[1:]):.0f} ms (median of {len(times) - 1})"
+        )
+        print(f"page: two Stages add {first[0] - before[0]:.0f} MB of heap, nine more {after[0] - first[0]:.0f} MB; "
+              f"the renderer's process {first[1] - before[1]:.0f} and {after[1] - first[1]:.0f} MB")  # fmt: skip
+        print(f"complaints in the console: {page.complaints or 'none'}; P = {products():.2f} ms")
+
+
+if __name__ == "__main__":
+    main()
