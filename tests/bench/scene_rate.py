@@ -46,10 +46,10 @@ Stage("crowd", scene=scene, compute=lambda state: None, fail={"up": 50.0},
       controls={"up": Slider(0.0, 100.0, 0.0)}, view=View(eye=3000))
 """
 ARM = "from labkit.chapters.ch06_tracker import stages\nstages.tx40()"
-DRAWN = "number => document.querySelectorAll('.labkit-stage .picture[data-pictures]').length > number"
 OPENING = """async (number) => {
     const start = performance.now();
-    window.jupyterapp.commands.execute("notebook:run-cell-and-select-next");
+    window.jupyterapp.shell.currentWidget.content.activeCellIndex = number + 1;
+    window.jupyterapp.commands.execute("notebook:run-cell");
     while (document.querySelectorAll(".labkit-stage .picture[data-pictures]").length <= number)
     {
         document.querySelectorAll(".labkit-stage")[number]?.scrollIntoView({block: "nearest"});
@@ -61,11 +61,12 @@ WATCH = """(node) => {
     window.__sent = null; window.__late = []; let answered = 0;
     const picture = node.querySelector(".picture");
     window.addEventListener("pointermove", () => { window.__sent ??= performance.now(); }, true);
-    new MutationObserver(() => { answered = performance.now(); }).observe(node, {attributes: true, attributeFilter: ["data-picture"]});
-    new MutationObserver(() => {
+    const look = (place, name, then) => new MutationObserver(then).observe(place, {attributes: true, attributeFilter: [name]});
+    look(node, "data-picture", () => { answered = performance.now(); });
+    look(picture, "data-pictures", () => {
         if (window.__sent === null || answered < window.__sent) return;
         window.__late.push(performance.now() - window.__sent); window.__sent = null;
-    }).observe(picture, {attributes: true, attributeFilter: ["data-pictures"]});
+    });
 }"""
 
 
@@ -132,9 +133,10 @@ def following(page, stage, drags):
 
 
 def server():
-    words = [sys.executable, "-m", "jupyterlab", "--no-browser", "--LabApp.expose_app_in_browser=True", "--ServerApp.port=0",
-             "--ServerApp.kernel_websocket_connection_class=labkit.stage.connection.PromptConnection"]  # fmt: skip
-    return driver.server([*words, "--allow-root"], PYTHONPATH=str(ROOT))
+    words = [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", "--ServerApp.port=0"]
+    words += ["--LabApp.expose_app_in_browser=True"]
+    words += ["--ServerApp.kernel_websocket_connection_class=labkit.server.connection.PromptConnection"]
+    return driver.server(words, PYTHONPATH=str(ROOT))
 
 
 def main():
@@ -164,15 +166,13 @@ def main():
                 else:
                     print(f"turning the TX40: {turning(page, stage, chosen.seconds):.0f} pictures/s")
                     late = following(page, stage, chosen.drags)
-                    print(f"flange to picture: median {statistics.median(late):.0f} ms, 95 % {np.percentile(late, 95):.0f} ms "
-                          f"({len(late)} pictures)")  # fmt: skip
+                    median, most = statistics.median(late), np.percentile(late, 95)
+                    print(f"flange to picture: median {median:.0f} ms, 95 % {most:.0f} ms ({len(late)} pictures)")
                     page.wait_for_timeout(1500)
                     first = heap_megabytes(page, session), renderer_megabytes()
         page.wait_for_timeout(2500)
         after = heap_megabytes(page, session), renderer_megabytes()
-        print(
-            f"opening: the first {times[0]:.0f} ms, the next {statistics.median(times[1:]):.0f} ms (median of {len(times) - 1})"
-        )
+        print(f"opening: the first {times[0]:.0f} ms, the next {statistics.median(times[1:]):.0f} ms (median of 10)")
         print(f"page: two Stages add {first[0] - before[0]:.0f} MB of heap, nine more {after[0] - first[0]:.0f} MB; "
               f"the renderer's process {first[1] - before[1]:.0f} and {after[1] - first[1]:.0f} MB")  # fmt: skip
         print(f"complaints in the console: {page.complaints or 'none'}; P = {products():.2f} ms")

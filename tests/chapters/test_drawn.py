@@ -210,7 +210,9 @@ def test_swirling_tool_reaches_from_flange_to_pivot():
     origin = stage.result["T"][:3, 3]
     assert np.linalg.norm(origin) == pytest.approx(100.0)  # the tip is 100 mm from the flange
     assert origin[2] == pytest.approx(100 * np.cos(np.deg2rad(25)))  # on a cone of 25 deg, the flange above
-    assert_along(stage, "tool", np.zeros(3), origin)
+    tip = origin + stage.result["T"][:3, :3] @ [0, 0, -100]  # the measured one: 0.05 deg of noise move it 0.1 mm
+    assert np.linalg.norm(tip) < 0.5
+    assert_along(stage, "tool", tip, origin)
     assert_drawn(stage, [origin, origin + 35 * stage.result["T"][:3, 0]])
 
 
