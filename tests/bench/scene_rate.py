@@ -61,7 +61,8 @@ WATCH = """(node) => {
     window.__sent = null; window.__late = []; let answered = 0;
     const picture = node.querySelector(".picture");
     window.addEventListener("pointermove", () => { window.__sent ??= performance.now(); }, true);
-    const look = (place, name, then) => new MutationObserver(then).observe(place, {attributes: true, attributeFilter: [name]});
+    const look = (place, name, then) =>
+        new MutationObserver(then).observe(place, {attributes: true, attributeFilter: [name]});
     look(node, "data-picture", () => { answered = performance.now(); });
     look(picture, "data-pictures", () => {
         if (window.__sent === null || answered < window.__sent) return;
