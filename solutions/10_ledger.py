@@ -6,7 +6,7 @@
 # **What you will learn.** What a printed digit hides, what it takes to call a number a misprint, and what a document must publish so that
 # others can check it.
 #
-# **What you need.** Any of the chapters before. About 30 minutes, and as long as the table keeps you.
+# **What you need.** Any of the chapters before. About 60 minutes, and as long as the table keeps you.
 
 # %% notation [markdown]
 # | status | meaning |
@@ -25,10 +25,13 @@
 # %% setup
 from functools import partial
 
+import numpy as np
 from IPython.display import HTML, Markdown
 
 from labkit.chapters.ch10_ledger.table import LedgerTable
 from labkit.documents import ledger, pages
+from labkit.documents.report import printed as report
+from labkit.documents.slips import single_slips
 from labkit.exercises import course
 
 ex = course("10-ledger")
@@ -56,6 +59,7 @@ ex.predict("digits", guess, reveal=partial(LedgerTable, found))
 # A printed number is an interval. Half a unit of its last digit may have been rounded away: 1.05 can be anything from 1.045 to 1.055. Mind the decimal comma of the
 # German and Czech documents, and exponents.
 
+
 # %% half_unit
 @ex.half_unit
 def half_unit(printed):
@@ -68,14 +72,45 @@ def half_unit(printed):
     ### END SOLUTION
 
 
+# %% bound-text [markdown]
+# ## What the inputs hide
+#
+# A result computed from printed numbers inherits what each of them hides. Move one input at a time by its half unit, up and down, and see how far the result
+# goes; the larger move counts, and the moves of all inputs add up. That is the *bound* of the table, to first order, and the only one it knows: none is chosen.
+
+
+# %% bound
+@ex.bound
+def bound(f, printed):
+    """Return how far rounding can move f(x): printed is a list of strings, f takes the array of their numbers."""
+    ### BEGIN SOLUTION
+    x, found = np.array([float(text.replace(",", ".")) for text in printed]), 0.0
+    for k, text in enumerate(printed):
+        step = half_unit(text) * np.eye(len(x))[k]
+        found += max(abs(f(x + step) - f(x)), abs(f(x - step) - f(x)))
+    return found
+    ### END SOLUTION
+
+
+# %% bound-used
+def fused(z):
+    """The lecture's fusion of two measured positions with variances 0.25 and 1 and the prior 0 with variance 20."""
+    return (z[0] / 0.25 + z[1]) / (1 / 0.25 + 1 + 1 / 20)
+
+
+print(f"fused: {fused([9.4, 10.6]):.4f}, bound {bound(fused, ['9.4', '10.6']):.4f}; the page prints 9.6")
+sides = ["98.5415", "99.9165", "181.6006"]  # x_P' of the thesis, table 6-3
+print(f"length: {np.linalg.norm([98.5415, 99.9165, 181.6006]):.4f} mm, bound {bound(np.linalg.norm, sides):.1e} mm")
+
 # %% status-text [markdown]
 # ## The words
 #
 # The status follows from the printed number, the computed value, and what is known about it: a *bound*, by which the digits of the printed
 # inputs can move the value; whether a *misprint* is proved, all single slips elsewhere having been tried; whether inputs had to be *simulated*. A simulation that lands within bound
 # and half unit together is *consistent*; one that does not decides nothing: *not computable*. Otherwise the milder word wins: *reproduced* within the half unit, *rounding* within
-# half unit plus bound, *misprint* where one is proved, *contradiction* where nothing else is left. (Digits that were cut off, and claims, come later.) Printed numbers come as strings, some with a decimal comma.
+# half unit plus bound, *misprint* where one is proved, *contradiction* where nothing else is left. (*Cut off* and *refuted* are left out here.) Printed numbers come as strings, some with a decimal comma.
 # What we chose ourselves: the order of the words, and what counts as one slip.
+
 
 # %% status
 @ex.status
@@ -93,6 +128,45 @@ def status(printed, value, bound, misprint, simulated):
     return "misprint" if misprint else "contradiction"
     ### END SOLUTION
 
+
+# %% suspects-text [markdown]
+# ## Who slipped?
+#
+# Numbers that disagree accuse everybody. A *misprint* is proved when a single slip of one number explains everything, and no slip of another does. `single_slips(text)`
+# lists all numbers one slip away: a sign lost, digits swapped, one wrong, one too many, one missing, the point moved. Entries and their average were printed; find everyone who could be it.
+
+
+# %% suspects
+@ex.suspects
+def suspects(entries, average):
+    """Return the set of positions whose single slip explains a disagreement; that of the average is len(entries).
+
+    entries: list of strings; average: a string. Rounding explains half units; where that suffices, the set is empty.
+    """
+    ### BEGIN SOLUTION
+
+    def agree(numbers):
+        x, h = [float(text) for text in numbers], [half_unit(text) for text in numbers]
+        return abs(np.mean(x[:-1]) - x[-1]) <= np.mean(h[:-1]) + h[-1] + 1e-12
+
+    printed, found = [*entries, average], set()
+    for k, text in enumerate([] if agree(printed) else printed):
+        if any(agree([*printed[:k], other, *printed[k + 1 :]]) for other in single_slips(text)):
+            found.add(k)
+    return found
+    ### END SOLUTION
+
+
+# %% suspects-used
+table = report.table_d_texts()
+*runs, average, rozptyl = table[:, report.COLUMNS.index("max_mm")].tolist()
+print(f"largest errors {', '.join(runs)}; average {average}: suspects {suspects(runs, average)}")
+for text in ("6", "9"):
+    print(f"run 3 with {text}: variance {np.var(np.array([*runs[:2], text, *runs[3:]], float)):.4f}, printed {rozptyl}")
+
+# %% suspects-verdict [markdown]
+# Two suspects: run 3, whose 6 would be a 9, or the average, which may have lost a zero (9.0468). One more printed number, the variance (*Rozptyl*), clears the average. That is what the ledger
+# calls a misprint: the slip is in one place, and all that is printed around it has been asked.
 
 # %% totals-text [markdown]
 # ## The totals

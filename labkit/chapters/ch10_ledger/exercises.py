@@ -9,6 +9,7 @@ from ...documents.ledger import Computed, Row, judge
 from ...documents.rounding import half_unit
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction
+from .proofs import BOUND, SUSPECTS
 
 FORMS = ("d.0d0000", "dd", "d,d", "-0,dd0", "de-k", "d.d0ek", "-d000", "dd.d")  # d: any digit but 0, k: up to 5
 
@@ -311,6 +312,7 @@ CHAPTER = Chapter(
             ],
             draws=16,
         ),
+        BOUND,
         Exercise(
             "status",
             reference=status,
@@ -359,5 +361,6 @@ CHAPTER = Chapter(
             ],
             draws=len(COMPARISONS),
         ),
+        SUSPECTS,
     ],
 )

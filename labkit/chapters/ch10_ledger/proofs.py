@@ -1,0 +1,337 @@
+"""Chapter 10: two exercises, a rounding bound to propagate and a column of numbers with one slip in it."""
+
+import functools
+
+import numpy as np
+
+from ...documents.rounding import half_unit, number, propagate, read
+from ...documents.slips import explained_by, single_slips
+from ...exercises import metrics
+from ...exercises.engine import Exercise, Mistake
+
+# --- propagate a bound ---
+
+
+def total(x):
+    """The sum of all."""
+    return float(np.sum(x))
+
+
+def product(x):
+    """The product of all."""
+    return float(np.prod(x))
+
+
+def length(x):
+    """The length of the vector."""
+    return float(np.sqrt(np.sum(np.square(x))))
+
+
+def share(x):
+    """The first over the sum of all."""
+    return float(x[0] / np.sum(x))
+
+
+def last_power(x):
+    """The first times the square of the last, less the second."""
+    return float(x[0] * x[-1] ** 2 - x[1])
+
+
+FUNCTIONS = (total, product, length, share, last_power)
+
+
+def printed_inputs(rng, function):
+    """A function and two to four printed numbers; at least one of them is coarse, so that up and down differ."""
+    texts = [f"{rng.uniform(2, 9):.{rng.integers(0, 4)}f}" for _ in range(rng.integers(1, 4))]
+    texts.append(f"{rng.uniform(2, 9):.{rng.integers(0, 2)}f}")
+    texts = [("-" if rng.random() < 0.3 and function is not share else "") + text for text in texts]
+    return function, [text.replace(".", ",") if rng.random() < 0.2 else text for text in rng.permutation(texts)]
+
+
+INPUTS = tuple(functools.partial(printed_inputs, function=f) for f in FUNCTIONS)
+
+
+def bound(f, printed):
+    """How far rounding of the printed inputs can move f, to first order."""
+    return float(propagate(f, read(printed))[1])
+
+
+def _moves(f, printed, halves=half_unit):
+    """What f gains when each number goes up, and when each goes down, by its half unit; two lists."""
+    x = np.array([number(text) for text in printed])
+    steps = [halves(text) * np.eye(len(x))[k] for k, text in enumerate(printed)]
+    return [f(x + step) - f(x) for step in steps], [f(x - step) - f(x) for step in steps]
+
+
+def _larger(f, printed, halves=half_unit):
+    return np.abs(_moves(f, printed, halves)).max(axis=0)
+
+
+def _all_at_once(f, printed):
+    x, halves = read(printed)
+    return max(abs(f(x + halves) - f(x)), abs(f(x - halves) - f(x)))
+
+
+def _never_put_back(f, printed):
+    x, halves = read(printed)
+    moved, found = x.copy(), 0.0
+    for k, half in enumerate(halves):
+        moved[k] += half
+        found += abs(f(moved) - f(x))
+    return found
+
+
+def _through_float(text):
+    return half_unit(str(number(text)))
+
+
+BOUND = Exercise(
+    "bound",
+    reference=bound,
+    draw=INPUTS,
+    metric=metrics.Numbers(1e-9),
+    hints=(
+        "Move one number at a time by its half unit, up and down, and look at what f does.",
+        "Of the two moves of a number the larger one counts; the moves of all numbers add up, as absolute values.",
+        "`x = np.array([float(text.replace(',', '.')) for text in printed])\n"
+        "found = 0.0\n"
+        "for k, text in enumerate(printed):\n"
+        "    step = half_unit(text) * np.eye(len(x))[k]\n"
+        "    found += max(abs(f(x + step) - f(x)), abs(f(x - step) - f(x)))\n"
+        "return found`",
+    ),
+    mistakes=[
+        Mistake(
+            lambda f, p: float(sum(map(half_unit, p))),
+            "You added the half units themselves. What counts is how far each of them moves f.",
+        ),
+        Mistake(
+            lambda f, p: _larger(f, p, lambda text: 2 * half_unit(text)).sum(),
+            "You moved each number by a whole unit of its last digit. Rounding hides half of one.",
+        ),
+        Mistake(
+            _all_at_once,
+            "You moved all numbers at once: their moves may cancel. Move one at a time and add the absolute values.",
+        ),
+        Mistake(
+            lambda f, p: _larger(f, p).max(),
+            "That is the worst single number. All of them may be off at once: add the moves up.",
+        ),
+        Mistake(
+            lambda f, p: np.sqrt((_larger(f, p) ** 2).sum()),
+            "The root of the sum of squares is for random errors. A bound must hold in the worst case: add all moves.",
+        ),
+        Mistake(
+            lambda f, p: abs(sum(_moves(f, p)[0])),
+            "You added the moves with their signs, so that they cancel: take the absolute value of each first.",
+        ),
+        Mistake(
+            lambda f, p: np.abs(_moves(f, p)[0]).sum(),
+            "You moved the numbers up only. Where f is curved the way down can be the longer one: the larger counts.",
+        ),
+        Mistake(
+            lambda f, p: np.abs(_moves(f, p)[1]).sum(),
+            "You moved the numbers down only. Where f is curved the way up can be the longer one: the larger counts.",
+        ),
+        Mistake(
+            lambda f, p: np.abs(np.subtract(*_moves(f, p))).sum() / 2,
+            "Half of the way from down to up is the mean of the two moves. The larger one counts.",
+        ),
+        Mistake(
+            lambda f, p: np.abs(np.subtract(*_moves(f, p))).sum(),
+            "That is the whole way from down to up. A bound says how far f can be from its value: one side of it.",
+        ),
+        Mistake(
+            lambda f, p: np.minimum(*np.abs(_moves(f, p))).sum(),
+            "Of the way up and the way down you took the shorter: a bound must hold for the longer one.",
+        ),
+        Mistake(
+            _never_put_back,
+            "The numbers you moved before stay moved: put each back before the next one goes.",
+        ),
+        Mistake(
+            lambda f, p: _larger(f, p, _through_float).sum(),
+            "float() forgets how many digits were printed. Take the half unit from the string.",
+        ),
+        Mistake(
+            lambda f, p: bound(f, p) / abs(f(read(p).values)),
+            "That is a share of the value. The bound has the unit of f.",
+        ),
+        Mistake(
+            lambda f, p: bound(f, p) + f(read(p).values),
+            "You added the value. Wanted is how far it can be off.",
+        ),
+    ],
+    draws=15,
+)
+
+
+# --- prove a misprint ---
+
+
+AWAY = {"edge": -1, "beyond": -2, "far": 2}  # units from the rounded average, to the side it was not rounded to
+
+
+def column(rng, slip):
+    """Entries and their average as printed, with a slip in an entry, in the average, or nowhere.
+
+    With a slip in an entry the average is printed to its last digit. "edge", "beyond" and "far" print an average that
+    is 1 to 2, 3 to 4 and 4 to 5 half units away: entries and average together allow 2, each alone 1. "fine" prints it
+    with one digit more, and off by what the entries alone allow.
+    """
+    decimals, count = int(rng.integers(1, 4)), int(rng.integers(4, 6))
+    values = np.round(rng.uniform(2, 60, count) * rng.choice([-1, 1], count, p=[0.2, 0.8]), decimals)
+    unit, more = 10.0**-decimals, int(rng.integers(0, 2))
+    if slip in AWAY:
+        near = np.round(values.mean(), decimals)
+        if not 0.05 * unit < abs(values.mean() - near) < 0.3 * unit:
+            return column(rng, slip)
+        side = 1 if values.mean() <= near else -1
+        return [f"{value:.{decimals}f}" for value in values], f"{near + AWAY[slip] * side * unit:.{decimals}f}"
+    entries, average = [f"{value:.{decimals}f}" for value in values], f"{values.mean():.{decimals + more}f}"
+    if slip == "fine":
+        average = f"{values.mean() + 0.3 * unit * rng.choice([-1, 1]):.{decimals + 1}f}"
+    elif slip == "average":
+        average = _slipped(rng, average, "one digit wrong")
+    elif slip:
+        k, average = int(rng.integers(count)), f"{values.mean():.{decimals + 2}f}"
+        entries[k] = _slipped(rng, entries[k], slip)
+    return entries, average
+
+
+def _slipped(rng, text, kind):
+    """The number with one slip that moves it by more than a few units of its last digit."""
+    far = [
+        other
+        for other, how in single_slips(text).items()
+        if how == kind and abs(number(other) - number(text)) > 40 * half_unit(text)
+    ]
+    return str(rng.choice(far)) if far else f"{-number(text):.{len(text.partition('.')[2])}f}"
+
+
+COLUMNS = tuple(
+    functools.partial(column, slip=slip)
+    for slip in ("two digits swapped", "one digit wrong", "", "average", "sign lost", "fine", *AWAY)
+)
+
+
+def _agree(entries, average, allowed=None):
+    halves = [half_unit(text) for text in entries]
+    slack = sum(halves) / len(halves) + half_unit(average) if allowed is None else allowed(halves, half_unit(average))
+    off = abs(sum(map(number, entries)) / len(entries) - number(average))
+    return off <= slack * (1 + 1e-9) + 1e-12
+
+
+def suspects(entries, average):
+    """Positions of the printed numbers of which one slip explains why entries and average disagree."""
+    printed = dict(enumerate([*entries, average]))
+    return set(explained_by(printed, lambda d: _agree([d[k] for k in range(len(entries))], d[len(entries)])))
+
+
+def _search(agree=_agree, check=True, slips=single_slips, places=lambda n: range(n + 1), first=False, give=None):
+    """A variant of `suspects` that goes another way in one respect."""
+
+    def variant(entries, average):
+        if check and agree(entries, average):
+            return set()
+        found = set()
+        for k in places(len(entries)):
+            for other in slips([*entries, average][k]):
+                trial = [*entries, average]
+                trial[k] = other
+                if agree(trial[:-1], trial[-1]):
+                    found.add(give(k, other) if give else k)
+            if first and found:
+                break
+        return found
+
+    return variant
+
+
+def _only(kind):
+    return lambda text: [other for other, how in single_slips(text).items() if how == kind]
+
+
+def _against_the_sum(entries, average):
+    slack = sum(map(half_unit, entries)) + half_unit(average)
+    return abs(sum(map(number, entries)) - number(average)) <= slack * (1 + 1e-9)
+
+
+def _allow(rule):
+    return functools.partial(_agree, allowed=rule)
+
+
+SUSPECTS = Exercise(
+    "suspects",
+    reference=suspects,
+    draw=COLUMNS,
+    metric=metrics.Exactly(),
+    hints=(
+        "First: do entries and average agree as printed? Only if not, who could have slipped?",
+        "They agree where |mean - average| is at most the mean of the entries' half units plus the average's. Try "
+        "every slip of every number, the average too, one at a time.",
+        "`def agree(numbers):\n"
+        "    x, h = [float(t) for t in numbers], [half_unit(t) for t in numbers]\n"
+        "    return abs(np.mean(x[:-1]) - x[-1]) <= np.mean(h[:-1]) + h[-1] + 1e-12\n"
+        "printed = [*entries, average]\n"
+        "if agree(printed):\n"
+        "    return set()\n"
+        "return {k for k, text in enumerate(printed)\n"
+        "        if any(agree([*printed[:k], other, *printed[k + 1:]]) for other in single_slips(text))}`",
+    ),
+    mistakes=[
+        Mistake(
+            _search(check=False),
+            "Where entries and average agree as printed, nobody has slipped: return an empty set.",
+        ),
+        Mistake(
+            _search(places=lambda n: range(n)),
+            "The average was printed too, and can carry the slip: try it as well, as the last position.",
+        ),
+        Mistake(
+            _search(agree=_allow(lambda halves, own: 0.0)),
+            "All numbers were rounded: agreement to the last bit is too much to ask. Allow what their half units hide.",
+        ),
+        Mistake(
+            _search(agree=_allow(lambda halves, own: own)),
+            "The entries were rounded as well: their half units, divided by how many there are, add to the average's.",
+        ),
+        Mistake(
+            _search(agree=_allow(lambda halves, own: np.mean(halves))),
+            "The average was rounded as well: its half unit adds to the mean of the entries'.",
+        ),
+        Mistake(
+            _search(agree=_allow(lambda halves, own: 2 * (np.mean(halves) + own))),
+            "You allow whole units of the last digit. Rounding hides half of one.",
+        ),
+        Mistake(
+            _search(agree=_allow(lambda halves, own: sum(halves) + own)),
+            "The entries' half units go into an average too: divide their sum by how many there are.",
+        ),
+        Mistake(
+            _search(agree=_against_the_sum),
+            "You compare the sum with the average: divide by how many entries there are.",
+        ),
+        Mistake(
+            _search(first=True),
+            "You stop at the first that explains it. Whether another explains it as well is the point.",
+        ),
+        Mistake(
+            _search(give=lambda k, other: k + 1),
+            "Positions count from 0 here; the average's is the number of entries.",
+        ),
+        Mistake(
+            _search(give=lambda k, other: other),
+            "You return what would have to be printed. Wanted are the positions.",
+        ),
+        Mistake(
+            _search(slips=_only("two digits swapped")),
+            "Swapped digits are one kind of slip. `single_slips` lists them all.",
+        ),
+        Mistake(
+            _search(slips=_only("one digit wrong")),
+            "A wrong digit is one kind of slip. `single_slips` lists them all.",
+        ),
+    ],
+    draws=len(COLUMNS),
+)
