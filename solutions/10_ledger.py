@@ -149,11 +149,9 @@ def suspects(entries, average):
         x, h = [float(text) for text in numbers], [half_unit(text) for text in numbers]
         return abs(np.mean(x[:-1]) - x[-1]) <= np.mean(h[:-1]) + h[-1] + 1e-12
 
-    printed, found = [*entries, average], set()
-    for k, text in enumerate([] if agree(printed) else printed):
-        if any(agree([*printed[:k], other, *printed[k + 1 :]]) for other in single_slips(text)):
-            found.add(k)
-    return found
+    printed = [*entries, average]
+    slips = [(k, [*printed[:k], s, *printed[k + 1 :]]) for k, text in enumerate(printed) for s in single_slips(text)]
+    return set() if agree(printed) else {k for k, trial in slips if agree(trial)}
     ### END SOLUTION
 
 
@@ -206,12 +204,10 @@ from dataclasses import replace
 rows = [entry.row for entry in found if entry.status == "reproduced"]
 rows = [row for row in rows if row.printed.startswith("0.99")][:3]
 for row in rows:
-    other = replace(row, printed=row.printed[:-1]
-                    + str((int(row.printed[-1]) + 5) % 10))
+    other = replace(row, printed=row.printed[:-1] + str((int(row.printed[-1]) + 5) % 10))
     computed = ledger.compute(row)
     words = ledger.judge(row, computed), ledger.judge(other, computed)
-    print(f"{row.id:20} printed {row.printed}: {words[0]}, if it were {other.printed}: "
-          f"{words[1]}")
+    print(f"{row.id:20} printed {row.printed}: {words[0]}, if it were {other.printed}: {words[1]}")
 
 # %% in-practice [markdown]
 # ## In practice

@@ -833,14 +833,16 @@ def underdetermined():
     )
     J = J / np.linalg.norm(J, axis=0)
     ranks = [np.linalg.matrix_rank(J[: 3 * n], tol=1e-9) for n in range(1, 32)]
-    enough = [n for n, rank in enumerate(ranks, 1) if rank == J.shape[1]]
-    names = {4: "four"}
+    open_, four = J.shape[1] - max(ranks), next((n for n, rank in enumerate(ranks, 1) if rank == J.shape[1]), None)
     return Computed(
-        names.get(enough[0], str(enough[0])) if enough else "no number of poses suffices",
+        "vierfach unterbestimmtes Gleichungssystem"
+        if four == 4
+        else f"{open_} unknowns stay open with any number of poses",
         proof=(
-            f"Four poses give 12 equations for {J.shape[1]} unknowns, but all {len(J)} equations of the 31 "
-            "poses have rank "
-            f"{ranks[-1]}: the plate's pose enters by the one point T_BP x_P', so its three rotations stay free."
+            f"The sentence counts twelve unknowns against three equations a measurement, so that four should do. All "
+            f"{len(J)} equations of the 31 poses have rank {ranks[-1]}: the plate's pose enters by the one "
+            "point T_BP x_P', so "
+            "its three rotations stay free."
         ),
     )
 
