@@ -25,6 +25,8 @@ import scipy.linalg
 from labkit.chapters.ch02_chaining import stages
 from labkit.documents.lab_sheet import printed as lab_sheet
 from labkit.exercises import course
+from labkit.files import systems
+from labkit.files.text import number_in
 from labkit.geometry import chaining
 from labkit.geometry.frames import relative
 from labkit.geometry.lie import exp_se3, log_se3
@@ -314,6 +316,78 @@ guess = ...  # your code here
 guess = "it opens again"
 ### END SOLUTION
 ex.predict("two_loops", guess, reveal=stages.two_loops)
+
+# %% files [markdown]
+# ## The sheet's files (*further*)
+#
+# The sheet's programs begin and end with files: `LoadSys` reads the three points of a system, `LoadSysN` eight systems (`4_2_System1.txt` to `4_2_System8.txt`), `LoadCalFrames` the poses of chapter 3 from
+# `Kreisel.txt`, `SaveCal` writes the tool to `Kalibrierung.txt`. None of them is printed. So here is a form of our own: a line a point, $x$ $y$ $z$ in mm, origin first; what follows a `#` is a comment;
+# empty lines count for nothing; some write 1,5 for 1.5.
+#
+# A reader has two duties. It returns what is there. And where something is wrong, it says **in one sentence what it expected, what came, and in which line**: `if (!LoadSys(...)) return EXIT_FAILURE;` tells the
+# person at the machine nothing. `number_in("1.5")` is 1.5, and NaN where there is no number.
+
+# %% read_system
+@ex.read_system
+def read_system(text):
+    """Return origin, x_point and y_point, shape (3, 3), from the text of a file.
+
+    Raises ValueError, naming the line, where it holds something else than such points."""
+    ### BEGIN SOLUTION
+    points = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        content = line.split("#")[0].replace(",", ".")
+        entries = [number_in(entry) for entry in content.split()]
+        if entries and not (len(entries) == 3 and np.isfinite(entries).all()):
+            raise ValueError(f"line {number}: expected x y z, got {line!r}")
+        points += [entries] if entries else []
+    if len(points) != 3:
+        raise ValueError(f"expected three points, got {len(points)}")
+    return np.array(points)
+    ### END SOLUTION
+
+
+# %% write-text [markdown]
+# And back. A file that is read must give the numbers that were written, all of them, to the last bit.
+
+# %% write_system
+@ex.write_system
+def write_system(points):
+    """Return a text from which read_system gets the same points, shape (3, 3), back."""
+    ### BEGIN SOLUTION
+    return "\n".join(" ".join(repr(float(v)) for v in point) for point in points)
+    ### END SOLUTION
+
+
+# %% round-trip
+points = lab_sheet.station_points().reshape(-1, 3, 3)
+texts = [write_system(three) for three in points]
+back = np.array([read_system(text) for text in texts])
+again = chaining.transforms_from_points(back.reshape(4, 2, 3, 3))
+print("eight systems, written and read:", bool((back == points).all()))
+print("the chain is the same to the last bit:", bool((again == measured).all()))
+six = np.array([[f"{v:.6f}" for v in three.ravel()] for three in points]).astype(float)
+print(f"six decimals would lose up to {np.abs(six.reshape(points.shape) - points).max():.0e} mm")
+
+# %% faults
+good = texts[0].splitlines()
+faults = [good[0], "186.6 -132,2 x"], [good[0], good[1], "1 2"], good[:2], [*good, good[0]]
+for lines in faults:
+    try:
+        read_system("\n".join(lines))
+    except ValueError as refusal:
+        print(refusal)
+
+# %% save-cal
+import tempfile
+from pathlib import Path
+
+with tempfile.TemporaryDirectory() as folder:
+    path = Path(folder) / "Kalibrierung.txt"
+    tip, pivot = [-1.747805, 44.586360, -87.648108], [-253.032904, 107.040686, -3.215224]
+    systems.save_calibration(path, tip, pivot)
+    print(path.read_text())
+    print("tip and pivot, read back:", *systems.load_calibration(path))
 
 # %% in-practice [markdown]
 # ## In practice

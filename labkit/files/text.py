@@ -51,6 +51,14 @@ class Table:
         return np.array([[float(re.sub("[dD]", "e", entry)) for entry in row] for row in picked])
 
 
+def number_in(entry):
+    """An entry as a float; NaN where it is no number."""
+    try:
+        return float(entry)
+    except ValueError:
+        return float("nan")
+
+
 def shown(entry):
     """An entry as a refusal repeats it."""
     return "an empty cell" if entry == "" else repr(entry if len(entry) <= SHOWN else entry[:SHOWN] + "...")

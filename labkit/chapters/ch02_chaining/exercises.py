@@ -9,6 +9,7 @@ from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
 from ...geometry import chaining, frames
 from ...geometry.lie import exp_se3, log_se3, nearest_rotation
+from . import beyond
 
 
 def random_pose(rng):
@@ -936,5 +937,6 @@ CHAPTER = Chapter(
             why="Closing B changes the common link, and A contains it. Doing it the other way round moves the leftover to B; "
             "only all links at once can close both.",
         ),
+        *beyond.FILES,
     ],
 )

@@ -1,0 +1,241 @@
+"""Exercises of chapter 2 beyond its core: the lab sheet's files, read and written."""
+
+import functools
+
+import numpy as np
+
+from ...exercises import metrics
+from ...exercises.engine import Exercise, Mistake
+from ...files.text import number_in
+
+# --- draws ---
+
+
+def system(rng):
+    """Three points of a system (mm), one number of which needs all its digits."""
+    points = rng.uniform(-500, 500, (3, 3)) * 10.0 ** rng.integers(-3, 1, (3, 3))
+    points[rng.integers(3), rng.integers(3)] = 0.1 + 0.2
+    return points
+
+
+def text_of_system(rng, comments=False, commas=False):
+    """The text of a system as someone typed it: blanks or tabs, empty lines, perhaps comments and decimal commas."""
+    lines = []
+    for point in system(rng).round(int(rng.integers(5, 9))):
+        lines += ["# measured by hand"] * comments + [""] * int(rng.random() < 0.4)
+        blank = str(rng.choice([" ", "   ", "\t"]))
+        line = blank.join(repr(float(value)) for value in point)
+        lines.append(" " * int(rng.integers(3)) + line + "  # touched twice" * (comments and rng.random() < 0.5))
+    text = "\n".join(lines) + "\n" * int(rng.integers(3))
+    return (text.replace(".", ",") if commas else text,)
+
+
+TEXTS = tuple(
+    functools.partial(text_of_system, comments=comments, commas=commas)
+    for comments, commas in ((False, False), (True, False), (False, True), (True, True))
+)
+
+
+# --- references and wrong variants ---
+
+
+def read_system(text):
+    """Reference of the exercise: the three points, or one sentence with the line."""
+    points = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        entries = [number_in(entry) for entry in line.split("#")[0].replace(",", ".").split()]
+        if entries and not (len(entries) == 3 and np.isfinite(entries).all()):
+            raise ValueError(f"line {number}: expected three numbers x y z, got {line!r}")
+        points += [entries] if entries else []
+    if len(points) != 3:
+        raise ValueError(f"expected three points, got {len(points)}")
+    return np.array(points)
+
+
+def write_system(points):
+    """Reference of the exercise: a line a point, all digits."""
+    return "\n".join(" ".join(repr(float(value)) for value in point) for point in points) + "\n"
+
+
+def _reading(change):
+    """The same with each line changed before it is taken apart."""
+    return lambda text: read_system("\n".join(change(line) for line in text.splitlines()))
+
+
+def _plainly(text, skip=lambda line: not line.strip(), entry=float):
+    """Splits lines and converts entries, nothing else."""
+    return np.array([[entry(e) for e in line.split()] for line in text.splitlines() if not skip(line)])
+
+
+def _written(form):
+    """A line a point in another format."""
+    return lambda points: "\n".join(" ".join(format(value, form) for value in point) for point in points)
+
+
+class ReadBack(np.ndarray):
+    """Points that were read from a student's text, told from an array that was returned."""
+
+
+class reads_back(metrics.Metric):
+    """What is read back from a text, beside what was to be written; nothing may be lost."""
+
+    def admit(self, result, expected):
+        if isinstance(result, ReadBack):
+            return result
+        if not isinstance(result, str):
+            raise metrics.Refused(f"expected a text, got {metrics._describe(result)}")
+        try:
+            return read_system(result).view(ReadBack)
+        except ValueError as fault:
+            raise metrics.Refused(f"what you wrote cannot be read: {fault}") from None
+
+    def deviations(self, result, expected):
+        off = float(np.abs(result - (read_system(expected) if isinstance(expected, str) else expected)).max())
+        return [metrics.Deviation("what is read back", off, "mm", 0.0)]
+
+    def parts(self, result, expected):
+        return [("", self, result, read_system(expected) if isinstance(expected, str) else expected)]
+
+
+def names_the_line(student, rng):
+    """A sentence about the first fault that is not refused with its line, None if all are."""
+    good = [" ".join(repr(float(value)) for value in point) for point in system(rng).round(3)]
+    at = int(rng.integers(1, 4))
+    for what, bad in (
+        ("a word in place of a number", "12.5 seven 3.0"),
+        ("two numbers", "12.5 3.0"),
+        ("four numbers", "12.5 3.0 4.0 5.0"),
+        ("nan", "12.5 nan 3.0"),
+    ):
+        lines = ["# a comment", *good]
+        lines[at] = bad
+        told = _refusal(student, "\n".join(lines))
+        if told is None:
+            return f"line {at + 1} of a file holds {what}: that must raise a ValueError, yours returned something."
+        if str(at + 1) not in told:
+            return f"line {at + 1} of a file holds {what}: your sentence does not name the line. It says: {told!r}."
+    for count in (2, 4):
+        if _refusal(student, "\n".join([*good, good[0]][:count])) is None:
+            return f"a file of {count} points is no system: that must raise a ValueError, yours returned something."
+    return None
+
+
+def _refusal(student, text):
+    try:
+        student(text)
+    except ValueError as refusal:
+        return str(refusal)
+    return None
+
+
+FILES = [
+    Exercise(
+        "read_system",
+        reference=read_system,
+        draw=TEXTS,
+        metric=metrics.Numbers(1e-12, "mm"),
+        properties=(names_the_line,),
+        hints=(
+            "Go through the lines with their numbers; a line that holds nothing but a comment holds no point.",
+            "Cut each line at `#`, make commas points, split it at blanks. Three finite numbers are a point; whatever else is left is a fault, and its line is named.",
+            "`points = []\nfor number, line in enumerate(text.splitlines(), start=1):\n"
+            "    entries = [number_in(e) for e in line.split('#')[0].replace(',', '.').split()]\n"
+            "    if entries and not (len(entries) == 3 and np.isfinite(entries).all()):\n"
+            "        raise ValueError(f'line {number}: expected x y z, got {line!r}')\n"
+            "    points += [entries] if entries else []\n"
+            "if len(points) != 3:\n    raise ValueError(f'expected three points, got {len(points)}')\n"
+            "return np.array(points)`",
+        ),
+        mistakes=[
+            Mistake(
+                _plainly,
+                "A line that begins with # holds a comment, and what stands behind a # in a line as well: cut it off before you split the line.",
+                id="read-comments",
+            ),
+            Mistake(
+                lambda text: _plainly("\n".join(line.split("#")[0] for line in text.splitlines())),
+                "Some write 1,5 for 1.5: replace the comma before you make a number of it.",
+                id="read-comma",
+            ),
+            Mistake(
+                _reading(lambda line: line.replace(",", "")),
+                "You dropped the decimal comma: 1,5 became 15. Replace it by a point.",
+                id="read-comma-dropped",
+            ),
+            Mistake(
+                lambda text: read_system(text).T,
+                "Your points stand in columns. One row a point: origin, x_point, y_point.",
+                id="read-columns",
+            ),
+            Mistake(
+                lambda text: read_system(text)[[0, 2, 1]],
+                "The last two points have changed places: the point on the x axis is the second line.",
+                id="read-order",
+            ),
+            Mistake(
+                lambda text: read_system(text) - read_system(text)[0],
+                "You subtracted the origin. The three points are returned as they stand in the file.",
+                id="read-relative",
+            ),
+            Mistake(
+                lambda text: read_system(text).ravel(),
+                "These are the right nine numbers in one row: shape (3, 3), one row a point.",
+                id="read-flat",
+            ),
+            Mistake(
+                lambda text: read_system(text).round(3),
+                "You rounded. A reader keeps what the file holds.",
+                id="read-rounded",
+            ),
+        ],
+    ),
+    Exercise(
+        "write_system",
+        reference=write_system,
+        draw=lambda rng: (system(rng),),
+        fixed={"points": "a system is always three points"},
+        metric=reads_back(),
+        hints=(
+            "One line a point, blanks in between. How many digits does a double need so that none is lost?",
+            "17 significant digits always suffice, and so does `repr`, which writes as few as needed.",
+            "`return '\\n'.join(' '.join(repr(float(v)) for v in point) for point in points)`",
+        ),
+        mistakes=[
+            Mistake(
+                _written(".6f"),
+                "Six decimals, as the sheet prints them, lose the rest: what is read back is another number. Take 17 significant digits, or `repr`.",
+                id="write-six",
+            ),
+            Mistake(
+                _written(".3f"),
+                "Three decimals look tidy and lose the rest. Take 17 significant digits, or `repr`.",
+                id="write-three",
+            ),
+            Mistake(
+                _written("g"),
+                "`g` keeps six significant digits, and so does `{v:g}`. Take 17, or `repr`.",
+                id="write-g",
+            ),
+            Mistake(
+                _written(".15g"),
+                "15 significant digits nearly suffice: 0.30000000000000004 comes back as 0.3. It takes 17, or `repr`.",
+                id="write-fifteen",
+            ),
+            Mistake(
+                _written(".16g"),
+                "16 significant digits suffice for many numbers, not for all. It takes 17, or `repr`.",
+                id="write-sixteen",
+            ),
+            Mistake(
+                lambda points: write_system(points.T),
+                "Your lines hold the columns: x of all points, then y, then z. One line a point.",
+                id="write-columns",
+            ),
+            Mistake(
+                lambda points: write_system(points.astype(np.float32)),
+                "You wrote single precision, seven digits. Keep the doubles.",
+                id="write-single",
+            ),
+        ],
+    ),
+]
