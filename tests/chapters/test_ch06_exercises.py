@@ -8,6 +8,7 @@ import pytest
 from labkit.chapters.ch06_tracker import exercises as ch06
 from labkit.exercises.engine import CORRECT, NOT_YET
 from labkit.geometry import frames
+from labkit.geometry.lie import exp_so3
 from labkit.machines import arm, log
 
 ITEMS = {item.id: item for item in ch06.CHAPTER.items}
@@ -113,3 +114,48 @@ def test_a_bound_of_e_trans_holds_since_both_errors_are_equally_long():
     lengths = np.linalg.norm(error[:, :3, 3], axis=1)
     np.testing.assert_allclose(lengths, np.linalg.norm(rows, axis=1), rtol=1e-9)
     assert ch06.e_trans(rows) >= lengths.mean() * np.sqrt(len(A)) / (len(A) - 1)
+
+
+# ---- other right ways through the further parts
+
+
+def cross_of_the_planes(delays, rate):
+    alpha, beta = 2 * np.pi * rate * np.array(delays) - np.pi / 2
+    d = np.cross([np.cos(alpha), 0, -np.sin(alpha)], [0, np.cos(beta), -np.sin(beta)])
+    return d / np.linalg.norm(d) * np.sign(d[2])
+
+
+def lengths_along_the_rays(origins, directions):
+    n = len(origins)
+    A = np.hstack([np.tile(np.eye(3), (n, 1)), np.zeros((3 * n, n))])
+    for k, d in enumerate(directions):
+        A[3 * k : 3 * k + 3, 3 + k] = -d
+    return np.linalg.lstsq(A, origins.ravel(), rcond=None)[0][:3]
+
+
+def by_differences(T, cov_T, p, cov_p):
+    def moved(e):
+        return T[:3, :3] @ exp_so3(e[:3]) @ (p + e[6:]) + T[:3, 3] + e[3:6]
+
+    J = np.array([(moved(1e-6 * e) - moved(-1e-6 * e)) / 2e-6 for e in np.eye(9)]).T
+    return J[:, :6] @ cov_T @ J[:, :6].T + J[:, 6:] @ cov_p @ J[:, 6:].T
+
+
+@pytest.mark.parametrize(
+    "name, answer",
+    [
+        ("ray_direction", cross_of_the_planes),
+        ("nearest_to_rays", lengths_along_the_rays),
+        ("singular_value_ratio", lambda M: np.sqrt(np.divide(*np.linalg.eigvalsh(M.T @ M)[[1, -1]]))),
+        ("static_error_and_lag", lambda speed, error: np.sqrt(np.polyfit(speed**2, error**2, 1))[::-1]),
+        ("moved_part", lambda W, E0, E1, P: W @ E1 @ np.linalg.inv(E0) @ np.linalg.inv(W) @ P),
+        ("point_covariance", by_differences),
+        ("shares", lambda Js, Cs: [float(np.sqrt(np.einsum("ij,jk,ik->", J, C, J))) for J, C in zip(Js, Cs)]),
+    ],
+)
+def test_other_ways_through_the_further_parts_are_right(name, answer):
+    texts(name, answer, CORRECT)
+
+
+def test_two_rays_alone_are_no_answer():
+    assert "first two rays" in texts("nearest_to_rays", lambda o, d: lengths_along_the_rays(o[:2], d[:2])).pop()

@@ -1,6 +1,7 @@
 """Chapter 6, its parts beyond the core path: base stations, errors over speed, the whole cell; items of its chapter."""
 
 import functools
+import itertools
 
 import numpy as np
 
@@ -40,9 +41,9 @@ def _tangents(a, b):
     return np.tan(a), np.tan(b), 1.0
 
 
-def rays(rng):
-    """Rays that pass a point at some distance; their number varies, and their directions are of any length."""
-    n = int(rng.integers(2, 6))
+def rays(rng, most):
+    """Two rays, or 3 to `most`, that pass a point at some distance; their directions are of any length."""
+    n = int(rng.integers(3, most + 1)) if most > 2 else 2
     place, origins = rng.uniform(-500, 500, 3), rng.uniform(-3000, 3000, (n, 3))
     directions = unit_vector(place - origins + rng.uniform(-30, 30, (n, 3)))
     return origins, directions * rng.uniform(0.3, 4, (n, 1))
@@ -57,6 +58,12 @@ def _normal_equations(block, right=None):
         return np.linalg.lstsq(N.sum(0), (M @ origins[..., None]).sum(0)[:, 0], rcond=None)[0]
 
     return variant
+
+
+def _nearest_in_pairs(origins, directions):
+    """The mean of the points halfway between each two rays."""
+    pairs = itertools.combinations(range(len(origins)), 2)
+    return np.mean([stations.nearest_to_rays(origins[[*p]], directions[[*p]]) for p in pairs], axis=0)
 
 
 def _along(d):
@@ -192,6 +199,21 @@ STATIONS = [
                 id="ray_direction-quarter",
             ),
             Mistake(
+                _direction(_tangents, turns=0.5 / np.pi),
+                "Delay times rate counts turns: an angle in rad is 2 pi times as much, and a quarter of a turn is pi / 2.",
+                id="ray_direction-turns",
+            ),
+            Mistake(
+                lambda delays, rate: _direction(_tangents)(delays, 60.0),
+                "You use 60 turns per second: `rate` says how many they are.",
+                id="ray_direction-sixty",
+            ),
+            Mistake(
+                lambda delays, rate: np.append(np.tan(delays), 1.0) / np.linalg.norm(np.append(np.tan(delays), 1.0)),
+                "The delays are times, in seconds. First make angles of them.",
+                id="ray_direction-times",
+            ),
+            Mistake(
                 _direction(_tangents, unit=False),
                 "The direction is right, its length is not 1.",
                 id="ray_direction-length",
@@ -250,7 +272,7 @@ STATIONS = [
     Exercise(
         "nearest_to_rays",
         reference=stations.nearest_to_rays,
-        draw=rays,
+        draw=(functools.partial(rays, most=6), functools.partial(rays, most=2)),
         metric=metrics.Numbers(1e-6, "mm"),
         hints=(
             "What of p - o is the distance to a ray through o? The part across its direction d. Make the sum of its squares least.",
@@ -291,6 +313,16 @@ STATIONS = [
                 lambda origins, directions: (origins + directions).mean(0),
                 "You went along each ray by the length of its direction, which says nothing. How far to go is what has to be found.",
                 id="nearest_to_rays-one-step",
+            ),
+            Mistake(
+                lambda origins, directions: stations.nearest_to_rays(origins[:2], directions[:2]),
+                "You used the first two rays alone. There may be more, and all of them count.",
+                id="nearest_to_rays-first-two",
+            ),
+            Mistake(
+                _nearest_in_pairs,
+                "You took the mean over pairs of rays. Two rays that are nearly parallel spoil it; one sum over all rays weighs them as they should be.",
+                id="nearest_to_rays-pairs",
             ),
         ],
     ),
@@ -336,6 +368,11 @@ SPEEDS = [
                 _line(lambda v: v, lambda e: e, lambda i, s: (i, s)),
                 "You laid a line through errors and speeds themselves, as if the errors simply added. Independent errors add as squares.",
                 id="static_error_and_lag-plain",
+            ),
+            Mistake(
+                _line(lambda v: v, lambda e: e, lambda i, s: (s, i)),
+                "A line through errors and speeds themselves, its slope first. Independent errors add as squares, and e0 comes first.",
+                id="static_error_and_lag-plain-swapped",
             ),
             Mistake(
                 _line(lambda v: v, _square, lambda i, s: (np.sqrt(max(i, 0)), np.sqrt(s))),
@@ -424,6 +461,31 @@ CELL = [
                 "This is T_EP, the part seen from the tracker. One step is left: where the tracker is now.",
                 id="moved_part-half-way",
             ),
+            Mistake(
+                lambda W, E0, E1, P: W @ E1 @ E0 @ P,
+                "The first reading has to be undone before the second is done: its inverse, with T_BW on both sides.",
+                id="moved_part-not-undone",
+            ),
+            Mistake(
+                lambda W, E0, E1, P: W @ invert(E0) @ E1 @ invert(W) @ P,
+                "E0^-1 E1 is the motion seen from the tracker. Between T_BW and its inverse stands the motion seen from W, E1 E0^-1.",
+                id="moved_part-seen-from-tracker",
+            ),
+            Mistake(
+                lambda W, E0, E1, P: P @ W @ E1 @ invert(W @ E0),
+                "The motion in the base stands before the part: T_BE1 T_BE0^-1 T_BP0.",
+                id="moved_part-behind",
+            ),
+            Mistake(
+                lambda W, E0, E1, P: W @ E1 @ invert(E0) @ W @ P,
+                "T_BW leads into the base at the end; at the beginning its inverse leads out of it.",
+                id="moved_part-world-twice",
+            ),
+            Mistake(
+                lambda W, E0, E1, P: P,
+                "This is where the part was learned. It has moved since.",
+                id="moved_part-still",
+            ),
         ],
     ),
     Prediction(
@@ -437,7 +499,7 @@ CELL = [
         "point_covariance",
         reference=point_covariance,
         draw=uncertain_point,
-        metric=metrics.Numbers(1e-9, "mm^2"),
+        metric=metrics.Numbers(1e-6, "mm^2"),
         fixed={
             "T_AB": "a pose is 4 x 4",
             "cov_AB": "a pose has six parameters",
@@ -490,6 +552,16 @@ CELL = [
                 id="point_covariance-shift",
             ),
             Mistake(
+                lambda T, cov_T, p, cov_p: T[:3, :3] @ (cov_T[3:, 3:] + cov_p) @ T[:3, :3].T,
+                "The shift of T is given in A and needs no turning, and the turn of T is missing: it moves the point by its lever.",
+                id="point_covariance-both-turned",
+            ),
+            Mistake(
+                lambda T, cov_T, p, cov_p: _carried(lever=lambda R, q: -skew(R @ q + T[:3, 3]))(T, cov_T, p, cov_p),
+                "A turn about B's origin has the lever from there, R p. Yours starts at A's origin.",
+                id="point_covariance-from-A",
+            ),
+            Mistake(
                 _carried(cov=_swapped),
                 "You took the translation first. The covariance holds the rotation vector first, then the translation.",
                 id="point_covariance-order",
@@ -531,6 +603,11 @@ CELL = [
                 _each(lambda J, C: np.sqrt(np.linalg.eigvalsh(J @ C @ J.T)[-1])),
                 "This is the standard deviation in the worst direction. Asked for is the one in space: the root of the trace.",
                 id="shares-worst",
+            ),
+            Mistake(
+                _each(lambda J, C: np.sqrt(np.diag(J @ C @ J.T).max())),
+                "This is the standard deviation along the worst axis. Asked for is the one in space: the root of the trace.",
+                id="shares-worst-axis",
             ),
             Mistake(
                 _each(lambda J, C: np.sqrt(np.trace(J @ C @ J.T) / 3)),

@@ -843,6 +843,11 @@ CHAPTER = Chapter(
                     id="singular_value_ratio-by-noise",
                 ),
                 Mistake(
+                    lambda M: _values(M)[-1] / _values(M)[-2],
+                    "This is the smallest over the second smallest. Asked for is the second smallest over the largest.",
+                    id="singular_value_ratio-two-smallest",
+                ),
+                Mistake(
                     lambda M: (_values(M)[-2] / _values(M)[0]) ** 2,
                     "These are the eigenvalues of M^T M, which are the squares of the singular values of M.",
                     id="singular_value_ratio-squares",
