@@ -334,6 +334,25 @@ guess = "only about z"
 ### END SOLUTION
 ex.predict("svd", guess, reveal=stages.svd_against_gram_schmidt)
 
+# %% kabsch [markdown]
+# Five lines do it. With $p_i$ and $q_i$ measured from their means, the rotation that turns
+# the $p_i$ best onto the $q_i$ follows from the SVD $\sum p_i q_i^\top = U S V^\top$ as
+# $R = V U^\top$; where that is a mirror image, the last column of $V$ changes its sign.
+
+# %% fit_frame
+@ex.fit_frame
+def fit_frame(points_F, points_W):
+    """Return T_WF, shape (4, 4), that fits best: both shapes (n, 3), n at least 3."""
+    ### BEGIN SOLUTION
+    p, q = points_F - points_F.mean(0), points_W - points_W.mean(0)
+    U, _, Vt = np.linalg.svd(p.T @ q)
+    R = Vt.T @ np.diag([1, 1, np.linalg.det(Vt.T @ U.T)]) @ U.T
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = R, points_W.mean(0) - R @ points_F.mean(0)
+    return T
+    ### END SOLUTION
+
+
 # %% in-practice [markdown]
 # ## In practice
 #

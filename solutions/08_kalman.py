@@ -70,6 +70,17 @@ def update(x, cov, z, C, cov_z):
     ### END SOLUTION
 
 
+# %% printed-filter [markdown]
+# The slide's header reads `KalmanFilter(x_k, u_k, z_k+1)`, its last line `return x_k+1`.
+# **What is missing to call it step after step?**
+
+# %% predict-printed
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = "the covariance, in and out"
+### END SOLUTION
+ex.predict("printed", guess)
+
 # %% bells [markdown]
 # ## Three bells
 #
@@ -442,6 +453,41 @@ for std_a in (4000.0, 400.0):
 # %% tracker-compare [markdown]
 # Unfiltered, the same readings are off by a median of 4 mm and by up to 500 mm. The honest filter keeps the median, which is systematic and which no filter sees, and removes the jumps. The
 # sure one refused a good reading, drove on by its model, and then refused nearly all of them: it is lost, several times farther off than its covariance admits.
+
+# %% batch [markdown]
+# ## All at once, or one by one? (*further*)
+#
+# Nobody moves, and a sensor measures several times. A filter takes the readings one by one
+# and keeps only state and covariance. Chapter 4 would take all at once, by weighted least
+# squares: what is known before ($x_0$, $\Sigma_0$) counts like one more reading. Write that.
+
+# %% batch_estimate
+@ex.batch_estimate
+def batch_estimate(x0, cov0, z, C, cov_z):
+    """Return state and covariance from all measurements z, shape (k, m), at once."""
+    ### BEGIN SOLUTION
+    N, b = np.linalg.inv(cov0), np.linalg.solve(cov0, x0)
+    for one in z:
+        N = N + C.T @ np.linalg.solve(cov_z, C)
+        b = b + C.T @ np.linalg.solve(cov_z, one)
+    return np.linalg.solve(N, b), np.linalg.inv(N)
+    ### END SOLUTION
+
+
+# %% batch-code
+rng, C, cov_z = np.random.default_rng(4), np.array([[1.0, 0.5]]), np.array([[0.2]])
+x0, cov0, z = np.zeros(2), np.diag([4.0, 9.0]), rng.normal(2.0, 0.5, (30, 1))
+x, cov = x0, cov0
+for one in z:
+    x, cov = update(x, cov, one, C, cov_z)
+at_once, cov_at_once = batch_estimate(x0, cov0, z, C, cov_z)
+print("one by one ", np.round(x, 4), "std", np.round(np.sqrt(np.diag(cov)), 4))
+print("all at once", np.round(at_once, 4), "std", np.round(np.sqrt(np.diag(cov_at_once)), 4))
+
+# %% batch-said [markdown]
+# The same, to the last digits: a Kalman filter *is* least squares, done step by step. Where a
+# model is linear nothing is lost by forgetting the readings. Where it is not, the extended
+# filter linearizes each reading where it stood *then*; all at once can linearize anew.
 
 # %% break-it [markdown]
 # ## Further, break it: the short form in single precision

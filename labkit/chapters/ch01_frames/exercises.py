@@ -299,6 +299,35 @@ def _flat_distance():
     return np.linalg.norm(points()["K0"][1] - points()["K1"][1])
 
 
+def drawn_points(rng, flat=False):
+    """Four to eight points of a drawing and where they were measured, noise of 0.5 mm; flat: in one plane, exactly."""
+    n = int(rng.integers(4, 9))
+    points_F = rng.uniform(-200, 200, (n, 3)) + rng.uniform(-300, 300, 3)
+    if flat:
+        points_F[:, 2] = rng.uniform(-100, 100)
+    T_WF = frames.pose(Rotation.from_rotvec(rng.uniform(-2, 2, 3)).as_matrix(), rng.uniform(-900, 900, 3))
+    noise = 0.0 if flat else 0.5
+    return points_F, frames.transform(T_WF, points_F) + noise * rng.normal(size=(n, 3))
+
+
+def _kabsch(handed=True, turned=lambda R: R, shift=lambda R, p, q: q.mean(0) - R @ p.mean(0), centered=True):
+    """A variant of `frames.fit_frame` in one of its parts."""
+
+    def variant(p, q):
+        about_p, about_q = (p.mean(0), q.mean(0)) if centered else (0, 0)
+        U, _, Vt = np.linalg.svd((p - about_p).T @ (q - about_q))
+        if callable(handed):
+            R = handed(U, Vt.T)
+        else:
+            R = Vt.T @ np.diag([1, 1, np.linalg.det(Vt.T @ U.T) if handed else 1]) @ U.T
+        R = turned(R)
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = R, shift(R, p, q)
+        return T
+
+    return variant
+
+
 CHAPTER = Chapter(
     "01-frames",
     title="Frames from three points",
@@ -827,6 +856,68 @@ CHAPTER = Chapter(
             answer="only about z",
             why="Three points lie in one plane whatever method you take, so the turns about x and y agree. Within the plane, "
             "Gram-Schmidt listens to the first edge alone; the SVD hears the third point too.",
+        ),
+        Exercise(
+            "fit_frame",
+            reference=frames.fit_frame,
+            draw=(drawn_points, functools.partial(drawn_points, flat=True)),
+            metric=metrics.Poses(1e-6, 1e-6),
+            hints=(
+                "First the turn, about the two centers of gravity; then the shift that puts one onto the other.",
+                "With p and q measured from their means, the SVD of p^T q = U S V^T gives R = V U^T; where det R = -1, "
+                "the last column of V changes its sign first. Then t = mean of W minus R times mean of F.",
+                "`p, q = points_F - points_F.mean(0), points_W - points_W.mean(0)\n"
+                "U, _, Vt = np.linalg.svd(p.T @ q)\n"
+                "R = Vt.T @ np.diag([1, 1, np.linalg.det(Vt.T @ U.T)]) @ U.T\n"
+                "T = np.eye(4)\n"
+                "T[:3, :3], T[:3, 3] = R, points_W.mean(0) - R @ points_F.mean(0)\n"
+                "return T`",
+            ),
+            mistakes=[
+                Mistake(
+                    _kabsch(handed=False),
+                    "On points in one plane this can be a mirror image (det R = -1): then the last column of V changes its sign.",
+                ),
+                Mistake(
+                    _kabsch(handed=lambda U, V: V @ np.diag([np.linalg.det(V @ U.T), 1, 1]) @ U.T),
+                    "The sign belongs to the last column, that of the smallest singular value: there it costs least.",
+                ),
+                Mistake(
+                    _kabsch(handed=lambda U, V: V @ U.T * np.sign(np.linalg.det(V @ U.T))),
+                    "The sign belongs to the last column alone: minus a mirror image is another rotation.",
+                ),
+                Mistake(
+                    lambda p, q: frames.invert(frames.fit_frame(p, q)),
+                    "This is T_FW, from W to F: exchange the roles of both sets of points.",
+                ),
+                Mistake(
+                    _kabsch(turned=lambda R: R.T),
+                    "Your rotation is the transpose: from p^T q = U S V^T follows R = V U^T.",
+                ),
+                Mistake(
+                    _kabsch(centered=False),
+                    "Subtract the means before the SVD: a rotation leaves a point where it is, and that point must be the center.",
+                ),
+                Mistake(
+                    _kabsch(shift=lambda R, p, q: q.mean(0) - p.mean(0)),
+                    "The rotation is right. The mean of F has to be turned before it is subtracted: t = mean W - R mean F.",
+                ),
+                Mistake(
+                    _kabsch(shift=lambda R, p, q: q.mean(0)),
+                    "The rotation is right. The translation is where the frame's origin lies, not the center of the points.",
+                ),
+                Mistake(
+                    _kabsch(shift=lambda R, p, q: np.zeros(3)), "The rotation is right, the translation is missing."
+                ),
+                Mistake(
+                    _kabsch(shift=lambda R, p, q: q[0] - R @ p[0]),
+                    "The rotation is right. You put the first point exactly: the means are to fall together.",
+                ),
+                Mistake(
+                    lambda p, q: frames.fit_frame(p[:3], q[:3]),
+                    "You use the first three points only. All of them count.",
+                ),
+            ],
         ),
     ],
 )

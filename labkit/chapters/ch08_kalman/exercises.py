@@ -39,6 +39,14 @@ def mixed_measurement(rng, n, m):
     return x, covariance(rng, n), C @ x + rng.normal(size=m), C, covariance(rng, m, 0.5)
 
 
+def measured_often(rng, n, m):
+    """What is known of a state, and several measurements of the same mixtures of it."""
+    x = rng.normal(size=n) * 3
+    C, cov_z = rng.normal(size=(m, n)), covariance(rng, m, 0.5)
+    z = C @ x + rng.multivariate_normal(np.zeros(m), cov_z, int(rng.integers(3, 7)))
+    return x + rng.normal(size=n), covariance(rng, n), z, C, cov_z
+
+
 def one_position_two_sensors(rng):
     x = rng.uniform(5, 15) * rng.choice([-1, 1])
     return x + rng.normal(), rng.uniform(2, 9), x + rng.uniform(-1, 1, 2), rng.uniform(0.3, 0.9, 2) * [1, 2]
@@ -174,6 +182,21 @@ def _moved(x, A, B, u):
 
 def _grown(P, A, B, Q):
     return A @ P @ A.T + B @ Q @ B.T
+
+
+def batch_estimate(x0, cov0, z, C, cov_z):
+    return _batch()(x0, cov0, z, C, cov_z)
+
+
+def _batch(prior=1.0, weight=np.linalg.inv, used=lambda z: z):
+    """Weighted least squares over all measurements and what was known before, or a variant in one of its parts."""
+
+    def variant(x0, cov0, z, C, cov_z):
+        W, known = weight(cov_z), prior * np.linalg.inv(cov0)
+        cov = np.linalg.pinv(known + len(used(z)) * C.T @ W @ C)
+        return cov @ (known @ x0 + C.T @ W @ used(z).sum(0)), cov
+
+    return variant
 
 
 def update(x, cov, z, C, cov_z):
@@ -1667,6 +1690,70 @@ CHAPTER = Chapter(
                 ),
                 Mistake(lambda y, S, g: True, "You let everything pass: what is the limit for?"),
                 Mistake(lambda y, S, g: False, "You refuse everything: such a filter never corrects itself."),
+            ],
+        ),
+        Prediction(
+            "printed",
+            question="The slide's algorithm is called as KalmanFilter(x_k, u_k, z_k+1) and returns x_k+1. What is missing to call it step after step?",
+            choices=("nothing", "the covariance, in and out", "the gain, in and out", "the next control"),
+            answer="the covariance, in and out",
+            why="Line 3 reads the covariance of step k and line 8 computes that of step k + 1, but neither the arguments nor the result "
+            "name it. The gain is made anew in each step and needs no memory.",
+        ),
+        Exercise(
+            "batch_estimate",
+            reference=batch_estimate,
+            draw=tuple(functools.partial(measured_often, n=n, m=m) for n, m in ((2, 1), (3, 2), (2, 2))),
+            metric=STATE_AND_COV,
+            hints=(
+                "What is known before is one more measurement, of the state itself, with its own covariance.",
+                "N = cov0^-1 + sum C' cov_z^-1 C and b = cov0^-1 x0 + sum C' cov_z^-1 z; then x = N^-1 b, with covariance N^-1.",
+                "`N, b = np.linalg.inv(cov0), np.linalg.solve(cov0, x0)\n"
+                "for one in z:\n"
+                "    N = N + C.T @ np.linalg.solve(cov_z, C)\n"
+                "    b = b + C.T @ np.linalg.solve(cov_z, one)\n"
+                "return np.linalg.solve(N, b), np.linalg.inv(N)`",
+            ),
+            mistakes=[
+                Mistake(
+                    _batch(prior=0.0),
+                    "What was known before the measurements is missing: x0 with cov0 counts like one more measurement.",
+                ),
+                Mistake(
+                    _batch(weight=lambda cov_z: np.eye(len(cov_z))),
+                    "The measurements count with the inverse of their covariance.",
+                ),
+                Mistake(_batch(weight=lambda cov_z: cov_z), "The covariance of the measurement weighs inversely."),
+                Mistake(
+                    _batch(weight=lambda cov_z: np.diag(1 / np.diag(cov_z))),
+                    "The correlations of the measurement are missing: the whole inverse of cov_z.",
+                ),
+                Mistake(_batch(used=lambda z: z[-1:]), "Only the last measurement counts in yours."),
+                Mistake(_batch(used=lambda z: z[:1]), "Only the first measurement counts in yours."),
+                Mistake(
+                    _batch(used=lambda z: z.mean(0, keepdims=True)),
+                    "The mean is no single measurement: its covariance is cov_z divided by their number.",
+                ),
+                Mistake(
+                    lambda x0, cov0, z, C, cov_z: (
+                        batch_estimate(x0, cov0, z, C, cov_z)[0],
+                        np.linalg.inv(batch_estimate(x0, cov0, z, C, cov_z)[1]),
+                    ),
+                    "The state is right. N is the information; the covariance is its inverse.",
+                ),
+                Mistake(
+                    lambda x0, cov0, z, C, cov_z: (batch_estimate(x0, cov0, z, C, cov_z)[0], cov0),
+                    "The state is right. The covariance is that from before the measurements.",
+                ),
+                Mistake(
+                    lambda x0, cov0, z, C, cov_z: (x0, batch_estimate(x0, cov0, z, C, cov_z)[1]),
+                    "The covariance is right. The state is that from before the measurements.",
+                ),
+                Mistake(
+                    lambda x0, cov0, z, C, cov_z: batch_estimate(np.zeros_like(x0), cov0, z, C, cov_z),
+                    "The covariance is right. In b the part of the state known before is missing: cov0^-1 x0.",
+                ),
+                Mistake(lambda *a: batch_estimate(*a)[::-1], "The order is state, covariance."),
             ],
         ),
     ],
