@@ -143,7 +143,7 @@ for name, H in (("yours", hessian(x)), ("listing C7", wells.printed_hessian(x)))
     print(f"{name:10}  {entries}   off by {np.abs(H - measured).max():.3f}")
 
 # %% listing-c7-verdict [markdown]
-# Listing C7 is wrong on the diagonal: $H_{11}$ ends in $-(-1600(x_1-1)^2)$ where $-1600(x_1+1)^2$ belongs, and $H_{22}$ repeats $H_{11}$ instead of using $x_2$.
+# Listing C7, in the text we have (made from a PDF), is wrong on the diagonal: $H_{11}$ ends in $-(-1600(x_1-1)^2)$ where $-1600(x_1+1)^2$ belongs, and $H_{22}$ repeats $H_{11}$ instead of using $x_2$.
 # The code in C9, which computed the results, is right.
 #
 # ## What kind of place is it?

@@ -85,7 +85,7 @@ print(f"nearest obstacle {ranges.min():.2f} m, median {np.median(ranges):.2f} m"
 #
 # For each particle: `sampleMotionModel` moves it, `measurementModel` gives its weight. Then $M$ particles are drawn
 # with probability proportional to
-# their weights. The slide's first line reads $\chi_k' = \chi_k = \emptyset$. Executed as printed, it empties the
+# their weights. The slide's first line reads, in our text of it, $\chi_k' = \chi_k = \emptyset$. Executed as printed, it empties the
 # *input*: no particle is left to move. It means
 # $\chi'_{k+1} = \chi_{k+1} = \emptyset$. And "with probability $w_i$" needs a division by $W$: densities do not add
 # up to 1.

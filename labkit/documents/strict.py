@@ -4,6 +4,8 @@
 from .circular import followers
 from .ledger import COUNTED, KINDS, STATUSES, counts, judge, rows, table
 
+CAVEAT = "The texts were made from PDFs: a digit may have been lost there as well as by the authors."
+
 
 def as_text():
     """All rows, one line each, and the results and claims by status beneath."""
@@ -27,7 +29,8 @@ def counts_text(all_rows):
     for document, count in by_document.items():
         lines.append(f"{document:10}" + "".join(f"{n:15}" for n in count.values()) + f"{sum(count.values()):6}")
     others = [f"{sum(row.kind == kind for row in all_rows)} {kind}" for kind in KINDS if kind not in COUNTED]
-    return "\n".join([*lines, "", f"Results and claims. Not counted: {', '.join(others)}."])
+    said = f"Results and claims. Not counted: {', '.join(others)}."
+    return "\n".join([*lines, "", said, CAVEAT])
 
 
 def faults(all_rows=None):

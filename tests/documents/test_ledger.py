@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labkit.documents import circular, ledger, strict
+from labkit.documents import circular, ledger, rounding, strict
 from labkit.documents.ledger import Computed, Row
 
 ROWS = ledger.rows()
@@ -85,6 +85,21 @@ def test_no_verdict_is_typed(path):
                 fixed = not any(isinstance(n, (ast.Name, ast.Call)) for n in ast.walk(given.get(name, ast.Name())))
                 nothing = isinstance(given.get(name), ast.Constant) and given[name].value is None
                 assert nothing or not fixed, f"{path.name}, line {node.lineno}: {name} is typed"
+
+
+@pytest.mark.parametrize("path", CLAIMS, ids=lambda path: path.stem)
+def test_no_printed_answer_is_typed_into_its_computation(path):
+    """A number of three digits or more that stands in the code is not the printed answer of one of its rows."""
+    answers = {
+        abs(rounding.number(row.printed)): row.id
+        for row in ROWS
+        if ledger._written(row).__code__.co_filename == str(path)
+        and rounding.half_unit(row.printed) is not None
+        and len(row.printed.lower().partition("e")[0].replace(".", "").strip("-0")) >= 3
+    }
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        number = isinstance(node, ast.Constant) and type(node.value) in (int, float)
+        assert not number or abs(node.value) not in answers, f"line {node.lineno} types {answers[abs(node.value)]}"
 
 
 def test_strict_text_counts_results_and_claims():

@@ -60,8 +60,8 @@ def product():
     proof = (
         f"The product of the printed matrices misses the printed product by up to {off[:3, 3].max():.1e} mm and "
         f"{off[:3, :3].max():.1e}; rounding to six decimals can move it by {bound[:3, 3].max():.1e} mm (levers up to "
-        f"{lever:.0f} mm) and {bound[:3, :3].max():.1e}. Links inside the rounding exist whose product is the printed "
-        f"one: those of points.csv meet it within {met:.1e}."
+        f"{lever:.0f} mm) and {bound[:3, :3].max():.1e}. Links inside the rounding exist whose product is the "
+        f"printed one: those of points.csv meet it within {met:.1e}."
     )
     return Computed(value, bound=bound, proof=proof)
 
@@ -93,8 +93,8 @@ def operator():
 
     found, total = explained_by(printed, holds, others), _combined("sum")
     proof = (
-        f"The printed result has 1 in its last entry; the sum of the four matrices has {total[3, 3]:.0f} there and is "
-        f"not a rigid transform. The product meets the printed result within {bound.max():.0e} mm, which rounding "
+        f"The printed result has 1 in its last entry; the sum of the four matrices has {total[3, 3]:.0f} there and "
+        f"is not a rigid transform. The product meets the printed result within {bound.max():.0e} mm, which rounding "
         f"explains; of all single slips in the {len(printed) - 1} entries of the result none explains the sum."
     )
     return Computed("sum" if holds(printed) else found[HERE][0], slips=found, proof=proof)

@@ -21,12 +21,11 @@ def _simulated(value):
     result = _calibration()
     deviation = np.sqrt(np.diag(result.covariance))
     proof = (
-        f"Kreisel.txt was never published. The listing's line numbers leave room for "
-        f"{lab_sheet.poses_in_listing()} poses; with as many synthetic ones, drawn so that the printed results "
-        "come out, "
-        "the calibration gives this value, with a "
-        f"standard deviation of {deviation[:3].max():.2f} mm for the worst component of the tip: s0 means noise of "
-        f"{result.std:.3f} mm per coordinate, with {3 * len(result.residuals) - 6} degrees of freedom."
+        f"Kreisel.txt was never published. The listing's line numbers leave room for {lab_sheet.poses_in_listing()} "
+        "poses; with as many synthetic ones, drawn so that the printed results come out, the calibration gives this "
+        f"value, with a standard deviation of {deviation[:3].max():.2f} mm for the worst component of the tip: s0 "
+        f"means noise of {result.std:.3f} mm per coordinate, with {3 * len(result.residuals) - 6} degrees of "
+        "freedom."
     )
     return Computed(value, simulated=True, proof=proof)
 
@@ -76,10 +75,9 @@ def least_number():
     ratio = {n: v[:, 5] / v[:, 0] for n, v in values.items()}
     enough = min(n for n, r in ratio.items() if r.max() > pivot.RANK_TOLERANCE)
     proof = (
-        "The sheet says at least (mindestens), and six unknowns do ask for two poses of three equations. They do not"
-        " suffice: R_1 - R_2 maps the axis of the turn between them to zero; in 1000 random pairs the smallest singular"
-        f" value never exceeds {ratio[2].max():.0e} of the largest. From {enough} poses on the system can be "
-        "solved (median"
-        f" {np.median(ratio[3]):.2f})."
+        "The sheet says at least (mindestens), and six unknowns do ask for two poses of three equations. They do not "
+        "suffice: R_1 - R_2 maps the axis of the turn between them to zero; in 1000 random pairs the smallest "
+        f"singular value never exceeds {ratio[2].max():.0e} of the largest. From {enough} poses on the system can be "
+        f"solved (median {np.median(ratio[3]):.2f})."
     )
     return Computed(-(-A.shape[2] // 3), proof=proof)

@@ -21,8 +21,8 @@ def fused_position():
     flat = float(_fusion(given | {"var0": 1e12}).x[0])
     std = float(_fusion(given | {"var0": given["var0"] ** 2}).x[0])
     proof = (
-        f"48.2 / 5.05 = {x:.4f}, {9.55 - x:.4f} below what rounds to 9.6; rounding the two measurements moves it "
-        f"by up to {bound:.4f}. Without a prior it is {flat:.4f}, with a standard deviation of 20 {std:.4f}."
+        f"48.2 / 5.05 = {x:.4f}, {9.55 - x:.4f} below what rounds to 9.6; rounding the two measurements moves it by "
+        f"up to {bound:.4f}. Without a prior it is {flat:.4f}, with a standard deviation of 20 {std:.4f}."
     )
     return Computed(x, bound=bound, proof=proof)
 
@@ -52,14 +52,14 @@ def index_of_the_variance():
     def holds(d):
         result = _fusion(given | {"var0": float(d["prior"])})
         variance = {"Σ_0": float(d["prior"]), "Σ_1": float(result.cov[0, 0])}[d[HERE]]
-        return abs(variance - given["var1"]) <= 0.05 and abs(float(result.x[0]) - given["x1"]) <= 0.1
+        near = abs(float(result.x[0]) - given["x1"]) <= rounding.half_unit("9.6") + fused_position().bound
+        return near and abs(variance - given["var1"]) <= rounding.half_unit("0.2")
 
     printed = {HERE: "Σ_0", "prior": f"{given['var0']:.0f}"}
     found = explained_by(printed, holds, lambda text: ("Σ_1",) if text == "Σ_0" else single_slips(text))
     proof = (
-        f"The prior's variance is printed as {given['var0']:.0f} above; {_fusion(given).cov[0, 0]:.4f} is the "
-        "one after "
-        "the correction, which the algorithm calls Σ_1. No single slip in the prior makes 0.2 the prior's."
+        f"The prior's variance is printed as {given['var0']:.0f} above; {_fusion(given).cov[0, 0]:.4f} is the one "
+        "after the correction, which the algorithm calls Σ_1. No single slip in the prior makes 0.2 the prior's."
     )
     return Computed("Σ_0" if holds(printed) else found[HERE][0], slips=found, proof=proof)
 
@@ -102,22 +102,30 @@ def needed_prediction():
     return rounding.propagate(lambda p, z, cov: _needed(p, z[0], cov, var_z), posterior, z, cov)
 
 
+def _corrected(prior, cov, z, var_z):
+    """State and variance of the position after the correction of a prediction."""
+    gain = cov / (cov[0] + var_z)
+    return np.array([*(prior + gain * (z[0] - prior[0])), cov[0] * (1 - gain[0])])
+
+
 def _agrees(d):
-    """Whether printed numbers agree: the correction of the state, that of the covariance, and the model's v = a t.
+    """Whether printed numbers agree, each rounded or cut off: the correction of state and variance, and the model.
 
     The covariance needs 51 steps of 0.1 s; from rest x = a T^2 n (n - 1) / 2 and v = a T n, so that v = 2 x / (T (n -
     1)).
     """
-    n = {name: float(text) for name, text in d.items()}
-    gain = np.array([n["prior_cov_xx"], n["prior_cov_xv"]]) / (n["prior_cov_xx"] + n["var_z"])
-    corrected = np.array([n["prior_x"], n["prior_v"]]) + gain * (n["z"] - n["prior_x"])
-    variance = n["prior_cov_xx"] * (1 - gain[0])
-    state = all(
-        abs(value - n[name]) <= 0.01 or rounding.is_cut_off(d[name], value)
-        for name, value in zip(("posterior_x", "posterior_v"), corrected)
+    prior, cov, z = (
+        rounding.read([d[name] for name in names])
+        for names in (("prior_x", "prior_v"), ("prior_cov_xx", "prior_cov_xv"), ("z",))
     )
-    model = abs(n["prior_v"] - 2 * n["prior_x"] / (0.1 * 50)) <= 0.05
-    return state and abs(variance - n["posterior_cov_xx"]) <= 1e-4 and model
+    var_z = float(d["var_z"])
+    values, bounds = rounding.propagate(lambda prior, cov, z: _corrected(prior, cov, z, var_z), prior, cov, z)
+    speed, slack = rounding.propagate(lambda prior: 2 * prior[0] / (0.1 * 50) - prior[1], prior)
+    corrected = all(
+        abs(value - float(d[name])) <= bound + rounding.half_unit(d[name]) or rounding.is_cut_off(d[name], value)
+        for name, value, bound in zip(("posterior_x", "posterior_v", "posterior_cov_xx"), values, bounds)
+    )
+    return corrected and abs(speed) <= slack
 
 
 @computes("kalman.vehicle_prior")
@@ -142,11 +150,9 @@ def predicted_state():
     model = reconstructed()[0]
     proof = (
         f"The printed correction (11.90, 4.98) of 11.79 needs ({value[0]:.3f} +- {bound[0]:.3f}, {value[1]:.3f} +- "
-        f"{bound[1]:.3f}) before it; 51 predictions from rest give ({model[0]:.2f}, {model[1]:.2f}). 12.5 and "
-        "5.0 are a "
-        f"t^2/2 and a t at t = 5 s. Of all single slips in the {len(printed)} printed numbers only those in the "
-        "prediction "
-        "make correction, covariance and model agree."
+        f"{bound[1]:.3f}) before it; 51 predictions from rest give ({model[0]:.2f}, {model[1]:.2f}). 12.5 and 5.0 "
+        f"are a t^2/2 and a t at t = 5 s. Of all single slips in the {len(printed)} printed numbers only those in "
+        "the prediction make correction, covariance and model agree."
     )
     return Computed(value, bound=bound, slips=slips, proof=proof)
 
@@ -160,8 +166,8 @@ def input_matrix():
     euler, exact = (state[0] for state in states.values())
     proof = (
         "A constant acceleration a also moves the position, by a T^2/2 in a step. The printed correction needs "
-        f"({needed[0]:.3f} +- {bound[0]:.3f}) m before it: 51 steps with (0, T) give {euler:.2f} m, with "
-        f"(T^2/2, T) {exact:.3f} m. The simulation leaves the term out, as the formula does."
+        f"({needed[0]:.3f} +- {bound[0]:.3f}) m before it: 51 steps with (0, T) give {euler:.2f} m, with (T^2/2, T) "
+        f"{exact:.3f} m. The simulation leaves the term out, as the formula does."
     )
     return Computed(" or ".join(hits), proof=proof)
 
@@ -170,9 +176,9 @@ def input_matrix():
 def covariance_after_prediction():
     cov = reconstructed()[1]
     proof = (
-        "Time step, starting covariance and noise are not printed. 51 predictions with T = 0.1 s, starting variances 1 "
-        f"and 0.01, acceleration noise 0.4 give {cov[0, 0]:.4f}, {cov[0, 1]:.4f}, {cov[1, 1]:.4f}; with T = 0.1 s no "
-        "number of steps near 50 but 51 gives round parameters."
+        "Time step, starting covariance and noise are not printed. 51 predictions with T = 0.1 s, starting variances "
+        f"1 and 0.01, acceleration noise 0.4 give {cov[0, 0]:.4f}, {cov[0, 1]:.4f}, {cov[1, 1]:.4f}; with T = 0.1 s "
+        "no number of steps near 50 but 51 gives round parameters."
     )
     return Computed(cov, simulated=True, proof=proof)
 

@@ -35,8 +35,7 @@ def mcl_first_line():
         found[HERE][0] if HERE in found else printed[HERE],
         slips=found,
         proof=f"Executed as printed, the first line empties the input: of 1000 particles {left} come back. The "
-        "sets filled "
-        "below are those of step k + 1; no other set for the loop to read helps.",
+        "sets filled below are those of step k + 1; no other set for the loop to read helps.",
     )
 
 

@@ -68,11 +68,10 @@ def entries():
     slips[COPIED] = explained_by({HERE: run["max_deg"], "mean": run["mean_deg"], "E_rot": run["E_rot"]}, ordered)
     value[COPIED] = _rms_angle_deg(float(run["E_rot"]))
     proof = (
-        "Six times the average less the five others gives run 3's largest error: "
-        f"{value[UPSIDE_DOWN]:.3f} mm, not 6; of all single slips in the column, its average and its variance "
-        "only this "
-        "entry's explains it. Run 4's largest angle equals its mean angle, and its E_rot alone demands at least "
-        f"{value[COPIED]:.3f} deg (root mean square of the angles); no slip in mean or E_rot helps."
+        f"Six times the average less the five others gives run 3's largest error: {value[UPSIDE_DOWN]:.3f} mm, not "
+        "6; of all single slips in the column, its average and its variance only this entry's explains it. Run 4's "
+        f"largest angle equals its mean angle, and its E_rot alone demands at least {value[COPIED]:.3f} deg (root "
+        "mean square of the angles); no slip in mean or E_rot helps."
     )
     return Computed(value, slips=slips, proof=proof)
 
@@ -114,8 +113,7 @@ def results_block():
     found = explained_by({HERE: "2.667", "average": texts["mean_mm"]}, holds)
     proof = (
         f"The printed average is {value[7]:.9f} mm, which the six runs give to the last digit, as in all other "
-        "columns; it "
-        f"rounds to {value[7]:.3f}."
+        f"columns; it rounds to {value[7]:.3f}."
     )
     return Computed(value, bound, slips={(7,): found}, proof=proof)
 
@@ -143,9 +141,8 @@ def unit_of_e_trans():
         "mm" if holds(printed) else found[HERE][0],
         slips=found,
         proof=f"Mean and largest errors of 2.666 and 9.468 mm over {POSES} poses keep equation (17) between "
-        f"{least:.2f} "
-        f"and {most:.2f} mm. The printed {average:.6f} is {1000 * average:.2f} mm when read in m, and 800 times too "
-        "small in mm; a slip in one entry would not move the six others.",
+        f"{least:.2f} and {most:.2f} mm. The printed {average:.6f} is {1000 * average:.2f} mm when read in m, and "
+        "800 times too small in mm; a slip in one entry would not move the six others.",
     )
 
 
@@ -179,9 +176,8 @@ def unit_of_e_rot():
         "deg" if holds(printed) else found[HERE][0],
         slips=found,
         proof=f"Without a unit, as the block of section 3.1 prints it, {float(E_rot[RUNS]):.3e} means an rms angle of "
-        f"{angle:.3f} deg, between the printed mean of {mean[RUNS]} and the printed largest of {largest[RUNS]} "
-        "deg, and "
-        "so in each run; read in degrees it is far below the mean.",
+        f"{angle:.3f} deg, between the printed mean of {mean[RUNS]} and the printed largest of {largest[RUNS]} deg, "
+        "and so in each run; read in degrees it is far below the mean.",
     )
 
 
@@ -195,8 +191,7 @@ def half_turn():
     return Computed(
         None,
         proof=f"The printed quaternion turns by {_mounting_angle_deg():.2f} deg; a half turn about z would read "
-        "(0, 0, 1, "
-        "0). The flange frame may include it already: the report does not say, so nothing is refuted.",
+        "(0, 0, 1, 0). The flange frame may include it already: the report does not say, so nothing is refuted.",
     )
 
 
@@ -217,10 +212,10 @@ def offset_after_half_turn():
     mean = rounding.read(table_d_texts()[RUNS, :3])
     value, bound = rounding.propagate(lambda m: 1000 * m * [-1, -1, 1], mean)
     proof = (
-        f"Appendix D and section 3.1 give ({-value[0]:.2f}, {-value[1]:.2f}, {value[2]:.2f}) mm. With the half turn of "
-        f"the text x and y come out; the conclusion's 65.3 mm is {65.3 - value[2]:.1f} mm more than z, which a "
-        "half turn "
-        "about z leaves alone."
+        f"Appendix D and section 3.1 give ({-value[0]:.2f}, {-value[1]:.2f}, {value[2]:.2f}) mm. With the half turn "
+        f"of the text x and y come out; the conclusion's 65.3 mm is {statements()['offset_z'] - value[2]:.1f} "
+        "mm more than z, which a "
+        "half turn about z leaves alone."
     )
     return Computed(value, bound, proof=proof)
 
@@ -233,9 +228,8 @@ def mean_angular_speed():
     return Computed(
         largest,
         proof=f"A mean of 5 rad/s exceeds the fastest motion, {fastest} rad/s, and the {largest:.3f} rad/s (3 "
-        "deg/s) that "
-        "the conclusion calls the largest error. 5 deg/s would still exceed it; 0.05 rad/s, which is 2.9 deg/s, would "
-        "not. The report does not tell which is meant.",
+        "deg/s) that the conclusion calls the largest error. 5 deg/s would still exceed it; 0.05 rad/s, which is 2.9 "
+        "deg/s, would not. The report does not tell which is meant.",
     )
 
 
@@ -248,9 +242,8 @@ def exceeds_guarantee():
     return Computed(
         "překračují" if beyond else "nepřekračují",
         proof=f"{said['largest_position']:.0f} mm and {said['largest_orientation']:.0f} deg against the maker's "
-        "precision "
-        f"of {said['precision']:.0f} mm and {said['orientation_precision']:.0f} deg; against its accuracy of "
-        f"{said['accuracy']:.0f} mm as well.",
+        f"precision of {said['precision']:.0f} mm and {said['orientation_precision']:.0f} deg; against its accuracy "
+        f"of {said['accuracy']:.0f} mm as well.",
     )
 
 
@@ -258,8 +251,7 @@ def _unpublished():
     return Computed(
         None,
         proof="The logs of section 3.2 were never published, and no printed number leads to this one. Chapter "
-        "6 simulates "
-        "such a run; what comes out there depends on the noise that is put in.",
+        "6 simulates such a run; what comes out there depends on the noise that is put in.",
     )
 
 
@@ -290,8 +282,8 @@ def drift_between_the_runs():
     return Computed(
         None,
         proof=f"No drift within a motion is printed. The six runs of appendix D span {minutes[-1]:.0f} minutes, and in "
-        f"none of {len(chance)} columns is the trend one that chance would make less often than in {chance[least]:.2f} "
-        f"of all 720 orders ({least}): nothing there speaks against the claim.",
+        f"none of {len(chance)} columns is the trend one that chance would make less often than in "
+        f"{chance[least]:.2f} of all 720 orders ({least}): nothing there speaks against the claim.",
     )
 
 
@@ -306,8 +298,8 @@ def independent_of_speed():
         proof=f"The maker allows {said['latency']:.0f} ms. At the highest speeds of the three motions that is "
         + ", ".join(f"{lag:.1f}" for lag in lags)
         + f" mm, which makes {mean:.0f} mm at rest {np.hypot(mean, lags[0]):.1f} mm in the slow and "
-        f"{np.hypot(mean, lags[-1]):.1f} mm in the fast motion: "
-        "nearly independent, though a smaller lag or none would be so as well.",
+        f"{np.hypot(mean, lags[-1]):.1f} mm in the fast motion: nearly independent, though a smaller lag or none "
+        "would be so as well.",
     )
 
 
@@ -345,8 +337,8 @@ def reaches():
         value,
         bound,
         proof=f"The elbow's limit is printed as 138 deg: half a degree of rounding moves this reach by {bound[1]:.1f} "
-        f"mm. All reaches are measured in the plane of the arm: with the shoulder offset the wrist gets {away:.1f} mm "
-        "away from axis 1.",
+        f"mm. All reaches are measured in the plane of the arm: with the shoulder offset the wrist gets {away:.1f} "
+        "mm away from axis 1.",
     )
 
 

@@ -97,12 +97,10 @@ def _solved(which, name, other):
     found = explained_by(SIMULATED | other, _follow)
     wrong, right = SIMULATED | other, SIMULATED | other | {key: texts[0] for key, texts in found.items() if key == name}
     proof = (
-        f"Solved for height, B and y the 39 printed coordinates of C10 give {value:.3f} +- {bound:.3f}. As "
-        "printed they "
-        f"miss by up to {max(_misses(tuple(wrong.items()), t) for t in ('6-2', 'C10')):.1f} mm, put right by "
-        f"{max(_misses(tuple(right.items()), t) for t in ('6-2', 'C10')):.4f} mm. Of all single slips in both "
-        "tables these "
-        f"make them follow: {'; '.join(f'{key} {texts[0]}' for key, texts in found.items())}."
+        f"Solved for height, B and y the 39 printed coordinates of C10 give {value:.3f} +- {bound:.3f}. As printed "
+        f"they miss by up to {max(_misses(tuple(wrong.items()), t) for t in ('6-2', 'C10')):.1f} mm, put right by "
+        f"{max(_misses(tuple(right.items()), t) for t in ('6-2', 'C10')):.4f} mm. Of all single slips in both tables "
+        f"these make them follow: {'; '.join(f'{key} {texts[0]}' for key, texts in found.items())}."
     )
     return Computed(value, bound, slips={HERE if key == name else key for key in found}, proof=proof)
 
@@ -166,11 +164,9 @@ def gauss_newton_end():
     return Computed(
         end,
         proof=(
-            "From the 39 coordinates as printed, with two decimals. At B = -90 deg A and C are not determined "
-            "one by one "
-            f"(the last singular value is {values[5] / values[0]:.0e} of the first), only their sum; what the "
-            "table prints "
-            "of them and of y is noise of the solver and has no rows."
+            "From the 39 coordinates as printed, with two decimals. At B = -90 deg A and C are not determined one by "
+            f"one (the last singular value is {values[5] / values[0]:.0e} of the first), only their sum; what the "
+            "table prints of them and of y is noise of the solver and has no rows."
         ),
     )
 
@@ -184,8 +180,8 @@ def gauss_newton_sign():
         -float(printed["A"]),
         slips=found,
         proof="The pose depends on A + C, which is 0 at the minimum; nine of the ten printed rows have "
-        "opposite signs, this "
-        f"one has A = C = 4e-4: a sign is missing, in {' or '.join(sorted('C' if k == HERE else k for k in found))}.",
+        "opposite signs, this one has A = C = 4e-4: a sign is missing, in "
+        f"{' or '.join(sorted('C' if k == HERE else k for k in found))}.",
     )
 
 
@@ -241,11 +237,9 @@ def trust_region_failure():
         None,
         proof=(
             f"From these starts the trust region of chapter 4 arrives in {counts[4]}, {counts[6]} and {counts[9]} "
-            "iterations; what the thesis's solver did was not published. Starts 4 and 6 cost "
-            f"{_start_cost(4):.1e} mm^2, "
-            f"less than its tolerance 1e-6; start 9 costs {_start_cost(9):.0f} mm^2, and there the derivatives "
-            "by A and C "
-            "are parallel (B = -90.1 deg)."
+            f"iterations; what the thesis's solver did was not published. Starts 4 and 6 cost {_start_cost(4):.1e} "
+            f"mm^2, less than its tolerance 1e-6; start 9 costs {_start_cost(9):.0f} mm^2, and there the derivatives "
+            "by A and C are parallel (B = -90.1 deg)."
         ),
     )
 
@@ -258,10 +252,8 @@ def trust_region_end():
         simulated=True,
         proof=(
             "The minimum of the 39 coordinates as printed. The trust region of chapter 4 finds it from all ten "
-            "starts, in "
-            f"{int(counts.min())} to {int(counts.max())} iterations. Where the thesis's own solver stopped "
-            "short of it, "
-            "nothing published says why."
+            f"starts, in {int(counts.min())} to {int(counts.max())} iterations. Where the thesis's own solver "
+            "stopped short of it, nothing published says why."
         ),
     )
 
@@ -324,8 +316,7 @@ def start_names():
         np.array([f"p_2,{axis}-rot" for axis in turned]),
         slips=slips,
         proof="Row 4 is called a turn about z and changes A, row 6 a turn about x and changes C, as the pose "
-        "convention has "
-        "it; their symbols name the other axis each.",
+        "convention has it; their symbols name the other axis each.",
     )
 
 
@@ -392,8 +383,7 @@ def _misprint(pose):
         bound,
         slips={HERE if key == (row["table"], row["column"]) else key for key in found},
         proof=f"The rest of the row and a calibration without it put this entry at {value:.2f} +- {bound:.2f}. "
-        "Single slips "
-        f"that explain the row, among all in its nine entries: {named}. {row['reason']}",
+        f"Single slips that explain the row, among all in its nine entries: {named}. {row['reason']}",
     )
 
 
@@ -427,9 +417,8 @@ def pattern_step():
         bound=spread,
         slips=explained_by({HERE: "67.7", "step": "22.5"}, holds),
         proof=(
-            f"The poses of this column are turned by {mean - 45:.2f} deg against those of the 45 deg column "
-            "(four lines, "
-            f"{spread:.2f} deg apart); with steps of 22.5 deg (6-22) the column is 67.5 deg."
+            f"The poses of this column are turned by {mean - 45:.2f} deg against those of the 45 deg column (four "
+            f"lines, {spread:.2f} deg apart); with steps of 22.5 deg (6-22) the column is 67.5 deg."
         ),
     )
 
@@ -465,9 +454,8 @@ def _table66_pose(name, pose):
         again.values,
         bound=again.halves,
         proof=(
-            f"C14 prints {again.values} for the same pose: where they differ by one in the last digit, it is "
-            "cut off in one "
-            "table and rounded in the other."
+            f"C14 prints {again.values} for the same pose: where they differ by one in the last digit, it is cut off "
+            "in one table and rounded in the other."
         ),
     )
 
@@ -520,8 +508,8 @@ def start_text():
     return Computed(
         B,
         proof=f"Pose and matrix of table 6-7 have B = {B:.0f} deg and T[0, 2] = {T[0, 2]:.0f}. With alpha = 180 "
-        "and beta = 90 "
-        f"deg in the order of (6-3) T[0, 2] would be {other[0, 2]:.0f}; the words do not say in which order they turn.",
+        f"and beta = 90 deg in the order of (6-3) T[0, 2] would be {other[0, 2]:.0f}; the words do not say in which "
+        "order they turn.",
     )
 
 
@@ -636,10 +624,9 @@ def form_deviation():
     return Computed(
         certificate.max(),
         proof="The certificate of the same sphere (C11) prints roundness deviations of "
-        f"{1000 * certificate.min():.3f} to "
-        f"{1000 * certificate.max():.3f} um, with an uncertainty of 0.04 um; the machine reports 67.4 um, 250 "
-        "times as much. "
-        "Whatever it touched, its diameter of 60.5541 mm is not the sphere's.",
+        f"{1000 * certificate.min():.3f} to {1000 * certificate.max():.3f} um, with an uncertainty of 0.04 um; the "
+        "machine reports 67.4 um, 250 times as much. Whatever it touched, its diameter of 60.5541 mm is not the "
+        "sphere's.",
     )
 
 
@@ -694,8 +681,8 @@ def _radius_proof():
     distances = ", ".join(f"the {name} {R:.1f} ({R4:.1f})" for name, (R, R4) in away.items())
     return (
         f"With the radius as a tenth unknown the 31 corrected poses give {R:.3f} +- {std:.3f} mm (without pose 4, "
-        f"which cuts next to the equator, {R4:.3f} +- {std4:.3f} mm). By the growth of the sum of squares, in standard "
-        f"deviations and in brackets without pose 4: {distances} away."
+        f"which cuts next to the equator, {R4:.3f} +- {std4:.3f} mm). By the growth of the sum of squares, in "
+        f"standard deviations and in brackets without pose 4: {distances} away."
     )
 
 
@@ -741,11 +728,9 @@ def end_pose():
             f"The least-squares pose of the printed data (decimal point of pose 2 repaired) lies {distance:.2f} mm "
             f"and {np.rad2deg(angle):.2f} deg away and has an rms of {fit.rms:.2f} mm against "
             f"{rms_at(end, target, measured):.2f} mm; of all sets of the seven corrections {nearest} comes nearest, "
-            f"{near_distance:.2f} mm and {np.rad2deg(near_angle):.2f} deg. Tables and end pose exclude each "
-            "other; which "
-            "of them the run did not have, the thesis does not show. A and C are hardly determined one by one "
-            "so close to "
-            "B = -90 deg."
+            f"{near_distance:.2f} mm and {np.rad2deg(near_angle):.2f} deg. Tables and end pose exclude each other; "
+            "which of them the run did not have, the thesis does not show. A and C are hardly determined one by one "
+            "so close to B = -90 deg."
         ),
     )
 
@@ -766,11 +751,9 @@ def end_iterations():
         bound=np.abs(counts - middle).max(),
         simulated=True,
         proof=(
-            f"At the start B = -90 deg the first step of the listing is undetermined: {len(counts)} starts "
-            "within 0.1 deg "
-            f"of it take {min(counts):.0f} to {max(counts):.0f} iterations on the printed data, half of them "
-            f"{middle:.0f} "
-            "or more. That excludes nothing."
+            f"At the start B = -90 deg the first step of the listing is undetermined: {len(counts)} starts within "
+            f"0.1 deg of it take {min(counts):.0f} to {max(counts):.0f} iterations on the printed data, half of them "
+            f"{middle:.0f} or more. That excludes nothing."
         ),
     )
 
@@ -795,10 +778,9 @@ def validation():
         simulated=True,
         proof=(
             "The pose is not named and its center came from a sphere fit of its own (radius 30.198 mm). Pose "
-            f"{best + 1} "
-            f"gives ({signed[0]:.3f}, {signed[1]:.3f}, {signed[2]:.3f}) mm, {lengths[best]:.3f} mm long, pose "
-            f"{second + 1} "
-            f"{lengths[second]:.3f} mm; y and z fit pose {best + 1}, and x would, had it lost its sign."
+            f"{best + 1} gives ({signed[0]:.3f}, {signed[1]:.3f}, {signed[2]:.3f}) mm, {lengths[best]:.3f} mm long, "
+            f"pose {second + 1} {lengths[second]:.3f} mm; y and z fit pose {best + 1}, and x would, had it lost its "
+            "sign."
         ),
     )
 
@@ -812,11 +794,9 @@ def claim():
     return Computed(
         np.array([printed.min(), printed.max()]),
         proof=(
-            f"Table 7-5 prints deviations from {printed.min():.2f} to {printed.max():.2f} mm, at one pose. Over "
-            "the 31 poses "
-            f"of the corrected tables the end pose leaves {corrected:.2f} mm (rms), a fit with the center free "
-            f"{joint:.3f} "
-            f"mm: {corrected / joint:.1f} times less. The sentence itself speaks of the one pose."
+            f"Table 7-5 prints deviations from {printed.min():.2f} to {printed.max():.2f} mm, at one pose. Over the "
+            f"31 poses of the corrected tables the end pose leaves {corrected:.2f} mm (rms), a fit with the center "
+            f"free {joint:.3f} mm: {corrected / joint:.1f} times less. The sentence itself speaks of the one pose."
         ),
     )
 
@@ -839,10 +819,9 @@ def underdetermined():
         if four == 4
         else f"{open_} unknowns stay open with any number of poses",
         proof=(
-            f"The sentence counts twelve unknowns against three equations a measurement, so that four should do. All "
-            f"{len(J)} equations of the 31 poses have rank {ranks[-1]}: the plate's pose enters by the one "
-            "point T_BP x_P', so "
-            "its three rotations stay free."
+            "The sentence counts twelve unknowns against three equations a measurement, so that four should do. All "
+            f"{len(J)} equations of the 31 poses have rank {ranks[-1]}: the plate's pose enters by the one point "
+            "T_BP x_P', so its three rotations stay free."
         ),
     )
 
@@ -855,8 +834,7 @@ def independent_measurements():
     return Computed(
         float(lines * len(angles)),
         proof=f"(6-22) to (6-25) define {lines} x {len(angles)} = {lines * len(angles)} measurements; n = 0 is "
-        "the same "
-        f"direction on all four lines, which leaves {len(poses)} directions of view. 31 were taken.",
+        f"the same direction on all four lines, which leaves {len(poses)} directions of view. 31 were taken.",
     )
 
 
@@ -885,8 +863,8 @@ def listing_cost():
         printed[HERE] if holds(printed) else found[HERE][0],
         slips=found,
         proof=(
-            f"Listing C3 squares the sum, (6-11) sums the squares: at the end pose {listed:.1f} against {formula:.1f} "
-            "mm^2. Listing C5 steps along J' e, the gradient of (6-11)."
+            f"Listing C3 squares the sum, (6-11) sums the squares: at the end pose {listed:.1f} against "
+            f"{formula:.1f} mm^2. Listing C5 steps along J' e, the gradient of (6-11)."
         ),
     )
 
@@ -913,11 +891,9 @@ def li_sign():
         found[HERE][0],
         slips=found,
         proof=(
-            f"A flange moved by +10 mm along x sees the sphere shifted by {left[0]:.0f} mm there: X_b = R0 (R_s "
-            "X_l + T_s) "
-            "+ T_0 being constant, the right side of (2-41) is T_01 - T_02, or the left one has the other "
-            "order; (2-40) is "
-            "right."
+            f"A flange moved by +10 mm along x sees the sphere shifted by {left[0]:.0f} mm there: X_b = R0 (R_s X_l "
+            "+ T_s) + T_0 being constant, the right side of (2-41) is T_01 - T_02, or the left one has the other "
+            "order; (2-40) is right."
         ),
     )
 
@@ -942,8 +918,7 @@ def kim_equation():
         found[HERE][0],
         slips=found,
         proof=f"Appendix A's D U = F holds for motions with A X = X B (off by {np.abs(D @ u - F).max():.0e}), "
-        "and (2-44) and "
-        "section 4.1 print that order; A X = B X would leave nothing but A = B.",
+        "and (2-44) and section 4.1 print that order; A X = B X would leave nothing but A = B.",
     )
 
 
@@ -971,8 +946,7 @@ def rating_scale():
     return Computed(
         10 * criteria,
         proof=f"Each approach is rated under {criteria} criteria from 1 to 10: no sum can exceed "
-        f"{10 * criteria}. Either a "
-        "fifth criterion is missing from the table or the scale is wrong.",
+        f"{10 * criteria}. Either a fifth criterion is missing from the table or the scale is wrong.",
     )
 
 
@@ -997,11 +971,9 @@ def angle_names():
         found[HERE][0],
         slips=found,
         proof=(
-            "Section 6.1.2, (6-7), (6-9) and listing C2 turn about z by A and about x by C, formula (6-3) the "
-            "other way "
-            f"round. The matrices of table 6-6 follow from their poses within {off['Rz(A) Ry(B) Rx(C)']:.0e} by "
-            "the former, "
-            f"and are missed by {off['Rz(C) Ry(B) Rx(A)']:.1f} by the latter."
+            "Section 6.1.2, (6-7), (6-9) and listing C2 turn about z by A and about x by C, formula (6-3) the other "
+            f"way round. The matrices of table 6-6 follow from their poses within {off['Rz(A) Ry(B) Rx(C)']:.0e} by "
+            f"the former, and are missed by {off['Rz(C) Ry(B) Rx(A)']:.1f} by the latter."
         ),
     )
 
@@ -1009,8 +981,20 @@ def angle_names():
 @computes("handeye.angle_names_2")
 def angle_names_of_chapter_2():
     return Computed(
-        ORDERS and angle_names().value,
+        angle_names().value,
         proof="Section 2.1.2 turns about z by C and about x by A, section 6.1.2, listing C2 and the tables "
         "about z by A and "
         "about x by C. Each is a convention; together they exchange A and C.",
+    )
+
+
+@computes("handeye.angle_axes")
+def angle_axes():
+    """The axis about which each of A, B and C alone turns the poses of table 6-6, in the order that fits them."""
+    order, axes = angle_names().value, {}
+    for factor in order.split():
+        axes[factor[3]] = factor[1]
+    return Computed(
+        np.array([f"um die {axes[name]}-Achse" for name in "ABC"]),
+        proof=f"The list of symbols gives all three angles the z axis; the matrices of table 6-6 need {order}.",
     )

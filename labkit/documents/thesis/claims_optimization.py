@@ -54,13 +54,16 @@ def _saddle_slips():
     printed = {(HERE, "f"): f, (HERE, "x1"): x[0], (HERE, "x2"): x[1]}
     printed |= {"100": "100", "a1": "1", "a2": "1", "200": "200", "b1": "-1", "b2": "-2"}
 
-    def holds(d):
-        n = {name: float(text) for name, text in d.items()}
-        x, centers = np.array([n[HERE, "x1"], n[HERE, "x2"]]), np.array([[n["a1"], n["a2"]], [n["b1"], n["b2"]]])
-        offset, depth = x - centers, np.array([n["100"], n["200"]])
+    def slope_and_value(place, centers, depth):
+        offset = place - centers
         q = (offset**2).sum(1) + 1
-        slope = ((2 * depth / q**2)[:, None] * offset).sum(0)
-        return np.linalg.norm(slope) < 0.1 and abs(-(depth / q).sum() - n[HERE, "f"]) < 0.05
+        return np.array([*((2 * depth / q**2)[:, None] * offset).sum(0), -(depth / q).sum()])
+
+    def holds(d):
+        place, f = rounding.read([d[HERE, "x1"], d[HERE, "x2"]]), rounding.read(d[HERE, "f"])
+        centers = [[float(d["a1"]), float(d["a2"])], [float(d["b1"]), float(d["b2"])]]
+        found, bound = rounding.propagate(slope_and_value, place, centers, [float(d["100"]), float(d["200"])])
+        return bool((np.abs(found - [0.0, 0.0, f.values]) <= bound + [0.0, 0.0, f.halves]).all())
 
     return {HERE if isinstance(name, tuple) else name: tried for name, tried in explained_by(printed, holds).items()}
 
@@ -68,14 +71,11 @@ def _saddle_slips():
 def _saddle_proof():
     saddle, printed = wells.extrema()[2], thesis.extrema()["saddle"][1:]
     return (
-        f"At the printed saddle (0.105, -0.205) f is {wells.value(printed):.3f}, as printed, but the gradient "
-        f"has length {np.linalg.norm(wells.gradient(printed)):.2f}, and the point is {_off_line(printed):.3f} "
-        "off the line "
-        "through both centers, which holds every stationary point; it vanishes at "
-        f"({saddle.x[0]:.4f}, {saddle.x[1]:.4f}), f = {saddle.value:.3f}, with Hessian eigenvalues "
-        f"{saddle.eigenvalues[0]:.1f} and {saddle.eigenvalues[1]:.1f}. No single slip in (6-16) makes the "
-        "printed point "
-        "stationary."
+        f"At the printed saddle (0.105, -0.205) f is {wells.value(printed):.3f}, as printed, but the gradient has "
+        f"length {np.linalg.norm(wells.gradient(printed)):.2f}, and the point is {_off_line(printed):.3f} off the "
+        f"line through both centers, which holds every stationary point; it vanishes at ({saddle.x[0]:.4f}, "
+        f"{saddle.x[1]:.4f}), f = {saddle.value:.3f}, with Hessian eigenvalues {saddle.eigenvalues[0]:.1f} and "
+        f"{saddle.eigenvalues[1]:.1f}. No single slip in (6-16) makes the printed point stationary."
     )
 
 
@@ -202,8 +202,7 @@ def newton_rule():
         found[HERE][0],
         slips=found,
         proof=f"|f| is {size[printed[HERE]]:.1f} or more in both minima, so the printed loop runs on to i_max; "
-        "the gradient "
-        f"is {size[gradient]:.0e} there, and listing C8 tests the gradient.",
+        f"the gradient is {size[gradient]:.0e} there, and listing C8 tests the gradient.",
     )
 
 
@@ -247,10 +246,8 @@ def newton_system():
         found["(2-26)"][0],
         slips={HERE if name == "(2-26)" else name for name in found},
         proof="(2-24), (2-25) and (2-27) agree on x - d with d = H^-1 grad f. From (-0.9, -1.9), taken "
-        "literally, (2-26) "
-        f"ends {far:.0f} away from the minimum; its inverse and its minus sign both have to go, and no change "
-        "of (2-25) or "
-        "(2-27) makes the three agree.",
+        f"literally, (2-26) ends {far:.0f} away from the minimum; its inverse and its minus sign both have to go, "
+        "and no change of (2-25) or (2-27) makes the three agree.",
     )
 
 
@@ -305,8 +302,7 @@ def gauss_newton_equation():
         found[HERE][0],
         slips=found,
         proof=f"J has shape {J.shape} and F {r.shape}: the printed product J F does not exist. With the "
-        "transpose (2-32) is "
-        "the solution (2-31), and listing C5 has it.",
+        "transpose (2-32) is the solution (2-31), and listing C5 has it.",
     )
 
 
@@ -326,8 +322,7 @@ def trust_region_update():
         found[HERE][0],
         slips=found,
         proof=f"From (0.5, 0.5) with radius 0.2, f goes from {wells.value(x):.1f} to {ends['x + h']:.1f} at x + "
-        "h, as (2-36) "
-        f"takes it, but to {ends['x - h']:.1f} at x - h.",
+        f"h, as (2-36) takes it, but to {ends['x - h']:.1f} at x - h.",
     )
 
 
@@ -374,10 +369,8 @@ def mu_identical():
     return Computed(
         "nahezu identisch" if np.ptp(mu, axis=0).max() < rounding.half_unit("0.98") else "verschieden",
         proof=f"By the table itself they differ by up to {np.ptp(mu, axis=0).max():.0e}. They say nothing about "
-        "the methods: mu "
-        "is the printed point less an ideal point of two decimals; with the rule of listing C8 Newton's "
-        "iterate is within "
-        f"{max(true, 1e-16):.0e} of the minimum, mu says {mu[0, 0].max():.1e}.",
+        "the methods: mu is the printed point less an ideal point of two decimals; with the rule of listing C8 "
+        f"Newton's iterate is within {max(true, 1e-16):.0e} of the minimum, mu says {mu[0, 0].max():.1e}.",
     )
 
 
@@ -475,9 +468,8 @@ def farthest_trust_region():
         np.repeat(np.array(reach)[:, None], 2, axis=1),
         simulated=True,
         proof="Solver and settings are MATLAB's. The trust region of chapter 4 ends in a minimum from "
-        "everywhere on the "
-        f"diagonal up to (100, 100), where the search ends, and changes from one to the other {changes} times: with it "
-        "there is no farthest start.",
+        "everywhere on the diagonal up to (100, 100), where the search ends, and changes from one to the other "
+        f"{changes} times: with it there is no farthest start.",
     )
 
 
@@ -523,8 +515,7 @@ def _saddle_of(method):
         "Keine Lösung" if share[2] == 0 else "gefunden",
         simulated=True,
         proof="A stand-in for the thesis's method, whose residuals or settings are not published, ends in the "
-        "saddle from "
-        f"{100 * share[2]:.1f} % of the starts in [-6, 6]^2.",
+        f"saddle from {100 * share[2]:.1f} % of the starts in [-6, 6]^2.",
     )
 
 
