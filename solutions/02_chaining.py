@@ -48,8 +48,8 @@ printed = lab_sheet.printed_transforms()
 measured = chaining.transforms_from_points(lab_sheet.station_points())
 for k, (T, S) in enumerate(zip(printed, measured)):
     angle, distance = chaining.closure_error(T)
-    off = np.abs(S - T).max()
-    print(f"K{k} to K{(k + 1) % 4}: {np.rad2deg(angle):6.2f} deg, {distance:6.2f} mm; synthetic entries off by {off:.1e}")
+    link = f"K{k} to K{(k + 1) % 4}: {np.rad2deg(angle):6.2f} deg, {distance:6.2f} mm"
+    print(f"{link}; synthetic entries off by {np.abs(S - T).max():.1e}")
 
 # %% order [markdown]
 # ## First A, then B
@@ -87,7 +87,7 @@ ex.predict("operator", guess)
 # %% chain
 @ex.chain
 def chain(transforms):
-    """Return T_0N, shape (4, 4), from the links T_01, T_12, ... stacked in an array of shape (N, 4, 4), in mm."""
+    """Return T_0N, shape (4, 4), from the links T_01, T_12, ..., shape (N, 4, 4), mm."""
     ### BEGIN SOLUTION
     T = np.eye(4)
     for link in transforms:
@@ -108,11 +108,15 @@ product = chain(printed)
 listing_7 = lab_sheet.printed_product()
 bound = chaining.rounding_bound(printed, lab_sheet.HALF_DIGIT)
 off = np.abs(product - listing_7)
-print("corner of the sum:", printed.sum(axis=0)[3, 3], "  of the product:", product[3, 3])
-print(f"rotation:    off by {off[:3, :3].max():.1e}, rounding allows {bound[:3, :3].max():.1e}")
-print(f"translation: off by {off[:3, 3].max():.1e} mm, rounding allows {bound[:3, 3].max():.1e} mm")
-print("every entry within its bound:", bool((off[:3] <= bound[:3] + lab_sheet.HALF_DIGIT).all()))
-print(f"product of the unrounded synthetic links: off by {np.abs(chain(measured) - listing_7).max():.1e}")
+corner = printed.sum(axis=0)[3, 3]
+print("corner of the sum:", corner, "  of the product:", product[3, 3])
+for name, part in (("rotation", np.s_[:3, :3]), ("translation (mm)", np.s_[:3, 3])):
+    most, allowed = off[part].max(), bound[part].max()
+    print(f"{name}: off by {most:.1e}, rounding allows {allowed:.1e}")
+within = off[:3] <= bound[:3] + lab_sheet.HALF_DIGIT
+print("every entry within its bound:", bool(within.all()))
+unrounded = np.abs(chain(measured) - listing_7).max()
+print(f"product of the unrounded synthetic links: off by {unrounded:.1e}")
 
 # %% closure [markdown]
 # ## The closure error
@@ -123,7 +127,7 @@ print(f"product of the unrounded synthetic links: off by {np.abs(chain(measured)
 # %% closure_error
 @ex.closure_error
 def closure_error(T):
-    """Return (angle in rad, distance in mm) by which T, shape (4, 4), differs from the identity."""
+    """Return angle (rad) and distance (mm) by which T, shape (4, 4), differs from I."""
     ### BEGIN SOLUTION
     R = T[:3, :3]
     twice_sine, twice_cosine = np.linalg.norm(R - R.T) / np.sqrt(2), np.trace(R) - 1
@@ -131,34 +135,43 @@ def closure_error(T):
     ### END SOLUTION
 
 
-# %% closure_angle_deg
-# by what angle does the sheet's loop miss itself, in degrees?
-closure_angle_deg = ...  # your code here
-### BEGIN SOLUTION
-closure_angle_deg = np.rad2deg(closure_error(product)[0])
-### END SOLUTION
-ex.closure_angle_deg(closure_angle_deg)
-
-# %% closure_distance
-# and by what distance, in mm?
-closure_distance = ...  # your code here
-### BEGIN SOLUTION
-closure_distance = closure_error(product)[1]
-### END SOLUTION
-ex.closure_distance(closure_distance)
+# %% sheet-closure
+angle, distance = closure_error(product)
+turn = np.rad2deg(angle)
+print(f"the sheet's loop misses itself by {turn:.1f} deg and {distance:.2f} mm")
 
 # %% work-piece [markdown]
-# (If you took the arccosine of the trace, compare the third digit with `chaining.closure_error(product)`: near 0 the cosine is flat, and six decimals of a matrix leave two or three
-# digits of the angle. The library also reads the sine, from $R - R^\top$.)
+# (Near 0 the cosine is flat: whoever takes the arccosine of the trace gets two or three digits of the angle from six decimals of a matrix. The library also reads the sine, from $R - R^\top$.)
 #
 # The sheet finds its product "annähernd genau" the identity. Whether it is depends on *where* you ask. A point of the work piece at $p$ is displaced by
 # $|T p - p|$, and what the angle adds to this grows with the distance from the axis of the closure motion.
+
+# %% even_lever
+# how far from the axis does the turn alone move a point as far as the loop's distance
+# (mm)? Nearer the shift counts more, farther away the turn
+even_lever = ...  # your code here
+### BEGIN SOLUTION
+angle, distance = closure_error(product)
+even_lever = distance / angle
+### END SOLUTION
+ex.even_lever(even_lever)
 
 # %% at-the-work-piece
 for x in (100, 300, 1000):
     points = x * np.vstack([np.eye(3), -np.eye(3)])
     d = chaining.displacement(product, points)
-    print(f"{x:5} mm from the origin of K0: {d.min():5.2f} to {d.max():5.2f} mm, along the axes")
+    along = f"{d.min():5.2f} to {d.max():5.2f} mm, along the axes"
+    print(f"{x:5} mm from the origin of K0: {along}")
+
+# %% worst_at_one_meter
+# and in the worst of all directions, at 1000 mm from the origin of K0 (mm)?
+worst_at_one_meter = ...  # your code here
+### BEGIN SOLUTION
+p = np.random.default_rng(0).normal(size=(20_000, 3))
+p *= 1000 / np.linalg.norm(p, axis=1)[:, None]
+worst_at_one_meter = chaining.displacement(product, p).max()
+### END SOLUTION
+ex.worst_at_one_meter(worst_at_one_meter)
 
 # %% lever [markdown]
 # ## One bad link
@@ -198,8 +211,10 @@ ex.predict("growth", guess, reveal=stages.growth)
 angle, distance = chaining.closure_error(product)
 std_rot = angle / np.sqrt(3 * len(printed))
 expected = chaining.expected_closure(printed, std_rot, 0.0)[1]
-print(f"noise of a link: {np.rad2deg(std_rot):.2f} deg a component, {100 * std_rot:.2f} mm on a triangle of 100 mm")
-print(f"closure distance it predicts: {expected:.1f} mm; found: {distance / expected:.1f} times that")
+on_triangle = f"{100 * std_rot:.2f} mm on a triangle of 100 mm"
+print(f"noise of a link: {np.rad2deg(std_rot):.2f} deg a component, {on_triangle}")
+print(f"closure distance it predicts: {expected:.1f} mm")
+print(f"found: {distance / expected:.1f} times that")
 
 # %% drift [markdown]
 # ## Right angles wear off
@@ -210,7 +225,7 @@ print(f"closure distance it predicts: {expected:.1f} mm; found: {distance / expe
 # %% orthonormalize
 @ex.orthonormalize
 def orthonormalize(T):
-    """Return a copy of T, shape (4, 4), with its rotation block replaced by the nearest rotation."""
+    """Return a copy of T, shape (4, 4), its block replaced by the nearest rotation."""
     ### BEGIN SOLUTION
     U, _, Vt = np.linalg.svd(T[:3, :3])
     X = T.copy()
@@ -225,8 +240,10 @@ for rounds in range(1, 1001):
     worn = worn @ product
     repaired = orthonormalize(repaired @ product)
     if rounds in (1, 10, 100, 1000):
-        defect, kept = chaining.orthonormality_error(worn), chaining.orthonormality_error(repaired)
-        print(f"{rounds:5} rounds: RᵀR differs from I by {defect:.1e}; repaired, below 1e-12: {kept < 1e-12}")
+        defect = chaining.orthonormality_error(worn)
+        kept = chaining.orthonormality_error(repaired) < 1e-12
+        off = f"RᵀR differs from I by {defect:.1e}"
+        print(f"{rounds:5} rounds: {off}; repaired, below 1e-12: {kept}")
 
 # %% sharing [markdown]
 # ## Sharing out the error
@@ -242,7 +259,9 @@ twist = np.zeros((4, 4))
 (a, b, c), twist[:3, 3] = log_se3(measured[0])[:3], log_se3(measured[0])[3:]
 twist[:3, :3] = [[0, -c, b], [c, 0, -a], [-b, a, 0]]
 print("a matrix exponential:", np.allclose(scipy.linalg.expm(twist), measured[0]))
-print("half the shift is not half the way:", half[:3, 3].round(1), "against", (0.5 * measured[0][:3, 3]).round(1), "mm")
+halved = (0.5 * measured[0][:3, 3]).round(1)
+way = half[:3, 3].round(1)
+print("half the shift is not half the way:", way, "against", halved, "mm")
 
 # %% sharing-derivation [markdown]
 # The pose after $N$ links should be $I$ but is $P_N = \exp(\xi)$. Nobody knows which link is to blame, so each takes its $N$-th part. Move the pose after $k$ links back by $k$ parts,
@@ -252,7 +271,10 @@ print("half the shift is not half the way:", half[:3, 3].round(1), "against", (0
 # %% distribute_closure
 @ex.distribute_closure
 def distribute_closure(transforms):
-    """Return the corrected links, shape (N, 4, 4), of a loop from its links T_01, ... T_(N-1)0, shape (N, 4, 4), in mm."""
+    """Return the corrected links, shape (N, 4, 4), of a loop.
+
+    transforms: its links T_01, ... T_(N-1)0, shape (N, 4, 4), mm.
+    """
     ### BEGIN SOLUTION
     N = len(transforms)
     poses = [np.eye(4)]
@@ -268,10 +290,12 @@ def distribute_closure(transforms):
 links = np.array([orthonormalize(T) for T in printed])
 corrected = distribute_closure(links)
 gaps = [chaining.closure_error(chain(loop))[1] for loop in (links, corrected)]
-print(f"closed: {gaps[1] < 1e-9}, by a factor of more than a million: {gaps[0] > 1e6 * gaps[1]}")
+much = gaps[0] > 1e6 * gaps[1]
+print(f"closed: {gaps[1] < 1e-9}, by a factor of more than a million: {much}")
 for k, (before, after) in enumerate(zip(links, corrected)):
     angle, distance = chaining.closure_error(relative(before, after))
-    print(f"link {k + 1}: turned by {np.rad2deg(angle):.4f} deg, its end moved by {distance:.3f} mm")
+    turn = np.rad2deg(angle)
+    print(f"link {k + 1}: turned by {turn:.4f} deg, its end moved by {distance:.3f} mm")
 
 # %% break-it [markdown]
 # ## Break it
@@ -285,7 +309,8 @@ blunder[1, 0, 3] += 20.0
 shared = chaining.distribute_closure(blunder)
 print("it closes without complaint:", bool(np.allclose(chain(shared), np.eye(4))))
 for k in range(4):
-    print(f"link {k + 1}: wrong by {np.linalg.norm((shared[k] - links[k])[:3, 3]):5.2f} mm")
+    off = np.linalg.norm((shared[k] - links[k])[:3, 3])
+    print(f"link {k + 1}: wrong by {off:5.2f} mm")
 try:
     chaining.distribute_closure([np.diag([-1.0, -1.0, 1.0, 1.0])])
 except ValueError as refusal:
@@ -299,12 +324,15 @@ except ValueError as refusal:
 # it shares differently: it knows that a small turn with a long lever explains more than a shift.
 
 # %% one-loop-two-ways
-graph = chaining.solve_pose_graph([(0, 1), (1, 2), (2, 3), (3, 0)], links, std_rot=std_rot, std_trans=0.3)
+pairs = [(0, 1), (1, 2), (2, 3), (3, 0)]
+graph = chaining.solve_pose_graph(pairs, links, std_rot=std_rot, std_trans=0.3)
 simple = chaining.stations(corrected)[:4]
 angles, distances = chaining.closure_error(relative(graph.poses, simple))
 for k in range(1, 4):
-    print(f"K{k}: graph and equal shares differ by {np.rad2deg(angles[k]):.3f} deg and {distances[k]:.2f} mm")
-print(f"weighted sum of squares {graph.chi2:.1f}, expected about {graph.dof} (std_rot comes from this very loop: no test)")
+    differ = f"{np.rad2deg(angles[k]):.3f} deg and {distances[k]:.2f} mm"
+    print(f"K{k}: graph and equal shares differ by {differ}")
+print(f"weighted sum of squares {graph.chi2:.1f}, expected about {graph.dof}")
+print("(std_rot comes from this very loop: no test)")
 
 # %% second-loop [markdown]
 # Now a second loop. Six frames, seven links, two loops A and B with one link in common. Decide what happens, then step through the measurements.
@@ -332,7 +360,7 @@ ex.predict("two_loops", guess, reveal=stages.two_loops)
 def read_system(text):
     """Return origin, x_point and y_point, shape (3, 3), from the text of a file.
 
-    Raises ValueError, naming the line, where it holds something else than such points."""
+    Raises ValueError, naming the line, where it holds anything else than points."""
     ### BEGIN SOLUTION
     points = []
     for number, line in enumerate(text.splitlines(), start=1):
@@ -367,11 +395,12 @@ again = chaining.transforms_from_points(back.reshape(4, 2, 3, 3))
 print("eight systems, written and read:", bool((back == points).all()))
 print("the chain is the same to the last bit:", bool((again == measured).all()))
 six = np.array([[f"{v:.6f}" for v in three.ravel()] for three in points]).astype(float)
-print(f"six decimals would lose up to {np.abs(six.reshape(points.shape) - points).max():.0e} mm")
+lost = np.abs(six.reshape(points.shape) - points).max()
+print(f"six decimals would lose up to {lost:.0e} mm")
 
 # %% faults
 good = texts[0].splitlines()
-faults = [good[0], "186.6 -132,2 x"], [good[0], good[1], "1 2"], good[:2], [*good, good[0]]
+faults = [good[0], "186.6 -132,2 x"], [*good[:2], "1 2"], good[:2], [*good, good[0]]
 for lines in faults:
     try:
         read_system("\n".join(lines))
@@ -384,7 +413,8 @@ from pathlib import Path
 
 with tempfile.TemporaryDirectory() as folder:
     path = Path(folder) / "Kalibrierung.txt"
-    tip, pivot = [-1.747805, 44.586360, -87.648108], [-253.032904, 107.040686, -3.215224]
+    tip = [-1.747805, 44.586360, -87.648108]
+    pivot = [-253.032904, 107.040686, -3.215224]
     systems.save_calibration(path, tip, pivot)
     print(path.read_text())
     print("tip and pivot, read back:", *systems.load_calibration(path))

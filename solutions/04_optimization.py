@@ -377,9 +377,9 @@ def dogleg_step(g, B, radius):
 # %% trust_region
 @ex.trust_region
 def trust_region(residual, jacobian, x, radius, steps):
-    """Return x, shape (n,), and the radius, a number, after `steps` rounds, taken or not.
+    """Return x, shape (n,), and the radius, a number, after so many rounds (steps).
 
-    residual(x): shape (m,); jacobian(x): shape (m, n); x, radius: those of the start."""
+    residual(x): (m,); jacobian(x): (m, n); x, radius: those of the start."""
     ### BEGIN SOLUTION
     for _ in range(steps):
         r, J = residual(x), jacobian(x)

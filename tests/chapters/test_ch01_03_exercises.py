@@ -244,3 +244,16 @@ def test_zeros_are_not_taken_for_the_last_row_alone():
 def test_small_singular_values_count(seed):
     outcome = judged("solve_pivot", lambda A, b: np.linalg.pinv(A, rcond=0.1) @ b, seed)
     assert outcome.status == NOT_YET and "drop singular values" in outcome.text
+
+
+def test_the_worst_direction_is_the_one_an_optimizer_finds():
+    T = chaining.chain(lab_sheet.printed_transforms())
+
+    def gain(angles):
+        (a, b), (ca, cb) = np.sin(angles), np.cos(angles)
+        p = 1000 * np.array([ca * cb, a * cb, b])
+        return -np.linalg.norm(T[:3, :3] @ p + T[:3, 3] - p)
+
+    starts = [(turn, tilt) for turn in (0.0, 2.0, 4.0) for tilt in (-0.5, 0.5)]
+    best = min(scipy.optimize.minimize(gain, start).fun for start in starts)
+    assert ITEMS["worst_at_one_meter"].reference() == pytest.approx(-best, rel=2e-4)

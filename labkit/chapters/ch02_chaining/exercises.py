@@ -114,10 +114,6 @@ def _arccos(cosine, clipped):
     return _closure(angle)
 
 
-def _trace_angle(R):
-    return np.arccos(np.clip((np.trace(R) - 1) / 2, -1, 1))
-
-
 def _with_rotation(T, R):
     T = T.copy()
     T[:3, :3] = R
@@ -279,8 +275,20 @@ def _sheet():
     return chaining.chain(lab_sheet.printed_transforms())
 
 
-def _angle_deg(wrong=None):
-    return np.rad2deg(chaining.closure_error(_sheet())[0] if wrong is None else wrong(_sheet()))
+def _lever(T, unit=lambda angle: angle):
+    """Distance from the axis at which the turn of T moves a point as far as T moves the origin."""
+    angle, distance = chaining.closure_error(T)
+    return float(distance / unit(angle))
+
+
+@functools.cache
+def _worst_at_one_meter():
+    """Largest displacement of a point 1000 mm from the origin of K0, over directions 1.3 deg apart (mm)."""
+    k = np.arange(20_000) + 0.5
+    height, turn = 1 - k / 10_000, np.pi * (1 + 5**0.5) * k  # a spiral from pole to pole
+    flat = np.sqrt(1 - height**2)
+    points = 1000 * np.column_stack([flat * np.cos(turn), flat * np.sin(turn), height])
+    return float(chaining.displacement(_sheet(), points).max())
 
 
 CLOSURE = metrics.Several(metrics.Angles(1e-6), metrics.Numbers(1e-9, "mm"), names=("angle", "distance"))
@@ -554,133 +562,99 @@ CHAPTER = Chapter(
             ],
         ),
         Value(
-            "closure_angle_deg",
-            reference=_angle_deg,
-            unit="deg",
+            "even_lever",
+            reference=lambda: _lever(_sheet()),
+            unit="mm",
             rtol=5e-3,  # arccos of the trace of a rounded matrix is that bad at small angles
             hints=(
-                "Chain the four printed transforms and ask for the closure error.",
-                "The first of the two results is the angle, in radians.",
-                "`closure_angle_deg = np.rad2deg(closure_error(product)[0])`",
+                "A turn moves a point by the angle times its distance from the axis.",
+                "The angle in rad times the lever is to be the closure distance: divide.",
+                "`angle, distance = closure_error(product)\neven_lever = distance / angle`",
             ),
             mistakes=[
-                Mistake(lambda: chaining.closure_error(_sheet())[0], "This is the angle in radians."),
                 Mistake(
-                    lambda: 0.0,
-                    "0 would be a perfect loop, and this one turns. (A clipped arccosine gives 0 where its argument is more than 1: it is "
-                    "(trace - 1) / 2, of the 3x3 block.)",
-                    id="closure-angle-zero",
+                    lambda: _lever(_sheet(), np.rad2deg),
+                    "You divided by the angle in degrees. A turn moves a point by the angle in rad times its lever.",
+                    id="lever-degrees",
                 ),
                 Mistake(
-                    lambda: np.linalg.norm(_sheet() - np.eye(4)),
-                    "This is the norm of T - I, which adds millimeters to numbers without a unit, or the distance, which is much the same "
-                    "number here. The angle is the first of the two results.",
-                    id="closure-angle-norm",
+                    lambda: 1 / _lever(_sheet()),
+                    "Upside down: the distance in mm, divided by the angle in rad, is a length.",
+                    id="lever-inverse",
                 ),
                 Mistake(
-                    lambda: _angle_deg(lambda T: np.arctan2(T[1, 0], T[0, 0])),
-                    "You read the turn about z alone. The loop also tilts by some tenths of a degree.",
+                    lambda: np.prod(chaining.closure_error(_sheet())),
+                    "You multiplied angle and distance. Which lever, times the angle, makes the distance?",
+                    id="lever-product",
                 ),
                 Mistake(
-                    lambda: _angle_deg(lambda T: np.linalg.norm(T[:3, :3] - np.eye(3))),
-                    "The norm of R - I is no angle: for small turns it is sqrt(2) times too large.",
+                    lambda: 2 * _lever(_sheet()),
+                    "Twice too large: the whole angle moves the point, not half of it.",
+                    id="lever-half-angle",
                 ),
                 Mistake(
-                    lambda: np.rad2deg(_trace_angle(chaining.chain(lab_sheet.printed_transforms()[1:])[:3, :3])),
-                    "The first link is missing from your chain.",
-                ),
-                Mistake(
-                    lambda: _angle_deg(
-                        lambda T: frames.rotation_angle(chaining.chain(lab_sheet.printed_transforms()[:-1]))
-                    ),
-                    "The last link is missing from your chain.",
-                ),
-                Mistake(
-                    lambda: _angle_deg(
-                        lambda T: frames.rotation_angle(chaining.chain(lab_sheet.printed_transforms()[::-1]))
-                    ),
+                    lambda: _lever(chaining.chain(lab_sheet.printed_transforms()[::-1])),
                     "You multiplied the links in the reverse order.",
+                    id="lever-reverse",
                 ),
                 Mistake(
-                    lambda: np.rad2deg(_angle_deg()),
-                    "You converted to degrees twice.",
+                    lambda: _lever(lab_sheet.printed_transforms()[0]),
+                    "This is the first link alone. The closure error belongs to the product of all four.",
+                    id="lever-first-link",
                 ),
                 Mistake(
-                    lambda: np.deg2rad(chaining.closure_error(_sheet())[0]),
-                    "You converted in the wrong direction: `closure_error` returns radians, so `np.rad2deg` is needed.",
-                ),
-                Mistake(
-                    lambda: chaining.closure_error(_sheet())[1],
-                    "This is the distance, in mm: the second of the two results. The angle is the first.",
-                ),
-                Mistake(
-                    lambda: np.rad2deg(chaining.closure_error(_sheet())[1]),
-                    "You converted the distance. The angle is the first of the two results.",
+                    lambda: np.linalg.norm(_sheet()[:3, 3]) / np.linalg.norm(_sheet()[:3, :3] - np.eye(3)),
+                    "The norm of R - I is no angle: for small turns it is sqrt(2) times too large.",
+                    id="lever-norm",
                 ),
             ],
         ),
         Value(
-            "closure_distance",
-            reference=lambda: chaining.closure_error(_sheet())[1],
+            "worst_at_one_meter",
+            reference=_worst_at_one_meter,
             unit="mm",
-            rtol=2.5e-3,  # three digits, as for the angle
+            rtol=2e-3,
             hints=(
-                "Where does the loop bring the origin of K0?",
-                "It is the length of the last column of the product, without its 1.",
-                "`closure_distance = closure_error(product)[1]`",
+                "The displacement depends on the direction of p: try many of length 1000 mm, in all directions.",
+                "Random directions: normal numbers, shape (n, 3), each divided by its length. Ten thousand are plenty.",
+                "`p = np.random.default_rng(0).normal(size=(20000, 3))\np *= 1000 / np.linalg.norm(p, axis=1)[:, None]\n"
+                "worst_at_one_meter = chaining.displacement(product, p).max()`",
             ),
             mistakes=[
                 Mistake(
-                    lambda: np.linalg.norm(_sheet()[:, 3]),
-                    "Your column still holds the 1 of the last row: take its first three entries.",
+                    lambda: chaining.displacement(_sheet(), 1000 * np.vstack([np.eye(3), -np.eye(3)])).max(),
+                    "This is the worst of the six axes. Between them lies a worse direction.",
+                    id="meter-axes",
                 ),
                 Mistake(
-                    lambda: np.linalg.norm(_sheet()[:2, 3]),
-                    "You took x and y alone. The loop also misses in z.",
+                    lambda: 1000 * chaining.closure_error(_sheet())[0],
+                    "This is what the turn alone does. The shift of the loop adds to it, or takes from it.",
+                    id="meter-turn",
                 ),
                 Mistake(
-                    lambda: np.abs(_sheet()[:3, 3]).sum(),
-                    "You added the components. The length is the root of the sum of squares.",
+                    lambda: 1000 * chaining.closure_error(_sheet())[0] + chaining.closure_error(_sheet())[1],
+                    "This adds angle times lever and distance as if both pointed the same way: no point can be worse, and none is that bad.",
+                    id="meter-sum",
                 ),
                 Mistake(
-                    lambda: np.linalg.norm(_sheet() - np.eye(4)),
-                    "This is the norm of the whole product less I, the numbers of the rotation included. Only the translation holds lengths.",
+                    lambda: np.hypot(1000 * chaining.closure_error(_sheet())[0], chaining.closure_error(_sheet())[1]),
+                    "This takes what the turn does and what the shift does to be perpendicular. In the worst direction they are nearly parallel.",
+                    id="meter-hypot",
                 ),
                 Mistake(
-                    lambda: np.linalg.norm(_sheet()),
-                    "This is the norm of the whole matrix, the numbers of the rotation included. Only the translation holds lengths.",
+                    lambda: chaining.closure_error(_sheet())[1],
+                    "This is the displacement of the origin of K0. A meter away it is larger.",
+                    id="meter-origin",
                 ),
                 Mistake(
-                    lambda: np.linalg.norm(chaining.chain(lab_sheet.printed_transforms()[::-1])[:3, 3]),
-                    "You multiplied the links in the reverse order.",
+                    lambda: 1000 * np.linalg.norm(_sheet()[:3, :3] - np.eye(3)),
+                    "The norm of R - I is sqrt(2) times the angle: no single point moves that far. Take |T p - p| for many p.",
+                    id="meter-norm",
                 ),
                 Mistake(
-                    lambda: np.linalg.norm(np.sum(lab_sheet.printed_transforms(), axis=0)[:3, 3]),
-                    "You added the four translations, but each is written in another frame.",
-                ),
-                Mistake(
-                    lambda: np.linalg.norm(lab_sheet.printed_transforms()[:, :3, 3], axis=1).sum(),
-                    "This is the length of the way around the loop, not the gap at its end.",
-                ),
-                Mistake(
-                    lambda: np.linalg.norm(chaining.chain(lab_sheet.printed_transforms()[1:])[:3, 3]),
-                    "The first link is missing from your chain.",
-                ),
-                Mistake(
-                    lambda: np.linalg.norm(chaining.chain(lab_sheet.printed_transforms()[:-1])[:3, 3]),
-                    "The last link is missing from your chain.",
-                ),
-                Mistake(
-                    _angle_deg,
-                    "This is the angle, in degrees. The distance is the second of the two results.",
-                ),
-                Mistake(
-                    lambda: chaining.closure_error(_sheet())[0],
-                    "This is the angle, in radians. The distance is the second of the two results.",
-                ),
-                Mistake(
-                    lambda: np.abs(_sheet()[:3, 3]).max(),
-                    "This is the largest component alone. The length is the root of the sum of squares.",
+                    lambda: 1000 + chaining.closure_error(_sheet())[1],
+                    "You returned how far the displaced point is from the origin. Subtract p.",
+                    id="meter-no-difference",
                 ),
             ],
         ),
