@@ -496,9 +496,21 @@ ex.predict("moved", guess, reveal=stages.moved_station)
 # %% moved-then [markdown]
 # A station that stood askew from the beginning turns the whole world a little, and the
 # reset into $W$ takes that up: $E_{trans}$ stays near the noise. One that moves during
-# the run makes two worlds, and no mounting fits both. Turn the knob until the mean
-# error is the report's, and read off how few milliradians that takes. A rocking station
-# does it at every stop. $E_{trans}$ sees what changes *within* a run, and nothing else.
+# the run makes two worlds, one that drifts makes twenty, and no mounting fits them all.
+# **By how many milliradians must it turn after stop 10, to make all of the $E_{trans}$
+# that the report prints, 0.802 mm?** Use the knob, or `stages.compute_moved_station`.
+
+# %% knock
+knock = ...  # your code here
+### BEGIN SOLUTION
+state = {"tilt": 2.0, "when": "after stop 10"}
+knock = 2.0 * 0.802 / stages.compute_moved_station(state)["E_trans"]
+### END SOLUTION
+knock = ex.knock(knock)
+
+# %% knock-then [markdown]
+# No eye sees so small a turn. A rocking station makes it anew at every stop. $E_{trans}$
+# sees what changes *within* a run, and nothing else.
 
 # %% beyond [markdown]
 # ## Beyond the document: can it be done better?

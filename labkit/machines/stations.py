@@ -403,6 +403,27 @@ def tilted(T_WL, rotation, shift=(0.0, 0.0, 0.0)):
     return as_transforms(T_WL, "T_WL") @ pose(exp_so3(rotation), as_points(shift, "shift"))
 
 
+def last_turned(T_WL, turns):
+    """Stations at each of several readings, the last of them turned about its own axes.
+
+    Parameters
+    ----------
+    T_WL : array-like, shape (n, 4, 4)
+        Where they are believed to stand.
+    turns : array-like, shape (k, 3), rad
+        Rotation vector of the last station at each reading.
+
+    Returns
+    -------
+    T_WL : array, shape (k, n, 4, 4)
+        As `read_poses` takes them.
+    """
+    T_WL, turns = as_shape(T_WL, "T_WL", "n", 4, 4), as_shape(turns, "turns", "k", 3)
+    actual = np.repeat(T_WL[None], len(turns), axis=0)
+    actual[:, -1] = tilted(actual[:, -1], turns)
+    return actual
+
+
 def read_poses(T_WE, believed, actual, rng, std_angle=0.0, diodes=DIODES):
     """What a tracker reports when its stations stand elsewhere than it believes.
 

@@ -232,6 +232,7 @@ def moved(tilt, when):
 def test_a_moved_station_shows_in_e_trans_only_if_it_moves_during_the_run():
     still, before, during = moved(0.0, "before the run"), moved(2.0, "before the run"), moved(2.0, "after stop 10")
     assert during["E_trans"] > 15 * before["E_trans"] and during["off"] > 10 * before["off"]
+    assert before["E_trans"] < moved(2.0, "slowly, all along")["E_trans"] < during["E_trans"]
     assert still["mean"] < 0.1 and moved(2.0, "at every stop")["E_trans"] > during["E_trans"]
     np.testing.assert_allclose(during["E_trans"], moved(4.0, "after stop 10")["E_trans"] / 2, rtol=0.03)
 

@@ -5,13 +5,16 @@ import itertools
 
 import numpy as np
 
+from ...documents.report.printed import COLUMNS, table_d
 from ...exercises import metrics
 from ...exercises.engine import Exercise, Mistake, Prediction, Value
 from ...geometry.frames import invert, pose, unit_vector
 from ...geometry.lie import exp_so3, skew
 from ...geometry.propagation import error_budget, point_covariance
-from ...machines import cell, stations
+from ...machines import cell, simulation, stations
 from ...machines.accuracy import static_error_and_lag
+from ...machines.arm import TX40, tool_pose
+from ...machines.mounting import calibrate_mounting
 
 # Base stations ---------------------------------------------------------------------------------------------------------------
 
@@ -72,6 +75,18 @@ def _along(d):
 
 def _across(d):
     return np.eye(3) - _along(d)
+
+
+@functools.cache
+def _knock(course="after stop 10"):
+    """Turn of one station, mrad, that makes the printed E_trans: it grows in proportion."""
+    joints = simulation.measuring_joints()
+    T_BF, T_BE = simulation.flange_poses(joints), tool_pose(TX40, joints, simulation.T_FE)
+    turned = np.arange(len(T_BE)) > (10 if course == "after stop 10" else -1)
+    actual = stations.last_turned(stations.STATIONS, 2e-3 * turned[:, None] * [0.0, 1.0, 0.0])
+    read = stations.read_poses(T_BE, stations.STATIONS, actual, np.random.default_rng(0))
+    found = calibrate_mounting(T_BF, invert(read[0]) @ read, factor=1e9)
+    return 2.0 * 1000 * table_d().mean[COLUMNS.index("E_trans")] / found.E_trans
 
 
 # Errors over speed -----------------------------------------------------------------------------------------------------------
@@ -332,6 +347,33 @@ STATIONS = [
         choices=("before the run begins", "after its tenth stop", "both alike"),
         answer="after its tenth stop",
         why="Before the run, nearly all of it is one rigid motion of the whole world, and W takes that up. In the middle there are two worlds, and no mounting fits both.",
+    ),
+    Value(
+        "knock",
+        reference=_knock,
+        unit="mrad",
+        rtol=0.05,
+        digits=2,
+        hints=(
+            "Set the figure to *after stop 10* and move the knob until E_trans is 0.80 mm.",
+            "E_trans grows in proportion to the turn: one reading is enough, and a division.",
+            "`result = stages.compute_moved_station({'tilt': 1.0, 'when': 'after stop 10'})\nknock = 0.802 / result['E_trans']`",
+        ),
+        mistakes=[
+            Mistake(
+                lambda: np.rad2deg(1e-3 * _knock()),
+                "This is in degrees. Wanted are mrad.",
+                id="knock-degrees",
+                within=0.006,
+            ),
+            Mistake(lambda: 1e-3 * _knock(), "This is in rad. Wanted are mrad.", id="knock-rad", within=1e-4),
+            Mistake(
+                lambda: _knock("before the run"),
+                "This would be the station that moved before the run, which hardly shows. Let it move after stop 10.",
+                id="knock-before",
+                within=6.0,
+            ),
+        ],
     ),
 ]
 

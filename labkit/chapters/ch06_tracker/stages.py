@@ -647,13 +647,14 @@ def sweeps():
 
 STD_ANGLE = 2e-5  # rad: white noise of an angle averaged over a stop, a twentieth of a millimeter at 2.5 m
 KEEP_ALL = 1e9  # no stop is left out: what one moved station does to the fit is the question
-KNOCK = {"before the run": 0, "after stop 10": 11, "at every stop": None}
-
-
-@functools.cache
-def _believed():
-    T_BF, T_BE = _stops()
-    return T_BF, T_BE, np.repeat(stations.STATIONS[None], len(T_BE), axis=0)
+STOPS = np.arange(simulation.STOPS)
+ABOUT_Y = np.array([0.0, 1.0, 0.0])
+COURSES = {  # the station's rotation vector at each stop, for a turn of 1
+    "before the run": np.tile(ABOUT_Y, (len(STOPS), 1)),
+    "after stop 10": (STOPS > 10)[:, None] * ABOUT_Y,
+    "slowly, all along": (STOPS / STOPS[-1])[:, None] * ABOUT_Y,
+    "at every stop": unit_noise((len(STOPS), 3), seed=9),
+}
 
 
 def compute_moved_station(state):
@@ -661,12 +662,8 @@ def compute_moved_station(state):
 
     Returns a dictionary: errors (21,) mm, E_trans (mm), mean (mm), off (mm): of the mounting from the truth.
     """
-    T_BF, T_BE, actual = _believed()
-    actual, tilt, since = actual.copy(), 1e-3 * state["tilt"], KNOCK[state["when"]]
-    if since is None:
-        actual[:, 1] = stations.tilted(actual[:, 1], tilt * unit_noise((len(T_BE), 3), seed=9))
-    else:
-        actual[since:, 1] = stations.tilted(actual[since:, 1], [0.0, tilt, 0.0])
+    T_BF, T_BE = _stops()
+    actual = stations.last_turned(stations.STATIONS, 1e-3 * state["tilt"] * COURSES[state["when"]])
     read = stations.read_poses(T_BE, stations.STATIONS, actual, np.random.default_rng(5), STD_ANGLE)
     found = calibrate_mounting(T_BF, invert(read[0]) @ read, factor=KEEP_ALL)
     return {
@@ -699,7 +696,7 @@ def moved_station():
         compute=compute_moved_station,
         controls={
             "tilt": Slider(0.0, 6.0, 1.7, step=0.1, label="turn of station 2 (mrad)"),
-            "when": Choice(list(KNOCK), "before the run", label="it moves"),
+            "when": Choice(list(COURSES), "before the run", label="it moves"),
         },
         fail={"tilt": 4.0, "when": "at every stop"},
         presets={"after stop 10": {"when": "after stop 10"}},

@@ -308,9 +308,8 @@ def clamped_stations():
     """By how much one of two stations must rock for errors ten times as large as those of appendix D."""
     joints = simulation.measuring_joints()
     T_BF, T_BE = simulation.flange_poses(joints), tool_pose(TX40, joints, simulation.T_FE)
-    rng, tilt = np.random.default_rng(2018), 1e-3
-    actual = np.repeat(stations.STATIONS[None], len(T_BE), axis=0)
-    actual[:, 1] = stations.tilted(actual[:, 1], tilt * rng.normal(size=(len(T_BE), 3)))
+    rng = np.random.default_rng(2018)
+    actual = stations.last_turned(stations.STATIONS, 1e-3 * rng.normal(size=(len(T_BE), 3)))
     read = stations.read_poses(T_BE, stations.STATIONS, actual, rng)
     found = calibrate_mounting(T_BF, frames.invert(read[0]) @ read, factor=1e9)
     per_mrad, printed = found.translation[1:].mean(), table_d().mean[COLUMNS.index("mean_mm")]
