@@ -109,6 +109,12 @@ def axes(ax, xlabel="", ylabel="", title="", equal=False, grid=True):
     return ax
 
 
+def legend_above(ax, **options):
+    """The legend over the axes, where no data lie under it. Returns it."""
+    place = {"loc": "lower left", "bbox_to_anchor": (-0.01, 1.0), "borderaxespad": 0.1, "columnspacing": 1.2}
+    return ax.legend(**{**place, **options})
+
+
 def words_below(ax, words):
     """Words instead of numbers along x, at 0, 1, ..., on one baseline whatever their letters. Returns ax."""
     ax.set_xticks(range(len(words)), words, va="baseline")

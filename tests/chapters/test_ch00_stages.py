@@ -17,8 +17,11 @@ def test_the_point_stays_where_its_turns_are_in_the_picture():
     stage = stages.quarter_turns()
     stage.set(p=(6, 4))
     assert np.hypot(*stage.state["p"]) == pytest.approx(stages.RADIUS)
-    stage.make_it_fail()
+    stage.set(p=(0, 0))
     assert "nothing to turn" in stage.caption
+    stage.make_it_fail()
+    short = np.rad2deg(np.arccos(-stage.result[0] @ stage.result[2] / (stage.result[0] @ stage.result[0])))
+    assert short == pytest.approx(20.0) and "20 deg" in stage.caption
 
 
 def test_colors_are_told_in_words_as_well():

@@ -54,6 +54,19 @@ def test_models_have_slope_one_and_two():
         np.testing.assert_allclose(slope[-3:], order, atol=0.06)
 
 
+def test_others_drive_the_same_circle_and_are_gone_where_keys_lead_elsewhere():
+    stage = drives.drive()
+    paths = stage.result["others"].reshape(drives.OTHERS, -1, 2)
+    assert paths.shape[1] == len(stage.result["truth"]) + 1 and np.isnan(paths[:, -1]).all()
+    ends, robot = paths[:, -2], stage.result["truth"][-1, :2]
+    assert np.abs(paths[:, 0]).max() == 0 and 0.05 < np.linalg.norm(ends - robot, axis=1).mean() < 1.0
+    spread = np.ptp(ends, axis=0).sum()
+    stage.set(factor=2.0)
+    assert np.ptp(stage.result["others"].reshape(drives.OTHERS, -1, 2)[:, -2], axis=0).sum() > 1.5 * spread
+    stage.receive({"arrows": ["up"]})
+    assert len(stage.result["others"]) == 0
+
+
 def test_arrow_keys_drive():
     stage = drives.drive()
     stage.set(t=0.0)

@@ -13,8 +13,12 @@ def plane(ax):
 
 
 def turned_points(ax):
-    """Arms from the origin to the point, its first and its second turn, with labels. Returns (lines, labels)."""
+    """Arms from the origin to the point, its first and its second turn, with labels; the circle that any turn keeps to,
+    and the place across the origin. Returns (lines, labels, circle, across).
+    """
     looks = ("measurement", "prediction", "estimate")
     lines = [ax.plot([], [], **{**style.look(look, linestyle="-"), "marker": "o"})[0] for look in looks]
     labels = [ax.text(0, 0, text) for text in ("p", "once", "twice")]
-    return lines, labels
+    (circle,) = ax.plot([], [], **style.look("guide"))
+    (across,) = ax.plot([], [], **style.look("rejected", marker="o", markersize=10))
+    return lines, labels, circle, across

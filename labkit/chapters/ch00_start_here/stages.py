@@ -36,15 +36,18 @@ def quarter_turns():
 
     def scene(fig):
         ax = figures.plane(fig.subplots())
-        lines, labels = figures.turned_points(ax)
+        lines, labels, circle, across = figures.turned_points(ax)
+        around = np.linspace(0, 2 * np.pi, 100)
 
         def update(state, result):
+            circle.set_data(*(np.hypot(*result[0]) * np.array([np.cos(around), np.sin(around)])))
+            across.set_data(*-result[:1].T)
             for line, label, point in zip(lines, labels, result):
                 line.set_data([0, point[0]], [0, point[1]])
                 label.set_position(point * (1 + 0.35 / max(np.hypot(*point), 1)))
                 label.set_horizontalalignment("left" if point[0] >= 0 else "right")
 
-        return [*lines, *labels], update
+        return [circle, across, *lines, *labels], update
 
     return Stage(
         "quarter turns",
@@ -53,7 +56,8 @@ def quarter_turns():
         handles={"p": Handle((3, 1), step=0.1)},
         controls={"angle": Slider(0, 180, 90, step=5, label="angle (deg)")},
         constrain=_inside,
-        fail={"p": (0, 0)},
+        fail={"angle": 80},
+        because="Turned by 80 deg instead of 90, twice, 20 deg are missing to the place across (hollow ring).",
         describe=_caption,
     )
 

@@ -37,10 +37,10 @@ def paths(ax, names):
 
 
 def emphasize(lines, chosen):
-    """The chosen one of several lines in the color of the estimate and on top, the others muted."""
-    for name, line in lines.items():
-        line.set(color=style.ESTIMATE if name == chosen else style.MUTED, linewidth=2.4 if name == chosen else 1.3)
-        line.set_zorder(4 if name == chosen else 3)
+    """The chosen one of several lines in the color of the estimate and on top, the others thin and muted."""
+    for line in lines.values():
+        line.set(color=style.MUTED, linewidth=0.9, markersize=0, zorder=3)
+    lines[chosen].set(color=style.ESTIMATE, linewidth=2.4, markersize=4.5, zorder=4)
 
 
 def model(ax):
@@ -53,11 +53,8 @@ def model(ax):
 
 def courses(ax, names, iterations, low, high):
     """Cost against iteration, one line per method, and a marker for the one shown. Returns ({name: line}, marker)."""
-    style.axes(ax, "iteration", "$f$")
+    style.axes(ax, "iteration", "$f$", "gray: the others")
     ax.set(xlim=(0, iterations), ylim=(low, high), xticks=range(0, iterations + 1, 4))
-    for name in names:
-        ax.plot([], [], color=style.INK, linewidth=1.3, markersize=4.5, **PATHS[name])
-    ax.legend(loc="upper right", fontsize=8, handlelength=3.0, borderaxespad=0.2)
     lines = paths(ax, names)
     (here,) = ax.plot([], [], marker="o", markersize=11, markerfacecolor="none", color=style.INK, zorder=6)
     return lines, here

@@ -76,8 +76,8 @@ class Search:
         (self.end,) = ax.plot([], [], **style.look("estimates", markersize=8))
         (self.robot,) = ax.plot([], [], color=style.TRUTH, linestyle="none", marker="+", markersize=13, label="robot")
         self.artists = [self.cloud, self.ellipse, self.weak, self.path, self.end, self.robot]
-        box = {"frameon": True, "facecolor": style.PAPER, "edgecolor": style.PAPER, "framealpha": 0.85}
-        ax.legend(loc="upper right", fontsize=8, **box)
+        legend = style.legend_above(ax, ncols=3)
+        legend.legend_handles[0].set(markersize=9, alpha=1.0)  # a dot too small to be seen among the words
 
     def set(self, robot, path, cloud, ellipse, weak):
         """Points (2,), (k, 2), (n, 2), (m, 2), (2, 2); empty arrays draw nothing."""
@@ -119,19 +119,22 @@ class ModelPaths:
 
 
 class Driven:
-    """True path, estimated path, ellipses along it and both robots."""
+    """True path, estimated path, ellipses along it and both robots; others that were given the same commands."""
 
-    def __init__(self, ax):
+    def __init__(self, ax, others):
+        faint = {"color": style.MUTED, "linewidth": 0.7, "alpha": 0.45}
+        (self.others,) = ax.plot([], [], **faint, label=f"{others} others, same commands")
         (self.outlines,) = ax.plot([], [], color=style.PREDICTION, linewidth=1.1, label="95 % ellipses")
         (self.truth,) = ax.plot([], [], **style.look("truth"), label="true path")
         (self.estimate,) = ax.plot([], [], **style.look("estimate", linewidth=1.8), label="dead reckoning")
         (self.robot,) = ax.plot([], [], color=style.TRUTH, linewidth=1.6)
         (self.ghost,) = ax.plot([], [], color=style.ESTIMATE, linewidth=1.6)
-        self.artists = [self.outlines, self.truth, self.estimate, self.ghost, self.robot]
-        ax.legend(loc="upper left", fontsize=8)
+        self.artists = [self.others, self.outlines, self.truth, self.estimate, self.ghost, self.robot]
+        style.legend_above(ax, ncols=2)
 
-    def set(self, truth, estimate, outlines):
-        """`truth`, `estimate`: (n, 3) poses; `outlines`: (k, 2), rows of NaN between ellipses."""
+    def set(self, truth, estimate, outlines, others):
+        """`truth`, `estimate`: (n, 3) poses; `outlines`, `others`: (k, 2), rows of NaN between ellipses or paths."""
+        self.others.set_data(*others.T)
         self.truth.set_data(*truth[:, :2].T)
         self.estimate.set_data(*estimate[:, :2].T)
         self.outlines.set_data(*outlines.T)

@@ -169,6 +169,7 @@ COUNTS = np.array([3, 5, 10, 20, 50, 100])  # time steps it is cut into
 KEYS = {"up": (1.0, 0.0), "down": (-1.0, 0.0), "left": (0.0, np.pi / 2), "right": (0.0, -np.pi / 2)}  # for 0.4 s
 KEY_STEPS = 4
 EVERY = 10  # steps between two drawn ellipses
+OTHERS = 30  # robots that were given the same commands
 RUNS = 1500
 VIEW = ((-4.4, 15.0), (-4.7, 7.5))  # m; holds the lecture's circle and 14 m straight on
 
@@ -260,6 +261,25 @@ def _advance_drive(state, event):
     return memory
 
 
+@functools.lru_cache(maxsize=8)
+def _others(factor):
+    """Paths of OTHERS robots on the lecture's circle at so many times its noise, shape (n + 1, OTHERS, 2)."""
+    circle = lecture.circle_drive()
+    noise = {name: value * factor**2 for name, value in circle.noise.items()}
+    rng = np.random.default_rng(3)
+    return odometry.sample_drives(np.zeros(3), circle.controls, circle.dt, **noise, rng=rng, runs=OTHERS, model="arc")[
+        ..., :2
+    ]
+
+
+def _others_so_far(state, steps):
+    """The others' paths one after the other, (k, 2) with rows of NaN between; none where keys have driven elsewhere."""
+    if steps != round(state["t"] / lecture.circle_drive().dt):
+        return np.empty((0, 2))
+    paths = _others(state["factor"])[: steps + 1].swapaxes(0, 1)
+    return np.concatenate([paths, np.full((OTHERS, 1, 2), np.nan)], axis=1).reshape(-1, 2)
+
+
 def compute_drive(state):
     """Paths, ellipses along the estimated one, and how far off the estimate is."""
     memory = state["memory"]
@@ -268,6 +288,7 @@ def compute_drive(state):
     return {
         "truth": truth,
         "estimate": estimate,
+        "others": _others_so_far(state, len(truth) - 1),
         "outlines": gaussian.outlines(estimate[shown, :2], cov[shown, :2, :2], points=31),
         "error": float(np.linalg.norm((truth[-1] - estimate[-1])[:2])),
         "std": float(np.sqrt(np.trace(cov[-1, :2, :2]))),
@@ -289,10 +310,10 @@ def drive():
     def scene(fig):
         ax = style.axes(fig.subplots(), "x (m)", "y (m)", equal=True)
         ax.set(xlim=VIEW[0], ylim=VIEW[1])
-        path = draw.Driven(ax)
+        path = draw.Driven(ax, OTHERS)
 
         def update(state, result):
-            path.set(result["truth"], result["estimate"], result["outlines"])
+            path.set(result["truth"], result["estimate"], result["outlines"], result["others"])
 
         return path.artists, update
 
