@@ -315,3 +315,9 @@ def test_version_change_log_and_citation_agree():
     newest = re.search(r"^## (\S+)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.M)[1]
     cited = re.search(r"^version: (\S+)$", (ROOT / "CITATION.cff").read_text(encoding="utf-8"), re.M)[1]
     assert version == newest == cited
+
+
+def test_no_two_test_files_share_a_name():
+    """pytest imports them by name alone: of two, one process can run one."""
+    names = [path.name for path in (ROOT / "tests").glob("**/*.py") if path.name != "conftest.py"]
+    assert len(names) == len(set(names)), sorted(name for name in set(names) if names.count(name) > 1)

@@ -9,8 +9,6 @@ import sys
 import driver
 import pytest
 
-from conftest import missing
-
 FIRST = "01/three-points"
 
 
@@ -34,7 +32,7 @@ def demo(*words):
 @pytest.fixture(scope="module")
 def browser_path():
     if not driver.find_browser():
-        missing("no Chromium on this machine: the browser test needs one")
+        driver.missing("no Chromium on this machine: the browser test needs one")
     return driver.find_browser()
 
 
