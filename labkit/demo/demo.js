@@ -124,6 +124,7 @@ class Wall {
       this.show();
     }
     if (message.kind === "card" && message.key === this.card.key) this.mount(message);
+    if (message.kind === "ahead") this.measure(message);
   }
 
   clear() {
@@ -146,12 +147,24 @@ class Wall {
       send: (message) => wire.send({ to, message }),
     };
     this.takeDown = stage.render({ model, el: $("#place") });
-    const buttons = [...document.querySelectorAll("#place .buttons button:not(.enlarge)")];
-    buttons.forEach((button, k) => { button.dataset.key = ["R", "F"][k] ?? `⇧${k - 1}`; });
-    const play = $("#place .play");
-    if (play) play.dataset.key = "P";
     const first = new MutationObserver(() => { first.disconnect(); this.focus(); }); // handles appear with the picture
     first.observe($("#place .labkit-stage"), { attributeFilter: ["data-picture"] });
+  }
+
+  /** The room that a Stage nearby will have here: Python draws it ahead in that size. */
+  measure({ stage: key, declaration }) {
+    const card = [1, -1].map((by) => this.cards[this.cards.indexOf(this.card) + by]).find((near) => near?.stage === key);
+    if (!card) return;
+    const asking = $("#bar").cloneNode(true);
+    const place = $("#place").cloneNode(false);
+    for (const node of [asking, place]) node.removeAttribute("id");
+    $("#ahead").replaceChildren(asking, place);
+    this.fill(asking, card, null);
+    let look = null;
+    const model = { get: (name) => ({ declaration })[name], on: () => {}, off: () => {}, send: (message) => { look ??= message.look; } };
+    stage.render({ model, el: place })();
+    $("#ahead").replaceChildren();
+    if (look) this.wire.ask({ ahead: key, look });
   }
 
   /** Arrow keys move the first handle at once, or drive, or turn; else the first control has them. */
@@ -176,25 +189,32 @@ class Wall {
   show() {
     const { card } = this;
     const ballot = this.now?.key === card.key ? this.now.ballot : null;
-    const answered = this.step === "answer";
     const covered = card.votes && (this.step === "question" || !card.stage);
     $("#cover").hidden = !covered;
     if ($("#place").inert !== covered) {
       $("#place").inert = covered; // no key moves what is not seen
       this.focus();
     }
-    $("#bar").hidden = Boolean(this.bare) || !card.stage;
-    $("#bar").classList.toggle("asked", card.votes);
     for (const place of [$("#bar"), $("#cover")]) {
-      place.classList.toggle("answered", answered);
-      place.querySelector(".question").textContent = card.question || card.shows;
-      place.querySelector(".happened").textContent = happened(card);
-      place.querySelector(".choices").replaceChildren(...choices(card, ballot, place.id === "cover"));
+      this.fill(place, card, ballot);
+      place.classList.toggle("answered", this.step === "answer");
     }
-    $("#cover .next").textContent = answered ? "" : card.stage ? "Enter shows the figure." : "Enter shows the answer.";
+    $("#cover .next").textContent = this.step === "answer" ? "" : card.stage ? "Enter shows the figure." : "Enter shows the answer.";
     $("#voting").textContent = this.now?.voting && ballot ? voted(ballot) : "";
     if (ballot) $("#voting").dataset.round = ballot.round;
     this.showJoin();
+  }
+
+  /** The words of a card; hidden ones take their room from the beginning. */
+  fill(place, card, ballot) {
+    const large = place.id === "cover";
+    if (!large) {
+      place.hidden = Boolean(this.bare) || !card.stage;
+      place.classList.toggle("asked", card.votes);
+    }
+    place.querySelector(".question").textContent = card.question || card.shows;
+    place.querySelector(".happened").textContent = happened(card);
+    place.querySelector(".choices").replaceChildren(...choices(card, ballot, large));
   }
 
   showJoin() {

@@ -23,14 +23,16 @@ class House:
         Called in the server's thread with each message of a Stage, as `framed` packs it.
     complain : function(sentence)
         Called in the server's thread with what went wrong beyond what a Stage says itself.
+    made : function(key, stage)
+        Called in the server's thread when a Stage is ready that is likely next: a page may say its size, `draw_ahead`.
     """
 
-    def __init__(self, makers, send, complain):
-        self.makers, self.send, self.complain = makers, send, complain
+    def __init__(self, makers, send, complain, made):
+        self.makers, self.send, self.complain, self.made = makers, send, complain, made
         self.stages, self.faults = {}, {}
         self.worker = ThreadPoolExecutor(1, thread_name_prefix="stages")
         self.loop = asyncio.get_running_loop()
-        self._waiting, self._look, self._timer = [], None, None
+        self._waiting, self._timer = [], None
 
     async def get(self, key):
         """(Stage, "") or (None, why it could not be made)."""
@@ -40,15 +42,18 @@ class House:
 
     def receive(self, key, message):
         """One message of a page to a Stage; it answers by `send`. Returns the work under way."""
-        self._look = message.get("look", self._look) if isinstance(message, dict) else self._look
         self._later()
         return self._submit(self._receive, key, message)
 
     def prepare(self, keys, shown):
         """From now on these are likely next; of the others but `shown`, the pixels are let go."""
-        self._waiting = [key for key in keys if key not in self.stages and key not in self.faults]
+        self._waiting = [key for key in keys if key not in self.faults]
         self._later()
         return self._submit(self._forget, {*keys, *shown})
+
+    def draw_ahead(self, key, look):
+        """Draw a Stage in the size it will have, for nobody yet."""
+        return self._submit(self._receive, key, {"look": look, "serial": "ahead"})
 
     def start_again(self):
         """All Stages as they were in the beginning."""
@@ -68,7 +73,7 @@ class House:
     def _ahead(self):
         self._timer = None
         key = self._waiting.pop(0)
-        self._submit(self._make, key, self._look)
+        self._submit(self._make_ahead, key)
         self._later()
 
     def _submit(self, work, *words):
@@ -91,7 +96,12 @@ class House:
 
     # -- in the worker's thread
 
-    def _make(self, key, look=None):
+    def _make_ahead(self, key):
+        self._make(key)
+        if key in self.stages:
+            self._in_loop(self.made, key, self.stages[key])
+
+    def _make(self, key):
         if key in self.stages or key in self.faults:
             return
         try:
@@ -101,8 +111,6 @@ class House:
             self.faults[key] = f"This Stage could not be made: {_sentence(error)}"
             return
         self.stages[key] = stage
-        if look:
-            stage.receive({"look": look})  # drawn in the window's size, for nobody yet
 
     def _receive(self, key, message):
         if key in self.stages:

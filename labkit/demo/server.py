@@ -1,7 +1,7 @@
 """The lecturer's pages: the demo and the notes, on this machine, behind a token as JupyterLab's.
 
-The page speaks to one WebSocket: {"open": key}, {"to": stage, "message": ...} for a Stage, {"reveal": key,
-"step": ...}, {"again": true}, {"vote": true}. It hears of what is shown as JSON, and of a
+The page speaks to one WebSocket: {"open": key}, {"to": stage, "message": ...} for a Stage, {"ahead": stage,
+"look": ...}, {"reveal": key, "step": ...}, {"again": true}, {"vote": true}. It hears of what is shown as JSON, and of a
 Stage's pictures as `house.framed` bytes.
 """
 
@@ -202,6 +202,8 @@ class Line(Own, tornado.websocket.WebSocketHandler):
             self.session.house.receive(message["to"], message["message"])
         elif "open" in message:
             await self.session.open(self, message["open"])
+        elif "ahead" in message:
+            self.session.draw_ahead(message["ahead"], message["look"])
         elif "reveal" in message:
             self.session.reveal(message["reveal"], message["step"])
         elif "again" in message:

@@ -24,7 +24,7 @@ class Session:
         self.steps = {}
         self.now = program.cards[0].key
         self.votes, self.room = Votes(), None
-        self.house = House(program.makers(), self._deliver, self.say)
+        self.house = House(program.makers(), self._deliver, self.say, self._made)
 
     # -- to the windows
 
@@ -56,6 +56,10 @@ class Session:
             if window.stage == stage:
                 window.show(frame)
 
+    def _made(self, key, stage):
+        if not any(window.stage == key for window in self.windows):
+            self._tell({"kind": "ahead", "stage": key, "declaration": stage.declaration()})
+
     # -- from the windows
 
     def step(self, key):
@@ -76,6 +80,11 @@ class Session:
             window.stage = card.stage if stage else ""
         window.tell({"kind": "card", "key": key, "declaration": stage and stage.declaration(), "fault": fault or ""})
         self.house.prepare(self.program.after(key), {w.stage for w in self.windows if w.stage})
+
+    def draw_ahead(self, stage, look):
+        """A window knows the size that a Stage will have which no window shows yet."""
+        if not any(window.stage == stage for window in self.windows):
+            self.house.draw_ahead(stage, look)
 
     def reveal(self, key, step):
         """Show a card up to a step."""

@@ -141,7 +141,7 @@ def test_digits_chapters_overview_theme_and_what_is_not_there(wall):
     wall.keyboard.press("Shift+PageDown")
     wall.wait_for_function("() => wall.card.key === '06/live-tracker'")
     wall.keyboard.press("9")
-    wall.wait_for_function("() => document.querySelector('#said').textContent.includes('numbers 1 to 6')")
+    wall.wait_for_function("() => document.querySelector('#said').textContent.includes('has the numbers 1 to')")
     wall.evaluate("() => { location.hash = '05/none'; }")
     wall.wait_for_function("() => document.querySelector('#said').textContent.includes('There is no 05/none')")
     dark = wall.evaluate("() => getComputedStyle(document.body).backgroundColor")

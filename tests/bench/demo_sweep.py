@@ -1,0 +1,99 @@
+"""Every Stage of every chapter in the demo: opened, made to fail, reset, played, moved by key; both themes, both sizes.
+
+    python tests/bench/demo_sweep.py [--chapters NN ...] [--shots FOLDER]
+
+Prints what is cut, what does not answer within ten seconds, and what the page complains of; the last line is the sum.
+With --shots a picture of each Stage, failed, with its answer shown.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "browser"), str(ROOT / "tests" / "bench")]
+
+import driver
+from demo_speed import SIZES, demo
+
+SECONDS = 10
+CUT = """() => {
+    const stage = document.querySelector("#place .labkit-stage"), box = stage.getBoundingClientRect();
+    const place = document.querySelector("#place");
+    const words = [...stage.querySelectorAll(".caption, .row, .status"), ...document.querySelectorAll("#bar p, #bar li")];
+    const wide = words.filter((node) => node.offsetParent && node.scrollWidth > node.clientWidth + 1);
+    return [box.bottom > innerHeight + 1 && "below the window by " + Math.round(box.bottom - innerHeight),
+            place.scrollHeight > place.clientHeight + 1 && "scrolls by " + (place.scrollHeight - place.clientHeight),
+            wide.length && "too wide: " + wide[0].className].filter(Boolean).join(", ");
+}"""
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--chapters", nargs="*", default=[])
+    parser.add_argument("--shots", type=Path)
+    options = parser.parse_args()
+    faults, opened = [], 0
+    for width, height in SIZES:
+        for dark in (False, True):
+            where = f"{width}x{height}{' dark' if dark else ''}"
+            with (
+                demo(*options.chapters) as (_, address, _, _),
+                driver.page_of(driver.find_browser(), dark=dark, width=width, height=height) as page,
+            ):
+                page.goto(address)
+                page.wait_for_function("() => window.wall?.now")
+                for key in page.evaluate("() => wall.cards.filter((card) => card.stage).map((card) => card.key)"):
+                    opened += 1
+                    found = [f"{where} {key}: {fault}" for fault in visit(page, key)]
+                    faults += found
+                    print("\n".join(found), end="\n" if found else "", flush=True)
+                    if options.shots:
+                        picture(page, options.shots, f"{key.replace('/', '-')}-{width}{'-dark' if dark else ''}.png")
+                faults += [f"{where}: {words}" for words in page.complaints]
+                faults += [f"{where}: it calls {host}" for host in page.hosts - {"127.0.0.1"}]
+    print(f"{opened} Stages opened, {len(faults)} faults")
+    return 1 if faults else 0
+
+
+def visit(page, key):
+    """What is wrong with one Stage."""
+    page.evaluate("(key) => { location.hash = key; }", key)
+    page.wait_for_function("(key) => wall.card.key === key && wall.now?.key === key", arg=key)
+    page.wait_for_selector("#place .labkit-stage[data-picture]", state="attached", timeout=60_000)
+    if page.evaluate("() => wall.step") == "question":
+        page.keyboard.press("a")
+    page.wait_for_selector("#cover", state="hidden")
+    faults = []
+    keys = ["f", "r", "p", "ArrowRight"] if page.locator("#place .play").count() else ["f", "r", "ArrowRight"]
+    for pressed in keys:
+        before = page.get_attribute("#place .labkit-stage", "data-picture")
+        page.keyboard.press(pressed)
+        try:
+            changed = "(before) => document.querySelector('#place .labkit-stage').dataset.picture !== before"
+            page.wait_for_function(changed, arg=before, timeout=1000 * SECONDS)
+        except Exception:
+            faults.append(f"no picture after {pressed}")
+        if pressed == "p":
+            page.keyboard.press("p")
+        if pressed == "f":
+            page.wait_for_timeout(450)  # the size has settled
+            faults += [f"failed: {words}" for words in [page.evaluate(CUT)] if words]
+    page.wait_for_timeout(450)
+    faults += [words for words in [page.evaluate(CUT)] if words]
+    said = page.locator("#place .status").inner_text()
+    return [*faults, *([f"it says: {said}"] if said else [])]
+
+
+def picture(page, folder, name):
+    """The window with the Stage failed and the answer shown."""
+    folder.mkdir(parents=True, exist_ok=True)
+    page.keyboard.press("f")
+    if page.evaluate("() => wall.step") == "figure":
+        page.keyboard.press("a")
+    page.wait_for_timeout(500)
+    page.screenshot(path=folder / name)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
