@@ -36,7 +36,9 @@ WATCH = """() => {
     const note = () => { if (window.__sent === null) window.__sent = performance.now(); };
     for (const type of ["keydown", "pointermove"]) root.addEventListener(type, note, true);
     new MutationObserver(() => {
-        if (window.__sent !== null) { window.__latencies.push(performance.now() - window.__sent); window.__sent = null; }
+        if (window.__sent === null) return;
+        window.__latencies.push(performance.now() - window.__sent);
+        window.__sent = null;
     }).observe(root, {attributeFilter: ["data-picture"]});
 }"""
 
@@ -100,8 +102,9 @@ def start(options):
                 page.wait_for_selector("#cover", state="hidden")
                 seen = time.perf_counter() - begun
                 print(
-                    f"demo {' '.join(words) or 'of all chapters':16} {attempt:5} listening after {seconds:.2f} s, first Stage "
-                    f"drawn behind its question {drawn:.2f} s after opening, seen after Enter {seen:.2f} s  P {processor():.2f}"
+                    f"demo {' '.join(words) or 'of all chapters':16} {attempt:5} listening after {seconds:.2f} s, first "
+                    f"Stage drawn behind its question {drawn:.2f} s after opening, seen after Enter {seen:.2f} s"
+                    f"  P {processor():.2f}"
                 )
                 if attempt == "warm":
                     nexts = [turn(page) for _ in range(min(12, page.evaluate("() => wall.cards.length") - 1))]
@@ -120,7 +123,8 @@ def turn(page):
             dispatchEvent(new KeyboardEvent("keydown", { key: "PageDown" }));
             const look = () => {
                 if (wall.card.key !== before && !wall.card.stage) return done(null);
-                if (wall.card.key !== before && document.querySelector("#place .labkit-stage[data-picture]")) return done((performance.now() - begun) / 1000);
+                const there = wall.card.key !== before && document.querySelector("#place .labkit-stage[data-picture]");
+                if (there) return done((performance.now() - begun) / 1000);
                 setTimeout(look, 5);
             };
             look();
@@ -234,8 +238,9 @@ def voting(options):
             page.wait_for_function("() => !wall.now.ballot.open")
             shown = page.evaluate("() => wall.now.ballot.shares[0]")
             print(
-                f"{PHONES} phones in {WITHIN:.0f} s at {width}x{height}: {found['counted']} counted, on the wall {sum(shown)} {shown}; page and "
-                f"vote, ms, median and 95 %: {told(found['took'])}; key to picture meanwhile: {told(moved)}  P {processor():.2f}",
+                f"{PHONES} phones in {WITHIN:.0f} s at {width}x{height}: {found['counted']} counted, on the wall "
+                f"{sum(shown)} {shown}; page and vote, ms, median and 95 %: {told(found['took'])}; key to picture "
+                f"meanwhile: {told(moved)}  P {processor():.2f}",
                 flush=True,
             )
 

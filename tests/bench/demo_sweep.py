@@ -20,8 +20,8 @@ SECONDS = 10
 CUT = """() => {
     const stage = document.querySelector("#place .labkit-stage"), box = stage.getBoundingClientRect();
     const place = document.querySelector("#place");
-    const words = [...stage.querySelectorAll(".caption, .row, .status"), ...document.querySelectorAll("#bar p, #bar li")];
-    const wide = words.filter((node) => node.offsetParent && node.scrollWidth > node.clientWidth + 1);
+    const words = document.querySelectorAll("#place :is(.caption, .row, .status), #bar :is(p, li)");
+    const wide = [...words].filter((node) => node.offsetParent && node.scrollWidth > node.clientWidth + 1);
     return [box.bottom > innerHeight + 1 && "below the window by " + Math.round(box.bottom - innerHeight),
             place.scrollHeight > place.clientHeight + 1 && "scrolls by " + (place.scrollHeight - place.clientHeight),
             wide.length && "too wide: " + wide[0].className].filter(Boolean).join(", ");
