@@ -102,8 +102,8 @@ def start(options):
                 page.wait_for_selector("#cover", state="hidden")
                 seen = time.perf_counter() - begun
                 print(
-                    f"demo {' '.join(words) or 'of all chapters':16} {attempt:5} listening after {seconds:.2f} s, first "
-                    f"Stage drawn behind its question {drawn:.2f} s after opening, seen after Enter {seen:.2f} s"
+                    f"demo {' '.join(words) or 'of all chapters':16} {attempt:5} listening after {seconds:.2f} s, "
+                    f"first Stage drawn behind its question {drawn:.2f} s after opening, seen after Enter {seen:.2f} s"
                     f"  P {processor():.2f}"
                 )
                 if attempt == "warm":
