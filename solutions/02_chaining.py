@@ -87,7 +87,8 @@ ex.predict("operator", guess)
 # %% chain
 @ex.chain
 def chain(transforms):
-    """Return T_0N, shape (4, 4), from the links T_01, T_12, ..., shape (N, 4, 4), mm."""
+    """Return T_0N, shape (4, 4), from the links T_01, T_12, ..., shape (N, 4, 4),
+    mm."""
     ### BEGIN SOLUTION
     T = np.eye(4)
     for link in transforms:

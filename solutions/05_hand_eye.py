@@ -53,7 +53,8 @@ np.set_printoptions(precision=3, suppress=True, linewidth=110)
 # %% the-data
 printed = thesis.measurements()
 for i in (0, 11, 30):
-    print(f"pose {i + 1:2}, line {printed.line[i]:2}  {printed.kuka_deg[i]}  sees the sphere at {printed.x_S[i]}")
+    print(f"pose {i + 1:2}, line {printed.line[i]:2}  {printed.kuka_deg[i]}  sees the "
+          f"sphere at {printed.x_S[i]}")
 p2_end = frames.kuka_from_degrees(thesis.kuka_pose_deg("scanner_end"))
 target = thesis.printed_target()
 print("the thesis's sphere center (tables 6-4 and 6-5):", target)
@@ -126,7 +127,8 @@ def fit_circle(x, z):
     x, z: coordinates of its points in the scan plane, shape (n,) each, mm.
     """
     ### BEGIN SOLUTION
-    a = np.linalg.lstsq(np.column_stack([x, z, np.ones(len(x))]), -(x**2 + z**2), rcond=None)[0]
+    a = np.linalg.lstsq(np.column_stack([x, z, np.ones(len(x))]), -(x**2 + z**2),
+                        rcond=None)[0]
     x_c, z_c = -a[0] / 2, -a[1] / 2
     return x_c, z_c, np.sqrt(x_c**2 + z_c**2 - a[2])
     ### END SOLUTION
@@ -154,7 +156,8 @@ ex.predict("equator", guess, reveal=stages.scan_line)
 def sphere_center_from_profile(x, z, radius, side):
     """Return the sphere's center in S, shape (3,), mm.
 
-    x, z: points of the scan line, shape (n,) each, mm; radius: of the sphere, mm; side: +1 or -1, the sign of y.
+    x, z: points of the scan line, shape (n,) each, mm; radius: of the sphere, mm; side:
+    +1 or -1, the sign of y.
     """
     ### BEGIN SOLUTION
     x_c, z_c, r = fit_circle(x, z)
@@ -173,7 +176,8 @@ def sphere_center_from_profile(x, z, radius, side):
 def kuka_residual(p2, T_BF, x_S, target):
     """Return the residual vectors in B, shape (N, 3), mm.
 
-    p2: x, y, z (mm), A, B, C (rad), shape (6,); T_BF (N, 4, 4); x_S (N, 3), mm; target (3,), mm.
+    p2: x, y, z (mm), A, B, C (rad), shape (6,); T_BF (N, 4, 4); x_S (N, 3), mm; target
+    (3,), mm.
     """
     ### BEGIN SOLUTION
     T_FS = frames.matrix_from_kuka(p2)
@@ -188,7 +192,8 @@ def kuka_residual(p2, T_BF, x_S, target):
 as_printed = kuka_residual(p2_end, printed.T_BF, printed.x_S, target)
 print("pose 1:", as_printed[0], "mm   pose 2:", as_printed[1], "mm")
 repaired = thesis.measurements((2,))
-print("z of pose 2 as printed:", printed.x_S[1, 2], "  and repaired:", repaired.x_S[1, 2])
+print("z of pose 2 as printed:", printed.x_S[1, 2], "  and repaired:",
+      repaired.x_S[1, 2])
 
 # %% predict-31
 guess = ...  # your code here
@@ -218,12 +223,15 @@ ex.rms_before(rms_before)
 # %% numeric_jacobian
 @ex.numeric_jacobian
 def numeric_jacobian(function, x, step):
-    """Return the derivative, shape (m, n), by central differences, a whole step to each side.
+    """Return the derivative, shape (m, n), by central differences, a whole step to each
+    side.
 
-    function: takes an array (n,), returns an array (m,); x: where, shape (n,); step: a number, the same for all n.
+    function: takes an array (n,), returns an array (m,); x: where, shape (n,); step: a
+    number, the same for all n.
     """
     ### BEGIN SOLUTION
-    columns = [(function(x + h) - function(x - h)) / (2 * step) for h in step * np.eye(len(x))]
+    columns = [(function(x + h) - function(x - h)) / (2 * step)
+               for h in step * np.eye(len(x))]
     return np.column_stack(columns)
     ### END SOLUTION
 
@@ -250,26 +258,32 @@ print("nearest rotation", nearest_rotation(np.eye(3) + skew(phi)) @ x)
 # %% analytic_jacobian
 @ex.analytic_jacobian
 def analytic_jacobian(T_FS, T_BF, x_S):
-    """Return the derivative of the stacked residuals by phi and tau, shape (3 N, 6): x, y, z of pose 1, then pose 2.
+    """Return the derivative of the stacked residuals by phi and tau, shape (3 N, 6): x,
+    y, z of pose 1, then pose 2.
 
-    T_FS (4, 4); T_BF (N, 4, 4); x_S (N, 3), mm. Columns: phi (mm per rad), then tau (mm per mm).
+    T_FS (4, 4); T_BF (N, 4, 4); x_S (N, 3), mm. Columns: phi (mm per rad), then tau (mm
+    per mm).
     """
     ### BEGIN SOLUTION
     R_BF = T_BF[:, :3, :3]
-    return np.concatenate([-R_BF @ T_FS[:3, :3] @ skew(x_S), R_BF], axis=2).reshape(-1, 6)
+    return np.concatenate([-R_BF @ T_FS[:3, :3] @ skew(x_S), R_BF],
+                          axis=2).reshape(-1, 6)
     ### END SOLUTION
 
 
 # %% gauss_newton_on_pose
 @ex.gauss_newton_on_pose
 def gauss_newton_on_pose(T_FS, T_BF, x_S, target):
-    """Return T_FS, shape (4, 4), after one Gauss-Newton step: R_FS exp(phi) and t_FS + tau.
+    """Return T_FS, shape (4, 4), after one Gauss-Newton step: R_FS exp(phi) and t_FS +
+    tau.
 
-    T_FS: where the step starts, (4, 4); T_BF (N, 4, 4); x_S (N, 3), mm; target (3,), mm, held fixed.
+    T_FS: where the step starts, (4, 4); T_BF (N, 4, 4); x_S (N, 3), mm; target (3,),
+    mm, held fixed.
     """
     ### BEGIN SOLUTION
     e = frames.transform(T_BF, frames.transform(T_FS, x_S)) - target
-    step = np.linalg.lstsq(analytic_jacobian(T_FS, T_BF, x_S), -e.ravel(), rcond=None)[0]
+    step = np.linalg.lstsq(analytic_jacobian(T_FS, T_BF, x_S), -e.ravel(),
+                           rcond=None)[0]
     return frames.pose(T_FS[:3, :3] @ exp_so3(step[:3]), T_FS[:3, 3] + step[3:])
     ### END SOLUTION
 
@@ -298,9 +312,11 @@ ex.predict("pole", guess, reveal=stages.convergence)
 T_sim, x_sim, c_sim, true_deg = thesis.simulation()
 for start, name in zip(*thesis.start_poses_deg()):
     runs, _ = listing_gauss_newton(start, T_sim, x_sim, c_sim)
-    print(f"{name:18} {len(runs) - 1} iterations, A + C = {abs(runs[-1, 3] + runs[-1, 5]):.1f} deg")
+    print(f"{name:18} {len(runs) - 1} iterations, A + C = "
+          f"{abs(runs[-1, 3] + runs[-1, 5]):.1f} deg")
 J = hand_eye.kuka_jacobian(frames.kuka_from_degrees(true_deg), T_sim, x_sim)
-print("rank of the Jacobian at B = -90 deg:", np.linalg.matrix_rank(J, tol=1e-9), "of 6")
+print("rank of the Jacobian at B = -90 deg:", np.linalg.matrix_rank(J, tol=1e-9),
+      "of 6")
 at_the_end = kuka_residual(p2_end, repaired.T_BF, repaired.x_S, target)
 costs = listing_cost(at_the_end).sum(), 0.5 * (at_the_end**2).sum()
 print(f"listing C3's cost: {costs[0]:.0f} mm2; formula (6-11): {costs[1]:.0f} mm2")
@@ -355,9 +371,11 @@ for m in runs if ex.after("trust_arrives") else ():
 # %% joint_residual
 @ex.joint_residual
 def joint_residual(u, T0, T_BF, x_S):
-    """Return the stacked residuals, shape (3 N,), mm: x, y, z of pose 1, then of pose 2.
+    """Return the stacked residuals, shape (3 N,), mm: x, y, z of pose 1, then of pose
+    2.
 
-    u: phi (rad), tau (mm), sphere center in B (mm), shape (9,); T0: the scanner pose that phi and tau move, (4, 4).
+    u: phi (rad), tau (mm), sphere center in B (mm), shape (9,); T0: the scanner pose
+    that phi and tau move, (4, 4).
     """
     ### BEGIN SOLUTION
     T_FS = frames.pose(T0[:3, :3] @ exp_so3(u[:3]), T0[:3, 3] + u[3:6])
@@ -375,7 +393,8 @@ def joint_residual(u, T0, T_BF, x_S):
 # %% linear_start
 @ex.linear_start
 def linear_start(T_BF, x_S):
-    """Return T_FS, shape (4, 4), and the sphere center in B, shape (3,), mm, from linear equations alone.
+    """Return T_FS, shape (4, 4), and the sphere center in B, shape (3,), mm, from
+    linear equations alone.
 
     T_BF (N, 4, 4); x_S (N, 3), mm.
     """
@@ -399,7 +418,8 @@ def linear_start(T_BF, x_S):
 # %% robust_weights
 @ex.robust_weights
 def robust_weights(residuals):
-    """Return one weight (0 to 1) per pose, shape (N,), for residual vectors of shape (N, 3) in mm."""
+    """Return one weight (0 to 1) per pose, shape (N,), for residual vectors of shape
+    (N, 3) in mm."""
     ### BEGIN SOLUTION
     lengths = np.linalg.norm(residuals, axis=1)
     u = lengths / (5 * np.median(lengths) / robust.MEDIAN_CHI3)
@@ -409,7 +429,8 @@ def robust_weights(residuals):
 
 # %% robust-code
 fit = hand_eye.calibrate_sphere_target(printed.T_BF, printed.x_S, robust=True)
-print("poses with weight 0:", np.flatnonzero(fit.weights == 0) + 1, f"  noise of the others: {fit.std:.2f} mm")
+print("poses with weight 0:", np.flatnonzero(fit.weights == 0) + 1,
+      f"  noise of the others: {fit.std:.2f} mm")
 for i in np.flatnonzero(fit.weights == 0):
     print(f"pose {i + 1:2}: residual in the base {fit.residuals[i]} mm")
 
@@ -430,12 +451,16 @@ ex.predict("slip", guess, reveal=stages.thirty_one_poses)
 # the plane of its line (along x, y, and the two diagonals x* and y*). Pose 12 is where it counts: its residual of 3 mm could be a digit in x, but its orientation is one degree off (only A − C counts at B = 90°).
 
 # %% neighbors-code
-turns, offsets = np.rad2deg(misprints.neighbor_turns(printed)), misprints.neighbor_offsets(printed)
+turns = np.rad2deg(misprints.neighbor_turns(printed))
+offsets = misprints.neighbor_offsets(printed)
 for pose in (2, 3, 4, 7, 12, 21, 30):
-    print(f"pose {pose:2}: turned {turns[pose - 1]:5.2f} deg off the middle, {offsets[pose - 1]:6.2f} mm off its plane")
+    print(f"pose {pose:2}: turned {turns[pose - 1]:5.2f} deg off the middle, "
+          f"{offsets[pose - 1]:6.2f} mm off its plane")
 rest = np.setdiff1d(np.arange(31), np.array([2, 3, 4, 7, 12, 21, 30]) - 1)
-print(f"the others, medians: {np.nanmedian(turns[rest]):.2f} deg, {np.median(np.abs(offsets[rest])):.1f} mm")
-for slip in misprints.explanations(thesis.printed_entries(), 12, fit.T_FS, fit.target, fit.std):
+print(f"the others, medians: {np.nanmedian(turns[rest]):.2f} deg, "
+      f"{np.median(np.abs(offsets[rest])):.1f} mm")
+for slip in misprints.explanations(thesis.printed_entries(), 12, fit.T_FS, fit.target,
+                                   fit.std):
     rest = f"leaves {slip.after:.2f} mm, {np.rad2deg(slip.turn):.2f} deg off the middle"
     print(f"  {slip.column:5} {slip.printed} -> {slip.corrected}: {rest} ({slip.slip})")
 
@@ -453,16 +478,17 @@ for slip in misprints.explanations(thesis.printed_entries(), 12, fit.T_FS, fit.t
 # %% find_misprints
 @ex.find_misprints
 def find_misprints(entries):
-    """Return the set of misprinted entries, such as {("C17", 2, "z"), ...}; poses count from 1.
+    """Return the misprinted entries, {("C17", 2, "z"), ...}; poses count from 1.
 
-    entries: {(table, pose, column): text} of C14 (x, y, z, A_deg, B_deg, C_deg) and C17 (x, y, z).
+    entries: {(table, pose, column): text}; columns x, y, z, of C14 A_deg to C_deg, too.
     """
     ### BEGIN SOLUTION
     measured = thesis.measurements_from(entries)
     fit = hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S, robust=True)
     named = set()
     for i in np.flatnonzero(np.linalg.norm(fit.residuals, axis=1) > 6 * fit.std):
-        slips = misprints.explanations(entries, int(i) + 1, fit.T_FS, fit.target, fit.std)
+        slips = misprints.explanations(entries, int(i) + 1, fit.T_FS, fit.target,
+                                       fit.std)
         if slips:
             named.add((slips[0].table, slips[0].pose, slips[0].column))
     return named
@@ -486,14 +512,16 @@ ex.rms_after(rms_after)
 # touched plate is 6.6 mm off.
 
 # %% steps-of-corrections
-poses, steps = [], thesis.corrections() if ex.after("rms_before", "find_misprints", "rms_after") else []
+poses, steps = [], thesis.corrections() if ex.after("rms_before", "find_misprints",
+                                                    "rms_after") else []
 for row in steps:
     poses.append(row["pose"])
     m = thesis.measurements(poses)
     end = hand_eye.rms_distance(kuka_residual(p2_end, m.T_BF, m.x_S, target))
     fixed = hand_eye.calibrate_sphere_target(m.T_BF, m.x_S, target=target).rms
     joint = hand_eye.calibrate_sphere_target(m.T_BF, m.x_S).rms
-    print(f"{row['table']} {row['pose']:2} {row['column']:5} {row['printed']:>8} -> {row['corrected']:8}", end=" ")
+    print(f"{row['table']} {row['pose']:2} {row['column']:5} {row['printed']:>8} -> "
+          f"{row['corrected']:8}", end=" ")
     print(f"rms {end:6.2f} end pose, {fixed:6.2f} center fixed, {joint:6.2f} all free")
 
 # %% radius-text [markdown]
@@ -510,7 +538,8 @@ radius = hand_eye.fit_radius(corrected.T_BF, corrected.x_S).radius
 ex.radius(radius)
 
 # %% radius-verdict
-choices = (("all poses", np.arange(31) >= 0), ("without pose 4", np.arange(31) != 3)) if ex.after("radius") else ()
+choices = (("all poses", np.arange(31) >= 0),
+           ("without pose 4", np.arange(31) != 3)) if ex.after("radius") else ()
 for name, used in choices:
     found = hand_eye.fit_radius(corrected.T_BF[used], corrected.x_S[used])
     print(f"{name}: {found.radius:.3f} mm")
@@ -519,7 +548,8 @@ for name, used in choices:
         x_S = thesis.centers_with_radius(corrected.x_S[used], R)
         rms = hand_eye.calibrate_sphere_target(corrected.T_BF[used], x_S).rms
         away = np.sqrt(used.sum() * (rms**2 - found.rms**2)) / found.std
-        print(f"  {source:19} {R:.4f} mm: rms {rms:.3f} mm, {away:4.1f} standard deviations away")
+        print(f"  {source:19} {R:.4f} mm: rms {rms:.3f} mm, {away:4.1f} standard "
+              "deviations away")
 
 # %% known [markdown]
 # The distance is $\sqrt{\Delta S}/s$: how much the sum of squares grows when $R$ is held there. (The usual standard deviation would mislead: pose 4 puts a kink into the rms at 29.977 mm, below
@@ -542,21 +572,26 @@ ex.predict("weak", guess, reveal=stages.pattern_designer)
 fit = hand_eye.calibrate_sphere_target(corrected.T_BF, corrected.x_S)
 left_out = hand_eye.leave_one_out(corrected.T_BF, corrected.x_S)
 if ex.after("rms_after"):
-    print(f"left out: rms {hand_eye.rms_distance(left_out):.3f} mm; in the fit: {fit.rms:.3f} mm")
+    print(f"left out: rms {hand_eye.rms_distance(left_out):.3f} mm; in the fit: "
+          f"{fit.rms:.3f} mm")
     lines = hand_eye.leave_one_out(corrected.T_BF, corrected.x_S, groups=corrected.line)
     print(f"a whole line of motion left out: {hand_eye.rms_distance(lines):.3f} mm")
     print(fit)
 
 # %% known-spread
-anywhere = np.random.default_rng(0).uniform(*np.transpose(planning.FIELD), size=(100_000, 3))
-anywhere[:, 1] *= np.where(np.arange(len(anywhere)) % 2, 1, -1)  # on both sides of the scan plane
+anywhere = np.random.default_rng(0).uniform(*np.transpose(planning.FIELD),
+                                            size=(100_000, 3))
+anywhere[:, 1] *= np.where(np.arange(len(anywhere)) % 2, 1, -1)  # both sides
 print("standard deviation of x_S:", corrected.x_S.std(axis=0).round(1), "mm")
 print("all over the field:       ", anywhere.std(axis=0).round(1), "mm")
 
 # %% known-rank
-p2, p3 = frames.kuka_from_matrix(fit.T_FS), frames.kuka_from_matrix(thesis.frame("plate"))
-J = hand_eye.plate_jacobian(corrected.T_BF, corrected.x_S, p2, p3, thesis.point("sphere_in_plate"))
-print("rank of the thesis's second step:", np.linalg.matrix_rank(J, tol=1e-6), "of 12 unknowns")
+p2 = frames.kuka_from_matrix(fit.T_FS)
+p3 = frames.kuka_from_matrix(thesis.frame("plate"))
+J = hand_eye.plate_jacobian(corrected.T_BF, corrected.x_S, p2, p3,
+                            thesis.point("sphere_in_plate"))
+print("rank of the thesis's second step:", np.linalg.matrix_rank(J, tol=1e-6),
+      "of 12 unknowns")
 
 # %% design [markdown]
 # The pattern always aimed at the middle of the field. Use all of it: x within ±25 mm, |y| from 3 to 25, z from 190 to 290 (`planning.FIELD`), line of sight (the scanner's z axis) at most 90° from straight
@@ -567,17 +602,20 @@ print("rank of the thesis's second step:", np.linalg.matrix_rank(J, tol=1e-6), "
 # %% design_poses
 @ex.design_poses
 def design_poses(T_FS, target, rng):
-    """Return 31 robot poses T_BF, shape (31, 4, 4), that would calibrate the scanner better.
+    """Return 31 robot poses T_BF, shape (31, 4, 4), that would calibrate the scanner
+    better.
 
-    T_FS (4, 4) and target (3,), mm: where scanner and sphere are; rng: a NumPy random generator.
+    T_FS (4, 4) and target (3,), mm: where scanner and sphere are; rng: a NumPy random
+    generator.
     """
     ### BEGIN SOLUTION
     x = rng.uniform(-25, 25, 31)
     y = rng.uniform(3, 25, 31) * rng.choice([-1, 1], 31)
     z = rng.choice([190, 290], 31)
-    down = np.diag([1.0, -1.0, -1.0]) @ T_FS[:3, :3].T  # the scanner looks straight down
+    down = np.diag([1.0, -1.0, -1.0]) @ T_FS[:3, :3].T  # it looks straight down
     turn = np.column_stack([rng.uniform(-0.8, 0.8, (31, 2)), rng.uniform(-3, 3, 31)])
-    return planning.poses_that_see(T_FS, target, exp_so3(turn) @ down, np.column_stack([x, y, z]))
+    return planning.poses_that_see(T_FS, target, exp_so3(turn) @ down,
+                                   np.column_stack([x, y, z]))
     ### END SOLUTION
 
 
@@ -589,10 +627,12 @@ def design_poses(T_FS, target, rng):
 # %% break-it-code
 shifted = np.tile(corrected.T_BF[0], (6, 1, 1))
 shifted[:, :3, 3] += 50 * np.random.default_rng(0).normal(size=(6, 3))
+fit_sphere, few = hand_eye.calibrate_sphere_target, corrected.x_S[:6]
 attempts = {
-    "translated only": lambda: hand_eye.calibrate_sphere_target(shifted, corrected.x_S[:6]),
-    "one line of motion": lambda: hand_eye.calibrate_sphere_target(corrected.T_BF[:4], corrected.x_S[:4]),
-    "Kim, Cho, Kim": lambda: literature.kim_linear(corrected.T_BF, corrected.x_S[:, None], fit.target[None]),
+    "translated only": lambda: fit_sphere(shifted, few),
+    "one line of motion": lambda: fit_sphere(corrected.T_BF[:4], few[:4]),
+    "Kim, Cho, Kim": lambda: literature.kim_linear(
+        corrected.T_BF, corrected.x_S[:, None], fit.target[None]),
     "Li et al.": lambda: literature.li_two_step(corrected.T_BF, corrected.x_S),
 }
 for name, attempt in attempts.items():
@@ -615,7 +655,8 @@ for name, attempt in attempts.items():
 def li_rotation(T_BF, x_S):
     """Return R_FS, shape (3, 3), from poses that all have one orientation.
 
-    T_BF: (N, 4, 4), moved in two directions at least; x_S: the sphere in each, (N, 3), mm.
+    T_BF: (N, 4, 4), moved in two directions at least; x_S: the sphere in each, (N, 3),
+    mm.
     """
     ### BEGIN SOLUTION
     seen = x_S - x_S.mean(axis=0)
@@ -652,9 +693,11 @@ def li_translation(T_BF, x_S, R_FS):
 # %% kim_system
 @ex.kim_system
 def kim_system(A, B):
-    """Return D, shape (12, 12), and F, shape (12,), with D u = F equivalent to A X = X B.
+    """Return D, shape (12, 12), and F, shape (12,), with D u = F equivalent to A X = X
+    B.
 
-    A, B: rigid motions, (4, 4). u: the rows of X one after another, its last row is known.
+    A, B: rigid motions, (4, 4). u: the rows of X one after another, its last row is
+    known.
     """
     ### BEGIN SOLUTION
     F = np.zeros(12)
@@ -677,7 +720,8 @@ def by_kim(scene):
     """T_FS from your equations, stacked over all neighboring poses."""
     X_W, X_S = (np.insert(x, 3, 1.0, axis=-1) for x in (scene.cube_W, scene.cube_S))
     M = np.swapaxes(X_S, 1, 2) @ X_W
-    A, B = frames.invert(scene.T_BF[:-1]) @ scene.T_BF[1:], M[:-1] @ np.linalg.inv(M[1:])
+    A = frames.invert(scene.T_BF[:-1]) @ scene.T_BF[1:]
+    B = M[:-1] @ np.linalg.inv(M[1:])
     D, F = zip(*(kim_system(a, b) for a, b in zip(A, B)))
     u = np.linalg.lstsq(np.vstack(D), np.concatenate(F), rcond=None)[0].reshape(3, 4)
     return frames.pose(nearest_rotation(u[:, :3]), u[:, 3])
@@ -699,7 +743,8 @@ both = literature.METHODS | {"your Li": by_li, "your Kim": by_kim}
 methods = both if ex.after("price_of_two_steps", "li_rotation", "kim_system") else {}
 errors, bound = literature.compare_methods(150, 0.1, np.random.default_rng(0), methods)
 for name, error in errors.items():
-    print(f"{name:24} {error:.2f} mm, {error / bound:.1f} times the bound for one sphere")
+    print(f"{name:24} {error:.2f} mm, {error / bound:.1f} times the bound for "
+          "one sphere")
 
 # %% literature-verdict [markdown]
 # Splitting a problem in two is convenient, and costs accuracy: what step 1 errs nobody corrects in step 2. Kim's cube has eight points in place of one, so that the bound for one sphere is not
@@ -756,7 +801,8 @@ robot = robot_accuracy.RobotErrors(np.zeros(2), std=0.05, lag=0.03)
 for speed in (50, 200, 800):
     command, dt = robot_accuracy.corner(speed)
     paths = robot_accuracy.drive(command, dt, robot, rng, n=10)
-    print(f"{speed} mm/s: path accuracy {robot_accuracy.path_accuracy(command, paths):.1f} mm")
+    off = robot_accuracy.path_accuracy(command, paths)
+    print(f"{speed} mm/s: path accuracy {off:.1f} mm")
 
 # %% use [markdown]
 # What data sheets of robots print is mostly repeatability; it is what counts for poses that were taught by hand. As soon as poses are computed, from CAD or from a scanner, accuracy counts.
@@ -775,13 +821,18 @@ guess = "not at all"
 ex.predict("same_orientation", guess)
 
 # %% gauge
-cad, marks = thesis.frame("scanner_start"), np.array([[1500.0, -650, 1100], [1500, -550, 1100]])
-alike, seen = robot_accuracy.looking_down_at(marks, fit.T_FS, turns=np.array([0.0, 0.0]))
-turned, seen = robot_accuracy.looking_down_at(marks, fit.T_FS, turns=np.array([0.0, np.pi]))
-for name, T_FS in (("CAD", cad), ("calibrated", fit.T_FS)) if ex.after("same_orientation") else ():
+cad, marks = thesis.frame("scanner_start"), np.array([[1500.0, -650, 1100],
+                                                      [1500, -550, 1100]])
+alike, seen = robot_accuracy.looking_down_at(marks, fit.T_FS,
+                                             turns=np.array([0.0, 0.0]))
+turned, seen = robot_accuracy.looking_down_at(marks, fit.T_FS,
+                                              turns=np.array([0.0, np.pi]))
+for name, T_FS in (("CAD", cad), ("calibrated",
+                                  fit.T_FS)) if ex.after("same_orientation") else ():
     p, q = frames.transform(alike, frames.transform(T_FS, seen))
     off = (p - marks[0]).round(2) + 0.0
-    print(f"{name:10} length {np.linalg.norm(q - p):6.2f} mm, first mark off by {off} mm")
+    print(f"{name:10} length {np.linalg.norm(q - p):6.2f} mm, first mark off by "
+          f"{off} mm")
 
 # %% cad-length-text [markdown]
 # The length is right and the place is wrong: the first mark lies 31 mm too high, and a nozzle sent there runs into the air. Now the flange makes half a turn between the marks (poses
@@ -796,7 +847,8 @@ cad_length = np.linalg.norm(q - p)
 ex.cad_length(cad_length)
 
 # %% all-lengths
-poses = {"CAD": cad, "thesis's end pose": thesis.frame("scanner_end"), "calibrated": fit.T_FS}
+poses = {"CAD": cad, "thesis's end pose": thesis.frame("scanner_end"),
+         "calibrated": fit.T_FS}
 for name, T_FS in poses.items() if ex.after("cad_length") else ():
     p, q = frames.transform(turned, frames.transform(T_FS, seen))
     print(f"{name:17} length {np.linalg.norm(q - p):6.2f} mm")

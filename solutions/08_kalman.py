@@ -482,7 +482,8 @@ for one in z:
     x, cov = update(x, cov, one, C, cov_z)
 at_once, cov_at_once = batch_estimate(x0, cov0, z, C, cov_z)
 print("one by one ", np.round(x, 4), "std", np.round(np.sqrt(np.diag(cov)), 4))
-print("all at once", np.round(at_once, 4), "std", np.round(np.sqrt(np.diag(cov_at_once)), 4))
+print("all at once", np.round(at_once, 4), "std",
+      np.round(np.sqrt(np.diag(cov_at_once)), 4))
 
 # %% batch-said [markdown]
 # The same, to the last digits: a Kalman filter *is* least squares, done step by step. Where a

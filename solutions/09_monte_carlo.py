@@ -314,7 +314,8 @@ def should_resample(weights, threshold):
 # %% multiply_weights
 @ex.multiply_weights
 def multiply_weights(weights, likelihood, step, n):
-    """Return (weights, resample): after this measurement, sum 1; True in every n-th step.
+    """Return (weights, resample): after this measurement, sum 1; True in every n-th
+    step.
 
     weights, likelihood: shape (M,); step counts from 1.
     """
@@ -459,9 +460,11 @@ for task, model, good, low, high, steps in zip(*(table[name] for name in columns
 # %% scan_from_depth
 @ex.scan_from_depth
 def scan_from_depth(depth, field_of_view, near, far):
-    """Return (ranges, bearings) of the columns seen, depth of shape (n,) from left to right.
+    """Return (ranges, bearings) of the columns seen, depth of shape (n,) from left to
+    right.
 
-    A column is seen when its depth is from near to far. Bearings are positive to the left.
+    A column is seen when its depth is from near to far. Bearings are positive to the
+    left.
     """
     ### BEGIN SOLUTION
     n = len(depth)

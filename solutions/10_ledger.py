@@ -82,7 +82,8 @@ def half_unit(printed):
 # %% bound
 @ex.bound
 def bound(f, printed):
-    """Return how far rounding can move f(x): printed is a list of strings, f takes the array of their numbers."""
+    """Return how far rounding can move f(x): printed is a list of strings, f takes the
+    array of their numbers."""
     ### BEGIN SOLUTION
     x, found = np.array([float(text.replace(",", ".")) for text in printed]), 0.0
     for k, text in enumerate(printed):
@@ -94,13 +95,16 @@ def bound(f, printed):
 
 # %% bound-used
 def fused(z):
-    """The lecture's fusion of two measured positions with variances 0.25 and 1 and the prior 0 with variance 20."""
+    """The lecture's fusion of two measured positions with variances 0.25 and 1 and the
+    prior 0 with variance 20."""
     return (z[0] / 0.25 + z[1]) / (1 / 0.25 + 1 + 1 / 20)
 
 
-print(f"fused: {fused([9.4, 10.6]):.4f}, bound {bound(fused, ['9.4', '10.6']):.4f}; the page prints 9.6")
+print(f"fused: {fused([9.4, 10.6]):.4f}, bound {bound(fused, ['9.4', '10.6']):.4f}; "
+      "the page prints 9.6")
 sides = ["98.5415", "99.9165", "181.6006"]  # x_P' of the thesis, table 6-3
-print(f"length: {np.linalg.norm([98.5415, 99.9165, 181.6006]):.4f} mm, bound {bound(np.linalg.norm, sides):.1e} mm")
+print(f"length: {np.linalg.norm([98.5415, 99.9165, 181.6006]):.4f} mm, bound "
+      f"{bound(np.linalg.norm, sides):.1e} mm")
 
 # %% status-text [markdown]
 # ## The words
@@ -139,18 +143,19 @@ def status(printed, value, bound, misprint, simulated):
 # %% suspects
 @ex.suspects
 def suspects(entries, average):
-    """Return the set of positions whose single slip explains a disagreement; that of the average is len(entries).
+    """Return the set of positions whose single slip explains a disagreement.
 
-    entries: list of strings; average: a string. Rounding explains half units; where that suffices, the set is empty.
+    entries: strings; average: a string, at position len(entries). Rounding explains
+    half units; where that suffices, the set is empty.
     """
     ### BEGIN SOLUTION
-
     def agree(numbers):
         x, h = [float(text) for text in numbers], [half_unit(text) for text in numbers]
         return abs(np.mean(x[:-1]) - x[-1]) <= np.mean(h[:-1]) + h[-1] + 1e-12
 
     printed = [*entries, average]
-    slips = [(k, [*printed[:k], s, *printed[k + 1 :]]) for k, text in enumerate(printed) for s in single_slips(text)]
+    slips = [(k, [*printed[:k], s, *printed[k + 1 :]])
+             for k in range(len(printed)) for s in single_slips(printed[k])]
     return set() if agree(printed) else {k for k, trial in slips if agree(trial)}
     ### END SOLUTION
 
@@ -158,9 +163,11 @@ def suspects(entries, average):
 # %% suspects-used
 table = report.table_d_texts()
 *runs, average, rozptyl = table[:, report.COLUMNS.index("max_mm")].tolist()
-print(f"largest errors {', '.join(runs)}; average {average}: suspects {suspects(runs, average)}")
+print(f"largest errors {', '.join(runs)}; average {average}: suspects "
+      f"{suspects(runs, average)}")
 for text in ("6", "9"):
-    print(f"run 3 with {text}: variance {np.var(np.array([*runs[:2], text, *runs[3:]], float)):.4f}, printed {rozptyl}")
+    variance = np.var(np.array([*runs[:2], text, *runs[3:]], float))
+    print(f"run 3 with {text}: variance {variance:.4f}, printed {rozptyl}")
 
 # %% suspects-verdict [markdown]
 # Two suspects: run 3, whose 6 would be a 9, or the average, which may have lost a zero (9.0468). One more printed number, the variance (*Rozptyl*), clears the average. That is what the ledger
@@ -204,10 +211,12 @@ from dataclasses import replace
 rows = [entry.row for entry in found if entry.status == "reproduced"]
 rows = [row for row in rows if row.printed.startswith("0.99")][:3]
 for row in rows:
-    other = replace(row, printed=row.printed[:-1] + str((int(row.printed[-1]) + 5) % 10))
+    other = replace(row, printed=row.printed[:-1]
+                    + str((int(row.printed[-1]) + 5) % 10))
     computed = ledger.compute(row)
     words = ledger.judge(row, computed), ledger.judge(other, computed)
-    print(f"{row.id:20} printed {row.printed}: {words[0]}, if it were {other.printed}: {words[1]}")
+    print(f"{row.id:20} printed {row.printed}: {words[0]}, if it were {other.printed}: "
+          f"{words[1]}")
 
 # %% in-practice [markdown]
 # ## In practice

@@ -155,7 +155,8 @@ ex.slip_cost(slip_cost)
 # %% slip-std
 if ex.after("slip_cost"):
     alone, both = slipped.rms_translation, slipped.plain.rms_translation
-    print(f"rms of the residuals: {alone:.2f} mm in the rows that agree, {both:.2f} mm in all")
+    print(f"rms of the residuals: {alone:.2f} mm in the rows that agree, {both:.2f} "
+          "mm in all")
     print("standard deviations told of the place:", slipped.std[3:], "mm")
 
 # %% clock-text [markdown]

@@ -60,6 +60,16 @@ def test_code_is_short_plain_and_comparable(name):
         assert not bad, f"cell {cell['id']} uses {bad[0]!r}"
 
 
+HALF_A_SCREEN = 88  # letters of code that a cell of half a screen shows
+
+
+@EACH_NOTEBOOK
+def test_code_fits_a_cell_of_half_a_screen(name):
+    for cell in cells(name, "code"):
+        wide = [line for line in "".join(cell["source"]).split("\n") if len(line) > HALF_A_SCREEN]
+        assert not wide, f"cell {cell['id']}: {wide[0]!r} has more than {HALF_A_SCREEN} letters"
+
+
 @EACH_NOTEBOOK
 def test_outputs_are_stored_where_nbval_compares_them_and_hold_text_and_small_pictures_alone(name):
     if name.startswith("notebooks"):
