@@ -233,7 +233,8 @@ ex.predict("neighborhood", guess, reveal=stages.saddle)
 #
 # $$f\big((1-\lambda)x + \lambda y\big) \le (1-\lambda)\,f(x) + \lambda\,f(y) \qquad \text{for all } x, y \text{ in the set and } 0 \le \lambda \le 1,$$
 #
-# and by the *Hessian*, which must have no negative eigenvalue anywhere in it. The first asks about pairs of places, the second about one place at a time, but at all of them.
+# and by the *Hessian*, which must have no negative eigenvalue anywhere in it. The first asks about pairs of places, the second about one place at a time, but at all of them. (Strict convexity
+# the thesis equates with a *positive definite* Hessian everywhere. That is sufficient, not necessary: $x^4$ is strictly convex, and its second derivative at 0 is 0.)
 #
 # Decide how much of the square passes the second, then drag P and Q. Where is $H$ positive definite? Does it help that it is, at P and at Q? And what does the other matrix say, $2J^\top J$ of the next section?
 

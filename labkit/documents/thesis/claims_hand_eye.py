@@ -6,11 +6,12 @@ import itertools
 import numpy as np
 from scipy.optimize import least_squares
 
-from ...calibration import hand_eye
+from ...calibration import hand_eye, literature
 from ...estimation import optimization
 from ...estimation.differences import numeric_jacobian
 from ...geometry import frames
 from ...geometry.lie import exp_so3
+from ...machines import robot_accuracy
 from .. import misprints, rounding
 from ..ledger import Computed, computes
 from ..slips import HERE, explained_by
@@ -997,4 +998,57 @@ def angle_axes():
     return Computed(
         np.array([f"um die {axes[name]}-Achse" for name in "ABC"]),
         proof=f"The list of symbols gives all three angles the z axis; the matrices of table 6-6 need {order}.",
+    )
+
+
+# --- what the sensor, the robot and the papers are said to do --------------------------------------------------------
+
+
+@computes("handeye.height_formula")
+def height_formula():
+    """The form of H that satisfies (2-11), L = H / tan(alpha) + H / tan(beta), in random triangles."""
+    alpha, beta, L = np.random.default_rng(0).uniform((0.3, 0.3, 20.0), (1.4, 1.4, 200.0), (100, 3)).T
+    a, b = np.tan(alpha), np.tan(beta)
+    forms = {
+        "L tan alpha tan beta / (tan alpha + tan beta)": L * a * b / (a + b),
+        "L (tan alpha + tan beta) / (tan alpha tan beta)": L * (a + b) / (a * b),
+        "L / (tan alpha + tan beta)": L / (a + b),
+    }
+    off = {form: float(np.abs(H / a + H / b - L).max()) for form, H in forms.items()}
+    return Computed(
+        min(off, key=off.get),
+        proof=f"In 100 triangles it returns the base to {min(off.values()):.0e} mm; sum and product exchanged miss it "
+        f"by {sorted(off.values())[1]:.0f} mm and more.",
+    )
+
+
+@computes("handeye.repeatability_base")
+def repeatability_without_base():
+    """Whether repeatability changes with the base the arrivals are given in."""
+    rng = np.random.default_rng(0)
+    reached, base = rng.normal(size=(30, 3)), frames.pose(exp_so3(rng.normal(size=3)), rng.uniform(-900, 900, 3))
+    here, there = robot_accuracy.repeatability(reached), robot_accuracy.repeatability(frames.transform(base, reached))
+    return Computed(
+        "ohne bekannte Lage" if abs(here - there) < 1e-9 else "mit bekannter Lage",
+        proof=f"The same arrivals seen from a base {np.linalg.norm(base[:3, 3]):.0f} mm away and turned have the same "
+        "repeatability: only their distances from one another enter.",
+    )
+
+
+@computes("handeye.li_moves")
+def li_moves():
+    """With how many translations of the robot the rotation of Li et al. follows."""
+    scene = literature.suitable_scene(1e-6, np.random.default_rng(0))
+    words = ("eine", "zwei", "drei")
+    enough = []
+    for moves in (1, 2, 3):
+        used = scene.translated[: moves + 1]
+        try:
+            found = literature.li_rotation(scene.T_BF[used], scene.x_S[used])
+            enough.append(np.abs(found - scene.T_FS[:3, :3]).max() < 1e-4)
+        except ValueError:
+            enough.append(False)
+    return Computed(
+        words[enough.index(True)],
+        proof="One translation leaves the turn about its own direction free; two in different directions fix it.",
     )

@@ -11,6 +11,7 @@ from functools import cache, partial
 
 import numpy as np
 
+from ...estimation import convexity
 from ...estimation import optimization as opt
 from ...estimation.differences import numeric_jacobian
 from .. import rounding
@@ -574,3 +575,20 @@ def stability_gauss_newton():
 @computes("optimization.stability_trust_region")
 def stability_trust_region():
     return _rating("trust_region")
+
+
+@computes("optimization.strict_convexity")
+def strict_convexity():
+    """Whether a strictly convex function must have a positive definite Hessian everywhere: x^4 is asked, at 0."""
+    ends = np.random.default_rng(0).uniform(-2, 2, (200, 2, 1))
+    gaps = []
+    for x, y in ends:
+        _, values, heights = convexity.chord(lambda z: float(z[0] ** 4), x, y, 11)
+        gaps.append((heights - values)[1:-1].min() / abs(y - x)[0] ** 4)
+    definite = convexity.positive_definite([[12 * 0.0**2]])
+    strict = min(gaps) > 0
+    return Computed(
+        "positiv semidefinit" if strict and not definite else "positiv definit",
+        proof=f"All {len(ends)} chords of x^4 lie above it inside, and its second derivative 12 x^2 is 0 at 0. A "
+        "positive definite Hessian is sufficient for strict convexity, not necessary.",
+    )
