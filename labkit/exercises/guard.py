@@ -141,7 +141,7 @@ class _Clock:
         if self.rung > SWALLOWED:
             sys.settrace(None)
 
-    ticking = False
+    ticking = sent = False
 
     def _disarm(self):
         if self.by_signal:
@@ -150,9 +150,21 @@ class _Clock:
             signal.signal(signal.SIGALRM, self.before)
         else:
             with self.lock:
+                if self.sent:  # it may be on its way: one more takes its place and is met here
+                    self.sent = False
+                    self._send()
+                    while True:
+                        pass
                 self.ticking = False
                 self.done.set()
-                ctypes.pythonapi.PyThreadState_SetAsyncExc(self.target, None)
+
+    def _send(self):
+        """Raise `TimeLimit` in the judged thread, between two lines.
+
+        It is never taken back: Python 3.11 would go on looking for it at every call, and a debugger or a profiler
+        that is switched on later would never get beyond its first one.
+        """
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(self.target, ctypes.py_object(TimeLimit))
 
     def _ring(self, _, frame):
         left = self.ends_cpu - time.thread_time()
@@ -169,7 +181,8 @@ class _Clock:
             wait = PERIOD
             with self.lock:
                 if self.ticking:
-                    ctypes.pythonapi.PyThreadState_SetAsyncExc(self.target, ctypes.py_object(TimeLimit))
+                    self.sent = True
+                    self._send()
 
 
 def _raise_at_every_line(frame):

@@ -5,6 +5,7 @@ import itertools
 import json
 import math
 import os
+import subprocess
 import sys
 import threading
 import time
@@ -15,7 +16,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from labkit.chapters.ch01_frames.exercises import CHAPTER, random_pose
-from labkit.exercises import engine, feedback, guard, metrics, progress, session
+from labkit.exercises import engine, feedback, guard, metrics, progress, session, source
 from labkit.exercises.engine import CORRECT, NOT_YET, RAISED, TO_DO, Chapter, Exercise, Mistake, Prediction, Value
 from labkit.exercises.feedback import Panel
 from labkit.geometry import frames
@@ -225,6 +226,38 @@ def test_time_limit_in_another_thread():
     thread.start()
     thread.join(timeout=10)
     assert "did not finish" in found[0].text
+
+
+WATCHED_AFTERWARDS = """
+import sys, threading
+from labkit.exercises import guard
+
+def endless():
+    while True:
+        pass
+
+def one():
+    return 1
+
+def check():
+    assert isinstance(guard.run(endless, (), limit=0.2).error, guard.TimeLimit)
+    assert guard.run(one, (), limit=0.2).result == 1
+    sys.setprofile(lambda *_: None)
+    found.append(one())
+    sys.setprofile(None)
+
+found = []
+thread = threading.Thread(target=check)
+thread.start()
+thread.join()
+assert found
+"""
+
+
+def test_a_profiler_runs_after_a_check_in_another_thread():
+    """Python 3.11 hangs in the first call a profiler sees when an exception of another thread was taken back."""
+    words = [sys.executable, "-c", WATCHED_AFTERWARDS]
+    assert subprocess.run(words, cwd=source.ROOT, timeout=20, capture_output=True).returncode == 0
 
 
 def test_interpreter_state_is_put_back():
