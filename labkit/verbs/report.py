@@ -112,10 +112,11 @@ def curve(x, y, x_label, y_label):
     far = np.concatenate([[True], np.diff(x) > 5 * max(usual, span / MAX_MARKS)])
     way = "".join(f"{'M' if new else 'L'}{a:.1f} {up(b):.1f}" for a, b, new in zip(across, y, far))
     parts = [_axis(top, y_label, up), f'<path d="{way}" fill="none" stroke="var(--estimate)" stroke-width="1.5"/>']
-    for share in (0, 0.5, 1):
+    for share, anchor in ((0, "start"), (0.5, "middle"), (1, "end")):
         place = LEFT + (WIDTH - LEFT - 15) * share
-        parts.append(f'<text x="{place:.1f}" y="{HEIGHT - 12}" text-anchor="middle">{x[0] + share * span:.4g}</text>')
-    parts.append(f'<text x="{WIDTH - 15}" y="{HEIGHT}" text-anchor="end" fill="var(--muted)">{x_label}</text>')
+        number = f"{x[0] + share * span:.4g}"
+        parts.append(f'<text x="{place:.1f}" y="{HEIGHT - 12}" text-anchor="{anchor}">{number}</text>')
+    parts.append(f'<text x="{WIDTH - 15}" y="{HEIGHT + 3}" text-anchor="end" fill="var(--muted)">{x_label}</text>')
     return _svg(parts, f"{y_label} over {x_label}")
 
 
@@ -130,7 +131,7 @@ def _axis(top, label, up):
 
 def _svg(parts, label):
     box = f'viewBox="0 0 {WIDTH} {HEIGHT + 4}" role="img" aria-label="{html.escape(label)}"'
-    return f"<svg {box}>{''.join(parts)}</svg>"
+    return f'<div class="wide"><svg {box}>{"".join(parts)}</svg></div>'
 
 
 class View:
