@@ -444,13 +444,13 @@ CHAPTER = Chapter(
             metric=STATE_AND_COV,
             hints=(
                 "The state follows the model; its uncertainty is carried along, and that of the control is added.",
-                "x = A x + B u and cov = A cov A' + B cov_u B' (lines 2 and 3 of the lecture's algorithm).",
+                "x = A x + B u and cov = A cov A^T + B cov_u B^T (lines 2 and 3 of the lecture's algorithm).",
                 "`return A @ x + B @ u, A @ cov @ A.T + B @ cov_u @ B.T`",
             ),
             mistakes=[
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T),
-                    "The control's noise is missing: add B cov_u B'.",
+                    "The control's noise is missing: add B cov_u B^T.",
                 ),
                 Mistake(
                     _predicted(lambda x, A, B, u: A @ x, _grown),
@@ -458,15 +458,15 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A.T @ P @ A + B @ Q @ B.T),
-                    "A stands on the wrong side: A cov A', not A' cov A.",
+                    "A stands on the wrong side: A cov A^T, not A^T cov A.",
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ P + B @ Q @ B.T),
-                    "A covariance is multiplied from both sides: A cov A'.",
+                    "A covariance is multiplied from both sides: A cov A^T.",
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + Q),
-                    "You added cov_u as it is. The control acts through B, and so does its noise: B cov_u B'.",
+                    "You added cov_u as it is. The control acts through B, and so does its noise: B cov_u B^T.",
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: P + B @ Q @ B.T),
@@ -506,7 +506,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _predicted(lambda x, A, B, u: x @ A + B @ u, _grown),
-                    "The order: A x is written A @ x. Yours is A' x.",
+                    "The order: A x is written A @ x. Yours is A^T x.",
                 ),
                 Mistake(
                     _predicted(lambda x, A, B, u: A @ x + u, _grown),
@@ -514,7 +514,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + B @ Q),
-                    "The control's covariance is multiplied from both sides: B cov_u B'.",
+                    "The control's covariance is multiplied from both sides: B cov_u B^T.",
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + B @ B.T),
@@ -526,11 +526,11 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ (P + B @ Q @ B.T) @ A.T),
-                    "The control's noise comes in during this step: it is added after A cov A', not carried along with it.",
+                    "The control's noise comes in during this step: it is added after A cov A^T, not carried along with it.",
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + Q[0, 0] * B @ B.T),
-                    "You took the first entry of cov_u alone. It is a matrix, one row per control: B cov_u B'.",
+                    "You took the first entry of cov_u alone. It is a matrix, one row per control: B cov_u B^T.",
                 ),
                 Mistake(
                     _predicted(lambda x, A, B, u: A @ x + B[:, 0] * u[0], _grown),
@@ -541,11 +541,11 @@ CHAPTER = Chapter(
                     "The last factor is the transpose of A, not its inverse.",
                 ),
                 Mistake(
-                    _predicted(_moved, lambda P, A, B, Q: B @ Q @ B.T), "The old covariance is missing: add A cov A'."
+                    _predicted(_moved, lambda P, A, B, Q: B @ Q @ B.T), "The old covariance is missing: add A cov A^T."
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + Q[0, 0] * np.eye(len(A))),
-                    "You added the variance of the first control to every state. It acts through B: B cov_u B'.",
+                    "You added the variance of the first control to every state. It acts through B: B cov_u B^T.",
                 ),
                 Mistake(lambda *given: predict_state(*given)[::-1], "The order is state, covariance."),
             ],
@@ -559,7 +559,7 @@ CHAPTER = Chapter(
             metric=STATE_AND_COV,
             hints=(
                 "How surprising is the measurement, and how much of the surprise belongs to the state?",
-                "S = C cov C' + cov_z, K = cov C' S^-1, x + K (z - C x), (I - K C) cov.",
+                "S = C cov C^T + cov_z, K = cov C^T S^-1, x + K (z - C x), (I - K C) cov.",
                 "`K = cov @ C.T @ np.linalg.inv(C @ cov @ C.T + cov_z)\n"
                 "return x + K @ (z - C @ x), (np.eye(len(x)) - K @ C) @ cov`",
             ),
@@ -570,7 +570,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _updated(gain=lambda P, C, R: P @ C.T @ np.linalg.inv(R)),
-                    "S is the noise of the sensor plus the uncertainty of the expected measurement, C cov C'.",
+                    "S is the noise of the sensor plus the uncertainty of the expected measurement, C cov C^T.",
                 ),
                 Mistake(
                     _updated(state=lambda x, K, z, C: x - K @ (z - C @ x)),
@@ -622,11 +622,11 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _updated(gain=lambda P, C, R: C @ P @ np.linalg.inv(C @ P @ C.T + R)),
-                    "The gain begins with cov C', not C cov.",
+                    "The gain begins with cov C^T, not C cov.",
                 ),
                 Mistake(
                     _updated(gain=lambda P, C, R: P @ C.T @ np.linalg.inv(C @ P @ C.T - R)),
-                    "Uncertainties add: S = C cov C' + cov_z.",
+                    "Uncertainties add: S = C cov C^T + cov_z.",
                 ),
                 Mistake(
                     _updated(gain=lambda P, C, R: P @ np.linalg.inv(P + R)),
@@ -634,19 +634,19 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _updated(gain=lambda P, C, R: P @ C @ np.linalg.inv(C @ P @ C.T + R)),
-                    "C stands transposed in the gain: cov C' S^-1.",
+                    "C stands transposed in the gain: cov C^T S^-1.",
                 ),
                 Mistake(
                     _updated(gain=lambda P, C, R: C.T @ np.linalg.inv(C @ P @ C.T + R)),
-                    "cov is missing from the gain: cov C' S^-1.",
+                    "cov is missing from the gain: cov C^T S^-1.",
                 ),
                 Mistake(
                     _updated(gain=lambda P, C, R: np.linalg.inv(C @ P @ C.T + R) @ P @ C.T),
-                    "The order: the inverse of S stands to the right of cov C'.",
+                    "The order: the inverse of S stands to the right of cov C^T.",
                 ),
                 Mistake(
                     _updated(gain=lambda P, C, R: np.linalg.inv(C @ P @ C.T + R) @ C @ P),
-                    "This is the transpose of the gain: K = cov C' S^-1.",
+                    "This is the transpose of the gain: K = cov C^T S^-1.",
                 ),
                 Mistake(_updated(gain=lambda P, C, R: P @ C.T), "The division by S is missing from the gain."),
                 Mistake(
@@ -663,7 +663,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _updated(gain=lambda P, C, R: P @ C.T @ np.linalg.inv(C.T @ P @ C + R)),
-                    "C is on the wrong side in S: C cov C', not C' cov C.",
+                    "C is on the wrong side in S: C cov C^T, not C^T cov C.",
                 ),
                 Mistake(_updated(state=lambda x, K, z, C: x + K @ (z - x)), "The expected measurement is C x, not x."),
                 Mistake(
@@ -872,7 +872,7 @@ CHAPTER = Chapter(
             metric=metrics.Numbers(1e-3),
             hints=(
                 "The gain does not depend on the data. Run the covariance alone until the gain stands still.",
-                "Repeat: cov = A cov A' + cov_v, K = cov C' S^-1, cov = (I - K C) cov. Some thousand times are cheap. Or let SciPy solve the Riccati equation.",
+                "Repeat: cov = A cov A^T + cov_v, K = cov C^T S^-1, cov = (I - K C) cov. Some thousand times are cheap. Or let SciPy solve the Riccati equation.",
                 "`from scipy.linalg import solve_discrete_are\n"
                 "P = solve_discrete_are(A.T, C.T, cov_v, cov_z)\n"
                 "return P @ C.T @ np.linalg.inv(C @ P @ C.T + cov_z)`",
@@ -892,7 +892,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda A, C, Q, R: kalman.steady_state(A, C, Q, R).cov_before @ C.T @ np.linalg.inv(R),
-                    "Not cov_z alone is divided by: the covariance before the correction goes with S = C cov C' + cov_z.",
+                    "Not cov_z alone is divided by: the covariance before the correction goes with S = C cov C^T + cov_z.",
                 ),
                 Mistake(
                     lambda A, C, Q, R: A @ kalman.steady_state(A, C, Q, R).gain,
@@ -1410,7 +1410,7 @@ CHAPTER = Chapter(
                     _all_wrapped,
                     "You wrapped the whole innovation. Only the bearing is an angle: a distance that is 5 m off stays 5 m off.",
                 ),
-                Mistake(_ekf(noise=False), "The control's noise G_u cov_u G_u' is missing from the prediction."),
+                Mistake(_ekf(noise=False), "The control's noise G_u cov_u G_u^T is missing from the prediction."),
                 Mistake(
                     _ekf(at="old", H_at="old"),
                     "Expected measurement and H belong to the predicted pose; you used the old one.",
@@ -1452,14 +1452,14 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _ekf(control=lambda cov_u, dt: cov_u * dt),
-                    "The time step stands in G_u already: G_u cov_u G_u' as it is.",
+                    "The time step stands in G_u already: G_u cov_u G_u^T as it is.",
                 ),
                 Mistake(
                     lambda x, cov, *given: (ekf_step(x, cov, *given)[0], _shrunk_at_the_end(x, cov, *given)),
                     "The pose is right. (I - K H) takes the H of the gain, at the predicted pose; yours is taken at the corrected one.",
                 ),
                 Mistake(_ekf(short=True), "You only predicted: the correction is missing."),
-                Mistake(_ekf(carry=False), "The old covariance must be carried along: G_x cov G_x'."),
+                Mistake(_ekf(carry=False), "The old covariance must be carried along: G_x cov G_x^T."),
                 Mistake(
                     _ekf(gain=lambda P, H, R: P @ H.T @ np.linalg.inv(H @ P @ H.T)),
                     "The sensor's noise is missing from S.",
@@ -1474,7 +1474,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _ekf(gain=lambda P, H, R: P @ H.T @ np.linalg.inv(R)),
-                    "S is the noise of the sensor plus the uncertainty of the expected measurement, H cov H'.",
+                    "S is the noise of the sensor plus the uncertainty of the expected measurement, H cov H^T.",
                 ),
                 Mistake(
                     _ekf(gain=lambda P, H, R: P @ H.T @ (H @ P @ H.T + R)),
@@ -1707,7 +1707,7 @@ CHAPTER = Chapter(
             metric=STATE_AND_COV,
             hints=(
                 "What is known before is one more measurement, of the state itself, with its own covariance.",
-                "N = cov0^-1 + sum C' cov_z^-1 C and b = cov0^-1 x0 + sum C' cov_z^-1 z; then x = N^-1 b, with covariance N^-1.",
+                "N = cov0^-1 + sum C^T cov_z^-1 C and b = cov0^-1 x0 + sum C^T cov_z^-1 z; then x = N^-1 b, with covariance N^-1.",
                 "`N, b = np.linalg.inv(cov0), np.linalg.solve(cov0, x0)\n"
                 "for one in z:\n"
                 "    N = N + C.T @ np.linalg.solve(cov_z, C)\n"
