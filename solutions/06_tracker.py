@@ -284,6 +284,22 @@ def reject_outliers(values, factor=4.0):
     ### END SOLUTION
 
 
+# %% mean-of-a-stop [markdown]
+# ### The mean of a stop (*further*)
+#
+# Positions are averaged as they are. Rotations come as quaternions, and $q$ and $-q$
+# are one rotation: a tracker may send either. Their mean is nothing at all.
+
+# %% mean_quaternion
+@ex.mean_quaternion
+def mean_quaternion(q):
+    """Return the mean, shape (4,), of length 1, of quaternions q, shape (n, 4), of
+    length 1 and of either sign, that lie within a few degrees; its sign is free."""
+    ### BEGIN SOLUTION
+    return np.linalg.eigh(q.T @ q)[1][:, -1]
+    ### END SOLUTION
+
+
 # %% the-log [markdown]
 # ## Calibrate
 #
@@ -509,8 +525,8 @@ knock = 2.0 * 0.802 / stages.compute_moved_station(state)["E_trans"]
 knock = ex.knock(knock)
 
 # %% knock-then [markdown]
-# No eye sees so small a turn. A rocking station makes it anew at every stop. $E_{trans}$
-# sees what changes *within* a run, and nothing else.
+# No eye sees so small a turn. A rocking station makes it anew at every stop.
+# $E_{trans}$ sees what changes *within* a run, and nothing else.
 
 # %% beyond [markdown]
 # ## Beyond the document: can it be done better?

@@ -212,6 +212,32 @@ def reject_outliers(values, factor=4.0):
     return ((distance <= factor * scale) | (scale == 0)).all(axis=1)
 
 
+def mean_quaternion(q):
+    """Mean of quaternions whose signs mean nothing: q and -q are one rotation, so only q q' can be averaged.
+
+    Parameters
+    ----------
+    q : array-like, shape (n, 4)
+        Of length 1, n >= 1.
+
+    Returns
+    -------
+    mean : array, shape (4,)
+        Of length 1: the eigenvector of sum q q' with the largest eigenvalue; its sign is free.
+
+    Raises
+    ------
+    ValueError
+        A wrong shape, or no quaternion.
+
+    Source: Markley, Cheng, Crassidis, Oshman, "Averaging quaternions", J. Guidance 30 (2007) 1193.
+    """
+    q = as_shape(q, "q", "n", 4)
+    if not len(q):
+        raise ValueError("q must hold at least one quaternion, got none")
+    return np.linalg.eigh(q.T @ q)[1][:, -1]
+
+
 def mean_pose(T):
     """Mean of poses that lie close together; rotations by the projected mean matrix; (n, 4, 4) -> (4, 4)."""
     T = as_shape(as_transforms(T, "T"), "T", "n", 4, 4)

@@ -24,7 +24,15 @@ from labkit.machines.accuracy import (
     tracking_errors,
 )
 from labkit.machines.arm import TX40, forward_kinematics
-from labkit.machines.log import Log, average_stops, mean_pose, read_csv, reject_outliers, write_csv
+from labkit.machines.log import (
+    Log,
+    average_stops,
+    mean_pose,
+    mean_quaternion,
+    read_csv,
+    reject_outliers,
+    write_csv,
+)
 from labkit.machines.mounting import calibrate_mounting, e_rot, e_trans
 from labkit.machines.packet import (
     FIELDS,
@@ -454,3 +462,13 @@ def test_squares_of_independent_errors_lie_on_a_line():
 def test_medians_of_intervals():
     medians = median_over_speed([0.1, 0.2, 0.3, 1.1], [1.0, 5.0, 3.0, 7.0], [0.0, 1.0, 2.0, 3.0])
     np.testing.assert_array_equal(medians, [3.0, 7.0, np.nan])
+
+
+@pytest.mark.parametrize("turn", [0.3, np.pi])
+def test_the_mean_of_quaternions_is_scipys_whatever_their_signs(turn):
+    rng = np.random.default_rng(9)
+    R = Rotation.from_rotvec([0.0, 0.0, turn]) * Rotation.from_rotvec(0.1 * rng.normal(size=(12, 3)))
+    mean = mean_quaternion(R.as_quat() * rng.choice([-1, 1], (12, 1)))
+    assert (Rotation.from_quat(mean).inv() * R.mean()).magnitude() < 1e-12
+    with pytest.raises(ValueError, match="at least one"):
+        mean_quaternion(np.empty((0, 4)))

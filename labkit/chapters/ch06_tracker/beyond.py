@@ -8,13 +8,95 @@ import numpy as np
 from ...documents.report.printed import COLUMNS, table_d
 from ...exercises import metrics
 from ...exercises.engine import Exercise, Mistake, Prediction, Value
-from ...geometry.frames import invert, pose, unit_vector
+from ...geometry.frames import invert, matrix_from_quaternion, pose, quaternion_from_matrix, unit_vector
 from ...geometry.lie import exp_so3, skew
 from ...geometry.propagation import error_budget, point_covariance
 from ...machines import cell, simulation, stations
 from ...machines.accuracy import static_error_and_lag
 from ...machines.arm import TX40, tool_pose
+from ...machines.log import mean_quaternion
 from ...machines.mounting import calibrate_mounting
+
+# The mean of a stop ----------------------------------------------------------------------------------------------------------
+
+
+def readings_of_a_stop(rng, part):
+    """Quaternions of both signs that scatter by two degrees about one whose given part is 0: its sign is noise."""
+    n, center = int(rng.integers(6, 16)), rng.normal(size=4)
+    center[part] = 0.0
+    R = matrix_from_quaternion(center / np.linalg.norm(center))
+    while True:
+        q = quaternion_from_matrix(R @ exp_so3(0.035 * rng.normal(size=(n, 3))))
+        same = q * np.where(q @ q[0] < 0, -1.0, 1.0)[:, None]
+        if 2 <= (same[:, part] < 0).sum() <= n - 2:
+            break
+    signs = rng.permutation(np.r_[1, 1, 1, -1, -1, rng.choice([-1, 1], n - 5)])
+    return (same * signs[:, None],)
+
+
+def _unit_mean(signs):
+    def variant(q):
+        mean = (q * signs(q)[:, None]).mean(axis=0)
+        return mean / np.linalg.norm(mean)
+
+    return variant
+
+
+STOPS = [
+    Exercise(
+        "mean_quaternion",
+        reference=mean_quaternion,
+        draw=tuple(functools.partial(readings_of_a_stop, part=part) for part in (3, 0, 1, 2)),
+        metric=metrics.UpToSign(2e-4),
+        hints=(
+            "q and -q are one rotation: whatever you average must be the same for both.",
+            "q q^T is. The unit vector with the largest sum of (q_i . mean)^2 is an eigenvector of sum q q^T.",
+            "`return np.linalg.eigh(q.T @ q)[1][:, -1]`",
+        ),
+        mistakes=[
+            Mistake(
+                _unit_mean(lambda q: np.ones(len(q))),
+                "q and -q are one rotation, but their mean is 0. The readings come in both signs: what you average must not depend on it.",
+                id="mean_quaternion-signs",
+            ),
+            Mistake(
+                lambda q: q.mean(axis=0),
+                "The readings come in both signs, which cancel; and a mean of unit vectors is shorter than 1.",
+                id="mean_quaternion-plain",
+            ),
+            Mistake(
+                _unit_mean(lambda q: np.where(q[:, 3] < 0, -1.0, 1.0)),
+                "You made w positive. Near a half turn w is about 0, and its sign is noise: readings of one rotation get opposite signs.",
+                id="mean_quaternion-w",
+            ),
+            Mistake(
+                _unit_mean(lambda q: np.where(q[:, 0] < 0, -1.0, 1.0)),
+                "You made the first part positive. Where it is about 0, its sign is noise.",
+                id="mean_quaternion-first-part",
+            ),
+            Mistake(
+                lambda q: _unit_mean(lambda p: np.ones(len(p)))(np.abs(q)),
+                "The absolute value of each part is another rotation: q and -q differ in all four signs at once.",
+                id="mean_quaternion-absolute",
+            ),
+            Mistake(
+                lambda q: np.linalg.eigh(q.T @ q)[1][:, 0],
+                "This eigenvector belongs to the smallest eigenvalue: what the readings have least of. `eigh` sorts upward.",
+                id="mean_quaternion-smallest",
+            ),
+            Mistake(
+                lambda q: (m := q * np.where(q @ q[0] < 0, -1.0, 1.0)[:, None]).mean(axis=0) * len(m),
+                "The signs are right, but you returned a sum. A quaternion has length 1.",
+                id="mean_quaternion-sum",
+            ),
+            Mistake(
+                lambda q: q[0],
+                "This is the first reading alone.",
+                id="mean_quaternion-one",
+            ),
+        ],
+    ),
+]
 
 # Base stations ---------------------------------------------------------------------------------------------------------------
 

@@ -1172,6 +1172,7 @@ CHAPTER = Chapter(
                 ),
             ],
         ),
+        *beyond.STOPS,
         Value(
             "mounting",
             reference=_mounting,
