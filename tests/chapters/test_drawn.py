@@ -324,7 +324,17 @@ def test_the_chosen_pose_sees_the_sphere_where_its_residual_ends():
     seen = scanner[:3, :3] @ result["x_S"][k] + scanner[:3, 3]
     assert_drawn(stage, [result["T_BF"][k, :3, 3], scanner[:3, 3], seen])
     assert result["residuals"][k] == pytest.approx(seen - result["target"], abs=1e-9)
-    assert_drawn(stage, [result["target"], result["target"] + 8 * result["residuals"][k]])
+    foot = result["T_BF"][k, :3, 3]
+    assert_drawn(stage, [foot, foot + 8 * result["residuals"][k]])
+    space = stage.spaces[0]
+    ball = space.named("sphere").corners()[..., :3].reshape(-1, 3) - result["target"]
+    assert np.linalg.norm(ball[ball[:, 2] > 0], axis=1) == pytest.approx(ch05.RADIUS, abs=1e-4)  # rounded
+    light = space.named("light").corners().reshape(-1, 3)
+    local = (light - scanner[:3, 3]) @ scanner[:3, :3]  # in the scanner: flat in y, from its origin to the field's end
+    assert np.abs(local[:, 1]).max() < 1 and [local[:, 2].min(), local[:, 2].max()] == pytest.approx([0, 290])
+    assert [local[:, 0].min(), local[:, 0].max()] == pytest.approx([-25 * 1.15, 25 * 1.15])
+    plate = (space.named("flange plate").corners().reshape(-1, 3) - foot) @ result["T_BF"][k, :3, :3]
+    assert plate[:, 2].max() == pytest.approx(0, abs=1e-6)  # its face is the flange frame's plane
     assert_drawn(stage, [[12, max(result["lengths"][k], 0.08) * 1.5]])
 
 
@@ -452,6 +462,8 @@ class OneTrail:
 
     def triad(self, *_, **__):
         return self.Item()
+
+    body = triad
 
     def fixed(self, item, value):
         item.set(value)

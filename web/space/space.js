@@ -304,6 +304,7 @@ class Scene {
     const [cssWidth, cssHeight] = [width * room.clientWidth, height * room.clientHeight];
     if (cssWidth < 2 || cssHeight < 2) return;
     Object.assign(this.canvas.style, { left: `${100 * left}%`, top: `${100 * top}%`, width: `${100 * width}%`, height: `${100 * height}%` });
+    Object.assign(this.view.tools.style, { top: `${100 * top}%`, right: `${100 * (1 - left - width)}%` });
     const ratio = Math.min(window.devicePixelRatio || 1, Math.sqrt(MAX_PIXELS / (cssWidth * cssHeight)));
     const [w, h] = [Math.round(cssWidth * ratio), Math.round(cssHeight * ratio)];
     if (this.canvas.width !== w || this.canvas.height !== h) Object.assign(this.canvas, { width: w, height: h });

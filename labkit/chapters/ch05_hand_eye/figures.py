@@ -3,6 +3,7 @@
 import numpy as np
 
 from ...stage import style
+from . import bodies
 
 TILT, YAW = (-105, 75), 70  # deg, of the error plane: detours past the pole reach farther than a start
 CIRCLE = np.linspace(0, 2 * np.pi, 121)
@@ -171,8 +172,8 @@ def set_bars(stems, lengths, floor=0.08):
     stems.set_data(x, y)
 
 
-def cell(scene):
-    """Sphere, flange positions by line of motion, scanner frame of the chosen pose and residual vectors in space.
+def cell(scene, radius):
+    """Sphere, flange positions by line of motion, hand and scanner of the chosen pose, residual vectors in space.
 
     Returns a dictionary of the items of the scene.
     """
@@ -183,7 +184,8 @@ def cell(scene):
     return {
         **flanges,
         "sight": scene.line(**style.look("guide")),
-        "sphere": scene.ellipsoid(**style.look("truth")),
+        "sphere": bodies.ball(scene, radius),
+        "hand": bodies.Hand(scene),
         "residuals": scene.line(color=style.ESTIMATE, linewidth=2.0),
         "chosen": scene.line(color=style.INK, linewidth=2.6),
         "flange": scene.triad("F", 110),

@@ -18,6 +18,7 @@ from ...geometry.lie import exp_so3, log_so3
 from ...machines import robot_accuracy, triangulation
 from ...stage import Choice, Handle, Slider, Stage, style
 from ...stage.scene3d import Scene, View
+from . import bodies
 from . import figures as draw
 
 RADIUS = 30.0  # mm, the sphere
@@ -546,26 +547,26 @@ def thirty_one_poses():
     lines = thesis.measurements().line
 
     def scene(fig):
-        left, right = fig.subplots(1, 2, width_ratios=(1, 1.05))
-        space = Scene(left, radius=520)
-        items = draw.cell(space)
+        left, right = fig.subplots(1, 2, width_ratios=(1.25, 1))
+        space = Scene(left, radius=520, title="residuals at their flanges, x 8", unit="mm")
+        items = draw.cell(space, RADIUS)
         stems, chosen, yardstick = draw.residual_bars(right, 31)
-        style.bare(left, "residual vectors x 8")
         rms = right.text(0.98, 0.97, "", transform=right.transAxes, ha="right", va="top")
 
         def update(state, result):
             target, T_BF, k = result["target"], result["T_BF"], result["pose"] - 1
             for line in draw.LINES:
                 items[line].set(T_BF[lines == line, :3, 3])
-            items["sphere"].set(target, RADIUS**2 * np.eye(3))
+            items["sphere"].set(bodies.at(target))
             seen = result["residuals"] * np.minimum(1, SHOWN_RESIDUAL / np.maximum(result["lengths"], 1e-9))[:, None]
-            tips = target + 8 * seen  # magnified, for the eye
-            gaps = np.full_like(tips, np.nan)
-            items["residuals"].set(np.stack([np.broadcast_to(target, tips.shape), tips, gaps], 1).reshape(-1, 3))
-            items["chosen"].set([target, tips[k]])
+            feet = T_BF[:, :3, 3]
+            tips = feet + 8 * seen  # magnified, for the eye
+            items["residuals"].set(np.stack([feet, tips, np.full_like(tips, np.nan)], 1).reshape(-1, 3))
+            items["chosen"].set([feet[k], tips[k]])
             scanner = T_BF[k] @ result["T_FS"]
             items["flange"].set(T_BF[k])
             items["scanner"].set(scanner)
+            items["hand"].set(T_BF[k], scanner)
             items["sight"].set([T_BF[k, :3, 3], scanner[:3, 3], frames.transform(scanner, result["x_S"][k])])
             space.draw(state["view"])
             draw.set_bars(stems, result["lengths"])
@@ -587,7 +588,7 @@ def thirty_one_poses():
             ),
         },
         click=1,
-        view=View(-60, 20, center=(1500.0, -600.0, 1300.0)),
+        view=View(-60, 20, center=(1500.0, -600.0, 1300.0), eye=3200.0),
         fail={"fit": "least squares"},
         because="Least squares over all 31 as printed: the few wrong rows pull the fit away from all the others.",
         presets={"All corrected": {"others": True, "slip": 1, "fit": "least squares"}},
@@ -658,10 +659,10 @@ def pattern_designer():
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.15, 1))
-        space = Scene(left, radius=480)
+        space = Scene(left, radius=480, unit="mm")
+        ball, hand = bodies.ball(space, RADIUS), bodies.Hand(space)
         flanges = space.points(**style.look("measurement", markersize=4))
         sights = space.line(**style.look("guide", alpha=0.5))
-        ball = space.ellipsoid(**style.look("truth"))
         printed = space.ellipsoid(**style.look("guide", linewidth=2.0))
         found = space.ellipsoid(**style.look("estimate"))
         weak = space.line(color=style.ESTIMATE, linewidth=3)
@@ -673,7 +674,8 @@ def pattern_designer():
             flanges.set(T_BF[:, :3, 3])
             gaps = np.full((len(T_BF), 3), np.nan)
             sights.set(np.stack([T_BF[:, :3, 3], np.broadcast_to(target, (len(T_BF), 3)), gaps], 1).reshape(-1, 3))
-            ball.set(target, RADIUS**2 * np.eye(3))
+            ball.set(bodies.at(target))
+            hand.set(T_BF[-1], T_BF[-1] @ result["T_FS"])
             aside = target + np.array([0.0, 0.0, -230.0])
             printed.set(aside, 40**2 * result["printed_cov"][3:6, 3:6])
             found.set(aside, 40**2 * (result["cov"][3:6, 3:6] if result["determined"] else np.zeros((3, 3))))
@@ -698,7 +700,7 @@ def pattern_designer():
             "tilt_deg": Slider(0, 85, 30, step=1, label="tilt up to (deg)"),
             "across": Slider(3, 25, 12, step=1, label="|y| up to (mm)"),
         },
-        view=View(-55, 15, center=(1528.0, -602.0, 1190.0)),
+        view=View(-55, 15, center=(1528.0, -602.0, 1190.0), eye=3200.0),
         fail={"tilt_deg": 0},
         describe=_pattern_sentence,
     )

@@ -46,6 +46,7 @@ class Trail:
         self.readings = scene.points(**style.look("measurement", markersize=4.5, markeredgewidth=0))
         self.rejected = scene.points(**style.look("rejected"))
         self.path = scene.line(**style.look("estimate", linewidth=1.8))
+        self.puck = scene.body(*bodies.puck(), name="puck")
         self.tracker = scene.triad("E", triad)
         self.tracker.name_at(-9, 10)
         scene.fixed(scene.triad("W", triad, linestyle=(0, (3, 1.5))), np.eye(4))
@@ -70,10 +71,51 @@ class Trail:
         ):
             item.set(points if len(points) else nothing)
         self.tracker.set(T_WE)
+        self.puck.set(T_WE)
 
     def path_in_front(self):
         """The filtered path over its readings, which are as deep in the scene; call it after the scene is drawn."""
         self.path.artist.set_zorder(3.2)
+
+
+STATIONS = np.array([[-470.0, 60.0, 400.0], [60.0, 470.0, 400.0]])  # mm: drawn close by; real ones hang meters away
+SWEEPS = 60.0  # a second, of a station; slowed down 120 times for the eye
+
+
+class Sweep:
+    """Two base stations, and the sheet of light of each on its way across the tracker; which one it is alternates."""
+
+    def __init__(self, scene):
+        self.poses = [_looking(place, np.array([-60.0, 60.0, 0.0])) for place in STATIONS]
+        for k, T in enumerate(self.poses):
+            scene.fixed(scene.body(*bodies.station(), name=f"station {k + 1}"), T)
+        self.sheets = [scene.body(bodies.sheet_of_light(720.0, 0.35), name=f"sheet {k + 1}") for k in range(2)]
+
+    def set(self, t, point):
+        """`t` in s; `point`: where the tracker is, (3,), which the sheet meets in the middle of its sweep."""
+        phase = (t * SWEEPS / 120.0) % 2.0
+        for k, (sheet, T) in enumerate(zip(self.sheets, self.poses)):
+            x, _, z = (point - T[:3, 3]) @ T[:3, :3]
+            angle = np.arctan2(x, z) + 1.4 * ((phase - k) - 0.5)
+            sheet.show(int(phase) == k)
+            sheet.set(T @ _about_y(angle))
+
+
+def _looking(place, goal):
+    """A frame at a place whose z axis points to a goal and whose x axis is level."""
+    z = (goal - place) / np.linalg.norm(goal - place)
+    x = np.cross([0.0, 0.0, 1.0], z)
+    x /= np.linalg.norm(x)
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = np.column_stack([x, np.cross(z, x), z]), place
+    return T
+
+
+def _about_y(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    T = np.eye(4)
+    T[0, [0, 2]], T[2, [0, 2]] = (c, s), (-s, c)
+    return T
 
 
 class RotationAxes:
@@ -84,6 +126,7 @@ class RotationAxes:
         self.radius = radius
         scene.fixed(scene.ellipsoid(**style.look("guide")), np.zeros(3), radius**2 * np.eye(3))
         self.lines = [scene.line(color=style.INK, linewidth=2.0, linestyle=dash) for dash in ("-", (0, (4, 2)))]
+        self.arrows = [scene.arrow(0.022 * radius, name=f"axis {k}") for k in "ab"]
         self.clouds = [
             scene.points(color=color, linestyle="none", marker=".", markersize=6, alpha=0.55, markeredgewidth=0)
             for color in style.AXES
@@ -96,6 +139,8 @@ class RotationAxes:
         (or nothing)."""
         for line, axis in zip(self.lines, axes):
             line.set(np.outer([-1.0, 1.0], axis) * self.radius)
+        for arrow, axis in zip(self.arrows, axes):
+            arrow.set(np.zeros(3), axis * self.radius)
         for k, cloud in enumerate(self.clouds):
             cloud.set(0.55 * self.radius * found[:, :, k])
         self.truth.set(T)

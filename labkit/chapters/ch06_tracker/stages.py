@@ -42,7 +42,7 @@ from ...machines.packet import POSITION, QUATERNION, TIME, packet_from_pose
 from ...machines.simulation import T_FE, Tracker
 from ...stage import Choice, Handle, Play, Slider, Stage, Toggle, style
 from ...stage.scene3d import Scene, View
-from ...stage.scene3d_handles import Dial, Free
+from ...stage.scene3d_handles import Dial, Free, OnSphere
 from ...tables import read_table
 from . import figures as draw
 from .bodies import RINGS
@@ -240,13 +240,15 @@ def live_tracker():
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.5, 1))
-        space = Scene(left, radius=420)
+        space = Scene(left, radius=480, half_width=520, floor=-320.0, unit="mm")
         trail = draw.Trail(space)
+        sweep = draw.Sweep(space)
         style.bare(right)
         words = right.text(0.0, 0.97, "", transform=right.transAxes, va="top", linespacing=1.5)
 
         def update(state, result):
             trail.set(result["positions"], result["used"], result["filtered"], result["T_WE"])
+            sweep.set(state["t"], result["T_WE"][:3, 3])
             space.draw(state["view"])
             trail.path_in_front()
             words.set_text(_live_words(result))
@@ -265,7 +267,7 @@ def live_tracker():
         compute=compute,
         controls={"loss": Slider(0.0, 0.5, 0.0, step=0.01, label="loss"), "nonsense": Toggle(False, "nonsense")},
         play=Play(LIVE_SECONDS, LIVE_STEP),
-        view=View(-50, 30, center=(-60, 60, 0)),
+        view=View(-50, 24, center=(-60, 60, 80), eye=3200.0),
         fail={"loss": 0.4, "nonsense": True},
         describe=sentence,
     )
@@ -305,10 +307,6 @@ def compute_two_axes(state):
         "error_deg": float(np.rad2deg(np.median(turn))), "error_mm": float(np.median(off)),
         "predicted_deg": float(np.rad2deg(2 * noise / values[-2])) if values[-2] > 1e-9 else np.inf,
     }  # fmt: skip
-
-
-def _on_sphere(state, moved):
-    return {name: unit_vector(state[name]) for name in ("a", "b")}
 
 
 def _two(value):
@@ -352,15 +350,14 @@ def two_axes():
         scene=scene,
         compute=compute_two_axes,
         handles={
-            "a": Handle((1.0, 0.0, 0.0), step=0.05, label="first rotation axis"),
-            "b": Handle((0.0, 0.6, 0.8), step=0.05, label="second rotation axis"),
+            "a": Handle((1.0, 0.0, 0.0), step=0.05, label="first rotation axis", way=OnSphere()),
+            "b": Handle((0.0, 0.6, 0.8), step=0.05, label="second rotation axis", way=OnSphere()),
         },
         controls={
             "angle": Slider(1.0, 120.0, 40.0, step=1.0, label="angle of the motions (deg)"),
             "noise": Slider(0.01, 1.0, 0.1, step=0.01, label="noise (deg)"),
         },
-        constrain=_on_sphere,
-        view=View(-50, 25),
+        view=View(-50, 25, eye=7.0),
         fail={"a": (0.0, 0.6, 0.8)},
         presets={"small motions": {"angle": 2.0}},
         describe=_axes_sentence,
