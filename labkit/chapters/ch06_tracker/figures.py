@@ -243,6 +243,9 @@ class Plan:
         (self.found,) = ax.plot([], [], **style.look("estimates", markersize=3, markeredgewidth=0, alpha=0.7))
         (self.region,) = ax.plot([], [], **style.look("prediction"))
         (self.diode,) = ax.plot([], [], **style.look("truth", linestyle="none", marker="+", markersize=12))
+        self.found.set_label("places found")
+        self.region.set_label("covariance, 3 std")
+        ax.legend(loc="upper left", fontsize=8)
         self.names = [
             ax.annotate(name, (0, 0), xytext=(8, -14), textcoords="offset points", fontweight="bold") for name in "AB"
         ]
@@ -331,7 +334,7 @@ class CellPlan:
         (self.miss,) = ax.plot([], [], **style.look("estimate", marker="D", markersize=5, markevery=[1]))
         self.miss.set_label("this cell")
         self.letter = ax.annotate("P", (0, 0), xytext=(-12, -12), textcoords="offset points", fontweight="bold")
-        ax.legend(loc="upper right", fontsize=8)
+        ax.legend(loc="lower left", fontsize=8)
         self.artists = [*self.parts, self.cloud, self.region, self.hole, self.miss, self.letter]
 
     def set(self, result):

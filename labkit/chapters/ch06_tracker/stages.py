@@ -636,7 +636,7 @@ def sweeps():
             "B": Handle((1700.0, -1500.0), step=50, bounds=reach, label="station B"),
             "P": Handle((300.0, 700.0), step=50, bounds=reach, label="diode"),
         },
-        controls={"jitter": Slider(1.0, 50.0, 20.0, step=1.0, label="error of a time (us)")},
+        controls={"jitter": Slider(1.0, 80.0, 40.0, step=1.0, label="error of a time (us)")},
         fail={"A": (-1900.0, -1500.0), "B": (-1500.0, -1300.0)},
         describe=_sweeps_sentence,
     )
