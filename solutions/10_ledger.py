@@ -180,7 +180,8 @@ for text in ("6", "9"):
 
 # %% totals tags=["nbval-ignore-output"]
 assert all(entry.status == entry.row.status for entry in found)
-Markdown(pages.totals_markdown([entry.row for entry in found]))
+rows = [entry.row for entry in found]
+Markdown(f"{pages.headline(rows)}\n\n{pages.totals_markdown(rows)}")
 
 # %% wrong-text [markdown]
 # ## What does not fit

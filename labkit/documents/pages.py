@@ -124,14 +124,24 @@ def _finding_html(finding):
 
 
 def totals_markdown(all_rows):
-    """Results and claims as a Markdown table, a line per document and one for all."""
-    lines = [f"| document | {' | '.join(STATUSES)} | all |", f"| --- |{' ---: |' * (len(STATUSES) + 1)}"]
+    """Results and claims as a Markdown table, a line per status and one for all."""
     by_document = counts(all_rows)
-    by_document["all four"] = {status: sum(c[status] for c in by_document.values()) for status in STATUSES}
-    for document, count in by_document.items():
-        cells = [*(count[status] for status in STATUSES), sum(count.values())]
-        lines.append(f"| {document} | {' | '.join(map(str, cells))} |")
+    columns = [*by_document.values(), {s: sum(c[s] for c in by_document.values()) for s in STATUSES}]
+    lines = [f"| results and claims | {' | '.join(DOCUMENTS)} | all four |", f"| --- |{' ---: |' * len(columns)}"]
+    for status in STATUSES:
+        lines.append(f"| {status} | {' | '.join(str(column[status]) for column in columns)} |")
+    lines.append(f"| all | {' | '.join(str(sum(column.values())) for column in columns)} |")
     return "\n".join(lines)
+
+
+def headline(all_rows):
+    """The totals in one sentence."""
+    found = {status: sum(count[status] for count in counts(all_rows).values()) for status in STATUSES}
+    agree, off = sum(found[s] for s in ("reproduced", "rounding", "cut off")), sum(found[s] for s in WRONG)
+    return (
+        f"{sum(found.values())} results and claims: {agree} come out from printed inputs, {off} do not, "
+        f"{found['consistent']} are possible, {found['not computable']} nobody can check."
+    )
 
 
 def with_totals(text, all_rows):
@@ -139,7 +149,7 @@ def with_totals(text, all_rows):
     if text.count(BEGIN) != 1 or text.count(END) != 1:
         raise ValueError(f"README.md must hold {BEGIN} and {END} once each, to say where the totals stand")
     head, rest = text.split(BEGIN)
-    return f"{head}{BEGIN}\n{totals_markdown(all_rows)}\n{END}{rest.split(END)[1]}"
+    return f"{head}{BEGIN}\n{headline(all_rows)}\n\n{totals_markdown(all_rows)}\n{END}{rest.split(END)[1]}"
 
 
 def main(readme=README):

@@ -1,5 +1,6 @@
 """The ledger's pages: built from rows and computations alone, and README says what they say."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -41,7 +42,8 @@ def test_totals_count_results_and_claims():
     counted = [row for row in rows if row.kind in ("result", "claim")]
     assert sum(sum(count.values()) for count in ledger.counts(rows).values()) == len(counted) < len(rows)
     last = pages.totals_markdown(rows).splitlines()[-1]
-    assert last.startswith("| all four |") and last.endswith(f"| {len(counted)} |")
+    assert last.startswith("| all |") and last.endswith(f"| {len(counted)} |")
+    assert sum(map(int, re.findall(r"\d+", pages.headline(rows))[1:])) == len(counted)
 
 
 def test_totals_need_their_marks():

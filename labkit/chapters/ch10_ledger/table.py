@@ -9,7 +9,7 @@ from ...documents.rounding import half_unit
 
 ALL = "all"
 SHOWN = 150  # rows that are drawn at once; the search narrows what is longer
-HEADER = ("document, place", "quantity", "printed", "computed", "unit", "status", "chapter")
+HEADER = {"status": "8.5em", "quantity": "auto", "printed": "7em", "computed": "7em"}  # column: its width
 LINK = "color: var(--jp-content-link-color, currentColor); cursor: pointer"
 SIGNS = {
     "reproduced": "✓",
@@ -46,39 +46,34 @@ def _haystack(entry):
 
 def table_html(entries):
     """The first rows as an HTML table, with a link to each row's chapter, and how many there are in all."""
-    head = "".join(f"<th>{title}</th>" for title in HEADER)
+    head = "".join(f'<th style="width: {width}; text-align: left">{title}</th>' for title, width in HEADER.items())
     body = "".join(_row_html(entry) for entry in entries[:SHOWN])
     count = f"{len(entries)} row{'' if len(entries) == 1 else 's'}"
     count += f", the first {SHOWN} of them shown" if len(entries) > SHOWN else ""
     if not entries:
         return '<p role="status">0 rows: no row of this document, status and kind holds all these words.</p>'
     return (
-        f'<p role="status">{count}</p><div style="max-height: 26em; overflow: auto">'
-        f'<table style="border-spacing: 0.8em 0.15em; line-height: 1.4">'
-        f'<thead><tr style="text-align: left">{head}</tr></thead>'
-        f"<tbody>{body}</tbody></table></div>"
+        f'<p role="status">{count}</p><div style="max-height: 32em; overflow: auto">'
+        f'<table style="table-layout: fixed; width: 100%; border-spacing: 0.4em 0.15em; line-height: 1.35">'
+        f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
     )
 
 
 def _row_html(entry):
+    """Two table rows: what is printed and computed, and beneath it, over the whole width, the argument."""
     row = entry.row
-    chapter = entry.notebook.removesuffix(".ipynb")
-    link = f'<a href="{entry.notebook}" target="_blank" style="{LINK}">{chapter[:2]}</a>'
-    cells = (
-        f"{row.document}, {row.place}",
-        row.quantity,
-        row.printed,
-        entry.value,
-        "" if row.unit == "1" else row.unit,
-    )
-    told = [html.escape(cell) for cell in cells]
-    told[1] += _argument_html(entry)
-    text = "".join(f'<td style="{WRAP if k != 4 else NOWRAP}">{cell}</td>' for k, cell in enumerate(told))
-    status = f'<td style="{NOWRAP}">{SIGNS[entry.status]} {entry.status}</td>'
-    return f'<tr style="vertical-align: top">{text}{status}<td>{link}</td></tr>'
+    unit = "" if row.unit in ("", "1") or entry.value == "-" else f" {row.unit}"
+    where = f'{html.escape(f"{row.document}, {row.place}")}, <a href="{entry.notebook}" target="_blank" style="{LINK}">'
+    where += f"chapter {int(entry.notebook[:2])}</a>"
+    what = f"{html.escape(row.quantity)}<br><small>{where}</small>"
+    status = f"{SIGNS[entry.status]} {entry.status}"
+    cells = (status, what, html.escape(row.printed), html.escape(entry.value + unit))
+    told = "".join(f'<td style="{WRAP}">{cell}</td>' for cell in cells)
+    why = f'<td colspan="{len(HEADER)}" style="{WRAP}">{_argument_html(entry)}</td>'
+    return f'<tr style="vertical-align: top">{told}</tr><tr>{why}</tr>'
 
 
-WRAP, NOWRAP = "overflow-wrap: anywhere; text-align: left", "white-space: nowrap; text-align: left"
+WRAP = "overflow-wrap: anywhere; text-align: left"
 
 
 def _argument_html(entry):
@@ -88,13 +83,13 @@ def _argument_html(entry):
     numbers += f", half a unit of the last digit {half:.1e}." if (half := half_unit(entry.row.printed)) else "."
     said = " ".join(part for part in (entry.proof, entry.row.note and f"({entry.row.note})", numbers) if part)
     code = f"<div>{html.escape(entry.place)}</div>{code_html(entry.code)}" if entry.code else ""
-    told = f'<div style="max-width: 34em">{html.escape(said)}</div>{code}'
+    told = f'<div style="max-width: 48em">{html.escape(said)}</div>{code}'
     return f'<details><summary style="{LINK}">why</summary>{told}</details>'
 
 
 def code_html(code):
     """Lines of code as HTML that scrolls instead of growing wider."""
-    style = "max-width: 34em; max-height: 16em; overflow: auto; margin: 0.3em 0; font-size: 0.9em"
+    style = "max-height: 16em; overflow: auto; margin: 0.3em 0; font-size: 0.9em"
     return f'<pre tabindex="0" style="{style}">{html.escape(code)}</pre>'
 
 
