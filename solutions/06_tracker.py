@@ -567,9 +567,17 @@ print("ignored poses:", np.flatnonzero(best.weights < 0.01))
 # ## In motion
 #
 # Section 3.2 moves the robot through the same points slowly, faster, fast, and finds
-# mean errors of ±15 mm and ±1° that hardly depend on speed. **A robot moves at 1.4 m/s
-# and the tracker lags 8 ms behind: how many mm is the position off?** Work it out, then
-# try speed, latency and nonsense. Which of the four summaries would you print?
+# mean errors of ±15 mm and ±1° that hardly depend on speed. In the fast motion the
+# tracker moves at up to 1.4 m/s and turns at up to 3.7 rad/s. **If it lags 8 ms behind,
+# by how many degrees is the rotation off, and by how many mm the position?** Work both
+# out, then try speed, latency and nonsense. Which of the four summaries would you print?
+
+# %% predict-turning
+guess = ...  # your code here
+### BEGIN SOLUTION
+guess = 1.7
+### END SOLUTION
+ex.predict("turning", guess)
 
 # %% predict-motion
 guess = ...  # your code here

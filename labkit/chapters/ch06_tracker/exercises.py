@@ -1280,6 +1280,14 @@ CHAPTER = Chapter(
             why="Good translations at a distance know the rotation better than the rotations do. Methods that solve the rotation first throw that away.",
         ),
         Prediction(
+            "turning",
+            question="The robot turns the tracker at 3.7 rad/s, and the tracker lags 8 ms behind. How large is the error of the rotation (deg)? The report's mean is 1.",
+            answer=1.696,
+            unit="deg",
+            within=0.05,
+            why="3.7 rad/s times 0.008 s = 0.0296 rad = 1.7 deg. A rotation lags like a position, by its own speed.",
+        ),
+        Prediction(
             "motion",
             question="A robot moves at 1.4 m/s and the tracker lags 8 ms behind. How large is the error of the position (mm)? The report found 15.",
             answer=11.2,
