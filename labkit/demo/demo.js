@@ -29,6 +29,8 @@ const KEYS = [
   ["Escape", "close what lies on top"],
   ["?", "these keys"],
 ];
+const SPACE = (globalThis[Symbol.for("labkit.space")] = { load: () => import("./space.js") }); // scenes in space: stage.js
+SPACE.load().then((module) => { SPACE.module = module; }, () => {});
 const $ = (selector) => document.querySelector(selector);
 
 /** What is shown, and what the keys do. */
@@ -161,7 +163,7 @@ class Wall {
     $("#ahead").replaceChildren(asking, place);
     this.fill(asking, card, null);
     let look = null;
-    const model = { get: (name) => ({ declaration })[name], on: () => {}, off: () => {}, send: (message) => { look ??= message.look; } };
+    const model = { get: () => ({ ...declaration, spaces: [] }), on: () => {}, off: () => {}, send: (message) => { look ??= message.look; } };
     stage.render({ model, el: place })();
     $("#ahead").replaceChildren();
     if (look) this.wire.ask({ ahead: key, look });
@@ -209,7 +211,7 @@ class Wall {
   fill(place, card, ballot) {
     const large = place.id === "cover";
     if (!large) {
-      place.hidden = Boolean(this.bare) || !card.stage;
+      place.hidden = Boolean(this.bare) || !card.stage || !(card.question || card.shows);
       place.classList.toggle("asked", card.votes);
     }
     place.querySelector(".question").textContent = card.question || card.shows;

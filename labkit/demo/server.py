@@ -254,7 +254,7 @@ class Application(tornado.web.Application):
                 (r"/code.svg", Code),
                 (r"/votes.csv", Table),
                 (r"/line", Line),
-                (r"/(stage\.(?:js|css))", Static, {"path": STAGE}),
+                (r"/(stage\.(?:js|css)|space\.js)", Static, {"path": STAGE}),
                 (r"/((?:demo|notes|common)\.(?:js|css))", Static, {"path": HERE}),
             ],
             default_handler_class=Nothing,

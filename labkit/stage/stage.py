@@ -137,7 +137,7 @@ class Stage:
         self._check_options(view)
         self._state = self._first_state(view)
         self.result, self.status, self.caption = None, "", ""
-        self._send, self._widget, self.at_rest = None, None, []
+        self._sends, self._widget, self.at_rest = [], None, []
         self._sent, self._shown, self._waiting, self._attached, self._epoch = 0, 0, False, False, 0
         self._because, self._said, self._tape = because, "", None
         self._cursor = ""
@@ -390,8 +390,12 @@ class Stage:
         }
 
     def connect(self, send):
-        """From now on pictures go to `send(message, buffers)`: a dict for JSON, and a list of bytes."""
-        self._send, self._attached = send, False
+        """From now on pictures go to `send(message, buffers)` as well: a dict for JSON, and a list of bytes."""
+        self._sends.append(send)
+
+    def _send(self, message, buffers):
+        for send in self._sends:
+            send(message, buffers)
 
     def forget_pixels(self):
         """Let go of the picture while no page shows it; a page that shows it again begins with a `look`."""
@@ -593,6 +597,12 @@ class Stage:
 
     def __repr__(self):
         return self._text
+
+    def show(self, where="cell"):
+        """Show it beneath the running cell, or ("window") on a page of its own, that of `python lab.py demo`."""
+        if where not in ("cell", "window"):
+            raise ValueError(f'a Stage is shown in the "cell" or in a "window", got {where!r}')
+        front.show(self) if where == "cell" else front.show_window(self)
 
     def _ipython_display_(self):
         front.show(self)

@@ -12,7 +12,7 @@ import tornado.httpclient
 import tornado.websocket
 
 from labkit.demo import room as rooms
-from labkit.demo import server
+from labkit.demo import server, window
 from labkit.demo.program import Asked, Card, Program
 from labkit.demo.show import Demo
 from labkit.stage import Handle, Slider, Stage
@@ -475,3 +475,32 @@ def test_the_code_of_a_vote_is_its_address():
     svg = room.code_svg().decode()
     assert svg.count("<path") == 2 and segno.make(room.address, error="m").mode == "byte"
     assert room.invitation() == {"address": f"192.0.2.17:8891/{room.code}", "joined": 0, "reachable": True}
+
+
+def test_a_stage_of_a_notebook_is_the_same_in_its_window(monkeypatch, capsys):
+    opened, heard = [], []
+    monkeypatch.setattr(window.webbrowser, "open", opened.append)
+    monkeypatch.delenv("JUPYTERHUB_USER", raising=False)
+    stage = good()
+    stage.connect(lambda message, buffers: heard.append(message))  # its cell in the notebook
+    stage.show("window")
+    address = capsys.readouterr().out.split()[-1]
+    assert opened == [address] and address.endswith("#window/good")
+    demo = window.WINDOWS.demo
+
+    async def work():
+        async with Window(demo) as page:
+            await page.open("window/good")
+            await page.ask("window/good", look=LOOK)
+            return await page.ask("window/good", step={"P": [40, 10]})
+
+    assert asyncio.run(asyncio.wait_for(work(), SECONDS))["caption"] == "at 6"
+    assert stage.state["P"][0] == 5 and heard[-1]["caption"] == "at 6"
+    other = good()
+    other.show("window")  # of the same name: it takes the place
+    assert window.WINDOWS.program.cards[-1].make() is other and len(window.WINDOWS.program.cards) == 1
+    with pytest.raises(ValueError, match="'cinema'"):
+        stage.show("cinema")
+    monkeypatch.setenv("JUPYTERHUB_USER", "someone")
+    with pytest.raises(ValueError, match="your own machine"):
+        stage.show("window")
