@@ -12,7 +12,7 @@ const KEPT_OUT = "No phone has joined yet. The network may keep devices apart (g
 const ALONE = "This machine is in no network that phones could share: they cannot reach it. Join one and start anew, or ask for hands.";
 const KEYS = [
   ["Page Down, Page Up", "next card, the one before; with Shift: next chapter, the one before"],
-  ["1 ... 9, 10", "card of this number in the chapter"],
+  ["1 ... 9, 10 ...", "card of this number in the chapter; two digits in a row"],
   ["Enter, A", "reveal: the figure, then the answer"],
   ["O", "overview of all cards"],
   ["Tab, arrow keys", "next handle or control; move it (with Shift: ten times as far)"],

@@ -93,8 +93,8 @@ async def run(program, options, counts):
             asyncio.get_running_loop().add_signal_handler(number, ended.set)
     await ended.wait()
     demo.close()
-    lost = [key for key, ballot in demo.session.votes.ballots.items() if ballot.rounds]
-    print(f"\nThe demo has ended{f'; the votes on {len(lost)} questions are gone with it' if lost else ''}.")
+    held = [key for key, ballot in demo.session.votes.ballots.items() if ballot.rounds]
+    print("\nThe demo has ended" + (f", and the votes on {', '.join(held)} with it." if held else "."))
 
 
 def _open_browser(address):
