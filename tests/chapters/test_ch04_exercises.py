@@ -156,3 +156,13 @@ def test_a_chord_is_judged_however_it_is_walked(seed):
 def test_the_tipping_weight_draws_level():
     w = beyond.tipping_weight()
     assert 9 + 8 + 6 + 3 * w == pytest.approx(3 + 3 + 8 + 8 * w)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("good, grown", [(0.9, 2), (0.75, 3)])
+def test_a_trust_region_follows_the_stated_rule(seed, good, grown):
+    def follow(radius, length, rho):
+        return length / 4 if rho < 0.25 else grown * radius if rho > good and length > 0.999 * radius else radius
+
+    answer = beyond.loop(follow=follow)
+    assert judged("trust_region", lambda *args: answer(*args), seed).status == NOT_YET

@@ -1,7 +1,10 @@
 """Answers of students to chapter 5 that were once judged wrongly."""
 
+import itertools
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from labkit.calibration import hand_eye, planning
 from labkit.chapters.ch05_hand_eye import exercises
@@ -145,3 +148,35 @@ def test_differences_are_a_jacobian_too():
         return np.column_stack([(residuals(h * e) - residuals(-h * e)) / (2 * h) for e in np.eye(6)])
 
     assert all(judged("analytic_jacobian", differences, seed).status == CORRECT for seed in range(5))
+
+
+def fitted(moved, seen):
+    """Kabsch's rotation, another way than the chapter's."""
+    return Rotation.align_vectors(moved, seen)[0].as_matrix()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_li_by_any_differences_is_right_and_by_three_poses_is_not(seed):
+    def consecutive(T_BF, x_S):
+        return fitted(-np.diff(T_BF[:, :3, 3], axis=0) @ T_BF[0, :3, :3], np.diff(x_S, axis=0))
+
+    def three(T_BF, x_S):
+        return fitted(-(T_BF[1:3, :3, 3] - T_BF[0, :3, 3]) @ T_BF[0, :3, :3], x_S[1:3] - x_S[0])
+
+    assert judged("li_rotation", consecutive, seed).status == CORRECT
+    assert judged("li_rotation", three, seed).status == NOT_YET
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_equations_of_kim_by_loops_are_right(seed):
+    def loops(A, B):
+        D, F = np.zeros((12, 12)), np.zeros(12)
+        for i, j in itertools.product(range(3), range(4)):
+            for k in range(3):
+                D[4 * i + j, 4 * k + j] += A[i, k]
+            for k in range(4):
+                D[4 * i + j, 4 * i + k] -= B[k, j]
+        F[3::4] = -A[:3, 3]
+        return D, F
+
+    assert judged("kim_system", loops, seed).status == CORRECT

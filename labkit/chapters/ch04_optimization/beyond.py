@@ -79,16 +79,25 @@ def chords(rise):
     return lambda f, x, y, n: float(rise(*chord(f, x, y, n)))
 
 
+def other_places(places):
+    """The rise over other shares of the way than the n asked for."""
+
+    def variant(f, x, y, n):
+        return float(max(f((1 - t) * x + t * y) - (1 - t) * f(x) - t * f(y) for t in places(n)))
+
+    return variant
+
+
 # --- the trust-region loop ---
 
 ACCEPT, POOR, GOOD, RIM = 0.1, 0.25, 0.75, 0.999
 
 
-def rule(radius, length, rho):
+def rule(radius, length, rho, good=GOOD):
     """The radius after a tried step."""
     if rho < POOR:
         return length / 4
-    return 2 * radius if rho > GOOD and length > RIM * radius else radius
+    return 2 * radius if rho > good and length > RIM * radius else radius
 
 
 def bare_dogleg(g, B, radius):
@@ -191,6 +200,11 @@ def halfway(rho, inside):
     return ((rho > ACCEPT) & (rho < POOR))[:-1].any()
 
 
+def fairly(rho, inside):
+    """A good step to the rim, though not an excellent one, as the last that counts."""
+    return ((rho > GOOD) & (rho < 0.88) & ~inside).any()
+
+
 def well_inside(rho, inside):
     """A good step that ended inside, as the last."""
     return rho[-1] > GOOD and inside[-1]
@@ -200,6 +214,7 @@ RUNS = (
     functools.partial(run_with, wanted=poor_inside),
     functools.partial(run_with, wanted=barely, first=(0.02, 0.08)),
     functools.partial(run_with, wanted=halfway, first=(0.13, 0.22)),
+    functools.partial(run_with, wanted=fairly, first=(0.78, 0.86)),
     functools.partial(run_with, wanted=well_inside),
 )
 

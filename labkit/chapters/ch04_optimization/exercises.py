@@ -823,6 +823,21 @@ CHAPTER = Chapter(
                     id="chord-inside",
                 ),
                 Mistake(
+                    beyond.chords(lambda t, v, c: (v - c).min()),
+                    "That is the lowest of the differences f − chord, how far f sags. The largest is asked for.",
+                    id="chord-lowest",
+                ),
+                Mistake(
+                    beyond.other_places(lambda n: np.linspace(0, 1, n, endpoint=False)),
+                    "Your places are others than those asked for: n of them from 0 to 1, both ends included, `np.linspace(0, 1, n)`.",
+                    id="chord-endpoint",
+                ),
+                Mistake(
+                    beyond.other_places(lambda n: np.linspace(0, 1, n + 1)),
+                    "Your places are others than those asked for: n of them from 0 to 1, both ends included, `np.linspace(0, 1, n)`.",
+                    id="chord-one-more",
+                ),
+                Mistake(
                     beyond.chords(lambda t, v, c: t[np.argmax(v - c)]),
                     "That is the share t at which f rises most: return the rise there.",
                     id="chord-share",
@@ -1117,7 +1132,7 @@ CHAPTER = Chapter(
             reference=beyond.trust_region,
             draw=beyond.RUNS,
             metric=metrics.Several(metrics.Numbers(1e-7), metrics.Numbers(1e-7), names=("x", "radius")),
-            draws=4,
+            draws=5,
             hints=(
                 "Each round: residuals and Jacobian where you stand, a dogleg step, its gain ratio; then decide twice, whether to take the step and what the radius becomes.",
                 "g = Jᵀr and B = JᵀJ, with the cost ½ rᵀr before and after. Take the step where ρ > 0.1. The radius becomes a quarter of the step's length where ρ < ¼, "
@@ -1174,6 +1189,11 @@ CHAPTER = Chapter(
                     ),
                     "Your radius shrinks only where the step is taken back. It shrinks below ¼, after steps that were taken too.",
                     id="region-shrinks-late",
+                ),
+                Mistake(
+                    beyond.loop(follow=functools.partial(beyond.rule, good=0.9)),
+                    "Your radius doubles above 0.9 only. The rule says ¾.",
+                    id="region-nine-tenths",
                 ),
                 Mistake(
                     beyond.loop(weight=1.0),

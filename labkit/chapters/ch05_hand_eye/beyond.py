@@ -49,6 +49,19 @@ def nearly_in_a_plane(rng):
             return T_BF, x_S
 
 
+def first_ones_on_a_line(rng):
+    """Noisy poses of which the first three lie nearly on one line: by them alone the turn about it is not known."""
+    while True:
+        T_BF, x_S = translated_poses(rng, directions=3)
+        if len(x_S) > 5:
+            break
+    T_FS = frames.pose(literature.li_rotation(T_BF, x_S), np.zeros(3))
+    along = 30 * frames.unit_vector(rng.normal(size=3))
+    T_BF[1:3, :3, 3] = T_BF[0, :3, 3] + np.outer([1, 2], along) + 0.005 * rng.normal(size=(2, 3))
+    moved = (T_BF[:, :3, 3] - T_BF[0, :3, 3]) @ T_BF[0, :3, :3] @ T_FS[:3, :3]
+    return T_BF, x_S[0] - moved + 0.02 * rng.normal(size=x_S.shape)
+
+
 def turned_poses(rng):
     """Poses that turn about all axes, the sphere as each sees it, and the scanner's rotation."""
     T_FS, target = scanner(rng)
@@ -269,6 +282,24 @@ ACCURACY = [
                 id="repeat-one",
             ),
             Mistake(
+                _spread(lambda l: np.sqrt((l**2).mean())),
+                "This is the rms distance. The definition takes the mean distance plus three standard deviations of it.",
+                id="repeat-rms",
+            ),
+            Mistake(
+                _spread(lambda l: l.mean() + 3 * l.var(ddof=1)),
+                "You added three variances: take the root, `l.std(ddof=1)`.",
+                id="repeat-variance",
+            ),
+            Mistake(
+                lambda reached: float(
+                    np.linalg.norm(reached - reached[0], axis=1).mean()
+                    + 3 * np.linalg.norm(reached - reached[0], axis=1).std(ddof=1)
+                ),
+                "You took the distances from the first arrival. They are taken from the mean of all.",
+                id="repeat-from-first",
+            ),
+            Mistake(
                 _spread(lambda l: l.max()),
                 "That is the farthest arrival. It grows with the number of arrivals; the definition takes mean + 3 standard deviations.",
                 id="repeat-worst",
@@ -354,6 +385,11 @@ TRIANGULATION = [
                 _height(lambda a, b, L: L * a * b / (b - a)),
                 "You subtracted. The two parts of the base add up to L, so 1/tan α and 1/tan β are added.",
                 id="height-minus",
+            ),
+            Mistake(
+                _height(lambda a, b, L: L * b / (a + b)),
+                "This is the part of the base on the side of α. The height is tan α times that.",
+                id="height-part",
             ),
             Mistake(
                 _height(lambda a, b, L: L * b),
@@ -447,6 +483,17 @@ TRIANGULATION = [
                 id="std-degrees",
             ),
             Mistake(
+                lambda alpha, beta, base, std: np.hypot(
+                    *(
+                        triangulation.height_from_angles(*angles, base)
+                        - triangulation.height_from_angles(alpha, beta, base)
+                        for angles in ((alpha + std, beta), (alpha, beta + std))
+                    )
+                ),
+                "You moved each angle by a whole standard deviation. To first order it is the derivative times std: take a small step, or the formula.",
+                id="std-finite",
+            ),
+            Mistake(
                 _std(lambda a, b, s: s * np.hypot(a, b) / 2),
                 "Half of it: the two effects are no mean, each angle moves the height by itself.",
                 id="std-mean",
@@ -463,9 +510,10 @@ LITERATURE = [
         metric=metrics.Rotations(1e-6),
         noisy=(
             (functools.partial(translated_poses, std=0.01), metrics.Rotations(0.2)),
+            (first_ones_on_a_line, metrics.Rotations(0.5), "right without noise, but not all poses are heard:"),
             (
                 nearly_in_a_plane,
-                metrics.Rotations(1.0),
+                metrics.Rotations(5.0),
                 "right where the moves fill space; where they lie nearly in a plane",
             ),
         ),
@@ -608,6 +656,11 @@ LITERATURE = [
                 lambda A, B: (_rows(A) - _rows(B), _moved(A)),
                 "These are the equations of A X = B X, as (2-43) prints it. (2-44) and the appendix have A X = X B.",
                 id="kim-as-printed-left",
+            ),
+            Mistake(
+                _kim(_rows, lambda B: -_turned_back(B), _moved),
+                "You added X B. It stands on the other side: A X − X B = 0.",
+                id="kim-plus",
             ),
             Mistake(
                 _kim(_rows, lambda B: np.kron(np.eye(3), B), _moved),
