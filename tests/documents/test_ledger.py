@@ -9,6 +9,8 @@ import pytest
 
 from labkit.documents import circular, ledger, rounding, strict
 from labkit.documents.ledger import Computed, Row
+from labkit.verbs import ledger as verb
+from labkit.verbs.arguments import Refusal
 
 ROWS = ledger.rows()
 CLAIMS = sorted((Path(ledger.__file__).parent).glob("*/claims_*.py"))
@@ -111,3 +113,20 @@ def test_strict_text_counts_results_and_claims():
 def test_each_row_shows_its_lines():
     place, code = ledger.code_of(next(row for row in ROWS if row.id == "chaining.product[0,3]"))
     assert place.startswith("labkit/documents/lab_sheet/claims_chaining.py, line") and "def product" in code
+
+
+def test_strict_refuses_what_a_reader_would_strike(monkeypatch, capsys):
+    row = a_row("1.25")
+    told = [(row, Computed(1.243), "contradiction"), (row, Computed(1.25), "reproduced")]
+    monkeypatch.setattr(strict, "table", lambda: told)
+    monkeypatch.setattr(strict, "followers", lambda rows: [row])
+    wrong, unproved, circular_row = strict.faults([row])
+    assert "says reproduced, the computation contradiction" in wrong and "without a proof" in unproved
+    assert "follows the printed one" in circular_row
+    with pytest.raises(Refusal, match="follows the printed one"):
+        verb.main(["--strict"])
+    assert "Results and claims" in capsys.readouterr().out
+    monkeypatch.setattr(strict, "table", lambda: told[1:])
+    monkeypatch.setattr(strict, "followers", lambda rows: [])
+    verb.main(["--strict"])
+    assert "No row reads its own printed answer" in capsys.readouterr().out
