@@ -1,5 +1,6 @@
 """One file in, one JSON out; and many of them at once, each in a process of its own, kept for the next time."""
 
+import contextlib
 import functools
 import hashlib
 import json
@@ -7,7 +8,9 @@ import multiprocessing.connection
 import os
 import re
 import secrets
+import signal
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -132,27 +135,43 @@ def judge_all(files, seed, folder, jobs, say):
     running, failed, done, begun = {}, {}, 0, time.monotonic()
     total = len(waiting)
     sandbox.bubblewrap(), edition()
-    try:
-        while waiting or running:
-            while waiting and len(running) < jobs:
-                digest, read = waiting.pop(0)
-                process = context.Process(target=_work, args=(read(), seed, str(folder)), daemon=False)
-                process.start()
-                running[process] = digest, time.monotonic()
-            multiprocessing.connection.wait([process.sentinel for process in running], timeout=1.0)
-            for process in [p for p, (_, start) in running.items() if not p.is_alive() or _is_late(start)]:
-                digest, start = running.pop(process)
+    with _interrupt_noted() as interrupted:
+        try:
+            while waiting or running:
+                while waiting and len(running) < jobs and not interrupted:
+                    digest, read = waiting.pop(0)
+                    process = context.Process(target=_work, args=(read(), seed, str(folder)), daemon=False)
+                    process.start()
+                    running[process] = digest, time.monotonic()
+                multiprocessing.connection.wait([process.sentinel for process in running], timeout=1.0)
+                if interrupted:
+                    raise KeyboardInterrupt
+                for process in [p for p, (_, start) in running.items() if not p.is_alive() or _is_late(start)]:
+                    digest, start = running.pop(process)
+                    _end(process)
+                    done += 1
+                    if known(folder, digest, seed) is None:
+                        failed[digest] = (
+                            "took too long" if _is_late(start) else f"ended its judge (exit code {process.exitcode})"
+                        )
+                    say(done, total, (time.monotonic() - begun) / done * (total - done))
+        finally:
+            for process in running:
                 _end(process)
-                done += 1
-                if known(folder, digest, seed) is None:
-                    failed[digest] = (
-                        "took too long" if _is_late(start) else f"ended its judge (exit code {process.exitcode})"
-                    )
-                say(done, total, (time.monotonic() - begun) / done * (total - done))
-    finally:
-        for process in running:
-            _end(process)
     return failed
+
+
+@contextlib.contextmanager
+def _interrupt_noted():
+    """A list that Ctrl-C makes true; raised in the moment in which a process is forked, the interrupt would be lost."""
+    noted, before = [], None
+    if threading.current_thread() is threading.main_thread():
+        before = signal.signal(signal.SIGINT, lambda *_: noted.append(True))
+    try:
+        yield noted
+    finally:
+        if before is not None:
+            signal.signal(signal.SIGINT, before)
 
 
 def _is_late(start):
@@ -166,7 +185,11 @@ def _end(process):
 
 
 def _work(data, seed, folder):
-    """A judge's process: limits its own memory, for it computes with what a submission asks for."""
+    """A judge's process: limits its own memory, for it computes with what a submission asks for.
+
+    A terminal sends Ctrl-C to all processes; the first one ends the others.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         import resource
 
