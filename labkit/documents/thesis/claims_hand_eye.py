@@ -740,7 +740,7 @@ def end_pose():
 def end_iterations():
     """The start lies on the pole B = -90 deg: the last bit of the first step decides how long the listing takes."""
     counts, measured = [], data(2)
-    for nudge in np.random.default_rng(0).uniform(-0.1, 0.1, 24):
+    for nudge in np.random.default_rng(0).uniform(-0.1, 0.1, 12):
         start = thesis.kuka_pose_deg("scanner_start") + [0, 0, 0, 0, nudge, 0]
         runs, ended = listings.listing_gauss_newton(
             start, measured.T_BF, measured.x_S, thesis.printed_target(), 1e-5, 1e-5
