@@ -78,10 +78,11 @@ def raise_open_files():
 async def run(program, options, counts):
     """Show a program until Ctrl-C; `options` are those of the verb."""
     demo = Demo(program, options.ip, options.port, counts)
+    room = demo.let_vote(options.vote_ip) if options.vote else None
     stages = sum(bool(card.make) for card in program.cards)
     print(f"{stages} Stages at {demo.address}\nStop with Ctrl-C in this window.", flush=True)
-    if options.vote:
-        _tell_of(demo.let_vote(options.vote_ip))
+    if room:
+        _tell_of(room)
     start = demo.session.house.get(program.cards[0].stage) if program.cards[0].stage else None
     if not options.no_browser:
         await asyncio.to_thread(_open_browser, demo.address)

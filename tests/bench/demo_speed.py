@@ -223,12 +223,12 @@ def voting(options):
             demo("05", "--vote", "--vote-ip", "127.0.0.1") as (_, address, joined, _),
             driver.page_of(driver.find_browser(), width=width, height=height) as page,
         ):
-            page.goto(address + "#05/scan-line")
+            page.goto(address)
             page.wait_for_function("() => window.wall?.now")
-            next(figures(page))
+            key = next(figures(page))
             page.keyboard.press("v")
             page.wait_for_function("() => wall.now.ballot?.open")
-            words = [sys.executable, __file__, "--phones", joined, "05/scan-line"]
+            words = [sys.executable, __file__, "--phones", joined, key]
             with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
                 moved = []
                 while process.poll() is None:
