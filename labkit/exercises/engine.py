@@ -39,6 +39,9 @@ class Outcome:
     mistake: int | None = None
     printed: str = ""
 
+    def __post_init__(self):
+        object.__setattr__(self, "text", guard.printable(self.text))
+
 
 @dataclass(frozen=True)
 class Mistake:
@@ -352,16 +355,16 @@ class _Trial:
             )
         if isinstance(error, SystemExit):
             return self.outcome(NOT_YET, "your code calls exit(): a function ends with `return`.")
-        if isinstance(error, TypeError) and not run.line and "argument" in str(error):
+        if isinstance(error, TypeError) and not run.line and "argument" in run.said:
             wanted = ", ".join(self._names(args) if args else self.exercise.arguments)
-            return self.outcome(NOT_YET, f"your function cannot be called with ({wanted}): {error}.")
+            return self.outcome(NOT_YET, f"your function cannot be called with ({wanted}): {run.said}.")
         if isinstance(error, NameError) and error.name:
             where = f"\nin {run.line}" if run.line else ""
             hint = f"`{error.name}` is not known: has the cell that defines it been run since the kernel started?"
             return self.outcome(RAISED, f"NameError: {hint}{where}")
         if isinstance(error, RecursionError):
             return self.outcome(RAISED, "RecursionError: your function calls itself without an end.")
-        said = _message(error)
+        said = run.said or WORDLESS.get(type(error), "" if isinstance(error, AssertionError) else "it says no more")
         if isinstance(error, AssertionError) and not said:
             said = "`assert` raises; an answer is handed over with `return`"
         advice = next((f". {told}" for words, told in ADVICE.items() if words in said), "")
@@ -405,9 +408,14 @@ def _equal_arrays(a, b):
         return isinstance(a, tuple | list) and len(a) == len(b) and all(map(_equal_arrays, a, b))
     a, b = np.asarray(a), np.asarray(b)
     rtol = metrics.FLOAT32_TOLERANCE if metrics._is_single(a) or metrics._is_single(b) else 1e-9
-    return a.shape == b.shape and np.allclose(a.astype(float), b.astype(float), rtol=rtol, atol=1e-12, equal_nan=True)
+    kind = complex if "c" in (a.dtype.kind, b.dtype.kind) else float
+    return a.shape == b.shape and np.allclose(a.astype(kind), b.astype(kind), rtol=rtol, atol=1e-12, equal_nan=True)
 
 
+WORDLESS = {  # what is raised without a word
+    MemoryError: "your code asks for more memory than there is",
+    KeyboardInterrupt: "the check was interrupted",
+}
 ADVICE = {  # what NumPy means
     "must be square": "`solve` and `inv` need as many equations as unknowns; `lstsq` takes more.",
     "Singular matrix": "The equations do not fix all unknowns: is one missing, or there twice? Has a loop run off?",
@@ -423,13 +431,6 @@ ADVICE = {  # what NumPy means
     "math domain error": "A root of a negative number, or an arccosine beyond 1, perhaps by rounding: see `np.clip`.",
     "could not be broadcast": "Entry by entry these shapes do not fit: is `@` meant, is a sum over an axis missing?",
 }
-
-
-def _message(error):
-    try:
-        return " ".join(str(error).split())[:300]
-    except Exception:  # a student's exception class may fail to print itself
-        return "(its message cannot be shown)"
 
 
 def _short(value):
@@ -518,6 +519,8 @@ class Value(Item):
         return None
 
     def _converted(self, answer, unit, expected):
+        if isinstance(unit, int | float):
+            raise ValueError(f"a decimal number is written with a point, {answer}.{unit}, and not {answer},{unit}")
         if unit == self.unit:
             return metrics.Numbers().admit(answer, expected)
         here, there = UNITS.get(self.unit), UNITS.get(unit)
@@ -531,7 +534,7 @@ class Value(Item):
             text = (
                 _for_value(run.error)
                 if isinstance(run.error, metrics.Refused)
-                else f"{type(run.error).__name__}: {_message(run.error)}"
+                else f"{type(run.error).__name__}: {run.said}"
             )
             return Outcome(NOT_YET, _closed(text))
         return self._compare(metric, run.result, expected)

@@ -9,14 +9,17 @@ import contextlib
 import copy
 import ctypes
 import functools
+import gc
 import io
+import linecache
+import locale
 import os
 import random
 import signal
 import sys
 import threading
 import time
-import traceback
+import types
 import warnings
 from dataclasses import dataclass, field
 
@@ -28,11 +31,24 @@ WAITING = 0.02  # share of its time that code computes which only waits, in a sl
 PERIOD = 0.05  # seconds between two rings of the clock
 SWALLOWED = 10  # rings that code may swallow before every line of it raises
 OUTPUT_LIMIT = 2000  # characters of printed text that are kept
-PROTECTED = ("numpy", "numpy.linalg", "math")
+PROTECTED = ("numpy", "numpy.linalg", "numpy.random", "math", "random", "builtins", "os", "time", "signal", "inspect")
+PROTECTED += ("copy", "json", "html", "itertools", "functools", "types", "contextlib", "traceback")
+CHANGING = {"builtins": {"_", "input", "breakpoint"}}  # what IPython itself sets anew from cell to cell
+DEPTH = 10_000  # calls within calls, at most: what student code may raise the limit to
 
 
 class TimeLimit(BaseException):
-    """Raised inside student code that runs too long; no Exception, so that `except Exception` does not swallow it."""
+    """Raised inside student code that runs too long; no Exception, so that `except Exception` does not swallow it.
+
+    One that was swallowed all the same dies in the code that did it. While `relentless`, the next line there then
+    raises another: also the one after an `except`, where no `try` catches it.
+    """
+
+    relentless = False
+
+    def __del__(self):
+        if TimeLimit.relentless:
+            _raise_at_every_line(sys._getframe(1))
 
 
 class Forbidden(BaseException):
@@ -45,9 +61,15 @@ class Run:
 
     result: object = None
     error: BaseException | None = None
+    said: str = ""
     line: str = ""
     printed: str = ""
     changed: list = field(default_factory=list)
+
+
+def printable(text):
+    """Text that every file and page takes: a lone surrogate, half of a letter, is written out."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 class _Capture(io.TextIOBase):
@@ -64,7 +86,7 @@ class _Capture(io.TextIOBase):
 
     def value(self):
         more = f"\n... and {self.lost} more characters" if self.lost else ""
-        return self.text + more
+        return printable(self.text) + more
 
 
 class Pristine:
@@ -79,15 +101,33 @@ class Pristine:
         for name, module in list(sys.modules.items()):
             ours = name == "labkit" or name.startswith("labkit.") or name in PROTECTED
             if ours and name not in self.saved and module is not None:
-                self.saved[name] = (vars(module), dict(vars(module)))
+                kept = CHANGING.get(name, ())
+                self.saved[name] = (module, {key: v for key, v in vars(module).items() if key not in kept})
+                if name.startswith("labkit."):
+                    self._look_into(module)
+
+    def _look_into(self, module):
+        """Remember the methods of a module's own classes."""
+        for value in list(vars(module).values()):
+            if isinstance(value, type) and value.__module__ == module.__name__:
+                methods = {k: v for k, v in vars(value).items() if isinstance(v, types.FunctionType | property)}
+                self.saved[f"{module.__name__}.{value.__qualname__}"] = (value, methods)
 
     def restore(self):
         """Put back what was replaced, and note the names, e.g. "labkit.geometry.frames.invert", in `replaced`."""
-        for name, (now, then) in self.saved.items():
+        for name, (owner, then) in self.saved.items():
+            if isinstance(owner, types.ModuleType) and sys.modules.get(name) is not owner:
+                sys.modules[name] = owner
+                self.replaced.append(name)
+            now = vars(owner)
             for key, value in then.items():
                 found = now.get(key, self)
                 if getattr(found, "_stands_for", found) is not value and key != "__warningregistry__":
-                    now[key] = value
+                    setattr(owner, key, value)
+                    self.replaced.append(f"{name}.{key}")
+            if isinstance(owner, type):
+                for key in [k for k, v in now.items() if k not in then and isinstance(v, types.FunctionType)]:
+                    delattr(owner, key)  # it stood before what is inherited
                     self.replaced.append(f"{name}.{key}")
 
     def drain(self):
@@ -137,9 +177,10 @@ class _Clock:
         """Afterwards nothing rings any more; a ring on the way out is taken back."""
         while self.ticking:
             with contextlib.suppress(TimeLimit):
+                TimeLimit.relentless = False
+                if self.rung > SWALLOWED:
+                    sys.settrace(None)
                 self._disarm()
-        if self.rung > SWALLOWED:
-            sys.settrace(None)
 
     ticking = sent = False
 
@@ -186,17 +227,25 @@ class _Clock:
 
 
 def _raise_at_every_line(frame):
-    """Code that swallows one `TimeLimit` after the other gets one at each line, up to the frame that runs it."""
+    """Code that swallows one `TimeLimit` after the other gets one at its next line, up to the frame that runs it.
+
+    Python stops tracing when a trace function raises: what is swallowed again is followed by `TimeLimit.__del__`.
+    """
 
     def tell(frame, event, value):
-        if event == "line":
+        if event == "line" and TimeLimit.relentless:
             raise TimeLimit
         return tell
 
+    beneath = []
     while frame is not None and frame.f_code is not _call.__code__:
-        frame.f_trace = tell
+        beneath.append(frame)
         frame = frame.f_back
-    sys.settrace(lambda *_: None)
+    if frame is not None:
+        TimeLimit.relentless = True
+        for frame in beneath:
+            frame.f_trace = tell
+        sys.settrace(lambda *_: None)
 
 
 def _call(function, args, finish):
@@ -241,17 +290,60 @@ def _replaced(owner, name, value):
         setattr(owner, name, before)
 
 
+def _set_environment(values):
+    if dict(os.environ) != values:
+        os.environ.clear()
+        os.environ.update(values)
+
+
+def _set_folder(folder):
+    if folder is not None and _working_folder() != folder:
+        os.chdir(folder)
+
+
+def _umask():
+    mask = os.umask(0o077)
+    os.umask(mask)
+    return mask
+
+
+def _set_path(entries):
+    sys.path[:] = entries
+
+
+STATE = [  # (how to read it, how to put it back) of what a process has once
+    (np.random.get_state, np.random.set_state),
+    (random.getstate, random.setstate),
+    (np.geterr, lambda values: np.seterr(**values)),
+    (np.geterrcall, np.seterrcall),
+    (np.get_printoptions, lambda values: np.set_printoptions(**values)),
+    (sys.getrecursionlimit, sys.setrecursionlimit),
+    (sys.gettrace, sys.settrace),
+    (sys.getprofile, sys.setprofile),
+    (lambda: list(sys.path), _set_path),
+    (lambda: dict(os.environ), _set_environment),
+    (lambda: locale.setlocale(locale.LC_ALL), lambda name: locale.setlocale(locale.LC_ALL, name)),
+    (gc.isenabled, lambda on: gc.enable() if on else gc.disable()),
+    (_umask, os.umask),
+    (lambda: _working_folder(), _set_folder),
+]
+if hasattr(signal, "pthread_sigmask"):
+    STATE.append(
+        (lambda: signal.pthread_sigmask(signal.SIG_BLOCK, ()), lambda m: signal.pthread_sigmask(signal.SIG_SETMASK, m))
+    )
+
+
 @contextlib.contextmanager
 def sandbox(capture):
     """Everything student code may touch, put back afterwards."""
-    state, python_state = np.random.get_state(), random.getstate()  # noqa: NPY002 (what students may seed)
-    err = np.geterr()
-    options, depth, folder = np.get_printoptions(), sys.getrecursionlimit(), _working_folder()
+    state = [(put, read()) for read, put in STATE]
+    limit = sys.setrecursionlimit
     with contextlib.ExitStack() as stack:
         stack.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore")
         stack.enter_context(contextlib.redirect_stdout(capture))
         stack.enter_context(contextlib.redirect_stderr(capture))
+        stack.enter_context(_replaced(sys, "setrecursionlimit", lambda depth: limit(min(depth, DEPTH))))
         stack.enter_context(_replaced(builtins, "input", _forbid("input()")))
         stack.enter_context(_replaced(builtins, "breakpoint", _forbid("breakpoint()")))
         for name in ("_exit", "abort", "kill", "fork", "execv"):
@@ -260,14 +352,9 @@ def sandbox(capture):
         try:
             yield
         finally:
-            np.random.set_state(state)  # noqa: NPY002
-            random.setstate(python_state)
-            np.seterr(**err)
-            np.set_printoptions(**options)
-            sys.setrecursionlimit(depth)
-            if folder is not None and _working_folder() != folder:
-                with contextlib.suppress(OSError):
-                    os.chdir(folder)
+            for put, value in state:
+                with contextlib.suppress(Exception):  # such as a folder that is gone
+                    put(value)
 
 
 def _working_folder():
@@ -315,11 +402,28 @@ def _run_once(function, args, finish, limit, author):
     except BaseException as error:  # SystemExit and KeyboardInterrupt of student code stay here as well
         outcome.error = error
         outcome.line = _student_line(error, author)
-    PRISTINE.restore()
+    outcome.said = message_of(outcome.error)
     outcome.printed = capture.value()
+    PRISTINE.restore()
     if outcome.error is None:
         outcome.changed = [k for k, (a, b) in enumerate(zip(args, given)) if not _same(a, b)]
     return outcome
+
+
+def message_of(error, limit=0.5):
+    """What an error says, in one line; a student's exception class may fail to print itself, or never end."""
+    if error is None:
+        return ""
+    clock = _Clock(limit)
+    try:
+        try:
+            with sandbox(_Capture()):
+                clock.start()
+                return _call(str, (error,), lambda said: printable(" ".join(said.split())[:300]))
+        finally:
+            clock.stop()
+    except BaseException:  # also TimeLimit, and SystemExit of student code
+        return "(its message cannot be shown)"
 
 
 def _same(before, after):
@@ -343,5 +447,11 @@ def _student_line(error, function):
     code = getattr(function, "__code__", None)
     if code is None:
         return ""
-    inside = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == code.co_filename]
-    return f"line {inside[-1].lineno}: {inside[-1].line}".rstrip(": ") if inside else ""
+    inside, trace = None, error.__traceback__
+    while trace is not None:
+        inside = trace if trace.tb_frame.f_code.co_filename == code.co_filename else inside
+        trace = trace.tb_next
+    if inside is None:
+        return ""
+    line = linecache.getline(code.co_filename, inside.tb_lineno, inside.tb_frame.f_globals).strip()
+    return f"line {inside.tb_lineno}: {line}".rstrip(": ")

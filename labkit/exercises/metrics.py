@@ -95,8 +95,11 @@ def _value(result):
         raise Refused("it returned None: is a `return` missing?")
     if result is ...:
         raise Refused("it returned `...`: the placeholder is still there")
-    if inspect.isgenerator(result) or inspect.iscoroutine(result):
-        raise Refused(f"it returned a {type(result).__name__}: use `return`, not `yield`")
+    if inspect.iscoroutine(result):
+        result.close()  # nobody waits for it
+        raise Refused("it returned a coroutine: leave out `async` before `def`")
+    if inspect.isgenerator(result):
+        raise Refused("it returned a generator: use `return`, not `yield`")
     if type(result) is tuple and len(result) == 4 and np.ndim(result[0]) and isinstance(result[2], INTEGERS):
         raise Refused(
             "`lstsq` returns four things in a tuple: x, sum of squares, rank, singular values. Take the first, [0]"

@@ -1,0 +1,224 @@
+# ruff: noqa: NPY002, SIM105, B012 (hostile student code, on purpose)
+"""What student code may do to a process: it gets one sentence, and the process is what it was."""
+
+import builtins
+import gc
+import json
+import locale
+import os
+import signal
+import sys
+import threading
+import time
+import warnings
+
+import numpy as np
+import pytest
+
+from labkit.exercises import engine, guard, metrics, session
+from labkit.exercises.engine import CORRECT, NOT_YET, RAISED, Exercise
+from labkit.exercises.feedback import Panel
+
+DOUBLE = Exercise(
+    "double",
+    reference=lambda v: 2 * v,
+    draw=lambda rng: (rng.normal(size=3),),
+    metric=metrics.Numbers(1e-9),
+    hints=("a", "b", "c"),
+    limit=0.5,
+)
+ANGLE = engine.Value("angle_deg", reference=lambda: 12.5, unit="deg", hints=("a", "b", "c"))
+
+
+class Evil(Exception):
+    def __str__(self):
+        raise ValueError("no message")
+
+
+class Endless(Exception):
+    def __str__(self):
+        while True:
+            pass
+
+
+class Leaving(Exception):
+    def __str__(self):
+        print("said from __str__")
+        sys.exit()
+
+
+def raising(error):
+    def double(v):
+        raise error
+
+    return double
+
+
+def deep(v):
+    sys.setrecursionlimit(10**9)
+
+    def down():
+        return down()
+
+    return down()
+
+
+async def waiting(v):
+    return 2 * v
+
+
+def swallowing_in_a_loop_of_numpy(v):
+    while True:
+        try:
+            np.linalg.norm(v)
+        except BaseException:
+            continue
+
+
+def swallowing_twice(v):
+    while True:
+        try:
+            try:
+                time.sleep(0.2)
+            except BaseException:
+                pass
+        except BaseException:
+            pass
+
+
+@pytest.mark.parametrize(
+    ("function", "status", "words"),
+    [
+        (raising(Evil()), RAISED, "Evil: (its message cannot be shown)"),
+        (raising(Endless()), RAISED, "Endless: (its message cannot be shown)"),
+        (raising(Leaving()), RAISED, "Leaving: (its message cannot be shown)"),
+        (raising(ValueError("half a letter \ud800")), RAISED, "half a letter \\ud800"),
+        (raising(MemoryError()), RAISED, "more memory than there is"),
+        (raising(KeyboardInterrupt()), RAISED, "the check was interrupted"),
+        (raising(ValueError()), RAISED, "ValueError: it says no more"),
+        (deep, RAISED, "calls itself without an end"),
+        (waiting, NOT_YET, "leave out `async`"),
+        (lambda v: 2j * v, NOT_YET, "complex"),
+        (swallowing_in_a_loop_of_numpy, NOT_YET, "did not finish within 0.5 s"),
+        (swallowing_twice, NOT_YET, "did not finish within 0.5 s"),
+    ],
+)
+def test_one_sentence_within_three_seconds(function, status, words, capsys):
+    begun = time.monotonic()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        outcome = DOUBLE.judge(function)
+    assert (outcome.status, words in outcome.text) == (status, True), outcome
+    json.dumps(outcome.text, ensure_ascii=False).encode()
+    assert time.monotonic() - begun < 3 * guard.PATIENCE and capsys.readouterr().out == ""
+
+
+def test_half_letters_that_are_printed_reach_no_page():
+    def double(v):
+        print("\udfff")
+        return v
+
+    outcome = DOUBLE.judge(double)
+    assert outcome.printed == "\\udfff\n"
+    Panel("double", [outcome.printed]).html().encode()
+
+
+def test_what_a_check_touches_is_put_back():
+    def read():
+        state = [get() for get, _ in guard.STATE]
+        return [s[1].tolist() if isinstance(s, tuple) and len(s) == 5 else s for s in state]
+
+    def careless(v):
+        np.random.seed(0)
+        np.seterr(all="raise")
+        np.seterrcall(print)
+        sys.setrecursionlimit(5000)
+        sys.path.append("nowhere")
+        os.environ["PATH"] = "nowhere"
+        os.environ["NEW"] = "1"
+        os.umask(0o777)
+        os.chdir("/")
+        gc.disable()
+        locale.setlocale(locale.LC_ALL, "C")
+        if hasattr(signal, "pthread_sigmask"):
+            signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGUSR1])
+        warnings.simplefilter("error")
+        return 2 * v
+
+    before, filters = read(), list(warnings.filters)
+    assert DOUBLE.judge(careless).status == CORRECT
+    assert read() == before and "NEW" not in os.environ and warnings.filters == filters
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "shown"),
+    [
+        (np.random, "default_rng", "numpy.random.default_rng"),
+        (builtins, "print", "builtins.print"),
+        (builtins, "len", "builtins.len"),
+        (json, "dumps", "json.dumps"),
+        (time, "sleep", "time.sleep"),
+        (metrics.Poses, "equal", "labkit.exercises.metrics.Poses.equal"),
+        (Exercise, "judge", "labkit.exercises.engine.Exercise.judge"),
+    ],
+)
+def test_what_is_replaced_is_put_back_and_named(owner, name, shown, capsys):
+    ex, original = session.course("01-frames"), getattr(owner, name)
+
+    def invert(T):
+        setattr(owner, name, lambda *_, **__: None)
+        return T
+
+    ex.invert(invert)
+    assert getattr(owner, name) is original
+    said = capsys.readouterr().out
+    assert f"Replaced in the library, and put back: {shown}" in said
+
+
+def test_a_module_thrown_out_comes_back(capsys):
+    ex = session.course("01-frames")
+
+    def invert(T):
+        del sys.modules["numpy"]
+        return T
+
+    ex.invert(invert)
+    assert sys.modules["numpy"] is np and "put back: numpy" in capsys.readouterr().out
+
+
+def test_a_folder_that_is_gone_changes_no_verdict(tmp_path, monkeypatch):
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    folder.rmdir()
+    assert DOUBLE.judge(lambda v: 2 * v).status == CORRECT
+
+
+def test_a_kernel_may_end_with_its_parent_while_a_check_runs(monkeypatch):
+    """ipykernel watches its parent in a thread of its own and leaves by os._exit: that must get through."""
+    left = []
+    monkeypatch.setattr(os, "_exit", left.append)
+
+    def double(v):
+        thread = threading.Thread(target=lambda: os._exit(1))
+        thread.start()
+        thread.join()
+        os._exit(0)
+
+    assert "os._exit()" in DOUBLE.judge(double).text and left == [1]
+
+
+def test_a_decimal_comma_is_named():
+    assert "written with a point, 12.5, and not 12,5" in ANGLE.judge(12, 5).text
+
+
+def test_without_interval_timers_no_limit_leaks_into_what_follows(monkeypatch):
+    """Windows, emulated: a second thread raises the limit, and never again once the check is over."""
+    monkeypatch.delattr(guard.signal, "setitimer", raising=False)
+    for _ in range(3):
+        outcome = guard.run(lambda: [i for i in iter(int, 1)], (), limit=0.2)
+        assert isinstance(outcome.error, guard.TimeLimit)
+        until = time.monotonic() + 5 * guard.PERIOD
+        while time.monotonic() < until:
+            pass
+    assert threading.active_count() < 20
