@@ -21,7 +21,9 @@ from .packet import PACKET, TIME, check_packet
 HOST = "127.0.0.1"
 BUFFER = 1 << 20  # bytes the system may hold back for us: 20 s of the stream
 MEMORY = 2048  # timestamps remembered to tell duplicates: 8 s at 250 Hz
-RESTART = 50  # readings in a row from before the memory: this many mean that the sender has started over
+RESTART = 50  # readings in a row from before the memory, or far off: this many mean that the sender has started over
+LEAP, LEAP_READINGS = 60.0, 100  # s, and readings: a stamp farther than both from the newest one is no lost packet
+IMPLAUSIBLE = "the time stamp is implausible"
 
 
 @dataclass
@@ -153,6 +155,7 @@ class Sender(_Endpoint):
     """
 
     def __init__(self, stream, port, speed=1.0):
+        port, speed = as_count(port, "port"), as_positive_number(speed, "speed")
         self.sent, self.finished = Counter(), threading.Event()
         self._stop = threading.Event()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -170,7 +173,7 @@ class Sender(_Endpoint):
             if kind != "lost":
                 try:
                     self._socket.sendto(datagram, address)
-                except OSError:
+                except (OSError, OverflowError):  # also a port beyond the last one
                     kind = "refused"
             self.sent[kind] += 1
         self.finished.set()
@@ -232,8 +235,10 @@ class Listener(_Endpoint):
     """
 
     def __init__(self, port=0, device=1.0, rate=250.0, keep=20000):
-        self.device, self.rate = device, rate
-        self._readings = deque(maxlen=keep)
+        self.device, self.rate = device, as_positive_number(rate, "rate")
+        port = as_count(port, "port", at_least=0)
+        self._leap = max(LEAP, LEAP_READINGS / self.rate)
+        self._readings = deque(maxlen=as_count(keep, "keep"))
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._clear()
@@ -255,7 +260,7 @@ class Listener(_Endpoint):
     def _clear(self):
         self._seen, self._order = set(), deque()
         self._first = self._newest = None
-        self._since, self._old = 0, 0
+        self._since, self._old, self._far = 0, 0, 0
 
     def _run(self):
         while not self._stop.is_set():
@@ -282,15 +287,19 @@ class Listener(_Endpoint):
         if stamp in self._seen:
             self._counts["duplicates"] += 1
             return
+        if self._leaps(stamp):
+            self._far += 1
+            if self._far < RESTART:
+                self._bad[IMPLAUSIBLE] += 1
+                return
+            self._start_over()
+        self._far = 0
         if len(self._order) == MEMORY and stamp < self._order[0]:
             self._counts["stale"] += 1
             self._old += 1
             if self._old < RESTART:
                 return
-            self._counts["restarts"] += 1
-            self._counts["lost"] += self._missing()
-            self._readings.clear()
-            self._clear()
+            self._start_over()
         self._old = 0
         self._remember(stamp)
         self._counts["good"] += 1
@@ -300,6 +309,19 @@ class Listener(_Endpoint):
         self._newest = stamp if self._newest is None else max(self._newest, stamp)
         self._first = stamp if self._first is None else min(self._first, stamp)
         self._readings.append(values)
+
+    def _leaps(self, stamp):
+        """Whether a stamp is far ahead of all others, or far behind while the memory cannot yet tell how old it is."""
+        if self._newest is None:
+            return False
+        ahead = stamp - self._newest
+        return ahead > self._leap or (-ahead > self._leap and len(self._order) < MEMORY)
+
+    def _start_over(self):
+        self._counts["restarts"] += 1
+        self._counts["lost"] += self._missing()
+        self._readings.clear()
+        self._clear()
 
     def _remember(self, stamp):
         if len(self._order) == MEMORY:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from labkit.machines import udp
-from labkit.machines.packet import TIME, check_packet, encode_packet, packet_from_pose
+from labkit.machines.packet import PACKET, TIME, check_packet, encode_packet, packet_from_pose
 
 
 def packets(count, start=0, device=1):
@@ -159,3 +159,48 @@ def test_a_flush_waits_for_what_is_still_on_its_way(seen, arrived):
         assert sender.finished.wait(3)
         sender.sent.update({"good": 18, "stale": 2, "lost": 1, "refused": 1})
         assert sender.flush(SimpleNamespace(statistics=statistics), seconds=0.05 if not arrived else 3.0) is arrived
+
+
+VALUES = packet_from_pose(np.eye(4), 0.0)
+
+
+def packet_at(stamp):
+    return PACKET.pack(*VALUES[:TIME], stamp, *VALUES[TIME + 1 :])
+
+
+def statistics_after(*stamps):
+    """What a listener has counted of packets with these time stamps, taken in this order without a network."""
+    with udp.Listener() as listener, listener._lock:
+        for stamp in stamps:
+            listener._take(packet_at(stamp))
+    return listener.statistics()
+
+
+def test_a_forged_time_stamp_is_refused_and_spoils_nothing():
+    """One packet from the far future among 5000 good ones, and one from beyond all time."""
+    good = [k / 250 for k in range(5000)]
+    seen = statistics_after(*good[:2500], 1e9, -1e308, 1e308, *good[2500:])
+    assert (seen.good, seen.lost, seen.restarts, seen.stale) == (5000, 0, 0, 0)
+    assert seen.bad == {udp.IMPLAUSIBLE: 3} and seen.datagrams == 5003
+
+
+def test_a_forged_first_packet_is_overcome_by_the_good_ones():
+    seen = statistics_after(1e9, *[k / 250 for k in range(200)])
+    assert seen.restarts == 1 and seen.bad == {udp.IMPLAUSIBLE: udp.RESTART - 1} and seen.lost == 0
+    assert seen.good == 1 + 200 - (udp.RESTART - 1)
+
+
+def test_a_sender_that_was_away_for_long_is_heard_again():
+    seen = statistics_after(*[k / 250 for k in range(300)], *[3600 + k / 250 for k in range(300)])
+    assert seen.restarts == 1 and seen.lost == 0 and seen.bad == {udp.IMPLAUSIBLE: udp.RESTART - 1}
+
+
+@pytest.mark.parametrize("options", [{"port": 80.5}, {"port": -1}, {"rate": float("nan")}, {"rate": 0}, {"keep": 0.5}])
+def test_a_listener_refuses_nonsense_in_a_sentence(options):
+    with pytest.raises(ValueError, match=f"{next(iter(options))} must be"):
+        udp.Listener(**options)
+
+
+def test_a_sender_to_no_port_finishes_and_says_refused():
+    with udp.Sender([(0.0, b"x", "good")], 70000) as sender:
+        assert sender.finished.wait(5) and sender.sent == {"refused": 1}
