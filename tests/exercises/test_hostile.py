@@ -1,4 +1,4 @@
-# ruff: noqa: NPY002, SIM105, B012 (hostile student code, on purpose)
+# ruff: noqa: NPY002, SIM105 (hostile student code, on purpose)
 """What student code may do to a process: it gets one sentence, and the process is what it was."""
 
 import builtins
