@@ -189,6 +189,8 @@ REFUSED = [
     (lambda: gaussian.ellipse(O2, I3), "cov must have shape"),
     (lambda: gaussian.share_inside(np.zeros((0, 2)), O2, np.eye(2)), "at least one"),
     (lambda: gaussian.share_inside(np.zeros((4, 2)), O2, np.zeros((2, 2))), "positive definite"),
+    (lambda: gaussian.share_inside(np.zeros((4, 2)), O2, np.array([[1.0, 2.0], [2.0, 1.0]])), "positive definite"),
+    (lambda: gaussian.share_inside(np.zeros((4, 2)), O2, np.array([[1.0, 0.5], [0.0, 1.0]])), "symmetric"),
     # kalman
     (lambda: kalman.predict(1.0, [[1.0]], [[1.0]]), "single number"),
     (lambda: kalman.predict(O2, np.eye(2), np.eye(2), [1.0, 0.0]), "B must have shape"),

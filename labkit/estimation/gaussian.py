@@ -14,6 +14,7 @@ from ..checks import (
     as_positive_number,
     as_probability,
     as_shape,
+    covariance_root,
     fit_together,
     solve_covariance,
 )
@@ -129,14 +130,16 @@ def share_inside(samples, mean, cov, probability=0.95):
     Raises
     ------
     ValueError
-        Wrong shapes, no sample, a covariance without an inverse.
+        Wrong shapes, no sample, a covariance that is not symmetric and positive definite.
     """
     mean = as_shape(mean, "mean", "dim")
     d = as_shape(samples, "samples", "n", len(mean)) - mean
     if not d.size:
         raise ValueError("samples must hold at least one, got none")
     probability = as_probability(probability, "probability")
-    squared = (d * solve_covariance(as_shape(cov, "cov", len(mean), len(mean)), "cov", d.T).T).sum(-1)
+    cov = as_shape(as_covariances(cov, "cov", len(mean)), "cov", len(mean), len(mean))
+    covariance_root(cov, "cov")  # refuses one that is not positive definite
+    squared = (d * solve_covariance(cov, "cov", d.T).T).sum(-1)
     return float((squared <= chi2.ppf(probability, d.shape[-1])).mean())
 
 
