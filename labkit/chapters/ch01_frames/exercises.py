@@ -300,14 +300,15 @@ def _flat_distance():
 
 
 def drawn_points(rng, flat=False):
-    """Four to eight points of a drawing and where they were measured, noise of 0.5 mm; flat: in one plane, exactly."""
+    """Four to eight points of a drawing and where they were measured, noise of 0.5 mm; flat: nearly in one plane, and
+    measured on its other side, so that a mirror image fits better on every processor."""
     n = int(rng.integers(4, 9))
     points_F = rng.uniform(-200, 200, (n, 3)) + rng.uniform(-300, 300, 3)
-    if flat:
-        points_F[:, 2] = rng.uniform(-100, 100)
     T_WF = frames.pose(Rotation.from_rotvec(rng.uniform(-2, 2, 3)).as_matrix(), rng.uniform(-900, 900, 3))
-    noise = 0.0 if flat else 0.5
-    return points_F, frames.transform(T_WF, points_F) + noise * rng.normal(size=(n, 3))
+    if flat:
+        points_F[:, 2] = rng.uniform(-100, 100) + rng.permutation(np.resize([0.5, -0.5, 1.0], n))
+        return points_F, frames.transform(T_WF, points_F * [1, 1, -1] + [0, 0, 2 * points_F[:, 2].mean()])
+    return points_F, frames.transform(T_WF, points_F) + 0.5 * rng.normal(size=(n, 3))
 
 
 def _kabsch(handed=True, turned=lambda R: R, shift=lambda R, p, q: q.mean(0) - R @ p.mean(0), centered=True):
