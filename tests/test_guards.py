@@ -311,6 +311,17 @@ def test_the_readme_shows_every_room(room):
         assert modules == set(re.findall(r"[a-z_]+", row.partition(":")[0]))
 
 
+LISTED = (*MATHEMATICS, "files", "documents", "stage")
+
+
+@pytest.mark.parametrize("room", LISTED)
+def test_a_room_says_what_lies_in_it(room):
+    """The first lines of a room name each of its modules."""
+    text = ast.get_docstring(ast.parse((ROOT / "labkit" / room / "__init__.py").read_text(encoding="utf-8")))
+    modules = {path.stem for path in (ROOT / "labkit" / room).glob("*.py")} - {"__init__"}
+    assert not modules - set(re.findall(r"\w+", text))
+
+
 @pytest.mark.parametrize("arguments", (["check", "--output-format=concise"], ["format", "--check"]), ids=" ".join)
 def test_ruff_is_content(arguments):
     ruff = subprocess.run([sys.executable, "-m", "ruff", *arguments, "."], cwd=ROOT, capture_output=True, text=True)

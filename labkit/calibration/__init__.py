@@ -3,6 +3,7 @@
 pivot       the tip of a tool that turns about a fixed point (Quirlen)
 sphere      what a line scanner sees of a sphere
 hand_eye    a scanner on a flange, from a sphere seen in many poses
+planning    where to put the robot before anything is measured, and what it will tell
 ax_xb       a sensor on a flange, from poses of both: A X = X B
 literature  the methods of Kim and of Li, as the thesis cites them
 motion      how the robot has to turn, and the refusal where it does not

@@ -7,6 +7,7 @@ points   measured points
 systems  the lab sheet's files: systems of three points, swirled frames, a tool
 bags     ROS recordings, where the optional package rosbags is installed
 logs     odometry, landmarks, readings and true poses of a drive
+samples  the synthetic cells of data/own_data, each with a planted fault
 
 Every refusal is one sentence with file and line.
 """

@@ -1,9 +1,8 @@
-"""A tracker on a robot flange: its packets, its logs, where it sits on the flange, and how well it follows a motion.
+"""The packets a tracker sends, encoded, checked and decoded.
 
 E is the frame of the tracker, W the frame in which it reports (its own pose at the moment its axes were reset), so a
-reading is `T_WE`. `T_FE` is the mounting on the flange F. Packets and logs speak meters, as the report does; everything
-else here is mm and rad.
-Source: report "Kalibrace a testovani systemu OTUS tracker", ZCU Plzen 2018: table 1, sections 3.1 and 3.2, appendix D.
+reading is `T_WE`. Packets speak meters, as the report does; poses are in mm and rad.
+Source: report "Kalibrace a testovani systemu OTUS tracker", ZCU Plzen 2018: section 2, table 1.
 """
 
 import struct

@@ -7,9 +7,11 @@ front       a Stage in a notebook
 canvas      pictures drawn, compared and sent
 renderer    how it is drawn: words kept, colors for the dark theme
 scene3d     points, lines and triads in space
+scene3d_solids, scene3d_handles  what stands in it, and how a handle moves through it
 style       colors and letters by role
 marks       small things that several chapters draw
-connection  pictures leave the server at once
+tape        moments gone by, so that time can be scrubbed
+film        a Stage recorded for the reading edition
 """
 
 from .controls import Choice, Handle, Play, Slider, Toggle
