@@ -28,6 +28,7 @@ from labkit.documents.thesis import wells
 from labkit.machines import simulation, udp
 from labkit.machines.arm import TX40, link_frames
 from labkit.machines.packet import POSITION, decode_packet
+from labkit.stage.scene3d import Scene
 from labkit.stage.scene3d_handles import Dial
 
 GAP = [np.nan, np.nan]
@@ -127,6 +128,10 @@ def test_three_points_draw_their_construction():
 def test_noisy_triangle_and_its_frame():
     stage = at(ch01.triangle_noise(), Y=(20.0, 45.0, 0.0))
     assert_drawn(stage, [[0, 0, 0], [100, 0, 0], [20, 45, 0], [0, 0, 0]], *([[0, 0, 0], e] for e in 60.0 * np.eye(3)))
+    plate = stage.spaces[0].named("plate").corners().reshape(-1, 3)
+    for corner in ([0, 0], [100, 0], [20, 45]):
+        here = plate[(np.abs(plate[:, :2] - corner) < 1e-9).all(1)]
+        assert sorted({round(z, 9) for z in here[:, 2]}) == pytest.approx([-0.3, 0.3])
     first = stage.result["T"][:, :3, 3] + 60.0 * stage.result["T"][:, :3, 0]
     assert_drawn(stage, first)
 
@@ -135,6 +140,8 @@ def test_gimbal_draws_the_frame_of_the_angles():
     stage = at(ch01.kuka_gimbal(), A_deg=30, B_deg=50, C_deg=-70)
     R = Rotation.from_euler("ZYX", [30, 50, -70], degrees=True).as_matrix()
     assert_drawn(stage, *([np.zeros(3), 0.58 * axis] for axis in R.T))
+    hand = stage.spaces[0].named("hand").corners().reshape(-1, 3) @ R  # seen from the frame it stands for
+    assert [hand[:, 0].max(), hand[:, 2].min(), hand[:, 2].max()] == pytest.approx([0.32, -0.1, 0.1])
     turned = np.deg2rad(np.linspace(0, 30, 25))
     assert_drawn(stage, np.column_stack([np.cos(turned), np.sin(turned), 0 * turned]))  # the arc of A, radius 1
 
@@ -478,6 +485,24 @@ def test_trail_sorts_readings_by_the_gate():
     np.testing.assert_array_equal(trail.path.value, positions + 1)
 
 
+def test_sheets_of_light_cross_the_tracker_in_the_middle_of_their_sweep():
+    stage = at(ch06.live_tracker(), t=0.0)
+    space, place = stage.spaces[0], np.array([120.0, -80.0, 60.0])
+    sweep = ch06_figures.Sweep(Scene(Figure().subplots(), radius=500))
+    scene = sweep.sheets[0].scene
+    for k in range(2):
+        sweep.set(1.0 + 2.0 * k, place)  # s: half a sweep, and half of the other station's
+        assert [sheet.shown for sheet in sweep.sheets] == [k == 0, k == 1]
+        corners = scene.named(f"sheet {k + 1}").corners().reshape(-1, 3)
+        normal = np.linalg.svd(corners - corners.mean(0))[2][2]
+        assert abs((place - corners.mean(0)) @ normal) < 1e-6  # in its plane,
+        station = scene.named(f"station {k + 1}").value
+        assert np.linalg.norm(corners - station[:3, 3], axis=1).min() < 0.51  # which begins in the station
+        aim = np.array([-60.0, 60.0, 0.0]) - station[:3, 3]
+        assert station[:3, 2] == pytest.approx(aim / np.linalg.norm(aim))
+    assert space.named("puck").value == pytest.approx(stage.result["T_WE"])
+
+
 def test_live_picture_draws_what_arrived(monkeypatch):
     packets = simulation.endless_packets(np.random.default_rng(3), lambda: True)
     readings = np.array([decode_packet(next(packets)) for _ in range(300)])
@@ -493,6 +518,10 @@ def test_live_picture_draws_what_arrived(monkeypatch):
 def test_rotation_axes_pass_through_the_middle():
     a, b = np.array([0.6, 0.0, 0.8]), np.array([0.0, 1.0, 0.0])
     stage = at(ch06.two_axes(), a=a, b=b)
+    for name, axis in (("axis a", a), ("axis b", b)):
+        arrow = [item.corners() for item in stage.spaces[0].items if item.called == name]
+        corners = np.concatenate(arrow).reshape(-1, 3)
+        assert [(corners @ axis).min(), (corners @ axis).max()] == pytest.approx([0, 1])
     assert_drawn(stage, [-a, a], [-b, b], *([np.zeros(3), 0.55 * axis] for axis in ch06.X_TRUE[:3, :3].T))
     assert_drawn(stage, 0.55 * stage.result["found"][:, :, 0])
 

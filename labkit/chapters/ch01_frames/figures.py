@@ -3,6 +3,7 @@
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
+from ...stage import scene3d_solids as solids
 from ...stage import style
 
 CIRCLE_DEG = np.arange(0, 361, 6)
@@ -45,6 +46,28 @@ class Matrix:
         for row, values in zip(self.entries, T):
             for entry, value in zip(row, values):
                 entry.set_text(f"{value + 0.0:.3f}".replace("-0.000", "0.000"))
+
+
+def unit_triangle():
+    """The triangle (0, 0), (1, 0), (0, 1), thin, to be stretched onto another by `onto`."""
+    return solids.raised([(0, 0), (1, 0), (0, 1)], -0.5, 0.5).looks(style.MEASUREMENT, 0.25)
+
+
+def onto(corners):
+    """The matrix that carries the unit triangle onto three points, (3, 3) -> (4, 4), 0.6 thick."""
+    o, x, y = corners
+    normal = np.cross(x - o, y - o)
+    T = np.eye(4)
+    T[:3, :3] = np.column_stack([x - o, y - o, 0.6 * normal / max(np.linalg.norm(normal), 1e-12)])
+    T[:3, 3] = o
+    return T
+
+
+def hand():
+    """A flange with a finger along its x axis, so that one sees how it is turned."""
+    return (
+        solids.cylinder(0.26, -0.1, 0.0).looks(style.STEEL), solids.box((-0.1, 0.32), (-0.07, 0.07), (0.0, 0.1)),
+    )  # fmt: skip
 
 
 class TipCloud:

@@ -9,6 +9,7 @@ from ...geometry.lie import exp_so3, log_so3
 from ...stage import Handle, Slider, Stage, style
 from ...stage.marks import PlaneFrame
 from ...stage.scene3d import Scene, View
+from ...stage.scene3d_handles import OnPlane
 from . import figures as draw
 
 NOISE_OF_A_TAPE = 0.01  # the yardstick of three_points, in the sheet's unit
@@ -144,7 +145,8 @@ def triangle_noise():
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.05, 1))
-        space = Scene(left, radius=85, half_width=82)
+        space = Scene(left, radius=85, half_width=82, floor=-25.0, unit="mm")
+        plate = space.body(draw.unit_triangle(), name="plate")
         cloud = draw.TipCloud(space, length)
         triad = space.triad("F", length)
         space.fixed(triad, np.eye(4))
@@ -156,6 +158,7 @@ def triangle_noise():
             cloud.set(result["T"])
             triangle = _triangle(ARM, *state["Y"][:2])
             edges.set(triangle[[0, 1, 2, 0]])
+            plate.set(draw.onto(triangle))
             corners.set(triangle)
             space.draw(state["view"])
             for k in range(3):
@@ -171,11 +174,11 @@ def triangle_noise():
         handles={
             "Y": Handle(
                 (30.0, 60.0, 0.0), step=1.0, bounds=((-20, 80), (1, 80), (-200, 200)), label="y point of the triangle",
-                color=style.MEASUREMENT,
+                color=style.MEASUREMENT, way=OnPlane(),
             )
         },
         controls={"std": Slider(0.05, 3.0, 0.5, step=0.05, label="noise per coordinate (mm)")},
-        view=View(-65, 35, center=(32, 25, 15)),
+        view=View(-65, 35, center=(32, 25, 15), eye=600.0),
         constrain=_stay_in_plane,
         fail={"Y": (60.0, 2.0, 0.0)},
         because="Y lies 2 mm from the x axis: its noise now turns the plane of the three points.",
@@ -230,6 +233,7 @@ def kuka_gimbal():
             for letter, color, radius, reach in zip("ABC", style.AXES[::-1], (1.0, 0.84, 0.68), (1.25, 1.13, 1.01))
         ]
         tool = space.triad("", 0.58, linewidth=3)
+        hand = space.body(*draw.hand(), name="hand")
         style.bare(right)
         rows = (
             ("set (A, B, C)", "deg"), ("read back from the pose", "deg"),
@@ -245,6 +249,7 @@ def kuka_gimbal():
             for ring, axis, zero, angle in zip(rings, result["axes"], result["zeros"], result["angles"]):
                 ring.set(axis, zero, angle)
             tool.set(result["T"])
+            hand.set(result["T"])
             space.draw(state["view"])
             rows = (np.rad2deg(result["angles"]), result["read_back_deg"], result["singular_values"], result["null"])
             for text, row, decimals in zip(numbers, rows, (0, 0, 3, 2)):
@@ -264,7 +269,7 @@ def kuka_gimbal():
             "B_deg": Slider(-90, 90, 30, label="B (deg)"),
             "C_deg": Slider(-180, 180, 20, label="C (deg)"),
         },
-        view=View(-50, 25),
+        view=View(-50, 25, eye=8.0),
         fail={"A_deg": 60, "B_deg": 90, "C_deg": 20},
         presets={"A and C trade places": {"A_deg": 0, "B_deg": 90, "C_deg": -40}},
         describe=_gimbal_sentence,
