@@ -543,14 +543,17 @@ def test_methods_stand_in_their_rows():
     assert_drawn(stage, *(np.column_stack([stage.result[k], rows]) for k in ("rotation", "translation")))
 
 
-def test_ellipses_of_six_runs_are_three_standard_deviations():
+def test_ellipsoids_of_six_runs_are_three_standard_deviations():
     stage = ch06.six_runs()
-    r = stage.result
-    assert_drawn(stage, r["results"][:, 1:])
-    outlines = [v for v in drawn(stage) if len(v) > 20]
-    for outline, center, cov in zip(outlines, (r["mean"][1:], r["single"][1:]), (r["spread"], r["claim"]), strict=True):
-        d = outline - center
-        np.testing.assert_allclose((d * np.linalg.solve(cov[1:, 1:], d.T).T).sum(1), 9.0)
+    r, truth = stage.result, simulation.T_FE[:3, 3]
+    assert_drawn(stage, r["results"] - truth, [np.zeros(3), r["mean"] - truth])
+    bodies = [i for i in stage.spaces[0].items if i.called == "an ellipsoid"]
+    ball = np.random.default_rng(0).normal(size=(50, 3))
+    ball /= np.linalg.norm(ball, axis=1, keepdims=True)
+    for body, center, cov in zip(bodies, (r["mean"], r["single"]), (r["spread"], r["claim"]), strict=True):
+        T = body.numbers()  # carries the unit sphere onto the ellipsoid that the page draws
+        d = ball @ T[:3, :3].T + T[:3, 3] - (center - truth)
+        np.testing.assert_allclose((d * np.linalg.solve(cov, d.T).T).sum(1), 9.0)
 
 
 # --- chapter 7 --------------------------------------------------------------------------------------------------------

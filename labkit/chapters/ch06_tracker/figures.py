@@ -210,26 +210,26 @@ def method_chart(ax, names):
 
 
 class Repeated:
-    """Repeated calibrations in two coordinates: each result, the ellipse of their spread, the ellipse a single run
-    claims, the truth."""
+    """Repeated calibrations in space, as seen from the truth: each result, the ellipsoid of their spread, the one that
+    a single run claims."""
 
-    def __init__(self, ax, truth, half_width=6.5):
-        style.axes(ax, "y of the mounting (mm)", "z of the mounting (mm)", "six runs, each 21 poses")
-        ax.set(xlim=(truth[1] - half_width, truth[1] + half_width), ylim=(truth[2] - half_width, truth[2] + half_width))
-        ax.plot(
-            *truth[1:], color=style.TRUTH, marker="+", markersize=16, markeredgewidth=2, linestyle="none", label="truth"
-        )
-        (self.runs,) = ax.plot([], [], **style.look("estimates", markersize=5), label="one run each")
-        (self.spread,) = ax.plot([], [], **style.look("estimate"), label="spread of the runs, 3 std")
-        (self.claim,) = ax.plot([], [], **style.look("prediction"), label="covariance of one run, 3 std")
-        ax.legend(loc="lower left", fontsize=8)
-        self.artists = [self.runs, self.spread, self.claim]
+    def __init__(self, scene, size):
+        self.spread = scene.ellipsoid(**style.look("estimate", label="spread of the runs, 3 std"))
+        self.claim = scene.ellipsoid(**style.look("prediction", label="covariance of one run, 3 std"))
+        self.runs = scene.points(**style.look("estimates", markersize=6, label="one run each"))
+        self.off = scene.line(**style.look("guide", linewidth=1.8))
+        truth = scene.points(color=style.TRUTH, marker="+", markersize=16, linestyle="none", label="truth")
+        scene.fixed(scene.triad("", size), np.eye(4))
+        scene.fixed(truth, np.zeros(3))
+        lines = (self.runs, self.spread, self.claim, truth)
+        scene.ax.legend(handles=[item.artist for item in lines], loc="lower left", bbox_to_anchor=(0.08, 0), fontsize=8)
 
-    def set(self, results, spread, claim):
-        """Results (n, 2), and outlines (m, 2): of their spread, of what a single run claims."""
-        self.runs.set_data(*results.T)
-        self.spread.set_data(*spread.T)
-        self.claim.set_data(*claim.T)
+    def set(self, results, mean, spread, single, claim):
+        """Results (n, 3), their mean and covariance, one of them and the covariance it claims; all less the truth."""
+        self.runs.set(results)
+        self.off.set([np.zeros(3), mean])
+        self.spread.set(mean, 9 * spread)
+        self.claim.set(single, 9 * claim)
 
 
 class Plan:

@@ -527,10 +527,6 @@ def compute_six_runs(state):
     spread, claim = np.cov(results.T, bias=True), single.covariance_of("T_FT.translation")
     return {
         "results": results, "spread": spread, "mean": results.mean(0), "single": single.T_FT[:3, 3], "claim": claim,
-        "outlines": [
-            ellipse(center[1:], cov[1:, 1:], THREE_STD)
-            for center, cov in ((results.mean(0), spread), (single.T_FT[:3, 3], claim))
-        ],
         "off": float(np.linalg.norm(results.mean(0) - T_FE[:3, 3])),
         "std": float(np.sqrt(results.var(0).sum())),
     }  # fmt: skip
@@ -541,24 +537,31 @@ def six_runs():
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.35, 1))
-        picture = draw.Repeated(left, T_FE[:3, 3])
+        space = Scene(left, radius=7.0, half_width=7.5, title="six runs, each 21 poses, seen from the truth", unit="mm")
+        picture = draw.Repeated(space, 2.5)
         style.bare(right)
         words = right.text(0.0, 0.9, "", transform=right.transAxes, va="top", linespacing=1.7)
 
         def update(state, result):
-            picture.set(result["results"][:, 1:], *result["outlines"])
+            truth = T_FE[:3, 3]
+            picture.set(
+                result["results"] - truth, result["mean"] - truth, result["spread"], result["single"] - truth,
+                result["claim"],
+            )  # fmt: skip
+            space.draw(state["view"])
             words.set_text(
                 f"spread over six runs\n{result['std']:.2f} mm\n\nmean off the truth\n{result['off']:.2f} mm\n\n"
                 f"std that one run claims\n{np.sqrt(np.trace(result['claim'])):.2f} mm"
             )
 
-        return [*picture.artists, words], update
+        return [*space.artists, words], update
 
     return Stage(
         "six runs",
         scene=scene,
         compute=compute_six_runs,
         controls={"field": Slider(0.0, 6.0, 2.0, step=0.1, label="systematic error (mm)")},
+        view=View(-50, 22),
         fail={"field": 6.0},
         presets={"no systematic error": {"field": 0.0}},
         describe=lambda r: (
