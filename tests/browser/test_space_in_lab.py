@@ -44,13 +44,14 @@ def page(address):
 
 
 def at_rest(page, number):
-    """(stage, [share of pixels covered, number of colors, the picture]) once the picture stays for 0.5 s."""
+    """(stage, [share of pixels covered, number of colors, the picture]) once the picture stays."""
     stage = page.locator(".labkit-stage").nth(number)
     stage.scroll_into_view_if_needed()
     stage.locator(".picture[data-pictures]").wait_for(timeout=20_000)
     before = None
     for _ in range(40):
-        page.wait_for_timeout(500)
+        page.wait_for_timeout(300)
+        stage.locator(".picture[data-rest=true]").wait_for(timeout=20_000)  # drawn with all its pixels
         now = stage.evaluate(PIXELS)
         if now == before:
             return stage, now

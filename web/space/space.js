@@ -180,6 +180,7 @@ export class View {
   /** Something moves: quick pictures now, a sharp one once it has come to rest. */
   stir() {
     this.moving = true;
+    this.place.dataset.rest = false;
     clearTimeout(this.calm);
     this.calm = setTimeout(() => { this.moving = false; this.request(); }, CALM);
     this.request();
@@ -252,6 +253,7 @@ export class View {
     const took = performance.now() - start;
     if (this.moving) this.adapt(took);
     this.place.dataset.pictures = Number(this.place.dataset.pictures ?? 0) + 1; // for benchmarks and tests
+    this.place.dataset.rest = !this.moving;
     this.place.dataset.triangles = this.scenes.reduce((sum, scene) => sum + scene.triangles, 0);
     this.place.dataset.took = took.toFixed(1);
   }
