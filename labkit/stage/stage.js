@@ -106,6 +106,7 @@ class Figure {
   show(message) {
     this.picture.style.width = `${message.width}px`;
     this.picture.style.aspectRatio = `${message.width} / ${message.height}`;
+    this.scenes.fit(message);
     this.screen.canvas.setAttribute("aria-label", [this.name, message.caption].filter(Boolean).join(": "));
     this.words.show(message);
     this.handles.show((this.places = this.scenes.placed(message.handles)));
@@ -260,6 +261,13 @@ class Scenes {
     const copy = view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength);
     this.view?.receive(space, new Float32Array(copy), dark);
     return buffers.slice(0, -1);
+  }
+
+  /** The picture has its size: scenes are drawn for it. */
+  fit({ width, height }) {
+    if (!this.live || this.size === `${width}x${height}`) return;
+    this.size = `${width}x${height}`;
+    this.view.stir();
   }
 
   /** Python draws. */
