@@ -65,7 +65,7 @@ def hilly(rng, falls):
     """
     while True:
         f, x = wavy(rng)
-        y, n = x + rng.normal(scale=1.5, size=len(x)), int(rng.integers(6, 40))
+        y, n = x + rng.normal(scale=1.5, size=len(x)), int(rng.integers(6, 20))
         _, values, heights = chord(f, x, y, n)
         gap = values - heights
         off_middle = gap.max() - gap[n // 2] > 0.05 * gap.max() and 1 < np.argmax(gap) < n - 2
@@ -191,8 +191,8 @@ def poor_inside(rho, inside):
 
 
 def barely(rho, inside):
-    """A step that lowers the cost and is taken back all the same."""
-    return ((rho > 0) & (rho < ACCEPT))[:-1].any()
+    """A step that lowers the cost and is taken back all the same; of twice its gain ratio it would be taken."""
+    return ((rho > ACCEPT / 2) & (rho < ACCEPT))[:-1].any()
 
 
 def halfway(rho, inside):
@@ -212,7 +212,7 @@ def well_inside(rho, inside):
 
 RUNS = (
     functools.partial(run_with, wanted=poor_inside),
-    functools.partial(run_with, wanted=barely, first=(0.02, 0.08)),
+    functools.partial(run_with, wanted=barely, first=(0.06, 0.085)),
     functools.partial(run_with, wanted=halfway, first=(0.13, 0.22)),
     functools.partial(run_with, wanted=fairly, first=(0.78, 0.86)),
     functools.partial(run_with, wanted=well_inside),
