@@ -154,5 +154,7 @@ class Canvas(FigureCanvasAgg):
         return self.renderer
 
     def forget(self):
-        """Let go of the renderer and its pixels; the next drawing makes another."""
+        """Let go of the renderer and its pixels, which each text holds as well; the next drawing makes another."""
         self.renderer, self._drawn_as, self._made = None, None, {}
+        for artist in self.figure.findobj(lambda artist: getattr(artist, "_renderer", None) is not None):
+            artist._renderer = None
