@@ -326,6 +326,7 @@ class Scene {
     this.triangles = solids.reduce((sum, { mesh }) => sum + mesh.triangles, 0);
     const shadow = z[2] > 0 ? (this.view.dark ? [0, 0, 0, 0.5] : [0, 0, 0, 0.16]) : null;
     renderer.draw(dw, dh, lens, { solids, paths, floor: this.floor, shadow }, !(renderer.software && this.view.moving));
+    this.paper.setTransform(1, 0, 0, 1, 0, 0); // `write` leaves CSS pixels behind
     this.paper.clearRect(0, 0, w, h);
     this.paper.imageSmoothingQuality = "high";
     this.paper.drawImage(renderer.canvas, 0, 0, dw, dh, 0, 0, w, h);
