@@ -20,6 +20,7 @@ from ..geometry.frames import invert, pose_distance
 from ..geometry.lie import log_so3
 from . import advice
 from .ax_xb import calibrate_hand_eye
+from .hand_eye import calibrate_sphere_target
 from .own_data import (
     FrameModel,
     HandEyeModel,
@@ -317,7 +318,7 @@ def pivot(poses, *, groups=None, length_unit="mm"):
     return _with(found, parameters=names, next_poses=proposals, next_std=course, poses=model.T_WF)
 
 
-def sphere(robot, points, *, groups=None, length_unit="mm"):
+def sphere(robot, points, *, groups=None, length_unit="mm", solver=calibrate_sphere_target):
     """Where a scanner sits on the flange, from flange poses and the center of one sphere seen in each.
 
     Parameters
@@ -328,13 +329,15 @@ def sphere(robot, points, *, groups=None, length_unit="mm"):
     groups : sequence, optional
         As in `hand_eye`.
     length_unit : str
+    solver : callable
+        Fits a mounting; `fast.hand_eye.calibrate_sphere_target` gives the same and is quick.
 
     Returns
     -------
     Calibration
         T is the sensor in the flange; `points["center"]` the center in the base.
     """
-    model = SphereModel(robot, points)
+    model = SphereModel(robot, points, solver=solver)
     advice.refuse_one_axis(model.T_BF)
     solution, kept = majority(model)
     plain = _attempt(lambda: model.fitted(np.ones(model.n, bool)))

@@ -387,7 +387,7 @@ class SphereModel(Model):
 
     needed = 4
 
-    def __init__(self, T_BF, x_S, std=(None,)):
+    def __init__(self, T_BF, x_S, std=(None,), solver=calibrate_sphere_target):
         T_BF, x_S = as_transforms(T_BF, "robot"), as_points(x_S, "points")
         if T_BF.ndim != 3 or x_S.shape != (len(T_BF), 3):
             raise ValueError(
@@ -396,19 +396,19 @@ class SphereModel(Model):
         if len(T_BF) < 4:
             raise ValueError(f"calibration with a sphere needs at least 4 poses, better 10, got {len(T_BF)}")
         super().__init__(len(T_BF), std)
-        self.T_BF, self.x_S, self.way = T_BF, x_S, T_BF
+        self.T_BF, self.x_S, self.solver, self.way = T_BF, x_S, solver, T_BF
 
     def size(self, channel):
         return np.abs(self.T_BF[:, :3, 3]).max() + np.abs(self.x_S).max()
 
     def fit(self, kept):
-        found = calibrate_sphere_target(self.T_BF[kept], self.x_S[kept])
+        found = self.solver(self.T_BF[kept], self.x_S[kept])
         return found.T_FS, found.target
 
     def start(self):
         if self.n < 7:
             return super().start()
-        return calibrate_sphere_target(self.T_BF, self.x_S, robust=True).weights > 0
+        return self.solver(self.T_BF, self.x_S, robust=True).weights > 0
 
     def linearize(self, solution):
         X, center = solution

@@ -16,6 +16,7 @@ import numpy as np
 from ..calibration import calibrate
 from ..estimation.clocks import sample_stream
 from ..fast.ax_xb import calibrate_hand_eye
+from ..fast.hand_eye import calibrate_sphere_target
 from ..files.bags import read_bag
 from ..files.points import read_points
 from ..files.poses import FORMATS, read_pairs, read_poses, refuse_times
@@ -163,7 +164,13 @@ def _sphere(options):
     points = read_points(options.points, options.length, options.any_size)
     _same_rows(robot, points)
     unit = _same_unit(options, robot)
-    result = calibrate.sphere(robot.in_unit(unit).T, points.in_unit(unit), groups=robot.group, length_unit=unit)
+    result = calibrate.sphere(
+        robot.in_unit(unit).T,
+        points.in_unit(unit),
+        groups=robot.group,
+        length_unit=unit,
+        solver=calibrate_sphere_target,
+    )
     return result, (robot.assumed, points.assumed)
 
 
