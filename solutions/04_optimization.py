@@ -213,7 +213,7 @@ for name, printed, e in zip(wells.NAMES, places, wells.extrema()):
 # %% saddle-statement [markdown]
 # ## "A saddle must be hit exactly"
 #
-# Rounding to three digits explains slopes up to about 0.3 in the wells and 0.05 at the pass, not 2.5. And you found the saddle with Newton, from $(0, 0)$. Section 7.1.1 says that no method finds it and that one would have to hit "exactly" the point (*exakt der Punkt*);
+# Rounding to three digits explains slopes up to about 0.3 in the wells and 0.05 at the pass, not 2.5. And you have just found the saddle: for Newton's step a start beside it is enough. Section 7.1.1 says that no method finds it and that one would have to hit "exactly" the point (*exakt der Punkt*);
 # section 2.5.2 of the same thesis says that Newton cannot tell a saddle from a minimum. How large is the neighborhood from which Newton ends in it?
 #
 # In the figure the thin lines are the two directions of curvature, solid where $f$ bends up, dashed where it bends down. The two blue bars are the Newton step,
@@ -229,14 +229,14 @@ ex.predict("neighborhood", guess, reveal=stages.saddle)
 # %% convex-text [markdown]
 # ## Where is f convex? (*further*)
 #
-# Were $f$ **convex**, none of this could happen: a convex function on a convex set has no local minimum but the global one (section 2.4.2). The thesis gives two tests. By the *chord*:
+# Were $f$ **convex**, every place where the gradient vanishes would be a global minimum (section 2.4.2): no saddle to end in, no second well. The thesis gives two tests. By the *chord*:
 #
 # $$f\big((1-\lambda)x + \lambda y\big) \le (1-\lambda)\,f(x) + \lambda\,f(y) \qquad \text{for all } x, y \text{ in the set and } 0 \le \lambda \le 1,$$
 #
 # and by the *Hessian*, which must have no negative eigenvalue anywhere in it. The first asks about pairs of places, the second about one place at a time, but at all of them. (Strict convexity
 # the thesis equates with a *positive definite* Hessian everywhere. That is sufficient, not necessary: $x^4$ is strictly convex, and its second derivative at 0 is 0.)
 #
-# Decide how much of the square passes the second, then drag P and Q. Where is $H$ positive definite? Does it help that it is, at P and at Q? And what does the other matrix say, $2J^\top J$ of the next section?
+# Decide how much of the square from $-6$ to 6 passes the second, then drag P and Q. Where is $H$ positive definite? Does it help that it is, at P and at Q? And what does the other matrix say, $2J^\top J$? (The next section tells where it comes from: Gauss-Newton takes it in place of $H$.)
 
 # %% predict-convex_share
 guess = ...  # your code here
@@ -246,9 +246,9 @@ guess = "about 1 %"
 ex.predict("convex_share", guess, reveal=stages.convexity)
 
 # %% chord-text [markdown]
-# $2J^\top J$ is positive definite everywhere: every Gauss-Newton step leads downhill. That does not make $f$ convex; it only makes each *model* so, and the wells stay two.
+# $2J^\top J$ is positive definite everywhere: every step made with it sets out downhill. That does not make $f$ convex; it only makes each *model* so, and the wells stay two.
 #
-# The chord needs no derivative at all. Write the test.
+# The chord needs no derivative at all. Write the test. The cell after it draws 300 chords in each of four disks around L, G and S. In which of them does $f$ rise above some?
 
 # %% rise_above_chord
 @ex.rise_above_chord
@@ -402,7 +402,7 @@ for steps in range(9):
     print(f"{steps} rounds: x = {x}, radius {radius:.3f}, f = {wells.value(x):.2f}")
 
 # %% assembled [markdown]
-# Which round took no step, and what did the next one do better? `opt.trust_region` is the same loop with more care: units, stopping rules, poses in place of vectors.
+# Which round took no step, and what did the next one do better? `opt.trust_region` is the same loop with more care: unknowns of unlike units, stopping rules, poses as well as vectors.
 
 # %% four-text [markdown]
 # ## Four paths on one map
@@ -455,7 +455,7 @@ luck = ex.luck(luck)
 # So four landings are weak evidence, and two of the four starts are Gauss-Newton's. Together with the documented fallback of `fminunc` they *suggest* that the praised trust
 # region was a quasi-Newton method. The deviations that table 7-1 prints beside its results, as $\mu$, measure no accuracy either: each is an iterate with four digits minus an "ideal" one with two.
 #
-# And "the farthest start"? Decide how much of the square leads Newton to a minimum, then rub it free for all four methods.
+# And "the farthest start"? Decide how much of the square from $-6$ to 6 leads Newton to a minimum, then rub it free for all four methods.
 
 # %% predict-share
 guess = ...  # your code here
@@ -489,7 +489,7 @@ for method in wells.METHODS:
 # | quadratic | $f$ quadratic, $g$, $h$ linear; convex where $B$ has no negative eigenvalue | `lstsq`, `lsq_linear` |
 # | nonlinear, a sum of squares | residuals at hand: $J$ is enough | `least_squares`: Gauss-Newton's relatives |
 # | nonlinear, smooth | local minima, saddles | `minimize`: trust region, BFGS |
-# | integer | variables in steps | `milp` |
+# | integer | some unknowns whole numbers | `milp`, where all else is linear |
 #
 # Calibrating a scanner is the third kind: residuals, six unknowns, no condition. It could also be written with the nine entries of a rotation matrix and the condition $R^\top R = I$. Drop
 # that condition and the rest is the second kind, convex and solved at once: this is how chapter 5 finds a start without a guess.
@@ -506,9 +506,9 @@ for name, levels in thesis.table_5_2().items():
 
 # %% tipping-text [markdown]
 # The sums are right; the "/50" is not: four criteria of at most 10 points make 40. (A fifth criterion may have been dropped, or lost on its way to our text.) In table 5-2, Gauss-Newton and
-# Levenberg-Marquardt have full marks, and the trust region, which is chosen, four less: the text weighs three things above the rest and does not say how much.
+# Levenberg-Marquardt have full marks, and the trust region, which is chosen, four or five less: the text weighs three things above the rest and does not say how much.
 #
-# Such sums hide weights of 1. Suppose that *solving*, the last criterion of table 4-1, counts $w$ times and the other three once. **From which $w$ on does the cube win over the sphere?**
+# Such sums hide weights of 1. Suppose that *solving*, the last criterion of table 4-1, counts $w$ times and the other three once (this $w$ is a weight, no depth of a well). **From which $w$ on does the cube win over the sphere?**
 
 # %% tipping_weight
 tipping_weight = ...  # your code here

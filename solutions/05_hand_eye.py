@@ -100,7 +100,7 @@ def height_std(alpha, beta, base, std):
 
 # %% over-the-range [markdown]
 # The data sheet (B1) promises $\pm 0.16\,\%$ of a range of 100 mm, as three standard deviations, from 190 to 290 mm. It does not print the base. With a base of 100 mm, which
-# noise of the angles would that be, and how is it shared out over the range? (Height above the laser, so $\alpha = 90°$.)
+# noise of the angles would that be, and how does the error of $H$ then change from one end of the range to the other? (Height above the laser, so $\alpha = 90°$.)
 
 # %% over-the-range-code
 base, promised = 100.0, triangulation.LINEARITY
@@ -111,12 +111,13 @@ for H, angles in at.items():
     print(f"H = {H} mm: {height_std(*angles, base, std):.3f} mm")
 
 # %% over-the-range-verdict [markdown]
+# Solved for the height, (2-11) is $H = L\,\tan\alpha\tan\beta/(\tan\alpha+\tan\beta)$ (2-12).
 # From the near end of its range to the far one the error doubles, whatever single number a data sheet prints. Go near, where the part allows it.
 
 # %% circle [markdown]
 # ## One scan line, one circle
 #
-# A line scanner triangulates a whole line of points at once ((2-12): $H = L\,\tan\alpha\tan\beta/(\tan\alpha+\tan\beta)$), all in its plane $y = 0$. The plane cuts the sphere in a circle. Multiply $(x-x_c)^2 + (z-z_c)^2 = r^2$ out and it is
+# A line scanner measures a whole line of points at once, all in its plane $y = 0$. The plane cuts the sphere in a circle. Multiply $(x-x_c)^2 + (z-z_c)^2 = r^2$ out and it is
 # *linear* in $a_1 = -2x_c$, $a_2 = -2z_c$, $a_3 = x_c^2 + z_c^2 - r^2$: that is listing C15. Keep the residuals small by any means you like.
 
 # %% fit_circle
@@ -186,7 +187,8 @@ def kuka_residual(p2, T_BF, x_S, target):
 
 
 # %% validation [markdown]
-# Table 7-5 validates the end pose at *one* unnamed position: $(0.24, -0.67, -0.11)$ mm. Compare pose 1. Then decide: **what is the rms over all 31**, about 0.7, 3 or 12 mm?
+# Table 7-5 validates the end pose at *one* unnamed position: $(0.24, -0.67, -0.11)$ mm. Compare pose 1. Pose 2 has a digit too many, which is taken out. Then decide: **what is the rms over all
+# 31**, about 0.7, 3 or 12 mm?
 
 # %% validation-code
 as_printed = kuka_residual(p2_end, printed.T_BF, printed.x_S, target)
@@ -685,7 +687,7 @@ def li_translation(T_BF, x_S, R_FS):
 
 
 # %% kim-text [markdown]
-# **Kim, Cho and Kim** watch a body with several known points $X_W$ (homogeneous, in columns). Between poses $p$ and $q$ the flange moves by $A = T_{BF,p}^{-1}\,T_{BF,q}$ and the scanner by
+# **Kim, Cho and Kim** watch a body with several points $X_W$, known in its own frame $W$ (homogeneous, in columns). Here $A$ and $B$ are motions: between poses $p$ and $q$ the flange moves by $A = T_{BF,p}^{-1}\,T_{BF,q}$ and the scanner by
 # $B = (X_S^p X_W^\top)(X_S^q X_W^\top)^{-1}$, and both are the same motion: $A X = X B$ with $X = T_{FS}$ (2-44). (Formula (2-43) prints $AX = BX$. Its own section, chapter 4.1 and appendix A contradict it.)
 #
 # Appendix A writes the rows of $X$ one after another, $u = (x_{11}, x_{12}, \dots, x_{34})$, and $AX = XB$ as twelve linear equations $D\,u = F$, first those of the entries (1, 1) to (1, 4).
@@ -835,7 +837,7 @@ for name, T_FS in (("CAD", cad), ("calibrated",
           f"{off} mm")
 
 # %% cad-length-text [markdown]
-# The length is right and the place is wrong: the first mark lies 31 mm too high, and a nozzle sent there runs into the air. Now the flange makes half a turn between the marks (poses
+# The length is right and the place is wrong: by the CAD pose the first mark lies 31 mm too high, and a nozzle sent there stops in the air. Now the flange makes half a turn between the marks (poses
 # `turned`, marks as `seen`). What length does the CAD pose give?
 
 # %% cad_length

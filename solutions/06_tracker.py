@@ -4,9 +4,9 @@
 # **What you will do.** Read the packets of a tracker, mount it on a simulated robot,
 # find where it sits, and judge how well it follows a motion.
 #
-# **What you will learn.** What a receiver can know of a stream, why two rotation axes
-# are needed, what a null vector hides, why six runs that agree may all be wrong, and
-# why accuracy in motion is a matter of time first.
+# **What you will learn.** What a receiver can know of a stream, which motions determine
+# a mounting, what a null vector hides, how much to believe six runs that agree, and why
+# accuracy in motion is a matter of time first.
 #
 # **What you need.** Chapter 1, the singular value decomposition by name. About 90
 # minutes; the parts marked *further* come on top: stations that move and errors over
@@ -410,12 +410,11 @@ for name, averages, variances in both:
 # does not tell. A digit may also have been lost when the document was converted to
 # text. Chapter 10 lists them all.
 #
-# ## Break it: repeat the same mistake
+# ## Break it: six runs that agree
 #
-# The runs agree within 0.2 mm while a single pose is off by 2.5 mm. If these errors
-# were random, 20 poses would scatter the mounting by more than half a millimeter. So
-# **how far from the truth is the mean of the six**: 0.1 mm (the spread over $\sqrt 6$),
-# 0.2 mm (the spread), or can the runs alone not tell?
+# The runs agree within 0.2 mm while a single pose is off by 2.5 mm. **How far from the
+# truth is the mean of the six**: 0.1 mm (the spread over $\sqrt 6$), 0.2 mm (the
+# spread), or can the runs alone not tell?
 
 # %% predict-runs
 guess = ...  # your code here
@@ -423,6 +422,10 @@ guess = ...  # your code here
 guess = "the runs alone cannot tell"
 ### END SOLUTION
 ex.predict("runs", guess, reveal=stages.six_runs)
+
+# %% runs-then [markdown]
+# Random errors of this size at 20 poses would scatter the mounting by more than half a
+# millimeter. The six agree far better: what errs is mostly the same in all of them.
 
 # %% sweeps [markdown]
 # ## Break it again: a station that moves (*further*)
@@ -437,7 +440,7 @@ ex.predict("runs", guess, reveal=stages.six_runs)
 # $$\alpha = \operatorname{atan2}(x, z), \qquad \beta = \operatorname{atan2}(y, z).$$
 #
 # The report prints no rate; 60 turns per second are our assumption. **How far does the
-# plane move in a microsecond, 3 m from the station?**
+# plane move in a microsecond, 3 m from the station, in mm?**
 
 # %% predict-sweep
 guess = ...  # your code here
@@ -480,7 +483,8 @@ def nearest_to_rays(origins, directions):
 
 # %% six-degrees [markdown]
 # Several diodes on a rigid body fix its whole pose: least squares on all angles. With
-# nine diodes even a single station suffices, in principle. Compare the depth:
+# nine diodes even a single station suffices, in principle. How well is the tracker's
+# place known then, along the three axes, and how well with both?
 
 # %% one-or-two-stations
 from labkit.machines import stations
@@ -512,7 +516,7 @@ ex.predict("moved", guess, reveal=stages.moved_station)
 # %% moved-then [markdown]
 # A station that stood askew from the beginning turns the whole world a little, and the
 # reset into $W$ takes that up: $E_{trans}$ stays near the noise. One that moves during
-# the run makes two worlds, one that drifts makes twenty, and no mounting fits them all.
+# the run makes two worlds, one that drifts makes a new one at every stop, and no mounting fits them all.
 # **By how many milliradians must it turn after stop 10, to make all of the $E_{trans}$
 # that the report prints, 0.802 mm?** Use the knob, or `stages.compute_moved_station`.
 
@@ -569,8 +573,9 @@ print("ignored poses:", np.flatnonzero(best.weights < 0.01))
 # Section 3.2 moves the robot through the same points slowly, faster, fast, and finds
 # mean errors of ±15 mm and ±1° that hardly depend on speed. In the fast motion the
 # tracker moves at up to 1.4 m/s and turns at up to 3.7 rad/s. **If it lags 8 ms behind,
-# by how many degrees is the rotation off, and by how many mm the position?** Work both
-# out, then try speed, latency and nonsense. Which of the four summaries would you print?
+# by how many degrees is the rotation off at most, by how many mm the position?** Work
+# both out, then try speed, latency and nonsense. Which of the four summaries would you
+# print?
 
 # %% predict-turning
 guess = ...  # your code here
@@ -649,8 +654,8 @@ ex.predict("tempo", guess, reveal=stages.over_speed)
 
 # %% squares-add [markdown]
 # What a tracker errs at rest knows nothing of the direction in which it is carried, and
-# independent errors add as squares: $e^2 = e_0^2 + (\tau v)^2$ with the lag $\tau$. So
-# a log of errors and speeds tells both apart, without any time stamp of the robot.
+# independent errors add as squares, on average: $e^2 = e_0^2 + (\tau v)^2$ with the lag
+# $\tau$. So errors and speeds alone tell both apart, in whatever order they are given.
 
 # %% static_error_and_lag
 @ex.static_error_and_lag
@@ -687,8 +692,8 @@ for name, chosen in (("all readings", sound | ~sound), ("without nonsense", soun
 # make.
 
 # %% in-practice [markdown]
-# The report asks for "advanced filtering" in its conclusion. The last lines did it in
-# two steps: a gate refuses what cannot follow from the motion so far, a Kalman filter
+# The report asks for "advanced filtering" in its conclusion. The lines "gated" of the
+# four motions above did it in two steps: a gate refuses what cannot follow from the motion so far, a Kalman filter
 # with constant velocity smooths the rest. What remains is the systematic error, which
 # no filter sees. Chapter 8 builds this filter.
 #

@@ -90,6 +90,16 @@ STOPS = [
                 id="mean_quaternion-sum",
             ),
             Mistake(
+                lambda q: (q * np.where(q @ q[0] < 0, -1.0, 1.0)[:, None]).mean(axis=0),
+                "The signs are right, but a mean of unit vectors that scatter is shorter than 1: divide it by its length.",
+                id="mean_quaternion-short",
+            ),
+            Mistake(
+                lambda q: np.median(q * np.where(q @ q[0] < 0, -1.0, 1.0)[:, None], axis=0),
+                "The signs are right, but this is the median of each part. Asked for is the mean, of length 1.",
+                id="mean_quaternion-median",
+            ),
+            Mistake(
                 lambda q: q[0],
                 "This is the first reading alone.",
                 id="mean_quaternion-one",
