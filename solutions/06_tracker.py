@@ -516,9 +516,10 @@ ex.predict("moved", guess, reveal=stages.moved_station)
 # %% moved-then [markdown]
 # A station that stood askew from the beginning turns the whole world a little, and the
 # reset into $W$ takes that up: $E_{trans}$ stays near the noise. One that moves during
-# the run makes two worlds, one that drifts makes a new one at every stop, and no mounting fits them all.
-# **By how many milliradians must it turn after stop 10, to make all of the $E_{trans}$
-# that the report prints, 0.802 mm?** Use the knob, or `stages.compute_moved_station`.
+# the run makes two worlds, one that drifts makes a new one at every stop, and no
+# mounting fits them all. **By how many milliradians must it turn after stop 10, to make
+# all of the $E_{trans}$ that the report prints, 0.802 mm?** Use the knob, or
+# `stages.compute_moved_station`.
 
 # %% knock
 knock = ...  # your code here
@@ -693,9 +694,9 @@ for name, chosen in (("all readings", sound | ~sound), ("without nonsense", soun
 
 # %% in-practice [markdown]
 # The report asks for "advanced filtering" in its conclusion. The lines "gated" of the
-# four motions above did it in two steps: a gate refuses what cannot follow from the motion so far, a Kalman filter
-# with constant velocity smooths the rest. What remains is the systematic error, which
-# no filter sees. Chapter 8 builds this filter.
+# four motions above did it in two steps: a gate refuses what cannot follow from the
+# motion so far, a Kalman filter with constant velocity smooths the rest. What remains
+# is the systematic error, which no filter sees. Chapter 8 builds this filter.
 #
 # ## In practice
 #
