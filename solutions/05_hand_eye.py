@@ -624,7 +624,8 @@ def design_poses(T_FS, target, rng):
 # %% break-it [markdown]
 # ## Break it
 #
-# Some motions teach nothing. A good function names the missing one. The two methods of the thesis's section 2.6 refuse this data for the same kind of reason.
+# Some motions teach nothing. A good function names the missing one. The two methods of the thesis's section 2.6, by Kim, Cho and Kim and by Li et al. (the next
+# section tells how they work), refuse the 31 poses for the same kind of reason.
 
 # %% break-it-code
 shifted = np.tile(corrected.T_BF[0], (6, 1, 1))
@@ -730,7 +731,7 @@ def by_kim(scene):
 
 
 # %% price-text [markdown]
-# How do both compare with the joint solution on the same poses? Below, 150 scenes with 0.1 mm of noise, the errors of the translation, and the Cramér-Rao bound of a sphere: no unbiased method
+# How do both compare on the same poses with the joint fit, of scanner and sphere center at once? Below, 150 scenes with 0.1 mm of noise, the errors of the translation, and the Cramér-Rao bound of a sphere: no unbiased method
 # can have less. Decide first.
 
 # %% predict-price

@@ -777,6 +777,10 @@ ex.predict("returns", guess, reveal=stages.whole_cell)
 # is then $R\exp(\varphi)\,p + t + d$. To first order that is
 # $R\,p + t - R\,[p]\,\varphi + d$, with $[p]$ the matrix of the cross product: a
 # rotation acts by its lever. For $e_A = J e$ the covariance is $J\,\Sigma\,J^\top$.
+#
+# The scanner's pose is known to 1 mm per axis at worst, and to 0.2°. **How well is then
+# a mark known that it sees 215 mm away?** Decide before the second cell below prints
+# it, with all of the covariance and with its variances alone.
 
 # %% point_covariance
 @ex.point_covariance
@@ -810,7 +814,8 @@ for name, cov in (("with its correlations", joint), ("its variances alone", apar
 #
 # Six sources know nothing of each other: three calibrations, the marks, two readings.
 # `jacobians` says how the tip's miss moves with each of them, all ways by which a
-# source enters added up; $T_{BW}$ enters twice. Write down what each contributes.
+# source enters added up; $T_{BW}$ enters twice. Which of the six contributes most?
+# Write down what each does.
 
 # %% shares
 @ex.shares

@@ -1310,12 +1310,12 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: beyond.tipping_weight(criteria=(2, 3)),
-                    "You weighted taking the data as well. Only solving, the last criterion, counts w times.",
+                    "That is the weight of taking the data and solving together. Only solving, the last criterion, counts w times.",
                     id="tipping-both",
                 ),
                 Mistake(
                     lambda: beyond.tipping_weight(criteria=(2,)),
-                    "You weighted taking the data, the third criterion. Solving is the last one.",
+                    "That is where both draw level if taking the data, the third criterion, is weighted. Solving is the last one.",
                     id="tipping-third",
                 ),
                 Mistake(

@@ -333,7 +333,7 @@ CAD_LENGTH = Value(
     mistakes=[
         Mistake(
             lambda: length_with("calibrated"),
-            "This is the length with the calibrated pose. Take `cad`.",
+            "This is the true length, which the calibrated pose gives. Take `cad`.",
             id="length-calibrated",
         ),
         Mistake(

@@ -783,28 +783,28 @@ CELL = [
         mistakes=[
             Mistake(
                 lambda: budget()[1] / 2,
-                "You halved the whole. Only one of six sources gets better.",
+                "This is half of the whole. Only one of six sources gets better.",
                 id="halved-all",
             ),
             Mistake(
                 lambda: budget()[1] - budget()[0]["tracker"] / 2,
-                "You subtracted half of the share. Standard deviations do not add, their squares do.",
+                "This is the total less half of the largest share. Standard deviations do not add, their squares do.",
                 id="halved-linear",
             ),
             Mistake(
                 lambda: _improved(np.sqrt(0.5)),
-                "You halved the variance. Half the standard deviation leaves a quarter of the variance.",
+                "This is the total with half of the variance. Half the standard deviation leaves a quarter of it.",
                 id="halved-variance",
             ),
             Mistake(
                 lambda: _improved(0.0),
-                "You left the source out. Half of its standard deviation remains.",
+                "This is the total without that source. Half of its standard deviation remains.",
                 id="halved-removed",
             ),
             *(
                 Mistake(
                     lambda source=source: _improved(0.5, source),
-                    "You improved a source that is not the largest.",
+                    "This is the total when a source is improved that is not the largest.",
                     id=f"halved-{source.replace(' ', '-')}",
                 )
                 for source in ("scanner", "tip", "marks", "first reading")
