@@ -1459,6 +1459,10 @@ CHAPTER = Chapter(
                     "Right to first order. Over a long way the arc bends: use the circle itself.",
                 ),
                 Mistake(
+                    _offset(lambda d, turn, way: way * turn / 2),
+                    "Right to first order. Over a long way the arc bends, and the middle goes farther than counted: use the circle.",
+                ),
+                Mistake(
                     _offset(lambda d, turn, way: d * np.sin(turn / 2)),
                     "The direction of the chord is right. The chord is shorter than the arc: times sin(h) / h, h half the turn.",
                 ),

@@ -157,19 +157,27 @@ def log_weights(rng, level):
 LOG_WEIGHTS = tuple(functools.partial(log_weights, level=level) for level in (-2000.0, -1.0, 900.0))
 
 
-def cycle_of_weights(rng, due):
-    """Weights, a likelihood for each particle, the number of the step, and the length of a cycle; due: at its end."""
+def cycle_of_weights(rng, step):
+    """Weights, a likelihood for each particle, the number of the step, and the length of a cycle; step: (rng, n) -> k."""
     m, n = rng.integers(5, 12), int(rng.integers(3, 7))
-    step = n * int(rng.integers(2, 6)) + (0 if due else int(rng.integers(1, n)))
     weights = rng.uniform(0.1, 1, m)
-    return weights / weights.sum(), rng.uniform(0.01, 3, m), step, n
+    return weights / weights.sum(), rng.uniform(0.01, 3, m), int(step(rng, n)), n
+
+
+# The first step, the end of the first cycle, of a later one, and in between
+STEPS = (
+    lambda rng, n: n * rng.integers(2, 6),
+    lambda rng, n: n * rng.integers(2, 6) + rng.integers(1, n),
+    lambda rng, n: 1,
+    lambda rng, n: n,
+)
 
 
 def row_of_depths(rng):
-    """Depths of a row of columns, some too near, too far or missing; opening angle and limits."""
+    """Depths of a row of columns, some too near, too far, on a limit or missing; opening angle and limits."""
     n, near, far = int(rng.integers(12, 24)), float(rng.uniform(0.4, 1.0)), float(rng.uniform(3.0, 5.0))
     depth = rng.uniform(1.1 * near, 0.95 * far, n)
-    depth[rng.choice(n, 4, replace=False)] = 0.0, 0.6 * near, 1.2 * far, 1.5 * far
+    depth[rng.choice(n, 6, replace=False)] = 0.0, 0.6 * near, near, far, 1.2 * far, 1.5 * far
     return depth, float(rng.uniform(0.7, 1.6)), near, far
 
 
@@ -1538,7 +1546,7 @@ CHAPTER = Chapter(
         Exercise(
             "multiply_weights",
             reference=multiply_weights,
-            draw=tuple(functools.partial(cycle_of_weights, due=due) for due in (True, False)),
+            draw=tuple(functools.partial(cycle_of_weights, step=step) for step in STEPS),
             metric=metrics.Several(metrics.Numbers(1e-9), metrics.Exactly(), names=("weights", "resample")),
             hints=(
                 "Between two resamplings a particle collects the likelihoods of all measurements. How do they combine?",
@@ -1581,6 +1589,10 @@ CHAPTER = Chapter(
                 Mistake(
                     _cycle(due=lambda k, n: k == n),
                     "The weights are right. You resample once, in step n: every n-th is meant.",
+                ),
+                Mistake(
+                    _cycle(due=lambda k, n: n % k == 0),
+                    "The weights are right. The remainder is that of step by n, not of n by step.",
                 ),
                 Mistake(
                     _cycle(due=lambda k, n: k % n == 1), "The weights are right. You resample one step after the n-th."
@@ -1648,6 +1660,10 @@ CHAPTER = Chapter(
                 Mistake(
                     _depth(angle=lambda u, fov: np.arctan((u + 1 / len(u)) * math.tan(fov / 2))),
                     "Half a column aside: the middle of column k is at k + 0.5.",
+                ),
+                Mistake(
+                    _depth(seen=lambda d, near, far: (d > near) & (d < far)),
+                    "A depth of exactly `near` or `far` is seen as well.",
                 ),
                 Mistake(
                     _depth(seen=lambda d, near, far: d > 0), "Depths outside of near and far are no readings either."

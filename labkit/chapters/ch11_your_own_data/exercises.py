@@ -59,12 +59,17 @@ def covariance_and_reading(rng):
     return C, rng.normal(size=(int(rng.integers(1, len(C))), len(C))) * rng.uniform(0.3, 2.0)
 
 
-def covariance_and_candidates(rng):
-    """A covariance and derivatives of possible readings among which every wrong rule picks another one."""
+def covariance_and_candidates(rng, noise_tells=False):
+    """A covariance and derivatives of possible readings among which every wrong rule picks another one.
+
+    noise_tells: among which the rule that forgets the noise of a reading picks another one.
+    """
     while True:
         C, m = information(rng), int(rng.integers(7, 13))
         candidates = rng.normal(size=(m, int(rng.integers(2, 4)), len(C))) * rng.uniform(0.2, 2.0, (m, 1, 1))
-        picks = [rule(C, candidates) for rule in (next_pose, *WRONG_RULES)]
+        picks = [
+            rule(C, candidates) for rule in (next_pose, *((_least_certain_volume,) if noise_tells else WRONG_RULES))
+        ]
         if len({*picks, picks[0] + 1}) == len(picks) + 1:
             return C, candidates
 
@@ -156,6 +161,10 @@ def _largest_volume(C, candidates):
 
 def _least_certain(C, candidates):
     return int(np.argmax(((candidates @ C) * candidates).sum((1, 2))))
+
+
+def _least_certain_volume(C, candidates):
+    return int(np.argmax(np.linalg.det(candidates @ C @ np.swapaxes(candidates, 1, 2))))
 
 
 WRONG_RULES = (_smallest_trace, _largest_derivative, _largest_volume, _least_certain)
@@ -399,7 +408,7 @@ CHAPTER = Chapter(
         Exercise(
             "next_pose",
             reference=next_pose,
-            draw=covariance_and_candidates,
+            draw=tuple(functools.partial(covariance_and_candidates, noise_tells=tells) for tells in (False, True)),
             metric=metrics.Exactly(),
             hints=(
                 "Compute what each candidate would leave, and compare one number of it.",
@@ -408,10 +417,11 @@ CHAPTER = Chapter(
                 "return int(np.argmin(left))`",
             ),
             mistakes=[
-                Mistake(_smallest_trace, "You compared the traces. They add squares of different units, and the largest unit decides alone: compare determinants."),
+                Mistake(_smallest_trace, "You took the candidate with the smallest trace. A trace adds squares of different units, and the largest unit decides alone: compare determinants."),
                 Mistake(_largest_derivative, "You took the candidate with the largest derivative. It may well tell what is known already: compute what it leaves."),
                 Mistake(_largest_volume, "You took the candidate that leaves most unknown: the smallest determinant is the best."),
                 Mistake(_least_certain, "You took the reading that can be predicted least. Its numbers may all say the same: compare the determinants of what is left."),
+                Mistake(_least_certain_volume, "You took the candidate with the largest det(J C J^T), the numbers that can be predicted least. They have noise as well: det(J C J^T + I)."),
                 Mistake(lambda C, c: next_pose(C, c) + 1, "Candidates count from 0."),
                 Mistake(lambda C, c: c[next_pose(C, c)], "This is the candidate's derivative. Asked for is its number."),
                 Mistake(lambda C, c: float(_volumes(C, c).min()), "This is the determinant it leaves. Asked for is the candidate's number."),
