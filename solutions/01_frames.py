@@ -335,8 +335,8 @@ guess = "only about z"
 ex.predict("svd", guess, reveal=stages.svd_against_gram_schmidt)
 
 # %% kabsch [markdown]
-# Five lines do it. With $p_i$ and $q_i$ measured from their means, the rotation that turns
-# the $p_i$ best onto the $q_i$ follows from the SVD $\sum p_i q_i^\top = U S V^\top$ as
+# Five lines do it. With the points $p_i$ in F and $q_i$ in W, both measured from their means,
+# the rotation that turns the $p_i$ best onto the $q_i$ follows from the SVD $\sum p_i q_i^\top = U S V^\top$ as
 # $R = V U^\top$; where that is a mirror image, the last column of $V$ changes its sign.
 
 # %% fit_frame

@@ -376,7 +376,8 @@ for way in (2.0, 14.0, 50.0):
 
 # %% unlike-wheels-said [markdown]
 # Noise that changes from meter to meter partly cancels: its mark grows with the power 1.5 of
-# the way. A wrong radius never cancels: it grows with the square, until the circle closes.
+# the way. A wrong radius never cancels: its mark grows with the square, as long as the robot
+# has turned little.
 # Nothing in $\Sigma_x$ tells of it. The remedy is to measure it: drive a long line, look
 # where you are, correct the radius (question 2 below asks what you would see).
 
@@ -386,8 +387,9 @@ for way in (2.0, 14.0, 50.0):
 # "Ackermann- und Mecanumantrieb werden analog behandelt", says the lecture, and leaves it to
 # you. The integration stays; only the way from the wheels to the body's velocity is new.
 #
-# A **car** (*Ackermann*) steers its front wheels by an angle $\delta$. All wheels roll about
-# one point, on the line of the rear axle. The robot's origin is the middle of that axle,
+# A **car** (*Ackermann*) steers in front. All wheels roll about one point, on the line of the
+# rear axle; for that the inner front wheel turns more than the outer one. The angle $\delta$
+# is that of a wheel in the middle between both. The robot's origin is the middle of the rear axle,
 # $v$ its speed, $L$ the distance between the axles.
 
 # %% ackermann_twist
@@ -401,8 +403,9 @@ def ackermann_twist(speed, steering, wheelbase):
 
 
 # %% mecanum [markdown]
-# A **Mecanum** wheel carries rollers at 45°. Four of them let a robot drive sideways. With
-# half length $a$ and half width $b$ of the robot, the rims run at
+# A **Mecanum** wheel carries rollers at 45°. Four of them let a robot drive sideways: $v_x$
+# ahead, $v_y$ to the left. The wheels, front left (FL) to rear right (RR), stand $a$ before or
+# behind the middle (half length) and $b$ beside it (half width). Their rims run at
 #
 # $$\begin{aligned}
 # w_\mathrm{FL} &= v_x - v_y - (a + b)\,\omega, &
@@ -411,7 +414,7 @@ def ackermann_twist(speed, steering, wheelbase):
 # w_\mathrm{RR} &= v_x - v_y + (a + b)\,\omega .
 # \end{aligned}$$
 #
-# Turn it around. The wheels slip, so the four numbers never fit exactly: take what fits best.
+# Turn it around. The wheels slip, so four measured numbers hardly fit exactly: take what fits best.
 
 # %% mecanum_twist
 @ex.mecanum_twist

@@ -71,7 +71,7 @@ def update(x, cov, z, C, cov_z):
 
 
 # %% printed-filter [markdown]
-# The slide's header reads `KalmanFilter(x_k, u_k, z_k+1)`, its last line `return x_k+1`.
+# The header of that slide's algorithm reads `KalmanFilter(x_k, u_k, z_k+1)`, its last line `return x_k+1`.
 # **What is missing to call it step after step?**
 
 # %% predict-printed
@@ -486,7 +486,7 @@ print("all at once", np.round(at_once, 4), "std",
       np.round(np.sqrt(np.diag(cov_at_once)), 4))
 
 # %% batch-said [markdown]
-# The same, to the last digits: a Kalman filter *is* least squares, done step by step. Where a
+# The same, to every printed digit: a Kalman filter *is* least squares, done step by step. Where a
 # model is linear nothing is lost by forgetting the readings. Where it is not, the extended
 # filter linearizes each reading where it stood *then*; all at once can linearize anew.
 

@@ -161,7 +161,7 @@ def log_sum_exp(log_weights):
 
 
 # %% beams [markdown]
-# A scan has 541. With all weights zero there is nothing to draw from. A sum of *log densities*, each from its formula, stays finite (the logarithm of a density that has become zero does not:
+# A scan has 541 beams, so its product is zero. With all weights zero there is nothing to draw from. A sum of *log densities*, each from its formula, stays finite (the logarithm of a density that has become zero does not:
 # it is $-\infty$). Subtracting the largest sum first makes the best particle weigh $e^0 = 1$ (`particles.normalize_weights`).
 #
 # ## Weighing by beams
@@ -341,8 +341,8 @@ for n in (1, 10, 40):
     print(f"N = {n:2}: descendants of {len(set(alive.tolist())):3} particles are left")
 
 # %% every-nth-said [markdown]
-# Fewer draws, fewer losses. And the price: between two resamplings the weight gathers on few
-# particles, while the others are moved and weighed for nothing. The filter of the arena
+# Fewer draws, fewer losses. And the price: between two resamplings a sensor that does tell
+# something gathers the weight on few particles; the others are moved and weighed for nothing. The filter of the arena
 # composes both: `mcl.every(n) & mcl.when_effective_below(share)`.
 
 # %% together [markdown]
@@ -483,8 +483,9 @@ for name, one in (("laser", sensors.Scanner()), ("camera", sensors.XTION)):
 
 # %% camera-said [markdown]
 # In the table above the rows *camera* are the global localization with it: the same filter,
-# the same particles, the same 60 steps. **Where does the difference come from**, from the
-# reach or from the opening angle? Make a `sensors.Scanner` that has one of both, and look.
+# the same particles, the same 60 steps. **What makes more beams of the camera miss every
+# wall**, the reach or the opening angle? Put a `sensors.Scanner` with one of both into the
+# cell, and look.
 
 # %% beyond [markdown]
 # ## Beyond the document: fewer particles when fewer will do

@@ -77,12 +77,12 @@ def motions(T_BF, T_ST):
 A, B = motions(robot.T, sensor.T)
 (angle_A, shift_A), (angle_B, shift_B) = motion.screw(A), motion.screw(B)
 angles, shifts = np.rad2deg(angle_A - angle_B), shift_A - shift_B
-for i in range(0, 23, 3):
+for i in range(0, len(angles), 3):
     off = f"{angles[i]:6.3f} deg, shifts by {shifts[i]:6.3f} mm"
     print(f"rows {i + 1:2} to {i + 2:2}: angles differ by {off}")
 
 # %% inverted [markdown]
-# The commonest fault of all is a file that holds the inverse: the camera in the board instead of the board in the camera. **Which of these numbers changes when one file holds the inverse poses?** Decide, then choose the cell *swapped role* and invert its second file; the clock of the third cell has a slider.
+# A common fault is a file that holds the inverse: the camera in the board instead of the board in the camera. **Which of these numbers changes when one file holds the inverse poses?** Decide, then choose the cell *swapped role* and invert its second file; the clock of the third cell has a slider.
 
 # %% predict-inverted
 guess = ...  # your code here
@@ -133,7 +133,7 @@ except ValueError as refusal:
 # | points, and where they should be | chapter 1 | `frame` |
 # | two streams with times | chapter 6, two clocks | `compare` |
 #
-# Both files exchanged, or both inverted, close the loop as well: then the result is the target's pose, and no data can tell. Only you know what hangs on the flange.
+# Both files exchanged, or both inverted, close the loop as well: then the result is the target's pose (exchanged: its inverse), and no data can tell. Only you know what hangs on the flange.
 #
 # ## Read the report
 
@@ -143,7 +143,7 @@ display(slipped)
 
 # %% report-text [markdown]
 # In a terminal, `python lab.py calibrate hand-eye --robot R --sensor S --out report` writes the same as a page with charts, and a view you can turn. Read it from the top: how many rows agree, what disagrees, and how. A few rejected rows here and there are bad readings.
-# A block of them that agrees with itself is a second mounting. Suppose nobody had looked, and all 24 rows had been fitted: the result keeps that fit as `slipped.plain`. **How far from the right place would it have put the sensor, in mm?**
+# A block of them that agrees with itself is a second mounting. Suppose nobody had looked, and all 24 rows had been fitted: the result keeps that fit as `slipped.plain`. **How far from where the rows that agree put the sensor would it have put it, in mm?**
 
 # %% slip_cost
 slip_cost = ...  # your code here
@@ -200,7 +200,8 @@ ex.predict("drop", guess, reveal=stages.pose_left_out)
 # %% honest-text [markdown]
 # ## An honest covariance
 #
-# With noise of standard deviation $s$ the parameters have the covariance $s^2 (J^\top J)^{-1}$. But $s$ comes from the same few residuals: $s^2 = r^\top r / f$, $f = n - p$. An error divided by an *estimated* standard deviation follows Student's law, whose variance is $f/(f-2)$.
+# With noise of standard deviation $s$ the parameters have the covariance $s^2 (J^\top J)^{-1}$. But $s$ comes from the same few residuals: $s^2 = r^\top r / f$, $f = n - p$. An error divided by an *estimated* standard deviation follows Student's law, whose variance is $f/(f-2)$. Angles and lengths have noises of their own: four poses
+# leave 24 numbers less 12 parameters, of which six belong to each.
 # **Four poses, noise estimated, that factor forgotten: how often does the truth lie farther away than two of the standard deviations told?**
 
 # %% predict-coverage
@@ -290,7 +291,7 @@ print("rms error of 100 calibrations:  ", rms)
 print("over what was predicted:        ", rms / before.next_std[3, 3:])
 
 # %% held-text [markdown]
-# A hundred errors know their own rms to 7 %. Within that, the prediction held. Where yours does not, in your own cell, the model is wrong and not the arithmetic: a target that bends, a robot that is not exact, readings that share an error.
+# A hundred errors know their own rms to 7 % (one standard deviation): ratios from 0.86 to 1.14 are what chance leaves. Within that, the prediction held. Where yours does not, in your own cell, the model is wrong and not the arithmetic: a target that bends, a robot that is not exact, readings that share an error.
 #
 # ## What the four documents would have needed
 #
@@ -352,7 +353,7 @@ for name, files in attempts.items():
 # %% yours [markdown]
 # ## Yours
 #
-# Put two files of your own beside this notebook, their names into the cell *the data*, and run on from there; or let the command write the report. Formats and options stand in `docs/calibrate.md`.
+# Put two files of your own beside this notebook, their names into the cell *the data*, and run on from there; or let the command write the report. (`ex.slip_cost` knows our cell only.) Formats and options stand in `docs/calibrate.md`.
 # Before you sign: the line of what was assumed; the angles of the motions; the rejected rows, with a reason for each; the weak direction; one calibration from half of the rows beside one from the other half.
 #
 # ## In practice
@@ -361,7 +362,7 @@ for name, files in attempts.items():
 # - Tilt about two axes at least, as far as the sensor sees the target.
 # - Measure the first pose again at the end: a screw that slipped shows there.
 # - One clock, or a motion that turns quickly, so that two can be aligned.
-# - Keep three poses out of the fit. They are the only ones that can contradict you.
+# - Keep three poses out of the fit. They have pulled nothing toward themselves.
 
 # %% questions [markdown]
 # ## Three questions, to answer in words
