@@ -1614,11 +1614,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _mecanum(signs=((1, 1, 1, 1), (-1, 1, -1, 1), (-1, 1, 1, -1)), lever=lambda a, b: a + b),
-                    "The signs of v_y and omega are exchanged.",
-                ),
-                Mistake(
-                    lambda w, a, b: mecanum_twist(w[[0, 1, 3, 2]], a, b),
-                    "The order of the wheels is front left, front right, rear left, rear right.",
+                    "v_y and omega have each other's signs, as if the rear wheels had changed places. The order is front left, "
+                    "front right, rear left, rear right.",
                 ),
                 Mistake(
                     lambda w, a, b: np.array([w.mean(), 0.0, mecanum_twist(w, a, b)[2]]),

@@ -164,10 +164,11 @@ def cycle_of_weights(rng, step):
     return weights / weights.sum(), rng.uniform(0.01, 3, m), int(step(rng, n)), n
 
 
-# The first step, the end of the first cycle, of a later one, and in between
+# The end of a later cycle, the step before it and after it, the first step, the end of the first cycle
 STEPS = (
     lambda rng, n: n * rng.integers(2, 6),
-    lambda rng, n: n * rng.integers(2, 6) + rng.integers(1, n),
+    lambda rng, n: n * rng.integers(2, 6) - 1,
+    lambda rng, n: n * rng.integers(2, 6) + 1,
     lambda rng, n: 1,
     lambda rng, n: n,
 )
