@@ -1552,7 +1552,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda v, d, L: np.array([v, 2 * v * np.tan(d) / L]),
-                    "Half the wheelbase would be right for a car whose rear wheels steer as well.",
+                    "Half the wheelbase would be right for a car whose rear wheels steer as far the other way.",
                 ),
                 Mistake(
                     lambda v, d, L: np.array([v, v * np.cos(d) / L]),

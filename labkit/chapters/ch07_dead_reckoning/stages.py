@@ -530,7 +530,7 @@ def reach():
         handles={"G": Handle((1.2, 0.6), step=0.1, label="the spot, in the first picture")},
         controls={"heading_deg": Slider(-180.0, 180.0, 50.0, step=5.0, label="heading on the spot (deg)")},
         fail={"G": (0.0, 1.0), "heading_deg": 0.0},
-        because="The goal lies straight beside the robot, and wheels that roll do not go sideways.",
+        because="The spot lies straight beside the robot, and wheels that roll do not go sideways.",
         presets={"U-turn": {"G": (0.0, 0.0), "heading_deg": 180.0}},
         size=(7.0, 3.0),
         describe=_reach_sentence,
