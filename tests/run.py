@@ -28,6 +28,7 @@ from labkit.verbs import build
 
 ROOT = source.ROOT
 SECONDS_A_JOB = 900
+UNITS = 4  # jobs of unit tests: short ones fill both processors to the end
 APART = ("browser", "hub")  # folders of tests that are jobs of their own
 COUNTED = ("passed", "failed", "error", "skipped", "xfailed")
 
@@ -70,7 +71,8 @@ def stirred_jobs(names, seed):
     """{name: seed} of the jobs that run with stirred last bits."""
     if seed is not None:
         return {name: seed for name in names if name.startswith(("named", "unit", "solved"))}
-    return {name: 1 for name in names if name == "unit tests 2" and os.environ.get("CI") == "true"}
+    even = [name for name in names if name.startswith("unit tests") and int(name.split()[-1]) % 2 == 0]
+    return dict.fromkeys(even, 1) if os.environ.get("CI") == "true" else {}
 
 
 def scratch_folder():
@@ -85,9 +87,8 @@ def all_jobs(scratch):
     units = sorted(str(path) for path in (ROOT / "tests").glob("**/test_*.py") if path.parent.name not in APART)
     solved = sorted(str(path) for path in (ROOT / "solutions").glob("[0-9][0-9]_*.ipynb"))
     jobs = {
-        "unit tests 1": units[0::2],
-        "unit tests 2": units[1::2],
         **{name: [str(ROOT / "tests" / name)] for name in APART},
+        **{f"unit tests {k + 1}": units[k::UNITS] for k in range(UNITS)},
         "solved notebooks 1": ["--nbval", *solved[0::2]],
         "solved notebooks 2": ["--nbval", *solved[1::2]],
     }
