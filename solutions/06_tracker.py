@@ -30,7 +30,7 @@ from labkit.documents.report import printed as report
 from labkit.documents.report.reconstruction import synthetic_mountings, synthetic_table
 from labkit.exercises import course
 from labkit.geometry.frames import relative, rotation_angle
-from labkit.machines import accuracy, arm, simulation, udp
+from labkit.machines import arm, simulation, tracking, udp
 from labkit.machines.log import average_stops, read_csv
 from labkit.machines.mounting import calibrate_mounting
 from labkit.tables import DATA, read_table
@@ -624,12 +624,12 @@ def time_offset(time, reference, delayed, max_offset=0.2):
 # %% four-motions
 for name in ("slow", "middle", "fast", "rotation"):
     m = simulation.simulate_motion(name, np.random.default_rng(5))
-    lag = time_offset(m.time, accuracy.speeds(m.time, m.T_true)[1], m.w_read)
-    errors = accuracy.tracking_errors(m.time, m.T_true, m.T_read)
-    raw = accuracy.summarize(errors.translation)
-    then = accuracy.shift_time(m.time, m.T_true, -lag)
-    smooth, gate = accuracy.filter_positions(m.time, m.T_read[:, :3, 3])
-    left = accuracy.summarize(np.linalg.norm(smooth - then[:, :3, 3], axis=1))
+    lag = time_offset(m.time, tracking.speeds(m.time, m.T_true)[1], m.w_read)
+    errors = tracking.tracking_errors(m.time, m.T_true, m.T_read)
+    raw = tracking.summarize(errors.translation)
+    then = tracking.shift_time(m.time, m.T_true, -lag)
+    smooth, gate = tracking.filter_positions(m.time, m.T_read[:, :3, 3])
+    left = tracking.summarize(np.linalg.norm(smooth - then[:, :3, 3], axis=1))
     words = ", ".join(f"{k} {v:.0f}" for k, v in raw.items())
     print(f"{name:9} lag {1000 * lag:4.0f} ms   raw: {words} mm")
     print(f"{'':21} gated: mean {left['mean']:.1f}, max {left['max']:.1f} mm,", end=" ")
@@ -673,8 +673,8 @@ def static_error_and_lag(speed, error):
 speed, error = [], []
 for k, name in enumerate(simulation.MOTIONS):
     m = simulation.simulate_motion(name, np.random.default_rng([3, k]))
-    e = accuracy.tracking_errors(m.time, m.T_true, m.T_read)
-    speed.append(accuracy.speeds(m.time, m.T_true)[0])
+    e = tracking.tracking_errors(m.time, m.T_true, m.T_read)
+    speed.append(tracking.speeds(m.time, m.T_true)[0])
     error.append(e.translation)
 speed, error = np.concatenate(speed), np.concatenate(error)
 sound = error < 100  # far below the nonsense, far above all else

@@ -30,7 +30,7 @@ from labkit.estimation import kalman
 from labkit.exercises import course
 from labkit.localization import ekf, odometry
 from labkit.machines import simulation
-from labkit.machines.accuracy import shift_time
+from labkit.machines.tracking import shift_time
 
 ex = course("08-kalman")
 np.set_printoptions(precision=4, suppress=True)

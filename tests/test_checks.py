@@ -25,7 +25,6 @@ from labkit.localization import ekf, lateration, maps, mcl, odometry, particles
 from labkit.localization.drives import find_route, follow
 from labkit.localization.sensors import LikelihoodField, Scanner, beam_density, see_landmarks, weigh_doors
 from labkit.machines import simulation, udp
-from labkit.machines.accuracy import filter_positions, shift_time, speeds, summarize, time_offset, tracking_errors
 from labkit.machines.arm import (
     HOME,
     TX40,
@@ -41,6 +40,7 @@ from labkit.machines.arm import (
 from labkit.machines.log import mean_pose, reject_outliers
 from labkit.machines.mounting import e_rot, e_trans
 from labkit.machines.packet import encode_packet, packet_from_pose
+from labkit.machines.tracking import filter_positions, shift_time, speeds, summarize, time_offset, tracking_errors
 
 I3, I4, O2, O3 = np.eye(3), np.eye(4), np.zeros(2), np.zeros(3)
 POSES = np.tile(I4, (5, 1, 1))

@@ -7,7 +7,7 @@ packet         the tracker's packets
 log            its logs, and the means of its stops
 mounting       where the tracker sits on the flange, by the report's method
 stations       base stations: sweeps become angles, rays, places, poses
-accuracy       how well it follows a motion
+tracking       how well it follows a motion
 simulation     its errors, simulated
 udp            its packets as a live stream
 cell           one cell from frames to tip: a part found with all of its calibrations, and the budget

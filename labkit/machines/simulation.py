@@ -15,10 +15,10 @@ import numpy as np
 from ..checks import as_count, as_positive_number
 from ..geometry.frames import invert, matrix_from_quaternion, pose
 from ..geometry.lie import exp_so3
-from .accuracy import shift_time, speeds
 from .arm import HOME, RAMP, TX40, forward_kinematics, measuring_poses, rotation_only, smooth_motion, tool_pose
 from .log import Log
 from .packet import POSITION, TIME, encode_packet, packet_from_pose
+from .tracking import shift_time, speeds
 
 RATE = 250.0  # Hz, wireless (report, section 2)
 STOPS, STOP_TIME, RUNS = 21, 4.0, 6  # report, section 3.1

@@ -137,7 +137,7 @@ ELSEWHERE = {  # modules whose tests stand in files of another name
     "machines/packet": ("machines/test_tracker.py", "machines/test_udp.py"),
     "machines/log": ("machines/test_tracker.py",),
     "machines/mounting": ("machines/test_tracker.py",),
-    "machines/accuracy": ("machines/test_tracker.py",),
+    "machines/tracking": ("machines/test_tracker.py",),
     "machines/simulation": ("machines/test_tracker.py",),
     "localization/ekf": ("estimation/test_kalman.py",),
     "localization/locate": ("localization/test_path.py", "verbs/test_localize_command.py"),

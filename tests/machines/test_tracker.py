@@ -13,16 +13,6 @@ from labkit.documents.report.reconstruction import synthetic_mountings
 from labkit.geometry.frames import invert, pose, pose_distance
 from labkit.geometry.lie import exp_so3, log_so3
 from labkit.machines import simulation
-from labkit.machines.accuracy import (
-    filter_positions,
-    median_over_speed,
-    shift_time,
-    speeds,
-    static_error_and_lag,
-    summarize,
-    time_offset,
-    tracking_errors,
-)
 from labkit.machines.arm import TX40, forward_kinematics
 from labkit.machines.log import (
     Log,
@@ -45,6 +35,16 @@ from labkit.machines.packet import (
     poses_from_packets,
 )
 from labkit.machines.simulation import T_FE
+from labkit.machines.tracking import (
+    filter_positions,
+    median_over_speed,
+    shift_time,
+    speeds,
+    static_error_and_lag,
+    summarize,
+    time_offset,
+    tracking_errors,
+)
 from labkit.tables import DATA, read_table
 
 

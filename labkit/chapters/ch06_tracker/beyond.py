@@ -12,10 +12,10 @@ from ...geometry.frames import invert, matrix_from_quaternion, pose, quaternion_
 from ...geometry.lie import exp_so3, skew
 from ...geometry.propagation import error_budget, point_covariance
 from ...machines import cell, simulation, stations
-from ...machines.accuracy import static_error_and_lag
 from ...machines.arm import TX40, tool_pose
 from ...machines.log import mean_quaternion
 from ...machines.mounting import calibrate_mounting
+from ...machines.tracking import static_error_and_lag
 
 # The mean of a stop ----------------------------------------------------------------------------------------------------------
 

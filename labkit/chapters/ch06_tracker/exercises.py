@@ -13,11 +13,11 @@ from ...geometry import lie
 from ...geometry.frames import invert, pose, relative, unit_vector
 from ...geometry.lie import exp_so3
 from ...machines import packet, simulation
-from ...machines.accuracy import time_offset
 from ...machines.arm import TX40, dh_matrix, forward_kinematics
 from ...machines.log import average_stops, reject_outliers
 from ...machines.mounting import calibrate_mounting, e_rot, e_trans
 from ...machines.packet import POSITION, QUATERNION, TIME, encode_packet, packet_from_pose
+from ...machines.tracking import time_offset
 from . import beyond
 
 # Packets ---------------------------------------------------------------------------------------------------------------------

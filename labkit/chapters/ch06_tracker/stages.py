@@ -14,16 +14,6 @@ from ...fast.ax_xb import calibrate_hand_eye, solve_ax_xb
 from ...geometry.frames import invert, matrix_from_quaternion, pose, pose_distance, transform, unit_vector
 from ...geometry.lie import exp_so3
 from ...machines import cell, simulation, stations, udp
-from ...machines.accuracy import (
-    filter_positions,
-    median_over_speed,
-    shift_time,
-    speeds,
-    static_error_and_lag,
-    summarize,
-    time_offset,
-    tracking_errors,
-)
 from ...machines.arm import (
     HOME,
     REACH_FOREARM,
@@ -40,6 +30,16 @@ from ...machines.log import reject_outliers
 from ...machines.mounting import calibrate_mounting
 from ...machines.packet import POSITION, QUATERNION, TIME, packet_from_pose
 from ...machines.simulation import T_FE, Tracker
+from ...machines.tracking import (
+    filter_positions,
+    median_over_speed,
+    shift_time,
+    speeds,
+    static_error_and_lag,
+    summarize,
+    time_offset,
+    tracking_errors,
+)
 from ...stage import Choice, Handle, Play, Slider, Stage, Toggle, style
 from ...stage.scene3d import Scene, View
 from ...stage.scene3d_handles import Dial, Free, OnSphere

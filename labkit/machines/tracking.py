@@ -12,7 +12,7 @@ from ..checks import as_finite, as_number, as_points, as_positive_number, as_sha
 from ..geometry.frames import pose, pose_distance
 from ..geometry.lie import log_so3
 
-# ---- accuracy in motion ----------------------------------------------------------------------------------------------
+# ---- errors of a motion ----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
