@@ -429,7 +429,8 @@ def mecanum_twist(speeds, half_length, half_width):
 
 # %% reach [markdown]
 # One command, held for two seconds, from where the gray robot stands. A differential drive
-# turns up to 100°/s, the car steers up to 35° (1 m between its axles), all reach 1 m/s.
+# turns up to 100°/s, the car steers up to 35° (1 m between its axles), all reach 1 m/s;
+# Mecanum wheels do so ahead and to the side at once.
 # **A spot one meter to the left, the same heading: which drive gets there?**
 
 # %% predict-reach

@@ -1,14 +1,22 @@
-"""Wheels other than the differential drive's: from what they do to how the body moves, and the step it takes.
+"""Wheels other than the differential drive's: from what they do to how the body moves, the step it takes, and where
+one command leads.
 
 Body velocities are along the robot's own axes: x ahead, y to the left, omega to the left (m/s, m/s, rad/s).
 Source: lecture "Lokalisierung", "Koppelnavigation fuer Radfahrzeuge (1)", which leaves both drives to the
 reader: "Ackermann- und Mecanumantrieb werden analog behandelt".
 """
 
-import numpy as np
+from collections.abc import Callable
+from typing import NamedTuple
 
-from ..checks import as_points, as_positive, as_positive_number, fit_together
+import numpy as np
+from scipy.optimize import least_squares
+
+from ..checks import as_points, as_positive, as_positive_number, as_shape, fit_together
+from ..geometry.planar import wrap_angle
 from .odometry import sinc_slope
+
+SAME = 1e-9  # squared misses that differ by less come from symmetric commands
 
 
 def ackermann_to_twist(u, wheelbase):
@@ -185,3 +193,77 @@ def _turned(angle, v):
     """Vectors (..., 2) turned by an angle to the left."""
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * v[..., 0] - s * v[..., 1], s * v[..., 0] + c * v[..., 1]], axis=-1)
+
+
+# --- what a drive can be told ----------------------------------------------------------------------------------------
+
+
+class Drive(NamedTuple):
+    """What a drive can be told: `numbers` shares of its limits, each from -1 to 1, and what the body does then.
+
+    twist: shares (..., numbers) -> v_x, v_y (m/s) and omega (rad/s), (..., 3).
+    """
+
+    numbers: int
+    twist: Callable
+
+
+def differential_drive(speed, turn_rate):
+    """Two driven wheels: shares of a speed (m/s) and of a turn rate (rad/s)."""
+    return Drive(2, lambda share: _ahead(speed * share[..., 0], turn_rate * share[..., 1]))
+
+
+def ackermann_drive(speed, steering, wheelbase):
+    """A car: shares of a speed (m/s) and of a steering angle (rad); wheelbase as for `ackermann_to_twist`."""
+    limits = np.array([speed, steering])
+    return Drive(2, lambda share: _ahead(*np.moveaxis(ackermann_to_twist(limits * share, wheelbase), -1, 0)))
+
+
+def mecanum_drive(speed, turn_rate):
+    """Four Mecanum wheels: shares of a speed ahead and to the left (m/s), and of a turn rate (rad/s)."""
+    return Drive(3, lambda share: np.array([speed, speed, turn_rate]) * share)
+
+
+def _ahead(v, omega):
+    return np.stack([v, np.zeros_like(v), omega], axis=-1)
+
+
+def nearest_command(drive, spot, dt, lever):
+    """The one command which, held for dt, leads from the origin nearest to a spot.
+
+    The best of a grid over all commands, improved by least squares within the limits: what is nearest on one side may
+    not be on the other. Of commands that miss by the same the gentlest is taken, and ahead before back.
+
+    Parameters
+    ----------
+    drive : Drive
+    spot : array-like, shape (3,)
+        Pose (m, m, rad).
+    dt : float
+        For which the command is held (s).
+    lever : float
+        What a heading that is off by 1 rad counts beside a place that is off (m).
+
+    Returns
+    -------
+    share : array, shape (drive.numbers,)
+        Between -1 and 1; `drive.twist(share)` is the body velocity.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, a time or a lever that is not positive.
+    """
+    spot, dt, lever = as_shape(spot, "spot", 3), as_positive_number(dt, "dt"), as_positive_number(lever, "lever")
+
+    def miss(share):
+        off = step_twist(np.zeros(3), drive.twist(share), dt) - spot
+        off[..., 2] = lever * wrap_angle(off[..., 2])
+        return off
+
+    axis = np.linspace(1, -1, 41 if drive.numbers == 2 else 11)
+    grid = np.stack(np.meshgrid(*[axis] * drive.numbers, indexing="ij"), axis=-1).reshape(-1, drive.numbers)
+    grid = grid[np.argsort(np.round((grid**2).sum(1), 9), kind="stable")]
+    far = (miss(grid) ** 2).sum(1)
+    start = grid[np.argmax(far <= far.min() + SAME)]
+    return least_squares(miss, start, bounds=(-1, 1), method="dogbox").x

@@ -93,6 +93,48 @@ def test_derivatives_of_a_step(omega):
     np.testing.assert_allclose(F_u, numeric_jacobian(lambda u: wheels.step_twist(x, u, 0.9), twist), atol=1e-7)
 
 
+DRIVES = {
+    "differential": wheels.differential_drive(0.8, 1.5),
+    "Ackermann": wheels.ackermann_drive(0.8, 0.6, 1.1),
+    "Mecanum": wheels.mecanum_drive(0.8, 1.5),
+}
+
+
+def test_shares_of_the_limits_become_the_body_s_velocity():
+    half = {name: drive.twist(np.full((3, drive.numbers), -0.5)) for name, drive in DRIVES.items()}
+    np.testing.assert_allclose(half["differential"], np.tile([-0.4, 0, -0.75], (3, 1)))
+    np.testing.assert_allclose(half["Ackermann"], np.tile([-0.4, 0, 0.4 * np.tan(0.3) / 1.1], (3, 1)))
+    np.testing.assert_allclose(half["Mecanum"], np.tile([-0.4, -0.4, -0.75], (3, 1)))
+
+
+@pytest.mark.parametrize("name", DRIVES)
+def test_the_nearest_command_misses_by_no_more_than_a_fine_grid(name):
+    """Beside 300 000 commands tried; and where one of them was given as the spot, it is reached."""
+    drive, dt, lever, rng = DRIVES[name], 1.5, 0.3, np.random.default_rng(5)
+    axis = np.linspace(-1, 1, 551 if drive.numbers == 2 else 67)
+    grid = np.stack(np.meshgrid(*[axis] * drive.numbers), -1).reshape(-1, drive.numbers)
+    ends = wheels.step_twist(np.zeros(3), drive.twist(grid), dt)
+
+    def miss(end, spot):
+        off = end - spot
+        turned = np.arctan2(np.sin(off[..., 2]), np.cos(off[..., 2]))
+        return np.sqrt(off[..., 0] ** 2 + off[..., 1] ** 2 + (lever * turned) ** 2)
+
+    for spot in rng.uniform([-1.5, -1.5, -np.pi], [1.5, 1.5, np.pi], (6, 3)):
+        share = wheels.nearest_command(drive, spot, dt, lever)
+        assert np.abs(share).max() <= 1
+        found = miss(wheels.step_twist(np.zeros(3), drive.twist(share), dt), spot)
+        assert found <= miss(ends, spot).min() + 1e-6
+    for spot in ends[rng.integers(0, len(ends), 6)]:
+        share = wheels.nearest_command(drive, spot, dt, lever)
+        assert miss(wheels.step_twist(np.zeros(3), drive.twist(share), dt), spot) < 1e-5
+
+
+def test_of_commands_that_miss_alike_the_one_ahead_is_taken():
+    """A spot straight beside the robot: an arc ahead and one back end equally far from it."""
+    assert wheels.nearest_command(DRIVES["differential"], [0, 1, 0], 2.0, 0.25)[0] > 0.05
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [
@@ -102,6 +144,8 @@ def test_derivatives_of_a_step(omega):
         (lambda: wheels.mecanum_matrix(0.3, -0.2), "half_width must be positive"),
         (lambda: wheels.step_twist(np.zeros(3), np.zeros(2), 0.1), "twist must have"),
         (lambda: wheels.step_twist(np.zeros(3), np.zeros(3), 0.0), "dt must be positive"),
+        (lambda: wheels.nearest_command(DRIVES["Mecanum"], [0.0, 1.0], 2.0, 0.2), "spot must have"),
+        (lambda: wheels.nearest_command(DRIVES["Mecanum"], [0.0, 1.0, 0.0], 2.0, 0.0), "lever must be positive"),
     ],
 )
 def test_refusals(call, words):

@@ -3,10 +3,10 @@
 import functools
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from ...documents.lecture import printed as lecture
 from ...estimation import gaussian
+from ...geometry.planar import wrap_angle
 from ...localization import lateration, odometry, wheels
 from ...stage import Choice, Handle, Play, Slider, Stage, style
 from ...stage.marks import Spare, strayed
@@ -390,120 +390,55 @@ def banana():
     )
 
 
-DRIVES = ("differential", "Ackermann", "Mecanum")
 HELD = 2.0  # s, for which one command is held
-LIMITS = {"v": 1.0, "omega": np.radians(100), "steering": np.radians(35)}  # m/s, rad/s, rad
-WHEELBASE = 1.0  # m
-HEADING = 0.25  # m per rad: what an error in the heading counts beside one in the place
-FAN = 9  # commands that are drawn
+SPEED, TURN_RATE, STEERING = 1.0, np.radians(100), np.radians(35)  # m/s, rad/s, rad: what the drives are told at most
+DRIVES = {
+    "differential": wheels.differential_drive(SPEED, TURN_RATE),
+    "Ackermann": wheels.ackermann_drive(SPEED, STEERING, wheelbase=1.0),
+    "Mecanum": wheels.mecanum_drive(SPEED, TURN_RATE),
+}
+LEVER = 0.25  # m: what an error of 1 rad in the heading counts beside one in the place
 CLOSE = 0.03  # m: there
 
 
-def _commands(drive, fine=41):
-    """Body velocities (m, 3) of the commands a drive may be given, on a grid."""
-    v = np.linspace(-1, 1, fine) * LIMITS["v"]
-    turn = np.linspace(-1, 1, fine)
-    if drive == "Mecanum":
-        v, turn = v[::4], turn[::4]
-        vx, vy, omega = (grid.ravel() for grid in np.meshgrid(v, v, turn * LIMITS["omega"], indexing="ij"))
-        return np.stack([vx, vy, omega], 1)
-    v, turn = (grid.ravel() for grid in np.meshgrid(v, turn, indexing="ij"))
-    return np.stack([v, np.zeros_like(v), _turn_rate(drive, v, turn)], 1)
+def _driven(drive, share, points):
+    """Poses (..., points + 1, 3) on the way of commands (..., k) held for HELD seconds."""
+    times = np.linspace(0, HELD, points + 1)[1:]
+    poses = wheels.step_twist(np.zeros(3), drive.twist(np.asarray(share))[..., None, :], times)
+    return np.concatenate([np.zeros_like(poses[..., :1, :]), poses], axis=-2)
 
 
-def _turn_rate(drive, v, turn):
-    """Turn rate of a share (-1 to 1) of what a drive can do; a car's follows its speed and its wheels."""
-    if drive == "Ackermann":
-        return wheels.ackermann_to_twist(np.stack([v, turn * LIMITS["steering"]], -1), WHEELBASE)[..., 1]
-    return turn * LIMITS["omega"]
-
-
-@functools.lru_cache(maxsize=4)
-def _reached(drive):
-    """(commands, poses after HELD seconds) of a drive."""
-    commands = _commands(drive)
-    return commands, wheels.step_twist(np.zeros(3), commands, HELD)
-
-
-@functools.lru_cache(maxsize=4)
 def fan(drive):
-    """Paths (n, k, 2) of a few commands at full speed, ahead and back (m)."""
-    turn = np.linspace(-1, 1, FAN)
-    if drive == "Mecanum":
-        angle = np.linspace(-np.pi, np.pi, 12, endpoint=False)
-        commands = np.concatenate(
-            [np.stack([np.cos(angle), np.sin(angle), np.full(12, rate)], 1) for rate in (0.0, LIMITS["omega"] / 2)]
-        )
+    """Paths (n, k, 2) of a few commands at full speed, ahead and back, or to all sides (m)."""
+    if drive.numbers == 2:
+        share = [(v, turn) for v in (1, -1) for turn in np.linspace(-1, 1, 9)]
     else:
-        commands = np.concatenate(
-            [
-                np.stack([np.full(FAN, v), np.zeros(FAN), _turn_rate(drive, np.full(FAN, v), turn)], 1)
-                for v in (1.0, -1.0)
-            ]
-        )
-    times = np.linspace(HELD / 24, HELD, 24)
-    paths = wheels.step_twist(np.zeros(3), commands[:, None], times)[..., :2]
-    return np.concatenate([np.zeros((len(paths), 1, 2)), paths], axis=1)
+        angles = np.linspace(-np.pi, np.pi, 12, endpoint=False)
+        share = [(np.cos(angle), np.sin(angle), turn) for turn in (0, 0.5) for angle in angles]
+    return _driven(drive, share, 24)[..., :2]
 
 
 def compute_reach(state):
     """For each drive the one command that ends nearest to the spot: its path, and what is left in m and degrees."""
     spot = np.array([*state["G"], np.radians(state["heading_deg"])])
     found = {}
-    for drive in DRIVES:
-        commands, ends = _reached(drive)
-        off = ends - spot
-        off[:, 2] = (off[:, 2] + np.pi) % (2 * np.pi) - np.pi
-        best = int(np.argmin(off[:, 0] ** 2 + off[:, 1] ** 2 + (HEADING * off[:, 2]) ** 2))
-        refined = least_squares(
-            lambda share, drive=drive: _miss(drive, share, spot), _shares(drive, commands[best]), bounds=(-1, 1)
-        )
-        twist = _twist(drive, refined.x)
-        path = wheels.step_twist(np.zeros(3), twist, np.linspace(HELD / 40, HELD, 40))
-        left = _miss(drive, refined.x, spot)
-        found[drive] = {
-            "path": np.vstack([np.zeros(3), path]),
-            "away": float(np.hypot(*left[:2])),
-            "turned_deg": float(np.degrees(abs(left[2]) / HEADING)),
+    for name, drive in DRIVES.items():
+        path = _driven(drive, wheels.nearest_command(drive, spot, HELD, LEVER), 40)
+        x, y, turned = path[-1] - spot
+        found[name] = {
+            "path": path,
+            "away": float(np.hypot(x, y)),
+            "turned_deg": float(np.degrees(abs(wrap_angle(turned)))),
         }
     return {"spot": spot, "drives": found}
 
 
-def _twist(drive, share):
-    """Body velocity of shares (-1 to 1) of a drive's limits."""
-    v = share[0] * LIMITS["v"]
-    if drive == "Mecanum":
-        return np.array([v, share[1] * LIMITS["v"], share[2] * LIMITS["omega"]])
-    return np.array([v, 0.0, float(_turn_rate(drive, np.asarray(v), np.asarray(share[1])))])
-
-
-def _shares(drive, twist):
-    """Where the search begins: shares near a command, inside the limits."""
-    if drive == "Mecanum":
-        share = twist / [LIMITS["v"], LIMITS["v"], LIMITS["omega"]]
-    elif drive == "Ackermann":
-        steering = np.arctan(WHEELBASE * twist[2] / twist[0]) if twist[0] else 0.0
-        share = np.array([twist[0] / LIMITS["v"], steering / LIMITS["steering"]])
-    else:
-        share = twist[[0, 2]] / [LIMITS["v"], LIMITS["omega"]]
-    return np.clip(share, -0.999, 0.999)
-
-
-def _miss(drive, share, spot):
-    """What is left to the spot, the heading as a length."""
-    off = wheels.step_twist(np.zeros(3), _twist(drive, share), HELD) - spot
-    return np.array([off[0], off[1], HEADING * ((off[2] + np.pi) % (2 * np.pi) - np.pi)])
-
-
 def _reach_sentence(result):
     words = []
-    for drive, found in result["drives"].items():
+    for name, found in result["drives"].items():
         there = found["away"] < CLOSE and found["turned_deg"] < 2
-        words.append(
-            f"{drive} gets there"
-            if there
-            else f"{drive} stays {found['away']:.2f} m and {found['turned_deg']:.0f}° off"
-        )
+        off = f"stays {found['away']:.2f} m and {found['turned_deg']:.0f}° off"
+        words.append(f"{name} {'gets there' if there else off}")
     return "; ".join(words) + "."
 
 
@@ -512,14 +447,14 @@ def reach():
 
     def scene(fig):
         views = {}
-        for ax, drive in zip(fig.subplots(1, 3, sharey=True), DRIVES):
-            style.axes(ax, "x (m)", "y (m)" if drive == DRIVES[0] else "", drive, equal=True)
+        for ax, (name, drive) in zip(fig.subplots(1, 3, sharey=True), DRIVES.items()):
+            style.axes(ax, "x (m)", "" if views else "y (m)", name, equal=True)
             ax.set(xlim=(-2.3, 2.5), ylim=(-2.4, 2.4))
-            views[drive] = draw.Reach(ax, fan(drive))
+            views[name] = draw.Reach(ax, fan(drive))
 
         def update(state, result):
-            for drive, view in views.items():
-                view.set(result["spot"], result["drives"][drive]["path"])
+            for name, view in views.items():
+                view.set(result["spot"], result["drives"][name]["path"])
 
         return [artist for view in views.values() for artist in view.artists], update
 
