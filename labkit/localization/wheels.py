@@ -209,18 +209,52 @@ class Drive(NamedTuple):
 
 
 def differential_drive(speed, turn_rate):
-    """Two driven wheels: shares of a speed (m/s) and of a turn rate (rad/s)."""
+    """Two driven wheels, told how fast to go ahead and to turn.
+
+    Parameters
+    ----------
+    speed, turn_rate : float
+        The most it can do (m/s, rad/s).
+
+    Returns
+    -------
+    drive : Drive
+    """
     return Drive(2, lambda share: _ahead(speed * share[..., 0], turn_rate * share[..., 1]))
 
 
 def ackermann_drive(speed, steering, wheelbase):
-    """A car: shares of a speed (m/s) and of a steering angle (rad); wheelbase as for `ackermann_to_twist`."""
+    """A car, told how fast to go ahead and to which side to steer.
+
+    Parameters
+    ----------
+    speed, steering : float
+        The most it can do (m/s, rad).
+    wheelbase : float
+        As for `ackermann_to_twist` (m).
+
+    Returns
+    -------
+    drive : Drive
+    """
     limits = np.array([speed, steering])
     return Drive(2, lambda share: _ahead(*np.moveaxis(ackermann_to_twist(limits * share, wheelbase), -1, 0)))
 
 
 def mecanum_drive(speed, turn_rate):
-    """Four Mecanum wheels: shares of a speed ahead and to the left (m/s), and of a turn rate (rad/s)."""
+    """Four Mecanum wheels, told how fast to go ahead, to the left, and to turn.
+
+    Parameters
+    ----------
+    speed : float
+        The most it can do ahead and, at the same time, to the left (m/s).
+    turn_rate : float
+        The most it can do (rad/s).
+
+    Returns
+    -------
+    drive : Drive
+    """
     return Drive(3, lambda share: np.array([speed, speed, turn_rate]) * share)
 
 
