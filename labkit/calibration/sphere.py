@@ -1,9 +1,9 @@
-"""What a laser line scanner sees of a sphere: triangulation, circle through a scan line, sphere center from the circle.
+"""What a laser line scanner sees of a sphere: the circle through a scan line, the sphere's center from the circle.
 
 A scan line lies in the plane y = 0 of the sensor frame S: x along the line, z along the distance, both in mm. The plane
 cuts a sphere of radius R in a circle of radius r, and the center lies sqrt(R^2 - r^2) in front of the plane or behind
 it: the scan line alone does not say on which side. Source: thesis "Optimierung bei der Kalibrierung von
-Sensor-Roboter-Systemen", HAW Hamburg 2019, sections 2.2 and 6.4.3, listings C15 and C16.
+Sensor-Roboter-Systemen", HAW Hamburg 2019, section 6.4.3, listings C15 and C16.
 """
 
 import math
@@ -82,59 +82,6 @@ class Sphere(Circle):
     """Sphere through points: like `Circle`, with the center (3,) and the covariance (4, 4) of x, y, z and radius."""
 
     parameters = (*point_parameters("center"), Parameter("radius", "mm"))
-
-
-def triangulation_height(base, alpha, beta):
-    """Height of a triangle over its base from the angles at both ends; broadcasts.
-
-    H = L tan(a) tan(b) / (tan(a) + tan(b)) = L sin(a) sin(b) / sin(a + b); the second form also holds where an angle is
-    90 deg.
-
-    Parameters
-    ----------
-    base : array-like
-        In any unit of length.
-    alpha, beta : array-like, rad
-
-    Returns
-    -------
-    height : float or array
-        In the unit of `base`.
-
-    Raises
-    ------
-    ValueError
-        When base or an angle is not positive, or the rays do not meet (angles adding up to 180 deg or more).
-
-    Source: thesis, formulas (2-9) to (2-12).
-    """
-    base, alpha, beta = as_positive(base, "base"), as_positive(alpha, "alpha"), as_positive(beta, "beta")
-    if (alpha + beta >= np.pi).any():
-        worst = np.rad2deg(np.max(alpha + beta))
-        raise ValueError(f"the rays must meet: alpha + beta must stay below 180 deg, got {shown(worst, '.6g')} deg")
-    return base * np.sin(alpha) * np.sin(beta) / np.sin(alpha + beta)
-
-
-def triangulation_std(base, alpha, beta, std_angle):
-    """Standard deviation of the height for independent errors of both angles, to first order; broadcasts.
-
-    dH/da = L sin(b)^2 / sin(a + b)^2: with a fixed base the error grows with the square of the distance.
-
-    Parameters
-    ----------
-    base : array-like
-        In any unit of length.
-    alpha, beta, std_angle : array-like, rad
-
-    Returns
-    -------
-    std : float or array
-        In the unit of `base`.
-    """
-    triangulation_height(base, alpha, beta)
-    base, alpha, beta = (np.asarray(v, float) for v in (base, alpha, beta))
-    s2 = np.sin(alpha + beta) ** 2
-    return as_positive(std_angle, "std_angle") * base * np.hypot(np.sin(beta) ** 2 / s2, np.sin(alpha) ** 2 / s2)
 
 
 def fit_circle_algebraic(x, z):

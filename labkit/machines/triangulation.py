@@ -10,7 +10,7 @@ Source: thesis "Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", H
 
 import numpy as np
 
-from ..checks import as_finite, as_nonnegative, as_positive, fit_together
+from ..checks import as_finite, as_nonnegative, as_positive, fit_together, shown
 
 RANGE = (190.0, 290.0)  # mm: where the scanner scanCONTROL 29xx-100 measures (B1)
 LINEARITY = 0.16 / 100 * 100.0 / 3  # mm: 0.16 % of that range, printed as three standard deviations (B1)
@@ -20,8 +20,12 @@ def _triangle(alpha, beta, base):
     """The three inputs of a triangle whose rays meet above the base."""
     alpha, beta, base = as_finite(alpha, "alpha"), as_finite(beta, "beta"), as_positive(base, "base")
     fit_together(alpha=alpha.shape, beta=beta.shape, base=base.shape)
-    if not ((alpha > 0) & (beta > 0) & (alpha + beta < np.pi)).all():
-        raise ValueError("alpha and beta must be positive and less than 180 deg together: else the rays never meet")
+    for name, angle in (("alpha", alpha), ("beta", beta)):
+        if (angle <= 0).any():
+            raise ValueError(f"the rays never meet: {name} must be positive, got {shown(angle.min())} rad")
+    if (alpha + beta >= np.pi).any():
+        most = np.rad2deg((alpha + beta).max())
+        raise ValueError(f"the rays never meet: alpha + beta must stay below 180 deg, got {shown(most)} deg")
     return alpha, beta, base
 
 

@@ -1,4 +1,4 @@
-"""Triangulation, circles and spheres against closed forms, SciPy, finite differences and Monte Carlo."""
+"""Circles and spheres against closed forms, SciPy, finite differences and Monte Carlo."""
 
 import numpy as np
 import pytest
@@ -12,25 +12,6 @@ def arc(center, radius, half_angle, n, std=0.0, seed=0):
     angle = np.linspace(-half_angle, half_angle, n)
     r = radius + std * rng.normal(size=n)
     return center[0] + r * np.sin(angle), center[1] - r * np.cos(angle)
-
-
-def test_triangulation_of_a_known_triangle():
-    # a 3-4-5 triangle: height over the hypotenuse 12 / 5
-    assert sphere.triangulation_height(5.0, np.arctan2(4, 3), np.arctan2(3, 4)) == pytest.approx(2.4)
-    assert sphere.triangulation_height(2.0, np.pi / 4, np.pi / 2) == pytest.approx(2.0)  # where tan has no value
-
-
-@pytest.mark.parametrize("base, alpha, beta", [(100.0, 1.2, 1.4), (50.0, 0.6, 2.0)])
-def test_triangulation_std_is_the_derivative(base, alpha, beta):
-    h, H = 1e-6, sphere.triangulation_height
-    by_a = (H(base, alpha + h, beta) - H(base, alpha - h, beta)) / (2 * h)
-    by_b = (H(base, alpha, beta + h) - H(base, alpha, beta - h)) / (2 * h)
-    assert sphere.triangulation_std(base, alpha, beta, 1e-3) == pytest.approx(1e-3 * np.hypot(by_a, by_b), rel=1e-7)
-
-
-def test_parallel_rays_are_refused():
-    with pytest.raises(ValueError, match="must stay below 180 deg, got 180"):
-        sphere.triangulation_height(1.0, np.pi / 2, np.pi / 2)
 
 
 @pytest.mark.parametrize("half_angle", [0.05, 0.5, 3.0])

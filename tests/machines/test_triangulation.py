@@ -28,6 +28,20 @@ def test_the_height_is_the_printed_formula():
     assert tri.height_from_angles(np.pi / 3, np.pi / 3, 2.0) == pytest.approx(np.sqrt(3))
 
 
+def test_the_height_of_a_known_triangle():
+    # a 3-4-5 triangle: height over the hypotenuse 12 / 5
+    assert tri.height_from_angles(np.arctan2(4, 3), np.arctan2(3, 4), 5.0) == pytest.approx(2.4)
+    assert tri.height_from_angles(np.pi / 4, np.pi / 2, 2.0) == pytest.approx(2.0)  # where tan has no value
+
+
+@pytest.mark.parametrize("base, alpha, beta", [(100.0, 1.2, 1.4), (50.0, 0.6, 2.0)])
+def test_the_standard_deviation_is_the_derivative(base, alpha, beta):
+    h, H = 1e-6, tri.height_from_angles
+    by_a = (H(alpha + h, beta, base) - H(alpha - h, beta, base)) / (2 * h)
+    by_b = (H(alpha, beta + h, base) - H(alpha, beta - h, base)) / (2 * h)
+    assert tri.height_std(alpha, beta, base, 1e-3) == pytest.approx(1e-3 * np.hypot(by_a, by_b), rel=1e-7)
+
+
 def test_derivatives_are_differences():
     place, base = random_triangles(50)
     alpha, beta = tri.angles_to(place, base)
@@ -56,6 +70,7 @@ def test_twice_as_far_is_nearly_four_times_as_bad():
     [
         (lambda: tri.height_from_angles(2.0, 1.5, 100.0), "never meet"),
         (lambda: tri.height_from_angles(-0.1, 1.0, 100.0), "never meet"),
+        (lambda: tri.height_from_angles(np.pi / 2, np.pi / 2, 1.0), "must stay below 180 deg, got 180"),
         (lambda: tri.height_from_angles(1.0, 1.0, 0.0), "base"),
         (lambda: tri.height_std(1.0, 1.0, 100.0, -1.0), "std"),
         (lambda: tri.height_std(1.0, np.nan, 100.0, 1.0), "beta"),
