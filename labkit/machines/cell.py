@@ -219,23 +219,27 @@ def flange_at_hole(cell, job):
     return pose(job.R_tool, hole_in_base(cell, job) - (job.R_tool @ cell.tip[..., None])[..., 0])
 
 
-def miss(truth, cell, job):
+def miss(truth, cell, job, measured=None):
     """How far the tip misses the hole when everything is computed with a cell and is really as in another.
 
     Parameters
     ----------
     truth : Cell
-        What the true cell would be; its readings and marks are those of `job`, taken as exact.
+        What the true cell would be.
     cell : Cell
         The calibrated cell.
     job : Job
+        With the marks and readings of the true cell.
+    measured : Job, optional
+        With the marks and readings the calibrated cell is given; unless given they are exact, those of `job`.
 
     Returns
     -------
     miss : array, shape (..., 3), mm
         Tip less hole, in the base.
     """
-    return transform(flange_at_hole(cell, job), truth.tip) - hole_in_base(truth, job)
+    flange = flange_at_hole(cell, job if measured is None else measured)
+    return transform(flange, truth.tip) - hole_in_base(truth, job)
 
 
 # ---- how sure it is --------------------------------------------------------------------------------------------------
@@ -380,7 +384,7 @@ def with_errors(cell, job, errors):
     cell : Cell
     job : Job
     """
-    e = {name: np.zeros(9 if name == "marks" else 3 if name == "tip" else 6) for name in SOURCES} | errors
+    e = {name: np.zeros(len(cov)) for name, cov in source_covariances(cell, job).items()} | errors
     marks = job.marks + e["marks"].reshape(*e["marks"].shape[:-1], 3, 3)
     return (
         replace(cell, tip=cell.tip + e["tip"], T_FS=disturb(cell.T_FS, e["scanner"]),
@@ -411,7 +415,7 @@ def simulate_misses(cell, job, rng, n=10_000):
         for name, cov in source_covariances(cell, job).items()
     }
     drawn_cell, drawn_job = with_errors(cell, job, errors)
-    return transform(flange_at_hole(drawn_cell, drawn_job), cell.tip) - hole_in_base(cell, job)
+    return miss(cell, drawn_cell, job, drawn_job)
 
 
 def frames_in_base(cell, job):

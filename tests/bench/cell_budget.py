@@ -28,9 +28,7 @@ def main(count):
                 sources = cells.source_covariances(cell, job)
                 errors = {n: rng.multivariate_normal(np.zeros(len(sources[n])), sources[n], method="svd")
                           for n in ("marks", "first reading", "second reading")}  # fmt: skip
-                measured = cells.with_errors(cell, job, errors)
-                tip = cells.transform(cells.flange_at_hole(*measured), cells.TRUTH.tip)
-                miss = tip - cells.hole_in_base(cells.TRUTH, job)
+                miss = cells.miss(cells.TRUTH, cell, job, cells.with_errors(cell, job, errors)[1])
                 covariance = sum(cells.miss_budget(cell, job).values())
                 budget += np.trace(covariance) / count
                 misses.append(miss)
