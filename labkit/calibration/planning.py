@@ -30,6 +30,7 @@ FIELD = (
     (3.0, 25.0),
     (190.0, 290.0),
 )  # mm: x, |y| and z of a sphere center whose arc the scanner sees well
+DOWN = np.diag([1.0, -1.0, -1.0])  # orientation of a frame whose z axis points straight down
 _IRRATIONAL = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0]) % 1.0
 
 
@@ -149,7 +150,8 @@ def poses_that_see(T_FS, target, R_BF, x_S):
     Parameters
     ----------
     T_FS : array-like, shape (4, 4)
-    target : array-like, shape (3,), mm
+    target : array-like, shape (..., 3), mm
+        One sphere, or one a pose.
     R_BF : array-like, shape (..., 3, 3)
     x_S : array-like, shape (..., 3), mm
 
@@ -194,6 +196,5 @@ def pattern(T_FS, target, tilt, spread, n=31):
     ])  # fmt: skip
     around, yaw = 2 * np.pi * u[:, 3], 2 * np.pi * u[:, 4] * min(1.0, tilt / 0.2)
     tilted = tilt * np.sqrt(u[:, 5])[:, None] * np.column_stack([np.cos(around), np.sin(around), np.zeros(n)])
-    down = np.diag([1.0, -1.0, -1.0])
     turned = exp_so3(np.column_stack([np.zeros((n, 2)), yaw]))
-    return poses_that_see(T_FS, target, exp_so3(tilted) @ turned @ down @ T_FS[:3, :3].T, x_S)
+    return poses_that_see(T_FS, target, exp_so3(tilted) @ turned @ DOWN @ T_FS[:3, :3].T, x_S)

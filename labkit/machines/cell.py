@@ -20,7 +20,7 @@ import numpy as np
 from ..calibration.ax_xb import calibrate_hand_eye
 from ..calibration.hand_eye import calibrate_sphere_target
 from ..calibration.pivot import calibrate_pivot, cone, touching_poses
-from ..calibration.planning import pattern
+from ..calibration.planning import DOWN, pattern, poses_that_see
 from ..checks import as_count, as_shape
 from ..geometry.frames import frame_from_points, invert, pose, transform
 from ..geometry.lie import exp_so3
@@ -37,7 +37,6 @@ from . import simulation
 from .arm import TX40, tool_pose
 
 SOURCES = ("tip", "scanner", "tracker", "marks", "first reading", "second reading")
-DOWN = np.diag([1.0, -1.0, -1.0])  # orientation of a flange whose z axis points down
 
 
 @dataclass(frozen=True, eq=False)
@@ -573,14 +572,13 @@ def simulated_job(now, learned=LEARNED, touched=False):
     now, learned = as_shape(now, "now", 3), as_shape(learned, "learned", 3)
     T_BP0, T_BP1 = place_on_table(*learned), place_on_table(*now)
     R_tool = exp_so3([0.0, 0.0, learned[2]]) @ DOWN
-    marks_B = transform(T_BP0, MARKS)
     if touched:
         marks, R_BF = np.zeros((3, 3)), np.broadcast_to(R_tool, (3, 3, 3))
-        arms = np.tile(TRUTH.tip, (3, 1))
+        T_FM = pose(np.eye(3), TRUTH.tip)  # M is what measures the marks: the tip, or the scanner
     else:
         marks = np.array([[6.0, 5.0, 215.0], [-8.0, -6.0, 230.0], [4.0, 7.0, 220.0]])
         tilts = exp_so3(np.deg2rad([[8.0, 0, 0], [-6.0, -6.0, 20.0], [0, -8.0, -20.0]]))
-        R_BF, arms = tilts @ R_tool @ TRUTH.T_FS[:3, :3].T, transform(TRUTH.T_FS, marks)
-    T_BF = pose(R_BF, marks_B - (R_BF @ arms[..., None])[..., 0])
+        R_BF, T_FM = tilts @ R_tool @ TRUTH.T_FS[:3, :3].T, TRUTH.T_FS
+    T_BF = poses_that_see(T_FM, transform(T_BP0, MARKS), R_BF, marks)
     T_WE0, T_WE1 = (invert(TRUTH.T_BW) @ T @ T_PE for T in (T_BP0, T_BP1))
     return Job(T_BF, marks, T_WE0, T_WE1, HOLE, R_tool, touched)

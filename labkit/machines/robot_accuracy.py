@@ -11,12 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..calibration.planning import poses_that_see
+from ..calibration.planning import DOWN, poses_that_see
 from ..checks import as_count, as_finite, as_nonnegative, as_points, as_positive_number, as_shape
-from ..geometry.frames import pose
 from ..geometry.lie import exp_so3
-
-DOWN = np.diag([1.0, -1.0, -1.0])  # a scanner that looks straight down
 
 
 def position_accuracy(command, reached):
@@ -216,5 +213,4 @@ def looking_down_at(marks, T_FS, turns, height=240.0):
     marks, turns = as_points(marks, "marks"), as_finite(turns, "turns")
     x_S = np.tile([0.0, 0.0, float(height)], (len(marks), 1))
     R_BF = exp_so3(turns[:, None] * [0.0, 0.0, 1.0]) @ DOWN @ np.asarray(T_FS)[:3, :3].T
-    poses = [poses_that_see(T_FS, mark, R[None], x[None])[0] for mark, R, x in zip(marks, R_BF, x_S)]
-    return pose(np.array(poses)[:, :3, :3], np.array(poses)[:, :3, 3]), x_S
+    return poses_that_see(T_FS, marks, R_BF, x_S), x_S
