@@ -488,10 +488,10 @@ def test_trail_sorts_readings_by_the_gate():
 def test_sheets_of_light_cross_the_tracker_in_the_middle_of_their_sweep():
     stage = at(ch06.live_tracker(), t=0.0)
     space, place = stage.spaces[0], np.array([120.0, -80.0, 60.0])
-    sweep = ch06_figures.Sweep(Scene(Figure().subplots(), radius=500))
+    sweep = ch06_figures.Sweep(Scene(Figure().subplots(), radius=500), ch06.NEARBY)
     scene = sweep.sheets[0].scene
     for k in range(2):
-        sweep.set(1.0 + 2.0 * k, place)  # s: half a sweep, and half of the other station's
+        sweep.set(*ch06.sheets_of_light(1.0 + 2.0 * k, place))  # s: half a sweep, and half of the other station's
         assert [sheet.shown for sheet in sweep.sheets] == [k == 0, k == 1]
         corners = scene.named(f"sheet {k + 1}").corners().reshape(-1, 3)
         normal = np.linalg.svd(corners - corners.mean(0))[2][2]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...geometry.frames import invert
+from ...geometry.frames import invert, pose
 from ...machines.arm import BASE_HEIGHT, REACH_FOREARM, REACH_WRIST, SHOULDER_OFFSET, TX40, link_frames
 from ...stage import scene3d_solids as solids
 from ...stage import style
@@ -14,17 +14,17 @@ ALONG_Y = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]]) 
 RINGS = (112.0, 92.0, 72.0)  # mm: radii of the wrist's gimbal
 
 
+def _shift(x, y, z):
+    return pose(np.eye(3), [x, y, z])
+
+
 def _across(radius, left, right, height, color=style.SHELL):
     """A cylinder along y between two y, at a height above the base."""
-    at = np.eye(4)
-    at[2, 3] = height
-    return solids.cylinder(radius, left, right).looks(color).moved(at @ ALONG_Y)
+    return solids.cylinder(radius, left, right).looks(color).moved(_shift(0, 0, height) @ ALONG_Y)
 
 
 def _upright(radius, bottom, top, top_radius=None, y=0.0, color=style.SHELL):
-    at = np.eye(4)
-    at[1, 3] = y
-    return solids.cylinder(radius, bottom, top, top_radius).looks(color).moved(at)
+    return solids.cylinder(radius, bottom, top, top_radius).looks(color).moved(_shift(0, y, 0))
 
 
 def upright_parts():
@@ -122,12 +122,5 @@ def sheet_of_light(length, half_angle):
     """The fan a station sends out, in its frame: a thin triangle that looks along z, upright in y."""
     side = length * np.tan(half_angle)
     fan = solids.raised([(0, 0), (length, -side), (length, side)], -0.5, 0.5)
-    turn = np.array([[0.0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])  # x of the outline along z
-    turn[:3, 0], turn[:3, 2] = (0, 0, 1), (-1, 0, 0)
+    turn = np.array([[0.0, 0, -1, 0], [0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]])  # x of the outline along z
     return fan.looks(style.PREDICTION, 0.25).moved(turn)
-
-
-def _shift(x, y, z):
-    T = np.eye(4)
-    T[:3, 3] = x, y, z
-    return T

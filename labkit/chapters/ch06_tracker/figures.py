@@ -57,7 +57,7 @@ class Trail:
         )
         self.legend = scene.ax.legend(
             handles=[Line2D([], [], **style.look(role, label=name, **more)) for role, name, more in keys],
-            loc="upper left",
+            loc="lower left",
             fontsize=8,
         )
 
@@ -78,44 +78,19 @@ class Trail:
         self.path.artist.set_zorder(3.2)
 
 
-STATIONS = np.array([[-470.0, 60.0, 400.0], [60.0, 470.0, 400.0]])  # mm: drawn close by; real ones hang meters away
-SWEEPS = 60.0  # a second, of a station; slowed down 120 times for the eye
-
-
 class Sweep:
     """Two base stations, and the sheet of light of each on its way across the tracker; which one it is alternates."""
 
-    def __init__(self, scene):
-        self.poses = [_looking(place, np.array([-60.0, 60.0, 0.0])) for place in STATIONS]
-        for k, T in enumerate(self.poses):
+    def __init__(self, scene, stations):
+        for k, T in enumerate(stations):
             scene.fixed(scene.body(*bodies.station(), name=f"station {k + 1}"), T)
         self.sheets = [scene.body(bodies.sheet_of_light(720.0, 0.35), name=f"sheet {k + 1}") for k in range(2)]
 
-    def set(self, t, point):
-        """`t` in s; `point`: where the tracker is, (3,), which the sheet meets in the middle of its sweep."""
-        phase = (t * SWEEPS / 120.0) % 2.0
-        for k, (sheet, T) in enumerate(zip(self.sheets, self.poses)):
-            x, _, z = (point - T[:3, 3]) @ T[:3, :3]
-            angle = np.arctan2(x, z) + 1.4 * ((phase - k) - 0.5)
-            sheet.show(int(phase) == k)
-            sheet.set(T @ _about_y(angle))
-
-
-def _looking(place, goal):
-    """A frame at a place whose z axis points to a goal and whose x axis is level."""
-    z = (goal - place) / np.linalg.norm(goal - place)
-    x = np.cross([0.0, 0.0, 1.0], z)
-    x /= np.linalg.norm(x)
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = np.column_stack([x, np.cross(z, x), z]), place
-    return T
-
-
-def _about_y(angle):
-    c, s = np.cos(angle), np.sin(angle)
-    T = np.eye(4)
-    T[0, [0, 2]], T[2, [0, 2]] = (c, s), (-s, c)
-    return T
+    def set(self, poses, on):
+        """Where both sheets are, (2, 4, 4), and which of them shines."""
+        for k, (sheet, T) in enumerate(zip(self.sheets, poses)):
+            sheet.show(k == on)
+            sheet.set(T)
 
 
 class RotationAxes:

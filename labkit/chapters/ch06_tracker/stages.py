@@ -165,6 +165,11 @@ def tx40():
 
 LIVE_SECONDS, LIVE_STEP, TRAIL = 60.0, 0.02, 375  # s, s (the browser adds what it needs itself), readings drawn
 IDLE = 1.5  # s without a look after which the stream ends by itself
+NEARBY = np.array(
+    [stations.looking(place, (-60.0, 60.0, 0.0)) for place in ((-470.0, 60.0, 400.0), (60.0, 470.0, 400.0))]
+)  # two stations, drawn close by; real ones hang meters away
+SLOWED = 120.0  # times, for the eye
+SWING = 1.4  # rad, of a sheet on its way across the tracker
 
 
 class Link:
@@ -212,6 +217,16 @@ def compute_live(readings, statistics):
     return {"positions": positions, "used": used, "filtered": filtered, "T_WE": last, "statistics": statistics}
 
 
+def sheets_of_light(t, place):
+    """Poses of both stations' sheets of light at a time (s), (2, 4, 4), and which of them shines; each meets the place,
+    (3,), in the middle of its way.
+    """
+    phase = (t * stations.TURN_RATE / SLOWED) % 2.0
+    x, _, z = transform(invert(NEARBY), place).T
+    angle = np.arctan2(x, z) + SWING * (phase - np.arange(2) - 0.5)
+    return NEARBY @ pose(exp_so3(angle[:, None] * ABOUT_Y), np.zeros(3)), int(phase)
+
+
 SHORT = {
     "length": "not 184 bytes",
     "a number is not finite": "a number not finite",
@@ -242,13 +257,13 @@ def live_tracker():
         left, right = fig.subplots(1, 2, width_ratios=(1.5, 1))
         space = Scene(left, radius=480, half_width=520, floor=-320.0, unit="mm")
         trail = draw.Trail(space)
-        sweep = draw.Sweep(space)
+        sweep = draw.Sweep(space, NEARBY)
         style.bare(right)
         words = right.text(0.0, 0.97, "", transform=right.transAxes, va="top", linespacing=1.5)
 
         def update(state, result):
             trail.set(result["positions"], result["used"], result["filtered"], result["T_WE"])
-            sweep.set(state["t"], result["T_WE"][:3, 3])
+            sweep.set(*sheets_of_light(state["t"], result["T_WE"][:3, 3]))
             space.draw(state["view"])
             trail.path_in_front()
             words.set_text(_live_words(result))
