@@ -861,7 +861,7 @@ def _cell_sentence(result):
     verdict = " Far more than the budget admits." if miss > 4 * result["total"] else ""
     return (
         f"The tip misses by {miss:.1f} mm; {result['total']:.2f} mm is to be expected, "
-        f"most of it from the {largest}.{verdict}"
+        f"the largest part of it from the {largest}.{verdict}"
     )
 
 
