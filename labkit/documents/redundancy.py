@@ -54,7 +54,8 @@ class Check:
         if high > 1.01 * low:
             size = f"from {low:.1f} to {high:.1f} std on" if np.isfinite(high) else f"{size}, some never"
         seen = f"an error is seen {size}" if self.left else "no error is ever seen"
-        return f"{self.document}: {self.measured}: {n} numbers, {p} unknowns: {seen}"
+        counted = f"{n} number{'s' * (n > 1)}, {p} unknown{'s' * (p > 1)}"
+        return f"{self.document}: {self.measured}: {counted}: {seen}"
 
 
 def checks():

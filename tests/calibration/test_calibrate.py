@@ -1,6 +1,7 @@
 """Calibrations of one's own data: against the truth of simulated cells, and every refusal."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -293,9 +294,16 @@ def test_results_print_themselves_and_fit_into_json():
 
 
 def test_rows_out_of_order_are_told():
+    """And beside what they miss by, how far the poses turn: about their main axis, and across it."""
     robot, sensor, _ = cell()
-    with pytest.raises(ValueError, match="the loop does not close: .* are the rows of both files in the same order"):
+    with pytest.raises(
+        ValueError, match="the loop does not close: .* are the rows of both files in the same order"
+    ) as e:
         calibrate.hand_eye(robot, np.roll(sensor, 1, axis=0))
+    told = re.search(r"turn by (\S+) deg about one axis and by (\S+) deg across it", str(e.value))
+    along, across = map(float, told.groups())
+    largest = np.rad2deg(max(np.linalg.norm(log_so3(a[:3, :3].T @ b[:3, :3])) for a in robot for b in robot))
+    assert across <= along <= largest <= 6 * along
 
 
 def test_no_minority_is_followed():

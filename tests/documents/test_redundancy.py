@@ -17,6 +17,7 @@ def test_as_measured_nothing_is_left_to_check(check):
 def test_with_one_thing_more_errors_are_seen():
     left = {check.document: check.left for check in ADDED}
     assert left == {"lab sheet": 3, "thesis": 93 - 9, "report": 5, "lecture": 2}
+    assert any("one run of a quantity: 1 number, 1 unknown:" in str(check) for check in MEASURED)
     assert all(np.isfinite(check.visible[0]) and f"from {check.visible[0]:.1f}" in str(check) for check in ADDED)
 
 
