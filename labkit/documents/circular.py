@@ -11,6 +11,7 @@ import gc
 import re
 import shutil
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,7 @@ KEYS = (
     "steps",
     "iterations",
 )  # name rows, count things
-LONGEST_TABLE = 100  # lines; longer ones are simulated logs, which no document prints
+LONGEST_TABLE = 100  # lines; longer ones are simulated logs and obstacle points, which no document prints
 AGREEING = ("reproduced", "rounding", "cut off", "consistent")
 _PLAIN = re.compile(r"([-+]?\d+(?:\.\d*)?)([eE][-+]?\d+)?")
 
@@ -68,8 +69,10 @@ def _forget():
     """Empty every cache of this package, so that the next computation reads its tables again."""
     package = __package__.partition(".")[0]
     for cached in gc.get_objects():
-        if isinstance(cached, functools._lru_cache_wrapper) and (cached.__module__ or "").startswith(package):
-            cached.cache_clear()
+        if isinstance(cached, functools._lru_cache_wrapper):
+            function = getattr(cached.__wrapped__, "func", cached.__wrapped__)  # out of its partial
+            if (function.__module__ or "").startswith(package):
+                cached.cache_clear()
 
 
 def _values(tried):
@@ -86,8 +89,39 @@ def _values(tried):
     return values
 
 
-def followers(all_rows=None):
-    """Results and claims that agree with what is printed because they read it.
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """Results and claims that agree with what is printed, computed from the tables and from moved ones.
+
+    Attributes
+    ----------
+    rows : list of ledger.Row
+    before, after : list
+        Their values, None for words.
+    moves : array, shape (n, 2)
+        What stands in the tables, and by how much each number was moved.
+    """
+
+    rows: list
+    before: list
+    after: list
+    moves: np.ndarray
+
+    @property
+    def followers(self):
+        """Rows that agree with what is printed because they read it."""
+        tried = zip(self.rows, self.before, self.after)
+        return [row for row, old, new in tried if _follows(row, old, new, self.moves)]
+
+    @property
+    def still(self):
+        """Rows whose number no table moves."""
+        tried = zip(self.rows, self.before, self.after)
+        return [row for row, old, new in tried if old is not None and new == old]
+
+
+def trial(all_rows=None):
+    """Compute the ledger from moved tables.
 
     Parameters
     ----------
@@ -96,7 +130,7 @@ def followers(all_rows=None):
 
     Returns
     -------
-    circular : list of ledger.Row
+    Trial
     """
     tried = [
         row
@@ -115,7 +149,7 @@ def followers(all_rows=None):
         finally:
             tables.DATA = home
             _forget()
-    return [row for row, old, new in zip(tried, before, after) if _follows(row, old, new, moves)]
+    return Trial(tried, before, after, moves)
 
 
 def _follows(row, old, new, moves):

@@ -1,7 +1,8 @@
-"""The ledger as text: every row, or results and claims by document and status, refused where one reads its "
-"own answer."""
+"""The ledger as text: every row, or results and claims by document and status, refused where one reads its own
+answer.
+"""
 
-from .circular import followers
+from .circular import trial
 from .ledger import COUNTED, KINDS, STATUSES, counts, judge, rows, table
 
 CAVEAT = "The texts were made from PDFs: a digit may have been lost there as well as by the authors."
@@ -44,6 +45,6 @@ def faults(all_rows=None):
             found.append(f"{row.id}: {status} without a proof")
     found += [
         f"{row.id}: the computed value follows the printed one, and is read, not computed"
-        for row in followers(all_rows)
+        for row in trial(all_rows).followers
     ]
     return found
