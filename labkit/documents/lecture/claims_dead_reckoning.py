@@ -126,5 +126,7 @@ def vertical_field_of_view():
     def vertical(horizontal):
         return np.degrees(2 * np.arctan(np.tan(np.radians(horizontal / 2)) * shape))
 
-    value, bound = rounding.propagate(vertical, rounding.read(f"{given['xtion_horizontal_deg']:.0f}"))
+    value, bound = rounding.propagate(
+        vertical, rounding.read(lecture.digits("dead_reckoning/sensors")["xtion_horizontal_deg"])
+    )
     return Computed(value, bound=bound)

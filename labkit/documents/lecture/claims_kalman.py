@@ -16,21 +16,23 @@ NOTEBOOK = "08_kalman"
 
 @computes("kalman.fusion_x")
 def fused_position():
-    given = lecture.example("fusion")
+    given, texts = lecture.example("fusion"), lecture.digits("kalman/fusion")
     x, bound = rounding.propagate(lambda z: _fusion(given | {"z1": z[0], "z2": z[1]}).x[0], _two_measurements())
     flat = float(_fusion(given | {"var0": 1e12}).x[0])
     std = float(_fusion(given | {"var0": given["var0"] ** 2}).x[0])
+    information, least = 1 / _fusion(given).cov[0, 0], given["x1"] - rounding.half_unit(texts["x1"])
     proof = (
-        f"48.2 / 5.05 = {x:.4f}, {9.55 - x:.4f} below what rounds to 9.6; rounding the two measurements moves it by "
-        f"up to {bound:.4f}. Without a prior it is {flat:.4f}, with a standard deviation of 20 {std:.4f}."
+        f"{information * x:.1f} / {information:.2f} = {x:.4f}, {least - x:.4f} below what rounds to {texts['x1']}; "
+        f"rounding the two measurements moves it by up to {bound:.4f}. Without a prior it is {flat:.4f}, with a "
+        f"standard deviation of {texts['var0']} {std:.4f}."
     )
     return Computed(x, bound=bound, proof=proof)
 
 
 def _two_measurements():
     """Both measured positions as printed, with one decimal; variances are settings of the example, and exact."""
-    given = lecture.example("fusion")
-    return rounding.read([f"{given[name]:.1f}" for name in ("z1", "z2")])
+    texts = lecture.digits("kalman/fusion")
+    return rounding.read([texts["z1"], texts["z2"]])
 
 
 def _fusion(given):
@@ -47,15 +49,15 @@ def fused_variance():
 @computes("kalman.fusion_var_index")
 def index_of_the_variance():
     """Which of the two variances the printed 0.2 is; a slip in the printed prior is tried as well."""
-    given = lecture.example("fusion")
+    given, texts = lecture.example("fusion"), lecture.digits("kalman/fusion")
 
     def holds(d):
         result = _fusion(given | {"var0": float(d["prior"])})
         variance = {"Σ_0": float(d["prior"]), "Σ_1": float(result.cov[0, 0])}[d[HERE]]
-        near = abs(float(result.x[0]) - given["x1"]) <= rounding.half_unit("9.6") + fused_position().bound
-        return near and abs(variance - given["var1"]) <= rounding.half_unit("0.2")
+        near = abs(float(result.x[0]) - given["x1"]) <= rounding.half_unit(texts["x1"]) + fused_position().bound
+        return near and abs(variance - given["var1"]) <= rounding.half_unit(texts["var1"])
 
-    printed = {HERE: "Σ_0", "prior": f"{given['var0']:.0f}"}
+    printed = {HERE: "Σ_0", "prior": texts["var0"]}
     found = explained_by(printed, holds, lambda text: ("Σ_1",) if text == "Σ_0" else single_slips(text))
     proof = (
         f"The prior's variance is printed as {given['var0']:.0f} above; {_fusion(given).cov[0, 0]:.4f} is the one "
@@ -65,23 +67,24 @@ def index_of_the_variance():
 
 
 def _vehicle():
-    """Printed prior covariance, printed numbers, and the gain they give."""
+    """Printed numbers of the example, and the printed prior covariance."""
     given = lecture.example("vehicle")
     cov = np.array([[given["prior_cov_xx"], given["prior_cov_xv"]], [given["prior_cov_xv"], given["prior_cov_vv"]]])
-    return given, cov, cov[:, 0] / (cov[0, 0] + given["var_z"])
+    return given, cov
+
+
+def _rounded(steps):
+    """Prediction of so many steps of 0.1 s from rest with 1 m/s^2, from the reconstructed variances in two decimals."""
+    return predict_vehicle(steps, 0.1, *np.round(reconstruct_vehicle(_vehicle()[1], steps, 0.1), 2))
 
 
 def reconstructed():
     """Predicted state and covariance of 51 steps of 0.1 s from rest with 1 m/s^2, from the rounded reconstruction."""
-    _, cov, _ = _vehicle()
-    return predict_vehicle(51, 0.1, *np.round(reconstruct_vehicle(cov, 51, 0.1), 3))
-
-
-DIGITS = {"prior_x": 1, "prior_v": 1, "z": 2, "posterior_x": 2, "posterior_v": 2}  # decimals printed; the others have 4
+    return _rounded(51)
 
 
 def _text(name):
-    return f"{lecture.example('vehicle')[name]:.{DIGITS.get(name, 4)}f}"
+    return lecture.digits("kalman/vehicle")[name]
 
 
 def _needed(posterior, z, cov, var_z):
@@ -119,29 +122,21 @@ def _agrees(d):
         for names in (("prior_x", "prior_v"), ("prior_cov_xx", "prior_cov_xv"), ("z",))
     )
     var_z = float(d["var_z"])
-    values, bounds = rounding.propagate(lambda prior, cov, z: _corrected(prior, cov, z, var_z), prior, cov, z)
     speed, slack = rounding.propagate(lambda prior: 2 * prior[0] / (0.1 * 50) - prior[1], prior)
-    corrected = all(
+    if abs(speed) > slack:
+        return False
+    values, bounds = rounding.propagate(lambda prior, cov, z: _corrected(prior, cov, z, var_z), prior, cov, z)
+    return all(
         abs(value - float(d[name])) <= bound + rounding.half_unit(d[name]) or rounding.is_cut_off(d[name], value)
         for name, value, bound in zip(("posterior_x", "posterior_v", "posterior_cov_xx"), values, bounds)
     )
-    return corrected and abs(speed) <= slack
 
 
 @computes("kalman.vehicle_prior")
 def predicted_state():
     value, bound = needed_prediction()
-    names = (
-        "prior_x",
-        "prior_v",
-        "prior_cov_xx",
-        "prior_cov_xv",
-        "z",
-        "posterior_x",
-        "posterior_v",
-        "posterior_cov_xx",
-    )
-    printed = {name: _text(name) for name in names} | {"var_z": f"{lecture.example('vehicle')['var_z']:.2f}"}
+    without = ("prior_cov_vv", "posterior_cov_xv", "posterior_cov_vv")  # do not enter `_agrees`
+    printed = {name: text for name, text in lecture.digits("kalman/vehicle").items() if name not in without}
     other = {"prior_x": f"{value[0]:.2f}", "prior_v": f"{reconstructed()[0][1]:.2f}"}  # the one beside it put right
     slips = {}
     for k, name in enumerate(("prior_x", "prior_v")):
@@ -174,11 +169,15 @@ def input_matrix():
 
 @computes("kalman.vehicle_prior_cov")
 def covariance_after_prediction():
-    cov = reconstructed()[1]
+    cov, printed = reconstructed()[1], _vehicle()[1]
+    var_x0, var_v0, var_a = np.round(reconstruct_vehicle(printed, 51, 0.1), 2)
+    half = rounding.half_unit(_text("prior_cov_xx"))
+    fits = [str(n) for n in range(40, 61) if (np.abs(_rounded(n)[1] - printed) <= half * (1 + 1e-6)).all()]
     proof = (
         "Time step, starting covariance and noise are not printed. 51 predictions with T = 0.1 s, starting variances "
-        f"1 and 0.01, acceleration noise 0.4 give {cov[0, 0]:.4f}, {cov[0, 1]:.4f}, {cov[1, 1]:.4f}; with T = 0.1 s "
-        "no number of steps near 50 but 51 gives round parameters."
+        f"{var_x0:g} and {var_v0:g}, acceleration noise {np.sqrt(var_a):g} give {cov[0, 0]:.4f}, {cov[0, 1]:.4f}, "
+        f"{cov[1, 1]:.4f}; of 40 to 60 predictions with T = 0.1 s, only {', '.join(fits)} reach all printed digits "
+        "from variances of two decimals."
     )
     return Computed(cov, simulated=True, proof=proof)
 
@@ -186,7 +185,7 @@ def covariance_after_prediction():
 @computes("kalman.vehicle_posterior")
 def corrected_state():
     """The correction of the reconstructed prediction; from the printed one neither number comes out."""
-    given, cov, _ = _vehicle()
+    given, cov = _vehicle()
     C, cov_z = [[1.0, 0.0]], [[given["var_z"]]]
     (x, v), bound = rounding.propagate(
         lambda z: kalman.update(*reconstructed(), z, C, cov_z).x, rounding.read([_text("z")])

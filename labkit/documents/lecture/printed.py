@@ -28,7 +28,7 @@ def constants(name):
     Source: lecture, pages "Simulation", "Fehlermodell für Steuerbefehl (1)" and "(2)", "2D-Laser-Scanner" and
     "RGBD-Kamera".
     """
-    return _by_name(f"dead_reckoning/{name}.csv")
+    return _by_name(f"dead_reckoning/{name}")
 
 
 def example(name):
@@ -53,11 +53,28 @@ def example(name):
     """
     if name not in ("fusion", "vehicle"):
         raise ValueError(f'name must be "fusion" or "vehicle", got {name!r}')
-    return _by_name(f"kalman/{name}.csv")
+    return _by_name(f"kalman/{name}")
+
+
+def digits(file):
+    """Numbers that the lecture prints one by one, digit by digit.
+
+    Parameters
+    ----------
+    file : str
+        "kalman/fusion", "kalman/vehicle", "dead_reckoning/circle_drive" or "dead_reckoning/sensors".
+
+    Returns
+    -------
+    texts : dict
+        {name: str}
+    """
+    table = read_table(f"{file}.csv", text=("name", "value", "unit"))
+    return dict(zip(table["name"].tolist(), table["value"].tolist()))
 
 
 def _by_name(file):
-    table = read_table(file, text=("name", "unit"))
+    table = read_table(f"{file}.csv", text=("name", "unit"))
     return dict(zip(table["name"].tolist(), table["value"].tolist()))
 
 
