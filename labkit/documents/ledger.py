@@ -112,6 +112,7 @@ def computes(*ids):
     return register
 
 
+@functools.cache
 def _load_claims():
     for document in DOCUMENTS:
         package = importlib.import_module(f".{document.replace(' ', '_')}", __package__)
