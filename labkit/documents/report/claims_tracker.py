@@ -119,8 +119,7 @@ def results_block():
 
 
 def _e_trans_range(scale):
-    """What equation (17) can be, in mm, for the printed mean and largest errors: mean <= root mean square <= "
-    "largest."""
+    """What equation (17) can be (mm) for the printed mean and largest errors: mean <= root mean square <= largest."""
     mean = dict(zip(COLUMNS, table_d().mean))
     return scale * mean["mean_mm"], scale * mean["max_mm"]
 
@@ -136,13 +135,14 @@ def unit_of_e_trans():
 
     printed = {HERE: "mm"} | dict(enumerate(texts.tolist()))
     found = explained_by(printed, holds, lambda text: ("m",) if text == "mm" else single_slips(text))
-    average = float(texts[RUNS])
+    average, mean = float(texts[RUNS]), dict(zip(COLUMNS, table_d().mean))
     return Computed(
         "mm" if holds(printed) else found[HERE][0],
         slips=found,
-        proof=f"Mean and largest errors of 2.666 and 9.468 mm over {POSES} poses keep equation (17) between "
-        f"{least:.2f} and {most:.2f} mm. The printed {average:.6f} is {1000 * average:.2f} mm when read in m, and "
-        "800 times too small in mm; a slip in one entry would not move the six others.",
+        proof=f"Mean and largest errors of {mean['mean_mm']:.3f} and {mean['max_mm']:.3f} mm over {POSES} poses keep "
+        f"equation (17) between {least:.2f} and {most:.2f} mm. The printed {average:.6f} is {1000 * average:.2f} mm "
+        f"when read in m, and at least {least / average:.0f} times too small in mm; a slip in one entry would not move "
+        "the six others.",
     )
 
 
@@ -211,11 +211,11 @@ def offset_after_half_turn():
     """The mounting seen with x and y reversed, as a half turn about z would, beside the conclusion's offset."""
     mean = rounding.read(table_d_texts()[RUNS, :3])
     value, bound = rounding.propagate(lambda m: 1000 * m * [-1, -1, 1], mean)
+    said = statements()["offset_z"]
     proof = (
         f"Appendix D and section 3.1 give ({-value[0]:.2f}, {-value[1]:.2f}, {value[2]:.2f}) mm. With the half turn "
-        f"of the text x and y come out; the conclusion's 65.3 mm is {statements()['offset_z'] - value[2]:.1f} "
-        "mm more than z, which a "
-        "half turn about z leaves alone."
+        f"of the text x and y come out; the conclusion's {said:g} mm is {said - value[2]:.1f} "
+        "mm more than z, which a half turn about z leaves alone."
     )
     return Computed(value, bound, proof=proof)
 

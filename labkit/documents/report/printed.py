@@ -45,10 +45,8 @@ def table_d():
 
     Source: report, appendix D.
     """
-    printed = read_table("tracker/table_d.csv", text=("run", *COLUMNS))
-    words = np.column_stack([printed[c] for c in COLUMNS])
-    values = words.astype(float)
-    return TableD(values[:RUNS], values[RUNS], values[RUNS + 1], np.vectorize(rounding.half_unit)(words))
+    values, halves = rounding.read(table_d_texts())
+    return TableD(values[:RUNS], values[RUNS], values[RUNS + 1], halves)
 
 
 def run_minutes():
