@@ -72,9 +72,14 @@ def _misses(entries, table):
     return float(np.abs(_centers(dict(entries), table) - _model()[1]).max())
 
 
+def _unit():
+    """A unit in the second decimal of the listing's coordinates (mm): what cutting the others off hides."""
+    return 2 * thesis.simulated_digits().halves.min()
+
+
 def _follow(d):
     """Whether both tables give all 39 coordinates to their two decimals, rounded or cut off."""
-    return all(_misses(tuple(d.items()), table) < 0.01 for table in ("6-2", "C10"))
+    return all(_misses(tuple(d.items()), table) < _unit() for table in ("6-2", "C10"))
 
 
 @functools.cache
@@ -89,19 +94,20 @@ def _solved_inputs():
         return _centers(SIMULATED | {"6-2 flange z": z, "6-2 P2 B": B, "plate y": y}, "6-2").ravel()
 
     fit = least_squares(lambda p: centers(p) - printed, [15.0, -80.0, -2.0])
-    return fit.x, 0.01 * np.abs(np.linalg.pinv(numeric_jacobian(centers, fit.x, 1e-6, "central"))).sum(1)
+    return fit.x, _unit() * np.abs(np.linalg.pinv(numeric_jacobian(centers, fit.x, 1e-6, "central"))).sum(1)
 
 
 def _solved(which, name, other):
     """One input from the coordinates; `other` are the inputs put right beside it."""
     value, bound = (x[which] for x in _solved_inputs())
     found = explained_by(SIMULATED | other, _follow)
-    wrong, right = SIMULATED | other, SIMULATED | other | {key: texts[0] for key, texts in found.items() if key == name}
+    inputs = (SIMULATED | other, SIMULATED | other | {key: texts[0] for key, texts in found.items() if key == name})
+    wrong, right = (max(_misses(tuple(d.items()), table) for table in ("6-2", "C10")) for d in inputs)
     proof = (
-        f"Solved for height, B and y the 39 printed coordinates of C10 give {value:.3f} +- {bound:.3f}. As printed "
-        f"they miss by up to {max(_misses(tuple(wrong.items()), t) for t in ('6-2', 'C10')):.1f} mm, put right by "
-        f"{max(_misses(tuple(right.items()), t) for t in ('6-2', 'C10')):.4f} mm. Of all single slips in both tables "
-        f"these make them follow: {'; '.join(f'{key} {texts[0]}' for key, texts in found.items())}."
+        f"Solved for height, B and y the 39 printed coordinates of C10 give {value:.3f} +- {bound:.3f}. With the two "
+        f"others put right and this one as printed they are missed by up to {wrong:.1f} mm, with all three put right "
+        f"by {right:.4f} mm. Of all single slips in both tables these make them follow: "
+        f"{'; '.join(f'{key} {texts[0]}' for key, texts in found.items())}."
     )
     return Computed(value, bound, slips={HERE if key == name else key for key in found}, proof=proof)
 
@@ -176,7 +182,8 @@ def gauss_newton_end():
 def gauss_newton_sign():
     """C of the row "turned about x" from the A beside it: at B = -90 deg only A + C is determined, and it is 0."""
     printed = {HERE: "0.0004", "A": "0.0004"}
-    found = explained_by(printed, lambda d: abs(float(d[HERE]) + float(d["A"])) < 0.0001)
+    unit = 2 * rounding.half_unit(printed[HERE])  # half of each
+    found = explained_by(printed, lambda d: abs(float(d[HERE]) + float(d["A"])) < unit)
     return Computed(
         -float(printed["A"]),
         slips=found,
@@ -355,8 +362,7 @@ def _predicted(pose, table, column):
 
 
 def _slips_in_table(pose):
-    """Columns whose single slip explains a row and, where the pattern speaks, keeps it halfway between its "
-    "neighbors."""
+    """Columns whose single slip explains a row and, where the pattern speaks, keeps it halfway between neighbors."""
     explained = _suspects()[pose]
     credible = [e for e in explained if not e.turn > misprints.TURNED] or explained
     steps = misprints.neighbor_offsets(corrected_data())
@@ -409,14 +415,16 @@ def pattern_step():
         frames.rotation_angle(at[line, 45.0][:3, :3].T @ at[line, 67.5][:3, :3]) for line in ("x", "y", "x*", "y*")
     ]
     mean, spread = 45 + np.rad2deg(np.mean(turns)), np.rad2deg(np.ptp(turns))
+    printed = {HERE: "67.7", "step": "22.5"}
 
     def holds(d):
-        return abs(3 * float(d["step"]) - float(d[HERE])) < 0.05 and abs(float(d[HERE]) - mean) < spread
+        steps = abs(3 * float(d["step"]) - float(d[HERE])) < rounding.half_unit(printed[HERE])
+        return steps and abs(float(d[HERE]) - mean) < spread
 
     return Computed(
         mean,
         bound=spread,
-        slips=explained_by({HERE: "67.7", "step": "22.5"}, holds),
+        slips=explained_by(printed, holds),
         proof=(
             f"The poses of this column are turned by {mean - 45:.2f} deg against those of the 45 deg column (four "
             f"lines, {spread:.2f} deg apart); with steps of 22.5 deg (6-22) the column is 67.5 deg."
@@ -562,13 +570,14 @@ def body_length_difference():
 @computes("handeye.body_angle_difference")
 def body_angle_difference():
     value, bound = _difference(_angles_to_axes)
-    angles = {name: _angles_to_axes(thesis.point(name))[1] for name in BODIES}
+    angles = {name: rounding.propagate(_angles_to_axes, _vector(name)) for name in BODIES}
+    printed = {HERE: "0.0010", BODIES[0]: "64.1921", BODIES[1]: "64.1920"}
+    half = rounding.half_unit(printed[HERE])  # that of all three
 
     def holds(d):
-        agree = all(abs(float(d[name]) - angle) <= 1.5e-4 for name, angle in angles.items())
-        return agree and abs(float(d[BODIES[0]]) - float(d[BODIES[1]]) - float(d[HERE])) < 1e-6
+        agree = all(abs(float(d[name]) - x[1]) <= slack[1] + half for name, (x, slack) in angles.items())
+        return agree and abs(float(d[BODIES[0]]) - float(d[BODIES[1]]) - float(d[HERE])) <= 3 * half * (1 + 1e-6)
 
-    printed = {HERE: "0.0010", BODIES[0]: "64.1921", BODIES[1]: "64.1920"}
     return Computed(
         value,
         bound,
@@ -583,10 +592,11 @@ def body_diameter_difference():
     measured = rounding.read(protocol["actual"][list(protocol["feature"]).index("diameter")])
     value, bound = rounding.propagate(lambda d: thesis.radius("listing") * 2 - d, measured)
     printed = {HERE: "0.5541", "CAD": "60.00", "measured": f"{float(measured.values):.4f}"}
+    half, again = rounding.half_unit(printed[HERE]), 2 * thesis.radius("coordinate machine")  # C13 prints it again
 
     def holds(d):
-        body = abs(float(d["measured"]) - 2 * thesis.radius("coordinate machine")) < 1e-6  # C13 prints it again
-        return body and abs(float(d["CAD"]) - float(d["measured"]) - float(d[HERE])) < 1e-6
+        off = abs(float(d["CAD"]) - float(d["measured"]) - float(d[HERE]))
+        return abs(float(d["measured"]) - again) <= half and off <= 2 * half
 
     return Computed(
         value,
@@ -621,13 +631,14 @@ def cmm_percent():
 @computes("handeye.cmm_form")
 def form_deviation():
     """The machine's form deviation of the sphere against the certificate's roundness, in mm."""
-    certificate = thesis.roundness_um() / 1000
+    certificate, protocol = thesis.roundness_um() / 1000, thesis.measuring_protocol()
+    actual = dict(zip(protocol["feature"], protocol["actual"].astype(float)))
     return Computed(
         certificate.max(),
         proof="The certificate of the same sphere (C11) prints roundness deviations of "
         f"{1000 * certificate.min():.3f} to {1000 * certificate.max():.3f} um, with an uncertainty of 0.04 um; the "
-        "machine reports 67.4 um, 250 times as much. Whatever it touched, its diameter of 60.5541 mm is not the "
-        "sphere's.",
+        f"machine reports {1000 * actual['form']:.1f} um, {actual['form'] / certificate.max():.0f} times as much. "
+        f"Whatever it touched, its diameter of {actual['diameter']:.4f} mm is not the sphere's.",
     )
 
 
@@ -678,16 +689,14 @@ def radius_distance(R, skip=()):
 
 def _radius_proof():
     (R, std), (R4, std4) = radius_fit(), radius_fit((4,))
-    away = {name: [radius_distance(r, skip) for skip in ((), (4,))] for name, r in RADII.items()}
-    distances = ", ".join(f"the {name} {R:.1f} ({R4:.1f})" for name, (R, R4) in away.items())
+    held = {source: thesis.radius(source) for source in ("certificate", "listing", "coordinate machine")}
+    away = {source: [radius_distance(r, skip) for skip in ((), (4,))] for source, r in held.items()}
+    distances = ", ".join(f"the {name}'s {held[name]:.4f} mm {R:.1f} ({R4:.1f})" for name, (R, R4) in away.items())
     return (
         f"With the radius as a tenth unknown the 31 corrected poses give {R:.3f} +- {std:.3f} mm (without pose 4, "
         f"which cuts next to the equator, {R4:.3f} +- {std4:.3f} mm). By the growth of the sum of squares, in "
         f"standard deviations and in brackets without pose 4: {distances} away."
     )
-
-
-RADII = {"certificate's 29.9725 mm": 29.9725, "listing's 30 mm": 30.0, "coordinate machine's 30.2770 mm": 30.27705}
 
 
 @computes("handeye.diameter_machine")
@@ -761,8 +770,7 @@ def end_iterations():
 
 @computes("handeye.validation")
 def validation():
-    """Residual of the best pose under the printed end pose; which pose the thesis took, and its center, it "
-    "does not say."""
+    """Residual of the best pose under the printed end pose; which pose and center the thesis took, it does not say."""
     target = thesis.printed_target()
 
     def residuals(pose_deg):
@@ -951,21 +959,30 @@ def rating_scale():
     )
 
 
+def _rotation(angles_deg):
+    return frames.matrix_from_kuka(frames.kuka_from_degrees([0.0, 0.0, 0.0, *angles_deg]))[:3, :3]
+
+
 ORDERS = {"Rz(C) Ry(B) Rx(A)": (2, 1, 0), "Rz(A) Ry(B) Rx(C)": (0, 1, 2)}
 
 
 @computes("handeye.angle_names")
 def angle_names():
     """Which order gives the matrices of table 6-6 from the poses printed beside them."""
-    off = {}
+    off, within, matrices = {}, {}, thesis.matrices_66()
     for name, order in ORDERS.items():
-        poses = [thesis.kuka_pose_deg(f"flange_{line}") for line in ("x45", "y45", "x*45", "y*45")]
-        T = frames.matrix_from_kuka(frames.kuka_from_degrees([[*p[:3], *p[3:][list(order)]] for p in poses]))
-        off[name] = float(np.abs(T[:, :3, :3] - thesis.matrices_66()).max())
+        off[name], within[name] = 0.0, True
+        for k, line in enumerate(("x45", "y45", "x*45", "y*45")):
+            angles, halves = (x[3:] for x in thesis.pose_digits(f"flange_{line}"))
+            given = rounding.Printed(angles[list(order)], 2 * halves[list(order)])  # table 6-6 cuts digits off
+            R, bound = rounding.propagate(_rotation, given)
+            misses = np.abs(R - matrices.values[k])
+            off[name] = max(off[name], float(misses.max()))
+            within[name] &= bool((misses <= bound + 2 * matrices.halves[k]).all())
     printed = {HERE: "Rz(C) Ry(B) Rx(A)", "(6-7), (6-9), C2": "Rz(A) Ry(B) Rx(C)"}
     found = explained_by(
         printed,
-        lambda d: d[HERE] == d["(6-7), (6-9), C2"] and off[d[HERE]] < 1e-3,
+        lambda d: d[HERE] == d["(6-7), (6-9), C2"] and within[d[HERE]],
         lambda text: [name for name in ORDERS if name != text],
     )
     return Computed(

@@ -340,6 +340,20 @@ def simulation(exact=True, printed=False):
     return Simulation(T_BF, x_S, target, scanner)
 
 
+def simulated_digits():
+    """The sensor coordinates of the simulation model as printed.
+
+    Returns
+    -------
+    x_S : rounding.Printed
+        Arrays of shape (13, 3), mm. Whole numbers are printed without decimals.
+
+    Source: thesis, listing C10.
+    """
+    table = read_table("hand_eye/simulation.csv", text=("axis", *CENTER_COLUMNS))
+    return rounding.read(np.column_stack([table[c] for c in CENTER_COLUMNS]))
+
+
 def start_poses_deg():
     """The ten start poses of the comparison.
 
@@ -392,12 +406,14 @@ def matrices_66():
 
     Returns
     -------
-    R : array, shape (4, 3, 3)
+    R : rounding.Printed
+        Arrays of shape (4, 3, 3).
 
     Source: thesis, table 6-6, lines x, y, x*, y*.
     """
-    table = read_table("hand_eye/table_6_6.csv", text=("line",))
-    return np.column_stack([table[c] for c in ("c1", "c2", "c3")]).reshape(4, 3, 3)
+    columns = ("c1", "c2", "c3")
+    table = read_table("hand_eye/table_6_6.csv", text=("line", *columns))
+    return rounding.read(np.column_stack([table[c] for c in columns]).reshape(4, 3, 3))
 
 
 def roundness_um():
