@@ -7,6 +7,7 @@ import numpy as np
 
 ORTHONORMAL_TOLERANCE = 1e-3  # six printed digits pass, a matrix in the wrong unit or a sheared one does not
 LAST_ROW_TOLERANCE = 1e-6  # a product of poses in single precision passes, a transposed pose or a scale does not
+COVARIANCE_TOLERANCE = 1e-6  # of the standard deviations: sums in another order pass, single precision, too
 LARGEST_COORDINATE = 1e75  # fourth powers of coordinates still fit into a float
 KINDS = {"b": "truth values", "c": "complex numbers", "U": "text", "S": "bytes", "M": "dates", "m": "durations"}
 
@@ -191,13 +192,24 @@ def as_probability(value, name):
 
 
 def as_covariances(value, name, n):
-    """`value` as covariances, shape (..., n, n): symmetric, no variance negative."""
+    """`value` as covariances, shape (..., n, n): symmetric, and in no direction a negative variance.
+
+    What rounding leaves passes: up to 1e-6 of the product of the two standard deviations.
+    """
     array = as_matrices(value, name, n, n)
     variances = np.diagonal(array, axis1=-2, axis2=-1)
     if (variances < 0).any():
         raise ValueError(f"{name} must hold no negative variance, got {shown(variances.min())}")
-    if np.abs(array - np.swapaxes(array, -1, -2)).max(initial=0.0) > 1e-6 * np.abs(array).max(initial=0.0):
+    std = np.sqrt(variances + 1e-12 * variances.max(-1, keepdims=True, initial=0.0))  # a row of zeros is rounded, too
+    rounding = COVARIANCE_TOLERANCE * std[..., :, None] * std[..., None, :]
+    if (np.abs(array - np.swapaxes(array, -1, -2)) > rounding).any():
         raise ValueError(f"{name} must be symmetric, but differs from its transpose")
+    try:
+        np.linalg.cholesky(array + (rounding + np.finfo(float).tiny) * np.eye(n))
+    except np.linalg.LinAlgError:
+        raise ValueError(
+            f"{name} must be positive definite or singular, but has a negative variance in some direction"
+        ) from None
     return array
 
 

@@ -80,6 +80,11 @@ REFUSED = [
     (lambda: checks.as_transforms(np.diag([1, 1, 1, -1]), "T"), r"got \(0, 0, 0, -1\)"),
     (lambda: checks.as_readings([np.inf], "z"), "z must be finite, or NaN"),
     (lambda: checks.as_covariances([[1.0, 0.5], [0.0, 1.0]], "cov", 2), "cov must be symmetric"),
+    (lambda: checks.as_covariances([[1e6, 0.5], [0.0, 1e-8]], "cov", 2), "cov must be symmetric"),
+    (lambda: checks.as_covariances([1e6 * I3, I3 + np.eye(3, k=1)], "cov", 3), "cov must be symmetric"),
+    (lambda: checks.as_covariances([[1.0, 1.1], [1.1, 1.0]], "cov", 2), "cov must be positive definite or singular"),
+    (lambda: checks.as_covariances([[0.0, 0.1], [0.1, 1.0]], "cov", 2), "cov must be positive definite or singular"),
+    (lambda: checks.as_covariances([I3, 1.6 * I3 - 0.6], "cov", 3), "cov must be positive definite or singular"),
     (lambda: checks.as_covariances([[-1.0, 0.0], [0.0, 1.0]], "cov", 2), "no negative variance, got -1"),
     (lambda: checks.as_probability(1.0, "p"), "p must lie between 0 and 1"),
     (lambda: checks.fit_together(a=(2,), b=(3,)), r"got \(2,\) of a, \(3,\) of b"),
@@ -317,6 +322,19 @@ def test_a_pose_that_is_off_by_rounding_is_a_pose(dtype):
     np.testing.assert_array_equal(back[3], (0.0, 0.0, 0.0, 1.0))
     scale = np.abs(product[:3, 3]).max()
     np.testing.assert_allclose((back @ product)[:3], np.eye(4)[:3], atol=1e3 * np.finfo(dtype).eps * scale)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_covariance_that_is_off_by_rounding_is_a_covariance(dtype):
+    """Sums and products leave a singular covariance with last bits of asymmetry, and slightly negative eigenvalues."""
+    J = np.random.default_rng(4).normal(size=(200, 6, 2)) * (1e-3, 1.0)
+    J[..., :3, :] *= 1e-3  # three angles beside three lengths
+    J[:50, 2], J[:20] = 0.0, 0.0
+    noise = np.random.default_rng(5).uniform(-1, 1, (200, 6, 6)) * np.finfo(dtype).eps
+    std = np.sqrt((J**2).sum(-1))
+    cov = (J @ np.swapaxes(J, -1, -2) + noise * std[..., :, None] * std[..., None, :]).astype(dtype)
+    assert np.linalg.eigvalsh(cov).min() < 0 and (cov != np.swapaxes(cov, -1, -2)).any()
+    np.testing.assert_array_equal(checks.as_covariances(cov, "cov", 6), cov)
 
 
 def test_lists_are_as_good_as_arrays():
