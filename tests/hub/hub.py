@@ -40,14 +40,18 @@ def set_up(place):
 
 @contextlib.contextmanager
 def running(place):
-    """The address of the hub that the last command starts; it ends with the block, and so do its students' servers."""
+    """The address of the hub that the last command starts; it ends with the block, and so do its students' servers.
+
+    It ends as well with a test run that is killed: it lives as long as the pipe from this process is open.
+    """
     port = free_ports()
-    line = commands()[-1].replace(PLACE, str(place))
+    line = commands()[-1].replace(PLACE, str(place)).partition(" && ")[2]
     with (place / "hub.log").open("wb") as log:
         process = subprocess.Popen(
-            ["bash", "-c", f"exec env {line.partition(' && ')[2]}"],
+            ["bash", "-c", f"{{ read; kill $$; }} <&0 & exec env {line} </dev/null"],
             cwd=place,
             env={**os.environ, "HUB_PORT": str(port), "PWD": str(place)},
+            stdin=subprocess.PIPE,
             stdout=log,
             stderr=subprocess.STDOUT,
         )
@@ -56,7 +60,7 @@ def running(place):
         wait_for(process, address, place / "hub.log")
         yield address
     finally:
-        process.terminate()
+        process.stdin.close()
         try:
             process.wait(30)
         except subprocess.TimeoutExpired:
