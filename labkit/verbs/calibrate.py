@@ -22,7 +22,7 @@ from ..files.points import read_points
 from ..files.poses import FORMATS, read_pairs, read_poses, refuse_times
 from ..geometry.frames import kuka_from_matrix
 from . import report
-from .arguments import Parser, Refusal, run, write
+from .arguments import COMMAND, Parser, Refusal, run, write
 
 MAGNIFIED = (1, 10, 100, 1000, 10_000, 100_000)  # times, that an ellipsoid is drawn larger than it is
 
@@ -98,7 +98,7 @@ def _same_rows(first, second):
     if len(first) != len(second):
         raise Refusal(
             f"{first.name} has {len(first)} rows and {second.name} has {len(second)}: they must come row by row "
-            "(to align two streams by their times, use: labkit calibrate compare)"
+            f"(to align two streams by their times, use: {COMMAND} calibrate compare)"
         )
     if getattr(first, "format", "") == getattr(second, "format", None) == "folder" and first.places != second.places:
         numbers = [[int("".join(filter(str.isdigit, p)) or 0) for p in poses.places] for poses in (first, second)]
@@ -112,7 +112,7 @@ def _hand_eye(options):
     elif options.robot and not options.sensor and options.robot.suffix.lower() == ".json":
         robot, sensor = read_pairs(options.robot, options.length, options.any_size)
     elif not options.robot or not options.sensor:
-        raise Refusal("labkit calibrate hand-eye needs --robot and --sensor (or one JSON file of pairs as --robot)")
+        raise Refusal("a hand-eye calibration needs --robot and --sensor (or one JSON file of pairs as --robot)")
     else:
         robot, sensor = _poses(options, options.robot), _poses(options, options.sensor)
     _same_rows(robot, sensor)

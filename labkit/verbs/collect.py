@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 from ..collect import batch, library, page, points, report, sandbox, submissions
-from .arguments import Parser, Refusal
+from .arguments import COMMAND, Parser, Refusal
 
 
 def main(arguments=None):
@@ -68,7 +68,7 @@ def _one(options):
 
 def _collect(options):
     if not options.folders:
-        raise Refusal("Which submissions? For example: python lab.py collect submissions.zip --out marks")
+        raise Refusal(f"Which submissions? For example: {COMMAND} collect submissions.zip --out marks")
     if options.jobs < 1:
         raise Refusal(f"--jobs is the number of notebooks judged at a time, got {options.jobs}")
     weights = points.read(options.points)
@@ -165,7 +165,7 @@ def _write(out, rows, gripes, weights, seed):
     facts = [
         *used,
         f"The draws follow from the seed {seed} and the content of each file. To judge one again, and to see "
-        f"the calls on which an answer failed: `python lab.py collect --one FILE --seed {seed}`",
+        f"the calls on which an answer failed: `{COMMAND} collect --one FILE --seed {seed}`",
         "A prediction is counted where it stands in the notebook; one made with a button is not stored there.",
     ]
     (out / "class.html").write_text(page.class_page(rows, chapters, facts), encoding="utf-8", newline="\n")

@@ -1,5 +1,4 @@
-"""`labkit ledger`: what the four documents print, recomputed; `--strict` refuses what an unfriendly reader "
-"would strike."""
+"""`labkit ledger`: what the four documents print, recomputed; `--strict` refuses rows that read their own answer."""
 
 from ..documents import strict
 from ..documents.ledger import rows
