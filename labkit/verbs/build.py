@@ -26,7 +26,7 @@ from PIL import Image
 from ..exercises import source
 from ..places import IS_CHECKOUT
 from .arguments import Parser, Refusal
-from .edition import write
+from .notebook_copies import write
 
 KERNEL = {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"}
 SECONDS_A_CELL = 60

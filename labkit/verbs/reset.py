@@ -6,7 +6,7 @@ from ..exercises import progress
 from ..exercises.engine import Prediction
 from ..exercises.session import chapters
 from ..places import IS_CHECKOUT, ROOT
-from . import edition
+from . import notebook_copies
 from .arguments import COMMAND, Parser, Refusal
 
 
@@ -42,9 +42,11 @@ def find(wanted):
 def notebook(chapter):
     """Put its beginning back; returns what was done."""
     name, folder = f"{chapter.notebook}.ipynb", ROOT / "notebooks" if IS_CHECKOUT else Path.cwd()
-    if not (IS_CHECKOUT or (folder / edition.GIVEN).exists()):
+    if not (IS_CHECKOUT or (folder / notebook_copies.GIVEN).exists()):
         raise Refusal(f"{folder} is no folder that holds your notebooks: call this in the one you named to start.")
-    return edition.fresh_copy(folder / name, edition.notebooks()[name], f"notebooks/{name}" if IS_CHECKOUT else name)
+    return notebook_copies.fresh_copy(
+        folder / name, notebook_copies.blank_notebooks()[name], f"notebooks/{name}" if IS_CHECKOUT else name
+    )
 
 
 def predictions(chapter):

@@ -6,7 +6,7 @@ A checkout is opened as it is when no folder is named. Any other option goes to 
 from pathlib import Path
 
 from ..places import IS_CHECKOUT, ROOT
-from . import edition, jupyter
+from . import jupyter, notebook_copies
 from .arguments import Parser, Refusal
 
 FIRST_NOTEBOOK = "00_start_here.ipynb"
@@ -37,7 +37,7 @@ def place(folder):
         if not IS_CHECKOUT:
             raise Refusal("Which folder shall hold your notebooks? For example: labkit start workbook")
         return ROOT, f"notebooks/{FIRST_NOTEBOOK}"
-    new = edition.give(folder)
+    new = notebook_copies.give(folder)
     if new:
         print(f"{len(new)} notebooks are laid out in {folder}.", flush=True)
     return Path(folder).resolve(), FIRST_NOTEBOOK

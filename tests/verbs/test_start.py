@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from labkit.verbs import edition, jupyter, start
+from labkit.verbs import jupyter, notebook_copies, start
 from labkit.verbs.arguments import Refusal
 
 
@@ -20,7 +20,7 @@ def opened(monkeypatch):
 def test_a_folder_gets_the_notebooks_once_and_is_opened(opened, tmp_path, capsys):
     folder = tmp_path / "Übung 1"
     assert start.main([str(folder), "--no-browser", "--ServerApp.x=1"]) == 0
-    assert f"{len(edition.notebooks())} notebooks are laid out" in capsys.readouterr().out
+    assert f"{len(notebook_copies.blank_notebooks())} notebooks are laid out" in capsys.readouterr().out
     (words, environment), first = opened[0], folder / "00_start_here.ipynb"
     assert f"--ServerApp.root_dir={folder}" in words and "--no-browser" in words and words[-1] == "--ServerApp.x=1"
     assert environment["JUPYTERLAB_WORKSPACES_DIR"] == str(folder / ".lab" / "workspaces")

@@ -6,7 +6,7 @@ import pytest
 
 from labkit.exercises import progress
 from labkit.exercises.session import chapters
-from labkit.verbs import edition, reset, update
+from labkit.verbs import notebook_copies, reset, update
 from labkit.verbs.arguments import Refusal
 
 
@@ -19,14 +19,14 @@ def notebook(**texts):
 
 
 def given(mine):
-    return {c["id"]: edition.digest(c) for c in mine["cells"]}
+    return {c["id"]: notebook_copies.digest(c) for c in mine["cells"]}
 
 
 OLD = notebook(a="1", b="2", c="3")
 
 
 def merged(mine, theirs, old=OLD):
-    found, kept = edition.merge(mine, theirs, given(old))
+    found, kept = notebook_copies.merge(mine, theirs, given(old))
     return found and [c["source"] for c in found["cells"]], kept
 
 
@@ -39,7 +39,7 @@ def test_untouched_cells_take_the_new_text_and_written_ones_stay():
 
 def test_outputs_of_what_did_not_change_stay():
     mine = {**OLD, "cells": [cell("a", "1", outputs=["shown"]), *OLD["cells"][1:]]}
-    found, _ = edition.merge(mine, notebook(a="1", b="new", c="3"), given(OLD))
+    found, _ = notebook_copies.merge(mine, notebook(a="1", b="new", c="3"), given(OLD))
     assert found["cells"][0]["outputs"] == ["shown"] and found["metadata"] == {"own": 1}
 
 
@@ -64,15 +64,17 @@ def test_cells_without_an_id_or_with_a_borrowed_one_are_never_lost():
 def test_a_folder_of_unknown_origin_loses_nothing():
     """Without the digests every cell counts as written."""
     mine = notebook(a="mine", b="2")
-    assert edition.merge(mine, notebook(a="1", b="new", c="3"), {})[0]["cells"][:2] == mine["cells"]
+    assert notebook_copies.merge(mine, notebook(a="1", b="new", c="3"), {})[0]["cells"][:2] == mine["cells"]
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     texts = {"01_a.ipynb": json.dumps(OLD), "02_b.ipynb": json.dumps(OLD)}
-    monkeypatch.setattr(edition, "notebooks", lambda: texts)
-    assert edition.give(tmp_path) == list(texts)
-    monkeypatch.setattr(edition, "notebooks", lambda: {**texts, "01_a.ipynb": json.dumps(notebook(a="new", b="2"))})
+    monkeypatch.setattr(notebook_copies, "blank_notebooks", lambda: texts)
+    assert notebook_copies.give(tmp_path) == list(texts)
+    monkeypatch.setattr(
+        notebook_copies, "blank_notebooks", lambda: {**texts, "01_a.ipynb": json.dumps(notebook(a="new", b="2"))}
+    )
     return tmp_path
 
 
@@ -91,32 +93,40 @@ def test_update_says_what_it_did_and_does_it_once(folder, capsys):
     assert capsys.readouterr().out == "The notebooks are those of this edition already.\n"
 
 
+def test_half_of_a_letter_in_a_cell_of_ones_own_is_kept(folder):
+    (folder / "01_a.ipynb").write_text(json.dumps(notebook(a="1", b="mine \ud800")), encoding="utf-8")
+    assert notebook_copies.update(folder) == [
+        "01_a.ipynb is brought to this edition; 1 of its cells stay as you wrote them"
+    ]
+    assert sources(folder / "01_a.ipynb") == ["new", "mine \ud800"]
+
+
 def test_update_leaves_what_it_cannot_read_and_tries_again_the_next_time(folder):
     whole = (folder / "01_a.ipynb").read_text(encoding="utf-8")
     for broken in ('{"cells": [', "[]", '{"cells": [{"id": 1}]}'):
         (folder / "01_a.ipynb").write_text(broken, encoding="utf-8")
-        assert edition.update(folder) == ["01_a.ipynb cannot be read as a notebook and is left as it is"]
+        assert notebook_copies.update(folder) == ["01_a.ipynb cannot be read as a notebook and is left as it is"]
         assert (folder / "01_a.ipynb").read_text(encoding="utf-8") == broken
     (folder / "01_a.ipynb").write_text(whole, encoding="utf-8")
-    edition.update(folder)
+    notebook_copies.update(folder)
     assert sources(folder / "01_a.ipynb") == ["new", "2"]
 
 
 def test_update_fills_an_empty_folder_and_refuses_one_of_other_things(folder, tmp_path):
-    assert edition.update(tmp_path / "new") == ["01_a.ipynb is new", "02_b.ipynb is new"]
+    assert notebook_copies.update(tmp_path / "new") == ["01_a.ipynb is new", "02_b.ipynb is new"]
     (tmp_path / "thesis").mkdir()
     (tmp_path / "thesis" / "draft.txt").touch()
     with pytest.raises(Refusal, match="holds no notebook of the course"):
-        edition.update(tmp_path / "thesis")
+        notebook_copies.update(tmp_path / "thesis")
 
 
 def test_reset_keeps_the_students_copy(tmp_path):
     path = tmp_path / "01_small.ipynb"
-    assert edition.fresh_copy(path, "fresh", path.name) == "01_small.ipynb is as in the beginning"
-    assert "already" in edition.fresh_copy(path, "fresh", path.name)
+    assert notebook_copies.fresh_copy(path, "fresh", path.name) == "01_small.ipynb is as in the beginning"
+    assert "already" in notebook_copies.fresh_copy(path, "fresh", path.name)
     for number in (1, 2):
         path.write_text(f"my work {number}", encoding="utf-8")
-        said = edition.fresh_copy(path, "fresh", f"notebooks/{path.name}")
+        said = notebook_copies.fresh_copy(path, "fresh", f"notebooks/{path.name}")
         assert said.endswith(f"yours is kept as notebooks/01_small.my-copy-{number}.ipynb")
         assert (tmp_path / f"01_small.my-copy-{number}.ipynb").read_text(encoding="utf-8") == f"my work {number}"
         assert path.read_text(encoding="utf-8") == "fresh"
@@ -127,7 +137,7 @@ def test_reset_of_an_installation_works_in_the_folder_one_stands_in(tmp_path, mo
     monkeypatch.chdir(tmp_path)
     with pytest.raises(Refusal, match="no folder that holds your notebooks"):
         reset.main(["01"])
-    edition.give(tmp_path)
+    notebook_copies.give(tmp_path)
     (tmp_path / "01_frames.ipynb").write_text("mine", encoding="utf-8")
     reset.main(["1"])
     assert capsys.readouterr().out.startswith("01_frames.ipynb is as in the beginning; yours is kept as 01_frames.my-")

@@ -1,4 +1,4 @@
-"""The blank notebooks of this edition: given to a folder, reset, and updated without touching what was written.
+"""A reader's copies of the blank notebooks: given to a folder, reset, updated without touching what was written.
 
 What a folder was given is remembered in its `.labkit.json`, a digest for every cell. A cell that is still as it was
 given takes the text of a new edition; a cell in which something was written stays, with its output.
@@ -16,7 +16,7 @@ from .arguments import Refusal
 GIVEN = ".labkit.json"
 
 
-def notebooks():
+def blank_notebooks():
     """{name: text} of the blank notebooks; in a checkout, where those in place may be worked in, from their sources."""
     if IS_CHECKOUT:
         from ..exercises import source
@@ -30,7 +30,7 @@ def give(folder):
     """Copy those notebooks into a folder that it does not hold yet; returns their names."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    new = {name: text for name, text in notebooks().items() if not (folder / name).exists()}
+    new = {name: text for name, text in blank_notebooks().items() if not (folder / name).exists()}
     for name, text in new.items():
         write(folder / name, text)
     _remember(folder, new)
@@ -46,26 +46,33 @@ def update(folder):
         When the folder holds other things and no notebook of the course.
     """
     folder, said = Path(folder), []
-    fresh, given = notebooks(), _given(folder)
+    fresh, given = blank_notebooks(), _given(folder)
     if not any((folder / name).exists() for name in fresh) and folder.exists() and any(folder.iterdir()):
         raise Refusal(f"{folder} holds no notebook of the course, but other things: name a folder of its own.")
+    brought = {}
     for name, text in fresh.items():
-        if not (folder / name).exists():
-            write(folder / name, text)
-            said.append(f"{name} is new")
-            continue
         try:
-            merged, kept = merge(_read(folder / name), json.loads(text), given.get(name, {}))
+            sentence = _bring(folder / name, text, given.get(name, {}))
         except (ValueError, KeyError, TypeError):
             said.append(f"{name} cannot be read as a notebook and is left as it is")
-            fresh = {other: words for other, words in fresh.items() if other != name}
             continue
-        if merged is not None:
-            write(folder / name, json.dumps(merged, indent=1, ensure_ascii=False) + "\n")
-            own = f"; {kept} of its cells stay as you wrote them" if kept else ""
-            said.append(f"{name} is brought to this edition{own}")
-    _remember(folder, fresh)
+        brought[name] = text
+        said += [sentence] if sentence else []
+    _remember(folder, brought)
     return said
+
+
+def _bring(path, text, given):
+    """Bring one notebook to this edition; returns a sentence, or nothing when it is so already."""
+    if not path.exists():
+        write(path, text)
+        return f"{path.name} is new"
+    merged, kept = merge(_read(path), json.loads(text), given)
+    if merged is None:
+        return ""
+    text = json.dumps(merged, indent=1, ensure_ascii=False) + "\n"
+    write(path, text.encode("utf-8", "backslashreplace").decode())  # half of a letter, as JSON writes it: \ud800
+    return f"{path.name} is brought to this edition" + (f"; {kept} of its cells stay as you wrote them" if kept else "")
 
 
 def merge(mine, theirs, given):
