@@ -83,11 +83,10 @@ async def run(program, options, counts):
     print(f"{stages} Stages at {demo.address}\nStop with Ctrl-C in this window.", flush=True)
     if room:
         _tell_of(room)
-    start = demo.session.house.get(program.cards[0].stage) if program.cards[0].stage else None
     if not options.no_browser:
         await asyncio.to_thread(_open_browser, demo.address)
-    if start:
-        await start
+    if program.cards[0].stage:
+        await demo.session.house.get(program.cards[0].stage)
     ended = asyncio.Event()
     with contextlib.suppress(NotImplementedError, ValueError):  # Windows ends the process itself
         for number in (signal.SIGINT, signal.SIGTERM):

@@ -29,26 +29,16 @@ class Windows:
         card = Card(key, "window", stage.name, key, make=lambda: stage)
         with self.lock:
             if self.loop is None:
-                self._start(card)
-            else:
-                asyncio.run_coroutine_threadsafe(self._add(card), self.loop).result(SECONDS)
+                self.loop = asyncio.new_event_loop()
+                threading.Thread(target=self.loop.run_forever, name="window", daemon=True).start()
+            asyncio.run_coroutine_threadsafe(self._add(card), self.loop).result(SECONDS)
         return f"{self.demo.address}#{key}"
 
-    def _start(self, card):
-        self.program.cards.append(card)
-        ready = threading.Event()
-
-        async def serve():
-            self.demo, self.loop = Demo(self.program), asyncio.get_running_loop()
-            ready.set()
-            await asyncio.Event().wait()
-
-        threading.Thread(target=asyncio.run, args=(serve(),), name="window", daemon=True).start()
-        ready.wait(SECONDS)
-
     async def _add(self, card):
-        house, cards = self.demo.session.house, self.program.cards
+        cards = self.program.cards
         cards[:] = [*(other for other in cards if other.key != card.key), card]
+        self.demo = self.demo or Demo(self.program)
+        house = self.demo.session.house
         house.makers[card.key] = card.make
         house.stages.pop(card.key, None)
 
@@ -62,7 +52,7 @@ def open_window(stage):
     Raises
     ------
     ValueError
-        Where the kernel runs on another machine than the browser.
+        Where the kernel runs on another machine than the browser, or no port is free.
     """
     if "JUPYTERHUB_USER" in os.environ:
         raise ValueError("A window of its own needs a kernel on your own machine; here, Enlarge fills this window.")

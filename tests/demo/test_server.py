@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import segno
 import tornado.httpclient
 import tornado.websocket
 
@@ -65,11 +66,11 @@ def cards():
     ]
 
 
-def in_demo(work, vote=False, **given):
-    """Run `work(demo)` beside a demo on free ports."""
+def in_demo(work, vote=False):
+    """Run `work(demo)` beside a demo on the first free ports."""
 
     async def run():
-        demo = Demo(Program(cards(), {"01": "One"}), port=given.get("port") or free_port())
+        demo = Demo(Program(cards(), {"01": "One"}))
         if vote:
             demo.let_vote("127.0.0.1")
         try:
@@ -249,12 +250,10 @@ def test_the_next_stage_is_made_ahead():
     async def work(demo):
         async with Window(demo) as window:
             await window.open("01/also-good")
-            while "01/good" not in demo.session.house.stages or not demo.session.house.faults:
-                if demo.session.house._timer is None and not demo.session.house._waiting:
-                    break
+            house = demo.session.house
+            while not house.faults:
                 await asyncio.sleep(0.02)
-            await asyncio.sleep(0.1)
-            return set(demo.session.house.stages), set(demo.session.house.faults)
+            return set(house.stages), set(house.faults)
 
     made, faults = in_demo(work)
     assert made == {"01/also-good"} and faults == {"01/bad"}  # its neighbors with a Stage: the one that cannot be made
@@ -467,13 +466,15 @@ def test_sixty_phones_vote_at_once_and_none_is_lost():
 
 
 def test_the_code_of_a_vote_is_its_address():
-    """Oracle: the library's own segment of the drawn code, compared at the same version and error level."""
-    segno = pytest.importorskip("segno")
+    """The drawing holds the address as bytes, dark on white, and another address is another drawing."""
     room = rooms.Room(SimpleNamespace(version=0), lambda: None)
     room.host, room.port = "192.0.2.17", 8891
     assert urllib.parse.urlsplit(room.address).path == f"/{room.code}" and len(room.code) == rooms.CODE_LENGTH
     svg = room.code_svg().decode()
     assert svg.count("<path") == 2 and segno.make(room.address, error="m").mode == "byte"
+    room.port = 8892
+    assert room.code_svg().decode() != svg
+    room.port = 8891
     assert room.invitation() == {"address": f"192.0.2.17:8891/{room.code}", "joined": 0, "reachable": True}
 
 
@@ -504,3 +505,12 @@ def test_a_stage_of_a_notebook_is_the_same_in_its_window(monkeypatch, capsys):
     monkeypatch.setenv("JUPYTERHUB_USER", "someone")
     with pytest.raises(ValueError, match="your own machine"):
         stage.show("window")
+
+
+def test_a_window_without_a_free_port_says_so_at_once(monkeypatch):
+    monkeypatch.setattr(server, "PORTS", 0)
+    windows = window.Windows()
+    with pytest.raises(server.Taken, match="are all taken"):
+        windows.show(good())
+    monkeypatch.undo()
+    assert windows.show(good()).endswith("#window/good")  # the next time there may be one
