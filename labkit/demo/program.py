@@ -17,6 +17,7 @@ from pathlib import Path
 from ..exercises import session, source
 from ..exercises.engine import Prediction
 from ..places import ROOT
+from .vote import MAX_SIZE
 
 MAX_QUESTIONS, MAX_LETTERS, MAX_CHOICES = 100, 400, 8
 FIELDS = {"question": str, "choices": list, "answer": object, "why": str, "unit": str, "stage": str, "before": str}
@@ -285,13 +286,18 @@ def _own(where, number, table):
     if len(set(choices)) < len(choices):
         raise ValueError(f"{where}: two of the choices are alike")
     answer = table.get("answer")
-    if answer is not None and (answer not in choices if choices else not isinstance(answer, int | float)):
-        raise ValueError(f"{where}: the answer {answer!r} is {'none of the choices' if choices else 'no number'}")
+    if answer is not None and (answer not in choices if choices else not _is_number(answer)):
+        wanted = "none of the choices" if choices else f"no number up to {MAX_SIZE:g}"
+        raise ValueError(f"{where}: the answer {repr(answer)[:40]} is {wanted}")
     if not choices and "answer" in table:
         answer = float(answer)
     asked = Asked(table["question"], tuple(choices), answer, table.get("why", ""), table.get("unit", ""))
     card = Card(f"own/{number}", "own", "Own questions", asked=asked, stage=table.get("stage", ""))
     return card, table.get("before", "")
+
+
+def _is_number(answer):
+    return type(answer) in (int, float) and abs(answer) <= MAX_SIZE
 
 
 def _placed(own, cards):
