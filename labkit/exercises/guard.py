@@ -414,14 +414,9 @@ def message_of(error, limit=0.5):
     """What an error says, in one line; a student's exception class may fail to print itself, or never end."""
     if error is None:
         return ""
-    clock = _Clock(limit)
     try:
-        try:
-            with sandbox(_Capture()):
-                clock.start()
-                return _call(str, (error,), lambda said: printable(" ".join(said.split())[:300]))
-        finally:
-            clock.stop()
+        with time_limit(limit), sandbox(_Capture()):
+            return _call(str, (error,), lambda said: printable(" ".join(said.split())[:300]))
     except BaseException:  # also TimeLimit, and SystemExit of student code
         return "(its message cannot be shown)"
 
