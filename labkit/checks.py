@@ -197,6 +197,23 @@ def as_covariances(value, name, n):
     What rounding leaves passes: up to 1e-6 of the product of the two standard deviations.
     """
     array = as_matrices(value, name, n, n)
+    if not _is_definite(array):
+        _refuse_indefinite(array, name)
+    return array
+
+
+def _is_definite(array):
+    """Whether symmetric matrices, to the last bit, are positive definite: most covariances are, and this is quick."""
+    if (array != np.swapaxes(array, -1, -2)).any():
+        return False
+    try:
+        np.linalg.cholesky(array)
+    except np.linalg.LinAlgError:
+        return False
+    return True
+
+
+def _refuse_indefinite(array, name):
     variances = np.diagonal(array, axis1=-2, axis2=-1)
     if (variances < 0).any():
         raise ValueError(f"{name} must hold no negative variance, got {shown(variances.min())}")
@@ -205,12 +222,11 @@ def as_covariances(value, name, n):
     if (np.abs(array - np.swapaxes(array, -1, -2)) > rounding).any():
         raise ValueError(f"{name} must be symmetric, but differs from its transpose")
     try:
-        np.linalg.cholesky(array + (rounding + np.finfo(float).tiny) * np.eye(n))
+        np.linalg.cholesky(array + (rounding + np.finfo(float).tiny) * np.eye(array.shape[-1]))
     except np.linalg.LinAlgError:
         raise ValueError(
             f"{name} must be positive definite or singular, but has a negative variance in some direction"
         ) from None
-    return array
 
 
 def solve_covariance(cov, name, right):
