@@ -251,10 +251,10 @@ def error_by_stop(ax, stops, printed):
 class OverSpeed:
     """Errors of several motions over their speed, medians of intervals, a law through them, and two printed levels."""
 
-    def __init__(self, ax, edges):
+    def __init__(self, ax, x, end):
         style.axes(ax, "speed, share of the fastest printed (1.4 m/s or 3.7 rad/s)", "error", "same path, three speeds")
-        ax.set(xlim=(0, edges[-1]), ylim=(0.05, 2000), yscale="log")
-        self.x = 0.5 * (edges[1:] + edges[:-1])
+        ax.set(xlim=(0, end), ylim=(0.05, 2000), yscale="log")
+        self.x = x
         self.dots = [
             ax.plot([], [], **style.look("measurement", marker=marker, markersize=3, alpha=0.55), label=name)[0]
             for marker, name in ((".", "slow"), ("^", "middle"), ("s", "fast"))
@@ -265,7 +265,7 @@ class OverSpeed:
         self.levels = [ax.plot([], [], **style.look("guide", linewidth=1.6))[0] for _ in range(2)]
         self.names = [
             ax.annotate(
-                text, (edges[-1], 1.0), xytext=(-2, -11 if k == 0 else 3), textcoords="offset points", ha="right",
+                text, (end, 1.0), xytext=(-2, -11 if k == 0 else 3), textcoords="offset points", ha="right",
                 color=style.MUTED, fontsize=9,
             )
             for k, text in enumerate(("printed mean", "printed largest"))
@@ -280,7 +280,7 @@ class OverSpeed:
         x, y, bad = (np.concatenate(result[key]) for key in ("share", "error", "bad"))
         self.nonsense.set_data(x[bad], y[bad])
         self.medians.set_data(self.x, result["median"])
-        self.law.set_data(self.x, np.hypot(result["e0"], result["growth"] * self.x))
+        self.law.set_data(self.x, result["law"])
         for line, name, level in zip(self.levels, self.names, result["printed"]):
             line.set_data([0, 2], [level, level])
             line.set_visible(bool(np.isfinite(level)))

@@ -722,6 +722,7 @@ def moved_station():
 # ---- errors over speed -----------------------------------------------------------------------------------------------
 
 SHARES = np.linspace(0.0, 1.25, 11)  # edges of the intervals of speed
+MIDDLES = 0.5 * (SHARES[1:] + SHARES[:-1])
 OVER = {  # quantity: its place in `TrackingErrors`, its unit, and the speed it is drawn over
     "position": ("translation", "mm", 0),
     "rotation": ("rotation", "deg", 1),
@@ -753,8 +754,8 @@ def compute_over_speed(state):
     """Errors of the slow, middle and fast motion over the speed, figures 10 to 15 of the report.
 
     Returns a dictionary: share (3 arrays) of the fastest speed, error (3 arrays) in the unit, bad (3 bool arrays),
-    median (10,), e0 and lag (s): what stays and what grows with the speed, nonsense left out; mean and largest error,
-    as they are; unit, printed (2,).
+    median and law (10,) over the middles of the intervals, the law at rest and at the fastest, and the lag (s) it
+    stands for, nonsense left out; the mean error of all readings and the largest but nonsense; unit, printed (2,).
     """
     field, unit, kind = OVER[state["of"]]
     follower = Tracker(nonsense=0.015 if state["nonsense"] else 0.0, burst=2.0, latency=state["latency"] / 1000)
@@ -766,12 +767,12 @@ def compute_over_speed(state):
         share.append(v[kind] / _fastest()[kind])
         error.append(np.rad2deg(e) if kind else e)
         bad.append(wrong)
-    x, y, good = (np.concatenate(part) for part in (share, error, bad))
-    good = ~good
+    x, y, good = np.concatenate(share), np.concatenate(error), ~np.concatenate(bad)
     e0, slope = static_error_and_lag(x[good], y[good])
     return {
         "share": share, "error": error, "bad": bad, "unit": unit, "printed": _printed(state["of"]),
-        "median": median_over_speed(x[good], y[good], SHARES), "e0": e0, "growth": slope,
+        "median": median_over_speed(x[good], y[good], SHARES), "law": np.hypot(e0, slope * MIDDLES),
+        "rest": e0, "fastest": float(np.hypot(e0, slope)),
         "mean": float(y.mean()), "largest": float(y[good].max()),
         "lag": slope / (_fastest()[0], np.rad2deg(_fastest()[1]))[kind] if "speed" not in field else None,
     }  # fmt: skip
@@ -782,7 +783,7 @@ def over_speed():
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.8, 1))
-        picture = draw.OverSpeed(left, SHARES)
+        picture = draw.OverSpeed(left, MIDDLES, SHARES[-1])
         style.bare(right)
         words = right.text(0.0, 0.95, "", transform=right.transAxes, va="top", linespacing=1.6)
 
@@ -790,8 +791,8 @@ def over_speed():
             picture.set(result)
             lag = "" if result["lag"] is None else f"\nas of a lag of {1000 * result['lag']:.1f} ms"
             words.set_text(
-                f"{state['of']}, {result['unit']}\n\nat rest {result['e0']:.2g}\n"
-                f"at the fastest {np.hypot(result['e0'], result['growth']):.2g}{lag}\n\n"
+                f"{state['of']}, {result['unit']}\n\nat rest {result['rest']:.2g}\n"
+                f"at the fastest {result['fastest']:.2g}{lag}\n\n"
                 f"mean of all {result['mean']:.2g}\nlargest but nonsense {result['largest']:.2g}"
             )
 
@@ -809,7 +810,7 @@ def over_speed():
         fail={"of": "position", "latency": 40.0, "nonsense": True},
         presets={"no lag": {"latency": 0.0}, "speed": {"of": "speed"}},
         describe=lambda r: (
-            f"At rest {r['e0']:.2g} {r['unit']}, at the fastest {np.hypot(r['e0'], r['growth']):.2g} {r['unit']}; "
+            f"At rest {r['rest']:.2g} {r['unit']}, at the fastest {r['fastest']:.2g} {r['unit']}; "
             f"the mean of all readings is {r['mean']:.2g}."
         ),
     )
