@@ -249,10 +249,10 @@ class Sighting(Result):
         Measured less predicted.
     weights : array, shape (2 n m,)
         1 for each angle.
-    given : float or None
+    given_std : float or None
         Standard deviation of an angle (rad), where it was given.
     std : float, rad
-        The same, as given or as the residuals have it, unbiased.
+        The same, as given or as the residuals have it, unbiased; NaN when six angles leave nothing to judge by.
     covariance : array, shape (6, 6)
         Of the rotation vector (rad, about the axes of E) and the translation (mm, in W).
     singular_values : array, shape (6,)
@@ -263,7 +263,7 @@ class Sighting(Result):
     T_WL: np.ndarray
     diodes: np.ndarray
     angles: np.ndarray
-    given: float | None = None
+    given_std: float | None = None
 
     parameters = pose_parameters("T_WE")
 
@@ -281,7 +281,10 @@ class Sighting(Result):
 
     @cached_property
     def std(self):
-        return self.given or float(np.sqrt((self.residuals**2).sum() / max(self.angles.size - 6, 1)))
+        if self.given_std is not None:
+            return self.given_std
+        freedom = self.angles.size - len(self.parameters)
+        return float(np.sqrt((self.residuals**2).sum() / freedom)) if freedom > 0 else np.nan
 
     @cached_property
     def covariance(self):

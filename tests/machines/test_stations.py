@@ -147,6 +147,15 @@ def test_covariance_of_a_pose_is_that_of_many_trials():
     assert np.mean([f.std for f in found]) == pytest.approx(std, rel=0.05)
 
 
+def test_six_angles_fit_exactly_and_say_nothing_of_their_noise():
+    L, diodes = stations.STATIONS[:1], stations.DIODES[:3]
+    angles = stations.body_angles(L, diodes, T_BE[3])
+    found = stations.sight(L, diodes, angles, T_BE[3])
+    assert np.isnan(found.std) and np.isnan(found.std_of("T_WE.translation")).all()
+    known = stations.sight(L, diodes, angles, T_BE[3], std=5e-5)
+    assert known.std == 5e-5 and (known.std_of("T_WE.translation") > 0).all()
+
+
 def test_one_station_is_poor_in_depth_alone():
     """Across the line of sight both are alike; along it the second station is worth a factor of ten and more."""
     one, two = (noisy_sight(n, 5e-5, np.random.default_rng(0)) for n in (1, 2))
