@@ -25,6 +25,7 @@ FIELDS = (
 TIME, POSITION, VELOCITY, QUATERNION, ANGULAR_VELOCITY = 1, slice(2, 5), slice(5, 8), slice(11, 15), slice(15, 18)
 MAX_POSITION = 10.0  # m: twice the tracking area of the data sheet (5 x 5 m); farther away nothing is tracked
 MAX_TIME = 1e10  # s, three centuries: no clock of a tracker has run that long
+IMPLAUSIBLE = "the time stamp is implausible"
 UNIT_TOLERANCE = 1e-3  # how far the length of a quaternion may be from 1
 
 
@@ -74,7 +75,7 @@ def check_packet(data):
     if abs(qx * qx + qy * qy + qz * qz + qw * qw - 1.0) > 2 * UNIT_TOLERANCE:
         return None, "the quaternion is not of length 1"
     if abs(values[TIME]) > MAX_TIME:
-        return None, "the time stamp is implausible"
+        return None, IMPLAUSIBLE
     if max(map(abs, values[2:5])) > MAX_POSITION:
         return None, f"the position is more than {MAX_POSITION:g} m away"
     return values, ""

@@ -16,14 +16,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..checks import as_count, as_positive_number
-from .packet import PACKET, TIME, check_packet
+from .packet import IMPLAUSIBLE, PACKET, TIME, check_packet
 
 HOST = "127.0.0.1"
 BUFFER = 1 << 20  # bytes the system may hold back for us: 20 s of the stream
 MEMORY = 2048  # timestamps remembered to tell duplicates: 8 s at 250 Hz
 RESTART = 50  # readings in a row from before the memory, or far off: this many mean that the sender has started over
 LEAP, LEAP_READINGS = 60.0, 100  # s, and readings: a stamp farther than both from the newest one is no lost packet
-IMPLAUSIBLE = "the time stamp is implausible"
 
 
 @dataclass
