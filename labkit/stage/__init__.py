@@ -8,7 +8,6 @@ canvas      pictures drawn, compared and sent
 renderer    how it is drawn: words kept, colors for the dark theme
 scene3d     bodies, frames, points and paths in space; scene3d_solids what bodies are made of, scene3d_handles how
             handles move there; space.js draws them in the page and is made of web/space
-scene3d_solids, scene3d_handles  what stands in it, and how a handle moves through it
 style       colors and letters by role
 marks       small things that several chapters draw
 tape        moments gone by, so that time can be scrubbed
