@@ -1,13 +1,16 @@
 """Scenes in space without a browser: what is described, which numbers travel, how handles move, what is refused."""
 
+import hashlib
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
-from labkit.stage import Handle, Slider, Stage, style
+from labkit.stage import Handle, Slider, Stage, front, style
 from labkit.stage import scene3d_solids as solids
 from labkit.stage.scene3d import Scene, View
 from labkit.stage.scene3d_handles import Along, Dial, Free, OnPlane, OnSphere, stepped
@@ -101,6 +104,16 @@ def test_the_drawing_is_sent_when_a_page_asks_and_costs_less_than_150_kB():
     stage.receive({"need": "space"})
     message, (source,) = sent[-1]
     assert message == {"module": "space"} and b"twgl" in source[:200] and 20_000 < len(source) < 150_000
+
+
+def test_the_drawing_is_made_of_its_sources_as_they_are():
+    """Else: cd web/space && npm install --no-package-lock && npm run build."""
+    folder = Path(__file__).parents[2] / "web" / "space"
+    names = ("build.mjs", "package.json", "renderer.js", "solids.js", "space.js")
+    assert sorted(path.name for path in folder.glob("*.*js*")) == sorted(names)
+    sources = "".join((folder / name).read_text(encoding="utf-8") for name in names)
+    made_of = re.search(r"Sources: (\w+)", front.SPACE.read_text(encoding="utf-8").splitlines()[0])[1]
+    assert made_of == hashlib.sha256(sources.encode()).hexdigest()
 
 
 def test_turning_needs_no_picture_and_python_learns_of_it():
