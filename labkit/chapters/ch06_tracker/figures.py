@@ -57,7 +57,7 @@ class Trail:
         )
         self.legend = scene.ax.legend(
             handles=[Line2D([], [], **style.look(role, label=name, **more)) for role, name, more in keys],
-            loc="lower left",
+            loc="upper center",
             fontsize=8,
         )
 
