@@ -193,7 +193,7 @@ class Calibration:
         if self.kind == "pivot":
             return [(f"{n} [{unit}]", p, std[3 * k : 3 * k + 3]) for k, (n, p) in enumerate(self.points.items())]
         turn = np.rad2deg(log_so3(self.T[:3, :3]))
-        return [(f"translation [{unit}]", self.T[:3, 3], std[3:]), ("rotation [deg]", turn, np.rad2deg(std[:3]))]
+        return [(f"translation [{unit}]", self.T[:3, 3], std[3:]), ("rotation vector [deg]", turn, np.rad2deg(std[:3]))]
 
 
 @dataclass(frozen=True, eq=False)

@@ -153,7 +153,7 @@ def pose_left_out():
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.1, 1))
-        space = Scene(left, radius=330)
+        space = Scene(left, radius=350)
         flanges = space.points(**style.look("measurement"))
         lost = space.points(**style.look("rejected", markersize=9, markeredgewidth=2))
         sights = space.line(**style.look("guide", alpha=0.5))
@@ -286,8 +286,8 @@ def _again_sentence(result):
         "student": f"with Student's factor for {result['freedom']:.1f} degrees of freedom",
     }[result["noise"]]
     return (
-        f"{result['n']} poses, {words}: {100 * result['beyond']:.1f} % lie beyond two standard deviations; rms "
-        f"{result['spread']:.2f} of them."
+        f"{result['n']} poses, {words}: {100 * result['beyond']:.1f} % lie beyond two standard deviations; the "
+        f"rms error is {result['spread']:.2f} standard deviations."
     )
 
 
