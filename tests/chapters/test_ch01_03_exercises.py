@@ -15,6 +15,7 @@ from labkit.chapters.ch03_quirlen import exercises as ch03_exercises
 from labkit.documents.lab_sheet import printed as lab_sheet
 from labkit.exercises import source
 from labkit.exercises.engine import CORRECT, NOT_YET, Exercise, Value
+from labkit.files.text import number_in
 from labkit.geometry import chaining, frames
 from labkit.geometry.frames import relative
 from labkit.geometry.lie import exp_se3, log_se3
@@ -234,6 +235,30 @@ def test_what_a_longer_base_does_to_the_turn_about_x():
     rounded = {key: round(float(value), 3) for key, value in law.items()}
     assert rounded == {(100, 50): 0.351, (200, 50): 0.365, (100, 100): 0.405, (200, 100): 0.351}
     assert all(abs(found[key] / law[key] - 1) < 0.03 for key in law)  # eight standard deviations of a sample of 40 000
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize(
+    "words, status",
+    [
+        (lambda number, line: f"expected three numbers, got {line!r}", NOT_YET),  # its digits name no line
+        (lambda number, line: f"line {number - 1}: {line!r}", NOT_YET),  # counts from 0
+        (lambda number, line: f"line {number}: {line!r}", CORRECT),
+    ],
+)
+def test_a_refusal_names_the_line(words, status, seed):
+    def read_system(text):
+        points = []
+        for number, line in enumerate(text.splitlines(), start=1):
+            entries = [number_in(entry) for entry in line.split("#")[0].replace(",", ".").split()]
+            if entries and not (len(entries) == 3 and np.isfinite(entries).all()):
+                raise ValueError(words(number, line))
+            points += [entries] if entries else []
+        if len(points) != 3:
+            raise ValueError("three points")
+        return np.array(points)
+
+    assert judged("read_system", read_system, seed).status == status
 
 
 def test_zeros_are_not_taken_for_the_last_row_alone():

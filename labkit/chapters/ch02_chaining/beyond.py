@@ -1,6 +1,7 @@
 """Exercises of chapter 2 beyond its core: the lab sheet's files, read and written."""
 
 import functools
+import re
 
 import numpy as np
 
@@ -62,9 +63,9 @@ def _reading(change):
     return lambda text: read_system("\n".join(change(line) for line in text.splitlines()))
 
 
-def _plainly(text, skip=lambda line: not line.strip(), entry=float):
+def _plainly(text):
     """Splits lines and converts entries, nothing else."""
-    return np.array([[entry(e) for e in line.split()] for line in text.splitlines() if not skip(line)])
+    return np.array([[float(entry) for entry in line.split()] for line in text.splitlines() if line.strip()])
 
 
 def _written(form):
@@ -90,30 +91,32 @@ class reads_back(metrics.Metric):
             raise metrics.Refused(f"what you wrote cannot be read: {fault}") from None
 
     def deviations(self, result, expected):
-        off = float(np.abs(result - (read_system(expected) if isinstance(expected, str) else expected)).max())
+        off = float(np.abs(result - self.admit(expected, expected)).max())
         return [metrics.Deviation("what is read back", off, "mm", 0.0)]
 
     def parts(self, result, expected):
-        return [("", self, result, read_system(expected) if isinstance(expected, str) else expected)]
+        return [("", self, result, self.admit(expected, expected))]
 
 
 def names_the_line(student, rng):
-    """A sentence about the first fault that is not refused with its line, None if all are."""
-    good = [" ".join(repr(float(value)) for value in point) for point in system(rng).round(3)]
-    at = int(rng.integers(1, 4))
+    """A sentence about the first fault that is not refused with its line, None if all are.
+
+    The points stand far down, at a line whose number is none of those in it.
+    """
+    good = write_system(system(rng).round(3)).splitlines()
+    before, at = int(rng.integers(60, 90)), int(rng.integers(3))
     for what, bad in (
         ("a word in place of a number", "12.5 seven 3.0"),
         ("two numbers", "12.5 3.0"),
         ("four numbers", "12.5 3.0 4.0 5.0"),
         ("nan", "12.5 nan 3.0"),
     ):
-        lines = ["# a comment", *good]
-        lines[at] = bad
-        told = _refusal(student, "\n".join(lines))
+        told = _refusal(student, "\n".join(["# a comment"] * before + good[:at] + [bad] + good[at + 1 :]))
+        number = before + at + 1
         if told is None:
-            return f"line {at + 1} of a file holds {what}: that must raise a ValueError, yours returned something."
-        if str(at + 1) not in told:
-            return f"line {at + 1} of a file holds {what}: your sentence does not name the line. It says: {told!r}."
+            return f"line {number} of a file holds {what}: that must raise a ValueError, yours returned something."
+        if not re.search(rf"\b{number}\b", told):
+            return f"line {number} of a file holds {what}: your sentence does not name the line. It says: {told!r}."
     for count in (2, 4):
         if _refusal(student, "\n".join([*good, good[0]][:count])) is None:
             return f"a file of {count} points is no system: that must raise a ValueError, yours returned something."
@@ -153,7 +156,7 @@ FILES = [
                 id="read-comments",
             ),
             Mistake(
-                lambda text: _plainly("\n".join(line.split("#")[0] for line in text.splitlines())),
+                lambda text: _plainly(re.sub("#.*", "", text)),
                 "Some write 1,5 for 1.5: replace the comma before you make a number of it.",
                 id="read-comma",
             ),
