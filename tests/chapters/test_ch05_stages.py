@@ -81,6 +81,9 @@ def test_taking_a_printed_start_moves_the_handle_and_dragging_lets_go_of_it():
     stage.set(number=9)
     assert stage.state["P"] == pytest.approx([np.sqrt(70**2 + 75**2 + 50**2), 0.102], abs=1e-3)
     assert stage.caption.startswith("From start 9")
+    stage.set(B_deg=-88.0)  # the truth moves away from the printed starts, and the handle stays at its cross
+    assert stage.state["P"] == pytest.approx(stage.result["printed"][8])
+    assert stage.state["P"] == pytest.approx(stage.result["paths"]["Gauss-Newton"][0])
     stage.set(P=(40, 30))
     assert stage.state["number"] == 0 and stage.caption.startswith("From the dragged start")
     stage.make_it_fail()

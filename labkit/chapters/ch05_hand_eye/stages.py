@@ -393,6 +393,12 @@ def _descents(start_deg, radius, B_deg):
     return {m: comparison.run(m, start_deg, "A, B, C", radius, B_deg, STEPS_SHOWN) for m in comparison.METHODS}
 
 
+@functools.cache
+def _printed_starts(B_deg):
+    """Distance (mm) and turn (deg) off the truth of the starts of table 7-2, the truth itself first."""
+    return comparison.errors(frames.matrix_from_kuka(frames.kuka_from_degrees(thesis.start_poses_deg()[0])), B_deg)
+
+
 def compute_methods(state):
     """Gauss-Newton and the trust region from the dragged start or from one of table 7-2: their runs and their paths.
 
@@ -402,7 +408,7 @@ def compute_methods(state):
     start = thesis.start_poses_deg()[0][number] if number else comparison.start_at(*state["P"], B)
     runs = _descents(tuple(start.tolist()), state["radius"], B)
     paths = {method: comparison.errors(run.poses, B) for method, run in runs.items()}
-    return {"runs": runs, "paths": paths, "number": number, "radius": state["radius"]}
+    return {"runs": runs, "paths": paths, "number": number, "printed": _printed_starts(B)[1:]}
 
 
 def _methods_sentence(result):
@@ -422,12 +428,9 @@ def two_methods():
     """Drag the start, or take one of table 7-2: Gauss-Newton against a trust region on the scanner's pose."""
     names = comparison.METHODS
 
-    def places(B_deg):
-        return comparison.errors(frames.matrix_from_kuka(frames.kuka_from_degrees(thesis.start_poses_deg()[0])), B_deg)
-
     def scene(fig):
         left, right = fig.subplots(1, 2)
-        paths = draw.start_plane(left, places(-90.0)[1:])
+        *paths, printed = draw.start_plane(left)
         *curves, back = draw.descents(right, names, STEPS_SHOWN, 1e-9, 1e3)
 
         def update(state, result):
@@ -438,13 +441,14 @@ def two_methods():
             run = result["runs"]["trust region"]
             rejected = np.flatnonzero(~run.accepted[: run.steps])
             back.set_data(rejected + 1, np.maximum(run.rms[rejected + 1], 1e-9))
+            printed.set_data(*result["printed"].T)
 
-        return [*paths, *curves, back], update
+        return [printed, *paths, *curves, back], update
 
     def follow(state, moved):
-        if "number" in moved and state["number"]:
-            return {"P": places(state["B_deg"])[state["number"]]}
-        return {"number": 0} if "P" in moved else {}
+        if "P" in moved and "number" not in moved:
+            return {"number": 0}
+        return {"P": _printed_starts(state["B_deg"])[state["number"]]} if state["number"] else {}
 
     return Stage(
         "Gauss-Newton against trust region",
