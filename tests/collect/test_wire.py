@@ -1,12 +1,13 @@
 """What crosses the border arrives as it was; what is nonsense is refused."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 
-from labkit.collect import border, library, rails, wire
-from labkit.exercises import guard
+from labkit.collect import border, library, rails, sandbox, wire
+from labkit.exercises import guard, source
 from labkit.localization.maps import OccupancyGrid
 
 
@@ -121,3 +122,16 @@ def test_a_secret_is_one_also_within_the_own_folder(tmp_path):
     secret, notes = tmp_path / "labkit" / "frames.py", tmp_path / "notes.txt"
     laid = rails.Rails([tmp_path / "labkit"], [secret], tmp_path)
     assert not laid.may_read(secret) and laid.may_read(notes) and laid.may_write(notes)
+
+
+def test_what_the_exercises_of_a_chapter_are_made_of_is_hidden_but_for_what_its_notebook_shows():
+    hidden = set(sandbox.hidden())
+    for path in sorted((sandbox.PACKAGE / "chapters").glob("*/exercises.py")):
+        own = re.findall(r"^from \.(\w*) import ([\w, ]+)", path.read_text(encoding="utf-8"), re.MULTILINE)
+        parts = {part for module, names in own for part in ([module] if module else names.split(", "))}
+        notebook = source.ROOT / "solutions" / f"{path.parent.name.removeprefix('ch')}.py"
+        shown = re.findall(
+            rf"^from labkit.chapters.{path.parent.name} import ([\w, ]+)", notebook.read_text("utf-8"), re.M
+        )
+        for part in {"exercises", *parts} - {name for names in shown for name in names.split(", ")}:
+            assert path.with_name(f"{part}.py") in hidden, f"a submission may read {part}.py of {path.parent.name}"
