@@ -1,4 +1,7 @@
-"""Draws and wrong variants of three exercises of chapter 4: the measured gradient, the chord, the trust-region loop."""
+"""Draws, references and wrong variants of four exercises of chapter 4, too long to stand among its items.
+
+The measured gradient, the chord, the trust-region loop, and the weights behind the choice of a way to calibrate.
+"""
 
 import functools
 
