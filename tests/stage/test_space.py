@@ -118,9 +118,10 @@ def test_the_drawing_is_made_of_its_sources_as_they_are():
 
 def test_turning_needs_no_picture_and_python_learns_of_it():
     stage, sent = wired(cell(), space=True)
-    before = len(sent)
+    before, stored = len(sent), stage.still()
     stage.receive({"view": {"angles": [400, 95], "zoom": 2.0, "center": [1, 0, 0]}})
     assert len(sent) == before
+    assert stage.still() != stored  # tomorrow's picture is what one looked at
     assert stage.state["view"] == View(40, 90, center=(1, 0, 0), eye=60.0, zoom=2.0)
     stage.receive({"view": {"angles": [None, 0], "zoom": 2.0, "center": [1, 0, 0]}})  # JSON's NaN: kept as it was
     assert stage.state["view"].azimuth_deg == 40
