@@ -235,8 +235,8 @@ class Session:
 
     def _constant(self, parts, module, name):
         """A constant of the chapter's figures, which are not loaded in the worker."""
-        figures = str(module).removeprefix(f"labkit.chapters.ch{self.chapter.notebook}.")
-        if figures not in set(FIGURES) - {"exercises"} or not str(name).isupper():
+        figures = {f"labkit.chapters.ch{self.chapter.notebook}.{part}" for part in FIGURES if part != "exercises"}
+        if str(module) not in figures or not str(name).isupper():
             raise AttributeError(f"there is no {str(module)[:80]}.{str(name)[:80]}")
         return {"value": self.border.encode(getattr(importlib.import_module(module), name), parts)}
 
