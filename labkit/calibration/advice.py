@@ -104,14 +104,14 @@ def refuse_mixed_roles(model, eye_to_hand):
         raise ValueError(MIXED_UP.format(other=other, times=times))
 
 
-def refuse_open_loop(T, residuals):
+def refuse_open_loop(T, residuals, length_unit="mm"):
     """Refuse residuals (n, 6) as large as the turns of the poses: nothing closes, so nothing is calibrated."""
     angle, (along, across, _) = np.sqrt((residuals[:, :3] ** 2).sum(1).mean()), axis_spread(T)[0]
     if angle > OPEN * across:
         length = np.sqrt((residuals[:, 3:] ** 2).sum(1).mean())
         raise ValueError(
             f"the loop does not close: even the rows that agree best miss by {np.rad2deg(angle):.3g} deg and "
-            f"{length:.3g} (rms), while the poses turn by {np.rad2deg(along):.3g} deg about one axis and by "
+            f"{length:.3g} {length_unit} (rms), while the poses turn by {np.rad2deg(along):.3g} deg about one axis and by "
             f"{np.rad2deg(across):.3g} deg across it: are the rows of both files in the same order?"
         )
 

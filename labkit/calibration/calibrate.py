@@ -274,7 +274,7 @@ def hand_eye(
     if judge_roles:
         advice.refuse_mixed_roles(model, eye_to_hand)
     solution, kept = majority(model)
-    advice.refuse_open_loop(model.T_BF[kept], model.linearize(solution)[0][kept])
+    advice.refuse_open_loop(model.T_BF[kept], model.linearize(solution)[0][kept], length_unit)
     frame = "base" if eye_to_hand else "flange"
     plain = _attempt(lambda: model.fitted(np.ones(model.n, bool)))
     found = _assembled(
@@ -425,7 +425,7 @@ def compare(time_a, a, time_b, b, *, length_unit="mm", max_offset=None, max_gap=
     model = HandEyeModel(invert(reference[rows]), seen[rows], solver=solver)
     advice.refuse_one_axis(model.T_BF)
     solution, kept = majority(model)
-    advice.refuse_open_loop(model.T_BF[kept], model.linearize(solution)[0][kept])
+    advice.refuse_open_loop(model.T_BF[kept], model.linearize(solution)[0][kept], length_unit)
     blocks = np.arange(len(rows)) * BLOCKS // len(rows)
     found = _assembled(
         model, solution, kept, None, blocks, length_unit, kind="compare", meaning="marker in the flange",

@@ -88,8 +88,8 @@ def test_rows_in_another_order_leave_the_loop_open():
     residuals[:, 1], residuals[:, 4] = 0.29 * turn, 7.0
     advice.refuse_open_loop(T_BF, residuals)
     residuals[:, 1] = 0.31 * turn
-    with pytest.raises(ValueError, match=rf"miss by {np.rad2deg(0.31 * turn):.3g} deg and 7 \(rms\)") as refusal:
-        advice.refuse_open_loop(T_BF, residuals)
+    with pytest.raises(ValueError, match=rf"miss by {np.rad2deg(0.31 * turn):.3g} deg and 7 m \(rms\)") as refusal:
+        advice.refuse_open_loop(T_BF, residuals, "m")
     assert f"turn by {np.rad2deg(turn):.3g} deg" in str(refusal.value)
 
 
