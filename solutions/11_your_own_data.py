@@ -26,7 +26,7 @@ from labkit.calibration import calibrate, motion
 from labkit.chapters.ch11_your_own_data import stages
 from labkit.documents import redundancy
 from labkit.exercises import course
-from labkit.files.poses import read_poses
+from labkit.files.poses import read_poses, refuse_other_rows
 from labkit.files.samples import sample_cell
 from labkit.geometry.frames import invert
 from labkit.geometry.lie import log_so3
@@ -46,6 +46,7 @@ np.set_printoptions(precision=2, suppress=True, linewidth=88)
 # %% the-data
 robot_file, sensor_file = sample_cell("slipped_screw")  # or your own, two paths as text
 robot, sensor = (read_poses(f).in_unit("mm") for f in (robot_file, sensor_file))
+refuse_other_rows(robot, sensor)
 print(robot.assumed)
 print(sensor.assumed)
 print("first flange pose:", robot.T[0, :3, 3], "mm")

@@ -43,8 +43,7 @@ class Poses:
     """Poses of one file.
 
     T: (n, 4, 4). time: (n,) s or None. group: (n,) or None. places: where each stands, "line 7" or "pose_007.txt".
-    format, length ("m" or "mm"): as recognized or told. assumed: the same in one line. ignored: titles of columns that
-    were not used.
+    format, length ("m" or "mm"): as recognized or told. assumed: the same in one line.
     """
 
     name: str
@@ -247,6 +246,21 @@ def refuse_times(poses):
         if bad.any():
             k = int(np.argmax(bad)) + 1
             raise FileError(f"{poses.name}, {poses.places[k]}: {what}, {poses.time[k]:.6f}")
+
+
+def refuse_other_rows(first, second):
+    """Refuse two files, of poses or of points, whose rows do not belong together one by one."""
+    if len(first) != len(second):
+        raise FileError(
+            f"{first.name} has {len(first)} rows and {second.name} has {len(second)}: they must come row by row "
+            "(two streams with times are aligned by: calibrate compare)"
+        )
+    if getattr(first, "format", "") == getattr(second, "format", None) == "folder" and first.places != second.places:
+        numbers = [[int("".join(filter(str.isdigit, p)) or 0) for p in poses.places] for poses in (first, second)]
+        if numbers[0] != numbers[1]:
+            raise FileError(
+                f"the numbers of the files in {first.name} and {second.name} differ: which belong together?"
+            )
 
 
 def _refuse_infinite(table, values):

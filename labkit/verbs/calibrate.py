@@ -19,10 +19,10 @@ from ..fast.ax_xb import calibrate_hand_eye
 from ..fast.hand_eye import calibrate_sphere_target
 from ..files.bags import read_bag
 from ..files.points import read_points
-from ..files.poses import FORMATS, read_pairs, read_poses, refuse_times
+from ..files.poses import FORMATS, read_pairs, read_poses, refuse_other_rows, refuse_times
 from ..geometry.frames import kuka_from_matrix
 from . import report
-from .arguments import COMMAND, Parser, Refusal, run, write
+from .arguments import Parser, Refusal, run, write
 
 MAGNIFIED = (1, 10, 100, 1000, 10_000, 100_000)  # times, that an ellipsoid is drawn larger than it is
 
@@ -94,18 +94,6 @@ def _same_unit(options, *files):
     return options.length or files[0].length
 
 
-def _same_rows(first, second):
-    if len(first) != len(second):
-        raise Refusal(
-            f"{first.name} has {len(first)} rows and {second.name} has {len(second)}: they must come row by row "
-            f"(to align two streams by their times, use: {COMMAND} calibrate compare)"
-        )
-    if getattr(first, "format", "") == getattr(second, "format", None) == "folder" and first.places != second.places:
-        numbers = [[int("".join(filter(str.isdigit, p)) or 0) for p in poses.places] for poses in (first, second)]
-        if numbers[0] != numbers[1]:
-            raise Refusal(f"the numbers of the files in {first.name} and {second.name} differ: which belong together?")
-
-
 def _hand_eye(options):
     if options.bag:
         robot, sensor = _from_bag(options)
@@ -115,7 +103,7 @@ def _hand_eye(options):
         raise Refusal("a hand-eye calibration needs --robot and --sensor (or one JSON file of pairs as --robot)")
     else:
         robot, sensor = _poses(options, options.robot), _poses(options, options.sensor)
-    _same_rows(robot, sensor)
+    refuse_other_rows(robot, sensor)
     unit = _same_unit(options, robot, sensor)
     groups = robot.group if robot.group is not None else sensor.group
     std_rot = None if options.std_rot_deg is None else np.deg2rad(options.std_rot_deg)
@@ -162,7 +150,7 @@ def _pivot(options):
 def _sphere(options):
     robot = _poses(options, options.robot)
     points = read_points(options.points, options.length, options.any_size)
-    _same_rows(robot, points)
+    refuse_other_rows(robot, points)
     unit = _same_unit(options, robot)
     result = calibrate.sphere(
         robot.in_unit(unit).T,
@@ -179,7 +167,7 @@ def _frame(options):
     nominal = options.nominal and read_points(options.nominal, options.length, options.any_size)
     unit = _same_unit(options, points)
     if nominal:
-        _same_rows(points, nominal)
+        refuse_other_rows(points, nominal)
     elif len(points) != 3:
         raise Refusal(f"{points.name}: a frame through points needs 3 of them, got {len(points)}; or give --nominal")
     result = calibrate.frame(

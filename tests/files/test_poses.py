@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from labkit.files.points import read_points
-from labkit.files.poses import read_pairs, read_poses, refuse_times
+from labkit.files.poses import read_pairs, read_poses, refuse_other_rows, refuse_times
 from labkit.files.text import FileError
 
 SAMPLES = Path(__file__).parent / "samples"
@@ -215,3 +215,18 @@ def test_times_of_a_stream_increase(times, sentence, tmp_path):
     path.write_text(GOOD)
     with pytest.raises(FileError, match="a stream needs a time in every row"):
         refuse_times(read_poses(path))
+
+
+def test_rows_of_two_files_belong_together(tmp_path):
+    robot, sensor = tmp_path / "robot", tmp_path / "sensor"
+    for folder, numbers in ((robot, (1, 2, 3)), (sensor, (1, 2, 4))):
+        folder.mkdir()
+        for number in numbers:
+            (folder / f"{folder.name}_{number:02}.txt").write_text(EYE)
+    with pytest.raises(FileError, match="the numbers of the files in robot and sensor differ"):
+        refuse_other_rows(read_poses(robot, length="mm", any_size=True), read_poses(sensor, length="mm"))
+    (sensor / "sensor_04.txt").rename(sensor / "sensor_03.txt")
+    refuse_other_rows(read_poses(robot, length="mm", any_size=True), read_poses(sensor, length="mm"))
+    (sensor / "sensor_03.txt").unlink()
+    with pytest.raises(FileError, match="robot has 3 rows and sensor has 2: they must come row by row"):
+        refuse_other_rows(read_poses(robot, length="mm", any_size=True), read_poses(sensor, length="mm"))
