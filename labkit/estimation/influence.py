@@ -10,8 +10,9 @@ Source: Cook, Weisberg, "Residuals and Influence in Regression" (1982), chapter 
 import numpy as np
 from scipy import stats
 
-from ..checks import as_finite, as_positive_number, as_probability, as_shape
+from ..checks import as_finite, as_matrices, as_positive_number, as_probability, as_shape
 
+FREE = 1e-12  # of the largest eigenvalue of a normal matrix with its columns scaled alike: what is smaller is rounding
 # Baarda's: seen with 80 %, while a good number is suspected once in a thousand
 VISIBLE = float(stats.norm.isf(0.0005) + stats.norm.ppf(0.8))
 
@@ -31,14 +32,53 @@ def inverse_normal(J):
 
 def invert_normal(N):
     """Inverse of a normal matrix with its columns scaled alike, (p, p); refuses one that is singular beside that."""
-    scale = np.sqrt(np.diagonal(N))
-    if not (scale > 0).all():
+    if not (np.diagonal(N) > 0).all():
         raise ValueError("a parameter changes no residual, so it is not determined")
-    values, vectors = np.linalg.eigh(N / scale / scale[:, None])
-    if values[0] <= 1e-12 * values[-1]:
+    values, vectors = _scaled_alike(N)
+    if values[0] <= FREE * values[-1]:
         raise ValueError("the measurements leave a direction of the parameters undetermined")
-    half = vectors / np.sqrt(values) / scale[:, None]
+    half = vectors / np.sqrt(values)
     return half @ half.T
+
+
+def _scaled_alike(N):
+    """Eigenvalues of a normal matrix with its columns scaled alike, smallest first, and the directions, unscaled."""
+    scale = np.sqrt(np.diagonal(N))
+    scale = np.where(scale > 0, scale, 1.0)
+    values, vectors = np.linalg.eigh(N / scale / scale[:, None])
+    return values, vectors / scale[:, None]
+
+
+def free_directions(N):
+    """Directions of the parameters that a normal matrix leaves undetermined.
+
+    Parameters
+    ----------
+    N : array-like, shape (p, p)
+
+    Returns
+    -------
+    directions : array, shape (p, k)
+        As columns, independent of each other; none where all parameters are determined.
+    """
+    values, directions = _scaled_alike(as_matrices(N, "N", len(N), len(N)))
+    return directions[:, values <= FREE * values[-1]]
+
+
+def shares(jacobian):
+    """How many of the parameters each block pays for: the trace of H_i.
+
+    Parameters
+    ----------
+    jacobian : array-like, shape (n, k, p)
+
+    Returns
+    -------
+    shares : array, shape (n,)
+        Between 0 and k; they add up to p.
+    """
+    J = as_shape(jacobian, "jacobian", "n", "k", "p")
+    return np.einsum("nki,ij,nkj->n", J, inverse_normal(J), J)
 
 
 def squared_distances(residuals, jacobian, kept):
@@ -137,7 +177,7 @@ def visible_errors(jacobian, times=VISIBLE):
         Infinite for a number that alone fixes a parameter.
     """
     J, times = as_shape(jacobian, "jacobian", "n", "p"), as_positive_number(times, "times")
-    left = 1 - np.einsum("ni,ij,nj->n", J, inverse_normal(J[:, None]), J)
+    left = 1 - shares(J[:, None])
     return np.where(left > 1e-9, times / np.sqrt(np.where(left > 1e-9, left, 1.0)), np.inf)
 
 

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from labkit.estimation.influence import VISIBLE, distance_limit, leave_out, squared_distances, visible_errors
+from labkit.estimation.influence import (
+    VISIBLE,
+    distance_limit,
+    free_directions,
+    leave_out,
+    shares,
+    squared_distances,
+    visible_errors,
+)
 
 RNG = np.random.default_rng(3)
 N, K, P = 12, 3, 5
@@ -36,9 +44,9 @@ def test_leaving_a_group_out_equals_the_fit_without_it():
 
 def test_distances_follow_chi_square_fitted_or_not():
     kept = np.arange(N) < 8
-    samples = []
+    rng, samples = np.random.default_rng(4), []
     for _ in range(2000):
-        y = RNG.normal(size=(N, K))
+        y = rng.normal(size=(N, K))
         x = np.linalg.lstsq(J[kept].reshape(-1, P), y[kept].ravel(), rcond=None)[0]
         samples.append(squared_distances(J @ x - y, J, kept))
     for i in range(N):  # deterministic: the seed is fixed
@@ -76,3 +84,22 @@ def test_an_error_of_the_visible_size_is_seen_four_times_in_five():
 def test_a_number_that_alone_fixes_a_parameter_hides_every_error():
     J = np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 2.0]])
     assert np.isfinite(visible_errors(J)[:2]).all() and np.isinf(visible_errors(J)[2])
+
+
+def test_shares_are_traces_of_the_projection_on_what_the_parameters_reach():
+    Q = np.linalg.qr(J.reshape(-1, P))[0].reshape(N, K, P)
+    np.testing.assert_allclose(shares(J), (Q**2).sum((1, 2)), atol=1e-12)
+    assert shares(J).sum() == pytest.approx(P)
+
+
+def test_free_directions_change_no_residual_and_are_as_many_as_the_rank_lacks():
+    """Parameters of very different size; two of them known only by their sum, one not at all."""
+    scale = np.array([1e-4, 1.0, 1e5, 3.0, 1.0])
+    flat = J.reshape(-1, P).copy()
+    flat[:, 3], flat[:, 4] = flat[:, 1], 0
+    flat = flat / scale
+    free = free_directions(flat.T @ flat)
+    assert free.shape == (P, 2)
+    np.testing.assert_allclose(flat @ free, 0, atol=1e-7)
+    assert np.linalg.matrix_rank(free / scale[:, None]) == 2
+    assert free_directions((J.reshape(-1, P) / scale).T @ (J.reshape(-1, P) / scale)).shape == (P, 0)

@@ -224,9 +224,9 @@ def test_rows_of_two_files_belong_together(tmp_path):
         for number in numbers:
             (folder / f"{folder.name}_{number:02}.txt").write_text(EYE)
     with pytest.raises(FileError, match="the numbers of the files in robot and sensor differ"):
-        refuse_other_rows(read_poses(robot, length="mm", any_size=True), read_poses(sensor, length="mm"))
+        refuse_other_rows(read_poses(robot, length="m"), read_poses(sensor, length="m"))
     (sensor / "sensor_04.txt").rename(sensor / "sensor_03.txt")
-    refuse_other_rows(read_poses(robot, length="mm", any_size=True), read_poses(sensor, length="mm"))
+    refuse_other_rows(read_poses(robot, length="m"), read_poses(sensor, length="m"))
     (sensor / "sensor_03.txt").unlink()
     with pytest.raises(FileError, match="robot has 3 rows and sensor has 2: they must come row by row"):
-        refuse_other_rows(read_poses(robot, length="mm", any_size=True), read_poses(sensor, length="mm"))
+        refuse_other_rows(read_poses(robot, length="m"), read_poses(sensor, length="m"))

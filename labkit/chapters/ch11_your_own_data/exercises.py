@@ -108,7 +108,7 @@ def left_out(r, J):
 
 
 def _shares(J):
-    return np.einsum("ni,ij,nj->n", J, np.linalg.inv(J.T @ J), J)
+    return influence.shares(J[:, None])
 
 
 def honest_covariance(r, J):

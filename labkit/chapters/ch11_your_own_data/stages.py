@@ -9,7 +9,7 @@ from ...calibration.motion import between_axes, motions, screw
 from ...calibration.own_data import Noise, hand_eye_derivative
 from ...estimation.clocks import sample_stream
 from ...estimation.gaussian import unit_noise
-from ...estimation.influence import invert_normal
+from ...estimation.influence import free_directions, inverse_normal, invert_normal, shares
 from ...files.poses import read_poses
 from ...files.samples import sample_cell
 from ...geometry.frames import invert
@@ -23,7 +23,6 @@ PLACE = (0.0, 0.0, 500.0)  # mm: the target in the sensor
 EVERY = 0.5  # s between the samples of a stream that are compared
 REPEATED = 4000
 BINS = np.linspace(-draw.REACH, draw.REACH, 49)
-FREE = 1e-3  # of the largest singular value: what is smaller is not determined
 
 
 # --- look before you compute -----------------------------------------------------------------------------------------
@@ -115,32 +114,26 @@ def compute_without(state):
     """Covariances with all ten poses and without one, what the rest leave free, and each pose's share."""
     J, T_BF = _derivatives(_ten(state["kind"]))
     kept = np.arange(10) != state["drop"] - 1
-    everything = invert_normal(_normal(J))
-    N = _normal(J[kept])
-    scale = 1 / np.sqrt(np.diagonal(everything)) / np.sqrt(12)  # so that the singular values have no unit
-    values, vectors = np.linalg.eigh(N / scale / scale[:, None])
-    determined = bool(values[0] > FREE**2 * values[-1])
-    T_BS = T_BF[0] @ CELL.T_FS
-    if determined:
-        C = invert_normal(N)
-        slide, shares = np.zeros(3), np.einsum("nki,ij,nkj->n", J, C, J) * kept
+    everything, C = inverse_normal(J), None
+    paid, slide = np.zeros(10), np.zeros(3)
+    free = free_directions(_normal(J[kept]))
+    if not free.size:
+        C, paid[kept] = inverse_normal(J[kept]), shares(J[kept])
     else:
-        C, shares = None, np.zeros(10)
-        free = vectors[:, values <= FREE**2 * values[-1]] / scale[:, None]
         slide = (free @ np.linalg.svd(free[:3])[2][-1])[3:6]  # of what is free, the part that turns nothing
         slide /= np.linalg.norm(slide)
     std = [float(np.sqrt(np.trace(c[3:6, 3:6]))) if c is not None else np.inf for c in (everything, C)]
     return {
-        "T_BF": T_BF, "T_BS": T_BS, "kept": kept, "drop": state["drop"], "everything": everything, "covariance": C,
-        "slide": T_BF[0, :3, :3] @ slide, "shares": shares, "std": std, "determined": determined,
+        "T_BF": T_BF, "T_BS": T_BF[0] @ CELL.T_FS, "kept": kept, "drop": state["drop"], "everything": everything,
+        "covariance": C, "free": free.shape[1], "slide": T_BF[0, :3, :3] @ slide, "shares": paid, "std": std,
     }  # fmt: skip
 
 
 def _without_sentence(result):
-    if not result["determined"]:
+    if result["free"]:
         return (
-            f"Without pose {result['drop']} two singular values are less than {FREE:g} of the largest: the sensor can "
-            "slide along the line through the target, and turn about it, unseen."
+            f"Without pose {result['drop']} {result['free']} of the twelve singular values are zero but for rounding: "
+            "the sensor can slide along the line through the target, and turn about it, unseen."
         )
     told = f"the sensor's place is known to {result['std'][1]:.2f} mm"
     if not result["drop"]:
@@ -261,7 +254,7 @@ def _again(n):
     e = unit_noise((REPEATED, 6 * n), seed=11)
     estimate = e @ rows @ C
     r = (e - estimate @ rows.T).reshape(REPEATED, n, 6)[:, :, 3:]
-    freedom = float(3 * n - np.einsum("nki,ij,nkj->", J[:, 3:], C, J[:, 3:]))
+    freedom = float(3 * n - shares(rows[:, None]).reshape(n, 6)[:, 3:].sum())
     return estimate[:, 3] / np.sqrt(C[3, 3]), (r**2).sum((1, 2)) / freedom, freedom
 
 
