@@ -111,8 +111,8 @@ def refuse_open_loop(T, residuals, length_unit="mm"):
         length = np.sqrt((residuals[:, 3:] ** 2).sum(1).mean())
         raise ValueError(
             f"the loop does not close: even the rows that agree best miss by {np.rad2deg(angle):.3g} deg and "
-            f"{length:.3g} {length_unit} (rms), while the poses turn by {np.rad2deg(along):.3g} deg about one axis and by "
-            f"{np.rad2deg(across):.3g} deg across it: are the rows of both files in the same order?"
+            f"{length:.3g} {length_unit} (rms), while the poses turn by {np.rad2deg(along):.3g} deg about one axis and "
+            f"by {np.rad2deg(across):.3g} deg across it: are the rows of both files in the same order?"
         )
 
 

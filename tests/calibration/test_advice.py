@@ -84,13 +84,14 @@ def test_files_whose_inverse_fits_are_refused_and_both_named(inverse, eye_to_han
 def test_rows_in_another_order_leave_the_loop_open():
     T_BF, T_ST = cell(n=30)
     residuals = np.zeros((30, 6))
-    turn = advice.axis_spread(T_BF)[0][1]
+    along, turn = advice.axis_spread(T_BF)[0][:2]
     residuals[:, 1], residuals[:, 4] = 0.29 * turn, 7.0
     advice.refuse_open_loop(T_BF, residuals)
     residuals[:, 1] = 0.31 * turn
     with pytest.raises(ValueError, match=rf"miss by {np.rad2deg(0.31 * turn):.3g} deg and 7 m \(rms\)") as refusal:
         advice.refuse_open_loop(T_BF, residuals, "m")
-    assert f"turn by {np.rad2deg(turn):.3g} deg" in str(refusal.value)
+    turns = f"turn by {np.rad2deg(along):.3g} deg about one axis and by {np.rad2deg(turn):.3g} deg across it"
+    assert turns in str(refusal.value)
 
 
 @pytest.mark.parametrize(
