@@ -42,7 +42,7 @@ found = pages.entries()
 #
 # Four documents, written with care, and read by many: the lab sheet *Kalibrierung*, a master thesis, a research report, the lecture *Lokalisierung*.
 # **Which of their numbers can be trusted?** Setup has just computed all of them afresh, from the data they print and the functions of chapters 1 to 9.
-# What is printed, and where, stands in `data/ledger.csv`; value, bound and status are computed by `labkit.documents`. A test moves every printed number and refuses a row whose value follows its own.
+# What is printed, and where, stands in `data/ledger.csv`; value, bound and status are computed by `labkit.documents`. A test moves the numbers of the tables a little and refuses a row whose value follows its own printed one.
 #
 # First a small one. Then search the table, by words, kind, status and document: *why* opens a row's argument, its numbers and the lines of code that compute it.
 
@@ -76,7 +76,7 @@ def half_unit(printed):
 # ## What the inputs hide
 #
 # A result computed from printed numbers inherits what each of them hides. Move one input at a time by its half unit, up and down, and see how far the result
-# goes; the larger move counts, and the moves of all inputs add up. That is the *bound* of the table, to first order, and the only one it knows: none is chosen.
+# goes; the larger move counts, and the moves of all inputs add up. That is the *bound* of the table, to first order. Where inputs were never published, it is what a reconstruction leaves open.
 
 
 # %% bound

@@ -117,7 +117,7 @@ def _dead_reckoning():
 
 
 def misprints_seen():
-    """How far the wrong rows of the thesis lie from the fit of the others, in standard deviations of a distance.
+    """How far the wrong rows of the thesis lie from the fit of the others, in standard deviations of a coordinate.
 
     Returns
     -------

@@ -5,6 +5,7 @@ import html
 import ipywidgets
 
 from ... import live
+from ...documents import ledger
 from ...documents.rounding import half_unit
 
 ALL = "all"
@@ -21,7 +22,6 @@ SIGNS = {
     "consistent": "?",
     "not computable": "–",
 }
-KINDS = ("result", "claim", "check", "structure", "consequence")
 COUNTED = "results and claims"
 
 
@@ -33,7 +33,7 @@ def matching(entries, text="", document=ALL, status=ALL, kind=ALL):
         for entry in entries
         if document in (ALL, entry.row.document)
         and status in (ALL, entry.status)
-        and (kind in (ALL, entry.row.kind) or (kind == COUNTED and entry.row.kind in KINDS[:2]))
+        and (kind in (ALL, entry.row.kind) or (kind == COUNTED and entry.row.kind in ledger.COUNTED))
         and all(word in _haystack(entry) for word in words)
     ]
 
@@ -106,7 +106,11 @@ class LedgerTable(ipywidgets.VBox):
         self.search = ipywidgets.Text(placeholder="a place, a quantity, a number", description="search")
         self.document = ipywidgets.Dropdown(options=documents, value=ALL, description="document")
         self.status = ipywidgets.Dropdown(options=statuses, value=ALL, description="status")
-        kinds = [ALL, COUNTED, *(kind for kind in KINDS if any(entry.row.kind == kind for entry in self.entries))]
+        kinds = [
+            ALL,
+            COUNTED,
+            *(kind for kind in ledger.KINDS if any(entry.row.kind == kind for entry in self.entries)),
+        ]
         self.kind = ipywidgets.Dropdown(options=kinds, value=ALL, description="kind")
         self.table = ipywidgets.HTML()
         controls = (self.search, self.kind, self.document, self.status)

@@ -849,6 +849,8 @@ def independent_measurements():
     )
 
 
+ZERO = 1e-9  # what floating point leaves of an identity; where it is none, numbers of the order of 1 are left
+
 COSTS = {"squares summed": lambda e: 0.5 * (e**2).sum(0), "sum squared": lambda e: listings.listing_cost(e)}
 
 
@@ -865,6 +867,7 @@ def listing_cost():
 
     def holds(d):
         slope = numeric_jacobian(lambda q: COSTS[d["(6-11)"]](residuals(q).reshape(-1, 3)).sum(), p, 1e-6, "central")
+        # central differences agree within 1e-6; the gradient of the other cost is another by several times
         return d[HERE] == d["(6-11)"] and np.allclose(slope, J.T @ e, rtol=1e-3, atol=1e-3 * np.abs(J.T @ e).max())
 
     printed = {HERE: "sum squared", "(6-11)": "squares summed"}
@@ -919,7 +922,7 @@ def kim_equation():
     other = frames.pose(exp_so3(rng.normal(size=3)), rng.normal(size=3))
     forms = {"AX = BX": other @ X - B @ X, "AX = XB": A @ X - X @ B}
     holds = {
-        name: float(np.abs(D @ u - F).max()) < 1e-9 and float(np.abs(off).max()) < 1e-9 for name, off in forms.items()
+        name: float(np.abs(D @ u - F).max()) < ZERO and float(np.abs(off).max()) < ZERO for name, off in forms.items()
     }
     printed = {HERE: "AX = BX", "section 4.1": "AX = XB"}
     found = explained_by(
@@ -1048,7 +1051,7 @@ def repeatability_without_base():
     reached, base = rng.normal(size=(30, 3)), frames.pose(exp_so3(rng.normal(size=3)), rng.uniform(-900, 900, 3))
     here, there = robot_accuracy.repeatability(reached), robot_accuracy.repeatability(frames.transform(base, reached))
     return Computed(
-        "ohne bekannte Lage" if abs(here - there) < 1e-9 else "mit bekannter Lage",
+        "ohne bekannte Lage" if abs(here - there) < ZERO else "mit bekannter Lage",
         proof=f"The same arrivals seen from a base {np.linalg.norm(base[:3, 3]):.0f} mm away and turned have the same "
         "repeatability: only their distances from one another enter.",
     )
@@ -1064,7 +1067,7 @@ def li_moves():
         used = scene.translated[: moves + 1]
         try:
             found = literature.li_rotation(scene.T_BF[used], scene.x_S[used])
-            enough.append(np.abs(found - scene.T_FS[:3, :3]).max() < 1e-4)
+            enough.append(np.abs(found - scene.T_FS[:3, :3]).max() < 1e-4)  # noise of 1e-6 mm leaves far less
         except ValueError:
             enough.append(False)
     return Computed(
