@@ -115,9 +115,10 @@ class Trial:
 
     @property
     def still(self):
-        """Rows whose number no table moves."""
-        tried = zip(self.rows, self.before, self.after)
-        return [row for row, old, new in tried if old is not None and new == old]
+        """Rows of computations in which no number moves with any table."""
+        tried = list(zip(self.rows, self.before, self.after))
+        moving = {base_of(row) for row, old, new in tried if new != old}
+        return [row for row, old, _ in tried if old is not None and base_of(row) not in moving]
 
 
 def trial(all_rows=None):
