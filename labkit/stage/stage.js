@@ -72,7 +72,7 @@ class Figure {
     this.screen = new Screen(this.picture, (message) => this.show(message), () => this.room.look(true));
     this.space = new Space(this.picture, this.screen.canvas, declared, this.line);
     this.handles = new Handles(this.picture, declared.handles, this.line);
-    this.scenes = new Scenes(this, declared.spaces ?? [], model);
+    this.scenes = new Scenes(this, declared);
     this.line.where = () => this.scenes.news();
     this.space.scenes = this.scenes;
     this.words = new Words();
@@ -211,8 +211,8 @@ class Line {
 
 /** Scenes in space: drawn by the page once it has the module, by Python until then and where the page cannot. */
 class Scenes {
-  constructor(figure, declared, model) {
-    Object.assign(this, { figure, declared, model, view: null, timer: 0, closed: declared.length === 0 });
+  constructor(figure, { spaces = [], home }) {
+    Object.assign(this, { figure, spaces, home, view: null, timer: 0, closed: spaces.length === 0 });
     this.page = globalThis[Symbol.for("labkit.space")] ??= { asked: -Infinity };
   }
 
@@ -242,6 +242,7 @@ class Scenes {
     try {
       this.page.module ??= await import(url);
     } catch (error) {
+      this.page.module = { works: () => false }; // it would be refused again
       console.warn("stage: no drawing in space, Python draws it", error);
     }
     URL.revokeObjectURL(url);
@@ -250,7 +251,7 @@ class Scenes {
   open() {
     if (!this.page.module.works()) return;
     const hooks = { onMove: () => this.figure.turned(), onAble: () => this.figure.room.look(true) };
-    this.view = new this.page.module.View(this.figure.picture, this.figure.screen.canvas, this.declared, hooks);
+    this.view = new this.page.module.View(this.figure.picture, this.figure.screen.canvas, this.spaces, this.home, hooks);
     this.view.show(false);
     this.figure.room.look(true);
   }

@@ -387,6 +387,7 @@ class Stage:
             "keys": self._keys,
             "click": self._click is not None,
             "spaces": [space.describe() for space in self._spaces],
+            "home": self.initial["view"].describe() if "view" in self.initial else None,
         }
 
     def connect(self, send):

@@ -116,6 +116,12 @@ def test_the_drawing_is_made_of_its_sources_as_they_are():
     assert made_of == hashlib.sha256(sources.encode()).hexdigest()
 
 
+def test_the_page_knows_the_home_view_wherever_one_has_turned_before_it_was_opened():
+    stage, _ = wired(cell(), space=True)
+    stage.receive({"view": {"angles": [40, 10], "zoom": 2.0, "center": [1, 0, 0]}})
+    assert stage.declaration()["home"] == VIEW.describe() != stage.state["view"].describe()
+
+
 def test_turning_needs_no_picture_and_python_learns_of_it():
     stage, sent = wired(cell(), space=True)
     before, stored = len(sent), stage.still()

@@ -48,7 +48,7 @@ void main() {
   vec2 d = size > 1e-4 ? way / size : vec2(1.0, 0.0);
   vec4 here = mix(p, q, corner.x);
   vec2 off = vec2(-d.y, d.x) * corner.y * (width * 0.5 + 0.5) + d * (corner.x * 2.0 - 1.0) * width * 0.35;
-  here.xy += off * 2.0 / room * here.w / 1.0;
+  here.xy += off * 2.0 / room * here.w;
   here.z -= 4e-4 * here.w;
   gl_Position = here;
   at = mix(along.x, along.y, corner.x) * lens.w;
@@ -86,27 +86,23 @@ void main() {
 const MARKERS = { o: 0, ".": 0, s: 1, D: 2, d: 2, x: 3, "+": 4, "^": 5, v: 6 };
 
 export class Renderer {
-  /** Throws where there is no WebGL 2. */
-  constructor(onLost, onBack) {
+  /** Throws where there is no WebGL 2; onChange(): the context is lost, or is back. */
+  constructor(onChange) {
     this.canvas = document.createElement("canvas");
     this.canvas.width = this.canvas.height = 1;
     this.canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault();
       this.lost = true;
-      onLost();
+      onChange();
     });
     this.canvas.addEventListener("webglcontextrestored", () => {
       this.prepare();
-      onBack();
+      onChange();
     });
-    const options = { alpha: true, premultipliedAlpha: true, stencil: true, depth: true, preserveDrawingBuffer: false, powerPreference: "low-power" };
-    const probe = document.createElement("canvas").getContext("webgl2");
-    if (!probe) throw new Error("no WebGL 2");
-    const named = probe.getExtension("WEBGL_debug_renderer_info");
-    this.software = /swiftshader|llvmpipe|software|basic render/i.test(named ? probe.getParameter(named.UNMASKED_RENDERER_WEBGL) : "");
-    probe.getExtension("WEBGL_lose_context")?.loseContext();
-    this.gl = this.canvas.getContext("webgl2", { ...options, antialias: false });
+    this.gl = this.canvas.getContext("webgl2", { stencil: true, antialias: false, powerPreference: "low-power" });
     if (!this.gl) throw new Error("no WebGL 2");
+    const named = this.gl.getExtension("WEBGL_debug_renderer_info");
+    this.software = /swiftshader|llvmpipe|software|basic render/i.test(named ? this.gl.getParameter(named.UNMASKED_RENDERER_WEBGL) : "");
     this.prepare();
   }
 
@@ -116,8 +112,9 @@ export class Renderer {
     this.meshes = new Map();
     this.smooth = null;
     this.age = (this.age ?? 0) + 1; // whoever holds buffers makes them anew when it has changed
-    this.solid = createProgramInfo(gl, [SOLID_VERTEX, SOLID_FRAGMENT]);
-    this.shade = createProgramInfo(gl, [SOLID_VERTEX, SHADOW_FRAGMENT]);
+    const places = ["position", "normal"]; // the same in both: a mesh is bound once for its picture and its shadow
+    this.solid = createProgramInfo(gl, [SOLID_VERTEX, SOLID_FRAGMENT], places);
+    this.shade = createProgramInfo(gl, [SOLID_VERTEX, SHADOW_FRAGMENT], places);
     this.line = createProgramInfo(gl, [LINE_VERTEX, LINE_FRAGMENT]);
     this.point = createProgramInfo(gl, [POINT_VERTEX, POINT_FRAGMENT]);
     for (const program of [this.solid, this.shade, this.line, this.point]) if (!program) throw new Error("the shaders were refused");
@@ -132,7 +129,7 @@ export class Renderer {
         position: new Float32Array(position), normal: new Float32Array(normal),
         indices: position.length / 3 > 65535 ? new Uint32Array(indices) : new Uint16Array(indices),
       });
-      this.meshes.set(key, { info, solid: createVertexArrayInfo(this.gl, [this.solid, this.shade], info), triangles: indices.length / 3 });
+      this.meshes.set(key, { info, arrays: createVertexArrayInfo(this.gl, [this.solid, this.shade], info), triangles: indices.length / 3 });
     }
     return this.meshes.get(key);
   }
@@ -206,7 +203,7 @@ export class Renderer {
 
   /** Draw one scene, width x height device pixels, which the canvas takes on; `smooth` edges cost a processor much.
    *  lens: {axes (9 numbers, columns), center, scale [x, y], eye, perUnit (device pixels), reach (how deep the scene is)}.
-   *  solids: [{mesh, pose, turn, color, shadow}], paths: [{line, points, color, width, dash, size, marker, hollow}] */
+   *  solids: [{mesh, pose, turn, color}], paths: [{line, points, color, width, dash, size, marker, hollow}] */
   draw(width, height, lens, { solids, paths, floor, shadow }, smooth) {
     const { gl, canvas } = this;
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
@@ -250,7 +247,7 @@ export class Renderer {
     gl.useProgram(this.solid.program);
     setUniforms(this.solid, common);
     for (const { mesh, pose, turn, color } of solids) {
-      gl.bindVertexArray(mesh.solid.vertexArrayObject);
+      gl.bindVertexArray(mesh.arrays.vertexArrayObject);
       setUniforms(this.solid, { pose, turn, color });
       gl.drawElements(gl.TRIANGLES, mesh.info.numElements, mesh.info.elementType, 0);
     }
@@ -266,9 +263,8 @@ export class Renderer {
     gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
     gl.depthMask(false);
     gl.disable(gl.DEPTH_TEST);
-    for (const { mesh, pose, casts } of solids) {
-      if (!casts) continue;
-      gl.bindVertexArray(mesh.solid.vertexArrayObject);
+    for (const { mesh, pose } of solids) {
+      gl.bindVertexArray(mesh.arrays.vertexArrayObject);
       setUniforms(this.shade, { pose: flattened(pose, floor) });
       gl.drawElements(gl.TRIANGLES, mesh.info.numElements, mesh.info.elementType, 0);
     }

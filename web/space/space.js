@@ -25,10 +25,7 @@ export function works() {
   if (renderer) return !renderer.lost;
   if (refused) return false;
   try {
-    renderer = new Renderer(
-      () => { for (const view of views) view.onAble(); },
-      () => { for (const view of views) view.rebuild(); },
-    );
+    renderer = new Renderer(() => { for (const view of views) view.onAble(); });
   } catch {
     refused = true;
   }
@@ -47,12 +44,12 @@ function rgb(hex) {
 
 /** All scenes of one Stage: they share where one looks from. */
 export class View {
-  /** place: the element with the picture; target: what has the focus and the pointer; onMove(): handles follow;
-   *  onAble(): whether this page can draw has changed. */
-  constructor(place, target, spaces, { onMove, onAble }) {
+  /** place: the element with the picture; target: what has the focus and the pointer; home: where one looks from at
+   *  first; onMove(): handles follow; onAble(): whether this page can draw has changed. */
+  constructor(place, target, spaces, home, { onMove, onAble }) {
     Object.assign(this, { place, target, onMove, onAble, shown: false, dirty: false, frame: 0, calm: 0, coarse: 0, slow: 0, moving: false, told: true });
     this.scenes = spaces.map((space) => new Scene(space, this));
-    this.home = this.state = null;
+    Object.assign(this, { home, state: home });
     this.dark = false;
     this.pointers = new Map();
     this.tools = this.makeTools();
@@ -166,11 +163,10 @@ export class View {
   }
 
   goHome() {
-    this.go({ ...this.home });
+    this.go(this.home);
   }
 
   go(changes) {
-    if (!this.state) return;
     this.state = { ...this.state, ...changes };
     this.told = false;
     this.stir();
@@ -188,7 +184,7 @@ export class View {
 
   /** For Python, once for each change. */
   news() {
-    if (this.told || !this.state) return undefined;
+    if (this.told) return undefined;
     this.told = true;
     const { azimuth, elevation, zoom, center } = this.state;
     return { angles: [azimuth, elevation], zoom, center };
@@ -204,11 +200,7 @@ export class View {
 
   receive({ places, rows, view }, numbers, dark) {
     this.dark = dark;
-    if (view) {
-      this.state = { azimuth: view.azimuth, elevation: view.elevation, zoom: view.zoom, center: view.center, eye: view.eye };
-      this.home ??= this.state;
-      this.told = true;
-    }
+    if (view) Object.assign(this, { state: view, told: true });
     let used = 0;
     this.scenes.forEach((scene, k) => {
       scene.place = places[k];
@@ -228,11 +220,6 @@ export class View {
     this.target.dataset.space = on;
   }
 
-  rebuild() {
-    for (const scene of this.scenes) for (const item of scene.items) item.age = -1;
-    this.onAble();
-  }
-
   /** Where a point is, in fractions of the picture: right, down. */
   fraction(point, scene = 0) {
     return this.scenes[scene].fraction(point);
@@ -245,7 +232,7 @@ export class View {
 
   draw() {
     this.frame = 0;
-    if (!this.shown || !this.state || renderer.lost) return;
+    if (!this.shown || renderer.lost) return;
     this.dirty = false;
     const start = performance.now();
     const scale = this.moving ? SCALES[this.coarse] : 1;
@@ -314,15 +301,14 @@ class Scene {
     const { zoom, eye, center } = this.view.state;
     const [x, y, z] = this.view.axes();
     const pixels = (zoom * room.clientWidth) / units; // CSS pixels a unit, at the center
-    const perUnit = pixels * (dw / cssWidth);
+    const drawn = dw / cssWidth; // device pixels a CSS pixel
     const lens = {
-      axes: [x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]], center, eye, perUnit,
+      axes: [x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]], center, eye, perUnit: pixels * drawn,
       scale: [(2 * pixels) / cssWidth, (2 * pixels) / cssHeight], reach: 12 * Math.max(this.radius, this.halfWidth),
     };
-    const dot_ = dw / cssWidth; // device pixels a CSS pixel
     const solids = [];
     const paths = [];
-    for (const item of this.items) if (item.shown) item.give(solids, paths, { dark: this.view.dark, ratio: dot_, turn: [x, y, z] });
+    for (const item of this.items) if (item.shown) item.give(solids, paths, { dark: this.view.dark, ratio: drawn, turn: [x, y, z] });
     this.triangles = solids.reduce((sum, { mesh }) => sum + mesh.triangles, 0);
     const shadow = z[2] > 0 ? (this.view.dark ? [0, 0, 0, 0.5] : [0, 0, 0, 0.16]) : null;
     renderer.draw(dw, dh, lens, { solids, paths, floor: this.floor, shadow }, !(renderer.software && this.view.moving));
@@ -408,22 +394,20 @@ class Scene {
 /** A line, single points, or both. */
 class Path {
   constructor(declared) {
-    Object.assign(this, declared, { shown: false, age: -1, lineInfo: null, pointInfo: null });
-    this.fresh = new Float32Array();
+    Object.assign(this, declared, { shown: false, changed: false, age: -1, lineInfo: null, pointInfo: null });
+    this.numbers = new Float32Array();
   }
 
   set(shown, numbers) {
-    this.shown = Boolean(shown);
-    this.fresh = numbers.slice();
-    this.age = -1;
+    Object.assign(this, { shown: Boolean(shown), numbers: numbers.slice(), changed: true });
   }
 
   give(solids, paths, { dark, ratio }) {
-    if (this.age !== renderer.age) {
-      if (this.generation !== renderer.age) this.lineInfo = this.pointInfo = null;
-      this.generation = this.age = renderer.age;
-      if (this.width > 0) this.lineInfo = renderer.segments(this.lineInfo, segmentsOf(this.fresh));
-      if (this.marker) this.pointInfo = renderer.points(this.pointInfo, finite(this.fresh));
+    if (this.age !== renderer.age) Object.assign(this, { age: renderer.age, changed: true, lineInfo: null, pointInfo: null });
+    if (this.changed) {
+      if (this.width > 0) this.lineInfo = renderer.segments(this.lineInfo, segmentsOf(this.numbers));
+      if (this.marker) this.pointInfo = renderer.points(this.pointInfo, finite(this.numbers));
+      this.changed = false;
     }
     const thick = this.width * ratio;
     paths.push({
@@ -434,7 +418,7 @@ class Path {
   }
 
   close() {
-    if (this.generation !== renderer?.age) return;
+    if (this.age !== renderer?.age) return;
     renderer.free(this.lineInfo);
     renderer.free(this.pointInfo);
   }
@@ -465,9 +449,12 @@ function finite(points) {
   return new Float32Array(out);
 }
 
+/** matplotlib's vertical alignment as a canvas names it. */
+const BASELINES = { center: "middle", top: "top", bottom: "bottom", baseline: "alphabetic" };
+
 class Words {
   constructor({ offset, align, baseline, bold, size, color }) {
-    Object.assign(this, { offset, align, baseline: { center: "middle", top: "top", bottom: "bottom" }[baseline] ?? "alphabetic", bold, size, color, shown: false });
+    Object.assign(this, { offset, align, baseline: BASELINES[baseline], bold, size, color, shown: false });
   }
 
   set(shown, numbers, words) {
@@ -503,11 +490,11 @@ function cofactors(m) {
 }
 
 /** Solids as they are drawn: the mesh, where it is, how its normals turn. */
-function placed(shape, pose, color, turn, casts = true) {
+function placed(shape, pose, color, turn) {
   const normals = cofactors(pose);
   const turned = [];
   for (const column of normals) for (const axis of turn) turned.push(dot(axis, column));
-  return { mesh: renderer.mesh(shape), pose, color, turn: turned, casts };
+  return { mesh: renderer.mesh(shape), pose, color, turn: turned };
 }
 
 class Body {
@@ -524,7 +511,7 @@ class Body {
   }
 
   give(solids, paths, { dark, turn }) {
-    for (const { shape, pose, color, opacity } of this.parts) solids.push(placed(shape, pose, [...rgb(color[Number(dark)]), opacity], turn, opacity >= 1));
+    for (const { shape, pose, color, opacity } of this.parts) solids.push(placed(shape, pose, [...rgb(color[Number(dark)]), opacity], turn));
   }
 }
 
@@ -573,6 +560,6 @@ class Triad {
     }
     if (!this.name) return;
     const { offset, align, baseline, color } = this.label;
-    pen.write(this.name, x + offset[0], y - offset[1], { color: color[Number(dark)], bold: true, align, baseline: { center: "middle", top: "top", bottom: "bottom" }[baseline] ?? "alphabetic" });
+    pen.write(this.name, x + offset[0], y - offset[1], { color: color[Number(dark)], bold: true, align, baseline: BASELINES[baseline] });
   }
 }
