@@ -6,6 +6,7 @@ The page is `stage.js` with Python behind it, as everywhere; it needs a Chromium
 
 import argparse
 import base64
+import contextlib
 import importlib
 import io
 import sys
@@ -65,7 +66,7 @@ class Bridge:
     """A Stage behind a page: messages of the page in, what it sends back out."""
 
     def __init__(self):
-        self.stage, self.said = None, []
+        self.stage, self.said, self.is_gone = None, [], False
 
     def show(self, page, stage):
         self.stage = stage
@@ -75,9 +76,27 @@ class Bridge:
         page.wait_for_timeout(450)
 
     def __call__(self, message):
+        if self.is_gone:
+            return []
         self.stage.receive(message)
         said, self.said = self.said, []
         return [[told, [base64.b64encode(file).decode() for file in files]] for told, files in said]
+
+
+@contextlib.contextmanager
+def stage_page(dark, width, height, ratio):
+    """(page, bridge): an empty page that shows what `bridge.show(page, stage)` is given."""
+    script = (ROOT / "labkit" / "stage" / "stage.js").read_text(encoding="utf-8").replace("export default", "//")
+    paper, words = COLORS[dark]
+    bridge = Bridge()
+    with driver.page_of(driver.find_browser(), dark, width, height, ratio) as page:
+        page.expose_function("toPython", bridge)
+        page.set_content("<!DOCTYPE html><title>sheets</title><body></body>")
+        look = f"body {{ margin: 0; background: {paper}; color: {words}; --words: {words}; --paper: {paper}; }}"
+        theme = f":root {{ color-scheme: {'dark' if dark else 'light'}; --jp-content-font-color1: {words}; }}"
+        page.add_style_tag(content=(ROOT / "labkit/stage/stage.css").read_text(encoding="utf-8") + look + theme)
+        page.add_script_tag(content=f"{{{script}{MODEL}}}")
+        yield page, bridge
 
 
 def stages(numbers):
@@ -92,17 +111,8 @@ def stages(numbers):
 
 def shots(found, dark, size, fail):
     """{(stem, name): (picture, what is cut)} in one theme and size."""
-    width, height, ratio = SIZES[size]
-    script = (ROOT / "labkit" / "stage" / "stage.js").read_text(encoding="utf-8").replace("export default", "//")
-    paper, words = COLORS[dark]
-    made, bridge = {}, Bridge()
-    with driver.page_of(driver.find_browser(), dark, width, height, ratio) as page:
-        page.expose_function("toPython", bridge)
-        page.set_content("<!DOCTYPE html><title>sheets</title><body></body>")
-        look = f"body {{ margin: 0; background: {paper}; color: {words}; --words: {words}; --paper: {paper}; }}"
-        theme = f":root {{ color-scheme: {'dark' if dark else 'light'}; --jp-content-font-color1: {words}; }}"
-        page.add_style_tag(content=(ROOT / "labkit/stage/stage.css").read_text(encoding="utf-8") + look + theme)
-        page.add_script_tag(content=f"{{{script}{MODEL}}}")
+    made = {}
+    with stage_page(dark, *SIZES[size]) as (page, bridge):
         for stem, names in found.items():
             module = importlib.import_module(f"labkit.chapters.ch{stem}.stages")
             for name in names:
