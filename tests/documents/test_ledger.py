@@ -87,7 +87,6 @@ NO_TABLE = {  # what is computed without a table of data/, and why no move of on
     "optimization.x_newton": "function (6-16), in thesis.wells",
     "optimization.start_newton": "function (6-16), in thesis.wells",
     "optimization.iterations_newton": "a count",
-    "handeye.gn_iterations": "a count",
     "handeye.independent_measurements": "a count",
     "chaining.frames_read": "a count",
     "pivot.unknowns": "a count",
