@@ -1,9 +1,11 @@
 """The notebooks on disk are what the sources give, and strict mode bites."""
 
 import asyncio
+import json
 import os
 import subprocess
 
+import nbformat
 import pytest
 
 from labkit.exercises import source
@@ -39,17 +41,41 @@ def test_no_notebook_has_lost_its_source():
     assert not build.orphans(NOTEBOOKS, SOLUTIONS)
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.stem)
-def test_a_blank_notebook_fails_in_strict_mode(path):
-    """The negative control: were strict mode toothless, the solved notebooks would prove nothing. The cells up to the
-    first exercise suffice.
-    """
+# --- the negative control: were strict mode toothless, the solved notebooks would prove nothing ----------------------
+
+ASKING = [path for path in SOURCES if any(source.region(cell.text) for cell in source.read(path))]
+
+
+def up_to_the_first_exercise(path):
+    """The code cells of a blank notebook, the first one that checks an answer included."""
     asked = {cell.id for cell in source.read(path) if source.region(cell.text)}
-    if not asked:
-        pytest.skip("this chapter asks for no code")
-    notebook = build.blank_notebook(path)
-    exercises = [k for k, cell in enumerate(notebook.cells) if cell.id in asked and "@ex." in cell.source]
-    last = exercises[0] if exercises else len(notebook.cells) - 1
-    notebook.cells = notebook.cells[: last + 1]
+    cells = [cell for cell in build.blank_notebook(path).cells if cell.cell_type == "code"]
+    exercises = [k for k, cell in enumerate(cells) if cell.id in asked and "@ex." in cell.source]
+    return [cell.source for cell in cells[: exercises[0] + 1 if exercises else len(cells)]]
+
+
+@pytest.fixture(scope="module")
+def ends():
+    """{chapter: what each of these cells ended with} in strict mode, all chapters in one kernel."""
+    code = f"""
+import json
+cells = { ({path.stem: up_to_the_first_exercise(path) for path in ASKING})!r}
+run = get_ipython().run_cell
+found = {{name: [run(cell).error_in_exec for cell in texts] for name, texts in cells.items()}}
+print("ENDS", json.dumps({{name: [e and type(e).__name__ for e in errors] for name, errors in found.items()}}))
+"""
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(code)])
+    asyncio.run(build.execute(notebook, "the control", SOLUTIONS, strict=True))
+    printed = "".join(output.get("text", "") for output in notebook.cells[0].outputs)
+    return json.loads(printed.rpartition("ENDS ")[2].splitlines()[0])
+
+
+@pytest.mark.parametrize("path", ASKING, ids=lambda path: path.stem)
+def test_a_blank_chapter_fails_in_strict_mode(path, ends):
+    assert "NotCorrect" in ends[path.stem] and set(ends[path.stem]) <= {None, "NotCorrect"}
+
+
+def test_a_blank_notebook_is_not_built_in_strict_mode():
+    path = SOURCES[1]
     with pytest.raises(build.BuildError, match="NotCorrect"):
-        asyncio.run(build.execute(notebook, path.stem, path.parent, strict=True))
+        asyncio.run(build.execute(build.blank_notebook(path), path.stem, path.parent, strict=True))
