@@ -28,7 +28,7 @@ from labkit.verbs import build
 
 ROOT = source.ROOT
 SECONDS_A_JOB = 900
-UNITS = 4  # jobs of unit tests: short ones fill both processors to the end
+UNITS = 2  # jobs of unit tests; each more costs its imports again
 APART = ("browser", "hub")  # folders of tests that are jobs of their own
 COUNTED = ("passed", "failed", "error", "skipped", "xfailed")
 
