@@ -322,3 +322,12 @@ def test_the_failing_cell_says_that_it_misses_by_more_than_admitted():
     assert "Far more than the budget admits" in stage.caption
     stage.press("back where it was learned")
     np.testing.assert_allclose(stage.result["part"][:2, 3], wr.cell.LEARNED[:2])
+
+
+def test_wherever_station_or_diode_is_dragged_both_stations_see_it():
+    stage = wr.sweeps()
+    for key in "ABP":
+        for place in [(-2600.0, -2600.0), (2600.0, -2600.0), (-2600.0, 2600.0), (0.0, -2600.0), (0.0, 0.0)]:
+            stage.reset()
+            stage.set(**{key: place})
+            assert stage.status == "" and np.all(np.abs(stage.result["angles"]) < np.pi / 2), (key, place)

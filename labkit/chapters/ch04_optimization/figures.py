@@ -126,5 +126,5 @@ def chord_profile(ax, low, high):
     (straight,) = ax.plot([], [], label="chord", **style.look("estimate"))
     (above,) = ax.plot([], [], color=style.AXIS_X, linewidth=5, alpha=0.45, zorder=1, label="f above it")
     (positive,) = ax.plot([], [], color=style.AXIS_Y, linewidth=5, solid_capstyle="butt", label="positive definite")
-    ax.legend(loc="upper right", fontsize=8)
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, fontsize=8, columnspacing=0.8, handlelength=1.2)
     return curve, straight, above, positive

@@ -243,7 +243,7 @@ def error_by_stop(ax, stops, printed):
     style.axes(ax, "stop", "error of the position (mm)", "A X against X B")
     ax.set(xlim=(0.3, stops - 0.3), ylim=(0.02, 60), yscale="log", xticks=range(5, stops, 5))
     ax.axhline(printed, **style.look("guide"))
-    ax.text(stops - 0.5, 1.08 * printed, "mean in the report", ha="right", va="bottom", color=style.MUTED, fontsize=9)
+    ax.text(0.5, 0.9 * printed, "mean in the report", va="top", color=style.MUTED, fontsize=9)
     (line,) = ax.plot([], [], **style.look("measurement", linestyle=":", linewidth=1.0))
     return line
 

@@ -590,6 +590,7 @@ def six_runs():
 
 SWEEPS = 40  # simulated readings of one place
 FLOOR = 2600.0  # mm, half the width of the room that is drawn
+CLOSEST = 200.0  # mm of the diode in front of a station
 
 
 def _flat(place):
@@ -616,6 +617,20 @@ def compute_sweeps(state):
         "outline": ellipse(place[:2], cut_axes(cov, FLOOR), THREE_STD), "found": found,
         "std": np.sqrt(np.linalg.eigvalsh(cov)[::-1]), "stations": T_WL[:, :2, 3], "place": place[:2],
     }  # fmt: skip
+
+
+def _in_view(state, moved):
+    """Stations off the middle they look at, and the diode in front of both: a station sees nothing behind itself."""
+    seen = {"P": np.array(state["P"], dtype=float)}
+    for name in "AB":
+        far = np.hypot(*state[name])
+        ahead = -np.array(state[name]) / far if far else np.array([0.0, 1.0])
+        seen[name] = -ahead * max(far, 2 * CLOSEST)
+    for _ in range(20):  # from one station to the other until both see it
+        for name in "AB":
+            ahead = -seen[name] / np.hypot(*seen[name])
+            seen["P"] = seen["P"] + max(0.0, CLOSEST - (seen["P"] - seen[name]) @ ahead) * ahead
+    return {key: np.clip(place, -FLOOR, FLOOR) for key, place in seen.items() if not np.array_equal(place, state[key])}
 
 
 def _sweeps_sentence(result):
@@ -655,6 +670,7 @@ def sweeps():
             "P": Handle((300.0, 700.0), step=50, bounds=reach, label="diode"),
         },
         controls={"jitter": Slider(1.0, 80.0, 40.0, step=1.0, label="error of a time (us)")},
+        constrain=_in_view,
         fail={"A": (-1900.0, -1500.0), "B": (-1500.0, -1300.0)},
         describe=_sweeps_sentence,
     )
