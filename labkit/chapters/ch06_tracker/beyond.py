@@ -185,10 +185,16 @@ def _knock(course="after stop 10"):
 
 
 def readings_in_motion(rng):
-    """Speeds, mm/s, and errors, mm, of a motion whose tracker lags; the squares scatter about their line."""
-    speed = rng.uniform(20, rng.uniform(900, 1800), int(rng.integers(30, 60)))
-    squares = rng.uniform(3, 9) ** 2 + (rng.uniform(0.008, 0.03) * speed) ** 2
-    return speed, np.sqrt(squares * (1 + 0.1 * rng.uniform(-1, 1, len(speed))))
+    """Speeds, mm/s, and errors, mm, of a motion whose tracker lags; the squares scatter about their line, which meets
+    the axis well above 0: what a negative e0^2 means, the docstring does not say.
+    """
+    while True:
+        speed = rng.uniform(20, rng.uniform(900, 1800), int(rng.integers(30, 60)))
+        squares = rng.uniform(3, 9) ** 2 + (rng.uniform(0.008, 0.03) * speed) ** 2
+        squares *= 1 + 0.1 * rng.uniform(-1, 1, len(speed))
+        slope, intercept = np.polyfit(speed**2, squares, 1)
+        if slope > 0 and intercept > 4:
+            return speed, np.sqrt(squares)
 
 
 def _line(x, y, end=lambda intercept, slope: (np.sqrt(intercept), np.sqrt(slope))):
