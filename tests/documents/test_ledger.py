@@ -75,7 +75,6 @@ def test_no_result_reads_its_own_printed_answer(moved):
 
 
 NO_TABLE = {  # what is computed without a table of data/, and why no move of one is seen
-    "particles.variance_lost": "particles of our own",
     "lateration.landmarks_2d": "landmarks of our own",
     "lateration.landmarks_3d": "landmarks of our own",
     "lateration.roots": "landmarks of our own",

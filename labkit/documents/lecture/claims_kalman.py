@@ -137,19 +137,17 @@ def predicted_state():
     value, bound = needed_prediction()
     without = ("prior_cov_vv", "posterior_cov_xv", "posterior_cov_vv")  # do not enter `_agrees`
     printed = {name: text for name, text in lecture.digits("kalman/vehicle").items() if name not in without}
-    other = {"prior_x": f"{value[0]:.2f}", "prior_v": f"{reconstructed()[0][1]:.2f}"}  # the one beside it put right
-    slips = {}
-    for k, name in enumerate(("prior_x", "prior_v")):
-        found = explained_by(printed | {key: text for key, text in other.items() if key != name}, _agrees)
-        slips[k,] = {HERE if key == name else key for key in found}
     model = reconstructed()[0]
+    found = explained_by(printed | {"prior_v": f"{model[1]:.2f}"}, _agrees)  # the velocity beside it put right
     proof = (
         f"The printed correction (11.90, 4.98) of 11.79 needs ({value[0]:.3f} +- {bound[0]:.3f}, {value[1]:.3f} +- "
-        f"{bound[1]:.3f}) before it; 51 predictions from rest give ({model[0]:.2f}, {model[1]:.2f}). 12.5 and 5.0 "
-        f"are a t^2/2 and a t at t = 5 s. Of all single slips in the {len(printed)} printed numbers only those in "
-        "the prediction make correction, covariance and model agree."
+        f"{bound[1]:.3f}) before it; 51 predictions from rest give ({model[0]:.2f}, {model[1]:.2f}) with 1 m/s^2, "
+        "which is not printed. 12.5 and 5.0 are a t^2/2 and a t at t = 5 s. No rounding leads to 12.5, and of all "
+        f"single slips in the {len(printed)} printed numbers only those in the prediction make correction, covariance "
+        f"and model agree. 5.0 alone could be a velocity between {value[1] - bound[1]:.2f} and 5.10 with its further "
+        "digits cut off, as 4.98 is: the milder word."
     )
-    return Computed(value, bound=bound, slips=slips, proof=proof)
+    return Computed(value, bound=bound, slips={(0,): {HERE if key == "prior_x" else key for key in found}}, proof=proof)
 
 
 @computes("kalman.vehicle_B")

@@ -2,6 +2,8 @@
 printed.
 """
 
+import functools
+
 import numpy as np
 
 from ...fast.sensors import SensorSuite
@@ -59,22 +61,26 @@ def roulette_cost():
     return Computed("O(M log(M))" if holds else f"{max(n.max() for n in counts.values())} comparisons a draw")
 
 
+def _spokes(weights, share):
+    """Steps of the spoke wheel: a spoke each, and each interval it passes; the first spoke stands at a share of d."""
+    m, n, count = len(weights), 0, 0
+    distance, end = weights.sum() / m, weights[0]
+    spoke = share * distance
+    for _ in range(m):
+        while spoke > end and n < m - 1:
+            n += 1
+            end += weights[n]
+            count += 1
+        spoke += distance
+        count += 1
+    return count
+
+
 @computes("particles.spoke_cost")
 def spoke_cost():
     """Whether the spoke wheel takes between M and 2 M steps: a spoke each, and an interval passed at most once."""
-    rng, steps = np.random.default_rng(11), {}
-    for m in (500, 1000, 2000, 4000):
-        weights = rng.exponential(size=m)
-        distance, n, count = weights.sum() / m, 0, 0
-        spoke, end = rng.uniform(0, distance), weights[0]
-        for _ in range(m):
-            while spoke > end and n < m - 1:
-                n += 1
-                end += weights[n]
-                count += 1
-            spoke += distance
-            count += 1
-        steps[m] = count
+    rng = np.random.default_rng(11)
+    steps = {m: _spokes(rng.exponential(size=m), rng.uniform()) for m in (500, 1000, 2000, 4000)}
     return Computed("O(M)" if all(m <= count < 2 * m for m, count in steps.items()) else f"steps: {steps}")
 
 
@@ -90,18 +96,26 @@ def spoke_distance():
     return Computed("W/M" if np.abs(mean - m * weights / total).max() <= step * (1 + 1e-6) else "not W/M")
 
 
-@computes("particles.variance_lost")
-def variance_lost():
-    """Pose variance of 100 particles of a standing robot after 2000 rounds of roulette.
+@functools.cache
+def _survivors():
+    """Which of 100 particles with equal weights are left after 2000 rounds of roulette, shape (100,).
 
-    Two draws from the last cloud differ with probability 0.99^2001 = 1.8e-9 on average, and with at least 0.0198 where
+    Two draws from the last set differ with probability 0.99^2001 = 1.8e-9 on average, and with at least 0.0198 where
     two different particles are left: fewer than one seed in ten million leaves them.
     """
-    rng = np.random.default_rng(12)
-    cloud, equal = rng.standard_normal((100, 3)), np.full(100, 0.01)
+    rng, left = np.random.default_rng(12), np.arange(100)
     for _ in range(2000):
-        cloud = cloud[particles.resample_roulette(equal, rng)]
-    return Computed(cloud.var(0).sum())
+        left = left[particles.resample_roulette(np.full(100, 0.01), rng)]
+    return left
+
+
+@computes("particles.variance_lost")
+def variance_lost():
+    """Variance of the poses of the particles that 2000 rounds of roulette leave."""
+    return Computed(
+        np.random.default_rng(12).standard_normal((100, 3))[_survivors()].var(0).sum(),
+        proof="M copies of one particle have no variance: it follows from the sentence before.",
+    )
 
 
 @computes("particles.spoke_unchanged")
@@ -116,10 +130,7 @@ def spoke_unchanged():
 
 @computes("particles.copies")
 def copies():
-    names, rng = np.arange(100), np.random.default_rng(13)
-    for _ in range(2000):
-        names = names[particles.resample_roulette(np.ones(100), rng)]
-    return Computed("M" if np.unique(names, return_counts=True)[1][0] == 100 else "fewer than M")
+    return Computed("M" if np.bincount(_survivors()).max() == 100 else "fewer than M")
 
 
 @computes("particles.field_speed")

@@ -823,7 +823,7 @@ def underdetermined():
         thesis.point("sphere_in_plate"),
     )
     J = J / np.linalg.norm(J, axis=0)
-    ranks = [np.linalg.matrix_rank(J[: 3 * n], tol=1e-9) for n in range(1, 32)]
+    ranks = [np.linalg.matrix_rank(J[: 3 * n]) for n in range(1, 32)]  # against what rounding leaves of a zero
     open_, four = J.shape[1] - max(ranks), next((n for n, rank in enumerate(ranks, 1) if rank == J.shape[1]), None)
     return Computed(
         "vierfach unterbestimmtes Gleichungssystem"
@@ -1026,6 +1026,11 @@ def angle_axes():
 # --- what the sensor, the robot and the papers are said to do --------------------------------------------------------
 
 
+def _base(H, tan_alpha, tan_beta):
+    """(2-11): the base under a height H between two angles."""
+    return H / tan_alpha + H / tan_beta
+
+
 @computes("handeye.height_formula")
 def height_formula():
     """The form of H that satisfies (2-11), L = H / tan(alpha) + H / tan(beta), in random triangles."""
@@ -1036,7 +1041,7 @@ def height_formula():
         "L (tan alpha + tan beta) / (tan alpha tan beta)": L * (a + b) / (a * b),
         "L / (tan alpha + tan beta)": L / (a + b),
     }
-    off = {form: float(np.abs(H / a + H / b - L).max()) for form, H in forms.items()}
+    off = {form: float(np.abs(_base(H, a, b) - L).max()) for form, H in forms.items()}
     return Computed(
         min(off, key=off.get),
         proof=f"In 100 triangles it returns the base to {min(off.values()):.0e} mm; sum and product exchanged miss it "

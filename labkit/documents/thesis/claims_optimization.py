@@ -6,7 +6,9 @@ differenced gradients. The latter because MATLAB's documentation of `fminunc` sa
 gradient supplied runs as quasi-Newton, and listing C6 leaves the derivatives to the solver.
 """
 
+import itertools
 import re
+from decimal import Decimal
 from functools import cache, partial
 
 import numpy as np
@@ -495,11 +497,11 @@ def start_spacing():
     starts = np.concatenate(
         [thesis.table_7_1(method)["start"] for method in wells.METHODS if method != "levenberg_marquardt"]
     )
-    gaps = np.diff(np.unique(np.abs(starts)))
-    odd = gaps[np.abs(gaps / 0.5 - np.round(gaps / 0.5)) > 1e-6]
+    decimals = sorted({abs(Decimal(repr(float(x)))) for x in starts.ravel()})  # as printed: no digit is lost
+    odd = [b - a for a, b in itertools.pairwise(decimals) if (b - a) % Decimal("0.5")]
     return Computed(
-        0.5 if not len(odd) else odd.min(),
-        proof=f"Starts on one line in steps of 0.5 differ by multiples of 0.5; 4.3 and 4.5 differ by {odd.min():.1f}.",
+        float(min(odd, default=Decimal("0.5"))),
+        proof=f"Starts on one line in steps of 0.5 differ by multiples of 0.5; 4.3 and 4.5 differ by {min(odd)}.",
     )
 
 
