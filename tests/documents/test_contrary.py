@@ -1,5 +1,5 @@
-"""No word that agrees is read from a table, and a word cannot be moved as a number can. So each is computed once more in
-a contrary world, where what it is computed from is another: a word that comes out there too would be typed.
+"""No word that agrees is read from a table, and a word cannot be moved as a number can. So each is computed once more
+in a contrary world, where what it is computed from is another: a word that comes out there too would be typed.
 """
 
 import csv
