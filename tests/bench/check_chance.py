@@ -62,7 +62,7 @@ def solved(seeds="100", *numbers):
         return next((outcome for outcome in outcomes if outcome.status == CORRECT), outcomes[0])
 
     Exercise.judge = with_all_seeds
-    for path in source.sources():
+    for path in source.sources()[1:]:  # chapter 0 shows a wrong answer
         if not numbers or path.name[:2] in numbers:
             runpy.run_path(str(path))
             print(f"{path.stem}: {counts['refused']} refused of {counts['checks']} so far", flush=True)
