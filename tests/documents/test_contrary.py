@@ -44,7 +44,11 @@ def ends(x, controls, dt, model):
 
 def distorted(method):
     table = TABLE(method)
-    return table | {"mu": table["mu"] * (100 if method == "newton" else 1), "iterations": -table["iterations"]}
+    return table | {
+        "mu": table["mu"] * (100 if method == "newton" else 1),
+        "iterations": -table["iterations"],
+        "start": 1 / table["start"],
+    }
 
 
 def li_from_four(T_BF, x_S):
@@ -90,7 +94,11 @@ CONTRARY = {  # rows: where, what, and what stands there in the contrary world
         )
     ): (OPT, "_share", lambda method: np.array(SHARES[method])),
     ("optimization.stability_gauss_newton",): (OPT, "_share", lambda m: np.array([m == "gauss_newton", 0, 0, 0.0])),
-    ("optimization.mu_identical", "optimization.fewer_iterations"): (printed, "table_7_1", distorted),
+    tuple(f"optimization.{what}" for what in ("mu_identical", "fewer_iterations", "farthest_start")): (
+        printed,
+        "table_7_1",
+        distorted,
+    ),
     ("handeye.stabler", "handeye.faster"): (HE, "_both_methods", lambda: FEWER),
     ("handeye.height_formula",): (HE, "_base", lambda H, a, b: H * a + H * b),
     ("handeye.repeatability_base",): (robot_accuracy, "repeatability", lambda reached: float(np.abs(reached).sum())),

@@ -4,7 +4,7 @@ import functools
 
 import numpy as np
 
-from ...geometry import chaining
+from ...geometry import chaining, frames
 from .. import rounding
 from ..ledger import Computed, computes
 from ..slips import HERE, explained_by, single_slips
@@ -104,3 +104,15 @@ def operator():
 def frames_read():
     """Each transform leads from one measured frame to another."""
     return Computed(2 * len(lab_sheet.printed_transforms()))
+
+
+@computes("chaining.nearly_ideal")
+def nearly_ideal():
+    angle, distance = frames.pose_distance(lab_sheet.printed_product(), np.eye(4))
+    bound = rounding.propagate(lambda rows: chaining.chain(_whole(rows)), lab_sheet.printed_links())[1]
+    return Computed(
+        None,
+        proof=f"The printed product misses the identity by {distance:.3f} mm and {np.rad2deg(angle):.3f} deg, "
+        f"{distance / bound[:3, 3].max():.0f} times what six decimals hide. How near is near the sheet does not "
+        "say: no accuracy of its measurements is printed.",
+    )

@@ -515,6 +515,15 @@ def fewer_iterations():
     return Computed(min(total, key=total.get), proof=f"By the table itself, both minima together: {total}.")
 
 
+@computes("optimization.farthest_start")
+def farthest_start():
+    starts = {"Newton": "newton", "Gauß-Newton": "gauss_newton", "Trust-Region": "trust_region"}
+    tables = {name: thesis.table_7_1(key) for name, key in starts.items()}
+    far = {name: float(np.linalg.norm(t["start"] - t["ideal"], axis=1).max()) for name, t in tables.items()}
+    listed = ", ".join(f"{name} {way:.1f}" for name, way in far.items())
+    return Computed(max(far, key=far.get), proof=f"By the table itself, farthest start from its minimum: {listed}.")
+
+
 @computes("optimization.saddle_newton")
 def saddle_newton():
     share = _share("newton")
