@@ -4,7 +4,7 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy import special
 
 from ..checks import (
     as_count,
@@ -41,6 +41,53 @@ def unit_noise(shape, seed):
     return noise
 
 
+def density(x, mean, std):
+    """Height of the normal density at x.
+
+    Parameters
+    ----------
+    x, mean : float or array-like
+    std : float
+
+    Returns
+    -------
+    height : array
+
+    Raises
+    ------
+    ValueError
+        A standard deviation that is not positive.
+    """
+    std = as_positive_number(std, "std")
+    return np.exp(-0.5 * ((as_finite(x, "x") - as_finite(mean, "mean")) / std) ** 2) / (std * np.sqrt(2 * np.pi))
+
+
+def chi_square_quantile(probability, dof):
+    """What a sum of squares of standard normal numbers stays below with a probability.
+
+    SciPy's `stats.chi2.ppf`; the import of `scipy.stats` would take longer than all else that a command imports.
+
+    Parameters
+    ----------
+    probability : float or array-like
+    dof : int or array-like
+        How many numbers.
+
+    Returns
+    -------
+    limit : float or array
+
+    Raises
+    ------
+    ValueError
+        A probability outside 0 to 1, no number at all.
+    """
+    probability, dof = as_finite(probability, "probability"), as_finite(dof, "dof")
+    if ((probability < 0) | (probability > 1)).any() or (dof <= 0).any():
+        raise ValueError("probability must lie between 0 and 1, and dof be positive")
+    return 2 * special.gammaincinv(dof / 2, probability)
+
+
 def ellipse(mean, cov, probability=0.95, points=61):
     """Closed outline of the region of a normal distribution in the plane.
 
@@ -68,7 +115,7 @@ def ellipse(mean, cov, probability=0.95, points=61):
     probability, points = as_probability(probability, "probability"), as_count(points, "points")
     fit_together(mean=mean.shape[:-1], cov=cov.shape[:-2])
     values, vectors = np.linalg.eigh(cov)
-    axes = vectors * np.sqrt(np.maximum(values, 0.0) * chi2.ppf(probability, 2))[..., None, :]
+    axes = vectors * np.sqrt(np.maximum(values, 0.0) * chi_square_quantile(probability, 2))[..., None, :]
     angle = np.linspace(0, 2 * np.pi, points)
     circle = np.stack([np.cos(angle), np.sin(angle)])
     return mean[..., None, :] + np.swapaxes(axes @ circle, -1, -2)
@@ -140,7 +187,7 @@ def share_inside(samples, mean, cov, probability=0.95):
     cov = as_shape(as_covariances(cov, "cov", len(mean)), "cov", len(mean), len(mean))
     covariance_root(cov, "cov")  # refuses one that is not positive definite
     squared = (d * solve_covariance(cov, "cov", d.T).T).sum(-1)
-    return float((squared <= chi2.ppf(probability, d.shape[-1])).mean())
+    return float((squared <= chi_square_quantile(probability, d.shape[-1])).mean())
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,5 +242,5 @@ def bent_region(pose, ends, probability=0.95, points=61):
     values, vectors = np.linalg.eigh(cov)
     angle = np.linspace(0, 2 * np.pi, points)
     circle = np.stack([np.sin(angle), np.cos(angle)])
-    ring = (vectors[:, 1:] * np.sqrt(np.maximum(values[1:], 0.0) * chi2.ppf(probability, 2)) @ circle).T
+    ring = (vectors[:, 1:] * np.sqrt(np.maximum(values[1:], 0.0) * chi_square_quantile(probability, 2)) @ circle).T
     return BentRegion(planar.compose_pose(pose, planar.exp_pose(mean + ring))[:, :2], twists, mean, cov)

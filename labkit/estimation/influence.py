@@ -8,13 +8,13 @@ Source: Cook, Weisberg, "Residuals and Influence in Regression" (1982), chapter 
 """
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from ..checks import as_finite, as_matrices, as_positive_number, as_probability, as_shape
 
 FREE = 1e-12  # of the largest eigenvalue of a normal matrix with its columns scaled alike: what is smaller is rounding
 # Baarda's: seen with 80 %, while a good number is suspected once in a thousand
-VISIBLE = float(stats.norm.isf(0.0005) + stats.norm.ppf(0.8))
+VISIBLE = float(special.ndtri(0.8) - special.ndtri(0.0005))
 
 
 def _blocks(residuals, jacobian):
@@ -124,7 +124,7 @@ def distance_limit(k, dof, probability=0.999):
     limit : float
         k times a quantile of the F distribution.
     """
-    return k * stats.f.ppf(as_probability(probability, "probability"), k, max(dof, 1))
+    return k * special.fdtri(k, max(dof, 1), as_probability(probability, "probability"))
 
 
 def leave_out(residuals, jacobian, groups=None):

@@ -8,7 +8,7 @@ Source: lecture "Lokalisierung", section "Lokalisierung mit einem Kalman-Filter"
 from dataclasses import dataclass, fields
 
 import numpy as np
-from scipy import linalg, stats
+from scipy import linalg
 
 from ..checks import (
     as_count,
@@ -24,6 +24,7 @@ from ..checks import (
     solve_covariance,
 )
 from ..geometry.planar import wrap_angle
+from .gaussian import chi_square_quantile
 
 FORMS = ("joseph", "short")
 
@@ -428,7 +429,7 @@ def mean_band(dof, runs, probability=0.99):
     """
     dof, runs = as_count(dof, "dof"), as_count(runs, "runs")
     tail = 0.5 * (1 - as_probability(probability, "probability"))
-    return tuple(stats.chi2.ppf([tail, 1 - tail], dof * runs) / runs)
+    return tuple(chi_square_quantile([tail, 1 - tail], dof * runs) / runs)
 
 
 def gate(step, probability=0.99):
@@ -449,4 +450,4 @@ def gate(step, probability=0.99):
     plausible : array of bool, shape (...)
     """
     probability, dof = as_probability(probability, "probability"), np.maximum(step.dof, 1)  # of nothing, NIS is 0
-    return step.nis <= stats.chi2.ppf(probability, dof)
+    return step.nis <= chi_square_quantile(probability, dof)

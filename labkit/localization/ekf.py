@@ -8,7 +8,6 @@ Source: lecture "Lokalisierung", section "Lokalisierung mit einem Kalman-Filter"
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from ..checks import (
     as_count,
@@ -21,6 +20,7 @@ from ..checks import (
     covariance_root,
     fit_together,
 )
+from ..estimation.gaussian import chi_square_quantile
 from ..estimation.kalman import Corrected, _after, _apply, _symmetric, _t, nis
 from ..geometry.planar import wrap_angle
 from . import odometry
@@ -445,7 +445,7 @@ def associate(x, cov, z, landmarks, std_range, std_bearing, by="mahalanobis", pr
         best = distance.argmin(1)
     else:
         raise ValueError(f'by must be "mahalanobis" or "nearest", got {by!r}')
-    passed = distance[np.arange(len(z)), best] <= stats.chi2.ppf(as_probability(probability, "probability"), 2)
+    passed = distance[np.arange(len(z)), best] <= chi_square_quantile(as_probability(probability, "probability"), 2)
     return np.where(passed, best, -1)
 
 

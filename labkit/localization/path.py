@@ -9,14 +9,14 @@ std_way in m per root second, std_turn in rad per root second, so that it does n
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from ..checks import as_covariances, as_shape
+from ..estimation.gaussian import chi_square_quantile
 from . import odometry
 from .ekf import ekf_update, measurement, measurement_jacobian
 
 GATE = 0.999  # share of good readings that pass
-LIMIT = float(stats.chi2.ppf(GATE, 2))
+LIMIT = float(chi_square_quantile(GATE, 2))
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from labkit.estimation import gaussian
 from labkit.geometry.planar import compose_pose
@@ -38,3 +38,14 @@ def test_axes_that_are_too_long_are_cut_and_the_others_left():
     cov = R @ np.diag([9.0, 0.25]) @ R.T
     np.testing.assert_allclose(gaussian.cut_axes(cov, 2.0), R @ np.diag([4.0, 0.25]) @ R.T, atol=1e-12)
     np.testing.assert_allclose(gaussian.cut_axes(cov, 5.0), cov, atol=1e-12)
+
+
+def test_quantiles_and_densities_are_those_of_scipy():
+    p, dof = np.array([0.0, 1e-9, 0.01, 0.5, 0.99, 1 - 1e-9, 1.0])[:, None], np.array([1, 2, 3, 1000])
+    np.testing.assert_allclose(gaussian.chi_square_quantile(p, dof), chi2.ppf(p, dof), rtol=1e-9)
+    np.testing.assert_allclose(gaussian.density(p, 0.3, 2.0), norm.pdf(p, 0.3, 2.0), rtol=1e-12)
+    for wrong in ((1.1, 2), (-0.1, 2), (0.5, 0), (np.nan, 2)):
+        with pytest.raises(ValueError, match="probability"):
+            gaussian.chi_square_quantile(*wrong)
+    with pytest.raises(ValueError, match="std must be positive"):
+        gaussian.density(0.0, 0.0, 0.0)

@@ -5,7 +5,6 @@ import threading
 import time as clock
 
 import numpy as np
-from scipy.stats import chi2
 
 from ...calibration import ax_xb
 from ...documents.report.printed import COLUMNS, motions, statements, table_d
@@ -517,7 +516,7 @@ def methods():
 
 # ---- six runs --------------------------------------------------------------------------------------------------------
 
-THREE_STD = chi2.cdf(3.0**2, 2)  # share of a normal distribution in the plane within three standard deviations
+THREE_STD = 1 - np.exp(-0.5 * 3.0**2)  # share of a normal distribution in the plane within three standard deviations
 
 
 @functools.cache

@@ -1,8 +1,8 @@
 """Figures of Kalman filters: three bells, bands over time, the landmark arena with its consistency panel."""
 
 import numpy as np
-from scipy.stats import norm
 
+from ...estimation import gaussian
 from ...stage import style
 from ...stage.marks import robot_outline
 
@@ -25,7 +25,7 @@ class Bells:
     def set(self, before, bells):
         """`before`, and each of `bells` in the order prediction, measurement, corrected: (mean, std)."""
         for line, (mean, std) in zip((self.before, *self.lines), (before, *bells)):
-            line.set_data(self.grid, norm.pdf(self.grid, mean, std))
+            line.set_data(self.grid, gaussian.density(self.grid, mean, std))
 
 
 class ErrorBand:

@@ -3,7 +3,6 @@
 import functools
 
 import numpy as np
-from scipy.stats import chi2
 
 from ...documents.lecture import printed as lecture
 from ...documents.lecture.examples import circle_course, simulate_vehicle
@@ -45,7 +44,7 @@ def compute_bells(state):
 def _bells_sentence(result):
     (_, s_p), (_, s_z), (x, s) = result["bells"]
     text = f"Standard deviations: predicted {s_p:.2f} m, measured {s_z:.2f} m, corrected {s:.2f} m, at {x:.2f} m."
-    if result["nis"] > chi2.ppf(0.99, 1):
+    if result["nis"] > gaussian.chi_square_quantile(0.99, 1):
         text += f" NIS {result['nis']:.0f}: fewer than one in a hundred fits so badly. The bell does not show it."
     return text
 
@@ -61,7 +60,7 @@ def bells():
 
         def update(state, result):
             three.set(result["before"], result["bells"])
-            limit = chi2.ppf(0.99, 1)
+            limit = gaussian.chi_square_quantile(0.99, 1)
             words.set_text(f"gain K = {result['gain']:.2f}\nNIS = {result['nis']:.2f} (99 % below {limit:.1f})")
 
         return [*three.artists, words], update
@@ -136,7 +135,7 @@ def vehicle():
         nis = draw.Consistency(grid["nis"], "NIS of each step")
         grid["x"].legend(loc="upper right", fontsize=8, ncols=2)
         grid["nis"].legend(loc="upper right", fontsize=8)
-        limits = chi2.ppf([0.005, 0.995], 1)
+        limits = gaussian.chi_square_quantile([0.005, 0.995], 1)
 
         def update(state, result):
             for k, line in enumerate(lines):
@@ -228,7 +227,7 @@ def compute_arena(state):
 def _arena_sentence(result):
     if not len(result["nees"]):
         return "Click the picture and drive with the arrow keys, or press play for the circle."
-    over = float((result["nees"] > chi2.ppf(0.995, 3)).mean())
+    over = float((result["nees"] > gaussian.chi_square_quantile(0.995, 3)).mean())
     text = f"The filter is {100 * result['error']:.0f} cm off; NEES now {result['nees'][-1]:.3g}, expected 3."
     text += strayed(result["truth"][-1], ARENA)
     if not result["wrap"] and result["nees"].max() > 100:
@@ -248,7 +247,7 @@ def arena():
         world, spare = draw.Arena(left), Spare(left, "2, not seen")
         panel = draw.Consistency(right, "NEES of each step", role="estimates")
         right.legend(loc="upper left", fontsize=8)
-        limits = chi2.ppf([0.005, 0.995], 3)
+        limits = gaussian.chi_square_quantile([0.005, 0.995], 3)
 
         def update(state, result):
             spare.set(state["L2"], state["count"] == 1)
