@@ -16,11 +16,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from . import guard, metrics, relations, scope
+from . import arguments, guard, metrics, relations, scope
 
 TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
 NOISY = "exact on clean data, but the data are not weighed as they should be: on noisy data"
 TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws of each kind
+LOOKING = 0.5  # seconds of processor time in which changes of the arguments are tried as an explanation
 UNITS = {
     "mm": ("length", 1e-3),
     "cm": ("length", 1e-2),
@@ -223,18 +224,42 @@ class _Trial:
         named = self._named_mistake() or self._named_in_parts()
         if named:
             return named
+        words = self._relation(whole=True) or self._other_arguments()
+        if words:
+            return self.outcome(NOT_YET, _closed(words))
         if self.refusal:
             return self.outcome(NOT_YET, _closed(self.refusal) + self._about_globals())
-        plain = self._plain_pairs()
         if self._right_on_plain():
             for metric, pair, words in zip(self.metrics, self.pairs, self.words):
                 if words and not metric.equal(*pair):
                     off = next(d for d in metric.deviations(*pair) if not d.within)
                     return self.outcome(NOT_YET, _closed(f"{words} {off}"))
+        words = self._relation()
+        return self.outcome(NOT_YET, (_closed(words) if words else self._deviation()) + self._about_globals())
+
+    def _relation(self, whole=False):
+        """What the general layer says of the results; nothing where one was refused, or only special ones are wrong."""
+        if self.refusal or self.exercise.metric is None or self._right_on_plain():
+            return None
         arrays = [arg for args in self.inputs for arg in args if isinstance(arg, np.ndarray)]
         sizes = {n for array in arrays for n in (*array.shape, array.size)}
-        words = relations.difference_words(self.exercise.metric, plain, sizes)
-        return self.outcome(NOT_YET, (_closed(words) if words else self._deviation()) + self._about_globals())
+        return relations.difference_words(self.exercise.metric, self._plain_pairs(), sizes, whole)
+
+    def _other_arguments(self):
+        """Whether the results are right for arguments changed in one respect, with these in words."""
+        if self.exercise.metric is None or not self.inputs:
+            return None
+        cases = self._cases()
+        read = scope.notebook_data(self.function)
+        notebook = {name: self.function.__globals__[name] for name in read}
+        ends = time.process_time() + LOOKING
+        for words, change in arguments.changes(self._names(self.inputs[0]), [case[0] for case in cases], notebook):
+            if time.process_time() > ends:
+                return None
+            variant = Mistake(lambda *args, change=change: self.exercise.reference(*change(args)), words)
+            if all(self._is_mistake(variant, *case) for case in cases):
+                return f"your result is what comes out {words}"
+        return None
 
     def _about_globals(self):
         """A line about data of the notebook that the function reads, which a checked function is not given."""
@@ -252,14 +277,17 @@ class _Trial:
 
     def _named_mistake(self):
         """The mistake that explains all plain draws, and the special ones too where those alone are wrong."""
-        everything = self._right_on_plain()
-        cases = [
-            case[:3] for case in zip(self.inputs, self.metrics, self.pairs, self.words) if everything or case[3] is None
-        ]
+        cases = self._cases()
         for k, mistake in enumerate(self.exercise.mistakes):
             if all(self._is_mistake(mistake, *case) for case in cases):
                 return self.outcome(NOT_YET, mistake.text, k)
         return None
+
+    def _cases(self):
+        """(arguments, metric, pair) of the draws that tell: the plain ones, or all where only special ones are off."""
+        everything = self._right_on_plain()
+        rows = zip(self.inputs, self.metrics, self.pairs, self.words)
+        return [row[:3] for row in rows if everything or row[3] is None]
 
     def _named_by_failing(self, error, args):
         """The mistake that explains the draws so far and fails on this one as well: right, or possible, in one size."""

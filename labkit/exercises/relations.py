@@ -18,25 +18,25 @@ LONGEST = 12  # entries along the last axis that are tried one by one
 FACTORS = {"pi": np.pi, "2 pi": 2 * np.pi, "the root of 2": np.sqrt(2.0), "the root of 3": np.sqrt(3.0)}
 
 
-def difference_words(metric, pairs, sizes=()):
+def difference_words(metric, pairs, sizes=(), whole=False):
     """What the general layer says of a wrong result, from relations that hold on all draws; None when it knows none.
 
     `pairs` are (admitted result, expected) of every draw; `sizes` the lengths of what was given, which a forgotten or
-    needless division by their number would show.
+    needless division by their number would show. `whole` leaves out what is true of a part of the result only.
     """
     for k, (name, part, _, _) in enumerate(metric.parts(*pairs[0])):
         piece = [metric.parts(*pair)[k] for pair in pairs]
         results, expected = [p[2] for p in piece], [p[3] for p in piece]
         if all(part.equal(r, e) for r, e in zip(results, expected)):
             continue
-        words = _relation(part, results, expected, sizes)
+        words = _relation(part, results, expected, sizes, whole)
         if words:
             return f"{name}: {words}" if name else words
         return None
     return None
 
 
-def _relation(metric, results, expected, sizes):
+def _relation(metric, results, expected, sizes, whole):
     if isinstance(metric, Exactly | Several):
         return None
     if isinstance(metric, Through):
@@ -53,18 +53,19 @@ def _relation(metric, results, expected, sizes):
             return False
 
     if isinstance(metric, Poses):
-        return _pose_relation(metric, results, expected, holds)
+        return _pose_as_a_whole(holds) or (None if whole else _pose_in_parts(metric, results, expected))
     if isinstance(metric, Rotations):
-        return _rotation_relation(results, holds)
+        return _rotation_relation(results, holds, whole)
     unit = getattr(metric, "unit", "")
-    return (
+    words = (
         _sign_or_unit(holds, unit)
         or _arrangement(results, holds)
         or _power(results, holds)
         or _factor(results, expected, sizes)
-        or _one_part(results, expected, holds, unit)
-        or _offset(results, expected, unit)
     )
+    if words or whole:
+        return words
+    return _one_part(results, expected, holds, unit) or _offset(results, expected, unit)
 
 
 # Poses and rotations -------------------------------------------------------------------------------------------------
@@ -79,10 +80,7 @@ def _moved(T, R=None, t=None):
     return T
 
 
-def _pose_relation(metric, results, expected, holds):
-    turned = _rotation_kind([r[..., :3, :3] for r in results], "rotation block")
-    if turned:
-        return turned
+def _pose_as_a_whole(holds):
     if holds(frames.invert):
         return "your result is the inverse of the expected pose: it maps in the other direction"
     if holds(lambda T: _moved(T, R=np.swapaxes(T[..., :3, :3], -1, -2))):
@@ -92,6 +90,13 @@ def _pose_relation(metric, results, expected, holds):
             return f"the rotation is right, the translation is {words} of what it should be: mm against m?"
     if holds(lambda T: _moved(T, t=-T[..., :3, 3])):
         return "the rotation is right, the translation has the opposite sign"
+    return None
+
+
+def _pose_in_parts(metric, results, expected):
+    turned = _rotation_kind([r[..., :3, :3] for r in results], "rotation block")
+    if turned:
+        return turned
     if all(map(_are_rounded, results, expected)):
         return "your result is rounded: hand over all digits"
     *turn, origin = (max(d, key=lambda d: d.amount) for d in zip(*map(metric.deviations, results, expected)))
@@ -114,9 +119,11 @@ def _rotation_kind(matrices, what):
     return None
 
 
-def _rotation_relation(results, holds):
+def _rotation_relation(results, holds, whole):
     if holds(lambda R: np.swapaxes(R, -1, -2)):
         return "your matrix is the transpose of the expected rotation: rows and columns, or the direction of the map"
+    if whole:
+        return None
     kind = _rotation_kind(results, "matrix")
     if kind:
         return kind

@@ -1,6 +1,7 @@
 """What a checked function sees besides its arguments: its own name, the notebook's data, the library's twin."""
 
 import contextlib
+import dis
 import sys
 import types
 
@@ -91,8 +92,11 @@ def notebook_data(function):
 
 
 def _names(code):
-    """Global names a code object uses, and those of the functions defined within it, each once and in order."""
-    found = dict.fromkeys(code.co_names)
+    """Global names a code object reads, and those of the functions defined within it, each once and in order.
+
+    `co_names` alone would hold attributes too: the T of `R.T` is no name of the notebook.
+    """
+    found = dict.fromkeys(i.argval for i in dis.get_instructions(code) if i.opname in ("LOAD_GLOBAL", "LOAD_NAME"))
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
             found |= dict.fromkeys(_names(constant))

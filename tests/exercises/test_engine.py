@@ -358,8 +358,10 @@ def moved(T, R=None, t=None):
         (lambda T: moved(T, R=T[:3, :3] * (1, 1, -1)), "determinant is -1"),
         (lambda T: moved(T, R=2 * T[:3, :3]), "not orthonormal"),
         (lambda T: moved(T, t=T[:3, 3] + 5), "translation is not"),
-        (lambda T: moved(T, R=np.eye(3)), "rotation is not"),
-        (lambda T: T.T.copy(), "last row must be 0 0 0 1"),
+        (lambda T: moved(T, R=np.diag([1.0, -1, -1])), "rotation is not"),
+        (lambda T: moved(T, R=np.eye(3)), "if `T` did not turn"),
+        (lambda T: T.T.copy(), "with `T` transposed"),
+        (lambda T: T - 0.5, "last row must be 0 0 0 1"),
         (lambda T: T[:3], "expected an array of shape (4, 4)"),
         (lambda T: frames.pose(T[:3, :3] @ frames.matrix_from_kuka([0, 0, 0, 0.1, 0, 0])[:3, :3], T[:3, 3] + 1), "deg"),
     ],
@@ -496,7 +498,7 @@ def test_noisy_draw_catches_a_fit_that_is_exact_only_on_clean_data():
         hints=("a", "b", "c"),
     )
     assert mean.judge(lambda x: x.mean()).status == CORRECT
-    assert "on noisy data" in mean.judge(lambda x: x[0]).text
+    assert "on noisy data" in mean.judge(lambda x: x[3]).text
 
 
 def test_properties_judge_stochastic_code():
