@@ -54,8 +54,8 @@ for k, (T, S) in enumerate(zip(printed, measured)):
 # %% order [markdown]
 # ## First A, then B
 #
-# Every move is made *in the frame that has been reached*. Below, A shifts and turns by 60°, B shifts only. Decide first, then drag the frames A and B,
-# and turn them with the sliders. Then try *No turns*.
+# Every move is made *in the frame that has been reached*. Below, A shifts and turns about z by 60°, B shifts only. Decide first, then drag the frames A and B,
+# and turn them with the sliders, B about x. Then try *No turns*.
 
 # %% predict-order
 guess = ...  # your code here
@@ -178,7 +178,7 @@ ex.worst_at_one_meter(worst_at_one_meter)
 # ## One bad link
 #
 # A turn at the end of link $k$ moves everything that follows. The end of the chain moves by the turn (in rad) times its **lever**: the distance from $K_k$ to the end.
-# The figure shows the sheet's loop in plan view: thin (black, or white on dark) as it is, purple as the chain sees it, gray the gap at $K_0$ and at a work piece P. Drag the frames, and choose which link is wrong.
+# The figure shows the sheet's loop: thin (black, or white on dark) as it is, purple as the chain sees it, gray the gap at $K_0$ and at a work piece P; the measuring arm stands where that link is measured. Drag the frames, choose which link is wrong, and about which axis: then the lever is the distance from that axis.
 
 # %% predict-lever
 guess = ...  # your code here

@@ -473,7 +473,7 @@ class Stage:
         (left, right), (bottom, top) = np.sort(ax.get_xlim()), np.sort(ax.get_ylim())
         if isinstance(handle, Dial) or handle.way is not None:
             there = None if to is None else self._picture.data(ax, to)
-            return self._moved_in_space(handle, at, there, steps, (right - left) / 100)
+            return self._moved_in_space(key, at, there, steps, (right - left) / 100)
         view = self._state.get("view")
         here = view.project(at)[:2] if len(at) == 3 else at
         if to is None:
@@ -484,16 +484,16 @@ class Stage:
         there = np.clip(there, (left, bottom), (right, top))
         return self._bounded(key, there if len(at) == 2 else at + view.unproject(there - here))
 
-    def _moved_in_space(self, handle, at, there, steps, step):
-        view = self._state["view"]
+    def _moved_in_space(self, key, at, there, steps, step):
+        handle, view = self._handles[key], self._state["view"]
         if there is None and isinstance(handle, Dial):
             return handle.stepped(at, steps)
         if there is None:
-            return stepped(handle.way, at, steps, view.axes, handle.step or step)
+            return self._bounded(key, stepped(handle.way, at, steps, view.axes, handle.step or step))
         eye, ray = view.ray(*there)
         if isinstance(handle, Dial):
             return handle.pull(at, self.result, eye, ray)
-        return handle.way.pull(at, eye, ray, view.axes[2])
+        return self._bounded(key, handle.way.pull(at, eye, ray, view.axes[2]))
 
     def _show_picture(self, reply=None):
         """One picture to the browser; one that has not yet shown the last three gets the newest as soon as it has."""

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from labkit.chapters.ch02_chaining import bodies
 from labkit.chapters.ch02_chaining import stages as w
 from labkit.geometry import chaining
 
@@ -17,33 +19,71 @@ def order(a, b, a_deg, b_deg):
 
 
 def test_order_of_product():
-    result = order((100.0, 0.0), (0.0, 50.0), 90.0, 0.0)
-    assert result["AB"][:2, 3] == pytest.approx([50, 0])  # B is a step along the new y axis, which points to -x
-    assert result["BA"][:2, 3] == pytest.approx([100, 50])
-    assert result["gap"] == pytest.approx(np.hypot(50, 50))
-    assert order((100.0, 0.0), (0.0, 50.0), 0.0, 0.0)["gap"] == pytest.approx(0, abs=1e-12)
+    result = order((100.0, 0.0, 0.0), (0.0, 50.0, 0.0), 90.0, 0.0)
+    assert result["AB"][:3, 3] == pytest.approx([50, 0, 0])  # B is a step along the new y axis, which points to -x
+    assert result["BA"][:3, 3] == pytest.approx([100, 50, 0])
+    assert result["gap"] == pytest.approx(np.hypot(50, 50)) and result["turn_deg"] == pytest.approx(0, abs=1e-6)
+    assert order((100.0, 0.0, 0.0), (0.0, 50.0, 9.0), 0.0, 0.0)["gap"] == pytest.approx(0, abs=1e-12)
 
 
-def loop(link, turn_deg, **places):
+def test_turns_about_two_axes_do_not_commute_even_on_the_spot():
+    """Quarter turns about z and x: the two products are a third of a turn apart, by their trace of zero."""
+    result = order(np.zeros(3), np.zeros(3), 90.0, 90.0)
+    turn = Rotation.from_euler("ZX", [90, 90], degrees=True).inv() * Rotation.from_euler("XZ", [90, 90], degrees=True)
+    assert result["gap"] == pytest.approx(0, abs=1e-12) and result["turn_deg"] == pytest.approx(120)
+    assert np.rad2deg(turn.magnitude()) == pytest.approx(120)
+
+
+def loop(link, turn_deg, axis="z", **places):
     _, origins = w._sheet_angles()
-    state = {f"K{k}": origins[k] for k in (1, 2, 3)} | {"P": np.array([200.0, 100.0])}
-    return w.compute_open_loop({**state, **places, "link": link, "turn_deg": turn_deg})
+    state = {f"K{k}": np.append(origins[k], 0.0) for k in (1, 2, 3)} | {"P": np.array([200.0, 100.0, 0.0])}
+    return w.compute_open_loop({**state, **places, "link": link, "turn_deg": turn_deg, "axis": axis})
 
 
-def test_open_loop_opens_by_the_turn_times_the_lever():
+@pytest.mark.parametrize("axis", "xyz")
+def test_open_loop_opens_by_the_turn_times_the_lever(axis):
     for link in (1, 2, 3, 4):
-        result = loop(link, 2.0)
+        result = loop(link, 2.0, axis)
         chord = 2 * np.sin(np.deg2rad(1.0)) * result["lever"]
         assert result["distance"] == pytest.approx(chord, abs=1e-9)
         assert result["angle_deg"] == pytest.approx(2.0)
-    assert loop(4, 2.0)["distance"] == pytest.approx(0, abs=1e-9)
-    closed = loop(2, 0.0)
+    assert loop(4, 2.0, axis)["distance"] == pytest.approx(0, abs=1e-9)
+    closed = loop(2, 0.0, axis)
     assert closed["distance"] == pytest.approx(0, abs=1e-9) and closed["at_piece"] == pytest.approx(0, abs=1e-9)
 
 
+def test_a_turn_about_x_or_y_lifts_the_end_out_of_the_plane():
+    angles, origins = w._sheet_angles()
+    for axis, toward in (("x", (1, 0)), ("y", (0, 1))):
+        along = np.array([[np.cos(angles[2]), -np.sin(angles[2])], [np.sin(angles[2]), np.cos(angles[2])]]) @ toward
+        result = loop(2, 5.0, axis)
+        assert result["lever"] == pytest.approx(abs(np.linalg.det([along, origins[2]])), rel=1e-9)
+        assert abs(result["measured"][-1][2, 3]) == pytest.approx(result["lever"] * np.sin(np.deg2rad(5.0)), rel=1e-9)
+
+
 def test_open_loop_at_the_work_piece():
-    result = loop(1, 3.0, P=np.array([-80.0, 90.0]))
-    assert np.linalg.norm(result["piece"][:, 0] - result["piece"][:, 1]) == pytest.approx(result["at_piece"])
+    result = loop(1, 3.0, P=np.array([-80.0, 90.0, 0.0]))
+    assert np.linalg.norm(result["piece"][0] - result["piece"][1]) == pytest.approx(result["at_piece"])
+
+
+def test_the_measuring_arm_stands_on_the_floor_and_touches_the_end_of_its_link():
+    stage = w.open_loop()
+    for link in (1, 2, 3, 4):
+        stage.set(link=link)
+        end = stage.result["true"][link][:3, 3]
+        probe = stage.spaces[0].named("probe").corners().reshape(-1, 3)
+        assert np.linalg.norm(probe - end, axis=1).min() < 5.0  # its radius
+        foot = stage.spaces[0].named("foot").corners().reshape(-1, 3)
+        assert foot[:, 2].min() == pytest.approx(w.FLOOR) and stage.result["stand"][2] == w.FLOOR
+
+
+@pytest.mark.parametrize("end", [(500.0, 0, 200), (0, 0, 700), (2000.0, 100, 300)])
+def test_both_links_of_the_measuring_arm_keep_their_lengths(end):
+    start = np.array([0.0, 0, 300])
+    elbow, wrist = bodies.bent(start, np.array(end), 400.0, 300.0)
+    assert np.linalg.norm(elbow - start) == pytest.approx(400) and np.linalg.norm(wrist - elbow) == pytest.approx(300)
+    reached = np.linalg.norm(np.subtract(end, start)) <= 700
+    assert np.allclose(wrist, end) == reached
 
 
 @pytest.mark.parametrize("layout", ["row", "loop"])
@@ -94,30 +134,10 @@ def test_growth_keeps_room_for_wide_numbers(width):
     assert max(left.get_ylim()) == 3000 and min(box.x0 for box in numbers) > label.get_window_extent(renderer).x1
 
 
-@pytest.mark.parametrize("place", [(5000.0, 5000.0), (-5000.0, -5000.0)])
-def test_frames_of_the_open_loop_stay_in_the_picture_with_their_names(place):
+@pytest.mark.parametrize("place", [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+def test_frames_of_the_open_loop_stay_in_their_plane_and_bounds(place):
     stage = w.open_loop()
     for name in ("K1", "K2", "K3", "P"):
-        right, down = (1.0, 0.0) if place[0] > 0 else (0.0, 1.0)
-        stage.receive({"drag": {name: (right, down)}})
-    stage.png()
-    names = [text for text in stage.figure.axes[0].texts if text.get_text() in ("K1", "K2", "K3", "P")]
-    assert len(names) == 4 and all(inside(name, stage) for name in names)
-    assert np.array_equal(stage.state["P"], (360, 190) if place[0] > 0 else (-440, -580))
-
-
-def test_free_direction_is_the_middle_of_the_widest_gap():
-    assert np.rad2deg(w.free_direction([(1, 0), (0, 1)])) == pytest.approx(225)
-    assert np.rad2deg(w.free_direction([(2, 0), (0, 1), (-1, 0)])) == pytest.approx(270)
-    assert np.rad2deg(w.free_direction([(1, 0), (0, 1), (0, 0)])) == pytest.approx(225)  # no direction: ignored
-
-
-@pytest.mark.parametrize("A_deg, B_deg", [(60, 0), (-90, 40), (180, 180)])
-def test_names_of_the_two_orders_keep_off_their_own_axes(A_deg, B_deg):
-    stage = w.order_of_product()
-    stage.set(A_deg=A_deg, B_deg=B_deg)
-    result = w.compute_order(stage.state)
-    names = {text.get_text(): text for ax in stage.figure.axes for text in ax.texts}
-    for key in ("A", "B", "AB", "BA"):
-        aside = np.array(names[key].xyann) / np.hypot(*names[key].xyann)
-        assert (result[key][:2, :2].T @ aside).max() < np.cos(np.deg2rad(40))
+        stage.receive({"drag": {name: place}})
+        at = stage.state[name]
+        assert at[2] == 0 and all(low <= v <= high for v, (low, high) in zip(at, w.WITHIN))

@@ -5,51 +5,72 @@ from matplotlib.ticker import LinearLocator
 from matplotlib.transforms import ScaledTranslation
 
 from ...stage import style
+from . import bodies
 
 EDGES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)  # mm
 LINKS = (1, 2, 4, 8, 16, 32, 64)
 LABEL_INCHES = 0.64  # from an axes to the name of its numbers, wide enough for five letters
-NAME_POINTS = 17  # from an origin to the middle of its name
 
 
 class Chain:
-    """Frames in plan view: a line from origin to origin, and the x and y axis of each as short strokes."""
+    """Frames in plan view, a line from origin to origin: `.set(poses)`, shape (n, 4, 4)."""
 
-    def __init__(self, ax, look, length, axes=True, **changes):
-        self.length = length
+    def __init__(self, ax, look, **changes):
         (self.line,) = ax.plot([], [], **{**style.look(look), "marker": "o", "markersize": 4, **changes})
-        self.strokes = [
-            ax.plot([], [], color=color, linewidth=1.8, alpha=0.9)[0] for color in (style.AXIS_X, style.AXIS_Y) if axes
-        ]
-        self.artists = [self.line, *self.strokes]
 
     def set(self, poses):
-        """`poses`: shape (n, 4, 4)."""
-        origins = poses[:, :2, 3]
-        self.line.set_data(*origins.T)
-        for stroke, axis in zip(self.strokes, (0, 1)):
-            tips = origins + self.length * poses[:, :2, axis]
-            gaps = np.full_like(tips, np.nan)
-            stroke.set_data(*np.stack([origins, tips, gaps], axis=1).reshape(-1, 2).T)
+        self.line.set_data(*poses[:, :2, 3].T)
 
 
-def plan_of_loop(ax):
-    """Plan view of the sheet's loop, in mm, with room to drag. Returns ax."""
-    style.axes(ax, "x of K0 (mm)", "y of K0 (mm)", equal=True)
-    ax.set(xlim=(-460, 380), ylim=(-600, 240))
-    return ax
+class Moves:
+    """Two moves one after the other: where they begin, the frame after the first, what both carry about, and a hollow
+    cross where the other order ends."""
+
+    def __init__(self, scene, first, second):
+        scene.fixed(scene.triad("0", 70), np.eye(4))
+        self.middle = scene.triad(first, 70, linestyle=(0, (4, 1.5)))
+        self.end = scene.triad(first + second, 90)
+        self.carried = scene.body(*bodies.piece(), name="piece")
+        self.path = scene.line(**style.look("estimate", linewidth=1.6))
+        self.other = scene.points(**style.look("rejected", markersize=9))
+
+    def set(self, middle, end, other):
+        """Poses (4, 4) after the first move, after both, and after both in the other order."""
+        self.middle.set(middle)
+        self.end.set(end)
+        self.carried.set(end)
+        self.path.set([np.zeros(3), middle[:3, 3], end[:3, 3]])
+        self.other.set(other[:3, 3])
 
 
-def names(ax, texts):
-    """Bold names that are moved with `.xy`; returns the annotations."""
-    place = {"xytext": (8, 8), "textcoords": "offset points", "fontweight": "bold", "zorder": 4}
-    return [ax.annotate(text, (0, 0), **place) for text in texts]
+class Loop:
+    """The sheet's loop as it is and as the chain sees it, the lever of a wrong link with the axis it turns about, the
+    gaps at K0 and at a work piece, and the measuring arm at the stand of that link."""
 
+    def __init__(self, scene):
+        self.arm = bodies.MeasuringArm(scene)
+        self.true = scene.line(**style.look("truth", marker="o", markersize=4))
+        self.measured = scene.line(**style.look("estimate", marker="o", markersize=4))
+        self.frames = [scene.triad(f"K{k}", 62) for k in range(4)]
+        self.lever = scene.line(**style.look("guide", linewidth=2))
+        self.axis = scene.line(**style.look("prediction"))
+        self.gap = scene.rod(5.0, style.REJECTED, name="gap at K0")
+        self.piece = scene.rod(5.0, style.REJECTED, name="gap at P")
+        self.name = scene.text("P", fontweight="bold")
 
-def set_name(frame, angle):
-    """Put the name of a `PlaneFrame` beside its origin, in the direction `angle` (rad)."""
-    frame.name.set(ha="center", va="center")
-    frame.name.xyann = NAME_POINTS * np.cos(angle), NAME_POINTS * np.sin(angle)
+    def set(self, result):
+        """Draw the result of `stages.compute_open_loop`."""
+        true, measured, k = result["true"], result["measured"], result["link"]
+        self.true.set(true[:, :3, 3])
+        self.measured.set(measured[:, :3, 3])
+        for frame, T in zip(self.frames, measured):
+            frame.set(T)
+        self.lever.set([result["pivot"], measured[-1, :3, 3]])
+        self.axis.set(result["pivot"] + np.outer([-110.0, 110.0], result["about"]))
+        self.gap.set(true[0, :3, 3], measured[-1, :3, 3])
+        self.piece.set(*result["piece"])
+        self.name.set(result["piece"][0])
+        self.arm.set(result["stand"], true[k % 4, :3, 3])
 
 
 def growth_axes(ax):

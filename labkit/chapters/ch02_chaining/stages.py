@@ -7,10 +7,11 @@ import numpy as np
 from ...documents.lab_sheet import printed as lab_sheet
 from ...estimation.gaussian import unit_noise
 from ...geometry import chaining
-from ...geometry.frames import relative
-from ...geometry.lie import exp_se3
+from ...geometry.frames import pose, relative, transform
+from ...geometry.lie import exp_se3, exp_so3
 from ...stage import Choice, Handle, Slider, Stage, style
-from ...stage.marks import PlaneFrame
+from ...stage.scene3d import Scene, View
+from ...stage.scene3d_handles import Free, OnPlane
 from . import figures as draw
 
 RUNS = 100
@@ -24,85 +25,73 @@ LOOP_A = ((0, True), (1, True), (2, True), (3, True))
 LOOP_B = ((4, True), (5, True), (6, True), (1, False))
 METHODS = ("as measured", "A, then B", "B, then A", "graph")
 MAGNIFIED = 30.0
-WITHIN = ((-440.0, 360.0), (-580.0, 190.0))  # mm: where frames may be dragged, so that their names stay in the picture
+WITHIN = ((-440.0, 360.0), (-580.0, 190.0), (0.0, 0.0))  # mm: where frames may be dragged: the plane of the loop
+MOVES = ((-180.0, 180.0),) * 3  # mm: how far a move may shift
+FLOOR = -120.0  # mm: the sheet's frames lie on a work piece, the measuring arm stands below
+BESIDE = 150.0  # mm: its stand, from the middle of a link
+AXES = {"z": 2, "x": 0, "y": 1}
 
 
-def _planar(angle, xy):
-    T = np.eye(4)
-    T[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    T[:2, 3] = xy
-    return T
+def _turned(axis, angle, shift):
+    """The pose of a turn (rad) about an axis (number), with a shift (3,)."""
+    return pose(exp_so3(angle * np.eye(3)[axis]), shift)
 
 
 def compute_order(state):
-    """Two moves A and B in the plane, their product in both orders, and how far the results are apart."""
-    A, B = (_planar(np.deg2rad(state[f"{k}_deg"]), state[k]) for k in "AB")
+    """Two moves in space, A about z and B about x, their product in both orders, and how far the results are apart."""
+    A = _turned(2, np.deg2rad(state["A_deg"]), state["A"])
+    B = _turned(0, np.deg2rad(state["B_deg"]), state["B"])
     AB, BA = chaining.chain([A, B]), chaining.chain([B, A])
-    return {"A": A, "B": B, "AB": AB, "BA": BA, "gap": float(np.linalg.norm(AB[:3, 3] - BA[:3, 3]))}
+    turn, gap = chaining.closure_error(relative(AB, BA))
+    return {"A": A, "B": B, "AB": AB, "BA": BA, "gap": float(gap), "turn_deg": float(np.rad2deg(turn))}
 
 
-def free_direction(directions):
-    """The angle (rad) in the middle of the widest gap between plane directions, shape (n, 2)."""
-    directions = np.asarray(directions, dtype=float)
-    x, y = directions[np.linalg.norm(directions, axis=1) > 1e-9].T
-    angles = np.sort(np.arctan2(y, x))
-    gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
-    widest = np.argmax(gaps)
-    return float(angles[widest] + gaps[widest] / 2)
+def _order_sentence(result):
+    if result["gap"] < 0.5 and result["turn_deg"] < 0.5:
+        return "Here both orders end at the same place: moves without a turn commute, and show nothing of the rule."
+    return (
+        f"The two ends lie {result['gap']:.0f} mm apart, and one is turned by {result['turn_deg']:.0f} deg against "
+        "the other. Hollow cross: where the other order ends."
+    )
 
 
 def order_of_product():
     """T_A T_B and T_B T_A side by side: the second move is made in the frame that the first one has reached."""
 
     def scene(fig):
-        panels = fig.subplots(1, 2, sharex=True, sharey=True)
-        frames, paths = [], []
-        for ax, first, second in zip(panels, "AB", "BA"):
-            style.axes(ax, "x (mm)", "y (mm)" if first == "A" else "", f"first {first}, then {second}", equal=True)
-            ax.set(xlim=(-400, 400), ylim=(-400, 400))
-            PlaneFrame(ax, "0", 70).set(np.eye(4))
-            middle = PlaneFrame(ax, first, 70, linestyle=(0, (4, 1.5)))
-            end = PlaneFrame(ax, first + second, 90)
-            (path,) = ax.plot([], [], **style.look("estimate", linewidth=1.4))
-            (other,) = ax.plot([], [], **style.look("rejected", markersize=9))
-            frames.append((middle, end))
-            paths.append((path, other))
+        panels = fig.subplots(1, 2)
+        spaces = [
+            Scene(ax, radius=235, title=f"first {order[0]}, then {order[1]}", floor=-90.0, unit="mm")
+            for ax, order in zip(panels, ("AB", "BA"))
+        ]
+        sides = [draw.Moves(space, *order) for space, order in zip(spaces, ("AB", "BA"))]
 
         def update(state, result):
-            ends = (result["AB"], result["BA"])
-            for k, (first, end, other) in enumerate(zip("AB", ends, ends[::-1])):
-                frames[k][0].set(result[first])
-                frames[k][1].set(end)
-                middle = result[first][:2, 3]
-                way = end[:2, 3] - middle
-                draw.set_name(frames[k][0], free_direction([*result[first][:2, :2].T, -middle, way]))
-                draw.set_name(frames[k][1], free_direction([*end[:2, :2].T, -way]))
-                paths[k][0].set_data(*np.transpose([(0, 0), middle, end[:2, 3]]))
-                paths[k][1].set_data(*other[:2, 3:])
+            ends = result["AB"], result["BA"]
+            for side, first, end, other in zip(sides, "AB", ends, ends[::-1]):
+                side.set(result[first], end, other)
+            for space in spaces:
+                space.draw(state["view"])
 
-        artists = [a for pair in paths for a in pair] + [a for pair in frames for f in pair for a in f.artists]
-        return artists, update
+        return [artist for space in spaces for artist in space.artists], update
 
     return Stage(
         "order of a product",
         scene=scene,
         compute=compute_order,
         handles={
-            "A": Handle((150.0, 40.0), step=5.0, bounds=((-150, 150), (-150, 150)), label="origin of A"),
-            "B": Handle((60.0, 130.0), step=5.0, bounds=((-150, 150), (-150, 150)), ax=1, label="origin of B"),
+            "A": Handle((150.0, 40.0, 0.0), step=5.0, bounds=MOVES, label="origin of A", way=Free()),
+            "B": Handle((60.0, 130.0, 60.0), step=5.0, bounds=MOVES, ax=1, label="origin of B", way=Free()),
         },
         controls={
-            "A_deg": Slider(-180, 180, 60, step=5, label="turn of A (deg)"),
-            "B_deg": Slider(-180, 180, 0, step=5, label="turn of B (deg)"),
+            "A_deg": Slider(-180, 180, 60, step=5, label="turn of A about z (deg)"),
+            "B_deg": Slider(-180, 180, 0, step=5, label="turn of B about x (deg)"),
         },
+        view=View(-60, 24, center=(95.0, 75.0, 50.0), eye=2000.0),
         presets={"No turns": {"A_deg": 0, "B_deg": 0}},
-        fail={"A_deg": 180, "B_deg": 180},
-        because="Each move turns by 180 deg, and sends the move after it the opposite way.",
-        describe=lambda result: (
-            f"The two ends lie {result['gap']:.0f} mm apart. Hollow cross: where the other order ends."
-            if result["gap"] > 0.5
-            else "Here both orders end at the same place: moves without a turn commute, and show nothing of the rule."
-        ),
+        fail={"A_deg": 90, "B_deg": 90},
+        because="Each move turns by 90 deg, and leads the move after it another way.",
+        describe=_order_sentence,
     )
 
 
@@ -113,61 +102,74 @@ def _sheet_angles():
     return np.arctan2(poses[:, 1, 0], poses[:, 0, 0]), poses[:, :2, 3]
 
 
+def _stand(start, end):
+    """Where the measuring arm stands to measure a link: beside its middle, on the floor, outside of the loop."""
+    way = (end - start)[:2]
+    length = np.hypot(*way)
+    beside = np.array([way[1], -way[0]]) / length if length > 1 else np.array([0.0, 1.0])
+    return np.append((start + end)[:2] / 2 + BESIDE * beside, FLOOR)
+
+
 def compute_open_loop(state):
-    """A loop K0 K1 K2 K3 K0 in the plane whose link number `link` is measured with a turn of `turn_deg`."""
+    """A loop K0 K1 K2 K3 K0 whose link number `link` is measured with a turn of `turn_deg` about an axis of its end.
+
+    `lever` is the distance of the loop's end from that axis.
+    """
     angles, _ = _sheet_angles()
-    origins = [np.zeros(2), *(state[f"K{k}"] for k in (1, 2, 3))]
-    true = np.array([_planar(a, xy) for a, xy in zip(angles, origins)])
-    links = relative(true, np.roll(true, -1, axis=0))
-    turn = np.deg2rad(state["turn_deg"])
-    links[state["link"] - 1] = links[state["link"] - 1] @ _planar(turn, (0, 0))
+    origins = [np.zeros(3), *(state[f"K{k}"] for k in (1, 2, 3))]
+    true = np.array([_turned(2, a, p) for a, p in zip(angles, origins)])
+    links, number = relative(true, np.roll(true, -1, axis=0)), state["link"]
+    axis = AXES[state["axis"]]
+    links[number - 1] = links[number - 1] @ _turned(axis, np.deg2rad(state["turn_deg"]), np.zeros(3))
     measured = chaining.stations(links)
     angle, distance = chaining.closure_error(measured[-1])
-    place = np.append(state["P"], 0.0)
+    end = true[number % 4]
+    about = end[:3, axis]
     return {
         "true": np.concatenate([true, true[:1]]),
         "measured": measured,
-        "pivot": measured[state["link"], :2, 3],
-        "lever": float(np.linalg.norm(true[state["link"] % 4, :2, 3])),
-        "link": state["link"],
+        "pivot": measured[number, :3, 3],
+        "about": about,
+        "lever": float(np.linalg.norm(np.cross(end[:3, 3], about))),
+        "link": number,
+        "axis": state["axis"],
         "angle_deg": float(np.rad2deg(angle)),
         "distance": float(distance),
-        "at_piece": float(chaining.displacement(measured[-1], place)),
-        "piece": np.transpose([place[:2], (measured[-1] @ np.append(place, 1.0))[:2]]),
+        "at_piece": float(chaining.displacement(measured[-1], state["P"])),
+        "piece": np.array([state["P"], transform(measured[-1], state["P"])]),
+        "stand": _stand(true[number - 1, :3, 3], end[:3, 3]),
     }
+
+
+def _loop_sentence(result):
+    return (
+        f"An error in link {result['link']} turns all that follows about {result['axis']} of K{result['link'] % 4}, "
+        f"{result['lever']:.0f} mm from the end: the loop opens by {result['distance']:.1f} mm, "
+        f"and by {result['at_piece']:.1f} mm at P. "
+        f"The closure angle is the error itself: {result['angle_deg']:.1f} deg."
+    )
 
 
 def open_loop():
     """Turn one link by a few degrees and watch the loop open; drag the frames to change the levers."""
 
     def scene(fig):
-        left, right = fig.subplots(1, 2, width_ratios=(1.7, 1))
-        draw.plan_of_loop(left)
-        true = draw.Chain(left, "truth", 55, axes=False)
-        measured = draw.Chain(left, "estimate", 55)
-        (lever,) = left.plot([], [], **style.look("guide", linewidth=2))
-        (gap,) = left.plot([], [], color=style.REJECTED, linewidth=3)
-        (piece,) = left.plot([], [], color=style.REJECTED, linewidth=3, marker="x", markersize=7)
-        labels = draw.names(left, ("K0", "K1", "K2", "K3", "P"))
+        left, right = fig.subplots(1, 2, width_ratios=(1.9, 1))
+        space = Scene(left, radius=430, half_width=470, floor=FLOOR, unit="mm")
+        loop = draw.Loop(space)
         style.bare(right)
         words = right.text(0.0, 0.95, "", transform=right.transAxes, va="top", linespacing=1.7)
 
         def update(state, result):
-            true.set(result["true"])
-            measured.set(result["measured"])
-            start, end = result["true"][0, :2, 3], result["measured"][-1, :2, 3]
-            lever.set_data(*np.transpose([result["pivot"], end]))
-            gap.set_data(*np.transpose([start, end]))
-            piece.set_data(*result["piece"])
-            for label, xy in zip(labels, [*result["true"][:4, :2, 3], state["P"]]):
-                label.xy = tuple(xy)
+            loop.set(result)
+            space.draw(state["view"])
             words.set_text(
                 f"closure error\n   {result['angle_deg']:.2f} deg\n   {result['distance']:.2f} mm\n\n"
                 f"at the work piece P\n   {result['at_piece']:.2f} mm\n\n"
                 f"lever of link {result['link']}\n   {result['lever']:.0f} mm"
             )
 
-        return [lever, *true.artists, *measured.artists, gap, piece, *labels, words], update
+        return [*space.artists, words], update
 
     _, origins = _sheet_angles()
     return Stage(
@@ -177,24 +179,24 @@ def open_loop():
         handles={
             **{
                 f"K{k}": Handle(
-                    tuple(np.round(origins[k], 1)), step=5.0, bounds=WITHIN, label=f"frame K{k}", color=style.TRUTH
+                    (*np.round(origins[k], 1), 0.0), step=5.0, bounds=WITHIN, label=f"frame K{k}", color=style.TRUTH,
+                    way=OnPlane(),
                 )
                 for k in (1, 2, 3)
             },
-            "P": Handle((260.0, 60.0), step=5.0, bounds=WITHIN, label="work piece", color=style.REJECTED),
+            "P": Handle(
+                (260.0, 60.0, 0.0), step=5.0, bounds=WITHIN, label="work piece", color=style.REJECTED, way=OnPlane()
+            ),
         },
         controls={
             "link": Slider(1, 4, 2, label="link with the error"),
             "turn_deg": Slider(-10.0, 10.0, 3.0, step=0.1, label="its error (deg)"),
+            "axis": Choice(list(AXES), "z", label="about"),
         },
-        fail={"link": 2, "turn_deg": 10.0, "K2": (-250.0, -540.0)},
-        describe=lambda result: (
-            f"An error in link {result['link']} turns all that follows about K{result['link'] % 4}, "
-            f"{result['lever']:.0f} mm from the end: the loop opens by {result['distance']:.1f} mm, "
-            f"and by {result['at_piece']:.1f} mm at P. "
-            f"The closure angle is the error itself: {result['angle_deg']:.1f} deg."
-        ),
-    )
+        view=View(-72, 40, center=(-40.0, -190.0, 0.0), eye=2600.0),
+        fail={"link": 2, "turn_deg": 10.0, "K2": (-250.0, -540.0, 0.0)},
+        describe=_loop_sentence,
+    )  # fmt: skip
 
 
 @functools.cache
@@ -324,9 +326,9 @@ def two_loops():
         left, right = fig.subplots(1, 2, width_ratios=(1.6, 1))
         style.axes(left, "x (mm)", "y (mm)", f"errors magnified {MAGNIFIED:.0f} times", equal=True)
         left.set(xlim=(-180, 980), ylim=(-260, 640))
-        truth = draw.Chain(left, "truth", 0, axes=False)
-        walked = draw.Chain(left, "prediction", 0, axes=False)
-        graph = draw.Chain(left, "estimate", 0, axes=False, marker="D")
+        truth = draw.Chain(left, "truth")
+        walked = draw.Chain(left, "prediction")
+        graph = draw.Chain(left, "estimate", marker="D")
         for letter, x in (("A", 200), ("B", 600)):
             left.text(x, 150, letter, ha="center", va="center", fontsize=14, color=style.MUTED)
         lines = (truth.line, walked.line, graph.line)

@@ -5,7 +5,6 @@ import numpy as np
 from ...stage import style
 from . import bodies
 
-TILT, YAW = (-105, 75), 70  # deg, of the error plane: detours past the pole reach farther than a start
 CIRCLE = np.linspace(0, 2 * np.pi, 121)
 LINES = {"x": "o", "y": "s", "x*": "^", "y*": "v"}  # a marker for each line of motion
 
@@ -108,26 +107,53 @@ def error_against_step(ax, steps, curves):
     return markers
 
 
-def error_plane(ax):
-    """Plane of the scanner's rotation error. Returns (path in A, B, C, path on the pose, pole)."""
-    style.axes(ax, "tilt off the truth (deg)", "yaw off the truth (deg)", "drag the start")
-    ax.set(xlim=TILT, ylim=(-YAW, YAW))
-    (pole,) = ax.plot([], [], **style.look("guide", linewidth=1.8))
-    ax.annotate("dotted:\nB = -90 deg", (0.98, 0.03), xycoords="axes fraction", ha="right", color=style.MUTED)
-    (euler,) = ax.plot([], [], **style.look("prediction", marker="o", markersize=5))
-    (se3,) = ax.plot([], [], **style.look("estimate", marker="D", markersize=4))
-    ax.plot([0], [0], color=style.TRUTH, marker="+", markersize=16, linestyle="none")
-    return euler, se3, pole
+class Walks:
+    """The flange and its scanner as they are, the walks of two searches for the scanner, each with the scanner where it
+    stands after the step shown, the circles the start is turned on, and the line that x of S must not lie along."""
+
+    def __init__(self, scene):
+        self.hand = bodies.Hand(scene)
+        self.frame = scene.triad("S", 90)
+        scene.fixed(scene.triad("F", 110, linestyle=(0, (4, 1.5))), np.eye(4))
+        self.pole = scene.line(**style.look("guide", linewidth=1.8))
+        self.name = scene.text("x of S along\nthis line:\nB = -90 deg", offset=(8, -26), color=style.MUTED, fontsize=8)
+        self.circles = {
+            name: scene.line(color=color, linewidth=1.6)
+            for name, color in (("yaw", style.AXIS_Z), ("tilt", style.AXIS_Y))
+        }
+        looks = (
+            ("euler", style.look("prediction", marker="o", markersize=5)),
+            ("se3", style.look("estimate", marker="D", markersize=4)),
+        )
+        self.walks = {name: scene.line(**look) for name, look in looks}
+        self.scanners = {
+            name: scene.body(bodies.ghost(look["color"]), name=f"scanner of {name}") for name, look in looks
+        }
+
+    def set(self, result, circles):
+        """The result of `stages.compute_iterations`; {name: (T, radius, angle in deg)} of each circle."""
+        truth = result["truth"]
+        self.hand.set(np.eye(4), truth)
+        self.frame.set(truth)
+        self.pole.set(truth[:3, 3] + np.outer([-40.0, 215.0], [0.0, 0.0, 1.0]))
+        self.name.set(truth[:3, 3] + [0.0, 0.0, 215.0])
+        for name, (T, radius, angle) in circles.items():
+            turned = np.deg2rad(np.sort([angle, *np.linspace(min(angle, 0.0) - 12, max(angle, 0.0) + 12, 37)]))
+            self.circles[name].set(T[:3, 3] + radius * np.column_stack([np.cos(turned), np.sin(turned)]) @ T[:3, :2].T)
+        for name, walk in self.walks.items():
+            walk.set(result[name]["seen"])
+            self.scanners[name].set(result[name]["now"])
 
 
 def iterations(ax, steps=30):
-    """Error of the scanner over the iterations, logarithmic. Returns (Euler curve, SE(3) curve)."""
+    """Error of the scanner over the iterations, logarithmic. Returns ((Euler curve, SE(3) curve), the step shown)."""
     style.axes(ax, "iteration", "rms distance (mm)", "how fast")
     ax.set(yscale="log", xlim=(0, steps), ylim=(1e-13, 1e4))
+    (here,) = ax.plot([], [], **style.look("guide"))
     (euler,) = ax.plot([], [], label="steps in A, B, C", **style.look("prediction", marker="o", markersize=5))
     (se3,) = ax.plot([], [], label="steps on the pose", **style.look("estimate", marker="D", markersize=5))
     ax.legend(loc="upper right")
-    return euler, se3
+    return (euler, se3), here
 
 
 def start_plane(ax, far=125.0):

@@ -18,6 +18,7 @@ from ...geometry.lie import exp_so3, log_so3
 from ...machines import robot_accuracy, triangulation
 from ...stage import Choice, Handle, Slider, Stage, style
 from ...stage.scene3d import Scene, View
+from ...stage.scene3d_handles import Dial
 from . import bodies
 from . import figures as draw
 
@@ -305,6 +306,11 @@ def difference_steps():
 # --- iterations ------------------------------------------------------------------------------------------------------
 
 
+MAX_STEPS = 30
+SEEN = np.array([0.0, 0.0, 240.0])  # mm, in S: the middle of the scanner's field
+DIALS = {"yaw": 150.0, "tilt": 120.0}  # mm, radii of the circles on which the start is turned
+
+
 @functools.cache
 def _simulated(B_deg):
     """The simulation model with its scanner turned to B: T_BF, x_S, target, true T_FS."""
@@ -315,18 +321,18 @@ def _simulated(B_deg):
 
 def compute_iterations(state):
     """Gauss-Newton from one start in A, B, C and on the pose: errors (tilt, yaw) in deg, rms, steps and largest turn
-    (deg).
+    (deg), the scanner's pose after each step, where it would see the sphere, and the pose after the step shown.
 
     The start is turned off the truth by the rotation vector (0, tilt, yaw) in F: tilt changes B, yaw is what A does.
     """
     T_BF, x_S, target, truth = _simulated(state["B_deg"])
-    tilt, yaw = np.deg2rad(state["P"])
+    tilt, yaw = np.deg2rad([state["tilt"], state["yaw"]])
     start = truth.copy()
     start[:3, :3] = exp_so3([0, tilt, yaw]) @ truth[:3, :3]
-    result = {"pole": -90.0 - state["B_deg"]}
+    result = {"truth": truth, "step": state["step"]}
     for name in ("euler", "se3"):
         run = hand_eye.gauss_newton_pose(
-            frames.kuka_from_matrix(start), T_BF, x_S, target, parameters=name, max_steps=30
+            frames.kuka_from_matrix(start), T_BF, x_S, target, parameters=name, max_steps=MAX_STEPS
         )
         R, values = run.poses[:, :3, :3], run.singular_values
         error = np.rad2deg(log_so3(R @ truth[:3, :3].T))
@@ -335,6 +341,7 @@ def compute_iterations(state):
             "path": error[:, 1:], "rms": np.maximum(run.rms, REST_MM), "steps": len(run.poses) - 1,
             "arrived": bool(run.converged and run.rms[-1] < 1e-6), "turned_deg": float(turns.sum()),
             "weakest": float(values[0, -1] / values[0, 0]),
+            "seen": frames.transform(run.poses, SEEN), "now": run.poses[min(state["step"], len(run.poses) - 1)],
         }  # fmt: skip
     return result
 
@@ -355,29 +362,52 @@ def _iterations_sentence(result):
     )
 
 
+def _start_circle(turned):
+    """Where the dial of the start's tilt (about y of F) or yaw (about z) has its circle: about the scanner."""
+
+    def where(result):
+        T = np.eye(4)
+        T[:3, :3] = np.eye(3) if turned == "yaw" else [[0, 1, 0], [0, 0, 1], [1, 0, 0]]  # z is what it turns about
+        T[:3, 3] = result["truth"][:3, 3]
+        return T, DIALS[turned]
+
+    return where
+
+
 def convergence():
-    """Drag the start pose: the same Gauss-Newton with steps in A, B, C and with steps on the right of the pose."""
+    """Turn the start: the same Gauss-Newton with steps in A, B, C and with steps on the right of the pose, as walks of
+    the scanner about the flange."""
+    circles = {name: _start_circle(name) for name in DIALS}
 
     def scene(fig):
-        left, right = fig.subplots(1, 2)
-        euler, se3, pole = draw.error_plane(left)
-        curves = draw.iterations(right)
+        left, right = fig.subplots(1, 2, width_ratios=(1.35, 1))
+        space = Scene(left, radius=255, half_width=265, unit="mm")
+        picture = draw.Walks(space)
+        curves, here = draw.iterations(right)
 
         def update(state, result):
-            for path, curve, name in ((euler, curves[0], "euler"), (se3, curves[1], "se3")):
-                path.set_data(*result[name]["path"].T)
+            picture.set(result, {name: (*where(result), state[name]) for name, where in circles.items()})
+            space.draw(state["view"])
+            for curve, name in zip(curves, ("euler", "se3")):
                 curve.set_data(np.arange(len(result[name]["rms"])), result[name]["rms"])
-            pole.set_data([result["pole"]] * 2, [-draw.YAW, draw.YAW])
+            here.set_data([result["step"]] * 2, [REST_MM, 1e4])
 
-        return [pole, euler, se3, *curves], update
+        return [*space.artists, *curves, here], update
 
     return Stage(
         "convergence from a dragged start",
         scene=scene,
         compute=compute_iterations,
-        handles={"P": Handle((-1.0, 30.0), step=0.5, bounds=((-68, 68), (-68, 68)), label="start, tilt and yaw")},
-        controls={"B_deg": Choice({"B = -88 deg": -88.0, "B = -30 deg": -30.0}, -88.0, label="scanner at")},
-        fail={"P": (-54.0, -30.0), "B_deg": -30.0},
+        handles={
+            "yaw": Dial(30.0, -68, 68, circles["yaw"], step=0.5, label="yaw of the start", color=style.AXIS_Z),
+            "tilt": Dial(-1.0, -68, 68, circles["tilt"], step=0.5, label="tilt of the start", color=style.AXIS_Y),
+        },
+        controls={
+            "B_deg": Choice({"B = -88 deg": -88.0, "B = -30 deg": -30.0}, -88.0, label="scanner at"),
+            "step": Slider(0, MAX_STEPS, 1, label="after step"),
+        },
+        view=View(-75, 24, center=(-100.0, 0.0, 60.0), eye=2000.0),
+        fail={"tilt": -54.0, "yaw": -30.0, "B_deg": -30.0},
         because="In the three angles this start is a long way from the goal, in the pose a short one.",
         describe=_iterations_sentence,
     )
