@@ -304,7 +304,7 @@ class CellScene:
         self.part = scene.body(*bodies.part(), name="part")
         self.trolley = scene.body(*bodies.trolley(cell.T_PE), name="trolley")
         self.learned = scene.line(**style.look("guide", linewidth=1.8))
-        self.found = scene.body(bodies.plate().looks(style.ESTIMATE, 0.35), name="part as found")
+        self.found = scene.body(bodies.plate().looks(style.ESTIMATE, 0.55), name="part as found")
         scene.fixed(scene.triad("B", 90), np.eye(4))
         self.frames = {name: scene.triad(letter, 60) for name, letter in SHOWN.items()}
         self.links = scene.line(**style.look("guide", linewidth=1.4))
@@ -314,7 +314,7 @@ class CellScene:
         self.circle = scene.line(**style.look("guide", linewidth=1.6))
         self.cloud = scene.points(**style.look("measurement", markersize=2, markeredgewidth=0, alpha=0.5))
         self.expected = scene.ellipsoid(**style.look("prediction"))
-        self.miss = scene.arrow(4.0, style.ESTIMATE, name="miss")
+        self.miss = scene.arrow(6.0, style.ESTIMATE, name="miss")
 
     def set(self, result, frames, enlarged):
         """The result of `stages.compute_whole_cell`, the arm's `link_frames`, how much larger errors are drawn."""

@@ -842,7 +842,7 @@ HALF_DEG, ONE_DEG = np.deg2rad([0.5, 1.0])
 SPOILED = {  # source: what `spoil` = 1 puts into it, and how that is told
     "tip": ("2 mm", np.array([2.0, 0.0, 0.0])),
     "scanner": ("1 deg", np.array([0.0, ONE_DEG, 0.0, 0.0, 0.0, 0.0])),
-    "tracker": ("0.5 deg", np.array([-HALF_DEG, 0.0, 0.0, 0.0, 0.0, 0.0])),
+    "tracker": ("0.5 deg", np.array([HALF_DEG, 0.0, 0.0, 0.0, 0.0, 0.0])),
     "marks": ("2 mm in the second", np.array([0, 0, 0, 0, 0, 2.0, 0, 0, 0])),
     "first reading": ("0.5 deg", np.array([0.0, HALF_DEG, 0.0, 0.0, 0.0, 0.0])),
     "second reading": ("0.5 deg", np.array([0.0, HALF_DEG, 0.0, 0.0, 0.0, 0.0])),
@@ -955,7 +955,7 @@ def whole_cell():
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(2.2, 1))
         title = f"click a frame; all errors x {ENLARGED:.0f}, ellipsoids 3 std"
-        space = Scene(left, radius=400, half_width=420, title=title, floor=0.0, unit="mm")
+        space = Scene(left, radius=410, half_width=460, title=title, floor=0.0, unit="mm")
         picture = draw.CellScene(space, cell)
         bars = draw.Budget(right, cell.SOURCES)
 
@@ -985,7 +985,7 @@ def whole_cell():
         },
         click=0,
         constrain=chosen_by_click,
-        view=View(28, 27, center=(110.0, 20.0, 200.0), eye=2800.0),
+        view=View(24, 28, center=(120.0, 75.0, 190.0), eye=2800.0),
         fail={"source": "tracker", "spoil": 1.0},
         presets={
             "back where it was learned": {
