@@ -27,6 +27,7 @@ ORBIT_PIXELS = 20  # pixels of dragging from picture to picture of a view: 10 de
 COLORS, NEAR = 256, 4
 LARGEST, FEWEST = 400_000, 12  # bytes of a track; a larger one loses every second picture, down to so many
 PLAYS = ("play", FAIL)
+NOTED = ("caption", "numbers", "status", "controls", "time")  # of a message, beside its handles
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +117,7 @@ class _Camera:
             }
             for key, place in heard["handles"].items()
         }
-        notes.append({key: heard[key] for key in ("caption", "status", "controls", "time")} | {"handles": handles})
+        notes.append({key: heard[key] for key in NOTED} | {"handles": handles})
         pictures.append(self.negatives.develop(*self.stage.in_both_themes()))
 
     def film(self):

@@ -83,7 +83,7 @@ WITH_HANDLES = (
     ch04.basins, ch05.triangle, ch05.scan_line,
     ch05.convergence, ch05.two_methods, ch05.pattern_designer, ch05.accuracy_kinds,
     ch06.tx40, ch06.two_axes, ch06.sweeps, ch06.whole_cell,
-    ch07.circles, ch08.bells, ch08.arena,
+    ch02.two_loops, ch05.difference_steps, ch07.circles, ch08.bells, ch08.vehicle, ch08.arena,
 )  # fmt: skip
 
 
@@ -212,16 +212,22 @@ def test_laws_of_growth_are_the_sums_over_the_levers():
     row = [law(300.0 * np.arange(n)) for n in numbers]
     loop = [law(300.0 * np.sin(np.pi * np.arange(n) / n)) for n in numbers]
     assert_drawn(stage, np.column_stack([numbers, row]), np.column_stack([numbers, loop]))
-    circle = np.deg2rad(np.linspace(0, 360, 73))
-    assert_drawn(stage, law(300.0 * np.arange(8)) * np.column_stack([np.cos(circle), np.sin(circle)]))
+    heights, frames = stage.result["heights"], np.arange(17)
+    assert_drawn(stage, [row for run in heights.T for row in (*zip(frames, run), GAP)])
+    std = np.array([np.sqrt(k * 0.1**2 + std**2 * np.sum((300.0 * np.arange(k)) ** 2)) for k in frames])
+    assert_drawn(stage, [*zip(frames, std), GAP, *zip(frames, -std)])
 
 
 def test_two_loops_are_magnified_about_the_true_corners():
-    stage = ch02.two_loops()
-    outline = [0, 1, 2, 3, 0, 1, 4, 5, 2]
-    true = np.array([[0, 0], [400, 0], [400, 300], [0, 300], [800, 0], [800, 300.0]])
-    graph = stage.result["graph"][:, :2, 3]
-    assert_drawn(stage, true[outline], (true + 30 * (graph - true))[outline])
+    """Shared out by equal quarters: A's way ends where it began, each frame moved on by its share of the error."""
+    stage = at(ch02.two_loops(), A=(-120.0, 60.0), B=(400.0, 300.0))
+    corners = np.array([[0, 0], [400, 0], [400, 300], [0, 300], [0, 0], [800, 0], [800, 300.0]])
+    measured_a = [*corners[:4], (-120, 60)]
+    measured_b = [corners[1], *corners[5:], corners[2]]
+    assert_drawn(stage, [*measured_a, GAP, *measured_b, GAP])
+    assert_drawn(at(stage, way="as measured"), measured_a, measured_b, [(0, 0), (-120, 60)])
+    left = at(stage, way="B, then A").result["left"]["B, then A"]
+    assert_drawn(stage, [*upright((0.1,), left[:1]), *upright((1.1,), left[1:])])
 
 
 # --- chapter 3 --------------------------------------------------------------------------------------------------------
@@ -392,7 +398,11 @@ def test_errors_of_differences_follow_their_orders():
     short, long = at(ch05.difference_steps(), h=0.1), at(ch05.difference_steps(), h=1.0)
     for scheme, factor in (("forward", 10.0), ("central", 100.0)):
         assert long.result["at"][scheme] == pytest.approx(factor * short.result["at"][scheme], rel=0.02)
-        assert_drawn(long, [[1.0, long.result["at"][scheme]]])
+        assert_drawn(long, [[0.0, long.result["at"][scheme]]])
+    curve = long.result["curve"]
+    assert_drawn(
+        long, np.column_stack([ch05.AROUND, curve]), [(0, 0), (1, curve[50])], [(-1, curve[10]), (1, curve[50])]
+    )
 
 
 # --- chapter 6 --------------------------------------------------------------------------------------------------------
@@ -679,6 +689,9 @@ def test_vehicle_errors_within_twice_the_promised_deviation():
     for k in (0, 1):
         upper = np.column_stack([r["time"], 2 * r["std"][:, k]])
         assert_drawn(stage, np.column_stack([r["time"], r["error"][:, k]]), np.vstack([upper, gap, upper * [1, -1]]))
+    assert_drawn(stage, np.column_stack([r["time"], r["measured"]]), [[1.0, r["nis"]]])
+    at_ = stage.state["P"][0]
+    assert_drawn(stage, [(at_ - 0.2, 2.0), (at_, 2.0), (at_, -2.0), (at_ - 0.2, -2.0)])
 
 
 def test_arena_draws_what_the_filter_believes():

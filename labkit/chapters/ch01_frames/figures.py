@@ -35,23 +35,6 @@ class Construction:
         self.kept.set([foot, y_point])
 
 
-class Matrix:
-    """A 4 x 4 transform as sixteen aligned numbers under a heading."""
-
-    def __init__(self, ax, x, y, heading, dx=0.24, dy=0.085):
-        place = {"transform": ax.transAxes, "ha": "right", "va": "center"}
-        ax.text(x, y + dy, heading, transform=ax.transAxes, fontweight="bold")
-        self.entries = [
-            [ax.text(x + dx * (j + 0.8), y - dy * (i + 0.2), "", **place) for j in range(4)] for i in range(4)
-        ]
-        self.artists = [entry for row in self.entries for entry in row]
-
-    def set(self, T):
-        for row, values in zip(self.entries, T):
-            for entry, value in zip(row, values):
-                entry.set_text(f"{value + 0.0:.3f}".replace("-0.000", "0.000"))
-
-
 def unit_triangle():
     """The triangle (0, 0), (1, 0), (0, 1), thin, to be stretched onto another by `onto`."""
     return solids.raised([(0, 0), (1, 0), (0, 1)], -0.5, 0.5).looks(style.MEASUREMENT, 0.25)

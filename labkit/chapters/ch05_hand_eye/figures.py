@@ -94,16 +94,33 @@ def driven_corner(ax, half):
     return commanded, driven, worst
 
 
-def error_against_step(ax, steps, curves):
-    """Error of finite differences over the step. `curves`: {label: errors}. Returns the markers, one per curve."""
-    style.axes(ax, "step h (deg)", "largest error (mm per deg)", "error of the derivative by A")
-    ax.set(xscale="log", yscale="log", xlim=(steps[0], steps[-1]), ylim=(1e-12, 1e3))
+def differences(ax, around):
+    """A function near a place, in steps to each side, with its tangent and the two secants. Returns (curve, forward,
+    central).
+    """
+    style.axes(ax, "steps away", "change, as the tangent has it", equal=True)
+    ax.set(xlim=(around[0], around[-1]), ylim=(-2.1, 2.1), xticks=(-1, 0, 1), yticks=(-2, -1, 0, 1, 2))
+    ax.plot(around, around, **style.look("truth", linewidth=1.2), label="tangent")
+    (curve,) = ax.plot([], [], color=style.MEASUREMENT, linewidth=2.4, label="residual, as computed")
+    (forward,) = ax.plot([], [], **style.look("prediction", marker="o", markersize=5), label="forward")
+    (central,) = ax.plot([], [], **style.look("estimate", marker="D", markersize=5), label="central")
+    style.legend_above(ax, ncols=2, fontsize=8, columnspacing=0.8, handlelength=1.4)
+    return curve, forward, central
+
+
+def error_against_step(ax, logs, curves):
+    """Error of finite differences over the logarithm of the step (deg). `curves`: {label: errors}. Returns the markers,
+    one per curve.
+    """
+    style.axes(ax, "step h (deg)", "largest error (mm per deg)")
+    ax.set(yscale="log", xlim=(logs[0], logs[-1]), ylim=(1e-13, 1e3))
+    ax.set_xticks(range(-12, 1, 3), [f"$10^{{{n}}}$" for n in range(-12, 1, 3)])
     looks = (style.look("prediction"), style.look("estimate"))
     markers = []
     for (label, errors), look in zip(curves.items(), looks):
-        ax.plot(steps, errors, label=label, **look)
+        ax.plot(logs, errors, label=label, **look)
         markers += ax.plot([], [], color=look["color"], marker="D", markersize=8, linestyle="none", clip_on=False)
-    ax.legend(loc="lower left")
+    style.legend_above(ax, ncols=2, fontsize=8)
     return markers
 
 

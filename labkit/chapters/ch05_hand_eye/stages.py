@@ -16,7 +16,7 @@ from ...fast.hand_eye import calibrate_sphere_target
 from ...geometry import frames
 from ...geometry.lie import exp_so3, log_so3
 from ...machines import robot_accuracy, triangulation
-from ...stage import Choice, Handle, Slider, Stage, style
+from ...stage import Choice, Handle, Slider, Stage, Target, style
 from ...stage.scene3d import Scene, View
 from ...stage.scene3d_handles import Dial
 from . import bodies
@@ -242,11 +242,15 @@ def scan_line():
 # --- steps of differences --------------------------------------------------------------------------------------------
 
 STEPS_DEG = np.geomspace(1e-13, 10.0, 57)
+LISTING = 5e-7  # deg, the step of listing C4
+AROUND = np.linspace(-1.5, 1.5, 61)  # steps to each side
 
 
 @functools.cache
-def _step_errors():
-    """Largest error of forward and central differences by A at the CAD pose on the real poses, over STEPS_DEG."""
+def _turned():
+    """(residual, exact, k): all residuals (mm) of the corrected poses as a function of A (deg) away from the CAD pose,
+    their derivatives there (mm per deg), (n,), and the number of one that answers well and bends most.
+    """
     measured, target = thesis.measurements(True), thesis.printed_target()
     p = thesis.kuka_pose_deg("scanner_end")
     unit = np.array([1, 1, 1, *np.deg2rad([1, 1, 1])])
@@ -254,53 +258,86 @@ def _step_errors():
 
     def residual(A):
         q = p.copy()
-        q[3] = A[0]
+        q[3] += A[0]
         return hand_eye.kuka_residuals(q * unit, measured.T_BF, measured.x_S, target)
 
+    bend = np.abs(residual([10.0]) + residual([-10.0]) - 2 * residual([0.0]))
+    return residual, exact, int(np.argmax(np.where(np.abs(exact) > np.abs(exact).max() / 2, bend, 0)))
+
+
+@functools.cache
+def _step_errors():
+    """Largest error (mm per deg) of forward and central differences by A at the CAD pose, over STEPS_DEG."""
+    residual, exact, _ = _turned()
     errors = {}
     for scheme in ("forward", "central"):
-        found = [numeric_jacobian(residual, p[3:4], h, scheme)[:, 0] for h in STEPS_DEG]
+        found = [numeric_jacobian(residual, np.zeros(1), h, scheme)[:, 0] for h in STEPS_DEG]
         errors[scheme] = np.maximum(np.abs(np.array(found) - exact).max(1), 1e-14)
     return errors
 
 
 def compute_steps(state):
-    """Errors of both schemes at the chosen step (mm per deg), and the best steps."""
+    """Errors of both schemes at the chosen step (mm per deg), the best steps, and the residual that bends most, near
+    the CAD pose: over AROUND steps to each side, in steps, so that its tangent has the slope 1.
+    """
     errors, h = _step_errors(), state["h"]
     at = {k: float(np.exp(np.interp(np.log(h), np.log(STEPS_DEG), np.log(e)))) for k, e in errors.items()}
     best = {k: float(STEPS_DEG[np.argmin(e)]) for k, e in errors.items()}
-    return {"h": h, "at": at, "best": best}
+    residual, exact, k = _turned()
+    values = np.array([residual([share * h])[k] for share in AROUND])
+    return {"h": h, "at": at, "best": best, "curve": (values - values[len(AROUND) // 2]) / (exact[k] * h)}
 
 
 def difference_steps():
-    """The step of a finite difference: too large, and curvature spoils it; too small, and rounding does."""
+    """The step of a finite difference: too large, and the curve bends away; too small, and it breaks into stairs."""
+    middle, one = len(AROUND) // 2, int(np.argmin(np.abs(AROUND - 1)))
 
     def scene(fig):
-        ax = fig.subplots()
+        left, right = fig.subplots(1, 2, width_ratios=(1, 1.25))
+        curve, forward, central = draw.differences(left, AROUND)
         errors = _step_errors()
-        markers = draw.error_against_step(ax, STEPS_DEG, errors)
-        ax.axvline(5e-7, **style.look("guide"))
-        ax.annotate("listing C4", (5e-7, 1e-12), xytext=(4, 4), textcoords="offset points", color=style.MUTED)
+        markers = draw.error_against_step(right, np.log10(STEPS_DEG), errors)
+        right.axvline(np.log10(LISTING), **style.look("guide"))
+        away = {"xytext": (4, 4), "textcoords": "offset points"}
+        right.annotate("listing C4", (np.log10(LISTING), 1e-13), **away, color=style.MUTED)
 
         def update(state, result):
+            y = result["curve"]
+            curve.set_data(AROUND, y)
+            forward.set_data([0, 1], [0, y[one]])
+            central.set_data([-1, 1], [y[2 * middle - one], y[one]])
             for marker, scheme in zip(markers, errors):
-                marker.set_data([result["h"]], [result["at"][scheme]])
+                marker.set_data([np.log10(result["h"])], [result["at"][scheme]])
 
-        return markers, update
+        return [curve, forward, central, *markers], update
+
+    def follow(state, moved):
+        """The ring stands on the curve of the central difference, and has a slider."""
+        log = state["P"][0] if "P" in moved and "h" not in moved else np.log10(state["h"])
+        central = np.interp(log, np.log10(STEPS_DEG), np.log10(_step_errors()["central"]))
+        return {"P": (log, 10.0**central), "h": float(np.clip(10.0**log, STEPS_DEG[0], STEPS_DEG[-1]))}
 
     return Stage(
         "step of the differences",
         scene=scene,
         compute=compute_steps,
-        controls={"h": Slider(1e-13, 10.0, 5e-7, log=True, label="step (deg)")},
-        fail={"h": 1e-13},
+        handles={
+            "P": Handle(
+                (np.log10(LISTING), 1e-6), step=0.1, ax=1, bounds=((-13, 1), (1e-14, 1e3)), color=style.ESTIMATE,
+                label="step, as a power of ten",
+            )
+        },
+        constrain=follow,
+        controls={"h": Slider(1e-13, 10.0, LISTING, log=True, label="step (deg)")},
+        fail={"h": 1e-13, "P": (-13.0, 1.0)},
         because="So small a step drowns in the last digits of the numbers.",
+        target=Target("a derivative right to 1e-9 mm per deg", lambda result: min(result["at"].values()) < 1e-9),
         describe=lambda result: (
-            f"Step {result['h']:.1e} deg: forward is off by {result['at']['forward']:.1e}, central by "
+            f"A step of {{h}} deg: forward is off by {result['at']['forward']:.1e}, central by "
             f"{result['at']['central']:.1e} mm per deg. Best steps: {result['best']['forward']:.0e} and "
             f"{result['best']['central']:.0e} deg."
         ),
-    )
+    )  # fmt: skip
 
 
 # --- iterations ------------------------------------------------------------------------------------------------------
