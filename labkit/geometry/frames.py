@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..checks import (
+    PRODUCT_TOLERANCE,
     as_finite,
     as_number,
     as_points,
@@ -282,7 +283,7 @@ def rotation_angle(T):
     --------
     pose_distance : the angle and the distance between two poses.
     """
-    R = rotation_block(T)
+    R = as_rotations(rotation_block(T), "T", PRODUCT_TOLERANCE)
     twice_sin = np.linalg.norm(
         np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1), axis=-1
     )
