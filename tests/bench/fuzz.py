@@ -110,8 +110,8 @@ def record(functions, rooms):
             pytest.skip("all there is to record has been seen")
         try:
             arguments = _arguments(frame, function)
-            large = sum(map(_size, arguments.values())) > SMALL
-            if (form := repr([_form(v) for v in arguments.values()])) not in shapes[name] and not (large and kept[name]):
+            form, large = repr([_form(v) for v in arguments.values()]), sum(map(_size, arguments.values())) > SMALL
+            if form not in shapes[name] and not (large and kept[name]):
                 kept[name].append(copy.deepcopy(arguments))
                 shapes[name].add(form)
         except Exception:  # what cannot be copied cannot be called again
