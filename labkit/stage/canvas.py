@@ -203,8 +203,11 @@ class Picture:
         """What the browser lacks since the last call: [png], or [runs, colors] of the changed pixels."""
         with DRAWING:
             pixels, before = self.draw(), self._sent
-            self._sent = pixels.copy()
-            found = None if whole or before is None else changes(before, self._sent)
+            found = None if whole or before is None else changes(before, pixels)
+            if before is None or before.shape != pixels.shape:
+                self._sent = pixels.copy()
+            else:
+                np.copyto(before, pixels)  # into the memory it has: a new one a picture takes longer to be had
             return [encode_png(pixels, self.fig.dpi)] if found is None else list(found)
 
     # -- where things are: fractions of the picture, from its upper left corner, as the browser counts

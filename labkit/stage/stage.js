@@ -25,6 +25,7 @@ const CLICK_RADIUS = 4; // CSS pixels
 const NEAR = 13; // CSS pixels: handles nearer than that are fanned out
 const MAX_ARROWS = 10; // presses kept while a message is in flight
 const CALM_INTERVAL = 500; // ms from picture to picture where the reader asks for reduced motion
+const MOST_LATE = 1500; // ms that a play leaves out to keep up; later, it goes on where it was
 const LETTERS = 13; // CSS pixels of the words around, at which the picture's letters have their own size
 const LARGEST = 2.4; // times as large letters may become in the whole window
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
@@ -836,7 +837,8 @@ class Clock {
   beat() {
     const now = performance.now();
     if (this.line.flight === null && this.line.pending.time === undefined) {
-      const late = this.patient ? 0 : Math.floor((now - this.due) / this.interval);
+      const slept = now - this.due > MOST_LATE; // the machine, or the page behind another
+      const late = this.patient || slept ? 0 : Math.floor((now - this.due) / this.interval);
       const next = Math.min(this.steps, this.at + this.stride * (1 + late));
       this.due = Math.max(this.due + this.interval * (1 + late), now);
       this.ask(next);

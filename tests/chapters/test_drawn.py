@@ -523,9 +523,6 @@ class OneTrail:
         def name_at(self, *_):
             pass
 
-    class ax:
-        legend = staticmethod(lambda **_: None)
-
     def points(self, **_):
         return self.Item()
 
@@ -541,7 +538,7 @@ class OneTrail:
 
 
 def test_trail_sorts_readings_by_the_gate():
-    trail = ch06_figures.Trail(OneTrail())
+    trail = ch06_figures.Trail(OneTrail(), Figure().subplots())
     positions, used = np.arange(12.0).reshape(4, 3), np.array([True, False, True, True])
     trail.set(positions, used, positions + 1, np.eye(4))
     np.testing.assert_array_equal(trail.readings.value, positions[[0, 2, 3]])

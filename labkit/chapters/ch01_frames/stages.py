@@ -177,15 +177,15 @@ def triangle_noise():
         compute=compute_triangle_noise,
         handles={
             "Y": Handle(
-                (30.0, 60.0, 0.0), step=1.0, bounds=((-20, 80), (1, 80), (-200, 200)), label="y point of the triangle",
+                (50.0, 10.0, 0.0), step=1.0, bounds=((-20, 80), (1, 80), (-200, 200)), label="y point of the triangle",
                 color=style.MEASUREMENT, way=OnPlane(),
             )
         },
-        controls={"std": Slider(0.05, 3.0, 0.5, step=0.05, label="noise per coordinate (mm)")},
+        controls={"std": Slider(0.05, 3.0, 0.05, step=0.05, label="noise per coordinate (mm)")},
         view=View(-65, 35, center=(32, 25, 15), eye=600.0),
         constrain=_stay_in_plane,
-        fail={"Y": (60.0, 2.0, 0.0)},
-        because="Y lies 2 mm from the x axis: its noise now turns the plane of the three points.",
+        fail={"Y": (50.0, 2.0, 0.0), "std": 0.5},
+        because="Y lies 2 mm from the x axis, and noise of 0.5 mm now turns the plane of the three points.",
         describe=_noise_sentence,
     )  # fmt: skip
 

@@ -175,11 +175,10 @@ def iterations(ax, steps=30):
 
 def start_plane(ax, far=125.0):
     """Plane of a start's distance and turn off the truth. Returns (first path, second, the printed starts)."""
-    style.axes(ax, "distance off the truth (mm)", "turn off the truth (deg)", "drag the start")
+    style.axes(ax, "distance off the truth (mm)", "turn off the truth (deg)", "drag the start; crosses: table 7-2")
     ax.set(xlim=(-4, far), ylim=(-6, 184))
     ax.set_yticks([0, 45, 90, 135, 180])
     (printed,) = ax.plot([], [], color=style.INK, marker="x", markersize=8, linestyle="none", clip_on=False)
-    ax.annotate("crosses: the starts of table 7-2", (0.98, 0.07), xycoords="axes fraction", ha="right")
     (first,) = ax.plot([], [], **style.look("estimate", marker="D", markersize=5))
     (second,) = ax.plot([], [], **style.look("prediction", marker="o", markersize=5))
     return first, second, printed

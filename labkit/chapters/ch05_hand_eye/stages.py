@@ -529,6 +529,7 @@ def two_methods():
             "B_deg": Choice({"B = -90 deg": -90.0, "B = -88 deg": -88.0}, -90.0, label="scanner at"),
         },
         fail={"P": (70.0, 175.0), "B_deg": -88.0},
+        because="Next to the pole and turned by 175 deg: Gauss-Newton takes every step, also those that lead uphill.",
         describe=_methods_sentence,
     )
 

@@ -42,9 +42,9 @@ SUMMARY = ("mean", "RMS", "median", "95 %")
 
 
 class Trail:
-    """Readings on their way through space: good ones, gated ones, and the filtered path."""
+    """Readings on their way through space: good ones, gated ones, and the filtered path; their legend beside them."""
 
-    def __init__(self, scene, triad=90.0):
+    def __init__(self, scene, beside, triad=90.0):
         self.readings = scene.points(**style.look("measurement", markersize=4.5, markeredgewidth=0))
         self.rejected = scene.points(**style.look("rejected"))
         self.path = scene.line(**style.look("estimate", linewidth=1.8))
@@ -57,10 +57,10 @@ class Trail:
             ("rejected", "refused by the gate", {}),
             ("estimate", "filtered", {}),
         )
-        self.legend = scene.ax.legend(
+        beside.legend(
             handles=[Line2D([], [], **style.look(role, label=name, **more)) for role, name, more in keys],
-            loc="upper center",
-            fontsize=8,
+            loc="lower left",
+            borderaxespad=0.0,
         )
 
     def set(self, positions, used, filtered, T_WE):
@@ -251,9 +251,10 @@ def error_by_stop(ax, stops, printed):
 
 
 class OverSpeed:
-    """Errors of several motions over their speed, medians of intervals, a law through them, and two printed levels."""
+    """Errors of several motions over their speed, medians of intervals, a law through them, and two printed levels;
+    their legend beside them."""
 
-    def __init__(self, ax, x, end):
+    def __init__(self, ax, beside, x, end):
         style.axes(ax, "speed, share of the fastest printed (1.4 m/s or 3.7 rad/s)", "error", "same path, three speeds")
         ax.set(xlim=(0, end), ylim=(0.05, 2000), yscale="log")
         self.x = x
@@ -272,7 +273,10 @@ class OverSpeed:
             )
             for k, text in enumerate(("printed mean", "printed largest"))
         ]  # fmt: skip
-        ax.legend(loc="upper left", ncols=3, fontsize=8)
+        named = [*self.dots, self.nonsense, self.medians, self.law]
+        legend = beside.legend(handles=named, loc="lower left", borderaxespad=0.0)
+        for dots in legend.legend_handles[:3]:
+            dots.set(markersize=6, alpha=1.0)
         self.artists = [*self.dots, self.nonsense, self.medians, self.law, *self.levels, *self.names]
 
     def set(self, result):

@@ -1,6 +1,7 @@
 """Stages of chapter 6: the TX40 with joints to turn, a live tracker, A X = X B, errors in motion, repeated runs."""
 
 import functools
+import itertools
 import threading
 import time as clock
 from dataclasses import replace
@@ -62,14 +63,14 @@ def joints(state):
 
 
 def compute_tx40(state):
-    """Frames of the links, poses of flange and tracker, and what the first three joints can do at the flange: singular
-    values, mm per rad."""
+    """Frames of the links, poses of flange and tracker, the wrist's distance from axis 2 (mm), and what the first three
+    joints can do at the flange: singular values, mm per rad."""
     q = joints(state)
     frames = link_frames(TX40.dh, q)
     values = np.linalg.svd(jacobian(TX40.dh, q)[3:, :3], compute_uv=False)
     return {
         "q": q, "frames": frames, "T_BF": frames[6], "T_BE": frames[6] @ T_FE, "singular_values": values,
-        "reach": state["reach"],
+        "wrist": float(np.hypot(*transform(invert(frames[1]), frames[4, :3, 3])[:2])), "reach": state["reach"],
     }  # fmt: skip
 
 
@@ -130,7 +131,10 @@ def tx40():
             angles = "\n".join(f"joint {k + 1}   {np.rad2deg(a):6.0f} deg" for k, a in enumerate(result["q"]))
             x, y, z = result["T_BF"][:3, 3]
             low = result["singular_values"][-1]
-            words.set_text(f"{angles}\n\nF at {x:.0f},\n{y:.0f}, {z:.0f} mm\nleast mobility\n{low:.0f} mm per rad")
+            words.set_text(
+                f"{angles}\n\nF at {x:.0f},\n{y:.0f}, {z:.0f} mm\nwrist to axis 2\n{result['wrist']:.0f} mm\n"
+                f"least mobility\n{low:.0f} mm per rad"
+            )
 
         return [*space.artists, words], update
 
@@ -166,6 +170,7 @@ def tx40():
 # ---- live ------------------------------------------------------------------------------------------------------------
 
 LIVE_SECONDS, LIVE_STEP, TRAIL = 60.0, 0.02, 375  # s, s (the browser adds what it needs itself), readings drawn
+REHEARSED = 1000  # packets until the tracker is well on its way
 IDLE = 1.5  # s without a look after which the stream ends by itself
 NEARBY = np.array(
     [stations.looking(place, (-60.0, 60.0, 0.0)) for place in ((-470.0, 60.0, 400.0), (60.0, 470.0, 400.0))]
@@ -174,12 +179,28 @@ SLOWED = 120.0  # times, for the eye
 SWING = 1.4  # rad, of a sheet on its way across the tracker
 
 
+def _faults(loss):
+    return udp.Faults(loss=float(loss), duplicate=0.01, reorder=0.02, malformed=0.01)
+
+
+@functools.lru_cache(maxsize=64)
+def rehearsal(loss, nonsense):
+    """Readings (k, 23) and `udp.Statistics` of a piece of the stream, handed on without a network: what stands there
+    before play."""
+    books, endless = udp.Books(keep=TRAIL), simulation.endless_packets(np.random.default_rng(1), lambda: nonsense)
+    packets = itertools.islice(endless, REHEARSED, REHEARSED + TRAIL)
+    for _, datagram, kind in udp.stream(packets, simulation.RATE, _faults(loss), np.random.default_rng(2)):
+        if kind != "lost":
+            books.take(datagram)
+    return books.readings(), books.statistics()
+
+
 class Link:
     """A simulated tracker and a receiver, connected by real UDP packets; both start at the first look and end when
     nobody looks any more."""
 
     def __init__(self):
-        self.faults, self.nonsense = udp.Faults(duplicate=0.01, reorder=0.02, malformed=0.01), False
+        self.faults, self.nonsense = _faults(0.0), False
         self._lock = threading.Lock()
         self._listener = self._sender = None
         self._looked = 0.0
@@ -252,13 +273,13 @@ def live_tracker():
 
     def compute(state):
         if state["t"] <= 0:
-            return compute_live(np.empty((0, 23)), udp.Statistics())
-        return compute_live(*link.look(state["loss"], state["nonsense"]))
+            return {**compute_live(*rehearsal(state["loss"], state["nonsense"])), "playing": False}
+        return {**compute_live(*link.look(state["loss"], state["nonsense"])), "playing": True}
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.5, 1))
         space = Scene(left, radius=480, half_width=520, floor=-320.0, unit="mm")
-        trail = draw.Trail(space)
+        trail = draw.Trail(space, right)
         sweep = draw.Sweep(space, NEARBY)
         style.bare(right)
         words = right.text(0.0, 0.97, "", transform=right.transAxes, va="top", linespacing=1.5)
@@ -275,8 +296,9 @@ def live_tracker():
     def sentence(result):
         s = result["statistics"]
         if not s.datagrams:
-            return "Press play: 250 packets per second start to arrive."
-        return f"{s.good} good readings, {s.lost} lost, {sum(s.bad.values())} bad, each counted once."
+            return "The first packet is on its way."
+        counted = f"{s.good} good readings, {s.lost} lost, {sum(s.bad.values())} bad, each counted once."
+        return counted if result["playing"] else f"1.5 s of the stream: {counted} Press play: real packets arrive over UDP."
 
     return Stage(
         "live tracker",
@@ -286,6 +308,7 @@ def live_tracker():
         play=Play(LIVE_SECONDS, LIVE_STEP),
         view=View(-50, 24, center=(-60, 60, 80), eye=3200.0),
         fail={"loss": 0.4, "nonsense": True},
+        because="Of five packets two are lost, and the stamps tell; the optics talk nonsense, and the gate refuses it.",
         describe=sentence,
     )
 
@@ -801,7 +824,7 @@ def over_speed():
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.8, 1))
-        picture = draw.OverSpeed(left, MIDDLES, SHARES[-1])
+        picture = draw.OverSpeed(left, right, MIDDLES, SHARES[-1])
         style.bare(right)
         words = right.text(0.0, 0.95, "", transform=right.transAxes, va="top", linespacing=1.6)
 
@@ -826,6 +849,7 @@ def over_speed():
             "nonsense": Toggle(False, "nonsense"),
         },
         fail={"of": "position", "latency": 40.0, "nonsense": True},
+        because="A lag of 40 ms: what moves is read where it was. Nonsense lifts the mean of all and hardly moves a median.",
         presets={"no lag": {"latency": 0.0}, "speed": {"of": "speed"}},
         describe=lambda r: (
             f"At rest {r['rest']:.2g} {r['unit']}, at the fastest {r['fastest']:.2g} {r['unit']}; "

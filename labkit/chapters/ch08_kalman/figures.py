@@ -19,7 +19,7 @@ class Bells:
             solid = {"marker": "", "linestyle": "-", "linewidth": 2.2} if role == "measurement" else {}
             self.lines += ax.plot([], [], **style.look(role, **solid), label=label)
         (self.before,) = ax.plot([], [], **style.look("guide"), label="before the motion")
-        ax.legend(loc="upper left", fontsize=8)
+        ax.legend(loc="upper left")
         self.artists = [self.before, *self.lines]
 
     def set(self, before, bells):
@@ -73,7 +73,7 @@ class Judge:
         self.band = ax.axhspan(0.5, 2, color=style.GRID, label="99 % band")
         (self.others,) = ax.plot([], [], color=style.MUTED, linewidth=1.4, label="all beliefs")
         (self.now,) = ax.plot([], [], **style.look("estimates", markersize=9), label="yours")
-        ax.legend(loc="upper right", fontsize=8)
+        ax.legend(loc="upper right")
         self.artists = [self.band, self.others, self.now]
 
     def set(self, result):
@@ -113,7 +113,7 @@ class Arena:
         stars = style.look("measurement", marker="*", markersize=7, alpha=0.7)
         (self.seen,) = ax.plot([], [], **stars, label="measured")
         self.artists = [self.seen, self.truth, self.estimate, self.ellipse, self.marks, self.ghost, self.robot]
-        ax.legend(loc="upper left", fontsize=8, ncols=2)
+        ax.legend(loc="upper left", ncols=2)
 
     def set(self, truth, estimate, ellipse, landmarks, seen):
         """`truth`, `estimate`: (n, 3); `ellipse`: (m, 2); `landmarks`: (k, 2); `seen`: (j, 2)."""
@@ -135,7 +135,7 @@ class Honesty:
         (self.believed,) = plane.plot([], [], **style.look("prediction"), label="95 %, as believed")
         cross = {"linestyle": "none", "marker": "+", "markersize": 13}
         (self.truth,) = plane.plot([0], [0], color=style.TRUTH, **cross, label="true")
-        plane.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=8, ncols=3, columnspacing=1.0)
+        plane.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, columnspacing=1.0)
         dots = style.look("estimate", marker="o", markersize=4)
         (self.curve,) = score.plot(iterations, np.ones(len(iterations)), **dots)
         (self.now,) = score.plot([], [], **style.look("estimates", markersize=9))

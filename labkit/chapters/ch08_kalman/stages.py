@@ -286,7 +286,7 @@ def arena():
         right.set(xlim=(0, 400), ylim=(1e-2, 1e5), yscale="log")
         world, spare = draw.Arena(left), Spare(left, "2, not seen")
         panel = draw.Consistency(right, "NEES of each step", role="estimates")
-        right.legend(loc="upper left", fontsize=8)
+        right.legend(loc="upper left")
         limits = gaussian.chi_square_quantile([0.005, 0.995], 3)
 
         def update(state, result):
