@@ -32,7 +32,8 @@ def turned_points(ax):
 def name_points(labels, points):
     """Put the names beyond their points; those that would meet are one: "p, twice"."""
     places = points * (1 + 0.35 / np.maximum(np.linalg.norm(points, axis=1), 1))[:, None]
-    named = [np.flatnonzero((np.abs(places[: k + 1] - place) < BESIDE).all(axis=1))[0] for k, place in enumerate(places)]
+    meet = (np.abs(places[:, None] - places) < BESIDE).all(axis=2)
+    named = meet.argmax(axis=1)  # the first that each meets
     for k, (label, place) in enumerate(zip(labels, places)):
         label.set_position(place)
         label.set_horizontalalignment("left" if points[k, 0] >= 0 else "right")

@@ -298,7 +298,9 @@ def live_tracker():
         if not s.datagrams:
             return "The first packet is on its way."
         counted = f"{s.good} good readings, {s.lost} lost, {sum(s.bad.values())} bad, each counted once."
-        return counted if result["playing"] else f"1.5 s of the stream: {counted} Press play: real packets arrive over UDP."
+        if result["playing"]:
+            return counted
+        return f"1.5 s of the stream: {counted} Press play: real packets arrive over UDP."
 
     return Stage(
         "live tracker",
@@ -849,7 +851,7 @@ def over_speed():
             "nonsense": Toggle(False, "nonsense"),
         },
         fail={"of": "position", "latency": 40.0, "nonsense": True},
-        because="A lag of 40 ms: what moves is read where it was. Nonsense lifts the mean of all and hardly moves a median.",
+        because="A lag of 40 ms: what moves is read where it was. Nonsense lifts the mean, hardly a median.",
         presets={"no lag": {"latency": 0.0}, "speed": {"of": "speed"}},
         describe=lambda r: (
             f"At rest {r['rest']:.2g} {r['unit']}, at the fastest {r['fastest']:.2g} {r['unit']}; "

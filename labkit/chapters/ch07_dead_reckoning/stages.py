@@ -121,7 +121,8 @@ def _circles_sentence(result):
     if result["reason"]:
         return f"Newton gives up. {result['reason'].capitalize()}. {values}"
     text = f"The search ends {result['error']:.2f} m from the robot. Dilution {result['dilution']:.3g}: "
-    text += f"{result['std']:.2f} m in a distance become {result['dilution'] * result['std']:.3g} m in the position. {values}"
+    text += f"{result['std']:.2f} m in a distance become {result['dilution'] * result['std']:.3g} m in the position. "
+    text += values
     if ratio < WEAK:
         text += " The lines of sight are nearly parallel: across them the distances say little."
     return text
