@@ -8,6 +8,7 @@
 //                            a model that has pixels, not files, sends message.pixels, [width, height], and RGBA
 //   off("msg:custom", hear)  no more
 //   send(message)            to Stage.receive(message), as JSON
+//   placed                   where it has this, `render` puts a function there: the places of handles as one looks now
 //
 // Scenes in space are drawn by `space.js`. The first Stage of a page that has one asks Python for it; a page without
 // Python sets globalThis[Symbol.for("labkit.space")] = { load: () => import("./space.js") } before.
@@ -77,6 +78,7 @@ class Figure {
     this.scenes = new Scenes(this, declared);
     this.line.where = () => this.scenes.news();
     this.space.scenes = this.scenes;
+    if (model.placed) model.placed = (places) => this.scenes.placed(places);
     this.words = new Words(declared.controls, this.line);
     this.clock = declared.play ? new Clock(declared.play, this.line) : null;
     this.controls = new Controls(declared.controls, this.line);
