@@ -20,7 +20,7 @@ from ..checks import (
     fit_together,
     shown,
 )
-from .lie import nearest_rotation, skew
+from .lie import exp_so3, nearest_rotation, skew
 
 MIN_ARM_ANGLE_DEG = 1e-3  # below this the triangle is so flat that its height drowns in the last digits of the points
 MIN_ARM = 1e-9  # relative to the largest coordinate: a shorter arm is rounding error, not a direction
@@ -222,6 +222,24 @@ def transform(T, points):
     if T.ndim > 2:
         fit_together(T=T.shape[:-2], points=points.shape[:-1])
     return (T[..., :3, :3] @ points[..., None])[..., 0] + T[..., :3, 3]
+
+
+def moved(T, step):
+    """Transform after a small change: turned on the right, shifted on the left, (R exp(phi), t + d).
+
+    Parameters
+    ----------
+    T : array-like, shape (..., 4, 4)
+        T_AB.
+    step : array-like, shape (..., 6)
+        Rotation vector phi about the axes of B (rad), shift d in A (length).
+
+    Returns
+    -------
+    T : array, shape (..., 4, 4)
+    """
+    T, step = as_transforms(T, "T"), as_points(step, "step", dim=6)
+    return pose(T[..., :3, :3] @ exp_so3(step[..., :3]), T[..., :3, 3] + step[..., 3:])
 
 
 def relative(T_WA, T_WB):

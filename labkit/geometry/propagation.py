@@ -1,8 +1,9 @@
 """How small errors of poses travel: through products and inverses, into points, from three points into a frame.
 
 The error of a transform T_AB = (R, t) is what `calibration.result` reports: a rotation vector phi about the axes of B
-(rad) and a shift d in A (mm), e = (phi, d), so that the true transform is (R exp(phi), t + d). To first order every
-error arrives somewhere else as J e, and a covariance as J cov J'. A rotation grows into a shift by its lever.
+(rad) and a shift d in A (mm), e = (phi, d), so that the true transform is (R exp(phi), t + d), `frames.moved(T, e)`. To
+first order every error arrives somewhere else as J e, and a covariance as J cov J'. A rotation grows into a shift by
+its lever.
 
 Source: the first-order law of propagation of uncertainty (GUM, JCGM 100:2008, section 5), with poses as in Sola, Deray,
 Atchuthan, "A micro Lie theory for state estimation in robotics" (2018), section V.
@@ -21,26 +22,8 @@ from ..checks import (
     fit_together,
     shown,
 )
-from .frames import frame_from_points, invert, pose
-from .lie import exp_so3, skew
-
-
-def disturb(T, e):
-    """Transform with an error.
-
-    Parameters
-    ----------
-    T : array-like, shape (..., 4, 4)
-        T_AB.
-    e : array-like, shape (..., 6)
-        Rotation vector about the axes of B (rad), shift in A (mm).
-
-    Returns
-    -------
-    T : array, shape (..., 4, 4)
-    """
-    T, e = as_transforms(T, "T"), as_points(e, "e", dim=6)
-    return pose(T[..., :3, :3] @ exp_so3(e[..., :3]), T[..., :3, 3] + e[..., 3:])
+from .frames import frame_from_points, invert
+from .lie import skew
 
 
 def _blocks(upper_left, lower_left, lower_right):

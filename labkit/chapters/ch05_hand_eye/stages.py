@@ -353,7 +353,7 @@ def _simulated(B_deg):
     """The simulation model with its scanner turned to B: T_BF, x_S, target, true T_FS."""
     T_BF, _, target, scanner = thesis.simulation()
     T_FS = frames.matrix_from_kuka(frames.kuka_from_degrees([*scanner[:4], B_deg, scanner[5]]))
-    return T_BF, frames.transform(frames.invert(T_FS), frames.transform(frames.invert(T_BF), target)), target, T_FS
+    return T_BF, hand_eye.sphere_in_scanner(T_BF, T_FS, target), target, T_FS
 
 
 def compute_iterations(state):
@@ -689,7 +689,7 @@ def compute_pattern(state):
     fit, x_mid, z_mid = _corrected_fit(), 0.0, 240.0
     spread = np.array([state["E"][0] - x_mid, state["across"], state["E"][1] - z_mid])
     T_BF = planning.pattern(fit.T_FS, fit.target, np.deg2rad(state["tilt_deg"]), spread)
-    x_S = frames.transform(frames.invert(fit.T_FS), frames.transform(frames.invert(T_BF), fit.target))
+    x_S = hand_eye.sphere_in_scanner(T_BF, fit.T_FS, fit.target)
     unseen = planning.unseen_changes(T_BF, fit.T_FS, fit.target)
     determined = not (len(unseen.turns) or len(unseen.slides))
     if determined:

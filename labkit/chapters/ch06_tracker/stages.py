@@ -12,9 +12,8 @@ from ...calibration import ax_xb
 from ...documents.report.printed import COLUMNS, motions, statements, table_d
 from ...estimation.gaussian import cut_axes, ellipse, unit_noise
 from ...fast.ax_xb import calibrate_hand_eye, solve_ax_xb
-from ...geometry.frames import invert, matrix_from_quaternion, pose, pose_distance, transform, unit_vector
+from ...geometry.frames import invert, matrix_from_quaternion, moved, pose, pose_distance, transform, unit_vector
 from ...geometry.lie import exp_so3, log_so3
-from ...geometry.propagation import disturb
 from ...machines import cell, simulation, stations, udp
 from ...machines.arm import (
     HOME,
@@ -912,7 +911,7 @@ def _source_places(of, job, T_BF):
 def _enlarged(T, to):
     """A pose that is as far from T as `to` is, ENLARGED times."""
     turn = log_so3(T[:3, :3].T @ to[:3, :3])
-    return disturb(T, ENLARGED * np.concatenate([turn, to[:3, 3] - T[:3, 3]]))
+    return moved(T, ENLARGED * np.concatenate([turn, to[:3, 3] - T[:3, 3]]))
 
 
 def compute_whole_cell(state):
