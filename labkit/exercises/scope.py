@@ -89,7 +89,7 @@ def _refusing(twin, where, theirs):
 def notebook_data(function):
     """Names of the notebook's data (no functions, no modules) that a function reads without being given them."""
     known, code = getattr(function, "__globals__", {}), getattr(function, "__code__", None)
-    if code is None:
+    if not isinstance(code, types.CodeType):  # none, or that of a function in another process
         return []
     return [name for name in _names(code) if name in known and _is_data(known[name])]
 
