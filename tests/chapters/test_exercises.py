@@ -70,7 +70,7 @@ def test_value_accepts_the_reference_and_refuses_its_neighbors(chapter, item):
 
 @functools.cache
 def computed_once(id):
-    """A Value whose reference and wrong variants, functions without arguments, are computed once for all its mistakes."""
+    """A Value whose reference and wrong variants, functions without arguments, are computed once for all mistakes."""
     item = next(i for _, i in VALUES if i.id == id)
     wrong = [replace(mistake, variant=functools.cache(mistake.variant)) for mistake in item.mistakes]
     return replace(item, reference=functools.cache(item.reference), mistakes=wrong)
