@@ -20,8 +20,6 @@ import time
 
 import numpy as np
 
-from ..exercises.guard import Abroad
-
 LARGEST = 64 << 20  # bytes of one message
 DEEPEST = 40  # containers within containers
 LONGEST = 400  # characters of a name or an error that cross
@@ -317,7 +315,7 @@ class Line:
                         raise Gone(ENDS) from None
 
     def _receive(self):
-        with _undisturbed(), Abroad.waiting():
+        with _undisturbed():
             try:
                 if not self.inbox:
                     self.inbox.append(self._message())

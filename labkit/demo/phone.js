@@ -11,13 +11,12 @@ function say(text) {
 }
 
 async function follow() {
-  for (let cut = true; ;) { // the first answer after a fault comes at once, and takes its sentence away
+  for (;;) {
     try {
-      const answer = await fetch(`/${CODE}/now?seen=${cut ? "" : now.version}`);
+      const answer = await fetch(`/${CODE}/now?seen=${now.version < 0 ? "" : now.version}`);
       if (answer.ok) {
         const next = await answer.json();
-        if (cut || next.version !== now.version) show(next);
-        cut = false;
+        if (next.version !== now.version) show(next);
         continue;
       }
       say(await answer.text());
@@ -25,7 +24,6 @@ async function follow() {
     } catch {
       say("The connection is gone; it is tried again.");
     }
-    cut = true;
     await new Promise((go) => setTimeout(go, AGAIN_AFTER));
   }
 }

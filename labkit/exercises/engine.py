@@ -16,11 +16,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from . import arguments, guard, metrics, relations, scope
+from . import arguments, cases, guard, metrics, operands, relations, scope, shapes, slips
 
 TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
 NOISY = "exact on clean data, but the data are not weighed as they should be: on noisy data"
 TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws of each kind
+MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried, to tell on which
 LOOKING = 0.5  # seconds of processor time in which changes of the arguments are tried as an explanation
 UNITS = {
     "mm": ("length", 1e-3),
@@ -64,6 +65,7 @@ class Item:
     """What all exercises share."""
 
     id: str
+    chapter = None  # the Chapter it stands in, which tells it so
 
     def __post_init__(self):
         if not self.id.isidentifier():
@@ -139,13 +141,12 @@ class Exercise(Item):
             return Outcome(TO_DO)
         if not callable(function):
             return Outcome(NOT_YET, f"expected a function, got {metrics._describe(function)}.")
-        twins = scope.twins_of(self)
-        if scope.is_the_librarys(function, self, twins):
+        if scope.is_the_librarys(function, self):
             where = f"{function.__module__}.{function.__name__}"
             return Outcome(
                 NOT_YET, f"that is the library's own function, `{where}`: it is the one you are asked to write."
             )
-        with scope.own_name(function, self.id), scope.without(twins, function):
+        with scope.own_name(function, self.id), scope.without_twin(function, self):
             return self._try(function, rng)
 
     def _try(self, function, rng):
@@ -225,17 +226,17 @@ class _Trial:
         named = self._named_mistake() or self._named_in_parts()
         if named:
             return named
-        words = self._relation(whole=True) or self._other_arguments()
+        words = self._relation(whole=True) or self._other_arguments() or self._terms() or self._one_change()
         if words:
-            return self.outcome(NOT_YET, _closed(words))
+            return self.outcome(NOT_YET, _closed(words) + self._about_globals())
         if self.refusal:
-            return self.outcome(NOT_YET, _closed(self.refusal) + self._about_globals())
+            return self.outcome(NOT_YET, _closed(self.refusal) + self._other_shape() + self._about_globals())
         if self._right_on_plain():
             for metric, pair, words in zip(self.metrics, self.pairs, self.words):
                 if words and not metric.equal(*pair):
                     off = next(d for d in metric.deviations(*pair) if not d.within)
                     return self.outcome(NOT_YET, _closed(f"{words} {off}"))
-        words = self._relation()
+        words = self._relation() or self._unmoved()
         return self.outcome(NOT_YET, (_closed(words) if words else self._deviation()) + self._about_globals())
 
     def _relation(self, whole=False):
@@ -261,6 +262,78 @@ class _Trial:
             if all(self._is_mistake(variant, *case) for case in cases):
                 return f"your result is what comes out {words}"
         return None
+
+    def _terms(self):
+        """What one argument, or a number of them, has to do with each part of the results that is wrong."""
+        if self.refusal or self.exercise.metric is None or self._right_on_plain():
+            return None
+        pairs = self._plain_pairs()
+        named = [dict(zip(self._names(args), args)) for args, _, _ in self._cases()]
+        told = []
+        for k, (name, metric, _, _) in enumerate(self.exercise.metric.parts(*pairs[0])):
+            pieces = [self.exercise.metric.parts(*pair)[k] for pair in pairs]
+            if isinstance(metric, metrics.Exactly) or all(metric.equal(r, e) for _, _, r, e in pieces):
+                continue
+            if any(metric.equal(r, e) for _, _, r, e in pieces):
+                return None  # right in some cases: these are what is to be told
+            results, expected = ([np.asarray(piece[i], dtype=float) for piece in pieces] for i in (2, 3))
+            words = operands.operand_words(metric, results, expected, named)
+            if words is None:
+                return None
+            told.append(f"{name}: {words}" if name else words)
+        return "\n".join(map(_closed, told)) or None
+
+    def _one_change(self):
+        """Whether the results are those of a right formula with one change, with this in words."""
+        if self.exercise.metric is None or not self.inputs:
+            return None
+        draws, ends = self._cases(), time.process_time() + LOOKING
+        try:
+            with guard.time_limit(2 * LOOKING), np.errstate(all="ignore"):
+                for words, function in slips.changed_formulas(self.exercise):
+                    if time.process_time() > ends:
+                        return None
+                    if all(self._is_mistake(Mistake(function, words), *case) for case in draws):
+                        return f"your result is what a right formula gives {words}"
+        except guard.TimeLimit:
+            return None
+        return None
+
+    def _other_shape(self):
+        """What results of a wrong shape have to do with the expected ones."""
+        results = [pair[0].value if isinstance(pair[0], _Refusal) else None for pair in self.pairs]
+        if any(result is None for result in results):
+            return ""
+        names = getattr(self.exercise.metric, "names", ())
+        words = shapes.shape_words(results, [expected for _, expected in self.pairs], names)
+        return f" {words[0].upper()}{words[1:]}." if words else ""
+
+    def _unmoved(self):
+        """An argument that makes no difference to the results, though it should."""
+        draws = self._cases()
+        if self.exercise.metric is None or not draws:
+            return None
+        for k, name in enumerate(self._names(draws[0][0])):
+            if self._makes_no_difference(k, draws):
+                return f"your result does not change with `{name}`, and it should"
+        return None
+
+    def _makes_no_difference(self, k, draws):
+        """Whether the k-th argument, taken from the next draw, changes the reference's results, never the student's."""
+        tried = 0
+        for (args, metric, pair), (others, _, _) in zip(draws, [*draws[1:], draws[0]]):
+            if not _could_change(args[k], others[k]):
+                continue
+            changed = (*args[:k], others[k], *args[k + 1 :])
+            try:
+                moved = not metric.equal(self.exercise.reference(*copy.deepcopy(changed)), pair[1])
+            except Exception:  # arguments of two draws need not go together
+                continue
+            run = guard.run(self.function, changed, limit=self.exercise.limit)
+            if not moved or run.error is not None or not _equal_as_written(metric, run.result, pair[0]):
+                return False
+            tried += 1
+        return tried > 1
 
     def _about_globals(self):
         """A line about data of the notebook that the function reads, which a checked function is not given."""
@@ -349,8 +422,28 @@ class _Trial:
         missed = [args for args, pair in zip(self.inputs, pairs) if not metric.equal(*pair)]
         if len(missed) == len(pairs):
             return _closed(str(most))
+        special, seen = self._special_case()
         right = f"It was right on {len(pairs) - len(missed)} of {len(pairs)} draws: which case is special?"
+        if special:
+            right = f"It is wrong where {special}, and right elsewhere, on {seen} draws."
         return f"{_closed(str(most))} {right}\nNot right when called as {self._call(missed[0])}"
+
+    def _special_case(self):
+        """What the draws on which the answer is wrong have in common, fresh ones among them, and how many these are."""
+        metric, rng = self.exercise.metric, np.random.default_rng(0)
+        draws = [(args, pair[1], not m.equal(*pair)) for args, m, pair in self._cases()]
+        ends = time.process_time() + LOOKING
+        for draw in itertools.islice(itertools.cycle(self.exercise.cases), MORE_DRAWS):
+            if time.process_time() > ends:
+                break
+            args = draw(rng)
+            expected = self.exercise.reference(*copy.deepcopy(args))
+            run = guard.run(
+                self.function, args, lambda result, e=expected: metric.admit(result, e), self.exercise.limit
+            )
+            draws.append((args, expected, run.error is not None or not metric.equal(run.result, expected)))
+        named = [(dict(zip(self._names(args), args)), expected) for args, expected, _ in draws]
+        return cases.case_words(named, [missed for _, _, missed in draws]), len(draws)
 
     def _call(self, args):
         given = ", ".join(f"{name}={_short(arg)}" for name, arg in zip(self._names(args), args))
@@ -414,6 +507,13 @@ def _fails(mistake, args):
     except Exception:
         return True
     return False
+
+
+def _could_change(one, other):
+    """Whether an argument of one draw can be put in the place of another's, and makes another call of it."""
+    if not all(isinstance(v, int | float | np.number | np.ndarray) and not isinstance(v, bool) for v in (one, other)):
+        return False
+    return np.shape(one) == np.shape(other) and not np.array_equal(one, other)
 
 
 @dataclass(frozen=True)
@@ -670,6 +770,8 @@ class Chapter:
     def __post_init__(self):
         object.__setattr__(self, "items", tuple(self.items))
         object.__setattr__(self, "title", self.title or self.name.partition("-")[2].replace("-", " ").capitalize())
+        for item in self.items:
+            object.__setattr__(item, "chapter", self)
         ids = [item.id for item in self.items]
         double = {i for i in ids if ids.count(i) > 1}
         taken = {"predict", "progress", "chapter", "after"} & set(ids)

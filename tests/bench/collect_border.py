@@ -91,9 +91,7 @@ def cell(item, k):
 
 
 if __name__ == "__main__":
-    what, *rest = sys.argv[1:] or ["nothing"]
-    if what not in ("solved", "mistakes"):
-        sys.exit(__doc__)
+    what, *rest = sys.argv[1:]
     if what == "solved":
         seeds, *rest = rest or ["20"]
         found = solved(int(seeds), rest)

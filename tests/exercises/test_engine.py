@@ -175,9 +175,9 @@ class Hostile:
 @pytest.mark.parametrize(
     "function, status, words",
     [
-        (endless, NOT_YET, "did not finish within 0.5 s"),
-        (endless_with_bare_except, NOT_YET, "did not finish within 0.5 s"),
-        (sleeping, NOT_YET, "did not finish within 0.5 s"),
+        (endless, NOT_YET, "did not finish within 2 s"),
+        (endless_with_bare_except, NOT_YET, "did not finish within 2 s"),
+        (sleeping, NOT_YET, "did not finish within 2 s"),
         (recursive, RAISED, "calls itself without an end"),
         (raising, RAISED, "ZeroDivisionError"),
         (leaving, NOT_YET, "calls exit()"),
@@ -206,11 +206,10 @@ class Hostile:
     ],
 )
 def test_hostile_code_gets_one_sentence(function, status, words):
-    item = replace(DOUBLE, limit=0.5) if "did not finish" in words else DOUBLE
     started = time.thread_time()
-    outcome = item.judge(function)
+    outcome = DOUBLE.judge(function)
     assert (outcome.status, words in outcome.text) == (status, True), outcome
-    assert time.thread_time() - started < 1.5
+    assert time.thread_time() - started < 3
 
 
 def test_flood_of_output_is_cut():
@@ -223,7 +222,7 @@ def test_flood_of_output_is_cut():
 def test_time_limit_in_another_thread():
     """Where no signal can be used (Windows, other threads) a second thread ends a Python loop."""
     found = []
-    thread = threading.Thread(target=lambda: found.append(replace(DOUBLE, limit=0.5).judge(endless)))
+    thread = threading.Thread(target=lambda: found.append(DOUBLE.judge(endless)))
     thread.start()
     thread.join(timeout=10)
     assert "did not finish" in found[0].text
@@ -486,7 +485,8 @@ def test_wrong_on_some_draws_only_says_so():
         draws=20,
     )
     text = exercise.judge(lambda v: v, rng=np.random.default_rng(0)).text
-    assert "which case is special?" in text and "Not right when called as size(v=-" in text
+    assert "It is wrong where `v` is negative, and right elsewhere" in text
+    assert "Not right when called as size(v=-" in text
 
 
 def test_noisy_draw_catches_a_fit_that_is_exact_only_on_clean_data():

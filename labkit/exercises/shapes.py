@@ -1,0 +1,145 @@
+"""The general layer, shapes: what a result of the wrong shape has to do with the expected one.
+
+The numbers may be right and stand in the wrong place: the diagonal for the matrix, the rows for their sum, one of two
+results. What is said holds on all draws.
+"""
+
+import numpy as np
+
+MOST = 6  # entries, rows or columns that are tried one by one
+LARGEST = 10_000  # entries of a result that is looked at
+
+
+def shape_words(results, expected, names=()):
+    """What refused results are, in words; None when nothing is found.
+
+    Parameters
+    ----------
+    results : list
+        What the student's function returned, one for every draw, as it came.
+    expected : list
+        What the reference returned: an array, a number, or a tuple of several.
+    names : sequence of str
+        Names of several results.
+    """
+    if names:
+        return _of_several(results, expected, names)
+    results, expected = list(map(_numbers, results)), list(map(_numbers, expected))
+    if any(x is None for x in (*results, *expected)):
+        return None
+    for words, change in _less():
+        if _holds(results, expected, lambda r, e, change=change: (r, change(e))):
+            return f"what you return is {words}"
+    for words, change in _more(min(len(r) if r.ndim else 0 for r in results)):
+        if _holds(results, expected, lambda r, e, change=change: (change(r), e)):
+            return words
+    return None
+
+
+def _of_several(results, expected, names):
+    for k, name in enumerate(names):
+        if _holds(results, expected, lambda r, e, k=k: (_numbers(r), _numbers(e[k]))):
+            return f"what you return is {name} alone" if len(names) > 1 else None
+    two = all(type(r) in (tuple, list) and len(r) == len(names) == 2 for r in results)
+    if two and all(_holds(results, expected, lambda r, e, k=k: (_numbers(r[k]), _numbers(e[1 - k]))) for k in (0, 1)):
+        return f"the two results are exchanged: first the {names[0]}, then the {names[1]}"
+    return None
+
+
+def _numbers(value):
+    """A result as an array of a size worth looking at; None for anything that is none, or hides what it is."""
+    plain = type(value) is np.ndarray or isinstance(value, np.number) or type(value) in (int, float)
+    if not plain and not (type(value) in (list, tuple) and all(_numbers(part) is not None for part in value[:LARGEST])):
+        return None
+    if getattr(value, "size", 0) > LARGEST:
+        return None
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        return None
+    return array.astype(float) if array.dtype.kind in "iuf" and array.size else None
+
+
+def _holds(results, expected, sides):
+    try:
+        with np.errstate(all="ignore"):
+            return all(_equal(*sides(r, e)) for r, e in zip(results, expected))
+    except (ValueError, IndexError, TypeError, AttributeError, np.linalg.LinAlgError):
+        return False
+
+
+def _equal(a, b):
+    if a is None or b is None or np.shape(a) != np.shape(b):
+        return False
+    return np.size(b) > 0 and np.size(a) > 0 and bool(np.allclose(a, b, rtol=1e-9, atol=1e-12))
+
+
+def _less():
+    """(words, change of the expected result): the student returned a part or a digest of it, or put it elsewhere."""
+    yield "the transpose of the expected result", lambda e: e.T
+    yield "the expected matrix' diagonal alone", lambda e: np.diag(_square(e))
+    yield "the roots of the expected matrix' diagonal", lambda e: np.sqrt(np.diag(_square(e)))
+    yield "a matrix with the expected numbers on its diagonal", lambda e: np.diag(_vector(e))
+    yield from _digests("the expected numbers")
+    yield "the expected result without its last row", lambda e: _long(e)[:-1]
+    yield "the expected result without its first row", lambda e: _long(e)[1:]
+    for k in range(1, MOST + 1):
+        yield f"the first {k} of the expected numbers or rows alone", lambda e, k=k: _long(e, k)[:k]
+        yield f"the top left {k} by {k} block of the expected matrix", lambda e, k=k: _square(e, k)[:k, :k]
+    for k in range(MOST):
+        yield f"row {k} (counted from 0) of the expected result alone", lambda e, k=k: _table(e)[k]
+        yield f"column {k} (counted from 0) of the expected result alone", lambda e, k=k: _table(e)[:, k]
+        yield f"entry {k} (counted from 0) of the expected result alone", lambda e, k=k: _vector(e)[k]
+        yield f"the first {k} columns of the expected result alone", lambda e, k=k: _table(e)[:, : max(k, 1)]
+
+
+def _more(rows):
+    """(words, change of the result): the student returned more than is asked for."""
+    for words, digest in _digests("the numbers you return"):
+        yield f"the expected result is {words}", digest
+    yield "the expected result is the diagonal of the matrix you return", lambda r: np.diag(_square(r))
+    yield "your result has one row too many, the last; the others are right", lambda r: _long(r)[:-1]
+    yield "your result has one row too many, the first; the others are right", lambda r: _long(r)[1:]
+    for k in range(min(rows, MOST)):
+        yield f"the expected result is entry or row {k} (counted from 0) of what you return", lambda r, k=k: r[k]
+    for k in range(MOST):
+        yield f"the expected result is column {k} (counted from 0) of what you return", lambda r, k=k: _table(r)[:, k]
+
+
+def _digests(of):
+    """(words, function) that make fewer numbers of many."""
+    yield f"the sum of {of}", np.sum
+    yield f"the mean of {of}", np.mean
+    yield f"the length (norm) of {of}", np.linalg.norm
+    yield f"the largest of {of}", np.max
+    yield f"the smallest of {of}", np.min
+    yield f"the number, from 0, of the largest of {of}", lambda e: float(np.argmax(_vector(e)))
+    yield f"the number, from 0, of the smallest of {of}", lambda e: float(np.argmin(_vector(e)))
+    for axis, each in ((0, "column"), (-1, "row")):
+        yield f"the sum of each {each} of {of}", lambda e, axis=axis: _table(e).sum(axis)
+        yield f"the mean of each {each} of {of}", lambda e, axis=axis: _table(e).mean(axis)
+        yield f"the length (norm) of each {each} of {of}", lambda e, axis=axis: np.linalg.norm(_table(e), axis=axis)
+
+
+def _vector(e):
+    if e.ndim != 1:
+        raise ValueError
+    return e
+
+
+def _table(e):
+    if e.ndim < 2:
+        raise ValueError
+    return e
+
+
+def _square(e, larger=0):
+    if e.ndim != 2 or e.shape[0] != e.shape[1] or len(e) <= larger:
+        raise ValueError
+    return e
+
+
+def _long(e, than=1):
+    if not e.ndim or len(e) <= than:
+        raise ValueError
+    return e
