@@ -182,7 +182,7 @@ print(f"largest difference from listing 4: {np.abs(T_K0K1 - listing_4).max():.1e
       "(half a printed digit is 5.0e-07)")
 
 # %% angle [markdown]
-# Now put it in two numbers. By what angle is $K_1$ turned against $K_0$? The drawing says 90°, but the points were moved by 0.01 on purpose.
+# By what angle is $K_1$ turned against $K_0$? The drawing says 90°, but the points were moved by 0.01 on purpose.
 
 # %% angle_deg
 angle_deg = ...  # your code here
@@ -191,11 +191,19 @@ angle_deg = np.rad2deg(np.arccos((np.trace(T_K0K1[:3, :3]) - 1) / 2))
 ### END SOLUTION
 ex.angle_deg(angle_deg)
 
+# %% half-a-degree [markdown]
+# Is that much? A hole is to be drilled at $(200, 0, 0)$ mm in $K_1$. In the drawing $K_1$ has the same origin and is turned by exactly 90°: that is `drawn` below.
+# **How far from its place in the drawing does the hole land?** Guess first, from the angle.
+
 # %% distance
+drawn = T_K0K1.copy()
+drawn[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
 distance = ...  # your code here
 ### BEGIN SOLUTION
-distance = np.linalg.norm(T_K0K1[:3, 3])
+hole = np.array([200.0, 0.0, 0.0])
+distance = np.linalg.norm(frames.transform(T_K0K1, hole) - frames.transform(drawn, hole))
 ### END SOLUTION
+ex.distance(distance)
 ex.distance(distance)
 
 # %% noise [markdown]

@@ -137,6 +137,13 @@ def _projected_on_all_of_a(a, b):
     return _columns(x, y, np.cross(x, y))
 
 
+def _number_subtracted(a, b):
+    x = a / np.linalg.norm(a)
+    y = b - b @ x
+    y /= np.linalg.norm(y)
+    return _columns(x, y, np.cross(x, y))
+
+
 def _left_handed(a, b):
     R = frames.gram_schmidt(a, b)
     return R * (1, 1, -1)
@@ -161,6 +168,12 @@ def _frame(axes):
 def _axes_in_rows(origin, x_point, y_point):
     T = frames.frame_from_points(origin, x_point, y_point)
     T[:3, :3] = T[:3, :3].T
+    return T
+
+
+def _origin_in_the_last_row(origin, x_point, y_point):
+    T = frames.frame_from_points(origin, x_point, y_point)
+    T[3, :3], T[:3, 3] = origin, 0
     return T
 
 
@@ -291,12 +304,24 @@ def _K0_T_K1():
     return frames.relative(K0, K1)
 
 
-def _distance():
-    return np.linalg.norm(_K0_T_K1()[:3, 3])
+HOLE = 200.0  # mm from the origin of K1, on its x axis
 
 
-def _flat_distance():
-    return np.linalg.norm(points()["K0"][1] - points()["K1"][1])
+def _drawn():
+    """K1 with its own origin, turned by the drawing's 90 deg."""
+    return frames.pose(_turn("z", np.pi / 2), _K0_T_K1()[:3, 3])
+
+
+def _hole():
+    return frames.transform(_K0_T_K1(), np.array([HOLE, 0, 0]))
+
+
+def _hole_as_drawn():
+    return frames.transform(_drawn(), np.array([HOLE, 0, 0]))
+
+
+def _missing():
+    return np.pi / 2 - frames.rotation_angle(_K0_T_K1())
 
 
 def drawn_points(rng, flat=False):
@@ -327,6 +352,17 @@ def _kabsch(handed=True, turned=lambda R: R, shift=lambda R, p, q: q.mean(0) - R
         return T
 
     return variant
+
+
+def _rotation_of_the_transpose(U, V):
+    """What comes of V where its transpose is taken for it, the sign of its last column included."""
+    return V.T @ np.diag([1, 1, np.sign(np.linalg.det(V.T @ U.T))]) @ U.T
+
+
+def _one_mean_for_all(p, q):
+    U, _, Vt = np.linalg.svd((p - p.mean()).T @ (q - q.mean()))
+    R = Vt.T @ np.diag([1, 1, np.sign(np.linalg.det(Vt.T @ U.T))]) @ U.T
+    return frames.pose(R, q.mean(0) - R @ p.mean(0))
 
 
 CHAPTER = Chapter(
@@ -388,6 +424,16 @@ CHAPTER = Chapter(
                     "Only two components are in your length. np.hypot takes two; np.linalg.norm takes all.",
                 ),
                 Mistake(lambda v: v, "You return v as it came. Its length is not 1 yet."),
+                Mistake(
+                    lambda v: v * np.linalg.norm(v),
+                    "You multiply by the length: what was long gets longer. Divide by it.",
+                    id="normalize-multiplied",
+                ),
+                Mistake(
+                    lambda v: v / np.sqrt(np.linalg.norm(v)),
+                    "You divide by the root of the length. `np.linalg.norm` has taken the root already.",
+                    id="normalize-root-twice",
+                ),
             ],
         ),
         Prediction(
@@ -468,6 +514,16 @@ CHAPTER = Chapter(
                     _projection_kept,
                     "You kept the part of b along x and threw the rest away. y is the rest: b minus its projection.",
                 ),
+                Mistake(
+                    lambda a, b: _columns(a, *frames.gram_schmidt(a, b).T[1:]),
+                    "Your first column is a with its length. Axes have length 1: put x there.",
+                    id="gram-schmidt-long-x",
+                ),
+                Mistake(
+                    _number_subtracted,
+                    "You subtracted the number b . x from every component. What b has along x is a vector: (b . x) x.",
+                    id="gram-schmidt-number",
+                ),
             ],
         ),
         Exercise(
@@ -520,6 +576,21 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda o, px, py: frames.frame_from_points(o, py, px),
                     "x_point and y_point have changed places: your x axis runs toward y_point.",
+                ),
+                Mistake(
+                    lambda o, px, py: frames.frame_from_points(o, px, o + px - py),
+                    "Your second edge runs from y_point to x_point, so that y points away from y_point: it is y_point - origin.",
+                    id="frame-edge-between",
+                ),
+                Mistake(
+                    lambda o, px, py: _with(frames.frame_from_points(o, px, py), t=(o + px + py) / 3),
+                    "You put the center of the three points into the last column. The frame sits at `origin`.",
+                    id="frame-center",
+                ),
+                Mistake(
+                    _origin_in_the_last_row,
+                    "The origin stands in the last row. It belongs into the last column, `T[:3, 3]`.",
+                    id="frame-last-row",
                 ),
             ],
         ),
@@ -610,6 +681,11 @@ CHAPTER = Chapter(
                     lambda A, B: frames.pose(A[:3, :3].T @ B[:3, :3], B[:3, 3] - A[:3, 3]),
                     "The rotation is right. The vector from A to B is still written in W: turn it into A with R_WAᵀ.",
                 ),
+                Mistake(
+                    lambda A, B: B - A,
+                    "You subtracted the matrices. Points are subtracted, poses are multiplied: T_AW T_WB.",
+                    id="relative-difference",
+                ),
             ],
         ),
         Value(
@@ -636,43 +712,89 @@ CHAPTER = Chapter(
                     lambda: np.rad2deg(np.arccos(np.trace(_K0_T_K1()[:3, :3]) - 1)),
                     "The half is missing: trace(R) = 1 + 2 cos(angle).",
                 ),
+                Mistake(
+                    lambda: 90 - np.rad2deg(frames.rotation_angle(_K0_T_K1())),
+                    "This is what is missing at 90 deg. By what angle is K1 turned?",
+                    id="angle-complement",
+                ),
+                Mistake(
+                    lambda: np.deg2rad(frames.rotation_angle(_K0_T_K1())),
+                    "The arccosine gives radians already, and here they are converted to radians once more: np.rad2deg makes degrees.",
+                    id="angle-deg2rad",
+                ),
+                Mistake(
+                    lambda: np.rad2deg(np.arctan(_K0_T_K1()[0, 0])),
+                    "The first entry of the matrix is the cosine of the angle, and this is its arctangent. np.arctan2 takes sine and cosine.",
+                    id="angle-arctangent",
+                ),
             ],
         ),
         Value(
             "distance",
-            reference=_distance,
+            reference=lambda: np.linalg.norm(_hole() - _hole_as_drawn()),
             unit="mm",
-            rtol=1e-5,
+            rtol=1e-4,
             hints=(
-                "The distance of two origins does not depend on who looks at them.",
-                "It is the length of the translation in T_K0K1.",
-                "`distance = np.linalg.norm(T_K0K1[:3, 3])`",
+                "Half a degree at the origin is more, the farther away one looks: take the hole to K0 by both frames.",
+                "T_K0K1 and `drawn` both map coordinates in K1 to K0. Map (200, 0, 0) with each, and take the length of the difference.",
+                "`hole = np.array([200.0, 0, 0, 1])\ndistance = np.linalg.norm((T_K0K1 @ hole - drawn @ hole)[:3])`",
             ),
             mistakes=[
                 Mistake(
-                    lambda: np.linalg.norm(_K0_T_K1()),
-                    "You took the norm of the whole matrix. Only its last column holds lengths.",
+                    lambda: np.linalg.norm(_K0_T_K1()[:3, 3]),
+                    "This is the distance of the two origins: where K1 lies, not where the hole lands.",
+                    id="distance-origins",
                 ),
                 Mistake(
-                    lambda: np.linalg.norm(_K0_T_K1()[:, 3]),
-                    "Your column still holds the 1 of the last row: take its first three entries.",
+                    lambda: HOLE * np.rad2deg(_missing()),
+                    "The lever is multiplied by an angle in degrees here: arcs take radians.",
+                    id="distance-degrees",
                 ),
                 Mistake(
-                    lambda: _K0_T_K1()[:3, 3].sum(),
-                    "You added the components, and they cancel. The distance is the root of the sum of squares.",
-                    id="distance-sum-signed",
+                    lambda: np.linalg.norm(_hole() - _hole_as_drawn()) ** 2,
+                    "This is the squared distance.",
+                    id="distance-squared",
                 ),
                 Mistake(
-                    lambda: abs(_K0_T_K1()[0, 3]),
-                    "This is the x component alone. The distance is the root of the sum of all three squares.",
-                    id="distance-x",
+                    lambda: np.abs(_hole() - _hole_as_drawn()).sum(),
+                    "The components are added. The distance is the root of the sum of squares.",
+                    id="distance-sum",
                 ),
-                Mistake(lambda: _distance() ** 2, "This is the squared distance."),
                 Mistake(
-                    lambda: np.abs(_K0_T_K1()[:3, 3]).sum(),
-                    "You added the absolute components. The distance is the root of the sum of squares.",
+                    lambda: np.linalg.norm(_hole()),
+                    "This is how far the hole is from the origin of K0. How far is it from its place in the drawing?",
+                    id="distance-from-K0",
                 ),
-                Mistake(_flat_distance, "This is the distance of the two x_points. The frames sit at their origins."),
+                Mistake(
+                    lambda: np.linalg.norm(_hole_as_drawn()),
+                    "This is how far the drawing's hole is from the origin of K0. How far apart are both holes?",
+                    id="distance-drawn-from-K0",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_hole() - [HOLE, 0, 0]),
+                    "This compares the hole with (200, 0, 0) in K0. Its place in the drawing is where `drawn` takes it.",
+                    id="distance-unmapped",
+                ),
+                Mistake(
+                    lambda: HOLE * frames.rotation_angle(_K0_T_K1()),
+                    "This takes the whole turn of K1. The drawing wants 90 deg of it: only the difference moves the hole away.",
+                    id="distance-whole-turn",
+                ),
+                Mistake(
+                    _missing,
+                    "This is the angle that is missing at 90 deg, in rad. How much is it 200 mm away?",
+                    id="distance-angle",
+                ),
+                Mistake(
+                    lambda: np.rad2deg(_missing()),
+                    "This is the angle that is missing at 90 deg. How much is it 200 mm away, in mm?",
+                    id="distance-angle-deg",
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(_K0_T_K1() - _drawn()),
+                    "This is the norm of the difference of two matrices. Let both act on the hole, and take the length of what differs.",
+                    id="distance-matrices",
+                ),
             ],
         ),
         Prediction(
@@ -735,6 +857,11 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda p: _with(frames.matrix_from_kuka(p), t=frames.matrix_from_kuka(p)[:3, :3] @ p[:3]),
                     "You rotated the position as well. x, y, z are already written in the base frame.",
+                ),
+                Mistake(
+                    lambda p: frames.pose(Rotation.from_rotvec(p[3:]).as_matrix(), p[:3]),
+                    "A, B, C are taken for a rotation vector, a single turn. They are three turns, one after the other.",
+                    id="kuka-rotvec",
                 ),
             ],
         ),
@@ -848,6 +975,16 @@ CHAPTER = Chapter(
                     lambda T: frames.kuka_from_matrix(frames.invert(T)),
                     "This is the pose of the inverse: F seen from W has become W seen from F.",
                 ),
+                Mistake(
+                    _angles(lambda abc: np.array([np.pi / 2 - abc[0], abc[1], abc[2]])),
+                    "B and C are right. np.arctan2 takes y first, then x: A = np.arctan2(r10, r00).",
+                    id="kuka-swapped-A-alone",
+                ),
+                Mistake(
+                    _angles(lambda abc: np.array([abc[0], abc[1], np.pi / 2 - abc[2]])),
+                    "A and B are right. np.arctan2 takes y first, then x: the sine of C before its cosine.",
+                    id="kuka-swapped-C-alone",
+                ),
             ],
         ),
         Prediction(
@@ -917,6 +1054,27 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda p, q: frames.fit_frame(p[:3], q[:3]),
                     "You use the first three points only. All of them count.",
+                ),
+                Mistake(
+                    _kabsch(handed=False, centered=False),
+                    "Subtract the means before the SVD: a rotation leaves a point where it is, and that point must be the center. (And "
+                    "where det R = -1 the last column of V changes its sign.)",
+                    id="fit-frame-not-centered-mirror",
+                ),
+                Mistake(
+                    _kabsch(handed=_rotation_of_the_transpose),
+                    "`np.linalg.svd` returns V already transposed: U, S, Vt. R = V U^T is `Vt.T @ U.T`.",
+                    id="fit-frame-V-as-returned",
+                ),
+                Mistake(
+                    _one_mean_for_all,
+                    "You took one mean over all numbers. Each coordinate has its own: `mean(axis=0)`.",
+                    id="fit-frame-mean-of-all",
+                ),
+                Mistake(
+                    lambda p, q: frames.frame_from_points(*q[:3]) @ frames.invert(frames.frame_from_points(*p[:3])),
+                    "You laid a frame through the first three points of each set. All points count, and all alike.",
+                    id="fit-frame-three-points",
                 ),
             ],
         ),
