@@ -73,6 +73,26 @@ def _written(form):
     return lambda points: "\n".join(" ".join(format(value, form) for value in point) for point in points)
 
 
+class Points(metrics.Numbers):
+    """Points of a file (mm); one that holds NaN let through what is no number."""
+
+    def admit(self, result, expected):
+        try:
+            return super().admit(result, expected)
+        except metrics.Refused:
+            if isinstance(result, np.ndarray | list | tuple) and _holds_nan(result):
+                words = "NaN stands where `number_in` found no number: 1,5 needs a point first, and what is none at all is a fault"
+                raise metrics.Refused(words) from None
+            raise
+
+
+def _holds_nan(result):
+    try:
+        return bool(np.isnan(np.asarray(result, dtype=float)).any())
+    except (TypeError, ValueError):
+        return False
+
+
 class ReadBack(np.ndarray):
     """Points that were read from a student's text, told from an array that was returned."""
 
@@ -136,7 +156,7 @@ FILES = [
         "read_system",
         reference=read_system,
         draw=TEXTS,
-        metric=metrics.Numbers(1e-12, "mm"),
+        metric=Points(1e-12, "mm"),
         properties=(names_the_line,),
         hints=(
             "Go through the lines with their numbers; a line that holds nothing but a comment holds no point.",
@@ -233,6 +253,11 @@ FILES = [
                 lambda points: write_system(points.T),
                 "Your lines hold the columns: x of all points, then y, then z. One line a point.",
                 id="write-columns",
+            ),
+            Mistake(
+                _written(".15f"),
+                "15 places after the point are too few for a small number: its digits begin later. Take 17 significant digits, or `repr`.",
+                id="write-fifteen-places",
             ),
             Mistake(
                 lambda points: write_system(points.astype(np.float32)),

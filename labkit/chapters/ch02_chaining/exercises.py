@@ -559,6 +559,11 @@ CHAPTER = Chapter(
                     lambda T: chaining.closure_error(T)[::-1],
                     "Angle and distance have changed places.",
                 ),
+                Mistake(
+                    _closure(lambda T: np.linalg.norm(T[:3, :3] - np.eye(3)) / np.sqrt(2)),
+                    "|R - I| / sqrt(2) is twice the sine of half the angle: the angle itself for small turns only.",
+                    id="closure-chord",
+                ),
             ],
         ),
         Value(
@@ -606,6 +611,18 @@ CHAPTER = Chapter(
                     lambda: np.linalg.norm(_sheet()[:3, 3]) / np.linalg.norm(_sheet()[:3, :3] - np.eye(3)),
                     "The norm of R - I is no angle: for small turns it is sqrt(2) times too large.",
                     id="lever-norm",
+                ),
+                Mistake(
+                    lambda: chaining.closure_error(_sheet())[1],
+                    "This is the loop's distance. Which lever, times the angle in rad, makes as much?",
+                    id="lever-distance",
+                ),
+                Mistake(
+                    lambda: (
+                        np.linalg.norm(lab_sheet.printed_transforms()[-1][:3, 3]) / chaining.closure_error(_sheet())[0]
+                    ),
+                    "This divides the length of the last link. The distance by which the loop misses itself is that of the product.",
+                    id="lever-last-link",
                 ),
             ],
         ),
@@ -655,6 +672,34 @@ CHAPTER = Chapter(
                     lambda: 1000 + chaining.closure_error(_sheet())[1],
                     "You returned how far the displaced point is from the origin. Subtract p.",
                     id="meter-no-difference",
+                ),
+                Mistake(
+                    lambda: 1000 * np.rad2deg(chaining.closure_error(_sheet())[0]),
+                    "The lever is multiplied by an angle in degrees here: arcs take radians.",
+                    id="meter-degrees",
+                ),
+                Mistake(
+                    lambda: 1000 * np.linalg.norm(_sheet()[:3, :3] - np.eye(3)) + chaining.closure_error(_sheet())[1],
+                    "The norm of R - I is sqrt(2) times the angle for small turns: no point is carried that far.",
+                    id="meter-norm",
+                ),
+                Mistake(
+                    lambda: 15.25,
+                    "Worse than any of the six axes, and still not the worst direction: try more of them.",
+                    id="meter-few-directions",
+                    within=0.27,
+                ),
+                Mistake(
+                    lambda: 7.4,
+                    "One of the six axes in the table above is worse than that: look for the largest, and between the axes too.",
+                    id="meter-below-the-axes",
+                    within=7.4,
+                ),
+                Mistake(
+                    lambda: 1e5,
+                    "No point 1000 mm away can be carried that far: the turn does at most 1000 mm times its angle in rad, the shift adds its length.",
+                    id="meter-too-far",
+                    within=1e5 - 15.7,
                 ),
             ],
         ),
@@ -900,6 +945,11 @@ CHAPTER = Chapter(
                 Mistake(
                     _between(lambda A, B: B @ frames.invert(A)),
                     "B @ inv(A) is the move seen from K0. The link from A to B, seen from A, is inv(A) @ B, `relative(A, B)`.",
+                ),
+                Mistake(
+                    _divided_by(lambda n: 4),
+                    "You divide by 4 whatever the loop: it has as many parts as it has links, N = len(transforms).",
+                    id="distribute-four",
                 ),
             ],
         ),

@@ -573,6 +573,11 @@ CHAPTER = Chapter(
                     lambda: np.linalg.norm(_kreisel().residuals, axis=1).mean(),
                     "This is the mean distance. The sheet takes the root of the mean square, which is a little larger.",
                 ),
+                Mistake(
+                    lambda: np.sqrt((_kreisel().residuals[[0, -1]] ** 2).sum() / 2),
+                    "These are the two poses that the sheet prints. All twelve count.",
+                    id="s0-two-poses",
+                ),
             ],
         ),
         Prediction(
