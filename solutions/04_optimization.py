@@ -304,18 +304,21 @@ def jacobian(x):
 
 
 # %% step-text [markdown]
-# With $r$ and $J$ a step is a linear least-squares problem. The thesis's (2-32) prints its solution with $J F$; with four residuals and two unknowns that product does not
-# exist. A transpose is missing.
+# With $r$ and $J$ a step is a linear least-squares problem, like that of chapter 3. The thesis's (2-32) prints its solution with $J F$; with four residuals and two unknowns
+# that product does not exist. A transpose is missing.
+#
+# Where the residuals bend, that step goes too far. **Levenberg and Marquardt** charge for its length: they minimize $|r + J h|^2 + \lambda |h|^2$. With $\lambda = 0$ that is
+# Gauss-Newton. Where does its gradient vanish, and which way does the step turn as $\lambda$ grows?
 
-# %% gauss_newton_step
-@ex.gauss_newton_step
-def gauss_newton_step(r, J):
-    """Return the step h, shape (n,), that minimizes |r + J h|.
+# %% damped_step
+@ex.damped_step
+def damped_step(r, J, damping):
+    """Return the step h, shape (n,), that minimizes |r + J h|^2 + damping |h|^2.
 
-    r: shape (m,); J: shape (m, n), m >= n.
+    r: shape (m,); J: shape (m, n), m >= n; damping: a number, 0 or positive.
     """
     ### BEGIN SOLUTION
-    return -np.linalg.lstsq(J, r, rcond=None)[0]
+    return -np.linalg.solve(J.T @ J + damping * np.eye(J.shape[1]), J.T @ r)
     ### END SOLUTION
 
 
@@ -324,7 +327,7 @@ def gauss_newton_step(r, J):
 #
 # $J^\top J$ has no negative eigenvalues, so Gauss-Newton points downhill; but nothing limits how far it goes. A **trust region** asks after every step: how much did $f$
 # really fall, and how much had the model promised? That is $\rho$ in (2-36). Below 0.1 the step is taken back; below ¼ the radius shrinks; above ¾, at the rim, it doubles.
-# **Levenberg-Marquardt** turns the same knob under another name: it adds $\lambda I$ to $J^\top J$, and a large $\lambda$ means a short step.
+# **Levenberg-Marquardt** turns the same knob under another name, $\lambda$: larger after a poor step, smaller after a good one.
 
 # %% gain_ratio
 @ex.gain_ratio

@@ -55,14 +55,14 @@ def test_break_it_shows_two_answers_also_to_whoever_has_not_solved_it():
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_gauss_newton_step_is_not_wired_to_two_unknowns(seed):
-    def two(r, J):
-        (a, b), (_, d) = J.T @ J
+def test_a_damped_step_is_not_wired_to_two_unknowns(seed):
+    def two(r, J, damping):
+        (a, b), (_, d) = J.T @ J + damping * np.eye(2)
         p, q = -J.T @ r
         return np.array([d * p - b * q, a * q - b * p]) / (a * d - b * b)
 
-    assert judged("gauss_newton_step", two, seed).status != CORRECT
-    outcome = judged("gauss_newton_step", lambda r, J: np.linalg.lstsq(J, -r, rcond=None), seed)
+    assert judged("damped_step", two, seed).status != CORRECT
+    outcome = judged("damped_step", lambda r, J, damping: np.linalg.lstsq(J, -r, rcond=None), seed)
     assert outcome.status == NOT_YET and "[0]" in outcome.text
 
 
@@ -166,3 +166,12 @@ def test_a_trust_region_follows_the_stated_rule(seed, good, grown):
 
     answer = beyond.loop(follow=follow)
     assert judged("trust_region", lambda *args: answer(*args), seed).status == NOT_YET
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_damped_step_may_be_a_taller_least_squares_problem(seed):
+    def stacked(r, J, damping):
+        n = J.shape[1]
+        return np.linalg.lstsq(np.vstack([J, np.sqrt(damping) * np.eye(n)]), -np.append(r, np.zeros(n)), rcond=None)[0]
+
+    assert judged("damped_step", stacked, seed).status == CORRECT

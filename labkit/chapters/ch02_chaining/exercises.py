@@ -681,7 +681,7 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda: 1000 * np.linalg.norm(_sheet()[:3, :3] - np.eye(3)) + chaining.closure_error(_sheet())[1],
                     "The norm of R - I is sqrt(2) times the angle for small turns: no point is carried that far.",
-                    id="meter-norm",
+                    id="meter-norm-and-shift",
                 ),
                 Mistake(
                     lambda: 15.25,

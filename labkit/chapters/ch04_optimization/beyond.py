@@ -143,6 +143,19 @@ def loop(**changes):
     return lambda residual, jacobian, x, radius, steps: descend(residual, jacobian, x, radius, steps, **changes)
 
 
+def never_looked_again(residual, jacobian, x, radius, steps):
+    """The loop with the residuals and the Jacobian of the start in every round."""
+    r, J = residual(x), jacobian(x)
+    g, B = J.T @ r, J.T @ J
+    for _ in range(steps):
+        step = bare_dogleg(g, B, radius)
+        new, length = residual(x + step), np.linalg.norm(step)
+        rho = 0.5 * (r @ r - new @ new) / -(g @ step + 0.5 * step @ B @ step)
+        x = x + step if rho > ACCEPT else x
+        radius = rule(radius, length, rho)
+    return x, radius
+
+
 def _problem(rng):
     """Residuals and their Jacobian: the two wells, or waves in two to four unknowns; and a start."""
     if rng.random() < 0.3:

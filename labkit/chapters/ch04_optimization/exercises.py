@@ -79,6 +79,16 @@ def residual_and_jacobian(rng, m, n):
 SIZES = ((6, 2), (7, 3), (4, 1), (3, 3), (9, 5))
 
 
+def damped_case(rng, m, n, damping):
+    """Residuals, Jacobian and a damping around this one; 0 is Gauss and Newton's step."""
+    return *residual_and_jacobian(rng, m, n), float(damping * rng.uniform(0.6, 1.4))
+
+
+DAMPED = tuple(
+    functools.partial(damped_case, m=m, n=n, damping=d) for (m, n), d in zip(SIZES, (0.5, 8.0, 4.0, 0.0, 60.0))
+)
+
+
 def tried_step(rng, shares):
     """Cost before and after a step that kept a share between these of its promise, with the model's g and B."""
     g, B = rng.normal(scale=3, size=2), turned(rng.uniform(1, 4, 2), rng.uniform(0.3, 1.2))
@@ -168,6 +178,16 @@ def _jacobian(less, depths=wells.DEPTHS):
         return np.vstack([np.sqrt(depths[k] / q[k]) * (np.eye(2) - less(d[k], q[k])) for k in range(2)])
 
     return variant
+
+
+def _jacobian_with(x, factor=lambda w, q: np.sqrt(w / q), product=lambda d: np.outer(d, d), depths=wells.DEPTHS):
+    """The Jacobian with another factor, product or depths."""
+    blocks = []
+    for w, c in zip(depths, wells.CENTERS):
+        d = x - c
+        q = d @ d + 1
+        blocks.append(factor(w, q) * (np.eye(2) - product(d) / q))
+    return np.vstack(blocks)
 
 
 def _diagonal_only(x):
@@ -279,6 +299,12 @@ def _wrong_comparison(g, B, radius):
     return full if full @ full <= radius else _past_newton(g, B, radius)
 
 
+def _corner_or_newton(g, B, radius):
+    """Never on the second leg: the corner, or the rim before it, until the Newton point lies inside."""
+    full, corner = opt.newton_step(g, B), opt.cauchy_step(g, B, radius)
+    return full if np.linalg.norm(full) <= radius else corner
+
+
 def _dogleg(
     corner=lambda p: p,
     full=lambda n: n,
@@ -385,6 +411,31 @@ CHAPTER = Chapter(
                     lambda x: wells.value(x),
                     "This is f itself. The gradient has two entries, its derivatives by x1 and x2.",
                     id="gradient-value",
+                ),
+                Mistake(
+                    _gradient(power=3),
+                    "Your denominators are q³: that is the power of the second derivative. The derivative of −1/q is 1/q² times that of q.",
+                    id="gradient-cubed",
+                ),
+                Mistake(
+                    lambda x: wells.gradient(x) / np.linalg.norm(wells.gradient(x)),
+                    "This is the direction of the gradient, of length 1. Its length tells how steep f is: leave it.",
+                    id="gradient-unit",
+                ),
+                Mistake(
+                    _gradient(second=(-2.0, -1.0)),
+                    "The second center is (−1, −2), x1 first: its offsets are x1 + 1 and x2 + 2.",
+                    id="gradient-center-order",
+                ),
+                Mistake(
+                    _gradient(second=(1.0, 1.0)),
+                    "Both wells sit at (1, 1) here. The deeper one has its center at (−1, −2).",
+                    id="gradient-one-center",
+                ),
+                Mistake(
+                    lambda x: wells.gradient(x) / 100,
+                    "The depths are 100 and 200; here they are 1 and 2.",
+                    id="gradient-depths",
                 ),
             ],
         ),
@@ -590,7 +641,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _stationary(_by(np.linalg.eigvalsh), lambda g: g @ g > 1e-6),
-                    "In effect your limit for |g| is 1e-3: `g @ g` is the square of the length. Take its root, and compare that with 1e-6.",
+                    "In effect your limit for |g| is 1e-3, not 1e-6. If you compare `g @ g` with 1e-6: that is the square of the length, take its root first.",
                     id="classify-square",
                 ),
                 Mistake(
@@ -659,6 +710,11 @@ CHAPTER = Chapter(
                     _swapped,
                     "Minimum and maximum are exchanged: at a minimum f bends up, all eigenvalues are positive.",
                 ),
+                Mistake(
+                    _stationary(lambda H: "minimum" if (np.linalg.eigvalsh(H) > 0).all() else "saddle"),
+                    "A maximum is called a saddle: where all eigenvalues are negative, f bends down in every direction.",
+                    id="classify-no-maximum",
+                ),
             ],
         ),
         Exercise(
@@ -712,6 +768,21 @@ CHAPTER = Chapter(
                     lambda g, H: -np.linalg.solve(_all_positive(H), g),
                     "Downhill along every direction, by |curvature|. Newton keeps the signs of H: where f bends down it climbs.",
                 ),
+                Mistake(
+                    lambda g, H: -np.linalg.solve(H, g) / np.linalg.norm(np.linalg.solve(H, g)),
+                    "The direction is right, and its length 1. Newton's step has a length of its own: it ends where the model is stationary.",
+                    id="newton-unit",
+                ),
+                Mistake(
+                    lambda g, H: np.linalg.solve(H, g).reshape(2, 1),
+                    "This is a column, shape (2, 1), and its sign is reversed. Leave g as it is, shape (2,).",
+                    id="newton-column-plus",
+                ),
+                Mistake(
+                    lambda g, H: -np.linalg.solve(H, g).reshape(2, 1),
+                    "The numbers are right, in a column of shape (2, 1). Leave g as it is, shape (2,).",
+                    id="newton-column",
+                ),
             ],
         ),
         Value(
@@ -739,6 +810,21 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda: wells.extrema()[1].x,
                     "That is the global minimum: start nearer to the pass between the wells.",
+                ),
+                Mistake(
+                    lambda: (wells.extrema()[0].x + wells.extrema()[1].x) / 2,
+                    "That is halfway between both minima. The deeper well pulls the pass away from there.",
+                    id="saddle-between-minima",
+                ),
+                Mistake(
+                    lambda: np.array([-0.9948, -1.9922]),
+                    "That is the global minimum, as the thesis prints it: start nearer to the pass between the wells.",
+                    id="saddle-printed-global",
+                ),
+                Mistake(
+                    lambda: np.array([0.9789, 0.9684]),
+                    "That is the local minimum, as the thesis prints it: start nearer to the pass between the wells.",
+                    id="saddle-printed-local",
                 ),
             ],
         ),
@@ -842,6 +928,26 @@ CHAPTER = Chapter(
                     "That is the share t at which f rises most: return the rise there.",
                     id="chord-share",
                 ),
+                Mistake(
+                    beyond.chords(lambda t, v, c: (v - c).sum()),
+                    "This is the sum over all places. Asked for is the largest rise among them.",
+                    id="chord-sum",
+                ),
+                Mistake(
+                    beyond.other_places(lambda n: np.linspace(0, 1, 21)),
+                    "You look at 21 places whatever n is: `np.linspace(0, 1, n)`.",
+                    id="chord-twenty-one",
+                ),
+                Mistake(
+                    beyond.other_places(lambda n: np.linspace(0, 1, n + 2)[1:-1]),
+                    "Your places leave out the ends: n of them, both ends included, is `np.linspace(0, 1, n)`.",
+                    id="chord-no-ends",
+                ),
+                Mistake(
+                    beyond.other_places(lambda n: np.linspace(0, 1, n - 1)),
+                    "You look at n − 1 places: `np.linspace(0, 1, n)` has n of them, both ends included.",
+                    id="chord-one-less",
+                ),
             ],
         ),
         Exercise(
@@ -918,35 +1024,123 @@ CHAPTER = Chapter(
                     "This is the gradient of f, 2Jᵀr. J itself has four rows, one a residual.",
                     id="jacobian-gradient",
                 ),
+                Mistake(
+                    lambda x: _jacobian_with(x, lambda w, q: w / q),
+                    "The root is missing: the factor in front is √(w/q).",
+                    id="jacobian-no-root",
+                ),
+                Mistake(
+                    lambda x: _jacobian_with(x, lambda w, q: np.sqrt(w) / q),
+                    "Only w is under the root. The factor in front is √(w/q): put the quotient in parentheses.",
+                    id="jacobian-root-of-w",
+                ),
+                Mistake(
+                    lambda x: _jacobian_with(x, lambda w, q: np.sqrt(w)),
+                    "Only w is under the root: the factor in front is √(w/q).",
+                    id="jacobian-without-q",
+                ),
+                Mistake(
+                    lambda x: _jacobian_with(x, product=lambda d: d @ d),
+                    "`d @ d` is a number, and is taken from all four entries. The product of a column and a row is `np.outer(d, d)`.",
+                    id="jacobian-inner",
+                ),
+                Mistake(
+                    lambda x: _jacobian_with(x, depths=(100.0, 100.0)),
+                    "The first two rows are right. The well at (−1, −2) is twice as deep: w = 200 there.",
+                    id="jacobian-one-depth",
+                ),
+                Mistake(
+                    lambda x: _jacobian_with(x, product=lambda d: np.outer(x, x)),
+                    "The outer product takes x itself. It is that of x − c, the offset from the well's center.",
+                    id="jacobian-of-x",
+                ),
             ],
         ),
         Exercise(
-            "gauss_newton_step",
-            reference=opt.gauss_newton_step,
-            draw=tuple(functools.partial(residual_and_jacobian, m=m, n=n) for m, n in SIZES),
-            metric=metrics.Numbers(1e-8),
+            "damped_step",
+            reference=opt.damped_step,
+            draw=DAMPED,
+            metric=metrics.Numbers(1e-7),
             hints=(
-                "Replace r(x + h) by r + J h and minimize its length.",
-                "That is linear least squares with matrix J and right-hand side −r; its normal equations are JᵀJ h = −Jᵀr. "
-                "They are right as well, but lose twice the digits, as in chapter 3.",
-                "`return -np.linalg.lstsq(J, r, rcond=None)[0]`",
+                "Set the gradient of |r + J h|² + λ |h|² to zero: what is added to JᵀJ?",
+                "(JᵀJ + λ I) h = −Jᵀr. Or without squaring J: least squares with √λ I beneath J, and zeros beneath r.",
+                "`return -np.linalg.solve(J.T @ J + damping * np.eye(J.shape[1]), J.T @ r)`",
             ),
             mistakes=[
                 Mistake(
-                    lambda r, J: np.linalg.lstsq(J, r)[0],
+                    lambda r, J, damping: -opt.damped_step(r, J, damping),
                     "The sign is wrong: r + J h should become small, so h has to counter r.",
+                    id="damped-sign",
                 ),
                 Mistake(
-                    lambda r, J: -J.T @ r, "That is the gradient of the cost, downhill; the curvature JᵀJ is missing."
-                ),
-                Mistake(lambda r, J: -J.T @ J @ J.T @ r, "You multiplied by JᵀJ instead of solving with it."),
-                Mistake(
-                    lambda r, J: -0.5 * np.linalg.lstsq(J, r)[0],
-                    "Half a step: cost ½|r|² has gradient Jᵀr and curvature JᵀJ, both without a 2.",
+                    lambda r, J, damping: opt.gauss_newton_step(r, J),
+                    "This is the step of Gauss and Newton. The damping, which charges for length, has no part in it.",
+                    id="damped-not",
                 ),
                 Mistake(
-                    lambda r, J: -(J.T @ r) / (J * J).sum(0),
+                    lambda r, J, damping: -J.T @ r,
+                    "That is the gradient of the cost, downhill; the curvature JᵀJ is missing.",
+                    id="damped-gradient",
+                ),
+                Mistake(
+                    lambda r, J, damping: -(J.T @ J + damping * np.eye(J.shape[1])) @ J.T @ r,
+                    "You multiplied by JᵀJ + λ I instead of solving with it.",
+                    id="damped-times",
+                ),
+                Mistake(
+                    lambda r, J, damping: -np.linalg.solve(J.T @ J + damping, J.T @ r),
+                    "The number λ is added to all entries of JᵀJ. It belongs to the diagonal: λ times `np.eye(n)`.",
+                    id="damped-everywhere",
+                ),
+                Mistake(
+                    lambda r, J, damping: opt.damped_step(r, J, damping**2),
+                    "λ counts squared: beneath J stands √λ I, whose square is the λ I of the normal equations.",
+                    id="damped-squared",
+                ),
+                Mistake(
+                    lambda r, J, damping: opt.damped_step(r, J, np.sqrt(damping)),
+                    "The root of λ stands in the normal equations. There it is λ I; its root stands beneath J.",
+                    id="damped-root",
+                ),
+                Mistake(
+                    lambda r, J, damping: opt.damped_step(r, J, damping / 2),
+                    "λ counts half. Both terms have the same factor: the gradient is 2Jᵀ(r + J h) + 2λ h.",
+                    id="damped-half",
+                ),
+                Mistake(
+                    lambda r, J, damping: opt.damped_step(r, J, 2 * damping),
+                    "λ counts twice. Both terms have the same factor: the gradient is 2Jᵀ(r + J h) + 2λ h.",
+                    id="damped-twice",
+                ),
+                Mistake(
+                    lambda r, J, damping: -np.linalg.solve(J.T @ J - damping * np.eye(J.shape[1]), J.T @ r),
+                    "The damping is subtracted, which makes the step longer. It is added: JᵀJ + λ I.",
+                    id="damped-minus",
+                ),
+                Mistake(
+                    lambda r, J, damping: -np.linalg.solve(J.T @ J + damping * np.diag(np.diag(J.T @ J)), J.T @ r),
+                    "Your damping is scaled with the diagonal of JᵀJ, as Marquardt has it. Here |h|² has one price for all: λ I.",
+                    id="damped-marquardt",
+                ),
+                Mistake(
+                    lambda r, J, damping: opt.gauss_newton_step(r, J) / (1 + damping),
+                    "You shortened the step of Gauss and Newton. Damping turns it as well: λ is added to the matrix before solving.",
+                    id="damped-shortened",
+                ),
+                Mistake(
+                    lambda r, J, damping: -(J.T @ r) / ((J * J).sum(0) + damping),
                     "Only the diagonal of JᵀJ is used: the columns of J are not perpendicular.",
+                    id="damped-diagonal",
+                ),
+                Mistake(
+                    lambda r, J, damping: opt.gauss_newton_step(r[: J.shape[1]], J[: J.shape[1]]),
+                    "You used as many residuals as there are unknowns, and no damping. All residuals count: (JᵀJ + λ I) h = −Jᵀr.",
+                    id="damped-first-rows",
+                ),
+                Mistake(
+                    lambda r, J, damping: r + J @ opt.damped_step(r, J, damping),
+                    "These are the residuals that the model leaves. Return the step h.",
+                    id="damped-residuals",
                 ),
             ],
         ),
@@ -1026,6 +1220,36 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda cost, new_cost, g, B, step: cost - new_cost / _predicted(g, B, step),
                     "Division comes before subtraction: put `cost - new_cost` in parentheses.",
+                ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: (cost - new_cost) / (cost + _predicted(g, B, step)),
+                    "The promised decrease has the cost added to it. It is m(0) − m(h), in which the cost cancels.",
+                    id="gain-cost-added",
+                ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: new_cost / cost,
+                    "This is the ratio of the costs. The gain is the actual decrease over the promised one.",
+                    id="gain-of-costs",
+                ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: cost - new_cost - _predicted(g, B, step),
+                    "This is the difference of both decreases. The gain is their ratio: actual over promised.",
+                    id="gain-difference",
+                ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: max(0.0, (cost - new_cost) / _predicted(g, B, step)),
+                    "A step that raised the cost has a negative gain; here it is cut off at 0.",
+                    id="gain-cut",
+                ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: (cost - new_cost) / -(g @ step + 0.5 * g @ B @ g),
+                    "The curvature term holds g twice. It is ½ hᵀB h, with the step.",
+                    id="gain-gBg",
+                ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: (cost - new_cost) / _predicted(g, B, step, half=2.0),
+                    "The quadratic term of the model carries a factor ½; here it is 2.",
+                    id="gain-twice",
                 ),
             ],
         ),
@@ -1125,6 +1349,38 @@ CHAPTER = Chapter(
                 Mistake(_dogleg(corner=lambda p: -p), "Your corner lies uphill: it is −(gᵀg / gᵀBg) g."),
                 Mistake(_dogleg(full=lambda n: -n), "Your Newton point has the wrong sign: it solves B h = −g."),
                 Mistake(_leg_from_zero, "The second leg starts at the corner: add corner to s times the leg."),
+                Mistake(
+                    _corner_or_newton,
+                    "Where the rim cuts the second leg you stop at the corner. Go on toward the Newton point, as far as the radius lets you.",
+                    id="dogleg-stops",
+                ),
+                Mistake(
+                    _dogleg(
+                        share=lambda a, b, c: (-b + np.sqrt(max(0.0, b * b - a * c))) / a, rim_term=lambda r: -(r**2)
+                    ),
+                    "In c the radius is subtracted: c = pᵀp − Δ², so that p + s l lies on the rim.",
+                    id="dogleg-c-sign",
+                ),
+                Mistake(
+                    _dogleg(share=lambda a, b, c: (-b + np.sqrt(max(0.0, b * b - a * c))) / a, rim_term=lambda r: r),
+                    "In c the radius is squared: c = pᵀp − Δ².",
+                    id="dogleg-c-radius",
+                ),
+                Mistake(
+                    _dogleg(corner=lambda p: p / np.linalg.norm(p), leg=None),
+                    "Your corner has length 1. It is the lowest point downhill: p = −(gᵀg / gᵀB g) g.",
+                    id="dogleg-unit-corner",
+                ),
+                Mistake(
+                    lambda g, B, radius: _dogleg(corner=lambda p: p / (g @ g))(g, B, radius),
+                    "gᵀg is missing in your corner: p = −(gᵀg / gᵀB g) g.",
+                    id="dogleg-corner-gg",
+                ),
+                Mistake(
+                    _dogleg(share=lambda a, b, c: (-2 * b + np.sqrt(4 * b * b - a * c)) / a),
+                    "b is pᵀl, without a 2: the formula for s has taken the factors out.",
+                    id="dogleg-2b",
+                ),
             ],
         ),
         Exercise(
@@ -1227,6 +1483,36 @@ CHAPTER = Chapter(
                     "This is where the first round ends: is the `return` inside the loop?",
                     id="region-one-round",
                 ),
+                Mistake(
+                    beyond.loop(
+                        follow=lambda radius, length, rho: (
+                            2 * beyond.rule(radius, length, rho)
+                            if rho > 0.75 and length > 0.999 * radius
+                            else beyond.rule(radius, length, rho)
+                        )
+                    ),
+                    "After a good step at the rim your radius becomes four times as large: it doubles.",
+                    id="trust-fourfold",
+                ),
+                Mistake(
+                    beyond.loop(
+                        follow=lambda radius, length, rho: (
+                            length / 2 if rho < 0.25 else beyond.rule(radius, length, rho)
+                        )
+                    ),
+                    "After a poor step your radius becomes half of the step's length: it is a quarter.",
+                    id="trust-half",
+                ),
+                Mistake(
+                    beyond.loop(follow=lambda radius, length, rho: length / 4 if rho < 0.25 else 2 * radius),
+                    "Your radius doubles after every step that is not poor. It doubles above ¾ and at the rim, otherwise it stays.",
+                    id="trust-else-doubles",
+                ),
+                Mistake(
+                    beyond.never_looked_again,
+                    "Residuals and Jacobian are those of the start in every round. Compute both where you stand, inside the loop.",
+                    id="trust-start",
+                ),
             ],
         ),
         Prediction(
@@ -1274,6 +1560,21 @@ CHAPTER = Chapter(
                     lambda: 100 * wells.luck(), "Right, in percent: give the probability as a number between 0 and 1."
                 ),
                 Mistake(lambda: 0.5**20, "That all five stand-ins have all landings right. One is enough."),
+                Mistake(
+                    lambda: 1 - (15 / 16) ** 4,
+                    "This tries four stand-ins. Five were tried, with four landings each.",
+                    id="luck-four",
+                ),
+                Mistake(
+                    lambda: 15 / 16,
+                    "That is the probability that one stand-in has not all landings right. Five were tried; at least one is to have them.",
+                    id="luck-one-wrong",
+                ),
+                Mistake(
+                    lambda: 5 / 32,
+                    "That is the toss of five coins, four of them right. Each stand-in has four landings, all to be right, and five are tried.",
+                    id="luck-four-of-five",
+                ),
             ],
         ),
         Prediction(
@@ -1322,6 +1623,46 @@ CHAPTER = Chapter(
                     lambda: 26 / 22,
                     "That is the ratio of the sums. The weight stands in front of one criterion, on both sides.",
                     id="tipping-ratio",
+                ),
+                Mistake(
+                    lambda: 26 - 22,
+                    "That is by how much the sphere leads. How much of it does each further unit of w win back?",
+                    id="tipping-lead",
+                ),
+                Mistake(
+                    lambda: (26 - 22) / 14,
+                    "That is the lead over the cube's other points. What wins it back is the gap in the last criterion, 8 − 3.",
+                    id="tipping-lead-14",
+                ),
+                Mistake(
+                    lambda: (9 + 8) / (3 + 3 + 8),
+                    "The ratio of the other points decides nothing: the weight multiplies the last criterion, on both sides.",
+                    id="tipping-17-14",
+                ),
+                Mistake(
+                    lambda: (9 + 8 + 6) - (3 + 3 + 8),
+                    "That is the lead of the sphere in the three other criteria. Divide it by the cube's lead in solving, 8 − 3.",
+                    id="tipping-nine",
+                ),
+                Mistake(
+                    lambda: 9 / (8 + 3),
+                    "The lead in the other criteria is divided by a sum. What w multiplies is the difference in solving, 8 − 3.",
+                    id="tipping-sum",
+                ),
+                Mistake(
+                    lambda: 1 + beyond.tipping_weight(),
+                    "One too many: w replaces the weight 1 of the printed sum, it is not added to it.",
+                    id="tipping-plus-one",
+                ),
+                Mistake(
+                    lambda: 8 / 3,
+                    "That is the ratio of the points for solving. The other three criteria count as well, once each.",
+                    id="tipping-ratio-of-solving",
+                ),
+                Mistake(
+                    lambda: 2,
+                    "With 2 the cube has won already, 30 to 29. Asked for is the weight at which both draw level.",
+                    id="tipping-two",
                 ),
             ],
         ),
