@@ -201,7 +201,8 @@ drawn[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
 distance = ...  # your code here
 ### BEGIN SOLUTION
 hole = np.array([200.0, 0.0, 0.0])
-distance = np.linalg.norm(frames.transform(T_K0K1, hole) - frames.transform(drawn, hole))
+apart = frames.transform(T_K0K1, hole) - frames.transform(drawn, hole)
+distance = np.linalg.norm(apart)
 ### END SOLUTION
 ex.distance(distance)
 ex.distance(distance)
