@@ -161,6 +161,20 @@ def test_sphere_that_does_not_move_in_the_field_is_refused(spread, where):
         hand_eye.calibrate_sphere_target(T_BF, x_S)
 
 
+@pytest.mark.parametrize("times, refused", [(0.3, True), (3.0, False)])
+def test_a_line_is_what_is_a_millionth_as_wide_as_long(times, refused):
+    along = np.linspace(-1, 1, 9)
+    across = np.cos(5 * along) - np.cos(5 * along) @ along / (along @ along) * along
+    across -= across.mean()
+    across *= np.linalg.norm(along) / np.linalg.norm(across)
+    x_S = np.column_stack([20 * along, np.full(9, 7.0), 240 + times * hand_eye.MIN_SPREAD * 20 * across])
+    if refused:
+        with pytest.raises(ValueError, match="on one line"):
+            hand_eye.refuse_one_line(x_S, np.ones(9))
+    else:
+        hand_eye.refuse_one_line(x_S, np.ones(9))
+
+
 def test_shapes_and_numbers_are_checked():
     T_BF, x_S = scene(6)
     with pytest.raises(ValueError, match=r"\(N, 4, 4\) and \(N, 3\), got"):

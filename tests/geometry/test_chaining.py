@@ -124,7 +124,7 @@ def test_distribution_refuses_what_has_no_answer():
     with pytest.raises(ValueError, match="half a turn"):
         chaining.distribute_closure([half_turn, np.eye(4)])
     with pytest.raises(ValueError, match="none negative"):
-        chaining.distribute_closure([np.eye(4), np.eye(4)], [1, -1])
+        chaining.distribute_closure([np.eye(4), np.eye(4)], [2, -1])
     with pytest.raises(ValueError, match="last axis|shape"):
         chaining.distribute_closure([np.eye(4), np.eye(4)], [1, 1, 1])
 
