@@ -98,9 +98,9 @@ def test_a_lost_beam_has_zero_weight_in_the_plain_model_only():
 
 def test_likelihood_field_weighting():
     field = LikelihoodField(ROOM, 0.5, share_hit=1.0, r_max=6.0)
-    weigh = weigh_likelihood_field(field, [5.7, 6.0], [0.0, 1.0])
-    assert weigh([[1.5, 1.5, 0.0]])[0] == pytest.approx(weigh.best, abs=1e-6)  # the second reading does not count
-    assert weigh.best == pytest.approx(-math.log(0.5 * math.sqrt(2 * math.pi)))
+    weigh = weigh_likelihood_field(field, [5.7, 2.6, 6.0], [0.0, math.pi / 2, 1.0])
+    assert weigh([[1.5, 1.5, 0.0]])[0] == pytest.approx(weigh.best, abs=1e-5)  # the third reading does not count
+    assert weigh.best == pytest.approx(-2 * math.log(0.5 * math.sqrt(2 * math.pi)))
 
 
 def test_likelihood_field_by_hand():

@@ -238,9 +238,13 @@ def test_covariance_of_the_mounting_is_that_of_repeated_runs():
     assert 5.4 < np.mean(nees) < 7.6  # the estimated noise widens 6 to about 6.5; a fixed seed
 
 
-def test_a_pose_of_nonsense_is_left_out():
+@pytest.mark.parametrize(
+    "turn, shift", [([0.3, 0, 0.2], [80, -60, 10]), ([0, 0, 0], [80, -60, 10]), ([0, 0.2, 0], [0] * 3)]
+)
+def test_a_pose_of_nonsense_is_left_out(turn, shift):
+    """Nonsense in its rotation, in its position, or in both."""
     T_BF, T_WE = readings(np.random.default_rng(6), 21, noise=0.5)
-    T_WE[7] = T_WE[7] @ pose(exp_so3([0.3, 0, 0.2]), [80.0, -60.0, 10.0])
+    T_WE[7] = pose(T_WE[7, :3, :3] @ exp_so3(turn), T_WE[7, :3, 3] + shift)
     m = calibrate_mounting(T_BF, T_WE)
     assert np.flatnonzero(~m.kept).tolist() == [7] and np.isnan(m.translation[7])
     assert pose_distance(m.T_FE, T_FE)[1] < 2
