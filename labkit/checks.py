@@ -6,6 +6,7 @@ from decimal import Decimal
 import numpy as np
 
 ORTHONORMAL_TOLERANCE = 1e-3  # six printed digits pass, a matrix in the wrong unit or a sheared one does not
+PRODUCT_TOLERANCE = 1e-2  # a product of a few such matrices
 LAST_ROW_TOLERANCE = 1e-6  # a product of poses in single precision passes, a transposed pose or a scale does not
 COVARIANCE_TOLERANCE = 1e-6  # of the standard deviations: sums in another order pass, single precision, too
 LARGEST_COORDINATE = 1e75  # fourth powers of coordinates still fit into a float
@@ -132,14 +133,14 @@ def fit_together(**shapes):
         raise ValueError(f"the leading axes must be equal or broadcast, got {found}") from None
 
 
-def as_rotations(value, name):
+def as_rotations(value, name, tolerance=ORTHONORMAL_TOLERANCE):
     """`value` as rotation matrices, shape (..., 3, 3), orthonormal and right-handed."""
     array = as_matrices(value, name, 3, 3)
-    _refuse_sheared(array, name)
+    _refuse_sheared(array, name, tolerance)
     return array
 
 
-def as_transforms(value, name):
+def as_transforms(value, name, tolerance=ORTHONORMAL_TOLERANCE):
     """`value` as rigid transforms, shape (..., 4, 4): orthonormal rotation block, last row (0, 0, 0, 1).
 
     What rounding leaves passes: up to 1e-6 in the last row, 1e-3 in R'R.
@@ -150,13 +151,13 @@ def as_transforms(value, name):
     if (off > LAST_ROW_TOLERANCE).any():
         row = last.reshape(-1, 4)[np.argmax(off)]
         raise ValueError(f"{name} must have the last row 0 0 0 1, got {shown(row, '.9g')}")
-    _refuse_sheared(array[..., :3, :3], name)
+    _refuse_sheared(array[..., :3, :3], name, tolerance)
     return array
 
 
-def _refuse_sheared(R, name):
+def _refuse_sheared(R, name, tolerance):
     error = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(initial=0.0)
-    if error > ORTHONORMAL_TOLERANCE:
+    if error > tolerance:
         raise ValueError(
             f"{name} must have an orthonormal rotation block, but R'R differs from I by {shown(error, '.3g')}"
         )
@@ -165,6 +166,44 @@ def _refuse_sheared(R, name):
         raise ValueError(
             f"{name} must be right-handed, but its rotation block has determinant {shown(det.min(), '.3g')}"
         )
+
+
+def as_generator(value, name="rng"):
+    """`value` as it is; refuses what is no `numpy.random.Generator`."""
+    return as_instance(value, name, np.random.Generator, "a numpy.random.Generator, as default_rng(seed) gives it")
+
+
+def as_function(value, name):
+    """`value` as it is; refuses what cannot be called."""
+    if not callable(value):
+        raise ValueError(f"{name} must be a function, got {kind(value)}")
+    return value
+
+
+def as_instance(value, name, type_, wanted=""):
+    """`value` as it is; refuses what is no instance of a class, which `wanted` puts into words."""
+    if not isinstance(value, type_):
+        raise ValueError(f"{name} must be {wanted or type_.__name__}, got {kind(value)}")
+    return value
+
+
+def as_choice(value, name, options):
+    """`value` as it is; refuses what is none of some words."""
+    if not isinstance(value, str) or value not in options:
+        raise ValueError(f"{name} must be one of {', '.join(options)}, got {value!r}")
+    return value
+
+
+def as_items(value, name, of):
+    """`value` as a list; refuses what holds no items, with the word for what they should be."""
+    if isinstance(value, str | bytes) or not np.iterable(value):
+        raise ValueError(f"{name} must be a sequence of {of}, got {kind(value)}")
+    return list(value)
+
+
+def kind(value):
+    """What something is, for a refusal: "None", or its type."""
+    return "None" if value is None else f"an object of type {type(value).__name__}"
 
 
 def as_positive(value, name):

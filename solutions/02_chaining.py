@@ -54,8 +54,8 @@ for k, (T, S) in enumerate(zip(printed, measured)):
 # %% order [markdown]
 # ## First A, then B
 #
-# Every move is made *in the frame that has been reached*. Below, A shifts and turns by 60°, B shifts only. Decide first, then drag the frames A and B,
-# and turn them with the sliders. Then try *No turns*.
+# Every move is made *in the frame that has been reached*. Below, A shifts and turns about z by 60°, B shifts only. Decide first, then drag the frames A and B,
+# and turn them with the sliders, B about x. Then try *No turns*.
 
 # %% predict-order
 guess = ...  # your code here
@@ -178,7 +178,7 @@ ex.worst_at_one_meter(worst_at_one_meter)
 # ## One bad link
 #
 # A turn at the end of link $k$ moves everything that follows. The end of the chain moves by the turn (in rad) times its **lever**: the distance from $K_k$ to the end.
-# The figure shows the sheet's loop in plan view: thin (black, or white on dark) as it is, purple as the chain sees it, gray the gap at $K_0$ and at a work piece P. Drag the frames, and choose which link is wrong.
+# The figure shows the sheet's loop: thin (black, or white on dark) as it is, purple as the chain sees it, gray the gap at $K_0$ and at a work piece P; the measuring arm stands where that link is measured. Drag the frames, choose which link is wrong, and about which axis: then the lever is the distance from that axis.
 
 # %% predict-lever
 guess = ...  # your code here
@@ -195,7 +195,7 @@ ex.predict("lever", guess, reveal=stages.open_loop)
 # $$\text{angle}^2 = 3N\sigma_r^2, \qquad \text{distance}^2 = 3N\sigma_t^2 + 2\sigma_r^2 \sum_k |l_k|^2 .$$
 #
 # (A turn about the lever itself moves nothing: two of three components count.) For $N$ links of length $L$ in a row the levers are $0, L, \dots, (N-1)L$.
-# On a loop of fixed size they stay below its diameter. In the figure, left: where a hundred chains end, seen along the chain (dashed circle: the law); right: the laws, and what was simulated.
+# On a loop of fixed size they stay below its diameter. In the figure, left: a hundred chains, seen from the side (dashed: the law); right: the laws, gray those of other errors of a link. The numbers of the sentence beneath can be dragged.
 
 # %% predict-growth
 guess = ...  # your code here
@@ -336,8 +336,8 @@ print(f"weighted sum of squares {graph.chi2:.1f}, expected about {graph.dof}")
 print("(std_rot comes from this very loop: no test)")
 
 # %% second-loop [markdown]
-# Now a second loop. Six frames, seven links, two loops A and B with one link in common. Decide what happens, then step through the measurements.
-# Left: the frames with their errors magnified; right: by how much each loop is still open.
+# Now a second loop. Six frames, seven links, two loops A and B with one link in common. Decide what happens, then pull either loop open at its ring.
+# Left: the loops with their errors magnified, as measured (thin) and after sharing out; right: by how much each is still open, for each way of sharing out.
 
 # %% predict-two-loops
 guess = ...  # your code here

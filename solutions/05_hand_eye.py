@@ -295,7 +295,8 @@ def gauss_newton_on_pose(T_FS, T_BF, x_S, target):
 #
 # CAD puts the scanner at B = −90°, where A and C turn about one line (chapter 1). Only A + C is left of the two there. The rate matrix, which makes a
 # rotation vector of $\dot A, \dot B, \dot C$, has determinant $-\cos B$. **What do Gauss-Newton steps in A, B, C do there that steps on the pose do not**: never
-# arrive, take detours, or nothing special? Decide; then drag the start along the pole's line, and away from it.
+# arrive, take detours, or nothing special? Decide; then turn the start by its rings, toward the pole
+# and away from it, and follow the scanner step by step.
 
 # %% predict-pole
 guess = ...  # your code here

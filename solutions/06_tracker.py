@@ -856,10 +856,10 @@ halved = np.sqrt(total**2 - 0.75 * largest**2)
 halved = ex.halved(halved)
 
 # %% what-a-budget-knows [markdown]
-# Now make the figure above fail, and push the part about. One calibration is wrong by
-# more than it admits, the tip misses by millimeters, and the budget has not changed: it
-# repeats what the calibrations say of themselves. It says where to work next, and
-# whether a miss is too large to be chance. It never says that nothing is wrong; a part
+# Now make the figure above fail, and push the part about; or click a frame and spoil it.
+# One calibration is wrong by more than it admits, the tip misses by millimeters, and
+# the budget has not changed: it repeats what the calibrations say of themselves. It
+# says where to work next, and whether a miss is too large to be chance. It never says that nothing is wrong; a part
 # measured twice, by different ways, does.
 
 # %% questions [markdown]

@@ -339,7 +339,7 @@ poses, covs = odometry.drive_with_covariance(np.zeros(3), np.zeros((3, 3)), cont
                                              drive.dt, **drive.noise)
 rng = np.random.default_rng(5)
 ends = odometry.sample_drives(np.zeros(3), controls, drive.dt, **drive.noise, rng=rng,
-                              runs=10_000)[-1]
+                              runs=10_000)[-1].copy()  # not the whole paths
 bent = gaussian.bent_region(poses[-1], ends)
 straight = gaussian.share_inside(ends, poses[-1], covs[-1])
 curved = gaussian.share_inside(bent.twists, bent.mean, bent.cov)

@@ -145,7 +145,8 @@ for name, (x0, var0, values) in readings.items():
 # time step $T$: $A = \begin{pmatrix}1 & T\\0 & 1\end{pmatrix}$, $B = \begin{pmatrix}0\\T\end{pmatrix}$, $C = (1\ \ 0)$. (Acceleration also moves the
 # position by $T^2/2$; the lecture leaves that out.)
 #
-# In the figure, move what the filter *believes* about its noises; the true ones stay 0.4 m/s² and 0.5 m. Switch the sensor off for three seconds.
+# In the figure, the dots are the sensor's errors, and the bracket beside them what the filter *believes* of the sensor. Pull it until it fits; the true noises stay 0.5 m and
+# 0.4 m/s². On the right the mean NIS judges every such belief. Then switch the sensor off for three seconds.
 
 # %% predict-velocity
 guess = ...  # your code here

@@ -30,6 +30,7 @@ ROOT = source.ROOT
 SECONDS_A_JOB = 900
 UNITS = 2  # jobs of unit tests; each more costs its imports again
 APART = ("browser", "hub")  # folders of tests that are jobs of their own
+BARE = ("-pno:hypothesispytest",)  # notebooks need none, and its import costs as much as a small kernel
 COUNTED = ("passed", "failed", "error", "skipped", "xfailed")
 
 
@@ -89,12 +90,12 @@ def all_jobs(scratch):
     jobs = {
         **{name: [str(ROOT / "tests" / name)] for name in APART},
         **{f"unit tests {k + 1}": units[k::UNITS] for k in range(UNITS)},
-        "solved notebooks 1": ["--nbval", *solved[0::2]],
-        "solved notebooks 2": ["--nbval", *solved[1::2]],
+        "solved notebooks 1": ["--nbval", *BARE, *solved[0::2]],
+        "solved notebooks 2": ["--nbval", *BARE, *solved[1::2]],
     }
     blank = [str(path) for path in blank_notebooks(scratch)]
-    jobs["blank notebooks 1"] = ["--nbval-lax", *blank[0::2]]
-    jobs["blank notebooks 2"] = ["--nbval-lax", *blank[1::2]]
+    jobs["blank notebooks 1"] = ["--nbval-lax", *BARE, *blank[0::2]]
+    jobs["blank notebooks 2"] = ["--nbval-lax", *BARE, *blank[1::2]]
     return {name: words for name, words in jobs.items() if any(not word.startswith("-") for word in words)}
 
 

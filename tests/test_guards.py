@@ -1,10 +1,12 @@
 """What keeps the house in order: notebook files that compare well, imports that run one way, colors from one place."""
 
 import ast
+import functools
 import json
 import re
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 
@@ -100,10 +102,19 @@ def storey_of(path):
     return parts[0] if len(parts) > 1 else GROUND_FLOOR.get(path.stem, "verbs")
 
 
-def imported(path):
+@functools.cache
+def facts(path):
+    """What the guards ask of a Python file, read once: its imports, its long functions, its colors."""
+    nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    return SimpleNamespace(
+        imports=list(imported(path, nodes)), long=set(long_functions(nodes)), colors=list(literal_colors(nodes))
+    )
+
+
+def imported(path, nodes):
     """Absolute names of all modules that a module of labkit imports."""
     package = path.relative_to(ROOT).with_suffix("").parts[:-1]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in nodes:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -154,7 +165,7 @@ MODULES = sorted((ROOT / "labkit").rglob("*.py"))
 def test_imports_go_down_only(path):
     """chapters -> documents -> mathematics -> checks; the engines know no chapter, a chapter knows no other."""
     storey = storey_of(path)
-    for name in imported(path):
+    for name in facts(path).imports:
         first, *rest = name.split(".")
         if first == "labkit" and rest:
             other = GROUND_FLOOR.get(rest[0], rest[0])
@@ -178,16 +189,16 @@ def test_what_a_document_prints_is_read_in_its_room(path):
     excused = path.relative_to(ROOT / "labkit").as_posix() in READS_A_TABLE
     if storey_of(path) not in (*MATHEMATICS, "chapters") or excused:
         return
-    reads = {name for name in imported(path) if name.startswith("labkit.tables")}
+    reads = {name for name in facts(path).imports if name.startswith("labkit.tables")}
     assert not reads, f"{path.name} imports {min(reads)}: move the table to labkit/documents"
 
 
 LONGEST_FUNCTION = 40  # lines of a body, without its docstring
 
 
-def long_functions(path):
+def long_functions(nodes):
     """Names of the functions of a module whose body is longer than LONGEST_FUNCTION; builders of Stages excepted."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in nodes:
         if isinstance(node, ast.FunctionDef):
             body = node.body[1:] if ast.get_docstring(node) and len(node.body) > 1 else node.body
             builds = any(isinstance(n, ast.Return) and _makes_a_stage(n.value) for n in node.body)
@@ -201,17 +212,20 @@ def _makes_a_stage(value):
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_functions_are_short(path):
-    found = set(long_functions(path))
+    found = facts(path).long
     assert not found, f"{found} exceeds {LONGEST_FUNCTION} lines: cut it where its parts have names"
 
 
+@functools.cache
 def public_functions(path):
-    """(definition, docstring) of each public function of a module with two or more parameters."""
+    """[(definition, docstring)] of each public function of a module with two or more parameters."""
+    found = []
     for node in ast.parse(path.read_text(encoding="utf-8")).body:
         if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
             given = node.args
             if len(given.posonlyargs + given.args + given.kwonlyargs) >= 2:
-                yield node, ast.get_docstring(node) or ""
+                found.append((node, ast.get_docstring(node) or ""))
+    return found
 
 
 def own_statements(function):
@@ -252,9 +266,9 @@ def test_mathematics_says_what_goes_in_and_what_comes_out(path):
             assert has_section(text, "Raises"), f"{node.name} needs a section Raises"
 
 
-def literal_colors(tree):
+def literal_colors(nodes):
     """(line, color) of each color written as text in the code."""
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             if re.fullmatch(r"#(?:[0-9a-fA-F]{3}){1,2}", node.value):
                 yield node.lineno, node.value
@@ -275,13 +289,13 @@ DRAWING = [p for p in MODULES if storey_of(p) in ("stage", "chapters") and p.nam
 
 @pytest.mark.parametrize("path", DRAWING, ids=lambda path: str(path.relative_to(ROOT)))
 def test_colors_come_from_the_style_alone(path):
-    found = list(literal_colors(ast.parse(path.read_text(encoding="utf-8"))))
+    found = facts(path).colors
     assert not found, f"line {found[0][0]} writes the color {found[0][1]!r}: take it from labkit/stage/style.py"
 
 
 def test_the_color_guard_sees_colors():
     code = 'ax.plot(x, y, "k--")\nax.scatter(x, y, c="red")\nINK = "#112233"\nax.plot(x, y, "-", color="none")'
-    assert [value for _, value in sorted(literal_colors(ast.parse(code)))] == ["k--", "red", "#112233"]
+    assert [value for _, value in sorted(literal_colors(ast.walk(ast.parse(code))))] == ["k--", "red", "#112233"]
 
 
 def test_constraints_hold_no_address():

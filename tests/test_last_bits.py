@@ -56,7 +56,7 @@ def test_a_notebook_runs_with_stirred_last_bits(tmp_path, monkeypatch):
     path = folder / "small.ipynb"
     path.write_text(json.dumps(notebook), encoding="utf-8")
     try:
-        passed, failed = (run.run(["--nbval", str(path)], seed)[0] for seed in (1, None))
+        passed, failed = (run.run(["--nbval", *run.BARE, str(path)], seed)[0] for seed in (1, None))
     finally:
         path.unlink()
         folder.rmdir()

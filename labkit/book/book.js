@@ -1,6 +1,26 @@
 // What the pages of the book do beyond being read: films, predictions, the ledger's search, light and dark, print.
 
 const EARLY = "600px"; // films this far below the window are loaded
+const UNABLE = "This browser has no WebGL 2, which would draw and turn the figure.";
+
+/** The drawing in space, loaded by the first figure that needs it: pages opened from a folder may load no modules. */
+const space = (globalThis[Symbol.for("labkit.space")] = {
+  load: () => (space.loading ??= new Promise((arrive, fail) => {
+    window.labkitSpace = arrive;
+    const script = element("script", "", { src: "space.js" });
+    script.addEventListener("error", fail);
+    document.head.append(script);
+  })),
+});
+
+async function drawsSpace() {
+  try {
+    space.module = await space.load();
+    return space.module.works();
+  } catch {
+    return false;
+  }
+}
 
 for (const figure of document.querySelectorAll("figure[data-film]")) watch(figure);
 
@@ -24,17 +44,28 @@ function load(figure) {
   document.head.append(script);
 }
 
-function project(figure, film) {
+async function project(figure, film) {
+  const inSpace = film.declaration.spaces.length > 0;
+  if (inSpace && !(await drawsSpace())) {
+    figure.querySelector("figcaption small").textContent = UNABLE;
+    return;
+  }
   const place = element("div");
   figure.prepend(place);
   render({ model: new Projector(film), el: place });
   const shown = new MutationObserver(() => { // the first picture is on the screen
-    if (!place.querySelector(".labkit-stage[data-picture]")) return;
+    if (!place.querySelector(inSpace ? ".labkit-stage[data-picture] canvas[data-space=true]" : ".labkit-stage[data-picture]")) return;
     shown.disconnect();
     figure.classList.add("live");
-    if (film.tracks.handle) place.querySelector(".picture").append(pathOf(film));
+    if (film.tracks.handle && !isInSpace(film)) place.querySelector(".picture").append(pathOf(film));
   });
-  shown.observe(place, { subtree: true, attributes: true, attributeFilter: ["data-picture"] });
+  shown.observe(place, { subtree: true, attributes: true, attributeFilter: ["data-picture", "data-space"] });
+}
+
+/** Whether the ring moves in space: then the scene itself shows where it was recorded. */
+function isInSpace(film) {
+  const [name] = Object.keys(film.declaration.handles);
+  return film.tracks.handle.notes[0].handles[name].point !== undefined;
 }
 
 /** Where the ring was recorded, as a dotted line. */

@@ -48,6 +48,7 @@ def recorded_words(data, declared):
     more = len(declared["handles"]) - len(shown["handles"]), len(declared["controls"]) - len(shown["controls"])
     beyond = [f"{n} more {word}{'s' * (n > 1)}" for n, word in zip(more, ("point", "control")) if n]
     said = f"Recorded: {', '.join(parts)}." if parts else "Recorded: its buttons."
+    said += " It turns freely." if "space" in data else ""
     if beyond:
         said += f" In the notebook {' and '.join(beyond)} move{'s' * (sum(more) == 1)}."
     return said

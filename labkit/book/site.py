@@ -47,6 +47,8 @@ def write(chapters, entries, folder):
     styles = (STAGE / "stage.css", HERE / "book.css")
     (folder / "book.css").write_text("\n".join(path.read_text(encoding="utf-8") for path in styles), encoding="utf-8")
     (folder / "book.js").write_text(script(), encoding="utf-8")
+    (folder / "space.js").write_text(space(), encoding="utf-8")
+    (folder / "space.LICENSE.txt").write_bytes((STAGE / "space.LICENSE.txt").read_bytes())
 
 
 def script():
@@ -54,6 +56,14 @@ def script():
     parts = [path.read_text(encoding="utf-8") for path in (STAGE / "stage.js", STAGE / "film.js", HERE / "book.js")]
     plain = re.sub(r"^export default .*$|^export (?=class|function|const)", "", "\n".join(parts), flags=re.M)
     return f'"use strict";\n(() => {{\n{plain}}})();\n'
+
+
+def space():
+    """The drawing in space as a classic script that hands its module to `labkitSpace`."""
+    head, module = (STAGE / "space.js").read_text(encoding="utf-8").split("\n", 1)
+    body, names = re.fullmatch(r"(.*)export\s*\{([^}]*)\};?\s*", module, re.S).groups()
+    handed = re.sub(r"(\w+) as (\w+)", r"\2: \1", names)
+    return f'{head}\n"use strict";labkitSpace((() => {{ {body}return {{ {handed} }}; }})());\n'
 
 
 def page(title, body, chapters, here):
@@ -91,8 +101,9 @@ def contents(chapters):
     return (
         f"<h1>{TITLE}</h1>\n<p>Four real documents, a lab sheet, a master thesis, a research report and a lecture, are "
         "recomputed number by number. This is the reading edition of the workbook: its text, its code with the "
-        "solutions, and its figures. They move: pull a ring along its dotted line, a slider, or time. Every figure can "
-        "be made to fail. In the notebooks everything in them is free, and the code is yours to write.</p>\n"
+        "solutions, and its figures. They move: pull a ring along its dotted line, a slider, or time; what lies in "
+        "space turns under the finger. Every figure can be made to fail. In the notebooks everything in them is free, "
+        "and the code is yours to write.</p>\n"
         '<p>Where a question stands before a figure, choose an answer first.</p>\n<ol class="cards" start="0">'
         f'{"".join(cards)}</ol>\n<p><a href="figures.html">All figures on one page</a> · '
         '<a href="ledger.html">The ledger: every printed number, recomputed</a></p>'

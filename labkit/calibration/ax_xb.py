@@ -16,8 +16,8 @@ from functools import cached_property
 import numpy as np
 
 from ..checks import as_positive_number, as_rotations, as_shape, as_transforms, shown
-from ..geometry.frames import invert, pose, rotation_block
-from ..geometry.lie import exp_so3, log_so3, nearest_rotation, skew
+from ..geometry.frames import invert, moved, pose, rotation_block
+from ..geometry.lie import log_so3, nearest_rotation, skew
 from .motion import refuse_one_axis
 from .result import Result, pose_parameters, result_class
 from .robust import median_std
@@ -415,16 +415,12 @@ def _gauss_newton(robot, T_ST, weights, given):
         r = np.concatenate([turn.ravel() * root / std_rot, gap.ravel() * root / std_trans])
         scale = 1 / np.linalg.norm(J, axis=0)
         step = scale * np.linalg.lstsq(J * scale, -r, rcond=None)[0]
-        sensor, target = _moved(sensor, step[:6]), _moved(target, step[6:])
+        sensor, target = moved(sensor, step[:6]), moved(target, step[6:])
         largest = np.abs(step[[0, 1, 2, 6, 7, 8]]).max()
         history.append((std_rot, std_trans, largest))
         if largest < STEP_TOLERANCE:
             break
     return sensor, target, history
-
-
-def _moved(T, step):
-    return pose(T[:3, :3] @ exp_so3(step[:3]), T[:3, 3] + step[3:])
 
 
 def noise_levels(square_rot, square_trans, freedom, given, size):

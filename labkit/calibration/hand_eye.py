@@ -30,7 +30,7 @@ from ..checks import (
     fit_together,
     shown,
 )
-from ..geometry.frames import invert, matrix_from_kuka, pose, transform
+from ..geometry.frames import invert, matrix_from_kuka, moved, pose, transform
 from ..geometry.lie import exp_so3, nearest_rotation, skew
 from .motion import refuse_one_axis
 from .result import Parameter, Result, point_parameters, pose_parameters, result_class
@@ -181,6 +181,24 @@ def rms_distance(residuals):
 # --- model -----------------------------------------------------------------------------------------------------------
 
 
+def sphere_in_scanner(T_BF, T_FS, target):
+    """The sphere's center as the scanner sees it in each pose: target, mapped from B to F and on to S.
+
+    Parameters
+    ----------
+    T_BF : array-like, shape (..., N, 4, 4)
+    T_FS : array-like, shape (4, 4)
+    target : array-like, shape (3,), mm
+
+    Returns
+    -------
+    x_S : array, shape (..., N, 3), mm
+
+    Source: thesis, formula (4-1), solved for x_S.
+    """
+    return transform(invert(T_FS), transform(invert(T_BF), target))
+
+
 def sphere_residuals(T_BF, x_S, T_FS, target):
     """Residual vectors T_BF T_FS x_S - target.
 
@@ -198,9 +216,9 @@ def sphere_residuals(T_BF, x_S, T_FS, target):
 
     Source: thesis, formula (4-3).
     """
-    moved, target = transform(T_BF, transform(T_FS, x_S)), as_points(target, "target")
-    fit_together(T_BF=moved.shape, target=target.shape)
-    return moved - target
+    centers, target = transform(T_BF, transform(T_FS, x_S)), as_points(target, "target")
+    fit_together(T_BF=centers.shape, target=target.shape)
+    return centers - target
 
 
 def kuka_residuals(p2, T_BF, x_S, target):
@@ -311,8 +329,8 @@ def radius_jacobian(T_BF, x_S, T_FS, radius):
     """
     by_R = np.zeros_like(x_S)
     by_R[:, 1] = radius / x_S[:, 1]
-    moved = T_BF[:, :3, :3] @ (T_FS[:3, :3] @ by_R[..., None])
-    return np.concatenate([joint_jacobian(T_BF, x_S, T_FS), moved.reshape(-1, 1)], axis=1)
+    turned = T_BF[:, :3, :3] @ (T_FS[:3, :3] @ by_R[..., None])
+    return np.concatenate([joint_jacobian(T_BF, x_S, T_FS), turned.reshape(-1, 1)], axis=1)
 
 
 def plate_jacobian(T_BF, x_S, p2, p3, x_P):
@@ -458,8 +476,8 @@ def _gauss_newton(R_FS, T_BF, x_S, weights, max_steps):
         r = sphere_residuals(T_BF, x_S, T_FS, target).ravel() * root
         return r, r @ r
 
-    def moved(T_FS, target, step):
-        return pose(T_FS[:3, :3] @ exp_so3(step[:3]), T_FS[:3, 3] + step[3:6]), target + step[6:]
+    def after(T_FS, target, step):
+        return moved(T_FS, step[:6]), target + step[6:]
 
     shift = _best_shift(R_FS, T_BF, x_S, root)
     T_FS, target = pose(R_FS, shift[:3]), shift[3:]
@@ -467,11 +485,11 @@ def _gauss_newton(R_FS, T_BF, x_S, weights, max_steps):
     for _ in range(max_steps):
         costs.append(cost)
         step = np.linalg.lstsq(joint_jacobian(T_BF, x_S, T_FS) * root[:, None], -r, rcond=None)[0]
-        trial = residuals(*moved(T_FS, target, step))
+        trial = residuals(*after(T_FS, target, step))
         while trial[1] > cost and np.abs(step[:3]).max() > STEP_TOLERANCE:
             step = step / 2
-            trial = residuals(*moved(T_FS, target, step))
-        (T_FS, target), (r, cost) = moved(T_FS, target, step), trial
+            trial = residuals(*after(T_FS, target, step))
+        (T_FS, target), (r, cost) = after(T_FS, target, step), trial
         if np.abs(step[:3]).max() <= STEP_TOLERANCE:
             break
     return T_FS, target, np.sqrt(np.array([*costs, cost]) / weights.sum())

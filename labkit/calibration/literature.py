@@ -10,7 +10,7 @@ import numpy as np
 from ..checks import as_count, as_matrices, as_positive_number, as_shape, as_transforms, shown
 from ..geometry.frames import invert, pose, transform
 from ..geometry.lie import exp_so3, nearest_rotation
-from .hand_eye import MIN_SPREAD, as_sightings, calibrate_sphere_target, linear_start
+from .hand_eye import MIN_SPREAD, as_sightings, calibrate_sphere_target, linear_start, sphere_in_scanner
 from .planning import poses_that_see, predicted_sphere_covariance
 
 CUBE = 60.0 * (np.indices((2, 2, 2)).reshape(3, 8).T - 0.5)  # mm, corners
@@ -259,7 +259,7 @@ def suitable_scene(std, rng):
     T_BF = poses_that_see(T_FS, target, exp_so3(rng.uniform(-1, 1, (12, 3))), places)
     shifts = np.concatenate([30 * np.eye(3), [[-30.0, 20.0, 10.0]]])
     T_BF = np.concatenate([T_BF, T_BF[:1] @ pose(np.tile(np.eye(3), (4, 1, 1)), shifts)])
-    exact = transform(invert(T_FS), transform(invert(T_BF), target))
+    exact = sphere_in_scanner(T_BF, T_FS, target)
     seen = exact + std * rng.normal(size=exact.shape)
     cube = transform(invert(T_BF @ T_FS)[:, None], CUBE + target)
     return SuitableScene(T_FS, target, T_BF, seen, cube + std * rng.normal(size=cube.shape), CUBE)

@@ -21,9 +21,9 @@ from ..checks import (
     fit_together,
     shown,
 )
-from ..geometry.frames import invert, pose, transform
+from ..geometry.frames import pose, transform
 from ..geometry.lie import exp_so3
-from .hand_eye import MIN_SPREAD, joint_jacobian
+from .hand_eye import MIN_SPREAD, joint_jacobian, sphere_in_scanner
 
 FIELD = (
     (-25.0, 25.0),
@@ -79,7 +79,7 @@ def predicted_sphere_covariance(T_BF, T_FS, target, std):
     ValueError
         For poses that leave a direction undetermined.
     """
-    x_S = transform(invert(T_FS), transform(invert(T_BF), target))
+    x_S = sphere_in_scanner(T_BF, T_FS, target)
     J = joint_jacobian(T_BF, x_S, T_FS)
     scale = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
     values = np.linalg.svd(J / scale, compute_uv=False)
@@ -128,7 +128,7 @@ def unseen_changes(T_BF, T_FS, target, tolerance=1e-3):
     --------
     predicted_sphere_covariance : how well the poses determine what they see.
     """
-    x_S = transform(invert(T_FS), transform(invert(T_BF), target))
+    x_S = sphere_in_scanner(T_BF, T_FS, target)
     distance = math.sqrt((x_S**2).sum(-1).mean())
     scale = np.array([1 / distance] * 3 + [1.0] * 6)
     _, values, Vt = np.linalg.svd(joint_jacobian(T_BF, x_S, T_FS) * scale, full_matrices=False)

@@ -30,8 +30,12 @@ const KEYS = [
   ["?", "these keys"],
 ];
 const SPACE = (globalThis[Symbol.for("labkit.space")] = { load: () => import("./space.js") }); // scenes in space: stage.js
-SPACE.load().then((module) => { SPACE.module = module; }, () => {});
 const $ = (selector) => document.querySelector(selector);
+
+/** The drawing in space, a large file: fetched once the first figure is there, unless it is one in space. */
+function getSpace() {
+  if (!SPACE.module) SPACE.load().then((module) => { SPACE.module = module; }, () => {});
+}
 
 /** What is shown, and what the keys do. */
 class Wall {
@@ -149,7 +153,7 @@ class Wall {
       send: (message) => wire.send({ to, message }),
     };
     this.takeDown = stage.render({ model, el: $("#place") });
-    const first = new MutationObserver(() => { first.disconnect(); this.focus(); }); // handles appear with the picture
+    const first = new MutationObserver(() => { first.disconnect(); this.focus(); getSpace(); }); // handles appear with the picture
     first.observe($("#place .labkit-stage"), { attributeFilter: ["data-picture"] });
   }
 

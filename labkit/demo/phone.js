@@ -11,12 +11,13 @@ function say(text) {
 }
 
 async function follow() {
-  for (;;) {
+  for (let cut = true; ;) { // the first answer after a fault comes at once, and takes its sentence away
     try {
-      const answer = await fetch(`/${CODE}/now?seen=${now.version < 0 ? "" : now.version}`);
+      const answer = await fetch(`/${CODE}/now?seen=${cut ? "" : now.version}`);
       if (answer.ok) {
         const next = await answer.json();
-        if (next.version !== now.version) show(next);
+        if (cut || next.version !== now.version) show(next);
+        cut = false;
         continue;
       }
       say(await answer.text());
@@ -24,6 +25,7 @@ async function follow() {
     } catch {
       say("The connection is gone; it is tried again.");
     }
+    cut = true;
     await new Promise((go) => setTimeout(go, AGAIN_AFTER));
   }
 }

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import ctypes
 import logging
 import signal
 import webbrowser
@@ -11,6 +12,7 @@ from . import server
 from .session import Session
 
 TELL_EVERY = 0.1  # s: votes that arrive together are one message to the wall
+LARGE = 1 << 18  # bytes of a piece of memory that goes back to the system as soon as it is free
 OPEN_FILES = 4096  # three hundred phones are as many connections; some systems begin with 256
 
 
@@ -75,18 +77,29 @@ def raise_open_files():
             resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
 
 
+def give_pixels_back():
+    """Let what held pixels go back to the system at once, where the C library is glibc.
+
+    It would raise the size from which it does so with each large piece that is freed; the pictures of a large window
+    then lie among small things that stay, and a demo of some hours grows by half a megabyte at each turn of the page.
+    """
+    with contextlib.suppress(OSError, AttributeError, TypeError):  # another C library, or Windows
+        ctypes.CDLL(None).mallopt(-3, LARGE)  # M_MMAP_THRESHOLD; setting it ends the raising
+
+
 async def run(program, options, counts):
     """Show a program until Ctrl-C; `options` are those of the verb."""
+    give_pixels_back()
     demo = Demo(program, options.ip, options.port, counts)
     room = demo.let_vote(options.vote_ip) if options.vote else None
+    if program.cards[0].stage:
+        await demo.session.house.get(program.cards[0].stage)  # a browser that opens finds it ready
     stages = sum(bool(card.make) for card in program.cards)
     print(f"{stages} Stages at {demo.address}\nStop with Ctrl-C in this window.", flush=True)
     if room:
         _tell_of(room)
     if not options.no_browser:
         await asyncio.to_thread(_open_browser, demo.address)
-    if program.cards[0].stage:
-        await demo.session.house.get(program.cards[0].stage)
     ended = asyncio.Event()
     with contextlib.suppress(NotImplementedError, ValueError):  # Windows ends the process itself
         for number in (signal.SIGINT, signal.SIGTERM):

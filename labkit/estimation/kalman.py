@@ -11,6 +11,7 @@ import numpy as np
 from scipy import linalg
 
 from ..checks import (
+    as_choice,
     as_count,
     as_covariances,
     as_finite,
@@ -26,7 +27,7 @@ from ..checks import (
 from ..geometry.planar import wrap_angle
 from .gaussian import chi_square_quantile
 
-FORMS = ("joseph", "short")
+FORMS, PRECISIONS = ("joseph", "short"), ("float", "float64", "float32")
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +134,7 @@ def predict(x, cov, A, B=None, u=None, cov_u=None, cov_v=None):
     Source: lecture, "Algorithmus fuer linearen Kalman-Filter", lines 2 and 3.
     """
     x, n = _state(x)
-    A, cov = as_matrices(A, "A", n, n), as_matrices(cov, "cov", n, n)
+    A, cov = as_matrices(A, "A", n, n), as_covariances(cov, "cov", n)
     push, spread = _driven(n, B, u, cov_u, cov_v)
     leading = {"x": x.shape[:-1], "cov": cov.shape[:-2], "A": A.shape[:-2]}
     fit_together(**leading, u=np.shape(push)[:-1], cov_u_and_cov_v=np.shape(spread)[:-2])
@@ -197,11 +198,11 @@ def update(x, cov, z, C, cov_z, form="joseph", dtype=float):
 
     Source: lecture, "Algorithmus fuer linearen Kalman-Filter", lines 5 to 8, and the remark on missing measurements.
     """
-    if form not in FORMS:
-        raise ValueError(f"form must be one of {', '.join(FORMS)}, got {form!r}")
+    as_choice(form, "form", FORMS), as_choice(getattr(dtype, "__name__", dtype), "dtype", PRECISIONS)
     x, n = _state(x)
     x = x.astype(dtype)
-    cov = as_matrices(cov, "cov", n, n).astype(dtype)  # the short form may have spoiled it: that is to be seen
+    rounds = form == "short" or dtype is np.float32  # what rounding makes of a covariance is to be seen there
+    cov = (as_matrices(cov, "cov", n, n) if rounds else as_covariances(cov, "cov", n)).astype(dtype)
     C = _measured_by(C, n).astype(dtype)
     m = C.shape[-2]
     cov_z = as_covariances(cov_z, "cov_z", m).astype(dtype)

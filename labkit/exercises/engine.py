@@ -141,12 +141,13 @@ class Exercise(Item):
             return Outcome(TO_DO)
         if not callable(function):
             return Outcome(NOT_YET, f"expected a function, got {metrics._describe(function)}.")
-        if scope.is_the_librarys(function, self):
+        twins = scope.twins_of(self)
+        if scope.is_the_librarys(function, self, twins):
             where = f"{function.__module__}.{function.__name__}"
             return Outcome(
                 NOT_YET, f"that is the library's own function, `{where}`: it is the one you are asked to write."
             )
-        with scope.own_name(function, self.id), scope.without_twin(function, self):
+        with scope.own_name(function, self.id), scope.without(twins, function):
             return self._try(function, rng)
 
     def _try(self, function, rng):

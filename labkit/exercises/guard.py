@@ -28,6 +28,7 @@ import numpy as np
 TIME_LIMIT = 2.0  # seconds of processor time that a single call may take
 PATIENCE = 3  # times as long may a call take that shares its processor with others
 WAITING = 0.02  # share of its time that code computes which only waits, in a sleep say
+ABROAD = 10  # times as long again, where most of it is waiting for another process that works for the call
 PERIOD = 0.05  # seconds between two rings of the clock
 SWALLOWED = 10  # rings that code may swallow before every line of it raises
 OUTPUT_LIMIT = 2000  # characters of printed text that are kept
@@ -149,11 +150,28 @@ def standing_for(original):
     return decorate
 
 
+class Abroad:
+    """How long this process has waited for another that works for it: no time of the code that is judged."""
+
+    seconds = 0.0
+
+    @classmethod
+    @contextlib.contextmanager
+    def waiting(cls):
+        """What runs within waits for the other process."""
+        began = time.monotonic()
+        try:
+            yield
+        finally:
+            cls.seconds += time.monotonic() - began
+
+
 class _Clock:
     """Raises `TimeLimit` in this thread after so many seconds of processor time, and again if the code swallows it.
 
     Processor time does not depend on what else the machine is doing; a call that shares its processor is ended after
-    `PATIENCE` times as long, one that only waits at once. Where the platform has interval timers (Linux, macOS) and
+    `PATIENCE` times as long, one that only waits at once. Waiting for a process that works for the call (`Abroad`) does
+    not count, up to `ABROAD` times as long again. Where the platform has interval timers (Linux, macOS) and
     this is the main thread, a signal does it, which also ends a sleep. Elsewhere a second thread raises it between two
     lines of Python; a single call into compiled code cannot be stopped there.
     """
@@ -163,7 +181,7 @@ class _Clock:
         self.by_signal = hasattr(signal, "setitimer") and threading.current_thread() is threading.main_thread()
 
     def start(self):
-        self.ends_cpu, self.ends_wall = time.thread_time() + self.seconds, time.monotonic() + PATIENCE * self.seconds
+        self.ends_cpu, self.began, self.abroad = time.thread_time() + self.seconds, time.monotonic(), Abroad.seconds
         if self.by_signal:
             self.before = signal.signal(signal.SIGALRM, self._ring)
             self.ticking = True
@@ -207,10 +225,18 @@ class _Clock:
         """
         ctypes.pythonapi.PyThreadState_SetAsyncExc(self.target, ctypes.py_object(TimeLimit))
 
+    def _own(self):
+        """Seconds since the start, without those spent waiting for another process."""
+        return time.monotonic() - self.began - (Abroad.seconds - self.abroad)
+
+    def _is_patient(self):
+        whole = time.monotonic() - self.began
+        return self._own() < PATIENCE * self.seconds and whole < ABROAD * PATIENCE * self.seconds
+
     def _ring(self, _, frame):
         left = self.ends_cpu - time.thread_time()
-        waits = left > (1 - WAITING) * self.seconds
-        if self.ticking and (left <= 0 or waits or time.monotonic() >= self.ends_wall):
+        waits = left > (1 - WAITING) * self.seconds and self._own() >= self.seconds
+        if self.ticking and (left <= 0 or waits or not self._is_patient()):
             self.rung += 1
             if self.rung > SWALLOWED:
                 _raise_at_every_line(frame)
@@ -221,7 +247,7 @@ class _Clock:
         while not self.done.wait(wait):
             wait = PERIOD
             with self.lock:
-                if self.ticking:
+                if self.ticking and (self._own() >= self.seconds or not self._is_patient()):
                     self.sent = True
                     self._send()
 

@@ -15,9 +15,9 @@ class TwinCalled(guard.Forbidden):
     """Raised in a student's function that calls the library's version of the very function it should be."""
 
 
-def is_the_librarys(function, exercise):
+def is_the_librarys(function, exercise, twins):
     """Whether an answer is no answer of one's own, but the library's."""
-    return function is exercise.reference or any(function is twin for _, _, twin in _twins(exercise))
+    return function is exercise.reference or any(function is twin for _, _, twin in twins)
 
 
 @contextlib.contextmanager
@@ -42,13 +42,13 @@ def own_name(function, name):
 
 
 @contextlib.contextmanager
-def without_twin(function, exercise):
+def without(twins, function):
     """While a function is judged, the notebook's code cannot call the library's function of the same name.
 
     The library itself can: only a call from the globals of the judged function raises `TwinCalled`.
     """
     theirs = getattr(function, "__globals__", None)
-    twins = list(_twins(exercise)) if theirs is not None else []
+    twins = twins if theirs is not None else []
     for module, name, twin in twins:
         setattr(module, name, _refusing(twin, f"{module.__name__.rpartition('.')[2]}.{name}", theirs))
     try:
@@ -58,19 +58,22 @@ def without_twin(function, exercise):
             setattr(module, name, twin)
 
 
-def _twins(exercise):
-    """(module, name, function) of what the library has for the exercise: its reference, or what that is called after.
+def twins_of(exercise):
+    """[(module, name, function)] of what the library has for it: its reference, or what that is called after.
 
     A reference that a chapter wrote around a function of the library bears its name.
     """
-    wrapped = (exercise.reference.__module__ or "").startswith(OWN_ROOMS)
+    reference, id = exercise.reference, exercise.id
+    wrapped = (reference.__module__ or "").startswith(OWN_ROOMS)
+    found = []
     for module_name, module in list(sys.modules.items()):
         if module is None or not module_name.startswith("labkit.") or module_name.startswith(OWN_ROOMS):
             continue
         for name, value in list(vars(module).items()):
-            is_public = isinstance(value, types.FunctionType) and not name.startswith("_")
-            if is_public and (value is exercise.reference or wrapped and name == exercise.id):
-                yield module, name, value
+            is_it = value is reference or wrapped and name == id
+            if is_it and isinstance(value, types.FunctionType) and not name.startswith("_"):
+                found.append((module, name, value))
+    return found
 
 
 def _refusing(twin, where, theirs):
@@ -86,7 +89,7 @@ def _refusing(twin, where, theirs):
 def notebook_data(function):
     """Names of the notebook's data (no functions, no modules) that a function reads without being given them."""
     known, code = getattr(function, "__globals__", {}), getattr(function, "__code__", None)
-    if code is None:
+    if not isinstance(code, types.CodeType):  # none, or that of a function in another process
         return []
     return [name for name in _names(code) if name in known and _is_data(known[name])]
 

@@ -4,6 +4,7 @@ Comma, semicolon, tab or blanks; decimal comma; comments behind `#`; a byte orde
 the number of its line, and every refusal names file and line.
 """
 
+import contextlib
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,17 @@ SHOWN = 40  # letters of a bad entry that a refusal repeats
 
 class FileError(ValueError):
     """What is wrong with a file, in one sentence with its name and the line."""
+
+
+@contextlib.contextmanager
+def naming(*paths):
+    """Whatever is refused within and names no file is a `FileError` that names these; None is a file not given."""
+    try:
+        yield
+    except FileError:
+        raise
+    except ValueError as reason:
+        raise FileError(f"{' and '.join(path.name for path in paths if path)}: {reason}") from None
 
 
 @dataclass(frozen=True, eq=False)

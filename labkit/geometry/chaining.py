@@ -13,6 +13,8 @@ from scipy.optimize import least_squares
 from ..checks import (
     as_count,
     as_finite,
+    as_generator,
+    as_items,
     as_matrices,
     as_number,
     as_points,
@@ -262,11 +264,9 @@ def distribute_in_turn(links, loops):
     links = _stack(links)
     if np.ndim(links) != 3:
         raise ValueError(f"links must have shape (m, 4, 4), got {links.shape}")
-    if isinstance(loops, str) or not np.iterable(loops):
-        raise ValueError(f"loops must be a sequence of loops, got {loops!r}")
-    for loop in loops:
+    for loop in as_items(loops, "loops", "loops"):
         corrected = distribute_closure(around(links, loop))
-        for (k, forward), T, back in zip(loop, corrected, invert(corrected)):
+        for k, forward, T, back in zip(*_loop(loop, len(links)), corrected, invert(corrected)):
             links[k] = T if forward else back
     return links
 
@@ -318,6 +318,7 @@ def noisy_links(transforms, std_rot, std_trans, rng, runs=1):
     """
     std_rot, std_trans = _noise(std_rot, std_trans)
     links, runs = as_shape(_stack(transforms), "transforms", "n", 4, 4), as_count(runs, "runs")
+    rng = as_generator(rng)
     xi = rng.normal(size=(len(links), runs, 6)) * np.repeat([std_rot, std_trans], 3)
     return links[:, None] @ exp_se3(xi)
 

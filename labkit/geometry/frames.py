@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..checks import (
+    PRODUCT_TOLERANCE,
     as_finite,
     as_number,
     as_points,
@@ -19,7 +20,7 @@ from ..checks import (
     fit_together,
     shown,
 )
-from .lie import nearest_rotation, skew
+from .lie import exp_so3, nearest_rotation, skew
 
 MIN_ARM_ANGLE_DEG = 1e-3  # below this the triangle is so flat that its height drowns in the last digits of the points
 MIN_ARM = 1e-9  # relative to the largest coordinate: a shorter arm is rounding error, not a direction
@@ -223,6 +224,24 @@ def transform(T, points):
     return (T[..., :3, :3] @ points[..., None])[..., 0] + T[..., :3, 3]
 
 
+def moved(T, step):
+    """Transform after a small change: turned on the right, shifted on the left, (R exp(phi), t + d).
+
+    Parameters
+    ----------
+    T : array-like, shape (..., 4, 4)
+        T_AB.
+    step : array-like, shape (..., 6)
+        Rotation vector phi about the axes of B (rad), shift d in A (length).
+
+    Returns
+    -------
+    T : array, shape (..., 4, 4)
+    """
+    T, step = as_transforms(T, "T"), as_points(step, "step", dim=6)
+    return pose(T[..., :3, :3] @ exp_so3(step[..., :3]), T[..., :3, 3] + step[..., 3:])
+
+
 def relative(T_WA, T_WB):
     """Pose of B seen from A: T_AB = T_WA^-1 T_WB.
 
@@ -282,7 +301,7 @@ def rotation_angle(T):
     --------
     pose_distance : the angle and the distance between two poses.
     """
-    R = rotation_block(T)
+    R = as_rotations(rotation_block(T), "T", PRODUCT_TOLERANCE)
     twice_sin = np.linalg.norm(
         np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1), axis=-1
     )

@@ -8,7 +8,7 @@ appendix.
 
 import numpy as np
 
-from ..checks import as_matrices, as_points
+from ..checks import PRODUCT_TOLERANCE, as_finite, as_matrices, as_points, as_rotations, as_transforms, fit_together
 
 
 def skew(v):
@@ -47,7 +47,7 @@ def log_so3(R):
 
     Accurate over the whole range: near pi, where R - R' vanishes, the axis is read from the symmetric part.
     """
-    R = as_matrices(R, "R", 3, 3)
+    R = as_rotations(R, "R", PRODUCT_TOLERANCE)
     w = 0.5 * np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1)
     sin = np.linalg.norm(w, axis=-1)
     cos = 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1)
@@ -91,7 +91,7 @@ def exp_se3(xi):
 
 def log_se3(T):
     """Twist xi = (phi, rho) of the rigid transform T; (..., 4, 4) -> (..., 6)."""
-    T = as_matrices(T, "T", 4, 4)
+    T = as_transforms(T, "T", PRODUCT_TOLERANCE)
     phi = log_so3(T[..., :3, :3])
     rho = np.linalg.solve(left_jacobian_so3(phi), T[..., :3, 3, None])[..., 0]
     return np.concatenate([phi, rho], axis=-1)
@@ -99,7 +99,7 @@ def log_se3(T):
 
 def adjoint(T):
     """Ad(T) with T exp(xi) T^-1 = exp(Ad(T) xi); (..., 4, 4) -> (..., 6, 6), twists rotation first."""
-    T = as_matrices(T, "T", 4, 4)
+    T = as_transforms(T, "T", PRODUCT_TOLERANCE)
     A = np.zeros((*T.shape[:-2], 6, 6))
     R = T[..., :3, :3]
     A[..., :3, :3] = A[..., 3:, 3:] = R
@@ -129,10 +129,11 @@ def interpolate(T0, T1, s):
 
     Source: Sola, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics" (2018), section II.
     """
-    T0, T1 = as_matrices(T0, "T0", 4, 4), as_matrices(T1, "T1", 4, 4)
+    T0, T1, s = as_transforms(T0, "T0"), as_transforms(T1, "T1"), as_finite(s, "s")
+    fit_together(T0=T0.shape[:-2], T1=T1.shape[:-2], s=s.shape)
     R_t = np.swapaxes(T0[..., :3, :3], -1, -2)
     between = np.zeros(np.broadcast_shapes(T0.shape, T1.shape))
     between[..., :3, :3] = R_t @ T1[..., :3, :3]
     between[..., :3, 3] = (R_t @ (T1[..., :3, 3] - T0[..., :3, 3])[..., None])[..., 0]
     between[..., 3, 3] = 1.0
-    return T0 @ exp_se3(np.asarray(s, float)[..., None] * log_se3(between))
+    return T0 @ exp_se3(s[..., None] * log_se3(between))

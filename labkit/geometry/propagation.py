@@ -1,8 +1,9 @@
 """How small errors of poses travel: through products and inverses, into points, from three points into a frame.
 
 The error of a transform T_AB = (R, t) is what `calibration.result` reports: a rotation vector phi about the axes of B
-(rad) and a shift d in A (mm), e = (phi, d), so that the true transform is (R exp(phi), t + d). To first order every
-error arrives somewhere else as J e, and a covariance as J cov J'. A rotation grows into a shift by its lever.
+(rad) and a shift d in A (mm), e = (phi, d), so that the true transform is (R exp(phi), t + d), `frames.moved(T, e)`. To
+first order every error arrives somewhere else as J e, and a covariance as J cov J'. A rotation grows into a shift by
+its lever.
 
 Source: the first-order law of propagation of uncertainty (GUM, JCGM 100:2008, section 5), with poses as in Sola, Deray,
 Atchuthan, "A micro Lie theory for state estimation in robotics" (2018), section V.
@@ -10,27 +11,19 @@ Atchuthan, "A micro Lie theory for state estimation in robotics" (2018), section
 
 import numpy as np
 
-from ..checks import as_points, as_transforms, shown
-from .frames import frame_from_points, invert, pose
-from .lie import exp_so3, skew
-
-
-def disturb(T, e):
-    """Transform with an error.
-
-    Parameters
-    ----------
-    T : array-like, shape (..., 4, 4)
-        T_AB.
-    e : array-like, shape (..., 6)
-        Rotation vector about the axes of B (rad), shift in A (mm).
-
-    Returns
-    -------
-    T : array, shape (..., 4, 4)
-    """
-    T, e = as_transforms(T, "T"), as_points(e, "e", dim=6)
-    return pose(T[..., :3, :3] @ exp_so3(e[..., :3]), T[..., :3, 3] + e[..., 3:])
+from ..checks import (
+    as_covariances,
+    as_finite,
+    as_instance,
+    as_items,
+    as_points,
+    as_shape,
+    as_transforms,
+    fit_together,
+    shown,
+)
+from .frames import frame_from_points, invert
+from .lie import skew
 
 
 def _blocks(upper_left, lower_left, lower_right):
@@ -110,6 +103,8 @@ def point_covariance(T_AB, cov_AB, p_B, cov_B):
     cov_A : array, shape (..., 3, 3), mm^2
     """
     J_T, J_p = point_jacobians(T_AB, p_B)
+    cov_AB, cov_B = as_covariances(cov_AB, "cov_AB", 6), as_covariances(cov_B, "cov_B", 3)
+    fit_together(T_AB=J_T.shape[:-2], cov_AB=cov_AB.shape[:-2], cov_B=cov_B.shape[:-2])
     return J_T @ cov_AB @ np.swapaxes(J_T, -1, -2) + J_p @ cov_B @ np.swapaxes(J_p, -1, -2)
 
 
@@ -132,7 +127,7 @@ def chain_jacobians(links):
     ValueError
         No link.
     """
-    links = [as_transforms(T, f"links[{k}]") for k, T in enumerate(links)]
+    links = [as_transforms(T, f"links[{k}]") for k, T in enumerate(as_items(links, "links", "transforms"))]
     if not links:
         raise ValueError("at least one link must come, got none")
     product, J = links[0], [np.broadcast_to(np.eye(6), (*links[0].shape[:-2], 6, 6))]
@@ -196,12 +191,13 @@ def error_budget(jacobians, covariances):
     ValueError
         Sources that differ, or a Jacobian that does not fit its covariance.
     """
+    jacobians, covariances = as_instance(jacobians, "jacobians", dict), as_instance(covariances, "covariances", dict)
     if set(jacobians) != set(covariances):
-        raise ValueError(f"both must name the same sources, got {sorted(jacobians)} and {sorted(covariances)}")
+        raise ValueError(f"both must name the same sources, got {list(jacobians)} and {list(covariances)}")
     shares = {}
     for name, J in jacobians.items():
-        J, cov = np.asarray(J, float), np.asarray(covariances[name], float)
-        if J.ndim != 2 or cov.shape != (J.shape[-1], J.shape[-1]):
+        J, cov = as_shape(J, f"the Jacobian of {name}", "m", "n"), as_finite(covariances[name], f"that of {name}")
+        if cov.shape != (J.shape[-1], J.shape[-1]):
             raise ValueError(f"{name}: a Jacobian of shape {shown(J.shape)} needs a square covariance, got {cov.shape}")
-        shares[name] = J @ cov @ J.T
+        shares[name] = J @ as_covariances(cov, f"the covariance of {name}", len(cov)) @ J.T
     return shares

@@ -308,14 +308,9 @@ def ekf_localize(
     for u, cov_u, z in zip(given.u, given.cov_u, given.z):
         step = ekf_step(x, cov, u, given.dt, cov_u, z, **sensor, model=model, wrap=wrap, cov_v=given.cov_v)
         x, cov = step.x, step.cov
-        steps.append(step)
-    return Localization(*(_column(steps, name, given.x0.shape[:-1]) for name in ("x", "cov", "nis", "dof")))
-
-
-def _column(steps, name, runs):
-    """One figure of all steps, the steps along the first axis; of the right shape also without any step."""
-    shape = {"x": (3,), "cov": (3, 3), "nis": (), "dof": ()}[name]
-    return np.array([getattr(step, name) for step in steps]).reshape(len(steps), *runs, *shape)
+        steps.append((x, cov, step.nis, step.dof))
+    columns, shapes = zip(*steps) if steps else [()] * 4, ((3,), (3, 3), (), ())
+    return Localization(*(np.reshape(c, (len(steps), *given.x0.shape[:-1], *s)) for c, s in zip(columns, shapes)))
 
 
 # --- the unscented filter ----------------------------------------------------

@@ -300,10 +300,11 @@ def drive(x0, controls, dt, model="midpoint"):
         raise ValueError(f"controls must have shape (n, ..., 2), got {controls.shape}")
     dt = as_positive_number(dt, "dt")
     x0 = as_points(x0, "x0", 3)
-    path = [np.broadcast_to(x0, (*fit_together(x0=x0.shape[:-1], controls=controls.shape[1:-1]), 3))]
-    for u in controls:
-        path.append(step(path[-1], u, dt, model))
-    return np.array(path)
+    path = np.empty((len(controls) + 1, *fit_together(x0=x0.shape[:-1], controls=controls.shape[1:-1]), 3))
+    path[0] = x0
+    for k, u in enumerate(controls):
+        path[k + 1] = step(path[k], u, dt, model)
+    return path
 
 
 def drive_with_covariance(x0, cov0, controls, dt, k_d, k_theta, k_drift, model="midpoint"):

@@ -18,15 +18,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..calibration.ax_xb import calibrate_hand_eye
-from ..calibration.hand_eye import calibrate_sphere_target
+from ..calibration.hand_eye import calibrate_sphere_target, sphere_in_scanner
 from ..calibration.pivot import calibrate_pivot, cone, touching_poses
 from ..calibration.planning import DOWN, pattern, poses_that_see
 from ..checks import as_count, as_shape
-from ..geometry.frames import frame_from_points, invert, pose, transform
+from ..geometry.frames import frame_from_points, invert, moved, pose, transform
 from ..geometry.lie import exp_so3
 from ..geometry.propagation import (
     chain_jacobians,
-    disturb,
     error_budget,
     inverse_jacobian,
     point_jacobians,
@@ -386,10 +385,10 @@ def with_errors(cell, job, errors):
     e = {name: np.zeros(len(cov)) for name, cov in source_covariances(cell, job).items()} | errors
     marks = job.marks + e["marks"].reshape(*e["marks"].shape[:-1], 3, 3)
     return (
-        replace(cell, tip=cell.tip + e["tip"], T_FS=disturb(cell.T_FS, e["scanner"]),
-                T_BW=disturb(cell.T_BW, e["tracker"])),
-        replace(job, marks=marks, T_WE0=disturb(job.T_WE0, e["first reading"]),
-                T_WE1=disturb(job.T_WE1, e["second reading"])),
+        replace(cell, tip=cell.tip + e["tip"], T_FS=moved(cell.T_FS, e["scanner"]),
+                T_BW=moved(cell.T_BW, e["tracker"])),
+        replace(job, marks=marks, T_WE0=moved(job.T_WE0, e["first reading"]),
+                T_WE1=moved(job.T_WE1, e["second reading"])),
     )  # fmt: skip
 
 
@@ -503,7 +502,7 @@ def calibrate_scanner(rng, n=31, tilt=0.35):
     """
     target = np.array([240.0, 0.0, 110.0])
     T_BF = pattern(TRUTH.T_FS, target, tilt, (20.0, 20.0, 20.0), n)
-    x_S = transform(invert(T_BF @ TRUTH.T_FS), target)
+    x_S = sphere_in_scanner(T_BF, TRUTH.T_FS, target)
     return calibrate_sphere_target(T_BF, x_S + STD_CENTER * rng.normal(size=x_S.shape))
 
 
@@ -522,7 +521,7 @@ def calibrate_tracker(rng, n=21):
     """
     q = simulation.measuring_joints()[: as_count(n, "n", at_least=3)]
     noise = rng.normal(size=(len(q), 6)) * np.repeat(STD_STOP, 3)
-    T_WE = disturb(invert(TRUTH.T_BW) @ tool_pose(TX40, q, simulation.T_FE), noise)
+    T_WE = moved(invert(TRUTH.T_BW) @ tool_pose(TX40, q, simulation.T_FE), noise)
     return calibrate_hand_eye(simulation.flange_poses(q), T_WE, *STD_STOP, eye="to hand")
 
 

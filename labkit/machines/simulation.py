@@ -13,7 +13,7 @@ from itertools import count
 import numpy as np
 
 from ..checks import as_count, as_positive_number
-from ..geometry.frames import invert, matrix_from_quaternion, pose
+from ..geometry.frames import invert, matrix_from_quaternion, moved, pose
 from ..geometry.lie import exp_so3
 from .arm import HOME, RAMP, TX40, forward_kinematics, measuring_poses, rotation_only, smooth_motion, tool_pose
 from .log import Log
@@ -129,7 +129,7 @@ class Tracker:
         error = self.systematic(T_BE[:, :3, 3]) + (0.0 if drift is None else drift)
         error[:, :3] += self.std_rotation * rng.normal(size=(len(T_BE), 3))
         error[:, 3:] += self.std_position * rng.normal(size=(len(T_BE), 3))
-        return pose(T_BE[:, :3, :3] @ exp_so3(error[:, :3]), T_BE[:, :3, 3] + error[:, 3:])
+        return moved(T_BE, error)
 
     def drift(self, stops, rng):
         """What each stop adds to all of its readings.

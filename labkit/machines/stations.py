@@ -16,7 +16,7 @@ import numpy as np
 
 from ..calibration.result import Result, pose_parameters, result_class
 from ..checks import as_finite, as_points, as_positive_number, as_shape, as_transforms, shown
-from ..geometry.frames import invert, pose, transform, unit_vector
+from ..geometry.frames import invert, moved, pose, transform, unit_vector
 from ..geometry.lie import exp_so3, skew
 
 TURN_RATE = 60.0  # turns per second, of a station of the first generation: assumed, see above
@@ -360,7 +360,7 @@ def poses_from_angles(T_WL, diodes, angles, start):
         r = (angles - predicted).reshape(*T.shape[:-2], -1, 1)
         Jt = np.swapaxes(J, -1, -2)
         step = np.linalg.solve(Jt @ J, Jt @ r)[..., 0]
-        T = pose(T[..., :3, :3] @ exp_so3(step[..., :3]), T[..., :3, 3] + size * step[..., 3:])
+        T = moved(T, step * np.repeat([1.0, size], 3))
         if np.abs(step).max(initial=0.0) < STEP_TOLERANCE:
             return T
     raise ValueError(f"the pose did not settle within {MAX_STEPS} steps: is the start too far off?")

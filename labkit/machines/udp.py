@@ -216,63 +216,36 @@ class Statistics:
     bad: dict = field(default_factory=dict)
 
 
-class Listener(_Endpoint):
-    """A receiver on localhost that never blocks its caller.
+class Books:
+    """What a receiver makes of datagrams, wherever they come from: readings in order, and counts that add up.
 
     Parameters
     ----------
-    port : int
-        0 takes any free port; `port` tells which.
     device : float or None
         Readings of another device are reported as bad. None accepts all.
     rate : float
         Readings per second, to estimate how many were lost.
     keep : int
         How many of the newest readings are kept.
-
-    Use as a context manager, or call `close`. Raises ValueError when the port is taken.
     """
 
-    def __init__(self, port=0, device=1.0, rate=250.0, keep=20000):
+    def __init__(self, device=1.0, rate=250.0, keep=20000):
         self.device, self.rate = device, as_positive_number(rate, "rate")
-        port = as_count(port, "port", at_least=0)
         self._leap = max(LEAP, LEAP_READINGS / self.rate)
         self._readings = deque(maxlen=as_count(keep, "keep"))
         self._lock = threading.Lock()
-        self._stop = threading.Event()
         self._clear()
         self._counts, self._bad = Counter(), Counter()
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
-        try:
-            self._socket.bind((HOST, port))
-        except (OSError, OverflowError) as error:
-            self._socket.close()
-            raise ValueError(
-                f"port {port} of this machine cannot be used ({error}); port=0 takes any free one"
-            ) from None
-        self._socket.settimeout(0.1)
-        self.port = self._socket.getsockname()[1]
-        self._thread = threading.Thread(target=self._run, name="tracker listener", daemon=True)
-        self._thread.start()
 
     def _clear(self):
         self._seen, self._order = set(), deque()
         self._first = self._newest = None
         self._since, self._old, self._far = 0, 0, 0
 
-    def _run(self):
-        while not self._stop.is_set():
-            try:
-                data = self._socket.recv(65535)
-            except TimeoutError:
-                continue
-            except OSError:  # Windows reports an earlier send to a closed port here; a closed socket ends the loop
-                if self._stop.wait(0.01):
-                    break
-                continue
-            with self._lock:
-                self._take(data)
+    def take(self, data):
+        """Judge one datagram, bytes, and count it."""
+        with self._lock:
+            self._take(data)
 
     def _take(self, data):
         self._counts["datagrams"] += 1
@@ -358,6 +331,50 @@ class Listener(_Endpoint):
         table = np.array(rows).reshape(-1, PACKET.size // 8)
         table = table[np.argsort(table[:, TIME], kind="stable")]
         return table if newest is None else table[max(len(table) - as_count(newest, "newest", at_least=0), 0) :]
+
+
+class Listener(_Endpoint, Books):
+    """A receiver on localhost that never blocks its caller.
+
+    Parameters
+    ----------
+    port : int
+        0 takes any free port; `port` tells which.
+    options
+        Those of `Books`.
+
+    Use as a context manager, or call `close`. Raises ValueError when the port is taken.
+    """
+
+    def __init__(self, port=0, **options):
+        super().__init__(**options)
+        port = as_count(port, "port", at_least=0)
+        self._stop = threading.Event()
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
+        try:
+            self._socket.bind((HOST, port))
+        except (OSError, OverflowError) as error:
+            self._socket.close()
+            raise ValueError(
+                f"port {port} of this machine cannot be used ({error}); port=0 takes any free one"
+            ) from None
+        self._socket.settimeout(0.1)
+        self.port = self._socket.getsockname()[1]
+        self._thread = threading.Thread(target=self._run, name="tracker listener", daemon=True)
+        self._thread.start()
+
+    def _run(self):
+        while not self._stop.is_set():
+            try:
+                data = self._socket.recv(65535)
+            except TimeoutError:
+                continue
+            except OSError:  # Windows reports an earlier send to a closed port here; a closed socket ends the loop
+                if self._stop.wait(0.01):
+                    break
+                continue
+            self.take(data)
 
 
 def listen(port=0, **options):

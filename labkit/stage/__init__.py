@@ -1,7 +1,7 @@
 """The figure one can touch; it knows no chapter and no mathematics.
 
 stage       the Stage: state, presets, what goes to the page and comes from it
-controls    what one may declare: handles, sliders, choices, toggles, time
+controls    what one may declare: handles, sliders, choices, toggles, time, targets
 stage.js    the front end, the same in notebooks and on any other page
 front       a Stage in a notebook
 canvas      pictures drawn, compared and sent
@@ -14,8 +14,8 @@ tape        moments gone by, so that time can be scrubbed
 film        a Stage recorded for the reading edition
 """
 
-from .controls import Choice, Handle, Play, Slider, Toggle
+from .controls import Choice, Handle, Play, Slider, Target, Toggle
 from .scene3d import View
 from .stage import Stage
 
-__all__ = ["Choice", "Handle", "Play", "Slider", "Stage", "Toggle", "View"]
+__all__ = ["Choice", "Handle", "Play", "Slider", "Stage", "Target", "Toggle", "View"]

@@ -29,6 +29,7 @@ MAX_STRETCH = 1.45  # a low place makes the picture so much wider than designed,
 STORED_WIDTH, STORED_COLORS = 700, 48  # pixels and colors of a picture in a file
 RING = 13  # points across the ring of a handle in such a picture
 MAX_CHANGES = 150_000  # pixels, four bytes each; beyond, decoding a whole picture is the quicker way
+HOLLOW, CHECK = "\N{WHITE CIRCLE}", "\N{CHECK MARK}"
 MAX_PASSES = 4  # of the layout, which halves its error in each
 
 DRAWING = (
@@ -60,6 +61,7 @@ class Picture:
             artist.set_animated(True)
             artist.set_in_layout(False)  # what moves must not push the axes about
         self._backgrounds, self._sent = {}, None  # a background a theme
+        self._heading = None
         self.draw_seconds = 0.0
         self.spaces = [ax.space for ax in self.fig.axes if hasattr(ax, "space")]
         self._in_space = {id(artist) for space in self.spaces for artist in space.artists}
@@ -67,6 +69,15 @@ class Picture:
     @property
     def dark(self):
         return self.canvas.dark
+
+    def head(self, words, marked):
+        """A line over the picture with a hollow mark, or with a check mark and bold; it belongs to the background."""
+        line, look = f"{CHECK if marked else HOLLOW} {words}", "bold" if marked else "normal"
+        if self._heading is None:
+            with style.rc():
+                self._heading = self.fig.suptitle(line, x=0.01, ha="left", fontsize=10, fontweight=look)
+        elif self._heading.get_text() != line:
+            self._heading.set(text=line, fontweight=look)
 
     @property
     def painted(self):
@@ -192,8 +203,11 @@ class Picture:
         """What the browser lacks since the last call: [png], or [runs, colors] of the changed pixels."""
         with DRAWING:
             pixels, before = self.draw(), self._sent
-            self._sent = pixels.copy()
-            found = None if whole or before is None else changes(before, self._sent)
+            found = None if whole or before is None else changes(before, pixels)
+            if before is None or before.shape != pixels.shape:
+                self._sent = pixels.copy()
+            else:
+                np.copyto(before, pixels)  # into the memory it has: a new one a picture takes longer to be had
             return [encode_png(pixels, self.fig.dpi)] if found is None else list(found)
 
     # -- where things are: fractions of the picture, from its upper left corner, as the browser counts

@@ -1,4 +1,4 @@
-"""What one may declare on a Stage: points to drag, sliders, choices, toggles, time.
+"""What one may declare on a Stage: points to drag, sliders, choices, toggles, time, a target to reach.
 
 The front end (`stage.js`) draws all of them from `declare(name)`, a plain dict, and speaks in positions: the number of
 a slider's step, of a word, 0 or 1. What a position means, and how its value is written, is known here alone.
@@ -13,6 +13,7 @@ from ..checks import as_finite, shown
 from . import style
 
 FEW_WORDS = 3  # so many stand side by side; more go into a drop-down
+LONGEST = 64  # letters of a target: one line over the narrowest picture
 
 
 @dataclass(frozen=True)
@@ -182,3 +183,23 @@ class Play:
         interval = max(20, round(1000 * self.dt / self.rate))
         stride = max(1, round(interval * self.rate / (1000 * self.dt)))
         return {"steps": self.steps, "interval": interval, "stride": stride, "patient": patient}
+
+
+@dataclass(frozen=True)
+class Target:
+    """What one is to reach by touching; it stands over the picture and ends the caption.
+
+    words : a noun phrase without a full stop, "a row of 32 links that ends within 5 mm", at most LONGEST letters.
+    reached : function(result) -> whether a result reaches it; not that of the start.
+    """
+
+    words: str
+    reached: object
+
+    def __post_init__(self):
+        if len(self.words) > LONGEST:
+            raise ValueError(f"a target takes at most {LONGEST} letters, got {len(self.words)}: {self.words!r}")
+
+    def told(self, is_reached):
+        """The target as it is said."""
+        return f"Target reached: {self.words}" if is_reached else f"Target: {self.words}"

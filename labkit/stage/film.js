@@ -1,6 +1,8 @@
 // A recorded Stage: answers `stage.js` from a film, as Python answers from a living Stage. What a film holds is said in
 // film.py. A handle goes to the recorded place nearest to the pointer, a slider to the recorded positions.
 
+// Scenes in space are drawn by `space.js` as with a living Stage, and turn freely: a note says which numbers each thing has.
+
 const KEPT = 4; // developed tracks kept at once, some 16 MB each
 
 const developed = new Map(); // track -> promise of its pictures, the newest last
@@ -14,12 +16,27 @@ function develop(track, area) {
   return developed.get(track);
 }
 
-async function unpacked(base64, area) {
+async function inflated(base64) {
   const packed = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const pictures = new Uint8Array(await new Response(stream).arrayBuffer());
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+async function unpacked(base64, area) {
+  const pictures = await inflated(base64);
   for (let k = area; k < pictures.length; k++) pictures[k] ^= pictures[k - area]; // each was stored as what differs
   return pictures;
+}
+
+/** All that things in space were given: [[words, numbers (float32)], ...]; the bytes were stored first bytes first. */
+async function things({ counts, words, numbers }) {
+  const sorted = await inflated(numbers);
+  const count = sorted.length / 4;
+  const bytes = new Uint8Array(sorted.length);
+  for (let k = 0; k < sorted.length; k++) bytes[4 * (k % count) + Math.floor(k / count)] = sorted[k];
+  const all = new Float32Array(bytes.buffer);
+  let used = 0;
+  return counts.map((many, k) => [words[k], all.subarray(used, (used += many))]);
 }
 
 function opaque(palette) {
@@ -31,7 +48,9 @@ export class Projector {
     this.film = film;
     this.palettes = film.palettes.map(opaque);
     this.hears = new Set();
-    Object.assign(this, { look: null, shown: 0, epoch: 0, turned: 0, asked: 0 });
+    Object.assign(this, { look: null, shown: 0, epoch: 0, turned: 0, asked: 0, drawn: null, home: null });
+    this.placed = (places) => places; // `stage.js` puts in its own: where handles are as one looks now
+    this.things = film.space ? things(film.space) : Promise.resolve([]);
     this.enter("start");
   }
 
@@ -40,7 +59,7 @@ export class Projector {
   off(kind, hear) { this.hears.delete(hear); }
 
   send(message) {
-    if (message.look) this.look = message.look;
+    if (message.look) Object.assign(this, { look: message.look, drawn: null });
     if (message.button) this.press(message.button);
     else if (message.time) this.seek(message.time);
     for (const [name, position] of Object.entries(message.control ?? {})) if (name) this.move("control", position);
@@ -65,6 +84,7 @@ export class Projector {
   press(button) {
     this.epoch += 1;
     this.turned = 0;
+    if (button === "Reset") this.home = this.film.declaration.home;
     this.enter(button === "Reset" ? (this.film.tracks.play ? "play" : "start") : button);
   }
 
@@ -74,17 +94,24 @@ export class Projector {
   }
 
   nearest(name, [right, down]) {
-    const away = this.film.tracks.handle.notes.map(({ handles }) => Math.hypot(handles[name].at[0] - right, handles[name].at[1] - down));
+    const away = this.film.tracks.handle.notes.map((note) => {
+      const [x, y] = this.placeOf(name, note);
+      return Math.hypot(x - right, y - down);
+    });
     return away.indexOf(Math.min(...away));
+  }
+
+  placeOf(name, { handles }) {
+    return this.placed(handles)[name].at;
   }
 
   /** One picture on or back, whichever lies in the direction of the arrow key. */
   neighbor(name, [right, up]) {
     const { notes } = this.film.tracks.handle;
-    const here = this.name === "handle" ? this.at : this.nearest(name, this.track.notes[this.at].handles[name].at);
-    const from = notes[here].handles[name].at;
+    const here = this.name === "handle" ? this.at : this.nearest(name, this.placeOf(name, this.track.notes[this.at]));
+    const from = this.placeOf(name, notes[here]);
     const along = (k) => {
-      const to = notes[k].handles[name].at;
+      const to = this.placeOf(name, notes[k]);
       return (to[0] - from[0]) * right - (to[1] - from[1]) * up;
     };
     const beside = [(here + 1) % notes.length, (here + notes.length - 1) % notes.length];
@@ -104,7 +131,7 @@ export class Projector {
     const asked = ++this.asked;
     const { track, at } = this;
     const [width, height] = this.film.size;
-    const pictures = await develop(track, width * height);
+    const [pictures, things] = await Promise.all([develop(track, width * height), this.things]);
     if (asked !== this.asked || !this.look) return; // a newer question has been put
     const dark = Number(this.look.dark);
     const colors = this.palettes[dark];
@@ -113,12 +140,30 @@ export class Projector {
     const scale = Math.min(this.look.width / width, this.look.height / height);
     const note = track.notes[at];
     const handles = Object.entries(note.handles).map(([name, place]) => [name, { ...place, color: place.color[dark] }]);
+    const [space, numbers] = this.look.space && note.things ? this.spaceOf(note.things, things) : [null, []];
     const message = {
-      ...note, handles: Object.fromEntries(handles), time: note.time && { ...note.time, ...this.clock(note), epoch: this.epoch },
+      ...note, space, handles: Object.fromEntries(handles), time: note.time && { ...note.time, ...this.clock(note), epoch: this.epoch },
       picture: ++this.shown, on: null, pixels: this.film.size, serial, cursor: "", milliseconds: 0,
       width: Math.round(scale * width), height: Math.round(scale * height),
     };
-    for (const hear of this.hears) hear(message, [new DataView(pixels.buffer)]);
+    for (const hear of this.hears) hear(message, [new DataView(pixels.buffer), ...numbers]);
+  }
+
+  /** What the scenes lack since the picture before: as Stage tells it, and the numbers. */
+  spaceOf(now, things) {
+    const chosen = [];
+    const rows = now.map((numbers, scene) => numbers.flatMap((number, k) => {
+      if (this.drawn?.[scene][k] === number) return [];
+      if (number < 0) return [[k, 0, 0, null]];
+      const [words, values] = things[number];
+      chosen.push(values);
+      return [[k, 1, values.length, words]];
+    }));
+    const all = new Float32Array(chosen.reduce((sum, values) => sum + values.length, 0));
+    chosen.reduce((used, values) => (all.set(values, used), used + values.length), 0);
+    const view = this.home;
+    Object.assign(this, { drawn: now, home: null });
+    return [{ places: this.film.places, rows, view }, [new DataView(all.buffer)]];
   }
 
   clock(note) {

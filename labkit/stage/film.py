@@ -5,6 +5,8 @@ kept, picture and words.
 All pictures of a film share one list of at most 256 colors, each with its twin on dark paper, so that one recording
 serves both themes. A picture is then one byte a pixel; each is stored as what differs from the one before (XOR), and
 all together deflated: 3 to 10 kB a picture. `stage.js` shows a film as it shows a living Stage; `film.js` answers it.
+What lies in space is not in the pictures: its description is kept once, and of each picture the numbers that Stage
+sends a page that draws it; so it turns freely, and costs less.
 """
 
 import base64
@@ -14,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import style
+from . import scene3d, style
 from .stage import FAIL
 
 ROOM, RATIO = 600, 1.25  # CSS pixels of the recorded picture's width; pixels a CSS pixel
@@ -25,8 +27,10 @@ REACH = 0.17  # half axes of a handle's loop, as a share of its axes
 MOVED = 0.004  # share of the picture a handle must move to count as moved
 ORBIT_PIXELS = 20  # pixels of dragging from picture to picture of a view: 10 degrees
 COLORS, NEAR = 256, 4
+DIGITS = 13  # binary digits kept of a number in space: 1/16000 of itself
 LARGEST, FEWEST = 400_000, 12  # bytes of a track; a larger one loses every second picture, down to so many
 PLAYS = ("play", FAIL)
+NOTED = ("caption", "numbers", "status", "controls", "time")  # of a message, beside its handles
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,12 +45,18 @@ class Film:
         Colors, each of shape (n, 3), uint8.
     tracks : dict
         {name: Track}: "start", "handle", "control", "view", "play", and one of each further button's name.
+    space : Numbers
+        What the notes of a Stage with scenes in space refer to; none otherwise.
+    places : list
+        Where its scenes are in the picture.
     """
 
     declaration: dict
     size: tuple
     palettes: tuple
     tracks: dict
+    space: object = None
+    places: tuple = ()
 
     def as_data(self):
         """The film for `film.js`, as data for JSON."""
@@ -55,7 +65,36 @@ class Film:
             name: {"notes": track.notes, "entry": track.entry, "pictures": base64.b64encode(track.reel).decode()}
             for name, track in self.tracks.items()
         }
-        return {"declaration": self.declaration, "size": self.size, "palettes": palettes, "tracks": tracks}
+        data = {"declaration": self.declaration, "size": self.size, "palettes": palettes, "tracks": tracks}
+        return data if self.space is None else {**data, "space": self.space.as_data(), "places": self.places}
+
+
+class Numbers:
+    """What things in space were given, each different set of numbers and words once: `number(words, numbers)`."""
+
+    def __init__(self):
+        self.known, self.words, self.values = {}, [], []
+
+    def number(self, words, numbers):
+        key = words, numbers.tobytes()
+        if key not in self.known:
+            self.known[key] = len(self.values)
+            self.words.append(words)
+            self.values.append(numbers)
+        return self.known[key]
+
+    def as_data(self):
+        """Counts, words, and all numbers: float32 of few digits, first bytes first, deflated."""
+        every = _shortened(np.concatenate([np.empty(0, "<f4"), *self.values]).astype("<f4"))
+        packed = zlib.compress(every.view(np.uint8).reshape(-1, 4).T.tobytes(), 9)
+        counts = [len(values) for values in self.values]
+        return {"counts": counts, "words": self.words, "numbers": base64.b64encode(packed).decode()}
+
+
+def _shortened(numbers):
+    """Numbers (float32) rounded to DIGITS binary digits: the rest would not be seen, and costs half the bytes."""
+    mantissa, exponent = np.frexp(numbers)
+    return np.ldexp(np.round(np.ldexp(mantissa, DIGITS)), exponent - DIGITS).astype("<f4")
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +133,23 @@ class _Camera:
         self.stage, self.heard, self.serial = stage, None, 0
         self.declared = stage.declaration()
         self.negatives, self.shots, self.entries = _Negatives(), {}, {}
-        stage.connect(lambda message, buffers: setattr(self, "heard", message))
-        self.tell(look={"width": ROOM, "height": 4 * ROOM, "ratio": RATIO, "dark": False})
+        self.numbers, self.things = Numbers(), [[-1] * len(space["items"]) for space in self.declared["spaces"]]
+        stage.connect(self.hear)
+        self.look(space=bool(self.things))
+
+    def look(self, **more):
+        self.tell(look={"width": ROOM, "height": 4 * ROOM, "ratio": RATIO, "dark": False, **more})
+
+    def hear(self, message, buffers):
+        """What the Stage sends: the message, and what it changes in space."""
+        self.heard = message
+        if not message.get("space"):
+            return
+        numbers, used = np.frombuffer(buffers[-1], "<f4"), 0
+        for things, rows in zip(self.things, message["space"]["rows"]):
+            for k, shown, count, words in rows:
+                things[k] = self.numbers.number(words, numbers[used : used + count]) if shown else -1
+                used += count
 
     def tell(self, **message):
         """One message to the Stage; what it answers."""
@@ -112,11 +166,13 @@ class _Camera:
                 "at": [round(x, 4) for x in place["at"]],
                 "value": place["value"],
                 "now": place["now"],
+                **({"point": np.round(place["point"], 5).tolist(), "scene": place["scene"]} if place["point"] else {}),
                 "color": [style.themed(self.stage.handles[key].color, dark) for dark in (False, True)],
             }
             for key, place in heard["handles"].items()
         }
-        notes.append({key: heard[key] for key in ("caption", "status", "controls", "time")} | {"handles": handles})
+        note = {key: heard[key] for key in NOTED} | {"handles": handles}
+        notes.append(note | ({"things": [list(things) for things in self.things]} if self.things else {}))
         pictures.append(self.negatives.develop(*self.stage.in_both_themes()))
 
     def film(self):
@@ -130,13 +186,32 @@ class _Camera:
                 self.tell(button=button)
                 self.shoot(button)
         self.tell(button="Reset")
+        places = self.heard["space"]["places"] if self.things else ()
+        self.look(space=False)
         palettes, chosen = self.negatives.colors()
         tracks = {
             name: self._track(name, chosen[np.array(pictures)], shown) for name, (_, pictures) in self.shots.items()
         }
         _renumber(tracks, shown["controls"])
         height, width = self.shots["start"][1][0].shape
-        return Film(self._declaration(shown, tracks), (width, height), palettes, tracks)
+        declaration = self._declaration(shown, tracks)
+        for name in shown["handles"]:
+            self._draw_path(name, declaration, tracks)
+        return Film(
+            declaration, (width, height), palettes, tracks, self.numbers if self.things else None, tuple(places)
+        )
+
+    def _draw_path(self, name, declaration, tracks):
+        """Where a handle was led in space, as one more thing of its scene."""
+        places = [note["handles"][name] for note in tracks["handle"].notes]
+        if "point" not in places[0]:
+            return
+        scene, points = places[0]["scene"], np.array([place["point"] for place in [*places, places[0]]], dtype="<f4")
+        declaration["spaces"][scene]["items"].append(scene3d.described_path(style.MUTED, 1.2, ":"))
+        number = self.numbers.number(None, points.ravel())
+        for track in tracks.values():
+            for note in track.notes:
+                note["things"][scene].append(number)
 
     def _track(self, name, pictures, shown):
         """A track no larger than it may be: with every second picture of what is larger; the ends stay."""
@@ -165,8 +240,8 @@ class _Camera:
             steps = len(tracks["play"].notes) - 1
             interval = round(min(max(interval / steps, QUICKEST), SLOWEST))
             declared["play"] = {"steps": steps, "interval": interval, "stride": 1, "patient": False}
-        empty = "turn" if "view" in tracks else ""
-        none = {"keys": False, "click": False, "spaces": []}  # pictures hold what is drawn in space, too
+        empty = "turn" if "view" in tracks or self.things else ""
+        none = {"keys": False, "click": False}
         return {**declared, **none, "buttons": list(declared["buttons"]), "empty": empty}
 
     # -- the tracks
@@ -228,7 +303,7 @@ class _Camera:
         return []
 
     def _view(self):
-        if self.declared["empty"] != "turn":
+        if self.declared["empty"] != "turn" or self.things:
             return
         for turn in range(TURNS):
             if turn:

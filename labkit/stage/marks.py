@@ -1,4 +1,6 @@
-"""Small things that several chapters draw: a frame in the plane, a robot, the name of what is not used."""
+"""Small things that several chapters draw: a matrix beside its frame, ghosts of other settings, a robot in the plane,
+the name of what is not used.
+"""
 
 import numpy as np
 
@@ -7,41 +9,62 @@ from . import style
 ARROW = np.array([[0.0, 0.6], [1.0, 0.0], [0.0, -0.6], [0.3, 0.0], [0.0, 0.6]])  # a robot that looks along x
 
 
-class PlaneFrame:
-    """A frame seen along the world's z axis: x and y with their letters, z as a dot (towards us) or a cross."""
+def broken(curves):
+    """Several curves, (k, n, 2), as one line broken by NaN, (k (n + 1), 2)."""
+    curves = np.asarray(curves, dtype=float)
+    return np.concatenate([curves, np.full((len(curves), 1, 2), np.nan)], axis=1).reshape(-1, 2)
 
-    def __init__(self, ax, name, length, linestyle="-"):
-        self.length = length
-        self.axes = [
-            ax.plot([], [], color=color, linestyle=linestyle, linewidth=2.4)[0]
-            for color in (style.AXIS_X, style.AXIS_Y)
-        ]
-        self.letters = [
-            ax.text(0, 0, letter, color=color, ha="center", va="center", zorder=4, clip_on=True)
-            for letter, color in (("x", style.AXIS_X), ("y", style.AXIS_Y))
-        ]
-        (self.z,) = ax.plot([], [], color=style.AXIS_Z, linestyle="none", marker="o", markersize=4, zorder=4)
-        (self.rim,) = ax.plot(
-            [], [], color=style.AXIS_Z, linestyle="none", marker="o", markersize=10, markerfacecolor="none", zorder=4
-        )
-        self.name = ax.annotate(
-            name, (0, 0), xytext=(-9, -9), textcoords="offset points", ha="right", va="top", fontweight="bold",
-            zorder=4, annotation_clip=True, clip_on=True,
-        )  # fmt: skip
-        self.artists = [*self.axes, *self.letters, self.z, self.rim, self.name]
+
+class Ghosts:
+    """What other settings would give, the whole range of a slider for instance: one faint line for all of them."""
+
+    def __init__(self, ax, label="", **look):
+        faint = {"color": style.MUTED, "linewidth": 0.8, "alpha": 0.4, "zorder": 1}
+        (self.line,) = ax.plot([], [], **{**faint, **look}, label=label)
+        self.artists = [self.line]
+
+    def set(self, curves):
+        """`curves`: (k, n, 2), or a list of (n, 2) of unlike length."""
+        self.line.set_data(*np.concatenate([broken([curve]) for curve in curves]).T)
+
+
+class Matrix:
+    """A homogeneous transform in brackets under its name: the columns of the axes in their colors, the origin in ink.
+
+    Parameters
+    ----------
+    ax : Axes
+    x, y : float
+        Left end of the name, and its height, in fractions of the axes.
+    heading : str
+    dx, dy : float
+        From column to column, and from row to row.
+    decimals : int
+    """
+
+    def __init__(self, ax, x, y, heading, dx=0.24, dy=0.085, decimals=3):
+        self.decimals = decimals
+        place = {"transform": ax.transAxes, "clip_on": False}
+        ax.text(x, y + dy, heading, fontweight="bold", **place)
+        low, high = y - 3.75 * dy, y + 0.35 * dy
+        for edge, inward in ((x - 0.01, 0.03), (x + 3.88 * dx, -0.03)):
+            ax.plot([edge + inward, edge, edge, edge + inward], [high, high, low, low], color=style.INK, **place)
+        colors = (*style.AXES, style.INK)
+        self.entries = [
+            [
+                ax.text(x + dx * (j + 0.8), y - dy * (i + 0.2), "", ha="right", va="center",
+                        color=style.MUTED if i == 3 else colors[j], **place)
+                for j in range(4)
+            ]
+            for i in range(4)
+        ]  # fmt: skip
+        self.artists = [entry for row in self.entries for entry in row]
 
     def set(self, T):
-        """Place it at T, shape (4, 4)."""
-        origin = T[:2, 3]
-        for line, letter, axis in zip(self.axes, self.letters, T[:2, :2].T):
-            tip = origin + self.length * axis
-            line.set_data(*np.transpose([origin, tip]))
-            letter.set_position(tip + 0.14 * self.length * axis)
-        for marker in (self.z, self.rim):
-            marker.set_data([origin[0]], [origin[1]])
-        self.z.set_marker("o" if T[2, 2] > 0 else "x")
-        self.z.set_markersize(4 if T[2, 2] > 0 else 7)
-        self.name.xy = tuple(origin)
+        """`T`: shape (4, 4)."""
+        for row, values in zip(self.entries, np.round(T, self.decimals) + 0.0):
+            for entry, value in zip(row, values):
+                entry.set_text(f"{value:.{self.decimals}f}")
 
 
 class Spare:

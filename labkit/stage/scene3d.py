@@ -298,11 +298,13 @@ class _Points(_Item):
 
     def describe(self):
         line = self.artist
-        return _path(line.get_color(), line.get_linewidth(), self.looks.get("linestyle", "-"), line.get_alpha(),
-                     line.get_marker(), line.get_markersize(), line.get_markerfacecolor())  # fmt: skip
+        return described_path(
+            line.get_color(), line.get_linewidth(), self.looks.get("linestyle", "-"), line.get_alpha(),
+            line.get_marker(), line.get_markersize(), line.get_markerfacecolor(),
+        )  # fmt: skip
 
 
-def _path(color, width, linestyle, alpha, marker="None", size=0.0, face=None):
+def described_path(color, width, linestyle, alpha=None, marker="None", size=0.0, face=None):
     """A path for the browser: widths and sizes in CSS pixels."""
     drawn = linestyle not in ("none", "None", "")
     dash = DASHES[linestyle] if isinstance(linestyle, str) else 1
@@ -339,8 +341,9 @@ class _FadingLine(_Item):
 
     def describe(self):
         looks = self.looks
-        return _path(looks.get("color", style.INK), looks.get("linewidth", 1.5), looks.get("linestyle", "-"),
-                     looks.get("alpha"))  # fmt: skip
+        return described_path(
+            looks.get("color", style.INK), looks.get("linewidth", 1.5), looks.get("linestyle", "-"), looks.get("alpha")
+        )
 
 
 class _Text(_Item):

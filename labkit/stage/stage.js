@@ -8,6 +8,7 @@
 //                            a model that has pixels, not files, sends message.pixels, [width, height], and RGBA
 //   off("msg:custom", hear)  no more
 //   send(message)            to Stage.receive(message), as JSON
+//   placed                   where it has this, `render` puts a function there: the places of handles as one looks now
 //
 // Scenes in space are drawn by `space.js`. The first Stage of a page that has one asks Python for it; a page without
 // Python sets globalThis[Symbol.for("labkit.space")] = { load: () => import("./space.js") } before.
@@ -18,12 +19,14 @@
 const PATIENCE = 2500; // ms until a message without an answer is given up, and said
 const SPEAK_AFTER = 700; // ms of rest until a screen reader hears the new caption,
 const SPEAK_EVERY = 2000; // ms between two captions it hears while the picture keeps changing
+const PIXELS_A_STEP = 4; // CSS pixels a number of the sentence is dragged by until it goes one step on
 const REST = 900; // ms without an event until the picture may be stored
 const SETTLED = 150; // ms without a change of size or theme until the picture follows
 const CLICK_RADIUS = 4; // CSS pixels
 const NEAR = 13; // CSS pixels: handles nearer than that are fanned out
 const MAX_ARROWS = 10; // presses kept while a message is in flight
 const CALM_INTERVAL = 500; // ms from picture to picture where the reader asks for reduced motion
+const MOST_LATE = 1500; // ms that a play leaves out to keep up; later, it goes on where it was
 const LETTERS = 13; // CSS pixels of the words around, at which the picture's letters have their own size
 const LARGEST = 2.4; // times as large letters may become in the whole window
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
@@ -75,7 +78,8 @@ class Figure {
     this.scenes = new Scenes(this, declared);
     this.line.where = () => this.scenes.news();
     this.space.scenes = this.scenes;
-    this.words = new Words();
+    if (model.placed) model.placed = (places) => this.scenes.placed(places);
+    this.words = new Words(declared.controls, this.line);
     this.clock = declared.play ? new Clock(declared.play, this.line) : null;
     this.controls = new Controls(declared.controls, this.line);
     this.buttons = buttonRow(declared.buttons, (key) => { this.clock?.stop(); this.line.press(key); });
@@ -371,26 +375,46 @@ function fraction(node, event) {
   return [limit((event.clientX - box.left) / box.width), limit((event.clientY - box.top) / box.height)];
 }
 
-/** Caption, status, and what a screen reader hears. */
+/** Caption, status, and what a screen reader hears. Numbers of the caption that are a slider's can be dragged. */
 class Words {
-  constructor() {
-    this.caption = element("p", "caption", { "aria-hidden": "true" }); // heard from `spoken`
+  constructor(controls, line) {
+    this.caption = element("p", "caption");
     this.status = element("p", "status", { role: "status" });
     this.gone = element("p", "gone", { role: "status" });
     this.spoken = element("div", "spoken", { "aria-live": "polite" });
     this.nodes = [this.status, this.gone, this.caption, this.spoken];
-    Object.assign(this, { timer: 0, since: 0, cursor: "" });
+    Object.assign(this, { controls, line, told: "", parts: [], order: "", timer: 0, since: 0, cursor: "" });
   }
 
-  show({ caption, status, cursor }) {
-    if (this.caption.textContent !== caption) {
-      this.caption.textContent = caption;
+  show({ caption, status, cursor, numbers, controls }) {
+    if (this.told !== caption) {
+      this.told = caption;
+      this.write(caption, (numbers ?? []).filter(([, , name]) => this.controls[name]));
       this.speak(caption);
     }
+    for (const part of this.parts) part.show?.(controls[part.name]);
     if (cursor && cursor !== this.cursor) this.speak(cursor);
     this.cursor = cursor;
     if (this.status.textContent !== status) this.status.textContent = status;
     this.notice("");
+  }
+
+  /** The caption; a number keeps its node, and with it focus and pointer, as long as the order of the numbers stays. */
+  write(caption, numbers) {
+    const order = JSON.stringify(numbers.map(([, , name]) => name));
+    if (this.order !== order || !this.parts.length) {
+      const focused = this.parts.find((part) => part.node === document.activeElement)?.name;
+      const text = () => ({ node: element("span", "", { "aria-hidden": "true" }) }); // heard from `spoken`
+      this.parts = [text(), ...numbers.flatMap(([, , name]) => [new CaptionNumber(name, this.controls[name], this.line), text()])];
+      this.caption.replaceChildren(...this.parts.map(({ node }) => node));
+      this.parts.find(({ name }) => name && name === focused)?.node.focus({ preventScroll: true });
+      this.order = order;
+    }
+    const cuts = [0, ...numbers.flatMap(([start, end]) => [start, end]), caption.length];
+    this.parts.forEach(({ node }, k) => {
+      const words = caption.slice(cuts[k], cuts[k + 1]);
+      if (node.textContent !== words) node.textContent = words;
+    });
   }
 
   notice(text) {
@@ -409,6 +433,47 @@ class Words {
 
   close() {
     clearTimeout(this.timer);
+  }
+}
+
+/** A slider's number in the caption: dragged sideways, or moved by arrow keys, it moves the slider. */
+class CaptionNumber {
+  constructor(name, { label, positions, unit }, line) {
+    Object.assign(this, { name, positions, unit, line, at: 0, held: null });
+    this.node = element("span", "number", {
+      role: "slider", tabindex: "0", "aria-label": label, title: `${label}: drag sideways`, "aria-valuemin": 0, "aria-valuemax": positions,
+      "data-number": name, "data-lm-suppress-shortcuts": "true",
+    });
+    this.node.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
+      taken(event);
+      this.node.focus({ preventScroll: true });
+      this.node.setPointerCapture(event.pointerId);
+      this.held = { x: event.clientX, at: this.at };
+    });
+    this.node.addEventListener("pointermove", (event) => {
+      if (this.held) this.ask(this.held.at + Math.round((event.clientX - this.held.x) / PIXELS_A_STEP));
+    });
+    for (const type of ["pointerup", "pointercancel", "lostpointercapture"]) this.node.addEventListener(type, () => { this.held = null; });
+    this.node.addEventListener("keydown", (event) => {
+      const arrow = arrowOf(event);
+      if (!arrow) return;
+      taken(event);
+      this.ask(this.at + (event.shiftKey ? 10 : 1) * (arrow[0] + arrow[1]));
+    });
+  }
+
+  ask(position) {
+    const at = Math.min(this.positions, Math.max(0, position));
+    if (at === this.at) return;
+    this.at = at;
+    this.line.add("control", (all) => ({ ...all, [this.name]: at }));
+  }
+
+  show({ at, text }) {
+    this.node.setAttribute("aria-valuenow", at);
+    this.node.setAttribute("aria-valuetext", this.unit ? `${text} ${this.unit}` : text);
+    if (this.line.pending.control?.[this.name] === undefined) this.at = at; // else it is further already
   }
 }
 
@@ -774,7 +839,8 @@ class Clock {
   beat() {
     const now = performance.now();
     if (this.line.flight === null && this.line.pending.time === undefined) {
-      const late = this.patient ? 0 : Math.floor((now - this.due) / this.interval);
+      const slept = now - this.due > MOST_LATE; // the machine, or the page behind another
+      const late = this.patient || slept ? 0 : Math.floor((now - this.due) / this.interval);
       const next = Math.min(this.steps, this.at + this.stride * (1 + late));
       this.due = Math.max(this.due + this.interval * (1 + late), now);
       this.ask(next);

@@ -60,6 +60,10 @@ start, advance : simulations that go on from what was. `start(state)` returns th
     "click" or "brush". Both functions see the memory so far as `state["memory"]` and return a new one, or the old one
     changed; draw random numbers from an rng in it. What it was is kept: time can be scrubbed backward, and forward
     again to what happened then, until something is touched in between.
+target=Target(words, reached) : what one is to reach. It stands over the picture, hollow or with a check mark, and ends
+    the caption, which a screen reader hears.
+describe : a sentence that holds "{offset}", the name of a slider in braces, gets the slider's number there; in a page
+    it can be dragged sideways, or moved by arrow keys, as the slider can.
 stage.set(**changes) : the same from Python, from any thread or asyncio task; a few dozen times a second are fine, the
 newest wins.
 
@@ -68,6 +72,7 @@ ValueError (or the type and text of anything else) appears under the figure and 
 environment variable LABKIT_STRICT=1 it is raised as well.
 """
 
+import re
 from dataclasses import dataclass
 from time import monotonic
 
@@ -77,6 +82,7 @@ from .. import live
 from ..checks import as_finite
 from . import front, style
 from .canvas import CSS_DPI, DRAWING, Picture
+from .controls import Slider
 from .scene3d_handles import Dial, stepped
 from .tape import Tape
 
@@ -87,6 +93,7 @@ ORBIT_DEG_PER_PIXEL = 0.5
 MAX_UNSEEN = 3
 RESERVED = ("t", "view", "click", "brush", "memory")
 FAIL = "Make it fail"
+NUMBER = re.compile(r"\{(\w+)\}")  # of a sentence: the name of a slider
 MAX_WAIT = 1.5  # s a page waits for steps of a simulation; the slider of time then goes back to what was reached
 
 
@@ -114,29 +121,30 @@ class Stage:
     size : (width, height)
         In inches of 100 CSS pixels, at most; JupyterLab's usual cell is 7 to 9 inches wide.
 
-    play, view, constrain, click, brush, keys, start, advance: see the module's docstring.
+    play, view, constrain, click, brush, keys, start, advance, target: see the module's docstring.
 
     Raises
     ------
     ValueError
-        For more than three controls, unknown names in presets, names used twice, options that need one another.
+        For more than three controls, unknown names in presets, names used twice, options that need one another, a
+        target that is reached before anything is touched.
     """
 
     def __init__(
         self, name, *, scene, compute, fail, handles=None, controls=None, presets=None, describe=None, because="",
         size=(7.0, 4.2), play=None, view=None, constrain=None, click=None, brush=None, keys=False, start=None,
-        advance=None,
+        advance=None, target=None,
     ):  # fmt: skip
         self.name = name
         self._handles, self._controls, self._play, self._presets = handles or {}, controls or {}, play, {}
         self._compute, self._describe, self._constrain = compute, describe, constrain
-        self._start, self._advance, self._keys = start, advance, keys
+        self._start, self._advance, self._keys, self._target = start, advance, keys, target
         self._click, self._brush = (
             None if a is None or a is False else int(a is not True and a) for a in (click, brush)
         )
         self._check_options(view)
         self._state = self._first_state(view)
-        self.result, self.status, self.caption = None, "", ""
+        self.result, self.status, self.caption, self.reached, self._numbers = None, "", "", False, []
         self._sends, self._widget, self.at_rest = [], None, []
         self._sent, self._shown, self._waiting, self._attached, self._epoch = 0, 0, False, False, 0
         self._because, self._said, self._tape = because, "", None
@@ -157,6 +165,8 @@ class Stage:
             self._restart()
             self._simulate(0, ())
         self._recompute()
+        if self.reached:
+            raise ValueError(f"Stage {name!r}: the target is reached before anything is touched: {target.words!r}")
         self._check_places()
         self._picture.draw()
         self._text = f"[stage: {name}] {self.caption}".rstrip()
@@ -352,7 +362,26 @@ class Stage:
         with DRAWING:
             self._picture.update(self.state, result)
         self.result, self.status = result, ""
-        self.caption = " ".join(filter(None, [self._said, str(self._describe(result)) if self._describe else ""]))
+        self._say()
+
+    def _say(self):
+        """The caption, where the numbers of sliders stand in it, and the target over the picture."""
+        told = [self._said, str(self._describe(self.result)) if self._describe else ""]
+        if self._target:
+            self.reached = bool(self._target.reached(self.result))
+            goal = self._target.told(self.reached)
+            self._picture.head(goal, self.reached)
+            told.append(f"{goal}.")
+        self.caption, self._numbers = "", []
+        words = NUMBER.split(" ".join(filter(None, told)))
+        for text, key in zip(words[::2], [*words[1::2], None]):
+            self.caption += text
+            if isinstance(self._controls.get(key), Slider):
+                number = self._controls[key].text(self._state[key])
+                self._numbers.append([len(self.caption), len(self.caption) + len(number), key])
+                self.caption += number
+            elif key:
+                self.caption += f"{{{key}}}"
 
     @property
     def buttons(self):
@@ -473,7 +502,7 @@ class Stage:
         (left, right), (bottom, top) = np.sort(ax.get_xlim()), np.sort(ax.get_ylim())
         if isinstance(handle, Dial) or handle.way is not None:
             there = None if to is None else self._picture.data(ax, to)
-            return self._moved_in_space(handle, at, there, steps, (right - left) / 100)
+            return self._moved_in_space(key, at, there, steps, (right - left) / 100)
         view = self._state.get("view")
         here = view.project(at)[:2] if len(at) == 3 else at
         if to is None:
@@ -484,16 +513,16 @@ class Stage:
         there = np.clip(there, (left, bottom), (right, top))
         return self._bounded(key, there if len(at) == 2 else at + view.unproject(there - here))
 
-    def _moved_in_space(self, handle, at, there, steps, step):
-        view = self._state["view"]
+    def _moved_in_space(self, key, at, there, steps, step):
+        handle, view = self._handles[key], self._state["view"]
         if there is None and isinstance(handle, Dial):
             return handle.stepped(at, steps)
         if there is None:
-            return stepped(handle.way, at, steps, view.axes, handle.step or step)
+            return self._bounded(key, stepped(handle.way, at, steps, view.axes, handle.step or step))
         eye, ray = view.ray(*there)
         if isinstance(handle, Dial):
             return handle.pull(at, self.result, eye, ray)
-        return handle.way.pull(at, eye, ray, view.axes[2])
+        return self._bounded(key, handle.way.pull(at, eye, ray, view.axes[2]))
 
     def _show_picture(self, reply=None):
         """One picture to the browser; one that has not yet shown the last three gets the newest as soon as it has."""
@@ -521,6 +550,7 @@ class Stage:
             "controls": {key: self._shown_control(key) for key in self._controls},
             "time": self._shown_time(),
             "caption": self.caption,
+            "numbers": self._numbers,
             "status": self.status,
             "cursor": self._cursor,
             "milliseconds": round(1e3 * (monotonic() - self._received), 1),

@@ -20,17 +20,20 @@ from ..fast.hand_eye import calibrate_sphere_target
 from ..files.bags import read_bag
 from ..files.points import read_points
 from ..files.poses import FORMATS, read_pairs, read_poses, refuse_other_rows, refuse_times
+from ..files.text import naming
 from ..geometry.frames import kuka_from_matrix
 from . import report
 from .arguments import Parser, Refusal, run, write
 
+FILES = ("bag", "robot", "sensor", "poses", "points", "nominal", "a", "b")  # options that hold one
 MAGNIFIED = (1, 10, 100, 1000, 10_000, 100_000)  # times, that an ellipsoid is drawn larger than it is
 
 
 def main(arguments):
     """Run one kind of calibration on files, and print or write what came out."""
     options = _parser().parse_args(arguments)
-    result, assumed = KINDS[options.kind](options)
+    with naming(*(getattr(options, name, None) for name in FILES)):
+        result, assumed = KINDS[options.kind](options)
     for line in assumed:
         print(line)
     print(*result.lines(), sep="\n")

@@ -12,6 +12,7 @@ import numpy as np
 from ..estimation.gaussian import ellipse
 from ..fast.path import filter_path
 from ..files.logs import read_landmarks, read_odometry, read_readings, read_truth
+from ..files.text import naming
 from ..localization.locate import NAMES, UNITS, locate
 from ..localization.path import LIMIT
 from . import report
@@ -27,18 +28,19 @@ def main(arguments):
     landmarks = read_landmarks(options.landmarks)
     readings = read_readings(options.measurements, options.angle)
     truth = options.truth and read_truth(options.truth, options.angle)
-    found = locate(
-        odometry.time,
-        np.stack([odometry.v, odometry.omega], 1),
-        readings.time,
-        readings.ids,
-        readings.z,
-        landmarks.ids,
-        landmarks.points,
-        noise=_noise(options),
-        truth=truth and (truth.time, truth.x),
-        filter_path=filter_path,
-    )
+    with naming(options.odometry, options.landmarks, options.measurements, options.truth):
+        found = locate(
+            odometry.time,
+            np.stack([odometry.v, odometry.omega], 1),
+            readings.time,
+            readings.ids,
+            readings.z,
+            landmarks.ids,
+            landmarks.points,
+            noise=_noise(options),
+            truth=truth and (truth.time, truth.x),
+            filter_path=filter_path,
+        )
     print(*found.lines(), sep="\n")
     if options.out:
         about = found.as_dict()

@@ -91,7 +91,9 @@ def cell(item, k):
 
 
 if __name__ == "__main__":
-    what, *rest = sys.argv[1:]
+    what, *rest = sys.argv[1:] or ["nothing"]
+    if what not in ("solved", "mistakes"):
+        sys.exit(__doc__)
     if what == "solved":
         seeds, *rest = rest or ["20"]
         found = solved(int(seeds), rest)

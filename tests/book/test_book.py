@@ -97,6 +97,12 @@ def test_every_stage_of_the_course_is_found_by_the_name_its_cell_calls():
         assert len(notebook.stages_of(solved)) == len(shown), stem
 
 
+def test_a_page_from_a_folder_gets_the_drawing_in_space_as_a_classic_script():
+    script = site.space()
+    assert "export" not in script and "labkitSpace(" in script and "twgl" in script.splitlines()[0]
+    assert re.search(r"return \{ View: \w+, ?works: \w+ \};", script[-80:])
+
+
 def test_what_was_recorded_is_said():
     stage = {"handles": {"A": "A", "B": "B"}, "controls": {"n": {"label": "n"}, "m": {"label": "m"}}}
     data = {
@@ -124,7 +130,8 @@ def test_the_site_is_whole_well_formed_and_calls_no_other_host(tmp_path):
     site.write(chapters, [entry()], tmp_path)
     pages = {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()}
     assert sorted(pages) == [
-        "07_dead_reckoning.html", "08_kalman.html", "book.css", "book.js", "figures.html", "index.html", "ledger.html"
+        "07_dead_reckoning.html", "08_kalman.html", "book.css", "book.js", "figures.html", "index.html", "ledger.html",
+            "space.LICENSE.txt", "space.js",
     ]  # fmt: skip
     ids = {}
     for name, page in pages.items():

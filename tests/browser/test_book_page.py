@@ -3,6 +3,7 @@
 import driver
 import nbformat
 import pytest
+from test_space_in_lab import apart, at_rest
 
 from labkit.book import figures, notebook, site
 from labkit.exercises import source
@@ -28,7 +29,9 @@ def book(tmp_path_factory):
         for name, value in SHORTER.items():
             patch.setattr(film, name, value)
         made = {name: figures.record(STEM, name, folder) for name in notebook.stages_of(solved).values()}
+        scene = figures.record("03_quirlen", "pose_designer", folder)
     site.write([site.Chapter(STEM, solved, made)], [], folder)
+    (folder / "scene.html").write_text(site.page("A scene", figures.as_html(scene), [], ""), encoding="utf-8")
     return folder
 
 
@@ -120,9 +123,52 @@ def test_time_runs_can_be_scrubbed_backward_and_follows_the_theme(page):
     page.locator("button.theme").click()
 
 
+def scene_of(page):
+    """(the figure, its picture in space once it stays)."""
+    found = page.locator("figure.stage")
+    found.locator("canvas[data-space=true]").wait_for(timeout=20_000)
+    return found, at_rest(page, 0)[1]
+
+
+def test_a_scene_turns_and_its_handle_follows_where_one_looks_from(page, book):
+    page.goto((book / "scene.html").as_uri())
+    found, (covered, colors, before) = scene_of(page)
+    assert covered > 0.05 and colors > 100
+    handle, home = found.locator(".handle"), found.locator(".handle").bounding_box()
+    found.locator("canvas:not(.space)").focus()
+    for _ in range(6):
+        page.keyboard.press("ArrowRight")
+    _, (_, _, turned) = scene_of(page)
+    there = handle.bounding_box()
+    assert apart(turned, before) > 0.5 and abs(there["x"] - home["x"]) + abs(there["y"] - home["y"]) > 8
+    caption = found.locator(".caption").inner_text()
+    page.mouse.move(there["x"] + 16, there["y"] + 16)
+    page.mouse.down()
+    page.mouse.move(there["x"] + 41, there["y"] + 31, steps=4)
+    page.mouse.up()
+    _, (_, _, dragged) = scene_of(page)
+    assert apart(dragged, turned) > 0.05 and found.locator(".caption").inner_text() != caption
+    found.get_by_role("button", name="Make it fail").click()
+    assert apart(scene_of(page)[1][2], dragged) > 0.1
+    found.get_by_role("button", name="Reset").click()
+    assert apart(scene_of(page)[1][2], before) < 0.1
+
+
 def test_nothing_is_wider_than_a_phone_and_no_other_host_is_called(page, book):
-    for name in (f"{STEM}.html", "index.html", "figures.html", "ledger.html"):
+    for name in (f"{STEM}.html", "index.html", "figures.html", "ledger.html", "scene.html"):
         page.goto((book / name).as_uri())
         page.wait_for_timeout(200)
         assert page.evaluate("document.documentElement.scrollWidth") <= 360, name
     assert page.hosts == {None} and page.complaints == []
+
+
+def test_without_webgl_a_scene_stays_a_picture_that_says_why(page, book):
+    page.add_init_script(
+        "HTMLCanvasElement.prototype.getContext = ((get) => function (kind, ...more) {"
+        "return kind === 'webgl2' ? null : get.call(this, kind, ...more); })"
+        "(HTMLCanvasElement.prototype.getContext)"
+    )
+    page.goto((book / "scene.html").as_uri())
+    found = page.locator("figure.stage")
+    found.get_by_text("no WebGL 2").wait_for(timeout=10_000)
+    assert found.locator("img").is_visible() and not found.locator(".labkit-stage").count()

@@ -1,4 +1,6 @@
-"""A scene in space on a page with Python behind it and no notebook: a lost WebGL context, a lost Python."""
+"""A Stage on a page with Python behind it and no notebook: sharp screens, numbers of the caption, a lost WebGL context,
+a lost Python.
+"""
 
 import driver
 import numpy as np
@@ -6,6 +8,7 @@ import pytest
 from contact_sheets import stage_page
 from test_space_in_lab import apart, at_rest
 
+from labkit.chapters.ch02_chaining import stages as chaining
 from labkit.chapters.ch06_tracker import stages
 
 CONTEXTS = """() => {
@@ -16,6 +19,14 @@ CONTEXTS = """() => {
         if (kind === "webgl2" && !contexts.includes(made)) contexts.push(made);
         return made;
     };
+}"""
+
+
+SMALL = """(canvas) => {
+    const small = new OffscreenCanvas(100, 60).getContext("2d");
+    small.imageSmoothingQuality = "high";
+    small.drawImage(canvas, 0, 0, 100, 60);
+    return [...small.getImageData(0, 0, 100, 60).data];
 }"""
 
 
@@ -31,6 +42,61 @@ def opened(page, bridge):
     bridge.show(page, stages.tx40())
     page.locator(".labkit-stage canvas[data-space=true]").wait_for(timeout=20_000)
     return page.locator(".labkit-stage")
+
+
+def middle_of(small):
+    """Where the middle of what is covered lies in a picture of 80 x 60 pixels."""
+    covered = np.reshape(small, (60, 80, 4))[..., 3]
+    return np.tensordot(covered, np.mgrid[:60, :80], axes=([0, 1], [1, 2])) / covered.sum()
+
+
+def sharp(page, ratio):
+    """Every canvas has a pixel for each of the screen's."""
+    for canvas in page.locator("canvas").all():
+        assert canvas.evaluate("node => node.width / node.clientWidth") == pytest.approx(ratio, abs=0.01)
+
+
+def test_a_sharp_screen_shows_the_same_with_more_pixels():
+    """In space, drawn several times over: the first picture, one turned to and fro; then in the plane."""
+    seen, small = {}, {}
+    for ratio in (1, 2):
+        with stage_page(False, 700, 640, ratio) as (page, bridge):
+            stage = opened(page, bridge)
+            stage.locator("canvas:not(.space)").focus()
+            for key in ("ArrowRight", "Home"):
+                page.keyboard.press(key)
+            seen[ratio] = at_rest(page, 0)[1]
+            sharp(page, ratio)
+            bridge.show(page, chaining.growth())
+            small[ratio] = np.array(page.locator("canvas:not(.space)").evaluate(SMALL)).reshape(60, 100, 4)[..., :3]
+            sharp(page, ratio)
+    assert seen[2][0] == pytest.approx(seen[1][0], rel=0.1)  # as much of it is covered
+    middles = [middle_of(seen[ratio][2]) for ratio in (1, 2)]
+    assert np.hypot(*np.subtract(*middles)) < 1  # at the same place
+    assert np.abs(small[1] - small[2]).mean() < 3  # of 255: letters and lines have their own pixels
+
+
+def test_numbers_of_the_caption_are_dragged_keyed_and_keep_the_focus():
+    with stage_page(False, 700, 640, 1) as (page, bridge):
+        bridge.show(page, chaining.open_loop())
+        number = page.locator('.caption [data-number="turn_deg"]')
+        slider = page.get_by_role("slider", name="its error (deg)").last
+        assert number.inner_text() == "3.0" and number.get_attribute("aria-valuetext") == "3.0 deg"
+        number.focus()
+        page.keyboard.press("ArrowRight")
+        page.keyboard.press("Shift+ArrowRight")
+        page.wait_for_function("() => document.querySelector('[data-number=turn_deg]').textContent === '4.1'")
+        assert number.evaluate("node => node === document.activeElement")
+        assert (
+            bridge.stage.state["turn_deg"] == pytest.approx(4.1) and slider.get_attribute("aria-valuetext") == "4.1 deg"
+        )
+        box = number.bounding_box()
+        page.mouse.move(box["x"] + 4, box["y"] + 4)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 4 - 40, box["y"] + 4, steps=5)
+        page.mouse.up()
+        page.wait_for_function("() => document.querySelector('[data-number=turn_deg]').textContent === '3.1'")
+        assert bridge.stage.state["turn_deg"] == pytest.approx(3.1) and page.complaints == []
 
 
 def test_python_draws_while_the_context_is_lost_and_the_page_again_when_it_is_back():

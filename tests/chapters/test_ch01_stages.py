@@ -21,7 +21,7 @@ def state_of_sheet(**changes):
 
 
 def test_removed_and_kept_make_up_the_arm():
-    result = w.compute_three_points(state_of_sheet(Y0=np.array([1.8, 2.9])))
+    result = w.compute_three_points(state_of_sheet(Y0=np.array([1.8, 2.9, 0.0])))
     assert result["removed"][0] ** 2 + result["kept"][0] ** 2 == pytest.approx((1.8 - 1.01) ** 2 + 0.9**2)
 
 
@@ -29,22 +29,31 @@ def test_three_points_gives_the_sheets_frames():
     result = w.compute_three_points(state_of_sheet())
     assert result["K0_T_K1"] == pytest.approx(frames.relative(*result["frames"]))
     for T, points, foot in zip(result["frames"], result["points"], result["feet"]):
-        assert (points[2] - foot) @ T[:2, 0] == pytest.approx(0, abs=1e-12)  # what is kept is perpendicular
-        assert np.linalg.det([foot - points[0], T[:2, 0]]) == pytest.approx(
-            0, abs=1e-12
-        )  # what is removed lies along x
+        assert (points[2] - foot) @ T[:3, 0] == pytest.approx(0, abs=1e-12)  # what is kept is perpendicular
+        removed = np.cross(foot - points[0], T[:3, 0])
+        assert removed == pytest.approx(np.zeros(3), abs=1e-12)  # what is removed lies along x
 
 
 def test_three_points_removes_the_part_along_x():
-    result = w.compute_three_points(state_of_sheet(O0=np.zeros(2), X0=np.array([2.0, 0]), Y0=np.array([0.7, 0.4])))
-    assert result["feet"][0] == pytest.approx([0.7, 0.0])
+    result = w.compute_three_points(
+        state_of_sheet(O0=np.zeros(3), X0=np.array([2.0, 0, 0]), Y0=np.array([0.7, 0.4, 0]))
+    )
+    assert result["feet"][0] == pytest.approx([0.7, 0.0, 0.0])
     assert result["frames"][0] == pytest.approx(np.eye(4))
 
 
+def test_a_point_lifted_out_of_the_plane_turns_the_frame_about_its_x_axis():
+    points = {"O0": np.zeros(3), "X0": np.array([2.0, 0, 0]), "Y0": np.array([0.7, 0.3, 0.4])}
+    result = w.compute_three_points(state_of_sheet(**points))
+    assert result["kept"][0] == pytest.approx(0.5) and result["removed"][0] == pytest.approx(0.7)
+    axes = result["frames"][0][:3, :3].T
+    assert axes == pytest.approx(np.array([[1, 0, 0], [0, 0.6, 0.8], [0, -0.8, 0.6]]))
+
+
 def test_three_points_roll_matches_repetitions():
-    state = state_of_sheet(Y0=np.array([1.4, 2.5]))
+    state = state_of_sheet(Y0=np.array([1.4, 2.5, 0.3]))
     rng = np.random.default_rng(3)
-    points = np.column_stack([w.compute_three_points(state)["points"][0], np.zeros(3)])
+    points = w.compute_three_points(state)["points"][0]
     noisy = points + w.NOISE_OF_A_TAPE * rng.standard_normal((20000, 3, 3))
     T = frames.frame_from_points(*np.moveaxis(noisy, 1, 0))
     true = frames.frame_from_points(*points)
@@ -56,9 +65,9 @@ def test_three_points_flat_and_collinear():
     stage = w.three_points()
     stage.make_it_fail()
     assert "next to nothing" in stage.caption
-    stage.set(Y0=(1.5, 2.0))
+    stage.set(Y0=(1.5, 2.0, 0.0))
     assert "collinear" in stage.status
-    stage.set(Y0=(1.5, 1.5))  # on the other side: z turns away from us
+    stage.set(Y0=(1.5, 1.5, 0.0))  # on the other side: z turns away from us
     assert stage.status == "" and stage.result["frames"][0][2, 2] == pytest.approx(-1)
 
 

@@ -59,8 +59,26 @@ def test_steps_are_best_where_rounding_meets_curvature():
     assert tiny["at"]["forward"] > 1e4 * result["at"]["forward"]
 
 
+def test_near_the_place_the_curve_is_its_tangent_then_it_bends_or_breaks_into_stairs():
+    """In steps, so that the tangent has the slope 1: residuals of some 1000 mm have digits 1e-13 mm apart."""
+    good, bent, broken = (w.compute_steps({"h": h})["curve"] for h in (1e-3, 10.0, 1e-13))
+    np.testing.assert_allclose(good, w.AROUND, atol=1e-4)
+    off = bent - w.AROUND
+    np.testing.assert_allclose(off[::6], off[30 + 6] / 0.3**2 * w.AROUND[::6] ** 2, atol=0.04)  # a parabola, nearly
+    assert abs(off[0]) > 0.1 and len(np.unique(broken)) < 15
+
+
+def test_the_ring_of_the_step_stands_on_the_curve_and_has_a_slider():
+    stage = w.difference_steps()
+    stage.set(P=(-3.0, 5.0))
+    assert stage.state["h"] == pytest.approx(1e-3) and stage.reached
+    assert stage.state["P"] == pytest.approx([-3.0, stage.result["at"]["central"]], rel=1e-6)
+    stage.set(h=0.1)
+    assert stage.state["P"][0] == pytest.approx(-1.0) and not stage.reached
+
+
 def test_steps_on_the_pose_need_no_detour():
-    result = w.compute_iterations({"P": np.array([-54.0, -30.0]), "B_deg": -30.0})
+    result = w.compute_iterations({"tilt": -54.0, "yaw": -30.0, "B_deg": -30.0, "step": 1})
     assert result["euler"]["arrived"] and result["se3"]["arrived"]
     assert result["euler"]["steps"] > 2 * result["se3"]["steps"]
     assert result["euler"]["turned_deg"] > 4 * result["se3"]["turned_deg"]
@@ -162,13 +180,15 @@ def test_scan_line_through_the_center_knows_no_y():
 
 
 def test_one_step_is_one_step():
-    assert "1 step," in w._iterations_sentence(w.compute_iterations({"P": np.zeros(2), "B_deg": -88.0}))
+    assert "1 step," in w._iterations_sentence(
+        w.compute_iterations({"tilt": 0.0, "yaw": 0.0, "B_deg": -88.0, "step": 1})
+    )
 
 
 def test_convergence_opens_next_to_the_pole_where_the_detour_is_seen():
     stage = w.convergence()
-    result = w.compute_iterations({"P": stage.state["P"], "B_deg": stage.state["B_deg"]})
-    assert abs(stage.state["P"][0] - result["pole"]) < 2
+    result = stage.result
+    assert abs(stage.state["tilt"] - (-90.0 - stage.state["B_deg"])) < 2
     assert result["euler"]["arrived"] and result["euler"]["steps"] > 2 * result["se3"]["steps"]
 
 

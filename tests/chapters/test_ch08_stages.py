@@ -34,8 +34,28 @@ def test_vehicle_settles_at_the_riccati_gain_and_loses_sight_in_a_dropout():
     settled = kalman.steady_state(A, C, 0.16 * B @ B.T + 1e-12 * np.eye(2), [[0.25]])
     np.testing.assert_allclose(result["gain"][-1], settled.gain[:, 0], rtol=0.02)
     blind = stages.compute_vehicle({"std_a": 0.4, "std_z": 0.5, "dropout": True})
-    assert blind["std"][74, 0] > 3 * result["std"][74, 0] and np.isnan(blind["nis"][60])
-    assert np.isfinite(blind["nis"][80])
+    assert blind["std"][74, 0] > 3 * result["std"][74, 0]
+    assert np.isnan(blind["measured"][60]) and np.isfinite(blind["measured"][80])
+
+
+@pytest.mark.parametrize("dropout", [False, True])
+def test_every_belief_is_judged_as_its_own_filter(dropout):
+    """The curve on the right is stepped for all beliefs at once; each of its points is a filter of its own."""
+    low, high = stages.compute_vehicle({"std_a": 0.4, "std_z": 0.5, "dropout": dropout})["band"]
+    for k, std in list(enumerate(stages.STDS_Z))[::6]:
+        result = stages.compute_vehicle({"std_a": 0.4, "std_z": float(std), "dropout": dropout})
+        assert result["others"][k] == pytest.approx(result["nis"], rel=1e-9)
+        assert stages._is_honest(result) == (low < result["nis"] < high)
+    assert (np.diff(result["others"]) < 0).all()  # the more noise is believed, the less surprises
+
+
+def test_the_bracket_and_its_slider_are_one():
+    stage = stages.vehicle()
+    assert stage.state["P"] == pytest.approx([stages.BRACKET, 2.0])
+    stage.set(P=(3.0, 1.0))
+    assert stage.state["std_z"] == pytest.approx(0.5) and stage.state["P"][0] == stages.BRACKET and stage.reached
+    stage.set(std_z=0.3)
+    assert stage.state["P"][1] == pytest.approx(0.6) and not stage.reached
 
 
 def scores(**changes):

@@ -28,6 +28,7 @@ from labkit.documents.thesis import wells
 from labkit.machines import simulation, udp
 from labkit.machines.arm import TX40, link_frames
 from labkit.machines.packet import POSITION, decode_packet
+from labkit.stage import Stage
 from labkit.stage.scene3d import Scene
 from labkit.stage.scene3d_handles import Dial
 
@@ -83,7 +84,7 @@ WITH_HANDLES = (
     ch04.basins, ch05.triangle, ch05.scan_line,
     ch05.convergence, ch05.two_methods, ch05.pattern_designer, ch05.accuracy_kinds,
     ch06.tx40, ch06.two_axes, ch06.sweeps, ch06.whole_cell,
-    ch07.circles, ch08.bells, ch08.arena,
+    ch02.two_loops, ch05.difference_steps, ch07.circles, ch08.bells, ch08.vehicle, ch08.arena,
 )  # fmt: skip
 
 
@@ -101,28 +102,47 @@ def gaps(stage):
 
 
 @pytest.mark.parametrize("make", WITH_HANDLES, ids=lambda make: f"{make.__module__.split('.')[2]}.{make.__name__}")
-@pytest.mark.parametrize("move", ("start", "made to fail", "moved"))
-def test_every_handle_lies_on_what_it_moves(make, move):
+def test_every_handle_lies_on_what_it_moves(make):
+    """At the start, made to fail, and moved: less than a pixel away, for circles are drawn as polygons."""
     stage = make()
-    if move == "made to fail":
-        stage.make_it_fail()
-    elif move == "moved":
-        for key, handle in stage.handles.items():
-            width = abs(np.subtract(*stage.figure.axes[handle.ax].get_xlim()))
-            stage.set(**{key: stage.state[key] - 0.03 * width})
-    assert max(gap for _, gap in gaps(stage)) < 1e-3  # less than a pixel: circles are drawn as polygons
+    for change in (lambda stage: None, Stage.make_it_fail, move_all):
+        change(stage)
+        assert max(gap for _, gap in gaps(stage)) < 1e-3, change.__name__
+        stage.reset()
+
+
+def move_all(stage):
+    for key, handle in stage.handles.items():
+        width = abs(np.subtract(*stage.figure.axes[handle.ax].get_xlim()))
+        stage.set(**{key: stage.state[key] - 0.03 * width})
+
+
+def assert_rod(stage, name, start, end):
+    """A rod reaches from one point to another, everywhere as far from the line between them or on it."""
+    corners = stage.spaces[0].named(name).corners().reshape(-1, 3) - start
+    length = np.linalg.norm(np.subtract(end, start))
+    along = np.subtract(end, start) / length
+    reach = corners @ along
+    off = np.linalg.norm(corners - np.outer(reach, along), axis=1)
+    assert [reach.min(), reach.max()] == pytest.approx([0.0, length], abs=1e-6 * length)
+    assert off[off > 1e-6 * length] == pytest.approx(off.max())
 
 
 # --- chapter 1 --------------------------------------------------------------------------------------------------------
 
 
 def test_three_points_draw_their_construction():
-    O0, X0, Y0 = np.array([0.5, 0.4]), np.array([2.1, 1.6]), np.array([0.3, 2.4])
+    O0, X0, Y0 = np.array([0.5, 0.4, 0.2]), np.array([2.1, 1.6, 0.2]), np.array([0.3, 2.4, 0.2])
     stage = at(ch01.three_points(), O0=O0, X0=X0, Y0=Y0)
     x = (X0 - O0) / 2.0  # 1.6, 1.2: 2 long
-    y = np.array([-0.6, 0.8])
+    y = np.array([-0.6, 0.8, 0.0])
     foot = O0 + x * (x @ (Y0 - O0))
     assert_drawn(stage, [X0, O0, Y0], [O0, foot], [foot], [foot, Y0], [O0, O0 + 0.7 * x], [O0, O0 + 0.7 * y])
+    plane = stage.spaces[0].named("K0").corners().reshape(-1, 3)
+    assert plane[:, 2] == pytest.approx(0.2)  # all three points lie in it
+    plate = stage.spaces[0].named("triangle of K0").corners().reshape(-1, 3)
+    for corner in (O0, X0, Y0):
+        assert np.linalg.norm(plate - corner, axis=1).min() == pytest.approx(0.006)  # half its thickness
 
 
 def test_noisy_triangle_and_its_frame():
@@ -158,21 +178,30 @@ def test_both_constructions_stand_on_the_triangle():
 
 
 def test_second_move_starts_in_the_frame_of_the_first():
-    A, B = np.array([140.0, 20.0]), np.array([-50.0, 110.0])
+    A, B = np.array([140.0, 20.0, 30.0]), np.array([-50.0, 110.0, 40.0])
     stage = at(ch02.order_of_product(), A=A, B=B, A_deg=50, B_deg=-35)
-    AB, BA = A + plane(50) @ B, B + plane(-35) @ A
-    assert_drawn(stage, [(0, 0), A, AB], [(0, 0), B, BA], [AB], [BA])
-    assert_drawn(stage, [AB, AB + 90 * plane(15)[:, 0]], [AB, AB + 90 * plane(15)[:, 1]])
+    RA, RB = (Rotation.from_euler(axis, deg, degrees=True).as_matrix() for axis, deg in (("z", 50), ("x", -35)))
+    AB, BA = A + RA @ B, B + RB @ A
+    assert_drawn(stage, [np.zeros(3), A, AB], [np.zeros(3), B, BA], [AB], [BA])
+    assert_drawn(stage, *([AB, AB + 90 * axis] for axis in (RA @ RB).T), *([A, A + 70 * axis] for axis in RA.T))
+    for space, end, R in zip(stage.spaces, (AB, BA), (RA @ RB, RB @ RA)):
+        piece = (space.named("piece").corners().reshape(-1, 3) - end) @ R  # seen from the frame it is carried by
+        assert piece.min(0) == pytest.approx(np.zeros(3), abs=1e-9) and piece.max(0) == pytest.approx([95, 70, 44])
 
 
-@pytest.mark.parametrize("link", (1, 2, 3, 4))
-def test_a_turned_link_opens_the_loop_about_its_end(link):
-    stage = at(ch02.open_loop(), link=link, turn_deg=8.0, K2=(-200.0, -300.0))
-    corners = [np.zeros(2), *(stage.state[f"K{k}"] for k in (1, 2, 3)), np.zeros(2)]
-    after = [c if k <= link else corners[link] + plane(8.0) @ (c - corners[link]) for k, c in enumerate(corners)]
+@pytest.mark.parametrize(("link", "axis"), [(1, "z"), (2, "z"), (3, "x"), (4, "y"), (2, "y")])
+def test_a_turned_link_opens_the_loop_about_its_end(link, axis):
+    stage = at(ch02.open_loop(), link=link, turn_deg=8.0, axis=axis, K2=(-200.0, -300.0, 0.0))
+    corners = [np.zeros(3), *(stage.state[f"K{k}"] for k in (1, 2, 3)), np.zeros(3)]
+    about = Rotation.from_euler("z", ch02._sheet_angles()[0][link % 4]).as_matrix()[:, "xyz".index(axis)]
+    turn = Rotation.from_rotvec(np.deg2rad(8.0) * about).as_matrix()
+    after = [c if k <= link else corners[link] + turn @ (c - corners[link]) for k, c in enumerate(corners)]
     place = stage.state["P"]
-    moved = after[-1] + plane(8.0) @ place
-    assert_drawn(stage, corners, after, [corners[link], after[-1]], [(0, 0), after[-1]], [place, moved])
+    assert_drawn(stage, corners, after, [corners[link], after[-1]])
+    assert_drawn(stage, corners[link] + np.outer([-110.0, 110.0], about))
+    if link < 4:  # else it opens nothing at K0
+        assert_rod(stage, "gap at K0", np.zeros(3), after[-1])
+    assert_rod(stage, "gap at P", place, corners[link] + turn @ (place - corners[link]))
 
 
 def test_laws_of_growth_are_the_sums_over_the_levers():
@@ -187,16 +216,22 @@ def test_laws_of_growth_are_the_sums_over_the_levers():
     row = [law(300.0 * np.arange(n)) for n in numbers]
     loop = [law(300.0 * np.sin(np.pi * np.arange(n) / n)) for n in numbers]
     assert_drawn(stage, np.column_stack([numbers, row]), np.column_stack([numbers, loop]))
-    circle = np.deg2rad(np.linspace(0, 360, 73))
-    assert_drawn(stage, law(300.0 * np.arange(8)) * np.column_stack([np.cos(circle), np.sin(circle)]))
+    heights, frames = stage.result["heights"], np.arange(17)
+    assert_drawn(stage, [row for run in heights.T for row in (*zip(frames, run), GAP)])
+    std = np.array([np.sqrt(k * 0.1**2 + std**2 * np.sum((300.0 * np.arange(k)) ** 2)) for k in frames])
+    assert_drawn(stage, [*zip(frames, std), GAP, *zip(frames, -std)])
 
 
 def test_two_loops_are_magnified_about_the_true_corners():
-    stage = ch02.two_loops()
-    outline = [0, 1, 2, 3, 0, 1, 4, 5, 2]
-    true = np.array([[0, 0], [400, 0], [400, 300], [0, 300], [800, 0], [800, 300.0]])
-    graph = stage.result["graph"][:, :2, 3]
-    assert_drawn(stage, true[outline], (true + 30 * (graph - true))[outline])
+    """Shared out by equal quarters: A's way ends where it began, each frame moved on by its share of the error."""
+    stage = at(ch02.two_loops(), A=(-120.0, 60.0), B=(400.0, 300.0))
+    corners = np.array([[0, 0], [400, 0], [400, 300], [0, 300], [0, 0], [800, 0], [800, 300.0]])
+    measured_a = [*corners[:4], (-120, 60)]
+    measured_b = [corners[1], *corners[5:], corners[2]]
+    assert_drawn(stage, [*measured_a, GAP, *measured_b, GAP])
+    assert_drawn(at(stage, way="as measured"), measured_a, measured_b, [(0, 0), (-120, 60)])
+    left = at(stage, way="B, then A").result["left"]["B, then A"]
+    assert_drawn(stage, [*upright((0.1,), left[:1]), *upright((1.1,), left[1:])])
 
 
 # --- chapter 3 --------------------------------------------------------------------------------------------------------
@@ -290,12 +325,19 @@ def test_sphere_its_mirror_image_and_the_circle_of_the_scan():
     assert cut.mean(0)[1] == pytest.approx(245.0, abs=0.5)
 
 
-def test_paths_of_both_parametrizations_start_at_the_handle():
-    stage = at(ch05.convergence(), P=(-2.0, 20.0))
+def test_the_scanner_walks_from_the_start_to_where_it_sits():
+    stage = at(ch05.convergence(), tilt=-2.0, yaw=20.0, step=2)
+    truth = stage.result["truth"]
+    turn = Rotation.from_rotvec([0.0, -2.0, 20.0], degrees=True).as_matrix()
+    seen = truth[:3, 3] + 240.0 * (turn @ truth[:3, :3])[:, 2]  # the start, and where the walk ends:
     for name in ("euler", "se3"):
         run = stage.result[name]
         assert run["path"][0] == pytest.approx([-2.0, 20.0], abs=1e-9)
-        assert_drawn(stage, run["path"], np.column_stack([np.arange(len(run["rms"])), run["rms"]]))
+        assert run["seen"][0] == pytest.approx(seen)
+        assert run["seen"][-1] == pytest.approx(truth[:3, 3] + 240.0 * truth[:3, 2], abs=1e-5)
+        assert_drawn(stage, run["seen"], np.column_stack([np.arange(len(run["rms"])), run["rms"]]))
+        box = stage.spaces[0].named(f"scanner of {name}").corners().reshape(-1, 3) - run["now"][:3, 3]
+        assert np.abs(box @ run["now"][:3, :3]).max(0) == pytest.approx([75, 26, 90])  # of its own frame
 
 
 def test_both_rays_meet_where_the_object_is():
@@ -360,7 +402,11 @@ def test_errors_of_differences_follow_their_orders():
     short, long = at(ch05.difference_steps(), h=0.1), at(ch05.difference_steps(), h=1.0)
     for scheme, factor in (("forward", 10.0), ("central", 100.0)):
         assert long.result["at"][scheme] == pytest.approx(factor * short.result["at"][scheme], rel=0.02)
-        assert_drawn(long, [[1.0, long.result["at"][scheme]]])
+        assert_drawn(long, [[0.0, long.result["at"][scheme]]])
+    curve = long.result["curve"]
+    assert_drawn(
+        long, np.column_stack([ch05.AROUND, curve]), [(0, 0), (1, curve[50])], [(-1, curve[10]), (1, curve[50])]
+    )
 
 
 # --- chapter 6 --------------------------------------------------------------------------------------------------------
@@ -441,12 +487,34 @@ def test_the_error_of_each_stop_after_the_first_is_drawn():
     assert_drawn(stage, np.column_stack([np.arange(1, 21), stage.result["errors"][1:]]))
 
 
-def test_the_part_and_the_enlarged_miss_stand_on_the_plan():
-    stage = at(ch06.whole_cell(), P=(100.0, 200.0), turn=90.0, spoiled="tip 2 mm off")
-    assert_drawn(stage, [[100, 200], [100, 310], [20, 225], [100, 200]])
-    hole = np.array([100 - 55.0, 200 + 80.0])
-    assert_drawn(stage, [hole], [hole, hole + ch06.ENLARGED * stage.result["miss"][:2]])
-    assert_drawn(stage, hole + ch06.ENLARGED * stage.result["cloud"], hole + ch06.ENLARGED * stage.result["outline"])
+def test_the_whole_cell_stands_where_its_numbers_say():
+    stage = at(ch06.whole_cell(), P=(100.0, 200.0, 100.0), turn=90.0, source="tip", spoil=1.0)
+    space, result = stage.spaces[0], stage.result
+    hole = np.array([100 - 55.0, 200 + 80.0, 100.0])
+    assert result["reached"] and result["hole"] == pytest.approx(hole)
+    assert_drawn(stage, [hole + ch06.ENLARGED * m for m in result["cloud"]])
+    part = space.named("part").corners().reshape(-1, 3)
+    for mark in ((100.0, 200.0), (100.0, 310.0), (20.0, 225.0)):  # the plate under each, turned by 90 deg
+        assert np.hypot(*(part[part[:, 2] > 102][:, :2] - mark).T).min() < 7
+    T_BF = result["T_BF"]
+    flange = space.named("flange plate").corners().reshape(-1, 3)
+    assert np.abs((flange - T_BF[:3, 3]) @ T_BF[:3, 2]).min() < 1e-3  # its face, by the arm's own kinematics
+    assert_rod(stage, "tool", T_BF[:3, 3], T_BF[:3, 3] + T_BF[:3, :3] @ result["cell"].tip)
+    miss = space.items[[item.called for item in space.items].index("miss")]
+    assert miss.value[:3, 3] == pytest.approx(hole)  # the shaft begins at the hole
+
+
+def test_of_the_whole_cell_the_chosen_transform_shows_its_covariance_enlarged():
+    stage = at(ch06.whole_cell(), source="scanner", spoil=0.0)
+    cell, T_BF = stage.result["cell"], stage.result["T_BF"]
+    ellipsoid = next(item for item in stage.spaces[0].items if item.called == "an ellipsoid")
+    R = T_BF[:3, :3]
+    assert ellipsoid.value == pytest.approx((T_BF @ cell.T_FS)[:3, 3])
+    assert ellipsoid.shape == pytest.approx((3 * ch06.ENLARGED) ** 2 * R @ cell.cov_FS[3:, 3:] @ R.T)
+    tip = at(stage, source="tip", spoil=0.5).result
+    off = tip["off"][:3, 3] - (tip["T_BF"] @ [*ch06.cell.TRUTH.tip, 1])[:3]
+    wrong = np.linalg.norm(tip["cell"].tip - ch06.cell.TRUTH.tip)
+    assert np.linalg.norm(off) == pytest.approx(ch06.ENLARGED * wrong)
 
 
 class OneTrail:
@@ -458,9 +526,6 @@ class OneTrail:
 
         def name_at(self, *_):
             pass
-
-    class ax:
-        legend = staticmethod(lambda **_: None)
 
     def points(self, **_):
         return self.Item()
@@ -477,7 +542,7 @@ class OneTrail:
 
 
 def test_trail_sorts_readings_by_the_gate():
-    trail = ch06_figures.Trail(OneTrail())
+    trail = ch06_figures.Trail(OneTrail(), Figure().subplots())
     positions, used = np.arange(12.0).reshape(4, 3), np.array([True, False, True, True])
     trail.set(positions, used, positions + 1, np.eye(4))
     np.testing.assert_array_equal(trail.readings.value, positions[[0, 2, 3]])
@@ -625,6 +690,9 @@ def test_vehicle_errors_within_twice_the_promised_deviation():
     for k in (0, 1):
         upper = np.column_stack([r["time"], 2 * r["std"][:, k]])
         assert_drawn(stage, np.column_stack([r["time"], r["error"][:, k]]), np.vstack([upper, gap, upper * [1, -1]]))
+    assert_drawn(stage, np.column_stack([r["time"], r["measured"]]), [[1.0, r["nis"]]])
+    at_ = stage.state["P"][0]
+    assert_drawn(stage, [(at_ - 0.2, 2.0), (at_, 2.0), (at_, -2.0), (at_ - 0.2, -2.0)])
 
 
 def test_arena_draws_what_the_filter_believes():

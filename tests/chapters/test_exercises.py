@@ -1,8 +1,10 @@
 """Every exercise of every chapter, proved by right and wrong answers."""
 
 import ast
+import functools
 import re
 import textwrap
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -52,9 +54,9 @@ def test_blank_is_to_do(chapter, item):
 
 @mistakes(EXERCISES)
 def test_each_mistake_gets_its_own_text(item, k):
-    for seed in range(3):
-        outcome = item.judge(same_answer(item, item.mistakes[k].variant), rng=np.random.default_rng(seed))
-        assert (outcome.status, outcome.text) == (NOT_YET, item.mistakes[k].text)
+    """On draws of its own, a mistake a seed; `tests/bench/check_chance.py` judges each for as long as one likes."""
+    outcome = item.judge(same_answer(item, item.mistakes[k].variant), rng=np.random.default_rng(k))
+    assert (outcome.status, outcome.text) == (NOT_YET, item.mistakes[k].text)
 
 
 @pytest.mark.parametrize("chapter, item", VALUES, ids=names(VALUES))
@@ -66,8 +68,17 @@ def test_value_accepts_the_reference_and_refuses_its_neighbors(chapter, item):
         assert item.judge(np.float64(expected) + 3 * max(item.rtol * abs(expected), item.atol)).status == NOT_YET
 
 
+@functools.cache
+def computed_once(id):
+    """A Value whose reference and wrong variants, functions without arguments, are computed once for all mistakes."""
+    item = next(i for _, i in VALUES if i.id == id)
+    wrong = [replace(mistake, variant=functools.cache(mistake.variant)) for mistake in item.mistakes]
+    return replace(item, reference=functools.cache(item.reference), mistakes=wrong)
+
+
 @mistakes(VALUES)
 def test_each_wrong_value_gets_its_own_text(item, k):
+    item = computed_once(item.id)
     outcome = item.judge(item.mistakes[k].variant())
     assert (outcome.status, outcome.mistake) == (NOT_YET, k), outcome.text
 
@@ -96,10 +107,11 @@ def typed(hint):
     return "\n".join(part if "\n" in part else "\n".join(part.split("; ")) for part in parts)
 
 
-def known_in(chapter):
+@functools.cache
+def known_in(notebook):
     """What a notebook knows, imports and exercises; and the parameters of each function, as written there."""
-    tree = ast.parse((session.SOLUTIONS / f"{chapter.notebook}.py").read_text(encoding="utf-8"))
-    known = {item.id: item.reference for item in chapter.items if isinstance(item, Exercise)}
+    tree = ast.parse((session.SOLUTIONS / f"{notebook}.py").read_text(encoding="utf-8"))
+    known = {item.id: item.reference for chapter, item in EXERCISES if chapter.notebook == notebook}
     for node in tree.body:
         if isinstance(node, ast.Import | ast.ImportFrom):
             exec(ast.unparse(node), known)
@@ -108,7 +120,8 @@ def known_in(chapter):
 
 @pytest.mark.parametrize("chapter, item", EXERCISES, ids=names(EXERCISES))
 def test_the_last_hint_is_right_when_typed_as_it_stands(chapter, item):
-    known, parameters = known_in(chapter)
+    known, parameters = known_in(chapter.notebook)
+    known = dict(known)
     exec(f"def {item.id}({parameters[item.id]}):\n{textwrap.indent(typed(item.hints[-1]), '    ')}", known)
     outcome = item.judge(known[item.id], rng=np.random.default_rng(0))
     assert outcome.status == CORRECT, outcome.text

@@ -1,4 +1,4 @@
-"""A class of twelve, judged across the border, with bubblewrap and without; and what attacks come to."""
+"""A class, judged across the border, with bubblewrap and without; and what attacks come to."""
 
 import csv
 import json
@@ -46,15 +46,15 @@ def table(path):
         return list(csv.DictReader(file))
 
 
-@WITH_AND_WITHOUT
-def test_a_class_of_twelve_is_reported_as_it_was_planted(boxed, tmp_path, capsys):
-    planted = write(tmp_path / "class", 12, 3)
+@pytest.mark.parametrize(("boxed", "students", "damaged"), [("none", 6, 1), ("bubblewrap", 12, 3)], indirect=["boxed"])
+def test_a_class_is_reported_as_it_was_planted(boxed, students, damaged, tmp_path, capsys):
+    planted = write(tmp_path / "class", students, damaged)
     out = tmp_path / "out"
     assert run(collect.main, [str(tmp_path / "class"), "--out", str(out), "--seed", "7", "--names", "folders"]) == 0
     found, problems = results(out), []
-    students = submissions.students([tmp_path / "class"], problems)
-    assert [student.key for student in students] == sorted(planted) and not problems
-    for student in students:
+    handed_in = submissions.students([tmp_path / "class"], problems)
+    assert [student.key for student in handed_in] == sorted(planted) and not problems
+    for student in handed_in:
         result = found.get(submissions.digest(student.files[0].read()))
         if isinstance(planted[student.key], str):
             assert "unreadable" in result, planted[student.key]
@@ -70,8 +70,8 @@ def test_a_class_of_twelve_is_reported_as_it_was_planted(boxed, tmp_path, capsys
         solved = 0 if isinstance(truth, str) else sum(status == "correct" for status, _ in truth.values())
         named = 0 if isinstance(truth, str) else sum(mistake is not None for _, mistake in truth.values())
         assert float(rows[key]["Grade"]) == solved + 0.5 * named
-    assert len(table(out / "problems.csv")) == 3
-    assert len(list((out / "feedback").iterdir())) == 12
+    assert len(table(out / "problems.csv")) == damaged
+    assert len(list((out / "feedback").iterdir())) == students
 
 
 def test_the_same_input_and_seed_give_the_same_bytes_without_any_name(tmp_path):

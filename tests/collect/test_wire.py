@@ -2,6 +2,7 @@
 
 import json
 import re
+import time
 
 import numpy as np
 import pytest
@@ -135,3 +136,16 @@ def test_what_the_exercises_of_a_chapter_are_made_of_is_hidden_but_for_what_its_
         )
         for part in {"exercises", *parts} - {name for names in shown for name in names.split(", ")}:
             assert path.with_name(f"{part}.py") in hidden, f"a submission may read {part}.py of {path.parent.name}"
+
+
+def test_waiting_for_the_other_side_is_not_the_students_time():
+    """A call across the border takes as long as the machine is busy; sleeping is the student's own."""
+
+    def asks(seconds):
+        with wire._undisturbed(), guard.Abroad.waiting():
+            time.sleep(seconds)
+        return seconds
+
+    assert guard.run(asks, (1.2,), limit=0.5).result == 1.2
+    assert isinstance(guard.run(asks, (0.8,), limit=0.4 / guard.ABROAD / guard.PATIENCE).error, guard.TimeLimit)
+    assert isinstance(guard.run(time.sleep, (0.3,), limit=0.05).error, guard.TimeLimit)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from labkit.chapters.ch02_chaining.exercises import CHAPTER as CHAINING
+from labkit.collect import border
 from labkit.exercises import metrics, scope
 from labkit.exercises.engine import CORRECT, NOT_YET, RAISED, Exercise
 from labkit.geometry import chaining, frames
@@ -73,6 +74,10 @@ def test_notebook_data_are_found_in_inner_functions_and_modules_are_none():
         "def f(x):\n    g = lambda y: y + offset\n    return np.sum(g(x)) * frames.MIN_ARM", offset=1.0, frames=frames
     )
     assert scope.notebook_data(function) == ["offset"]
+
+
+def test_of_a_function_in_another_process_no_data_are_seen():
+    assert scope.notebook_data(border.Remote(None, 1, "f", ["x"])) == []
 
 
 def test_each_of_two_results_may_be_a_slip_of_its_own():

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from labkit.geometry import propagation
-from labkit.geometry.frames import frame_from_points, gram_schmidt_covariance, invert, pose, transform
+from labkit.geometry.frames import frame_from_points, gram_schmidt_covariance, invert, moved, pose, transform
 
 
 def random_pose(rng):
@@ -30,8 +30,8 @@ def test_errors_of_both_factors_arrive_in_the_product(seed):
     rng = np.random.default_rng(seed)
     A, B = random_pose(rng), random_pose(rng)
     J_A, J_B = propagation.product_jacobians(A, B)
-    by_A = differences(lambda e: error_between(A @ B, propagation.disturb(A, e) @ B), 6)
-    by_B = differences(lambda e: error_between(A @ B, A @ propagation.disturb(B, e)), 6)
+    by_A = differences(lambda e: error_between(A @ B, moved(A, e) @ B), 6)
+    by_B = differences(lambda e: error_between(A @ B, A @ moved(B, e)), 6)
     np.testing.assert_allclose(J_A, by_A, atol=1e-6)
     np.testing.assert_allclose(J_B, by_B, atol=1e-6)
 
@@ -40,13 +40,13 @@ def test_errors_of_both_factors_arrive_in_the_product(seed):
 def test_the_error_of_an_inverse_and_of_a_point(seed):
     rng = np.random.default_rng(seed)
     T, p = random_pose(rng), rng.uniform(-100, 100, 3)
-    by_T = differences(lambda e: error_between(invert(T), invert(propagation.disturb(T, e))), 6)
+    by_T = differences(lambda e: error_between(invert(T), invert(moved(T, e))), 6)
     np.testing.assert_allclose(propagation.inverse_jacobian(T), by_T, atol=1e-6)
     np.testing.assert_allclose(
         propagation.inverse_jacobian(invert(T)) @ propagation.inverse_jacobian(T), np.eye(6), atol=1e-9
     )
     J_T, J_p = propagation.point_jacobians(T, p)
-    np.testing.assert_allclose(J_T, differences(lambda e: transform(propagation.disturb(T, e), p), 6), atol=1e-6)
+    np.testing.assert_allclose(J_T, differences(lambda e: transform(moved(T, e), p), 6), atol=1e-6)
     np.testing.assert_allclose(J_p, differences(lambda e: transform(T, p + e), 3), atol=1e-6)
 
 
@@ -58,7 +58,7 @@ def test_covariance_of_a_point_is_that_of_many_draws():
     roots = rng.normal(size=(6, 6)) * scale[:, None], 0.1 * rng.normal(size=(3, 3))
     cov_T, cov_p = (root @ root.T for root in roots)
     e, d = (rng.normal(size=(20_000, len(root))) @ root.T for root in roots)
-    points = transform(propagation.disturb(T, e), p + d)
+    points = transform(moved(T, e), p + d)
     values, axes = np.linalg.eigh(propagation.point_covariance(T, cov_T, p, cov_p))
     np.testing.assert_allclose((points @ axes).var(0), values, rtol=0.06)
 
@@ -70,7 +70,7 @@ def test_each_link_of_a_chain():
     for k in range(4):
 
         def product(e, k=k):
-            return np.linalg.multi_dot([propagation.disturb(L, e) if i == k else L for i, L in enumerate(links)])
+            return np.linalg.multi_dot([moved(L, e) if i == k else L for i, L in enumerate(links)])
 
         np.testing.assert_allclose(J[k], differences(lambda e, f=product: error_between(T, f(e)), 6), atol=2e-6)
     with pytest.raises(ValueError, match="at least one link"):

@@ -1,11 +1,16 @@
-"""A film shows what its Stage shows: same pictures in both themes, same words, at the places it says."""
+"""A film shows what its Stage shows: same pictures in both themes, same words, same numbers of what lies in space."""
 
+import base64
+import json
 import zlib
 
 import numpy as np
 import pytest
 
 from labkit.stage import Choice, Handle, Play, Slider, Stage, film, style
+from labkit.stage import scene3d_solids as solids
+from labkit.stage.scene3d import Scene, View
+from labkit.stage.scene3d_handles import Along
 
 
 def compute(state):
@@ -143,3 +148,56 @@ def test_few_colors_are_kept_as_they_are_and_many_are_grouped_near(seed):
     ramp = np.linspace(0, 255, 4000)[:, None] * np.ones(6)
     group = film._grouped(ramp, np.ones(4000), 256)
     assert max(np.ptp(ramp[group == k, 0]) for k in range(256)) < 4
+
+
+def in_space():
+    """A ball on a handle, another that is hidden while it is low, and words."""
+
+    def scene(fig):
+        space = Scene(fig.subplots(), radius=10)
+        ball, other = space.body(solids.sphere(1.0)), space.body(solids.sphere(2.0))
+        words = space.text("")
+
+        def update(state, result):
+            for body, x in ((ball, 0.0), (other, 1 / 3)):
+                T = np.eye(4)
+                T[:3, 3] = x, 0.7, state["P"][2]
+                body.set(T)
+            other.show(state["P"][2] > 0)
+            words.set(state["P"], f"{state['P'][2]:.0f}")
+            space.draw(state["view"])
+
+        return space.artists, update
+
+    up = Handle((0, 0.7, 1.0), way=Along((0, 0, 1)), bounds=((0, 0), (0.7, 0.7), (-5, 5)))
+    return Stage(
+        "balls", scene=scene, compute=lambda state: None, handles={"P": up}, fail={"P": (0, 0.7, 5)}, view=View()
+    )
+
+
+def test_what_lies_in_space_is_kept_as_numbers_and_turns_freely():
+    made = film.record(in_space())
+    data = json.loads(json.dumps(made.as_data()))
+    assert set(made.tracks) == {"start", "handle", "Make it fail"} and made.declaration["empty"] == "turn"
+    raw = np.frombuffer(zlib.decompress(base64.b64decode(data["space"]["numbers"])), np.uint8)
+    numbers = np.split(raw.reshape(4, -1).T.copy().view("<f4").ravel(), np.cumsum(data["space"]["counts"])[:-1])
+    heights = []
+    for note in made.tracks["handle"].notes:
+        ball, other, words, path = note["things"][0]
+        x, y, z = note["handles"]["P"]["point"]
+        assert numbers[ball].reshape(4, 4)[:3, 3] == pytest.approx([0, y, z], rel=1e-4, abs=1e-6)
+        assert (other == -1) == (z <= 0)
+        assert other == -1 or numbers[other].reshape(4, 4)[0, 3] == pytest.approx(1 / 3, rel=1e-4)
+        assert data["space"]["words"][words] == f"{z:.0f}"
+        assert numbers[path].reshape(-1, 3)[:, 2].max() == pytest.approx(
+            max(p["handles"]["P"]["point"][2] for p in made.tracks["handle"].notes), rel=1e-4
+        )
+        heights.append(z)
+    assert np.ptp(heights) > 4
+    assert len(made.declaration["spaces"][0]["items"]) == 4  # with the path on which the handle was led
+
+
+def test_the_pictures_of_a_scene_in_space_hold_nothing_of_it():
+    made = film.record(in_space())
+    first, last = (picture(made, "handle", k, False) for k in (0, len(made.tracks["handle"].notes) // 2))
+    assert np.array_equal(first, last)

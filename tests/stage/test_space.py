@@ -232,6 +232,14 @@ def test_arrow_keys_follow_the_axes_of_the_world():
     )
 
 
+def test_a_handle_with_a_way_keeps_its_bounds_however_it_is_moved():
+    stage, _ = wired(cell(handles={"P": Handle((1, 1, 1), way=Free(), bounds=((0, 2), (0, 2), (1, 1)))}), space=True)
+    for message in ({"drag": {"P": (0.9, 0.1)}}, {"step": {"P": (90, 90)}}, {"drag": {"P": (0.1, 0.9)}}):
+        stage.receive({**message, "serial": "a:2"})
+        assert (stage.state["P"] >= (0, 0, 1)).all() and (stage.state["P"] <= (2, 2, 1)).all()
+    assert not np.array_equal(stage.state["P"], (1, 1, 1))
+
+
 def test_a_dial_follows_the_pointer_and_ends_at_its_limits():
     stage, _ = wired(cell(), space=True)
     ax = stage.figure.axes[0]

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from labkit.chapters.ch08_kalman import stages
-from labkit.stage import Choice, Handle, Play, Slider, Stage, Toggle, canvas, style
+from labkit.stage import Choice, Handle, Play, Slider, Stage, Target, Toggle, canvas, style
 from labkit.stage.renderer import Canvas
 from labkit.stage.scene3d import Scene, View
 
@@ -702,3 +702,43 @@ def test_going_back_to_a_width_moves_no_axes():
         picture.draw()
         places.append([ax.get_position().bounds for ax in picture.fig.axes])
     np.testing.assert_allclose(places[0], places[2], atol=2 / 700)
+
+
+# -- a target, and numbers of the sentence
+
+
+def test_a_target_is_over_the_picture_ends_the_caption_and_turns_when_it_is_reached():
+    stage = segment(target=Target("P and Q within 2 mm", lambda distance: distance < 2))
+    assert stage.caption == "5.0 mm Target: P and Q within 2 mm." and not stage.reached
+    heading, before = stage.figure._suptitle, stage.png()
+    assert heading.get_text() == "\N{WHITE CIRCLE} Target: P and Q within 2 mm" and heading.get_fontweight() == "normal"
+    extent = heading.get_window_extent(stage._picture.canvas.get_renderer())
+    assert stage.figure.bbox.x0 <= extent.x0 and extent.x1 <= stage.figure.bbox.x1
+    assert extent.y0 > stage.figure.axes[0].get_window_extent().y1  # the layout made room for it
+    stage.set(Q=(1, 2))
+    assert stage.caption == "1.0 mm Target reached: P and Q within 2 mm." and stage.reached
+    assert heading.get_text().startswith("\N{CHECK MARK} Target reached") and heading.get_fontweight() == "bold"
+    stage.reset()
+    assert stage.png() == before and not stage.reached
+
+
+def test_a_target_that_asks_nothing_or_says_too_much_is_refused():
+    with pytest.raises(ValueError, match="reached before anything is touched: 'P and Q within 9 mm'"):
+        segment(target=Target("P and Q within 9 mm", lambda distance: distance < 9))
+    with pytest.raises(ValueError, match="at most 64 letters, got 65"):
+        Target("x" * 65, bool)
+
+
+def test_numbers_of_the_sentence_are_a_sliders_and_say_where_they_stand():
+    told = {"describe": lambda distance: f"Times {{scale}} it is {distance:.1f} mm in {{words}}, {{scale}} times."}
+    stage, sent = wire(segment(**told))
+    assert stage.caption == "Times 1.0 it is 5.0 mm in {words}, 1.0 times."
+    stage.receive({"control": {"scale": 20}, "serial": "a:2"})
+    message = sent[-1][0]
+    assert message["caption"] == "Times 2.0 it is 10.0 mm in {words}, 2.0 times."
+    assert [(message["caption"][a:b], name) for a, b, name in message["numbers"]] == [
+        ("2.0", "scale"),
+        ("2.0", "scale"),
+    ]
+    stage.make_it_fail()
+    assert sent[-1][0]["caption"] == stage.caption

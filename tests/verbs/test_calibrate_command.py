@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from labkit.__main__ import main
 from labkit.exercises.source import ROOT
@@ -41,8 +42,29 @@ def files(tmp_path, monkeypatch):
     np.savetxt(tmp_path / "pivot.txt", touching.reshape(-1, 16), fmt="%.6f")
     np.savetxt(tmp_path / "points.csv", sensor[:, :3, 3], fmt="%.4f", delimiter=",")
     np.savetxt(tmp_path / "three.csv", robot[:3, :3, 3], fmt="%.4f", delimiter=",")
+    for name, poses in (("robot", robot), ("sensor", sensor), ("touching", touching)):
+        np.savetxt(tmp_path / f"two_{name}.txt", poses[:2].reshape(-1, 16), fmt="%.6f")
+    np.savetxt(tmp_path / "two.csv", sensor[:2, :3, 3], fmt="%.4f", delimiter=",")
+    about_z = pose(exp_so3(np.linspace(-0.5, 0.5, 15)[:, None] * [0.0, 0.0, 1.0]), robot[:, :3, 3])
+    for name, poses in (("robot", about_z), ("sensor", invert(about_z @ X) @ Y)):
+        np.savetxt(tmp_path / f"axis_{name}.txt", poses.reshape(-1, 16), fmt="%.9f")
+    _streams(tmp_path)
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+def _streams(folder):
+    """a.txt and b.txt: TUM rows of one motion on two clocks; b with a time twice, turned round, and cut by a gap."""
+    t = 0.02 * np.arange(400)
+    phi = np.stack([np.sin(0.9 * t), 0.7 * np.sin(1.7 * t + 1), 0.5 * np.sin(2.4 * t)], -1)
+    moving = pose(exp_so3(phi), 300 * np.cos(phi))
+    for name, T, clock in (("a", moving, t), ("b", invert(Y) @ moving @ X, t + 7.25)):
+        q = Rotation.from_matrix(T[:, :3, :3]).as_quat()
+        table = np.column_stack([clock, T[:, :3, 3], q])
+        rows = {name: table, "gap": np.delete(table, slice(150, 300), 0), "back": table[::-1]}
+        rows["twice"] = table[[0, 1, 1, *range(2, 400)]]
+        for kind in rows if name == "b" else ("a",):
+            np.savetxt(folder / f"{kind}.txt", rows[kind], fmt="%.9f")
 
 
 def test_files_of_two_units_and_formats_give_one_result(files, capsys):
@@ -89,7 +111,7 @@ def test_every_kind_runs_and_reports(files, capsys, words, said):
 REFUSED = [
     (
         ["hand-eye", "--robot", "robot.csv", "--sensor", "swapped.txt"],
-        "it seems that the sensor file holds the sensor in",
+        "robot.csv and swapped.txt: it seems that the sensor file holds the sensor in",
     ),
     (["hand-eye", "--robot", "robot.csv", "--sensor", "short.txt"], "robot.csv has 15 rows and short.txt has 14"),
     (["hand-eye", "--robot", "robot.csv"], "needs --robot and --sensor"),
@@ -100,6 +122,25 @@ REFUSED = [
     ),
     (["frame", "points.csv"], "points.csv: a frame through points needs 3 of them, got 15"),
     (["compare", "--a", "robot.csv", "--b", "sensor.txt"], "robot.csv: a stream needs a time in every row"),
+    (
+        ["hand-eye", "--robot", "two_robot.txt", "--sensor", "two_sensor.txt", "--length", "mm"],
+        "two_robot.txt and two_sensor.txt: hand-eye calibration needs at least 3 poses, better 10, got 2",
+    ),
+    (
+        ["pivot", "two_touching.txt", "--length", "mm"],
+        "two_touching.txt: pivot calibration needs at least 3 poses, better 10, got 2",
+    ),
+    (
+        ["sphere", "--robot", "two_robot.txt", "--points", "two.csv", "--length", "mm"],
+        "two_robot.txt and two.csv: calibration with a sphere needs at least 4 poses, better 10, got 2",
+    ),
+    (["frame", "two.csv"], "two.csv: a frame through points needs 3 of them, got 2; or give --nominal"),
+    (
+        ["hand-eye", "--robot", "axis_robot.txt", "--sensor", "axis_sensor.txt", "--length", "mm"],
+        "axis_robot.txt and axis_sensor.txt: the flange turns about one axis only, the flange's z axis, by 17.7 deg",
+    ),
+    (["compare", "--a", "a.txt", "--b", "twice.txt", "--length", "mm"], "twice.txt, line 3: the same time"),
+    (["compare", "--a", "a.txt", "--b", "back.txt", "--length", "mm"], "back.txt, line 2: a time before that"),
     (["pivot"], "the following arguments are required: poses; see: python lab.py calibrate pivot --help"),
     (["eye"], "invalid choice: 'eye'"),
     ([], "the following arguments are required: KIND"),
@@ -111,6 +152,14 @@ def test_what_is_wrong_is_said_in_one_sentence(files, capsys, words, sentence):
     assert main(["calibrate", *words]) == 1
     said = capsys.readouterr()
     assert sentence in said.err and said.err.count("\n") == 1 and said.out == ""
+
+
+def test_streams_of_two_clocks_with_a_gap(files):
+    words = ["compare", "--a", "a.txt", "--b", "gap.txt", "--length", "mm", "--out", "found"]
+    assert main(["calibrate", *words]) == 0
+    found = json.loads((files / "found" / "result.json").read_text())
+    assert found["time_offset"]["offset"] == pytest.approx(7.25, abs=1e-3) and 200 < found["rows"] < 260
+    assert np.allclose(np.array(found["T"])[:3, 3], X[:3, 3], atol=0.05)
 
 
 def test_the_module_is_the_command(files):

@@ -1,6 +1,11 @@
 """Chapter 0: a point and its quarter turns."""
 
+import numpy as np
+
 from ...stage import style
+
+NAMES = ("p", "once", "twice")
+BESIDE = np.array([1.1, 0.45])  # two names nearer than this, across and up, would be written over each other
 
 
 def plane(ax):
@@ -18,7 +23,18 @@ def turned_points(ax):
     """
     looks = ("measurement", "prediction", "estimate")
     lines = [ax.plot([], [], **{**style.look(look, linestyle="-"), "marker": "o"})[0] for look in looks]
-    labels = [ax.text(0, 0, text) for text in ("p", "once", "twice")]
+    labels = [ax.text(0, 0, text) for text in NAMES]
     (circle,) = ax.plot([], [], **style.look("guide"))
     (across,) = ax.plot([], [], **style.look("rejected", marker="o", markersize=10))
     return lines, labels, circle, across
+
+
+def name_points(labels, points):
+    """Put the names beyond their points; those that would meet are one: "p, twice"."""
+    places = points * (1 + 0.35 / np.maximum(np.linalg.norm(points, axis=1), 1))[:, None]
+    meet = (np.abs(places[:, None] - places) < BESIDE).all(axis=2)
+    named = meet.argmax(axis=1)  # the first that each meets
+    for k, (label, place) in enumerate(zip(labels, places)):
+        label.set_position(place)
+        label.set_horizontalalignment("left" if points[k, 0] >= 0 else "right")
+        label.set_text(", ".join(name for name, first in zip(NAMES, named) if first == k))

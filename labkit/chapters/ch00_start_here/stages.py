@@ -42,10 +42,9 @@ def quarter_turns():
         def update(state, result):
             circle.set_data(*(np.hypot(*result[0]) * np.array([np.cos(around), np.sin(around)])))
             across.set_data(*-result[:1].T)
-            for line, label, point in zip(lines, labels, result):
+            for line, point in zip(lines, result):
                 line.set_data([0, point[0]], [0, point[1]])
-                label.set_position(point * (1 + 0.35 / max(np.hypot(*point), 1)))
-                label.set_horizontalalignment("left" if point[0] >= 0 else "right")
+            figures.name_points(labels, result)
 
         return [circle, across, *lines, *labels], update
 

@@ -11,41 +11,28 @@ TOPS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)  # deg
 
 
 class Construction:
-    """The arms of three measured points, what Gram-Schmidt removes of the second (hollow cross) and what it keeps."""
+    """Three measured points in space, the triangle and the plane they span, what Gram-Schmidt removes of the second
+    arm (hollow cross) and what it keeps."""
 
-    def __init__(self, ax):
-        (self.arms,) = ax.plot([], [], color=style.MEASUREMENT, linewidth=1.2, alpha=0.7)
-        (self.points,) = ax.plot([], [], **style.look("measurement", markersize=6, zorder=3.5))
-        (self.removed,) = ax.plot([], [], color=style.REJECTED, linestyle=":", linewidth=2.2)
-        (self.foot,) = ax.plot([], [], **style.look("rejected", markersize=7))
-        (self.kept,) = ax.plot([], [], **style.look("prediction"))
-        self.artists = [self.arms, self.removed, self.kept, self.foot, self.points]
+    def __init__(self, scene, name):
+        self.plane = scene.body(solids.box((-0.25, 1.3), (-0.25, 1.3), (0, 0)).looks(style.PREDICTION, 0.16), name=name)
+        self.plate = scene.body(unit_triangle(), name=f"triangle of {name}")
+        self.arms = scene.line(color=style.MEASUREMENT, linewidth=1.4)
+        self.removed = scene.line(color=style.REJECTED, linestyle=":", linewidth=2.2)
+        self.kept = scene.line(**style.look("prediction"))
+        self.foot = scene.points(**style.look("rejected", markersize=7))
+        self.points = scene.points(**style.look("measurement", markersize=6))
 
-    def set(self, points, foot):
-        """`points`: origin, x_point, y_point, shape (3, 2); `foot`: where y_point falls on the first arm's line."""
+    def set(self, T, points, foot):
+        """The frame (4, 4); origin, x_point, y_point, (3, 3); where y_point falls on the first arm's line, (3,)."""
         origin, x_point, y_point = points
-        self.arms.set_data(*np.transpose([x_point, origin, y_point]))
-        self.points.set_data(*np.transpose(points))
-        self.removed.set_data(*np.transpose([origin, foot]))
-        self.foot.set_data([foot[0]], [foot[1]])
-        self.kept.set_data(*np.transpose([foot, y_point]))
-
-
-class Matrix:
-    """A 4 x 4 transform as sixteen aligned numbers under a heading."""
-
-    def __init__(self, ax, x, y, heading, dx=0.24, dy=0.085):
-        place = {"transform": ax.transAxes, "ha": "right", "va": "center"}
-        ax.text(x, y + dy, heading, transform=ax.transAxes, fontweight="bold")
-        self.entries = [
-            [ax.text(x + dx * (j + 0.8), y - dy * (i + 0.2), "", **place) for j in range(4)] for i in range(4)
-        ]
-        self.artists = [entry for row in self.entries for entry in row]
-
-    def set(self, T):
-        for row, values in zip(self.entries, T):
-            for entry, value in zip(row, values):
-                entry.set_text(f"{value + 0.0:.3f}".replace("-0.000", "0.000"))
+        self.plane.set(T)
+        self.plate.set(onto(points, 0.012))
+        self.arms.set([x_point, origin, y_point])
+        self.points.set(points)
+        self.removed.set([origin, foot])
+        self.foot.set(foot)
+        self.kept.set([foot, y_point])
 
 
 def unit_triangle():
@@ -53,12 +40,12 @@ def unit_triangle():
     return solids.raised([(0, 0), (1, 0), (0, 1)], -0.5, 0.5).looks(style.MEASUREMENT, 0.25)
 
 
-def onto(corners):
-    """The matrix that carries the unit triangle onto three points, (3, 3) -> (4, 4), 0.6 thick."""
+def onto(corners, thickness=0.6):
+    """The matrix that carries the unit triangle onto three points, (3, 3) -> (4, 4), so thick."""
     o, x, y = corners
     normal = np.cross(x - o, y - o)
     T = np.eye(4)
-    T[:3, :3] = np.column_stack([x - o, y - o, 0.6 * normal / max(np.linalg.norm(normal), 1e-12)])
+    T[:3, :3] = np.column_stack([x - o, y - o, thickness * normal / max(np.linalg.norm(normal), 1e-12)])
     T[:3, 3] = o
     return T
 

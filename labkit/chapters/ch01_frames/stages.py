@@ -7,12 +7,13 @@ from ...estimation.gaussian import unit_noise
 from ...geometry import frames
 from ...geometry.lie import exp_so3, log_so3
 from ...stage import Handle, Slider, Stage, style
-from ...stage.marks import PlaneFrame
+from ...stage.marks import Matrix
 from ...stage.scene3d import Scene, View
-from ...stage.scene3d_handles import OnPlane
+from ...stage.scene3d_handles import Free, OnPlane
 from . import figures as draw
 
 NOISE_OF_A_TAPE = 0.01  # the yardstick of three_points, in the sheet's unit
+ROOM = ((0.2, 3.0), (0.4, 3.4), (-0.5, 1.2))  # where its points may be dragged
 ARM = 100.0  # mm, the trusted edge of the noisy triangles
 HEIGHTS = np.geomspace(1.0, 100.0, 41)  # mm
 NEAR_POLE_DEG = 1.0
@@ -21,28 +22,28 @@ FLAT_ROLL_DEG = 20.0  # three_points: from here on the caption speaks of the fla
 
 
 def sheet_points():
-    """The sheet's points as {handle name: (x, y)}, "O0" the origin of K0 and so on; all have z = 0."""
+    """The sheet's points as {handle name: (x, y, z)}, "O0" the origin of K0 and so on."""
     return {
-        f"{letter}{frame[-1]}": tuple(corner[:2].tolist())
+        f"{letter}{frame[-1]}": tuple(corner.tolist())
         for frame, corners in lab_sheet.points().items()
         for letter, corner in zip("OXY", corners)
     }
 
 
 def compute_three_points(state):
-    """Both frames of six points in the plane, what Gram-Schmidt removes and keeps of Y, and K0_T_K1."""
+    """Both frames of six points in space, what Gram-Schmidt removes and keeps of Y, and K0_T_K1."""
     result = {"frames": [], "points": [], "feet": [], "removed": [], "kept": [], "roll_deg": []}
     for k in "01":
         points = np.array([state["O" + k], state["X" + k], state["Y" + k]])
-        T = frames.frame_from_points(*np.column_stack([points, np.zeros(3)]))
-        x, arm = T[:2, 0], points[2] - points[0]
-        height = np.hypot(*(arm - (arm @ x) * x))
-        length = np.hypot(*(points[1] - points[0]))
-        covariance = frames.gram_schmidt_covariance(length, arm @ x, height, NOISE_OF_A_TAPE)
+        T = frames.frame_from_points(*points)
+        arm, length = points[2] - points[0], np.linalg.norm(points[1] - points[0])
+        along = arm @ T[:3, 0]
+        height = np.linalg.norm(arm - along * T[:3, 0])
+        covariance = frames.gram_schmidt_covariance(length, along, height, NOISE_OF_A_TAPE)
         result["frames"].append(T)
         result["points"].append(points)
-        result["feet"].append(points[0] + (arm @ x) * x)
-        result["removed"].append(abs(arm @ x))
+        result["feet"].append(points[0] + along * T[:3, 0])
+        result["removed"].append(abs(along))
         result["kept"].append(height)
         result["roll_deg"].append(np.rad2deg(np.sqrt(covariance[0, 0])))
     return {**result, "K0_T_K1": frames.relative(*result["frames"])}
@@ -71,18 +72,18 @@ def three_points():
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.25, 1))
-        style.axes(left, "x of the world (sheet's unit)", "y", equal=True)
-        left.set(xlim=(0, 3), ylim=(0.2, 3.4))
-        constructions = [draw.Construction(left) for _ in "01"]
-        triads = [PlaneFrame(left, "K0", 0.7), PlaneFrame(left, "K1", 0.7, linestyle=(0, (4, 1.5)))]
+        space = Scene(left, radius=1.5, half_width=1.5, floor=-0.6)
+        constructions = [draw.Construction(space, f"K{k}") for k in range(2)]
+        triads = [space.triad("K0", 0.7), space.triad("K1", 0.7, linestyle=(0, (4, 1.5)))]
         style.bare(right)
-        matrix = draw.Matrix(right, 0.0, 0.86, "T_K0K1")
+        matrix = Matrix(right, 0.0, 0.86, "T_K0K1")
         words = right.text(0.0, 0.36, "", transform=right.transAxes, va="top", linespacing=1.6)
 
         def update(state, result):
             for k in range(2):
-                constructions[k].set(result["points"][k], result["feet"][k])
+                constructions[k].set(result["frames"][k], result["points"][k], result["feet"][k])
                 triads[k].set(result["frames"][k])
+            space.draw(state["view"])
             matrix.set(result["K0_T_K1"])
             words.set_text(
                 f"removed of Y: {result['removed'][0]:.3f} in K0,\n{result['removed'][1]:.3f} in K1\n"
@@ -90,8 +91,7 @@ def three_points():
                 f"K1 by {_degrees(result['roll_deg'][1])}"
             )
 
-        moving = [a for item in (*constructions, *triads, matrix) for a in item.artists]
-        return [*moving, words], update
+        return [*space.artists, *matrix.artists, words], update
 
     labels = {"O": "origin", "X": "point on the x axis", "Y": "point on the side of y"}
     return Stage(
@@ -99,12 +99,16 @@ def three_points():
         scene=scene,
         compute=compute_three_points,
         handles={
-            name: Handle(at, step=0.01, label=f"{labels[name[0]]} of K{name[1]}", color=style.MEASUREMENT)
+            name: Handle(
+                at, step=0.01, bounds=ROOM, label=f"{labels[name[0]]} of K{name[1]}", color=style.MEASUREMENT,
+                way=Free(),
+            )
             for name, at in sheet_points().items()
         },
-        fail={"Y0": (1.7, 2.004)},
+        view=View(-62, 42, center=(1.5, 1.9, 0.0), eye=10.0),
+        fail={"Y0": (1.7, 2.004, 0.0)},
         describe=_three_points_sentence,
-    )
+    )  # fmt: skip
 
 
 def _triangle(x_arm, y_along, y_height):
@@ -173,15 +177,15 @@ def triangle_noise():
         compute=compute_triangle_noise,
         handles={
             "Y": Handle(
-                (30.0, 60.0, 0.0), step=1.0, bounds=((-20, 80), (1, 80), (-200, 200)), label="y point of the triangle",
+                (50.0, 10.0, 0.0), step=1.0, bounds=((-20, 80), (1, 80), (-200, 200)), label="y point of the triangle",
                 color=style.MEASUREMENT, way=OnPlane(),
             )
         },
-        controls={"std": Slider(0.05, 3.0, 0.5, step=0.05, label="noise per coordinate (mm)")},
+        controls={"std": Slider(0.05, 3.0, 0.05, step=0.05, label="noise per coordinate (mm)")},
         view=View(-65, 35, center=(32, 25, 15), eye=600.0),
         constrain=_stay_in_plane,
-        fail={"Y": (60.0, 2.0, 0.0)},
-        because="Y lies 2 mm from the x axis: its noise now turns the plane of the three points.",
+        fail={"Y": (50.0, 2.0, 0.0), "std": 0.5},
+        because="Y lies 2 mm from the x axis, and noise of 0.5 mm now turns the plane of the three points.",
         describe=_noise_sentence,
     )  # fmt: skip
 

@@ -33,7 +33,7 @@ def translated_poses(rng, directions=3, std=0.0):
     shifts = rng.uniform(-40, 40, (n, directions)) @ np.linalg.qr(rng.normal(size=(3, 3)))[0][:directions]
     T_BF = poses_that_see(T_FS, target, exp_so3(rng.uniform(-1.5, 1.5, 3))[None], np.array([[0.0, 0.0, 240.0]]))
     T_BF = T_BF @ frames.pose(np.tile(np.eye(3), (n, 1, 1)), shifts)
-    return T_BF, seen_from(T_BF, T_FS, target) + std * rng.normal(size=(n, 3))
+    return T_BF, hand_eye.sphere_in_scanner(T_BF, T_FS, target) + std * rng.normal(size=(n, 3))
 
 
 def nearly_in_a_plane(rng):
@@ -68,10 +68,6 @@ def turned_poses(rng):
     n = int(rng.integers(4, 10))
     x_S = np.column_stack([rng.uniform(-25, 25, n), rng.uniform(-20, 20, n), rng.uniform(190, 290, n)])
     return poses_that_see(T_FS, target, exp_so3(rng.uniform(-1.2, 1.2, (n, 3))), x_S), x_S, T_FS[:3, :3].copy()
-
-
-def seen_from(T_BF, T_FS, target):
-    return frames.transform(frames.invert(T_FS), frames.transform(frames.invert(T_BF), target))
 
 
 def two_motions(rng):

@@ -9,6 +9,13 @@ from ...calibration.planning import FIELD
 from ...stage import scene3d_solids as solids
 from ...stage import style
 
+SCANNER = solids.box((-75, 75), (-26, 26), (-90, 0)), solids.box((-55, 55), (-18, 18), (0, 4)).looks(style.INK)
+
+
+def ghost(color):
+    """The scanner where a search believes it to be, in the color of the search."""
+    return SCANNER[0].looks(color, 0.45)
+
 
 class Hand:
     """The flange, the scanner, what holds it, and its fan of light: `.set(T_BF, T_BS)`."""
@@ -20,10 +27,7 @@ class Hand:
             name="flange plate",
         )  # fmt: skip
         self.holder = scene.rod(22.0, name="holder")
-        self.scanner = scene.body(
-            solids.box((-75, 75), (-26, 26), (-90, 0)), solids.box((-55, 55), (-18, 18), (0, 4)).looks(style.INK),
-            name="scanner",
-        )  # fmt: skip
+        self.scanner = scene.body(*SCANNER, name="scanner")
         light = solids.raised([(0, 0), (far, left * 1.15), (far, right * 1.15)], -0.6, 0.6).looks(style.LASER, 0.3)
         turn = np.array([[0.0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])  # the fan lies in y = 0, down z
         self.light = scene.body(light.moved(turn), name="light")

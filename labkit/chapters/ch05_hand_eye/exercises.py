@@ -241,16 +241,12 @@ def _center(change):
 def gauss_newton_on_pose(T_FS, T_BF, x_S, target):
     """Reference of the exercise: one Gauss-Newton step with an increment on the right of the pose."""
     step = _step(T_FS, T_BF, x_S, target)
-    return _applied(T_FS, step)
+    return frames.moved(T_FS, step)
 
 
 def _step(T_FS, T_BF, x_S, target):
     J = analytic_jacobian(T_FS, T_BF, x_S)
     return -np.linalg.lstsq(J, _residual(T_FS, T_BF, x_S, target).ravel(), rcond=None)[0]
-
-
-def _applied(T_FS, step):
-    return frames.pose(T_FS[:3, :3] @ exp_so3(step[:3]), T_FS[:3, 3] + step[3:])
 
 
 def _stepped(change):
@@ -262,7 +258,7 @@ def _stepped(change):
 
 def _gradient_step(T_FS, T_BF, x_S, target):
     J = analytic_jacobian(T_FS, T_BF, x_S)
-    return _applied(T_FS, -J.T @ _residual(T_FS, T_BF, x_S, target).ravel() / (J * J).sum())
+    return frames.moved(T_FS, -J.T @ _residual(T_FS, T_BF, x_S, target).ravel() / (J * J).sum())
 
 
 def _iterated(T_FS, T_BF, x_S, target):
@@ -272,12 +268,12 @@ def _iterated(T_FS, T_BF, x_S, target):
 
 
 def _step_without_target(T_FS, T_BF, x_S, target):
-    return _applied(T_FS, _step(T_FS, T_BF, x_S, np.zeros(3)))
+    return frames.moved(T_FS, _step(T_FS, T_BF, x_S, np.zeros(3)))
 
 
 def joint_residual(u, T0, T_BF, x_S):
     """Reference of the exercise: nine unknowns, phi and translation about T0, and the sphere's center."""
-    return _residual(_applied(T0, u[:6]), T_BF, x_S, u[6:]).ravel()
+    return _residual(frames.moved(T0, u[:6]), T_BF, x_S, u[6:]).ravel()
 
 
 def _linear(change):
@@ -453,7 +449,7 @@ def _problem_of_design(T_BF, T_FS, target):
     if T_BF.shape != (31, 4, 4):
         return f"31 poses are wanted, shape (31, 4, 4); got {T_BF.shape}."
     try:
-        x_S = frames.transform(frames.invert(T_FS), frames.transform(frames.invert(T_BF), target))
+        x_S = hand_eye.sphere_in_scanner(T_BF, T_FS, target)
     except ValueError as refusal:
         return f"{refusal}."
     return planning.field_problem(x_S) or _looks_up(T_BF, T_FS) or _too_uncertain(T_BF, T_FS, target, x_S)
@@ -806,14 +802,14 @@ CHAPTER = Chapter(
                         "You moved the pose from the left as a whole. Turn it on the right, R_FS exp(phi), and add tau to t_FS."),
                 Mistake(_stepped(lambda T, s: T @ frames.pose(exp_so3(s[:3]), s[3:])),
                         "You moved the pose from the right as a whole, so tau is turned by R_FS. It is written in F: add it to t_FS."),
-                Mistake(_stepped(lambda T, s: _applied(T, s / 2)), "You took half of the step. Gauss-Newton takes the whole."),
+                Mistake(_stepped(lambda T, s: frames.moved(T, s / 2)), "You took half of the step. Gauss-Newton takes the whole."),
                 Mistake(_step_without_target, "The target is missing from your residual: the step leads to the base's origin."),
                 Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3] @ exp_so3(s[3:]), T[:3, 3] + s[:3])),
                         "Rotation and translation have changed places: the first three entries of the step are phi."),
                 Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3] @ Rotation.from_euler("xyz", s[:3]).as_matrix(), T[:3, 3] + s[3:])),
                         "phi is one rotation vector, not three angles to turn by in turn: use exp_so3."),
 
-                Mistake(_stepped(lambda T, s: _applied(T, -s)), "You stepped uphill: the step solves J step = -e."),
+                Mistake(_stepped(lambda T, s: frames.moved(T, -s)), "You stepped uphill: the step solves J step = -e."),
                 Mistake(_stepped(lambda T, s: frames.pose(exp_so3(s[:3]) @ T[:3, :3], T[:3, 3] + s[3:])),
                         "The turn exp(phi) stands on the left. Your Jacobian turns about the scanner's axes, so it belongs on the right of R_FS."),
                 Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3] @ lie.nearest_rotation(np.eye(3) + skew(s[:3])), T[:3, 3] + s[3:])),
@@ -885,13 +881,13 @@ CHAPTER = Chapter(
                         "The change of translation u[3:6] is to be added to the translation of T0."),
                 Mistake(lambda u, T, B, x: _residual(frames.pose(T[:3, :3] @ exp_so3(u[:3]), T[:3, 3] + T[:3, :3] @ u[3:6]), B, x, u[6:]).ravel(),
                         "Your change of translation is turned by R0. It is written in F, so add it as it is."),
-                Mistake(lambda u, T, B, x: _residual(_applied(T, u[:6]), B, x, -u[6:]).ravel(), "The center is subtracted, yours is added."),
-                Mistake(lambda u, T, B, x: _residual(_applied(T, u[:6]), B, x, np.zeros(3)).ravel(), "The center u[6:] is missing."),
+                Mistake(lambda u, T, B, x: _residual(frames.moved(T, u[:6]), B, x, -u[6:]).ravel(), "The center is subtracted, yours is added."),
+                Mistake(lambda u, T, B, x: _residual(frames.moved(T, u[:6]), B, x, np.zeros(3)).ravel(), "The center u[6:] is missing."),
                 Mistake(lambda u, T, B, x: _residual(frames.pose(T[:3, :3] @ exp_so3(u[3:6]), T[:3, 3] + u[:3]), B, x, u[6:]).ravel(),
                         "Rotation and translation have changed places: phi comes first."),
-                Mistake(lambda u, T, B, x: _residual(_applied(T, np.r_[-u[:3], u[3:6]]), B, x, u[6:]).ravel(), "You turned by exp(-phi), backward."),
-                Mistake(lambda u, T, B, x: -_residual(_applied(T, u[:6]), B, x, u[6:]).ravel(), "The sign is reversed: the center is subtracted from what is measured."),
-                Mistake(lambda u, T, B, x: (frames.transform(_applied(T, u[:6]), x) - frames.transform(frames.invert(B), u[6:])).ravel(),
+                Mistake(lambda u, T, B, x: _residual(frames.moved(T, np.r_[-u[:3], u[3:6]]), B, x, u[6:]).ravel(), "You turned by exp(-phi), backward."),
+                Mistake(lambda u, T, B, x: -_residual(frames.moved(T, u[:6]), B, x, u[6:]).ravel(), "The sign is reversed: the center is subtracted from what is measured."),
+                Mistake(lambda u, T, B, x: (frames.transform(frames.moved(T, u[:6]), x) - frames.transform(frames.invert(B), u[6:])).ravel(),
                         "Your residual is written in the flange's frame: bring the measured point to B, and subtract the center there."),
                 Mistake(lambda u, T, B, x: _residual(T, B, x, u[6:]).ravel(), "T0 has not been moved by u[:6]."),
                 Mistake(lambda u, T, B, x: _residual(frames.pose(exp_so3(u[:3]), u[3:6]), B, x, u[6:]).ravel(),
@@ -902,8 +898,8 @@ CHAPTER = Chapter(
                         "I + [phi] is only nearly a rotation, and phi need not be small: use exp_so3."),
                 Mistake(lambda u, T, B, x: hand_eye.kuka_residuals(u[:6], B, x, u[6:]).ravel(),
                         "You read u[:6] as a KUKA pose. It is a rotation vector and a change of translation about T0."),
-                Mistake(lambda u, T, B, x: _residual(_applied(T, u[:6]), B, x, u[6:]).T.ravel(), "The order is all x, all y, all z; wanted is x, y, z of pose 1, then of pose 2, ..."),
-                Mistake(lambda u, T, B, x: _residual(_applied(T, u[:6]), B, x, u[6:]), "The residuals are right; stack them into one vector of 3 N numbers."),
+                Mistake(lambda u, T, B, x: _residual(frames.moved(T, u[:6]), B, x, u[6:]).T.ravel(), "The order is all x, all y, all z; wanted is x, y, z of pose 1, then of pose 2, ..."),
+                Mistake(lambda u, T, B, x: _residual(frames.moved(T, u[:6]), B, x, u[6:]), "The residuals are right; stack them into one vector of 3 N numbers."),
             ],
         ),
         Exercise(

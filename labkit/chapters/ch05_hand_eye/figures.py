@@ -5,7 +5,6 @@ import numpy as np
 from ...stage import style
 from . import bodies
 
-TILT, YAW = (-105, 75), 70  # deg, of the error plane: detours past the pole reach farther than a start
 CIRCLE = np.linspace(0, 2 * np.pi, 121)
 LINES = {"x": "o", "y": "s", "x*": "^", "y*": "v"}  # a marker for each line of motion
 
@@ -95,48 +94,91 @@ def driven_corner(ax, half):
     return commanded, driven, worst
 
 
-def error_against_step(ax, steps, curves):
-    """Error of finite differences over the step. `curves`: {label: errors}. Returns the markers, one per curve."""
-    style.axes(ax, "step h (deg)", "largest error (mm per deg)", "error of the derivative by A")
-    ax.set(xscale="log", yscale="log", xlim=(steps[0], steps[-1]), ylim=(1e-12, 1e3))
+def differences(ax, around):
+    """A function near a place, in steps to each side, with its tangent and the two secants. Returns (curve, forward,
+    central).
+    """
+    style.axes(ax, "steps away", "change, as the tangent has it", equal=True)
+    ax.set(xlim=(around[0], around[-1]), ylim=(-2.1, 2.1), xticks=(-1, 0, 1), yticks=(-2, -1, 0, 1, 2))
+    ax.plot(around, around, **style.look("truth", linewidth=1.2), label="tangent")
+    (curve,) = ax.plot([], [], color=style.MEASUREMENT, linewidth=2.4, label="residual, as computed")
+    (forward,) = ax.plot([], [], **style.look("prediction", marker="o", markersize=5), label="forward")
+    (central,) = ax.plot([], [], **style.look("estimate", marker="D", markersize=5), label="central")
+    style.legend_above(ax, ncols=2, fontsize=8, columnspacing=0.8, handlelength=1.4)
+    return curve, forward, central
+
+
+def error_against_step(ax, logs, curves):
+    """Error of finite differences over the logarithm of the step (deg). `curves`: {label: errors}. Returns the markers,
+    one per curve.
+    """
+    style.axes(ax, "step h (deg)", "largest error (mm per deg)")
+    ax.set(yscale="log", xlim=(logs[0], logs[-1]), ylim=(1e-13, 1e3))
+    ax.set_xticks(range(-12, 1, 3), [f"$10^{{{n}}}$" for n in range(-12, 1, 3)])
     looks = (style.look("prediction"), style.look("estimate"))
     markers = []
     for (label, errors), look in zip(curves.items(), looks):
-        ax.plot(steps, errors, label=label, **look)
+        ax.plot(logs, errors, label=label, **look)
         markers += ax.plot([], [], color=look["color"], marker="D", markersize=8, linestyle="none", clip_on=False)
-    ax.legend(loc="lower left")
+    style.legend_above(ax, ncols=2, fontsize=8)
     return markers
 
 
-def error_plane(ax):
-    """Plane of the scanner's rotation error. Returns (path in A, B, C, path on the pose, pole)."""
-    style.axes(ax, "tilt off the truth (deg)", "yaw off the truth (deg)", "drag the start")
-    ax.set(xlim=TILT, ylim=(-YAW, YAW))
-    (pole,) = ax.plot([], [], **style.look("guide", linewidth=1.8))
-    ax.annotate("dotted:\nB = -90 deg", (0.98, 0.03), xycoords="axes fraction", ha="right", color=style.MUTED)
-    (euler,) = ax.plot([], [], **style.look("prediction", marker="o", markersize=5))
-    (se3,) = ax.plot([], [], **style.look("estimate", marker="D", markersize=4))
-    ax.plot([0], [0], color=style.TRUTH, marker="+", markersize=16, linestyle="none")
-    return euler, se3, pole
+class Walks:
+    """The flange and its scanner as they are, the walks of two searches for the scanner, each with the scanner where it
+    stands after the step shown, the circles the start is turned on, and the line that x of S must not lie along."""
+
+    def __init__(self, scene):
+        self.hand = bodies.Hand(scene)
+        self.frame = scene.triad("S", 90)
+        scene.fixed(scene.triad("F", 110, linestyle=(0, (4, 1.5))), np.eye(4))
+        self.pole = scene.line(**style.look("guide", linewidth=1.8))
+        self.name = scene.text("x of S along\nthis line:\nB = -90 deg", offset=(8, -26), color=style.MUTED, fontsize=8)
+        self.circles = {
+            name: scene.line(color=color, linewidth=1.6)
+            for name, color in (("yaw", style.AXIS_Z), ("tilt", style.AXIS_Y))
+        }
+        looks = (
+            ("euler", style.look("prediction", marker="o", markersize=5)),
+            ("se3", style.look("estimate", marker="D", markersize=4)),
+        )
+        self.walks = {name: scene.line(**look) for name, look in looks}
+        self.scanners = {
+            name: scene.body(bodies.ghost(look["color"]), name=f"scanner of {name}") for name, look in looks
+        }
+
+    def set(self, result, circles):
+        """The result of `stages.compute_iterations`; {name: (T, radius, angle in deg)} of each circle."""
+        truth = result["truth"]
+        self.hand.set(np.eye(4), truth)
+        self.frame.set(truth)
+        self.pole.set(truth[:3, 3] + np.outer([-40.0, 215.0], [0.0, 0.0, 1.0]))
+        self.name.set(truth[:3, 3] + [0.0, 0.0, 215.0])
+        for name, (T, radius, angle) in circles.items():
+            turned = np.deg2rad(np.sort([angle, *np.linspace(min(angle, 0.0) - 12, max(angle, 0.0) + 12, 37)]))
+            self.circles[name].set(T[:3, 3] + radius * np.column_stack([np.cos(turned), np.sin(turned)]) @ T[:3, :2].T)
+        for name, walk in self.walks.items():
+            walk.set(result[name]["seen"])
+            self.scanners[name].set(result[name]["now"])
 
 
 def iterations(ax, steps=30):
-    """Error of the scanner over the iterations, logarithmic. Returns (Euler curve, SE(3) curve)."""
+    """Error of the scanner over the iterations, logarithmic. Returns ((Euler curve, SE(3) curve), the step shown)."""
     style.axes(ax, "iteration", "rms distance (mm)", "how fast")
     ax.set(yscale="log", xlim=(0, steps), ylim=(1e-13, 1e4))
+    (here,) = ax.plot([], [], **style.look("guide"))
     (euler,) = ax.plot([], [], label="steps in A, B, C", **style.look("prediction", marker="o", markersize=5))
     (se3,) = ax.plot([], [], label="steps on the pose", **style.look("estimate", marker="D", markersize=5))
     ax.legend(loc="upper right")
-    return euler, se3
+    return (euler, se3), here
 
 
 def start_plane(ax, far=125.0):
     """Plane of a start's distance and turn off the truth. Returns (first path, second, the printed starts)."""
-    style.axes(ax, "distance off the truth (mm)", "turn off the truth (deg)", "drag the start")
+    style.axes(ax, "distance off the truth (mm)", "turn off the truth (deg)", "drag the start; crosses: table 7-2")
     ax.set(xlim=(-4, far), ylim=(-6, 184))
     ax.set_yticks([0, 45, 90, 135, 180])
     (printed,) = ax.plot([], [], color=style.INK, marker="x", markersize=8, linestyle="none", clip_on=False)
-    ax.annotate("crosses: the starts of table 7-2", (0.98, 0.07), xycoords="axes fraction", ha="right")
     (first,) = ax.plot([], [], **style.look("estimate", marker="D", markersize=5))
     (second,) = ax.plot([], [], **style.look("prediction", marker="o", markersize=5))
     return first, second, printed

@@ -16,8 +16,9 @@ from ...fast.hand_eye import calibrate_sphere_target
 from ...geometry import frames
 from ...geometry.lie import exp_so3, log_so3
 from ...machines import robot_accuracy, triangulation
-from ...stage import Choice, Handle, Slider, Stage, style
+from ...stage import Choice, Handle, Slider, Stage, Target, style
 from ...stage.scene3d import Scene, View
+from ...stage.scene3d_handles import Dial
 from . import bodies
 from . import figures as draw
 
@@ -241,11 +242,15 @@ def scan_line():
 # --- steps of differences --------------------------------------------------------------------------------------------
 
 STEPS_DEG = np.geomspace(1e-13, 10.0, 57)
+LISTING = 5e-7  # deg, the step of listing C4
+AROUND = np.linspace(-1.5, 1.5, 61)  # steps to each side
 
 
 @functools.cache
-def _step_errors():
-    """Largest error of forward and central differences by A at the CAD pose on the real poses, over STEPS_DEG."""
+def _turned():
+    """(residual, exact, k): all residuals (mm) of the corrected poses as a function of A (deg) away from the CAD pose,
+    their derivatives there (mm per deg), (n,), and the number of one that answers well and bends most.
+    """
     measured, target = thesis.measurements(True), thesis.printed_target()
     p = thesis.kuka_pose_deg("scanner_end")
     unit = np.array([1, 1, 1, *np.deg2rad([1, 1, 1])])
@@ -253,56 +258,94 @@ def _step_errors():
 
     def residual(A):
         q = p.copy()
-        q[3] = A[0]
+        q[3] += A[0]
         return hand_eye.kuka_residuals(q * unit, measured.T_BF, measured.x_S, target)
 
+    bend = np.abs(residual([10.0]) + residual([-10.0]) - 2 * residual([0.0]))
+    return residual, exact, int(np.argmax(np.where(np.abs(exact) > np.abs(exact).max() / 2, bend, 0)))
+
+
+@functools.cache
+def _step_errors():
+    """Largest error (mm per deg) of forward and central differences by A at the CAD pose, over STEPS_DEG."""
+    residual, exact, _ = _turned()
     errors = {}
     for scheme in ("forward", "central"):
-        found = [numeric_jacobian(residual, p[3:4], h, scheme)[:, 0] for h in STEPS_DEG]
+        found = [numeric_jacobian(residual, np.zeros(1), h, scheme)[:, 0] for h in STEPS_DEG]
         errors[scheme] = np.maximum(np.abs(np.array(found) - exact).max(1), 1e-14)
     return errors
 
 
 def compute_steps(state):
-    """Errors of both schemes at the chosen step (mm per deg), and the best steps."""
+    """Errors of both schemes at the chosen step (mm per deg), the best steps, and the residual that bends most, near
+    the CAD pose: over AROUND steps to each side, in steps, so that its tangent has the slope 1.
+    """
     errors, h = _step_errors(), state["h"]
     at = {k: float(np.exp(np.interp(np.log(h), np.log(STEPS_DEG), np.log(e)))) for k, e in errors.items()}
     best = {k: float(STEPS_DEG[np.argmin(e)]) for k, e in errors.items()}
-    return {"h": h, "at": at, "best": best}
+    residual, exact, k = _turned()
+    values = np.array([residual([share * h])[k] for share in AROUND])
+    return {"h": h, "at": at, "best": best, "curve": (values - values[len(AROUND) // 2]) / (exact[k] * h)}
 
 
 def difference_steps():
-    """The step of a finite difference: too large, and curvature spoils it; too small, and rounding does."""
+    """The step of a finite difference: too large, and the curve bends away; too small, and it breaks into stairs."""
+    middle, one = len(AROUND) // 2, int(np.argmin(np.abs(AROUND - 1)))
 
     def scene(fig):
-        ax = fig.subplots()
+        left, right = fig.subplots(1, 2, width_ratios=(1, 1.25))
+        curve, forward, central = draw.differences(left, AROUND)
         errors = _step_errors()
-        markers = draw.error_against_step(ax, STEPS_DEG, errors)
-        ax.axvline(5e-7, **style.look("guide"))
-        ax.annotate("listing C4", (5e-7, 1e-12), xytext=(4, 4), textcoords="offset points", color=style.MUTED)
+        markers = draw.error_against_step(right, np.log10(STEPS_DEG), errors)
+        right.axvline(np.log10(LISTING), **style.look("guide"))
+        away = {"xytext": (4, 4), "textcoords": "offset points"}
+        right.annotate("listing C4", (np.log10(LISTING), 1e-13), **away, color=style.MUTED)
 
         def update(state, result):
+            y = result["curve"]
+            curve.set_data(AROUND, y)
+            forward.set_data([0, 1], [0, y[one]])
+            central.set_data([-1, 1], [y[2 * middle - one], y[one]])
             for marker, scheme in zip(markers, errors):
-                marker.set_data([result["h"]], [result["at"][scheme]])
+                marker.set_data([np.log10(result["h"])], [result["at"][scheme]])
 
-        return markers, update
+        return [curve, forward, central, *markers], update
+
+    def follow(state, moved):
+        """The ring stands on the curve of the central difference, and has a slider."""
+        log = state["P"][0] if "P" in moved and "h" not in moved else np.log10(state["h"])
+        central = np.interp(log, np.log10(STEPS_DEG), np.log10(_step_errors()["central"]))
+        return {"P": (log, 10.0**central), "h": float(np.clip(10.0**log, STEPS_DEG[0], STEPS_DEG[-1]))}
 
     return Stage(
         "step of the differences",
         scene=scene,
         compute=compute_steps,
-        controls={"h": Slider(1e-13, 10.0, 5e-7, log=True, label="step (deg)")},
-        fail={"h": 1e-13},
+        handles={
+            "P": Handle(
+                (np.log10(LISTING), 1e-6), step=0.1, ax=1, bounds=((-13, 1), (1e-14, 1e3)), color=style.ESTIMATE,
+                label="step, as a power of ten",
+            )
+        },
+        constrain=follow,
+        controls={"h": Slider(1e-13, 10.0, LISTING, log=True, label="step (deg)")},
+        fail={"h": 1e-13, "P": (-13.0, 1.0)},
         because="So small a step drowns in the last digits of the numbers.",
+        target=Target("a derivative right to 1e-9 mm per deg", lambda result: min(result["at"].values()) < 1e-9),
         describe=lambda result: (
-            f"Step {result['h']:.1e} deg: forward is off by {result['at']['forward']:.1e}, central by "
+            f"A step of {{h}} deg: forward is off by {result['at']['forward']:.1e}, central by "
             f"{result['at']['central']:.1e} mm per deg. Best steps: {result['best']['forward']:.0e} and "
             f"{result['best']['central']:.0e} deg."
         ),
-    )
+    )  # fmt: skip
 
 
 # --- iterations ------------------------------------------------------------------------------------------------------
+
+
+MAX_STEPS = 30
+SEEN = np.array([0.0, 0.0, 240.0])  # mm, in S: the middle of the scanner's field
+DIALS = {"yaw": 150.0, "tilt": 120.0}  # mm, radii of the circles on which the start is turned
 
 
 @functools.cache
@@ -310,23 +353,23 @@ def _simulated(B_deg):
     """The simulation model with its scanner turned to B: T_BF, x_S, target, true T_FS."""
     T_BF, _, target, scanner = thesis.simulation()
     T_FS = frames.matrix_from_kuka(frames.kuka_from_degrees([*scanner[:4], B_deg, scanner[5]]))
-    return T_BF, frames.transform(frames.invert(T_FS), frames.transform(frames.invert(T_BF), target)), target, T_FS
+    return T_BF, hand_eye.sphere_in_scanner(T_BF, T_FS, target), target, T_FS
 
 
 def compute_iterations(state):
     """Gauss-Newton from one start in A, B, C and on the pose: errors (tilt, yaw) in deg, rms, steps and largest turn
-    (deg).
+    (deg), the scanner's pose after each step, where it would see the sphere, and the pose after the step shown.
 
     The start is turned off the truth by the rotation vector (0, tilt, yaw) in F: tilt changes B, yaw is what A does.
     """
     T_BF, x_S, target, truth = _simulated(state["B_deg"])
-    tilt, yaw = np.deg2rad(state["P"])
+    tilt, yaw = np.deg2rad([state["tilt"], state["yaw"]])
     start = truth.copy()
     start[:3, :3] = exp_so3([0, tilt, yaw]) @ truth[:3, :3]
-    result = {"pole": -90.0 - state["B_deg"]}
+    result = {"truth": truth, "step": state["step"]}
     for name in ("euler", "se3"):
         run = hand_eye.gauss_newton_pose(
-            frames.kuka_from_matrix(start), T_BF, x_S, target, parameters=name, max_steps=30
+            frames.kuka_from_matrix(start), T_BF, x_S, target, parameters=name, max_steps=MAX_STEPS
         )
         R, values = run.poses[:, :3, :3], run.singular_values
         error = np.rad2deg(log_so3(R @ truth[:3, :3].T))
@@ -335,6 +378,7 @@ def compute_iterations(state):
             "path": error[:, 1:], "rms": np.maximum(run.rms, REST_MM), "steps": len(run.poses) - 1,
             "arrived": bool(run.converged and run.rms[-1] < 1e-6), "turned_deg": float(turns.sum()),
             "weakest": float(values[0, -1] / values[0, 0]),
+            "seen": frames.transform(run.poses, SEEN), "now": run.poses[min(state["step"], len(run.poses) - 1)],
         }  # fmt: skip
     return result
 
@@ -355,29 +399,52 @@ def _iterations_sentence(result):
     )
 
 
+def _start_circle(turned):
+    """Where the dial of the start's tilt (about y of F) or yaw (about z) has its circle: about the scanner."""
+
+    def where(result):
+        T = np.eye(4)
+        T[:3, :3] = np.eye(3) if turned == "yaw" else [[0, 1, 0], [0, 0, 1], [1, 0, 0]]  # z is what it turns about
+        T[:3, 3] = result["truth"][:3, 3]
+        return T, DIALS[turned]
+
+    return where
+
+
 def convergence():
-    """Drag the start pose: the same Gauss-Newton with steps in A, B, C and with steps on the right of the pose."""
+    """Turn the start: the same Gauss-Newton with steps in A, B, C and with steps on the right of the pose, as walks of
+    the scanner about the flange."""
+    circles = {name: _start_circle(name) for name in DIALS}
 
     def scene(fig):
-        left, right = fig.subplots(1, 2)
-        euler, se3, pole = draw.error_plane(left)
-        curves = draw.iterations(right)
+        left, right = fig.subplots(1, 2, width_ratios=(1.35, 1))
+        space = Scene(left, radius=255, half_width=265, unit="mm")
+        picture = draw.Walks(space)
+        curves, here = draw.iterations(right)
 
         def update(state, result):
-            for path, curve, name in ((euler, curves[0], "euler"), (se3, curves[1], "se3")):
-                path.set_data(*result[name]["path"].T)
+            picture.set(result, {name: (*where(result), state[name]) for name, where in circles.items()})
+            space.draw(state["view"])
+            for curve, name in zip(curves, ("euler", "se3")):
                 curve.set_data(np.arange(len(result[name]["rms"])), result[name]["rms"])
-            pole.set_data([result["pole"]] * 2, [-draw.YAW, draw.YAW])
+            here.set_data([result["step"]] * 2, [REST_MM, 1e4])
 
-        return [pole, euler, se3, *curves], update
+        return [*space.artists, *curves, here], update
 
     return Stage(
         "convergence from a dragged start",
         scene=scene,
         compute=compute_iterations,
-        handles={"P": Handle((-1.0, 30.0), step=0.5, bounds=((-68, 68), (-68, 68)), label="start, tilt and yaw")},
-        controls={"B_deg": Choice({"B = -88 deg": -88.0, "B = -30 deg": -30.0}, -88.0, label="scanner at")},
-        fail={"P": (-54.0, -30.0), "B_deg": -30.0},
+        handles={
+            "yaw": Dial(30.0, -68, 68, circles["yaw"], step=0.5, label="yaw of the start", color=style.AXIS_Z),
+            "tilt": Dial(-1.0, -68, 68, circles["tilt"], step=0.5, label="tilt of the start", color=style.AXIS_Y),
+        },
+        controls={
+            "B_deg": Choice({"B = -88 deg": -88.0, "B = -30 deg": -30.0}, -88.0, label="scanner at"),
+            "step": Slider(0, MAX_STEPS, 1, label="after step"),
+        },
+        view=View(-75, 24, center=(-100.0, 0.0, 60.0), eye=2000.0),
+        fail={"tilt": -54.0, "yaw": -30.0, "B_deg": -30.0},
         because="In the three angles this start is a long way from the goal, in the pose a short one.",
         describe=_iterations_sentence,
     )
@@ -462,6 +529,7 @@ def two_methods():
             "B_deg": Choice({"B = -90 deg": -90.0, "B = -88 deg": -88.0}, -90.0, label="scanner at"),
         },
         fail={"P": (70.0, 175.0), "B_deg": -88.0},
+        because="Next to the pole and turned by 175 deg: Gauss-Newton takes every step, also those that lead uphill.",
         describe=_methods_sentence,
     )
 
@@ -621,7 +689,7 @@ def compute_pattern(state):
     fit, x_mid, z_mid = _corrected_fit(), 0.0, 240.0
     spread = np.array([state["E"][0] - x_mid, state["across"], state["E"][1] - z_mid])
     T_BF = planning.pattern(fit.T_FS, fit.target, np.deg2rad(state["tilt_deg"]), spread)
-    x_S = frames.transform(frames.invert(fit.T_FS), frames.transform(frames.invert(T_BF), fit.target))
+    x_S = hand_eye.sphere_in_scanner(T_BF, fit.T_FS, fit.target)
     unseen = planning.unseen_changes(T_BF, fit.T_FS, fit.target)
     determined = not (len(unseen.turns) or len(unseen.slides))
     if determined:

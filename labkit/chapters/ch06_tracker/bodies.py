@@ -124,3 +124,38 @@ def sheet_of_light(length, half_angle):
     fan = solids.raised([(0, 0), (length, -side), (length, side)], -0.5, 0.5)
     turn = np.array([[0.0, 0, -1, 0], [0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]])  # x of the outline along z
     return fan.looks(style.PREDICTION, 0.25).moved(turn)
+
+
+def scanner():
+    """A small line scanner that looks along its z axis, from its own frame."""
+    light = solids.raised([(0, 0), (215, -38), (215, 38)], -0.5, 0.5).looks(style.LASER, 0.22)
+    turn = np.array([[0.0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])  # the fan lies in y = 0, down z
+    return solids.box((-30, 30), (-12, 12), (-36, 0)).looks(style.STEEL), light.moved(turn)
+
+
+def plate():
+    """The part of the cell: a plate around its three marks, top at z = 0."""
+    return solids.raised([(-18, -18), (128, -18), (128, 60), (60, 98), (-18, 98)], -12.0, 0.0)
+
+
+def part():
+    """The plate with its marks and its hole."""
+    marks = (
+        solids.cylinder(6, 0, 3).looks(style.MEASUREMENT).moved(_shift(*p, 0)) for p in ((0, 0), (110, 0), (25, 80))
+    )
+    return plate(), solids.cylinder(7, 0, 2).looks(style.INK).moved(_shift(80, 55, 0)), *marks
+
+
+def trolley(T_PE):
+    """What carries the part and its tracker, in P: a board, a leg down to the floor, a post with the puck."""
+    x, y, z = T_PE[:3, 3]
+    return (
+        solids.box((-110, 140), (-40, 110), (-22, -12)).looks(style.STEEL),
+        solids.cylinder(26, -100, -22, 20).looks(style.STEEL).moved(_shift(30, 35, 0)),
+        solids.cylinder(7, -12, z).looks(style.STEEL).moved(_shift(x, y, 0)),
+        *(solid.moved(T_PE @ _scaled(0.55)) for solid in puck()),
+    )
+
+
+def _scaled(factor):
+    return np.diag([factor, factor, factor, 1.0])

@@ -36,13 +36,15 @@ class ArmPicture:
         self.tool.set(T_BE)
 
 
+TURN_RADIUS = 150.0  # mm, of the circle on which the part of the cell is turned
+SHOWN = {"scanner": "S", "tracker": "W", "marks": "P0", "first reading": "E0", "second reading": "E", "part": "P"}
 SUMMARY = ("mean", "RMS", "median", "95 %")
 
 
 class Trail:
-    """Readings on their way through space: good ones, gated ones, and the filtered path."""
+    """Readings on their way through space: good ones, gated ones, and the filtered path; their legend beside them."""
 
-    def __init__(self, scene, triad=90.0):
+    def __init__(self, scene, beside, triad=90.0):
         self.readings = scene.points(**style.look("measurement", markersize=4.5, markeredgewidth=0))
         self.rejected = scene.points(**style.look("rejected"))
         self.path = scene.line(**style.look("estimate", linewidth=1.8))
@@ -55,10 +57,10 @@ class Trail:
             ("rejected", "refused by the gate", {}),
             ("estimate", "filtered", {}),
         )
-        self.legend = scene.ax.legend(
+        beside.legend(
             handles=[Line2D([], [], **style.look(role, label=name, **more)) for role, name, more in keys],
-            loc="upper center",
-            fontsize=8,
+            loc="lower left",
+            borderaxespad=0.0,
         )
 
     def set(self, positions, used, filtered, T_WE):
@@ -249,9 +251,10 @@ def error_by_stop(ax, stops, printed):
 
 
 class OverSpeed:
-    """Errors of several motions over their speed, medians of intervals, a law through them, and two printed levels."""
+    """Errors of several motions over their speed, medians of intervals, a law through them, and two printed levels;
+    their legend beside them."""
 
-    def __init__(self, ax, x, end):
+    def __init__(self, ax, beside, x, end):
         style.axes(ax, "speed, share of the fastest printed (1.4 m/s or 3.7 rad/s)", "error", "same path, three speeds")
         ax.set(xlim=(0, end), ylim=(0.05, 2000), yscale="log")
         self.x = x
@@ -270,7 +273,10 @@ class OverSpeed:
             )
             for k, text in enumerate(("printed mean", "printed largest"))
         ]  # fmt: skip
-        ax.legend(loc="upper left", ncols=3, fontsize=8)
+        named = [*self.dots, self.nonsense, self.medians, self.law]
+        legend = beside.legend(handles=named, loc="lower left", borderaxespad=0.0)
+        for dots in legend.legend_handles[:3]:
+            dots.set(markersize=6, alpha=1.0)
         self.artists = [*self.dots, self.nonsense, self.medians, self.law, *self.levels, *self.names]
 
     def set(self, result):
@@ -288,41 +294,60 @@ class OverSpeed:
             name.set_visible(bool(np.isfinite(level)))
 
 
-class CellPlan:
-    """The cell from above: the robot's foot, the part as learned and as it stands, and, enlarged about its hole, the
-    misses of simulated cells, the budget's ellipse and the miss of this cell."""
+class CellScene:
+    """The whole cell in space: arm with tip and scanner at the hole, part and tracker on their trolley, the part as it
+    was learned and, with its error enlarged, as it was found; the chosen source, its ellipsoid and its error; misses of
+    simulated cells about the hole, the budget's ellipsoid and the miss of this cell."""
 
-    def __init__(self, ax, marks, enlarged):
-        self.marks, self.enlarged = marks, enlarged
-        style.axes(ax, "x (mm)", "y (mm)", f"plan; misses enlarged {enlarged:.0f} times", equal=True)
-        ax.set(xlim=(-260, 420), ylim=(-330, 420))
-        ax.plot(0, 0, color=style.MUTED, marker="o", markersize=30, markerfacecolor="none", markeredgewidth=5)
-        ax.text(0, 0, "B", ha="center", va="center", fontweight="bold")
-        self.parts = [
-            ax.plot([], [], **style.look("guide", linewidth=1.8), label="learned")[0],
-            ax.plot([], [], **style.look("truth", linewidth=2.0), label="part")[0],
-        ]
-        (self.cloud,) = ax.plot([], [], **style.look("measurement", markersize=2, markeredgewidth=0, alpha=0.6))
-        self.cloud.set_label("simulated cells")
-        (self.region,) = ax.plot([], [], **style.look("prediction"), label="budget, 3 std")
-        (self.hole,) = ax.plot([], [], **style.look("truth", linestyle="none", marker="+", markersize=11))
-        (self.miss,) = ax.plot([], [], **style.look("estimate", marker="D", markersize=5, markevery=[1]))
-        self.miss.set_label("this cell")
-        self.letter = ax.annotate("P", (0, 0), xytext=(-12, -12), textcoords="offset points", fontweight="bold")
-        ax.legend(loc="lower left", fontsize=8)
-        self.artists = [*self.parts, self.cloud, self.region, self.hole, self.miss, self.letter]
+    def __init__(self, scene, cell):
+        self.cell = cell
+        self.robot = bodies.Tx40(scene)
+        self.tool = scene.rod(4.0, style.INK, name="tool")
+        self.scanner = scene.body(*bodies.scanner(), name="scanner")
+        self.holder = scene.rod(9.0, name="holder")
+        self.part = scene.body(*bodies.part(), name="part")
+        self.trolley = scene.body(*bodies.trolley(cell.T_PE), name="trolley")
+        self.learned = scene.line(**style.look("guide", linewidth=1.8))
+        self.found = scene.body(bodies.plate().looks(style.ESTIMATE, 0.55), name="part as found")
+        scene.fixed(scene.triad("B", 90), np.eye(4))
+        self.frames = {name: scene.triad(letter, 60) for name, letter in SHOWN.items()}
+        self.links = scene.line(**style.look("guide", linewidth=1.4))
+        self.chosen = scene.points(color=style.INK, linestyle="none", marker="o", markersize=13, markerfacecolor="none")
+        self.known = scene.ellipsoid(**style.look("estimate"))
+        self.off = scene.triad("", 60, linestyle=(0, (3, 1.5)))
+        self.circle = scene.line(**style.look("guide", linewidth=1.6))
+        self.cloud = scene.points(**style.look("measurement", markersize=2, markeredgewidth=0, alpha=0.5))
+        self.expected = scene.ellipsoid(**style.look("prediction"))
+        self.miss = scene.arrow(6.0, style.ESTIMATE, name="miss")
 
-    def set(self, result):
-        """Draw the result of `stages.compute_whole_cell`."""
-        for line, T in zip(self.parts, (result["learned"], result["part"])):
-            corners = self.marks @ T[:2, :2].T + T[:2, 3]
-            line.set_data(*corners[[0, 1, 2, 0]].T)
+    def set(self, result, frames, enlarged):
+        """The result of `stages.compute_whole_cell`, the arm's `link_frames`, how much larger errors are drawn."""
+        T_BF, part, places = result["T_BF"], result["part"], result["places"]
+        self.robot.set(frames)
+        self.tool.set(T_BF[:3, 3], places["tip"])
+        self.scanner.set(T_BF @ result["cell"].T_FS)
+        self.holder.set(T_BF[:3, 3], places["scanner"])
+        self.part.set(part)
+        self.trolley.set(part)
+        self.found.set(result["found"])
+        corners = self.cell.MARKS[[0, 1, 2, 0]]
+        self.learned.set(corners @ result["learned"][:3, :3].T + result["learned"][:3, 3])
+        for name, frame in self.frames.items():
+            frame.set(result["frames"][name])
+        base, gap = np.zeros(3), np.full(3, np.nan)
+        world = places["tracker"]
+        self.links.set([
+            base, world, places["first reading"], gap, world, places["second reading"], gap, base, places["marks"],
+        ])  # fmt: skip
+        self.chosen.set(places[result["source"]])
+        self.known.set(result["place"][:3, 3], (3 * enlarged) ** 2 * result["known"])
+        self.off.set(result["off"])
+        turned = result["turn"] + np.linspace(0, 2 * np.pi, 61)
+        self.circle.set(part[:3, 3] + TURN_RADIUS * np.column_stack([np.cos(turned), np.sin(turned), 0 * turned]))
         hole = result["hole"]
-        self.hole.set_data(*hole[:, None])
-        self.cloud.set_data(*(hole + self.enlarged * result["cloud"]).T)
-        self.region.set_data(*(hole + self.enlarged * result["outline"]).T)
-        self.miss.set_data(*np.transpose([hole, hole + self.enlarged * result["miss"][:2]]))
-        self.letter.xy = tuple(result["part"][:2, 3])
+        self.cloud.set(hole + enlarged * result["cloud"])
+        self.expected.set(hole, (3 * enlarged) ** 2 * result["covariance"])
+        self.miss.set(hole, hole + enlarged * result["miss"])
 
 
 class Budget:

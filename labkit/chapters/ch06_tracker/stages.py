@@ -1,8 +1,10 @@
 """Stages of chapter 6: the TX40 with joints to turn, a live tracker, A X = X B, errors in motion, repeated runs."""
 
 import functools
+import itertools
 import threading
 import time as clock
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,8 +12,8 @@ from ...calibration import ax_xb
 from ...documents.report.printed import COLUMNS, motions, statements, table_d
 from ...estimation.gaussian import cut_axes, ellipse, unit_noise
 from ...fast.ax_xb import calibrate_hand_eye, solve_ax_xb
-from ...geometry.frames import invert, matrix_from_quaternion, pose, pose_distance, transform, unit_vector
-from ...geometry.lie import exp_so3
+from ...geometry.frames import invert, matrix_from_quaternion, moved, pose, pose_distance, transform, unit_vector
+from ...geometry.lie import exp_so3, log_so3
 from ...machines import cell, simulation, stations, udp
 from ...machines.arm import (
     HOME,
@@ -20,6 +22,7 @@ from ...machines.arm import (
     SHOULDER_OFFSET,
     TX40,
     forward_kinematics,
+    inverse_kinematics,
     jacobian,
     link_frames,
     reach_position,
@@ -41,7 +44,7 @@ from ...machines.tracking import (
 )
 from ...stage import Choice, Handle, Play, Slider, Stage, Toggle, style
 from ...stage.scene3d import Scene, View
-from ...stage.scene3d_handles import Dial, Free, OnSphere
+from ...stage.scene3d_handles import Dial, Free, OnPlane, OnSphere
 from ...tables import read_table
 from . import figures as draw
 from .bodies import RINGS
@@ -59,14 +62,14 @@ def joints(state):
 
 
 def compute_tx40(state):
-    """Frames of the links, poses of flange and tracker, and what the first three joints can do at the flange: singular
-    values, mm per rad."""
+    """Frames of the links, poses of flange and tracker, the wrist's distance from axis 2 (mm), and what the first three
+    joints can do at the flange: singular values, mm per rad."""
     q = joints(state)
     frames = link_frames(TX40.dh, q)
     values = np.linalg.svd(jacobian(TX40.dh, q)[3:, :3], compute_uv=False)
     return {
         "q": q, "frames": frames, "T_BF": frames[6], "T_BE": frames[6] @ T_FE, "singular_values": values,
-        "reach": state["reach"],
+        "wrist": float(np.hypot(*transform(invert(frames[1]), frames[4, :3, 3])[:2])), "reach": state["reach"],
     }  # fmt: skip
 
 
@@ -127,7 +130,10 @@ def tx40():
             angles = "\n".join(f"joint {k + 1}   {np.rad2deg(a):6.0f} deg" for k, a in enumerate(result["q"]))
             x, y, z = result["T_BF"][:3, 3]
             low = result["singular_values"][-1]
-            words.set_text(f"{angles}\n\nF at {x:.0f},\n{y:.0f}, {z:.0f} mm\nleast mobility\n{low:.0f} mm per rad")
+            words.set_text(
+                f"{angles}\n\nF at {x:.0f},\n{y:.0f}, {z:.0f} mm\nwrist to axis 2\n{result['wrist']:.0f} mm\n"
+                f"least mobility\n{low:.0f} mm per rad"
+            )
 
         return [*space.artists, words], update
 
@@ -163,6 +169,7 @@ def tx40():
 # ---- live ------------------------------------------------------------------------------------------------------------
 
 LIVE_SECONDS, LIVE_STEP, TRAIL = 60.0, 0.02, 375  # s, s (the browser adds what it needs itself), readings drawn
+REHEARSED = 1000  # packets until the tracker is well on its way
 IDLE = 1.5  # s without a look after which the stream ends by itself
 NEARBY = np.array(
     [stations.looking(place, (-60.0, 60.0, 0.0)) for place in ((-470.0, 60.0, 400.0), (60.0, 470.0, 400.0))]
@@ -171,12 +178,28 @@ SLOWED = 120.0  # times, for the eye
 SWING = 1.4  # rad, of a sheet on its way across the tracker
 
 
+def _faults(loss):
+    return udp.Faults(loss=float(loss), duplicate=0.01, reorder=0.02, malformed=0.01)
+
+
+@functools.lru_cache(maxsize=64)
+def rehearsal(loss, nonsense):
+    """Readings (k, 23) and `udp.Statistics` of a piece of the stream, handed on without a network: what stands there
+    before play."""
+    books, endless = udp.Books(keep=TRAIL), simulation.endless_packets(np.random.default_rng(1), lambda: nonsense)
+    packets = itertools.islice(endless, REHEARSED, REHEARSED + TRAIL)
+    for _, datagram, kind in udp.stream(packets, simulation.RATE, _faults(loss), np.random.default_rng(2)):
+        if kind != "lost":
+            books.take(datagram)
+    return books.readings(), books.statistics()
+
+
 class Link:
     """A simulated tracker and a receiver, connected by real UDP packets; both start at the first look and end when
     nobody looks any more."""
 
     def __init__(self):
-        self.faults, self.nonsense = udp.Faults(duplicate=0.01, reorder=0.02, malformed=0.01), False
+        self.faults, self.nonsense = _faults(0.0), False
         self._lock = threading.Lock()
         self._listener = self._sender = None
         self._looked = 0.0
@@ -249,13 +272,13 @@ def live_tracker():
 
     def compute(state):
         if state["t"] <= 0:
-            return compute_live(np.empty((0, 23)), udp.Statistics())
-        return compute_live(*link.look(state["loss"], state["nonsense"]))
+            return {**compute_live(*rehearsal(state["loss"], state["nonsense"])), "playing": False}
+        return {**compute_live(*link.look(state["loss"], state["nonsense"])), "playing": True}
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.5, 1))
         space = Scene(left, radius=480, half_width=520, floor=-320.0, unit="mm")
-        trail = draw.Trail(space)
+        trail = draw.Trail(space, right)
         sweep = draw.Sweep(space, NEARBY)
         style.bare(right)
         words = right.text(0.0, 0.97, "", transform=right.transAxes, va="top", linespacing=1.5)
@@ -272,8 +295,11 @@ def live_tracker():
     def sentence(result):
         s = result["statistics"]
         if not s.datagrams:
-            return "Press play: 250 packets per second start to arrive."
-        return f"{s.good} good readings, {s.lost} lost, {sum(s.bad.values())} bad, each counted once."
+            return "The first packet is on its way."
+        counted = f"{s.good} good readings, {s.lost} lost, {sum(s.bad.values())} bad, each counted once."
+        if result["playing"]:
+            return counted
+        return f"1.5 s of the stream: {counted} Press play: real packets arrive over UDP."
 
     return Stage(
         "live tracker",
@@ -283,6 +309,7 @@ def live_tracker():
         play=Play(LIVE_SECONDS, LIVE_STEP),
         view=View(-50, 24, center=(-60, 60, 80), eye=3200.0),
         fail={"loss": 0.4, "nonsense": True},
+        because="Of five packets two are lost, and the stamps tell; the optics talk nonsense, and the gate refuses it.",
         describe=sentence,
     )
 
@@ -798,7 +825,7 @@ def over_speed():
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.8, 1))
-        picture = draw.OverSpeed(left, MIDDLES, SHARES[-1])
+        picture = draw.OverSpeed(left, right, MIDDLES, SHARES[-1])
         style.bare(right)
         words = right.text(0.0, 0.95, "", transform=right.transAxes, va="top", linespacing=1.6)
 
@@ -823,6 +850,7 @@ def over_speed():
             "nonsense": Toggle(False, "nonsense"),
         },
         fail={"of": "position", "latency": 40.0, "nonsense": True},
+        because="A lag of 40 ms: what moves is read where it was. Nonsense lifts the mean, hardly a median.",
         presets={"no lag": {"latency": 0.0}, "speed": {"of": "speed"}},
         describe=lambda r: (
             f"At rest {r['rest']:.2g} {r['unit']}, at the fastest {r['fastest']:.2g} {r['unit']}; "
@@ -833,14 +861,23 @@ def over_speed():
 
 # ---- the whole cell --------------------------------------------------------------------------------------------------
 
-ENLARGED = 30.0  # how much larger than the plan what is uncertain is drawn
+ENLARGED = 30.0  # how much larger than the cell its errors are drawn
 CLOUD = 400  # simulated cells
-SPOILED = {
-    "as calibrated": {},
-    "tip 2 mm off": {"tip": np.array([2.0, 0.0, 0.0])},
-    "scanner turned 1 deg": {"scanner": np.array([0.0, np.deg2rad(1.0), 0.0, 0.0, 0.0, 0.0])},
-    "tracker's world turned 0.5 deg": {"tracker": np.array([np.deg2rad(-0.5), 0.0, 0.0, 0.0, 0.0, 0.0])},
+HALF_DEG, ONE_DEG = np.deg2rad([0.5, 1.0])
+SPOILED = {  # source: what `spoil` = 1 puts into it, and how that is told
+    "tip": ("2 mm", np.array([2.0, 0.0, 0.0])),
+    "scanner": ("1 deg", np.array([0.0, ONE_DEG, 0.0, 0.0, 0.0, 0.0])),
+    "tracker": ("0.5 deg", np.array([HALF_DEG, 0.0, 0.0, 0.0, 0.0, 0.0])),
+    "marks": ("2 mm in the second", np.array([0, 0, 0, 0, 0, 2.0, 0, 0, 0])),
+    "first reading": ("0.5 deg", np.array([0.0, HALF_DEG, 0.0, 0.0, 0.0, 0.0])),
+    "second reading": ("0.5 deg", np.array([0.0, HALF_DEG, 0.0, 0.0, 0.0, 0.0])),
 }
+CALLED = {
+    "tip": "the tip in F", "scanner": "the scanner, T_FS", "tracker": "the tracker's world, T_BW",
+    "marks": "the part as learned, by its marks, T_BP0",
+    "first reading": "the tracker when the part was learned, T_WE0", "second reading": "the tracker now, T_WE1",
+}  # fmt: skip
+NEAR = 70.0  # mm: so near to a frame a click chooses it
 CELL_SEED = 6
 
 
@@ -849,65 +886,137 @@ def _calibrated():
     return cell.calibrated_cell(np.random.default_rng(CELL_SEED))
 
 
+def _part_now(state):
+    return np.array([*state["P"][:2], np.deg2rad(state["turn"])])
+
+
+def _used(state):
+    """The job as the true cell would measure it, and the cell and job that are used, one source of them spoiled."""
+    job = cell.simulated_job(_part_now(state), touched=state["marks"] == "touched with the tip")
+    source = state["source"]
+    return job, *cell.with_errors(_calibrated(), job, {source: state["spoil"] * SPOILED[source][1]})
+
+
+def _source_places(of, job, T_BF):
+    """Where each source shows in the base with the flange at T_BF: its pose (4, 4), and the covariance of its place
+    (3, 3), mm^2."""
+    frames = cell.frames_in_base(of, job)
+    then = cell.frames_in_base(of, replace(job, T_WE1=job.T_WE0))["E"]
+    tip = pose(T_BF[:3, :3], transform(T_BF, of.tip)), T_BF[:3, :3] @ of.cov_tip @ T_BF[:3, :3].T
+    scanner = T_BF @ of.T_FS, frames["S"][1][3:, 3:]
+    named = (frames["W"], frames["P0"], then, frames["E"])
+    return dict(zip(cell.SOURCES, (tip, scanner, *((T, cov[3:, 3:]) for T, cov in named))))
+
+
+def _enlarged(T, to):
+    """A pose that is as far from T as `to` is, ENLARGED times."""
+    turn = log_so3(T[:3, :3].T @ to[:3, :3])
+    return moved(T, ENLARGED * np.concatenate([turn, to[:3, 3] - T[:3, 3]]))
+
+
 def compute_whole_cell(state):
     """A part that was learned and is found again with all calibrations of the cell, one of them spoiled.
 
-    Returns a dictionary: cell and job, part (4, 4) and learned (4, 4) as they truly stand, hole (2,) on the plan, miss
-    (3,) mm of the tip, sizes {source: mm} and their total, outline (n, 2) and cloud (m, 2) of the miss to be expected,
-    mm.
+    Returns a dictionary: cell and job that are used, q (6,) of the arm at the hole and whether it gets there, T_BF,
+    part, learned and found (4, 4), found with its error enlarged; hole (3,), miss (3,) mm of the tip, sizes {source:
+    mm} and their total, covariance (3, 3) and cloud (m, 3) of the miss to be expected; of the chosen source its place
+    as used (4, 4), with its error enlarged, and its covariance (3, 3); frames {source: (4, 4)} and
+    places {source: (3,)} that can be clicked.
     """
-    now = (*state["P"], np.deg2rad(state["turn"]))
-    job = cell.simulated_job(now, touched=state["marks"] == "touched with the tip")
-    used, _ = cell.with_errors(_calibrated(), job, SPOILED[state["spoiled"]])
-    shares = cell.miss_budget(used, job)
-    cov = sum(shares.values())
-    cloud = cell.simulate_misses(used, job, np.random.default_rng(62), CLOUD)
-    part = cell.place_on_table(*now)
+    job, used, measured = _used(state)
+    T_BF = cell.flange_at_hole(used, measured)
+    true, there = _source_places(cell.TRUTH, job, T_BF), _source_places(used, measured, T_BF)
+    start = np.array([np.arctan2(T_BF[1, 3], T_BF[0, 3]), *np.deg2rad([40.0, 100.0, 0.0, 40.0, 0.0])])
+    q, reached = inverse_kinematics(TX40, T_BF, start)
+    shares = cell.miss_budget(used, measured)
+    cov, part = sum(shares.values()), cell.place_on_table(*_part_now(state))
+    source = state["source"]
     return {
-        "cell": used, "job": job, "part": part, "learned": cell.place_on_table(*cell.LEARNED),
-        "hole": transform(part, cell.HOLE)[:2], "miss": cell.miss(cell.TRUTH, used, job),
-        "sizes": cell.sizes(shares), "total": float(np.sqrt(np.trace(cov))),
-        "outline": ellipse(np.zeros(2), cov[:2, :2], THREE_STD), "cloud": cloud[:, :2],
+        "cell": used, "job": measured, "q": q, "reached": bool(reached), "T_BF": T_BF, "part": part,
+        "turn": float(np.deg2rad(state["turn"])), "learned": cell.place_on_table(*cell.LEARNED),
+        "found": _enlarged(part, cell.part_pose(used, measured)),
+        "hole": transform(part, cell.HOLE), "miss": cell.miss(cell.TRUTH, used, job, measured),
+        "sizes": cell.sizes(shares), "total": float(np.sqrt(np.trace(cov))), "covariance": cov,
+        "cloud": cell.simulate_misses(used, measured, np.random.default_rng(62), CLOUD), "source": source,
+        "spoiled": state["spoil"], "place": there[source][0], "known": there[source][1],
+        "off": _enlarged(true[source][0], there[source][0]),
+        "frames": {name: T for name, (T, _) in there.items()} | {"part": part},
+        "places": {name: T[:3, 3] for name, (T, _) in there.items()},
     }  # fmt: skip
 
 
+def chosen_by_click(state, moved):
+    """A click on a frame of the cell, or near it, chooses its source."""
+    if "click" not in moved or state["click"] is None:
+        return {}
+    _, used, measured = _used(state)
+    seen = {
+        name: np.linalg.norm(state["view"].project(T[:3, 3])[:2] - state["click"])
+        for name, (T, _) in _source_places(used, measured, cell.flange_at_hole(used, measured)).items()
+    }
+    nearest = min(seen, key=seen.get)
+    return {"source": nearest} if seen[nearest] < NEAR else {}
+
+
 def _cell_sentence(result):
-    largest = max(result["sizes"], key=result["sizes"].get)
-    miss = np.linalg.norm(result["miss"])
+    source, miss = result["source"], np.linalg.norm(result["miss"])
+    std = np.sqrt(np.trace(result["known"]))
+    told = f"{CALLED[source][0].upper()}{CALLED[source][1:]}: known to {std:.2f} mm"
+    if result["spoiled"]:
+        told += f", spoiled by {result['spoiled']:.1f} times {SPOILED[source][0]}"
     verdict = " Far more than the budget admits." if miss > 4 * result["total"] else ""
-    return (
-        f"The tip misses by {miss:.1f} mm; {result['total']:.2f} mm is to be expected, "
-        f"the largest part of it from the {largest}.{verdict}"
-    )
+    arm = "" if result["reached"] else " The arm itself does not get there."
+    return f"{told}. The tip misses by {miss:.1f} mm; {result['total']:.2f} mm is to be expected.{verdict}{arm}"
+
+
+def _part_circle(result):
+    """Where the dial of the part's turn has its circle."""
+    return pose(np.eye(3), result["part"][:3, 3]), draw.TURN_RADIUS
 
 
 def whole_cell():
-    """One cell from beginning to end: move the part, spoil a calibration, watch budget and miss."""
+    """One cell from beginning to end: move the part, click a transform, spoil it, watch part, budget and miss."""
 
     def scene(fig):
-        left, right = fig.subplots(1, 2, width_ratios=(1.45, 1))
-        plan = draw.CellPlan(left, cell.MARKS[:, :2], ENLARGED)
+        left, right = fig.subplots(1, 2, width_ratios=(2.2, 1))
+        title = f"click a frame; all errors x {ENLARGED:.0f}, ellipsoids 3 std"
+        space = Scene(left, radius=410, half_width=460, title=title, floor=0.0, unit="mm")
+        picture = draw.CellScene(space, cell)
         bars = draw.Budget(right, cell.SOURCES)
 
         def update(state, result):
-            plan.set(result)
+            picture.set(result, link_frames(TX40.dh, result["q"]), ENLARGED)
+            space.draw(state["view"])
             bars.set(result["sizes"], result["total"])
 
-        return [*plan.artists, *bars.artists], update
+        return [*space.artists, *bars.artists], update
 
+    start = (*cell.FAR[:2], cell.TABLE)
     return Stage(
         "the whole cell",
         scene=scene,
         compute=compute_whole_cell,
-        handles={"P": Handle(cell.FAR[:2], step=20, bounds=((-120.0, 260.0), (-260.0, 280.0)), label="part")},
-        controls={
-            "turn": Slider(-45.0, 120.0, 86.0, step=1.0, label="turn of the part (deg)"),
-            "marks": Choice(["seen by the scanner", "touched with the tip"], "seen by the scanner", label="marks"),
-            "spoiled": Choice(list(SPOILED), "as calibrated", label="calibrations"),
+        handles={
+            "P": Handle(
+                start, step=20, bounds=((-120.0, 260.0), (-260.0, 280.0), (cell.TABLE, cell.TABLE)), label="part",
+                way=OnPlane(),
+            ),
+            "turn": Dial(86.0, -45.0, 120.0, _part_circle, label="turn of the part"),
         },
-        fail={"spoiled": "tracker's world turned 0.5 deg"},
+        controls={
+            "source": Choice(list(SPOILED), "tracker", label="transform"),
+            "spoil": Slider(0.0, 2.0, 0.0, step=0.1, label="spoiled"),
+            "marks": Choice(["seen by the scanner", "touched with the tip"], "seen by the scanner", label="marks"),
+        },
+        click=0,
+        constrain=chosen_by_click,
+        view=View(24, 28, center=(120.0, 75.0, 190.0), eye=2800.0),
+        fail={"source": "tracker", "spoil": 1.0},
         presets={
-            "back where it was learned": {"P": cell.LEARNED[:2], "turn": float(np.rad2deg(cell.LEARNED[2]).round())}
+            "back where it was learned": {
+                "P": (*cell.LEARNED[:2], cell.TABLE), "turn": float(np.rad2deg(cell.LEARNED[2]).round())
+            }
         },
         describe=_cell_sentence,
-    )
+        size=(7.6, 4.6),
+    )  # fmt: skip

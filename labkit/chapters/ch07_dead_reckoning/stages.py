@@ -117,10 +117,12 @@ def _path(landmarks, distances, start):
 
 def _circles_sentence(result):
     ratio = result["singular_values"][1] / result["singular_values"][0]
+    values = "Singular values of the lines of sight: {:.2f}, {:.2f}.".format(*result["singular_values"])
     if result["reason"]:
-        return f"Newton gives up. {result['reason'].capitalize()}."
+        return f"Newton gives up. {result['reason'].capitalize()}. {values}"
     text = f"The search ends {result['error']:.2f} m from the robot. Dilution {result['dilution']:.3g}: "
-    text += f"{result['std']:.2f} m in a distance become {result['dilution'] * result['std']:.3g} m in the position."
+    text += f"{result['std']:.2f} m in a distance become {result['dilution'] * result['std']:.3g} m in the position. "
+    text += values
     if ratio < WEAK:
         text += " The lines of sight are nearly parallel: across them the distances say little."
     return text
@@ -133,15 +135,13 @@ def circles():
         ax = style.axes(fig.subplots(), "x (m)", "y (m)", equal=True)
         ax.set(xlim=(-4.0, 14.8), ylim=(-5.4, 6.4))
         rings, search, spare = draw.Circles(ax), draw.Search(ax), Spare(ax, "C, not used")
-        words = ax.text(0.02, 0.02, "", transform=ax.transAxes, va="bottom", fontsize=9)
 
         def update(state, result):
             rings.set(result["landmarks"], result["distances"], state["R"])
             spare.set(state["C"], state["count"] == 2)
             search.set(state["R"], result["path"], result["cloud"], result["ellipse"], result["weak"])
-            words.set_text("singular values of the lines of sight: {:.2f}, {:.2f}".format(*result["singular_values"]))
 
-        return [*rings.artists, *spare.artists, *search.artists, words], update
+        return [*rings.artists, *spare.artists, *search.artists], update
 
     return Stage(
         "distance circles",
@@ -378,7 +378,7 @@ def banana():
         compute=compute_banana,
         controls={
             "path": Choice({"straight": "straight", "circle": "circle"}, "straight", label="path"),
-            "factor": Slider(0.5, 4.0, 2.0, step=0.5, label="noise, times the lecture's"),
+            "factor": Slider(0.5, 4.0, 1.0, step=0.5, label="noise, times the lecture's"),
             "region": Choice(["ellipse", "bent"], "ellipse", label="region"),
         },
         fail={"factor": 4.0},

@@ -19,7 +19,7 @@ class Bells:
             solid = {"marker": "", "linestyle": "-", "linewidth": 2.2} if role == "measurement" else {}
             self.lines += ax.plot([], [], **style.look(role, **solid), label=label)
         (self.before,) = ax.plot([], [], **style.look("guide"), label="before the motion")
-        ax.legend(loc="upper left", fontsize=8)
+        ax.legend(loc="upper left")
         self.artists = [self.before, *self.lines]
 
     def set(self, before, bells):
@@ -28,20 +28,60 @@ class Bells:
             line.set_data(self.grid, gaussian.density(self.grid, mean, std))
 
 
-class ErrorBand:
-    """An error over time within the band that the filter promises."""
+class Belief:
+    """Errors of position and velocity within what the filter promises, the sensor's errors as dots, and beside them, as
+    a bracket, what the filter believes of the sensor.
+    """
 
-    def __init__(self, ax, label):
-        promised = "\N{PLUS-MINUS SIGN}2 sigma, promised"
-        (self.band,) = ax.plot([], [], **style.look("prediction", linewidth=1.6), label=promised)
-        (self.error,) = ax.plot([], [], **style.look("estimate", linewidth=1.6), label=label)
-        ax.axhline(0, color=style.GRID, linewidth=1)
-        self.artists = [self.band, self.error]
+    def __init__(self, position, velocity, seconds):
+        for ax, label, limit in ((position, "position error (m)", 2.6), (velocity, "velocity (m/s)", 1.3)):
+            style.axes(ax, "time (s)" if ax is velocity else "", label)
+            ax.set(xlim=(0, 1.09 * seconds), ylim=(-limit, limit), xticks=np.arange(0, seconds + 1, 2))
+            ax.axhline(0, color=style.GRID, linewidth=1)
+        (self.dots,) = position.plot([], [], **style.look("measurement", markersize=3), label="sensor")
+        (self.bracket,) = position.plot([], [], color=style.MEASUREMENT, linewidth=3, label="believed of it")
+        self.bands, self.errors = [], []
+        for ax in (position, velocity):
+            self.bands += ax.plot([], [], **style.look("prediction", linewidth=1.8), label="promised")
+            self.errors += ax.plot([], [], **style.look("estimate", linewidth=1.6), label="filter")
+        position.set_title("all bands: \N{PLUS-MINUS SIGN}2 sigma", loc="right", fontsize=8, color=style.MUTED)
+        style.legend_above(position, ncols=2, fontsize=8, columnspacing=0.8, handlelength=1.4)
+        self.artists = [self.dots, *self.bands, *self.errors, self.bracket]
 
-    def set(self, time, error, std):
-        """`time`, `error`, `std`: (n,)."""
-        self.error.set_data(time, error)
-        self.band.set_data([*time, np.nan, *time], [*(2 * std), np.nan, *(-2 * std)])
+    def set(self, result, at):
+        """Draw what `compute_vehicle` returns; the bracket stands at `at` (s)."""
+        time, reach = result["time"], 2 * result["std_z"]
+        self.dots.set_data(time, result["measured"])
+        for k, (band, error) in enumerate(zip(self.bands, self.errors)):
+            edge = 2 * result["std"][:, k]
+            band.set_data([*time, np.nan, *time], [*edge, np.nan, *-edge])
+            error.set_data(time, result["error"][:, k])
+        self.bracket.set_data(at + np.array([-0.2, 0, 0, -0.2]), [reach, reach, -reach, -reach])
+
+
+class Judge:
+    """Mean NIS against the noise the filter may believe of its sensor, with the band that holds 99 %."""
+
+    def __init__(self, ax, stds, true):
+        style.axes(ax, "believed noise of z (m)", "mean NIS")
+        ax.set(xlim=(0, 1.05 * stds[-1]), ylim=(0.05, 300), yscale="log")
+        ax.set_yticks([0.1, 1, 10, 100], ["0.1", "1", "10", "100"])
+        ax.minorticks_off()
+        ax.axvline(true, **style.look("guide"))
+        ax.annotate("true", (true, 0.06), xytext=(4, 0), textcoords="offset points", color=style.MUTED)
+        self.stds = stds
+        self.band = ax.axhspan(0.5, 2, color=style.GRID, label="99 % band")
+        (self.others,) = ax.plot([], [], color=style.MUTED, linewidth=1.4, label="all beliefs")
+        (self.now,) = ax.plot([], [], **style.look("estimates", markersize=9), label="yours")
+        ax.legend(loc="upper right")
+        self.artists = [self.band, self.others, self.now]
+
+    def set(self, result):
+        """Draw what `compute_vehicle` returns."""
+        low, high = result["band"]
+        self.band.set(y=low, height=high - low)
+        self.others.set_data(self.stds, result["others"])
+        self.now.set_data([result["std_z"]], [result["nis"]])
 
 
 class Consistency:
@@ -73,7 +113,7 @@ class Arena:
         stars = style.look("measurement", marker="*", markersize=7, alpha=0.7)
         (self.seen,) = ax.plot([], [], **stars, label="measured")
         self.artists = [self.seen, self.truth, self.estimate, self.ellipse, self.marks, self.ghost, self.robot]
-        ax.legend(loc="upper left", fontsize=8, ncols=2)
+        ax.legend(loc="upper left", ncols=2)
 
     def set(self, truth, estimate, ellipse, landmarks, seen):
         """`truth`, `estimate`: (n, 3); `ellipse`: (m, 2); `landmarks`: (k, 2); `seen`: (j, 2)."""
@@ -95,7 +135,7 @@ class Honesty:
         (self.believed,) = plane.plot([], [], **style.look("prediction"), label="95 %, as believed")
         cross = {"linestyle": "none", "marker": "+", "markersize": 13}
         (self.truth,) = plane.plot([0], [0], color=style.TRUTH, **cross, label="true")
-        plane.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=8, ncols=3, columnspacing=1.0)
+        plane.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, columnspacing=1.0)
         dots = style.look("estimate", marker="o", markersize=4)
         (self.curve,) = score.plot(iterations, np.ones(len(iterations)), **dots)
         (self.now,) = score.plot([], [], **style.look("estimates", markersize=9))

@@ -9,7 +9,7 @@ from ...documents.lecture.examples import circle_course, simulate_vehicle
 from ...estimation import gaussian, kalman
 from ...geometry import planar
 from ...localization import ekf, odometry
-from ...stage import Choice, Handle, Play, Slider, Stage, Toggle, style
+from ...stage import Choice, Handle, Play, Slider, Stage, Target, Toggle, style
 from ...stage.marks import Spare, strayed
 from . import figures as draw
 
@@ -19,6 +19,8 @@ PEAK = 1 / np.sqrt(2 * np.pi)  # height of the bell of standard deviation 1
 NOISE = {"var_x0": 1.0, "var_v0": 0.01, "var_a": 0.16, "var_z": 0.25}  # the vehicle, as reconstructed
 STEPS, DT = 100, 0.1
 DROPOUT = slice(45, 75)
+STDS_Z = np.arange(1, 25) * 0.05  # m, the range of the slider
+BRACKET = 10.4  # s, where the bracket stands
 KEYS = {"up": (1.0, 0.0), "down": (-1.0, 0.0), "left": (0.0, np.pi / 2), "right": (0.0, -np.pi / 2)}
 KEY_STEPS = 4
 ARENA = ((-6.0, 7.0), (-3.0, 8.5))  # m, the part of the floor that is drawn
@@ -93,70 +95,108 @@ def _vehicle_truth():
     return simulate_vehicle(STEPS, DT, **NOISE, rng=np.random.default_rng(2))
 
 
-def compute_vehicle(state):
-    """Errors, promised standard deviations, gains and NIS of the vehicle filter, over STEPS steps."""
-    truth, z = _vehicle_truth()
-    A, B, C = kalman.vehicle_model(DT)
-    z, cov0 = z[:, None].copy(), np.diag([NOISE["var_x0"], NOISE["var_v0"]])
-    if state["dropout"]:
+def _vehicle_measured(dropout):
+    """The measurements, (STEPS,), NaN where the sensor is off."""
+    z = _vehicle_truth()[1].copy()
+    if dropout:
         z[DROPOUT] = np.nan
+    return z
+
+
+@functools.lru_cache(maxsize=8)
+def _nis_of_all_beliefs(std_a, dropout):
+    """Mean NIS of the filters that believe STDS_Z of the sensor, all of them stepped at once."""
+    A, B, C = kalman.vehicle_model(DT)
+    x, cov, scores = np.zeros((len(STDS_Z), 2)), np.diag([NOISE["var_x0"], NOISE["var_v0"]]), []
+    for z in _vehicle_measured(dropout):
+        x, cov = kalman.predict(x, cov, A, B, [1.0], [[std_a**2]])
+        if np.isfinite(z):
+            step = kalman.update(x, cov, [z], C, STDS_Z[:, None, None] ** 2)
+            x, cov = step.x, step.cov
+            scores.append(kalman.nis(step.innovation, step.cov_innovation))
+    return np.mean(scores, axis=0)
+
+
+def compute_vehicle(state):
+    """Errors of the sensor and of the filter over STEPS steps, what the filter promises, its mean NIS, the band of 99 %
+    for it, and the mean NIS for every noise of the sensor one may believe in.
+    """
+    truth, z = _vehicle_truth()[0], _vehicle_measured(state["dropout"])
+    A, B, C = kalman.vehicle_model(DT)
     beliefs = {"cov_z": [[state["std_z"] ** 2]], "cov_u": [[state["std_a"] ** 2]]}
-    run = kalman.filter_steps(z, A, C, x0=np.zeros(2), cov0=cov0, B=B, u=[1.0], **beliefs)
-    nis = kalman.nis(run.innovation, run.cov_innovation)
+    cov0 = np.diag([NOISE["var_x0"], NOISE["var_v0"]])
+    run = kalman.filter_steps(z[:, None], A, C, x0=np.zeros(2), cov0=cov0, B=B, u=[1.0], **beliefs)
+    seen = np.isfinite(z)
     return {
         "time": DT * np.arange(1, STEPS + 1),
         "error": run.x - truth,
+        "measured": z - truth[:, 0],
         "std": np.sqrt(np.diagonal(run.cov, axis1=-2, axis2=-1)),
+        "std_z": state["std_z"],
         "gain": run.gain[..., 0],
-        "nis": np.where(np.isnan(z[:, 0]), np.nan, nis),
+        "nis": float(kalman.nis(run.innovation, run.cov_innovation)[seen].mean()),
+        "band": kalman.mean_band(1, int(seen.sum())),
+        "others": _nis_of_all_beliefs(state["std_a"], state["dropout"]),
     }
 
 
+def _is_honest(result):
+    low, high = result["band"]
+    return low < result["nis"] < high
+
+
 def _vehicle_sentence(result):
-    seen = np.isfinite(result["nis"])
-    mean, (low, high) = result["nis"][seen].mean(), kalman.mean_band(1, int(seen.sum()))
-    verdict = "in its band" if low < mean < high else "too large: the filter promises too much" if mean > high else (
-        "too small: the filter promises too little"
-    )  # fmt: skip
-    return f"Mean NIS {mean:.2f} (99 % band {low:.2f} to {high:.2f}): {verdict}. Last gain {result['gain'][-1, 0]:.2f}."
+    low, high = result["band"]
+    verdict = "in its band" if _is_honest(result) else "too large: the filter promises too much" if (
+        result["nis"] > high) else "too small: the filter promises too little"  # fmt: skip
+    return (
+        f"The filter believes {{std_z}} m of its sensor and {{std_a}} m/s\N{SUPERSCRIPT TWO} of its motor. Mean NIS "
+        f"{result['nis']:.2f} (99 % band {low:.2f} to {high:.2f}): {verdict}. Velocity known to "
+        f"{result['std'][-1, 1]:.2f} m/s."
+    )
 
 
 def vehicle():
-    """Position and velocity of the lecture's vehicle, what the filter promises, and its NIS."""
+    """What the filter believes of its sensor against how the sensor scatters: pull the bracket, the NIS judges it."""
 
     def scene(fig):
-        grid = fig.subplot_mosaic([["x", "nis"], ["v", "nis"]], width_ratios=(1.35, 1))
-        for key, label, limit in (("x", "position error (m)", 2.2), ("v", "velocity error (m/s)", 1.3)):
-            style.axes(grid[key], "time (s)" if key == "v" else "", label)
-            grid[key].set(xlim=(0, STEPS * DT), ylim=(-limit, limit))
-        style.axes(grid["nis"], "time (s)", "NIS")
-        grid["nis"].set(xlim=(0, STEPS * DT), ylim=(1e-3, 300), yscale="log")
-        lines = [draw.ErrorBand(grid["x"], "error"), draw.ErrorBand(grid["v"], "error")]
-        nis = draw.Consistency(grid["nis"], "NIS of each step")
-        grid["x"].legend(loc="upper right", fontsize=8, ncols=2)
-        grid["nis"].legend(loc="upper right", fontsize=8)
-        limits = gaussian.chi_square_quantile([0.005, 0.995], 1)
+        grid = fig.subplot_mosaic([["x", "nis"], ["v", "nis"]], width_ratios=(1.5, 1), height_ratios=(1.6, 1))
+        position = draw.Belief(grid["x"], grid["v"], DT * STEPS)
+        judge = draw.Judge(grid["nis"], STDS_Z, np.sqrt(NOISE["var_z"]))
 
         def update(state, result):
-            for k, line in enumerate(lines):
-                line.set(result["time"], result["error"][:, k], result["std"][:, k])
-            nis.set(result["time"], result["nis"], *limits)
+            position.set(result, state["P"][0])
+            judge.set(result)
 
-        return [a for item in (*lines, nis) for a in item.artists], update
+        return [*position.artists, *judge.artists], update
+
+    def follow(state, moved):
+        """The bracket shows twice the deviation of the slider, and sets it."""
+        if "P" in moved and "std_z" not in moved:
+            return {"std_z": state["P"][1] / 2}
+        return {"P": (BRACKET, 2 * state["std_z"])}
 
     return Stage(
         "the vehicle",
         scene=scene,
         compute=compute_vehicle,
+        handles={
+            "P": Handle(
+                (BRACKET, 2.0), step=0.1, bounds=((BRACKET, BRACKET), (2 * STDS_Z[0], 2 * STDS_Z[-1])),
+                label="twice the noise the filter believes of its sensor", color=style.MEASUREMENT,
+            )
+        },
+        constrain=follow,
         controls={
+            "std_z": Slider(STDS_Z[0], STDS_Z[-1], 1.0, step=0.05, label="believed noise of z (m)"),
             "std_a": Slider(0.02, 2.0, 0.4, step=0.02, label="believed noise of a (m/s\N{SUPERSCRIPT TWO})"),
-            "std_z": Slider(0.05, 2.0, 0.5, step=0.05, label="believed noise of z (m)"),
             "dropout": Toggle(False, label="no measurements from 4.5 to 7.5 s"),
         },
-        fail={"std_z": 0.15, "std_a": 0.04},
+        fail={"std_z": 0.15, "std_a": 0.04, "P": (BRACKET, 0.3)},
         because="The filter is told of less noise than there is: it trusts itself too much.",
+        target=Target("a filter that is honest: mean NIS within its 99 % band", _is_honest),
         describe=_vehicle_sentence,
-    )
+    )  # fmt: skip
 
 
 # --- the arena ------------------------------------------------------------------
@@ -246,7 +286,7 @@ def arena():
         right.set(xlim=(0, 400), ylim=(1e-2, 1e5), yscale="log")
         world, spare = draw.Arena(left), Spare(left, "2, not seen")
         panel = draw.Consistency(right, "NEES of each step", role="estimates")
-        right.legend(loc="upper left", fontsize=8)
+        right.legend(loc="upper left")
         limits = gaussian.chi_square_quantile([0.005, 0.995], 3)
 
         def update(state, result):

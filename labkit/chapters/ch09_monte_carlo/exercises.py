@@ -93,8 +93,11 @@ def plain_ray(rng):
             squarely = np.ptp(around) < min(0.12 * around[2], 0.25) and around[2] > 1.0
             apart = np.diff(np.sort(wrong)).min() > 0.2  # none of these slips is mistaken for another one
             if squarely and apart and np.abs(wrong - around[2]).min() > 0.3:
-                clips = abs(maps.walk_ray(grid, pose, b, R_MAX) - around[2]) > grid.resolution  # a corner before
-                behind = _hits(grid, pose, b, R_MAX, grid.resolution / 2).max(initial=0.0) > around[2] + 1.0
+                steps = _hits(grid, pose, b, R_MAX, grid.resolution / 2)
+                stepped = steps.min(initial=R_MAX)  # half a cell at a time: a wall's corner is easily stepped over
+                exact = maps.walk_ray(grid, pose, b, R_MAX)
+                clips = max(abs(exact - around[2]), abs(stepped - around[2])) > grid.resolution
+                behind = steps.max(initial=0.0) > around[2] + 1.0
                 if behind and not clips:
                     return grid, pose, float(b), R_MAX
 

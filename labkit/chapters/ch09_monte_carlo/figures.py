@@ -127,7 +127,7 @@ def corridor(fig, length):
     sticks, places = [], []
     for ax, title in zip(axes, titles):
         ax.set(xlim=(0, length), ylim=(0, 1.15), yticks=[])
-        ax.set_title(title, fontsize=9, pad=2)
+        ax.set_title(title, pad=2)
         ax.grid(False)
         sticks += ax.plot([], [], color=style.ESTIMATE, linewidth=0.8, alpha=0.7)
         places += ax.plot(
@@ -225,7 +225,7 @@ class MapForms:
             *np.transpose(list(building.nodes.values())), **style.look("estimates", marker="o", markersize=7)
         )
         names = [
-            ax.annotate(name, at, xytext=(5, 5), textcoords="offset points", fontsize=8)
+            ax.annotate(name, at, xytext=(5, 5), textcoords="offset points")
             for name, at in building.nodes.items()
             if not name.startswith("door")
         ]

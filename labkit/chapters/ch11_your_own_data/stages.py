@@ -132,7 +132,7 @@ def compute_without(state):
 def _without_sentence(result):
     if result["free"]:
         return (
-            f"Without pose {result['drop']} {result['free']} of the twelve singular values are zero but for rounding: "
+            f"Without pose {result['drop']}, {result['free']} of the twelve singular values are zero but for rounding: "
             "the sensor can slide along the line through the target, and turn about it, unseen."
         )
     told = f"the sensor's place is known to {result['std'][1]:.2f} mm"

@@ -52,6 +52,8 @@ def index_of_the_variance():
     given, texts = lecture.example("fusion"), lecture.digits("kalman/fusion")
 
     def holds(d):
+        if float(d["prior"]) < 0:
+            return False  # no variance
         result = _fusion(given | {"var0": float(d["prior"])})
         variance = {"Σ_0": float(d["prior"]), "Σ_1": float(result.cov[0, 0])}[d[HERE]]
         near = abs(float(result.x[0]) - given["x1"]) <= rounding.half_unit(texts["x1"]) + fused_position().bound

@@ -63,7 +63,7 @@ def _centers(d, table):
     pose[1], pose[4] = float(d["P2 y"]), float(d[f"{table} P2 B"])
     target[1:] = float(d["plate y"]) + float(d["sphere y"]), float(d["plate z"]) + float(d["sphere z"])
     T_FS = frames.matrix_from_kuka(frames.kuka_from_degrees(pose))
-    return frames.transform(frames.invert(T_FS), frames.transform(frames.invert(flange), target))
+    return hand_eye.sphere_in_scanner(flange, T_FS, target)
 
 
 @functools.cache
@@ -889,7 +889,7 @@ def li_sign():
     T_BF = np.tile(np.eye(4), (2, 1, 1))
     T_BF[1, 0, 3] = 10.0
     T_FS, target = joint_fit().T_FS, np.array([200.0, 0.0, 300.0])
-    x = frames.transform(frames.invert(T_FS), frames.transform(frames.invert(T_BF), target))
+    x = hand_eye.sphere_in_scanner(T_BF, T_FS, target)
     left, step = T_FS[:3, :3] @ (x[1] - x[0]), T_BF[1, :3, 3] - T_BF[0, :3, 3]
     right = {"T_02 - T_01": step, "T_01 - T_02": -step}
     signs = {"+ T_0": 1.0, "- T_0": -1.0}

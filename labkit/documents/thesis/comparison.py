@@ -68,7 +68,7 @@ def model(B_deg=-90.0):
     T_BF, _, target, scanner = thesis.simulation()
     scanner = np.array([*scanner[:4], B_deg, scanner[5]])
     T_FS = frames.matrix_from_kuka(frames.kuka_from_degrees(scanner))
-    return T_BF, frames.transform(frames.invert(T_FS), frames.transform(frames.invert(T_BF), target)), target, scanner
+    return T_BF, hand_eye.sphere_in_scanner(T_BF, T_FS, target), target, scanner
 
 
 def run(method, start_deg, parameters="A, B, C", radius=10.0, B_deg=-90.0, max_steps=60):
@@ -122,7 +122,7 @@ def _trust_region(scene, start, parameters, radius, max_steps):
         trace = opt.trust_region(
             lambda T_FS: hand_eye.sphere_residuals(T_BF, x_S, T_FS, target).ravel(),
             lambda T_FS: hand_eye.joint_jacobian(T_BF, x_S, T_FS, target_free=False),
-            frames.matrix_from_kuka(start), retract=moved, scale=turns + shifts, radius=radius,
+            frames.matrix_from_kuka(start), retract=frames.moved, scale=turns + shifts, radius=radius,
             max_iterations=max_steps, stop=_arrives,
         )  # fmt: skip
         poses = trace.x
@@ -139,11 +139,6 @@ def _trust_region(scene, start, parameters, radius, max_steps):
 def _arrives(before, after):
     distance = np.sqrt(2 * after.cost / (len(after.residual) / 3))
     return "the sphere is met" if distance <= ARRIVED_MM else ""
-
-
-def moved(T_FS, step):
-    """The pose after a step of a rotation vector on its right (rad) and a shift (mm), (4, 4) and (6,) -> (4, 4)."""
-    return frames.pose(T_FS[:3, :3] @ exp_so3(step[:3]), T_FS[:3, 3] + step[3:])
 
 
 def rating(arrived):

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...calibration.hand_eye import sphere_in_scanner
 from ...checks import as_points, as_positive_number
 from ...geometry import frames
 from ...tables import read_table
@@ -336,7 +337,7 @@ def simulation(exact=True, printed=False):
     x_S = np.column_stack([data[c] for c in CENTER_COLUMNS])
     if exact and not printed:
         T_FS = frames.matrix_from_kuka(frames.kuka_from_degrees(scanner))
-        x_S = frames.transform(frames.invert(T_FS), frames.transform(frames.invert(T_BF), target))
+        x_S = sphere_in_scanner(T_BF, T_FS, target)
     return Simulation(T_BF, x_S, target, scanner)
 
 
