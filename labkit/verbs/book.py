@@ -33,17 +33,18 @@ def main(arguments=None):
     if not paths:
         raise Refusal("The book is made from the sources in solutions/, which this edition does not have.")
     _make_empty(out, figures.FOLDER)
+    notebooks = {path.stem: _stored(path) for path in paths}
+    names = {stem: list(stages_of(notebook).values()) for stem, notebook in notebooks.items()}
     with ProcessPoolExecutor(os.cpu_count() or 1) as workers:
-        notebooks = {path.stem: _notebook(path) for path in paths}
         ledger = workers.submit(pages.entries)
-        names = {stem: list(stages_of(notebook).values()) for stem, notebook in notebooks.items()}
+        executed = {path.stem: workers.submit(_executed, notebooks[path.stem], path) for path in paths}
         films = {
             (stem, name): workers.submit(figures.record, stem, name, out) for stem in names for name in names[stem]
         }
         films = {key: _film(key, future) for key, future in films.items()}
         chapters = [
-            site.Chapter(stem, notebook, {name: films[stem, name] for name in names[stem]})
-            for stem, notebook in notebooks.items()
+            site.Chapter(stem, executed[stem].result(), {name: films[stem, name] for name in names[stem]})
+            for stem in notebooks
         ]
         site.write(chapters, ledger.result(), out)
     size = sum(file.stat().st_size for file in out.rglob("*") if file.is_file())
@@ -76,12 +77,16 @@ def _film(key, future):
         raise Refusal(f"{key[0]}, figure {key[1]!r} could not be recorded: {error}") from error
 
 
-def _notebook(path):
-    """The solved notebook of a source with all its outputs."""
+def _stored(path):
+    """The solved notebook of a source as it is stored."""
     stored = path.with_suffix(".ipynb")
     if not stored.exists() or build.stale([path], ROOT / "notebooks", ROOT / "solutions"):
         raise Refusal(f"The notebooks of {path.stem} are not as their source says: python lab.py build {path.stem[:2]}")
-    notebook = nbformat.read(stored, as_version=4)
+    return nbformat.read(stored, as_version=4)
+
+
+def _executed(notebook, path):
+    """The notebook with all its outputs: those that are not stored, as they differ from day to day, are made."""
     if lacks_outputs(notebook):
         asyncio.run(build.execute(notebook, path.stem, path.parent))
     return notebook
