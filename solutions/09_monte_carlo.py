@@ -61,8 +61,8 @@ ex.predict("corridor", guess, reveal=stages.corridor)
 #
 # The lecture shows four kinds of map (slides *Gitterbasierte*, *Linienbasierte*, *Punktbasierte Karten*,
 # *topologische Karten*). Here they are of one small building.
-# Its plan is ours: the lecture's maps are pictures only. Move the probe and switch the form. The last two are
-# computed from the grid; you will need them soon.
+# Its plan is ours: the lecture's maps are pictures only. Move the probe, and read what each map answers, and from how
+# many numbers. The last two are computed from the grid; you will need them soon.
 #
 # The sensor is the lecture's Sick LMS 100: 18 m, 270°, one beam every 0.5° (slide *2D-Laser-Scanner*). A filter takes
 # every ninth beam, because neighbors

@@ -44,10 +44,27 @@ def test_the_corridor_ends_at_a_wall():
     assert all((np.clip(x, 0, 12) == x).all() for x, _, _ in result["shots"])
 
 
-def test_maps_store_what_they_say():
-    result = stages.compute_maps({"form": "lines", "probe": np.array([8.4, 2.4])})
-    assert result["stored"] == load_building().lines.size and result["cell"] == "free" and result["node"] == "hall"
-    assert np.isnan(stages.compute_maps({"form": "graph", "probe": np.array([-1.0, 2.4])})["distance"])
+def maps_at(x, y):
+    return stages.compute_maps({"probe": np.array([x, y])})
+
+
+def test_six_maps_answer_one_question():
+    """In the hall, 2.4 m above the outer wall y = 0, no other wall nearer than 1.8 m: all forms agree on it."""
+    b, result = load_building(), maps_at(8.4, 1.5)
+    assert result["answers"]["occupancy grid"] == "free" and result["answers"]["graph"] == "near “hall”"
+    assert result["means"]["lines"] == pytest.approx([8.4, 0.0])
+    assert np.hypot(*(result["means"]["points"] - [8.4, 1.5])) == pytest.approx(1.5, abs=0.15)
+    assert result["free_by"] == pytest.approx(1.5, abs=0.15)
+    assert stages.stored()["lines"] == b.lines.size and stages.stored()["points"] == b.points.size
+    assert maps_at(-1.0, 2.4)["answers"]["distance field"] == "beyond the map"
+    assert maps_at(15.6, 9.8)["answers"]["occupancy grid"] == "unknown" and maps_at(15.6, 9.8)["free_by"] == 0
+
+
+def test_the_nearest_place_of_a_wall_is_its_foot_or_its_end():
+    walls = np.array([[0, 0, 4, 0], [10, 0, 10, 5.0]])
+    assert stages.nearest_on(walls, np.array([1.0, 2.0])) == pytest.approx([1, 0])
+    assert stages.nearest_on(walls, np.array([6.0, 1.0])) == pytest.approx([4, 0])
+    assert stages.nearest_on(walls, np.array([9.0, 7.0])) == pytest.approx([10, 5])
 
 
 def test_likelihood_field_likes_wrong_rooms_better_than_the_beam_model():
@@ -110,13 +127,16 @@ def test_twelve_pictures_end_right_with_many_and_wrong_with_few_particles():
     assert stages.compute_twelve({"particles": 5000, "t": 0.0})["number"] == 1
 
 
-def test_soccer_paths():
-    errors = {}
+def test_soccer_errors_are_the_distances_of_the_paths():
+    rms = {}
     for reads in stages.READINGS:
         result = stages.compute_soccer({"reads": reads, "t": 47.6})
-        errors[reads] = np.sqrt(np.square(result["estimates"] - result["truth"][1:])[:, :2].sum(1).mean())
-    assert errors["range and bearing"] < 0.15 and errors["range only"] < 0.25 and errors["bearing only"] < 0.25
-    assert errors["nothing"] > 2 * errors["range and bearing"]
+        rms[reads] = np.sqrt((result["errors"]["MCL"] ** 2).mean())
+        tail = np.hypot(*(result["estimates"] - result["truth"][1:])[:, :2].T)
+        np.testing.assert_allclose(result["errors"]["MCL"][-len(tail) :], tail)
+        assert len(tail) == stages.TAIL + 1 and len(result["others"]) == 4
+    assert rms["range and bearing"] < 0.15 and rms["range only"] < 0.25 and rms["bearing only"] < 0.25
+    assert rms["nothing"] > 2 * rms["range and bearing"]
 
 
 def drive(stage, *events):

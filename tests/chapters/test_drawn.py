@@ -738,18 +738,15 @@ def test_corridor_stands_on_its_doors_and_particles():
         assert_drawn(stage, upright(x, height), [[truth, 1.0]])
 
 
-@pytest.mark.parametrize("form", ch09.FORMS)
-def test_one_form_of_the_map_is_shown_and_the_probe(form):
-    stage, b = at(ch09.map_forms(), form=form, probe=(3.0, 4.0)), load_building()
-    assert_drawn(stage, [[3.0, 4.0]])
-    shown = {
-        "lines": [row for wall in b.lines for row in (wall[:2], wall[2:], GAP)],
-        "points": b.points,
-        "graph": list(b.nodes.values()),
-    }
-    for name, points in shown.items():
-        found = [v for v in drawn(stage) if v.shape == np.shape(points) and np.allclose(v, points, equal_nan=True)]
-        assert len(found) == (name == form)
+def test_six_maps_share_the_probe_and_show_what_they_mean():
+    stage, b = at(ch09.map_forms(), probe=(3.0, 4.0)), load_building()
+    assert [ax.get_title(loc="left").split(",")[0] for ax in stage.figure.axes] == list(ch09.FORMS)
+    assert sum(v.shape == (1, 2) and np.allclose(v, (3.0, 4.0)) for v in drawn(stage)) == 6
+    means = stage.result["means"]
+    assert_drawn(stage, *([(3.0, 4.0), means[form]] for form in ("lines", "points", "graph")))
+    still = [line.get_xydata() for ax in stage.figure.axes for line in ax.lines if line not in stage.moving]
+    for points in ([row for wall in b.lines for row in (wall[:2], wall[2:], GAP)], b.points, list(b.nodes.values())):
+        assert any(v.shape == np.shape(points) and np.allclose(v, points, equal_nan=True) for v in still)
 
 
 def test_scan_starts_at_the_robot_in_both_pictures():
@@ -800,6 +797,9 @@ def test_soccer_robot_looks_at_the_landmark_it_sees():
     stage = ch09.soccer()
     seen = next(t for t in np.arange(0, 40, 0.4) if at(stage, t=t).result["seen"] >= 0)
     r = at(stage, t=seen).result
+    k, past = r["step"], r["errors"]["MCL"][: r["step"] + 1]
+    assert_drawn(stage, np.column_stack([0.4 * np.arange(1, k + 2), np.maximum(past, 0.01)]))
+    assert_drawn(stage, robot_mark(r["odometry"][-1], 0.12))
     robot = r["truth"][-1]
     assert_drawn(stage, [robot[:2], r["landmarks"][r["seen"]]], robot_mark(robot, 0.12), r["states"][:, :2])
     assert_drawn(stage, r["truth"][:, :2], r["odometry"][:, :2], r["estimates"][:, :2])

@@ -167,14 +167,20 @@ def summary(ax):
     return raw, corrected, claim, words
 
 
-def method_chart(ax, names):
-    """Error over bound of several methods, rotation and translation. Returns (rotation, translation)."""
-    style.axes(ax, "rms error / Cramer-Rao bound", "", "20 poses, 400 trials")
+def method_chart(ax, names, ways, elsewhere):
+    """Error over bound of several methods, rotation and translation, each with its way; `elsewhere`: the rotation at
+    all noises, (noises, methods), as a faint range. Returns (rotation, translation).
+    """
+    style.axes(ax, "rms error / Cramer-Rao bound", "", "gray: the rotation at all four noises")
     ax.set(xlim=(0.8, 150), xscale="log", ylim=(len(names) - 0.4, -0.6))
-    ax.set_yticks(range(len(names)), names)
+    ax.set_yticks(range(len(names)), [f"{name}\n{way}" for name, way in zip(names, ways)], fontsize=8)
     ax.set_xticks([1, 3, 10, 30, 100], ["1", "3", "10", "30", "100"])
     ax.minorticks_off()
     ax.axvline(1.0, color=style.INK, linewidth=1.6)
+    for row, values in enumerate(elsewhere.T):
+        ax.plot(
+            np.sort(values), [row] * len(values), color=style.MUTED, marker="o", markersize=4, linewidth=5, alpha=0.25
+        )
     (rotation,) = ax.plot([], [], **style.look("estimates", markersize=8), label="rotation")
     (translation,) = ax.plot(
         [],

@@ -9,6 +9,7 @@ from matplotlib.patches import PathPatch, Wedge
 from matplotlib.path import Path
 
 from ...stage import style
+from ...stage.marks import Ghosts
 
 CELLS = {1: style.INK, 2: style.MUTED}  # occupied and unknown cells; free ones stay paper
 BARS = np.array([0.0, 1.0, np.nan])
@@ -203,46 +204,47 @@ def error_curve(ax, steps):
     return ax.plot([], [], **style.look("estimate", linewidth=1.6))[0]
 
 
-class MapForms:
-    """One building as grid, lines, points and graph, and its distance and likelihood field; `show` picks one."""
+class MapForm:
+    """One form of a building's map, small, under its name and the count of its numbers; the probe, and what it answers.
 
-    def __init__(self, ax, building, field):
+    The forms: occupancy grid, lines, points, graph, distance field, likelihood field.
+    """
+
+    def __init__(self, ax, form, numbers, building, field):
         grid = building.grid
-        extent = grid.extent
-        style.axes(ax, "x (m)", "y (m)", equal=True, grid=False)
-        ax.set(xlim=extent[:2], ylim=extent[2:])
-        walls, unknown = (ax.add_patch(squares(grid.cells == kind, extent, color)) for kind, color in CELLS.items())
-        place = {"extent": extent, "origin": "lower", "interpolation": "nearest"}
-        self.images = {
-            "distance field": ax.imshow(grid.distance, cmap=style.HEAT, **place),
-            "likelihood field": ax.imshow(field.table, cmap=style.HEAT, **place),
-        }
-        (lines,) = ax.plot(*segments(building.lines), color=style.INK, linewidth=2)
-        (points,) = ax.plot(*building.points.T, **style.look("measurement", markersize=2.5))
-        ways = [(*building.nodes[a], *building.nodes[b]) for a, b in building.edges]
-        (edges,) = ax.plot(*segments(ways), color=style.PREDICTION, linewidth=2)
-        (nodes,) = ax.plot(
-            *np.transpose(list(building.nodes.values())), **style.look("estimates", marker="o", markersize=7)
-        )
-        names = [
-            ax.annotate(name, at, xytext=(5, 5), textcoords="offset points")
-            for name, at in building.nodes.items()
-            if not name.startswith("door")
-        ]
-        self.parts = {
-            "occupancy grid": [walls, unknown],
-            **{key: [image] for key, image in self.images.items()},
-            "lines": [lines],
-            "points": [points],
-            "graph": [edges, nodes, *names],
-        }
-        self.artists = [artist for part in self.parts.values() for artist in part]
+        style.axes(ax, equal=True, grid=False)
+        ax.set(xlim=grid.extent[:2], ylim=grid.extent[2:], xticks=(), yticks=(), xlabel=" ")  # room for the answer
+        ax.set_title(f"{form}, {numbers:,} numbers", fontsize=9)
+        self._draw(ax, form, building, field)
+        (self.way,) = ax.plot([], [], color=style.ESTIMATE, linewidth=2)
+        (self.probe,) = ax.plot([], [], **style.look("estimates", markersize=6, markeredgecolor=style.PAPER))
+        below = {"xycoords": "axes fraction", "xytext": (0, -4), "textcoords": "offset points"}
+        self.answer = ax.annotate("", (0.5, 0.0), **below, ha="center", va="top", fontsize=9, fontweight="bold")
+        self.artists = [self.way, self.probe, self.answer]
 
-    def show(self, form):
-        """Show one of the forms, hide the others."""
-        for name, part in self.parts.items():
-            for artist in part:
-                artist.set_visible(name == form)
+    def _draw(self, ax, form, building, field):
+        grid = building.grid
+        place = {"extent": grid.extent, "origin": "lower", "interpolation": "nearest", "cmap": style.HEAT}
+        if form == "occupancy grid":
+            for kind, color in CELLS.items():
+                ax.add_patch(squares(grid.cells == kind, grid.extent, color))
+        elif form == "lines":
+            ax.plot(*segments(building.lines), color=style.INK, linewidth=1.6)
+        elif form == "points":
+            ax.plot(*building.points.T, **style.look("measurement", markersize=1.6))
+        elif form == "graph":
+            ways = [(*building.nodes[a], *building.nodes[b]) for a, b in building.edges]
+            ax.plot(*segments(ways), color=style.PREDICTION, linewidth=1.6)
+            nodes = np.transpose(list(building.nodes.values()))
+            ax.plot(*nodes, color=style.PREDICTION, linestyle="none", marker="o", markersize=4.5)
+        else:
+            ax.imshow(grid.distance if form == "distance field" else field.table, **place)
+
+    def set(self, probe, answer, means=None):
+        """`probe`: (2,); `answer`: words; `means`: the place the answer speaks of, (2,), if any."""
+        self.probe.set_data(*np.reshape(probe, (2, 1)))
+        self.answer.set_text(answer)
+        self.way.set_data(*np.transpose([probe, probe if means is None else means]))
 
 
 class Soccer:
@@ -257,13 +259,16 @@ class Soccer:
             ax.annotate(str(number), at, xytext=(8, 6), textcoords="offset points")
         self.landmarks = landmarks
         self.cloud = Cloud(ax, size=3)
-        (self.truth,) = ax.plot([], [], **style.look("truth"), label="true path")
-        (self.odometry,) = ax.plot([], [], color=style.MUTED, linestyle=":", linewidth=2, label="odometry")
-        (self.path,) = ax.plot([], [], **style.look("estimate", linestyle=(0, (5, 2))), label="MCL")
-        (self.sight,) = ax.plot([], [], color=style.MEASUREMENT, linewidth=2)
-        self.robot = RobotMark(ax, radius=0.12)
-        ax.legend(loc="upper center", ncols=3)
-        self.artists = [*self.cloud.artists, self.sight, self.odometry, self.path, self.truth, *self.robot.artists]
+        (self.truth,) = ax.plot([], [], **style.look("truth"), label="robot")
+        (self.odometry,) = ax.plot([], [], **style.look("prediction", linewidth=1.6), label="odometry")
+        (self.path,) = ax.plot([], [], **style.look("estimate"), label="MCL")
+        (self.sight,) = ax.plot([], [], color=style.MEASUREMENT, linewidth=2, label="seen")
+        self.robot, self.counted = RobotMark(ax, radius=0.12), RobotMark(ax, color=style.PREDICTION, radius=0.12)
+        style.legend_above(ax, ncols=4)
+        self.artists = [
+            *self.cloud.artists, self.sight, self.odometry, self.path, self.truth, *self.counted.artists,
+            *self.robot.artists,
+        ]  # fmt: skip
 
     def set(self, truth, odometry, estimates, states, seen):
         """Paths so far, (n, 3) each, the cloud (M, 3) and the index of the landmark seen (-1: none)."""
@@ -272,5 +277,27 @@ class Soccer:
         self.path.set_data(*estimates[:, :2].T)
         self.cloud.set(states)
         self.robot.set(truth[-1])
+        self.counted.set(odometry[-1])
         ends = [truth[-1, :2], self.landmarks[seen]] if seen >= 0 else [(np.nan, np.nan)]
         self.sight.set_data(*np.transpose(ends))
+
+
+class SoccerErrors:
+    """Errors of odometry and MCL over time up to now, strong, and of all readings over the whole run, faint."""
+
+    def __init__(self, ax, seconds):
+        style.axes(ax, "time (s)", "error (m)")
+        ax.set_title("gray: odometry, and MCL with the other readings", fontsize=9, color=style.MUTED)
+        ax.set(xlim=(0, seconds), ylim=(0.01, 6), yscale="log")
+        ax.set_yticks([0.01, 0.1, 1], ["0.01", "0.1", "1"])
+        ax.minorticks_off()
+        self.ghosts = Ghosts(ax)
+        looks = {"odometry": style.look("prediction"), "MCL": style.look("estimate")}
+        self.curves = {name: ax.plot([], [], **look)[0] for name, look in looks.items()}
+        self.artists = [*self.ghosts.artists, *self.curves.values()]
+
+    def set(self, time, step, errors, others):
+        """`time`: (n,) s; `step`: the number of now; `errors`: {name: (n,)} m; `others`: those of all readings."""
+        self.ghosts.set([np.column_stack([time, np.maximum(other, 0.01)]) for other in others])
+        for name, curve in self.curves.items():
+            curve.set_data(time[: step + 1], np.maximum(errors[name][: step + 1], 0.01))

@@ -12,7 +12,7 @@ from ...fast.sensors import SensorSuite, weigh_beams
 from ...localization import maps, mcl, odometry, particles
 from ...localization.drives import Wanderer
 from ...localization.sensors import SENSORS, weigh_doors, weigh_likelihood_field
-from ...stage import Choice, Handle, Play, Slider, Stage, style
+from ...stage import Choice, Handle, Play, Slider, Stage, Target, style
 from . import figures as draw
 
 CORRIDOR = 12.0  # m
@@ -113,63 +113,86 @@ def corridor():
 
 # Maps ----------------------------------------------------------------------------------------------------------------
 
+FAR = 2.0  # m
 FORMS = ("occupancy grid", "lines", "points", "graph", "distance field", "likelihood field")
 
 
 def compute_maps(state):
-    """What the map says at the probe, and how many numbers this form of the map stores."""
+    """What each form of the map answers at the probe, in words; the places that lines, points and graph mean; how far
+    (m) every wall is from it, by the distance field, if it is free.
+    """
     b, at = building(), state["probe"]
-    stored = {
-        "occupancy grid": b.grid.cells.size,
-        "lines": b.lines.size,
-        "points": b.points.size,
-        "graph": 2 * len(b.nodes) + 2 * len(b.edges),
-        "distance field": b.grid.cells.size,
-        "likelihood field": b.grid.cells.size,
-    }
     i, j = b.grid.cell_of(at)
     inside = 0 <= i < b.grid.cells.shape[0] and 0 <= j < b.grid.cells.shape[1]
-    nearest = min(b.nodes, key=lambda name: np.hypot(*(np.array(b.nodes[name]) - at)))
-    return {
-        "form": state["form"],
-        "stored": stored[state["form"]],
-        "cell": ("free", "occupied", "unknown")[int(b.grid.at(at))],
-        "distance": float(b.grid.distance[i, j]) if inside else np.nan,
-        "node": nearest,
+    nodes = np.array(list(b.nodes.values()))
+    node = int(np.argmin(np.hypot(*(nodes - at).T)))
+    means = {
+        "lines": nearest_on(b.lines, at),
+        "points": b.points[np.argmin(np.hypot(*(b.points - at).T))],
+        "graph": nodes[node],
     }
+    off = {form: float(np.hypot(*(place - at))) for form, place in means.items()}
+    cell = ("free", "occupied", "unknown")[int(b.grid.at(at))]
+    distance, weight = (float(table[i, j]) if inside else np.nan for table in (b.grid.distance, suite().field.table))
+    return {
+        "means": means,
+        "free_by": distance if cell == "free" else 0.0,
+        "answers": {
+            "occupancy grid": cell,
+            "lines": f"a wall {off['lines']:.2f} m away",
+            "points": f"a point {off['points']:.2f} m away",
+            "graph": f"near “{list(b.nodes)[node]}”",
+            "distance field": f"obstacle in {distance:.2f} m" if inside else "beyond the map",
+            "likelihood field": f"log weight {weight:.1f}" if inside else "beyond the map",
+        },
+    }
+
+
+@functools.cache
+def stored():
+    """How many numbers each form of the map holds."""
+    b = building()
+    graph = 2 * len(b.nodes) + 2 * len(b.edges)
+    return dict(zip(FORMS, (b.grid.cells.size, b.lines.size, b.points.size, graph, *2 * (b.grid.cells.size,))))
+
+
+def nearest_on(lines, at):
+    """The place nearest to a point on segments (n, 4), x1 y1 x2 y2."""
+    start, along = lines[:, :2], lines[:, 2:] - lines[:, :2]
+    share = np.clip(((at - start) * along).sum(1) / np.maximum((along**2).sum(1), 1e-12), 0, 1)
+    feet = start + share[:, None] * along
+    return feet[np.argmin(np.hypot(*(feet - at).T))]
 
 
 def _maps_sentence(result):
-    where = f"{result['form']}: {result['stored']:,} numbers stored. Under the probe: {result['cell']}"
-    if np.isnan(result["distance"]):
-        return f"{where}, beyond the map."
-    return f"{where}, {result['distance']:.1f} m from the nearest obstacle, nearest place {result['node']!r}."
+    told = "; ".join(f"{form}: {answer}" for form, answer in result["answers"].items())
+    return f"Under the probe, {told}."
 
 
 def map_forms():
-    """One building as the lecture's four kinds of map, and the two fields computed from the grid."""
+    """One building as the lecture's four kinds of map and the two fields of the grid: one probe asks all six."""
 
     def scene(fig):
-        b, ax = building(), fig.subplots()
-        pictures = draw.MapForms(ax, b, suite().field)
-        (probe,) = ax.plot([], [], **style.look("estimates", markersize=8))
+        axes = fig.subplots(2, 3).ravel()
+        b, field = building(), suite().field
+        pictures = [draw.MapForm(ax, form, stored()[form], b, field) for ax, form in zip(axes, FORMS)]
 
         def update(state, result):
-            pictures.show(result["form"])
-            probe.set_data(*state["probe"][:, None])
+            for form, picture in zip(FORMS, pictures):
+                picture.set(state["probe"], result["answers"][form], result["means"].get(form))
 
-        return [*pictures.artists, probe], update
+        return [artist for picture in pictures for artist in picture.artists], update
 
     return Stage(
         "one building, six maps",
         scene=scene,
         compute=compute_maps,
-        handles={"probe": Handle((8.4, 2.4), step=0.1, label="probe", color=style.ESTIMATE)},
-        controls={"form": Choice(FORMS, FORMS[0], label="map")},
+        handles={"probe": Handle((5.0, 5.3), step=0.1, label="probe", color=style.ESTIMATE)},
         fail={"probe": (15.6, 9.8)},
-        because="The probe stands where nothing was ever measured.",
+        because="The probe stands where nothing was ever measured: some maps say so, the others answer all the same.",
+        target=Target(f"a place {FAR} m from every wall", lambda result: result["free_by"] >= FAR),
         describe=_maps_sentence,
-        size=(7.0, 4.6),
+        size=(7.6, 4.4),
     )
 
 
@@ -490,6 +513,7 @@ def twelve_pictures():
     )
 
 
+SOCCER_DT, TAIL = 0.4, 25  # s a step; steps of the paths that are shown
 READINGS = {
     "range and bearing": ("range", "bearing"),
     "range only": ("range",),
@@ -503,50 +527,67 @@ def _soccer(use):
     return soccer_run(use=use)
 
 
+@functools.cache
+def _soccer_errors():
+    """Distance (m) of odometry and of MCL with each reading from the robot, after every step: {name: (n,)}."""
+    runs = {name: _soccer(use) for name, use in READINGS.items()}
+    paths = {"odometry": runs["nothing"].odometry[1:], **{name: run.estimates for name, run in runs.items()}}
+    return {name: np.hypot(*(path - runs["nothing"].truth[1:])[:, :2].T) for name, path in paths.items()}
+
+
 def compute_soccer(state):
-    """The soccer run up to now: paths, cloud, the landmark seen, and the error of both estimates (m)."""
-    run = _soccer(READINGS[state["reads"]])
-    k = min(int(round(state["t"] / 0.4)), len(run.estimates) - 1)
-    off = [
-        float(np.hypot(*(path[k + d] - run.truth[k + 1])[:2])) for path, d in ((run.estimates, 0), (run.odometry, 1))
-    ]
+    """The soccer run up to now: the last TAIL steps of the paths, cloud, the landmark seen, and the errors (m) of
+    odometry and MCL so far, those of the other readings over the whole run.
+    """
+    run, errors = _soccer(READINGS[state["reads"]]), _soccer_errors()
+    k = min(int(round(state["t"] / SOCCER_DT)), len(run.estimates) - 1)
+    first = max(0, k - TAIL)
     return {
-        "truth": run.truth[: k + 2],
-        "odometry": run.odometry[: k + 2],
-        "estimates": run.estimates[: k + 1],
+        "truth": run.truth[first : k + 2],
+        "odometry": run.odometry[first : k + 2],
+        "estimates": run.estimates[first : k + 1],
         "states": run.pictures[k].states,
         "seen": int(run.seen[k]),
-        "errors": off,
+        "time": SOCCER_DT * np.arange(1, len(run.estimates) + 1),
+        "step": k,
+        "errors": {"odometry": errors["odometry"], "MCL": errors[state["reads"]]},
+        "others": [errors[name] for name in READINGS],
         "landmarks": run.landmarks,
     }
 
 
+def _soccer_sentence(result):
+    k = result["step"]
+    mcl, odometry_off = (float(result["errors"][name][k]) for name in ("MCL", "odometry"))
+    sight = f"it sees landmark {result['seen'] + 1}" if result["seen"] >= 0 else "no landmark is in sight"
+    return f"MCL is off by {mcl:.2f} m, odometry by {odometry_off:.2f} m; {sight}."
+
+
 def soccer():
-    """Six landmarks around a soccer field: the true path, odometry, and what MCL makes of them."""
+    """Six landmarks around a soccer field: odometry walks away from the robot, what the camera reads pulls MCL back."""
 
     def scene(fig):
-        ax = fig.subplots()
-        field = draw.Soccer(ax, _soccer(READINGS["range and bearing"]).landmarks)
+        top, bottom = fig.subplots(2, 1, height_ratios=(2.6, 1))
+        field = draw.Soccer(top, _soccer(READINGS["range and bearing"]).landmarks)
+        curves = draw.SoccerErrors(bottom, 47.6)
 
         def update(state, result):
-            field.set(**{key: value for key, value in result.items() if key not in ("errors", "landmarks")})
+            field.set(*(result[key] for key in ("truth", "odometry", "estimates", "states", "seen")))
+            curves.set(result["time"], result["step"], result["errors"], result["others"])
 
-        return field.artists, update
+        return [*field.artists, *curves.artists], update
 
     return Stage(
         "soccer field",
         scene=scene,
         compute=compute_soccer,
         controls={"reads": Choice(tuple(READINGS), "range and bearing", label="the camera reads")},
-        play=Play(t_max=47.6, dt=0.4, rate=4.0),
+        play=Play(t_max=47.6, dt=SOCCER_DT, rate=4.0, start=20.0),
         fail={"reads": "nothing", "t": 47.6},
         because="No landmark is read: the particles count steps as odometry does, and drift as it does.",
         presets={"At the end": {"t": 47.6}},
-        describe=lambda result: (
-            f"MCL is off by {result['errors'][0]:.2f} m, odometry by {result['errors'][1]:.2f} m; "
-            + (f"it sees landmark {result['seen'] + 1}." if result["seen"] >= 0 else "no landmark in sight.")
-        ),
-        size=(7.0, 4.8),
+        describe=_soccer_sentence,
+        size=(7.0, 5.4),
     )
 
 
