@@ -171,7 +171,7 @@ def method_chart(ax, names, ways, elsewhere):
     """Error over bound of several methods, rotation and translation, each with its way; `elsewhere`: the rotation at
     all noises, (noises, methods), as a faint range. Returns (rotation, translation).
     """
-    style.axes(ax, "rms error / Cramer-Rao bound", "", "gray: the rotation at all four noises")
+    style.axes(ax, "rms error / Cramer-Rao bound", "", "gray: at all four noises")
     ax.set(xlim=(0.8, 150), xscale="log", ylim=(len(names) - 0.4, -0.6))
     ax.set_yticks(range(len(names)), [f"{name}\n{way}" for name, way in zip(names, ways)], fontsize=8)
     ax.set_xticks([1, 3, 10, 30, 100], ["1", "3", "10", "30", "100"])

@@ -495,7 +495,7 @@ CASES = {
 FIRST, AT_ONCE = "rotation first", "both at once"
 WAYS = {
     "OpenCV Tsai": FIRST, "OpenCV Park": FIRST, "OpenCV Horaud": FIRST, "OpenCV Andreff": AT_ONCE,
-    "OpenCV Daniilidis": AT_ONCE, "report": FIRST, "maximum likelihood": "both at once, weighed by their noise",
+    "OpenCV Daniilidis": AT_ONCE, "report": FIRST, "maximum likelihood": "both, weighed by noise",
 }  # fmt: skip
 
 
