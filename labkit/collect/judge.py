@@ -84,7 +84,7 @@ class Session:
         with sandbox.worker() as process:
             self.border = Border(process.stdout.fileno(), process.stdin.fileno(), self._run_trusted, SILENCE)
             self.border.line.until = until
-            handlers = ("cell", "failed", "blank", "hand", "predict", "library", "constant")
+            handlers = ("cell", "failed", "blank", "hand", "predict", "library", "constant", "compute")
             self.border.handlers |= {name: getattr(self, f"_{name}") for name in handlers}
             try:
                 self.border.ask("prepare", **self._equipment())
@@ -239,6 +239,17 @@ class Session:
         if str(module) not in figures or not str(name).isupper():
             raise AttributeError(f"there is no {str(module)[:80]}.{str(name)[:80]}")
         return {"value": self.border.encode(getattr(importlib.import_module(module), name), parts)}
+
+    def _compute(self, parts, module, name, args):
+        """What a Stage computes from a state, as a notebook may ask it; refused while an answer is judged."""
+        if self.judging:
+            raise RuntimeError(f"no figure computes while {self.judging} is judged")
+        if module != f"labkit.chapters.ch{self.chapter.notebook}.stages" or not str(name).startswith("compute_"):
+            raise AttributeError(f"there is no {str(module)[:80]}.{str(name)[:80]}")
+        outcome = run_trusted(getattr(importlib.import_module(module), name), args, {}, None, lambda r: r)
+        if outcome.error is not None:
+            raise outcome.error
+        return {"value": self.border.encode(outcome.result, parts)}
 
     def _fingerprint(self, item, answer):
         """The same few letters for all functions that give the same results on draws that all students share."""

@@ -5,6 +5,7 @@ answer are replaced by questions to the judge, who refuses them while that exerc
 Started by `sandbox.worker` with its own file as the command: FOLDER OF LABKIT, SECONDS OF PROCESSOR TIME [ITS FOLDER].
 """
 
+import functools
 import importlib
 import importlib.abc
 import importlib.util
@@ -35,13 +36,17 @@ class Dull:
 
 
 class DullModule(types.ModuleType):
-    """A module of figures: its names in capitals are the judge's constants, all others are dull."""
+    """A module of figures: its names in capitals are the judge's constants, what it computes is the judge's to compute,
+    all others are dull.
+    """
 
-    constant = None  # asks the judge
+    constant = computed = None  # ask the judge
 
     def __getattr__(self, name):
         if name.startswith("__"):
             raise AttributeError(name)
+        if name.startswith("compute_"):
+            return functools.partial(DullModule.computed, self.__name__, name)
         return DullModule.constant(self.__name__, name) if name.isupper() else Dull()
 
 
@@ -80,6 +85,9 @@ class Worker:
         session.course = lambda name: Handover(self, chapter, exercises, name)
         session.course_map = session.progress_text = lambda: Dull()
         DullModule.constant = lambda module, name: self.border.ask("constant", module=module, name=name)["value"]
+        DullModule.computed = lambda module, name, *args: self.border.ask(
+            "compute", module=module, name=name, args=list(args)
+        )["value"]
         from IPython.core.interactiveshell import InteractiveShell
         from traitlets.config import Config
 
@@ -169,6 +177,10 @@ class Handover:
 
     def predict(self, id, answer=None, reveal=None):
         self._worker.border.ask("predict", id=id, answer=None if self._worker._is_blank(answer) else answer)
+
+    def after(self, *ids):
+        """Cells that would give an answer away wait for nothing here: nobody reads their output."""
+        return True
 
     def progress(self): ...
 

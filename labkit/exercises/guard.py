@@ -166,14 +166,39 @@ class Abroad:
             cls.seconds += time.monotonic() - began
 
 
+class Starved:
+    """How long the processor served others while this process's main thread was ready to go on, where Linux tells."""
+
+    file = -1
+
+    @classmethod
+    def look(cls):
+        """Open what tells it, before rails are laid, and anew in a process that was forked."""
+        with contextlib.suppress(OSError):
+            cls.file = os.open("/proc/self/schedstat", os.O_RDONLY)
+
+    @classmethod
+    def seconds(cls):
+        """Since the process began; 0 where nobody tells."""
+        try:
+            return 1e-9 * int(os.pread(cls.file, 100, 0).split()[1])
+        except (OSError, ValueError, IndexError, AttributeError):
+            return 0.0
+
+
+Starved.look()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=Starved.look)
+
+
 class _Clock:
     """Raises `TimeLimit` in this thread after so many seconds of processor time, and again if the code swallows it.
 
     Processor time does not depend on what else the machine is doing; a call that shares its processor is ended after
-    `PATIENCE` times as long, one that only waits at once. Waiting for a process that works for the call (`Abroad`) does
-    not count, up to `ABROAD` times as long again. Where the platform has interval timers (Linux, macOS) and
-    this is the main thread, a signal does it, which also ends a sleep. Elsewhere a second thread raises it between two
-    lines of Python; a single call into compiled code cannot be stopped there.
+    `PATIENCE` times as long, one that only waits at once. Waiting for the processor (`Starved`) or a process that works
+    for the call (`Abroad`, up to `ABROAD` times as long again) does not count. Where the platform has interval timers
+    (Linux, macOS) and this is the main thread, a signal does it, which also ends a sleep. Elsewhere a second thread
+    raises it between two lines of Python; a single call into compiled code cannot be stopped there.
     """
 
     def __init__(self, seconds):
@@ -181,7 +206,8 @@ class _Clock:
         self.by_signal = hasattr(signal, "setitimer") and threading.current_thread() is threading.main_thread()
 
     def start(self):
-        self.ends_cpu, self.began, self.abroad = time.thread_time() + self.seconds, time.monotonic(), Abroad.seconds
+        self.ends_cpu, self.began = time.thread_time() + self.seconds, time.monotonic()
+        self.abroad, self.starved = Abroad.seconds, Starved.seconds()
         if self.by_signal:
             self.before = signal.signal(signal.SIGALRM, self._ring)
             self.ticking = True
@@ -225,13 +251,16 @@ class _Clock:
         """
         ctypes.pythonapi.PyThreadState_SetAsyncExc(self.target, ctypes.py_object(TimeLimit))
 
+    def _whole(self):
+        """Seconds since the start, without those that the processor gave to others."""
+        return time.monotonic() - self.began - (Starved.seconds() - self.starved)
+
     def _own(self):
-        """Seconds since the start, without those spent waiting for another process."""
-        return time.monotonic() - self.began - (Abroad.seconds - self.abroad)
+        """The same without those spent waiting for another process."""
+        return self._whole() - (Abroad.seconds - self.abroad)
 
     def _is_patient(self):
-        whole = time.monotonic() - self.began
-        return self._own() < PATIENCE * self.seconds and whole < ABROAD * PATIENCE * self.seconds
+        return self._own() < PATIENCE * self.seconds and self._whole() < ABROAD * PATIENCE * self.seconds
 
     def _ring(self, _, frame):
         left = self.ends_cpu - time.thread_time()

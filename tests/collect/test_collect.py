@@ -198,6 +198,18 @@ def test_a_prediction_an_unfinished_exercise_and_a_missing_cell_are_told_apart()
     assert result["items"]["flat"] == {"status": "predicted", "choice": "a height twice as large", "right": True}
 
 
+def test_a_stage_computes_for_a_value_but_not_while_an_answer_is_judged():
+    head = "from labkit.chapters.ch01_frames import stages\nstate = dict(A_deg=10.0, B_deg=20.0, C_deg=30.0)\n"
+    value = f"{head}T = stages.compute_kuka_gimbal(state)['T']\nassert ex.after('invert') and T.shape == (4, 4)\n"
+    name = next(text for _, text in solved_cells() if "ex.distance" in text)
+    cells = replaced(solved_cells(), "distance", value + name)
+    cells = replaced(cells, "invert", f"{head}@ex.invert\ndef invert(T):\n    stages.compute_kuka_gimbal(state)")
+    result = batch.judged(notebook_text(cells).encode(), 1)
+    assert result["items"]["distance"]["status"] == "correct"
+    assert result["items"]["invert"]["status"] == "raised"
+    assert "no figure computes while invert is judged" in result["items"]["invert"]["text"]
+
+
 def test_reordered_cells_and_double_ids_cost_only_what_they_break():
     first, *rest = solved_cells()
     result = batch.judged(notebook_text([first, *(("x", text) for _, text in reversed(rest))]).encode(), 1)

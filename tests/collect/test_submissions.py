@@ -1,5 +1,6 @@
 """Reading what students handed in, as several systems leave it; points, names, tables."""
 
+import ast
 import csv
 import json
 import zipfile
@@ -8,6 +9,7 @@ import pytest
 
 from labkit.collect import library, points, report, submissions
 from labkit.collect.submissions import Unreadable
+from labkit.exercises import session
 from labkit.verbs import collect
 from labkit.verbs.arguments import Refusal, run
 
@@ -183,3 +185,15 @@ def test_refusals_are_one_sentence(tmp_path, capsys):
         assert said and "\n" not in said and "Traceback" not in said
     with pytest.raises(Refusal, match="Which submissions"):
         collect.main(["--out", str(tmp_path / "out")])
+
+
+@pytest.mark.parametrize("path", sorted(session.SOLUTIONS.glob("*.py")), ids=lambda path: path.stem)
+def test_a_notebook_asks_of_its_stages_only_what_a_submission_may(path):
+    """Stages are not drawn there: a cell may show one, read a constant, let one compute, and no more."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    shown = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    shown |= {id(word.value) for node in ast.walk(tree) if isinstance(node, ast.Call) for word in node.keywords}
+    shown |= {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call) and id(node) in shown}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "stages":
+            assert node.attr.isupper() or node.attr.startswith("compute_") or id(node) in shown, ast.unparse(node)
