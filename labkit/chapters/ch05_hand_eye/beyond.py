@@ -114,12 +114,17 @@ def _spread(change):
     return lambda reached: float(change(np.linalg.norm(reached - reached.mean(0), axis=1)))
 
 
-def length_with(name, turn_deg=180.0):
+def _spread_of(l):
+    """ISO 9283's number of any distances: their mean plus three standard deviations."""
+    return float(l.mean() + 3 * l.std(ddof=1))
+
+
+def length_with(name, turn_deg=180.0, change=lambda T: T):
     """Length of the gauge of the notebook (mm) with some pose of the scanner, the flange turned in between."""
     measured = thesis.measurements(True)
     truth = hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S).T_FS
     T_BF, x_S = robot_accuracy.looking_down_at(GAUGE, truth, np.deg2rad([0.0, turn_deg]))
-    T_FS = truth if name == "calibrated" else thesis.frame(name)
+    T_FS = change(truth if name == "calibrated" else thesis.frame(name))
     p, q = frames.transform(T_BF, frames.transform(T_FS, x_S))
     return float(np.linalg.norm(q - p))
 
@@ -138,6 +143,12 @@ def _by_angles(alpha, beta, base, power=2, share=1.0):
     """Derivatives with another power of the height or another share of the base."""
     H = triangulation.height_from_angles(alpha, beta, base)
     return H**power / share / np.sin(alpha) ** 2, H**power / share / np.sin(beta) ** 2
+
+
+def _by_tangents(alpha, beta, base, std):
+    """The derivatives of tan in place of those of cot."""
+    H = triangulation.height_from_angles(alpha, beta, base)
+    return std * H**2 / base * np.hypot(1 / np.cos(alpha) ** 2, 1 / np.cos(beta) ** 2)
 
 
 def _rotation(change):
@@ -188,6 +199,15 @@ def _moved(A, sign=-1.0):
     F = np.zeros((3, 4))
     F[:, 3] = sign * A[:3, 3]
     return F.ravel()
+
+
+class EitherSide(metrics.Several):
+    """Equations D u = F: A X − X B and X B − A X say the same."""
+
+    def admit(self, result, expected):
+        D, F = super().admit(result, expected)
+        reversed_ = self.metrics[0].equal(-D, expected[0])
+        return [-D, -F] if reversed_ else [D, F]
 
 
 def _by_columns(A, B):
@@ -243,6 +263,36 @@ ACCURACY = [
                 lambda command, reached: np.linalg.norm(reached.mean() - command),
                 "`reached.mean()` averages over the coordinates as well. Write `reached.mean(axis=0)`.",
                 id="accuracy-axis",
+            ),
+            Mistake(
+                lambda command, reached: reached.mean(0) - command,
+                "This is the vector from the command to the mean. The accuracy is its length.",
+                id="accuracy-vector",
+            ),
+            Mistake(
+                lambda command, reached: np.linalg.norm((reached - command).mean(axis=1)),
+                "`mean(axis=1)` averages the coordinates of each arrival. The mean of the arrivals is `mean(axis=0)`.",
+                id="accuracy-other-axis",
+            ),
+            Mistake(
+                lambda command, reached: abs((reached - command).mean()),
+                "This averages over the coordinates as well. Mean of the arrivals, `mean(axis=0)`, then the length of the difference.",
+                id="accuracy-all-mean",
+            ),
+            Mistake(
+                lambda command, reached: np.linalg.norm(reached.mean(0)),
+                "This is how far the mean is from the origin: subtract the command.",
+                id="accuracy-no-command",
+            ),
+            Mistake(
+                lambda command, reached: np.abs(reached - command).mean(0),
+                "These are mean deviations of each coordinate, signs lost. First the mean of the arrivals, then its distance from the command.",
+                id="accuracy-coordinates",
+            ),
+            Mistake(
+                lambda command, reached: np.linalg.norm((reached - command).sum(0)) / (len(reached) - 1),
+                "The sum is divided by n − 1. A mean divides by n.",
+                id="accuracy-n-1",
             ),
         ],
     ),
@@ -310,6 +360,42 @@ ACCURACY = [
                 "You took standard deviations of the coordinates. First the distances from the mean, one number an arrival.",
                 id="repeat-coordinates",
             ),
+            Mistake(
+                lambda reached: _spread_of(np.linalg.norm(reached, axis=1)),
+                "The distances are taken from 0. They are those of the arrivals from their own mean.",
+                id="repeat-from-origin",
+            ),
+            Mistake(
+                _spread(lambda l: np.sqrt((l**2).sum() / (len(l) - 1))),
+                "This is the spread of the arrivals about their mean, in one number. The definition takes the mean distance plus three standard "
+                "deviations of the distances.",
+                id="repeat-rms-n-1",
+            ),
+            Mistake(
+                lambda reached: _spread_of(np.linalg.norm(reached - reached.mean(0), axis=0)),
+                "One distance for each coordinate: `axis=0` runs down the arrivals. One for each arrival is `axis=1`.",
+                id="repeat-axis",
+            ),
+            Mistake(
+                lambda reached: _spread_of(np.linalg.norm(reached - np.median(reached, axis=0), axis=1)),
+                "The distances are taken from the median. They are those from the mean.",
+                id="repeat-median",
+            ),
+            Mistake(
+                lambda reached: _spread_of(np.linalg.norm(np.diff(reached, axis=0), axis=1)),
+                "These are distances between one arrival and the next. They are taken from the mean of all.",
+                id="repeat-neighbors",
+            ),
+            Mistake(
+                _spread(lambda l: l.mean() + 2 * l.std(ddof=1)),
+                "Two standard deviations on top of the mean; the definition takes three.",
+                id="repeat-two",
+            ),
+            Mistake(
+                _spread(lambda l: l.mean() - 3 * l.std(ddof=1)),
+                "The three standard deviations are subtracted: they come on top of the mean.",
+                id="repeat-minus",
+            ),
         ],
     ),
 ]
@@ -346,6 +432,21 @@ CAD_LENGTH = Value(
             lambda: length_with("scanner_start", 90.0),
             "This is the length after a quarter turn. The poses `turned` differ by half a turn.",
             id="length-quarter",
+        ),
+        Mistake(
+            lambda: length_with("scanner_start", change=frames.invert),
+            "The CAD pose is inverted here. `cad` takes coordinates in the scanner to the flange, as it stands.",
+            id="length-inverted",
+        ),
+        Mistake(
+            lambda: length_with("scanner_start", change=lambda T: np.eye(4)),
+            "The scanner's pose is missing: the marks are seen in its frame, `cad` takes them to the flange.",
+            id="length-no-scanner",
+        ),
+        Mistake(
+            lambda: 164.0,
+            "100 and twice 32 are added as if the CAD pose were off along the gauge. Compute where both marks land.",
+            id="length-guessed",
         ),
     ],
 )
@@ -411,6 +512,31 @@ TRIANGULATION = [
                 lambda alpha, beta, base: base * np.sin(alpha) / np.sin(alpha + beta),
                 "This is the length of the ray from the end at β to the object. Its height is sin β times that.",
                 id="height-other-ray",
+            ),
+            Mistake(
+                _height(lambda a, b, L: L * a * b / (a - b)),
+                "A difference stands below, of the tangents or in the sine: H = L tan α tan β / (tan α + tan β) = L sin α sin β / sin(α + β).",
+                id="height-minus-reversed",
+            ),
+            Mistake(
+                _height(lambda a, b, L: L * (a + b)),
+                "The base is multiplied by both tangents. H = L / (1/tan α + 1/tan β).",
+                id="height-times-tangents",
+            ),
+            Mistake(
+                _height(lambda a, b, L: L / 2 * b),
+                "This cuts the base in the middle, which is right only where both angles are alike. The height cuts it in H/tan α and H/tan β.",
+                id="height-half-base",
+            ),
+            Mistake(
+                lambda alpha, beta, base: base * np.sin(alpha) * np.sin(beta),
+                "The sine of the third angle is missing: L sin α sin β / sin(α + β).",
+                id="height-third-sine",
+            ),
+            Mistake(
+                lambda alpha, beta, base: base / (1 / np.cos(alpha) + 1 / np.cos(beta)),
+                "Cosines stand where tangents belong: in a right triangle with the height H, the other leg is H/tan α.",
+                id="height-cosine",
             ),
         ],
     ),
@@ -494,6 +620,44 @@ TRIANGULATION = [
                 "Half of it: the two effects are no mean, each angle moves the height by itself.",
                 id="std-mean",
             ),
+            Mistake(
+                lambda alpha, beta, base, std: np.hypot(*triangulation.height_derivatives(alpha, beta, base)),
+                "std is missing: this is by how much the height errs for one rad.",
+                id="std-missing",
+            ),
+            Mistake(
+                lambda alpha, beta, base, std: std * np.hypot(*_by_angles(alpha, beta, base, 1, base)),
+                "H enters squared: ∂H/∂α = H²/(L sin² α).",
+                id="std-height-once",
+            ),
+            Mistake(
+                lambda alpha, beta, base, std: std * triangulation.height_from_angles(alpha, beta, base),
+                "This is H times std. How much H changes with an angle is its derivative, H²/(L sin² α) for α.",
+                id="std-times-height",
+            ),
+            Mistake(
+                lambda alpha, beta, base, std: (
+                    triangulation.height_from_angles(alpha + std, beta + std, base)
+                    - triangulation.height_from_angles(alpha, beta, base)
+                ),
+                "Both angles are raised at once, as if they erred alike. Independent errors add up in their squares.",
+                id="std-both-at-once",
+            ),
+            Mistake(
+                _by_tangents,
+                "The derivative is that of tan, 1/cos². In L = H (cot α + cot β) stand cotangents: −1/sin².",
+                id="std-cosine",
+            ),
+            Mistake(
+                _std(lambda a, b, s: 3 * s * np.hypot(a, b)),
+                "These are three standard deviations. One is asked for.",
+                id="std-three",
+            ),
+            Mistake(
+                _std(lambda a, b, s: s * np.sqrt(abs(a * a - b * b))),
+                "The squares are subtracted. Independent errors add up in their squares.",
+                id="std-squares-subtracted",
+            ),
         ],
     ),
 ]
@@ -560,6 +724,36 @@ LITERATURE = [
                 lambda T, x: _fit(-(T[1:2, :3, 3] - T[:1, :3, 3]) @ T[0, :3, :3], x[1:2] - x[:1]),
                 "One move leaves the turn about its direction free. Use all poses.",
                 id="li-one-move",
+            ),
+            Mistake(
+                lambda T, x: _fit(np.diff(T[:, :3, 3], axis=0) @ T[0, :3, :3], np.diff(x, axis=0)),
+                "The sign is that of (2-41) as it is printed. If the flange moves one way, the sphere moves the other way in the scanner: the right "
+                "side is T_01 − T_02.",
+                id="li-sign-differences",
+            ),
+            Mistake(
+                lambda T, x: _fit(np.diff(T[:, :3, 3], axis=0), np.diff(x, axis=0)),
+                "R_BF is missing, and the sign is that of (2-41) as it is printed. In the flange's frame: R_FS (x_q − x_p) = −R_BFᵀ (t_q − t_p).",
+                id="li-as-printed",
+            ),
+            Mistake(
+                _rotation(lambda R, t, x: _fit(t, x)),
+                "R_BF is missing, and the sign is that of (2-41) as it is printed. In the flange's frame: R_FS (x_q − x_p) = −R_BFᵀ (t_q − t_p).",
+                id="li-as-printed-means",
+            ),
+            Mistake(
+                _rotation(lambda R, t, x: np.linalg.lstsq(x, -t @ R, rcond=None)[0].T),
+                "Least squares over all nine entries gives no rotation where the moves lie nearly in a plane or noise is about: sum the outer products "
+                "and take the nearest rotation.",
+                id="li-nine-entries",
+            ),
+            Mistake(
+                lambda T, x: (
+                    np.linalg.lstsq(np.diff(x, axis=0), -np.diff(T[:, :3, 3], axis=0) @ T[0, :3, :3], rcond=None)[0].T
+                ),
+                "Least squares over all nine entries gives no rotation where the moves lie nearly in a plane or noise is about: sum the outer products "
+                "and take the nearest rotation.",
+                id="li-nine-entries-differences",
             ),
         ],
     ),
@@ -636,7 +830,7 @@ LITERATURE = [
         reference=literature.kim_matrix,
         draw=two_motions,
         fixed={"A": POSE, "B": POSE},
-        metric=metrics.Several(metrics.Numbers(1e-9), metrics.Numbers(1e-9), names=("D", "F")),
+        metric=EitherSide(metrics.Numbers(1e-9), metrics.Numbers(1e-9), names=("D", "F")),
         hints=(
             "Write entry (1, 1) of A X and of X B out, then (1, 2): which u's appear, with which factors? X's last row is 0 0 0 1.",
             "With the rows of X one after another, A X is (A₃ₓ₃ ⊗ I₄) u plus the last column of A, which has no u and goes to F; X B is (I₃ ⊗ Bᵀ) u.",
@@ -684,14 +878,24 @@ LITERATURE = [
                 id="kim-columns",
             ),
             Mistake(
-                lambda A, B: tuple(-part for part in literature.kim_matrix(A, B)),
-                "This is X B − A X, the same solutions with all signs reversed. Appendix A has A X − X B.",
-                id="kim-reversed",
-            ),
-            Mistake(
                 lambda A, B: (np.kron(A, np.eye(4)) - np.kron(np.eye(4), B.T), np.zeros(16)),
                 "Sixteen equations: the last row of X is known, 0 0 0 1. Leave it out, and its 1 fills F.",
                 id="kim-sixteen",
+            ),
+            Mistake(
+                _kim(lambda A: np.kron(A[:3, :3].T, np.eye(4)), _turned_back, _moved),
+                "A enters transposed. Row i of A X is the sum of a_ik times row k of X: A₃ₓ₃ ⊗ I₄ as it stands.",
+                id="kim-A-transposed",
+            ),
+            Mistake(
+                lambda A, B: (_turned_back(A) - _rows(B), -_moved(B)),
+                "These are the equations of X A = B X. A and B have changed sides: A X = X B.",
+                id="kim-sides",
+            ),
+            Mistake(
+                lambda A, B: (literature.kim_matrix(A, B)[0], _moved(B)),
+                "F holds the last column of B. The 1 in X's last row meets the last column of A.",
+                id="kim-F-of-B",
             ),
         ],
     ),

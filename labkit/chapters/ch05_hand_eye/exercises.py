@@ -230,6 +230,17 @@ def _circle_through_three(x, z):
     return p, q, np.sqrt(c + p * p + q * q)
 
 
+def _circle_by(x, z):
+    """The linear equations of listing C15."""
+    a = np.linalg.lstsq(np.column_stack([x, z, np.ones(len(x))]), -(x * x + z * z), rcond=None)[0]
+    return -a[0] / 2, -a[1] / 2, np.sqrt((a[0] ** 2 + a[1] ** 2) / 4 - a[2])
+
+
+def _circle_through_origin(x, z):
+    a = np.linalg.lstsq(np.column_stack([x, z]), -(x * x + z * z), rcond=None)[0]
+    return -a[0] / 2, -a[1] / 2, np.hypot(a[0], a[1]) / 2
+
+
 def _center(change):
     def variant(x, z, radius, side):
         cx, cz, r = fit_circle(x, z)
@@ -294,6 +305,16 @@ def _linear_without_rotation(T_BF, x_S):
     T_FS = np.eye(4)
     T_FS[:3] = np.column_stack([u[:9].reshape(3, 3), u[9:12]])
     return T_FS, u[12:]
+
+
+def _linear_by(T_BF, x_S, right=1.0, rotation=lie.nearest_rotation):
+    """The linear equations with the right side turned, or something else for the nearest rotation."""
+    R_t, n = np.swapaxes(T_BF[:, :3, :3], 1, 2), len(T_BF)
+    M = np.kron(np.eye(3), x_S[:, None, :]).reshape(n, 3, 9)
+    D = np.concatenate([M, np.tile(np.eye(3), (n, 1, 1)), -R_t], 2)
+    b = -right * (R_t @ T_BF[:, :3, 3, None])
+    u = np.linalg.lstsq(D.reshape(-1, 15), b.ravel(), rcond=None)[0]
+    return frames.pose(rotation(u[:9].reshape(3, 3)), u[9:12]), u[12:]
 
 
 def _linear_without_turning_back(T_BF, x_S):
@@ -487,10 +508,17 @@ def _rms_of_end_pose(*fixed):
     return float(hand_eye.rms_distance(residuals))
 
 
-def _lengths_of_end_pose():
+def _vectors_of_end_pose():
     measured = thesis.measurements((2,))
-    residuals = _residual(thesis.frame("scanner_end"), measured.T_BF, measured.x_S, thesis.printed_target())
-    return np.linalg.norm(residuals, axis=1)
+    return _residual(thesis.frame("scanner_end"), measured.T_BF, measured.x_S, thesis.printed_target())
+
+
+def _lengths_of_end_pose():
+    return np.linalg.norm(_vectors_of_end_pose(), axis=1)
+
+
+def _rms_without_pose_2():
+    return float(np.sqrt((np.delete(_lengths_of_end_pose(), 1) ** 2).mean()))
 
 
 def _rms_with_printed_target():
@@ -510,6 +538,11 @@ def _joint_rms(*fixed):
 def _robust_fit():
     measured = thesis.measurements(True)
     return hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S, robust=True)
+
+
+def _robust_rms_as_printed():
+    measured = thesis.measurements()
+    return hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S, robust=True).rms
 
 
 def _rms_without_the_seven():
@@ -546,6 +579,18 @@ def _shallower_radius():
 @functools.cache
 def _fitted_radius():
     measured = thesis.measurements(True)
+    return hand_eye.fit_radius(measured.T_BF, measured.x_S).radius
+
+
+@functools.cache
+def _radius_without(pose):
+    measured = thesis.measurements(True)
+    return hand_eye.fit_radius(*(np.delete(a, pose - 1, axis=0) for a in (measured.T_BF, measured.x_S))).radius
+
+
+@functools.cache
+def _radius_with_pose_2_alone():
+    measured = thesis.measurements((2,))
     return hand_eye.fit_radius(measured.T_BF, measured.x_S).radius
 
 
@@ -591,7 +636,12 @@ CHAPTER = Chapter(
                         "a3 entered the radius with the wrong sign: r^2 = xc^2 + zc^2 - a3."),
                 Mistake(_circle_about_mean, "You took the mean of the points for the center. An arc lies on one side of its center."),
                 Mistake(_circle(lambda x, z, r: (z, x, r)), "The two coordinates of the center have changed places."),
-            ],
+                Mistake(lambda x, z: _circle_by(x[:3], z[:3]), "The circle goes through the first three points. All points of the scan line count."),
+                Mistake(lambda x, z: (2 * fit_circle(x, z)[0], 2 * fit_circle(x, z)[1], np.sqrt(abs(3 * (fit_circle(x, z)[0]**2 + fit_circle(x, z)[1]**2) + fit_circle(x, z)[2]**2))),
+                        "The halves are missing: a1 = -2 xc, so xc = -a1/2, and zc = -a2/2; the radius follows from these."),
+                Mistake(_circle(lambda cx, cz, r: (cx, cz, 2 * r)), "Your third number is the diameter. The radius is asked for."),
+                Mistake(_circle_through_origin, "The column of ones is missing: without a3 every circle goes through the origin."),
+],
         ),
         Prediction(
             "equator",
@@ -637,7 +687,11 @@ CHAPTER = Chapter(
                         "This is the center of the circle. The sphere's center lies off the plane by d."),
                 Mistake(_center(lambda x, z, r, R, s: np.array([x, s * np.sqrt(R * R - r * r), z + R])),
                         "You went a radius deeper. The circle's center is already as deep as the sphere's."),
-            ],
+                Mistake(_center(lambda cx, cz, r, R, side: np.array([cx, side * np.sqrt(abs(30.0**2 - r * r)), cz])),
+                        "This takes a sphere of 30 mm, whatever `radius` says."),
+                Mistake(_center(lambda cx, cz, r, R, side: np.array([cx, side * np.sqrt(abs(R - r)), cz])),
+                        "The squares are missing under the root: d^2 = R^2 - r^2."),
+],
         ),
         Exercise(
             "kuka_residual",
@@ -673,7 +727,9 @@ CHAPTER = Chapter(
                 Mistake(lambda p2, T, x, c: frames.transform(T, frames.transform(frames.matrix_from_kuka(p2), x - c)),
                         "You subtracted the target from x_S. They are written in different frames: subtract it last, in B."),
                 Mistake(_kuka_directions, "The flange's own position is missing: use the whole T_BF, not its rotation alone."),
-            ],
+                Mistake(lambda p2, T_BF, x_S, target: np.einsum("nij,nj->ni", T_BF @ frames.matrix_from_kuka(p2), np.insert(x_S, 3, 0.0, axis=1))[:, :3] - target,
+                        "Both translations are missing. A point in homogeneous coordinates ends in 1; with 0 it is a direction."),
+],
         ),
         Prediction(
             "thirty_one",
@@ -705,7 +761,11 @@ CHAPTER = Chapter(
                 Mistake(lambda: float(np.median(_lengths_of_end_pose())), "This is the median length. Asked for is the rms, in which the worst poses count."),
                 Mistake(lambda: _rms_of_end_pose(2) ** 2, "This is the mean square: take its root."),
                 Mistake(lambda: np.sqrt(31) * _rms_of_end_pose(2), "This is the root of the sum: divide by the number of poses first."),
-            ],
+                Mistake(lambda: _rms_of_end_pose(2) * np.sqrt(31 / 30), "The mean of the squares divides by n - 1 here. A mean divides by the 31 poses."),
+                Mistake(lambda: _rms_without_pose_2(), "Pose 2 is left out. Repaired, it counts like the others: use `repaired`, all 31."),
+                Mistake(lambda: float(_lengths_of_end_pose()[0]), "This is pose 1 alone. The rms is over all 31."),
+                Mistake(lambda: float(_vectors_of_end_pose().std()), "This is the standard deviation of all coordinates, their mean taken off. Asked for is the rms of the lengths."),
+],
         ),
         Exercise(
             "numeric_jacobian",
@@ -731,7 +791,10 @@ CHAPTER = Chapter(
                 Mistake(lambda f, x, h: _central(f, x, h / 2),
                         "You go half a step to each side. That is a central difference too, but of step / 2; here each side takes a whole step."),
                 Mistake(_not_restored, "After a variable has been moved it must go back before the next one moves: work on a fresh copy of x."),
-            ],
+                Mistake(lambda f, x, h: np.column_stack([(f(x + d * x) - f(x - d * x)) / (2 * h) for d in h * np.eye(len(x))]),
+                        "Your step grows with x: step times x. It is the same for all variables."),
+                Mistake(lambda f, x, h: _central(f, x, h).sum(axis=0), "The values of the function are added. Each has a row of its own: shape (m, n)."),
+],
         ),
         Prediction(
             "step",
@@ -778,7 +841,11 @@ CHAPTER = Chapter(
                         "R_FS and R_BF have changed places. From S to F comes first: R_BF R_FS [x]."),
                 Mistake(lambda T, B, x: np.concatenate([-B[:, :3, :3] @ T[:3, :3] @ skew(x), B[:, :3, :3]], axis=1).reshape(-1, 6),
                         "The two blocks of a pose belong side by side: axis=2, or np.hstack for one pose."),
-            ],
+                Mistake(lambda T_FS, T_BF, x_S: analytic_jacobian(T_FS, T_BF, x_S) * np.repeat([np.pi / 180, 1.0], 3),
+                        "The first three columns are per degree. phi is in rad."),
+                Mistake(lambda T_FS, T_BF, x_S: analytic_jacobian(T_FS, T_BF, x_S) * np.repeat([1.0, -1.0], 3),
+                        "The columns of tau have the wrong sign: t_FS + tau moves the point by + R_BF tau."),
+],
         ),
         Exercise(
             "gauss_newton_on_pose",
@@ -819,7 +886,15 @@ CHAPTER = Chapter(
                 Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3], T[:3, 3] + s[3:])), "The rotation has not been moved."),
                 Mistake(_stepped(lambda T, s: frames.pose(T[:3, :3] @ exp_so3(s[:3]), T[:3, 3])), "The translation has not been moved."),
                 Mistake(_gradient_step, "You went along the gradient. Gauss-Newton solves with J^T J as well."),
-            ],
+                Mistake(lambda T_FS, T_BF, x_S, target: frames.moved(T_FS, -analytic_jacobian(T_FS, T_BF, x_S).T @ _residual(T_FS, T_BF, x_S, target).ravel()),
+                        "This steps down the gradient. Gauss-Newton solves J step = -e in the least-squares sense."),
+                Mistake(lambda T_FS, T_BF, x_S, target: frames.moved(T_FS, _step(T_FS, T_BF, x_S, thesis.printed_target())),
+                        "The thesis's sphere center stands where the argument `target` belongs."),
+                Mistake(lambda T_FS, T_BF, x_S, target: frames.moved(T_FS, _step(T_FS, T_BF, x_S, -target)),
+                        "The target is added to what is measured. The residual subtracts it."),
+                Mistake(lambda T_FS, T_BF, x_S, target: gauss_newton_on_pose(np.eye(4), T_BF, x_S, target),
+                        "The step starts from the identity. It starts where T_FS is."),
+],
         ),
         Prediction(
             "pole",
@@ -860,7 +935,13 @@ CHAPTER = Chapter(
                 Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3], -T[:3, 3]), c)), "The translation of T_FS has the wrong sign."),
                 Mistake(_linear_with_unturned_right_side, "Your right side is -t_BF. It is to be turned into the flange frame as well: -R_BF^T t_BF."),
                 Mistake(_linear_without_turning_back, "You multiplied by R_BF where R_BF^T is needed: bring everything into the flange frame."),
-            ],
+                Mistake(functools.partial(_linear_by, right=-1.0),
+                        "The right side has the wrong sign: it is -R_BF^T t_BF."),
+                Mistake(functools.partial(_linear_by, rotation=lambda M: np.linalg.qr(M)[0]),
+                        "QR leaves the signs of its columns open, and trusts the first one most. Take the nearest rotation."),
+                Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3], c), T[:3, 3])),
+                        "t_FS and the center have changed places: after the nine entries of R_FS come t_FS, then c."),
+],
         ),
         Exercise(
             "joint_residual",
@@ -900,6 +981,8 @@ CHAPTER = Chapter(
                         "You read u[:6] as a KUKA pose. It is a rotation vector and a change of translation about T0."),
                 Mistake(lambda u, T, B, x: _residual(frames.moved(T, u[:6]), B, x, u[6:]).T.ravel(), "The order is all x, all y, all z; wanted is x, y, z of pose 1, then of pose 2, ..."),
                 Mistake(lambda u, T, B, x: _residual(frames.moved(T, u[:6]), B, x, u[6:]), "The residuals are right; stack them into one vector of 3 N numbers."),
+                Mistake(lambda u, T0, T_BF, x_S: joint_residual(np.concatenate([u[3:], u[:3]]), T0, T_BF, x_S),
+                        "The order of the unknowns is phi, tau, center; here the center is read from the front."),
             ],
         ),
         Exercise(
@@ -939,7 +1022,13 @@ CHAPTER = Chapter(
                 Mistake(_weights(lambda r: np.sqrt(_tukey(r / (5 * np.median(r) / robust.MEDIAN_CHI3)))), "The bracket is squared: (1 - u^2)^2."),
                 Mistake(_weights(lambda r: (r < 5 * np.median(r) / robust.MEDIAN_CHI3).astype(float)),
                         "You cut off sharply. Tukey's weight falls smoothly, so that no pose decides by crossing a line."),
-            ],
+                Mistake(_weights(lambda r: _tukey(r / 5)), "There is no scale in it: u = length / (5 s), with s from the median length."),
+                Mistake(_weights(lambda r: _tukey(r / (7 * np.median(r) / robust.MEDIAN_CHI3))), "The cutoff is that of chapter 3, 7 scales. Here it is 5."),
+                Mistake(_weights(lambda r: np.where(r < 5 * np.median(r) / robust.MEDIAN_CHI3, (1 - (r / (5 * np.median(r) / robust.MEDIAN_CHI3)) ** 3) ** 3, 0)),
+                        "These are third powers (tricube). Tukey's biweight has squares: (1 - u^2)^2."),
+                Mistake(lambda e: _tukey(np.abs(e) / (5 * np.median(np.abs(e)) / robust.MEDIAN_CHI3)),
+                        "This weighs each coordinate. A pose is good or bad as a whole: one weight per pose, from the length of its vector."),
+],
         ),
         Prediction(
             "slip",
@@ -996,7 +1085,11 @@ CHAPTER = Chapter(
                 Mistake(lambda: _joint_rms(2), "Only pose 2 is repaired in this fit. Use all corrections."),
                 Mistake(lambda: corrected_fit().std, "This is the estimated noise of one coordinate, with 84 degrees of freedom. Asked for is the rms distance."),
                 Mistake(lambda: _rms_of_end_pose(*ALL_FIXED), "These are the corrected data under the thesis's end pose. Fit scanner and center anew."),
-            ],
+                Mistake(_joint_rms, "These are the tables as printed, with all their slips. Use `corrected`."),
+                Mistake(lambda: _joint_rms(*ALL_FIXED) ** 2, "This is the mean square: take its root."),
+                Mistake(lambda: _joint_rms(*ALL_FIXED) * np.sqrt(31), "This is the root of the sum: divide by the number of poses first."),
+                Mistake(_robust_rms_as_printed, "This is a robust fit to the tables as printed. Use `corrected`, all 31 alike."),
+],
         ),
         Value(
             "radius",
@@ -1019,7 +1112,11 @@ CHAPTER = Chapter(
                         "The sign under the root is reversed: y'^2 = y^2 + R^2 - 30^2, so a larger sphere means a larger y'.", within=0.002),
                 Mistake(lambda: 2 * _fitted_radius(),
                         "This is a diameter: half of it."),
-            ],
+                Mistake(lambda: _radius_without(4), "Pose 4, next to the equator, is left out. Here all 31 corrected poses are asked.", within=0.001),
+                Mistake(_radius_with_pose_2_alone, "Only pose 2 is repaired in this fit. Use `corrected`.", within=0.001),
+                Mistake(lambda: np.mean([thesis.radius(s) for s in ("certificate", "listing", "coordinate machine")]),
+                        "This is the mean of the three radii. Ask the poses, none of the three."),
+],
         ),
         Prediction(
             "weak",
