@@ -173,6 +173,11 @@ def as_generator(value, name="rng"):
     return as_instance(value, name, np.random.Generator, "a numpy.random.Generator, as default_rng(seed) gives it")
 
 
+def as_optional_generator(value, seed=0):
+    """`value`, or a generator of this seed in place of None."""
+    return np.random.default_rng(seed) if value is None else as_generator(value)
+
+
 def as_function(value, name):
     """`value` as it is; refuses what cannot be called."""
     if not callable(value):

@@ -123,7 +123,13 @@ def imported(path, nodes):
             yield from (f"{module}.{alias.name}" for alias in node.names)
 
 
-GROUND_FLOOR = {"checks": "checks", "tables": "checks", "places": "checks", "__init__": "checks"}
+GROUND_FLOOR = {
+    "checks": "checks",
+    "documented": "checks",
+    "tables": "checks",
+    "places": "checks",
+    "__init__": "checks",
+}
 MATHEMATICS = ("geometry", "estimation", "calibration", "machines", "localization", "fast")
 MAY_IMPORT = {  # besides itself
     "checks": (),

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from ..checks import as_shape, as_transforms
+from ..documented import documented
 from ..geometry.frames import invert
 from ..geometry.lie import log_so3
 from .own_data import HandEyeModel
@@ -18,6 +20,7 @@ MIXED_UP = (  # a loop whose robot is inverted closes as well as one whose senso
 )
 
 
+@documented
 def axis_name(v, frame):
     """A direction in words: `the flange's z axis`, or its three numbers where it is none.
 
@@ -39,6 +42,7 @@ def axis_name(v, frame):
     return f"the direction ({', '.join(f'{x + 0.0:.2f}' for x in v)}) of the {frame}"
 
 
+@documented
 def weak_direction(covariance, frame, what):
     """How unevenly a block of a covariance is determined, and a sentence about it.
 
@@ -70,6 +74,7 @@ def weak_direction(covariance, frame, what):
 
 def axis_spread(T):
     """Rms turn of poses about each principal axis of their motions, largest first (rad), and these axes as columns."""
+    T = as_shape(as_transforms(T, "T"), "T", "n", 4, 4)
     middle = T[len(T) // 2, :3, :3]
     turns = log_so3(middle.T @ T[:, :3, :3])
     values, vectors = np.linalg.eigh(turns.T @ turns / len(T))
@@ -116,6 +121,7 @@ def refuse_open_loop(T, residuals, length_unit="mm"):
         )
 
 
+@documented
 def moved_block(kept, agree):
     """The block of rejected rows that agree among themselves.
 

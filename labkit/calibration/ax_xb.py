@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from ..checks import as_positive_number, as_rotations, as_shape, as_transforms, shown
+from ..documented import documented
 from ..geometry.frames import invert, moved, pose, rotation_block
 from ..geometry.lie import log_so3, nearest_rotation, skew
 from .motion import refuse_one_axis
@@ -340,6 +341,7 @@ def _reweighted(solve, result):
     return result
 
 
+@documented
 def linear_rotations(robot, T_ST, weights):
     """Rotations of sensor and target: R X A = Y for all poses is K rvec(X) = N rvec(Y), X and Y singular vectors of K.
 
@@ -372,6 +374,7 @@ def _best_shifts(robot, T_ST, weights, Rx, Ry):
     return pose(Rx, t[:3]), pose(Ry, t[3:])
 
 
+@documented
 def loop_jacobians(robot, sensor, target, T_ST):
     """Derivatives of the loop's errors by small rotations and translations of sensor and target.
 
@@ -423,6 +426,7 @@ def _gauss_newton(robot, T_ST, weights, given):
     return sensor, target, history
 
 
+@documented
 def noise_levels(square_rot, square_trans, freedom, given, size):
     """Standard deviations of the readings: as given, or from sums of squares and their degrees of freedom.
 

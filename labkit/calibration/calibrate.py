@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..checks import as_points, as_shape, as_transforms
+from ..documented import documented
 from ..estimation.clocks import clock_offset, longest_step, sample_stream
 from ..estimation.influence import inverse_normal, leave_out
 from ..geometry.frames import invert, pose_distance
@@ -234,6 +235,7 @@ class Comparison:
 # --- the kinds -------------------------------------------------------------------------------------------------------
 
 
+@documented
 def hand_eye(
     robot, sensor, *, eye_to_hand=False, std_rot=None, std_trans=None, groups=None, length_unit="mm", judge_roles=True,
     solver=calibrate_hand_eye,
@@ -287,6 +289,7 @@ def hand_eye(
     return _with(found, next_poses=proposals, next_std=course, warnings=warnings, poses=robot)
 
 
+@documented
 def pivot(poses, *, groups=None, length_unit="mm"):
     """Tip of a tool and the point it touches, from poses that all touch it.
 
@@ -318,6 +321,7 @@ def pivot(poses, *, groups=None, length_unit="mm"):
     return _with(found, parameters=names, next_poses=proposals, next_std=course, poses=model.T_WF)
 
 
+@documented
 def sphere(robot, points, *, groups=None, length_unit="mm", solver=calibrate_sphere_target):
     """Where a scanner sits on the flange, from flange poses and the center of one sphere seen in each.
 
@@ -349,6 +353,7 @@ def sphere(robot, points, *, groups=None, length_unit="mm", solver=calibrate_sph
     return _with(found, next_poses=proposals, next_std=course, poses=model.T_BF)
 
 
+@documented
 def frame(points, nominal=None, *, std_trans=None, groups=None, length_unit="mm"):
     """A frame from measured points: the best fit to nominal ones, or through three (origin, x axis, xy plane).
 
@@ -389,6 +394,7 @@ def frame(points, nominal=None, *, std_trans=None, groups=None, length_unit="mm"
     )  # fmt: skip
 
 
+@documented
 def compare(time_a, a, time_b, b, *, length_unit="mm", max_offset=None, max_gap=None, solver=calibrate_hand_eye):
     """Two streams of poses of one motion on two clocks: mounting, clock offset, and the error of the second.
 

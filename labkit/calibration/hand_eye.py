@@ -23,6 +23,7 @@ from ..checks import (
     as_count,
     as_finite,
     as_number,
+    as_optional_generator,
     as_points,
     as_positive_number,
     as_shape,
@@ -30,6 +31,7 @@ from ..checks import (
     fit_together,
     shown,
 )
+from ..documented import documented
 from ..geometry.frames import invert, matrix_from_kuka, moved, pose, transform
 from ..geometry.lie import exp_so3, nearest_rotation, skew
 from .motion import refuse_one_axis
@@ -313,6 +315,7 @@ def joint_jacobian(T_BF, x_S, T_FS, target_free=True):
     return J.reshape(3 * len(R), -1)
 
 
+@documented
 def radius_jacobian(T_BF, x_S, T_FS, radius):
     """`joint_jacobian` with the sphere's radius as a tenth column: y = +-sqrt(R^2 - r^2) has dy/dR = R / y.
 
@@ -413,7 +416,7 @@ def calibrate_with(fit, T_BF, x_S, target, robust, rng):
     known = None if target is None else as_shape(target, "target", 3)
     T_BF, x_S, weights = T_BF.copy(), x_S.copy(), np.ones(len(T_BF))
     if robust:
-        weights = _trimmed_start(fit, T_BF, x_S, known, sample, np.random.default_rng(0) if rng is None else rng)
+        weights = _trimmed_start(fit, T_BF, x_S, known, sample, as_optional_generator(rng))
         T_FS, center, weights, history = _reweighted(fit, T_BF, x_S, known, weights)
     else:
         T_FS, center, history = fit(T_BF, x_S, weights, known, MAX_STEPS)
@@ -555,6 +558,7 @@ def _linear_solution(T_BF, x_S, weights):
     return u, values[14] / values[0] if 3 * n >= 15 else 0.0
 
 
+@documented
 def gauss_newton_pose(start, T_BF, x_S, target=None, parameters="euler", max_steps=50, tolerance=1e-10):
     """Plain Gauss-Newton from a start pose, each iterate kept: what listing C5 does, with the derivative exact.
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..checks import as_count, as_matrices, as_positive_number, as_shape, as_transforms, shown
+from ..documented import documented
 from ..geometry.frames import invert, pose, transform
 from ..geometry.lie import exp_so3, nearest_rotation
 from .hand_eye import MIN_SPREAD, as_sightings, calibrate_sphere_target, linear_start, sphere_in_scanner
@@ -240,6 +241,7 @@ class SuitableScene:
         return np.array([0, 12, 13, 14, 15])
 
 
+@documented
 def suitable_scene(std, rng):
     """A random scanner, a sphere and a 60 mm cube, seen from poses that suit all methods.
 
@@ -273,6 +275,7 @@ METHODS = {
 }
 
 
+@documented
 def compare_methods(repeats, std, rng, methods=METHODS):
     """Errors of several methods on scenes that suit all of them, and the bound for one sphere.
 

@@ -8,6 +8,7 @@ along their axes. Source: Chen, "A screw motion approach to uniqueness analysis 
 import numpy as np
 
 from ..checks import as_transforms, shown
+from ..documented import documented
 from ..geometry.frames import invert
 from ..geometry.lie import log_so3
 
@@ -62,6 +63,7 @@ def screw(T):
     return angle, np.where(turns, along, np.linalg.norm(t, axis=-1))
 
 
+@documented
 def between_axes(T, apart=1):
     """Angles between the axes of motions: the same for A and B whatever the mounting.
 
@@ -84,6 +86,7 @@ def between_axes(T, apart=1):
     return np.arccos(np.clip((axes[apart:] * axes[:-apart]).sum(1), -1, 1))
 
 
+@documented
 def turning(R, weights):
     """How far orientations turn about the axes across each direction, and the directions.
 
@@ -108,6 +111,7 @@ def turning(R, weights):
     return np.sqrt(np.maximum(values, 0.0)), directions
 
 
+@documented
 def refuse_one_axis(R, weights, frame, shifted):
     """Refuses orientations that do not turn about two axes.
 

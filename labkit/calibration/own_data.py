@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..checks import as_points, as_shape, as_transforms
+from ..documented import documented
 from ..estimation.influence import distance_limit, inverse_normal, invert_normal, squared_distances
 from ..geometry.frames import fit_frame, frame_from_points, invert
 from ..geometry.lie import exp_so3, log_so3, nearest_rotation, skew
@@ -152,6 +153,7 @@ def majority(model):
     return model.fitted(kept), kept
 
 
+@documented
 def best_candidate(n, solve, misfit, seed=0):
     """The rows that the best of many three-row solutions explains.
 
@@ -194,6 +196,7 @@ def best_candidate(n, solve, misfit, seed=0):
     return kept, reached
 
 
+@documented
 def next_poses(model, solution, kept, count=3):
     """Poses that would improve the first six parameters most, one after the other.
 
@@ -322,6 +325,7 @@ class HandEyeModel(Model):
         return flange, hand_eye_derivative(flange, readings, X)
 
 
+@documented
 def hand_eye_derivative(T_BF, predicted, T_FS):
     """Derivative of the residuals of hand-eye readings by the poses of sensor and target.
 
@@ -467,6 +471,7 @@ class FrameModel(Model):
         return r, J
 
 
+@documented
 def three_point_frame(points, std):
     """Frame through three points, with its covariance.
 

@@ -20,6 +20,7 @@ from ..checks import (
     as_finite,
     as_nonnegative,
     as_number,
+    as_optional_generator,
     as_points,
     as_rotations,
     as_shape,
@@ -295,7 +296,7 @@ def calibrate_pivot(T_WF, std_rot=None, std_trans=None, robust=False, rng=None):
     tolerance = rank_tolerance(noise)
     refuse_free_tip(T, tolerance)
     if robust:
-        x, weights = _reweighted(T, noise, np.random.default_rng(0) if rng is None else rng)
+        x, weights = _reweighted(T, noise, as_optional_generator(rng))
         if (count := np.count_nonzero(weights)) < 4:
             raise ValueError(f"only {count} of {len(T)} poses agree on a tip; at least 4 must")
         refuse_free_tip(T[weights > 0], tolerance)

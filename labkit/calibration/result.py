@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..documented import documented
 from ..geometry.lie import log_so3
 
 result_class = dataclass(frozen=True, eq=False, repr=False)
@@ -24,6 +25,7 @@ class Parameter(NamedTuple):
     unit: str
 
 
+@documented
 def point_parameters(name, axes="xyz"):
     """The coordinates of a point, as parameters in mm.
 

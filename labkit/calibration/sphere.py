@@ -22,6 +22,7 @@ from ..checks import (
     as_shape,
     shown,
 )
+from ..documented import documented
 from .result import Parameter, Result, point_parameters, result_class
 
 MIN_SAGITTA = 1e-6  # an arc flatter than this, relative to its length, fixes no circle: the points are collinear
@@ -230,6 +231,7 @@ def offset_sensitivity(radius, circle_radius):
         return radius / d, -np.asarray(circle_radius, float) / d
 
 
+@documented
 def sphere_center_from_profile(x, z, radius, side):
     """Center of a sphere of known radius from one scan line, in the sensor frame.
 
@@ -264,6 +266,7 @@ def _refuse_side(side):
         raise ValueError(f"side must be +1 or -1, the sign of the center's y coordinate, got {side!r}")
 
 
+@documented
 def profile_center_covariance(radius, circle, side, std_radius=0.0):
     """First-order covariance of the center that `sphere_center_from_profile` finds.
 
@@ -291,6 +294,7 @@ def profile_center_covariance(radius, circle, side, std_radius=0.0):
     return J @ cov @ J.T
 
 
+@documented
 def scan_line(center, radius, half_angle, n, std=0.0, rng=None):
     """Points a scanner at the origin of S measures on a sphere: the arc of the cut that faces it.
 

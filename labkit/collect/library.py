@@ -8,6 +8,7 @@ import copy
 import dataclasses
 import functools
 import importlib
+import inspect
 import pkgutil
 import re
 import sys
@@ -72,7 +73,7 @@ def _of(item, names, tools):
         args = item.cases[k % len(item.cases)](np.random.default_rng(k))
         calls = _watched(item.reference, args, names)
         held = calls if held is None else held & calls
-    own = names.get(getattr(item.reference, "__code__", None))
+    own = names.get(getattr(inspect.unwrap(item.reference), "__code__", None))
     found = {name for name in held if name.rpartition(".")[2] not in tools} | ({own} if own else set())
     last = {name.rpartition(".")[2] for name in found}
     twins = {name for name in names.values() if name.startswith("labkit.fast.") and name.rpartition(".")[2] in last}

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..checks import as_finite, as_positive_number, as_shape, as_transforms
+from ..documented import documented
 from ..geometry.lie import interpolate, log_so3
 
 GAP = 3.5  # steps without a sample: more than this many median ones are a gap
@@ -33,6 +34,9 @@ class ClockOffset:
 
 def longest_step(time):
     """The longest step between samples of a stream that is no gap (s)."""
+    time = as_shape(time, "time", "n")
+    if len(time) < 2:
+        raise ValueError(f"time must hold at least two samples, got {len(time)}")
     return GAP * float(np.median(np.diff(time)))
 
 
@@ -74,6 +78,7 @@ def sample_stream(time, T, when, max_gap=None):
     return poses, known
 
 
+@documented
 def angular_speed(time, T, when, span):
     """Mean angular speed of a stream of poses around given times.
 
@@ -95,6 +100,7 @@ def angular_speed(time, T, when, span):
     return np.where(known_0 & known_1, turn / span, np.nan)
 
 
+@documented
 def clock_offset(time_a, T_a, time_b, T_b, max_offset=None):
     """How far the clock of one stream is ahead of another's, from the angular speeds of the motion both saw.
 

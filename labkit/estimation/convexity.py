@@ -8,6 +8,7 @@ Sensor-Roboter-Systemen", HAW Hamburg 2019, section 2.4.2.
 import numpy as np
 
 from ..checks import as_count, as_finite, as_matrices
+from ..documented import documented
 
 
 def positive_definite(B):
@@ -33,6 +34,7 @@ def positive_definite(B):
     return (np.linalg.eigvalsh(as_matrices(B, "B", n, n)) > 0).all(-1)
 
 
+@documented
 def chord(f, x, y, n):
     """A function and its chord at n places from x to y, evenly spaced, both ends included.
 
@@ -64,6 +66,7 @@ def chord(f, x, y, n):
     return share, values, (1 - share) * values[0] + share * values[-1]
 
 
+@documented
 def rise_above_chord(f, x, y, n):
     """By how much f rises above its chord at most, over the n places of `chord`; 0 where it never does.
 

@@ -3,8 +3,10 @@
 import numpy as np
 
 from ..checks import as_count, as_finite, as_positive
+from ..documented import documented
 
 
+@documented
 def numeric_jacobian(function, x, step=1e-6, scheme="central", retract=np.add, n=None):
     """Derivative of a function with respect to the n entries of an increment of x.
 
@@ -38,8 +40,6 @@ def numeric_jacobian(function, x, step=1e-6, scheme="central", retract=np.add, n
     n = x.size if n is None else as_count(n, "n")
     if not n or steps.shape not in ((), (n,)):
         raise ValueError(f"x and step must have shapes (n,) and () or (n,), got {x.shape} and {steps.shape}")
-    if scheme not in ("forward", "central"):
-        raise ValueError(f"scheme must be 'forward' or 'central', got {scheme!r}")
     columns, here = [], function(x) if scheme == "forward" else None
     for h, direction in zip(np.broadcast_to(steps, n), np.eye(n)):
         ahead = function(retract(x, h * direction))

@@ -11,6 +11,7 @@ import numpy as np
 from scipy import special
 
 from ..checks import as_finite, as_matrices, as_positive_number, as_probability, as_shape
+from ..documented import documented
 
 FREE = 1e-12  # of the largest eigenvalue of a normal matrix with its columns scaled alike: what is smaller is rounding
 # Baarda's: seen with 80 %, while a good number is suspected once in a thousand
@@ -26,12 +27,15 @@ def _blocks(residuals, jacobian):
 
 def inverse_normal(J):
     """(sum J_i'J_i)^-1, (n, k, p) -> (p, p); refuses parameters that the blocks leave undetermined."""
+    J = as_shape(J, "J", "n", "k", "p")
     flat = J.reshape(-1, J.shape[2])
     return invert_normal(flat.T @ flat)
 
 
 def invert_normal(N):
     """Inverse of a normal matrix with its columns scaled alike, (p, p); refuses one that is singular beside that."""
+    N = as_shape(N, "N", "p", "p")
+    N = as_shape(N, "N", len(N), len(N))
     if not (np.diagonal(N) > 0).all():
         raise ValueError("a parameter changes no residual, so it is not determined")
     values, vectors = _scaled_alike(N)
@@ -49,6 +53,7 @@ def _scaled_alike(N):
     return values, vectors / scale[:, None]
 
 
+@documented
 def free_directions(N):
     """Directions of the parameters that a normal matrix leaves undetermined.
 
@@ -81,6 +86,7 @@ def shares(jacobian):
     return np.einsum("nki,ij,nkj->n", J, inverse_normal(J), J)
 
 
+@documented
 def squared_distances(residuals, jacobian, kept):
     """Squared distance of each block from what the kept ones predict, in standard deviations; shape (n,).
 
@@ -158,6 +164,7 @@ def leave_out(residuals, jacobian, groups=None):
     return predicted, np.array(shifts)
 
 
+@documented
 def visible_errors(jacobian, times=VISIBLE):
     """The smallest error of each number that a fit to all of them would show, in standard deviations.
 

@@ -24,6 +24,7 @@ from ..checks import (
     fit_together,
     solve_covariance,
 )
+from ..documented import documented
 from ..geometry.planar import wrap_angle
 from .gaussian import chi_square_quantile
 
@@ -357,6 +358,7 @@ def steady_state(A, C, cov_v, cov_z):
 # --- consistency -------------------------------------------------------------
 
 
+@documented
 def nees(truth, x, cov, angle=None):
     """Normalized estimation error squared, error' cov^-1 error.
 
@@ -433,6 +435,7 @@ def mean_band(dof, runs, probability=0.99):
     return tuple(chi_square_quantile([tail, 1 - tail], dof * runs) / runs)
 
 
+@documented
 def gate(step, probability=0.99):
     """Whether what was measured is plausible: its NIS lies below the chi-square quantile of as many numbers.
 

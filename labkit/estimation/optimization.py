@@ -19,6 +19,8 @@ import numpy as np
 from ..checks import (
     as_count,
     as_finite,
+    as_floats,
+    as_function,
     as_matrices,
     as_nonnegative,
     as_number,
@@ -27,6 +29,7 @@ from ..checks import (
     fit_together,
     shown,
 )
+from ..documented import documented
 
 ROUNDING = 10 * np.finfo(float).eps  # a relative change of the cost below this is noise
 
@@ -399,6 +402,7 @@ def predicted_decrease(g, B, step):
     return -(g * step).sum(-1) - 0.5 * _bend(step, B)
 
 
+@documented
 def gain_ratio(cost, new_cost, g, B, step):
     """Actual over predicted decrease: 1 for a perfect model, below 0 when the cost rose.
 
@@ -496,21 +500,32 @@ class _Recorder:
 
 def _smooth(cost, gradient, hessian):
     """Evaluator of a smooth function: x -> Point."""
+    for function, name in ((cost, "cost"), (gradient, "gradient"), (hessian, "hessian")):
+        as_function(function, name)
 
     def at(x):
-        g, H = np.asarray(gradient(x), dtype=float), np.asarray(hessian(x), dtype=float)
+        g, H = as_floats(gradient(x), "the gradient"), as_floats(hessian(x), "the Hessian")
         if g.ndim != 1 or H.shape != (g.size, g.size):
             raise ValueError(f"gradient and hessian must return shapes (n,) and (n, n), got {g.shape} and {H.shape}")
-        return Point(x, float(cost(x)), g, H)
+        return Point(x, _one_number(cost(x)), g, H)
 
     return at
 
 
+def _one_number(value):
+    """A cost as a float, infinity among them."""
+    value = as_floats(value, "the cost")
+    if value.size != 1:
+        raise ValueError(f"the cost must be one number, got shape {value.shape}")
+    return value.item()
+
+
 def _squares(residual, jacobian):
     """Evaluator of a sum of squares: x -> Point with cost 1/2 |r|^2, gradient J'r and curvature J'J."""
+    as_function(residual, "residual"), as_function(jacobian, "jacobian")
 
     def at(x):
-        r, J = np.asarray(residual(x), dtype=float), np.asarray(jacobian(x), dtype=float)
+        r, J = as_floats(residual(x), "the residual"), as_floats(jacobian(x), "the Jacobian")
         if r.ndim != 1 or J.ndim != 2 or J.shape[0] != r.size or J.shape[0] < J.shape[1]:
             raise ValueError(
                 f"residual and jacobian must return shapes (m,) and (m, n) with m >= n, got {r.shape} and {J.shape}"
@@ -557,6 +572,7 @@ def _undamped(evaluate, x0, next_step, retract, stop, max_iterations):
     return record.trace(f"no convergence within {max_iterations} iterations", False)
 
 
+@documented
 def newton(cost, gradient, hessian, x0, *, stop=None, max_iterations=100):
     """Newton's method on a smooth function: full steps toward whichever stationary point comes first.
 
@@ -590,6 +606,7 @@ def newton(cost, gradient, hessian, x0, *, stop=None, max_iterations=100):
     return _undamped(_smooth(cost, gradient, hessian), x0, next_step, np.add, stop or small_gradient(), max_iterations)
 
 
+@documented
 def gauss_newton(residual, jacobian, x0, *, retract=np.add, stop=None, max_iterations=100):
     """Gauss-Newton on a sum of squares: full steps that minimize the linearized residual.
 
@@ -664,6 +681,7 @@ def levenberg_marquardt(
     return record.trace(f"no convergence within {max_iterations} iterations", False)
 
 
+@documented
 def trust_region(
     fun, jac, x0, *, hessian=None, radius=1.0, max_radius=1e3, accept=0.1, subproblem=dogleg_step,
     scale=1.0, retract=np.add, stop=None, max_iterations=200,

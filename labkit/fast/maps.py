@@ -5,8 +5,8 @@ import functools
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from ..checks import as_count, as_points, as_positive_number, as_shape
-from ..localization.maps import as_rays
+from ..checks import as_count, as_instance, as_points, as_positive_number, as_shape
+from ..localization.maps import OccupancyGrid, as_rays
 
 RAYS = 1 << 17  # rays worked on at once
 STRIDE = 4  # jumps between two looks at which rays have ended
@@ -19,6 +19,7 @@ def cast_rays(grid, poses, bearings, r_max):
     Where a ray ends, the edge of the cell it entered gives the distance. A ray that clips the corner of a cell may pass
     it: `walk_ray` does not.
     """
+    as_instance(grid, "grid", OccupancyGrid)
     poses, bearings, r_max = as_rays(poses, bearings, r_max)
     flat = poses.reshape(-1, 3)
     ranges = np.empty((len(flat), len(bearings)), dtype=np.float32)
@@ -88,7 +89,7 @@ class Tracer:
     """A grid that casts its rays by `cast_rays` of this module."""
 
     def __init__(self, grid):
-        self.grid = grid
+        self.grid = as_instance(grid, "grid", OccupancyGrid)
 
     def cast(self, poses, bearings, r_max):
         """`cast_rays(grid, poses, bearings, r_max)`."""
@@ -112,7 +113,7 @@ class RangeTable:
 
     def __init__(self, grid, r_max, n_angles=120):
         self.grid, self.r_max, self.n_angles = grid, as_positive_number(r_max, "r_max"), as_count(n_angles, "n_angles")
-        height, width = grid.cells.shape
+        height, width = as_instance(grid, "grid", OccupancyGrid).cells.shape
         table = np.zeros((height, width, self.n_angles), dtype=np.float32)
         i, j = np.nonzero(~grid.occupied)
         poses = np.column_stack([grid.center_of(i, j), np.zeros(len(i))])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..checks import as_count, as_positive
+from ..checks import as_count, as_generator, as_positive
 from ..localization import odometry
 from ..localization.particles import as_noisy_control, as_weights
 
@@ -14,7 +14,7 @@ def sample_motion(states, u, dt, rng, cov_u, model="midpoint"):
     """
     states, u, root = as_noisy_control(states, u, cov_u)
     dt, model = as_positive(dt, "dt"), odometry.as_model(model)
-    noise = rng.standard_normal((*states.shape[:-1], 2))
+    noise = as_generator(rng).standard_normal((*states.shape[:-1], 2))
     v, omega = (u[k] + noise @ row for k, row in enumerate(root))
     length, turn = odometry.chord(v, omega, dt, model)
     t = np.tan(0.5 * (states[..., 2] + turn))
@@ -37,7 +37,7 @@ def resample_systematic(weights, rng, size=None):
     ends = np.cumsum(weights)
     ends *= size / ends[-1]
     full = ends >= ends[-1]
-    ends -= rng.random()
+    ends -= as_generator(rng).random()
     spokes = np.ceil(ends, out=ends).astype(np.intp)
     spokes[full] = size
     return np.repeat(np.arange(len(weights)), np.diff(spokes, prepend=0))

@@ -9,12 +9,13 @@ import math
 
 import numpy as np
 
-from ..checks import as_covariances, as_shape
-from ..localization.path import LIMIT, Path
+from ..checks import as_covariances, as_instance, as_shape
+from ..localization.path import LIMIT, Log, Noise, Path
 
 
 def filter_path(log, x0, cov0, noise):
     """Extended Kalman filter along a log: arguments and result of `localization.path.filter_path`."""
+    as_instance(log, "log", Log), as_instance(noise, "noise", Noise)
     x0, cov0 = as_shape(x0, "x0", 3), as_shape(as_covariances(cov0, "cov0", 3), "cov0", 3, 3)
     n, k = len(log.time), len(log.z)
     at_row = np.arange(n) + np.searchsorted(log.row, np.arange(n), side="left")

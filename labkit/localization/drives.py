@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..checks import as_count, as_points, as_positive_number, as_shape
+from ..documented import documented
 from ..geometry.planar import wrap_angle
 from . import odometry
 
@@ -104,6 +105,7 @@ def follow(start, waypoints, n_steps, dt, speed=0.6, turn_rate=0.8):
     return np.array(controls).reshape(-1, 2)
 
 
+@documented
 def random_drive(building, noise, n_steps, rng, dt=0.5, start=None):
     """A `Drive` from room to room of a building, in a random order.
 
@@ -156,6 +158,7 @@ class Wanderer:
         """Forget where it was heading: it has been carried away."""
         self.at = self.goal = None
 
+    @documented
     def control(self, pose, dt, speed=0.6, turn_rate=0.8):
         """The control for the next step, shape (2,): it turns toward the place it is heading for, then drives there.
 

@@ -12,6 +12,7 @@ import numpy as np
 from ..checks import (
     as_count,
     as_covariances,
+    as_generator,
     as_points,
     as_positive_number,
     as_probability,
@@ -20,6 +21,7 @@ from ..checks import (
     covariance_root,
     fit_together,
 )
+from ..documented import documented
 from ..estimation.gaussian import chi_square_quantile
 from ..estimation.kalman import Corrected, _after, _apply, _symmetric, _t, nis
 from ..geometry.planar import wrap_angle
@@ -444,6 +446,7 @@ def associate(x, cov, z, landmarks, std_range, std_bearing, by="mahalanobis", pr
     return np.where(passed, best, -1)
 
 
+@documented
 def simulate_drive(x0, controls, dt, cov_u, landmarks, std_range, std_bearing, rng, runs, model="euler", reach=np.inf):
     """Drives of many robots on the same commands, their controls and measurements with Gaussian noise.
 
@@ -484,7 +487,7 @@ def simulate_drive(x0, controls, dt, cov_u, landmarks, std_range, std_bearing, r
     x0 = as_points(x0, "x0", 3)
     if x0.shape not in ((3,), (runs, 3)):
         raise ValueError(f"x0 must have shape (3,) or ({runs}, 3), got {x0.shape}")
-    real = controls[:, None, :] + rng.standard_normal((len(controls), runs, 2)) @ _t(root)
+    real = controls[:, None, :] + as_generator(rng).standard_normal((len(controls), runs, 2)) @ _t(root)
     truth = odometry.drive(np.broadcast_to(x0, (runs, 3)), real, dt, model)
     z = measurement(truth[1:], landmarks)
     far = z[..., 0] > reach

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.optimize import least_squares, minimize
 
 from ..checks import as_finite, as_points, as_shape
+from ..documented import documented
 from ..estimation.kalman import mean_band
 from ..geometry.planar import compose_pose, relative_pose, wrap_angle
 from . import odometry, path
@@ -130,6 +131,7 @@ def mend_clock(time):
     return clean, starts, said + ((f"and {len(starts) - 6} jumps more",) if len(starts) > 6 else ())
 
 
+@documented
 def place_readings(odometry_time, starts, reading_time):
     """The odometry row in which each reading was taken.
 
@@ -174,6 +176,7 @@ def place_readings(odometry_time, starts, reading_time):
 # --- a global start --------------------------------------------------------------------------------------------------
 
 
+@documented
 def global_start(log, noise, rng):
     """Pose and covariance at the first row of a log, from its first readings alone: particles, then least squares.
 
@@ -269,6 +272,7 @@ def _misfits(particles, way, z, landmark, landmarks, std):
 # --- noise -----------------------------------------------------------------------------------------------------------
 
 
+@documented
 def fit_noise(log, x0, cov0, noise, free, filter_path):
     """Standard deviations of greatest likelihood, from the first readings of a log.
 
@@ -311,6 +315,7 @@ def fit_noise(log, x0, cov0, noise, free, filter_path):
 # --- the whole -------------------------------------------------------------------------------------------------------
 
 
+@documented
 def locate(
     odometry_time, u, reading_time, ids, z, landmark_ids, landmarks, *, noise=None, truth=None, seed=0,
     filter_path=path.filter_path,

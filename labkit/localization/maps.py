@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from ..checks import as_finite, as_number, as_points, as_positive_number, as_shape, shown
+from ..checks import as_finite, as_number, as_points, as_positive_number, as_shape, fit_together, shown
+from ..documented import documented
 
 FREE, OCCUPIED, UNKNOWN = 0, 1, 2
 _SYMBOLS = {".": FREE, " ": FREE, "#": OCCUPIED, "?": UNKNOWN}
@@ -84,6 +85,7 @@ class OccupancyGrid:
         return cls(np.array(cells[::-1]), resolution, origin)
 
     @classmethod
+    @documented
     def from_png(cls, path, resolution, origin=(0.0, 0.0), occupied_below=0.35, free_above=0.8):
         """Grid from a gray picture.
 
@@ -182,7 +184,9 @@ class OccupancyGrid:
 
     def center_of(self, i, j):
         """The midpoint (..., 2) of cells (m)."""
-        return np.stack([j + 0.5, i + 0.5], axis=-1) * self.resolution + self.origin
+        i, j = as_finite(i, "i"), as_finite(j, "j")
+        fit_together(i=i.shape, j=j.shape)
+        return np.stack(np.broadcast_arrays(j + 0.5, i + 0.5), axis=-1) * self.resolution + self.origin
 
     def at(self, points, outside=UNKNOWN):
         """FREE, OCCUPIED or UNKNOWN at points (..., 2), and `outside` beyond the map."""
@@ -218,6 +222,7 @@ def _between_crossings(start, end):
     return start + np.concatenate([[0.0], middle, [1.0]])[:, None] * (end - start)
 
 
+@documented
 def distance_field(grid):
     """Distance from the middle of each cell to the middle of the nearest occupied one.
 
@@ -242,6 +247,7 @@ def distance_field(grid):
     return distance_transform_edt(~grid.occupied) * grid.resolution
 
 
+@documented
 def walk_ray(grid, pose, bearing, r_max):
     """Distance to the first occupied cell along one ray, exactly: from cell to cell, in the order the ray crosses them.
 
@@ -296,6 +302,7 @@ class _Axis:
         return travelled
 
 
+@documented
 def cast_rays(grid, poses, bearings, r_max):
     """`walk_ray` from many poses in many directions.
 

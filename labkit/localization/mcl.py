@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..checks import as_count, as_number, as_points, shown
+from ..checks import as_count, as_function, as_generator, as_number, as_points, shown
+from ..documented import documented
 from .particles import (
     effective_size,
     estimate_mode,
@@ -280,6 +281,7 @@ class MonteCarloLocalizer:
         """`Estimate` by the heaviest cluster."""
         return estimate_mode(self.states, self.weights)
 
+    @documented
     def step(self, u, dt, weighting, rng):
         """Move, weigh, and resample if it is time.
 
@@ -302,7 +304,9 @@ class MonteCarloLocalizer:
 
     def correct(self, weighting, rng):
         """The `StepReport` of a step without motion."""
-        self._step += 1
+        if weighting is not None:
+            as_function(weighting, "weighting")
+        self._step, rng = self._step + 1, as_generator(rng)
         mean_weight, all_zero = (None, False) if weighting is None else self._weigh(weighting)
         states, weights = self.states, self.weights
         due = self.resampling.when(self._step, weights)
@@ -313,7 +317,7 @@ class MonteCarloLocalizer:
 
     def resize(self, n_particles, rng):
         """Go on with another number of particles, drawn from this cloud."""
-        self.n_max = as_count(n_particles, "n_particles")
+        self.n_max, rng = as_count(n_particles, "n_particles"), as_generator(rng)
         self.states = self.states[self.resampling.draw(self.weights, rng, self.n_max)]
         self._log_weights = np.zeros(self.n_max)
 
@@ -348,6 +352,7 @@ class MonteCarloLocalizer:
         return n
 
 
+@documented
 def localizer(grid, motion, n_particles, rng, start=None, recovery=True, **options):
     """A `MonteCarloLocalizer` spread over a map, or about a known pose.
 
@@ -394,6 +399,7 @@ class Picture:
         return self.step.estimate.pose
 
 
+@documented
 def record(filter_, drive, measure, rng):
     """Run a filter along a drive and keep a `Picture` of each step.
 

@@ -20,6 +20,7 @@ from ..checks import (
     fit_together,
     shown,
 )
+from ..documented import documented
 
 MODELS = ("euler", "midpoint", "arc")
 
@@ -161,6 +162,7 @@ def step_jacobians(x, u, dt, model="midpoint"):
     return F_x, F_u
 
 
+@documented
 def sinc_slope(h):
     """Derivative of sin(h) / h, with its series where h is small.
 

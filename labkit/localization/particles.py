@@ -20,6 +20,7 @@ from ..checks import (
     as_shape,
     shown,
 )
+from ..documented import documented
 from ..geometry.planar import wrap_angle
 from . import odometry
 
@@ -28,6 +29,7 @@ _BIN_TURN, _MODE_TURN = math.radians(15), math.radians(30)
 # --- motion ----------------------------------------------------------------------------------------------------------
 
 
+@documented
 def sample_motion(states, u, dt, rng, cov_u, model="midpoint"):
     """Each particle moved by its own noisy copy of the control.
 
@@ -149,6 +151,7 @@ def as_weights(weights):
     return weights
 
 
+@documented
 def resample_roulette(weights, rng, size=None):
     """Indices drawn independently with probability w / sum(w): one spin of the wheel per particle, O(M log M).
 
@@ -177,6 +180,7 @@ def resample_roulette(weights, rng, size=None):
     return _pointed_at(weights, spins)
 
 
+@documented
 def resample_systematic(weights, rng, size=None):
     """Indices by one turn of a wheel with evenly spaced spokes: O(M), and equal weights give every particle once.
 
@@ -256,6 +260,7 @@ def should_resample(weights, threshold=0.5):
     return effective_size(weights) < as_number(threshold, "threshold") * len(weights)
 
 
+@documented
 def count_ancestors(resample, n_particles, n_steps, rng):
     """How many of the first particles survive when a standing robot resamples equal weights again and again.
 
@@ -504,6 +509,7 @@ class KldSampling:
         return int(np.argmax(enough)) + 1 if enough.any() else len(bins)
 
 
+@documented
 def uniform_states(grid, n_particles, rng):
     """Poses spread evenly over the free cells of a map and over all headings.
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..checks import as_covariances, as_shape
+from ..documented import documented
 from ..estimation.gaussian import chi_square_quantile
 from . import odometry
 from .ekf import ekf_update, measurement, measurement_jacobian
@@ -79,6 +80,7 @@ class Path:
     landmark: np.ndarray
 
 
+@documented
 def filter_path(log, x0, cov0, noise):
     """Extended Kalman filter along a log, reading by reading.
 

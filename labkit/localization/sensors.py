@@ -23,6 +23,7 @@ from ..checks import (
     fit_together,
     shown,
 )
+from ..documented import documented
 from ..geometry.planar import wrap_angle
 
 SENSORS = ("landmarks", "beams", "likelihood field")
@@ -128,6 +129,7 @@ def log_normal(error, std):
     return -0.5 * np.square(error / std) - math.log(std * math.sqrt(2 * math.pi))
 
 
+@documented
 def see_landmarks(grid, pose, landmarks, rng, std_range=0.1, std_bearing=0.035, r_max=8.0):
     """The landmarks in sight, nearer than r_max and not behind a wall, and noisy readings of them.
 
@@ -333,6 +335,7 @@ class LikelihoodField:
         return np.where(inside, log_p, self.log_density(self.max_distance)).sum(-1)
 
 
+@documented
 def weigh_likelihood_field(field, ranges, bearings):
     """Weighting by a `LikelihoodField`: how near do the measured obstacle points lie to mapped ones?
 
@@ -426,6 +429,7 @@ class Scanner:
         n = round(self.field_of_view_deg / self.resolution_deg)
         return np.radians(np.linspace(-self.field_of_view_deg / 2, self.field_of_view_deg / 2, n + 1))
 
+    @documented
     def scan(self, grid, pose, rng, every=1):
         """One simulated scan.
 
@@ -530,6 +534,7 @@ class SensorSuite:
         """What predicts the ranges of the beam model: has `cast(poses, bearings, r_max)`."""
         return self.caster(self.building.grid)
 
+    @documented
     def measure(self, sensor, pose, rng, world=None):
         """A tempered `Weighting` from one measurement at the true pose; None when no landmark is in sight.
 

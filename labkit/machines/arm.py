@@ -24,6 +24,7 @@ from ..checks import (
     fit_together,
     shown,
 )
+from ..documented import documented
 from ..geometry.frames import invert, pose, unit_vector
 from ..geometry.lie import exp_so3, log_so3
 
@@ -156,6 +157,7 @@ def _jacobian(frames):
     return np.swapaxes(np.concatenate([axes, np.cross(axes, arms)], axis=-1), -1, -2)
 
 
+@documented
 def inverse_kinematics(robot, T_BF, start, iterations=60, tolerance=1e-9):
     """Joint angles that reach a pose, by damped least squares from `start`, kept inside the joint limits.
 
@@ -229,6 +231,7 @@ def _pose_error(T, T_goal):
     return np.concatenate([log_so3(turn), T_goal[..., :3, 3] - T[..., :3, 3]], axis=-1)
 
 
+@documented
 def within_limits(robot, q):
     """Whether all joints keep their limits.
 
@@ -245,6 +248,7 @@ def within_limits(robot, q):
     return ((q >= robot.q_min) & (q <= robot.q_max)).all(-1)
 
 
+@documented
 def measuring_poses(robot, rng, count=21, center=None, spread=(0.5, 0.35, 0.35, 0.9, 0.7, 0.9), box=None, facing=0.3):
     """Joint angles of reachable measuring poses about a center pose, the first being the center itself.
 
@@ -406,6 +410,7 @@ HOME = np.deg2rad(
 )  # arm bent, flange above the forearm: the pose in which the tracker is referenced
 
 
+@documented
 def wrist_reach(robot, q):
     """Distances of the wrist center (axis 5) as the data sheet names them.
 
@@ -428,6 +433,7 @@ def wrist_reach(robot, q):
     return in_plane, np.linalg.norm(wrist - shoulder, axis=-1), np.linalg.norm(wrist - elbow, axis=-1)
 
 
+@documented
 def tool_pose(robot, q, T_FE):
     """Pose in B of a frame E mounted on the flange.
 
@@ -444,6 +450,7 @@ def tool_pose(robot, q, T_FE):
     return forward_kinematics(robot.dh, q) @ as_transforms(T_FE, "T_FE")
 
 
+@documented
 def rotation_only(robot, T_FE, start, axes, angle, duration, rate):
     """A motion that turns the mounted frame E to and fro about its own axes and leaves its origin where it is.
 
@@ -488,6 +495,7 @@ def rotation_only(robot, T_FE, start, axes, angle, duration, rate):
     return time, q
 
 
+@documented
 def reach_position(robot, position, start, joints=(0, 1, 2), iterations=40):
     """Joint angles that bring the flange to a position with some joints alone; the others stay as in `start`.
 
@@ -520,6 +528,7 @@ def reach_position(robot, position, start, joints=(0, 1, 2), iterations=40):
     return best
 
 
+@documented
 def arm_points(robot, q):
     """Where to draw the arm: base, axis 2, shoulder, elbow, wrist, flange.
 

@@ -22,6 +22,7 @@ from ..calibration.hand_eye import calibrate_sphere_target, sphere_in_scanner
 from ..calibration.pivot import calibrate_pivot, cone, touching_poses
 from ..calibration.planning import DOWN, pattern, poses_that_see
 from ..checks import as_count, as_shape
+from ..documented import documented
 from ..geometry.frames import frame_from_points, invert, moved, pose, transform
 from ..geometry.lie import exp_so3
 from ..geometry.propagation import (
@@ -97,6 +98,7 @@ class Job:
     std_reading: tuple = (np.deg2rad(0.02), 0.12)
 
 
+@documented
 def cell_from(tip, scanner, tracker):
     """The cell that three calibrations describe.
 
@@ -120,6 +122,7 @@ def cell_from(tip, scanner, tracker):
 # ---- from the marks to the tip ---------------------------------------------------------------------------------------
 
 
+@documented
 def marks_in_base(cell, job):
     """The three marks of the part in the base, where it was learned.
 
@@ -137,6 +140,7 @@ def marks_in_base(cell, job):
     return transform(job.T_BF, transform(cell.T_FS[..., None, :, :], job.marks))
 
 
+@documented
 def learned_pose(cell, job):
     """T_BP0, the frame through the marks: chapter 1.
 
@@ -152,6 +156,7 @@ def learned_pose(cell, job):
     return frame_from_points(*np.moveaxis(marks_in_base(cell, job), -2, 0))
 
 
+@documented
 def moved_part(T_BW, T_WE0, T_WE1, T_BP0):
     """Where a part stands after its tracker has moved with it: chapter 2's chain around the tracker.
 
@@ -172,6 +177,7 @@ def moved_part(T_BW, T_WE0, T_WE1, T_BP0):
     return T_BE1 @ invert(T_BE0) @ T_BP0
 
 
+@documented
 def part_pose(cell, job):
     """T_BP, where the part is now.
 
@@ -187,6 +193,7 @@ def part_pose(cell, job):
     return moved_part(cell.T_BW, job.T_WE0, job.T_WE1, learned_pose(cell, job))
 
 
+@documented
 def hole_in_base(cell, job):
     """Where the hole is found.
 
@@ -202,6 +209,7 @@ def hole_in_base(cell, job):
     return transform(part_pose(cell, job), job.hole)
 
 
+@documented
 def flange_at_hole(cell, job):
     """Flange pose that brings the tip to the hole as it was found.
 
@@ -217,6 +225,7 @@ def flange_at_hole(cell, job):
     return pose(job.R_tool, hole_in_base(cell, job) - (job.R_tool @ cell.tip[..., None])[..., 0])
 
 
+@documented
 def miss(truth, cell, job, measured=None):
     """How far the tip misses the hole when everything is computed with a cell and is really as in another.
 
@@ -243,6 +252,7 @@ def miss(truth, cell, job, measured=None):
 # ---- how sure it is --------------------------------------------------------------------------------------------------
 
 
+@documented
 def source_covariances(cell, job):
     """Covariance of each source.
 
@@ -275,6 +285,7 @@ def _mark_jacobians(cell, job):
     return {"tip": by_tip, "scanner": by_scanner, "marks": every.reshape(9, 9)}
 
 
+@documented
 def part_jacobians(cell, job):
     """How the part's pose T_BP moves with each source.
 
@@ -299,6 +310,7 @@ def part_jacobians(cell, job):
     }
 
 
+@documented
 def miss_jacobians(cell, job):
     """How the tip's miss of the hole moves with each source; the tip may enter twice, and cancel.
 
@@ -319,6 +331,7 @@ def miss_jacobians(cell, job):
     return jacobians
 
 
+@documented
 def part_covariance(cell, job):
     """Covariance of T_BP to first order.
 
@@ -335,6 +348,7 @@ def part_covariance(cell, job):
     return sum(error_budget(part_jacobians(cell, job), source_covariances(cell, job)).values())
 
 
+@documented
 def miss_budget(cell, job):
     """What each source contributes to the covariance of the miss.
 
@@ -367,6 +381,7 @@ def sizes(shares):
     return {name: float(np.sqrt(np.trace(share))) for name, share in shares.items()}
 
 
+@documented
 def with_errors(cell, job, errors):
     """The cell and the job as they would be with errors in their sources.
 
@@ -392,6 +407,7 @@ def with_errors(cell, job, errors):
     )  # fmt: skip
 
 
+@documented
 def simulate_misses(cell, job, rng, n=10_000):
     """The miss of the hole in many simulated cells, all sources drawn from their covariances; nothing is linearized.
 
@@ -416,6 +432,7 @@ def simulate_misses(cell, job, rng, n=10_000):
     return miss(cell, drawn_cell, job, drawn_job)
 
 
+@documented
 def frames_in_base(cell, job):
     """Every frame of the cell as it stands in the base when the tip goes to the hole, each with its covariance.
 
@@ -466,6 +483,7 @@ LEARNED = (190.0, -180.0, 0.3)  # x, y (mm) and turn (rad) of the part when it i
 FAR = (60.0, 250.0, 1.5)  # and somewhere else
 
 
+@documented
 def calibrate_tip(rng, n=24, half_angle=0.5):
     """The tip by *Quirlen*, as in chapter 3.
 
@@ -485,6 +503,7 @@ def calibrate_tip(rng, n=24, half_angle=0.5):
     return calibrate_pivot(touching_poses(R, TRUTH.tip, [300.0, 50.0, 200.0], 0.0, STD_TOUCH, rng))
 
 
+@documented
 def calibrate_scanner(rng, n=31, tilt=0.35):
     """The scanner from a sphere, as in chapter 5.
 
@@ -506,6 +525,7 @@ def calibrate_scanner(rng, n=31, tilt=0.35):
     return calibrate_sphere_target(T_BF, x_S + STD_CENTER * rng.normal(size=x_S.shape))
 
 
+@documented
 def calibrate_tracker(rng, n=21):
     """Where the tracker's world is, with the tracker still on the flange, as in chapter 6.
 
@@ -525,6 +545,7 @@ def calibrate_tracker(rng, n=21):
     return calibrate_hand_eye(simulation.flange_poses(q), T_WE, *STD_STOP, eye="to hand")
 
 
+@documented
 def calibrated_cell(rng):
     """A cell whose three calibrations were simulated, one after the other.
 
@@ -554,6 +575,7 @@ def place_on_table(x, y, turn):
     return pose(exp_so3([0.0, 0.0, turn]), [x, y, TABLE])
 
 
+@documented
 def simulated_job(now, learned=LEARNED, touched=False):
     """The job of a part, without noise: what the true cell would measure.
 

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..checks import as_finite, as_number, as_positive_number, as_shape, as_transforms
+from ..documented import documented
 from ..geometry.frames import matrix_from_quaternion, pose, quaternion_from_matrix
 from ..geometry.lie import log_so3
 from .packet import MAX_POSITION, UNIT_TOLERANCE
@@ -41,6 +42,7 @@ class Log:
 _LENGTHS = {"m": 1000.0, "mm": 1.0}
 
 
+@documented
 def write_csv(path, log, unit="m", digits=5):
     """Write a log as a table: time [s], stop (where the log has stops), x y z [unit], qx qy qz qw.
 
@@ -246,6 +248,7 @@ def mean_pose(T):
     return pose(Rotation.from_matrix(T[:, :3, :3]).mean().as_matrix(), T[:, :3, 3].mean(0))
 
 
+@documented
 def average_stops(log, factor=4.0, share=0.5):
     """Mean reading of every stop, with outliers left out by `reject_outliers` on position and rotation vector.
 

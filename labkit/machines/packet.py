@@ -10,6 +10,7 @@ import struct
 import numpy as np
 
 from ..checks import as_finite, as_points, as_transforms, fit_together
+from ..documented import documented
 from ..geometry.frames import matrix_from_quaternion, pose, quaternion_from_matrix
 
 # ---- the packet ------------------------------------------------------------------------------------------------------
@@ -37,6 +38,7 @@ def encode_packet(values):
     return PACKET.pack(*values)
 
 
+@documented
 def decode_packet(data):
     """The 23 numbers of a packet, in the order of `FIELDS`.
 

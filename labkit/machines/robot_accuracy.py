@@ -13,6 +13,7 @@ import numpy as np
 
 from ..calibration.planning import DOWN, poses_that_see
 from ..checks import as_count, as_finite, as_nonnegative, as_points, as_positive_number, as_shape
+from ..documented import documented
 from ..geometry.lie import exp_so3
 
 
@@ -127,6 +128,7 @@ class RobotErrors:
     lag: float = 0.0
 
 
+@documented
 def arrive(command, directions, errors, rng):
     """Where a robot stops that comes from given directions.
 
@@ -147,6 +149,7 @@ def arrive(command, directions, errors, rng):
     return as_finite(command, "command") + errors.offset - errors.backlash * directions + noise
 
 
+@documented
 def drive(command, dt, errors, rng, n=1):
     """Paths of a robot whose controllers follow with a delay: a first-order lag, at rest at the start.
 
@@ -172,6 +175,7 @@ def drive(command, dt, errors, rng, n=1):
     return path + errors.offset + errors.std * rng.normal(size=(n, *command.shape))
 
 
+@documented
 def corner(speed, length=60.0, instants=61):
     """A path around a right angle at constant speed, each leg of one length.
 
@@ -192,6 +196,7 @@ def corner(speed, length=60.0, instants=61):
     return path, (s[1] - s[0]) / as_positive_number(speed, "speed")
 
 
+@documented
 def looking_down_at(marks, T_FS, turns, height=240.0):
     """Flange poses from which a scanner sees marks straight below it, the flange turned about the vertical in between.
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import as_generator
+from ..documented import documented
 from ..geometry.frames import invert, pose
 from ..geometry.lie import exp_so3
 
@@ -29,13 +31,14 @@ class SensorCell:
     std_rot: float
     std_trans: float
 
+    @documented
     def read(self, T_BF, rng, T_FS=None, std=1.0):
         """The target as the sensor sees it from flange poses, with noise.
 
         Parameters
         ----------
         T_BF : array, shape (n, 4, 4)
-        rng : numpy.random.Generator
+        rng : numpy.random.Generator or None
         T_FS : array, shape (4, 4) or (n, 4, 4), optional
             Where the sensor sits, when it has moved.
         std : float
@@ -48,6 +51,7 @@ class SensorCell:
         seen, n = invert(T_BF @ (self.T_FS if T_FS is None else T_FS)) @ self.T_BT, len(T_BF)
         if not std:
             return seen
+        rng = as_generator(rng)
         seen[:, :3, 3] += std * self.std_trans * rng.normal(size=(n, 3))
         return pose(seen[:, :3, :3] @ exp_so3(std * self.std_rot * rng.normal(size=(n, 3))), seen[:, :3, 3])
 

@@ -13,6 +13,7 @@ from itertools import count
 import numpy as np
 
 from ..checks import as_count, as_positive_number
+from ..documented import documented
 from ..geometry.frames import invert, matrix_from_quaternion, moved, pose
 from ..geometry.lie import exp_so3
 from .arm import HOME, RAMP, TX40, forward_kinematics, measuring_poses, rotation_only, smooth_motion, tool_pose
@@ -96,6 +97,7 @@ class Tracker:
         )
         return waves, rng.uniform(0, 2 * np.pi, 12), rng.normal(size=(12, 6)) / np.sqrt(6.0)
 
+    @documented
     def systematic(self, positions):
         """Systematic error at places of the room.
 
@@ -112,6 +114,7 @@ class Tracker:
         error = np.sin(positions @ waves.T + phases) @ amplitudes
         return error * np.repeat([self.field_rotation, self.field_position], 3)
 
+    @documented
     def read(self, T_BE, rng, drift=None):
         """Readings of the true poses in the room (here the robot's base), without nonsense and latency.
 
@@ -131,6 +134,7 @@ class Tracker:
         error[:, 3:] += self.std_position * rng.normal(size=(len(T_BE), 3))
         return moved(T_BE, error)
 
+    @documented
     def drift(self, stops, rng):
         """What each stop adds to all of its readings.
 
@@ -146,6 +150,7 @@ class Tracker:
         """
         return rng.normal(size=(stops, 6)) * np.repeat([self.drift_rotation, self.drift_position], 3)
 
+    @documented
     def spoil(self, T, rng, tail=0.15):
         """Put bursts of nonsense into readings.
 
@@ -187,6 +192,7 @@ def measuring_joints(seed=7):
     return measuring_poses(TX40, np.random.default_rng(seed), STOPS)
 
 
+@documented
 def calibration_run(rng, tracker=None, joints=None, rate=5.0, lost_stop=None):
     """One run of section 3.1: the robot rests 4 s at each of the 21 poses.
 
@@ -267,6 +273,7 @@ class Motion:
     nonsense: np.ndarray
 
 
+@documented
 def robot_motion(name, rate=RATE):
     """Joint angles of one of the motions of section 3.2.
 
@@ -297,6 +304,7 @@ def robot_motion(name, rate=RATE):
     return smooth_motion(np.deg2rad(VIA_DEG), SLOW_DURATION * MOTIONS[name], rate)
 
 
+@documented
 def simulate_motion(name, rng, tracker=None, rate=RATE):
     """A motion of section 3.2 as the robot makes it and the tracker sees it.
 
@@ -330,6 +338,7 @@ def simulate_motion(name, rng, tracker=None, rate=RATE):
     return Motion(time, q, to_W @ T_BE, to_W @ T_read, v_read, w_read, bad)
 
 
+@documented
 def follow_path(time, T_BE, tracker, rng):
     """What a tracker reports while it is carried along a path.
 
@@ -369,6 +378,7 @@ def flange_poses(joints):
     return forward_kinematics(TX40.dh, joints)
 
 
+@documented
 def endless_packets(rng, nonsense=lambda: False, tracker=None):
     """Packets of a tracker that is carried through the slow motion again and again; a generator without an end.
 

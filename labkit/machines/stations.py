@@ -16,6 +16,7 @@ import numpy as np
 
 from ..calibration.result import Result, pose_parameters, result_class
 from ..checks import as_finite, as_points, as_positive_number, as_shape, as_transforms, shown
+from ..documented import documented
 from ..geometry.frames import invert, moved, pose, transform, unit_vector
 from ..geometry.lie import exp_so3, skew
 
@@ -366,6 +367,7 @@ def poses_from_angles(T_WL, diodes, angles, start):
     raise ValueError(f"the pose did not settle within {MAX_STEPS} steps: is the start too far off?")
 
 
+@documented
 def sight(T_WL, diodes, angles, start, std=None):
     """One pose with its covariance; the parameters are those of `poses_from_angles`, for a single body.
 
@@ -427,6 +429,7 @@ def last_turned(T_WL, turns):
     return actual
 
 
+@documented
 def read_poses(T_WE, believed, actual, rng, std_angle=0.0, diodes=DIODES):
     """What a tracker reports when its stations stand elsewhere than it believes.
 

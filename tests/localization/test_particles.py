@@ -124,17 +124,20 @@ def test_effective_size_and_variance_say_the_same(w):
     assert pt.should_resample(w, 0.5) == (n < 0.5 * len(w))
 
 
+RNG = np.random.default_rng(0)  # refused before it draws
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [
         (lambda: pt.normalize_weights([-np.inf, -np.inf]), "no particle explains the measurement"),
         (lambda: pt.normalize_weights([0.0, np.nan]), "NaN"),
-        (lambda: pt.resample_systematic([0.0, 0.0], None), "not all 0"),
-        (lambda: pt.resample_roulette([0.5, -0.1], None), "at least 0"),
-        (lambda: pt.resample_roulette([[0.5]], None), "vector (M,)"),
+        (lambda: pt.resample_systematic([0.0, 0.0], RNG), "not all 0"),
+        (lambda: pt.resample_roulette([0.5, -0.1], RNG), "at least 0"),
+        (lambda: pt.resample_roulette([[0.5]], RNG), "vector (M,)"),
         (lambda: pt.circular_mean([0.0, math.pi]), "cancel"),
         (
-            lambda: pt.sample_motion([[0, 0]], (1, 0), 0.1, None, np.eye(2)),
+            lambda: pt.sample_motion([[0, 0]], (1, 0), 0.1, RNG, np.eye(2)),
             "states must have shape (..., 3), got (1, 2)",
         ),
     ],

@@ -1,0 +1,183 @@
+"""A docstring keeps its word: an argument of another kind or shape is refused before anything is computed.
+
+`@documented` reads the Parameters of a NumPy docstring at the first call: "rng : numpy.random.Generator",
+"tracker : Tracker, optional", 'model : {"euler", "arc"}', "T_BE : array, shape (k, 4, 4)". What it does not
+understand it leaves to the function, and "array-like" arguments, which functions check with `labkit.checks`.
+"""
+
+import functools
+import inspect
+import re
+import sys
+
+import numpy as np
+
+from .checks import as_finite, as_floats, as_number, kind
+
+_LINE = re.compile(r"^(\w[\w, ]*?) : (.+)$")
+_SHAPE = re.compile(r"\(([^()]*)\)")
+_PLAIN = {"str": str, "dict": dict, "bytes": bytes, "bool": (bool, np.bool_), "list": (list, tuple)}
+
+
+def documented(function):
+    """Decorator: arguments of another kind or shape than the docstring says are refused in one sentence."""
+    rules = []
+
+    @functools.wraps(function)
+    def checked(*args, **kwargs):
+        if not rules:
+            rules.append(_rules(function))
+        for place, name, check in rules[0]:
+            if name in kwargs:
+                kwargs[name] = check(kwargs[name])
+            elif place < len(args):
+                value = check(args[place])
+                if value is not args[place]:
+                    args = (*args[:place], value, *args[place + 1 :])
+        return function(*args, **kwargs)
+
+    return checked
+
+
+def _rules(function):
+    """(place, name, check) of every parameter whose word is understood."""
+    found = []
+    parameters = inspect.signature(function).parameters
+    places = {name: place for place, name in enumerate(parameters)}
+    for names, said, more in _parameters(_text(function)):
+        for name in names:
+            default = parameters[name].default if name in places else None
+            check = _check(name, said, f"{said}{more} {default}", function) if name in places else None
+            if check:
+                optional = "optional" in said or "None" in said or default is None
+                found.append((places[name], name, functools.partial(_unless_none, check) if optional else check))
+    return found
+
+
+def _text(function):
+    """The docstring; of a constructor, its class's."""
+    if function.__name__ != "__init__":
+        return function.__doc__ or ""
+    return getattr(sys.modules[function.__module__], function.__qualname__.partition(".")[0]).__doc__ or ""
+
+
+def _parameters(text):
+    """(names, what is said of them, the lines beneath) from the section Parameters."""
+    lines = inspect.cleandoc(text).splitlines()
+    try:
+        begin = lines.index("Parameters") + 2
+    except ValueError:
+        return
+    entry = None
+    for k in range(begin, len(lines) + 1):
+        ends = k == len(lines) or (k + 1 < len(lines) and set(lines[k + 1]) == {"-"})
+        match = None if ends else _LINE.match(lines[k])
+        if (ends or match) and entry:
+            yield entry
+        if ends:
+            return
+        if match:
+            entry = [name.strip() for name in match[1].split(",")], match[2], ""
+        elif entry:
+            entry = (*entry[:2], f"{entry[2]} {lines[k].strip()}")
+
+
+def _unless_none(check, value):
+    return value if value is None else check(value)
+
+
+def _check(name, said, more, function):
+    """A function that returns the argument, or refuses it; None where the docstring's word is not understood."""
+    gaps = bool(re.search(r"\bNaN\b|\binf", more))
+    if said.startswith("{"):
+        options = re.findall(r'"([^"]*)"', said.partition("}")[0])
+        return functools.partial(_one_of, name, options) if options else None
+    first = said.partition(",")[0].strip()
+    if first == "float":
+        return functools.partial(_number, name, gaps) if said in ("float", "float, mm", "float, optional") else None
+    if first in ("array", "arrays"):
+        return functools.partial(_array, name, _shapes(said), gaps)
+    if first == "numpy.random.Generator":
+        return functools.partial(_instance, name, np.random.Generator, "a numpy.random.Generator")
+    if re.match(r"(function|callable)s?\b", first):
+        return functools.partial(_function, name)
+    words = [word for word in first.split(" or ") if word != "None"]
+    types = [_PLAIN.get(word) or _classes(word, function) for word in words]
+    if not all(types):
+        return None
+    alike = re.search(r"[Oo]r anything with `(\w+)", more)
+    wanted = f"of type {' or '.join(words)}{f', or have `{alike[1]}`' if alike else ''}"
+    return functools.partial(_instance, name, tuple(_flat(types)), wanted, alike=alike[1] if alike else None)
+
+
+def _flat(types):
+    for entry in types:
+        yield from entry if isinstance(entry, tuple) else (entry,)
+
+
+def _classes(word, function):
+    """The class of labkit that a word names: of the function's own module first, else all of this name."""
+    if not re.fullmatch(r"[\w.]*\b[A-Z]\w*", word):
+        return ()
+    last = word.rpartition(".")[2]
+    own = function.__globals__.get(last)
+    if isinstance(own, type):
+        return (own,)
+    loaded = [vars(m).get(last) for n, m in list(sys.modules.items()) if n.startswith("labkit.") and m is not None]
+    return tuple({entry for entry in loaded if isinstance(entry, type)})
+
+
+def _shapes(said):
+    """The shapes a parameter may have, each a tuple of numbers, names and perhaps "..." in front; () for any."""
+    after = said.partition("shape")[2]
+    shapes = [[part.strip() for part in text.split(",") if part.strip()] for text in _SHAPE.findall(after)]
+    if not all(re.fullmatch(r"\w+|\.\.\.", part) for shape in shapes for part in shape):
+        return ()
+    return tuple(tuple(int(part) if part.isdigit() else part for part in shape) for shape in shapes)
+
+
+def _array(name, shapes, gaps, value):
+    if not _is_kept(value):
+        value = as_floats(value, name)
+    if not gaps and value.dtype.kind == "f":
+        as_finite(value, name)
+    if shapes and not any(_fits(value.shape, shape) for shape in shapes):
+        wanted = " or ".join(f"({', '.join(map(str, shape))}{',' * (len(shape) == 1)})" for shape in shapes)
+        raise ValueError(f"{name} must have shape {wanted}, got {value.shape}")
+    return value
+
+
+def _is_kept(value):
+    """Whether a function gets an array as it is: truth values and indices must stay what they are."""
+    return isinstance(value, np.ndarray) and value.dtype.kind in "iufb"
+
+
+def _fits(found, shape):
+    if shape[:1] == ("...",):
+        shape = shape[1:]
+        found = found[len(found) - len(shape) :] if len(found) >= len(shape) else ()
+    return len(found) == len(shape) and all(isinstance(w, str) or w == n for w, n in zip(shape, found))
+
+
+def _number(name, gaps, value):
+    if not gaps or np.shape(as_floats(value, name)):
+        as_number(value, name)
+    return value
+
+
+def _one_of(name, options, value):
+    if not isinstance(value, str) or value not in options:
+        raise ValueError(f"{name} must be one of {', '.join(options)}, got {value!r}")
+    return value
+
+
+def _instance(name, types, wanted, value, alike=None):
+    if not isinstance(value, types) and not (alike and hasattr(value, alike)):
+        raise ValueError(f"{name} must be {wanted}, got {kind(value)}")
+    return value
+
+
+def _function(name, value):
+    if not callable(value):
+        raise ValueError(f"{name} must be a function, got {kind(value)}")
+    return value

@@ -1,0 +1,71 @@
+"""An argument of another kind or shape than the docstring says is refused in a sentence; what it says is let through."""
+
+import numpy as np
+import pytest
+
+from labkit.documented import documented
+from labkit.machines.simulation import MOVING, Tracker, follow_path
+
+
+@documented
+def measure(T, x, rng, tracker=None, model="euler", grid=None, times=None):
+    """One measurement.
+
+    Parameters
+    ----------
+    T : array, shape (k, 4, 4)
+        Poses.
+    x, times : array, shape (3,) or (n, 3)
+        NaN where nothing was seen.
+    rng : numpy.random.Generator
+    tracker : Tracker, optional
+    model : {"euler", "arc"}
+        As in `step`.
+    grid : Tracker
+        Or anything with `cast(poses)`.
+
+    Returns
+    -------
+    x : array
+    """
+    return x
+
+
+RNG, T, X = np.random.default_rng(0), np.zeros((2, 4, 4)), np.zeros(3)
+
+
+class Caster:
+    def cast(self, poses):
+        return poses
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"T": np.zeros((4, 4))}, r"T must have shape \(k, 4, 4\), got \(4, 4\)"),
+        ({"T": np.full((2, 4, 4), np.nan)}, "T must be finite"),
+        ({"T": None}, "T must hold real numbers, got None"),
+        ({"x": np.zeros((3, 2))}, r"x must have shape \(3,\) or \(n, 3\), got \(3, 2\)"),
+        ({"rng": 5}, "rng must be a numpy.random.Generator, got an object of type int"),
+        ({"rng": None}, "rng must be a numpy.random.Generator, got None"),
+        ({"tracker": "Vive"}, "tracker must be of type Tracker, got an object of type str"),
+        ({"model": "none"}, "model must be one of euler, arc, got 'none'"),
+        ({"model": None}, "model must be one of euler, arc, got None"),
+        ({"grid": 1.0}, "grid must be of type Tracker, or have `cast`, got an object of type float"),
+    ],
+)
+def test_what_the_docstring_does_not_say_is_refused(change, words):
+    with pytest.raises(ValueError, match=words):
+        measure(**({"T": T, "x": X, "rng": RNG} | change))
+
+
+def test_what_it_says_arrives():
+    gaps = np.array([[1.0, np.nan, 2.0]])
+    assert measure(T, gaps, RNG, MOVING, "arc", Caster()) is gaps
+    assert measure(T.tolist(), X.tolist(), rng=RNG, tracker=Tracker()).dtype == float
+    assert measure.__wrapped__ is not measure and measure.__doc__.startswith("One measurement")
+
+
+def test_a_function_of_the_library_keeps_its_word():
+    with pytest.raises(ValueError, match="tracker must be of type Tracker, got None"):
+        follow_path(np.arange(2.0), np.zeros((2, 4, 4)), None, RNG)
