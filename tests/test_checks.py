@@ -49,6 +49,7 @@ GRID = maps.OccupancyGrid.from_ascii("###\n#.#\n###")
 COV = np.diag([0.1, 0.1, 0.01])
 MARKS = np.array([[0.0, 0.0], [5.0, 1.0], [2.0, 6.0]])
 TIME = np.arange(5.0)
+STEP = kalman.update(O2, np.eye(2), O2, np.eye(2), np.eye(2))
 
 
 def rng():
@@ -123,7 +124,10 @@ REFUSED = [
     (lambda: sphere.scan_line(O3, 30.0, np.nan, 5), "half_angle must be finite"),
     (lambda: sphere.scan_line(O3, 30.0, 1.0, 5, std=0.1), "rng must be given"),
     (lambda: sphere.scan_line(O3, 30.0, 1.0, 0), "n must be a whole number"),
-    (lambda: sphere.profile_center_covariance(30.0, sphere.fit_circle(I4[:, :2]), 2), r"side must be \+1 or -1"),
+    (
+        lambda: sphere.profile_center_covariance(30.0, sphere.fit_circle([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]), 2),
+        r"side must be \+1 or -1",
+    ),
     (lambda: sphere.sphere_center_from_profile(O3, O3, 30.0, [1, 1]), r"side must be \+1 or -1"),
     (lambda: hand_eye.rms_distance(np.zeros((0, 3))), "N >= 1"),
     (lambda: listing_cost(np.zeros((0, 3))), "n >= 1"),
@@ -214,7 +218,7 @@ REFUSED = [
     (lambda: kalman.nis(O3, np.eye(2)), "cov_innovation must have shape"),
     (lambda: kalman.mean_band(3, 0), "runs must be a whole number"),
     (
-        lambda: kalman.gate(kalman.update(O2[:1], I3[:1, :1], O2[:1], I3[:1, :1], I3[:1, :1]), probability=2.0),
+        lambda: kalman.gate(STEP, probability=2.0),
         "probability must lie between",
     ),
     (lambda: ekf.ekf_update(O3, COV, np.full((3, 2), np.inf), MARKS + 1, 0.1, 0.1), "NaN where nothing"),

@@ -1,4 +1,4 @@
-"""An argument of another kind or shape than the docstring says is refused in a sentence; what it says is let through."""
+"""An argument of another kind or shape than the docstring says is refused; what it says is let through."""
 
 import numpy as np
 import pytest
