@@ -1,6 +1,7 @@
 """Every Stage in four sizes and two themes: `python tests/browser/contact_sheets.py OUT [NN ...] [--fail]`.
 
-Writes OUT/NN-light.png and OUT/NN-dark.png, a row a Stage and a column a size, and names what is cut or does not fit.
+Writes OUT/NN-light.png and OUT/NN-dark.png, a row a Stage and a column a size, and names what is cut or does not fit,
+what has no name or no ring, and what keys do not reach. Motion is reduced.
 The page is `stage.js` with Python behind it, as everywhere; it needs a Chromium, no JupyterLab.
 """
 
@@ -62,6 +63,28 @@ CUT = """() => {
 }"""  # fmt: skip # noqa: E501
 
 
+UNHEARD = """() => {
+  const stage = document.querySelector(".labkit-stage");
+  const said = [];
+  const named = (node) => node.getAttribute("aria-label") || [...(node.labels ?? [])].map((l) => l.textContent.trim()).join(" ") || node.textContent.trim();
+  for (const node of stage.querySelectorAll("input, select, button, .handle, .number, canvas:not(.space)")) {
+    const called = node.className || node.tagName;
+    if (!named(node)) said.push(`${called} has no name`);
+    if (node.tabIndex < 0 && !node.matches("canvas")) said.push(`${called} is not reached by Tab`);
+  }
+  for (const handle of stage.querySelectorAll(".handle:not([hidden])")) {
+    const ring = getComputedStyle(handle, "::after");
+    if (ring.borderTopStyle !== "solid" || parseFloat(ring.borderTopWidth) < 1.5) said.push(`${handle.dataset.handle} has no ring`);
+    if (handle.getAttribute("role") !== "slider" || !handle.getAttribute("aria-valuetext")) said.push(`${handle.dataset.handle} does not say where it is`);
+  }
+  const canvas = stage.querySelector("canvas:not(.space)");
+  const touched = canvas.dataset.empty || canvas.dataset.click === "true";
+  if (touched && (canvas.tabIndex !== 0 || !canvas.getAttribute("aria-description"))) said.push("empty space does something, but not by keys");
+  if (!stage.querySelector("[aria-live=polite]") || !stage.getAttribute("aria-label")) said.push("is not announced");
+  return [...new Set(said)];
+}"""  # noqa: E501
+
+
 class Bridge:
     """A Stage behind a page: messages of the page in, what it sends back out."""
 
@@ -89,7 +112,7 @@ def stage_page(dark, width, height, ratio):
     script = (ROOT / "labkit" / "stage" / "stage.js").read_text(encoding="utf-8").replace("export default", "//")
     paper, words = COLORS[dark]
     bridge = Bridge()
-    with driver.page_of(driver.find_browser(), dark, width, height, ratio) as page:
+    with driver.page_of(driver.find_browser(), dark, width, height, ratio, calm=True) as page:
         page.expose_function("toPython", bridge)
         page.set_content("<!DOCTYPE html><title>sheets</title><body></body>")
         look = f"body {{ margin: 0; background: {paper}; color: {words}; --words: {words}; --paper: {paper}; }}"
@@ -110,7 +133,7 @@ def stages(numbers):
 
 
 def shots(found, dark, size, fail):
-    """{(stem, name): (picture, what is cut)} in one theme and size."""
+    """{(stem, name): (picture, what is cut or cannot be heard or reached by keys)} in one theme and size."""
     made = {}
     with stage_page(dark, *SIZES[size]) as (page, bridge):
         for stem, names in found.items():
@@ -121,7 +144,8 @@ def shots(found, dark, size, fail):
                     stage.make_it_fail()
                 bridge.show(page, stage)
                 picture = page.locator(".labkit-stage").screenshot()
-                made[stem, name] = Image.open(io.BytesIO(picture)).convert("RGB"), page.evaluate(CUT)
+                wrong = [*page.evaluate(CUT), *page.evaluate(UNHEARD)]
+                made[stem, name] = Image.open(io.BytesIO(picture)).convert("RGB"), wrong
         if page.complaints:
             print("console:", *page.complaints, sep="\n  ")
     return made

@@ -120,8 +120,10 @@ def wait_for_address(process, log, seconds=90):
 
 
 @contextlib.contextmanager
-def page_of(browser_path, dark=False, width=1280, height=900, scale=1):
-    """A page in a fresh browser; `page.hosts` are the hosts it calls, `page.complaints` the errors in its console."""
+def page_of(browser_path, dark=False, width=1280, height=900, scale=1, calm=False):
+    """A page in a fresh browser, `calm` for a reader who asks for reduced motion; `page.hosts` are the hosts it calls,
+    `page.complaints` the errors in its console.
+    """
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
@@ -130,6 +132,7 @@ def page_of(browser_path, dark=False, width=1280, height=900, scale=1):
             viewport={"width": width, "height": height},
             device_scale_factor=scale,
             color_scheme="dark" if dark else "light",
+            reduced_motion="reduce" if calm else "no-preference",
         )
         page.hosts, page.complaints = set(), []
         page.on("request", lambda request: page.hosts.add(urlsplit(request.url).hostname))

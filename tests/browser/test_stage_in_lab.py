@@ -10,7 +10,7 @@ import nbformat
 import pytest
 
 CELLS = (
-    "from labkit.chapters.ch01_frames import stages\nstages.kuka_gimbal()",
+    "from labkit.chapters.ch01_frames import stages\nprint('a printed line')\nstages.kuka_gimbal()",
     "from labkit.chapters.ch03_quirlen import stages as swirling\nswirling.swirl()",
     "from labkit.chapters.ch04_optimization import stages as surfaces\nsurfaces.basins()",
     "from labkit.chapters.ch01_frames.stages import three_points\n"
@@ -186,6 +186,11 @@ def is_whole(page, stage, must_fit):
     )
     sharp = abs(stage.locator("canvas:not(.space)").evaluate("node => node.width / node.clientWidth") - 1) < 0.02
     return inside and sharp and (not must_fit or inner["height"] <= seen["height"])
+
+
+def test_printed_lines_wrap_between_words(page):
+    printed = page.locator(".jp-RenderedText pre", has_text="a printed line")
+    assert printed.evaluate("node => getComputedStyle(node).wordBreak") == "normal"
 
 
 def test_enlarged_it_fills_the_window_and_escape_leads_back(page):

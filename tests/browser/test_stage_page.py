@@ -5,11 +5,13 @@ a lost Python.
 import driver
 import numpy as np
 import pytest
-from contact_sheets import stage_page
+from contact_sheets import CUT, UNHEARD, stage_page
 from test_space_in_lab import apart, at_rest
 
 from labkit.chapters.ch02_chaining import stages as chaining
+from labkit.chapters.ch05_hand_eye import stages as hand_eye
 from labkit.chapters.ch06_tracker import stages
+from labkit.chapters.ch09_monte_carlo import stages as monte_carlo
 
 CONTEXTS = """() => {
     window.contexts = [];
@@ -74,6 +76,23 @@ def test_a_sharp_screen_shows_the_same_with_more_pixels():
     middles = [middle_of(seen[ratio][2]) for ratio in (1, 2)]
     assert np.hypot(*np.subtract(*middles)) < 1  # at the same place
     assert np.abs(small[1] - small[2]).mean() < 3  # of 255: letters and lines have their own pixels
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def test_everything_has_a_name_a_ring_and_keys_and_nothing_is_cut(dark):
+    """With reduced motion, as wide as half a screen: points, a scene in space, a click, a pen with time.
+
+    `contact_sheets.py` asks the same of every Stage in four sizes.
+    """
+    with stage_page(dark, 620, 650, 1) as (page, bridge):
+        for make in (chaining.two_loops, hand_eye.thirty_one_poses, monte_carlo.arena):
+            bridge.show(page, make())
+            assert page.evaluate(CUT) == [] and page.evaluate(UNHEARD) == [], make.__name__
+            page.evaluate("() => { document.querySelector('.labkit-stage .buttons button').textContent = ''; }")
+            assert page.evaluate(UNHEARD) == ["BUTTON has no name"]  # the question can be answered with no
+        tree = page.locator(".labkit-stage").aria_snapshot()
+        assert 'slider "time"' in tree and 'button "Make it fail"' in tree and 'application "arena' in tree
+        assert page.complaints == []
 
 
 def test_numbers_of_the_caption_are_dragged_keyed_and_keep_the_focus():

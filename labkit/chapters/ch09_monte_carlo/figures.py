@@ -12,6 +12,15 @@ from ...stage import style
 from ...stage.marks import Ghosts
 
 CELLS = {1: style.INK, 2: style.MUTED}  # occupied and unknown cells; free ones stay paper
+RING = {
+    "linestyle": "none",
+    "marker": "o",
+    "markersize": 30,
+    "markerfacecolor": "none",
+    "markeredgewidth": 2.0,
+    "markeredgecolor": style.MUTED,
+    "zorder": 6,
+}  # as around a handle: what a stroke carries away
 BARS = np.array([0.0, 1.0, np.nan])
 
 

@@ -748,7 +748,8 @@ def arena():
         top.set(xlabel="", ylabel="y (m)")
         cloud, truth, guess = draw.Cloud(top), draw.RobotMark(top), draw.RobotMark(top, color=style.ESTIMATE)
         scan, disks = draw.Beams(top), draw.Disks(top)
-        draw.key(top, {"robot": truth, "estimate": guess, "scan": scan, "obstacles not on the map": disks})
+        (ring,) = top.plot([], [], **draw.RING)
+        draw.key(top, {"robot, drag it": truth, "estimate": guess, "scan": scan, "obstacles not on the map": disks})
         curve = draw.error_curve(bottom, HISTORY)
 
         def update(state, result):
@@ -757,10 +758,11 @@ def arena():
             guess.set(result["estimate"])
             scan.set(result["pose"], result["ends"])
             disks.set(result["disks"])
+            ring.set_data(*result["pose"][:2, None])
             curve.set_data(np.arange(len(result["errors"])), np.maximum(result["errors"], 0.011))
 
         moving = [a for item in (scan, cloud, disks, guess, truth) for a in item.artists]
-        return [*moving, curve], update
+        return [*moving, ring, curve], update
 
     return Stage(
         "arena",
