@@ -173,10 +173,11 @@ def main():
     parser.add_argument("folder", type=Path)
     parser.add_argument("chapters", nargs="*")
     parser.add_argument("--fail", action="store_true", help='after "Make it fail"')
+    parser.add_argument("--theme", choices=("light", "dark"), help="one of the themes alone")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     found = stages(options.chapters)
-    for dark in (False, True):
+    for dark in [theme == "dark" for theme in ("light", "dark") if options.theme in (None, theme)]:
         made = {size: shots(found, dark, size, options.fail) for size in SIZES}
         for stem, names in found.items():
             rows = [(name, [made[size][stem, name][0] for size in SIZES]) for name in names]

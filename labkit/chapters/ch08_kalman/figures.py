@@ -131,8 +131,8 @@ class Honesty:
 
     def __init__(self, plane, score, iterations):
         look = style.look("estimates", marker=".", markersize=4, markeredgewidth=0, alpha=0.7)
-        (self.cloud,) = plane.plot([], [], **look, label="200 corrected positions")
-        (self.believed,) = plane.plot([], [], **style.look("prediction"), label="95 %, as believed")
+        (self.cloud,) = plane.plot([], [], **look, label="corrected")
+        (self.believed,) = plane.plot([], [], **style.look("prediction"), label="95 % believed")
         cross = {"linestyle": "none", "marker": "+", "markersize": 13}
         (self.truth,) = plane.plot([0], [0], color=style.TRUTH, **cross, label="true")
         plane.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, columnspacing=1.0)

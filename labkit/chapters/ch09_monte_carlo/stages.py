@@ -444,7 +444,7 @@ def standing():
         "the standing robot",
         scene=scene,
         compute=compute_standing,
-        controls={"rounds": Slider(0, 200, 0, step=1, label="rounds of resampling")},
+        controls={"rounds": Slider(0, 200, 20, step=1, label="rounds of resampling")},
         fail={"rounds": 200},
         because="Nothing was learned in 200 rounds: what is lost was lost by drawing alone.",
         describe=lambda result: (
@@ -749,7 +749,7 @@ def arena():
         cloud, truth, guess = draw.Cloud(top), draw.RobotMark(top), draw.RobotMark(top, color=style.ESTIMATE)
         scan, disks = draw.Beams(top), draw.Disks(top)
         (ring,) = top.plot([], [], **draw.RING)
-        draw.key(top, {"robot, drag it": truth, "estimate": guess, "scan": scan, "obstacles not on the map": disks})
+        draw.key(top, {"robot: drag it": truth, "estimate": guess, "scan": scan, "not on the map": disks})
         curve = draw.error_curve(bottom, HISTORY)
 
         def update(state, result):
