@@ -6,11 +6,22 @@ window, are let go when neither it nor a neighbor is shown.
 """
 
 import asyncio
+import gc
 import json
 import struct
 from concurrent.futures import ThreadPoolExecutor
 
 AHEAD_AFTER = 0.25  # s without a message of a page until the next Stage is made: nobody is dragging then
+
+
+def collect(to_stay=False):
+    """Collect what is in circles, which holds pixels as well: matplotlib's formulas leave exceptions with the frames
+    that drew. What is `to_stay`, all there is by then, is never looked at again, so that this takes milliseconds; for a
+    process that does nothing else.
+    """
+    gc.collect()
+    if to_stay:
+        gc.freeze()
 
 
 class House:
@@ -25,11 +36,15 @@ class House:
         Called in the server's thread with what went wrong beyond what a Stage says itself.
     made : function(key, stage)
         Called in the server's thread when a Stage is ready that is likely next: a page may say its size, `draw_ahead`.
+
+    `collect` is called when a Stage was made, which is to stay, and when pixels were let go: it does nothing unless the
+    process is the demo's own.
     """
 
     def __init__(self, makers, send, complain, made):
         self.makers, self.send, self.complain, self.made = makers, send, complain, made
         self.stages, self.faults = {}, {}
+        self.collect = lambda to_stay=False: None
         self.worker = ThreadPoolExecutor(1, thread_name_prefix="stages")
         self.loop = asyncio.get_running_loop()
         self._waiting, self._timer = [], None
@@ -40,10 +55,10 @@ class House:
             await self._run(self._make, key)
         return self.stages.get(key), self.faults.get(key, "")
 
-    def receive(self, key, message):
-        """One message of a page to a Stage; it answers by `send`. Returns the work under way."""
+    def receive(self, key, message, done):
+        """One message of a page to a Stage; it answers by `send`, and `done()` is called in the server's thread."""
         self._later()
-        return self._submit(self._receive, key, message)
+        self._submit(self._receive, key, message).add_done_callback(lambda _: self._in_loop(done))
 
     def prepare(self, keys, shown):
         """From now on these are likely next; of the others but `shown`, the pixels are let go."""
@@ -111,6 +126,7 @@ class House:
             self.faults[key] = f"This Stage could not be made: {_sentence(error)}"
             return
         self.stages[key] = stage
+        self.collect(to_stay=True)
 
     def _receive(self, key, message):
         if key in self.stages:
@@ -120,6 +136,7 @@ class House:
         for key, stage in self.stages.items():
             if key not in kept:
                 stage.forget_pixels()
+        self.collect()
 
     def _reset(self):
         for stage in self.stages.values():

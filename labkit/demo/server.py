@@ -23,6 +23,7 @@ from . import program as programs
 HERE = Path(__file__).parent
 STAGE = Path(engine.__file__).parent
 MAX_MESSAGE = 1 << 20  # bytes; a long stroke drawn in one go takes some 20 kB
+MAX_WAITING = 20  # messages of a window that wait for the Stages; a page sends its next one when the last is answered
 POLICY = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; connect-src 'self' ws: wss:"
 FIRST_PORT, PORTS = 8890, 50
 NOT_HERE = {getattr(errno, name, None) for name in ("EADDRNOTAVAIL", "WSAEADDRNOTAVAIL")}
@@ -178,6 +179,7 @@ class Line(Own, tornado.websocket.WebSocketHandler):
     """One window of the lecturer."""
 
     key = stage = ""
+    waiting = 0
 
     def open(self):
         self.set_nodelay(True)
@@ -199,7 +201,7 @@ class Line(Own, tornado.websocket.WebSocketHandler):
         if not isinstance(message, dict):
             raise TypeError("a message is an object")
         if "to" in message:
-            self.session.house.receive(message["to"], message["message"])
+            self._pass_on(message["to"], message["message"])
         elif "open" in message:
             await self.session.open(self, message["open"])
         elif "ahead" in message:
@@ -212,6 +214,15 @@ class Line(Own, tornado.websocket.WebSocketHandler):
             self.session.vote()
         else:
             raise KeyError("none of these")
+
+    def _pass_on(self, stage, message):
+        if self.waiting >= MAX_WAITING:
+            raise ValueError("More came at once than the figures can follow; the rest is left out.")
+        self.waiting += 1
+        self.session.house.receive(stage, message, self._answered)
+
+    def _answered(self):
+        self.waiting -= 1
 
     def tell(self, message):
         self._write(json.dumps(message), False)

@@ -3,12 +3,14 @@
 import asyncio
 import contextlib
 import ctypes
+import gc
 import logging
 import signal
 import webbrowser
 
 from . import room as rooms
 from . import server
+from .house import collect
 from .session import Session
 
 TELL_EVERY = 0.1  # s: votes that arrive together are one message to the wall
@@ -90,7 +92,9 @@ def give_pixels_back():
 async def run(program, options, counts):
     """Show a program until Ctrl-C; `options` are those of the verb."""
     give_pixels_back()
+    gc.freeze()
     demo = Demo(program, options.ip, options.port, counts)
+    demo.session.house.collect = collect
     room = demo.let_vote(options.vote_ip) if options.vote else None
     if program.cards[0].stage:
         await demo.session.house.get(program.cards[0].stage)  # a browser that opens finds it ready

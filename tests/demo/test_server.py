@@ -66,7 +66,7 @@ def cards():
     ]
 
 
-def in_demo(work, vote=False):
+def in_demo(work, vote=False, seconds=SECONDS):
     """Run `work(demo)` beside a demo on the first free ports."""
 
     async def run():
@@ -74,7 +74,7 @@ def in_demo(work, vote=False):
         if vote:
             demo.let_vote("127.0.0.1")
         try:
-            return await asyncio.wait_for(work(demo), SECONDS)
+            return await asyncio.wait_for(work(demo), seconds)
         finally:
             demo.close()
 

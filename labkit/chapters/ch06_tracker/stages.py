@@ -182,13 +182,19 @@ def _faults(loss):
     return udp.Faults(loss=float(loss), duplicate=0.01, reorder=0.02, malformed=0.01)
 
 
+@functools.cache
+def _rehearsed(nonsense):
+    """Packets of a tracker that is well on its way."""
+    endless = simulation.endless_packets(np.random.default_rng(1), lambda: nonsense)
+    return list(itertools.islice(endless, REHEARSED, REHEARSED + TRAIL))
+
+
 @functools.lru_cache(maxsize=64)
 def rehearsal(loss, nonsense):
     """Readings (k, 23) and `udp.Statistics` of a piece of the stream, handed on without a network: what stands there
     before play."""
-    books, endless = udp.Books(keep=TRAIL), simulation.endless_packets(np.random.default_rng(1), lambda: nonsense)
-    packets = itertools.islice(endless, REHEARSED, REHEARSED + TRAIL)
-    for _, datagram, kind in udp.stream(packets, simulation.RATE, _faults(loss), np.random.default_rng(2)):
+    books = udp.Books(keep=TRAIL)
+    for _, datagram, kind in udp.stream(_rehearsed(nonsense), simulation.RATE, _faults(loss), np.random.default_rng(2)):
         if kind != "lost":
             books.take(datagram)
     return books.readings(), books.statistics()
@@ -906,14 +912,20 @@ def _used(state):
 
 
 def _source_places(of, job, T_BF):
-    """Where each source shows in the base with the flange at T_BF: its pose (4, 4), and the covariance of its place
-    (3, 3), mm^2."""
-    frames = cell.frames_in_base(of, job)
-    then = cell.frames_in_base(of, replace(job, T_WE1=job.T_WE0))["E"]
-    tip = pose(T_BF[:3, :3], transform(T_BF, of.tip)), T_BF[:3, :3] @ of.cov_tip @ T_BF[:3, :3].T
-    scanner = T_BF @ of.T_FS, frames["S"][1][3:, 3:]
-    named = (frames["W"], frames["P0"], then, frames["E"])
-    return dict(zip(cell.SOURCES, (tip, scanner, *((T, cov[3:, 3:]) for T, cov in named))))
+    """Where each source shows in the base with the flange at T_BF, a pose (4, 4)."""
+    tip = pose(T_BF[:3, :3], transform(T_BF, of.tip))
+    readings = (of.T_BW @ job.T_WE0, of.T_BW @ job.T_WE1)
+    return dict(zip(cell.SOURCES, (tip, T_BF @ of.T_FS, of.T_BW, cell.learned_pose(of, job), *readings)))
+
+
+def _known(of, job, T_BF, source):
+    """Covariance (3, 3), mm^2, of the place at which a source shows."""
+    if source == "tip":
+        return T_BF[:3, :3] @ of.cov_tip @ T_BF[:3, :3].T
+    shown = {"scanner": "S", "tracker": "W", "marks": "P0", "first reading": "E", "second reading": "E"}[source]
+    if source == "first reading":
+        job = replace(job, T_WE1=job.T_WE0)
+    return cell.frames_in_base(of, job)[shown][1][3:, 3:]
 
 
 def _enlarged(T, to):
@@ -946,10 +958,9 @@ def compute_whole_cell(state):
         "hole": transform(part, cell.HOLE), "miss": cell.miss(cell.TRUTH, used, job, measured),
         "sizes": cell.sizes(shares), "total": float(np.sqrt(np.trace(cov))), "covariance": cov,
         "cloud": cell.simulate_misses(used, measured, np.random.default_rng(62), CLOUD), "source": source,
-        "spoiled": state["spoil"], "place": there[source][0], "known": there[source][1],
-        "off": _enlarged(true[source][0], there[source][0]),
-        "frames": {name: T for name, (T, _) in there.items()} | {"part": part},
-        "places": {name: T[:3, 3] for name, (T, _) in there.items()},
+        "spoiled": state["spoil"], "place": there[source], "known": _known(used, measured, T_BF, source),
+        "off": _enlarged(true[source], there[source]), "frames": there | {"part": part},
+        "places": {name: T[:3, 3] for name, T in there.items()},
     }  # fmt: skip
 
 
@@ -960,7 +971,7 @@ def chosen_by_click(state, moved):
     _, used, measured = _used(state)
     seen = {
         name: np.linalg.norm(state["view"].project(T[:3, 3])[:2] - state["click"])
-        for name, (T, _) in _source_places(used, measured, cell.flange_at_hole(used, measured)).items()
+        for name, T in _source_places(used, measured, cell.flange_at_hole(used, measured)).items()
     }
     nearest = min(seen, key=seen.get)
     return {"source": nearest} if seen[nearest] < NEAR else {}

@@ -74,8 +74,13 @@ def digits(file):
 
 
 def _by_name(file):
+    return dict(_named(file))
+
+
+@functools.cache
+def _named(file):
     table = read_table(f"{file}.csv", text=("name", "unit"))
-    return dict(zip(table["name"].tolist(), table["value"].tolist()))
+    return tuple(zip(table["name"].tolist(), table["value"].tolist()))
 
 
 @functools.cache
