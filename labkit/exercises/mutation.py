@@ -67,13 +67,16 @@ WITHOUT = {
 }
 
 
-def changes(function):
+def changes(function, most=4):
     """All single changes of a function, the likeliest slips first.
 
     Parameters
     ----------
     function : ast.FunctionDef
         A right solution.
+    most : int
+        How unlikely the changes may be: 0 for signs and operators, 1 with what is left out or exchanged, 2 with numbers
+        and signs of single names, 3 and 4 with parts squared and names in place of others.
 
     Returns
     -------
@@ -84,8 +87,10 @@ def changes(function):
     names = _names(function)
     for k, node in enumerate(ast.walk(function)):
         for rank, words, new in _changed(node, names):
-            found.append((rank, len(found), words, _with(function, k, new)))
-    found += [(1, len(found) + i, words, tree) for i, (words, tree) in enumerate(_statements(function))]
+            if rank <= most:
+                found.append((rank, len(found), words, _with(function, k, new)))
+    if most:
+        found += [(1, len(found) + i, words, tree) for i, (words, tree) in enumerate(_statements(function))]
     return [(words, tree) for _, _, words, tree in sorted(found, key=lambda change: change[:2])]
 
 

@@ -32,7 +32,7 @@ NUMBERS = tuple(functools.partial(printed_number, form=form) for form in FORMS)
 COMPARISONS = tuple(
     functools.partial(comparison, off=off, bound=bound, misprint=misprint, simulated=simulated, comma=k % 5 == 3)
     for k, (off, bound, misprint, simulated) in enumerate(
-        itertools.product((0.0, 0.4, 1.8, 2.7, 60.0), (0.0, 1.5, 100.0), (False, True), (False, True))
+        itertools.product((0.0, 0.4, 1.8, 2.2, 2.7, 60.0), (0.0, 1.5, 100.0), (False, True), (False, True))
     )
 )
 
@@ -135,6 +135,16 @@ def _signed(printed, value, bound, misprint, simulated):
     return status(printed, value, bound, misprint, simulated)
 
 
+def _signed_up(printed, value, bound, misprint, simulated):
+    value = min(value, _number(printed))
+    return status(printed, value, bound, misprint, simulated)
+
+
+def _root_of_squares(printed, value, bound, misprint, simulated):
+    half = half_unit(printed)
+    return status(printed, value, np.hypot(half, bound) - half, misprint, simulated)
+
+
 def _within_a_unit(printed, value, bound, misprint, simulated):
     rule = _simulated_word if simulated else _real_word
     return rule(2 * half_unit(printed) * (1 + 1e-6), abs(value - _number(printed)), bound, misprint)
@@ -220,6 +230,32 @@ STATUSES = (
     ),
     (_within_a_unit, "You compare with a whole unit of the last digit. Rounding hides half of it."),
     (_signed, "A value below the printed one is off as well: take the absolute difference."),
+    (_signed_up, "A value above the printed one is off as well: take the absolute difference."),
+    (
+        _root_of_squares,
+        "Half unit and bound add up as they are: a bound must hold in the worst case, the root of squares does not.",
+    ),
+    (
+        _judged(lambda h, o, b, m: _real_word(h, o, b, m).replace("contradiction", "refuted")),
+        "What is left in the end is a *contradiction*: *refuted* is said of claims, and left out here.",
+    ),
+    (
+        _judged(_real_word, lambda h, o, b, m: "consistent" if o <= h + b else "contradiction"),
+        "A simulation far from the printed value contradicts nothing: its inputs were never published, so the row is not computable.",
+    ),
+    (
+        _judged(
+            lambda h, o, b, m: "misprint" if m else _real_word(h, o, b, m),
+        ),
+        "*misprint* comes last: ask for *reproduced* and *rounding* before it. A number that comes out is no misprint.",
+    ),
+    (
+        _judged(
+            _real_word,
+            lambda h, o, b, m: _real_word(h, o, b, True) if o <= h + b or m else "not computable",
+        ),
+        "Ask for `simulated` first: without the inputs nothing is reproduced, and no misprint proved.",
+    ),
 )
 
 

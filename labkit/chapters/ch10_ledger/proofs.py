@@ -169,6 +169,7 @@ BOUND = Exercise(
 # --- prove a misprint ---
 
 
+FINE = {"fine": 0.3, "too fine": 0.8}  # units by which an average with one digit more is off
 AWAY = {"edge": -1, "beyond": -2, "far": 2}  # units from the rounded average, to the side it was not rounded to
 
 
@@ -177,7 +178,8 @@ def column(rng, slip):
 
     With a slip in an entry the average is printed to its last digit. "edge", "beyond" and "far" print an average that
     is 1 to 2, 3 to 4 and 4 to 5 half units away: entries and average together allow 2, each alone 1. "fine" prints it
-    with one digit more, and off by what the entries alone allow.
+    with one digit more, and off by what the entries alone allow; "too fine" is off by more than that. In "mixed" one
+    entry has a digit less than the others, and is what allows most.
     """
     decimals, count = int(rng.integers(1, 4)), int(rng.integers(4, 6))
     values = np.round(rng.uniform(2, 60, count) * rng.choice([-1, 1], count, p=[0.2, 0.8]), decimals)
@@ -189,8 +191,11 @@ def column(rng, slip):
         side = 1 if values.mean() <= near else -1
         return [f"{value:.{decimals}f}" for value in values], f"{near + AWAY[slip] * side * unit:.{decimals}f}"
     entries, average = [f"{value:.{decimals}f}" for value in values], f"{values.mean():.{decimals + more}f}"
-    if slip == "fine":
-        average = f"{values.mean() + 0.3 * unit * rng.choice([-1, 1]):.{decimals + 1}f}"
+    if slip in FINE:
+        average = f"{values.mean() + FINE[slip] * unit * rng.choice([-1, 1]):.{decimals + 1}f}"
+    elif slip == "mixed":
+        values[1] = np.round(values[1], decimals - 1)
+        entries[1], average = f"{values[1]:.{decimals - 1}f}", f"{values.mean() + 0.8 * unit:.{decimals + 1}f}"
     elif slip == "average":
         average = _slipped(rng, average, "one digit wrong")
     elif slip:
@@ -211,7 +216,7 @@ def _slipped(rng, text, kind):
 
 COLUMNS = tuple(
     functools.partial(column, slip=slip)
-    for slip in ("two digits swapped", "one digit wrong", "", "average", "sign lost", "fine", *AWAY)
+    for slip in ("two digits swapped", "one digit wrong", "", "average", "sign lost", "mixed", *FINE, *AWAY)
 )
 
 

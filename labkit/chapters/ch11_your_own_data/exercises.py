@@ -13,6 +13,7 @@ from ...files.poses import read_poses
 from ...files.samples import sample_cell
 from ...geometry.frames import invert, pose
 from ...geometry.lie import exp_so3, log_so3
+from ...machines.sensor_cell import CELL
 
 # --- draws -----------------------------------------------------------------------------------------------------------
 
@@ -118,6 +119,10 @@ def honest_covariance(r, J):
     return (noise.std * noise.widening)[0] ** 2 * np.linalg.inv(J.T @ J)
 
 
+def _freedom(r, J):
+    return float(len(r) - J.shape[1])
+
+
 def _covariance(factor):
     """r'r times a factor of n and p, times the inverse of J'J."""
 
@@ -165,6 +170,22 @@ def _least_certain(C, candidates):
 
 def _least_certain_volume(C, candidates):
     return int(np.argmax(np.linalg.det(candidates @ C @ np.swapaxes(candidates, 1, 2))))
+
+
+def _largest_eigenvalue(C, candidates):
+    return int(np.argmin(np.linalg.eigvalsh(_left(C, candidates))[:, -1]))
+
+
+def _one_after_the_other(C, candidates):
+    volumes = []
+    for J in candidates:
+        C = with_one_more(C, J)
+        volumes.append(np.linalg.det(C))
+    return int(np.argmin(volumes))
+
+
+def _alone(C, candidates):
+    return int(np.argmin([np.linalg.det(np.linalg.pinv(J.T @ J)) for J in candidates]))
 
 
 WRONG_RULES = (_smallest_trace, _largest_derivative, _largest_volume, _least_certain)
@@ -237,6 +258,10 @@ CHAPTER = Chapter(
                         "The transpose of a 4 x 4 pose is not its inverse. Use `invert`."),
                 Mistake(lambda F, S: (invert(F) @ np.roll(F, -1, 0), S @ invert(np.roll(S, -1, 0))),
                         "You closed the circle from the last row to the first: n rows make n - 1 motions."),
+                Mistake(lambda F, S: (invert(F[:-2]) @ F[2:], S[:-2] @ invert(S[2:])),
+                        "You leave a row out: each motion leads from a row to the very next one."),
+                Mistake(lambda F, S: (np.diff(F, axis=0), np.diff(S, axis=0)),
+                        "Poses are not subtracted. The motion from one to the next is a product with an inverse."),
             ],
         ),
         Prediction(
@@ -268,6 +293,11 @@ CHAPTER = Chapter(
                         "This is the angle of the turn between two motions. Asked for is the angle between their axes."),
                 Mistake(lambda T, k: np.abs(_angles(T)[k:] - _angles(T)[:-k]),
                         "This compares how far two motions turn. Asked for is the angle between their axes."),
+                Mistake(lambda T, k: _angles(T)[k:] - _angles(T)[:-k],
+                        "This compares how far two motions turn, with a sign. Asked for is the angle between their axes."),
+                *(Mistake(lambda T, k, column=column: _angle_between(T[k:, :3, column], T[:-k, :3, column]),
+                          "You compared where a coordinate axis goes: a column of the rotation. The axis of a motion is what stays, the direction of its rotation vector.")
+                  for column in (2, 0, 1)),
                 Mistake(lambda T, k: np.arccos(np.clip((log_so3(T[k:, :3, :3]) * log_so3(T[:-k, :3, :3])).sum(1), -1, 1)),
                         "Your rotation vectors have the length of the angle. Bring them to length 1 before the scalar product."),
                 Mistake(lambda T, k: np.arccos(np.clip((_axes(T)[k:] * _axes(T)[:1]).sum(1), -1, 1)),
@@ -302,6 +332,15 @@ CHAPTER = Chapter(
                         "This is by how much the residuals grow. Asked for is by how much the result moves."),
                 Mistake(lambda: _apart(invert(slipped().plain.T), invert(slipped().T)),
                         "You compared the inverse matrices: where the flange sits, seen from the sensor."),
+                Mistake(lambda: float(np.linalg.norm(slipped().plain.T - slipped().T)),
+                        "You took the norm over the whole matrix: the entries of the rotation are no millimeters. The last column alone says where the sensor is."),
+                Mistake(lambda: slip_cost() / np.sqrt(3), "This is the rms of the three coordinates: a distance is the root of the sum of their squares, not of the mean."),
+                Mistake(lambda: _apart(slipped().plain.T, CELL.T_FS), "This is how far the fit to all rows is from the truth, which nobody has for data of his own. Asked for is the way from the fit to the rows that agree."),
+                Mistake(lambda: _apart(slipped().T, CELL.T_FS), "This is how far the fit to the rows that agree is from the truth. Asked for is the way from it to the fit to all rows."),
+                Mistake(lambda: abs(np.linalg.norm(slipped().T[:3, 3]) - np.linalg.norm(slipped().plain.T[:3, 3])),
+                        "You compared two distances from the flange. Subtract the places first, then take the length."),
+                *(Mistake(lambda k=k: abs(float(slipped().plain.T[k, 3] - slipped().T[k, 3])), "This is one coordinate of the difference. The distance takes all three.") for k in (1, 2)),
+                Mistake(lambda: float(np.linalg.norm((slipped().T @ slipped().plain.T)[:3, 3])), "You multiplied the two mountings without inverting one."),
             ],
         ),
         Exercise(
@@ -327,6 +366,12 @@ CHAPTER = Chapter(
                 Mistake(lambda r, J: r / (1 - J.shape[1] / len(r)),
                         "You gave every number the mean share p / n. Each row of J has a share of its own."),
                 Mistake(lambda r, J: r / (1 - (J**2).sum(1)), "(J'J)^-1 is missing between the two rows of J."),
+                Mistake(lambda r, J: r / (1 - ((J @ J.T @ J) * J).sum(1)), "J'J stands between the two rows of J as it is: its inverse belongs there."),
+                Mistake(lambda r, J: r - _shares(J), "You subtracted h, a share without unit, from a residual. What is left of an error is 1 - h of it: divide by that."),
+                Mistake(lambda r, J: r * (1 + _shares(J)), "1 + h is only the beginning of 1 / (1 - h): right for small shares."),
+                Mistake(lambda r, J: r / (1 - _shares(J)) ** 2, "You divided by 1 - h twice."),
+                Mistake(lambda r, J: 2 * r - left_out(r, J), "The fit to the others is right, its sign is not: their fit is subtracted from the number, not added to it."),
+                Mistake(lambda r, J: r / (1 - np.linalg.inv(J.T @ J).trace()), "You took one number for all: the trace of (J'J)^-1. Each row of J has a share of its own, j' (J'J)^-1 j."),
             ],
         ),
         Prediction(
@@ -365,6 +410,16 @@ CHAPTER = Chapter(
                 Mistake(_covariance(lambda rr, n, f: rr * f / (f - 2)), "r'r is the sum of squares. The variance is r'r / f."),
                 Mistake(_covariance(lambda rr, n, f: rr / (f - 1) * f / (f - 2)),
                         "You took one degree of freedom too many away: with p parameters f = n - p, not n - p - 1."),
+                Mistake(_covariance(lambda rr, n, f: rr / f * (f / (f - 2)) ** 2), "Student's factor has been squared: f / (f - 2) is that of a variance already."),
+                Mistake(_covariance(lambda rr, n, f: rr / f * f / (f + 2)), "A sign: the variance of Student's law is f / (f - 2), larger than 1."),
+                Mistake(_covariance(lambda rr, n, f: rr / (f - 1)), "Of Student's factor f / (f - 2) you have f / (f - 1)."),
+                Mistake(_covariance(lambda rr, n, f: rr / (n - 1) * (n - 1) / (n - 3)), "Your f is n - 1, as for a mean. Here p parameters are fitted: f = n - p."),
+                Mistake(_covariance(lambda rr, n, f: rr / (n - 1)), "You divided by n - 1, as for a mean. Here p parameters are fitted, f = n - p, and Student's f / (f - 2) is missing."),
+                Mistake(lambda r, J: np.var(r) * _freedom(r, J) / (_freedom(r, J) - 2) * np.linalg.inv(J.T @ J),
+                        "`np.var` takes the mean of the residuals off and divides by their number. The noise is r'r / f."),
+                Mistake(lambda r, J: np.var(r) * np.linalg.inv(J.T @ J),
+                        "`np.var` takes the mean of the residuals off and divides by their number. The noise is r'r / f, and Student's f / (f - 2) is missing."),
+                Mistake(lambda r, J: r @ r / (_freedom(r, J) - 2) * (J.T @ J), "J'J is information. The covariance takes its inverse."),
             ],
         ),
         Prediction(
@@ -396,6 +451,16 @@ CHAPTER = Chapter(
                 Mistake(lambda C, J: np.linalg.inv(2 * np.linalg.inv(C) + J.T @ J), "You counted the data you have twice."),
                 Mistake(lambda C, J: C @ J.T @ np.linalg.solve(J @ C @ J.T + np.eye(len(J)), J @ C),
                         "This is what the reading takes away. Subtract it from C."),
+                Mistake(lambda C, J: C + C @ J.T @ np.linalg.solve(J @ C @ J.T + np.eye(len(J)), J @ C),
+                        "You added what the reading takes away: a covariance shrinks with every reading."),
+                Mistake(lambda C, J: np.linalg.inv(np.linalg.inv(C) - J.T @ J), "You subtracted the new information. It adds up."),
+                Mistake(lambda C, J: C - C @ J.T @ np.linalg.solve(J @ C @ J.T + 1, J @ C),
+                        "`+ 1` adds one to every entry of J C J^T. The whitened covariance of the reading is the identity, np.eye(len(J))."),
+                Mistake(lambda C, J: np.linalg.inv(np.linalg.inv(C) + np.outer(J[0], J[0])), "Only the first number of the reading counts. J^T J takes all of its rows."),
+                Mistake(lambda C, J: 1 / (1 / C + J.T @ J), "`1 / C` turns every entry over. The inverse of a matrix is np.linalg.inv(C)."),
+                Mistake(lambda C, J: np.linalg.inv(1 / C + J.T @ J), "`1 / C` turns every entry over. The inverse of a matrix is np.linalg.inv(C)."),
+                Mistake(lambda C, J: np.linalg.inv(np.linalg.inv(C) + np.linalg.pinv(J.T @ J)), "J^T J is information already: it is added as it is, not inverted."),
+                Mistake(lambda C, J: C + np.linalg.pinv(J.T @ J), "You added covariances. What adds up are their inverses, the information."),
             ],
         ),
         Prediction(
@@ -417,7 +482,8 @@ CHAPTER = Chapter(
                 "return int(np.argmin(left))`",
             ),
             mistakes=[
-                Mistake(_smallest_trace, "You took the candidate with the smallest trace. A trace adds squares of different units, and the largest unit decides alone: compare determinants."),
+                *(Mistake(rule, "Your choice is that of the smallest trace, or of the smallest largest eigenvalue. Among squares of different units the largest unit decides alone: compare determinants.")
+                  for rule in (_smallest_trace, _largest_eigenvalue)),
                 Mistake(_largest_derivative, "You took the candidate with the largest derivative. It may well tell what is known already: compute what it leaves."),
                 Mistake(_largest_volume, "You took the candidate that leaves most unknown: the smallest determinant is the best."),
                 Mistake(_least_certain, "You took the reading that can be predicted least. Its numbers may all say the same: compare the determinants of what is left."),
@@ -425,6 +491,9 @@ CHAPTER = Chapter(
                 Mistake(lambda C, c: next_pose(C, c) + 1, "Candidates count from 0."),
                 Mistake(lambda C, c: c[next_pose(C, c)], "This is the candidate's derivative. Asked for is its number."),
                 Mistake(lambda C, c: float(_volumes(C, c).min()), "This is the determinant it leaves. Asked for is the candidate's number."),
+                Mistake(_one_after_the_other, "You keep what one candidate brought when you try the next. Each is tried on the same C."),
+                Mistake(_alone, "You looked at each candidate alone: what is known already, C, makes some of them worth little."),
+                Mistake(lambda C, c: 0, "You return the first one, whatever it brings."),
             ],
         ),
         Exercise(
@@ -450,6 +519,13 @@ CHAPTER = Chapter(
                 Mistake(lambda J, s, k: k * s**2 / np.sqrt(1 - _shares(J)), "You took the variance of the noise. Its standard deviation belongs here."),
                 Mistake(lambda J, s, k: np.full(len(J), k * s / np.sqrt(1 - J.shape[1] / len(J))),
                         "You gave every number the mean share p / n. Each row of J has a share of its own."),
+                Mistake(lambda J, s, k: k * s / np.sqrt(1 + _shares(J)), "1 + h belongs to a number that was not fitted. These were: 1 - h."),
+                Mistake(lambda J, s, k: k + s / np.sqrt(1 - _shares(J)), "You added `times`. It says how many of these standard deviations: multiply."),
+                *(Mistake(lambda J, s, k, f=f: k * s / np.sqrt(f(1 - s**2 * _shares(J))),
+                          "The noise does not belong into h: with equal noise the share of a number follows from J alone.") for f in (np.abs, np.asarray)),
+                *(Mistake(lambda J, s, k, f=f: k * s / np.sqrt(f(1 - ((J @ J.T @ J) * J).sum(1))),
+                          "J'J stands between the two rows of J as it is: its inverse belongs there.") for f in (np.abs, np.asarray)),
+                Mistake(lambda J, s, k: 4.13 * s / np.sqrt(1 - _shares(J)), "Your 4.13 is fixed. `times` says how many standard deviations are taken."),
             ],
         ),
     ],
