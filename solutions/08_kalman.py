@@ -226,7 +226,7 @@ for T in (0.05, 0.09, 0.11, 0.12):
 # %% wrap_angle
 @ex.wrap_angle
 def wrap_angle(angle):
-    """Return the same direction within [-pi, pi)."""
+    """Return the same direction as an angle from -pi to pi."""
     ### BEGIN SOLUTION
     return (angle + np.pi) % (2 * np.pi) - np.pi
     ### END SOLUTION

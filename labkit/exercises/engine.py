@@ -21,6 +21,7 @@ from . import arguments, cases, guard, metrics, operands, relations, scope, shap
 TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
 NOISY = "exact on clean data, but the data are not weighed as they should be: on noisy data"
 TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws of each kind
+MANY_DIGITS = 1e-3  # by how much better some draws come out where one case is special
 MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried, to tell on which
 LOOKING = 0.5  # seconds of processor time in which changes of the arguments are tried as an explanation
 UNITS = {
@@ -237,7 +238,7 @@ class _Trial:
                 if words and not metric.equal(*pair):
                     off = next(d for d in metric.deviations(*pair) if not d.within)
                     return self.outcome(NOT_YET, _closed(f"{words} {off}"))
-        words = self._relation() or self._unmoved()
+        words = self._unmoved() or self._relation()
         return self.outcome(NOT_YET, (_closed(words) if words else self._deviation()) + self._about_globals())
 
     def _relation(self, whole=False):
@@ -418,7 +419,7 @@ class _Trial:
             return "right on most draws, but not on all."
         most = max(worst, key=lambda d: d.amount / max(d.tolerance, 1e-300))
         near = relations.not_accurate_enough(most)
-        if near:
+        if near and not self._right_to_many_digits(most):
             return near
         missed = [args for args, pair in zip(self.inputs, pairs) if not metric.equal(*pair)]
         if len(missed) == len(pairs):
@@ -428,6 +429,11 @@ class _Trial:
         if special:
             right = f"It is wrong where {special}, and right elsewhere, on {seen} draws."
         return f"{_closed(str(most))} {right}\nNot right when called as {self._call(missed[0])}"
+
+    def _right_to_many_digits(self, worst):
+        """Whether some draws come out so much better than the worst that a case is to be told, not the accuracy."""
+        sizes = [max((d.amount for d in m.deviations(*pair)), default=0.0) for _, m, pair in self._cases()]
+        return len(sizes) > 1 and min(sizes) < MANY_DIGITS * worst.amount
 
     def _special_case(self):
         """What the draws on which the answer is wrong have in common, fresh ones among them, and how many these are."""
@@ -635,7 +641,7 @@ class Value(Item):
             else guard.run(self._converted, (answer, unit, expected))
         )
         if isinstance(run.error, metrics.Refused | ValueError):
-            return Outcome(NOT_YET, _closed(_for_value(run.error)))
+            return Outcome(NOT_YET, _closed(_for_value(run.error)) + _of_shape(answer, expected))
         if run.error is not None:
             return Outcome(NOT_YET, f"expected a number{self._in_unit()}, got {metrics._describe(answer)}.")
         return self._compare(metric, run.result, expected)
@@ -666,7 +672,7 @@ class Value(Item):
                 if isinstance(run.error, metrics.Refused)
                 else f"{type(run.error).__name__}: {run.said}"
             )
-            return Outcome(NOT_YET, _closed(text))
+            return Outcome(NOT_YET, _closed(text) + _of_shape(answer, expected))
         return self._compare(metric, run.result, expected)
 
     def _compare(self, metric, answer, expected):
@@ -690,7 +696,7 @@ class Value(Item):
         if digits > 1:
             least = f"at least {self.digits} digits are needed"
             return Outcome(NOT_YET, f"right as far as it goes: {least}, so hand over the computed value.")
-        words = relations.difference_words(metric, [(answer, expected)])
+        words = relations.difference_words(metric, [(answer, expected)]) or relations.ratio_words(answer, expected)
         return Outcome(NOT_YET, _closed(words) if words else self._which_way(answer, expected))
 
     def _which_way(self, answer, expected):
@@ -703,6 +709,12 @@ class Value(Item):
 
     def _in_unit(self):
         return f" in {self.unit}" if self.unit else ""
+
+
+def _of_shape(answer, expected):
+    """What an answer of the wrong shape has to do with the expected one, as one more sentence."""
+    words = shapes.shape_words([answer], [expected])
+    return f" {words[0].upper()}{words[1:].replace('you return', 'you hand over')}." if words else ""
 
 
 def _closed(sentence):

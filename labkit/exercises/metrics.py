@@ -170,8 +170,9 @@ def _refuse_infinite(array):
         which = "NaN" if np.isnan(array).any() else "infinity"
         count = "" if array.ndim == 0 else f" in {bad} of {array.size} entries"
         raise Refused(
-            f"the result holds {which}{count}: look for a division by zero, a root of a negative number,"
-            " an arccos or arcsin of something beyond -1 and 1, or an iteration that runs away"
+            f"the result holds {which}{count}: look for a division by zero, the exponential of a large number or the"
+            " logarithm of 0, a root of a negative number, an arccos or arcsin of something beyond -1 and 1, or an"
+            " iteration that runs away"
         )
 
 
@@ -188,18 +189,20 @@ def _is_single(array):
 class Numbers(Metric):
     """A number or an array: largest deviation, relative to the size of the expected entries (at least 1).
 
-    `tol` is that relative tolerance; `unit` names the deviation.
+    `tol` is that relative tolerance; `unit` names the deviation. With `absolute` the tolerance is in this unit, however
+    large the entries are.
     """
 
     tol: float = 1e-9
     unit: str = ""
+    absolute: bool = False
 
     def admit(self, result, expected):
         return as_array(result, np.shape(expected))
 
     def deviations(self, result, expected):
         expected = np.asarray(expected, dtype=float)
-        scale = max(1.0, np.abs(expected).max(initial=0.0))
+        scale = 1.0 if self.absolute else max(1.0, np.abs(expected).max(initial=0.0))
         tol = max(self.tol, FLOAT32_TOLERANCE) if _is_single(result) else self.tol
         amount = float(np.abs(result.astype(float) - expected).max(initial=0.0))
         return [Deviation("the largest entry" if result.ndim else "", amount, self.unit, tol * scale)]

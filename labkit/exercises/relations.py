@@ -14,6 +14,8 @@ from .metrics import Exactly, Numbers, Poses, Rotations, Several, Through
 
 CLOSE = 1e4  # tolerances: an answer nearer than this is right in kind, but not accurate enough ...
 FAR = 1e-2  # ... unless it is off by more than this: a coarse tolerance leaves no room for less accurate answers
+SIMPLE = 12  # the largest number in a fraction that is worth telling
+EXACT = 1e-9  # how nearly two numbers have to agree for it
 LONGEST = 12  # entries along the last axis that are tried one by one
 FACTORS = {"pi": np.pi, "2 pi": 2 * np.pi, "the root of 2": np.sqrt(2.0), "the root of 3": np.sqrt(3.0)}
 
@@ -154,8 +156,20 @@ def _sign_or_unit(holds, unit):
         return "your result is in radians where degrees are expected"
     for factor, words in ((1e3, "a thousandth of"), (1e-3, "a thousand times"), (0.5, "twice"), (2.0, "half")):
         if holds(lambda r, factor=factor: factor * r):
-            return f"your result is {words} the expected one{': mm against m?' if factor in (1e3, 1e-3) else ''}"
+            return f"your result is {words} the expected one{_thousand(unit) if factor in (1e3, 1e-3) else ''}"
     return None
+
+
+def _thousand(unit):
+    """Which two units a factor of a thousand may have confused."""
+    units = {
+        "mm": "mm against m",
+        "m": "mm against m",
+        "s": "ms against s",
+        "rad": "mrad against rad",
+        "mrad": "mrad against rad",
+    }
+    return f": {units[unit]}?" if unit in units else ", on every draw"
 
 
 def _arrangement(results, holds):
@@ -276,6 +290,24 @@ def _offset(results, expected, unit):
     if len(results) > 1 and abs(gaps[0]) > 1e-9 and np.ptp(gaps) < 1e-9 * max(1.0, abs(gaps[0])):
         amount = f"{abs(gaps[0]):.4g}{' ' + unit if unit else ''}"
         return f"your result is too {'large' if gaps[0] > 0 else 'small'} by {amount}, on every draw"
+    return None
+
+
+def ratio_words(answer, expected):
+    """What a wrong number has to do with the right one: a simple fraction of it, the root of one, what is left to 1."""
+    if np.ndim(expected) or not (np.isfinite(answer) and expected and answer):
+        return None
+    ratio = float(answer) / float(expected)
+    for power, form in ((1, "{}"), (2, "the root of {}")):
+        for n, m in itertools.product(range(1, SIMPLE + 1), repeat=2):
+            if np.gcd(n, m) == 1 and n != m and abs(abs(ratio) ** power * m / n - 1) < EXACT:
+                fraction = form.format(f"{n}/{m}" if m > 1 else n)
+                return f"your value is {'minus ' if ratio < 0 else ''}{fraction} times the expected one"
+    for whole, words in ((1.0, "1"), (np.pi, "pi"), (2 * np.pi, "2 pi"), (180.0, "180"), (360.0, "360")):
+        if abs(answer + expected - whole) < EXACT * whole:
+            return f"your value and the expected one make {words} together: it is what is left of {words}"
+        if abs(abs(answer - expected) - whole) < EXACT * whole:
+            return f"your value is too {'large' if answer > expected else 'small'} by {words}"
     return None
 
 

@@ -300,8 +300,9 @@ def _mad(values):
 def speed_curves(rng, sign):
     """Angular speeds of a robot and of a tracker that lags (sign 1), or leads (-1), by a fraction of a sample."""
     step = float(rng.choice([0.01, 0.0125]))
-    time, phase = step * np.arange(int(rng.integers(550, 700))), rng.uniform(0, 6, 3)
-    lag = sign * (rng.integers(7, 15) + rng.choice([0.27, 0.33, 0.67, 0.73])) * step
+    time, phase = rng.uniform(1, 50) + step * np.arange(int(rng.integers(550, 700))), rng.uniform(0, 6, 3)
+    samples = int(rng.integers(7, 30))
+    lag = sign * (samples + rng.choice([0.27, 0.33, 0.67, 0.73])) * step
 
     def curve(t):
         return (
@@ -311,7 +312,7 @@ def speed_curves(rng, sign):
             + 0.15 * np.sin(5.9 * t + phase[2])
         )
 
-    return time, curve(time), curve(time - lag), step * int(rng.integers(18, 26))
+    return time, curve(time), curve(time - lag), step * (samples + int(rng.integers(4, 12)))
 
 
 def _overlap(reference, delayed, n):
@@ -384,8 +385,20 @@ def _run_1(factor=4.0):
     return stop_poses(), average_stops(synthetic_log(1), factor)[0]
 
 
-def _mounting(factor=4.0, gate=8.0):
-    return calibrate_mounting(*_run_1(factor), gate).T_FE
+def _mounting(factor=4.0, gate=8.0, R=None):
+    """The mounting; with a rotation R given, that one, and the translation that belongs to it."""
+    found = calibrate_mounting(*_run_1(factor), gate)
+    if R is None:
+        return found.T_FE
+    T_BF, T_WE = _run_1(factor)
+    A, B = relative(T_BF[0], T_BF)[found.kept][1:], relative(T_WE[0], T_WE)[found.kept][1:]
+    return pose(R, ax_xb.translation_from_motions(A, B, R)[0])
+
+
+def _from_the_poses():
+    T_BF, T_WE = _run_1()
+    kept = calibrate_mounting(T_BF, T_WE).kept
+    return ax_xb.solve_ax_xb(T_BF[kept], T_WE[kept])
 
 
 def _against_the_readings():
@@ -1214,6 +1227,18 @@ CHAPTER = Chapter(
                     lambda: pose(_mounting()[:3, :3], _mounting()[:3, 3] / 1000),
                     "The translation is in meters; wanted are mm.",
                 ),
+                Mistake(
+                    lambda: pose(_mounting()[:3, :3], _mounting(gate=1e9, R=_mounting()[:3, :3])[:3, 3]),
+                    "The rotation is right. For the translation the stop that `kept` excludes is still in.",
+                ),
+                Mistake(
+                    lambda: pose(_mounting(gate=1e9)[:3, :3], _mounting(R=_mounting(gate=1e9)[:3, :3])[:3, 3]),
+                    "The translation leaves out what `kept` excludes. For the rotation that stop is still in.",
+                ),
+                Mistake(
+                    _from_the_poses,
+                    "You took the poses themselves. A X = X B holds for motions, `A` and `B`: the tracker's poses stand in a frame of its own.",
+                ),
             ],
         ),
         Value(
@@ -1245,6 +1270,10 @@ CHAPTER = Chapter(
                         "This is the spread of another coordinate. The height z is `mountings[:, 2, 3]`.",
                     )
                     for axis in (0, 1)
+                ),
+                Mistake(
+                    lambda: np.std([m.T_FE[:3, 3] for m in synthetic_mountings()]),
+                    "You took the three coordinates together. The height z is `mountings[:, 2, 3]`.",
                 ),
                 Mistake(
                     lambda: np.std([m.T_FE for m in synthetic_mountings()]),

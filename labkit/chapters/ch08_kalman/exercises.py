@@ -77,6 +77,13 @@ def landmark_aside(rng, side, turned):
     return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
 
 
+def landmark_behind(rng, side):
+    """A landmark so nearly behind the robot that a hundredth of a radian or of a meter takes it across the seam."""
+    x, r = np.array([*rng.uniform(-4, 4, 2), rng.uniform(-3, 3)]), rng.uniform(1.5, 6)
+    angle = x[2] + side * (np.pi - rng.uniform(5e-4, 1e-3))
+    return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
+
+
 def within_half_a_turn(rng):
     return (rng.uniform(-3, 3),)
 
@@ -199,6 +206,27 @@ def _batch(prior=1.0, weight=np.linalg.inv, used=lambda z: z):
     return variant
 
 
+def _batch_of_sums(information, known):
+    """All at once from sums; `information(prior's, one measurement's, number)` and the prior's part of the right side."""
+
+    def variant(x0, cov0, z, C, cov_z):
+        V, V0 = np.linalg.inv(cov_z), np.linalg.inv(cov0)
+        cov = np.linalg.inv(information(V0, C.T @ V @ C, len(z)))
+        return cov @ (known(V0, x0) + C.T @ V @ z.sum(0)), cov
+
+    return variant
+
+
+def _batch_with_covariances(x0, cov0, z, C, cov_z):
+    cov = np.linalg.inv(cov0 + len(z) * C.T @ cov_z @ C)
+    return cov @ (cov0 @ x0 + C.T @ cov_z @ z.sum(0)), cov
+
+
+def _batch_unweighted(x0, cov0, z, C, cov_z):
+    cov = np.linalg.inv(np.eye(len(x0)) + len(z) * C.T @ C)
+    return cov @ (x0 + C.T @ z.sum(0)), cov
+
+
 def update(x, cov, z, C, cov_z):
     result = kalman.update(x, cov, z, C, cov_z)
     return result.x, result.cov
@@ -252,8 +280,33 @@ def _fused(weights, var=None):
     return variant
 
 
+def _second_from_the_old_variance(x0, var0, z, stds):
+    first, second = (var0 / (var0 + std**2) for std in stds)
+    x = x0 + first * (z[0] - x0)
+    return x + second * (z[1] - x), (1 - second) * (1 - first) * var0
+
+
 def steady_state_gain(A, C, cov_v, cov_z):
     return kalman.steady_state(A, C, cov_v, cov_z).gain
+
+
+def _never_corrected(n):
+    def variant(A, C, Q, R):
+        P = np.eye(len(A))
+        for _ in range(n):
+            P = A @ P @ A.T + Q
+        return _gain(P, C, R)
+
+    return variant
+
+
+def _settled(A, C, Q, R):
+    """Covariance before and after the correction, once it stands still."""
+    P = np.eye(len(A))
+    for _ in range(1000):
+        before = A @ P @ A.T + Q
+        P = _shrunk(before, _gain(before, C, R), C)
+    return before, P
 
 
 def _rounds(n):
@@ -367,6 +420,23 @@ def _through_the_linear_filter(predict_too, correct_too):
     return step
 
 
+def _ekf_by_the_slope(x, cov, u, dt, cov_u, z, landmark, cov_z):
+    moved, cov = _ekf(short=True)(x, cov, u, dt, cov_u, z, landmark, cov_z)
+    H = measurement_jacobian(moved, landmark)
+    y = z - H @ moved
+    y[1] = wrapped(y[1])
+    K = _gain(cov, H, cov_z)
+    return moved + K @ y, _shrunk(cov, K, H)
+
+
+def _ekf_in_degrees(x, cov, u, dt, cov_u, z, landmark, cov_z):
+    moved, cov = _ekf(short=True)(x, cov, u, dt, cov_u, z, landmark, cov_z)
+    H, expected = measurement_jacobian(moved, landmark), measurement(moved, landmark)
+    y = np.array([z[0] - expected[0], wrapped(z[1] - np.rad2deg(expected[1]))])
+    K = _gain(cov, H, cov_z)
+    return moved + K @ y, _shrunk(cov, K, H)
+
+
 def _all_wrapped(x, cov, u, dt, cov_u, z, landmark, cov_z):
     moved, cov = _ekf(short=True)(x, cov, u, dt, cov_u, z, landmark, cov_z)
     H = measurement_jacobian(moved, landmark)
@@ -407,6 +477,9 @@ def _gated(score):
         return bool(score(y, S) <= limit)
 
     return variant
+
+
+_PRIOR = np.array([[1.9469, 0.2550], [0.2550, 0.0916]])  # as the page prints it
 
 
 def _printed_correction(change=lambda given: given):
@@ -735,6 +808,17 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(
+                    lambda x0, v, z, s: (
+                        _fused(lambda v, s: [v, *s**2])(x0, v, z, s)[0],
+                        fuse_two_sensors(x0, v, z, s)[1],
+                    ),
+                    "The variance is right. Your weights of the position are the variances: what is uncertain counts most. Take one over them.",
+                ),
+                Mistake(
+                    _second_from_the_old_variance,
+                    "The second sensor meets the variance from before the first one. After a correction the new variance counts.",
+                ),
+                Mistake(
                     _fused(lambda v, s: [1 / np.sqrt(v), *(1 / s)]),
                     "Weights are one over the variance, not over the standard deviation.",
                 ),
@@ -878,6 +962,25 @@ CHAPTER = Chapter(
                 "return P @ C.T @ np.linalg.inv(C @ P @ C.T + cov_z)`",
             ),
             mistakes=[
+                *(
+                    Mistake(
+                        _never_corrected(n),
+                        "The correction is missing in your loop: the covariance only grows, and the gain with it.",
+                    )
+                    for n in (100, 200, 300, 500, 1000)
+                ),
+                Mistake(
+                    lambda A, C, Q, R: kalman.steady_state(A, C, Q, R).gain.T,
+                    "This is the transpose: the gain turns m numbers into n states, (n, m).",
+                ),
+                Mistake(
+                    lambda A, C, Q, R: _settled(A, C, Q, R)[0],
+                    "This is the covariance before the correction. The gain is made of it: cov C^T S^-1.",
+                ),
+                Mistake(
+                    lambda A, C, Q, R: _settled(A, C, Q, R)[1],
+                    "This is the covariance after the correction. Asked for is the gain.",
+                ),
                 Mistake(
                     lambda A, C, Q, R: _gain(kalman.steady_state(A, C, Q, R).cov_after, C, R),
                     "Your gain comes from the covariance after the correction. It needs the one before.",
@@ -927,6 +1030,16 @@ CHAPTER = Chapter(
                 "`corrected = update(np.array([12.5, 5.0]), prior_cov, np.array([11.79]), np.array([[1.0, 0.0]]), np.array([[0.25]]))`",
             ),
             mistakes=[
+                Mistake(
+                    lambda: update(
+                        np.array([12.5, 5.0]), _PRIOR, np.array([11.79]), np.array([[0.0, 1.0]]), np.array([[0.25]])
+                    )[0],
+                    "You took the measurement for one of the velocity. The sensor sees the position: C = (1, 0).",
+                ),
+                Mistake(
+                    lambda: np.array([12.5, 5.0]) + _PRIOR[:, 0] * (11.79 - 12.5),
+                    "The gain is not divided by S, the variance of the innovation: 1.9469 + 0.25.",
+                ),
                 Mistake(
                     lambda: np.array([11.90, 4.98]),
                     "This is what the page prints. Its own numbers give something else: compute it.",
@@ -1162,6 +1275,14 @@ CHAPTER = Chapter(
             draw=seen_landmark,
             fixed={"x": POSE, "landmark": LANDMARK},
             metric=metrics.Numbers(1e-5),
+            noisy=[
+                (
+                    functools.partial(landmark_behind, side=side),
+                    metrics.Numbers(1e-5),
+                    "right, but not where the landmark stands nearly behind the robot: a difference of two bearings is to be wrapped:",
+                )
+                for side in (1, -1)
+            ],
             hints=(
                 "Move the robot a little toward the landmark, then across, then turn it. What do distance and bearing do?",
                 "Row 0: (-dx/r, -dy/r, 0). Row 1: (dy/q, -dx/q, -1) with q = r^2.",
@@ -1171,6 +1292,10 @@ CHAPTER = Chapter(
                 "return np.array([[-dx / r, -dy / r, 0], [dy / q, -dx / q, -1]])`",
             ),
             mistakes=[
+                Mistake(
+                    lambda x, l: -measurement_jacobian(x, l) * (1, 1, 0),
+                    "These are the derivatives by the place of the landmark, and by no heading. The robot moves: signs turn, and the last entry is -1.",
+                ),
                 Mistake(
                     _rows(lambda dx, dy, r: [[dx / r, dy / r, 0], [-dy / r**2, dx / r**2, -1]]),
                     "These are the derivatives by the landmark's position. By the robot's they have the opposite sign.",
@@ -1390,6 +1515,14 @@ CHAPTER = Chapter(
                 "return x + K @ y, (np.eye(3) - K @ H) @ cov`",
             ),
             mistakes=[
+                Mistake(
+                    _ekf_by_the_slope,
+                    "Your innovation is z - H x. The sensor measures by the bent function: z - measurement(x, landmark). H is only its slope.",
+                ),
+                Mistake(
+                    _ekf_in_degrees,
+                    "Your innovation mixes degrees and radians: `measurement` gives the bearing in radians already.",
+                ),
                 Mistake(
                     _ekf(wrap=False),
                     "The bearing innovation is not wrapped: a measurement just across +-pi throws your robot around by a full turn.",
@@ -1679,7 +1812,7 @@ CHAPTER = Chapter(
                     lambda y, S, g: bool((np.abs(y) <= 2 * np.sqrt(np.diag(S))).all()),
                     "You left the correlation out: use the whole inverse of S, not only its diagonal.",
                 ),
-                Mistake(_gated(lambda y, S: y @ S @ y), "S stands in the middle as its inverse."),
+                Mistake(_gated(lambda y, S: y @ S @ y), "You multiplied by S. In the middle stands its inverse."),
                 Mistake(
                     _gated(lambda y, S: y @ np.linalg.solve(S, y) / len(y)),
                     "Too much passes: the limit belongs to the sum, not to the mean over the numbers. It is larger for more of them.",
@@ -1716,6 +1849,22 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(
+                    _batch_of_sums(lambda V, C, n: V + C, lambda V0, x0: V0 @ x0),
+                    "All measurements count for the state, but the covariance knows of one only: their information adds up, k times C^T cov_z^-1 C.",
+                ),
+                Mistake(
+                    _batch_of_sums(lambda V, C, n: V + n * C, lambda V0, x0: x0),
+                    "The covariance is right. x0 counts with its own weight, cov0^-1 x0.",
+                ),
+                Mistake(
+                    _batch_with_covariances,
+                    "You weigh with the covariances themselves: what is uncertain would count most. Their inverses are the weights.",
+                ),
+                Mistake(
+                    _batch_unweighted,
+                    "You gave x0 and all measurements the same weight. Each counts with the inverse of its covariance: weighted least squares.",
+                ),
+                Mistake(
                     _batch(prior=0.0),
                     "What was known before the measurements is missing: x0 with cov0 counts like one more measurement.",
                 ),
@@ -1739,7 +1888,7 @@ CHAPTER = Chapter(
                         batch_estimate(x0, cov0, z, C, cov_z)[0],
                         np.linalg.inv(batch_estimate(x0, cov0, z, C, cov_z)[1]),
                     ),
-                    "The state is right. N is the information; the covariance is its inverse.",
+                    "The state is right. What you return beside it is the information; the covariance is its inverse.",
                 ),
                 Mistake(
                     lambda x0, cov0, z, C, cov_z: (batch_estimate(x0, cov0, z, C, cov_z)[0], cov0),
@@ -1751,7 +1900,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda x0, cov0, z, C, cov_z: batch_estimate(np.zeros_like(x0), cov0, z, C, cov_z),
-                    "The covariance is right. In b the part of the state known before is missing: cov0^-1 x0.",
+                    "The covariance is right. To the state what was known before has to be added: cov0^-1 x0, beside the sum of C^T cov_z^-1 z.",
                 ),
                 Mistake(lambda *a: batch_estimate(*a)[::-1], "The order is state, covariance."),
             ],

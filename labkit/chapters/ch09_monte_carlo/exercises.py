@@ -680,7 +680,8 @@ def _draws(resample, weights, rng, runs):
         if index.shape != (len(weights),) or index.dtype.kind not in "iu":
             return f"expected {len(weights)} whole numbers, got shape {index.shape} of {index.dtype}"
         if index.min() < 0 or index.max() >= len(weights):
-            return f"an index {index.max()} came out of {len(weights)} particles"
+            wrong = index.min() if index.min() < 0 else index.max()
+            return f"an index {wrong} came out of {len(weights)} particles, which count from 0 to {len(weights) - 1}"
         total += np.bincount(index, minlength=len(weights))
     return total / total.sum()
 
@@ -902,6 +903,8 @@ def _catches(specimen, good, others, extra=()):
         def check(test, rng):
             for _ in range(RUNS):
                 if not test(function, *((rng,) if extra else ())):
+                    if not any(test(other, *((rng,) if extra else ())) for other in good):
+                        return "your test says False of every function it is tried on, the correct ones too."
                     return f"your test also rejects a correct function ({GOOD_WORDS[function]}): it asks for more than must hold."
             return None
 
@@ -988,6 +991,15 @@ def _hunt(id, reference, specimen, why, hints, others, good=GOOD, extra=("rng",)
     )
 
 
+def _scan_seen(depth, field_of_view, seen):
+    """A scan whose columns are chosen by `seen(ranges, depth)`."""
+    n = len(depth)
+    bearings = np.arctan((n / 2 - 0.5 - np.arange(n)) / (n / 2) * np.tan(field_of_view / 2))
+    ranges = depth / np.cos(bearings)
+    chosen = seen(ranges, depth)
+    return ranges[chosen], bearings[chosen]
+
+
 CHAPTER = Chapter(
     "09-monte-carlo",
     title="Monte-Carlo localization",
@@ -1064,6 +1076,10 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(
+                    lambda x, z, l, r, b: landmark_weight(x, z, l, r, b) + (len(z) - 1) * np.log(2 * np.pi * r * b),
+                    "The factor 1 / (std sqrt(2 pi)) stands once in each density: once for each range and each bearing, not once in all.",
+                ),
+                Mistake(
                     _landmarks(wrap=False),
                     "A bearing difference near 360 deg counted as a large error. Wrap the difference to [-pi, pi).",
                 ),
@@ -1137,6 +1153,10 @@ CHAPTER = Chapter(
                 "`beams_to_zero = next(n for n in range(1, 1000) if 0.01**n == 0)`",
             ),
             mistakes=[
+                Mistake(lambda: 23, "There float32 ends. NumPy computes in float64 unless told otherwise."),
+                Mistake(
+                    lambda: 8, "There 1 + p is 1 in float64. The product itself goes on: it has an exponent of its own."
+                ),
                 Mistake(
                     lambda: 154,
                     "There the *normal* numbers of float64 end (2.2e-308). Smaller ones still exist, with fewer digits: count on.",
@@ -1177,6 +1197,33 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(
+                    lambda l: np.log(np.exp(l).sum()),
+                    "np.exp(900) is infinite and np.exp(-2000) is zero, so their sum says nothing. Take the largest logarithm out of all of them first.",
+                ),
+                Mistake(
+                    lambda l: l.min() + np.log(np.exp(l - l.min()).sum()),
+                    "With impossible particles (-inf) among them the smallest logarithm, or the mean, is -inf too, and -inf - (-inf) is nothing. Take out the largest.",
+                ),
+                Mistake(
+                    lambda l: np.log(np.exp(l - l.max()).sum()) - l.max(),
+                    "The largest logarithm was taken out. In the end it is added again, not subtracted.",
+                ),
+                Mistake(
+                    lambda l: l.sum(),
+                    "You added the logarithms: that is the logarithm of the product. Asked for is that of the sum.",
+                ),
+                Mistake(
+                    lambda l: np.exp(l - l.max()).sum() * np.exp(l.max()),
+                    "This is the sum itself, which overflows. Its logarithm is asked for.",
+                ),
+                Mistake(
+                    lambda l: np.exp(l).sum(), "This is the sum itself, which overflows. Its logarithm is asked for."
+                ),
+                Mistake(
+                    lambda l: l - l.max() - np.log(np.exp(l - l.max()).sum()),
+                    "These are the logarithms of the normalized weights, one a particle. Asked for is one number, the logarithm of their sum before.",
+                ),
+                Mistake(
                     lambda l: np.log(np.exp(l - l.max()).sum()),
                     "The largest logarithm was taken out: add it again at the end.",
                 ),
@@ -1205,8 +1252,14 @@ CHAPTER = Chapter(
             reference=maps.walk_ray,
             draw=(plain_ray, ray_past_the_unknown),
             fixed={"pose": POSE},
-            metric=metrics.Numbers(0.16, "m"),
-            noisy=[(short_ray, metrics.Numbers(0.16, "m"), "Right where something is hit, but not where nothing is:")],
+            metric=metrics.Numbers(0.16, "m", absolute=True),
+            noisy=[
+                (
+                    short_ray,
+                    metrics.Numbers(0.16, "m", absolute=True),
+                    "Right where something is hit, but not where nothing is:",
+                )
+            ],
             hints=(
                 "Walk along the ray in steps smaller than a cell, and stop in the first occupied one.",
                 "The direction is theta + bearing. grid.at([x, y]) says what is there; maps.OCCUPIED is an obstacle.",
@@ -1262,6 +1315,10 @@ CHAPTER = Chapter(
                 "`return np.sum(-0.5 * ((ranges - expected) / std) ** 2 - np.log(std * np.sqrt(2 * np.pi)))`",
             ),
             mistakes=[
+                Mistake(
+                    lambda r, e, s: np.sum(-0.5 * ((r - e) / s) ** 2 - np.log10(s * np.sqrt(2 * np.pi))),
+                    "The logarithm is the natural one, np.log: -0.5 (e / std)^2 is one of base e.",
+                ),
                 Mistake(
                     lambda r, e, s: math.exp(beam_weight(r, e, s)), "This is the product. Its logarithm is asked for."
                 ),
@@ -1625,6 +1682,14 @@ CHAPTER = Chapter(
                 "return (depth / np.cos(bearings))[seen], bearings[seen]`",
             ),
             mistakes=[
+                Mistake(
+                    lambda d, f, near, far: _scan_seen(d, f, lambda r, d: (r >= near) & (r <= far)),
+                    "near and far are limits of the depth, along the optical axis: compare the depth, not the range along the ray.",
+                ),
+                Mistake(
+                    lambda d, f, near, far: _scan_seen(d, np.radians(f), lambda r, d: (d >= near) & (d <= far)),
+                    "The opening angle is in radians already.",
+                ),
                 Mistake(
                     _depth(of=lambda d, b: d),
                     "The bearings are right. A depth counts along the optical axis: to the sides the range is longer.",
