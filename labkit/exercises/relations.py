@@ -162,14 +162,10 @@ def _sign_or_unit(holds, unit):
 
 def _thousand(unit):
     """Which two units a factor of a thousand may have confused."""
-    units = {
-        "mm": "mm against m",
-        "m": "mm against m",
-        "s": "ms against s",
-        "rad": "mrad against rad",
-        "mrad": "mrad against rad",
-    }
-    return f": {units[unit]}?" if unit in units else ", on every draw"
+    units = {"s": "ms against s", "rad": "mrad against rad", "mrad": "mrad against rad"}
+    if unit in ("", "mm", "m"):
+        return ": mm against m?"
+    return f": {units[unit]}?" if unit in units else ""
 
 
 def _arrangement(results, holds):

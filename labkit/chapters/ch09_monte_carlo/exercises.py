@@ -903,9 +903,9 @@ def _catches(specimen, good, others, extra=()):
         def check(test, rng):
             for _ in range(RUNS):
                 if not test(function, *((rng,) if extra else ())):
-                    if not any(test(other, *((rng,) if extra else ())) for other in good):
-                        return "your test says False of every function it is tried on, the correct ones too."
-                    return f"your test also rejects a correct function ({GOOD_WORDS[function]}): it asks for more than must hold."
+                    ever = any(test(other, *((rng,) if extra else ())) for other in good)
+                    more = "" if ever else " It says False of every function it is tried on."
+                    return f"your test also rejects a correct function ({GOOD_WORDS[function]}): it asks for more than must hold.{more}"
             return None
 
         return check
