@@ -92,8 +92,8 @@ def give_pixels_back():
 async def run(program, options, counts):
     """Show a program until Ctrl-C; `options` are those of the verb."""
     give_pixels_back()
-    gc.freeze()
     demo = Demo(program, options.ip, options.port, counts)
+    gc.freeze()
     demo.session.house.collect = collect
     room = demo.let_vote(options.vote_ip) if options.vote else None
     if program.cards[0].stage:
