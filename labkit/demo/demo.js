@@ -297,7 +297,7 @@ class Wall {
 
   button(number) {
     if (this.step === "question") return; // nothing is shown yet
-    document.querySelectorAll("#place .buttons button:not(.enlarge)")[number]?.click();
+    document.querySelectorAll("#place .buttons > button:not(.enlarge)")[number]?.click();
   }
 
   pressIn(dialog, event) {

@@ -254,7 +254,8 @@ class Scenes {
 
   open() {
     if (!this.page.module.works()) return;
-    const hooks = { onMove: () => this.figure.turned(), onAble: () => this.figure.room.look(true) };
+    const { room, buttons } = this.figure;
+    const hooks = { onMove: () => this.figure.turned(), onAble: () => room.look(true), seat: (tools) => buttons.insertBefore(tools, room.button) };
     this.view = new this.page.module.View(this.figure.picture, this.figure.screen.canvas, this.spaces, this.home, hooks);
     this.view.show(false);
     this.figure.room.look(true);

@@ -1,10 +1,12 @@
 // One WebGL context a page: each scene is drawn into it and copied onto its own 2D canvas, so that a page with twenty
 // Stages needs one context, and a picture stays where the context is lost.
 
-import { createBufferInfoFromArrays, createProgramInfo, createVertexArrayInfo, setUniforms } from "twgl.js";
+import { createProgramInfo, setUniforms } from "twgl.js";
 import { triangles } from "./solids.js";
 
 const NEAR = 0.05; // of the eye's distance
+const SHADOWED = 2.2; // half the width of the floor that can lie in shadow, in the scene's half widths
+const SHADOW_PIXELS = [1024, 512]; // of the shadow's own picture; where a processor draws
 const LENS = `
 uniform mat3 axes; uniform vec3 center; uniform vec4 lens; uniform vec2 range; // lens: scale x, y, eye (0: infinite), pixels a unit
 vec4 project(vec3 world) {
@@ -14,16 +16,30 @@ vec4 project(vec3 world) {
   return vec4(p.xy * lens.xy, depth * w, w);
 }`;
 const SOLID_VERTEX = `#version 300 es
-precision highp float;
-in vec3 position; in vec3 normal;
-uniform mat4 pose; uniform mat3 turn;
+precision highp float; precision highp sampler2D;
+in vec3 position; in vec3 normal; in float part;
+uniform sampler2D parts; // a row for each: its pose in four columns, its color
+uniform vec3 fall; // of a shadow: along the light onto the floor's height, and the scale of its own picture; else 0
 ${LENS}
-out vec3 n;
-void main() { n = turn * normal; gl_Position = project((pose * vec4(position, 1.0)).xyz); }`;
+out vec3 n; flat out vec4 color;
+void main() {
+  int row = int(part);
+  color = texelFetch(parts, ivec2(4, row), 0);
+  if (color.a == 0.0) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); return; }
+  vec3 a = texelFetch(parts, ivec2(0, row), 0).xyz, b = texelFetch(parts, ivec2(1, row), 0).xyz, c = texelFetch(parts, ivec2(2, row), 0).xyz;
+  vec3 world = a * position.x + b * position.y + c * position.z + texelFetch(parts, ivec2(3, row), 0).xyz;
+  if (fall.z > 0.0) {
+    gl_Position = vec4((world.xy + vec2(0.28, -0.2) * (world.z - fall.x)) * fall.z, 0.0, 1.0);
+    return;
+  }
+  n = axes * (cross(b, c) * normal.x + cross(c, a) * normal.y + cross(a, b) * normal.z); // a body may be stretched
+  gl_Position = project(world);
+}`;
 const SOLID_FRAGMENT = `#version 300 es
 precision highp float;
-in vec3 n; uniform vec4 color; out vec4 shown;
+in vec3 n; flat in vec4 color; uniform vec3 fall; out vec4 shown;
 void main() {
+  if (fall.z > 0.0) { shown = vec4(1.0); return; }
   vec3 m = normalize(n); if (!gl_FrontFacing) m = -m;
   float light = 0.56 + 0.44 * max(dot(m, vec3(-0.42, 0.66, 0.62)), 0.0);
   float gleam = 0.16 * pow(max(dot(m, vec3(-0.24, 0.37, 0.90)), 0.0), 18.0);
@@ -31,17 +47,26 @@ void main() {
   float a = min(color.a * rim, 1.0);
   shown = vec4((color.rgb * light + gleam) * a, a);
 }`;
-const SHADOW_FRAGMENT = `#version 300 es
+const FLOOR_VERTEX = `#version 300 es
 precision highp float;
-in vec3 n; uniform vec4 color; out vec4 shown;
-void main() { shown = color; }`;
+in vec2 corner; uniform vec3 fall;
+${LENS}
+out vec2 at;
+void main() { at = 0.5 + 0.5 * corner; gl_Position = project(vec3(corner / fall.z, fall.x)); }`;
+const FLOOR_FRAGMENT = `#version 300 es
+precision highp float; precision highp sampler2D;
+in vec2 at; uniform sampler2D fallen; uniform vec4 shade; out vec4 shown;
+void main() { shown = shade * texture(fallen, at).a; }`;
 const LINE_VERTEX = `#version 300 es
 precision highp float;
-in vec2 corner; in vec3 a; in vec3 b; in vec2 along;
-uniform vec2 room; uniform float width;
+in vec2 corner; in vec3 a; in vec3 b; in vec2 along; in vec4 look; in vec2 kind; // kind: width, dash (none, dashed, dotted)
+uniform vec2 room; uniform float ratio; uniform float share;
 ${LENS}
-out float at; out float side;
+out float at; out float side; flat out vec4 color; flat out float width; flat out vec2 dash;
 void main() {
+  width = kind.x * ratio;
+  color = vec4(look.rgb, look.a * share);
+  dash = kind.y == 1.0 ? vec2(4.2, 2.7) * max(width, 2.0 * ratio) : kind.y == 2.0 ? vec2(2.6, 1.2) * max(width, 1.5 * ratio) : vec2(0.0);
   vec4 p = project(a); vec4 q = project(b);
   vec2 way = (q.xy / q.w - p.xy / p.w) * room;
   float size = length(way);
@@ -56,7 +81,7 @@ void main() {
 }`;
 const LINE_FRAGMENT = `#version 300 es
 precision highp float;
-in float at; in float side; uniform vec4 color; uniform float width; uniform vec2 dash; out vec4 shown;
+in float at; in float side; flat in vec4 color; flat in float width; flat in vec2 dash; out vec4 shown;
 void main() {
   if (dash.x > 0.0 && mod(at, dash.x) > dash.y) discard;
   float a = color.a * clamp(width * 0.5 + 0.5 - abs(side), 0.0, 1.0);
@@ -64,13 +89,22 @@ void main() {
 }`;
 const POINT_VERTEX = `#version 300 es
 precision highp float;
-in vec3 position; uniform float size;
+in vec3 position; in vec4 look; in vec3 kind; // kind: size, marker, whether it is hollow
+uniform float ratio; uniform float share;
 ${LENS}
-void main() { gl_Position = project(position); gl_Position.z -= 6e-4 * gl_Position.w; gl_PointSize = size + 2.0; }`;
+flat out vec4 color; flat out vec3 drawn;
+void main() {
+  color = vec4(look.rgb, look.a * share);
+  drawn = vec3(kind.x * ratio, kind.yz);
+  gl_Position = project(position);
+  gl_Position.z -= 6e-4 * gl_Position.w;
+  gl_PointSize = drawn.x + 2.0;
+}`;
 const POINT_FRAGMENT = `#version 300 es
 precision highp float;
-uniform vec4 color; uniform float size; uniform int marker; uniform bool hollow; out vec4 shown;
+flat in vec4 color; flat in vec3 drawn; out vec4 shown;
 void main() {
+  float size = drawn.x; int marker = int(drawn.y);
   vec2 p = (gl_PointCoord - 0.5) * (size + 2.0); vec2 q = abs(p);
   float r = 0.5 * size;
   float d = marker == 1 ? max(q.x, q.y) - 0.9 * r : marker == 2 ? (q.x + q.y) * 0.72 - 0.85 * r
@@ -78,12 +112,15 @@ void main() {
     : marker == 4 ? min(q.x, q.y) - 0.16 * r + max(0.0, max(q.x, q.y) - r) * 4.0 // +
     : marker == 5 ? max(q.x * 1.7 + p.y, -p.y - 0.8 * r) * 0.8 - 0.55 * r // triangle up: p.y grows downward
     : marker == 6 ? max(q.x * 1.7 - p.y, p.y - 0.8 * r) * 0.8 - 0.55 * r : length(p) - r;
-  if (hollow) d = abs(d + 1.0) - 1.0;
+  if (drawn.z > 0.5) d = abs(d + 1.0) - 1.0;
   float a = color.a * clamp(0.5 - d, 0.0, 1.0);
   if (a < 0.02) discard;
   shown = vec4(color.rgb * a, a);
 }`;
-const MARKERS = { o: 0, ".": 0, s: 1, D: 2, d: 2, x: 3, "+": 4, "^": 5, v: 6 };
+export const MARKERS = { o: 0, ".": 0, s: 1, D: 2, d: 2, x: 3, "+": 4, "^": 5, v: 6 };
+export const LINE_NUMBERS = 16; // of a corner of a piece of a line: from, to, length until its start and its end, color, width, dash, which corner
+export const POINT_NUMBERS = 10; // of a point: where, color, size, marker, hollow
+export const PART_NUMBERS = 20; // of a part of a body: its pose in columns, its color; opacity 0 hides it
 
 export class Renderer {
   /** Throws where there is no WebGL 2; onChange(): the context is lost, or is back. */
@@ -99,7 +136,7 @@ export class Renderer {
       this.prepare();
       onChange();
     });
-    this.gl = this.canvas.getContext("webgl2", { stencil: true, antialias: false, powerPreference: "low-power" });
+    this.gl = this.canvas.getContext("webgl2", { antialias: false, powerPreference: "low-power" });
     if (!this.gl) throw new Error("no WebGL 2");
     const named = this.gl.getExtension("WEBGL_debug_renderer_info");
     this.software = /swiftshader|llvmpipe|software|basic render/i.test(named ? this.gl.getParameter(named.UNMASKED_RENDERER_WEBGL) : "");
@@ -109,79 +146,120 @@ export class Renderer {
   prepare() {
     const { gl } = this;
     this.lost = false;
-    this.meshes = new Map();
     this.smooth = null;
     this.age = (this.age ?? 0) + 1; // whoever holds buffers makes them anew when it has changed
-    const places = ["position", "normal"]; // the same in both: a mesh is bound once for its picture and its shadow
-    this.solid = createProgramInfo(gl, [SOLID_VERTEX, SOLID_FRAGMENT], places);
-    this.shade = createProgramInfo(gl, [SOLID_VERTEX, SHADOW_FRAGMENT], places);
+    this.solid = createProgramInfo(gl, [SOLID_VERTEX, SOLID_FRAGMENT]);
+    this.floor = createProgramInfo(gl, [FLOOR_VERTEX, FLOOR_FRAGMENT]);
     this.line = createProgramInfo(gl, [LINE_VERTEX, LINE_FRAGMENT]);
     this.point = createProgramInfo(gl, [POINT_VERTEX, POINT_FRAGMENT]);
-    for (const program of [this.solid, this.shade, this.line, this.point]) if (!program) throw new Error("the shaders were refused");
+    for (const program of [this.solid, this.floor, this.line, this.point]) if (!program) throw new Error("the shaders were refused");
   }
 
-  /** Buffers of a solid, one for all bodies of the page that are alike. */
-  mesh(shape) {
-    const key = JSON.stringify(shape);
-    if (!this.meshes.has(key)) {
-      const { position, normal, indices } = triangles(shape);
-      const info = createBufferInfoFromArrays(this.gl, {
-        position: new Float32Array(position), normal: new Float32Array(normal),
-        indices: position.length / 3 > 65535 ? new Uint32Array(indices) : new Uint16Array(indices),
-      });
-      this.meshes.set(key, { info, arrays: createVertexArrayInfo(this.gl, [this.solid, this.shade], info), triangles: indices.length / 3 });
-    }
-    return this.meshes.get(key);
-  }
-
-  /** Segments of a path (float32, 8 a segment: from, to, length until its start and its end). */
-  segments(old, data) {
+  /** All solids of a scene as one: a processor that draws spends more on being asked than on triangles. Shapes of parts,
+   *  the `full` ones first, then those one can look through; where they are is told by `place`. */
+  solids(shapes, full) {
     const { gl } = this;
-    const info = old ?? this.segmentArrays();
-    gl.bindBuffer(gl.ARRAY_BUFFER, info.buffer);
-    gl.bufferData(gl.ARRAY_BUFFER, data, gl.DYNAMIC_DRAW);
-    info.count = data.length / 8;
-    return info;
-  }
-
-  segmentArrays() {
-    const { gl } = this;
-    const info = { vao: gl.createVertexArray(), buffer: gl.createBuffer(), corners: gl.createBuffer() };
-    gl.bindVertexArray(info.vao);
-    const place = (name) => gl.getAttribLocation(this.line.program, name);
-    gl.bindBuffer(gl.ARRAY_BUFFER, info.corners);
-    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array([0, -1, 1, -1, 0, 1, 1, 1]), gl.STATIC_DRAW);
-    gl.enableVertexAttribArray(place("corner"));
-    gl.vertexAttribPointer(place("corner"), 2, gl.FLOAT, false, 0, 0);
-    gl.bindBuffer(gl.ARRAY_BUFFER, info.buffer);
-    for (const [name, size, offset] of [["a", 3, 0], ["b", 3, 12], ["along", 2, 24]]) {
-      gl.enableVertexAttribArray(place(name));
-      gl.vertexAttribPointer(place(name), size, gl.FLOAT, false, 32, offset);
-      gl.vertexAttribDivisor(place(name), 1);
-    }
+    const made = { position: [], normal: [], part: [], indices: [], full: 0, vao: gl.createVertexArray(), buffers: [], table: gl.createTexture(), count: shapes.length };
+    shapes.forEach((shape, number) => {
+      const mesh = meshOf(shape);
+      const first = made.position.length / 3;
+      for (const v of mesh.position) made.position.push(v);
+      for (const v of mesh.normal) made.normal.push(v);
+      for (let k = 0; k < mesh.position.length / 3; k++) made.part.push(number);
+      for (const index of mesh.indices) made.indices.push(first + index);
+      if (number < full) made.full = made.indices.length;
+    });
+    gl.bindVertexArray(made.vao);
+    for (const [name, size] of [["position", 3], ["normal", 3], ["part", 1]]) this.attribute(this.solid, made, name, size, new Float32Array(made[name]));
+    const indices = gl.createBuffer();
+    made.buffers.push(indices);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, indices);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array(made.indices), gl.STATIC_DRAW);
     gl.bindVertexArray(null);
-    return info;
+    gl.bindTexture(gl.TEXTURE_2D, made.table);
+    for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
+    const { full: opaque, vao, buffers, table, count } = made;
+    return { full: opaque, all: made.indices.length, vao, buffers, table, count };
+  }
+
+  attribute(program, made, name, size, data) {
+    const { gl } = this;
+    const buffer = gl.createBuffer();
+    made.buffers.push(buffer);
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+    gl.bufferData(gl.ARRAY_BUFFER, data, gl.STATIC_DRAW);
+    const place = gl.getAttribLocation(program.program, name);
+    gl.enableVertexAttribArray(place);
+    gl.vertexAttribPointer(place, size, gl.FLOAT, false, 0, 0);
+  }
+
+  /** Poses and colors of all parts, PART_NUMBERS each; the shadow has to be cast again. */
+  place(solids, numbers) {
+    const { gl } = this;
+    solids.cast = false;
+    gl.bindTexture(gl.TEXTURE_2D, solids.table);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, PART_NUMBERS / 4, solids.count, 0, gl.RGBA, gl.FLOAT, numbers);
+  }
+
+  /** All lines, or all points, of a scene: LINE_NUMBERS or POINT_NUMBERS each. A line has four corners a piece, as
+   *  triangles: a processor draws instances one by one. */
+  lines(old, data) {
+    const { gl } = this;
+    const layout = [["a", 3], ["b", 3], ["along", 2], ["look", 4], ["kind", 2], ["corner", 2]];
+    const made = old ?? this.interleaved(this.line, layout, LINE_NUMBERS);
+    if (!old) made.buffers.push((made.indices = gl.createBuffer()));
+    this.rows(made, data, 4 * LINE_NUMBERS);
+    if (made.count > (made.room ?? 0)) {
+      made.room = 2 * made.count;
+      const indices = new Uint32Array(6 * made.room);
+      for (let k = 0; k < made.room; k++) indices.set([4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 2, 4 * k + 1, 4 * k + 3], 6 * k);
+      gl.bindVertexArray(made.vao);
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, made.indices);
+      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
+      gl.bindVertexArray(null);
+    }
+    return made;
   }
 
   points(old, data) {
-    const { gl } = this;
-    const info = old ?? { vao: gl.createVertexArray(), buffer: gl.createBuffer() };
-    gl.bindVertexArray(info.vao);
-    gl.bindBuffer(gl.ARRAY_BUFFER, info.buffer);
-    gl.bufferData(gl.ARRAY_BUFFER, data, gl.DYNAMIC_DRAW);
-    const place = gl.getAttribLocation(this.point.program, "position");
-    gl.enableVertexAttribArray(place);
-    gl.vertexAttribPointer(place, 3, gl.FLOAT, false, 0, 0);
-    gl.bindVertexArray(null);
-    info.count = data.length / 3;
-    return info;
+    return this.rows(old ?? this.interleaved(this.point, [["position", 3], ["look", 4], ["kind", 3]], POINT_NUMBERS), data, POINT_NUMBERS);
   }
 
-  free(info) {
-    if (!info || this.lost) return;
-    this.gl.deleteVertexArray(info.vao);
-    this.gl.deleteBuffer(info.buffer);
-    if (info.corners) this.gl.deleteBuffer(info.corners);
+  interleaved(program, layout, numbers) {
+    const { gl } = this;
+    const made = { vao: gl.createVertexArray(), buffers: [] };
+    gl.bindVertexArray(made.vao);
+    made.rows = gl.createBuffer();
+    made.buffers.push(made.rows);
+    gl.bindBuffer(gl.ARRAY_BUFFER, made.rows);
+    let offset = 0;
+    for (const [name, size] of layout) {
+      const place = gl.getAttribLocation(program.program, name);
+      gl.enableVertexAttribArray(place);
+      gl.vertexAttribPointer(place, size, gl.FLOAT, false, 4 * numbers, 4 * offset);
+      offset += size;
+    }
+    gl.bindVertexArray(null);
+    return made;
+  }
+
+  rows(made, data, numbers) {
+    const { gl } = this;
+    gl.bindBuffer(gl.ARRAY_BUFFER, made.rows);
+    gl.bufferData(gl.ARRAY_BUFFER, data, gl.DYNAMIC_DRAW);
+    made.count = data.length / numbers;
+    return made;
+  }
+
+  free(made) {
+    if (!made || this.lost) return;
+    this.gl.deleteVertexArray(made.vao);
+    for (const buffer of made.buffers) this.gl.deleteBuffer(buffer);
+    for (const texture of [made.table, made.shadow?.texture]) if (texture) this.gl.deleteTexture(texture);
+    if (made.shadow) {
+      this.gl.deleteFramebuffer(made.shadow.frame);
+      this.free(made.shadow.quad);
+    }
   }
 
   /** Where edges are smoothed: four samples a pixel, copied onto the canvas in the end. */
@@ -192,7 +270,7 @@ export class Renderer {
     gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
     if (this.smooth.size !== `${width}x${height}`) {
       this.smooth.size = `${width}x${height}`;
-      for (const [buffer, format, place] of [[color, gl.RGBA8, gl.COLOR_ATTACHMENT0], [depth, gl.DEPTH24_STENCIL8, gl.DEPTH_STENCIL_ATTACHMENT]]) {
+      for (const [buffer, format, place] of [[color, gl.RGBA8, gl.COLOR_ATTACHMENT0], [depth, gl.DEPTH_COMPONENT24, gl.DEPTH_ATTACHMENT]]) {
         gl.bindRenderbuffer(gl.RENDERBUFFER, buffer);
         gl.renderbufferStorageMultisample(gl.RENDERBUFFER, 4, format, width, height);
         gl.framebufferRenderbuffer(gl.FRAMEBUFFER, place, gl.RENDERBUFFER, buffer);
@@ -202,38 +280,48 @@ export class Renderer {
   }
 
   /** Draw one scene, width x height device pixels, which the canvas takes on; `smooth` edges cost a processor much.
-   *  lens: {axes (9 numbers, columns), center, scale [x, y], eye, perUnit (device pixels), reach (how deep the scene is)}.
-   *  solids: [{mesh, pose, turn, color}], paths: [{line, points, color, width, dash, size, marker, hollow}] */
-  draw(width, height, lens, { solids, paths, floor, shadow }, smooth) {
+   *  lens: {axes (9 numbers, columns), center, scale [x, y], eye, perUnit (device pixels), ratio (device pixels a CSS
+   *  pixel), reach (how deep the scene is)}. */
+  draw(width, height, lens, { solids, lines, points, floor, shadow, wide }, smooth) {
     const { gl, canvas } = this;
+    const fall = [floor ?? 0, 0, 1 / (SHADOWED * wide)];
+    const shaded = solids && shadow && floor !== null;
+    if (shaded && !solids.cast) this.castShadow(solids, fall);
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     const frame = smooth ? this.smoothTarget(width, height) : null;
     gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
     gl.viewport(0, 0, width, height);
     gl.depthMask(true);
     gl.clearColor(0, 0, 0, 0);
-    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     const far = lens.eye > 0 ? 1 + lens.reach / lens.eye : 1; // distances over the eye's
     const range = lens.eye > 0 ? [(far + NEAR) / (far - NEAR), (-2 * far * NEAR) / (far - NEAR)] : [0, 1 / lens.reach];
-    const common = { axes: lens.axes, center: lens.center, lens: [...lens.scale, lens.eye, lens.perUnit], range, room: [width, height] };
-    const full = solids.filter((s) => s.color[3] >= 1);
-    const thin = solids.filter((s) => s.color[3] < 1);
-    if (shadow && floor !== null) this.drawShadows(full, common, floor, shadow);
-    this.drawSolids(full, common);
-    this.drawPaths(paths, common, 1);
-    gl.depthMask(false);
-    gl.enable(gl.CULL_FACE);
-    for (const side of [gl.FRONT, gl.BACK]) {
-      gl.cullFace(side);
-      this.drawSolids(thin, common);
+    const common = { axes: lens.axes, center: lens.center, lens: [...lens.scale, lens.eye, lens.perUnit], range, room: [width, height], ratio: lens.ratio };
+    if (solids) {
+      if (shaded) this.drawShadow(solids, common, fall, shadow);
+      gl.useProgram(this.solid.program);
+      gl.bindVertexArray(solids.vao);
+      setUniforms(this.solid, { ...common, parts: solids.table, fall: [0, 0, 0] });
+      this.drawPart(0, solids.full);
     }
-    gl.disable(gl.CULL_FACE);
+    this.drawPaths(lines, points, common, 1);
+    gl.depthMask(false);
+    if (solids && solids.all > solids.full) {
+      gl.useProgram(this.solid.program);
+      gl.bindVertexArray(solids.vao);
+      gl.enable(gl.CULL_FACE);
+      for (const side of [gl.FRONT, gl.BACK]) {
+        gl.cullFace(side);
+        this.drawPart(solids.full, solids.all);
+      }
+      gl.disable(gl.CULL_FACE);
+    }
     gl.depthFunc(gl.GREATER); // what lies behind a body shines through a little
-    this.drawPaths(paths, common, 0.22);
+    this.drawPaths(lines, points, common, 0.22);
     gl.bindVertexArray(null);
     if (!frame) return;
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, frame);
@@ -242,65 +330,71 @@ export class Renderer {
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
   }
 
-  drawSolids(solids, common) {
+  drawPart(from, to) {
     const { gl } = this;
-    gl.useProgram(this.solid.program);
-    setUniforms(this.solid, common);
-    for (const { mesh, pose, turn, color } of solids) {
-      gl.bindVertexArray(mesh.arrays.vertexArrayObject);
-      setUniforms(this.solid, { pose, turn, color });
-      gl.drawElements(gl.TRIANGLES, mesh.info.numElements, mesh.info.elementType, 0);
-    }
+    if (to > from) gl.drawElements(gl.TRIANGLES, to - from, gl.UNSIGNED_INT, 4 * from);
   }
 
-  /** Everything flattened onto the floor along the light; each pixel is darkened once. */
-  drawShadows(solids, common, floor, color) {
+  /** The shadow of everything one cannot look through, as seen from above in a picture of its own: drawn when something
+   *  has moved, not when one looks from elsewhere. */
+  castShadow(solids, fall) {
     const { gl } = this;
-    gl.useProgram(this.shade.program);
-    setUniforms(this.shade, { ...common, color, turn: [1, 0, 0, 0, 1, 0, 0, 0, 1] });
-    gl.enable(gl.STENCIL_TEST);
-    gl.stencilFunc(gl.EQUAL, 0, 255);
-    gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
-    gl.depthMask(false);
+    const size = SHADOW_PIXELS[Number(this.software)];
+    if (!solids.shadow) {
+      solids.shadow = { frame: gl.createFramebuffer(), texture: gl.createTexture(), quad: { vao: gl.createVertexArray(), buffers: [] } };
+      gl.bindTexture(gl.TEXTURE_2D, solids.shadow.texture);
+      gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA8, size, size);
+      for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
+      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
+      gl.bindVertexArray(solids.shadow.quad.vao);
+      this.attribute(this.floor, solids.shadow.quad, "corner", 2, new Float32Array([-1, -1, 1, -1, -1, 1, 1, 1]));
+    }
+    gl.bindFramebuffer(gl.FRAMEBUFFER, solids.shadow.frame);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, solids.shadow.texture, 0);
+    gl.viewport(0, 0, size, size);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT);
     gl.disable(gl.DEPTH_TEST);
-    for (const { mesh, pose } of solids) {
-      gl.bindVertexArray(mesh.arrays.vertexArrayObject);
-      setUniforms(this.shade, { pose: flattened(pose, floor) });
-      gl.drawElements(gl.TRIANGLES, mesh.info.numElements, mesh.info.elementType, 0);
-    }
-    gl.enable(gl.DEPTH_TEST);
-    gl.depthMask(true);
-    gl.disable(gl.STENCIL_TEST);
+    gl.disable(gl.BLEND);
+    gl.useProgram(this.solid.program);
+    gl.bindVertexArray(solids.vao);
+    setUniforms(this.solid, { parts: solids.table, fall });
+    this.drawPart(0, solids.full);
+    solids.cast = true;
   }
 
-  drawPaths(paths, common, share) {
+  drawShadow(solids, common, fall, shade) {
     const { gl } = this;
-    for (const path of paths) {
-      const color = [...path.color.slice(0, 3), path.color[3] * share];
-      if (path.line?.count) {
-        gl.useProgram(this.line.program);
-        setUniforms(this.line, { ...common, color, width: path.width, dash: path.dash });
-        gl.bindVertexArray(path.line.vao);
-        gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, path.line.count);
-      }
-      if (path.points?.count) {
-        gl.useProgram(this.point.program);
-        setUniforms(this.point, { ...common, color, size: path.size, marker: MARKERS[path.marker] ?? 0, hollow: path.hollow });
-        gl.bindVertexArray(path.points.vao);
-        gl.drawArrays(gl.POINTS, 0, path.points.count);
-      }
+    gl.useProgram(this.floor.program);
+    gl.bindVertexArray(solids.shadow.quad.vao);
+    setUniforms(this.floor, { ...common, fall, fallen: solids.shadow.texture, shade });
+    gl.depthMask(false);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+    gl.depthMask(true);
+  }
+
+  drawPaths(lines, points, common, share) {
+    const { gl } = this;
+    if (lines?.count) {
+      gl.useProgram(this.line.program);
+      setUniforms(this.line, { ...common, share });
+      gl.bindVertexArray(lines.vao);
+      gl.drawElements(gl.TRIANGLES, 6 * lines.count, gl.UNSIGNED_INT, 0);
+    }
+    if (points?.count) {
+      gl.useProgram(this.point.program);
+      setUniforms(this.point, { ...common, share });
+      gl.bindVertexArray(points.vao);
+      gl.drawArrays(gl.POINTS, 0, points.count);
     }
   }
 }
 
-/** A pose (columns) followed by the fall along the light onto z = floor. */
-function flattened(m, floor) {
-  const [lx, ly] = [0.28, -0.2]; // sideways for each unit of height
-  const out = new Float32Array(16);
-  for (let column = 0; column < 4; column++) {
-    const [x, y, z, w] = m.slice(4 * column, 4 * column + 4);
-    const height = z - floor * w;
-    out.set([x + lx * height, y + ly * height, floor * w, w], 4 * column);
-  }
-  return out;
+const meshes = new Map();
+
+/** Triangles of a solid, made once for all that are alike. */
+function meshOf(shape) {
+  const key = JSON.stringify(shape);
+  if (!meshes.has(key)) meshes.set(key, triangles(shape));
+  return meshes.get(key);
 }

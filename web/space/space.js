@@ -4,7 +4,7 @@
 // Whoever shows Stages without Python (a reading edition) sets globalThis[Symbol.for("labkit.space")] to
 // () => import("./space.js") before; the declaration and one recorded message with `space` and its numbers are enough.
 
-import { Renderer } from "./renderer.js";
+import { LINE_NUMBERS, MARKERS, PART_NUMBERS, POINT_NUMBERS, Renderer } from "./renderer.js";
 import { dot } from "./solids.js";
 
 const DEGREES_PER_PIXEL = 0.5;
@@ -45,8 +45,9 @@ function rgb(hex) {
 /** All scenes of one Stage: they share where one looks from. */
 export class View {
   /** place: the element with the picture; target: what has the focus and the pointer; home: where one looks from at
-   *  first; onMove(): handles follow; onAble(): whether this page can draw has changed. */
-  constructor(place, target, spaces, home, { onMove, onAble }) {
+   *  first; onMove(): handles follow; onAble(): whether this page can draw has changed; seat(tools): where the
+   *  buttons of the view go, beside the picture, not on it. */
+  constructor(place, target, spaces, home, { onMove, onAble, seat }) {
     Object.assign(this, { place, target, onMove, onAble, shown: false, dirty: false, frame: 0, calm: 0, coarse: 0, slow: 0, moving: false, told: true });
     this.scenes = spaces.map((space) => new Scene(space, this));
     Object.assign(this, { home, state: home });
@@ -54,7 +55,7 @@ export class View {
     this.pointers = new Map();
     this.tools = this.makeTools();
     this.target.after(...this.scenes.map((scene) => scene.canvas)); // below the handles
-    this.place.append(this.tools);
+    seat(this.tools);
     this.watch = new IntersectionObserver((entries) => {
       this.seen = entries.some((entry) => entry.isIntersecting);
       if (this.seen && this.dirty) this.request();
@@ -205,7 +206,7 @@ export class View {
     this.scenes.forEach((scene, k) => {
       scene.place = places[k];
       for (const [number, shown, count, words] of rows[k]) {
-        scene.items[number].set(shown, numbers.subarray(used, used + count), words);
+        scene.set(number, shown, numbers.subarray(used, used + count), words);
         used += count;
       }
     });
@@ -267,7 +268,12 @@ export class View {
 class Scene {
   constructor({ radius, halfWidth, unit, floor, colors, items }, view) {
     Object.assign(this, { radius, halfWidth, unit, floor, colors, view, place: null });
-    this.items = items.map((item) => new { path: Path, text: Words, triad: Triad, body: Body }[item.kind](item, this));
+    this.items = items.map((item) => new { path: Path, text: Words, triad: Triad, body: Body }[item.kind](item));
+    const owned = this.items.flatMap((item) => (item.parts ?? []).map((part) => ({ item, part })));
+    this.parts = [...owned.filter(({ part }) => part.opacity >= 1), ...owned.filter(({ part }) => part.opacity < 1)];
+    this.full = owned.filter(({ part }) => part.opacity >= 1).length;
+    this.paths = this.items.filter((item) => item instanceof Path);
+    this.given = {};
     this.canvas = document.createElement("canvas");
     this.canvas.className = "space";
     this.canvas.setAttribute("aria-hidden", "true"); // the picture below bears the name and the words
@@ -293,7 +299,6 @@ class Scene {
     const [cssWidth, cssHeight] = [width * room.clientWidth, height * room.clientHeight];
     if (cssWidth < 2 || cssHeight < 2) return;
     Object.assign(this.canvas.style, { left: `${100 * left}%`, top: `${100 * top}%`, width: `${100 * width}%`, height: `${100 * height}%` });
-    Object.assign(this.view.tools.style, { top: `${100 * top}%`, right: `${100 * (1 - left - width)}%` });
     const ratio = Math.min(window.devicePixelRatio || 1, Math.sqrt(MAX_PIXELS / (cssWidth * cssHeight)));
     const [w, h] = [Math.round(cssWidth * ratio), Math.round(cssHeight * ratio)];
     if (this.canvas.width !== w || this.canvas.height !== h) Object.assign(this.canvas, { width: w, height: h });
@@ -304,19 +309,48 @@ class Scene {
     const drawn = dw / cssWidth; // device pixels a CSS pixel
     const lens = {
       axes: [x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]], center, eye, perUnit: pixels * drawn,
-      scale: [(2 * pixels) / cssWidth, (2 * pixels) / cssHeight], reach: 12 * Math.max(this.radius, this.halfWidth),
+      scale: [(2 * pixels) / cssWidth, (2 * pixels) / cssHeight], reach: 12 * Math.max(this.radius, this.halfWidth), ratio: drawn,
     };
-    const solids = [];
-    const paths = [];
-    for (const item of this.items) if (item.shown) item.give(solids, paths, { dark: this.view.dark, ratio: drawn, turn: [x, y, z] });
-    this.triangles = solids.reduce((sum, { mesh }) => sum + mesh.triangles, 0);
+    this.give();
+    this.triangles = this.given.solids ? this.given.solids.all / 3 : 0;
     const shadow = z[2] > 0 ? (this.view.dark ? [0, 0, 0, 0.5] : [0, 0, 0, 0.16]) : null;
-    renderer.draw(dw, dh, lens, { solids, paths, floor: this.floor, shadow }, !(renderer.software && this.view.moving));
+    renderer.draw(dw, dh, lens, { ...this.given, floor: this.floor, shadow, wide: Math.max(this.radius, this.halfWidth) }, !(renderer.software && this.view.moving));
     this.paper.setTransform(1, 0, 0, 1, 0, 0); // `write` leaves CSS pixels behind
     this.paper.clearRect(0, 0, w, h);
     this.paper.imageSmoothingQuality = "high";
     this.paper.drawImage(renderer.canvas, 0, 0, dw, dh, 0, 0, w, h);
     this.write(w / cssWidth, cssWidth, cssHeight, pixels);
+  }
+
+  /** To the buffers what has changed since the last picture: a turn of the view changes nothing. */
+  give() {
+    const { dark } = this.view;
+    if (this.age !== renderer.age) Object.assign(this, { age: renderer.age, given: {}, moved: true, redrawn: true });
+    if (this.dark !== dark) Object.assign(this, { dark, moved: true, redrawn: true });
+    if (this.moved && this.parts.length) {
+      this.given.solids ??= renderer.solids(this.parts.map(({ part }) => part.shape), this.full);
+      this.table ??= new Float32Array(PART_NUMBERS * this.parts.length);
+      this.parts.forEach(({ item, part }, k) => {
+        const color = item.shown ? [...rgb(part.color[Number(dark)]), part.opacity] : [0, 0, 0, 0];
+        if (part.pose) this.table.set(part.pose, PART_NUMBERS * k);
+        this.table.set(color, PART_NUMBERS * k + 16);
+      });
+      renderer.place(this.given.solids, this.table);
+    }
+    if (this.redrawn) {
+      const shown = this.paths.filter((path) => path.shown);
+      this.given.lines = renderer.lines(this.given.lines, joined(shown.map((path) => path.lines(dark))));
+      this.given.points = renderer.points(this.given.points, joined(shown.map((path) => path.points(dark))));
+    }
+    Object.assign(this, { moved: false, redrawn: false });
+  }
+
+  /** One thing's numbers from Python. */
+  set(number, shown, numbers, words) {
+    const item = this.items[number];
+    item.set(shown, numbers, words);
+    if (item.parts) this.moved = true;
+    else if (item instanceof Path) this.redrawn = true;
   }
 
   /** Words, the scale and the base frame in the corner, in CSS pixels. */
@@ -386,67 +420,74 @@ class Scene {
   }
 
   close() {
-    for (const item of this.items) item.close?.();
+    if (this.age === renderer?.age) for (const made of Object.values(this.given)) renderer.free(made);
     this.canvas.remove();
   }
+}
+
+const CORNERS = [[0, -1], [1, -1], [0, 1], [1, 1]]; // of a piece of a line: along it, and to its side
+
+function joined(arrays) {
+  const all = new Float32Array(arrays.reduce((sum, array) => sum + array.length, 0));
+  arrays.reduce((used, array) => (all.set(array, used), used + array.length), 0);
+  return all;
 }
 
 /** A line, single points, or both. */
 class Path {
   constructor(declared) {
-    Object.assign(this, declared, { shown: false, changed: false, age: -1, lineInfo: null, pointInfo: null });
-    this.numbers = new Float32Array();
+    Object.assign(this, declared, { shown: false, numbers: new Float32Array() });
   }
 
   set(shown, numbers) {
-    Object.assign(this, { shown: Boolean(shown), numbers: numbers.slice(), changed: true });
+    Object.assign(this, { shown: Boolean(shown), numbers: numbers.slice() });
   }
 
-  give(solids, paths, { dark, ratio }) {
-    if (this.age !== renderer.age) Object.assign(this, { age: renderer.age, changed: true, lineInfo: null, pointInfo: null });
-    if (this.changed) {
-      if (this.width > 0) this.lineInfo = renderer.segments(this.lineInfo, segmentsOf(this.numbers));
-      if (this.marker) this.pointInfo = renderer.points(this.pointInfo, finite(this.numbers));
-      this.changed = false;
+  look(dark) {
+    return [...rgb(this.color[Number(dark)]), this.opacity];
+  }
+
+  /** For each piece between two finite points its four corners: from, to, the length until there, how it looks. */
+  lines(dark) {
+    const { numbers } = this;
+    const count = this.width > 0 ? Math.max(0, numbers.length / 3 - 1) : 0;
+    const out = new Float32Array(4 * LINE_NUMBERS * count);
+    const look = [...this.look(dark), this.width, Math.min(this.dash, 2)];
+    let [used, length] = [0, 0];
+    for (let k = 0; k < count; k++) {
+      const ends = numbers.subarray(3 * k, 3 * k + 6);
+      const piece = Math.hypot(ends[3] - ends[0], ends[4] - ends[1], ends[5] - ends[2]);
+      if (!Number.isFinite(piece)) {
+        length = 0;
+        continue;
+      }
+      for (const corner of CORNERS) {
+        out.set(ends, used);
+        out[used + 6] = length;
+        out[used + 7] = length + piece;
+        out.set(look, used + 8);
+        out.set(corner, used + 14);
+        used += LINE_NUMBERS;
+      }
+      length += piece;
     }
-    const thick = this.width * ratio;
-    paths.push({
-      line: this.lineInfo, points: this.pointInfo, color: [...rgb(this.color[Number(dark)]), this.opacity], width: thick,
-      dash: [[0, 0], [4.2 * Math.max(thick, 2 * ratio), 2.7 * Math.max(thick, 2 * ratio)], [2.6 * Math.max(thick, 1.5 * ratio), 1.2 * Math.max(thick, 1.5 * ratio)]][this.dash],
-      size: this.size * (this.marker === "." ? 0.6 : 1) * ratio, marker: this.marker, hollow: this.hollow,
-    });
+    return out.subarray(0, used);
   }
 
-  close() {
-    if (this.age !== renderer?.age) return;
-    renderer.free(this.lineInfo);
-    renderer.free(this.pointInfo);
-  }
-}
-
-/** From, to, and the length until there, for each piece between two finite points. */
-function segmentsOf(points) {
-  const count = Math.max(0, points.length / 3 - 1);
-  const out = new Float32Array(8 * count);
-  let [used, length] = [0, 0];
-  for (let k = 0; k < count; k++) {
-    const [a, b, c, d, e, f] = points.subarray(3 * k, 3 * k + 6);
-    const piece = Math.hypot(d - a, e - b, f - c);
-    if (!Number.isFinite(piece)) {
-      length = 0;
-      continue;
+  points(dark) {
+    const { numbers } = this;
+    const count = this.marker ? Math.floor(numbers.length / 3) : 0;
+    const out = new Float32Array(POINT_NUMBERS * count);
+    const look = [...this.look(dark), this.size * (this.marker === "." ? 0.6 : 1), MARKERS[this.marker] ?? 0, Number(this.hollow)];
+    let used = 0;
+    for (let k = 0; k < 3 * count; k += 3) {
+      if (!Number.isFinite(numbers[k] + numbers[k + 1] + numbers[k + 2])) continue;
+      out.set(numbers.subarray(k, k + 3), used);
+      out.set(look, used + 3);
+      used += POINT_NUMBERS;
     }
-    out.set([a, b, c, d, e, f, length, length + piece], used);
-    used += 8;
-    length += piece;
+    return out.subarray(0, used);
   }
-  return out.subarray(0, used);
-}
-
-function finite(points) {
-  const out = [];
-  for (let k = 0; k + 2 < points.length; k += 3) if (Number.isFinite(points[k] + points[k + 1] + points[k + 2])) out.push(points[k], points[k + 1], points[k + 2]);
-  return new Float32Array(out);
 }
 
 /** matplotlib's vertical alignment as a canvas names it. */
@@ -460,8 +501,6 @@ class Words {
   set(shown, numbers, words) {
     Object.assign(this, { shown: Boolean(shown), point: [...numbers], words: words ?? "" });
   }
-
-  give() {}
 
   write(pen, at, dark) {
     const [x, y] = at(this.point);
@@ -482,21 +521,6 @@ function times(a, b) {
   return out;
 }
 
-/** What turns the normals of a body that may be stretched: its cofactors, in columns. */
-function cofactors(m) {
-  const [a, b, c] = [m.slice(0, 3), m.slice(4, 7), m.slice(8, 11)];
-  const cross = (u, v) => [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-  return [cross(b, c), cross(c, a), cross(a, b)];
-}
-
-/** Solids as they are drawn: the mesh, where it is, how its normals turn. */
-function placed(shape, pose, color, turn) {
-  const normals = cofactors(pose);
-  const turned = [];
-  for (const column of normals) for (const axis of turn) turned.push(dot(axis, column));
-  return { mesh: renderer.mesh(shape), pose, color, turn: turned };
-}
-
 class Body {
   constructor({ parts }) {
     this.parts = parts.map((part) => ({ ...part, at: columns(part.at) }));
@@ -509,10 +533,6 @@ class Body {
     const pose = columns(numbers);
     for (const part of this.parts) part.pose = times(pose, part.at);
   }
-
-  give(solids, paths, { dark, turn }) {
-    for (const { shape, pose, color, opacity } of this.parts) solids.push(placed(shape, pose, [...rgb(color[Number(dark)]), opacity], turn));
-  }
 }
 
 const SHAFT = { kind: "turned", profile: [[0, 0], [1, 0], [1, 1], [0, 1]] };
@@ -521,15 +541,22 @@ const TIP = { kind: "turned", profile: [[0, 0], [1, 0], [0, 1]] };
 class Triad {
   constructor({ length, name, label, broken, width, axes }) {
     Object.assign(this, { length, name, label, broken, axes, radius: Math.max(0.012, 0.006 * width) * length, shown: false });
+    const pieces = broken ? [[0, 0.17], [0.26, 0.43], [0.52, 0.69]] : [[0, 0.86]];
+    this.parts = axes.flatMap((color, axis) => [
+      ...pieces.map(([from, to]) => ({ shape: SHAFT, axis, from, to, radius: this.radius, color, opacity: 1 })),
+      { shape: TIP, axis, from: broken ? 0.76 : 0.82, to: 1, radius: 2.6 * this.radius, color, opacity: 1 },
+    ]);
   }
 
   set(shown, numbers) {
     this.shown = Boolean(shown);
-    if (numbers.length === 16) this.pose = columns(numbers);
+    if (numbers.length !== 16) return;
+    this.pose = columns(numbers);
+    for (const part of this.parts) part.pose = this.piece(part);
   }
 
-  /** A piece of an axis: number, from, to (shares of the length), radius. */
-  piece(k, from, to, radius) {
+  /** A piece of an axis: its number, from, to (shares of the length), radius. */
+  piece({ axis: k, from, to, radius }) {
     const L = this.length;
     const local = new Float32Array(16);
     const [u, v] = [(k + 1) % 3, (k + 2) % 3];
@@ -539,15 +566,6 @@ class Triad {
     local[12 + k] = from * L;
     local[15] = 1;
     return times(this.pose, local);
-  }
-
-  give(solids, paths, { dark, turn }) {
-    for (let k = 0; k < 3; k++) {
-      const color = [...rgb(this.axes[k][Number(dark)]), 1];
-      const pieces = this.broken ? [[0, 0.17], [0.26, 0.43], [0.52, 0.69]] : [[0, 0.86]];
-      for (const [from, to] of pieces) solids.push(placed(SHAFT, this.piece(k, from, to, this.radius), color, turn));
-      solids.push(placed(TIP, this.piece(k, this.broken ? 0.76 : 0.82, 1, 2.6 * this.radius), color, turn));
-    }
   }
 
   write(pen, at, dark) {
