@@ -230,6 +230,7 @@ class Scenes {
 
   /** Ask for the module unless another Stage of the page has done so; open the view as soon as it is there. */
   ask() {
+    clearTimeout(this.timer);
     if (this.closed || this.view) return;
     const { page } = this;
     if (page.module) return this.open();
@@ -250,6 +251,7 @@ class Scenes {
       console.warn("stage: no drawing in space, Python draws it", error);
     }
     URL.revokeObjectURL(url);
+    this.ask(); // this Stage opens now, the others of the page when they look again
   }
 
   open() {

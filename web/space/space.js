@@ -212,6 +212,8 @@ export class View {
     });
     this.show(true);
     this.stir();
+    if (this.frame) cancelAnimationFrame(this.frame);
+    if (this.seen) this.draw(); // at once: the next frame shows it, whoever waits for it would paint it one later
   }
 
   show(on) {
