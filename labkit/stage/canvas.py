@@ -196,7 +196,7 @@ class Picture:
         if image.width > STORED_WIDTH:
             image = image.resize((STORED_WIDTH, round(image.height * STORED_WIDTH / image.width)))
         file = io.BytesIO()
-        image.quantize(STORED_COLORS, dither=Image.Dither.NONE).save(file, "png", optimize=True)
+        image.quantize(STORED_COLORS, dither=Image.Dither.NONE).save(file, "png")
         return file.getvalue()
 
     def news(self, whole=False):

@@ -6,7 +6,7 @@ import driver
 import numpy as np
 import pytest
 from contact_sheets import CUT, UNHEARD, stage_page
-from test_space_in_lab import apart, at_rest
+from test_space_in_lab import PIXELS, apart, at_rest
 
 from labkit.chapters.ch02_chaining import stages as chaining
 from labkit.chapters.ch05_hand_eye import stages as hand_eye
@@ -131,6 +131,72 @@ def test_python_draws_while_the_context_is_lost_and_the_page_again_when_it_is_ba
         assert not bridge.stage._picture.painted
         assert apart(at_rest(page, 0)[1][2], before[2]) < 0.1
         assert page.complaints == []
+
+
+MANY = """(count) => {
+    const place = document.createElement("div");
+    document.body.append(place);
+    for (let k = 0; k < count; k++) {
+        const stage = document.querySelector(".labkit-stage");
+        const { module } = globalThis[Symbol.for("labkit.space")];
+        const box = Object.assign(document.createElement("div"), { className: "labkit-stage more" });
+        const picture = Object.assign(document.createElement("div"), { className: "picture" });
+        const canvas = document.createElement("canvas");
+        Object.assign(picture.style, { width: "600px", height: "400px" });
+        picture.append(canvas);
+        box.append(picture);
+        place.append(box);
+        const hooks = { onMove() {}, onAble() {}, seat() {} };
+        const view = new module.View(picture, canvas, window.declared.spaces, window.declared.home, hooks);
+        view.receive(window.told.space, window.told.numbers, false);
+    }
+}"""
+
+
+def test_twenty_scenes_on_a_page_share_one_context_and_those_out_of_sight_hold_no_pixels():
+    with stage_page(False, 700, 640, 1) as (page, bridge):
+        opened(page, bridge)
+        at_rest(page, 0)
+        bridge.stage._picture.fit(600, 400, 1, False, space=True)
+        space = bridge.stage.spaces[0]
+        rows, numbers = space.news(whole=True)
+        told = {"places": [[0, 0, 1, 1, 1300]], "rows": [rows], "view": None}
+        page.evaluate(
+            "([declared, space, numbers]) => Object.assign(window,"
+            " { declared, told: { space, numbers: new Float32Array(numbers) } })",
+            [bridge.stage.declaration(), told, np.where(np.isfinite(numbers), numbers, 0).tolist()],
+        )
+        page.evaluate(MANY, 19)
+        page.wait_for_timeout(1500)
+        assert page.evaluate("contexts.length") == 1
+        widths = page.evaluate("() => [...document.querySelectorAll('canvas.space')].map(canvas => canvas.width)")
+        assert len(widths) == 20 and sum(width > 1 for width in widths) <= 4  # those in the window or near it
+        last = page.locator(".labkit-stage").last
+        last.scroll_into_view_if_needed()
+        page.wait_for_function("[...document.querySelectorAll('canvas.space')].at(-1).width > 1", timeout=10_000)
+        page.wait_for_timeout(600)
+        covered, colors, _ = last.evaluate(PIXELS)
+        assert covered > 0.02 and colors > 200 and page.complaints == []
+
+
+def test_a_click_on_a_frame_of_the_cell_chooses_it_from_wherever_one_looks():
+    with stage_page(False, 820, 700, 1) as (page, bridge):
+        page.evaluate(CONTEXTS)
+        bridge.show(page, stages.whole_cell())
+        page.locator(".labkit-stage canvas[data-space=true]").wait_for(timeout=20_000)
+        at_rest(page, 0)
+        canvas = page.locator(".labkit-stage canvas:not(.space)")
+        canvas.focus()
+        for _ in range(3):
+            page.keyboard.press("ArrowLeft")
+        at_rest(page, 0)
+        page.wait_for_timeout(1200)  # what one sees is told at rest
+        stage, box = bridge.stage, canvas.bounding_box()
+        place = stage.state["view"].project(stage.result["places"]["marks"])[:2]
+        x, y = stage._picture.fraction(stage.figure.axes[0], place)
+        page.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
+        page.locator(".caption", has_text="The part as learned").wait_for(timeout=5000)
+        assert stage.state["source"] == "marks" and page.complaints == []
 
 
 def test_without_python_the_view_still_turns_and_a_pulled_handle_goes_back():

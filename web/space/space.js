@@ -15,6 +15,7 @@ const CALM = 160; // ms of rest until it is drawn as sharply as it can be
 const SCALES = [1, 0.75, 0.5];
 const AXIS_VIEWS = { x: [0, 0], y: [90, 0], z: [-90, 90] };
 const LETTER = 12; // CSS pixels
+const EARLY = "200px"; // so near to the window a scene is drawn
 
 let renderer = null;
 let refused = false;
@@ -57,9 +58,10 @@ export class View {
     this.target.after(...this.scenes.map((scene) => scene.canvas)); // below the handles
     seat(this.tools);
     this.watch = new IntersectionObserver((entries) => {
-      this.seen = entries.some((entry) => entry.isIntersecting);
+      this.seen = entries[entries.length - 1].isIntersecting;
       if (this.seen && this.dirty) this.request();
-    });
+      else if (!this.seen) this.rest();
+    }, { rootMargin: EARLY });
     this.watch.observe(place);
     this.seen = true;
     this.listen();
@@ -89,6 +91,7 @@ export class View {
   listen() {
     const on = (type, act, options) => this.target.addEventListener(type, act, { signal: this.ended.signal, ...options });
     this.ended = new AbortController();
+    window.addEventListener("beforeprint", () => this.draw(), { signal: this.ended.signal });
     on("wheel", (event) => { // a pinch of a touch pad is a wheel with Ctrl; without it the page scrolls
       if (!this.shown || !(event.ctrlKey || event.metaKey)) return;
       event.preventDefault();
@@ -226,6 +229,14 @@ export class View {
   /** Where a point is, in fractions of the picture: right, down. */
   fraction(point, scene = 0) {
     return this.scenes[scene].fraction(point);
+  }
+
+  /** Out of sight: pixels are given back until it is seen, or printed. */
+  rest() {
+    cancelAnimationFrame(this.frame);
+    this.frame = 0;
+    for (const { canvas } of this.scenes) Object.assign(canvas, { width: 1, height: 1 });
+    this.dirty = true;
   }
 
   request() {
