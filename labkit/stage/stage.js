@@ -215,8 +215,8 @@ class Line {
 
 /** Scenes in space: drawn by the page once it has the module, by Python until then and where the page cannot. */
 class Scenes {
-  constructor(figure, { spaces = [], home }) {
-    Object.assign(this, { figure, spaces, home, view: null, timer: 0, closed: spaces.length === 0 });
+  constructor(figure, { spaces = [], home, size }) {
+    Object.assign(this, { figure, spaces, home, width: size[0], view: null, timer: 0, closed: spaces.length === 0 });
     this.page = globalThis[Symbol.for("labkit.space")] ??= { asked: -Infinity };
   }
 
@@ -257,7 +257,7 @@ class Scenes {
   open() {
     if (!this.page.module.works()) return;
     const { room, buttons } = this.figure;
-    const hooks = { onMove: () => this.figure.turned(), onAble: () => room.look(true), seat: (tools) => buttons.insertBefore(tools, room.button) };
+    const hooks = { onMove: () => this.figure.turned(), onAble: () => room.look(true), seat: (tools) => buttons.insertBefore(tools, room.button), width: this.width };
     this.view = new this.page.module.View(this.figure.picture, this.figure.screen.canvas, this.spaces, this.home, hooks);
     this.view.show(false);
     this.figure.room.look(true);

@@ -146,7 +146,7 @@ MANY = """(count) => {
         picture.append(canvas);
         box.append(picture);
         place.append(box);
-        const hooks = { onMove() {}, onAble() {}, seat() {} };
+        const hooks = { onMove() {}, onAble() {}, seat() {}, width: 700 };
         const view = new module.View(picture, canvas, window.declared.spaces, window.declared.home, hooks);
         view.receive(window.told.space, window.told.numbers, false);
     }

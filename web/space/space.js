@@ -15,6 +15,8 @@ const CALM = 160; // ms of rest until it is drawn as sharply as it can be
 const SCALES = [1, 0.75, 0.5];
 const AXIS_VIEWS = { x: [0, 0], y: [90, 0], z: [-90, 90] };
 const LETTER = 12; // CSS pixels
+const CROWDED = 0.85; // a picture narrower than so much of its designed width shrinks, letters too,
+const SMALLEST = 0.65; // here down to so much of their size
 const EARLY = "200px"; // so near to the window a scene is drawn
 
 let renderer = null;
@@ -47,9 +49,9 @@ function rgb(hex) {
 export class View {
   /** place: the element with the picture; target: what has the focus and the pointer; home: where one looks from at
    *  first; onMove(): handles follow; onAble(): whether this page can draw has changed; seat(tools): where the
-   *  buttons of the view go, beside the picture, not on it. */
-  constructor(place, target, spaces, home, { onMove, onAble, seat }) {
-    Object.assign(this, { place, target, onMove, onAble, shown: false, dirty: false, frame: 0, calm: 0, coarse: 0, slow: 0, moving: false, told: true });
+   *  buttons of the view go, beside the picture, not on it; width: the picture's as designed, CSS pixels. */
+  constructor(place, target, spaces, home, { onMove, onAble, seat, width }) {
+    Object.assign(this, { width, place, target, onMove, onAble, shown: false, dirty: false, frame: 0, calm: 0, coarse: 0, slow: 0, moving: false, told: true });
     this.scenes = spaces.map((space) => new Scene(space, this));
     Object.assign(this, { home, state: home });
     this.dark = false;
@@ -373,14 +375,15 @@ class Scene {
     const [left, top, wide, high] = this.place;
     const room = this.view.place;
     const style = getComputedStyle(room);
-    const size = (parseFloat(style.fontSize) / 13) * LETTER;
+    const shrunk = clip(room.clientWidth / (CROWDED * this.view.width), SMALLEST, 1); // as the picture around shrinks
+    const size = shrunk * (parseFloat(style.fontSize) / 13) * LETTER;
     paper.setTransform(ratio, 0, 0, ratio, 0, 0);
     const at = (point) => {
       const [right, down] = this.fraction(point);
       return [((right - left) / wide) * width, ((down - top) / high) * height];
     };
     const pen = {
-      halo: `${this.colors.paper[dark]}c0`, ink: this.colors.muted[dark],
+      shrunk, halo: `${this.colors.paper[dark]}c0`, ink: this.colors.muted[dark],
       write: (text, x, y, { color, bold = false, scale = 1, align = "center", baseline = "middle" }) => {
         paper.font = `${bold ? "bold " : ""}${(scale * size).toFixed(1)}px ${style.fontFamily}`;
         Object.assign(paper, { textAlign: align, textBaseline: baseline, lineWidth: 3, strokeStyle: pen.halo, fillStyle: color, lineJoin: "round" });
@@ -518,7 +521,7 @@ class Words {
   write(pen, at, dark) {
     const [x, y] = at(this.point);
     if (!Number.isFinite(x)) return;
-    pen.write(this.words, x + this.offset[0], y - this.offset[1], { color: this.color[Number(dark)], bold: this.bold, scale: this.size, align: this.align, baseline: this.baseline });
+    pen.write(this.words, x + pen.shrunk * this.offset[0], y - pen.shrunk * this.offset[1], { color: this.color[Number(dark)], bold: this.bold, scale: this.size, align: this.align, baseline: this.baseline });
   }
 }
 
@@ -591,6 +594,6 @@ class Triad {
     }
     if (!this.name) return;
     const { offset, align, baseline, color } = this.label;
-    pen.write(this.name, x + offset[0], y - offset[1], { color: color[Number(dark)], bold: true, align, baseline: BASELINES[baseline] });
+    pen.write(this.name, x + pen.shrunk * offset[0], y - pen.shrunk * offset[1], { color: color[Number(dark)], bold: true, align, baseline: BASELINES[baseline] });
   }
 }
