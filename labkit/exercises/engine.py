@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from . import arguments, cases, guard, metrics, operands, relations, scope, shapes, slips
+from . import arguments, cases, guard, metrics, operands, quantities, relations, scope, shapes, slips
 
 TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
 NOISY = "exact on clean data, but the data are not weighed as they should be: on noisy data"
@@ -611,6 +611,7 @@ class Value(Item):
     rtol, atol: how close an answer must be (relative to the value, absolute in `unit`).
     digits:     a right answer may be rounded to so many significant digits, as a notebook prints it.
     mistakes:  functions without arguments that give a wrong value.
+    of:        {name: function} of the data it is made of, by which a wrong answer may be known.
     """
 
     reference: object
@@ -621,6 +622,7 @@ class Value(Item):
     mistakes: tuple = ()
     metric: object = None
     digits: int = 3
+    of: dict = field(default_factory=dict)
 
     def measure(self):
         expected = float(self.reference())
@@ -696,8 +698,15 @@ class Value(Item):
         if digits > 1:
             least = f"at least {self.digits} digits are needed"
             return Outcome(NOT_YET, f"right as far as it goes: {least}, so hand over the computed value.")
-        words = relations.difference_words(metric, [(answer, expected)]) or relations.ratio_words(answer, expected)
+        words = relations.difference_words(metric, [(answer, expected)]) or self._made_otherwise(answer)
+        words = words or relations.ratio_words(answer, expected)
         return Outcome(NOT_YET, _closed(words) if words else self._which_way(answer, expected))
+
+    def _made_otherwise(self, answer):
+        """Which other number of the same data it is."""
+        if np.ndim(answer) or not self.of:
+            return None
+        return quantities.quantity_words(float(answer), {name: data() for name, data in self.of.items()})
 
     def _which_way(self, answer, expected):
         if np.ndim(expected) or not np.isfinite(answer):

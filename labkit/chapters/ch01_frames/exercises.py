@@ -693,6 +693,11 @@ CHAPTER = Chapter(
             reference=lambda: np.rad2deg(frames.rotation_angle(_K0_T_K1())),
             unit="deg",
             rtol=1e-4,
+            of={
+                "the angle": lambda: frames.rotation_angle(_K0_T_K1()),
+                "T_K0K1[:3, 3]": lambda: _K0_T_K1()[:3, 3],
+                "the cosine": lambda: _K0_T_K1()[0, 0],
+            },
             hints=(
                 "The trace of a rotation matrix knows its angle.",
                 "trace(R) = 1 + 2 cos(angle).",
@@ -734,6 +739,12 @@ CHAPTER = Chapter(
             reference=lambda: np.linalg.norm(_hole() - _hole_as_drawn()),
             unit="mm",
             rtol=1e-4,
+            of={
+                "the hole in K0": _hole,
+                "the drawing's hole in K0": _hole_as_drawn,
+                "the way between both": lambda: _hole() - _hole_as_drawn(),
+                "T_K0K1[:3, 3]": lambda: _K0_T_K1()[:3, 3],
+            },
             hints=(
                 "Half a degree at the origin is more, the farther away one looks: take the hole to K0 by both frames.",
                 "T_K0K1 and `drawn` both map coordinates in K1 to K0. Map (200, 0, 0) with each, and take the length of the difference.",

@@ -571,6 +571,10 @@ CHAPTER = Chapter(
             reference=lambda: _lever(_sheet()),
             unit="mm",
             rtol=5e-3,  # arccos of the trace of a rounded matrix is that bad at small angles
+            of={
+                "angle": lambda: chaining.closure_error(_sheet())[0],
+                "distance": lambda: chaining.closure_error(_sheet())[1],
+            },
             hints=(
                 "A turn moves a point by the angle times its distance from the axis.",
                 "The angle in rad times the lever is to be the closure distance: divide.",
@@ -631,6 +635,10 @@ CHAPTER = Chapter(
             reference=_worst_at_one_meter,
             unit="mm",
             rtol=2e-3,
+            of={
+                "angle": lambda: chaining.closure_error(_sheet())[0],
+                "distance": lambda: chaining.closure_error(_sheet())[1],
+            },
             hints=(
                 "The displacement depends on the direction of p: try many of length 1000 mm, in all directions.",
                 "Random directions: normal numbers, shape (n, 3), each divided by its length. Ten thousand are plenty.",

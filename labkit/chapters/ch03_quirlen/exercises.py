@@ -358,6 +358,7 @@ CHAPTER = Chapter(
             reference=lambda: np.linalg.norm(_kreisel().tip),
             unit="mm",
             rtol=1e-3,
+            of={"x": lambda: np.concatenate([_kreisel().tip, _kreisel().pivot])},
             hints=(
                 "Which of the six numbers in x say where the tip is, and seen from where?",
                 "The tip seen from the flange is P_t, the first three entries of x. Its length is the root of the sum of squares.",
@@ -520,6 +521,7 @@ CHAPTER = Chapter(
             reference=lambda: _kreisel().s0,
             unit="mm",
             rtol=1e-3,
+            of={"residuals": lambda: _kreisel().residuals},
             hints=(
                 "The sheet's formula, listing 8: the root of the sum of squares over n.",
                 "n is the number of poses, not of equations; rᵀr is the sum of the squares of all 3n numbers.",

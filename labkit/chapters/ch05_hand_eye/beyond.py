@@ -119,14 +119,19 @@ def _spread_of(l):
     return float(l.mean() + 3 * l.std(ddof=1))
 
 
-def length_with(name, turn_deg=180.0, change=lambda T: T):
-    """Length of the gauge of the notebook (mm) with some pose of the scanner, the flange turned in between."""
+def marks_with(name, turn_deg=180.0, change=lambda T: T):
+    """The way between both marks of the notebook's gauge (mm) with some pose of the scanner, the flange turned in between."""
     measured = thesis.measurements(True)
     truth = hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S).T_FS
     T_BF, x_S = robot_accuracy.looking_down_at(GAUGE, truth, np.deg2rad([0.0, turn_deg]))
     T_FS = change(truth if name == "calibrated" else thesis.frame(name))
     p, q = frames.transform(T_BF, frames.transform(T_FS, x_S))
-    return float(np.linalg.norm(q - p))
+    return q - p
+
+
+def length_with(*args, **kwargs):
+    """Length of the gauge (mm), as it is measured so."""
+    return float(np.linalg.norm(marks_with(*args, **kwargs)))
 
 
 def _height(change):
@@ -407,6 +412,7 @@ CAD_LENGTH = Value(
     reference=lambda: length_with("scanner_start"),
     unit="mm",
     rtol=1e-3,
+    of={"the way between both marks": lambda: marks_with("scanner_start")},
     hints=(
         "Bring both marks into the base with the CAD pose, and take their distance.",
         "p = T_BF T_FS x_S, mark by mark: `frames.transform` twice, with `cad` for T_FS and the poses `turned`.",

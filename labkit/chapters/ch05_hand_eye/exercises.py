@@ -743,6 +743,7 @@ CHAPTER = Chapter(
             reference=lambda: _rms_of_end_pose(2),
             unit="mm",
             rtol=2e-3,
+            of={"the residuals": lambda: _vectors_of_end_pose()},
             hints=(
                 "The residuals of all 31 poses under the thesis's end pose and its printed sphere center.",
                 "rms distance: the root of the mean of the squared lengths, one length per pose.",
@@ -1069,6 +1070,7 @@ CHAPTER = Chapter(
             reference=lambda: _joint_rms(*ALL_FIXED),
             unit="mm",
             rtol=3e-3,
+            of={"the residuals": lambda: corrected_fit().residuals},
             hints=(
                 "Scanner and center together, all 31 poses, all seven corrections.",
                 "`hand_eye.calibrate_sphere_target` on the corrected measurements; no pose is dropped.",
