@@ -297,7 +297,7 @@ def test_the_two_steps_of_li_one_by_one():
 
 
 def test_the_suitable_scene_shows_sphere_and_cube_with_the_stated_noise():
-    """The rms of 48 and of 384 normal numbers is within half of its expectation but for one seed in a million."""
+    """The rms of 48 normal numbers is within half of its expectation but for two seeds in a million; this one is fixed."""
     scene = literature.suitable_scene(0.3, np.random.default_rng(8))
     T_BS = scene.T_BF @ scene.T_FS
     sphere = np.einsum("nij,nj->ni", T_BS, np.column_stack([scene.x_S, np.ones(16)]))[:, :3] - scene.target
