@@ -146,12 +146,12 @@ ELSEWHERE = {  # modules whose tests stand in files of another name
 
 
 def tests_of(path):
-    """The test files of a module: its own name in the same room, and those of ELSEWHERE."""
+    """The test files of a module: its own name in the same room, those of ELSEWHERE, and that of one bad entry."""
     room, module = path.parent.name, path.stem
     own = f"{room}/test_{'fast_' if room == 'fast' else ''}{module}.py"
-    files = [own, *ELSEWHERE.get(f"{room}/{module}", ())]
+    files = [own, *ELSEWHERE.get(f"{room}/{module}", ()), "test_one_in_a_batch.py"]
     found = tuple(f"tests/{file}" for file in files if (ROOT / "tests" / file).exists())
-    if not found and module != "__init__":
+    if len(found) < 2 and module != "__init__":
         raise SystemExit(f"labkit/{room}/{module}.py has no test file: name it in ELSEWHERE")
     return found
 

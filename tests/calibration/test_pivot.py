@@ -167,6 +167,28 @@ def test_robust_finds_the_outliers_at_forty_percent():
         assert np.linalg.norm(result.tip - TIP) < 2
 
 
+def test_the_robust_covariance_is_that_of_an_m_estimate():
+    """Huber's: sum psi^2 over the freedom and over the squared mean slope of psi, here from differences; times the
+    inverse of the weighted normal matrix.
+    """
+    T, _ = with_outliers(measured(np.random.default_rng(5), 40), np.random.default_rng(6), 0.2)
+    result = pivot.calibrate_pivot(T, robust=True)
+    r, w = result.residuals, result.weights
+    d = np.linalg.norm(r, axis=1)
+    assert 0 < (w == 0).sum() < 20
+    cut = np.median((d / np.sqrt(1 - np.sqrt(w)))[w > 0])  # w = (1 - (d / cut)^2)^2
+
+    def psi(v):
+        return np.maximum(1 - (v**2).sum(1) / cut**2, 0)[:, None] ** 2 * v
+
+    slopes = sum((psi(r + h) - psi(r - h))[:, k] / 2e-5 for k, h in enumerate(1e-5 * np.eye(3))) / 3
+    A = np.sqrt(w)[:, None, None] * pivot.pivot_matrix(T).reshape(-1, 3, 6)
+    freedom = 3 * w.sum() - 6
+    spread = (psi(r) ** 2).sum() / freedom / (slopes.sum() / w.sum()) ** 2
+    np.testing.assert_allclose(psi(r), w[:, None] * r, rtol=1e-3, atol=1e-6)
+    np.testing.assert_allclose(result.covariance, spread * np.linalg.inv(np.einsum("nki,nkj->ij", A, A)), rtol=1e-3)
+
+
 def test_robust_is_repeatable_and_takes_a_generator():
     T, _ = with_outliers(measured(np.random.default_rng(9), 40), np.random.default_rng(9), 0.2)
     first, second = (pivot.calibrate_pivot(T, robust=True) for _ in range(2))

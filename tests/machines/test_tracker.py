@@ -28,6 +28,7 @@ from labkit.machines.packet import (
     FIELDS,
     PACKET,
     POSITION,
+    TIME,
     VELOCITY,
     decode_packet,
     encode_packet,
@@ -265,6 +266,7 @@ def test_stops_are_averaged_without_their_outliers():
     T = pose(exp_so3(1e-3 * rng.normal(size=(40, 3))), [100.0, 0, 0] + 0.3 * rng.normal(size=(40, 3)))
     clean = mean_pose(T[:30])
     T[30:, :3, 3] += 300
+    T[39] = pose(exp_so3([0.0, 0.0, np.pi]), [-100.0, 0, 0])  # the turns from it to the others may have either sign
     mean, used = average_stops(Log(np.arange(40) / 10, T, np.zeros(40, int)))
     assert used[0] == 0.75
     angle, distance = pose_distance(mean[0], clean)
@@ -392,6 +394,12 @@ def test_nonsense_of_the_stream_jumps_by_the_stated_length():
     shift = positions(True) - positions(False)
     np.testing.assert_allclose(np.linalg.norm(shift, axis=1), 0.35, rtol=1e-9)  # m
     assert len(np.unique(shift.round(9), axis=0)) > 5  # several bursts, each in a direction of its own
+
+
+def test_the_stream_counts_its_time_in_packets():
+    packets = simulation.endless_packets(np.random.default_rng(1))
+    times = [decode_packet(next(packets))[TIME] for _ in range(5)]
+    assert times == pytest.approx(np.arange(5) / simulation.RATE, abs=1e-12)
 
 
 # ---- synthetic data and what they teach
