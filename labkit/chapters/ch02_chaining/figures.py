@@ -71,15 +71,15 @@ def growth_axes(ax):
     chosen.
     """
     style.axes(ax, "number of links", "closure distance (mm, rms)")
-    ax.set(xscale="log", yscale="log", xlim=(0.9, 75), ylim=(0.1, 3000))
+    ax.set(xscale="log", yscale="log", xlim=(0.9, 75), ylim=(0.1, 30_000))
     ax.set_xticks(LINKS, [str(n) for n in LINKS])
-    ax.set_yticks([0.1, 1, 10, 100, 1000], ["0.1", "1", "10", "100", "1000"])
+    ax.set_yticks([0.1, 1, 10, 100, 1000, 10_000], ["0.1", "1", "10", "100", "1000", "10000"])
     ax.minorticks_off()
     ghosts = Ghosts(ax, label="0.01 to 1 deg")
     (straight,) = ax.plot([], [], **style.look("prediction"), label="law, in a row")
     (loop,) = ax.plot([], [], **style.look("prediction", linestyle=":"), label="on a loop")
     (here,) = ax.plot([], [], **style.look("estimates", markersize=8), label="simulated")
-    style.legend_above(ax, ncols=2, fontsize=8)
+    ax.legend(loc="upper left")
     return ghosts, (straight, loop), here
 
 
@@ -93,7 +93,7 @@ def trumpet_axes(ax, runs):
     (mean,) = ax.plot([], [], **style.look("truth"), label="as it should be")
     ax.set(xlim=(0, LINKS[-1]), xticks=[0, *LINKS[3:]])
     ax.yaxis.set_major_locator(LinearLocator(5))
-    style.legend_above(ax, ncols=2, fontsize=8)
+    ax.legend(loc="upper left")
     set_edge(ax, EDGES[0])
     return lines, law, mean
 

@@ -90,7 +90,7 @@ def driven_corner(ax, half):
     (commanded,) = ax.plot([], [], label="commanded", **style.look("truth"))
     (driven,) = ax.plot([], [], label="driven", **style.look("measurement", linestyle="-", marker=""))
     (worst,) = ax.plot([], [], label="path accuracy", **style.look("estimate"))
-    ax.legend(loc="lower left")
+    ax.legend(loc="upper left")
     return commanded, driven, worst
 
 

@@ -257,12 +257,11 @@ def error_by_stop(ax, stops, printed):
 
 
 class OverSpeed:
-    """Errors of several motions over their speed, medians of intervals, a law through them, and two printed levels;
-    their legend beside them."""
+    """Errors of several motions over their speed, medians of intervals, a law through them, and two printed levels."""
 
-    def __init__(self, ax, beside, x, end):
+    def __init__(self, ax, x, end):
         style.axes(ax, "speed, share of the fastest printed (1.4 m/s or 3.7 rad/s)", "error", "same path, three speeds")
-        ax.set(xlim=(0, end), ylim=(0.05, 2000), yscale="log")
+        ax.set(xlim=(0, end), ylim=(0.05, 20_000), yscale="log")  # the legend has room above the data
         self.x = x
         self.dots = [
             ax.plot([], [], **style.look("measurement", marker=marker, markersize=3, alpha=0.55), label=name)[0]
@@ -280,7 +279,7 @@ class OverSpeed:
             for k, text in enumerate(("printed mean", "printed largest"))
         ]  # fmt: skip
         named = [*self.dots, self.nonsense, self.medians, self.law]
-        legend = beside.legend(handles=named, loc="lower left", borderaxespad=0.0)
+        legend = ax.legend(handles=named, loc="upper left", ncols=3, columnspacing=0.8, handlelength=1.4)
         for dots in legend.legend_handles[:3]:
             dots.set(markersize=6, alpha=1.0)
         self.artists = [*self.dots, self.nonsense, self.medians, self.law, *self.levels, *self.names]

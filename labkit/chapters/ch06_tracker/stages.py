@@ -839,7 +839,7 @@ def over_speed():
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.8, 1))
-        picture = draw.OverSpeed(left, right, MIDDLES, SHARES[-1])
+        picture = draw.OverSpeed(left, MIDDLES, SHARES[-1])
         style.bare(right)
         words = right.text(0.0, 0.95, "", transform=right.transAxes, va="top", linespacing=1.6)
 

@@ -58,7 +58,7 @@ def bells():
         ax = style.axes(fig.subplots(), "position (m)", "density (1/m)")
         ax.set(xlim=(0, 20), ylim=(0, 1.15))
         three = draw.Bells(ax, GRID)
-        words = ax.text(0.27, 0.97, "", transform=ax.transAxes, ha="left", va="top")
+        words = ax.text(0.99, 0.97, "", transform=ax.transAxes, ha="right", va="top")
 
         def update(state, result):
             three.set(result["before"], result["bells"])

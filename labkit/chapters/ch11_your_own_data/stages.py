@@ -58,7 +58,7 @@ def motions_beside_each_other():
         left, right = fig.subplots(1, 2)
         angles, between = (
             draw.diagonal(left, "angle of each motion", 60),
-            draw.diagonal(right, "between axes, two motions apart", 180),
+            draw.diagonal(right, "between two axes", 180),
         )
 
         def update(state, result):
