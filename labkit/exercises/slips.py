@@ -6,6 +6,7 @@ said is true by construction, and names the slip without showing the formula.
 
 import ast
 import functools
+import warnings
 
 from ..places import ROOT
 from . import mutation, source
@@ -25,7 +26,8 @@ def changed_formulas(exercise):
     for words, tree in _changes(exercise.chapter.notebook, exercise.id)[:RANKS]:
         namespace = dict(known)
         try:
-            exec(compile(ast.Module([tree], []), "<a formula with one change>", "exec"), namespace)
+            with warnings.catch_warnings(action="ignore"):  # of nonsense such as 2[0], which is tried as well
+                exec(compile(ast.Module([tree], []), "<a formula with one change>", "exec"), namespace)
         except (SyntaxError, ValueError, RecursionError):
             continue
         yield words, namespace[function.name]

@@ -326,14 +326,17 @@ def _missing():
 
 def drawn_points(rng, flat=False):
     """Four to eight points of a drawing and where they were measured, noise of 0.5 mm; flat: nearly in one plane, and
-    measured on its other side, so that a mirror image fits better on every processor."""
-    n = int(rng.integers(4, 9))
-    points_F = rng.uniform(-200, 200, (n, 3)) + rng.uniform(-300, 300, 3)
-    T_WF = frames.pose(Rotation.from_rotvec(rng.uniform(-2, 2, 3)).as_matrix(), rng.uniform(-900, 900, 3))
-    if flat:
+    measured on its other side, so that a mirror image fits better on every processor, the means subtracted or not."""
+    while True:
+        n = int(rng.integers(4, 9))
+        points_F = rng.uniform(-200, 200, (n, 3)) + rng.uniform(-300, 300, 3)
+        T_WF = frames.pose(Rotation.from_rotvec(rng.uniform(-2, 2, 3)).as_matrix(), rng.uniform(-900, 900, 3))
+        if not flat:
+            return points_F, frames.transform(T_WF, points_F) + 0.5 * rng.normal(size=(n, 3))
         points_F[:, 2] = rng.uniform(-100, 100) + rng.permutation(np.resize([0.5, -0.5, 1.0], n))
-        return points_F, frames.transform(T_WF, points_F * [1, 1, -1] + [0, 0, 2 * points_F[:, 2].mean()])
-    return points_F, frames.transform(T_WF, points_F) + 0.5 * rng.normal(size=(n, 3))
+        points_W = frames.transform(T_WF, points_F * [1, 1, -1] + [0, 0, 2 * points_F[:, 2].mean()])
+        if np.linalg.det(points_F.T @ points_W) < -1e9:  # mm^6, of about 1e13
+            return points_F, points_W
 
 
 def _kabsch(handed=True, turned=lambda R: R, shift=lambda R, p, q: q.mean(0) - R @ p.mean(0), centered=True):
