@@ -713,8 +713,9 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: np.rad2deg(np.arccos(np.clip(np.trace(_K0_T_K1()) / 2 - 0.5, -1, 1))),
-                    "You took the trace of the 4x4 matrix, whose corner is no part of the rotation, or forgot the - 1: the cosine is "
+                    "This is what comes of the trace of the 4x4 matrix, whose corner is no part of the rotation, or without the - 1: the cosine is "
                     "(trace(R) - 1) / 2, of the 3x3 block.",
+                    id="angle_deg-9b97c7",
                 ),
                 Mistake(
                     lambda: np.rad2deg(np.arccos(np.trace(_K0_T_K1()[:3, :3]) - 1)),

@@ -255,6 +255,16 @@ FILES = [
                 id="write-columns",
             ),
             Mistake(
+                lambda points: write_system(points - points[0]),
+                "The origin is subtracted. The points are written as they are.",
+                id="write-relative",
+            ),
+            Mistake(
+                lambda points: write_system(np.abs(points)),
+                "The signs have got lost.",
+                id="write-abs",
+            ),
+            Mistake(
                 _written(".15f"),
                 "15 places after the point are too few for a small number: its digits begin later. Take 17 significant digits, or `repr`.",
                 id="write-fifteen-places",

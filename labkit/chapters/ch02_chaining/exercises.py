@@ -215,6 +215,14 @@ def _forward_instead_of_back(transforms):
     return _moved(poses, exp_se3(np.arange(n + 1)[:, None] / n * xi))
 
 
+def _by_length(transforms):
+    """Shares in proportion to the lengths of the links."""
+    poses, xi, _ = _parts(transforms)
+    lengths = np.linalg.norm(np.asarray(transforms)[:, :3, 3], axis=1)
+    shares = np.append(0.0, np.cumsum(lengths) / lengths.sum())
+    return _moved(poses, exp_se3(-shares[:, None] * xi))
+
+
 def _divided_by(number):
     """k / number(N) in place of k / N."""
 
@@ -564,6 +572,11 @@ CHAPTER = Chapter(
                     "|R - I| / sqrt(2) is twice the sine of half the angle: the angle itself for small turns only.",
                     id="closure-chord",
                 ),
+                Mistake(
+                    _closure(lambda T: np.linalg.norm(log_se3(T))),
+                    "This is the length of the whole twist, rad and mm in one number. The angle is the length of its first three entries.",
+                    id="closure-twist",
+                ),
             ],
         ),
         Value(
@@ -583,7 +596,7 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     lambda: _lever(_sheet(), np.rad2deg),
-                    "You divided by the angle in degrees. A turn moves a point by the angle in rad times its lever.",
+                    "This divides by the angle in degrees. A turn moves a point by the angle in rad times its lever.",
                     id="lever-degrees",
                 ),
                 Mistake(
@@ -593,7 +606,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: np.prod(chaining.closure_error(_sheet())),
-                    "You multiplied angle and distance. Which lever, times the angle, makes the distance?",
+                    "This is angle times distance. Which lever, times the angle, makes the distance?",
                     id="lever-product",
                 ),
                 Mistake(
@@ -603,7 +616,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: _lever(chaining.chain(lab_sheet.printed_transforms()[::-1])),
-                    "You multiplied the links in the reverse order.",
+                    "This belongs to the links multiplied in the reverse order.",
                     id="lever-reverse",
                 ),
                 Mistake(
@@ -678,7 +691,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: 1000 + chaining.closure_error(_sheet())[1],
-                    "You returned how far the displaced point is from the origin. Subtract p.",
+                    "This is how far the displaced point is from the origin. Subtract p.",
                     id="meter-no-difference",
                 ),
                 Mistake(
@@ -958,6 +971,16 @@ CHAPTER = Chapter(
                     _divided_by(lambda n: 4),
                     "You divide by 4 whatever the loop: it has as many parts as it has links, N = len(transforms).",
                     id="distribute-four",
+                ),
+                Mistake(
+                    _divided_by(lambda n: 2 * n),
+                    "Half of the error is shared out: the loop stays open by the other half. The pose after k links goes back by k/N.",
+                    id="distribute-half",
+                ),
+                Mistake(
+                    _by_length,
+                    "Each link pays in proportion to its length. The loop closes; here the shares are equal, k/N.",
+                    id="distribute-by-length",
                 ),
             ],
         ),

@@ -133,6 +133,11 @@ def _squares():
     return (_kreisel().residuals ** 2).sum()
 
 
+def _correlation(covariance):
+    std = np.sqrt(np.diag(covariance))
+    return covariance / np.outer(std, std)
+
+
 CHAPTER = Chapter(
     "03-quirlen",
     title="Quirlen: calibration about a pivot",
@@ -351,6 +356,21 @@ CHAPTER = Chapter(
                     lambda A, b: A @ pivot.solve_pivot(A, b) - b,
                     "These are the residuals A x - b. The solution x itself is wanted, shape (6,).",
                 ),
+                Mistake(
+                    lambda A, b: np.linalg.solve(A.T @ A + np.eye(6), A.T @ b),
+                    "Something is added to AᵀA, which pulls the solution toward 0. Least squares solves AᵀA x = Aᵀb as it is.",
+                    id="solve-ridge",
+                ),
+                Mistake(
+                    lambda A, b: np.linalg.lstsq(A[-6:], b[-6:], rcond=None)[0],
+                    "You used the last two poses alone. Use all equations.",
+                    id="solve-last-six",
+                ),
+                Mistake(
+                    lambda A, b: np.abs(np.linalg.lstsq(A, b, rcond=None)[0]),
+                    "The signs have got lost: tip and pivot have coordinates of both signs.",
+                    id="solve-abs",
+                ),
             ],
         ),
         Value(
@@ -371,7 +391,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: np.hypot(np.linalg.norm(_kreisel().tip), np.linalg.norm(_kreisel().pivot)),
-                    "You took the norm of all six entries. The tip is the first three.",
+                    "This is the norm of all six entries. The tip is the first three.",
+                    id="tip_length-b84ab1",
                 ),
                 Mistake(
                     lambda: abs(_kreisel().tip[2]), "This is the z component alone: the tip also sits to the side."
@@ -379,23 +400,27 @@ CHAPTER = Chapter(
                 Mistake(lambda: _kreisel().tip[2], "This is the z component alone: the tip also sits to the side."),
                 Mistake(
                     lambda: np.abs(_kreisel().tip).sum(),
-                    "You added the components. The length is the root of the sum of squares.",
+                    "This is a sum of components. The length is the root of the sum of squares.",
+                    id="tip_length-b16803",
                 ),
                 Mistake(
                     lambda: _kreisel().tip.sum(),
-                    "You added the components. The length is the root of the sum of squares.",
+                    "This is a sum of components. The length is the root of the sum of squares.",
+                    id="tip_length-b16803-2",
                 ),
                 Mistake(
                     lambda: np.linalg.norm(_kreisel().tip[1:]),
-                    "You took y and z alone: Python counts from 0, so the first three entries are x[:3].",
+                    "This is the length of y and z alone: Python counts from 0, so the first three entries are x[:3].",
+                    id="tip_length-c7acb9",
                 ),
                 Mistake(
                     lambda: np.linalg.norm(_kreisel().tip[:2]),
-                    "You took x and y alone, the distance from the flange's z axis: the slice x[:2] holds two entries.",
+                    "This is the length of x and y alone, the distance from the flange's z axis: the slice x[:2] holds two entries.",
+                    id="tip_length-f925f0",
                 ),
                 Mistake(
                     lambda: np.hypot(np.linalg.norm(_kreisel().tip), _kreisel().pivot[0]),
-                    "You took four entries: x[3] is the first coordinate of the pivot. The tip is x[:3].",
+                    "This is the norm of four entries: x[3] is the first coordinate of the pivot. The tip is x[:3].",
                     id="tip-four",
                 ),
                 Mistake(
@@ -410,7 +435,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: np.linalg.norm(_kreisel().tip - _kreisel().pivot),
-                    "You subtracted two points of different frames: the tip is seen from the flange, the pivot from the world.",
+                    "This is the difference of two points of different frames: the tip is seen from the flange, the pivot from the world.",
+                    id="tip_length-a61113",
                 ),
                 Mistake(
                     lambda: np.linalg.norm(_kreisel().tip) / np.sqrt(3),
@@ -514,6 +540,11 @@ CHAPTER = Chapter(
                     lambda T, tip, point: pivot.pivot_residuals(T, tip, point).T,
                     "The numbers are right, but each pose stands in a column: one row per pose is wanted, shape (n, 3).",
                 ),
+                Mistake(
+                    lambda T, tip, point: T[:, :3, :3] @ (tip - point) + T[:, :3, 3],
+                    "The pivot is turned as well. It is written in the world: only the tip is turned by R.",
+                    id="residuals-pivot-turned",
+                ),
             ],
         ),
         Value(
@@ -530,7 +561,8 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     lambda: np.sqrt(_squares() / 36),
-                    "You divided by the 36 equations: the rms of one coordinate. The sheet divides by the 12 poses.",
+                    "This divides by the 36 equations: the rms of one coordinate. The sheet divides by the 12 poses.",
+                    id="s0-79bab0",
                 ),
                 Mistake(
                     lambda: _kreisel().std,
@@ -538,18 +570,21 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: np.sqrt(_squares() / 11),
-                    "You divided by n - 1. Nothing was estimated as a mean here: the sheet divides by the 12 poses.",
+                    "This divides by n - 1. Nothing was estimated as a mean here: the sheet divides by the 12 poses.",
+                    id="s0-188dc3",
                 ),
                 Mistake(lambda: np.sqrt(_squares()), "The division by n is missing under the root."),
                 Mistake(
                     lambda: np.sqrt(_squares()) / 12,
-                    "The n belongs under the root: you divided after it.",
+                    "The n belongs under the root: here it divides after it.",
+                    id="s0-76c6e1",
                 ),
                 Mistake(lambda: _squares() / 12, "The root is missing: this is a variance, in mm²."),
                 Mistake(lambda: _squares(), "This is rᵀr. Divide it by n and take the root."),
                 Mistake(
                     lambda: _squares() / 36,
-                    "The root is missing, and you divided by the 36 equations instead of the 12 poses.",
+                    "The root is missing, and the 36 equations divide instead of the 12 poses.",
+                    id="s0-f9e847",
                 ),
                 Mistake(
                     lambda: np.linalg.norm(_kreisel().residuals, axis=1).std(),
@@ -557,15 +592,18 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: np.sqrt(_squares() / 35),
-                    "You divided by 36 - 1 (`ddof=1`). Nothing was estimated as a mean here: the sheet divides by the 12 poses.",
+                    "This divides by 36 - 1 (`ddof=1`). Nothing was estimated as a mean here: the sheet divides by the 12 poses.",
+                    id="s0-c439df",
                 ),
                 Mistake(
                     lambda: np.sqrt(_squares() / 33),
-                    "You divided by 36 - 3. The sheet divides by the 12 poses (and there are six unknowns, not three).",
+                    "This divides by 36 - 3. The sheet divides by the 12 poses (and there are six unknowns, not three).",
+                    id="s0-5dc682",
                 ),
                 Mistake(
                     lambda: np.sqrt(_squares() / 6),
-                    "You divided by 12 - 6. The sheet divides by the 12 poses.",
+                    "This divides by 12 - 6. The sheet divides by the 12 poses.",
+                    id="s0-bd8b4c",
                 ),
                 Mistake(
                     lambda: np.linalg.norm(_kreisel().residuals, axis=1).max(),
@@ -709,6 +747,16 @@ CHAPTER = Chapter(
                     lambda A, r: np.vdot(r, r) / (r.size - 6) * (A.T @ A) ** -1.0,
                     "You took the reciprocal of every entry. The inverse matrix is `np.linalg.inv(A.T @ A)`.",
                 ),
+                Mistake(
+                    lambda A, residuals: np.linalg.norm(residuals, axis=1).mean() ** 2 * np.linalg.inv(A.T @ A),
+                    "The squared mean distance in space stands for the variance of a coordinate. That is rᵀr / (3n - 6).",
+                    id="covariance-mean-distance",
+                ),
+                Mistake(
+                    lambda A, residuals: _correlation(np.linalg.inv(A.T @ A)),
+                    "These are correlations, without a unit. The covariance is std² (AᵀA)⁻¹, in mm².",
+                    id="covariance-correlation",
+                ),
             ],
         ),
         Exercise(
@@ -815,6 +863,26 @@ CHAPTER = Chapter(
                 Mistake(
                     _weights(lambda q: np.minimum(1, 1 / q)),
                     "These are Huber's weights: they never vanish, so a pose far away still pulls.",
+                ),
+                Mistake(
+                    lambda d, scale: np.where(d < 7 * scale, (1 - (d / (7 * scale)) ** 3) ** 3, 0.0),
+                    "These are third powers (tricube). Tukey's weights have squares: (1 - q^2)^2.",
+                    id="weights-tricube",
+                ),
+                Mistake(
+                    lambda d, scale: np.where(d**2 < 7 * scale, (1 - d**2 / (7 * scale)) ** 2, 0.0),
+                    "Only the distance is squared: q^2 is the square of the whole quotient, d / (7 scale).",
+                    id="weights-squared-distance",
+                ),
+                Mistake(
+                    lambda d, scale: np.exp(-((d / scale) ** 2) / 2),
+                    "This is a Gaussian bell, with no cutoff. Tukey's weights are (1 - q^2)^2, and 0 where q > 1.",
+                    id="weights-bell",
+                ),
+                Mistake(
+                    lambda d, scale: 1 / (1 + (d / (7 * scale)) ** 2),
+                    "These are Cauchy's weights: they never vanish, so a pose far away still pulls.",
+                    id="weights-cauchy",
                 ),
             ],
         ),

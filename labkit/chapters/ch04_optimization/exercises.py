@@ -1545,7 +1545,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: 1 - (1 - 1 / 3**4) ** 5,
-                    "You gave each landing three outcomes. The toss has two, L or G.",
+                    "This gives each landing three outcomes. The toss has two, L or G.",
                     id="luck-three-sides",
                 ),
                 Mistake(
