@@ -152,3 +152,10 @@ def test_metrics_of_all_exercises_admit_their_reference():
             args = item.cases[0](np.random.default_rng(1))
             expected = item.reference(*args)
             assert item.metric.equal(expected, expected)
+
+
+@pytest.mark.parametrize("chapter, item", VALUES, ids=names(VALUES))
+def test_the_last_hint_of_a_value_is_code_that_binds_its_name(chapter, item):
+    tree = ast.parse(typed(item.hints[-1]))
+    bound = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+    assert item.id in bound, item.hints[-1]

@@ -1529,7 +1529,7 @@ CHAPTER = Chapter(
             hints=(
                 "First one stand-in: four tosses, all of them right.",
                 "At least one of five is the opposite of none of five.",
-                "`1 - (1 - p)**5`, where p is the probability that one stand-in has all four right.",
+                "`one = 0.5**4  # all four landings of one stand-in\nluck = 1 - (1 - one)**5`",
             ),
             mistakes=[
                 Mistake(lambda: 0.5**4, "That is one stand-in by itself. Five were tried."),
