@@ -362,7 +362,10 @@ def _closes_both(result):
 
 
 def two_loops():
-    """Two loops with a common link: pull either open; sharing out one opens the other, the pose graph closes both."""
+    """Two loops with a common link: pull either open; sharing out one opens the other, the pose graph closes both.
+
+    A plan: the loops lie in a plane, and gaps that are magnified could not be compared in a perspective.
+    """
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.7, 1))

@@ -738,7 +738,7 @@ def pattern_designer():
         printed = space.ellipsoid(**style.look("guide", linewidth=2.0))
         found = space.ellipsoid(**style.look("estimate"))
         weak = space.line(color=style.ESTIMATE, linewidth=3)
-        name = space.text("errors of the translation, x 40", offset=(0, 4), ha="center")
+        name = space.text("translation errors, x 40", offset=(0, 4), ha="center")
         used, places = draw.field_of_view(right, planning.FIELD)
 
         def update(state, result):

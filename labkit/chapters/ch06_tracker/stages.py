@@ -679,7 +679,10 @@ def _sweeps_sentence(result):
 
 
 def sweeps():
-    """Two base stations and a diode on a plan: delays, rays, and the ellipse of the place."""
+    """Two base stations and a diode on a plan: delays, rays, and the ellipse of the place.
+
+    A plan: the angle at which both rays cross is the whole matter, and a view from aside would falsify it.
+    """
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.5, 1))
