@@ -783,14 +783,19 @@ class Prediction(Item):
 
 @dataclass(frozen=True)
 class Chapter:
-    """A chapter's exercises in the order of its notebook; `name` is "NN-name" for the notebook NN_name."""
+    """A chapter's exercises in the order of its notebook; `name` is "NN-name" for the notebook NN_name.
+
+    `further` are the ids of those that stand beyond the core path, in sections marked *further*.
+    """
 
     name: str
     items: tuple = field(default_factory=tuple)
     title: str = ""
+    further: tuple = ()
 
     def __post_init__(self):
         object.__setattr__(self, "items", tuple(self.items))
+        object.__setattr__(self, "further", tuple(self.further))
         object.__setattr__(self, "title", self.title or self.name.partition("-")[2].replace("-", " ").capitalize())
         for item in self.items:
             object.__setattr__(item, "chapter", self)
@@ -799,6 +804,8 @@ class Chapter:
         taken = {"predict", "progress", "chapter", "after"} & set(ids)
         if double or taken:
             raise ValueError(f"chapter {self.name}: the exercise id {min(double | taken)!r} is taken")
+        if set(self.further) - set(ids):
+            raise ValueError(f"chapter {self.name}: {min(set(self.further) - set(ids))!r} is none of its exercises")
 
     def __getitem__(self, id):
         for item in self.items:

@@ -8,6 +8,7 @@ import os
 import pkgutil
 import re
 import zlib
+from typing import NamedTuple
 
 import ipywidgets
 import numpy as np
@@ -344,17 +345,39 @@ def _sentence(text):
 
 
 def chapter_panel(chapter):
-    """What is solved in a chapter, item by item."""
+    """What is solved in a chapter, item by item; what goes beyond the core path is marked."""
     done = progress.solved()
-    lines = [f"{'✓' if (chapter.name, item.id) in done else '○'} {item.id}" for item in chapter.items]
-    count = sum(line.startswith("✓") for line in lines)
-    return Panel(f"{chapter.name}: {count} of {len(lines)} done", ["\n".join(lines)])
+    lines = []
+    for item in chapter.items:
+        sign = "✓" if (chapter.name, item.id) in done else "○"
+        lines.append(f"{sign} {item.id}{'  (further)' if item.id in chapter.further else ''}")
+    count = _count(chapter, done)
+    return Panel(f"{chapter.name}: {count.core} of {count.of_core} done{_more(count)}", ["\n".join(lines)])
+
+
+class Count(NamedTuple):
+    """How much of a chapter is done: of its core path, and of what goes further."""
+
+    core: int
+    of_core: int
+    further: int
+    of_further: int
+
+
+def _count(chapter, done):
+    core = [(chapter.name, item.id) in done for item in chapter.items if item.id not in chapter.further]
+    more = [(chapter.name, id) in done for id in chapter.further]
+    return Count(sum(core), len(core), sum(more), len(more))
+
+
+def _more(count):
+    return f", further {count.further} of {count.of_further}" if count.of_further else ""
 
 
 def overview():
-    """(chapter, number done, number of items) of every chapter."""
+    """(chapter, `Count` of what is done) of every chapter."""
     done = progress.solved()
-    return [(c, sum((c.name, i.id) in done for i in c.items), len(c.items)) for c in chapters()]
+    return [(c, _count(c, done)) for c in chapters()]
 
 
 class CourseMap:
@@ -367,11 +390,11 @@ class CourseMap:
         rows = "".join(
             f'<tr><td style="text-align:right">{c.name[:2].lstrip("0") or "0"}</td>'
             f'<td style="text-align:left"><a href="{c.notebook}.ipynb">{html.escape(c.title)}</a></td>'
-            f'<td><progress value="{done}" max="{total}" aria-label="{html.escape(c.title)}"></progress></td>'
-            f"<td>{done} of {total}</td></tr>"
-            for c, done, total in overview()
+            f'<td><progress value="{n.core}" max="{n.of_core}" aria-label="{html.escape(c.title)}"></progress></td>'
+            f"<td>{n.core} of {n.of_core}</td><td>{f'{n.further} of {n.of_further}' if n.of_further else ''}</td></tr>"
+            for c, n in overview()
         )
-        head = "<tr><th></th><th>chapter</th><th>done</th><th></th></tr>"
+        head = "<tr><th></th><th>chapter</th><th>done</th><th></th><th>further</th></tr>"
         return {"text/plain": repr(self), "text/html": f"<table>{head}{rows}</table>"}
 
 
@@ -383,7 +406,7 @@ def course_map():
 def progress_text():
     """All chapters with a bar of what is done; `python lab.py progress` prints it."""
     lines = []
-    for chapter, count, total in overview():
-        bar = "#" * round(20 * count / max(total, 1))
-        lines.append(f"{chapter.name:20} [{bar:20}] {count:2} of {total}")
+    for chapter, n in overview():
+        bar = "#" * round(20 * n.core / max(n.of_core, 1))
+        lines.append(f"{chapter.name:20} [{bar:20}] {n.core:2} of {n.of_core}{_more(n)}")
     return "\n".join(lines)

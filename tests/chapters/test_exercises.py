@@ -159,3 +159,27 @@ def test_the_last_hint_of_a_value_is_code_that_binds_its_name(chapter, item):
     tree = ast.parse(typed(item.hints[-1]))
     bound = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
     assert item.id in bound, item.hints[-1]
+
+
+def asked_in(chapter):
+    """The ids of a chapter's items in the order of its notebook, and those in sections whose heading says further."""
+    order, further, level, ids = [], [], None, {item.id for item in chapter.items}
+    for cell in source.read(session.SOLUTIONS / f"{chapter.notebook}.py"):
+        if cell.kind == "markdown":
+            for depth, words in re.findall(r"^(#+) (.*)", cell.text, re.MULTILINE):
+                if level is None or len(depth) <= level:
+                    level = len(depth) if re.search(r"\bfurther\b", words, re.IGNORECASE) else None
+        elif "student" not in cell.tags:
+            for groups in re.findall(r'ex\.predict\(\s*"(\w+)"|ex\.(\w+)\b', cell.text):
+                id = "".join(groups)
+                if id in ids and id not in order:
+                    order.append(id)
+                    further += [id] if level else []
+    return order, further
+
+
+@pytest.mark.parametrize("chapter", CHAPTERS, ids=lambda c: c.name)
+def test_progress_lists_what_the_notebook_asks_in_its_order_and_marks_what_goes_further(chapter):
+    order, further = asked_in(chapter)
+    assert [item.id for item in chapter.items] == order
+    assert sorted(chapter.further) == sorted(further)

@@ -15,13 +15,6 @@ CHAPTER = Chapter(
     "00-start-here",
     title="Start here",
     items=[
-        Prediction(
-            "twice",
-            question="You turn a point by a quarter turn, twice. Where does it end up?",
-            choices=("where it was", "opposite, across the origin", "mirrored in the x axis"),
-            answer="opposite, across the origin",
-            why="Two quarter turns are a half turn: (x, y) becomes (-x, -y).",
-        ),
         Exercise(
             "quarter_turn",
             reference=quarter_turn,
@@ -73,6 +66,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(lambda p: p, "You return the point as it came."),
             ],
+        ),
+        Prediction(
+            "twice",
+            question="You turn a point by a quarter turn, twice. Where does it end up?",
+            choices=("where it was", "opposite, across the origin", "mirrored in the x axis"),
+            answer="opposite, across the origin",
+            why="Two quarter turns are a half turn: (x, y) becomes (-x, -y).",
         ),
     ],
 )

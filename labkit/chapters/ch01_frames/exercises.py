@@ -1094,4 +1094,8 @@ CHAPTER = Chapter(
             ],
         ),
     ],
+    further=(
+        "svd",
+        "fit_frame",
+    ),
 )

@@ -731,6 +731,13 @@ CHAPTER = Chapter(
             answer="the second, to K2",
             why="The error turns everything after the link about its end. K2 is farthest from K0; the fourth link ends at K0 and has no lever at all.",
         ),
+        Prediction(
+            "growth",
+            question="Frames in a row, each measured from the one before with a small turning error. Twice as many links: how much larger is the error at the end?",
+            choices=("1.4 times", "2 times", "2.8 times"),
+            answer="2.8 times",
+            why="The turns add like random steps, with the square root of N; each one acts through a lever that grows with N: together N^1.5, and 2^1.5 = 2.8 (somewhat more in short rows).",
+        ),
         Exercise(
             "orthonormalize",
             reference=chaining.orthonormalize,
@@ -821,13 +828,6 @@ CHAPTER = Chapter(
                     "You multiplied entry by entry: `*` is not `@`.",
                 ),
             ],
-        ),
-        Prediction(
-            "growth",
-            question="Frames in a row, each measured from the one before with a small turning error. Twice as many links: how much larger is the error at the end?",
-            choices=("1.4 times", "2 times", "2.8 times"),
-            answer="2.8 times",
-            why="The turns add like random steps, with the square root of N; each one acts through a lever that grows with N: together N^1.5, and 2^1.5 = 2.8 (somewhat more in short rows).",
         ),
         Exercise(
             "distribute_closure",
@@ -994,4 +994,9 @@ CHAPTER = Chapter(
         ),
         *beyond.FILES,
     ],
+    further=(
+        "two_loops",
+        "read_system",
+        "write_system",
+    ),
 )

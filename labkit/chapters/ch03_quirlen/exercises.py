@@ -621,19 +621,19 @@ CHAPTER = Chapter(
             ],
         ),
         Prediction(
+            "spin",
+            question="The tool spins about its own axis, sixty poses, never tilted. What will the residual and the error of the tip be?",
+            choices=("both small", "both large", "a small residual, a large error"),
+            answer="a small residual, a large error",
+            why="The residual only says how well the equations are fulfilled. A tip anywhere on the tool's axis fulfills them.",
+        ),
+        Prediction(
             "two_poses",
             question="Two poses give six equations for six unknowns. Is that enough?",
             choices=("yes, exactly enough", "only with a large turn between them", "never"),
             answer="never",
             why="Whatever the turn between the two poses, it has an axis. A tip shifted along it, with the pivot shifted alike, "
             "fulfills the same equations: R_1 - R_2 has rank 2.",
-        ),
-        Prediction(
-            "spin",
-            question="The tool spins about its own axis, sixty poses, never tilted. What will the residual and the error of the tip be?",
-            choices=("both small", "both large", "a small residual, a large error"),
-            answer="a small residual, a large error",
-            why="The residual only says how well the equations are fulfilled. A tip anywhere on the tool's axis fulfills them.",
         ),
         Prediction(
             "cone",

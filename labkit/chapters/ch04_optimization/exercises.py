@@ -1668,4 +1668,12 @@ CHAPTER = Chapter(
         ),
     ],
     title="Optimization",
+    further=(
+        "convex_share",
+        "rise_above_chord",
+        "trust_region",
+        "luck",
+        "share",
+        "tipping_weight",
+    ),
 )

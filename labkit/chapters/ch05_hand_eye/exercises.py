@@ -912,39 +912,6 @@ CHAPTER = Chapter(
             why="The residuals are linear in the translation and nearly so in these small turns: the model is good, no step is taken back, and only the radius makes it slower.",
         ),
         Exercise(
-            "linear_start",
-            reference=hand_eye.linear_start,
-            draw=lambda rng: scene(rng)[1:3],
-            metric=metrics.Several(metrics.Poses(1e-5, 1e-4), metrics.Numbers(1e-7, "mm"), names=("T_FS", "target")),
-            noisy=(noisy_scene,  # t_FS solved anew, or a refined answer, is right as well
-                   metrics.Several(metrics.Poses(0.5, 2.5), metrics.Numbers(2e-3, "mm"), names=("T_FS", "target")),
-                   "exact on clean data, but on noisy data"),
-            hints=(
-                "Forget for a moment that R_FS is a rotation: then all unknowns enter linearly.",
-                "R_FS x + t_FS - R_BF^T target = -R_BF^T t_BF. Fifteen unknowns: nine of R_FS, three of t_FS, three of the target.",
-                "`A = np.vstack([np.hstack([np.kron(np.eye(3), x), np.eye(3), -T[:3, :3].T]) for T, x in zip(T_BF, x_S)])\n"
-                "b = np.concatenate([-T[:3, :3].T @ T[:3, 3] for T in T_BF])\n"
-                "u = np.linalg.lstsq(A, b, rcond=None)[0]\n"
-                "return frames.pose(nearest_rotation(u[:9].reshape(3, 3)), u[9:12]), u[12:]`",
-            ),
-            mistakes=[
-                Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3].T, T[:3, 3]), c)),
-                        "Your rotation is the transpose: the nine unknowns came back in the other order (rows and columns)."),
-                Mistake(_linear(lambda T, c: (T, -c)), "The target has the wrong sign: it stands on the other side of the equation, with -R_BF^T."),
-                Mistake(_linear_without_rotation, "On noisy data your nine numbers are not a rotation: take the nearest one."),
-                Mistake(_linear(lambda T, c: (frames.invert(T), c)), "Your pose is the inverse, T_SF."),
-                Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3], -T[:3, 3]), c)), "The translation of T_FS has the wrong sign."),
-                Mistake(_linear_with_unturned_right_side, "Your right side is -t_BF. It is to be turned into the flange frame as well: -R_BF^T t_BF."),
-                Mistake(_linear_without_turning_back, "You multiplied by R_BF where R_BF^T is needed: bring everything into the flange frame."),
-                Mistake(functools.partial(_linear_by, right=-1.0),
-                        "The right side has the wrong sign: it is -R_BF^T t_BF."),
-                Mistake(functools.partial(_linear_by, rotation=lambda M: np.linalg.qr(M)[0]),
-                        "QR leaves the signs of its columns open, and trusts the first one most. Take the nearest rotation."),
-                Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3], c), T[:3, 3])),
-                        "t_FS and the center have changed places: after the nine entries of R_FS come t_FS, then c."),
-],
-        ),
-        Exercise(
             "joint_residual",
             reference=joint_residual,
             draw=increments,
@@ -985,6 +952,39 @@ CHAPTER = Chapter(
                 Mistake(lambda u, T0, T_BF, x_S: joint_residual(np.concatenate([u[3:], u[:3]]), T0, T_BF, x_S),
                         "The order of the unknowns is phi, tau, center; here the center is read from the front."),
             ],
+        ),
+        Exercise(
+            "linear_start",
+            reference=hand_eye.linear_start,
+            draw=lambda rng: scene(rng)[1:3],
+            metric=metrics.Several(metrics.Poses(1e-5, 1e-4), metrics.Numbers(1e-7, "mm"), names=("T_FS", "target")),
+            noisy=(noisy_scene,  # t_FS solved anew, or a refined answer, is right as well
+                   metrics.Several(metrics.Poses(0.5, 2.5), metrics.Numbers(2e-3, "mm"), names=("T_FS", "target")),
+                   "exact on clean data, but on noisy data"),
+            hints=(
+                "Forget for a moment that R_FS is a rotation: then all unknowns enter linearly.",
+                "R_FS x + t_FS - R_BF^T target = -R_BF^T t_BF. Fifteen unknowns: nine of R_FS, three of t_FS, three of the target.",
+                "`A = np.vstack([np.hstack([np.kron(np.eye(3), x), np.eye(3), -T[:3, :3].T]) for T, x in zip(T_BF, x_S)])\n"
+                "b = np.concatenate([-T[:3, :3].T @ T[:3, 3] for T in T_BF])\n"
+                "u = np.linalg.lstsq(A, b, rcond=None)[0]\n"
+                "return frames.pose(nearest_rotation(u[:9].reshape(3, 3)), u[9:12]), u[12:]`",
+            ),
+            mistakes=[
+                Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3].T, T[:3, 3]), c)),
+                        "Your rotation is the transpose: the nine unknowns came back in the other order (rows and columns)."),
+                Mistake(_linear(lambda T, c: (T, -c)), "The target has the wrong sign: it stands on the other side of the equation, with -R_BF^T."),
+                Mistake(_linear_without_rotation, "On noisy data your nine numbers are not a rotation: take the nearest one."),
+                Mistake(_linear(lambda T, c: (frames.invert(T), c)), "Your pose is the inverse, T_SF."),
+                Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3], -T[:3, 3]), c)), "The translation of T_FS has the wrong sign."),
+                Mistake(_linear_with_unturned_right_side, "Your right side is -t_BF. It is to be turned into the flange frame as well: -R_BF^T t_BF."),
+                Mistake(_linear_without_turning_back, "You multiplied by R_BF where R_BF^T is needed: bring everything into the flange frame."),
+                Mistake(functools.partial(_linear_by, right=-1.0),
+                        "The right side has the wrong sign: it is -R_BF^T t_BF."),
+                Mistake(functools.partial(_linear_by, rotation=lambda M: np.linalg.qr(M)[0]),
+                        "QR leaves the signs of its columns open, and trusts the first one most. Take the nearest rotation."),
+                Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3], c), T[:3, 3])),
+                        "t_FS and the center have changed places: after the nine entries of R_FS come t_FS, then c."),
+],
         ),
         Exercise(
             "robust_weights",
@@ -1142,6 +1142,7 @@ CHAPTER = Chapter(
                 "return planning.poses_that_see(T_FS, target, exp_so3(turns) @ np.diag([1, -1, -1]) @ T_FS[:3, :3].T, x_S)`",
             ),
         ),
+        *beyond.LITERATURE,
         Prediction(
             "price_of_two_steps",
             question="Li's method fits the rotation first and then the translation, from the same sixteen poses as the joint fit. How much larger are its errors of the translation?",
@@ -1149,7 +1150,6 @@ CHAPTER = Chapter(
             answer="about three times",
             why="Step 1 hears only the five poses of one orientation, and what it errs is multiplied by the distance of the sphere in step 2. The joint fit lets all poses speak on both.",
         ),
-        *beyond.LITERATURE,
         Prediction(
             "repeats",
             question="A robot is recalibrated, and the mean of its arrivals moves onto the cross. What happens to its repeatability?",
@@ -1167,6 +1167,7 @@ CHAPTER = Chapter(
         ),
         beyond.CAD_LENGTH,
     ],
+    further=("twice_as_far", "height_from_angles", "height_std", "trust_arrives", "joint_residual", "linear_start", "weak", "design_poses", "li_rotation", "li_translation", "kim_system", "price_of_two_steps", "repeats", "position_accuracy", "repeatability", "same_orientation", "cad_length",),
 )  # fmt: skip
 
 

@@ -629,6 +629,13 @@ CELL = [
         ],
     ),
     Prediction(
+        "touch",
+        question="Instead of seen by the scanner, the marks are touched with the same tip, the flange turned as later at the hole. The tip's calibration is 1 mm off. By how much does the tip miss the hole, if the trolley has not moved?",
+        choices=("not at all", "by 1 mm", "by 2 mm"),
+        answer="not at all",
+        why="The tip is wrong by the same vector when it measures and when it is used, and the two cancel. An error that is common to both needs no calibration; turn the part, and it comes back.",
+    ),
+    Prediction(
         "returns",
         question="The trolley comes back exactly to where the part was learned. What does the error of T_BW do to the part's place now?",
         choices=("nothing", "as much as anywhere", "twice as much: it enters twice"),
@@ -827,12 +834,5 @@ CELL = [
                 id="halved-squared",
             ),
         ],
-    ),
-    Prediction(
-        "touch",
-        question="Instead of seen by the scanner, the marks are touched with the same tip, the flange turned as later at the hole. The tip's calibration is 1 mm off. By how much does the tip miss the hole, if the trolley has not moved?",
-        choices=("not at all", "by 1 mm", "by 2 mm"),
-        answer="not at all",
-        why="The tip is wrong by the same vector when it measures and when it is used, and the two cancel. An error that is common to both needs no calibration; turn the part, and it comes back.",
     ),
 ]

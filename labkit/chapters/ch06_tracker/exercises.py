@@ -429,13 +429,6 @@ CHAPTER = Chapter(
     "06-tracker",
     title="A tracker on a robot flange",
     items=[
-        Prediction(
-            "loss",
-            question="The packet has no sequence number and no checksum. How can a receiver know that one was lost?",
-            choices=("it cannot", "from gaps in the time stamps", "UDP reports it"),
-            answer="from gaps in the time stamps",
-            why="UDP says nothing. At a known rate a gap in the time stamps can be counted; a duplicate shows the same stamp twice.",
-        ),
         Exercise(
             "decode_packet",
             reference=decode_packet,
@@ -502,6 +495,13 @@ CHAPTER = Chapter(
                     "You read the bytes in the wrong order (big-endian): the numbers come out absurd. The workbook assumes little-endian doubles.",
                 ),
             ],
+        ),
+        Prediction(
+            "loss",
+            question="The packet has no sequence number and no checksum. How can a receiver know that one was lost?",
+            choices=("it cannot", "from gaps in the time stamps", "UDP reports it"),
+            answer="from gaps in the time stamps",
+            why="UDP says nothing. At a known rate a gap in the time stamps can be counted; a duplicate shows the same stamp twice.",
         ),
         Prediction(
             "fold",
@@ -1423,4 +1423,20 @@ CHAPTER = Chapter(
         *beyond.SPEEDS,
         *beyond.CELL,
     ],
+    further=(
+        "mean_quaternion",
+        "sweep",
+        "ray_direction",
+        "nearest_to_rays",
+        "moved",
+        "knock",
+        "tempo",
+        "static_error_and_lag",
+        "moved_part",
+        "touch",
+        "returns",
+        "point_covariance",
+        "shares",
+        "halved",
+    ),
 )

@@ -554,13 +554,6 @@ CHAPTER = Chapter(
                 ),
             ],
         ),
-        Prediction(
-            "roots",
-            question="A robot stands on the line between two landmarks, and both measured distances come out 1 % short. In how many points do the circles meet?",
-            choices=("none", "one", "two"),
-            answer="none",
-            why="The two distances no longer add up to the way between the landmarks. Off the line the circles meet in two points, mirror images of each other, and the start decides which one Newton finds.",
-        ),
         Exercise(
             "newton_lateration",
             reference=newton_lateration,
@@ -634,6 +627,13 @@ CHAPTER = Chapter(
                     "The search runs off to infinity: the step must solve J step = -f, with J = 2 (position - landmarks) at the present position.",
                 ),
             ],
+        ),
+        Prediction(
+            "roots",
+            question="A robot stands on the line between two landmarks, and both measured distances come out 1 % short. In how many points do the circles meet?",
+            choices=("none", "one", "two"),
+            answer="none",
+            why="The two distances no longer add up to the way between the landmarks. Off the line the circles meet in two points, mirror images of each other, and the start decides which one Newton finds.",
         ),
         Exercise(
             "wheel_to_twist",
@@ -1633,4 +1633,10 @@ CHAPTER = Chapter(
             "ahead. They reach the spot too, by more than one command, as everyone knows who has parked a car.",
         ),
     ],
+    further=(
+        "wheel_offset",
+        "ackermann_twist",
+        "mecanum_twist",
+        "reach",
+    ),
 )

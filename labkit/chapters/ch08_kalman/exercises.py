@@ -789,6 +789,14 @@ CHAPTER = Chapter(
             ],
         ),
         Prediction(
+            "printed",
+            question="The slide's algorithm is called as KalmanFilter(x_k, u_k, z_k+1) and returns x_k+1. What is missing to call it step after step?",
+            choices=("nothing", "the covariance, in and out", "the gain, in and out", "the next control"),
+            answer="the covariance, in and out",
+            why="Line 3 reads the covariance of step k and line 8 computes that of step k + 1, but neither the arguments nor the result "
+            "name it. The gain is made anew in each step and needs no memory.",
+        ),
+        Prediction(
             "bell",
             question="Prediction and measurement are equally sure but 2 m apart. The corrected bell, compared with both, is ...",
             choices=("wider than both", "as wide as both", "narrower than both"),
@@ -1825,14 +1833,6 @@ CHAPTER = Chapter(
                 Mistake(lambda y, S, g: False, "You refuse everything: such a filter never corrects itself."),
             ],
         ),
-        Prediction(
-            "printed",
-            question="The slide's algorithm is called as KalmanFilter(x_k, u_k, z_k+1) and returns x_k+1. What is missing to call it step after step?",
-            choices=("nothing", "the covariance, in and out", "the gain, in and out", "the next control"),
-            answer="the covariance, in and out",
-            why="Line 3 reads the covariance of step k and line 8 computes that of step k + 1, but neither the arguments nor the result "
-            "name it. The gain is made anew in each step and needs no memory.",
-        ),
         Exercise(
             "batch_estimate",
             reference=batch_estimate,
@@ -1906,4 +1906,8 @@ CHAPTER = Chapter(
             ],
         ),
     ],
+    further=(
+        "precise",
+        "batch_estimate",
+    ),
 )

@@ -1666,93 +1666,6 @@ CHAPTER = Chapter(
             ],
         ),
         Exercise(
-            "scan_from_depth",
-            reference=scan_from_depth,
-            draw=row_of_depths,
-            metric=metrics.Several(
-                metrics.Numbers(1e-9, "m"), metrics.Numbers(1e-9, "rad"), names=("ranges", "bearings")
-            ),
-            hints=(
-                "Where on the picture is column k? Half the picture's width belongs to tan(field_of_view / 2).",
-                "With u = (n / 2 - 0.5 - k) / (n / 2): bearing = arctan(u tan(field_of_view / 2)), range = depth / cos(bearing).",
-                "`n = len(depth)\n"
-                "u = (n / 2 - 0.5 - np.arange(n)) / (n / 2)\n"
-                "bearings = np.arctan(u * np.tan(field_of_view / 2))\n"
-                "seen = (depth >= near) & (depth <= far)\n"
-                "return (depth / np.cos(bearings))[seen], bearings[seen]`",
-            ),
-            mistakes=[
-                Mistake(
-                    lambda d, f, near, far: _scan_seen(d, f, lambda r, d: (r >= near) & (r <= far)),
-                    "near and far are limits of the depth, along the optical axis: compare the depth, not the range along the ray.",
-                ),
-                Mistake(
-                    lambda d, f, near, far: _scan_seen(d, np.radians(f), lambda r, d: (d >= near) & (d <= far)),
-                    "The opening angle is in radians already.",
-                ),
-                Mistake(
-                    _depth(of=lambda d, b: d),
-                    "The bearings are right. A depth counts along the optical axis: to the sides the range is longer.",
-                ),
-                Mistake(
-                    _depth(of=lambda d, b: d * np.cos(b)),
-                    "The bearings are right. The cosine divides: the range is longer than the depth.",
-                ),
-                Mistake(
-                    _depth(of=lambda d, b: d / np.sin(b)),
-                    "The bearings are right. The depth is the side along the axis: the cosine.",
-                ),
-                Mistake(
-                    _depth(angle=lambda u, fov: u * fov / 2),
-                    "Columns are evenly spaced on the picture, not in angle: the arctangent is missing.",
-                ),
-                Mistake(
-                    _depth(angle=lambda u, fov: -np.arctan(u * math.tan(fov / 2))),
-                    "Left and right are exchanged: column 0 is on the left, where bearings are positive.",
-                ),
-                Mistake(
-                    _depth(angle=lambda u, fov: np.arctan(u * math.tan(fov))),
-                    "Half of the opening angle lies on each side: tan(field_of_view / 2).",
-                ),
-                Mistake(
-                    _depth(angle=lambda u, fov: np.arctan(u / math.tan(fov / 2))),
-                    "The tangent is upside down: the edge of the picture is at field_of_view / 2.",
-                ),
-                Mistake(
-                    _depth(angle=lambda u, fov: np.arctan(np.linspace(1, -1, len(u)) * math.tan(fov / 2))),
-                    "A column has its bearing in its middle: the outermost ones lie half a column inside.",
-                ),
-                Mistake(
-                    _depth(angle=lambda u, fov: np.arctan((u - 1 / len(u)) * math.tan(fov / 2))),
-                    "Half a column aside: the middle of column k is at k + 0.5.",
-                ),
-                Mistake(
-                    _depth(angle=lambda u, fov: np.arctan((u + 1 / len(u)) * math.tan(fov / 2))),
-                    "Half a column aside: the middle of column k is at k + 0.5.",
-                ),
-                Mistake(
-                    _depth(seen=lambda d, near, far: (d > near) & (d < far)),
-                    "A depth of exactly `near` or `far` is seen as well.",
-                ),
-                Mistake(
-                    _depth(seen=lambda d, near, far: d > 0), "Depths outside of near and far are no readings either."
-                ),
-                Mistake(
-                    _depth(seen=lambda d, near, far: d <= far), "What is nearer than `near`, also 0, is no reading."
-                ),
-                Mistake(_depth(seen=lambda d, near, far: d >= near), "What is farther than `far` is no reading."),
-                Mistake(
-                    _depth(seen=lambda d, near, far: np.ones(len(d), bool)),
-                    "Columns without a depth between near and far are to be left out.",
-                ),
-                Mistake(lambda *a: scan_from_depth(*a)[::-1], "The order is ranges, bearings."),
-                Mistake(
-                    lambda *a: (scan_from_depth(*a)[0], np.degrees(scan_from_depth(*a)[1])),
-                    "The ranges are right. The bearings are in degrees: leave them in radians.",
-                ),
-            ],
-        ),
-        Exercise(
             "circular_mean",
             reference=circular_mean,
             draw=(headings, functools.partial(headings, about=0.0)),
@@ -1925,6 +1838,93 @@ CHAPTER = Chapter(
             ],
             draws=12,
         ),
+        Exercise(
+            "scan_from_depth",
+            reference=scan_from_depth,
+            draw=row_of_depths,
+            metric=metrics.Several(
+                metrics.Numbers(1e-9, "m"), metrics.Numbers(1e-9, "rad"), names=("ranges", "bearings")
+            ),
+            hints=(
+                "Where on the picture is column k? Half the picture's width belongs to tan(field_of_view / 2).",
+                "With u = (n / 2 - 0.5 - k) / (n / 2): bearing = arctan(u tan(field_of_view / 2)), range = depth / cos(bearing).",
+                "`n = len(depth)\n"
+                "u = (n / 2 - 0.5 - np.arange(n)) / (n / 2)\n"
+                "bearings = np.arctan(u * np.tan(field_of_view / 2))\n"
+                "seen = (depth >= near) & (depth <= far)\n"
+                "return (depth / np.cos(bearings))[seen], bearings[seen]`",
+            ),
+            mistakes=[
+                Mistake(
+                    lambda d, f, near, far: _scan_seen(d, f, lambda r, d: (r >= near) & (r <= far)),
+                    "near and far are limits of the depth, along the optical axis: compare the depth, not the range along the ray.",
+                ),
+                Mistake(
+                    lambda d, f, near, far: _scan_seen(d, np.radians(f), lambda r, d: (d >= near) & (d <= far)),
+                    "The opening angle is in radians already.",
+                ),
+                Mistake(
+                    _depth(of=lambda d, b: d),
+                    "The bearings are right. A depth counts along the optical axis: to the sides the range is longer.",
+                ),
+                Mistake(
+                    _depth(of=lambda d, b: d * np.cos(b)),
+                    "The bearings are right. The cosine divides: the range is longer than the depth.",
+                ),
+                Mistake(
+                    _depth(of=lambda d, b: d / np.sin(b)),
+                    "The bearings are right. The depth is the side along the axis: the cosine.",
+                ),
+                Mistake(
+                    _depth(angle=lambda u, fov: u * fov / 2),
+                    "Columns are evenly spaced on the picture, not in angle: the arctangent is missing.",
+                ),
+                Mistake(
+                    _depth(angle=lambda u, fov: -np.arctan(u * math.tan(fov / 2))),
+                    "Left and right are exchanged: column 0 is on the left, where bearings are positive.",
+                ),
+                Mistake(
+                    _depth(angle=lambda u, fov: np.arctan(u * math.tan(fov))),
+                    "Half of the opening angle lies on each side: tan(field_of_view / 2).",
+                ),
+                Mistake(
+                    _depth(angle=lambda u, fov: np.arctan(u / math.tan(fov / 2))),
+                    "The tangent is upside down: the edge of the picture is at field_of_view / 2.",
+                ),
+                Mistake(
+                    _depth(angle=lambda u, fov: np.arctan(np.linspace(1, -1, len(u)) * math.tan(fov / 2))),
+                    "A column has its bearing in its middle: the outermost ones lie half a column inside.",
+                ),
+                Mistake(
+                    _depth(angle=lambda u, fov: np.arctan((u - 1 / len(u)) * math.tan(fov / 2))),
+                    "Half a column aside: the middle of column k is at k + 0.5.",
+                ),
+                Mistake(
+                    _depth(angle=lambda u, fov: np.arctan((u + 1 / len(u)) * math.tan(fov / 2))),
+                    "Half a column aside: the middle of column k is at k + 0.5.",
+                ),
+                Mistake(
+                    _depth(seen=lambda d, near, far: (d > near) & (d < far)),
+                    "A depth of exactly `near` or `far` is seen as well.",
+                ),
+                Mistake(
+                    _depth(seen=lambda d, near, far: d > 0), "Depths outside of near and far are no readings either."
+                ),
+                Mistake(
+                    _depth(seen=lambda d, near, far: d <= far), "What is nearer than `near`, also 0, is no reading."
+                ),
+                Mistake(_depth(seen=lambda d, near, far: d >= near), "What is farther than `far` is no reading."),
+                Mistake(
+                    _depth(seen=lambda d, near, far: np.ones(len(d), bool)),
+                    "Columns without a depth between near and far are to be left out.",
+                ),
+                Mistake(lambda *a: scan_from_depth(*a)[::-1], "The order is ranges, bearings."),
+                Mistake(
+                    lambda *a: (scan_from_depth(*a)[0], np.degrees(scan_from_depth(*a)[1])),
+                    "The ranges are right. The bearings are in degrees: leave them in radians.",
+                ),
+            ],
+        ),
         _hunt(
             "hunt_1",
             hunt_1,
@@ -1995,4 +1995,8 @@ CHAPTER = Chapter(
             extra=(),
         ),
     ],
+    further=(
+        "multiply_weights",
+        "scan_from_depth",
+    ),
 )

@@ -381,6 +381,13 @@ CHAPTER = Chapter(
             answer="the one tilted across",
             why="It alone fixes what the nine leave free. Its residual is small for that very reason: nobody contradicts it.",
         ),
+        Prediction(
+            "coverage",
+            question="Four poses, noise estimated from their residuals, no factor of Student. How often does the truth lie farther away than two of the standard deviations so told?",
+            choices=("1 time in 20", "1 time in 10", "1 time in 3"),
+            answer="1 time in 10",
+            why="With six degrees of freedom the noise itself is off by a third, and where it came out too small the truth lies outside.",
+        ),
         Exercise(
             "honest_covariance",
             reference=honest_covariance,
@@ -421,13 +428,6 @@ CHAPTER = Chapter(
                         "`np.var` takes the mean of the residuals off and divides by their number. The noise is r'r / f, and Student's f / (f - 2) is missing."),
                 Mistake(lambda r, J: r @ r / (_freedom(r, J) - 2) * (J.T @ J), "J'J is information. The covariance takes its inverse."),
             ],
-        ),
-        Prediction(
-            "coverage",
-            question="Four poses, noise estimated from their residuals, no factor of Student. How often does the truth lie farther away than two of the standard deviations so told?",
-            choices=("1 time in 20", "1 time in 10", "1 time in 3"),
-            answer="1 time in 10",
-            why="With six degrees of freedom the noise itself is off by a third, and where it came out too small the truth lies outside.",
         ),
         Exercise(
             "with_one_more",
