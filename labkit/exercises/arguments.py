@@ -41,6 +41,21 @@ def changes(names, inputs, notebook):
     for k in numeric:
         for words, change in _of_one(names[k], columns[k]):
             yield words, _replace(k, change)
+    yield from _scaled(names, columns, numeric)
+
+
+def _scaled(names, columns, numeric):
+    """One argument multiplied or divided by another one that is a number, but no count."""
+    plain = [k for k in numeric if all(np.ndim(v) == 0 and not isinstance(v, int | np.integer) for v in columns[k])]
+    for k, by in itertools.product(numeric, plain):
+        if k != by and not all(isinstance(v, int | np.integer) for v in columns[k]):
+            here, other = f"`{names[k]}`", f"`{names[by]}`"
+            yield f"with {here} times {other} in place of {here}", _by_another(k, by, np.multiply)
+            yield f"with {here} divided by {other} in place of {here}", _by_another(k, by, np.divide)
+
+
+def _by_another(k, by, operation):
+    return lambda args: (*args[:k], operation(args[k], args[by]), *args[k + 1 :])
 
 
 def _is_numeric(value):
@@ -145,6 +160,8 @@ def _of_entries(here, n):
         entry = f"entry {k} (counted from 0) of {here}"
         yield f"if {entry} had the opposite sign", _entry(k, np.negative)
         yield f"if {entry} were 0", _entry(k, lambda v: 0.0)
+        yield f"if {entry} were half as large", _entry(k, lambda v: v / 2)
+        yield f"if {entry} were twice as large", _entry(k, lambda v: 2 * v)
     for i, j in itertools.combinations(range(n), 2):
         yield f"with the entries {i} and {j} (counted from 0) of {here} exchanged", _entries(i, j)
 

@@ -423,12 +423,22 @@ class _Trial:
             return near
         missed = [args for args, pair in zip(self.inputs, pairs) if not metric.equal(*pair)]
         if len(missed) == len(pairs):
-            return _closed(str(most))
+            return _closed(str(most)) + self._right_parts()
         special, seen = self._special_case()
         right = f"It was right on {len(pairs) - len(missed)} of {len(pairs)} draws: which case is special?"
         if special:
             right = f"It is wrong where {special}, and right elsewhere, on {seen} draws."
         return f"{_closed(str(most))} {right}\nNot right when called as {self._call(missed[0])}"
+
+    def _right_parts(self):
+        """Which of several results are right on all draws, as one more sentence; nothing where none or all are."""
+        metric, pairs = self.exercise.metric, self._plain_pairs()
+        right = [
+            name
+            for k, (name, part, _, _) in enumerate(metric.parts(*pairs[0]))
+            if all(part.equal(*metric.parts(*pair)[k][2:]) for pair in pairs)
+        ]
+        return f" Right are: {', '.join(right)}." if right and isinstance(metric, metrics.Several) else ""
 
     def _right_to_many_digits(self, worst):
         """Whether some draws come out so much better than the worst that a case is to be told, not the accuracy."""

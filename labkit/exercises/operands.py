@@ -25,7 +25,10 @@ def operand_words(metric, results, expected, named):
     if not named or not any(np.any(e) for e in expected):
         return None
     numeric = _numeric(named)
-    return _term(metric, results, expected, numeric) or _factor(results, expected, numeric)
+    words = _term(metric, results, expected, numeric) or _factor(results, expected, numeric)
+    if words or not all(np.all(e) for e in expected):
+        return words
+    return _factor(results, [1 / e for e in expected], numeric, "the reciprocal of the expected one")
 
 
 def _numeric(named):
@@ -79,7 +82,7 @@ def _identity(metric, results, expected):
     return None
 
 
-def _factor(results, expected, numeric):
+def _factor(results, expected, numeric, what="the expected one"):
     """A factor between result and expected that differs from draw to draw as an argument does, or a number of them."""
     ratios = [_ratio(r, e) for r, e in zip(results, expected)]
     if None in ratios or len(ratios) < 2 or np.ptp(np.abs(ratios)) <= CLOSE * abs(ratios[0]):
@@ -88,9 +91,9 @@ def _factor(results, expected, numeric):
         for power, form in POWERS.items():
             for sign, minus in ((1, ""), (-1, "minus ")):
                 if _same(ratios, sign * sizes**power):
-                    return f"your result is {minus}the expected one times {form.format(words)}"
+                    return f"your result is {minus}{what} times {form.format(words)}"
                 if _same(ratios, sign * sizes**-power):
-                    return f"{form.format(words)} times your result is {minus}the expected one"
+                    return f"{form.format(words)} times your result is {minus}{what}"
     return None
 
 

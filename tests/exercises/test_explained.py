@@ -126,3 +126,14 @@ def test_the_special_case_is_named():
     assert "wrong where `std` is negative, and right elsewhere" in told(
         item, "return np.sin(x.sum()) * abs(std) + x[0]"
     )
+
+
+def test_an_argument_scaled_by_another_is_named():
+    item = exercise(lambda x, std: x / std + np.sin(x), _draw)
+    assert "with `x` times `std` in place of `x`" in told(item, "x = x * std\nreturn x / std + np.sin(x)")
+
+
+def test_of_two_results_the_right_one_is_told():
+    both = metrics.Several(NUMBERS, NUMBERS, names=("sine", "cosine"))
+    item = exercise(lambda x, std: (np.sin(x), np.cos(x) + std**3), _draw, both)
+    assert "Right are: sine." in told(item, "return np.sin(x), np.cos(x) + std**2.7 - 0.1 * x**4")
