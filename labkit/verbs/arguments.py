@@ -1,6 +1,7 @@
 """Command lines that refuse in one sentence: no usage dump, no traceback, exit code 1."""
 
 import argparse
+import contextlib
 import errno
 import json
 import os
@@ -68,7 +69,17 @@ def _refuse(words):
 def sentence(error):
     """What the operating system refused, in a sentence that names the file."""
     reason = REASONS.get(error.errno) or error.strerror or str(error)
-    return f"{error.filename or 'A file'}: {reason}."
+    return f"{error.filename or 'A file or what is printed'}: {reason}."
+
+
+@contextlib.contextmanager
+def named(path):
+    """What the operating system refuses within bears the file's name: of a write to a full disk it says none."""
+    try:
+        yield
+    except OSError as error:
+        error.filename = error.filename or str(path)
+        raise
 
 
 def write(folder, **files):
@@ -77,4 +88,5 @@ def write(folder, **files):
     for name, content in files.items():
         name = name.replace("__", ".")
         text = content if isinstance(content, str) else json.dumps(content, indent=1, allow_nan=False) + "\n"
-        (folder / name).write_text(text, encoding="utf-8")
+        with named(folder / name):
+            (folder / name).write_text(text, encoding="utf-8")

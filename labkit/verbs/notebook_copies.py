@@ -11,7 +11,7 @@ import os
 from pathlib import Path
 
 from ..places import IS_CHECKOUT, ROOT
-from .arguments import Refusal
+from .arguments import Refusal, named
 
 GIVEN = ".labkit.json"
 
@@ -133,8 +133,9 @@ def write(path, text):
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.name}.partial")
     try:
-        partial.write_text(text, encoding="utf-8", newline="\n")
-        os.replace(partial, path)
+        with named(path):
+            partial.write_text(text, encoding="utf-8", newline="\n")
+            os.replace(partial, path)
     finally:
         partial.unlink(missing_ok=True)
 

@@ -4,11 +4,12 @@ import errno
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from labkit import __main__ as command
-from labkit.verbs import VERBS, arguments
+from labkit.verbs import VERBS, arguments, notebook_copies
 
 ROOT = command.__file__ and os.path.dirname(os.path.dirname(os.path.abspath(command.__file__)))
 
@@ -71,3 +72,17 @@ def test_a_reader_who_has_seen_enough_is_no_error():
     process.stdout.close()
     assert process.stderr.read() == "" and process.wait(10) is not None
     process.stderr.close()
+
+
+def test_a_full_disk_is_said_with_the_file_that_found_no_room(monkeypatch, tmp_path, capsys):
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))  # as a write says it: without a name
+
+    monkeypatch.setattr(Path, "write_text", full)
+    for write in (
+        lambda: notebook_copies.write(tmp_path / "a.ipynb", ""),
+        lambda: arguments.write(tmp_path, a__csv=""),
+    ):
+        assert arguments.run(lambda words, write=write: write(), []) == 1
+        said = capsys.readouterr().err
+        assert said.startswith(str(tmp_path / "a.")) and said.endswith("the disk is full.\n")
