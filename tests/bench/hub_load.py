@@ -5,9 +5,10 @@
 The hub is set up by the commands of docs/hub.md, into FOLDER if it is not there yet. For each number of users: all log
 in together, each runs chapter 1 from its first cell to its last, and moves its Stages for so long: a second with an
 arrow key held down (25 moves), two seconds of looking at it, then the next Stage. Printed: seconds from the log-in to
-the first page and of Run All, milliseconds from a key to the picture that answers it, failures, memory (PSS) and
-processors of the hub with its proxy, servers and kernels. The students' own page is no browser but this process, which
-takes a share of the processors for itself; it is in the last column.
+the first page and of Run All, milliseconds from a key to the picture that answers it, failures, memory (PSS) of the
+hub with its proxy, servers and kernels, their processor time up to the end of Run All by student, and how many
+processors are busy while Stages move. The students' own page is no browser but this process, which takes a share of
+the processors for itself; it is in the last column.
 """
 
 import argparse
@@ -27,7 +28,7 @@ import students
 NOTEBOOK = "workbook/01_frames.ipynb"
 MOVES, LOOKING = 25, 2.0  # of one drag; s until the next one
 HEAD = ("users", "log-in s", "Run All s", "median ms", "p95", "p99", "longest", "moves", "failed", "MiB", "MiB/user")
-HEAD += ("processors", "of them the pages")
+HEAD += ("processor s to begin", "processors", "of them the pages")
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
@@ -86,7 +87,7 @@ def memory(processes):
             lines = Path(f"/proc/{process}/smaps_rollup").read_text().splitlines()
         except OSError:
             continue
-        total += next(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
+        total += sum(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
     return total / 1024
 
 
@@ -121,7 +122,7 @@ def day(place, users, seconds):
     failed = [f for d in days for f in d.failed]
     numbers = (np.nanmedian(log_in), np.nanmedian(run_all), *np.percentile(moves, (50, 95, 99, 100)))
     row = (users, *(f"{v:.0f}" for v in numbers), len(moves), len(failed), f"{held:.0f}", f"{held / users:.0f}")
-    return (*row, f"{busy + pages:.2f}", f"{pages:.2f}"), failed
+    return (*row, f"{before / users:.0f}", f"{busy + pages:.2f}", f"{pages:.2f}"), failed
 
 
 def main():
