@@ -219,7 +219,8 @@ def outcome_of(name, function, arguments):
         signal.setitimer(signal.ITIMER_PROF, SECONDS)
         try:
             with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-                where = first_not_finite(call(function, arguments), name.rpartition(".")[2])
+                result = call(function, arguments)
+                where = first_not_finite(result, name.rpartition(".")[2])
             outcome, more = ("NaN or inf" if where else "finite"), where
         except Hang:
             outcome, more = "hang", f"more than {SECONDS:g} s"
@@ -227,17 +228,17 @@ def outcome_of(name, function, arguments):
             outcome, more = _kind_of(error), f"{type(error).__name__}: {error}"
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0)
-    if outcome == "NaN or inf" and says_nan(function):
+    if outcome == "NaN or inf" and says_nan(function, type(result)):
         outcome = "NaN as documented"
     warned = [w for w in warned if not issubclass(w.category, ResourceWarning)]
     return outcome, str(warned[0].message) if warned else "", " ".join(more.split())[:200]
 
 
-def says_nan(function):
-    """Whether the docstring says that a result may hold NaN or an infinity."""
+def says_nan(function, kind):
+    """Whether the docstring, or that of the result's class, says that a result may hold NaN or an infinity."""
     owner = getattr(sys.modules[function.__module__], function.__qualname__.partition(".")[0])
-    said = " ".join(text for text in (function.__doc__, owner.__doc__) if text)
-    return bool(re.search(r"\bNaN|\binf(inity|inities|inite)?\b", said))
+    said = " ".join(text for text in (function.__doc__, owner.__doc__, kind.__doc__) if text)
+    return bool(re.search(r"\bNaN\b|\binf(inity|inities|inite)?\b", said, re.IGNORECASE))
 
 
 def first_not_finite(value, path, depth=0):
