@@ -19,7 +19,7 @@ c.SimpleLocalProcessSpawner.home_dir_template = str(HERE / "homes" / "{username}
 c.Spawner.cmd = [str(HERE / "bin" / "jupyterhub-singleuser"), *(["--allow-root"] if os.geteuid() == 0 else [])]
 c.Spawner.default_url = "/lab/tree/workbook/00_start_here.ipynb"
 c.Spawner.environment = {"OMP_NUM_THREADS": "1", "JUPYTER_PREFER_ENV_PATH": "1"}
-c.Spawner.start_timeout = 120
+c.Spawner.start_timeout = c.Spawner.http_timeout = 120  # a whole class that begins at once makes each other wait
 cull = [str(HERE / "bin" / "python"), "-m", "jupyterhub_idle_culler", "--timeout=3600"]
 c.JupyterHub.services = [{"name": "cull", "command": cull}]
 scopes = ["list:users", "read:users:activity", "read:servers", "delete:servers"]
