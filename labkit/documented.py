@@ -12,7 +12,7 @@ import sys
 
 import numpy as np
 
-from .checks import as_finite, as_floats, as_number, kind
+from .checks import PRODUCT_TOLERANCE, as_finite, as_floats, as_number, as_transforms, kind
 
 _LINE = re.compile(r"^(\w[\w, ]*?) : (.+)$")
 _SHAPE = re.compile(r"\(([^()]*)\)")
@@ -144,6 +144,8 @@ def _array(name, shapes, gaps, value):
     if shapes and not any(_fits(value.shape, shape) for shape in shapes):
         wanted = " or ".join(f"({', '.join(map(str, shape))}{',' * (len(shape) == 1)})" for shape in shapes)
         raise ValueError(f"{name} must have shape {wanted}, got {value.shape}")
+    if name.startswith("T") and value.shape[-2:] == (4, 4) and not gaps:
+        as_transforms(value, name, PRODUCT_TOLERANCE)
     return value
 
 

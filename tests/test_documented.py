@@ -31,7 +31,7 @@ def measure(T, x, rng, tracker=None, model="euler", grid=None, times=None):
     return x
 
 
-RNG, T, X = np.random.default_rng(0), np.zeros((2, 4, 4)), np.zeros(3)
+RNG, T, X = np.random.default_rng(0), np.tile(np.eye(4), (2, 1, 1)), np.zeros(3)
 
 
 class Caster:
@@ -44,6 +44,7 @@ class Caster:
     [
         ({"T": np.zeros((4, 4))}, r"T must have shape \(k, 4, 4\), got \(4, 4\)"),
         ({"T": np.full((2, 4, 4), np.nan)}, "T must be finite"),
+        ({"T": np.ones((2, 4, 4))}, "T must have the last row 0 0 0 1"),
         ({"T": None}, "T must hold real numbers, got None"),
         ({"x": np.zeros((3, 2))}, r"x must have shape \(3,\) or \(n, 3\), got \(3, 2\)"),
         ({"rng": 5}, "rng must be a numpy.random.Generator, got an object of type int"),
@@ -68,4 +69,4 @@ def test_what_it_says_arrives():
 
 def test_a_function_of_the_library_keeps_its_word():
     with pytest.raises(ValueError, match="tracker must be of type Tracker, got None"):
-        follow_path(np.arange(2.0), np.zeros((2, 4, 4)), None, RNG)
+        follow_path(np.arange(2.0), T, None, RNG)

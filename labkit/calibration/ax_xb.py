@@ -374,7 +374,6 @@ def _best_shifts(robot, T_ST, weights, Rx, Ry):
     return pose(Rx, t[:3]), pose(Ry, t[3:])
 
 
-@documented
 def loop_jacobians(robot, sensor, target, T_ST):
     """Derivatives of the loop's errors by small rotations and translations of sensor and target.
 

@@ -31,7 +31,6 @@ from ..checks import (
     fit_together,
     shown,
 )
-from ..documented import documented
 from ..geometry.frames import invert, matrix_from_kuka, moved, pose, transform
 from ..geometry.lie import exp_so3, nearest_rotation, skew
 from .motion import refuse_one_axis
@@ -315,7 +314,6 @@ def joint_jacobian(T_BF, x_S, T_FS, target_free=True):
     return J.reshape(3 * len(R), -1)
 
 
-@documented
 def radius_jacobian(T_BF, x_S, T_FS, radius):
     """`joint_jacobian` with the sphere's radius as a tenth column: y = +-sqrt(R^2 - r^2) has dy/dR = R / y.
 
@@ -558,7 +556,6 @@ def _linear_solution(T_BF, x_S, weights):
     return u, values[14] / values[0] if 3 * n >= 15 else 0.0
 
 
-@documented
 def gauss_newton_pose(start, T_BF, x_S, target=None, parameters="euler", max_steps=50, tolerance=1e-10):
     """Plain Gauss-Newton from a start pose, each iterate kept: what listing C5 does, with the derivative exact.
 
