@@ -264,7 +264,7 @@ def _one_part(results, expected, holds, unit):
     if len(first) > 2:
         for rows in range(len(first) - 1, 0, -1):
             if _all_equal([r[:rows] for r in results], [e[:rows] for e in expected]):
-                return f"the first {rows} are right, not all behind them are: does a loop that fills them reach the end?"
+                return f"the first {rows} are right, not all behind them are: does a loop end too early?"
     return None
 
 
