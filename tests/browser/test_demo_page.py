@@ -215,6 +215,51 @@ def test_the_notes_follow_in_a_second_window(wall):
     notes.close()
 
 
+def test_a_line_cut_by_sleep_comes_back_and_all_is_where_it_was(wall):
+    show(wall, FIRST)
+    wall.keyboard.press("f")
+    failed = rest(wall)
+    wall.evaluate("() => wall.wire.socket.close()")
+    wall.wait_for_function("() => document.querySelector('#said').textContent.includes('The line to Python is cut')")
+    wall.wait_for_function("() => wall.wire.socket.readyState === 1 && !document.querySelector('#said').textContent")
+    show(wall, FIRST)
+    assert rest(wall) == failed
+    moved(wall, lambda: wall.keyboard.press("r"))
+
+
+def test_a_play_that_slept_goes_on_where_it_was(wall):
+    show(wall, "03/swirl")
+    wall.keyboard.press("r")
+    rest(wall)
+    before, at, end = wall.evaluate(
+        """async () => {
+            const slider = document.querySelector("#place .time input"), play = document.querySelector("#place .play");
+            const sleep = (ms) => new Promise((go) => setTimeout(go, ms));
+            play.click();
+            const real = performance.now.bind(performance), before = +slider.value;
+            performance.now = () => real() + 3.6e6;
+            for (let k = 0; k < 200 && +slider.value === before; k++) await sleep(50);
+            play.click();
+            delete performance.now;
+            return [before, +slider.value, +slider.max];
+        }"""
+    )
+    assert before < at < end
+
+
+def test_a_browser_opened_again_finds_the_card(wall):
+    show(wall, "05/convergence")
+    context = wall.context.browser.new_context()
+    page = context.new_page()
+    page.goto(wall.url.partition("?")[0])
+    assert "token" in page.inner_text("body")  # what it did not see once, it does not open
+    context.add_cookies(wall.context.cookies())
+    page.reload()
+    page.wait_for_function("() => window.wall?.card.key === '05/convergence'")
+    page.wait_for_selector("#place .labkit-stage[data-picture]", state="attached")
+    context.close()
+
+
 def test_a_page_whose_server_is_gone_says_so(wall):
     assert wall.complaints == []
     wall.process.terminate()
