@@ -18,6 +18,7 @@ import numpy as np
 from ..checks import (
     as_count,
     as_finite,
+    as_generator,
     as_nonnegative,
     as_number,
     as_optional_generator,
@@ -533,6 +534,7 @@ def touching_poses(R, tip, pivot, std_rot=0.0, std_trans=0.0, rng=None):
     if std_rot or std_trans:
         if rng is None:
             raise ValueError("rng must be given when std_rot or std_trans is not 0")
+        rng = as_generator(rng)
         T[..., :3, :3] = R @ exp_so3(std_rot * rng.normal(size=(*R.shape[:-2], 3)))
         T[..., :3, 3] += std_trans * rng.normal(size=(*R.shape[:-2], 3))
     return T

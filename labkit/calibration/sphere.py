@@ -14,6 +14,7 @@ import numpy as np
 from ..checks import (
     as_count,
     as_finite,
+    as_generator,
     as_nonnegative,
     as_number,
     as_points,
@@ -324,6 +325,7 @@ def scan_line(center, radius, half_angle, n, std=0.0, rng=None):
     std = float(as_nonnegative(as_number(std, "std"), "std"))
     if std and rng is None:
         raise ValueError("rng must be given when std is not 0")
+    rng = as_generator(rng) if std else None
     r = np.sqrt(max(as_positive_number(radius, "radius") ** 2 - center[1] ** 2, 0.0))
     if r == 0:
         raise ValueError(

@@ -237,8 +237,7 @@ def _given(u, z, landmarks, x0, cov0, dt, std_range, std_bearing, cov_u, cov_v, 
     if u.ndim not in (2, 3):
         raise ValueError(f"u must have shape (n, 2) or (n, runs, 2), got {u.shape}")
     n, m = len(u), len(landmarks)
-    if model not in odometry.MODELS:
-        raise ValueError(f"model must be one of {', '.join(odometry.MODELS)}, got {model!r}")
+    model = odometry.as_model(model)
     if z.ndim not in (3, 4) or z.shape[0] != n or z.shape[-2:] != (m, 2):
         raise ValueError(
             f"z must have shape ({n}, {m}, 2) or ({n}, runs, {m}, 2) for {n} controls and {m} landmarks, got {z.shape}"

@@ -9,9 +9,11 @@ Source: lecture "Lokalisierung", section "Koppelnavigation".
 import numpy as np
 
 from ..checks import (
+    as_choice,
     as_count,
     as_covariances,
     as_finite,
+    as_generator,
     as_number,
     as_points,
     as_positive,
@@ -77,9 +79,7 @@ def _inputs(x, u, dt, model):
 
 def as_model(model):
     """`model`, one of `MODELS`."""
-    if model not in MODELS:
-        raise ValueError(f"model must be one of {', '.join(MODELS)}, got {model!r}")
-    return model
+    return as_choice(model, "model", MODELS)
 
 
 def chord(v, omega, dt, model):
@@ -355,7 +355,7 @@ def noisy_controls(controls, dt, k_d, k_theta, k_drift, rng, runs):
     controls, runs = as_shape(controls, "controls", "n", 2), as_count(runs, "runs")
     cov_u = control_covariance(controls, as_positive_number(dt, "dt"), k_d, k_theta, k_drift)
     std = np.sqrt(np.diagonal(cov_u, axis1=-2, axis2=-1))
-    return controls[:, None, :] + std[:, None, :] * rng.standard_normal((len(controls), runs, 2))
+    return controls[:, None, :] + std[:, None, :] * as_generator(rng).standard_normal((len(controls), runs, 2))
 
 
 def sample_drives(x0, controls, dt, k_d, k_theta, k_drift, rng, runs, model="midpoint"):

@@ -14,6 +14,7 @@ from ..checks import (
     as_covariances,
     as_finite,
     as_floats,
+    as_generator,
     as_number,
     as_points,
     as_positive_number,
@@ -208,7 +209,7 @@ def resample_systematic(weights, rng, size=None):
     """
     weights = as_weights(weights)
     size = len(weights) if size is None else as_count(size, "size", at_least=0)
-    return _pointed_at(weights, (np.arange(size) + rng.random()) / max(size, 1))
+    return _pointed_at(weights, (np.arange(size) + as_generator(rng).random()) / max(size, 1))
 
 
 def _pointed_at(weights, places):
