@@ -50,10 +50,11 @@ def _solution(exercise):
 
 
 def _cells(notebook):
-    path = ROOT / "solutions" / f"{notebook}.py"
-    if not path.exists():
+    try:
+        cells = source.read(ROOT / "solutions" / f"{notebook}.py")
+    except (OSError, source.SourceError):
         return []
-    return [cell for cell in source.read(path) if cell.kind == "code" and "student" not in cell.tags]
+    return [cell for cell in cells if cell.kind == "code" and "student" not in cell.tags]
 
 
 @functools.cache
