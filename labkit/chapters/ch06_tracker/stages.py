@@ -1001,7 +1001,7 @@ def whole_cell():
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(2.2, 1))
-        title = f"click a frame; all errors x {ENLARGED:.0f}, ellipsoids 3 std"
+        title = f"all errors x {ENLARGED:.0f}, ellipsoids 3 std"
         space = Scene(left, radius=410, half_width=460, title=title, floor=0.0, unit="mm")
         picture = draw.CellScene(space, cell)
         bars = draw.Budget(right, cell.SOURCES)
