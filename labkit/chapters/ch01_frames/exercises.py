@@ -51,13 +51,14 @@ def scaled_direction(rng, scale):
     return (scale * random_direction(rng),)
 
 
-def kuka_pose(rng, A_deg=(-170, 170)):
+def kuka_pose(rng, A_deg=(-170, 170), B_deg=(-80, 80)):
     """A KUKA pose well away from the gimbal lock."""
-    low, high = (A_deg[0], -80, -170), (A_deg[1], 80, 170)
+    low, high = (A_deg[0], B_deg[0], -170), (A_deg[1], B_deg[1], 170)
     return (np.concatenate([rng.uniform(-800, 800, 3), np.deg2rad(rng.uniform(low, high))]),)
 
 
 A_RANGES = ((-80, 80), (100, 170), (-170, -100))  # deg: both signs of r00, and of r10
+B_RANGES = ((-80, -5), (5, 80), (-80, 80))  # deg: below and above 0 at every check
 POINT = "a point has three coordinates"
 POSE = "one pose is one 4x4 matrix"
 
@@ -891,7 +892,8 @@ CHAPTER = Chapter(
             "kuka_from_matrix",
             reference=frames.kuka_from_matrix,
             draw=tuple(
-                lambda rng, A_deg=A_deg: (frames.matrix_from_kuka(kuka_pose(rng, A_deg)[0]),) for A_deg in A_RANGES
+                lambda rng, A_deg=A_deg, B_deg=B_deg: (frames.matrix_from_kuka(kuka_pose(rng, A_deg, B_deg)[0]),)
+                for A_deg, B_deg in zip(A_RANGES, B_RANGES)
             ),
             fixed={"T": POSE},
             metric=_read_by_kuka(1e-6),
