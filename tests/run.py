@@ -28,7 +28,7 @@ from labkit.verbs import build
 
 ROOT = source.ROOT
 SECONDS_A_JOB = 900
-UNITS = 2  # jobs of unit tests; each more costs its imports again
+UNITS = 4  # jobs of unit tests: none is left alone on one processor at the end
 APART = ("browser", "hub")  # folders of tests that are jobs of their own
 BARE = ("-pno:hypothesispytest",)  # notebooks need none, and its import costs as much as a small kernel
 COUNTED = ("passed", "failed", "error", "skipped", "xfailed")
@@ -84,12 +84,12 @@ def scratch_folder():
 
 
 def all_jobs(scratch):
-    """{name: arguments of pytest}, the longest first."""
+    """{name: arguments of pytest}, the longest first; stirred ones take longer than others."""
     units = sorted(str(path) for path in (ROOT / "tests").glob("**/test_*.py") if path.parent.name not in APART)
     solved = sorted(str(path) for path in (ROOT / "solutions").glob("[0-9][0-9]_*.ipynb"))
     jobs = {
         **{name: [str(ROOT / "tests" / name)] for name in APART},
-        **{f"unit tests {k + 1}": units[k::UNITS] for k in range(UNITS)},
+        **{f"unit tests {k}": units[k - 1 :: UNITS] for k in sorted(range(1, UNITS + 1), key=lambda k: k % 2)},
         "solved notebooks 1": ["--nbval", *BARE, *solved[0::2]],
         "solved notebooks 2": ["--nbval", *BARE, *solved[1::2]],
     }

@@ -153,17 +153,23 @@ def standing_for(original):
 class Abroad:
     """How long this process has waited for another that works for it: no time of the code that is judged."""
 
-    seconds = 0.0
+    ended, since = 0.0, None
 
     @classmethod
     @contextlib.contextmanager
     def waiting(cls):
         """What runs within waits for the other process."""
-        began = time.monotonic()
+        cls.since = time.monotonic()
         try:
             yield
         finally:
-            cls.seconds += time.monotonic() - began
+            cls.ended, cls.since = cls.seconds(), None
+
+    @classmethod
+    def seconds(cls):
+        """Since the process began; a wait that still lasts counts, since a ring may come in its midst."""
+        since = cls.since
+        return cls.ended + (0.0 if since is None else time.monotonic() - since)
 
 
 class Starved:
@@ -207,7 +213,7 @@ class _Clock:
 
     def start(self):
         self.ends_cpu, self.began = time.thread_time() + self.seconds, time.monotonic()
-        self.abroad, self.starved = Abroad.seconds, Starved.seconds()
+        self.abroad, self.starved = Abroad.seconds(), Starved.seconds()
         if self.by_signal:
             self.before = signal.signal(signal.SIGALRM, self._ring)
             self.ticking = True
@@ -257,7 +263,7 @@ class _Clock:
 
     def _own(self):
         """The same without those spent waiting for another process."""
-        return self._whole() - (Abroad.seconds - self.abroad)
+        return self._whole() - (Abroad.seconds() - self.abroad)
 
     def _is_patient(self):
         return self._own() < PATIENCE * self.seconds and self._whole() < ABROAD * PATIENCE * self.seconds

@@ -154,6 +154,13 @@ def test_waiting_for_the_other_side_is_not_the_students_time():
             time.sleep(seconds)
         return seconds
 
+    def rings_in_its_midst(seconds):
+        """As where another thread takes the signal: it is heard before the wait is over."""
+        with guard.Abroad.waiting():
+            time.sleep(seconds)
+        return seconds
+
     assert guard.run(asks, (1.2,), limit=0.5).result == 1.2
+    assert guard.run(rings_in_its_midst, (0.4,), limit=0.1).result == 0.4
     assert isinstance(guard.run(asks, (0.8,), limit=0.4 / guard.ABROAD / guard.PATIENCE).error, guard.TimeLimit)
     assert isinstance(guard.run(time.sleep, (0.3,), limit=0.05).error, guard.TimeLimit)
