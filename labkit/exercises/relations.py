@@ -264,7 +264,12 @@ def _one_part(results, expected, holds, unit):
     if len(first) > 2:
         for rows in range(len(first) - 1, 0, -1):
             if _all_equal([r[:rows] for r in results], [e[:rows] for e in expected]):
-                return f"the first {rows} are right, not all behind them are: does a loop end too early?"
+                right = (
+                    "the first is right, not all behind it"
+                    if rows == 1
+                    else f"the first {rows} are right, not all behind them"
+                )
+                return f"{right} are: does a loop end too early?"
     return None
 
 

@@ -1216,7 +1216,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _from_pose_to_pose,
-                    "You used the motions from each pose to the next. They are shorter, and the report takes all from pose 0.",
+                    "This comes out of the motions from each pose to the next. They are shorter, and the report takes all from pose 0.",
+                    id="mounting-f9cf46",
                 ),
                 Mistake(lambda: invert(_mounting()), "This is the flange seen from the tracker: the inverse."),
                 Mistake(
@@ -1237,7 +1238,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _from_the_poses,
-                    "You took the poses themselves. A X = X B holds for motions, `A` and `B`: the tracker's poses stand in a frame of its own.",
+                    "This comes out of the poses themselves. A X = X B holds for motions, `A` and `B`: the tracker's poses stand in a frame of its own.",
+                    id="mounting-e9d6a5",
                 ),
             ],
         ),
@@ -1254,7 +1256,8 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     lambda: _heights().std(ddof=1),
-                    "You divided by 5. For estimating a spread that is the better choice; appendix D divides by 6.",
+                    "This is the sum divided by 5. For estimating a spread that is the better choice; appendix D divides by 6.",
+                    id="spread-196c75",
                 ),
                 Mistake(lambda: _heights().var(), "This is the variance, in square millimeters. Its root is wanted."),
                 Mistake(
@@ -1273,11 +1276,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: np.std([m.T_FE[:3, 3] for m in synthetic_mountings()]),
-                    "You took the three coordinates together. The height z is `mountings[:, 2, 3]`.",
+                    "This is the spread of the three coordinates together. The height z is `mountings[:, 2, 3]`.",
+                    id="spread-41e48b",
                 ),
                 Mistake(
                     lambda: np.std([m.T_FE for m in synthetic_mountings()]),
-                    "You took all entries of all matrices together. The height z is `mountings[:, 2, 3]`.",
+                    "This is the spread of all entries of all matrices together. The height z is `mountings[:, 2, 3]`.",
+                    id="spread-25cc36",
                 ),
                 Mistake(
                     lambda: np.ptp(_heights()),

@@ -617,7 +617,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda L, d, s: newton_lateration(L, d, np.zeros(2)),
-                    "You start at the origin: the search has to begin at `start`, or it may find the mirror image.",
+                    "That is where a search from the origin ends: it has to begin at `start`, or it may find the mirror image.",
+                    id="newton_lateration-52342d",
                 ),
                 Mistake(
                     lambda L, d, s: np.zeros(2), "You return the last step, which is zero by then, not the position."
@@ -1375,7 +1376,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _without_carrying,
-                    "You added up the noise of the steps. Earlier heading errors also move all later positions: F_x cov F_x^T.",
+                    "Here the noise of the steps is added up, no more. Earlier heading errors also move all later positions: F_x cov F_x^T.",
+                    id="end_cov-53000c",
                 ),
                 Mistake(
                     lambda: _circle("midpoint")[1],
@@ -1389,7 +1391,8 @@ CHAPTER = Chapter(
                 Mistake(_exchanged, "k_theta and k_drift have changed places."),
                 Mistake(
                     lambda: _loop(start_cov=1.0)[1],
-                    "You started with the identity. The start is known: a covariance of zeros.",
+                    "This starts with the identity. The start is known: a covariance of zeros.",
+                    id="end_cov-4019c7",
                 ),
                 Mistake(
                     lambda: np.zeros((3, 3)), "This is the covariance of the start. Does the loop store the new one?"

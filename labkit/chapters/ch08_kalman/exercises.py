@@ -910,7 +910,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: _fusion(var0=400.0),
-                    "You read the 20 as a standard deviation. Interesting: that gives the printed 9.6. But the page writes Sigma_0, a variance.",
+                    "This takes the 20 as a standard deviation. Interesting: that gives the printed 9.6. But the page writes Sigma_0, a variance.",
+                    id="fused-ef2548",
                 ),
                 Mistake(lambda: 9.6, "This is what the page prints. It is not what its numbers give: compute it."),
                 Mistake(
@@ -928,14 +929,20 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda: 20 / 3, "The plain mean of prior and sensors. Each counts as much as one over its variance."
                 ),
-                Mistake(lambda: _fusion(x0=10.0), "You put in the true position as the prior. The page's prior is 0."),
+                Mistake(
+                    lambda: _fusion(x0=10.0),
+                    "This has the true position as the prior. The page's prior is 0.",
+                    id="fused-6c1ba9",
+                ),
                 Mistake(
                     lambda: _fusion(std1=1.0, std2=0.5),
                     "The standard deviations are exchanged: the first sensor is the better one.",
                 ),
                 Mistake(lambda: _fusion(x0=20.0), "20 is the prior's variance. Its position is 0."),
                 Mistake(
-                    lambda: _fusion(var0=20.0**0.5), "You took the root of the prior's variance: it goes in as it is."
+                    lambda: _fusion(var0=20.0**0.5),
+                    "This has the root of the prior's variance, which goes in as it is.",
+                    id="fused-9ac8d0",
                 ),
                 Mistake(lambda: _fusion(std2=1e9), "The second sensor is missing."),
                 Mistake(lambda: _fusion(std1=1e9), "The first sensor is missing."),
@@ -1042,7 +1049,8 @@ CHAPTER = Chapter(
                     lambda: update(
                         np.array([12.5, 5.0]), _PRIOR, np.array([11.79]), np.array([[0.0, 1.0]]), np.array([[0.25]])
                     )[0],
-                    "You took the measurement for one of the velocity. The sensor sees the position: C = (1, 0).",
+                    "This takes the measurement for one of the velocity. The sensor sees the position: C = (1, 0).",
+                    id="corrected-fd1dc1",
                 ),
                 Mistake(
                     lambda: np.array([12.5, 5.0]) + _PRIOR[:, 0] * (11.79 - 12.5),
@@ -1054,7 +1062,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: _printed_correction(lambda g: g | {"var_z": 0.25**2}).x,
-                    "You squared 0.25. The page prints it as Sigma_z: it is a variance already.",
+                    "This squares 0.25. The page prints it as Sigma_z: it is a variance already.",
+                    id="corrected-56ad3c",
                 ),
                 Mistake(
                     lambda: _printed_correction(lambda g: g | {"prior_cov_xv": 0.0}).x,
@@ -1066,7 +1075,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: _printed_correction(lambda g: g | {"var_z": 0.5}).x,
-                    "You took the root of 0.25. A variance goes in as it is.",
+                    "This takes the root of 0.25. A variance goes in as it is.",
+                    id="corrected-279f26",
                 ),
                 Mistake(
                     lambda: _printed_correction(lambda g: g | {"prior_x": 12.75, "prior_v": 5.1}).x,
@@ -1075,7 +1085,8 @@ CHAPTER = Chapter(
                 Mistake(lambda: np.array([12.5, 5.0]), "This is the prediction: the correction is missing."),
                 Mistake(
                     lambda: np.array([11.79, 5.0]),
-                    "You took the measurement for the position. The filter believes only a part of it.",
+                    "This is the measurement itself. The filter believes only a part of it.",
+                    id="corrected-886caa",
                 ),
                 Mistake(
                     lambda: _printed_correction().x - [12.5, 5.0],
@@ -1087,7 +1098,8 @@ CHAPTER = Chapter(
                             lambda g: g | {"prior_cov_xx": 0.2216, "prior_cov_xv": 0.0290, "prior_cov_vv": 0.0620}
                         ).x
                     ),
-                    "You put in the covariance after the correction. The gain comes from the one before, prior_cov.",
+                    "This comes out with the covariance after the correction. The gain comes from the one before, prior_cov.",
+                    id="corrected-0bd9ba",
                 ),
                 Mistake(
                     lambda: _printed_correction(lambda g: g | {"var_z": 0.0}).x,
