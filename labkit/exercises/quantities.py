@@ -46,7 +46,8 @@ def _quoted(name):
 
 
 def _agrees(answer, value):
-    return abs(answer - value) <= 1e-9 * abs(value) or relations.significant_digits(answer, value) >= DIGITS
+    off = abs(answer - value) / abs(value)
+    return off <= 1e-9 or off < 20.0 * 10.0**-DIGITS and relations.significant_digits(answer, value) >= DIGITS
 
 
 def _candidates(data):
