@@ -17,7 +17,7 @@ ex = course("00-start-here")
 # %% map [markdown]
 # ## The map, and where you are
 #
-# Each chapter has a core path of 45 to 90 minutes. Sections marked *further* come on top, and are counted apart. They build on each other, but an unsolved step never blocks you: its name then stands for the
+# Each chapter has a core path that is meant for 45 to 90 minutes. Sections marked *further* come on top, and are counted apart. They build on each other, but an unsolved step never blocks you: its name then stands for the
 # reference solution, and the cell says so. After a restart, run the cells above the place where you go on (*Run > Run All Above Selected Cell*).
 
 # %% course-map tags=["nbval-ignore-output"]
