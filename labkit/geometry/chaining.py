@@ -301,6 +301,32 @@ def expected_closure(transforms, std_rot, std_trans):
     return np.sqrt(3 * n) * std_rot, np.sqrt(3 * n * std_trans**2 + 2 * std_rot**2 * (levers**2).sum())
 
 
+def expected_heights(transforms, std_rot, std_trans):
+    """Error to expect in the height of each frame of a chain with noisy links, to first order.
+
+    Height is measured along z of the first frame. A turn at the end of link j lifts frame k by its lever l_jk, their
+    distance seen along z:
+
+        height_k^2 = k std_trans^2 + std_rot^2 sum_{j <= k} l_jk^2
+
+    Parameters
+    ----------
+    transforms : sequence of array-like, each (4, 4)
+    std_rot, std_trans : float
+        Standard deviation of each component of a link's rotation vector (rad) and translation.
+
+    Returns
+    -------
+    heights : array, shape (N + 1,)
+        Standard deviations, 0 for the first frame.
+    """
+    std_rot, std_trans = _noise(std_rot, std_trans)
+    origins = stations(transforms)[:, :2, 3]
+    levers = np.linalg.norm(origins[:, None] - origins, axis=-1)
+    turned = np.tril(levers**2)[:, 1:].sum(1)  # a link's turn stands at its end, and moves what follows
+    return np.sqrt(np.arange(len(origins)) * std_trans**2 + std_rot**2 * turned)
+
+
 def noisy_links(transforms, std_rot, std_trans, rng, runs=1):
     """Links with noise, T_k exp(xi_k).
 

@@ -100,13 +100,6 @@ def test_growth_agrees_with_its_laws(layout, n):
     np.testing.assert_allclose(heights[1:], result["std_heights"][1:], rtol=0.3)
 
 
-def test_height_of_a_row_is_the_sum_over_its_levers():
-    row = np.column_stack([300.0 * np.arange(6), np.zeros(6)])
-    levers = [300.0 * np.arange(k) for k in range(6)]  # from the ends of the links before
-    expected = [np.sqrt(k * 0.1**2 + 0.002**2 * np.sum(lever**2)) for k, lever in enumerate(levers)]
-    np.testing.assert_allclose(w.height_std(row, 0.002), expected)
-
-
 def test_growth_exponents():
     result = w.compute_growth({"n": 8, "std_rot_deg": 1.0, "layout": "row"})
     row, ring = (result["laws"][name] for name in ("row", "loop"))

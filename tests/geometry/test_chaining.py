@@ -146,6 +146,22 @@ def test_expected_closure_agrees_with_simulation(links):
     np.testing.assert_allclose(found, chaining.expected_closure(links, std_rot, std_trans), rtol=0.03)
 
 
+def test_height_of_a_row_is_the_sum_over_its_levers():
+    levers = [300.0 * np.arange(k) for k in range(6)]  # from the ends of the links before
+    expected = [np.sqrt(k * 0.1**2 + 0.002**2 * np.sum(lever**2)) for k, lever in enumerate(levers)]
+    np.testing.assert_allclose(chaining.expected_heights(chaining.straight_chain(5, 300.0), 0.002, 0.1), expected)
+
+
+def test_expected_heights_of_a_chain_in_space_agree_with_simulation():
+    rng, std_rot, std_trans, runs = np.random.default_rng(5), 1e-3, 0.2, 4000
+    links = exp_se3(rng.normal(size=(7, 6)) * np.repeat([0.8, 200.0], 3))
+    noisy = chaining.stations(chaining.noisy_links(links, std_rot, std_trans, rng, runs))
+    off = noisy[..., 2, 3] - chaining.stations(links)[:, None, 2, 3]
+    np.testing.assert_allclose(
+        np.sqrt((off**2).mean(1)), chaining.expected_heights(links, std_rot, std_trans), rtol=0.06
+    )
+
+
 def test_growth_has_the_derived_exponents():
     lengths = np.array([100, 200])
     straight = [chaining.expected_closure(chaining.straight_chain(n, 100.0), 1e-3, 0.0)[1] for n in lengths]

@@ -5,6 +5,7 @@ How the arm looks nobody printed; where it touches is what was measured.
 
 import numpy as np
 
+from ...geometry.frames import pose
 from ...stage import scene3d_solids as solids
 from ...stage import style
 
@@ -33,11 +34,11 @@ class MeasuringArm:
         """Where its foot stands on the floor, and what it touches, (3,), mm; what is out of reach it points at."""
         shoulder, wrist = np.add(stand, [0, 0, SHOULDER]), np.add(tip, [0, 0, PROBE])
         elbow, wrist = bent(shoulder, wrist, UPPER, FORE)
-        self.foot.set(at(stand))
+        self.foot.set(pose(np.eye(3), stand))
         self.upper.set(shoulder, elbow)
-        self.elbow.set(at(elbow))
+        self.elbow.set(pose(np.eye(3), elbow))
         self.fore.set(elbow, wrist)
-        self.wrist.set(at(wrist))
+        self.wrist.set(pose(np.eye(3), wrist))
         self.probe.set(wrist, np.subtract(wrist, [0, 0, PROBE]))
 
 
@@ -59,10 +60,3 @@ def piece():
         solids.box((0, 95), (0, 26), (0, 20)), solids.box((0, 26), (26, 70), (0, 20)),
         solids.box((0, 26), (0, 26), (20, 44)).looks(style.STEEL),
     )  # fmt: skip
-
-
-def at(point):
-    """The pose of something that is not turned, (4, 4)."""
-    T = np.eye(4)
-    T[:3, 3] = point
-    return T

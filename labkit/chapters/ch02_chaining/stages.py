@@ -223,39 +223,20 @@ def _errors(std_rot):
     return exp_se3(unit_noise((max(draw.LINKS), RUNS, 6), seed=2) * np.repeat([std_rot, STD_TRANS], 3))
 
 
-def walk(links, errors):
-    """Frames of noisy chains, where they should be and where they are; links (n, 4, 4), errors (n, runs, 4, 4).
-
-    Returns (right, runs): frames 0 to n, (n + 1, 4, 4) and (n + 1, runs, 4, 4).
-    """
-    right, noisy = np.tile(np.eye(4), (len(links) + 1, 1, 1)), np.tile(np.eye(4), (len(links) + 1, RUNS, 1, 1))
-    for k, link in enumerate(links):
-        right[k + 1] = right[k] @ link
-        noisy[k + 1] = noisy[k] @ (link @ errors[k])
-    return right, noisy
-
-
-def height_std(origins, std_rot):
-    """Standard deviation (mm) of the height of each frame of a chain that lies in a plane; origins (n + 1, 2), mm."""
-    frames = len(origins)
-    levers = np.linalg.norm(origins[:, None] - origins, axis=-1)
-    turned = np.tril(levers**2, -1)[:, 1:].sum(1)  # a link's turn stands at its end, and moves what follows
-    return np.sqrt(np.arange(frames) * STD_TRANS**2 + std_rot**2 * turned)
-
-
 def compute_growth(state):
     """Noisy chains of n links: heights of all their frames (mm), where they end, closure distance (mm, rms) of chains
     of 1 to 64 links, and the law for both layouts and for all errors of a link that can be chosen.
     """
     name, n, std_rot = state["layout"], state["n"], np.deg2rad(state["std_rot_deg"])
-    right, noisy = walk(_layout(name, n)[0], _errors(std_rot))
+    links = _layout(name, n)[0]
+    right, noisy = chaining.stations(links), chaining.stations(links[:, None] @ _errors(std_rot)[:n])
     off = noisy[:, :, :3, 3] - right[:, None, :3, 3]
     distance = np.sqrt((off[-1] ** 2).sum(-1).mean())
     return {
         "n": n,
         "layout": name,
         "heights": off[..., 2],
-        "std_heights": height_std(right[:, :2, 3], std_rot),
+        "std_heights": chaining.expected_heights(links, std_rot, STD_TRANS),
         "here": float(distance),
         "expected": float(_law(name, n, std_rot)),
         "laws": {name: np.array([_law(name, k, std_rot) for k in draw.LINKS]) for name in LAYOUTS.values()},

@@ -46,10 +46,3 @@ def ball(scene, radius):
         solids.sphere(radius).looks(style.SHELL), solids.cylinder(7.0, -4 * radius, -0.9 * radius).looks(style.STEEL),
         name="sphere",
     )  # fmt: skip
-
-
-def at(point):
-    """The pose of something that is not turned, (4, 4)."""
-    T = np.eye(4)
-    T[:3, 3] = point
-    return T

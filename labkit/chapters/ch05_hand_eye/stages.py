@@ -629,7 +629,7 @@ def thirty_one_poses():
             target, T_BF, k = result["target"], result["T_BF"], result["pose"] - 1
             for line in draw.LINES:
                 items[line].set(T_BF[lines == line, :3, 3])
-            items["sphere"].set(bodies.at(target))
+            items["sphere"].set(frames.pose(np.eye(3), target))
             seen = result["residuals"] * np.minimum(1, SHOWN_RESIDUAL / np.maximum(result["lengths"], 1e-9))[:, None]
             feet = T_BF[:, :3, 3]
             tips = feet + 8 * seen  # magnified, for the eye
@@ -746,7 +746,7 @@ def pattern_designer():
             flanges.set(T_BF[:, :3, 3])
             gaps = np.full((len(T_BF), 3), np.nan)
             sights.set(np.stack([T_BF[:, :3, 3], np.broadcast_to(target, (len(T_BF), 3)), gaps], 1).reshape(-1, 3))
-            ball.set(bodies.at(target))
+            ball.set(frames.pose(np.eye(3), target))
             hand.set(T_BF[-1], T_BF[-1] @ result["T_FS"])
             aside = target + np.array([0.0, 0.0, -230.0])
             printed.set(aside, 40**2 * result["printed_cov"][3:6, 3:6])
