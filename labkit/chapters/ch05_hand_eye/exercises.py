@@ -223,17 +223,15 @@ def _circle_about_mean(x, z):
     return x.mean(), z.mean(), np.hypot(x - x.mean(), z - z.mean()).mean()
 
 
-def _circle_through_three(x, z):
-    """Uses the two ends and the middle of the scan line, and no other point."""
-    k = [0, len(x) // 2, -1]
-    p, q, c = np.linalg.solve(np.column_stack([2 * x[k], 2 * z[k], np.ones(3)]), x[k] ** 2 + z[k] ** 2)
-    return p, q, np.sqrt(c + p * p + q * q)
+def _circle_through(numbers):
+    """Uses three points of the scan line, `numbers(count)`, and no other."""
 
+    def variant(x, z):
+        k = numbers(len(x))
+        p, q, c = np.linalg.solve(np.column_stack([2 * x[k], 2 * z[k], np.ones(3)]), x[k] ** 2 + z[k] ** 2)
+        return p, q, np.sqrt(c + p * p + q * q)
 
-def _circle_by(x, z):
-    """The linear equations of listing C15."""
-    a = np.linalg.lstsq(np.column_stack([x, z, np.ones(len(x))]), -(x * x + z * z), rcond=None)[0]
-    return -a[0] / 2, -a[1] / 2, np.sqrt((a[0] ** 2 + a[1] ** 2) / 4 - a[2])
+    return variant
 
 
 def _circle_through_origin(x, z):
@@ -630,18 +628,18 @@ CHAPTER = Chapter(
                         "a1 and a2 entered the radius whole. They are -2 xc and -2 zc: halve them before you square."),
                 Mistake(_circle(lambda x, z, r: (x, z, np.sqrt(x * x + z * z - r * r))),
                         "Your radius is the root of a3 alone, but a3 = xc^2 + zc^2 - r^2: solve for r."),
-                Mistake(_circle_through_three, "Three points make a circle, with all their noise in it. Let every point of the scan line count."),
+                Mistake(_circle_through(lambda n: [0, n // 2, -1]), "Three points make a circle, with all their noise in it. Let every point of the scan line count."),
                 Mistake(_circle(lambda x, z, r: (x, z, r * r)), "Your third number is the squared radius: a root is missing."),
                 Mistake(_circle(lambda x, z, r: (x, z, np.sqrt(max(2 * x * x + 2 * z * z - r * r, 0)))),
                         "a3 entered the radius with the wrong sign: r^2 = xc^2 + zc^2 - a3."),
                 Mistake(_circle_about_mean, "You took the mean of the points for the center. An arc lies on one side of its center."),
                 Mistake(_circle(lambda x, z, r: (z, x, r)), "The two coordinates of the center have changed places."),
-                Mistake(lambda x, z: _circle_by(x[:3], z[:3]), "The circle goes through the first three points. All points of the scan line count."),
-                Mistake(lambda x, z: (2 * fit_circle(x, z)[0], 2 * fit_circle(x, z)[1], np.sqrt(abs(3 * (fit_circle(x, z)[0]**2 + fit_circle(x, z)[1]**2) + fit_circle(x, z)[2]**2))),
+                Mistake(_circle_through(lambda n: [0, 1, 2]), "The circle goes through the first three points. All points of the scan line count."),
+                Mistake(_circle(lambda x, z, r: (2 * x, 2 * z, np.sqrt(3 * x * x + 3 * z * z + r * r))),
                         "The halves are missing: a1 = -2 xc, so xc = -a1/2, and zc = -a2/2; the radius follows from these."),
                 Mistake(_circle(lambda cx, cz, r: (cx, cz, 2 * r)), "Your third number is the diameter. The radius is asked for."),
                 Mistake(_circle_through_origin, "The column of ones is missing: without a3 every circle goes through the origin."),
-],
+            ],
         ),
         Prediction(
             "equator",
@@ -691,7 +689,7 @@ CHAPTER = Chapter(
                         "This takes a sphere of 30 mm, whatever `radius` says."),
                 Mistake(_center(lambda cx, cz, r, R, side: np.array([cx, side * np.sqrt(abs(R - r)), cz])),
                         "The squares are missing under the root: d^2 = R^2 - r^2."),
-],
+            ],
         ),
         Exercise(
             "kuka_residual",
@@ -729,7 +727,7 @@ CHAPTER = Chapter(
                 Mistake(_kuka_directions, "The flange's own position is missing: use the whole T_BF, not its rotation alone."),
                 Mistake(lambda p2, T_BF, x_S, target: np.einsum("nij,nj->ni", T_BF @ frames.matrix_from_kuka(p2), np.insert(x_S, 3, 0.0, axis=1))[:, :3] - target,
                         "Both translations are missing. A point in homogeneous coordinates ends in 1; with 0 it is a direction."),
-],
+            ],
         ),
         Prediction(
             "thirty_one",
@@ -743,7 +741,7 @@ CHAPTER = Chapter(
             reference=lambda: _rms_of_end_pose(2),
             unit="mm",
             rtol=2e-3,
-            of={"the residuals": lambda: _vectors_of_end_pose()},
+            of={"the residuals": _vectors_of_end_pose},
             hints=(
                 "The residuals of all 31 poses under the thesis's end pose and its printed sphere center.",
                 "rms distance: the root of the mean of the squared lengths, one length per pose.",
@@ -763,10 +761,10 @@ CHAPTER = Chapter(
                 Mistake(lambda: _rms_of_end_pose(2) ** 2, "This is the mean square: take its root."),
                 Mistake(lambda: np.sqrt(31) * _rms_of_end_pose(2), "This is the root of the sum: divide by the number of poses first."),
                 Mistake(lambda: _rms_of_end_pose(2) * np.sqrt(31 / 30), "The mean of the squares divides by n - 1 here. A mean divides by the 31 poses."),
-                Mistake(lambda: _rms_without_pose_2(), "Pose 2 is left out. Repaired, it counts like the others: use `repaired`, all 31."),
+                Mistake(_rms_without_pose_2, "Pose 2 is left out. Repaired, it counts like the others: use `repaired`, all 31."),
                 Mistake(lambda: float(_lengths_of_end_pose()[0]), "This is pose 1 alone. The rms is over all 31."),
                 Mistake(lambda: float(_vectors_of_end_pose().std()), "This is the standard deviation of all coordinates, their mean taken off. Asked for is the rms of the lengths."),
-],
+            ],
         ),
         Exercise(
             "numeric_jacobian",
@@ -795,7 +793,7 @@ CHAPTER = Chapter(
                 Mistake(lambda f, x, h: np.column_stack([(f(x + d * x) - f(x - d * x)) / (2 * h) for d in h * np.eye(len(x))]),
                         "Your step grows with x: step times x. It is the same for all variables."),
                 Mistake(lambda f, x, h: _central(f, x, h).sum(axis=0), "The values of the function are added. Each has a row of its own: shape (m, n)."),
-],
+            ],
         ),
         Prediction(
             "step",
@@ -846,7 +844,7 @@ CHAPTER = Chapter(
                         "The first three columns are per degree. phi is in rad."),
                 Mistake(lambda T_FS, T_BF, x_S: analytic_jacobian(T_FS, T_BF, x_S) * np.repeat([1.0, -1.0], 3),
                         "The columns of tau have the wrong sign: t_FS + tau moves the point by + R_BF tau."),
-],
+            ],
         ),
         Exercise(
             "gauss_newton_on_pose",
@@ -895,7 +893,7 @@ CHAPTER = Chapter(
                         "The target is added to what is measured. The residual subtracts it."),
                 Mistake(lambda T_FS, T_BF, x_S, target: gauss_newton_on_pose(np.eye(4), T_BF, x_S, target),
                         "The step starts from the identity. It starts where T_FS is."),
-],
+            ],
         ),
         Prediction(
             "pole",
@@ -984,7 +982,7 @@ CHAPTER = Chapter(
                         "QR leaves the signs of its columns open, and trusts the first one most. Take the nearest rotation."),
                 Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3], c), T[:3, 3])),
                         "t_FS and the center have changed places: after the nine entries of R_FS come t_FS, then c."),
-],
+            ],
         ),
         Exercise(
             "robust_weights",
@@ -1029,7 +1027,7 @@ CHAPTER = Chapter(
                         "These are third powers (tricube). Tukey's biweight has squares: (1 - u^2)^2."),
                 Mistake(lambda e: _tukey(np.abs(e) / (5 * np.median(np.abs(e)) / robust.MEDIAN_CHI3)),
                         "This weighs each coordinate. A pose is good or bad as a whole: one weight per pose, from the length of its vector."),
-],
+            ],
         ),
         Prediction(
             "slip",
@@ -1091,7 +1089,7 @@ CHAPTER = Chapter(
                 Mistake(lambda: _joint_rms(*ALL_FIXED) ** 2, "This is the mean square: take its root."),
                 Mistake(lambda: _joint_rms(*ALL_FIXED) * np.sqrt(31), "This is the root of the sum: divide by the number of poses first."),
                 Mistake(_robust_rms_as_printed, "This is a robust fit to the tables as printed. Use `corrected`, all 31 alike."),
-],
+            ],
         ),
         Value(
             "radius",
@@ -1118,7 +1116,7 @@ CHAPTER = Chapter(
                 Mistake(_radius_with_pose_2_alone, "Only pose 2 is repaired in this fit. Use `corrected`.", within=0.001),
                 Mistake(lambda: np.mean([thesis.radius(s) for s in ("certificate", "listing", "coordinate machine")]),
                         "This is the mean of the three radii. Ask the poses, none of the three."),
-],
+            ],
         ),
         Prediction(
             "weak",
