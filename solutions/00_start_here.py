@@ -17,8 +17,8 @@ ex = course("00-start-here")
 # %% map [markdown]
 # ## The map, and where you are
 #
-# Each chapter has a core path that is meant for 45 to 90 minutes. Sections marked *further* come on top, and are counted apart. They build on each other, but an unsolved step never blocks you: its name then stands for the
-# reference solution, and the cell says so. After a restart, run the cells above the place where you go on (*Run > Run All Above Selected Cell*).
+# Each chapter has a core path that is meant for 45 to 90 minutes; sections marked *further* come on top, and are counted apart. The chapters build on each other, but an
+# unsolved step never blocks you: its name then stands for the reference solution, and the cell says so. After a restart, run the cells above the place where you go on (*Run > Run All Above Selected Cell*).
 
 # %% course-map tags=["nbval-ignore-output"]
 course_map()

@@ -205,7 +205,6 @@ apart = frames.transform(T_K0K1, hole) - frames.transform(drawn, hole)
 distance = np.linalg.norm(apart)
 ### END SOLUTION
 ex.distance(distance)
-ex.distance(distance)
 
 # %% noise [markdown]
 # ## How good is a frame?

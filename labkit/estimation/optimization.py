@@ -268,7 +268,7 @@ def damped_step(r, J, damping):
     Raises
     ------
     ValueError
-        Shapes that do not fit together, a damping that is not positive.
+        Shapes that do not fit together, a damping below 0.
     """
     r, J, damping = as_finite(r, "r"), as_finite(J, "J"), as_nonnegative(damping, "damping")
     if r.ndim < 1 or J.ndim < 2 or J.shape[-2] != r.shape[-1]:

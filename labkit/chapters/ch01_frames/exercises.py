@@ -583,7 +583,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda o, px, py: frames.frame_from_points(o, px, o + px - py),
-                    "Your second edge runs from y_point to x_point, so that y points away from y_point: it is y_point - origin.",
+                    "Your y points away from y_point, and takes z to the other side with it: the second edge is y_point - origin.",
                     id="frame-edge-between",
                 ),
                 Mistake(
@@ -593,7 +593,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _origin_in_the_last_row,
-                    "The origin stands in the last row. It belongs into the last column, `T[:3, 3]`.",
+                    "The origin stands in the last row. It belongs in the last column, `T[:3, 3]`.",
                     id="frame-last-row",
                 ),
             ],

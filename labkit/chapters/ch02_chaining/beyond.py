@@ -81,7 +81,7 @@ class Points(metrics.Numbers):
             return super().admit(result, expected)
         except metrics.Refused:
             if isinstance(result, np.ndarray | list | tuple) and _holds_nan(result):
-                words = "NaN stands where `number_in` found no number: 1,5 needs a point first, and what is none at all is a fault"
+                words = "NaN stands among your points. `number_in` gives it for what is no number: give 1,5 its point first, and leave comments out"
                 raise metrics.Refused(words) from None
             raise
 

@@ -813,7 +813,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: (wells.extrema()[0].x + wells.extrema()[1].x) / 2,
-                    "That is halfway between both minima. The deeper well pulls the pass away from there.",
+                    "That is halfway between both minima. The pass lies nearer to the shallower well: the deeper one reaches farther.",
                     id="saddle-between-minima",
                 ),
                 Mistake(
@@ -1635,9 +1635,9 @@ CHAPTER = Chapter(
                     id="tipping-lead-14",
                 ),
                 Mistake(
-                    lambda: (9 + 8) / (3 + 3 + 8),
+                    lambda: (9 + 8 + 6) / (3 + 3 + 8),
                     "The ratio of the other points decides nothing: the weight multiplies the last criterion, on both sides.",
-                    id="tipping-17-14",
+                    id="tipping-ratio-of-others",
                 ),
                 Mistake(
                     lambda: (9 + 8 + 6) - (3 + 3 + 8),
