@@ -343,10 +343,7 @@ ACCURACY = [
                 id="repeat-variance",
             ),
             Mistake(
-                lambda reached: float(
-                    np.linalg.norm(reached - reached[0], axis=1).mean()
-                    + 3 * np.linalg.norm(reached - reached[0], axis=1).std(ddof=1)
-                ),
+                lambda reached: _spread_of(np.linalg.norm(reached - reached[0], axis=1)),
                 "You took the distances from the first arrival. They are taken from the mean of all.",
                 id="repeat-from-first",
             ),
