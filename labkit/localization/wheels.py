@@ -198,7 +198,7 @@ def _turned(angle, v):
 # --- what a drive can be told ----------------------------------------------------------------------------------------
 
 
-class Drive(NamedTuple):
+class Drivetrain(NamedTuple):
     """What a drive can be told: `numbers` shares of its limits, each from -1 to 1, and what the body does then.
 
     twist: shares (..., numbers) -> v_x, v_y (m/s) and omega (rad/s), (..., 3).
@@ -218,9 +218,9 @@ def differential_drive(speed, turn_rate):
 
     Returns
     -------
-    drive : Drive
+    drive : Drivetrain
     """
-    return Drive(2, lambda share: _ahead(speed * share[..., 0], turn_rate * share[..., 1]))
+    return Drivetrain(2, lambda share: _ahead(speed * share[..., 0], turn_rate * share[..., 1]))
 
 
 def ackermann_drive(speed, steering, wheelbase):
@@ -235,10 +235,10 @@ def ackermann_drive(speed, steering, wheelbase):
 
     Returns
     -------
-    drive : Drive
+    drive : Drivetrain
     """
     limits = np.array([speed, steering])
-    return Drive(2, lambda share: _ahead(*np.moveaxis(ackermann_to_twist(limits * share, wheelbase), -1, 0)))
+    return Drivetrain(2, lambda share: _ahead(*np.moveaxis(ackermann_to_twist(limits * share, wheelbase), -1, 0)))
 
 
 def mecanum_drive(speed, turn_rate):
@@ -253,9 +253,9 @@ def mecanum_drive(speed, turn_rate):
 
     Returns
     -------
-    drive : Drive
+    drive : Drivetrain
     """
-    return Drive(3, lambda share: np.array([speed, speed, turn_rate]) * share)
+    return Drivetrain(3, lambda share: np.array([speed, speed, turn_rate]) * share)
 
 
 def _ahead(v, omega):
@@ -270,7 +270,7 @@ def nearest_command(drive, spot, dt, lever):
 
     Parameters
     ----------
-    drive : Drive
+    drive : Drivetrain
     spot : array-like, shape (3,)
         Pose (m, m, rad).
     dt : float
