@@ -216,7 +216,7 @@ class Statistics:
     bad: dict = field(default_factory=dict)
 
 
-class Books:
+class Receiver:
     """What a receiver makes of datagrams, wherever they come from: readings in order, and counts that add up.
 
     Parameters
@@ -333,7 +333,7 @@ class Books:
         return table if newest is None else table[max(len(table) - as_count(newest, "newest", at_least=0), 0) :]
 
 
-class Listener(_Endpoint, Books):
+class Listener(_Endpoint, Receiver):
     """A receiver on localhost that never blocks its caller.
 
     Parameters
@@ -341,7 +341,7 @@ class Listener(_Endpoint, Books):
     port : int
         0 takes any free port; `port` tells which.
     options
-        Those of `Books`.
+        Those of `Receiver`.
 
     Use as a context manager, or call `close`. Raises ValueError when the port is taken.
     """

@@ -193,11 +193,11 @@ def _rehearsed(nonsense):
 def rehearsal(loss, nonsense):
     """Readings (k, 23) and `udp.Statistics` of a piece of the stream, handed on without a network: what stands there
     before play."""
-    books = udp.Books(keep=TRAIL)
+    receiver = udp.Receiver(keep=TRAIL)
     for _, datagram, kind in udp.stream(_rehearsed(nonsense), simulation.RATE, _faults(loss), np.random.default_rng(2)):
         if kind != "lost":
-            books.take(datagram)
-    return books.readings(), books.statistics()
+            receiver.take(datagram)
+    return receiver.readings(), receiver.statistics()
 
 
 class Link:
