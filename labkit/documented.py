@@ -12,7 +12,17 @@ import sys
 
 import numpy as np
 
-from .checks import PRODUCT_TOLERANCE, as_finite, as_floats, as_number, as_transforms, kind
+from .checks import (
+    PRODUCT_TOLERANCE,
+    as_choice,
+    as_finite,
+    as_floats,
+    as_function,
+    as_generator,
+    as_number,
+    as_transforms,
+    kind,
+)
 
 _LINE = re.compile(r"^(\w[\w, ]*?) : (.+)$")
 _SHAPE = re.compile(r"\(([^()]*)\)")
@@ -91,40 +101,31 @@ def _check(name, said, more, function):
     gaps = bool(re.search(r"\bNaN\b|\binf", more))
     if said.startswith("{"):
         options = re.findall(r'"([^"]*)"', said.partition("}")[0])
-        return functools.partial(_one_of, name, options) if options else None
+        return functools.partial(as_choice, name=name, options=options) if options else None
     first = said.partition(",")[0].strip()
     if first == "float":
-        return functools.partial(_number, name, gaps) if said in ("float", "float, mm", "float, optional") else None
+        return functools.partial(_number, name, gaps)
     if first in ("array", "arrays"):
         return functools.partial(_array, name, _shapes(said), gaps)
-    if first == "numpy.random.Generator":
-        return functools.partial(_instance, name, np.random.Generator, "a numpy.random.Generator")
     if re.match(r"(function|callable)s?\b", first):
-        return functools.partial(_function, name)
+        return functools.partial(as_function, name=name)
     words = [word for word in first.split(" or ") if word != "None"]
-    types = [_PLAIN.get(word) or _classes(word, function) for word in words]
+    if words == ["numpy.random.Generator"]:
+        return functools.partial(as_generator, name=name)
+    types = [_PLAIN.get(word) or _class(word, function) for word in words]
     if not all(types):
         return None
     alike = re.search(r"[Oo]r anything with `(\w+)", more)
     wanted = f"of type {' or '.join(words)}{f', or have `{alike[1]}`' if alike else ''}"
-    return functools.partial(_instance, name, tuple(_flat(types)), wanted, alike=alike[1] if alike else None)
+    return functools.partial(_instance, name, types, wanted, alike[1] if alike else None)
 
 
-def _flat(types):
-    for entry in types:
-        yield from entry if isinstance(entry, tuple) else (entry,)
-
-
-def _classes(word, function):
-    """The class of labkit that a word names: of the function's own module first, else all of this name."""
+def _class(word, function):
+    """The class a word names, or the word where the function's module does not import it; None if it names none."""
     if not re.fullmatch(r"[\w.]*\b[A-Z]\w*", word):
-        return ()
-    last = word.rpartition(".")[2]
-    own = function.__globals__.get(last)
-    if isinstance(own, type):
-        return (own,)
-    loaded = [vars(m).get(last) for n, m in list(sys.modules.items()) if n.startswith("labkit.") and m is not None]
-    return tuple({entry for entry in loaded if isinstance(entry, type)})
+        return None
+    own = function.__globals__.get(word)
+    return own if isinstance(own, type) else word
 
 
 def _shapes(said):
@@ -167,19 +168,14 @@ def _number(name, gaps, value):
     return value
 
 
-def _one_of(name, options, value):
-    if not isinstance(value, str) or value not in options:
-        raise ValueError(f"{name} must be one of {', '.join(options)}, got {value!r}")
-    return value
-
-
-def _instance(name, types, wanted, value, alike=None):
-    if not isinstance(value, types) and not (alike and hasattr(value, alike)):
+def _instance(name, types, wanted, alike, value):
+    if not any(_is_of(value, type_) for type_ in types) and not (alike and hasattr(value, alike)):
         raise ValueError(f"{name} must be {wanted}, got {kind(value)}")
     return value
 
 
-def _function(name, value):
-    if not callable(value):
-        raise ValueError(f"{name} must be a function, got {kind(value)}")
-    return value
+def _is_of(value, type_):
+    """Whether a value is of a class, or of one that is called like this: "Building", "drives.Drive"."""
+    if not isinstance(type_, str):
+        return isinstance(value, type_)
+    return any(f".{c.__module__}.{c.__qualname__}".endswith(f".{type_}") for c in type(value).__mro__)

@@ -1,9 +1,13 @@
 """An argument of another kind or shape than the docstring says is refused; what it says is let through."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
 from labkit.documented import documented
+from labkit.localization import drives, path
+from labkit.machines import log
 from labkit.machines.simulation import MOVING, Tracker, follow_path
 
 
@@ -47,8 +51,11 @@ class Caster:
         ({"T": np.ones((2, 4, 4))}, "T must have the last row 0 0 0 1"),
         ({"T": None}, "T must hold real numbers, got None"),
         ({"x": np.zeros((3, 2))}, r"x must have shape \(3,\) or \(n, 3\), got \(3, 2\)"),
-        ({"rng": 5}, "rng must be a numpy.random.Generator, got an object of type int"),
-        ({"rng": None}, "rng must be a numpy.random.Generator, got None"),
+        (
+            {"rng": 5},
+            r"rng must be a numpy.random.Generator, as default_rng\(seed\) gives it, got an object of type int",
+        ),
+        ({"rng": None}, r"rng must be a numpy.random.Generator, as default_rng\(seed\) gives it, got None"),
         ({"tracker": "Vive"}, "tracker must be of type Tracker, got an object of type str"),
         ({"model": "none"}, "model must be one of euler, arc, got 'none'"),
         ({"model": None}, "model must be one of euler, arc, got None"),
@@ -70,3 +77,25 @@ def test_what_it_says_arrives():
 def test_a_function_of_the_library_keeps_its_word():
     with pytest.raises(ValueError, match="tracker must be of type Tracker, got None"):
         follow_path(np.arange(2.0), T, None, RNG)
+
+
+@documented
+def replay(log, drive):
+    """A class that this module does not import.
+
+    Parameters
+    ----------
+    log : path.Log
+    drive : Drive
+    """
+    return log, drive
+
+
+def test_a_class_that_is_not_imported_is_known_by_its_name_and_module():
+    way, seen = np.zeros((1, 3)), drives.Drive(np.zeros((1, 3)), np.zeros((0, 2)), 0.1)
+    own = path.Log(*[way] * len(fields(path.Log)))
+    assert replay(own, seen) == (own, seen)
+    with pytest.raises(ValueError, match="log must be of type path.Log, got an object of type Log"):
+        replay(log.Log(way, way, way), seen)
+    with pytest.raises(ValueError, match="drive must be of type Drive, got an object of type Log"):
+        replay(own, own)

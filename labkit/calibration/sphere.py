@@ -14,7 +14,6 @@ import numpy as np
 from ..checks import (
     as_count,
     as_finite,
-    as_generator,
     as_nonnegative,
     as_number,
     as_points,
@@ -309,8 +308,10 @@ def scan_line(center, radius, half_angle, n, std=0.0, rng=None):
         Half the angle of the arc, seen from the center of the circle (rad).
     n : int
         Number of points.
-    std, rng : float, numpy.random.Generator
-        Noise across the arc (mm) and its generator.
+    std : float
+        Noise across the arc (mm).
+    rng : numpy.random.Generator, optional
+        Needed for noise.
 
     Returns
     -------
@@ -325,7 +326,6 @@ def scan_line(center, radius, half_angle, n, std=0.0, rng=None):
     std = float(as_nonnegative(as_number(std, "std"), "std"))
     if std and rng is None:
         raise ValueError("rng must be given when std is not 0")
-    rng = as_generator(rng) if std else None
     r = np.sqrt(max(as_positive_number(radius, "radius") ** 2 - center[1] ** 2, 0.0))
     if r == 0:
         raise ValueError(

@@ -12,7 +12,6 @@ import numpy as np
 from ..checks import (
     as_count,
     as_covariances,
-    as_generator,
     as_points,
     as_positive_number,
     as_probability,
@@ -486,7 +485,7 @@ def simulate_drive(x0, controls, dt, cov_u, landmarks, std_range, std_bearing, r
     x0 = as_points(x0, "x0", 3)
     if x0.shape not in ((3,), (runs, 3)):
         raise ValueError(f"x0 must have shape (3,) or ({runs}, 3), got {x0.shape}")
-    real = controls[:, None, :] + as_generator(rng).standard_normal((len(controls), runs, 2)) @ _t(root)
+    real = controls[:, None, :] + rng.standard_normal((len(controls), runs, 2)) @ _t(root)
     truth = odometry.drive(np.broadcast_to(x0, (runs, 3)), real, dt, model)
     z = measurement(truth[1:], landmarks)
     far = z[..., 0] > reach
