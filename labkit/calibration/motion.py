@@ -63,7 +63,6 @@ def screw(T):
     return angle, np.where(turns, along, np.linalg.norm(t, axis=-1))
 
 
-@documented
 def between_axes(T, apart=1):
     """Angles between the axes of motions: the same for A and B whatever the mounting.
 

@@ -471,7 +471,6 @@ class FrameModel(Model):
         return r, J
 
 
-@documented
 def three_point_frame(points, std):
     """Frame through three points, with its covariance.
 

@@ -66,7 +66,6 @@ def chord(f, x, y, n):
     return share, values, (1 - share) * values[0] + share * values[-1]
 
 
-@documented
 def rise_above_chord(f, x, y, n):
     """By how much f rises above its chord at most, over the n places of `chord`; 0 where it never does.
 

@@ -18,7 +18,6 @@ from ..checks import (
     fit_together,
     solve_covariance,
 )
-from ..documented import documented
 from ..geometry import planar
 
 
@@ -63,7 +62,6 @@ def density(x, mean, std):
     return np.exp(-0.5 * ((as_finite(x, "x") - as_finite(mean, "mean")) / std) ** 2) / (std * np.sqrt(2 * np.pi))
 
 
-@documented
 def chi_square_quantile(probability, dof):
     """What a sum of squares of standard normal numbers stays below with a probability.
 

@@ -53,7 +53,6 @@ def _scaled_alike(N):
     return values, vectors / scale[:, None]
 
 
-@documented
 def free_directions(N):
     """Directions of the parameters that a normal matrix leaves undetermined.
 
@@ -86,7 +85,6 @@ def shares(jacobian):
     return np.einsum("nki,ij,nkj->n", J, inverse_normal(J), J)
 
 
-@documented
 def squared_distances(residuals, jacobian, kept):
     """Squared distance of each block from what the kept ones predict, in standard deviations; shape (n,).
 

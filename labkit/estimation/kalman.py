@@ -358,7 +358,6 @@ def steady_state(A, C, cov_v, cov_z):
 # --- consistency -------------------------------------------------------------
 
 
-@documented
 def nees(truth, x, cov, angle=None):
     """Normalized estimation error squared, error' cov^-1 error.
 

@@ -402,7 +402,6 @@ def predicted_decrease(g, B, step):
     return -(g * step).sum(-1) - 0.5 * _bend(step, B)
 
 
-@documented
 def gain_ratio(cost, new_cost, g, B, step):
     """Actual over predicted decrease: 1 for a perfect model, below 0 when the cost rose.
 

@@ -181,7 +181,6 @@ def resample_roulette(weights, rng, size=None):
     return _pointed_at(weights, spins)
 
 
-@documented
 def resample_systematic(weights, rng, size=None):
     """Indices by one turn of a wheel with evenly spaced spokes: O(M), and equal weights give every particle once.
 

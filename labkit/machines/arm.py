@@ -495,7 +495,6 @@ def rotation_only(robot, T_FE, start, axes, angle, duration, rate):
     return time, q
 
 
-@documented
 def reach_position(robot, position, start, joints=(0, 1, 2), iterations=40):
     """Joint angles that bring the flange to a position with some joints alone; the others stay as in `start`.
 

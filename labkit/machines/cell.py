@@ -156,7 +156,6 @@ def learned_pose(cell, job):
     return frame_from_points(*np.moveaxis(marks_in_base(cell, job), -2, 0))
 
 
-@documented
 def moved_part(T_BW, T_WE0, T_WE1, T_BP0):
     """Where a part stands after its tracker has moved with it: chapter 2's chain around the tracker.
 

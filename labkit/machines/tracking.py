@@ -9,7 +9,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from ..checks import as_finite, as_number, as_points, as_positive_number, as_shape, as_transforms, shown
-from ..documented import documented
 from ..geometry.frames import pose, pose_distance
 from ..geometry.lie import log_so3
 
@@ -143,7 +142,6 @@ def static_error_and_lag(speed, error):
     return tuple(float(np.sqrt(max(v, 0.0))) for v in ((error**2).mean() - slope * x.mean(), slope))
 
 
-@documented
 def median_over_speed(speed, error, edges):
     """Median error between the edges of intervals of speed.
 

@@ -11,7 +11,6 @@ Source: thesis "Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", H
 import numpy as np
 
 from ..checks import as_finite, as_nonnegative, as_positive, fit_together, shown
-from ..documented import documented
 
 RANGE = (190.0, 290.0)  # mm: where the scanner scanCONTROL 29xx-100 measures (B1)
 LINEARITY = 0.16 / 100 * 100.0 / 3  # mm: 0.16 % of that range, printed as three standard deviations (B1)
@@ -91,7 +90,6 @@ def height_std(alpha, beta, base, std):
     return np.hypot(by_alpha, by_beta) * as_nonnegative(std, "std")
 
 
-@documented
 def angles_to(place, base):
     """The angles at which both ends of a base see a place.
 
