@@ -317,7 +317,6 @@ def compute_two_loops(state):
     every = np.stack(list(links.values()), axis=1)
     left = [chaining.closure_error(chaining.chain(chaining.around(every, loop)))[1] for loop in (LOOP_A, LOOP_B)]
     return {
-        "graph": graph.poses,
         "measured": _walks(measured),
         "walks": _walks(links[state["way"]]),
         "left": dict(zip(links, np.transpose(left))),

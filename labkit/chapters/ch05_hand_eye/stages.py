@@ -248,8 +248,8 @@ AROUND = np.linspace(-1.5, 1.5, 61)  # steps to each side
 
 @functools.cache
 def _turned():
-    """(residual, exact, k): all residuals (mm) of the corrected poses as a function of A (deg) away from the CAD pose,
-    their derivatives there (mm per deg), (n,), and the number of one that answers well and bends most.
+    """(residual, exact, k): all residuals (mm) of the corrected poses as a function of A (deg) away from the thesis's
+    end pose, their derivatives there (mm per deg), (n,), and the number of one that answers well and bends most.
     """
     measured, target = thesis.measurements(True), thesis.printed_target()
     p = thesis.kuka_pose_deg("scanner_end")
@@ -267,7 +267,7 @@ def _turned():
 
 @functools.cache
 def _step_errors():
-    """Largest error (mm per deg) of forward and central differences by A at the CAD pose, over STEPS_DEG."""
+    """Largest error (mm per deg) of forward and central differences by A at the thesis's end pose, over STEPS_DEG."""
     residual, exact, _ = _turned()
     errors = {}
     for scheme in ("forward", "central"):
@@ -278,7 +278,7 @@ def _step_errors():
 
 def compute_steps(state):
     """Errors of both schemes at the chosen step (mm per deg), the best steps, and the residual that bends most, near
-    the CAD pose: over AROUND steps to each side, in steps, so that its tangent has the slope 1.
+    the thesis's end pose: over AROUND steps to each side, in steps, so that its tangent has the slope 1.
     """
     errors, h = _step_errors(), state["h"]
     at = {k: float(np.exp(np.interp(np.log(h), np.log(STEPS_DEG), np.log(e)))) for k, e in errors.items()}
