@@ -443,25 +443,30 @@ def frames_in_base(cell, job):
     Returns
     -------
     frames : dict
-        {name: (T, covariance)}, shapes (4, 4) and (6, 6): W, the tracker E now, the part P as it was learned (P0) and
-        now (P), the flange F, which counts as exact, and the scanner S on it.
+        {name: (T, covariance)}, shapes (4, 4) and (6, 6): W, the tracker and the part as they were learned (E0, P0) and
+        now (E, P), the flange F, which counts as exact, and the scanner S on it.
     """
     J0 = three_point_jacobian(*marks_in_base(cell, job))
     cov = source_covariances(cell, job)
     by_marks = {name: J0 @ J for name, J in _mark_jacobians(cell, job).items()}
     learned = sum(error_budget(by_marks, {name: cov[name] for name in by_marks}).values())
     T_BF = flange_at_hole(cell, job)
-    by_world, by_reading = product_jacobians(cell.T_BW, job.T_WE1)
-    reading = cov["second reading"]
     turned = product_jacobians(T_BF, cell.T_FS)[1]
     return {
         "W": (cell.T_BW, cell.cov_BW),
-        "E": (cell.T_BW @ job.T_WE1, by_world @ cell.cov_BW @ by_world.T + by_reading @ reading @ by_reading.T),
+        "E0": _tracker_in_base(cell, job.T_WE0, cov["first reading"]),
+        "E": _tracker_in_base(cell, job.T_WE1, cov["second reading"]),
         "P0": (learned_pose(cell, job), learned),
         "P": (part_pose(cell, job), part_covariance(cell, job)),
         "F": (T_BF, np.zeros((6, 6))),
         "S": (T_BF @ cell.T_FS, turned @ cell.cov_FS @ turned.T),
     }
+
+
+def _tracker_in_base(cell, T_WE, cov_reading):
+    """A reading of the tracker in the base, with its covariance."""
+    by_world, by_reading = product_jacobians(cell.T_BW, T_WE)
+    return cell.T_BW @ T_WE, by_world @ cell.cov_BW @ by_world.T + by_reading @ cov_reading @ by_reading.T
 
 
 # ---- a simulated cell ------------------------------------------------------------------------------------------------

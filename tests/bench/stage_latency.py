@@ -65,7 +65,7 @@ def stages():
         module = importlib.import_module(f"labkit.chapters.{info.name}.stages")
         for name, function in vars(module).items():
             if (
-                inspect.isfunction(function) and function.__module__ == module.__name__
+                inspect.isfunction(function) and function.__module__.startswith(module.__package__)
                 and not name.startswith(("_", "compute"))
                 and all(p.default is not p.empty for p in inspect.signature(function).parameters.values())
                 and isinstance(function(), Stage)

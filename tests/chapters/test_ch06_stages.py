@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from labkit.chapters.ch06_tracker import stages as wr
+from labkit.chapters.ch06_tracker import whole_cell as wc
 from labkit.machines import simulation, stations, udp
 from labkit.machines.arm import (
     BASE_HEIGHT,
@@ -280,12 +281,12 @@ def test_printed_levels_stand_where_the_unit_is_the_same():
 # ---- the whole cell
 
 
-def whole_cell(P=wr.cell.FAR[:2], turn=86.0, marks="seen by the scanner", source="tracker", spoil=0.0):
-    P = np.append(P, wr.cell.TABLE)
-    return wr.compute_whole_cell({"P": P, "turn": turn, "marks": marks, "source": source, "spoil": spoil})
+def whole_cell(P=wc.cell.FAR[:2], turn=86.0, marks="seen by the scanner", source="tracker", spoil=0.0):
+    P = np.append(P, wc.cell.TABLE)
+    return wc.compute_whole_cell({"P": P, "turn": turn, "marks": marks, "source": source, "spoil": spoil})
 
 
-HOME_AGAIN = {"P": wr.cell.LEARNED[:2], "turn": np.rad2deg(wr.cell.LEARNED[2])}
+HOME_AGAIN = {"P": wc.cell.LEARNED[:2], "turn": np.rad2deg(wc.cell.LEARNED[2])}
 
 
 def test_the_answers_of_both_questions_about_common_errors():
@@ -296,7 +297,7 @@ def test_the_answers_of_both_questions_about_common_errors():
     assert bent[0] == pytest.approx(bent[1], abs=1e-9)
 
 
-@pytest.mark.parametrize("source", wr.SPOILED)
+@pytest.mark.parametrize("source", wc.SPOILED)
 def test_a_spoiled_source_moves_the_located_part_and_hardly_the_budget(source):
     good, bad = whole_cell(), whole_cell(source=source, spoil=1.0)
     assert bad["total"] == pytest.approx(good["total"], rel=0.05)
@@ -309,7 +310,7 @@ def test_a_spoiled_source_moves_the_located_part_and_hardly_the_budget(source):
 def test_simulated_cells_lie_as_the_covariance_says():
     """Of 400 cells, 97.1 % are expected within three standard deviations in space."""
     result = whole_cell()
-    cov = sum(wr.cell.miss_budget(result["cell"], result["job"]).values())
+    cov = sum(wc.cell.miss_budget(result["cell"], result["job"]).values())
     assert result["covariance"] == pytest.approx(cov)
     d2 = np.einsum("ni,ij,nj->n", result["cloud"], np.linalg.inv(cov), result["cloud"])
     assert 0.94 < (d2 < 9).mean() < 1.0
@@ -317,34 +318,34 @@ def test_simulated_cells_lie_as_the_covariance_says():
 
 
 def test_the_failing_cell_says_that_it_misses_by_more_than_admitted():
-    stage = wr.whole_cell()
+    stage = wc.whole_cell()
     assert "Far more" not in stage.caption
     stage.make_it_fail()
     assert "Far more than the budget admits" in stage.caption
     stage.press("back where it was learned")
-    np.testing.assert_allclose(stage.result["part"][:2, 3], wr.cell.LEARNED[:2])
+    np.testing.assert_allclose(stage.result["part"][:2, 3], wc.cell.LEARNED[:2])
 
 
 @pytest.mark.parametrize(
     "view",
-    [wr.View(28, 27, center=(110, 20, 200), eye=2800.0), wr.View(-60, 65, center=(110, 20, 200), eye=2800.0, zoom=0.8)],
+    [wc.View(28, 27, center=(110, 20, 200), eye=2800.0), wc.View(-60, 65, center=(110, 20, 200), eye=2800.0, zoom=0.8)],
 )
 def test_every_source_of_the_cell_is_chosen_by_a_click_on_its_frame_from_wherever_one_looks(view):
-    stage = wr.whole_cell()
+    stage = wc.whole_cell()
     stage.set(view=view)
     ax = stage.figure.axes[0]
-    for name in wr.SPOILED:
+    for name in wc.SPOILED:
         here = stage._picture.fraction(ax, view.project(stage.result["places"][name])[:2])
         stage.receive({"click": here, "serial": "a:1"})
-        assert stage.state["source"] == name and stage.caption.startswith(wr.CALLED[name][:1].upper())
+        assert stage.state["source"] == name and stage.caption.startswith(wc.CALLED[name][:1].upper())
     stage.receive({"click": stage._picture.fraction(ax, (-400.0, -390.0)), "serial": "a:2"})
     assert stage.state["source"] == name  # a click beside all of them chooses none
 
 
 def test_the_arm_says_where_it_does_not_get():
     assert whole_cell()["reached"]
-    stage = wr.whole_cell()
-    stage.set(P=(0.0, 0.0, wr.cell.TABLE), turn=0.0)
+    stage = wc.whole_cell()
+    stage.set(P=(0.0, 0.0, wc.cell.TABLE), turn=0.0)
     assert "does not get there" in stage.caption
 
 

@@ -20,6 +20,7 @@ from labkit.chapters.ch04_optimization import stages as ch04
 from labkit.chapters.ch05_hand_eye import stages as ch05
 from labkit.chapters.ch06_tracker import figures as ch06_figures
 from labkit.chapters.ch06_tracker import stages as ch06
+from labkit.chapters.ch06_tracker import whole_cell
 from labkit.chapters.ch07_dead_reckoning import stages as ch07
 from labkit.chapters.ch08_kalman import stages as ch08
 from labkit.chapters.ch09_monte_carlo import stages as ch09
@@ -492,7 +493,7 @@ def test_the_whole_cell_stands_where_its_numbers_say():
     space, result = stage.spaces[0], stage.result
     hole = np.array([100 - 55.0, 200 + 80.0, 100.0])
     assert result["reached"] and result["hole"] == pytest.approx(hole)
-    assert_drawn(stage, [hole + ch06.ENLARGED * m for m in result["cloud"]])
+    assert_drawn(stage, [hole + whole_cell.ENLARGED * m for m in result["cloud"]])
     part = space.named("part").corners().reshape(-1, 3)
     for mark in ((100.0, 200.0), (100.0, 310.0), (20.0, 225.0)):  # the plate under each, turned by 90 deg
         assert np.hypot(*(part[part[:, 2] > 102][:, :2] - mark).T).min() < 7
@@ -510,11 +511,11 @@ def test_of_the_whole_cell_the_chosen_transform_shows_its_covariance_enlarged():
     ellipsoid = next(item for item in stage.spaces[0].items if item.called == "an ellipsoid")
     R = T_BF[:3, :3]
     assert ellipsoid.value == pytest.approx((T_BF @ cell.T_FS)[:3, 3])
-    assert ellipsoid.shape == pytest.approx((3 * ch06.ENLARGED) ** 2 * R @ cell.cov_FS[3:, 3:] @ R.T)
+    assert ellipsoid.shape == pytest.approx((3 * whole_cell.ENLARGED) ** 2 * R @ cell.cov_FS[3:, 3:] @ R.T)
     tip = at(stage, source="tip", spoil=0.5).result
-    off = tip["off"][:3, 3] - (tip["T_BF"] @ [*ch06.cell.TRUTH.tip, 1])[:3]
-    wrong = np.linalg.norm(tip["cell"].tip - ch06.cell.TRUTH.tip)
-    assert np.linalg.norm(off) == pytest.approx(ch06.ENLARGED * wrong)
+    off = tip["off"][:3, 3] - (tip["T_BF"] @ [*whole_cell.cell.TRUTH.tip, 1])[:3]
+    wrong = np.linalg.norm(tip["cell"].tip - whole_cell.cell.TRUTH.tip)
+    assert np.linalg.norm(off) == pytest.approx(whole_cell.ENLARGED * wrong)
 
 
 class OneTrail:

@@ -117,14 +117,19 @@ def test_correlations_within_a_calibration_matter():
 def test_frames_in_the_base_carry_their_covariance():
     there = job()
     frames = cells.frames_in_base(CELL, there)
-    assert set(frames) == {"W", "E", "P0", "P", "F", "S"}
+    assert set(frames) == {"W", "E0", "E", "P0", "P", "F", "S"}
     np.testing.assert_allclose(transform(frames["F"][0], CELL.tip), cells.hole_in_base(CELL, there), atol=1e-9)
     np.testing.assert_allclose(frames["P"][1], cells.part_covariance(CELL, there))
     rng = np.random.default_rng(3)
     e = {n: rng.multivariate_normal(np.zeros(len(c)), c, 4000, method="svd") for n, c in
          cells.source_covariances(CELL, there).items()}  # fmt: skip
     drawn, drawn_job = cells.with_errors(CELL, there, e)
-    for name, T in (("P0", cells.learned_pose(drawn, drawn_job)), ("E", drawn.T_BW @ drawn_job.T_WE1)):
+    found = {
+        "P0": cells.learned_pose(drawn, drawn_job),
+        "E0": drawn.T_BW @ drawn_job.T_WE0,
+        "E": drawn.T_BW @ drawn_job.T_WE1,
+    }
+    for name, T in found.items():
         shifts = T[:, :3, 3].std(0)
         np.testing.assert_allclose(shifts, np.sqrt(np.diag(frames[name][1])[3:]), rtol=0.06)
 

@@ -326,7 +326,7 @@ class CellScene:
         self.miss = scene.arrow(6.0, style.ESTIMATE, name="miss")
 
     def set(self, result, frames, enlarged):
-        """The result of `stages.compute_whole_cell`, the arm's `link_frames`, how much larger errors are drawn."""
+        """The result of `whole_cell.compute_whole_cell`, the arm's `link_frames`, how much larger errors are drawn."""
         T_BF, part, places = result["T_BF"], result["part"], result["places"]
         self.robot.set(frames)
         self.tool.set(T_BF[:3, 3], places["tip"])
