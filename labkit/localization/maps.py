@@ -247,6 +247,33 @@ def distance_field(grid):
     return distance_transform_edt(~grid.occupied) * grid.resolution
 
 
+def nearest_on_lines(lines, point):
+    """The place on the walls of a line map that is nearest to a point: the foot of a wall's perpendicular, or an end.
+
+    Parameters
+    ----------
+    lines : array-like, shape (n, 4)
+        Walls, x1, y1, x2, y2 (m).
+    point : array-like, shape (2,), m
+
+    Returns
+    -------
+    place : array, shape (2,), m
+
+    Raises
+    ------
+    ValueError
+        No wall at all, or other shapes.
+    """
+    lines, point = as_shape(lines, "lines", "n", 4), as_shape(point, "point", 2)
+    if not len(lines):
+        raise ValueError("lines must hold at least one wall")
+    start, along = lines[:, :2], lines[:, 2:] - lines[:, :2]
+    share = np.clip(((point - start) * along).sum(1) / np.maximum((along**2).sum(1), 1e-12), 0, 1)
+    feet = start + share[:, None] * along
+    return feet[np.argmin(np.hypot(*(feet - point).T))]
+
+
 @documented
 def walk_ray(grid, pose, bearing, r_max):
     """Distance to the first occupied cell along one ray, exactly: from cell to cell, in the order the ray crosses them.

@@ -154,3 +154,12 @@ def test_building_files_are_what_the_script_writes(tmp_path):
         assert path.read_text() == (DATA / "monte_carlo" / path.name).read_text(), path.name
     stored = OccupancyGrid.from_png(DATA / "monte_carlo/building.png", 0.1)
     assert (OccupancyGrid.from_png(tmp_path / "building.png", 0.1).cells == stored.cells).all()
+
+
+def test_the_nearest_place_of_a_wall_is_its_foot_or_its_end():
+    walls = np.array([[0, 0, 4, 0], [10, 0, 10, 5.0]])
+    assert maps.nearest_on_lines(walls, [1.0, 2.0]) == pytest.approx([1, 0])
+    assert maps.nearest_on_lines(walls, [6.0, 1.0]) == pytest.approx([4, 0])
+    assert maps.nearest_on_lines(walls, [9.0, 7.0]) == pytest.approx([10, 5])
+    with pytest.raises(ValueError, match="at least one wall"):
+        maps.nearest_on_lines(np.empty((0, 4)), [1.0, 2.0])

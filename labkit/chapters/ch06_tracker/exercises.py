@@ -390,9 +390,7 @@ def _mounting(factor=4.0, gate=8.0, R=None):
     found = calibrate_mounting(*_run_1(factor), gate)
     if R is None:
         return found.T_FE
-    T_BF, T_WE = _run_1(factor)
-    A, B = relative(T_BF[0], T_BF)[found.kept][1:], relative(T_WE[0], T_WE)[found.kept][1:]
-    return pose(R, ax_xb.translation_from_motions(A, B, R)[0])
+    return pose(R, ax_xb.translation_from_motions(found.A[found.kept][1:], found.B[found.kept][1:], R)[0])
 
 
 def _from_the_poses():
@@ -1229,11 +1227,11 @@ CHAPTER = Chapter(
                     "The translation is in meters; wanted are mm.",
                 ),
                 Mistake(
-                    lambda: pose(_mounting()[:3, :3], _mounting(gate=1e9, R=_mounting()[:3, :3])[:3, 3]),
+                    lambda: _mounting(gate=1e9, R=_mounting()[:3, :3]),
                     "The rotation is right. For the translation the stop that `kept` excludes is still in.",
                 ),
                 Mistake(
-                    lambda: pose(_mounting(gate=1e9)[:3, :3], _mounting(R=_mounting(gate=1e9)[:3, :3])[:3, 3]),
+                    lambda: _mounting(R=_mounting(gate=1e9)[:3, :3]),
                     "The translation leaves out what `kept` excludes. For the rotation that stop is still in.",
                 ),
                 Mistake(

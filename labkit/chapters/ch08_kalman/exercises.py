@@ -479,13 +479,14 @@ def _gated(score):
     return variant
 
 
-_PRIOR = np.array([[1.9469, 0.2550], [0.2550, 0.0916]])  # as the page prints it
-
-
-def _printed_correction(change=lambda given: given):
+def _printed_correction(change=lambda given: given, C=(1.0, 0.0)):
     given = change(dict(lecture.example("vehicle")))
     cov = np.array([[given["prior_cov_xx"], given["prior_cov_xv"]], [given["prior_cov_xv"], given["prior_cov_vv"]]])
-    return kalman.update([given["prior_x"], given["prior_v"]], cov, [given["z"]], [[1.0, 0.0]], [[given["var_z"]]])
+    return kalman.update([given["prior_x"], given["prior_v"]], cov, [given["z"]], [C], [[given["var_z"]]])
+
+
+def _not_divided(prior_x, prior_v, prior_cov_xx, prior_cov_xv, z, **_):
+    return np.array([prior_x, prior_v]) + np.array([prior_cov_xx, prior_cov_xv]) * (z - prior_x)
 
 
 def _fusion(**changes):
@@ -980,7 +981,7 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         _never_corrected(n),
-                        "The correction is missing in your loop: the covariance only grows, and the gain with it.",
+                        "The correction is missing in your loop, cov = (I - K C) cov: this is the gain of a filter that has never measured before.",
                     )
                     for n in (100, 200, 300, 500, 1000)
                 ),
@@ -1046,14 +1047,12 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(
-                    lambda: update(
-                        np.array([12.5, 5.0]), _PRIOR, np.array([11.79]), np.array([[0.0, 1.0]]), np.array([[0.25]])
-                    )[0],
+                    lambda: _printed_correction(C=(0.0, 1.0)).x,
                     "This takes the measurement for one of the velocity. The sensor sees the position: C = (1, 0).",
                     id="corrected-fd1dc1",
                 ),
                 Mistake(
-                    lambda: np.array([12.5, 5.0]) + _PRIOR[:, 0] * (11.79 - 12.5),
+                    lambda: _not_divided(**lecture.example("vehicle")),
                     "The gain is not divided by S, the variance of the innovation: 1.9469 + 0.25.",
                 ),
                 Mistake(

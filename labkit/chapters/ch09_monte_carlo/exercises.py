@@ -362,6 +362,12 @@ def _depth(angle=None, of=lambda depth, b: depth / np.cos(b), seen=lambda d, nea
     return variant
 
 
+def _within(near, far, ranges, bearings):
+    """Of a scan the rays whose length lies between near and far."""
+    kept = (ranges >= near) & (ranges <= far)
+    return ranges[kept], bearings[kept]
+
+
 def should_resample(weights, threshold):
     """True when the effective size is below threshold times M."""
     return particles.should_resample(weights, threshold)
@@ -904,7 +910,7 @@ def _catches(specimen, good, others, extra=()):
             for _ in range(RUNS):
                 if not test(function, *((rng,) if extra else ())):
                     ever = any(test(other, *((rng,) if extra else ())) for other in good)
-                    more = "" if ever else " It says False of every function it is tried on."
+                    more = "" if ever else " It says False of every correct function it is tried on."
                     return f"your test also rejects a correct function ({GOOD_WORDS[function]}): it asks for more than must hold.{more}"
             return None
 
@@ -989,15 +995,6 @@ def _hunt(id, reference, specimen, why, hints, others, good=GOOD, extra=("rng",)
         draws=1,
         limit=IMPORTS,
     )
-
-
-def _scan_seen(depth, field_of_view, seen):
-    """A scan whose columns are chosen by `seen(ranges, depth)`."""
-    n = len(depth)
-    bearings = np.arctan((n / 2 - 0.5 - np.arange(n)) / (n / 2) * np.tan(field_of_view / 2))
-    ranges = depth / np.cos(bearings)
-    chosen = seen(ranges, depth)
-    return ranges[chosen], bearings[chosen]
 
 
 CHAPTER = Chapter(
@@ -1856,11 +1853,11 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(
-                    lambda d, f, near, far: _scan_seen(d, f, lambda r, d: (r >= near) & (r <= far)),
+                    lambda d, f, near, far: _within(near, far, *scan_from_depth(d, f, 1e-9, 1e9)),
                     "near and far are limits of the depth, along the optical axis: compare the depth, not the range along the ray.",
                 ),
                 Mistake(
-                    lambda d, f, near, far: _scan_seen(d, np.radians(f), lambda r, d: (d >= near) & (d <= far)),
+                    lambda d, f, near, far: scan_from_depth(d, np.radians(f), near, far),
                     "The opening angle is in radians already.",
                 ),
                 Mistake(

@@ -127,7 +127,7 @@ def compute_maps(state):
     nodes = np.array(list(b.nodes.values()))
     node = int(np.argmin(np.hypot(*(nodes - at).T)))
     means = {
-        "lines": nearest_on(b.lines, at),
+        "lines": maps.nearest_on_lines(b.lines, at),
         "points": b.points[np.argmin(np.hypot(*(b.points - at).T))],
         "graph": nodes[node],
     }
@@ -154,14 +154,6 @@ def stored():
     b = building()
     graph = 2 * len(b.nodes) + 2 * len(b.edges)
     return dict(zip(FORMS, (b.grid.cells.size, b.lines.size, b.points.size, graph, *2 * (b.grid.cells.size,))))
-
-
-def nearest_on(lines, at):
-    """The place nearest to a point on segments (n, 4), x1 y1 x2 y2."""
-    start, along = lines[:, :2], lines[:, 2:] - lines[:, :2]
-    share = np.clip(((at - start) * along).sum(1) / np.maximum((along**2).sum(1), 1e-12), 0, 1)
-    feet = start + share[:, None] * along
-    return feet[np.argmin(np.hypot(*(feet - at).T))]
 
 
 def _maps_sentence(result):
@@ -513,7 +505,7 @@ def twelve_pictures():
     )
 
 
-SOCCER_DT, TAIL = 0.4, 25  # s a step; steps of the paths that are shown
+SOCCER_DT, SOCCER_END, TAIL = 0.4, 47.6, 25  # s a step, s to the last one; steps of the paths that are shown
 READINGS = {
     "range and bearing": ("range", "bearing"),
     "range only": ("range",),
@@ -569,7 +561,7 @@ def soccer():
     def scene(fig):
         top, bottom = fig.subplots(2, 1, height_ratios=(2.6, 1))
         field = draw.Soccer(top, _soccer(READINGS["range and bearing"]).landmarks)
-        curves = draw.SoccerErrors(bottom, 47.6)
+        curves = draw.SoccerErrors(bottom, SOCCER_END)
 
         def update(state, result):
             field.set(*(result[key] for key in ("truth", "odometry", "estimates", "states", "seen")))
@@ -582,10 +574,10 @@ def soccer():
         scene=scene,
         compute=compute_soccer,
         controls={"reads": Choice(tuple(READINGS), "range and bearing", label="the camera reads")},
-        play=Play(t_max=47.6, dt=SOCCER_DT, rate=4.0, start=20.0),
-        fail={"reads": "nothing", "t": 47.6},
+        play=Play(t_max=SOCCER_END, dt=SOCCER_DT, rate=4.0, start=20.0),
+        fail={"reads": "nothing", "t": SOCCER_END},
         because="No landmark is read: the particles count steps as odometry does, and drift as it does.",
-        presets={"At the end": {"t": 47.6}},
+        presets={"At the end": {"t": SOCCER_END}},
         describe=_soccer_sentence,
         size=(7.0, 5.4),
     )
