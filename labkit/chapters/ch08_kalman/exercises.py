@@ -924,7 +924,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: _fusion(std1=np.sqrt(0.5), std2=1.0),
-                    "You weigh the sensors by one over the standard deviation. One over the variance is 4 and 1.",
+                    "This weighs the sensors by one over the standard deviation. One over the variance is 4 and 1.",
+                    id="fused-47698a",
                 ),
                 Mistake(lambda: 1 / 5.05, "This is the variance, the second result. The position is asked for."),
                 Mistake(
@@ -1070,7 +1071,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: 2 * np.array([12.5, 5.0]) - _printed_correction().x,
-                    "You correct away from the measurement.",
+                    "This corrects away from the measurement.",
+                    id="corrected-7b2ede",
                 ),
                 Mistake(
                     lambda: _printed_correction(lambda g: g | {"var_z": 0.5}).x,

@@ -71,7 +71,7 @@ def covariance_and_candidates(rng, noise_tells=False):
         picks = [
             rule(C, candidates) for rule in (next_pose, *((_least_certain_volume,) if noise_tells else WRONG_RULES))
         ]
-        if len({*picks, picks[0] + 1}) == len(picks) + 1:
+        if len({*picks, picks[0] + 1}) == len(picks) + 1 and _alone(C, candidates) != picks[0]:
             return C, candidates
 
 
@@ -185,7 +185,7 @@ def _one_after_the_other(C, candidates):
 
 
 def _alone(C, candidates):
-    return int(np.argmin([np.linalg.det(np.linalg.pinv(J.T @ J)) for J in candidates]))
+    return int(np.argmax(np.linalg.det(candidates @ np.swapaxes(candidates, 1, 2))))
 
 
 WRONG_RULES = (_smallest_trace, _largest_derivative, _largest_volume, _least_certain)
@@ -331,14 +331,14 @@ CHAPTER = Chapter(
                 Mistake(lambda: slipped().plain.rms_translation - slipped().rms_translation,
                         "This is by how much the residuals grow. Asked for is by how much the result moves."),
                 Mistake(lambda: _apart(invert(slipped().plain.T), invert(slipped().T)),
-                        "You compared the inverse matrices: where the flange sits, seen from the sensor."),
+                        "This compares the inverse matrices: where the flange sits, seen from the sensor.", id="slip_cost-7ac5ea"),
                 Mistake(lambda: float(np.linalg.norm(slipped().plain.T - slipped().T)),
                         "This is the norm over the whole matrix: the entries of the rotation are no millimeters. The last column alone says where the sensor is.", id="slip_cost-13ecf4"),
                 Mistake(lambda: slip_cost() / np.sqrt(3), "This is the rms of the three coordinates: a distance is the root of the sum of their squares, not of the mean."),
                 Mistake(lambda: _apart(slipped().plain.T, CELL.T_FS), "This is how far the fit to all rows is from the truth, which nobody has for data of his own. Asked for is the way from the fit to the rows that agree."),
                 Mistake(lambda: _apart(slipped().T, CELL.T_FS), "This is how far the fit to the rows that agree is from the truth. Asked for is the way from it to the fit to all rows."),
                 Mistake(lambda: abs(np.linalg.norm(slipped().T[:3, 3]) - np.linalg.norm(slipped().plain.T[:3, 3])),
-                        "You compared two distances from the flange. Subtract the places first, then take the length."),
+                        "This is the difference of two distances from the flange. Subtract the places first, then take the length."),
                 *(Mistake(lambda k=k: abs(float(slipped().plain.T[k, 3] - slipped().T[k, 3])), "This is one coordinate of the difference. The distance takes all three.") for k in (1, 2)),
                 Mistake(lambda: float(np.linalg.norm((slipped().T @ slipped().plain.T)[:3, 3])), "This comes out when the two mountings are multiplied and none is inverted.", id="slip_cost-49c86f"),
             ],
@@ -491,7 +491,7 @@ CHAPTER = Chapter(
                 Mistake(lambda C, c: next_pose(C, c) + 1, "Candidates count from 0."),
                 Mistake(lambda C, c: c[next_pose(C, c)], "This is the candidate's derivative. Asked for is its number."),
                 Mistake(lambda C, c: float(_volumes(C, c).min()), "This is the determinant it leaves. Asked for is the candidate's number."),
-                Mistake(_one_after_the_other, "You keep what one candidate brought when you try the next. Each is tried on the same C."),
+                Mistake(_one_after_the_other, "You return the last one, whatever it brings. It always seems the best where C keeps what the candidates before it brought: each is tried on the same C."),
                 Mistake(_alone, "You looked at each candidate alone: what is known already, C, makes some of them worth little."),
                 Mistake(lambda C, c: 0, "You return the first one, whatever it brings."),
             ],
