@@ -4,6 +4,7 @@ import functools
 
 import numpy as np
 
+from ...estimation.differences import numeric_jacobian
 from ...localization import lateration, odometry
 from .. import rounding
 from ..ledger import Computed, computes
@@ -11,29 +12,21 @@ from . import printed as lecture
 
 NOTEBOOK = "07_dead_reckoning"
 
-
 POSES_TRIED = (([0.3, -1.2, 0.8], [0.7, 0.4], 0.1), ([2.0, 0.4, -2.1], [1.3, -0.6], 0.25))  # pose, control, time step
-
-
 STEP = 1e-6  # of the central differences below
 
 
 def _numeric_jacobians(x, u, dt):
     """F_x and F_u of the simplified step by central differences at a pose and a control."""
-    x, u = np.array(x), np.array(u)
-
-    def slope(dx, du):
-        return (odometry.step(x + dx, u + du, dt, "euler") - odometry.step(x - dx, u - du, dt, "euler")) / (2 * STEP)
-
-    F_x = np.column_stack([slope(STEP * e, 0.0) for e in np.eye(3)])
-    return F_x, np.column_stack([slope(0.0, STEP * e) for e in np.eye(2)])
+    F_x = numeric_jacobian(lambda x: odometry.step(x, u, dt, "euler"), x, STEP)
+    return F_x, numeric_jacobian(lambda u: odometry.step(x, u, dt, "euler"), u, STEP)
 
 
 def _left_by_differences(x, u, dt):
     """What central differences leave of a right derivative: STEP^2 / 6 of the third one, here dt v or dt at most, and
     two rounded ends of a pose, each off by up to two units in the last place (a product and a sum), over 2 STEP.
     """
-    third, largest = dt * max(abs(u[0]), 1.0), np.abs(odometry.step(np.array(x), np.array(u), dt, "euler")).max()
+    third, largest = dt * max(abs(u[0]), 1.0), np.abs(odometry.step(x, u, dt, "euler")).max()
     return STEP**2 / 6 * third + 2 * np.spacing(max(largest, 1.0)) / STEP
 
 
