@@ -498,14 +498,10 @@ def start_spacing():
         [thesis.table_7_1(method)["start"] for method in wells.METHODS if method != "levenberg_marquardt"]
     )
     decimals = sorted({abs(Decimal(repr(float(x)))) for x in starts.ravel()})  # as printed: no digit is lost
-    odd = [b - a for a, b in itertools.pairwise(decimals) if (b - a) % Decimal("0.5")]
-    return Computed(
-        float(min(odd, default=Decimal("0.5"))),
-        proof=f"Starts on one line in steps of 0.5 differ by multiples of 0.5; 4.3 and 4.5 differ by {min(odd)}.",
-    )
-
-
-# --- Table 7-1 and the text around it: what is claimed ---
+    odd = {b - a: (a, b) for a, b in itertools.pairwise(decimals) if (b - a) % Decimal("0.5")}
+    step = min(odd, default=Decimal("0.5"))
+    apart = f"; {odd[step][0]} and {odd[step][1]} differ by {step}" if odd else ""
+    return Computed(float(step), proof=f"Starts on one line in steps of 0.5 differ by multiples of 0.5{apart}.")
 
 
 @computes("optimization.fewer_iterations")
