@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..checks import (
+    as_choice,
     as_count,
     as_finite,
     as_number,
@@ -298,8 +299,7 @@ def laterate(landmarks, distances, start=None, cost="distance", std=1.0, steps=1
     Source: lecture, "Least-Square-Verfahren bei mehr als 2 Landmarken" (the cost "squares").
     """
     landmarks, distances = _landmarks(landmarks, distances)
-    if cost not in COSTS:
-        raise ValueError(f"cost must be one of {', '.join(COSTS)}, got {cost!r}")
+    cost = as_choice(cost, "cost", COSTS)
     std, dim, steps = as_positive_number(std, "std"), landmarks.shape[1], as_count(steps, "steps")
     x = linear_start(landmarks, distances) if start is None else as_points(start, "start", dim)
     x = np.broadcast_to(x, (*fit_together(start=x.shape[:-1], distances=distances.shape[:-1]), dim)).copy()

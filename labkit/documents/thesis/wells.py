@@ -12,7 +12,7 @@ from functools import cache, partial
 import numpy as np
 from scipy.optimize import minimize
 
-from ...checks import as_count, as_points, as_positive_number
+from ...checks import as_choice, as_count, as_points, as_positive_number
 from ...estimation import optimization as opt
 
 CENTERS = np.array([[1.0, 1.0], [-1.0, -2.0]])
@@ -189,9 +189,7 @@ def destinations(method, starts, max_iterations=100):
     steps : array of int, shape (...)
         Steps tried until x moved by less than 1e-10, or max_iterations.
     """
-    if method not in METHODS:
-        raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
-    advance, first = _ADVANCE[method]
+    advance, first = _ADVANCE[as_choice(method, "method", METHODS)]
     starts, max_iterations = as_points(starts, "starts", 2), as_count(max_iterations, "max_iterations", at_least=0)
     x = starts.reshape(-1, 2).copy()
     memory = first(x)
