@@ -39,10 +39,12 @@ window.show = (declaration) => {
     on: (kind, hear) => { if (kind === "msg:custom") hears.add(hear); },
     off: (kind, hear) => hears.delete(hear),
     send: async (message) => {
+      window.underway = (window.underway ?? 0) + 1;
       for (const [said, files] of await window.toPython(message)) {
         const buffers = files.map((file) => new DataView(Uint8Array.from(atob(file), (c) => c.charCodeAt(0)).buffer));
         for (const hear of hears) hear(said, buffers);
       }
+      window.underway -= 1;
     },
   };
   document.body.replaceChildren();
@@ -50,6 +52,14 @@ window.show = (declaration) => {
   window.close_ = render({ model, el: document.body });
 };
 """
+RESTS = """async () => {
+  for (let calm = 0, last = ""; calm < 4; ) {
+    await new Promise((go) => setTimeout(go, 100));
+    const { picture } = document.querySelector(".labkit-stage").dataset;
+    calm = !window.underway && picture === last ? calm + 1 : 0;
+    last = picture;
+  }
+}"""
 CUT = """() => {
   const stage = document.querySelector(".labkit-stage");
   const box = stage.getBoundingClientRect();
@@ -95,8 +105,9 @@ class Bridge:
         self.stage = stage
         stage.connect(lambda message, buffers: self.said.append((message, buffers)))
         page.evaluate("declaration => window.show(declaration)", stage.declaration())
-        page.locator(".labkit-stage[data-picture]").wait_for(timeout=20_000)
-        page.wait_for_timeout(450)
+        drawn = "canvas[data-space=true]" if stage.spaces else "canvas"
+        page.locator(f".labkit-stage[data-picture] {drawn}").first.wait_for(timeout=20_000)
+        page.evaluate(RESTS)  # nothing is on its way, and nothing new came for four tenths of a second
 
     def __call__(self, message):
         if self.is_gone:

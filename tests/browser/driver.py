@@ -163,6 +163,15 @@ def wait_until_idle(page, seconds=120):
         page.wait_for_timeout(250)
 
 
+def soon(page, check, seconds=15):
+    """Wait until `check()` holds, however busy the machine is; whether it came to hold."""
+    for _ in range(10 * seconds):
+        if check():
+            return True
+        page.wait_for_timeout(100)
+    return False
+
+
 def run_all(page, seconds=120):
     """Run all cells and wait for the last one."""
     page.evaluate("() => { window.jupyterapp.commands.execute('notebook:run-all-cells'); }")

@@ -219,8 +219,14 @@ def test_a_line_cut_by_sleep_comes_back_and_all_is_where_it_was(wall):
     show(wall, FIRST)
     wall.keyboard.press("f")
     failed = rest(wall)
-    wall.evaluate("() => wall.wire.socket.close()")
-    wall.wait_for_function("() => document.querySelector('#said').textContent.includes('The line to Python is cut')")
+    wall.evaluate(
+        """() => new Promise((told) => { // seen from within: the line is back within a second
+            const said = document.querySelector("#said");
+            const seen = () => { if (said.textContent.includes("The line to Python is cut")) told(); };
+            new MutationObserver(seen).observe(said, { childList: true, characterData: true, subtree: true });
+            wall.wire.socket.close();
+        })"""
+    )
     wall.wait_for_function("() => wall.wire.socket.readyState === 1 && !document.querySelector('#said').textContent")
     show(wall, FIRST)
     assert rest(wall) == failed

@@ -48,15 +48,6 @@ def figure(page, number):
     return stage
 
 
-def soon(page, check, seconds=15):
-    """Wait until `check()` holds, however busy the machine is; whether it came to hold."""
-    for _ in range(10 * seconds):
-        if check():
-            return True
-        page.wait_for_timeout(100)
-    return False
-
-
 def pixels(page, stage):
     """What is on the canvas, once nothing has changed there for 0.7 s."""
     before = None
@@ -97,11 +88,11 @@ def test_a_slider_moves_by_keys_keeps_the_focus_and_says_its_value_with_its_unit
     slider.focus()
     for _ in range(3):
         page.keyboard.press("ArrowRight")
-    assert soon(page, lambda: slider.get_attribute("aria-valuetext") == "33 deg")
+    assert driver.soon(page, lambda: slider.get_attribute("aria-valuetext") == "33 deg")
     assert pixels(page, stage) != before
     assert slider.evaluate("node => node === document.activeElement")
     stage.get_by_role("button", name="Reset").click()
-    assert soon(page, lambda: slider.input_value() == "120") and pixels(page, stage) == before
+    assert driver.soon(page, lambda: slider.input_value() == "120") and pixels(page, stage) == before
 
 
 def test_play_moves_time_and_the_live_region_speaks_meanwhile(page):
@@ -147,7 +138,7 @@ def test_handles_that_lie_on_each_other_are_pulled_one_by_one(page):
     page.mouse.move(x - 60, y - 60, steps=5)
     page.mouse.up()
     page.wait_for_timeout(500)
-    assert soon(page, lambda: place(stage, "X0")[1] < y - 40)
+    assert driver.soon(page, lambda: place(stage, "X0")[1] < y - 40)
     assert abs(place(stage, "X1")[1] - before["X1"][1]) < 25
     stage.get_by_role("button", name="Reset").click()
     page.wait_for_timeout(400)
@@ -168,7 +159,8 @@ def test_a_figure_fits_what_one_sees_and_nothing_is_cut(page, width, height):
     try:
         for number in (GIMBAL, SWIRL, BASINS):
             stage = figure(page, number)
-            assert soon(page, lambda stage=stage: is_whole(page, stage, must_fit=height > 450 and width > 400)), number
+            must_fit = height > 450 and width > 400
+            assert driver.soon(page, lambda stage=stage, fit=must_fit: is_whole(page, stage, fit)), number
     finally:
         page.set_viewport_size({"width": 1280, "height": 900})
         page.wait_for_timeout(400)
@@ -202,14 +194,14 @@ def test_enlarged_it_fills_the_window_and_escape_leads_back(page):
         box = stage.locator("canvas:not(.space)").bounding_box()
         return box["width"] * box["height"]
 
-    assert soon(page, lambda: size() > 1.2 * small["width"] * small["height"])
+    assert driver.soon(page, lambda: size() > 1.2 * small["width"] * small["height"])
     assert tuple(stage.bounding_box().values()) == (0, 0, 1280, 900)
     for part in stage.locator("button, input, .caption").all():
         place = part.bounding_box()
         assert place["y"] + place["height"] <= 900 and place["x"] + place["width"] <= 1280
     page.keyboard.press("Escape")
     picture = stage.locator("canvas:not(.space)")
-    assert soon(page, lambda: picture.bounding_box()["width"] == pytest.approx(small["width"], abs=1))
+    assert driver.soon(page, lambda: picture.bounding_box()["width"] == pytest.approx(small["width"], abs=1))
     assert stage.get_by_role("button", name="Enlarge").is_visible()
 
 

@@ -6,7 +6,7 @@ import driver
 import numpy as np
 import pytest
 from contact_sheets import CUT, UNHEARD, stage_page
-from test_space_in_lab import PIXELS, apart, at_rest
+from test_space_in_lab import apart, at_rest
 
 from labkit.chapters.ch02_chaining import stages as chaining
 from labkit.chapters.ch05_hand_eye import stages as hand_eye
@@ -167,15 +167,15 @@ def test_twenty_scenes_on_a_page_share_one_context_and_those_out_of_sight_hold_n
             [bridge.stage.declaration(), told, np.where(np.isfinite(numbers), numbers, 0).tolist()],
         )
         page.evaluate(MANY, 19)
-        page.wait_for_timeout(1500)
-        assert page.evaluate("contexts.length") == 1
-        widths = page.evaluate("() => [...document.querySelectorAll('canvas.space')].map(canvas => canvas.width)")
-        assert len(widths) == 20 and sum(width > 1 for width in widths) <= 4  # those in the window or near it
-        last = page.locator(".labkit-stage").last
-        last.scroll_into_view_if_needed()
-        page.wait_for_function("[...document.querySelectorAll('canvas.space')].at(-1).width > 1", timeout=10_000)
-        page.wait_for_timeout(600)
-        covered, colors, _ = last.evaluate(PIXELS)
+
+        def holding():
+            return page.evaluate("() => [...document.querySelectorAll('canvas.space')].filter(c => c.width > 1).length")
+
+        assert driver.soon(page, lambda: 1 <= holding() <= 4)  # those in the window or near it
+        assert page.locator("canvas.space").count() == 20 and page.evaluate("contexts.length") == 1
+        page.locator(".labkit-stage").last.scroll_into_view_if_needed()
+        page.wait_for_function("[...document.querySelectorAll('canvas.space')].at(-1).width > 1", timeout=20_000)
+        covered, colors, _ = at_rest(page, 19)[1]
         assert covered > 0.02 and colors > 200 and page.complaints == []
 
 
@@ -185,17 +185,18 @@ def test_a_click_on_a_frame_of_the_cell_chooses_it_from_wherever_one_looks():
         bridge.show(page, stages.whole_cell())
         page.locator(".labkit-stage canvas[data-space=true]").wait_for(timeout=20_000)
         at_rest(page, 0)
-        canvas = page.locator(".labkit-stage canvas:not(.space)")
+        stage, canvas = bridge.stage, page.locator(".labkit-stage canvas:not(.space)")
+        there = stage.state["view"].azimuth_deg - 15  # after three presses; what one sees is told at rest
         canvas.focus()
         for _ in range(3):
             page.keyboard.press("ArrowLeft")
+        assert driver.soon(page, lambda: abs((stage.state["view"].azimuth_deg - there + 180) % 360 - 180) < 1e-6)
         at_rest(page, 0)
-        page.wait_for_timeout(1200)  # what one sees is told at rest
-        stage, box = bridge.stage, canvas.bounding_box()
+        box = canvas.bounding_box()
         place = stage.state["view"].project(stage.result["places"]["marks"])[:2]
         x, y = stage._picture.fraction(stage.figure.axes[0], place)
         page.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
-        page.locator(".caption", has_text="The part as learned").wait_for(timeout=5000)
+        page.locator(".caption", has_text="The part as learned").wait_for(timeout=20_000)
         assert stage.state["source"] == "marks" and page.complaints == []
 
 
@@ -211,7 +212,7 @@ def test_without_python_the_view_still_turns_and_a_pulled_handle_goes_back():
         page.mouse.down()
         page.mouse.move(x + 40, y - 30, steps=3)
         page.mouse.up()
-        stage.locator(".gone", has_text="Python does not answer").wait_for(timeout=5000)
+        stage.locator(".gone", has_text="Python does not answer").wait_for(timeout=20_000)
         there = handle.bounding_box()
         assert np.hypot(there["x"] - start["x"], there["y"] - start["y"]) < 1
         stage.locator("canvas:not(.space)").focus()
