@@ -15,9 +15,9 @@ AHEAD_AFTER = 0.25  # s without a message of a page until the next Stage is made
 
 
 def collect(to_stay=False):
-    """Collect what is in circles, which holds pixels as well: matplotlib's formulas leave exceptions with the frames
-    that drew. What is `to_stay`, all there is by then, is never looked at again, so that this takes milliseconds; for a
-    process that does nothing else.
+    """Let garbage that refers to itself go now: exceptions in matplotlib's formula parser keep the frames that drew,
+    and with them the pixels. `to_stay`: all that is left is never looked at again, so that the next call takes
+    milliseconds instead of a fifth of a second; for a process that does nothing but a demo.
     """
     gc.collect()
     if to_stay:

@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import ctypes
-import gc
 import logging
 import signal
 import webbrowser
@@ -93,7 +92,6 @@ async def run(program, options, counts):
     """Show a program until Ctrl-C; `options` are those of the verb."""
     give_pixels_back()
     demo = Demo(program, options.ip, options.port, counts)
-    gc.freeze()
     demo.session.house.collect = collect
     room = demo.let_vote(options.vote_ip) if options.vote else None
     if program.cards[0].stage:
