@@ -1,8 +1,8 @@
 // Scenes in space, drawn by the browser. `labkit/stage/stage.js` loads this once a page, opens a `View` for each Stage that
 // declares spaces, and hands it what Stage sends. Turning needs no Python; where one looks from is told with the next message.
 //
-// Whoever shows Stages without Python (a reading edition) sets globalThis[Symbol.for("labkit.space")] to
-// () => import("./space.js") before; the declaration and one recorded message with `space` and its numbers are enough.
+// The first lines of `stage.js` say how a page without Python gets it; the declaration and one recorded message with
+// `space` and its numbers are enough.
 
 import { LINE_NUMBERS, MARKERS, PART_NUMBERS, POINT_NUMBERS, Renderer } from "./renderer.js";
 import { dot } from "./solids.js";
@@ -217,8 +217,9 @@ export class View {
     });
     this.show(true);
     this.stir();
-    if (this.frame) cancelAnimationFrame(this.frame);
-    if (this.seen) this.draw(); // at once: the next frame shows it, whoever waits for it would paint it one later
+    if (!this.seen) return;
+    cancelAnimationFrame(this.frame);
+    this.draw(); // at once: the next frame shows it, whoever waits for it would paint it one later
   }
 
   show(on) {
