@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...stage import style
-from ...stage.marks import robot_outline
+from ...stage.marks import broken, robot_outline
 
 CIRCLE = np.stack([np.cos(np.linspace(0, 2 * np.pi, 91)), np.sin(np.linspace(0, 2 * np.pi, 91))], axis=1)
 
@@ -51,14 +51,12 @@ class Circles:
     def set(self, landmarks, distances, robot):
         """`landmarks`: (n, 2); `distances`: (n,); `robot`: (2,)."""
         curves = landmarks[:, None, :] + distances[:, None, None] * CIRCLE
-        gap = np.full((len(landmarks), 1, 2), np.nan)
-        self.rings.set_data(*np.concatenate([curves, gap], axis=1).reshape(-1, 2).T)
+        self.rings.set_data(*broken(curves).T)
         self.marks.set_data(*landmarks.T)
         for k, name in enumerate(self.names):
             name.set_visible(k < len(landmarks))
             name.xy = tuple(landmarks[min(k, len(landmarks) - 1)])
-        rays = np.stack([landmarks, np.broadcast_to(robot, landmarks.shape), np.full_like(landmarks, np.nan)], axis=1)
-        self.sights.set_data(*rays.reshape(-1, 2).T)
+        self.sights.set_data(*broken(np.stack([landmarks, np.broadcast_to(robot, landmarks.shape)], axis=1)).T)
 
 
 class Search:
@@ -171,8 +169,7 @@ class Reach:
     """What one command reaches: a fan of paths, the best one, the robot at its end, and the spot."""
 
     def __init__(self, ax, paths):
-        gap = np.full((len(paths), 1, 2), np.nan)
-        ax.plot(*np.concatenate([paths, gap], axis=1).reshape(-1, 2).T, color=style.GRID, linewidth=1.1)
+        ax.plot(*broken(paths).T, color=style.GRID, linewidth=1.1)
         ax.fill(*robot_outline(np.zeros(3), 0.16).T, facecolor=style.FAINT, edgecolor=style.MUTED)
         (self.spot,) = ax.plot([], [], **style.look("prediction"))
         (self.path,) = ax.plot([], [], **style.look("estimate"))
