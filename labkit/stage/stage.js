@@ -79,9 +79,9 @@ class Figure {
     this.line.where = () => this.scenes.news();
     this.space.scenes = this.scenes;
     if (model.placed) model.placed = (places) => this.scenes.placed(places);
-    this.words = new Words(declared.controls, this.line);
     this.clock = declared.play ? new Clock(declared.play, this.line) : null;
     this.controls = new Controls(declared.controls, this.line);
+    this.words = new Words(this.controls.inputs);
     this.buttons = buttonRow(declared.buttons, (key) => { this.clock?.stop(); this.line.press(key); });
     this.room = new Room(this.root, this.picture, declared.size, this.line, this.buttons);
     this.room.canDraw = () => this.scenes.able;
@@ -112,9 +112,9 @@ class Figure {
     this.picture.style.aspectRatio = `${message.width} / ${message.height}`;
     this.scenes.fit(message);
     this.screen.canvas.setAttribute("aria-label", [this.name, message.caption].filter(Boolean).join(": "));
-    this.words.show(message);
     this.handles.show((this.places = this.scenes.placed(message.handles)));
     this.controls.show(message.controls);
+    this.words.show(message);
     this.clock?.show(message.time);
     this.root.dataset.python = message.milliseconds;
     this.root.dataset.picture = message.picture;
@@ -380,22 +380,22 @@ function fraction(node, event) {
 
 /** Caption, status, and what a screen reader hears. Numbers of the caption that are a slider's can be dragged. */
 class Words {
-  constructor(controls, line) {
+  constructor(inputs) {
     this.caption = element("p", "caption");
     this.status = element("p", "status", { role: "status" });
     this.gone = element("p", "gone", { role: "status" });
     this.spoken = element("div", "spoken", { "aria-live": "polite" });
     this.nodes = [this.status, this.gone, this.caption, this.spoken];
-    Object.assign(this, { controls, line, told: "", parts: [], order: "", timer: 0, since: 0, cursor: "" });
+    Object.assign(this, { inputs, told: "", parts: [], order: "", timer: 0, since: 0, cursor: "" });
   }
 
-  show({ caption, status, cursor, numbers, controls }) {
+  show({ caption, status, cursor, numbers }) {
     if (this.told !== caption) {
       this.told = caption;
-      this.write(caption, (numbers ?? []).filter(([, , name]) => this.controls[name]));
+      this.write(caption, numbers.filter(([, , name]) => this.inputs.has(name))); // a film has some of the sliders
       this.speak(caption);
     }
-    for (const part of this.parts) part.show?.(controls[part.name]);
+    for (const part of this.parts) part.show?.();
     if (cursor && cursor !== this.cursor) this.speak(cursor);
     this.cursor = cursor;
     if (this.status.textContent !== status) this.status.textContent = status;
@@ -408,7 +408,7 @@ class Words {
     if (this.order !== order || !this.parts.length) {
       const focused = this.parts.find((part) => part.node === document.activeElement)?.name;
       const text = () => ({ node: element("span", "", { "aria-hidden": "true" }) }); // heard from `spoken`
-      this.parts = [text(), ...numbers.flatMap(([, , name]) => [new CaptionNumber(name, this.controls[name], this.line), text()])];
+      this.parts = [text(), ...numbers.flatMap(([, , name]) => [new CaptionNumber(name, this.inputs.get(name)), text()])];
       this.caption.replaceChildren(...this.parts.map(({ node }) => node));
       this.parts.find(({ name }) => name && name === focused)?.node.focus({ preventScroll: true });
       this.order = order;
@@ -441,10 +441,10 @@ class Words {
 
 /** A slider's number in the caption: dragged sideways, or moved by arrow keys, it moves the slider. */
 class CaptionNumber {
-  constructor(name, { label, positions, unit }, line) {
-    Object.assign(this, { name, positions, unit, line, at: 0, held: null });
+  constructor(name, { input, label }) {
+    Object.assign(this, { name, input, held: null });
     this.node = element("span", "number", {
-      role: "slider", tabindex: "0", "aria-label": label, title: `${label}: drag sideways`, "aria-valuemin": 0, "aria-valuemax": positions,
+      role: "slider", tabindex: "0", "aria-label": label, title: `${label}: drag sideways`, "aria-valuemin": 0, "aria-valuemax": input.max,
       "data-number": name, "data-lm-suppress-shortcuts": "true",
     });
     this.node.addEventListener("pointerdown", (event) => {
@@ -452,7 +452,7 @@ class CaptionNumber {
       taken(event);
       this.node.focus({ preventScroll: true });
       this.node.setPointerCapture(event.pointerId);
-      this.held = { x: event.clientX, at: this.at };
+      this.held = { x: event.clientX, at: Number(input.value) };
     });
     this.node.addEventListener("pointermove", (event) => {
       if (this.held) this.ask(this.held.at + Math.round((event.clientX - this.held.x) / PIXELS_A_STEP));
@@ -462,21 +462,19 @@ class CaptionNumber {
       const arrow = arrowOf(event);
       if (!arrow) return;
       taken(event);
-      this.ask(this.at + (event.shiftKey ? 10 : 1) * (arrow[0] + arrow[1]));
+      this.ask(Number(input.value) + (event.shiftKey ? 10 : 1) * (arrow[0] + arrow[1]));
     });
   }
 
   ask(position) {
-    const at = Math.min(this.positions, Math.max(0, position));
-    if (at === this.at) return;
-    this.at = at;
-    this.line.add("control", (all) => ({ ...all, [this.name]: at }));
+    const before = this.input.value;
+    this.input.value = position; // it keeps to its ends
+    if (this.input.value !== before) this.input.dispatchEvent(new Event("input"));
   }
 
-  show({ at, text }) {
-    this.node.setAttribute("aria-valuenow", at);
-    this.node.setAttribute("aria-valuetext", this.unit ? `${text} ${this.unit}` : text);
-    if (this.line.pending.control?.[this.name] === undefined) this.at = at; // else it is further already
+  show() {
+    this.node.setAttribute("aria-valuenow", this.input.value);
+    this.node.setAttribute("aria-valuetext", this.input.getAttribute("aria-valuetext"));
   }
 }
 
@@ -755,6 +753,7 @@ function sliderInput({ label, positions, unit }, send) {
   const number = element("output", "", { "aria-hidden": "true" });
   input.addEventListener("input", () => send(Number(input.value)));
   return {
+    input, label,
     node: element("div", "control", {}, [element("label", "", {}, [label, input]), number]),
     show(at, text) {
       if (Number(input.value) !== at) input.value = at;

@@ -12,6 +12,15 @@ CELLS = (
     "from labkit.chapters.ch03_quirlen import stages as tools\ntools.pose_designer()",
     "from labkit.chapters.ch01_frames import stages as frames\nframes.kuka_gimbal()",
 )
+CONTEXTS = """() => {
+    window.contexts = [];
+    const getContext = HTMLCanvasElement.prototype.getContext;
+    HTMLCanvasElement.prototype.getContext = function (kind, ...options) {
+        const made = getContext.call(this, kind, ...options);
+        if (kind === "webgl2" && !contexts.includes(made)) contexts.push(made);
+        return made;
+    };
+}"""
 PIXELS = """(stage) => {
     const canvas = stage.querySelector("canvas.space");
     const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);

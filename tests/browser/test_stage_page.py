@@ -6,23 +6,12 @@ import driver
 import numpy as np
 import pytest
 from contact_sheets import CUT, UNHEARD, stage_page
-from test_space_in_lab import apart, at_rest
+from test_space_in_lab import CONTEXTS, apart, at_rest
 
 from labkit.chapters.ch02_chaining import stages as chaining
 from labkit.chapters.ch05_hand_eye import stages as hand_eye
 from labkit.chapters.ch06_tracker import stages
 from labkit.chapters.ch09_monte_carlo import stages as monte_carlo
-
-CONTEXTS = """() => {
-    window.contexts = [];
-    const getContext = HTMLCanvasElement.prototype.getContext;
-    HTMLCanvasElement.prototype.getContext = function (kind, ...options) {
-        const made = getContext.call(this, kind, ...options);
-        if (kind === "webgl2" && !contexts.includes(made)) contexts.push(made);
-        return made;
-    };
-}"""
-
 
 SMALL = """(canvas) => {
     const small = new OffscreenCanvas(100, 60).getContext("2d");
@@ -116,6 +105,13 @@ def test_numbers_of_the_caption_are_dragged_keyed_and_keep_the_focus():
         page.mouse.up()
         page.wait_for_function("() => document.querySelector('[data-number=turn_deg]').textContent === '3.1'")
         assert bridge.stage.state["turn_deg"] == pytest.approx(3.1) and page.complaints == []
+        bridge.is_gone, at = True, slider.input_value()
+        number.press("ArrowRight")
+        page.locator(".gone", has_text="Python does not answer").wait_for(timeout=20_000)
+        assert slider.input_value() == at
+        bridge.is_gone = False
+        number.press("ArrowRight")  # one step on from what is shown
+        page.wait_for_function("() => document.querySelector('[data-number=turn_deg]').textContent === '3.2'")
 
 
 def test_python_draws_while_the_context_is_lost_and_the_page_again_when_it_is_back():
