@@ -1,7 +1,7 @@
 // A recorded Stage: answers `stage.js` from a film, as Python answers from a living Stage. What a film holds is said in
 // film.py. A handle goes to the recorded place nearest to the pointer, a slider to the recorded positions.
-
-// Scenes in space are drawn by `space.js` as with a living Stage, and turn freely: a note says which numbers each thing has.
+// Scenes in space are drawn by `space.js` as with a living Stage, and turn freely: a note says which numbers each thing
+// has. No picture holds them, so the numbers are sent even while the page has lost its means to draw.
 
 const KEPT = 4; // developed tracks kept at once, some 16 MB each
 
@@ -140,9 +140,9 @@ export class Projector {
     const scale = Math.min(this.look.width / width, this.look.height / height);
     const note = track.notes[at];
     const handles = Object.entries(note.handles).map(([name, place]) => [name, { ...place, color: place.color[dark] }]);
-    const [space, numbers] = this.look.space && note.things ? this.spaceOf(note.things, things) : [null, []];
+    const [space, numbers] = note.things ? this.spaceOf(note.things, things) : [null, []];
     const message = {
-      ...note, space, handles: Object.fromEntries(handles), time: note.time && { ...note.time, ...this.clock(note), epoch: this.epoch },
+      ...note, space, handles: Object.fromEntries(handles), time: note.time && { ...note.time, ...this.clock(), epoch: this.epoch },
       picture: ++this.shown, on: null, pixels: this.film.size, serial, cursor: "", milliseconds: 0,
       width: Math.round(scale * width), height: Math.round(scale * height),
     };
@@ -166,7 +166,7 @@ export class Projector {
     return [{ places: this.film.places, rows, view }, [new DataView(all.buffer)]];
   }
 
-  clock(note) {
+  clock() {
     const { play } = this.film.tracks;
     return ["play", "Make it fail"].includes(this.name) ? {} : { at: play.entry };
   }

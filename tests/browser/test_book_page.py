@@ -3,7 +3,8 @@
 import driver
 import nbformat
 import pytest
-from test_space_in_lab import apart, at_rest
+from test_space_in_lab import CONTEXTS, apart, at_rest
+from test_space_in_lab import PIXELS as SPACE_PIXELS
 
 from labkit.book import figures, notebook, site
 from labkit.exercises import source
@@ -57,7 +58,7 @@ def shown(found):
     while (now := stage.get_attribute("data-picture")) != before:
         before = now
         found.page.wait_for_timeout(150)
-    return found.locator("canvas").evaluate(PIXELS), found.locator(".caption").inner_text()
+    return found.locator("canvas:not(.space)").evaluate(PIXELS), found.locator(".caption").inner_text()
 
 
 def after(found, act):
@@ -133,6 +134,7 @@ def scene_of(page):
 
 
 def test_a_scene_turns_and_its_handle_follows_where_one_looks_from(page, book):
+    page.add_init_script(f"({CONTEXTS})()")
     page.goto((book / "scene.html").as_uri())
     found, (covered, colors, before) = scene_of(page)
     assert covered > 0.05 and colors > 100
@@ -151,7 +153,15 @@ def test_a_scene_turns_and_its_handle_follows_where_one_looks_from(page, book):
     _, (_, _, dragged) = scene_of(page)
     assert apart(dragged, turned) > 0.05 and found.locator(".caption").inner_text() != caption
     found.get_by_role("button", name="Make it fail").click()
-    assert apart(scene_of(page)[1][2], dragged) > 0.1
+    failed = scene_of(page)[1][2]
+    assert apart(failed, dragged) > 0.1
+    after(
+        found,
+        lambda: page.evaluate("() => (window.loss = contexts[0].getExtension('WEBGL_lose_context')).loseContext()"),
+    )
+    kept = found.locator(".labkit-stage").evaluate(SPACE_PIXELS)[2]
+    assert apart(kept, failed) < 0.1 and found.locator("canvas.space").is_visible()
+    after(found, lambda: page.evaluate("() => loss.restoreContext()"))
     found.get_by_role("button", name="Reset").click()
     assert apart(scene_of(page)[1][2], before) < 0.1
 
