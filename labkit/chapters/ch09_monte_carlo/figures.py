@@ -296,7 +296,7 @@ class SoccerErrors:
 
     def __init__(self, ax, seconds):
         style.axes(ax, "time (s)", "error (m)")
-        ax.set_title("gray: odometry, and MCL with the other readings", fontsize=9, color=style.MUTED)
+        ax.set_title("gray: MCL with each of the readings", fontsize=9, color=style.MUTED)
         ax.set(xlim=(0, seconds), ylim=(0.01, 6), yscale="log")
         ax.set_yticks([0.01, 0.1, 1], ["0.01", "0.1", "1"])
         ax.minorticks_off()

@@ -529,7 +529,7 @@ def _soccer_errors():
 
 def compute_soccer(state):
     """The soccer run up to now: the last TAIL steps of the paths, cloud, the landmark seen, and the errors (m) of
-    odometry and MCL so far, those of the other readings over the whole run.
+    odometry and MCL, and those of MCL with each of the readings.
     """
     run, errors = _soccer(READINGS[state["reads"]]), _soccer_errors()
     k = min(int(round(state["t"] / SOCCER_DT)), len(run.estimates) - 1)
