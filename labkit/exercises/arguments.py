@@ -1,6 +1,6 @@
 """The general layer, arguments: whether a wrong result is the right one for arguments that differ in one respect.
 
-What is said is true by construction: the reference, called with the changed arguments, gives the student's result on
+What is said holds on all draws: the reference, called with the changed arguments, gives the student's result on
 all draws. The commonest slips are of this kind: two arguments exchanged, a matrix not inverted, a term forgotten, an
 angle in degrees, the last row left out, the notebook's data in place of what was handed over.
 """
@@ -30,7 +30,7 @@ def changes(names, inputs, notebook):
         What comes after "your result is what comes out", and a function from one draw's arguments to changed ones.
     """
     columns = list(zip(*inputs))
-    numeric = [k for k, column in enumerate(columns) if all(map(_is_numeric, column))]
+    numeric = [k for k, column in enumerate(columns) if all(map(is_numeric, column))]
     for k, (name, value) in itertools.product(numeric, notebook.items()):
         if _is_like(value, columns[k][0]):
             yield f"with the notebook's `{name}` in place of `{names[k]}`", _replace(k, lambda _, value=value: value)
@@ -58,7 +58,8 @@ def _by_another(k, by, operation):
     return lambda args: (*args[:k], operation(args[k], args[by]), *args[k + 1 :])
 
 
-def _is_numeric(value):
+def is_numeric(value):
+    """Whether an argument is a number or an array of numbers."""
     if isinstance(value, bool):
         return False
     return isinstance(value, int | float | np.number) or isinstance(value, np.ndarray) and value.dtype.kind in "if"
@@ -66,7 +67,7 @@ def _is_numeric(value):
 
 def _is_like(value, given):
     """Whether data of the notebook could stand where an argument is meant: numbers of the same dimensions."""
-    return _is_numeric(value) and np.ndim(value) == np.ndim(given) and np.shape(value)[1:] == np.shape(given)[1:]
+    return is_numeric(value) and np.ndim(value) == np.ndim(given) and np.shape(value)[1:] == np.shape(given)[1:]
 
 
 def _replace(k, change):

@@ -6,6 +6,9 @@ normalized. What is said holds on all draws, whatever code it came from.
 
 import numpy as np
 
+from . import relations
+from .arguments import is_numeric
+
 POWERS = {1.0: "{}", 2.0: "the square of {}", 0.5: "the root of {}"}
 CLOSE = 1e-7  # how far apart, relatively, two ratios may lie that are the same
 
@@ -36,15 +39,9 @@ def _numeric(named):
     found = {}
     for name in named[0]:
         values = [given[name] for given in named]
-        if all(_is_numeric(value) for value in values):
+        if all(is_numeric(value) for value in values):
             found[name] = [np.asarray(value, dtype=float) for value in values]
     return found
-
-
-def _is_numeric(value):
-    if isinstance(value, bool | np.bool_):
-        return False
-    return isinstance(value, int | float | np.number) or isinstance(value, np.ndarray) and value.dtype.kind in "iuf"
 
 
 def _term(metric, results, expected, numeric):
@@ -84,7 +81,7 @@ def _identity(metric, results, expected):
 
 def _factor(results, expected, numeric, what="the expected one"):
     """A factor between result and expected that differs from draw to draw as an argument does, or a number of them."""
-    ratios = [_ratio(r, e) for r, e in zip(results, expected)]
+    ratios = [relations.constant_ratio(r, e, CLOSE) for r, e in zip(results, expected)]
     if None in ratios or len(ratios) < 2 or np.ptp(np.abs(ratios)) <= CLOSE * abs(ratios[0]):
         return None
     for words, sizes in _sizes(numeric):
@@ -95,15 +92,6 @@ def _factor(results, expected, numeric, what="the expected one"):
                 if _same(ratios, sign * sizes**-power):
                     return f"{form.format(words)} times your result is {minus}{what}"
     return None
-
-
-def _ratio(result, expected):
-    """The one number that turns the expected entries into those of the result; None when they need several."""
-    use = np.abs(expected) > 1e-12
-    if result.shape != expected.shape or not use.any() or (np.abs(result[~use]) > 1e-9).any():
-        return None
-    ratio = result[use] / expected[use]
-    return float(ratio.flat[0]) if ratio.flat[0] and np.ptp(ratio) <= CLOSE * abs(ratio.flat[0]) else None
 
 
 def _same(ratios, sizes):

@@ -48,6 +48,9 @@ def _relation(metric, results, expected, sizes, whole):
     results = [np.asarray(r, dtype=float) for r in results]
     expected = [np.asarray(e, dtype=float) for e in expected]
 
+    if _are_rounded(results, expected):
+        return "your result is rounded: hand over all digits"
+
     def holds(change):
         try:
             return all(metric.equal(change(r), e) for r, e in zip(results, expected))
@@ -99,8 +102,6 @@ def _pose_in_parts(metric, results, expected):
     turned = _rotation_kind([r[..., :3, :3] for r in results], "rotation block")
     if turned:
         return turned
-    if all(map(_are_rounded, results, expected)):
-        return "your result is rounded: hand over all digits"
     *turn, origin = (max(d, key=lambda d: d.amount) for d in zip(*map(metric.deviations, results, expected)))
     if all(map(not_accurate_enough, (*turn, origin))):
         return None
@@ -214,7 +215,7 @@ def _power(results, holds):
 
 
 def _factor(results, expected, sizes):
-    ratios = [_constant_ratio(r, e) for r, e in zip(results, expected)]
+    ratios = [constant_ratio(r, e, 1e-9) for r, e in zip(results, expected)]
     if None in ratios or len(ratios) < 2 or np.ptp(ratios) > 1e-9 * abs(ratios[0]):
         return None
     ratio = ratios[0]
@@ -238,12 +239,13 @@ def _times(ratio, sizes):
     return f"your result is {ratio:.4g} times the expected one, on every draw"
 
 
-def _constant_ratio(result, expected):
+def constant_ratio(result, expected, close):
+    """The one number that turns the expected entries into those of the result; None when they need several."""
     use = np.abs(expected) > 1e-12
-    if not use.any() or (np.abs(result[~use]) > 1e-9).any():
+    if result.shape != expected.shape or not use.any() or (np.abs(result[~use]) > 1e-9).any():
         return None
     ratio = result[use] / expected[use]
-    return float(ratio.flat[0]) if np.ptp(ratio) <= 1e-9 * abs(ratio.flat[0]) and ratio.flat[0] != 0 else None
+    return float(ratio.flat[0]) if ratio.flat[0] and np.ptp(ratio) <= close * abs(ratio.flat[0]) else None
 
 
 def _one_part(results, expected, holds, unit):
@@ -313,8 +315,10 @@ def ratio_words(answer, expected):
 # Digits --------------------------------------------------------------------------------------------------------------
 
 
-def _are_rounded(result, expected):
-    return any(np.array_equal(result, np.round(expected, n)) for n in range(1, 9))
+def _are_rounded(results, expected):
+    """Whether these are the expected results with some digits, one of which shows at least: 1 for 0.9996 shows none."""
+    shown = any(float(f"{x:.0e}") != x for result in results for x in np.ravel(result))
+    return shown and all(significant_digits(r, e) > 1 for r, e in zip(results, expected))
 
 
 def significant_digits(answer, expected):
