@@ -1,12 +1,16 @@
 """The general layer, cases: where an answer is right on some draws and not on others, what those have in common."""
 
+import math
+
 import numpy as np
 
 ENTRIES = 4  # of a short vector, that are looked at one by one
+WAYS = 1000  # in which as many draws could have been missed: with fewer, one of some fifty traits may fit by chance
 
 
 def case_words(draws, missed):
-    """What the draws on which an answer is wrong have in common, and no other has; None when nothing is found.
+    """What the draws on which an answer is wrong have in common, and no other has; None when nothing is found, or when
+    so few draws are looked at, or missed, that it may be chance.
 
     Parameters
     ----------
@@ -15,6 +19,8 @@ def case_words(draws, missed):
     missed : list of bool
         On which of them the answer is wrong.
     """
+    if math.comb(len(missed), sum(missed)) < WAYS:
+        return None
     traits = [_traits(given, expected) for given, expected in draws]
     shared = set(traits[0]).intersection(*traits[1:])
     for words in traits[0]:

@@ -23,7 +23,7 @@ NOISY = "exact on clean data, but the data are not weighed as they should be: on
 TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws of each kind
 MANY_DIGITS = 1e-3  # by how much better some draws come out where one case is special
 MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried, to tell on which
-LOOKING = 0.5  # seconds of processor time in which changes of the arguments are tried as an explanation
+LOOKING = 0.5  # seconds of processor time in which changes of arguments, or of the formula, are tried as explanation
 UNITS = {
     "mm": ("length", 1e-3),
     "cm": ("length", 1e-2),
@@ -256,13 +256,23 @@ class _Trial:
         cases = self._cases()
         read = scope.notebook_data(self.function)
         notebook = {name: self.function.__globals__[name] for name in read}
-        ends = time.process_time() + LOOKING
-        for words, change in arguments.changes(self._names(self.inputs[0]), [case[0] for case in cases], notebook):
-            if time.process_time() > ends:
-                return None
-            variant = Mistake(lambda *args, change=change: self.exercise.reference(*change(args)), words)
-            if all(self._is_mistake(variant, *case) for case in cases):
-                return f"your result is what comes out {words}"
+        tried = arguments.changes(self._names(self.inputs[0]), [case[0] for case in cases], notebook)
+        reference = self.exercise.reference
+        words = self._first_that_fits((words, lambda *args, c=change: reference(*c(args))) for words, change in tried)
+        return words and f"your result is what comes out {words}"
+
+    def _first_that_fits(self, variants):
+        """The words of the first of (words, function) that gives the student's results; None if none does in time."""
+        draws, ends = self._cases(), time.thread_time() + LOOKING
+        try:
+            with guard.time_limit(2 * LOOKING):  # a variant may well have a loop without an end
+                for words, function in variants:
+                    if time.thread_time() > ends:
+                        return None
+                    if all(self._is_mistake(Mistake(function, words), *case) for case in draws):
+                        return words
+        except guard.TimeLimit:
+            return None
         return None
 
     def _terms(self):
@@ -289,17 +299,8 @@ class _Trial:
         """Whether the results are those of a right formula with one change, with this in words."""
         if self.exercise.metric is None or not self.inputs:
             return None
-        draws, ends = self._cases(), time.process_time() + LOOKING
-        try:
-            with guard.time_limit(2 * LOOKING), np.errstate(all="ignore"):
-                for words, function in slips.changed_formulas(self.exercise):
-                    if time.process_time() > ends:
-                        return None
-                    if all(self._is_mistake(Mistake(function, words), *case) for case in draws):
-                        return f"your result is what a right formula gives {words}"
-        except guard.TimeLimit:
-            return None
-        return None
+        words = self._first_that_fits(slips.changed_formulas(self.exercise))
+        return words and f"your result is what a right formula gives {words}"
 
     def _other_shape(self):
         """What results of a wrong shape have to do with the expected ones."""
@@ -394,7 +395,7 @@ class _Trial:
     def _is_slip_of(self, k, part, metric, cases):
         """Whether one part of the results is that of mistake k on all draws."""
         try:
-            with np.errstate(all="ignore"):
+            with np.errstate(all="ignore"), guard.only_finite_matrices():
                 wrong = [self.exercise.mistakes[k].variant(*copy.deepcopy(args))[part] for args, _, _ in cases]
                 same = all(_equal_as_written(metric, pair[0][part], w) for (_, _, pair), w in zip(cases, wrong))
                 return same and not all(metric.equal(w, pair[1][part]) for (_, _, pair), w in zip(cases, wrong))
@@ -404,7 +405,7 @@ class _Trial:
     def _is_mistake(self, mistake, args, metric, pair):
         metric = metric or metrics.Numbers(1e-12)
         try:
-            with np.errstate(all="ignore"):
+            with np.errstate(all="ignore"), guard.only_finite_matrices():
                 wrong = mistake.variant(*copy.deepcopy(args))
                 result = pair[0].value if isinstance(pair[0], _Refusal) else pair[0]
                 return _equal_as_written(metric, result, wrong)
@@ -427,7 +428,7 @@ class _Trial:
         special, seen = self._special_case()
         right = f"It was right on {len(pairs) - len(missed)} of {len(pairs)} draws: which case is special?"
         if special:
-            right = f"It is wrong where {special}, and right elsewhere, on {seen} draws."
+            right = f"On {seen} draws it was wrong exactly where {special}."
         return f"{_closed(str(most))} {right}\nNot right when called as {self._call(missed[0])}"
 
     def _right_parts(self):

@@ -351,6 +351,25 @@ def _replaced(owner, name, value):
         setattr(owner, name, before)
 
 
+@contextlib.contextmanager
+def only_finite_matrices():
+    """Within, what NumPy decomposes must be finite: LAPACK would write of NaN on the terminal, past `sys.stderr`."""
+    with contextlib.ExitStack() as stack:
+        for name in ("lstsq", "pinv", "svd"):
+            stack.enter_context(_replaced(np.linalg, name, _finite_only(getattr(np.linalg, name), name)))
+        yield
+
+
+def _finite_only(original, name):
+    @standing_for(original)
+    def decompose(a, *args, **kwargs):
+        if not np.isfinite(a).all():
+            raise np.linalg.LinAlgError(f"the matrix given to `{name}` holds NaN or infinity")
+        return original(a, *args, **kwargs)
+
+    return decompose
+
+
 def _set_environment(values):
     if dict(os.environ) != values:
         os.environ.clear()
@@ -405,6 +424,7 @@ def sandbox(capture):
         stack.enter_context(contextlib.redirect_stdout(capture))
         stack.enter_context(contextlib.redirect_stderr(capture))
         stack.enter_context(_replaced(sys, "setrecursionlimit", lambda depth: limit(min(depth, DEPTH))))
+        stack.enter_context(only_finite_matrices())
         stack.enter_context(_replaced(builtins, "input", _forbid("input()")))
         stack.enter_context(_replaced(builtins, "breakpoint", _forbid("breakpoint()")))
         for name in ("_exit", "abort", "kill", "fork", "execv"):

@@ -486,7 +486,7 @@ def test_wrong_on_some_draws_only_says_so():
         draws=20,
     )
     text = exercise.judge(lambda v: v, rng=np.random.default_rng(0)).text
-    assert "It is wrong where `v` is negative, and right elsewhere" in text
+    assert "draws it was wrong exactly where `v` is negative" in text
     assert "Not right when called as size(v=-" in text
 
 

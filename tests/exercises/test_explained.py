@@ -8,7 +8,7 @@ import textwrap
 import numpy as np
 import pytest
 
-from labkit.exercises import cases, metrics, mutation, operands, shapes
+from labkit.exercises import cases, engine, guard, metrics, mutation, operands, shapes
 from labkit.exercises.engine import NOT_YET, Exercise
 
 RNG = np.random.default_rng(3)
@@ -67,8 +67,9 @@ def test_one_of_several_results_and_two_exchanged():
 
 def test_the_case_on_which_an_answer_is_wrong():
     draws = [({"v": v, "n": n}, 1.0) for v, n in ((1.0, 2), (-1.0, 2), (2.0, 3), (-3.0, 3))]
-    assert cases.case_words(draws, [False, True, False, True]) == "`v` is negative"
-    assert cases.case_words(draws, [False, True, True, False]) is None
+    assert cases.case_words(4 * draws, 4 * [False, True, False, True]) == "`v` is negative"
+    assert cases.case_words(4 * draws, 4 * [False, True, True, False]) is None
+    assert cases.case_words(draws, [False, True, False, True]) is None, "so few draws may agree by chance"
 
 
 FORMULA = """
@@ -119,11 +120,47 @@ def test_an_argument_without_effect_is_named():
     assert "does not change with `std`" in told(item, "return x / 1.7 + np.sin(x)")
 
 
+def test_a_rounded_result_is_said_to_be_rounded_though_an_argument_has_no_effect_on_its_digits():
+    item = exercise(lambda x, std: np.sin(x) + 1e-9 * std**3 * np.cos(x), _draw, metrics.Numbers(1e-12))
+    assert "your result is rounded" in told(item, "return np.round(np.sin(x) + 1e-9 * std**3 * np.cos(x), 4)")
+    assert "rounded" not in told(item, "return np.sin(x)")
+
+
+def test_a_one_that_should_be_a_little_less_is_not_called_rounded():
+    item = exercise(lambda x, std: 1.0 - 1e-4 * std * np.cos(x) ** 2, _draw)
+    assert "rounded" not in told(item, "return np.ones(4)").partition(":")[0]
+
+
+def test_what_is_tried_as_explanation_writes_nothing_on_the_terminal(capfd):
+    def fit(x, std):
+        rows = np.vander(1 / x, 2)
+        return np.linalg.lstsq(rows, std * x, rcond=None)[0]
+
+    told(exercise(fit, _draw), "return np.sin(x[:2]) + std")
+    assert capfd.readouterr() == ("", "")
+    with guard.only_finite_matrices():
+        for decompose in (np.linalg.lstsq, np.linalg.pinv, np.linalg.svd):
+            with pytest.raises(np.linalg.LinAlgError, match="holds NaN"):
+                decompose(np.full((3, 3), np.nan), *([np.ones(3)] if decompose.__name__ == "lstsq" else []))
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_change_that_never_ends_is_given_up(monkeypatch):
+    def steps(x, std):
+        left = 9.0
+        while left > 0:
+            left -= abs(std)
+        return left + x
+
+    monkeypatch.setattr(engine, "LOOKING", 0.05)
+    assert "comes out" not in told(exercise(steps, _draw), "return np.sin(x)")
+
+
 def test_the_special_case_is_named():
     item = exercise(
         lambda x, std: np.sin(x.sum()) * std + x[0], lambda rng: (rng.normal(size=2), rng.choice([-1.3, 1.7]))
     )
-    assert "wrong where `std` is negative, and right elsewhere" in told(
+    assert "draws it was wrong exactly where `std` is negative" in told(
         item, "return np.sin(x.sum()) * abs(std) + x[0]"
     )
 
