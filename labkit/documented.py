@@ -55,9 +55,10 @@ def _rules(function):
     parameters = inspect.signature(function).parameters
     places = {name: place for place, name in enumerate(parameters)}
     for names, said, more in _parameters(_text(function)):
-        for name in names:
+        for k, name in enumerate(names):
             default = parameters[name].default if name in places else None
-            check = _check(name, said, f"{said}{more} {default}", function) if name in places else None
+            own = _of_one(said, k, len(names))
+            check = _check(name, own, f"{said}{more} {default}", function) if name in places else None
             if check:
                 optional = "optional" in said or "None" in said or default is None
                 found.append((places[name], name, functools.partial(_unless_none, check) if optional else check))
@@ -90,6 +91,13 @@ def _parameters(text):
             entry = [name.strip() for name in match[1].split(",")], match[2], ""
         elif entry:
             entry = (*entry[:2], f"{entry[2]} {lines[k].strip()}")
+
+
+def _of_one(said, k, n):
+    """What is said of the k-th of n names: of "arrays, shapes (n, 3), (m, 3)" each has its own."""
+    first, plural, after = said.partition("shapes")
+    shapes = _SHAPE.findall(after)
+    return f"{first}shape ({shapes[k]})" if plural and len(shapes) == n else said
 
 
 def _unless_none(check, value):

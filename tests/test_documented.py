@@ -80,6 +80,25 @@ def test_a_function_of_the_library_keeps_its_word():
 
 
 @documented
+def weigh(x, cov):
+    """Two arguments on one line.
+
+    Parameters
+    ----------
+    x, cov : arrays, shapes (3,) and (3, 3)
+    """
+    return x, cov
+
+
+def test_each_of_several_names_has_a_shape_of_its_own():
+    assert weigh(X, np.eye(3))[0] is X
+    with pytest.raises(ValueError, match=r"x must have shape \(3,\), got \(3, 3\)"):
+        weigh(np.eye(3), np.eye(3))
+    with pytest.raises(ValueError, match=r"cov must have shape \(3, 3\), got \(3,\)"):
+        weigh(X, X)
+
+
+@documented
 def replay(log, drive):
     """A class that this module does not import.
 

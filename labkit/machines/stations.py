@@ -382,9 +382,7 @@ def sight(T_WL, diodes, angles, start, std=None):
     Sighting
     """
     T = poses_from_angles(T_WL, diodes, angles, start)
-    given = None if std is None else as_positive_number(std, "std")
-    T_WL, diodes = as_shape(T_WL, "T_WL", "n", 4, 4), as_shape(diodes, "diodes", "m", 3)
-    return Sighting(T, T_WL, diodes, as_finite(angles, "angles"), given)
+    return Sighting(T, T_WL, diodes, angles, None if std is None else as_positive_number(std, "std"))
 
 
 # ---- stations that do not stay ---------------------------------------------------------------------------------------
