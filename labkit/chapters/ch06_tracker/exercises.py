@@ -1309,7 +1309,7 @@ CHAPTER = Chapter(
             question="Rotations are noisy (0.5 deg), translations good (0.1 mm). Which way finds the mounting's rotation best?",
             choices=("from the rotations alone", "from rotations and translations at once", "both alike"),
             answer="from rotations and translations at once",
-            why="Good translations at a distance know the rotation better than the rotations do. Methods that solve the rotation first throw that away.",
+            why="Good translations at a distance know the rotation better than the rotations do, if both are weighed by their noise. Rotation first throws that away, and both at once without weights gets no closer.",
         ),
         Prediction(
             "turning",

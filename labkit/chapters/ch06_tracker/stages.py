@@ -130,7 +130,7 @@ def tx40():
             x, y, z = result["T_BF"][:3, 3]
             low = result["singular_values"][-1]
             words.set_text(
-                f"{angles}\n\nF at {x:.0f},\n{y:.0f}, {z:.0f} mm\nwrist to axis 2\n{result['wrist']:.0f} mm\n"
+                f"{angles}\n\nF at\n{x:.0f}, {y:.0f}, {z:.0f} mm\nwrist to axis 2\n{result['wrist']:.0f} mm\n"
                 f"least mobility\n{low:.0f} mm per rad"
             )
 
@@ -538,8 +538,8 @@ def methods():
     def sentence(result):
         best, worst = np.argmin(result["rotation"]), np.argmax(result["rotation"])
         return (
-            f"{result['names'][best]}: {result['rotation'][best]:.2f} times the bound in rotation; "
-            f"{result['names'][worst]}: {result['rotation'][worst]:.1f} times."
+            f"Best: {result['names'][best]}, {result['rotation'][best]:.2f} times the bound in rotation; "
+            f"worst: {result['names'][worst]}, {result['rotation'][worst]:.1f} times."
         )
 
     return Stage(

@@ -439,7 +439,7 @@ def _reach_sentence(result):
         there = found["away"] < CLOSE and found["turned_deg"] < 2
         off = f"stays {found['away']:.2f} m and {found['turned_deg']:.0f}° off"
         words.append(f"{name} {'gets there' if there else off}")
-    return "; ".join(words) + "."
+    return f"By one command, {'; '.join(words)}."
 
 
 def reach():

@@ -58,12 +58,12 @@ def bells():
         ax = style.axes(fig.subplots(), "position (m)", "density (1/m)")
         ax.set(xlim=(0, 20), ylim=(0, 1.15))
         three = draw.Bells(ax, GRID)
-        words = ax.text(0.99, 0.97, "", transform=ax.transAxes, ha="right", va="top")
+        words = ax.set_title("", loc="right")
 
         def update(state, result):
             three.set(result["before"], result["bells"])
             limit = gaussian.chi_square_quantile(0.99, 1)
-            words.set_text(f"gain K = {result['gain']:.2f}\nNIS = {result['nis']:.2f} (99 % below {limit:.1f})")
+            words.set_text(f"gain K = {result['gain']:.2f},  NIS = {result['nis']:.2f} (99 % below {limit:.1f})")
 
         return [*three.artists, words], update
 
@@ -286,7 +286,7 @@ def arena():
         right.set(xlim=(0, 400), ylim=(1e-2, 1e5), yscale="log")
         world, spare = draw.Arena(left), Spare(left, "2, not seen")
         panel = draw.Consistency(right, "NEES of each step", role="estimates")
-        right.legend(loc="upper left")
+        style.legend_above(right)
         limits = gaussian.chi_square_quantile([0.005, 0.995], 3)
 
         def update(state, result):

@@ -1516,7 +1516,7 @@ CHAPTER = Chapter(
             "particles still have descendants?",
             choices=("about 630", "about 100", "about 10", "all 1000"),
             answer="about 10",
-            why="The first round loses 37 %. Later, with k families left, the next one dies out after some 2 M / k^2 rounds: after t rounds about 2 M / t remain.",
+            why="The first round loses 37 %. Later, with k families left, the next one dies out after some 2 M / k² rounds: after t rounds about 2 M / t remain.",
         ),
         Exercise(
             "effective_size",

@@ -255,7 +255,7 @@ def field_against_beams():
     """Drag the robot: how likely is its scan at every other place, by the beam model and by the likelihood field?"""
 
     def scene(fig):
-        axes = fig.subplots(2, 1)
+        axes = fig.subplots(1, 2)
         plan = building().grid.extent, _places()[2], building().lines
         heats = [
             draw.heat(ax, *plan, f"{model}: bright is likely (log scale)", HEAT_DEPTH)
@@ -286,7 +286,7 @@ def field_against_beams():
         fail={"scan": "something in the way", "beams": "plain"},
         because="Something that is not in the map stands in the way, and the plain beam model forgives nothing.",
         describe=_heat_sentence,
-        size=(6.0, 7.2),
+        size=(7.6, 3.0),
     )
 
 
@@ -551,7 +551,7 @@ def compute_soccer(state):
 def _soccer_sentence(result):
     k = result["step"]
     mcl, odometry_off = (float(result["errors"][name][k]) for name in ("MCL", "odometry"))
-    sight = f"it sees landmark {result['seen'] + 1}" if result["seen"] >= 0 else "no landmark is in sight"
+    sight = f"it sees landmark {result['seen'] + 1}" if result["seen"] >= 0 else "no landmark is read"
     return f"MCL is off by {mcl:.2f} m, odometry by {odometry_off:.2f} m; {sight}."
 
 
