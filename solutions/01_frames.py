@@ -189,7 +189,7 @@ angle_deg = ...  # your code here
 ### BEGIN SOLUTION
 angle_deg = np.rad2deg(np.arccos((np.trace(T_K0K1[:3, :3]) - 1) / 2))
 ### END SOLUTION
-ex.angle_deg(angle_deg)
+angle_deg = ex.angle_deg(angle_deg)
 
 # %% half-a-degree [markdown]
 # Is that much? A hole is to be drilled at $(200, 0, 0)$ mm in $K_1$. In the drawing $K_1$ has the same origin and is turned by exactly 90°: that is `drawn` below.
@@ -204,7 +204,7 @@ hole = np.array([200.0, 0.0, 0.0])
 apart = frames.transform(T_K0K1, hole) - frames.transform(drawn, hole)
 distance = np.linalg.norm(apart)
 ### END SOLUTION
-ex.distance(distance)
+distance = ex.distance(distance)
 
 # %% noise [markdown]
 # ## How good is a frame?

@@ -155,7 +155,7 @@ even_lever = ...  # your code here
 angle, distance = closure_error(product)
 even_lever = distance / angle
 ### END SOLUTION
-ex.even_lever(even_lever)
+even_lever = ex.even_lever(even_lever)
 
 # %% at-the-work-piece
 for x in (100, 300, 1000):
@@ -172,7 +172,7 @@ p = np.random.default_rng(0).normal(size=(20_000, 3))
 p *= 1000 / np.linalg.norm(p, axis=1)[:, None]
 worst_at_one_meter = chaining.displacement(product, p).max()
 ### END SOLUTION
-ex.worst_at_one_meter(worst_at_one_meter)
+worst_at_one_meter = ex.worst_at_one_meter(worst_at_one_meter)
 
 # %% lever [markdown]
 # ## One bad link

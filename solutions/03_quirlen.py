@@ -107,7 +107,7 @@ tip_length = ...  # your code here
 ### BEGIN SOLUTION
 tip_length = np.linalg.norm(x[:3])
 ### END SOLUTION
-ex.tip_length(tip_length)
+tip_length = ex.tip_length(tip_length)
 
 # %% residuals [markdown]
 # ## What is left over
@@ -138,7 +138,7 @@ s0 = ...  # your code here
 ### BEGIN SOLUTION
 s0 = np.sqrt((residuals**2).sum() / len(poses))
 ### END SOLUTION
-ex.s0(s0)
+s0 = ex.s0(s0)
 
 # %% what-s0-means [markdown]
 # The sheet calls $s_0$ the standard deviation of the result (*Standardabweichung des Ergebnisses*). That it is not: it says how far the poses disagree, and how sure the result is comes further down.

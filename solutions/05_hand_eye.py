@@ -214,7 +214,7 @@ rms_before = ...  # your code here
 residuals = kuka_residual(p2_end, repaired.T_BF, repaired.x_S, target)
 rms_before = np.sqrt((residuals**2).sum(axis=1).mean())
 ### END SOLUTION
-ex.rms_before(rms_before)
+rms_before = ex.rms_before(rms_before)
 
 # %% derivatives [markdown]
 # ## Derivatives you can trust
@@ -508,7 +508,7 @@ rms_after = ...  # your code here
 ### BEGIN SOLUTION
 rms_after = hand_eye.calibrate_sphere_target(corrected.T_BF, corrected.x_S).rms
 ### END SOLUTION
-ex.rms_after(rms_after)
+rms_after = ex.rms_after(rms_after)
 
 # %% rms-after [markdown]
 # Here is what each correction buys; the last line compares like with like, the printed pose and your fit on the same corrected tables. Two things were needed: right numbers *and* a free center. With the printed center even perfect tables leave 4.8 mm, because the
@@ -538,7 +538,7 @@ radius = ...  # your code here
 ### BEGIN SOLUTION
 radius = hand_eye.fit_radius(corrected.T_BF, corrected.x_S).radius
 ### END SOLUTION
-ex.radius(radius)
+radius = ex.radius(radius)
 
 # %% radius-verdict
 choices = (("all poses", np.arange(31) >= 0),
@@ -848,7 +848,7 @@ cad_length = ...  # your code here
 p, q = frames.transform(turned, frames.transform(cad, seen))
 cad_length = np.linalg.norm(q - p)
 ### END SOLUTION
-ex.cad_length(cad_length)
+cad_length = ex.cad_length(cad_length)
 
 # %% all-lengths
 poses = {"CAD": cad, "thesis's end pose": thesis.frame("scanner_end"),

@@ -119,7 +119,7 @@ fused = ...  # your code here
 ### BEGIN SOLUTION
 fused = fuse_two_sensors(0.0, 20.0, np.array([9.4, 10.6]), np.array([0.5, 1.0]))[0]
 ### END SOLUTION
-ex.fused(fused)
+fused = ex.fused(fused)
 
 # %% fused-against [markdown]
 # Printed is 9.6, and the true position is 10. Yours rounds to another digit. Which other reading of the page gives 9.6? (It also calls the new
@@ -193,7 +193,7 @@ corrected = ...  # your code here
 C, cov_z = np.array([[1.0, 0.0]]), np.array([[0.25]])
 corrected = update(np.array([12.5, 5.0]), prior_cov, np.array([11.79]), C, cov_z)
 ### END SOLUTION
-ex.corrected(corrected)
+corrected = ex.corrected(corrected)
 
 # %% detective [markdown]
 # The covariance agrees to the last digit, the state does not: printed is (11.90, 4.98). Four digits of a covariance are a good witness. After $n$

@@ -143,7 +143,7 @@ p, beams_to_zero = 1.0, 0
 while p > 0:
     p, beams_to_zero = p * 0.01, beams_to_zero + 1
 ### END SOLUTION
-ex.beams_to_zero(beams_to_zero)
+beams_to_zero = ex.beams_to_zero(beams_to_zero)
 
 # %% in-logarithms [markdown]
 # The remedy: keep logarithms and add. Only at the end weights are wanted, and there the sum

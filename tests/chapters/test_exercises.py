@@ -68,6 +68,13 @@ def test_value_accepts_the_reference_and_refuses_its_neighbors(chapter, item):
         assert item.judge(np.float64(expected) + 3 * max(item.rtol * abs(expected), item.atol)).status == NOT_YET
 
 
+@pytest.mark.parametrize("chapter, item", VALUES, ids=names(VALUES))
+def test_a_notebook_checks_a_value_once_and_goes_on_with_what_the_check_returns(chapter, item):
+    text = (session.SOLUTIONS / f"{chapter.notebook}.py").read_text(encoding="utf-8")
+    checks = re.findall(rf"^.*\bex\.{item.id}\(.*$", text, re.MULTILINE)
+    assert checks == [f"{item.id} = ex.{item.id}({item.id})"]
+
+
 @functools.cache
 def computed_once(id):
     """A Value whose reference and wrong variants, functions without arguments, are computed once for all mistakes."""
