@@ -151,7 +151,7 @@ slip_cost = ...  # your code here
 ### BEGIN SOLUTION
 slip_cost = np.linalg.norm(slipped.plain.T[:3, 3] - slipped.T[:3, 3])
 ### END SOLUTION
-ex.slip_cost(slip_cost)
+slip_cost = ex.slip_cost(slip_cost)
 
 # %% slip-std
 if ex.after("slip_cost"):
@@ -354,7 +354,7 @@ for name, files in attempts.items():
 # %% yours [markdown]
 # ## Yours
 #
-# Put two files of your own, the same rows in both, beside this notebook, their names into the cell *the data*, and run on from there; or let the command write the report. (`ex.slip_cost` knows our cell only.) Formats and options stand in `docs/calibrate.md`.
+# Put two files of your own, the same rows in both, beside this notebook, their names into the line `robot_file, sensor_file = ...` at the top, and run on from there; or let the command write the report. (`ex.slip_cost` knows our cell only.) Formats and options stand in `docs/calibrate.md`.
 # Before you sign: the line of what was assumed; the angles of the motions; the rejected rows, with a reason for each; the weak direction; one calibration from half of the rows beside one from the other half.
 #
 # ## In practice

@@ -147,7 +147,8 @@ def _from_table(path, format, angle, quaternion):
     group = table.numbers([columns["group"].index])[:, 0] if "group" in columns else None
     if group is None and "stop" in columns:
         group = table.numbers([columns["stop"].index])[:, 0]
-    said = f"{name}, {how}, columns " + ("by their titles" if columns else "by their number")
+    kind_said = how if how.startswith(name) else f"{name}, {how}"
+    said = f"{kind_said}, columns " + ("by their titles" if columns else "by their number")
     if ignored and columns:
         said += f", not used: {', '.join(ignored)[:80]}"
     return Poses(table.name, T, time, group, places, name, unit and ("m" if LENGTHS[unit] > 1 else "mm"), said)
