@@ -298,8 +298,9 @@ CHAPTER = Chapter(
                 *(Mistake(lambda T, k, column=column: _angle_between(T[k:, :3, column], T[:-k, :3, column]),
                           "You compared where a coordinate axis goes: a column of the rotation. The axis of a motion is what stays, the direction of its rotation vector.")
                   for column in (2, 0, 1)),
-                Mistake(lambda T, k: np.arccos(np.clip((log_so3(T[k:, :3, :3]) * log_so3(T[:-k, :3, :3])).sum(1), -1, 1)),
-                        "Your rotation vectors have the length of the angle. Bring them to length 1 before the scalar product."),
+                *(Mistake(lambda T, k, limits=limits: np.arccos(np.clip((log_so3(T[k:, :3, :3]) * log_so3(T[:-k, :3, :3])).sum(1), *limits)),
+                          "Your rotation vectors have the length of the angle. Bring them to length 1 before the scalar product.")
+                  for limits in ((-1, 1), (-np.inf, np.inf))),
                 Mistake(lambda T, k: np.arccos(np.clip((_axes(T)[k:] * _axes(T)[:1]).sum(1), -1, 1)),
                         "You compare every axis with the first. Asked for is each with the one `apart` further on."),
                 Mistake(lambda T, k: motion.between_axes(T, 1), "You compare neighbors whatever `apart` says."),
@@ -424,6 +425,10 @@ CHAPTER = Chapter(
                 Mistake(_covariance(lambda rr, n, f: rr / (n - 1)), "You divided by n - 1, as for a mean. Here p parameters are fitted, f = n - p, and Student's f / (f - 2) is missing."),
                 Mistake(lambda r, J: np.var(r) * _freedom(r, J) / (_freedom(r, J) - 2) * np.linalg.inv(J.T @ J),
                         "`np.var` takes the mean of the residuals off and divides by their number. The noise is r'r / f."),
+                Mistake(lambda r, J: np.var(r, ddof=J.shape[1]) * _freedom(r, J) / (_freedom(r, J) - 2) * np.linalg.inv(J.T @ J),
+                        "`np.var` takes the mean of the residuals off, with `ddof` as well. The noise is r'r / f."),
+                Mistake(lambda r, J: np.var(r, ddof=J.shape[1]) * np.linalg.inv(J.T @ J),
+                        "`np.var` takes the mean of the residuals off, with `ddof` as well. The noise is r'r / f, and Student's f / (f - 2) is missing."),
                 Mistake(lambda r, J: np.var(r) * np.linalg.inv(J.T @ J),
                         "`np.var` takes the mean of the residuals off and divides by their number. The noise is r'r / f, and Student's f / (f - 2) is missing."),
                 Mistake(lambda r, J: r @ r / (_freedom(r, J) - 2) * (J.T @ J), "J'J is information. The covariance takes its inverse."),
@@ -512,7 +517,8 @@ CHAPTER = Chapter(
                 Mistake(lambda J, s, k: k * s * np.sqrt(1 - _shares(J)),
                         "This is how large the residual is. The error behind it is larger, by 1 / (1 - h)."),
                 Mistake(lambda J, s, k: k * s * (1 - _shares(J)), "A number with a large share hides its error better, not worse: divide by the root of 1 - h."),
-                Mistake(lambda J, s, k: np.full(len(J), k * s), "This holds for a number that the fit does not use. Each fitted number hides part of its error: its share h is missing."),
+                *(Mistake(variant, "This holds for a number that the fit does not use. Each fitted number hides part of its error: its share h is missing.")
+                  for variant in (lambda J, s, k: np.full(len(J), k * s), lambda J, s, k: k * s)),
                 Mistake(lambda J, s, k: k * s / np.sqrt(_shares(J)), "You divided by the root of the share h. What the others check is 1 - h."),
                 Mistake(lambda J, s, k: k / np.sqrt(1 - _shares(J)), "The noise is missing: these are standard deviations, not the unit of the readings."),
                 Mistake(lambda J, s, k: s / np.sqrt(1 - _shares(J)), "`times` is missing: an error of one standard deviation is not seen."),
