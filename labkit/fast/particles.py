@@ -14,16 +14,16 @@ def sample_motion(states, u, dt, rng, cov_u, model="midpoint"):
     """
     states, u, root = as_noisy_control(states, u, cov_u)
     dt, model = as_positive(dt, "dt"), odometry.as_model(model)
-    noise = as_generator(rng).standard_normal((*states.shape[:-1], 2))
-    v, omega = (u[k] + noise @ row for k, row in enumerate(root))
+    noise = as_generator(rng).standard_normal((states[..., 0].size, 2))
+    v, omega = (root @ noise.T + u[:, None]).reshape(2, *states.shape[:-1])
     length, turn = odometry.chord(v, omega, dt, model)
     t = np.tan(0.5 * (states[..., 2] + turn))
     square = t * t
     length /= 1 + square
     moved = np.empty(states.shape)
-    moved[..., 0] = states[..., 0] + length * (1 - square)
-    moved[..., 1] = states[..., 1] + 2 * length * t
-    moved[..., 2] = states[..., 2] + omega * dt
+    np.add(states[..., 0], length * (1 - square), out=moved[..., 0])
+    np.add(states[..., 1], 2 * length * t, out=moved[..., 1])
+    np.add(states[..., 2], omega * dt, out=moved[..., 2])
     return moved
 
 
@@ -38,6 +38,7 @@ def resample_systematic(weights, rng, size=None):
     ends *= size / ends[-1]
     full = ends >= ends[-1]
     ends -= as_generator(rng).random()
-    spokes = np.ceil(ends, out=ends).astype(np.intp)
-    spokes[full] = size
-    return np.repeat(np.arange(len(weights)), np.diff(spokes, prepend=0))
+    counts = np.ceil(ends, out=ends).astype(np.intp)
+    counts[full] = size
+    counts[1:] -= counts[:-1].copy()
+    return np.repeat(np.arange(len(weights)), counts)
