@@ -1,5 +1,7 @@
 """Clouds of ten thousand particles moved and drawn anew; each equals its namesake in `localization.particles`."""
 
+import math
+
 import numpy as np
 
 from ..checks import as_count, as_generator, as_positive
@@ -8,14 +10,14 @@ from ..localization.particles import as_noisy_control, as_weights
 
 
 def sample_motion(states, u, dt, rng, cov_u, model="midpoint"):
-    """As `localization.particles.sample_motion`, of the same random numbers, on one coordinate after the other.
+    """As `localization.particles.sample_motion`, of `normal_pairs`, on one coordinate after the other.
 
     Sine and cosine of the direction come from t, the tangent of half of it: 2 t / (1 + t^2) and (1 - t^2) / (1 + t^2).
     """
     states, u, root = as_noisy_control(states, u, cov_u)
     dt, model = as_positive(dt, "dt"), odometry.as_model(model)
-    noise = as_generator(rng).standard_normal((states[..., 0].size, 2))
-    v, omega = (root @ noise.T + u[:, None]).reshape(2, *states.shape[:-1])
+    noise = root @ normal_pairs(as_generator(rng), states[..., 0].size)
+    v, omega = (u[:, None] + noise).reshape(2, *states.shape[:-1])
     length, turn = odometry.chord(v, omega, dt, model)
     t = np.tan(0.5 * (states[..., 2] + turn))
     square = t * t
@@ -27,6 +29,18 @@ def sample_motion(states, u, dt, rng, cov_u, model="midpoint"):
     return moved
 
 
+def normal_pairs(rng, n):
+    """Independent standard normal numbers, shape (2, n), as points of the plane: half the squared distance from the
+    middle is exponential, the direction uniform (Box and Muller), in steps of 4e-7 rad.
+    """
+    far, direction = np.sqrt(2 * rng.standard_exponential(n)), rng.random(n, dtype=np.float32)
+    direction *= math.tau
+    pairs = np.empty((2, n))
+    np.multiply(far, np.cos(direction), out=pairs[0])
+    np.multiply(far, np.sin(direction), out=pairs[1])
+    return pairs
+
+
 def resample_systematic(weights, rng, size=None):
     """As `localization.particles.resample_systematic`, of the same random number.
 
@@ -36,9 +50,9 @@ def resample_systematic(weights, rng, size=None):
     size = len(weights) if size is None else as_count(size, "size", at_least=0)
     ends = np.cumsum(weights)
     ends *= size / ends[-1]
-    full = ends >= ends[-1]
+    full = np.searchsorted(ends, ends[-1])
     ends -= as_generator(rng).random()
     counts = np.ceil(ends, out=ends).astype(np.intp)
-    counts[full] = size
+    counts[full:] = size
     counts[1:] -= counts[:-1].copy()
     return np.repeat(np.arange(len(weights)), counts)

@@ -16,7 +16,7 @@ MANY = 4096  # states from which on single precision pays
 
 
 def weigh_landmarks(z, landmarks, std_range=None, std_bearing=None):
-    """As `localization.sensors.weigh_landmarks`, one landmark at a time on contiguous coordinates.
+    """As `localization.sensors.weigh_landmarks`, on contiguous coordinates.
 
     Thousands of states are weighed in single precision, as long as it rounds a reading by no more than about a
     ten-thousandth of its standard deviation and overflows nowhere.
@@ -25,45 +25,43 @@ def weigh_landmarks(z, landmarks, std_range=None, std_bearing=None):
     stds = (std_range, std_bearing)
     best = -len(z) * sum(math.log(std * math.sqrt(2 * math.pi)) for std in stds if std is not None)
     coarse = (std_range is None or (z[:, 0] < 1e3 * std_range).all()) and (std_bearing is None or std_bearing > 5e-3)
-    see = functools.partial(_misfit, z.tolist(), landmarks.tolist(), std_range, std_bearing)
 
     def weigh(states):
-        x, y, theta = np.moveaxis(as_points(states, "states"), -1, 0).copy()
-        theta *= 1 / math.tau
-        theta -= np.rint(theta)
-        if coarse and x.size >= MANY:
-            with np.errstate(over="ignore"):
-                misfit = see(x, y, theta.astype(np.float32)).astype(float)
-            if np.isfinite(misfit).all():
-                return best - misfit
-        return best - see(x, y, theta)
+        states = as_points(states, "states")
+        coordinates = states.reshape(-1, 3).T.copy()
+        misfit = None
+        if coarse and states.size >= 3 * MANY:
+            with np.errstate(over="ignore", invalid="ignore"):
+                misfit = _misfit(z, landmarks, std_range, std_bearing, coordinates, np.float32)
+        if misfit is None or not np.isfinite(misfit).all():
+            misfit = _misfit(z, landmarks, std_range, std_bearing, coordinates, float)
+        return (best - misfit).reshape(states.shape[:-1])
 
     return Weighting(weigh, best)
 
 
-def _misfit(z, landmarks, std_range, std_bearing, x, y, turns):
-    """Half the sum of squared errors of all readings, each in standard deviations, in the precision of `turns`."""
-    misfit = np.zeros_like(turns)
-    for (r, phi), (mark_x, mark_y) in zip(z, landmarks):
-        dx, dy = ((mark - at).astype(turns.dtype, copy=False) for mark, at in ((mark_x, x), (mark_y, y)))
-        if std_bearing is not None:
-            off = np.arctan2(dy, dx)
-            off *= 1 / math.tau
-            off -= turns
-            off -= phi / math.tau
-            off -= np.rint(off)
-            off *= math.tau * math.sqrt(0.5) / std_bearing
-            off *= off
-            misfit += off
-        if std_range is not None:
-            dx *= dx
-            dy *= dy
-            dx += dy
-            far = np.sqrt(dx)
-            far -= r
-            far *= math.sqrt(0.5) / std_range
-            far *= far
-            misfit += far
+def _misfit(z, landmarks, std_range, std_bearing, coordinates, dtype):
+    """Half the sum of squared errors of all readings, each in standard deviations, worked out in `dtype`."""
+    turns = coordinates[2] / math.tau
+    turns -= np.rint(turns)
+    d = (landmarks[:, :, None] - coordinates[:2]).astype(dtype, copy=False)
+    misfit = np.zeros(len(turns))
+    if std_bearing is not None:
+        off = np.arctan2(d[:, 1], d[:, 0])
+        off *= 1 / math.tau
+        off -= turns.astype(dtype, copy=False)
+        off -= (z[:, 1:] / math.tau).astype(dtype)
+        off -= np.rint(off)
+        off *= math.tau * math.sqrt(0.5) / std_bearing
+        off *= off
+        misfit += off.sum(0)
+    if std_range is not None:
+        d *= d
+        far = np.sqrt(d[:, 0] + d[:, 1])
+        far -= z[:, :1].astype(dtype)
+        far *= math.sqrt(0.5) / std_range
+        far *= far
+        misfit += far.sum(0)
     return misfit
 
 

@@ -29,6 +29,27 @@ def test_landmarks(dtype, stds, m):
     assert a(states[0]) == pytest.approx(b(states[0])) and a(states.reshape(4, -1, 3)).shape == (4, len(states) // 4)
 
 
+@pytest.mark.parametrize(("stds", "error"), [((0.2, 0.1), 1e-5), ((0.2, 1e-3), 1e-10), ((1e-3, 0.1), 1e-10)])
+def test_thousands_in_single_precision(stds, error):
+    """Only where it cannot be told: readings that are finer than it are weighed in double precision.
+
+    Readings are rounded by about 3e-7 rad and 1e-6 m, 5e-6 standard deviations: this moves k^2 / 2 by 5e-6 k.
+    """
+    rng = np.random.default_rng(8)
+    marks, z = rng.uniform(-5, 5, (4, 2)), np.column_stack([rng.uniform(1, 6, 4), rng.uniform(-4, 4, 4)])
+    states = rng.uniform([-6, -6, -30], [6, 6, 30], (fast.MANY, 3))
+    a, b = (module.weigh_landmarks(z, marks, *stds)(states) for module in (fast, plain))
+    assert a.dtype == float and (np.abs(a - b) < error * (1 + np.abs(b))).all()
+
+
+def test_thousands_too_far_for_single_precision():
+    states = np.full((fast.MANY, 3), [1e30, -1e25, 2.0])
+    states[0] = 0.0
+    a, b = (module.weigh_landmarks([[2.0, 0.3]], [[1.0, 2.0]], 0.2, 0.1)(states) for module in (fast, plain))
+    assert np.isfinite(a).all()
+    np.testing.assert_allclose(a, b, rtol=1e-9)
+
+
 def test_a_state_on_the_landmark():
     """It sees it in no direction: only the range counts alike, and no NaN comes out."""
     for stds, same in (((0.1, None), True), ((0.1, 0.1), False)):
