@@ -30,8 +30,19 @@ def sample_motion(states, u, dt, rng, cov_u, model="midpoint"):
 
 
 def normal_pairs(rng, n):
-    """Independent standard normal numbers, shape (2, n), as points of the plane: half the squared distance from the
-    middle is exponential, the direction uniform (Box and Muller), in steps of 4e-7 rad.
+    """Independent standard normal numbers as points of the plane, which is quicker than one by one.
+
+    Half the squared distance from the middle is exponential and the direction uniform (Box and Muller), the latter in
+    single precision: one of 16 million directions.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    n : int
+
+    Returns
+    -------
+    array, shape (2, n)
     """
     far, direction = np.sqrt(2 * rng.standard_exponential(n)), rng.random(n, dtype=np.float32)
     direction *= math.tau
