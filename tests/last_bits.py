@@ -4,8 +4,8 @@ As a plugin of pytest, `pytest -p last_bits`, it stirs the unit tests; `python l
 a kernel, where `load_ipython_extension` is called, it stirs a notebook. LAST_BITS in the environment is the seed. The
 same input gives the same output, as on any one processor: what differs between two seeds hangs on last bits.
 
-Stirred are the functions whose results differ from one build of BLAS and LAPACK to the next, by one unit in the last
-place per entry, up, down or not at all. `@` stays as it is: it cannot be replaced from outside.
+Stirred are the functions whose results differ from one build of BLAS and LAPACK to the next, by one or two units in
+the last place per entry, up, down or not at all. `@` stays as it is: it cannot be replaced from outside.
 """
 
 import functools
@@ -22,17 +22,24 @@ STIRRED = (
 )
 
 
+@functools.cache
+def factors(char, seed, size):
+    """More than `size` numbers beside one, to stir results of that type: below, one itself and above by one unit."""
+    one = np.array(1, dtype=char)
+    beside = np.array([np.nextafter(one, 0 * one), one, np.nextafter(one, 2 * one)])
+    return np.random.default_rng(seed).choice(beside, 2 * size + 4096)
+
+
 def stirred(value, seed):
-    """`value` with the entries of its float arrays moved by -1, 0 or 1 unit in the last place."""
+    """`value` with the entries of its float arrays moved by at most two units in the last place; zero stays zero."""
     if isinstance(value, np.floating):
         return stirred(np.asarray(value), seed)[()]
     if isinstance(value, np.ndarray) and value.dtype.kind == "c":
         return stirred(value.real, seed) + 1j * stirred(value.imag, seed)
-    if isinstance(value, np.ndarray) and value.dtype.kind == "f":
-        rng = np.random.default_rng([seed, zlib.crc32(value.tobytes())])
-        way = rng.integers(-1, 2, value.shape)
-        next_to = np.nextafter(value, np.copysign(np.inf, way).astype(value.dtype))
-        return np.where((way == 0) | (value == 0) | ~np.isfinite(value), value, next_to)
+    if isinstance(value, np.ndarray) and value.dtype.char in "fd":
+        near_one = factors(value.dtype.char, seed, value.size)
+        place = zlib.crc32(value.tobytes()) % (near_one.size - value.size + 1)
+        return value * near_one[place : place + value.size].reshape(value.shape)
     if isinstance(value, tuple):
         parts = [stirred(part, seed) for part in value]
         return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)

@@ -46,7 +46,7 @@ def table(path):
         return list(csv.DictReader(file))
 
 
-@pytest.mark.parametrize(("boxed", "students", "damaged"), [("none", 6, 1), ("bubblewrap", 12, 3)], indirect=["boxed"])
+@pytest.mark.parametrize(("boxed", "students", "damaged"), [("none", 4, 1), ("bubblewrap", 7, 2)], indirect=["boxed"])
 def test_a_class_is_reported_as_it_was_planted(boxed, students, damaged, tmp_path, capsys):
     planted = write(tmp_path / "class", students, damaged)
     out = tmp_path / "out"
