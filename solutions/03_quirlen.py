@@ -7,7 +7,7 @@
 # **What you will learn.** What a small residual is worth, what singular values say before anything is measured, what the sheet's
 # $s_0$ means in millimeters, how many poses it takes, and how to let go of outliers.
 #
-# **What you need.** Chapter 1, least squares. About 90 minutes.
+# **What you need.** Chapter 1, least squares. About 75 minutes.
 
 # %% notation [markdown]
 # | letter | meaning |

@@ -6,8 +6,8 @@
 # **What you will learn.** What a quadratic model is, what Newton makes of a place where $f$ bends down, what a sum of squares buys, how a gain ratio keeps a
 # method honest, and why "reaches the minimum from far away" says little.
 #
-# **What you need.** Gradient, matrix, a little NumPy. Two sittings of about an hour, the second from
-# *Gauss-Newton needs a sum of squares* on; what is marked *further* goes beyond them. Chapter 5 uses all of it on real robot data.
+# **What you need.** Gradient, matrix, a little NumPy. About 90 minutes, in two sittings if you like, the second from
+# *Gauss-Newton needs a sum of squares* on; what is marked *further* comes on top. Chapter 5 uses all of it on real robot data.
 
 # %% notation [markdown]
 # | letter | meaning |

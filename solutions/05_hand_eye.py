@@ -7,7 +7,8 @@
 # **What you will learn.** A sphere center from one scan line, derivatives you can trust, Gauss-Newton on a pose, a start without a guess, robust
 # weights, and how to tell what data can know.
 #
-# **What you need.** Chapters 1 and 4. About 90 minutes up to *Free the sphere*; the parts marked *further* are a second and a third evening.
+# **What you need.** Chapters 1 and 4. About 90 minutes, in two sittings if you like, the second from *Let the outliers speak for themselves* on; the parts marked *further*
+# take as long again.
 
 # %% notation [markdown]
 # | letter | meaning |

@@ -9,8 +9,9 @@
 # accuracy in motion is a matter of time first.
 #
 # **What you need.** Chapter 1, the singular value decomposition by name. About 90
-# minutes; the parts marked *further* come on top: stations that move and errors over
-# speed, 25 minutes each, and the whole cell at the end, 30 minutes.
+# minutes; the parts marked *further* come on top: the report's two errors, stations
+# that move, other methods and errors over speed, 50 minutes together, and the whole
+# cell at the end, 30 minutes.
 
 # %% notation [markdown]
 # | letter | meaning |
@@ -237,7 +238,7 @@ def translation_lsq(A, B, R):
 
 
 # %% errors [markdown]
-# ## Two errors, taken at their word
+# ## Two errors, taken at their word (*further*)
 #
 # With $v$ the null vector (of length 1) and $N$ the number of motions, the report
 # measures its fit by $E_{rot} = \frac{1}{N-1}\lVert M^\top M\,v \rVert$ (13) and
@@ -369,8 +370,8 @@ spread = ex.spread(spread)
 # ## Against the document
 #
 # Appendix D checks itself: six times an average less five entries is the sixth. And
-# since the mean $\bar e$ of $N$ distances never exceeds their root mean square,
-# $E_{trans} \ge \bar e \sqrt{N} / (N - 1)$ with $\bar e = 2.67$ mm and $N = 20$: a row
+# since the mean $\bar e$ of $N$ distances never exceeds their root mean square, the
+# error of *Two errors, taken at their word* obeys $E_{trans} \ge \bar e \sqrt{N} / (N - 1)$ with $\bar e = 2.67$ mm and $N = 20$: a row
 # of $K_1 t - K_2$ and the translation error of a motion differ by a rotation only, so
 # they are equally long. (The report left out some poses, and does not say how many;
 # with $N = 19$ the bound is 3 % higher.)
@@ -534,7 +535,7 @@ knock = ex.knock(knock)
 # $E_{trans}$ sees what changes *within* a run, and nothing else.
 
 # %% beyond [markdown]
-# ## Beyond the document: can it be done better?
+# ## Beyond the document: can it be done better? (*further*)
 #
 # The report solves the rotation first, then the translation; so do most methods of
 # OpenCV. The figure shows seven methods beside the Cramér-Rao bound, which no unbiased

@@ -6,7 +6,7 @@
 # **What you will learn.** How a start decides what a search finds, why geometry can matter more than the sensor, what the time step does to a motion model, and why
 # odometry that errs by two centimeters in its first meter is a meter off after fourteen.
 #
-# **What you need.** Derivatives, matrices, covariances; chapter 4 helps with Newton. About 80
+# **What you need.** Derivatives, matrices, covariances; chapter 4 helps with Newton. About 90
 # minutes; what is marked *further* goes beyond them.
 
 # %% notation [markdown]

@@ -12,7 +12,7 @@
 # | letter | meaning |
 # | --- | --- |
 # | $x$, $\Sigma$, in code `x`, `cov` | state and its covariance; $x^-$ before the correction |
-# | $A$, $B$, $C$ | the state follows itself, the control acts, the sensor sees; $A^\top$, in hints `A'`, is the transpose |
+# | $A$, $B$, $C$ | the state follows itself, the control acts, the sensor sees; $A^\top$, in hints Aᵀ, is the transpose |
 # | $\Sigma_u$, $\Sigma_z$ | covariances of control and measurement |
 # | $\Sigma_v$, in code `cov_v` | noise of the system in one step, here $B \Sigma_u B^\top$ |
 # | $y = z - Cx^-$, $S$ | innovation (what surprises) and its covariance |

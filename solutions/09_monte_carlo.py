@@ -3,13 +3,14 @@
 #
 # **What you will do.** Find a robot in a building with a cloud of guesses: move them, weigh them by a laser scan,
 # redraw them. Then carry the robot
-# away, and catch four bugs that published code really had.
+# away; further on, catch four bugs that published code really had.
 #
 # **What you will learn.** Why weights live in logarithms, why two models of the same scanner disagree, what
 # resampling costs, why a mean can lie in a
 # wall, and how a filter notices that it is lost.
 #
-# **What you need.** Chapter 7 (motion models) and the normal distribution. About 90 minutes.
+# **What you need.** Chapter 7 (motion models) and the normal distribution. About 90 minutes;
+# what is marked *further* comes on top, the bug hunt alone with some 20.
 
 # %% notation [markdown]
 # | letter | meaning |
@@ -108,9 +109,9 @@ def sample_motion(states, u, dt, std_u, rng):
 
 
 # %% landmarks [markdown]
-# ## Weighing by landmarks
+# ## Weighing by landmarks (*further*)
 #
-# A landmark $j$ is measured at range $r_j$ and bearing $\varphi_j$. How probable is that, seen from a particle?
+# The robot of this chapter has a laser, that of the soccer field below sees landmarks. A landmark $j$ is measured at range $r_j$ and bearing $\varphi_j$. How probable is that, seen from a particle?
 # Multiply both normal densities over all landmarks
 # (slide *Landmarkbasiertes Verfahren (2)*). Return the **logarithm**. And mind the seam: a bearing of 179° and one of
 # −179° differ by 2°
@@ -388,7 +389,7 @@ print(f"heaviest cluster     x = {mode[0]:.1f}, y = {mode[1]:.1f}, cell "
       f"{words[int(grid.at(mode[:2]))]}")
 
 # %% soccer [markdown]
-# ## Against the document: the soccer field
+# ## Against the document: the soccer field (*further*)
 #
 # The lecture's example (slides *Beispiel (1)*, *(2)* behind the landmark model): an Aibo robot among six landmarks, and
 # three paths, the true one, odometry, and MCL. The start is known here: *local* localization. Numbers were never
@@ -488,7 +489,7 @@ for name, one in (("laser", sensors.Scanner()), ("camera", sensors.XTION)):
 # cell, and look.
 
 # %% beyond [markdown]
-# ## Beyond the document: fewer particles when fewer will do
+# ## Beyond the document: fewer particles when fewer will do (*further*)
 #
 # The drives here and in the arena have the noise of the lecture's *example* (slides *Fehlermodell für Steuerbefehl
 # (1)*, *(2)*): 5 cm per meter, 5° per turn, 2° per meter. The circle of chapters 7 and 8 has its simulation's 2 cm.
@@ -515,7 +516,7 @@ turn = abs(planar.wrap_angle(run[-1].estimate[2] - run[-1].truth[2]))
 print("found" if error < 0.3 and turn < np.deg2rad(10) else "lost", "at the end")
 
 # %% bug-hunt [markdown]
-# ## Bug hunt
+# ## Bug hunt (*further*)
 #
 # Everybody makes these mistakes: each specimen below has a defect that published robotics code really had, rewritten,
 # no names. None raises an error on

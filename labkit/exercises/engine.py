@@ -17,6 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from . import arguments, cases, guard, metrics, operands, quantities, relations, scope, shapes, slips
+from .typeset import typeset
 
 TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
 NOISY = "exact on clean data, but the data are not weighed as they should be: on noisy data"
@@ -43,7 +44,7 @@ class Outcome:
     printed: str = ""
 
     def __post_init__(self):
-        object.__setattr__(self, "text", guard.printable(self.text))
+        object.__setattr__(self, "text", guard.printable(typeset(self.text)))
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,8 @@ class Item:
         hints = getattr(self, "hints", None)
         if hints is not None and (isinstance(hints, str) or len(hints) != 3):
             raise ValueError(f"exercise {self.id!r} needs exactly three hints, got {len(hints)}")
+        if hints is not None:
+            object.__setattr__(self, "hints", tuple(map(typeset, hints)))
         if hasattr(self, "mistakes"):
             object.__setattr__(self, "mistakes", _with_ids(self.id, self.mistakes))
 
@@ -82,9 +85,9 @@ def _with_ids(exercise, mistakes):
     """The mistakes, each with an id of its own: that of its sentence, numbered where several variants share it."""
     named = []
     for mistake in mistakes:
-        words = f"{exercise}-{hashlib.sha256(mistake.text.encode()).hexdigest()[:6]}"
-        same = sum(other.text == mistake.text for other in named)
-        named.append(replace(mistake, id=mistake.id or (f"{words}-{same + 1}" if same else words)))
+        words, text = f"{exercise}-{hashlib.sha256(mistake.text.encode()).hexdigest()[:6]}", typeset(mistake.text)
+        same = sum(other.text == text for other in named)
+        named.append(replace(mistake, text=text, id=mistake.id or (f"{words}-{same + 1}" if same else words)))
     return tuple(named)
 
 

@@ -279,7 +279,7 @@ class Rotations(Metric):
             return [Deviation("the rotation", entry, "in its largest entry", allowed)]
         angle = float(np.rad2deg(np.max(frames.rotation_angle(np.swapaxes(R, -1, -2) @ expected), initial=0.0)))
         tol = max(self.deg, 2e-3) if single else self.deg
-        return [Deviation("the rotation", angle, "deg", tol), Deviation("R'R - I", skewness, "", max(allowed, 1e-9))]
+        return [Deviation("the rotation", angle, "deg", tol), Deviation("RᵀR - I", skewness, "", max(allowed, 1e-9))]
 
 
 def _are_rotations(matrices):

@@ -116,7 +116,7 @@ def _rotation_kind(matrices, what):
     """What keeps matrices from being rotations, if anything does."""
     sheared = max(np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).max(initial=0.0) for r in matrices)
     if sheared > 1e-3:
-        return f"your {what} is not orthonormal: R'R differs from I by {sheared:.2g}"
+        return f"your {what} is not orthonormal: RᵀR differs from I by {sheared:.2g}"
     if any((np.linalg.det(r) < 0).any() for r in matrices):
         return f"your {what} is a reflection, its determinant is -1: one axis points the wrong way"
     return None

@@ -11,6 +11,7 @@ import pytest
 
 from labkit.exercises import metrics, session, source
 from labkit.exercises.engine import CORRECT, NOT_YET, TO_DO, Exercise, Prediction, Value
+from labkit.exercises.typeset import typeset
 
 CHAPTERS = session.chapters()
 ITEMS = [(chapter, item) for chapter in CHAPTERS for item in chapter.items]
@@ -132,6 +133,25 @@ def test_the_last_hint_is_right_when_typed_as_it_stands(chapter, item):
     exec(f"def {item.id}({parameters[item.id]}):\n{textwrap.indent(typed(item.hints[-1]), '    ')}", known)
     outcome = item.judge(known[item.id], rng=np.random.default_rng(0))
     assert outcome.status == CORRECT, outcome.text
+
+
+def test_what_takes_more_than_three_lines_gets_its_steps_between_formula_and_code():
+    """The second hint says what comes after what, which takes some words; whether the right ones, a reader sees."""
+    for _, item in EXERCISES:
+        if len(item.hints[2].strip("`").splitlines()) > 3:
+            assert len(item.hints[1].split()) >= 20, (item.id, item.hints[1])
+
+
+def test_hints_and_texts_write_the_transpose_as_the_notebook_does():
+    """A raised T outside of code; a prime means the next state there, and says nothing of rows and columns."""
+    for _, item in EXERCISES + VALUES:
+        for text in (*item.hints, *(mistake.text for mistake in item.mistakes)):
+            words = "".join(text.split("`")[::2])
+            assert not re.search(r"\^T\b|\^-1\b|\b([A-Zjr]|cov|F_[xu])'(?! =|s\b)", words), text
+
+
+def test_what_is_typed_with_a_caret_is_shown_raised_but_not_in_code():
+    assert typeset("K = cov C^T S^-1, or `C^T`: 2^-10, A^Tx") == "K = cov Cᵀ S⁻¹, or `C^T`: 2^-10, A^Tx"
 
 
 def test_hints_do_not_repeat():

@@ -121,6 +121,13 @@ def _not_rejected(a, b):
     return _columns(x, y, np.cross(x, y))
 
 
+def _split_alike(a, b):
+    """The rotation nearest to both edges at length 1: it bends x and y alike."""
+    x, y = a / np.linalg.norm(a), b / np.linalg.norm(b)
+    U, _, Vt = np.linalg.svd(_columns(x, y, np.cross(x, y)))
+    return U @ Vt
+
+
 def _long_z(a, b):
     R = frames.gram_schmidt(a, b)
     return _columns(R[:, 0], R[:, 1], np.cross(a, b))
@@ -476,6 +483,12 @@ CHAPTER = Chapter(
                     "The part along a is (b . a)/(a . a) a. You divide by the length of a once, it takes the square (or a normalized a).",
                 ),
                 Mistake(
+                    _split_alike,
+                    "This is the rotation nearest to both edges: it turns x and y by half the error each. Gram-Schmidt keeps the "
+                    "direction of a, and takes only what b has across it.",
+                    id="gram-schmidt-nearest",
+                ),
+                Mistake(
                     _long_z,
                     "x and y are right, but your z is a cross b, whose length is the area between the edges: take x cross y, or normalize.",
                     id="gram-schmidt-long-z",
@@ -538,7 +551,7 @@ CHAPTER = Chapter(
             metric=metrics.Poses(1e-6, 1e-6),
             hints=(
                 "A pose is a rotation (which way the axes point) and a translation (where the origin is).",
-                "The two directions are x_point - origin and y_point - origin; gram_schmidt makes axes of them.",
+                "The two directions are x_point - origin and y_point - origin; gram_schmidt makes axes of them. Start with np.eye(4), and fill in its block and its last column.",
                 "`T = np.eye(4)\nT[:3, :3] = gram_schmidt(x_point - origin, y_point - origin)\nT[:3, 3] = origin\nreturn T`",
             ),
             mistakes=[

@@ -125,6 +125,17 @@ def _columns_normalized(T):
     return _with_rotation(T, R / np.linalg.norm(R, axis=0))
 
 
+def _normalized_first(axis):
+    """The rotation nearest to the columns (axis 0) or rows (axis 1) at length 1."""
+
+    def variant(T):
+        R = T[:3, :3]
+        U, _, Vt = np.linalg.svd(R / np.linalg.norm(R, axis=axis, keepdims=True))
+        return _with_rotation(T, U @ Vt)
+
+    return variant
+
+
 def _rows_normalized(T):
     R = T[:3, :3]
     return _with_rotation(T, R / np.linalg.norm(R, axis=1, keepdims=True))
@@ -328,7 +339,7 @@ CHAPTER = Chapter(
             metric=metrics.Poses(1e-6, 1e-6),
             hints=(
                 "Neighboring letters cancel: T_AB T_BC T_CD = T_AD. Where does a link that has just been measured go, to the left or to the right?",
-                "Start with the identity and multiply each link from the right, in the order given.",
+                "Start with the identity and multiply each link from the right, in the order given: a loop over the links that keeps the product.",
                 "`T = np.eye(4)\nfor link in transforms:\n    T = T @ link\nreturn T`",
             ),
             mistakes=[
@@ -786,6 +797,15 @@ CHAPTER = Chapter(
                 Mistake(
                     _rows_normalized,
                     "The rows have length 1, but they are still not perpendicular.",
+                ),
+                *(
+                    Mistake(
+                        _normalized_first(axis),
+                        f"You made the {what} length 1 before the SVD. The result is a rotation, but another one is nearest to R "
+                        "as it stands: U Vᵀ alone sets all lengths right.",
+                        id=f"orthonormalize-{what}-first",
+                    )
+                    for axis, what in enumerate(("columns", "rows"))
                 ),
                 Mistake(
                     lambda T: _with_rotation(T, T[:3, :3] / np.linalg.norm(T[:3, :3], axis=1)),

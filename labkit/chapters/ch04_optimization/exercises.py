@@ -614,7 +614,7 @@ CHAPTER = Chapter(
             fixed={"g": TWO, "H": TWO},
             hints=(
                 "First order first: only a place where the gradient vanishes is a candidate at all.",
-                "Second order: the signs of the eigenvalues of H tell how f bends along its two main directions.",
+                "First order: is |g| above 1e-6? Then second order: the signs of the eigenvalues of H, `np.linalg.eigvalsh(H)`, tell how f bends along its two main directions.",
                 '`if np.linalg.norm(g) > 1e-6:\n    return "not stationary"\ne = np.linalg.eigvalsh(H)\n'
                 'return "minimum" if (e > 0).all() else "maximum" if (e < 0).all() else "saddle"`',
             ),

@@ -768,7 +768,7 @@ LITERATURE = [
         metric=metrics.Several(metrics.Numbers(1e-6, "mm"), metrics.Numbers(1e-6, "mm"), names=("t_FS", "target")),
         hints=(
             "With R_FS known, (2-40) is linear in what is left: t_FS and the target, six numbers.",
-            "Each pose gives R_BF t_FS − target = −(t_BF + R_BF R_FS x_S), three rows: R_BF beside −I.",
+            "Each pose gives R_BF t_FS − target = −(t_BF + R_BF R_FS x_S), three rows: R_BF beside −I. Stack the rows of all poses, and solve for six numbers by least squares.",
             "`R, t = T_BF[:, :3, :3], T_BF[:, :3, 3]\nrows = np.vstack([np.hstack([R_i, -np.eye(3)]) for R_i in R])\n"
             "right = np.concatenate([-(t_i + R_i @ R_FS @ x) for R_i, t_i, x in zip(R, t, x_S)])\n"
             "u = np.linalg.lstsq(rows, right, rcond=None)[0]\nreturn u[:3], u[3:]`",

@@ -961,7 +961,7 @@ CHAPTER = Chapter(
                    "exact on clean data, but on noisy data"),
             hints=(
                 "Forget for a moment that R_FS is a rotation: then all unknowns enter linearly.",
-                "R_FS x + t_FS - R_BF^T target = -R_BF^T t_BF. Fifteen unknowns: nine of R_FS, three of t_FS, three of the target.",
+                "R_FS x + t_FS - R_BF^T target = -R_BF^T t_BF. Fifteen unknowns: nine of R_FS, three of t_FS, three of the target. A pose gives three rows: `np.kron(np.eye(3), x)` for R_FS row by row, then `np.eye(3)`, then -R_BF^T. Solve all rows, and take `nearest_rotation` of the first nine.",
                 "`A = np.vstack([np.hstack([np.kron(np.eye(3), x), np.eye(3), -T[:3, :3].T]) for T, x in zip(T_BF, x_S)])\n"
                 "b = np.concatenate([-T[:3, :3].T @ T[:3, 3] for T in T_BF])\n"
                 "u = np.linalg.lstsq(A, b, rcond=None)[0]\n"
@@ -1013,6 +1013,9 @@ CHAPTER = Chapter(
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.std(r)))), "Your scale is the standard deviation of the lengths: the outliers stretch it. Take the median length / 1.538."),
                 Mistake(_weights(lambda r: _tukey(r / (5 * 1.4826 * np.median(np.abs(r - np.median(r)))))),
                         "Your scale is the median distance of the lengths from their median (MAD). A length is itself a distance, from 0: take its median / 1.538."),
+                Mistake(_weights(lambda r: _tukey(r / (5 * np.median(np.abs(r - np.median(r))) / robust.MEDIAN_CHI3))),
+                        "You took the median distance of the lengths from their median (MAD). A length is itself a distance, from 0: divide its own median by 1.538.",
+                        id="robust-weights-mad-1538"),
                 Mistake(_weights(lambda r: 1 - _tukey(r / (5 * np.median(r) / robust.MEDIAN_CHI3))), "Turned around: good poses get weight 1, gross ones 0."),
                 Mistake(_weights(lambda r: np.clip(1 - r / (5 * np.median(r) / robust.MEDIAN_CHI3), 0, None) ** 2), "Inside the bracket u is squared: (1 - u^2)^2."),
                 Mistake(_weights(lambda r: np.minimum(1, np.median(r) / robust.MEDIAN_CHI3 * 1.345 / r)), "These are Huber's weights, which never reach zero. Tukey's do: (1 - u^2)^2 below u = 1, else 0."),
@@ -1046,7 +1049,7 @@ CHAPTER = Chapter(
             properties=(lambda student, rng: _judge_printed(student),),
             hints=(
                 "Two questions: which rows do not fit a robust calibration, and which single slip explains each of them?",
-                "`misprints.explanations(entries, pose, T_FS, target, std)` tries every slip of a row and puts the most credible first.",
+                "Fit the entries robustly. Rows whose residual is longer than 6 `fit.std` are suspects: `misprints.explanations(entries, pose, T_FS, target, std)` tries every slip of a row and puts the most credible first.",
                 "`m = thesis.measurements_from(entries)\n"
                 "fit = hand_eye.calibrate_sphere_target(m.T_BF, m.x_S, robust=True)\n"
                 "bad = np.flatnonzero(np.linalg.norm(fit.residuals, axis=1) > 6 * fit.std)\n"

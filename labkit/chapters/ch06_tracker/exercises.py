@@ -726,7 +726,7 @@ CHAPTER = Chapter(
             metric=metrics.Rotations(1e-5),
             hints=(
                 "The singular vector of the smallest singular value, put back into a 3 x 3 matrix column by column.",
-                'Vt[-1].reshape(3, 3, order="F"); its sign is free, so make the determinant positive; then the nearest rotation by a second SVD.',
+                'Vt[-1].reshape(3, 3, order="F"); its sign is free, so make the determinant positive; then the nearest rotation, U times Vt of a second SVD.',
                 "`Vt = np.linalg.svd(M)[2]\n"
                 "X = Vt[-1].reshape(3, 3, order='F')\n"
                 "X *= np.sign(np.linalg.det(X))\n"
@@ -1191,7 +1191,7 @@ CHAPTER = Chapter(
             metric=metrics.Poses(0.002, 0.02),
             hints=(
                 "Put your own functions in a row: blocks, rotation, translation. A pose that `kept` excludes must not take part.",
-                "A_kept, B_kept = A[kept][1:], B[kept][1:] are the motions that take part: kept poses, without the reference itself.",
+                "A_kept, B_kept = A[kept][1:], B[kept][1:] are the motions that take part: kept poses, without the reference itself. A kron_row of each motion, stacked; then the rotation, then the translation; both go into a 4x4 identity.",
                 "`A_kept, B_kept = A[kept][1:], B[kept][1:]\n"
                 "M = np.concatenate([kron_row(a[:3, :3], b[:3, :3]) for a, b in zip(A_kept, B_kept)])\n"
                 "R = rotation_from_nullvector(M)\n"
@@ -1427,12 +1427,15 @@ CHAPTER = Chapter(
         *beyond.CELL,
     ],
     further=(
+        "e_rot",
+        "e_trans",
         "mean_quaternion",
         "sweep",
         "ray_direction",
         "nearest_to_rays",
         "moved",
         "knock",
+        "methods",
         "tempo",
         "static_error_and_lag",
         "moved_part",

@@ -567,7 +567,7 @@ CHAPTER = Chapter(
             metric=metrics.Numbers(1e-8, "m"),
             hints=(
                 "Replace the residuals by their tangent planes, go to where those are zero, repeat.",
-                "Row i of the Jacobian is 2 (position - landmark_i). The step solves J step = -residual.",
+                "Row i of the Jacobian is 2 (position - landmark_i). The step solves J step = -residual. Twenty times over: Jacobian and residual of the present position, then the step.",
                 "`position = start\n"
                 "for _ in range(20): position = position - np.linalg.solve(2 * (position - landmarks), lateration_residual(landmarks, distances, position))\n"
                 "return position`",

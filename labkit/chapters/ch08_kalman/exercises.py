@@ -356,6 +356,14 @@ def measurement(x, landmark):
     return ekf.measurement(x, np.atleast_2d(landmark))[0]
 
 
+def _bearing_by_arccos(wrap):
+    def variant(x, landmark):
+        d = landmark - x[:2]
+        return np.array([np.hypot(*d), wrap(np.arccos(d[0] / np.hypot(*d)) - x[2])])
+
+    return variant
+
+
 def measurement_jacobian(x, landmark):
     return ekf.measurement_jacobian(x, np.atleast_2d(landmark))[0]
 
@@ -689,7 +697,11 @@ CHAPTER = Chapter(
                     _updated(cov=lambda P, K, C: P - K @ C),
                     "The last factor is missing: what is taken away is K C cov.",
                 ),
-                Mistake(_joseph(-1), "Joseph's form has a plus: the sensor's noise K cov_z K' comes in again."),
+                Mistake(
+                    _joseph(-1),
+                    "Joseph's form has a plus: the sensor's noise K cov_z K^T comes in again.",
+                    id="update-ee7d3e",
+                ),
                 Mistake(
                     _updated(gain=lambda P, C, R: _gain(P, C, np.diag(np.diag(R)))),
                     "You took the diagonal of cov_z alone. Noises that belong together have entries beside it.",
@@ -777,7 +789,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _updated(cov=lambda P, K, C: (np.eye(len(P)) - K @ C) @ P @ (np.eye(len(P)) - K @ C).T),
-                    "Half of Joseph's form: K cov_z K' is missing. Or leave the last factor out: (I - K C) cov.",
+                    "Half of Joseph's form: K cov_z K^T is missing. Or leave the last factor out: (I - K C) cov.",
+                    id="update-076e3e",
                 ),
                 Mistake(
                     lambda x, P, z, C, R: (
@@ -984,7 +997,7 @@ CHAPTER = Chapter(
                         _never_corrected(n),
                         "The correction is missing in your loop, cov = (I - K C) cov: this is the gain of a filter that has never measured before.",
                     )
-                    for n in (100, 200, 300, 500, 1000)
+                    for n in (100, 200, 300, 500, 1000, 2000, 3000, 5000)
                 ),
                 Mistake(
                     lambda A, C, Q, R: kalman.steady_state(A, C, Q, R).gain.T,
@@ -1239,6 +1252,15 @@ CHAPTER = Chapter(
                     lambda x, l: np.array([measurement(x, l)[0], np.arctan(np.divide(*(l - x[:2])[::-1])) - x[2]]),
                     "np.arctan cannot tell left from right of the y axis: np.arctan2(dy, dx) can. And the bearing has to be wrapped.",
                 ),
+                *(
+                    Mistake(
+                        _bearing_by_arccos(wrap),
+                        "An arccosine knows no sign: it sees a landmark on the left and one on the right in the same direction. "
+                        "np.arctan2(dy, dx) tells them apart.",
+                        id=f"measurement-arccos-{name}",
+                    )
+                    for name, wrap in (("wrapped", wrapped), ("plain", float))
+                ),
                 Mistake(lambda x, l: measurement(x, l)[::-1], "The order is distance, bearing."),
                 Mistake(
                     lambda x, l: measurement(x, l) * [measurement(x, l)[0], 1],
@@ -1306,7 +1328,7 @@ CHAPTER = Chapter(
             ],
             hints=(
                 "Move the robot a little toward the landmark, then across, then turn it. What do distance and bearing do?",
-                "Row 0: (-dx/r, -dy/r, 0). Row 1: (dy/q, -dx/q, -1) with q = r^2.",
+                "Row 0: (-dx/r, -dy/r, 0). Row 1: (dy/q, -dx/q, -1) with q = r^2. Compute dx, dy, q and r first, then write both rows as one array.",
                 "`dx, dy = landmark - x[:2]\n"
                 "q = dx**2 + dy**2\n"
                 "r = np.sqrt(q)\n"
@@ -1525,7 +1547,7 @@ CHAPTER = Chapter(
             metric=metrics.Several(metrics.PlanarPoses(1e-7), metrics.Numbers(1e-7), names=("pose", "covariance")),
             hints=(
                 "The pose takes the motion model itself, only its covariance takes G_x and G_u. Then correct: the innovation takes the measurement itself, gain and covariance take H in place of C.",
-                "The Jacobian H and the expected measurement belong to the predicted pose; the bearing innovation is wrapped.",
+                "Jacobians at the old pose; the pose by `odometry.step(x, u, dt, 'euler')`, its covariance by both Jacobians. Then, at the predicted pose, H and the expected measurement; the innovation, its bearing wrapped; gain and correction as in `update`.",
                 "`G_x, G_u = motion_jacobians(x, u, dt)\n"
                 "x = odometry.step(x, u, dt, 'euler')\n"
                 "cov = G_x @ cov @ G_x.T + G_u @ cov_u @ G_u.T\n"

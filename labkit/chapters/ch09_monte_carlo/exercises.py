@@ -498,6 +498,16 @@ def _field_cells(grid, pose, ranges, bearings, std):
     return float(_normal_log(d, std).sum())
 
 
+def _field_shrunk(grid, pose, ranges, bearings, std):
+    d = grid.distance[grid.cell_of(_end_points(pose, ranges, bearings))] * grid.resolution
+    return float(_normal_log(d, std).sum())
+
+
+def _field_in_degrees(grid, pose, ranges, bearings, std):
+    angle = np.rad2deg(pose[2] + bearings)
+    return _field(grid, pose[:2] + ranges[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]), std)
+
+
 def _field_mean(grid, pose, ranges, bearings, std):
     return distance_field_weight(grid, pose, ranges, bearings, std) / len(ranges)
 
@@ -576,6 +586,14 @@ RESAMPLING_SLIPS = (
         "Compare with the share `threshold` itself, not with 1 - threshold.",
     ),
     (
+        lambda w, t: w.var() > t,
+        "You compare the variance of the weights, which grows with their size, with a share: compare effective_size(weights).",
+    ),
+    (
+        lambda w, t: w.max() / w.sum() > t,
+        "You compare the share of the heaviest particle. Many of middling weight can be worth few as well: effective_size(weights).",
+    ),
+    (
         lambda w, t: w.sum() < t * len(w),
         "You compare the sum of the weights. Compare effective_size(weights).",
     ),
@@ -601,6 +619,28 @@ def _spin(weights, rng, scale=None, shift=0):
     """Indices by independent spins up to `scale` (by default the sum of the weights), moved by `shift`."""
     ends = np.cumsum(weights)
     return np.searchsorted(ends, rng.random(len(ends)) * (ends[-1] if scale is None else scale)) + shift
+
+
+def _searched_in_shares(weights, rng):
+    """The slip of looking for the spin among the shares themselves, kept inside the array afterwards."""
+    return np.clip(np.searchsorted(weights / weights.sum(), rng.random(len(weights))), 0, len(weights) - 1)
+
+
+def _spokes_to_the_end(weights, rng):
+    """Spokes from 0 to W, both included, before the turn."""
+    ends, m = np.cumsum(weights), len(weights)
+    return np.minimum(np.searchsorted(ends, (rng.random() / m + np.linspace(0, 1, m)) * ends[-1]), m - 1)
+
+
+def _one_step_a_spoke(weights, rng):
+    """`if` in place of `while`: a spoke passes one end at most."""
+    m, i, end, found = len(weights), 0, weights[0], []
+    first = rng.random() * weights.sum() / m
+    for k in range(m):
+        if first + k * weights.sum() / m > end and i < m - 1:
+            i, end = i + 1, end + weights[i + 1]
+        found.append(i)
+    return np.array(found)
 
 
 def _turn(weights, places, scale=None):
@@ -812,6 +852,11 @@ def _noise_is_right(move, rng):
     found = moved.std(0)
     for name, unit, amount, wanted in (("x", "m", found[0], dt * std_u[0]), ("theta", "rad", found[2], dt * std_u[1])):
         if abs(amount - wanted) > 0.1 * wanted:
+            if abs(amount * dt - wanted) < 0.1 * wanted:
+                return (
+                    f"4000 particles spread in {name} by std_u itself, whatever dt is: the noise was added to the pose, or "
+                    "after the step. It belongs to the control."
+                )
             return (
                 f"4000 particles spread by {amount:.3f} {unit} (standard deviation) in {name} after one step of {dt} s with "
                 f"std_u = {std_u.tolist()}, expected {wanted:.3f} {unit}."
@@ -1064,7 +1109,7 @@ CHAPTER = Chapter(
             limit=IMPORTS,
             hints=(
                 "What range and what bearing would a robot at this pose expect? Compare them with z.",
-                "The bearing is atan2(dy, dx) - theta. Wrap the *difference*, then add the logarithms of both normal densities.",
+                "The bearing is atan2(dy, dx) - theta. Wrap the *difference* of measured and expected, then add the logarithms of both normal densities, of all landmarks.",
                 "`dx, dy = (landmarks - pose[:2]).T\n"
                 "e = z[:, 0] - np.hypot(dx, dy)\n"
                 "f = planar.wrap_angle(z[:, 1] - np.arctan2(dy, dx) + pose[2])\n"
@@ -1259,7 +1304,7 @@ CHAPTER = Chapter(
             ],
             hints=(
                 "Walk along the ray in steps smaller than a cell, and stop in the first occupied one.",
-                "The direction is theta + bearing. grid.at([x, y]) says what is there; maps.OCCUPIED is an obstacle.",
+                "The direction is theta + bearing. Walk along it in steps of half a cell: grid.at([x, y]) says what is there, and the first maps.OCCUPIED ends the beam. If none comes, r_max.",
                 "`a = pose[2] + bearing\n"
                 "r = np.arange(0, r_max, grid.resolution / 2)\n"
                 "xy = pose[:2] + r[:, None] * [np.cos(a), np.sin(a)]\n"
@@ -1391,6 +1436,16 @@ CHAPTER = Chapter(
                     "The factor 1 / (std sqrt(2 pi)) stands once in each density: as many times as there are beams.",
                 ),
                 Mistake(_field_cells, "The distances are in meters already: do not divide by the resolution."),
+                Mistake(
+                    _field_shrunk,
+                    "The distances are in meters already: do not multiply by the resolution.",
+                    id="field-times-resolution",
+                ),
+                Mistake(
+                    _field_in_degrees,
+                    "np.cos and np.sin take radians, and the bearings are in radians: leave them as they come.",
+                    id="field-degrees",
+                ),
                 Mistake(_field_mean, "You took the mean over the beams. The logarithms add up."),
                 Mistake(_field_probability, "This is p itself, which underflows with many beams. Return log p."),
                 Mistake(_field_no_peak, "The factor 1 / (std sqrt(2 pi)) of each beam is missing."),
@@ -1442,9 +1497,16 @@ CHAPTER = Chapter(
                     lambda w, rng: rng.multinomial(len(w), w / w.sum()),
                     "These are counts, how often each particle comes out. Asked for are the indices: np.repeat makes them.",
                 ),
-                Mistake(
-                    lambda w, rng: np.searchsorted(w, rng.random(len(w))),
-                    "You searched in the weights. Search in their running sum, np.cumsum(weights).",
+                *(
+                    Mistake(
+                        variant,
+                        "You searched in the weights. Search in their running sum, np.cumsum(weights).",
+                        id=id,
+                    )
+                    for variant, id in (
+                        (lambda w, rng: np.searchsorted(w, rng.random(len(w))), "resample_roulette-e49150"),
+                        (_searched_in_shares, "roulette-searched-in-shares"),
+                    )
                 ),
                 Mistake(
                     lambda w, rng: np.searchsorted(np.cumsum(np.sort(w)), rng.random(len(w)) * w.sum()),
@@ -1498,6 +1560,16 @@ CHAPTER = Chapter(
                         np.searchsorted(np.cumsum(w), (rng.random() + np.arange(len(w)) / len(w)) * w.sum()), len(w) - 1
                     ),
                     "You turn the wheel by up to W. One gap is enough, up to W / M: (rng.random() + np.arange(M)) / M.",
+                ),
+                Mistake(
+                    _spokes_to_the_end,
+                    "Your first and your last spoke stand one whole turn apart, as np.linspace does with its end point: M spokes are W / M apart.",
+                    id="systematic-end-point",
+                ),
+                Mistake(
+                    _one_step_a_spoke,
+                    "From one spoke to the next you go on by one particle at most. Light ones may be passed over: `while`, not `if`.",
+                    id="systematic-if",
                 ),
                 Mistake(_spin, "These are M independent spins, the roulette. Here one random number turns all spokes."),
                 Mistake(lambda w, rng: _turn(w, 0.0), "The wheel has not been turned: start with one random number."),
@@ -1599,7 +1671,7 @@ CHAPTER = Chapter(
                 "`return effective_size(weights) < threshold * len(weights)`",
             ),
             mistakes=[Mistake(slip, text) for slip, text in RESAMPLING_SLIPS],
-            draws=30,
+            draws=36,
         ),
         Exercise(
             "multiply_weights",
@@ -1961,7 +2033,7 @@ CHAPTER = Chapter(
             "While the weights add up to 1 it does no harm. Let their sum be a little less, and try several times: the last spoke must fall beyond it.",
             (
                 "On average it is right. What does it take for granted about the weights?",
-                "Floating-point weights need not add up to 1. Try a sum a little below 1, several times.",
+                "Floating-point weights need not add up to 1. Try a sum a little below 1, several times, with `except IndexError` around it, and look at the largest index.",
                 "`try:\n"
                 "    return all(resample(np.full(1000, 0.000999), rng).max() < 1000 for _ in range(20))\n"
                 "except IndexError:\n"
@@ -1976,7 +2048,7 @@ CHAPTER = Chapter(
             "With one reading, or by which particle is heavier, it looks right. What must a second reading do to the *ratio* of two weights?",
             (
                 "Independent readings multiply. What must happen when the same reading comes twice?",
-                "The ratio of two particles' weights must be squared.",
+                "Weigh two particles by one reading, then by the same reading of the same landmark twice: the ratio of their weights must be squared.",
                 "`x, mark = np.array([[0.0, 0, 0], [0.3, 0, 0]]), np.array([[2.0, 0]])\n"
                 "a, b = weigh(x, np.array([2.0]), mark, 0.3)\n"
                 "c, d = weigh(x, np.array([2.0, 2.0]), np.vstack([mark, mark]), 0.3)\n"
@@ -1992,8 +2064,5 @@ CHAPTER = Chapter(
             extra=(),
         ),
     ],
-    further=(
-        "multiply_weights",
-        "scan_from_depth",
-    ),
+    further=("landmark_weight", "multiply_weights", "scan_from_depth", "hunt_1", "hunt_2", "hunt_3", "hunt_4"),
 )

@@ -92,7 +92,8 @@ BOUND = Exercise(
     metric=metrics.Numbers(1e-9),
     hints=(
         "Move one number at a time by its half unit, up and down, and look at what f does.",
-        "Of the two moves of a number the larger one counts; the moves of all numbers add up, as absolute values.",
+        "For each number: f with it half a unit up, and f with it half a unit down. The larger of the two changes "
+        "counts; those of all numbers add up, as absolute values.",
         "`x = np.array([float(text.replace(',', '.')) for text in printed])\n"
         "found = 0.0\n"
         "for k, text in enumerate(printed):\n"
