@@ -5,6 +5,7 @@ controls    what one may declare: handles, sliders, choices, toggles, time, targ
 stage.js    the front end, the same in notebooks and on any other page
 front       a Stage in a notebook
 canvas      pictures drawn, compared and sent
+room        how a figure fits a place that is smaller than designed
 renderer    how it is drawn: words kept, colors for the dark theme
 scene3d     bodies, frames, points and paths in space; scene3d_solids what bodies are made of, scene3d_handles how
             handles move there; space.js draws them in the page and is made of web/space

@@ -11,6 +11,7 @@ pixels, against 12 ms by Pillow at level 1 and 9 ms as WebP.
 import io
 import struct
 import threading
+import warnings
 import zlib
 from time import monotonic
 
@@ -21,11 +22,13 @@ from PIL import Image
 
 from . import style
 from .renderer import Canvas
+from .room import LETTERS, LOW, NARROW, PANEL, SLENDER, Panels, Words, break_lines
 
 CSS_DPI = 100  # a figure inch is 100 CSS pixels: 10 pt text is as large as the notebook's own
 MAX_PIXELS = 5e6  # of a picture; beyond, a sharper screen gets fewer of its pixels
-MIN_SCALE = 0.85  # a narrower or lower place shrinks the whole picture, letters too, instead of crowding it further
-MAX_STRETCH = 1.45  # a low place makes the picture so much wider than designed, but no wider
+ROOMY = 0.85  # of the designed size: down to it letters keep their size, and below as much of it as they can
+MAX_STRETCH = 1.6  # a low place makes the picture so much wider than designed, but no wider
+WIDEST = 3.2  # width of panels that a low place puts beside each other, as a multiple of their height
 STORED_WIDTH, STORED_COLORS = 700, 48  # pixels and colors of a picture in a file
 RING = 13  # points across the ring of a handle in such a picture
 MAX_CHANGES = 150_000  # pixels, four bytes each; beyond, decoding a whole picture is the quicker way
@@ -62,6 +65,8 @@ class Picture:
             artist.set_in_layout(False)  # what moves must not push the axes about
         self._backgrounds, self._sent = {}, None  # a background a theme
         self._heading = None
+        self.panels, self._words = Panels(self.fig), None  # how they stand, and how far apart they were designed
+        self._moving = set(self.artists)
         self.draw_seconds = 0.0
         self.spaces = [ax.space for ax in self.fig.axes if hasattr(ax, "space")]
         self._in_space = {id(artist) for space in self.spaces for artist in space.artists}
@@ -104,16 +109,51 @@ class Picture:
             return
         self._room = room
         width, height, ratio, letters = room
-        aspect = self.size[1] / self.size[0]
-        height = min(height, width * aspect)
-        self.width, self.height = round(min(width, MAX_STRETCH * height / aspect)), round(height)
-        inches = np.array([self.width, self.height]) / (CSS_DPI * letters)
-        inches /= min(1.0, *(inches / (MIN_SCALE * np.array(self.size))))
-        ratio = min(max(ratio, 1.0), np.sqrt(MAX_PIXELS / (self.width * self.height)))
-        self.fig.set_dpi(self.width * ratio / inches[0])
-        self.fig.set_size_inches(*inches)
-        self.fig.set_layout_engine("constrained")
+        if self._words is None:
+            self._words = Words(self.fig)
+        whole = CSS_DPI * letters * np.array(self.size)
+        narrow, low = width < NARROW * whole[0], height < LOW * whole[1]
+        self.panels.arrange(self.panels.best(narrow, low))
+        break_lines(self.fig, narrow, self._moving)
+        self._take_shape(width, height, narrow)
+        least = min(1.0, *([self.width, self.height] / (ROOMY * whole)))
+        for share, growth in self._tries(least):
+            self._take_shape(width, height, narrow, growth)
+            self._scale(letters * share, min(max(ratio, 1.0), np.sqrt(MAX_PIXELS / (self.width * self.height))))
+            if least == 1 or self._fits():
+                break
         self._backgrounds = {}
+
+    def _take_shape(self, width, height, narrow, growth=0.0):
+        """Width and height (CSS pixels) of the picture in a room; panels under each other may grow beyond it."""
+        aspect = self.size[1] / self.size[0]
+        if self.panels.way == "column":
+            low, high = (share * self.panels.count * width for share in PANEL)
+            height = np.clip(height, low, high)
+            height += growth * (high - height)
+        elif self.panels.way == "row":
+            width = min(width, WIDEST * height)
+        else:
+            height = min(height, width * (max(aspect, SLENDER) if narrow else aspect))
+            width = min(width, MAX_STRETCH * height / aspect)
+        self.width, self.height = round(width), round(height)
+
+    def _tries(self, least):
+        """(size of the letters, growth) from the best to the one that always goes: all shrunk alike."""
+        if self.panels.way == "column":
+            return [(1.0, 0.0), *((share, 1.0) for share in LETTERS)]
+        return [*((share, 0.0) for share in LETTERS if share > least), (least, 0.0)]
+
+    def _scale(self, letters, ratio):
+        self.fig.set_dpi(CSS_DPI * letters * ratio)
+        self.fig.set_size_inches(self.width / (CSS_DPI * letters), self.height / (CSS_DPI * letters))
+        self.fig.set_layout_engine("constrained")
+
+    def _fits(self):
+        with style.rc(), warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            self._lay_out()
+            return not said and self._words.fit()
 
     def _draw_background(self):
         with style.rc():

@@ -34,7 +34,8 @@ titles. Artists are drawn in order of their zorder, always above the background.
 
 Looks. Colors come from `stage.style`; the dark theme is applied while drawing, nothing is to be done for it
 (colormapped images stay as they are). The axes are laid out once a size, with what the scene drew at first. Narrow
-cells crowd the picture to 85 % of `size` and then scale it down, so leave words that much room.
+cells crowd the picture to 85 % of `size`, so leave words that much room; below, `stage.room` puts panels under each
+other and takes the largest letters that leave the words apart.
 
 Tests need no browser: `stage.set(P=(3, 2))`, then `stage.result`, `stage.caption`, `stage.status`, `stage.png()`;
 `stage.make_it_fail()`, `stage.reset()`, `stage.press("name of a button")`.

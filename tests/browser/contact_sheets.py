@@ -1,7 +1,8 @@
-"""Every Stage in four sizes and two themes: `python tests/browser/contact_sheets.py OUT [NN ...] [--fail]`.
+"""Every Stage in four sizes and two themes, at first and failed: `python tests/browser/contact_sheets.py OUT [NN ...]`.
 
-Writes OUT/NN-light.png and OUT/NN-dark.png, a row a Stage and a column a size, and names what is cut or does not fit,
-what has no name or no ring, and what keys do not reach. Motion is reduced.
+Writes OUT/NN-light.png, NN-light-failed.png and the same of the dark theme, a row a Stage and a column a size, and
+names what is cut or does not fit, letters of the picture below 11 CSS pixels, what has no name or no ring, and what
+keys do not reach. Motion is reduced.
 The page is `stage.js` with Python behind it, as everywhere; it needs a Chromium, no JupyterLab.
 """
 
@@ -18,17 +19,20 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "browser")]
 
 import driver  # noqa: E402
 import nbformat  # noqa: E402
+from matplotlib.text import Text  # noqa: E402
 from PIL import Image, ImageDraw  # noqa: E402
 
 from labkit.book.notebook import stages_of  # noqa: E402
 from labkit.exercises import source  # noqa: E402
 
 SIZES = {  # width and height in CSS pixels, device pixels a CSS pixel
-    "a cell at 1440x900": (1150, 780, 1),
+    "1920x1080": (1620, 950, 1),
     "1280x720 at 150 %": (700, 359, 1.5),
     "half a screen, 900 px": (620, 650, 1),
     "a phone": (360, 640, 2),
 }
+LOOKS = ("light", "light-failed", "dark", "dark-failed")
+SMALLEST = 11  # CSS pixels of letters
 COLUMN, GAP, HEAD = 560, 12, 26  # pixels of a sheet
 COLORS = {False: ("#ffffff", "#1a1a1a"), True: ("#111111", "#e8e8e8")}
 MODEL = """
@@ -121,16 +125,23 @@ class Bridge:
 def stage_page(dark, width, height, ratio):
     """(page, bridge): an empty page that shows what `bridge.show(page, stage)` is given."""
     script = (ROOT / "labkit" / "stage" / "stage.js").read_text(encoding="utf-8").replace("export default", "//")
-    paper, words = COLORS[dark]
     bridge = Bridge()
     with driver.page_of(driver.find_browser(), dark, width, height, ratio, calm=True) as page:
         page.expose_function("toPython", bridge)
-        page.set_content("<!DOCTYPE html><title>sheets</title><body></body>")
-        look = f"body {{ margin: 0; background: {paper}; color: {words}; --words: {words}; --paper: {paper}; }}"
-        theme = f":root {{ color-scheme: {'dark' if dark else 'light'}; --jp-content-font-color1: {words}; }}"
-        page.add_style_tag(content=(ROOT / "labkit/stage/stage.css").read_text(encoding="utf-8") + look + theme)
+        page.set_content("<!DOCTYPE html><title>sheets</title><style id=theme></style><body></body>")
+        page.add_style_tag(content=(ROOT / "labkit/stage/stage.css").read_text(encoding="utf-8"))
         page.add_script_tag(content=f"{{{script}{MODEL}}}")
+        dress(page, dark)
         yield page, bridge
+
+
+def dress(page, dark):
+    """Give the page a theme."""
+    paper, words = COLORS[dark]
+    look = f".labkit-stage {{ --words: {words} !important; --paper: {paper} !important; }}"
+    look += f"body {{ margin: 0; background: {paper}; color: {words}; }}"
+    theme = f":root {{ color-scheme: {'dark' if dark else 'light'}; --jp-content-font-color1: {words}; }}"
+    page.evaluate("(words) => { document.getElementById('theme').textContent = words; }", look + theme)
 
 
 def stages(numbers):
@@ -143,23 +154,34 @@ def stages(numbers):
     return found
 
 
-def shots(found, dark, size, fail):
-    """{(stem, name): (picture, what is cut or cannot be heard or reached by keys)} in one theme and size."""
+def shots(found, size, said):
+    """{(theme, stem, name): picture} in one size; `said(stem, name, words)` hears what is cut, too small, or cannot be
+    heard or reached by keys.
+    """
     made = {}
-    with stage_page(dark, *SIZES[size]) as (page, bridge):
+    with stage_page(False, *SIZES[size]) as (page, bridge):
         for stem, names in found.items():
             module = importlib.import_module(f"labkit.chapters.ch{stem}.stages")
             for name in names:
                 stage = getattr(module, name)()
-                if fail:
-                    stage.make_it_fail()
-                bridge.show(page, stage)
-                picture = page.locator(".labkit-stage").screenshot()
-                wrong = [*page.evaluate(CUT), *page.evaluate(UNHEARD)]
-                made[stem, name] = Image.open(io.BytesIO(picture)).convert("RGB"), wrong
-        if page.complaints:
-            print("console:", *page.complaints, sep="\n  ")
+                for look in LOOKS:
+                    dress(page, look.startswith("dark"))
+                    (stage.make_it_fail if look.endswith("failed") else stage.reset)()
+                    bridge.show(page, stage)
+                    picture = page.locator(".labkit-stage").screenshot()
+                    made[look, stem, name] = Image.open(io.BytesIO(picture)).convert("RGB")
+                    for words in [*page.evaluate(CUT), *page.evaluate(UNHEARD), *small_letters(stage)]:
+                        said(stem, f"{name}, {look}, {size}", words)
+        for words in page.complaints:
+            print("console:", words)
     return made
+
+
+def small_letters(stage):
+    """What the picture writes in letters below SMALLEST."""
+    fig, ratio = stage.figure, stage.figure.bbox.width / stage._picture.width
+    sizes = [text.get_fontsize() * fig.dpi / 72 / ratio for text in fig.findobj(Text) if text.get_text().strip()]
+    return [f"letters of {min(sizes):.1f} px"] if sizes and min(sizes) < SMALLEST else []
 
 
 def sheet(rows):
@@ -183,20 +205,22 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("chapters", nargs="*")
-    parser.add_argument("--fail", action="store_true", help='after "Make it fail"')
-    parser.add_argument("--theme", choices=("light", "dark"), help="one of the themes alone")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
-    found = stages(options.chapters)
-    for dark in [theme == "dark" for theme in ("light", "dark") if options.theme in (None, theme)]:
-        made = {size: shots(found, dark, size, options.fail) for size in SIZES}
-        for stem, names in found.items():
-            rows = [(name, [made[size][stem, name][0] for size in SIZES]) for name in names]
-            sheet(rows).save(options.folder / f"{stem[:2]}-{'dark' if dark else 'light'}.png")
-            for size in SIZES:
-                for name in names:
-                    for said in made[size][stem, name][1]:
-                        print(f"{stem} {name}, {size}: {said}")
+    found, count = stages(options.chapters), 0
+
+    def said(stem, where, words):
+        nonlocal count
+        count += 1
+        print(f"{stem} {where}: {words}", flush=True)
+
+    for stem, names in found.items():
+        made = {size: shots({stem: names}, size, said) for size in SIZES}
+        for look in LOOKS:
+            rows = [(name, [made[size][look, stem, name] for size in SIZES]) for name in names]
+            sheet(rows).save(options.folder / f"{stem[:2]}-{look}.png")
+    pictures = len(SIZES) * len(LOOKS) * sum(map(len, found.values()))
+    print(f"{pictures} pictures, {count} things to look at")
 
 
 if __name__ == "__main__":

@@ -94,13 +94,15 @@ def test_the_first_handle_goes_around_and_the_note_says_where(recorded):
     notes = recorded.tracks["handle"].notes
     places = np.array([note["handles"]["P"]["at"] for note in notes])
     living = stage()
+    living._picture.fit(film.ROOM, 4 * film.ROOM, film.RATIO, False)
+    living.png()  # it is laid out
     axes = living.figure.axes[0]
     for note, place in zip(notes[::3], places[::3]):
         x = axes.transData.inverted().transform(
             place * [1, -1] * living.figure.bbox.size + [0, living.figure.bbox.height]
         )
         told = float(note["caption"].split()[2].rstrip(","))
-        assert abs(told - x[0]) < 0.2
+        assert abs(told - x[0]) < 0.02
     assert (np.ptp(places, axis=0) > 0.15).all() and len(np.unique(places, axis=0)) == film.AROUND
     assert list(recorded.declaration["handles"]) == ["P"] and "Q" not in notes[0]["handles"]
 

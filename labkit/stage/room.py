@@ -1,0 +1,152 @@
+"""How a figure fits a place that is smaller than designed: panels under or beside each other, long words in two lines,
+letters as large as leave the words apart.
+
+Letters that are scaled down with the picture cannot be read on a phone or on a projector at 150 %. So panels that stand
+side by side go under each other where the place is narrow, and the other way round where it is low; and of several
+sizes of letters the largest is taken at which no more words lie on each other, or leave the picture, than where the
+picture has its own size, and which leaves every panel a third of its share of the picture.
+"""
+
+import numpy as np
+from matplotlib.legend import Legend
+from matplotlib.text import Text
+
+NARROW = 0.68  # of the designed width; narrower, panels stand under each other
+LOW = 0.6  # of the designed height; lower, panels stand beside each other
+PANEL = 0.55, 0.8  # height of a panel that stands under another, as a share of its width: least and most
+SLENDER = 0.8  # height of a single panel where the place is narrow, at most
+ALIKE = 1.4, 2.6  # so many times as large as another panel under it, and beside it, at most
+ROUGH = 2.0  # pixels that two words may share, for their boxes are larger than their letters
+LEAST = 0.35  # of its share of the picture must be left to a panel
+LETTERS = (1.0, 0.92, 0.85, 0.77, 0.7)  # sizes of the letters that are tried, as shares of their own
+
+
+class Panels:
+    """The panels of a figure: as designed, in one column, or in one row.
+
+    Panels in one row or in two columns can stand in one column, two under each other in one row. What stands in no grid
+    stays where it is.
+    """
+
+    def __init__(self, fig):
+        self.fig, self.way = fig, "designed"
+        self.spec = {ax: ax.get_subplotspec() for ax in fig.axes}
+        grids = {spec.get_gridspec() for spec in self.spec.values() if spec is not None}
+        self.grid = next(iter(grids)) if len(grids) == 1 and None not in self.spec.values() else None
+        self.rows, self.columns = (1, 1) if self.grid is None else (self.grid.nrows, self.grid.ncols)
+
+    @property
+    def count(self):
+        """How many stand under each other in one column."""
+        return self.rows * self.columns
+
+    def best(self, narrow, low):
+        """How they stand best in a place."""
+        if narrow and self.columns > 1 and (self.rows == 1 or self.columns == 2):
+            return "column"
+        return "row" if low and not narrow and (self.rows, self.columns) == (2, 1) else "designed"
+
+    def arrange(self, way):
+        """Let them stand as designed, in one "column" or in one "row"."""
+        if way == self.way:
+            return
+        self.way = way
+        specs = {"designed": lambda: self.spec, "column": self._in_a_column, "row": self._in_a_row}[way]()
+        for ax, spec in specs.items():
+            ax.set_subplotspec(spec)
+            if spec.colspan.start == 0 and self.spec[ax].colspan.start:
+                ax.tick_params(labelleft=True)  # it may have stood beside one that said it
+            elif self.spec[ax].colspan.start and len(ax.get_shared_y_axes().get_siblings(ax)) > 1:
+                ax.tick_params(labelleft=False)
+
+    def _in_a_column(self):
+        widths, heights = self._ratios()
+        shares = [w * h / sum(heights) for w in np.clip(widths, 0, ALIKE[0] * min(widths)) for h in heights]
+        grid, rows = self.fig.add_gridspec(self.count, 1, height_ratios=shares), self.rows
+        first = {ax: spec.colspan.start * rows + spec.rowspan.start for ax, spec in self.spec.items()}
+        return {ax: grid[first[ax] : first[ax] + len(spec.rowspan), 0] for ax, spec in self.spec.items()}
+
+    def _in_a_row(self):
+        heights = self._ratios()[1]
+        grid = self.fig.add_gridspec(1, self.rows, width_ratios=np.clip(heights, 0, ALIKE[1] * min(heights)))
+        return {ax: grid[0, spec.rowspan.start] for ax, spec in self.spec.items()}
+
+    def _ratios(self):
+        """Widths of the columns and heights of the rows, as designed."""
+        return self.grid.get_width_ratios() or [1] * self.columns, self.grid.get_height_ratios() or [1] * self.rows
+
+
+class Words:
+    """What must stay apart in a figure, judged against how it was designed.
+
+    fig : Figure
+        At its own size, drawn.
+    """
+
+    def __init__(self, fig):
+        self.fig = fig
+        self.in_space = {id(text) for ax in fig.axes if hasattr(ax, "space") for text in ax.texts}
+        self.crowd, self.shares = self.crowded(), self._shares()
+
+    def fit(self):
+        """Whether they stay apart, and no panel has become too small."""
+        return (self._shares() >= LEAST * self.shares).all() and self.crowded() <= self.crowd
+
+    def crowded(self):
+        """How many words lie on another, or leave the figure, and how many legends lie on a line or its marks."""
+        boxes = self._boxes()
+        low, high = boxes[:, :2], boxes[:, 2:]
+        shared = np.minimum(high[:, None], high) - np.maximum(low[:, None], low)
+        pairs = np.triu((shared > ROUGH).all(-1), 1).sum()
+        outside = ((low < -ROUGH) | (high > self.fig.bbox.size + ROUGH)).any(-1).sum()
+        return int(pairs + outside + sum(map(self._covers, self.fig.axes)))
+
+    def _covers(self, ax):
+        """Whether the legend of an axes lies on one of its lines."""
+        if ax.get_legend() is None:
+            return False
+        low, high = ax.get_legend().get_window_extent().get_points()
+        along = np.linspace(0, 1, 9)[:, None, None]
+        for line in ax.lines:
+            path = line.get_transform().transform(line.get_xydata()) if line.get_visible() else np.empty((0, 2))
+            if line.get_linestyle() != "None" and len(path) > 1:
+                path = ((1 - along) * path[:-1] + along * path[1:]).reshape(-1, 2)
+            if ((path > low) & (path < high)).all(-1).any():
+                return True
+        return False
+
+    def _shares(self):
+        return np.array([np.prod(ax.get_window_extent().size / self.fig.bbox.size) for ax in self.fig.axes])
+
+    def _boxes(self):
+        """Boxes (left, bottom, right, top) in pixels of all words that are shown, shape (n, 4); letters in space move
+        with what they name.
+        """
+        renderer, unseen = self.fig.canvas.get_renderer(), set(self.in_space)
+        for legend in self.fig.findobj(Legend):
+            legend.draw(renderer)  # only then its words know where they stand; the background will be drawn over them
+        for ax in self.fig.axes:
+            for axis, k in ((ax.xaxis, 0), (ax.yaxis, 1)):
+                low, high = sorted(axis.get_view_interval())
+                shown = ax.axison and axis.get_visible()
+                labels = axis.get_ticklabels(which="both")
+                unseen |= {id(label) for label in labels if not (shown and low <= label.get_position()[k] <= high)}
+
+        def is_shown(artist):
+            return (
+                isinstance(artist, Text) and artist.get_visible() and artist.get_text().strip()
+                and id(artist) not in unseen
+            )  # fmt: skip
+
+        boxes = [text.get_window_extent(renderer).extents for text in self.fig.findobj(is_shown)]
+        return np.array(boxes).reshape(-1, 4)
+
+
+def break_lines(fig, on, moving):
+    """Let words that would leave the figure go on in a second line; not those that move, which would take longer, and
+    not those of legends, whose boxes would not follow.
+    """
+    kept = {*moving, *(text for legend in fig.findobj(Legend) for text in legend.get_texts())}
+    for text in fig.findobj(Text):
+        if text not in kept:
+            text.set_wrap(on)

@@ -1,0 +1,108 @@
+"""A figure in places smaller than designed: its panels, its letters, what they must not cover."""
+
+import numpy as np
+import pytest
+
+from labkit.stage import Stage, style
+from labkit.stage.canvas import Picture
+from labkit.stage.room import LEAST, Words
+
+PHONE, PROJECTOR, OWN = (352, 430), (690, 210), (700, 900)
+
+
+def picture(rows, columns, words="y (mm)", size=(7.0, 4.2)):
+    def scene(fig):
+        axes = fig.subplots(rows, columns, squeeze=False).ravel()
+        for ax in axes:
+            style.axes(ax, "x (mm)", words)
+            ax.plot([0, 1], [0, 1], label="a line")
+        return [], lambda state, result: None
+
+    made = Picture(scene, size)
+    made.draw()
+    return made
+
+
+def fitted(made, room):
+    made.fit(*room, 1.0, False)
+    made.draw()
+    return [ax.get_window_extent() for ax in made.fig.axes]
+
+
+def letters(made):
+    """Their size as a share of the designed one."""
+    return made.fig.dpi / 100
+
+
+def test_panels_side_by_side_go_under_each_other_on_a_phone_and_come_back():
+    made = picture(1, 2)
+    designed = [box.bounds for box in fitted(made, OWN)]
+    upper, lower = fitted(made, PHONE)
+    assert upper.x0 == pytest.approx(lower.x0, abs=1) and upper.y0 > lower.y1
+    assert min(upper.width, lower.width) > 0.7 * 352 and letters(made) == 1 and made.height == 430
+    np.testing.assert_allclose([box.bounds for box in fitted(made, OWN)], designed, atol=0.5)
+
+
+def test_two_columns_of_two_become_one_of_four_column_after_column():
+    boxes = fitted(picture(2, 2, "y"), (352, 900))
+    order = np.argsort([-box.y0 for box in boxes])
+    assert order.tolist() == [0, 2, 1, 3]
+
+
+def test_panels_under_each_other_go_side_by_side_where_it_is_low():
+    made = picture(2, 1)
+    left, right = fitted(made, PROJECTOR)
+    assert left.x1 < right.x0 and left.y0 == pytest.approx(right.y0, abs=1)
+    assert made.height == 210 and letters(made) == 1
+
+
+def test_letters_are_the_largest_that_leave_the_words_apart():
+    """Eighteen rows that fill the figure: they touch in a low place unless they become smaller."""
+
+    def scene(fig):
+        ax = style.bare(fig.subplots())
+        for k in range(18):
+            ax.text(0, k / 18, f"row {k}", fontsize=10)
+        return [], lambda state, result: None
+
+    made = Picture(scene, (7.0, 4.2))
+    made.draw()
+    assert Words(made.fig).crowded() == 0
+    fitted(made, PROJECTOR)
+    small = letters(made)
+    assert 0.5 < small < 1 and Words(made.fig).crowded() == 0
+    fitted(made, (690, 300))
+    assert small < letters(made) <= 1 and Words(made.fig).crowded() == 0
+
+
+def test_words_on_each_other_outside_and_a_legend_on_a_line_are_counted():
+    made = picture(1, 1)
+    ax, words = made.fig.axes[0], Words(made.fig)
+    assert words.crowd == 0 and words.fit()
+    one, other = ax.text(0.5, 0.2, "here"), ax.text(0.51, 0.2, "here too")
+    assert words.crowded() == 1
+    other.remove()
+    one.set_position((3, 0.2))
+    assert words.crowded() == 1  # it leaves the figure
+    one.remove()
+    ax.legend(loc="lower left")
+    assert words.crowded() == 1  # the line begins there
+    ax.legend(loc="upper left")
+    assert words.crowded() == 0 and words.fit()
+    ax.set_position([0.1, 0.1, 0.5, LEAST])
+    assert not words.fit()  # less than LEAST of its share is left
+
+
+def test_a_long_target_takes_two_lines_on_a_phone():
+    stage = Stage(
+        "long", scene=lambda fig: (fig.subplots() and [], lambda state, result: None), compute=lambda state: None,
+        fail={},
+    )  # fmt: skip
+    stage._picture.head("the quick brown fox that jumps over the lazy dog, within 5 mm", False)
+    head = stage._picture._heading
+    heights = {}
+    for room in (OWN, PHONE):
+        fitted(stage._picture, room)
+        heights[room] = head.get_window_extent().height
+        assert head.get_window_extent().x1 <= stage._picture.width
+    assert heights[PHONE] > 1.8 * heights[OWN]
