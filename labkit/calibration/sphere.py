@@ -348,9 +348,7 @@ def _profile(x, z):
     points = np.stack([x, z], axis=-1)
     p = points - points.mean(-2, keepdims=True)
     moments = np.swapaxes(p, -1, -2) @ p
-    values = np.linalg.eigvalsh(
-        moments / np.maximum(np.abs(p).max((-2, -1)), np.finfo(float).tiny)[..., None, None] ** 2
-    )
+    values = np.linalg.eigvalsh(moments)
     ratio = np.sqrt(np.maximum(values[..., 0], 0.0) / np.maximum(values[..., 1], np.finfo(float).tiny))
     if (ratio <= MIN_SAGITTA).any():
         raise ValueError(

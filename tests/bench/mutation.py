@@ -4,7 +4,7 @@
 
 Rooms: geometry estimation calibration machines localization fast (all by default). No file is touched: a process that
 has imported NumPy, SciPy and pytest, but nothing of labkit, forks once a change; the child compiles the changed text in
-place of the module and runs the module's own test files up to the first failure: at first the tests that enter the
+place of the module and runs the module's own test files, its fast twin's among them, up to the first failure: at first the tests that enter the
 changed function, the quickest before the others; what survives these goes through the whole files. A child may use ten
 times the processor time of the unchanged run, then the change counts as caught. Left alone are docstrings, refusals
 (`raise`), texts, annotations, defaults, indices and numbers below 0.001, which are tolerances. Prints every survivor
@@ -149,7 +149,8 @@ def tests_of(path):
     """The test files of a module: its own name in the same room, those of ELSEWHERE, and that of one bad entry."""
     room, module = path.parent.name, path.stem
     own = f"{room}/test_{'fast_' if room == 'fast' else ''}{module}.py"
-    files = [own, *ELSEWHERE.get(f"{room}/{module}", ()), "test_one_in_a_batch.py"]
+    twin = f"fast/test_fast_{module}.py"  # compares the readable form with the tuned one
+    files = list(dict.fromkeys([own, twin, *ELSEWHERE.get(f"{room}/{module}", ()), "test_one_in_a_batch.py"]))
     found = tuple(f"tests/{file}" for file in files if (ROOT / "tests" / file).exists())
     if len(found) < 2 and module != "__init__":
         raise SystemExit(f"labkit/{room}/{module}.py has no test file: name it in ELSEWHERE")

@@ -245,3 +245,27 @@ def test_a_fit_that_runs_out_of_steps_says_so(room, monkeypatch):
     assert room.calibrate_hand_eye(T_BF, T_ST).converged and room.calibrate_hand_eye(T_BF, T_ST, robust=True).converged
     monkeypatch.setattr(room, "MAX_STEPS", 1)
     assert not room.calibrate_hand_eye(T_BF, T_ST).converged
+
+
+def test_the_first_robust_rounds_weigh_by_one_over_the_distance_and_the_later_ones_by_tukey(monkeypatch):
+    """Seen from outside: the weights handed to the solver, for residuals that stay as they are."""
+    rng = np.random.default_rng(2)
+    r = rng.normal(size=(12, 6)) * np.array([1e-3] * 3 + [0.2] * 3)
+    r[0] *= 3.0
+    given = []
+
+    class Still:
+        residuals, weights = r, np.ones(12)
+
+    def solve(weights):
+        given.append(weights)
+        Still.weights = weights
+        return Still
+
+    scales = [np.median(np.linalg.norm(part, axis=1)) / 1.5381722544550522 for part in (r[:, :3], r[:, 3:])]
+    d = np.hypot(np.linalg.norm(r[:, :3], axis=1) / scales[0], np.linalg.norm(r[:, 3:], axis=1) / scales[1])
+    monkeypatch.setattr(ax_xb, "_size", lambda result: 1000.0)
+    ax_xb._reweighted(solve, Still)
+    np.testing.assert_allclose(given[0], 1 / np.maximum(d, 1.0), rtol=1e-6)
+    np.testing.assert_allclose(given[ax_xb.LOOSE_ROUNDS], np.maximum(1 - (d / ax_xb.TUKEY) ** 2, 0) ** 2, rtol=1e-6)
+    assert d.max() > ax_xb.TUKEY > 1 and len(given) == ax_xb.LOOSE_ROUNDS + 1

@@ -449,3 +449,96 @@ def test_singular_values_of_an_iterate_are_millimeters_per_millimeter():
     reach = np.sqrt((x_S**2).sum(1).mean())
     J = hand_eye.joint_jacobian(T_BF, x_S, T_FS0, target_free=False) / [reach, reach, reach, 1, 1, 1]
     np.testing.assert_allclose(found, np.linalg.svd(J, compute_uv=False), rtol=1e-9)
+
+
+def test_the_cube_is_one_of_60_mm():
+    sides = np.linalg.norm(literature.CUBE[:, None] - literature.CUBE, axis=-1)
+    assert np.unique(sides.round(9)) == pytest.approx(60 * np.sqrt([0, 1, 2, 3]))
+    np.testing.assert_allclose(literature.CUBE.mean(0), 0, atol=1e-12)
+
+
+def test_kim_refuses_a_cube_that_is_flat_to_a_billionth():
+    T_BF, points_S, corners = cube_scene()
+    for thickness, flat in ((1e-9, True), (1e-3, False)):
+        squeezed = corners * [1.0, 1.0, thickness / np.ptp(corners[:, 2])]
+        seen = frames.transform(frames.invert(T_BF @ T_FS0)[:, None], squeezed)
+        if flat:
+            with pytest.raises(ValueError, match="rank 3, not 4"):
+                kim_linear(T_BF, seen, squeezed)
+        else:
+            kim_linear(T_BF, seen, squeezed)
+
+
+def test_li_says_by_how_much_the_nearest_orientations_differ():
+    turned = exp_so3(np.deg2rad([[0.0, 0, 0], [3.0, 0, 0], [0, 9.0, 0]]))
+    with pytest.raises(ValueError, match="the nearest differ by 3 deg"):
+        li_two_step(frames.pose(turned, np.eye(3)), np.eye(3))
+
+
+@pytest.mark.parametrize(("n", "half"), [(20, 13), (9, 7)])
+def test_the_robust_start_rests_on_the_half_that_agrees(n, half, monkeypatch):
+    """Half of the poses and of a sample of four, and one more: they are exact, the others far off."""
+    monkeypatch.setattr(hand_eye, "SUBSETS", 50)
+    T_BF, _ = scene(n)
+    x_S = frames.transform(frames.invert(T_BF @ T_FS0), TARGET0)
+    x_S[half:] += np.random.default_rng(1).uniform(20, 60, (n - half, 3))
+    weights = hand_eye._trimmed_start(hand_eye._least_squares, T_BF, x_S, TARGET0, 4, np.random.default_rng(0))
+    np.testing.assert_array_equal(weights, np.arange(n) < half)
+
+
+def test_the_linear_system_is_judged_by_its_condition():
+    """Smallest over largest singular value of the 15 columns, centers divided by their root mean square."""
+    T_BF, x_S = scene(9)
+    reach = np.sqrt((x_S**2).sum(1).mean())
+    rows = [np.hstack([np.kron(np.eye(3), x / reach), np.eye(3), -T[:3, :3].T]) for T, x in zip(T_BF, x_S)]
+    _, found = hand_eye._linear_solution(T_BF, x_S, np.ones(9))
+    assert found == pytest.approx(1 / np.linalg.cond(np.vstack(rows)), rel=1e-9)
+    assert hand_eye._linear_solution(T_BF[:4], x_S[:4], np.ones(4))[1] == 0.0
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_singular_values_are_those_of_the_weighted_jacobian_in_lengths(known):
+    """Turns times the root-mean-square distance of the sphere; with a free radius, columns of length one."""
+    T_BF, x_S = scene(12)
+    x_S[:3] += 40.0
+    found = hand_eye.calibrate_sphere_target(T_BF, x_S, TARGET0 if known else None, robust=True)
+    w, J = found.weights, hand_eye.joint_jacobian(T_BF, x_S, found.T_FS, target_free=not known)
+    reach = np.sqrt((w * (x_S**2).sum(1)).sum() / w.sum())
+    J = np.sqrt(np.repeat(w, 3))[:, None] * J / np.r_[[reach] * 3, np.ones(J.shape[1] - 3)]
+    np.testing.assert_allclose(found.singular_values, np.linalg.svd(J, compute_uv=False), rtol=1e-9)
+
+
+def test_singular_values_with_a_free_radius_are_those_of_columns_of_length_one(monkeypatch):
+    T_BF, x_S = scene(12)
+    J = np.random.default_rng(3).normal(size=(36, 10)) * np.r_[np.full(3, 200.0), np.ones(7)]
+    fit = hand_eye.SphereRadius(T_FS0, TARGET0, T_BF, x_S, np.ones(12), np.zeros(1), radius=30.0)
+    monkeypatch.setattr(hand_eye, "radius_jacobian", lambda *given: J)
+    np.testing.assert_allclose(fit.singular_values, np.linalg.svd(J / np.linalg.norm(J, axis=0), compute_uv=False), rtol=1e-9)
+
+
+def test_orientations_count_as_one_up_to_the_angle_asked_for():
+    """Pairs turned by 0.009 deg are translated ones, by 0.011 deg they are not; 1 deg when asked for."""
+    T_BF, _ = scene(6)
+
+    def seen_after(turn_deg, **more):
+        turns = exp_so3(np.deg2rad(turn_deg) * np.eye(3))
+        T = np.concatenate([T_BF, T_BF[:1] @ frames.pose(turns, 60.0 * np.eye(3))])
+        x_S = frames.transform(frames.invert(T @ T_FS0), TARGET0)
+        return li_two_step(T, x_S, **more)[0]
+
+    np.testing.assert_allclose(seen_after(0.006)[:3, :3], T_FS0[:3, :3], atol=2e-3)  # 0.006 deg move it 0.07 mm of 60
+    np.testing.assert_allclose(seen_after(0.6, max_turn_deg=1.0)[:3, :3], T_FS0[:3, :3], atol=0.2)
+    for turn, least, limit in ((0.011, "0.011", 0.0105), (1.2, "1.2", 1.0)):
+        with pytest.raises(ValueError, match=f"the nearest differ by {least} deg"):
+            seen_after(turn, max_turn_deg=limit)
+
+
+def test_scenes_of_the_literature_fill_their_ranges():
+    """The scanner within 100 mm along each axis of the flange, the sphere within 500 mm; 40 scenes reach nine tenths."""
+    rng = np.random.default_rng(0)
+    scenes = [literature.suitable_scene(0.1, rng) for _ in range(40)]
+    for values, half in (([s.T_FS[:3, 3] for s in scenes], 100.0), ([s.target for s in scenes], 500.0)):
+        values = np.array(values)
+        assert np.abs(values).max() <= half and (values.min(0) < -0.8 * half).all() and (values.max(0) > 0.8 * half).all()
+    x_S = np.array([s.x_S[:12] for s in scenes])
+    assert (np.abs(x_S[..., :2]).max((0, 1)) < [26, 21]).all() and 188 < x_S[..., 2].min() < x_S[..., 2].max() < 292

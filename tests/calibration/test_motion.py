@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from labkit.calibration.motion import between_axes, motions, screw
+from labkit.calibration.motion import between_axes, motions, screw, turning
 from labkit.geometry.frames import invert, pose
 from labkit.geometry.lie import exp_so3
 
@@ -45,3 +45,15 @@ def test_an_inverted_file_is_seen_between_motions_that_share_no_row_alone():
     _, wrong = motions(T_BF, invert(T_ST))
     assert np.allclose(screw(A), screw(wrong)) and np.allclose(between_axes(A), between_axes(wrong), atol=1e-7)
     assert np.abs(between_axes(A, 2) - between_axes(wrong, 2)).max() > 0.2
+
+
+def test_turns_across_the_axes_are_root_mean_squares_whatever_the_weights_add_up_to():
+    """Small turns about x, y and z with known weighted squares: across z turn those about x and y, and so on."""
+    sizes, weights = np.array([0.02, 0.01, 0.005]), np.array([3.0, 1.0, 2.0, 3.0, 1.0, 2.0])
+    turns = np.concatenate([np.diag(sizes), -np.diag(sizes)])
+    squares = np.array([6.0, 2.0, 4.0]) * sizes**2 / 12  # about x, y and z
+    for factor in (1.0, 0.01, 40.0):
+        found, directions = turning(exp_so3(turns), factor * weights)
+        order = np.argsort(squares.sum() - squares)
+        np.testing.assert_allclose(found**2, (squares.sum() - squares)[order], rtol=1e-3)
+        np.testing.assert_allclose(np.abs(directions), np.eye(3)[:, order], atol=1e-3)

@@ -134,3 +134,18 @@ def test_the_field_ends_where_it_says(axis, low, high):
         assert planning.field_problem(outside) == f"{told} mm, outside {from_:g} to {to:g}."
         outside[2] = outside[1]
         assert planning.field_problem(outside).startswith("in 2 poses the sphere")
+
+
+def test_whether_poses_determine_all_is_judged_on_columns_of_length_one():
+    """Turns as small as 1e-4 rad are enough, those of 1e-7 are not: the limit is 1e-6 of the largest singular value."""
+    for size in (1e-4, 1e-7):
+        T_BF = poses_at(places(9), size * turns(9))
+        J = planning.joint_jacobian(T_BF, seen_in(T_BF), T_FS0)
+        ratio = 1 / np.linalg.cond(J / np.linalg.norm(J, axis=0))
+        assert (ratio > planning.MIN_SPREAD) == (size == 1e-4)
+        if ratio > planning.MIN_SPREAD:
+            found = planning.predicted_sphere_covariance(T_BF, T_FS0, TARGET0, 0.1)
+            np.testing.assert_allclose(found, 0.01 * np.linalg.inv(J.T @ J), rtol=1e-3)
+        else:
+            with pytest.raises(ValueError, match="undetermined"):
+                planning.predicted_sphere_covariance(T_BF, T_FS0, TARGET0, 0.1)

@@ -75,3 +75,15 @@ def test_a_result_prints_estimate_deviation_and_unit():
     assert "<td>T_FS.rotation</td><td>10.00, -20.00, 30.00</td><td>0.10, 0.20, 0.40</td><td>deg</td>" in page
     unsure = dataclasses.replace(example, covariance=np.full((7, 7), np.nan))
     assert "radius  30.012 mm  +- unknown" in repr(unsure)
+
+
+def test_digits_are_unknown_when_one_deviation_is(pivoted):
+    rows = dataclasses.replace(pivoted)._rows()
+    assert all(spread != "unknown" for _, _, spread, _ in rows)
+    for bad in (np.nan, np.inf, 0.0):
+        spoilt = dataclasses.replace(pivoted)
+        covariance = pivoted.covariance.copy()
+        covariance[0, 0] = bad
+        vars(spoilt)["covariance"] = covariance
+        name, values, spread, _ = next(iter(spoilt._rows()))
+        assert spread == "unknown" and values.count(".") == 3 and len(values.split(",")[0].split(".")[1]) == 3, name

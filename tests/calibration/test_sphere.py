@@ -140,3 +140,21 @@ def test_a_fit_that_does_not_settle_says_so(monkeypatch):
     x, z = arc([2.0, 240.0], 20.0, 0.5, 30, 0.2)
     with pytest.raises(ValueError, match="does not settle: after 1 steps the radius is"):
         sphere.fit_circle(x, z)
+
+
+class Started(Exception):
+    """Carries the start of a fit out of it."""
+
+
+def test_the_algebraic_start_of_a_sphere_is_exact_without_noise(monkeypatch):
+    """Gauss-Newton forgives most starts, so the start is looked at alone: a shallow cap far from the origin."""
+
+    def stop(points, start):
+        raise Started(start)
+
+    monkeypatch.setattr(sphere, "_geometric", stop)
+    v = np.random.default_rng(6).normal(size=(40, 3)) * [0.3, 0.3, 0.0] + [0.0, 0.0, 1.0]
+    points = [900.0, -400.0, 250.0] + 30.0 * v / np.linalg.norm(v, axis=1, keepdims=True)
+    with pytest.raises(Started) as caught:
+        sphere.fit_sphere(points)
+    np.testing.assert_allclose(caught.value.args[0], [900.0, -400.0, 250.0, 30.0], rtol=1e-9)

@@ -86,3 +86,23 @@ def test_each_stream_may_begin_at_any_time_of_its_clock():
     assert abs(found.offset - (0.2 + 40.0 - 100.0)) < 5 * found.std
     part = clock_offset(time_a[300:], T_a[300:], time_b[120:], T_b[120:])
     assert abs(part.offset - 0.2) < 5 * part.std
+
+
+def test_a_steady_turn_has_its_own_speed():
+    time = np.arange(0, 4, 0.05)
+    T = np.tile(np.eye(4), (len(time), 1, 1))
+    T[:, :3, :3] = exp_so3(np.outer(time, [0.3, -0.4, 0.0]))  # 0.5 rad/s
+    when = np.array([0.14, 0.16, 1.0, 3.79, 3.81])
+    speed = angular_speed(time, T, when, 0.3)
+    np.testing.assert_allclose(speed[1:4], 0.5, rtol=1e-9)
+    assert np.isnan(speed[[0, 4]]).all()  # half the interval lies before the first sample, or behind the last
+
+
+def test_the_overlap_is_the_time_both_cover():
+    """A stream of 6 s within one of 30 s, less the interval over which a turn is measured."""
+    time_a, T_a, time_b, T_b = streams(3, 0.4)
+    part = clock_offset(time_a, T_a, time_b[100:280], T_b[100:280])
+    assert abs(part.offset - 0.4) < 5 * part.std
+    assert part.overlap == pytest.approx(time_b[279] - time_b[100] - 0.3, abs=0.1)
+    both = clock_offset(time_a, T_a, time_b, T_b)
+    assert both.overlap == pytest.approx(min(time_a[-1], time_b[-1] - 0.4) - (time_b[0] - 0.4) - 0.3, abs=0.1)

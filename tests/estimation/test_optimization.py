@@ -431,3 +431,12 @@ def test_a_search_that_is_stuck_has_arrived_only_where_nothing_is_promised(gradi
     point = SimpleNamespace(x=np.array([1.0]), cost=1.0, gradient=np.array([gradient]), curvature=np.array([[1.0]]))
     assert opt._stuck(point, np.array([1e-17])) == ("no step lowers the cost, down to rounding", converged)
     assert opt._stuck(point, np.array([1e-3])) == ("", False)
+
+
+def test_stationary_means_a_small_gradient_beside_the_largest_curvature():
+    """H has eigenvalues 1 and 2 and a skew part, which no quadratic form has."""
+    H, tol = np.array([[1.0, 5.0], [-5.0, 2.0]]), 1e-3
+    assert opt.classify_extremum([0.0, 1.9e-3], H, tol) == "minimum" and opt.classify_extremum([0.0, 1.9e-3], -H, tol) == "maximum"
+    assert opt.classify_extremum([0.0, 2.1e-3], H, tol) == "not stationary"
+    assert opt.classify_extremum([0.0, 0.0], np.diag([2.0, 2.1e-3]), tol) == "minimum"
+    assert opt.classify_extremum([0.0, 0.0], np.diag([2.0, 1.9e-3]), tol) == "degenerate"

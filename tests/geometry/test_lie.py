@@ -103,3 +103,15 @@ def test_interpolation_is_a_share_of_the_twist_between_both(share):
     for k in range(5):
         twist = np.real(logm(np.linalg.inv(T0[k]) @ T1[k]))
         np.testing.assert_allclose(found[k], T0[k] @ expm(share * twist), atol=1e-8)
+
+
+@pytest.mark.parametrize("short", [0.0, 1e-9, 1e-5, 1e-3])
+def test_half_turns_about_the_axes_and_between_them(short):
+    """Where the skew part fades, the axis comes from the largest column of the symmetric one."""
+    axes = np.concatenate([np.eye(3), -np.eye(3), np.array([[0.6, 0.8, 0], [0, -0.6, 0.8], [1e-4, 0, -1]])])
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    turns = (np.pi - short) * axes
+    found = lie.log_so3(Rotation.from_rotvec(turns).as_matrix())
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), np.pi - short, rtol=1e-9)
+    off = np.minimum(np.abs(found - turns).max(1), np.abs(found + turns).max(1) if short < 1e-8 else np.inf)
+    assert off.max() < 1e-7  # a half turn is one about either sign of its axis

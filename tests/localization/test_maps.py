@@ -163,3 +163,13 @@ def test_the_nearest_place_of_a_wall_is_its_foot_or_its_end():
     assert maps.nearest_on_lines(walls, [9.0, 7.0]) == pytest.approx([10, 5])
     with pytest.raises(ValueError, match="at least one wall"):
         maps.nearest_on_lines(np.empty((0, 4)), [1.0, 2.0])
+
+
+def test_a_ray_is_cast_from_where_the_map_begins():
+    """The same room with its corner elsewhere and cells of 0.5 m: twice as near, nothing else."""
+    moved = OccupancyGrid.from_ascii(ROOM, resolution=0.5, origin=(-7.0, 3.0))
+    plain = OccupancyGrid.from_ascii(ROOM)
+    for x, y, theta in ((1.5, 1.5, 0.0), (1.5, 2.2, 0.3), (6.2, 3.1, -2.6), (4.4, 1.2, 1.9)):
+        far = maps.walk_ray(plain, (x, y, theta), 0.1, 30.0)
+        near = maps.walk_ray(moved, (-7.0 + x / 2, 3.0 + y / 2, theta), 0.1, 15.0)
+        assert near == pytest.approx(far / 2) and 0 < far < 8

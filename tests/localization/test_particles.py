@@ -224,3 +224,14 @@ def test_uniform_states_fill_each_free_cell_and_no_other():
     assert np.abs(own).max() <= 0.25 and (own.min(0) < -0.24).all() and (own.max(0) > 0.24).all()
     assert np.bincount(which).min() > 140  # of 200 each; six standard deviations
     assert states[:, 2].min() < -3.0 and states[:, 2].max() > 3.0
+
+
+def test_the_mode_is_what_lies_within_one_and_a_half_bins():
+    """Bins of 0.4 m and 0.2 rad about a cloud at one place: 0.55 m and 0.25 rad belong to it, 0.65 m and 0.35 do not."""
+    core = np.tile([1.0, 1.0, 1.0], (50, 1))
+    beside = core[:4] + np.array([[0.55, 0, 0], [0, 0.65, 0], [0, 0, 0.25], [0, 0, -0.35]])
+    mode = pt.estimate_mode(np.concatenate([core, beside]), cell=0.4, turn=0.2)
+    kept = np.concatenate([core, beside[[0, 2]]])
+    np.testing.assert_allclose(mode.pose, kept.mean(0), atol=1e-4)  # headings within 0.25 rad: sine is nearly the angle
+    np.testing.assert_allclose(mode.covariance, np.cov(kept.T, bias=True), atol=1e-5)
+    assert mode.share == pytest.approx(52 / 54)

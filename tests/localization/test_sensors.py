@@ -220,3 +220,19 @@ def test_columns_without_a_depth_are_left_out():
 def test_a_camera_that_cannot_be_is_refused(field_of_view, near):
     with pytest.raises(ValueError, match="field_of_view must be less than pi, and near less than far"):
         scan_from_depth(np.ones(4), field_of_view, near)
+
+
+def test_a_tempered_weighting_is_a_power_of_the_weights():
+    weighting = weigh_landmarks([[5.0, 0.1]], [[5.0, 0.0]], std_range=0.5, std_bearing=0.1)
+    tempered, states = weighting.tempered(0.3), np.array([[0.0, 0, 0], [0.5, 0, 0.2]])
+    np.testing.assert_allclose(tempered(states), 0.3 * weighting(states))
+    assert tempered.best == pytest.approx(0.3 * weighting.best) and abs(weighting.best) > 0.1
+
+
+def test_a_door_is_a_bell_of_its_standard_deviation():
+    """At one and a half standard deviations from the nearest of two doors, from either side."""
+    says = (1 - 0.8) + (2 * 0.8 - 1) * stats.norm.pdf(1.5) / stats.norm.pdf(0)
+    for door, not_door in ((True, False), (False, True)):
+        weigh = weigh_doors([2.0, 5.0], saw_door=door, std=0.4, trust=0.8)
+        np.testing.assert_allclose(np.exp(weigh(np.array([1.4, 2.6, 4.4, 5.6]))), says if door else 1 - says)
+        assert weigh.best == pytest.approx(math.log(0.8)) and door != not_door

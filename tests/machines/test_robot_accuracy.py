@@ -90,3 +90,11 @@ def test_a_wrong_pose_of_the_scanner_shifts_alike_and_turns_with_the_flange():
 def test_what_does_not_fit_is_refused(call, words):
     with pytest.raises(ValueError, match=words):
         call()
+
+
+def test_backlash_holds_a_robot_back_on_its_way():
+    """It stops short of the command, and beyond it by the offset; exactly so without noise."""
+    errors = ra.RobotErrors(np.array([0.1, 0.0, -0.2]), backlash=0.05)
+    ways = np.array([[1.0, 0, 0], [0, -1.0, 0]])
+    found = ra.arrive([10.0, 20.0, 30.0], ways, errors, STILL)
+    np.testing.assert_allclose(found, [[10.05, 20.0, 29.8], [10.1, 20.05, 29.8]])

@@ -187,3 +187,14 @@ def test_a_station_that_moves_during_the_run_shows_and_one_that_moved_before_doe
     assert during[0] > 10 * before[0] and during[1] > 10 * before[1]
     assert e_trans(0.0, since=11)[0] < 1e-9
     assert e_trans(1.0, since=11)[0] == pytest.approx(during[0] / 2, rel=0.02)  # small tilts: proportional
+
+
+def test_the_diodes_sit_on_a_dome_of_90_mm():
+    """A ring of five about the axis at even turns, one on top, three between; none hides another's direction."""
+    d = stations.DIODES / 45.0
+    np.testing.assert_allclose(np.linalg.norm(stations.DIODES, axis=1), 45.0)
+    ring = np.arctan2(d[:5, 1], d[:5, 0])
+    np.testing.assert_allclose(np.rad2deg(ring), [0, 72, 144, -144, -72], atol=1.5)
+    np.testing.assert_allclose(d[8], [0, 0, 1])
+    assert (np.rad2deg(np.arcsin(d[:5, 2])) < 12).all() and (d[5:8, 2] > 0.75).all() and (d[:, 2] > 0.15).all()
+    assert np.linalg.norm(d[5:8, :2].sum(0)) < 0.15  # the three between balance each other
