@@ -4,12 +4,13 @@
 
 Rooms: geometry estimation calibration machines localization fast (all by default). No file is touched: a process that
 has imported NumPy, SciPy and pytest, but nothing of labkit, forks once a change; the child compiles the changed text in
-place of the module and runs the module's own test files, its fast twin's among them, up to the first failure: at first the tests that enter the
-changed function, the quickest before the others; what survives these goes through the whole files. A child may use ten
-times the processor time of the unchanged run, then the change counts as caught. Left alone are docstrings, refusals
-(`raise`), texts, annotations, defaults, indices and numbers below 0.001, which are tolerances. Prints every survivor
-with its line and the share at the end. Whether a survivor changes any result at all (a starting value, a bound on
-rounding) is for the reader to judge. No part of the test run: a hundred changes take some five minutes on two cores.
+place of the module and runs the module's own test files, its fast twin's among them, up to the first failure: at first
+the tests that enter the changed function, the quickest before the others; what survives these goes through the whole
+files. A child may use ten times the processor time of the unchanged run, then the change counts as caught. Left alone
+are docstrings, refusals (`raise`), texts, annotations, defaults, indices and numbers below 0.001, which are tolerances.
+Prints every survivor with its line and the share at the end. Whether a survivor changes any result at all (a
+starting value, a bound on rounding) is for the reader to judge. No part of the test run: a hundred changes take some
+five minutes on two cores.
 """
 
 import argparse

@@ -327,3 +327,31 @@ def test_the_table_over_speed_counts_every_sample_once():
     lines = calibrate.Comparison(np.arange(400.0), angle, distance, speed, table, 7).lines("mm")
     assert lines[0].startswith("400 samples compared, 7 of the second stream") and len(lines) == 1 + len(table)
     assert f"{table[0][2]:6d} samples" in lines[1] and "mm/s" in lines[1]
+
+
+def test_blocks_that_move_the_result_widen_its_covariance():
+    """Shifts of three standard deviations along every column of a root: (12 - 1) / 12 of 2 * 9 times the covariance."""
+    robot, sensor, _ = cell(1)
+    plain = calibrate.hand_eye(robot, sensor)
+    root = 3 * np.linalg.cholesky(plain.covariance)
+    shifts = dict(enumerate(np.concatenate([root.T, -root.T])))
+    wide = calibrate._widened_by_blocks(calibrate._with(plain, group_shifts=shifts))
+    np.testing.assert_allclose(wide.covariance, 11 / 12 * 18 * plain.covariance, rtol=1e-6)
+    assert "4.1 times" in wide.warnings[-1]
+    spoilt = shifts | {5: np.full(6, np.nan)}
+    few = {k: shifts[k] for k in range(11)}
+    small = {k: v / 3.1 for k, v in shifts.items()}
+    for none in (spoilt, few, small):
+        as_it_was = calibrate._widened_by_blocks(calibrate._with(plain, group_shifts=none))
+        assert (as_it_was.covariance == plain.covariance).all()
+
+
+def test_errors_are_told_over_six_ranges_of_speed_with_as_many_rows_each():
+    rng = np.random.default_rng(0)
+    speed, angle, distance = rng.permutation(600) + 0.5, rng.random(600), rng.random(600)
+    table = calibrate._over_speed(angle, distance, speed)
+    assert [row[2] for row in table] == [100] * 6 and table[0][0] == 0.5 and table[-1][1] == 599.5
+    for k, row in enumerate(table):
+        inside = (speed > 100 * k) & (speed < 100 * (k + 1))
+        assert row[3] == pytest.approx(np.rad2deg(np.sqrt((angle[inside] ** 2).mean())))
+        assert row[4] == pytest.approx(np.sqrt((distance[inside] ** 2).mean()))

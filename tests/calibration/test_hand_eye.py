@@ -513,7 +513,9 @@ def test_singular_values_with_a_free_radius_are_those_of_columns_of_length_one(m
     J = np.random.default_rng(3).normal(size=(36, 10)) * np.r_[np.full(3, 200.0), np.ones(7)]
     fit = hand_eye.SphereRadius(T_FS0, TARGET0, T_BF, x_S, np.ones(12), np.zeros(1), radius=30.0)
     monkeypatch.setattr(hand_eye, "radius_jacobian", lambda *given: J)
-    np.testing.assert_allclose(fit.singular_values, np.linalg.svd(J / np.linalg.norm(J, axis=0), compute_uv=False), rtol=1e-9)
+    np.testing.assert_allclose(
+        fit.singular_values, np.linalg.svd(J / np.linalg.norm(J, axis=0), compute_uv=False), rtol=1e-9
+    )
 
 
 def test_orientations_count_as_one_up_to_the_angle_asked_for():
@@ -534,11 +536,13 @@ def test_orientations_count_as_one_up_to_the_angle_asked_for():
 
 
 def test_scenes_of_the_literature_fill_their_ranges():
-    """The scanner within 100 mm along each axis of the flange, the sphere within 500 mm; 40 scenes reach nine tenths."""
+    """The scanner within 100 mm along each axis of the flange, the sphere within 500 mm; 40 scenes fill this."""
     rng = np.random.default_rng(0)
     scenes = [literature.suitable_scene(0.1, rng) for _ in range(40)]
     for values, half in (([s.T_FS[:3, 3] for s in scenes], 100.0), ([s.target for s in scenes], 500.0)):
         values = np.array(values)
-        assert np.abs(values).max() <= half and (values.min(0) < -0.8 * half).all() and (values.max(0) > 0.8 * half).all()
+        assert (
+            np.abs(values).max() <= half and (values.min(0) < -0.8 * half).all() and (values.max(0) > 0.8 * half).all()
+        )
     x_S = np.array([s.x_S[:12] for s in scenes])
     assert (np.abs(x_S[..., :2]).max((0, 1)) < [26, 21]).all() and 188 < x_S[..., 2].min() < x_S[..., 2].max() < 292

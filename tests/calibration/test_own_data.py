@@ -307,3 +307,28 @@ def test_the_size_of_a_channel_is_the_largest_length_in_it(make, truth):
             largest[name] = np.abs(array[:, :3, 3] if array.shape[1:] == (4, 4) else array).max()
     assert model.size(len(model.channels) - 1) == pytest.approx(sum(largest.values()))
     assert len(model.channels) == 1 or model.size(0) == 1.0
+
+
+def test_the_distance_allowed_counts_the_numbers_left_over(monkeypatch):
+    """12 rows of 6 numbers less 12 parameters where the noise is estimated, and no end of them where it is given."""
+    asked, real = [], own_data.distance_limit
+    monkeypatch.setattr(own_data, "distance_limit", lambda k, dof: asked.append((k, dof)) or real(k, dof))
+    own_data.majority(own_data.HandEyeModel(*readings()))
+    assert asked[-1] == (6, 12 * 6 - 12)
+    own_data.majority(own_data.HandEyeModel(*readings(), std=(2e-3, 0.3)))
+    assert asked[-1][1] >= 10**5
+
+
+def test_a_row_may_be_wrong_in_the_smaller_channel_alone():
+    """Angles of thousandths beside lengths of ones: each channel counts in units of what the majority reaches."""
+    turns, lengths = 1e-3 * np.linspace(0.5, 1.0, 12), np.linspace(1.0, 0.5, 12)
+    turns[4], lengths[9] = 0.1, 90.0
+    kept, reached = own_data.best_candidate(
+        12,
+        lambda rows: (np.zeros((len(rows), 1)),),
+        lambda solutions, rows: (
+            np.broadcast_to(turns[rows], (len(solutions[0]), len(rows))),
+            np.broadcast_to(lengths[rows], (len(solutions[0]), len(rows))),
+        ),
+    )
+    assert not kept[4] and not kept[9] and 5e-4 < reached[0] < 1e-3 and 0.5 < reached[1] < 1.0

@@ -311,7 +311,18 @@ def test_bad_input_is_refused_in_words(call, text):
 
 
 def test_the_robust_standard_deviation_is_that_of_gaussian_noise():
-    """3 x 900 residual numbers tell it to 1.4 %; the weights alone would leave 4 % too little, and twice that undone."""
+    """3 x 900 residual numbers tell it to 1.4 %; the weights alone would leave 4 % too little."""
     T = measured(np.random.default_rng(21), 900)
     plain, found = pivot.calibrate_pivot(T), pivot.calibrate_pivot(T, robust=True)
     assert found.std == pytest.approx(plain.std, rel=0.015)
+
+
+def test_a_small_singular_value_is_told_and_none_is_called_nothing():
+    spin = pivot.touching_poses(Rotation.from_rotvec(np.outer(np.linspace(0, 3, 9), [0, 0, 1])).as_matrix(), TIP, POINT)
+    with pytest.raises(ValueError, match="singular value is practically nothing of the largest"):
+        pivot.refuse_free_tip(spin, 1e-6)
+    few = measured(np.random.default_rng(4), 9)
+    ratio = 1 / np.linalg.cond(pivot.pivot_matrix(few))
+    with pytest.raises(ValueError, match=f"singular value is {ratio:.1e} of the largest"):
+        pivot.refuse_free_tip(few, 0.9)
+    pivot.refuse_free_tip(few, 0.9 * ratio)

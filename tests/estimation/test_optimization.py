@@ -436,7 +436,30 @@ def test_a_search_that_is_stuck_has_arrived_only_where_nothing_is_promised(gradi
 def test_stationary_means_a_small_gradient_beside_the_largest_curvature():
     """H has eigenvalues 1 and 2 and a skew part, which no quadratic form has."""
     H, tol = np.array([[1.0, 5.0], [-5.0, 2.0]]), 1e-3
-    assert opt.classify_extremum([0.0, 1.9e-3], H, tol) == "minimum" and opt.classify_extremum([0.0, 1.9e-3], -H, tol) == "maximum"
+    assert (
+        opt.classify_extremum([0.0, 1.9e-3], H, tol) == "minimum"
+        and opt.classify_extremum([0.0, 1.9e-3], -H, tol) == "maximum"
+    )
     assert opt.classify_extremum([0.0, 2.1e-3], H, tol) == "not stationary"
     assert opt.classify_extremum([0.0, 0.0], np.diag([2.0, 2.1e-3]), tol) == "minimum"
     assert opt.classify_extremum([0.0, 0.0], np.diag([2.0, 1.9e-3]), tol) == "degenerate"
+
+
+@pytest.mark.parametrize("radius", [0.3, 1.0, 4.0])
+def test_the_exact_step_is_the_lowest_point_of_the_disk(radius):
+    """Convex, saddle and the hard case, where the gradient has no part along the lowest direction: by a fine search."""
+    angle, inner = np.linspace(0, 2 * np.pi, 3601), np.linspace(0, 1, 201)[:, None]
+    disk = radius * np.stack([inner * np.cos(angle), inner * np.sin(angle)], axis=-1).reshape(-1, 2)
+    for g, B in (
+        ([1.0, -2.0], [[3.0, 1.0], [1.0, 2.0]]),
+        ([1.0, -2.0], [[3.0, 1.0], [1.0, -2.0]]),
+        ([0.0, 0.5], [[-2.0, 0.0], [0.0, 1.0]]),
+        ([0.0, 0.0], [[-2.0, 0.0], [0.0, 1.0]]),
+    ):
+        g, B = np.array(g), np.array(B)
+        step = opt.exact_step(g, B, radius)
+        lowest = (disk @ g + 0.5 * np.einsum("ni,ij,nj->n", disk, B, disk)).min()
+        assert np.linalg.norm(step) <= radius * (1 + 1e-6)
+        assert step @ g + 0.5 * step @ B @ step == pytest.approx(lowest, rel=2e-3)
+        if np.linalg.eigvalsh(B)[0] < 0:
+            assert np.linalg.norm(step) == pytest.approx(radius, rel=1e-6)

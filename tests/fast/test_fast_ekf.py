@@ -134,3 +134,12 @@ def test_refuses_in_the_same_words(given):
             module.ekf_localize(*given[0], **given[1])
         said.append(str(refusal.value))
     assert said[0] == said[1]
+
+
+def test_equals_it_where_readings_are_half_a_turn_off():
+    """Innovations of the bearing over the whole circle, wrapped or not; one step, as what follows is chaos."""
+    z = simulated(LANDMARKS[:1], np.inf)[:1]
+    for off in (1.9, -2.8, 4.0, -7.0):
+        wrong = z + [0.0, off]
+        both(U[:1], wrong, LANDMARKS[:1])
+        both(U[:1], wrong, LANDMARKS[:1], wrap=False)

@@ -248,3 +248,12 @@ def test_a_notebook_shows_the_lines_as_a_list():
     shown = dataclasses.replace(found, warnings=("a < b",))._repr_html_()
     assert shown.startswith("<ul><li>120 poses from") and shown.endswith("<li>warning: a &lt; b</li></ul>")
     assert shown.count("<li>") == len(found.lines()) + 1 and repr(found) == "\n".join(found.lines())
+
+
+def test_a_mean_over_the_readings_used_is_told_when_some_are_not():
+    time, u, truth, rows, when, ids, z = course(60)
+    z[5] += [3.0, 1.0]
+    found = located(time, u, when, ids, z)
+    assert not found.used[5] and found.used.sum() > 12
+    told = found.as_dict()["mean_nis"]
+    assert told == pytest.approx(found.nis[found.used].mean()) and 0.3 < told < 4

@@ -173,3 +173,20 @@ def test_a_ray_is_cast_from_where_the_map_begins():
         far = maps.walk_ray(plain, (x, y, theta), 0.1, 30.0)
         near = maps.walk_ray(moved, (-7.0 + x / 2, 3.0 + y / 2, theta), 0.1, 15.0)
         assert near == pytest.approx(far / 2) and 0 < far < 8
+
+
+def test_a_margin_lies_around_the_lines():
+    grid = OccupancyGrid.from_lines([[1.0, 2.0, 3.0, 2.0], [3.0, 2.0, 3.0, 4.0]], 0.5, margin=1.0)
+    assert grid.extent == (0.0, 4.5, 1.0, 5.5)  # the cells that hold 0 and 4, 1 and 5
+    assert grid.at([3.1, 3.0]) == OCCUPIED and grid.at([0.1, 1.1]) == FREE == grid.at([4.4, 5.4])
+
+
+def test_the_nearest_place_on_walls_is_that_of_a_fine_search():
+    rng = np.random.default_rng(3)
+    lines = rng.uniform(-5, 5, (6, 4)) + [7, -3, 7, -3]
+    share = np.linspace(0, 1, 4001)[:, None, None]
+    along = lines[:, :2] + share * (lines[:, 2:] - lines[:, :2])
+    for point in rng.uniform(-6, 6, (30, 2)) + [7, -3]:
+        found = maps.nearest_on_lines(lines, point)
+        least = np.hypot(*(along - point).reshape(-1, 2).T).min()
+        assert np.hypot(*(found - point)) == pytest.approx(least, abs=1e-5)

@@ -9,6 +9,7 @@ from scipy.linalg import expm
 
 from labkit.documents.lecture import printed as lecture
 from labkit.estimation import gaussian
+from labkit.estimation.differences import numeric_jacobian
 from labkit.geometry import planar
 from labkit.localization import odometry
 
@@ -192,3 +193,14 @@ def test_noisy_controls_have_the_variances_of_the_error_model():
     np.testing.assert_allclose(noisy.mean(1), u, atol=5 * 0.25 / np.sqrt(runs))
     expected = [[0.02 * 0.5 / dt, (0.03 * 0.3 + 0.01 * 0.5) / dt], [0.02 * 0.2 / dt, (0.03 * 0.4 + 0.01 * 0.2) / dt]]
     np.testing.assert_allclose(noisy.var(1), expected, rtol=5 * np.sqrt(2 / runs))
+
+
+@pytest.mark.parametrize("h", [1e-9, 1e-4, 0.0099, 0.0101, 0.5, -2.0])
+def test_the_slope_of_sinc_near_zero_and_beyond(h):
+    """Its series to four more orders near zero, a difference of long step and high order elsewhere."""
+    if abs(h) < 0.02:
+        exact = h * (-1 / 3 + h**2 / 30 - h**4 / 840 + h**6 / 45360 - h**8 / 3991680)
+        limit = 1e-12 if abs(h) < 1e-2 else 1e-9  # beyond, the closed form loses four digits
+    else:
+        exact, limit = float(numeric_jacobian(lambda x: np.sinc(x / np.pi), np.array([h]), 1e-3)[0, 0]), 1e-6
+    assert odometry.sinc_slope(np.array(h)) == pytest.approx(exact, rel=limit)

@@ -227,7 +227,7 @@ def test_uniform_states_fill_each_free_cell_and_no_other():
 
 
 def test_the_mode_is_what_lies_within_one_and_a_half_bins():
-    """Bins of 0.4 m and 0.2 rad about a cloud at one place: 0.55 m and 0.25 rad belong to it, 0.65 m and 0.35 do not."""
+    """Bins of 0.4 m and 0.2 rad about one place: 0.55 m and 0.25 rad belong to it, 0.65 m and 0.35 rad do not."""
     core = np.tile([1.0, 1.0, 1.0], (50, 1))
     beside = core[:4] + np.array([[0.55, 0, 0], [0, 0.65, 0], [0, 0, 0.25], [0, 0, -0.35]])
     mode = pt.estimate_mode(np.concatenate([core, beside]), cell=0.4, turn=0.2)

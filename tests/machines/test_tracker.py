@@ -484,3 +484,14 @@ def test_the_mean_of_quaternions_is_scipys_whatever_their_signs(turn):
     assert (Rotation.from_quat(mean).inv() * R.mean()).magnitude() < 1e-12
     with pytest.raises(ValueError, match="at least one"):
         mean_quaternion(np.empty((0, 4)))
+
+
+def test_a_clock_may_begin_anywhere():
+    """Offsets and shifts in time are those of the differences: 1000 s more on every time change nothing."""
+    time = np.arange(400) * 0.01
+    curve, late = (
+        np.sin(2 * time) + 0.3 * np.sin(5.1 * time),
+        np.sin(2 * (time - 0.043)) + 0.3 * np.sin(5.1 * (time - 0.043)),
+    )
+    assert time_offset(time + 1000.0, curve, late) == pytest.approx(time_offset(time, curve, late), abs=1e-9)
+    assert time_offset(time, curve, late) == pytest.approx(0.043, abs=1e-3)
