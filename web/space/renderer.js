@@ -49,14 +49,14 @@ void main() {
 }`;
 const FLOOR_VERTEX = `#version 300 es
 precision highp float;
-in vec2 corner; uniform vec3 fall;
+in vec2 corner; uniform vec3 fall; uniform vec4 reach; // of the shadow in its own picture: low x, low y, high x, high y
 ${LENS}
 out vec2 at;
-void main() { at = 0.5 + 0.5 * corner; gl_Position = project(vec3(corner / fall.z, fall.x)); }`;
+void main() { vec2 p = mix(reach.xy, reach.zw, corner); at = 0.5 + 0.5 * p; gl_Position = project(vec3(p / fall.z, fall.x)); }`;
 const FLOOR_FRAGMENT = `#version 300 es
 precision highp float; precision highp sampler2D;
 in vec2 at; uniform sampler2D fallen; uniform vec4 shade; out vec4 shown;
-void main() { shown = shade * texture(fallen, at).a; }`;
+void main() { shown = shade * texture(fallen, at).r; }`;
 const LINE_VERTEX = `#version 300 es
 precision highp float;
 in vec2 corner; in vec3 a; in vec3 b; in vec2 along; in vec4 look; in vec2 kind; // kind: width, dash (none, dashed, dotted)
@@ -107,11 +107,14 @@ void main() {
   float size = drawn.x; int marker = int(drawn.y);
   vec2 p = (gl_PointCoord - 0.5) * (size + 2.0); vec2 q = abs(p);
   float r = 0.5 * size;
-  float d = marker == 1 ? max(q.x, q.y) - 0.9 * r : marker == 2 ? (q.x + q.y) * 0.72 - 0.85 * r
-    : marker == 3 ? abs(q.x - q.y) - 0.3 * r + max(0.0, max(q.x, q.y) - r) * 4.0 // x
-    : marker == 4 ? min(q.x, q.y) - 0.16 * r + max(0.0, max(q.x, q.y) - r) * 4.0 // +
-    : marker == 5 ? max(q.x * 1.7 + p.y, -p.y - 0.8 * r) * 0.8 - 0.55 * r // triangle up: p.y grows downward
-    : marker == 6 ? max(q.x * 1.7 - p.y, p.y - 0.8 * r) * 0.8 - 0.55 * r : length(p) - r;
+  float d = length(p) - r;
+  if (marker > 0) { // a processor that draws would work out all of them for every point
+    d = marker == 1 ? max(q.x, q.y) - 0.9 * r : marker == 2 ? (q.x + q.y) * 0.72 - 0.85 * r
+      : marker == 3 ? abs(q.x - q.y) - 0.3 * r + max(0.0, max(q.x, q.y) - r) * 4.0 // x
+      : marker == 4 ? min(q.x, q.y) - 0.16 * r + max(0.0, max(q.x, q.y) - r) * 4.0 // +
+      : marker == 5 ? max(q.x * 1.7 + p.y, -p.y - 0.8 * r) * 0.8 - 0.55 * r // triangle up: p.y grows downward
+      : max(q.x * 1.7 - p.y, p.y - 0.8 * r) * 0.8 - 0.55 * r;
+  }
   if (drawn.z > 0.5) d = abs(d + 1.0) - 1.0;
   float a = color.a * clamp(0.5 - d, 0.0, 1.0);
   if (a < 0.02) discard;
@@ -156,10 +159,11 @@ export class Renderer {
   }
 
   /** All solids of a scene as one: a processor that draws spends more on being asked than on triangles. Shapes of parts,
-   *  the `full` ones first, then those one can look through; where they are is told by `place`. */
-  solids(shapes, full) {
+   *  the `closed` ones first, then up to number `full` the others one cannot look through, then those one can; where
+   *  they are is told by `place`. */
+  solids(shapes, closed, full) {
     const { gl } = this;
-    const made = { position: [], normal: [], part: [], indices: [], full: 0, vao: gl.createVertexArray(), buffers: [], table: gl.createTexture(), count: shapes.length };
+    const made = { position: [], normal: [], part: [], indices: [], closed: 0, full: 0, vao: gl.createVertexArray(), buffers: [], table: gl.createTexture(), count: shapes.length };
     shapes.forEach((shape, number) => {
       const mesh = meshOf(shape);
       const first = made.position.length / 3;
@@ -167,6 +171,7 @@ export class Renderer {
       for (const v of mesh.normal) made.normal.push(v);
       for (let k = 0; k < mesh.position.length / 3; k++) made.part.push(number);
       for (const index of mesh.indices) made.indices.push(first + index);
+      if (number < closed) made.closed = made.indices.length;
       if (number < full) made.full = made.indices.length;
     });
     gl.bindVertexArray(made.vao);
@@ -178,8 +183,8 @@ export class Renderer {
     gl.bindVertexArray(null);
     gl.bindTexture(gl.TEXTURE_2D, made.table);
     for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
-    const { full: opaque, vao, buffers, table, count } = made;
-    return { full: opaque, all: made.indices.length, vao, buffers, table, count };
+    const { closed: shut, full: opaque, vao, buffers, table, count } = made;
+    return { closed: shut, full: opaque, all: made.indices.length, vao, buffers, table, count, bounds: shapes.slice(0, full).map(boundsOf) };
   }
 
   attribute(program, made, name, size, data) {
@@ -197,6 +202,7 @@ export class Renderer {
   place(solids, numbers) {
     const { gl } = this;
     solids.cast = false;
+    solids.numbers = numbers;
     gl.bindTexture(gl.TEXTURE_2D, solids.table);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, PART_NUMBERS / 4, solids.count, 0, gl.RGBA, gl.FLOAT, numbers);
   }
@@ -302,11 +308,16 @@ export class Renderer {
     const range = lens.eye > 0 ? [(far + NEAR) / (far - NEAR), (-2 * far * NEAR) / (far - NEAR)] : [0, 1 / lens.reach];
     const common = { axes: lens.axes, center: lens.center, lens: [...lens.scale, lens.eye, lens.perUnit], range, room: [width, height], ratio: lens.ratio };
     if (solids) {
-      if (shaded) this.drawShadow(solids, common, fall, shadow);
       gl.useProgram(this.solid.program);
       gl.bindVertexArray(solids.vao);
       setUniforms(this.solid, { ...common, parts: solids.table, fall: [0, 0, 0] });
-      this.drawPart(0, solids.full);
+      const seen = solids.mirrored ? 0 : solids.closed; // of what is closed one sees the outside alone
+      gl.enable(gl.CULL_FACE);
+      gl.cullFace(gl.BACK);
+      this.drawPart(0, seen);
+      gl.disable(gl.CULL_FACE);
+      this.drawPart(seen, solids.full);
+      if (shaded) this.drawShadow(solids, common, fall, shadow); // after what hides it
     }
     this.drawPaths(lines, points, common, 1);
     gl.depthMask(false);
@@ -343,11 +354,11 @@ export class Renderer {
     if (!solids.shadow) {
       solids.shadow = { frame: gl.createFramebuffer(), texture: gl.createTexture(), quad: { vao: gl.createVertexArray(), buffers: [] } };
       gl.bindTexture(gl.TEXTURE_2D, solids.shadow.texture);
-      gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA8, size, size);
+      gl.texStorage2D(gl.TEXTURE_2D, 1, gl.R8, size, size);
       for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
       gl.bindVertexArray(solids.shadow.quad.vao);
-      this.attribute(this.floor, solids.shadow.quad, "corner", 2, new Float32Array([-1, -1, 1, -1, -1, 1, 1, 1]));
+      this.attribute(this.floor, solids.shadow.quad, "corner", 2, new Float32Array([0, 0, 1, 0, 0, 1, 1, 1]));
     }
     gl.bindFramebuffer(gl.FRAMEBUFFER, solids.shadow.frame);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, solids.shadow.texture, 0);
@@ -361,13 +372,14 @@ export class Renderer {
     setUniforms(this.solid, { parts: solids.table, fall });
     this.drawPart(0, solids.full);
     solids.cast = true;
+    solids.shadow.reach = reachOf(solids, fall, 2 / size);
   }
 
   drawShadow(solids, common, fall, shade) {
     const { gl } = this;
     gl.useProgram(this.floor.program);
     gl.bindVertexArray(solids.shadow.quad.vao);
-    setUniforms(this.floor, { ...common, fall, fallen: solids.shadow.texture, shade });
+    setUniforms(this.floor, { ...common, fall, fallen: solids.shadow.texture, shade, reach: solids.shadow.reach });
     gl.depthMask(false);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
     gl.depthMask(true);
@@ -388,6 +400,35 @@ export class Renderer {
       gl.drawArrays(gl.POINTS, 0, points.count);
     }
   }
+}
+
+/** How far the shadow reaches in its own picture, [low x, low y, high x, high y], and by `more` around. */
+function reachOf({ numbers, bounds }, fall, more) {
+  const reach = [1, 1, -1, -1];
+  bounds.forEach(([low, high], number) => {
+    const m = numbers.subarray(PART_NUMBERS * number, PART_NUMBERS * (number + 1));
+    if (m[19] === 0) return; // out of sight
+    for (let corner = 0; corner < 8; corner++) {
+      const p = low.map((v, k) => (corner & (1 << k) ? high[k] : v));
+      const [x, y, z] = [0, 1, 2].map((k) => m[k] * p[0] + m[4 + k] * p[1] + m[8 + k] * p[2] + m[12 + k]);
+      [x + 0.28 * (z - fall[0]), y - 0.2 * (z - fall[0])].forEach((v, k) => {
+        reach[k] = Math.max(-1, Math.min(reach[k], v * fall[2] - more));
+        reach[k + 2] = Math.min(1, Math.max(reach[k + 2], v * fall[2] + more));
+      });
+    }
+  });
+  return reach;
+}
+
+/** Lowest and highest x, y, z of a solid. */
+function boundsOf(shape) {
+  const { position } = meshOf(shape);
+  const bounds = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
+  position.forEach((v, k) => {
+    bounds[0][k % 3] = Math.min(bounds[0][k % 3], v);
+    bounds[1][k % 3] = Math.max(bounds[1][k % 3], v);
+  });
+  return bounds;
 }
 
 const meshes = new Map();

@@ -6,6 +6,11 @@ export function triangles(shape) {
   return { turned, raised, tube }[shape.kind](shape);
 }
 
+/** Whether one can never see its inside. */
+export function isClosed({ kind, profile }) {
+  return kind === "raised" || (kind === "turned" && profile[0][0] === 0 && profile[profile.length - 1][0] === 0);
+}
+
 /** A profile of (radius, height), turned about z; round where its pieces meet at a small angle. */
 function turned({ profile }) {
   const largest = Math.max(...profile.map(([r]) => r));

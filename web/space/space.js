@@ -5,7 +5,7 @@
 // `space` and its numbers are enough.
 
 import { LINE_NUMBERS, MARKERS, PART_NUMBERS, POINT_NUMBERS, Renderer } from "./renderer.js";
-import { dot } from "./solids.js";
+import { dot, isClosed } from "./solids.js";
 
 const DEGREES_PER_PIXEL = 0.5;
 const ZOOM = [0.2, 12];
@@ -286,8 +286,10 @@ class Scene {
     Object.assign(this, { radius, halfWidth, unit, floor, colors, view, place: null });
     this.items = items.map((item) => new { path: Path, text: Words, triad: Triad, body: Body }[item.kind](item));
     const owned = this.items.flatMap((item) => (item.parts ?? []).map((part) => ({ item, part })));
-    this.parts = [...owned.filter(({ part }) => part.opacity >= 1), ...owned.filter(({ part }) => part.opacity < 1)];
-    this.full = owned.filter(({ part }) => part.opacity >= 1).length;
+    const kinds = [0, 1, 2].map((kind) => owned.filter(({ part }) => (part.opacity < 1 ? 2 : isClosed(part.shape) ? 0 : 1) === kind));
+    this.parts = kinds.flat();
+    this.closed = kinds[0].length;
+    this.full = this.closed + kinds[1].length;
     this.paths = this.items.filter((item) => item instanceof Path);
     this.given = {};
     this.canvas = document.createElement("canvas");
@@ -333,7 +335,7 @@ class Scene {
     renderer.draw(dw, dh, lens, { ...this.given, floor: this.floor, shadow, wide: Math.max(this.radius, this.halfWidth) }, !(renderer.software && this.view.moving));
     this.paper.setTransform(1, 0, 0, 1, 0, 0); // `write` leaves CSS pixels behind
     this.paper.clearRect(0, 0, w, h);
-    this.paper.imageSmoothingQuality = "high";
+    this.paper.imageSmoothingQuality = this.view.moving ? "low" : "high"; // cubic costs a processor as much as the solids
     this.paper.drawImage(renderer.canvas, 0, 0, dw, dh, 0, 0, w, h);
     this.write(w / cssWidth, cssWidth, cssHeight, pixels);
   }
@@ -344,13 +346,14 @@ class Scene {
     if (this.age !== renderer.age) Object.assign(this, { age: renderer.age, given: {}, moved: true, redrawn: true });
     if (this.dark !== dark) Object.assign(this, { dark, moved: true, redrawn: true });
     if (this.moved && this.parts.length) {
-      this.given.solids ??= renderer.solids(this.parts.map(({ part }) => part.shape), this.full);
+      this.given.solids ??= renderer.solids(this.parts.map(({ part }) => part.shape), this.closed, this.full);
       this.table ??= new Float32Array(PART_NUMBERS * this.parts.length);
       this.parts.forEach(({ item, part }, k) => {
         const color = item.shown ? [...rgb(part.color[Number(dark)]), part.opacity] : [0, 0, 0, 0];
         if (part.pose) this.table.set(part.pose, PART_NUMBERS * k);
         this.table.set(color, PART_NUMBERS * k + 16);
       });
+      this.given.solids.mirrored = this.parts.some(({ part }, k) => k < this.closed && part.pose && turnsInsideOut(part.pose));
       renderer.place(this.given.solids, this.table);
     }
     if (this.redrawn) {
@@ -536,6 +539,11 @@ function times(a, b) {
   const out = new Float32Array(16);
   for (let c = 0; c < 4; c++) for (let r = 0; r < 4; r++) for (let k = 0; k < 4; k++) out[4 * c + r] += a[4 * k + r] * b[4 * c + k];
   return out;
+}
+
+/** Whether a pose in columns shows the inside of a body. */
+function turnsInsideOut(m) {
+  return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[4] * (m[1] * m[10] - m[2] * m[9]) + m[8] * (m[1] * m[6] - m[2] * m[5]) < 0;
 }
 
 class Body {
