@@ -291,6 +291,7 @@ class Scenes {
   /** Places of the handles, as one looks now. */
   placed(places) {
     if (!this.live) return places;
+    this.view.measure();
     const seen = ([name, place]) => [name, place.point ? { ...place, at: this.view.fraction(place.point, place.scene) } : place];
     return Object.fromEntries(Object.entries(places).map(seen));
   }
@@ -486,8 +487,9 @@ class Handles {
   }
 
   show(places) {
-    for (const handle of this.all) handle.put(places[handle.name]);
-    this.fan();
+    const box = this.place.getBoundingClientRect(); // before anything moves: the page need not be laid out for it
+    for (const handle of this.all) handle.put(places[handle.name], box);
+    this.fan(box);
   }
 
   goBack() {
@@ -495,8 +497,7 @@ class Handles {
   }
 
   /** Handles that lie on each other are drawn around their spot, each with its name, and can be pulled one by one. */
-  fan() {
-    const box = this.place.getBoundingClientRect();
+  fan(box) {
     const spots = this.all.map((h) => [h.at[0] * box.width, h.at[1] * box.height]);
     this.all.forEach((handle, k) => {
       const group = this.all.map((_, j) => j).filter((j) => Math.hypot(spots[j][0] - spots[k][0], spots[j][1] - spots[k][1]) < NEAR);
@@ -561,7 +562,7 @@ class Handle {
     this.node.style.top = `${100 * down}%`;
   }
 
-  put(place) {
+  put(place, box) {
     this.last = place.at;
     this.node.hidden = false;
     this.node.style.setProperty("--ring", place.color);
@@ -569,7 +570,6 @@ class Handle {
     this.node.setAttribute("aria-valuenow", place.now);
     if (this.held && !this.corrected) {
       if (this.line.pending.drag?.[this.name] !== undefined || this.line.flight !== null) return; // the pointer is further already
-      const box = this.place.getBoundingClientRect();
       this.corrected = Math.hypot((place.at[0] - this.at[0]) * box.width, (place.at[1] - this.at[1]) * box.height) > 2;
     }
     this.move(place.at);

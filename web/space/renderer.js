@@ -285,10 +285,11 @@ export class Renderer {
     return frame;
   }
 
-  /** Draw one scene, width x height device pixels, which the canvas takes on; `smooth` edges cost a processor much.
+  /** Draw one scene, width x height device pixels, which the canvas takes on; `smooth` edges cost a processor much, and
+   *  `quick` leaves out the points that bodies hide.
    *  lens: {axes (9 numbers, columns), center, scale [x, y], eye, perUnit (device pixels), ratio (device pixels a CSS
    *  pixel), reach (how deep the scene is)}. */
-  draw(width, height, lens, { solids, lines, points, floor, shadow, wide }, smooth) {
+  draw(width, height, lens, { solids, lines, points, floor, shadow, wide }, smooth, quick) {
     const { gl, canvas } = this;
     const fall = [floor ?? 0, 0, 1 / (SHADOWED * wide)];
     const shaded = solids && shadow && floor !== null;
@@ -332,7 +333,7 @@ export class Renderer {
       gl.disable(gl.CULL_FACE);
     }
     gl.depthFunc(gl.GREATER); // what lies behind a body shines through a little
-    this.drawPaths(lines, points, common, 0.22);
+    this.drawPaths(lines, quick ? null : points, common, 0.22);
     gl.bindVertexArray(null);
     if (!frame) return;
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, frame);

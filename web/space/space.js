@@ -10,8 +10,9 @@ import { dot, isClosed } from "./solids.js";
 const DEGREES_PER_PIXEL = 0.5;
 const ZOOM = [0.2, 12];
 const MAX_PIXELS = 3e6;
-const SLOW = 30; // ms a picture may take until it is drawn coarser while it moves
-const CALM = 160; // ms of rest until it is drawn as sharply as it can be
+const SLOW = 20; // ms a picture may take until it is drawn coarser while it moves
+const CALM = 160; // ms of rest until it is drawn as sharply as it can be,
+const HELD = 500; // while a finger or a button is down, which may go on at any moment
 const SCALES = [1, 0.75, 0.5];
 const AXIS_VIEWS = { x: [0, 0], y: [90, 0], z: [-90, 90] };
 const LETTER = 12; // CSS pixels
@@ -51,7 +52,7 @@ export class View {
    *  first; onMove(): handles follow; onAble(): whether this page can draw has changed; seat(tools): where the
    *  buttons of the view go, beside the picture, not on it; width: the picture's as designed, CSS pixels. */
   constructor(place, target, spaces, home, { onMove, onAble, seat, width }) {
-    Object.assign(this, { width, place, target, onMove, onAble, shown: false, dirty: false, frame: 0, calm: 0, coarse: 0, slow: 0, moving: false, told: true });
+    Object.assign(this, { width, place, target, onMove, onAble, shown: false, dirty: false, frame: 0, calm: 0, coarse: 0, slow: 0, moving: false, told: true, turned: false, held: false });
     this.scenes = spaces.map((space) => new Scene(space, this));
     Object.assign(this, { home, state: home });
     this.dark = false;
@@ -104,6 +105,8 @@ export class View {
     on("pointerdown", (event) => this.down(event), { capture: true });
     on("pointermove", (event) => this.moved(event), { capture: true });
     for (const type of ["pointerup", "pointercancel", "lostpointercapture"]) on(type, (event) => this.pointers.delete(event.pointerId), { capture: true });
+    this.place.addEventListener("pointerdown", () => { this.held = true; }, { signal: this.ended.signal, capture: true });
+    for (const type of ["pointerup", "pointercancel"]) window.addEventListener(type, () => this.letGo(), { signal: this.ended.signal, capture: true });
   }
 
   /** Two fingers, the right button or Shift move and zoom; one finger turns, by stage.js. */
@@ -174,18 +177,27 @@ export class View {
 
   go(changes) {
     this.state = { ...this.state, ...changes };
-    this.told = false;
+    Object.assign(this, { told: false, turned: true });
     this.stir();
-    this.onMove();
   }
 
   /** Something moves: quick pictures now, a sharp one once it has come to rest. */
   stir() {
     this.moving = true;
     this.place.dataset.rest = false;
-    clearTimeout(this.calm);
-    this.calm = setTimeout(() => { this.moving = false; this.request(); }, CALM);
+    this.settle();
     this.request();
+  }
+
+  settle() {
+    clearTimeout(this.calm);
+    this.calm = setTimeout(() => { this.moving = false; this.request(); }, this.held ? HELD : CALM);
+  }
+
+  letGo() {
+    if (!this.held) return;
+    this.held = false;
+    if (this.moving) this.settle();
   }
 
   /** For Python, once for each change. */
@@ -229,7 +241,12 @@ export class View {
     this.target.dataset.space = on;
   }
 
-  /** Where a point is, in fractions of the picture: right, down. */
+  /** The picture's size now, CSS pixels: asked for once a picture, as the page may have to be laid out for it. */
+  measure() {
+    this.room = [this.place.clientWidth, this.place.clientHeight];
+  }
+
+  /** Where a point is, in fractions of the picture as it was measured: right, down. */
   fraction(point, scene = 0) {
     return this.scenes[scene].fraction(point);
   }
@@ -249,6 +266,9 @@ export class View {
 
   draw() {
     this.frame = 0;
+    this.measure();
+    if (this.turned) this.onMove();
+    this.turned = false;
     if (!this.shown || renderer.lost) return;
     this.dirty = false;
     const start = performance.now();
@@ -265,7 +285,7 @@ export class View {
   /** Coarser after several slow pictures, finer after many quick ones. */
   adapt(took) {
     this.slow = took > SLOW ? Math.max(1, this.slow + 1) : took < SLOW / 3 ? Math.min(-1, this.slow - 1) : 0;
-    if (this.slow >= 3) [this.coarse, this.slow] = [Math.min(this.coarse + 1, SCALES.length - 1), 0];
+    if (this.slow >= 2) [this.coarse, this.slow] = [Math.min(this.coarse + 1, SCALES.length - 1), 0];
     else if (this.slow <= -20) [this.coarse, this.slow] = [Math.max(this.coarse - 1, 0), 0];
   }
 
@@ -299,7 +319,7 @@ class Scene {
   }
 
   unitsPerPixel() {
-    return this.place[4] / this.view.place.clientWidth;
+    return this.place[4] / this.view.room[0];
   }
 
   fraction(point) {
@@ -307,14 +327,14 @@ class Scene {
     const { center, eye, zoom } = this.view.state;
     const p = this.view.axes().map((axis) => dot(axis, point.map((v, k) => v - center[k])));
     const near = zoom / (eye > 0 ? Math.max(1 - p[2] / eye, 0.05) : 1);
-    const aspect = this.view.place.clientWidth / this.view.place.clientHeight;
+    const aspect = this.view.room[0] / this.view.room[1];
     return [left + width / 2 + (near * p[0]) / units, top + height / 2 - (near * p[1] * aspect) / units];
   }
 
   draw(scale) {
     const [left, top, width, height, units] = this.place;
-    const room = this.view.place;
-    const [cssWidth, cssHeight] = [width * room.clientWidth, height * room.clientHeight];
+    const { room } = this.view;
+    const [cssWidth, cssHeight] = [width * room[0], height * room[1]];
     if (cssWidth < 2 || cssHeight < 2) return;
     Object.assign(this.canvas.style, { left: `${100 * left}%`, top: `${100 * top}%`, width: `${100 * width}%`, height: `${100 * height}%` });
     const ratio = Math.min(window.devicePixelRatio || 1, Math.sqrt(MAX_PIXELS / (cssWidth * cssHeight)));
@@ -323,7 +343,7 @@ class Scene {
     const [dw, dh] = [Math.round(w * scale), Math.round(h * scale)];
     const { zoom, eye, center } = this.view.state;
     const [x, y, z] = this.view.axes();
-    const pixels = (zoom * room.clientWidth) / units; // CSS pixels a unit, at the center
+    const pixels = (zoom * room[0]) / units; // CSS pixels a unit, at the center
     const drawn = dw / cssWidth; // device pixels a CSS pixel
     const lens = {
       axes: [x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]], center, eye, perUnit: pixels * drawn,
@@ -332,7 +352,7 @@ class Scene {
     this.give();
     this.triangles = this.given.solids ? this.given.solids.all / 3 : 0;
     const shadow = z[2] > 0 ? (this.view.dark ? [0, 0, 0, 0.5] : [0, 0, 0, 0.16]) : null;
-    renderer.draw(dw, dh, lens, { ...this.given, floor: this.floor, shadow, wide: Math.max(this.radius, this.halfWidth) }, !(renderer.software && this.view.moving));
+    renderer.draw(dw, dh, lens, { ...this.given, floor: this.floor, shadow, wide: Math.max(this.radius, this.halfWidth) }, !(renderer.software && this.view.moving), scale < 1);
     this.paper.setTransform(1, 0, 0, 1, 0, 0); // `write` leaves CSS pixels behind
     this.paper.clearRect(0, 0, w, h);
     this.paper.imageSmoothingQuality = this.view.moving ? "low" : "high"; // cubic costs a processor as much as the solids
@@ -377,9 +397,8 @@ class Scene {
     const { paper } = this;
     const dark = Number(this.view.dark);
     const [left, top, wide, high] = this.place;
-    const room = this.view.place;
-    const style = getComputedStyle(room);
-    const shrunk = clip(room.clientWidth / (CROWDED * this.view.width), SMALLEST, 1); // as the picture around shrinks
+    const style = getComputedStyle(this.view.place);
+    const shrunk = clip(this.view.room[0] / (CROWDED * this.view.width), SMALLEST, 1); // as the picture around shrinks
     const size = shrunk * (parseFloat(style.fontSize) / 13) * LETTER;
     paper.setTransform(ratio, 0, 0, ratio, 0, 0);
     const at = (point) => {
