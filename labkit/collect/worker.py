@@ -74,7 +74,7 @@ class Worker:
 
         self.scope = scope
         self.border = Border(reading, writing, run_guarded)
-        self.border.handlers |= {"prepare": self._prepare, "run": self._run}
+        self.border.handlers |= {"prepare": self._prepare, "run": self._run, "rerun": self.border._rerun}
         self.shell = self.pristine = None
 
     def _prepare(self, parts, chapter, exercises, references, library, secret, readable, own):

@@ -7,6 +7,7 @@ business of `session`.
 """
 
 import copy
+import functools
 import hashlib
 import inspect
 import itertools
@@ -16,7 +17,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from . import arguments, cases, guard, metrics, operands, quantities, relations, scope, shapes, slips
+from . import arguments, cases, guard, metrics, operands, quantities, relations, rerun, scope, shapes, slips, steps
 from .typeset import typeset
 
 TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
@@ -24,6 +25,7 @@ NOISY = "exact on clean data, but the data are not weighed as they should be: on
 TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws of each kind
 MANY_DIGITS = 1e-3  # by how much better some draws come out where one case is special
 MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried, to tell on which
+MORE_CASES = 8  # on which an explanation from the first draws is tried once more
 LOOKING = 0.5  # seconds of processor time in which changes of arguments, or of the formula, are tried as explanation
 UNITS = {
     "mm": ("length", 1e-3),
@@ -231,11 +233,14 @@ class _Trial:
         named = self._named_mistake() or self._named_in_parts()
         if named:
             return named
-        words = self._relation(whole=True) or self._other_arguments() or self._terms() or self._one_change()
+        words = self._relation(whole=True) or self._other_arguments() or self._terms()
+        step = None if words else self._step()
+        words = words or (step if not self.refusal else None) or self._one_change()
         if words:
             return self.outcome(NOT_YET, _closed(words) + self._about_globals())
         if self.refusal:
-            return self.outcome(NOT_YET, _closed(self.refusal) + self._other_shape() + self._about_globals())
+            words = self._other_shape() or (f" {step[0].upper()}{_closed(step[1:])}" if step else "")
+            return self.outcome(NOT_YET, _closed(self.refusal) + words + self._about_globals())
         if self._right_on_plain():
             for metric, pair, words in zip(self.metrics, self.pairs, self.words):
                 if words and not metric.equal(*pair):
@@ -297,6 +302,34 @@ class _Trial:
                 return None
             told.append(f"{name}: {words}" if name else words)
         return "\n".join(map(_closed, told)) or None
+
+    def _step(self):
+        """At which step of the student's own code it goes wrong, and in which way."""
+        if self.exercise.metric is None or not self.inputs or self.spent > LOOKING:
+            return None
+        written = rerun.written(self.function)
+        if written is None:
+            return None
+        drawn = [
+            steps.Case(args, metric, pair[1], not isinstance(pair[0], _Refusal) and metric.equal(*pair))
+            for args, metric, pair in zip(self.inputs, self.metrics, self.pairs)
+        ]
+        found = [None if isinstance(pair[0], _Refusal) else rerun.numeric(pair[0]) for pair in self.pairs]
+        search = steps.Search(written, self._names(self.inputs[0]), drawn, found, self._fresh_cases, LOOKING / 2)
+        return search.words(lambda cases: steps.of_solution(self.exercise, cases, LOOKING / 2))
+
+    @functools.cached_property
+    def _fresh(self):
+        """More draws of the plain kinds, on which an explanation is tried once more."""
+        rng, found = np.random.default_rng(0), []
+        for draw in itertools.islice(itertools.cycle(self.exercise.cases), MORE_CASES):
+            args = draw(rng)
+            found.append(steps.Case(args, self.exercise.metric, self.exercise.reference(*copy.deepcopy(args))))
+        return found
+
+    def _fresh_cases(self, kind):
+        """Those for a kind of change; values from the solution are those of certain draws, and go with no others."""
+        return () if kind == "given" else self._fresh
 
     def _one_change(self):
         """Whether the results are those of a right formula with one change, with this in words."""

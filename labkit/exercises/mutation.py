@@ -1,11 +1,16 @@
 """All single changes of a function's syntax tree: the slips that a hand makes in a right formula.
 
-Each comes with words that say what was changed, to be read behind "your result is what a right formula gives". The
-general layer compares a wrong result with what these give; `tests/bench/mutants.py` types them into the checks.
+Each comes with words that say what was changed, to be read behind "your result is what a right formula gives", and
+with words for the other direction, where the change is made in a wrong function and mends it. The general layer
+compares a wrong result with what the first give (`slips`), and mends a student's own code by the second (`steps`);
+`tests/bench/mutants.py` types them into the checks.
 """
 
 import ast
+import contextlib
 import copy
+import re
+from dataclasses import dataclass
 
 PAIRS = (
     *(("sin", "cos"), ("arcsin", "arccos"), ("min", "max"), ("minimum", "maximum"), ("argmin", "argmax")),
@@ -53,43 +58,117 @@ WITHOUT = {
 }
 
 
+@dataclass(frozen=True)
+class Change:
+    """One change of a function's syntax tree.
+
+    words:  what was changed in a right formula, behind "your result is what a right formula gives".
+    mends:  what is wrong where this change makes a function right, as a clause: "plus stands where minus belongs".
+    rank:   how unlikely it is.
+    place:  the part of the tree that is changed.
+    sets:   (node, name of its field, new content), one or two.
+    """
+
+    words: str
+    mends: str
+    rank: int
+    place: ast.AST
+    sets: tuple
+
+    @contextlib.contextmanager
+    def made(self):
+        """Within, the function's own tree is the changed one."""
+        before = [(node, field, getattr(node, field)) for node, field, _ in self.sets]
+        for node, field, new in self.sets:
+            setattr(node, field, new)
+        try:
+            yield
+        finally:
+            for node, field, old in before:
+                setattr(node, field, old)
+
+    def tree(self, function):
+        """The changed function, as a tree of its own."""
+        with self.made():
+            return ast.fix_missing_locations(copy.deepcopy(function))
+
+
 def changes(function, most=4):
-    """All single changes of a function, the likeliest slips first.
+    """All single changes of a function, the likeliest slips first; a changed tree is made when it is asked for.
 
     Parameters
     ----------
     function : ast.FunctionDef
-        A right solution.
+        A right solution, or a student's.
     most : int
         How unlikely the changes may be: 0 for signs and operators, 1 with what is left out or exchanged, 2 with numbers
         and signs of single names, 3 and 4 with parts squared and names in place of others.
 
     Returns
     -------
-    changes : list of (str, ast.FunctionDef)
-        What was changed, in words, and the function that came of it.
+    changes : list of Change
     """
-    found = []
-    names = _names(function)
-    for k, node in enumerate(ast.walk(function)):
-        for rank, words, new in _changed(node, names):
-            if rank <= most:
-                found.append((rank, len(found), words, _with(function, k, new)))
+    found, names = [], _names(function)
+    for owner in ast.walk(function):
+        for field, content in ast.iter_fields(owner):
+            for i, node in enumerate(content if isinstance(content, list) else [content]):
+                if not isinstance(node, ast.AST):
+                    continue
+                for rank, words, new in _changed(node, names):
+                    if rank <= most:
+                        _locate(new, node)
+                        whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
+                        mends = _mends(words, node, new)
+                        found.append(Change(words, mends, rank, node, ((owner, field, whole),)))
     if most:
-        found += [(1, len(found) + i, words, tree) for i, (words, tree) in enumerate(_statements(function))]
-    return [(words, tree) for _, _, words, tree in sorted(found, key=lambda change: change[:2])]
+        found += _statements(function)
+    return sorted(found, key=lambda change: change.rank)
 
 
-def _with(function, k, new):
-    """A copy of the function in which the k-th node of the walk is another one."""
-    tree = copy.deepcopy(function)
-    target = next(node for i, node in enumerate(ast.walk(tree)) if i == k)
+def _locate(new, node):
+    """What takes a node's place stands in its line."""
+    if "lineno" in new._attributes and not hasattr(new, "lineno"):
+        ast.copy_location(new, node)
+    ast.fix_missing_locations(new)
 
-    class Exchange(ast.NodeTransformer):
-        def visit(self, node):
-            return copy.deepcopy(new) if node is target else self.generic_visit(node)
 
-    return ast.fix_missing_locations(Exchange().visit(tree))
+REVERSED = (  # (words of what was changed in a right formula, what is wrong where the change mends)
+    (r"with (.+) where (.+) belongs", r"\2 stands where \1 belongs"),
+    (r"without one of its (.+)s", r"one \1 is too many"),
+    (r"without one matrix of a product", "one matrix of the product is too many"),
+    (r"without `(\w+)=` in one call", r"`\1=` does not belong there"),
+    (r"without `(\w+)`", r"`\1` is too much"),
+    (r"with one transpose too many, or too few", "one transpose is missing, or too many"),
+    (r"with (.+) (turned around|turned over|exchanged)", r"\1 is \2"),
+    (r"with one sign turned", "the sign is the other one"),
+    (r"with one part squared", "the square of this belongs there"),
+    (r"with the root of one part taken", "the root of this belongs there"),
+    (r"with one angle in degrees", "this belongs there in degrees"),
+    (r"along another axis in one call", "the axis is another one"),
+    (r"with one case treated like the other", "this case needs no treatment of its own"),
+    (r"with ([01]) in the place of one part", r"\1 belongs in the place of this"),
+    (r"with one row or column too many, the (\w+)", r"the \1 row or column is left out, and belongs there"),
+    (r"with one round of its loop", "the loop is to take one round only"),
+    (r"with one case (never|always) taken", r"this case is to be \1 taken"),
+    (r"with `=` where a value is to be added to", "`+=` stands where `=` belongs"),
+)
+
+
+def _mends(words, node, new):
+    """What is wrong with a function that this change makes right."""
+    if isinstance(node, ast.Name):
+        return _name_that_mends(words, node, new)
+    for said, told in REVERSED:
+        if re.fullmatch(said, words):
+            told = re.sub(said, told, words)
+            return re.sub(r"^(two .+|the factors .+|.* and .+|the two .+) is ", r"\1 are ", told)
+    return ""
+
+
+def _name_that_mends(words, node, new):
+    if isinstance(new, ast.Name | ast.Constant):
+        return f"`{node.id}` stands where `{ast.unparse(new)}` belongs"
+    return {"with one sign turned": f"`{node.id}` has the wrong sign"}.get(words, f"`{ast.unparse(new)}` belongs there")
 
 
 def _names(function):
@@ -170,6 +249,9 @@ def _call(node, names):
             yield 0, words, ast.Call(ast.Attribute(node.func.value, twin, ast.Load()), node.args, node.keywords)
         else:
             yield 0, words, ast.Call(ast.Name(twin, ast.Load()), node.args, node.keywords)
+    if name == "arctan" and node.args and isinstance(getattr(node.args[0], "op", None), ast.Div):
+        both = _numpy("arctan2", node.args[0].left, node.args[0].right)
+        yield 0, "with `arctan2` where `arctan` of a quotient belongs", both
     if name == "arctan2" and len(node.args) == 2:
         quotient = _numpy("arctan", ast.BinOp(node.args[0], ast.Div(), node.args[1]))
         yield 0, "with `arctan` of a quotient where `arctan2` belongs", quotient
@@ -267,37 +349,60 @@ def _subscript(node, names):
 
 
 def _statements(function):
-    """(words, tree) for every step left out, and every loop that takes one round only."""
-    for k, node in enumerate(ast.walk(function)):
+    """Steps left out, loops that take one round only, cases never or always taken, steps in another order or block."""
+    for owner in ast.walk(function):
         for field in ("body", "orelse"):
-            block = getattr(node, field, None)
-            if not isinstance(block, list):
-                continue
-            for i, statement in enumerate(block):
-                if isinstance(statement, ast.Assign | ast.AugAssign | ast.If | ast.For | ast.Expr) and not _is_told(
-                    statement
-                ):
-                    yield "without one of its steps", _shorter(function, k, field, i)
-                if isinstance(statement, ast.AugAssign):
-                    new = ast.Assign([statement.target], statement.value)
-                    yield "with `=` where a value is to be added to", _shorter(function, k, field, i, new)
-                if isinstance(statement, ast.For):
-                    once = [*statement.body, ast.Break()]
-                    loop = ast.For(statement.target, statement.iter, once, [], None)
-                    yield "with one round of its loop", _shorter(function, k, field, i, loop)
-                if isinstance(statement, ast.If):
-                    for words, test in (("never", False), ("always", True)):
-                        new = ast.If(ast.Constant(test), statement.body, statement.orelse)
-                        yield f"with one case {words} taken", _shorter(function, k, field, i, new)
+            block = getattr(owner, field, None)
+            if isinstance(block, list):
+                for i, statement in enumerate(block):
+                    for words, mends, new in _instead(statement):
+                        for part in new:
+                            _locate(part, statement)
+                        sets = ((owner, field, [*block[:i], *new, *block[i + 1 :]]),)
+                        yield Change(words, mends, 1, statement, sets)
+                    yield from _elsewhere(owner, field, block, i)
+
+
+def _instead(statement):
+    """(words, what is wrong where it mends, statements) of what may stand in a statement's place."""
+    kinds = ast.Assign | ast.AugAssign | ast.If | ast.For | ast.Expr
+    if isinstance(statement, kinds) and not _is_told(statement):
+        yield "without one of its steps", "this step is too many", [ast.Pass()]
+    if isinstance(statement, ast.AugAssign):
+        words, mends = "with `=` where a value is to be added to", "`+=` stands where `=` belongs"
+        yield words, mends, [ast.Assign([statement.target], statement.value)]
+    if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name | ast.Subscript):
+        mends = "`=` throws away what was there before, which belongs to the result: `+=`"
+        yield "with `+=` where `=` belongs", mends, [ast.AugAssign(statement.targets[0], ast.Add(), statement.value)]
+    if isinstance(statement, ast.For):
+        once = [*statement.body, ast.Break()]
+        mends = "the loop is to take one round only"
+        yield "with one round of its loop", mends, [ast.For(statement.target, statement.iter, once, [], None)]
+    if isinstance(statement, ast.If):
+        for words, test in (("never", False), ("always", True)):
+            new = ast.If(ast.Constant(test), statement.body, statement.orelse)
+            mends = f"what stands under this condition is to happen {words}"
+            yield f"with one case {words} taken", mends, [new]
+
+
+def _elsewhere(owner, field, block, i):
+    """Two neighboring steps exchanged; the last one of a loop behind it, or the one behind it in the loop."""
+    here, behind = block[i], block[i + 1] if i + 1 < len(block) else None
+    if behind is not None and not isinstance(here, ast.Return):
+        order = [*block[:i], behind, here, *block[i + 2 :]]
+        mends = "this step and the one behind it are in the wrong order"
+        yield Change("with two of its steps exchanged", mends, 1, here, ((owner, field, order),))
+    if not isinstance(here, ast.For | ast.While):
+        return
+    if len(here.body) > 1:
+        out = ((here, "body", here.body[:-1]), (owner, field, [*block[: i + 1], here.body[-1], *block[i + 1 :]]))
+        mends = "this stands inside the loop, at its end, and belongs behind it"
+        yield Change("with one step of a loop behind it", mends, 1, here.body[-1], out)
+    if behind is not None and not isinstance(behind, ast.Return):
+        into = ((here, "body", [*here.body, behind]), (owner, field, [*block[: i + 1], *block[i + 2 :]]))
+        mends = "this stands behind the loop and belongs into it, at its end"
+        yield Change("with a step drawn into a loop", mends, 1, behind, into)
 
 
 def _is_told(statement):
     return isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
-
-
-def _shorter(function, k, field, i, new=None):
-    """A copy of the function without one statement, or with another one in its place."""
-    tree = copy.deepcopy(function)
-    block = getattr(next(node for j, node in enumerate(ast.walk(tree)) if j == k), field)
-    block[i] = copy.deepcopy(new) if new is not None else ast.Pass()
-    return ast.fix_missing_locations(tree)

@@ -5,6 +5,7 @@ said is true by construction, and names the slip without showing the formula.
 """
 
 import ast
+import copy
 import functools
 import warnings
 
@@ -23,14 +24,25 @@ def changed_formulas(exercise):
     if solution is None:
         return
     function, known = solution
-    for words, tree in _changes(exercise.chapter.notebook, exercise.id)[:RANKS]:
+    for change in _changes(exercise.chapter.notebook, exercise.id)[:RANKS]:
         namespace = dict(known)
         try:
-            with warnings.catch_warnings(action="ignore"):  # of nonsense such as 2[0], which is tried as well
-                exec(compile(ast.Module([tree], []), "<a formula with one change>", "exec"), namespace)
+            with warnings.catch_warnings(action="ignore"), change.made():  # also of nonsense, such as 2[0]
+                code = compile(ast.Module([function], []), "<a formula with one change>", "exec")
+            exec(code, namespace)
         except (SyntaxError, ValueError, RecursionError):
             continue
-        yield words, namespace[function.name]
+        yield change.words, namespace[function.name]
+
+
+def solved(exercise):
+    """The solution's function and its tree; None where the solutions are not at hand."""
+    solution = _solution(exercise)
+    if solution is None:
+        return None
+    tree, known = copy.deepcopy(solution[0]), solution[1]
+    exec(compile(ast.Module([tree], []), "<a solution>", "exec"), known)
+    return known[tree.name], tree
 
 
 @functools.cache

@@ -50,7 +50,8 @@ def survivors(item, most):
     """Number of changes tried, and the differences of those that pass."""
     function, known = slips._solution(item)
     seen, found, original = set(), [], ast.unparse(function)
-    for _, tree in mutation.changes(function, most):
+    for change in mutation.changes(function, most):
+        tree = change.tree(function)
         text = ast.unparse(tree)
         if text in seen or text == original:
             continue

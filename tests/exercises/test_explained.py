@@ -84,10 +84,10 @@ def formula(a, b):
 def test_single_changes_of_a_formula_are_functions_that_differ_in_one_place():
     function = ast.parse(FORMULA).body[0]
     found = mutation.changes(function)
-    texts = [ast.unparse(tree) for _, tree in found]
-    assert ast.unparse(function) not in texts
-    told = dict(zip(texts, (words for words, _ in found)))
+    texts = [ast.unparse(change.tree(function)) for change in found]
     plain = ast.unparse(function)
+    assert plain not in texts and ast.unparse(ast.parse(FORMULA).body[0]) == plain
+    told = dict(zip(texts, (change.words for change in found)))
     for new, words in (
         (plain.replace("b.T", "b"), "without one of its transposes"),
         (plain.replace("@", "*"), "with `*` where `@` belongs"),

@@ -1,0 +1,497 @@
+"""A student's function run again, with what it computes on the way noted, or one thing in it otherwise.
+
+The function is read again as its author typed it, and every part of it is led through a note that keeps the value or
+puts another in its place. Nothing of an exercise is known here: in `collect` this runs where the student's code does.
+"""
+
+import ast
+import copy
+import functools
+import inspect
+import itertools
+import linecache
+import textwrap
+import types
+import warnings
+
+import numpy as np
+
+from . import guard, mutation
+
+NOTE, TICK = "_labkit_note_", "_labkit_tick_"
+ROUNDS = 12  # values of one place that are kept: it may stand in a loop
+ENTRIES = 5000  # of an array that is kept
+LENGTH = 60  # characters of code that are quoted
+PATIENCE = 5  # times as many steps as the function itself takes may a changed one take ...
+STEPS = 2000  # ... and so many more
+MOST = 800  # changes of the code that are made
+AXIS = ", along the last axis)"
+OPAQUE = {"locals", "globals", "vars", "eval", "exec", "super", "breakpoint"}
+
+
+class TooLong(BaseException):
+    """A changed function takes far more steps than the function itself; no Exception, so that it is not swallowed."""
+
+
+def written(function):
+    """What can be run again of a function; None where its code cannot be read.
+
+    One in another process has a `written` of its own.
+    """
+    if hasattr(function, "written"):
+        return function.written()
+    tree = _tree(function)
+    return None if tree is None else Written(function, tree)
+
+
+def _tree(function):
+    """The definition of a function as it was typed, its lines counted as there; None where it cannot be read."""
+    if not isinstance(function, types.FunctionType) or function.__code__.co_freevars:
+        return None
+    code = function.__code__
+    lines = linecache.getlines(code.co_filename, function.__globals__)[code.co_firstlineno - 1 :]
+    try:
+        module = ast.parse(textwrap.dedent("".join(inspect.getblock(lines))))
+        again = next(c for c in compile(module, "", "exec").co_consts if isinstance(c, types.CodeType))
+    except (SyntaxError, ValueError, IndexError, StopIteration, RecursionError):
+        return None
+    node = module.body[0]
+    if not isinstance(node, ast.FunctionDef) or again.co_code != code.co_code or again.co_names != code.co_names:
+        return None
+    names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
+    if names & OPAQUE or any(isinstance(n, ast.Global | ast.Nonlocal | ast.Yield | ast.Await) for n in ast.walk(node)):
+        return None
+    ast.increment_lineno(module, code.co_firstlineno - 1)
+    return _bare(node)
+
+
+def _bare(node):
+    """The definition without what stands around the steps: decorators, docstring, defaults, annotations."""
+    node.decorator_list, node.returns = [], None
+    if ast.get_docstring(node, clean=False) is not None and len(node.body) > 1:
+        node.body = node.body[1:]
+    node.args.defaults, node.args.kw_defaults = [], [None] * len(node.args.kwonlyargs)
+    for argument in ast.walk(node.args):
+        if isinstance(argument, ast.arg):
+            argument.annotation = None
+    return node
+
+
+class Written:
+    """A function that was read again.
+
+    changes: (rank, line, code, what is wrong where it mends) of every single change of the code, by its number.
+    places:  (line, code, name of the variable, how many parts) of every value on the way, by its number.
+    """
+
+    def __init__(self, function, tree):
+        self.function, self.tree, self.limit = function, tree, guard.TIME_LIMIT
+        self.counted, self.spent = STEPS, 0.0
+        self._noted, self.places = _noted(function, tree)
+        _ticking(tree)
+
+    @functools.cached_property
+    def _changes(self):
+        return [c for c in mutation.changes(self.tree) if c.mends][:MOST]
+
+    @property
+    def changes(self):
+        return [(c.rank, c.place.lineno, _shown(c.place), c.mends) for c in self._changes]
+
+    def results(self, plans, args, seconds, keep):
+        """What comes of every plan on one draw, in the plans' order, each handed to `keep`.
+
+        A plan is ("code", number of a change), ("value", number of a place, number of one of `OTHERWISE`, number of an
+        argument) or ("given", number of a place, values in its place, one for every round). Where one fails, `keep`
+        gets None. The list is shorter where the time, in seconds, is over.
+        """
+        found = []
+
+        def work():
+            for plan in plans:
+                found.append(keep(self._result(plan, args)))
+
+        guard.run(work, (), limit=seconds, author=self.function)
+        return found
+
+    def _result(self, plan, args):
+        copies = copy.deepcopy(args)
+        try:
+            with np.errstate(all="ignore"):
+                if plan[0] == "code":
+                    return (self._changed(plan[1])(*copies),)
+                note = _Note(self.counted, plan[1], _otherwise(plan, copies))
+                return (self._made(self._noted, {NOTE: note})(*copies),)
+        except (Exception, TooLong):  # a change may well make nonsense of a function
+            return None
+
+    def _changed(self, number):
+        with warnings.catch_warnings(action="ignore"), self._changes[number].made():
+            code = compile(ast.Module([self.tree], []), "<changed>", "exec")
+        steps = itertools.count(1)
+
+        def tick():
+            if next(steps) > self.counted:
+                raise TooLong
+
+        return self._made(code, {TICK: tick})
+
+    def _made(self, code, extra):
+        """The function that a compiled definition gives among the names of the notebook, which it leaves alone."""
+        known = {**self.function.__globals__, **extra}
+        exec(code, known)
+        made = known[self.function.__code__.co_name]
+        made.__defaults__, made.__kwdefaults__ = self.function.__defaults__, self.function.__kwdefaults__
+        return made
+
+    def trace(self, args, seconds):
+        """(number of rounds, their values in one array) of every place on one draw; (0, None) where there are none."""
+        kept, note = [[] for _ in self.places], None
+
+        def work():
+            nonlocal note
+            note = _Note(None, kept=kept)
+            with np.errstate(all="ignore"):
+                self._made(self._noted, {NOTE: note})(*copy.deepcopy(args))
+
+        guard.run(work, (), limit=seconds, author=self.function)
+        self.counted = max(self.counted, PATIENCE * note.steps + STEPS) if note else STEPS
+        return [_stacked(values) for values in kept]
+
+
+def _stacked(values):
+    """(count, values of all rounds in one array); (0, None) where there are none of one shape."""
+    if not values or any(v is None or v.shape != values[0].shape for v in values):
+        return 0, None
+    return len(values), np.stack(values)
+
+
+def numeric(value):
+    """A value as an array of numbers that is kept; None for anything else."""
+    if isinstance(value, bool | np.bool_ | int | float | np.number):
+        return np.asarray(value, dtype=float)
+    if isinstance(value, list | tuple) and 0 < len(value) <= ENTRIES and type(value) in (list, tuple):
+        try:
+            value = np.asarray(value)
+        except ValueError:
+            return None
+    if isinstance(value, np.ndarray) and value.dtype.kind in "biuf" and 0 < value.size <= ENTRIES:
+        return np.array(value, dtype=float)
+    return None
+
+
+class _Note:
+    """Is told every value on the way; keeps them, or puts others in the place of one."""
+
+    def __init__(self, most, place=-1, otherwise=None, kept=None):
+        self.most, self.place, self.otherwise, self.kept = most, place, otherwise, kept
+        self.steps = self.round = 0
+
+    def __call__(self, k, value):
+        self.steps += 1
+        if self.most is not None and self.steps > self.most:
+            raise TooLong
+        if self.kept is not None and len(self.kept[k]) < ROUNDS:
+            self.kept[k].append(numeric(value))
+        if k == self.place:
+            self.round += 1
+            return self.otherwise(value, self.round - 1)
+        return value
+
+
+# What is put in the place of a value ------------------------------------------------------------------------------
+
+
+def _otherwise(plan, args):
+    """function(value, round) -> what is put in its place."""
+    if plan[0] == "given":
+        values = plan[2]
+        return lambda value, turn: _like(value, values[min(turn, len(values) - 1)])
+    change = OTHERWISE[plan[2]][1]
+    if plan[3] is None:
+        return lambda value, turn: _like(value, change(_number(value)))
+    return lambda value, turn: _like(value, change(_number(value), np.asarray(args[plan[3]], dtype=float)))
+
+
+def _number(value):
+    found = numeric(value)
+    if found is None:
+        raise ValueError("no number")
+    return found
+
+
+def _like(value, new):
+    """A new value of the same kind as the old one: an index stays an index, a truth value a truth value."""
+    whole = isinstance(value, int | np.integer) or isinstance(value, np.ndarray) and value.dtype.kind in "iu"
+    if isinstance(value, bool | np.bool_):
+        return bool(new)
+    if isinstance(value, np.ndarray) and value.dtype.kind == "b":
+        return np.asarray(new) != 0
+    if whole and np.shape(new) == np.shape(value) and np.all(np.asarray(new) == np.round(new)):
+        return int(new) if np.ndim(new) == 0 else np.asarray(new).astype(int)
+    if isinstance(value, list) and np.ndim(new):
+        return list(np.asarray(new))
+    if isinstance(value, tuple) and np.ndim(new):
+        return tuple(np.asarray(new))
+    new = np.array(new, dtype=float)
+    return float(new) if new.ndim == 0 else new
+
+
+def _square(v):
+    if v.ndim < 2 or v.shape[-1] != v.shape[-2]:
+        raise ValueError("not square")
+    return v
+
+
+def _matrix(v):
+    if v.ndim < 2:
+        raise ValueError("no matrix")
+    return v
+
+
+def _long(v):
+    if not v.ndim or len(v) < 2:
+        raise ValueError("no vector")
+    return v
+
+
+def _whole(v):
+    if v.ndim or v != np.round(v):
+        raise ValueError("no whole number")
+    return v
+
+
+def _truth(v):
+    return 1.0 - v
+
+
+def _entry_negated(v, k):
+    v = _long(v).copy()
+    v[..., k] = -v[..., k]
+    return v
+
+
+def _entries_exchanged(v, i, j):
+    v = _long(v).copy()
+    v[..., [i, j]] = v[..., [j, i]]
+    return v
+
+
+def _pose(v, turn, shift):
+    if v.shape[-2:] != (4, 4):
+        raise ValueError("no pose")
+    v = v.copy()
+    v[..., :3, :3], v[..., :3, 3] = turn(v[..., :3, :3].copy()), shift(v[..., :3, 3].copy())
+    return v
+
+
+def _normalized(v):
+    return _long(v) / np.linalg.norm(v, axis=-1, keepdims=True)
+
+
+def _with_own_rows(v):
+    return v - _matrix(v).mean(axis=0)
+
+
+def _same(v):
+    return v
+
+
+def _kept_rows(v, rows):
+    return _long(v)[rows]
+
+
+OTHERWISE = (  # (what it should have been, function of the value [and of an argument]), the likeliest first
+    ("it has the wrong sign", np.negative),
+    ("it belongs there transposed", lambda v: np.swapaxes(_matrix(v), -1, -2)),
+    ("its inverse belongs there", lambda v: np.linalg.inv(_square(v))),
+    ("half of it belongs there", lambda v: v / 2),
+    ("twice as much belongs there", lambda v: 2 * v),
+    ("its square belongs there", np.square),
+    ("its root belongs there", np.sqrt),
+    ("its reciprocal belongs there", lambda v: 1 / v),
+    ("it belongs there in radians", np.deg2rad),
+    ("it belongs there in degrees", np.rad2deg),
+    ("a thousand times as much belongs there: a unit?", lambda v: 1000 * v),
+    ("a thousandth of it belongs there: a unit?", lambda v: v / 1000),
+    ("it belongs there without its sign", np.abs),
+    ("it belongs there one larger", lambda v: _whole(v) + 1),
+    ("it belongs there one smaller", lambda v: _whole(v) - 1),
+    ("1 less it, 1 - ..., belongs there", _truth),
+    ("it does not belong there: with 0 in its place", np.zeros_like),
+    ("it does not belong there: with 1 in its place", np.ones_like),
+    ("the identity belongs in its place", lambda v: 0 * _square(v) + np.eye(v.shape[-1])),
+    ("it is to be divided by its length", _normalized),
+    ("the mean of its rows is to be taken off", _with_own_rows),
+    ("the mean of its rows belongs there", lambda v: _long(v).mean(axis=0)),
+    ("the sum of its rows belongs there", lambda v: _long(v).sum(axis=0)),
+    ("its length (norm) belongs there", lambda v: np.linalg.norm(_long(v))),
+    ("its sum belongs there", lambda v: _long(v).sum()),
+    ("its running sum belongs there", lambda v: np.cumsum(_long(v), axis=0)),
+    ("it belongs there in reverse order", lambda v: _long(v)[::-1]),
+    ("its last row or entry does not belong there", lambda v: _kept_rows(v, np.s_[:-1])),
+    ("its first row or entry does not belong there", lambda v: _kept_rows(v, np.s_[1:])),
+    ("it belongs there wrapped to between -pi and pi", lambda v: np.angle(np.exp(1j * v))),
+    ("it belongs there not below 0", lambda v: np.maximum(v, 0.0)),
+    ("its logarithm belongs there", np.log),
+    ("its exponential belongs there", np.exp),
+    ("its sine belongs there", np.sin),
+    ("its tangent belongs there", np.tan),
+    ("its diagonal alone belongs there", lambda v: np.diag(np.diag(_square(v)))),
+    ("its rotation belongs there transposed", lambda v: _pose(v, lambda R: np.swapaxes(R, -1, -2), _same)),
+    ("its translation has the wrong sign", lambda v: _pose(v, _same, np.negative)),
+    ("its translation does not belong there", lambda v: _pose(v, _same, np.zeros_like)),
+    ("its rotation does not belong there", lambda v: _pose(v, lambda R: 0 * R + np.eye(3), _same)),
+    *(
+        (f"its entry {k} (counted from 0{AXIS} has the wrong sign", functools.partial(_entry_negated, k=k))
+        for k in range(4)
+    ),
+    *(
+        (
+            f"its entries {i} and {j} (counted from 0{AXIS} are exchanged",
+            functools.partial(_entries_exchanged, i=i, j=j),
+        )
+        for i, j in itertools.combinations(range(4), 2)
+    ),
+    ("it is to be multiplied by `{}`", np.multiply),
+    ("it is to be divided by `{}`", np.divide),
+    ("`{}` belongs in its place", lambda v, a: a),
+    ("`{}` is missing: it is to be added", np.add),
+    ("`{}` is to be taken off", np.subtract),
+    ("it is to be multiplied by the square of `{}`", lambda v, a: v * a**2),
+    ("it is to be divided by the square of `{}`", lambda v, a: v / a**2),
+    ("it is to be divided by the number of rows or entries of `{}`", lambda v, a: v / len(a)),
+    ("it is to be multiplied by the number of rows or entries of `{}`", lambda v, a: v * len(a)),
+)
+ALONE = sum("{}" not in words for words, _ in OTHERWISE)  # of one value; the others take an argument as well
+
+
+# Notes in the code ------------------------------------------------------------------------------------------------
+
+
+def _noted(function, tree):
+    """The compiled definition in which every value goes through a note, and the places by their numbers."""
+    known = {name for name, value in function.__globals__.items() if isinstance(value, types.ModuleType)}
+    noting = _Noting(known, tree)
+    noted = ast.fix_missing_locations(noting.definition())
+    return compile(ast.Module([noted], []), "<noted>", "exec"), noting.places
+
+
+def _shown(node):
+    if isinstance(node, ast.For | ast.While | ast.If | ast.With):
+        return ast.unparse(node).partition("\n")[0]
+    text = ast.unparse(node)
+    return text if len(text) <= LENGTH and "\n" not in text else f"{text.partition(chr(10))[0][: LENGTH - 4]} ..."
+
+
+class _Noting(ast.NodeTransformer):
+    """Puts a note around every value that is computed, and behind every name that is bound."""
+
+    def __init__(self, modules, tree):
+        self.modules, self.tree, self.places = modules, copy.deepcopy(tree), []
+        stored = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+        self.own = stored | {argument.arg for argument in ast.walk(tree.args) if isinstance(argument, ast.arg)}
+
+    def definition(self):
+        self.tree.body = [part for statement in self.tree.body for part in self._list(self.visit(statement))]
+        return self.tree
+
+    @staticmethod
+    def _list(found):
+        return found if isinstance(found, list) else [found]
+
+    def _note(self, node, name="", text=""):
+        here = (node.lineno, text or _shown(node), name, sum(1 for _ in ast.walk(node)))
+        inner = self._inner(node)
+        self.places.append(here)  # behind its parts: in the order in which they are computed
+        call = ast.Call(ast.Name(NOTE, ast.Load()), [ast.Constant(len(self.places) - 1), inner], [])
+        return ast.copy_location(call, node)
+
+    def visit(self, node):
+        if not isinstance(node, ast.expr):
+            return super().visit(node)
+        if isinstance(node, ast.Constant | ast.JoinedStr):
+            return node
+        if isinstance(getattr(node, "ctx", None), ast.Store | ast.Del) or self._is_of_a_module(node):
+            return node
+        if isinstance(node, ast.Starred | ast.Lambda | ast.Slice | ast.NamedExpr):
+            return self._inner(node)
+        return self._note(node, node.id if isinstance(node, ast.Name) else "")
+
+    def _inner(self, node):
+        if isinstance(node, ast.Call):
+            if isinstance(node.func, ast.Attribute) and not self._is_of_a_module(node.func):
+                node.func.value = self.visit(node.func.value)
+            elif not isinstance(node.func, ast.Name | ast.Attribute):
+                node.func = self.visit(node.func)
+            node.args = [self.visit(arg) for arg in node.args]
+            for keyword in node.keywords:
+                keyword.value = self.visit(keyword.value)
+            return node
+        if isinstance(node, ast.Subscript):
+            node.value = self.visit(node.value)
+            if isinstance(node.slice, ast.Tuple):
+                node.slice.elts = [self.visit(part) for part in node.slice.elts]
+            else:
+                node.slice = self.visit(node.slice)
+            return node
+        return self.generic_visit(node)
+
+    def _is_of_a_module(self, node):
+        while isinstance(node, ast.Attribute):
+            node = node.value
+        return isinstance(node, ast.Name) and node.id in self.modules and node.id not in self.own
+
+    def _behind(self, statement, targets, text):
+        """The statement, and behind it a note of every name that it binds or fills."""
+        names = []
+        for target in targets:
+            for node in target.elts if isinstance(target, ast.Tuple | ast.List) else [target]:
+                while isinstance(node, ast.Subscript | ast.Starred):
+                    node = node.value
+                if isinstance(node, ast.Name) and node.id in self.own:
+                    names.append(node.id)
+        notes = []
+        for name in names:
+            noted = self._note(ast.copy_location(ast.Name(name, ast.Load()), statement), name, text)
+            notes.append(ast.copy_location(ast.Assign([ast.Name(name, ast.Store())], noted), statement))
+        return [statement, *notes]
+
+    def visit_Assign(self, node):
+        only, text = node.targets[0], _shown(node)
+        if len(node.targets) == 1 and isinstance(only, ast.Name) and not isinstance(node.value, ast.Constant):
+            node.value = self._note(node.value, only.id, text)
+            return node
+        node.value = self.visit(node.value)
+        return self._behind(node, node.targets, text)
+
+    def visit_AugAssign(self, node):
+        text = _shown(node)
+        node.value = self.visit(node.value)
+        return self._behind(node, [node.target], text)
+
+    def visit_AnnAssign(self, node):
+        node.annotation = ast.Constant(0)
+        if node.value is None:
+            return node
+        text = _shown(node)
+        node.value = self.visit(node.value)
+        return self._behind(node, [node.target], text)
+
+    def visit_FunctionDef(self, node):
+        node.body = [part for statement in node.body for part in self._list(self.visit(statement))]
+        return node
+
+    def visit_ClassDef(self, node):
+        return node
+
+    def visit_Match(self, node):
+        return node
+
+
+def _ticking(tree):
+    """Counts the rounds of every loop, so that a change without an end is given up."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.For | ast.While):
+            tick = ast.Expr(ast.Call(ast.Name(TICK, ast.Load()), [], []))
+            node.body.insert(0, ast.fix_missing_locations(ast.copy_location(tick, node)))
