@@ -232,7 +232,7 @@ class Written:
     def __init__(self, remote, changes, places):
         self.remote, self.spent = remote, 0.0
         self.changes = [(int(rank), int(line), str(code), str(mends)) for rank, line, code, mends in changes]
-        self.places = [(int(line), str(code), str(name), int(size)) for line, code, name, size in places]
+        self.places = [(int(n), str(code), str(name), int(size), int(k)) for n, code, name, size, k in places]
 
     def trace(self, args, seconds):
         """As `rerun.Written.trace`."""

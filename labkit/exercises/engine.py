@@ -234,13 +234,17 @@ class _Trial:
         if named:
             return named
         words = self._relation(whole=True) or self._other_arguments() or self._terms()
-        step = None if words else self._step()
-        words = words or (step if not self.refusal else None) or self._one_change()
+        search = None if words else self._search()
+        step = search and search.words()
+        words = words or (not self.refusal and step) or self._one_change()
         if words:
             return self.outcome(NOT_YET, _closed(words) + self._about_globals())
+        step = step or search and not self._right_somewhere() and search.given_words(self._solution(search))
         if self.refusal:
             words = self._other_shape() or (f" {step[0].upper()}{_closed(step[1:])}" if step else "")
             return self.outcome(NOT_YET, _closed(self.refusal) + words + self._about_globals())
+        if step:
+            return self.outcome(NOT_YET, _closed(step) + self._about_globals())
         if self._right_on_plain():
             for metric, pair, words in zip(self.metrics, self.pairs, self.words):
                 if words and not metric.equal(*pair):
@@ -303,8 +307,16 @@ class _Trial:
             told.append(f"{name}: {words}" if name else words)
         return "\n".join(map(_closed, told)) or None
 
-    def _step(self):
-        """At which step of the student's own code it goes wrong, and in which way."""
+    def _solution(self, search):
+        return steps.of_solution(self.exercise, search.cases, LOOKING / 2)
+
+    def _right_somewhere(self):
+        """Whether some plain draws come out right: then these are what is to be told."""
+        metric = self.exercise.metric
+        return not self.refusal and any(metric.equal(*pair) for pair in self._plain_pairs())
+
+    def _search(self):
+        """What looks for the step of the student's own code at which it goes wrong; None where it cannot be read."""
         if self.exercise.metric is None or not self.inputs or self.spent > LOOKING:
             return None
         written = rerun.written(self.function)
@@ -315,8 +327,7 @@ class _Trial:
             for args, metric, pair in zip(self.inputs, self.metrics, self.pairs)
         ]
         found = [None if isinstance(pair[0], _Refusal) else rerun.numeric(pair[0]) for pair in self.pairs]
-        search = steps.Search(written, self._names(self.inputs[0]), drawn, found, self._fresh_cases, LOOKING / 2)
-        return search.words(lambda cases: steps.of_solution(self.exercise, cases, LOOKING / 2))
+        return steps.Search(written, self._names(self.inputs[0]), drawn, found, self._fresh_cases, LOOKING / 2)
 
     @functools.cached_property
     def _fresh(self):

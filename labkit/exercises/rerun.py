@@ -40,18 +40,19 @@ def written(function):
     """
     if hasattr(function, "written"):
         return function.written()
-    tree = _tree(function)
-    return None if tree is None else Written(function, tree)
+    found = _read(function)
+    return None if found is None else Written(function, *found)
 
 
-def _tree(function):
-    """The definition of a function as it was typed, its lines counted as there; None where it cannot be read."""
+def _read(function):
+    """A function's definition, its lines counted as in its cell, and these lines; None where it cannot be read."""
     if not isinstance(function, types.FunctionType) or function.__code__.co_freevars:
         return None
     code = function.__code__
     lines = linecache.getlines(code.co_filename, function.__globals__)[code.co_firstlineno - 1 :]
     try:
-        module = ast.parse(textwrap.dedent("".join(inspect.getblock(lines))))
+        text = textwrap.dedent("".join(inspect.getblock(lines)))
+        module = ast.parse(text)
         again = next(c for c in compile(module, "", "exec").co_consts if isinstance(c, types.CodeType))
     except (SyntaxError, ValueError, IndexError, StopIteration, RecursionError):
         return None
@@ -62,7 +63,7 @@ def _tree(function):
     if names & OPAQUE or any(isinstance(n, ast.Global | ast.Nonlocal | ast.Yield | ast.Await) for n in ast.walk(node)):
         return None
     ast.increment_lineno(module, code.co_firstlineno - 1)
-    return _bare(node)
+    return _bare(node), {code.co_firstlineno + k: line for k, line in enumerate(text.splitlines())}
 
 
 def _bare(node):
@@ -81,13 +82,13 @@ class Written:
     """A function that was read again.
 
     changes: (rank, line, code, what is wrong where it mends) of every single change of the code, by its number.
-    places:  (line, code, name of the variable, how many parts) of every value on the way, by its number.
+    places:  (line, code, name of the variable, size, number of its first part) of every value on the way.
     """
 
-    def __init__(self, function, tree):
-        self.function, self.tree, self.limit = function, tree, guard.TIME_LIMIT
+    def __init__(self, function, tree, lines=None):
+        self.function, self.tree, self.lines = function, tree, lines or {}
         self.counted, self.spent = STEPS, 0.0
-        self._noted, self.places = _noted(function, tree)
+        self._noted, self.places = _noted(function, tree, self.lines)
         _ticking(tree)
 
     @functools.cached_property
@@ -96,13 +97,14 @@ class Written:
 
     @property
     def changes(self):
-        return [(c.rank, c.place.lineno, _shown(c.place), c.mends) for c in self._changes]
+        return [(c.rank, c.place.lineno, _shown(c.place, self.lines), c.mends) for c in self._changes]
 
     def results(self, plans, args, seconds, keep):
         """What comes of every plan on one draw, in the plans' order, each handed to `keep`.
 
         A plan is ("code", number of a change), ("value", number of a place, number of one of `OTHERWISE`, number of an
-        argument) or ("given", number of a place, values in its place, one for every round). Where one fails, `keep`
+        argument), ("own", number of a place, number of one of `OTHERWISE`, number of the place where a variable was
+        bound before) or ("given", number of a place, values in its place, one for every round). Where one fails, `keep`
         gets None. The list is shorter where the time, in seconds, is over.
         """
         found = []
@@ -120,7 +122,9 @@ class Written:
             with np.errstate(all="ignore"):
                 if plan[0] == "code":
                     return (self._changed(plan[1])(*copies),)
-                note = _Note(self.counted, plan[1], _otherwise(plan, copies))
+                note = _Note(self.counted, plan[1])
+                note.watched = plan[3] if plan[0] == "own" else None
+                note.otherwise = _otherwise(plan, copies, note)
                 return (self._made(self._noted, {NOTE: note})(*copies),)
         except (Exception, TooLong):  # a change may well make nonsense of a function
             return None
@@ -183,8 +187,10 @@ def numeric(value):
 class _Note:
     """Is told every value on the way; keeps them, or puts others in the place of one."""
 
-    def __init__(self, most, place=-1, otherwise=None, kept=None):
-        self.most, self.place, self.otherwise, self.kept = most, place, otherwise, kept
+    otherwise = watched = seen = None  # function(value, round); a place whose last value is seen
+
+    def __init__(self, most, place=-1, kept=None):
+        self.most, self.place, self.kept = most, place, kept
         self.steps = self.round = 0
 
     def __call__(self, k, value):
@@ -193,6 +199,8 @@ class _Note:
             raise TooLong
         if self.kept is not None and len(self.kept[k]) < ROUNDS:
             self.kept[k].append(numeric(value))
+        if k == self.watched:
+            self.seen = value
         if k == self.place:
             self.round += 1
             return self.otherwise(value, self.round - 1)
@@ -202,7 +210,7 @@ class _Note:
 # What is put in the place of a value ------------------------------------------------------------------------------
 
 
-def _otherwise(plan, args):
+def _otherwise(plan, args, note):
     """function(value, round) -> what is put in its place."""
     if plan[0] == "given":
         values = plan[2]
@@ -210,6 +218,8 @@ def _otherwise(plan, args):
     change = OTHERWISE[plan[2]][1]
     if plan[3] is None:
         return lambda value, turn: _like(value, change(_number(value)))
+    if plan[0] == "own":
+        return lambda value, turn: _like(value, change(_number(value), _number(note.seen)))
     return lambda value, turn: _like(value, change(_number(value), np.asarray(args[plan[3]], dtype=float)))
 
 
@@ -358,37 +368,43 @@ OTHERWISE = (  # (what it should have been, function of the value [and of an arg
     ("`{}` belongs in its place", lambda v, a: a),
     ("`{}` is missing: it is to be added", np.add),
     ("`{}` is to be taken off", np.subtract),
+    ("the matrix `{}` is to be multiplied with it, from the left", lambda v, a: _matrix(a) @ v),
     ("it is to be multiplied by the square of `{}`", lambda v, a: v * a**2),
     ("it is to be divided by the square of `{}`", lambda v, a: v / a**2),
     ("it is to be divided by the number of rows or entries of `{}`", lambda v, a: v / len(a)),
     ("it is to be multiplied by the number of rows or entries of `{}`", lambda v, a: v * len(a)),
 )
+WITH_OWN = 6  # of those that take an argument also take a variable
 ALONE = sum("{}" not in words for words, _ in OTHERWISE)  # of one value; the others take an argument as well
 
 
 # Notes in the code ------------------------------------------------------------------------------------------------
 
 
-def _noted(function, tree):
+def _noted(function, tree, lines):
     """The compiled definition in which every value goes through a note, and the places by their numbers."""
     known = {name for name, value in function.__globals__.items() if isinstance(value, types.ModuleType)}
-    noting = _Noting(known, tree)
+    noting = _Noting(known, tree, lines)
     noted = ast.fix_missing_locations(noting.definition())
     return compile(ast.Module([noted], []), "<noted>", "exec"), noting.places
 
 
-def _shown(node):
-    if isinstance(node, ast.For | ast.While | ast.If | ast.With):
-        return ast.unparse(node).partition("\n")[0]
-    text = ast.unparse(node)
-    return text if len(text) <= LENGTH and "\n" not in text else f"{text.partition(chr(10))[0][: LENGTH - 4]} ..."
+def _shown(node, lines):
+    """A part of the code as it was typed, if it is short enough to be quoted."""
+    if isinstance(node, ast.stmt) and hasattr(node, "body"):
+        return lines.get(node.lineno, ast.unparse(node).partition("\n")[0]).strip()
+    if node.lineno == node.end_lineno and node.lineno in lines:
+        text = lines[node.lineno].encode()[node.col_offset : node.end_col_offset].decode()
+    else:
+        text = ast.unparse(node).partition("\n")[0]
+    return text if len(text) <= LENGTH else f"{text[: LENGTH - 4]} ..."
 
 
 class _Noting(ast.NodeTransformer):
     """Puts a note around every value that is computed, and behind every name that is bound."""
 
-    def __init__(self, modules, tree):
-        self.modules, self.tree, self.places = modules, copy.deepcopy(tree), []
+    def __init__(self, modules, tree, lines):
+        self.modules, self.tree, self.lines, self.places = modules, copy.deepcopy(tree), lines, []
         stored = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
         self.own = stored | {argument.arg for argument in ast.walk(tree.args) if isinstance(argument, ast.arg)}
 
@@ -401,7 +417,8 @@ class _Noting(ast.NodeTransformer):
         return found if isinstance(found, list) else [found]
 
     def _note(self, node, name="", text=""):
-        here = (node.lineno, text or _shown(node), name, sum(1 for _ in ast.walk(node)))
+        size, first = sum(1 for _ in ast.walk(node)), len(self.places)
+        here = (node.lineno, text or _shown(node, self.lines), name, size, first)
         inner = self._inner(node)
         self.places.append(here)  # behind its parts: in the order in which they are computed
         call = ast.Call(ast.Name(NOTE, ast.Load()), [ast.Constant(len(self.places) - 1), inner], [])
@@ -458,7 +475,7 @@ class _Noting(ast.NodeTransformer):
         return [statement, *notes]
 
     def visit_Assign(self, node):
-        only, text = node.targets[0], _shown(node)
+        only, text = node.targets[0], _shown(node, self.lines)
         if len(node.targets) == 1 and isinstance(only, ast.Name) and not isinstance(node.value, ast.Constant):
             node.value = self._note(node.value, only.id, text)
             return node
@@ -466,7 +483,7 @@ class _Noting(ast.NodeTransformer):
         return self._behind(node, node.targets, text)
 
     def visit_AugAssign(self, node):
-        text = _shown(node)
+        text = _shown(node, self.lines)
         node.value = self.visit(node.value)
         return self._behind(node, [node.target], text)
 
@@ -474,7 +491,7 @@ class _Noting(ast.NodeTransformer):
         node.annotation = ast.Constant(0)
         if node.value is None:
             return node
-        text = _shown(node)
+        text = _shown(node, self.lines)
         node.value = self.visit(node.value)
         return self._behind(node, [node.target], text)
 

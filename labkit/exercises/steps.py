@@ -48,18 +48,13 @@ class Search:
         self.cases, self.results = [cases[k] for k in order], [results[k] for k in order]
         self.values = [written.trace(case.args, seconds) for case in self.cases]
 
-    def words(self, solution):
-        """What is wrong where, from the likeliest kind of change to the least; `solution(cases)` gives its values."""
-        return (
-            self.code_words(range(WORTH))
-            or self.value_words()
-            or self.code_words(range(WORTH, 9))
-            or self.given_words(solution(self.cases))
-        )
+    def words(self):
+        """What is wrong where, from the likeliest kind of change to the least; None where nothing mends the result."""
+        return self.code_words(range(WORTH)) or self.value_words() or self.code_words(range(WORTH, 9))
 
     def mending(self, plans, values=None):
         """The first plan that makes the result right on all draws; None where none does in time."""
-        ends, left = time.monotonic() + 4 * self.seconds, self.seconds
+        left = self.seconds
         for start in range(0, len(plans), BATCH):
             batch, began, before = plans[start : start + BATCH], time.thread_time(), self.written.spent
             fits = self._fitting(batch, 0, left, values)
@@ -69,7 +64,7 @@ class Search:
                 if all(fit == [True] for fit in (*others, *more)):
                     return plan
             left -= time.thread_time() - began + self.written.spent - before
-            if left <= 0.01 or time.monotonic() > ends or len(fits) < len(batch):
+            if left <= 0.01 or len(fits) < len(batch):
                 return None
         return None
 
@@ -93,15 +88,18 @@ class Search:
     # Values on the way turned into others
 
     def value_words(self):
-        plan = self.mending(list(self._turned()))
+        return self._turned_words(self._turned()) or self._turned_words(self._with_own())
+
+    def _turned_words(self, plans):
+        plan = self.mending(list(plans))
         if plan is None:
             return None
-        _, k, change, argument = plan
-        words = rerun.OTHERWISE[change][0].format(*([] if argument is None else [self.names[argument]]))
-        return f"{self._where(k)}: {words}. {ALONE}"
+        kind, k, change, other = plan
+        name = "" if other is None else self.written.places[other][2] if kind == "own" else self.names[other]
+        return f"{self._where(k)}: {rerun.OTHERWISE[change][0].format(name)}. {ALONE}"
 
     def _where(self, k):
-        line, code, _, _ = self.written.places[k]
+        line, code, *_ = self.written.places[k]
         return f"in line {line}, `{code}`"
 
     def _turned(self):
@@ -114,6 +112,18 @@ class Search:
                 for k, value in seen:
                     if _changes(function, value, others):
                         yield "value", k, change, argument
+
+    def _with_own(self):
+        """Plans of values put together with a variable that was bound before."""
+        places, values = self.written.places, self.values[0]
+        bound = [k for k, (_, code, name, *_) in enumerate(places) if name and code != name and values[k][0]]
+        for change in range(rerun.ALONE, rerun.ALONE + rerun.WITH_OWN):
+            for variable in bound:
+                for k in range(variable + 1, len(places)):
+                    if values[k][0] and _changes(
+                        rerun.OTHERWISE[change][1], values[k][1][0], [values[variable][1][-1]]
+                    ):
+                        yield "own", k, change, variable
 
     # Values of the solution
 
@@ -154,8 +164,22 @@ class Search:
         mine = [values[k][1] for values in self.values]
         theirs = [np.broadcast_to(v[q][1], m.shape) for v, m in zip(solution.values, mine)]
         words = value_relation(mine, theirs, [dict(zip(self.names, case.args)) for case in self.cases])
-        here = f"{self._where(k)}: {words or 'this value is not right'}"
-        return f"{here}. With the right value there, all that follows is right"
+        words = words or f"this value is not right{self._of_right_parts(k, solution)}"
+        end = "" if words[-1] in ".?" else "."
+        return f"{self._where(k)}: {words}{end} With the right value there, all that follows is right"
+
+    def _of_right_parts(self, k, solution):
+        """Whether the parts of a wrong value are right, so that it is what is done with them."""
+        parts, part = [], k - 1
+        while part >= self.written.places[k][4]:
+            parts.insert(0, part)
+            part = self.written.places[part][4] - 1
+        parts = [part for part in parts if all(values[part][0] for values in self.values)]
+        codes = dict.fromkeys(f"`{self.written.places[part][1]}`" for part in parts if self._is_known(part, solution))
+        if not codes or not all(self._is_known(part, solution) for part in parts):
+            return ""
+        are, them = ("are", "them") if len(codes) > 1 else ("is", "it")
+        return f", though {' and '.join(codes)} in it {are}: look at what is done with {them}"
 
 
 def value_relation(mine, theirs, named):

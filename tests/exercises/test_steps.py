@@ -1,0 +1,126 @@
+"""The general layer, steps: in which line of a student's own code it goes wrong, and in which way."""
+
+import linecache
+import textwrap
+
+import numpy as np
+import pytest
+
+from labkit.exercises import metrics, rerun, session, steps
+from labkit.exercises.engine import CORRECT, NOT_YET, Exercise
+
+
+def typed(body, name="formula", arguments="a, b"):
+    """A function as a notebook has it: its lines can be read again."""
+    text = f"def {name}({arguments}):\n" + textwrap.indent(textwrap.dedent(body).strip(), "    ") + "\n"
+    file = f"<typed {hash(text)}>"
+    linecache.cache[file] = (len(text), None, text.splitlines(True), file)
+    known = {"np": np}
+    exec(compile(text, file, "exec"), known)
+    return known[name]
+
+
+def reference(a, b):
+    """Length of the part of b that is perpendicular to a, times the number of entries."""
+    x = a / np.linalg.norm(a)
+    return len(b) * np.linalg.norm(b - (b @ x) * x)
+
+
+ITEM = Exercise(
+    "formula",
+    reference=reference,
+    draw=lambda rng: (rng.normal(size=3), rng.normal(size=3)),
+    metric=metrics.Numbers(1e-9),
+    hints=("a", "b", "c"),
+)
+
+
+def told(body):
+    outcome = ITEM.judge(typed(body), rng=np.random.default_rng(0))
+    assert outcome.status == NOT_YET
+    return outcome.text
+
+
+RIGHT = """
+x = a / np.linalg.norm(a)
+n = len(b)
+r = b - (b @ x) * x
+total = 0.0
+for k in range(n):
+    total += r[k] ** 2
+return n * np.sqrt(total)
+"""
+
+
+def test_what_is_right_stays_right():
+    assert ITEM.judge(typed(RIGHT)).status == CORRECT
+
+
+@pytest.mark.parametrize(
+    "right, wrong, said",
+    [
+        ("b - (b", "b + (b", "in line 4, `b + (b @ x) * x`: plus stands where minus belongs."),
+        ("a / np", "b / np", "in line 2, `b`: `a` belongs in its place."),
+        ("range(n)", "range(n - 1)", "in line 6, `n - 1`: one term is too many."),
+        ("r[k] ** 2", "r[k]", ": its square belongs there. With this alone changed, your result is right."),
+        ("total +=", "total =", "in line 7, `total = r[k] ** 2`: `=` throws away what was there before"),
+        ("b @ x) * x", "b @ x)", "in line 4, `b @ x`: it is to be multiplied by `x`."),
+    ],
+)
+def test_the_line_and_the_slip_are_told(right, wrong, said):
+    assert right in RIGHT
+    assert said in told(RIGHT.replace(right, wrong))
+
+
+def test_no_line_is_blamed_when_no_single_change_mends():
+    assert "in line" not in told("return np.sin(a).sum() * 0.1 + np.exp(b[0]) - 3.3 * a[1] ** 5")
+
+
+def test_a_change_without_an_end_is_given_up():
+    body = """
+    x = a / np.linalg.norm(a)
+    left, n = 3.0, 0
+    while left > 0.5:
+        left -= 1.0
+        n += 1
+    return n + np.linalg.norm(b - (b @ x) * x)
+    """
+    assert "plus stands where `*` belongs" in told(body)
+
+
+def test_running_again_leaves_arguments_globals_and_the_function_alone():
+    function = typed("a[0] = 7.0\nc = a + b\nreturn c * 2")
+    written, known = rerun.written(function), dict(function.__globals__)
+    a, b = np.zeros(3), np.ones(3)
+    traced = written.trace((a, b), 1.0)
+    assert not a.any() and function.__globals__ == known
+    values = {name: found for (_, _, name, *_), (count, found) in zip(written.places, traced) if count}
+    assert np.array_equal(values["c"], [[8.0, 1.0, 1.0]])
+    assert written.results([("code", 0)], (a, b), 1.0, lambda found: found is not None) in ([True], [False])
+    assert not a.any()
+
+
+@pytest.mark.parametrize(
+    "function", [lambda a: a, np.sin, typed("return eval('a')"), typed("global c\nc = 1\nreturn a"), len, 3]
+)
+def test_what_cannot_be_read_again_is_left_alone(function):
+    assert rerun.written(function) is None
+
+
+def test_values_in_place_of_others_keep_their_kind():
+    assert rerun._like(3, 4.0) == 4 and type(rerun._like(3, 4.0)) is int
+    assert rerun._like(True, 0.0) is False
+    assert rerun._like(np.array([1, 2]), np.array([2.0, 1.0])).dtype.kind == "i"
+    assert rerun._like([1.0, 2.0], np.ones(2)) == [1.0, 1.0]
+
+
+def test_the_value_that_is_not_right_is_found_by_that_of_the_solution():
+    item = next(c for c in session.chapters() if c.name == "01-frames")["invert"]
+    body = "out = np.eye(4)\nout[:3, :3] = T[:3, :3].T\nout[:3, 3] = T[:3, 3] @ T[:3, :3].T\nreturn out"
+    outcome = item.judge(typed(body, "invert", "T"), rng=np.random.default_rng(0))
+    assert "in line 4, `T[:3, 3] @ T[:3, :3].T`: this value is not right, though" in outcome.text
+
+
+def test_how_two_values_differ():
+    mine, theirs = [np.ones((1, 2, 3))] * 2, [-np.ones((1, 2, 3))] * 2
+    assert "right up to its sign" in steps.value_relation(mine, theirs, [{"a": 1.0}] * 2)
