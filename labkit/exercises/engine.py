@@ -25,6 +25,7 @@ NOISY = "exact on clean data, but the data are not weighed as they should be: on
 TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws of each kind
 MANY_DIGITS = 1e-3  # by how much better some draws come out where one case is special
 MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried, to tell on which
+SEARCHING = 0.25  # seconds of processor time for each kind of change of the student's own code
 MORE_CASES = 8  # on which an explanation from the first draws is tried once more
 LOOKING = 0.5  # seconds of processor time in which changes of arguments, or of the formula, are tried as explanation
 UNITS = {
@@ -308,7 +309,7 @@ class _Trial:
         return "\n".join(map(_closed, told)) or None
 
     def _solution(self, search):
-        return steps.of_solution(self.exercise, search.cases, LOOKING / 2)
+        return steps.of_solution(self.exercise, search.cases, SEARCHING)
 
     def _right_somewhere(self):
         """Whether some plain draws come out right: then these are what is to be told."""
@@ -327,7 +328,7 @@ class _Trial:
             for args, metric, pair in zip(self.inputs, self.metrics, self.pairs)
         ]
         found = [None if isinstance(pair[0], _Refusal) else rerun.numeric(pair[0]) for pair in self.pairs]
-        return steps.Search(written, self._names(self.inputs[0]), drawn, found, self._fresh_cases, LOOKING / 2)
+        return steps.Search(written, self._names(self.inputs[0]), drawn, found, self._fresh_cases, SEARCHING)
 
     @functools.cached_property
     def _fresh(self):

@@ -6,7 +6,7 @@ import textwrap
 import numpy as np
 import pytest
 
-from labkit.exercises import metrics, rerun, session, steps
+from labkit.exercises import engine, metrics, rerun, session, steps
 from labkit.exercises.engine import CORRECT, NOT_YET, Exercise
 
 
@@ -33,6 +33,11 @@ ITEM = Exercise(
     metric=metrics.Numbers(1e-9),
     hints=("a", "b", "c"),
 )
+
+
+@pytest.fixture(autouse=True)
+def searches_to_the_end(monkeypatch):
+    monkeypatch.setattr(engine, "SEARCHING", 30.0)
 
 
 def told(body):
