@@ -65,7 +65,7 @@ def quarter_turn(p):
 # %% predict [markdown]
 # ## Predict, then touch
 #
-# Where a figure can surprise, a question stands before it. Click an answer (`guess` may stay as it is): the first one is locked in, and the figure appears. Drag its round handles with mouse or finger; or select one with the Tab key and move it
+# Where a figure can surprise, a question stands before it. The first one: **you turn a point by a quarter turn, twice. Where does it end up?** Run the cell and click an answer (`guess` may stay as it is): the first one is locked in, and the figure appears. Drag its round handles with mouse or finger; or select one with the Tab key and move it
 # with the arrow keys (Shift makes ten steps at once). *Reset* brings the start back, *Make it fail* shows what goes wrong.
 
 # %% predict-twice

@@ -60,7 +60,7 @@ def normalize(v):
 # ## Three points are too many
 #
 # Three noisy points almost never form a right angle, so no orthonormal frame passes through all of them. The sheet repairs this with Gram-Schmidt
-# (*Schmidtsche Orthonormalisierung*). Before you see it move: decide what it does to the two measured edges.
+# (*Schmidtsche Orthonormalisierung*). Before you see it move: **all three points carry the same noise; which measured direction does Gram-Schmidt keep exactly?**
 #
 # Then drag the six points, the y points above all. A hollow cross shows the part of the second edge that is thrown away, the dashed line what is kept, and the matrix beside it
 # is $T_{K_0K_1}$. Try *Make it fail* too.
@@ -263,7 +263,7 @@ def matrix_from_kuka(xyzabc):
 #
 # Three rings carry the flange, the plate on which a robot holds its tool. At B = ±90° the outer and the inner ring lie in one plane and turn about the same line: one degree of freedom is lost
 # (*gimbal lock*). The figure also shows singular values: how strongly the pose answers to the best and the worst combination of changes of A, B, C. A zero among them means that one
-# combination, the "weakest change", moves nothing. Decide first, then move the sliders, or press *Make it fail* to go to the pole.
+# combination, the "weakest change", moves nothing. **At B = 90° you raise A by 30° and C by 30°: how does the flange move?** Decide, then move the sliders, or press *Make it fail* to go to the pole.
 
 # %% predict-pole
 guess = ...  # your code here

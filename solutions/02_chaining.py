@@ -54,7 +54,7 @@ for k, (T, S) in enumerate(zip(printed, measured)):
 # %% order [markdown]
 # ## First A, then B
 #
-# Every move is made *in the frame that has been reached*. Below, A shifts and turns about z by 60°, B shifts only. Decide first, then drag the frames A and B,
+# Every move is made *in the frame that has been reached*. Below, A shifts and turns about z by 60°, B shifts only. **Does the order of the two matter?** Decide, then drag the frames A and B,
 # and turn them with the sliders, B about x. Then try *No turns*.
 
 # %% predict-order
@@ -75,7 +75,7 @@ ex.predict("order", guess, reveal=stages.order_of_product)
 # | 0.012191 | 0.999923 | 0.002337 | 1.215314 |
 # | −0.006386 | −0.002259 | 0.999977 | −0.128655 |
 #
-# Decide from what you know of rotations.
+# **Which of the two did the program compute, the sum or the product?** Decide from what you know of rotations.
 
 # %% predict-operator
 guess = ...  # your code here
@@ -178,7 +178,7 @@ worst_at_one_meter = ex.worst_at_one_meter(worst_at_one_meter)
 # ## One bad link
 #
 # A turn at the end of link $k$ moves everything that follows. The end of the chain moves by the turn (in rad) times its **lever**: the distance from $K_k$ to the end.
-# The figure shows the sheet's loop: thin (black, or white on dark) as it is, purple as the chain sees it, gray the gap at $K_0$ and at a work piece P; the measuring arm stands where that link is measured. Drag the frames, choose which link is wrong, and about which axis: then the lever is the distance from that axis.
+# The figure shows the sheet's loop: thin (black, or white on dark) as it is, purple as the chain sees it, gray the gap at $K_0$ and at a work piece P; the measuring arm stands where that link is measured. **One link is turned wrongly by 3°: which one opens the loop most at $K_0$?** Decide, then drag the frames, choose which link is wrong, and about which axis: then the lever is the distance from that axis.
 
 # %% predict-lever
 guess = ...  # your code here
@@ -196,6 +196,7 @@ ex.predict("lever", guess, reveal=stages.open_loop)
 #
 # (A turn about the lever itself moves nothing: two of three components count.) For $N$ links of length $L$ in a row the levers are $0, L, \dots, (N-1)L$.
 # On a loop of fixed size they stay below its diameter. In the figure, left: a hundred chains, seen from the side (dashed: the law); right: the laws, gray those of other errors of a link. The numbers of the sentence beneath can be dragged.
+# **Twice as many links in a row: how much larger is the error at the end?**
 
 # %% predict-growth
 guess = ...  # your code here
@@ -336,7 +337,7 @@ print(f"weighted sum of squares {graph.chi2:.1f}, expected about {graph.dof}")
 print("(std_rot comes from this very loop: no test)")
 
 # %% second-loop [markdown]
-# Now a second loop. Six frames, seven links, two loops A and B with one link in common. Decide what happens, then pull either loop open at its ring.
+# Now a second loop. Six frames, seven links, two loops A and B with one link in common. **You share out the error of loop A, then that of loop B: what about loop A?** Decide, then pull either loop open at its ring.
 # Left: the loops with their errors magnified, as measured (thin) and after sharing out; right: by how much each is still open, for each way of sharing out.
 
 # %% predict-two-loops

@@ -323,6 +323,9 @@ def robust_weights(distances, scale):
     ### END SOLUTION
 
 
+# %% outliers-text [markdown]
+# **Three of twelve touches are a few millimeters beside the point, the noise is 0.2 mm: how far off is the tip of plain least squares?**
+
 # %% predict-outliers
 guess = ...  # your code here
 ### BEGIN SOLUTION

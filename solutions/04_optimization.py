@@ -95,7 +95,7 @@ print("within 1e-4 of the measured one:", off < 1e-4)
 # The gradient is a positive number times $x - c_1$ plus another times $x - c_2$. It can vanish only where both pull in opposite directions: **on the
 # straight line between the centers.** Both minima (L and G) and the saddle (S) lie on it.
 #
-# Newton's idea: lay a parabola on $f$ where you stand, with the right height, slope and curvature, and go to its vertex. Decide, then drag the start
+# Newton's idea: lay a parabola on $f$ where you stand, with the right height, slope and curvature, and go to its vertex. **From a fifth of the way to $(-1, -2)$, where $f$ bends downward, where does Newton end?** Decide, then drag the start
 # (or focus it and press the arrow keys). The triangle at the bottom marks the vertex. *Make it fail* goes to a place where the parabola is nearly straight.
 
 # %% predict-top
@@ -411,7 +411,7 @@ for steps in range(9):
 # ## Four paths on one map
 #
 # Now all four from the same start. Newton and the trust region (*Trust-Region-Verfahren*) use the true Hessian, Gauss-Newton and Levenberg-Marquardt the sum of squares. Blue lines are
-# the chosen method's model at the chosen iteration, the dashed circle its radius, the thick bar its step. Nobody works this out in the head, so guess; then drag the start and the iteration.
+# the chosen method's model at the chosen iteration, the dashed circle its radius, the thick bar its step. **How many of the four reach the global minimum from $(3, 3)$?** Nobody works this out in the head, so guess; then drag the start and the iteration.
 
 # %% predict-four
 guess = ...  # your code here

@@ -220,8 +220,8 @@ rms_before = ex.rms_before(rms_before)
 # %% derivatives [markdown]
 # ## Derivatives you can trust
 #
-# The thesis takes forward differences with $h = 5\cdot10^{-7}$ for millimeters and degrees alike (listing C4). Chapter 4 measured the gradient of one number; write the central difference of a whole vector. Then decide which step
-# is best by the angle A, **near 0.0000001, near 0.001 or near 1 degree**.
+# The thesis takes forward differences with $h = 5\cdot10^{-7}$ for millimeters and degrees alike (listing C4). Chapter 4 measured the gradient of one number; write the central difference of a whole vector. Then decide: **which step
+# is best by the angle A**, near 0.0000001, near 0.001 or near 1 degree?
 
 # %% numeric_jacobian
 @ex.numeric_jacobian

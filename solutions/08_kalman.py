@@ -84,7 +84,7 @@ ex.predict("printed", guess)
 # %% bells [markdown]
 # ## Three bells
 #
-# Decide, then drag the peak of the measurement: sideways moves it, upward makes it sharper. Watch what the gain follows, and what it does not look at.
+# **Prediction and measurement are equally sure, but 2 m apart: what becomes of the corrected bell?** Decide, then drag the peak of the measurement: sideways moves it, upward makes it sharper. Watch what the gain follows, and what it does not look at.
 # *Make it fail* shows what the bells do not tell.
 
 # %% predict-bell
@@ -147,6 +147,7 @@ for name, (x0, var0, values) in readings.items():
 #
 # In the figure, the dots are the sensor's errors, and the bracket beside them what the filter *believes* of the sensor. Pull it until it fits; the true noises stay 0.5 m and
 # 0.4 m/s². On the right the mean NIS judges every such belief. Then switch the sensor off for three seconds.
+# First decide: **the velocity is never measured, so what becomes of its uncertainty while the vehicle drives?**
 
 # %% predict-velocity
 guess = ...  # your code here
@@ -318,7 +319,7 @@ def ekf_step(x, cov, u, dt, cov_u, z, landmark, cov_z):
 # ## Drive among landmarks
 #
 # As in the lecture's "Beispielfahrt mit einer Landmarke": stars show where each measurement puts the landmark. Arrow keys or play; drag the landmarks while it drives. The panel shows
-# the NEES, which averages 3 for an honest filter of three states. Then make it fail, twice.
+# the NEES, which averages 3 for an honest filter of three states. **A filter forgets to wrap the bearing's innovation: what happens when a bearing crosses from +180° to −180°?** Decide, then make it fail, twice.
 
 # %% predict-wrapping
 guess = ...  # your code here
@@ -365,6 +366,7 @@ for name, belief in beliefs.items():
 # ## Further, beyond the document: a sensor ten times more precise
 #
 # The extended filter replaces a curve by its tangent at the prediction. Here 200 robots know their start poorly, and are corrected once.
+# **With a sensor ten times more precise, is the filter's covariance more trustworthy, or less?**
 
 # %% predict-precise
 guess = ...  # your code here
@@ -400,7 +402,7 @@ for name, step in filters.items():
 # %% gates [markdown]
 # ## Which landmark was that?
 #
-# Real landmarks wear no numbers, and some measurements belong to none. The innovation in units of its covariance, $y^\top S^{-1} y$ (the NIS), decides: nearest in this distance, and only if it
+# Real landmarks wear no numbers, and some measurements belong to none. The innovation in units of its covariance, $y^\top S^{-1} y$ (the NIS), decides: nearest in this distance (Mahalanobis's), and only if it
 # lies below the chi-square limit (5.99 for two numbers and 95 %). Only what was measured counts: with one landmark in sight and three on the map the limit is that of two numbers, not of six
 # (`kalman.gate` takes the number from `step.dof`). In the example the filter's heading is off by 8°: what it measures of landmark 0 then lies nearer to
 # landmark 1 *in meters*, and the gate can only throw the measurement away.

@@ -269,6 +269,10 @@ def resample_systematic(weights, rng):
 # %% wheel-stage
 stages.wheel()
 
+# %% standing-text [markdown]
+# **A robot stands still, 1000 particles weigh the same, and roulette resamples 200 times. How many of the first 1000
+# still have descendants?**
+
 # %% predict-standing
 guess = ...  # your code here
 ### BEGIN SOLUTION
@@ -402,8 +406,8 @@ stages.soccer()
 # %% kidnapping [markdown]
 # ## The kidnapped robot
 #
-# The lecture names the *kidnapped robot problem* and leaves it there. In the arena below you can do it: **drag the
-# robot away**. A stroke elsewhere
+# The lecture names the *kidnapped robot problem* and leaves it there. **The cloud has converged, then the robot is carried into another room: what does the plain filter
+# do?** Decide. In the arena you can do it: drag the robot away. A stroke elsewhere
 # draws obstacles that the map does not know. Press play, or click the picture and drive with the arrow keys. Switch
 # models and resamplers while it runs, and when the robot
 # is lost, choose *spoke wheel + recovery*.
@@ -494,7 +498,7 @@ for name, one in (("laser", sensors.Scanner()), ("camera", sensors.XTION)):
 # The drives here and in the arena have the noise of the lecture's *example* (slides *Fehlermodell für Steuerbefehl
 # (1)*, *(2)*): 5 cm per meter, 5° per turn, 2° per meter. The circle of chapters 7 and 8 has its simulation's 2 cm.
 #
-# A converged cloud needs no 5000 particles. KLD sampling counts the bins (0.5 m by 0.5 m by 15°) the cloud occupies and
+# A converged cloud needs no 5000 particles. KLD sampling (after the Kullback-Leibler distance) counts the bins (0.5 m by 0.5 m by 15°) the cloud occupies and
 # keeps as many particles as a chi-square bound asks for: with $k$ bins $n = \chi^2_{k-1} / (2\varepsilon)$, its 99 % quantile, and `n_min` at least.
 # The price: a cloud that shrinks onto the wrong place has nobody left elsewhere, and then all hangs on the recovery.
 # Compare the rows *adaptive* and *global*: which model pays it, and why that one? Then run the cell with

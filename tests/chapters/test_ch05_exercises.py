@@ -141,6 +141,15 @@ def test_how_far_the_three_printed_radii_are_from_the_fitted_one():
     assert circles.argmax() == 3 and 29.9725 < circles.max() < radius  # the kink
 
 
+def test_the_residual_that_table_7_5_prints_is_that_of_pose_1_but_for_a_sign():
+    """The sentence of the notebook: y and z to 0.01 mm, x up to its sign and 0.014 mm, and of no other pose."""
+    p2, m = frames.kuka_from_degrees(thesis.kuka_pose_deg("scanner_end")), thesis.measurements((2,))
+    residuals = ITEMS["kuka_residual"].reference(p2, m.T_BF, m.x_S, thesis.printed_target())
+    off = np.abs(np.abs(residuals) - [0.24, 0.67, 0.11])
+    assert off[0, 1:].max() < 0.01 and residuals[0, 0] < 0 and round(off[0, 0], 3) == 0.014
+    assert off[1:].max(axis=1).min() > 0.1
+
+
 def test_differences_are_a_jacobian_too():
     def differences(T_FS, T_BF, x_S, h=1e-4):
         def residuals(u):

@@ -5,6 +5,7 @@ import pytest
 
 from labkit.chapters.ch07_dead_reckoning import exercises as ch07
 from labkit.chapters.ch07_dead_reckoning import stages
+from labkit.documents.lecture import printed as lecture
 from labkit.exercises.engine import CORRECT, NOT_YET
 from labkit.localization import lateration, odometry
 
@@ -84,3 +85,19 @@ def test_the_share_that_is_to_be_predicted():
 def test_midpoint_and_simplified_model_are_equally_sure_of_their_end():
     sure = [np.sqrt(np.trace(ch07._circle(model)[1][:2, :2])) for model in ("euler", "midpoint")]
     assert abs(sure[0] - sure[1]) < 1e-4
+
+
+def test_a_drift_grows_with_the_power_of_one_and_a_half_and_a_larger_wheel_with_the_square():
+    k_drift = lecture.circle_drive().noise["k_drift"]
+
+    def std(way, dt=0.1):
+        controls = np.tile([1.0, 0.0], (round(way / dt), 1))
+        noise = {"k_d": 0.0, "k_theta": 0.0, "k_drift": k_drift}
+        covs = odometry.drive_with_covariance(np.zeros(3), np.zeros((3, 3)), controls, dt, **noise)[1]
+        return np.sqrt(covs[-1][1, 1])
+
+    assert std(14.0) == pytest.approx(np.sqrt(k_drift * 14.0**3 / 3), rel=1e-3)
+    assert std(28.0) / std(14.0) == pytest.approx(2**1.5, rel=1e-3)
+    offset = ITEMS["wheel_offset"].reference
+    assert offset(2.0, 0.01, 0.5) / offset(1.0, 0.01, 0.5) == pytest.approx(4, rel=1e-3)
+    assert offset(100.0, 0.01, 0.5) / offset(50.0, 0.01, 0.5) < 4  # it has turned by more than a little

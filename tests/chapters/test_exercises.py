@@ -188,6 +188,16 @@ def test_the_last_hint_of_a_value_is_code_that_binds_its_name(chapter, item):
     assert item.id in bound, item.hints[-1]
 
 
+@pytest.mark.parametrize("chapter", CHAPTERS, ids=lambda c: c.name)
+def test_the_question_of_a_prediction_stands_before_its_cell(chapter):
+    """Whoever reads before running knows what is to be decided; the cell's output repeats it with the choices."""
+    text = ""
+    for cell in source.read(session.SOLUTIONS / f"{chapter.notebook}.py"):
+        asked = cell.kind == "code" and re.search(r'ex\.predict\(\s*"(\w+)"', cell.text)
+        assert not asked or "?" in text, f"{asked[1]}: the text before it asks nothing"
+        text = cell.text if cell.kind == "markdown" else text
+
+
 def asked_in(chapter):
     """The ids of a chapter's items in the order of its notebook, and those in sections whose heading says further."""
     order, further, level, ids = [], [], None, {item.id for item in chapter.items}

@@ -1105,7 +1105,7 @@ CHAPTER = Chapter(
             reference=landmark_weight,
             draw=(landmarks_at_a_pose, landmarks_from_a_wrong_room),
             fixed={"pose": POSE},
-            metric=metrics.Numbers(1e-8),
+            metric=metrics.Numbers(1e-6),
             limit=IMPORTS,
             hints=(
                 "What range and what bearing would a robot at this pose expect? Compare them with z.",
@@ -1348,7 +1348,7 @@ CHAPTER = Chapter(
             "beam_weight",
             reference=beam_weight,
             draw=beams_at_a_pose,
-            metric=metrics.Numbers(1e-9),
+            metric=metrics.Numbers(1e-6),
             noisy=[(whole_scan(beams_at_a_pose), metrics.Numbers(1e-6), "Right for few beams, but not for 541:")],
             limit=IMPORTS,
             hints=(
