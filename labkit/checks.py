@@ -98,9 +98,11 @@ def as_matrices(value, name, rows, columns):
 
 
 def as_shape(value, name, *shape):
-    """`value` as a finite array of just this shape; a letter stands for any length."""
-    array = as_finite(value, name)
-    if array.ndim != len(shape) or any(isinstance(w, int) and w != n for w, n in zip(shape, array.shape)):
+    """`value` as a finite array of just this shape; a letter stands for any length, and twice for the same."""
+    array, letters = as_finite(value, name), {}
+    if array.ndim != len(shape) or any(
+        n != (w if isinstance(w, int) else letters.setdefault(w, n)) for w, n in zip(shape, array.shape)
+    ):
         wanted = f"({shape[0]},)" if len(shape) == 1 else f"({', '.join(map(str, shape))})"
         raise ValueError(f"{name} must have shape {wanted}, got {array.shape}")
     return array
@@ -122,6 +124,18 @@ def as_count(value, name, at_least=1):
     if number != int(number) or number < at_least:
         raise ValueError(f"{name} must be a whole number, at least {at_least}, got {shown(number)}")
     return int(number)
+
+
+def as_whole(value, name, at_least=None):
+    """`value` as it is if it is one whole number, not below `at_least`; 3.0 becomes 3."""
+    if not isinstance(value, int | np.integer) or isinstance(value, bool):
+        number = as_number(value, name)
+        if number != int(number):
+            raise ValueError(f"{name} must be a whole number, got {shown(number)}")
+        value = int(number)
+    if at_least is not None and value < at_least:
+        raise ValueError(f"{name} must be a whole number, at least {at_least}, got {value}")
+    return value
 
 
 def fit_together(**shapes):
@@ -168,6 +182,26 @@ def _refuse_sheared(R, name, tolerance):
         )
 
 
+def as_truths(value, name):
+    """`value` as an array of truth values; refuses numbers, which would be indices."""
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        raise ValueError(f"{name} must hold truth values, got rows of different lengths") from None
+    if array.dtype.kind != "b":
+        got = "numbers" if array.dtype.kind in "iuf" else _what(array)
+        raise ValueError(f"{name} must hold truth values, got {got}")
+    return array
+
+
+def as_indices(value, name):
+    """`value` as an array of whole numbers, which name rows or entries."""
+    array = as_floats(value, name) if np.size(value) else np.zeros(np.shape(value), int)
+    if (array != np.floor(array)).any() or not np.isfinite(array).all():
+        raise ValueError(f"{name} must hold whole numbers")
+    return array.astype(int)
+
+
 def as_generator(value, name="rng"):
     """`value` as it is; refuses what is no `numpy.random.Generator`."""
     return as_instance(value, name, np.random.Generator, "a numpy.random.Generator, as default_rng(seed) gives it")
@@ -195,7 +229,8 @@ def as_instance(value, name, type_, wanted=""):
 def as_choice(value, name, options):
     """`value` as it is; refuses what is none of some words."""
     if not isinstance(value, str) or value not in options:
-        raise ValueError(f"{name} must be one of {', '.join(options)}, got {value!r}")
+        got = repr(value) if isinstance(value, str) else kind(value)
+        raise ValueError(f"{name} must be one of {', '.join(options)}, got {got}")
     return value
 
 

@@ -7,6 +7,7 @@ understand it leaves to the function, and "array-like" arguments, which function
 
 import functools
 import inspect
+import os
 import re
 import sys
 
@@ -15,18 +16,25 @@ import numpy as np
 from .checks import (
     PRODUCT_TOLERANCE,
     as_choice,
+    as_covariances,
     as_finite,
     as_floats,
     as_function,
     as_generator,
+    as_indices,
     as_number,
+    as_rotations,
     as_transforms,
+    as_truths,
+    as_whole,
     kind,
 )
 
 _LINE = re.compile(r"^(\w[\w, ]*?) : (.+)$")
 _SHAPE = re.compile(r"\(([^()]*)\)")
+_ARRAY = re.compile(r"(bool )?arrays?( of int)?\b(?!-like)")
 _PLAIN = {"str": str, "dict": dict, "bytes": bytes, "bool": (bool, np.bool_), "list": (list, tuple)}
+_PLAIN |= {"tuple": (list, tuple), "path": os.PathLike}
 
 
 def documented(function):
@@ -37,20 +45,30 @@ def documented(function):
     def checked(*args, **kwargs):
         if not rules:
             rules.append(_rules(function))
-        for place, name, check in rules[0]:
+        sizes = {}
+        for place, name, check, shape in rules[0]:
             if name in kwargs:
-                kwargs[name] = check(kwargs[name])
+                value = kwargs[name] = check(kwargs[name])
             elif place < len(args):
                 value = check(args[place])
                 if value is not args[place]:
                     args = (*args[:place], value, *args[place + 1 :])
+            else:
+                continue
+            if shape and value is not None:
+                _refuse_other_sizes(name, value, shape, sizes)
         return function(*args, **kwargs)
 
     return checked
 
 
+def unchecked(function):
+    """The function beneath `documented`, for an inner loop whose arguments have been checked."""
+    return function.__wrapped__
+
+
 def _rules(function):
-    """(place, name, check) of every parameter whose word is understood."""
+    """(place, name, check, shape of an array that has but one) of every parameter whose word is understood."""
     found = []
     parameters = inspect.signature(function).parameters
     places = {name: place for place, name in enumerate(parameters)}
@@ -61,7 +79,9 @@ def _rules(function):
             check = _check(name, own, f"{said}{more} {default}", function) if name in places else None
             if check:
                 optional = "optional" in said or "None" in said or default is None
-                found.append((places[name], name, functools.partial(_unless_none, check) if optional else check))
+                shapes = _shapes(own) if _ARRAY.match(own) else ()
+                check = functools.partial(_unless_none, check) if optional else check
+                found.append((places[name], name, check, shapes[0] if len(shapes) == 1 else None))
     return found
 
 
@@ -113,8 +133,11 @@ def _check(name, said, more, function):
     first = said.partition(",")[0].strip()
     if first == "float":
         return functools.partial(_number, name, gaps)
-    if first in ("array", "arrays"):
-        return functools.partial(_array, name, _shapes(said), gaps)
+    if first == "int":
+        least = re.search(r"\bat least (\d+)", more)
+        return functools.partial(as_whole, name=name, at_least=int(least[1]) if least else None)
+    if _ARRAY.match(said):
+        return functools.partial(_array, name, _shapes(said), first.startswith("bool"), "of int" in first, gaps)
     if re.match(r"(function|callable)s?\b", first):
         return functools.partial(as_function, name=name)
     words = [word for word in first.split(" or ") if word != "None"]
@@ -145,22 +168,43 @@ def _shapes(said):
     return tuple(tuple(int(part) if part.isdigit() else part for part in shape) for shape in shapes)
 
 
-def _array(name, shapes, gaps, value):
-    if not _is_kept(value):
+def _array(name, shapes, truths, indices, gaps, value):
+    if truths:
+        value = as_truths(value, name)
+    elif indices:
+        value = as_indices(value, name)
+    elif not (isinstance(value, np.ndarray) and value.dtype.kind in "iufb"):  # truth values and indices stay such
         value = as_floats(value, name)
     if not gaps and value.dtype.kind == "f":
         as_finite(value, name)
     if shapes and not any(_fits(value.shape, shape) for shape in shapes):
         wanted = " or ".join(f"({', '.join(map(str, shape))}{',' * (len(shape) == 1)})" for shape in shapes)
         raise ValueError(f"{name} must have shape {wanted}, got {value.shape}")
-    if name.startswith("T") and value.shape[-2:] == (4, 4) and not gaps:
-        as_transforms(value, name, PRODUCT_TOLERANCE)
+    if not gaps:
+        _keeps_its_name(name, {shape[-2:] for shape in shapes}, value)
     return value
 
 
-def _is_kept(value):
-    """Whether a function gets an array as it is: truth values and indices must stay what they are."""
-    return isinstance(value, np.ndarray) and value.dtype.kind in "iufb"
+def _keeps_its_name(name, ends, value):
+    """Refuses what is called a transform, a rotation or a covariance and is none.
+
+    An array of shape (..., 4, 4) is one of transforms here, whatever its name.
+    """
+    if value.shape[-2:] == (4, 4) and (name.startswith("T") or (4, 4) in ends):
+        as_transforms(value, name, PRODUCT_TOLERANCE)
+    elif value.shape[-2:] == (3, 3) and (re.match(r"R(_|$)", name) or (4, 4) in ends):
+        as_rotations(value, name, PRODUCT_TOLERANCE)
+    elif name.startswith("cov") and value.ndim > 1 and value.shape[-2] == value.shape[-1]:
+        as_covariances(value, name, value.shape[-1])
+
+
+def _refuse_other_sizes(name, value, shape, sizes):
+    """Refuses an array in whose shape a letter stands for another number than in that of an argument before it."""
+    for letter, n in zip(reversed(shape), reversed(value.shape)):
+        if isinstance(letter, str) and letter != "...":
+            known, other = sizes.setdefault(letter, (n, name))
+            if known != n:
+                raise ValueError(f"{name} must have {letter} = {known} as {other} has, got shape {value.shape}")
 
 
 def _fits(found, shape):

@@ -75,6 +75,8 @@ def weak_direction(covariance, frame, what):
 def axis_spread(T):
     """Rms turn of poses about each principal axis of their motions, largest first (rad), and these axes as columns."""
     T = as_shape(as_transforms(T, "T"), "T", "n", 4, 4)
+    if not len(T):
+        raise ValueError("T must hold at least one pose, got none")
     middle = T[len(T) // 2, :3, :3]
     turns = log_so3(middle.T @ T[:, :3, :3])
     values, vectors = np.linalg.eigh(turns.T @ turns / len(T))
@@ -96,8 +98,15 @@ def refuse_one_axis(T, name="the flange"):
         )
 
 
+@documented
 def refuse_mixed_roles(model, eye_to_hand):
-    """Refuse poses whose inverses close the loop far better: a file that holds something else."""
+    """Refuse poses whose inverses close the loop far better: a file that holds something else.
+
+    Parameters
+    ----------
+    model : HandEyeModel
+    eye_to_hand : bool
+    """
     turn, reach = axis_spread(model.T_BF)[0][1], np.linalg.norm(model.T_ST[:, :3, 3], axis=1).max()
     if model.misfit[0] < PLAIN * turn and model.misfit[1] < PLAIN * turn * reach:
         return  # wrong roles miss by as much as the poses turn
@@ -109,8 +118,16 @@ def refuse_mixed_roles(model, eye_to_hand):
         raise ValueError(MIXED_UP.format(other=other, times=times))
 
 
+@documented
 def refuse_open_loop(T, residuals, length_unit="mm"):
-    """Refuse residuals (n, 6) as large as the turns of the poses: nothing closes, so nothing is calibrated."""
+    """Refuse residuals as large as the turns of the poses: nothing closes, so nothing is calibrated.
+
+    Parameters
+    ----------
+    T : array, shape (n, 4, 4)
+    residuals : array, shape (n, 6)
+    length_unit : str
+    """
     angle, (along, across, _) = np.sqrt((residuals[:, :3] ** 2).sum(1).mean()), axis_spread(T)[0]
     if angle > OPEN * across:
         length = np.sqrt((residuals[:, 3:] ** 2).sum(1).mean())

@@ -15,8 +15,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..checks import as_positive_number, as_rotations, as_shape, as_transforms, shown
-from ..documented import documented
+from ..checks import as_choice, as_positive_number, as_rotations, as_shape, as_transforms, shown
+from ..documented import documented, unchecked
 from ..geometry.frames import invert, moved, pose, rotation_block
 from ..geometry.lie import log_so3, nearest_rotation, skew
 from .motion import refuse_one_axis
@@ -76,7 +76,7 @@ class HandEye(Result):
     def _information(self):
         """Normal matrices of the twelve unknowns for noise of size 1, rotations and translations apart."""
         root = np.sqrt(np.repeat(self.weights, 3))[:, None]
-        by_turns, by_gaps = (root * J for J in loop_jacobians(*self._loop, self.T_ST))
+        by_turns, by_gaps = (root * J for J in unchecked(loop_jacobians)(*self._loop, self.T_ST))
         return by_turns.T @ by_turns, by_gaps.T @ by_gaps
 
     @cached_property
@@ -148,12 +148,13 @@ ROLES = {"in hand": EyeInHand, "to hand": EyeToHand}
 # --- the report's method ---------------------------------------------------------------------------------------------
 
 
+@documented
 def kronecker_matrix(A, B):
     """The linear system of the rotation, M vec(X) = 0, vec stacking **columns**; equations (7) to (9).
 
     Parameters
     ----------
-    A, B : array-like, shape (N, 3, 3) or (N, 4, 4)
+    A, B : array, shape (N, 3, 3) or (N, 4, 4)
         Motions of the flange and of the sensor, A_i X = X B_i. The report writes X A = B X: its letters are exchanged.
 
     Returns
@@ -249,7 +250,7 @@ def solve_ax_xb(A, B):
     A, B = as_transforms(A, "A"), as_transforms(B, "B")
     if A.ndim != 3 or A.shape != B.shape or len(A) < 2:
         raise ValueError(f"A and B must both have shape (N, 4, 4) with N >= 2, got {A.shape} and {B.shape}")
-    M = kronecker_matrix(A, B)
+    M = unchecked(kronecker_matrix)(A, B)
     R, values = rotation_from_kronecker(M)
     if values[-2] <= RELATIVE_RANK * np.sqrt(len(A)):
         raise ValueError(
@@ -299,17 +300,23 @@ def calibrate_hand_eye(T_BF, T_ST, std_rot=None, std_trans=None, robust=False, *
     return calibrate_with(_gauss_newton, T_BF, T_ST, std_rot, std_trans, robust, eye)
 
 
+@documented
 def calibrate_with(fit, T_BF, T_ST, std_rot, std_trans, robust, eye):
     """What `calibrate_hand_eye` does around its fit: input, outliers, result.
 
-    `fit(robot, T_ST, weights, given)` returns sensor and target of the loop robot @ sensor @ T_ST = target, and the
-    history.
+    Parameters
+    ----------
+    fit : function
+        fit(robot, T_ST, weights, given) returns sensor and target of the loop robot @ sensor @ T_ST = target, and the
+        history.
+    T_BF, T_ST, std_rot, std_trans, eye
+        As in `calibrate_hand_eye`.
+    robust : bool
     """
     T_BF, T_ST = as_transforms(T_BF, "T_BF"), as_transforms(T_ST, "T_ST")
     if T_BF.ndim != 3 or T_BF.shape != T_ST.shape or len(T_BF) < 3:
         raise ValueError(f"T_BF and T_ST must both have shape (N, 4, 4) with N >= 3, got {T_BF.shape} and {T_ST.shape}")
-    if eye not in ROLES:
-        raise ValueError(f"eye must be 'in hand' or 'to hand', got {eye!r}")
+    as_choice(eye, "eye", ROLES)
     given = tuple(
         None if std is None else as_positive_number(std, name)
         for std, name in ((std_rot, "std_rot"), (std_trans, "std_trans"))
@@ -318,7 +325,7 @@ def calibrate_with(fit, T_BF, T_ST, std_rot, std_trans, robust, eye):
     robot, frame = (T_BF, "base") if eye == "in hand" else (invert(T_BF), "flange")
 
     def solve(weights):
-        refuse_one_axis(robot[:, :3, :3], weights, frame, "sensor and target")
+        unchecked(refuse_one_axis)(robot[:, :3, :3], weights, frame, "sensor and target")
         sensor, target, history = fit(robot, T_ST, weights, given)
         return ROLES[eye](sensor, target, T_BF, T_ST, weights, given, np.array(history))
 
@@ -368,12 +375,13 @@ def _best_shifts(robot, T_ST, weights, Rx, Ry):
     """Sensor and target with the rotations Rx and Ry and the translations that fit best: they enter linearly."""
     sensor, target = pose(Rx, np.zeros(3)), pose(Ry, np.zeros(3))
     root = np.sqrt(np.repeat(weights, 3))
-    J = loop_jacobians(robot, sensor, target, T_ST)[1][:, [3, 4, 5, 9, 10, 11]]
+    J = unchecked(loop_jacobians)(robot, sensor, target, T_ST)[1][:, [3, 4, 5, 9, 10, 11]]
     gaps = (robot @ sensor @ T_ST)[:, :3, 3].ravel()
     t = np.linalg.lstsq(J * root[:, None], -gaps * root, rcond=None)[0]
     return pose(Rx, t[:3]), pose(Ry, t[3:])
 
 
+@documented
 def loop_jacobians(robot, sensor, target, T_ST):
     """Derivatives of the loop's errors by small rotations and translations of sensor and target.
 
@@ -411,8 +419,8 @@ def _gauss_newton(robot, T_ST, weights, given):
         E, gap = target[:3, :3].T @ closed[:, :3, :3], closed[:, :3, 3] - target[:3, 3]
         turn = 0.5 * np.stack([E[:, 2, 1] - E[:, 1, 2], E[:, 0, 2] - E[:, 2, 0], E[:, 1, 0] - E[:, 0, 1]], axis=1)
         squares = weights @ (3 - np.trace(E, axis1=1, axis2=2)), weights @ (gap**2).sum(1)
-        std_rot, std_trans = noise_levels(*squares, (freedom, freedom), given, size)
-        by_turns, by_gaps = loop_jacobians(robot, sensor, target, T_ST)
+        std_rot, std_trans = unchecked(noise_levels)(*squares, (freedom, freedom), given, size)
+        by_turns, by_gaps = unchecked(loop_jacobians)(robot, sensor, target, T_ST)
         J = np.concatenate([by_turns * root[:, None] / std_rot, by_gaps * root[:, None] / std_trans])
         r = np.concatenate([turn.ravel() * root / std_rot, gap.ravel() * root / std_trans])
         scale = 1 / np.linalg.norm(J, axis=0)
@@ -433,8 +441,10 @@ def noise_levels(square_rot, square_trans, freedom, given, size):
     ----------
     square_rot, square_trans : float
         Sums of squares (rad^2, mm^2).
-    freedom, given : pairs
-        Degrees of freedom, and standard deviations where they are known (rad, mm) or None, of rotation and translation.
+    freedom : array, shape (2,)
+        Degrees of freedom of rotation and translation.
+    given : tuple
+        Standard deviations of both where they are known (rad, mm), or None.
     size : float
         Of the data (mm): noise-free data have at least its rounding.
 

@@ -31,6 +31,7 @@ from ..checks import (
     fit_together,
     shown,
 )
+from ..documented import documented, unchecked
 from ..geometry.frames import invert, matrix_from_kuka, moved, pose, transform
 from ..geometry.lie import exp_so3, nearest_rotation, skew
 from .motion import refuse_one_axis
@@ -288,6 +289,7 @@ def rate_matrix(A, B):
     return np.array([[0.0, -sa, ca * cb], [0.0, ca, sa * cb], [1.0, 0.0, -sb]])
 
 
+@documented
 def joint_jacobian(T_BF, x_S, T_FS, target_free=True):
     """Derivative of the residuals by phi (in S), translation (in F) and target (in B).
 
@@ -328,8 +330,11 @@ def radius_jacobian(T_BF, x_S, T_FS, radius):
     -------
     J : array, shape (3 N, 10)
     """
+    (T_BF, x_S), T_FS = as_sightings(T_BF, x_S), as_shape(as_transforms(T_FS, "T_FS"), "T_FS", 4, 4)
+    if not x_S[:, 1].all():
+        raise ValueError("x_S must hold no center in the scan plane: y = 0 does not change with the radius alone")
     by_R = np.zeros_like(x_S)
-    by_R[:, 1] = radius / x_S[:, 1]
+    by_R[:, 1] = as_number(radius, "radius") / x_S[:, 1]
     turned = T_BF[:, :3, :3] @ (T_FS[:3, :3] @ by_R[..., None])
     return np.concatenate([joint_jacobian(T_BF, x_S, T_FS), turned.reshape(-1, 1)], axis=1)
 
@@ -362,6 +367,7 @@ def plate_jacobian(T_BF, x_S, p2, p3, x_P):
 # --- calibration -----------------------------------------------------------------------------------------------------
 
 
+@documented
 def calibrate_sphere_target(T_BF, x_S, target=None, robust=False, rng=None):
     """Pose of a scanner on the flange, and the sphere's center, from the center seen in N robot poses, without a start.
 
@@ -402,10 +408,17 @@ def calibrate_sphere_target(T_BF, x_S, target=None, robust=False, rng=None):
     return calibrate_with(_least_squares, T_BF, x_S, target, robust, rng)
 
 
+@documented
 def calibrate_with(fit, T_BF, x_S, target, robust, rng):
     """What `calibrate_sphere_target` does around its fit: input, outliers, result.
 
-    `fit(T_BF, x_S, weights, target, max_steps)` returns T_FS, target and the rms distance (mm) of its iterates.
+    Parameters
+    ----------
+    fit : function
+        fit(T_BF, x_S, weights, target, max_steps) returns T_FS, target and the rms distance (mm) of its iterates.
+    T_BF, x_S, target, rng
+        As in `calibrate_sphere_target`.
+    robust : bool
     """
     (T_BF, x_S), sample = as_sightings(T_BF, x_S), SAMPLE if target is None else SAMPLE_KNOWN
     fewest = sample + 1 if robust else 4 if target is None else 3
@@ -429,15 +442,30 @@ def as_sightings(T_BF, x_S):
     return T_BF, x_S
 
 
+@documented
 def refuse_undetermined(T_BF, x_S, weights, target_known):
-    """Refuses poses that leave scanner or sphere free, naming the missing motion."""
-    refuse_one_line(x_S, weights)
+    """Refuses poses that leave scanner or sphere free, naming the missing motion.
+
+    Parameters
+    ----------
+    T_BF, x_S, weights : arrays, shapes (N, 4, 4), (N, 3), (N,)
+    target_known : bool
+    """
+    unchecked(refuse_one_line)(x_S, weights)
     if not target_known:
-        refuse_one_axis(T_BF[:, :3, :3], weights, "base", "scanner and sphere")
+        unchecked(refuse_one_axis)(T_BF[:, :3, :3], weights, "base", "scanner and sphere")
 
 
+@documented
 def refuse_one_line(x_S, weights):
-    """Refuses sphere centers on one line of the scanner frame: nothing then fixes the rotation about it."""
+    """Refuses sphere centers on one line of the scanner frame: nothing then fixes the rotation about it.
+
+    Parameters
+    ----------
+    x_S, weights : arrays, shapes (N, 3) and (N,)
+    """
+    if len(x_S) < 2:
+        raise ValueError(f"at least 2 sphere centers are needed, got {len(x_S)}")
     mean = weights @ x_S / weights.sum()
     spread = np.linalg.svd((x_S - mean) * np.sqrt(weights)[:, None], compute_uv=False)
     far = math.sqrt(weights.sum()) * np.linalg.norm(mean)
@@ -451,7 +479,7 @@ def refuse_one_line(x_S, weights):
 
 def _least_squares(T_BF, x_S, weights, target, max_steps):
     """T_FS and target that minimize the weighted sum of squares, and the rms distance of the iterates."""
-    refuse_undetermined(T_BF, x_S, weights, target is not None)
+    unchecked(refuse_undetermined)(T_BF, x_S, weights, target is not None)
     if target is not None:
         T_FS = _fit_frame(x_S, transform(invert(T_BF), target), weights)
         return T_FS, target, [rms_distance(sphere_residuals(T_BF, x_S, T_FS, target))]
@@ -556,6 +584,7 @@ def _linear_solution(T_BF, x_S, weights):
     return u, values[14] / values[0] if 3 * n >= 15 else 0.0
 
 
+@documented
 def gauss_newton_pose(start, T_BF, x_S, target=None, parameters="euler", max_steps=50, tolerance=1e-10):
     """Plain Gauss-Newton from a start pose, each iterate kept: what listing C5 does, with the derivative exact.
 
@@ -582,8 +611,6 @@ def gauss_newton_pose(start, T_BF, x_S, target=None, parameters="euler", max_ste
 
     Source: thesis, listings C3 to C5; `labkit.documents.thesis.listings` has them as printed.
     """
-    if parameters not in ("euler", "se3"):
-        raise ValueError(f"parameters must be 'euler' or 'se3', got {parameters!r}")
     (T_BF, x_S), p = as_sightings(T_BF, x_S), as_shape(start, "start", 6)
     max_steps, tolerance = as_count(max_steps, "max_steps", at_least=0), as_number(tolerance, "tolerance")
     T_FS, free = matrix_from_kuka(p), target is None

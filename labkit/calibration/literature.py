@@ -7,7 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import as_count, as_matrices, as_positive_number, as_shape, as_transforms, shown
+from ..checks import (
+    PRODUCT_TOLERANCE,
+    as_count,
+    as_matrices,
+    as_positive_number,
+    as_rotations,
+    as_shape,
+    as_transforms,
+    shown,
+)
 from ..documented import documented
 from ..geometry.frames import invert, pose, transform
 from ..geometry.lie import exp_so3, nearest_rotation
@@ -73,6 +82,7 @@ def kim_matrix(A, B):
     Parameters
     ----------
     A, B : array-like, shape (..., 4, 4)
+        Motions. B, made of measured points, may be rigid but for their noise: only its last row is that of a motion.
 
     Returns
     -------
@@ -85,7 +95,7 @@ def kim_matrix(A, B):
 
     Source: thesis, appendix A.
     """
-    A, B = as_matrices(A, "A", 4, 4), as_matrices(B, "B", 4, 4)
+    A, B = as_transforms(A, "A", PRODUCT_TOLERANCE), as_matrices(B, "B", 4, 4)
     if A.shape != B.shape:
         raise ValueError(f"A and B must have the same shape (..., 4, 4), got {A.shape} and {B.shape}")
     left = A[..., :3, None, :3, None] * np.eye(4)[:, None]
@@ -155,7 +165,7 @@ def li_translation(T_BF, x_S, R_FS):
 
     Source: thesis, formulas (2-40) and (2-42), after Li et al. (2011).
     """
-    (T_BF, x_S), R_FS = as_sightings(T_BF, x_S), as_shape(R_FS, "R_FS", 3, 3)
+    (T_BF, x_S), R_FS = as_sightings(T_BF, x_S), as_shape(as_rotations(R_FS, "R_FS"), "R_FS", 3, 3)
     R, t = T_BF[:, :3, :3], T_BF[:, :3, 3]
     design = np.concatenate([R, np.tile(-np.eye(3), (len(R), 1, 1))], axis=2).reshape(-1, 6)
     right = -(t + (R @ (x_S @ R_FS.T)[..., None])[..., 0])

@@ -7,8 +7,8 @@ along their axes. Source: Chen, "A screw motion approach to uniqueness analysis 
 
 import numpy as np
 
-from ..checks import as_transforms, shown
-from ..documented import documented
+from ..checks import as_count, as_shape, as_transforms, shown
+from ..documented import documented, unchecked
 from ..geometry.frames import invert
 from ..geometry.lie import log_so3
 
@@ -80,7 +80,10 @@ def between_axes(T, apart=1):
     angles : array, shape (n - apart,)
         Between 0 and pi (rad).
     """
-    phi = log_so3(as_transforms(T, "T")[:, :3, :3])
+    T, apart = as_shape(as_transforms(T, "T"), "T", "n", 4, 4), as_count(apart, "apart")
+    phi = log_so3(T[:, :3, :3])
+    if apart >= len(T):
+        raise ValueError(f"apart must be below the number of motions, {len(T)}, got {apart}")
     axes = phi / np.linalg.norm(phi, axis=1, keepdims=True)
     return np.arccos(np.clip((axes[apart:] * axes[:-apart]).sum(1), -1, 1))
 
@@ -129,7 +132,7 @@ def refuse_one_axis(R, weights, frame, shifted):
     ValueError
         With the axis that all poses share.
     """
-    turns, directions = turning(R, weights)
+    turns, directions = unchecked(turning)(R, weights)
     if turns[2] < MIN_TURN:
         raise ValueError(
             f"the poses only translate: {shifted} can be shifted together in any direction; add poses that turn the "

@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..checks import as_points, as_shape, as_transforms
+from ..checks import as_instance, as_items, as_number, as_points, as_positive_number, as_shape, as_transforms, as_truths
 from ..documented import documented
 from ..estimation.influence import distance_limit, inverse_normal, invert_normal, squared_distances
 from ..geometry.frames import fit_frame, frame_from_points, invert
 from ..geometry.lie import exp_so3, log_so3, nearest_rotation, skew
-from .ax_xb import calibrate_hand_eye
-from .hand_eye import calibrate_sphere_target, joint_jacobian
+from .ax_xb import EyeInHand, calibrate_hand_eye
+from .hand_eye import SphereHandEye, calibrate_sphere_target, joint_jacobian
 from .pivot import calibrate_pivot
 
 SAMPLES, SCORED = 100, 200  # three-row candidates of a robust start, and rows that judge them
@@ -56,18 +56,42 @@ class Model:
     channels: how many numbers of a row share one standard deviation, such as (3, 3) for a rotation and a translation.
     std: standard deviations of the channels, None where they are to be estimated. needed: the fewest rows of a fit.
     way: poses of the robot (n, 4, 4), or None.
+    unknowns: what a solution holds, {name: shape}.
     """
 
     channels = (3,)
     needed = 3
     way = None
+    unknowns = {}
 
     def __init__(self, n, std):
         self.n, self.std, self._fits = n, std, {}
 
+    def __init_subclass__(cls):
+        """The methods of every kind take its own rows and solutions alone."""
+        for name, check in (("fit", cls.as_rows), ("linearize", cls.as_solution), ("proposals", cls.as_solution)):
+            if name in vars(cls):
+                setattr(cls, name, _of_its_own(vars(cls)[name], check))
+
+    def as_rows(self, kept):
+        """Which rows count, bool (n,); refuses what says it of others."""
+        kept = as_truths(kept, "kept")
+        if kept.shape != (self.n,):
+            raise ValueError(f"kept must have shape ({self.n},), got {kept.shape}")
+        return kept
+
+    def as_solution(self, solution):
+        """The parts of a solution as arrays; refuses those of another kind of calibration."""
+        parts, names = as_items(solution, "solution", "arrays"), ", ".join(self.unknowns)
+        if len(parts) != len(self.unknowns):
+            raise ValueError(f"solution must hold {names}, got {len(parts)} parts")
+        parts = [as_shape(part, name, *shape) for part, (name, shape) in zip(parts, self.unknowns.items())]
+        return tuple(as_transforms(part, "solution") if part.ndim == 2 else part for part in parts)
+
     def fitted(self, kept):
         """The solution from some rows, remembered."""
-        key = np.asarray(kept, bool).tobytes()
+        kept = self.as_rows(kept)
+        key = kept.tobytes()
         if key not in self._fits:
             self._fits[key] = self.fit(kept)
         return self._fits[key]
@@ -86,10 +110,19 @@ class Model:
 
     def proposals(self, solution):
         """Poses that could be measured next, (m, 4, 4), and the derivative (m, k, p) of what they would measure."""
-        raise NotImplementedError
+        raise ValueError(f"a {type(self).__name__} knows no poses to measure next")
 
+    @documented
     def noise(self, r, J, kept):
-        """`Noise` of the kept rows, each channel charged the share of the parameters that it fixes."""
+        """`Noise` of the kept rows, each channel charged the share of the parameters that it fixes.
+
+        Parameters
+        ----------
+        r : array, shape (n, k)
+            Residuals.
+        J : array, shape (n, k, p)
+        kept : bool array, shape (n,)
+        """
         edges = np.cumsum((0, *self.channels))
         parts = [slice(a, b) for a, b in zip(edges, edges[1:])]
         p, count = J.shape[2], kept.sum()
@@ -113,21 +146,43 @@ class Model:
 
     def whitened(self, solution, kept):
         """(residuals, derivative, `Noise`), the first two in units of the noise."""
-        r, J = self.linearize(solution)
+        (r, J), kept = self.linearize(solution), self.as_rows(kept)
         noise = self.noise(r, J, kept)
         per_number = np.repeat(noise.std, self.channels)
         return r / per_number, J / per_number[:, None], noise
 
+    @documented
     def widened(self, J, noise):
-        """A whitened derivative in units of what is known of the noise: `inverse_normal` of it is the covariance."""
+        """A whitened derivative in units of what is known of the noise: `inverse_normal` of it is the covariance.
+
+        Parameters
+        ----------
+        J : array, shape (n, k, p)
+        noise : Noise
+        """
         return J / np.repeat(noise.widening, self.channels)[:, None]
 
 
+def _of_its_own(method, check):
+    """A method of a `Model` whose argument has passed a check of that model."""
+
+    @functools.wraps(method)
+    def checked(self, given):
+        return method(self, check(self, given))
+
+    return checked
+
+
+@documented
 def majority(model):
     """Rows that agree with each other, and the fit to them: (solution, kept).
 
     Fits, measures the distance of each row from what the kept ones predict, keeps those that a good row would reach
     with 99.9 %, and repeats until nothing changes.
+
+    Parameters
+    ----------
+    model : Model
 
     Raises
     ------
@@ -162,12 +217,13 @@ def best_candidate(n, solve, misfit, seed=0):
     Parameters
     ----------
     n : int
-        Number of rows.
+        Number of rows, at least 3.
     solve : callable
         rows (m, 3) -> m solutions.
     misfit : callable
         (solutions, rows) -> tuple of arrays (m, len(rows)), one per channel.
     seed : int
+        At least 0.
 
     Returns
     -------
@@ -208,6 +264,7 @@ def next_poses(model, solution, kept, count=3):
     kept : bool array, shape (n,)
         The rows that count.
     count : int
+        At least 1.
 
     Returns
     -------
@@ -234,7 +291,7 @@ def next_poses(model, solution, kept, count=3):
 
 def turned_both_ways(angle=TILT):
     """Small catalog of rotations (18, 3, 3): about x, y, z and the diagonals between them, both ways."""
-    axes = np.array([a for a in np.ndindex(3, 3, 3)]) - 1.0
+    axes, angle = np.array([a for a in np.ndindex(3, 3, 3)]) - 1.0, as_number(angle, "angle")
     axes = axes[(np.abs(axes).sum(1) > 0) & (np.abs(axes).sum(1) < 3)]
     return exp_so3(angle * axes / np.linalg.norm(axes, axis=1)[:, None])
 
@@ -246,6 +303,7 @@ class HandEyeModel(Model):
     """T_BF T_FS T_ST = T_BT with noise on the sensor's readings; parameters of T_FS, then of T_BT."""
 
     channels = (3, 3)
+    unknowns = {"T_FS": (4, 4), "T_BT": (4, 4)}
 
     def __init__(self, T_BF, T_ST, std=(None, None), solver=calibrate_hand_eye):
         T_BF, T_ST = as_transforms(T_BF, "robot"), as_transforms(T_ST, "sensor")
@@ -261,6 +319,7 @@ class HandEyeModel(Model):
 
     def fit(self, kept):
         found = self.solver(self.T_BF[kept], self.T_ST[kept], *self.std)
+        as_instance(found, "what solver returns", EyeInHand)
         return found.T_FS, found.T_BT
 
     def linearize(self, solution):
@@ -354,6 +413,8 @@ def hand_eye_derivative(T_BF, predicted, T_FS):
 class PivotModel(Model):
     """R tip + p = pivot with noise of one size on every coordinate; parameters are tip, then pivot."""
 
+    unknowns = {"tip": (3,), "pivot": (3,)}
+
     def __init__(self, T_WF, std=(None,)):
         T_WF = as_transforms(T_WF, "poses")
         if T_WF.ndim != 3 or len(T_WF) < 3:
@@ -390,6 +451,7 @@ class SphereModel(Model):
     """T_BF T_FS x_S = center, noise of one size on the seen centers; parameters of T_FS, then the center."""
 
     needed = 4
+    unknowns = {"T_FS": (4, 4), "center": (3,)}
 
     def __init__(self, T_BF, x_S, std=(None,), solver=calibrate_sphere_target):
         T_BF, x_S = as_transforms(T_BF, "robot"), as_points(x_S, "points")
@@ -407,12 +469,14 @@ class SphereModel(Model):
 
     def fit(self, kept):
         found = self.solver(self.T_BF[kept], self.x_S[kept])
+        as_instance(found, "what solver returns", SphereHandEye)
         return found.T_FS, found.target
 
     def start(self):
         if self.n < 7:
             return super().start()
-        return self.solver(self.T_BF, self.x_S, robust=True).weights > 0
+        found = self.solver(self.T_BF, self.x_S, robust=True)
+        return as_instance(found, "what solver returns", SphereHandEye).weights > 0
 
     def linearize(self, solution):
         X, center = solution
@@ -432,6 +496,8 @@ class SphereModel(Model):
 
 class FrameModel(Model):
     """T_WF p_F = p_W with noise of one size on the measured points; parameters of T_WF."""
+
+    unknowns = {"T_WF": (4, 4)}
 
     def __init__(self, nominal, measured, std=(None,)):
         nominal, measured = as_points(nominal, "nominal"), as_points(measured, "measured")
@@ -486,7 +552,7 @@ def three_point_frame(points, std):
     T : array, shape (4, 4)
     covariance : array, shape (6, 6), or None without noise
     """
-    points = as_shape(points, "points", 3, 3)
+    points, std = as_shape(points, "points", 3, 3), None if std is None else as_positive_number(std, "std")
     T = frame_from_points(*points)
     if std is None:
         return T, None

@@ -29,6 +29,7 @@ from ..checks import (
     fit_together,
     shown,
 )
+from ..documented import documented, unchecked
 from ..geometry.lie import exp_so3, skew
 from .result import Result, point_parameters, result_class
 from .robust import median_std, tukey_weights
@@ -261,6 +262,7 @@ def _inverse_gram(A):
 # --- calibration -----------------------------------------------------------------------------------------------------
 
 
+@documented
 def calibrate_pivot(T_WF, std_rot=None, std_trans=None, robust=False, rng=None):
     """Tip and pivot from poses that all touch one point.
 
@@ -295,7 +297,7 @@ def calibrate_pivot(T_WF, std_rot=None, std_trans=None, robust=False, rng=None):
     """
     T, noise = as_poses(T_WF, 5 if robust else 3).copy(), as_noise(std_rot, std_trans)
     tolerance = rank_tolerance(noise)
-    refuse_free_tip(T, tolerance)
+    unchecked(refuse_free_tip)(T, tolerance)
     if robust:
         x, weights = _reweighted(T, noise, as_optional_generator(rng))
         if (count := np.count_nonzero(weights)) < 4:
@@ -333,15 +335,28 @@ def as_noise(std_rot, std_trans):
     return std_rot, std_trans
 
 
+@documented
 def rank_tolerance(noise):
-    """How small the smallest singular value may be beside the largest: orientation noise feigns some of its own."""
+    """How small the smallest singular value may be beside the largest: orientation noise feigns some of its own.
+
+    Parameters
+    ----------
+    noise : array, shape (2,), or None
+        Standard deviations of rotation (rad) and translation (mm).
+    """
     return RANK_TOLERANCE if noise is None else max(RANK_TOLERANCE, NOISE_TOLERANCE * noise[0])
 
 
+@documented
 def refuse_free_tip(T, tolerance):
     """Refuses poses whose stacked matrix has a singular value below the tolerance (relative to the largest).
 
     The null vector is (v, R_i v): the tip can move along v, fixed in the tool, and the pivot with it.
+
+    Parameters
+    ----------
+    T : array, shape (n, 4, 4)
+    tolerance : float
     """
     _, values, Vt = np.linalg.svd(np.linalg.qr(pivot_matrix(T), mode="r"))
     ratios = values / values[0]

@@ -21,6 +21,7 @@ from ..checks import (
     fit_together,
     shown,
 )
+from ..documented import documented
 from ..geometry.frames import pose, transform
 from ..geometry.lie import exp_so3
 from .hand_eye import MIN_SPREAD, joint_jacobian, sphere_in_scanner
@@ -108,6 +109,7 @@ class Unseen:
     slides: np.ndarray
 
 
+@documented
 def unseen_changes(T_BF, T_FS, target, tolerance=1e-3):
     """Changes of scanner and sphere that a set of poses hardly sees.
 

@@ -53,6 +53,7 @@ class Result:
 
     parameters = ()
 
+    @documented
     def covariance_of(self, name, other=None):
         """Block of the covariance between the parameters under `name` and those under `other` (by default the same).
 
@@ -73,8 +74,14 @@ class Result:
         rows = self._places(name)
         return self.covariance[np.ix_(rows, rows if other is None else self._places(other))]
 
+    @documented
     def std_of(self, name):
-        """Standard deviations of the parameters under `name`: a float for one, an array for a group."""
+        """Standard deviations of the parameters under `name`: a float for one, an array for a group.
+
+        Parameters
+        ----------
+        name : str
+        """
         std = np.sqrt(np.diagonal(self.covariance_of(name)))
         return float(std[0]) if any(p.name == name for p in self.parameters) else std
 

@@ -5,7 +5,7 @@ Source: Huber, "Robust Statistics" (1981); Tukey's biweight after Beaton and Tuk
 
 import numpy as np
 
-from ..checks import as_finite, as_positive_number
+from ..checks import as_finite, as_positive_number, as_shape
 
 MEDIAN_CHI3 = 1.5381722544550522  # median length of a vector of three standard normal components
 
@@ -23,7 +23,10 @@ def median_std(lengths):
     std : float
         In the same unit.
     """
-    return float(np.median(as_finite(lengths, "lengths"))) / MEDIAN_CHI3
+    lengths = as_shape(lengths, "lengths", "n")
+    if not len(lengths):
+        raise ValueError("lengths must hold at least one number, got none")
+    return float(np.median(lengths)) / MEDIAN_CHI3
 
 
 def tukey_weights(lengths, std, cut):

@@ -20,6 +20,7 @@ from ..checks import (
     as_positive,
     as_positive_number,
     as_shape,
+    kind,
     shown,
 )
 from ..documented import documented
@@ -263,7 +264,8 @@ def sphere_center_from_profile(x, z, radius, side):
 
 def _refuse_side(side):
     if np.ndim(side) or side not in (1, -1):
-        raise ValueError(f"side must be +1 or -1, the sign of the center's y coordinate, got {side!r}")
+        got = kind(side) if np.ndim(side) else repr(side)
+        raise ValueError(f"side must be +1 or -1, the sign of the center's y coordinate, got {got}")
 
 
 @documented

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import as_finite, as_positive_number, as_shape, as_transforms
+from ..checks import as_finite, as_positive, as_positive_number, as_shape, as_transforms
 from ..documented import documented
 from ..geometry.lie import interpolate, log_so3
 
@@ -125,6 +125,7 @@ def clock_offset(time_a, T_a, time_b, T_b, max_offset=None):
     """
     time_a, time_b = as_shape(time_a, "time_a", "n"), as_shape(time_b, "time_b", "m")
     step = min(np.median(np.diff(time_a)), np.median(np.diff(time_b)))
+    as_positive(step, "the median step of both streams")
     span = max(SPAN, 2 * np.median(np.diff(time_a)), 2 * np.median(np.diff(time_b)))
     grids = [np.arange(time[0] + span / 2, time[-1] - span / 2, step) for time in (time_a, time_b)]
     if min(map(len, grids)) < 2 * BLOCKS:

@@ -7,7 +7,7 @@ Sensor-Roboter-Systemen", HAW Hamburg 2019, section 2.4.2.
 
 import numpy as np
 
-from ..checks import as_count, as_finite, as_matrices
+from ..checks import as_count, as_finite, as_matrices, as_number
 from ..documented import documented
 
 
@@ -62,7 +62,7 @@ def chord(f, x, y, n):
     if x.ndim != 1 or x.shape != y.shape:
         raise ValueError(f"x and y must have the same shape (d,), got {x.shape} and {y.shape}")
     share = np.linspace(0.0, 1.0, n)
-    values = np.array([float(f((1 - t) * x + t * y)) for t in share])
+    values = np.array([as_number(f((1 - t) * x + t * y), "what f returns") for t in share])
     return share, values, (1 - share) * values[0] + share * values[-1]
 
 

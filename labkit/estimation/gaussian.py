@@ -83,6 +83,7 @@ def chi_square_quantile(probability, dof):
         A probability outside 0 to 1, no number at all.
     """
     probability, dof = as_finite(probability, "probability"), as_finite(dof, "dof")
+    fit_together(probability=probability.shape, dof=dof.shape)
     if ((probability < 0) | (probability > 1)).any() or (dof <= 0).any():
         raise ValueError("probability must lie between 0 and 1, and dof be positive")
     return 2 * special.gammaincinv(dof / 2, probability)

@@ -10,7 +10,7 @@ Source: Cook, Weisberg, "Residuals and Influence in Regression" (1982), chapter 
 import numpy as np
 from scipy import special
 
-from ..checks import as_finite, as_matrices, as_positive_number, as_probability, as_shape
+from ..checks import as_finite, as_positive_number, as_probability, as_shape
 from ..documented import documented
 
 FREE = 1e-12  # of the largest eigenvalue of a normal matrix with its columns scaled alike: what is smaller is rounding
@@ -65,7 +65,7 @@ def free_directions(N):
     directions : array, shape (p, k)
         As columns, independent of each other; none where all parameters are determined.
     """
-    values, directions = _scaled_alike(as_matrices(N, "N", len(N), len(N)))
+    values, directions = _scaled_alike(as_shape(N, "N", "p", "p"))
     return directions[:, values <= FREE * values[-1]]
 
 
@@ -112,6 +112,7 @@ def squared_distances(residuals, jacobian, kept):
     return np.where(known, along**2 / np.where(known, values, 1.0), 0.0).sum(1)
 
 
+@documented
 def distance_limit(k, dof, probability=0.999):
     """Squared distance that a good block of numbers stays below.
 
@@ -128,7 +129,7 @@ def distance_limit(k, dof, probability=0.999):
     limit : float
         k times a quantile of the F distribution.
     """
-    return k * special.fdtri(k, max(dof, 1), as_probability(probability, "probability"))
+    return k * special.fdtri(as_positive_number(k, "k"), max(dof, 1), as_probability(probability, "probability"))
 
 
 def leave_out(residuals, jacobian, groups=None):

@@ -358,6 +358,7 @@ def steady_state(A, C, cov_v, cov_z):
 # --- consistency -------------------------------------------------------------
 
 
+@documented
 def nees(truth, x, cov, angle=None):
     """Normalized estimation error squared, error' cov^-1 error.
 
@@ -385,7 +386,7 @@ def nees(truth, x, cov, angle=None):
     error = truth - x
     if angle is not None:
         if angle not in range(-error.shape[-1], error.shape[-1]):
-            raise ValueError(f"angle must be the index of one of {error.shape[-1]} states, got {angle!r}")
+            raise ValueError(f"angle must be the index of one of {error.shape[-1]} states, got {angle}")
         error[..., angle] = wrap_angle(error[..., angle])
     return _squared(error, cov, "cov")
 

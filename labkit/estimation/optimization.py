@@ -423,7 +423,9 @@ def gain_ratio(cost, new_cost, g, B, step):
     """
     cost, new_cost = as_finite(cost, "cost"), as_finite(new_cost, "new_cost")
     noise = ROUNDING * np.abs(cost) + np.finfo(float).tiny
-    return (cost - new_cost + noise) / (predicted_decrease(g, B, step) + noise)
+    predicted = predicted_decrease(g, B, step)
+    fit_together(cost=cost.shape, new_cost=new_cost.shape, decrease=predicted.shape)
+    return (cost - new_cost + noise) / (predicted + noise)
 
 
 def classify_extremum(g, H, tol=1e-6):
@@ -642,6 +644,7 @@ def gauss_newton(residual, jacobian, x0, *, retract=np.add, stop=None, max_itera
     return _undamped(_squares(residual, jacobian), x0, next_step, retract, stop or settled(), max_iterations)
 
 
+@documented
 def levenberg_marquardt(
     residual, jacobian, x0, *, damping=1e-3, scale=1.0, retract=np.add, stop=None, max_iterations=100
 ):  # fmt: skip
@@ -650,6 +653,11 @@ def levenberg_marquardt(
     `damping` is the first damping, relative to the largest diagonal entry of the scaled J'J. A step that raises the
     cost is rejected and the damping grows; the better the model predicted, the more it shrinks. Other parameters as in
     `gauss_newton` and `trust_region`.
+
+    Parameters
+    ----------
+    residual, jacobian, retract : callables
+    stop : callable, optional
 
     Source: Nielsen, Damping parameter in Marquardt's method, IMM report (1999).
     """
@@ -749,7 +757,7 @@ def next_radius(radius, length, gain, max_radius):
     ----------
     radius, length, gain : array-like, shapes that broadcast
         Radius and length of the step, and the gain ratio it had.
-    max_radius : float
+    max_radius : float or array-like
 
     Returns
     -------
@@ -758,6 +766,9 @@ def next_radius(radius, length, gain, max_radius):
 
     Source: thesis, section 6.1.6.
     """
+    radius, length, gain = as_finite(radius, "radius"), as_finite(length, "length"), as_floats(gain, "gain")
+    max_radius = as_floats(max_radius, "max_radius")
+    fit_together(radius=radius.shape, length=length.shape, gain=gain.shape)
     on_rim = length >= (1 - 1e-9) * radius
     wider = np.where((gain > 0.75) & on_rim, np.minimum(2 * radius, max_radius), radius)
     return np.where(gain < 0.25, 0.25 * length, wider)[()]

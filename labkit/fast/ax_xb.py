@@ -15,6 +15,7 @@ from ..calibration.ax_xb import (
     noise_levels,
 )
 from ..checks import as_transforms
+from ..documented import unchecked
 from ..geometry.frames import pose
 from ..geometry.lie import nearest_rotation, skew
 
@@ -53,7 +54,7 @@ def solve_ax_xb(A, B):
         raise ValueError(f"A and B must have shapes (N, 4, 4) and (..., N, 4, 4) with N >= 2, got {A.shape}, {B.shape}")
     runs, n = B.shape[:-3], len(A)
     every = np.broadcast_to(A, B.shape)
-    M = kronecker_matrix(every.reshape(-1, 4, 4), B.reshape(-1, 4, 4)).reshape(*runs, 9 * n, 9)
+    M = unchecked(kronecker_matrix)(every.reshape(-1, 4, 4), B.reshape(-1, 4, 4)).reshape(*runs, 9 * n, 9)
     X = np.swapaxes(np.linalg.svd(M, full_matrices=False)[2][..., -1, :].reshape(*runs, 3, 3), -1, -2)
     R = nearest_rotation(X * np.where(np.linalg.det(X) < 0, -1.0, 1.0)[..., None, None])
     K1 = (_I3 - A[:, :3, :3]).reshape(-1, 3)
@@ -69,12 +70,12 @@ def _fit(robot, T_ST, weights, given):
     normal_r = np.empty((6, 6))
     normal_r[:3, :3] = normal_r[3:, 3:] = total * _I3
     normal_r[:3, 3:], normal_r[3:, :3] = -sum_A, -sum_A.T
-    both, freedom, history = linear_rotations(robot, T_ST, weights), 3 * total - 6, []
+    both, freedom, history = unchecked(linear_rotations)(robot, T_ST, weights), 3 * total - 6, []
     for _ in range(MAX_STEPS):
         x, y = both.reshape(2, 9)
         Lx, Ly = (both[:, None] @ _GENERATORS).reshape(2, 3, 9)
         Kx, Hx = K @ x, H9 @ x + h
-        std_r, std_t = noise_levels(3 * total - y @ Kx, x @ Hx + h @ x + h0, (freedom, freedom), given, size)
+        std_r, std_t = unchecked(noise_levels)(3 * total - y @ Kx, x @ Hx + h @ x + h0, (freedom, freedom), given, size)
         normal, gradient = normal_r / std_r**2, np.empty(6)
         normal[:3, :3] += Lx @ H9 @ Lx.T / std_t**2
         gradient[:3] = Lx @ (Hx / std_t**2 - 0.5 / std_r**2 * (K.T @ y))

@@ -18,6 +18,7 @@ from ..calibration.hand_eye import (
     sphere_residuals,
 )
 from ..calibration.motion import MIN_TURN
+from ..documented import unchecked
 from ..geometry.lie import nearest_rotation, skew
 
 NARROW = 1e-5  # relative spread of the sphere's places below which the readable refusal has a look
@@ -34,7 +35,7 @@ def _fit(T_BF, x_S, weights, target, max_steps):
     """Least squares with given weights: T_FS, target and the rms distance of the iterates."""
     mean, G, total = _moments(T_BF[:, :3, :3], T_BF[:, :3, 3], x_S, weights, target)
     if not _is_clearly_determined(mean, G, total, target):
-        refuse_undetermined(T_BF, x_S, weights, target is not None)
+        unchecked(refuse_undetermined)(T_BF, x_S, weights, target is not None)
     T_FS = np.eye(4)
     if target is not None:
         T_FS[:3, :3] = nearest_rotation(G[3:6, :3])

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..calibration import pivot
 from ..calibration.pivot import PivotCalibration, as_poses, rank_tolerance, refuse_free_tip
+from ..documented import unchecked
 from .rigid import rigid_rows
 
 
@@ -16,7 +17,7 @@ def calibrate_pivot(T_WF, std_rot=None, std_trans=None, robust=False, rng=None):
 
     The plain estimate comes from sums over the poses; with noise figures or robust, the readable function does it.
     """
-    if robust or std_rot is not None or std_trans is not None:
+    if robust is not False or std_rot is not None or std_trans is not None:
         return pivot.calibrate_pivot(T_WF, std_rot, std_trans, robust, rng)
     rows = rigid_rows(T_WF, "T_WF")
     if rows is None or rows.shape[1] < 3:
@@ -24,7 +25,7 @@ def calibrate_pivot(T_WF, std_rot=None, std_trans=None, robust=False, rng=None):
     n, entries, T = rows.shape[1], rows[:12], rows.T.reshape(-1, 4, 4)
     products, mean = entries @ entries.T, entries.mean(1).reshape(3, 4)
     gram = products[:4, :4] + products[4:8, 4:8] + products[8:, 8:] - n * (mean.T @ mean)
-    tip = _tip(gram, T, rank_tolerance(None))
+    tip = _tip(gram, T, unchecked(rank_tolerance)(None))
     return PivotCalibration(tip, mean[:, :3] @ tip + mean[:, 3], T, np.ones(n))
 
 

@@ -22,6 +22,7 @@ from ..checks import (
     as_shape,
     as_transforms,
     fit_together,
+    kind,
     shown,
 )
 from .frames import frame_from_points, invert, relative, rotation_angle, rotation_block, transform
@@ -233,7 +234,8 @@ def _loop(loop, count):
     try:
         numbers, forward = zip(*loop)
     except (TypeError, ValueError):
-        raise ValueError(f"a loop must be a sequence of pairs (number of the link, forward), got {loop!r}") from None
+        said = f"a loop must be a sequence of pairs (number of the link, forward), got {kind(loop)}"
+        raise ValueError(said) from None
     numbers = [as_count(k, "the number of a link", at_least=-count) for k in numbers]
     if max(numbers) >= count:
         raise ValueError(f"a loop must name links from 0 to {count - 1}, got {max(numbers)}")

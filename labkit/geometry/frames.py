@@ -239,6 +239,7 @@ def moved(T, step):
     T : array, shape (..., 4, 4)
     """
     T, step = as_transforms(T, "T"), as_points(step, "step", dim=6)
+    fit_together(T=T.shape[:-2], step=step.shape[:-1])
     return pose(T[..., :3, :3] @ exp_so3(step[..., :3]), T[..., :3, 3] + step[..., 3:])
 
 

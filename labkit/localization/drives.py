@@ -2,11 +2,12 @@
 
 import math
 from collections import deque
+from collections.abc import Hashable
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import as_count, as_points, as_positive_number, as_shape
+from ..checks import as_count, as_items, as_points, as_positive_number, as_shape, kind
 from ..documented import documented
 from ..geometry.planar import wrap_angle
 from . import odometry
@@ -31,8 +32,12 @@ def find_route(edges, start, goal):
 
     Source: lecture, "topologische Karten".
     """
+    edges = as_items(edges, "edges", "pairs of names")
     if not all(isinstance(edge, (tuple, list)) and len(edge) == 2 for edge in edges):
         raise ValueError("edges must be pairs of names")
+    for name in (start, goal, *(name for edge in edges for name in edge)):
+        if not isinstance(name, Hashable):
+            raise ValueError(f"a place must have a name, got {kind(name)}")
     before, queue = {start: None}, deque([start])
     while queue and goal not in before:
         here = queue.popleft()
@@ -171,6 +176,7 @@ class Wanderer:
         speed, turn_rate : float
             m/s and rad/s.
         """
+        pose = as_shape(pose, "pose", 3)
         if self.goal is None:
             self.goal = self._in_sight(pose)
         if self.goal is None:

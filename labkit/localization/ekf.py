@@ -396,6 +396,7 @@ def unscented_update(x, cov, z, landmarks, std_range, std_bearing):
 # --- association and simulated drives ----------------------------------------
 
 
+@documented
 def associate(x, cov, z, landmarks, std_range, std_bearing, by="mahalanobis", probability=0.99):
     """Index of the landmark each measurement belongs to; each is matched on its own.
 
@@ -436,10 +437,8 @@ def associate(x, cov, z, landmarks, std_range, std_bearing, by="mahalanobis", pr
     if by == "nearest":
         points = x[:2] + z[:, :1] * np.stack([np.cos(x[2] + z[:, 1]), np.sin(x[2] + z[:, 1])], axis=-1)
         best = np.linalg.norm(points[:, None, :] - landmarks, axis=-1).argmin(1)
-    elif by == "mahalanobis":
-        best = distance.argmin(1)
     else:
-        raise ValueError(f'by must be "mahalanobis" or "nearest", got {by!r}')
+        best = distance.argmin(1)
     passed = distance[np.arange(len(z)), best] <= chi_square_quantile(as_probability(probability, "probability"), 2)
     return np.where(passed, best, -1)
 

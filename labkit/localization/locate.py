@@ -5,12 +5,13 @@ around their landmarks, standard deviations of greatest likelihood where none ar
 new start where it has lost the robot.
 """
 
+from collections.abc import Hashable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares, minimize
 
-from ..checks import as_finite, as_points, as_shape
+from ..checks import as_choice, as_finite, as_instance, as_items, as_points, as_positive_number, as_shape
 from ..documented import documented
 from ..estimation.kalman import mean_band
 from ..geometry.planar import compose_pose, relative_pose, wrap_angle
@@ -116,7 +117,7 @@ def mend_clock(time):
 
     A step backward, or one longer than ten median steps, is replaced by a median one and begins a new part.
     """
-    time = as_finite(time, "time")
+    time = as_shape(time, "time", "n")
     step = np.diff(time)
     usual = float(np.median(step[step > 0])) if (step > 0).any() else 0.0
     if not usual > 0:
@@ -286,7 +287,7 @@ def fit_noise(log, x0, cov0, noise, free, filter_path):
         What is known of the start (m, m, rad).
     noise : Noise
         Where to begin, and what is not free.
-    free : sequence of str
+    free : tuple of str
         The names of those to find.
     filter_path : callable
         Of `localization.path` or `fast.path`.
@@ -295,13 +296,15 @@ def fit_noise(log, x0, cov0, noise, free, filter_path):
     -------
     Noise
     """
-    log = log.readings(slice(0, FIT_READINGS))
+    for name in free:
+        as_choice(name, "free", NAMES)
+    log = log.readings(np.arange(len(log.z)) < FIT_READINGS)
     log = log.rows(0, int(log.row[-1]) + 1)
     nothing = SPURIOUS / (2 * np.pi * max(log.z[:, 0].max(), 1.0))
 
     def cost(logs):
         trial = replace(noise, **dict(zip(free, np.exp(np.clip(logs, -12, 4)))))
-        seen = filter_path(log, x0, cov0, trial)
+        seen = as_instance(filter_path(log, x0, cov0, trial), "what filter_path returns", path.Path)
         density = np.exp(np.clip(-0.5 * (seen.nis + seen.log_det), -700, 50)) / (2 * np.pi)
         return -float(np.log((1 - SPURIOUS) * density + nothing).sum()) + 0.01 * float(np.sum((logs - start) ** 2))
 
@@ -335,7 +338,7 @@ def locate(
     truth : pair of arrays, optional
         Times (q,) on the clock of the odometry and poses (q, 3).
     seed : int
-        Of the particles.
+        Of the particles, at least 0.
     filter_path : callable
         The filter; `fast.path.filter_path` gives the same and is quick.
 
@@ -349,7 +352,14 @@ def locate(
         One sentence: nothing explains the readings, or none can be placed.
     """
     u, z, landmarks = as_points(u, "u", 2), as_shape(z, "z", "k", 2), as_shape(landmarks, "landmarks", "m", 2)
-    raw_time, reading_time = as_finite(odometry_time, "odometry_time"), as_finite(reading_time, "reading_time")
+    raw_time, reading_time = (
+        as_shape(odometry_time, "odometry_time", len(u)),
+        as_shape(reading_time, "reading_time", len(z)),
+    )
+    ids, landmark_ids = as_items(ids, "ids", "names"), as_items(landmark_ids, "landmark_ids", "names")
+    for name, named, rows in (("ids", ids, z), ("landmark_ids", landmark_ids, landmarks)):
+        if len(named) != len(rows) or not all(isinstance(one, Hashable) for one in named):
+            raise ValueError(f"{name} must hold {len(rows)} names, got {len(named)}")
     time, starts, warnings = mend_clock(raw_time)
     row, lag = place_readings(raw_time, starts, reading_time)
     index = {name: k for k, name in enumerate(landmark_ids)}
@@ -362,7 +372,7 @@ def locate(
     if len(good) < FEWEST:
         raise ValueError(f"only {len(good)} readings name a landmark of the map at a time that the odometry covers")
     log = Log(time, u, z[good], row[good], lag[good], landmark[good], landmarks)
-    given = dict(noise or {})
+    given = {as_choice(name, "noise", NAMES): as_positive_number(std, name) for name, std in (noise or {}).items()}
     level, rng = replace(GUESS, **given), np.random.default_rng(seed)
     x0, cov0, first = _first_start(log, level, rng)
     free = tuple(name for name in NAMES if name not in given)

@@ -10,6 +10,7 @@ meters, angles radians, planar poses (..., 3) are x, y, theta. Source: lecture "
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
@@ -149,9 +150,19 @@ class OccupancyGrid:
         symbols = np.array([".", "#", "?"])
         return "\n".join("".join(row) for row in symbols[self.cells[::-1]])
 
+    @documented
     def to_png(self, path):
-        """Write the picture that `from_png` reads."""
+        """Write the picture that `from_png` reads.
+
+        Parameters
+        ----------
+        path : str or Path
+            Its name ends in .png.
+        """
         from PIL import Image
+
+        if Path(path).suffix.lower() != ".png":
+            raise ValueError(f"path must end in .png, got {str(path)!r}")
 
         Image.fromarray(np.array(_GRAY, dtype=np.uint8)[self.cells[::-1]]).save(path)
 

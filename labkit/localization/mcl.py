@@ -14,6 +14,7 @@ import numpy as np
 from ..checks import as_count, as_function, as_generator, as_number, as_points, shown
 from ..documented import documented
 from .particles import (
+    as_weights,
     effective_size,
     estimate_mode,
     normalize_weights,
@@ -46,7 +47,8 @@ class Policy:
     rule: object
 
     def __call__(self, step, weights):
-        return bool(self.rule(step, weights))
+        """Whether to resample after a step, from 1 on, with weights, shape (M,)."""
+        return bool(self.rule(as_count(step, "step"), as_weights(weights)))
 
     def __and__(self, other):
         return Policy(lambda step, weights: self(step, weights) and other(step, weights))
@@ -183,16 +185,34 @@ class Recovery:
 
     def __post_init__(self):
         least, most = as_number(self.least, "least"), as_number(self.most, "most")
+        as_function(self.draw, "draw")
+        as_number(self.alpha_slow, "alpha_slow"), as_number(self.alpha_fast, "alpha_fast")
         if not 0 <= least <= most <= 1:
             raise ValueError(f"least must not be above most, both from 0 to 1, got {shown(least)} and {shown(most)}")
 
+    @documented
     def watch(self, mean_weight, averages):
-        """`recover` for a filter: averages, a `Recovered` or None before the first measurement."""
+        """`recover` for a filter.
+
+        Parameters
+        ----------
+        mean_weight : float
+        averages : Recovered or None
+            None before the first measurement.
+        """
         w_slow, w_fast = (mean_weight, mean_weight) if averages is None else averages[1:]
         return recover(mean_weight, w_slow, w_fast, self.alpha_slow, self.alpha_fast)
 
+    @documented
     def count(self, asked, n):
-        """How many of n particles to replace when the averages ask for the share `asked`."""
+        """How many of n particles to replace when the averages ask for the share `asked`.
+
+        Parameters
+        ----------
+        asked : float
+        n : int
+            At least 0.
+        """
         return round(min(max(asked, self.least), self.most) * n)
 
 
@@ -302,11 +322,16 @@ class MonteCarloLocalizer:
         self.states = self.motion(self.states, u, dt, rng)
         return self.correct(weighting, rng)
 
+    @documented
     def correct(self, weighting, rng):
-        """The `StepReport` of a step without motion."""
-        if weighting is not None:
-            as_function(weighting, "weighting")
-        self._step, rng = self._step + 1, as_generator(rng)
+        """The `StepReport` of a step without motion.
+
+        Parameters
+        ----------
+        weighting : sensors.Weighting or None
+        rng : numpy.random.Generator
+        """
+        self._step = self._step + 1
         mean_weight, all_zero = (None, False) if weighting is None else self._weigh(weighting)
         states, weights = self.states, self.weights
         due = self.resampling.when(self._step, weights)

@@ -67,6 +67,7 @@ def twist_to_wheel(u, track):
     """
     u = as_points(u, "u", 2)
     half = as_positive(track, "track") / 2
+    fit_together(u=u.shape[:-1], track=half.shape)
     return u[..., 0] - half * u[..., 1], u[..., 0] + half * u[..., 1]
 
 
@@ -82,8 +83,15 @@ def as_model(model):
     return as_choice(model, "model", MODELS)
 
 
+@documented
 def chord(v, omega, dt, model):
-    """The straight line a step is replaced by, its direction relative to the heading; v, omega, dt, model as in `step`.
+    """The straight line a step is replaced by, its direction relative to the heading.
+
+    Parameters
+    ----------
+    v, omega, dt : array, shape (...)
+        As in `step`.
+    model : {"euler", "midpoint", "arc"}
 
     Returns
     -------

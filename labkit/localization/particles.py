@@ -15,6 +15,7 @@ from ..checks import (
     as_finite,
     as_floats,
     as_generator,
+    as_indices,
     as_number,
     as_points,
     as_positive_number,
@@ -278,7 +279,7 @@ def count_ancestors(resample, n_particles, n_steps, rng):
     names, weights = np.arange(n_particles), np.full(n_particles, 1.0 / n_particles)
     left = [n_particles]
     for _ in range(n_steps):
-        names = names[resample(weights, rng)]
+        names = names[as_indices(resample(weights, rng), "what resample returns")]
         left.append(len(np.unique(names)))
     return np.array(left)
 

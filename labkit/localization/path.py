@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import as_covariances, as_shape
+from ..checks import as_covariances, as_positive_number, as_shape
 from ..documented import documented
 from ..estimation.gaussian import chi_square_quantile
 from . import odometry
@@ -37,14 +37,28 @@ class Log:
     landmark: np.ndarray
     landmarks: np.ndarray
 
+    @documented
     def readings(self, chosen):
-        """The same log with some of its readings."""
+        """The same log with some of its readings.
+
+        Parameters
+        ----------
+        chosen : bool array, shape (k,)
+        """
+        if len(chosen) != len(self.z):
+            raise ValueError(f"chosen must have shape ({len(self.z)},), got {chosen.shape}")
         return Log(
             self.time, self.u, self.z[chosen], self.row[chosen], self.lag[chosen], self.landmark[chosen], self.landmarks
         )
 
+    @documented
     def rows(self, first, last):
-        """The part from one row to another, with the readings in it."""
+        """The part from one row to another, with the readings in it.
+
+        Parameters
+        ----------
+        first, last : int
+        """
         inside = (self.row >= first) & (self.row < last)
         part = self.readings(inside)
         return Log(
@@ -64,6 +78,7 @@ class Noise:
 
     def odometry(self, dt):
         """Covariance (2, 2) of a command that holds for dt seconds."""
+        dt = as_positive_number(dt, "dt")
         return np.diag([self.std_way**2, self.std_turn**2]) / dt
 
 

@@ -15,6 +15,7 @@ from scipy.special import ndtr
 from ..checks import (
     as_count,
     as_finite,
+    as_floats,
     as_nonnegative,
     as_number,
     as_points,
@@ -126,6 +127,7 @@ def log_normal(error, std):
     -------
     log_density : array of the error's shape
     """
+    error, std = as_floats(error, "error"), as_positive_number(std, "std")
     return -0.5 * np.square(error / std) - math.log(std * math.sqrt(2 * math.pi))
 
 
@@ -292,6 +294,7 @@ class LikelihoodField:
     Source: lecture, "Likelihoodfield (1)" and "(2)".
     """
 
+    @documented
     def __init__(self, grid, std, share_hit=0.95, r_max=18.0, max_distance=None):
         self.grid, self.std = grid, as_positive_number(std, "std")
         self.r_max = as_positive_number(r_max, "r_max")
@@ -524,6 +527,7 @@ class SensorSuite:
     likelihood_field = LikelihoodField
     caster = staticmethod(lambda grid: grid)  # what casts a grid's rays
 
+    @documented
     def __init__(self, building, scanner=Scanner(), every=9, std_field=0.15, std_beam=0.2, exponents=EXPONENTS):
         self.building, self.scanner, self.every, self.std_beam = building, scanner, every, std_beam
         self.exponents = exponents
@@ -540,8 +544,7 @@ class SensorSuite:
 
         Parameters
         ----------
-        sensor : str
-            One of `SENSORS`.
+        sensor : {"landmarks", "beams", "likelihood field"}
         pose : array-like, shape (3,)
         rng : numpy.random.Generator
         world : OccupancyGrid, optional
@@ -561,19 +564,31 @@ class SensorSuite:
         """`Scanner.scan` in a world, with this suite's scanner and beams."""
         return self.scanner.scan(self.caster(world), pose, rng, self.every)
 
+    @documented
     def weigh_sighting(self, index, z):
-        """The tempered `Weighting` of the landmarks `index` read as z; None when there are none."""
+        """The tempered `Weighting` of the landmarks `index` read as z; None when there are none.
+
+        Parameters
+        ----------
+        index : array of int, shape (m,)
+        z : array, shape (m, 2)
+        """
         if not len(index):
             return None
         weighting = self.weigh_landmarks(z, self.building.landmarks[index], self.std_range, self.std_bearing)
         return weighting.tempered(self.exponents["landmarks"])
 
+    @documented
     def weigh_scan(self, sensor, ranges, bearings):
-        """The tempered `Weighting` of a scan by "beams" or "likelihood field"."""
+        """The tempered `Weighting` of a scan.
+
+        Parameters
+        ----------
+        sensor : {"beams", "likelihood field"}
+        ranges, bearings : array-like, shape (B,)
+        """
         if sensor == "beams":
             weighting = self.weigh_beams(self.ranges, ranges, bearings, self.std_beam, self.scanner.r_max)
-        elif sensor == "likelihood field":
-            weighting = weigh_likelihood_field(self.field, ranges, bearings)
         else:
-            raise ValueError(f"sensor must be one of {', '.join(SENSORS)}, got {sensor!r}")
+            weighting = weigh_likelihood_field(self.field, ranges, bearings)
         return weighting.tempered(self.exponents[sensor])

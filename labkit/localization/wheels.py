@@ -13,6 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..checks import as_points, as_positive, as_positive_number, as_shape, fit_together
+from ..documented import documented
 from ..geometry.planar import wrap_angle
 from .odometry import sinc_slope
 
@@ -262,6 +263,7 @@ def _ahead(v, omega):
     return np.stack([v, np.zeros_like(v), omega], axis=-1)
 
 
+@documented
 def nearest_command(drive, spot, dt, lever):
     """The one command which, held for dt, leads from the origin nearest to a spot.
 

@@ -163,6 +163,7 @@ def inverse_kinematics(robot, T_BF, start, iterations=60, tolerance=1e-9):
 
     Parameters
     ----------
+    robot : Arm
     T_BF : array-like, shape (..., 4, 4)
     start : array-like, shape (n,) or (..., n)
         Where the search begins. A start near the solution picks the branch (elbow, wrist); one start for a whole path
@@ -456,6 +457,7 @@ def rotation_only(robot, T_FE, start, axes, angle, duration, rate):
 
     Parameters
     ----------
+    robot : Arm
     axes : array-like, shape (m, 3)
         Directions in E at `start`, one after the other, each with an equal share of `duration`.
     angle : float, rad
@@ -495,14 +497,18 @@ def rotation_only(robot, T_FE, start, axes, angle, duration, rate):
     return time, q
 
 
+@documented
 def reach_position(robot, position, start, joints=(0, 1, 2), iterations=40):
     """Joint angles that bring the flange to a position with some joints alone; the others stay as in `start`.
 
     Parameters
     ----------
+    robot : Arm
     position : array-like, shape (3,), mm, in B
     start : array-like, shape (n,), rad
-    joints : tuple of three indices
+    joints : array of int, shape (m,)
+        Which of them move.
+    iterations : int
 
     Returns
     -------
@@ -510,7 +516,9 @@ def reach_position(robot, position, start, joints=(0, 1, 2), iterations=40):
         Inside the joint limits. Out of reach, the flange stops as close as damped least squares brings it.
     """
     position, q = as_shape(position, "position", 3), np.array(as_shape(start, "start", len(robot.dh)))
-    joints = list(joints)
+    joints = [int(k) for k in joints]
+    if not set(joints) <= set(range(len(q))):
+        raise ValueError(f"joints must lie between 0 and {len(q) - 1}, got {joints}")
     best, best_size = q.copy(), np.inf
     for _ in range(iterations):
         frames = link_frames(robot.dh, q)

@@ -156,16 +156,17 @@ def learned_pose(cell, job):
     return frame_from_points(*np.moveaxis(marks_in_base(cell, job), -2, 0))
 
 
+@documented
 def moved_part(T_BW, T_WE0, T_WE1, T_BP0):
     """Where a part stands after its tracker has moved with it: chapter 2's chain around the tracker.
 
     Parameters
     ----------
-    T_BW : array-like, shape (..., 4, 4)
+    T_BW : array, shape (..., 4, 4)
         The tracker's world in the base (mm).
-    T_WE0, T_WE1 : array-like, shape (..., 4, 4)
+    T_WE0, T_WE1 : array, shape (..., 4, 4)
         Its readings when the part was learned, and now.
-    T_BP0 : array-like, shape (..., 4, 4)
+    T_BP0 : array, shape (..., 4, 4)
         The part as it was learned.
 
     Returns

@@ -85,8 +85,13 @@ def write_csv(path, log, unit="m", digits=5):
             writer.writerow([f"{t:.3f}", *stop, *(f"{v:.{places}f}" for v in p), *(f"{v:.6f}" for v in q)])
 
 
+@documented
 def read_csv(path):
     """Read a log written by `write_csv`, in m or mm, into mm.
+
+    Parameters
+    ----------
+    path : str or path
 
     Returns
     -------

@@ -67,7 +67,7 @@ def decode_packet(data):
 def check_packet(data):
     """(values, "") of a good packet, (None, reason) of a bad one; plain Python, since the receiver calls it for every
     datagram."""
-    if len(data) != PACKET.size:
+    if not isinstance(data, bytes) or len(data) != PACKET.size:
         return None, f"length: expected {PACKET.size} bytes"
     values = PACKET.unpack(data)
     total = sum(values)

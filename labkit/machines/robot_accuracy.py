@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..calibration.planning import DOWN, poses_that_see
-from ..checks import as_count, as_finite, as_nonnegative, as_points, as_positive_number, as_shape
+from ..checks import as_count, as_nonnegative, as_positive_number, as_shape, as_transforms
 from ..documented import documented
 from ..geometry.lie import exp_so3
 
@@ -144,9 +144,10 @@ def arrive(command, directions, errors, rng):
     -------
     reached : array, shape (n, d), mm
     """
-    directions = as_finite(directions, "directions")
+    command = as_shape(command, "command", "d")
+    directions = as_shape(directions, "directions", "n", len(command))
     noise = as_nonnegative(errors.std, "std") * rng.normal(size=directions.shape)
-    return as_finite(command, "command") + errors.offset - errors.backlash * directions + noise
+    return command + errors.offset - errors.backlash * directions + noise
 
 
 @documented
@@ -215,7 +216,8 @@ def looking_down_at(marks, T_FS, turns, height=240.0):
     x_S : array, shape (n, 3), mm
         The marks as the scanner sees them.
     """
-    marks, turns = as_points(marks, "marks"), as_finite(turns, "turns")
+    marks, T_FS = as_shape(marks, "marks", "n", 3), as_shape(as_transforms(T_FS, "T_FS"), "T_FS", 4, 4)
+    turns = as_shape(turns, "turns", len(marks))
     x_S = np.tile([0.0, 0.0, float(height)], (len(marks), 1))
-    R_BF = exp_so3(turns[:, None] * [0.0, 0.0, 1.0]) @ DOWN @ np.asarray(T_FS)[:3, :3].T
+    R_BF = exp_so3(turns[:, None] * [0.0, 0.0, 1.0]) @ DOWN @ T_FS[:3, :3].T
     return poses_that_see(T_FS, marks, R_BF, x_S), x_S

@@ -12,7 +12,7 @@ from itertools import count
 
 import numpy as np
 
-from ..checks import as_count, as_positive_number
+from ..checks import as_choice, as_count, as_positive_number
 from ..documented import documented
 from ..geometry.frames import invert, matrix_from_quaternion, moved, pose
 from ..geometry.lie import exp_so3
@@ -141,6 +141,7 @@ class Tracker:
         Parameters
         ----------
         stops : int
+            At least 0.
         rng : numpy.random.Generator
 
         Returns
@@ -187,8 +188,15 @@ RESTING = Tracker(nonsense=0.008)
 MOVING = Tracker(nonsense=0.015, burst=2.0, latency=0.008)
 
 
+@documented
 def measuring_joints(seed=7):
-    """The 21 joint positions of all six runs, rad; the first is where the tracker is reset."""
+    """The 21 joint positions of all six runs, rad; the first is where the tracker is reset.
+
+    Parameters
+    ----------
+    seed : int
+        At least 0.
+    """
     return measuring_poses(TX40, np.random.default_rng(seed), STOPS)
 
 
@@ -198,6 +206,10 @@ def calibration_run(rng, tracker=None, joints=None, rate=5.0, lost_stop=None):
 
     Parameters
     ----------
+    rng : numpy.random.Generator
+    tracker : Tracker, optional
+    joints : array, shape (n, 6), optional
+        In which it rests (rad); those of the report's runs without them.
     rate : float
         Readings per second that the log keeps (the stream has 250).
     lost_stop : int, optional
@@ -299,8 +311,7 @@ def robot_motion(name, rate=RATE):
     if name == "rotation":
         to_and_fro = 2 * TURN_ANGLE / ((1 - RAMP) * TURN_SPEED)
         return rotation_only(TX40, T_FE, HOME, np.eye(3), TURN_ANGLE, 3 * to_and_fro, rate)
-    if name not in MOTIONS:
-        raise ValueError(f"name must be one of slow, middle, fast, rotation, got {name!r}")
+    as_choice(name, "name", (*MOTIONS, "rotation"))
     return smooth_motion(np.deg2rad(VIA_DEG), SLOW_DURATION * MOTIONS[name], rate)
 
 

@@ -360,11 +360,18 @@ def poses_from_angles(T_WL, diodes, angles, start):
         J = J.reshape(*T.shape[:-2], -1, 6) * np.repeat([1.0, size], 3)
         r = (angles - predicted).reshape(*T.shape[:-2], -1, 1)
         Jt = np.swapaxes(J, -1, -2)
-        step = np.linalg.solve(Jt @ J, Jt @ r)[..., 0]
+        step = _solved(Jt @ J, Jt @ r)[..., 0]
         T = moved(T, step * np.repeat([1.0, size], 3))
         if np.abs(step).max(initial=0.0) < STEP_TOLERANCE:
             return T
     raise ValueError(f"the pose did not settle within {MAX_STEPS} steps: is the start too far off?")
+
+
+def _solved(N, right):
+    try:
+        return np.linalg.solve(N, right)
+    except np.linalg.LinAlgError:
+        raise ValueError("the angles do not fix the pose: are the diodes on one line?") from None
 
 
 @documented
@@ -448,8 +455,14 @@ def read_poses(T_WE, believed, actual, rng, std_angle=0.0, diodes=DIODES):
     -------
     T_WE : array, shape (k, 4, 4)
     """
-    T_WE = as_shape(T_WE, "T_WE", "k", 4, 4)
-    actual = np.broadcast_to(as_transforms(actual, "actual"), (len(T_WE), *np.shape(believed)))
+    T_WE, believed = as_shape(T_WE, "T_WE", "k", 4, 4), as_shape(believed, "believed", "n", 4, 4)
+    actual = as_transforms(actual, "actual")
+    if actual.shape not in (believed.shape, (len(T_WE), *believed.shape)):
+        raise ValueError(
+            f"actual must have the shape of believed, {believed.shape}, or one more axis of {len(T_WE)} "
+            f"readings, got {actual.shape}"
+        )
+    actual = np.broadcast_to(actual, (len(T_WE), *believed.shape))
     points = transform(T_WE[:, None], diodes)[:, None]
     angles = station_angles(actual[:, :, None], points)
     angles = angles + float(std_angle) * rng.normal(size=angles.shape)

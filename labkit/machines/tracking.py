@@ -156,7 +156,8 @@ def median_over_speed(speed, error, edges):
     median : array, shape (m,)
         NaN where no reading falls.
     """
-    speed, error, edges = as_finite(speed, "speed"), as_finite(error, "error"), as_finite(edges, "edges")
+    speed, edges = as_shape(speed, "speed", "n"), as_shape(edges, "edges", "m + 1")
+    error = as_shape(error, "error", len(speed))
     return np.array(
         [
             np.median(error[inside]) if (inside := (speed >= low) & (speed < high)).any() else np.nan

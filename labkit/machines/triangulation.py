@@ -10,7 +10,7 @@ Source: thesis "Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", H
 
 import numpy as np
 
-from ..checks import as_finite, as_nonnegative, as_positive, fit_together, shown
+from ..checks import as_finite, as_nonnegative, as_points, as_positive, fit_together, shown
 
 RANGE = (190.0, 290.0)  # mm: where the scanner scanCONTROL 29xx-100 measures (B1)
 LINEARITY = 0.16 / 100 * 100.0 / 3  # mm: 0.16 % of that range, printed as three standard deviations (B1)
@@ -103,7 +103,8 @@ def angles_to(place, base):
     -------
     alpha, beta : arrays or floats, rad
     """
-    place = as_finite(place, "place")
+    place, base = as_points(place, "place", dim=2), as_finite(base, "base")
+    fit_together(place=place.shape[:-1], base=base.shape)
     return np.arctan2(place[..., 1], place[..., 0]), np.arctan2(place[..., 1], base - place[..., 0])
 
 

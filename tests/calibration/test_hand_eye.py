@@ -282,7 +282,8 @@ def test_kim_solves_the_cube_and_refuses_the_sphere():
 
 def test_kim_matrix_is_the_printed_one():
     rng = np.random.default_rng(0)
-    A, B, X = (np.vstack([rng.normal(size=(3, 4)), [0, 0, 0, 1]]) for _ in range(3))
+    A, B, X = (np.vstack([rng.normal(size=(3, 4)), [0, 0, 0, 1]]) for _ in range(3))  # true of any X, and of any B
+    A[:3, :3] = Rotation.random(rng=rng).as_matrix()
     D, F = kim_matrix(A, B)
     np.testing.assert_allclose(D @ X[:3].ravel() - F, (A @ X - X @ B)[:3].ravel(), atol=1e-12)
     np.testing.assert_allclose(
