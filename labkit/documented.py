@@ -134,7 +134,7 @@ def _check(name, said, more, function):
     if first == "float":
         return functools.partial(_number, name, gaps)
     if first == "int":
-        least = re.search(r"\bat least (\d+)", more)
+        least = re.search(r"\b[Aa]t least (\d+)", more)
         return functools.partial(as_whole, name=name, at_least=int(least[1]) if least else None)
     if _ARRAY.match(said):
         return functools.partial(_array, name, _shapes(said), first.startswith("bool"), "of int" in first, gaps)

@@ -5,7 +5,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from labkit.documented import documented
+from labkit.documented import documented, unchecked
 from labkit.localization import drives, path
 from labkit.machines import log
 from labkit.machines.simulation import MOVING, Tracker, follow_path
@@ -72,6 +72,55 @@ def test_what_it_says_arrives():
     assert measure(T, gaps, RNG, MOVING, "arc", Caster()) is gaps
     assert measure(T.tolist(), X.tolist(), rng=RNG, tracker=Tracker()).dtype == float
     assert measure.__wrapped__ is not measure and measure.__doc__.startswith("One measurement")
+
+
+@documented
+def select(R, cov, r, kept, rows=None, count=3, robot=None, given=(None, None)):
+    """Arguments whose letters, kinds and names say more than their shapes.
+
+    Parameters
+    ----------
+    R : array, shape (3, 3)
+    cov : array, shape (2, 2)
+    r : array, shape (n, 2)
+    kept : bool array, shape (n,)
+    rows : array of int, shape (m,), optional
+    count : int
+        At least 1.
+    robot : array, shape (4, 4), optional
+    given : tuple
+    """
+    return kept, rows, count
+
+
+GOOD = {"R": np.eye(3), "cov": np.eye(2), "r": np.zeros((4, 2)), "kept": [True, False, True, True]}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"R": np.ones((3, 3))}, "R must have an orthonormal rotation block"),
+        ({"cov": [[1.0, 2.0], [2.0, 1.0]]}, "cov must be positive definite or singular"),
+        ({"kept": [True, False]}, r"kept must have n = 4 as r has, got shape \(2,\)"),
+        ({"kept": [1, 0, 1, 1]}, "kept must hold truth values, got numbers"),
+        ({"kept": [[True], []]}, "kept must hold truth values, got rows of different lengths"),
+        ({"rows": [0.5]}, "rows must hold whole numbers"),
+        ({"count": 0}, "count must be a whole number, at least 1, got 0"),
+        ({"count": 1.5}, "count must be a whole number, got 1.5"),
+        ({"count": True}, "count must hold real numbers, got truth values"),
+        ({"robot": np.diag([1.0, 1.0, -1.0, 1.0])}, "robot must be right-handed"),
+        ({"given": 5}, "given must be of type tuple, got an object of type int"),
+    ],
+)
+def test_letters_kinds_and_names_are_kept(change, words):
+    with pytest.raises(ValueError, match=words):
+        select(**(GOOD | change))
+
+
+def test_whole_numbers_and_truth_values_arrive_as_such():
+    kept, rows, count = select(**GOOD, rows=[2.0, 0], count=2.0)
+    assert kept.dtype == bool and rows.dtype.kind == "i" and (count, type(count)) == (2, int)
+    assert unchecked(select)(1, 2, 3, "anything") == ("anything", None, 3)
 
 
 def test_a_function_of_the_library_keeps_its_word():

@@ -312,6 +312,15 @@ def calibrate_with(fit, T_BF, T_ST, std_rot, std_trans, robust, eye):
     T_BF, T_ST, std_rot, std_trans, eye
         As in `calibrate_hand_eye`.
     robust : bool
+
+    Returns
+    -------
+    EyeInHand or EyeToHand
+
+    Raises
+    ------
+    ValueError
+        As `calibrate_hand_eye`.
     """
     T_BF, T_ST = as_transforms(T_BF, "T_BF"), as_transforms(T_ST, "T_ST")
     if T_BF.ndim != 3 or T_BF.shape != T_ST.shape or len(T_BF) < 3:

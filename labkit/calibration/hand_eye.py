@@ -329,6 +329,11 @@ def radius_jacobian(T_BF, x_S, T_FS, radius):
     Returns
     -------
     J : array, shape (3 N, 10)
+
+    Raises
+    ------
+    ValueError
+        A center in the scan plane, y = 0.
     """
     (T_BF, x_S), T_FS = as_sightings(T_BF, x_S), as_shape(as_transforms(T_FS, "T_FS"), "T_FS", 4, 4)
     if not x_S[:, 1].all():

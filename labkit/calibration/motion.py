@@ -79,6 +79,11 @@ def between_axes(T, apart=1):
     -------
     angles : array, shape (n - apart,)
         Between 0 and pi (rad).
+
+    Raises
+    ------
+    ValueError
+        No motion that is so many further on.
     """
     T, apart = as_shape(as_transforms(T, "T"), "T", "n", 4, 4), as_count(apart, "apart")
     phi = log_so3(T[:, :3, :3])

@@ -659,6 +659,10 @@ def levenberg_marquardt(
     residual, jacobian, retract : callables
     stop : callable, optional
 
+    Returns
+    -------
+    Trace
+
     Source: Nielsen, Damping parameter in Marquardt's method, IMM report (1999).
     """
     evaluate, stop, scale = _squares(residual, jacobian), stop or settled(), as_positive(scale, "scale")

@@ -514,6 +514,11 @@ def reach_position(robot, position, start, joints=(0, 1, 2), iterations=40):
     -------
     q : array, shape (n,)
         Inside the joint limits. Out of reach, the flange stops as close as damped least squares brings it.
+
+    Raises
+    ------
+    ValueError
+        A joint that the robot has not.
     """
     position, q = as_shape(position, "position", 3), np.array(as_shape(start, "start", len(robot.dh)))
     joints = [int(k) for k in joints]

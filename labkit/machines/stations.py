@@ -454,6 +454,11 @@ def read_poses(T_WE, believed, actual, rng, std_angle=0.0, diodes=DIODES):
     Returns
     -------
     T_WE : array, shape (k, 4, 4)
+
+    Raises
+    ------
+    ValueError
+        Stations of another number than believed.
     """
     T_WE, believed = as_shape(T_WE, "T_WE", "k", 4, 4), as_shape(believed, "believed", "n", 4, 4)
     actual = as_transforms(actual, "actual")

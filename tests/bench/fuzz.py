@@ -6,7 +6,8 @@ Arguments are recorded while the unit tests of the rooms run, and spoilt once to
 infinities, signs, zeros, wrong kinds, asymmetric and indefinite covariances, matrices that are no rotations, swapped
 arguments (`fuzz_mutations.py`). A call that holds a number above 1e9, arrays below 1e-12 or a count above 1e5 is
 "extreme"; every other one is of ordinary magnitude, and there only three outcomes are right: a finite result, NaN where
-the docstring says so, or a sentence of labkit's own. Each call has 10 s and 4 GB. Linux and macOS; 20 to 40 minutes.
+the docstring says so, or a sentence: labkit's own, or the system's about a file, with its name. Each call
+has 10 s and 4 GB. Linux and macOS; 20 to 40 minutes.
 
 Seeded: the arguments of MODULE.FUNCTION:CALL, as `--examples` names it, are the same in every run.
 """
@@ -27,6 +28,7 @@ import re
 import resource
 import signal
 import sys
+import tempfile
 import time
 import traceback
 import types
@@ -58,8 +60,8 @@ KEPT = 10  # recorded calls of a function, of unlike shapes
 LONG_ENOUGH = 1.0  # s of one test; most of what comes later repeats what came before
 SECONDS, BYTES = 10.0, 4 << 30  # of processor time and memory for one call
 LARGEST, SMALLEST, LARGEST_COUNT = 1e9, 1e-12, 100_000
-OUTCOMES = ("finite", "refused", "NaN as documented", "NaN or inf", "foreign", "caller's function", "hang")
-RIGHT = {"finite", "refused", "NaN as documented", "caller's function"}
+OUTCOMES = ("finite", "refused", "file", "NaN as documented", "NaN or inf", "foreign", "caller's function", "hang")
+RIGHT = {"finite", "refused", "file", "NaN as documented", "caller's function"}
 
 
 class Hang(BaseException):
@@ -95,8 +97,8 @@ def _add(found, name, value):
         found[inspect.unwrap(value).__code__] = (name, value)
 
 
-def record(functions, rooms):
-    """{name: [arguments]} met while the unit tests of the rooms run."""
+def record(functions, rooms, scratch):
+    """{name: [arguments]} met while the unit tests of the rooms run; the files they name stay in a folder."""
     kept, shapes, begun = defaultdict(list), defaultdict(set), [0.0]
 
     def meet(frame, event, _):
@@ -128,6 +130,7 @@ def record(functions, rooms):
             sys.setprofile(None)
 
     words = ["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", "--deselect", "tests/machines/test_udp.py"]
+    words += ["--basetemp", scratch, "-o", "tmp_path_retention_policy=all"]
     with contextlib.redirect_stdout(io.StringIO()) as said:
         code = pytest.main([*words, *(str(ROOT / "tests" / room) for room in rooms)], plugins=[Plugin()])
     if code:
@@ -266,6 +269,8 @@ def _kind_of(error):
     frames = [f for f in traceback.extract_tb(error.__traceback__) if "/bench/fuzz" not in f.filename]
     if any(f.filename.startswith(str(ROOT / "tests")) for f in frames):
         return "caller's function"
+    if isinstance(error, OSError) and error.filename:
+        return "file"
     if not frames or not frames[-1].filename.startswith(str(Path(labkit.__file__).parent)):
         return "foreign"
     raised = linecache.getline(frames[-1].filename, frames[-1].lineno).strip().startswith("raise")
@@ -326,7 +331,10 @@ def table(counts):
     """Markdown: a row a module, ordinary magnitude first."""
     lines = []
     for extreme, title in ((False, "ordinary magnitude"), (True, "extreme")):
-        lines += [f"\n| {title} | calls | {' | '.join(OUTCOMES)} | with a warning |", f"| --- {'| ---: ' * 9}|"]
+        lines += [
+            f"\n| {title} | calls | {' | '.join(OUTCOMES)} | with a warning |",
+            f"| --- {'| ---: ' * (len(OUTCOMES) + 2)}|",
+        ]
         modules = sorted({module for module, e, _ in counts if e == extreme})
         for module in [*modules, "all"]:
             row = [sum(n for (m, e, o), n in counts.items() if e == extreme and o == outcome and module in (m, "all"))
@@ -396,7 +404,8 @@ def main():
     wanted = tuple(what.split(",")) if what else ("",)
     functions = public()
     rooms = [room for room in ROOMS if any(w.split(".")[0] in (room, "") for w in wanted)]
-    records = record(functions, rooms)
+    scratch = tempfile.TemporaryDirectory()
+    records = record(functions, rooms, f"{scratch.name}/tests")
     chosen = {n: f for n, f in functions.values() if n in records and n.startswith(wanted)}
     signal.signal(signal.SIGPROF, _ring)
     if one:
