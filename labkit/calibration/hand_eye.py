@@ -424,6 +424,15 @@ def calibrate_with(fit, T_BF, x_S, target, robust, rng):
     T_BF, x_S, target, rng
         As in `calibrate_sphere_target`.
     robust : bool
+
+    Returns
+    -------
+    SphereHandEye
+
+    Raises
+    ------
+    ValueError
+        As `calibrate_sphere_target`.
     """
     (T_BF, x_S), sample = as_sightings(T_BF, x_S), SAMPLE if target is None else SAMPLE_KNOWN
     fewest = sample + 1 if robust else 4 if target is None else 3

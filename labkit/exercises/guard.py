@@ -416,12 +416,28 @@ if hasattr(signal, "pthread_sigmask"):
     )
 
 
+class Judging:
+    """Whether student code runs: what it calls in turn must not judge it once more, and so on without an end."""
+
+    depth = 0
+
+    @classmethod
+    @contextlib.contextmanager
+    def on(cls):
+        cls.depth += 1
+        try:
+            yield
+        finally:
+            cls.depth -= 1
+
+
 @contextlib.contextmanager
 def sandbox(capture):
     """Everything student code may touch, put back afterwards."""
     state = [(put, read()) for read, put in STATE]
     limit = sys.setrecursionlimit
     with contextlib.ExitStack() as stack:
+        stack.enter_context(Judging.on())
         stack.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore")
         stack.enter_context(contextlib.redirect_stdout(capture))
@@ -433,6 +449,7 @@ def sandbox(capture):
         for name in ("_exit", "abort", "kill", "fork", "execv"):
             stack.enter_context(_replaced(os, name, _forbid(f"os.{name}()", getattr(os, name, None))))
         stack.enter_context(_replaced(_shell(), "ask_exit", _forbid("exit()")))
+        stack.enter_context(_replaced(_shell(), "run_cell", _forbid("run_cell()")))
         try:
             yield
         finally:

@@ -123,6 +123,8 @@ class Bound:
 
     def __call__(self, answer, unit=None):
         """Check an answer, say what came out, and return what later cells go on with: the answer, or the reference."""
+        if guard.Judging.depth:
+            raise guard.Forbidden(f"ex.{self._item.id}()")
         guard.PRISTINE.restore()
         is_value = isinstance(self._item, Value)
         outcome = self._item.judge(answer, unit) if is_value else self._item.judge(answer, self._generator())

@@ -208,6 +208,17 @@ def test_a_kernel_may_end_with_its_parent_while_a_check_runs(monkeypatch):
     assert "os._exit()" in DOUBLE.judge(double).text and left == [1]
 
 
+def test_a_check_within_a_check_is_refused_and_the_next_one_runs(capsys):
+    ex = session.course("01-frames")
+
+    def invert(T):
+        return ex.invert(invert)
+
+    for _ in range(2):
+        ex.invert(invert)
+        assert "calls ex.invert(), which a checked function must not do" in " ".join(capsys.readouterr().out.split())
+
+
 def test_a_decimal_comma_is_named():
     assert "written with a point, 12.5, and not 12,5" in ANGLE.judge(12, 5).text
 

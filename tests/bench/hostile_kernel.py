@@ -1,0 +1,205 @@
+"""What a real kernel answers to hostile answers: python tests/bench/hostile_kernel.py [WORD ...] (Linux).
+
+Each case is a student's cell in a kernel of its own that has run chapter 1's set-up, and after it a right answer to the
+same exercise: printed are the seconds, those of processor time, what was said of the case, and whether the right
+answer, an exercise of another kind and plain Python still work. A case is answered when a sentence comes within LIMIT
+seconds of processor time a check, no traceback, and all three work. Words choose cases by their names.
+
+Not tried: what is deliberate sabotage of the kernel itself, such as SIGTERM to oneself, execve, a segmentation fault,
+`builtins.len = None` in a plain cell. What loops in compiled code (`sum(itertools.repeat(1))`) ends with the kernel
+alone, and chapter 0 says so.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from jupyter_client.manager import start_new_kernel
+
+from labkit.exercises import source
+from labkit.verbs import build
+
+LIMIT = 3.0  # s of processor time; on a busy machine a check may take three times as long by the clock
+TICKS = os.sysconf("SC_CLK_TCK")
+PATIENCE = 60.0  # s until a cell counts as hung
+RIGHT = """@ex.invert
+def invert(T):
+    X = np.eye(4)
+    X[:3, :3] = T[:3, :3].T
+    X[:3, 3] = -T[:3, :3].T @ T[:3, 3]
+    return X
+"""
+AFTER = f"{RIGHT}\nex.distance(1.0)\nprint('sum', sum([1, 2]), len(repr(np.eye(2))), os.getcwd() != '')"
+
+
+def answer(body, head=""):
+    """A cell that answers `invert` with a body."""
+    return f"{head}\n@ex.invert\ndef invert(T):\n" + "".join(f"    {line}\n" for line in body.splitlines())
+
+
+SWALLOW = "while True:\n    try:\n        {}\n    except{}:\n        {}"
+CASES = {
+    "3a endless comprehension": answer("return [i for i in iter(int, 1)]"),
+    "3b swallowed sleep": answer(SWALLOW.format("time.sleep(0.5)", "", "pass")),
+    "3b swallowed twice": answer(
+        "while True:\n    try:\n        try:\n            time.sleep(0.5)\n        except:\n            pass\n"
+        "    except:\n        pass"
+    ),
+    "3b swallowed around NumPy": answer(SWALLOW.format("np.linalg.norm(T)", " BaseException", "continue")),
+    "3d recursion limit and endless recursion": answer(
+        "import sys\nsys.setrecursionlimit(10**9)\ndef f(n):\n    return f(n + 1)\nreturn f(0)"
+    ),
+    "3e the same loop three times": answer("while True:\n    pass") * 3,
+    "8 the name is the reference": answer("return invert(T)"),
+    "9 the working directory is deleted": answer(
+        "return np.linalg.inv(T)", "import tempfile\nd = tempfile.mkdtemp()\nos.chdir(d)\nos.rmdir(d)"
+    )
+    + "\nos.chdir('/')",
+    "9 decimal comma": "ex.distance(12,5)",
+    "9 complex result": answer("return np.linalg.inv(T) + 1j"),
+    "9 async def": RIGHT.replace("def invert", "async def invert"),
+    "9 half a letter printed": answer("print('\\ud800')\nreturn T"),
+    "9 half a letter raised": answer("raise ValueError('\\udfff')"),
+    "9 half a letter returned": answer("return '\\udfff'"),
+    "9 MemoryError": answer("raise MemoryError"),
+    "9 KeyboardInterrupt": answer("raise KeyboardInterrupt"),
+    "9 ValueError that says nothing": answer("raise ValueError"),
+    "9 default_rng replaced": answer("np.random.default_rng = None\nreturn T"),
+    "9 builtins.print replaced": answer("import builtins\nbuiltins.print = None\nreturn T"),
+    "9 builtins.all replaced": answer("import builtins\nbuiltins.all = lambda *_: True\nreturn T"),
+    "9 builtins.zip replaced": answer("import builtins\nbuiltins.zip = lambda *_: []\nreturn T"),
+    "9 copy replaced": answer("import copy\ncopy.deepcopy = None\nreturn T"),
+    "9 os replaced": answer("os.getcwd = None\nreturn T"),
+    "9 signal replaced": answer("import signal\nsignal.setitimer = None\nreturn T"),
+    "9 json replaced": answer("import json\njson.dumps = None\nreturn T"),
+    "9 html replaced": answer("import html\nhtml.escape = None\nreturn T"),
+    "9 time replaced": answer("time.monotonic = None\nreturn T"),
+    "9 inspect replaced": answer("import inspect\ninspect.signature = None\nreturn T"),
+    "9 a class of labkit patched": answer(
+        "from labkit.exercises import metrics\nmetrics.Poses.equal = lambda *_: True\nreturn T"
+    ),
+    "9 seterrcall, locale, environ, path, mask, trace, gc": answer(
+        "import gc, locale, signal, sys\nnp.seterr(all='call')\nnp.seterrcall(print)\n"
+        "locale.setlocale(locale.LC_ALL, 'C')\nos.environ.clear()\nsys.path.clear()\n"
+        "signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])\n"
+        "gc.disable()\nos.umask(0o777)\nsys.settrace(lambda *_: None)\nreturn T"
+    ),
+    "2 endless __str__": answer(
+        "class E(Exception):\n    def __str__(self):\n        while True:\n            pass\nraise E"
+    ),
+    "2 evil __str__": answer("class E(Exception):\n    def __str__(self):\n        raise RuntimeError\nraise E"),
+    "2 evil __repr__ returned": answer("class R:\n    def __repr__(self):\n        raise RuntimeError\nreturn R()"),
+    "2 evil __array__": answer("class R:\n    def __array__(self, *_, **__):\n        raise SystemExit\nreturn R()"),
+    "2 the timer switched off": answer("import signal\nsignal.setitimer(signal.ITIMER_REAL, 0)\nreturn T"),
+    "2 a check inside its own check": answer("return ex.invert(invert)"),
+    "2 numpy thrown out": answer("import sys\ndel sys.modules['numpy']\nreturn T"),
+    "2 nested run_cell": answer("get_ipython().run_cell('1 / 0')\nreturn T"),
+    "2 the student's own names deleted": answer("globals().pop('np', None)\nreturn T") + "import numpy as np",
+    "2 exit": answer("exit()"),
+    "2 os._exit": answer("os._exit(1)"),
+    "2 kill": answer("os.kill(os.getpid(), 9)"),
+    "2 fork": answer("os.fork()"),
+    "2 input": answer("return input()"),
+    "2 pdb": answer("breakpoint()\nreturn T"),
+    "2 100 MB printed": answer("print('x' * 10**8)\nreturn T"),
+    "2 standard output closed": answer("import sys\nsys.stdout.close()\nreturn T"),
+    "2 a terabyte": answer("return np.zeros(2**40)"),
+    "2 a thread that goes on": answer(
+        "import threading\nthreading.Thread(target=time.sleep, args=(1,)).start()\nreturn T"
+    ),
+    "2 a warning as error": answer("import warnings\nwarnings.simplefilter('error')\nreturn T"),
+    "2 the argument changed": answer("T[:] = 0\nreturn T"),
+}
+
+
+def main(words):
+    """Print a row a case; returns 1 where one is not answered."""
+    chosen = {name: cell for name, cell in CASES.items() if not words or any(word in name for word in words)}
+    print("| case | s | of processor | what is said | then |\n| --- | ---: | ---: | --- | --- |", flush=True)
+    failed = 0
+    with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(2) as pool:
+        for name, row, good in pool.map(lambda name: tried(name, chosen[name], scratch), chosen):
+            failed += not good
+            print(f"| {name} | {' | '.join(row)} |{'' if good else ' **open**'}", flush=True)
+    print(f"\n{len(chosen) - failed} of {len(chosen)} are answered")
+    return int(failed > 0)
+
+
+def tried(name, cell, scratch):
+    """(name, columns of its row, whether all is well) of one case."""
+    environment = {**build.kernel_environment(scratch, strict=False), "OMP_NUM_THREADS": "1"}
+    manager, client = start_new_kernel(kernel_name="python3", env=environment, cwd=scratch, stderr=subprocess.DEVNULL)
+    try:
+        run(client, setup())
+        before = processor_seconds(manager)
+        seconds, said, hung = run(client, cell)
+        busy = processor_seconds(manager) - before
+        after = "" if hung else run(client, AFTER)[1]
+    finally:
+        client.stop_channels()
+        manager.shutdown_kernel(now=True)
+    works = "✓ invert" in after and "distance" in after and "sum 3 " in after
+    good = (
+        not hung
+        and busy < LIMIT * max(cell.count("@ex."), 1)
+        and said != ""
+        and "Traceback" not in said + after
+        and works
+    )
+    return (
+        name,
+        (f"{seconds:.1f}", f"{busy:.1f}", first_lines(said), "all works" if works else first_lines(after)),
+        good,
+    )
+
+
+def processor_seconds(manager):
+    """User and system time of a kernel so far; 0 where it has died."""
+    try:
+        stat = Path(f"/proc/{manager.provisioner.pid}/stat").read_text()
+    except OSError:
+        return 0.0
+    return sum(map(int, stat.rpartition(")")[2].split()[11:13])) / TICKS
+
+
+def setup():
+    """The blank notebook's first code cells, up to the course."""
+    cells = [c.source for c in build.blank_notebook(source.find("01")).cells if c.cell_type == "code"]
+    last = next(k for k, text in enumerate(cells) if "course(" in text)
+    return "\n".join([*cells[: last + 1], "import os, time", "import numpy as np"])
+
+
+def run(client, code):
+    """(seconds, text of all outputs, whether it hung) of a cell."""
+    said, begun = [], time.monotonic()
+
+    def hear(message):
+        content = message["content"]
+        data = content.get("data", {})
+        said.append(content.get("text") or data.get("text/plain", ""))
+        if message["msg_type"] == "error":
+            said.append("Traceback " + content["ename"] + ": " + content["evalue"])
+
+    try:
+        client.execute_interactive(code, output_hook=hear, timeout=PATIENCE, allow_stdin=False)
+    except TimeoutError:
+        return PATIENCE, "no answer", True
+    except RuntimeError as error:
+        return time.monotonic() - begun, f"the kernel died: {error}", True
+    return time.monotonic() - begun, "\n".join(filter(None, said)), False
+
+
+def first_lines(text, length=160):
+    """The beginning of what was said, for one cell of a table."""
+    return re.sub(r"\s+", " ", text).replace("|", "/").strip()[:length] or "nothing"
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
