@@ -88,7 +88,7 @@ def _add(found, name, value):
     if isinstance(value, type):
         made = vars(value).get("__post_init__" if dataclasses.is_dataclass(value) else "__init__")
         if made is not None:
-            found[made.__code__] = (name, value)
+            found[inspect.unwrap(made).__code__] = (name, value)
         for key, member in vars(value).items():
             function = getattr(member, "__func__", member)
             if isinstance(function, types.FunctionType) and (not key.startswith("_") or key == "__call__"):
