@@ -408,6 +408,9 @@ def compare(time_a, a, time_b, b, *, length_unit="mm", max_offset=None, max_gap=
         Search for the clock offset within this (s).
     max_gap : float, optional
         Samples of the reference farther apart are not joined (s); 3.5 median steps without it.
+    length_unit : str
+    solver : callable
+        As in `hand_eye`.
 
     Returns
     -------

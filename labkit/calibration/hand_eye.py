@@ -22,6 +22,7 @@ import numpy as np
 from ..checks import (
     as_count,
     as_finite,
+    as_nonnegative,
     as_number,
     as_optional_generator,
     as_points,
@@ -480,6 +481,8 @@ def refuse_one_line(x_S, weights):
     """
     if len(x_S) < 2:
         raise ValueError(f"at least 2 sphere centers are needed, got {len(x_S)}")
+    if not as_nonnegative(weights, "weights").any():
+        raise ValueError("weights must not all be zero")
     mean = weights @ x_S / weights.sum()
     spread = np.linalg.svd((x_S - mean) * np.sqrt(weights)[:, None], compute_uv=False)
     far = math.sqrt(weights.sum()) * np.linalg.norm(mean)

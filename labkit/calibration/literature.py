@@ -67,6 +67,8 @@ def kim_linear(T_BF, points_S, points_W):
             f"points_W must hold four points or more that do not lie in one plane: X_S X_W' has rank {rank}, not 4"
         )
     M = np.swapaxes(X_S, 1, 2) @ X_W
+    if (np.linalg.matrix_rank(M[1:]) < 4).any():
+        raise ValueError("points_S must span space in every pose, as points_W do")
     D, F = kim_matrix(invert(T_BF[:-1]) @ T_BF[1:], M[:-1] @ np.linalg.inv(M[1:]))
     u, _, rank, _ = np.linalg.lstsq(D.reshape(-1, 12), F.ravel(), rcond=1e-10)
     if rank < 12:

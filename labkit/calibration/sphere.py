@@ -177,7 +177,7 @@ def fit_sphere(points, std=None):
     if flatness[2] <= MIN_SAGITTA * flatness[0]:
         raise ValueError(
             "points must not lie in one plane: the third singular value is "
-            f"{shown(flatness[2] / flatness[0], '.1e')} of the first"
+            f"{shown(flatness[2] / max(flatness[0], np.finfo(float).tiny), '.1e')} of the first"
         )
     a = np.linalg.lstsq(np.column_stack([p, np.ones(len(p))]), -(p * p).sum(1), rcond=None)[0]
     center = -0.5 * a[:3]

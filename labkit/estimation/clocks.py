@@ -124,6 +124,8 @@ def clock_offset(time_a, T_a, time_b, T_b, max_offset=None):
         When a stream does not turn, or no offset brings the two speeds together.
     """
     time_a, time_b = as_shape(time_a, "time_a", "n"), as_shape(time_b, "time_b", "m")
+    if min(len(time_a), len(time_b)) < 2:
+        raise ValueError(f"streams must hold at least 2 samples each, got {len(time_a)} and {len(time_b)}")
     step = min(np.median(np.diff(time_a)), np.median(np.diff(time_b)))
     as_positive(step, "the median step of both streams")
     span = max(SPAN, 2 * np.median(np.diff(time_a)), 2 * np.median(np.diff(time_b)))

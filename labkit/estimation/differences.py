@@ -40,6 +40,8 @@ def numeric_jacobian(function, x, step=1e-6, scheme="central", retract=np.add, n
     n = x.size if n is None else as_count(n, "n")
     if not n or steps.shape not in ((), (n,)):
         raise ValueError(f"x and step must have shapes (n,) and () or (n,), got {x.shape} and {steps.shape}")
+    if retract is np.add and (x.ndim > 1 or x.size != n):
+        raise ValueError(f"x must have shape ({n},) where no retract says what an increment does, got {x.shape}")
     columns, here = [], function(x) if scheme == "forward" else None
     for h, direction in zip(np.broadcast_to(steps, n), np.eye(n)):
         ahead = function(retract(x, h * direction))

@@ -10,7 +10,7 @@ Source: Cook, Weisberg, "Residuals and Influence in Regression" (1982), chapter 
 import numpy as np
 from scipy import special
 
-from ..checks import as_finite, as_positive_number, as_probability, as_shape
+from ..checks import as_finite, as_positive_number, as_probability, as_shape, as_truths
 from ..documented import documented
 
 FREE = 1e-12  # of the largest eigenvalue of a normal matrix with its columns scaled alike: what is smaller is rounding
@@ -20,7 +20,7 @@ VISIBLE = float(special.ndtri(0.8) - special.ndtri(0.0005))
 
 def _blocks(residuals, jacobian):
     r, J = as_finite(residuals, "residuals"), as_finite(jacobian, "jacobian")
-    if r.ndim != 2 or J.ndim != 3 or J.shape[:2] != r.shape:
+    if r.ndim != 2 or J.ndim != 3 or J.shape[:2] != r.shape or not J.size:
         raise ValueError(f"residuals and jacobian must have shapes (n, k) and (n, k, p), got {r.shape} and {J.shape}")
     return r, J
 
@@ -100,9 +100,16 @@ def squared_distances(residuals, jacobian, kept):
     -------
     distances : array, shape (n,)
         Chi-square with k degrees of freedom for good blocks, fitted or not.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, kept blocks that leave a parameter undetermined.
     """
     r, J = _blocks(residuals, jacobian)
-    kept = np.asarray(kept, bool)
+    kept = as_truths(kept, "kept")
+    if kept.shape != r.shape[:1]:
+        raise ValueError(f"kept must have shape {r.shape[:1]}, got {kept.shape}")
     H = J @ inverse_normal(J[kept]) @ np.swapaxes(J, 1, 2)
     spread = np.eye(r.shape[1]) - np.where(kept, 1.0, -1.0)[:, None, None] * H
     values, vectors = np.linalg.eigh(spread)

@@ -21,11 +21,13 @@ from ..checks import (
     as_finite,
     as_floats,
     as_function,
+    as_instance,
     as_matrices,
     as_nonnegative,
     as_number,
     as_positive,
     as_positive_number,
+    as_shape,
     fit_together,
     shown,
 )
@@ -213,6 +215,7 @@ def newton_parts(g, H):
     --------
     newton_step : the same step at once.
     """
+    g, H = as_shape(g, "g", "n"), as_shape(H, "H", "n", "n")
     g, H = _model(g, H)
     curvatures, directions = np.linalg.eigh(H)
     if (curvatures == 0).any():
@@ -543,6 +546,13 @@ def _start(evaluate, x0):
     return point
 
 
+def _rule(stop, usual):
+    """A stopping rule whose answer is a reason or an empty text, as that of the usual ones."""
+    if stop is None:
+        return usual()
+    return lambda point, new: as_instance(stop(point, new), "what stop returns", str, "text")
+
+
 def _refuse_scale(scale, point):
     if scale.shape not in ((), point.gradient.shape):
         raise ValueError(f"scale must be one number or one per unknown, {point.gradient.shape}, got {scale.shape}")
@@ -604,7 +614,9 @@ def newton(cost, gradient, hessian, x0, *, stop=None, max_iterations=100):
             return None, "the Hessian is singular"
         return newton_step(point.gradient, point.curvature), ""
 
-    return _undamped(_smooth(cost, gradient, hessian), x0, next_step, np.add, stop or small_gradient(), max_iterations)
+    return _undamped(
+        _smooth(cost, gradient, hessian), x0, next_step, np.add, _rule(stop, small_gradient), max_iterations
+    )
 
 
 @documented
@@ -641,7 +653,7 @@ def gauss_newton(residual, jacobian, x0, *, retract=np.add, stop=None, max_itera
             return None, f"the Jacobian has rank {rank}, but there are {n} unknowns"
         return gauss_newton_step(point.residual, point.jacobian), ""
 
-    return _undamped(_squares(residual, jacobian), x0, next_step, retract, stop or settled(), max_iterations)
+    return _undamped(_squares(residual, jacobian), x0, next_step, retract, _rule(stop, settled), max_iterations)
 
 
 @documented
@@ -665,7 +677,7 @@ def levenberg_marquardt(
 
     Source: Nielsen, Damping parameter in Marquardt's method, IMM report (1999).
     """
-    evaluate, stop, scale = _squares(residual, jacobian), stop or settled(), as_positive(scale, "scale")
+    evaluate, stop, scale = _squares(residual, jacobian), _rule(stop, settled), as_positive(scale, "scale")
     max_iterations = as_count(max_iterations, "max_iterations", at_least=0)
     point = _start(evaluate, x0)
     _refuse_scale(scale, point)
@@ -734,7 +746,7 @@ def trust_region(
         raise ValueError(f"accept must lie in [0, 1/4), got {shown(accept)}")
     radius, max_radius = as_positive_number(radius, "radius"), as_positive_number(max_radius, "max_radius")
     evaluate = _squares(fun, jac) if hessian is None else _smooth(fun, jac, hessian)
-    stop, scale = stop or settled(), as_positive(scale, "scale")
+    stop, scale = _rule(stop, settled), as_positive(scale, "scale")
     point = _start(evaluate, x0)
     _refuse_scale(scale, point)
     record = _Recorder([point])

@@ -130,7 +130,14 @@ def random_drive(building, noise, n_steps, rng, dt=0.5, start=None):
     Returns
     -------
     Drive
+
+    Raises
+    ------
+    ValueError
+        Another noise than these three.
     """
+    if set(noise) != {"k_d", "k_theta", "k_drift"}:
+        raise ValueError(f"noise must hold k_d, k_theta and k_drift, got {', '.join(map(str, noise)) or 'none'}")
     rooms = [name for name in building.nodes if not name.startswith(("door", "corridor"))]
     here = start or rooms[rng.integers(len(rooms))]
     xy = np.array(building.nodes[here])

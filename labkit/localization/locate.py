@@ -152,7 +152,14 @@ def place_readings(odometry_time, starts, reading_time):
         -1 where the odometry does not cover the reading.
     lag : array, shape (m,), s
         Since the time of that row.
+
+    Raises
+    ------
+    ValueError
+        Parts that do not begin at row 0, or do not rise.
     """
+    if not len(starts) or starts[0] != 0 or (np.diff([*starts, len(odometry_time)]) <= 0).any():
+        raise ValueError("starts must rise from 0 and stay below the number of rows")
     ends = np.concatenate([starts[1:], [len(odometry_time)]])
     usual = float(np.median(np.abs(np.diff(odometry_time))))
     low, high = odometry_time[starts], odometry_time[ends - 1] + usual

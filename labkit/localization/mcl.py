@@ -284,6 +284,7 @@ class MonteCarloLocalizer:
     Source: lecture, "Monte-Carlo-Lokalisierung"; recovery and adaptive number are beyond it.
     """
 
+    @documented
     def __init__(self, states, motion, resampling=Resampling(), recovery=None, adaptive=None):
         self.states = as_points(states, "states").reshape(-1, 3).copy()
         self.motion, self.resampling, self.recovery, self.adaptive = motion, resampling, recovery, adaptive

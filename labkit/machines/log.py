@@ -53,7 +53,7 @@ def write_csv(path, log, unit="m", digits=5):
     unit : str
         "m" or "mm", of the positions in the file.
     digits : int
-        Decimals of a meter, whatever the unit.
+        Decimals of a meter, whatever the unit; at least 0.
 
     Raises
     ------

@@ -193,8 +193,9 @@ def spoilt(name, number, records, seed):
     extreme = rng.random() < 0.15
     for _ in range(rng.choice([1, 1, 1, 2, 3]) if names else 0):
         chosen = names[rng.integers(len(names))]
-        if len(names) > 1 and rng.random() < 0.05:
-            other = names[rng.integers(len(names))]
+        single = [n for n in names if n not in ("args", "kwargs", "options")]
+        if chosen in single and rng.random() < 0.05:
+            other = single[rng.integers(len(single))]
             arguments[chosen], arguments[other] = arguments[other], arguments[chosen]
         elif isinstance(arguments[chosen], tuple | dict) and chosen in ("args", "kwargs", "options"):
             arguments[chosen] = type(arguments[chosen])(arguments[chosen])
@@ -233,8 +234,17 @@ def outcome_of(name, function, arguments):
             signal.setitimer(signal.ITIMER_PROF, 0)
     if outcome == "NaN or inf" and says_nan(function, type(result)):
         outcome = "NaN as documented"
+    if outcome == "foreign" and any(map(is_exchanged, arguments.values())):
+        outcome = "caller's function"
     warned = [w for w in warned if not issubclass(w.category, ResourceWarning)]
     return outcome, str(warned[0].message) if warned else "", " ".join(more.split())[:200]
+
+
+def is_exchanged(value):
+    """Whether a function takes another's place that returns or takes something else, perhaps within a dictionary."""
+    if isinstance(value, dict):
+        return any(map(is_exchanged, value.values()))
+    return getattr(value, "is_exchanged", False) or value is len or value is float
 
 
 def says_nan(function, kind):
