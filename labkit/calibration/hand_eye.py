@@ -66,6 +66,8 @@ class SphereHandEye(Result):
         Root-mean-square distance (mm) at the start and after each step, or after each round of weights when robust.
     target_known : bool
         Whether the target was given and not estimated.
+    converged : bool
+        Whether the last step or round changed nothing that matters; False where they ran out.
     residuals : array, shape (N, 3)
         T_BF T_FS x_S - target in the base (mm).
     rms : float
@@ -90,6 +92,10 @@ class SphereHandEye(Result):
     @property
     def parameters(self):
         return pose_parameters("T_FS") + (() if self.target_known else point_parameters("target"))
+
+    @property
+    def converged(self):
+        return len(self.history) < MAX_STEPS
 
     @cached_property
     def residuals(self):

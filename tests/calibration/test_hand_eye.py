@@ -13,6 +13,7 @@ from labkit.calibration.robust import tukey_weights
 from labkit.documents.thesis import printed as thesis
 from labkit.documents.thesis.listings import listing_cost, listing_gauss_newton
 from labkit.estimation.differences import numeric_jacobian
+from labkit.fast import hand_eye as fast_hand_eye
 from labkit.geometry import frames
 from labkit.geometry.lie import exp_so3
 
@@ -547,3 +548,14 @@ def test_scenes_of_the_literature_fill_their_ranges():
         )
     x_S = np.array([s.x_S[:12] for s in scenes])
     assert (np.abs(x_S[..., :2]).max((0, 1)) < [26, 21]).all() and 188 < x_S[..., 2].min() < x_S[..., 2].max() < 292
+
+
+@pytest.mark.parametrize("room", [hand_eye, fast_hand_eye])
+def test_a_fit_that_runs_out_of_steps_says_so(room, monkeypatch):
+    T_BF, x_S = scene(12, std=3.0)
+    x_S[:2] += 25.0
+    for robust in (False, True):
+        assert room.calibrate_sphere_target(T_BF, x_S, robust=robust).converged
+    monkeypatch.setattr(hand_eye, "MAX_STEPS", 1)
+    for robust in (False, True):
+        assert not room.calibrate_sphere_target(T_BF, x_S, robust=robust).converged
