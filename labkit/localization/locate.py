@@ -451,7 +451,7 @@ def _lost(used, landmark, patience):
     streak = 0
     for k in np.flatnonzero(landmark >= 0):
         streak = 0 if used[k] else streak + 1
-        if streak == LOST and k >= patience:
+        if streak >= LOST and k >= patience:
             return int(k) - LOST + 1 if k >= LOST - 1 else 0
     return None
 

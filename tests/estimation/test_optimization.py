@@ -463,3 +463,21 @@ def test_the_exact_step_is_the_lowest_point_of_the_disk(radius):
         assert step @ g + 0.5 * step @ B @ step == pytest.approx(lowest, rel=2e-3)
         if np.linalg.eigvalsh(B)[0] < 0:
             assert np.linalg.norm(step) == pytest.approx(radius, rel=1e-6)
+
+
+def test_the_damping_of_levenberg_marquardt_follows_nielsens_rule():
+    """Read back from the steps, (J'J + damping I) step = -J'r: a third at least, more after a rise, and twice that."""
+    trace = opt.levenberg_marquardt(rosen_residual, rosen_jacobian, [-1.9, 2.0], damping=1e-3)
+    assert trace.converged and not trace.accepted.all()
+    dampings = []
+    for x, step in zip(trace.x, trace.step):
+        r, J = rosen_residual(x), rosen_jacobian(x)
+        dampings.append(-(step @ (J.T @ r + J.T @ J @ step)) / (step @ step))
+    assert dampings[0] == pytest.approx(1e-3 * (rosen_jacobian(trace.x[0]) ** 2).sum(0).max(), rel=1e-6)
+    growth = 2.0
+    for damping, after, gain in zip(dampings, dampings[1:], trace.gain):
+        if after < 1e-5:
+            break  # below, rounding hides it
+        expected = max(1 / 3, 1 - (2 * gain - 1) ** 3) if gain > 0 else growth
+        growth = 2.0 if gain > 0 else 2 * growth
+        assert after / damping == pytest.approx(expected, rel=1e-4)

@@ -257,3 +257,36 @@ def test_a_mean_over_the_readings_used_is_told_when_some_are_not():
     assert not found.used[5] and found.used.sum() > 12
     told = found.as_dict()["mean_nis"]
     assert told == pytest.approx(found.nis[found.used].mean()) and 0.3 < told < 4
+
+
+@pytest.mark.parametrize(("readings", "tries"), [(34, 2), (31, 2), (20, 2), (19, 1), (100, 7), (400, 13)])
+def test_a_start_is_looked_for_every_half_window_and_not_for_ever(readings, tries, monkeypatch):
+    """At readings 0, 15, 30, ... as long as four would be left behind the next, and up to six windows."""
+    asked = []
+
+    def refuse(part, noise, rng):
+        asked.append(len(part.z))
+        raise ValueError("none fits")
+
+    monkeypatch.setattr(room, "global_start", refuse)
+    time, u, truth, rows, when, ids, z = course(3 * readings + 2)
+    log = as_log(time, u, rows, when, ids, z)
+    assert len(log.z) == readings
+    with pytest.raises(ValueError, match="none fits"):
+        room._first_start(log, Noise(**NOISE), np.random.default_rng(0))
+    assert asked == [readings - 15 * k for k in range(tries)]
+
+
+def test_after_a_restart_the_filter_has_a_window_of_readings_to_settle(monkeypatch):
+    """A filter that uses nothing is lost at its twelfth reading, and begun anew, not before the 31st, at the 20th."""
+    monkeypatch.setattr(room, "global_start", lambda log, noise, rng: (np.zeros(3), np.eye(3)))
+    time, u, truth, rows, when, ids, z = course(302)
+
+    def useless(log, x0, cov0, noise):
+        n, k = len(log.time), len(log.z)
+        nothing = np.zeros(k)
+        return path.Path(np.zeros((n, 3)), np.tile(np.eye(3), (n, 1, 1)), nothing, nothing, nothing > 0, log.landmark)
+
+    log = as_log(time, u, rows, when, ids, z)
+    _, restarts, _ = room._with_restarts(log, np.zeros(3), np.eye(3), 0, Noise(**NOISE), None, useless)
+    assert restarts == tuple(rows[:77:19].tolist())
