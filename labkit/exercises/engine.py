@@ -624,6 +624,7 @@ ADVICE = {  # what NumPy means
     "for ^: ": "`^` is no power in Python: write `**`.",
     "is out of bounds for axis": "Indices count from 0, the row comes first: [row, column].",
     "math domain error": "A root of a negative number, or an arccosine beyond 1, perhaps by rounding: see `np.clip`.",
+    "requires a buffer of": "The format and the data differ in length: in `struct`, d takes 8 bytes, f takes 4.",
     "remapped shapes": "In `einsum` one letter has one length: here a letter stands for two.",
     "could not be broadcast": "Entry by entry these shapes do not fit: is `@` meant, is a sum over an axis missing?",
 }

@@ -5,6 +5,7 @@ import itertools
 import json
 import math
 import os
+import struct
 import subprocess
 import sys
 import threading
@@ -397,6 +398,7 @@ def asserting(v):
         (lambda v: math.sqrt(-1.0), "np.clip"),
         (lambda v: v * np.ones((5, 2)), "is `@` meant"),
         (asserting, "handed over with `return`"),
+        (lambda v: struct.unpack("<3f", bytes(24)), "d takes 8 bytes"),
     ],
 )
 def test_what_numpy_means(answer, words):

@@ -387,7 +387,7 @@ CHAPTER = Chapter(
             fixed={"v": POINT},
             metric=metrics.Numbers(1e-9),
             hints=(
-                "A direction keeps its direction when it is divided by a positive number.",
+                "A direction says which way, not how far. What has to become 1, and by which number do you divide to get it there?",
                 "The length of v is the root of the sum of its squared components.",
                 "`return v / np.linalg.norm(v)`",
             ),
