@@ -46,21 +46,24 @@ class Live(anywidget.AnyWidget):
         self._widget, self._text, self._still, self._stored = widget, text, still, ""
 
     def show(self):
-        """Display it beneath the running cell."""
-        self._store()
+        """Display it beneath the running cell: its place at once, so that the page makes the widget while Python still
+        writes what is stored.
+        """
+        self._put("")
         place = {"text/plain": "", "text/html": f'<div data-labkit-live="{self.place}"></div>'}
         if "VSCODE_PID" in os.environ and "JPY_SESSION_NAME" not in os.environ:
             # VS Code runs no widget's script before an output names one
             place[WIDGET] = {"version_major": 2, "version_minor": 0, "model_id": self._widget.model_id}
         display(place, raw=True)
+        self._put(self._still())
 
     def refresh(self):
         """Store anew what it shows."""
         if get_ipython() is not None:
-            self._store()
+            self._put(self._still())
 
-    def _store(self):
-        page = f'<div data-labkit-still="{self.place}">{self._still()}</div>'
+    def _put(self, still):
+        page = f'<div data-labkit-still="{self.place}">{still}</div>'
         if page != self._stored:
             bundle = {"text/plain": self._text, "text/html": page}
             display(bundle, raw=True, display_id=self.place, update=bool(self._stored))

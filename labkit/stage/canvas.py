@@ -67,7 +67,7 @@ class Picture:
         self._heading = None
         self.panels, self._words = Panels(self.fig), None  # how they stand, and how far apart they were designed
         self._moving = set(self.artists)
-        self.draw_seconds = 0.0
+        self.draw_seconds, self._laid_out = 0.0, False
         self.spaces = [ax.space for ax in self.fig.axes if hasattr(ax, "space")]
         self._in_space = {id(artist) for space in self.spaces for artist in space.artists}
 
@@ -110,6 +110,7 @@ class Picture:
         self._room = room
         width, height, ratio, letters = room
         if self._words is None:
+            self.draw()
             self._words = Words(self.fig)
         whole = CSS_DPI * letters * np.array(self.size)
         narrow, low = width < NARROW * whole[0], height < LOW * whole[1]
@@ -148,6 +149,7 @@ class Picture:
         self.fig.set_dpi(CSS_DPI * letters * ratio)
         self.fig.set_size_inches(self.width / (CSS_DPI * letters), self.height / (CSS_DPI * letters))
         self.fig.set_layout_engine("constrained")
+        self._laid_out = False
 
     def _fits(self):
         with style.rc(), warnings.catch_warnings(record=True) as said:
@@ -161,6 +163,12 @@ class Picture:
             self.canvas.draw()
         self._backgrounds[self.dark] = self.canvas.copy_from_bbox(self.fig.bbox)
         self.fig.stale = False
+
+    def _stand(self):
+        """The axes stand where they will be drawn, also before the first drawing."""
+        if not self._laid_out:
+            with DRAWING, style.rc():
+                self._lay_out()
 
     def _lay_out(self):
         """Place the axes once a size: a layout at every change of limits would make them jump.
@@ -179,6 +187,7 @@ class Picture:
                 break
             before = places
         self.fig.set_layout_engine("none")
+        self._laid_out = True
 
     def draw(self):
         """Draw, anew only what has to be; returns the pixels, array of shape (height, width, 4)."""
@@ -254,6 +263,7 @@ class Picture:
 
     def fraction(self, ax, xy):
         """Fractions (right, down) of the picture at data coordinates `xy` of an axes."""
+        self._stand()
         x, y = ax.transData.transform(xy)
         return float(x / self.fig.bbox.width), float(1 - y / self.fig.bbox.height)
 
@@ -261,6 +271,7 @@ class Picture:
         """Where a scene in space may be drawn, (left, top, width, height) in fractions of the picture, and how many of
         its units the whole picture is wide. The axes lie in the middle of the place.
         """
+        self._stand()
         left, bottom, width, height = ax.get_position(original=True).bounds
         low, high = ax.get_xlim()
         units = (high - low) * self.fig.bbox.width / ax.bbox.width
@@ -268,6 +279,7 @@ class Picture:
 
     def data(self, ax, fraction):
         """Data coordinates of an axes at fractions (right, down) of the picture; (..., 2) -> (..., 2)."""
+        self._stand()
         right, down = np.moveaxis(np.asarray(fraction, dtype=float), -1, 0)
         pixels = np.stack([right * self.fig.bbox.width, (1 - down) * self.fig.bbox.height], -1)
         return ax.transData.inverted().transform(pixels)

@@ -20,6 +20,7 @@ const PATIENCE = 2500; // ms until a message without an answer is given up, and 
 const SPEAK_AFTER = 700; // ms of rest until a screen reader hears the new caption,
 const SPEAK_EVERY = 2000; // ms between two captions it hears while the picture keeps changing
 const PIXELS_A_STEP = 4; // CSS pixels a number of the sentence is dragged by until it goes one step on
+const READ = 6000; // ms a hint stays
 const REST = 900; // ms without an event until the picture may be stored
 const SETTLED = 150; // ms without a change of size or theme until the picture follows
 const CLICK_RADIUS = 4; // CSS pixels
@@ -609,6 +610,14 @@ class Space {
     canvas.addEventListener("pointercancel", () => { this.press = null; });
     canvas.addEventListener("keydown", (event) => this.key(event));
     canvas.addEventListener("blur", () => this.leave());
+    canvas.addEventListener("focus", () => this.tell());
+  }
+
+  /** The hint, until it has been read: the words of the picture lie under it. No animation, which keeps a page busy. */
+  tell() {
+    this.hint.hidden = false;
+    clearTimeout(this.reading);
+    this.reading = setTimeout(() => { this.hint.hidden = true; }, READ);
   }
 
   get points() {

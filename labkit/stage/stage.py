@@ -169,7 +169,6 @@ class Stage:
         if self.reached:
             raise ValueError(f"Stage {name!r}: the target is reached before anything is touched: {target.words!r}")
         self._check_places()
-        self._picture.draw()
         self._text = f"[stage: {name}] {self.caption}".rstrip()
 
     def _first_state(self, view):

@@ -1,16 +1,18 @@
 """Scenes in space in real JupyterLab, in headless Chromium: how fast they open, turn and follow, and what ten of them
 cost.
 
-    python tests/bench/scene_rate.py [--seconds 3] [--drags 60]
+    python tests/bench/scene_rate.py [--seconds 3] [--drags 60] [--stages 10]
 
 A scene of 60 bodies (about 15,000 triangles) and 2,000 points is turned by the mouse: pictures per second, which the
 page draws without the kernel. The TX40's flange is dragged: from the pointer's event to the picture drawn with what
 Python computed. Opening: from running the cell to the first picture drawn in space, the first on the page (which loads
 the drawing) and the next. Memory: what ten Stages add to the page's own heap and to the browser's renderer process.
-P is the time of 1000 products of two 3x3 matrices, as in peers.py: others have the machine where it is large.
+P is the time of 1000 products of two 3x3 matrices, as in peers.py: others have the machine where it is large. What a
+picture costs the processors, in ms of the page's process and of the one that draws, depends less on others.
 """
 
 import argparse
+import os
 import statistics
 import sys
 import time
@@ -46,17 +48,19 @@ Stage("crowd", scene=scene, compute=lambda state: None, fail={"up": 50.0},
       controls={"up": Slider(0.0, 100.0, 0.0)}, view=View(eye=3000))
 """
 ARM = "from labkit.chapters.ch06_tracker import stages\nstages.tx40()"
-OPENING = """async (number) => {
+OPENING = """(number) => new Promise(go => {
     const start = performance.now();
+    const stage = () => document.querySelectorAll(".labkit-stage")[number];
+    new MutationObserver((records, observer) => {
+        const shown = records.some(({ attributeName }) => attributeName === "data-picture");
+        if (shown) stage()?.scrollIntoView({block: "nearest"});
+        if (!stage()?.querySelector(".picture[data-pictures]")) return;
+        observer.disconnect();
+        go(performance.now() - start);
+    }).observe(document.body, {subtree: true, attributeFilter: ["data-picture", "data-pictures"]});
     window.jupyterapp.shell.currentWidget.content.activeCellIndex = number + 1;
     window.jupyterapp.commands.execute("notebook:run-cell");
-    while (document.querySelectorAll(".labkit-stage .picture[data-pictures]").length <= number)
-    {
-        document.querySelectorAll(".labkit-stage")[number]?.scrollIntoView({block: "nearest"});
-        await new Promise(resolve => setTimeout(resolve, 5));
-    }
-    return performance.now() - start;
-}"""
+})"""
 WATCH = """(node) => {
     window.__sent = null; window.__late = []; let answered = 0;
     const picture = node.querySelector(".picture");
@@ -79,16 +83,32 @@ def products():
     return 1e3 * (time.perf_counter() - start)
 
 
-def renderer_megabytes():
-    """Resident memory of Chromium's renderer processes."""
-    sizes = []
+def processes(kind):
+    """The folders in /proc of this bench's own Chromium processes of a kind."""
+    parents, found = {}, []
     for folder in Path("/proc").glob("[0-9]*"):
         try:
-            if b"--type=renderer" in (folder / "cmdline").read_bytes():
-                sizes.append(int((folder / "statm").read_text().split()[1]) * 4096 / 1e6)
+            parents[int(folder.name)] = int((folder / "stat").read_text().rsplit(")", 1)[1].split()[1])
+            if f"--type={kind}".encode() in (folder / "cmdline").read_bytes():
+                found.append(folder)
         except OSError:
             pass
-    return sum(sizes)
+
+    def is_own(number):
+        return number == os.getpid() or (number in parents and is_own(parents[number]))
+
+    return [folder for folder in found if is_own(int(folder.name))]
+
+
+def renderer_megabytes():
+    """Resident memory of Chromium's renderer processes."""
+    return sum(int((folder / "statm").read_text().split()[1]) * 4096 / 1e6 for folder in processes("renderer"))
+
+
+def spent(kind):
+    """Processor time of Chromium's processes of a kind so far (ms)."""
+    times = [(folder / "stat").read_text().rsplit(")", 1)[1].split()[11:13] for folder in processes(kind)]
+    return sum(int(t) for pair in times for t in pair) * 1e3 / os.sysconf("SC_CLK_TCK")
 
 
 def heap_megabytes(page, session):
@@ -110,13 +130,15 @@ def drag(page, box, seconds, at=(0.3, 0.2)):
 
 
 def turning(page, stage, seconds):
-    """Pictures per second while the mouse turns the view."""
+    """Pictures per second while the mouse turns the view, and what each costs the processors, in words."""
     picture = stage.locator(".picture")
     count = lambda: int(picture.get_attribute("data-pictures"))  # noqa: E731
     drag(page, picture.bounding_box(), 1.0)
-    before = count()
+    before, costs = count(), [spent("renderer"), spent("gpu-process")]
     took = drag(page, picture.bounding_box(), seconds)
-    return (count() - before) / took
+    pictures = count() - before
+    costs = [(spent(kind) - cost) / pictures for kind, cost in zip(("renderer", "gpu-process"), costs)]
+    return f"{pictures / took:.0f} pictures/s (each {costs[0]:.0f} + {costs[1]:.0f} ms of processors)"
 
 
 def following(page, stage, drags):
@@ -144,9 +166,10 @@ def main():
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--seconds", type=float, default=3.0)
     options.add_argument("--drags", type=int, default=60)
+    options.add_argument("--stages", type=int, default=10, help="of the TX40")
     chosen = options.parse_args()
-    print(f"P = {products():.2f} ms")
-    cells = ["from labkit.chapters.ch06_tracker import stages", CROWD.strip(), ARM, *[ARM] * 9]
+    print(f"P = {products():.2f} ms, load {os.getloadavg()[0]:.1f}")
+    cells = ["from labkit.chapters.ch06_tracker import stages", CROWD.strip(), ARM, *[ARM] * (chosen.stages - 1)]
     with driver.notebook_of(*cells) as notebook, server() as address, driver.page_of(driver.find_browser()) as page:
         driver.open_notebook(page, address, notebook)
         session = page.context.new_cdp_session(page)
@@ -155,7 +178,7 @@ def main():
         driver.wait_until_idle(page)
         before = heap_megabytes(page, session), renderer_megabytes()
         times = []
-        for k in range(11):
+        for k in range(chosen.stages + 1):
             times.append(page.evaluate(OPENING, k))
             if k in (0, 1):
                 stage = page.locator(".labkit-stage").nth(k)
@@ -163,9 +186,9 @@ def main():
                 page.wait_for_timeout(1500)
                 if k == 0:
                     print(f"triangles: {stage.locator('.picture').get_attribute('data-triangles')}")
-                    print(f"turning 60 bodies and 2,000 points: {turning(page, stage, chosen.seconds):.0f} pictures/s")
+                    print(f"turning 60 bodies and 2,000 points: {turning(page, stage, chosen.seconds)}")
                 else:
-                    print(f"turning the TX40: {turning(page, stage, chosen.seconds):.0f} pictures/s")
+                    print(f"turning the TX40: {turning(page, stage, chosen.seconds)}")
                     late = following(page, stage, chosen.drags)
                     median, most = statistics.median(late), np.percentile(late, 95)
                     print(f"flange to picture: median {median:.0f} ms, 95 % {most:.0f} ms ({len(late)} pictures)")
@@ -173,8 +196,9 @@ def main():
                     first = heap_megabytes(page, session), renderer_megabytes()
         page.wait_for_timeout(2500)
         after = heap_megabytes(page, session), renderer_megabytes()
-        print(f"opening: the first {times[0]:.0f} ms, the next {statistics.median(times[1:]):.0f} ms (median of 10)")
-        print(f"page: two Stages add {first[0] - before[0]:.0f} MB of heap, nine more {after[0] - first[0]:.0f} MB; "
+        more, each = chosen.stages - 1, statistics.median(times[1:])
+        print(f"opening: the first {times[0]:.0f} ms, the next {each:.0f} ms (median of {chosen.stages})")
+        print(f"page: two Stages add {first[0] - before[0]:.0f} MB of heap, {more} more {after[0] - first[0]:.0f} MB; "
               f"the renderer's process {first[1] - before[1]:.0f} and {after[1] - first[1]:.0f} MB")  # fmt: skip
         print(f"complaints in the console: {page.complaints or 'none'}; P = {products():.2f} ms")
 
