@@ -1,9 +1,10 @@
 """Every Stage of every chapter in the demo: opened, made to fail, reset, played, moved by key; both themes, both sizes.
 
-    python tests/bench/demo_sweep.py [--chapters NN ...] [--shots FOLDER]
+    python tests/bench/demo_sweep.py [--chapters NN ...] [--sizes 1280x720 ...] [--themes light dark] [--shots FOLDER]
 
 Prints what is cut, what does not answer within ten seconds, and what the page complains of; the last line is the sum.
-With --shots a picture of each Stage, failed, with its answer shown.
+A size such as 1280x720@1.5 is that window with the browser's zoom at 150 %. With --shots a picture of each Stage,
+failed, with its answer shown.
 """
 
 import argparse
@@ -17,6 +18,7 @@ import driver
 from demo_speed import SIZES, demo
 
 SECONDS = 10
+PLAIN = [f"{width}x{height}" for width, height in SIZES]
 CUT = """() => {
     const stage = document.querySelector("#place .labkit-stage"), box = stage.getBoundingClientRect();
     const place = document.querySelector("#place");
@@ -31,15 +33,17 @@ CUT = """() => {
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--chapters", nargs="*", default=[])
+    parser.add_argument("--sizes", nargs="*", default=PLAIN)
+    parser.add_argument("--themes", nargs="*", choices=("light", "dark"), default=("light", "dark"))
     parser.add_argument("--shots", type=Path)
     options = parser.parse_args()
     faults, opened = [], 0
-    for width, height in SIZES:
-        for dark in (False, True):
-            where = f"{width}x{height}{' dark' if dark else ''}"
+    for size in options.sizes:
+        for theme in options.themes:
+            where = f"{size} {theme}"
             with (
                 demo(*options.chapters) as (_, address, _, _),
-                driver.page_of(driver.find_browser(), dark=dark, width=width, height=height) as page,
+                driver.page_of(driver.find_browser(), dark=theme == "dark", **window(size)) as page,
             ):
                 page.goto(address)
                 page.wait_for_function("() => window.wall?.now")
@@ -49,11 +53,19 @@ def main():
                     faults += found
                     print("\n".join(found), end="\n" if found else "", flush=True)
                     if options.shots:
-                        picture(page, options.shots, f"{key.replace('/', '-')}-{width}{'-dark' if dark else ''}.png")
+                        picture(page, options.shots, f"{key.replace('/', '-')}-{size}-{theme}.png")
                 faults += [f"{where}: {words}" for words in page.complaints]
                 faults += [f"{where}: it calls {host}" for host in page.hosts - {"127.0.0.1"}]
     print(f"{opened} Stages opened, {len(faults)} faults")
     return 1 if faults else 0
+
+
+def window(size):
+    """What a size as 1280x720@1.5 is for the browser: with its zoom a window has fewer, larger pixels."""
+    pixels, _, zoom = size.partition("@")
+    zoom = float(zoom or 1)
+    width, height = (round(int(number) / zoom) for number in pixels.split("x"))
+    return {"width": width, "height": height, "scale": zoom}
 
 
 def visit(page, key):
