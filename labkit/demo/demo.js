@@ -176,7 +176,7 @@ class Wall {
   /** Arrow keys move the first handle at once, or drive, or turn; else the first control has them. */
   focus() {
     if ($("dialog[open]")) return;
-    const first = $("#place .handle") ?? $("#place canvas[tabindex]") ?? $("#place input, #place select");
+    const first = $("#place .handle") ?? $("#place canvas[tabindex]") ?? $("#place :is(input:not([type='radio']:not(:checked)), select)");
     (first ?? document.activeElement).focus?.({ preventScroll: true });
   }
 

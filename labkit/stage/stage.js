@@ -792,7 +792,10 @@ function wordsInput({ label, words }, send) {
   const head = element("span", "head", { "aria-hidden": "true" }, [label]);
   return {
     node: element("div", "control", { role: "radiogroup", "aria-label": label }, [head, ...labels]),
-    show(at) { inputs[at].checked = true; },
+    show(at) {
+      inputs[at].checked = true;
+      if (inputs.includes(document.activeElement)) inputs[at].focus({ preventScroll: true }); // arrow keys go on from there
+    },
   };
 }
 
@@ -911,6 +914,7 @@ class Room {
     if (!width) return; // hidden, or a theme is being exchanged
     if (this.enlarged) this.root.style.fontSize = `${this.lettersOfTheWindow()}px`;
     const style = getComputedStyle(this.root);
+    this.keepLines(`${width} ${style.fontSize}`);
     const height = Math.floor(this.visibleHeight() / 8) * 8;
     const look = {
       width: Math.floor(width - parseFloat(style.paddingLeft) - parseFloat(style.paddingRight)), height,
@@ -922,6 +926,14 @@ class Room {
     if (words === this.last && !again) return;
     this.last = words;
     this.line.add("look", () => look);
+  }
+
+  /** Lines that the caption has once taken stay its own at this width: the picture changes its size once, not to and fro. */
+  keepLines(place) {
+    const caption = this.root.querySelector(".caption");
+    if (this.place !== place) caption.style.minHeight = "";
+    this.place = place;
+    caption.style.minHeight = `${caption.offsetHeight}px`;
   }
 
   /** What the picture may have of the height one sees at once, beside caption and controls. */

@@ -81,31 +81,47 @@ def visit(page, key):
     if page.locator("#place .picture canvas").count() > 1:
         keys.remove("ArrowRight")  # the page alone turns a scene in space: no picture comes
     for pressed in keys:
-        before = page.get_attribute("#place .labkit-stage", "data-picture")
-        page.keyboard.press(pressed)
-        try:
-            changed = "(before) => document.querySelector('#place .labkit-stage').dataset.picture !== before"
-            page.wait_for_function(changed, arg=before, timeout=1000 * SECONDS)
-        except Exception:
+        if not press(page, pressed):
             faults.append(f"no picture after {pressed}")
         if pressed == "p":
             page.keyboard.press("p")
         if pressed == "f":
-            page.wait_for_timeout(450)  # the size has settled
-            faults += [f"failed: {words}" for words in [page.evaluate(CUT)] if words]
-    page.wait_for_timeout(450)
-    faults += [words for words in [page.evaluate(CUT)] if words]
+            faults += [f"failed: {words}" for words in [cut(page)] if words]
+    faults += [words for words in [cut(page)] if words]
     said = page.locator("#place .status").inner_text()
     return [*faults, *([f"it says: {said}"] if said else [])]
+
+
+def press(page, key):
+    """Whether a picture comes after a key."""
+    before = page.get_attribute("#place .labkit-stage", "data-picture")
+    page.keyboard.press(key)
+    try:
+        changed = "(before) => document.querySelector('#place .labkit-stage').dataset.picture !== before"
+        page.wait_for_function(changed, arg=before, timeout=1000 * SECONDS)
+    except Exception:
+        return False
+    return True
+
+
+def cut(page):
+    """What is cut for good: a caption of another length has its picture a moment later."""
+    page.wait_for_timeout(450)
+    for _ in range(10):
+        words = page.evaluate(CUT)
+        if not words:
+            break
+        page.wait_for_timeout(300)
+    return words
 
 
 def picture(page, folder, name):
     """The window with the Stage failed and the answer shown."""
     folder.mkdir(parents=True, exist_ok=True)
-    page.keyboard.press("f")
+    press(page, "f")
     if page.evaluate("() => wall.step") == "figure":
         page.keyboard.press("a")
-    page.wait_for_timeout(500)
+    cut(page)
     page.screenshot(path=folder / name)
 
 

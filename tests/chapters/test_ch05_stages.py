@@ -105,7 +105,7 @@ def test_taking_a_printed_start_moves_the_handle_and_dragging_lets_go_of_it():
     stage.set(P=(40, 30))
     assert stage.state["number"] == 0 and stage.caption.startswith("From the dragged start")
     stage.make_it_fail()
-    assert "of them uphill. Trust region" in stage.caption and "steps, never uphill" in stage.caption
+    assert "of them uphill; trust region" in stage.caption and "steps, never uphill" in stage.caption
 
 
 def test_residuals_of_the_31_poses_follow_the_edits():

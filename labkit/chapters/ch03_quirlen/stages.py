@@ -83,7 +83,8 @@ def pose_designer():
             ellipsoid.set(np.zeros(3), result["covariance_seen"])
             far = result["null_seen"] * (1.15 if result["undetermined"] else 0.0)
             null.set(np.array([-far, far]))
-            name.set(far if result["undetermined"] else (0, 0, 99.0))
+            lower = -np.copysign(1.0, far[2]) * far  # the other end may stand among the tools
+            name.set(lower if result["undetermined"] else (0, 0, 99.0))
             space.draw(state["view"])
             markers.set_data(np.arange(1, 7), np.maximum(result["singular_values"], 1.2e-3))
             floor.set_data([0.4, 6.6], [max(result["floor"], 1e-9)] * 2)
@@ -118,6 +119,7 @@ def pose_designer():
         view=View(-60, 30, center=(0, 0, 0.4), eye=6.0),
         presets={"Narrow cone": {f"D{k}": tuple(d) for k, d in enumerate(_ring(3.0), start=1)}},
         fail={"spin_deg": 60, **{f"D{k}": (0.0, 0.0, 1.0) for k in range(1, 7)}},
+        because="All six tools point the same way, and spin about it: what lies along it never shows.",
         describe=sentence,
     )
 

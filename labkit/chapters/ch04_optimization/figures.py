@@ -103,7 +103,7 @@ def curvature(ax):
 
 def indefinite(ax, x, y, lowest):
     """Shade where the smallest eigenvalue of the Hessian is negative, and say so. Returns the contour set."""
-    ax.text(0.015, 0.975, "gray: the Hessian is indefinite", transform=ax.transAxes, va="top", fontsize=9)
+    ax.set_title("gray: the Hessian is indefinite")
     return ax.contourf(x, y, lowest, levels=[-1e9, 0], colors=[style.FAINT], zorder=0)
 
 

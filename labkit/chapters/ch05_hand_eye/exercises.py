@@ -800,7 +800,7 @@ CHAPTER = Chapter(
             question="With which step is a central difference by the angle A most accurate here?",
             choices=("near 0.0000001 deg", "near 0.001 deg", "near 1 deg"),
             answer="near 0.001 deg",
-            why="Rounding grows as 1/h, curvature as h^2: they meet near the cube root of the machine's precision. The listing's step is too small.",
+            why="Rounding grows as 1/h, curvature as h²: they meet near the cube root of the machine's precision. The listing's step is too small.",
         ),
         Exercise(
             "analytic_jacobian",
@@ -1037,7 +1037,7 @@ CHAPTER = Chapter(
             question="Pose 3 is printed with x = 1379.64 and misses the sphere by 18.27 mm along -x. What happened?",
             choices=("the robot sagged", "a digit is missing", "two digits changed places"),
             answer="two digits changed places",
-            why="1397.64 is 18.00 mm farther, and the neighbors on the line stand at 1397.6 to 1398.1. Then 0.45 mm remain, like everywhere else.",
+            why="1397.64 is 18.00 mm farther, and the neighbors on the line stand at 1397.6 to 1398.1. Then 0.41 mm remain, like everywhere else.",
         ),
         Exercise(
             "find_misprints",

@@ -162,6 +162,7 @@ def accuracy_kinds():
             "speed": Slider(10, 600, 100, step=10, label="speed (mm/s)"),
         },
         fail={"backlash": 1.0, "around": True, "speed": 600},
+        because="Each arrival stops short by the backlash, from its own side; and at 600 mm/s the lag cuts the corner.",
         describe=_accuracy_sentence,
     )
 
@@ -333,9 +334,9 @@ def difference_steps():
         because="So small a step drowns in the last digits of the numbers.",
         target=Target("a derivative right to 1e-9 mm per deg", lambda result: min(result["at"].values()) < 1e-9),
         describe=lambda result: (
-            f"A step of {{h}} deg: forward is off by {result['at']['forward']:.1e}, central by "
-            f"{result['at']['central']:.1e} mm per deg. Best steps: {result['best']['forward']:.0e} and "
-            f"{result['best']['central']:.0e} deg."
+            f"A step of {{h}} deg: forward is off by {result['at']['forward']:.2g}, central by "
+            f"{result['at']['central']:.2g} mm per deg. Best steps: {result['best']['forward']:.1g} and "
+            f"{result['best']['central']:.1g} deg."
         ),
     )  # fmt: skip
 
@@ -483,12 +484,11 @@ def _methods_sentence(result):
         run = result["runs"][method]
         steps = "1 step" if run.steps == 1 else f"{run.steps} steps"
         climbs = {0: "never uphill", 1: "1 of them uphill"}.get(run.climbs, f"{run.climbs} of them uphill")
-        name = method[0].upper() + method[1:]
-        return f"{name}: {steps}, {climbs}" if run.arrived else f"{name}: not there after {run.steps} steps"
+        return f"{method} in {steps}, {climbs}" if run.arrived else f"{method} not even in {run.steps} steps"
 
     where = f"start {result['number']} of table 7-2" if result["number"] else "the dragged start"
     newton, trust = (told(method) for method in comparison.METHODS)
-    return f"From {where}. {newton}. {trust}, {result['runs']['trust region'].taken_back} taken back."
+    return f"From {where}: {newton}; {trust}, {result['runs']['trust region'].taken_back} taken back."
 
 
 def two_methods():
@@ -774,5 +774,6 @@ def pattern_designer():
         },
         view=View(-55, 15, center=(1528.0, -602.0, 1190.0), eye=3200.0),
         fail={"tilt_deg": 0},
+        because="The scanner is never tilted.",
         describe=_pattern_sentence,
     )

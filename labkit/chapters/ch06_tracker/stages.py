@@ -617,6 +617,7 @@ def six_runs():
         controls={"field": Slider(0.0, 6.0, 2.0, step=0.1, label="systematic error (mm)")},
         view=View(-50, 22),
         fail={"field": 6.0},
+        because="What is always wrong is wrong in each of the six runs: repeating them shows nothing of it.",
         presets={"no systematic error": {"field": 0.0}},
         describe=lambda r: (
             f"The six runs agree within {r['std']:.2f} mm; their mean is {r['off']:.2f} mm off the truth, "
@@ -714,6 +715,7 @@ def sweeps():
         controls={"jitter": Slider(1.0, 80.0, 40.0, step=1.0, label="error of a time (us)")},
         constrain=_in_view,
         fail={"A": (-1900.0, -1500.0), "B": (-1500.0, -1300.0)},
+        because="Both stations look from nearly the same side: their rays run along each other.",
         describe=_sweeps_sentence,
     )
 
@@ -772,6 +774,7 @@ def moved_station():
             "when": Choice(list(COURSES), "before the run", label="it moves"),
         },
         fail={"tilt": 4.0, "when": "at every stop"},
+        because="The station turns anew at every stop: no single mounting fits them all.",
         presets={"after stop 10": {"when": "after stop 10"}},
         describe=lambda r: f"E_trans is {r['E_trans']:.2f} mm, and the mounting is {r['off']:.2f} mm off the truth.",
     )

@@ -264,11 +264,16 @@ def compute_arena(state):
     }
 
 
+def _rounded(number):
+    """Three digits, written out up to a million."""
+    return f"{float(f'{number:.3g}'):g}"
+
+
 def _arena_sentence(result):
     if not len(result["nees"]):
         return "Click the picture and drive with the arrow keys, or press play for the circle."
     over = float((result["nees"] > gaussian.chi_square_quantile(0.995, 3)).mean())
-    text = f"The filter is {100 * result['error']:.0f} cm off; NEES now {result['nees'][-1]:.3g}, expected 3."
+    text = f"The filter is {100 * result['error']:.0f} cm off; NEES now {_rounded(result['nees'][-1])}, expected 3."
     text += strayed(result["truth"][-1], ARENA)
     if not result["wrap"] and result["nees"].max() > 100:
         text += " A bearing near 180 deg jumped by a whole turn, and the correction took it at its word."
@@ -359,7 +364,7 @@ def _honesty_sentence(result):
     low, high = kalman.mean_band(3, RUNS)
     verdict = "honest" if low < result["nees"] < high else "the filter believes its ellipse, and is wrong"
     return (
-        f"RMS error {1000 * result['rms']:.0f} mm, mean NEES {result['nees']:.3g} "
+        f"RMS error {1000 * result['rms']:.0f} mm, mean NEES {_rounded(result['nees'])} "
         f"(99 % band {low:.2f} to {high:.2f}): {verdict}."
     )
 

@@ -559,9 +559,9 @@ def soccer():
     """Six landmarks around a soccer field: odometry walks away from the robot, what the camera reads pulls MCL back."""
 
     def scene(fig):
-        top, bottom = fig.subplots(2, 1, height_ratios=(2.6, 1))
-        field = draw.Soccer(top, _soccer(READINGS["range and bearing"]).landmarks)
-        curves = draw.SoccerErrors(bottom, SOCCER_END)
+        left, right = fig.subplots(1, 2, width_ratios=(1.7, 1))
+        field = draw.Soccer(left, _soccer(READINGS["range and bearing"]).landmarks)
+        curves = draw.SoccerErrors(right, SOCCER_END)
 
         def update(state, result):
             field.set(*(result[key] for key in ("truth", "odometry", "estimates", "states", "seen")))
@@ -579,7 +579,7 @@ def soccer():
         because="No landmark is read: the particles count steps as odometry does, and drift as it does.",
         presets={"At the end": {"t": SOCCER_END}},
         describe=_soccer_sentence,
-        size=(7.0, 5.4),
+        size=(7.6, 4.2),
     )
 
 
@@ -735,14 +735,13 @@ def arena():
     """
 
     def scene(fig):
-        top, bottom = fig.subplots(2, 1, height_ratios=(4.2, 1))
-        draw.floor_plan(top, building().lines)
-        top.set(xlabel="", ylabel="y (m)")
-        cloud, truth, guess = draw.Cloud(top), draw.RobotMark(top), draw.RobotMark(top, color=style.ESTIMATE)
-        scan, disks = draw.Beams(top), draw.Disks(top)
-        (ring,) = top.plot([], [], **draw.RING)
-        draw.key(top, {"robot: drag it": truth, "estimate": guess, "scan": scan, "not on the map": disks})
-        curve = draw.error_curve(bottom, HISTORY)
+        left, right = fig.subplots(1, 2, width_ratios=(2.2, 1))
+        draw.floor_plan(left, building().lines)
+        cloud, truth, guess = draw.Cloud(left), draw.RobotMark(left), draw.RobotMark(left, color=style.ESTIMATE)
+        scan, disks = draw.Beams(left), draw.Disks(left)
+        (ring,) = left.plot([], [], **draw.RING)
+        draw.key(left, {"robot: drag it": truth, "estimate": guess, "scan": scan, "not on the map": disks})
+        curve = draw.error_curve(right, HISTORY)
 
         def update(state, result):
             cloud.set(result["states"])
@@ -772,5 +771,5 @@ def arena():
         keys=True,
         fail={"particles": 100, "t": 20.0},
         describe=_arena_sentence,
-        size=(7.0, 5.8),
+        size=(7.6, 4.2),
     )

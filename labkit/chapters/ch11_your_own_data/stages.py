@@ -80,6 +80,7 @@ def motions_beside_each_other():
             "clock_ms": Slider(-200, 200, 0, step=2, label="clock set forward by (ms)"),
         },
         fail={"cell": "swapped_role"},
+        because="One of the files holds the inverse poses: no mounting brings the axes together.",
         describe=lambda result: (
             f"The angles of the motions differ by {result['rms'][0]:.2g} deg (rms), the angles between their axes by "
             f"{result['rms'][1]:.2g} deg."
@@ -310,5 +311,6 @@ def done_again():
             ),
         },
         fail={"n": 3},
+        because="Three poses hardly tell how large the noise is.",
         describe=_again_sentence,
     )
