@@ -73,7 +73,7 @@ def pose_designer():
         heads = space.points(**style.look("measurement", markersize=7))
         ellipsoid = space.ellipsoid(**style.look("estimate"))
         null = space.line(color=style.TRUTH, linewidth=2.2, linestyle=(0, (2, 1.5)))
-        name = space.text("null vector", offset=(8, -4))
+        name = space.text("null vector", offset=(34, 4))  # beside the rings of tools that stand there
         markers, floor = draw.singular_value_axes(right)
 
         def update(state, result):
@@ -83,8 +83,7 @@ def pose_designer():
             ellipsoid.set(np.zeros(3), result["covariance_seen"])
             far = result["null_seen"] * (1.15 if result["undetermined"] else 0.0)
             null.set(np.array([-far, far]))
-            lower = -np.copysign(1.0, far[2]) * far  # the other end may stand among the tools
-            name.set(lower if result["undetermined"] else (0, 0, 99.0))
+            name.set(far if result["undetermined"] else (0, 0, 99.0))
             space.draw(state["view"])
             markers.set_data(np.arange(1, 7), np.maximum(result["singular_values"], 1.2e-3))
             floor.set_data([0.4, 6.6], [max(result["floor"], 1e-9)] * 2)

@@ -102,8 +102,7 @@ def curvature(ax):
 
 
 def indefinite(ax, x, y, lowest):
-    """Shade where the smallest eigenvalue of the Hessian is negative, and say so. Returns the contour set."""
-    ax.set_title("gray: the Hessian is indefinite")
+    """Shade where the smallest eigenvalue of the Hessian is negative. Returns the contour set."""
     return ax.contourf(x, y, lowest, levels=[-1e9, 0], colors=[style.FAINT], zorder=0)
 
 

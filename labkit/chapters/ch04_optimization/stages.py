@@ -241,6 +241,7 @@ def saddle():
         lowest = np.linalg.eigvalsh(wells.hessian(grid))[..., 0]
         draw.indefinite(ax, grid[..., 0], grid[..., 1], lowest)
         _map(ax, x, y)
+        ax.set_title("gray: the Hessian is indefinite")
         lines = draw.paths(ax, ("newton", "trust_region"))
         arms = draw.curvature(ax)
 
