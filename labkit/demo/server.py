@@ -27,6 +27,7 @@ MAX_WAITING = 20  # messages of a window that wait for the Stages; a page sends 
 POLICY = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; connect-src 'self' ws: wss:"
 FIRST_PORT, PORTS = 8890, 50
 NOT_HERE = {getattr(errno, name, None) for name in ("EADDRNOTAVAIL", "WSAEADDRNOTAVAIL")}
+FOREIGN = "{} is no address of this machine. Name one of its own, or leave the option out."
 
 
 class Taken(ValueError):
@@ -52,10 +53,10 @@ def listen(application, ip, port=None, first=FIRST_PORT, **options):
         try:
             sockets = tornado.netutil.bind_sockets(number, ip, reuse_port=False)
         except socket.gaierror:
-            raise Taken(f"{ip} is no address of this machine. Leave it out to listen on 127.0.0.1.") from None
+            raise Taken(FOREIGN.format(ip)) from None
         except OSError as error:
             if error.errno in NOT_HERE:
-                raise Taken(f"{ip} is no address of this machine. Leave it out to listen on 127.0.0.1.") from None
+                raise Taken(FOREIGN.format(ip)) from None
             continue
         server = tornado.httpserver.HTTPServer(application, **options)
         server.add_sockets(sockets)

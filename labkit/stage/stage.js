@@ -901,6 +901,7 @@ class Room {
     };
     this.resizing = new ResizeObserver(this.watch);
     this.resizing.observe(root);
+    this.resizing.observe(root.parentElement); // less room around it does not change its own size
     this.theming = new MutationObserver(this.watch);
     for (const node of [document.documentElement, document.body]) this.theming.observe(node, { attributes: true });
     window.addEventListener("resize", this.watch); // also fired when the zoom, and with it the pixel ratio, changes

@@ -10,6 +10,7 @@ import driver
 import pytest
 
 FIRST = "01/three-points"
+INSIDE = "() => document.querySelector('#place .labkit-stage').getBoundingClientRect().bottom <= innerHeight + 1"
 
 
 @contextlib.contextmanager
@@ -92,7 +93,7 @@ def turned(page):
 
 # one a chapter, of every kind: points, turned views, a list, play, keys, a brush; `tests/bench/demo_sweep.py` opens all
 KINDS = ("00/quarter-turns", "01/triangle-noise", "02/growth", "03/swirl", "04/basins", "05/thirty-one-poses",
-         "06/methods", "07/drive", "08/bells", "09/arena")  # fmt: skip
+         "06/methods", "07/drive", "08/bells", "09/arena", "11/motions-beside-each-other")  # fmt: skip
 
 
 @pytest.mark.parametrize("key", KINDS)
@@ -107,8 +108,7 @@ def test_a_stage_fails_resets_plays_and_is_moved_by_key(wall, key):
         turned(wall)
     else:
         moved(wall, lambda: wall.keyboard.press("ArrowRight"))
-    inside = "() => document.querySelector('#place .labkit-stage').getBoundingClientRect().bottom <= innerHeight + 1"
-    wall.wait_for_function(inside)
+    wall.wait_for_function(INSIDE)
     assert wall.locator("#place .status").inner_text() == ""
 
 
@@ -195,6 +195,7 @@ def test_three_phones_vote_in_two_rounds(wall):
         assert not phones[0].locator("#answers button").first.is_enabled() or phones[0].wait_for_function(
             "() => !now.open"
         )
+    wall.wait_for_function(INSIDE)  # the shares have taken a line of the figure's room
     shares = [row.inner_text() for row in wall.locator("#cover .bar").all()]
     assert shares[:2] == ["33 % (1)", "67 % (2) second round"]
     with wall.expect_download() as saved:
@@ -265,7 +266,7 @@ def test_a_browser_opened_again_finds_the_card(wall):
     assert "token" in page.inner_text("body")  # what it did not see once, it does not open
     context.add_cookies(wall.context.cookies())
     page.reload()
-    page.wait_for_function("() => window.wall?.card.key === '05/convergence'")
+    page.wait_for_function("() => window.wall?.card?.key === '05/convergence'")
     page.wait_for_selector("#place .labkit-stage[data-picture]", state="attached")
     context.close()
 
