@@ -17,7 +17,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from . import arguments, cases, guard, metrics, operands, quantities, relations, rerun, scope, shapes, slips, steps
+from . import arguments, cases, guard, metrics, operands, quantities, regions, relations, rerun, scope, shapes, slips
+from . import steps as own_steps
 from .typeset import typeset
 
 TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
@@ -236,13 +237,15 @@ class _Trial:
             return named
         words = self._relation(whole=True) or self._other_arguments() or self._terms()
         search = None if words else self._search()
-        step = search and search.words()
+        solution = search and self._solution(search)
+        step = search and (search.passed_words(solution) or search.words())
         words = words or (not self.refusal and step) or self._one_change()
         if words:
             return self.outcome(NOT_YET, _closed(words) + self._about_globals())
-        step = step or search and not self._right_somewhere() and search.given_words(self._solution(search))
+        step = step or search and not self._right_somewhere() and search.given_words(solution)
         if self.refusal:
             words = self._other_shape() or (f" {step[0].upper()}{_closed(step[1:])}" if step else "")
+            words = words or self._agreement(search, solution)
             return self.outcome(NOT_YET, _closed(self.refusal) + words + self._about_globals())
         if step:
             return self.outcome(NOT_YET, _closed(step) + self._about_globals())
@@ -252,7 +255,13 @@ class _Trial:
                     off = next(d for d in metric.deviations(*pair) if not d.within)
                     return self.outcome(NOT_YET, _closed(f"{words} {off}"))
         words = self._unmoved() or self._relation()
-        return self.outcome(NOT_YET, (_closed(words) if words else self._deviation()) + self._about_globals())
+        words = _closed(words) if words else self._deviation()
+        return self.outcome(NOT_YET, words + self._agreement(search, solution) + self._about_globals())
+
+    def _agreement(self, search, solution):
+        """How far what is computed on the way is what the solution computes, as one more sentence."""
+        words = search and not self._right_somewhere() and search.agreement_words(solution)
+        return f" {words}." if words else ""
 
     def _relation(self, whole=False):
         """What the general layer says of the results; nothing where one was refused, or only special ones are wrong."""
@@ -309,7 +318,7 @@ class _Trial:
         return "\n".join(map(_closed, told)) or None
 
     def _solution(self, search):
-        return steps.of_solution(self.exercise, search.cases, SEARCHING)
+        return own_steps.of_solution(self.exercise, search.cases, SEARCHING)
 
     def _right_somewhere(self):
         """Whether some plain draws come out right: then these are what is to be told."""
@@ -324,11 +333,11 @@ class _Trial:
         if written is None:
             return None
         drawn = [
-            steps.Case(args, metric, pair[1], not isinstance(pair[0], _Refusal) and metric.equal(*pair))
+            own_steps.Case(args, metric, pair[1], not isinstance(pair[0], _Refusal) and metric.equal(*pair))
             for args, metric, pair in zip(self.inputs, self.metrics, self.pairs)
         ]
         found = [None if isinstance(pair[0], _Refusal) else rerun.numeric(pair[0]) for pair in self.pairs]
-        return steps.Search(written, self._names(self.inputs[0]), drawn, found, self._fresh_cases, SEARCHING)
+        return own_steps.Search(written, self._names(self.inputs[0]), drawn, found, self._fresh_cases, SEARCHING)
 
     @functools.cached_property
     def _fresh(self):
@@ -336,7 +345,7 @@ class _Trial:
         rng, found = np.random.default_rng(0), []
         for draw in itertools.islice(itertools.cycle(self.exercise.cases), MORE_CASES):
             args = draw(rng)
-            found.append(steps.Case(args, self.exercise.metric, self.exercise.reference(*copy.deepcopy(args))))
+            found.append(own_steps.Case(args, self.exercise.metric, self.exercise.reference(*copy.deepcopy(args))))
         return found
 
     def _fresh_cases(self, kind):
@@ -760,8 +769,12 @@ class Value(Item):
             least = f"at least {self.digits} digits are needed"
             return Outcome(NOT_YET, f"right as far as it goes: {least}, so hand over the computed value.")
         words = relations.difference_words(metric, [(answer, expected)]) or self._made_otherwise(answer)
-        words = words or relations.ratio_words(answer, expected)
+        words = words or self._changed(metric, answer, expected) or relations.ratio_words(answer, expected)
         return Outcome(NOT_YET, _closed(words) if words else self._which_way(answer, expected))
+
+    def _changed(self, metric, answer, expected):
+        """Which change of the solution's computation gives it."""
+        return regions.change_words(self, answer, lambda found: metric.equal(found, expected), LOOKING)
 
     def _made_otherwise(self, answer):
         """Which other number of the same data it is."""

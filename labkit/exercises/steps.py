@@ -5,7 +5,6 @@ another (`rerun.OTHERWISE`), or a value on the way that the chapter's solution h
 is where it goes wrong.
 """
 
-import itertools
 import time
 
 import numpy as np
@@ -16,6 +15,7 @@ from .arguments import is_numeric
 WORTH = 3  # how unlikely a change of the code may be that is tried before changes of values
 CLOSE = 1e-7  # how far, relatively, two values may lie apart that are the same
 BATCH = 120  # changes that are tried at once
+ENTRIES = 8  # of a result that are looked at one by one
 NAMED = 4  # values that are told to be right, at most
 ALONE = "With this alone changed, your result is right"
 
@@ -36,6 +36,43 @@ class Case:
             return False
 
 
+    def admit(self, found):
+        """The result of a changed function as the metric takes it; None where it does not."""
+        try:
+            return self.metric.admit(found[0], self.expected)
+        except Exception:  # as above, and what failed
+            return None
+
+    def gain(self, found, right):
+        """How many parts of a result came right, all that were right still being so; 0 where none did."""
+        result = self.admit(found)
+        if result is None:
+            return 0
+        parts = self.right_parts(result)
+        if not set(right) <= set(parts):
+            return 0
+        simple = relations.difference_words(self.metric, [(result, self.expected)], (), True)
+        return 100 if simple else len(parts) - len(right)
+
+    def right_parts(self, result):
+        """Names of the parts of an admitted result that are right."""
+        if result is None:
+            return []
+        if isinstance(self.metric, metrics.Several):
+            return [name for name, part, r, e in self.metric.parts(result, self.expected) if part.equal(r, e)]
+        try:
+            off = self.metric.deviations(result, self.expected)
+        except Exception:  # of a result that no metric foresees
+            return []
+        if len(off) > 1:
+            return [d.what for d in off if d.within]
+        r, e = np.asarray(result, dtype=float), np.asarray(self.expected, dtype=float)
+        if r.shape != e.shape or not 0 < r.ndim < 3 or r.shape[-1] > ENTRIES or not isinstance(self.metric, metrics.Numbers):
+            return []
+        entries = "entry" if r.ndim == 1 else "column"
+        return [f"{entries} {k} (counted from 0)" for k in range(r.shape[-1]) if _same(r[..., k], e[..., k])]
+
+
 class Search:
     """Looks for one change that mends a student's function."""
 
@@ -47,6 +84,7 @@ class Search:
         order = sorted(range(len(cases)), key=lambda k: cases[k].was_right)
         self.cases, self.results = [cases[k] for k in order], [results[k] for k in order]
         self.values = [written.trace(case.args, seconds) for case in self.cases]
+        self.admitted = [None if r is None else r for r in self.results]
 
     def words(self):
         """What is wrong where, from the likeliest kind of change to the least; None where nothing mends the result."""
@@ -125,6 +163,54 @@ class Search:
                     ):
                         yield "own", k, change, variable
 
+    # Changes that mend a part, or leave a simple difference
+
+    def partly_words(self):
+        """A change of the code that leaves a simple difference, or makes a part of the result right on all draws."""
+        plans = [("code", k) for k, (rank, *_) in enumerate(self.written.changes) if rank < WORTH]
+        begun, best = time.thread_time() - self.written.spent, None
+        right = [case.right_parts(result) for case, result in zip(self.cases, self.admitted)]
+        for start in range(0, len(plans), BATCH):
+            batch = plans[start : start + BATCH]
+            for plan, better in zip(batch, self.written.results(batch, *self._first(right[0]))):
+                if better and (words := self._partly(plan, right)) and (best is None or better > best[0]):
+                    best = better, plan, words
+            if time.thread_time() + self.written.spent - begun > self.seconds:
+                break
+        if best is None:
+            return None
+        _, line, code, mends = self.written.changes[best[1][1]]
+        return f"in line {line}, `{code}`: {mends}. With this changed, {best[2]}"
+
+    def _first(self, right):
+        """Arguments of the first draw, seconds, and how much better a changed function's result is on it."""
+        case = self.cases[0]
+        return case.args, self.seconds, lambda found: case.gain(found, right)
+
+    def _partly(self, plan, right):
+        """What comes right on all draws by a change that does not make all right, in words."""
+        found = []
+        for case in self.cases:
+            kept = self.written.results([plan], case.args, self.seconds, case.admit)
+            if kept != [None] and kept:
+                found.append(kept[0])
+        if len(found) < len(self.cases):
+            return None
+        words = relations.difference_words(self.cases[0].metric, self._pairs(found), (), True)
+        if words:
+            return words
+        parts = [case.right_parts(result) for case, result in zip(self.cases, found)]
+        if any(not set(before) <= set(after) for before, after in zip(right, parts)):
+            return None
+        come = set.intersection(*map(set, parts)) - set.union(*map(set, right))
+        come = [part for part in parts[0] if part in come]
+        if not come or len(come) > 4:
+            return None
+        return f"{' and '.join(come)} {'come' if len(come) > 1 else 'comes'} out right, though not all"
+
+    def _pairs(self, results):
+        return [(result, case.expected) for result, case in zip(results, self.cases)]
+
     # Values of the solution
 
     def given_words(self, solution):
@@ -145,17 +231,22 @@ class Search:
                 if all(_exchangeable(a, b) for a, b in pairs) and not (solution.is_result[q] and self.is_result(k)):
                     yield k, q
 
-    def _is_known(self, k, solution):
+    def _is_known(self, k, solution, given=True):
         """Whether a value on the way is one that the solution has as well, or an argument: then it is right."""
         if not all(values[k][0] for values in self.values):
-            return True
-        mine = [values[k][1] for values in self.values]
+            return given
         known = ([values[q][1] for values in solution.values] for q in solution.distinct)
+        return any(self._is_value(k, theirs) for theirs in known) or given and self._is_given(k)
+
+    def _is_given(self, k):
+        """Whether a value on the way is an argument."""
         given = ([rerun.numeric(case.args[i]) for case in self.cases] for i in range(len(self.names)))
-        return any(
-            all(t is not None and _same(m[0], t[0] if t.ndim > m.ndim - 1 else t) for m, t in zip(mine, theirs))
-            for theirs in itertools.chain(known, given)
-        )
+        return any(all(g is not None for g in arg) and self._is_value(k, [g[None] for g in arg]) for arg in given)
+
+    def _is_value(self, k, theirs):
+        """Whether a value on the way is another one on every draw, round by round; or one of rounds, row by row."""
+        mine = [values[k] for values in self.values]
+        return all(count and (_same(m, t) or len(t) == 1 and _same(m, t[0])) for (count, m), t in zip(mine, theirs))
 
     def is_result(self, k):
         return all(r is not None and _same(v[k][1][-1], r) for v, r in zip(self.values, self.results))
@@ -167,6 +258,45 @@ class Search:
         words = words or f"this value is not right{self._of_right_parts(k, solution)}"
         end = "" if words[-1] in ".?" else "."
         return f"{self._where(k)}: {words}{end} With the right value there, all that follows is right"
+
+    # What agrees with the solution
+
+    def passed_words(self, solution):
+        """A value on the way that is the right result already, though it is not what is returned."""
+        results = [q for q in solution.distinct if solution.is_result[q]] if solution else []
+        for k in range(len(self.written.places)):
+            if any(self._is_value(k, [values[q][1] for values in solution.values]) for q in results):
+                return f"{self._where(k)}, stands the right result, but something else is returned"
+        return None
+
+    def agreement_words(self, solution):
+        """How far the values on the way are those of the solution, and the first that is none of them."""
+        if solution is None:
+            return None
+        known = [k for k in range(len(self.written.places)) if self._is_step(k) and self._is_known(k, solution, False)]
+        if not known:
+            return None
+        behind = [k for k in range(known[-1] + 1, len(self.written.places)) if self._is_step(k)]
+        names = dict.fromkeys(self._called(k) for k in known if self.written.places[k][2])
+        last = f"{self._called(known[-1])} (line {self.written.places[known[-1]][0]})"
+        right = f"{', '.join(list(names)[-NAMED:])}" if len(names) > 1 else last
+        told = f"As far as {right} your values are those of the solution"
+        if not behind:
+            return told
+        line, code, *_ = self.written.places[behind[0]]
+        return f"{told}; `{code}` in line {line} is the first behind that is not among them: look there"
+
+    def _called(self, k):
+        _, code, name, *_ = self.written.places[k]
+        return f"`{name or code}`"
+
+    def _is_step(self, k):
+        """Whether a value is computed there: no argument, no name that is read, no constant."""
+        line, code, name, *_ = self.written.places[k]
+        if code == name or not all(values[k][0] for values in self.values):
+            return False
+        mine = [values[k][1] for values in self.values]
+        return len(mine) > 1 and not _same(mine[0][0], mine[1][0]) and not self._is_given(k)
 
     def _of_right_parts(self, k, solution):
         """Whether the parts of a wrong value are right, so that it is what is done with them."""
@@ -190,6 +320,7 @@ def value_relation(mine, theirs, named):
     words = relations.difference_words(exact, list(zip(mine, theirs)), (), True)
     words = words or operands.operand_words(exact, mine, theirs, named)
     words = words or relations.difference_words(exact, list(zip(mine, theirs)), ())
+    words = words and words.removesuffix(": does a loop end too early?")
     for said, told in (("your result", "it"), ("your matrix", "it"), ("the expected", "the right")):
         words = words and words.replace(said, told)
     return words
