@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from . import arguments, cases, guard, metrics, operands, quantities, regions, relations, rerun, scope, shapes, slips
+from . import arguments, cases, guard, metrics, operands, quantities, regions, relations, scope, shapes, slips
 from . import steps as own_steps
 from .typeset import typeset
 
@@ -26,7 +26,7 @@ NOISY = "exact on clean data, but the data are not weighed as they should be: on
 TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws of each kind
 MANY_DIGITS = 1e-3  # by how much better some draws come out where one case is special
 MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried, to tell on which
-SEARCHING = 0.25  # seconds of processor time for each kind of change of the student's own code
+SEARCHING = 0.2  # seconds of processor time for each kind of change of the student's own code
 MORE_CASES = 8  # on which an explanation from the first draws is tried once more
 LOOKING = 0.5  # seconds of processor time in which changes of arguments, or of the formula, are tried as explanation
 UNITS = {
@@ -205,9 +205,9 @@ class _Trial:
                 admitted.append(_Refusal(result))
             return None
 
-        started = time.perf_counter()
+        started = _seconds()
         run = guard.run(self.function, args, finish, self.exercise.limit)
-        self.spent += time.perf_counter() - started
+        self.spent += _seconds() - started
         self.printed = self.printed or run.printed
         if run.error is not None:
             return self._named_by_failing(run.error, args) or self._raised(run, args)
@@ -242,7 +242,8 @@ class _Trial:
         words = words or (not self.refusal and step) or self._one_change()
         if words:
             return self.outcome(NOT_YET, _closed(words) + self._about_globals())
-        step = step or search and not self._right_somewhere() and search.given_words(solution)
+        if search and not step and not self._right_somewhere():
+            step = search.partly_words() or search.given_words(solution)
         if self.refusal:
             words = self._other_shape() or (f" {step[0].upper()}{_closed(step[1:])}" if step else "")
             words = words or self._agreement(search, solution)
@@ -329,15 +330,11 @@ class _Trial:
         """What looks for the step of the student's own code at which it goes wrong; None where it cannot be read."""
         if self.exercise.metric is None or not self.inputs or self.spent > LOOKING:
             return None
-        written = rerun.written(self.function)
-        if written is None:
-            return None
         drawn = [
-            own_steps.Case(args, metric, pair[1], not isinstance(pair[0], _Refusal) and metric.equal(*pair))
+            own_steps.Case(args, metric, pair[1], None if isinstance(pair[0], _Refusal) else pair[0])
             for args, metric, pair in zip(self.inputs, self.metrics, self.pairs)
         ]
-        found = [None if isinstance(pair[0], _Refusal) else rerun.numeric(pair[0]) for pair in self.pairs]
-        return own_steps.Search(written, self._names(self.inputs[0]), drawn, found, self._fresh_cases, SEARCHING)
+        return own_steps.search(self.function, self._names(self.inputs[0]), drawn, self._fresh_cases, SEARCHING)
 
     @functools.cached_property
     def _fresh(self):
@@ -507,9 +504,9 @@ class _Trial:
         """What the draws on which the answer is wrong have in common, fresh ones among them, and how many these are."""
         metric, rng = self.exercise.metric, np.random.default_rng(0)
         draws = [(args, pair[1], not m.equal(*pair)) for args, m, pair in self._cases()]
-        ends = time.perf_counter() + LOOKING
+        ends = _seconds() + LOOKING
         for draw in itertools.islice(itertools.cycle(self.exercise.cases), MORE_DRAWS):
-            if time.perf_counter() > ends or self.spent > LOOKING:
+            if _seconds() > ends or self.spent > LOOKING:
                 break  # a slow answer, perhaps in another process: it is not called more often than it must
             args = draw(rng)
             expected = self.exercise.reference(*copy.deepcopy(args))
@@ -572,6 +569,11 @@ class _Trial:
         if args and self.pairs and all(m and m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)):
             with_ += "\nIt was right before, on other draws: what is different about this one, its shapes perhaps?"
         return self.outcome(RAISED, f"{type(error).__name__}: {said}{advice}{where}{with_}")
+
+
+def _seconds():
+    """Of processor time, and of waiting for another process that computes for this one."""
+    return time.thread_time() + guard.Abroad.seconds()
 
 
 def _fails(mistake, args):

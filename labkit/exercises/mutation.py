@@ -140,6 +140,7 @@ REVERSED = (  # (words of what was changed in a right formula, what is wrong whe
     (r"without `(\w+)`", r"`\1` is too much"),
     (r"with one transpose too many, or too few", "one transpose is missing, or too many"),
     (r"with (.+) (turned around|turned over|exchanged)", r"\1 is \2"),
+    (r"with the factors of one product `@` in another order", "the factors of this product belong in another order"),
     (r"with one sign turned", "the sign is the other one"),
     (r"with one part squared", "the square of this belongs there"),
     (r"with the root of one part taken", "the root of this belongs there"),
@@ -212,6 +213,11 @@ def _operation(node, names):
         yield 1, WITHOUT[kind], node.left
         if kind not in (ast.Pow, ast.Mod):
             yield 1, WITHOUT[kind], node.right
+    if kind is ast.MatMult and isinstance(node.left, ast.BinOp) and isinstance(node.left.op, ast.MatMult):
+        a, b, c = node.left.left, node.left.right, node.right
+        for one, two, three in ((a, c, b), (b, c, a), (c, a, b), (c, b, a)):
+            inner = ast.BinOp(one, ast.MatMult(), two)
+            yield 1, "with the factors of one product `@` in another order", ast.BinOp(inner, ast.MatMult(), three)
     if kind is ast.MatMult:
         for left, right in ((_transposed(node.left), node.right), (node.left, _transposed(node.right))):
             yield 1, "with one transpose too many, or too few", ast.BinOp(left, node.op, right)

@@ -5,6 +5,7 @@ another (`rerun.OTHERWISE`), or a value on the way that the chapter's solution h
 is where it goes wrong.
 """
 
+import functools
 import time
 
 import numpy as np
@@ -20,11 +21,25 @@ NAMED = 4  # values that are told to be right, at most
 ALONE = "With this alone changed, your result is right"
 
 
-class Case:
-    """One draw: its arguments, and whether a result is right on it."""
+def _or_nothing(method):
+    """What fails on values that nobody foresaw says nothing: an explanation is worth less than the check."""
 
-    def __init__(self, args, metric, expected, was_right=False):
-        self.args, self.metric, self.expected, self.was_right = args, metric, expected, was_right
+    @functools.wraps(method)
+    def told(*args):
+        try:
+            return method(*args)
+        except Exception:
+            return None
+
+    return told
+
+
+class Case:
+    """One draw: its arguments, the expected result, and that of the student as the metric admits it, if it does."""
+
+    def __init__(self, args, metric, expected, result=None):
+        self.args, self.metric, self.expected, self.result = args, metric, expected, result
+        self.was_right = result is not None and metric.equal(result, expected)
 
     def keep(self, found):
         """Whether what a changed function gave, in a tuple, is right; None stands for one that failed."""
@@ -34,7 +49,6 @@ class Case:
             return bool(self.metric.equal(found[0], self.expected))
         except Exception:  # a result of a kind that no metric foresees
             return False
-
 
     def admit(self, found):
         """The result of a changed function as the metric takes it; None where it does not."""
@@ -65,27 +79,28 @@ class Case:
         except Exception:  # of a result that no metric foresees
             return []
         if len(off) > 1:
-            return [d.what for d in off if d.within]
-        r, e = np.asarray(result, dtype=float), np.asarray(self.expected, dtype=float)
-        if r.shape != e.shape or not 0 < r.ndim < 3 or r.shape[-1] > ENTRIES or not isinstance(self.metric, metrics.Numbers):
+            return [d.what for d in off if d.within and d.what.startswith("the ")]
+        if not isinstance(self.metric, metrics.Numbers) or not 0 < np.ndim(self.expected) < 3:
             return []
+        r, e = np.asarray(result, dtype=float), np.asarray(self.expected, dtype=float)
+        told = [k for k in range(min(e.shape[-1], ENTRIES)) if not np.isin(e[..., k], (0.0, 1.0)).all()]
         entries = "entry" if r.ndim == 1 else "column"
-        return [f"{entries} {k} (counted from 0)" for k in range(r.shape[-1]) if _same(r[..., k], e[..., k])]
+        return [f"{entries} {k} (counted from 0)" for k in told if _same(r[..., k], e[..., k])]
 
 
 class Search:
     """Looks for one change that mends a student's function."""
 
-    def __init__(self, written, names, cases, results, more, seconds):
-        """`results` of the cases as arrays; `more()` gives further cases, on which what was found is tried once more;
-        `seconds` for each kind of change.
+    def __init__(self, written, names, cases, more, seconds):
+        """`more(kind of change)` gives further cases, on which what was found is tried once more; `seconds` for each
+        kind.
         """
         self.written, self.names, self.more, self.seconds = written, names, more, seconds
-        order = sorted(range(len(cases)), key=lambda k: cases[k].was_right)
-        self.cases, self.results = [cases[k] for k in order], [results[k] for k in order]
+        self.cases = sorted(cases, key=lambda case: case.was_right)
+        self.results = [None if case.result is None else rerun.numeric(case.result) for case in self.cases]
         self.values = [written.trace(case.args, seconds) for case in self.cases]
-        self.admitted = [None if r is None else r for r in self.results]
 
+    @_or_nothing
     def words(self):
         """What is wrong where, from the likeliest kind of change to the least; None where nothing mends the result."""
         return self.code_words(range(WORTH)) or self.value_words() or self.code_words(range(WORTH, 9))
@@ -165,11 +180,12 @@ class Search:
 
     # Changes that mend a part, or leave a simple difference
 
+    @_or_nothing
     def partly_words(self):
         """A change of the code that leaves a simple difference, or makes a part of the result right on all draws."""
         plans = [("code", k) for k, (rank, *_) in enumerate(self.written.changes) if rank < WORTH]
-        begun, best = time.thread_time() - self.written.spent, None
-        right = [case.right_parts(result) for case, result in zip(self.cases, self.admitted)]
+        begun, best = time.thread_time() + self.written.spent, None
+        right = [case.right_parts(case.result) for case in self.cases]
         for start in range(0, len(plans), BATCH):
             batch = plans[start : start + BATCH]
             for plan, better in zip(batch, self.written.results(batch, *self._first(right[0]))):
@@ -192,7 +208,7 @@ class Search:
         found = []
         for case in self.cases:
             kept = self.written.results([plan], case.args, self.seconds, case.admit)
-            if kept != [None] and kept:
+            if kept and kept[0] is not None:
                 found.append(kept[0])
         if len(found) < len(self.cases):
             return None
@@ -213,6 +229,7 @@ class Search:
 
     # Values of the solution
 
+    @_or_nothing
     def given_words(self, solution):
         """The smallest part whose value, taken from the solution, mends the result; and how the two differ."""
         if solution is None:
@@ -261,6 +278,7 @@ class Search:
 
     # What agrees with the solution
 
+    @_or_nothing
     def passed_words(self, solution):
         """A value on the way that is the right result already, though it is not what is returned."""
         results = [q for q in solution.distinct if solution.is_result[q]] if solution else []
@@ -269,6 +287,7 @@ class Search:
                 return f"{self._where(k)}, stands the right result, but something else is returned"
         return None
 
+    @_or_nothing
     def agreement_words(self, solution):
         """How far the values on the way are those of the solution, and the first that is none of them."""
         if solution is None:
@@ -310,6 +329,13 @@ class Search:
             return ""
         are, them = ("are", "them") if len(codes) > 1 else ("is", "it")
         return f", though {' and '.join(codes)} in it {are}: look at what is done with {them}"
+
+
+@_or_nothing
+def search(function, names, cases, more, seconds):
+    """A `Search` for what is wrong in a function; None where its code cannot be read again."""
+    written = rerun.written(function)
+    return written and Search(written, names, cases, more, seconds)
 
 
 def value_relation(mine, theirs, named):
@@ -367,6 +393,7 @@ def _changes(function, value, others):
     return np.isfinite(new).all() and not _same(new, value)
 
 
+@_or_nothing
 def of_solution(exercise, cases, seconds):
     """The solution's values on the way; None where it is not at hand."""
     found = slips.solved(exercise)
