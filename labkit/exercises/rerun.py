@@ -26,7 +26,10 @@ PATIENCE = 5  # times as many steps as the function itself takes may a changed o
 STEPS = 2000  # ... and so many more
 MOST = 800  # changes of the code that are made
 AXIS = ", along the last axis)"
-OPAQUE = {"locals", "globals", "vars", "eval", "exec", "super", "breakpoint"}
+OPAQUE = {"locals", "globals", "vars", "eval", "exec", "super", "breakpoint"}  # what code says of itself
+OUTSIDE = {"open", "write", "write_text", "write_bytes", "touch", "mkdir", "unlink", "remove", "rename", "savetxt"}
+OUTSIDE |= {"save", "savez", "tofile", "dump", "to_csv", "system", "run", "Popen", "sendto", "send", "connect"}
+UNREAD = ast.Global | ast.Nonlocal | ast.Yield | ast.Await  # in a function that is not run again
 
 
 class TooLong(BaseException):
@@ -60,7 +63,8 @@ def _read(function):
     if not isinstance(node, ast.FunctionDef) or again.co_code != code.co_code or again.co_names != code.co_names:
         return None
     names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
-    if names & OPAQUE or any(isinstance(n, ast.Global | ast.Nonlocal | ast.Yield | ast.Await) for n in ast.walk(node)):
+    names |= {n.attr for n in ast.walk(node) if isinstance(n, ast.Attribute)}  # what may write files stays as it is
+    if names & (OPAQUE | OUTSIDE) or any(isinstance(n, UNREAD) for n in ast.walk(node)):
         return None
     ast.increment_lineno(module, code.co_firstlineno - 1)
     return _bare(node), {code.co_firstlineno + k: line for k, line in enumerate(text.splitlines())}

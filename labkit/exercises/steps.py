@@ -98,7 +98,11 @@ class Search:
         self.written, self.names, self.more, self.seconds = written, names, more, seconds
         self.cases = sorted(cases, key=lambda case: case.was_right)
         self.results = [None if case.result is None else rerun.numeric(case.result) for case in self.cases]
-        self.values = [written.trace(case.args, seconds) for case in self.cases]
+        self.values, begun = [], time.thread_time() + written.spent
+        for case in self.cases:
+            if time.thread_time() + written.spent - begun > seconds:
+                raise TimeoutError("a function so slow is not run again and again")
+            self.values.append(written.trace(case.args, seconds))
 
     @_or_nothing
     def words(self):

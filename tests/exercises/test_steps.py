@@ -106,7 +106,8 @@ def test_running_again_leaves_arguments_globals_and_the_function_alone():
 
 
 @pytest.mark.parametrize(
-    "function", [lambda a: a, np.sin, typed("return eval('a')"), typed("global c\nc = 1\nreturn a"), len, 3]
+    "function",
+    [lambda a: a, np.sin, typed("return eval('a')"), typed("global c\nc = 1\nreturn a"), typed("open(a)"), len, 3],
 )
 def test_what_cannot_be_read_again_is_left_alone(function):
     assert rerun.written(function) is None
@@ -119,11 +120,22 @@ def test_values_in_place_of_others_keep_their_kind():
     assert rerun._like([1.0, 2.0], np.ones(2)) == [1.0, 1.0]
 
 
+def told_of(id, body, arguments):
+    item = next(c for c in session.chapters() if c.name == "01-frames")[id]
+    return item.judge(typed(body, id, arguments), rng=np.random.default_rng(0)).text
+
+
 def test_the_value_that_is_not_right_is_found_by_that_of_the_solution():
-    item = next(c for c in session.chapters() if c.name == "01-frames")["invert"]
-    body = "out = np.eye(4)\nout[:3, :3] = T[:3, :3].T\nout[:3, 3] = T[:3, 3] @ T[:3, :3].T\nreturn out"
-    outcome = item.judge(typed(body, "invert", "T"), rng=np.random.default_rng(0))
-    assert "in line 4, `T[:3, 3] @ T[:3, :3].T`: this value is not right, though" in outcome.text
+    body = "x = a / np.linalg.norm(a)\nz = np.cross(x, b)\nz = z / np.linalg.norm(z)\n"
+    said = told_of("gram_schmidt", f"{body}return np.column_stack([x, b / np.linalg.norm(b), z])", "a, b")
+    assert "in line 5, `b / np.linalg.norm(b)`: this value is not right" in said
+
+
+def test_of_two_slips_the_first_is_told_with_what_is_left():
+    said = told_of(
+        "invert", "R = T[:3, :3]\nout = T.copy()\nout[:3, :3] = R.T\nout[:3, 3] = T[:3, 3] @ R.T\nreturn out", "T"
+    )
+    assert "`T[:3, 3] @ R.T`: the factors of one product `@` are exchanged. With this changed, the rotation is" in said
 
 
 def test_how_two_values_differ():
