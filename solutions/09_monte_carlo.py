@@ -605,6 +605,8 @@ def hunt_4(weigh):
 # tiny constant, some die. Ours keeps the cloud, skips the scan, and says so.
 
 # %% break-it-code
+suite, rng = SensorSuite(building), np.random.default_rng(5)
+motion = particles.odometry_motion(**printed.example_noise())
 lost = ranges.copy()
 lost[0] = scanner.r_max
 plain = sensors.weigh_beams(suite.ranges, lost, bearings, 0.2, scanner.r_max,
@@ -613,8 +615,7 @@ mixture = sensors.weigh_beams(suite.ranges, lost, bearings, 0.2, scanner.r_max)
 for name, weigh in (("plain", plain), ("mixture", mixture)):
     near = mcl.MonteCarloLocalizer(pose + rng.normal(0, 0.05, (500, 3)), motion)
     step = near.correct(weigh, rng)
-    print(f"{name:8} all weights zero: {step.all_zero}   scan used: "
-          f"{not step.all_zero}")
+    print(f"{name:8} all weights zero: {step.all_zero}   used: {not step.all_zero}")
 try:
     particles.normalize_weights(np.full(5, -np.inf))
 except ValueError as refusal:

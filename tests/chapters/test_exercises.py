@@ -198,21 +198,54 @@ def test_the_question_of_a_prediction_stands_before_its_cell(chapter):
         text = cell.text if cell.kind == "markdown" else text
 
 
-def asked_in(chapter):
-    """The ids of a chapter's items in the order of its notebook, and those in sections whose heading says further."""
-    order, further, level, ids = [], [], None, {item.id for item in chapter.items}
+def with_further(chapter):
+    """The cells of a chapter's source, each with whether the heading it stands under says further."""
+    level = None
     for cell in source.read(session.SOLUTIONS / f"{chapter.notebook}.py"):
         if cell.kind == "markdown":
             for depth, words in re.findall(r"^(#+) (.*)", cell.text, re.MULTILINE):
                 if level is None or len(depth) <= level:
                     level = len(depth) if re.search(r"\bfurther\b", words, re.IGNORECASE) else None
-        elif "student" not in cell.tags:
+        yield cell, level is not None
+
+
+def asked_in(chapter):
+    """The ids of a chapter's items in the order of its notebook, and those in sections whose heading says further."""
+    order, further, ids = [], [], {item.id for item in chapter.items}
+    for cell, beyond in with_further(chapter):
+        if cell.kind == "code" and "student" not in cell.tags:
             for groups in re.findall(r'ex\.predict\(\s*"(\w+)"|ex\.(\w+)\b', cell.text):
                 id = "".join(groups)
                 if id in ids and id not in order:
                     order.append(id)
-                    further += [id] if level else []
+                    further += [id] if beyond else []
     return order, further
+
+
+def names_of(text):
+    """The names a cell binds, and those it reads, wherever in it."""
+    nodes = list(ast.walk(ast.parse(text)))
+    bound = {n.id for n in nodes if isinstance(n, ast.Name) and not isinstance(n.ctx, ast.Load)}
+    bound |= {n.name for n in nodes if isinstance(n, ast.FunctionDef | ast.ClassDef)}
+    bound |= {
+        (a.asname or a.name).split(".")[0] for n in nodes if isinstance(n, ast.Import | ast.ImportFrom) for a in n.names
+    }
+    bound |= {n.arg for n in nodes if isinstance(n, ast.arg)}
+    return bound, {n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+
+
+@pytest.mark.parametrize("chapter", CHAPTERS, ids=lambda c: c.name)
+def test_the_core_of_a_chapter_needs_nothing_from_what_goes_further(chapter):
+    """Whoever leaves the sections called further out meets no name that only they define."""
+    core, elsewhere = set(), set()
+    for cell, beyond in with_further(chapter):
+        if cell.kind == "code" and "student" not in cell.tags:
+            bound, read = names_of(cell.text)
+            if beyond:
+                elsewhere |= bound
+            else:
+                core |= bound
+                assert not (read & elsewhere) - core, f"{cell.id} reads {sorted((read & elsewhere) - core)}"
 
 
 @pytest.mark.parametrize("chapter", CHAPTERS, ids=lambda c: c.name)

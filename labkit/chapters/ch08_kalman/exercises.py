@@ -992,13 +992,6 @@ CHAPTER = Chapter(
                 "return P @ C.T @ np.linalg.inv(C @ P @ C.T + cov_z)`",
             ),
             mistakes=[
-                *(
-                    Mistake(
-                        _never_corrected(n),
-                        "The correction is missing in your loop, cov = (I - K C) cov: this is the gain of a filter that has never measured before.",
-                    )
-                    for n in (100, 200, 300, 500, 1000, 2000, 3000, 5000)
-                ),
                 Mistake(
                     lambda A, C, Q, R: kalman.steady_state(A, C, Q, R).gain.T,
                     "This is the transpose: the gain turns m numbers into n states, (n, m).",
@@ -1044,6 +1037,13 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda A, C, Q, R: steady_state_gain(A, C, Q, R)[:, 0],
                     "This is the first column alone. K is a matrix, shape (n, m), also where it has one column.",
+                ),
+                *(
+                    Mistake(
+                        _never_corrected(n),
+                        "The correction is missing in your loop, cov = (I - K C) cov: this is the gain of a filter that has never measured before.",
+                    )
+                    for n in (100, 200, 300, 500, 1000, 2000, 3000, 5000)
                 ),
             ],
         ),
