@@ -22,6 +22,7 @@ REASONS = {
     errno.EMFILE: "too many files are open",
     errno.ENAMETOOLONG: "the name is too long",
 }
+HELD = (32, 33)  # what Windows says of a file that another program has open, and of a part of one that it has locked
 
 
 class Refusal(Exception):
@@ -68,6 +69,8 @@ def _refuse(words):
 
 def sentence(error):
     """What the operating system refused, in a sentence that names the file."""
+    if getattr(error, "winerror", None) in HELD:
+        return f"{error.filename or 'A file'}: another program has it open. Close it there, and run this again."
     reason = REASONS.get(error.errno) or error.strerror or str(error)
     return f"{error.filename or 'A file or what is printed'}: {reason}."
 

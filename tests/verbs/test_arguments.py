@@ -37,6 +37,20 @@ def test_what_the_system_refuses_is_a_sentence(number, said, capsys):
     assert capsys.readouterr().err == said + "\n"
 
 
+def test_a_file_that_another_program_has_open_is_said_to_be(capsys, tmp_path, monkeypatch):
+    """Windows, emulated: such a file can be neither replaced nor removed."""
+
+    class Held(PermissionError):
+        winerror = 32
+
+    def held(path, *_):
+        raise Held(errno.EACCES, "The process cannot access the file", str(path))
+
+    monkeypatch.setattr(os, "replace", held)
+    assert arguments.run(lambda folder: notebook_copies.give(folder), tmp_path / "workbook") == 1
+    assert "another program has it open. Close it there" in capsys.readouterr().err
+
+
 def test_other_ends(capsys):
     assert arguments.run(raising(arguments.Refusal("so\nand  so")), []) == 1
     assert arguments.run(raising(KeyboardInterrupt()), []) == 130
@@ -55,11 +69,14 @@ def test_every_verb_has_its_module_and_its_line_of_help(capsys):
     assert "There is no verb 'tset'. There are start, update" in capsys.readouterr().err
 
 
-def test_a_console_without_the_letters_gets_others_and_no_traceback():
-    environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
+@pytest.mark.parametrize(
+    ("encoding", "said"), [("ascii", b"\\u2713 \\xfc\n"), ("cp1252", b"\\u2713 \xfc\n"), ("cp437", b"\\u2713 \x81\n")]
+)
+def test_a_console_without_the_letters_gets_others_and_no_traceback(encoding, said):
+    environment = {**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"}
     words = [sys.executable, "-c", "from labkit.verbs.arguments import run; run(lambda _: print('✓ ü'), [])"]
-    told = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True)
-    assert told.stdout == "\\u2713 \\xfc\n" and told.stderr == ""
+    told = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True)
+    assert told.stdout.replace(b"\r", b"") == said and told.stderr == b""
 
 
 @pytest.mark.skipif(os.name == "nt", reason="pipes end otherwise on Windows")
