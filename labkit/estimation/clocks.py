@@ -64,7 +64,7 @@ def sample_stream(time, T, when, max_gap=None):
     ValueError
         Wrong shapes, fewer than two samples, a time that does not increase.
     """
-    time, T, when = as_finite(time, "time"), as_transforms(T, "T"), as_finite(when, "when")
+    time, T, when = as_finite(time, "time"), as_transforms(T, "T"), as_shape(when, "when", "n")
     if T.ndim != 3 or len(T) < 2 or time.shape != T.shape[:1]:
         raise ValueError(f"time and T must have shapes (k,) and (k, 4, 4) with k >= 2, got {time.shape} and {T.shape}")
     if (np.diff(time) <= 0).any():

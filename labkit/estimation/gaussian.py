@@ -76,6 +76,7 @@ def chi_square_quantile(probability, dof):
     Returns
     -------
     limit : float or array
+        Infinite for the probability 1.
 
     Raises
     ------
@@ -141,6 +142,8 @@ def cut_axes(cov, longest):
         A wrong shape, a limit that is not positive.
     """
     cov = as_finite(cov, "cov")
+    if not cov.ndim:
+        raise ValueError("cov must have shape (..., n, n), got ()")
     cov, longest = as_covariances(cov, "cov", cov.shape[-1]), as_positive_number(longest, "longest")
     values, axes = np.linalg.eigh(cov)
     return (axes * np.minimum(values, longest**2)[..., None, :]) @ np.swapaxes(axes, -1, -2)

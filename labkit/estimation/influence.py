@@ -82,6 +82,8 @@ def shares(jacobian):
         Between 0 and k; they add up to p.
     """
     J = as_shape(jacobian, "jacobian", "n", "k", "p")
+    if not J.size:
+        raise ValueError(f"jacobian must hold numbers, got shape {J.shape}")
     return np.einsum("nki,ij,nkj->n", J, inverse_normal(J), J)
 
 

@@ -348,7 +348,7 @@ def steady_state(A, C, cov_v, cov_z):
     cov_v = as_shape(as_covariances(cov_v, "cov_v", n), "cov_v", n, n)
     cov_z = as_shape(as_covariances(cov_z, "cov_z", m), "cov_z", m, m)
     try:
-        before = linalg.solve_discrete_are(A.T, C.T, cov_v, cov_z)
+        before = linalg.solve_discrete_are(A.T, C.T, _symmetric(cov_v), _symmetric(cov_z))
     except np.linalg.LinAlgError as error:
         raise ValueError(f"the filter has no steady state: {error}") from None
     gain = np.linalg.solve(C @ before @ C.T + cov_z, C @ before).T

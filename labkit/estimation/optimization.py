@@ -782,9 +782,9 @@ def next_radius(radius, length, gain, max_radius):
 
     Source: thesis, section 6.1.6.
     """
-    radius, length, gain = as_finite(radius, "radius"), as_finite(length, "length"), as_floats(gain, "gain")
-    max_radius = as_floats(max_radius, "max_radius")
-    fit_together(radius=radius.shape, length=length.shape, gain=gain.shape)
+    radius, length, gain = as_positive(radius, "radius"), as_nonnegative(length, "length"), as_floats(gain, "gain")
+    max_radius = as_positive(max_radius, "max_radius")
+    fit_together(radius=radius.shape, length=length.shape, gain=gain.shape, max_radius=max_radius.shape)
     on_rim = length >= (1 - 1e-9) * radius
     wider = np.where((gain > 0.75) & on_rim, np.minimum(2 * radius, max_radius), radius)
     return np.where(gain < 0.25, 0.25 * length, wider)[()]

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from ..checks import as_count, as_generator, as_positive
+from ..checks import as_count, as_generator, as_positive, fit_together
+from ..documented import documented, unchecked
 from ..localization import odometry
 from ..localization.particles import as_noisy_control, as_weights
 
@@ -16,19 +17,20 @@ def sample_motion(states, u, dt, rng, cov_u, model="midpoint"):
     """
     states, u, root = as_noisy_control(states, u, cov_u)
     dt, model = as_positive(dt, "dt"), odometry.as_model(model)
-    noise = root @ normal_pairs(as_generator(rng), states[..., 0].size)
+    noise = root @ unchecked(normal_pairs)(as_generator(rng), states[..., 0].size)
     v, omega = (u[:, None] + noise).reshape(2, *states.shape[:-1])
-    length, turn = odometry.chord(v, omega, dt, model)
+    length, turn = unchecked(odometry.chord)(v, omega, dt, model)
     t = np.tan(0.5 * (states[..., 2] + turn))
     square = t * t
     length /= 1 + square
-    moved = np.empty(states.shape)
+    moved = np.empty((*fit_together(states=states.shape[:-1], dt=dt.shape), 3))
     np.add(states[..., 0], length * (1 - square), out=moved[..., 0])
     np.add(states[..., 1], 2 * length * t, out=moved[..., 1])
     np.add(states[..., 2], omega * dt, out=moved[..., 2])
     return moved
 
 
+@documented
 def normal_pairs(rng, n):
     """Independent standard normal numbers as points of the plane, which is quicker than one by one.
 
@@ -39,6 +41,7 @@ def normal_pairs(rng, n):
     ----------
     rng : numpy.random.Generator
     n : int
+        At least 0.
 
     Returns
     -------
