@@ -332,3 +332,35 @@ def test_a_row_may_be_wrong_in_the_smaller_channel_alone():
         ),
     )
     assert not kept[4] and not kept[9] and 5e-4 < reached[0] < 1e-3 and 0.5 < reached[1] < 1.0
+
+
+@pytest.mark.parametrize("n", [12, 32, 33])
+def test_proposals_turn_every_so_many_row_both_ways_about_all_axes(n):
+    """18 turns of each of the rows 0, n // 16, 2 (n // 16), ..., each of which still sees what the model says."""
+    T_BF, T_ST = readings(n)
+    x_S = T_ST[:, :3, 3]
+    center = (T_BF @ T_FS @ np.concatenate([x_S, np.ones((n, 1))], axis=1)[..., None])[:, :3, 0].mean(0)
+    rows = np.arange(0, n, max(n // 16, 1))
+    poses, J = own_data.SphereModel(T_BF, x_S).proposals((T_FS, center))
+    assert poses.shape == (18 * len(rows), 4, 4) and J.shape == (18 * len(rows), 3, 9)
+    seen = np.repeat(x_S[rows], 18, axis=0)
+    np.testing.assert_allclose(
+        (poses @ T_FS @ np.concatenate([seen, np.ones((len(seen), 1))], axis=1)[..., None])[:, :3, 0],
+        np.broadcast_to(center, (len(seen), 3)),
+        atol=1e-9,
+    )
+    assert len(own_data.PivotModel(T_BF).proposals((np.ones(3), center))[0]) == 18 * len(rows)
+    assert len(own_data.HandEyeModel(T_BF, T_ST).proposals((T_FS, T_BT))[0]) == 18 * len(rows)
+
+
+def test_three_points_on_a_line_give_way_to_the_widest_triangle(monkeypatch):
+    nominal = np.array(
+        [[500.0, 400, 300], [510, 400, 300], [520, 400, 300], [500, 430, 300], [500, 400, 320], [530, 0, 0]]
+    )
+    T = pose(exp_so3([0.2, 0.1, -0.4]), np.array([10.0, 20.0, 30.0]))
+    model = own_data.FrameModel(nominal, nominal @ T[:3, :3].T + T[:3, 3])
+    rows = np.array([[0, 1, 2], [0, 3, 4], [0, 3, 5]])  # a line, a triangle, the widest
+    asked, real = [], own_data.fit_frame
+    monkeypatch.setattr(own_data, "fit_frame", lambda a, b: asked.append(a) or real(a, b))
+    model._solve(rows)
+    np.testing.assert_array_equal(asked[0], nominal[[[0, 3, 5], [0, 3, 4], [0, 3, 5]]])

@@ -106,3 +106,12 @@ def test_the_overlap_is_the_time_both_cover():
     assert part.overlap == pytest.approx(time_b[279] - time_b[100] - 0.3, abs=0.1)
     both = clock_offset(time_a, T_a, time_b, T_b)
     assert both.overlap == pytest.approx(min(time_a[-1], time_b[-1] - 0.4) - (time_b[0] - 0.4) - 0.3, abs=0.1)
+
+
+def test_the_fewest_samples_that_can_be_aligned():
+    """Twice twelve blocks of steps behind the 0.3 s over which a turn is measured."""
+    time_a, T_a, time_b, T_b = streams(2, 0.0)
+    few = 24 + 9  # of 0.033 s; ten are behind the 0.3 s
+    with pytest.raises(ValueError, match="at least 24 steps"):
+        clock_offset(time_a, T_a, time_b[: few - 12], T_b[: few - 12])
+    assert abs(clock_offset(time_a, T_a, time_b[: few + 60], T_b[: few + 60]).offset) < 0.05

@@ -431,6 +431,8 @@ def test_a_search_that_is_stuck_has_arrived_only_where_nothing_is_promised(gradi
     point = SimpleNamespace(x=np.array([1.0]), cost=1.0, gradient=np.array([gradient]), curvature=np.array([[1.0]]))
     assert opt._stuck(point, np.array([1e-17])) == ("no step lowers the cost, down to rounding", converged)
     assert opt._stuck(point, np.array([1e-3])) == ("", False)
+    point.cost = 1e9  # whose rounding is 1e-7: now both promise nothing
+    assert opt._stuck(point, np.array([1e-17]))[1] == (0.5 * gradient**2 < 8 * 2.3e-16 * 1e9)
 
 
 def test_stationary_means_a_small_gradient_beside_the_largest_curvature():
@@ -481,3 +483,19 @@ def test_the_damping_of_levenberg_marquardt_follows_nielsens_rule():
         expected = max(1 / 3, 1 - (2 * gain - 1) ** 3) if gain > 0 else growth
         growth = 2.0 if gain > 0 else 2 * growth
         assert after / damping == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("run", [opt.levenberg_marquardt, opt.trust_region])
+def test_the_stopping_rule_is_asked_after_accepted_steps_alone(run):
+    """And with the points before and after the step."""
+    asked = []
+
+    def low(before, after):
+        asked.append((before.x, after.x))
+        return "low" if after.cost < 1e-3 else ""
+
+    trace = run(rosen_residual, rosen_jacobian, [-1.9, 2.0], stop=low)
+    assert trace.converged and trace.reason == "low" and not trace.accepted.all()
+    assert len(asked) == trace.accepted.sum()
+    pairs = zip(trace.x[:-1][trace.accepted], trace.x[1:][trace.accepted])
+    assert all(np.array_equal(asked[k], pair) for k, pair in enumerate(pairs))

@@ -52,6 +52,16 @@ def test_equals_it_where_little_or_nothing_is_certain(n):
     np.testing.assert_allclose(unseen.cov[-1, -1, -1], 1 + 0.1 * len(Z))  # what is not seen grows, settled gain or not
 
 
+@pytest.mark.parametrize("n", [2, 3])
+def test_equals_it_where_every_state_moves_every_other(n):
+    """A full transition, turning and slightly damped, and a sensor that sees a bit of everything."""
+    rng = np.random.default_rng(n)
+    turn = np.linalg.qr(rng.normal(size=(n, n)))[0]
+    _, _, x0, cov0, cov_v = system(n)
+    assert np.abs(turn).min() > 0.05
+    assert_equal(Z, 0.97 * turn, rng.uniform(0.5, 1, (1, n)), [[0.04]], x0, cov0, cov_v=cov_v)
+
+
 def test_equals_it_on_single_precision_and_whole_numbers():
     A, C, x0, cov0, cov_v = (part.astype(np.float32) for part in system(2))
     found = assert_equal(Z.astype(np.float32), A, C, np.float32([[0.04]]), x0, cov0, cov_v=cov_v)

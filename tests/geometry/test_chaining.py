@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from labkit.documents.lab_sheet import printed as lab_sheet
 from labkit.geometry import chaining
 from labkit.geometry.frames import pose, relative, rotation_angle
-from labkit.geometry.lie import exp_se3, log_se3
+from labkit.geometry.lie import exp_se3, exp_so3, log_se3
 from labkit.tables import DATA
 
 
@@ -284,3 +284,16 @@ def test_polygon_stands_on_a_circle_of_its_size(n):
     origins = np.array([chaining.chain(links[:k])[:3, 3] for k in range(1, n + 1)])
     np.testing.assert_allclose(np.linalg.norm(origins - origins.mean(0), axis=1), 150.0, rtol=1e-12)
     np.testing.assert_allclose(np.linalg.norm(np.diff(origins, axis=0), axis=1), 300 * np.sin(np.pi / n), rtol=1e-12)
+
+
+def test_a_loop_that_misses_by_half_a_turn_has_no_nearest_way_back():
+    """Up to a thousandth of a radian short of it the closure is distributed."""
+    axis = np.array([0.6, 0.0, 0.8])
+    for short, refused in ((1.5e-3, False), (0.5e-3, True)):
+        links = pose(exp_so3(np.outer([0.5, 0.5], (np.pi - short) * axis)), np.eye(3)[:2])
+        if refused:
+            with pytest.raises(ValueError, match="half a turn has no nearest way back"):
+                chaining.distribute_closure(links)
+        else:
+            closed = chaining.distribute_closure(links)
+            np.testing.assert_allclose(closed[0] @ closed[1], np.eye(4), atol=1e-9)

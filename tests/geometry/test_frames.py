@@ -264,3 +264,10 @@ def test_the_quick_look_at_a_stack_passes_nothing_that_a_single_pose_fails(shear
                 as_transforms(poses, "T")
     else:
         assert as_transforms(T, "T") is T and as_transforms(T[2], "T").shape == (4, 4)
+
+
+def test_a_pose_moves_by_a_turn_of_its_own_axes_and_a_shift_of_its_origin():
+    T = frames.pose(Rotation.from_rotvec([0.3, -0.4, 1.0]).as_matrix(), [1.0, 2.0, 3.0])
+    found = frames.moved(T, [0.1, 0.0, -0.2, 10.0, -20.0, 5.0])
+    np.testing.assert_allclose(found[:3, :3], T[:3, :3] @ Rotation.from_rotvec([0.1, 0.0, -0.2]).as_matrix())
+    np.testing.assert_allclose(found[:3, 3], [11.0, -18.0, 8.0])

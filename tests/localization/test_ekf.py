@@ -231,3 +231,11 @@ def test_gate_of_the_association_is_the_quantile_of_the_noise(off):
     z = np.array([10.0, 0.0]) + np.outer([0.99 * limit, 1.01 * limit], off)
     found = ekf.associate(np.zeros(3), np.zeros((3, 3)), z, [[10.0, 0.0]], 0.1, 0.02, probability=0.95)
     assert found.tolist() == [0, -1]
+
+
+def test_nearest_compares_the_places_where_the_readings_lie():
+    """Without noise, from a turned pose, every reading lies on its own landmark."""
+    x, cov = np.array([1.0, -2.0, 2.1]), np.diag([0.01, 0.01, 1e-4])
+    z = ekf.measurement(x, LANDMARKS)
+    every = np.arange(len(LANDMARKS))
+    np.testing.assert_array_equal(ekf.associate(x, cov, z, LANDMARKS, 0.1, 0.02, by="nearest"), every)

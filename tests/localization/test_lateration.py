@@ -170,3 +170,11 @@ def test_the_search_stops_after_so_many_steps():
     away = [np.hypot(*(end.position - [3.0, 4.0])) for end in ends]
     assert away[0] > away[1] > away[2] > away[3] and ends[3].converged and 3 < ends[3].iterations < 50
     assert away[0] < np.hypot(*(far - [3.0, 4.0]))
+
+
+def test_the_first_intersection_lies_left_of_the_way_between_the_centers():
+    """A 3-4-5 triangle over the base, and its mirror image under it; turned around when the centers are."""
+    found = lateration.circle_intersections([[0.0, 0.0], [5.0, 0.0]], [3.0, 4.0])
+    np.testing.assert_allclose(found, [[1.8, 2.4], [1.8, -2.4]], atol=1e-12)
+    found = lateration.circle_intersections([[5.0, 0.0], [0.0, 0.0]], [4.0, 3.0])
+    np.testing.assert_allclose(found, [[1.8, -2.4], [1.8, 2.4]], atol=1e-12)

@@ -495,3 +495,26 @@ def test_a_clock_may_begin_anywhere():
     )
     assert time_offset(time + 1000.0, curve, late) == pytest.approx(time_offset(time, curve, late), abs=1e-9)
     assert time_offset(time, curve, late) == pytest.approx(0.043, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", ["slow", "middle", "fast"])
+def test_motions_are_about_as_quick_as_the_report_says(name):
+    """Its table gives what each speed reaches; the way is ours, so a tenth more or less is left to it."""
+    printed = read_table("tracker/motions.csv", text=("motion",))
+    row = list(printed["motion"]).index(name)
+    time, q = simulation.robot_motion(name, 250)
+    v, w = speeds(time, forward_kinematics(TX40.dh, q) @ T_FE)
+    assert v.max() / 1000 == pytest.approx(printed["v_high"][row], rel=0.1)
+    assert w.max() == pytest.approx(printed["w_high"][row], rel=0.1)
+
+
+def test_a_shifted_stream_lies_on_the_lines_between_its_samples():
+    """Uneven steps, shifts of parts of a step and of several; the ends hold on."""
+    rng = np.random.default_rng(3)
+    time = np.cumsum(rng.uniform(0.01, 0.05, 30))
+    T = some_poses(rng, 30)
+    for offset in (0.013, -0.031, 0.2, -0.4):
+        when = np.clip(time + offset, time[0], time[-1])
+        found = shift_time(time, T, offset)
+        expected = np.stack([np.interp(when, time, T[:, k, 3]) for k in range(3)], axis=1)
+        np.testing.assert_allclose(found[:, :3, 3], expected, atol=1e-9)
