@@ -623,7 +623,6 @@ def thirty_one_poses():
         space = Scene(left, radius=520, title="residuals at their flanges, x 8", unit="mm")
         items = draw.cell(space, RADIUS)
         stems, chosen, yardstick = draw.residual_bars(right, 31)
-        rms = right.text(0.98, 0.97, "", transform=right.transAxes, ha="right", va="top")
 
         def update(state, result):
             target, T_BF, k = result["target"], result["T_BF"], result["pose"] - 1
@@ -644,9 +643,8 @@ def thirty_one_poses():
             draw.set_bars(stems, result["lengths"])
             chosen.set_data([k + 1], [max(result["lengths"][k], 0.08) * 1.5])
             yardstick.set_data([0, 32], [result["rms"]] * 2)
-            rms.set_text(f"rms {result['rms']:.2f} mm\nmedian {result['median']:.2f} mm")
 
-        return [*space.artists, stems, chosen, yardstick, rms], update
+        return [*space.artists, stems, chosen, yardstick], update
 
     return Stage(
         "31 poses and their residuals",

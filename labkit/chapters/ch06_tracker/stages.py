@@ -378,16 +378,14 @@ def two_axes():
         space = Scene(left, radius=1.3)
         picture = draw.RotationAxes(space, 1.0)
         stems, markers = draw.singular_values(right)
-        words = left.text(0.0, 1.0, "", transform=left.transAxes, va="top", linespacing=1.4, fontsize=9)
+        words = left.text(0.0, 1.0, "", transform=left.transAxes, va="top", fontsize=9)  # one line: the sphere is near
 
         def update(state, result):
             picture.set(result["axes"], pose(X_TRUE[:3, :3], np.zeros(3)), result["found"], result["free"])
             space.draw(state["view"])
             draw.set_singular_values(stems, markers, result["singular_values"])
-            words.set_text(
-                f"median error {_two(result['error_deg'])} deg, {_two(result['error_mm'])} mm\npredicted "
-                + (f"{_two(deg)} deg rms" if (deg := result["predicted_deg"]) < 180 else "without limit")
-            )
+            limit = f"{_two(deg)} deg rms" if (deg := result["predicted_deg"]) < 180 else "without limit"
+            words.set_text(f"predicted error {limit}")
 
         return [*space.artists, stems, markers, words], update
 
