@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from scipy.stats import chisquare, norm
+from scipy.stats import binom, chisquare, norm
 
+from labkit.chapters.ch09_monte_carlo import exercises as ch09
 from labkit.exercises import session
 from labkit.exercises.engine import CORRECT, NOT_YET, RAISED
 from labkit.localization import maps, mcl, odometry, particles
@@ -282,3 +283,16 @@ def test_a_test_that_is_too_strict_is_told_which_correct_function_it_rejects():
         )
 
     assert "counts scatter" in judge("hunt_1", exact).text
+
+
+def test_chance_refuses_a_right_roulette_less_than_once_in_a_million_checks():
+    """By the laws: binomial shares, the variance of a variance of binomial counts (its excess kurtosis is -0.2)."""
+    shares = 0.0
+    for weights in ch09.WEIGHTS:
+        n = 2000 // len(weights) * len(weights)
+        for p in weights / weights.sum():
+            low, high = np.ceil(n * (p - ch09.SHARE_OFF)) - 1, np.floor(n * (p + ch09.SHARE_OFF))
+            shares += binom.cdf(low, n, p) + binom.sf(high, n, p)
+    std = 2.5 * np.sqrt(2 / 599 - 0.2 / 600)
+    half = norm.cdf((ch09.HALF_VARIES - 2.5) / std)
+    assert shares + half < 1e-6, (shares, half)

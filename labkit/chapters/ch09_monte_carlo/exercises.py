@@ -760,13 +760,18 @@ def _valid(resample, rng):
     return found + "." if isinstance(found, str) else None
 
 
+WEIGHTS = (np.array([0.1, 0.7, 0.1, 0.1, 0.0]), np.array([0.5, 0.25, 0.15, 0.1]), np.array([3.0, 1.0]))
+SHARE_OFF = 0.06  # of 2000 draws: by the binomial law a right roulette is farther off in one of some million checks
+HALF_VARIES = 1.8  # 600 counts of variance 2.5: five standard deviations of their own variance below it
+
+
 def _proportional(resample, rng):
-    for weights in (np.array([0.1, 0.7, 0.1, 0.1, 0.0]), np.array([0.5, 0.25, 0.15, 0.1]), np.array([3.0, 1.0])):
+    for weights in WEIGHTS:
         found, expected = _draws(resample, weights, rng, 2000 // len(weights)), weights / weights.sum()
         if isinstance(found, str):
             return found + "."
         k = int(np.argmax(np.abs(found - expected)))
-        if abs(found[k] - expected[k]) > 0.06:
+        if abs(found[k] - expected[k]) > SHARE_OFF:
             return (
                 f"with the weights {weights.tolist()} index {k} gets {100 * found[k]:.0f} % of the draws "
                 f"instead of {100 * expected[k]:.0f} %."
@@ -788,7 +793,7 @@ def _spins_are_independent(resample, rng):
             "binomial). Each spin needs its own."
         )
     half = float(counts[:, :5].sum(1).var())
-    if half < 1.8:
+    if half < HALF_VARIES:
         return (
             f"the spins are not independent: the draws from one half of the wheel vary by {half:.1f} instead of 2.5. "
             "Does each spin start where the last one ended?"
