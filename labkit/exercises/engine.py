@@ -210,7 +210,8 @@ class _Trial:
         self.spent += _seconds() - started
         self.printed = self.printed or run.printed
         if run.error is not None:
-            return self._named_by_failing(run.error, args) or self._raised(run, args)
+            named = self._named_by_failing(run.error, args)
+            return named or self._mended(self._raised(run, args), args, metric, expected)
         if run.changed:
             names = ", ".join(f"`{name}`" for k, name in enumerate(self._names(args)) if k in run.changed)
             return self.outcome(NOT_YET, f"your function changes its argument {names} in place: work on a copy.")
@@ -335,6 +336,15 @@ class _Trial:
             for args, metric, pair in zip(self.inputs, self.metrics, self.pairs)
         ]
         return own_steps.search(self.function, self._names(self.inputs[0]), drawn, self._fresh_cases, SEARCHING)
+
+    def _mended(self, outcome, args, metric, expected):
+        """What was raised, with the change of the student's code that gives the right result, if one does."""
+        if outcome.status != RAISED or metric is None or metric is not self.exercise.metric:
+            return outcome
+        drawn = [own_steps.Case(args, metric, expected), *self._fresh[:2]]
+        search = own_steps.search(self.function, self._names(args), drawn, self._fresh_cases, SEARCHING)
+        words = search and search.words()
+        return replace(outcome, text=f"{outcome.text}\n{words[0].upper()}{_closed(words[1:])}") if words else outcome
 
     @functools.cached_property
     def _fresh(self):

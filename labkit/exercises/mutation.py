@@ -202,7 +202,8 @@ def _changed(node, names):
 
 def _operation(node, names):
     kind = type(node.op)
-    for other in OTHERS.get(kind, ()):
+    one = isinstance(node.right, ast.Constant) and node.right.value == 1  # n * 1 for n + 1 is a term left out
+    for other in () if one and kind in (ast.Add, ast.Sub) else OTHERS.get(kind, ()):
         words = f"with {SIGNS.get(other, 'another sign')} where {SIGNS.get(kind, 'another sign')} belongs"
         yield 0, words, ast.BinOp(node.left, other(), node.right)
     if kind in (ast.Sub, ast.Div, ast.MatMult):

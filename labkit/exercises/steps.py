@@ -217,7 +217,7 @@ class Search:
         if len(found) < len(self.cases):
             return None
         words = relations.difference_words(self.cases[0].metric, self._pairs(found), (), True)
-        if words:
+        if words and not self._are_given(found):
             return words
         parts = [case.right_parts(result) for case, result in zip(self.cases, found)]
         if any(not set(before) <= set(after) for before, after in zip(right, parts)):
@@ -227,6 +227,12 @@ class Search:
         if not come or len(come) > 4:
             return None
         return f"{' and '.join(come)} {'come' if len(come) > 1 else 'comes'} out right, though not all"
+
+    def _are_given(self, results):
+        """Whether results are but one of the arguments."""
+        drawn = [(rerun.numeric(result), case.args) for result, case in zip(results, self.cases)]
+        columns = [[(r, rerun.numeric(args[i])) for r, args in drawn] for i in range(len(self.names))]
+        return any(all(r is not None and a is not None and _same(r, a) for r, a in column) for column in columns)
 
     def _pairs(self, results):
         return [(result, case.expected) for result, case in zip(results, self.cases)]
@@ -288,7 +294,8 @@ class Search:
         results = [q for q in solution.distinct if solution.is_result[q]] if solution else []
         for k in range(len(self.written.places)):
             if any(self._is_value(k, [values[q][1] for values in solution.values]) for q in results):
-                return f"{self._where(k)}, stands the right result, but something else is returned"
+                each = ", a part of it in each round" if any(values[k][0] > 1 for values in self.values) else ""
+                return f"{self._where(k)}, stands the right result{each}, but something else is returned"
         return None
 
     @_or_nothing
@@ -300,6 +307,7 @@ class Search:
         if not known:
             return None
         behind = [k for k in range(known[-1] + 1, len(self.written.places)) if self._is_step(k)]
+        behind = [k for k in behind if not self._is_taken_out(k, solution)]
         names = dict.fromkeys(self._called(k) for k in known if self.written.places[k][2])
         last = f"{self._called(known[-1])} (line {self.written.places[known[-1]][0]})"
         right = f"{', '.join(list(names)[-NAMED:])}" if len(names) > 1 else last
@@ -308,6 +316,11 @@ class Search:
             return told
         line, code, *_ = self.written.places[behind[0]]
         return f"{told}; `{code}` in line {line} is the first behind that is not among them: look there"
+
+    def _is_taken_out(self, k, solution):
+        """Whether this is but a part or the transpose of a value that is right."""
+        *_, code, name, _, first = self.written.places[k]
+        return not name and code.endswith(("]", ".T")) and first < k and self._is_known(k - 1, solution)
 
     def _called(self, k):
         _, code, name, *_ = self.written.places[k]

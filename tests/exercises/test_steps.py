@@ -138,6 +138,11 @@ def test_of_two_slips_the_first_is_told_with_what_is_left():
     assert "`T[:3, 3] @ R.T`: the factors of one product `@` are exchanged. With this changed, the rotation is" in said
 
 
+def test_what_raises_is_told_with_the_change_that_mends_it():
+    outcome = ITEM.judge(typed(RIGHT.replace("range(n)", "range(n + 1)")), rng=np.random.default_rng(0))
+    assert outcome.text.startswith("IndexError") and "line 6, `n + 1`: one term is too many." in outcome.text
+
+
 def test_how_two_values_differ():
     mine, theirs = [np.ones((1, 2, 3))] * 2, [-np.ones((1, 2, 3))] * 2
     assert "right up to its sign" in steps.value_relation(mine, theirs, [{"a": 1.0}] * 2)
