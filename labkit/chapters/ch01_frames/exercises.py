@@ -59,6 +59,7 @@ def kuka_pose(rng, A_deg=(-170, 170), B_deg=(-80, 80)):
 
 A_RANGES = ((-80, 80), (100, 170), (-170, -100))  # deg: both signs of r00, and of r10
 B_RANGES = ((-80, -5), (5, 80), (-80, 80))  # deg: below and above 0 at every check
+NEAR_THE_POLE = (((-170, 170), (86, 89.5)), ((-170, 170), (-89.5, -86)))  # deg: A and C are still two angles
 POINT = "a point has three coordinates"
 POSE = "one pose is one 4x4 matrix"
 
@@ -291,6 +292,14 @@ def _B_along(R, a):
 def _angles_one_by_one(T):
     b = np.arctan2(-T[2, 0], np.hypot(T[0, 0], T[1, 0]))
     return np.array([*T[:3, 3], np.arctan2(T[1, 0], T[0, 0]), b, np.arctan2(T[2, 1], T[2, 2])])
+
+
+def _pole_of_five_degrees(T):
+    """A is set to 0 wherever B is beyond 85 deg, as if all of that were the pole."""
+    xyzabc, R = frames.kuka_from_matrix(T), T[:3, :3]
+    if abs(xyzabc[4]) > np.deg2rad(85):
+        xyzabc[3], xyzabc[5] = 0, np.arctan2(-R[1, 2], R[1, 1])
+    return xyzabc
 
 
 def at_the_pole(sign):
@@ -906,7 +915,7 @@ CHAPTER = Chapter(
             reference=frames.kuka_from_matrix,
             draw=tuple(
                 lambda rng, A_deg=A_deg, B_deg=B_deg: (frames.matrix_from_kuka(kuka_pose(rng, A_deg, B_deg)[0]),)
-                for A_deg, B_deg in zip(A_RANGES, B_RANGES)
+                for A_deg, B_deg in (*zip(A_RANGES, B_RANGES), *NEAR_THE_POLE)
             ),
             fixed={"T": POSE},
             metric=_read_by_kuka(1e-6),
@@ -936,6 +945,12 @@ CHAPTER = Chapter(
                     "Right except at the pole: there rounding can push r20 a hair beyond 1, and its arcsine is NaN. Cut it with "
                     "`np.clip(..., -1, 1)`, or take arctan2 of -r20 and the root of r00² + r10².",
                     id="kuka-arcsine",
+                ),
+                Mistake(
+                    _pole_of_five_degrees,
+                    "Right except near the pole: A may be chosen freely at B = 90 deg alone. Even half a degree beside it A and C "
+                    "are two angles, and np.arctan2 still reads both.",
+                    id="kuka-wide-pole",
                 ),
                 Mistake(
                     _undone(lambda R: np.arctan(R[1, 0] / R[0, 0]), _B_along),
