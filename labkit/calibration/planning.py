@@ -53,8 +53,8 @@ def field_problem(x_S):
         if bad.any():
             name = "|y|" if axis == "y" else axis
             first = values[bad].ravel()[0]
-            poses = "one pose" if bad.sum() == 1 else f"{bad.sum()} poses"
-            return f"in {poses} the sphere lies at {name} = {shown(first, '.1f')} mm, outside {low:g} to {high:g}."
+            poses, at = ("one pose", "at") if bad.sum() == 1 else (f"{bad.sum()} poses", "first at")
+            return f"in {poses} the sphere lies outside {name} = {low:g} to {high:g} mm, {at} {shown(first, '.1f')} mm."
     return None
 
 

@@ -150,6 +150,11 @@ def _axes(order, signs):
 def _sign_or_unit(holds, unit):
     if holds(np.negative):
         return "your result is right up to its sign"
+    if unit not in ("", "deg", "rad", "deg/s", "rad/s") and (holds(np.deg2rad) or holds(np.rad2deg)):
+        factor = "180/pi" if holds(np.deg2rad) else "pi/180"
+        return (
+            f"your result is {factor} times the expected one: is an angle in it in the wrong unit, or converted twice?"
+        )
     if holds(np.deg2rad):
         once_too_often = "your result has been converted to degrees once too often"
         return once_too_often if unit == "deg" else "your result is in degrees where radians are expected"

@@ -130,10 +130,11 @@ def test_the_field_ends_where_it_says(axis, low, high):
         assert planning.field_problem(inside) is None
         outside = inside.copy()
         outside[1, axis] += 0.1 * outward
-        told = f"in one pose the sphere lies at {name} = {abs(outside[1, axis]) if axis == 1 else outside[1, axis]:.1f}"
-        assert planning.field_problem(outside) == f"{told} mm, outside {from_:g} to {to:g}."
+        found = abs(outside[1, axis]) if axis == 1 else outside[1, axis]
+        told = f"the sphere lies outside {name} = {from_:g} to {to:g} mm,"
+        assert planning.field_problem(outside) == f"in one pose {told} at {found:.1f} mm."
         outside[2] = outside[1]
-        assert planning.field_problem(outside).startswith("in 2 poses the sphere")
+        assert planning.field_problem(outside) == f"in 2 poses {told} first at {found:.1f} mm."
 
 
 def test_whether_poses_determine_all_is_judged_on_columns_of_length_one():

@@ -32,6 +32,7 @@ def changed(index, value):
     "change, expected, told",
     [
         (np.negative, VECTORS, "up to its sign"),
+        (np.rad2deg, VECTORS, "180/pi times the expected one: is an angle in it in the wrong unit"),
         (lambda e: e / np.pi, VECTORS, "pi times your result is the expected one"),
         (lambda e: np.sqrt(3) * e, TABLES, "the root of 3 times the expected one"),
         (lambda e: e / 7, TABLES, "1/7 of the expected one"),

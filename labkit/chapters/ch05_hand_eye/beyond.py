@@ -418,7 +418,8 @@ CAD_LENGTH = Value(
     mistakes=[
         Mistake(
             lambda: length_with("calibrated"),
-            "This is the true length, which the calibrated pose gives. Take `cad`.",
+            "This is the true length. The calibrated pose gives it, and so does the CAD pose while the flange keeps its orientation "
+            "(`alike`). Take `cad` with the poses `turned`.",
             id="length-calibrated",
         ),
         Mistake(
