@@ -128,7 +128,7 @@ def as_count(value, name, at_least=1):
 
 def as_whole(value, name, at_least=None):
     """`value` as it is if it is one whole number, not below `at_least`; 3.0 becomes 3."""
-    if not isinstance(value, int | np.integer) or isinstance(value, bool):
+    if not isinstance(value, int | np.integer) or isinstance(value, bool | np.timedelta64):
         number = as_number(value, name)
         if number != int(number):
             raise ValueError(f"{name} must be a whole number, got {shown(number)}")

@@ -146,7 +146,7 @@ def rounding_bound(transforms, half_unit):
     -------
     bound : array, shape (4, 4)
     """
-    links = _links(transforms)
+    links = [as_shape(T, "transforms", 4, 4) for T in _links(transforms)]
     E = np.zeros((4, 4))
     E[:3] = as_positive_number(half_unit, "half_unit")
     bound = np.zeros((4, 4))

@@ -21,7 +21,7 @@ from ..calibration.ax_xb import calibrate_hand_eye
 from ..calibration.hand_eye import calibrate_sphere_target, sphere_in_scanner
 from ..calibration.pivot import calibrate_pivot, cone, touching_poses
 from ..calibration.planning import DOWN, pattern, poses_that_see
-from ..checks import as_count, as_shape
+from ..checks import as_choice, as_count, as_points, as_shape
 from ..documented import documented
 from ..geometry.frames import frame_from_points, invert, moved, pose, transform
 from ..geometry.lie import exp_so3
@@ -396,8 +396,16 @@ def with_errors(cell, job, errors):
     -------
     cell : Cell
     job : Job
+
+    Raises
+    ------
+    ValueError
+        A source that there is not, an error of another shape.
     """
-    e = {name: np.zeros(len(cov)) for name, cov in source_covariances(cell, job).items()} | errors
+    known = source_covariances(cell, job)
+    e = {name: np.zeros(len(cov)) for name, cov in known.items()}
+    for name, error in errors.items():
+        e[as_choice(name, "errors", known)] = as_points(error, name, len(known[name]))
     marks = job.marks + e["marks"].reshape(*e["marks"].shape[:-1], 3, 3)
     return (
         replace(cell, tip=cell.tip + e["tip"], T_FS=moved(cell.T_FS, e["scanner"]),

@@ -279,7 +279,7 @@ def _kind_of(error):
     frames = [f for f in traceback.extract_tb(error.__traceback__) if "/bench/fuzz" not in f.filename]
     if any(f.filename.startswith(str(ROOT / "tests")) for f in frames):
         return "caller's function"
-    if isinstance(error, OSError) and error.filename:
+    if isinstance(error, OSError) and error.filename is not None:
         return "file"
     if not frames or not frames[-1].filename.startswith(str(Path(labkit.__file__).parent)):
         return "foreign"
