@@ -12,6 +12,9 @@ from labkit.chapters.ch02_chaining import stages as chaining
 from labkit.chapters.ch05_hand_eye import stages as hand_eye
 from labkit.chapters.ch06_tracker import stages
 from labkit.chapters.ch09_monte_carlo import stages as monte_carlo
+from labkit.stage import Stage, Toggle, View
+from labkit.stage import scene3d_solids as solids
+from labkit.stage.scene3d import Scene
 
 SMALL = """(canvas) => {
     const small = new OffscreenCanvas(100, 60).getContext("2d");
@@ -126,6 +129,37 @@ def test_python_draws_while_the_context_is_lost_and_the_page_again_when_it_is_ba
         page.locator(".labkit-stage canvas[data-space=true]").wait_for(timeout=10_000)
         assert not bridge.stage._picture.painted
         assert apart(at_rest(page, 0)[1][2], before[2]) < 0.1
+        assert page.complaints == []
+
+
+def two_balls():
+    """A ball and a half shell, which a control mirrors in a plane that changes neither."""
+
+    def scene(fig):
+        space = Scene(fig.subplots(), radius=3, floor=-1.5)
+        profile = [(1.2 * np.sin(a), -1.2 * np.cos(a)) for a in np.linspace(0, np.pi / 2, 9)]
+        bodies = space.body(solids.sphere(1.2)), space.body(solids.turned(profile))
+
+        def update(state, result):
+            for body, place in zip(bodies, (-1.4, 1.4)):
+                T = np.diag([1.0, -1.0 if state["mirrored"] else 1.0, 1.0, 1.0])
+                T[0, 3] = place
+                body.set(T)
+            space.draw(state["view"])
+
+        return space.artists, update
+
+    return Stage("two balls", scene=scene, compute=lambda state: None, fail={"mirrored": True},
+                 controls={"mirrored": Toggle(False)}, view=View(-60, 30))  # fmt: skip
+
+
+def test_a_mirrored_body_shows_its_outside_too():
+    with stage_page(False, 500, 500, 1) as (page, bridge):
+        bridge.show(page, two_balls())
+        _, (covered, _, before) = at_rest(page, 0)
+        page.locator("input[type=checkbox]").check()
+        _, (_, _, after) = at_rest(page, 0)
+        assert covered > 0.05 and apart(before, after) < 0.5
         assert page.complaints == []
 
 

@@ -13,6 +13,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 
+from labkit import live
 from labkit.chapters.ch08_kalman import stages
 from labkit.stage import Choice, Handle, Play, Slider, Stage, Target, Toggle, canvas, style
 from labkit.stage.renderer import Canvas
@@ -232,6 +233,16 @@ def test_strict_raises_too(monkeypatch):
 
 
 # -- outputs
+
+
+def test_a_stage_stands_in_the_page_before_its_stored_picture_is_made(monkeypatch):
+    said = []
+    monkeypatch.setattr(live, "display", lambda bundle, **how: said.append((bundle["text/html"], how.get("update"))))
+    shown = live.Live(segment().widget, "words", lambda: f"drawn after {len(said)}")
+    shown.show()
+    empty, place, stored = said
+    assert empty == (f'<div data-labkit-still="{shown.place}"></div>', False) and shown.place in place[0]
+    assert stored == (f'<div data-labkit-still="{shown.place}">drawn after 2</div>', True)
 
 
 def test_text_is_constant_and_what_is_stored_needs_no_kernel():
