@@ -1,6 +1,6 @@
 """Every Stage in four sizes and two themes, at first and failed: `python tests/browser/contact_sheets.py OUT [NN ...]`.
 
-Writes OUT/NN-light.png, NN-light-failed.png and the same of the dark theme, a row a Stage and a column a size, and
+Writes OUT/NN-light-1.png, NN-light-failed-1.png and the same of the dark theme, a row a Stage and a column a size, and
 names what is cut or does not fit, letters of the picture below 11 CSS pixels, what has no name or no ring, and what
 keys do not reach. Motion is reduced.
 The page is `stage.js` with Python behind it, as everywhere; it needs a Chromium, no JupyterLab.
@@ -31,9 +31,9 @@ SIZES = {  # width and height in CSS pixels, device pixels a CSS pixel
     "half a screen, 900 px": (620, 650, 1),
     "a phone": (360, 640, 2),
 }
-LOOKS = ("light", "light-failed", "dark", "dark-failed")
+LOOKS = ("light", "light-failed", "dark-failed", "dark")  # each is one change from the one before
 SMALLEST = 11  # CSS pixels of letters
-COLUMN, GAP, HEAD = 560, 12, 26  # pixels of a sheet
+COLUMNS, ROWS, GAP, HEAD = (560, 400, 380, 220), 3, 8, 22  # widths in pixels of a sheet, and Stages of one
 COLORS = {False: ("#ffffff", "#1a1a1a"), True: ("#111111", "#e8e8e8")}
 MODEL = """
 window.show = (declaration) => {
@@ -57,8 +57,8 @@ window.show = (declaration) => {
 };
 """
 RESTS = """async () => {
-  for (let calm = 0, last = ""; calm < 4; ) {
-    await new Promise((go) => setTimeout(go, 100));
+  for (let calm = 0, last = ""; calm < 3; ) {
+    await new Promise((go) => setTimeout(go, 110)); // longer in all than a change of theme takes to be noticed
     const { picture } = document.querySelector(".labkit-stage").dataset;
     calm = !window.underway && picture === last ? calm + 1 : 0;
     last = picture;
@@ -141,7 +141,8 @@ def dress(page, dark):
     look = f".labkit-stage {{ --words: {words} !important; --paper: {paper} !important; }}"
     look += f"body {{ margin: 0; background: {paper}; color: {words}; }}"
     theme = f":root {{ color-scheme: {'dark' if dark else 'light'}; --jp-content-font-color1: {words}; }}"
-    page.evaluate("(words) => { document.getElementById('theme').textContent = words; }", look + theme)
+    told = "(words) => { document.getElementById('theme').textContent = words; document.body.dataset.theme = words; }"
+    page.evaluate(told, look + theme)
 
 
 def stages(numbers):
@@ -164,10 +165,10 @@ def shots(found, size, said):
             module = importlib.import_module(f"labkit.chapters.ch{stem}.stages")
             for name in names:
                 stage = getattr(module, name)()
-                for look in LOOKS:
-                    dress(page, look.startswith("dark"))
-                    (stage.make_it_fail if look.endswith("failed") else stage.reset)()
-                    bridge.show(page, stage)
+                dress(page, False)
+                for look, change in zip(LOOKS, (bridge.show, fail, dress, reset)):
+                    change(page, stage if change == bridge.show else True)
+                    page.evaluate(RESTS)
                     picture = page.locator(".labkit-stage").screenshot()
                     made[look, stem, name] = Image.open(io.BytesIO(picture)).convert("RGB")
                     for words in [*page.evaluate(CUT), *page.evaluate(UNHEARD), *small_letters(stage)]:
@@ -175,6 +176,14 @@ def shots(found, size, said):
         for words in page.complaints:
             print("console:", words)
     return made
+
+
+def fail(page, _):
+    page.get_by_role("button", name="Make it fail", exact=True).click()
+
+
+def reset(page, _):
+    page.get_by_role("button", name="Reset", exact=True).click()
 
 
 def small_letters(stage):
@@ -187,16 +196,18 @@ def small_letters(stage):
 def sheet(rows):
     """One picture of [(title, [pictures])], a row each."""
     small = [
-        (title, [p.resize((COLUMN, round(p.height * COLUMN / p.width)), Image.LANCZOS) for p in pictures])
+        (title, [p.resize((w, round(p.height * w / p.width)), Image.LANCZOS) for p, w in zip(pictures, COLUMNS)])
         for title, pictures in rows
     ]
     heights = [HEAD + max(p.height for p in pictures) + GAP for _, pictures in small]
-    whole = Image.new("RGB", (len(SIZES) * (COLUMN + GAP), sum(heights)), "#808080")
+    whole = Image.new("RGB", (sum(COLUMNS) + len(COLUMNS) * GAP, sum(heights)), "#808080")
     pen, top = ImageDraw.Draw(whole), 0
     for (title, pictures), height in zip(small, heights):
-        for column, picture in enumerate(pictures):
-            pen.text((column * (COLUMN + GAP) + 4, top + 6), f"{title}: {list(SIZES)[column]}", fill="white")
-            whole.paste(picture, (column * (COLUMN + GAP), top + HEAD))
+        left = 0
+        for size, picture in zip(SIZES, pictures):
+            pen.text((left + 4, top + 5), f"{title}: {size}", fill="white")
+            whole.paste(picture, (left, top + HEAD))
+            left += picture.width + GAP
         top += height
     return whole
 
@@ -218,7 +229,8 @@ def main():
         made = {size: shots({stem: names}, size, said) for size in SIZES}
         for look in LOOKS:
             rows = [(name, [made[size][look, stem, name] for size in SIZES]) for name in names]
-            sheet(rows).save(options.folder / f"{stem[:2]}-{look}.png")
+            for k in range(0, len(rows), ROWS):
+                sheet(rows[k : k + ROWS]).save(options.folder / f"{stem[:2]}-{look}-{1 + k // ROWS}.png")
     pictures = len(SIZES) * len(LOOKS) * sum(map(len, found.values()))
     print(f"{pictures} pictures, {count} things to look at")
 
