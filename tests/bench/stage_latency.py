@@ -4,7 +4,7 @@
 
 Finds all functions in labkit.chapters.*.stages that return a Stage without arguments, puts them into one notebook,
 starts JupyterLab with fresh settings on a free port, runs all cells, moves each Stage (first handle by arrow keys and
-by mouse; otherwise the first slider, or the view), and prints in milliseconds, per Stage and way of moving it: median
+by mouse; the first slider, the view or the cursor in the picture, and by clicks), and prints in milliseconds, per Stage and way of moving it: median
 and 95th percentile of event to picture; medians of message to answer in the page and of message to answer in the
 kernel; and without a browser, compute with update, and drawing with encoding. P is the time of 1000 products of two
 3x3 matrices at that moment, as in peers.py: where it is well above the smallest of the run, others had the machine.
@@ -35,7 +35,7 @@ FLAGS = [
     "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync",
 ]  # fmt: skip
-TARGET_MS = 50.0
+TARGET_MS, MEDIAN_MS = 50.0, 30.0  # of the 95th percentile, and of the median
 WARM_UP = 4
 
 # the page notes when an event was sent and when the picture after it was drawn: everything between is the latency
@@ -43,7 +43,7 @@ WATCH = """(root) => {
     const stage = root.querySelector(".labkit-stage");
     window.__latencies = []; window.__sent = null;
     const note = () => { if (window.__sent === null) window.__sent = performance.now(); };
-    for (const type of ["keydown", "pointermove"]) root.addEventListener(type, note, true);
+    for (const type of ["keydown", "pointermove", "pointerup"]) root.addEventListener(type, note, true);
     new MutationObserver(() => {
         if (window.__sent !== null) { window.__latencies.push([performance.now() - window.__sent,
             +stage.dataset.answer, +stage.dataset.python]); window.__sent = null;
@@ -207,6 +207,17 @@ def latencies(page, output, events):
     if canvas.count():
         canvas.focus()
         collect("picture", arrow)
+    canvas = output.locator(".labkit-stage canvas[data-click=true]").first
+    if canvas.count():
+        box = canvas.bounding_box()
+
+        def click(k):
+            page.mouse.move(box["x"] + box["width"] * (0.58 + 0.015 * (k % 20)), box["y"] + box["height"] * 0.6)
+            page.evaluate("() => { window.__sent = null; }")
+            page.mouse.down()
+            page.mouse.up()
+
+        collect("click", click)
     return found
 
 
@@ -266,16 +277,20 @@ def main():
                 for way, ms in ((way, ms) for way, ms in found.items() if ms):
                     median, answer, python = np.median(ms, axis=0)
                     high = np.percentile(np.array(ms)[:, 0], 95)
-                    rows.append((high, P))
+                    rows.append((high, P, median))
                     print(
                         f"{module + '.' + name:44s} {way:8s} {len(ms):3d} {median:7.1f} {high:7.1f}"
                         f" {answer:7.1f} {python:7.1f}"
-                        f" {apply:7.1f} {draw:6.1f} {P:5.2f}"
+                        f" {apply:7.1f} {draw:6.1f} {P:5.2f}",
+                        flush=True,
                     )
-            limit = 1.25 * min(speed for _, speed in rows)
-            slow = [speed for high, speed in rows if not high <= TARGET_MS]
-            calm = sum(speed <= limit for speed in slow)
-            print(f"{len(slow)} rows above {TARGET_MS:.0f} ms (95th percentile), {calm} of them at P <= {limit:.2f} ms")
+            limit = 1.25 * min(speed for _, speed, _ in rows)
+            for what, goal, column in (("95th percentile", TARGET_MS, 0), ("median", MEDIAN_MS, 2)):
+                slow = [row[1] for row in rows if not row[column] <= goal]
+                calm = sum(speed <= limit for speed in slow)
+                told = f"{len(slow)} of {len(rows)} rows above {goal:.0f} ms ({what})"
+                print(f"{told}, {calm} of them at P <= {limit:.2f} ms")
+            print(f"middle of the medians {np.median([row[2] for row in rows]):.1f} ms")
         finally:
             browser.close()
             lab.close()
