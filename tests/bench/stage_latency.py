@@ -4,8 +4,9 @@
 
 Finds all functions in labkit.chapters.*.stages that return a Stage without arguments, puts them into one notebook,
 starts JupyterLab with fresh settings on a free port, runs all cells, moves each Stage (first handle by arrow keys and
-by mouse; the first slider, the view or the cursor in the picture, and by clicks), and prints in milliseconds, per Stage and way of moving it: median
-and 95th percentile of event to picture; medians of message to answer in the page and of message to answer in the
+by mouse; the first slider, the view or the cursor in the picture by keys; clicks), and prints in milliseconds, per
+Stage and way of moving it: median and 95th percentile of event to picture; medians of message to answer in the page and
+of message to answer in the
 kernel; and without a browser, compute with update, and drawing with encoding. P is the time of 1000 products of two
 3x3 matrices at that moment, as in peers.py: where it is well above the smallest of the run, others had the machine.
 With --shots also a screenshot of each Stage in the light and the dark theme, wide and narrow.
