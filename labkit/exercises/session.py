@@ -306,29 +306,49 @@ def ask(chapter, item, answer, reveal):
 def _locked_panel(chapter, item, choice, first):
     if first:
         progress.record(chapter.name, item.id, "predicted", answer=choice)
-    unit = f" {item.unit}" if item.unit else ""
-    verdict = "That is what happens." if item.is_right(choice) else f"What happens: {item.answer}{unit}."
-    return Panel(f"{item.id}: locked in", [item.question, f"Your prediction: {choice}{unit}. {verdict}", item.why])
+    return Panel(
+        f"{item.id}: locked in", [item.question, f"{_chosen(item, choice)} {_verdict(item, choice)}", item.why]
+    )
+
+
+def _chosen(item, choice):
+    return f"Your prediction: {choice}{_unit(item)}."
+
+
+def _verdict(item, choice):
+    return "That is what happens." if item.is_right(choice) else f"What happens: {item.answer}{_unit(item)}."
+
+
+def _unit(item):
+    return f" {item.unit}" if item.unit else ""
 
 
 def _question(chapter, item, reveal):
-    """The question with a button for each choice; a click locks it in and puts the figure beneath."""
+    """The question with a button for each choice; a click locks it in and puts the figure beneath, and under it what
+    happens, folded: one can find out by hand first.
+    """
     text = ipywidgets.HTML(Panel(f"{item.id}: predict first", [item.question], TO_DO).html())
     answers = ipywidgets.HBox(layout=ipywidgets.Layout(flex_flow="row wrap"))
     name = f"[predict first: {item.question} {' | '.join(map(str, item.choices))}]".replace(" ]", "]")
     choices = "".join(f"<li>{html.escape(str(choice))}</li>" for choice in item.choices)
-    revealed = []
-    box = Named(
-        [text, answers],
-        name,
-        lambda: text.value + (f"<ul>{choices}</ul>" if answers.children else "".join(t.still() for t in revealed)),
-    )
+    revealed, told = [], ipywidgets.HTML()
+
+    def still():
+        if answers.children:
+            return f"{text.value}<ul>{choices}</ul>"
+        return "".join([text.value, *(thing.still() for thing in revealed), told.value])
+
+    box = Named([text, answers], name, still)
 
     def lock(choice):
-        text.value = _locked_panel(chapter, item, choice, first=True).html()
-        answers.children = []
+        panel = _locked_panel(chapter, item, choice, first=True)
         revealed.extend([reveal()] if reveal else [])
-        box.children = [text, *(thing.widget for thing in revealed)]
+        answers.children = []
+        if revealed:
+            told.value = _folded("What happened?", Panel(_verdict(item, choice), [item.why]))
+            panel = Panel(panel.head, [item.question, _chosen(item, choice)])
+        text.value = panel.html()
+        box.children = [text, *(thing.widget for thing in revealed), told]
         for thing in revealed:
             thing.at_rest.append(box.store)
         box.store()
@@ -339,6 +359,12 @@ def _question(chapter, item, reveal):
         number = ipywidgets.FloatText(description=item.unit or "value", layout=ipywidgets.Layout(width="14em"))
         answers.children = [number, feedback.button("Lock in", lambda: lock(number.value))]
     return box
+
+
+def _folded(summary, panel):
+    """A panel as HTML that opens on a click or by keys."""
+    style = "cursor:pointer;margin:4px;font-size:var(--jp-content-font-size1, inherit)"
+    return f'<details><summary style="{style}">{summary}</summary>{panel.html()}</details>'
 
 
 def _sentence(text):

@@ -19,6 +19,13 @@ CELLS = (
     "ex.invert(lambda T: T)",
 )
 GIMBAL, SWIRL, BASINS, POINTS = range(4)
+ANSWERED = """(number) => {
+    const { top, bottom } = document.querySelectorAll(".labkit-stage")[number].getBoundingClientRect();
+    const seen = document.querySelector(".jp-Notebook .jp-WindowedPanel-outer").getBoundingClientRect();
+    const place = document.activeElement.closest("[data-labkit-live]");
+    return { whole: top >= seen.top - 1 && bottom <= seen.bottom + 1,
+             focus: place !== null && place.querySelector(".labkit-stage") !== null };
+}"""
 MENDED = "Run All makes it live again."
 
 
@@ -36,6 +43,8 @@ def page(address, notebook):
         driver.run_all(page)
         page.locator(".jp-OutputArea-output button", has_text="it does not move").click()
         page.locator(".labkit-stage[data-picture]").nth(POINTS).wait_for(timeout=20_000)
+        page.wait_for_timeout(1000)
+        page.answered = page.evaluate(ANSWERED, POINTS)
         driver.show_notebook_alone(page)
         yield page
 
@@ -125,6 +134,14 @@ def test_keys_draw_as_a_mouse_does(page):
     assert not stage.locator(".cursor").is_visible()
     stage.get_by_role("button", name="Reset").click()
     assert pixels(page, stage) == before
+
+
+def test_an_answer_keeps_the_focus_in_its_place_and_brings_its_whole_figure_into_sight(page):
+    """Right after the click that locked a prediction in."""
+    assert page.answered == {"whole": True, "focus": True}
+    told = page.locator("details", has_text="What happened?")
+    assert told.count() == 1 and not told.evaluate("node => node.open")
+    assert "What happens" not in page.locator(".jp-Notebook:visible").inner_text()
 
 
 def test_handles_that_lie_on_each_other_are_pulled_one_by_one(page):

@@ -754,7 +754,9 @@ def test_a_click_locks_in_and_reveals():
     assert repr(box) == "[predict first: Up or down? up | down]"
     buttons[0].click()
     assert box.children[1].value == "the figure" and Figure.at_rest == [box.store]
-    assert "Your prediction: up" in box.still() and box.still().endswith("<p>its picture</p>")
+    asked, answered = box.still().split("<p>its picture</p>")
+    assert "Your prediction: up" in asked and "That is what happens" not in asked  # one looks first
+    assert answered.startswith("<details><summary") and "That is what happens" in answered
     assert ("98-small", "guess") in progress.solved()
 
 
