@@ -168,11 +168,11 @@ class Bound:
         feedback.show(self._solution())
 
     def starter(self):
-        """Show the cell as it was in the beginning, to be copied."""
+        """Show the cell without an answer, to be copied."""
         feedback.show(self._starter())
 
     def reset(self):
-        """Forget this exercise's progress and hints, and show the cell as it was in the beginning."""
+        """Forget this exercise's progress and hints, and show the cell without an answer."""
         feedback.show(self._start_over())
 
     def _next_hint(self):
@@ -202,7 +202,7 @@ class Bound:
     def _starter(self):
         cell = self._cell()
         code = source.blank(cell) if cell else self._blank_cell()
-        return Panel(f"{self._item.id}: the cell as it was, to be copied", code=code)
+        return Panel(f"{self._item.id}: the cell without an answer, to be copied", code=code)
 
     def _blank_cell(self):
         """The cell of the blank notebook, for an edition without solutions."""

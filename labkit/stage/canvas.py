@@ -135,7 +135,8 @@ class Picture:
         elif self.panels.way == "row":
             width = min(width, WIDEST * height)
         else:
-            height = min(height, width * (max(aspect, SLENDER) if narrow else aspect))
+            slender = SLENDER[self.panels.rows > 1] if narrow else 0.0
+            height = min(height, width * max(aspect, slender))
             width = min(width, MAX_STRETCH * height / aspect)
         self.width, self.height = round(width), round(height)
 
@@ -143,7 +144,7 @@ class Picture:
         """(size of the letters, growth) from the best to the one that always goes: all shrunk alike."""
         if self.panels.way == "column":
             return [(1.0, 0.0), *((share, 1.0) for share in LETTERS)]
-        return [*((share, 0.0) for share in LETTERS if share > least), (least, 0.0)]
+        return [*((share, 0.0) for share in LETTERS if share > least), (least, 0.0), (ROOMY * least, 0.0)]
 
     def _scale(self, letters, ratio):
         self.fig.set_dpi(CSS_DPI * letters * ratio)
@@ -161,6 +162,10 @@ class Picture:
         with style.rc():
             self._lay_out()
             self.canvas.draw()
+            if any(ax.yaxis.label.get_window_extent().x0 < 0 for ax in self.fig.axes if ax.get_ylabel()):
+                self.fig.set_layout_engine("constrained")  # wider numbers have pushed a name out: this once all moves
+                self._lay_out()
+                self.canvas.draw()
         self._backgrounds[self.dark] = self.canvas.copy_from_bbox(self.fig.bbox)
         self.fig.stale = False
 

@@ -14,7 +14,7 @@ from matplotlib.text import Text
 NARROW = 0.68  # of the designed width; narrower, panels stand under each other
 LOW = 0.6  # of the designed height; lower, panels stand beside each other
 PANEL = 0.55, 0.8  # height of a panel that stands under another, as a share of its width: least and most
-SLENDER = 0.8  # height of a single panel where the place is narrow, at most
+SLENDER = 0.8, 1.25  # height of what does not stack where the place is narrow, at most: one row, and several
 ALIKE = 1.4, 2.6  # so many times as large as another panel under it, and beside it, at most
 ROUGH = 2.0  # pixels that two words may share, for their boxes are larger than their letters
 LEAST = 0.35  # of its share of the picture must be left to a panel

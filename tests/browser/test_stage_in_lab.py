@@ -139,7 +139,7 @@ def test_keys_draw_as_a_mouse_does(page):
 def test_an_answer_keeps_the_focus_in_its_place_and_brings_its_whole_figure_into_sight(page):
     """Right after the click that locked a prediction in."""
     assert page.answered == {"whole": True, "focus": True}
-    told = page.locator("details", has_text="What happened?")
+    told = page.locator("[data-labkit-live] details", has_text="What happened?")
     assert told.count() == 1 and not told.evaluate("node => node.open")
     assert "What happens" not in page.locator(".jp-Notebook:visible").inner_text()
 
@@ -204,6 +204,7 @@ def test_printed_lines_wrap_between_words(page):
 
 def test_enlarged_it_fills_the_window_and_escape_leads_back(page):
     stage = figure(page, GIMBAL)
+    pixels(page, stage)  # it has come to rest in the window of this size
     small = stage.locator("canvas:not(.space)").bounding_box()
     stage.get_by_role("button", name="Enlarge").click()
 

@@ -124,3 +124,11 @@ def test_where_the_hessian_is_positive_definite_no_chord_is_crossed():
         inside += result["positive"].all()
         assert result["rise"] < 1e-9 or not result["positive"].all()
     assert 5 < inside < 35
+
+
+def test_the_target_of_four_paths_is_near_a_minimum_and_not_at_a_saddle():
+    stage = stages.four_paths()
+    stage.set(start=wells.extrema()[1].x + 0.05)
+    assert stage.reached and set(stage.result["ends"].values()) == {"global minimum"}
+    stage.set(start=wells.extrema()[2].x)
+    assert not stage.reached

@@ -207,3 +207,10 @@ def test_arena_changes_its_number_of_particles_while_it_runs():
     for count in (20_000, 100, 10_000):
         stage.set(particles=count)
         assert len(drive(stage, "tick")["states"]) == count
+
+
+def test_the_arena_begins_with_an_error():
+    """No picture begins empty: the densest place of the first cloud is an estimate, and a wrong one."""
+    stage = stages.arena()
+    (first,) = stage.result["errors"]
+    assert first == pytest.approx(stage.result["off"]) and first > 0.5 and f"{first:.2f} m off" in stage.caption

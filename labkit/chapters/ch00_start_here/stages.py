@@ -28,7 +28,7 @@ def _caption(points):
     """The three points in words."""
     told = [f"({x:.1f}, {y:.1f})" for x, y in points]
     hint = " At the origin there is nothing to turn." if np.allclose(points[0], 0) else ""
-    return f"p = {told[0]}, turned once {told[1]}, twice {told[2]}.{hint}"
+    return f"p = {told[0]}, turned by {{angle}} deg once {told[1]}, twice {told[2]}.{hint}"
 
 
 def quarter_turns():

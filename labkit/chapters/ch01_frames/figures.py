@@ -153,7 +153,7 @@ def compare_errors(ax):
 
 def set_top(ax, value):
     """Raise or lower the upper limit in few steps, so that the axes are redrawn seldom."""
-    top = min((t for t in TOPS if t > 1.4 * value), default=TOPS[-1])  # the legend has room above the data
+    top = min((t for t in TOPS if t > 1.9 * value), default=TOPS[-1])  # the legend has room above the data
     if ax.get_ylim()[1] != top:
         ax.set_ylim(0, top)
 

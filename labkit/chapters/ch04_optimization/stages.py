@@ -8,7 +8,7 @@ import numpy as np
 from ...documents.thesis import wells
 from ...estimation import optimization as opt
 from ...estimation.convexity import chord, positive_definite
-from ...stage import Choice, Handle, Slider, Stage, Toggle, style
+from ...stage import Choice, Handle, Slider, Stage, Target, Toggle, style
 from . import figures as draw
 
 LEVELS = (-200, -170, -140, -110, -90, -75, -67.58, -60, -50, -40, -30, -22, -16, -12)
@@ -159,6 +159,12 @@ def _four_caption(result):
     )
 
 
+def _all_agree(result):
+    """Whether all four paths end in the same minimum, which one it may be."""
+    ends = set(result["ends"].values())
+    return len(ends) == 1 and ends <= {"local minimum", "global minimum"}
+
+
 def four_paths():
     """Drag the start; compare the four paths, and look at one method's model, radius and step at each iteration."""
 
@@ -196,6 +202,7 @@ def four_paths():
         },
         fail={"start": (1.3, 1.3), "method": "newton", "k": 2},
         because="Newton looks for a place without slope, and a saddle is one: from this start it ends there.",
+        target=Target("a start from which all four end in one minimum", _all_agree),
         describe=_four_caption,
         size=(7.6, 4.6),
     )

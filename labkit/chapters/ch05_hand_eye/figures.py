@@ -79,7 +79,7 @@ def target_board(ax, half, hits):
     (ring,) = ax.plot([], [], color=style.INK, marker="o", markersize=12, markerfacecolor="none", linestyle="none")
     (dots,) = ax.plot([], [], **style.look("measurement", markersize=4))
     (mean,) = ax.plot([], [], **style.look("estimates", markersize=8))
-    ax.legend(loc="upper left")
+    ax.legend(loc="lower left")
     return ring, dots, mean, accuracy, circle
 
 
@@ -164,12 +164,12 @@ class Walks:
 
 def iterations(ax, steps=30):
     """Error of the scanner over the iterations, logarithmic. Returns ((Euler curve, SE(3) curve), the step shown)."""
-    style.axes(ax, "iteration", "rms distance (mm)", "how fast")
+    style.axes(ax, "iteration", "rms distance (mm)")
     ax.set(yscale="log", xlim=(0, steps), ylim=(1e-13, 1e4))
     (here,) = ax.plot([], [], **style.look("guide"))
     (euler,) = ax.plot([], [], label="steps in A, B, C", **style.look("prediction", marker="o", markersize=5))
     (se3,) = ax.plot([], [], label="steps on the pose", **style.look("estimate", marker="D", markersize=5))
-    ax.legend(loc="upper right")
+    style.legend_above(ax, ncols=2, fontsize=8, columnspacing=0.8, handlelength=1.6)
     return (euler, se3), here
 
 
@@ -186,12 +186,12 @@ def start_plane(ax, far=125.0):
 
 def descents(ax, names, steps, low, high):
     """Rms distance over the steps of two methods, those taken back as crosses. Returns (first, second, taken back)."""
-    style.axes(ax, "step", "rms distance (mm)", "how fast")
+    style.axes(ax, "step", "rms distance (mm)")
     ax.set(yscale="log", xlim=(0, steps), ylim=(low, high))
     (first,) = ax.plot([], [], label=names[0], **style.look("estimate", marker="D", markersize=5))
     (second,) = ax.plot([], [], label=names[1], **style.look("prediction", marker="o", markersize=5))
     (back,) = ax.plot([], [], label="taken back", **style.look("rejected", markersize=8, color=style.INK))
-    ax.legend(loc="upper right")
+    style.legend_above(ax, ncols=3, fontsize=8, columnspacing=0.8, handlelength=1.6)
     return first, second, back
 
 

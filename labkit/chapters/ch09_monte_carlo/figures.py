@@ -210,7 +210,7 @@ def error_curve(ax, steps):
     ax.set_yticks([0.01, 0.1, 1, 10], ["0.01", "0.1", "1", "10"])
     ax.minorticks_off()
     ax.axhline(0.3, **style.look("guide"))
-    return ax.plot([], [], **style.look("estimate", linewidth=1.6))[0]
+    return ax.plot([], [], **style.look("estimate", linewidth=1.6, marker="D", markersize=5, markevery=[-1]))[0]
 
 
 class MapForm:

@@ -608,7 +608,8 @@ def start_arena(state):
         "world": building().grid,
         "disks": np.empty((0, 3)),
         "ends": np.empty((0, 2)),
-        "errors": [],
+        "estimate": (estimate := filter_.estimate().pose),
+        "errors": [float(np.hypot(*(estimate - pose)[:2]))],
         "step": None,
         "stroke": None,
         "drawn": 0,
@@ -704,7 +705,7 @@ def compute_arena(state):
     of the steps so far, and the filter's numbers.
     """
     memory = state["memory"]
-    estimate = memory.get("estimate", np.full(3, np.nan))
+    estimate = memory["estimate"]
     return {
         "states": memory["filter"].states,
         "pose": memory["pose"],
@@ -719,7 +720,8 @@ def compute_arena(state):
 
 def _arena_sentence(result):
     if result["step"] is None:
-        return "The particles are everywhere. Press play, or click the picture and use the arrow keys."
+        where = f"The particles are everywhere, and where they happen to be densest is {result['off']:.2f} m off."
+        return f"{where} Press play, or click the picture and use the arrow keys."
     step = result["step"]
     words = f"Off by {result['off']:.2f} m; {step.n_particles} particles worth {step.effective:.0f} equal ones"
     if step.n_particles <= FEW and len(result["errors"]) > SETTLED and result["off"] > 1:
