@@ -5,7 +5,7 @@ a lost Python.
 import driver
 import numpy as np
 import pytest
-from contact_sheets import CUT, UNHEARD, stage_page
+from contact_sheets import CUT, RESTS, UNHEARD, stage_page
 from test_space_in_lab import CONTEXTS, apart, at_rest
 
 from labkit.chapters.ch02_chaining import stages as chaining
@@ -84,6 +84,31 @@ def test_everything_has_a_name_a_ring_and_keys_and_nothing_is_cut(dark):
             assert page.evaluate(UNHEARD) == ["BUTTON has no name"]  # the question can be answered with no
         tree = page.locator(".labkit-stage").aria_snapshot()
         assert 'slider "time"' in tree and 'button "Make it fail"' in tree and 'application "arena' in tree
+        assert page.complaints == []
+
+
+EDITOR = """([dark, paper, words]) => {
+    const colors = `--vscode-editor-background: ${paper}; --vscode-foreground: ${words};`;
+    document.getElementById("theme").textContent = `:root { ${colors} }`;
+    document.body.className = `vscode-${dark ? "dark" : "light"}`;
+}"""
+
+
+def test_the_theme_of_another_editor_is_followed():
+    """A page with the colors and the class of VS Code, and none of JupyterLab's; VS Code itself is not run here."""
+    with stage_page(False, 700, 640, 1) as (page, bridge):
+        for dark, paper, words in ((True, "#1e1e1e", "#cccccc"), (False, "#ffffff", "#3b3b3b")):
+            page.evaluate(EDITOR, [dark, paper, words])
+            if bridge.stage is None:
+                bridge.show(page, chaining.growth())
+            assert driver.soon(page, lambda dark=dark: bridge.stage._picture.dark is dark)
+            page.evaluate(RESTS)
+            corner = page.locator("canvas:not(.space)").evaluate(
+                "node => node.getContext('2d').getImageData(2, node.height - 2, 1, 1).data[0]"
+            )
+            assert corner < 40 if dark else corner > 220
+            told = page.locator(".caption").evaluate("node => getComputedStyle(node).color")
+            assert told == ("rgb(204, 204, 204)" if dark else "rgb(59, 59, 59)")
         assert page.complaints == []
 
 

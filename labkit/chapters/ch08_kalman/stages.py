@@ -399,7 +399,7 @@ def honesty():
             "iterations": Slider(1, 6, 1, label="iterations"),
         },
         fail={"std_prior": 1.0, "std_range": 0.01},
-        because="The distance is linearized a long way from the robot, and so precise a sensor is believed all the same.",
+        because="The distance is linearized far from the robot, and so precise a sensor is believed all the same.",
         presets={"Iterate": {"std_prior": 1.0, "std_range": 0.01, "iterations": 6}},
         describe=_honesty_sentence,
     )
