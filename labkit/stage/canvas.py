@@ -109,10 +109,10 @@ class Picture:
             return
         self._room = room
         width, height, ratio, letters = room
-        if self._words is None:
-            self.draw()
-            self._words = Words(self.fig)
         whole = CSS_DPI * letters * np.array(self.size)
+        if self._words is None and min([width, height] / whole) < 1:
+            self.draw()  # as large as it is so far, its words are where they were designed
+            self._words = Words(self.fig)
         narrow, low = width < NARROW * whole[0], height < LOW * whole[1]
         self.panels.arrange(self.panels.best(narrow, low))
         break_lines(self.fig, narrow, self._moving)
