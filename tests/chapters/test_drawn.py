@@ -812,9 +812,9 @@ def test_soccer_robot_looks_at_the_landmark_it_sees():
 def test_arena_draws_robot_estimate_scan_and_errors():
     stage = at(ch09.arena(), particles=500, t=1.5)
     r = stage.result
-    assert len(r["errors"]) == 3
+    assert len(r["errors"]) == 4  # before the first step, and after three
     assert_drawn(stage, r["states"][:, :2], robot_mark(r["pose"], 0.35), robot_mark(r["estimate"], 0.35))
-    assert_drawn(stage, r["ends"], rays(r["pose"], r["ends"]), np.column_stack([range(3), r["errors"]]))
+    assert_drawn(stage, r["ends"], rays(r["pose"], r["ends"]), np.column_stack([range(4), r["errors"]]))
 
 
 def test_obstacles_are_circles_about_their_places():
