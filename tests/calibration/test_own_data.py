@@ -364,3 +364,17 @@ def test_three_points_on_a_line_give_way_to_the_widest_triangle(monkeypatch):
     monkeypatch.setattr(own_data, "fit_frame", lambda a, b: asked.append(a) or real(a, b))
     model._solve(rows)
     np.testing.assert_array_equal(asked[0], nominal[[[0, 3, 5], [0, 3, 4], [0, 3, 5]]])
+
+
+def test_one_wrong_point_of_five_is_left_out_though_the_search_begins_with_all():
+    """Fewer than six points are not searched for a start: the first fit holds them all, and its distances tell."""
+    rng = np.random.default_rng(5)
+    nominal = rng.uniform(-300, 300, (5, 3))
+    T = pose(exp_so3([0.2, 0.1, -0.4]), np.array([10.0, 20.0, 30.0]))
+    measured = nominal @ T[:3, :3].T + T[:3, 3] + 0.02 * rng.normal(size=(5, 3))
+    measured[3] += [0.0, 0.9, 0.0]  # nine standard deviations
+    model = own_data.FrameModel(nominal, measured, std=(0.1,))
+    assert model.start().all()
+    solution, kept = own_data.majority(model)
+    assert kept.tolist() == [True, True, True, False, True]
+    np.testing.assert_allclose(solution[0], own_data.fit_frame(nominal[kept], measured[kept]))
