@@ -135,6 +135,7 @@ def turn(page):
 
 def figures(page):
     """Each card with a Stage, shown; yields its key."""
+    page.set_default_timeout(120_000)  # beside other work a Stage and its neighbors take their time to be made
     for key in page.evaluate("() => wall.cards.filter((card) => card.stage).map((card) => card.key)"):
         page.evaluate("(key) => { location.hash = key; }", key)
         page.wait_for_function("(key) => wall.card.key === key && wall.now?.key === key", arg=key)

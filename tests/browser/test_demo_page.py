@@ -146,6 +146,9 @@ def test_question_first_then_the_figure_then_what_happened(wall):
     wall.wait_for_selector("#bar.answered")
     assert "There the circle is largest" in wall.locator("#bar .happened").inner_text()
     assert wall.locator("#bar .right").inner_text().endswith("through the center")
+    wall.evaluate("() => { document.querySelector('#bar').style.paddingBottom = '3em'; }")  # as a line of shares would
+    wall.wait_for_function(INSIDE)
+    wall.evaluate("() => { document.querySelector('#bar').style.paddingBottom = ''; }")
 
 
 def test_digits_chapters_overview_theme_and_what_is_not_there(wall):
@@ -195,7 +198,6 @@ def test_three_phones_vote_in_two_rounds(wall):
         assert not phones[0].locator("#answers button").first.is_enabled() or phones[0].wait_for_function(
             "() => !now.open"
         )
-    wall.wait_for_function(INSIDE)  # the shares have taken a line of the figure's room
     shares = [row.inner_text() for row in wall.locator("#cover .bar").all()]
     assert shares[:2] == ["33 % (1)", "67 % (2) second round"]
     with wall.expect_download() as saved:

@@ -113,7 +113,7 @@ class Arena:
         stars = style.look("measurement", marker="*", markersize=7, alpha=0.7)
         (self.seen,) = ax.plot([], [], **stars, label="measured")
         self.artists = [self.seen, self.truth, self.estimate, self.ellipse, self.marks, self.ghost, self.robot]
-        ax.legend(loc="upper left", ncols=2)
+        style.legend_above(ax, ncols=2)
 
     def set(self, truth, estimate, ellipse, landmarks, seen):
         """`truth`, `estimate`: (n, 3); `ellipse`: (m, 2); `landmarks`: (k, 2); `seen`: (j, 2)."""
