@@ -146,9 +146,6 @@ def test_question_first_then_the_figure_then_what_happened(wall):
     wall.wait_for_selector("#bar.answered")
     assert "There the circle is largest" in wall.locator("#bar .happened").inner_text()
     assert wall.locator("#bar .right").inner_text().endswith("through the center")
-    wall.evaluate("() => { document.querySelector('#bar').style.paddingBottom = '3em'; }")  # as a line of shares would
-    wall.wait_for_function(INSIDE)
-    wall.evaluate("() => { document.querySelector('#bar').style.paddingBottom = ''; }")
 
 
 def test_digits_chapters_overview_theme_and_what_is_not_there(wall):
