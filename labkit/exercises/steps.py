@@ -315,7 +315,8 @@ class Search:
         if not behind:
             return told
         line, code, *_ = self.written.places[behind[0]]
-        return f"{told}; `{code}` in line {line} is the first behind that is not among them: look there"
+        first = f"`{code}` in line {line} is the first behind that is not among them"
+        return f"{told}; {first}. Look from there on, unless you go another way than it does"
 
     def _is_taken_out(self, k, solution):
         """Whether this is but a part or the transpose of a value that is right."""
