@@ -786,7 +786,7 @@ class Value(Item):
 
     def _changed(self, metric, answer, expected):
         """Which change of the solution's computation gives it."""
-        return regions.change_words(self, answer, lambda found: metric.equal(found, expected), LOOKING)
+        return regions.change_words(self, answer, lambda found: metric.equal(found, expected), 2 * SEARCHING)
 
     def _made_otherwise(self, answer):
         """Which other number of the same data it is."""

@@ -33,19 +33,36 @@ def change_words(value, answer, is_right, seconds):
     """
     if value.chapter is None:
         return None
-    known = _prepared(value, seconds)
-    if known is None:
+    unchanged, changed = _variants(value, seconds)
+    if unchanged is None or not is_right(unchanged):
         return None
-    function, data = known
+    words = next((words for words, found in changed if _agrees(answer, found)), None)
+    return words and f"this is what a right computation gives {words}"
+
+
+_FOUND = {}  # what `_variants` gave, by notebook and exercise: it does not depend on the answer
+
+
+def _variants(value, seconds):
+    """What the computation gives, and what comes of it with one change after the other, with this in words."""
+    key = value.chapter.notebook, value.id
+    if key not in _FOUND:
+        _FOUND[key] = _computed(_prepared(value, seconds), seconds)
+    return _FOUND[key]
+
+
+def _computed(prepared, seconds):
+    if prepared is None:
+        return None, []
+    function, data = prepared
+    unchanged, changed = None, []
     with contextlib.suppress(guard.TimeLimit), guard.time_limit(seconds):
         unchanged = _run(function, data, contextlib.nullcontext())
-        if unchanged is None or not is_right(unchanged):
-            return None
         for change in mutation.changes(function)[:MOST]:
             found = _run(function, data, change.made())
-            if found is not None and _agrees(answer, found):
-                return f"this is what a right computation gives {change.words}"
-    return None
+            if found is not None:
+                changed.append((change.words, found))
+    return unchanged, changed
 
 
 def _run(function, data, made):
