@@ -22,6 +22,7 @@ import numpy as np
 from ..checks import (
     as_count,
     as_finite,
+    as_instance,
     as_nonnegative,
     as_number,
     as_optional_generator,
@@ -441,6 +442,7 @@ def calibrate_with(fit, T_BF, x_S, target, robust, rng):
     ValueError
         As `calibrate_sphere_target`.
     """
+    as_instance(robust, "robust", bool | np.bool_, "True or False")
     (T_BF, x_S), sample = as_sightings(T_BF, x_S), SAMPLE if target is None else SAMPLE_KNOWN
     fewest = sample + 1 if robust else 4 if target is None else 3
     if len(T_BF) < fewest:

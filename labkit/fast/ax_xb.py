@@ -25,7 +25,7 @@ _I3 = np.eye(3)
 
 def calibrate_hand_eye(T_BF, T_ST, std_rot=None, std_trans=None, robust=False, *, eye="in hand"):
     """Poses of sensor and target from noisy readings: `labkit.calibration.ax_xb.calibrate_hand_eye`."""
-    return calibrate_with(_fit, T_BF, T_ST, std_rot, std_trans, robust, eye)
+    return unchecked(calibrate_with)(_fit, T_BF, T_ST, std_rot, std_trans, robust, eye)
 
 
 def solve_ax_xb(A, B):

@@ -28,7 +28,7 @@ _GENERATORS = skew(_EYE)  # derivatives of a small rotation about x, y, z
 
 def calibrate_sphere_target(T_BF, x_S, target=None, robust=False, rng=None):
     """Scanner on the flange and center of the sphere: `labkit.calibration.hand_eye.calibrate_sphere_target`."""
-    return calibrate_with(_fit, T_BF, x_S, target, robust, rng)
+    return unchecked(calibrate_with)(_fit, T_BF, x_S, target, robust, rng)
 
 
 def _fit(T_BF, x_S, weights, target, max_steps):
