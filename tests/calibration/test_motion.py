@@ -57,3 +57,9 @@ def test_turns_across_the_axes_are_root_mean_squares_whatever_the_weights_add_up
         order = np.argsort(squares.sum() - squares)
         np.testing.assert_allclose(found**2, (squares.sum() - squares)[order], rtol=1e-3)
         np.testing.assert_allclose(np.abs(directions), np.eye(3)[:, order], atol=1e-3)
+
+
+def test_the_angle_between_axes_does_not_hang_on_how_far_they_turn():
+    turns = np.array([[0.3, 0, 0], [0, 1.2, 0], [0.02, 0.02, 0]])
+    found = between_axes(pose(exp_so3(turns), np.zeros((3, 3))), 1)
+    np.testing.assert_allclose(np.rad2deg(found), [90.0, 45.0], atol=1e-6)

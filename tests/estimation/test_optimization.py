@@ -499,3 +499,8 @@ def test_the_stopping_rule_is_asked_after_accepted_steps_alone(run):
     assert len(asked) == trace.accepted.sum()
     pairs = zip(trace.x[:-1][trace.accepted], trace.x[1:][trace.accepted])
     assert all(np.array_equal(asked[k], pair) for k, pair in enumerate(pairs))
+
+
+def test_a_good_step_to_the_rim_doubles_any_radius():
+    assert opt.next_radius(3.0, 3.0, 0.9, 100.0) == 6.0 and opt.next_radius(0.2, 0.2, 0.9, 100.0) == 0.4
+    assert opt.next_radius(3.0, 3.0, 0.9, 5.0) == 5.0 and opt.next_radius(3.0, 2.0, 0.9, 100.0) == 3.0

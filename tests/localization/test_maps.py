@@ -190,3 +190,8 @@ def test_the_nearest_place_on_walls_is_that_of_a_fine_search():
         found = maps.nearest_on_lines(lines, point)
         least = np.hypot(*(along - point).reshape(-1, 2).T).min()
         assert np.hypot(*(found - point)) == pytest.approx(least, abs=1e-5)
+
+
+def test_free_is_neither_occupied_nor_unknown():
+    grid = OccupancyGrid.from_ascii("#..\n..?")
+    assert grid.free.tolist() == [[True, True, False], [False, True, True]]
