@@ -262,8 +262,8 @@ def growth(options):
             page.keyboard.press("PageDown")
             if page.evaluate("() => wall.card.key") == before:
                 page.evaluate("() => { location.hash = wall.cards[0].key; }")
-            page.wait_for_function(
-                "() => !wall.card.stage || document.querySelector('#place .labkit-stage[data-picture]')"
+            page.wait_for_function(  # a truth value: an element handed out here would stay for good, and its pixels
+                "() => !wall.card.stage || !!document.querySelector('#place .labkit-stage[data-picture]')"
             )
             if number % max(1, options.switches // 10) == 0:
                 heap = page.evaluate("() => performance.memory.usedJSHeapSize") / 2**20
