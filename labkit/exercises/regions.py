@@ -6,6 +6,7 @@ values of other exercises being the references; then the computation is run with
 
 import ast
 import contextlib
+import copy
 import functools
 import io
 import warnings
@@ -123,7 +124,7 @@ def _prepared(value, seconds):
     found = _region(value.chapter.notebook, value.id)
     if found is None:
         return None
-    before, function = found
+    before, function = found[0], copy.deepcopy(found[1])
     needed, stored = _names(function)
     known = {item.id: item.reference for item in value.chapter.items if hasattr(item, "draw")}
     try:
