@@ -204,7 +204,8 @@ def test_printed_lines_wrap_between_words(page):
 
 def test_enlarged_it_fills_the_window_and_escape_leads_back(page):
     stage = figure(page, GIMBAL)
-    pixels(page, stage)  # it has come to rest in the window of this size
+    assert driver.soon(page, lambda: stage.locator("canvas:not(.space)").bounding_box()["width"] > 600)
+    pixels(page, stage)  # it has come to rest in the window of this size, after the phone's of the test before
     small = stage.locator("canvas:not(.space)").bounding_box()
     stage.get_by_role("button", name="Enlarge").click()
 
