@@ -131,4 +131,16 @@ def test_the_target_of_four_paths_is_near_a_minimum_and_not_at_a_saddle():
     stage.set(start=wells.extrema()[1].x + 0.05)
     assert stage.reached and set(stage.result["ends"].values()) == {"global minimum"}
     stage.set(start=wells.extrema()[2].x)
-    assert not stage.reached
+    assert not stage.reached and stage.status == ""
+
+
+def test_a_start_without_slope_is_said_to_be_one(monkeypatch):
+    """Whether the gradient is exactly 0 at a stationary point, hangs on rounding: here it is."""
+    flat = lambda of: lambda x, **options: 0 * of(x, **options)  # noqa: E731
+    monkeypatch.setattr(wells, "gradient", flat(wells.gradient))
+    stages._runs.cache_clear()
+    result = stages.four_runs({"start": np.array([0.5, 0.5]), "method": "trust_region", "k": 3})
+    stages._runs.cache_clear()
+    assert result["runs"]["trust_region"].iterations == 0
+    assert not result["step"].any() and result["k"] == 0
+    assert stages._four_caption(result).endswith("Trust region takes no step: there is no slope at its start.")

@@ -121,8 +121,10 @@ def four_runs(state):
     """Traces of all methods from the start, and of the chosen one the model, radius and step at iteration k."""
     runs = _runs(tuple(state["start"].tolist()))
     run = runs[state["method"]]
-    k = min(state["k"], run.iterations - 1)
-    x, step, radius = run.x[k], run.step[k], float(run.radius[k])
+    k = min(state["k"], max(run.iterations - 1, 0))
+    x, step, radius, gain, accepted = run.x[k], np.zeros(2), 0.0, np.nan, True
+    if run.iterations:  # none where the slope vanishes at the start
+        step, radius, gain, accepted = run.step[k], float(run.radius[k]), float(run.gain[k]), bool(run.accepted[k])
     reach = min(radius if np.isfinite(radius) else np.linalg.norm(step), 3.0)
     return {
         "runs": runs,
@@ -131,8 +133,8 @@ def four_runs(state):
         "x": x,
         "step": step,
         "radius": radius,
-        "gain": float(run.gain[k]),
-        "accepted": bool(run.accepted[k]),
+        "gain": gain,
+        "accepted": accepted,
         "contours": model_contours(x, wells.model(state["method"], x), max(1.25 * reach, 0.15)),
         "ends": {name: _end(r) for name, r in runs.items()},
     }
@@ -153,6 +155,8 @@ def _four_caption(result):
     gain = "" if np.isnan(result["gain"]) else f", gain {result['gain']:.2f}"
     taken = "" if result["accepted"] else ", rejected"
     radius = "none" if np.isinf(result["radius"]) else f"{result['radius']:.2f}"
+    if not result["runs"][result["method"]].iterations:
+        return f"{ends}. {_name(result['method'])} takes no step: there is no slope at its start."
     return (
         f"{ends}. Step {result['k'] + 1} of {draw.PATHS[result['method']]['label']}: length "
         f"{np.linalg.norm(result['step']):.2f}, radius {radius}{gain}{taken}."
