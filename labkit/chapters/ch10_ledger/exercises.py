@@ -95,6 +95,41 @@ def _without_zeros(number):
     return number.rstrip("0") if "." in number else number
 
 
+def _significant_digits(counted):
+    """The last of the digits counted, where the first digit that is not 0 stands in the place of the ones."""
+
+    def variant(printed):
+        number, _, exponent = printed.replace(",", ".").partition("e")
+        return 0.5 * 10.0 ** (int(exponent or 0) - len(counted(number.replace(".", "").lstrip("-"))) + 1)
+
+    return variant
+
+
+def _four_digits(printed):
+    return 0.5 * 10.0 ** (np.floor(np.log10(abs(_number(printed)))) - 3)
+
+
+def _only_the_exponent(printed):
+    exponent = printed.partition("e")[2]
+    return 0.5 * 10.0 ** int(exponent) if exponent else half_unit(printed)
+
+
+def _ends_at_the_exponent(printed):
+    """The decimals as the letters behind the point, the exponent's among them; 0.5 without a point."""
+    decimals = printed.replace(",", ".").partition(".")[2]
+    return 0.5 * 10.0 ** -len(decimals)
+
+
+def _hundreds(printed):
+    whole, _, decimals = printed.strip("-").replace(",", ".").partition(".")
+    return 0.5 / 10 ** len(decimals) if decimals else 0.5 * 10 ** (len(whole) - len(whole.rstrip("0")))
+
+
+def _trailing_zeros(printed):
+    """Decimals without the zeros at the end, of the whole text: an exponent is not read."""
+    return 0.5 * 10.0 ** -len(printed.replace(",", ".").rstrip("0").partition(".")[2])
+
+
 def _whole_is_exact(printed):
     return 0.0 if printed.lstrip("-").isdigit() else half_unit(printed)
 
@@ -148,6 +183,16 @@ def _root_of_squares(printed, value, bound, misprint, simulated):
 def _within_a_unit(printed, value, bound, misprint, simulated):
     rule = _simulated_word if simulated else _real_word
     return rule(2 * half_unit(printed) * (1 + 1e-6), abs(value - _number(printed)), bound, misprint)
+
+
+def _relative(printed, value, bound, misprint, simulated):
+    rule = _simulated_word if simulated else _real_word
+    off = abs(value - _number(printed)) / abs(_number(printed))
+    return rule(half_unit(printed) * (1 + 1e-6), off, bound, misprint)
+
+
+def _rounded_to(digits):
+    return lambda p, v, b, m, s: status(p, round(v, digits), b, m, s)
 
 
 def _without_reading_commas(printed, value, bound, misprint, simulated):
@@ -227,6 +272,34 @@ STATUSES = (
     (
         lambda p, v, b, m, s: status(p, round(v, _decimals(p)), b, m, s),
         "You rounded the value first, which moves it by up to half a unit more: compare it as it was computed.",
+    ),
+    (
+        _judged(lambda h, o, b, m: "reproduced" if o <= 2 * h else _real_word(h, o, b, m)),
+        "You call *reproduced* what is off by a whole unit of the last digit. Rounding hides half of it.",
+    ),
+    (
+        _relative,
+        "You divide by the printed number. Half unit and bound are in the unit of the value: compare the difference itself.",
+    ),
+    *(
+        (
+            _rounded_to(digits),
+            "You rounded the value first, always to the same decimals: compare it as it was computed.",
+        )
+        for digits in (2, 3, 1)
+    ),
+    (
+        _judged(
+            _real_word, lambda h, o, b, m: "consistent" if o <= h else "rounding" if o <= h + b else "not computable"
+        ),
+        "A simulation within half unit and bound together is *consistent*: *rounding* is said of published inputs.",
+    ),
+    *(
+        (
+            _judged(_real_word, lambda h, o, b, m, word=word: "consistent" if o <= h + b else word),
+            "The word for a simulation that lands elsewhere is *not computable*, written like this.",
+        )
+        for word in ("not consistent", "inconsistent", "undecided", "unknown")
     ),
     (_within_a_unit, "You compare with a whole unit of the last digit. Rounding hides half of it."),
     (_signed, "A value below the printed one is off as well: take the absolute difference."),
@@ -328,6 +401,32 @@ CHAPTER = Chapter(
                 Mistake(
                     _whole_zeros_do_not_count,
                     "Here all printed digits count, the zeros of -1000 too: its last digit is worth 1.",
+                ),
+                *(
+                    Mistake(
+                        _significant_digits(counted),
+                        "You counted significant digits. What the last digit is worth depends on its place behind the point alone: 86 and 1086 hide the same.",
+                    )
+                    for counted in (lambda digits: digits.lstrip("0"), lambda digits: digits)
+                ),
+                Mistake(
+                    _four_digits,
+                    "You assume four digits for every number. How many were printed is seen in the string alone.",
+                ),
+                Mistake(
+                    _only_the_exponent,
+                    "3.20e3 has two decimals and an exponent: both count, its last digit is worth 10.",
+                ),
+                Mistake(
+                    _ends_at_the_exponent,
+                    "An exponent is not read yet: in 3.20e3 two decimals stand before it, and it shifts the half unit by three places.",
+                ),
+                *(
+                    Mistake(
+                        variant,
+                        "Zeros at the end were printed like any other digit, and an exponent is no decimal: cut off nothing but the exponent, and count it for itself.",
+                    )
+                    for variant in (_hundreds, _trailing_zeros)
                 ),
                 Mistake(_with_the_sign, "Half a unit is a size, without a sign: that of -0,250 is 0.0005."),
                 Mistake(

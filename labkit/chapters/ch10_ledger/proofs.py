@@ -37,7 +37,17 @@ def last_power(x):
     return float(x[0] * x[-1] ** 2 - x[1])
 
 
-FUNCTIONS = (total, product, length, share, last_power)
+def depth(x):
+    """How far the vector reaches below 1: greatest, and flat, where all are 0, and falling with each square."""
+    return float(1 - np.sum(np.square(x)))
+
+
+def shortage(x):
+    """Ten less the product of the first and the square of the last."""
+    return float(10 - x[0] * x[-1] ** 2)
+
+
+FUNCTIONS = (total, product, length, share, last_power, depth, shortage)
 
 
 def printed_inputs(rng, function):
@@ -45,7 +55,9 @@ def printed_inputs(rng, function):
     texts = [f"{rng.uniform(2, 9):.{rng.integers(0, 4)}f}" for _ in range(rng.integers(1, 4))]
     texts.append(f"{rng.uniform(2, 9):.{rng.integers(0, 2)}f}")
     texts = [("-" if rng.random() < 0.3 and function is not share else "") + text for text in texts]
-    return function, [text.replace(".", ",") if rng.random() < 0.2 else text for text in rng.permutation(texts)]
+    return function, [
+        str(text).replace(".", ",") if rng.random() < 0.2 else str(text) for text in rng.permutation(texts)
+    ]
 
 
 INPUTS = tuple(functools.partial(printed_inputs, function=f) for f in FUNCTIONS)
@@ -83,6 +95,42 @@ def _never_put_back(f, printed):
 
 def _through_float(text):
     return half_unit(str(number(text)))
+
+
+def _by_derivative(step):
+    """Half units times the slopes of f, by differences over steps of this size."""
+    return lambda f, printed: (
+        np.abs(np.subtract(*_moves(f, printed, lambda text: step)) / (2 * step)) @ read(printed)[1]
+    )
+
+
+def _signs_left(f, printed):
+    up, down = _moves(f, printed)
+    return np.maximum(up, down).sum()
+
+
+def _one_sign_left(f, printed):
+    up, down = _moves(f, printed)
+    return np.maximum(up, np.abs(down)).sum()
+
+
+def _other_sign_left(f, printed):
+    up, down = _moves(f, printed)
+    return np.maximum(np.abs(up), down).sum()
+
+
+def _relative_moves(f, printed):
+    return _larger(f, printed, lambda text: half_unit(text) * abs(number(text))).sum()
+
+
+def _one_half_for_all(pick):
+    """All numbers moved by the same half unit, the one picked of the list."""
+
+    def variant(f, printed):
+        half = pick([half_unit(text) for text in printed])
+        return _larger(f, printed, lambda text: half).sum()
+
+    return variant
 
 
 BOUND = Exercise(
@@ -154,6 +202,37 @@ BOUND = Exercise(
             lambda f, p: _larger(f, p, _through_float).sum(),
             "float() forgets how many digits were printed. Take the half unit from the string.",
         ),
+        Mistake(_signs_left, "You took the larger gain. A fall can be the larger change: compare absolute values."),
+        *(
+            Mistake(
+                variant,
+                "Of the two changes one is taken with its sign. A fall counts as much as a rise: both need abs().",
+            )
+            for variant in (_one_sign_left, _other_sign_left)
+        ),
+        *(
+            Mistake(
+                _by_derivative(step),
+                "That is the slope times the half unit. Where f is curved the move itself is larger: go the half "
+                "unit up and down.",
+            )
+            for step in (1e-6, 1e-5, 1e-4, 1e-7, 1e-8)
+        ),
+        Mistake(
+            _relative_moves,
+            "You took the half unit as a share of the number. It has the number's own unit: add and subtract it.",
+        ),
+        *(
+            Mistake(
+                _one_half_for_all(pick),
+                "You move all numbers by the same half unit. Each was printed with digits of its own, and has its own.",
+            )
+            for pick in (lambda halves: halves[0], lambda halves: halves[-1], max, min)
+        ),
+        Mistake(
+            lambda f, p: _larger(f, p).max() * len(p),
+            "You took the largest move for every number. Each number moves f by its own amount: add these up.",
+        ),
         Mistake(
             lambda f, p: bound(f, p) / abs(f(read(p).values)),
             "That is a share of the value. The bound has the unit of f.",
@@ -163,7 +242,7 @@ BOUND = Exercise(
             "You added the value. Wanted is how far it can be off.",
         ),
     ],
-    draws=15,
+    draws=3 * len(INPUTS),
 )
 
 
@@ -172,6 +251,34 @@ BOUND = Exercise(
 
 FINE = {"fine": 0.3, "too fine": 0.8}  # units by which an average with one digit more is off
 AWAY = {"edge": -1, "beyond": -2, "far": 2}  # units from the rounded average, to the side it was not rounded to
+
+
+LIMIT = 0.04  # how near a gap at the limit is to what rounding allows, as a share of it
+BEYOND = (1.3, 1.5)  # and one that is beyond, but within the largest half unit
+
+
+def at_the_limit(rng, finer, low, high):
+    """Entries of mixed digits and an average as far away as `low` to `high` times what their rounding allows.
+
+    finer: how many decimals the average has more than the coarsest entry. Beyond 1, some slip must explain the gap;
+    below, some slip would if a little less were allowed, so that whoever allows less names somebody.
+    """
+    while True:
+        decimals, count = int(rng.integers(1, 3)), int(rng.integers(4, 6))
+        digits = decimals + rng.permutation([0, 1, 1, *rng.integers(0, 2, count - 3)])
+        entries = [f"{rng.uniform(2, 60) * rng.choice([-1, 1], p=[0.2, 0.8]):.{d}f}" for d in digits]
+        own = 0.5 * 10.0 ** -(decimals + finer)
+        allowed = sum(map(half_unit, entries)) / count + own
+        mean = sum(map(number, entries)) / count
+        average = f"{mean + rng.choice([-1, 1]) * allowed * rng.uniform(low, high):.{decimals + finer}f}"
+        if low < abs(mean - number(average)) / allowed < high:
+            found = suspects(entries, average)
+            if found or high < 1 and _search(agree=_allow(_a_little_less))(entries, average):
+                return entries, average
+
+
+def _a_little_less(halves, own):
+    return (np.mean(halves) + own) * (1 - LIMIT)
 
 
 def column(rng, slip):
@@ -215,9 +322,30 @@ def _slipped(rng, text, kind):
     return str(rng.choice(far)) if far else f"{-number(text):.{len(text.partition('.')[2])}f}"
 
 
+def _clear(rng, draw):
+    """A column of which no gap, as it is or after a slip, lies at what is allowed to the last bits."""
+    while True:
+        drawn = draw(rng)
+        sides = (lambda halves, own, by=by: (np.mean(halves) + own) * (1 + by) for by in (-1e-7, 1e-7))
+        fewer, more = (_search(agree=_allow(side))(*drawn) for side in sides)
+        if fewer == more:
+            return drawn
+
+
 COLUMNS = tuple(
-    functools.partial(column, slip=slip)
-    for slip in ("two digits swapped", "one digit wrong", "", "average", "sign lost", "mixed", *FINE, *AWAY)
+    functools.partial(_clear, draw=draw)
+    for draw in (
+        *(
+            functools.partial(column, slip=slip)
+            for slip in ("two digits swapped", "one digit wrong", "", "average", "sign lost", "mixed", *FINE, *AWAY)
+        ),
+        *(
+            functools.partial(at_the_limit, finer=finer, low=low, high=high)
+            for finer in (2, 0)
+            for low, high in ((1 - LIMIT, 1 - 1e-3), (1 + 1e-3, 1 + LIMIT))
+        ),
+        functools.partial(at_the_limit, finer=2, low=BEYOND[0], high=BEYOND[1]),
+    )
 )
 
 
@@ -234,11 +362,19 @@ def suspects(entries, average):
     return set(explained_by(printed, lambda d: _agree([d[k] for k in range(len(entries))], d[len(entries)])))
 
 
-def _search(agree=_agree, check=True, slips=single_slips, places=lambda n: range(n + 1), first=False, give=None):
+def _search(
+    agree=_agree,
+    check=True,
+    slips=single_slips,
+    places=lambda n: range(n + 1),
+    first=False,
+    give=None,
+    first_agree=None,
+):
     """A variant of `suspects` that goes another way in one respect."""
 
     def variant(entries, average):
-        if check and agree(entries, average):
+        if check and (first_agree or agree)(entries, average):
             return set()
         found = set()
         for k in places(len(entries)):
@@ -246,12 +382,47 @@ def _search(agree=_agree, check=True, slips=single_slips, places=lambda n: range
                 trial = [*entries, average]
                 trial[k] = other
                 if agree(trial[:-1], trial[-1]):
-                    found.add(give(k, other) if give else k)
+                    found.add(give(k, other, entries) if give else k)
             if first and found:
                 break
         return found
 
     return variant
+
+
+def _printed_there(entries, average):
+    return {[*entries, average][k] for k in suspects(entries, average)}
+
+
+def _slips_pile_up(entries, average):
+    """Every slip is tried on a column in which the slips before it still stand."""
+    x, own = [number(text) for text in entries], number(average)
+    slack = sum(map(half_unit, entries)) / len(entries) + half_unit(average)
+    found = set()
+    if _agree(entries, average):
+        return found
+    for k, text in enumerate(entries):
+        for other in single_slips(text):
+            x[k] = number(other)
+            if abs(np.mean(x) - own) <= slack:
+                found.add(k)
+    return found | {len(x) for other in single_slips(average) if abs(np.mean(x) - number(other)) <= slack}
+
+
+def _average_in_the_mean(entries, average):
+    values = [*map(number, entries), number(average)]
+    slack = sum(map(half_unit, entries)) / len(entries) + half_unit(average)
+    return abs(sum(values) / len(values) - values[-1]) <= slack * (1 + 1e-9) + 1e-12
+
+
+def _over_one_more(entries, average):
+    slack = sum(map(half_unit, entries)) / len(entries) + half_unit(average)
+    return abs(sum(map(number, entries)) / (len(entries) + 1) - number(average)) <= slack * (1 + 1e-9) + 1e-12
+
+
+def _outlier(entries, average, agree):
+    values = np.array([number(text) for text in entries])
+    return set() if agree(entries, average) else {int(np.argmax(np.abs(values - values.mean())))}
 
 
 def _only(kind):
@@ -265,6 +436,41 @@ def _against_the_sum(entries, average):
 
 def _allow(rule):
     return functools.partial(_agree, allowed=rule)
+
+
+TOLERANCES = (
+    (
+        lambda halves, own: max(halves) + own,
+        "You allow the largest half unit. The error of a mean is at most the mean of the half units: add "
+        "them up, divide by their number.",
+    ),
+    (
+        lambda halves, own: halves[0] + own,
+        "You allow the first entry's half unit for all. Each has its own: what they allow together is their mean.",
+    ),
+    (
+        lambda halves, own: min(halves) + own,
+        "You allow the smallest half unit. Each entry has its own: what they allow together is their mean.",
+    ),
+    (
+        lambda halves, own: max(halves) / len(halves) + own,
+        "You count the half unit of one entry only. All may be off at once: add them up before you divide.",
+    ),
+    (
+        lambda halves, own: float(np.sqrt(np.sum(np.square(halves)))) / len(halves) + own,
+        "The root of the sum of squares is for random errors. What rounding allows is the worst case: add "
+        "the half units.",
+    ),
+    (
+        lambda halves, own: float(np.hypot(np.mean(halves), own)),
+        "The root of the sum of squares is for random errors. What rounding allows is the worst case: add "
+        "the half units.",
+    ),
+    (
+        lambda halves, own: (sum(halves) + own) / (len(halves) + 1),
+        "The average's half unit is not divided: its own rounding counts fully, beside the mean of the entries'.",
+    ),
+)
 
 
 SUSPECTS = Exercise(
@@ -323,11 +529,62 @@ SUSPECTS = Exercise(
             "You stop at the first that explains it. Whether another explains it as well is the point.",
         ),
         Mistake(
-            _search(give=lambda k, other: k + 1),
+            _search(give=lambda k, other, entries: k + 1),
             "Positions count from 0 here; the average's is the number of entries.",
         ),
         Mistake(
-            _search(give=lambda k, other: other),
+            _search(give=lambda k, other, entries: k + (k < len(entries))),
+            "Positions count from 0 here; the average's is the number of entries.",
+        ),
+        Mistake(
+            _search(give=lambda k, other, entries: -1 if k == len(entries) else k),
+            "You give the average position -1. It stands behind the entries: its position is their number.",
+        ),
+        *(
+            Mistake(
+                _search(give=give),
+                "You return what is printed at the suspects. Wanted are their positions.",
+            )
+            for give in (
+                lambda k, other, entries: [*entries, len(entries)][k],
+                lambda k, other, entries: [*entries, "average"][k],
+            )
+        ),
+        Mistake(_printed_there, "You return what is printed at the suspects. Wanted are their positions."),
+        Mistake(
+            _slips_pile_up,
+            "The slips you have tried stay in the column: take a fresh copy for each.",
+        ),
+        *(Mistake(_search(agree=_allow(rule)), text) for rule, text in TOLERANCES),
+        *(
+            Mistake(
+                variant,
+                "Your mean of the entries contains the average, which pulls the two together. Compare it with the "
+                "mean of the entries alone.",
+            )
+            for variant in (_search(agree=_average_in_the_mean), _search(agree=_average_in_the_mean, check=False))
+        ),
+        *(
+            Mistake(
+                _search(agree=_over_one_more, first_agree=first),
+                "You divide by one more than there are entries. The mean of n entries is their sum over n.",
+            )
+            for first in (_agree, _over_one_more)
+        ),
+        Mistake(
+            lambda entries, average: set() if _agree(entries, average) else set(range(len(entries) + 1)),
+            "You accuse everybody. Wanted are those of whom one slip makes entries and average agree.",
+        ),
+        *(
+            Mistake(
+                functools.partial(_outlier, agree=agree),
+                "You accuse the number that stands out. A true value may; wanted is whose slip makes entries and "
+                "average agree.",
+            )
+            for agree in (_agree, _allow(lambda halves, own: own))
+        ),
+        Mistake(
+            _search(give=lambda k, other, entries: other),
             "You return what would have to be printed. Wanted are the positions.",
         ),
         Mistake(
