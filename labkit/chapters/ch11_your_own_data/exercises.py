@@ -39,6 +39,20 @@ def some_motions(rng, apart):
     return pose(exp_so3(rng.uniform(0.2, 2.0, (n, 1)) * axes), rng.uniform(-300, 300, (n, 3))), apart
 
 
+def motions_about_one_axis(rng):
+    """Motions about one axis, some of them the other way, of which some cosine comes out beyond 1 in the last bits."""
+    while True:
+        n = int(rng.integers(6, 10))
+        axis = rng.normal(size=3)
+        turns = rng.uniform(0.2, 2.0, n) * np.where(np.arange(n) % 5 < 2, 1, -1)
+        T = pose(exp_so3(turns[:, None] * axis / np.linalg.norm(axis)), rng.uniform(-300, 300, (n, 3)))
+        phi = log_so3(T[:, :3, :3])
+        axes = phi / np.linalg.norm(phi, axis=1, keepdims=True)
+        apart = int(rng.integers(1, 4))
+        if np.abs((axes[apart:] * axes[:-apart]).sum(1)).max() > 1:
+            return T, apart
+
+
 def fitted_line(rng):
     """Residuals of a linear fit of p parameters to n numbers, and its derivative."""
     p = int(rng.integers(2, 5))
@@ -101,6 +115,10 @@ def _axes(T):
 
 def _angle_between(a, b):
     return np.arccos(np.clip((a * b).sum(1) / np.linalg.norm(a, axis=1) / np.linalg.norm(b, axis=1), -1, 1))
+
+
+def _without_clip(T, k):
+    return np.arccos((_axes(T)[k:] * _axes(T)[:-k]).sum(1))
 
 
 def left_out(r, J):
@@ -276,6 +294,12 @@ CHAPTER = Chapter(
             reference=motion.between_axes,
             draw=tuple(functools.partial(some_motions, apart=k) for k in (2, 1, 3)),
             metric=metrics.Numbers(1e-7, "rad"),
+            noisy=(
+                motions_about_one_axis,
+                metrics.Numbers(1e-6, "rad"),
+                "right for axes in all directions, but not for parallel and opposite ones, where a cosine may come out "
+                "as 1.0000000000000002:",
+            ),
             hints=(
                 "The rotation vector of a motion points along its axis. Its length is the angle, which should not matter here.",
                 "Bring the rotation vectors to length 1; the scalar product of two of them is the cosine of the angle between.",
@@ -284,6 +308,8 @@ CHAPTER = Chapter(
                 "return np.arccos(np.clip((axes[apart:] * axes[:-apart]).sum(axis=1), -1, 1))`",
             ),
             mistakes=[
+                Mistake(_without_clip,
+                        "Right, but for parallel or opposite axes a scalar product may come out as 1.0000000000000002, of which arccos is NaN: np.clip it to -1 ... 1."),
                 Mistake(_changed(np.rad2deg), "These are degrees. Inside, angles are radians."),
                 Mistake(_changed(np.cos), "These are the cosines: np.arccos is missing."),
                 Mistake(_changed(lambda a: np.arccos(np.abs(np.cos(a)))),
@@ -327,6 +353,9 @@ CHAPTER = Chapter(
                         "This is the largest of the three coordinates. Asked for is the distance."),
                 Mistake(lambda: float(np.abs(slipped().plain.T[:3, 3] - slipped().T[:3, 3]).sum()),
                         "This is the sum of the three coordinates. A distance is the root of the sum of their squares.", id="slip_cost-555eab"),
+                Mistake(lambda: round(slip_cost(), 1), "This is right as far as it goes, rounded to one decimal: at least 3 digits are needed, so hand over the computed value."),
+                Mistake(lambda: slipped().rms_translation, "This is the rms that the report states of the rows that agree, not how far the mounting moves."),
+                Mistake(lambda: float(np.linalg.norm((invert(slipped().T) @ slipped().plain.T)[:3, :3])), "This is the norm of a rotation matrix, the root of 3 for every rotation. The way is in the last column."),
                 Mistake(lambda: slip_cost() ** 2, "This is the squared distance: a root is missing."),
                 Mistake(lambda: slipped().plain.rms_translation, "This is the rms of the fit to all rows, not where it puts the sensor."),
                 Mistake(lambda: slipped().plain.rms_translation - slipped().rms_translation,
@@ -411,6 +440,8 @@ CHAPTER = Chapter(
                         "Student's factor is right, but the noise is not: divide r^T r by f = n - p, not by n.", id="honest_covariance-0ba31b"),
                 Mistake(_covariance(lambda rr, n, f: rr / f),
                         "This is the covariance for a noise that is known. Yours is estimated: Student's factor f / (f - 2) is missing."),
+                Mistake(_covariance(lambda rr, n, f: rr / (f - 1) * (f - 1) / (f - 3)),
+                        "Your f is one too small: it is n - p. A mean that is taken off would cost one more, but none is taken off here."),
                 Mistake(_covariance(lambda rr, n, f: 1.0), "The noise is missing: this is the covariance for readings of standard deviation 1."),
                 Mistake(_covariance(lambda rr, n, f: np.sqrt(rr / f) * f / (f - 2)), "You multiplied by s. A covariance takes its square."),
                 Mistake(_covariance(lambda rr, n, f: rr / f * np.sqrt(f / (f - 2))),
@@ -449,6 +480,7 @@ CHAPTER = Chapter(
                 Mistake(lambda C, J: np.linalg.inv(C) + J.T @ J, "This is the information. Invert it: asked for is the covariance."),
                 Mistake(lambda C, J: C + J.T @ J, "You added information to a covariance. Invert C first, and the sum in the end."),
                 Mistake(lambda C, J: np.linalg.inv(C + J.T @ J), "You added information to a covariance: the inverse of C is missing inside."),
+                Mistake(lambda C, J: C - J.T @ J, "You took information away from a covariance: their units differ. Invert C, add J^T J, and invert the sum."),
                 Mistake(lambda C, J: C, "Nothing has changed: the reading is missing."),
                 Mistake(lambda C, J: C - C @ J.T @ np.linalg.solve(J @ C @ J.T, J @ C),
                         "You took the reading as free of noise. Whitened, its covariance is I: J C J^T + I."),
@@ -488,6 +520,9 @@ CHAPTER = Chapter(
                 "return int(np.argmin(left))`",
             ),
             mistakes=[
+                Mistake(lambda C, c: next_pose(C, c[:, :1]), "You compare what the first number of each reading leaves. A reading brings all rows of its J."),
+                Mistake(lambda C, c: int(np.linalg.det(c @ C @ np.swapaxes(c, 1, 2)).argmin()),
+                        "You took the reading that can be predicted best. It tells least that is new: compare the determinants of what is left, `with_one_more(C, J)`."),
                 *(Mistake(rule, "Your choice is that of the smallest trace, or of the smallest largest eigenvalue. Among squares of different units the largest unit decides alone: compare determinants.")
                   for rule in (_smallest_trace, _largest_eigenvalue)),
                 Mistake(_largest_derivative, "You took the candidate with the largest derivative. It may well tell what is known already: compute what it leaves."),
