@@ -269,7 +269,7 @@ ex.predict("spread", guess, reveal=stages.drive)
 #
 # The lecture prints the constants, $k_d = (0.02\,\mathrm{m})^2/1\,\mathrm{m}$, $k_\theta = (5°)^2/360°$ and $k_\mathrm{drift} = (2°)^2/1\,\mathrm{m}$, but not where the drive
 # ends. `lecture.circle_drive()` holds them in radians and meters: `drive.controls` (140, 2), `drive.dt`, and `drive.noise` with the three constants by name, to be passed on as `**drive.noise`.
-# Start at the origin and take all steps. (They turn by 336°: the circle does not quite close.)
+# Start at the origin and take all steps with `step_euler`, the model of the lecture. (They turn by 336°: the circle does not quite close.)
 
 # %% end_pose
 drive = lecture.circle_drive()

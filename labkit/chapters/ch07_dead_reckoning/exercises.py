@@ -439,12 +439,13 @@ def _circle(model="euler", **changes):
 
 
 @functools.cache
-def _loop(step=propagate, steps=None, start_cov=0.0, **noise):
-    """The loop over the circle with another step, fewer steps, another covariance at the start or other constants."""
+def _loop(step=propagate, steps=None, start_cov=0.0, at_the_end=False, noise_time=None, **noise):
+    """The loop over the circle with another step, fewer steps, another start or other constants of the noise."""
     drive = lecture.circle_drive()
-    x, cov = np.zeros(3), start_cov * np.eye(3)
+    x, cov = _circle()[0] if at_the_end else np.zeros(3), start_cov * np.eye(3)
     for u in drive.controls[:steps]:
-        x, cov = step(x, cov, u, drive.dt, odometry.control_covariance(u, drive.dt, **(drive.noise | noise)))
+        cov_u = odometry.control_covariance(u, noise_time or drive.dt, **(drive.noise | noise))
+        x, cov = step(x, cov, u, drive.dt, cov_u)
     return x, cov
 
 
@@ -460,6 +461,10 @@ def _wrong_side(x, cov, u, dt, cov_u):
 def _at_new_pose(x, cov, u, dt, cov_u):
     moved = step_euler(x, u, dt)
     return moved, propagate(moved, cov, u, dt, cov_u)[1]
+
+
+def _not_handed_on(x, cov, u, dt, cov_u):
+    return x, propagate(x, cov, u, dt, cov_u)[1]
 
 
 def _exchanged():
@@ -723,6 +728,17 @@ CHAPTER = Chapter(
                 Mistake(
                     _straight(_way, _before, _turn),
                     "The half turn does not belong here, and its sign is wrong: drive along theta.",
+                ),
+                Mistake(
+                    lambda x, u, dt: x + dt * np.array([u[0], u[1], u[1]]),
+                    "v goes into x and omega into y, and the heading into neither: v T cos(theta) and v T sin(theta) are the way.",
+                ),
+                *(
+                    Mistake(
+                        lambda x, u, dt, share=share: x + dt * np.array([u[0], share * u[0], u[1]]),
+                        "The heading does not enter the way: it is v T cos(theta) in x and v T sin(theta) in y.",
+                    )
+                    for share in (1, 0)
                 ),
                 *_slips(_way, _old, "theta"),
             ],
@@ -1350,6 +1366,14 @@ CHAPTER = Chapter(
                     lambda: _loop(_turned_first)[0],
                     "Each step turns first and drives along the new heading. The simplified model drives along the old one.",
                 ),
+                Mistake(
+                    lambda: odometry.drive(np.zeros(3), lecture.circle_drive().controls, 1.0, "euler")[-1],
+                    "Your steps last 1 s. `drive.dt` is 0.1 s.",
+                ),
+                Mistake(
+                    lambda: np.array([0, 0, _circle()[0][2]]),
+                    "The heading is right. The circle does not close: it turns by 336 deg, so the position follows from the steps.",
+                ),
                 Mistake(lambda: _circle()[0] * [1, 1, 0], "The position is right, the heading is missing."),
                 Mistake(
                     lambda: _circle()[0] * [1, -1, -1],
@@ -1387,6 +1411,18 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda: _loop(k_theta=5.0**2 / 360, k_drift=2.0**2)[1],
                     "k_theta and k_drift are in degrees. `drive.noise` holds them in radians.",
+                ),
+                Mistake(
+                    lambda: _loop(_not_handed_on)[1],
+                    "Every step starts at the pose of the start here: hand the pose on as well as the covariance, `x, end_cov = propagate(...)`.",
+                ),
+                Mistake(
+                    lambda: _loop(at_the_end=True)[1],
+                    "This starts where the drive before ended. The pose starts at zeros again, like the covariance.",
+                ),
+                Mistake(
+                    lambda: _loop(noise_time=1.0)[1],
+                    "The control's covariance is that of a step of 1 s. `drive.dt` is 0.1 s, there as well.",
                 ),
                 Mistake(_exchanged, "k_theta and k_drift have changed places."),
                 Mistake(
@@ -1528,6 +1564,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda v, d, L: np.array([v, v / (L * np.tan(d))]),
                     "The tangent is upside down: with straight wheels your car would spin.",
+                ),
+                Mistake(
+                    lambda v, d, L: np.array([v, L * np.tan(d) / v]),
+                    "Speed and wheelbase have changed places: omega = v tan(steering) / wheelbase, and a car that stands does not turn.",
                 ),
                 Mistake(
                     lambda v, d, L: np.array([v, v * np.tan(d)]),

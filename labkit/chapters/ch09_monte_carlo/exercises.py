@@ -150,14 +150,18 @@ def cloud_weights(rng):
     return (rng.exponential(size=rng.integers(20, 40)) ** rng.uniform(0.2, 3) * 50 ** rng.uniform(-2, 1),)
 
 
-def log_weights(rng, level):
-    """Logarithms of weights about this level, one or two of them impossible (-inf)."""
+def log_weights(rng, level, possible=False):
+    """Logarithms of weights about this level, one or two of them impossible (-inf) unless all are `possible`."""
     logs = level + rng.normal(0, 2, rng.integers(6, 15))
-    logs[rng.choice(len(logs), rng.integers(1, 3), replace=False)] = -np.inf
+    if not possible:
+        logs[rng.choice(len(logs), rng.integers(1, 3), replace=False)] = -np.inf
     return (logs,)
 
 
-LOG_WEIGHTS = tuple(functools.partial(log_weights, level=level) for level in (-2000.0, -1.0, 900.0))
+LOG_WEIGHTS = (
+    *(functools.partial(log_weights, level=level) for level in (-2000.0, -1.0, 900.0)),
+    functools.partial(log_weights, level=-2000.0, possible=True),
+)
 
 
 def cycle_of_weights(rng, step):
@@ -199,13 +203,13 @@ def near_the_threshold(rng, side):
     return w, float(particles.effective_size(w) / len(w) * (1 + 0.02 * side))
 
 
-def averages(rng):
-    """w_mean, w_slow, w_fast, alpha_slow, alpha_fast: a drop as often as a rise."""
+def averages(rng, low=False):
+    """w_mean, w_slow, w_fast, alpha_slow, alpha_fast: a drop as often as a rise; low: a share above one half."""
     slow = rng.uniform(0.2, 0.8)
     return (
-        slow * rng.uniform(0.1, 1.9),
+        slow * (rng.uniform(0.1, 0.4) if low else rng.uniform(0.1, 1.9)),
         slow,
-        slow * rng.uniform(0.6, 1.2),
+        slow * (rng.uniform(0.1, 0.35) if low else rng.uniform(0.6, 1.2)),
         rng.uniform(0.02, 0.1),
         rng.uniform(0.2, 0.5),
     )
@@ -1228,6 +1232,24 @@ CHAPTER = Chapter(
                     lambda: 308,
                     "That counts powers of ten, and stops where the *normal* numbers end. Each beam contributes two.",
                 ),
+                Mistake(
+                    lambda: 541,
+                    "That is a whole scan. The product is zero long before its last beam: count until it is.",
+                ),
+                *(
+                    Mistake(
+                        lambda number=number: math.log(number) / math.log(0.01),
+                        "There the *normal* numbers of float64 end (2.2e-308). Smaller ones still exist, with fewer digits, and beams are whole: count on.",
+                    )
+                    for number in (2.2250738585072014e-308,)
+                ),
+                *(
+                    Mistake(
+                        lambda beams=beams: beams,
+                        "That far 0.01 to the power n is no more than lost beside 1. By itself it is a number above zero: it has an exponent of its own.",
+                    )
+                    for beams in (7, 9, 16, math.log(2.220446049250313e-16) / math.log(0.01))
+                ),
                 Mistake(lambda: 323, "That counts powers of ten. Each beam contributes two of them."),
                 Mistake(lambda: 324, "That counts powers of ten. Each beam contributes two of them."),
             ],
@@ -1250,6 +1272,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda l: l.min() + np.log(np.exp(l - l.min()).sum()),
                     "With impossible particles (-inf) among them the smallest logarithm, or the mean, is -inf too, and -inf - (-inf) is nothing. Take out the largest.",
+                ),
+                Mistake(
+                    lambda l: np.abs(l).max() + np.log(np.exp(l - np.abs(l).max()).sum()),
+                    "You took out the largest size. Of -2000 and -2001 that is 2001, and exp(-4001) is zero: take out the largest logarithm as it is, without abs.",
                 ),
                 Mistake(
                     lambda l: np.log(np.exp(l - l.max()).sum()) - l.max(),
@@ -1630,8 +1656,8 @@ CHAPTER = Chapter(
                     "You squared the whole quotient. Squared are the sum above, and each weight below.",
                 ),
                 Mistake(
-                    lambda w: w.sum() ** 2 / w.sum() ** 2,
-                    "Below stands the sum of the squares, (weights ** 2).sum(), not the square of the sum.",
+                    lambda w: 1 / np.square(w / np.linalg.norm(w)).sum(),
+                    "This is 1 for all weights. Divide the square of their sum by the sum of their squares, (weights ** 2).sum().",
                 ),
                 Mistake(
                     lambda w: 1 / np.square(w / w.mean()).sum(), "Divide the weights by their sum, not by their mean."
@@ -1720,6 +1746,10 @@ CHAPTER = Chapter(
                 Mistake(_cycle(due=lambda k, n: False), "The weights are right. You never resample."),
                 Mistake(
                     _cycle(due=lambda k, n: k >= n), "The weights are right. From step n on you resample in every step."
+                ),
+                Mistake(
+                    _cycle(due=lambda k, n: k > n),
+                    "The weights are right. You resample in every step after n: every n-th is meant, step n itself included.",
                 ),
                 Mistake(
                     _cycle(due=lambda k, n: k == n),
@@ -1835,7 +1865,7 @@ CHAPTER = Chapter(
         Exercise(
             "recover",
             reference=recover,
-            draw=averages,
+            draw=(*[averages] * 5, functools.partial(averages, low=True)),
             metric=metrics.Several(
                 metrics.Numbers(1e-9), metrics.Numbers(1e-9), metrics.Numbers(1e-9), names=("share", "w_slow", "w_fast")
             ),
@@ -1899,6 +1929,13 @@ CHAPTER = Chapter(
                         *mcl.recover(m, s, f, a, b)[1:],
                     ),
                     "Limits of the share are the filter's own business: return it as the formula gives it.",
+                ),
+                *(
+                    Mistake(
+                        _share(lambda s, f, low=low, high=high: min(high, max(low, 1 - f / s))),
+                        "Limits of the share are the filter's own business: return it as the formula gives it.",
+                    )
+                    for low, high in ((0.3, 0.5), (0.0, 0.5), (0.0, 0.3), (0.1, 0.3), (0.1, 1.0), (0.3, 1.0))
                 ),
                 *RECOVERIES,
                 Mistake(
