@@ -471,6 +471,14 @@ STATIONS = [
                 id="knock-before",
                 within=6.0,
             ),
+            *(
+                Mistake(
+                    lambda e_trans=e_trans: e_trans,
+                    "This is E_trans itself, in mm. Asked for is the turn of the station that makes it.",
+                    id=f"knock-e-trans-{k}",
+                )
+                for k, e_trans in enumerate((0.802, 0.8))
+            ),
         ],
     ),
 ]
@@ -823,6 +831,16 @@ CELL = [
                 for source in ("scanner", "tip", "marks", "first reading")
             ),
             Mistake(lambda: budget()[1], "This is the total as it is.", id="halved-not"),
+            Mistake(
+                lambda: float(np.sqrt(budget()[1] ** 2 - budget()[0]["tracker"] ** 2 / 4)),
+                "You took away a quarter of its variance. Half of the standard deviation leaves a quarter: three quarters go.",
+                id="halved-quarter",
+            ),
+            Mistake(
+                lambda: float(np.sqrt(budget()[1] ** 2 - budget()[0]["tracker"] / 2)),
+                "From the sum of the squares you took half a standard deviation, millimeters from square millimeters.",
+                id="halved-units",
+            ),
             Mistake(
                 lambda: budget()[0]["tracker"] / 2,
                 "This is the improved share alone. The other five remain: add the squares.",

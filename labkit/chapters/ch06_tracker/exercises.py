@@ -3,6 +3,7 @@
 import functools
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ...calibration import ax_xb
 from ...documents.report.printed import table_d
@@ -11,7 +12,7 @@ from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
 from ...geometry import lie
 from ...geometry.frames import invert, pose, relative, unit_vector
-from ...geometry.lie import exp_so3
+from ...geometry.lie import exp_so3, log_so3
 from ...machines import packet, simulation
 from ...machines.arm import TX40, dh_matrix, forward_kinematics
 from ...machines.log import average_stops, reject_outliers
@@ -409,6 +410,13 @@ def _against_the_readings():
 def _maximum_likelihood():
     T_BF, T_WE = _run_1()
     return ax_xb.calibrate_hand_eye(T_BF, T_WE, robust=True, eye="to hand").T_FT
+
+
+def _aligned():
+    """The rotation that brings the rotation vectors of B nearest to those of A, and the translation that follows."""
+    found = calibrate_mounting(*_run_1())
+    a, b = (log_so3(T[found.kept][1:, :3, :3]) for T in (found.A, found.B))
+    return _mounting(R=Rotation.align_vectors(a, b)[0].as_matrix())
 
 
 def _from_pose_to_pose():
@@ -1125,6 +1133,11 @@ CHAPTER = Chapter(
                     "You took 1.4826 times the mean of the distances. Gross values blow it up; take their median.",
                 ),
                 Mistake(
+                    _keep(np.median, lambda v: 1.4826 * np.median(np.abs(v - v.mean()))),
+                    "The distances inside the spread are taken from the mean, which gross values move: take them from the median.",
+                    id="reject_outliers-mean-inside",
+                ),
+                Mistake(
                     _keep(np.median, _mad),
                     "The factor 1.4826 is missing: the median distance is only 0.67 standard deviations.",
                 ),
@@ -1213,6 +1226,16 @@ CHAPTER = Chapter(
                     "This is the maximum likelihood solution, which comes later. Here the report's method is asked for: your own three functions.",
                 ),
                 Mistake(
+                    _aligned,
+                    "This comes out where the axes of the motions are aligned, by `align_vectors` for instance: a good route with other weights, 0.004 deg away. Asked for is what your `rotation_from_nullvector` and `translation_lsq` give.",
+                    id="mounting-aligned",
+                ),
+                Mistake(
+                    lambda: _mounting(R=np.eye(3)) @ pose(_mounting()[:3, :3], np.zeros(3)),
+                    "The rotation is right, but `translation_lsq` was given the identity: it needs the R just found.",
+                    id="mounting-identity",
+                ),
+                Mistake(
                     _from_pose_to_pose,
                     "This comes out of the motions from each pose to the next. They are shorter, and the report takes all from pose 0.",
                     id="mounting-f9cf46",
@@ -1289,6 +1312,21 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda: _heights().std() / np.sqrt(6),
                     "This is the standard error of the mean. Wanted is the spread of single runs.",
+                ),
+                Mistake(
+                    lambda: np.sqrt(np.sum([np.var([m.T_FE[k, 3] for m in synthetic_mountings()]) for k in range(3)])),
+                    "This is the spread in space, all three coordinates. The height z alone is `mountings[:, 2, 3]`.",
+                    id="spread-space",
+                ),
+                Mistake(
+                    lambda: np.sqrt(np.mean((_heights() - _heights()[0]) ** 2)),
+                    "This is the spread about the first run. A standard deviation is taken about the mean of the six.",
+                    id="spread-first",
+                ),
+                Mistake(
+                    lambda: np.std([m.T_FE[2, 2] for m in synthetic_mountings()]),
+                    "This is an entry of the rotation, `[2, 2]` of each mounting. The height z is `mountings[:, 2, 3]`.",
+                    id="spread-rotation",
                 ),
                 Mistake(
                     lambda: 1000 * np.sqrt(table_d().variance[2]),
