@@ -7,6 +7,7 @@ business of `session`.
 """
 
 import copy
+import dis
 import functools
 import hashlib
 import inspect
@@ -27,7 +28,8 @@ TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws of eac
 MANY_DIGITS = 1e-3  # by how much better some draws come out where one case is special
 MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried, to tell on which
 SEARCHING = 0.2  # seconds of processor time for each kind of change of the student's own code
-MORE_CASES = 8  # on which an explanation from the first draws is tried once more
+MORE_CASES = 8  # on which an explanation from the first draws is tried once more, at least ...
+MOST_CASES = 64  # ... and at most, as far as LOOKING allows: of one in fifty draws a coincidence may hide
 LOOKING = 0.5  # seconds of processor time in which changes of arguments, or of the formula, are tried as explanation
 UNITS = {
     "mm": ("length", 1e-3),
@@ -240,13 +242,14 @@ class _Trial:
         search = None if words else self._search()
         solution = search and self._solution(search)
         step = search and (search.passed_words(solution) or search.words())
-        words = words or (not self.refusal and step) or self._one_change()
+        shape = self._other_shape() if self.refusal else ""
+        words = words or (not self.refusal and step) or (not shape and self._one_change())
         if words:
             return self.outcome(NOT_YET, _closed(words) + self._about_globals())
         if search and not step and not self._right_somewhere():
             step = search.partly_words() or search.given_words(solution)
         if self.refusal:
-            words = self._other_shape() or (f" {step[0].upper()}{_closed(step[1:])}" if step else "")
+            words = shape or (f" {step[0].upper()}{_closed(step[1:])}" if step else "")
             words = words or self._agreement(search, solution)
             return self.outcome(NOT_YET, _closed(self.refusal) + words + self._about_globals())
         if step:
@@ -271,7 +274,8 @@ class _Trial:
             return None
         arrays = [arg for args in self.inputs for arg in args if isinstance(arg, np.ndarray)]
         sizes = {n for array in arrays for n in (*array.shape, array.size)}
-        return relations.difference_words(self.exercise.metric, self._plain_pairs(), sizes, whole)
+        words = relations.difference_words(self.exercise.metric, self._plain_pairs(), sizes, whole)
+        return words if words is None or _has_loop(self.function) else words.replace(relations.LOOP, "")
 
     def _other_arguments(self):
         """Whether the results are right for arguments changed in one respect, with these in words."""
@@ -282,22 +286,74 @@ class _Trial:
         notebook = {name: self.function.__globals__[name] for name in read}
         tried = arguments.changes(self._names(self.inputs[0]), [case[0] for case in cases], notebook)
         reference = self.exercise.reference
-        words = self._first_that_fits((words, lambda *args, c=change: reference(*c(args))) for words, change in tried)
+        if self._is_always_the_same():
+            return None
+        told = ((words, change) for words, change in tried if self._is_felt(change))
+        words = self._first_that_fits((words, lambda *args, c=change: reference(*c(args))) for words, change in told)
         return words and f"your result is what comes out {words}"
 
-    def _first_that_fits(self, variants):
-        """The words of the first of (words, function) that gives the student's results; None if none does in time."""
-        draws, ends = self._cases(), time.thread_time() + LOOKING
+    def _is_always_the_same(self):
+        """Whether the results are one and the same on all draws, so that many a wrong computation would give them."""
+        metric, pairs = self.exercise.metric, self._plain_pairs()
+        if self.refusal or isinstance(metric, metrics.Exactly) or len(pairs) < 2:
+            return False
+        return all(np.shape(r) == np.shape(pairs[0][0]) and metric.equal(r, pairs[0][0]) for r, _ in pairs[1:])
+
+    def _is_felt(self, change):
+        """Whether a change of arguments leaves them as they are where the answer is right, if that is about numbers."""
+        if self.refusal or isinstance(self.exercise.metric, metrics.Exactly):
+            return True
         try:
-            with guard.time_limit(2 * LOOKING):  # a variant may well have a loop without an end
-                for words, function in variants:
-                    if time.thread_time() > ends:
-                        return None
-                    if all(self._is_mistake(Mistake(function, words), *case) for case in draws):
-                        return words
-        except guard.TimeLimit:
-            return None
+            right = [args for args, metric, pair in self._cases() if metric.equal(*pair)]
+            return all(all(map(np.array_equal, change(copy.deepcopy(args)), args)) for args in right)
+        except Exception:  # a change may not be possible for the arguments of each draw
+            return False
+
+    def _first_that_fits(self, variants):
+        """The words of the first of (words, function) that gives the student's results, on fresh draws as well; None
+        if none does in time.
+        """
+        draws, ends, variants = self._cases(), time.thread_time() + LOOKING, iter(variants)
+        while time.thread_time() < ends:
+            fits = None
+            try:
+                with guard.time_limit(2 * LOOKING):  # a variant may well have a loop without an end
+                    for words, function in variants:
+                        if time.thread_time() > ends:
+                            return None
+                        if all(self._is_mistake(Mistake(function, words), *case) for case in draws):
+                            fits = words, function
+                            break
+            except guard.TimeLimit:
+                return None
+            if fits is None or self._fits_more(fits[1]):
+                return fits and fits[0]
         return None
+
+    def _fits_more(self, function):
+        """Whether a variant gives the student's results on fresh draws as well."""
+        mistake, draws = Mistake(function, ""), self._fresh_results
+        try:
+            with guard.time_limit(2 * LOOKING):
+                return all(self._is_mistake(mistake, *draw) for draw in draws)
+        except guard.TimeLimit:
+            return False
+
+    @functools.cached_property
+    def _fresh_results(self):
+        """(arguments, metric, (result, expected)) of the student's function on fresh plain draws, where it succeeds."""
+        found, ends = [], _seconds() + LOOKING
+        for case in self._fresh:
+            if _seconds() > ends or self.spent > LOOKING:
+                break  # a slow answer is not called more often than it must
+            run = guard.run(self.function, case.args, limit=self.exercise.limit)
+            if case.metric is self.exercise.metric and run.error is None:
+                try:
+                    result = case.metric.admit(run.result, case.expected)
+                except Exception:  # a result that is refused; any other kind of answer is as good as one
+                    result = _Refusal(run.result)
+                found.append((case.args, case.metric, (result, case.expected)))
+        return found
 
     def _terms(self):
         """What one argument, or a number of them, has to do with each part of the results that is wrong."""
@@ -335,29 +391,44 @@ class _Trial:
             own_steps.Case(args, metric, pair[1], None if isinstance(pair[0], _Refusal) else pair[0])
             for args, metric, pair in zip(self.inputs, self.metrics, self.pairs)
         ]
-        return own_steps.search(self.function, self._names(self.inputs[0]), drawn, self._fresh_cases, SEARCHING)
+        return own_steps.search(self.function, self._names(self.inputs[0]), drawn, self._judging(), SEARCHING)
 
     def _mended(self, outcome, args, metric, expected):
         """What was raised, with the change of the student's code that gives the right result, if one does."""
         if outcome.status != RAISED or metric is None or metric is not self.exercise.metric:
             return outcome
         drawn = [own_steps.Case(args, metric, expected), *self._fresh[:2]]
-        search = own_steps.search(self.function, self._names(args), drawn, self._fresh_cases, SEARCHING)
+        search = own_steps.search(self.function, self._names(args), drawn, self._judging(), SEARCHING)
         words = search and search.words()
         return replace(outcome, text=f"{outcome.text}\n{words[0].upper()}{_closed(words[1:])}") if words else outcome
 
     @functools.cached_property
     def _fresh(self):
-        """More draws of the plain kinds, on which an explanation is tried once more."""
-        rng, found = np.random.default_rng(0), []
-        for draw in itertools.islice(itertools.cycle(self.exercise.cases), MORE_CASES):
+        """More draws, on which an explanation is tried once more: plain ones, the special ones among the first."""
+        rng, found, ends = np.random.default_rng(0), [], _seconds() + LOOKING
+        plain = [(draw, self.exercise.metric) for draw in self.exercise.cases]
+        first = [*itertools.islice(itertools.cycle(plain), MORE_CASES)]
+        first += 2 * [(draw, metric) for draw, metric, *_ in self.exercise.noisy]
+        for draw, metric in itertools.islice(itertools.chain(first, itertools.cycle(plain)), MOST_CASES):
+            if len(found) >= len(first) and _seconds() > ends:
+                break
             args = draw(rng)
-            found.append(own_steps.Case(args, self.exercise.metric, self.exercise.reference(*copy.deepcopy(args))))
+            found.append(own_steps.Case(args, metric, self.exercise.reference(*copy.deepcopy(args))))
         return found
 
     def _fresh_cases(self, kind):
         """Those for a kind of change; values from the solution are those of certain draws, and go with no others."""
         return () if kind == "given" else self._fresh
+
+    def _judging(self):
+        return own_steps.Judging(self._fresh_cases, self._has_properties)
+
+    def _has_properties(self, function):
+        """Whether a changed function has the properties asked for, which are part of the judgment."""
+        try:
+            return not any(holds(function, np.random.default_rng(0)) for holds in self.exercise.properties)
+        except Exception:  # what fails has not got them
+            return False
 
     def _one_change(self):
         """Whether the results are those of a right formula with one change, with this in words."""
@@ -380,6 +451,7 @@ class _Trial:
         draws = self._cases()
         if self.exercise.metric is None or not draws or self.spent > LOOKING:
             return None
+        draws += self._fresh_results
         for k, name in enumerate(self._names(draws[0][0])):
             if self._makes_no_difference(k, draws):
                 return f"your result does not change with `{name}`, and it should"
@@ -593,6 +665,18 @@ def _fails(mistake, args):
             mistake.variant(*copy.deepcopy(args))
     except Exception:
         return True
+    return False
+
+
+def _has_loop(function):
+    """Whether a function, or one within it, jumps back; so it may where its code is not known."""
+    codes = [getattr(function, "__code__", None)]
+    for code in codes:
+        if not isinstance(code, types.CodeType):
+            return True
+        if any("JUMP_BACKWARD" in i.opname or i.opname == "FOR_ITER" for i in dis.get_instructions(code)):
+            return True
+        codes += [constant for constant in code.co_consts if isinstance(constant, types.CodeType)]
     return False
 
 

@@ -148,7 +148,12 @@ REVERSED = (  # (words of what was changed in a right formula, what is wrong whe
     (r"along another axis in one call", "the axis is another one"),
     (r"with one case treated like the other", "this case needs no treatment of its own"),
     (r"with ([01]) in the place of one part", r"\1 belongs in the place of this"),
-    (r"with one row or column too many, the (\w+)", r"the \1 row or column is left out, and belongs there"),
+    (r"with one slice taken to the end", "what stands behind this slice is left out, and belongs there"),
+    (r"with one slice taken from the start", "what stands before this slice is left out, and belongs there"),
+    (
+        r"with a list of whole numbers made one of floats",
+        "an array made of this is one of integers, and cuts off decimals",
+    ),
     (r"with one round of its loop", "the loop is to take one round only"),
     (r"with one case (never|always) taken", r"this case is to be \1 taken"),
     (r"with `=` where a value is to be added to", "`+=` stands where `=` belongs"),
@@ -202,7 +207,8 @@ def _changed(node, names):
 
 def _operation(node, names):
     kind = type(node.op)
-    one = isinstance(node.right, ast.Constant) and node.right.value == 1  # n * 1 for n + 1 is a term left out
+    sides = (getattr(part, "value", None) for part in (node.left, node.right) if isinstance(part, ast.Constant))
+    one = 1 in sides  # n * 1 for n + 1 is a term left out
     for other in () if one and kind in (ast.Add, ast.Sub) else OTHERS.get(kind, ()):
         words = f"with {SIGNS.get(other, 'another sign')} where {SIGNS.get(kind, 'another sign')} belongs"
         yield 0, words, ast.BinOp(node.left, other(), node.right)
@@ -337,13 +343,17 @@ def _sequence(node, names):
     for i in range(len(node.elts) - 1):
         items = [*node.elts[:i], node.elts[i + 1], node.elts[i], *node.elts[i + 2 :]]
         yield 1, "with two neighbors in one list exchanged", type(node)(items, ast.Load())
+    first = node.elts[0] if node.elts else None
+    if isinstance(first, ast.Constant) and type(first.value) is int:
+        floats = [ast.Constant(float(first.value)), *node.elts[1:]]
+        yield 1, "with a list of whole numbers made one of floats", type(node)(floats, ast.Load())
 
 
 def _slice(node, names):
     if node.lower:
-        yield 2, "with one row or column too many, the first", ast.Slice(None, node.upper, node.step)
+        yield 2, "with one slice taken from the start", ast.Slice(None, node.upper, node.step)
     if node.upper:
-        yield 2, "with one row or column too many, the last", ast.Slice(node.lower, None, node.step)
+        yield 2, "with one slice taken to the end", ast.Slice(node.lower, None, node.step)
 
 
 def _subscript(node, names):

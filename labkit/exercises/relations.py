@@ -16,6 +16,7 @@ CLOSE = 1e4  # tolerances: an answer nearer than this is right in kind, but not 
 FAR = 1e-2  # ... unless it is off by more than this: a coarse tolerance leaves no room for less accurate answers
 SIMPLE = 12  # the largest number in a fraction that is worth telling
 EXACT = 1e-9  # how nearly two numbers have to agree for it
+LOOP = ": does a loop end too early?"  # asked where the code has one
 LONGEST = 12  # entries along the last axis that are tried one by one
 FACTORS = {"pi": np.pi, "2 pi": 2 * np.pi, "the root of 2": np.sqrt(2.0), "the root of 3": np.sqrt(3.0)}
 
@@ -266,7 +267,7 @@ def _one_part(results, expected, holds, unit):
             patched = [_with_entry(r, k, e[..., k]) for r, e in zip(results, expected)]
             if _all_equal(patched, expected):
                 off = max(np.abs(r[..., k] - e[..., k]).max() for r, e in zip(results, expected))
-                where = f"only entry {k} (counted from 0){_along(first)}"
+                where = _wrong_places(results, expected, k)
                 return f"{where} is not right: it is off by {off:.3g}{' ' + unit if unit else ''}"
     if len(first) > 2:
         for rows in range(len(first) - 1, 0, -1):
@@ -276,8 +277,21 @@ def _one_part(results, expected, holds, unit):
                     if rows == 1
                     else f"the first {rows} are right, not all behind them"
                 )
-                return f"{right} are: does a loop end too early?"
+                return f"{right} are{LOOP}"
     return None
+
+
+def _wrong_places(results, expected, k):
+    """Where results are wrong that differ from the expected ones in entry k along the last axis alone."""
+    wrong = [~np.isclose(r[..., k], e[..., k], rtol=1e-9, atol=1e-12) for r, e in zip(results, expected)]
+    if not wrong[0].ndim:
+        return f"only entry {k} (counted from 0)"
+    if all(w.all() for w in wrong):
+        return f"only entry {k} (counted from 0) in each row"
+    rows = {tuple(map(int, row)) for w in wrong for row in np.argwhere(w)}
+    if len(rows) == 1 and len({w.shape for w in wrong}) == 1:
+        return f"only entry {[*rows.pop(), k]} (counted from 0)"
+    return f"only entry {k} (counted from 0) in some rows"
 
 
 def _with_entry(r, k, value):

@@ -7,6 +7,7 @@ is where it goes wrong.
 
 import functools
 import time
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,6 +19,7 @@ CLOSE = 1e-7  # how far, relatively, two values may lie apart that are the same
 BATCH = 120  # changes that are tried at once
 ENTRIES = 8  # of a result that are looked at one by one
 NAMED = 4  # values that are told to be right, at most
+TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
 ALONE = "With this alone changed, your result is right"
 
 
@@ -88,14 +90,24 @@ class Case:
         return [f"{entries} {k} (counted from 0)" for k in told if _same(r[..., k], e[..., k])]
 
 
+@dataclass(frozen=True)
+class Judging:
+    """How a change that was found is judged as an answer would be.
+
+    more:  function of the kind of change that gives further cases, on which it is tried once more.
+    holds: function of the changed function: whether it has the properties that an answer must have.
+    """
+
+    more: object
+    holds: object
+
+
 class Search:
     """Looks for one change that mends a student's function."""
 
-    def __init__(self, written, names, cases, more, seconds):
-        """`more(kind of change)` gives further cases, on which what was found is tried once more; `seconds` for each
-        kind.
-        """
-        self.written, self.names, self.more, self.seconds = written, names, more, seconds
+    def __init__(self, written, names, cases, judging, seconds):
+        """`seconds` are for each kind of change."""
+        self.written, self.names, self.judging, self.seconds = written, names, judging, seconds
         self.cases = sorted(cases, key=lambda case: case.was_right)
         self.results = [None if case.result is None else rerun.numeric(case.result) for case in self.cases]
         self.values, begun = [], time.thread_time() + written.spent
@@ -117,13 +129,26 @@ class Search:
             fits = self._fitting(batch, 0, left, values)
             for plan in [plan for plan, fit in zip(batch, fits) if fit]:
                 others = (self._fitting([plan], i, self.seconds, values) for i in range(1, len(self.cases)))
-                more = (self.written.results([plan], c.args, self.seconds, c.keep) for c in self.more(plan[0]))
-                if all(fit == [True] for fit in (*others, *more)):
+                if all(fit == [True] for fit in others) and self._is_answer(plan):
                     return plan
             left -= time.thread_time() - began + self.written.spent - before
             if left <= 0.01 or len(fits) < len(batch):
                 return None
         return None
+
+    def _is_answer(self, plan):
+        """Whether the function with this change would be taken as an answer, as far as fresh draws tell."""
+        fresh = (self.written.results([plan], c.args, self.seconds, c.keep) for c in self.judging.more(plan[0]))
+        if any(fit != [True] for fit in fresh):
+            return False
+
+        def changed(*args):
+            found = self.written.results([plan], args, self.seconds, lambda found: found)
+            if not found or found[0] is None:
+                raise ValueError("the changed function failed")
+            return found[0][0]
+
+        return plan[0] == "given" or self.judging.holds(changed)
 
     def _fitting(self, plans, i, seconds, values):
         """Whether each plan makes the i-th result right; `values[i]` are those that plans put in other's places."""
@@ -139,8 +164,18 @@ class Search:
         plan = self.mending([("code", k) for k, (rank, *_) in enumerate(changes) if rank in ranks])
         if plan is None:
             return None
-        _, line, code, mends = changes[plan[1]]
+        _, line, code, mends = changes[self._left_out_instead(plan[1])]
         return f"in line {line}, `{code}`: {mends}. {ALONE}"
+
+    def _left_out_instead(self, number):
+        """The change that leaves out a part where another sign mends only because it makes that part do nothing."""
+        changes = self.written.changes
+        here = changes[number][1:3]
+        if " stands where " not in changes[number][3]:
+            return number
+        fewer = [("code", k) for k, (_, *at, mends) in enumerate(changes) if tuple(at) == here and TOO_MANY in mends]
+        plan = self.mending(fewer)
+        return number if plan is None else plan[1]
 
     # Values on the way turned into others
 
@@ -162,7 +197,7 @@ class Search:
     def _turned(self):
         """Plans of values turned into others, the likeliest first, without those that change nothing or cannot be."""
         numeric = [i for i in range(len(self.names)) if all(is_numeric(case.args[i]) for case in self.cases)]
-        seen = [(k, values[0]) for k, (count, values) in enumerate(self.values[0]) if count]
+        seen = [(k, values[0]) for k, (count, values) in enumerate(self.values[0]) if count and not self._is_filled(k)]
         for change, (_, function) in enumerate(rerun.OTHERWISE):
             for argument in [None] if change < rerun.ALONE else numeric:
                 others = [] if argument is None else [np.asarray(self.cases[0].args[argument], dtype=float)]
@@ -251,12 +286,17 @@ class Search:
         """(place, place of the solution) of values of one shape that differ on every draw, the smallest place first."""
         places = self.written.places
         for k in sorted(range(len(places)), key=lambda k: places[k][3]):
-            if self._is_known(k, solution):
+            if self._is_filled(k) or self._is_known(k, solution):
                 continue
             for q in solution.distinct:
                 pairs = [(mine[k], theirs[q]) for mine, theirs in zip(self.values, solution.values)]
                 if all(_exchangeable(a, b) for a, b in pairs) and not (solution.is_result[q] and self.is_result(k)):
                     yield k, q
+
+    def _is_filled(self, k):
+        """Whether only a part of this array is assigned there: its other parts are not what the line is about."""
+        _, code, name, *_ = self.written.places[k]
+        return bool(name) and code.startswith(f"{name}[")
 
     def _is_known(self, k, solution, given=True):
         """Whether a value on the way is one that the solution has as well, or an argument: then it is right."""
@@ -303,24 +343,49 @@ class Search:
         """How far the values on the way are those of the solution, and the first that is none of them."""
         if solution is None:
             return None
-        known = [k for k in range(len(self.written.places)) if self._is_step(k) and self._is_known(k, solution, False)]
+        units = self._units(solution)
+        right = [self._is_known(k, solution, False) or self._is_part_of_results(k) for k in units]
+        known = units[: right.index(False)] if False in right else units
         if not known:
             return None
-        behind = [k for k in range(known[-1] + 1, len(self.written.places)) if self._is_step(k)]
-        behind = [k for k in behind if not self._is_taken_out(k, solution)]
         names = dict.fromkeys(self._called(k) for k in known if self.written.places[k][2])
         last = f"{self._called(known[-1])} (line {self.written.places[known[-1]][0]})"
-        right = f"{', '.join(list(names)[-NAMED:])}" if len(names) > 1 else last
-        told = f"As far as {right} your values are those of the solution"
-        if not behind:
+        told = f"{', '.join(list(names)[-NAMED:])}" if len(names) > 1 else last
+        told = f"As far as {told} your values are those of the solution"
+        if len(known) == len(units) or not self._has_counterpart(units[len(known)], solution):
             return told
-        line, code, *_ = self.written.places[behind[0]]
+        line, code, *_ = self.written.places[units[len(known)]]
         first = f"`{code}` in line {line} is the first behind that is not among them"
         return f"{told}; {first}. Look from there on, unless you go another way than it does"
 
+    def _units(self, solution):
+        """Places of the steps as a whole, in their order: variables that are bound, and what is part of no other."""
+        steps = [k for k in range(len(self.written.places)) if self._is_step(k) and not self._is_taken_out(k, solution)]
+        inner = {part for k in steps for part in range(self.written.places[k][4], k)}
+        return [k for k in steps if k not in inner and not self._is_filled(k)]
+
+    def _has_counterpart(self, k, solution):
+        """Whether the solution has a value of this kind that is none of the student's: the one that this should be."""
+        for q in solution.distinct:
+            theirs = [values[q][1] for values in solution.values]
+            if all(_exchangeable(mine[k], values[q]) for mine, values in zip(self.values, solution.values)):
+                if not any(self._is_value(other, theirs) for other in range(len(self.written.places))):
+                    return True
+        return False
+
+    def _is_part_of_results(self, k):
+        """Whether a value is one entry or one column of the right results."""
+        expected = [rerun.numeric(case.expected) for case in self.cases]
+        if any(e is None or not e.ndim or e.shape[-1] != expected[0].shape[-1] for e in expected):
+            return False
+        columns = ([e[..., j][None] for e in expected] for j in range(min(expected[0].shape[-1], ENTRIES)))
+        return any(self._is_value(k, column) for column in columns)
+
     def _is_taken_out(self, k, solution):
-        """Whether this is but a part or the transpose of a value that is right."""
-        *_, code, name, _, first = self.written.places[k]
+        """Whether this is but a part, the length or the transpose of a value that is right."""
+        _, code, name, _, first = self.written.places[k]
+        if code.startswith("len("):
+            return True
         return not name and code.endswith(("]", ".T")) and first < k and self._is_known(k - 1, solution)
 
     def _called(self, k):
@@ -333,6 +398,8 @@ class Search:
         if code == name or not all(values[k][0] for values in self.values):
             return False
         mine = [values[k][1] for values in self.values]
+        if all(np.isin(m, (0.0, 1.0)).all() for m in mine):  # a condition
+            return False
         return len(mine) > 1 and not _same(mine[0][0], mine[1][0]) and not self._is_given(k)
 
     def _of_right_parts(self, k, solution):
@@ -350,10 +417,10 @@ class Search:
 
 
 @_or_nothing
-def search(function, names, cases, more, seconds):
+def search(function, names, cases, judging, seconds):
     """A `Search` for what is wrong in a function; None where its code cannot be read again."""
     written = rerun.written(function)
-    return written and Search(written, names, cases, more, seconds)
+    return written and Search(written, names, cases, judging, seconds)
 
 
 def value_relation(mine, theirs, named):
@@ -364,7 +431,7 @@ def value_relation(mine, theirs, named):
     words = relations.difference_words(exact, list(zip(mine, theirs)), (), True)
     words = words or operands.operand_words(exact, mine, theirs, named)
     words = words or relations.difference_words(exact, list(zip(mine, theirs)), ())
-    words = words and words.removesuffix(": does a loop end too early?")
+    words = words and words.removesuffix(relations.LOOP)
     for said, told in (("your result", "it"), ("your matrix", "it"), ("the expected", "the right")):
         words = words and words.replace(said, told)
     return words

@@ -850,7 +850,9 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _weights(lambda q: np.where(q < 1, np.trunc((1 - q**2) ** 2), 0.0)),
-                    "Your weights are whole numbers: was the array made of integers? Zeros of `np.zeros` are not.",
+                    "All your weights are 0. Does one far pose decide for all of them? Or was the array made of integers, "
+                    "which cut a weight below 1 off to 0?",
+                    id="robust_weights-cc038c",
                 ),
                 Mistake(
                     _weights(np.vectorize(lambda q: (1 - q**2) ** 2 if q < 1 else 0)),
