@@ -297,7 +297,10 @@ class _Trial:
         metric, pairs = self.exercise.metric, self._plain_pairs()
         if self.refusal or isinstance(metric, metrics.Exactly) or len(pairs) < 2:
             return False
-        return all(np.shape(r) == np.shape(pairs[0][0]) and metric.equal(r, pairs[0][0]) for r, _ in pairs[1:])
+        try:
+            return all(_equal_as_written(metric, result, pairs[0][0]) for result, _ in pairs[1:])
+        except Exception:  # results of different draws need not go together
+            return False
 
     def _is_felt(self, change):
         """Whether a change of arguments leaves them as they are where the answer is right, if that is about numbers."""
@@ -346,13 +349,11 @@ class _Trial:
         for case in self._fresh:
             if _seconds() > ends or self.spent > LOOKING:
                 break  # a slow answer is not called more often than it must
-            run = guard.run(self.function, case.args, limit=self.exercise.limit)
-            if case.metric is self.exercise.metric and run.error is None:
-                try:
-                    result = case.metric.admit(run.result, case.expected)
-                except Exception:  # a result that is refused; any other kind of answer is as good as one
-                    result = _Refusal(run.result)
-                found.append((case.args, case.metric, (result, case.expected)))
+            if case.metric is self.exercise.metric:
+                admitted = functools.partial(_admitted, case.metric, case.expected)
+                run = guard.run(self.function, case.args, admitted, self.exercise.limit)
+                if run.error is None:
+                    found.append((case.args, case.metric, (run.result, case.expected)))
         return found
 
     def _terms(self):
@@ -692,6 +693,13 @@ class _Refusal:
     """A result the metric refused, kept because a named mistake may explain it (a transposed shape, say)."""
 
     value: object
+
+
+def _admitted(metric, expected, result):
+    try:
+        return metric.admit(result, expected)
+    except metrics.Refused:
+        return _Refusal(result)
 
 
 def _equal_as_written(metric, result, wrong):

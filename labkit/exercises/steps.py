@@ -6,6 +6,7 @@ is where it goes wrong.
 """
 
 import functools
+import re
 import time
 from dataclasses import dataclass
 
@@ -197,7 +198,7 @@ class Search:
     def _turned(self):
         """Plans of values turned into others, the likeliest first, without those that change nothing or cannot be."""
         numeric = [i for i in range(len(self.names)) if all(is_numeric(case.args[i]) for case in self.cases)]
-        seen = [(k, values[0]) for k, (count, values) in enumerate(self.values[0]) if count and not self._is_filled(k)]
+        seen = [(k, values[0]) for k, (count, values) in enumerate(self.values[0]) if count and self._may_turn(k)]
         for change, (_, function) in enumerate(rerun.OTHERWISE):
             for argument in [None] if change < rerun.ALONE else numeric:
                 others = [] if argument is None else [np.asarray(self.cases[0].args[argument], dtype=float)]
@@ -285,8 +286,14 @@ class Search:
     def _given(self, solution):
         """(place, place of the solution) of values of one shape that differ on every draw, the smallest place first."""
         places = self.written.places
+        filled = {places[k][2] for k in range(len(places)) if self._is_filled(k)}
         for k in sorted(range(len(places)), key=lambda k: places[k][3]):
-            if self._is_filled(k) or self._is_known(k, solution):
+            if (
+                places[k][2] in filled
+                and places[k][1] != places[k][2]
+                or self._is_filled(k)
+                or self._is_known(k, solution)
+            ):
                 continue
             for q in solution.distinct:
                 pairs = [(mine[k], theirs[q]) for mine, theirs in zip(self.values, solution.values)]
@@ -297,6 +304,11 @@ class Search:
         """Whether only a part of this array is assigned there: its other parts are not what the line is about."""
         _, code, name, *_ = self.written.places[k]
         return bool(name) and code.startswith(f"{name}[")
+
+    def _may_turn(self, k):
+        """Whether a line is about the whole of a value, which no number bounds, so that half of it would do as well."""
+        bounded = (code for _, code, _, _, first in self.written.places[k + 1 :] if first <= k)
+        return not self._is_filled(k) and not any(re.search(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$", c) for c in bounded)
 
     def _is_known(self, k, solution, given=True):
         """Whether a value on the way is one that the solution has as well, or an argument: then it is right."""
@@ -366,11 +378,14 @@ class Search:
 
     def _has_counterpart(self, k, solution):
         """Whether the solution has a value of this kind that is none of the student's: the one that this should be."""
+        mine = [values[k] for values in self.values]
         for q in solution.distinct:
-            theirs = [values[q][1] for values in solution.values]
-            if all(_exchangeable(mine[k], values[q]) for mine, values in zip(self.values, solution.values)):
-                if not any(self._is_value(other, theirs) for other in range(len(self.written.places))):
-                    return True
+            theirs = [values[q] for values in solution.values]
+            lacking = not any(
+                self._is_value(other, [t for _, t in theirs]) for other in range(len(self.written.places))
+            )
+            if lacking and all(map(_exchangeable, mine, theirs)):
+                return True
         return False
 
     def _is_part_of_results(self, k):

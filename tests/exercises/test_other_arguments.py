@@ -93,3 +93,30 @@ def test_attributes_are_no_data_of_the_notebook():
     known = {"T": np.eye(4)}
     exec("def f(A, B): return A.T @ B", known)
     assert "notebook" not in BETWEEN.judge(known["f"]).text
+
+
+def test_a_constant_answer_is_not_told_as_another_argument():
+    item = Exercise(
+        "formula",
+        reference=lambda a, b: a * b,
+        draw=lambda rng: (rng.normal(size=3), float(rng.uniform(1, 2))),
+        metric=metrics.Numbers(1e-9),
+        hints=("a", "b", "c"),
+    )
+    text = item.judge(lambda a, b: np.zeros(3), rng=np.random.default_rng(0)).text
+    assert "what comes out" not in text
+
+
+def test_an_argument_changed_holds_on_fresh_draws_as_well():
+    draws = iter([0.0, 1.0] * 3)
+    item = Exercise(
+        "formula",
+        reference=lambda a, b: a + b,
+        draw=lambda rng: (float(rng.uniform(1, 2)), next(draws, 0.5)),
+        metric=metrics.Numbers(1e-9),
+        hints=("a", "b", "c"),
+    )
+    text = item.judge(
+        lambda a, b: a + (3.0 if b == 0.5 else 1.0 - np.cos(np.pi * b)), rng=np.random.default_rng(0)
+    ).text
+    assert "what comes out" not in text

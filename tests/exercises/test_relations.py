@@ -138,3 +138,12 @@ def test_a_coarse_tolerance_makes_no_wrong_answer_right_in_kind():
     assert relations.not_accurate_enough(deviation) is None
     near = metrics.Numbers(1e-6).deviations(np.array([0.5, 0.9995]), np.array([0.5, 1.0]))[0]
     assert "not accurate enough" in relations.not_accurate_enough(near)
+
+
+def test_a_single_wrong_entry_of_a_matrix_is_named_by_row_and_column():
+    expected = [np.array([[1.5, 2.5], [3.5, k]]) for k in (4.5, 5.5)]
+    results = [e.copy() for e in expected]
+    for k, result in enumerate(results):
+        result[1, 1] = 7.7 * (k + 1) ** 2
+    words = relations.difference_words(metrics.Numbers(1e-9), list(zip(results, expected)))
+    assert words.startswith("only entry [1, 1] (counted from 0) is not right")

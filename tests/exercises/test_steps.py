@@ -146,3 +146,92 @@ def test_what_raises_is_told_with_the_change_that_mends_it():
 def test_how_two_values_differ():
     mine, theirs = [np.ones((1, 2, 3))] * 2, [-np.ones((1, 2, 3))] * 2
     assert "right up to its sign" in steps.value_relation(mine, theirs, [{"a": 1.0}] * 2)
+
+
+def judged(item, body, arguments="a, b"):
+    outcome = item.judge(typed(body, item.id, arguments), rng=np.random.default_rng(0))
+    assert outcome.status == NOT_YET
+    return outcome.text
+
+
+def asked(reference, draw, **more):
+    exact = metrics.Numbers(1e-9)
+    return Exercise("formula", reference=reference, draw=draw, metric=exact, hints=("a", "b", "c"), **more)
+
+
+def two_numbers(rng):
+    return float(rng.uniform(1, 2)), float(rng.uniform(1, 2))
+
+
+def test_a_change_that_fails_a_property_or_a_special_draw_mends_nothing():
+    def at_zero(function, rng):
+        return None if np.isfinite(function(1.0, 0.0)) else "at 0 it fails"
+
+    body = """
+    if b < 1.5:
+        return a - b * b / 6
+    return a * np.sin(b) / b
+    """
+
+    def right(a, b):
+        return a * np.sinc(b / np.pi)
+
+    def draw(rng):
+        return float(rng.uniform(1, 2)), float(rng.uniform(0.2, 1.4))
+
+    assert steps.ALONE in judged(asked(right, draw), body)
+    assert steps.ALONE not in judged(asked(right, draw, properties=(at_zero,)), body)
+    special = (lambda rng: (1.0, 0.0), metrics.Numbers(1e-9), "at 0")
+    assert steps.ALONE not in judged(asked(right, draw, noisy=special), body)
+
+
+def test_a_neutral_operation_is_told_as_a_term_too_many():
+    body = """
+    one = len("x")
+    return a + one
+    """
+    text = judged(asked(lambda a, b: a, two_numbers), body)
+    assert "one term is too many" in text and "stands where" not in text
+
+
+def test_an_array_of_integers_is_named_as_such():
+    def right(a, b):
+        return np.array([a, b, 1.0])
+
+    body = """
+    found = np.array([0, 0, 1])
+    found[0] = a
+    found[1] = b
+    return found
+    """
+    assert "`[0, 0, 1]`: an array made of this is one of integers" in judged(asked(right, two_numbers), body)
+
+
+def test_no_line_that_fills_a_part_is_blamed_for_the_whole():
+    def right(a, b):
+        return np.linalg.norm([a, b, np.hypot(a, b)])
+
+    body = """
+    found = np.zeros(3)
+    found[0] = np.exp(a) - 7
+    found[1] = np.tan(b) * 3
+    found[2] = a - 5 * b
+    return np.linalg.norm(found)
+    """
+    assert "in line 5" not in judged(asked(right, two_numbers), body)
+
+
+def test_what_agrees_ends_at_the_first_step_that_does_not(monkeypatch):
+    text = "def formula(a, b):\n    x = a * b\n    y = a + x\n    z = np.exp(b)\n    return x * y + z\n"
+    known = {"np": np}
+    exec(text, known)
+    tree = steps.slips.ast.parse(text).body[0]
+    monkeypatch.setattr(steps.slips, "solved", lambda exercise: (known["formula"], tree))
+    body = """
+    x = a * b
+    y = np.sin(a) - 3 * x ** 2
+    z = np.exp(b)
+    return x * y - 2 * z ** 3
+    """
+    text = judged(asked(known["formula"], two_numbers), body)
+    assert "As far as `x` (line 2) your values are those of the solution; `y = np.sin(a)" in text
