@@ -1088,6 +1088,11 @@ CHAPTER = Chapter(
                     id="corrected-7b2ede",
                 ),
                 Mistake(
+                    lambda: np.array([12.5, 5.0]) + np.array([0.886, 0.116]) * (12.5 - 11.79),
+                    "This corrects away from the measurement.",
+                    id="corrected-away-rounded",
+                ),
+                Mistake(
                     lambda: _printed_correction(lambda g: g | {"var_z": 0.5}).x,
                     "This takes the root of 0.25. A variance goes in as it is.",
                     id="corrected-279f26",
@@ -1464,6 +1469,10 @@ CHAPTER = Chapter(
                 Mistake(
                     _jacobians(_last_column(lambda x, u, t: (-u[0] * np.sin(x[2]), u[0] * np.cos(x[2])))),
                     "In G_x the time step is missing: the way is v T.",
+                ),
+                Mistake(
+                    _jacobians(_last_column(lambda x, u, t: (-np.sin(x[2]), np.cos(x[2])))),
+                    "In G_x the way is missing, speed and time step: -v T sin(theta), v T cos(theta).",
                 ),
                 Mistake(
                     _jacobians(_last_column(lambda x, u, t: (-t * np.sin(x[2]), t * np.cos(x[2])))),
