@@ -20,6 +20,7 @@ CLOSE = 1e-7  # how far, relatively, two values may lie apart that are the same
 BATCH = 120  # changes that are tried at once
 ENTRIES = 8  # of a result that are looked at one by one
 NAMED = 4  # values that are told to be right, at most
+BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with a number
 TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
 ALONE = "With this alone changed, your result is right"
 
@@ -162,11 +163,17 @@ class Search:
 
     def code_words(self, ranks):
         changes = self.written.changes
-        plan = self.mending([("code", k) for k, (rank, *_) in enumerate(changes) if rank in ranks])
+        likely = (k for k, (rank, *_) in enumerate(changes) if rank in ranks)
+        plan = self.mending([("code", k) for k in likely if not self._moves_a_bound(*changes[k][1:])])
         if plan is None:
             return None
         _, line, code, mends = changes[self._left_out_instead(plan[1])]
         return f"in line {line}, `{code}`: {mends}. {ALONE}"
+
+    def _moves_a_bound(self, line, code, mends):
+        """Whether a change only turns what is compared with a number: another number would do as well."""
+        compared = (text for at, text, *_ in self.written.places if at == line and code in text and BOUND.search(text))
+        return mends.endswith(("belongs there", "belongs there in degrees")) and any(compared)
 
     def _left_out_instead(self, number):
         """The change that leaves out a part where another sign mends only because it makes that part do nothing."""
@@ -308,7 +315,7 @@ class Search:
     def _may_turn(self, k):
         """Whether a line is about the whole of a value, which no number bounds, so that half of it would do as well."""
         bounded = (code for _, code, _, _, first in self.written.places[k + 1 :] if first <= k)
-        return not self._is_filled(k) and not any(re.search(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$", c) for c in bounded)
+        return not self._is_filled(k) and not any(map(BOUND.search, bounded))
 
     def _is_known(self, k, solution, given=True):
         """Whether a value on the way is one that the solution has as well, or an argument: then it is right."""
