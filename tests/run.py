@@ -6,8 +6,8 @@
                                                   returns stirred (`last_bits.py`); also before names
 
 Unit tests, solved notebooks (strict) and blank notebooks (lax) are dealt out to a few pytest processes, two more at a
-time than there are processors, since browsers, kernels and judges of a class wait for each other. The last line is the sum,
-"N passed, N failed"; the exit code is 1 if anything failed.
+time than there are processors, since browsers, kernels and judges of a class wait for each other. The last line is the
+sum, "N passed, N failed"; the exit code is 1 if anything failed.
 
 In continuous integration (CI=true) the second half of the unit tests runs with stirred last bits.
 A blank notebook that a student has worked in is judged by no test: a fresh one from the source is run in its place.
