@@ -323,12 +323,17 @@ def _slipped(rng, text, kind):
 
 
 def _clear(rng, draw):
-    """A column of which no gap, as it is or after a slip, lies at what is allowed to the last bits."""
+    """A column of which no gap, as it is or after a slip, lies at what is allowed to the last bits.
+
+    Nor does it matter whether a number with a slip keeps its half unit or gets that of its new digits.
+    """
     while True:
         drawn = draw(rng)
-        sides = (lambda halves, own, by=by: (np.mean(halves) + own) * (1 + by) for by in (-1e-7, 1e-7))
-        fewer, more = (_search(agree=_allow(side))(*drawn) for side in sides)
-        if fewer == more:
+        sides = [lambda halves, own, by=by: (np.mean(halves) + own) * (1 + by) for by in (-1e-7, 1e-7)]
+        found = [_search(agree=_allow(side))(*drawn) for side in sides]
+        halves, own = [half_unit(text) for text in drawn[0]], half_unit(drawn[1])
+        found += [_search(agree=_allow(lambda *_, s=side, h=halves, o=own: s(h, o)))(*drawn) for side in sides]
+        if all(each == found[0] for each in found):
             return drawn
 
 
