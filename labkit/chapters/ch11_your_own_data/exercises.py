@@ -85,7 +85,7 @@ def covariance_and_candidates(rng, noise_tells=False):
         picks = [
             rule(C, candidates) for rule in (next_pose, *((_least_certain_volume,) if noise_tells else WRONG_RULES))
         ]
-        if len({*picks, picks[0] + 1}) == len(picks) + 1 and _alone(C, candidates) not in picks:
+        if len({*picks, picks[0] + 1}) == len(picks) + 1 and _alone(C, candidates) != picks[0]:
             return C, candidates
 
 
@@ -206,11 +206,7 @@ def _alone(C, candidates):
     return int(np.argmax(np.linalg.det(candidates @ np.swapaxes(candidates, 1, 2))))
 
 
-def _first_number(C, candidates):
-    return next_pose(C, candidates[:, :1])
-
-
-WRONG_RULES = (_smallest_trace, _largest_derivative, _largest_volume, _least_certain, _first_number)
+WRONG_RULES = (_smallest_trace, _largest_derivative, _largest_volume, _least_certain)
 
 
 def visible(J, std, times):
@@ -524,7 +520,6 @@ CHAPTER = Chapter(
                 "return int(np.argmin(left))`",
             ),
             mistakes=[
-                Mistake(_first_number, "You compare what the first number of each reading leaves. A reading brings all rows of its J."),
                 *(Mistake(rule, "Your choice is that of the smallest trace, or of the smallest largest eigenvalue. Among squares of different units the largest unit decides alone: compare determinants.")
                   for rule in (_smallest_trace, _largest_eigenvalue)),
                 Mistake(_largest_derivative, "You took the candidate with the largest derivative. It may well tell what is known already: compute what it leaves."),
