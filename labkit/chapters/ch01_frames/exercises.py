@@ -59,7 +59,7 @@ def kuka_pose(rng, A_deg=(-170, 170), B_deg=(-80, 80)):
 
 A_RANGES = ((-80, 80), (100, 170), (-170, -100))  # deg: both signs of r00, and of r10
 B_RANGES = ((-80, -5), (5, 80), (-80, 80))  # deg: below and above 0 at every check
-NEAR_THE_POLE = (((-170, 170), (86, 89.5)), ((-170, 170), (-89.5, -86)))  # deg: A and C are still two angles
+NEAR_THE_POLE = (((-170, 170), (86, 89)), ((-170, 170), (-89, -86)))  # deg: A and C are still two angles
 POINT = "a point has three coordinates"
 POSE = "one pose is one 4x4 matrix"
 
