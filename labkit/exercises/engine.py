@@ -133,6 +133,8 @@ class Exercise(Item):
         object.__setattr__(self, "noisy", (noisy,) if noisy and callable(noisy[0]) else tuple(noisy))
         if self.metric is None and not self.properties:
             raise ValueError(f"exercise {self.id!r} needs a metric or properties")
+        if len(self.cases) > self.draws:
+            raise ValueError(f"exercise {self.id!r} takes {self.draws} draws, too few for {len(self.cases)} in turn")
 
     @property
     def cases(self):

@@ -59,7 +59,7 @@ def kuka_pose(rng, A_deg=(-170, 170), B_deg=(-80, 80)):
 
 A_RANGES = ((-80, 80), (100, 170), (-170, -100))  # deg: both signs of r00, and of r10
 B_RANGES = ((-80, -5), (5, 80), (-80, 80))  # deg: below and above 0 at every check
-NEAR_THE_POLE = (((-170, 170), (86, 89)), ((-170, 170), (-89, -86)))  # deg: A and C are still two angles
+NEAR_THE_POLE = (((-170, 170), (86, 89)), ((-170, 170), (-89.9, -89.8)))  # deg: A and C are still two angles
 POINT = "a point has three coordinates"
 POSE = "one pose is one 4x4 matrix"
 
@@ -294,12 +294,16 @@ def _angles_one_by_one(T):
     return np.array([*T[:3, 3], np.arctan2(T[1, 0], T[0, 0]), b, np.arctan2(T[2, 1], T[2, 2])])
 
 
-def _pole_of_five_degrees(T):
-    """A is set to 0 wherever B is beyond 85 deg, as if all of that were the pole."""
-    xyzabc, R = frames.kuka_from_matrix(T), T[:3, :3]
-    if abs(xyzabc[4]) > np.deg2rad(85):
-        xyzabc[3], xyzabc[5] = 0, np.arctan2(-R[1, 2], R[1, 1])
-    return xyzabc
+def _pole_from(limit_deg):
+    """A is set to 0 wherever B is beyond the limit, as if all of that were the pole."""
+
+    def variant(T):
+        xyzabc, R = frames.kuka_from_matrix(T), T[:3, :3]
+        if abs(xyzabc[4]) > np.deg2rad(limit_deg):
+            xyzabc[3], xyzabc[5] = 0, np.arctan2(-R[1, 2], R[1, 1])
+        return xyzabc
+
+    return variant
 
 
 def at_the_pole(sign):
@@ -946,11 +950,14 @@ CHAPTER = Chapter(
                     "`np.clip(..., -1, 1)`, or take arctan2 of -r20 and the root of r00² + r10².",
                     id="kuka-arcsine",
                 ),
-                Mistake(
-                    _pole_of_five_degrees,
-                    "Right except near the pole: A may be chosen freely at B = 90 deg alone. Even half a degree beside it A and C "
-                    "are two angles, and np.arctan2 still reads both.",
-                    id="kuka-wide-pole",
+                *(
+                    Mistake(
+                        _pole_from(limit_deg),
+                        "Right except near the pole: A may be chosen freely at B = 90 deg alone. Even a tenth of a degree beside it "
+                        "A and C are two angles, and np.arctan2 still reads both.",
+                        id=f"kuka-pole-from-{limit_deg:g}",
+                    )
+                    for limit_deg in (85, 89.5)
                 ),
                 Mistake(
                     _undone(lambda R: np.arctan(R[1, 0] / R[0, 0]), _B_along),
