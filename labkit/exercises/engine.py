@@ -112,7 +112,7 @@ class Exercise(Item):
     properties: functions (student_function, rng) -> None or a sentence that says what does not hold.
     fixed:      {argument: reason} of arguments that are the same, or of one shape, in all draws: what the docstring
                 leaves free must vary, or an answer could be wired to it.
-    draws:      how many draws a check takes.
+    draws:      how many draws a check takes; 0 where the properties alone judge.
     limit:      seconds that one call may take.
     """
 
@@ -133,7 +133,7 @@ class Exercise(Item):
         object.__setattr__(self, "noisy", (noisy,) if noisy and callable(noisy[0]) else tuple(noisy))
         if self.metric is None and not self.properties:
             raise ValueError(f"exercise {self.id!r} needs a metric or properties")
-        if len(self.cases) > self.draws:
+        if 0 < self.draws < len(self.cases):
             raise ValueError(f"exercise {self.id!r} takes {self.draws} draws, too few for {len(self.cases)} in turn")
 
     @property
