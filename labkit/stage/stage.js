@@ -944,14 +944,23 @@ class Room {
     for (let node = this.root.parentElement; node; node = node.parentElement) { // the outermost that scrolls is the notebook
       if (/auto|scroll/.test(getComputedStyle(node).overflowY) && node.clientHeight > 100) seen = Math.min(window.innerHeight, node.clientHeight);
     }
-    return seen - (this.root.offsetHeight - this.picture.offsetHeight) - 12;
+    return seen - (this.root.offsetHeight - this.picture.offsetHeight - this.passing()) - 12;
+  }
+
+  /** Height of the lines that come and go: for them the picture does not change its size, or a kernel that is late with
+   *  its answers would be asked for one more picture each time that this is said.
+   */
+  passing() {
+    let sum = 0;
+    for (const node of this.root.querySelectorAll(".status, .gone")) if (node.offsetHeight) sum += node.offsetHeight + parseFloat(getComputedStyle(node).marginTop);
+    return sum;
   }
 
   rows() {
     const style = getComputedStyle(this.root);
     let sum = parseFloat(style.paddingTop) + parseFloat(style.paddingBottom);
     for (const node of this.root.children) if (node !== this.picture) sum += node.offsetHeight;
-    return sum + 24;
+    return sum - this.passing() + 24;
   }
 
   /** Letters as large as the whole figure grows: a lecture hall reads them. */

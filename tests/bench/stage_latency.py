@@ -2,13 +2,13 @@
 
     python tests/bench/stage_latency.py [--only NAME ...] [--events 40] [--shots DIR] [--chromium PATH]
 
-Finds all functions in labkit.chapters.*.stages that return a Stage without arguments, puts them into one notebook,
-starts JupyterLab with fresh settings on a free port, runs all cells, moves each Stage (first handle by arrow keys and
-by mouse; the first slider, the view or the cursor in the picture by keys; clicks), and prints in milliseconds, per
-Stage and way of moving it: median and 95th percentile of event to picture; medians of message to answer in the page and
-of message to answer in the
-kernel; and without a browser, compute with update, and drawing with encoding. P is the time of 1000 products of two
-3x3 matrices at that moment, as in peers.py: where it is well above the smallest of the run, others had the machine.
+Finds all functions in labkit.chapters.*.stages that return a Stage without arguments, puts those of a chapter into one
+notebook, as a reader has them, starts JupyterLab with fresh settings on a free port, runs all cells, moves each Stage
+(first handle by arrow keys and by mouse; the first slider, the view or the cursor in the picture by keys; clicks), and
+prints in milliseconds, per Stage and way of moving it: median and 95th percentile of event to picture; medians of
+message to answer in the page and of message to answer in the kernel; and without a browser, compute with update, and
+drawing with encoding. P is the time of 1000 products of two 3x3 matrices at that moment, as in peers.py: where it is
+well above the smallest of the run, others had the machine.
 With --shots also a screenshot of each Stage in the light and the dark theme, wide and narrow.
 """
 
@@ -16,6 +16,7 @@ import argparse
 import importlib
 import importlib.util
 import inspect
+import itertools
 import json
 import os
 import pkgutil
@@ -113,8 +114,7 @@ def notebook(chosen):
 class Lab:
     """JupyterLab on a free port with fresh settings, in a folder of its own."""
 
-    def __init__(self, folder, content):
-        (folder / "stages.ipynb").write_text(json.dumps(content))
+    def __init__(self, folder):
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
@@ -136,7 +136,7 @@ class Lab:
              "--ServerApp.kernel_websocket_connection_class=labkit.server.connection.PromptConnection"],
             env=env, cwd=folder, stdout=self.log, stderr=self.log,
         )  # fmt: skip
-        self.url = f"http://127.0.0.1:{port}/lab/tree/stages.ipynb?token={token}"
+        self.folder, self.server, self.token = folder, f"http://127.0.0.1:{port}", token
         for _ in range(150):
             try:
                 urllib.request.urlopen(f"http://127.0.0.1:{port}/api?token={token}", timeout=1).read()
@@ -144,6 +144,11 @@ class Lab:
             except OSError:
                 time.sleep(0.2)
         raise RuntimeError(f"JupyterLab did not start: {(folder / 'lab.log').read_text()[-2000:]}")
+
+    def opened(self, page, name, chosen):
+        """Put Stages into a notebook of that name, open it alone, and run it."""
+        (self.folder / f"{name}.ipynb").write_text(json.dumps(notebook(chosen)))
+        run_all(page, f"{self.server}/lab/tree/{name}.ipynb?reset&token={self.token}", len(chosen))
 
     def close(self):
         self.process.terminate()
@@ -254,47 +259,60 @@ def main():
     if unknown:
         parser.error(f"no module or Stage is named {', '.join(unknown)}")
     chosen = [(m, n) for m, n in every if not options.only or {m, n, f"{m}.{n}"} & set(options.only)]
+    rows = []  # 95th percentile, P and median
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as play:
-        lab = Lab(Path(folder), notebook(chosen))
+        lab = Lab(Path(folder))
         browser = play.chromium.launch(executable_path=options.chromium, args=FLAGS)
+        print(
+            f"{'Stage':44s} {'way':8s} {'n':>3s} {'median':>7s} {'95 %':>7s} {'answer':>7s} {'kernel':>7s}"
+            f" {'compute':>7s} {'draw':>6s} {'P':>5s}"
+        )
         try:
-            page = browser.new_page(viewport={"width": 1280, "height": 1000}, device_scale_factor=options.ratio)
-            page.on("console", lambda m: print("console:", m.text) if m.type == "error" else None)
-            page.on("pageerror", lambda error: print("page error:", error))
-            run_all(page, lab.url, len(chosen))
-            if options.shots:
-                options.shots.mkdir(parents=True, exist_ok=True)
-                shoot(page, chosen, options.shots)
-            print(
-                f"{'Stage':44s} {'way':8s} {'n':>3s} {'median':>7s} {'95 %':>7s} {'answer':>7s} {'kernel':>7s}"
-                f" {'compute':>7s} {'draw':>6s} {'P':>5s}"
-            )
-            rows = []  # 95th percentile and P
-            for k, (module, name) in enumerate(chosen):
-                apply, draw = python_part(module, name)
-                before = reference()
-                found = latencies(page, stage_of(page, k), options.events)
-                P = max(before, reference())
-                for way, ms in ((way, ms) for way, ms in found.items() if ms):
-                    median, answer, python = np.median(ms, axis=0)
-                    high = np.percentile(np.array(ms)[:, 0], 95)
-                    rows.append((high, P, median))
-                    print(
-                        f"{module + '.' + name:44s} {way:8s} {len(ms):3d} {median:7.1f} {high:7.1f}"
-                        f" {answer:7.1f} {python:7.1f}"
-                        f" {apply:7.1f} {draw:6.1f} {P:5.2f}",
-                        flush=True,
-                    )
-            limit = 1.25 * min(speed for _, speed, _ in rows)
-            for what, goal, column in (("95th percentile", TARGET_MS, 0), ("median", MEDIAN_MS, 2)):
-                slow = [row[1] for row in rows if not row[column] <= goal]
-                calm = sum(speed <= limit for speed in slow)
-                told = f"{len(slow)} of {len(rows)} rows above {goal:.0f} ms ({what})"
-                print(f"{told}, {calm} of them at P <= {limit:.2f} ms")
-            print(f"middle of the medians {np.median([row[2] for row in rows]):.1f} ms")
+            for module, group in itertools.groupby(chosen, key=lambda pair: pair[0]):
+                page = browser.new_page(viewport={"width": 1280, "height": 1000}, device_scale_factor=options.ratio)
+                page.on("console", lambda m: print("console:", m.text) if m.type == "error" else None)
+                page.on("pageerror", lambda error: print("page error:", error))
+                rows += chapter(lab, page, module, list(group), options)
+                page.close()
         finally:
             browser.close()
             lab.close()
+    summary(rows)
+
+
+def chapter(lab, page, module, chosen, options):
+    """Print the rows of one chapter's notebook; its (95th percentile, P, median)."""
+    lab.opened(page, module, chosen)
+    if options.shots:
+        options.shots.mkdir(parents=True, exist_ok=True)
+        shoot(page, chosen, options.shots)
+    rows = []
+    for k, (_, name) in enumerate(chosen):
+        apply, draw = python_part(module, name)
+        before = reference()
+        found = latencies(page, stage_of(page, k), options.events)
+        P = max(before, reference())
+        for way, ms in ((way, ms) for way, ms in found.items() if ms):
+            median, answer, python = np.median(ms, axis=0)
+            high = np.percentile(np.array(ms)[:, 0], 95)
+            rows.append((high, P, median))
+            print(
+                f"{module + '.' + name:44s} {way:8s} {len(ms):3d} {median:7.1f} {high:7.1f}"
+                f" {answer:7.1f} {python:7.1f}"
+                f" {apply:7.1f} {draw:6.1f} {P:5.2f}",
+                flush=True,
+            )
+    return rows
+
+
+def summary(rows):
+    limit = 1.25 * min(speed for _, speed, _ in rows)
+    for what, goal, column in (("95th percentile", TARGET_MS, 0), ("median", MEDIAN_MS, 2)):
+        slow = [row[1] for row in rows if not row[column] <= goal]
+        calm = sum(speed <= limit for speed in slow)
+        told = f"{len(slow)} of {len(rows)} rows above {goal:.0f} ms ({what})"
+        print(f"{told}, {calm} of them at P <= {limit:.2f} ms")
+    print(f"middle of the medians {np.median([row[2] for row in rows]):.1f} ms")
 
 
 if __name__ == "__main__":

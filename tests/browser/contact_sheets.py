@@ -103,7 +103,7 @@ class Bridge:
     """A Stage behind a page: messages of the page in, what it sends back out."""
 
     def __init__(self):
-        self.stage, self.said, self.is_gone = None, [], False
+        self.stage, self.said, self.is_gone, self.unheard = None, [], False, []
 
     def show(self, page, stage):
         self.stage = stage
@@ -115,6 +115,7 @@ class Bridge:
 
     def __call__(self, message):
         if self.is_gone:
+            self.unheard.append(message)
             return []
         self.stage.receive(message)
         said, self.said = self.said, []

@@ -136,7 +136,9 @@ def test_numbers_of_the_caption_are_dragged_keyed_and_keep_the_focus():
         bridge.is_gone, at = True, slider.input_value()
         number.press("ArrowRight")
         page.locator(".gone", has_text="Python does not answer").wait_for(timeout=20_000)
+        page.wait_for_timeout(500)  # longer than a change of size takes to be noticed
         assert slider.input_value() == at
+        assert len(bridge.unheard) == 1 and "look" not in bridge.unheard[0]  # what is said asks for no other picture
         bridge.is_gone = False
         number.press("ArrowRight")  # one step on from what is shown
         page.wait_for_function("() => document.querySelector('[data-number=turn_deg]').textContent === '3.2'")
