@@ -71,7 +71,7 @@ class Figure {
     this.name = declared.name;
     this.root = element("div", "labkit-stage", { role: "group", "aria-label": declared.name });
     el.append(this.root);
-    this.line = new Line(model, () => this.silent());
+    this.line = new Line(model, { onSilence: () => this.silent(), onStir: () => this.mark() });
     this.picture = element("div", "picture");
     this.screen = new Screen(this.picture, (message) => this.show(message), () => this.room.look(true));
     this.space = new Space(this.picture, this.screen.canvas, declared, this.line);
@@ -122,6 +122,11 @@ class Figure {
     this.line.seen(message);
   }
 
+  /** For tests: whether nothing is on its way to Python or from there, and nothing waits for the page to be still. */
+  mark() {
+    this.root.dataset.rest = this.line.still && !this.room.settling;
+  }
+
   /** One looks from elsewhere: the handles go along, and Python hears of it with the next message, or at rest. */
   turned() {
     if (this.places) this.handles.show(this.scenes.placed(this.places));
@@ -147,13 +152,18 @@ class Figure {
 /** To Python: all that happened is merged into `pending`; one message is in flight, the next carries what came meanwhile,
  *  so that a drag never queues up. Python answers each with one picture. */
 class Line {
-  constructor(model, onSilence) {
-    Object.assign(this, { model, onSilence, pending: {}, flight: null, silent: false, timer: 0, resting: 0, count: 0, shown: 0, took: 0 });
+  constructor(model, { onSilence, onStir }) {
+    Object.assign(this, { model, onSilence, onStir, pending: {}, flight: null, silent: false, timer: 0, resting: 0, count: 0, shown: 0, answer: 0, took: 0 });
     this.view = Math.random().toString(36).slice(2); // two views of one Stage tell their answers apart
   }
 
   get idle() {
     return this.flight === null && Object.keys(this.pending).length === 0;
+  }
+
+  /** The last answer has come, and is on the screen. */
+  get still() {
+    return this.idle && !this.silent && this.shown > 0 && this.shown >= this.answer;
   }
 
   add(key, combine) {
@@ -170,7 +180,11 @@ class Line {
 
   flush() {
     clearTimeout(this.resting);
-    if (this.flight !== null || Object.keys(this.pending).length === 0) return;
+    if (this.flight === null && Object.keys(this.pending).length > 0) this.pass();
+    this.onStir();
+  }
+
+  pass() {
     this.flight = `${this.view}:${++this.count}`;
     this.sent = performance.now();
     this.timer = setTimeout(() => { this.flight = null; this.silent = true; this.onSilence(); this.flush(); }, PATIENCE);
@@ -189,7 +203,7 @@ class Line {
   hasAnswer(message) {
     if (message.serial === null || message.serial !== this.flight) return false;
     this.flight = null;
-    this.silent = false;
+    this.answer = message.picture;
     clearTimeout(this.timer);
     this.took = performance.now() - this.sent;
     return true;
@@ -198,6 +212,7 @@ class Line {
   /** A picture is on the screen. Python waits after three: every other one that is no answer is acknowledged. */
   seen(message) {
     this.shown = message.picture;
+    this.silent = false; // what comes late has come
     if (message.serial === null && this.idle && this.shown % 2 === 0) this.send({ shown: this.shown });
     this.flush();
     this.rest();
@@ -897,7 +912,8 @@ class Room {
     });
     this.watch = () => { // once it has come to rest: while a theme is exchanged, nothing has its size or color
       clearTimeout(this.settling);
-      this.settling = setTimeout(() => this.look(), SETTLED);
+      this.settling = setTimeout(() => { this.settling = 0; this.look(); line.onStir(); }, SETTLED);
+      line.onStir();
     };
     this.resizing = new ResizeObserver(this.watch);
     this.resizing.observe(root);

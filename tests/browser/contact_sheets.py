@@ -43,12 +43,10 @@ window.show = (declaration) => {
     on: (kind, hear) => { if (kind === "msg:custom") hears.add(hear); },
     off: (kind, hear) => hears.delete(hear),
     send: async (message) => {
-      window.underway = (window.underway ?? 0) + 1;
       for (const [said, files] of await window.toPython(message)) {
         const buffers = files.map((file) => new DataView(Uint8Array.from(atob(file), (c) => c.charCodeAt(0)).buffer));
         for (const hear of hears) hear(said, buffers);
       }
-      window.underway -= 1;
     },
   };
   document.body.replaceChildren();
@@ -56,14 +54,6 @@ window.show = (declaration) => {
   window.close_ = render({ model, el: document.body });
 };
 """
-RESTS = """async () => {
-  for (let calm = 0, last = ""; calm < 3; ) {
-    await new Promise((go) => setTimeout(go, 110)); // longer in all than a change of theme takes to be noticed
-    const { picture } = document.querySelector(".labkit-stage").dataset;
-    calm = !window.underway && picture === last ? calm + 1 : 0;
-    last = picture;
-  }
-}"""
 CUT = """() => {
   const stage = document.querySelector(".labkit-stage");
   const box = stage.getBoundingClientRect();
@@ -111,7 +101,7 @@ class Bridge:
         page.evaluate("declaration => window.show(declaration)", stage.declaration())
         drawn = "canvas[data-space=true]" if stage.spaces else "canvas"
         page.locator(f".labkit-stage[data-picture] {drawn}").first.wait_for(timeout=20_000)
-        page.evaluate(RESTS)  # nothing is on its way, and nothing new came for four tenths of a second
+        page.evaluate(driver.RESTS)
 
     def __call__(self, message):
         if self.is_gone:
@@ -169,7 +159,7 @@ def shots(found, size, said):
                 dress(page, False)
                 for look, change in zip(LOOKS, (bridge.show, fail, dress, reset)):
                     change(page, stage if change == bridge.show else True)
-                    page.evaluate(RESTS)
+                    page.evaluate(driver.RESTS)
                     picture = page.locator(".labkit-stage").screenshot()
                     made[look, stem, name] = Image.open(io.BytesIO(picture)).convert("RGB")
                     for words in [*page.evaluate(CUT), *page.evaluate(UNHEARD), *small_letters(stage)]:

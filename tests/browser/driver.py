@@ -163,6 +163,17 @@ def wait_until_idle(page, seconds=120):
         page.wait_for_timeout(250)
 
 
+RESTS = """async () => {
+    const frame = () => new Promise(requestAnimationFrame);
+    for (let still = 0; still < 3; ) { // what a picture changes around it is noticed in the frame after
+        await frame();
+        const stage = document.querySelector("#place .labkit-stage, body > .labkit-stage");
+        const sharp = stage?.querySelector(".picture").dataset.rest !== "false"; // a scene in space, once it is still
+        still = sharp && stage?.dataset.rest === "true" ? still + 1 : 0;
+    }
+}"""
+
+
 def soon(page, check, seconds=15):
     """Wait until `check()` holds, however busy the machine is; whether it came to hold."""
     for _ in range(10 * seconds):

@@ -59,14 +59,10 @@ def show(page, key):
 
 def rest(page):
     """Wait until the figure is drawn and nothing is on its way; its pixels."""
+    page.evaluate(driver.RESTS)
     return page.evaluate(
-        """async () => {
+        """() => {
             const root = document.querySelector("#place .labkit-stage");
-            for (let calm = 0, last = ""; calm < 3; ) {
-                await new Promise((go) => setTimeout(go, 60));
-                calm = root.dataset.picture === last ? calm + 1 : 0;
-                last = root.dataset.picture;
-            }
             return root.querySelector("canvas").toDataURL().length + ":" + root.querySelector(".caption").textContent;
         }"""
     )

@@ -5,7 +5,7 @@ a lost Python.
 import driver
 import numpy as np
 import pytest
-from contact_sheets import CUT, RESTS, UNHEARD, stage_page
+from contact_sheets import CUT, UNHEARD, stage_page
 from test_space_in_lab import CONTEXTS, apart, at_rest
 
 from labkit.chapters.ch02_chaining import stages as chaining
@@ -102,7 +102,7 @@ def test_the_theme_of_another_editor_is_followed():
             if bridge.stage is None:
                 bridge.show(page, chaining.growth())
             assert driver.soon(page, lambda dark=dark: bridge.stage._picture.dark is dark)
-            page.evaluate(RESTS)
+            page.evaluate(driver.RESTS)
             corner = page.locator("canvas:not(.space)").evaluate(
                 "node => node.getContext('2d').getImageData(2, node.height - 2, 1, 1).data[0]"
             )
