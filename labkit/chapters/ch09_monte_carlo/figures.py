@@ -136,7 +136,7 @@ def corridor(fig, length):
     )
     sticks, places = [], []
     for ax, title in zip(axes, titles):
-        ax.set(xlim=(0, length), ylim=(0, 1.15), yticks=[])
+        ax.set(xlim=(0, length), ylim=(0, 1.45), yticks=[])  # the robot stands beneath the title, not in it
         ax.set_title(title, pad=2)
         ax.grid(False)
         sticks += ax.plot([], [], color=style.ESTIMATE, linewidth=0.8, alpha=0.7)
