@@ -99,13 +99,19 @@ def as_matrices(value, name, rows, columns):
 
 def as_shape(value, name, *shape):
     """`value` as a finite array of just this shape; a letter stands for any length, and twice for the same."""
-    array, letters = as_finite(value, name), {}
-    if array.ndim != len(shape) or any(
-        n != (w if isinstance(w, int) else letters.setdefault(w, n)) for w, n in zip(shape, array.shape)
-    ):
+    array = as_finite(value, name)
+    if not is_of_shape(array, shape):
         wanted = f"({shape[0]},)" if len(shape) == 1 else f"({', '.join(map(str, shape))})"
         raise ValueError(f"{name} must have shape {wanted}, got {array.shape}")
     return array
+
+
+def is_of_shape(array, shape):
+    """Whether an array has just this shape; a letter stands for any length, and twice for the same."""
+    letters = {}
+    return array.ndim == len(shape) and all(
+        n == (w if isinstance(w, int) else letters.setdefault(w, n)) for w, n in zip(shape, array.shape)
+    )
 
 
 def as_number(value, name):
@@ -120,22 +126,17 @@ def as_positive_number(value, name):
 
 def as_count(value, name, at_least=1):
     """`value` as a whole number, not below `at_least`."""
-    number = as_number(value, name)
-    if number != int(number) or number < at_least:
-        raise ValueError(f"{name} must be a whole number, at least {at_least}, got {shown(number)}")
-    return int(number)
+    return as_whole(as_number(value, name), name, at_least)
 
 
 def as_whole(value, name, at_least=None):
     """`value` as it is if it is one whole number, not below `at_least`; 3.0 becomes 3."""
-    if not isinstance(value, int | np.integer) or isinstance(value, bool | np.timedelta64):
-        number = as_number(value, name)
-        if number != int(number):
-            raise ValueError(f"{name} must be a whole number, got {shown(number)}")
-        value = int(number)
-    if at_least is not None and value < at_least:
-        raise ValueError(f"{name} must be a whole number, at least {at_least}, got {value}")
-    return value
+    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool | np.timedelta64)
+    number = value if is_whole else as_number(value, name)
+    if number != int(number) or (at_least is not None and number < at_least):
+        bound, got = "" if at_least is None else f", at least {at_least}", number if is_whole else shown(number)
+        raise ValueError(f"{name} must be a whole number{bound}, got {got}")
+    return number if is_whole else int(number)
 
 
 def fit_together(**shapes):

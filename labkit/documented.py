@@ -27,6 +27,7 @@ from .checks import (
     as_transforms,
     as_truths,
     as_whole,
+    is_of_shape,
     kind,
 )
 
@@ -177,7 +178,7 @@ def _array(name, shapes, truths, indices, gaps, value):
         value = as_floats(value, name)
     if not gaps and value.dtype.kind == "f":
         as_finite(value, name)
-    if shapes and not any(_fits(value.shape, shape) for shape in shapes):
+    if shapes and not any(_fits(value, shape) for shape in shapes):
         wanted = " or ".join(f"({', '.join(map(str, shape))}{',' * (len(shape) == 1)})" for shape in shapes)
         raise ValueError(f"{name} must have shape {wanted}, got {value.shape}")
     if not gaps:
@@ -207,11 +208,11 @@ def _refuse_other_sizes(name, value, shape, sizes):
                 raise ValueError(f"{name} must have {letter} = {known} as {other} has, got shape {value.shape}")
 
 
-def _fits(found, shape):
+def _fits(value, shape):
+    """Whether an array is of a shape that may begin with "...", any number of axes of any length."""
     if shape[:1] == ("...",):
-        shape = shape[1:]
-        found = found[len(found) - len(shape) :] if len(found) >= len(shape) else ()
-    return len(found) == len(shape) and all(isinstance(w, str) or w == n for w, n in zip(shape, found))
+        shape = (*map(str, range(value.ndim - len(shape) + 1)), *shape[1:])
+    return is_of_shape(value, shape)
 
 
 def _number(name, gaps, value):

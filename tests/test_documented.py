@@ -75,7 +75,7 @@ def test_what_it_says_arrives():
 
 
 @documented
-def select(R, cov, r, kept, rows=None, count=3, robot=None, given=(None, None)):
+def select(R, cov, r, kept, rows=None, count=3, robot=None, given=(None, None), normal=None):
     """Arguments whose letters, kinds and names say more than their shapes.
 
     Parameters
@@ -89,6 +89,7 @@ def select(R, cov, r, kept, rows=None, count=3, robot=None, given=(None, None)):
         At least 1.
     robot : array, shape (4, 4), optional
     given : tuple
+    normal : array, shape (..., p, p), optional
     """
     return kept, rows, count
 
@@ -106,11 +107,13 @@ GOOD = {"R": np.eye(3), "cov": np.eye(2), "r": np.zeros((4, 2)), "kept": [True, 
         ({"kept": [[True], []]}, "kept must hold truth values, got rows of different lengths"),
         ({"rows": [0.5]}, "rows must hold whole numbers"),
         ({"count": 0}, "count must be a whole number, at least 1, got 0"),
-        ({"count": 1.5}, "count must be a whole number, got 1.5"),
+        ({"count": 1.5}, "count must be a whole number, at least 1, got 1.5"),
         ({"count": np.timedelta64(3, "s")}, "count must hold real numbers, got durations"),
         ({"count": True}, "count must hold real numbers, got truth values"),
         ({"robot": np.diag([1.0, 1.0, -1.0, 1.0])}, "robot must be right-handed"),
         ({"given": 5}, "given must be of type tuple, got an object of type int"),
+        ({"normal": np.zeros((5, 3, 2))}, r"normal must have shape \(\.\.\., p, p\), got \(5, 3, 2\)"),
+        ({"normal": np.zeros(2)}, r"normal must have shape \(\.\.\., p, p\), got \(2,\)"),
     ],
 )
 def test_letters_kinds_and_names_are_kept(change, words):
