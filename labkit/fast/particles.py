@@ -1,4 +1,8 @@
-"""Clouds of ten thousand particles moved and drawn anew; each equals its namesake in `localization.particles`."""
+"""Clouds of ten thousand particles moved and drawn anew.
+
+Given the same random numbers, each equals its namesake in `localization.particles`; `sample_motion` draws its normal
+ones in another way, `normal_pairs`.
+"""
 
 import math
 
@@ -34,8 +38,8 @@ def sample_motion(states, u, dt, rng, cov_u, model="midpoint"):
 def normal_pairs(rng, n):
     """Independent standard normal numbers as points of the plane, which is quicker than one by one.
 
-    Half the squared distance from the middle is exponential and the direction uniform (Box and Muller), the latter in
-    single precision: one of 16 million directions.
+    Half the squared distance from the middle is exponential and the direction uniform (Box and Muller). One of 16
+    million directions is enough for a cloud: single precision makes sine and cosine quicker.
 
     Parameters
     ----------
