@@ -1,6 +1,7 @@
 """What arrives at the border: every public function refuses bad input with one clear sentence."""
 
 import numbers
+from collections.abc import Hashable
 from decimal import Decimal
 
 import numpy as np
@@ -240,6 +241,15 @@ def as_items(value, name, of):
     if isinstance(value, str | bytes) or not np.iterable(value):
         raise ValueError(f"{name} must be a sequence of {of}, got {kind(value)}")
     return list(value)
+
+
+def as_names(value, name):
+    """`value` as a list of names; refuses what can name nothing, such as a list."""
+    names = as_items(value, name, "names")
+    for one in names:
+        if not isinstance(one, Hashable):
+            raise ValueError(f"{name} must hold names, got {kind(one)}")
+    return names
 
 
 def kind(value):

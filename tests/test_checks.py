@@ -23,6 +23,7 @@ from labkit.fast.maps import RangeTable
 from labkit.geometry import chaining, frames, lie, planar
 from labkit.localization import ekf, lateration, maps, mcl, odometry, particles
 from labkit.localization.drives import find_route, follow
+from labkit.localization.locate import locate
 from labkit.localization.sensors import LikelihoodField, Scanner, beam_density, see_landmarks, weigh_doors
 from labkit.machines import simulation, udp
 from labkit.machines.arm import (
@@ -266,6 +267,15 @@ REFUSED = [
     (lambda: follow(O3, [[1.0, 1.0]], 5, 0.0), "dt must be positive"),
     (lambda: see_landmarks(None, O3, MARKS, rng(), std_range=-0.1), "std_range must not be negative"),
     (lambda: find_route(["x"], "a", "b"), "edges must be pairs"),
+    (lambda: find_route([("a", ["b"])], "a", "b"), "places must hold names, got an object of type list"),
+    (
+        lambda: locate([0.0], [[1.0, 0.0]], [0.0], [["a"]], [[1.0, 0.0]], ["a"], [[2.0, 0.0]]),
+        "ids must hold names, got an object of type list",
+    ),
+    (
+        lambda: locate([0.0], [[1.0, 0.0]], [0.0], [], [[1.0, 0.0]], ["a"], [[2.0, 0.0]]),
+        "ids must hold 1 names, got 0",
+    ),
     (lambda: particles.uniform_states(GRID, -1, rng()), "n_particles must be a whole number"),
     # optimization, wells
     (lambda: optimization.newton_step([1.0, np.nan], np.eye(2)), "the gradient must be finite"),

@@ -2,12 +2,11 @@
 
 import math
 from collections import deque
-from collections.abc import Hashable
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import as_count, as_items, as_points, as_positive_number, as_shape, kind
+from ..checks import as_count, as_items, as_names, as_points, as_positive_number, as_shape
 from ..documented import documented
 from ..geometry.planar import wrap_angle
 from . import odometry
@@ -35,9 +34,7 @@ def find_route(edges, start, goal):
     edges = as_items(edges, "edges", "pairs of names")
     if not all(isinstance(edge, (tuple, list)) and len(edge) == 2 for edge in edges):
         raise ValueError("edges must be pairs of names")
-    for name in (start, goal, *(name for edge in edges for name in edge)):
-        if not isinstance(name, Hashable):
-            raise ValueError(f"a place must have a name, got {kind(name)}")
+    as_names((start, goal, *(name for edge in edges for name in edge)), "places")
     before, queue = {start: None}, deque([start])
     while queue and goal not in before:
         here = queue.popleft()

@@ -5,13 +5,12 @@ around their landmarks, standard deviations of greatest likelihood where none ar
 new start where it has lost the robot.
 """
 
-from collections.abc import Hashable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares, minimize
 
-from ..checks import as_choice, as_finite, as_instance, as_items, as_points, as_positive_number, as_shape
+from ..checks import as_choice, as_finite, as_instance, as_names, as_points, as_positive_number, as_shape
 from ..documented import documented
 from ..estimation.kalman import mean_band
 from ..geometry.planar import compose_pose, relative_pose, wrap_angle
@@ -359,13 +358,11 @@ def locate(
         One sentence: nothing explains the readings, or none can be placed.
     """
     u, z, landmarks = as_points(u, "u", 2), as_shape(z, "z", "k", 2), as_shape(landmarks, "landmarks", "m", 2)
-    raw_time, reading_time = (
-        as_shape(odometry_time, "odometry_time", len(u)),
-        as_shape(reading_time, "reading_time", len(z)),
-    )
-    ids, landmark_ids = as_items(ids, "ids", "names"), as_items(landmark_ids, "landmark_ids", "names")
+    raw_time = as_shape(odometry_time, "odometry_time", len(u))
+    reading_time = as_shape(reading_time, "reading_time", len(z))
+    ids, landmark_ids = as_names(ids, "ids"), as_names(landmark_ids, "landmark_ids")
     for name, named, rows in (("ids", ids, z), ("landmark_ids", landmark_ids, landmarks)):
-        if len(named) != len(rows) or not all(isinstance(one, Hashable) for one in named):
+        if len(named) != len(rows):
             raise ValueError(f"{name} must hold {len(rows)} names, got {len(named)}")
     time, starts, warnings = mend_clock(raw_time)
     row, lag = place_readings(raw_time, starts, reading_time)
