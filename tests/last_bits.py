@@ -5,7 +5,8 @@ a kernel, where `load_ipython_extension` is called, it stirs a notebook. LAST_BI
 same input gives the same output, as on any one processor: what differs between two seeds hangs on last bits.
 
 Stirred are the functions whose results differ from one build of BLAS and LAPACK to the next, by one or two units in
-the last place per entry, up, down or not at all. `@` stays as it is: it cannot be replaced from outside.
+the last place per entry, up, down or not at all; so is a 1 that every processor finds exactly, and a symmetric result
+is so no more: nothing may hang on either. `@` stays as it is: it cannot be replaced from outside.
 """
 
 import functools
