@@ -46,76 +46,76 @@ def answer(body, head=""):
 
 SWALLOW = "while True:\n    try:\n        {}\n    except{}:\n        {}"
 CASES = {
-    "3a endless comprehension": answer("return [i for i in iter(int, 1)]"),
-    "3b swallowed sleep": answer(SWALLOW.format("time.sleep(0.5)", "", "pass")),
-    "3b swallowed twice": answer(
+    "endless comprehension": answer("return [i for i in iter(int, 1)]"),
+    "swallowed sleep": answer(SWALLOW.format("time.sleep(0.5)", "", "pass")),
+    "swallowed twice": answer(
         "while True:\n    try:\n        try:\n            time.sleep(0.5)\n        except:\n            pass\n"
         "    except:\n        pass"
     ),
-    "3b swallowed around NumPy": answer(SWALLOW.format("np.linalg.norm(T)", " BaseException", "continue")),
-    "3d recursion limit and endless recursion": answer(
+    "swallowed around NumPy": answer(SWALLOW.format("np.linalg.norm(T)", " BaseException", "continue")),
+    "recursion limit and endless recursion": answer(
         "import sys\nsys.setrecursionlimit(10**9)\ndef f(n):\n    return f(n + 1)\nreturn f(0)"
     ),
-    "3e the same loop three times": answer("while True:\n    pass") * 3,
-    "8 the name is the reference": answer("return invert(T)"),
-    "9 the working directory is deleted": answer(
+    "the same loop three times": answer("while True:\n    pass") * 3,
+    "the name is the reference": answer("return invert(T)"),
+    "the working directory is deleted": answer(
         "return np.linalg.inv(T)", "import tempfile\nd = tempfile.mkdtemp()\nos.chdir(d)\nos.rmdir(d)"
     )
     + "\nos.chdir('/')",
-    "9 decimal comma": "ex.distance(12,5)",
-    "9 complex result": answer("return np.linalg.inv(T) + 1j"),
-    "9 async def": RIGHT.replace("def invert", "async def invert"),
-    "9 half a letter printed": answer("print('\\ud800')\nreturn T"),
-    "9 half a letter raised": answer("raise ValueError('\\udfff')"),
-    "9 half a letter returned": answer("return '\\udfff'"),
-    "9 MemoryError": answer("raise MemoryError"),
-    "9 KeyboardInterrupt": answer("raise KeyboardInterrupt"),
-    "9 ValueError that says nothing": answer("raise ValueError"),
-    "9 default_rng replaced": answer("np.random.default_rng = None\nreturn T"),
-    "9 builtins.print replaced": answer("import builtins\nbuiltins.print = None\nreturn T"),
-    "9 builtins.all replaced": answer("import builtins\nbuiltins.all = lambda *_: True\nreturn T"),
-    "9 builtins.zip replaced": answer("import builtins\nbuiltins.zip = lambda *_: []\nreturn T"),
-    "9 copy replaced": answer("import copy\ncopy.deepcopy = None\nreturn T"),
-    "9 os replaced": answer("os.getcwd = None\nreturn T"),
-    "9 signal replaced": answer("import signal\nsignal.setitimer = None\nreturn T"),
-    "9 json replaced": answer("import json\njson.dumps = None\nreturn T"),
-    "9 html replaced": answer("import html\nhtml.escape = None\nreturn T"),
-    "9 time replaced": answer("time.monotonic = None\nreturn T"),
-    "9 inspect replaced": answer("import inspect\ninspect.signature = None\nreturn T"),
-    "9 a class of labkit patched": answer(
+    "decimal comma": "ex.distance(12,5)",
+    "complex result": answer("return np.linalg.inv(T) + 1j"),
+    "async def": RIGHT.replace("def invert", "async def invert"),
+    "half a letter printed": answer("print('\\ud800')\nreturn T"),
+    "half a letter raised": answer("raise ValueError('\\udfff')"),
+    "half a letter returned": answer("return '\\udfff'"),
+    "MemoryError": answer("raise MemoryError"),
+    "KeyboardInterrupt": answer("raise KeyboardInterrupt"),
+    "ValueError that says nothing": answer("raise ValueError"),
+    "default_rng replaced": answer("np.random.default_rng = None\nreturn T"),
+    "builtins.print replaced": answer("import builtins\nbuiltins.print = None\nreturn T"),
+    "builtins.all replaced": answer("import builtins\nbuiltins.all = lambda *_: True\nreturn T"),
+    "builtins.zip replaced": answer("import builtins\nbuiltins.zip = lambda *_: []\nreturn T"),
+    "copy replaced": answer("import copy\ncopy.deepcopy = None\nreturn T"),
+    "os replaced": answer("os.getcwd = None\nreturn T"),
+    "signal replaced": answer("import signal\nsignal.setitimer = None\nreturn T"),
+    "json replaced": answer("import json\njson.dumps = None\nreturn T"),
+    "html replaced": answer("import html\nhtml.escape = None\nreturn T"),
+    "time replaced": answer("time.monotonic = None\nreturn T"),
+    "inspect replaced": answer("import inspect\ninspect.signature = None\nreturn T"),
+    "a class of labkit patched": answer(
         "from labkit.exercises import metrics\nmetrics.Poses.equal = lambda *_: True\nreturn T"
     ),
-    "9 seterrcall, locale, environ, path, mask, trace, gc": answer(
+    "seterrcall, locale, environ, path, mask, trace, gc": answer(
         "import gc, locale, signal, sys\nnp.seterr(all='call')\nnp.seterrcall(print)\n"
         "locale.setlocale(locale.LC_ALL, 'C')\nos.environ.clear()\nsys.path.clear()\n"
         "signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])\n"
         "gc.disable()\nos.umask(0o777)\nsys.settrace(lambda *_: None)\nreturn T"
     ),
-    "2 endless __str__": answer(
+    "endless __str__": answer(
         "class E(Exception):\n    def __str__(self):\n        while True:\n            pass\nraise E"
     ),
-    "2 evil __str__": answer("class E(Exception):\n    def __str__(self):\n        raise RuntimeError\nraise E"),
-    "2 evil __repr__ returned": answer("class R:\n    def __repr__(self):\n        raise RuntimeError\nreturn R()"),
-    "2 evil __array__": answer("class R:\n    def __array__(self, *_, **__):\n        raise SystemExit\nreturn R()"),
-    "2 the timer switched off": answer("import signal\nsignal.setitimer(signal.ITIMER_REAL, 0)\nreturn T"),
-    "2 a check inside its own check": answer("return ex.invert(invert)"),
-    "2 numpy thrown out": answer("import sys\ndel sys.modules['numpy']\nreturn T"),
-    "2 nested run_cell": answer("get_ipython().run_cell('1 / 0')\nreturn T"),
-    "2 the student's own names deleted": answer("globals().pop('np', None)\nreturn T") + "import numpy as np",
-    "2 exit": answer("exit()"),
-    "2 os._exit": answer("os._exit(1)"),
-    "2 kill": answer("os.kill(os.getpid(), 9)"),
-    "2 fork": answer("os.fork()"),
-    "2 input": answer("return input()"),
-    "2 pdb": answer("breakpoint()\nreturn T"),
-    "2 100 MB printed": answer("print('x' * 10**8)\nreturn T"),
-    "2 standard output closed": answer("import sys\nsys.stdout.close()\nreturn T"),
-    "2 a terabyte": answer("return np.zeros(2**40)"),
-    "2 a thread that goes on": answer(
+    "evil __str__": answer("class E(Exception):\n    def __str__(self):\n        raise RuntimeError\nraise E"),
+    "evil __repr__ returned": answer("class R:\n    def __repr__(self):\n        raise RuntimeError\nreturn R()"),
+    "evil __array__": answer("class R:\n    def __array__(self, *_, **__):\n        raise SystemExit\nreturn R()"),
+    "the timer switched off": answer("import signal\nsignal.setitimer(signal.ITIMER_REAL, 0)\nreturn T"),
+    "a check inside its own check": answer("return ex.invert(invert)"),
+    "numpy thrown out": answer("import sys\ndel sys.modules['numpy']\nreturn T"),
+    "nested run_cell": answer("get_ipython().run_cell('1 / 0')\nreturn T"),
+    "the student's own names deleted": answer("globals().pop('np', None)\nreturn T") + "import numpy as np",
+    "exit": answer("exit()"),
+    "os._exit": answer("os._exit(1)"),
+    "kill": answer("os.kill(os.getpid(), 9)"),
+    "fork": answer("os.fork()"),
+    "input": answer("return input()"),
+    "pdb": answer("breakpoint()\nreturn T"),
+    "100 MB printed": answer("print('x' * 10**8)\nreturn T"),
+    "standard output closed": answer("import sys\nsys.stdout.close()\nreturn T"),
+    "a terabyte": answer("return np.zeros(2**40)"),
+    "a thread that goes on": answer(
         "import threading\nthreading.Thread(target=time.sleep, args=(1,)).start()\nreturn T"
     ),
-    "2 a warning as error": answer("import warnings\nwarnings.simplefilter('error')\nreturn T"),
-    "2 the argument changed": answer("T[:] = 0\nreturn T"),
+    "a warning as error": answer("import warnings\nwarnings.simplefilter('error')\nreturn T"),
+    "the argument changed": answer("T[:] = 0\nreturn T"),
 }
 
 
