@@ -271,14 +271,9 @@ def at_the_limit(rng, finer, low, high):
         allowed = sum(map(half_unit, entries)) / count + own
         mean = sum(map(number, entries)) / count
         average = f"{mean + rng.choice([-1, 1]) * allowed * rng.uniform(low, high):.{decimals + finer}f}"
-        if low < abs(mean - number(average)) / allowed < high:
-            found = suspects(entries, average)
-            if found or high < 1 and _search(agree=_allow(_a_little_less))(entries, average):
-                return entries, average
-
-
-def _a_little_less(halves, own):
-    return (np.mean(halves) + own) * (1 - LIMIT)
+        off = abs(mean - number(average)) / allowed
+        if low < off < high and _suspected(_gaps(entries, average), -LIMIT if high < 1 else 0):
+            return entries, average
 
 
 def column(rng, slip):
@@ -329,12 +324,38 @@ def _clear(rng, draw):
     """
     while True:
         drawn = draw(rng)
-        sides = [lambda halves, own, by=by: (np.mean(halves) + own) * (1 + by) for by in (-1e-7, 1e-7)]
-        found = [_search(agree=_allow(side))(*drawn) for side in sides]
-        halves, own = [half_unit(text) for text in drawn[0]], half_unit(drawn[1])
-        found += [_search(agree=_allow(lambda *_, s=side, h=halves, o=own: s(h, o)))(*drawn) for side in sides]
+        gaps = _gaps(*drawn)
+        found = [_suspected(gaps, more, kept) for more in (-1e-7, 1e-7) for kept in (False, True)]
         if all(each == found[0] for each in found):
             return drawn
+
+
+def _gaps(entries, average):
+    """The gap and what rounding allows, as printed; and of each number, after each of its slips, the gap and by how
+    much more is allowed for the new digits."""
+    printed = [*entries, average]
+    part = np.append(np.full(len(entries), 1 / len(entries)), -1.0)  # of each number in the gap
+    values, halves = _read(printed)
+    gap, slips = part @ values, []
+    for text, share, value, half in zip(printed, part, values, halves):
+        others, own = _read(single_slips(text))
+        slips.append((np.abs(gap + share * (others - value)), abs(share) * (own - half)))
+    return abs(gap), np.abs(part) @ halves, slips
+
+
+def _read(texts):
+    return np.array([number(text) for text in texts]), np.array([half_unit(text) for text in texts])
+
+
+def _suspected(gaps, more, kept=False):
+    """`suspects` from the gaps, where more than rounding explains is allowed, by this share of it.
+
+    kept: a number with a slip keeps the half unit that it was printed with.
+    """
+    gap, allowed, slips = gaps
+    if gap <= allowed * (1 + more):
+        return set()
+    return {k for k, (left, new) in enumerate(slips) if (left <= (allowed + (not kept) * new) * (1 + more)).any()}
 
 
 COLUMNS = tuple(
