@@ -108,7 +108,7 @@ def changes(function, most=4):
     -------
     changes : list of Change
     """
-    found, names = [], _names(function)
+    found, names, indices = [], _names(function), set(_indices(function))
     for owner in ast.walk(function):
         for field, content in ast.iter_fields(owner):
             for i, node in enumerate(content if isinstance(content, list) else [content]):
@@ -116,6 +116,7 @@ def changes(function, most=4):
                     continue
                 for rank, words, new in _changed(node, names):
                     if rank <= most:
+                        words = COUNTED if node in indices and words == "with one sign turned" else words
                         _locate(new, node)
                         whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
                         mends = _mends(words, node, new)
@@ -125,6 +126,15 @@ def changes(function, most=4):
     return sorted(found, key=lambda change: change.rank)
 
 
+def _indices(function):
+    """What stands in brackets, or on either side of a colon there: its sign says from which end is counted."""
+    for node in ast.walk(function):
+        if isinstance(node, ast.Subscript):
+            yield from node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+        elif isinstance(node, ast.Slice):
+            yield from (node.lower, node.upper)
+
+
 def _locate(new, node):
     """What takes a node's place stands in its line."""
     if "lineno" in new._attributes and not hasattr(new, "lineno"):
@@ -132,6 +142,7 @@ def _locate(new, node):
     ast.fix_missing_locations(new)
 
 
+COUNTED = "with one index counted from the other end"
 REVERSED = (  # (words of what was changed in a right formula, what is wrong where the change mends)
     (r"with (.+) where (.+) belongs", r"\2 stands where \1 belongs"),
     (r"without one of its (.+)s", r"one \1 is too many"),
@@ -142,6 +153,7 @@ REVERSED = (  # (words of what was changed in a right formula, what is wrong whe
     (r"with (.+) (turned around|turned over|exchanged)", r"\1 is \2"),
     (r"with the factors of one product `@` in another order", "the factors of this product belong in another order"),
     (r"with one sign turned", "the sign is the other one"),
+    (COUNTED, "this index counts from the other end"),
     (r"with one part squared", "the square of this belongs there"),
     (r"with the root of one part taken", "the root of this belongs there"),
     (r"with one angle in degrees", "this belongs there in degrees"),

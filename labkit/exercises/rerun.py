@@ -263,6 +263,12 @@ def _matrix(v):
     return v
 
 
+def _vector(v):
+    if v.ndim != 1:
+        raise ValueError("no vector")
+    return _long(v)
+
+
 def _long(v):
     if not v.ndim or len(v) < 2:
         raise ValueError("no vector")
@@ -300,7 +306,11 @@ def _pose(v, turn, shift):
 
 
 def _normalized(v):
-    return _long(v) / np.linalg.norm(v, axis=-1, keepdims=True)
+    return _vector(v) / np.linalg.norm(v)
+
+
+def _rows_normalized(v):
+    return _matrix(v) / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
 def _with_own_rows(v):
@@ -336,6 +346,7 @@ OTHERWISE = (  # (what it should have been, function of the value [and of an arg
     ("it does not belong there: with 1 in its place", np.ones_like),
     ("the identity belongs in its place", lambda v: 0 * _square(v) + np.eye(v.shape[-1])),
     ("it is to be divided by its length", _normalized),
+    ("each of its rows is to be divided by its own length", _rows_normalized),
     ("the mean of its rows is to be taken off", _with_own_rows),
     ("the mean of its rows belongs there", lambda v: _long(v).mean(axis=0)),
     ("the sum of its rows belongs there", lambda v: _long(v).sum(axis=0)),

@@ -953,7 +953,7 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         _pole_from(limit_deg),
-                        "Right except near the pole: A may be chosen freely at B = 90 deg alone. Even a tenth of a degree beside it "
+                        "Right except near the pole: A may be chosen freely at B = +-90 deg alone. Even a tenth of a degree beside it "
                         "A and C are two angles, and np.arctan2 still reads both.",
                         id=f"kuka-pole-from-{limit_deg:g}",
                     )

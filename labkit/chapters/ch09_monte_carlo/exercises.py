@@ -1236,19 +1236,16 @@ CHAPTER = Chapter(
                     lambda: 541,
                     "That is a whole scan. The product is zero long before its last beam: count until it is.",
                 ),
-                *(
-                    Mistake(
-                        lambda number=number: math.log(number) / math.log(0.01),
-                        "There the *normal* numbers of float64 end (2.2e-308). Smaller ones still exist, with fewer digits, and beams are whole: count on.",
-                    )
-                    for number in (2.2250738585072014e-308,)
+                Mistake(
+                    lambda: math.log(np.finfo(float).tiny) / math.log(0.01),
+                    "There the *normal* numbers of float64 end (2.2e-308). Smaller ones still exist, with fewer digits, and beams are whole: count on.",
                 ),
                 *(
                     Mistake(
                         lambda beams=beams: beams,
-                        "That far 0.01 to the power n is no more than lost beside 1. By itself it is a number above zero: it has an exponent of its own.",
+                        "From n = 8 on 0.01 to the power n is lost when it is added to 1. By itself it is a number above zero: it has an exponent of its own.",
                     )
-                    for beams in (7, 9, 16, math.log(2.220446049250313e-16) / math.log(0.01))
+                    for beams in (7, 9, 16, math.log(np.finfo(float).eps) / math.log(0.01))
                 ),
                 Mistake(lambda: 323, "That counts powers of ten. Each beam contributes two of them."),
                 Mistake(lambda: 324, "That counts powers of ten. Each beam contributes two of them."),

@@ -405,7 +405,7 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         _significant_digits(counted),
-                        "You counted significant digits. What the last digit is worth depends on its place behind the point alone: 86 and 1086 hide the same.",
+                        "You counted digits, all of them or the significant ones. What the last digit is worth depends on its place alone, before the point or behind it: 86 and 1086 hide the same.",
                     )
                     for counted in (lambda digits: digits.lstrip("0"), lambda digits: digits)
                 ),
