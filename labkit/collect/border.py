@@ -177,7 +177,7 @@ class Remote:
         content = {"args": list(args), "plans": list(plans), "seconds": float(seconds), "what": what}
         try:
             told = self.border.ask("rerun", function=self.number, **content)
-            return told["found"], float(told["spent"])
+            return told["found"], self._worked(told["spent"])
         except wire.Gone:
             raise
         except Exception:  # an explanation is not worth more than the answer
@@ -206,8 +206,16 @@ class Remote:
     def _spend(self, told):
         if isinstance(told.get("printed"), str) and told["printed"]:
             print(told["printed"][: guard.OUTPUT_LIMIT + 100], end="")
+        spent = self._worked(told.get("spent", 0.0))
         if self.left is not None:
-            self.left = max(0.05, self.left - max(0.0, float(told.get("spent", 0.0))))
+            self.left = max(0.05, self.left - spent)
+
+    @staticmethod
+    def _worked(spent):
+        """The seconds that the other side says it has worked, within reason, and counted as such."""
+        spent = min(max(0.0, float(spent)), JUDGE_SECONDS)
+        guard.Abroad.worked += spent
+        return spent
 
     def _put_back(self, args, content, parts):
         """What the other side did to its copies of the arguments happens to ours."""
@@ -230,14 +238,13 @@ class Written:
     """`rerun.Written` of a function on the other side."""
 
     def __init__(self, remote, changes, places):
-        self.remote, self.spent = remote, 0.0
+        self.remote = remote
         self.changes = [(int(rank), int(line), str(code), str(mends)) for rank, line, code, mends in changes]
         self.places = [(int(n), str(code), str(name), int(size), int(k)) for n, code, name, size, k in places]
 
     def trace(self, args, seconds):
         """As `rerun.Written.trace`."""
-        found, spent = self.remote.rerun("trace", args, seconds=seconds)
-        self.spent += spent
+        found, _ = self.remote.rerun("trace", args, seconds=seconds)
         return [_rounds(*pair) for pair in found] if len(found) == len(self.places) else [(0, None)] * len(self.places)
 
     def results(self, plans, args, seconds, keep):
@@ -245,7 +252,7 @@ class Written:
         kept, left = [], seconds
         for start in range(0, len(plans), AT_ONCE):
             found, spent = self.remote.rerun("results", args, plans[start : start + AT_ONCE], left)
-            self.spent, left = self.spent + spent, left - spent
+            left -= spent
             guard.run(lambda found=found: kept.extend(map(keep, found)), (), limit=guard.TIME_LIMIT)
             if left <= 0 or len(found) < min(AT_ONCE, len(plans) - start):
                 break

@@ -22,7 +22,7 @@ from .worker import FIGURES
 SILENCE = 30.0  # seconds that a cell may compute without handing anything in
 WHOLE = 240.0  # seconds for all of a notebook
 TURNS = 6  # times that a notebook is run, without the cells that stopped it
-LOOKING = 2.0  # seconds in which an explanation is looked for, of each kind: what a notebook finds is found here too
+LOOKING = 4.0  # seconds in which an explanation is looked for: what a notebook finds is found here too
 HANDED = 25  # times that one exercise may be handed in
 LIBRARY = "library"  # the status of an answer that is not the student's own
 NOT_REACHED, PREDICTED, UNREADABLE = "not reached", "predicted", "not a choice"
@@ -52,7 +52,7 @@ class Plan:
 def judge(chapter, cells, seed, key):
     """The `Verdicts` on the code cells of one notebook; draws follow from `seed` and `key`, which names the file."""
     plan, until = Plan(), time.monotonic() + WHOLE
-    engine.LOOKING = engine.SEARCHING = LOOKING
+    engine.LOOKING = LOOKING
     stopped = []
     for _ in range(TURNS):
         run = Session(chapter, seed, key, plan)

@@ -12,7 +12,6 @@ import functools
 import hashlib
 import inspect
 import itertools
-import time
 import types
 from dataclasses import dataclass, field, replace
 
@@ -20,6 +19,7 @@ import numpy as np
 
 from . import arguments, cases, guard, metrics, operands, quantities, regions, relations, scope, shapes, slips
 from . import steps as own_steps
+from .budget import Budget, seconds
 from .typeset import typeset
 
 TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
@@ -27,10 +27,9 @@ NOISY = "exact on clean data, but the data are not weighed as they should be: on
 TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws of each kind
 MANY_DIGITS = 1e-3  # by how much better some draws come out where one case is special
 MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried, to tell on which
-SEARCHING = 0.2  # seconds of processor time for each kind of change of the student's own code
 MORE_CASES = 8  # on which an explanation from the first draws is tried once more, at least ...
 MOST_CASES = 64  # ... and at most, as far as LOOKING allows: of one in fifty draws a coincidence may hide
-LOOKING = 0.5  # seconds of processor time in which changes of arguments, or of the formula, are tried as explanation
+LOOKING = 1.2  # seconds of processor time, from the beginning of a check, in which an explanation is looked for
 UNITS = {
     "mm": ("length", 1e-3),
     "cm": ("length", 1e-2),
@@ -191,7 +190,7 @@ class _Trial:
     def __init__(self, exercise, function):
         self.exercise, self.function = exercise, function
         self.pairs, self.inputs, self.metrics, self.words = [], [], [], []
-        self.refusal, self.printed, self.spent = "", "", 0.0
+        self.refusal, self.printed, self.spent, self.budget = "", "", 0.0, Budget(LOOKING)
 
     def outcome(self, status, text="", mistake=None):
         return Outcome(status, text, mistake, self.printed)
@@ -209,9 +208,9 @@ class _Trial:
                 admitted.append(_Refusal(result))
             return None
 
-        started = _seconds()
+        started = seconds()
         run = guard.run(self.function, args, finish, self.exercise.limit)
-        self.spent += _seconds() - started
+        self.spent += seconds() - started
         self.printed = self.printed or run.printed
         if run.error is not None:
             named = self._named_by_failing(run.error, args)
@@ -318,14 +317,12 @@ class _Trial:
         """The words of the first of (words, function) that gives the student's results, on fresh draws as well; None
         if none does in time.
         """
-        draws, ends, variants = self._cases(), time.thread_time() + LOOKING, iter(variants)
-        while time.thread_time() < ends:
+        draws, kind, variants = self._cases(), self.budget.part(), iter(variants)
+        while kind.left():
             fits = None
             try:
-                with guard.time_limit(2 * LOOKING):  # a variant may well have a loop without an end
+                with guard.time_limit(kind.left()):  # a variant may well have a loop without an end
                     for words, function in variants:
-                        if time.thread_time() > ends:
-                            return None
                         if all(self._is_mistake(Mistake(function, words), *case) for case in draws):
                             fits = words, function
                             break
@@ -339,7 +336,7 @@ class _Trial:
         """Whether a variant gives the student's results on fresh draws as well."""
         mistake, draws = Mistake(function, ""), self._fresh_results
         try:
-            with guard.time_limit(2 * LOOKING):
+            with guard.time_limit(self.budget.left()):
                 return all(self._is_mistake(mistake, *draw) for draw in draws)
         except guard.TimeLimit:
             return False
@@ -347,9 +344,9 @@ class _Trial:
     @functools.cached_property
     def _fresh_results(self):
         """(arguments, metric, (result, expected)) of the student's function on fresh plain draws, where it succeeds."""
-        found, ends = [], _seconds() + LOOKING
+        found, kind = [], self.budget.part()
         for case in self._fresh:
-            if _seconds() > ends or self.spent > LOOKING:
+            if not kind.left():
                 break  # a slow answer is not called more often than it must
             if case.metric is self.exercise.metric:
                 admitted = functools.partial(_admitted, case.metric, case.expected)
@@ -379,7 +376,7 @@ class _Trial:
         return "\n".join(map(_closed, told)) or None
 
     def _solution(self, search):
-        return own_steps.of_solution(self.exercise, search.cases, SEARCHING)
+        return own_steps.of_solution(self.exercise, search.cases, self.budget)
 
     def _right_somewhere(self):
         """Whether some plain draws come out right: then these are what is to be told."""
@@ -388,32 +385,32 @@ class _Trial:
 
     def _search(self):
         """What looks for the step of the student's own code at which it goes wrong; None where it cannot be read."""
-        if self.exercise.metric is None or not self.inputs or self.spent > LOOKING:
+        if self.exercise.metric is None or not self.inputs:
             return None
         drawn = [
             own_steps.Case(args, metric, pair[1], None if isinstance(pair[0], _Refusal) else pair[0])
             for args, metric, pair in zip(self.inputs, self.metrics, self.pairs)
         ]
-        return own_steps.search(self.function, self._names(self.inputs[0]), drawn, self._judging(), SEARCHING)
+        return own_steps.search(self.function, self._names(self.inputs[0]), drawn, self._judging(), self.budget)
 
     def _mended(self, outcome, args, metric, expected):
         """What was raised, with the change of the student's code that gives the right result, if one does."""
         if outcome.status != RAISED or metric is None or metric is not self.exercise.metric:
             return outcome
         drawn = [own_steps.Case(args, metric, expected), *self._fresh[:2]]
-        search = own_steps.search(self.function, self._names(args), drawn, self._judging(), SEARCHING)
+        search = own_steps.search(self.function, self._names(args), drawn, self._judging(), self.budget)
         words = search and search.words()
         return replace(outcome, text=f"{outcome.text}\n{words[0].upper()}{_closed(words[1:])}") if words else outcome
 
     @functools.cached_property
     def _fresh(self):
         """More draws, on which an explanation is tried once more: plain ones, the special ones among the first."""
-        rng, found, ends = np.random.default_rng(0), [], _seconds() + LOOKING
+        rng, found, kind = np.random.default_rng(0), [], self.budget.part()
         plain = [(draw, self.exercise.metric) for draw in self.exercise.cases]
         first = [*itertools.islice(itertools.cycle(plain), MORE_CASES)]
         first += 2 * [(draw, metric) for draw, metric, *_ in self.exercise.noisy]
         for draw, metric in itertools.islice(itertools.chain(first, itertools.cycle(plain)), MOST_CASES):
-            if len(found) >= len(first) and _seconds() > ends:
+            if len(found) >= len(first) and not kind.left():
                 break
             args = draw(rng)
             found.append(own_steps.Case(args, metric, self.exercise.reference(*copy.deepcopy(args))))
@@ -452,7 +449,7 @@ class _Trial:
     def _unmoved(self):
         """An argument that makes no difference to the results, though it should."""
         draws = self._cases()
-        if self.exercise.metric is None or not draws or self.spent > LOOKING:
+        if self.exercise.metric is None or not draws or not self.budget.left():
             return None
         draws += self._fresh_results
         for k, name in enumerate(self._names(draws[0][0])):
@@ -589,9 +586,9 @@ class _Trial:
         """What the draws on which the answer is wrong have in common, fresh ones among them, and how many these are."""
         metric, rng = self.exercise.metric, np.random.default_rng(0)
         draws = [(args, pair[1], not m.equal(*pair)) for args, m, pair in self._cases()]
-        ends = _seconds() + LOOKING
+        kind = self.budget.part()
         for draw in itertools.islice(itertools.cycle(self.exercise.cases), MORE_DRAWS):
-            if _seconds() > ends or self.spent > LOOKING:
+            if not kind.left():
                 break  # a slow answer, perhaps in another process: it is not called more often than it must
             args = draw(rng)
             expected = self.exercise.reference(*copy.deepcopy(args))
@@ -654,11 +651,6 @@ class _Trial:
         if args and self.pairs and all(m and m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)):
             with_ += "\nIt was right before, on other draws: what is different about this one, its shapes perhaps?"
         return self.outcome(RAISED, f"{type(error).__name__}: {said}{advice}{where}{with_}")
-
-
-def _seconds():
-    """A clock that stands still while the processor serves others, where that is known."""
-    return time.perf_counter() - guard.Starved.seconds()
 
 
 def _fails(mistake, args):
@@ -880,7 +872,7 @@ class Value(Item):
 
     def _changed(self, metric, answer, expected):
         """Which change of the solution's computation gives it."""
-        return regions.change_words(self, answer, lambda found: metric.equal(found, expected), 2 * SEARCHING)
+        return regions.change_words(self, answer, lambda found: metric.equal(found, expected), LOOKING / 2)
 
     def _made_otherwise(self, answer):
         """Which other number of the same data it is."""

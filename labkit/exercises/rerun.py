@@ -91,7 +91,7 @@ class Written:
 
     def __init__(self, function, tree, lines=None):
         self.function, self.tree, self.lines = function, tree, lines or {}
-        self.counted, self.spent = STEPS, 0.0
+        self.counted = STEPS
         self._noted, self.places = _noted(function, tree, self.lines)
         _ticking(tree)
 

@@ -7,7 +7,6 @@ is where it goes wrong.
 
 import functools
 import re
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,16 +106,11 @@ class Judging:
 class Search:
     """Looks for one change that mends a student's function."""
 
-    def __init__(self, written, names, cases, judging, seconds):
-        """`seconds` are for each kind of change."""
-        self.written, self.names, self.judging, self.seconds = written, names, judging, seconds
+    def __init__(self, written, names, cases, judging, budget):
+        self.written, self.names, self.judging, self.budget = written, names, judging, budget
         self.cases = sorted(cases, key=lambda case: case.was_right)
         self.results = [None if case.result is None else rerun.numeric(case.result) for case in self.cases]
-        self.values, begun = [], time.thread_time() + written.spent
-        for case in self.cases:
-            if time.thread_time() + written.spent - begun > seconds:
-                raise TimeoutError("a function so slow is not run again and again")
-            self.values.append(written.trace(case.args, seconds))
+        self.values = _traces(written, self.cases, budget)
 
     @_or_nothing
     def words(self):
@@ -125,39 +119,38 @@ class Search:
 
     def mending(self, plans, values=None):
         """The first plan that makes the result right on all draws; None where none does in time."""
-        left = self.seconds
+        kind = self.budget.part()
         for start in range(0, len(plans), BATCH):
-            batch, began, before = plans[start : start + BATCH], time.thread_time(), self.written.spent
-            fits = self._fitting(batch, 0, left, values)
+            batch = plans[start : start + BATCH]
+            fits = self._fitting(batch, 0, kind, values)
             for plan in [plan for plan, fit in zip(batch, fits) if fit]:
-                others = (self._fitting([plan], i, self.seconds, values) for i in range(1, len(self.cases)))
+                others = (self._fitting([plan], i, self.budget, values) for i in range(1, len(self.cases)))
                 if all(fit == [True] for fit in others) and self._is_answer(plan):
                     return plan
-            left -= time.thread_time() - began + self.written.spent - before
-            if left <= 0.01 or len(fits) < len(batch):
+            if not kind.left() or len(fits) < len(batch):
                 return None
         return None
 
     def _is_answer(self, plan):
         """Whether the function with this change would be taken as an answer, as far as fresh draws tell."""
-        fresh = (self.written.results([plan], c.args, self.seconds, c.keep) for c in self.judging.more(plan[0]))
+        fresh = (self.written.results([plan], c.args, self.budget.left(), c.keep) for c in self.judging.more(plan[0]))
         if any(fit != [True] for fit in fresh):
             return False
 
         def changed(*args):
-            found = self.written.results([plan], args, self.seconds, lambda found: found)
+            found = self.written.results([plan], args, self.budget.left(), lambda found: found)
             if not found or found[0] is None:
                 raise ValueError("the changed function failed")
             return found[0][0]
 
         return plan[0] == "given" or self.judging.holds(changed)
 
-    def _fitting(self, plans, i, seconds, values):
+    def _fitting(self, plans, i, budget, values):
         """Whether each plan makes the i-th result right; `values[i]` are those that plans put in other's places."""
         case = self.cases[i]
         if values is not None:
             plans = [(kind, k, list(values[i][q][1])) for kind, k, q in plans]
-        return self.written.results(plans, case.args, seconds, case.keep)
+        return self.written.results(plans, case.args, budget.left(), case.keep)
 
     # Changes of the code
 
@@ -231,30 +224,30 @@ class Search:
     def partly_words(self):
         """A change of the code that leaves a simple difference, or makes a part of the result right on all draws."""
         plans = [("code", k) for k, (rank, *_) in enumerate(self.written.changes) if rank < WORTH]
-        begun, best = time.thread_time() + self.written.spent, None
+        kind, best = self.budget.part(), None
         right = [case.right_parts(case.result) for case in self.cases]
         for start in range(0, len(plans), BATCH):
             batch = plans[start : start + BATCH]
-            for plan, better in zip(batch, self.written.results(batch, *self._first(right[0]))):
+            for plan, better in zip(batch, self._gains(batch, right[0], kind)):
                 if better and (words := self._partly(plan, right)) and (best is None or better > best[0]):
                     best = better, plan, words
-            if time.thread_time() + self.written.spent - begun > self.seconds:
+            if not kind.left():
                 break
         if best is None:
             return None
         _, line, code, mends = self.written.changes[best[1][1]]
         return f"in line {line}, `{code}`: {mends}. With this changed, {best[2]}"
 
-    def _first(self, right):
-        """Arguments of the first draw, seconds, and how much better a changed function's result is on it."""
+    def _gains(self, plans, right, kind):
+        """How much better each plan makes the result of the first draw."""
         case = self.cases[0]
-        return case.args, self.seconds, lambda found: case.gain(found, right)
+        return self.written.results(plans, case.args, kind.left(), lambda found: case.gain(found, right))
 
     def _partly(self, plan, right):
         """What comes right on all draws by a change that does not make all right, in words."""
         found = []
         for case in self.cases:
-            kept = self.written.results([plan], case.args, self.seconds, case.admit)
+            kept = self.written.results([plan], case.args, self.budget.left(), case.admit)
             if kept and kept[0] is not None:
                 found.append(kept[0])
         if len(found) < len(self.cases):
@@ -439,10 +432,20 @@ class Search:
 
 
 @_or_nothing
-def search(function, names, cases, judging, seconds):
+def search(function, names, cases, judging, budget):
     """A `Search` for what is wrong in a function; None where its code cannot be read again."""
     written = rerun.written(function)
-    return written and Search(written, names, cases, judging, seconds)
+    return written and Search(written, names, cases, judging, budget)
+
+
+def _traces(written, cases, budget):
+    """The values on the way of every draw; a function that is too slow for that is not run again and again."""
+    kind, found = budget.part(), []
+    for case in cases:
+        if not kind.left():
+            raise TimeoutError
+        found.append(written.trace(case.args, kind.left()))
+    return found
 
 
 def value_relation(mine, theirs, named):
@@ -462,8 +465,8 @@ def value_relation(mine, theirs, named):
 class Solution:
     """The values on the way of the chapter's solution on the same draws."""
 
-    def __init__(self, written, cases, seconds):
-        self.places, self.values = written.places, [written.trace(case.args, seconds) for case in cases]
+    def __init__(self, written, cases, budget):
+        self.places, self.values = written.places, _traces(written, cases, budget)
         kept = [q for q in range(len(self.places)) if all(values[q][0] for values in self.values)]
         self.distinct = []
         for q in kept:
@@ -501,10 +504,10 @@ def _changes(function, value, others):
 
 
 @_or_nothing
-def of_solution(exercise, cases, seconds):
+def of_solution(exercise, cases, budget):
     """The solution's values on the way; None where it is not at hand."""
     found = slips.solved(exercise)
     if found is None:
         return None
     function, tree = found
-    return Solution(rerun.Written(function, tree), cases, seconds)
+    return Solution(rerun.Written(function, tree), cases, budget)

@@ -8,7 +8,6 @@ from labkit.exercises import engine, regions, session
 
 @pytest.fixture(autouse=True)
 def searches_to_the_end(monkeypatch):
-    monkeypatch.setattr(engine, "SEARCHING", 15.0)
     monkeypatch.setattr(regions, "_FOUND", {})
 
 

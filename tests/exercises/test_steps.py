@@ -35,11 +35,6 @@ ITEM = Exercise(
 )
 
 
-@pytest.fixture(autouse=True)
-def searches_to_the_end(monkeypatch):
-    monkeypatch.setattr(engine, "SEARCHING", 30.0)
-
-
 def told(body):
     outcome = ITEM.judge(typed(body), rng=np.random.default_rng(0))
     assert outcome.status == NOT_YET
