@@ -11,7 +11,7 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from stage_latency import FLAGS, Lab, notebook, reference, run_all, stage_of
+from stage_latency import FLAGS, Lab, reference, stage_of
 
 PLAYS = (
     ("ch09_monte_carlo", "arena", "10,000 particles", 15.0, None),
@@ -26,9 +26,8 @@ COUNT = """async (seconds) => {
 }"""
 
 
-def rates(url, page, button, seconds, rounds):
+def rates(page, button, seconds, rounds):
     """Pictures a second of the one Stage of a notebook, round by round."""
-    run_all(page, url, 1)
     stage = stage_of(page, 0)
     if button:
         stage.get_by_role("button", name=button).click()
@@ -50,10 +49,11 @@ def main():
         )
         for module, name, what, goal, button in PLAYS:
             with tempfile.TemporaryDirectory() as folder:
-                lab = Lab(Path(folder), notebook([(module, name)]))
+                lab = Lab(Path(folder))
                 try:
                     page, before = browser.new_page(viewport={"width": 1280, "height": 1000}), reference()
-                    found = rates(lab.url, page, button, options.seconds, options.rounds)
+                    lab.opened(page, name, [(module, name)])
+                    found = rates(page, button, options.seconds, options.rounds)
                     P = max(before, reference())
                     told = ", ".join(f"{rate:.1f}" for rate in found)
                     print(f"{name}, {what}: {told} pictures a second (goal {goal:.0f}, P {P:.2f} ms)", flush=True)
