@@ -1,4 +1,4 @@
-"""How long an explanation may be looked for: one budget for a check, of which every kind of explanation takes a part."""
+"""How long an explanation may be looked for: one budget for a check, and of it a part for each kind of explanation."""
 
 import time
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labkit.exercises import engine, regions, session
+from labkit.exercises import regions, session
 
 
 @pytest.fixture(autouse=True)

@@ -6,7 +6,7 @@ import textwrap
 import numpy as np
 import pytest
 
-from labkit.exercises import engine, guard, metrics, rerun, session, steps
+from labkit.exercises import guard, metrics, rerun, session, steps
 from labkit.exercises.engine import CORRECT, NOT_YET, Exercise
 
 
