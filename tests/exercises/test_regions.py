@@ -7,7 +7,7 @@ from labkit.exercises import regions, session
 
 
 @pytest.fixture(autouse=True)
-def searches_to_the_end(monkeypatch):
+def nothing_found_before(monkeypatch):
     monkeypatch.setattr(regions, "_FOUND", {})
 
 
