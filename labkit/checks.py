@@ -1,5 +1,6 @@
 """What arrives at the border: every public function refuses bad input with one clear sentence."""
 
+import math
 import numbers
 from collections.abc import Hashable
 from decimal import Decimal
@@ -76,25 +77,31 @@ def _what(array):
 
 def as_points(value, name, dim=3):
     """`value` as finite points, shape (..., dim)."""
-    array = as_finite(value, name)
+    array, largest = _with_largest(value, name)
     if array.ndim < 1 or array.shape[-1] != dim:
         raise ValueError(f"{name} must have shape (..., {dim}), got {array.shape}")
-    _refuse_huge(array, name)
+    _refuse_huge(largest, name)
     return array
 
 
-def _refuse_huge(array, name):
-    largest = np.abs(array).max(initial=0.0)
+def _with_largest(value, name):
+    """`value` as an array of finite floats, and the largest of their amounts; thousands of them are passed twice."""
+    array = as_floats(value, name)
+    largest = max(array.max(initial=0.0), -array.min(initial=0.0))  # NaN if one is
+    return (array if math.isfinite(largest) else as_finite(array, name)), largest
+
+
+def _refuse_huge(largest, name):
     if largest > LARGEST_COORDINATE:
         raise ValueError(f"{name} must hold numbers below {LARGEST_COORDINATE:.0e}, got {shown(largest, '.3g')}")
 
 
 def as_matrices(value, name, rows, columns):
     """`value` as finite matrices, shape (..., rows, columns)."""
-    array = as_finite(value, name)
+    array, largest = _with_largest(value, name)
     if array.shape[-2:] != (rows, columns):
         raise ValueError(f"{name} must have shape (..., {rows}, {columns}), got {array.shape}")
-    _refuse_huge(array, name)
+    _refuse_huge(largest, name)
     return array
 
 

@@ -51,7 +51,9 @@ def normal_pairs(rng, n):
     -------
     array, shape (2, n)
     """
-    far, direction = np.sqrt(2 * rng.standard_exponential(n)), rng.random(n, dtype=np.float32)
+    far, direction = rng.standard_exponential(n, dtype=np.float32), rng.random(n, dtype=np.float32)
+    far *= 2
+    np.sqrt(far, out=far)
     direction *= math.tau
     pairs = np.empty((2, n))
     np.multiply(far, np.cos(direction), out=pairs[0])

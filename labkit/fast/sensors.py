@@ -44,7 +44,8 @@ def _misfit(z, landmarks, std_range, std_bearing, coordinates, dtype):
     """Half the sum of squared errors of all readings, each in standard deviations, worked out in `dtype`."""
     turns = coordinates[2] / math.tau
     turns -= np.rint(turns)
-    d = (landmarks[:, :, None] - coordinates[:2]).astype(dtype, copy=False)
+    d = np.empty((len(landmarks), 2, len(turns)), dtype)
+    np.subtract(landmarks[:, :, None], coordinates[:2], out=d, casting="same_kind")
     misfit = np.zeros(len(turns))
     if std_bearing is not None:
         off = np.arctan2(d[:, 1], d[:, 0])
@@ -52,16 +53,16 @@ def _misfit(z, landmarks, std_range, std_bearing, coordinates, dtype):
         off -= turns.astype(dtype, copy=False)
         off -= (z[:, 1:] / math.tau).astype(dtype)
         off -= np.rint(off)
-        off *= math.tau * math.sqrt(0.5) / std_bearing
         off *= off
-        misfit += off.sum(0)
+        scale = math.tau * math.sqrt(0.5) / std_bearing
+        misfit += off.sum(0) * scale * scale
     if std_range is not None:
         d *= d
         far = np.sqrt(d[:, 0] + d[:, 1])
         far -= z[:, :1].astype(dtype)
-        far *= math.sqrt(0.5) / std_range
         far *= far
-        misfit += far.sum(0)
+        scale = math.sqrt(0.5) / std_range
+        misfit += far.sum(0) * scale * scale
     return misfit
 
 

@@ -130,9 +130,8 @@ def normalize_weights(log_weights):
         When every weight is zero (all logarithms -inf): no particle explains the measurement.
     """
     log_weights = as_floats(log_weights, "log_weights")
-    if log_weights.ndim != 1 or not log_weights.size or np.isnan(log_weights).any() or (log_weights == np.inf).any():
+    if log_weights.ndim != 1 or not log_weights.size or not (top := log_weights.max()) < np.inf:
         raise ValueError(f"log_weights must be a vector of numbers or -inf, got shape {log_weights.shape} or NaN in it")
-    top = log_weights.max()
     if top == -np.inf:
         raise ValueError("log_weights are all -inf: no particle explains the measurement, every weight is zero")
     weights = np.exp(log_weights - top)

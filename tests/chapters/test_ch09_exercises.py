@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import binom, chisquare, norm
 
 from labkit.chapters.ch09_monte_carlo import exercises as ch09
-from labkit.exercises import session
+from labkit.exercises import engine, session
 from labkit.exercises.engine import CORRECT, NOT_YET, RAISED
 from labkit.localization import maps, mcl, odometry, particles
 
@@ -150,7 +150,8 @@ def test_spins_that_go_on_where_the_last_one_ended_are_refused():
 
 
 @pytest.mark.parametrize("answer", [161.65, 162.5])
-def test_beams_are_whole(answer):
+def test_beams_are_whole(answer, monkeypatch):
+    monkeypatch.setattr(engine, "LOOKING", 0.1)  # why it is wrong is not asked here
     assert CHAPTER["beams_to_zero"].judge(answer).status == NOT_YET
 
 
