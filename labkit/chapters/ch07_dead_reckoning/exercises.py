@@ -7,6 +7,7 @@ import numpy as np
 from ...documents.lecture import printed as lecture
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...geometry.planar import wrap_angle
 from ...localization import lateration, odometry, wheels
 
 # Draws -----------------------------------------------------------------------
@@ -59,7 +60,18 @@ def two_wheels(rng, faster_right=True):
     return (slow, slow + more, rng.uniform(0.2, 0.8)) if faster_right else (slow + more, slow, rng.uniform(0.2, 0.8))
 
 
-WHEELS = (two_wheels, functools.partial(two_wheels, faster_right=False))
+def wheels_alike(rng, turn):
+    """Wheels of one speed: straight on with turn = 1; on the spot, to either side, with turn = -1."""
+    speed = rng.uniform(0.2, 1) * rng.choice([-1, 1])
+    return speed, turn * speed, rng.uniform(0.2, 0.8)
+
+
+WHEELS = (
+    two_wheels,
+    functools.partial(two_wheels, faster_right=False),
+    functools.partial(wheels_alike, turn=-1),
+    functools.partial(wheels_alike, turn=1),
+)
 
 
 def pose_control_step(rng, side=1, gear=1):
@@ -72,6 +84,16 @@ def pose_control_step(rng, side=1, gear=1):
 
 
 EITHER_WAY = tuple(functools.partial(pose_control_step, side=side, gear=gear) for gear in (1, -1) for side in (1, -1))
+
+
+def across_the_seam(rng):
+    """The same with a heading that comes to 180 deg, or beyond, during the turn."""
+    x, u, dt = pose_control_step(rng, side=rng.choice([-1, 1]), gear=rng.choice([-1, 1]))
+    turn = u[1] * dt
+    return np.array([*x[:2], np.sign(turn) * np.pi - rng.uniform(0.2, 0.8) * turn]), u, dt
+
+
+STEPS = (*EITHER_WAY, across_the_seam)
 PLANAR = {"x": "a planar pose is always (x, y, theta)", "u": "a control is always (v, omega)"}
 
 
@@ -170,6 +192,10 @@ def ackermann_twist(speed, steering, wheelbase):
 
 def mecanum_twist(speeds, half_length, half_width):
     return wheels.mecanum_to_twist(speeds, half_length, half_width)[0]
+
+
+def _bicycle_about_its_middle(speed, steering, wheelbase):
+    return np.array([speed, speed * np.sin(np.arctan(np.tan(steering) / 2)) / (wheelbase / 2)])
 
 
 def _three_wheels(speeds, half_length, half_width):
@@ -309,6 +335,16 @@ def _slips_of_the_sum(step, angle):
             f"A sign in y: add the way times the sine of {angle}.",
         ),
     ]
+
+
+def _between_wrapped_headings(x, u, dt):
+    after = wrap_angle(x[2] + u[1] * dt)
+    return _straight(_way, lambda *given: (x[2] + after) / 2, _turn)(x, u, dt)
+
+
+def _mean_of_two_ways(x, u, dt):
+    turn = np.array([0.0, 0.0, u[1] * dt])
+    return (step_euler(x, u, dt) + step_euler(x + turn, u, dt) - turn) / 2
 
 
 def _chord(theta, v, omega, dt):
@@ -700,6 +736,10 @@ CHAPTER = Chapter(
                     "No absolute value: a turn to the right has omega < 0.",
                 ),
                 Mistake(
+                    lambda a, b, l: np.array([(a + b) / 2, (b - a) / l if a + b else 0.0]),
+                    "Right but for a turn on the spot. There v and the radius are both 0, and v / radius says nothing: the difference of the wheels does.",
+                ),
+                Mistake(
                     lambda a, b, l: np.array([a + b, (a - b) / l]),
                     "Two slips: v is half the sum, and omega is positive when the right wheel is faster.",
                 ),
@@ -708,7 +748,7 @@ CHAPTER = Chapter(
         Exercise(
             "step_euler",
             reference=step_euler,
-            draw=EITHER_WAY,
+            draw=STEPS,
             fixed=PLANAR,
             metric=metrics.PlanarPoses(),
             hints=(
@@ -746,7 +786,7 @@ CHAPTER = Chapter(
         Exercise(
             "step_midpoint",
             reference=step_midpoint,
-            draw=EITHER_WAY,
+            draw=STEPS,
             fixed=PLANAR,
             metric=metrics.PlanarPoses(),
             hints=(
@@ -777,6 +817,18 @@ CHAPTER = Chapter(
                     _straight(_way, _mean, _turn), "A bracket too many: theta + omega T / 2, not (theta + omega T) / 2."
                 ),
                 Mistake(
+                    _between_wrapped_headings,
+                    "Right until the heading passes 180 deg: the mean of 179 deg and -179 deg is 0. Add half of the turn to the old heading.",
+                ),
+                Mistake(
+                    _mean_of_two_ways,
+                    "You take the mean of two ways, along the old and along the new heading. The midpoint model drives one way, v T, along the heading in their middle.",
+                ),
+                Mistake(
+                    lambda x, u, dt: step_euler(step_euler(x, u, dt / 2), u, dt / 2),
+                    "These are two steps of the simplified model, each of half the time. The midpoint model takes one, along the heading of half the turn.",
+                ),
+                Mistake(
                     _straight(_way, _beyond, _turn),
                     "The heading was turned before it was used: keep the old theta for cosine and sine.",
                 ),
@@ -786,7 +838,7 @@ CHAPTER = Chapter(
         Exercise(
             "step_arc",
             reference=step_arc,
-            draw=EITHER_WAY,
+            draw=STEPS,
             fixed=PLANAR,
             metric=metrics.PlanarPoses(1e-7),  # thousands of short steps are right as well
             noisy=tuple(
@@ -1556,6 +1608,10 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda v, d, L: np.array([v, v * d / L]), "Right for small angles only: the tangent is missing."
+                ),
+                Mistake(
+                    _bicycle_about_its_middle,
+                    "That is the model about the middle of the car, which slips aside, with v as the speed there. Here v is the speed of the rear axle's middle.",
                 ),
                 Mistake(
                     lambda v, d, L: np.array([v, v * np.tan(d) * L]),
