@@ -240,6 +240,7 @@ class _Trial:
         if named:
             return named
         words = self._relation(whole=True) or self._other_arguments() or self._terms()
+        unmoved = None if words or self.refusal else self._unmoved()  # now, since the search may use up the budget
         search = None if words else self._search()
         solution = search and self._solution(search)
         step = search and (search.passed_words(solution) or search.words())
@@ -260,7 +261,7 @@ class _Trial:
                 if words and not metric.equal(*pair):
                     off = next(d for d in metric.deviations(*pair) if not d.within)
                     return self.outcome(NOT_YET, _closed(f"{words} {off}"))
-        words = self._unmoved() or self._relation()
+        words = unmoved or self._relation()
         words = _closed(words) if words else self._deviation()
         return self.outcome(NOT_YET, words + self._agreement(search, solution) + self._about_globals())
 
@@ -451,28 +452,40 @@ class _Trial:
         draws = self._cases()
         if self.exercise.metric is None or not draws or not self.budget.left():
             return None
-        draws += self._fresh_results
+        unread = _unread(self.function)
         for k, name in enumerate(self._names(draws[0][0])):
-            if self._makes_no_difference(k, draws):
+            if name in unread and any(self._moves(k, *pair) for pair in self._exchanges(k, draws)):
+                return f"your function never uses `{name}`, and its result should change with it"
+            if self._makes_no_difference(k, draws) and self._makes_no_difference(k, draws + self._fresh_results, 2):
                 return f"your result does not change with `{name}`, and it should"
         return None
 
-    def _makes_no_difference(self, k, draws):
+    def _exchanges(self, k, draws):
+        """(draw, its arguments with the k-th of another one) of every draw; the next that has another one like it."""
+        for i, (args, *_) in enumerate(draws):
+            others = next((o for o, *_ in draws[i + 1 :] + draws[:i] if _could_change(args[k], o[k])), None)
+            if others is not None:
+                yield draws[i], (*args[:k], others[k], *args[k + 1 :])
+
+    def _moves(self, k, draw, changed):
+        """Whether the reference gives another result for the changed arguments; None where they do not go together."""
+        try:
+            return not draw[1].equal(self.exercise.reference(*copy.deepcopy(changed)), draw[2][1])
+        except Exception:
+            return None
+
+    def _makes_no_difference(self, k, draws, least=0):
         """Whether the k-th argument, taken from the next draw, changes the reference's results, never the student's."""
         tried = 0
-        for (args, metric, pair), (others, _, _) in zip(draws, [*draws[1:], draws[0]]):
-            if not _could_change(args[k], others[k]):
-                continue
-            changed = (*args[:k], others[k], *args[k + 1 :])
-            try:
-                moved = not metric.equal(self.exercise.reference(*copy.deepcopy(changed)), pair[1])
-            except Exception:  # arguments of two draws need not go together
+        for draw, changed in self._exchanges(k, draws):
+            moved = self._moves(k, draw, changed)
+            if moved is None:
                 continue
             run = guard.run(self.function, changed, limit=self.exercise.limit)
-            if not moved or run.error is not None or not _equal_as_written(metric, run.result, pair[0]):
+            if not moved or run.error is not None or not _equal_as_written(draw[1], run.result, draw[2][0]):
                 return False
             tried += 1
-        return tried > 1
+        return tried >= least
 
     def _about_globals(self):
         """A line about data of the notebook that the function reads, which a checked function is not given."""
@@ -673,6 +686,16 @@ def _has_loop(function):
             return True
         codes += [constant for constant in code.co_consts if isinstance(constant, types.CodeType)]
     return False
+
+
+def _unread(function):
+    """Names of the arguments that a function's code, and that of functions within it, never reads."""
+    code = getattr(function, "__code__", None)
+    if not isinstance(code, types.CodeType):
+        return set()
+    names = code.co_varnames[: code.co_argcount]
+    read = {name for i in dis.get_instructions(code) if i.opname.startswith("LOAD") for name in np.ravel(i.argval)}
+    return set(names) - read - set(code.co_cellvars)
 
 
 def _could_change(one, other):

@@ -58,6 +58,10 @@ WITHOUT = {
 }
 
 
+COARSE, FINE = 1e-6, 1e-6  # from which on a bound or a step of differences may be too large, and what part of it is not
+ROUNDS = 200  # of a loop, or ten times as many as it has: enough for what converges
+
+
 @dataclass(frozen=True)
 class Change:
     """One change of a function's syntax tree.
@@ -133,6 +137,41 @@ def _indices(function):
             yield from node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         elif isinstance(node, ast.Slice):
             yield from (node.lower, node.upper)
+
+
+def mending(function):
+    """What may mend a function: all single changes, and besides them bounds and steps made finer, loops made longer."""
+    return sorted([*_finer(function), *changes(function)], key=lambda change: change.rank)
+
+
+def _finer(function):
+    """Numbers that end a loop, bound a case or make a step of differences, so small or large that they do no harm."""
+    for owner in ast.walk(function):
+        if isinstance(owner, ast.Compare) and len(owner.ops) == 1:
+            number = owner.comparators[0]
+            if _is_coarse(number) and isinstance(owner.ops[0], ast.Lt | ast.LtE | ast.Gt | ast.GtE):
+                yield _with_a_millionth(0, owner, ((owner, "comparators", [ast.Constant(FINE * number.value)]),))
+        elif isinstance(owner, ast.Assign) and _is_coarse(owner.value):
+            yield _with_a_millionth(2, owner, ((owner, "value", ast.Constant(FINE * owner.value.value)),))
+        elif isinstance(owner, ast.For) and getattr(getattr(owner.iter, "func", None), "id", "") == "range":
+            given = owner.iter.args
+            if len(given) == 1 and isinstance(given[0], ast.Constant) and type(given[0].value) is int:
+                more = max(10 * given[0].value, ROUNDS)
+                mends = f"these are too few rounds: {more} will do"
+                number = ast.copy_location(ast.Constant(more), given[0])
+                yield Change("", mends, 0, owner.iter, ((owner.iter, "args", [number]),))
+
+
+def _is_coarse(node):
+    return isinstance(node, ast.Constant) and type(node.value) is float and COARSE < node.value <= 1.0
+
+
+def _with_a_millionth(rank, place, sets):
+    number = place.value if isinstance(place, ast.Assign) else place.comparators[0]
+    mends = f"`{ast.unparse(number)}` is far too large: a millionth of it will do"
+    for _, _, new in sets:
+        _locate(new[0] if isinstance(new, list) else new, number)
+    return Change("", mends, rank, place, sets)
 
 
 def _locate(new, node):

@@ -97,7 +97,7 @@ class Written:
 
     @functools.cached_property
     def _changes(self):
-        return [c for c in mutation.changes(self.tree) if c.mends][:MOST]
+        return [c for c in mutation.mending(self.tree) if c.mends][:MOST]
 
     @property
     def changes(self):

@@ -20,6 +20,7 @@ BATCH = 120  # changes that are tried at once
 ENTRIES = 8  # of a result that are looked at one by one
 NAMED = 4  # values that are told to be right, at most
 BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with a number
+DECIMALS = re.compile(r"[<>]=? *\d*(\.\d+(e[+-]?\d+)?|e-\d+)$|[<>]=? *\d+e-\d+$")  # a comparison with such a number
 TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
 ALONE = "With this alone changed, your result is right"
 
@@ -164,7 +165,11 @@ class Search:
         return f"in line {line}, `{code}`: {mends}. {ALONE}"
 
     def _moves_a_bound(self, line, code, mends):
-        """Whether a change only turns what is compared with a number: another number would do as well."""
+        """Whether a change only turns what is compared with a number: another number would do as well. Nor is a number
+        with decimals what something computed is to be equal to.
+        """
+        if mends.endswith(("where `==` belongs", "where `!=` belongs")):
+            return bool(DECIMALS.search(code))
         compared = (text for at, text, *_ in self.written.places if at == line and code in text and BOUND.search(text))
         return mends.endswith(("belongs there", "belongs there in degrees")) and any(compared)
 

@@ -2,6 +2,7 @@
 
 import linecache
 import textwrap
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -233,3 +234,38 @@ def test_what_agrees_ends_at_the_first_step_that_does_not(monkeypatch):
     """
     text = judged(asked(known["formula"], two_numbers), body)
     assert "As far as `x` (line 2) your values are those of the solution; `y = np.sin(a)" in text
+
+
+def _root(a, b):
+    return np.sqrt(1 + a @ a)
+
+
+@pytest.mark.parametrize(
+    "reference, body, said",
+    [
+        (
+            _root,
+            "s = 1.0\nfor _ in range(2):\n    s = (s + (1 + a @ a) / s) / 2\nreturn s",
+            "`range(2)`: these are too few",
+        ),
+        (
+            _root,
+            "s, t = 1.0, 9.0\nwhile abs(s - t) > 0.5:\n    s, t = (s + (1 + a @ a) / s) / 2, s\nreturn s",
+            "line 3, `abs(s - t) > 0.5`: `0.5` is far too large",
+        ),
+        (
+            lambda a, b: np.cos(a),
+            "h = 0.3\nreturn (np.sin(a + h) - np.sin(a)) / h",
+            "line 2, `h = 0.3`: `0.3` is far too",
+        ),
+    ],
+)
+def test_bounds_that_are_too_coarse_and_loops_that_end_too_early_are_told(reference, body, said):
+    item = replace(ITEM, reference=reference, metric=metrics.Numbers(1e-6))
+    outcome = item.judge(typed(body), rng=np.random.default_rng(0))
+    assert outcome.status == NOT_YET and said in outcome.text
+
+
+def test_nothing_computed_is_to_be_equal_to_a_number_with_decimals():
+    outcome = ITEM.judge(typed(f"if abs(b[0]) < 0.5:\n    return 0.0\n{RIGHT.strip()}"), rng=np.random.default_rng(0))
+    assert "`0.5` is far too large" in outcome.text
