@@ -7,6 +7,7 @@ import pytest
 import scipy.linalg
 import scipy.optimize
 from numpy.linalg import lstsq
+from scipy.spatial.transform import Rotation
 
 from labkit.calibration import pivot
 from labkit.chapters.ch01_frames import exercises as ch01_exercises
@@ -217,7 +218,7 @@ def test_an_angle_of_more_than_90_deg_and_no_angle_at_all(seed):
         R = T[:3, :3]
         return np.arcsin(min(np.linalg.norm(R - R.T) / np.sqrt(8), 1)), distance(T)
 
-    assert "60 deg from 120 deg" in judged("closure_error", by_arcsine, seed).text
+    assert "120 deg you get 60 deg" in judged("closure_error", by_arcsine, seed).text
     with np.errstate(invalid="ignore"):
         assert "np.clip" in judged("closure_error", lambda T: (np.arccos(cosine(T)), distance(T)), seed).text
     cut = judged("closure_error", lambda T: (np.arccos(np.clip(cosine(T), -1, 1)), distance(T)), seed)
@@ -282,3 +283,112 @@ def test_the_worst_direction_is_the_one_an_optimizer_finds():
     starts = [(turn, tilt) for turn in (0.0, 2.0, 4.0) for tilt in (-0.5, 0.5)]
     best = min(scipy.optimize.minimize(gain, start).fun for start in starts)
     assert ITEMS["worst_at_one_meter"].reference() == pytest.approx(-best, rel=2e-4)
+
+
+def upward(a, b):
+    R = frames.gram_schmidt(a, b)
+    return R * (1, 1, -1 if R[2, 2] < 0 else 1)
+
+
+def from_two_entries(T):
+    c, s, t = T[0, 0], T[1, 0], T[:3, 3]
+    return np.array([[c, s, 0, -c * t[0] - s * t[1]], [-s, c, 0, s * t[0] - c * t[1]], [0, 0, 1, -t[2]], [0, 0, 0, 1]])
+
+
+def last_turn_only(xyzabc):
+    R = Rotation.from_euler("x", 3 * xyzabc[5]).as_matrix()
+    return np.block([[R, np.reshape(xyzabc[:3], (3, 1))], [0, 0, 0, 1]])
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "name, answer, told",
+    [
+        ("gram_schmidt", upward, ""),
+        ("invert", from_two_entries, "turned about z alone"),
+        ("matrix_from_kuka", last_turn_only, "All three turns take C"),
+    ],
+)
+def test_frames_that_are_right_for_some_only(name, answer, told, seed):
+    outcome = FRAMES[name].judge(answer, rng=np.random.default_rng(seed))
+    assert outcome.status == NOT_YET and told in outcome.text
+
+
+def test_an_affine_map_is_no_fit_of_a_frame():
+    def fit(points_F, points_W):
+        affine = np.linalg.lstsq(np.column_stack([points_F, np.ones(len(points_F))]), points_W, rcond=None)[0]
+        U, _, Vt = np.linalg.svd(affine[:3].T)
+        T = np.eye(4)
+        T[:3, :3] = U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt
+        T[:3, 3] = points_W.mean(0) - T[:3, :3] @ points_F.mean(0)
+        return T
+
+    assert "any linear map" in FRAMES["fit_frame"].judge(fit, rng=np.random.default_rng(0)).text
+
+
+def two_links_at_least(transforms):
+    return np.linalg.multi_dot(list(transforms))
+
+
+def twists_added(transforms):
+    return exp_se3(sum(map(log_se3, transforms)))
+
+
+def rounded_singular_values(T):
+    U, s, Vt = np.linalg.svd(T[:3, :3])
+    return np.vstack([np.column_stack([U @ np.diag(s.round()) @ Vt, T[:3, 3]]), T[3]])
+
+
+def one_newton_step(T):
+    R = (T[:3, :3] + np.linalg.inv(T[:3, :3]).T) / 2
+    return np.vstack([np.column_stack([R, T[:3, 3]]), T[3]])
+
+
+def to_the_corrected_pose(transforms):
+    n, xi, P, links = len(transforms), log_se3(chaining.stations(transforms)[-1]), np.eye(4), []
+    for k, T in enumerate(transforms, start=1):
+        links.append(relative(P, exp_se3(-k / n * xi) @ P @ T))
+        P = P @ T
+    return np.array(links)
+
+
+def tip_then_point(A, b):
+    tip = lstsq(A[:, :3], b, rcond=None)[0]
+    return np.append(tip, lstsq(A[:, 3:], b - A[:, :3] @ tip, rcond=None)[0])
+
+
+def no_exponents(text):
+    lines = [line.split("#")[0].replace(",", ".").split() for line in text.splitlines()]
+    if not all(re.fullmatch(r"-?\d+(\.\d+)?", entry) for line in lines for entry in line):
+        raise ValueError("line 1")
+    return np.array([[number_in(entry) for entry in line] for line in lines if line])
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "name, answer, told",
+    [
+        ("chain", two_links_at_least, ""),
+        ("chain", twists_added, "added the twists"),
+        ("orthonormalize", rounded_singular_values, ""),
+        ("orthonormalize", one_newton_step, "one step of an iteration"),
+        ("closure_error", lambda T: (abs(np.arctan2(T[1, 0], T[0, 0])), np.linalg.norm(T[:3, 3])), "about z alone"),
+        ("closure_error", lambda T: {"angle": 0.1, "distance": T[0, 3]}, "got a dict"),
+        ("distribute_closure", to_the_corrected_pose, "the share of their end"),
+        ("read_system", no_exponents, "line 1"),
+        ("solve_pivot", tip_then_point, "You fitted the tip first"),
+    ],
+)
+def test_chains_and_pivots_that_are_right_for_some_only(name, answer, told, seed):
+    outcome = judged(name, answer, seed)
+    assert outcome.status != CORRECT and told in outcome.text
+
+
+def test_values_near_a_mistake_are_that_mistake():
+    angle, distance = chaining.closure_error(chaining.chain(lab_sheet.printed_transforms()))
+    chord = 2000 * np.sin(angle / 2)
+    assert "turn alone" in judged("worst_at_one_meter", chord).text
+    assert "no point can be worse" in judged("worst_at_one_meter", chord + distance).text
+    assert "|p| is 1000 mm" in judged("worst_at_one_meter", distance + angle).text
+    flanges = lab_sheet.kreisel_poses()[:, :3, 3]
+    assert "the positions of the flange" in judged("tip_length", np.linalg.norm(flanges, axis=1).mean()).text

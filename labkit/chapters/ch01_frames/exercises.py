@@ -26,24 +26,28 @@ def random_pose(rng):
 ACUTE, OBTUSE = (35, 80), (100, 145)  # deg
 
 
-def two_directions(rng, between=ACUTE):
-    """Two directions at the given angles (deg), of different length."""
-    a = random_direction(rng)
-    across = frames.unit_vector(np.cross(a, rng.normal(size=3)))
-    angle = np.deg2rad(rng.uniform(*between))
-    return a, rng.uniform(20, 300) * (np.cos(angle) * frames.unit_vector(a) + np.sin(angle) * across)
+def two_directions(rng, between=ACUTE, signs=(1, 1, 1)):
+    """Two directions at the given angles (deg), of different length; r00, r11 and r22 of their axes have these signs."""
+    while True:
+        a = random_direction(rng)
+        across = frames.unit_vector(np.cross(a, rng.normal(size=3)))
+        angle = np.deg2rad(rng.uniform(*between))
+        b = rng.uniform(20, 300) * (np.cos(angle) * frames.unit_vector(a) + np.sin(angle) * across)
+        if np.array_equal(np.sign(np.diag(frames.gram_schmidt(a, b))), signs):
+            return a, b
 
 
-def three_points(rng, between=ACUTE):
+def three_points(rng, between=ACUTE, signs=(1, 1, 1)):
     """Three measured points of a frame, in millimeters."""
     origin = rng.uniform(-500, 500, 3)
-    a, b = two_directions(rng, between)
+    a, b = two_directions(rng, between, signs)
     return origin, origin + a, origin + b
 
 
 def either_angle(draw):
-    """The draw with an acute and with an obtuse angle at the origin, in turn."""
-    return tuple(functools.partial(draw, between=between) for between in (ACUTE, OBTUSE))
+    """The draw with an acute and an obtuse angle at the origin, each axis pointing up and down its line, in turn."""
+    turns = ((ACUTE, (1, 1, -1)), (OBTUSE, (1, -1, 1)), (ACUTE, (-1, -1, 1)), (OBTUSE, (-1, 1, -1)))
+    return tuple(functools.partial(draw, between=between, signs=signs) for between, signs in turns)
 
 
 def scaled_direction(rng, scale):
@@ -208,6 +212,12 @@ def _with(T, R=None, t=None):
     T[:3, :3] = T[:3, :3] if R is None else R
     T[:3, 3] = T[:3, 3] if t is None else t
     return T
+
+
+def _about_z_alone(T):
+    """The inverse of a turn about z and a shift, from two entries of the rotation."""
+    R = np.array([[T[0, 0], T[1, 0], 0], [-T[1, 0], T[0, 0], 0], [0, 0, 1]])
+    return _with(T, R, -R @ T[:3, 3])
 
 
 def _kuka(order, angles=(3, 4, 5)):
@@ -381,6 +391,18 @@ def _kabsch(handed=True, turned=lambda R: R, shift=lambda R, p, q: q.mean(0) - R
 def _rotation_of_the_transpose(U, V):
     """What comes of V where its transpose is taken for it, the sign of its last column included."""
     return V.T @ np.diag([1, 1, np.sign(np.linalg.det(V.T @ U.T))]) @ U.T
+
+
+def _affine_first(handed):
+    """The nearest rotation to the block of the best affine map, which may shear and stretch."""
+
+    def variant(p, q):
+        block = np.linalg.lstsq(np.column_stack([p, np.ones(len(p))]), q, rcond=None)[0][:3].T
+        U, _, Vt = np.linalg.svd(block)
+        R = U @ np.diag([1, 1, np.linalg.det(U @ Vt) if handed else 1]) @ Vt
+        return frames.pose(R, q.mean(0) - R @ p.mean(0))
+
+    return variant
 
 
 def _one_mean_for_all(p, q):
@@ -665,6 +687,11 @@ CHAPTER = Chapter(
                     "The rotation is undone, the translation is missing: it is -Rᵀ t.",
                 ),
                 Mistake(lambda T: T, "This is T itself. The inverse maps the other way."),
+                Mistake(
+                    _about_z_alone,
+                    "Of the rotation you use two entries, as if it turned about z alone. T turns about any axis: take the whole block, Rᵀ.",
+                    id="invert-about-z",
+                ),
             ],
         ),
         Exercise(
@@ -763,6 +790,19 @@ CHAPTER = Chapter(
                     "The first entry of the matrix is the cosine of the angle, and this is its arctangent. np.arctan2 takes sine and cosine.",
                     id="angle-arctangent",
                 ),
+                Mistake(
+                    lambda: np.rad2deg(np.arctan(_K0_T_K1()[1, 0])),
+                    "Below the first entry stands the sine of the angle, and this is its arctangent. np.arctan2 takes sine and cosine.",
+                    id="angle-arctangent-of-sine",
+                ),
+                *(
+                    Mistake(
+                        lambda off=off: 90 + off,
+                        "The 0.01 by which the points were moved are millimeters, not degrees. What they do to the angle, the matrix tells.",
+                        id=f"angle-moved-by-{off}",
+                    )
+                    for off in (0.01, -0.01)
+                ),
             ],
         ),
         Value(
@@ -837,6 +877,14 @@ CHAPTER = Chapter(
                     "This is the norm of the difference of two matrices. Let both act on the hole, and take the length of what differs.",
                     id="distance-matrices",
                 ),
+                Mistake(
+                    lambda: np.linalg.norm(
+                        frames.transform(frames.invert(_K0_T_K1()), np.array([HOLE, 0, 0]))
+                        - frames.transform(frames.invert(_drawn()), np.array([HOLE, 0, 0]))
+                    ),
+                    "Both poses are inverted here: that takes (200, 0, 0) from K0 to K1. The hole is given in K1 and wanted in K0.",
+                    id="distance-inverted",
+                ),
             ],
         ),
         Prediction(
@@ -904,6 +952,15 @@ CHAPTER = Chapter(
                     lambda p: frames.pose(Rotation.from_rotvec(p[3:]).as_matrix(), p[:3]),
                     "A, B, C are taken for a rotation vector, a single turn. They are three turns, one after the other.",
                     id="kuka-rotvec",
+                ),
+                *(
+                    Mistake(
+                        _kuka(order, (5, 5, 5)),
+                        "All three turns take C. If you made functions in a loop: they look up its variables when they are called, and "
+                        "find the last ones. Compute each matrix within the loop.",
+                        id=f"kuka-all-C-{order}",
+                    )
+                    for order in ("xxx", "zyx")
                 ),
             ],
         ),
@@ -1127,6 +1184,15 @@ CHAPTER = Chapter(
                     lambda p, q: frames.frame_from_points(*q[:3]) @ frames.invert(frames.frame_from_points(*p[:3])),
                     "You laid a frame through the first three points of each set. All points count, and all alike.",
                     id="fit-frame-three-points",
+                ),
+                *(
+                    Mistake(
+                        _affine_first(handed),
+                        "You fitted any linear map, and made a rotation of it afterwards. The rotation nearest to that map is not the one "
+                        "that lies best to the points: take the SVD of p^T q.",
+                        id=f"fit-frame-affine-{handed}",
+                    )
+                    for handed in (True, False)
                 ),
             ],
         ),

@@ -20,12 +20,16 @@ def system(rng):
 
 
 def text_of_system(rng, comments=False, commas=False):
-    """The text of a system as someone typed it: blanks or tabs, empty lines, perhaps comments and decimal commas."""
+    """The text of a system as someone typed it: blanks or tabs, empty lines, perhaps comments and decimal commas; without
+    them the last number of each point has an exponent."""
     lines = []
     for point in system(rng).round(int(rng.integers(5, 9))):
         lines += ["# measured by hand"] * comments + [""] * int(rng.random() < 0.4)
         blank = str(rng.choice([" ", "   ", "\t"]))
-        line = blank.join(repr(float(value)) for value in point)
+        numbers = [repr(float(value)) for value in point]
+        if not comments and not commas:
+            numbers[2] = f"{point[2]:.6e}"
+        line = blank.join(numbers)
         lines.append(" " * int(rng.integers(3)) + line + "  # touched twice" * (comments and rng.random() < 0.5))
     text = "\n".join(lines) + "\n" * int(rng.integers(3))
     return (text.replace(".", ",") if commas else text,)

@@ -47,6 +47,14 @@ def worn_pose(rng):
     return (T,)
 
 
+def stretched_pose(rng):
+    """A pose whose rotation block is far from one: each of its singular values rounds to another number than 1."""
+    T = random_pose(rng)
+    T[:3, :3] = T[:3, :3] @ frames.matrix_from_quaternion(rng.normal(size=4)) * rng.permutation([0.4, 1.7, 2.6])
+    T[:3, :3] = T[:3, :3] @ frames.matrix_from_quaternion(rng.normal(size=4))
+    return (T,)
+
+
 def open_loop(rng, count):
     """Links of a loop of `count` frames that does not quite close."""
     links = random_links(rng, count)[0]
@@ -76,6 +84,10 @@ def _turned_too_far(transforms):
 def _from(start):
     """A chain that begins with something else than the identity."""
     return lambda transforms: start @ chaining.chain(transforms)
+
+
+def _twists_added(transforms):
+    return exp_se3(log_se3(transforms).sum(axis=0))
 
 
 def _elementwise(transforms):
@@ -151,6 +163,19 @@ def _gram_schmidt(first, second):
         return _with_rotation(T, R)
 
     return variant
+
+
+def _through_angles(T):
+    """The rotation whose angles A, B, C stand in the entries of which they are read."""
+    R = T[:3, :3]
+    b = np.arctan2(-R[2, 0], np.hypot(R[2, 1], R[2, 2]))
+    abc = [np.arctan2(R[1, 0], R[0, 0]), b, np.arctan2(R[2, 1], R[2, 2])]
+    return frames.matrix_from_kuka(np.concatenate([T[:3, 3], abc]))
+
+
+def _one_step(T):
+    """One step of Newton's iteration, the mean of R and its inverse transposed."""
+    return _with_rotation(T, (T[:3, :3] + np.linalg.inv(T[:3, :3]).T) / 2)
 
 
 def _svd_variant(rule):
@@ -337,6 +362,11 @@ CHAPTER = Chapter(
             reference=chaining.chain,
             draw=tuple(functools.partial(random_links, count=n) for n in (3, 2, 5, 4)),
             metric=metrics.Poses(1e-6, 1e-6),
+            noisy=(
+                functools.partial(random_links, count=1),
+                metrics.Poses(1e-6, 1e-6),
+                "right, but not of a single link:",
+            ),
             hints=(
                 "Neighboring letters cancel: T_AB T_BC T_CD = T_AD. Where does a link that has just been measured go, to the left or to the right?",
                 "Start with the identity and multiply each link from the right, in the order given: a loop over the links that keeps the product.",
@@ -429,6 +459,11 @@ CHAPTER = Chapter(
                     "These are the poses after 1, 2, ... N links. The chain is the last of them.",
                 ),
                 Mistake(
+                    _twists_added,
+                    "You added the twists of the links. Twists of turns about different axes do not add up: multiply the matrices.",
+                    id="chain-twists",
+                ),
+                Mistake(
                     _turned_too_far,
                     "The rotations are right, but you turned each translation by its own link too: add R @ p first, then go on to the new R.",
                 ),
@@ -490,8 +525,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _closure(lambda T: np.arcsin(np.clip(_twice_sine(T) / 2, -1, 1))),
-                    "The arcsine cannot tell 60 deg from 120 deg: both have the same sine. The cosine, (trace - 1) / 2, can; "
-                    "np.arctan2 takes both.",
+                    "For 120 deg you get 60 deg: both have the same sine, and a cosine of the same size. The sign of the cosine, "
+                    "(trace - 1) / 2, tells them apart; np.arctan2 takes sine and cosine.",
                     id="closure-arcsine",
                 ),
                 Mistake(
@@ -550,9 +585,22 @@ CHAPTER = Chapter(
                     _distance(lambda T: np.sum(T[:3, 3] ** 2)),
                     "This is the squared distance.",
                 ),
-                Mistake(
-                    _closure(lambda T: np.arctan2(T[1, 0], T[0, 0])),
-                    "You read the turn about z alone. The loop also tilts: the angle of the whole rotation is asked for.",
+                *(
+                    Mistake(
+                        _closure(lambda T, size=size: size(np.arctan2(T[1, 0], T[0, 0]))),
+                        "You read the turn about z alone. The loop also tilts: the angle of the whole rotation is asked for.",
+                    )
+                    for size in (float, abs)
+                ),
+                *(
+                    Mistake(
+                        _closure(
+                            lambda T, part=part: 2 * np.arcsin(min(np.linalg.norm(T[:3, :3] - np.eye(3)) / part, 1))
+                        ),
+                        "|R - I| is 2 sqrt(2) sin(angle / 2), as the squares of all nine entries add up: solve this for the angle.",
+                        id=f"closure-chord-{name}",
+                    )
+                    for name, part in (("2", 2), ("sqrt-2", np.sqrt(2)), ("4", 4))
                 ),
                 Mistake(
                     _closure(lambda T: (np.trace(T[:3, :3]) - 1) / 2),
@@ -679,11 +727,13 @@ CHAPTER = Chapter(
                     lambda: 1000 * chaining.closure_error(_sheet())[0],
                     "This is what the turn alone does. The shift of the loop adds to it, or takes from it.",
                     id="meter-turn",
+                    within=0.005,  # the chord in place of the arc
                 ),
                 Mistake(
                     lambda: 1000 * chaining.closure_error(_sheet())[0] + chaining.closure_error(_sheet())[1],
                     "This adds angle times lever and distance as if both pointed the same way: no point can be worse, and none is that bad.",
                     id="meter-sum",
+                    within=0.005,
                 ),
                 Mistake(
                     lambda: np.hypot(1000 * chaining.closure_error(_sheet())[0], chaining.closure_error(_sheet())[1]),
@@ -692,8 +742,9 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: chaining.closure_error(_sheet())[1],
-                    "This is the displacement of the origin of K0. A meter away it is larger.",
+                    "This is the displacement of the origin of K0, or of a point near it. A meter away it is larger: |p| is 1000 mm.",
                     id="meter-origin",
+                    within=0.02,
                 ),
                 Mistake(
                     lambda: 1000 * np.linalg.norm(_sheet()[:3, :3] - np.eye(3)),
@@ -714,6 +765,11 @@ CHAPTER = Chapter(
                     lambda: 1000 * np.linalg.norm(_sheet()[:3, :3] - np.eye(3)) + chaining.closure_error(_sheet())[1],
                     "The norm of R - I is sqrt(2) times the angle for small turns: no point is carried that far.",
                     id="meter-norm-and-shift",
+                ),
+                Mistake(
+                    lambda: 1000 * chaining.closure_error(_sheet())[0] - chaining.closure_error(_sheet())[1],
+                    "This takes the shift off what the turn does. In the worst direction it adds to it, nearly all of it.",
+                    id="meter-difference",
                 ),
                 Mistake(
                     lambda: 15.25,
@@ -752,7 +808,7 @@ CHAPTER = Chapter(
         Exercise(
             "orthonormalize",
             reference=chaining.orthonormalize,
-            draw=worn_pose,
+            draw=(worn_pose, stretched_pose),
             fixed={"T": ONE_POSE},
             metric=metrics.Poses(1e-6, 1e-6),
             hints=(
@@ -846,6 +902,18 @@ CHAPTER = Chapter(
                 Mistake(
                     _svd_variant(lambda U, s, Vt: U * Vt),
                     "You multiplied entry by entry: `*` is not `@`.",
+                ),
+                Mistake(
+                    _one_step,
+                    "The mean of R and its inverse transposed is one step of an iteration toward the nearest rotation: go on until "
+                    "nothing changes, or take the SVD.",
+                    id="orthonormalize-one-step",
+                ),
+                Mistake(
+                    _through_angles,
+                    "You read three angles and make a rotation of them. They come from five of the nine entries; the nearest rotation "
+                    "listens to all nine.",
+                    id="orthonormalize-angles",
                 ),
             ],
         ),
@@ -986,6 +1054,16 @@ CHAPTER = Chapter(
                 Mistake(
                     _between(lambda A, B: B @ frames.invert(A)),
                     "B @ inv(A) is the move seen from K0. The link from A to B, seen from A, is inv(A) @ B, `relative(A, B)`.",
+                ),
+                Mistake(
+                    lambda Ts: frames.relative(chaining.stations(Ts)[:-1], _moved_poses(Ts)[1:]),
+                    "Your links take the share of their end, k/N, and forget that their beginning has moved as well: `relative(A, B)` of two moved poses.",
+                    id="distribute-one-end",
+                ),
+                Mistake(
+                    lambda Ts: frames.relative(_moved_poses(Ts)[:-1], chaining.stations(Ts)[1:]),
+                    "Your links take off the share of their beginning, and forget that their end moves as well: `relative(A, B)` of two moved poses.",
+                    id="distribute-other-end",
                 ),
                 Mistake(
                     _divided_by(lambda n: 4),

@@ -102,6 +102,18 @@ def _tip_alone(A, b):
     return np.concatenate([np.linalg.lstsq(A[:, :3], b, rcond=None)[0], np.zeros(3)])
 
 
+def _one_after_the_other(A, b):
+    """The tip fitted as if there were no pivot, then the pivot to what is left."""
+    tip = np.linalg.lstsq(A[:, :3], b, rcond=None)[0]
+    return np.concatenate([tip, np.linalg.lstsq(A[:, 3:], b - A[:, :3] @ tip, rcond=None)[0]])
+
+
+def _variance_of_each_axis(A, residuals):
+    """A covariance with another variance for x, y and z: of the rows, or of both sides."""
+    n = len(residuals)
+    return np.tile((residuals**2).sum(axis=0) / (n - 2), 2)[:, None] * np.linalg.inv(A.T @ A)
+
+
 def _covariance(scale):
     """A variant of pivot_covariance with another variance: scale(r, n)."""
 
@@ -371,6 +383,11 @@ CHAPTER = Chapter(
                     "The signs have got lost: tip and pivot have coordinates of both signs.",
                     id="solve-abs",
                 ),
+                Mistake(
+                    _one_after_the_other,
+                    "You fitted the tip first, as if there were no pivot, then the pivot to what was left. Both share each equation: solve for all six at once.",
+                    id="solve-one-after-the-other",
+                ),
             ],
         ),
         Value(
@@ -378,7 +395,10 @@ CHAPTER = Chapter(
             reference=lambda: np.linalg.norm(_kreisel().tip),
             unit="mm",
             rtol=1e-3,
-            of={"x": lambda: np.concatenate([_kreisel().tip, _kreisel().pivot])},
+            of={
+                "x": lambda: np.concatenate([_kreisel().tip, _kreisel().pivot]),
+                "the positions of the flange": lambda: lab_sheet.kreisel_poses()[:, :3, 3],
+            },
             hints=(
                 "Which of the six numbers in x say where the tip is, and seen from where?",
                 "The tip seen from the flange is P_t, the first three entries of x. Its length is the root of the sum of squares.",
@@ -677,6 +697,11 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda A, r: np.sqrt(np.diag(pivot.pivot_covariance(A, r))),
                     "These are the six standard deviations. The whole matrix is wanted, shape (6, 6).",
+                ),
+                Mistake(
+                    _variance_of_each_axis,
+                    "You took another variance for x, y and z. One noise is meant for all coordinates: one number, from all 3n residuals.",
+                    id="covariance-each-axis",
                 ),
                 Mistake(
                     _covariance(lambda r, n: r @ r / (n - 2)),
