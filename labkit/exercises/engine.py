@@ -239,7 +239,7 @@ class _Trial:
         named = self._named_mistake() or self._named_in_parts()
         if named:
             return named
-        words = self._relation(whole=True) or self._other_arguments() or self._terms()
+        words = self._kept() or self._relation(whole=True) or self._other_arguments() or self._terms()
         unmoved = None if words or self.refusal else self._unmoved()  # now, since the search may use up the budget
         search = None if words else self._search()
         solution = search and self._solution(search)
@@ -269,6 +269,26 @@ class _Trial:
         """How far what is computed on the way is what the solution computes, as one more sentence."""
         words = search and not self._right_somewhere() and search.agreement_words(solution)
         return f" {words}." if words else ""
+
+    def _kept(self):
+        """What stays from one call of the function to the next, if its results show it."""
+        if self.exercise.metric is None or not self.inputs or not self.budget.left():
+            return None
+        if _one_array([pair[0] for pair in self.pairs]):
+            return (
+                "your function returns one and the same array at every call: a later call overwrites what an earlier "
+                "one returned. Make the array within the function"
+            )
+        metric, first = self.metrics[0], self.pairs[0][0]
+        admitted = functools.partial(_admitted, metric, self.pairs[0][1])
+        run = guard.run(self.function, self.inputs[0], admitted, self.exercise.limit)
+        if run.error is None and _same_result(metric, run.result, first):
+            return None
+        told = "stops with an error" if run.error is not None else "gives another result"
+        return (
+            f"called twice with the same arguments, your function {told} the second time. Does something stay from "
+            "call to call, a global variable or a default argument that is changed?"
+        )
 
     def _relation(self, whole=False):
         """What the general layer says of the results; nothing where one was refused, or only special ones are wrong."""
@@ -717,6 +737,23 @@ def _admitted(metric, expected, result):
         return metric.admit(result, expected)
     except metrics.Refused:
         return _Refusal(result)
+
+
+def _one_array(results):
+    """Whether results of several calls are one array, so that each shows what the last call left in it."""
+    arrays = [getattr(result, "value", result) for result in results]
+    if len(arrays) < 2 or not all(isinstance(array, np.ndarray) and array.size for array in arrays):
+        return False
+    return all(np.shares_memory(array, arrays[0]) for array in arrays[1:])
+
+
+def _same_result(metric, one, other):
+    """Whether two results of a student's function are one, also where the metric refuses them; if in doubt they are."""
+    one, other = (getattr(result, "value", result) for result in (one, other))
+    try:
+        return _equal_arrays(one, other) or metric.equal(one, other)
+    except Exception:  # of a kind that cannot be compared
+        return True
 
 
 def _equal_as_written(metric, result, wrong):

@@ -99,6 +99,8 @@ def _value(result):
         result.close()  # nobody waits for it
         raise Refused("it returned a coroutine: leave out `async` before `def`")
     if inspect.isgenerator(result):
+        if result.gi_code.co_name == "<genexpr>":
+            raise Refused("it returned a generator, whose numbers are still to be computed: make an array of it")
         raise Refused("it returned a generator: use `return`, not `yield`")
     if type(result) is tuple and len(result) == 4 and np.ndim(result[0]) and isinstance(result[2], INTEGERS):
         raise Refused(
@@ -383,6 +385,7 @@ class Several(Metric):
             raise Refused("it returned None: is a `return` missing?")
         try:
             count = len(result)
+            _refuse_unordered(result, wanted)
         except TypeError:
             raise Refused(f"{wanted}, got {_describe(result)}") from None
         if count != len(self.names):
@@ -409,6 +412,12 @@ class Several(Metric):
 
     def parts(self, result, expected):
         return list(zip(self.names, self.metrics, result, expected))
+
+
+def _refuse_unordered(result, wanted):
+    """Several results stand in an order: what goes by names, or is one text, is none of them."""
+    if isinstance(result, dict | set | frozenset | str):
+        raise Refused(f"{wanted}, separated by commas, got {_describe(result)}")
 
 
 @dataclass(frozen=True)

@@ -185,6 +185,7 @@ COUNTED = "with one index counted from the other end"
 REVERSED = (  # (words of what was changed in a right formula, what is wrong where the change mends)
     (r"with (.+) where (.+) belongs", r"\2 stands where \1 belongs"),
     (r"without one of its (.+)s", r"one \1 is too many"),
+    (r"without the term `(\w+)` in one place", r"the term `\1` is too many"),
     (r"without one matrix of a product", "one matrix of the product is too many"),
     (r"without `(\w+)=` in one call", r"`\1=` does not belong there"),
     (r"without `(\w+)`", r"`\1` is too much"),
@@ -268,9 +269,9 @@ def _operation(node, names):
         words = f"with {what.get(kind, 'the factors of one product `@` exchanged')}"
         yield 0, words, ast.BinOp(node.right, node.op, node.left)
     if kind in WITHOUT:
-        yield 1, WITHOUT[kind], node.left
+        yield 1, _without(kind, node.right, names), node.left
         if kind not in (ast.Pow, ast.Mod):
-            yield 1, WITHOUT[kind], node.right
+            yield 1, _without(kind, node.left, names), node.right
     if kind is ast.MatMult and isinstance(node.left, ast.BinOp) and isinstance(node.left.op, ast.MatMult):
         a, b, c = node.left.left, node.left.right, node.right
         for one, two, three in ((a, c, b), (b, c, a), (c, a, b), (c, b, a)):
@@ -282,6 +283,13 @@ def _operation(node, names):
     if kind in (ast.Add, ast.Sub, ast.Div):
         yield 3, "with one part squared", ast.BinOp(node, ast.Pow(), ast.Constant(2))
         yield 3, "with the root of one part taken", _numpy("sqrt", node)
+
+
+def _without(kind, part, names):
+    """What is left out, by its name where it is an argument."""
+    if kind in (ast.Add, ast.Sub) and isinstance(part, ast.Name) and part.id in names[0]:
+        return f"without the term `{part.id}` in one place"
+    return WITHOUT[kind]
 
 
 def _transposed(node):
@@ -342,7 +350,8 @@ def _comparison(node, names):
         here = type(node.ops[0])
         if len(node.ops) == 1 and here in COMPARISONS and kind is not here:
             words = f"with `{sign}` where `{COMPARISONS[here]}` belongs"
-            yield 0, words, ast.Compare(node.left, [kind()], node.comparators)
+            equals = kind in (ast.Eq, ast.NotEq) and here not in (ast.Eq, ast.NotEq)  # of numbers: never, or always
+            yield 2 if equals else 0, words, ast.Compare(node.left, [kind()], node.comparators)
 
 
 def _conditions(node, names):

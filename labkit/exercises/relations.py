@@ -65,6 +65,7 @@ def _relation(metric, results, expected, sizes, whole):
     unit = getattr(metric, "unit", "")
     words = (
         _sign_or_unit(holds, unit)
+        or _without_sign(metric, results, expected)
         or _arrangement(results, holds)
         or _power(results, holds)
         or _factor(results, expected, sizes)
@@ -167,6 +168,13 @@ def _sign_or_unit(holds, unit):
     return None
 
 
+def _without_sign(metric, results, expected):
+    """Right but for signs, and never negative."""
+    if all((r >= 0).all() and metric.equal(r, np.abs(e)) for r, e in zip(results, expected)):
+        return "your result is right but for its sign, which is lost: a square, a root or an arccosine on the way?"
+    return None
+
+
 def _thousand(unit):
     """Which two units a factor of a thousand may have confused."""
     units = {"s": "ms against s", "rad": "mrad against rad", "mrad": "mrad against rad"}
@@ -263,6 +271,11 @@ def _one_part(results, expected, holds, unit):
         for k in range(first.shape[-1]):
             if holds(lambda r, k=k: _with_entry(r, k, -r[..., k])):
                 return f"entry {k} (counted from 0) has the opposite sign{_along(first)}; all others are right"
+        for k in range(first.shape[-1]):
+            bare = [_with_entry(e, k, np.abs(e[..., k])) for e in expected]
+            if all((r[..., k] >= 0).all() for r in results) and _all_equal(results, bare):
+                lost = f"entry {k} (counted from 0) has lost its sign{_along(first)}: yours is never negative"
+                return f"{lost}; all others are right"
         for k in range(first.shape[-1]):
             patched = [_with_entry(r, k, e[..., k]) for r, e in zip(results, expected)]
             if _all_equal(patched, expected):

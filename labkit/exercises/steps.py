@@ -5,6 +5,7 @@ another (`rerun.OTHERWISE`), or a value on the way that the chapter's solution h
 is where it goes wrong.
 """
 
+import ast
 import functools
 import re
 from dataclasses import dataclass
@@ -197,8 +198,9 @@ class Search:
         return f"{self._where(k)}: {rerun.OTHERWISE[change][0].format(name)}. {ALONE}"
 
     def _where(self, k):
-        line, code, *_ = self.written.places[k]
-        return f"in line {line}, `{code}`"
+        line, code, name, *_ = self.written.places[k]
+        several = name and re.match(r"[\w*, ]*,[\w*, ]*=[^=]", code)  # w, V = ...: which of them
+        return f"in line {line}, `{name if several else code}`"
 
     def _turned(self):
         """Plans of values turned into others, the likeliest first, without those that change nothing or cannot be."""
@@ -420,6 +422,8 @@ class Search:
         mine = [values[k][1] for values in self.values]
         if all(np.isin(m, (0.0, 1.0)).all() for m in mine):  # a condition
             return False
+        if all(m.shape == (1,) and (m == np.round(m)).all() for m in mine) or not name and _is_listing(code):
+            return False  # a count, or several values that are steps of their own
         return len(mine) > 1 and not _same(mine[0][0], mine[1][0]) and not self._is_given(k)
 
     def _of_right_parts(self, k, solution):
@@ -451,6 +455,14 @@ def _traces(written, cases, budget):
             raise TimeoutError
         found.append(written.trace(case.args, kind.left()))
     return found
+
+
+def _is_listing(code):
+    """Whether code is a tuple or a list of several values."""
+    try:
+        return isinstance(ast.parse(code, mode="eval").body, ast.Tuple | ast.List)
+    except SyntaxError:  # quoted in part
+        return False
 
 
 def value_relation(mine, theirs, named):

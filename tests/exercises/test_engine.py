@@ -191,7 +191,7 @@ class Hostile:
         (lambda v: None, TO_DO, ""),
         (lambda v: [] and v, NOT_YET, "expected an array of shape (3,), got shape (0,)"),
         (lambda v: np.full(3, np.nan), NOT_YET, "NaN in 3 of 3"),
-        (lambda v: (x for x in v), NOT_YET, "generator"),
+        (lambda v: (x for x in v), NOT_YET, "still to be computed"),
         (lambda v: object(), NOT_YET, "an object"),
         (lambda v: Hostile(), NOT_YET, "Hostile"),
         (lambda v: np.linalg.norm, NOT_YET, "parentheses"),
@@ -962,3 +962,27 @@ def test_the_pole_is_checked_apart():
     exercise = CHAPTER["kuka_from_matrix"]
     assert "rounding noise" in exercise.judge(one_by_one).text
     assert exercise.judge(zero_at_the_pole).text.startswith("right away from the pole, but at B = 90 deg")
+
+
+KEPT, BUFFER = [], np.zeros(3)
+
+
+def keeps_a_sum(v):
+    KEPT.append(v)
+    return 2 * sum(KEPT)
+
+
+def fills_one_array(v):
+    BUFFER[:] = BUFFER + v
+    return BUFFER
+
+
+@pytest.mark.parametrize(
+    "function, words",
+    [
+        (keeps_a_sum, "called twice with the same arguments"),
+        (fills_one_array, "one and the same array at every call"),
+    ],
+)
+def test_what_stays_between_calls_is_told(function, words):
+    assert words in DOUBLE.judge(function, rng=np.random.default_rng(0)).text

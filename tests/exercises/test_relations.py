@@ -36,6 +36,8 @@ def changed(index, value):
         (lambda e: e / np.pi, VECTORS, "pi times your result is the expected one"),
         (lambda e: np.sqrt(3) * e, TABLES, "the root of 3 times the expected one"),
         (lambda e: e / 7, TABLES, "1/7 of the expected one"),
+        (np.abs, TABLES, "right but for its sign, which is lost"),
+        (changed((slice(None), 2), np.abs), TABLES, "entry 2 (counted from 0) has lost its sign in each row"),
         (changed(1, np.negative), VECTORS, "entry 1 (counted from 0) has the opposite sign"),
         (changed((slice(None), 2), np.negative), TABLES, "entry 2 (counted from 0) has the opposite sign in each row"),
         (lambda e: e[[2, 1, 0, 3]], VECTORS, "the entries 0 and 2 (counted from 0) are exchanged"),

@@ -73,6 +73,44 @@ def test_the_line_and_the_slip_are_told(right, wrong, said):
     assert said in told(RIGHT.replace(right, wrong))
 
 
+@pytest.mark.parametrize(
+    "body, said",
+    [
+        (
+            """
+            x = a / np.linalg.norm(a)
+            q = (b - (b @ x) * x) @ (b - (b @ x) * x)
+            root = q
+            for _ in range(3):
+                root = (root + q / root) / 2
+            return len(b) * root
+            """,
+            "in line 5, `range(3)`: these are too few rounds",
+        ),
+        (
+            """
+            G = np.array([a, b]) @ np.array([a, b]).T
+            w, V = np.linalg.eigh(G)
+            return len(b) * w[0] * w[1] / np.linalg.norm(a)
+            """,
+            "in line 3, `w`: its root belongs there.",
+        ),
+        (
+            """
+            x = a / np.linalg.norm(a)
+            r = b - (b @ x) * x
+            if r[0] < 0.3:
+                r = a - 2 * r
+            return len(b) * np.linalg.norm(r)
+            """,
+            "in line 4, `if r[0] < 0.3:`: this step is too many.",
+        ),
+    ],
+)
+def test_what_is_blamed_is_what_a_student_can_change(body, said):
+    assert said in told(body)
+
+
 def test_no_line_is_blamed_when_no_single_change_mends():
     assert "in line" not in told("return np.sin(a).sum() * 0.1 + np.exp(b[0]) - 3.3 * a[1] ** 5")
 
