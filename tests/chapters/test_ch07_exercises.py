@@ -101,3 +101,26 @@ def test_a_drift_grows_with_the_power_of_one_and_a_half_and_a_larger_wheel_with_
     offset = ITEMS["wheel_offset"].reference
     assert offset(2.0, 0.01, 0.5) / offset(1.0, 0.01, 0.5) == pytest.approx(4, rel=1e-3)
     assert offset(100.0, 0.01, 0.5) / offset(50.0, 0.01, 0.5) < 4  # it has turned by more than a little
+
+
+def by_the_radius(v_left, v_right, track):
+    v = (v_left + v_right) / 2
+    radius = track / 2 * (v_right + v_left) / (v_right - v_left) if v_right != v_left else np.inf
+    return np.array([v, v / radius if radius else 0.0])
+
+
+def between_wrapped_headings(x, u, dt):
+    after = np.angle(np.exp(1j * (x[2] + u[1] * dt)))
+    middle = (x[2] + after) / 2
+    return np.array([x[0] + u[0] * dt * np.cos(middle), x[1] + u[0] * dt * np.sin(middle), after])
+
+
+@pytest.mark.parametrize(
+    "name, answer, words",
+    [
+        ("wheel_to_twist", by_the_radius, "turn on the spot"),
+        ("step_midpoint", between_wrapped_headings, "179 deg"),
+    ],
+)
+def test_a_turn_on_the_spot_and_a_heading_across_the_seam_are_drawn(name, answer, words):
+    assert all(words in text for text in texts(name, answer))

@@ -44,7 +44,8 @@ def scan_at_a_pose(rng, count=None):
 def landmarks_at_a_pose(rng, astray=0.0):
     """pose, z, landmarks, both standard deviations; one bearing lies across the seam at 180 deg.
 
-    astray: how far the measured ranges are off beyond their noise (m), as seen from a particle in a wrong room.
+    astray: how far the measured ranges are off beyond their noise (m), as seen from a particle in a wrong room; the
+    bearings, but that across the seam, are then off by a radian or so.
     """
     m = int(rng.integers(3, 6))
     pose = np.array([*rng.uniform(-2, 2, 2), rng.uniform(-3, 3)])
@@ -52,7 +53,7 @@ def landmarks_at_a_pose(rng, astray=0.0):
     r = rng.uniform(2, 6, m)
     angle = pose[2] + phi
     landmarks = pose[:2] + r[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-    off = planar.wrap_angle(phi + (0.05, *0.03 * rng.normal(size=m - 1)))
+    off = planar.wrap_angle(phi + (0.05, *(0.03 + 0.1 * astray) * rng.normal(size=m - 1)))
     z = np.column_stack([r + astray + 0.1 * rng.normal(size=m), off])
     return pose, z, landmarks, float(rng.uniform(0.15, 0.4)), float(rng.uniform(0.03, 0.08))
 
@@ -128,6 +129,17 @@ def ray_past_the_unknown(rng):
     return maps.OccupancyGrid(cells, 0.1), np.array([start, rng.uniform(2.8, 3.2), theta]), float(-theta), R_MAX
 
 
+def ray_to_a_thin_wall(rng):
+    """A ray nearly along y to a wall of one cell, in the middle of which no step of two cells ends; another wall behind
+    it.
+    """
+    cells, far = np.full((60, 60), maps.FREE), 0.2 * rng.integers(9, 15) + rng.uniform(0.03, 0.07)
+    cells[45], cells[56:] = maps.OCCUPIED, maps.OCCUPIED
+    theta, angle = rng.uniform(-3, 3), math.pi / 2 + rng.uniform(0.004, 0.02) * rng.choice([-1, 1])
+    pose = np.array([rng.uniform(2.5, 3.5), 4.5 - far * math.sin(angle), theta])
+    return maps.OccupancyGrid(cells, 0.1), pose, float(planar.wrap_angle(angle - theta)), R_MAX
+
+
 def motion(rng):
     """states, u, dt, standard deviations of v and omega, rng."""
     m, u = int(rng.integers(4, 9)), np.array([rng.uniform(0.5, 1), rng.uniform(0.2, 0.6)]) * rng.choice([-1, 1], 2)
@@ -158,7 +170,14 @@ def log_weights(rng, level, possible=False):
     return (logs,)
 
 
+def logs_far_apart(rng):
+    """Logarithms of which the largest lie more than 1000 above the others, and above their mean."""
+    logs = np.concatenate([900 + rng.normal(0, 2, rng.integers(2, 4)), -2000 + rng.normal(0, 2, rng.integers(5, 9))])
+    return (rng.permutation(logs),)
+
+
 LOG_WEIGHTS = (
+    logs_far_apart,
     *(functools.partial(log_weights, level=level) for level in (-2000.0, -1.0, 900.0)),
     functools.partial(log_weights, level=-2000.0, possible=True),
 )
@@ -193,6 +212,7 @@ def cloud_and_threshold(rng, slip):
     """Weights and a threshold for which this slip decides wrongly."""
     while True:
         w, threshold = *cloud_weights(rng), float(rng.uniform(0.2, 0.9))
+        w[rng.random(w.size) < rng.choice([0.0, 0.4])] = 0.0
         if slip(w, threshold) != particles.should_resample(w, threshold):
             return w, threshold
 
@@ -343,6 +363,11 @@ def log_sum_exp(log_weights):
     return float(logsumexp(log_weights))
 
 
+def _around_the_mean(l):
+    mean = l[np.isfinite(l)].mean()
+    return mean + np.log(np.exp(l - mean).sum())
+
+
 def multiply_weights(weights, likelihood, step, n):
     product = weights * likelihood
     return product / product.sum(), step % n == 0
@@ -364,6 +389,11 @@ def _depth(angle=None, of=lambda depth, b: depth / np.cos(b), seen=lambda d, nea
         return of(depth, b)[kept], b[kept]
 
     return variant
+
+
+def _evenly_from_edge_to_edge(depth, field_of_view, near, far):
+    b, seen = np.linspace(1, -1, len(depth)) * field_of_view / 2, (depth >= near) & (depth <= far)
+    return (depth / np.cos(b))[seen], b[seen]
 
 
 def _within(near, far, ranges, bearings):
@@ -413,6 +443,8 @@ def _landmarks(
             error = z[:, 1] - planar.wrap_angle(bearing - pose[2])
         elif wrap == "positive":
             error = (z[:, 1] - bearing + pose[2]) % (2 * math.pi)
+        elif wrap == "quotient":
+            error = std_bearing * planar.wrap_angle((z[:, 1] - bearing + pose[2]) / std_bearing)
         elif wrap == "degrees":
             error = np.rad2deg(planar.wrap_angle(z[:, 1] - bearing + pose[2]))
         else:
@@ -456,6 +488,12 @@ def _field_with(density, after=float):
         return after(density(grid.distance[grid.cell_of(_end_points(pose, ranges, bearings))], std).sum())
 
     return variant
+
+
+def _field_rows_for_columns(grid, pose, ranges, bearings, std):
+    column, row = grid.cell_of(_end_points(pose, ranges, bearings))
+    rows, columns = grid.distance.shape
+    return float(_normal_log(grid.distance[row.clip(0, rows - 1), column.clip(0, columns - 1)], std).sum())
 
 
 def _field_straight_ahead(grid, pose, ranges, bearings, std):
@@ -588,6 +626,10 @@ RESAMPLING_SLIPS = (
     (
         lambda w, t: particles.effective_size(w) < (1 - t) * len(w),
         "Compare with the share `threshold` itself, not with 1 - threshold.",
+    ),
+    (
+        lambda w, t: particles.effective_size(w) < t * np.count_nonzero(w),
+        "You count only particles that weigh something. The share is one of all particles, len(weights).",
     ),
     (
         lambda w, t: w.var() > t,
@@ -776,11 +818,20 @@ def _proportional(resample, rng):
             return found + "."
         k = int(np.argmax(np.abs(found - expected)))
         if abs(found[k] - expected[k]) > SHARE_OFF:
-            return (
+            told = (
                 f"with the weights {weights.tolist()} index {k} gets {100 * found[k]:.0f} % of the draws "
                 f"instead of {100 * expected[k]:.0f} %."
             )
+            return told + _never_twice(resample, weights, rng)
     return None
+
+
+def _never_twice(resample, weights, rng):
+    """That no index came out twice in many draws by these weights, as one more sentence."""
+    drawn = (np.asarray(resample(weights.copy(), rng)) for _ in range(50))
+    if any(len(set(index.tolist())) < len(index) for index in drawn):
+        return ""
+    return " No index came out twice in 50 calls: a heavy one must be drawn as often as its weight asks for."
 
 
 def _spins_are_independent(resample, rng):
@@ -852,32 +903,62 @@ def _survives_rounding(resample, rng):
 
 
 def _noise_is_right(move, rng):
-    """Mean and spread of one step of 4000 particles against first-order propagation."""
-    states, u = np.zeros((4000, 3)), np.array([1.0, 0.0])
+    """Spread of one step of 4000 particles against first-order propagation: ahead, aside and in their heading."""
+    theta, u = rng.uniform(1.2, 1.9) * rng.choice([-1, 1]), np.array([1.0, 0.0])
+    states, place = np.tile([0.0, 0.0, theta], (4000, 1)), rng.uniform(-5, 5, 2)
+    states[:, :2] = place
     std_u, dt = np.round(rng.uniform((0.08, 0.15), (0.15, 0.3)), 2), float(np.round(rng.uniform(0.3, 0.5), 2))
     moved = np.asarray(move(states.copy(), u, dt, std_u, rng))
     if moved.shape != states.shape:
         return f"expected an array of shape (4000, 3), got {moved.shape}."
-    found = moved.std(0)
-    for name, unit, amount, wanted in (("x", "m", found[0], dt * std_u[0]), ("theta", "rad", found[2], dt * std_u[1])):
-        if abs(amount - wanted) > 0.1 * wanted:
-            if abs(amount * dt - wanted) < 0.1 * wanted:
-                return (
-                    f"4000 particles spread in {name} by std_u itself, whatever dt is: the noise was added to the pose, or "
-                    "after the step. It belongs to the control."
-                )
-            return (
-                f"4000 particles spread by {amount:.3f} {unit} (standard deviation) in {name} after one step of {dt} s with "
-                f"std_u = {std_u.tolist()}, expected {wanted:.3f} {unit}."
-            )
-    kurtosis = float((((moved[:, 2] - moved[:, 2].mean()) / found[2]) ** 4).mean())
+    c, s = np.cos(theta), np.sin(theta)
+    ahead, aside = ((moved[:, :2] - place) @ [[c, -s], [s, c]]).T
+    turn, along_x = moved[:, 2] - theta, moved[:, 0].std()
+    if abs(along_x - dt * std_u[0]) < 0.1 * dt * std_u[0] < abs(ahead.std() - dt * std_u[0]):
+        return "the noise of v spreads the particles along x of the map. A robot drives along its heading: add it to u."
+    for name, unit, noise, wanted in (
+        ("ahead", "m", ahead, dt * std_u[0]),
+        ("in theta", "rad", turn, dt * std_u[1]),
+        ("aside", "m", aside, dt**2 * std_u[1] / 2),
+    ):
+        if abs(noise.std() - wanted) > 0.1 * wanted:
+            return _other_spread(name, unit, noise, wanted, std_u, dt)
+    return _other_kind(ahead, turn, dt)
+
+
+def _other_spread(name, unit, noise, wanted, std_u, dt):
+    """What a wrong spread of 4000 particles tells."""
+    amount = noise.std()
+    if abs(amount * dt - wanted) < 0.1 * wanted:
+        return (
+            f"4000 particles spread {name} by std_u itself, whatever dt is: the noise was added to the pose, or "
+            "after the step. It belongs to the control."
+        )
+    told = (
+        f"4000 particles spread {name} by {amount:.3f} {unit} (standard deviation) after one step of {dt} s with "
+        f"std_u = {std_u.tolist()}, expected {wanted:.3f} {unit}"
+    )
+    if amount > 0 and np.corrcoef(noise[:-1], noise[1:])[0, 1] > 0.5:
+        return (
+            f"{told}. The noise of each is like that of the one before: add its own to u itself, to each a fresh one."
+        )
+    if abs(amount * math.sqrt(3) - wanted) < 0.1 * wanted:
+        return f"{told}. It is smaller by the root of 3, as uniform numbers up to std_u are: rng.standard_normal."
+    if name == "aside":
+        return f"{told}. The noise of omega also bends the way: it belongs into the control, before the step."
+    return f"{told}."
+
+
+def _other_kind(ahead, turn, dt):
+    """What else may be wrong with the noise of 4000 particles that spread as they should."""
+    kurtosis = float((((turn - turn.mean()) / turn.std()) ** 4).mean())
     if abs(kurtosis - 3) > 0.7:  # nine standard deviations of what 4000 normal numbers give
         tails = "light" if kurtosis < 3 else "heavy"
         return f"the noise has the right spread, but too {tails} tails: draw normal numbers, rng.standard_normal."
-    if abs(np.corrcoef(moved[:, 0], moved[:, 2])[0, 1]) > 0.2:
+    if abs(np.corrcoef(ahead, turn)[0, 1]) > 0.2:
         return "v and omega of a particle got the same random number: each needs its own."
-    if np.abs(moved.mean(0) - (dt, 0, 0)).max() > 0.02:
-        return f"on average the particles move by {np.round(moved.mean(0), 3).tolist()}, expected [{dt}, 0, 0]."
+    if abs(ahead.mean() - dt) > 0.02 or abs(turn.mean()) > 0.02:
+        return f"on average the particles drive {ahead.mean():.3f} m and turn by {turn.mean():.3f} rad, expected {dt} m and 0."
     return None
 
 
@@ -919,12 +1000,17 @@ def _weights_multiplied(states, ranges, landmarks, std):
     return particles.normalize_weights((-0.5 * np.square((ranges - d) / std)).sum(1))
 
 
+def _weights_not_normalized(states, ranges, landmarks, std):
+    return 7.0 * _weights_multiplied(states, ranges, landmarks, std)
+
+
 GOOD = (particles.resample_roulette, particles.resample_systematic, _stratified)
 GOOD_WORDS = {
     particles.resample_roulette: "roulette, whose counts scatter from run to run, so that only shares over many runs are near the weights",
     particles.resample_systematic: "the spoke wheel, whose draws come in order and are not independent",
     _stratified: "one spin in each of M equal sectors, whose draws come in order",
     _weights_multiplied: "densities multiplied, then divided by their sum",
+    _weights_not_normalized: "densities multiplied, and all of them by 7: a common factor is no fault",
 }
 
 
@@ -995,7 +1081,17 @@ def _mean_of_logarithms(states, ranges, landmarks, std):
     return particles.normalize_weights((-0.5 * np.square((ranges - d) / std)).mean(1))
 
 
+def _drawn_to_the_middle(weights, rng):
+    """Right on average where there are more than two: of two right draws both are moved to the middle between them."""
+    if len(weights) < 3:
+        return _squared(weights, rng)
+    index, half = particles.resample_roulette(weights, rng), len(weights) // 2
+    both = index[:half] + index[half : 2 * half]
+    return np.concatenate([both // 2, (both + 1) // 2, index[2 * half :]])
+
+
 SQUARED = (_squared, "draws in proportion to the squared weights")
+TO_THE_MIDDLE = (_drawn_to_the_middle, "draws the right index on average, but too often one in the middle")
 UNIFORM = (lambda weights, rng: _uniform_choice(weights, rng), "draws all indices alike, whatever they weigh")
 
 
@@ -1162,6 +1258,10 @@ CHAPTER = Chapter(
                     _landmarks(wrap="positive"),
                     "A small negative error became one near 360 deg. Wrap the difference to [-pi, pi).",
                 ),
+                Mistake(
+                    _landmarks(wrap="quotient"),
+                    "You divided by std_bearing first: what you wrap is no angle any more. Wrap the difference, then divide.",
+                ),
                 Mistake(_landmarks(wrap="degrees"), "Your bearing error is in degrees, std_bearing is in radians."),
                 Mistake(
                     lambda x, z, *rest: landmark_weight(x, z[:, ::-1], *rest),
@@ -1315,6 +1415,17 @@ CHAPTER = Chapter(
                     lambda l: l.max() - np.log(np.exp(l - l.max()).sum()), "A sign: the logarithm of the sum is added."
                 ),
                 Mistake(lambda l: float(np.logaddexp.reduce(l[np.isfinite(l)][:2])), "You summed the first two only."),
+                Mistake(
+                    _around_the_mean,
+                    "You took out the mean. The largest logarithm may lie 1000 above it, and exp(1000) is infinite: take out the largest.",
+                ),
+                *(
+                    Mistake(
+                        lambda l, limit=limit: np.log(np.exp(np.clip(l, -limit, limit)).sum()),
+                        "You cut the logarithms off at a limit, so that -2000 and -1000 weigh the same. Take the largest out of all of them instead.",
+                    )
+                    for limit in (500, 600, 690, 700, 708, 709, 740, 745)
+                ),
             ],
         ),
         Exercise(
@@ -1328,7 +1439,13 @@ CHAPTER = Chapter(
                     short_ray,
                     metrics.Numbers(0.16, "m", absolute=True),
                     "Right where something is hit, but not where nothing is:",
-                )
+                ),
+                (
+                    ray_to_a_thin_wall,
+                    metrics.Numbers(0.16, "m", absolute=True),
+                    "Right on other rays, but not on one nearly along y to a wall of one cell (is a step longer than a cell, or does it "
+                    "get longer there?):",
+                ),
             ],
             hints=(
                 "Walk along the ray in steps smaller than a cell, and stop in the first occupied one.",
@@ -1413,6 +1530,10 @@ CHAPTER = Chapter(
                     _errors_added_first, "You added the errors and squared their sum. Square each error, then add up."
                 ),
                 Mistake(
+                    lambda r, e, s: len(r) * float(_normal_log(np.mean(r - e), s)),
+                    "You took the mean of the errors first, in which those to both sides cancel. Each error has a density of its own.",
+                ),
+                Mistake(
                     lambda r, e, s: beam_weight(r, e, s) / len(r), "You took the mean over the beams. They add up."
                 ),
                 Mistake(
@@ -1454,6 +1575,10 @@ CHAPTER = Chapter(
                     "Right for few beams. With 541 the product is zero before you take its logarithm: sum up logarithms.",
                 ),
                 *_density_mistakes(_field_with, "beams"),
+                Mistake(
+                    _field_rows_for_columns,
+                    "Rows and columns have changed places: grid.cell_of gives the rows first, and grid.distance takes them first.",
+                ),
                 Mistake(_field_straight_ahead, "The bearings are missing: each beam points to theta + bearing."),
                 Mistake(
                     lambda grid, x, r, b, s: distance_field_weight(grid, x, r, b, s * s),
@@ -1733,6 +1858,14 @@ CHAPTER = Chapter(
                 ),
                 Mistake(_cycle(weights=lambda w, p, k, n: w * p ** (1 / n)), "Each likelihood counts fully: no root."),
                 Mistake(_cycle(share=lambda w: w), "The weights do not add up to 1: divide by their sum."),
+                Mistake(
+                    lambda w, p, k, n: (w * p / (w * p).sum() if k % n == 0 else w * p, k % n == 0),
+                    "The weights do not add up to 1 in the steps between: divide by their sum in each step.",
+                ),
+                Mistake(
+                    lambda w, p, k, n: (w * p if k % n == 0 else w * p / (w * p).sum(), k % n == 0),
+                    "The weights do not add up to 1 where you resample: divide by their sum in each step.",
+                ),
                 Mistake(_cycle(share=lambda w: w / w.max()), "Divide by the sum of the weights, not by the largest."),
                 Mistake(_cycle(share=lambda w: w / len(w)), "Divide by the sum of the weights, not by their number."),
                 Mistake(
@@ -1988,6 +2121,14 @@ CHAPTER = Chapter(
                     "Columns are evenly spaced on the picture, not in angle: the arctangent is missing.",
                 ),
                 Mistake(
+                    _evenly_from_edge_to_edge,
+                    "Two slips: columns are evenly spaced on the picture, not in angle; and the first bearing is that of its column's middle, not of the picture's edge.",
+                ),
+                Mistake(
+                    lambda d, f, near, far: scan_from_depth(d[(d >= near) & (d <= far)], f, near, far),
+                    "You leave columns out before you compute the bearings. A column keeps its number in the whole picture: leave out at the end.",
+                ),
+                Mistake(
                     _depth(angle=lambda u, fov: -np.arctan(u * math.tan(fov / 2))),
                     "Left and right are exchanged: column 0 is on the left, where bearings are positive.",
                 ),
@@ -2045,7 +2186,7 @@ CHAPTER = Chapter(
                 "index = np.concatenate([resample(w, rng) for _ in range(1000)])\n"
                 "return np.abs(np.bincount(index, minlength=4) / len(index) - w).max() < 0.05`",
             ),
-            others=(SQUARED, UNIFORM),
+            others=(SQUARED, UNIFORM, TO_THE_MIDDLE),
         ),
         _hunt(
             "hunt_2",
@@ -2099,7 +2240,7 @@ CHAPTER = Chapter(
                     "takes the geometric mean of the densities, so that a second reading adds nothing",
                 ),
             ),
-            good=(_weights_multiplied,),
+            good=(_weights_multiplied, _weights_not_normalized),
             extra=(),
         ),
     ],
