@@ -303,8 +303,9 @@ print("over what was predicted:        ", rms / before.next_std[3, 3:])
 def visible(J, std, times):
     """Return the smallest error of each number that is seen, shape (n,), unit of std.
 
-    J (n, p): derivative of the numbers by the parameters; std: their noise, all alike;
-    times: how many standard deviations of its residual an error must reach, as 4.13.
+    J (n, p): derivative of the numbers by the parameters, no share h of which is 1;
+    std: their noise, all alike; times: how many standard deviations of its residual an
+    error must reach, as 4.13.
     """
     ### BEGIN SOLUTION
     h = np.einsum("ni,ij,nj->n", J, np.linalg.inv(J.T @ J), J)

@@ -1,16 +1,21 @@
 """The general layer, cases: where an answer is right on some draws and not on others, what those have in common."""
 
+import inspect
+import itertools
 import math
 
 import numpy as np
 
 ENTRIES = 4  # of a short vector, that are looked at one by one
 WAYS = 1000  # in which as many draws could have been missed: with fewer, one of some fifty traits may fit by chance
+PAIRS = 200  # times as many ways where two traits are told together: there are so many more of them
+CONFUSED = 3  # pairs of words that are told, at most
 
 
 def case_words(draws, missed):
-    """What the draws on which an answer is wrong have in common, and no other has; None when nothing is found, or when
-    so few draws are looked at, or missed, that it may be chance.
+    """What the draws on which an answer is wrong have in common, behind "it was wrong": "exactly where" no other has
+    it, "only where" some have; None when nothing is found, or when so few draws are looked at, or missed, that it may
+    be chance.
 
     Parameters
     ----------
@@ -19,14 +24,87 @@ def case_words(draws, missed):
     missed : list of bool
         On which of them the answer is wrong.
     """
-    if math.comb(len(missed), sum(missed)) < WAYS:
+    ways = math.comb(len(missed), sum(missed))
+    if ways < WAYS:
         return None
+    told = {words: true for words, true in _told(draws).items() if not all(true)}
+    told = {words: true for words, true in told.items() if all(t or not m for t, m in zip(true, missed))}
+    exact = (words for words, true in told.items() if true == missed)
+    if words := next(exact, None):
+        return f"exactly where {words}"
+    for one, two in itertools.combinations(told, 2) if ways > PAIRS * WAYS else ():
+        if [a and b for a, b in zip(told[one], told[two])] == missed:
+            return f"exactly where {one} and {two}"
+    rarest = min(told, key=lambda words: sum(told[words]), default=None)
+    if rarest and (sum(told[rarest]) / len(missed)) ** sum(missed) < 1 / WAYS:
+        return f"only where {rarest}"
+    return None
+
+
+def _told(draws):
+    """{words: on which draws they are true}."""
     traits = [_traits(given, expected) for given, expected in draws]
     shared = set(traits[0]).intersection(*traits[1:])
-    for words in traits[0]:
-        if words in shared and [trait[words] for trait in traits] == missed:
-            return words
-    return None
+    return {words: [trait[words] for trait in traits] for words in traits[0] if words in shared} | _kinds(draws)
+
+
+def side_words(results):
+    """Whether numbers are too small, or too large, on every draw, in words; None where it is not so, or not known.
+
+    Parameters
+    ----------
+    results : list of (object, object)
+        What the student's function gave and the expected result, of every draw.
+    """
+    if len(results) < 4 or any(np.ndim(v) or not isinstance(v, float | np.ndarray) for pair in results for v in pair):
+        return None
+    off = np.array([result - expected for result, expected in results], dtype=float)
+    side = "small" if (off < 0).all() else "large" if (off > 0).all() else None
+    return side and f"too {side} on every draw"
+
+
+def result_words(results):
+    """What words, truth values or sets have to do with the right ones on all draws; None where nothing is found.
+
+    Parameters
+    ----------
+    results : list of (object, object)
+        What the student's function gave and the expected result, of every draw.
+    """
+    if not all(type(value) in (str, bool, int, set, frozenset) for pair in results for value in pair):
+        return None
+    wrong = [(result, expected) for result, expected in results if result != expected]
+    if not wrong:
+        return None
+    first, several = results[0][0], any(expected != results[0][1] for _, expected in results)
+    if several and not (isinstance(first, set | frozenset) and first) and all(r == first for r, _ in results):
+        return f"it returns {first!r} on every draw, whatever comes in"
+    if all(isinstance(value, set | frozenset) for pair in wrong for value in pair):
+        if all(result < expected for result, expected in wrong):
+            return "what it returns is right, but not all of it is there"
+        if all(result > expected for result, expected in wrong):
+            return "all that is right is there, but more is returned than that"
+        return None
+    pairs = list(dict.fromkeys(wrong))
+    if (
+        len(wrong) == len(results)
+        or len(pairs) > CONFUSED
+        or not all(isinstance(value, str) for pair in pairs for value in pair)
+    ):
+        return None
+    told = [f"{result!r} where {expected!r} is right" for result, expected in pairs]
+    return f"it returns {' and '.join([', '.join(told[:-1]), told[-1]] if told[:-1] else told)}"
+
+
+def _kinds(draws):
+    """{words: on which draws they are true} of what an argument or the right result is, where it is a word, a truth
+    value or a function.
+    """
+    found = []
+    for given, expected in draws:
+        functions = {f"`{name}` is {value.__name__}" for name, value in given.items() if inspect.isfunction(value)}
+        found.append(functions | ({f"`{expected!r}` is right"} if isinstance(expected, str | bool | int) else set()))
+    return {words: [words in kinds for kinds in found] for words in dict.fromkeys(w for k in found for w in sorted(k))}
 
 
 def _traits(given, expected):
@@ -34,15 +112,11 @@ def _traits(given, expected):
     found = {}
     for name, value in given.items():
         found |= _of_value(f"`{name}`", value)
-    if isinstance(expected, str | bool | int | np.bool_):
-        found |= {f"`{expected!r}` is right": True}
-    elif (
-        not isinstance(expected, tuple) and np.ndim(expected) == 0 and not isinstance(expected, set | frozenset | dict)
-    ):
+    if isinstance(expected, set | frozenset):
+        found["the right result is empty"] = not expected
+    elif isinstance(expected, float | np.floating):
         found["the right result is negative"] = bool(expected < 0)
         found["the right result is 0"] = bool(expected == 0)
-    elif isinstance(expected, set | frozenset):
-        found["the right result is empty"] = not expected
     return found
 
 
@@ -61,12 +135,17 @@ def _of_value(here, value):
 
 
 def _of_text(here, text):
+    number, exponent, power = text.lower().replace(",", ".").partition("e")
     return {
         f"{here} has a comma": "," in text,
-        f"{here} has no decimals": "." not in text and "," not in text,
-        f"{here} has an exponent": "e" in text.lower(),
-        f"{here} has a negative exponent": "e-" in text.lower(),
-        f"{here} ends with a zero behind the point": text.endswith("0") and ("." in text or "," in text),
+        f"{here} has no decimals": "." not in number,
+        f"{here} has decimals": "." in number,
+        f"{here} has an exponent": bool(exponent),
+        f"{here} has a negative exponent": power.startswith("-"),
+        f"{here} has an exponent that is not negative": bool(exponent) and not power.startswith("-"),
+        f"{here} ends with a zero behind the point": number.endswith("0") and "." in number,
+        f"{here} ends with a zero": number.endswith("0"),
+        f"{here} has several digits": sum(c.isdigit() for c in number) > 1,
         f"{here} is negative": text.startswith("-"),
     }
 

@@ -25,7 +25,9 @@ from .typeset import typeset
 TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
 NOISY = "exact on clean data, but the data are not weighed as they should be: on noisy data"
 TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws of each kind
+NOT_RIGHT = "\nNot right when called as "
 MANY_DIGITS = 1e-3  # by how much better some draws come out where one case is special
+SHOWN = 4  # entries of a set or vector that is shown whole
 MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried, to tell on which
 MORE_CASES = 8  # on which an explanation from the first draws is tried once more, at least ...
 MOST_CASES = 64  # ... and at most, as far as LOOKING allows: of one in fifty draws a coincidence may hide
@@ -591,14 +593,27 @@ class _Trial:
         near = relations.not_accurate_enough(most)
         if near and not self._right_to_many_digits(most):
             return near
-        missed = [args for args, pair in zip(self.inputs, pairs) if not metric.equal(*pair)]
+        told = _closed(cases.result_words(pairs) or str(most))
+        missed = [(args, *pair) for args, pair in zip(self.inputs, pairs) if not metric.equal(*pair)]
         if len(missed) == len(pairs):
-            return _closed(str(most)) + self._right_parts()
+            side = cases.side_words(pairs)
+            told = f"{told[:-1]}, and {side}." if side else told
+            return told + self._right_parts() + self._example(*missed[0])
         special, seen = self._special_case()
         right = f"It was right on {len(pairs) - len(missed)} of {len(pairs)} draws: which case is special?"
         if special:
-            right = f"On {seen} draws it was wrong exactly where {special}."
-        return f"{_closed(str(most))} {right}\nNot right when called as {self._call(missed[0])}"
+            right = f"On {seen} draws it was wrong {special}."
+        return f"{told} {right}{self._example(*missed[0]) or f'{NOT_RIGHT}{self._call(missed[0][0])}'}"
+
+    def _example(self, args, result, expected):
+        """One call that did not come out right, with what it gives, if all can be shown whole; the right result is told
+        where it is one of some words, a number stays to be found.
+        """
+        call, mine = self._call(args), _whole(result)
+        if "<" in call or mine is None:
+            return ""
+        right = f", and {_whole(expected)} is right" if isinstance(expected, str) and self._right_somewhere() else ""
+        return f"{NOT_RIGHT}{call}: it gives {mine}{right}"
 
     def _right_parts(self):
         """Which of several results are right on all draws, as one more sentence; nothing where none or all are."""
@@ -779,6 +794,7 @@ WORDLESS = {  # what is raised without a word
     KeyboardInterrupt: "the check was interrupted",
 }
 ADVICE = {  # what NumPy means
+    "could not convert string to float": "`float` reads 1.5, but not 1,5: replace a decimal comma by a point first.",
     "must be square": "`solve` and `inv` need as many equations as unknowns; `lstsq` takes more.",
     "Singular matrix": "The equations do not fix all unknowns: is one missing, or there twice? Has a loop run off?",
     "Incompatible dimensions": "`lstsq` needs one right side a row of the matrix: is `.ravel()` missing?",
@@ -797,8 +813,28 @@ ADVICE = {  # what NumPy means
 }
 
 
+def _whole(value):
+    """A number, word, set or short vector as it is shown whole; None for anything larger."""
+    value = value.item() if isinstance(value, np.ndarray) and not value.ndim else value
+    if isinstance(value, set | frozenset):
+        plain = len(value) <= SHOWN and all(type(v) in (int, float, str) for v in value)
+        words = ", ".join(sorted(map(_short, value), key=lambda text: (len(text), text))) if plain else ""
+        return f"{{{words}}}" if words else None if value else "set()"
+    if isinstance(value, np.ndarray) and value.ndim == 1 and 0 < value.size <= SHOWN:
+        return _short(value)
+    return _short(value) if np.ndim(value) == 0 and isinstance(value, str | int | float | np.generic) else None
+
+
+def _plain(value):
+    """A value with NumPy's numbers and words, within it too, as Python's, which are shown as one types them."""
+    if isinstance(value, np.generic):
+        return value.item()
+    return type(value)(map(_plain, value)) if type(value) in (list, tuple, set) else value
+
+
 def _short(value):
     """An argument in a few characters."""
+    value = _plain(value)
     if isinstance(value, np.ndarray):
         if value.size > 16:
             return f"<array of shape {value.shape}>"

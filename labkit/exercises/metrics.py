@@ -302,8 +302,10 @@ class Poses(Metric):
         result = as_array(result, np.shape(expected))
         if result.shape[-2:] != (4, 4):
             raise Refused(f"a pose has shape (..., 4, 4), not {result.shape}")
-        if not np.allclose(result[..., 3, :], (0, 0, 0, 1), atol=1e-6):
-            row = result[..., 3, :].reshape(-1, 4)[0]
+        last = result[..., 3, :].reshape(-1, 4)
+        right = np.isclose(last, (0, 0, 0, 1), atol=1e-6).all(axis=1)
+        if not right.all():
+            row = last[np.argmin(right)]
             raise Refused(f"the last row must be 0 0 0 1, got {' '.join(f'{v:.3g}' for v in row)}")
         return result
 

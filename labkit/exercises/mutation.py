@@ -37,10 +37,11 @@ TWINS = {name: (twin,) for pair in PAIRS for name, twin in (pair, pair[::-1])} |
 }
 WRAPPERS = {"array", "asarray", "float", "int", "list", "tuple", "range", "len", "zip", "enumerate", "bool", "set"}
 SIGNS = {ast.Add: "plus", ast.Sub: "minus", ast.Mult: "`*`", ast.Div: "`/`", ast.MatMult: "`@`", ast.Pow: "`**`"}
+SIGNS |= {ast.FloorDiv: "`//`", ast.Mod: "`%`"}
 OTHERS = {
     ast.Add: (ast.Sub, ast.Mult),
     ast.Sub: (ast.Add, ast.Div),
-    ast.Mult: (ast.Div, ast.Add),
+    ast.Mult: (ast.Div, ast.Add, ast.MatMult),
     ast.Div: (ast.Mult, ast.Sub),
     ast.MatMult: (ast.Mult,),
     ast.FloorDiv: (ast.Div,),
@@ -181,6 +182,7 @@ def _locate(new, node):
     ast.fix_missing_locations(new)
 
 
+AFRESH = "with a list or array that each round finds as it was"
 COUNTED = "with one index counted from the other end"
 REVERSED = (  # (words of what was changed in a right formula, what is wrong where the change mends)
     (r"with (.+) where (.+) belongs", r"\2 stands where \1 belongs"),
@@ -438,6 +440,7 @@ def _statements(function):
                         sets = ((owner, field, [*block[:i], *new, *block[i + 1 :]]),)
                         yield Change(words, mends, 1, statement, sets)
                     yield from _elsewhere(owner, field, block, i)
+                    yield from _afresh(owner, field, block, i)
 
 
 def _instead(statement):
@@ -475,10 +478,44 @@ def _elsewhere(owner, field, block, i):
         out = ((here, "body", here.body[:-1]), (owner, field, [*block[: i + 1], here.body[-1], *block[i + 1 :]]))
         mends = "this stands inside the loop, at its end, and belongs behind it"
         yield Change("with one step of a loop behind it", mends, 1, here.body[-1], out)
+    last = here.body[-1]
+    if isinstance(last, ast.If) and last.orelse and isinstance(last.orelse[-1], ast.Return):
+        out = ((last, "orelse", []), (owner, field, [*block[: i + 1], *last.orelse, *block[i + 1 :]]))
+        mends = "this ends the loop in its first round, and belongs behind it"
+        yield Change("with the last case of a loop behind it", mends, 1, last.orelse[-1], out)
     if behind is not None and not isinstance(behind, ast.Return):
         into = ((here, "body", [*here.body, behind]), (owner, field, [*block[: i + 1], *block[i + 2 :]]))
         mends = "this stands behind the loop and belongs into it, at its end"
         yield Change("with a step drawn into a loop", mends, 1, behind, into)
+
+
+def _afresh(owner, field, block, i):
+    """A list or array from before a loop that is as it was at the beginning of each round, though rounds change it."""
+    loop = block[i]
+    if not isinstance(loop, ast.For | ast.While):
+        return
+    stored = {n.id for n in ast.walk(loop) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    for inner in ast.walk(loop):
+        if not isinstance(inner, ast.For | ast.While):
+            continue
+        for name in sorted({_changed_in_place(statement) for statement in inner.body} - stored - {None}):
+            kept = f"{name}_as_it_was"
+            before, again = (
+                ast.parse(f"{to} = __import__('copy').deepcopy({of})").body[0]
+                for to, of in ((kept, name), (name, kept))
+            )
+            _locate(before, loop)
+            _locate(again, inner)
+            mends = f"`{name}` is changed in each round, and the next one finds it changed: each needs a fresh copy"
+            outside = (owner, field, [*block[:i], before, *block[i:]])
+            yield Change(AFRESH, mends, 1, inner, (outside, (inner, "body", [again, *inner.body])))
+
+
+def _changed_in_place(statement):
+    """The name of a list or array of which a statement changes a part; None where it does no such thing."""
+    targets = getattr(statement, "targets", [getattr(statement, "target", None)])
+    target = targets[0].value if isinstance(targets[0], ast.Subscript) else None
+    return target.id if isinstance(target, ast.Name) else None
 
 
 def _is_told(statement):

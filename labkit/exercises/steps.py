@@ -20,9 +20,12 @@ CLOSE = 1e-7  # how far, relatively, two values may lie apart that are the same
 BATCH = 120  # changes that are tried at once
 ENTRIES = 8  # of a result that are looked at one by one
 NAMED = 4  # values that are told to be right, at most
+ANGLES = re.compile(r"rad|deg|angle|turn|rot|axis|axes|theta|phi|psi|sin|cos|tan|pose|frame", re.IGNORECASE)
+SCALED = ("half of it", "twice as much", "a thousand times as much", "a thousandth of it")  # what a choice may not tell
 BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with a number
 DECIMALS = re.compile(r"[<>]=? *\d*(\.\d+(e[+-]?\d+)?|e-\d+)$|[<>]=? *\d+e-\d+$")  # a comparison with such a number
 TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
+NEVER = "is to happen never"  # where a case mends by being left out
 ALONE = "With this alone changed, your result is right"
 
 
@@ -113,6 +116,7 @@ class Search:
         self.cases = sorted(cases, key=lambda case: case.was_right)
         self.results = [None if case.result is None else rerun.numeric(case.result) for case in self.cases]
         self.values = _traces(written, self.cases, budget)
+        self.turns = any(map(ANGLES.search, [written.function.__doc__ or "", *written.lines.values()]))
 
     @_or_nothing
     def words(self):
@@ -158,12 +162,19 @@ class Search:
 
     def code_words(self, ranks):
         changes = self.written.changes
-        likely = (k for k, (rank, *_) in enumerate(changes) if rank in ranks)
+        likely = (k for k, (rank, *_) in enumerate(changes) if rank in ranks and self._may_be_said(changes[k][-1]))
         plan = self.mending([("code", k) for k in likely if not self._moves_a_bound(*changes[k][1:])])
         if plan is None:
             return None
         _, line, code, mends = changes[self._left_out_instead(plan[1])]
         return f"in line {line}, `{code}`: {mends}. {ALONE}"
+
+    def _may_be_said(self, mends):
+        """Whether a change is about something that the function has to do with: degrees are of angles alone, and how
+        large a number is matters little where one of several is chosen.
+        """
+        chosen = all(isinstance(c.metric, metrics.Exactly) and type(c.expected) is int for c in self.cases)
+        return (self.turns or not mends.endswith(("radians", "degrees"))) and not (chosen and mends.startswith(SCALED))
 
     def _moves_a_bound(self, line, code, mends):
         """Whether a change only turns what is compared with a number: another number would do as well. Nor is a number
@@ -175,12 +186,19 @@ class Search:
         return mends.endswith(("belongs there", "belongs there in degrees")) and any(compared)
 
     def _left_out_instead(self, number):
-        """The change that leaves out a part where another sign mends only because it makes that part do nothing."""
+        """The change that leaves out a part where another sign mends only because it makes that part do nothing; for a
+        case that must not happen, that it never happens.
+        """
         changes = self.written.changes
-        here = changes[number][1:3]
-        if " stands where " not in changes[number][3]:
+        here, said = changes[number][1:3], changes[number][3]
+        if " stands where " not in said:
             return number
-        fewer = [("code", k) for k, (_, *at, mends) in enumerate(changes) if tuple(at) == here and TOO_MANY in mends]
+        never = said.endswith("`==` belongs")
+        fewer = [
+            ("code", k)
+            for k, (_, *at, mends) in enumerate(changes)
+            if tuple(at) == here and TOO_MANY in mends or never and at[0] == here[0] and mends.endswith(NEVER)
+        ]
         plan = self.mending(fewer)
         return number if plan is None else plan[1]
 
@@ -206,7 +224,9 @@ class Search:
         """Plans of values turned into others, the likeliest first, without those that change nothing or cannot be."""
         numeric = [i for i in range(len(self.names)) if all(is_numeric(case.args[i]) for case in self.cases)]
         seen = [(k, values[0]) for k, (count, values) in enumerate(self.values[0]) if count and self._may_turn(k)]
-        for change, (_, function) in enumerate(rerun.OTHERWISE):
+        for change, (words, function) in enumerate(rerun.OTHERWISE):
+            if not self._may_be_said(words):
+                continue
             for argument in [None] if change < rerun.ALONE else numeric:
                 others = [] if argument is None else [np.asarray(self.cases[0].args[argument], dtype=float)]
                 for k, value in seen:

@@ -938,7 +938,8 @@ def test_words_count_without_their_case_and_wrong_ones_are_quoted():
         "kind", reference=lambda x: "minimum", draw=lambda rng: (1.0,), metric=metrics.Exactly(), hints=("a", "b", "c")
     )
     assert kind.judge(lambda x: " Minimum").status == CORRECT
-    assert kind.judge(lambda x: "low").text == "`'low'` is not the answer here."
+    said = kind.judge(lambda x: "low").text
+    assert said.startswith("`'low'` is not the answer here.") and "minimum" not in said
 
 
 def test_a_name_from_a_cell_not_yet_run_is_explained():

@@ -3,6 +3,9 @@ the case that is special.
 """
 
 import ast
+import dataclasses
+import linecache
+import re
 import textwrap
 
 import numpy as np
@@ -67,9 +70,52 @@ def test_one_of_several_results_and_two_exchanged():
 
 def test_the_case_on_which_an_answer_is_wrong():
     draws = [({"v": v, "n": n}, 1.0) for v, n in ((1.0, 2), (-1.0, 2), (2.0, 3), (-3.0, 3))]
-    assert cases.case_words(4 * draws, 4 * [False, True, False, True]) == "`v` is negative"
+    assert cases.case_words(4 * draws, 4 * [False, True, False, True]) == "exactly where `v` is negative"
     assert cases.case_words(4 * draws, 4 * [False, True, True, False]) is None
     assert cases.case_words(draws, [False, True, False, True]) is None, "so few draws may agree by chance"
+
+
+TEXTS = [({"printed": text, "sure": k % 2 == 0}, k % 3) for k, text in enumerate(20 * ["3e4", "1.20", "5e-2", "7,1"])]
+
+
+@pytest.mark.parametrize(
+    "is_wrong, told",
+    [
+        (lambda g, e: "e4" in g["printed"], "exactly where `printed` has an exponent that is not negative"),
+        (
+            lambda g, e: g["printed"] == "3e4" and e == 2,
+            "exactly where `printed` has an exponent that is not negative and",
+        ),
+        (lambda g, e: e == 1, "exactly where `1` is right"),
+        (lambda g, e: g["printed"] == "1.20" and e != 1, "only where `printed` ends with a zero behind the point"),
+    ],
+)
+def test_what_texts_and_words_have_in_common_one_or_two_at_once(is_wrong, told):
+    assert cases.case_words(TEXTS, [is_wrong(*draw) for draw in TEXTS]).startswith(told)
+
+
+def test_what_only_a_few_others_have_is_told_too():
+    draws = [({"printed": text}, 0.5) for text in 8 * ["1.5", "2.7", "3.30", "4.1"]]
+    wrong = [k % 4 == 2 and k > 8 for k in range(len(draws))]
+    assert cases.case_words(draws, wrong) == "only where `printed` ends with a zero behind the point"
+
+
+@pytest.mark.parametrize(
+    "results, told",
+    [
+        ([("a", "b"), ("c", "c"), ("a", "b")], "it returns 'a' where 'b' is right"),
+        ([("a", "b"), ("b", "c"), ("c", "c")], "it returns 'a' where 'b' is right and 'b' where 'c' is right"),
+        ([("a", "b"), ("a", "c")], "it returns 'a' on every draw, whatever comes in"),
+        ([({1}, {1, 2}), (set(), {3})], "what it returns is right, but not all of it is there"),
+        ([({1, 2}, {1}), ({3}, {3})], "all that is right is there, but more is returned than that"),
+        ([(set(), {1}), (set(), set())], "it returns set() on every draw, whatever comes in"),
+        ([({1}, {2}), ({3}, {3})], None),
+        ([("a", "b"), ("c", "d")], None),
+        ([(1.0, 2.0)], None),
+    ],
+)
+def test_words_and_sets_in_the_place_of_others(results, told):
+    assert cases.result_words(results) == told
 
 
 FORMULA = """
@@ -175,3 +221,84 @@ def test_of_two_results_the_right_one_is_told():
     both = metrics.Several(NUMBERS, NUMBERS, names=("sine", "cosine"))
     item = exercise(lambda x, std: (np.sin(x), np.cos(x) + std**3), _draw, both)
     assert "Right are: sine." in told(item, "return np.sin(x), np.cos(x) + std**2.7 - 0.1 * x**4")
+
+
+def test_one_call_is_shown_with_what_it_gives_and_with_the_right_word():
+    item = exercise(lambda x, std: float(np.sin(x) * std + x**2), lambda rng: (rng.uniform(1, 3), rng.uniform(1, 2)))
+    text = told(item, "return np.tan(x) * std + 0.3 * x**3 + (std > 1.5)")
+    x, std, mine = (float(v) for v in re.search(r"x=(\S+), std=(\S+)\): it gives (\S+)$", text).groups())
+    assert mine == pytest.approx(np.tan(x) * std + 0.3 * x**3 + (std > 1.5), rel=1e-3)
+    words = exercise(lambda x, std: "abcde"[int(x)], lambda rng: (rng.uniform(0, 5), rng.normal()), metrics.Exactly())
+    said = told(dataclasses.replace(words, draws=12), "return 'abcde'[int(x * x) % 5]")
+    assert re.search(r"x=\S+, std=\S+\): it gives '[a-e]', and '[a-e]' is right$", said)
+
+
+def test_what_is_small_on_every_draw_is_said_to_be():
+    item = exercise(lambda x, std: float(np.exp(x) + std), lambda rng: (rng.uniform(1, 3), rng.uniform(1, 2)))
+    assert "too small on every draw" in told(item, "return 1.0 + x * 0.3 * np.cos(std) ** 2")
+
+
+def test_numpys_words_and_numbers_are_shown_as_one_types_them():
+    assert engine._short([np.str_("4.5"), np.int64(3)]) == "['4.5', 3]"
+    assert engine._short((np.str_("a"),)) == "('a',)"
+
+
+LOOPS = {
+    "x is changed": (
+        "total = 0.0\nfor k in range(4):\n    x[k] += std\n    total += np.prod(x)\nreturn total",
+        "`x` is changed in each round, and the next one finds it changed",
+    ),
+    "the first round ends it": (
+        "for k in range(4):\n    if x[k] < 0:\n        return x[k] * std\n    else:\n        return std\n",
+        "`return std`: this ends the loop in its first round, and belongs behind it",
+    ),
+    "entry by entry": ("M = np.outer(x, x) + np.eye(4)\nreturn (M * np.diag(x) * std)", "`*` stands where `@` belongs"),
+    "a division that cuts": ("return 7 * std // 2 + x", "`//` stands where `/` belongs"),
+}
+
+
+def _one_at_a_time(x, std):
+    return sum(float(np.prod(x + std * np.eye(4)[k])) for k in range(4))
+
+
+def _first_negative(x, std):
+    return float(next((v for v in x if v < 0), 1.0) * std)
+
+
+RIGHT = (
+    _one_at_a_time,
+    _first_negative,
+    lambda x, std: (np.outer(x, x) + np.eye(4)) @ np.diag(x) * std,
+    lambda x, std: 3.5 * std + x,
+)
+
+
+@pytest.mark.parametrize("name, right", [*zip(LOOPS, RIGHT)])
+def test_loops_that_keep_what_they_changed_and_loops_that_end_at_once(name, right):
+    body, words = LOOPS[name]
+    body = f"x = list(x)\n{body}" if "changed" in name else body
+    text = "def formula(x, std):\n" + textwrap.indent(body, "    ") + "\n"
+    linecache.cache[name] = (len(text), None, text.splitlines(True), name)
+    known = {"np": np}
+    exec(compile(text, name, "exec"), known)
+    assert words in exercise(right, _draw).judge(known["formula"], rng=np.random.default_rng(0)).text
+
+
+def test_the_pose_that_is_none_is_shown():
+    T = np.tile(np.eye(4), (3, 1, 1))
+    T[2] = 0
+    with pytest.raises(metrics.Refused, match="got 0 0 0 0"):
+        metrics.Poses().admit(T, T)
+
+
+def test_no_angle_is_spoken_of_where_there_is_none():
+    """A threshold that is a matter of scale: any smaller number would do, and degrees are none of it."""
+    item = exercise(lambda x, std: int(np.argmin(x) if x.min() < 9 else 0), lambda rng: (rng.uniform(1, 8, 5), 1.0))
+    item = dataclasses.replace(item, metric=metrics.Exactly())
+    loop = "    for k in range(5):\n        if x[k] < best:\n            best, which = x[k], k\n"
+    text = f"def formula(x, std):\n    best, which = 1.0, 0\n{loop}    return which\n"
+    linecache.cache["choice"] = (len(text), None, text.splitlines(True), "choice")
+    known = {}
+    exec(compile(text, "choice", "exec"), known)
+    told = item.judge(known["formula"], rng=np.random.default_rng(0)).text
+    assert "radians" not in told and "half of it" not in told

@@ -5,13 +5,23 @@ import itertools
 
 import numpy as np
 
-from ...documents.ledger import Computed, Row, judge
 from ...documents.rounding import half_unit
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction
 from .proofs import BOUND, SUSPECTS
 
-FORMS = ("d.0d0000", "dd", "d,d", "-0,dd0", "de-k", "d.d0ek", "-d000", "dd.d")  # d: any digit but 0, k: up to 5
+FORMS = (
+    "d.0d0000",
+    "dd",
+    "d,d",
+    "-0,dd0",
+    "de-k",
+    "d.d0ek",
+    "-d000",
+    "dd.d",
+    "dek",
+    "d.dde-k",
+)  # d: any digit but 0, k: up to 5
 
 
 def printed_number(rng, form):
@@ -19,18 +29,31 @@ def printed_number(rng, form):
     return ("".join(str(rng.integers(1, 10 if c == "d" else 6)) if c in "dk" else c for c in form),)
 
 
-def comparison(rng, off, bound, misprint, simulated, comma):
-    """printed, value, bound, misprint, simulated; `off` and `bound` in half units of the last printed digit."""
-    decimals = int(rng.integers(1, 4))
+def comparison(rng, off, bound, misprint, simulated, comma, beyond, zero):
+    """printed, value, bound, misprint, simulated; `off` and `bound` in half units of the last printed digit.
+
+    beyond: whether the value is larger than what is printed, signs apart, as where digits were cut off. zero: whether
+    the last printed digit is 0.
+    """
+    decimals = int(rng.integers(2 if zero else 1, 4))
     half, number = 0.5 * 10.0**-decimals, rng.uniform(20, 90) * rng.choice([-1, 1])
-    printed = f"{number:.{decimals}f}"
-    value = float(printed) - off * half * np.sign(number)  # toward zero: digits that are cut off leave too little
+    printed = f"{number:.{decimals - 1}f}0" if zero else f"{number:.{decimals}f}"
+    value = float(printed) + (1 if beyond else -1) * off * half * np.sign(number)
     return printed.replace(".", ",") if comma else printed, float(value), bound * half, misprint, simulated
 
 
 NUMBERS = tuple(functools.partial(printed_number, form=form) for form in FORMS)
 COMPARISONS = tuple(
-    functools.partial(comparison, off=off, bound=bound, misprint=misprint, simulated=simulated, comma=k % 5 == 3)
+    functools.partial(
+        comparison,
+        off=off,
+        bound=bound,
+        misprint=misprint,
+        simulated=simulated,
+        comma=k % 5 == 3,
+        beyond=(k // 2 + k // 4) % 2 == 0,
+        zero=k % 7 == 2,
+    )
     for k, (off, bound, misprint, simulated) in enumerate(
         itertools.product((0.0, 0.4, 1.8, 2.2, 2.7, 60.0), (0.0, 1.5, 100.0), (False, True), (False, True))
     )
@@ -38,9 +61,9 @@ COMPARISONS = tuple(
 
 
 def status(printed, value, bound, misprint, simulated):
-    """The word the ledger gives."""
-    row = Row("x", "lecture", "", "", printed, "", "result", "reproduced", "")
-    return judge(row, Computed(value, bound=bound, slips=() if misprint else None, simulated=simulated))
+    """The word the ledger gives, without its *cut off*."""
+    half, off = half_unit(printed) * (1 + 1e-6), abs(value - _number(printed))
+    return (_simulated_word if simulated else _real_word)(half, off, bound, misprint)
 
 
 def _number(printed):
@@ -107,6 +130,23 @@ def _significant_digits(counted):
 
 def _four_digits(printed):
     return 0.5 * 10.0 ** (np.floor(np.log10(abs(_number(printed)))) - 3)
+
+
+def _first_digit(printed):
+    return 0.5 * 10.0 ** np.floor(np.log10(abs(_number(printed))))
+
+
+def _until_whole(printed):
+    """Ten times as much until no decimals are left, of the number: zeros at the end are not seen."""
+    x, half = _number(printed), 0.5
+    while abs(x - round(x)) > 1e-9:
+        x, half = 10 * x, half / 10
+    return half
+
+
+def _negative_exponents_alone(printed):
+    """As with a split at "e-": what stands behind another exponent's point is all counted as decimals."""
+    return half_unit(printed) if "e-" in printed else _ends_at_the_exponent(printed)
 
 
 def _only_the_exponent(printed):
@@ -200,11 +240,74 @@ def _without_reading_commas(printed, value, bound, misprint, simulated):
     return status(printed, value, bound, misprint, simulated)
 
 
+def _close_by_default(printed, value, bound, misprint, simulated):
+    """With np.isclose, which allows a share of the printed number as well."""
+    rule, more = _simulated_word if simulated else _real_word, 1e-5 * abs(_number(printed))
+    return rule(half_unit(printed) + more, abs(value - _number(printed)), bound, misprint)
+
+
+def _half_through_float(printed, value, bound, misprint, simulated):
+    rule, off = _simulated_word if simulated else _real_word, abs(value - _number(printed))
+    return rule(_through_float(printed) * (1 + 1e-6), off, bound, misprint)
+
+
+def _as_text(strip):
+    """Reproduced is what is the printed text when it is written with as many decimals; `strip`: of what is printed."""
+
+    def variant(printed, value, bound, misprint, simulated):
+        same = f"{value:.{_decimals(printed)}f}" == strip(printed)
+        if simulated or same:
+            return "reproduced" if same and not simulated else status(printed, value, bound, misprint, simulated)
+        word = status(printed, value, bound, misprint, simulated)
+        return "rounding" if word == "reproduced" else word
+
+    return variant
+
+
+def _cut_off(printed, value, bound, misprint, simulated):
+    word, off = status(printed, value, bound, misprint, simulated), abs(value) - abs(_number(printed))
+    rest = word not in ("reproduced", "consistent", "not computable")
+    return "cut off" if rest and 0 < off < 2 * half_unit(printed) else word
+
+
 STATUSES = (
+    (
+        _close_by_default,
+        "np.isclose allows a share of the number besides: rtol=1e-5 unless you write rtol=0. Half unit and bound are all that is allowed.",
+    ),
+    (
+        _half_through_float,
+        "float() forgets how many digits were printed: 43.00 has two decimals. Take the half unit from the string.",
+    ),
+    (
+        _as_text(str),
+        "You compare texts, and some are printed with a comma. Compare numbers: the difference with the half unit.",
+    ),
+    (_cut_off, "*Cut off* is left out here: what is off by less than a whole unit is judged as all else."),
+    (
+        _judged(_real_word, lambda h, o, b, m: "consistent" if o <= b else "not computable"),
+        "A simulation stands beside a number that was rounded: compare with half unit + bound, not with the bound alone.",
+    ),
+    (
+        _judged(
+            lambda h, o, b, m: (
+                "reproduced" if o <= h + b else "rounding" if o <= h + 2 * b else "misprint" if m else "contradiction"
+            )
+        ),
+        "You allow the bound for *reproduced* already. That is said within the half unit; within half unit + bound it is *rounding*.",
+    ),
+    (
+        _judged(lambda h, o, b, m: "reproduced" if o <= h + b else "misprint" if m else "contradiction"),
+        "You allow the bound for *reproduced* already. That is said within the half unit; within half unit + bound it is *rounding*.",
+    ),
     (_without_reading_commas, "float() does not read a decimal comma: replace it by a point first."),
     (_judged(_real_word, _real_word), "`simulated` does not enter yet: without the inputs nothing is reproduced."),
     (
         _judged(_real_word, lambda h, o, b, m: "reproduced" if o <= h else "consistent"),
+        "Ask for `simulated` first. A simulated value is *consistent* within half unit and bound, else *not computable*.",
+    ),
+    (
+        _judged(_real_word, lambda h, o, b, m: "reproduced" if o <= h else _simulated_word(h, o, b, m)),
         "Ask for `simulated` first. A simulated value is *consistent* within half unit and bound, else *not computable*.",
     ),
     (
@@ -427,6 +530,15 @@ CHAPTER = Chapter(
                         "Zeros at the end were printed like any other digit, and an exponent is no decimal: cut off nothing but the exponent, and count it for itself.",
                     )
                     for variant in (_hundreds, _trailing_zeros)
+                ),
+                Mistake(_first_digit, "You take the place of the first digit. Rounded was the last one."),
+                Mistake(
+                    _until_whole,
+                    "A number does not know how it was printed: zeros at its end are lost. Count the decimals in the string.",
+                ),
+                Mistake(
+                    _negative_exponents_alone,
+                    "An exponent may be positive as well: 3.20e3 has two decimals, and its last digit is worth 10.",
                 ),
                 Mistake(_with_the_sign, "Half a unit is a size, without a sign: that of -0,250 is 0.0005."),
                 Mistake(

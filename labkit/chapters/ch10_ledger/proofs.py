@@ -1,6 +1,7 @@
 """Chapter 10: two exercises, a rounding bound to propagate and a column of numbers with one slip in it."""
 
 import functools
+import itertools
 
 import numpy as np
 
@@ -84,6 +85,12 @@ def _all_at_once(f, printed):
     return max(abs(f(x + halves) - f(x)), abs(f(x - halves) - f(x)))
 
 
+def _corners(f, printed):
+    x, halves = read(printed)
+    signs = itertools.product((-1, 1), repeat=len(x))
+    return max(abs(f(x + halves * np.array(corner)) - f(x)) for corner in signs)
+
+
 def _never_put_back(f, printed):
     x, halves = read(printed)
     moved, found = x.copy(), 0.0
@@ -161,6 +168,16 @@ BOUND = Exercise(
         Mistake(
             _all_at_once,
             "You moved all numbers at once: their moves may cancel. Move one at a time and add the absolute values.",
+        ),
+        Mistake(
+            lambda f, p: max(np.abs(moves).sum() for moves in _moves(f, p)),
+            "You add all ups and all downs and take the larger sum. For one number the way up may be longer, for "
+            "another the way down: the larger of the two counts for each.",
+        ),
+        Mistake(
+            _corners,
+            "You move all numbers at once, in all combinations of up and down. Move one at a time, and add what each "
+            "of them does.",
         ),
         Mistake(
             lambda f, p: _larger(f, p).max(),
@@ -249,7 +266,7 @@ BOUND = Exercise(
 # --- prove a misprint ---
 
 
-FINE = {"fine": 0.3, "too fine": 0.8}  # units by which an average with one digit more is off
+FINE = {"fine": (0.3, 1), "too fine": (0.8, 1), "finest": (0.56, 2)}  # units it is off, digits an average has more
 AWAY = {"edge": -1, "beyond": -2, "far": 2}  # units from the rounded average, to the side it was not rounded to
 
 
@@ -281,9 +298,12 @@ def column(rng, slip):
 
     With a slip in an entry the average is printed to its last digit. "edge", "beyond" and "far" print an average that
     is 1 to 2, 3 to 4 and 4 to 5 half units away: entries and average together allow 2, each alone 1. "fine" prints it
-    with one digit more, and off by what the entries alone allow; "too fine" is off by more than that. In "mixed" one
-    entry has a digit less than the others, and is what allows most.
+    with one digit more, and off by what the entries alone allow; "too fine" and "finest" are off by more than that. In
+    "mixed" one entry has a digit less than the others, and is what allows most. "alone" is one entry; "lost" are whole
+    numbers of two digits, one of which had three.
     """
+    if slip in ("alone", "lost"):
+        return _of_few_digits(rng, slip == "lost")
     decimals, count = int(rng.integers(1, 4)), int(rng.integers(4, 6))
     values = np.round(rng.uniform(2, 60, count) * rng.choice([-1, 1], count, p=[0.2, 0.8]), decimals)
     unit, more = 10.0**-decimals, int(rng.integers(0, 2))
@@ -295,7 +315,8 @@ def column(rng, slip):
         return [f"{value:.{decimals}f}" for value in values], f"{near + AWAY[slip] * side * unit:.{decimals}f}"
     entries, average = [f"{value:.{decimals}f}" for value in values], f"{values.mean():.{decimals + more}f}"
     if slip in FINE:
-        average = f"{values.mean() + FINE[slip] * unit * rng.choice([-1, 1]):.{decimals + 1}f}"
+        off, more = FINE[slip]
+        average = f"{values.mean() + off * unit * rng.choice([-1, 1]):.{decimals + more}f}"
     elif slip == "mixed":
         values[1] = np.round(values[1], decimals - 1)
         entries[1], average = f"{values[1]:.{decimals - 1}f}", f"{values.mean() + 0.8 * unit:.{decimals + 1}f}"
@@ -305,6 +326,15 @@ def column(rng, slip):
         k, average = int(rng.integers(count)), f"{values.mean():.{decimals + 2}f}"
         entries[k] = _slipped(rng, entries[k], slip)
     return entries, average
+
+
+def _of_few_digits(rng, lost):
+    """One entry and an average with two digits swapped; or whole numbers, of which one lost its first digit."""
+    if lost:
+        values = rng.integers(11, 60, 4)
+        return [str(value) for value in rng.permutation(values)], str(round(values.mean() + 25))
+    tens, ones = rng.choice(np.arange(1, 10), 2, replace=False)
+    return [f"{tens}{ones}.5"], f"{ones}{tens}.5"
 
 
 def _slipped(rng, text, kind):
@@ -318,21 +348,25 @@ def _slipped(rng, text, kind):
 
 
 def _clear(rng, draw):
-    """A column of which no gap, as it is or after a slip, lies at what is allowed to the last bits.
+    """A column of which no gap, as it is or after a slip, lies at what is allowed to the last bits, be it by all, by
+    the entries alone or by the average alone.
 
     Nor does it matter whether a number with a slip keeps its half unit or gets that of its new digits.
     """
     while True:
         drawn = draw(rng)
         gaps = _gaps(*drawn)
-        found = [_suspected(gaps, more, kept) for more in (-1e-7, 1e-7) for kept in (False, True)]
-        if all(each == found[0] for each in found):
+        if all(
+            _suspected(gaps, -1e-7, False, counted) == _suspected(gaps, 1e-7, kept, counted)
+            for kept, counted in ((False, (1, 1)), (True, (1, 1)), (False, (1, 0)), (False, (0, 1)))
+        ):
             return drawn
 
 
 def _gaps(entries, average):
-    """The gap and what rounding allows, as printed; and of each number, after each of its slips, the gap and by how
-    much more is allowed for the new digits."""
+    """The gap and what rounding of the entries and of the average allows, as printed; and of each number, after each of
+    its slips, the gap and by how much more is allowed for the new digits.
+    """
     printed = [*entries, average]
     part = np.append(np.full(len(entries), 1 / len(entries)), -1.0)  # of each number in the gap
     values, halves = _read(printed)
@@ -340,22 +374,26 @@ def _gaps(entries, average):
     for text, share, value, half in zip(printed, part, values, halves):
         others, own = _read(single_slips(text))
         slips.append((np.abs(gap + share * (others - value)), abs(share) * (own - half)))
-    return abs(gap), np.abs(part) @ halves, slips
+    allowed = np.abs(part) * halves
+    return abs(gap), (allowed[:-1].sum(), allowed[-1]), slips
 
 
 def _read(texts):
     return np.array([number(text) for text in texts]), np.array([half_unit(text) for text in texts])
 
 
-def _suspected(gaps, more, kept=False):
+def _suspected(gaps, more, kept=False, counted=(1, 1)):
     """`suspects` from the gaps, where more than rounding explains is allowed, by this share of it.
 
-    kept: a number with a slip keeps the half unit that it was printed with.
+    kept: a number with a slip keeps the half unit that it was printed with. counted: whether what rounding of the
+    entries allows counts, and what that of the average does.
     """
     gap, allowed, slips = gaps
+    allowed = np.dot(counted, allowed)
     if gap <= allowed * (1 + more):
         return set()
-    return {k for k, (left, new) in enumerate(slips) if (left <= (allowed + (not kept) * new) * (1 + more)).any()}
+    counts = len(slips) * [0] if kept else [counted[0]] * (len(slips) - 1) + [counted[1]]
+    return {k for k, (left, new) in enumerate(slips) if (left <= (allowed + counts[k] * new) * (1 + more)).any()}
 
 
 COLUMNS = tuple(
@@ -363,7 +401,10 @@ COLUMNS = tuple(
     for draw in (
         *(
             functools.partial(column, slip=slip)
-            for slip in ("two digits swapped", "one digit wrong", "", "average", "sign lost", "mixed", *FINE, *AWAY)
+            for slip in (
+                *("two digits swapped", "one digit wrong", "", "average", "sign lost", "mixed", "alone", "lost"),
+                *(*FINE, *AWAY),
+            )
         ),
         *(
             functools.partial(at_the_limit, finer=finer, low=low, high=high)
@@ -422,17 +463,30 @@ def _printed_there(entries, average):
 
 def _slips_pile_up(entries, average):
     """Every slip is tried on a column in which the slips before it still stand."""
-    x, own = [number(text) for text in entries], number(average)
-    slack = sum(map(half_unit, entries)) / len(entries) + half_unit(average)
-    found = set()
+    printed, found = [*entries, average], set()
     if _agree(entries, average):
         return found
-    for k, text in enumerate(entries):
+    for k, text in enumerate([*entries, average]):
         for other in single_slips(text):
-            x[k] = number(other)
-            if abs(np.mean(x) - own) <= slack:
+            printed[k] = other
+            if _agree(printed[:-1], printed[-1]):
                 found.add(k)
-    return found | {len(x) for other in single_slips(average) if abs(np.mean(x) - number(other)) <= slack}
+    return found
+
+
+def _agree_one_way(entries, average, sign):
+    slack = sum(map(half_unit, entries)) / len(entries) + half_unit(average)
+    return sign * (sum(map(number, entries)) / len(entries) - number(average)) <= slack * (1 + 1e-9) + 1e-12
+
+
+def _median_agrees(entries, average):
+    slack = sum(map(half_unit, entries)) / len(entries) + half_unit(average)
+    return abs(np.median([number(text) for text in entries]) - number(average)) <= slack * (1 + 1e-9) + 1e-12
+
+
+def _cut_to_the_longest(entries, average):
+    longest = max(map(len, [*entries, average]))
+    return _search(slips=lambda text: [other[:longest] for other in single_slips(text)])(entries, average)
 
 
 def _average_in_the_mean(entries, average):
@@ -522,6 +576,46 @@ SUSPECTS = Exercise(
             _search(check=False),
             "Where entries and average agree as printed, nobody has slipped: return an empty set.",
         ),
+        *(
+            Mistake(
+                _search(agree=functools.partial(_agree_one_way, sign=sign)),
+                "You compare the difference with its sign, so that a large one of the other sign agrees with anything: "
+                "take its absolute value.",
+            )
+            for sign in (1, -1)
+        ),
+        Mistake(
+            lambda entries, average: found if len(found := suspects(entries, average)) == 1 else set(),
+            "You accuse nobody where several could have slipped. Wanted are all of them.",
+        ),
+        Mistake(
+            _search(slips=lambda text: list(single_slips(text))[:1]),
+            "You try the first slip of each number only. Does a `return` end the loop in its first round?",
+        ),
+        *(
+            Mistake(
+                _search(agree=_median_agrees, first_agree=first),
+                "You compare with the median. An average is the mean: the sum of the entries over their number.",
+            )
+            for first in (None, _agree)
+        ),
+        Mistake(
+            _cut_to_the_longest,
+            "A NumPy array of texts keeps the length of the longest: of a slip with a digit more the end is cut off. "
+            "Keep texts in a list.",
+        ),
+        Mistake(
+            lambda entries, average: len(suspects(entries, average)),
+            "You return how many there are. Wanted are their positions, in a set.",
+        ),
+        Mistake(
+            _search(agree=_allow(lambda halves, own: np.mean(halves) + 2 * own)),
+            "You allow a whole unit of the average. Rounding hides half of one.",
+        ),
+        Mistake(
+            _search(agree=_allow(lambda halves, own: 2 * np.mean(halves) + own)),
+            "You allow whole units of the entries. Rounding hides half of one.",
+        ),
         Mistake(
             _search(places=lambda n: range(n)),
             "The average was printed too, and can carry the slip: try it as well, as the last position.",
@@ -582,13 +676,10 @@ SUSPECTS = Exercise(
             "The slips you have tried stay in the column: take a fresh copy for each.",
         ),
         *(Mistake(_search(agree=_allow(rule)), text) for rule, text in TOLERANCES),
-        *(
-            Mistake(
-                variant,
-                "Your mean of the entries contains the average, which pulls the two together. Compare it with the "
-                "mean of the entries alone.",
-            )
-            for variant in (_search(agree=_average_in_the_mean), _search(agree=_average_in_the_mean, check=False))
+        Mistake(
+            _search(agree=_average_in_the_mean),
+            "Your mean of the entries contains the average, which pulls the two together. Compare it with the mean of "
+            "the entries alone.",
         ),
         *(
             Mistake(

@@ -3,6 +3,7 @@
 import functools
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ...calibration import calibrate, motion
 from ...calibration.own_data import Noise
@@ -27,16 +28,22 @@ def rows_of_a_cell(rng):
     return T_BF, invert(T_BF @ X) @ Y
 
 
-def some_motions(rng, apart):
-    """Motions that turn by 10 to 120 deg about axes in all directions, and how far apart they are compared."""
+def some_motions(rng, apart, turns=(0.2, 2.0)):
+    """Motions that turn by such angles (rad) about axes in all directions, and how far apart they are compared.
+
+    Some of the axes that are compared have largest entries of different sign: with turns from 2.2 on the scalar part of
+    the quaternion that SciPy gives is negative for one of the two.
+    """
     n = int(rng.integers(5, 10))
     while True:
         axes = rng.normal(size=(n, 3))
         axes /= np.linalg.norm(axes, axis=1, keepdims=True)
         cosines = (axes[apart:] * axes[:-apart]).sum(1)
-        if np.abs(cosines).max() < 0.95 and cosines.min() < -0.2:
+        largest = np.take_along_axis(axes, np.abs(axes).argmax(1)[:, None], 1)[:, 0]
+        both = (largest[apart:] * largest[:-apart]).min() < 0
+        if np.abs(cosines).max() < 0.95 and cosines.min() < -0.2 and both:
             break
-    return pose(exp_so3(rng.uniform(0.2, 2.0, (n, 1)) * axes), rng.uniform(-300, 300, (n, 3))), apart
+    return pose(exp_so3(rng.uniform(*turns, (n, 1)) * axes), rng.uniform(-300, 300, (n, 3))), apart
 
 
 def motions_about_one_axis(rng):
@@ -74,19 +81,18 @@ def covariance_and_reading(rng):
     return C, rng.normal(size=(int(rng.integers(1, len(C))), len(C))) * rng.uniform(0.3, 2.0)
 
 
-def covariance_and_candidates(rng, noise_tells=False):
-    """A covariance and derivatives of possible readings among which every wrong rule picks another one.
+def covariance_and_candidates(rng, rules, volume=None):
+    """A covariance and derivatives of possible readings among which each of the wrong rules picks another one.
 
-    noise_tells: among which the rule that forgets the noise of a reading picks another one.
+    volume: the smallest determinant that is left, by a choice of units: all above 1, or all 0 to some decimals.
     """
     while True:
         C, m = information(rng), int(rng.integers(7, 13))
         candidates = rng.normal(size=(m, int(rng.integers(2, 4)), len(C))) * rng.uniform(0.2, 2.0, (m, 1, 1))
-        picks = [
-            rule(C, candidates) for rule in (next_pose, *((_least_certain_volume,) if noise_tells else WRONG_RULES))
-        ]
-        if len({*picks, picks[0] + 1}) == len(picks) + 1 and _alone(C, candidates) != picks[0]:
-            return C, candidates
+        picks = [rule(C, candidates) for rule in (next_pose, *rules)]
+        if len({*picks, picks[0] + 1}) == len(picks) + 1 and _alone(C, candidates) != picks[0] != 0:
+            unit = 1.0 if volume is None else (volume / _volumes(C, candidates).min()) ** (1 / len(C))
+            return unit * C, candidates / np.sqrt(unit)
 
 
 def shares_of_a_fit(rng):
@@ -115,6 +121,28 @@ def _axes(T):
 
 def _angle_between(a, b):
     return np.arccos(np.clip((a * b).sum(1) / np.linalg.norm(a, axis=1) / np.linalg.norm(b, axis=1), -1, 1))
+
+
+def _between(axes):
+    """A variant from the axes it takes, a function of the rotations that gives vectors of any length."""
+    return lambda T, k: _angle_between(axes(T[:, :3, :3])[k:], axes(T[:, :3, :3])[:-k])
+
+
+def _sum_of_neighbors(T, k):
+    step = motion.between_axes(T, 1)
+    return np.array([step[i : i + k].sum() for i in range(len(T) - k)])
+
+
+OTHER_AXES = (
+    (_between(lambda R: Rotation.from_matrix(R).as_quat()[:, :3]),
+     "q and -q are the same turn: where the scalar part of a quaternion is negative, its vector part points against the axis. Turn its sign there, or take the rotation vector."),
+    (_between(lambda R: Rotation.from_matrix(R).as_euler("xyz")),
+     "Euler angles are three turns one after the other, no axis. The axis is the direction of the rotation vector."),
+    (_between(lambda R: Rotation.from_matrix(R).as_euler("XYZ")),
+     "Euler angles are three turns one after the other, no axis. The axis is the direction of the rotation vector."),
+    (_sum_of_neighbors,
+     "You add the angles between neighbors. Axes in space turn back as well: take the angle between the two themselves."),
+)  # fmt: skip
 
 
 def _without_clip(T, k):
@@ -194,6 +222,18 @@ def _largest_eigenvalue(C, candidates):
     return int(np.argmin(np.linalg.eigvalsh(_left(C, candidates))[:, -1]))
 
 
+def _product_of_variances(C, candidates):
+    return int(np.argmin(np.prod(np.diagonal(_left(C, candidates), axis1=1, axis2=2), axis=1)))
+
+
+def _least_certain_first(C, candidates):
+    return int(np.argmax([J[0] @ C @ J[0] for J in candidates]))
+
+
+def _largest_information(C, candidates):
+    return int(np.argmax(np.linalg.norm(np.swapaxes(candidates, 1, 2) @ candidates, axis=(1, 2))))
+
+
 def _one_after_the_other(C, candidates):
     volumes = []
     for J in candidates:
@@ -206,7 +246,16 @@ def _alone(C, candidates):
     return int(np.argmax(np.linalg.det(candidates @ np.swapaxes(candidates, 1, 2))))
 
 
-WRONG_RULES = (_smallest_trace, _largest_derivative, _largest_volume, _least_certain)
+CHOICES = tuple(
+    functools.partial(covariance_and_candidates, rules=rules, volume=volume)
+    for rules, volume in (
+        ((_smallest_trace, _largest_derivative, _largest_volume, _least_certain), None),
+        ((_least_certain_volume, _largest_eigenvalue), None),
+        ((_least_certain_first, _least_certain), 10.0),
+        ((_product_of_variances, _largest_eigenvalue, _smallest_trace), None),
+        ((_largest_information, _largest_derivative), 1e-15),
+    )
+)
 
 
 def visible(J, std, times):
@@ -231,6 +280,11 @@ def _apart(a, b):
 def slip_cost():
     """How far the fit to all rows puts the sensor from the fit to those that agree (mm)."""
     return _apart(slipped().plain.T, slipped().T)
+
+
+def _turn_apart():
+    """The angle between the two mountings (rad)."""
+    return float(np.linalg.norm(log_so3(slipped().T[:3, :3].T @ slipped().plain.T[:3, :3])))
 
 
 def _fit_to_the_rejected():
@@ -298,7 +352,10 @@ CHAPTER = Chapter(
         Exercise(
             "between_axes",
             reference=motion.between_axes,
-            draw=tuple(functools.partial(some_motions, apart=k) for k in (2, 1, 3)),
+            draw=(
+                *(functools.partial(some_motions, apart=k) for k in (2, 1, 3)),
+                functools.partial(some_motions, apart=1, turns=(2.2, 3.0)),
+            ),
             metric=metrics.Numbers(1e-7, "rad"),
             noisy=(
                 motions_about_one_axis,
@@ -317,6 +374,7 @@ CHAPTER = Chapter(
                 Mistake(_without_clip,
                         "Right, but for parallel or opposite axes a scalar product may come out as 1.0000000000000002, of which arccos is NaN: np.clip it to -1 ... 1."),
                 Mistake(_changed(np.rad2deg), "These are degrees. Inside, angles are radians."),
+                *(Mistake(variant, text) for variant, text in OTHER_AXES),
                 Mistake(_changed(np.cos), "These are the cosines: np.arccos is missing."),
                 Mistake(_changed(lambda a: np.arccos(np.abs(np.cos(a)))),
                         "Your angles end at 90 deg. An axis has a direction, the one about which the angle is positive, so two may stand at up to 180."),
@@ -362,6 +420,14 @@ CHAPTER = Chapter(
                 Mistake(lambda: round(slip_cost(), 1), "This is right as far as it goes, rounded to one decimal: at least 3 digits are needed, so hand over the computed value."),
                 Mistake(lambda: slipped().rms_translation, "This is the rms that the report states of the rows that agree, not how far the mounting moves."),
                 Mistake(lambda: float(np.linalg.norm((invert(slipped().T) @ slipped().plain.T)[:3, :3])), "This is the norm of a rotation matrix, the root of 3 for every rotation. The way is in the last column."),
+                Mistake(lambda: float(np.abs(slipped().plain.T - slipped().T).sum()),
+                        "This adds up all entries of the difference. The last column alone says where the sensor is, and its length is a root of a sum of squares."),
+                Mistake(lambda: float(np.rad2deg(_turn_apart())), "This is the angle between the two mountings, in degrees. Asked for is the way in mm: the last columns."),
+                Mistake(lambda: _turn_apart(), "This is the angle between the two mountings, in rad. Asked for is the way in mm: the last columns."),
+                *(Mistake(lambda k=k: float(np.linalg.norm(np.delete(slipped().plain.T[:3, 3] - slipped().T[:3, 3], k))), "This is the length of two coordinates of the difference. The distance takes all three.") for k in range(3)),
+                *(Mistake(lambda of=of: float(np.linalg.norm(of().T[:3, 3])), "This is how far one of the two fits puts the sensor from the flange. Asked for is how far the two places are from each other.")
+                  for of in (lambda: slipped().plain, slipped)),
+                Mistake(lambda: 0.0, "This is 0, as where a fit is compared with itself, or the last rows, 0 0 0 1, of two poses. The places are their last columns."),
                 Mistake(lambda: slip_cost() ** 2, "This is the squared distance: a root is missing."),
                 Mistake(lambda: slipped().plain.rms_translation, "This is the rms of the fit to all rows, not where it puts the sensor."),
                 Mistake(lambda: slipped().plain.rms_translation - slipped().rms_translation,
@@ -407,6 +473,8 @@ CHAPTER = Chapter(
                 Mistake(lambda r, J: r * (1 + _shares(J)), "1 + h is only the beginning of 1 / (1 - h): right for small shares."),
                 Mistake(lambda r, J: r / (1 - _shares(J)) ** 2, "You divided by 1 - h twice."),
                 Mistake(lambda r, J: 2 * r - left_out(r, J), "The fit to the others is right, its sign is not: their fit is subtracted from the number, not added to it."),
+                *(Mistake(lambda r, J, kept=kept: r - J @ np.linalg.lstsq(J[kept], r[kept], rcond=None)[0],
+                          "You leave out the same number each time. The one whose residual is asked for is left out, and no other.") for kept in (np.s_[:-1], np.s_[1:])),
                 Mistake(lambda r, J: r / (1 - np.linalg.inv(J.T @ J).trace()), "You took one number for all: the trace of (J^T J)^-1. Each row of J has a share of its own, j^T (J^T J)^-1 j.",
                         id="left_out-6638ce"),
             ],
@@ -518,7 +586,7 @@ CHAPTER = Chapter(
         Exercise(
             "next_pose",
             reference=next_pose,
-            draw=tuple(functools.partial(covariance_and_candidates, noise_tells=tells) for tells in (False, True)),
+            draw=CHOICES,
             metric=metrics.Exactly(),
             hints=(
                 "Compute what each candidate would leave, and compare one number of it.",
@@ -529,6 +597,11 @@ CHAPTER = Chapter(
             mistakes=[
                 *(Mistake(rule, "Your choice is that of the smallest trace, or of the smallest largest eigenvalue. Among squares of different units the largest unit decides alone: compare determinants.")
                   for rule in (_smallest_trace, _largest_eigenvalue)),
+                Mistake(lambda C, c: next_pose(C, c) * int(_volumes(C, c).min() < 1),
+                        "Right where a determinant is below 1, else the first one: does your search begin with the number 1? Begin with infinity, or with the first candidate's own."),
+                Mistake(_product_of_variances, "You multiplied the variances: that is the determinant only where C has no other entries. What two parameters share counts too: np.linalg.det."),
+                Mistake(_largest_information, "You took the candidate whose own information is largest. It may well tell what is known already: compute what it leaves, with C."),
+                Mistake(_least_certain_first, "You look at the first number of each reading alone, and at how well it can be predicted. Compute what the whole reading leaves, and compare determinants."),
                 Mistake(_largest_derivative, "You took the candidate with the largest derivative. It may well tell what is known already: compute what it leaves."),
                 Mistake(_largest_volume, "You took the candidate that leaves most unknown: the smallest determinant is the best."),
                 Mistake(_least_certain, "You took the reading that can be predicted least. Its numbers may all say the same: compare the determinants of what is left."),
