@@ -2,7 +2,6 @@
 
 import math
 import numbers
-from collections.abc import Hashable
 from decimal import Decimal
 
 import numpy as np
@@ -47,12 +46,10 @@ def as_floats(value, name):
     Raises
     ------
     ValueError
-        When it holds text, complex numbers, truth values, dates or other objects, or rows of different lengths.
+        When it holds text, complex numbers, truth values, dates or other objects, masked numbers, or rows of different
+        lengths.
     """
-    try:
-        array = np.asarray(value)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} must hold real numbers, got rows of different lengths") from None
+    array = _as_array(value, name, "real numbers")
     if array.dtype.kind in "iuf":
         return array.astype(float, copy=False)
     if array.dtype.kind == "O" and all(_is_real(entry) for entry in array.flat):
@@ -63,6 +60,16 @@ def as_floats(value, name):
     raise ValueError(f"{name} must hold real numbers, got {_what(array)}")
 
 
+def _as_array(value, name, wanted):
+    """`value` as a plain array; a masked one would lose its mask and go on with what the mask hides."""
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        raise ValueError(f"{name} must hold {wanted}, got masked entries")
+    try:
+        return np.asarray(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must hold {wanted}, got rows of different lengths") from None
+
+
 def _is_real(entry):
     return isinstance(entry, numbers.Real | Decimal) and not isinstance(entry, bool | np.bool_)
 
@@ -71,8 +78,10 @@ def _what(array):
     """What an array holds that are no real numbers, in words."""
     if array.dtype.kind != "O":
         return KINDS.get(array.dtype.kind, f"entries of type {array.dtype}")
-    stranger = next(entry for entry in array.flat if not _is_real(entry))
-    return "None" if stranger is None else f"an entry of type {type(stranger).__name__}"
+    for entry in array.flat:
+        if not _is_real(entry):
+            return "None" if entry is None else f"an entry of type {type(entry).__name__}"
+    return "numbers" if array.size else "nothing"
 
 
 def as_points(value, name, dim=3):
@@ -193,21 +202,20 @@ def _refuse_sheared(R, name, tolerance):
 
 def as_truths(value, name):
     """`value` as an array of truth values; refuses numbers, which would be indices."""
-    try:
-        array = np.asarray(value)
-    except ValueError:
-        raise ValueError(f"{name} must hold truth values, got rows of different lengths") from None
+    array = _as_array(value, name, "truth values")
     if array.dtype.kind != "b":
         got = "numbers" if array.dtype.kind in "iuf" else _what(array)
         raise ValueError(f"{name} must hold truth values, got {got}")
     return array
 
 
-def as_indices(value, name):
-    """`value` as an array of whole numbers, which name rows or entries."""
-    array = as_floats(value, name) if np.size(value) else np.zeros(np.shape(value), int)
+def as_indices(value, name, below=None):
+    """`value` as an array of whole numbers, which name rows or entries: from 0 on, where `below` says how many."""
+    array = as_floats(value, name)
     if (array != np.floor(array)).any() or not np.isfinite(array).all():
         raise ValueError(f"{name} must hold whole numbers")
+    if below is not None and ((array < 0) | (array >= below)).any():
+        raise ValueError(f"{name} must lie from 0 to {below - 1}, got {shown(array.min())} to {shown(array.max())}")
     return array.astype(int)
 
 
@@ -235,6 +243,11 @@ def as_instance(value, name, type_, wanted=""):
     return value
 
 
+def as_truth(value, name):
+    """`value` as it is; refuses what is neither True nor False, such as an array."""
+    return as_instance(value, name, bool | np.bool_, "True or False")
+
+
 def as_choice(value, name, options):
     """`value` as it is; refuses what is none of some words."""
     if not isinstance(value, str) or value not in options:
@@ -254,8 +267,10 @@ def as_names(value, name):
     """`value` as a list of names; refuses what can name nothing, such as a list."""
     names = as_items(value, name, "names")
     for one in names:
-        if not isinstance(one, Hashable):
-            raise ValueError(f"{name} must hold names, got {kind(one)}")
+        try:
+            hash(one)
+        except TypeError:
+            raise ValueError(f"{name} must hold names, got {kind(one)}") from None
     return names
 
 
@@ -277,6 +292,14 @@ def as_nonnegative(value, name):
     array = as_finite(value, name)
     if (array < 0).any():
         raise ValueError(f"{name} must not be negative, got {shown(array.min())}")
+    return array
+
+
+def as_row_weights(value, name="weights"):
+    """`value` as weights of rows: none below 0, not all 0."""
+    array = as_nonnegative(value, name)
+    if not array.any():
+        raise ValueError(f"{name} must not all be zero")
     return array
 
 

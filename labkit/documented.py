@@ -1,8 +1,8 @@
 """A docstring keeps its word: an argument of another kind or shape is refused before anything is computed.
 
 `@documented` reads the Parameters of a NumPy docstring at the first call: "rng : numpy.random.Generator",
-"tracker : Tracker, optional", 'model : {"euler", "arc"}', "T_BE : array, shape (k, 4, 4)". What it does not
-understand it leaves to the function, and "array-like" arguments, which functions check with `labkit.checks`.
+"tracker : Tracker, optional", 'model : {"euler", "arc"}', "T_BE : array, shape (k, 4, 4)", "free : tuple of str". What
+it does not understand it leaves to the function, and "array-like" arguments, which functions check with `labkit.checks`.
 """
 
 import functools
@@ -36,6 +36,7 @@ _SHAPE = re.compile(r"\(([^()]*)\)")
 _ARRAY = re.compile(r"(bool )?arrays?( of int)?\b(?!-like)")
 _PLAIN = {"str": str, "dict": dict, "bytes": bytes, "bool": (bool, np.bool_), "list": (list, tuple)}
 _PLAIN |= {"tuple": (list, tuple), "path": os.PathLike}
+_OF = re.compile(r"(tuple|list|dict) of (\w+?)s?$")  # the plural of a kind is its word and an s
 
 
 def documented(function):
@@ -79,7 +80,7 @@ def _rules(function):
             own = _of_one(said, k, len(names))
             check = _check(name, own, f"{said}{more} {default}", function) if name in places else None
             if check:
-                optional = "optional" in said or "None" in said or default is None
+                optional = "None" in said or default is None
                 shapes = _shapes(own) if _ARRAY.match(own) else ()
                 check = functools.partial(_unless_none, check) if optional else check
                 found.append((places[name], name, check, shapes[0] if len(shapes) == 1 else None))
@@ -141,6 +142,9 @@ def _check(name, said, more, function):
         return functools.partial(_array, name, _shapes(said), first.startswith("bool"), "of int" in first, gaps)
     if re.match(r"(function|callable)s?\b", first):
         return functools.partial(as_function, name=name)
+    if container := _OF.match(first):
+        entry = _check(f"each entry of {name}", container[2], "", function)
+        return entry and functools.partial(_container, name, container[1], entry)
     words = [word for word in first.split(" or ") if word != "None"]
     if words == ["numpy.random.Generator"]:
         return functools.partial(as_generator, name=name)
@@ -174,7 +178,7 @@ def _array(name, shapes, truths, indices, gaps, value):
         value = as_truths(value, name)
     elif indices:
         value = as_indices(value, name)
-    elif not (isinstance(value, np.ndarray) and value.dtype.kind in "iufb"):  # truth values and indices stay such
+    elif type(value) is not np.ndarray or value.dtype.kind not in "iufb":  # truth values and indices stay such
         value = as_floats(value, name)
     if not gaps and value.dtype.kind == "f":
         as_finite(value, name)
@@ -218,6 +222,13 @@ def _fits(value, shape):
 def _number(name, gaps, value):
     if not gaps or np.shape(as_floats(value, name)):
         as_number(value, name)
+    return value
+
+
+def _container(name, word, check, value):
+    _instance(name, [_PLAIN[word]], f"of type {word}", None, value)
+    for entry in value.values() if isinstance(value, dict) else value:
+        check(entry)
     return value
 
 

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..checks import as_choice, as_instance, as_positive_number, as_rotations, as_shape, as_transforms, shown
+from ..checks import as_choice, as_instance, as_positive_number, as_rotations, as_shape, as_transforms, as_truth, shown
 from ..documented import documented, unchecked
 from ..geometry.frames import invert, moved, pose, rotation_block
 from ..geometry.lie import log_so3, nearest_rotation, skew
@@ -326,7 +326,7 @@ def calibrate_with(fit, T_BF, T_ST, std_rot, std_trans, robust, eye):
     if T_BF.ndim != 3 or T_BF.shape != T_ST.shape or len(T_BF) < 3:
         raise ValueError(f"T_BF and T_ST must both have shape (N, 4, 4) with N >= 3, got {T_BF.shape} and {T_ST.shape}")
     as_choice(eye, "eye", ROLES)
-    as_instance(robust, "robust", bool | np.bool_, "True or False")
+    as_truth(robust, "robust")
     given = tuple(
         None if std is None else as_positive_number(std, name)
         for std, name in ((std_rot, "std_rot"), (std_trans, "std_trans"))

@@ -22,14 +22,15 @@ import numpy as np
 from ..checks import (
     as_count,
     as_finite,
-    as_instance,
-    as_nonnegative,
+    as_names,
     as_number,
     as_optional_generator,
     as_points,
     as_positive_number,
+    as_row_weights,
     as_shape,
     as_transforms,
+    as_truth,
     fit_together,
     shown,
 )
@@ -442,7 +443,7 @@ def calibrate_with(fit, T_BF, x_S, target, robust, rng):
     ValueError
         As `calibrate_sphere_target`.
     """
-    as_instance(robust, "robust", bool | np.bool_, "True or False")
+    as_truth(robust, "robust")
     (T_BF, x_S), sample = as_sightings(T_BF, x_S), SAMPLE if target is None else SAMPLE_KNOWN
     fewest = sample + 1 if robust else 4 if target is None else 3
     if len(T_BF) < fewest:
@@ -489,8 +490,7 @@ def refuse_one_line(x_S, weights):
     """
     if len(x_S) < 2:
         raise ValueError(f"at least 2 sphere centers are needed, got {len(x_S)}")
-    if not as_nonnegative(weights, "weights").any():
-        raise ValueError("weights must not all be zero")
+    as_row_weights(weights)
     mean = weights @ x_S / weights.sum()
     spread = np.linalg.svd((x_S - mean) * np.sqrt(weights)[:, None], compute_uv=False)
     far = math.sqrt(weights.sum()) * np.linalg.norm(mean)
@@ -685,7 +685,7 @@ def leave_one_out(T_BF, x_S, robust=False, groups=None):
     x_S : array-like, shape (N, 3), mm
     robust : bool
         As in `calibrate_sphere_target`.
-    groups : array-like, shape (N,), optional
+    groups : sequence of N names, optional
         Which poses go together, such as the names of their lines; None leaves out one pose at a time.
 
     Returns
@@ -698,12 +698,14 @@ def leave_one_out(T_BF, x_S, robust=False, groups=None):
         When `groups` does not name a group for each pose.
     """
     T_BF, x_S = as_sightings(T_BF, x_S)
-    groups = np.arange(len(T_BF)) if groups is None else np.asarray(groups)
-    if groups.shape != (len(T_BF),):
-        raise ValueError(f"groups must name one group a pose, shape ({len(T_BF)},), got {groups.shape}")
+    groups = list(range(len(T_BF))) if groups is None else as_names(groups, "groups")
+    if len(groups) != len(T_BF):
+        raise ValueError(f"groups must name one group a pose, {len(T_BF)} of them, got {len(groups)}")
     found = np.empty_like(x_S)
-    for group in dict.fromkeys(groups.tolist()):
-        out = groups == group
+    number = {group: k for k, group in enumerate(dict.fromkeys(groups))}
+    numbers = np.array([number[group] for group in groups])
+    for k in range(len(number)):
+        out = numbers == k
         fit = calibrate_sphere_target(T_BF[~out], x_S[~out], robust=robust)
         found[out] = sphere_residuals(T_BF[out], x_S[out], fit.T_FS, fit.target)
     return found

@@ -297,7 +297,7 @@ def compare_methods(repeats, std, rng, methods=METHODS):
     std : float
         Noise of each coordinate (mm).
     rng : numpy.random.Generator
-    methods : dict, optional
+    methods : dict of functions, optional
         {name: function of a `SuitableScene` that returns T_FS}; those of the literature and the joint fit by default.
 
     Returns
@@ -312,7 +312,8 @@ def compare_methods(repeats, std, rng, methods=METHODS):
     for _ in range(repeats):
         scene = suitable_scene(std, rng)
         for name, method in methods.items():
-            squares[name].append(((method(scene)[:3, 3] - scene.T_FS[:3, 3]) ** 2).sum())
+            found = as_shape(method(scene), f"what {name} returns", 4, 4)
+            squares[name].append(((found[:3, 3] - scene.T_FS[:3, 3]) ** 2).sum())
         covariance = predicted_sphere_covariance(scene.T_BF, scene.T_FS, scene.target, std)
         bounds.append(np.trace(covariance[3:6, 3:6]))
     return {name: float(np.sqrt(np.mean(square))) for name, square in squares.items()}, float(np.sqrt(np.mean(bounds)))

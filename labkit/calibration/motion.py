@@ -7,7 +7,7 @@ along their axes. Source: Chen, "A screw motion approach to uniqueness analysis 
 
 import numpy as np
 
-from ..checks import as_count, as_shape, as_transforms, shown
+from ..checks import as_count, as_row_weights, as_shape, as_transforms, shown
 from ..documented import documented, unchecked
 from ..geometry.frames import invert
 from ..geometry.lie import log_so3
@@ -104,6 +104,7 @@ def turning(R, weights):
     ----------
     R : array, shape (n, 3, 3)
     weights : array, shape (n,)
+        At least 0, not all 0.
 
     Returns
     -------
@@ -112,7 +113,7 @@ def turning(R, weights):
     directions : array, shape (3, 3)
         The direction of each, as columns, in the frame that R maps to.
     """
-    total = weights.sum()
+    total = as_row_weights(weights).sum()
     D = R - np.tensordot(weights, R, 1) / total
     values, directions = np.linalg.eigh(np.einsum("n,nij,nkj->ik", weights, D, D) / total)
     return np.sqrt(np.maximum(values, 0.0)), directions

@@ -12,7 +12,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..checks import as_instance, as_items, as_number, as_points, as_positive_number, as_shape, as_transforms, as_truths
+from ..checks import (
+    as_indices,
+    as_instance,
+    as_items,
+    as_number,
+    as_points,
+    as_positive_number,
+    as_shape,
+    as_transforms,
+    as_truths,
+)
 from ..documented import documented
 from ..estimation.influence import distance_limit, inverse_normal, invert_normal, squared_distances
 from ..geometry.frames import fit_frame, frame_from_points, invert
@@ -69,7 +79,13 @@ class Model:
 
     def __init_subclass__(cls):
         """The methods of every kind take its own rows and solutions alone."""
-        for name, check in (("fit", cls.as_rows), ("linearize", cls.as_solution), ("proposals", cls.as_solution)):
+        checks = {
+            "fit": cls.as_rows,
+            "linearize": cls.as_solution,
+            "proposals": cls.as_solution,
+            "size": cls.as_channel,
+        }
+        for name, check in checks.items():
             if name in vars(cls):
                 setattr(cls, name, _of_its_own(vars(cls)[name], check))
 
@@ -87,6 +103,10 @@ class Model:
             raise ValueError(f"solution must hold {names}, got {len(parts)} parts")
         parts = [as_shape(part, name, *shape) for part, (name, shape) in zip(parts, self.unknowns.items())]
         return tuple(as_transforms(part, "solution") if part.ndim == 2 else part for part in parts)
+
+    def as_channel(self, channel):
+        """The number of a channel; refuses one that there is not."""
+        return int(as_indices(as_number(channel, "channel"), "channel", below=len(self.channels)))
 
     def fitted(self, kept):
         """The solution from some rows, remembered."""
@@ -108,6 +128,37 @@ class Model:
         """Rows to begin with, bool (n,): a majority that agrees."""
         return np.ones(self.n, bool)
 
+    def candidate(self):
+        """The rows that the best of many three-row solutions explains.
+
+        The score is the product of the channels' misfits at the row that closes the required share, so no scale is
+        needed. `_solve(rows (m, 3))` gives m solutions, `_misfit(solutions, rows)` an array (m, len(rows)) a channel.
+
+        Returns
+        -------
+        explained : bool array, shape (n,)
+        misfit : tuple
+            Of the best, in each channel.
+        """
+        n, rng = self.n, np.random.default_rng(0)
+        if n * (n - 1) * (n - 2) // 6 <= SAMPLES:
+            rows = np.array(list(combinations(range(n), 3)))
+        else:
+            rows = rng.random((SAMPLES, min(n, 1000))).argsort(1)[:, :3] * (max(n // 1000, 1))
+        judges = np.arange(n) if n <= SCORED else rng.choice(n, SCORED, replace=False)
+        solutions = self._solve(rows)
+        rank = min(max(int(np.ceil(LEAST_SHARE * len(judges))), LEAST), len(judges)) - 1
+        parts = self._misfit(solutions, judges)
+        scores = sum(np.log(np.partition(m, rank, axis=1)[:, rank] + 1e-12) for m in parts)
+        best = int(np.nanargmin(np.where(np.isfinite(scores), scores, np.inf)))
+        parts = self._misfit(tuple(part[best : best + 1] for part in solutions), np.arange(n))
+        rank = min(max(int(np.ceil(LEAST_SHARE * n)), LEAST), n) - 1
+        reached = tuple(float(np.partition(m[0], rank)[rank]) for m in parts)
+        total = sum((m[0] / (limit + 1e-12)) ** 2 for m, limit in zip(parts, reached))
+        kept = np.zeros(n, bool)
+        kept[np.argsort(total)[: rank + 1]] = True
+        return kept, reached
+
     def proposals(self, solution):
         """Poses that could be measured next, (m, 4, 4), and the derivative (m, k, p) of what they would measure."""
         raise ValueError(f"a {type(self).__name__} knows no poses to measure next")
@@ -123,7 +174,7 @@ class Model:
         J : array, shape (n, k, p)
         kept : bool array, shape (n,)
         """
-        edges = np.cumsum((0, *self.channels))
+        J, edges = self._as_derivative(J), np.cumsum((0, *self.channels))
         parts = [slice(a, b) for a, b in zip(edges, edges[1:])]
         p, count = J.shape[2], kept.sum()
         floors = [max(FLOOR * self.size(c), 1e-300) for c in range(len(parts))]
@@ -160,7 +211,10 @@ class Model:
         J : array, shape (n, k, p)
         noise : Noise
         """
-        return J / np.repeat(noise.widening, self.channels)[:, None]
+        return self._as_derivative(J) / np.repeat(noise.widening, self.channels)[:, None]
+
+    def _as_derivative(self, J):
+        return as_shape(J, "J", "n", sum(self.channels), "p")
 
 
 def _of_its_own(method, check):
@@ -206,50 +260,6 @@ def majority(model):
         stretch, kept = 1.0, fresh
         seen.append(fresh)
     return model.fitted(kept), kept
-
-
-@documented
-def best_candidate(n, solve, misfit, seed=0):
-    """The rows that the best of many three-row solutions explains.
-
-    The score is the product of the channels' misfits at the row that closes the required share, so no scale is needed.
-
-    Parameters
-    ----------
-    n : int
-        Number of rows, at least 3.
-    solve : callable
-        rows (m, 3) -> m solutions.
-    misfit : callable
-        (solutions, rows) -> tuple of arrays (m, len(rows)), one per channel.
-    seed : int
-        At least 0.
-
-    Returns
-    -------
-    explained : bool array, shape (n,)
-    misfit : tuple
-        Of the best, in each channel.
-    """
-    rng = np.random.default_rng(seed)
-    every = n * (n - 1) * (n - 2) // 6
-    if every <= SAMPLES:
-        rows = np.array(list(combinations(range(n), 3)))
-    else:
-        rows = rng.random((SAMPLES, min(n, 1000))).argsort(1)[:, :3] * (max(n // 1000, 1))
-    judges = np.arange(n) if n <= SCORED else rng.choice(n, SCORED, replace=False)
-    solutions = solve(rows)
-    rank = min(max(int(np.ceil(LEAST_SHARE * len(judges))), LEAST), len(judges)) - 1
-    scores = sum(np.log(np.partition(m, rank, axis=1)[:, rank] + 1e-12) for m in misfit(solutions, judges))
-    best = int(np.nanargmin(np.where(np.isfinite(scores), scores, np.inf)))
-    one = tuple(part[best : best + 1] for part in solutions)
-    parts = misfit(one, np.arange(n))
-    rank = min(max(int(np.ceil(LEAST_SHARE * n)), LEAST), n) - 1
-    reached = tuple(float(np.partition(m[0], rank)[rank]) for m in parts)
-    total = sum((m[0] / (limit + 1e-12)) ** 2 for m, limit in zip(parts, reached))
-    kept = np.zeros(n, bool)
-    kept[np.argsort(total)[: rank + 1]] = True
-    return kept, reached
 
 
 @documented
@@ -339,7 +349,7 @@ class HandEyeModel(Model):
 
     @functools.cached_property
     def _candidate(self):
-        return best_candidate(self.n, self._solve, self._misfit)
+        return self.candidate()
 
     def _solve(self, rows):
         """Mounting and target from three poses each: two motions turn one pair of vectors into the other."""
@@ -517,7 +527,7 @@ class FrameModel(Model):
     def start(self):
         if self.n < 6:
             return super().start()
-        return best_candidate(self.n, self._solve, self._misfit)[0]
+        return self.candidate()[0]
 
     def _solve(self, rows):
         sides = self.nominal[rows[:, 1:]] - self.nominal[rows[:, :1]]

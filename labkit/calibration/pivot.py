@@ -26,6 +26,7 @@ from ..checks import (
     as_rotations,
     as_shape,
     as_transforms,
+    as_whole,
     fit_together,
     shown,
 )
@@ -222,7 +223,7 @@ def pivot_residuals(T_WF, tip, pivot):
 
     Source: lab sheet, section 3, equation (2).
     """
-    T, tip, pivot = as_poses(T_WF, 1), as_points(tip, "tip"), as_points(pivot, "pivot")
+    T, tip, pivot = as_poses(T_WF, 1), as_shape(tip, "tip", 3), as_shape(pivot, "pivot", 3)
     return T[:, :3, :3] @ tip + T[:, :3, 3] - pivot
 
 
@@ -312,7 +313,7 @@ def calibrate_pivot(T_WF, std_rot=None, std_trans=None, robust=False, rng=None):
 
 def as_poses(T_WF, at_least):
     """The poses as an array (n, 4, 4), n >= at_least; anything else is refused."""
-    T = as_transforms(T_WF, "T_WF")
+    T, at_least = as_transforms(T_WF, "T_WF"), as_whole(at_least, "at_least")
     if T.ndim != 3:
         raise ValueError(f"T_WF must have shape (n, 4, 4), got {T.shape}")
     if len(T) < at_least:
@@ -356,8 +357,11 @@ def refuse_free_tip(T, tolerance):
     Parameters
     ----------
     T : array, shape (n, 4, 4)
+        n >= 2.
     tolerance : float
     """
+    if len(T) < 2:
+        raise ValueError(f"T must hold at least 2 poses, got {len(T)}")
     _, values, Vt = np.linalg.svd(np.linalg.qr(pivot_matrix(T), mode="r"))
     ratios = values / values[0]
     if ratios[5] > tolerance:

@@ -3,11 +3,13 @@
 import numpy as np
 
 from ..checks import LARGEST_COORDINATE, LAST_ROW_TOLERANCE, ORTHONORMAL_TOLERANCE, as_floats
+from ..documented import documented
 
 CERTAIN = ORTHONORMAL_TOLERANCE**2 / 10  # two columns of length 1 within t of their cross product's: x'y <= sqrt(5 t)
 BLOCK = 1024  # poses that stay in a processor's cache from one pass to the next
 
 
+@documented
 def rigid_rows(value, name):
     """The entries of a stack of poses as contiguous rows, a copy, when they are rigid beyond doubt.
 

@@ -20,6 +20,7 @@ from ..checks import (
     fit_together,
     shown,
 )
+from ..documented import documented
 from .lie import exp_so3, nearest_rotation, skew
 
 MIN_ARM_ANGLE_DEG = 1e-3  # below this the triangle is so flat that its height drowns in the last digits of the points
@@ -262,6 +263,7 @@ def relative(T_WA, T_WB):
     return _invert(T_WA) @ T_WB
 
 
+@documented
 def rotation_block(T, name="T"):
     """Upper left 3 x 3 block of finite matrices, a rotation or not.
 

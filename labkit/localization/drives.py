@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import as_count, as_items, as_names, as_points, as_positive_number, as_shape
+from ..checks import as_choice, as_count, as_items, as_names, as_points, as_positive_number, as_shape
 from ..documented import documented
 from ..geometry.planar import wrap_angle
 from . import odometry
@@ -136,7 +136,7 @@ def random_drive(building, noise, n_steps, rng, dt=0.5, start=None):
     if set(noise) != {"k_d", "k_theta", "k_drift"}:
         raise ValueError(f"noise must hold k_d, k_theta and k_drift, got {', '.join(map(str, noise)) or 'none'}")
     rooms = [name for name in building.nodes if not name.startswith(("door", "corridor"))]
-    here = start or rooms[rng.integers(len(rooms))]
+    here = rooms[rng.integers(len(rooms))] if start is None else as_choice(start, "start", building.nodes)
     xy = np.array(building.nodes[here])
     pose = np.array([*xy, rng.uniform(-np.pi, np.pi)])
     waypoints = []
@@ -180,7 +180,8 @@ class Wanderer:
         speed, turn_rate : float
             m/s and rad/s.
         """
-        pose = as_shape(pose, "pose", 3)
+        pose, dt = as_shape(pose, "pose", 3), as_positive_number(dt, "dt")
+        speed, turn_rate = as_positive_number(speed, "speed"), as_positive_number(turn_rate, "turn_rate")
         if self.goal is None:
             self.goal = self._in_sight(pose)
         if self.goal is None:

@@ -17,6 +17,7 @@ from ..checks import (
     as_probability,
     as_readings,
     as_shape,
+    as_truth,
     covariance_root,
     fit_together,
 )
@@ -133,7 +134,7 @@ def _stacked(z, predicted, wrap):
     fit_together(z=z.shape[:-2], x=predicted.shape[:-2])
     seen = ~np.isnan(z - predicted)
     y = np.where(seen, z - predicted, 0.0)
-    if wrap:
+    if as_truth(wrap, "wrap"):
         y[..., 1] = wrap_angle(y[..., 1])
     return y.reshape(*y.shape[:-2], -1), seen.reshape(*seen.shape[:-2], -1)
 
@@ -253,7 +254,8 @@ def _given(u, z, landmarks, x0, cov0, dt, std_range, std_bearing, cov_u, cov_v, 
         u, z, landmarks, np.broadcast_to(x0, (*runs, 3)), _symmetric(np.broadcast_to(cov0, (*runs, 3, 3))),
         as_positive_number(dt, "dt"), as_positive_number(std_range, "std_range"),
         as_positive_number(std_bearing, "std_bearing"),
-        _control_covariances(np.zeros((2, 2)) if cov_u is None else cov_u, n), _symmetric(cov_v), model, bool(wrap),
+        _control_covariances(np.zeros((2, 2)) if cov_u is None else cov_u, n), _symmetric(cov_v), model,
+        as_truth(wrap, "wrap"),
     )  # fmt: skip
 
 
@@ -346,10 +348,11 @@ def unscented_predict(x, cov, u, dt, cov_u, model="euler"):
         Wrong shapes, numbers that are not finite, a covariance that is not positive definite.
     """
     x, cov = as_points(x, "x", 3), as_covariances(cov, "cov", 3)
-    shape = x.shape[:-1]
-    both = np.concatenate([x, np.broadcast_to(as_points(u, "u", 2), (*shape, 2))], axis=-1)
+    u, cov_u = as_points(u, "u", 2), as_covariances(cov_u, "cov_u", 2)
+    shape = fit_together(x=x.shape[:-1], cov=cov.shape[:-2], u=u.shape[:-1], cov_u=cov_u.shape[:-2])
+    both = np.concatenate([np.broadcast_to(x, (*shape, 3)), np.broadcast_to(u, (*shape, 2))], axis=-1)
     joint = np.zeros((*shape, 5, 5))
-    joint[..., :3, :3], joint[..., 3:, 3:] = cov, as_covariances(cov_u, "cov_u", 2)
+    joint[..., :3, :3], joint[..., 3:, 3:] = cov, cov_u
     points, weights = _sigma_points(both, joint)
     moved = odometry.step(points[..., :3], points[..., 3:], dt, model)
     mean = weights @ moved
@@ -376,6 +379,7 @@ def unscented_update(x, cov, z, landmarks, std_range, std_bearing):
     """
     x, cov = as_points(x, "x", 3), as_covariances(cov, "cov", 3)
     std_range, std_bearing = as_positive_number(std_range, "std_range"), as_positive_number(std_bearing, "std_bearing")
+    x = np.broadcast_to(x, (*fit_together(x=x.shape[:-1], cov=cov.shape[:-2]), 3))
     points, weights = _sigma_points(x, cov)
     center = measurement(x, landmarks)
     marks = np.asarray(landmarks, dtype=float)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares, minimize
 
-from ..checks import as_choice, as_finite, as_instance, as_names, as_points, as_positive_number, as_shape
+from ..checks import as_choice, as_instance, as_items, as_names, as_points, as_positive_number, as_shape
 from ..documented import documented
 from ..estimation.kalman import mean_band
 from ..geometry.planar import compose_pose, relative_pose, wrap_angle
@@ -141,6 +141,7 @@ def place_readings(odometry_time, starts, reading_time):
     Parameters
     ----------
     odometry_time : array, shape (n,), s
+        n >= 2.
     starts : array of int, shape (k,)
         Rows in which a part of the odometry with rising times begins.
     reading_time : array, shape (m,), s
@@ -155,8 +156,10 @@ def place_readings(odometry_time, starts, reading_time):
     Raises
     ------
     ValueError
-        Parts that do not begin at row 0, or do not rise.
+        Parts that do not begin at row 0, or do not rise; fewer than two rows.
     """
+    if len(odometry_time) < 2:
+        raise ValueError(f"odometry_time must hold at least 2 times, got {len(odometry_time)}")
     if not len(starts) or starts[0] != 0 or (np.diff([*starts, len(odometry_time)]) <= 0).any():
         raise ValueError("starts must rise from 0 and stay below the number of rows")
     ends = np.concatenate([starts[1:], [len(odometry_time)]])
@@ -357,6 +360,7 @@ def locate(
     ValueError
         One sentence: nothing explains the readings, or none can be placed.
     """
+    truth = None if truth is None else _as_true_path(truth)
     u, z, landmarks = as_points(u, "u", 2), as_shape(z, "z", "k", 2), as_shape(landmarks, "landmarks", "m", 2)
     raw_time = as_shape(odometry_time, "odometry_time", len(u))
     reading_time = as_shape(reading_time, "reading_time", len(z))
@@ -390,6 +394,17 @@ def locate(
     return Located(
         raw_time, found.x, found.cov, used, nis, tuple(why), level, free, restarts, (*warnings, *said), errors, nees
     )
+
+
+def _as_true_path(truth):
+    """Times (q,) and poses (q, 3) of the truth; anything else is refused."""
+    parts = as_items(truth, "truth", "times and poses")
+    if len(parts) != 2:
+        raise ValueError(f"truth must hold times and poses, got {len(parts)} parts")
+    time = as_shape(parts[0], "the times of truth", "q")
+    if not len(time):
+        raise ValueError("truth must hold at least one pose, got none")
+    return time, as_shape(parts[1], "the poses of truth", len(time), 3)
 
 
 def _first_start(log, noise, rng):
@@ -455,7 +470,7 @@ def _lost(used, landmark, patience):
 
 def _against(time, starts, found, truth):
     """Errors (n, 3) and NEES (n,) against true poses, interpolated; NaN where the truth or one clock does not reach."""
-    t, x = as_finite(truth[0], "truth"), as_points(truth[1], "truth")
+    t, x = truth
     level = np.stack([np.interp(time, t, column) for column in (x[:, 0], x[:, 1], np.unwrap(x[:, 2]))], 1)
     e = found.x - level
     e[:, 2] = wrap_angle(e[:, 2])

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..checks import as_count, as_function, as_generator, as_number, as_points, shown
+from ..checks import as_count, as_function, as_generator, as_number, as_points, as_shape, shown
 from ..documented import documented
 from .particles import (
     as_weights,
@@ -387,6 +387,7 @@ def localizer(grid, motion, n_particles, rng, start=None, recovery=True, **optio
     grid : maps.OccupancyGrid
     motion : function (states, u, dt, rng) -> states
     n_particles : int
+        At least 1.
     rng : numpy.random.Generator
     start : array-like, shape (3,), optional
         A known pose (m, m, rad): local localization. When not given, global.
@@ -402,7 +403,7 @@ def localizer(grid, motion, n_particles, rng, start=None, recovery=True, **optio
     if start is None:
         states = uniform_states(grid, n_particles, rng)
     else:
-        states = as_points(start, "start") + rng.standard_normal((n_particles, 3)) * SPREAD_ABOUT_START
+        states = as_shape(start, "start", 3) + rng.standard_normal((n_particles, 3)) * SPREAD_ABOUT_START
     policy = Recovery(functools.partial(uniform_states, grid)) if recovery else None
     return MonteCarloLocalizer(states, motion, recovery=policy, **options)
 

@@ -16,6 +16,7 @@ from ..checks import (
     as_count,
     as_finite,
     as_floats,
+    as_indices,
     as_nonnegative,
     as_number,
     as_points,
@@ -126,6 +127,7 @@ def log_normal(error, std):
     Returns
     -------
     log_density : array of the error's shape
+        -infinity for an infinite error.
     """
     error, std = as_floats(error, "error"), as_positive_number(std, "std")
     return -0.5 * np.square(error / std) - math.log(std * math.sqrt(2 * math.pi))
@@ -575,6 +577,7 @@ class SensorSuite:
         """
         if not len(index):
             return None
+        index = as_indices(index, "index", below=len(self.building.landmarks))
         weighting = self.weigh_landmarks(z, self.building.landmarks[index], self.std_range, self.std_bearing)
         return weighting.tempered(self.exponents["landmarks"])
 
