@@ -1,8 +1,9 @@
 """A docstring keeps its word: an argument of another kind or shape is refused before anything is computed.
 
 `@documented` reads the Parameters of a NumPy docstring at the first call: "rng : numpy.random.Generator",
-"tracker : Tracker, optional", 'model : {"euler", "arc"}', "T_BE : array, shape (k, 4, 4)", "free : tuple of str". What
-it does not understand it leaves to the function, and "array-like" arguments, which functions check with `labkit.checks`.
+"tracker : Tracker, optional", 'model : {"euler", "arc"}', "T_BE : array, shape (k, 4, 4)", "free : tuple of str".
+What it does not understand it leaves to the function, and "array-like" arguments, which functions check with
+`labkit.checks`.
 """
 
 import functools

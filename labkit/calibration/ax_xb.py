@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..checks import as_choice, as_instance, as_positive_number, as_rotations, as_shape, as_transforms, as_truth, shown
+from ..checks import as_choice, as_positive_number, as_rotations, as_shape, as_transforms, as_truth, shown
 from ..documented import documented, unchecked
 from ..geometry.frames import invert, moved, pose, rotation_block
 from ..geometry.lie import log_so3, nearest_rotation, skew

@@ -542,7 +542,7 @@ def _squares(residual, jacobian):
 def _start(evaluate, x0):
     point = evaluate(as_finite(x0, "x0"))
     if not _is_finite(point):
-        raise ValueError(f"the cost or its derivatives are not finite at the start x0 = {x0}")
+        raise ValueError(f"the cost or its derivatives are not finite at the start x0 = {shown(x0)}")
     return point
 
 

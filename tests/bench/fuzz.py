@@ -61,6 +61,7 @@ LONG_ENOUGH = 1.0  # s of one test; most of what comes later repeats what came b
 SECONDS, BYTES = 10.0, 4 << 30  # of processor time and memory for one call
 LARGEST, SMALLEST, LARGEST_COUNT = 1e9, 1e-12, 100_000
 OUTCOMES = ("finite", "refused", "file", "NaN as documented", "NaN or inf", "foreign", "caller's function", "hang")
+FUNCTIONS = (types.FunctionType, types.BuiltinFunctionType, np.ufunc, type)
 RIGHT = {"finite", "refused", "file", "NaN as documented", "caller's function"}
 
 
@@ -201,11 +202,16 @@ def spoilt(name, number, records, seed):
             arguments[chosen] = type(arguments[chosen])(arguments[chosen])
         else:
             arguments[chosen] = spoil(arguments[chosen], rng, extreme)
-    return arguments, extreme or any(_is_extreme(v) for n, v in arguments.items() if n != "self")
+    counts = {n for n, v in records[number % len(records)].items() if _is_count(v)}
+    return arguments, extreme or any(_is_extreme(v, n in counts) for n, v in arguments.items() if n != "self")
 
 
-def _is_extreme(value):
-    if isinstance(value, int) and not isinstance(value, bool):
+def _is_count(value):
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def _is_extreme(value, count=False):
+    if _is_count(value) or (count and isinstance(value, float)):
         return abs(value) > LARGEST_COUNT
     if is_numeric(value):
         array = np.abs(np.asarray(value, dtype=float))
@@ -216,7 +222,7 @@ def _is_extreme(value):
     return False
 
 
-def outcome_of(name, function, arguments):
+def outcome_of(name, function, arguments, records):
     """(outcome, whether something was warned of, a line that tells more)."""
     with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
@@ -234,17 +240,22 @@ def outcome_of(name, function, arguments):
             signal.setitimer(signal.ITIMER_PROF, 0)
     if outcome == "NaN or inf" and says_nan(function, type(result)):
         outcome = "NaN as documented"
-    if outcome == "foreign" and any(map(is_exchanged, arguments.values())):
+    if outcome == "foreign" and functions_in(arguments) - set().union(*map(functions_in, records)):
         outcome = "caller's function"
     warned = [w for w in warned if not issubclass(w.category, ResourceWarning)]
     return outcome, str(warned[0].message) if warned else "", " ".join(more.split())[:200]
 
 
-def is_exchanged(value):
-    """Whether a function takes another's place that returns or takes something else, perhaps within a dictionary."""
-    if isinstance(value, dict):
-        return any(map(is_exchanged, value.values()))
-    return getattr(value, "is_exchanged", False) or value is len or value is float
+def functions_in(arguments):
+    """{(parameter, function)} of a call; one that was recorded in no call takes or returns something else."""
+    found = set()
+    for name, value in arguments.items():
+        if isinstance(value, dict):
+            found |= {(name, function) for _, function in functions_in(value)}
+        elif callable(value) and name != "self":
+            function = getattr(value, "__func__", value)
+            found.add((name, function if isinstance(function, FUNCTIONS) else type(function)))
+    return found
 
 
 def says_nan(function, kind):
@@ -300,7 +311,7 @@ def work(pipe, name, function, records, numbers, seed):
         arguments, extreme = spoilt(name, number, records, seed)
         pipe.send((number, extreme, None))
         resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time() + 3 * SECONDS), resource.RLIM_INFINITY))
-        pipe.send((number, extreme, outcome_of(name, function, arguments)))
+        pipe.send((number, extreme, outcome_of(name, function, arguments, records)))
     pipe.close()
 
 
@@ -388,7 +399,7 @@ def accepted(chosen, records):
         for arguments in records[name]:
             for key, value in arguments.items():
                 for kind, what, instead in impostors(key, value) if key != "self" else ():
-                    told = outcome_of(name, function, copy.deepcopy(arguments) | {key: instead})
+                    told = outcome_of(name, function, copy.deepcopy(arguments) | {key: instead}, records[name])
                     tried.setdefault((name, key, kind, what), (told[0], told[2]))
     lines = ["\n| in place of | arguments | refused |", "| --- | ---: | ---: |"]
     for kind in ("rotation", "covariance"):

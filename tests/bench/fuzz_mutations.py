@@ -162,7 +162,6 @@ def _spoil_function(value, rng):
         result = value(*args, **kwargs)
         return _stranger(result, rng) if rng.random() < 0.4 else spoil(result, rng)
 
-    instead.is_exchanged = True
     return instead if rng.random() < 0.6 else _stranger(value, rng)
 
 
