@@ -7,23 +7,24 @@ import numpy as np
 import pytest
 
 from labkit import checks
-from labkit.calibration import ax_xb, hand_eye, pivot, planning, robust, sphere
+from labkit.calibration import ax_xb, hand_eye, motion, own_data, pivot, planning, robust, sphere
 from labkit.calibration.literature import compare_methods, kim_linear, li_two_step
 from labkit.documents.lecture import printed as lecture
 from labkit.documents.lecture.examples import reconstruct_vehicle
 from labkit.documents.thesis import printed as thesis
 from labkit.documents.thesis import wells
 from labkit.documents.thesis.listings import listing_cost
-from labkit.estimation import gaussian, kalman, optimization
+from labkit.estimation import gaussian, influence, kalman, optimization
 from labkit.estimation.differences import numeric_jacobian
 from labkit.fast import sensors as fast_sensors
 from labkit.fast.ekf import ekf_localize
 from labkit.fast.kalman import filter_steps
 from labkit.fast.maps import RangeTable
-from labkit.geometry import chaining, frames, lie, planar
-from labkit.localization import ekf, lateration, maps, mcl, odometry, particles
+from labkit.geometry import chaining, frames, lie, planar, propagation
+from labkit.localization import drives, ekf, lateration, maps, mcl, odometry, particles
 from labkit.localization.drives import find_route, follow
-from labkit.localization.locate import locate
+from labkit.localization.ekf import unscented_predict, unscented_update
+from labkit.localization.locate import locate, place_readings
 from labkit.localization.sensors import LikelihoodField, Scanner, beam_density, see_landmarks, weigh_doors
 from labkit.machines import simulation, udp
 from labkit.machines.arm import (
@@ -49,6 +50,7 @@ HOME, ARM = HOME, TX40
 GRID = maps.OccupancyGrid.from_ascii("###\n#.#\n###")
 COV = np.diag([0.1, 0.1, 0.01])
 MARKS = np.array([[0.0, 0.0], [5.0, 1.0], [2.0, 6.0]])
+SIGHTINGS = [I4] * 4, np.zeros((4, 3))
 TIME = np.arange(5.0)
 STEP = kalman.update(O2, np.eye(2), O2, np.eye(2), np.eye(2))
 
@@ -277,6 +279,18 @@ REFUSED = [
         "ids must hold 1 names, got 0",
     ),
     (lambda: particles.uniform_states(GRID, -1, rng()), "n_particles must be a whole number"),
+    (lambda: mcl.localizer(GRID, np.add, -2000.0, rng(), start=O3), "n_particles must be a whole number, at least 1"),
+    (lambda: GRID.at(O2, outside=()), r"outside must have shape \(\), got \(0,\)"),
+    (lambda: checks.as_indices([0, 19], "index", below=19), "index must lie from 0 to 18, got 0 to 19"),
+    (lambda: checks.as_indices([-1], "index", below=19), "index must lie from 0 to 18, got -1 to -1"),
+    (lambda: checks.as_names([("a", [])], "ids"), "ids must hold names, got an object of type tuple"),
+    (lambda: checks.as_row_weights([0.0, 0.0]), "weights must not all be zero"),
+    (lambda: checks.as_truth(np.zeros(3), "wrap"), "wrap must be True or False, got an object of type ndarray"),
+    (lambda: place_readings([5.0], [0], [1.0]), "odometry_time must hold at least 2 times, got 1"),
+    (lambda: locate(*[[0.0]] * 7, truth={"a": 1.0}), "truth must hold times and poses, got 1 parts"),
+    (lambda: locate(*[[0.0]] * 7, truth=([0.0], O3)), "the poses of truth must have shape"),
+    (lambda: unscented_predict(np.zeros((5, 3)), I3, np.ones((4, 2)), 0.1, np.eye(2)), "leading axes must be equal"),
+    (lambda: unscented_update(np.zeros((2, 3)), [I3] * 3, [[1, 0]], [[4, 4]], 0.1, 0.1), "leading axes must be equal"),
     # optimization, wells
     (lambda: optimization.newton_step([1.0, np.nan], np.eye(2)), "the gradient must be finite"),
     (lambda: optimization.newton_step(O2, I3), "the curvature must have shape"),
@@ -292,7 +306,25 @@ REFUSED = [
     (lambda: optimization.trust_region(wells.residual, wells.jacobian, O2, scale=O3 + 1), "one per unknown"),
     (lambda: optimization.trust_region(wells.residual, wells.jacobian, O2, accept="ok"), "accept must hold real"),
     (lambda: optimization.gauss_newton(wells.residual, wells.jacobian, O2, max_iterations=1.5), "max_iterations"),
+    (
+        lambda: optimization.gauss_newton(np.exp, np.diag, O2, retract=lambda x, step: np.ones(3)),
+        r"retract must keep the shape of x, \(2,\), got \(3,\)",
+    ),
     (lambda: wells.which([np.nan, 0.0]), "x must be finite"),
+    # calibration, geometry
+    (lambda: pivot.pivot_residuals([I4], np.zeros((2, 3)), O3), r"tip must have shape \(3,\), got \(2, 3\)"),
+    (lambda: pivot.as_poses([I4], np.datetime64("now")), "at_least must hold real numbers, got dates"),
+    (lambda: pivot.refuse_free_tip(I4[None], 1e-6), "T must hold at least 2 poses, got 1"),
+    (lambda: motion.turning(I3[None], np.zeros(1)), "weights must not all be zero"),
+    (lambda: compare_methods(1, 0.1, rng(), {"truth": lambda scene: scene.target}), "what truth returns must have"),
+    (lambda: hand_eye.leave_one_out(*SIGHTINGS, groups=["a", "b"]), "one group a pose, 4 of them, got 2"),
+    (lambda: hand_eye.leave_one_out(*SIGHTINGS, groups=[1.0, [2.0], 3, 4]), "groups must hold names"),
+    (lambda: own_data.FrameModel(np.eye(3), np.eye(3)).size(O3), r"channel must have shape \(\), got \(3,\)"),
+    (lambda: own_data.FrameModel(np.eye(3), np.eye(3)).size(1), "channel must lie from 0 to 0, got 1 to 1"),
+    (lambda: own_data.FrameModel(np.eye(3), np.eye(3)).noise(np.eye(3), np.zeros((3, 2, 6)), [True] * 3), "J must"),
+    (lambda: propagation.point_jacobians([I4] * 3, np.ones((2, 3))), "leading axes must be equal or broadcast"),
+    (lambda: influence.inverse_normal(np.zeros((3, 1, 0))), "J must hold numbers"),
+    (lambda: drives.Wanderer(None, rng()).control(O3, 0.0), "dt must be positive"),
     (lambda: wells.value(O2, width=0.0), "width must be positive"),
 ]
 

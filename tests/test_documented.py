@@ -75,7 +75,7 @@ def test_what_it_says_arrives():
 
 
 @documented
-def select(R, cov, r, kept, rows=None, count=3, robot=None, given=(None, None), normal=None):
+def select(R, cov, r, kept, rows=None, count=3, robot=None, given=(None, None), normal=None, free=(), ways=None):
     """Arguments whose letters, kinds and names say more than their shapes.
 
     Parameters
@@ -90,6 +90,8 @@ def select(R, cov, r, kept, rows=None, count=3, robot=None, given=(None, None), 
     robot : array, shape (4, 4), optional
     given : tuple
     normal : array, shape (..., p, p), optional
+    free : tuple of str, optional
+    ways : dict of functions, optional
     """
     return kept, rows, count
 
@@ -112,6 +114,15 @@ GOOD = {"R": np.eye(3), "cov": np.eye(2), "r": np.zeros((4, 2)), "kept": [True, 
         ({"count": True}, "count must hold real numbers, got truth values"),
         ({"robot": np.diag([1.0, 1.0, -1.0, 1.0])}, "robot must be right-handed"),
         ({"given": 5}, "given must be of type tuple, got an object of type int"),
+        ({"r": np.ma.array(np.zeros((4, 2)), mask=np.eye(4, 2))}, "r must hold real numbers, got masked entries"),
+        ({"kept": np.ma.array([True] * 4, mask=[1, 0, 0, 0])}, "kept must hold truth values, got masked entries"),
+        ({"kept": np.zeros(0, object)}, "kept must hold truth values, got nothing"),
+        ({"rows": [1.0, [2.0]]}, "rows must hold real numbers, got rows of different lengths"),
+        ({"free": "std"}, "free must be of type tuple, got an object of type str"),
+        ({"free": None}, "free must be of type tuple, got None"),
+        ({"free": ("std", 5)}, "each entry of free must be of type str, got an object of type int"),
+        ({"ways": {"one": abs, "two": 5}}, "each entry of ways must be a function, got an object of type int"),
+        ({"ways": abs}, "ways must be of type dict, got an object of type builtin_function_or_method"),
         ({"normal": np.zeros((5, 3, 2))}, r"normal must have shape \(\.\.\., p, p\), got \(5, 3, 2\)"),
         ({"normal": np.zeros(2)}, r"normal must have shape \(\.\.\., p, p\), got \(2,\)"),
     ],
@@ -121,8 +132,12 @@ def test_letters_kinds_and_names_are_kept(change, words):
         select(**(GOOD | change))
 
 
+def test_a_mask_that_hides_nothing_is_none():
+    assert type(measure(T, np.ma.array(X), RNG, Tracker(), grid=Caster())) is np.ndarray
+
+
 def test_whole_numbers_and_truth_values_arrive_as_such():
-    kept, rows, count = select(**GOOD, rows=[2.0, 0], count=2.0)
+    kept, rows, count = select(**GOOD, rows=[2.0, 0], count=2.0, free=("std",), ways={"one": abs})
     assert kept.dtype == bool and rows.dtype.kind == "i" and (count, type(count)) == (2, int)
     assert unchecked(select)(1, 2, 3, "anything") == ("anything", None, 3)
 

@@ -28,6 +28,8 @@ def _blocks(residuals, jacobian):
 def inverse_normal(J):
     """(sum J_i'J_i)^-1, (n, k, p) -> (p, p); refuses parameters that the blocks leave undetermined."""
     J = as_shape(J, "J", "n", "k", "p")
+    if not J.size:
+        raise ValueError(f"J must hold numbers, got shape {J.shape}")
     flat = J.reshape(-1, J.shape[2])
     return invert_normal(flat.T @ flat)
 
@@ -35,7 +37,6 @@ def inverse_normal(J):
 def invert_normal(N):
     """Inverse of a normal matrix with its columns scaled alike, (p, p); refuses one that is singular beside that."""
     N = as_shape(N, "N", "p", "p")
-    N = as_shape(N, "N", len(N), len(N))
     if not (np.diagonal(N) > 0).all():
         raise ValueError("a parameter changes no residual, so it is not determined")
     values, vectors = _scaled_alike(N)
@@ -82,8 +83,6 @@ def shares(jacobian):
         Between 0 and k; they add up to p.
     """
     J = as_shape(jacobian, "jacobian", "n", "k", "p")
-    if not J.size:
-        raise ValueError(f"jacobian must hold numbers, got shape {J.shape}")
     return np.einsum("nki,ij,nkj->n", J, inverse_normal(J), J)
 
 

@@ -563,6 +563,14 @@ def _is_finite(point):
     return math.isfinite(point.cost) and math.isfinite(np.vdot(g, g)) and math.isfinite(np.vdot(B, B))
 
 
+def _retracted(retract, x, step):
+    """The unknowns after a step; refuses what is of another shape than before it."""
+    new = as_floats(retract(x, step), "what retract returns")
+    if new.shape != np.shape(x):
+        raise ValueError(f"retract must keep the shape of x, {np.shape(x)}, got {new.shape}")
+    return new
+
+
 def _undamped(evaluate, x0, next_step, retract, stop, max_iterations):
     """The loop Newton and Gauss-Newton share: solve, step, ask the stopping rule."""
     point = _start(evaluate, x0)
@@ -572,7 +580,7 @@ def _undamped(evaluate, x0, next_step, retract, stop, max_iterations):
         if trouble:
             return record.trace(trouble, False)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            new = evaluate(retract(point.x, step))
+            new = evaluate(_retracted(retract, point.x, step))
         if not _is_finite(new):
             return record.trace("the next step leads to where the cost is not finite", False)
         record.add(new, step)
@@ -793,7 +801,7 @@ def next_radius(radius, length, gain, max_radius):
 def _try(evaluate, point, retract, step):
     """The point a step leads to, and the step's gain ratio; -infinity where the cost is not finite."""
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        new = evaluate(retract(point.x, step))
+        new = evaluate(_retracted(retract, point.x, step))
     if not _is_finite(new):
         return new, -np.inf
     return new, float(gain_ratio(point.cost, new.cost, point.gradient, point.curvature, step))

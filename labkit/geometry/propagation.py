@@ -82,6 +82,7 @@ def point_jacobians(T_AB, p_B):
         e_A = J_T e_AB + J_p e_B.
     """
     T_AB, p_B = as_transforms(T_AB, "T_AB"), as_points(p_B, "p_B")
+    fit_together(T_AB=T_AB.shape[:-2], p_B=p_B.shape[:-1])
     lever = -T_AB[..., :3, :3] @ skew(p_B)
     shift = np.broadcast_to(np.eye(3), lever.shape)
     return np.concatenate([lever, shift], axis=-1), T_AB[..., :3, :3]

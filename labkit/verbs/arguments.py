@@ -18,6 +18,7 @@ REASONS = {
     errno.EPERM: "you have no permission",
     errno.ENOENT: "there is no such file or folder",
     errno.EISDIR: "it is a folder",
+    errno.EEXIST: "a file of this name is there already",
     errno.ENOTDIR: "it is, or lies in, a file and not a folder",
     errno.EMFILE: "too many files are open",
     errno.ENAMETOOLONG: "the name is too long",
