@@ -312,6 +312,7 @@ REFUSED = [
     ),
     (lambda: wells.which([np.nan, 0.0]), "x must be finite"),
     # calibration, geometry
+    (lambda: odometry.chord(np.ones(5), np.ones(2), 0.1, "arc"), r"must be equal or broadcast, got \(5,\) of v"),
     (lambda: pivot.pivot_residuals([I4], np.zeros((2, 3)), O3), r"tip must have shape \(3,\), got \(2, 3\)"),
     (lambda: pivot.as_poses([I4], np.datetime64("now")), "at_least must hold real numbers, got dates"),
     (lambda: pivot.refuse_free_tip(I4[None], 1e-6), "T must hold at least 2 poses, got 1"),

@@ -98,6 +98,7 @@ def chord(v, omega, dt, model):
     length, turn : arrays, shape (...)
         In m and rad.
     """
+    fit_together(v=np.shape(v), omega=np.shape(omega), dt=np.shape(dt))
     half_turn = 0.5 * omega * dt
     length = v * dt
     if model == "euler":

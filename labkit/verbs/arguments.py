@@ -3,6 +3,7 @@
 import argparse
 import contextlib
 import errno
+import io
 import json
 import os
 import sys
@@ -42,6 +43,7 @@ class Parser(argparse.ArgumentParser):
 
 def run(work, arguments=None):
     """Exit code of `work(arguments)`: what it returns, or 1 with what it refused on standard error."""
+    sys.stdout = sys.stdout or io.StringIO()  # whoever started this has closed it, or never gave it one
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")  # a console that has no letter for it stops nothing

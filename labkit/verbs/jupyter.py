@@ -5,10 +5,12 @@ import errno
 import os
 import socket
 import sys
+import tempfile
 import time
+from pathlib import Path
 
 from ..places import IS_CHECKOUT
-from .arguments import COMMAND, Refusal
+from .arguments import COMMAND, Refusal, sentence
 from .processes import call
 
 FIRST_PORT, PORTS = 8888, 50
@@ -45,11 +47,12 @@ def open_lab(folder, notebook, options, passed_on):
             "read the token. The token stays on.",
             flush=True,
         )
+    places = {**own_places(folder), **places_without_a_home()}
     for _ in range(ATTEMPTS):
         port, begun = choose_port(options.ip, options.port), time.monotonic()
         print(f"JupyterLab starts at port {port}; stop it with Ctrl-C in this window.", flush=True)
         words = lab_command(sys.executable, folder, notebook, options.ip, port, options.no_browser) + passed_on
-        code = call(words, **own_places(folder))
+        code = call(words, **places)
         if not code or time.monotonic() - begun > STARTING or is_free(options.ip, port):
             return code
         print(f"Another program took port {port} in the meantime.", flush=True)
@@ -64,6 +67,23 @@ def own_places(folder):
     except OSError:
         return {"JUPYTER_PREFER_ENV_PATH": "1"}
     return {"JUPYTER_PREFER_ENV_PATH": "1", "JUPYTERLAB_WORKSPACES_DIR": str(workspaces)}
+
+
+def places_without_a_home():
+    """Where JupyterLab and IPython keep their files when the home folder cannot be written; says so. Else nothing."""
+    from jupyter_core import paths  # lab.py imports this module before anything is installed
+
+    try:
+        for place in (paths.jupyter_config_dir(), paths.jupyter_data_dir(), paths.jupyter_runtime_dir()):
+            Path(place).mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=place) as file:
+                file.write(b"labkit")
+    except OSError as error:
+        instead = tempfile.mkdtemp(prefix="labkit-")
+        print(f"{sentence(error)} JupyterLab keeps its own files in {instead} this time.", flush=True)
+        names = ("JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR", "IPYTHONDIR")
+        return {name: str(Path(instead, name.lower())) for name in names}
+    return {}
 
 
 def lab_command(python, folder, notebook, ip, port, no_browser):

@@ -91,6 +91,15 @@ def test_a_reader_who_has_seen_enough_is_no_error():
     process.stderr.close()
 
 
+@pytest.mark.skipif(os.name == "nt", reason="a shell closes no streams there")
+def test_whoever_gives_no_place_to_print_to_gets_no_traceback():
+    code = "from labkit.verbs.arguments import run; run(lambda _: print('x'), [])"
+    told = subprocess.run(
+        ["sh", "-c", '"$@" >&-', "sh", sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True
+    )
+    assert (told.returncode, told.stderr) == (0, "")
+
+
 def test_a_full_disk_is_said_with_the_file_that_found_no_room(monkeypatch, tmp_path, capsys):
     def full(*_, **__):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))  # as a write says it: without a name

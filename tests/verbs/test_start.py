@@ -1,6 +1,7 @@
 """Opening JupyterLab: where the notebooks lie, which port, and what is said or refused before."""
 
 import socket
+import tempfile
 
 import pytest
 
@@ -74,6 +75,16 @@ def test_a_port_that_is_lost_before_jupyterlab_listens_is_replaced(monkeypatch, 
 def test_a_folder_that_cannot_be_written_keeps_its_workspaces_elsewhere(tmp_path):
     (tmp_path / ".lab").write_text("in the way", encoding="utf-8")
     assert jupyter.own_places(tmp_path) == {"JUPYTER_PREFER_ENV_PATH": "1"}
+
+
+def test_a_home_that_cannot_be_written_keeps_nobody_from_working(tmp_path, monkeypatch, capsys):
+    assert jupyter.places_without_a_home() == {} and capsys.readouterr().out == ""
+    (tmp_path / "home").write_text("a file", encoding="utf-8")
+    monkeypatch.setenv("JUPYTER_DATA_DIR", str(tmp_path / "home" / "jupyter"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    places = jupyter.places_without_a_home()
+    assert set(places) > {"JUPYTER_RUNTIME_DIR", "IPYTHONDIR"} and all(str(tmp_path) in p for p in places.values())
+    assert "JupyterLab keeps its own files in" in capsys.readouterr().out
 
 
 def test_jupyterlab_listens_on_this_machine_alone_and_keeps_its_token():
