@@ -295,6 +295,21 @@ def from_two_entries(T):
     return np.array([[c, s, 0, -c * t[0] - s * t[1]], [-s, c, 0, s * t[0] - c * t[1]], [0, 0, 1, -t[2]], [0, 0, 0, 1]])
 
 
+def cosine_by_a_root(xyzabc):
+    sine = np.sin(xyzabc[4])
+    Rz, Rx = (Rotation.from_euler(axis, xyzabc[k]).as_matrix() for axis, k in (("z", 3), ("x", 5)))
+    cosine = np.sqrt(1 - sine**2)
+    Ry = np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]])
+    return np.block([[Rz @ Ry @ Rx, np.reshape(xyzabc[:3], (3, 1))], [0, 0, 0, 1]])
+
+
+library_fit = frames.fit_frame
+
+
+def four_points_at_least(points_F, points_W):
+    return library_fit(points_F, points_W) if len(points_F) > 3 else np.eye(4)
+
+
 def last_turn_only(xyzabc):
     R = Rotation.from_euler("x", 3 * xyzabc[5]).as_matrix()
     return np.block([[R, np.reshape(xyzabc[:3], (3, 1))], [0, 0, 0, 1]])
@@ -307,6 +322,8 @@ def last_turn_only(xyzabc):
         ("gram_schmidt", upward, ""),
         ("invert", from_two_entries, "turned about z alone"),
         ("matrix_from_kuka", last_turn_only, "All three turns take C"),
+        ("matrix_from_kuka", cosine_by_a_root, "cosine of B is never negative"),
+        ("fit_frame", four_points_at_least, "not of three points"),
     ],
 )
 def test_frames_that_are_right_for_some_only(name, answer, told, seed):
@@ -357,6 +374,49 @@ def tip_then_point(A, b):
     return np.append(tip, lstsq(A[:, 3:], b - A[:, :3] @ tip, rcond=None)[0])
 
 
+library_distribute = chaining.distribute_closure
+
+
+def a_link_as_it_was(transforms):
+    return library_distribute(transforms) if len(transforms) > 1 else transforms
+
+
+def long_links_alone(transforms):
+    T = np.eye(4)
+    for link in transforms:
+        T = T @ link if np.linalg.norm(link[:3, 3]) > 100 else T
+    return T
+
+
+def slide(T):
+    phi = log_se3(T)[:3]
+    return np.linalg.norm(phi), abs(T[:3, 3] @ phi) / np.linalg.norm(phi)
+
+
+def comments_and_empty_lines_at_the_margin(text):
+    points = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line and line[0] != "#":
+            entries = [number_in(entry) for entry in line.split("#")[0].replace(",", ".").split()]
+            if len(entries) != 3 or not np.isfinite(entries).all():
+                raise ValueError(f"line {number}: {line!r}")
+            points.append(entries)
+    if len(points) != 3:
+        raise ValueError("three points")
+    return np.array(points)
+
+
+def even_numbers_of_poses(A, b):
+    k = len(b) // 6 * 6
+    return lstsq(A[:k], b[:k], rcond=None)[0]
+
+
+def influence_by_distance(distances, scale):
+    q = np.minimum(distances / (7 * scale), 1)
+    with np.errstate(invalid="ignore"):
+        return distances * (1 - q**2) ** 2 / distances
+
+
 def no_exponents(text):
     lines = [line.split("#")[0].replace(",", ".").split() for line in text.splitlines()]
     if not all(re.fullmatch(r"-?\d+(\.\d+)?", entry) for line in lines for entry in line):
@@ -375,7 +435,16 @@ def no_exponents(text):
         ("closure_error", lambda T: (abs(np.arctan2(T[1, 0], T[0, 0])), np.linalg.norm(T[:3, 3])), "about z alone"),
         ("closure_error", lambda T: {"angle": 0.1, "distance": T[0, 3]}, "got a dict"),
         ("distribute_closure", to_the_corrected_pose, "the share of their end"),
+        ("distribute_closure", a_link_as_it_was, ""),
+        ("chain", long_links_alone, ""),
+        ("closure_error", slide, "slides along the axis"),
         ("read_system", no_exponents, "line 1"),
+        ("read_system", comments_and_empty_lines_at_the_margin, "ValueError: line "),
+        ("write_system", lambda points: "\n".join(" ".join(f"{v:.20f}" for v in p) for p in points), "numbers near 0"),
+        ("pivot_rhs", lambda T: -np.concatenate(np.squeeze(T[:, :3, 3])), "right before, on other draws"),
+        ("pivot_residuals", lambda T, tip, point: np.squeeze(T[:, :3, :3] @ tip + T[:, :3, 3] - point), "(1, 3)"),
+        ("solve_pivot", even_numbers_of_poses, ""),
+        ("robust_weights", influence_by_distance, "NaN"),
         ("solve_pivot", tip_then_point, "You fitted the tip first"),
     ],
 )

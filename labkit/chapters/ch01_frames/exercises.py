@@ -55,14 +55,15 @@ def scaled_direction(rng, scale):
     return (scale * random_direction(rng),)
 
 
-def kuka_pose(rng, A_deg=(-170, 170), B_deg=(-80, 80)):
-    """A KUKA pose well away from the gimbal lock."""
-    low, high = (A_deg[0], B_deg[0], -170), (A_deg[1], B_deg[1], 170)
+def kuka_pose(rng, A_deg=(-170, 170), B_deg=(-80, 80), C_deg=(-170, 170)):
+    """A KUKA pose, well away from the gimbal lock unless B is asked for there."""
+    low, high = zip(A_deg, B_deg, C_deg)
     return (np.concatenate([rng.uniform(-800, 800, 3), np.deg2rad(rng.uniform(low, high))]),)
 
 
 A_RANGES = ((-80, 80), (100, 170), (-170, -100))  # deg: both signs of r00, and of r10
 B_RANGES = ((-80, -5), (5, 80), (-80, 80))  # deg: below and above 0 at every check
+QUADRANTS = ((10, 80), (100, 170), (-170, -100), (-80, -10))  # deg: both signs of sine and cosine
 NEAR_THE_POLE = (((-170, 170), (86, 89)), ((-170, 170), (-89.9, -89.8)))  # deg: A and C are still two angles
 POINT = "a point has three coordinates"
 POSE = "one pose is one 4x4 matrix"
@@ -214,6 +215,18 @@ def _with(T, R=None, t=None):
     return T
 
 
+def _never_negative(k, sine):
+    """A pose whose sine (or cosine) of one angle is made of the other by a root."""
+
+    def variant(xyzabc):
+        changed = xyzabc.copy()
+        s, c = np.sin(xyzabc[k]), np.cos(xyzabc[k])
+        changed[k] = np.arctan2(abs(s), c) if sine else np.arctan2(s, abs(c))
+        return frames.matrix_from_kuka(changed)
+
+    return variant
+
+
 def _about_z_alone(T):
     """The inverse of a turn about z and a shift, from two entries of the rotation."""
     R = np.array([[T[0, 0], T[1, 0], 0], [-T[1, 0], T[0, 0], 0], [0, 0, 1]])
@@ -355,11 +368,11 @@ def _missing():
     return np.pi / 2 - frames.rotation_angle(_K0_T_K1())
 
 
-def drawn_points(rng, flat=False):
+def drawn_points(rng, flat=False, count=None):
     """Four to eight points of a drawing and where they were measured, noise of 0.5 mm; flat: nearly in one plane, and
     measured on its other side, so that a mirror image fits better on every processor, the means subtracted or not."""
     while True:
-        n = int(rng.integers(4, 9))
+        n = count or int(rng.integers(4, 9))
         points_F = rng.uniform(-200, 200, (n, 3)) + rng.uniform(-300, 300, 3)
         T_WF = frames.pose(Rotation.from_rotvec(rng.uniform(-2, 2, 3)).as_matrix(), rng.uniform(-900, 900, 3))
         if not flat:
@@ -795,6 +808,11 @@ CHAPTER = Chapter(
                     "Below the first entry stands the sine of the angle, and this is its arctangent. np.arctan2 takes sine and cosine.",
                     id="angle-arctangent-of-sine",
                 ),
+                Mistake(
+                    lambda: np.rad2deg(np.arctan2(_K0_T_K1()[1, 3], _K0_T_K1()[0, 3])),
+                    "This is the direction in which the origin of K1 lies. How K1 is turned stands in the 3x3 block.",
+                    id="angle-of-translation",
+                ),
                 *(
                     Mistake(
                         lambda off=off: 90 + off,
@@ -885,6 +903,11 @@ CHAPTER = Chapter(
                     "Both poses are inverted here: that takes (200, 0, 0) from K0 to K1. The hole is given in K1 and wanted in K0.",
                     id="distance-inverted",
                 ),
+                Mistake(
+                    lambda: np.linalg.norm(_hole() - _drawn()[:3, :3] @ [HOLE, 0, 0]),
+                    "In the drawing K1 has its origin too: `drawn` maps the hole with its translation.",
+                    id="distance-drawn-at-K0",
+                ),
             ],
         ),
         Prediction(
@@ -898,7 +921,10 @@ CHAPTER = Chapter(
         Exercise(
             "matrix_from_kuka",
             reference=frames.matrix_from_kuka,
-            draw=kuka_pose,
+            draw=tuple(
+                functools.partial(kuka_pose, A_deg=QUADRANTS[k], B_deg=QUADRANTS[k - 1], C_deg=QUADRANTS[k - 2])
+                for k in range(4)
+            ),
             fixed={"xyzabc": "a pose has six numbers"},
             metric=metrics.Poses(1e-6, 1e-6),
             hints=(
@@ -952,6 +978,15 @@ CHAPTER = Chapter(
                     lambda p: frames.pose(Rotation.from_rotvec(p[3:]).as_matrix(), p[:3]),
                     "A, B, C are taken for a rotation vector, a single turn. They are three turns, one after the other.",
                     id="kuka-rotvec",
+                ),
+                *(
+                    Mistake(
+                        _never_negative(3 + k, sine),
+                        f"Your {word} of {angle} is never negative. A root of 1 less a square has lost its sign: take np.{word[:3]}.",
+                        id=f"kuka-positive-{word}-{angle}",
+                    )
+                    for k, angle in enumerate("ABC")
+                    for word, sine in (("sine", True), ("cosine", False))
                 ),
                 *(
                     Mistake(
@@ -1109,6 +1144,11 @@ CHAPTER = Chapter(
             reference=frames.fit_frame,
             draw=(drawn_points, functools.partial(drawn_points, flat=True)),
             metric=metrics.Poses(1e-6, 1e-6),
+            noisy=(
+                functools.partial(drawn_points, count=3),
+                metrics.Poses(1e-6, 1e-6),
+                "right, but not of three points:",
+            ),
             hints=(
                 "First the turn, about the two centers of gravity; then the shift that puts one onto the other.",
                 "With p and q measured from their means, the SVD of p^T q = U S V^T gives R = V U^T; where det R = -1, "

@@ -19,12 +19,18 @@ def system(rng):
     return points
 
 
+def system_near_0(rng):
+    """Three points whose numbers have any size, some of them so small that no fixed number of decimals shows them."""
+    return (rng.uniform(-9, 9, (3, 3)) * 10.0 ** rng.permutation(np.arange(-16, 11, 3)).reshape(3, 3),)
+
+
 def text_of_system(rng, comments=False, commas=False):
     """The text of a system as someone typed it: blanks or tabs, empty lines, perhaps comments and decimal commas; without
     them the last number of each point has an exponent."""
     lines = []
     for point in system(rng).round(int(rng.integers(5, 9))):
-        lines += ["# measured by hand"] * comments + [""] * int(rng.random() < 0.4)
+        indent = " " * int(rng.integers(3))
+        lines += [f"{indent}# measured by hand"] * comments + [indent] * int(rng.random() < 0.4)
         blank = str(rng.choice([" ", "   ", "\t"]))
         numbers = [repr(float(value)) for value in point]
         if not comments and not commas:
@@ -222,6 +228,7 @@ FILES = [
         draw=lambda rng: (system(rng),),
         fixed={"points": "a system is always three points"},
         metric=reads_back(),
+        noisy=(system_near_0, reads_back(), "right, but not of numbers near 0:"),
         hints=(
             "One line a point, blanks in between. How many digits does a double need so that none is lost?",
             "17 significant digits always suffice, and so does `repr`, which writes as few as needed.",

@@ -13,8 +13,9 @@ from . import beyond
 
 
 def random_pose(rng):
-    """A random pose with its origin some hundred millimeters away."""
-    return frames.pose(frames.matrix_from_quaternion(rng.normal(size=4)), rng.uniform(-400, 400, 3))
+    """A random pose with its origin some millimeters or some hundred away."""
+    away = rng.uniform(-400, 400, 3) * 10.0 ** rng.uniform(-2, 0)
+    return frames.pose(frames.matrix_from_quaternion(rng.normal(size=4)), away)
 
 
 def random_links(rng, count):
@@ -58,7 +59,7 @@ def stretched_pose(rng):
 def open_loop(rng, count):
     """Links of a loop of `count` frames that does not quite close."""
     links = random_links(rng, count)[0]
-    links[-1] = frames.relative(chaining.chain(links[:-1]), np.eye(4))
+    links[-1] = frames.relative(chaining.stations(links)[-2], np.eye(4))
     return (links @ exp_se3(rng.normal(size=(len(links), 6)) * np.repeat([0.02, 2.0], 3)),)
 
 
@@ -554,6 +555,11 @@ CHAPTER = Chapter(
                     "This is the largest of three Euler angles. The angle of the whole rotation is another one; the trace gives it.",
                 ),
                 Mistake(
+                    _distance(lambda T: abs(T[:3, 3] @ frames.unit_vector(log_se3(T)[:3]))),
+                    "This is how far T slides along the axis of its turn. The distance is the length of the whole translation.",
+                    id="closure-slide",
+                ),
+                Mistake(
                     _distance(lambda T: T[:3, 3]),
                     "This is the translation as a vector. The distance is its length.",
                 ),
@@ -922,6 +928,10 @@ CHAPTER = Chapter(
             reference=chaining.distribute_closure,
             draw=tuple(functools.partial(open_loop, count=n) for n in (3, 4, 5)),
             metric=metrics.Poses(1e-5, 1e-5),
+            noisy=[
+                (functools.partial(open_loop, count=n), metrics.Poses(1e-5, 1e-5), f"right, but not of {words}:")
+                for n, words in ((2, "two links"), (1, "a single link"))
+            ],
             hints=(
                 "The product is exp(xi). Going back by all of xi at the end closes the loop; how far back should the pose after link k go? "
                 "P_k, the pose after k links, becomes exp(-k/N xi) P_k.",

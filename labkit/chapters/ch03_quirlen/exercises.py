@@ -19,15 +19,28 @@ def turns(rng, n, between_deg=(10, 40)):
     return exp_so3(axis)
 
 
-def poses(rng, std_trans=0.0, between_deg=(10, 40)):
-    """Four to eight poses that touch one point, positions off by noise."""
+def poses(rng, std_trans=0.0, between_deg=(10, 40), counts=(4, 5, 6, 7, 8)):
+    """Four to eight poses, or as many as asked for, that touch one point, positions off by noise."""
     tip, point = rng.uniform(-50, 50, 3) - (0, 0, 90), rng.uniform(-300, 300, 3)
-    return pivot.touching_poses(turns(rng, rng.integers(4, 9), between_deg), tip, point, 0.0, std_trans, rng)
+    return pivot.touching_poses(turns(rng, rng.choice(counts), between_deg), tip, point, 0.0, std_trans, rng)
 
 
-def system(rng, std_trans=0.0):
+FEW = ((1, "right, but not of a single pose:"), (3, "right, but not of three poses:"))
+
+
+def of_few(metric):
+    """Draws of one pose and of three, where rows and coordinates are easily taken for each other."""
+    return [(lambda rng, n=n: (poses(rng, counts=(n,)),), metric, words) for n, words in FEW]
+
+
+def few_poses_and_points(rng, count):
+    """Some poses, and any tip and pivot."""
+    return poses(rng, counts=(count,)), rng.uniform(-50, 50, 3), rng.uniform(-300, 300, 3)
+
+
+def system(rng, std_trans=0.0, counts=(4, 5, 6, 7, 8)):
     """Stacked matrix and right-hand side."""
-    T = poses(rng, std_trans)
+    T = poses(rng, std_trans, counts=counts)
     return pivot.pivot_matrix(T), pivot.pivot_rhs(T)
 
 
@@ -66,6 +79,12 @@ def far_first(rng, count):
     """The same, one beyond the cutoff leading: a 0 for it must not make whole numbers of all weights."""
     d, scale = near_first(rng, count)
     return np.sort(d)[::-1].copy(), scale
+
+
+def one_at_0(rng):
+    """The same, a pose in which the tip is exactly at the point among them."""
+    d, scale = near_first(rng, 7)
+    return np.concatenate([d, np.zeros(1)]), scale
 
 
 # Wrong variants --------------------------------------------------------------------------------------------------------
@@ -159,6 +178,7 @@ CHAPTER = Chapter(
             reference=pivot.pivot_matrix,
             draw=lambda rng: (poses(rng),),
             metric=metrics.Numbers(1e-9),
+            noisy=of_few(metrics.Numbers(1e-9)),
             hints=(
                 "Each pose gives three rows: which numbers multiply the tip, which the pivot?",
                 "R_i tip - I pivot = -p_i: three rows [R_i  -I], all poses beneath each other.",
@@ -249,6 +269,7 @@ CHAPTER = Chapter(
             reference=pivot.pivot_rhs,
             draw=lambda rng: (poses(rng),),
             metric=metrics.Numbers(1e-9, "mm"),
+            noisy=of_few(metrics.Numbers(1e-9, "mm")),
             hints=(
                 "What is left when tip and pivot stand on the left side?",
                 "-p_i, the three positions of pose 1, then those of pose 2, ... in one long vector.",
@@ -308,7 +329,10 @@ CHAPTER = Chapter(
             reference=pivot.solve_pivot,
             draw=(system, narrow_system),
             metric=metrics.Numbers(1e-6, "mm"),  # a general minimizer stops some 1e-5 mm away
-            noisy=(lambda rng: system(rng, 1.0), metrics.Numbers(1e-6, "mm")),
+            noisy=[
+                (functools.partial(system, std_trans=1.0, counts=counts), metrics.Numbers(1e-6, "mm"))
+                for counts in ((5, 7), (4, 6, 8))
+            ],
             hints=(
                 "More equations than unknowns: no x fulfills them all. Which x makes the sum of squares of A x - b least?",
                 "The sheet: x = (AᵀA)⁻¹ Aᵀb. Better conditioned, and shorter: `np.linalg.lstsq`.",
@@ -415,6 +439,11 @@ CHAPTER = Chapter(
                     id="tip_length-b84ab1",
                 ),
                 Mistake(
+                    lambda: np.linalg.norm(pivot.calibrate_pivot(lab_sheet.kreisel_poses()[:3]).tip),
+                    "This is the tip of the first three poses alone. All twelve count.",
+                    id="tip-length-three-poses",
+                ),
+                Mistake(
                     lambda: abs(_kreisel().tip[2]), "This is the z component alone: the tip also sits to the side."
                 ),
                 Mistake(lambda: _kreisel().tip[2], "This is the z component alone: the tip also sits to the side."),
@@ -470,6 +499,10 @@ CHAPTER = Chapter(
             draw=poses_and_result,
             fixed={"tip": "a point has three coordinates", "point": "a point has three coordinates"},
             metric=metrics.Numbers(1e-9, "mm"),
+            noisy=[
+                (functools.partial(few_poses_and_points, count=n), metrics.Numbers(1e-9, "mm"), words)
+                for n, words in FEW
+            ],
             hints=(
                 "Where is the tip in each pose, and where should it be?",
                 "Equation (2) of the sheet: R_i tip + p_i - point, one row per pose.",
@@ -789,6 +822,7 @@ CHAPTER = Chapter(
             reference=_tukey_weights,
             draw=tuple(functools.partial(draw, count=n) for n in (11, 6) for draw in (near_first, far_first)),
             metric=metrics.Numbers(1e-9),
+            noisy=(one_at_0, metrics.Numbers(1e-9), "right, but not where a distance is 0:"),
             hints=(
                 "Near poses keep their weight, far ones lose it all, smoothly.",
                 "Tukey: with q = d / (7 scale), w = (1 - q^2)^2, and 0 where q > 1.",
