@@ -48,6 +48,7 @@ OTHERS = {
     ast.Mod: (ast.FloorDiv,),
 }
 COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+EQUALITIES = (ast.Eq, ast.NotEq)
 WITHOUT = {
     ast.Add: "without one of its terms",
     ast.Sub: "without one of its terms",
@@ -352,8 +353,8 @@ def _comparison(node, names):
         here = type(node.ops[0])
         if len(node.ops) == 1 and here in COMPARISONS and kind is not here:
             words = f"with `{sign}` where `{COMPARISONS[here]}` belongs"
-            equals = kind in (ast.Eq, ast.NotEq) and here not in (ast.Eq, ast.NotEq)  # of numbers: never, or always
-            yield 2 if equals else 0, words, ast.Compare(node.left, [kind()], node.comparators)
+            other = (kind in EQUALITIES) != (here in EQUALITIES)  # of numbers: a case never met, or always
+            yield 2 if other else 0, words, ast.Compare(node.left, [kind()], node.comparators)
 
 
 def _conditions(node, names):

@@ -987,3 +987,7 @@ def fills_one_array(v):
 )
 def test_what_stays_between_calls_is_told(function, words):
     assert words in DOUBLE.judge(function, rng=np.random.default_rng(0)).text
+
+
+def test_an_array_that_nobody_writes_into_is_not_overwritten():
+    assert "overwrites" not in DOUBLE.judge(lambda v: BUFFER, rng=np.random.default_rng(0)).text
