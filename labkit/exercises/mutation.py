@@ -61,6 +61,7 @@ WITHOUT = {
 
 
 COARSE, FINE = 1e-6, 1e-6  # from which on a bound or a step of differences may be too large, and what part of it is not
+FINER = -1  # the rank of what is made finer: few changes, tried by themselves, before others make loops without an end
 ROUNDS = 200  # of a loop, or ten times as many as it has: enough for what converges
 
 
@@ -152,7 +153,7 @@ def _finer(function):
         if isinstance(owner, ast.Compare) and len(owner.ops) == 1:
             number = owner.comparators[0]
             if _is_coarse(number) and isinstance(owner.ops[0], ast.Lt | ast.LtE | ast.Gt | ast.GtE):
-                yield _with_a_millionth(0, owner, ((owner, "comparators", [ast.Constant(FINE * number.value)]),))
+                yield _with_a_millionth(FINER, owner, ((owner, "comparators", [ast.Constant(FINE * number.value)]),))
         elif isinstance(owner, ast.Assign) and _is_coarse(owner.value):
             yield _with_a_millionth(2, owner, ((owner, "value", ast.Constant(FINE * owner.value.value)),))
         elif isinstance(owner, ast.For) and getattr(getattr(owner.iter, "func", None), "id", "") == "range":
@@ -161,7 +162,7 @@ def _finer(function):
                 more = max(10 * given[0].value, ROUNDS)
                 mends = f"these are too few rounds: {more} will do"
                 number = ast.copy_location(ast.Constant(more), given[0])
-                yield Change("", mends, 0, owner.iter, ((owner.iter, "args", [number]),))
+                yield Change("", mends, FINER, owner.iter, ((owner.iter, "args", [number]),))
 
 
 def _is_coarse(node):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import metrics, operands, relations, rerun, slips
+from . import metrics, mutation, operands, relations, rerun, slips
 from .arguments import is_numeric
 
 WORTH = 3  # how unlikely a change of the code may be that is tried before changes of values
@@ -121,7 +121,8 @@ class Search:
     @_or_nothing
     def words(self):
         """What is wrong where, from the likeliest kind of change to the least; None where nothing mends the result."""
-        return self.code_words(range(WORTH)) or self.value_words() or self.code_words(range(WORTH, 9))
+        words = self.code_words((mutation.FINER,)) or self.code_words(range(WORTH))
+        return words or self.value_words() or self.code_words(range(WORTH, 9))
 
     def mending(self, plans, values=None):
         """The first plan that makes the result right on all draws; None where none does in time."""
@@ -250,7 +251,7 @@ class Search:
     @_or_nothing
     def partly_words(self):
         """A change of the code that leaves a simple difference, or makes a part of the result right on all draws."""
-        plans = [("code", k) for k, (rank, *_) in enumerate(self.written.changes) if rank < WORTH]
+        plans = [("code", k) for k, (rank, *_) in enumerate(self.written.changes) if 0 <= rank < WORTH]
         kind, best = self.budget.part(), None
         right = [case.right_parts(case.result) for case in self.cases]
         for start in range(0, len(plans), BATCH):

@@ -32,11 +32,11 @@ def prediction(rng, n, k):
     return rng.normal(size=n) * 5, covariance(rng, n), A, B, rng.normal(size=k) * 2, covariance(rng, k)
 
 
-def mixed_measurement(rng, n, m):
-    """State of n, and m numbers measured of mixtures of them."""
+def mixed_measurement(rng, n, m, off=1.0):
+    """State of n, and m numbers measured of mixtures of them; off: how far they are from those expected."""
     x = rng.normal(size=n) * 3
     C = rng.normal(size=(m, n))
-    return x, covariance(rng, n), C @ x + rng.normal(size=m), C, covariance(rng, m, 0.5)
+    return x, covariance(rng, n), C @ x + off * rng.normal(size=m), C, covariance(rng, m, 0.5)
 
 
 def measured_often(rng, n, m):
@@ -191,6 +191,12 @@ def _grown(P, A, B, Q):
     return A @ P @ A.T + B @ Q @ B.T
 
 
+def _without_B(x, P, A, B, u, Q):
+    noise, k = np.zeros_like(P), len(u)
+    noise[-k:, -k:] = Q
+    return _moved(x, A, B, u), A @ P @ A.T + noise
+
+
 def batch_estimate(x0, cov0, z, C, cov_z):
     return _batch()(x0, cov0, z, C, cov_z)
 
@@ -215,6 +221,14 @@ def _batch_of_sums(information, known):
         return cov @ (known(V0, x0) + C.T @ V @ z.sum(0)), cov
 
     return variant
+
+
+def _prior_with_each(x0, cov0, z, C, cov_z):
+    return _batch(prior=float(len(z)))(x0, cov0, z, C, cov_z)
+
+
+def _state_unweighted(x0, cov0, z, C, cov_z):
+    return _batch_unweighted(x0, cov0, z, C, cov_z)[0], batch_estimate(x0, cov0, z, C, cov_z)[1]
 
 
 def _batch_with_covariances(x0, cov0, z, C, cov_z):
@@ -255,6 +269,26 @@ def _joseph(sign):
 
 def _gain(P, C, R):
     return P @ C.T @ np.linalg.inv(C @ P @ C.T + R)
+
+
+def _by_the_diagonal(short):
+    """A gain that divides by the variances of the innovation alone, with one of two forms of the covariance."""
+
+    def variant(x, P, z, C, R):
+        S = C @ P @ C.T + R
+        K = P @ C.T / np.diag(S)
+        return _corrected(x, K, z, C), _shrunk(P, K, C) if short else P - K @ S @ K.T
+
+    return variant
+
+
+def _number_by_number(x, P, z, C, R):
+    """The numbers of a measurement one by one, each with the gain of the first covariance."""
+    gains = [P @ c / (c @ P @ c + R[i, i]) for i, c in enumerate(C)]
+    shrunk = P - sum(np.outer(k, c) @ P for k, c in zip(gains, C))
+    for k, c, number in zip(gains, C, z):
+        x = x + k * (number - c @ x)
+    return x, shrunk
 
 
 def _corrected(x, K, z, C):
@@ -366,6 +400,11 @@ def _bearing_by_arccos(wrap):
 
 def measurement_jacobian(x, landmark):
     return ekf.measurement_jacobian(x, np.atleast_2d(landmark))[0]
+
+
+def _in_the_robots_frame(x, landmark):
+    r, phi = measurement(x, landmark)
+    return np.array([[-np.cos(phi), -np.sin(phi), 0.0], [np.sin(phi) / r, -np.cos(phi) / r, -1.0]])
 
 
 def _rows(change):
@@ -491,6 +530,9 @@ def _printed_correction(change=lambda given: given, C=(1.0, 0.0)):
     given = change(dict(lecture.example("vehicle")))
     cov = np.array([[given["prior_cov_xx"], given["prior_cov_xv"]], [given["prior_cov_xv"], given["prior_cov_vv"]]])
     return kalman.update([given["prior_x"], given["prior_v"]], cov, [given["z"]], [C], [[given["var_z"]]])
+
+
+ONE_STEP_MORE = {"prior_cov_xx": 1.9469 + 0.2 * 0.2550 + 0.01 * 0.0916, "prior_cov_xv": 0.2550 + 0.1 * 0.0916}
 
 
 def _not_divided(prior_x, prior_v, prior_cov_xx, prior_cov_xv, z, **_):
@@ -630,13 +672,18 @@ CHAPTER = Chapter(
                     "You added the variance of the first control to every state. It acts through B: B cov_u B^T.",
                 ),
                 Mistake(lambda *given: predict_state(*given)[::-1], "The order is state, covariance."),
+                Mistake(
+                    _without_B,
+                    "B is missing in the covariance: the control's noise enters through it, as B cov_u Bᵀ, not as a block by itself.",
+                ),
             ],
         ),
         Exercise(
             "update",
             reference=update,
             draw=tuple(
-                functools.partial(mixed_measurement, n=n, m=m) for n, m in ((2, 2), (3, 1), (2, 3), (3, 3), (4, 2))
+                functools.partial(mixed_measurement, n=n, m=m, off=off)
+                for n, m, off in ((2, 2, 1.0), (3, 1, 0.01), (2, 3, 1.0), (3, 3, 0.01), (4, 2, 1.0))
             ),
             metric=STATE_AND_COV,
             hints=(
@@ -800,6 +847,17 @@ CHAPTER = Chapter(
                     "The gain comes from the covariance before the correction. You computed it anew from the corrected one.",
                 ),
                 Mistake(lambda *given: update(*given)[::-1], "The order is state, covariance."),
+                *(
+                    Mistake(
+                        _by_the_diagonal(short),
+                        "You divide by the diagonal of S alone. What is measured together goes together: S is to be inverted as a whole.",
+                    )
+                    for short in (True, False)
+                ),
+                Mistake(
+                    _number_by_number,
+                    "Each number of the measurement meets the covariance from before them all. One by one, the second meets what the first has left.",
+                ),
             ],
         ),
         Prediction(
@@ -904,6 +962,10 @@ CHAPTER = Chapter(
                         fuse_two_sensors(x0, v, z, s)[1],
                     ),
                     "The variance is right. A weighted mean is divided by the sum of its weights.",
+                ),
+                Mistake(
+                    lambda x0, v0, z, s: fuse_two_sensors(x0, v0, [np.mean(z)] * 2, [np.sqrt((s @ s) / 2)] * 2),
+                    "You take the plain mean of both sensors first. The better one is to count more: each weighs one over its variance.",
                 ),
             ],
         ),
@@ -1124,6 +1186,13 @@ CHAPTER = Chapter(
                     lambda: _printed_correction(lambda g: g | {"var_z": 0.0}).x,
                     "The sensor's variance 0.25 is missing: your filter believes the measurement entirely.",
                 ),
+                *(
+                    Mistake(
+                        lambda further=further: _printed_correction(lambda g: g | {"prior_x": 13.0} | further).x,
+                        "You predict once more before you correct. The printed state is the prediction already.",
+                    )
+                    for further in ({}, ONE_STEP_MORE)
+                ),
             ],
         ),
         Exercise(
@@ -1340,6 +1409,10 @@ CHAPTER = Chapter(
                 "return np.array([[-dx / r, -dy / r, 0], [dy / q, -dx / q, -1]])`",
             ),
             mistakes=[
+                Mistake(
+                    _in_the_robots_frame,
+                    "Your first two columns are the derivatives along the robot's own axes. x and y are those of the map: dx, dy = landmark - x[:2].",
+                ),
                 Mistake(
                     lambda x, l: -measurement_jacobian(x, l) * (1, 1, 0),
                     "These are the derivatives by the place of the landmark, and by no heading. The robot moves: signs turn, and the last entry is -1.",
@@ -1947,6 +2020,14 @@ CHAPTER = Chapter(
                     "The covariance is right. To the state what was known before has to be added: cov0^-1 x0, beside the sum of C^T cov_z^-1 z.",
                 ),
                 Mistake(lambda *a: batch_estimate(*a)[::-1], "The order is state, covariance."),
+                Mistake(
+                    _prior_with_each,
+                    "What is known before counts once. You add it anew with each measurement.",
+                ),
+                Mistake(
+                    _state_unweighted,
+                    "The covariance is right. For the state all rows weigh alike: each is to count as the inverse of its covariance says, cov0 or cov_z.",
+                ),
             ],
         ),
     ],
