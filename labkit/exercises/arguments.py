@@ -139,6 +139,7 @@ def _of_one(name, column):
 def _of_matrices(here, column):
     yield f"with {here} transposed", lambda v: np.swapaxes(v, -1, -2)
     yield f"with {here} inverted", np.linalg.inv
+    yield f"with the diagonal of {here} alone", lambda v: v * np.eye(v.shape[-1])
     yield f"if {here} were the identity", lambda v: np.broadcast_to(np.eye(v.shape[-1]), v.shape).copy()
     if all(np.shape(v)[-1] == 4 and np.allclose(v[..., 3, :], (0, 0, 0, 1)) for v in column):
         yield f"with the rotation of {here} transposed", _pose(lambda R: np.swapaxes(R, -1, -2), lambda t: t)

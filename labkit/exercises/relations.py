@@ -72,7 +72,14 @@ def _relation(metric, results, expected, sizes, whole):
     )
     if words or whole:
         return words
-    return _one_part(results, expected, holds, unit) or _offset(results, expected, unit)
+    part = None if _is_near(metric, results, expected) else _one_part(results, expected, holds, unit)
+    return part or _offset(results, expected, unit)
+
+
+def _is_near(metric, results, expected):
+    """Whether all that is off is so little off that accuracy is the question, and not which part is wrong."""
+    off = [d for pair in zip(results, expected) for d in metric.deviations(*pair) if not d.within]
+    return all(map(not_accurate_enough, off))
 
 
 # Poses and rotations -------------------------------------------------------------------------------------------------

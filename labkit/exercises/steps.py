@@ -19,6 +19,7 @@ WORTH = 3  # how unlikely a change of the code may be that is tried before chang
 CLOSE = 1e-7  # how far, relatively, two values may lie apart that are the same
 BATCH = 120  # changes that are tried at once
 ENTRIES = 8  # of a result that are looked at one by one
+ROWS = 4  # of a value that are looked at one by one
 NAMED = 4  # values that are told to be right, at most
 ANGLES = re.compile(r"rad|deg|angle|turn|rot|axis|axes|theta|phi|psi|sin|cos|tan|pose|frame", re.IGNORECASE)
 SCALED = ("half of it", "twice as much", "a thousand times as much", "a thousandth of it")  # what a choice may not tell
@@ -206,7 +207,17 @@ class Search:
     # Values on the way turned into others
 
     def value_words(self):
-        return self._turned_words(self._turned()) or self._turned_words(self._with_own())
+        """Those that are the result itself come first: a slow function leaves no time for all the others."""
+        places = range(len(self.written.places))
+        ends = {k for k in places if self._ends(k)}
+        words = self._turned_words(self._with_own(ends)) or self._turned_words(self._turned(ends))
+        others = set(places) - ends
+        return words or self._turned_words(self._turned(others)) or self._turned_words(self._with_own(others))
+
+    def _ends(self, k):
+        """Whether a value is the result on all draws on which that place is reached, the first among them."""
+        reached = [(v[k][1][-1], r) for v, r in zip(self.values, self.results) if v[k][0]]
+        return bool(self.values[0][k][0]) and all(r is not None and _same(value, r) for value, r in reached)
 
     def _turned_words(self, plans):
         plan = self.mending(list(plans))
@@ -221,10 +232,11 @@ class Search:
         several = name and re.match(r"[\w*, ]*,[\w*, ]*=[^=]", code)  # w, V = ...: which of them
         return f"in line {line}, `{name if several else code}`"
 
-    def _turned(self):
-        """Plans of values turned into others, the likeliest first, without those that change nothing or cannot be."""
+    def _turned(self, among):
+        """Plans of values at these places turned into others, the likeliest first; none that change nothing."""
         numeric = [i for i in range(len(self.names)) if all(is_numeric(case.args[i]) for case in self.cases)]
-        seen = [(k, values[0]) for k, (count, values) in enumerate(self.values[0]) if count and self._may_turn(k)]
+        first = self.values[0]
+        seen = [(k, first[k][1][0]) for k in sorted(among) if first[k][0] and self._may_turn(k)]
         for change, (words, function) in enumerate(rerun.OTHERWISE):
             if not self._may_be_said(words):
                 continue
@@ -234,13 +246,13 @@ class Search:
                     if _changes(function, value, others):
                         yield "value", k, change, argument
 
-    def _with_own(self):
-        """Plans of values put together with a variable that was bound before."""
+    def _with_own(self, among):
+        """Plans of values at these places put together with a variable that was bound before."""
         places, values = self.written.places, self.values[0]
         bound = [k for k, (_, code, name, *_) in enumerate(places) if name and code != name and values[k][0]]
         for change in range(rerun.ALONE, rerun.ALONE + rerun.WITH_OWN):
             for variable in bound:
-                for k in range(variable + 1, len(places)):
+                for k in sorted(k for k in among if k > variable):
                     if values[k][0] and _changes(
                         rerun.OTHERWISE[change][1], values[k][1][0], [values[variable][1][-1]]
                     ):
@@ -384,7 +396,10 @@ class Search:
         if solution is None:
             return None
         units = self._units(solution)
-        right = [self._is_known(k, solution, False) or self._is_part_of_results(k) for k in units]
+        right = [
+            self._is_known(k, solution, False) or self._is_row(k, solution) or self._is_part_of_results(k)
+            for k in units
+        ]
         known = units[: right.index(False)] if False in right else units
         if not known:
             return None
@@ -413,6 +428,15 @@ class Search:
                 self._is_value(other, [t for _, t in theirs]) for other in range(len(self.written.places))
             )
             if lacking and all(map(_exchangeable, mine, theirs)):
+                return True
+        return False
+
+    def _is_row(self, k, solution):
+        """Whether a value is a row of one of the solution's values that has few: several results taken apart, say."""
+        for q in solution.distinct:
+            theirs = [values[q][1] for values in solution.values]
+            few = min(t.shape[1] if t.ndim > 2 else 0 for t in theirs)
+            if few <= ROWS and any(self._is_value(k, [t[:, row] for t in theirs]) for row in range(few)):
                 return True
         return False
 

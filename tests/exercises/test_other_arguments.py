@@ -27,6 +27,7 @@ ROWS = exercise(
     lambda a, b, n: (np.arange(len(a)) @ (a * np.sin(b))) ** n,
     lambda rng: (*rng.uniform(0.2, 1, (2, int(rng.integers(6, 9)), 2)), int(rng.integers(2, 5))),
 )
+SPREAD = exercise(lambda C, x: (x @ C @ x) ** 2, lambda rng: (rng.normal(size=(3, 3)), rng.normal(size=3)))
 BETWEEN = exercise(
     lambda A, B: frames.invert(A) @ B, lambda rng: (random_pose(rng), random_pose(rng)), metrics.Poses(1e-6, 1e-6)
 )
@@ -46,6 +47,7 @@ BETWEEN = exercise(
         (GAP, lambda T, p, s: (frames.pose(T[:3, :3].T, T[:3, 3]), p, s), "with the rotation of `T` transposed"),
         (GAP, lambda T, p, s: (frames.pose(T[:3, :3], 0 * p), p, s), "comes out if `T` had no translation"),
         (GAP, lambda T, p, s: (frames.pose(np.eye(3), T[:3, 3]), p, s), "comes out if `T` did not turn"),
+        (SPREAD, lambda C, x: (C * np.eye(3), x), "comes out with the diagonal of `C` alone"),
         (ROWS, lambda a, b, n: (b, a, n), "comes out with `a` and `b` exchanged"),
         (ROWS, lambda a, b, n: (a, np.rad2deg(b), n), "comes out with `b` converted to degrees"),
         (ROWS, lambda a, b, n: (a, b, n + 1), "comes out with `n` + 1 in place of `n`"),

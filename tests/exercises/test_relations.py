@@ -55,6 +55,13 @@ def test_relations_of_numbers(change, expected, told):
     assert told in words(change, expected)
 
 
+def test_a_part_that_is_off_by_so_little_is_not_called_wrong():
+    coarse = metrics.Numbers(1e-5)
+    near, far = ([(e + [0, 0, off, 0], e) for e in VECTORS] for off in (1e-3, 1.0))
+    assert relations.difference_words(coarse, near) is None
+    assert "only entry 2" in relations.difference_words(coarse, far)
+
+
 @pytest.mark.parametrize("expected", [VECTORS, TABLES, SQUARES])
 def test_unrelated_numbers_have_no_relation(expected):
     rng = np.random.default_rng(1)
