@@ -22,7 +22,7 @@ from PIL import Image
 
 from . import style
 from .renderer import Canvas
-from .room import LETTERS, LOW, NARROW, PANEL, SLENDER, Panels, Words, break_lines
+from .room import LETTERS, LOW, NARROW, PANEL, SLENDER, Legends, Panels, Words, break_lines
 
 CSS_DPI = 100  # a figure inch is 100 CSS pixels: 10 pt text is as large as the notebook's own
 MAX_PIXELS = 5e6  # of a picture; beyond, a sharper screen gets fewer of its pixels
@@ -65,7 +65,8 @@ class Picture:
             artist.set_in_layout(False)  # what moves must not push the axes about
         self._backgrounds, self._sent = {}, None  # a background a theme
         self._heading = None
-        self.panels, self._words = Panels(self.fig), None  # how they stand, and how far apart they were designed
+        self.panels = Panels(self.fig)
+        self._words = self._legends = None  # how far apart they were designed, and in how many columns
         self._moving = set(self.artists)
         self.draw_seconds, self._laid_out = 0.0, False
         self.spaces = [ax.space for ax in self.fig.axes if hasattr(ax, "space")]
@@ -112,18 +113,32 @@ class Picture:
         whole = CSS_DPI * letters * np.array(self.size)
         if self._words is None and min([width, height] / whole) < 1:
             self.draw()  # as large as it is so far, its words are where they were designed
-            self._words = Words(self.fig)
+            self._words, self._legends = Words(self.fig), Legends(self.fig)
         narrow, low = width < NARROW * whole[0], height < LOW * whole[1]
         self.panels.arrange(self.panels.best(narrow, low))
         break_lines(self.fig, narrow, self._moving)
         self._take_shape(width, height, narrow)
         least = min(1.0, *([self.width, self.height] / (ROOMY * whole)))
-        for share, growth in self._tries(least):
-            self._take_shape(width, height, narrow, growth)
-            self._scale(letters * share, min(max(ratio, 1.0), np.sqrt(MAX_PIXELS / (self.width * self.height))))
-            if least == 1 or self._fits():
+        on_a_line, small = None, min([width, height] / whole) < 1
+        for share, growth, folded in self._tries(least, small):
+            self._take_letters(room, narrow, share, growth, folded)
+            fits = least == 1 or self._fits()
+            if fits:
+                break
+            if fits is None and on_a_line is None and share >= LETTERS[-1]:
+                on_a_line = share, growth, folded
+            if on_a_line and share <= LETTERS[-1] and folded:
+                self._take_letters(room, narrow, *on_a_line)  # a legend on a line hides less than letters too small
                 break
         self._backgrounds = {}
+
+    def _take_letters(self, room, narrow, share, growth, folded):
+        """Draw for a room with letters of a share of their size, wide legends folded or not."""
+        width, height, ratio, letters = room
+        self._take_shape(width, height, narrow, growth)
+        self._scale(letters * share, min(max(ratio, 1.0), np.sqrt(MAX_PIXELS / (self.width * self.height))))
+        if self._legends:
+            self._legends.fold(self.panels.share if folded else None)
 
     def _take_shape(self, width, height, narrow, growth=0.0):
         """Width and height (CSS pixels) of the picture in a room; panels under each other may grow beyond it."""
@@ -135,16 +150,21 @@ class Picture:
         elif self.panels.way == "row":
             width = min(width, WIDEST * height)
         else:
-            slender = SLENDER[self.panels.rows > 1] if narrow else 0.0
-            height = min(height, width * max(aspect, slender))
+            low, high = SLENDER[self.panels.rows > 1] if narrow else (0.0, 0.0)
+            height = min(height, width * max(aspect, low + growth * (high - low)))
             width = min(width, MAX_STRETCH * height / aspect)
         self.width, self.height = round(width), round(height)
 
-    def _tries(self, least):
-        """(size of the letters, growth) from the best to the one that always goes: all shrunk alike."""
+    def _tries(self, least, small):
+        """(size of the letters, growth, whether legends are folded) from the best to the one that always goes: all
+        shrunk alike.
+        """
         if self.panels.way == "column":
-            return [(1.0, 0.0), *((share, 1.0) for share in LETTERS)]
-        return [*((share, 0.0) for share in LETTERS if share > least), (least, 0.0), (ROOMY * least, 0.0)]
+            tries = [(1.0, 0.0), *((share, 1.0) for share in LETTERS)]
+        else:
+            tries = [(share, float(share < 1)) for share in LETTERS if share > least]
+            tries += [(least, 1.0), (ROOMY * least, 1.0)]
+        return [(*one, folded) for one in tries for folded in ((False, True) if least < 1 else (small,))]
 
     def _scale(self, letters, ratio):
         self.fig.set_dpi(CSS_DPI * letters * ratio)
@@ -153,6 +173,7 @@ class Picture:
         self._laid_out = False
 
     def _fits(self):
+        """Whether all words stand apart; None where a legend lies on a line, and nothing else is wrong."""
         with style.rc(), warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
             self._lay_out()

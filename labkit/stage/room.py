@@ -1,10 +1,11 @@
 """How a figure fits a place that is smaller than designed: panels under or beside each other, long words in two lines,
-letters as large as leave the words apart.
+legends in fewer columns, letters as large as leave the words apart.
 
 Letters that are scaled down with the picture cannot be read on a phone or on a projector at 150 %. So panels that stand
-side by side go under each other where the place is narrow, and the other way round where it is low; and of several
-sizes of letters the largest is taken at which no more words lie on each other, or leave the picture, than where the
-picture has its own size, and which leaves every panel a third of its share of the picture.
+side by side go under each other where the place is narrow, and the other way round where it is low; a legend wider than
+its panel's share of the picture, which would push the panel together, takes more rows; and of several sizes of letters
+the largest is taken at which no more words lie on each other, or leave the picture, than where the picture has its own
+size, and which leaves every panel a third of its share of the picture.
 """
 
 import numpy as np
@@ -14,18 +15,23 @@ from matplotlib.text import Text
 NARROW = 0.68  # of the designed width; narrower, panels stand under each other
 LOW = 0.6  # of the designed height; lower, panels stand beside each other
 PANEL = 0.55, 0.8  # height of a panel that stands under another, as a share of its width: least and most
-SLENDER = 0.8, 1.25  # height of what does not stack where the place is narrow, at most: one row, and several
+SLENDER = (
+    (0.8, 1.2),
+    (1.25, 1.25),
+)  # height where the place is narrow, at most and where words need it: one row, several
+LEGEND = 0.8  # of its panel's share of the picture: as wide a legend may be
 ALIKE = 1.4, 2.6  # so many times as large as another panel under it, and beside it, at most
 ROUGH = 2.0  # pixels that two words may share, for their boxes are larger than their letters
+GAP = 0.03  # inches of the picture that two words in one line must stay apart
 LEAST = 0.35  # of its share of the picture must be left to a panel
 LETTERS = (1.0, 0.92, 0.85, 0.77, 0.7)  # sizes of the letters that are tried, as shares of their own
 
 
 class Panels:
-    """The panels of a figure: as designed, in one column, or in one row.
+    """The panels of a figure: as designed, in one column, in one row, or in as many rows as there were columns.
 
-    Panels in one row or in two columns can stand in one column, two under each other in one row. What stands in no grid
-    stays where it is.
+    Panels in one row or in two columns can stand in one column, two rows of up to three panels in one row, and two rows
+    of more than two columns can be turned. What stands in no grid stays where it is.
     """
 
     def __init__(self, fig):
@@ -34,24 +40,33 @@ class Panels:
         grids = {spec.get_gridspec() for spec in self.spec.values() if spec is not None}
         self.grid = next(iter(grids)) if len(grids) == 1 and None not in self.spec.values() else None
         self.rows, self.columns = (1, 1) if self.grid is None else (self.grid.nrows, self.grid.ncols)
-
-    @property
-    def count(self):
-        """How many stand under each other in one column."""
-        return self.rows * self.columns
+        self.count = len(self.spec)
 
     def best(self, narrow, low):
         """How they stand best in a place."""
         if narrow and self.columns > 1 and (self.rows == 1 or self.columns == 2):
             return "column"
-        return "row" if low and not narrow and (self.rows, self.columns) == (2, 1) else "designed"
+        if self.rows == 2 and (narrow or low):
+            if narrow and self.columns > 2:
+                return "turned"
+            return "row" if low and not narrow and len(self.spec) <= 3 else "designed"
+        return "designed"
+
+    def share(self, ax):
+        """Width that an axes and what belongs to it may take, as a share of the picture."""
+        spec = ax.get_subplotspec()
+        if self.grid is None or spec is None:
+            return 1.0
+        widths = np.array(spec.get_gridspec().get_width_ratios() or [1] * spec.get_gridspec().ncols, float)
+        return widths[spec.colspan.start : spec.colspan.stop].sum() / widths.sum()
 
     def arrange(self, way):
-        """Let them stand as designed, in one "column" or in one "row"."""
+        """Let them stand as "designed", in one "column", in one "row", or "turned"."""
         if way == self.way:
             return
         self.way = way
-        specs = {"designed": lambda: self.spec, "column": self._in_a_column, "row": self._in_a_row}[way]()
+        ways = {"column": self._in_a_column, "row": self._in_a_row, "turned": self._turned}
+        specs = ways[way]() if way in ways else self.spec
         for ax, spec in specs.items():
             ax.set_subplotspec(spec)
             if spec.colspan.start == 0 and self.spec[ax].colspan.start:
@@ -62,14 +77,25 @@ class Panels:
     def _in_a_column(self):
         widths, heights = self._ratios()
         shares = [w * h / sum(heights) for w in np.clip(widths, 0, ALIKE[0] * min(widths)) for h in heights]
-        grid, rows = self.fig.add_gridspec(self.count, 1, height_ratios=shares), self.rows
+        grid, rows = self.fig.add_gridspec(len(shares), 1, height_ratios=shares), self.rows
         first = {ax: spec.colspan.start * rows + spec.rowspan.start for ax, spec in self.spec.items()}
         return {ax: grid[first[ax] : first[ax] + len(spec.rowspan), 0] for ax, spec in self.spec.items()}
 
     def _in_a_row(self):
-        heights = self._ratios()[1]
-        grid = self.fig.add_gridspec(1, self.rows, width_ratios=np.clip(heights, 0, ALIKE[1] * min(heights)))
-        return {ax: grid[0, spec.rowspan.start] for ax, spec in self.spec.items()}
+        widths, heights = self._ratios()
+        order = sorted(self.spec, key=lambda ax: (self.spec[ax].colspan.start, self.spec[ax].rowspan.start))
+        if self.columns > 1:  # a panel as high as two has its width; two under each other have theirs each
+            shares = [widths[self.spec[ax].colspan.start] for ax in order]
+        else:
+            shares = np.clip(heights, 0, ALIKE[1] * min(heights))
+        grid = self.fig.add_gridspec(1, len(order), width_ratios=shares)
+        return {ax: grid[0, k] for k, ax in enumerate(order)}
+
+    def _turned(self):
+        """As many rows as there were columns; read line by line, the order stays."""
+        grid = self.fig.add_gridspec(self.columns, self.rows)
+        places = {ax: spec.rowspan.start * self.columns + spec.colspan.start for ax, spec in self.spec.items()}
+        return {ax: grid[divmod(place, self.rows)] for ax, place in places.items()}
 
     def _ratios(self):
         """Widths of the columns and heights of the rows, as designed."""
@@ -89,17 +115,26 @@ class Words:
         self.crowd, self.shares = self.crowded(), self._shares()
 
     def fit(self):
-        """Whether they stay apart, and no panel has become too small."""
-        return (self._shares() >= LEAST * self.shares).all() and self.crowded() <= self.crowd
+        """Whether they stay apart, and no panel has become too small; None where only a legend lies on a line."""
+        if (self._shares() < LEAST * self.shares).any():
+            return False
+        crowd = self.crowded()
+        if crowd <= self.crowd:
+            return True
+        return None if crowd - self.covered() <= self.crowd else False
 
     def crowded(self):
         """How many words lie on another, or leave the figure, and how many legends lie on a line or its marks."""
         boxes = self._boxes()
         low, high = boxes[:, :2], boxes[:, 2:]
         shared = np.minimum(high[:, None], high) - np.maximum(low[:, None], low)
-        pairs = np.triu((shared > ROUGH).all(-1), 1).sum()
+        pairs = np.triu((shared > (-GAP * self.fig.dpi, ROUGH)).all(-1), 1).sum()
         outside = ((low < -ROUGH) | (high > self.fig.bbox.size + ROUGH)).any(-1).sum()
-        return int(pairs + outside + sum(map(self._covers, self.fig.axes)))
+        return int(pairs + outside) + self.covered()
+
+    def covered(self):
+        """How many legends lie on a line or its marks."""
+        return sum(map(self._covers, self.fig.axes))
 
     def _covers(self, ax):
         """Whether the legend of an axes lies on one of its lines."""
@@ -138,8 +173,50 @@ class Words:
                 and id(artist) not in unseen
             )  # fmt: skip
 
-        boxes = [text.get_window_extent(renderer).extents for text in self.fig.findobj(is_shown)]
+        legends = [legend for legend in self.fig.findobj(Legend) if legend.get_visible()]
+        unseen |= {id(text) for legend in legends for text in legend.findobj(Text)}  # a legend counts as one word
+        boxes = [text.get_window_extent(renderer).extents for text in [*legends, *self.fig.findobj(is_shown)]]
         return np.array(boxes).reshape(-1, 4)
+
+
+class Legends:
+    """The legends of a figure, with as many columns as designed or fewer.
+
+    fig : Figure
+    """
+
+    def __init__(self, fig):
+        self.fig = fig
+        self.designed = []  # (legend, its columns, their entries)
+        for legend in fig.findobj(Legend):
+            columns = list(_columns(legend))
+            self.designed.append((legend, columns, [list(column.get_children()) for column in columns]))
+
+    def fold(self, share=None):
+        """Take columns from each legend until it is no wider than its part of the picture, where that is needed.
+
+        share : callable, optional
+            Part of the picture that belongs to an axes. Without it each has its columns back.
+        """
+        for legend, columns, entries in self.designed:
+            for count in range(len(columns), 0, -1):
+                self._deal(legend, columns[:count], entries)
+                room = np.inf if share is None else LEGEND * share(legend.axes) * self.fig.bbox.width
+                if legend.get_window_extent(self.fig.canvas.get_renderer()).width <= room:
+                    break
+
+    def _deal(self, legend, columns, entries):
+        if len(columns) < len(entries):
+            entries = np.array_split(np.array(sum(entries, []), dtype=object), len(columns))
+        for column, part in zip(columns, entries):
+            column.get_children()[:] = part
+        _columns(legend)[:] = columns
+
+
+def _columns(legend):
+    """The list of a legend's columns itself: what is changed in it changes the legend."""
+    _, box = legend.get_children()[0].get_children()  # under its title
+    return box.get_children()
 
 
 def break_lines(fig, on, moving):

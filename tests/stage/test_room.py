@@ -93,6 +93,77 @@ def test_words_on_each_other_outside_and_a_legend_on_a_line_are_counted():
     assert not words.fit()  # less than LEAST of its share is left
 
 
+def with_a_wide_legend():
+    def scene(fig):
+        for ax in fig.subplots(1, 2):
+            style.axes(ax, "x (mm)", "y (mm)")
+            for word in ("the robot itself", "its estimate", "what it scans", "not on the map"):
+                ax.plot([0, 1], [0, 1], label=word)
+        style.legend_above(fig.axes[0], ncols=4)
+        return [], lambda state, result: None
+
+    return Picture(scene, (12.0, 4.2))
+
+
+def test_a_legend_wider_than_its_panel_takes_more_rows_in_a_small_place_and_has_its_columns_back():
+    made = with_a_wide_legend()
+    made.draw()
+    legend = made.fig.axes[0].get_legend()
+    at_first = [text.get_text() for text in legend.get_texts()]
+    size = legend.get_window_extent().size
+    upper, _ = fitted(made, PHONE)
+    folded = legend.get_window_extent()
+    assert folded.height > 1.5 * size[1] and folded.x1 <= made.fig.bbox.x1 and upper.width > 0.7 * 352
+    assert letters(made) >= 0.85
+    fitted(made, (1200, 900))
+    np.testing.assert_allclose(legend.get_window_extent().size, size, atol=1)
+    assert [text.get_text() for text in legend.get_texts()] == at_first
+
+
+def test_letters_that_cannot_be_read_are_worse_than_a_legend_on_a_line():
+    def scene(fig):
+        ax = style.axes(fig.subplots(), "x (mm)", "y (mm)")
+        ax.plot(np.linspace(-6, 6, 200), np.exp(-(np.linspace(-6, 6, 200) ** 2)), label="a bell with a long name")
+        ax.legend(loc="upper right")
+        return [], lambda state, result: None
+
+    made = Picture(scene, (7.0, 4.2))
+    made.draw()
+    fitted(made, (240, 430))
+    assert letters(made) >= 0.7 and Words(made.fig).covered() == 1
+
+
+def test_three_panels_in_two_rows_go_side_by_side_where_it_is_low():
+    def scene(fig):
+        grid = fig.add_gridspec(2, 2, width_ratios=(3, 2))
+        for place in (grid[0, 0], grid[1, 0], grid[:, 1]):
+            style.axes(fig.add_subplot(place), "x (mm)", "y")
+        return [], lambda state, result: None
+
+    made = Picture(scene, (7.0, 4.2))
+    made.draw()
+    boxes = fitted(made, PROJECTOR)
+    assert [box.y0 for box in boxes] == pytest.approx([boxes[0].y0] * 3, abs=1)
+    assert boxes[0].x1 < boxes[1].x0 and boxes[1].x1 < boxes[2].x0 and letters(made) == 1
+
+
+def test_two_rows_of_three_become_three_of_two_on_a_phone():
+    boxes = fitted(picture(2, 3, "y"), PHONE)
+    assert np.argsort([-box.y0 * 10 + box.x0 / 100 for box in boxes]).tolist() == [0, 1, 2, 3, 4, 5]
+    assert boxes[0].y0 == pytest.approx(boxes[1].y0, abs=1) and boxes[1].y0 > boxes[2].y1
+
+
+def test_two_words_in_one_line_stay_apart():
+    made = picture(1, 1)
+    ax, words = made.fig.axes[0], Words(made.fig)
+    one = ax.text(0.1, 0.2, "occupancy grid", transform=ax.transAxes)
+    end, _ = ax.transAxes.inverted().transform(one.get_window_extent().get_points()[1])
+    other = ax.text(end + 0.002, 0.2, "lines", transform=ax.transAxes)
+    assert words.crowded() == 1
+    other.set_x(other.get_position()[0] + 0.05)
+    assert words.crowded() == 0
+
+
 def test_a_long_target_takes_two_lines_on_a_phone():
     stage = Stage(
         "long", scene=lambda fig: (fig.subplots() and [], lambda state, result: None), compute=lambda state: None,

@@ -39,12 +39,15 @@ class Belief:
             ax.set(xlim=(0, 1.09 * seconds), ylim=(-limit, limit), xticks=np.arange(0, seconds + 1, 2))
             ax.axhline(0, color=style.GRID, linewidth=1)
         (self.dots,) = position.plot([], [], **style.look("measurement", markersize=3), label="sensor")
-        (self.bracket,) = position.plot([], [], color=style.MEASUREMENT, linewidth=3, label="believed of it")
+        (self.bracket,) = position.plot(
+            [], [], color=style.MEASUREMENT, linewidth=3, label="believed, \N{PLUS-MINUS SIGN}2 sigma"
+        )
         self.bands, self.errors = [], []
         for ax in (position, velocity):
-            self.bands += ax.plot([], [], **style.look("prediction", linewidth=1.8), label="promised")
+            self.bands += ax.plot(
+                [], [], **style.look("prediction", linewidth=1.8), label="promised, \N{PLUS-MINUS SIGN}2 sigma"
+            )
             self.errors += ax.plot([], [], **style.look("estimate", linewidth=1.6), label="filter")
-        position.set_title("all bands: \N{PLUS-MINUS SIGN}2 sigma", loc="right", fontsize=8, color=style.MUTED)
         style.legend_above(position, ncols=2, fontsize=8, columnspacing=0.8, handlelength=1.4)
         self.artists = [self.dots, *self.bands, *self.errors, self.bracket]
 
