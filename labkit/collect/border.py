@@ -111,6 +111,8 @@ class Border:
             found = written and (written.changes, written.places)
         elif what == "trace":
             found = written.trace(args, seconds)
+        elif what == "truths":
+            found = written.truths(args, seconds)
         else:
             found = written.results(plans, args, seconds, self._sent)
         return {"found": self.encode(found, parts), "spent": {"plain": time.thread_time() - began}}
@@ -246,6 +248,12 @@ class Written:
         """As `rerun.Written.trace`."""
         found, _ = self.remote.rerun("trace", args, seconds=seconds)
         return [_rounds(*pair) for pair in found] if len(found) == len(self.places) else [(0, None)] * len(self.places)
+
+    def truths(self, draws, seconds):
+        """As `rerun.Written.truths`."""
+        found, _ = self.remote.rerun("truths", [list(args) for args in draws], seconds=seconds)
+        told = [[(int(k), bool(true), bool(false), int(n)) for k, true, false, n in conditions] for conditions in found]
+        return [[c for c in conditions if 0 <= c[0] < len(self.places)] for conditions in told]
 
     def results(self, plans, args, seconds, keep):
         """As `rerun.Written.results`."""

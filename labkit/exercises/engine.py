@@ -6,6 +6,7 @@ An `Exercise` is a reference function, a random draw of its arguments, a metric,
 business of `session`.
 """
 
+import contextlib
 import copy
 import dis
 import functools
@@ -32,6 +33,7 @@ MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried,
 MORE_CASES = 8  # on which an explanation from the first draws is tried once more, at least ...
 MOST_CASES = 64  # ... and at most, as far as LOOKING allows: of one in fifty draws a coincidence may hide
 LOOKING = 1.2  # seconds of processor time, from the beginning of a check, in which an explanation is looked for
+SPECIAL = 0.8  # more, where an answer is right on some draws only, for what the others have in common
 UNITS = {
     "mm": ("length", 1e-3),
     "cm": ("length", 1e-2),
@@ -216,7 +218,9 @@ class _Trial:
         self.printed = self.printed or run.printed
         if run.error is not None:
             named = self._named_by_failing(run.error, args)
-            return named or self._mended(self._raised(run, args), args, metric, expected)
+            told = self._raised(run, args)
+            endless = isinstance(run.error, RecursionError | MemoryError)  # it would be so again and again
+            return named or (told if endless else self._mended(told, args, metric, expected))
         if run.changed:
             names = ", ".join(f"`{name}`" for k, name in enumerate(self._names(args)) if k in run.changed)
             return self.outcome(NOT_YET, f"your function changes its argument {names} in place: work on a copy.")
@@ -247,7 +251,7 @@ class _Trial:
         solution = search and self._solution(search)
         step = search and (search.passed_words(solution) or search.words())
         shape = self._other_shape() if self.refusal else ""
-        words = words or (not self.refusal and step) or (not shape and self._one_change())
+        words = words or (not self.refusal and step) or (not shape and (unmoved or self._one_change()))
         if words:
             return self.outcome(NOT_YET, _closed(words) + self._about_globals())
         if search and not step and not self._right_somewhere():
@@ -264,7 +268,7 @@ class _Trial:
                     off = next(d for d in metric.deviations(*pair) if not d.within)
                     return self.outcome(NOT_YET, _closed(f"{words} {off}"))
         words = unmoved or self._relation()
-        words = _closed(words) if words else self._deviation()
+        words = _closed(words) if words else self._deviation() + self._constant()
         return self.outcome(NOT_YET, words + self._agreement(search, solution) + self._about_globals())
 
     def _agreement(self, search, solution):
@@ -498,6 +502,13 @@ class _Trial:
         except Exception:
             return None
 
+    def _constant(self):
+        """That all results are one and the same, if they are and should not be, as one more sentence."""
+        results, expected = zip(*self._plain_pairs())
+        if len(results) < 2 or _are_one(expected) or not _are_one(results):
+            return ""
+        return " Your result is the same on every draw, the right one is not: is it typed in, or made of other data?"
+
     def _makes_no_difference(self, k, draws, least=0):
         """Whether the k-th argument, taken from the next draw, changes the reference's results, never the student's."""
         tried = 0
@@ -601,10 +612,8 @@ class _Trial:
             side = cases.side_words(pairs)
             told = f"{told[:-1]}, and {side}." if side else told
             return told + self._right_parts() + self._example(*missed[0])
-        special, seen = self._special_case()
-        right = f"It was right on {len(pairs) - len(missed)} of {len(pairs)} draws: which case is special?"
-        if special:
-            right = f"On {seen} draws it was wrong {special}."
+        special = self._special_case()
+        right = special or f"It was right on {len(pairs) - len(missed)} of {len(pairs)} draws: which case is special?"
         return f"{told} {right}{self._example(*missed[0]) or f'{NOT_RIGHT}{self._call(missed[0][0])}'}"
 
     def _example(self, args, result, expected):
@@ -633,12 +642,12 @@ class _Trial:
         return len(sizes) > 1 and min(sizes) < MANY_DIGITS * worst.amount
 
     def _special_case(self):
-        """What the draws on which the answer is wrong have in common, fresh ones among them, and how many these are."""
+        """What the draws on which the answer is wrong have in common, fresh ones among them, as a sentence."""
         metric, rng = self.exercise.metric, np.random.default_rng(0)
         draws = [(args, pair[1], not m.equal(*pair)) for args, m, pair in self._cases()]
-        kind = self.budget.part()
+        kind = Budget(max(SPECIAL, self.budget.left()))
         for draw in itertools.islice(itertools.cycle(self.exercise.cases), MORE_DRAWS):
-            if not kind.left():
+            if kind.left() < SPECIAL / 2:
                 break  # a slow answer, perhaps in another process: it is not called more often than it must
             args = draw(rng)
             expected = self.exercise.reference(*copy.deepcopy(args))
@@ -646,8 +655,13 @@ class _Trial:
                 self.function, args, lambda result, e=expected: metric.admit(result, e), self.exercise.limit
             )
             draws.append((args, expected, run.error is not None or not metric.equal(run.result, expected)))
+        missed = [wrong for *_, wrong in draws]
         named = [(dict(zip(self._names(args), args)), expected) for args, expected, _ in draws]
-        return cases.case_words(named, [missed for _, _, missed in draws]), len(draws)
+        words = cases.case_words(named, missed)
+        if words is None or not words.startswith("exactly"):
+            given = [args for args, *_ in draws]
+            words = own_steps.condition_words(self.function, given, missed, kind) or words
+        return words and f"On {len(draws)} draws it was wrong {words}."
 
     def _call(self, args):
         given = ", ".join(f"{name}={_short(arg)}" for name, arg in zip(self._names(args), args))
@@ -711,6 +725,14 @@ def _fails(mistake, args):
     except Exception:
         return True
     return False
+
+
+def _are_one(results):
+    """Whether results are one and the same."""
+    try:
+        return all(_equal_arrays(result, results[0]) for result in results[1:])
+    except (TypeError, ValueError):  # no numbers, but words or a set of them
+        return all(type(result) in (str, set) and result == results[0] for result in results[1:])
 
 
 def _has_loop(function):
@@ -872,6 +894,8 @@ class Value(Item):
     digits:     a right answer may be rounded to so many significant digits, as a notebook prints it.
     mistakes:  functions without arguments that give a wrong value.
     of:        {name: function} of the data it is made of, by which a wrong answer may be known.
+    about:     function(answer) -> what follows from an answer that nothing else explains, beside what is asked for, in
+               a sentence.
     """
 
     reference: object
@@ -883,6 +907,7 @@ class Value(Item):
     metric: object = None
     digits: int = 3
     of: dict = field(default_factory=dict)
+    about: object = None
 
     def measure(self):
         expected = float(self.reference())
@@ -960,7 +985,15 @@ class Value(Item):
             return Outcome(NOT_YET, f"right as far as it goes: {least}, so hand over the computed value.")
         words = relations.difference_words(metric, [(answer, expected)]) or self._made_otherwise(answer)
         words = words or self._changed(metric, answer, expected) or relations.ratio_words(answer, expected)
+        words = words or self._follows(answer)
         return Outcome(NOT_YET, _closed(words) if words else self._which_way(answer, expected))
+
+    def _follows(self, answer):
+        """What would follow from the answer, in words; None where the Value does not tell, or nothing can."""
+        if self.about is None or not np.isfinite(answer).all():
+            return None
+        with contextlib.suppress(ValueError, ArithmeticError), np.errstate(all="ignore"):
+            return self.about(answer)
 
     def _changed(self, metric, answer, expected):
         """Which change of the solution's computation gives it."""

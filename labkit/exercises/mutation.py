@@ -63,6 +63,7 @@ WITHOUT = {
 COARSE, FINE = 1e-6, 1e-6  # from which on a bound or a step of differences may be too large, and what part of it is not
 FINER = -1  # the rank of what is made finer: few changes, tried by themselves, before others make loops without an end
 ROUNDS = 200  # of a loop, or ten times as many as it has: enough for what converges
+REPEATED = 1  # how unlikely a slip may be that is looked for in several places at once
 
 
 @dataclass(frozen=True)
@@ -133,6 +134,67 @@ def changes(function, most=4):
     return sorted(found, key=lambda change: change.rank)
 
 
+def _counted_by_loops(function):
+    """Changes of a whole number in brackets to the variable of a loop."""
+    loops = [n.target.id for n in ast.walk(function) if isinstance(n, ast.For) and isinstance(n.target, ast.Name)]
+    for owner in ast.walk(function):
+        for field, content in ast.iter_fields(owner):
+            if field == "slice" and isinstance(content, ast.Constant) and type(content.value) is int:
+                for name in dict.fromkeys(loops):
+                    new = ast.copy_location(ast.Name(name, ast.Load()), content)
+                    words = f"with {content.value} where `{name}` belongs"
+                    mends = f"{content.value} stands where `{name}` belongs"
+                    yield Change(words, mends, 2, content, ((owner, field, new),))
+
+
+def _everywhere(found):
+    """One change made at all places at once that look alike but for their names."""
+    alike = {}
+    for change in found:
+        if change.rank <= REPEATED and change.mends and isinstance(change.place, ast.expr):
+            alike.setdefault((change.words, _form(change.place), _form(_put(change))), []).append(change)
+    for group in alike.values():
+        sets = _together(group)
+        if sets is None or any(_holds(a.place, b.place) for a in group for b in group):
+            continue
+        first, *others = sorted(group, key=lambda change: (change.place.lineno, change.place.col_offset))
+        also = " and ".join(f"`{ast.unparse(other.place)}` (line {other.place.lineno})" for other in others)
+        yield Change(first.words, f"{first.mends}, and the same in {also}", first.rank, first.place, sets)
+
+
+def _put(change):
+    """What a change puts in the place of a part."""
+    owner, field, new = change.sets[0]
+    return next(n for o, n in zip(getattr(owner, field), new) if n is not o) if isinstance(new, list) else new
+
+
+def _together(group):
+    """What several changes set, in lists as well; None where there is one, or two of them change the same part."""
+    sets = {}
+    for change in group:
+        owner, field, new = change.sets[0]
+        _, _, before = sets.setdefault((id(owner), field), (owner, field, new))
+        if before is new:
+            continue
+        if not isinstance(new, list) or any(
+            a is not o and b is not o for o, a, b in zip(getattr(owner, field), before, new)
+        ):
+            return None
+        both = [b if a is o else a for o, a, b in zip(getattr(owner, field), before, new)]
+        sets[id(owner), field] = owner, field, both
+    return tuple(sets.values()) if len(group) > 1 else None
+
+
+def _form(node):
+    """What a part of the code looks like without the names of its values."""
+    return re.sub(r"\bid='(?!np'|math')\w+'", "id=''", ast.dump(node))
+
+
+def _holds(one, other):
+    """Whether a part of the code stands within another one."""
+    return one is not other and any(part is other for part in ast.walk(one))
+
+
 def _indices(function):
     """What stands in brackets, or on either side of a colon there: its sign says from which end is counted."""
     for node in ast.walk(function):
@@ -143,8 +205,12 @@ def _indices(function):
 
 
 def mending(function):
-    """What may mend a function: all single changes, and besides them bounds and steps made finer, loops made longer."""
-    return sorted([*_finer(function), *changes(function)], key=lambda change: change.rank)
+    """What may mend a function: all single changes, and besides them bounds and steps made finer, loops made longer, an
+    index that a loop should count, and one slip mended wherever it stands: who copies a line copies its slip.
+    """
+    found = changes(function)
+    found = [*_finer(function), *found, *_counted_by_loops(function), *_everywhere(found)]
+    return sorted(found, key=lambda change: change.rank)
 
 
 def _finer(function):

@@ -5,6 +5,7 @@ puts another in its place. Nothing of an exercise is known here: in `collect` th
 """
 
 import ast
+import contextlib
 import copy
 import functools
 import inspect
@@ -52,15 +53,14 @@ def _read(function):
     if not isinstance(function, types.FunctionType) or function.__code__.co_freevars:
         return None
     code = function.__code__
-    lines = linecache.getlines(code.co_filename, function.__globals__)[code.co_firstlineno - 1 :]
+    cell = linecache.getlines(code.co_filename, function.__globals__)
     try:
-        text = textwrap.dedent("".join(inspect.getblock(lines)))
+        text = textwrap.dedent("".join(inspect.getblock(cell[code.co_firstlineno - 1 :])))
         module = ast.parse(text)
-        again = next(c for c in compile(module, "", "exec").co_consts if isinstance(c, types.CodeType))
-    except (SyntaxError, ValueError, IndexError, StopIteration, RecursionError):
+    except (SyntaxError, ValueError, IndexError, RecursionError):
         return None
     node = module.body[0]
-    if not isinstance(node, ast.FunctionDef) or again.co_code != code.co_code or again.co_names != code.co_names:
+    if not isinstance(node, ast.FunctionDef) or not (_makes(text, code) or _makes("".join(cell), code)):
         return None
     names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
     names |= {n.attr for n in ast.walk(node) if isinstance(n, ast.Attribute)}  # what may write files stays as it is
@@ -68,6 +68,18 @@ def _read(function):
         return None
     ast.increment_lineno(module, code.co_firstlineno - 1)
     return _bare(node), {code.co_firstlineno + k: line for k, line in enumerate(text.splitlines())}
+
+
+def _makes(text, code):
+    """Whether a text is compiled to this code. A call of what is imported beside the function is compiled otherwise
+    than one of what was imported before, so that the whole cell may tell where the definition alone does not.
+    """
+    try:
+        made = compile(text, "", "exec")
+    except (SyntaxError, ValueError, RecursionError):  # a cell may hold what is no Python
+        return False
+    found = (c for c in made.co_consts if isinstance(c, types.CodeType) and c.co_name == code.co_name)
+    return any(c.co_code == code.co_code and c.co_names == code.co_names for c in found)
 
 
 def _bare(node):
@@ -108,8 +120,9 @@ class Written:
 
         A plan is ("code", number of a change), ("value", number of a place, number of one of `OTHERWISE`, number of an
         argument), ("own", number of a place, number of one of `OTHERWISE`, number of the place where a variable was
-        bound before) or ("given", number of a place, values in its place, one for every round). Where one fails, `keep`
-        gets None. The list is shorter where the time, in seconds, is over.
+        bound before), ("argument", number of an argument, number of one of `OTHERWISE`) or ("given", number of a place,
+        values in its place, one for every round). Where one fails, `keep` gets None. The list is shorter where the
+        time, in seconds, is over.
         """
         found = []
 
@@ -126,6 +139,9 @@ class Written:
             with np.errstate(all="ignore"):
                 if plan[0] == "code":
                     return (self._changed(plan[1])(*copies),)
+                if plan[0] == "argument":
+                    note = _Note(self.counted)
+                    return (self._made(self._noted, {NOTE: note})(*_given_otherwise(copies, *plan[1:])),)
                 note = _Note(self.counted, plan[1])
                 note.watched = plan[3] if plan[0] == "own" else None
                 note.otherwise = _otherwise(plan, copies, note)
@@ -165,6 +181,23 @@ class Written:
         guard.run(work, (), limit=seconds, author=self.function)
         self.counted = max(self.counted, PATIENCE * note.steps + STEPS) if note else STEPS
         return [_stacked(values) for values in kept]
+
+    def truths(self, draws, seconds):
+        """Of every draw: (number of a place, if ever true, if ever false, in how many rounds) of the conditions met.
+
+        The list is shorter where the time, in seconds, is over.
+        """
+        found = []
+
+        def work():
+            for args in draws:
+                note = _Truths(None)
+                with np.errstate(all="ignore"), contextlib.suppress(Exception):  # a draw on which it fails
+                    self._made(self._noted, {NOTE: note})(*copy.deepcopy(args))
+                found.append([(k, *met) for k, met in note.met.items()])
+
+        guard.run(work, (), limit=seconds, author=self.function)
+        return found
 
 
 def _stacked(values):
@@ -211,6 +244,20 @@ class _Note:
         return value
 
 
+class _Truths(_Note):
+    """Is told every value on the way, and keeps which conditions were true and which were false."""
+
+    def __init__(self, most):
+        super().__init__(most)
+        self.met = {}
+
+    def __call__(self, k, value):
+        if isinstance(value, bool | np.bool_):
+            true, false, rounds = self.met.get(k, (False, False, 0))
+            self.met[k] = true or bool(value), false or not value, rounds + 1
+        return value
+
+
 # What is put in the place of a value ------------------------------------------------------------------------------
 
 
@@ -225,6 +272,10 @@ def _otherwise(plan, args, note):
     if plan[0] == "own":
         return lambda value, turn: _like(value, change(_number(value), _number(note.seen)))
     return lambda value, turn: _like(value, change(_number(value), np.asarray(args[plan[3]], dtype=float)))
+
+
+def _given_otherwise(args, i, change):
+    return (*args[:i], _like(args[i], OTHERWISE[change][1](_number(args[i]))), *args[i + 1 :])
 
 
 def _number(value):

@@ -7,6 +7,7 @@ is where it goes wrong.
 
 import ast
 import functools
+import math
 import re
 from dataclasses import dataclass
 
@@ -23,6 +24,7 @@ ROWS = 4  # of a value that are looked at one by one
 NAMED = 4  # values that are told to be right, at most
 ANGLES = re.compile(r"rad|deg|angle|turn|rot|axis|axes|theta|phi|psi|sin|cos|tan|pose|frame", re.IGNORECASE)
 SCALED = ("half of it", "twice as much", "a thousand times as much", "a thousandth of it")  # what a choice may not tell
+CHANCE = 1000  # one case of so many may be chance
 BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with a number
 DECIMALS = re.compile(r"[<>]=? *\d*(\.\d+(e[+-]?\d+)?|e-\d+)$|[<>]=? *\d+e-\d+$")  # a comparison with such a number
 TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
@@ -212,7 +214,8 @@ class Search:
         ends = {k for k in places if self._ends(k)}
         words = self._turned_words(self._with_own(ends)) or self._turned_words(self._turned(ends))
         others = set(places) - ends
-        return words or self._turned_words(self._turned(others)) or self._turned_words(self._with_own(others))
+        words = words or self._turned_words(self._turned(others)) or self._turned_words(self._with_own(others))
+        return words or self._argument_words()
 
     def _ends(self, k):
         """Whether a value is the result on all draws on which that place is reached, the first among them."""
@@ -226,6 +229,19 @@ class Search:
         kind, k, change, other = plan
         name = "" if other is None else self.written.places[other][2] if kind == "own" else self.names[other]
         return f"{self._where(k)}: {rerun.OTHERWISE[change][0].format(name)}. {ALONE}"
+
+    def _argument_words(self):
+        """What is to be done with an argument before the first line, as it is read in several places."""
+        plans = []
+        for i in range(len(self.names)):
+            values = [rerun.numeric(case.args[i]) for case in self.cases]
+            if all(value is not None for value in values):
+                one = range(rerun.ALONE)
+                plans += [
+                    ("argument", i, change) for change in one if _changes(rerun.OTHERWISE[change][1], values[0], [])
+                ]
+        plan = self.mending(plans)
+        return plan and f"wherever you read `{self.names[plan[1]]}`: {rerun.OTHERWISE[plan[2]][0]}. {ALONE}"
 
     def _where(self, k):
         line, code, name, *_ = self.written.places[k]
@@ -397,8 +413,7 @@ class Search:
             return None
         units = self._units(solution)
         right = [
-            self._is_known(k, solution, False) or self._is_row(k, solution) or self._is_part_of_results(k)
-            for k in units
+            self._is_known(k, solution, False) or self._is_row(k, solution) or self._is_part(k, solution) for k in units
         ]
         known = units[: right.index(False)] if False in right else units
         if not known:
@@ -440,13 +455,19 @@ class Search:
                 return True
         return False
 
-    def _is_part_of_results(self, k):
-        """Whether a value is one entry or one column of the right results."""
+    def _is_part(self, k, solution):
+        """Whether a value is one entry or one column of the right results, or of a value that the solution has."""
         expected = [rerun.numeric(case.expected) for case in self.cases]
-        if any(e is None or not e.ndim or e.shape[-1] != expected[0].shape[-1] for e in expected):
+        if not any(e is None for e in expected) and self._is_column(k, [e[None] for e in expected]):
+            return True
+        return any(self._is_column(k, [values[q][1] for values in solution.values]) for q in solution.distinct)
+
+    def _is_column(self, k, wholes):
+        """Whether a value is, round by round, one entry along the last axis of others."""
+        if any(w.ndim < 2 or w.shape[-1] != wholes[0].shape[-1] for w in wholes):
             return False
-        columns = ([e[..., j][None] for e in expected] for j in range(min(expected[0].shape[-1], ENTRIES)))
-        return any(self._is_value(k, column) for column in columns)
+        entries = range(min(wholes[0].shape[-1], ENTRIES))
+        return any(self._is_value(k, [w[..., j] for w in wholes]) for j in entries)
 
     def _is_taken_out(self, k, solution):
         """Whether this is but a part, the length or the transpose of a value that is right."""
@@ -508,6 +529,50 @@ def _is_listing(code):
         return isinstance(ast.parse(code, mode="eval").body, ast.Tuple | ast.List)
     except SyntaxError:  # quoted in part
         return False
+
+
+@_or_nothing
+def condition_words(function, draws, missed, budget):
+    """Which condition in a student's own code was true, or false, wherever the result is wrong; None where none tells,
+    or where this may be chance.
+
+    Parameters
+    ----------
+    function : function
+    draws : list of tuple
+        Arguments.
+    missed : list of bool
+        On which of them the result is wrong.
+    budget : Budget
+    """
+    written = rerun.written(function)
+    if written is None:
+        return None
+    met = [
+        {(k, truth): n for k, *seen, n in conditions for truth in (0, 1) if seen[truth]}
+        for conditions in written.truths(draws, budget.left())
+    ]
+    if len(met) < len(draws):
+        return None
+    best = None
+    for place in sorted(set().union(*met)):
+        without = [i for i, found in enumerate(met) if place not in found]
+        if any(missed[i] for i in without) or _may_be_chance(len(draws), sum(missed), len(without)):
+            continue
+        if best is None or len(without) > best[0]:
+            best = len(without), place
+    if best is None:
+        return None
+    _, (k, truth) = best
+    line, code, *_ = written.places[k]
+    once = all(found.get((k, truth), 0) < 2 for found in met)
+    where = f"`{code}` (line {line}) was {'false' if truth else 'true'}{'' if once else ' in some round'}"
+    return f"{'exactly' if best[0] == len(draws) - sum(missed) else 'only'} where {where}: look at what happens then"
+
+
+def _may_be_chance(draws, missed, without):
+    """Whether so many draws might be right by chance, more often than once in some thousand cases."""
+    return not without or math.comb(draws, without) < CHANCE * math.comb(draws - missed, without)
 
 
 def value_relation(mine, theirs, named):

@@ -991,3 +991,13 @@ def test_what_stays_between_calls_is_told(function, words):
 
 def test_an_array_that_nobody_writes_into_is_not_overwritten():
     assert "overwrites" not in DOUBLE.judge(lambda v: BUFFER, rng=np.random.default_rng(0)).text
+
+
+def test_what_follows_from_a_value_is_told_where_nothing_else_is():
+    def about(answer):
+        return f"Its square is {answer**2:g}" if answer > 0 else f"Its root is {1 / 0}"
+
+    root = Value("root", reference=lambda: np.sqrt(7.3), hints=("a", "b", "c"), about=about)
+    assert root.judge(2.1).text == "Its square is 4.41."
+    assert root.judge(-2.1).text == "not this value, and it should have the other sign: the hints lead on."
+    assert root.judge(np.nan).status == NOT_YET

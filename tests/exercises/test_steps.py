@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from labkit.exercises import guard, metrics, rerun, session, steps
+from labkit.exercises.budget import Budget
 from labkit.exercises.engine import CORRECT, NOT_YET, Exercise
 
 
@@ -145,6 +146,91 @@ def test_running_again_leaves_arguments_globals_and_the_function_alone():
 )
 def test_what_cannot_be_read_again_is_left_alone(function):
     assert rerun.written(function) is None
+
+
+def test_a_cell_that_imports_what_its_function_calls_is_read_again():
+    lines = (
+        "import math",
+        "def formula(a, b):",
+        "    x = a / math.sqrt(a @ b)",
+        "    return 3 * np.linalg.norm(b - (b @ x) * x)",
+    )
+    cell = "\n".join(lines) + "\n"
+    linecache.cache["<a cell>"] = (len(cell), None, cell.splitlines(True), "<a cell>")
+    known = {"np": np}
+    exec(compile(cell, "<a cell>", "exec"), known)
+    positive = replace(ITEM, draw=lambda rng: (rng.uniform(1, 2, 3), rng.uniform(1, 2, 3)))
+    said = positive.judge(known["formula"], rng=np.random.default_rng(0)).text
+    assert said.startswith("in line 3, ")
+
+
+def sines(a, b):
+    return np.sin(a[0]) * np.sin(b[0]) + np.sin(a[1])
+
+
+def test_a_slip_that_is_made_wherever_a_line_is_copied_is_told_once():
+    item = replace(ITEM, reference=sines)
+    said = item.judge(typed("return np.cos(a[0]) * np.cos(b[0]) + np.sin(a[1])"), rng=np.random.default_rng(0)).text
+    assert said.startswith(
+        "in line 2, `np.cos(a[0])`: `cos` stands where `sin` belongs, and the same in `np.cos(b[0])`"
+    )
+
+
+def test_an_index_that_a_loop_should_count_is_told():
+    body = """
+    total = 0.0
+    for k in range(3):
+        total += a[k] * b[0]
+    return total
+    """
+    said = replace(ITEM, reference=lambda a, b: float(a @ b)).judge(typed(body), rng=np.random.default_rng(0)).text
+    assert said.startswith("in line 4, `0`: 0 stands where `k` belongs.")
+
+
+def test_what_is_to_be_done_with_an_argument_that_is_read_twice_is_told():
+    item = replace(ITEM, reference=lambda a, b: (b @ a / np.linalg.norm(a)) ** 2 + b[0] * a[1] / np.linalg.norm(a))
+    said = item.judge(typed("c = a @ b\nreturn c * (a @ b) + b[0] * a[1]"), rng=np.random.default_rng(0)).text
+    assert said.startswith("wherever you read `a`: it is to be divided by its length.")
+
+
+def test_the_condition_that_was_met_where_it_is_wrong_is_told():
+    body = """
+    best = 0.0
+    for k in range(3):
+        if a[k] * b[k] > 0.5:
+            return a[k] * b[k]
+        best = max(best, a[k] * b[k])
+    return best
+    """
+    item = replace(ITEM, reference=lambda a, b: max(0.0, (a * b).max()) + (((a * b) > 0.5).any() and 0.1 * a[0] ** 2))
+    said = item.judge(typed(body), rng=np.random.default_rng(0)).text
+    assert "draws it was wrong exactly where `a[k] * b[k] > 0.5` (line 4) was true in some round" in said
+
+
+def test_a_result_that_never_changes_is_told():
+    said = ITEM.judge(typed("return 3.7"), rng=np.random.default_rng(0)).text
+    assert "your function never uses `a`" in said
+    item = replace(ITEM, draw=lambda rng: ({"a": rng.normal()}, {"b": 1.0}), reference=lambda a, b: a["a"])
+    said = item.judge(typed("return 3.7 + 0 * len(a) * len(b)"), rng=np.random.default_rng(0)).text
+    assert "Your result is the same on every draw" in said
+
+
+def test_an_entry_of_a_right_value_is_right():
+    body = """
+    u, v = a[0] - 1.0, a[1] - 2.0
+    w = u + v
+    return w * w + 0.3 * np.sin(7 * b[0]) * b[1] ** 3
+    """
+    search = steps.search(typed(body), ["a", "b"], _cases(), None, Budget(1.0))
+    right = typed("d = a[:2] - np.array([1.0, 2.0])\nq = d @ d\nreturn q * b[2]")
+    solution = steps.Solution(rerun.written(right), search.cases, Budget(1.0))
+    assert "`w = u + v` in line 3 is the first" in search.agreement_words(solution)
+
+
+def _cases():
+    rng = np.random.default_rng(0)
+    draws = [(rng.normal(size=3), rng.normal(size=3)) for _ in range(4)]
+    return [steps.Case(args, ITEM.metric, 1.0, 2.0) for args in draws]
 
 
 def test_values_in_place_of_others_keep_their_kind():

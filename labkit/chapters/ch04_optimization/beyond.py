@@ -156,6 +156,30 @@ def never_looked_again(residual, jacobian, x, radius, steps):
     return x, radius
 
 
+def cost_of_the_start(residual, jacobian, x, radius, steps):
+    """The loop with the cost of the start in every gain ratio."""
+    first = residual(x) @ residual(x)
+    for _ in range(steps):
+        r, J = residual(x), jacobian(x)
+        g, B = J.T @ r, J.T @ J
+        step = bare_dogleg(g, B, radius)
+        new, length = residual(x + step), np.linalg.norm(step)
+        rho = 0.5 * (first - new @ new) / -(g @ step + 0.5 * step @ B @ step)
+        x = x + step if rho > ACCEPT else x
+        radius = rule(radius, length, rho)
+    return x, radius
+
+
+def until_rejected(residual, jacobian, x, radius, steps):
+    """The loop, ended by the first step that is taken back."""
+    for _ in range(steps):
+        before = x
+        x, radius = descend(residual, jacobian, x, radius, 1)
+        if x is before:
+            break
+    return x, radius
+
+
 def _problem(rng):
     """Residuals and their Jacobian: the two wells, or waves in two to four unknowns; and a start."""
     if rng.random() < 0.3:

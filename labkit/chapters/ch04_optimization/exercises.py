@@ -40,10 +40,10 @@ def classify_extremum(g, H):
     return _by(np.linalg.eigvalsh)(H)
 
 
-def kind_of_point(rng, bends, length, signs=(1, -3), angle_deg=(30, 60)):
+def kind_of_point(rng, bends, length, signs=(1, -3), angle_deg=(30, 60), between=(0.9, 1.1)):
     """Gradient of this length and Hessian that bends up (1) or down (-1) a little and much along two turned axes."""
     eigenvalues = np.array([rng.uniform(0.5, 1.0), rng.uniform(4.0, 8.0)]) * bends
-    g = rng.uniform(0.9, 1.1, 2) * signs
+    g = rng.uniform(*between, 2) * signs
     return rng.uniform(*length) * g / np.linalg.norm(g), turned(eigenvalues, np.deg2rad(rng.uniform(*angle_deg)))
 
 
@@ -58,6 +58,8 @@ KINDS = (
     functools.partial(kind_of_point, bends=BOWL, length=(1.1e-6, 1.2e-6), signs=(1, -1)),  # each entry is below it
     *(functools.partial(kind_of_point, bends=BOWL, length=l) for l in ((2e-6, 5e-6), (2e-5, 5e-5), (2e-4, 5e-4))),
     functools.partial(kind_of_point, bends=BOWL, length=(2e-3, 5e-3)),
+    functools.partial(kind_of_point, bends=BOWL, length=STEEP, signs=(1, -1), between=(1, 1)),  # its entries cancel
+    functools.partial(kind_of_point, bends=BOWL, length=STEEP, signs=(0, 1)),  # along one axis
 )
 
 
@@ -326,6 +328,12 @@ def _dogleg(
         return p + share(way @ way, p @ way, p @ p - rim_term(radius)) * way
 
     return variant
+
+
+def _slope_there(x):
+    """Whether a place is stationary, as a sentence."""
+    slope = np.linalg.norm(wells.gradient(x))
+    return f"There the gradient is {slope:.3g} long. At a saddle it vanishes"
 
 
 CHAPTER = Chapter(
@@ -650,6 +658,16 @@ CHAPTER = Chapter(
                     "You compare each entry with 1e-6. Both may be smaller while |g|, the root of the sum of their squares, is larger.",
                     id="classify-entries",
                 ),
+                Mistake(
+                    _stationary(_by(np.linalg.eigvalsh), lambda g: abs(g.sum()) > 1e-6),
+                    "You add the entries of g, and where they have opposite signs they cancel: |g| is the root of the sum of their squares.",
+                    id="classify-sum",
+                ),
+                Mistake(
+                    _stationary(_by(np.linalg.eigvalsh), lambda g: (np.abs(g) > 1e-6).all()),
+                    "In effect both entries of g must be large. A gradient along one axis has an entry that is 0, and is not small: take the length |g|.",
+                    id="classify-all",
+                ),
                 *(
                     Mistake(
                         _stationary(_by(np.linalg.eigvalsh), lambda g, limit=limit: np.linalg.norm(g) > limit),
@@ -758,6 +776,11 @@ CHAPTER = Chapter(
                 ),
                 Mistake(lambda g, H: -g, "That is steepest descent: H is not used at all."),
                 Mistake(
+                    lambda g, H: -(g @ g) / (g @ H @ g) * g,
+                    "This is the stationary point of the model along g alone, a step of steepest descent. Newton's step solves H h = −g: in all directions at once.",
+                    id="newton-along-g",
+                ),
+                Mistake(
                     lambda g, H: -(1 / H) @ g,
                     "`H**-1` inverts each entry by itself. The inverse matrix is `np.linalg.inv(H)`; better solve the system.",
                 ),
@@ -790,6 +813,7 @@ CHAPTER = Chapter(
             "saddle",
             reference=lambda: wells.extrema()[2].x,
             metric=metrics.Numbers(1e-3),
+            about=_slope_there,
             hints=(
                 "Close to a place where the gradient vanishes Newton goes there, whatever its kind.",
                 "Start at (0, 0) and repeat x = x + newton_step(gradient(x), hessian(x)) until x stands still. If it runs away, start between the wells.",
@@ -1461,6 +1485,25 @@ CHAPTER = Chapter(
                     beyond.loop(stale=True),
                     "J is computed once, at the start. It belongs to where you stand: compute it in every round.",
                     id="region-stale",
+                ),
+                Mistake(
+                    beyond.cost_of_the_start,
+                    "You compare every new cost with that of the start. The gain of a step is counted from where it begins: take the cost anew in each round.",
+                    id="region-first-cost",
+                ),
+                Mistake(
+                    beyond.loop(
+                        follow=lambda radius, length, rho: (
+                            beyond.rule(radius, length, rho) if rho > beyond.ACCEPT else radius
+                        )
+                    ),
+                    "Your radius changes only where the step is taken. After one that is taken back it must shrink, or the same step is tried again.",
+                    id="region-only-taken",
+                ),
+                Mistake(
+                    beyond.until_rejected,
+                    "You stop at the first step that is taken back. It shrinks the radius, and the next round tries a shorter one: go on for all rounds.",
+                    id="region-stops",
                 ),
                 Mistake(
                     beyond.loop(step_of=opt.cauchy_step),

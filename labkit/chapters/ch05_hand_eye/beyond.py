@@ -134,6 +134,15 @@ def length_with(*args, **kwargs):
     return float(np.linalg.norm(marks_with(*args, **kwargs)))
 
 
+def place_error():
+    """How far a mark comes out from its true place with the CAD pose, mm: both by as much."""
+    measured = thesis.measurements(True)
+    truth = hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S).T_FS
+    T_BF, x_S = robot_accuracy.looking_down_at(GAUGE, truth, np.deg2rad([0.0, 180.0]))
+    found = frames.transform(T_BF, frames.transform(thesis.frame("scanner_start"), x_S))
+    return float(np.linalg.norm(found[0] - GAUGE[0]))
+
+
 def _height(change):
     """Something else made of the tangents of both angles and the base."""
     return lambda alpha, beta, base: change(np.tan(alpha), np.tan(beta), base)
@@ -433,6 +442,11 @@ CAD_LENGTH = Value(
             id="length-difference",
         ),
         Mistake(
+            place_error,
+            "This is how far a mark is off its place. Asked for is the distance between both marks, as the CAD pose gives it.",
+            id="length-place",
+        ),
+        Mistake(
             lambda: length_with("scanner_start", 90.0),
             "This is the length after a quarter turn. The poses `turned` differ by half a turn.",
             id="length-quarter",
@@ -471,6 +485,11 @@ TRIANGULATION = [
                 _height(lambda a, b, L: L * (1 / a + 1 / b)),
                 "You multiplied by the sum of 1/tan: L = H (1/tan α + 1/tan β), so H is L divided by it.",
                 id="height-inverse",
+            ),
+            Mistake(
+                lambda alpha, beta, base: base * np.tan(alpha) * np.tan(beta) / np.tan(alpha + beta),
+                "The sum of two tangents is not the tangent of the sum: L tan α tan β/(tan α + tan β).",
+                id="height-tangent-of-sum",
             ),
             Mistake(
                 _height(lambda a, b, L: L / (a + b)),

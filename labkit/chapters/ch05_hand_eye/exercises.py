@@ -1,6 +1,7 @@
 """Chapter 5: hand-eye calibration of a line scanner, from one scan line to 31 audited poses."""
 
 import functools
+from collections import Counter
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -418,7 +419,9 @@ class named_entries(metrics.Exactly):
 
     def deviations(self, result, expected):
         missed, accused = len(expected - result), len(result - expected)
-        return [Count("misprints are not named yet", missed), Count("entries are accused wrongly", accused)]
+        rows = Counter((table, pose) for table, pose, _ in result)
+        whole = " (several of one row: one slip a row is meant)" if max(rows.values(), default=0) > 1 else ""
+        return [Count("misprints are not named yet", missed), Count(f"entries are accused wrongly{whole}", accused)]
 
 
 # --- designing poses -------------------------------------------------------------------------------------------------
@@ -506,6 +509,12 @@ def _rms_of_end_pose(*fixed):
     return float(hand_eye.rms_distance(residuals))
 
 
+def _rms_of_linear_start():
+    measured = thesis.measurements(ALL_FIXED)
+    T_FS, target = hand_eye.linear_start(measured.T_BF, measured.x_S)
+    return float(hand_eye.rms_distance(frames.transform(measured.T_BF @ T_FS, measured.x_S) - target))
+
+
 def _vectors_of_end_pose():
     measured = thesis.measurements((2,))
     return _residual(thesis.frame("scanner_end"), measured.T_BF, measured.x_S, thesis.printed_target())
@@ -572,6 +581,14 @@ def _rms_with_radius(R):
 def _shallower_radius():
     """The second minimum of the rms, where the circle of pose 4 is larger than the sphere."""
     return float(minimize_scalar(_rms_with_radius, bounds=(29.9, 29.97), method="bounded").x)
+
+
+def _rms_beside(R):
+    """What a fit of the scanner and the center leaves with a wrong radius, beside the least, as a sentence."""
+    if not 29 < R < 31:
+        return None
+    least, here = _rms_with_radius(_fitted_radius()), _rms_with_radius(R)
+    return f"With this radius the fit of scanner and center leaves {here:.4f} mm rms. The least that a radius leaves is {least:.4f} mm"
 
 
 @functools.cache
@@ -1057,7 +1074,7 @@ CHAPTER = Chapter(
                 "return {(e.table, e.pose, e.column) for e in best}`",
             ),
             mistakes=[
-                Mistake(_by_plain_least_squares, "This is all that a plain least-squares fit shows: its grossest slip bends it so far that the others hide. Fit robustly."),
+                Mistake(_by_plain_least_squares, "This is all that a plain least-squares fit shows: its grossest slip bends it so far that the others hide. Fit robustly, and take every pose that stands out, not the worst alone.", id="find_misprints-389b20"),
                 Mistake(_too_strict, "You accuse poses that are merely noisy. Among 31 poses some exceed 2.5 standard deviations by chance; take 6."),
                 Mistake(_all_explanations, "You name every entry that could be changed. One slip per row: take the most credible explanation."),
                 Mistake(lambda entries: {(r["table"], r["pose"], r["column"]) for r in thesis.corrections()},
@@ -1087,6 +1104,7 @@ CHAPTER = Chapter(
                 Mistake(_rms_with_printed_target, "Here the thesis's sphere center was held fixed. Free it."),
                 Mistake(lambda: _joint_rms(2), "Only pose 2 is repaired in this fit. Use all corrections."),
                 Mistake(lambda: corrected_fit().std, "This is the estimated noise of one coordinate, with 84 degrees of freedom. Asked for is the rms distance."),
+                Mistake(_rms_of_linear_start, "This is the rms at the linear start, which takes R_FS for any nine numbers. Iterate from there: `hand_eye.calibrate_sphere_target`.", id="rms_after-linear"),
                 Mistake(lambda: _rms_of_end_pose(*ALL_FIXED), "These are the corrected data under the thesis's end pose. Fit scanner and center anew."),
                 Mistake(_joint_rms, "These are the tables as printed, with all their slips. Use `corrected`."),
                 Mistake(lambda: _joint_rms(*ALL_FIXED) ** 2, "This is the mean square: take its root."),
@@ -1099,6 +1117,7 @@ CHAPTER = Chapter(
             reference=lambda: _fitted_radius(),
             unit="mm",
             rtol=2e-4,  # to 0.01 mm
+            about=lambda R: _rms_beside(R),
             hints=(
                 "Every y was computed as sqrt(30^2 - r^2). Another radius moves all centers along y, and some radius fits best.",
                 "`thesis.centers_with_radius(x_S, R)` gives the centers for another R: try a grid, or make R a tenth unknown.",

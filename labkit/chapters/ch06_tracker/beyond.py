@@ -4,6 +4,7 @@ import functools
 import itertools
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from ...documents.report.printed import COLUMNS, table_d
 from ...exercises import metrics
@@ -181,6 +182,12 @@ def _knock(course="after stop 10"):
     return 2.0 * 1000 * table_d().mean[COLUMNS.index("E_trans")] / found.E_trans
 
 
+def _e_trans_of_a_turn(turn):
+    """What E_trans a turn after stop 10 makes, as a sentence."""
+    printed = 1000 * table_d().mean[COLUMNS.index("E_trans")]
+    return f"A turn of {turn:.3g} mrad after stop 10 makes an E_trans of about {printed * turn / _knock():.2g} mm, not {printed:.3f} mm"
+
+
 # Errors over speed -----------------------------------------------------------------------------------------------------------
 
 
@@ -205,6 +212,19 @@ def _line(x, y, end=lambda intercept, slope: (np.sqrt(intercept), np.sqrt(slope)
         return tuple(map(float, end(intercept, slope)))
 
     return variant
+
+
+def _ends_alone(speed, error):
+    """The law through the first reading and the last."""
+    slope, intercept = np.polyfit(speed[[0, -1]] ** 2, error[[0, -1]] ** 2, 1)
+    return float(np.sqrt(intercept)), float(np.sqrt(slope))
+
+
+def _fitted_to_errors(speed, error):
+    """The law with the least squares of the errors themselves."""
+    start = np.sqrt(np.maximum(np.polyfit(speed**2, error**2, 1)[::-1], 1e-6))
+    found = least_squares(lambda u: np.hypot(u[0], u[1] * speed) - error, start, x_scale=start, xtol=1e-14, ftol=1e-14)
+    return tuple(map(float, np.abs(found.x)))
 
 
 def _square(v):
@@ -451,6 +471,7 @@ STATIONS = [
         reference=_knock,
         unit="mrad",
         rtol=0.05,
+        about=_e_trans_of_a_turn,
         digits=2,
         hints=(
             "Set the figure to *after stop 10* and move the knob until E_trans is 0.80 mm.",
@@ -536,6 +557,16 @@ SPEEDS = [
                 _line(_square, _square, lambda i, s: (np.sqrt(i), 1000 * np.sqrt(s))),
                 "The lag is in milliseconds; wanted are seconds.",
                 id="static_error_and_lag-milliseconds",
+            ),
+            Mistake(
+                _ends_alone,
+                "You use the first reading and the last alone, with all their noise. A least-squares line takes all of them.",
+                id="static_error_and_lag-ends",
+            ),
+            Mistake(
+                _fitted_to_errors,
+                "Here the errors themselves are fitted by least squares. Asked for are the squares of the errors, against those of the speed: a line.",
+                id="static_error_and_lag-errors",
             ),
             Mistake(
                 _line(_square, _square, lambda i, s: (np.sqrt(i), s)),
@@ -831,6 +862,16 @@ CELL = [
                 for source in ("scanner", "tip", "marks", "first reading")
             ),
             Mistake(lambda: budget()[1], "This is the total as it is.", id="halved-not"),
+            Mistake(
+                lambda: _improved(0.25),
+                "This is with a quarter of that source's standard deviation. Four times as many readings halve it.",
+                id="halved-quarter",
+            ),
+            Mistake(
+                lambda: sum(budget()[0].values()) - max(budget()[0].values()) / 2,
+                "You added the standard deviations. The sources know nothing of each other: their squares add.",
+                id="halved-sum",
+            ),
             Mistake(
                 lambda: float(np.sqrt(budget()[1] ** 2 - budget()[0]["tracker"] ** 2 / 4)),
                 "You took away a quarter of its variance. Half of the standard deviation leaves a quarter: three quarters go.",

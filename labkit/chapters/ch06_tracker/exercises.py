@@ -270,6 +270,11 @@ def spoiled(rng, factor):
     return rng.permutation(50 + rng.uniform(0.5, 2) * values), factor
 
 
+def all_equal(rng):
+    """Readings without any noise: each lies at the median, and so within any limit, 0 as well."""
+    return np.full(int(rng.integers(5, 40)), rng.uniform(-50, 50)), float(rng.uniform(2, 6))
+
+
 class KeptOrNot(metrics.Exactly):
     """True or False for each value; says how many are kept or refused wrongly."""
 
@@ -1110,6 +1115,11 @@ CHAPTER = Chapter(
             reference=reject_outliers,
             draw=tuple(functools.partial(spoiled, factor=factor) for factor in (4.0, 3.0, 5.0)),
             metric=KeptOrNot(),
+            noisy=(
+                all_equal,
+                KeptOrNot(),
+                "Right as long as the values differ. Where all are equal, each lies at the median, at a distance of 0, and 0 is within a limit of 0:",
+            ),
             hints=(
                 "Measure how far each value is from the middle, in units of a spread. Outliers must move neither of the two.",
                 "Middle: the median. Spread: 1.4826 times the median of the distances from it; for normal noise that is a standard deviation.",
@@ -1281,6 +1291,11 @@ CHAPTER = Chapter(
                     id="spread-196c75",
                 ),
                 Mistake(lambda: _heights().var(), "This is the variance, in square millimeters. Its root is wanted."),
+                Mistake(
+                    lambda: np.std([np.linalg.norm(m.T_FE[:3, 3]) for m in synthetic_mountings()]),
+                    "This is the scatter of the distances from the flange. Asked for is that of their height z, `mountings[:, 2, 3]`.",
+                    id="spread-distance",
+                ),
                 Mistake(
                     lambda: _heights().var(ddof=1),
                     "This is a variance, in square millimeters, and divided by 5. Divide by 6 and take the root.",
