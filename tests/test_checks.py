@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from labkit import checks
-from labkit.calibration import ax_xb, hand_eye, motion, own_data, pivot, planning, robust, sphere
+from labkit.calibration import advice, ax_xb, hand_eye, motion, own_data, pivot, planning, robust, sphere
 from labkit.calibration.literature import compare_methods, kim_linear, li_two_step
 from labkit.documents.lecture import printed as lecture
 from labkit.documents.lecture.examples import reconstruct_vehicle
@@ -26,7 +26,7 @@ from labkit.localization.drives import find_route, follow
 from labkit.localization.ekf import unscented_predict, unscented_update
 from labkit.localization.locate import locate, place_readings
 from labkit.localization.sensors import LikelihoodField, Scanner, beam_density, see_landmarks, weigh_doors
-from labkit.machines import simulation, udp
+from labkit.machines import robot_accuracy, simulation, stations, udp
 from labkit.machines.arm import (
     HOME,
     TX40,
@@ -43,6 +43,7 @@ from labkit.machines.log import mean_pose, reject_outliers
 from labkit.machines.mounting import e_rot, e_trans
 from labkit.machines.packet import encode_packet, packet_from_pose
 from labkit.machines.tracking import filter_positions, shift_time, speeds, summarize, time_offset, tracking_errors
+from labkit.machines.triangulation import place_from_angles
 
 I3, I4, O2, O3 = np.eye(3), np.eye(4), np.zeros(2), np.zeros(3)
 POSES = np.tile(I4, (5, 1, 1))
@@ -311,7 +312,14 @@ REFUSED = [
         r"retract must keep the shape of x, \(2,\), got \(3,\)",
     ),
     (lambda: wells.which([np.nan, 0.0]), "x must be finite"),
-    # calibration, geometry
+    # calibration, geometry, machines
+    (lambda: reach_position(TX40, O3, np.zeros(6), joints=[]), "joints must name at least one"),
+    (lambda: reach_position(TX40, O3, np.zeros(6), joints=[6]), "joints must lie from 0 to 5, got 6 to 6"),
+    (lambda: robot_accuracy.drive(np.zeros((3, 3)), 0.1, robot_accuracy.RobotErrors(offset=O2), rng()), "of offset"),
+    (lambda: stations.poses_from_angles([I4], I3, np.zeros((0, 1, 3, 2)), np.zeros((0, 4, 4))), "at least one pose"),
+    (lambda: place_from_angles(["a"], 1.0, 1.0), "alpha must hold real numbers, got text"),
+    (lambda: advice.refuse_one_axis([I4], name=O3), "name must be of type str"),
+    (lambda: sphere.sphere_center_from_profile(O3, O3, 30.0, [1.0, [2.0]]), r"side must be \+1 or -1"),
     (lambda: odometry.chord(np.ones(5), np.ones(2), 0.1, "arc"), r"must be equal or broadcast, got \(5,\) of v"),
     (lambda: pivot.pivot_residuals([I4], np.zeros((2, 3)), O3), r"tip must have shape \(3,\), got \(2, 3\)"),
     (lambda: pivot.as_poses([I4], np.datetime64("now")), "at_least must hold real numbers, got dates"),

@@ -83,8 +83,16 @@ def axis_spread(T):
     return np.sqrt(np.maximum(values[::-1], 0.0)), vectors[:, ::-1]
 
 
+@documented
 def refuse_one_axis(T, name="the flange"):
-    """Refuse poses that turn about one axis only, or not at all: they leave a direction free."""
+    """Refuse poses that turn about one axis only, or not at all: they leave a direction free.
+
+    Parameters
+    ----------
+    T : array-like, shape (n, 4, 4)
+    name : str
+        What turns, for the sentence.
+    """
     spread, axes = axis_spread(T)
     if spread[0] < LEAST_TURN:
         raise ValueError(

@@ -7,6 +7,7 @@ Sensor-Roboter-Systemen", HAW Hamburg 2019, section 6.4.3, listings C15 and C16.
 """
 
 import math
+import numbers
 from functools import cached_property
 
 import numpy as np
@@ -45,7 +46,7 @@ class Circle(Result):
     std : float
         Of a point across the arc, given or estimated (mm); NaN without redundancy.
     covariance : array, shape (3, 3)
-        Of x, z and radius (mm^2).
+        Of x, z and radius (mm^2); NaN without redundancy.
     singular_values : array, shape (3,)
         Of the Jacobian, largest first.
     """
@@ -81,7 +82,10 @@ class Circle(Result):
 
 @result_class
 class Sphere(Circle):
-    """Sphere through points: like `Circle`, with the center (3,) and the covariance (4, 4) of x, y, z and radius."""
+    """Sphere through points: like `Circle`, with the center (3,) and the covariance (4, 4) of x, y, z and radius.
+
+    Standard deviation and covariance are NaN where four points leave no redundancy.
+    """
 
     parameters = (*point_parameters("center"), Parameter("radius", "mm"))
 
@@ -263,8 +267,8 @@ def sphere_center_from_profile(x, z, radius, side):
 
 
 def _refuse_side(side):
-    if np.ndim(side) or side not in (1, -1):
-        got = kind(side) if np.ndim(side) else repr(side)
+    if not isinstance(side, numbers.Real) or side not in (1, -1):
+        got = repr(side) if isinstance(side, numbers.Real | str) else kind(side)
         raise ValueError(f"side must be +1 or -1, the sign of the center's y coordinate, got {got}")
 
 

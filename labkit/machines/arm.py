@@ -16,6 +16,7 @@ from scipy.interpolate import CubicSpline
 from ..checks import (
     as_count,
     as_finite,
+    as_indices,
     as_number,
     as_points,
     as_positive_number,
@@ -518,12 +519,12 @@ def reach_position(robot, position, start, joints=(0, 1, 2), iterations=40):
     Raises
     ------
     ValueError
-        A joint that the robot has not.
+        A joint that the robot has not, or none.
     """
     position, q = as_shape(position, "position", 3), np.array(as_shape(start, "start", len(robot.dh)))
-    joints = [int(k) for k in joints]
-    if not set(joints) <= set(range(len(q))):
-        raise ValueError(f"joints must lie between 0 and {len(q) - 1}, got {joints}")
+    joints = as_indices(joints, "joints", below=len(q))
+    if not len(joints):
+        raise ValueError("joints must name at least one, got none")
     best, best_size = q.copy(), np.inf
     for _ in range(iterations):
         frames = link_frames(robot.dh, q)

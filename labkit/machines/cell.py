@@ -405,7 +405,8 @@ def with_errors(cell, job, errors):
     known = source_covariances(cell, job)
     e = {name: np.zeros(len(cov)) for name, cov in known.items()}
     for name, error in errors.items():
-        e[as_choice(name, "errors", known)] = as_points(error, name, len(known[name]))
+        as_choice(name, "errors", known)
+        e[name] = as_points(error, name, len(known[name]))
     marks = job.marks + e["marks"].reshape(*e["marks"].shape[:-1], 3, 3)
     return (
         replace(cell, tip=cell.tip + e["tip"], T_FS=moved(cell.T_FS, e["scanner"]),

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..calibration.planning import DOWN, poses_that_see
-from ..checks import as_count, as_nonnegative, as_positive_number, as_shape, as_transforms
+from ..checks import as_count, as_nonnegative, as_positive_number, as_shape, as_transforms, fit_together
 from ..documented import documented
 from ..geometry.lie import exp_so3
 
@@ -169,6 +169,7 @@ def drive(command, dt, errors, rng, n=1):
     paths : array, shape (n, k, d), mm
     """
     command, dt, n = as_shape(command, "command", "k", "d"), as_positive_number(dt, "dt"), as_count(n, "n")
+    fit_together(command=command.shape[1:], offset=np.shape(errors.offset))
     share = 1.0 if errors.lag == 0 else -np.expm1(-dt / errors.lag)
     path = command.copy()
     for k in range(1, len(command)):

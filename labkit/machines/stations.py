@@ -352,6 +352,8 @@ def poses_from_angles(T_WL, diodes, angles, start):
     angles, T = as_finite(angles, "angles"), as_transforms(start, "start").copy()
     if len(diodes) < 3:
         raise ValueError(f"at least three diodes fix a pose, got {len(diodes)}")
+    if not T.size:
+        raise ValueError(f"start must hold at least one pose, got shape {T.shape}")
     if angles.shape != (*T.shape[:-2], len(T_WL), len(diodes), 2):
         raise ValueError(f"angles must have shape (..., {len(T_WL)}, {len(diodes)}, 2), got {angles.shape}")
     size = np.linalg.norm(T_WL[:, :3, 3], axis=-1).max()

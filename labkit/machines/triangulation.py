@@ -120,5 +120,5 @@ def place_from_angles(alpha, beta, base):
     -------
     place : array, shape (..., 2), mm
     """
-    height = height_from_angles(alpha, beta, base)
+    height, alpha = height_from_angles(alpha, beta, base), as_finite(alpha, "alpha")
     return np.stack([height * np.cos(alpha) / np.sin(alpha), height], axis=-1)

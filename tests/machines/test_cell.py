@@ -145,3 +145,8 @@ def test_the_robot_reaches_all_of_it(now, touched):
         reached |= inverse_kinematics(TX40, goals, start)[1]
         reached |= inverse_kinematics(TX40, goals, HOME + [0, 0, 0, 0, 0, turn])[1]
     assert reached.all()
+
+
+def test_an_error_of_a_source_that_there_is_not_is_refused():
+    with pytest.raises(ValueError, match="errors must be one of .*tip.* got 'other'"):
+        cells.with_errors(CELL, cells.simulated_job(cells.place_on_table(0.0, 0.0, 0.0)), {"other": np.zeros(3)})
