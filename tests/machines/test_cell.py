@@ -149,4 +149,4 @@ def test_the_robot_reaches_all_of_it(now, touched):
 
 def test_an_error_of_a_source_that_there_is_not_is_refused():
     with pytest.raises(ValueError, match="errors must be one of .*tip.* got 'other'"):
-        cells.with_errors(CELL, cells.simulated_job(cells.place_on_table(0.0, 0.0, 0.0)), {"other": np.zeros(3)})
+        cells.with_errors(CELL, job(), {"other": np.zeros(3)})
