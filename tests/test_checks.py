@@ -312,7 +312,14 @@ REFUSED = [
         r"retract must keep the shape of x, \(2,\), got \(3,\)",
     ),
     (lambda: wells.which([np.nan, 0.0]), "x must be finite"),
+    (
+        lambda: optimization.gauss_newton(lambda x: O3 + 1, lambda x: I3, np.zeros(6)),
+        r"x has shape \(6,\), but its derivatives are by 3 unknowns",
+    ),
     # calibration, geometry, machines
+    (lambda: gaussian.density(np.ones(7), np.ones(2), 1.0), r"got \(7,\) of x, \(2,\) of mean"),
+    (lambda: chaining.expected_heights([[I4] * 2] * 3, 0.1, 0.1), r"transforms must have shape \(4, 4\)"),
+    (lambda: propagation.product_jacobians([I4] * 3, [I4] * 2), "of T_AB, .* of T_BC"),
     (lambda: reach_position(TX40, O3, np.zeros(6), joints=[]), "joints must name at least one"),
     (lambda: reach_position(TX40, O3, np.zeros(6), joints=[6]), "joints must lie from 0 to 5, got 6 to 6"),
     (lambda: robot_accuracy.drive(np.zeros((3, 3)), 0.1, robot_accuracy.RobotErrors(offset=O2), rng()), "of offset"),

@@ -58,8 +58,9 @@ def density(x, mean, std):
     ValueError
         A standard deviation that is not positive.
     """
-    std = as_positive_number(std, "std")
-    return np.exp(-0.5 * ((as_finite(x, "x") - as_finite(mean, "mean")) / std) ** 2) / (std * np.sqrt(2 * np.pi))
+    x, mean, std = as_finite(x, "x"), as_finite(mean, "mean"), as_positive_number(std, "std")
+    fit_together(x=x.shape, mean=mean.shape)
+    return np.exp(-0.5 * ((x - mean) / std) ** 2) / (std * np.sqrt(2 * np.pi))
 
 
 def chi_square_quantile(probability, dof):

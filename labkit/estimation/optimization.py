@@ -565,6 +565,8 @@ def _is_finite(point):
 
 def _retracted(retract, x, step):
     """The unknowns after a step; refuses what is of another shape than before it."""
+    if retract is np.add and np.shape(step) != np.shape(x):
+        raise ValueError(f"x has shape {np.shape(x)}, but its derivatives are by {len(step)} unknowns")
     new = as_floats(retract(x, step), "what retract returns")
     if new.shape != np.shape(x):
         raise ValueError(f"retract must keep the shape of x, {np.shape(x)}, got {new.shape}")

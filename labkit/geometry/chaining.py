@@ -323,7 +323,7 @@ def expected_heights(transforms, std_rot, std_trans):
         Standard deviations, 0 for the first frame.
     """
     std_rot, std_trans = _noise(std_rot, std_trans)
-    origins = stations(transforms)[:, :2, 3]
+    origins = stations([as_shape(T, "transforms", 4, 4) for T in _links(transforms)])[:, :2, 3]
     levers = np.linalg.norm(origins[:, None] - origins, axis=-1)
     turned = np.tril(levers**2)[:, 1:].sum(1)  # a link's turn stands at its end, and moves what follows
     return np.sqrt(np.arange(len(origins)) * std_trans**2 + std_rot**2 * turned)

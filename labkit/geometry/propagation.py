@@ -47,6 +47,7 @@ def product_jacobians(T_AB, T_BC):
         e_AC = J_AB e_AB + J_BC e_BC. A turn of the first factor moves the end by its lever, t_BC.
     """
     T_AB, T_BC = as_transforms(T_AB, "T_AB"), as_transforms(T_BC, "T_BC")
+    fit_together(T_AB=T_AB.shape[:-2], T_BC=T_BC.shape[:-2])
     (R, _), (S, t) = ((T[..., :3, :3], T[..., :3, 3]) for T in (T_AB, T_BC))
     return _blocks(np.swapaxes(S, -1, -2), -R @ skew(t), np.eye(3)), _blocks(np.eye(3), np.zeros((3, 3)), R)
 
