@@ -12,15 +12,33 @@ from pygments.lexers import PythonLexer
 FORMULA = r"\$(?!\s)(?P<formula_tex>(?:\\\$|[^$`])+?)(?<!\s)\$(?!\d)"
 DISPLAYED = r"^ {0,3}\$\$(?P<displayed_tex>[\s\S]+?)\$\$[ \t]*$"
 NOTEBOOK = re.compile(r"(?:\.\./notebooks/|\./)?(\d\d_\w+)\.ipynb")
+ALIGNED = re.compile(r"\\(begin|end)\{aligned\}")
+EQUALS = "<mo>&#x0003D;</mo>"
 
 
 def mathml(tex, block=False):
     """A formula in LaTeX as MathML; raises ValueError for one that holds a word it does not know."""
-    made = convert(tex.strip(), display="block" if block else "inline")
-    unknown = re.search(r"\\[A-Za-z]+", made)
+    known = ALIGNED.sub(r"\\\1{align*}", tex.strip())  # lines up the same; the converter prints the marks of the other
+    made = convert(known, display="block" if block else "inline")
+    unknown = re.search(r"\\[A-Za-z]+|(?<=>)&(?=<)", made)
     if unknown:
         raise ValueError(f"the formula {tex!r} holds {unknown[0]}, which MathML cannot be made of")
-    return made
+    return made if block else _breakable(made)
+
+
+def _breakable(made):
+    """A formula within a line as one for each side of its equal signs, so that the line can end before one."""
+    head, inside, tail = re.fullmatch(r"(<math[^>]*>)(.*)(</math>)", made, re.DOTALL).groups()
+    parts, start = [], 0
+    for sign in re.finditer(re.escape(EQUALS), inside):
+        before = inside[: sign.start()]
+        depth = len(re.findall(r"<m\w+(?![^>]*/>)[^>]*>", before)) - before.count("</m")
+        if depth == 1 and sign.start() > len("<mrow>"):  # in the outermost row, and not its first word
+            parts.append(inside[start : sign.start()])
+            start = sign.start()
+    rows = [part.removeprefix("<mrow>") for part in [*parts, inside[start:].removesuffix("</mrow>")]]
+    infix = EQUALS.replace("<mo>", '<mo form="infix">')
+    return "".join(f"{head}<mrow>{row.replace(EQUALS, infix)}</mrow>{tail}" for row in rows) if parts else made
 
 
 def python(code):

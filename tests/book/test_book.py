@@ -58,6 +58,23 @@ def test_a_formula_is_set_and_one_with_an_unknown_word_is_refused():
         text.mathml(r"\nosuchword x")
 
 
+def test_lines_of_a_formula_are_lined_up_and_their_marks_not_printed():
+    made = text.mathml(r"\begin{aligned} a &= b, & c &= d \\ e &= f, & g &= h \end{aligned}", block=True)
+    assert made.count("<mtr>") == 2 and made.count("<mtd") == 8 and ">&<" not in made
+    with pytest.raises(ValueError, match="holds &"):
+        text.mathml("a &= b")
+
+
+def test_a_formula_within_a_line_can_break_before_its_equal_signs():
+    assert [text.mathml(tex).count("<math") for tex in ("a = b = c", "= b", "x^{(n=2)}", r"\frac{a=b}{c}")] == [
+        3,
+        1,
+        1,
+        1,
+    ]
+    assert text.mathml("a = b").count('<mo form="infix">') == 1 and text.mathml("a = b", block=True).count("<math") == 1
+
+
 def test_links_to_notebooks_lead_to_pages():
     assert 'href="02_chaining.html"' in text.as_html("[on](02_chaining.ipynb)")
     assert 'href="02_chaining.html#why"' in text.as_html("[on](../notebooks/02_chaining.ipynb#why)")
