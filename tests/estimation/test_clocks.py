@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from labkit.estimation.clocks import angular_speed, clock_offset, sample_stream
+from labkit.estimation.clocks import BLOCKS, _jackknife, angular_speed, clock_offset, sample_stream
 from labkit.geometry.lie import exp_se3, exp_so3, interpolate
 
 
@@ -66,6 +66,15 @@ def test_the_standard_deviation_of_the_offset_is_honest():
         found = clock_offset(*streams(seed, 0.05, n=900, noise=3e-3))
         scores.append((found.offset - 0.05) / found.std)
     assert 0.6 < np.sqrt(np.mean(np.square(scores))) < 1.6
+
+
+def test_the_jackknife_leaves_one_block_out_at_a_time():
+    """Against fits of a line through the origin to what is left, one after the other."""
+    rng = np.random.default_rng(5)
+    slope = rng.normal(size=240) * np.linspace(0.2, 3, 240)  # blocks of unequal weight
+    d, block = 0.3 * slope + rng.normal(size=240), np.arange(240) // (240 // BLOCKS)
+    fits = [np.linalg.lstsq(slope[block != k, None], d[block != k])[0][0] for k in range(BLOCKS)]
+    np.testing.assert_allclose(_jackknife(slope, d), np.sqrt(BLOCKS - 1) * np.std(fits), rtol=1e-12)
 
 
 def test_what_cannot_be_aligned_is_refused():

@@ -68,9 +68,9 @@ def test_where_the_linear_start_fails_both_find_the_same(data):
     np.testing.assert_allclose(two.T_FS, one.T_FS, atol=1e-6)
 
 
-def nearly_one_axis(tilt):
+def nearly_one_axis(tilt, turn=1.0):
     rng = np.random.default_rng(3)
-    turns = np.column_stack([tilt * rng.normal(size=(9, 2)), rng.uniform(-1, 1, 9)])
+    turns = np.column_stack([tilt * rng.normal(size=(9, 2)), turn * rng.uniform(-1, 1, 9)])
     T_BF = frames.pose(exp_so3(turns), rng.uniform(-200, 200, (9, 3)))
     return T_BF, frames.transform(frames.invert(T_FS), frames.transform(frames.invert(T_BF), TARGET))
 
@@ -93,6 +93,7 @@ def still(spread):
         (scene(8, turn=0.0), "only translate"),
         (nearly_one_axis(0.0), r"one axis, \(0.000, 0.000, 1.000\) in the base"),
         (nearly_one_axis(3e-4), "one axis"),
+        (nearly_one_axis(4e-4, turn=0.03), "one axis"),
         (still((0, 0, 0)), "at one place"),
         (still((0, 0, 30)), "on one line"),
         ((scene(6)[0], scene(5)[1]), r"\(N, 4, 4\) and \(N, 3\)"),

@@ -53,6 +53,14 @@ def test_equals_it_where_little_or_nothing_is_certain(n):
 
 
 @pytest.mark.parametrize("n", [2, 3])
+def test_a_covariance_whose_sign_alone_changes_is_not_settled(n):
+    """Nothing is seen, and the second state turns over at every step: its variance stays, its covariances do not."""
+    A, cov0 = np.diag([1.0, -1.0, 1.0])[:n, :n], 0.5 * (np.eye(n) + 1)
+    found = assert_equal(Z[:20], A, np.zeros((1, n)), [[0.04]], np.zeros(n), cov0)
+    np.testing.assert_array_equal(found.cov[:, 0, 1], np.tile([-0.5, 0.5], 10))
+
+
+@pytest.mark.parametrize("n", [2, 3])
 def test_equals_it_where_every_state_moves_every_other(n):
     """A full transition, turning and slightly damped, and a sensor that sees a bit of everything."""
     rng = np.random.default_rng(n)
