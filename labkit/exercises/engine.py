@@ -753,7 +753,8 @@ def _unread(function):
     if not isinstance(code, types.CodeType):
         return set()
     names = code.co_varnames[: code.co_argcount]
-    read = {name for i in dis.get_instructions(code) if i.opname.startswith("LOAD") for name in np.ravel(i.argval)}
+    loads = [i for i in dis.get_instructions(code) if i.opname.startswith("LOAD") and i.opname != "LOAD_CONST"]
+    read = {name for i in loads for name in (i.argval if isinstance(i.argval, tuple) else (i.argval,))}
     return set(names) - read - set(code.co_cellvars)
 
 

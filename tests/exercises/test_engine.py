@@ -1001,3 +1001,10 @@ def test_what_follows_from_a_value_is_told_where_nothing_else_is():
     assert root.judge(2.1).text == "Its square is 4.41."
     assert root.judge(-2.1).text == "not this value, and it should have the other sign: the hints lead on."
     assert root.judge(np.nan).status == NOT_YET
+
+
+def test_constants_of_any_shape_are_no_arguments_that_are_read():
+    def nested(v):
+        return sum(w * c[0] for w, c in ((100, (1, 1)), (200, (-1, -2)))) * np.ones(3)
+
+    assert "your function never uses `v`" in DOUBLE.judge(nested, rng=np.random.default_rng(0)).text
