@@ -42,7 +42,7 @@ def as_many_states_as_readings(x, cov, z, C, cov_z):
         ("predict_state", only_for_one_size, "single control"),
         ("update", with_two_states, "2 x 2"),
         ("update", as_many_states_as_readings, "size of the state"),
-        ("gate", lambda y, S, limit: bool(y @ np.linalg.inv(S) @ y <= 5.99), "Your limit stays 5.99"),
+        ("gate", lambda y, S, limit: bool(y @ np.linalg.inv(S) @ y <= 5.99), "a fixed limit of 5.99"),
         ("predict_state", lambda x, P, A, B, u, Q: A @ x + B @ u, "expected 2 results"),
     ],
 )
@@ -157,3 +157,31 @@ def test_all_other_readings_of_the_page_round_to_what_it_prints():
     readings = [(0, 400, z), (0, 1e12, z), (10, 20, z), (0, 20, z + [0.007, 0])]
     assert all(round(ch08.fuse_two_sensors(x0, var0, values, stds)[0], 1) == 9.6 for x0, var0, values in readings)
     assert round(ch08.fuse_two_sensors(0, 20, z, stds)[0], 1) == 9.5
+
+
+def only_what_surprises(x, cov, z, C, cov_z):
+    return ITEMS["update"].reference(x, cov, z, C, cov_z) if np.linalg.norm(z - C @ x) > 0.5 else (x, cov)
+
+
+def first_covariance_for_all(x, cov, z, C, cov_z):
+    gains = [cov @ c / (c @ cov @ c + R) for c, R in zip(C, np.diag(cov_z))]
+    for k, c, number in zip(gains, C, z):
+        x = x + k * (number - c @ x)
+    return x, cov - sum(np.outer(k, c @ cov) for k, c in zip(gains, C))
+
+
+def with_a_limit_of_its_own(innovation, cov_innovation, limit):
+    return bool(innovation @ np.linalg.solve(cov_innovation, innovation) < stats.chi2.ppf(0.95, len(innovation)))
+
+
+@pytest.mark.parametrize(
+    "name, answer, words",
+    [
+        ("update", only_what_surprises, ""),
+        ("update", first_covariance_for_all, "what the first has left"),
+        ("gate", with_a_limit_of_its_own, "limit"),
+    ],
+)
+def test_small_innovations_and_unused_limits_are_told(name, answer, words):
+    status, texts = judged(name, answer)
+    assert status == NOT_YET and all(words in text for text in texts), texts

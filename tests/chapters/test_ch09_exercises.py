@@ -335,6 +335,16 @@ def of_the_living(weights, threshold):
     return particles.effective_size(weights) < threshold * np.count_nonzero(weights)
 
 
+def without_putting_back(weights, rng):
+    return rng.permutation(len(weights))
+
+
+def turned_too_far(weights, rng):
+    ends, m = np.cumsum(weights), len(weights)
+    spokes = np.arange(m) / m * ends[-1] + rng.random() * ends[-1] / (m - 1)
+    return np.searchsorted(ends, np.minimum(spokes, ends[-1] * (1 - 1e-12)))
+
+
 def by_the_mean_index(resample, rng):
     index = np.concatenate([resample(np.array([1.0, 2.0, 3.0, 4.0]), rng) for _ in range(3000)])
     return abs(index.mean() - 2.0) < 0.05
@@ -351,6 +361,8 @@ PASSED_BEFORE = [
     ("cast_ray", in_steps_along_x, "nearly along y"),
     ("cast_ray", in_steps_of_two_cells, "right formula"),
     ("should_resample", of_the_living, "weigh something"),
+    ("resample_roulette", without_putting_back, "No index came out twice"),
+    ("resample_systematic", turned_too_far, "at most one gap"),
     ("hunt_1", by_the_mean_index, "on average"),
     ("hunt_4", of_weights_with_the_sum_1, "a common factor is no fault"),
 ]

@@ -1915,7 +1915,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda y, S, g: gate(y, S, 5.991),
-                    "Your limit stays 5.99. It comes as an argument: other sizes and probabilities have others.",
+                    "You decide as a fixed limit of 5.99 would. The limit comes as an argument: other sizes and probabilities have others.",
+                    id="gate-024d64",
                 ),
                 Mistake(
                     _gated(lambda y, S: np.sqrt(y @ np.linalg.solve(S, y))),

@@ -888,6 +888,14 @@ class _LateSpin(np.random.Generator):
         return low + (high - low) * self.random(size)
 
 
+def _turn_is_one_gap(resample, rng):
+    """The first spoke of the farthest turn against the first of eight equal weights."""
+    index = np.asarray(resample(np.full(8, 0.125), _LateSpin(np.random.PCG64(0))))
+    if index.shape == (8,) and index.dtype.kind in "iu" and index.min() > 0:
+        return "with a random number of nearly 1 the wheel turns past the first of 8 equal weights: at most one gap, W / M."
+    return None
+
+
 def _survives_rounding(resample, rng):
     """The last spoke against weights in single precision whose running sum, after a division, ends below 1."""
     for seed in range(20):
@@ -1676,6 +1684,7 @@ CHAPTER = Chapter(
             properties=(
                 _valid,
                 _drawn_from_the_rng,
+                _turn_is_one_gap,
                 _proportional,
                 _equal_weights_stay,
                 _spokes_are_even,
