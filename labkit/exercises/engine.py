@@ -841,7 +841,7 @@ def _whole(value):
         return f"{{{words}}}" if words else None if value else "set()"
     if isinstance(value, np.ndarray) and value.ndim == 1 and 0 < value.size <= SHOWN:
         return _short(value)
-    return _short(value) if np.ndim(value) == 0 and isinstance(value, str | int | float | np.generic) else None
+    return _short(value) if isinstance(value, str | int | float | np.generic) else None
 
 
 def _plain(value):

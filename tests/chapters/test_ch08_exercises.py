@@ -170,6 +170,14 @@ def first_covariance_for_all(x, cov, z, C, cov_z):
     return x, cov - sum(np.outer(k, c @ cov) for k, c in zip(gains, C))
 
 
+def mean_of_all_entries(x0, cov0, z, C, cov_z):
+    return ITEMS["update"].reference(x0, cov0, np.full(z.shape[1], z.mean()), C, cov_z / len(z))
+
+
+def test_two_results_of_other_shapes_are_judged_though_they_cannot_be_shown():
+    assert judged("batch_estimate", mean_of_all_entries)[0] == NOT_YET
+
+
 def with_a_limit_of_its_own(innovation, cov_innovation, limit):
     return bool(innovation @ np.linalg.solve(cov_innovation, innovation) < stats.chi2.ppf(0.95, len(innovation)))
 
