@@ -76,10 +76,9 @@ def result_words(results):
     wrong = [(result, expected) for result, expected in results if result != expected]
     if not wrong:
         return None
-    first, several = results[0][0], any(expected != results[0][1] for _, expected in results)
-    if several and not (isinstance(first, set | frozenset) and first) and all(r == first for r, _ in results):
-        return f"it returns {first!r} on every draw, whatever comes in"
     if all(isinstance(value, set | frozenset) for pair in wrong for value in pair):
+        if not any(result for result, _ in wrong):
+            return "it returns an empty set where something belongs into it"
         if all(result < expected for result, expected in wrong):
             return "what it returns is right, but not all of it is there"
         if all(result > expected for result, expected in wrong):

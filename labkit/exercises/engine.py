@@ -268,8 +268,10 @@ class _Trial:
                     off = next(d for d in metric.deviations(*pair) if not d.within)
                     return self.outcome(NOT_YET, _closed(f"{words} {off}"))
         words = unmoved or self._relation()
-        words = _closed(words) if words else self._deviation() + self._constant()
-        return self.outcome(NOT_YET, words + self._agreement(search, solution) + self._about_globals())
+        said, example, call = (_closed(words) if words else self._deviation()).partition(NOT_RIGHT)
+        said += "" if words else self._constant()
+        words = said + self._agreement(search, solution) + example + call
+        return self.outcome(NOT_YET, words + self._about_globals())
 
     def _agreement(self, search, solution):
         """How far what is computed on the way is what the solution computes, as one more sentence."""

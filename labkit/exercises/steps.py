@@ -28,7 +28,6 @@ CHANCE = 1000  # one case of so many may be chance
 BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with a number
 DECIMALS = re.compile(r"[<>]=? *\d*(\.\d+(e[+-]?\d+)?|e-\d+)$|[<>]=? *\d+e-\d+$")  # a comparison with such a number
 TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
-NEVER = "is to happen never"  # where a case mends by being left out
 ALONE = "With this alone changed, your result is right"
 
 
@@ -190,19 +189,12 @@ class Search:
         return mends.endswith(("belongs there", "belongs there in degrees")) and any(compared)
 
     def _left_out_instead(self, number):
-        """The change that leaves out a part where another sign mends only because it makes that part do nothing; for a
-        case that must not happen, that it never happens.
-        """
+        """The change that leaves out a part where another sign mends only because it makes that part do nothing."""
         changes = self.written.changes
-        here, said = changes[number][1:3], changes[number][3]
-        if " stands where " not in said:
+        here = changes[number][1:3]
+        if " stands where " not in changes[number][3]:
             return number
-        never = said.endswith("`==` belongs")
-        fewer = [
-            ("code", k)
-            for k, (_, *at, mends) in enumerate(changes)
-            if tuple(at) == here and TOO_MANY in mends or never and at[0] == here[0] and mends.endswith(NEVER)
-        ]
+        fewer = [("code", k) for k, (_, *at, mends) in enumerate(changes) if tuple(at) == here and TOO_MANY in mends]
         plan = self.mending(fewer)
         return number if plan is None else plan[1]
 

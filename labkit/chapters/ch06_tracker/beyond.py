@@ -494,6 +494,15 @@ STATIONS = [
             ),
             *(
                 Mistake(
+                    lambda turn=turn: turn,
+                    "This is the 0.1 deg of the question before. Asked for is another turn, the one that makes an E_trans of "
+                    "0.802 mm: try some, in mrad, and see what they make.",
+                    id=f"knock-of-the-question-{k}",
+                )
+                for k, turn in enumerate((0.1, 1e3 * np.deg2rad(0.1), 1.75))
+            ),
+            *(
+                Mistake(
                     lambda e_trans=e_trans: e_trans,
                     "This is E_trans itself, in mm. Asked for is the turn of the station that makes it.",
                     id=f"knock-e-trans-{k}",

@@ -100,6 +100,18 @@ def _never_put_back(f, printed):
     return found
 
 
+def _up_and_left_down(f, printed):
+    x, halves = read(printed)
+    found = 0.0
+    for k, half in enumerate(halves):
+        up, down = x.copy(), x.copy()
+        up[k] += half
+        down[k] -= half
+        found += max(abs(f(up) - f(read(printed).values)), abs(f(down) - f(read(printed).values)))
+        x = down
+    return found
+
+
 def _through_float(text):
     return half_unit(str(number(text)))
 
@@ -210,6 +222,14 @@ BOUND = Exercise(
         Mistake(
             lambda f, p: np.minimum(*np.abs(_moves(f, p))).sum(),
             "Of the way up and the way down you took the shorter: a bound must hold for the longer one.",
+        ),
+        Mistake(
+            lambda f, p: _larger(f, p).mean(),
+            "That is the mean of the moves. All numbers may be off at once: add the moves up.",
+        ),
+        Mistake(
+            _up_and_left_down,
+            "A number that went up and down stays down while the next one moves: put each back to where it was.",
         ),
         Mistake(
             _never_put_back,

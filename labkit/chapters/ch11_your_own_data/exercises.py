@@ -140,6 +140,8 @@ OTHER_AXES = (
      "Euler angles are three turns one after the other, no axis. The axis is the direction of the rotation vector."),
     (_between(lambda R: Rotation.from_matrix(R).as_euler("XYZ")),
      "Euler angles are three turns one after the other, no axis. The axis is the direction of the rotation vector."),
+    (lambda T, k: motion.between_axes(T[::k], 1),
+     "You take every motion `apart` further on, and these one after the other. Each motion is compared with the one `apart` further on: n - apart angles."),
     (_sum_of_neighbors,
      "You add the angles between neighbors. Axes in space turn back as well: take the angle between the two themselves."),
 )  # fmt: skip
