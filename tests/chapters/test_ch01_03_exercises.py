@@ -303,6 +303,13 @@ def cosine_by_a_root(xyzabc):
     return np.block([[Rz @ Ry @ Rx, np.reshape(xyzabc[:3], (3, 1))], [0, 0, 0, 1]])
 
 
+def pole_by_r00(T):
+    xyzabc, R = library_angles(T), T[:3, :3]
+    if abs(R[0, 0]) < 1e-6:
+        xyzabc[3], xyzabc[5] = 0, np.arctan2(-R[1, 2], R[1, 1])
+    return xyzabc
+
+
 library_fit = frames.fit_frame
 
 
@@ -323,7 +330,8 @@ def last_turn_only(xyzabc):
         ("invert", from_two_entries, "turned about z alone"),
         ("matrix_from_kuka", last_turn_only, "All three turns take C"),
         ("matrix_from_kuka", cosine_by_a_root, "cosine of B is never negative"),
-        ("fit_frame", four_points_at_least, "not of three points"),
+        ("fit_frame", four_points_at_least, ""),
+        ("kuka_from_matrix", pole_by_r00, ""),
     ],
 )
 def test_frames_that_are_right_for_some_only(name, answer, told, seed):
@@ -445,6 +453,7 @@ def no_exponents(text):
         ("pivot_residuals", lambda T, tip, point: np.squeeze(T[:, :3, :3] @ tip + T[:, :3, 3] - point), "(1, 3)"),
         ("solve_pivot", even_numbers_of_poses, ""),
         ("robust_weights", influence_by_distance, "NaN"),
+        ("pivot_covariance", lambda A, r: r.sum() ** 2 / len(r) * np.linalg.inv(A.T @ A), "sum the squares"),
         ("solve_pivot", tip_then_point, "You fitted the tip first"),
     ],
 )
@@ -461,3 +470,7 @@ def test_values_near_a_mistake_are_that_mistake():
     assert "|p| is 1000 mm" in judged("worst_at_one_meter", distance + angle).text
     flanges = lab_sheet.kreisel_poses()[:, :3, 3]
     assert "the positions of the flange" in judged("tip_length", np.linalg.norm(flanges, axis=1).mean()).text
+
+
+def test_a_rounded_number_is_not_the_sum_it_happens_to_be():
+    assert "from the origin of K1" in FRAMES["distance"].judge(200.0).text

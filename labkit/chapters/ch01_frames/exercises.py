@@ -343,6 +343,13 @@ def at_the_pole(sign):
     return draw
 
 
+def beside_the_axes(rng):
+    """A and C of 90 or -90 deg: r00 and r22 are 0, as at the pole, and both angles are what they are."""
+    xyzabc = kuka_pose(rng)[0]
+    xyzabc[[3, 5]] = rng.choice([-1, 1], 2) * np.pi / 2
+    return (frames.matrix_from_kuka(xyzabc),)
+
+
 def _K0_T_K1():
     K0, K1 = (frames.frame_from_points(*points()[name]) for name in ("K0", "K1"))
     return frames.relative(K0, K1)
@@ -543,7 +550,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _normalized_too_early,
-                    "You normalized b before its part along x was removed; what is left of it, y, has to be normalized afterwards (and z inherits its length).",
+                    "Your y is divided by the length of b. What is to be of length 1 is what is left of b without its part along x (and z inherits the length of y).",
                     id="gram-schmidt-early",
                 ),
                 Mistake(
@@ -866,6 +873,11 @@ CHAPTER = Chapter(
                     id="distance-from-K0",
                 ),
                 Mistake(
+                    lambda: HOLE,
+                    "This is how far the hole is from the origin of K1. How far is it from its place in the drawing?",
+                    id="distance-from-K1",
+                ),
+                Mistake(
                     lambda: np.linalg.norm(_hole_as_drawn()),
                     "This is how far the drawing's hole is from the origin of K0. How far apart are both holes?",
                     id="distance-drawn-from-K0",
@@ -1021,7 +1033,8 @@ CHAPTER = Chapter(
                     (1, "right away from the pole, but at B = 90 deg"),
                     (-1, "right, but at B = -90 deg"),
                 )
-            ],
+            ]
+            + [(beside_the_axes, _read_by_kuka(1e-6), "right, but not where A and C are 90 or -90 deg:")],
             hints=(
                 "Compare the entries of Rz(A) Ry(B) Rx(C) that hold few terms: the first column gives A and B. Then undo A: "
                 "Rz(A)ᵀ R = Ry(B) Rx(C), whose middle row is 0, cos C, -sin C.",

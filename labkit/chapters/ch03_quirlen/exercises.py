@@ -732,6 +732,11 @@ CHAPTER = Chapter(
                     "These are the six standard deviations. The whole matrix is wanted, shape (6, 6).",
                 ),
                 Mistake(
+                    _covariance(lambda r, n: 0.0),
+                    "Your covariance is 0. The residuals of least squares add up to 0, and the square of that sum is 0 as well: sum the squares.",
+                    id="covariance-0",
+                ),
+                Mistake(
                     _variance_of_each_axis,
                     "You took another variance for x, y and z. One noise is meant for all coordinates: one number, from all 3n residuals.",
                     id="covariance-each-axis",
