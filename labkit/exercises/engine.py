@@ -463,7 +463,7 @@ class _Trial:
 
     def _one_change(self):
         """Whether the results are those of a right formula with one change, with this in words."""
-        if self.exercise.metric is None or not self.inputs:
+        if self.exercise.metric is None or not self.inputs or self._is_always_the_same():
             return None
         words = self._first_that_fits(slips.changed_formulas(self.exercise))
         return words and f"your result is what a right formula gives {words}"

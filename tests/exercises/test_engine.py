@@ -1008,3 +1008,13 @@ def test_constants_of_any_shape_are_no_arguments_that_are_read():
         return sum(w * c[0] for w, c in ((100, (1, 1)), (200, (-1, -2)))) * np.ones(3)
 
     assert "your function never uses `v`" in DOUBLE.judge(nested, rng=np.random.default_rng(0)).text
+
+
+@pytest.mark.parametrize("times, told", [(0, False), (3, True)])
+def test_a_result_that_never_changes_is_no_slip_of_a_formula(times, told, monkeypatch):
+    """Whatever makes 0 of a formula would explain a 0."""
+    monkeypatch.setattr(engine.slips, "changed_formulas", lambda exercise: [("with a slip", lambda v: times * v)])
+    trial, rng = engine._Trial(DOUBLE, lambda v: times * v), np.random.default_rng(0)
+    for _ in range(3):
+        trial.draw(DOUBLE.draw(rng), DOUBLE.metric)
+    assert bool(trial._one_change()) == told
