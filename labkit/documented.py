@@ -81,7 +81,7 @@ def _rules(function):
             own = _of_one(said, k, len(names))
             check = _check(name, own, f"{said}{more} {default}", function) if name in places else None
             if check:
-                optional = "None" in said or default is None
+                optional = "None" in said.partition("->")[0] or default is None
                 shapes = _shapes(own) if _ARRAY.match(own) else ()
                 check = functools.partial(_unless_none, check) if optional else check
                 found.append((places[name], name, check, shapes[0] if len(shapes) == 1 else None))

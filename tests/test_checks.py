@@ -317,6 +317,14 @@ REFUSED = [
         r"x has shape \(6,\), but its derivatives are by 3 unknowns",
     ),
     # calibration, geometry, machines
+    (lambda: advice.axis_name(np.array([True, False, False]), "flange"), "v must hold real numbers, got truth values"),
+    (lambda: planning.predicted_sphere_covariance(np.zeros((0, 4, 4)), I4, O3, 0.1), "number of poses must be"),
+    (lambda: simulation.stop_readings(np.zeros((0, 4, 4)), simulation.RESTING, rng()), "number of stops must be"),
+    (lambda: robot_accuracy.path_repeatability(np.zeros((8, 0, 2))), "number of instants must be .* at least 1, got 0"),
+    (
+        lambda: simulation.calibration_run(rng(), joints=np.zeros((0, 6))),
+        "number of stops must be .* at least 1, got 0",
+    ),
     (lambda: gaussian.density(np.ones(7), np.ones(2), 1.0), r"got \(7,\) of x, \(2,\) of mean"),
     (lambda: chaining.expected_heights([[I4] * 2] * 3, 0.1, 0.1), r"transforms must have shape \(4, 4\)"),
     (lambda: propagation.product_jacobians([I4] * 3, [I4] * 2), "of T_AB, .* of T_BC"),

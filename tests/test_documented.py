@@ -75,7 +75,9 @@ def test_what_it_says_arrives():
 
 
 @documented
-def select(R, cov, r, kept, rows=None, count=3, robot=None, given=(None, None), normal=None, free=(), ways=None):
+def select(
+    R, cov, r, kept, rows=None, count=3, robot=None, given=(None, None), normal=None, free=(), ways=None, way=abs
+):
     """Arguments whose letters, kinds and names say more than their shapes.
 
     Parameters
@@ -92,6 +94,7 @@ def select(R, cov, r, kept, rows=None, count=3, robot=None, given=(None, None), 
     normal : array, shape (..., p, p), optional
     free : tuple of str, optional
     ways : dict of functions, optional
+    way : function (x) -> float or None
     """
     return kept, rows, count
 
@@ -122,6 +125,7 @@ GOOD = {"R": np.eye(3), "cov": np.eye(2), "r": np.zeros((4, 2)), "kept": [True, 
         ({"free": None}, "free must be of type tuple, got None"),
         ({"free": ("std", 5)}, "each entry of free must be of type str, got an object of type int"),
         ({"ways": {"one": abs, "two": 5}}, "each entry of ways must be a function, got an object of type int"),
+        ({"way": None}, "way must be a function, got None"),
         ({"ways": abs}, "ways must be of type dict, got an object of type builtin_function_or_method"),
         ({"normal": np.zeros((5, 3, 2))}, r"normal must have shape \(\.\.\., p, p\), got \(5, 3, 2\)"),
         ({"normal": np.zeros(2)}, r"normal must have shape \(\.\.\., p, p\), got \(2,\)"),

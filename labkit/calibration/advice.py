@@ -35,6 +35,7 @@ def axis_name(v, frame):
     -------
     words : str
     """
+    v = as_shape(v, "v", 3)
     v = v * np.sign(v[np.argmax(np.abs(v))])
     k = int(np.argmax(np.abs(v)))
     if abs(v[k]) > 0.94:  # within 20 deg

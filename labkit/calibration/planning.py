@@ -81,6 +81,7 @@ def predicted_sphere_covariance(T_BF, T_FS, target, std):
         For poses that leave a direction undetermined.
     """
     x_S = sphere_in_scanner(T_BF, T_FS, target)
+    as_count(len(x_S), "the number of poses")
     J = joint_jacobian(T_BF, x_S, T_FS)
     scale = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
     values = np.linalg.svd(J / scale, compute_uv=False)

@@ -103,6 +103,7 @@ def path_repeatability(paths):
     Source: RT of ISO 9283, at equal instants.
     """
     paths = as_shape(paths, "paths", "n", "k", "d")
+    as_count(paths.shape[1], "the number of instants")
     return max(repeatability(paths[:, k]) for k in range(paths.shape[1]))
 
 

@@ -222,6 +222,7 @@ def calibration_run(rng, tracker=None, joints=None, rate=5.0, lost_stop=None):
     """
     tracker = tracker or RESTING
     joints = measuring_joints() if joints is None else joints
+    as_count(len(joints), "the number of stops")
     readings = as_count(np.floor(STOP_TIME * as_positive_number(rate, "rate")), "the number of readings per stop")
     T_BE = tool_pose(TX40, joints, T_FE)
     drift = tracker.drift(len(joints), rng)
@@ -252,6 +253,7 @@ def stop_readings(T_BE, tracker, rng):
     -------
     T_WE : array, shape (n, 4, 4)
     """
+    as_count(len(T_BE), "the number of stops")
     T = tracker.read(T_BE, rng, tracker.drift(len(T_BE), rng))
     return invert(T[0]) @ T
 
