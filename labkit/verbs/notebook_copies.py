@@ -114,8 +114,13 @@ def digest(cell):
     return hashlib.sha256(f"{cell['cell_type']}\n{words}".encode("utf-8", "surrogatepass")).hexdigest()[:16]
 
 
+WHERE_OPEN = "If it is open in JupyterLab, choose File > Reload Notebook from Disk there before you save."
+
+
 def fresh_copy(path, text, shown):
-    """Put a notebook's beginning in place; one that differs is kept beside it. Returns what was done."""
+    """Put a notebook's beginning in place; one that differs is kept beside it. Returns what was done, and what to do
+    where it is open: JupyterLab goes on showing what it has read, and saving that would undo this.
+    """
     if path.exists() and path.read_text(encoding="utf-8", errors="replace") == text:
         return f"{shown} is as in the beginning already"
     kept = ""
@@ -123,7 +128,7 @@ def fresh_copy(path, text, shown):
         copies = (path.with_name(f"{path.stem}.my-copy-{k}.ipynb") for k in itertools.count(1))
         copy = next(copy for copy in copies if not copy.exists())
         os.replace(path, copy)
-        kept = f"; yours is kept as {shown[: -len(path.name)]}{copy.name}"
+        kept = f"; yours is kept as {shown[: -len(path.name)]}{copy.name}.\n{WHERE_OPEN}"
     write(path, text)
     return f"{shown} is as in the beginning{kept}"
 

@@ -127,7 +127,9 @@ def test_reset_keeps_the_students_copy(tmp_path):
     for number in (1, 2):
         path.write_text(f"my work {number}", encoding="utf-8")
         said = notebook_copies.fresh_copy(path, "fresh", f"notebooks/{path.name}")
-        assert said.endswith(f"yours is kept as notebooks/01_small.my-copy-{number}.ipynb")
+        done, advice = said.split("\n")
+        assert done.endswith(f"yours is kept as notebooks/01_small.my-copy-{number}.ipynb.")
+        assert "Reload Notebook from Disk" in advice  # the words of JupyterLab's File menu
         assert (tmp_path / f"01_small.my-copy-{number}.ipynb").read_text(encoding="utf-8") == f"my work {number}"
         assert path.read_text(encoding="utf-8") == "fresh"
 
