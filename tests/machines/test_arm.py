@@ -87,6 +87,8 @@ def test_inverse_kinematics_reaches_the_measuring_poses():
     assert reached.all() and within_limits(TX40, q).all()
     angle, distance = pose_distance(forward_kinematics(TX40.dh, q), T)
     assert angle.max() < 1e-8 and distance.max() < 1e-5
+    alone, reached = inverse_kinematics(TX40, T[-1], HOME)
+    assert reached and np.allclose(forward_kinematics(TX40.dh, alone), T[-1], atol=1e-5)
 
 
 def test_inverse_kinematics_says_what_is_out_of_reach():

@@ -74,6 +74,13 @@ def test_every_malformed_packet_is_refused():
         assert check_packet(udp.break_packet(data, rng))[1]
 
 
+@pytest.mark.parametrize("length, good", [(0.9991, True), (1.0009, True), (0.9989, False), (1.0011, False)])
+def test_a_quaternion_may_be_a_thousandth_too_long_or_short(length, good):
+    values = list(check_packet(packets(1)[0])[0])
+    values[11:15] = [length * q for q in values[11:15]]
+    assert (check_packet(encode_packet(values))[1] == "") == good
+
+
 def test_duplicates_late_ones_and_foreign_devices():
     a, b, c = packets(3)
     with udp.listen() as listener:
