@@ -553,12 +553,13 @@ class _Trial:
         return [row[:3] for row in rows if everything or row[3] is None]
 
     def _named_by_failing(self, error, args):
-        """The mistake that explains the draws so far and fails on this one as well: right, or possible, in one size."""
+        """The mistake that explains the draws so far and fails alike on this one: right, or possible, in one size."""
         if not isinstance(error, ValueError | TypeError | IndexError):
             return None
         cases = [*zip(self.inputs, self.metrics, self.pairs)]
         for k, mistake in enumerate(self.exercise.mistakes):
-            if cases and _fails(mistake, args) and all(self._is_mistake(mistake, *case) for case in cases):
+            alike = cases and type(_failure(mistake, args)) is type(error)
+            if alike and all(self._is_mistake(mistake, *case) for case in cases):
                 return self.outcome(NOT_YET, mistake.text, k)
         return None
 
@@ -719,14 +720,14 @@ class _Trial:
         return self.outcome(RAISED, f"{type(error).__name__}: {said}{advice}{where}{with_}")
 
 
-def _fails(mistake, args):
-    """Whether a wrong variant cannot compute a draw at all."""
+def _failure(mistake, args):
+    """What a wrong variant raises on a draw; None where it can compute it."""
     try:
         with np.errstate(all="ignore"):
             mistake.variant(*copy.deepcopy(args))
-    except Exception:
-        return True
-    return False
+    except Exception as error:
+        return error
+    return None
 
 
 def _are_one(results):
