@@ -124,7 +124,7 @@ def test_a_stage_is_where_it_was_left_and_all_go_back_by_one_key(wall):
     wall.wait_for_selector("#place .labkit-stage[data-picture]", state="attached")
     assert wall.evaluate("() => [wall.card.key, location.hash]") == [FIRST, f"#{FIRST}"]
     assert rest(wall) == failed
-    wall.keyboard.press("Shift+R")
+    moved(wall, lambda: wall.keyboard.press("Shift+R"))
     wall.wait_for_function("() => wall.step === 'question'")
     assert rest(wall) == start
 

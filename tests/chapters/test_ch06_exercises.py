@@ -35,7 +35,7 @@ def test_the_number_of_columns_is_not_told_that_it_is_the_number_of_motions():
 def test_the_constant_of_the_robust_rule_may_be_rounded(constant):
     def keep(values, factor):
         distance = np.abs(values - np.median(values))
-        return distance < factor * constant * np.median(distance)
+        return distance <= factor * constant * np.median(distance)
 
     texts("reject_outliers", keep, CORRECT)
 

@@ -884,7 +884,7 @@ CELL = [
             Mistake(
                 lambda: float(np.sqrt(budget()[1] ** 2 - budget()[0]["tracker"] ** 2 / 4)),
                 "You took away a quarter of its variance. Half of the standard deviation leaves a quarter: three quarters go.",
-                id="halved-quarter",
+                id="halved-quarter-removed",
             ),
             Mistake(
                 lambda: float(np.sqrt(budget()[1] ** 2 - budget()[0]["tracker"] / 2)),
