@@ -28,7 +28,7 @@ from labkit.verbs import build
 
 ROOT = source.ROOT
 SECONDS_A_JOB = 900
-UNITS = 4  # jobs of unit tests: none is left alone on one processor at the end
+UNITS = 6  # jobs of unit tests: short enough that none is left alone on one processor at the end
 APART = ("browser", "hub")  # folders of tests that are jobs of their own
 BARE = ("-pno:hypothesispytest",)  # notebooks need none, and its import costs as much as a small kernel
 COUNTED = ("passed", "failed", "error", "skipped", "xfailed")
