@@ -28,7 +28,8 @@ from labkit.verbs import build
 
 ROOT = source.ROOT
 SECONDS_A_JOB = 900
-UNITS = 6  # jobs of unit tests: short enough that none is left alone on one processor at the end
+UNITS = 5  # jobs of unit tests beside the longest: none is left alone on one processor at the end
+LONGEST = ROOT / "tests" / "chapters" / "test_exercises.py"  # a job of its own, begun among the first
 APART = ("browser", "hub")  # folders of tests that are jobs of their own
 BARE = ("-pno:hypothesispytest",)  # notebooks need none, and its import costs as much as a small kernel
 COUNTED = ("passed", "failed", "error", "skipped", "xfailed")
@@ -85,10 +86,12 @@ def scratch_folder():
 
 def all_jobs(scratch):
     """{name: arguments of pytest}, the longest first; stirred ones take longer than others."""
-    units = sorted(str(path) for path in (ROOT / "tests").glob("**/test_*.py") if path.parent.name not in APART)
+    tests = (path for path in (ROOT / "tests").glob("**/test_*.py") if path.parent.name not in APART)
+    units = sorted(str(path) for path in tests if path != LONGEST)
     solved = sorted(str(path) for path in (ROOT / "solutions").glob("[0-9][0-9]_*.ipynb"))
     jobs = {
         **{name: [str(ROOT / "tests" / name)] for name in APART},
+        "unit tests 0": [str(LONGEST)],
         **{f"unit tests {k}": units[k - 1 :: UNITS] for k in sorted(range(1, UNITS + 1), key=lambda k: k % 2)},
         "solved notebooks 1": ["--nbval", *BARE, *solved[0::2]],
         "solved notebooks 2": ["--nbval", *BARE, *solved[1::2]],
