@@ -56,7 +56,7 @@ def side_words(results):
     results : list of (object, object)
         What the student's function gave and the expected result, of every draw.
     """
-    if len(results) < 4 or any(np.ndim(v) or not isinstance(v, float | np.ndarray) for pair in results for v in pair):
+    if len(results) < 4 or any(not isinstance(v, float | np.ndarray) or np.ndim(v) for pair in results for v in pair):
         return None
     off = np.array([result - expected for result, expected in results], dtype=float)
     side = "small" if (off < 0).all() else "large" if (off > 0).all() else None

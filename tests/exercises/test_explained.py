@@ -238,6 +238,19 @@ def test_what_is_small_on_every_draw_is_said_to_be():
     assert "too small on every draw" in told(item, "return 1.0 + x * 0.3 * np.cos(std) ** 2")
 
 
+def test_a_vector_and_a_number_that_are_both_wrong_are_compared_apart():
+    two = metrics.Several(metrics.Numbers(), metrics.Numbers(), names=("place", "radius"))
+    item = Exercise(
+        "walk",
+        reference=lambda x: (np.cos(x), float(x @ x)),
+        draw=lambda rng: (rng.normal(size=3),),
+        metric=two,
+        hints=("a", "b", "c"),
+    )
+    outcome = item.judge(lambda x: (x**3 - np.sin(x), float(np.exp(x[0]) + x[1])), rng=np.random.default_rng(0))
+    assert outcome.status == NOT_YET and "is off by" in outcome.text
+
+
 def test_numpys_words_and_numbers_are_shown_as_one_types_them():
     assert engine._short([np.str_("4.5"), np.int64(3)]) == "['4.5', 3]"
     assert engine._short((np.str_("a"),)) == "('a',)"
