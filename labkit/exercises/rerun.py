@@ -45,7 +45,30 @@ def written(function):
     if hasattr(function, "written"):
         return function.written()
     found = _read(function)
-    return None if found is None else Written(function, *found)
+    if found is None:
+        return None
+    tree, lines = found
+    beside = _beside(function, tree)
+    for _, _, more in beside:
+        lines = lines | more
+    return Written(function, tree, lines, [(helper, definition) for helper, definition, _ in beside])
+
+
+def _beside(function, tree):
+    """(function, definition, lines) of those that a function calls, and of those that they call, if they stand in the
+    cell of its definition: what is wrong with it may be wrong there.
+    """
+    known, code, found, unread = function.__globals__, function.__code__, {}, [tree]
+    while unread:
+        names = {n.id for n in ast.walk(unread.pop()) if isinstance(n, ast.Name)}
+        for name in sorted(names - set(found) - {code.co_name}):
+            helper = known.get(name)
+            if not isinstance(helper, types.FunctionType) or helper.__code__.co_name != name:
+                continue
+            if helper.__code__.co_filename == code.co_filename and (read := _read(helper)):
+                found[name] = (helper, *read)
+                unread.append(read[0])
+    return list(found.values())
 
 
 def _read(function):
@@ -95,21 +118,24 @@ def _bare(node):
 
 
 class Written:
-    """A function that was read again.
+    """A function that was read again, with the functions `beside` it, [(function, definition)], that it calls.
 
     changes: (rank, line, code, what is wrong where it mends) of every single change of the code, by its number.
     places:  (line, code, name of the variable, size, number of its first part) of every value on the way.
     """
 
-    def __init__(self, function, tree, lines=None):
-        self.function, self.tree, self.lines = function, tree, lines or {}
+    def __init__(self, function, tree, lines=None, beside=()):
+        self.function, self.beside, self.lines = function, [helper for helper, _ in beside], lines or {}
+        self.trees = [*(definition for _, definition in beside), tree]
         self.counted = STEPS
-        self._noted, self.places = _noted(function, tree, self.lines)
-        _ticking(tree)
+        self._noted, self.places = _noted(function, self.trees, self.lines)
+        for tree in self.trees:
+            _ticking(tree)
 
     @functools.cached_property
     def _changes(self):
-        return [c for c in mutation.mending(self.tree) if c.mends][:MOST]
+        found = [c for tree in reversed(self.trees) for c in mutation.mending(tree) if c.mends]
+        return sorted(found, key=lambda change: change.rank)[:MOST]
 
     @property
     def changes(self):
@@ -151,7 +177,7 @@ class Written:
 
     def _changed(self, number):
         with warnings.catch_warnings(action="ignore"), self._changes[number].made():
-            code = compile(ast.Module([self.tree], []), "<changed>", "exec")
+            code = compile(ast.Module(self.trees, []), "<changed>", "exec")
         steps = itertools.count(1)
 
         def tick():
@@ -164,8 +190,9 @@ class Written:
         """The function that a compiled definition gives among the names of the notebook, which it leaves alone."""
         known = {**self.function.__globals__, **extra}
         exec(code, known)
-        made = known[self.function.__code__.co_name]
-        made.__defaults__, made.__kwdefaults__ = self.function.__defaults__, self.function.__kwdefaults__
+        for function in (*self.beside, self.function):
+            made = known[function.__code__.co_name]
+            made.__defaults__, made.__kwdefaults__ = function.__defaults__, function.__kwdefaults__
         return made
 
     def trace(self, args, seconds):
@@ -447,12 +474,13 @@ ALONE = sum("{}" not in words for words, _ in OTHERWISE)  # of one value; the ot
 # Notes in the code ------------------------------------------------------------------------------------------------
 
 
-def _noted(function, tree, lines):
-    """The compiled definition in which every value goes through a note, and the places by their numbers."""
+def _noted(function, trees, lines):
+    """The compiled definitions in which every value goes through a note, and the places by their numbers."""
     known = {name for name, value in function.__globals__.items() if isinstance(value, types.ModuleType)}
-    noting = _Noting(known, tree, lines)
-    noted = ast.fix_missing_locations(noting.definition())
-    return compile(ast.Module([noted], []), "<noted>", "exec"), noting.places
+    places, noted = [], []
+    for tree in trees:
+        noted.append(ast.fix_missing_locations(_Noting(known, tree, lines, places).definition()))
+    return compile(ast.Module(noted, []), "<noted>", "exec"), places
 
 
 def _shown(node, lines):
@@ -469,8 +497,8 @@ def _shown(node, lines):
 class _Noting(ast.NodeTransformer):
     """Puts a note around every value that is computed, and behind every name that is bound."""
 
-    def __init__(self, modules, tree, lines):
-        self.modules, self.tree, self.lines, self.places = modules, copy.deepcopy(tree), lines, []
+    def __init__(self, modules, tree, lines, places):
+        self.modules, self.tree, self.lines, self.places = modules, copy.deepcopy(tree), lines, places
         stored = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
         self.own = stored | {argument.arg for argument in ast.walk(tree.args) if isinstance(argument, ast.arg)}
 

@@ -158,7 +158,7 @@ class Search:
         """Whether each plan makes the i-th result right; `values[i]` are those that plans put in other's places."""
         case = self.cases[i]
         if values is not None:
-            plans = [(kind, k, list(values[i][q][1])) for kind, k, q in plans]
+            plans = [(kind, k, list(_in_rounds(self.values[i][k], values[i][q])[1])) for kind, k, q in plans]
         return self.written.results(plans, case.args, budget.left(), case.keep)
 
     # Changes of the code
@@ -380,7 +380,8 @@ class Search:
 
     def _compared(self, k, q, solution):
         mine = [values[k][1] for values in self.values]
-        theirs = [np.broadcast_to(v[q][1], m.shape) for v, m in zip(solution.values, mine)]
+        rounds = [_in_rounds(values[k], v[q])[1] for values, v in zip(self.values, solution.values)]
+        theirs = [np.broadcast_to(t, m.shape) for t, m in zip(rounds, mine)]
         words = value_relation(mine, theirs, [dict(zip(self.names, case.args)) for case in self.cases])
         words = words or f"this value is not right{self._of_right_parts(k, solution)}"
         end = "" if words[-1] in ".?" else "."
@@ -606,9 +607,15 @@ def _same(a, b):
     return np.shape(a) == np.shape(b) and bool(np.allclose(a, b, rtol=CLOSE, atol=1e-12, equal_nan=True))
 
 
+def _in_rounds(mine, theirs):
+    """(count, values) of the solution, row by row where the student's loop takes one row of it in each round."""
+    (count, a), (turns, b) = mine, theirs
+    return (count, b[0]) if turns == 1 and count > 1 and b.shape[1:2] == (count,) and b.ndim > a.ndim else theirs
+
+
 def _exchangeable(mine, theirs):
     """Whether a value of the solution can take the place of one of the student's, and is another."""
-    (count, a), (turns, b) = mine, theirs
+    (count, a), (turns, b) = mine, _in_rounds(mine, theirs)
     fits = count > 0 and turns in (1, count) and a.shape[1:] == b.shape[1:]
     return fits and not _same(a, np.broadcast_to(b, a.shape))
 

@@ -155,13 +155,43 @@ def test_a_cell_that_imports_what_its_function_calls_is_read_again():
         "    x = a / math.sqrt(a @ b)",
         "    return 3 * np.linalg.norm(b - (b @ x) * x)",
     )
-    cell = "\n".join(lines) + "\n"
-    linecache.cache["<a cell>"] = (len(cell), None, cell.splitlines(True), "<a cell>")
-    known = {"np": np}
-    exec(compile(cell, "<a cell>", "exec"), known)
     positive = replace(ITEM, draw=lambda rng: (rng.uniform(1, 2, 3), rng.uniform(1, 2, 3)))
-    said = positive.judge(known["formula"], rng=np.random.default_rng(0)).text
+    said = positive.judge(of_cell(*lines)["formula"], rng=np.random.default_rng(0)).text
     assert said.startswith("in line 3, ")
+
+
+def of_cell(*lines):
+    """What a cell of these lines defines."""
+    cell = "\n".join(lines) + "\n"
+    file = f"<cell {hash(cell)}>"
+    linecache.cache[file] = (len(cell), None, cell.splitlines(True), file)
+    known = {"np": np}
+    exec(compile(cell, file, "exec"), known)
+    return known
+
+
+HELPED = (
+    "def unit(v, least=0.0):",
+    "    return v / max(np.sqrt(squares(v)), least)",
+    "def squares(v):",
+    "    return np.sum(v * v)",
+    "def formula(a, b):",
+    "    x = unit(a)",
+    "    return len(b) * np.linalg.norm(b - (b @ x) * x)",
+)
+
+
+@pytest.mark.parametrize(
+    "right, wrong, said",
+    [
+        ("np.sum(v * v)", "np.mean(v * v)", "in line 4, `np.mean(v * v)`: `mean` stands where `sum` belongs."),
+        ("np.sqrt(squares(v))", "squares(v)", "in line 2, `squares(v)`: its root belongs there."),
+    ],
+)
+def test_what_is_wrong_in_a_function_beside_the_answer_is_told_there(right, wrong, said):
+    assert ITEM.judge(of_cell(*HELPED)["formula"]).status == CORRECT
+    wrong = of_cell(*(line.replace(right, wrong) for line in HELPED))["formula"]
+    assert ITEM.judge(wrong, rng=np.random.default_rng(0)).text.startswith(said)
 
 
 def sines(a, b):
@@ -249,6 +279,18 @@ def test_the_value_that_is_not_right_is_found_by_that_of_the_solution():
     body = "x = a / np.linalg.norm(a)\nz = np.cross(x, b)\nz = z / np.linalg.norm(z)\n"
     said = told_of("gram_schmidt", f"{body}return np.column_stack([x, b / np.linalg.norm(b), z])", "a, b")
     assert "in line 5, `b / np.linalg.norm(b)`: this value is not right" in said
+
+
+def test_a_loop_that_takes_the_rows_of_the_solutions_array_one_by_one_is_compared_with_them():
+    item = next(c for c in session.chapters() if c.name == "07-dead-reckoning")["lateration_residual"]
+    cell = of_cell(
+        "def square(a, b):",
+        "    return sum(abs(p - q) for p, q in zip(a, b)) ** 2",
+        "def lateration_residual(landmarks, distances, position):",
+        "    return np.array([square(a, position) - d ** 2 for a, d in zip(landmarks, distances)])",
+    )
+    said = item.judge(cell["lateration_residual"], rng=np.random.default_rng(0)).text
+    assert said.startswith("in line 4, `square(a, position)`: this value is not right")
 
 
 def test_of_two_slips_the_first_is_told_with_what_is_left():
