@@ -269,9 +269,14 @@ class _Trial:
                     return self.outcome(NOT_YET, _closed(f"{words} {off}"))
         words = unmoved or self._relation()
         said, example, call = (_closed(words) if words else self._deviation()).partition(NOT_RIGHT)
-        said += "" if words else self._constant()
+        said += self._where_it_is_wrong() if words else self._constant()
         words = said + self._agreement(search, solution) + example + call
         return self.outcome(NOT_YET, words + self._about_globals())
+
+    def _where_it_is_wrong(self):
+        """What the draws on which it is wrong have in common, as one more sentence, where it is right on others."""
+        words = self._special_case() if self._right_somewhere() else None
+        return f" {words}" if words else ""
 
     def _agreement(self, search, solution):
         """How far what is computed on the way is what the solution computes, as one more sentence."""

@@ -60,6 +60,7 @@ WITHOUT = {
 }
 
 
+REDUCTIONS = {"sum", "mean", "median", "std", "var", "prod", "max", "min", "norm", "argmax", "argmin", "any", "all"}
 COARSE, FINE = 1e-6, 1e-6  # from which on a bound or a step of differences may be too large, and what part of it is not
 FINER = -1  # the rank of what is made finer: few changes, tried by themselves, before others make loops without an end
 ROUNDS = 200  # of a loop, or ten times as many as it has: enough for what converges
@@ -205,12 +206,74 @@ def _indices(function):
 
 
 def mending(function):
-    """What may mend a function: all single changes, and besides them bounds and steps made finer, loops made longer, an
-    index that a loop should count, and one slip mended wherever it stands: who copies a line copies its slip.
+    """What may mend a function: all single changes, and besides them bounds and steps made finer, loops made longer or
+    gone on with, an axis, an outer product, an index that a loop should count, and one slip mended wherever it stands:
+    who copies a line copies its slip.
     """
-    found = changes(function)
+    found = [*changes(function), *_with_an_axis(function)]
     found = [*_finer(function), *found, *_counted_by_loops(function), *_everywhere(found)]
+    found += [*_with_an_outer_product(function), *_of_rounds(function)]
     return sorted(found, key=lambda change: change.rank)
+
+
+def _with_an_axis(function):
+    """Sums, means and the like of all numbers of an array, taken along one axis."""
+    for owner in ast.walk(function):
+        for field, content in ast.iter_fields(owner):
+            for i, node in enumerate(content if isinstance(content, list) else [content]):
+                if not _takes_all(node):
+                    continue
+                for axis in (0, 1):
+                    new = ast.Call(node.func, node.args, [*node.keywords, ast.keyword("axis", ast.Constant(axis))])
+                    _locate(new, node)
+                    whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
+                    mends = f"this takes all numbers together, and `axis={axis}` belongs there"
+                    yield Change("", mends, 1, node, ((owner, field, whole),))
+
+
+def _takes_all(node):
+    """Whether this is a call of a sum, a mean or the like without an axis: of NumPy, or a method of an array."""
+    if not isinstance(node, ast.Call) or getattr(node.func, "attr", "") not in REDUCTIONS or node.keywords:
+        return False
+    of_numpy = ast.unparse(node.func).startswith("np.")
+    return len(node.args) == of_numpy
+
+
+def _with_an_outer_product(function):
+    """A vector times itself, made a matrix."""
+    for owner in ast.walk(function):
+        for field, node in ast.iter_fields(owner):
+            if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.MatMult | ast.Pow):
+                left, right = node.left, node.right
+                alike = ast.unparse(right) in (ast.unparse(left), f"{ast.unparse(left)}.T")
+                if alike or isinstance(node.op, ast.Pow) and getattr(right, "value", None) == 2:
+                    new = _numpy("outer", left, left)
+                    _locate(new, node)
+                    yield Change(
+                        "", "`np.outer` makes a matrix of it, and belongs there", 2, node, ((owner, field, new),)
+                    )
+
+
+def _of_rounds(function):
+    """Loops that go on where `break` ends them, and those that keep the largest, or the least, where they add up."""
+    for owner in ast.walk(function):
+        for field in ("body", "orelse"):
+            block = getattr(owner, field, None)
+            for i, statement in enumerate(block if isinstance(block, list) else ()):
+                for mends, new in _other_rounds(statement):
+                    _locate(new, statement)
+                    yield Change("", mends, 2, statement, ((owner, field, [*block[:i], new, *block[i + 1 :]]),))
+
+
+def _other_rounds(statement):
+    if isinstance(statement, ast.Break):
+        yield "the rounds behind it are left out, and `continue` belongs there", ast.Continue()
+    adds = isinstance(statement, ast.AugAssign) and isinstance(statement.op, ast.Add)
+    if adds and isinstance(statement.target, ast.Name):
+        so_far = ast.Name(statement.target.id, ast.Load())
+        for keep, words in (("max", "largest"), ("min", "least")):
+            kept = ast.Call(ast.Name(keep, ast.Load()), [so_far, statement.value], [])
+            yield f"all are added up here, and the {words} belongs there", ast.Assign([statement.target], kept)
 
 
 def _finer(function):

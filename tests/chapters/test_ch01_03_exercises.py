@@ -474,3 +474,44 @@ def test_values_near_a_mistake_are_that_mistake():
 
 def test_a_rounded_number_is_not_the_sum_it_happens_to_be():
     assert "from the origin of K1" in FRAMES["distance"].judge(200.0).text
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_short_vector_is_scaled_as_well(seed):
+    def kept_where_short(v):
+        n = np.linalg.norm(v)
+        return v if n < 1e-3 else v / n
+
+    item = ch01_exercises.CHAPTER["normalize"]
+    assert item.judge(kept_where_short, rng=np.random.default_rng(seed)).status == NOT_YET
+
+
+def test_lines_are_counted_with_the_empty_ones():
+    def only_full_lines(text):
+        return read_points([line for line in text.splitlines() if line.strip()])
+
+    outcome = judged("read_system", only_full_lines)
+    assert outcome.status == NOT_YET and "your sentence does not name the line" in outcome.text
+
+
+def test_two_systems_and_an_empty_file_are_none():
+    def in_threes(text):
+        points = read_points(text.splitlines(), count=None)
+        if len(points) % 3:
+            raise ValueError("no three points")
+        return points[-3:]
+
+    outcome = judged("read_system", in_threes)
+    assert outcome.status == NOT_YET and "a file of 6 points is no system" in outcome.text
+
+
+def read_points(lines, count=3):
+    points = []
+    for number, line in enumerate(lines, start=1):
+        entries = [number_in(entry) for entry in line.split("#")[0].replace(",", ".").split()]
+        if entries and (len(entries) != 3 or not np.isfinite(entries).all()):
+            raise ValueError(f"line {number}: three numbers are expected, not {line!r}")
+        points += [entries] if entries else []
+    if count and len(points) != count:
+        raise ValueError(f"expected {count} points, got {len(points)}")
+    return np.array(points)

@@ -175,3 +175,42 @@ def test_a_damped_step_may_be_a_taller_least_squares_problem(seed):
         return np.linalg.lstsq(np.vstack([J, np.sqrt(damping) * np.eye(n)]), -np.append(r, np.zeros(n)), rcond=None)[0]
 
     assert judged("damped_step", stacked, seed).status == CORRECT
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_kind_is_not_read_beside_the_diagonal(seed):
+    def beside(g, H):
+        if np.linalg.norm(g) > 1e-6:
+            return "not stationary"
+        return "saddle" if np.linalg.det(H) < 0 else "minimum" if H[0, 1] < 0 else "maximum"
+
+    assert judged("classify_extremum", beside, seed).status == NOT_YET
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_step_need_not_go_straight_down(seed):
+    def straight(cost, new_cost, g, B, step):
+        return (cost - new_cost) / (np.linalg.norm(g) * np.linalg.norm(step) - step @ B @ step / 2)
+
+    def of_a_positive_cost(cost, new_cost, g, B, step):
+        return (abs(cost) - abs(new_cost)) / -(g @ step + step @ B @ step / 2)
+
+    for answer in (straight, of_a_positive_cost):
+        assert judged("gain_ratio", answer, seed).status == NOT_YET
+
+
+def test_one_step_toward_the_saddle_is_not_the_saddle():
+    x = np.array([0.105, -0.205])
+    step = opt.newton_step(wells.gradient(x), wells.hessian(x))
+    assert judged("saddle", x + step).text == "There the gradient is 0.0435 long. At a saddle it vanishes."
+    assert judged("saddle", np.array([0.169, -0.246])).status == CORRECT
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_chord_has_two_places_at_least(seed):
+    def between(f, x, y, n):
+        rises = [f(x + t * (y - x)) - f(x) - t * (f(y) - f(x)) for t in np.linspace(0, 1, max(n, 3))]
+        return max(rises)
+
+    outcome = judged("rise_above_chord", between, seed)
+    assert outcome.status == NOT_YET and "both ends alone" in outcome.text

@@ -233,6 +233,13 @@ def test_one_call_is_shown_with_what_it_gives_and_with_the_right_word():
     assert re.search(r"x=\S+, std=\S+\): it gives '[a-e]', and '[a-e]' is right$", said)
 
 
+def test_where_the_first_entries_are_right_it_is_told_on_which_draws_the_others_are_not():
+    item = exercise(lambda x, std: np.array([x, x * x, np.sin(3 * x), np.cos(3 * x)]), lambda rng: (rng.normal(), 1.0))
+    text = told(item, "return np.array([x, x * x, *((np.sin(3 * x), np.cos(3 * x)) if x > 0.0 else (0.3, x - 0.2))])")
+    assert text.startswith("the first 2 are right, not all behind them are. On ")
+    assert "draws it was wrong exactly where `x` is negative." in text
+
+
 def test_what_is_small_on_every_draw_is_said_to_be():
     item = exercise(lambda x, std: float(np.exp(x) + std), lambda rng: (rng.uniform(1, 3), rng.uniform(1, 2)))
     assert "too small on every draw" in told(item, "return 1.0 + x * 0.3 * np.cos(std) ** 2")

@@ -112,6 +112,52 @@ def test_what_is_blamed_is_what_a_student_can_change(body, said):
     assert said in told(body)
 
 
+@pytest.mark.parametrize(
+    "right, body, said",
+    [
+        (
+            lambda rows: rows - rows.mean(axis=0),
+            "return rows - rows.mean()",
+            "in line 2, `rows.mean()`: this takes all numbers together, and `axis=0` belongs there.",
+        ),
+        (
+            lambda rows: np.outer(rows[0], rows[0]) - np.eye(3) / rows[1, 2],
+            "d = rows[0]\nreturn d * d - np.eye(3) / rows[1, 2]",
+            "in line 3, `d * d`: `np.outer` makes a matrix of it, and belongs there.",
+        ),
+        (
+            lambda rows: np.where(rows[0] > 0.3, rows[0] ** 3, 0.0),
+            """
+            w = np.zeros(3)
+            for k in range(3):
+                if rows[0, k] <= 0.3:
+                    break
+                w[k] = rows[0, k] ** 3
+            return w
+            """,
+            "in line 5, `break`: the rounds behind it are left out, and `continue` belongs there.",
+        ),
+        (
+            lambda rows: float(np.abs(rows[:, 0] * rows[:, 1]).max()),
+            """
+            most = 0.0
+            for row in rows:
+                most += abs(row[0] * row[1])
+            return most
+            """,
+            "in line 4, `most += abs(row[0] * row[1])`: all are added up here, and the largest belongs there.",
+        ),
+    ],
+)
+def test_an_axis_an_outer_product_and_what_a_loop_leaves_out_are_told(right, body, said):
+    def draw(rng):
+        return (rng.normal(size=(4, 3)),)
+
+    item = replace(ITEM, id="rows", reference=right, draw=draw)
+    outcome = item.judge(typed(body, "rows_made", "rows"), rng=np.random.default_rng(0))
+    assert outcome.text.startswith(said)
+
+
 def test_no_line_is_blamed_when_no_single_change_mends():
     assert "in line" not in told("return np.sin(a).sum() * 0.1 + np.exp(b[0]) - 3.3 * a[1] ** 5")
 

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from ...documents.lab_sheet.printed import points
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...exercises.whole import right_for_whole_numbers
 from ...geometry import frames
 
 
@@ -438,9 +439,14 @@ CHAPTER = Chapter(
         Exercise(
             "normalize",
             reference=frames.unit_vector,
-            draw=tuple(functools.partial(scaled_direction, scale=s) for s in (1.0, 1e-4, 1e3)),
+            draw=tuple(functools.partial(scaled_direction, scale=s) for s in (1.0, 1e-6, 1e3, 1e-4)),
             fixed={"v": POINT},
             metric=metrics.Numbers(1e-9),
+            properties=(
+                right_for_whole_numbers(
+                    frames.unit_vector, metrics.Numbers(1e-9), functools.partial(scaled_direction, scale=1.0), 0
+                ),
+            ),
             hints=(
                 "A direction says which way, not how far. What has to become 1, and by which number do you divide to get it there?",
                 "The length of v is the root of the sum of its squared components.",
@@ -515,6 +521,7 @@ CHAPTER = Chapter(
             draw=either_angle(two_directions),
             fixed={"a": POINT, "b": POINT},
             metric=metrics.Rotations(1e-7),
+            properties=(right_for_whole_numbers(frames.gram_schmidt, metrics.Rotations(1e-7), two_directions, 0, 1),),
             hints=(
                 "x takes the direction of a. y may only use what b has across x.",
                 "Remove from b its part along x: b - (b . x) x, with x of length 1. Then normalize. z follows from the right-hand rule.",
@@ -604,6 +611,9 @@ CHAPTER = Chapter(
             draw=either_angle(three_points),
             fixed={"origin": POINT, "x_point": POINT, "y_point": POINT},
             metric=metrics.Poses(1e-6, 1e-6),
+            properties=(
+                right_for_whole_numbers(frames.frame_from_points, metrics.Poses(1e-6, 1e-6), three_points, 0, 1, 2),
+            ),
             hints=(
                 "A pose is a rotation (which way the axes point) and a translation (where the origin is).",
                 "The two directions are x_point - origin and y_point - origin; gram_schmidt makes axes of them. Start with np.eye(4), and fill in its block and its last column.",
@@ -1157,6 +1167,7 @@ CHAPTER = Chapter(
             reference=frames.fit_frame,
             draw=(drawn_points, functools.partial(drawn_points, flat=True)),
             metric=metrics.Poses(1e-6, 1e-6),
+            properties=(right_for_whole_numbers(frames.fit_frame, metrics.Poses(1e-6, 1e-6), drawn_points, 0, 1),),
             noisy=(
                 functools.partial(drawn_points, count=3),
                 metrics.Poses(1e-6, 1e-6),

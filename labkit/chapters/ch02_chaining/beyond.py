@@ -131,24 +131,25 @@ class reads_back(metrics.Metric):
 def names_the_line(student, rng):
     """A sentence about the first fault that is not refused with its line, None if all are.
 
-    The points stand far down, at a line whose number is none of those in it.
+    The points stand far down, below comments and empty lines, at a line whose number is none of those in it.
     """
     good = write_system(system(rng).round(3)).splitlines()
-    before, at = int(rng.integers(60, 90)), int(rng.integers(3))
+    before, at = 3 * int(rng.integers(20, 30)), int(rng.integers(3))
     for what, bad in (
         ("a word in place of a number", "12.5 seven 3.0"),
         ("two numbers", "12.5 3.0"),
         ("four numbers", "12.5 3.0 4.0 5.0"),
         ("nan", "12.5 nan 3.0"),
     ):
-        told = _refusal(student, "\n".join(["# a comment"] * before + good[:at] + [bad] + good[at + 1 :]))
+        above = ["# a comment", "", "  "] * (before // 3)
+        told = _refusal(student, "\n".join(above + good[:at] + [bad] + good[at + 1 :]))
         number = before + at + 1
         if told is None:
             return f"line {number} of a file holds {what}: that must raise a ValueError, yours returned something."
         if not re.search(rf"\b{number}\b", told):
             return f"line {number} of a file holds {what}: your sentence does not name the line. It says: {told!r}."
-    for count in (2, 4):
-        if _refusal(student, "\n".join([*good, good[0]][:count])) is None:
+    for count in (2, 4, 6, 0):
+        if _refusal(student, "\n".join([*good, *good][:count])) is None:
             return f"a file of {count} points is no system: that must raise a ValueError, yours returned something."
     return None
 

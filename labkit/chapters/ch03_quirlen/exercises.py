@@ -8,6 +8,7 @@ from ...calibration import pivot, robust
 from ...documents.lab_sheet import printed as lab_sheet
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...exercises.whole import right_for_whole_numbers
 from ...geometry import frames
 from ...geometry.lie import exp_so3
 
@@ -827,6 +828,11 @@ CHAPTER = Chapter(
             reference=_tukey_weights,
             draw=tuple(functools.partial(draw, count=n) for n in (11, 6) for draw in (near_first, far_first)),
             metric=metrics.Numbers(1e-9),
+            properties=(
+                right_for_whole_numbers(
+                    _tukey_weights, metrics.Numbers(1e-9), functools.partial(near_first, count=9), 0
+                ),
+            ),
             noisy=(one_at_0, metrics.Numbers(1e-9), "right, but not where a distance is 0:"),
             hints=(
                 "Near poses keep their weight, far ones lose it all, smoothly.",

@@ -77,6 +77,14 @@ def hilly(rng, falls):
             return f, x, y, n
 
 
+def both_ends(rng):
+    """A chord of which no place but its ends is looked at: nothing rises above it there, though the middle does."""
+    while True:
+        f, x, y, _ = hilly(rng, falls=bool(rng.integers(2)))
+        if f((x + y) / 2) - (f(x) + f(y)) / 2 > 0.05:
+            return f, x, y, 2
+
+
 def chords(rise):
     """Something else made of share, values and heights of a chord."""
     return lambda f, x, y, n: float(rise(*chord(f, x, y, n)))
