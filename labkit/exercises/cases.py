@@ -167,7 +167,19 @@ def _of_array(here, array):
         found[f"{here} is not square"] = array.shape[0] != array.shape[1]
         found[f"{here} has more rows than columns"] = array.shape[0] > array.shape[1]
         found[f"{here} has fewer rows than columns"] = array.shape[0] < array.shape[1]
+        found |= _of_points(here, array)
     return found
+
+
+def _of_points(here, points):
+    """Whether points of a plane or of space, more than it takes to fill it, lie on one line or in one plane."""
+    if points.shape[1] not in (2, 3) or len(points) <= points.shape[1] or not np.isfinite(points).all():
+        return {}
+    sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    line, plane = sizes[1] < 1e-9 * sizes[0], sizes[-1] < 1e-9 * sizes[0]
+    return {f"the rows of {here} lie on one line": bool(line)} | (
+        {f"the rows of {here} lie in one plane": bool(plane)} if points.shape[1] == 3 else {}
+    )
 
 
 def _of_count(here, words, count):

@@ -33,6 +33,8 @@ MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried,
 MORE_CASES = 8  # on which an explanation from the first draws is tried once more, at least ...
 MOST_CASES = 64  # ... and at most, as far as LOOKING allows: of one in fifty draws a coincidence may hide
 LOOKING = 1.2  # seconds of processor time, from the beginning of a check, in which an explanation is looked for
+RANDOM = {"default_rng", "random", "normal", "standard_normal", "multivariate_normal", "RandomState", "gauss"}
+BY_CHANCE = 0.3  # how far off, relatively, a result made of random numbers may be by chance
 SPECIAL = 0.8  # more, where an answer is right on some draws only, for what the others have in common
 UNITS = {
     "mm": ("length", 1e-3),
@@ -269,7 +271,7 @@ class _Trial:
                     return self.outcome(NOT_YET, _closed(f"{words} {off}"))
         words = unmoved or self._relation()
         said, example, call = (_closed(words) if words else self._deviation()).partition(NOT_RIGHT)
-        said += self._where_it_is_wrong() if words else self._constant()
+        said += self._where_it_is_wrong() if words else self._constant() + self._by_chance()
         words = said + self._agreement(search, solution) + example + call
         return self.outcome(NOT_YET, words + self._about_globals())
 
@@ -515,6 +517,18 @@ class _Trial:
         if len(results) < 2 or _are_one(expected) or not _are_one(results):
             return ""
         return " Your result is the same on every draw, the right one is not: is it typed in, or made of other data?"
+
+    def _by_chance(self):
+        """That a result which is nearly right comes of random numbers, as one more sentence."""
+        drawn = RANDOM & set(getattr(getattr(self.function, "__code__", None), "co_names", ()))
+        if not drawn or "rng" in self.exercise.arguments or isinstance(self.exercise.metric, metrics.Exactly):
+            return ""
+        numbers = [(_numbers_of(r), _numbers_of(e)) for r, e in self._plain_pairs()]
+        if any(r is None or e is None or np.shape(r) != np.shape(e) for r, e in numbers):
+            return ""
+        if any(np.linalg.norm(np.subtract(r, e)) > BY_CHANCE * np.linalg.norm(e) for r, e in numbers):
+            return ""
+        return " Your function draws random numbers, so part of this may be chance: is there a way without them?"
 
     def _makes_no_difference(self, k, draws, least=0):
         """Whether the k-th argument, taken from the next draw, changes the reference's results, never the student's."""

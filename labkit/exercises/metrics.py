@@ -192,12 +192,13 @@ class Numbers(Metric):
     """A number or an array: largest deviation, relative to the size of the expected entries (at least 1).
 
     `tol` is that relative tolerance; `unit` names the deviation. With `absolute` the tolerance is in this unit, however
-    large the entries are.
+    large the entries are. With `double` it is the same for numbers of single precision: what is read keeps all digits.
     """
 
     tol: float = 1e-9
     unit: str = ""
     absolute: bool = False
+    double: bool = False
 
     def admit(self, result, expected):
         return as_array(result, np.shape(expected))
@@ -205,7 +206,7 @@ class Numbers(Metric):
     def deviations(self, result, expected):
         expected = np.asarray(expected, dtype=float)
         scale = 1.0 if self.absolute else max(1.0, np.abs(expected).max(initial=0.0))
-        tol = max(self.tol, FLOAT32_TOLERANCE) if _is_single(result) else self.tol
+        tol = max(self.tol, FLOAT32_TOLERANCE) if _is_single(result) and not self.double else self.tol
         amount = float(np.abs(result.astype(float) - expected).max(initial=0.0))
         return [Deviation("the largest entry" if result.ndim else "", amount, self.unit, tol * scale)]
 

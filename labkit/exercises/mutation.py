@@ -36,6 +36,8 @@ TWINS = {name: (twin,) for pair in PAIRS for name, twin in (pair, pair[::-1])} |
     "normal": ("uniform",),
 }
 WRAPPERS = {"array", "asarray", "float", "int", "list", "tuple", "range", "len", "zip", "enumerate", "bool", "set"}
+GUARD = 1e-3  # below which a bound stands for 0
+BOUNDED = {"clip"}  # exchanged, a value and its bound make a constant: that mends, and is not what happened
 SIGNS = {ast.Add: "plus", ast.Sub: "minus", ast.Mult: "`*`", ast.Div: "`/`", ast.MatMult: "`@`", ast.Pow: "`**`"}
 SIGNS |= {ast.FloorDiv: "`//`", ast.Mod: "`%`"}
 OTHERS = {
@@ -64,6 +66,9 @@ REDUCTIONS = {"sum", "mean", "median", "std", "var", "prod", "max", "min", "norm
 COARSE, FINE = 1e-6, 1e-6  # from which on a bound or a step of differences may be too large, and what part of it is not
 FINER = -1  # the rank of what is made finer: few changes, tried by themselves, before others make loops without an end
 ROUNDS = 200  # of a loop, or ten times as many as it has: enough for what converges
+SIZES = ("len({})", "len({}) - 1", "{}.shape[-1]")  # what a number that is typed in may stand for
+TURNS = {90: "np.pi / 2", 180: "np.pi", 360: "2 * np.pi"}
+TYPED = 2  # the rank of a number that is typed in
 REPEATED = 1  # how unlikely a slip may be that is looked for in several places at once
 
 
@@ -206,13 +211,17 @@ def _indices(function):
 
 
 def mending(function):
-    """What may mend a function: all single changes, and besides them bounds and steps made finer, loops made longer or
-    gone on with, an axis, an outer product, an index that a loop should count, and one slip mended wherever it stands:
-    who copies a line copies its slip.
+    """What may mend a function: all single changes, and besides them bounds and steps made finer, loops made longer,
+    gone on with or begun at 0, an axis, an outer product, an index that a loop should count, an argument or a size that is
+    typed in, and one slip mended wherever it stands: who copies a line copies its slip.
     """
-    found = [*changes(function), *_with_an_axis(function)]
+    found = changes(function)
+    narrower = list(_narrower(function, found))
+    found = [change for change in found if not any(change is other for other in narrower)]
+    found += _with_an_axis(function)
     found = [*_finer(function), *found, *_counted_by_loops(function), *_everywhere(found)]
     found += [*_with_an_outer_product(function), *_of_rounds(function)]
+    found += [*_begun_late(function), *_typed_numbers(function)]
     return sorted(found, key=lambda change: change.rank)
 
 
@@ -276,6 +285,30 @@ def _other_rounds(statement):
             yield f"all are added up here, and the {words} belongs there", ast.Assign([statement.target], kept)
 
 
+def _narrower(function, found):
+    """Changes that draw the bounds of an `np.clip` nearer together: they mend where any constant would."""
+    clips = [n for n in ast.walk(function) if getattr(getattr(n, "func", None), "attr", "") == "clip"]
+    within = {part: call for call in clips if len(call.args) == 3 for part in ast.walk(call)}
+    for change in found:
+        call = within.get(change.place)
+        before = call and [_number(bound) for bound in call.args[1:]]
+        if not before or None in before:
+            continue
+        with change.made():
+            after = [_number(bound) for bound in call.args[1:]]
+        if None not in after and (after[0] > before[0] or after[1] < before[1]):
+            yield change
+
+
+def _number(node):
+    """A number as it is typed, with or without a sign; None for anything else."""
+    try:
+        value = ast.literal_eval(node)
+    except ValueError:
+        return None
+    return value if isinstance(value, int | float) else None
+
+
 def _finer(function):
     """Numbers that end a loop, bound a case or make a step of differences, so small or large that they do no harm."""
     for owner in ast.walk(function):
@@ -292,6 +325,48 @@ def _finer(function):
                 mends = f"these are too few rounds: {more} will do"
                 number = ast.copy_location(ast.Constant(more), given[0])
                 yield Change("", mends, FINER, owner.iter, ((owner.iter, "args", [number]),))
+
+
+def _begun_late(function):
+    """Loops over `range(first, behind)` that begin at 0."""
+    for node in ast.walk(function):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "range" and len(node.args) == 2:
+            mends = f"the loop begins at `{ast.unparse(node.args[0])}`, and belongs from 0 on"
+            yield Change("", mends, 2, node, ((node, "args", node.args[1:]),))
+
+
+def _typed_numbers(function):
+    """Numbers that are typed in, changed to an argument that is read nowhere, to the size of one, or to radians; a
+    number that stands in several places is changed in all of them as well.
+    """
+    given = [argument.arg for argument in function.args.args]
+    read = {n.id for n in ast.walk(function) if isinstance(n, ast.Name)}
+    unread, alike = [name for name in given if name not in read], {}
+    for owner, field, content, i, node in _typed(function):
+        sizes = [form.format(name) for name in given for form in SIZES if type(node.value) is int and node.value > 1]
+        turns = [TURNS[node.value]] if node.value in TURNS else []
+        for text in (*unread, *turns, *sizes):
+            new = ast.copy_location(ast.parse(text, mode="eval").body, node)
+            _locate(new, node)
+            whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
+            mends = f"{node.value} is typed in where `{text}` belongs"
+            change = Change("", mends, TYPED if text in sizes else 1, node, ((owner, field, whole),))
+            alike.setdefault((node.value, text), []).append(change)
+            yield change
+    for (number, text), group in alike.items():
+        if sets := _together(group):
+            mends = f"{number} is typed in where `{text}` belongs, here and where it stands again"
+            yield Change("", mends, TYPED, group[0].place, sets)
+
+
+def _typed(function):
+    """(owner, field, content, place in it, number) of what is typed in, but in brackets."""
+    inner = {n for part in ast.walk(function) if isinstance(part, ast.Subscript) for n in ast.walk(part.slice)}
+    for owner in ast.walk(function):
+        for field, content in ast.iter_fields(owner):
+            for i, node in enumerate(content if isinstance(content, list) else [content]):
+                if isinstance(node, ast.Constant) and type(node.value) in (int, float) and node not in inner:
+                    yield owner, field, content, i, node
 
 
 def _is_coarse(node):
@@ -402,8 +477,13 @@ def _operation(node, names):
         words = f"with {what.get(kind, 'the factors of one product `@` exchanged')}"
         yield 0, words, ast.BinOp(node.right, node.op, node.left)
     if kind in WITHOUT:
-        yield 1, _without(kind, node.right, names), node.left
-        if kind not in (ast.Pow, ast.Mod):
+        bare = kind in (
+            ast.Add,
+            ast.Sub,
+        )  # a number alone for x - 1 is nobody's slip, and mends where any constant does
+        if not (bare and isinstance(node.left, ast.Constant)):
+            yield 1, _without(kind, node.right, names), node.left
+        if kind not in (ast.Pow, ast.Mod) and not (bare and isinstance(node.right, ast.Constant)):
             yield 1, _without(kind, node.left, names), node.right
     if kind is ast.MatMult and isinstance(node.left, ast.BinOp) and isinstance(node.left.op, ast.MatMult):
         a, b, c = node.left.left, node.left.right, node.right
@@ -448,7 +528,7 @@ def _call(node, names):
     inner = node.args[0] if node.args else getattr(node.func, "value", None)
     if isinstance(inner, ast.Starred) or name in WRAPPERS:
         return
-    for twin in TWINS.get(name, ()):
+    for twin in () if _is_guarded(name, node.args) else TWINS.get(name, ()):
         words = f"with `{twin}` where `{name}` belongs"
         if isinstance(node.func, ast.Attribute):
             yield 0, words, ast.Call(ast.Attribute(node.func.value, twin, ast.Load()), node.args, node.keywords)
@@ -462,7 +542,7 @@ def _call(node, names):
         yield 0, "with `arctan` of a quotient where `arctan2` belongs", quotient
     if inner is not None and not (isinstance(inner, ast.Name) and inner.id in ("np", "rng")):
         yield 1, f"without `{name}`", inner
-    for i in range(len(node.args) - 1):
+    for i in range(len(node.args) - 1 if name not in BOUNDED else 0):
         args = [*node.args[:i], node.args[i + 1], node.args[i], *node.args[i + 2 :]]
         yield 1, f"with two arguments of `{name}` exchanged", ast.Call(node.func, args, node.keywords)
     for i, keyword in enumerate(node.keywords):
@@ -476,6 +556,12 @@ def _call(node, names):
     yield 3, "with one part squared", ast.BinOp(node, ast.Pow(), ast.Constant(2))
     yield 3, "with the root of one part taken", _numpy("sqrt", node)
     yield 3, "with one angle in degrees", _numpy("rad2deg", node)
+
+
+def _is_guarded(name, args):
+    """Whether a bound only keeps a division from failing: the other bound would make a constant of what it bounds."""
+    numbers = [a.value for a in args if isinstance(a, ast.Constant) and isinstance(a.value, float)]
+    return name in ("minimum", "maximum", "min", "max") and any(0 < number < GUARD for number in numbers)
 
 
 def _comparison(node, names):
@@ -585,6 +671,9 @@ def _instead(statement):
     if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name | ast.Subscript):
         mends = "`=` throws away what was there before, which belongs to the result: `+=`"
         yield "with `+=` where `=` belongs", mends, [ast.AugAssign(statement.targets[0], ast.Add(), statement.value)]
+    if isinstance(statement, ast.Continue):
+        mends = "`continue` goes on with the next round; `break`, which ends the loop, belongs there"
+        yield "with `break` where `continue` belongs", mends, [ast.Break()]
     if isinstance(statement, ast.For):
         once = [*statement.body, ast.Break()]
         mends = "the loop is to take one round only"

@@ -52,6 +52,9 @@ def _relation(metric, results, expected, sizes, whole):
     if _are_rounded(results, expected):
         return "your result is rounded: hand over all digits"
 
+    if _are_cut_off(results, expected):
+        return "your result is the right one without its decimals: is it put into an array of whole numbers?"
+
     def holds(change):
         try:
             return all(metric.equal(change(r), e) for r, e in zip(results, expected))
@@ -358,6 +361,13 @@ def _are_rounded(results, expected):
     """Whether these are the expected results with some digits, one of which shows at least: 1 for 0.9996 shows none."""
     shown = any(float(f"{x:.0e}") != x for result in results for x in np.ravel(result))
     return shown and all(significant_digits(r, e) > 1 for r, e in zip(results, expected))
+
+
+def _are_cut_off(results, expected):
+    """Whether these are the expected numbers with their decimals cut off, which only an array shows well enough."""
+    cut = [r.shape == e.shape and np.array_equal(r, np.trunc(e)) for r, e in zip(results, expected)]
+    lost = [int((np.round(e) != e).sum()) for e in expected]
+    return all(cut) and all(n > 2 for n in lost)
 
 
 def significant_digits(answer, expected):

@@ -211,6 +211,29 @@ def test_the_special_case_is_named():
     )
 
 
+def test_the_special_case_is_named_behind_the_entry_that_is_wrong():
+    item = exercise(
+        lambda x, std: np.array([x, x * std, 3.0]), lambda rng: (rng.uniform(1, 2), float(rng.choice([-1.3, 1.7])))
+    )
+    text = told(item, "return np.array([x, x * std if std > 0 else 0.1 * np.exp(x), 3.0])")
+    assert text.startswith("only entry 1 (counted from 0) is not right") and "exactly where `std` is negative" in text
+
+
+def test_a_result_that_is_nearly_right_by_chance_is_told_so():
+    item = exercise(lambda x, std: x + std**2, lambda rng: (rng.uniform(1, 3), rng.uniform(1, 2)))
+    many = "r = np.random.default_rng(0)\nreturn x + np.var(std * r.normal(size=300))"
+    assert "draws random numbers, so part of this may be chance" in told(item, many)
+    assert "random numbers" not in told(item, "return 9 * x ** 3 + np.random.default_rng(0).normal()")
+
+
+def test_points_that_lie_in_a_plane_are_a_case():
+    rng = np.random.default_rng(0)
+    clouds = [rng.normal(size=(7, 3)) * [1, 1, k % 2] + 3 for k in range(30)]
+    missed = [not k % 2 for k in range(30)]
+    words = cases.case_words([({"x": cloud}, 0.0) for cloud in clouds], missed)
+    assert words == "exactly where the rows of `x` lie in one plane"
+
+
 def test_an_argument_scaled_by_another_is_named():
     item = exercise(lambda x, std: x / std + np.sin(x), _draw)
     assert "with `x` times `std` in place of `x`" in told(item, "x = x * std\nreturn x / std + np.sin(x)")

@@ -49,6 +49,7 @@ def changed(index, value):
         (np.linalg.inv, SQUARES, "the inverse of the expected one"),
         (np.square, VECTORS, "the square of the expected one"),
         (np.reciprocal, VECTORS, "the reciprocal of the expected one"),
+        (np.trunc, [9 * e for e in TABLES], "the right one without its decimals"),
     ],
 )
 def test_relations_of_numbers(change, expected, told):

@@ -1,6 +1,7 @@
 """The general layer, steps: in which line of a student's own code it goes wrong, and in which way."""
 
 import linecache
+import re
 import textwrap
 from dataclasses import replace
 
@@ -450,6 +451,56 @@ def test_what_agrees_ends_at_the_first_step_that_does_not(monkeypatch):
 
 def _root(a, b):
     return np.sqrt(1 + a @ a)
+
+
+def _up_to_above(a, b):
+    """Entries of a that are not above 1, each with its place, and the largest of b."""
+    return sum(k * v for k, v in enumerate(a) if v <= 1) + b.max()
+
+
+@pytest.mark.parametrize(
+    "reference, body, said",
+    [
+        (
+            _up_to_above,
+            "s = b.max()\nfor k, v in enumerate(a):\n    if v > 1:\n        break\n    s += k * v\nreturn s",
+            "line 5, `break`: the rounds behind it are left out, and `continue` belongs there",
+        ),
+        (
+            lambda a, b: sum(a[k] * b[j] ** k for j in range(3) for k in range(3)),
+            "s = 0.0\nfor j in range(3):\n    for k in range(j, 3):\n        s += a[k] * b[j] ** k\nreturn s",
+            "`range(j, 3)`: the loop begins at `j`, and belongs from 0 on",
+        ),
+        (
+            lambda a, b: a * (np.sin((np.pi - b[0]) / 3) + b[1]),
+            "return a * (np.sin((180 - b[0]) / 3) + b[1])",
+            "`180`: 180 is typed in where `np.pi` belongs",
+        ),
+        (lambda a, b: a.sum() * b, "return a.sum() * 1.5", "`1.5`: 1.5 is typed in where `b` belongs"),
+        (
+            lambda a, b: np.sum(a**2) / len(a) + np.exp(len(a) - b[0]),
+            "return np.sum(a**2) / 7 + np.exp(7 - b[0])",
+            "7 is typed in where `len(a)` belongs, here and where it stands again",
+        ),
+    ],
+)
+def test_loops_and_numbers_that_are_typed_in_are_told(reference, body, said):
+    def draw(rng):
+        n = int(rng.integers(3, 6))
+        return rng.uniform(0.5, 1.3, n), rng.normal(size=3)
+
+    assert said in judged(asked(reference, draw), body)
+
+
+@pytest.mark.parametrize("weights", ["np.clip(a, -1, 1)", "np.maximum(a, 1e-9)", "np.clip((a - 1) / 2, 0, 1)"])
+def test_a_change_that_makes_weights_alike_is_not_told_as_the_slip(weights):
+    body = f"w = {weights}\nreturn (w @ b) / w.sum()"
+    text = judged(asked(lambda a, b: b.mean(), two_vectors), body)
+    assert not re.search("exchanged|stands where|one term is too many", text)
+
+
+def two_vectors(rng):
+    return rng.uniform(0.1, 0.9, 3), rng.normal(size=3)
 
 
 @pytest.mark.parametrize(
