@@ -229,8 +229,8 @@ def numeric_jacobian(function, x, step):
     """Return the derivative, shape (m, n), by central differences, a whole step to each
     side.
 
-    function: takes an array (n,), returns an array (m,); x: where, shape (n,); step: a
-    number, the same for all n.
+    function: takes an array (n,), returns an array (m,); x: where, floats, shape (n,);
+    step: a number, the same for all n.
     """
     ### BEGIN SOLUTION
     columns = [(function(x + h) - function(x - h)) / (2 * step)

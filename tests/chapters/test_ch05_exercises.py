@@ -190,3 +190,43 @@ def test_equations_of_kim_by_loops_are_right(seed):
         return D, F
 
     assert judged("kim_system", loops, seed).status == CORRECT
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_start_from_the_first_poses_alone_is_not_right(seed):
+    def first_six(T_BF, x_S):
+        return hand_eye.linear_start(T_BF[:6], x_S[:6])
+
+    outcome = judged("linear_start", first_six, seed)
+    assert outcome.status == NOT_YET
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_step_two_of_li_hears_all_poses_and_takes_any_least_squares(seed):
+    def from_differences(T_BF, x_S, R_FS):
+        R, y = T_BF[:, :3, :3], T_BF[:, :3, 3] + (T_BF[:, :3, :3] @ (x_S @ R_FS.T)[..., None])[..., 0]
+        t = np.linalg.lstsq((R[1:] - R[0]).reshape(-1, 3), (y[0] - y[1:]).ravel(), rcond=None)[0]
+        return t, (y + R @ t).mean(axis=0)
+
+    def first_three(T_BF, x_S, R_FS):
+        return from_differences(T_BF[:3], x_S[:3], R_FS)
+
+    assert judged("li_translation", from_differences, seed).status == CORRECT
+    assert "not all poses are heard" in judged("li_translation", first_three, seed).text
+
+
+@pytest.mark.parametrize(
+    "of, told", [(lambda T, T_FS: T @ T_FS, "the scanner's poses"), (lambda T, T_FS: frames.invert(T), "inverse poses")]
+)
+def test_good_poses_of_another_frame_are_told_as_such(of, told):
+    def poses(T_FS, target, rng):
+        return of(exercises.design_poses(T_FS, target, rng), T_FS)
+
+    assert told in judged("design_poses", poses).text
+
+
+def test_rows_whose_other_entry_is_the_misprint_are_told():
+    metric, wanted = exercises.named_entries(), {("C14", 3, "x"), ("C17", 2, "z"), ("C14", 4, "y")}
+    told = str(metric.deviations({("C14", 3, "y"), ("C14", 2, "x")}, wanted)[0])
+    assert told.startswith("3 of 3 misprints are not named yet: in the rows 2, 3 you name")
+    assert str(metric.deviations({("C14", 3, "x")}, wanted)[0]) == "2 misprints are not named yet"

@@ -159,3 +159,45 @@ def test_other_ways_through_the_further_parts_are_right(name, answer):
 
 def test_two_rays_alone_are_no_answer():
     assert "first two rays" in texts("nearest_to_rays", lambda o, d: lengths_along_the_rays(o[:2], d[:2])).pop()
+
+
+def test_a_packet_read_in_single_precision_is_not_right():
+    def decoded(data):
+        v = np.frombuffer(data, "<f8").astype(np.float32)
+        return v[1], 1000 * v[2:5], v[11:15]
+
+    assert "single precision" in texts("decode_packet", decoded).pop()
+
+
+def test_the_median_of_an_even_number_and_truth_values_that_are_whole_numbers():
+    def upper(values, factor=4.0):
+        m = np.sort(values)[len(values) // 2]
+        d = np.abs(values - m)
+        return d <= factor * 1.4826 * np.sort(d)[len(d) // 2]
+
+    def ones(values, factor=4.0):
+        d = np.abs(values - np.median(values))
+        return np.where(d <= factor * 1.4826 * np.median(d), 1, 0)
+
+    def listed(values, factor=4.0):
+        return [bool(kept) for kept in ones(values, factor)]
+
+    assert all("Where it is even, the median" in text for text in texts("reject_outliers", upper))
+    assert all("whole numbers for places" in text for text in texts("reject_outliers", ones))
+    texts("reject_outliers", listed, CORRECT)
+
+
+def test_the_first_shift_that_is_least_among_its_neighbors_is_not_enough():
+    def offset(time, reference, delayed, max_offset=0.2):
+        step, n = time[1] - time[0], len(time)
+        shifts = np.arange(-round(max_offset / step), round(max_offset / step) + 1)
+        cost = [
+            np.mean((reference[max(0, -k) : n - max(0, k)] - delayed[max(0, k) : n - max(0, -k)]) ** 2) for k in shifts
+        ]
+        i = 1
+        while i < len(cost) - 2 and cost[i + 1] < cost[i]:
+            i += 1
+        left, middle, right = cost[i - 1 : i + 2]
+        return (shifts[i] + 0.5 * (left - right) / (left - 2 * middle + right)) * step
+
+    texts("time_offset", offset)

@@ -70,6 +70,16 @@ def turned_poses(rng):
     return poses_that_see(T_FS, target, exp_so3(rng.uniform(-1.2, 1.2, (n, 3))), x_S), x_S, T_FS[:3, :3].copy()
 
 
+def first_ones_turned_alike(rng):
+    """Noisy poses of which the first three hardly turn: by them alone t_FS and target are not known."""
+    T_FS, target = scanner(rng)
+    n = int(rng.integers(7, 11))
+    x_S = np.column_stack([rng.uniform(-25, 25, n), rng.uniform(-20, 20, n), rng.uniform(190, 290, n)])
+    turns = np.concatenate([rng.uniform(-0.01, 0.01, (3, 3)), rng.uniform(-1.2, 1.2, (n - 3, 3))])
+    T_BF = poses_that_see(T_FS, target, exp_so3(rng.uniform(-1, 1, 3)) @ exp_so3(turns), x_S)
+    return T_BF, x_S + 0.02 * rng.normal(size=(n, 3)), T_FS[:3, :3].copy()
+
+
 def two_motions(rng):
     """A motion of the flange and the same motion of the scanner."""
     X, A = (frames.pose(exp_so3(rng.uniform(-1, 1, 3)), rng.uniform(-2, 2, 3)) for _ in range(2))
@@ -667,6 +677,11 @@ TRIANGULATION = [
                 id="std-both-at-once",
             ),
             Mistake(
+                _std(lambda a, b, s: s * abs(a - b)),
+                "The two effects are subtracted, as if one angle erred upward whenever the other errs downward. Independent errors add up in their squares.",
+                id="std-subtracted",
+            ),
+            Mistake(
                 _by_tangents,
                 "The derivative is that of tan, 1/cos². In L = H (cot α + cot β) stand cotangents: −1/sin².",
                 id="std-cosine",
@@ -786,6 +801,15 @@ LITERATURE = [
         draw=turned_poses,
         fixed={"R_FS": ROTATION},
         metric=metrics.Several(metrics.Numbers(1e-6, "mm"), metrics.Numbers(1e-6, "mm"), names=("t_FS", "target")),
+        noisy=(  # differences from one pose are weighed otherwise, and right as well
+            first_ones_turned_alike,
+            metrics.Several(
+                metrics.Numbers(0.3, "mm", absolute=True),
+                metrics.Numbers(0.3, "mm", absolute=True),
+                names=("t_FS", "target"),
+            ),
+            "right without noise, but not all poses are heard:",
+        ),
         hints=(
             "With R_FS known, (2-40) is linear in what is left: t_FS and the target, six numbers.",
             "Each pose gives R_BF t_FS − target = −(t_BF + R_BF R_FS x_S), three rows: R_BF beside −I. Stack the rows of all poses, and solve for six numbers by least squares.",

@@ -52,6 +52,14 @@ def noisy_scene(rng):
             return T_BF, x_S
 
 
+def first_ones_alike(rng):
+    """Noisy poses of which all but the last six hardly turn: the first ones alone tell next to nothing."""
+    T_FS, T_BF, x_S, target = scene(rng, n=int(rng.integers(14, 20)))
+    R = T_BF[0, :3, :3] @ exp_so3(rng.uniform(-0.003, 0.003, (len(x_S) - 6, 3)))
+    T_BF[:-6] = frames.pose(R, target - (R @ frames.transform(T_FS, x_S[:-6])[..., None])[..., 0])
+    return T_BF, x_S + 0.02 * rng.normal(size=x_S.shape)
+
+
 def kuka_scene(rng):
     """A KUKA pose (mm, rad) somewhat off the true scanner, with poses, centers and target."""
     T_FS, T_BF, x_S, target = scene(rng)
@@ -146,6 +154,11 @@ def _kuka_inverse(p2, T_BF, x_S, target):
 
 def _kuka_flange_inverse(p2, T_BF, x_S, target):
     return _residual(frames.matrix_from_kuka(p2), frames.invert(T_BF), x_S, target)
+
+
+def _kuka_in_flange(p2, T_BF, x_S, target):
+    seen = frames.transform(frames.matrix_from_kuka(p2), x_S)
+    return seen - frames.transform(frames.invert(T_BF), np.tile(target, (len(x_S), 1)))
 
 
 def _kuka_angles(sequence):
@@ -419,6 +432,12 @@ class named_entries(metrics.Exactly):
 
     def deviations(self, result, expected):
         missed, accused = len(expected - result), len(result - expected)
+        found = {pose for _, pose, _ in expected - result} & {pose for _, pose, _ in result - expected}
+        if found:
+            which = ", ".join(map(str, sorted(found)))
+            words = f"in row {which} you name" if len(found) == 1 else f"in the rows {which} you name"
+            words = f"{missed} of {len(expected)} misprints {'is' if missed == 1 else 'are'} not named yet: {words} an entry, but not the misprinted one"
+            return [metrics.Deviation("", float(missed), "", 0.5, words=words)]
         rows = Counter((table, pose) for table, pose, _ in result)
         whole = " (several of one row: one slip a row is meant)" if max(rows.values(), default=0) > 1 else ""
         return [Count("misprints are not named yet", missed), Count(f"entries are accused wrongly{whole}", accused)]
@@ -474,7 +493,26 @@ def _problem_of_design(T_BF, T_FS, target):
         x_S = hand_eye.sphere_in_scanner(T_BF, T_FS, target)
     except ValueError as refusal:
         return f"{refusal}."
-    return planning.field_problem(x_S) or _looks_up(T_BF, T_FS) or _too_uncertain(T_BF, T_FS, target, x_S)
+    off = planning.field_problem(x_S)
+    return (
+        off
+        and (_of_another_frame(T_BF, T_FS, target) or off)
+        or _looks_up(T_BF, T_FS)
+        or _too_uncertain(T_BF, T_FS, target, x_S)
+    )
+
+
+def _of_another_frame(T_BF, T_FS, target):
+    """Which other poses these are, if as such they keep the sphere in the field."""
+    others = {
+        "the scanner's poses, T_BF T_FS. The flange's are wanted: multiply by the inverse of T_FS from the right": T_BF
+        @ frames.invert(T_FS),
+        "the inverse poses, T_FB. T_BF maps from the flange to the base": frames.invert(T_BF),
+    }
+    for words, T in others.items():
+        if planning.field_problem(hand_eye.sphere_in_scanner(T, T_FS, target)) is None:
+            return f"these are {words}."
+    return None
 
 
 def _looks_up(T_BF, T_FS):
@@ -595,6 +633,12 @@ def _rms_beside(R):
 def _fitted_radius():
     measured = thesis.measurements(True)
     return hand_eye.fit_radius(measured.T_BF, measured.x_S).radius
+
+
+@functools.cache
+def _std_of_radius():
+    measured = thesis.measurements(True)
+    return hand_eye.fit_radius(measured.T_BF, measured.x_S).std
 
 
 @functools.cache
@@ -725,6 +769,7 @@ CHAPTER = Chapter(
                 Mistake(lambda p2, T, x, c: _residual(frames.matrix_from_kuka(p2), T, x, -c), "The target is to be subtracted; yours is added."),
                 Mistake(lambda p2, T, x, c: frames.transform(T, x) - c, "T_FS is missing: x_S is still in the scanner's frame when T_BF meets it."),
                 Mistake(_kuka_flange_inverse, "You used the inverse of T_BF: it maps F to B, as it stands."),
+                Mistake(_kuka_in_flange, "These are the residuals along the axes of F: the target was brought into the flange. (4-3) brings the sphere into B.", id="kuka_residual-in-flange"),
                 Mistake(_kuka_angles("XYZ"), "You turned by A about x and by C about z. KUKA: A about z, then B about y, then C about x."),
                 Mistake(_kuka_angles("zyx"), "You turned about fixed axes. A, B, C turn about axes that move along: Rz(A) Ry(B) Rx(C)."),
                 Mistake(_kuka_without_target, "The target is missing: these are positions of the sphere in the base, not residuals."),
@@ -973,9 +1018,12 @@ CHAPTER = Chapter(
             reference=hand_eye.linear_start,
             draw=lambda rng: scene(rng)[1:3],
             metric=metrics.Several(metrics.Poses(1e-5, 1e-4), metrics.Numbers(1e-7, "mm"), names=("T_FS", "target")),
-            noisy=(noisy_scene,  # t_FS solved anew, or a refined answer, is right as well
-                   metrics.Several(metrics.Poses(0.5, 2.5), metrics.Numbers(2e-3, "mm"), names=("T_FS", "target")),
-                   "exact on clean data, but on noisy data"),
+            noisy=((noisy_scene,  # t_FS solved anew, or a refined answer, is right as well
+                    metrics.Several(metrics.Poses(0.5, 2.5), metrics.Numbers(2e-3, "mm"), names=("T_FS", "target")),
+                    "exact on clean data, but on noisy data"),
+                   (first_ones_alike,
+                    metrics.Several(metrics.Poses(0.4, 2.0), metrics.Numbers(2e-3, "mm"), names=("T_FS", "target")),
+                    "exact on clean data, but not all poses are heard. Where only the last ones turn far,")),
             hints=(
                 "Forget for a moment that R_FS is a rotation: then all unknowns enter linearly.",
                 "R_FS x + t_FS - R_BF^T target = -R_BF^T t_BF. Fifteen unknowns: nine of R_FS, three of t_FS, three of the target. A pose gives three rows: `np.kron(np.eye(3), x)` for R_FS row by row, then `np.eye(3)`, then -R_BF^T. Solve all rows, and take `nearest_rotation` of the first nine.",
@@ -1103,6 +1151,7 @@ CHAPTER = Chapter(
                 Mistake(lambda: _joint_rms(2, 3, 4, 7, 21, 30), "Pose 12 is not corrected yet: one degree is missing there."),
                 Mistake(_rms_with_printed_target, "Here the thesis's sphere center was held fixed. Free it."),
                 Mistake(lambda: _joint_rms(2), "Only pose 2 is repaired in this fit. Use all corrections."),
+                Mistake(lambda: _robust_fit().std, "This is the noise of one coordinate that a robust fit estimates. Asked for is the rms distance of the fit to all 31.", id="rms_after-robust-std"),
                 Mistake(lambda: corrected_fit().std, "This is the estimated noise of one coordinate, with 84 degrees of freedom. Asked for is the rms distance."),
                 Mistake(_rms_of_linear_start, "This is the rms at the linear start, which takes R_FS for any nine numbers. Iterate from there: `hand_eye.calibrate_sphere_target`.", id="rms_after-linear"),
                 Mistake(lambda: _rms_of_end_pose(*ALL_FIXED), "These are the corrected data under the thesis's end pose. Fit scanner and center anew."),
@@ -1134,6 +1183,7 @@ CHAPTER = Chapter(
                         "The sign under the root is reversed: y'^2 = y^2 + R^2 - 30^2, so a larger sphere means a larger y'.", within=0.002),
                 Mistake(lambda: 2 * _fitted_radius(),
                         "This is a diameter: half of it."),
+                Mistake(_std_of_radius, "This is the standard deviation of the radius. Asked for is the radius itself.", id="radius-std"),
                 Mistake(lambda: _radius_without(4), "Pose 4, next to the equator, is left out. Here all 31 corrected poses are asked.", within=0.001),
                 Mistake(_radius_with_pose_2_alone, "Only pose 2 is repaired in this fit. Use `corrected`.", within=0.001),
                 Mistake(lambda: np.mean([thesis.radius(s) for s in ("certificate", "listing", "coordinate machine")]),

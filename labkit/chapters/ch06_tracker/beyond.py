@@ -5,6 +5,7 @@ import itertools
 
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 from ...documents.report.printed import COLUMNS, table_d
 from ...exercises import metrics
@@ -59,6 +60,18 @@ STOPS = [
                 _unit_mean(lambda q: np.ones(len(q))),
                 "q and -q are one rotation, but their mean is 0. The readings come in both signs: what you average must not depend on it.",
                 id="mean_quaternion-signs",
+            ),
+            Mistake(
+                lambda q: Rotation.from_euler("xyz", Rotation.from_quat(q).as_euler("xyz").mean(axis=0)).as_quat(),
+                "You averaged angles about three axes. They jump by a whole turn where one passes 180 deg, and near the pole small turns move them "
+                "far: average the quaternions, signs aside.",
+                id="mean_quaternion-euler",
+            ),
+            Mistake(
+                lambda q: Rotation.from_rotvec(Rotation.from_quat(q).as_rotvec().mean(axis=0)).as_quat(),
+                "You averaged rotation vectors. Near a half turn two that are nearly one rotation point in opposite directions; and the mean is not "
+                "quite that of the rotations elsewhere.",
+                id="mean_quaternion-vectors",
             ),
             Mistake(
                 lambda q: q.mean(axis=0),
@@ -610,6 +623,13 @@ CELL = [
         ),
         mistakes=[
             Mistake(
+                lambda T_BW, T_WE0, T_WE1, T_BP0: pose(
+                    T_BP0[:3, :3], T_BP0[:3, 3] + T_BW[:3, :3] @ (T_WE1[:3, 3] - T_WE0[:3, 3])
+                ),
+                "You shifted the part by the way of the tracker. The trolley turns as well: then the part turns with it, and swings round.",
+                id="moved_part-shifted",
+            ),
+            Mistake(
                 lambda W, E0, E1, P: cell.moved_part(W, E1, E0, P),
                 "You moved the part backward: first and second reading have changed places.",
                 id="moved_part-backward",
@@ -871,6 +891,11 @@ CELL = [
                 for source in ("scanner", "tip", "marks", "first reading")
             ),
             Mistake(lambda: budget()[1], "This is the total as it is.", id="halved-not"),
+            Mistake(
+                lambda: float(np.hypot(budget()[1], np.sqrt(3) * budget()[0]["tracker"]) / 2),
+                "Here all sources are halved but the largest. It is the other way round.",
+                id="halved-all-others",
+            ),
             Mistake(
                 lambda: _improved(0.25),
                 "This is with a quarter of that source's standard deviation. Four times as many readings halve it.",

@@ -270,6 +270,16 @@ def spoiled(rng, factor):
     return rng.permutation(50 + rng.uniform(0.5, 2) * values), factor
 
 
+def two_heaps(rng):
+    """An even number of values in two heaps: the median lies halfway between them, where no value is."""
+    n, gap = int(rng.integers(8, 20)), rng.uniform(2, 4)
+    core = np.r_[-gap - rng.uniform(0, 0.2, n), gap + rng.uniform(0, 0.2, n)]
+    factor = float(rng.uniform(2.5, 5))
+    limit = factor * 1.4826 * (gap + 0.1)
+    values = np.r_[core, limit * np.array([-1.6, -1.3, -0.8, 0.8, 1.3, 1.6])]
+    return rng.permutation(50 + values), factor
+
+
 def all_equal(rng):
     """Readings without any noise: each lies at the median, and so within any limit, 0 as well."""
     return np.full(int(rng.integers(5, 40)), rng.uniform(-50, 50)), float(rng.uniform(2, 6))
@@ -277,6 +287,12 @@ def all_equal(rng):
 
 class KeptOrNot(metrics.Exactly):
     """True or False for each value; says how many are kept or refused wrongly."""
+
+    def admit(self, result, expected):
+        if np.asarray(expected).dtype == bool and getattr(np.asarray(result), "dtype", None).kind in "iu":
+            told = "`values[kept]` takes whole numbers for places"
+            raise metrics.Refused(f"expected an array of True and False, got whole numbers: {told}")
+        return super().admit(result, expected)
 
     def deviations(self, result, expected):
         if np.asarray(expected).dtype != bool:
@@ -299,14 +315,24 @@ def _tukey(values, factor):
     return (values >= low - 1.5 * (high - low)) & (values <= high + 1.5 * (high - low))
 
 
+def _refused_again(values, factor):
+    kept, before = np.ones(len(values), bool), None
+    while not np.array_equal(kept, before):
+        left, before = values[kept], kept
+        kept = kept & (np.abs(values - np.median(left)) <= factor * 1.4826 * _mad(left))
+    return kept
+
+
 def _mad(values):
     return np.median(np.abs(values - np.median(values)))
 
 
-def speed_curves(rng, sign):
-    """Angular speeds of a robot and of a tracker that lags (sign 1), or leads (-1), by a fraction of a sample."""
+def speed_curves(rng, sign, wide=False):
+    """Angular speeds of a robot and of a tracker that lags (sign 1), or leads (-1), by a fraction of a sample. Where the
+    largest offset is wide, the curves match a little at several shifts, and well at one.
+    """
     step = float(rng.choice([0.01, 0.0125]))
-    time, phase = rng.uniform(1, 50) + step * np.arange(int(rng.integers(550, 700))), rng.uniform(0, 6, 3)
+    time, phase = rng.uniform(1, 50) + step * np.arange(int(rng.integers(550, 700))), rng.uniform(0, 6, 4)
     samples = int(rng.integers(7, 30))
     lag = sign * (samples + rng.choice([0.27, 0.33, 0.67, 0.73])) * step
 
@@ -316,9 +342,11 @@ def speed_curves(rng, sign):
             + 0.6 * np.sin(2.1 * t + phase[0])
             + 0.3 * np.sin(3.7 * t + phase[1])
             + 0.15 * np.sin(5.9 * t + phase[2])
+            + 0.45 * wide * np.sin(9.0 * t + phase[3])
         )
 
-    return time, curve(time), curve(time - lag), step * (samples + int(rng.integers(4, 12)))
+    most = int(rng.integers(130, 170)) if wide else samples + int(rng.integers(4, 12))
+    return time, curve(time), curve(time - lag), step * most
 
 
 def _overlap(reference, delayed, n):
@@ -417,6 +445,15 @@ def _maximum_likelihood():
     return ax_xb.calibrate_hand_eye(T_BF, T_WE, robust=True, eye="to hand").T_FT
 
 
+def _of_motions(chosen):
+    """The mounting from other motions than those of the kept poses: `chosen` makes of these truth values others."""
+    found = calibrate_mounting(*_run_1())
+    some = chosen(found.kept)
+    A, B = found.A[some], found.B[some]
+    R = ax_xb.rotation_from_kronecker(ax_xb.kronecker_matrix(A, B))[0]
+    return pose(R, np.linalg.lstsq(_k1(A).reshape(-1, 3), _k2(A, B, R).ravel(), rcond=None)[0])
+
+
 def _aligned():
     """The rotation that brings the rotation vectors of B nearest to those of A, and the translation that follows."""
     found = calibrate_mounting(*_run_1())
@@ -445,9 +482,9 @@ CHAPTER = Chapter(
             reference=decode_packet,
             draw=_packet,
             metric=metrics.Several(
-                metrics.Numbers(1e-9, "s"),
-                metrics.Numbers(1e-9, "mm"),
-                metrics.Numbers(1e-9),
+                metrics.Numbers(1e-9, "s", double=True),
+                metrics.Numbers(1e-9, "mm", double=True),
+                metrics.Numbers(1e-9, double=True),
                 names=("time", "position", "quaternion"),
             ),
             hints=(
@@ -499,6 +536,12 @@ CHAPTER = Chapter(
                 Mistake(
                     _fields(dtype="u1"),
                     "You picked single bytes. Turn every 8 bytes into one number first: `np.frombuffer` or `struct.unpack`.",
+                ),
+                Mistake(
+                    _fields(double=np.float32),
+                    "You cut the packet's doubles to single precision: seven digits are left, and a clock that has run for an hour goes by "
+                    "steps of 0.2 ms.",
+                    id="decode_packet-single",
                 ),
                 Mistake(_scalar_first, "The packet's quaternion is x, y, z, w: you put w first."),
                 Mistake(
@@ -704,6 +747,11 @@ CHAPTER = Chapter(
                     "The sign between the two products is a minus: A X - X B = 0.",
                 ),
                 Mistake(
+                    lambda A, B: np.outer(np.eye(3), A) - np.outer(B.T, np.eye(3)),
+                    "`np.outer` stretches both matrices out into vectors first. The product meant is `np.kron`, a block for each entry.",
+                    id="kron_row-outer",
+                ),
+                Mistake(
                     lambda A, B: np.kron(A, np.eye(3)) - np.kron(np.eye(3), B),
                     "vec(P X Q) = (Q^T kron P) vec(X): P stands on the right of the product, Q on the left and transposed. A is a P, B is a Q.",
                 ),
@@ -749,7 +797,8 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     lambda M: rotation_from_nullvector(M).T,
-                    "The null vector holds the columns of X. NumPy's reshape fills rows, so you got the transpose: the classic silent error.",
+                    "Your rotation is the transpose. The null vector holds the columns of X, and NumPy's reshape fills rows, the classic silent "
+                    "error; or was it transposed once more on the way?",
                 ),
                 Mistake(
                     lambda M: -rotation_from_nullvector(M),
@@ -801,6 +850,13 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda M: lie.nearest_rotation(_signed(_null(M[:9]).reshape(3, 3, order="F"))),
                     "Only the first motion is used, and one axis leaves the rotation about it free: take all rows of M.",
+                ),
+                Mistake(
+                    lambda M: lie.nearest_rotation(
+                        _signed(np.linalg.eig(M.T @ M)[1][:, 0].real.reshape(3, 3, order="F"))
+                    ),
+                    "You took the first of the vectors that `eig` gives: it does not sort them. `eigh` does, the smallest first.",
+                    id="rotation_from_nullvector-unsorted",
                 ),
                 Mistake(
                     lambda M: np.zeros((3, 3)),
@@ -933,6 +989,11 @@ CHAPTER = Chapter(
                     "stack all motions, solve once.",
                 ),
                 Mistake(
+                    lambda A, B, R: np.linalg.solve(_k1(A).mean(axis=0), _k2(A, B, R).mean(axis=0)),
+                    "You averaged the equations of all motions into three. Least squares keeps all 3 N rows, one under the other.",
+                    id="translation_lsq-averaged",
+                ),
+                Mistake(
                     _translation(lambda A: np.eye(3) + A[:, :3, :3], _k2),
                     "K1 has the wrong sign: (I - R_A) t = t_A - R t_B.",
                 ),
@@ -973,6 +1034,14 @@ CHAPTER = Chapter(
                 "`v = np.linalg.svd(M)[2][-1]\nreturn np.linalg.norm(M.T @ (M @ v)) / (len(M) / 9 - 1)`",
             ),
             mistakes=[
+                *(
+                    Mistake(
+                        lambda M, N=N: e_rot(M) * (len(M) / 9 - 1) / (N - 1),
+                        f"You divide by {N - 1}, as for {N} motions. How many they are, M tells: nine rows for each.",
+                        id=f"e_rot-of-{N}",
+                    )
+                    for N in (19, 21)
+                ),
                 Mistake(
                     lambda M: e_rot(M) * (len(M) / 9 - 1) / (len(M) / 9),
                     "You divide by N. The report divides by N - 1.",
@@ -1116,9 +1185,16 @@ CHAPTER = Chapter(
             draw=tuple(functools.partial(spoiled, factor=factor) for factor in (4.0, 3.0, 5.0)),
             metric=KeptOrNot(),
             noisy=(
-                all_equal,
-                KeptOrNot(),
-                "Right as long as the values differ. Where all are equal, each lies at the median, at a distance of 0, and 0 is within a limit of 0:",
+                (
+                    all_equal,
+                    KeptOrNot(),
+                    "Right as long as the values differ. Where all are equal, each lies at the median, at a distance of 0, and 0 is within a limit of 0:",
+                ),
+                (
+                    two_heaps,
+                    KeptOrNot(),
+                    "Right where the number of values is odd. Where it is even, the median lies halfway between the two in the middle:",
+                ),
             ),
             hints=(
                 "Measure how far each value is from the middle, in units of a spread. Outliers must move neither of the two.",
@@ -1197,6 +1273,12 @@ CHAPTER = Chapter(
                     )
                 ),
                 Mistake(
+                    _refused_again,
+                    "You apply the rule again to what it has kept, until nothing more goes: each time the limit shrinks, and good values go "
+                    "as well. It is applied once.",
+                    id="reject_outliers-again",
+                ),
+                Mistake(
                     _tukey,
                     "This is the rule of a box plot, 1.5 times the quartile distance. It knows no `factor`; take the median distance.",
                 ),
@@ -1250,6 +1332,11 @@ CHAPTER = Chapter(
                     "This comes out of the motions from each pose to the next. They are shorter, and the report takes all from pose 0.",
                     id="mounting-f9cf46",
                 ),
+                Mistake(
+                    lambda: _of_motions(lambda kept: np.isin(np.arange(len(kept)), np.arange(1, 5))),
+                    "These are the first four motions alone. All that `kept` leaves in should take part.",
+                    id="mounting-first-four",
+                ),
                 Mistake(lambda: invert(_mounting()), "This is the flange seen from the tracker: the inverse."),
                 Mistake(
                     _against_the_readings,
@@ -1279,6 +1366,7 @@ CHAPTER = Chapter(
             reference=lambda: _heights().std(),
             unit="mm",
             rtol=1e-2,
+            of={"the six heights": _heights},
             hints=(
                 "Six numbers, the z of each mounting. Appendix D prints their variance (Rozptyl), divided by 6.",
                 "The standard deviation is the root of that variance.",
@@ -1319,6 +1407,17 @@ CHAPTER = Chapter(
                     lambda: np.std([m.T_FE for m in synthetic_mountings()]),
                     "This is the spread of all entries of all matrices together. The height z is `mountings[:, 2, 3]`.",
                     id="spread-25cc36",
+                ),
+                Mistake(
+                    lambda: np.abs(_heights() - _heights().mean()).mean(),
+                    "This is the mean distance from the mean. A standard deviation is the root of the mean square.",
+                    id="spread-mean-distance",
+                ),
+                Mistake(
+                    lambda: np.sqrt(np.mean((_heights() - simulation.T_FE[2, 3]) ** 2)),
+                    "This is the scatter about the true height, so that what all six err alike counts as well. A standard deviation is taken about "
+                    "their own mean.",
+                    id="spread-about-truth",
                 ),
                 Mistake(
                     lambda: np.ptp(_heights()),
@@ -1383,7 +1482,7 @@ CHAPTER = Chapter(
         Exercise(
             "time_offset",
             reference=time_offset,
-            draw=tuple(functools.partial(speed_curves, sign=sign) for sign in (1, -1)),
+            draw=tuple(functools.partial(speed_curves, sign=s, wide=wide) for wide in (False, True) for s in (1, -1)),
             metric=metrics.Numbers(6e-4, "s"),
             hints=(
                 "Shift one curve against the other, sample by sample, and find where they differ least. Then look between the samples.",
@@ -1397,6 +1496,19 @@ CHAPTER = Chapter(
                 "return (k - n + 0.5 * (l - r) / (l - 2 * m + r)) * step`",
             ),
             mistakes=[
+                Mistake(
+                    lambda time, reference, delayed, max_offset: time[np.argmax(delayed)] - time[np.argmax(reference)],
+                    "You compare the times of two largest values. Each curve has many like it, and noise decides which is the largest: "
+                    "compare the curves as a whole.",
+                    id="time_offset-peaks",
+                ),
+                Mistake(
+                    lambda time, reference, delayed, max_offset: (
+                        time_offset(time, reference, delayed, max_offset) * 0.004 / (time[1] - time[0])
+                    ),
+                    "You take 4 ms from sample to sample. How far apart the samples are, `time` tells.",
+                    id="time_offset-4-ms",
+                ),
                 Mistake(
                     lambda *a: -time_offset(*a),
                     "The sign is reversed: positive means that the tracker lags behind.",
