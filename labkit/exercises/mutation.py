@@ -212,8 +212,8 @@ def _indices(function):
 
 def mending(function):
     """What may mend a function: all single changes, and besides them bounds and steps made finer, loops made longer,
-    gone on with or begun at 0, an axis, an outer product, an index that a loop should count, an argument or a size that is
-    typed in, and one slip mended wherever it stands: who copies a line copies its slip.
+    gone on with or begun at 0, an axis, an outer product, an index that a loop should count, an argument or a size that
+    is typed in, and one slip mended wherever it stands: who copies a line copies its slip.
     """
     found = changes(function)
     narrower = list(_narrower(function, found))
