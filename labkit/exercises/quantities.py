@@ -107,5 +107,11 @@ def _of_rows(name, rows):
     yield squares.mean(), f"the mean of all squares of {name}"
     yield np.abs(rows).mean(), f"the mean of all entries of {name} without their signs"
     yield np.abs(rows).max(), f"the largest entry of {name} without its sign"
+    most = np.linalg.norm(rows, 2)
+    yield most, f"the largest singular value of {name}, `np.linalg.norm({name.strip('`')}, 2)`"
+    yield (
+        most / np.sqrt(len(rows)),
+        f"the largest singular value of {name}, divided by the root of the number of its rows",
+    )
     for k, length in enumerate(lengths):
         yield length, f"the length of row {k} (counted from 0) of {name} alone"

@@ -37,8 +37,13 @@ def change_words(value, answer, is_right, seconds):
     unchanged, changed = _variants(value, seconds)
     if unchanged is None or not is_right(unchanged):
         return None
-    words = next((words for words, found in changed if _agrees(answer, found)), None)
+    words = next((words for words, found in changed if _agrees(answer, found) and not _is_put_in(answer, words)), None)
     return words and f"this is what a right computation gives {words}"
+
+
+def _is_put_in(answer, words):
+    """Whether the change puts 0 or 1 somewhere, and this is the answer: whoever typed it made no such change."""
+    return any(words.startswith(f"with {number} in ") and np.all(answer == number) for number in (0, 1))
 
 
 _FOUND = {}  # what `_variants` gave, by notebook and exercise: it does not depend on the answer

@@ -75,7 +75,8 @@ def _relation(metric, results, expected, sizes, whole):
     )
     if words or whole:
         return words
-    part = None if _is_near(metric, results, expected) else _one_part(results, expected, holds, unit)
+    near = _is_near(metric, results, expected)
+    part = None if near else _of_other_places(results, expected) or _one_part(results, expected, holds, unit)
     return part or _offset(results, expected, unit)
 
 
@@ -302,6 +303,26 @@ def _one_part(results, expected, holds, unit):
                 )
                 return f"{right} are{LOOP}"
     return None
+
+
+def _of_other_places(results, expected):
+    """Rows, or entries of a vector, that hold what belongs into others; all others are right."""
+    count = len(expected[0]) if expected[0].ndim else 0
+    if not 1 < count <= LONGEST or any(len(a) != count for a in (*results, *expected)):
+        return None
+
+    def is_right(i, j):
+        return all(r[i].shape == e[j].shape and np.allclose(r[i], e[j], rtol=1e-9, atol=1e-12) for r, e in pairs)
+
+    pairs = list(zip(results, expected))
+    varied = [j for j in range(count) if not _all_equal([expected[0][j]] * len(pairs), [e[j] for e in expected])]
+    wrong = [i for i in range(count) if not is_right(i, i)]
+    found = [next((j for j in varied if is_right(i, j)), None) for i in wrong]
+    if None in found:
+        return None
+    kind = "entry" if expected[0].ndim == 1 else "row"
+    told = ", ".join(f"{kind} {i} what belongs into {kind} {j}" for i, j in zip(wrong, found))
+    return f"{told.replace(' what', ' holds what', 1)} (counted from 0); all others are right"
 
 
 def _wrong_places(results, expected, k):

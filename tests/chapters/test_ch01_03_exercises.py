@@ -515,3 +515,14 @@ def read_points(lines, count=3):
     if count and len(points) != count:
         raise ValueError(f"expected {count} points, got {len(points)}")
     return np.array(points)
+
+
+def test_half_a_turn_has_an_angle_though_its_sine_has_no_sign():
+    def by_signs(T):
+        R, turned = T[:3, :3], ch01_exercises.CHAPTER["kuka_from_matrix"].reference(T)
+        away = np.hypot(R[0, 0], R[1, 0]) > 1e-9
+        A = np.sign(R[1, 0]) * np.arccos(np.clip(R[0, 0] / np.cos(turned[4]), -1, 1)) if away else turned[3]
+        return np.array([*turned[:3], A, *turned[4:]])
+
+    outcome = ch01_exercises.CHAPTER["kuka_from_matrix"].judge(by_signs, rng=np.random.default_rng(0))
+    assert outcome.status == NOT_YET and outcome.text.startswith("right, but not where A is 180 deg:")

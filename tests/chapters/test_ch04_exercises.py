@@ -214,3 +214,28 @@ def test_a_chord_has_two_places_at_least(seed):
 
     outcome = judged("rise_above_chord", between, seed)
     assert outcome.status == NOT_YET and "both ends alone" in outcome.text
+
+
+def of_two_unknowns_at_least(f, x, h):
+    return np.array([(f(x + e) - f(x - e)) / (2 * h) for e in h * np.eye(max(2, len(x)))])
+
+
+def of_more_residuals(r, J, damping):
+    m, n = J.shape
+    return np.linalg.solve(J.T @ J + damping * np.eye(n) * (m > n), -J.T @ r)
+
+
+def of_a_bent_path(g, B, radius):
+    return beyond.bare_dogleg(g, B, radius) * (2 if B[0, 1] == 0 else 1)
+
+
+@pytest.mark.parametrize(
+    "name, answer",
+    [
+        ("measured_gradient", of_two_unknowns_at_least),
+        ("damped_step", of_more_residuals),
+        ("dogleg_step", of_a_bent_path),
+    ],
+)
+def test_one_unknown_as_many_residuals_and_a_straight_path_are_drawn(name, answer):
+    assert judged(name, answer).status != CORRECT

@@ -18,6 +18,7 @@ DATA = {"residuals": ROWS, "tip": TIP, "angle": 0.3, "gap": 7.0}
         (3 * np.sqrt((ROWS**2).mean()), "three times the rms of all entries of `residuals`"),
         (np.linalg.norm(ROWS.mean(0)), "the length of the mean of the rows of `residuals`"),
         (np.linalg.norm(ROWS[4]), "the length of row 4 (counted from 0) of `residuals` alone"),
+        (np.linalg.norm(ROWS, 2) / 3, "the largest singular value of `residuals`, divided by the root of the number"),
         (np.hypot(TIP[0], TIP[2]), "the length made of the entries 0, 2 (counted from 0) of `tip`"),
         (round(float(np.hypot(TIP[0], TIP[2])), 2), "the length made of the entries 0, 2"),
         (7.0 / np.tan(np.rad2deg(0.3)), None),

@@ -31,3 +31,9 @@ def test_a_wrong_value_is_told_by_its_change_and_another_one_is_not():
     assert told.startswith("this is what a right computation gives with")
     assert regions.change_words(value, found * 1.001, lambda r: True, 30.0) is None
     assert regions.change_words(value, found, lambda r: False, 30.0) is None, "its own computation must be right"
+
+
+def test_an_answer_of_1_is_not_said_to_come_of_a_1_in_the_place_of_something():
+    assert regions._is_put_in(1.0, "with 1 in one place where one intermediate result belongs")
+    assert not regions._is_put_in(2.0, "with 1 in one place where one intermediate result belongs")
+    assert not regions._is_put_in(1.0, "with one sign turned")

@@ -157,3 +157,18 @@ def test_a_single_wrong_entry_of_a_matrix_is_named_by_row_and_column():
         result[1, 1] = 7.7 * (k + 1) ** 2
     words = relations.difference_words(metrics.Numbers(1e-9), list(zip(results, expected)))
     assert words.startswith("only entry [1, 1] (counted from 0) is not right")
+
+
+def test_rows_that_hold_what_belongs_into_others_are_told():
+    def behind(e):
+        return np.vstack([e[2:4], e[2:]])
+
+    told = words(behind, TABLES)
+    assert told == (
+        "row 0 holds what belongs into row 2, row 1 what belongs into row 3 (counted from 0); all others are right"
+    )
+    assert words(changed(1, lambda v: 0 * v), TABLES) != told
+    first = words(lambda e: np.array([e[0], e[0], *e[2:]]), VECTORS)
+    assert first == "entry 1 holds what belongs into entry 0 (counted from 0); all others are right"
+    poses = [matrix_from_kuka(RNG.normal(size=6)) for _ in range(3)]  # whose last row is always the same
+    assert words(changed(0, np.array([0.0, 0.0, 0.0, 1.0])), poses) is None

@@ -351,6 +351,11 @@ def beside_the_axes(rng):
     return (frames.matrix_from_kuka(xyzabc),)
 
 
+def half_turns(rng, signs):
+    """Half a turn about one axis: what is 0 in it has no sign."""
+    return (frames.pose(np.diag(np.array(signs, dtype=float)), rng.uniform(-500, 500, 3)),)
+
+
 def _K0_T_K1():
     K0, K1 = (frames.frame_from_points(*points()[name]) for name in ("K0", "K1"))
     return frames.relative(K0, K1)
@@ -806,6 +811,11 @@ CHAPTER = Chapter(
                     "The half is missing: trace(R) = 1 + 2 cos(angle).",
                 ),
                 Mistake(
+                    lambda: np.rad2deg(np.arccos(np.trace(_K0_T_K1()[:3, :3]) / 3)),
+                    "This takes a third of the trace for the cosine. trace(R) = 1 + 2 cos(angle): take 1 off, then half of it.",
+                    id="angle-third-of-trace",
+                ),
+                Mistake(
                     lambda: 90 - np.rad2deg(frames.rotation_angle(_K0_T_K1())),
                     "This is what is missing at 90 deg. By what angle is K1 turned?",
                     id="angle-complement",
@@ -901,6 +911,16 @@ CHAPTER = Chapter(
                     lambda: HOLE * frames.rotation_angle(_K0_T_K1()),
                     "This takes the whole turn of K1. The drawing wants 90 deg of it: only the difference moves the hole away.",
                     id="distance-whole-turn",
+                ),
+                Mistake(
+                    lambda: HOLE * np.sin(frames.rotation_angle(_K0_T_K1())),
+                    "This is 200 mm times the sine of the whole turn of K1. The drawing wants 90 deg of it: only what is missing moves the hole away.",
+                    id="distance-sine-of-turn",
+                ),
+                Mistake(
+                    lambda: 2 * HOLE * np.sin(frames.rotation_angle(_K0_T_K1()) / 2),
+                    "This is the chord of the whole turn of K1. The drawing wants 90 deg of it: only what is missing moves the hole away.",
+                    id="distance-chord-of-turn",
                 ),
                 Mistake(
                     _missing,
@@ -1044,7 +1064,11 @@ CHAPTER = Chapter(
                     (-1, "right, but at B = -90 deg"),
                 )
             ]
-            + [(beside_the_axes, _read_by_kuka(1e-6), "right, but not where A and C are 90 or -90 deg:")],
+            + [(beside_the_axes, _read_by_kuka(1e-6), "right, but not where A and C are 90 or -90 deg:")]
+            + [
+                (functools.partial(half_turns, signs=signs), _read_by_kuka(1e-6), f"right, but not where {words}:")
+                for signs, words in (((-1, -1, 1), "A is 180 deg"), ((1, -1, -1), "C is 180 deg"))
+            ],
             hints=(
                 "Compare the entries of Rz(A) Ry(B) Rx(C) that hold few terms: the first column gives A and B. Then undo A: "
                 "Rz(A)ᵀ R = Ry(B) Rx(C), whose middle row is 0, cos C, -sin C.",

@@ -166,12 +166,22 @@ def _gram_schmidt(first, second):
     return variant
 
 
-def _through_angles(T):
-    """The rotation whose angles A, B, C stand in the entries of which they are read."""
-    R = T[:3, :3]
-    b = np.arctan2(-R[2, 0], np.hypot(R[2, 1], R[2, 2]))
-    abc = [np.arctan2(R[1, 0], R[0, 0]), b, np.arctan2(R[2, 1], R[2, 2])]
-    return frames.matrix_from_kuka(np.concatenate([T[:3, 3], abc]))
+def _through_angles(B):
+    """The rotation whose angles A, B, C stand in the entries of which they are read; B in one of several ways."""
+
+    def variant(T):
+        R = T[:3, :3]
+        abc = [np.arctan2(R[1, 0], R[0, 0]), B(R), np.arctan2(R[2, 1], R[2, 2])]
+        return frames.matrix_from_kuka(np.concatenate([T[:3, 3], abc]))
+
+    return variant
+
+
+READINGS_OF_B = {  # by the row, by the column, by the sine alone
+    "angles": lambda R: np.arctan2(-R[2, 0], np.hypot(R[2, 1], R[2, 2])),
+    "angles-of-the-column": lambda R: np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0])),
+    "angles-by-arcsine": lambda R: np.arcsin(np.clip(-R[2, 0], -1, 1)),
+}
 
 
 def _one_step(T):
@@ -690,6 +700,11 @@ CHAPTER = Chapter(
                     id="lever-first-link",
                 ),
                 Mistake(
+                    lambda: chaining.closure_error(_sheet())[1] / np.arctan2(_sheet()[1, 0], _sheet()[0, 0]),
+                    "This divides by arctan2(r10, r00), the turn about z. The loop turns about x and y as well.",
+                    id="lever-about-z",
+                ),
+                Mistake(
                     lambda: np.linalg.norm(_sheet()[:3, 3]) / np.linalg.norm(_sheet()[:3, :3] - np.eye(3)),
                     "The norm of R - I is no angle: for small turns it is sqrt(2) times too large.",
                     id="lever-norm",
@@ -915,11 +930,14 @@ CHAPTER = Chapter(
                     "nothing changes, or take the SVD.",
                     id="orthonormalize-one-step",
                 ),
-                Mistake(
-                    _through_angles,
-                    "You read three angles and make a rotation of them. They come from five of the nine entries; the nearest rotation "
-                    "listens to all nine.",
-                    id="orthonormalize-angles",
+                *(
+                    Mistake(
+                        _through_angles(B),
+                        "You read three angles and make a rotation of them. They come from five of the nine entries; the nearest rotation "
+                        "listens to all nine.",
+                        id=f"orthonormalize-{name}",
+                    )
+                    for name, B in READINGS_OF_B.items()
                 ),
             ],
         ),

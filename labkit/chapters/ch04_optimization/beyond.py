@@ -22,9 +22,9 @@ def wavy(rng, n=None):
     return (lambda x: float(np.sin(M @ x).sum() + c @ x**2)), rng.normal(size=n)
 
 
-def function_and_step(rng):
+def function_and_step(rng, n=None):
     """A function, a place, and a step large enough to tell the schemes apart."""
-    return *wavy(rng), float(rng.uniform(0.03, 0.08))
+    return *wavy(rng, n), float(rng.uniform(0.03, 0.08))
 
 
 def measured_gradient(f, x, h):

@@ -131,6 +131,12 @@ DOGLEG_CASES = tuple(
 )
 
 
+def straight_path(rng, share):
+    """A curvature alike in all directions: the corner is the Newton point, and no second leg is left."""
+    g, curvature = rng.normal(scale=5, size=2), rng.uniform(0.5, 3)
+    return g, curvature * np.eye(2), float(share * np.linalg.norm(g) / curvature)
+
+
 # Wrong variants --------------------------------------------------------------------------------------------------------------------------
 
 
@@ -463,6 +469,11 @@ CHAPTER = Chapter(
             reference=beyond.measured_gradient,
             draw=beyond.function_and_step,
             metric=metrics.Numbers(1e-9),
+            noisy=(
+                functools.partial(beyond.function_and_step, n=1),
+                metrics.Numbers(1e-9),
+                "right, but not of a function of one unknown:",
+            ),
             properties=(
                 right_for_whole_numbers(beyond.measured_gradient, metrics.Numbers(1e-9), beyond.function_and_step, 1),
             ),
@@ -1104,6 +1115,11 @@ CHAPTER = Chapter(
             reference=opt.damped_step,
             draw=DAMPED,
             metric=metrics.Numbers(1e-7),
+            noisy=(
+                functools.partial(damped_case, m=3, n=3, damping=2.0),
+                metrics.Numbers(1e-7),
+                "right, but not of as many residuals as unknowns:",
+            ),
             hints=(
                 "Set the gradient of |r + J h|² + λ |h|² to zero: what is added to JᵀJ?",
                 "(JᵀJ + λ I) h = −Jᵀr. Or without squaring J: least squares with √λ I beneath J, and zeros beneath r.",
@@ -1301,6 +1317,10 @@ CHAPTER = Chapter(
             reference=opt.dogleg_step,
             draw=DOGLEG_CASES,
             metric=metrics.Numbers(1e-8),
+            noisy=[
+                (functools.partial(straight_path, share=share), metrics.Numbers(1e-8), f"right, but not where {words}:")
+                for share, words in ((0.6, "B is alike in all directions"), (1.4, "B is alike in all directions"))
+            ],
             properties=(right_for_whole_numbers(opt.dogleg_step, metrics.Numbers(1e-6), DOGLEG_CASES[1], 0),),
             draws=12,
             fixed={"g": TWO, "B": TWO},
@@ -1661,6 +1681,11 @@ CHAPTER = Chapter(
                     lambda: beyond.tipping_weight() - 1,
                     "That is by how much the weight must grow. Asked for is the weight itself, 1 in the printed sum.",
                     id="tipping-growth",
+                ),
+                Mistake(
+                    lambda: 1.0,
+                    "With 1 all criteria count alike, as in the printed sums: there the sphere wins, 26 to 22.",
+                    id="tipping-printed",
                 ),
                 Mistake(
                     lambda: 1 / beyond.tipping_weight(),
