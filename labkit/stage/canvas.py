@@ -22,7 +22,7 @@ from PIL import Image
 
 from . import style
 from .renderer import Canvas
-from .room import LETTERS, LOW, NARROW, PANEL, SLENDER, Legends, Panels, Words, break_lines
+from .room import LEGIBLE, LETTERS, LOW, NARROW, PANEL, SLENDER, Legends, Panels, Words, break_lines
 
 CSS_DPI = 100  # a figure inch is 100 CSS pixels: 10 pt text is as large as the notebook's own
 MAX_PIXELS = 5e6  # of a picture; beyond, a sharper screen gets fewer of its pixels
@@ -116,7 +116,7 @@ class Picture:
             self._words, self._legends = Words(self.fig), Legends(self.fig)
         narrow, low = width < NARROW * whole[0], height < LOW * whole[1]
         self.panels.arrange(self.panels.best(narrow, low))
-        break_lines(self.fig, narrow, self._moving)
+        break_lines(self.fig, narrow or low, self._moving)
         self._take_shape(width, height, narrow)
         least = min(1.0, *([self.width, self.height] / (ROOMY * whole)))
         on_a_line, small = None, min([width, height] / whole) < 1
@@ -127,7 +127,7 @@ class Picture:
                 break
             if fits is None and on_a_line is None and share >= LETTERS[-1]:
                 on_a_line = share, growth, folded
-            if on_a_line and share <= LETTERS[-1] and folded:
+            if on_a_line and share <= LEGIBLE and folded:
                 self._take_letters(room, narrow, *on_a_line)  # a legend on a line hides less than letters too small
                 break
         self._backgrounds = {}

@@ -1,8 +1,9 @@
-"""Small things that several chapters draw: a matrix beside its frame, ghosts of other settings, a robot in the plane,
-the name of what is not used.
+"""Small things that several chapters draw: a matrix beside its frame, numbers beside a picture, ghosts of other
+settings, a robot in the plane, the name of what is not used.
 """
 
 import numpy as np
+from matplotlib.text import Text
 
 from . import style
 
@@ -65,6 +66,51 @@ class Matrix:
         for row, values in zip(self.entries, np.round(T, self.decimals) + 0.0):
             for entry, value in zip(row, values):
                 entry.set_text(f"{value:.{self.decimals}f}")
+
+
+class Readout(Text):
+    """Lines of words and numbers that fill a panel from the top: where it is low, the lines draw together before any
+    letter gets smaller. A legend of the panel stays free.
+
+    Parameters
+    ----------
+    ax : Axes
+    top : float
+        Where the first line begins, in fractions of the axes.
+    """
+
+    LOOSE, TIGHT = 1.7, 1.05  # spacing of the lines, as a multiple of the letters' height
+
+    def __init__(self, ax, top=0.95):
+        super().__init__(0.0, top, "", va="top", linespacing=self.LOOSE, transform=ax.transAxes)
+        self._settled = None
+        ax.add_artist(self)
+        self.set_clip_on(False)
+
+    def draw(self, renderer):
+        self._settle(renderer)
+        super().draw(renderer)
+
+    def get_window_extent(self, renderer=None, dpi=None):
+        self._settle(renderer or self.figure.canvas.get_renderer())
+        return super().get_window_extent(renderer, dpi)
+
+    def _settle(self, renderer):
+        """As wide a spacing as the panel has room for, found anew where the panel, its letters or its lines change."""
+        now = self.figure.dpi, self.get_fontsize(), *self.axes.bbox.bounds, self.get_text().count("\n")
+        if now == self._settled:
+            return
+        self._settled, legend, low = now, self.axes.get_legend(), self.axes.bbox.y0
+        if legend:
+            low = max(low, legend.get_window_extent(renderer).y1)
+        room = self.get_transform().transform(self.get_position())[1] - low
+        tight, loose = (self._height(renderer, spacing) for spacing in (self.TIGHT, self.LOOSE))
+        share = (room - tight) / (loose - tight) if loose > tight else 1.0
+        self.set_linespacing(self.TIGHT + float(np.clip(share, 0.0, 1.0)) * (self.LOOSE - self.TIGHT))
+
+    def _height(self, renderer, spacing):
+        self.set_linespacing(spacing)
+        return super().get_window_extent(renderer).height
 
 
 class Spare:

@@ -25,6 +25,7 @@ ROUGH = 2.0  # pixels that two words may share, for their boxes are larger than 
 GAP = 0.03  # inches of the picture that two words in one line must stay apart
 LEAST = 0.35  # of its share of the picture must be left to a panel
 LETTERS = (1.0, 0.92, 0.85, 0.77, 0.7)  # sizes of the letters that are tried, as shares of their own
+LEGIBLE = 0.77  # of their size: to keep a legend off a line, letters shrink no further
 
 
 class Panels:

@@ -627,7 +627,7 @@ def test_ellipsoids_of_six_runs_are_three_standard_deviations():
 
 def test_methods_that_work_are_ticked_and_the_others_say_why():
     stage = at(ch07.methods(), sensor="odometry", task="global")
-    names, verdicts = np.reshape([a.get_text() for a in stage.moving], (2, -1))
+    names, verdicts = np.reshape([a.get_text().replace("\n", " ") for a in stage.moving], (2, -1))
     works = [verdict.endswith("works") for verdict in verdicts]
     assert stage.result["usable"] == names[works].tolist()
     assert all(why in verdict for why, verdict in zip(stage.result["verdicts"], verdicts))

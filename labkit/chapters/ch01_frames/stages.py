@@ -7,7 +7,7 @@ from ...estimation.gaussian import unit_noise
 from ...geometry import frames
 from ...geometry.lie import exp_so3, log_so3
 from ...stage import Handle, Slider, Stage, style
-from ...stage.marks import Matrix
+from ...stage.marks import Matrix, Readout
 from ...stage.scene3d import Scene, View
 from ...stage.scene3d_handles import Free, OnPlane
 from . import figures as draw
@@ -77,7 +77,7 @@ def three_points():
         triads = [space.triad("K0", 0.7), space.triad("K1", 0.7, linestyle=(0, (4, 1.5)))]
         style.bare(right)
         matrix = Matrix(right, 0.0, 0.86, "T_K0K1")
-        words = right.text(0.0, 0.36, "", transform=right.transAxes, va="top", linespacing=1.6)
+        words = Readout(right, 0.47)
 
         def update(state, result):
             for k in range(2):

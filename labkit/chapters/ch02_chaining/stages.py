@@ -10,6 +10,7 @@ from ...geometry import chaining
 from ...geometry.frames import pose, relative, transform
 from ...geometry.lie import exp_se3, exp_so3
 from ...stage import Choice, Handle, Slider, Stage, Target, style
+from ...stage.marks import Readout
 from ...stage.scene3d import Scene, View
 from ...stage.scene3d_handles import Free, OnPlane
 from . import figures as draw
@@ -164,7 +165,7 @@ def open_loop():
         space = Scene(left, radius=430, half_width=470, floor=FLOOR, unit="mm")
         loop = draw.Loop(space)
         style.bare(right)
-        words = right.text(0.0, 0.95, "", transform=right.transAxes, va="top", linespacing=1.7)
+        words = Readout(right)
 
         def update(state, result):
             loop.set(result)

@@ -171,24 +171,21 @@ def method_chart(ax, names, ways, elsewhere):
     """Error over bound of several methods, rotation and translation, each with its way; `elsewhere`: the rotation at
     all noises, (noises, methods), as a faint range. Returns (rotation, translation).
     """
-    style.axes(ax, "rms error / Cramer-Rao bound", "", "gray: at all four noises")
+    style.axes(ax, "rms error / Cramer-Rao bound")
     ax.set(xlim=(0.8, 150), xscale="log", ylim=(len(names) - 0.4, -0.6))
     ax.set_yticks(range(len(names)), [f"{name}\n{way}" for name, way in zip(names, ways)], fontsize=8)
     ax.set_xticks([1, 3, 10, 30, 100], ["1", "3", "10", "30", "100"])
     ax.minorticks_off()
     ax.axvline(1.0, color=style.INK, linewidth=1.6)
     for row, values in enumerate(elsewhere.T):
-        ax.plot(
+        (spread,) = ax.plot(
             np.sort(values), [row] * len(values), color=style.MUTED, marker="o", markersize=4, linewidth=5, alpha=0.25
         )
+    hollow = {"marker": "o", "markerfacecolor": "none", "markeredgewidth": 1.8}
     (rotation,) = ax.plot([], [], **style.look("estimates", markersize=8), label="rotation")
-    (translation,) = ax.plot(
-        [],
-        [],
-        **style.look("estimates", marker="o", markersize=8, markerfacecolor="none", markeredgewidth=1.8),
-        label="translation",
-    )
-    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
+    (translation,) = ax.plot([], [], **style.look("estimates", markersize=8, **hollow), label="translation")
+    spread.set_label("rotation at all four noises")
+    style.legend_above(ax, handles=[rotation, translation, spread], ncols=3)
     return rotation, translation
 
 
@@ -271,18 +268,12 @@ class OverSpeed:
         (self.medians,) = ax.plot([], [], **style.look("estimates", markersize=6), label="median")
         (self.law,) = ax.plot([], [], **style.look("prediction"), label="squares add")
         self.levels = [ax.plot([], [], **style.look("guide", linewidth=1.6))[0] for _ in range(2)]
-        self.names = [
-            ax.annotate(
-                text, (end, 1.0), xytext=(-2, -11 if k == 0 else 3), textcoords="offset points", ha="right",
-                color=style.MUTED, fontsize=9,
-            )
-            for k, text in enumerate(("printed mean", "printed largest"))
-        ]  # fmt: skip
+        self.name = ax.annotate("", (0, 1), (3, 3), textcoords="offset points", color=style.MUTED, fontsize=9)
         named = [*self.dots, self.nonsense, self.medians, self.law]
         legend = ax.legend(handles=named, loc="upper left", ncols=3, columnspacing=0.8, handlelength=1.4)
         for dots in legend.legend_handles[:3]:
             dots.set(markersize=6, alpha=1.0)
-        self.artists = [*self.dots, self.nonsense, self.medians, self.law, *self.levels, *self.names]
+        self.artists = [*self.dots, self.nonsense, self.medians, self.law, *self.levels, self.name]
 
     def set(self, result):
         """Draw the result of `stages.compute_over_speed`."""
@@ -292,11 +283,15 @@ class OverSpeed:
         self.nonsense.set_data(x[bad], y[bad])
         self.medians.set_data(self.x, result["median"])
         self.law.set_data(self.x, result["law"])
-        for line, name, level in zip(self.levels, self.names, result["printed"]):
+        printed = np.isfinite(result["printed"])
+        for line, level, shown in zip(self.levels, result["printed"], printed):
             line.set_data([0, 2], [level, level])
-            line.set_visible(bool(np.isfinite(level)))
-            name.xy = (name.xy[0], level if np.isfinite(level) else 1.0)
-            name.set_visible(bool(np.isfinite(level)))
+            line.set_visible(bool(shown))
+        if printed.any():  # over the upper line, and left, where a slow tracker errs least
+            words = np.array(["mean", "largest"])[printed]
+            self.name.set_text(f"printed {' and '.join(words)}")
+            self.name.xy = (0.0, np.nanmax(result["printed"]))
+        self.name.set_visible(bool(printed.any()))
 
 
 class CellScene:

@@ -41,6 +41,7 @@ from ...machines.tracking import (
     tracking_errors,
 )
 from ...stage import Choice, Handle, Play, Slider, Stage, Toggle, style
+from ...stage.marks import Readout
 from ...stage.scene3d import Scene, View
 from ...stage.scene3d_handles import Dial, Free, OnSphere
 from ...tables import read_table
@@ -120,7 +121,7 @@ def tx40():
         space = Scene(left, radius=530, half_width=560, floor=0.0, unit="mm")
         arm = draw.ArmPicture(space)
         style.bare(right)
-        words = right.text(0.0, 0.95, "", transform=right.transAxes, va="top", linespacing=1.7)
+        words = Readout(right)
 
         def update(state, result):
             arm.set(result["frames"], result["T_BE"], [grip(result) for grip in grips], result["q"])
@@ -286,7 +287,7 @@ def live_tracker():
         trail = draw.Trail(space, right)
         sweep = draw.Sweep(space, NEARBY)
         style.bare(right)
-        words = right.text(0.0, 0.97, "", transform=right.transAxes, va="top", linespacing=1.5)
+        words = Readout(right, 0.97)
 
         def update(state, result):
             trail.set(result["positions"], result["used"], result["filtered"], result["T_WE"])
@@ -592,7 +593,7 @@ def six_runs():
         space = Scene(left, radius=7.0, half_width=7.5, title="six runs, each 21 poses, seen from the truth", unit="mm")
         picture = draw.Repeated(space, 2.5)
         style.bare(right)
-        words = right.text(0.0, 0.9, "", transform=right.transAxes, va="top", linespacing=1.7)
+        words = Readout(right, 0.9)
 
         def update(state, result):
             truth = T_FE[:3, 3]
@@ -686,7 +687,7 @@ def sweeps():
         left, right = fig.subplots(1, 2, width_ratios=(1.5, 1))
         picture = draw.Plan(left, FLOOR)
         style.bare(right)
-        words = right.text(0.0, 0.92, "", transform=right.transAxes, va="top", linespacing=1.6)
+        words = Readout(right, 0.92)
 
         def update(state, result):
             picture.set(result["stations"], result["place"], result["found"], result["outline"])
@@ -752,7 +753,7 @@ def moved_station():
         left, right = fig.subplots(1, 2, width_ratios=(1.7, 1))
         errors = draw.error_by_stop(left, simulation.STOPS, table_d().mean[COLUMNS.index("mean_mm")])
         style.bare(right)
-        words = right.text(0.0, 0.92, "", transform=right.transAxes, va="top", linespacing=1.6)
+        words = Readout(right, 0.92)
 
         def update(state, result):
             errors.set_data(np.arange(1, simulation.STOPS), result["errors"][1:])
@@ -844,7 +845,7 @@ def over_speed():
         left, right = fig.subplots(1, 2, width_ratios=(1.8, 1))
         picture = draw.OverSpeed(left, MIDDLES, SHARES[-1])
         style.bare(right)
-        words = right.text(0.0, 0.95, "", transform=right.transAxes, va="top", linespacing=1.6)
+        words = Readout(right)
 
         def update(state, result):
             picture.set(result)

@@ -5,26 +5,29 @@ import numpy as np
 from ...stage import style
 from ...stage.marks import broken, robot_outline
 
+SHORT = 9  # letters of words that are never broken
 CIRCLE = np.stack([np.cos(np.linspace(0, 2 * np.pi, 91)), np.sin(np.linspace(0, 2 * np.pi, 91))], axis=1)
 
 
 class MethodTable:
-    """Four methods in four rows: the printed facts, and a verdict that changes."""
+    """Four methods in four rows: the printed facts, and a verdict that changes. Longer words stand in two lines, for
+    which a phone has room.
+    """
 
-    COLUMNS = (0.0, 0.23, 0.42, 0.71)
+    COLUMNS = (0.0, 0.26, 0.5, 0.76)
 
     def __init__(self, ax, rows):
         style.bare(ax)
         ax.set(xlim=(0, 1), ylim=(0, 1))
         for x, heading in zip(self.COLUMNS, ("method", "accuracy", "sensors", "for this task")):
-            ax.text(x, 0.93, heading, fontweight="bold")
+            ax.text(x, 0.97, heading, fontweight="bold", va="top")
         self.names, self.verdicts = [], []
         for k, (name, accuracy, sensors) in enumerate(rows):
-            y = 0.74 - 0.21 * k
-            self.names.append(ax.text(self.COLUMNS[0], y, name, fontsize=11))
-            ax.text(self.COLUMNS[1], y, accuracy, color=style.MUTED)
-            ax.text(self.COLUMNS[2], y, sensors, color=style.MUTED)
-            self.verdicts.append(ax.text(self.COLUMNS[3], y, ""))
+            place = {"y": 0.73 - 0.22 * k, "va": "center"}
+            self.names.append(ax.text(self.COLUMNS[0], s=_in_two_lines(name), **place))
+            ax.text(self.COLUMNS[1], s=_in_two_lines(accuracy), color=style.MUTED, **place)
+            ax.text(self.COLUMNS[2], s=_in_two_lines(sensors), color=style.MUTED, **place)
+            self.verdicts.append(ax.text(self.COLUMNS[3], s="", **place))
         self.artists = [*self.names, *self.verdicts]
 
     def set(self, verdicts):
@@ -32,8 +35,18 @@ class MethodTable:
         for name, text, reason in zip(self.names, self.verdicts, verdicts):
             name.set_fontweight("normal" if reason else "bold")
             name.set_color(style.MUTED if reason else style.INK)
-            text.set_text(f"\N{MULTIPLICATION SIGN} {reason}" if reason else "\N{CHECK MARK} works")
+            words = f"\N{MULTIPLICATION SIGN} {reason}" if reason else "\N{CHECK MARK} works"
+            text.set_text(_in_two_lines(words))
             text.set_color(style.MUTED if reason else style.INK)
+
+
+def _in_two_lines(words):
+    """Words broken at the space that leaves the shorter lines; short ones stay."""
+    if len(words) <= SHORT:
+        return words
+    spaces = [k for k, letter in enumerate(words) if letter == " "]
+    k = min(spaces, key=lambda k: max(k, len(words) - k - 1), default=None)
+    return words if k is None else f"{words[:k]}\n{words[k + 1 :]}"
 
 
 class Circles:

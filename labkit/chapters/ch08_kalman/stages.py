@@ -385,7 +385,7 @@ def honesty():
 
         def update(state, result):
             parts.set(result["positions"], result["ellipse"], result["curve"], result["iterations"])
-            words.set_text(f"half width {result['scale']:.2g} m, holds 90 %")
+            words.set_text(f"half width {result['scale']:.2g} m,\nholds 90 %")
 
         return [*parts.artists, words], update
 
