@@ -89,7 +89,7 @@ class Own(Quiet, tornado.web.RequestHandler):
         token, name = self.application.settings["token"], self.application.settings["cookie"]
         given = self.get_query_argument("token", "")
         if given and hmac.compare_digest(given.encode(), token.encode()):
-            self.set_cookie(name, token, httponly=True, samesite="Strict")
+            self.set_cookie(name, token, httponly=True, samesite="Lax")  # a slide may link here
             if self.request.method == "GET" and not isinstance(self, Line):
                 self.redirect(self.request.path)
         elif not hmac.compare_digest(self.get_cookie(name, "").encode(), token.encode()):

@@ -147,6 +147,17 @@ def picture(frame):
     return json.loads(frame[4 + 4 * count : 4 + 4 * count + length])
 
 
+def test_a_link_on_a_slide_takes_the_token_along():
+    async def work(demo):
+        address = f"http://127.0.0.1:{demo.port}/?token={demo.application.token}"
+        client = tornado.httpclient.AsyncHTTPClient()
+        answer = await client.fetch(address, raise_error=False, follow_redirects=False)
+        kept = answer.headers["Set-Cookie"]
+        assert "HttpOnly" in kept and "SameSite=Lax" in kept  # sent where one follows a link, and nowhere else
+
+    in_demo(work)
+
+
 def test_without_the_token_nothing_is_shown():
     async def work(demo):
         paths = (
