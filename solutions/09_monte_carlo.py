@@ -154,7 +154,7 @@ beams_to_zero = ex.beams_to_zero(beams_to_zero)
 # %% log_sum_exp
 @ex.log_sum_exp
 def log_sum_exp(log_weights):
-    """Return log(sum(exp(log_weights))), log_weights of shape (M,)."""
+    """Return log(sum(exp(log_weights))), log_weights of shape (M,), not all -inf."""
     ### BEGIN SOLUTION
     top = log_weights.max()
     return top + np.log(np.exp(log_weights - top).sum())

@@ -434,7 +434,8 @@ class First(Metric):
     others: tuple
 
     def admit(self, result, expected):
-        if not isinstance(result, tuple) or len(result) != 1 + len(self.others):
+        several = isinstance(result, tuple) and len(result) == 1 + len(self.others)
+        if not several or all(isinstance(part, int | float | np.number) for part in result) and np.ndim(expected):
             return self.metric.admit(result, expected)
         first = self.metric.admit(result[0], expected)
         for (name, metric, reference), part in zip(self.others, result[1:]):

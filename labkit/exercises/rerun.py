@@ -360,6 +360,8 @@ def _whole(v):
 
 
 def _truth(v):
+    if np.min(v) < 0 or np.max(v) > 1:
+        raise ValueError("no share, and no truth value")
     return 1.0 - v
 
 

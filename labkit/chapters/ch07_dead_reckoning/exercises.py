@@ -13,15 +13,15 @@ from ...localization import lateration, odometry, wheels
 # Draws -----------------------------------------------------------------------
 
 
-def two_circles(rng, left=True, up=True, with_origin=True):
+def two_circles(rng, left=True, up=True, with_origin=True, angle=None):
     """Two landmarks, exact distances to a robot off their line, and a start near it.
 
     left: of the way from the first landmark to the second; up: above its mirror image; with_origin: on the origin's
-    side of the line, which a search from (0, 0) finds without the start.
+    side of the line, which a search from (0, 0) finds without the start; angle: direction of that way, drawn if None.
     """
-    side = 1 if left else -1
-    angle, base = rng.uniform(-1.4, 1.4) + (0 if left == up else np.pi), rng.uniform(4, 9)
-    along = np.array([np.cos(angle), np.sin(angle)])
+    side, base = 1 if left else -1, rng.uniform(4, 9)
+    angle = rng.uniform(-1.4, 1.4) + (0 if left == up else np.pi) if angle is None else angle
+    along = np.round([np.cos(angle), np.sin(angle)], 15)
     across = side * np.array([-along[1], along[0]])
     a = rng.uniform(-5, 5, 2)
     a = a if (a @ across < 0) == with_origin else -a
@@ -38,9 +38,12 @@ def several_circles(rng):
     return landmarks, np.linalg.norm(landmarks - position, axis=1) * (1 + off), position
 
 
-def from_afar(rng, left):
-    """Two landmarks and a start so far off that a few steps, or the Jacobian of the start alone, do not arrive."""
-    landmarks, distances, _ = two_circles(rng, left=left)
+def from_afar(rng, left, angle=None):
+    """Two landmarks and a start so far off that a few steps, or the Jacobian of the start alone, do not arrive.
+
+    Of landmarks in a row, angle = 0 or pi / 2, one coordinate arrives with the first step.
+    """
+    landmarks, distances, _ = two_circles(rng, left=left, angle=angle)
     line = landmarks[1] - landmarks[0]
     across = (1 if left else -1) * np.array([-line[1], line[0]])
     robot = max(lateration.circle_intersections(landmarks, distances), key=lambda p: across @ (p - landmarks[0]))
@@ -125,7 +128,16 @@ def car(rng, left=True, gear=1):
     return gear * rng.uniform(0.3, 3), steering, rng.choice([-1, 1]) * rng.uniform(0.2, 0.6) + rng.uniform(1.2, 3)
 
 
-CARS = tuple(functools.partial(car, left=left, gear=gear) for gear in (1, -1) for left in (True, False))
+def car_straight_on(rng):
+    """The same with its wheels straight: the circle has no center."""
+    speed, _, wheelbase = car(rng)
+    return speed, 0.0, wheelbase
+
+
+CARS = (
+    *(functools.partial(car, left=left, gear=gear) for gear in (1, -1) for left in (True, False)),
+    car_straight_on,
+)
 
 
 def rolling(rng):
@@ -494,6 +506,13 @@ def _wrong_side(x, cov, u, dt, cov_u):
     return step_euler(x, u, dt), F_x.T @ cov @ F_x + F_u @ cov_u @ F_u.T
 
 
+def _from_elsewhere(x):
+    """Where the circle ends that does not start at the origin with the heading 0."""
+    for u in lecture.circle_drive().controls:
+        x = step_euler(x, u, lecture.circle_drive().dt)
+    return x
+
+
 def _at_new_pose(x, cov, u, dt, cov_u):
     moved = step_euler(x, u, dt)
     return moved, propagate(moved, cov, u, dt, cov_u)[1]
@@ -598,8 +617,12 @@ CHAPTER = Chapter(
         Exercise(
             "newton_lateration",
             reference=newton_lateration,
-            draw=(*CIRCLES, functools.partial(from_afar, left=True), functools.partial(from_afar, left=False)),
-            draws=6,
+            draw=(
+                *CIRCLES,
+                *(functools.partial(from_afar, left=left) for left in (True, False)),
+                *(functools.partial(from_afar, left=True, angle=angle) for angle in (0.0, np.pi / 2)),
+            ),
+            draws=8,
             fixed={
                 "landmarks": "with two of them the two equations can be solved",
                 "distances": "one for each landmark",
@@ -738,6 +761,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda a, b, l: np.array([(a + b) / 2, (b - a) / l if a + b else 0.0]),
                     "Right but for a turn on the spot. There v and the radius are both 0, and v / radius says nothing: the difference of the wheels does.",
+                ),
+                Mistake(
+                    lambda a, b, l: np.array([max(a, b), (b - a) / l]),
+                    "You take the larger speed for v. The middle of the axle moves with the mean of both.",
                 ),
                 Mistake(
                     lambda a, b, l: np.array([a + b, (a - b) / l]),
@@ -1415,6 +1442,10 @@ CHAPTER = Chapter(
                 ),
                 Mistake(lambda: np.zeros(3), "This is the start. Does the loop store the new pose?"),
                 Mistake(
+                    lambda: _from_elsewhere(np.array([0.0, 0.0, np.pi / 2])),
+                    "Your drive starts with a heading of 90 deg. At the origin of the poses, (0, 0, 0), it is 0.",
+                ),
+                Mistake(
                     lambda: _loop(_turned_first)[0],
                     "Each step turns first and drives along the new heading. The simplified model drives along the old one.",
                 ),
@@ -1458,6 +1489,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda: _circle("midpoint")[1],
                     "This is the midpoint model's covariance; the lecture uses the simplified one.",
+                ),
+                Mistake(
+                    lambda: _loop(**{name: value**0.5 for name, value in lecture.circle_drive().noise.items()})[1],
+                    "This takes the roots of the three constants. They are variances per meter or turn, as drive.noise holds them.",
                 ),
                 Mistake(lambda: _loop(k_d=0.0)[1], "The distance error k_d is missing from the control's covariance."),
                 Mistake(

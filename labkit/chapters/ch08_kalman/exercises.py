@@ -77,6 +77,12 @@ def landmark_aside(rng, side, turned):
     return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
 
 
+def turned_several_times(rng):
+    """A pose whose heading has gathered several turns, as a sum of steps does, and a landmark."""
+    x, landmark = seen_landmark(rng)
+    return x + [0.0, 0.0, 2 * np.pi * rng.integers(2, 4) * rng.choice([-1, 1])], landmark
+
+
 def landmark_behind(rng, side):
     """A landmark so nearly behind the robot that a hundredth of a radian or of a meter takes it across the seam."""
     x, r = np.array([*rng.uniform(-4, 4, 2), rng.uniform(-3, 3)]), rng.uniform(1.5, 6)
@@ -122,11 +128,13 @@ def filter_step(rng, ahead=1, astray=0.2):
     return x, cov, u, dt, cov_u, z, landmark, covariance(rng, 2, 0.003)
 
 
-def estimate_and_truth(rng, side=1, astray=0.3):
-    """True and estimated pose whose headings lie on both sides of +-pi, and a covariance; errors up to `astray` m."""
+def estimate_and_truth(rng, side=1, astray=0.3, turns=0):
+    """True and estimated pose whose headings lie on both sides of +-pi, and a covariance; errors up to `astray` m, and
+    so many full turns that only the estimate has counted.
+    """
     truth = np.array([*rng.uniform(-4, 4, 2), side * (np.pi - rng.uniform(0.02, 0.1))])
     off = rng.uniform(0.8, 1.0, 2) * astray * rng.choice([-1, 1], 2)
-    return truth, truth + [*off, side * (rng.uniform(0.15, 0.3) - 2 * np.pi)], covariance(rng, 3, 0.05)
+    return truth, truth + [*off, side * (rng.uniform(0.15, 0.3) - 2 * np.pi * (1 + turns))], covariance(rng, 3, 0.05)
 
 
 def surprise(rng, wanted, along=None, std=(0.3, 1.5), measure=np.linalg.solve, limit=(4.0, 9.0)):
@@ -386,6 +394,11 @@ def _sine_sign(G, x, u, dt):
     return G * [[1, 1, -1], [1, 1, 1], [1, 1, 1]]
 
 
+def _turned_once(angle):
+    """Wrapped by one turn at most."""
+    return angle - 2 * np.pi * np.sign(angle) if abs(angle) > np.pi else angle
+
+
 def measurement(x, landmark):
     return ekf.measurement(x, np.atleast_2d(landmark))[0]
 
@@ -515,6 +528,16 @@ def _error(truth, x):
     return e
 
 
+def _nees_of(heading):
+    """NEES with `heading(true one, estimated one)` for the error of the heading."""
+
+    def variant(truth, x, cov):
+        e = np.append((truth - x)[:2], heading(truth[2], x[2]))
+        return e @ np.linalg.solve(cov, e)
+
+    return variant
+
+
 def gate(innovation, cov_innovation, limit):
     return bool(kalman.nis(innovation, cov_innovation) <= limit)
 
@@ -537,6 +560,11 @@ ONE_STEP_MORE = {"prior_cov_xx": 1.9469 + 0.2 * 0.2550 + 0.01 * 0.0916, "prior_c
 
 def _not_divided(prior_x, prior_v, prior_cov_xx, prior_cov_xv, z, **_):
     return np.array([prior_x, prior_v]) + np.array([prior_cov_xx, prior_cov_xv]) * (z - prior_x)
+
+
+def _each_by_its_own_variance(prior_x, prior_v, prior_cov_xx, prior_cov_vv, var_z, z, **_):
+    variances = np.array([prior_cov_xx, prior_cov_vv])
+    return np.array([prior_x, prior_v]) + variances / (variances + var_z) * (z - prior_x)
 
 
 def _fusion(**changes):
@@ -1163,6 +1191,10 @@ CHAPTER = Chapter(
                     lambda: _printed_correction(lambda g: g | {"prior_x": 12.75, "prior_v": 5.1}).x,
                     "This is the correction of (12.75, 5.10). The page prints the prediction (12.5, 5.0): start from it.",
                 ),
+                Mistake(
+                    lambda: _each_by_its_own_variance(**lecture.example("vehicle")),
+                    "You divide each variance by itself plus 0.25. The velocity is not measured: its gain is the covariance 0.2550 by S = 1.9469 + 0.25.",
+                ),
                 Mistake(lambda: np.array([12.5, 5.0]), "This is the prediction: the correction is missing."),
                 Mistake(
                     lambda: np.array([11.79, 5.0]),
@@ -1283,7 +1315,7 @@ CHAPTER = Chapter(
         Exercise(
             "measurement",
             reference=measurement,
-            draw=each_way(landmark_aside, "side", "turned"),
+            draw=(*each_way(landmark_aside, "side", "turned"), turned_several_times),
             fixed={"x": POSE, "landmark": LANDMARK},
             draws=12,
             metric=metrics.Numbers(1e-9),
@@ -1313,6 +1345,14 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda x, l: np.array([measurement(x, l)[0], wrapped(np.arctan2(*(l - x[:2])) - x[2])]),
                     "np.arctan2 takes y first, then x.",
+                ),
+                Mistake(
+                    lambda x, l: measurement(x, l) * [1, 0] + [0, _turned_once(np.arctan2(*(l - x[:2])[::-1]) - x[2])],
+                    "Right within one full turn. A heading that has gathered several keeps the others: take the remainder, as wrap_angle does.",
+                ),
+                Mistake(
+                    lambda x, l: wrapped(measurement(x, l)),
+                    "You wrapped both numbers. Only the bearing is an angle: a distance of 5 m stays 5 m.",
                 ),
                 Mistake(
                     lambda x, l: measurement(x, l) % [np.inf, 2 * np.pi],
@@ -1799,7 +1839,12 @@ CHAPTER = Chapter(
         Exercise(
             "nees",
             reference=nees,
-            draw=(*each_way(estimate_and_truth, "side"), functools.partial(estimate_and_truth, astray=5.0)),
+            draw=(
+                *each_way(estimate_and_truth, "side"),
+                functools.partial(estimate_and_truth, astray=5.0),
+                functools.partial(estimate_and_truth, turns=2),
+            ),
+            draws=6,
             fixed={"truth": POSE, "x": POSE, "cov": POSE},
             metric=metrics.Numbers(1e-8),
             hints=(
@@ -1811,6 +1856,14 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda t, x, P: (t - x) @ np.linalg.solve(P, t - x),
                     "The heading error is not wrapped: both headings are nearly the same direction.",
+                ),
+                Mistake(
+                    _nees_of(lambda true, found: _turned_once(true - found)),
+                    "Right within one full turn. A heading that has gathered several keeps the others: take the remainder, as wrap_angle does.",
+                ),
+                Mistake(
+                    _nees_of(lambda true, found: wrapped(true) - wrapped(found)),
+                    "You wrapped each heading. 179 deg and -179 deg are still 358 deg apart then: wrap their difference.",
                 ),
                 Mistake(
                     lambda t, x, P: float(wrapped(t - x) @ np.linalg.solve(P, wrapped(t - x))),

@@ -70,6 +70,18 @@ def beams_at_a_pose(rng, count=None):
     return expected + 0.2 * rng.normal(size=count), expected, float(rng.uniform(0.15, 0.4))
 
 
+def beams_from_a_wrong_pose(rng):
+    """The same with ranges that are 12 m off: the density of each is zero in float64, its logarithm is not."""
+    ranges, expected, std = beams_at_a_pose(rng)
+    return ranges + 12.0 * rng.choice([-1, 1], len(ranges)), expected, std
+
+
+def scan_by_a_sharp_sensor(rng):
+    """A scan whose end points lie so many standard deviations from the nearest wall that densities are zero."""
+    grid, pose, ranges, bearings, _ = scan_at_a_pose(rng)
+    return grid, pose, 0.5 * ranges, bearings, float(rng.uniform(0.002, 0.004))
+
+
 def whole_scan(draw):
     """The draw with as many beams as the scanner has, and so wide a std that a plain product of their densities is zero
     in float64.
@@ -223,6 +235,13 @@ def near_the_threshold(rng, side):
     return w, float(particles.effective_size(w) / len(w) * (1 + 0.02 * side))
 
 
+def at_the_threshold(rng):
+    """Weights of 0 and of one size whose effective size, a power of two, is just the share; all without rounding."""
+    m = 2 ** rng.integers(2, 5)
+    n = 2 ** rng.integers(0, np.log2(m) + 1)
+    return rng.permutation(2.0 ** rng.integers(-2, 3) * (np.arange(m) < n)), float(n / m)
+
+
 def averages(rng, low=False):
     """w_mean, w_slow, w_fast, alpha_slow, alpha_fast: a drop as often as a rise; low: a share above one half."""
     slow = rng.uniform(0.2, 0.8)
@@ -313,9 +332,31 @@ DENSITIES = (
 )
 
 
+def _lifted(x, std):
+    """log N of a density that is kept from zero by something tiny."""
+    return np.log(_normal(x, std) + 1e-300)
+
+
+def _of_the_density(x, std):
+    with np.errstate(divide="ignore"):
+        return np.log(_normal(x, std))
+
+
+ROUNDED_TO_ZERO = (
+    (
+        _of_the_density,
+        "Right but for large errors: there the density is zero in float64, and the logarithm of 0 is -inf. Write down the logarithm's own formula.",
+    ),
+    (
+        _lifted,
+        "Right but for large errors: there the density is zero in float64, and what you add in its place decides. Write down the logarithm's own formula.",
+    ),
+)
+
+
 def _density_mistakes(variant, readings):
     """Slips in the density; variant(density, after=...) sums up densities of the readings, `after` is applied to it."""
-    slips = [Mistake(variant(density), text) for density, text in DENSITIES]
+    slips = [Mistake(variant(density), text) for density, text in (*DENSITIES, *ROUNDED_TO_ZERO)]
     added = f"You added the densities. Independent {readings} multiply: their *logarithms* are added."
     return [*slips, Mistake(variant(_normal), added), Mistake(variant(_normal, after=_logarithm), added)]
 
@@ -606,6 +647,10 @@ def _ray_to_the_last(grid, pose, bearing, r_max):
     return float([r_max, *_hits(grid, pose, bearing, r_max, grid.resolution / 2)][-1])
 
 
+def _up_to_the_share(weights, threshold):
+    return particles.effective_size(weights) <= threshold * len(weights)
+
+
 RESAMPLING_SLIPS = (
     (
         lambda w, t: not particles.should_resample(w, t),
@@ -642,6 +687,10 @@ RESAMPLING_SLIPS = (
     (
         lambda w, t: w.sum() < t * len(w),
         "You compare the sum of the weights. Compare effective_size(weights).",
+    ),
+    (
+        _up_to_the_share,
+        "Right but for an effective size that is just the share: below it means `<`, not `<=`.",
     ),
     (lambda w, t: True, "You resample always. With even weights that only loses particles."),
     (
@@ -822,8 +871,17 @@ def _proportional(resample, rng):
                 f"with the weights {weights.tolist()} index {k} gets {100 * found[k]:.0f} % of the draws "
                 f"instead of {100 * expected[k]:.0f} %."
             )
-            return told + _never_twice(resample, weights, rng)
+            return told + (_shifted(found, expected) or _never_twice(resample, weights, rng))
     return None
+
+
+def _shifted(found, expected):
+    """That each index has the share of a neighbor, as one more sentence."""
+    for neighbor, shares, slip in (("before", expected[:-2], "high"), ("behind", expected[2:], "low")):
+        apart = np.ptp(shares) > 2 * SHARE_OFF if shares.size else False
+        if apart and np.abs(found[1:-1] - shares).max() < SHARE_OFF:
+            return f" Between the first and the last, each index gets the share of the one {neighbor} it: is it one too {slip}?"
+    return ""
 
 
 def _never_twice(resample, weights, rng):
@@ -919,25 +977,27 @@ def _noise_is_right(move, rng):
     moved = np.asarray(move(states.copy(), u, dt, std_u, rng))
     if moved.shape != states.shape:
         return f"expected an array of shape (4000, 3), got {moved.shape}."
-    c, s = np.cos(theta), np.sin(theta)
-    ahead, aside = ((moved[:, :2] - place) @ [[c, -s], [s, c]]).T
-    turn, along_x = moved[:, 2] - theta, moved[:, 0].std()
-    if abs(along_x - dt * std_u[0]) < 0.1 * dt * std_u[0] < abs(ahead.std() - dt * std_u[0]):
+
+    def errors(moved):
+        c, s = np.cos(theta), np.sin(theta)
+        ahead, aside = ((moved[:, :2] - place) @ [[c, -s], [s, c]]).T
+        return {"ahead": ahead, "in theta": moved[:, 2] - theta, "aside": aside}
+
+    off, along_x = errors(moved), moved[:, 0].std()
+    if min(abs(along_x - t * std_u[0]) for t in (dt, 1.0)) < 0.1 * dt * std_u[0] and 2 * off["ahead"].std() < along_x:
         return "the noise of v spreads the particles along x of the map. A robot drives along its heading: add it to u."
-    for name, unit, noise, wanted in (
-        ("ahead", "m", ahead, dt * std_u[0]),
-        ("in theta", "rad", turn, dt * std_u[1]),
-        ("aside", "m", aside, dt**2 * std_u[1] / 2),
-    ):
-        if abs(noise.std() - wanted) > 0.1 * wanted:
-            return _other_spread(name, unit, noise, wanted, std_u, dt)
-    return _other_kind(ahead, turn, dt)
+    for name, wanted in (("ahead", dt * std_u[0]), ("in theta", dt * std_u[1]), ("aside", dt**2 * std_u[1] / 2)):
+        if abs(off[name].std() - wanted) > 0.1 * wanted:
+            longer = errors(np.asarray(move(states.copy(), u, 2 * dt, std_u, rng)))[name].std()
+            return _other_spread(name, off[name], wanted, std_u, dt, longer)
+    return _other_kind(off["ahead"], off["in theta"], dt)
 
 
-def _other_spread(name, unit, noise, wanted, std_u, dt):
-    """What a wrong spread of 4000 particles tells."""
-    amount = noise.std()
-    if abs(amount * dt - wanted) < 0.1 * wanted:
+def _other_spread(name, noise, wanted, std_u, dt, longer):
+    """What a wrong spread of 4000 particles tells; longer: that after a step of twice the time."""
+    amount, std, unit = noise.std(), std_u[int(name == "in theta")], "rad" if name == "in theta" else "m"
+    own = name != "aside" and abs(amount - std) < 0.1 * std
+    if own and abs(longer - amount) < 0.1 * amount:
         return (
             f"4000 particles spread {name} by std_u itself, whatever dt is: the noise was added to the pose, or "
             "after the step. It belongs to the control."
@@ -950,16 +1010,25 @@ def _other_spread(name, unit, noise, wanted, std_u, dt):
         return (
             f"{told}. The noise of each is like that of the one before: add its own to u itself, to each a fresh one."
         )
-    if abs(amount * math.sqrt(3) - wanted) < 0.1 * wanted:
+    if name != "aside" and abs(noise.mean() - dt * (name == "ahead")) > 0.3 * wanted:
+        return f"{told}. On average the noise is not 0: it should go both ways, as rng.standard_normal does."
+    if abs(amount * math.sqrt(3) - wanted) < 0.1 * wanted and _kurtosis(noise) < 2.2:
         return f"{told}. It is smaller by the root of 3, as uniform numbers up to std_u are: rng.standard_normal."
+    if name != "aside" and abs(amount - dt * math.sqrt(std)) < 0.05 * amount:
+        return f"{told}. That is what the root of std_u gives: std_u holds standard deviations, not variances."
     if name == "aside":
         return f"{told}. The noise of omega also bends the way: it belongs into the control, before the step."
     return f"{told}."
 
 
+def _kurtosis(noise):
+    """3 of normal numbers, 1.8 of uniform ones."""
+    return float((((noise - noise.mean()) / noise.std()) ** 4).mean())
+
+
 def _other_kind(ahead, turn, dt):
     """What else may be wrong with the noise of 4000 particles that spread as they should."""
-    kurtosis = float((((turn - turn.mean()) / turn.std()) ** 4).mean())
+    kurtosis = _kurtosis(turn)
     if abs(kurtosis - 3) > 0.7:  # nine standard deviations of what 4000 normal numbers give
         tails = "light" if kurtosis < 3 else "heavy"
         return f"the noise has the right spread, but too {tails} tails: draw normal numbers, rng.standard_normal."
@@ -1502,7 +1571,10 @@ CHAPTER = Chapter(
             reference=beam_weight,
             draw=beams_at_a_pose,
             metric=metrics.Numbers(1e-6),
-            noisy=[(whole_scan(beams_at_a_pose), metrics.Numbers(1e-6), "Right for few beams, but not for 541:")],
+            noisy=[
+                (whole_scan(beams_at_a_pose), metrics.Numbers(1e-6), "Right for few beams, but not for 541:"),
+                (beams_from_a_wrong_pose, metrics.Numbers(1e-6), "Right where the map fits, but not 12 m off:"),
+            ],
             limit=IMPORTS,
             hints=(
                 "Each beam is a normal density of measured minus expected range. A product turns into a sum of logarithms.",
@@ -1560,7 +1632,14 @@ CHAPTER = Chapter(
             draw=scan_at_a_pose,
             fixed={"grid": "the chapter has one building", "pose": POSE},
             metric=metrics.Numbers(1e-6),
-            noisy=[(whole_scan(scan_at_a_pose), metrics.Numbers(1e-6), "Right for few beams, but not for 541:")],
+            noisy=[
+                (whole_scan(scan_at_a_pose), metrics.Numbers(1e-6), "Right for few beams, but not for 541:"),
+                (
+                    scan_by_a_sharp_sensor,
+                    metrics.Numbers(1e-6),
+                    "Right where the walls are near, but not far from them:",
+                ),
+            ],
             hints=(
                 "Put the end point of each beam on the map and ask how far the nearest obstacle is.",
                 "End point: x + r cos(theta + b), y + r sin(theta + b). The distance stands in grid.distance at grid.cell_of(point).",
@@ -1823,8 +1902,13 @@ CHAPTER = Chapter(
             "should_resample",
             reference=should_resample,
             draw=(
-                *(functools.partial(cloud_and_threshold, slip=slip) for slip, _ in RESAMPLING_SLIPS),
+                *(
+                    functools.partial(cloud_and_threshold, slip=slip)
+                    for slip, _ in RESAMPLING_SLIPS
+                    if slip is not _up_to_the_share
+                ),
                 *(functools.partial(near_the_threshold, side=side) for side in (1, -1)),
+                at_the_threshold,
             ),
             metric=metrics.Exactly(),
             hints=(
