@@ -9,6 +9,7 @@ compares a wrong result with what the first give (`slips`), and mends a student'
 import ast
 import contextlib
 import copy
+import math
 import re
 from dataclasses import dataclass
 
@@ -69,6 +70,7 @@ ROUNDS = 200  # of a loop, or ten times as many as it has: enough for what conve
 SIZES = ("len({})", "len({}) - 1", "{}.shape[-1]")  # what a number that is typed in may stand for
 TURNS = {90: "np.pi / 2", 180: "np.pi", 360: "2 * np.pi"}
 TYPED = 2  # the rank of a number that is typed in
+ROUNDED = 2e-3  # how far, relatively, a number may lie from a multiple of pi that it is meant to be
 REPEATED = 1  # how unlikely a slip may be that is looked for in several places at once
 
 
@@ -153,6 +155,32 @@ def _counted_by_loops(function):
                     yield Change(words, mends, 2, content, ((owner, field, new),))
 
 
+def _rounded_pi(function):
+    """All numbers that are pi or a simple multiple of it, rounded, with all their digits at once."""
+    sets, rounded = [], []
+    for owner in ast.walk(function):
+        for field, content in ast.iter_fields(owner):
+            parts = content if isinstance(content, list) else [content]
+            new = [_with_all_digits(part) for part in parts]
+            changed = [part for part, other in zip(parts, new) if other is not part]
+            if changed:
+                sets.append((owner, field, new if isinstance(content, list) else new[0]))
+                rounded += changed
+    if rounded:
+        first = min(rounded, key=lambda node: (node.lineno, node.col_offset))
+        yield Change("", f"{first.value} is rounded: np.pi has all the digits", 1, first, tuple(sets))
+
+
+def _with_all_digits(node):
+    """A number with the digits of the multiple of pi that it is, rounded; any other part of the code as it is."""
+    if not isinstance(node, ast.Constant) or type(node.value) is not float or not node.value:
+        return node
+    for exact in (math.pi, 2 * math.pi, math.pi / 2, math.pi / 180, 180 / math.pi):
+        if 0 < abs(node.value / exact - 1) < ROUNDED:
+            return ast.copy_location(ast.Constant(exact), node)
+    return node
+
+
 def _everywhere(found):
     """One change made at all places at once that look alike but for their names."""
     alike = {}
@@ -213,7 +241,7 @@ def _indices(function):
 def mending(function):
     """What may mend a function: all single changes, and besides them bounds and steps made finer, loops made longer,
     gone on with or begun at 0, an axis, an outer product, an index that a loop should count, an argument or a size that
-    is typed in, and one slip mended wherever it stands: who copies a line copies its slip.
+    is typed in, a pi of three digits, and one slip mended wherever it stands: who copies a line copies its slip.
     """
     found = changes(function)
     narrower = list(_narrower(function, found))
@@ -222,6 +250,7 @@ def mending(function):
     found = [*_finer(function), *found, *_counted_by_loops(function), *_everywhere(found)]
     found += [*_with_an_outer_product(function), *_of_rounds(function)]
     found += [*_begun_late(function), *_typed_numbers(function)]
+    found += [*_shorter_steps(function), *_rounded_pi(function)]
     return sorted(found, key=lambda change: change.rank)
 
 
@@ -367,6 +396,27 @@ def _typed(function):
             for i, node in enumerate(content if isinstance(content, list) else [content]):
                 if isinstance(node, ast.Constant) and type(node.value) in (int, float) and node not in inner:
                     yield owner, field, content, i, node
+
+
+def _shorter_steps(function):
+    """Steps along a ray or in time, in a `while` that asks for what they add up to or in `np.arange`, made shorter."""
+    for owner in ast.walk(function):
+        if isinstance(owner, ast.While):
+            asked = {n.id for n in ast.walk(owner.test) if isinstance(n, ast.Name)}
+            for step in owner.body:
+                adds = isinstance(step, ast.AugAssign) and isinstance(step.op, ast.Add | ast.Sub)
+                whole = adds and type(getattr(step.value, "value", None)) is int
+                if adds and not whole and getattr(step.target, "id", "") in asked:
+                    yield _with_a_hundredth(step, "value", step.value)
+        elif isinstance(owner, ast.Call) and getattr(owner.func, "attr", "") == "arange" and len(owner.args) == 3:
+            yield _with_a_hundredth(owner, "args", owner.args[2])
+
+
+def _with_a_hundredth(place, field, step):
+    new = ast.BinOp(step, ast.Div(), ast.Constant(100))
+    _locate(new, step)
+    mends = f"steps of `{ast.unparse(step)}` are far too long: a hundredth of that will do"
+    return Change("", mends, FINER, place, ((place, field, [*place.args[:2], new] if field == "args" else new),))
 
 
 def _is_coarse(node):
@@ -537,6 +587,9 @@ def _call(node, names):
     if name == "arctan" and node.args and isinstance(getattr(node.args[0], "op", None), ast.Div):
         both = _numpy("arctan2", node.args[0].left, node.args[0].right)
         yield 0, "with `arctan2` where `arctan` of a quotient belongs", both
+    if name == "where" and len(node.args) == 3:
+        for case in node.args[1:]:
+            yield 0, "with one case treated like the other", case
     if name == "arctan2" and len(node.args) == 2:
         quotient = _numpy("arctan", ast.BinOp(node.args[0], ast.Div(), node.args[1]))
         yield 0, "with `arctan` of a quotient where `arctan2` belongs", quotient
@@ -681,7 +734,7 @@ def _instead(statement):
     if isinstance(statement, ast.If):
         for words, test in (("never", False), ("always", True)):
             new = ast.If(ast.Constant(test), statement.body, statement.orelse)
-            mends = f"what stands under this condition is to happen {words}"
+            mends = f"what stands under this condition should {words} happen"
             yield f"with one case {words} taken", mends, [new]
 
 

@@ -98,6 +98,8 @@ def _more(rows):
     yield "the expected result is the diagonal of the matrix you return", lambda r: np.diag(_square(r))
     yield "your result has one row too many, the last; the others are right", lambda r: _long(r)[:-1]
     yield "your result has one row too many, the first; the others are right", lambda r: _long(r)[1:]
+    if rows > MOST:
+        yield "the expected result is the last entry or row of what you return", lambda r: r[-1]
     for k in range(min(rows, MOST)):
         yield f"the expected result is entry or row {k} (counted from 0) of what you return", lambda r, k=k: r[k]
     for k in range(MOST):

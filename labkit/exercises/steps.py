@@ -189,13 +189,19 @@ class Search:
         return mends.endswith(("belongs there", "belongs there in degrees")) and any(compared)
 
     def _left_out_instead(self, number):
-        """The change that leaves out a part where another sign mends only because it makes that part do nothing."""
+        """The change that leaves out a part where another sign mends only because it makes that part do nothing; that
+        which meets a case never or always, where another comparison does no more.
+        """
         changes = self.written.changes
-        here = changes[number][1:3]
-        if " stands where " not in changes[number][3]:
+        line, code, mends = changes[number][1:]
+        if " stands where " not in mends:
             return number
-        fewer = [("code", k) for k, (_, *at, mends) in enumerate(changes) if tuple(at) == here and TOO_MANY in mends]
-        plan = self.mending(fewer)
+
+        def is_plainer(at, text, words):
+            less = text == code and TOO_MANY in words
+            return at == line and (less or code in text and words.endswith(("never happen", "always happen")))
+
+        plan = self.mending([("code", k) for k, (_, *change) in enumerate(changes) if is_plainer(*change)])
         return number if plan is None else plan[1]
 
     # Values on the way turned into others

@@ -1,5 +1,7 @@
 """Answers of students to chapter 7 that were once judged wrongly, and sentences of its notebook."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -124,3 +126,25 @@ def between_wrapped_headings(x, u, dt):
 )
 def test_a_turn_on_the_spot_and_a_heading_across_the_seam_are_drawn(name, answer, words):
     assert all(words in text for text in texts(name, answer))
+
+
+def until_x_stands_still(landmarks, distances, start):
+    x = np.array(start, dtype=float)
+    for _ in range(30):
+        away = x - landmarks
+        step = np.linalg.solve(2 * away, (away**2).sum(1) - distances**2)
+        x = x - step
+        if abs(step[0]) < 1e-9:
+            break
+    return x
+
+
+def by_the_radius_of_the_car(speed, steering, wheelbase):
+    return np.array([speed, speed / (wheelbase / math.tan(steering))])
+
+
+@pytest.mark.parametrize(
+    "name, answer", [("newton_lateration", until_x_stands_still), ("ackermann_twist", by_the_radius_of_the_car)]
+)
+def test_landmarks_in_a_row_and_wheels_straight_ahead_are_drawn(name, answer):
+    assert CORRECT not in [ITEMS[name].judge(answer, rng=np.random.default_rng(seed)).status for seed in range(3)]

@@ -193,3 +193,29 @@ def with_a_limit_of_its_own(innovation, cov_innovation, limit):
 def test_small_innovations_and_unused_limits_are_told(name, answer, words):
     status, texts = judged(name, answer)
     assert status == NOT_YET and all(words in text for text in texts), texts
+
+
+def test_a_state_of_two_numbers_is_no_state_with_a_covariance():
+    x, cov = ITEMS["corrected"].reference(), ITEMS["corrected"].metric.others[0][2]()
+    assert all(ITEMS["corrected"].judge(answer).status == CORRECT for answer in (tuple(x.tolist()), x, (x, cov)))
+    assert ITEMS["corrected"].judge((11.9, 4.98)).status == NOT_YET
+
+
+def once(angle):
+    return angle - 2 * np.pi * np.sign(angle) if abs(angle) > np.pi else angle
+
+
+def measured_with_one_turn(x, landmark):
+    dx, dy = landmark - x[:2]
+    return np.array([np.hypot(dx, dy), once(np.arctan2(dy, dx) - x[2])])
+
+
+def nees_with_one_turn(truth, x, cov):
+    e = np.array([*(truth - x)[:2], once(truth[2] - x[2])])
+    return e @ np.linalg.solve(cov, e)
+
+
+@pytest.mark.parametrize("name, answer", [("measurement", measured_with_one_turn), ("nees", nees_with_one_turn)])
+def test_headings_gather_several_turns(name, answer):
+    status, texts = judged(name, answer)
+    assert status == NOT_YET and all("several" in text for text in texts), texts

@@ -9,6 +9,7 @@ from scipy.stats import binom, chisquare, norm
 from labkit.chapters.ch09_monte_carlo import exercises as ch09
 from labkit.exercises import engine, session
 from labkit.exercises.engine import CORRECT, NOT_YET, RAISED
+from labkit.geometry import planar
 from labkit.localization import maps, mcl, odometry, particles
 
 CHAPTER = next(chapter for chapter in session.chapters() if chapter.name == "09-monte-carlo")
@@ -354,7 +355,53 @@ def of_weights_with_the_sum_1(weigh):
     return three_readings(weigh) and abs(weigh(np.zeros((2, 3)), np.ones(1), np.ones((1, 2)), 1.0).sum() - 1) < 1e-9
 
 
+def up_to_the_share(weights, threshold):
+    return particles.effective_size(weights) <= threshold * len(weights)
+
+
+def of_each_density(ranges, expected, std):
+    with np.errstate(divide="ignore"):
+        return np.log(norm.pdf(ranges - expected, scale=std)).sum()
+
+
+def kept_from_zero(ranges, expected, std):
+    return np.log(norm.pdf(ranges - expected, scale=std) + 1e-300).sum()
+
+
+def field_of_each_density(grid, pose, ranges, bearings, std):
+    angle = pose[2] + bearings
+    ends = pose[:2] + ranges[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    return of_each_density(grid.distance[grid.cell_of(ends)], 0.0, std)
+
+
+def landmarks_of_each_density(pose, z, landmarks, std_range, std_bearing):
+    dx, dy = (landmarks - pose[:2]).T
+    off = planar.wrap_angle(z[:, 1] - np.arctan2(dy, dx) + pose[2])
+    return of_each_density(z[:, 0], np.hypot(dx, dy), std_range) + of_each_density(off, 0.0, std_bearing)
+
+
+def of_variances(x, u, dt, std_u, rng):
+    return odometry.step(x, rng.multivariate_normal(u, np.diag(std_u), size=len(x)), dt)
+
+
+def forward_only(x, u, dt, std_u, rng):
+    return odometry.step(x, u + np.abs(rng.standard_normal((len(x), 2))) * std_u, dt)
+
+
+def one_too_high(weights, rng):
+    ends = np.cumsum(weights)
+    return np.minimum(np.searchsorted(ends, rng.random(len(ends)) * ends[-1]) + 1, len(ends) - 1)
+
+
 PASSED_BEFORE = [
+    ("sample_motion", of_variances, "the root of std_u"),
+    ("sample_motion", forward_only, "go both ways"),
+    ("should_resample", up_to_the_share, "not `<=`"),
+    ("beam_weight", of_each_density, "the logarithm of 0"),
+    ("beam_weight", kept_from_zero, "what you add in its place"),
+    ("distance_field_weight", field_of_each_density, "the logarithm of 0"),
+    ("landmark_weight", landmarks_of_each_density, "the logarithm of 0"),
+    ("resample_roulette", one_too_high, "the share of the one before it"),
     ("sample_motion", after_the_step, "along x of the map"),
     ("sample_motion", from_one_to_the_next, "like that of the one before"),
     ("log_sum_exp", around_the_mean, "took out the mean"),

@@ -54,6 +54,7 @@ TABLES = [RNG.normal(size=(n, 4)) for n in (5, 6, 7)]
         (lambda e: e[:-1], TABLES, "without its last row"),
         (lambda e: e[:, 2], TABLES, "column 2 (counted from 0)"),
         (lambda e: np.vstack([e, e[:1]]), TABLES, "one row too many, the last"),
+        (lambda e: np.vstack([RNG.normal(size=(9, *e.shape)), e[None]]), TABLES, "the last entry or row"),
         (lambda e: RNG.normal(size=9), TABLES, None),
     ],
 )

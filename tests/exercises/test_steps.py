@@ -532,3 +532,49 @@ def test_bounds_that_are_too_coarse_and_loops_that_end_too_early_are_told(refere
 def test_nothing_computed_is_to_be_equal_to_a_number_with_decimals():
     outcome = ITEM.judge(typed(f"if abs(b[0]) < 0.5:\n    return 0.0\n{RIGHT.strip()}"), rng=np.random.default_rng(0))
     assert "`0.5` is far too large" in outcome.text
+
+
+def _wrapped(a, b):
+    return (a + np.pi) % (2 * np.pi) - np.pi
+
+
+def _summed(a, b):
+    return a @ a / len(b) + b[0]
+
+
+def _clipped(a, b):
+    return np.maximum(a, 0.0)
+
+
+def several(rng):
+    n = rng.integers(3, 9)
+    return 3 * rng.normal(size=n), 2 + rng.normal(size=n)
+
+
+@pytest.mark.parametrize(
+    "reference, body, said",
+    [
+        (_wrapped, "return (a + 3.14) % 6.28 - 3.14", "in line 2, `3.14`: 3.14 is rounded: np.pi has all the digits."),
+        (_summed, "return a @ a / 30 + b[0]", "in line 2, `30`: 30 is typed in where `len(a)` belongs."),
+        (_clipped, "return np.where(a < 0, 0.0, np.where(a > 2, 2.0, a))", "this case needs no treatment of its own."),
+        (
+            _clipped,
+            "c = np.maximum(a, 0)\nif c.min() >= 0:\n    c = c + 1\nreturn c",
+            "`if c.min() >= 0:`: what stands under this condition should never happen.",
+        ),
+    ],
+)
+def test_rounded_numbers_typed_lengths_and_cases_that_are_none_are_told(reference, body, said):
+    assert said in judged(asked(reference, several), body)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "t = 0.0\nwhile t < a:\n    t += 0.3\nreturn t",
+        "t = np.arange(0, 9, 3 * 0.1)\nreturn t[t >= a][0]",
+    ],
+)
+def test_steps_that_are_too_long_are_told(body):
+    item = replace(asked(lambda a, b: a, lambda rng: rng.uniform(1, 2, 2)), metric=metrics.Numbers(0.01))
+    assert "are far too long: a hundredth of that will do" in judged(item, body)

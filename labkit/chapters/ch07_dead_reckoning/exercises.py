@@ -1626,6 +1626,7 @@ CHAPTER = Chapter(
             "ackermann_twist",
             reference=ackermann_twist,
             draw=CARS,
+            draws=len(CARS),
             metric=metrics.Numbers(1e-9),
             hints=(
                 "All wheels turn about one point on the line of the rear axle. How far aside is it?",

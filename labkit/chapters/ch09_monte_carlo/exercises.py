@@ -1203,7 +1203,7 @@ def hunt_4(weigh):
     return bool(np.isclose(twice[0] / twice[1], (once[0] / once[1]) ** 2))
 
 
-def _hunt(id, reference, specimen, why, hints, others, good=GOOD, extra=("rng",)):
+def _hunt(id, reference, specimen, why, hints, others, good=GOOD, extra=("rng",), named=""):
     specimen = _on_show(specimen)
     return Exercise(
         id,
@@ -1216,6 +1216,7 @@ def _hunt(id, reference, specimen, why, hints, others, good=GOOD, extra=("rng",)
             Mistake(
                 lambda *_: True,
                 f"Your test says True of the specimen, which means correct (if you meant it to say caught: that is False). {why}",
+                id=named,
             ),
             Mistake(lambda *_: None, "Your test returned None: it has to return True (passed) or False (caught)."),
         ],
@@ -2303,7 +2304,7 @@ CHAPTER = Chapter(
             "hunt_3",
             hunt_3,
             specimens.specimen_3,
-            "While the weights add up to 1 it does no harm. Let their sum be a little less, and try several times: the last spoke must fall beyond it.",
+            "While the weights add up to 1 it does no harm. Let their sum be a little less, and try several times: the last spoke must fall beyond it. The IndexError is the harm: catch it, and return False.",
             (
                 "On average it is right. What does it take for granted about the weights?",
                 "Floating-point weights need not add up to 1. Try a sum a little below 1, several times, with `except IndexError` around it, and look at the largest index.",
@@ -2313,6 +2314,7 @@ CHAPTER = Chapter(
                 "    return False`",
             ),
             others=((_beyond_the_last, "raises nothing, but hands out an index beyond the last particle"),),
+            named="hunt_3-632ac2",
         ),
         _hunt(
             "hunt_4",
