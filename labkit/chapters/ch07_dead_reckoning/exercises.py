@@ -129,9 +129,9 @@ def car(rng, left=True, gear=1):
 
 
 def car_straight_on(rng):
-    """The same with its wheels straight: the circle has no center."""
+    """The same with its wheels straight, so that the circle has no center, in Python's own numbers, as one types them."""
     speed, _, wheelbase = car(rng)
-    return speed, 0.0, wheelbase
+    return float(speed), 0.0, float(wheelbase)
 
 
 CARS = (
@@ -1626,7 +1626,6 @@ CHAPTER = Chapter(
             "ackermann_twist",
             reference=ackermann_twist,
             draw=CARS,
-            draws=len(CARS),
             metric=metrics.Numbers(1e-9),
             hints=(
                 "All wheels turn about one point on the line of the rear axle. How far aside is it?",
