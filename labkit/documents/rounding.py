@@ -4,6 +4,7 @@ One mechanism for every bound of the ledger. A printed number stands for all num
 digit; a result computed from several of them can be off by what each hides, propagated to first order and added up.
 """
 
+import functools
 import re
 from typing import NamedTuple
 
@@ -40,7 +41,12 @@ def half_unit(printed):
     half : float or None
         None for text.
     """
-    match = _NUMBER.fullmatch(printed.strip())
+    return _half_unit(printed.strip())
+
+
+@functools.lru_cache(maxsize=4096)  # who looks for slips asks for the same few texts thousands of times
+def _half_unit(printed):
+    match = _NUMBER.fullmatch(printed)
     if not match:
         return None
     return 0.5 * 10.0 ** (int(match["exponent"] or 0) - len(match["decimals"] or ""))

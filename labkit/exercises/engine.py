@@ -304,7 +304,7 @@ class _Trial:
         told = "stops with an error" if run.error is not None else "gives another result"
         return (
             f"called twice with the same arguments, your function {told} the second time. Does something stay from "
-            "call to call, a global variable or a default argument that is changed?"
+            "call to call, a global variable or a default argument that is changed? Or is something drawn at random?"
         )
 
     def _relation(self, whole=False):

@@ -2,6 +2,7 @@
 
 import contextlib
 import dis
+import functools
 import sys
 import types
 
@@ -63,7 +64,12 @@ def twins_of(exercise):
 
     A reference that a chapter wrote around a function of the library bears its name.
     """
-    reference, id = exercise.reference, exercise.id
+    return _twins(exercise.reference, exercise.id, len(sys.modules))
+
+
+@functools.lru_cache(maxsize=512)
+def _twins(reference, id, _loaded):
+    """`twins_of` a reference, looked for again when modules have been loaded."""
     wrapped = (reference.__module__ or "").startswith(OWN_ROOMS)
     found = []
     for module_name, module in list(sys.modules.items()):
