@@ -62,9 +62,8 @@ def test_a_result_that_is_right_for_other_arguments_says_for_which(of, change, t
     def answer(*args):
         return of.reference(*change(*args))
 
-    for seed in range(3):
-        outcome = of.judge(answer, rng=np.random.default_rng(seed))
-        assert outcome.status == NOT_YET and told in outcome.text, outcome.text
+    outcome = of.judge(answer, rng=np.random.default_rng(0))
+    assert outcome.status == NOT_YET and told in outcome.text, outcome.text
 
 
 def test_data_of_the_notebook_in_place_of_an_argument_are_named():
@@ -75,15 +74,14 @@ def test_data_of_the_notebook_in_place_of_an_argument_are_named():
 
 
 def test_a_result_that_one_change_does_not_explain_is_not_explained():
-    for seed in range(3):
-        rng = np.random.default_rng(seed)
-        for of, answer in (
-            (GAP, lambda T, p, s: GAP.reference(T, p, s) + np.sin(p)),
-            (ROWS, lambda a, b, n: ROWS.reference(a, b, n) + np.cos(b[0])),
-            (BETWEEN, lambda A, B: A @ B @ A),
-        ):
-            outcome = of.judge(answer, rng=rng)
-            assert outcome.status == NOT_YET and "comes out" not in outcome.text, outcome.text
+    rng = np.random.default_rng(0)
+    for of, answer in (
+        (GAP, lambda T, p, s: GAP.reference(T, p, s) + np.sin(p)),
+        (ROWS, lambda a, b, n: ROWS.reference(a, b, n) + np.cos(b[0])),
+        (BETWEEN, lambda A, B: A @ B @ A),
+    ):
+        outcome = of.judge(answer, rng=rng)
+        assert outcome.status == NOT_YET and "comes out" not in outcome.text, outcome.text
 
 
 def test_an_answer_that_is_right_is_right_however_often_a_change_leaves_it_as_it_is():
