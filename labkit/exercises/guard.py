@@ -11,8 +11,10 @@ import ctypes
 import functools
 import gc
 import io
+import itertools
 import linecache
 import locale
+import operator
 import os
 import random
 import signal
@@ -106,33 +108,38 @@ class Pristine:
             ours = name == "labkit" or name.startswith("labkit.") or name in PROTECTED
             if ours and name not in self.saved and module is not None:
                 kept = CHANGING.get(name, ())
-                self.saved[name] = (module, {key: v for key, v in vars(module).items() if key not in kept})
+                self.saved[name] = (module, {key: v for key, v in vars(module).items() if key not in kept}, None)
                 if name.startswith("labkit."):
                     self._look_into(module)
 
     def _look_into(self, module):
-        """Remember the methods of a module's own classes."""
+        """Remember the methods of a module's own classes, and how many names each has."""
         for value in list(vars(module).values()):
             if isinstance(value, type) and value.__module__ == module.__name__:
                 methods = {k: v for k, v in vars(value).items() if isinstance(v, types.FunctionType | property)}
-                self.saved[f"{module.__name__}.{value.__qualname__}"] = (value, methods)
+                self.saved[f"{module.__name__}.{value.__qualname__}"] = (value, methods, len(vars(value)))
 
     def restore(self):
         """Put back what was replaced, and note the names, e.g. "labkit.geometry.frames.invert", in `replaced`."""
-        for name, (owner, then) in self.saved.items():
-            if isinstance(owner, types.ModuleType) and sys.modules.get(name) is not owner:
+        for name, (owner, then, size) in self.saved.items():
+            if size is None and sys.modules.get(name) is not owner:
                 sys.modules[name] = owner
                 self.replaced.append(name)
             now = vars(owner)
-            for key, value in then.items():
-                found = now.get(key, self)
-                if getattr(found, "_stands_for", found) is not value and key != "__warningregistry__":
-                    setattr(owner, key, value)
-                    self.replaced.append(f"{name}.{key}")
-            if isinstance(owner, type):
+            # name by name only where one differs: this follows every call, and holds thousands of names
+            if not all(map(operator.is_, map(now.get, then, itertools.repeat(self)), then.values())):
+                self._put_back(name, owner, now, then)
+            if size is not None and len(now) != size:
                 for key in [k for k, v in now.items() if k not in then and isinstance(v, types.FunctionType)]:
                     delattr(owner, key)  # it stood before what is inherited
                     self.replaced.append(f"{name}.{key}")
+
+    def _put_back(self, name, owner, now, then):
+        for key, value in then.items():
+            found = now.get(key, self)
+            if getattr(found, "_stands_for", found) is not value and key != "__warningregistry__":
+                setattr(owner, key, value)
+                self.replaced.append(f"{name}.{key}")
 
     def drain(self):
         """The names noted since the last call, each once."""
