@@ -526,3 +526,32 @@ def test_half_a_turn_has_an_angle_though_its_sine_has_no_sign():
 
     outcome = ch01_exercises.CHAPTER["kuka_from_matrix"].judge(by_signs, rng=np.random.default_rng(0))
     assert outcome.status == NOT_YET and outcome.text.startswith("right, but not where A is 180 deg:")
+
+
+@pytest.mark.parametrize(
+    "name, answer",
+    [
+        ("normalize", lambda v: v / np.linalg.norm(v) if v.all() else v),
+        ("frame_from_points", lambda o, x, y: made_frame(o, x, y) if o.any() else np.diag([1.0, 1, 1, 0])),
+        ("relative", lambda A, B: A if np.allclose(A, B) else np.linalg.inv(A) @ B),
+    ],
+)
+def test_zeros_and_one_frame_twice_are_drawn(name, answer):
+    outcome = ch01_exercises.CHAPTER[name].judge(answer, rng=np.random.default_rng(0))
+    assert outcome.status == NOT_YET
+
+
+def made_frame(origin, x_point, y_point):
+    x = (x_point - origin) / np.linalg.norm(x_point - origin)
+    y = y_point - origin - (y_point - origin) @ x * x
+    y /= np.linalg.norm(y)
+    return np.vstack([np.column_stack([x, y, np.cross(x, y), origin]), [0, 0, 0, 1]])
+
+
+def test_a_letter_behind_a_number_is_drawn():
+    def found_by_a_pattern(text):
+        lines = [line.split("#")[0].replace(",", ".") for line in text.splitlines()]
+        return read_points([" ".join(re.findall(r"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?", line)) for line in lines])
+
+    assert judged("read_system", lambda text: read_points(text.splitlines())).status == CORRECT
+    assert "holds a letter behind a number" in judged("read_system", found_by_a_pattern).text

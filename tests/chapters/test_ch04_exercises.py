@@ -239,3 +239,32 @@ def of_a_bent_path(g, B, radius):
 )
 def test_one_unknown_as_many_residuals_and_a_straight_path_are_drawn(name, answer):
     assert judged(name, answer).status != CORRECT
+
+
+def one_round_at_least(residual, jacobian, x, radius, steps):
+    return beyond.descend(residual, jacobian, x, radius, max(steps, 1))
+
+
+def by_eigenvectors(g, H):
+    """By eigenvectors (b, w - a), which are nothing where H is diagonal."""
+    if H[0, 1] == 0:
+        return np.zeros(2)
+    w = np.linalg.eigvalsh(H)
+    V = np.array([[H[0, 1], k - H[0, 0]] for k in w])
+    return -sum((v @ g) / (v @ v) / k * v for v, k in zip(V, w))
+
+
+def of_a_model_that_bends_up(cost, new_cost, g, B, step):
+    return (cost - new_cost) / -(g @ step + abs(step @ B @ step) / 2)
+
+
+@pytest.mark.parametrize(
+    "name, answer",
+    [
+        ("trust_region", one_round_at_least),
+        ("newton_step", by_eigenvectors),
+        ("gain_ratio", of_a_model_that_bends_up),
+    ],
+)
+def test_no_rounds_a_diagonal_and_a_model_that_bends_down_are_drawn(name, answer):
+    assert judged(name, answer).status == NOT_YET

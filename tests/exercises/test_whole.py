@@ -54,6 +54,6 @@ def test_what_is_right_or_stops_by_itself_is_taken():
 
 
 def test_what_is_wrong_at_whole_numbers_for_another_reason_is_told_no_cause():
-    anywhere = replace(NORMALIZE, draw=lambda rng: (rng.uniform(1, 2, 3),))
+    anywhere = replace(NORMALIZE, draw=lambda rng: (rng.uniform(1, 2, 3),), noisy=())
     outcome = judged(anywhere, lambda v: v / np.linalg.norm(v) + (np.abs(v).max() > 9))
     assert outcome.status == NOT_YET and outcome.text.startswith("right so far, but not for [")

@@ -56,6 +56,21 @@ def scaled_direction(rng, scale):
     return (scale * random_direction(rng),)
 
 
+def edges_on_axes(rng):
+    """Two edges along axes of W, at a right angle: many a product in them is exactly 0."""
+    one, other = rng.permutation(3)[:2]
+    lengths = rng.choice([-1, 1], 2) * rng.uniform(20, 300, 2)
+    return lengths[0] * np.eye(3)[one], lengths[1] * np.eye(3)[other]
+
+
+def points_on_axes(rng):
+    """The same edges, from the origin of W."""
+    return np.zeros(3), *edges_on_axes(rng)
+
+
+ON_AXES = "right, but not along the axes of W, where products are exactly 0:"
+
+
 def kuka_pose(rng, A_deg=(-170, 170), B_deg=(-80, 80), C_deg=(-170, 170)):
     """A KUKA pose, well away from the gimbal lock unless B is asked for there."""
     low, high = zip(A_deg, B_deg, C_deg)
@@ -447,6 +462,7 @@ CHAPTER = Chapter(
             draw=tuple(functools.partial(scaled_direction, scale=s) for s in (1.0, 1e-6, 1e3, 1e-4)),
             fixed={"v": POINT},
             metric=metrics.Numbers(1e-9),
+            noisy=(lambda rng: (edges_on_axes(rng)[0],), metrics.Numbers(1e-9), ON_AXES),
             properties=(
                 right_for_whole_numbers(
                     frames.unit_vector, metrics.Numbers(1e-9), functools.partial(scaled_direction, scale=1.0), 0
@@ -526,6 +542,7 @@ CHAPTER = Chapter(
             draw=either_angle(two_directions),
             fixed={"a": POINT, "b": POINT},
             metric=metrics.Rotations(1e-7),
+            noisy=(edges_on_axes, metrics.Rotations(1e-7), ON_AXES),
             properties=(right_for_whole_numbers(frames.gram_schmidt, metrics.Rotations(1e-7), two_directions, 0, 1),),
             hints=(
                 "x takes the direction of a. y may only use what b has across x.",
@@ -616,6 +633,7 @@ CHAPTER = Chapter(
             draw=either_angle(three_points),
             fixed={"origin": POINT, "x_point": POINT, "y_point": POINT},
             metric=metrics.Poses(1e-6, 1e-6),
+            noisy=(points_on_axes, metrics.Poses(1e-6, 1e-6), ON_AXES),
             properties=(
                 right_for_whole_numbers(frames.frame_from_points, metrics.Poses(1e-6, 1e-6), three_points, 0, 1, 2),
             ),
@@ -735,6 +753,11 @@ CHAPTER = Chapter(
             draw=lambda rng: (random_pose(rng), random_pose(rng)),
             fixed={"T_WA": POSE, "T_WB": POSE},
             metric=metrics.Poses(1e-6, 1e-6),
+            noisy=(
+                lambda rng: 2 * (random_pose(rng),),
+                metrics.Poses(1e-6, 1e-6),
+                "right, but not where both frames are one:",
+            ),
             hints=(
                 "Neighboring letters cancel: which two transforms give T_AB when W stands between them?",
                 "T_AB = T_AW T_WB, and T_AW is the inverse of T_WA.",

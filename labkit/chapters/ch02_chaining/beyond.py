@@ -30,13 +30,17 @@ def text_of_system(rng, comments=False, commas=False):
     lines = []
     for point in system(rng).round(int(rng.integers(5, 9))):
         indent = " " * int(rng.integers(3))
-        lines += [f"{indent}# measured by hand"] * comments + [indent] * int(rng.random() < 0.4)
+        lines += [f"{indent}# measured by hand, part 2"] * comments + [indent] * int(rng.random() < 0.4)
         blank = str(rng.choice([" ", "   ", "\t"]))
         numbers = [repr(float(value)) for value in point]
         if not comments and not commas:
             numbers[2] = f"{point[2]:.6e}"
         line = blank.join(numbers)
-        lines.append(" " * int(rng.integers(3)) + line + "  # touched twice" * (comments and rng.random() < 0.5))
+        lines.append(
+            " " * int(rng.integers(3))
+            + line
+            + rng.choice(["  # touched 2 times", "# again"]) * (comments and rng.random() < 0.7)
+        )
     text = "\n".join(lines) + "\n" * int(rng.integers(3))
     return (text.replace(".", ",") if commas else text,)
 
@@ -128,20 +132,25 @@ class reads_back(metrics.Metric):
         return [("", self, result, self.admit(expected, expected))]
 
 
+FAULTS = (
+    ("a word in place of a number", "12.5 seven 3.0"),
+    ("two numbers", "12.5 3.0"),
+    ("four numbers", "12.5 3.0 4.0 5.0"),
+    ("nan", "12.5 nan 3.0"),
+    ("a letter behind a number", "12.5 7x 3.0"),
+)
+
+
 def names_the_line(student, rng):
     """A sentence about the first fault that is not refused with its line, None if all are.
 
     The points stand far down, below comments and empty lines, at a line whose number is none of those in it.
     """
     good = write_system(system(rng).round(3)).splitlines()
-    before, at = 3 * int(rng.integers(20, 30)), int(rng.integers(3))
-    for what, bad in (
-        ("a word in place of a number", "12.5 seven 3.0"),
-        ("two numbers", "12.5 3.0"),
-        ("four numbers", "12.5 3.0 4.0 5.0"),
-        ("nan", "12.5 nan 3.0"),
-    ):
-        above = ["# a comment", "", "  "] * (before // 3)
+    before, first = 3 * int(rng.integers(20, 30)), int(rng.integers(4))
+    above = ["# a comment", "", "  "] * (before // 3)
+    for k, (what, bad) in enumerate(FAULTS):
+        at = (first + k) % 4  # in place of each point, and below all three
         told = _refusal(student, "\n".join(above + good[:at] + [bad] + good[at + 1 :]))
         number = before + at + 1
         if told is None:

@@ -371,7 +371,7 @@ CHAPTER = Chapter(
         Exercise(
             "chain",
             reference=chaining.chain,
-            draw=tuple(functools.partial(random_links, count=n) for n in (3, 2, 5, 4)),
+            draw=tuple(functools.partial(random_links, count=n) for n in (3, 2, 9, 4)),
             metric=metrics.Poses(1e-6, 1e-6),
             noisy=(
                 functools.partial(random_links, count=1),
@@ -944,7 +944,7 @@ CHAPTER = Chapter(
         Exercise(
             "distribute_closure",
             reference=chaining.distribute_closure,
-            draw=tuple(functools.partial(open_loop, count=n) for n in (3, 4, 5)),
+            draw=tuple(functools.partial(open_loop, count=n) for n in (3, 4, 7)),
             metric=metrics.Poses(1e-5, 1e-5),
             noisy=[
                 (functools.partial(open_loop, count=n), metrics.Poses(1e-5, 1e-5), f"right, but not of {words}:")

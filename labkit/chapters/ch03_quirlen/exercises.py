@@ -20,8 +20,8 @@ def turns(rng, n, between_deg=(10, 40)):
     return exp_so3(axis)
 
 
-def poses(rng, std_trans=0.0, between_deg=(10, 40), counts=(4, 5, 6, 7, 8)):
-    """Four to eight poses, or as many as asked for, that touch one point, positions off by noise."""
+def poses(rng, std_trans=0.0, between_deg=(10, 40), counts=(4, 5, 6, 8, 13)):
+    """Four to thirteen poses, or as many as asked for, that touch one point, positions off by noise."""
     tip, point = rng.uniform(-50, 50, 3) - (0, 0, 90), rng.uniform(-300, 300, 3)
     return pivot.touching_poses(turns(rng, rng.choice(counts), between_deg), tip, point, 0.0, std_trans, rng)
 
@@ -39,7 +39,7 @@ def few_poses_and_points(rng, count):
     return poses(rng, counts=(count,)), rng.uniform(-50, 50, 3), rng.uniform(-300, 300, 3)
 
 
-def system(rng, std_trans=0.0, counts=(4, 5, 6, 7, 8)):
+def system(rng, std_trans=0.0, counts=(4, 5, 6, 8, 13)):
     """Stacked matrix and right-hand side."""
     T = poses(rng, std_trans, counts=counts)
     return pivot.pivot_matrix(T), pivot.pivot_rhs(T)
@@ -70,7 +70,7 @@ def matrix_and_residuals(rng):
 
 def near_first(rng, count):
     """Distances, one of them far below the scale and some beyond the cutoff, and a scale; the nearest leads."""
-    scale = rng.uniform(0.1, 0.6)
+    scale = rng.choice([rng.uniform(0.1, 0.6), rng.uniform(1.5, 3)])
     near, far = rng.uniform(0.02, 0.13, 1), rng.uniform(1.1, 6, 3) * pivot.TUKEY
     middle = rng.uniform(0.2, 0.95, count - 4) * pivot.TUKEY
     return scale * np.concatenate([near, rng.permutation(np.concatenate([middle, far]))]), scale
@@ -80,6 +80,12 @@ def far_first(rng, count):
     """The same, one beyond the cutoff leading: a 0 for it must not make whole numbers of all weights."""
     d, scale = near_first(rng, count)
     return np.sort(d)[::-1].copy(), scale
+
+
+def all_far(rng):
+    """Distances beyond the cutoff, all of them: no weight is left."""
+    d, scale = near_first(rng, 5)
+    return d + pivot.TUKEY * scale, scale
 
 
 def one_at_0(rng):
@@ -833,7 +839,10 @@ CHAPTER = Chapter(
                     _tukey_weights, metrics.Numbers(1e-9), functools.partial(near_first, count=9), 0
                 ),
             ),
-            noisy=(one_at_0, metrics.Numbers(1e-9), "right, but not where a distance is 0:"),
+            noisy=[
+                (one_at_0, metrics.Numbers(1e-9), "right, but not where a distance is 0:"),
+                (all_far, metrics.Numbers(1e-9), "right, but not where all poses are too far away:"),
+            ],
             hints=(
                 "Near poses keep their weight, far ones lose it all, smoothly.",
                 "Tukey: with q = d / (7 scale), w = (1 - q^2)^2, and 0 where q > 1.",

@@ -164,6 +164,18 @@ def never_looked_again(residual, jacobian, x, radius, steps):
     return x, radius
 
 
+def model_of_the_start(residual, jacobian, x, radius, steps):
+    """The loop with gradient and curvature of the start in every round, the cost being that of where it stands."""
+    g, B = jacobian(x).T @ residual(x), jacobian(x).T @ jacobian(x)
+    for _ in range(steps):
+        step = bare_dogleg(g, B, radius)
+        r, new, length = residual(x), residual(x + step), np.linalg.norm(step)
+        rho = 0.5 * (r @ r - new @ new) / -(g @ step + 0.5 * step @ B @ step)
+        x = x + step if rho > ACCEPT else x
+        radius = rule(radius, length, rho)
+    return x, radius
+
+
 def cost_of_the_start(residual, jacobian, x, radius, steps):
     """The loop with the cost of the start in every gain ratio."""
     first = residual(x) @ residual(x)
@@ -265,6 +277,11 @@ RUNS = (
     functools.partial(run_with, wanted=fairly, first=(0.78, 0.86)),
     functools.partial(run_with, wanted=well_inside),
 )
+
+
+def no_rounds(rng):
+    """No rounds at all: everything stays as it was."""
+    return *_problem(rng), float(rng.uniform(0.3, 3.0)), 0
 
 
 # --- the choice of a way to calibrate ---

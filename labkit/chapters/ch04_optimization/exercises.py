@@ -74,6 +74,11 @@ def gradient_and_hessian(rng, signs):
     return rng.normal(scale=5, size=2), turned(eigenvalues, rng.uniform(0.3, 1.2))
 
 
+def diagonal_model(rng):
+    """A gradient and a Hessian without mixed derivatives."""
+    return rng.normal(scale=5, size=2), np.diag(rng.uniform(1, 6, 2) * rng.choice([-1, 1], 2))
+
+
 MODELS = tuple(functools.partial(gradient_and_hessian, signs=s) for s in ((1, 1), (-1, 1), (-1, -1), (1, -1)))
 
 
@@ -100,9 +105,10 @@ DAMPED = tuple(  # 0 in a size that is damped as well: what tells them apart is 
 def tried_step(rng, shares):
     """Cost before and after a step that kept a share between these of its promise, with the model's g and B.
 
-    It goes downhill, yet not straight down, and a cost may be negative, as that of a well is.
+    It goes downhill, yet not straight down; a cost may be negative, as that of a well is, and a model bend down.
     """
-    g, B = rng.normal(scale=3, size=2), turned(rng.uniform(1, 4, 2), rng.uniform(0.3, 1.2))
+    curvatures = rng.uniform(1, 4, 2) * rng.choice(((1, 1), (1, -1)))
+    g, B = rng.normal(scale=3, size=2), turned(curvatures, rng.uniform(0.3, 1.2))
     aside = rng.choice([-1, 1]) * rng.uniform(0.3, 0.8)
     step = -rng.uniform(0.08, 0.2) * (g + aside * np.array([-g[1], g[0]]))
     cost = rng.choice([-1, 1]) * rng.uniform(5, 20)
@@ -129,6 +135,9 @@ DOGLEG_CASES = tuple(
     for length in ((15, 40), (0.01, 0.05))  # squares of lengths are larger, then smaller than the lengths
     for between in ((-0.7, -0.2), (0.2, 0.8), (1.3, 2.0))
 )
+
+
+ITERATE = metrics.Several(metrics.Numbers(1e-7), metrics.Numbers(1e-7), names=("x", "radius"))
 
 
 def straight_path(rng, share):
@@ -767,6 +776,7 @@ CHAPTER = Chapter(
             draw=MODELS,
             fixed={"g": TWO, "H": TWO},
             metric=metrics.Numbers(1e-9),
+            noisy=(diagonal_model, metrics.Numbers(1e-9), "right, but not where H is diagonal:"),
             properties=(right_for_whole_numbers(opt.newton_step, metrics.Numbers(1e-6), MODELS[0], 0),),
             hints=(
                 "The quadratic model is stationary where its gradient g + H h vanishes.",
@@ -1451,7 +1461,8 @@ CHAPTER = Chapter(
             "trust_region",
             reference=beyond.trust_region,
             draw=beyond.RUNS,
-            metric=metrics.Several(metrics.Numbers(1e-7), metrics.Numbers(1e-7), names=("x", "radius")),
+            metric=ITERATE,
+            noisy=(beyond.no_rounds, ITERATE, "right, but not of no rounds at all:"),
             draws=5,
             hints=(
                 "Each round: residuals and Jacobian where you stand, a dogleg step, its gain ratio; then decide twice, whether to take the step and what the radius becomes.",
@@ -1595,6 +1606,11 @@ CHAPTER = Chapter(
                     beyond.never_looked_again,
                     "Residuals and Jacobian are those of the start in every round. Compute both where you stand, inside the loop.",
                     id="trust-start",
+                ),
+                Mistake(
+                    beyond.model_of_the_start,
+                    "g and B are those of the start in every round. Compute both where you stand, inside the loop.",
+                    id="trust-model-of-the-start",
                 ),
             ],
         ),
