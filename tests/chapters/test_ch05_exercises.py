@@ -230,3 +230,21 @@ def test_rows_whose_other_entry_is_the_misprint_are_told():
     told = str(metric.deviations({("C14", 3, "y"), ("C14", 2, "x")}, wanted)[0])
     assert told.startswith("3 of 3 misprints are not named yet: in the rows 2, 3 you name")
     assert str(metric.deviations({("C14", 3, "x")}, wanted)[0]) == "2 misprints are not named yet"
+
+
+def test_the_slip_of_the_sphere_two_meters_away_is_not_always_there():
+    def with_pose_two(entries):
+        return exercises.find_misprints(entries) | {("C17", 2, "z")}
+
+    assert judged("find_misprints", lambda entries: exercises.find_misprints(entries)).status == CORRECT
+    assert judged("find_misprints", with_pose_two).status == NOT_YET
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_middle_of_a_scan_line_is_not_the_middle_of_its_circle(seed):
+    def centered(x, z):
+        x_c = (x.min() + x.max()) / 2
+        p, q = np.linalg.lstsq(np.c_[2 * z, np.ones(len(z))], (x - x_c) ** 2 + z**2, rcond=None)[0]
+        return x_c, p, np.sqrt(q + p * p)
+
+    assert judged("fit_circle", centered, seed).status == NOT_YET

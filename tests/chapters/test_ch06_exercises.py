@@ -200,4 +200,11 @@ def test_the_first_shift_that_is_least_among_its_neighbors_is_not_enough():
         left, middle, right = cost[i - 1 : i + 2]
         return (shifts[i] + 0.5 * (left - right) / (left - 2 * middle + right)) * step
 
-    texts("time_offset", offset)
+    assert ITEMS["time_offset"].judge(offset, rng=np.random.default_rng(0)).status == NOT_YET
+
+
+def test_a_link_may_turn_and_step_either_way():
+    def no_way_back(theta, d, a, alpha):
+        return arm.dh_matrix(theta, abs(d), a, alpha)
+
+    texts("dh_matrix", no_way_back)

@@ -105,6 +105,10 @@ def noisy_right_triangle(rng):
     return *triangle(rng, right_angle=True), float(np.deg2rad(rng.uniform(0.01, 1.0)))
 
 
+def noisy_obtuse_triangle(rng):
+    return *obtuse_triangle(rng), float(np.deg2rad(rng.uniform(0.01, 1.0)))
+
+
 def arrivals(rng):
     """Where a robot was sent, and where it arrived, in the plane or in space."""
     d, n = int(rng.integers(2, 4)), int(rng.integers(5, 40))
@@ -576,7 +580,7 @@ TRIANGULATION = [
     Exercise(
         "height_std",
         reference=triangulation.height_std,
-        draw=(noisy_triangle, noisy_right_triangle),
+        draw=(noisy_triangle, noisy_right_triangle, noisy_obtuse_triangle),
         metric=metrics.Numbers(1e-5, "mm"),
         hints=(
             "How much does H change when one angle changes a little? Differentiate L = H (cot α + cot β), with L fixed.",

@@ -84,15 +84,15 @@ def pose_off(rng):
 
 def smooth_function(rng):
     """A curved function of some variables, a place and a step large enough to tell the schemes apart."""
-    m, n = rng.choice(np.arange(2, 6), 2, replace=False)
+    m, n = rng.choice(np.arange(1, 6), 2, replace=False)
     M, c = rng.normal(size=(m, n)), rng.normal(size=m)
     return (lambda x: np.sin(M @ x) + c * (x @ x)), rng.normal(size=n), float(rng.uniform(0.03, 0.08))
 
 
 def arc(rng, std=0.0):
-    """A scan line: points of a circle, 60 to 120 deg of it."""
-    n = int(rng.integers(50, 90))
-    angle = np.linspace(-1, 1, n) * rng.uniform(0.55, 1.0)
+    """A scan line: points of a circle, 60 to 120 deg of it, more on one side of its lowest point than on the other."""
+    n, side = int(rng.integers(50, 90)), rng.choice([-1, 1])
+    angle = side * np.linspace(-rng.uniform(0.25, 0.5), rng.uniform(0.8, 1.2), n)[::side]
     r = rng.uniform(20, 30) + std * rng.normal(size=n)
     return rng.uniform(-20, 20) + r * np.sin(angle), rng.uniform(200, 280) - r * np.cos(angle)
 
@@ -100,7 +100,7 @@ def arc(rng, std=0.0):
 def profile(rng, side):
     """A scan line of a sphere of some radius whose center lies on this side of the scan plane."""
     radius = float(rng.uniform(25, 35))
-    center = np.array([rng.uniform(4, 20), side * rng.uniform(6, 20), rng.uniform(200, 280)])
+    center = np.array([rng.uniform(4, 20) * rng.choice([-1, 1]), side * rng.uniform(6, 20), rng.uniform(200, 280)])
     return *sphere.scan_line(center, radius, rng.uniform(0.6, 1.0), int(rng.integers(40, 70))), radius, side
 
 
@@ -118,9 +118,14 @@ def residuals_with_outliers(rng):
     return (e,)
 
 
-def entries_with_more_slips(rng):
-    """The printed tables with two further slips in good rows: two digits of a length swapped, 9 to 90 mm away."""
+def entries_with_more_slips(rng, mended=()):
+    """The printed tables, misprints of some poses mended, with two further slips in good rows: two digits of a length
+    swapped, 9 to 90 mm away.
+    """
     entries = thesis.printed_entries()
+    for row in thesis.corrections():
+        if row["pose"] in mended:
+            entries[row["table"], row["pose"], row["column"]] = row["corrected"]
     for pose in rng.choice(np.array([6, 10, 14, 18, 19, 23, 27]), 2, replace=False):
         key = "C14", int(pose), str(rng.choice(["x", "y", "z"]))
         slips = [
@@ -1107,7 +1112,7 @@ CHAPTER = Chapter(
         Exercise(
             "find_misprints",
             reference=find_misprints,
-            draw=entries_with_more_slips,
+            draw=(entries_with_more_slips, functools.partial(entries_with_more_slips, mended=(2, 21))),
             metric=named_entries(),
             draws=2,
             limit=15.0,

@@ -63,7 +63,7 @@ def _scalar_first(data):
 
 def link(rng):
     """Parameters of one link: rad, mm, mm, rad."""
-    return (*rng.uniform((-3, 50, 50, -1.5), (3, 300, 300, -0.3)),)
+    return (*(rng.uniform((0.3, 50, 50, 0.3), (3, 300, 300, 1.5)) * rng.choice([-1, 1], 4)),)
 
 
 def _entry_by_entry(th, d, a, al):
