@@ -233,11 +233,8 @@ def test_rows_whose_other_entry_is_the_misprint_are_told():
 
 
 def test_the_slip_of_the_sphere_two_meters_away_is_not_always_there():
-    def with_pose_two(entries):
-        return exercises.find_misprints(entries) | {("C17", 2, "z")}
-
-    assert judged("find_misprints", lambda entries: exercises.find_misprints(entries)).status == CORRECT
-    assert judged("find_misprints", with_pose_two).status == NOT_YET
+    drawn = [draw(np.random.default_rng(0))[0] for draw in ITEMS["find_misprints"].cases]
+    assert [("C17", 2, "z") in exercises.find_misprints(entries) for entries in drawn] == [True, False]
 
 
 @pytest.mark.parametrize("seed", range(3))
