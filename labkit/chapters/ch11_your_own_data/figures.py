@@ -55,12 +55,12 @@ def remaining(ax):
 
 def histogram(ax):
     """Errors over the standard deviation told. Returns (steps, normal law, Student's law)."""
-    style.axes(ax, "error / standard deviation told", "density", "calibrations done again")
+    style.axes(ax, "calibrations done again: error / standard deviation told", "density")
     ax.set(xlim=(-REACH, REACH), ylim=(0, 0.48))
     for side in (-2, 2):
         ax.axvline(side, **style.look("guide"))
     (steps,) = ax.plot([], [], color=style.MEASUREMENT, linewidth=1.8, drawstyle="steps-mid", label="errors")
     (normal,) = ax.plot([], [], **style.look("prediction", label="if the noise were known"))
     (student,) = ax.plot([], [], **style.look("estimate", label="Student's law"))
-    ax.legend(loc="upper right")
+    style.legend_above(ax, ncols=3)
     return steps, normal, student
