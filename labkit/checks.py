@@ -11,6 +11,9 @@ PRODUCT_TOLERANCE = 1e-2  # a product of a few such matrices
 LAST_ROW_TOLERANCE = 1e-6  # a product of poses in single precision passes, a transposed pose or a scale does not
 COVARIANCE_TOLERANCE = 1e-6  # of the standard deviations: sums in another order pass, single precision, too
 LARGEST_COORDINATE = 1e75  # fourth powers of coordinates still fit into a float
+FEW = 500  # numbers: of fewer the amounts are quicker than the largest and the smallest
+SMALLEST_POSITIVE = 1e-75  # of what is divided by, for the same reason
+MOST = 10_000_000  # what one call makes of a kind: some hundred megabytes of poses
 KINDS = {"b": "truth values", "c": "complex numbers", "U": "text", "S": "bytes", "M": "dates", "m": "durations"}
 
 
@@ -23,12 +26,13 @@ def shown(value, form="g"):
     return text.lstrip("-") if float(text) == 0 else text
 
 
-def as_finite(value, name):
-    """`value` as an array of finite floats; refuses what is no number, NaN and infinities."""
+def as_finite(value, name, below=LARGEST_COORDINATE):
+    """`value` as an array of finite floats; refuses what is no number, NaN, infinities and what has no fourth power."""
     array = as_floats(value, name)
-    if not np.isfinite(array).all():
-        where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise ValueError(f"{name} must be finite, got {array[where]} at index {list(where)}")
+    if array.size < FEW and (np.abs(array) <= below).all():
+        return array
+    array, largest = _with_largest(array, name)
+    _refuse_huge(largest, name, below)
     return array
 
 
@@ -97,12 +101,15 @@ def _with_largest(value, name):
     """`value` as an array of finite floats, and the largest of their amounts; thousands of them are passed twice."""
     array = as_floats(value, name)
     largest = max(array.max(initial=0.0), -array.min(initial=0.0))  # NaN if one is
-    return (array if math.isfinite(largest) else as_finite(array, name)), largest
+    if not math.isfinite(largest):
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise ValueError(f"{name} must be finite, got {array[where]} at index {list(where)}")
+    return array, largest
 
 
-def _refuse_huge(largest, name):
-    if largest > LARGEST_COORDINATE:
-        raise ValueError(f"{name} must hold numbers below {LARGEST_COORDINATE:.0e}, got {shown(largest, '.3g')}")
+def _refuse_huge(largest, name, below=LARGEST_COORDINATE):
+    if largest > below:
+        raise ValueError(f"{name} must hold numbers below {below:.0e}, got {shown(largest, '.3g')}")
 
 
 def as_matrices(value, name, rows, columns):
@@ -144,6 +151,14 @@ def as_positive_number(value, name):
 def as_count(value, name, at_least=1):
     """`value` as a whole number, not below `at_least`."""
     return as_whole(as_number(value, name), name, at_least)
+
+
+def as_size(value, name, at_least=1):
+    """`value` as a whole number of things that are made and kept, not below `at_least`, and not too many of them."""
+    size = as_count(value, name, at_least)
+    if size > MOST:
+        raise ValueError(f"{name} must be at most {MOST:.0e}, got {shown(size)}")
+    return size
 
 
 def as_whole(value, name, at_least=None):
@@ -282,8 +297,9 @@ def kind(value):
 def as_positive(value, name):
     """`value` as positive finite floats (a standard deviation, a length, a time step)."""
     array = as_finite(value, name)
-    if (array <= 0).any():
-        raise ValueError(f"{name} must be positive, got {shown(array.min())}")
+    if (array < SMALLEST_POSITIVE).any():
+        wanted = "positive" if array.min() <= 0 else f"at least {SMALLEST_POSITIVE:.0e}"
+        raise ValueError(f"{name} must be {wanted}, got {shown(array.min())}")
     return array
 
 

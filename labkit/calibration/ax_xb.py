@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..checks import as_choice, as_positive_number, as_rotations, as_shape, as_transforms, as_truth, shown
+from ..checks import as_choice, as_number, as_positive_number, as_rotations, as_shape, as_transforms, as_truth, shown
 from ..documented import documented, unchecked
 from ..geometry.frames import invert, moved, pose, rotation_block
 from ..geometry.lie import log_so3, nearest_rotation, skew
@@ -463,6 +463,7 @@ def noise_levels(square_rot, square_trans, freedom, given, size):
     std_rot, std_trans : float, rad and mm
     """
     floors = MIN_ANGLE_STD, MIN_LENGTH_STD * size
+    given = [known if known is None else as_number(known, "given") for known in given]
     return tuple(
         known or max(max(square, 0.0) / max(free, 1.0), floor**2) ** 0.5
         for known, square, free, floor in zip(given, (square_rot, square_trans), freedom, floors)

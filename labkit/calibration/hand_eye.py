@@ -20,6 +20,7 @@ from functools import cached_property
 import numpy as np
 
 from ..checks import (
+    SMALLEST_POSITIVE,
     as_count,
     as_finite,
     as_names,
@@ -494,8 +495,8 @@ def refuse_one_line(x_S, weights):
     mean = weights @ x_S / weights.sum()
     spread = np.linalg.svd((x_S - mean) * np.sqrt(weights)[:, None], compute_uv=False)
     far = math.sqrt(weights.sum()) * np.linalg.norm(mean)
-    if spread[1] <= MIN_SPREAD * max(spread[0], MIN_SPREAD * far):
-        where = "at one place" if spread[0] <= MIN_SPREAD * far else "on one line"
+    if spread[1] <= max(MIN_SPREAD * max(spread[0], MIN_SPREAD * far), SMALLEST_POSITIVE):
+        where = "at one place" if spread[0] <= max(MIN_SPREAD * far, SMALLEST_POSITIVE) else "on one line"
         raise ValueError(
             f"the sphere stays {where} of the scanner frame, so the scanner's rotation about it is free; change its "
             "depth and its place along the scan line between the poses"
@@ -529,28 +530,37 @@ def _gauss_newton(R_FS, T_BF, x_S, weights, max_steps):
     most to a tenth.
     """
     root, R_BF, t_BF = np.sqrt(np.repeat(weights, 3)), T_BF[:, :3, :3], T_BF[:, :3, 3]
+    turned_S = skew(x_S)
+    J = np.empty((len(T_BF), 3, 9))
+    J[..., 3:6], J[..., 6:] = R_BF, -np.eye(3)
 
-    def residuals(T_FS, target):  # as `sphere_residuals`, whose checks would take most of the time of a fit
+    # `sphere_residuals`, `joint_jacobian` and `moved`, whose checks would take most of the time
+    def at(T_FS, target):
         seen = R_BF @ (x_S @ T_FS[:3, :3].T + T_FS[:3, 3])[..., None]
         r = (seen[..., 0] + t_BF - target).ravel() * root
-        return r, r @ r
+        return T_FS, target, r, r @ r
 
-    def after(T_FS, target, step):  # as `moved`
-        return pose(T_FS[:3, :3] @ exp_so3(step[:3]), T_FS[:3, 3] + step[3:6]), target + step[6:]
+    def jacobian(T_FS):
+        J[..., :3] = -R_BF @ (T_FS[:3, :3] @ turned_S)
+        return J.reshape(-1, 9) * root[:, None]
+
+    def after(T_FS, target, step):
+        moved = T_FS.copy()
+        moved[:3, :3], moved[:3, 3] = T_FS[:3, :3] @ exp_so3(step[:3]), T_FS[:3, 3] + step[3:6]
+        return at(moved, target + step[6:])
 
     shift = _best_shift(R_FS, T_BF, x_S, root)
-    T_FS, target = pose(R_FS, shift[:3]), shift[3:]
-    (r, cost), costs = residuals(T_FS, target), []
+    (T_FS, target, r, cost), costs = at(pose(R_FS, shift[:3]), shift[3:]), []
     for _ in range(max_steps):
         costs.append(cost)
-        J = joint_jacobian(T_BF, x_S, T_FS) * root[:, None]
-        step = np.linalg.lstsq(J, -r, rcond=None)[0]
-        slope, trial = r @ J @ step, residuals(*after(T_FS, target, step))
-        while trial[1] > cost and np.abs(step[:3]).max() > STEP_TOLERANCE:
-            share = max(0.1, slope / (2 * slope - (trial[1] - cost)))
+        weighted = jacobian(T_FS)
+        step = np.linalg.lstsq(weighted, -r, rcond=None)[0]
+        slope, trial = r @ weighted @ step, after(T_FS, target, step)
+        while trial[3] > cost and np.abs(step[:3]).max() > STEP_TOLERANCE:
+            share = max(0.1, slope / (2 * slope - (trial[3] - cost)))
             step, slope = share * step, share * slope
-            trial = residuals(*after(T_FS, target, step))
-        (T_FS, target), (r, cost) = after(T_FS, target, step), trial
+            trial = after(T_FS, target, step)
+        T_FS, target, r, cost = trial
         if np.abs(step[:3]).max() <= STEP_TOLERANCE:
             break
     return T_FS, target, np.sqrt(np.array([*costs, cost]) / weights.sum())

@@ -9,11 +9,11 @@ import numpy as np
 
 from ..checks import (
     PRODUCT_TOLERANCE,
-    as_count,
     as_matrices,
     as_positive_number,
     as_rotations,
     as_shape,
+    as_size,
     as_transforms,
     shown,
 )
@@ -307,7 +307,7 @@ def compare_methods(repeats, std, rng, methods=METHODS):
     bound : float
         The Cramer-Rao bound of one sphere (mm), rms over the repeats.
     """
-    repeats, std = as_count(repeats, "repeats"), as_positive_number(std, "std")
+    repeats, std = as_size(repeats, "repeats"), as_positive_number(std, "std")
     squares, bounds = {name: [] for name in methods}, []
     for _ in range(repeats):
         scene = suitable_scene(std, rng)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..checks import (
+    as_count,
     as_indices,
     as_instance,
     as_items,
@@ -20,6 +21,7 @@ from ..checks import (
     as_points,
     as_positive_number,
     as_shape,
+    as_size,
     as_transforms,
     as_truths,
 )
@@ -214,7 +216,9 @@ class Model:
         return self._as_derivative(J) / np.repeat(noise.widening, self.channels)[:, None]
 
     def _as_derivative(self, J):
-        return as_shape(J, "J", "n", sum(self.channels), "p")
+        J = as_shape(J, "J", "n", sum(self.channels), "p")
+        as_count(J.shape[2], "the number of parameters in J")
+        return J
 
 
 def _of_its_own(method, check):
@@ -283,6 +287,7 @@ def next_poses(model, solution, kept, count=3):
     std : array, shape (count + 1, 6)
         Predicted standard deviations now and after each of them, for noise as found.
     """
+    count = as_size(count, "count")
     _, J, noise = model.whitened(solution, kept)
     poses, candidates = model.proposals(solution)
     candidates = model.widened(candidates / np.repeat(noise.std, model.channels)[:, None], noise)

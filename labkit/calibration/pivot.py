@@ -16,7 +16,6 @@ from functools import cached_property
 import numpy as np
 
 from ..checks import (
-    as_count,
     as_finite,
     as_generator,
     as_nonnegative,
@@ -25,10 +24,12 @@ from ..checks import (
     as_points,
     as_rotations,
     as_shape,
+    as_size,
     as_transforms,
     as_whole,
     fit_together,
     shown,
+    solve_covariance,
 )
 from ..documented import documented, unchecked
 from ..geometry.lie import exp_so3, skew
@@ -457,7 +458,8 @@ def predicted_covariance(R, tip, std_rot, std_trans):
     lever = skew(tip)
     C = std_trans**2 * np.eye(3) + std_rot**2 * lever @ lever.T
     A = np.concatenate([R, np.broadcast_to(-np.eye(3), R.shape)], axis=-1)
-    information = (np.swapaxes(A, 1, 2) @ (R @ np.linalg.inv(C) @ np.swapaxes(R, 1, 2)) @ A).sum(0)
+    inverse = solve_covariance(C, "the noise of a reading", np.eye(3))
+    information = (np.swapaxes(A, 1, 2) @ (R @ inverse @ np.swapaxes(R, 1, 2)) @ A).sum(0)
     values = np.linalg.eigvalsh(information)
     if values[0] <= RANK_TOLERANCE**2 * values[-1]:
         raise ValueError("the orientations do not fix the tip: the information matrix has a zero eigenvalue")
@@ -515,7 +517,7 @@ def cone(n, half_angle, turns=0.0):
     -------
     R : array, shape (n, 3, 3)
     """
-    n, half_angle, turns = as_count(n, "n"), as_number(half_angle, "half_angle"), as_number(turns, "turns")
+    n, half_angle, turns = as_size(n, "n"), as_number(half_angle, "half_angle"), as_number(turns, "turns")
     phi = 2 * np.pi * np.arange(n) / n
     sine, cosine = np.sin(half_angle), np.cos(half_angle)
     d = np.column_stack([sine * np.cos(phi), sine * np.sin(phi), np.full(n, cosine)])

@@ -17,6 +17,7 @@ from ..checks import (
     as_positive_number,
     as_rotations,
     as_shape,
+    as_size,
     as_transforms,
     fit_together,
     shown,
@@ -163,8 +164,9 @@ def poses_that_see(T_FS, target, R_BF, x_S):
     T_BF : array, shape (..., 4, 4)
     """
     R_BF, arms = as_rotations(R_BF, "R_BF"), transform(T_FS, x_S)
-    fit_together(R_BF=R_BF.shape[:-2], x_S=arms.shape[:-1])
-    return pose(R_BF, as_points(target, "target") - (R_BF @ arms[..., None])[..., 0])
+    target = as_points(target, "target")
+    fit_together(R_BF=R_BF.shape[:-2], x_S=arms.shape[:-1], target=target.shape[:-1])
+    return pose(R_BF, target - (R_BF @ arms[..., None])[..., 0])
 
 
 def pattern(T_FS, target, tilt, spread, n=31):
@@ -186,7 +188,7 @@ def pattern(T_FS, target, tilt, spread, n=31):
     -------
     T_BF : array, shape (n, 4, 4)
     """
-    n, tilt, spread = as_count(n, "n"), as_number(tilt, "tilt"), as_shape(spread, "spread", 3)
+    n, tilt, spread = as_size(n, "n"), as_number(tilt, "tilt"), as_shape(spread, "spread", 3)
     T_FS, target = as_shape(as_transforms(T_FS, "T_FS"), "T_FS", 4, 4), as_shape(target, "target", 3)
     k = np.arange(n)
     u = (0.5 + np.outer(k, _IRRATIONAL)) % 1.0  # evenly spread over a cube, without chance

@@ -13,7 +13,6 @@ from functools import cached_property
 import numpy as np
 
 from ..checks import (
-    as_count,
     as_finite,
     as_nonnegative,
     as_number,
@@ -21,6 +20,7 @@ from ..checks import (
     as_positive,
     as_positive_number,
     as_shape,
+    as_size,
     kind,
     shown,
 )
@@ -328,7 +328,7 @@ def scan_line(center, radius, half_angle, n, std=0.0, rng=None):
     ValueError
         Noise without a generator, a scan plane that misses the sphere.
     """
-    center, half_angle, n = as_shape(center, "center", 3), as_number(half_angle, "half_angle"), as_count(n, "n")
+    center, half_angle, n = as_shape(center, "center", 3), as_number(half_angle, "half_angle"), as_size(n, "n")
     std = float(as_nonnegative(as_number(std, "std"), "std"))
     if std and rng is None:
         raise ValueError("rng must be given when std is not 0")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import as_finite, as_positive, as_positive_number, as_shape, as_transforms
+from ..checks import MOST, as_finite, as_positive, as_positive_number, as_shape, as_transforms, shown
 from ..documented import documented
 from ..geometry.lie import interpolate, log_so3
 
@@ -129,6 +129,9 @@ def clock_offset(time_a, T_a, time_b, T_b, max_offset=None):
     step = min(np.median(np.diff(time_a)), np.median(np.diff(time_b)))
     as_positive(step, "the median step of both streams")
     span = max(SPAN, 2 * np.median(np.diff(time_a)), 2 * np.median(np.diff(time_b)))
+    steps = max(np.ptp(time_a), np.ptp(time_b)) / step
+    if steps > MOST:
+        raise ValueError(f"streams must last at most {MOST:.0e} of their median steps, got {shown(steps)}")
     grids = [np.arange(time[0] + span / 2, time[-1] - span / 2, step) for time in (time_a, time_b)]
     if min(map(len, grids)) < 2 * BLOCKS:
         raise ValueError(f"streams must hold at least {2 * BLOCKS} steps each beyond {span:.2g} s to be aligned")

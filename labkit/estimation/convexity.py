@@ -7,7 +7,7 @@ Sensor-Roboter-Systemen", HAW Hamburg 2019, section 2.4.2.
 
 import numpy as np
 
-from ..checks import as_count, as_finite, as_matrices, as_number
+from ..checks import as_finite, as_matrices, as_number, as_size
 from ..documented import documented
 
 
@@ -58,7 +58,7 @@ def chord(f, x, y, n):
 
     Source: thesis, section 2.4.2, definition a) of convex functions.
     """
-    x, y, n = as_finite(x, "x"), as_finite(y, "y"), as_count(n, "n", at_least=2)
+    x, y, n = as_finite(x, "x"), as_finite(y, "y"), as_size(n, "n", at_least=2)
     if x.ndim != 1 or x.shape != y.shape:
         raise ValueError(f"x and y must have the same shape (d,), got {x.shape} and {y.shape}")
     share = np.linspace(0.0, 1.0, n)

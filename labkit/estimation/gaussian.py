@@ -7,13 +7,13 @@ import numpy as np
 from scipy import special
 
 from ..checks import (
-    as_count,
     as_covariances,
     as_finite,
     as_points,
     as_positive_number,
     as_probability,
     as_shape,
+    as_size,
     covariance_root,
     fit_together,
     solve_covariance,
@@ -115,7 +115,7 @@ def ellipse(mean, cov, probability=0.95, points=61):
         Wrong shapes, a negative variance, a probability that is none.
     """
     mean, cov = as_points(mean, "mean", 2), as_covariances(cov, "cov", 2)
-    probability, points = as_probability(probability, "probability"), as_count(points, "points")
+    probability, points = as_probability(probability, "probability"), as_size(points, "points")
     fit_together(mean=mean.shape[:-1], cov=cov.shape[:-2])
     values, vectors = np.linalg.eigh(cov)
     axes = vectors * np.sqrt(np.maximum(values, 0.0) * chi_square_quantile(probability, 2))[..., None, :]
@@ -241,7 +241,7 @@ def bent_region(pose, ends, probability=0.95, points=61):
     pose, ends = as_shape(pose, "pose", 3), as_shape(ends, "ends", "n", 3)
     if len(ends) < 2:
         raise ValueError(f"ends must hold at least two poses, got {len(ends)}")
-    probability, points = as_probability(probability, "probability"), as_count(points, "points")
+    probability, points = as_probability(probability, "probability"), as_size(points, "points")
     twists = planar.log_pose(planar.relative_pose(pose, ends))
     mean, cov = twists.mean(0), np.cov(twists.T)
     values, vectors = np.linalg.eigh(cov)

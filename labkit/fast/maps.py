@@ -5,7 +5,7 @@ import functools
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from ..checks import as_count, as_instance, as_points, as_positive_number, as_shape
+from ..checks import as_instance, as_points, as_positive_number, as_shape, as_size
 from ..localization.maps import OccupancyGrid, as_rays
 
 RAYS = 1 << 17  # rays worked on at once
@@ -112,7 +112,7 @@ class RangeTable:
     """
 
     def __init__(self, grid, r_max, n_angles=120):
-        self.grid, self.r_max, self.n_angles = grid, as_positive_number(r_max, "r_max"), as_count(n_angles, "n_angles")
+        self.grid, self.r_max, self.n_angles = grid, as_positive_number(r_max, "r_max"), as_size(n_angles, "n_angles")
         height, width = as_instance(grid, "grid", OccupancyGrid).cells.shape
         table = np.zeros((height, width, self.n_angles), dtype=np.float32)
         i, j = np.nonzero(~grid.occupied)

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from ..checks import as_count, as_generator, as_positive, fit_together
+from ..checks import as_generator, as_positive, as_size, fit_together
 from ..documented import documented, unchecked
 from ..localization import odometry
 from ..localization.particles import as_noisy_control, as_weights
@@ -51,6 +51,7 @@ def normal_pairs(rng, n):
     -------
     array, shape (2, n)
     """
+    n = as_size(n, "n", at_least=0)
     far, direction = rng.standard_exponential(n, dtype=np.float32), rng.random(n, dtype=np.float32)
     far *= 2
     np.sqrt(far, out=far)
@@ -67,7 +68,7 @@ def resample_systematic(weights, rng, size=None):
     Counts the spokes that point at each particle or an earlier one, which takes rounding up in place of a search.
     """
     weights = as_weights(weights)
-    size = len(weights) if size is None else as_count(size, "size", at_least=0)
+    size = len(weights) if size is None else as_size(size, "size", at_least=0)
     ends = np.cumsum(weights)
     ends *= size / ends[-1]
     full = np.searchsorted(ends, ends[-1])

@@ -20,6 +20,7 @@ from ..checks import (
     as_points,
     as_positive_number,
     as_shape,
+    as_size,
     as_transforms,
     fit_together,
     kind,
@@ -345,7 +346,7 @@ def noisy_links(transforms, std_rot, std_trans, rng, runs=1):
     links : array, shape (N, runs, 4, 4)
     """
     std_rot, std_trans = _noise(std_rot, std_trans)
-    links, runs = as_shape(_stack(transforms), "transforms", "n", 4, 4), as_count(runs, "runs")
+    links, runs = as_shape(_stack(transforms), "transforms", "n", 4, 4), as_size(runs, "runs")
     rng = as_generator(rng)
     xi = rng.normal(size=(len(links), runs, 6)) * np.repeat([std_rot, std_trans], 3)
     return links[:, None] @ exp_se3(xi)
@@ -372,7 +373,7 @@ def polygon_loop(n, size):
     -------
     links : array, shape (n, 4, 4)
     """
-    n, size = as_count(n, "n"), as_number(size, "size")
+    n, size = as_size(n, "n"), as_number(size, "size")
     turn = 2 * np.pi / n
     link = np.eye(4)
     link[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
@@ -393,7 +394,7 @@ def straight_chain(n, length):
     -------
     links : array, shape (n, 4, 4)
     """
-    n, length = as_count(n, "n"), as_number(length, "length")
+    n, length = as_size(n, "n"), as_number(length, "length")
     links = np.repeat(np.eye(4)[None], n, axis=0)
     links[:, 0, 3] = length
     return links

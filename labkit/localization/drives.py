@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import as_choice, as_count, as_items, as_names, as_points, as_positive_number, as_shape
+from ..checks import as_choice, as_items, as_names, as_points, as_positive_number, as_shape, as_size
 from ..documented import documented
 from ..geometry.planar import wrap_angle
 from . import odometry
@@ -89,7 +89,7 @@ def follow(start, waypoints, n_steps, dt, speed=0.6, turn_rate=0.8):
     -------
     array, shape (n_steps, 2)
     """
-    (x, y, theta), n_steps = as_shape(start, "start", 3), as_count(n_steps, "n_steps", at_least=0)
+    (x, y, theta), n_steps = as_shape(start, "start", 3), as_size(n_steps, "n_steps", at_least=0)
     named = ((dt, "dt"), (speed, "speed"), (turn_rate, "turn_rate"))
     dt, speed, turn_rate = (as_positive_number(value, name) for value, name in named)
     controls = []
@@ -139,8 +139,8 @@ def random_drive(building, noise, n_steps, rng, dt=0.5, start=None):
     here = rooms[rng.integers(len(rooms))] if start is None else as_choice(start, "start", building.nodes)
     xy = np.array(building.nodes[here])
     pose = np.array([*xy, rng.uniform(-np.pi, np.pi)])
-    waypoints = []
-    while len(waypoints) < 2 * n_steps * dt:  # more than can be reached
+    waypoints, enough = [], as_size(np.ceil(2 * n_steps * dt), "2 n_steps dt", at_least=0)  # more than can be reached
+    while len(waypoints) < enough:
         goal = rooms[rng.integers(len(rooms))]
         if goal != here:
             waypoints += [building.nodes[name] for name in find_route(building.edges, here, goal)[1:]]

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..checks import (
-    as_count,
     as_covariances,
     as_points,
     as_positive_number,
     as_probability,
     as_readings,
     as_shape,
+    as_size,
     as_truth,
     covariance_root,
     fit_together,
@@ -176,7 +176,7 @@ def ekf_update(x, cov, z, landmarks, std_range, std_bearing, iterations=1, wrap=
     std = np.array([as_positive_number(std_range, "std_range"), as_positive_number(std_bearing, "std_bearing")])
     fit_together(x=prior.shape[:-1], cov=cov.shape[:-2])
     x = prior
-    for _ in range(as_count(iterations, "iterations")):
+    for _ in range(as_size(iterations, "iterations")):
         H = measurement_jacobian(x, landmarks)
         H = H.reshape(*H.shape[:-3], -1, 3)
         y, seen = _stacked(z, measurement(x, landmarks), wrap)
@@ -482,7 +482,7 @@ def simulate_drive(x0, controls, dt, cov_u, landmarks, std_range, std_bearing, r
     ValueError
         Wrong shapes, a covariance that is not positive definite.
     """
-    controls, runs = as_shape(controls, "controls", "n", 2), as_count(runs, "runs")
+    controls, runs = as_shape(controls, "controls", "n", 2), as_size(runs, "runs")
     std_range, std_bearing = as_positive_number(std_range, "std_range"), as_positive_number(std_bearing, "std_bearing")
     root = covariance_root(_control_covariances(cov_u, len(controls)), "cov_u")
     x0 = as_points(x0, "x0", 3)

@@ -98,10 +98,13 @@ class OccupancyGrid:
         occupied_below, free_above : float
             Shares of white: what is darker is occupied, what is lighter is free, what lies between is unknown.
         """
-        from PIL import Image
+        from PIL import Image, UnidentifiedImageError
 
-        with Image.open(path) as image:
-            gray = np.asarray(image.convert("L"))[::-1] / 255.0
+        try:
+            with Image.open(path) as image:
+                gray = np.asarray(image.convert("L"))[::-1] / 255.0
+        except UnidentifiedImageError:
+            raise ValueError(f"path must name a picture, and {path} is none") from None
         cells = np.where(gray < occupied_below, OCCUPIED, np.where(gray > free_above, FREE, UNKNOWN))
         return cls(cells, resolution, origin)
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..checks import as_count, as_function, as_generator, as_number, as_points, as_shape, shown
+from ..checks import as_count, as_function, as_generator, as_number, as_points, as_shape, as_size, shown
 from ..documented import documented
 from .particles import (
     as_weights,
@@ -343,7 +343,7 @@ class MonteCarloLocalizer:
 
     def resize(self, n_particles, rng):
         """Go on with another number of particles, drawn from this cloud."""
-        self.n_max, rng = as_count(n_particles, "n_particles"), as_generator(rng)
+        self.n_max, rng = as_size(n_particles, "n_particles"), as_generator(rng)
         self.states = self.states[self.resampling.draw(self.weights, rng, self.n_max)]
         self._log_weights = np.zeros(self.n_max)
 

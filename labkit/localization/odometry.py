@@ -10,7 +10,6 @@ import numpy as np
 
 from ..checks import (
     as_choice,
-    as_count,
     as_covariances,
     as_finite,
     as_generator,
@@ -19,6 +18,7 @@ from ..checks import (
     as_positive,
     as_positive_number,
     as_shape,
+    as_size,
     fit_together,
     shown,
 )
@@ -361,7 +361,7 @@ def noisy_controls(controls, dt, k_d, k_theta, k_drift, rng, runs):
     -------
     controls : array, shape (n, runs, 2)
     """
-    controls, runs = as_shape(controls, "controls", "n", 2), as_count(runs, "runs")
+    controls, runs = as_shape(controls, "controls", "n", 2), as_size(runs, "runs")
     cov_u = control_covariance(controls, as_positive_number(dt, "dt"), k_d, k_theta, k_drift)
     std = np.sqrt(np.diagonal(cov_u, axis1=-2, axis2=-1))
     return controls[:, None, :] + std[:, None, :] * as_generator(rng).standard_normal((len(controls), runs, 2))

@@ -20,6 +20,7 @@ from ..checks import (
     as_points,
     as_positive_number,
     as_shape,
+    as_size,
     shown,
 )
 from ..documented import documented
@@ -140,7 +141,7 @@ def normalize_weights(log_weights):
 
 def as_weights(weights):
     """`weights` as a vector (M,) of floats, at least 0 and not all 0; refuses what cannot be added up."""
-    weights = as_finite(weights, "weights")
+    weights = as_finite(weights, "weights", below=math.inf)
     if weights.ndim != 1 or not weights.size:
         raise ValueError(f"weights must be a vector (M,), got shape {weights.shape}")
     low, high = weights.min(), weights.max()
@@ -177,7 +178,7 @@ def resample_roulette(weights, rng, size=None):
     Source: lecture, "Resampling mit Roulette-Rad-Verfahren".
     """
     weights = as_weights(weights)
-    spins = np.sort(rng.random(len(weights) if size is None else as_count(size, "size", at_least=0)))
+    spins = np.sort(rng.random(len(weights) if size is None else as_size(size, "size", at_least=0)))
     return _pointed_at(weights, spins)
 
 
@@ -207,7 +208,7 @@ def resample_systematic(weights, rng, size=None):
     Source: lecture, "Resampling mit Speichenrad-Verfahren".
     """
     weights = as_weights(weights)
-    size = len(weights) if size is None else as_count(size, "size", at_least=0)
+    size = len(weights) if size is None else as_size(size, "size", at_least=0)
     return _pointed_at(weights, (np.arange(size) + as_generator(rng).random()) / max(size, 1))
 
 
@@ -274,7 +275,7 @@ def count_ancestors(resample, n_particles, n_steps, rng):
     -------
     array of int, shape (n_steps + 1,)
     """
-    n_particles, n_steps = as_count(n_particles, "n_particles"), as_count(n_steps, "n_steps", at_least=0)
+    n_particles, n_steps = as_size(n_particles, "n_particles"), as_size(n_steps, "n_steps", at_least=0)
     names, weights = np.arange(n_particles), np.full(n_particles, 1.0 / n_particles)
     left = [n_particles]
     for _ in range(n_steps):
@@ -531,7 +532,7 @@ def uniform_states(grid, n_particles, rng):
     i, j = np.nonzero(grid.free)
     if not len(i):
         raise ValueError("grid must have at least one free cell, got none: there is no place for a particle")
-    n_particles = as_count(n_particles, "n_particles", at_least=0)
+    n_particles = as_size(n_particles, "n_particles", at_least=0)
     pick = rng.integers(len(i), size=n_particles)
     xy = grid.center_of(i[pick], j[pick]) + grid.resolution * (rng.random((n_particles, 2)) - 0.5)
     return np.column_stack([xy, rng.uniform(-np.pi, np.pi, n_particles)])

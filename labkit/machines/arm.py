@@ -21,6 +21,7 @@ from ..checks import (
     as_points,
     as_positive_number,
     as_shape,
+    as_size,
     as_transforms,
     fit_together,
     shown,
@@ -36,6 +37,7 @@ REACH_FOREARM, REACH_WRIST, REACH_FLANGE = 225.0, 450.0, 515.0
 # which lists the TX40 with the same three link lengths and joint limits.
 SHOULDER_OFFSET, BASE_HEIGHT = 35.0, 320.0
 RAMP = 0.12  # share of a motion's time spent on getting up to speed, and on slowing down
+MOST_SAMPLES = 250_000  # of a motion: a thousand seconds at the 250 Hz of the report's tracker
 
 
 @dataclass(frozen=True)
@@ -281,7 +283,7 @@ def measuring_poses(robot, rng, count=21, center=None, spread=(0.5, 0.35, 0.35, 
     box = np.array([[-600.0] * 3, [600.0, 600.0, 1000.0]]) if box is None else as_finite(box, "box")
     if box.shape != (2, 3):
         raise ValueError(f"box must have shape (2, 3), two corners, got {box.shape}")
-    spread, count = as_shape(spread, "spread", len(robot.dh)), as_count(count, "count")
+    spread, count = as_shape(spread, "spread", len(robot.dh)), as_size(count, "count")
     found, tries = [np.array(center)], 0
     while len(found) < count:
         tries += 1
@@ -329,9 +331,10 @@ def smooth_motion(via, duration, rate):
 def _samples(duration, rate):
     """Sampling times 0, 1 / rate, ... up to the duration (s)."""
     count = duration * rate
-    if not 0.5 < count < 1e7:
+    if not 0.5 < count <= MOST_SAMPLES:
         raise ValueError(
-            f"duration and rate must give from 1 to 1e7 steps, got {shown(duration)} s at {shown(rate)} samples/s"
+            f"duration and rate must give from 1 to {MOST_SAMPLES} steps, got {shown(duration)} s at "
+            f"{shown(rate)} samples/s"
         )
     return np.arange(round(count) + 1) / rate
 

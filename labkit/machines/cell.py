@@ -21,7 +21,7 @@ from ..calibration.ax_xb import calibrate_hand_eye
 from ..calibration.hand_eye import calibrate_sphere_target, sphere_in_scanner
 from ..calibration.pivot import calibrate_pivot, cone, touching_poses
 from ..calibration.planning import DOWN, pattern, poses_that_see
-from ..checks import as_choice, as_count, as_points, as_shape
+from ..checks import as_choice, as_count, as_points, as_shape, as_size
 from ..documented import documented
 from ..geometry.frames import frame_from_points, invert, moved, pose, transform
 from ..geometry.lie import exp_so3
@@ -432,7 +432,7 @@ def simulate_misses(cell, job, rng, n=10_000):
     -------
     misses : array, shape (n, 3), mm
     """
-    n = as_count(n, "n")
+    n = as_size(n, "n")
     errors = {
         name: rng.multivariate_normal(np.zeros(len(cov)), cov, n, method="svd")
         for name, cov in source_covariances(cell, job).items()

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..checks import as_finite, as_number, as_positive_number, as_shape, as_transforms
+from ..checks import as_finite, as_number, as_positive_number, as_shape, as_size, as_transforms
 from ..documented import documented
 from ..geometry.frames import matrix_from_quaternion, pose, quaternion_from_matrix
 from ..geometry.lie import log_so3
@@ -67,6 +67,7 @@ def write_csv(path, log, unit="m", digits=5):
     if unit not in _LENGTHS:
         raise ValueError(f"unit must be m or mm, got {unit!r}")
     positions = log.T_WE[:, :3, 3] / _LENGTHS[unit]
+    digits = as_size(digits, "digits", at_least=0)
     places = digits if unit == "m" else max(digits - 3, 0)
     header = [
         "time [s]",

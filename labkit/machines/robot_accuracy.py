@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..calibration.planning import DOWN, poses_that_see
-from ..checks import as_count, as_nonnegative, as_positive_number, as_shape, as_transforms, fit_together
+from ..checks import as_count, as_nonnegative, as_positive_number, as_shape, as_size, as_transforms, fit_together
 from ..documented import documented
 from ..geometry.lie import exp_so3
 
@@ -169,7 +169,7 @@ def drive(command, dt, errors, rng, n=1):
     -------
     paths : array, shape (n, k, d), mm
     """
-    command, dt, n = as_shape(command, "command", "k", "d"), as_positive_number(dt, "dt"), as_count(n, "n")
+    command, dt, n = as_shape(command, "command", "k", "d"), as_positive_number(dt, "dt"), as_size(n, "n")
     fit_together(command=command.shape[1:], offset=np.shape(errors.offset))
     share = 1.0 if errors.lag == 0 else -np.expm1(-dt / errors.lag)
     path = command.copy()
@@ -194,7 +194,7 @@ def corner(speed, length=60.0, instants=61):
         From (-length, 0) over (0, 0) to (0, length).
     dt : float, s
     """
-    s = np.linspace(-length, length, as_count(instants, "instants", at_least=3))
+    s = np.linspace(-length, length, as_size(instants, "instants", at_least=3))
     path = np.column_stack([np.minimum(s, 0.0), np.maximum(s, 0.0)])
     return path, (s[1] - s[0]) / as_positive_number(speed, "speed")
 

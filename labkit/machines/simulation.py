@@ -12,7 +12,7 @@ from itertools import count
 
 import numpy as np
 
-from ..checks import as_choice, as_count, as_positive_number
+from ..checks import as_choice, as_count, as_positive_number, as_size
 from ..documented import documented
 from ..geometry.frames import invert, matrix_from_quaternion, moved, pose
 from ..geometry.lie import exp_so3
@@ -149,6 +149,7 @@ class Tracker:
         drift : array, shape (stops, 6)
             Rotation vector (rad) and displacement (mm).
         """
+        stops = as_size(stops, "stops", at_least=0)
         return rng.normal(size=(stops, 6)) * np.repeat([self.drift_rotation, self.drift_position], 3)
 
     @documented
@@ -223,7 +224,7 @@ def calibration_run(rng, tracker=None, joints=None, rate=5.0, lost_stop=None):
     tracker = tracker or RESTING
     joints = measuring_joints() if joints is None else joints
     as_count(len(joints), "the number of stops")
-    readings = as_count(np.floor(STOP_TIME * as_positive_number(rate, "rate")), "the number of readings per stop")
+    readings = as_size(np.floor(STOP_TIME * as_positive_number(rate, "rate")), "the number of readings per stop")
     T_BE = tool_pose(TX40, joints, T_FE)
     drift = tracker.drift(len(joints), rng)
     stop = np.repeat(np.arange(len(joints)), readings)
