@@ -13,6 +13,7 @@ COVARIANCE_TOLERANCE = 1e-6  # of the standard deviations: sums in another order
 LARGEST_COORDINATE = 1e75  # fourth powers of coordinates still fit into a float
 FEW = 500  # numbers: of fewer the amounts are quicker than the largest and the smallest
 SMALLEST_POSITIVE = 1e-75  # of what is divided by, for the same reason
+LARGEST_WHOLE = 1e15  # beyond, a float does not tell one whole number from the next
 MOST = 10_000_000  # what one call makes of a kind: some hundred megabytes of poses
 KINDS = {"b": "truth values", "c": "complex numbers", "U": "text", "S": "bytes", "M": "dates", "m": "durations"}
 
@@ -157,7 +158,7 @@ def as_size(value, name, at_least=1):
     """`value` as a whole number of things that are made and kept, not below `at_least`, and not too many of them."""
     size = as_count(value, name, at_least)
     if size > MOST:
-        raise ValueError(f"{name} must be at most {MOST:.0e}, got {shown(size)}")
+        raise ValueError(f"{name} must be at most {MOST:.0e}, got {shown(size, '.9g')}")
     return size
 
 
@@ -227,8 +228,8 @@ def as_truths(value, name):
 def as_indices(value, name, below=None):
     """`value` as an array of whole numbers, which name rows or entries: from 0 on, where `below` says how many."""
     array = as_floats(value, name)
-    if (array != np.floor(array)).any() or not np.isfinite(array).all():
-        raise ValueError(f"{name} must hold whole numbers")
+    if (array != np.floor(array)).any() or (np.abs(array) > LARGEST_WHOLE).any():  # infinities among them
+        raise ValueError(f"{name} must hold whole numbers, of amounts up to {LARGEST_WHOLE:.0e}")
     if below is not None and ((array < 0) | (array >= below)).any():
         raise ValueError(f"{name} must lie from 0 to {below - 1}, got {shown(array.min())} to {shown(array.max())}")
     return array.astype(int)
@@ -322,7 +323,7 @@ def as_row_weights(value, name="weights"):
 def as_probability(value, name):
     """`value` as one float above 0 and below 1."""
     number = as_number(value, name)
-    if not 0 < number < 1:
+    if not SMALLEST_POSITIVE < number < 1:
         raise ValueError(f"{name} must lie between 0 and 1, got {shown(number)}")
     return number
 

@@ -15,7 +15,17 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from ..checks import as_finite, as_number, as_points, as_positive_number, as_shape, as_whole, fit_together, shown
+from ..checks import (
+    as_finite,
+    as_indices,
+    as_number,
+    as_points,
+    as_positive_number,
+    as_shape,
+    as_whole,
+    fit_together,
+    shown,
+)
 from ..documented import documented
 
 FREE, OCCUPIED, UNKNOWN = 0, 1, 2
@@ -204,7 +214,7 @@ class OccupancyGrid:
 
     def at(self, points, outside=UNKNOWN):
         """FREE, OCCUPIED or UNKNOWN at points (..., 2), and `outside` beyond the map."""
-        (i, j), outside = self.cell_of(points), as_whole(outside, "outside")
+        (i, j), outside = self.cell_of(points), as_indices(as_whole(outside, "outside"), "outside")
         height, width = self.cells.shape
         inside = (i >= 0) & (i < height) & (j >= 0) & (j < width)
         return np.where(inside, self.cells[np.where(inside, i, 0), np.where(inside, j, 0)], outside)

@@ -37,6 +37,7 @@ REACH_FOREARM, REACH_WRIST, REACH_FLANGE = 225.0, 450.0, 515.0
 # which lists the TX40 with the same three link lengths and joint limits.
 SHOULDER_OFFSET, BASE_HEIGHT = 35.0, 320.0
 RAMP = 0.12  # share of a motion's time spent on getting up to speed, and on slowing down
+IN_VAIN = 20_000  # draws of a pose without one that fits: where one in 200 does, that is as good as impossible
 MOST_SAMPLES = 250_000  # of a motion: a thousand seconds at the 250 Hz of the report's tracker
 
 
@@ -284,16 +285,17 @@ def measuring_poses(robot, rng, count=21, center=None, spread=(0.5, 0.35, 0.35, 
     if box.shape != (2, 3):
         raise ValueError(f"box must have shape (2, 3), two corners, got {box.shape}")
     spread, count = as_shape(spread, "spread", len(robot.dh)), as_size(count, "count")
-    found, tries = [np.array(center)], 0
+    found, tries, last = [np.array(center)], 0, 0
     while len(found) < count:
         tries += 1
-        if tries > 200 * count:
+        if tries > 200 * count or tries > last + IN_VAIN:
             raise ValueError(f"only {len(found)} of {count} measuring poses were found: widen spread or box")
         q = center + spread * rng.uniform(-1, 1, len(robot.dh))
         T = forward_kinematics(robot.dh, q)
         inside = (T[:3, 3] >= box[0]).all() and (T[:3, 3] <= box[1]).all()
         if within_limits(robot, q) and inside and T[2, 2] >= facing:
             found.append(q)
+            last = tries
     return np.array(found)
 
 

@@ -86,6 +86,7 @@ def path_accuracy(command, paths):
     """
     command = as_shape(command, "command", "k", "d")
     paths = as_shape(paths, "paths", "n", *command.shape)
+    as_count(len(paths), "the number of paths")
     return float(np.linalg.norm(paths.mean(0) - command, axis=1).max())
 
 

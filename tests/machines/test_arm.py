@@ -6,6 +6,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from labkit.geometry.frames import pose, pose_distance
+from labkit.machines import arm
 from labkit.machines.arm import (
     BASE_HEIGHT,
     HOME,
@@ -103,6 +104,12 @@ def test_measuring_poses_are_reachable_and_spread_out():
     assert joints.shape == (30, 6) and within_limits(TX40, joints).all() and (T[:, 2, 2] >= 0.3).all()
     with pytest.raises(ValueError, match="widen spread or box"):
         measuring_poses(TX40, np.random.default_rng(3), box=[[0, 0, 0], [1, 1, 1]])
+
+
+def test_measuring_poses_that_are_nowhere_are_not_looked_for_for_long(monkeypatch):
+    monkeypatch.setattr(arm, "IN_VAIN", 30)
+    with pytest.raises(ValueError, match="only 1 of 1000000 measuring poses were found: widen spread or box"):
+        measuring_poses(TX40, np.random.default_rng(3), count=10**6, box=[[0, 0, 0], [1, 1, 1]])
 
 
 def test_data_sheet_reaches():
