@@ -26,7 +26,7 @@ from labkit.localization.drives import find_route, follow
 from labkit.localization.ekf import unscented_predict, unscented_update
 from labkit.localization.locate import locate, place_readings
 from labkit.localization.sensors import LikelihoodField, Scanner, beam_density, see_landmarks, weigh_doors
-from labkit.machines import robot_accuracy, simulation, stations, udp
+from labkit.machines import robot_accuracy, simulation, stations, triangulation, udp
 from labkit.machines.arm import (
     HOME,
     TX40,
@@ -38,6 +38,7 @@ from labkit.machines.arm import (
     reach_position,
     rotation_only,
     smooth_motion,
+    tool_pose,
 )
 from labkit.machines.log import mean_pose, reject_outliers
 from labkit.machines.mounting import e_rot, e_trans
@@ -46,6 +47,7 @@ from labkit.machines.tracking import filter_positions, shift_time, speeds, summa
 from labkit.machines.triangulation import place_from_angles
 
 I3, I4, O2, O3 = np.eye(3), np.eye(4), np.zeros(2), np.zeros(3)
+ON_X = np.array([[1.0, 0.0], [2.0, 0.0]])
 POSES = np.tile(I4, (5, 1, 1))
 HOME, ARM = HOME, TX40
 GRID = maps.OccupancyGrid.from_ascii("###\n#.#\n###")
@@ -290,6 +292,10 @@ REFUSED = [
     ),
     (lambda: particles.uniform_states(GRID, -1, rng()), "n_particles must be a whole number"),
     (lambda: mcl.localizer(GRID, np.add, -2000.0, rng(), start=O3), "n_particles must be a whole number, at least 1"),
+    (lambda: tool_pose(TX40, np.zeros((3, 6)), np.tile(I4, (2, 1, 1))), r"\(3,\) of q, \(2,\) of T_FE"),
+    (lambda: reach_position(TX40, O3, np.zeros(6), iterations=10**12), r"iterations must be at most 1e\+07"),
+    (lambda: triangulation.height_derivatives(1e-200, 1.4, 100.0), "squared sine of an angle must be"),
+    (lambda: ekf.ekf_update(O3, 1e40 * I3, ON_X, ON_X, 0.1, 0.1), "the innovation must be positive definite"),
     (lambda: robot_accuracy.path_accuracy(np.zeros((4, 2)), np.zeros((0, 4, 2))), "number of paths must be a whole"),
     (lambda: GRID.at(O2, outside=()), r"outside must have shape \(\), got \(0,\)"),
     (lambda: checks.as_indices([0, 19], "index", below=19), "index must lie from 0 to 18, got 0 to 19"),
@@ -367,7 +373,6 @@ REFUSED = [
     ),
     (lambda: ax_xb.noise_levels(1.0, 1.0, O2 + 1, (None, O2), 1.0), r"given must have shape \(\)"),
     (lambda: maps.OccupancyGrid.from_png(__file__, 1.0), "path must name a picture, and .* is none"),
-    (lambda: robot_accuracy.path_accuracy(np.zeros((4, 2)), np.zeros((0, 4, 2))), "number of paths must be a whole"),
     (lambda: GRID.at(O2, outside=10**30), "outside must hold whole numbers"),
     (lambda: hand_eye.calibrate_sphere_target(POSES, 1e-300 * np.eye(5, 3)), "the sphere stays at one place"),
     (lambda: propagation.point_jacobians([I4] * 3, np.ones((2, 3))), "leading axes must be equal or broadcast"),

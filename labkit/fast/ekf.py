@@ -23,7 +23,10 @@ def ekf_localize(
     var_u = np.diagonal(given.cov_u, axis1=-2, axis2=-1)
     weights = 1 / given.std_range**2, 1 / given.std_bearing**2
     run = _filter_many if given.z.ndim == 4 else _filter_one
-    x, cov, score = run(given, weights, var_u, 0.5 if model == "midpoint" else 0.0)
+    try:
+        x, cov, score = run(given, weights, var_u, 0.5 if model == "midpoint" else 0.0)
+    except ZeroDivisionError:
+        raise ValueError("the covariance of the innovation must be positive definite, but it is singular") from None
     return Localization(x, cov, score, np.isfinite(given.z).sum((-1, -2)))
 
 

@@ -20,6 +20,7 @@ from ..checks import (
     as_truth,
     covariance_root,
     fit_together,
+    solve_covariance,
 )
 from ..documented import documented
 from ..estimation.gaussian import chi_square_quantile
@@ -183,7 +184,7 @@ def ekf_update(x, cov, z, landmarks, std_range, std_bearing, iterations=1, wrap=
         H = np.where(seen[..., None], H, 0.0)
         R = np.tile(std**2, H.shape[-2] // 2) * np.eye(H.shape[-2])
         S = H @ cov @ _t(H) + R
-        K = _t(np.linalg.solve(S, H @ cov))
+        K = _t(solve_covariance(S, "the covariance of the innovation", H @ cov))
         x = prior + _apply(K, y - _apply(H, prior - x))
     return Corrected(x, _symmetric(_after(cov, K, H, R)), y, S, K, seen.sum(-1))
 
@@ -305,14 +306,14 @@ def ekf_localize(
     Source: lecture, "Algorithmus fuer erweiterten Kalman-Filter".
     """
     given = _given(u, z, landmarks, x0, cov0, dt, std_range, std_bearing, cov_u, cov_v, model, wrap)
-    x, cov, steps = given.x0, given.cov0, []
+    x, cov, shape = given.x0, given.cov0, (len(given.u), *given.x0.shape[:-1])
+    found = Localization(np.empty((*shape, 3)), np.empty((*shape, 3, 3)), np.empty(shape), np.empty(shape, int))
     sensor = {"landmarks": given.landmarks, "std_range": given.std_range, "std_bearing": given.std_bearing}
-    for u, cov_u, z in zip(given.u, given.cov_u, given.z):
+    for k, (u, cov_u, z) in enumerate(zip(given.u, given.cov_u, given.z)):
         step = ekf_step(x, cov, u, given.dt, cov_u, z, **sensor, model=model, wrap=wrap, cov_v=given.cov_v)
         x, cov = step.x, step.cov
-        steps.append((x, cov, step.nis, step.dof))
-    columns, shapes = zip(*steps) if steps else [()] * 4, ((3,), (3, 3), (), ())
-    return Localization(*(np.reshape(c, (len(steps), *given.x0.shape[:-1], *s)) for c, s in zip(columns, shapes)))
+        found.x[k], found.cov[k], found.nis[k], found.dof[k] = x, cov, step.nis, step.dof
+    return found
 
 
 # --- the unscented filter ----------------------------------------------------
@@ -393,7 +394,8 @@ def unscented_update(x, cov, z, landmarks, std_range, std_bearing):
     spread = np.where(seen[..., None, :], h - mean[..., None, :], 0.0)
     var = np.tile([std_range**2, std_bearing**2], h.shape[-1] // 2)
     S = _t(weights[:, None] * spread) @ spread + np.diag(var)
-    K = _t(np.linalg.solve(S, _t(weights[:, None] * spread) @ (points - x[..., None, :])))
+    cross = _t(weights[:, None] * spread) @ (points - x[..., None, :])
+    K = _t(solve_covariance(S, "the covariance of the innovation", cross))
     return Corrected(x + _apply(K, y), _symmetric(cov - K @ S @ _t(K)), y, S, K, seen.sum(-1))
 
 
@@ -492,7 +494,7 @@ def simulate_drive(x0, controls, dt, cov_u, landmarks, std_range, std_bearing, r
     truth = odometry.drive(np.broadcast_to(x0, (runs, 3)), real, dt, model)
     z = measurement(truth[1:], landmarks)
     far = z[..., 0] > reach
-    z = z + rng.standard_normal(z.shape) * [std_range, std_bearing]
+    z += rng.standard_normal(z.shape) * [std_range, std_bearing]
     z[..., 1] = wrap_angle(z[..., 1])
     z[far] = np.nan
     return SimulatedRuns(truth, controls, z)

@@ -454,7 +454,9 @@ def tool_pose(robot, q, T_FE):
     -------
     T_BE : array, shape (..., 4, 4)
     """
-    return forward_kinematics(robot.dh, q) @ as_transforms(T_FE, "T_FE")
+    T_BF, T_FE = forward_kinematics(robot.dh, q), as_transforms(T_FE, "T_FE")
+    fit_together(q=T_BF.shape[:-2], T_FE=T_FE.shape[:-2])
+    return T_BF @ T_FE
 
 
 @documented
@@ -531,7 +533,7 @@ def reach_position(robot, position, start, joints=(0, 1, 2), iterations=40):
     if not len(joints):
         raise ValueError("joints must name at least one, got none")
     best, best_size = q.copy(), np.inf
-    for _ in range(iterations):
+    for _ in range(as_size(iterations, "iterations", at_least=0)):
         frames = link_frames(robot.dh, q)
         gap = position - frames[-1, :3, 3]
         size = float(np.linalg.norm(gap))

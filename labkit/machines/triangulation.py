@@ -68,8 +68,9 @@ def height_derivatives(alpha, beta, base):
     Source: the derivative of thesis (2-11), L / H = cot(alpha) + cot(beta).
     """
     alpha, beta, base = _triangle(alpha, beta, base)
-    square = height_from_angles(alpha, beta, base) ** 2 / base
-    return square / np.sin(alpha) ** 2, square / np.sin(beta) ** 2
+    square, sines = height_from_angles(alpha, beta, base) ** 2 / base, (np.sin(alpha) ** 2, np.sin(beta) ** 2)
+    as_positive(np.minimum(*sines), "the squared sine of an angle")
+    return square / sines[0], square / sines[1]
 
 
 def height_std(alpha, beta, base, std):
