@@ -26,8 +26,10 @@ from .typeset import typeset
 TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
 NOISY = "exact on clean data, but the data are not weighed as they should be: on noisy data"
 TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws of each kind
+BEFORE = "It was right before, on other draws: what is different about this one, its shapes perhaps?"
 NOT_RIGHT = "\nNot right when called as "
 MANY_DIGITS = 1e-3  # by how much better some draws come out where one case is special
+LIKE_CHANCE = 8  # draws on which a choice must stay as it is, so that this is not chance
 SHOWN = 4  # entries of a set or vector that is shown whole
 MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried, to tell on which
 MORE_CASES = 8  # on which an explanation from the first draws is tried once more, at least ...
@@ -210,7 +212,7 @@ class _Trial:
             try:
                 admitted.append(metric.admit(result, expected) if metric else result)
             except metrics.Refused as refusal:
-                self.refusal = self.refusal or str(refusal)
+                self.refusal = self.refusal or f"{self._led(words)}{refusal}"
                 admitted.append(_Refusal(result))
             return None
 
@@ -220,7 +222,7 @@ class _Trial:
         self.printed = self.printed or run.printed
         if run.error is not None:
             named = self._named_by_failing(run.error, args)
-            told = self._raised(run, args)
+            told = self._raised(run, args, words)
             endless = isinstance(run.error, RecursionError | MemoryError)  # it would be so again and again
             return named or (told if endless else self._mended(told, args, metric, expected))
         if run.changed:
@@ -231,6 +233,12 @@ class _Trial:
         self.metrics.append(metric)
         self.words.append(words)
         return None
+
+    def _led(self, words):
+        """What is said of a special draw before its result is refused, where all draws before it were right."""
+        right = self.pairs and all(m and m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs))
+        lead = _lead(words) if right else ""
+        return f"{lead[:-1]}: " if lead else ""
 
     def property(self, holds, rng):
         """Check one property of the student's function, guarded like a call."""
@@ -375,7 +383,7 @@ class _Trial:
         mistake, draws = Mistake(function, ""), self._fresh_results
         try:
             with guard.time_limit(self.budget.left()):
-                return all(self._is_mistake(mistake, *draw) for draw in draws)
+                return self._is_it_again(mistake) and all(self._is_mistake(mistake, *draw) for draw in draws)
         except guard.TimeLimit:
             return False
 
@@ -416,10 +424,15 @@ class _Trial:
     def _solution(self, search):
         return own_steps.of_solution(self.exercise, search.cases, self.budget)
 
+    def _is_choice(self):
+        """Whether one of several is to be chosen, which a wrong rule may well do by chance."""
+        numbers = all(type(expected) is int for _, expected in self.pairs)
+        return numbers and isinstance(self.exercise.metric, metrics.Exactly)
+
     def _right_somewhere(self):
-        """Whether some plain draws come out right: then these are what is to be told."""
+        """Whether some plain draws come out right, and not by chance: then these are what is to be told."""
         metric = self.exercise.metric
-        return not self.refusal and any(metric.equal(*pair) for pair in self._plain_pairs())
+        return not self.refusal and not self._is_choice() and any(metric.equal(*pair) for pair in self._plain_pairs())
 
     def _search(self):
         """What looks for the step of the student's own code at which it goes wrong; None where it cannot be read."""
@@ -477,11 +490,12 @@ class _Trial:
 
     def _other_shape(self):
         """What results of a wrong shape have to do with the expected ones."""
-        results = [pair[0].value if isinstance(pair[0], _Refusal) else None for pair in self.pairs]
+        pairs = self._plain_pairs()
+        results = [pair[0].value if isinstance(pair[0], _Refusal) else None for pair in pairs]
         if any(result is None for result in results):
             return ""
         names = getattr(self.exercise.metric, "names", ())
-        words = shapes.shape_words(results, [expected for _, expected in self.pairs], names)
+        words = shapes.shape_words(results, [expected for _, expected in pairs], names)
         return f" {words[0].upper()}{words[1:]}." if words else ""
 
     def _unmoved(self):
@@ -493,7 +507,8 @@ class _Trial:
         for k, name in enumerate(self._names(draws[0][0])):
             if name in unread and any(self._moves(k, *pair) for pair in self._exchanges(k, draws)):
                 return f"your function never uses `{name}`, and its result should change with it"
-            if self._makes_no_difference(k, draws) and self._makes_no_difference(k, draws + self._fresh_results, 2):
+            least = LIKE_CHANCE if self._is_choice() else 2
+            if self._makes_no_difference(k, draws) and self._makes_no_difference(k, draws + self._fresh_results, least):
                 return f"your result does not change with `{name}`, and it should"
         return None
 
@@ -561,9 +576,23 @@ class _Trial:
         """The mistake that explains all plain draws, and the special ones too where those alone are wrong."""
         cases = self._cases()
         for k, mistake in enumerate(self.exercise.mistakes):
-            if all(self._is_mistake(mistake, *case) for case in cases):
+            if all(self._is_mistake(mistake, *case) for case in cases) and self._is_it_again(mistake):
                 return self.outcome(NOT_YET, mistake.text, k)
         return None
+
+    def _is_it_again(self, mistake):
+        """Whether an answer chooses what a mistake does on fresh draws too, where one of several is chosen: two rules
+        may choose alike by chance.
+        """
+        if self.refusal or self._right_on_plain() or not self._is_choice():
+            return True
+        rng, metric = np.random.default_rng(0), self.exercise.metric
+        for draw in itertools.islice(itertools.cycle(self.exercise.cases), MORE_DRAWS):
+            args = draw(rng)
+            run = guard.run(self.function, args, limit=self.exercise.limit)
+            if run.error is not None or not self._is_mistake(mistake, args, metric, (run.result, None)):
+                return False
+        return True
 
     def _cases(self):
         """(arguments, metric, pair) of the draws that tell: the plain ones, or all where only special ones are off."""
@@ -635,7 +664,8 @@ class _Trial:
             told = f"{told[:-1]}, and {side}." if side else told
             return told + self._right_parts() + self._example(*missed[0])
         special = self._special_case()
-        right = special or f"It was right on {len(pairs) - len(missed)} of {len(pairs)} draws: which case is special?"
+        asked = ", perhaps by chance." if self._is_choice() else ": which case is special?"
+        right = special or f"It was right on {len(pairs) - len(missed)} of {len(pairs)} draws{asked}"
         return f"{told} {right}{self._example(*missed[0]) or f'{NOT_RIGHT}{self._call(missed[0][0])}'}"
 
     def _example(self, args, result, expected):
@@ -696,7 +726,7 @@ class _Trial:
         names = names if len(names) == len(args) else self.exercise.arguments
         return [names[k] if k < len(names) else f"argument {k + 1}" for k in range(len(args))]
 
-    def _raised(self, run, args):
+    def _raised(self, run, args, words=None):
         error = run.error
         if isinstance(error, NotImplementedError):
             return self.outcome(TO_DO)
@@ -735,8 +765,13 @@ class _Trial:
         where = f"\nin {run.line}" if run.line else ""
         with_ = f"\nwhen called as {self._call(args)}" if args else ""
         if args and self.pairs and all(m and m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)):
-            with_ += "\nIt was right before, on other draws: what is different about this one, its shapes perhaps?"
+            with_ += f"\n{_lead(words) or BEFORE}"
         return self.outcome(RAISED, f"{type(error).__name__}: {said}{advice}{where}{with_}")
+
+
+def _lead(words):
+    """What an exercise says of a special draw that alone fails, as a sentence; "" where it says nothing of its own."""
+    return "" if words in (None, NOISY) else f"{words[0].upper()}{words[1:].rstrip(':')}."
 
 
 def _failure(mistake, args):
@@ -849,6 +884,7 @@ ADVICE = {  # what NumPy means
     "is out of bounds for axis": "Indices count from 0, the row comes first: [row, column].",
     "math domain error": "A root of a negative number, or an arccosine beyond 1, perhaps by rounding: see `np.clip`.",
     "requires a buffer of": "The format and the data differ in length: in `struct`, d takes 8 bytes, f takes 4.",
+    "float' object is not subscriptable": "Brackets take an entry out of several: here stands a single number.",
     "remapped shapes": "In `einsum` one letter has one length: here a letter stands for two.",
     "could not be broadcast": "Entry by entry these shapes do not fit: is `@` meant, is a sum over an axis missing?",
 }

@@ -538,6 +538,8 @@ def _same(before, after):
         return len(before) == len(after) and all(map(_same, before, after))
     if isinstance(before, dict):
         return before.keys() == after.keys() and all(_same(before[k], after[k]) for k in before)
+    if isinstance(before, str | int | float | np.number):
+        return type(before) is type(after) and (before == after or before != before and after != after)
     return True
 
 

@@ -327,10 +327,10 @@ class Exactly(Metric):
         if result is None and expected is not None:
             raise Refused("it returned None: is a `return` missing?")
         if isinstance(expected, set | frozenset):
-            try:
-                return {v.item() if isinstance(v, np.generic) else v for v in result}
-            except TypeError:
-                raise Refused(f"expected a set, got {_describe(result)}") from None
+            if not isinstance(result, set | frozenset):
+                made = ": set(...) makes one of it" if isinstance(result, list | tuple | dict) else ""
+                raise Refused(f"expected a set, got {_describe(result)}{made}")
+            return {v.item() if isinstance(v, np.generic) else v for v in result}
         if isinstance(expected, np.ndarray):
             try:
                 array = np.asarray(result)

@@ -17,6 +17,7 @@ PAIRS = (
     *(("sin", "cos"), ("arcsin", "arccos"), ("min", "max"), ("minimum", "maximum"), ("argmin", "argmax")),
     *(("any", "all"), ("zeros", "ones"), ("deg2rad", "rad2deg"), ("hstack", "vstack")),
 )
+PRECISIONS = {"float16": ("float64",), "float32": ("float64",), "single": ("float64",), "half": ("float64",)}
 TWINS = {name: (twin,) for pair in PAIRS for name, twin in (pair, pair[::-1])} | {
     "tan": ("sin", "cos"),
     "arctan2": ("hypot",),
@@ -438,6 +439,8 @@ def _locate(new, node):
     ast.fix_missing_locations(new)
 
 
+ARRAYS = {"array", "asarray", "zeros_like", "ones_like", "empty_like"}  # that take over whole numbers as such
+WHOLE = "with an array of floats made one of whole numbers"
 AFRESH = "with a list or array that each round finds as it was"
 COUNTED = "with one index counted from the other end"
 REVERSED = (  # (words of what was changed in a right formula, what is wrong where the change mends)
@@ -464,6 +467,7 @@ REVERSED = (  # (words of what was changed in a right formula, what is wrong whe
         r"with a list of whole numbers made one of floats",
         "an array made of this is one of integers, and cuts off decimals",
     ),
+    (WHOLE, "`dtype=float` is missing: an array made of whole numbers alone cuts off decimals"),
     (r"with one round of its loop", "the loop is to take one round only"),
     (r"with one case (never|always) taken", r"this case is to be \1 taken"),
     (r"with `=` where a value is to be added to", "`+=` stands where `=` belongs"),
@@ -571,11 +575,16 @@ def _unary(node, names):
 def _attribute(node, names):
     if node.attr == "T" and isinstance(node.ctx, ast.Load):
         yield 0, "without one of its transposes", node.value
+    for other in PRECISIONS.get(node.attr, ()):
+        yield 0, f"with `{other}` where `{node.attr}` belongs", ast.Attribute(node.value, other, node.ctx)
 
 
 def _call(node, names):
     name = getattr(node.func, "attr", getattr(node.func, "id", ""))
     inner = node.args[0] if node.args else getattr(node.func, "value", None)
+    if name in ARRAYS and not any(keyword.arg == "dtype" for keyword in node.keywords):
+        floats = [*node.keywords, ast.keyword("dtype", ast.Name("float", ast.Load()))]
+        yield 1, WHOLE, ast.Call(node.func, node.args[:1], floats)
     if isinstance(inner, ast.Starred) or name in WRAPPERS:
         return
     for twin in () if _is_guarded(name, node.args) else TWINS.get(name, ()):
@@ -721,6 +730,15 @@ def _instead(statement):
     if isinstance(statement, ast.AugAssign):
         words, mends = "with `=` where a value is to be added to", "`+=` stands where `=` belongs"
         yield words, mends, [ast.Assign([statement.target], statement.value)]
+    if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
+        copied = ast.Call(ast.Attribute(statement.value, "copy", ast.Load()), [], [])
+        name, of = statement.targets[0].id, statement.value
+        if isinstance(of, ast.Name):
+            mends = f"`{name}` is no copy of `{of.id}`, but another name for it: what changes one changes both"
+            yield "with another name where a copy belongs", mends, [ast.Assign(statement.targets, copied)]
+        if isinstance(of, ast.Subscript) and isinstance(of.value, ast.Name):
+            mends = f"`{name}` is no copy, but a part of `{of.value.id}`: what changes one changes the other"
+            yield "with a part where a copy belongs", mends, [ast.Assign(statement.targets, copied)]
     if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name | ast.Subscript):
         mends = "`=` throws away what was there before, which belongs to the result: `+=`"
         yield "with `+=` where `=` belongs", mends, [ast.AugAssign(statement.targets[0], ast.Add(), statement.value)]

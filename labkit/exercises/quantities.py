@@ -42,7 +42,7 @@ def quantity_words(answer, data):
 
 def _quoted(name):
     """A name of the notebook in quotes; words as they are."""
-    return name if " " in name and not name.endswith("]") else f"`{name}`"
+    return name if " " in name and "[" not in name else f"`{name}`"
 
 
 def _agrees(answer, value):

@@ -322,11 +322,17 @@ def _like(value, new):
     if whole and np.shape(new) == np.shape(value) and np.all(np.asarray(new) == np.round(new)):
         return int(new) if np.ndim(new) == 0 else np.asarray(new).astype(int)
     if isinstance(value, list) and np.ndim(new):
-        return list(np.asarray(new))
+        return _list_like(value, np.asarray(new))
     if isinstance(value, tuple) and np.ndim(new):
         return tuple(np.asarray(new))
     new = np.array(new, dtype=float)
     return float(new) if new.ndim == 0 else new
+
+
+def _list_like(value, new):
+    """A list of whole numbers stays one: made one of floats it might mend what has nothing to do with its values."""
+    whole = all(isinstance(part, int | np.integer) and not isinstance(part, bool) for part in value)
+    return new.astype(int).tolist() if whole and (new == np.round(new)).all() else list(new)
 
 
 def _square(v):

@@ -40,6 +40,10 @@ def _of_several(results, expected, names):
     for k, name in enumerate(names):
         if _holds(results, expected, lambda r, e, k=k: (_numbers(r), _numbers(e[k]))):
             return f"what you return is {name} alone" if len(names) > 1 else None
+    for k, name in enumerate(names):
+        parts = [r[k] for r in results if type(r) in (tuple, list) and len(r) == len(names)]
+        if len(parts) == len(results) and (words := shape_words(parts, [e[k] for e in expected])):
+            return f"{name}: {words}"
     two = all(type(r) in (tuple, list) and len(r) == len(names) == 2 for r in results)
     if two and all(_holds(results, expected, lambda r, e, k=k: (_numbers(r[k]), _numbers(e[1 - k]))) for k in (0, 1)):
         return f"the two results are exchanged: first the {names[0]}, then the {names[1]}"
@@ -83,6 +87,7 @@ def _less():
     yield from _digests("the expected numbers")
     yield "the expected result without its last row", lambda e: _long(e)[:-1]
     yield "the expected result without its first row", lambda e: _long(e)[1:]
+    yield "every second of the expected numbers or rows", lambda e: _long(e, 2)[::2]
     for k in range(1, MOST + 1):
         yield f"the first {k} of the expected numbers or rows alone", lambda e, k=k: _long(e, k)[:k]
         yield f"the top left {k} by {k} block of the expected matrix", lambda e, k=k: _square(e, k)[:k, :k]

@@ -23,7 +23,11 @@ ENTRIES = 8  # of a result that are looked at one by one
 ROWS = 4  # of a value that are looked at one by one
 NAMED = 4  # values that are told to be right, at most
 ANGLES = re.compile(r"rad|deg|angle|turn|rot|axis|axes|theta|phi|psi|sin|cos|tan|pose|frame", re.IGNORECASE)
-SCALED = ("half of it", "twice as much", "a thousand times as much", "a thousandth of it")  # what a choice may not tell
+SCALED = re.compile(  # of a choice, which does not depend on how large all is that is compared
+    "half of it|twice as much|a thousand|it belongs there in|its (square|root|reciprocal|log|exp|sine|tangent)"
+    "|it is to be (multiplied|divided) by"
+)
+COUNT = re.compile(r"^len\([^()]*\)$|\.shape\[-?\d\]$|\.size$")  # of which no half, root or sine is meant
 CHANCE = 1000  # one case of so many may be chance
 BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with a number
 DECIMALS = re.compile(r"[<>]=? *\d*(\.\d+(e[+-]?\d+)?|e-\d+)$|[<>]=? *\d+e-\d+$")  # a comparison with such a number
@@ -118,6 +122,7 @@ class Search:
         self.cases = sorted(cases, key=lambda case: case.was_right)
         self.results = [None if case.result is None else rerun.numeric(case.result) for case in self.cases]
         self.values = _traces(written, self.cases, budget)
+        self.chosen = all(isinstance(c.metric, metrics.Exactly) and type(c.expected) is int for c in self.cases)
         self.turns = any(map(ANGLES.search, [written.function.__doc__ or "", *written.lines.values()]))
 
     @_or_nothing
@@ -176,8 +181,7 @@ class Search:
         """Whether a change is about something that the function has to do with: degrees are of angles alone, and how
         large a number is matters little where one of several is chosen.
         """
-        chosen = all(isinstance(c.metric, metrics.Exactly) and type(c.expected) is int for c in self.cases)
-        return (self.turns or not mends.endswith(("radians", "degrees"))) and not (chosen and mends.startswith(SCALED))
+        return (self.turns or not mends.endswith(("radians", "degrees"))) and not (self.chosen and SCALED.match(mends))
 
     def _moves_a_bound(self, line, code, mends):
         """Whether a change only turns what is compared with a number: another number would do as well. Nor is a number
@@ -257,6 +261,8 @@ class Search:
             for argument in [None] if change < rerun.ALONE else numeric:
                 others = [] if argument is None else [np.asarray(self.cases[0].args[argument], dtype=float)]
                 for k, value in seen:
+                    if SCALED.match(words) and COUNT.search(self.written.places[k][1]):
+                        continue
                     if _changes(function, value, others):
                         yield "value", k, change, argument
 
@@ -351,7 +357,9 @@ class Search:
                 continue
             for q in solution.distinct:
                 pairs = [(mine[k], theirs[q]) for mine, theirs in zip(self.values, solution.values)]
-                if all(_exchangeable(a, b) for a, b in pairs) and not (solution.is_result[q] and self.is_result(k)):
+                if all(_exchangeable(a, b) for a, b in pairs) and not (
+                    solution.is_result[q] and (self.chosen or self.is_result(k))
+                ):
                     yield k, q
 
     def _is_filled(self, k):

@@ -29,19 +29,52 @@ def printed_number(rng, form):
     return ("".join(str(rng.integers(1, 10 if c == "d" else 6)) if c in "dk" else c for c in form),)
 
 
-def comparison(rng, off, bound, misprint, simulated, comma, beyond, zero):
+def comparison(rng, off, bound, misprint, simulated, comma, beyond, zero, decimals):
     """printed, value, bound, misprint, simulated; `off` and `bound` in half units of the last printed digit.
 
-    beyond: whether the value is larger than what is printed, signs apart, as where digits were cut off. zero: whether
-    the last printed digit is 0.
+    decimals: at least so many are printed. beyond: whether the value is larger than what is printed, signs apart, as
+    where digits were cut off. zero: whether the last printed digit is 0.
     """
-    decimals = int(rng.integers(2 if zero else 1, 4))
+    decimals = max(2, decimals) if zero else decimals
     half, number = 0.5 * 10.0**-decimals, rng.uniform(20, 90) * rng.choice([-1, 1])
     printed = f"{number:.{decimals - 1}f}0" if zero else f"{number:.{decimals}f}"
     value = float(printed) + (1 if beyond else -1) * off * half * np.sign(number)
     return printed.replace(".", ",") if comma else printed, float(value), bound * half, misprint, simulated
 
 
+def special_comparison(rng, kind):
+    """printed, value, bound, misprint, simulated.
+
+    "sign": the value has the other sign. "edge": it is off by half a unit, or by half a unit and the bound, to the last
+    bit. "exponent": printed with one. "whole": a whole number, of which the last digits are 0.
+    """
+    misprint, simulated = bool(rng.integers(2)), bool(rng.integers(2))
+    bound, whole = float(rng.integers(0, 4)), int(rng.integers(2, 90)) * int(rng.choice([-1, 1]))
+    if kind == "sign":
+        return str(whole), -whole + 0.25, bound / 4, misprint, simulated
+    if kind == "edge":
+        return (
+            str(whole),
+            whole + int(rng.choice([-1, 1])) * (0.5 + rng.integers(2) * bound),
+            bound,
+            misprint,
+            simulated,
+        )
+    if kind == "whole":
+        return f"{whole}00", 100.0 * whole + rng.choice([-1, 1]) * rng.uniform(5, 40), bound, misprint, simulated
+    value = whole / 100 + 0.01 * rng.choice([-1, 1]) * rng.choice([0.3, 2.5, 9.0])
+    return f"{whole}e-2", float(value), bound / 100, misprint, simulated
+
+
+SPECIAL = tuple(
+    (functools.partial(special_comparison, kind=kind), metrics.Exactly(), f"right otherwise, but not where {words}:")
+    for kind, words in (
+        ("sign", "the value has the other sign than the printed number"),
+        ("edge", "the value is off by half a unit exactly, or by half unit and bound exactly: that is still within"),
+        ("exponent", "the number is printed with an exponent, as 3e-4"),
+        ("whole", "the number is whole and ends with zeros: they are digits like all others"),
+    )
+)
 NUMBERS = tuple(functools.partial(printed_number, form=form) for form in FORMS)
 COMPARISONS = tuple(
     functools.partial(
@@ -53,9 +86,13 @@ COMPARISONS = tuple(
         comma=k % 5 == 3,
         beyond=(k // 2 + k // 4) % 2 == 0,
         zero=k % 7 == 2,
+        decimals=1 + k % 3,  # all of them with every `off` and `bound`
     )
     for k, (off, bound, misprint, simulated) in enumerate(
-        itertools.product((0.0, 0.4, 1.8, 2.2, 2.7, 60.0), (0.0, 1.5, 100.0), (False, True), (False, True))
+        [
+            *itertools.product((0.0, 0.4, 1.8, 2.2, 2.7, 60.0), (0.0, 1.5, 100.0), (False, True), (False, True)),
+            *((3.2, 1.5, False, simulated) for simulated in (False, True)),
+        ]
     )
 )
 
@@ -282,6 +319,14 @@ STATUSES = (
     (
         _as_text(str),
         "You compare texts, and some are printed with a comma. Compare numbers: the difference with the half unit.",
+    ),
+    (
+        lambda p, v, b, m, s: status(p, v, 2 * b, m, s),
+        "You allow twice the bound. It holds to either side: half unit + bound, once.",
+    ),
+    (
+        lambda p, v, b, m, s: status(p, v, b * abs(v), m, s),
+        "You take the bound as a share of the value. It has the value's own unit: half unit + bound.",
     ),
     (_cut_off, "*Cut off* is left out here: what is off by less than a whole unit is judged as all else."),
     (
@@ -565,6 +610,7 @@ CHAPTER = Chapter(
             reference=status,
             draw=COMPARISONS,
             metric=metrics.Exactly(),
+            noisy=SPECIAL,
             hints=(
                 "Ask the questions in an order: was the input published at all? Does the value round to the printed one? ...",
                 "off = |value - printed| against half_unit(printed), then against half_unit(printed) + bound. A simulated value within "

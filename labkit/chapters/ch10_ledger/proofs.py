@@ -15,17 +15,17 @@ from ...exercises.engine import Exercise, Mistake
 
 def total(x):
     """The sum of all."""
-    return float(np.sum(x))
+    return float(x.sum())
 
 
 def product(x):
     """The product of all."""
-    return float(np.prod(x))
+    return float(x.prod())
 
 
 def length(x):
     """The length of the vector."""
-    return float(np.sqrt(np.sum(np.square(x))))
+    return float(np.sqrt((x**2).sum()))
 
 
 def share(x):
@@ -64,6 +64,17 @@ def printed_inputs(rng, function):
 INPUTS = tuple(functools.partial(printed_inputs, function=f) for f in FUNCTIONS)
 
 
+def special_inputs(rng, kind):
+    """A function and printed numbers that are "whole", with an "exponent", or of which one is printed "twice"."""
+    texts = [str(rng.integers(2, 30)) for _ in range(3)]
+    if kind == "exponent":
+        texts[1] = f"{rng.uniform(2, 9):.{rng.integers(0, 3)}f}e{rng.choice([-2, -1, 1, 2])}"
+    elif kind == "twice":
+        texts = [f"{rng.uniform(2, 9):.{rng.integers(1, 3)}f}" for _ in range(2)]
+        texts.insert(int(rng.integers(0, 3)), texts[0])
+    return last_power, texts
+
+
 def bound(f, printed):
     """How far rounding of the printed inputs can move f, to first order."""
     return float(propagate(f, read(printed))[1])
@@ -78,6 +89,11 @@ def _moves(f, printed, halves=half_unit):
 
 def _larger(f, printed, halves=half_unit):
     return np.abs(_moves(f, printed, halves)).max(axis=0)
+
+
+def _larger_with_signs(f, printed):
+    up, down = map(np.array, _moves(f, printed))
+    return np.where(np.abs(up) >= np.abs(down), up, down)
 
 
 def _all_at_once(f, printed):
@@ -157,6 +173,18 @@ BOUND = Exercise(
     reference=bound,
     draw=INPUTS,
     metric=metrics.Numbers(1e-9),
+    noisy=[
+        (
+            functools.partial(special_inputs, kind=kind),
+            metrics.Numbers(1e-9),
+            f"right otherwise, but not where {words}:",
+        )
+        for kind, words in (
+            ("whole", "all numbers are whole"),
+            ("exponent", "a number is printed with an exponent, as 3e-4"),
+            ("twice", "one and the same number is printed twice"),
+        )
+    ],
     hints=(
         "Move one number at a time by its half unit, up and down, and look at what f does.",
         "For each number: f with it half a unit up, and f with it half a unit down. The larger of the two changes "
@@ -202,6 +230,15 @@ BOUND = Exercise(
         Mistake(
             lambda f, p: abs(sum(_moves(f, p)[0])),
             "You added the moves with their signs, so that they cancel: take the absolute value of each first.",
+        ),
+        Mistake(
+            lambda f, p: abs(_larger_with_signs(f, p).sum()),
+            "Of each number you took the larger move, but with its sign, so that they cancel in the sum: take the "
+            "absolute value of each before you add.",
+        ),
+        Mistake(
+            lambda f, p: _larger(f, p)[:2].sum(),
+            "You moved the first two numbers only. Each of them counts, however many there are.",
         ),
         Mistake(
             lambda f, p: np.abs(_moves(f, p)[0]).sum(),
@@ -348,6 +385,14 @@ def column(rng, slip):
     return entries, average
 
 
+def of_the_average_alone(rng):
+    """A column whose average has a slip that no slip of an entry explains."""
+    while True:
+        entries, average = column(rng, "average")
+        if _suspected(_gaps(entries, average), 0) == {len(entries)}:
+            return entries, average
+
+
 def _of_few_digits(rng, lost):
     """One entry and an average with two digits swapped; or whole numbers, of which one lost its first digit."""
     if lost:
@@ -416,6 +461,27 @@ def _suspected(gaps, more, kept=False, counted=(1, 1)):
     return {k for k, (left, new) in enumerate(slips) if (left <= (allowed + counts[k] * new) * (1 + more)).any()}
 
 
+def other_columns(rng, kind):
+    """Columns with a slip at a place that `column` never has.
+
+    "twice": an entry that is printed twice, and either of the two may be wrong. "many": more entries than five, or
+    fewer than four.
+    """
+    count = 4 if kind == "twice" else int(rng.choice([2, 3, 7, 8]))
+    values = np.round(rng.uniform(20, 60, count), 1)
+    entries = [f"{value:.1f}" for value in values]
+    if kind == "twice":
+        k, j = sorted(rng.choice(count, 2, replace=False))
+        values[j], entries[j] = values[k], entries[k]
+    else:
+        k = int(rng.integers(count))
+    entries[k] = _slipped(rng, entries[k], "one digit wrong")
+    if kind == "twice":
+        entries[j] = entries[k]
+        values[j] = number(entries[k])
+    return entries, f"{values.mean():.3f}"
+
+
 COLUMNS = tuple(
     functools.partial(_clear, draw=draw)
     for draw in (
@@ -431,6 +497,7 @@ COLUMNS = tuple(
             for finer in (2, 0)
             for low, high in ((1 - LIMIT, 1 - 1e-3), (1 + 1e-3, 1 + LIMIT))
         ),
+        of_the_average_alone,
         functools.partial(at_the_limit, finer=2, low=BEYOND[0], high=BEYOND[1]),
     )
 )
@@ -499,6 +566,26 @@ def _agree_one_way(entries, average, sign):
     return sign * (sum(map(number, entries)) / len(entries) - number(average)) <= slack * (1 + 1e-9) + 1e-12
 
 
+def _without_signs_agrees(entries, average):
+    slack = sum(map(half_unit, entries)) / len(entries) + half_unit(average)
+    mean = sum(abs(number(text)) for text in entries) / len(entries)
+    return abs(mean - number(average)) <= slack * (1 + 1e-9) + 1e-12
+
+
+def _first_half_as_printed(entries, average):
+    slack = half_unit(entries[0]) + half_unit(average)
+    return _search(agree=_allow(lambda halves, own: slack))(entries, average)
+
+
+def _within_a_share(share):
+    """Entries and average agree where their gap is at most this share of the average."""
+
+    def agree(entries, average):
+        return abs(sum(map(number, entries)) / len(entries) - number(average)) <= share * abs(number(average))
+
+    return _search(agree=agree)
+
+
 def _median_agrees(entries, average):
     slack = sum(map(half_unit, entries)) / len(entries) + half_unit(average)
     return abs(np.median([number(text) for text in entries]) - number(average)) <= slack * (1 + 1e-9) + 1e-12
@@ -520,9 +607,18 @@ def _over_one_more(entries, average):
     return abs(sum(map(number, entries)) / (len(entries) + 1) - number(average)) <= slack * (1 + 1e-9) + 1e-12
 
 
+def _all_over_one_more(entries, average):
+    allowed = sum(map(half_unit, entries)) / (len(entries) + 1) + half_unit(average)
+    return abs(sum(map(number, entries)) / (len(entries) + 1) - number(average)) <= allowed * (1 + 1e-9) + 1e-12
+
+
 def _outlier(entries, average, agree):
     values = np.array([number(text) for text in entries])
     return set() if agree(entries, average) else {int(np.argmax(np.abs(values - values.mean())))}
+
+
+def _without(kind):
+    return lambda text: [other for other, how in single_slips(text).items() if how != kind]
 
 
 def _only(kind):
@@ -543,6 +639,11 @@ TOLERANCES = (
         lambda halves, own: max(halves) + own,
         "You allow the largest half unit. The error of a mean is at most the mean of the half units: add "
         "them up, divide by their number.",
+    ),
+    (
+        lambda halves, own: max(*halves, own),
+        "You allow the largest half unit of all. Entries and average were rounded: what they allow adds up, the mean "
+        "of the entries' half units and the average's.",
     ),
     (
         lambda halves, own: halves[0] + own,
@@ -578,6 +679,13 @@ SUSPECTS = Exercise(
     reference=suspects,
     draw=COLUMNS,
     metric=metrics.Exactly(),
+    noisy=[
+        (functools.partial(_clear, draw=functools.partial(other_columns, kind=kind)), metrics.Exactly(), words)
+        for kind, words in (
+            ("twice", "right for entries that all differ, but not where two of them are printed alike:"),
+            ("many", "right for four or five entries, but not for fewer or more:"),
+        )
+    ],
     hints=(
         "First: do entries and average agree as printed? Only if not, who could have slipped?",
         "They agree where |mean - average| is at most the mean of the entries' half units plus the average's. Try "
@@ -709,6 +817,11 @@ SUSPECTS = Exercise(
             for first in (_agree, _over_one_more)
         ),
         Mistake(
+            _search(agree=_all_over_one_more),
+            "You divide by one more than there are entries. The mean of n entries is their sum over n, and that of "
+            "their half units too.",
+        ),
+        Mistake(
             lambda entries, average: set() if _agree(entries, average) else set(range(len(entries) + 1)),
             "You accuse everybody. Wanted are those of whom one slip makes entries and average agree.",
         ),
@@ -723,6 +836,25 @@ SUSPECTS = Exercise(
         Mistake(
             _search(give=lambda k, other, entries: other),
             "You return what would have to be printed. Wanted are the positions.",
+        ),
+        Mistake(
+            _search(slips=_without("sign lost")),
+            "You leave out lost signs. `single_slips` lists all slips there are: take them as they come.",
+        ),
+        Mistake(
+            _search(agree=_without_signs_agrees),
+            "Your mean is that of the numbers without their signs. Entries below 0 make an average smaller.",
+        ),
+        Mistake(
+            _first_half_as_printed,
+            "You allow the first entry's half unit for all. Each has its own: what they allow together is their mean.",
+        ),
+        *(
+            Mistake(
+                _within_a_share(share),
+                "You allow a share of the average. What rounding explains are half units of the last digits.",
+            )
+            for share in (0.05, 0.01, 0.005, 0.001)
         ),
         Mistake(
             _search(slips=_only("two digits swapped")),

@@ -19,9 +19,9 @@ from ...machines.sensor_cell import CELL
 # --- draws -----------------------------------------------------------------------------------------------------------
 
 
-def rows_of_a_cell(rng):
-    """Flange poses and exact readings of some rows, from random places."""
-    n = int(rng.integers(4, 10))
+def rows_of_a_cell(rng, n=None):
+    """Flange poses and exact readings of n rows, or some, from random places."""
+    n = n or int(rng.integers(4, 10))
     T_BF = pose(exp_so3(rng.uniform(-1, 1, (n, 3))), rng.uniform(-400, 400, (n, 3)))
     X = pose(exp_so3(rng.uniform(-1, 1, 3)), rng.uniform(-150, 150, 3))
     Y = pose(exp_so3(rng.uniform(-1, 1, 3)), rng.uniform(-900, 900, 3))
@@ -60,11 +60,34 @@ def motions_about_one_axis(rng):
             return T, apart
 
 
-def fitted_line(rng):
-    """Residuals of a linear fit of p parameters to n numbers, and its derivative."""
-    p = int(rng.integers(2, 5))
-    n = p + int(rng.integers(4, 9))
+def one_pair(rng):
+    """As many motions as are needed for one pair of them to be compared."""
+    apart = int(rng.integers(1, 4))
+    return pose(exp_so3(rng.normal(size=(apart + 1, 3))), rng.uniform(-300, 300, (apart + 1, 3))), apart
+
+
+def motions_of_half_a_turn(rng):
+    """Motions that turn by nearly 180 deg: the sine of their angle is so small that rounding hides an axis in it."""
+    T, apart = some_motions(rng, int(rng.integers(1, 4)))
+    turns = np.pi - rng.uniform(1, 3, (len(T), 1)) * 1e-12
+    return pose(exp_so3(turns * _axes(T)), T[:, :3, 3]), apart
+
+
+def fitted_line(rng, freedom=(4, 8), p=None, unlike=False, alone=False):
+    """Residuals of a linear fit of p parameters to n numbers, and its derivative.
+
+    freedom: the least and the largest n - p. unlike: the parameters have units of very different size, as radians
+    beside millimeters. alone: one number pays for most of a parameter, its share is above 0.95.
+    """
+    p = p or int(rng.integers(2, 5))
+    n = p + int(rng.integers(freedom[0], freedom[1] + 1))
     J, noise = rng.normal(size=(n, p)) * rng.uniform(0.3, 3.0), rng.uniform(0.2, 4.0) * rng.normal(size=n)
+    if unlike:
+        J *= 10.0 ** rng.permutation(np.linspace(-1.7, 1.7, p))
+    if alone:
+        k = int(rng.integers(n))
+        others = np.delete(J, k, axis=0)
+        J[k] *= np.sqrt(rng.uniform(30, 90) / (J[k] @ np.linalg.solve(others.T @ others, J[k])))
     return noise - J @ np.linalg.lstsq(J, noise, rcond=None)[0], J
 
 
@@ -75,10 +98,14 @@ def information(rng, p=None):
     return M @ M.T + 1e-3 * np.diag(rng.uniform(0.5, 1.5, p))
 
 
-def covariance_and_reading(rng):
-    """A covariance, and the derivative of one more reading of k numbers."""
+def covariance_and_reading(rng, more=False):
+    """A covariance, and the derivative of one more reading of k numbers; `more` of them than there are parameters, or
+    as many.
+    """
     C = information(rng)
-    return C, rng.normal(size=(int(rng.integers(1, len(C))), len(C))) * rng.uniform(0.3, 2.0)
+    p = len(C)
+    k = int(rng.integers(p, p + 3) if more else rng.integers(1, p))
+    return C, rng.normal(size=(k, p)) * rng.uniform(0.3, 2.0)
 
 
 def covariance_and_candidates(rng, rules, volume=None):
@@ -95,10 +122,38 @@ def covariance_and_candidates(rng, rules, volume=None):
             return unit * C, candidates / np.sqrt(unit)
 
 
-def shares_of_a_fit(rng):
+def best_at(rng, place):
+    """A covariance and candidates of which the best one stands at this place."""
+    C, candidates = covariance_and_candidates(rng, ())
+    order = np.arange(len(candidates))
+    order[[place, next_pose(C, candidates)]] = order[[next_pose(C, candidates), place]]
+    return C, candidates[order]
+
+
+def few_candidates(rng):
+    """Fewer candidates than parameters, and more numbers in each reading than there are parameters."""
+    C, m = information(rng, int(rng.integers(4, 7))), int(rng.integers(2, 4))
+    return C, rng.normal(size=(m, len(C) + 1, len(C))) * rng.uniform(0.1, 0.4, (m, 1, 1))
+
+
+def shares_of_a_fit(rng, **kind):
     """Whitened derivative, noise of a number, and how many standard deviations are taken as seen."""
-    _, J = fitted_line(rng)
+    _, J = fitted_line(rng, **kind)
     return J, float(rng.uniform(0.05, 3.0)), float(rng.uniform(3.0, 6.0))
+
+
+def special_fits(draw, metric):
+    """What `noisy` takes of fits at special places."""
+    return [
+        (functools.partial(draw, unlike=True), metric,
+         "right where all parameters have units of one size, but not where they differ, as radians and millimeters do:"),
+        (functools.partial(draw, alone=True), metric,
+         "right for small shares h, but not where one number has a share above 0.95:"),
+        (functools.partial(draw, p=1), metric, "right for several parameters, but not for one, p = 1:"),
+    ]  # fmt: skip
+
+
+MOTIONS = metrics.Several(metrics.Poses(1e-6, 1e-6), metrics.Poses(1e-6, 1e-6), names=("A", "B"))
 
 
 # --- references and wrong variants -----------------------------------------------------------------------------------
@@ -244,6 +299,37 @@ def _one_after_the_other(C, candidates):
     return int(np.argmin(volumes))
 
 
+def _searched(beats):
+    """A search that goes through the candidates: the last one whose determinant `beats` those before it, a list."""
+
+    def variant(C, candidates):
+        volumes = list(_volumes(C, candidates))
+        return max((i for i in range(1, len(volumes)) if beats(volumes[i], volumes[:i])), default=0)
+
+    return variant
+
+
+def _first_that_beats(C, candidates):
+    volumes = _volumes(C, candidates)
+    return int(np.argmax(volumes < volumes[0])) if (volumes < volumes[0]).any() else 0
+
+
+def _volume_of_a_part(part):
+    return lambda C, candidates: int(np.argmin(np.linalg.det(_left(C, candidates)[:, part, part])))
+
+
+def _largest_variance(C, candidates):
+    return int(np.argmin(np.diagonal(_left(C, candidates), axis1=1, axis2=2).max(1)))
+
+
+def _largest_drop(C, candidates):
+    return int(np.argmax((np.diag(C) - np.diagonal(_left(C, candidates), axis1=1, axis2=2)).max(1)))
+
+
+def _along_the_worst(C, candidates):
+    return int(np.argmax(np.linalg.norm(candidates @ np.linalg.eigh(C)[1][:, -1], axis=1)))
+
+
 def _alone(C, candidates):
     return int(np.argmax(np.linalg.det(candidates @ np.swapaxes(candidates, 1, 2))))
 
@@ -255,7 +341,7 @@ CHOICES = tuple(
         ((_least_certain_volume, _largest_eigenvalue), None),
         ((_least_certain_first, _least_certain), 10.0),
         ((_product_of_variances, _largest_eigenvalue, _smallest_trace), None),
-        ((_largest_information, _largest_derivative), 1e-15),
+        ((_largest_information, _largest_derivative, _volume_of_a_part(np.s_[-3:])), 1e-15),
     )
 )
 
@@ -303,7 +389,8 @@ CHAPTER = Chapter(
             "motions",
             reference=motion.motions,
             draw=rows_of_a_cell,
-            metric=metrics.Several(metrics.Poses(1e-6, 1e-6), metrics.Poses(1e-6, 1e-6), names=("A", "B")),
+            metric=MOTIONS,
+            noisy=(functools.partial(rows_of_a_cell, n=2), MOTIONS, "right for many rows, but not for two of them, which make one motion:"),
             hints=(
                 "Write the loop for row i and for row i + 1. Both equal T_BT, so they equal each other.",
                 "T_BF[i] X T_ST[i] = T_BF[i+1] X T_ST[i+1]: bring all of the robot to the left, all of the sensor to the right.",
@@ -359,12 +446,13 @@ CHAPTER = Chapter(
                 functools.partial(some_motions, apart=1, turns=(2.2, 3.0)),
             ),
             metric=metrics.Numbers(1e-7, "rad"),
-            noisy=(
-                motions_about_one_axis,
-                metrics.Numbers(1e-6, "rad"),
-                "right for axes in all directions, but not for parallel and opposite ones, where a cosine may come out "
-                "as 1.0000000000000002:",
-            ),
+            noisy=[
+                (motions_about_one_axis, metrics.Numbers(1e-6, "rad"),
+                 "right for axes in all directions, but not for parallel and opposite ones, where a cosine may come out as 1.0000000000000002:"),
+                (one_pair, metrics.Numbers(1e-6, "rad"), "right for several pairs, but not where one pair alone is to be compared, which gives one angle in an array:"),
+                (motions_of_half_a_turn, metrics.Numbers(1e-6, "rad"),
+                 "right, but not for motions of nearly half a turn, where the sine of the angle, and R less its transpose with it, vanishes:"),
+            ],
             hints=(
                 "The rotation vector of a motion points along its axis. Its length is the angle, which should not matter here.",
                 "Bring the rotation vectors to length 1; the scalar product of two of them is the cosine of the angle between.",
@@ -412,6 +500,15 @@ CHAPTER = Chapter(
                 "`slipped.T` and `slipped.plain.T` are the two mountings; the distance is that of their last columns.",
                 "`slip_cost = np.linalg.norm(slipped.plain.T[:3, 3] - slipped.T[:3, 3])`",
             ),
+            of={
+                "slipped.plain.T[:3, 3] - slipped.T[:3, 3]": lambda: slipped().plain.T[:3, 3] - slipped().T[:3, 3],
+                "(slipped.plain.T - slipped.T)[:3].T": lambda: (slipped().plain.T - slipped().T)[:3].T,
+                "slipped.std[:3]": lambda: slipped().std[:3],
+                "slipped.std[3:]": lambda: slipped().std[3:],
+                "slipped.T_target[:3, 3]": lambda: slipped().T_target[:3, 3],
+                "slipped.T_target[:3, 3] - slipped.T[:3, 3]": lambda: slipped().T_target[:3, 3] - slipped().T[:3, 3],
+                "slipped.T_target[:3, 3] - slipped.plain.T[:3, 3]": lambda: slipped().T_target[:3, 3] - slipped().plain.T[:3, 3],
+            },
             mistakes=[
                 Mistake(lambda: _apart(_fit_to_the_rejected(), slipped().T),
                         "This is how far the sensor slipped. A fit to all rows ends up between the two mountings: how far from the first?"),
@@ -452,6 +549,7 @@ CHAPTER = Chapter(
             reference=left_out,
             draw=fitted_line,
             metric=metrics.Numbers(1e-7),
+            noisy=special_fits(fitted_line, metrics.Numbers(1e-7)),
             hints=(
                 "A number that is fitted pulls the fit toward itself. Its share is h = j^T (J^T J)^-1 j, with j its row of J.",
                 "Of its own error only 1 - h is left in the residual: divide by that.",
@@ -498,8 +596,15 @@ CHAPTER = Chapter(
         Exercise(
             "honest_covariance",
             reference=honest_covariance,
-            draw=fitted_line,
+            draw=(functools.partial(fitted_line, freedom=(4, 4)), fitted_line),
             metric=metrics.Numbers(1e-8),
+            noisy=[
+                *special_fits(fitted_line, metrics.Numbers(1e-8)),
+                (functools.partial(fitted_line, freedom=(3, 3)), metrics.Numbers(1e-8),
+                 "right where n - p is larger than 3, but not where it is 3, the least that is allowed:"),
+                (functools.partial(fitted_line, freedom=(90, 120)), metrics.Numbers(1e-8),
+                 "right for few numbers, but not for a hundred, where Student's factor is nearly 1 and not 1 yet:"),
+            ],
             hints=(
                 "First the noise: r^T r, divided by the number of residuals less the number of parameters, f.",
                 "C = s^2 (J^T J)^-1 would be right if s were known. It is an estimate as well: the variance of Student's law is f / (f - 2).",
@@ -548,6 +653,8 @@ CHAPTER = Chapter(
             reference=with_one_more,
             draw=covariance_and_reading,
             metric=metrics.Numbers(1e-7),
+            noisy=(functools.partial(covariance_and_reading, more=True), metrics.Numbers(1e-7),
+                   "right for a reading of fewer numbers than there are parameters, but not for one of as many, or more:"),
             hints=(
                 "What is known adds up, not what is unknown: information is the inverse of a covariance.",
                 "The reading brings the information J^T J. Add it to the inverse of C, and invert the sum.",
@@ -561,6 +668,8 @@ CHAPTER = Chapter(
                 Mistake(lambda C, J: C, "Nothing has changed: the reading is missing."),
                 Mistake(lambda C, J: C - C @ J.T @ np.linalg.solve(J @ C @ J.T, J @ C),
                         "You took the reading as free of noise. Whitened, its covariance is I: J C J^T + I."),
+                Mistake(lambda C, J: C - (lambda K: K @ K.T)(C @ J.T @ np.linalg.inv(J @ C @ J.T + np.eye(len(J)))),
+                        "Between the gain K and its transpose the covariance of the reading is missing: C - K (J C J^T + I) K^T, or C - K J C."),
                 Mistake(lambda C, J: C - C @ J.T @ J @ C, "This is the first step toward it. The change is not small: (C^-1 + J^T J)^-1, or J C J^T + I between."),
                 Mistake(lambda C, J: np.linalg.inv(np.linalg.inv(C) + 2 * J.T @ J), "You counted the reading twice."),
                 Mistake(lambda C, J: np.linalg.inv(2 * np.linalg.inv(C) + J.T @ J), "You counted the data you have twice."),
@@ -590,6 +699,11 @@ CHAPTER = Chapter(
             reference=next_pose,
             draw=CHOICES,
             metric=metrics.Exactly(),
+            noisy=[
+                (functools.partial(best_at, place=0), metrics.Exactly(), "right where the best candidate is not the first, but not where it is:"),
+                (functools.partial(best_at, place=-1), metrics.Exactly(), "right where the best candidate is not the last, but not where it is:"),
+                (few_candidates, metrics.Exactly(), "right, but not where there are fewer candidates than parameters, each of more numbers than these:"),
+            ],
             hints=(
                 "Compute what each candidate would leave, and compare one number of it.",
                 "Angles and lengths have different units, so a trace would add square radians to square millimeters. The determinant, the volume of the ellipsoid squared, needs no common unit.",
@@ -601,6 +715,17 @@ CHAPTER = Chapter(
                   for rule in (_smallest_trace, _largest_eigenvalue)),
                 Mistake(lambda C, c: next_pose(C, c) * int(_volumes(C, c).min() < 1),
                         "Right where a determinant is below 1, else the first one: does your search begin with the number 1? Begin with infinity, or with the first candidate's own."),
+                Mistake(lambda C, c: next_pose(C, c) if _volumes(C, c).min() < 1 else None,
+                        "No candidate is found where all determinants are above 1: does your search begin with the number 1? Begin with infinity, or with the first candidate's own."),
+                Mistake(_searched(lambda d, before: d < before[0]),
+                        "You compare each candidate with the first one, and return the last that is better. Remember the smallest determinant so far, and compare with that."),
+                Mistake(_first_that_beats, "You stop at the first candidate that is better than number 0. A later one may be better still: go through all."),
+                Mistake(_searched(lambda d, before: d < before[-1]),
+                        "You compare each candidate with the one before it. Remember the smallest determinant so far, and compare with that."),
+                *(Mistake(_volume_of_a_part(part), "You compare the determinants of a part of each covariance. All parameters count: take the whole matrix.") for part in (np.s_[-3:], np.s_[:3])),
+                *(Mistake(rule, "You look at the largest of the variances, or at the largest drop of one. All parameters count, and what they share: compare determinants.")
+                  for rule in (_largest_variance, _largest_drop)),
+                Mistake(_along_the_worst, "You look at the direction alone that is known worst. Compute what each candidate leaves, in all directions, and compare determinants."),
                 Mistake(_product_of_variances, "You multiplied the variances: that is the determinant only where C has no other entries. What two parameters share counts too: np.linalg.det."),
                 Mistake(_largest_information, "You took the candidate whose own information is largest. It may well tell what is known already: compute what it leaves, with C."),
                 Mistake(_least_certain_first, "You look at the first number of each reading alone, and at how well it can be predicted. Compute what the whole reading leaves, and compare determinants."),
@@ -621,6 +746,7 @@ CHAPTER = Chapter(
             reference=visible,
             draw=shares_of_a_fit,
             metric=metrics.Numbers(1e-8),
+            noisy=special_fits(shares_of_a_fit, metrics.Numbers(1e-8)),
             hints=(
                 "An error d of one number leaves (1 - h) d in its own residual. How large is the noise of that residual?",
                 "The standard deviation of the residual is std sqrt(1 - h). The error is seen when (1 - h) d is `times` as large.",
@@ -632,6 +758,8 @@ CHAPTER = Chapter(
                 Mistake(lambda J, s, k: k * s * np.sqrt(1 - _shares(J)),
                         "This is how large the residual is. The error behind it is larger, by 1 / (1 - h)."),
                 Mistake(lambda J, s, k: k * s * (1 - _shares(J)), "A number with a large share hides its error better, not worse: divide by the root of 1 - h."),
+                Mistake(lambda J, s, k: k * s * np.sqrt(_shares(J) / (1 - _shares(J))),
+                        "This is the noise of what the others predict for the number. Its own belongs to it as well: the variances s^2 h / (1 - h) and s^2 add up to s^2 / (1 - h)."),
                 *(Mistake(variant, "This holds for a number that the fit does not use. Each fitted number hides part of its error: its share h is missing.")
                   for variant in (lambda J, s, k: np.full(len(J), k * s), lambda J, s, k: k * s)),
                 Mistake(lambda J, s, k: k * s / np.sqrt(_shares(J)), "You divided by the root of the share h. What the others check is 1 - h."),
