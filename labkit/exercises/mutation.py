@@ -441,6 +441,7 @@ def _locate(new, node):
 
 ARRAYS = {"array", "asarray", "zeros_like", "ones_like", "empty_like"}  # that take over whole numbers as such
 WHOLE = "with an array of floats made one of whole numbers"
+ALIASES = ("with another name where a copy belongs", "with a part where a copy belongs")
 AFRESH = "with a list or array that each round finds as it was"
 COUNTED = "with one index counted from the other end"
 REVERSED = (  # (words of what was changed in a right formula, what is wrong where the change mends)
@@ -584,7 +585,7 @@ def _call(node, names):
     inner = node.args[0] if node.args else getattr(node.func, "value", None)
     if name in ARRAYS and not any(keyword.arg == "dtype" for keyword in node.keywords):
         floats = [*node.keywords, ast.keyword("dtype", ast.Name("float", ast.Load()))]
-        yield 1, WHOLE, ast.Call(node.func, node.args[:1], floats)
+        yield 2, WHOLE, ast.Call(node.func, node.args[:1], floats)
     if isinstance(inner, ast.Starred) or name in WRAPPERS:
         return
     for twin in () if _is_guarded(name, node.args) else TWINS.get(name, ()):
@@ -717,7 +718,7 @@ def _statements(function):
                         for part in new:
                             _locate(part, statement)
                         sets = ((owner, field, [*block[:i], *new, *block[i + 1 :]]),)
-                        yield Change(words, mends, 1, statement, sets)
+                        yield Change(words, mends, FINER if words in ALIASES else 1, statement, sets)
                     yield from _elsewhere(owner, field, block, i)
                     yield from _afresh(owner, field, block, i)
 
@@ -735,10 +736,10 @@ def _instead(statement):
         name, of = statement.targets[0].id, statement.value
         if isinstance(of, ast.Name):
             mends = f"`{name}` is no copy of `{of.id}`, but another name for it: what changes one changes both"
-            yield "with another name where a copy belongs", mends, [ast.Assign(statement.targets, copied)]
+            yield ALIASES[0], mends, [ast.Assign(statement.targets, copied)]
         if isinstance(of, ast.Subscript) and isinstance(of.value, ast.Name):
             mends = f"`{name}` is no copy, but a part of `{of.value.id}`: what changes one changes the other"
-            yield "with a part where a copy belongs", mends, [ast.Assign(statement.targets, copied)]
+            yield ALIASES[1], mends, [ast.Assign(statement.targets, copied)]
     if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name | ast.Subscript):
         mends = "`=` throws away what was there before, which belongs to the result: `+=`"
         yield "with `+=` where `=` belongs", mends, [ast.AugAssign(statement.targets[0], ast.Add(), statement.value)]

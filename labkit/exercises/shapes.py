@@ -40,13 +40,15 @@ def _of_several(results, expected, names):
     for k, name in enumerate(names):
         if _holds(results, expected, lambda r, e, k=k: (_numbers(r), _numbers(e[k]))):
             return f"what you return is {name} alone" if len(names) > 1 else None
-    for k, name in enumerate(names):
-        parts = [r[k] for r in results if type(r) in (tuple, list) and len(r) == len(names)]
-        if len(parts) == len(results) and (words := shape_words(parts, [e[k] for e in expected])):
-            return f"{name}: {words}"
     two = all(type(r) in (tuple, list) and len(r) == len(names) == 2 for r in results)
     if two and all(_holds(results, expected, lambda r, e, k=k: (_numbers(r[k]), _numbers(e[1 - k]))) for k in (0, 1)):
         return f"the two results are exchanged: first the {names[0]}, then the {names[1]}"
+    for k, name in enumerate(names):
+        parts = [r[k] for r in results if type(r) in (tuple, list) and len(r) == len(names)]
+        if len(parts) < len(results) or _holds(parts, expected, lambda r, e, k=k: (_numbers(r), _numbers(e[k]))):
+            continue
+        if words := shape_words(parts, [e[k] for e in expected]):
+            return f"{name}: {words}"
     return None
 
 

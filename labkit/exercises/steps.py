@@ -238,10 +238,9 @@ class Search:
         for i in range(len(self.names)):
             values = [rerun.numeric(case.args[i]) for case in self.cases]
             if all(value is not None for value in values):
-                one = range(rerun.ALONE)
-                plans += [
-                    ("argument", i, change) for change in one if _changes(rerun.OTHERWISE[change][1], values[0], [])
-                ]
+                for change, (words, function) in enumerate(rerun.OTHERWISE[: rerun.ALONE]):
+                    if self._may_be_said(words) and _changes(function, values[0], []):
+                        plans.append(("argument", i, change))
         plan = self.mending(plans)
         return plan and f"wherever you read `{self.names[plan[1]]}`: {rerun.OTHERWISE[plan[2]][0]}. {ALONE}"
 

@@ -1019,3 +1019,32 @@ def test_a_result_that_never_changes_is_no_slip_of_a_formula(times, told, monkey
     # after the draws: what student code has run beside, the guard puts back
     monkeypatch.setattr(engine.slips, "changed_formulas", lambda exercise: [("with a slip", lambda v: times * v)])
     assert bool(trial._one_change()) == told
+
+
+def test_a_list_of_texts_or_numbers_that_is_changed_is_told():
+    def changes(texts):
+        texts[0] = texts[0].replace(",", ".")
+        return float(texts[0])
+
+    item = Exercise(
+        "first",
+        reference=lambda texts: float(texts[0].replace(",", ".")),
+        draw=lambda rng: ([f"{rng.integers(9)},5", "2"],),
+        metric=metrics.Numbers(1e-9),
+        hints=("a", "b", "c"),
+    )
+    assert "changes its argument `texts` in place" in item.judge(changes).text
+    assert not guard._same([1.0, 2], [1.0, 3]) and guard._same([np.nan, "a"], [np.nan, "a"])
+
+
+def test_a_set_is_asked_for_as_a_set():
+    with pytest.raises(metrics.Refused, match=r"got a list: set\(...\) makes one of it"):
+        metrics.Exactly().admit([1, 2], {1, 2})
+    assert metrics.Exactly().admit(frozenset([np.int64(1)]), {1}) == {1}
+
+
+def test_what_an_exercise_says_of_a_special_draw_leads_where_it_is_refused_or_raises():
+    words = "right for long vectors, but not for one entry:"
+    item = replace(DOUBLE, noisy=(lambda rng: (rng.normal(size=1),), metrics.Numbers(1e-9), words))
+    assert item.judge(lambda v: np.squeeze(2 * v)).text.startswith("Right for long vectors, but not for one entry: exp")
+    assert "Right for long vectors, but not for one entry." in item.judge(lambda v: 2 * v + 0 * v[1]).text

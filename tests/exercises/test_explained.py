@@ -69,6 +69,12 @@ def test_one_of_several_results_and_two_exchanged():
     assert "exchanged" in shapes.shape_words([p[::-1] for p in pairs], pairs, ("state", "covariance"))
 
 
+def test_every_second_row_of_one_of_several_results():
+    pairs = [(e, np.vstack([e, e + 1.0])) for e in MATRICES]
+    told = shapes.shape_words([(a, b[::2]) for a, b in pairs], pairs, ("state", "covariance"))
+    assert told == "covariance: what you return is every second of the expected numbers or rows"
+
+
 def test_the_case_on_which_an_answer_is_wrong():
     draws = [({"v": v, "n": n}, 1.0) for v, n in ((1.0, 2), (-1.0, 2), (2.0, 3), (-3.0, 3))]
     assert cases.case_words(4 * draws, 4 * [False, True, False, True]) == "exactly where `v` is negative"
@@ -76,13 +82,16 @@ def test_the_case_on_which_an_answer_is_wrong():
     assert cases.case_words(draws, [False, True, False, True]) is None, "so few draws may agree by chance"
 
 
-TEXTS = [({"printed": text, "sure": k % 2 == 0}, k % 3) for k, text in enumerate(20 * ["3e4", "1.20", "5e-2", "7,1"])]
+TEXTS = [
+    ({"printed": text, "sure": k % 2 == 0}, k % 3) for k, text in enumerate(20 * ["3e4", "1.20", "5e-2", "7,1", "1.05"])
+]
 
 
 @pytest.mark.parametrize(
     "is_wrong, told",
     [
         (lambda g, e: "e4" in g["printed"], "exactly where `printed` has an exponent that is not negative"),
+        (lambda g, e: g["printed"] == "1.05", "exactly where `printed` has a zero right behind the point"),
         (
             lambda g, e: g["printed"] == "3e4" and e == 2,
             "exactly where `printed` has an exponent that is not negative and",

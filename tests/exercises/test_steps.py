@@ -315,6 +315,7 @@ def test_values_in_place_of_others_keep_their_kind():
     assert rerun._like(True, 0.0) is False
     assert rerun._like(np.array([1, 2]), np.array([2.0, 1.0])).dtype.kind == "i"
     assert rerun._like([1.0, 2.0], np.ones(2)) == [1.0, 1.0]
+    assert all(type(v) is int for v in rerun._like([1, 2], np.array([-1.0, -2.0]))), "no list of floats by a sign"
 
 
 def told_of(id, body, arguments):
@@ -414,6 +415,30 @@ def test_an_array_of_integers_is_named_as_such():
     return found
     """
     assert "`[0, 0, 1]`: an array made of this is one of integers" in judged(asked(right, two_numbers), body)
+
+
+@pytest.mark.parametrize(
+    "body, said",
+    [
+        (
+            "x = np.array([a, b]).astype(np.float32)\nreturn float(x[0] * (x[0] + 1))",
+            "`float32` stands where `float64`",
+        ),
+        (
+            "x = np.array([a, b])\ny = x\ny[0] += 1\nreturn x[0] * y[0]",
+            "`y` is no copy of `x`, but another name for it",
+        ),
+        ("x = np.array([[a, b]])\ny = x[0]\ny[0] += 1\nreturn x[0, 0] * y[0]", "`y` is no copy, but a part of `x`"),
+    ],
+)
+def test_a_copy_that_is_none_and_too_few_digits_are_told(body, said):
+    assert said in judged(asked(lambda a, b: a * (a + 1.0), two_numbers), body)
+
+
+def test_an_array_of_whole_numbers_alone_is_told():
+    body = "x = np.array([n for n in (a, b)])\nx[0] = x[0] + 0.5\nreturn x[0] * x[1]"
+    item = asked(lambda a, b: (a + 0.5) * b, lambda rng: (int(rng.integers(1, 9)), int(rng.integers(1, 9))))
+    assert "`dtype=float` is missing" in judged(item, body)
 
 
 def test_no_line_that_fills_a_part_is_blamed_for_the_whole():
@@ -578,3 +603,21 @@ def test_rounded_numbers_typed_lengths_and_cases_that_are_none_are_told(referenc
 def test_steps_that_are_too_long_are_told(body):
     item = replace(asked(lambda a, b: a, lambda rng: rng.uniform(1, 2, 2)), metric=metrics.Numbers(0.01))
     assert "are far too long: a hundredth of that will do" in judged(item, body)
+
+
+def chosen(rng):
+    return rng.normal(size=(6, 3)), float(rng.uniform(0.5, 2.0))
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "best, which = 0.9, 0\nfor k in range(len(a)):\n    d = b * a[k] @ a[k]\n    if d < best:\n"
+        "        best, which = d, k\nreturn which",
+        "return int(np.argmin([np.abs(v).max() + v[0] for v in a]))",
+    ],
+)
+def test_no_unit_or_factor_is_blamed_for_a_choice(body):
+    item = asked(lambda a, b: int(np.argmin((a**2).sum(1))), chosen)
+    said = judged(replace(item, metric=metrics.Exactly()), body)
+    assert not re.search("radians|degrees|divided by|thousand|half of|special", said), said

@@ -45,21 +45,17 @@ def comparison(rng, off, bound, misprint, simulated, comma, beyond, zero, decima
 def special_comparison(rng, kind):
     """printed, value, bound, misprint, simulated.
 
-    "sign": the value has the other sign. "edge": it is off by half a unit, or by half a unit and the bound, to the last
-    bit. "exponent": printed with one. "whole": a whole number, of which the last digits are 0.
+    "sign": the value has the other sign. "edge": it is off by half a unit to the last bit, from an odd number. "limit":
+    by half a unit and the bound. "exponent": printed with one. "whole": a whole number, of which the last digits are 0.
     """
     misprint, simulated = bool(rng.integers(2)), bool(rng.integers(2))
     bound, whole = float(rng.integers(0, 4)), int(rng.integers(2, 90)) * int(rng.choice([-1, 1]))
     if kind == "sign":
         return str(whole), -whole + 0.25, bound / 4, misprint, simulated
     if kind == "edge":
-        return (
-            str(whole),
-            whole + int(rng.choice([-1, 1])) * (0.5 + rng.integers(2) * bound),
-            bound,
-            misprint,
-            simulated,
-        )
+        return str(whole | 1), (whole | 1) + 0.5 * int(rng.choice([-1, 1])), bound, misprint, False
+    if kind == "limit":
+        return str(whole), whole + int(rng.choice([-1, 1])) * (0.5 + bound), bound, misprint, simulated
     if kind == "whole":
         return f"{whole}00", 100.0 * whole + rng.choice([-1, 1]) * rng.uniform(5, 40), bound, misprint, simulated
     value = whole / 100 + 0.01 * rng.choice([-1, 1]) * rng.choice([0.3, 2.5, 9.0])
@@ -70,7 +66,8 @@ SPECIAL = tuple(
     (functools.partial(special_comparison, kind=kind), metrics.Exactly(), f"right otherwise, but not where {words}:")
     for kind, words in (
         ("sign", "the value has the other sign than the printed number"),
-        ("edge", "the value is off by half a unit exactly, or by half unit and bound exactly: that is still within"),
+        ("edge", "the value is off by half a unit exactly: that is still within"),
+        ("limit", "the value is off by half unit and bound exactly: that is still within"),
         ("exponent", "the number is printed with an exponent, as 3e-4"),
         ("whole", "the number is whole and ends with zeros: they are digits like all others"),
     )
