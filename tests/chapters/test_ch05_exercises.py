@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from labkit.calibration import hand_eye, planning
 from labkit.chapters.ch05_hand_eye import exercises
+from labkit.documents import misprints
 from labkit.documents.thesis import claims_hand_eye
 from labkit.documents.thesis import printed as thesis
 from labkit.exercises.engine import CORRECT, NOT_YET
@@ -245,3 +246,17 @@ def test_the_middle_of_a_scan_line_is_not_the_middle_of_its_circle(seed):
         return x_c, p, np.sqrt(q + p * p)
 
     assert judged("fit_circle", centered, seed).status == NOT_YET
+
+
+def test_the_last_explanation_of_a_row_is_not_the_most_credible():
+    def last(entries):
+        m = thesis.measurements_from(entries)
+        fit = hand_eye.calibrate_sphere_target(m.T_BF, m.x_S, robust=True)
+        rows = (
+            misprints.explanations(entries, i + 1, fit.T_FS, fit.target, fit.std)
+            for i in np.flatnonzero(fit.weights == 0)
+        )
+        return {(row[-1].table, int(row[-1].pose), row[-1].column) for row in rows}
+
+    assert "explanations` puts that one first" in exercises._judge_ambiguous(last)
+    assert exercises._judge_ambiguous(exercises.find_misprints) is None

@@ -277,6 +277,16 @@ def _step(T_FS, T_BF, x_S, target):
     return -np.linalg.lstsq(J, _residual(T_FS, T_BF, x_S, target).ravel(), rcond=None)[0]
 
 
+def _step_in_two_frames(T_FS, T_BF, x_S, target):
+    e = frames.transform(T_FS, x_S) - frames.transform(frames.invert(T_BF), np.tile(target, (len(x_S), 1)))
+    return frames.moved(T_FS, -np.linalg.lstsq(analytic_jacobian(T_FS, T_BF, x_S), e.ravel(), rcond=None)[0])
+
+
+def _step_of_translation(T_FS, T_BF, x_S, target):
+    J, e = analytic_jacobian(T_FS, T_BF, x_S)[:, 3:], _residual(T_FS, T_BF, x_S, target)
+    return frames.pose(T_FS[:3, :3], T_FS[:3, 3] - np.linalg.lstsq(J, e.ravel(), rcond=None)[0])
+
+
 def _stepped(change):
     def variant(T_FS, T_BF, x_S, target):
         return change(T_FS, _step(T_FS, T_BF, x_S, target))
@@ -928,6 +938,8 @@ CHAPTER = Chapter(
                 "return frames.pose(T_FS[:3, :3] @ exp_so3(step[:3]), T_FS[:3, 3] + step[3:])`",
             ),
             mistakes=[
+                Mistake(_step_in_two_frames, "Your residuals stand along the axes of F, the rows of the Jacobian in B: bring both into one frame.", id="gauss_newton-two-frames"),
+                Mistake(_step_of_translation, "Only tau is solved for. Rotation and translation move the residuals together: all six columns at once.", id="gauss_newton-translation"),
                 Mistake(_iterated, "You iterated to the end. Asked for is one step."),
                 Mistake(lambda *a: gauss_newton_on_pose(gauss_newton_on_pose(*a), *a[1:]), "You took two steps. Asked for is one."),
                 Mistake(_stepped(lambda T, s: s), "You return the step. Move the pose by it: R_FS exp(phi) and t_FS + tau."),
@@ -1116,7 +1128,7 @@ CHAPTER = Chapter(
             metric=named_entries(),
             draws=2,
             limit=15.0,
-            properties=(lambda student, rng: _judge_printed(student),),
+            properties=(lambda student, rng: _judge_printed(student) or _judge_ambiguous(student),),
             hints=(
                 "Two questions: which rows do not fit a robust calibration, and which single slip explains each of them?",
                 "Fit the entries robustly. Rows whose residual is longer than 6 `fit.std` are suspects: `misprints.explanations(entries, pose, T_FS, target, std)` tries every slip of a row and puts the most credible first.",
@@ -1255,3 +1267,15 @@ def _judge_printed(student):
     if wanted - named:
         return f"in the printed tables {len(wanted - named)} of the 7 misprints are not named yet."
     return None
+
+
+def _judge_ambiguous(student):
+    """Nor is it left to chance that of several entries that explain a row the most credible is taken: here the last one
+    of row 12 is another entry.
+    """
+    entries = entries_with_more_slips(np.random.default_rng(0), mended=(2, 21))[0]
+    wanted = find_misprints(entries)
+    off = named_entries().admit(student(entries), wanted) ^ wanted
+    if off and {pose for _, pose, _ in off} == {12}:
+        return "several entries explain row 12, and yours is not the most credible: `explanations` puts that one first."
+    return "on one more table not all misprints are named, or too many entries are." if off else None

@@ -247,6 +247,12 @@ def _k2(A, B, R):
     return A[:, :3, 3] - B[:, :3, 3] @ R.T
 
 
+def _weighed(A, B, R, weight):
+    """The translation with rows multiplied by something of the angle of their motion."""
+    w = weight(np.linalg.norm(log_so3(A[:, :3, :3]), axis=1))[:, None]
+    return np.linalg.lstsq((w[..., None] * _k1(A)).reshape(-1, 3), (w * _k2(A, B, R)).ravel(), rcond=None)[0]
+
+
 def gaps(rng):
     A, B, R = translation_problem(rng)
     return (ax_xb.translation_from_motions(A, B, R)[1],)
@@ -987,6 +993,19 @@ CHAPTER = Chapter(
                     lambda A, B, R: np.einsum("nij,nj->ni", np.linalg.pinv(_k1(A)), _k2(A, B, R)).mean(axis=0),
                     "You solved each motion alone and averaged. Each leaves t along its own axis free, and pinv sets that part to zero: "
                     "stack all motions, solve once.",
+                ),
+                *(
+                    Mistake(
+                        lambda A, B, R, weight=weight: _weighed(A, B, R, weight),
+                        "You weigh the motions by their angles. Plain least squares is meant, each row as it is: large angles have their say by "
+                        "I - R_A already.",
+                        id=f"translation_lsq-{name}",
+                    )
+                    for name, weight in (
+                        ("by-angle", lambda w: w),
+                        ("by-root-of-angle", np.sqrt),
+                        ("over-angle", lambda w: 1 / w),
+                    )
                 ),
                 Mistake(
                     lambda A, B, R: np.linalg.solve(_k1(A).mean(axis=0), _k2(A, B, R).mean(axis=0)),
