@@ -131,6 +131,7 @@ theme.addEventListener("click", () => {
 });
 
 window.addEventListener("beforeprint", () => {
+  for (const picture of document.querySelectorAll("img[loading=lazy]")) picture.loading = "eager";
   for (const closed of document.querySelectorAll(".prediction details:not([open])")) {
     closed.open = true;
     window.addEventListener("afterprint", () => { closed.open = false; }, { once: true });
