@@ -343,7 +343,7 @@ class Search:
         return plan and self._compared(*plan[1:], solution)
 
     def _given(self, solution):
-        """(place, place of the solution) of values of one shape that differ on every draw, the smallest place first."""
+        """(place, place of the solution) of like values that differ where the result is wrong, the smallest first."""
         places = self.written.places
         filled = {places[k][2] for k in range(len(places)) if self._is_filled(k)}
         for k in sorted(range(len(places)), key=lambda k: places[k][3]):
@@ -356,10 +356,13 @@ class Search:
                 continue
             for q in solution.distinct:
                 pairs = [(mine[k], theirs[q]) for mine, theirs in zip(self.values, solution.values)]
-                if all(_exchangeable(a, b) for a, b in pairs) and not (
-                    solution.is_result[q] and (self.chosen or self.is_result(k))
-                ):
+                if self._could_be(pairs) and not (solution.is_result[q] and (self.chosen or self.is_result(k))):
                     yield k, q
+
+    def _could_be(self, pairs):
+        """Whether values of the solution can take the place of the student's, and are others where that is wrong."""
+        wrong = [not case.was_right for case in self.cases]
+        return all(_exchangeable(a, b) if off else _fits(a, b) for (a, b), off in zip(pairs, wrong))
 
     def _is_filled(self, k):
         """Whether only a part of this array is assigned there: its other parts are not what the line is about."""
@@ -628,9 +631,14 @@ def _in_rounds(mine, theirs):
 
 def _exchangeable(mine, theirs):
     """Whether a value of the solution can take the place of one of the student's, and is another."""
+    a, (_, b) = mine[1], _in_rounds(mine, theirs)
+    return _fits(mine, theirs) and not _same(a, np.broadcast_to(b, a.shape))
+
+
+def _fits(mine, theirs):
+    """Whether a value of the solution can take the place of one of the student's."""
     (count, a), (turns, b) = mine, _in_rounds(mine, theirs)
-    fits = count > 0 and turns in (1, count) and a.shape[1:] == b.shape[1:]
-    return fits and not _same(a, np.broadcast_to(b, a.shape))
+    return count > 0 and turns in (1, count) and a.shape[1:] == b.shape[1:]
 
 
 def _changes(function, value, others):

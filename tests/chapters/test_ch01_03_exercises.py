@@ -447,7 +447,7 @@ def no_exponents(text):
         ("chain", long_links_alone, ""),
         ("closure_error", slide, "slides along the axis"),
         ("read_system", no_exponents, "line 1"),
-        ("read_system", comments_and_empty_lines_at_the_margin, "ValueError: line "),
+        ("read_system", comments_and_empty_lines_at_the_margin, ""),
         ("write_system", lambda points: "\n".join(" ".join(f"{v:.20f}" for v in p) for p in points), "numbers near 0"),
         ("pivot_rhs", lambda T: -np.concatenate(np.squeeze(T[:, :3, 3])), "right before, on other draws"),
         ("pivot_residuals", lambda T, tip, point: np.squeeze(T[:, :3, :3] @ tip + T[:, :3, 3] - point), "(1, 3)"),

@@ -579,7 +579,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _normalized_too_early,
-                    "Your y is divided by the length of b. What is to be of length 1 is what is left of b without its part along x (and z inherits the length of y).",
+                    "Your y and z are too short: y is what is left of b without its part along x, over the length of all of b. It is to be divided by its own length (and z inherits that of y).",
                     id="gram-schmidt-early",
                 ),
                 Mistake(

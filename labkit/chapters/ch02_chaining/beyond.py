@@ -192,7 +192,7 @@ FILES = [
         mistakes=[
             Mistake(
                 _plainly,
-                "A line that begins with # holds a comment, and what stands behind a # in a line as well: cut it off before you split the line.",
+                "What stands behind a # is a comment, blanks before it or not: cut it off before you split the line, and leave out a line of which nothing is left.",
                 id="read-comments",
             ),
             Mistake(
