@@ -316,18 +316,35 @@ def _other_rounds(statement):
 
 
 def _narrower(function, found):
-    """Changes that draw the bounds of an `np.clip` nearer together: they mend where any constant would."""
-    clips = [n for n in ast.walk(function) if getattr(getattr(n, "func", None), "attr", "") == "clip"]
-    within = {part: call for call in clips if len(call.args) == 3 for part in ast.walk(call)}
+    """Changes that draw bounds nearer together, those of `np.clip` or one of `max` and the like: they mend where any
+    constant would.
+    """
+    calls = [n for n in ast.walk(function) if isinstance(n, ast.Call) and len(n.args) > 1]
+    within = {part: call for call in calls for part in ast.walk(call) if _limits(call)}
     for change in found:
         call = within.get(change.place)
-        before = call and [_number(bound) for bound in call.args[1:]]
-        if not before or None in before:
+        if call is None:
             continue
+        (low, high), name = _limits(call), _called(call)
         with change.made():
-            after = [_number(bound) for bound in call.args[1:]]
-        if None not in after and (after[0] > before[0] or after[1] < before[1]):
+            new = _limits(call) if _called(call) == name and len(call.args) > 1 else None
+        if new and (new[0] > low or new[1] < high):
             yield change
+
+
+def _called(call):
+    return getattr(call.func, "attr", getattr(call.func, "id", ""))
+
+
+def _limits(call):
+    """Between which numbers, typed in, a call keeps what it is given; None where it does not."""
+    name, numbers = _called(call), [_number(part) for part in call.args]
+    if name == "clip" and len(numbers) == 3 and None not in numbers[1:]:
+        return numbers[1], numbers[2]
+    typed = [number for number in numbers if number is not None]
+    if len(typed) != 1:
+        return None
+    return {"max": (typed[0], math.inf), "min": (-math.inf, typed[0])}.get(name.removesuffix("imum"))
 
 
 def _number(node):

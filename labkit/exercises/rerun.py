@@ -411,6 +411,18 @@ def _kept_rows(v, rows):
     return _long(v)[rows]
 
 
+def _of_its_shape(change):
+    """The change where it leaves an array its shape: one of whose length alone is read would be told for the length."""
+
+    def changed(v, a):
+        new = change(v, a)
+        if v.ndim and np.shape(new) != v.shape:
+            raise ValueError("another shape")
+        return new
+
+    return changed
+
+
 OTHERWISE = (  # (what it should have been, function of the value [and of an argument]), the likeliest first
     ("it has the wrong sign", np.negative),
     ("it belongs there transposed", lambda v: np.swapaxes(_matrix(v), -1, -2)),
@@ -464,14 +476,14 @@ OTHERWISE = (  # (what it should have been, function of the value [and of an arg
         )
         for i, j in itertools.combinations(range(4), 2)
     ),
-    ("it is to be multiplied by `{}`", np.multiply),
-    ("it is to be divided by `{}`", np.divide),
+    ("it is to be multiplied by `{}`", _of_its_shape(np.multiply)),
+    ("it is to be divided by `{}`", _of_its_shape(np.divide)),
     ("`{}` belongs in its place", lambda v, a: a),
-    ("`{}` is missing: it is to be added", np.add),
-    ("`{}` is to be taken off", np.subtract),
+    ("`{}` is missing: it is to be added", _of_its_shape(np.add)),
+    ("`{}` is to be taken off", _of_its_shape(np.subtract)),
     ("the matrix `{}` is to be multiplied with it, from the left", lambda v, a: _matrix(a) @ v),
-    ("it is to be multiplied by the square of `{}`", lambda v, a: v * a**2),
-    ("it is to be divided by the square of `{}`", lambda v, a: v / a**2),
+    ("it is to be multiplied by the square of `{}`", _of_its_shape(lambda v, a: v * a**2)),
+    ("it is to be divided by the square of `{}`", _of_its_shape(lambda v, a: v / a**2)),
     ("it is to be divided by the number of rows or entries of `{}`", lambda v, a: v / len(a)),
     ("it is to be multiplied by the number of rows or entries of `{}`", lambda v, a: v * len(a)),
 )

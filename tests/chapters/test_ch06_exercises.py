@@ -208,3 +208,11 @@ def test_a_link_may_turn_and_step_either_way():
         return arm.dh_matrix(theta, abs(d), a, alpha)
 
     texts("dh_matrix", no_way_back)
+
+
+def test_quartiles_are_no_median_of_distances():
+    def quartiles(values, factor=4.0):
+        low, middle, high = np.percentile(values, [25, 50, 75])
+        return np.abs(values - middle) <= factor * (high - low) / 1.349
+
+    assert all("on both sides of the median" in text for text in texts("reject_outliers", quartiles))

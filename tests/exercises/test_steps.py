@@ -517,11 +517,21 @@ def test_loops_and_numbers_that_are_typed_in_are_told(reference, body, said):
     assert said in judged(asked(reference, draw), body)
 
 
-@pytest.mark.parametrize("weights", ["np.clip(a, -1, 1)", "np.maximum(a, 1e-9)", "np.clip((a - 1) / 2, 0, 1)"])
+@pytest.mark.parametrize(
+    "weights", ["np.clip(a, -1, 1)", "np.maximum(a, 1e-9)", "np.clip((a - 1) / 2, 0, 1)", "np.maximum(a, 0)"]
+)
 def test_a_change_that_makes_weights_alike_is_not_told_as_the_slip(weights):
     body = f"w = {weights}\nreturn (w @ b) / w.sum()"
     text = judged(asked(lambda a, b: b.mean(), two_vectors), body)
     assert not re.search("exchanged|stands where|one term is too many", text)
+
+
+def test_no_factor_is_told_for_what_only_counts():
+    def draw(rng):
+        return rng.normal(size=2), rng.normal(size=(int(rng.integers(3, 9)), 2))
+
+    text = judged(asked(lambda a, b: np.cos(b.sum() / len(b)), draw), "return np.cos(b.sum() / len(a))")
+    assert text.startswith("in line 2, `a`: `b` belongs in its place.")
 
 
 def two_vectors(rng):

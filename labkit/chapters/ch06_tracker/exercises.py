@@ -276,6 +276,15 @@ def spoiled(rng, factor):
     return rng.permutation(50 + rng.uniform(0.5, 2) * values), factor
 
 
+def lopsided(rng):
+    """Values that lie close below their median and far apart above it, and some at certain shares of the limit."""
+    n, factor = 2 * int(rng.integers(50, 80)) + 1, float(rng.uniform(2.6, 5))
+    core = 4 * np.linspace(0, 1, n) ** 2
+    tail = np.array([-1.5, -1.1, -0.92, 0.92, 1.1, 1.5])
+    limit = factor * 1.4826 * _mad(np.r_[core, 99 * np.sign(tail)])
+    return rng.permutation(50 + np.r_[core, np.median(core) + limit * tail]), factor
+
+
 def two_heaps(rng):
     """An even number of values in two heaps: the median lies halfway between them, where no value is."""
     n, gap = int(rng.integers(8, 20)), rng.uniform(2, 4)
@@ -635,6 +644,11 @@ CHAPTER = Chapter(
                 "return T`",
             ),
             mistakes=[
+                Mistake(
+                    lambda dh, q: functools.reduce(np.matmul, dh_matrix(dh[:, 0], dh[:, 1], dh[:, 2], dh[:, 3] + q)),
+                    "The joint angles are added to alpha, in the last column. They turn about z: the angle is offset + q, in the first.",
+                    id="forward_kinematics-alpha",
+                ),
                 Mistake(
                     lambda dh, q: forward_kinematics(TX40.dh, q),
                     "You took the table of the TX40. Any robot may come in: use the argument `dh`.",
@@ -1208,6 +1222,12 @@ CHAPTER = Chapter(
                     all_equal,
                     KeptOrNot(),
                     "Right as long as the values differ. Where all are equal, each lies at the median, at a distance of 0, and 0 is within a limit of 0:",
+                ),
+                (
+                    lopsided,
+                    KeptOrNot(),
+                    "Right where the values lie alike on both sides of the median. Where they do not, the distances from it have another median "
+                    "than half the way between the quartiles, say:",
                 ),
                 (
                     two_heaps,
