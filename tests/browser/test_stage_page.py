@@ -50,6 +50,17 @@ def sharp(page, ratio):
         assert canvas.evaluate("node => node.width / node.clientWidth") == pytest.approx(ratio, abs=0.01)
 
 
+def test_a_body_one_can_look_through_is_drawn_where_there_is_a_shadow():
+    def covered(page):
+        return np.mean(np.reshape(at_rest(page, 0)[1][2], (-1, 4))[:, 3] > 10)
+
+    with stage_page(False, 700, 640, 1) as (page, bridge):
+        reach = opened(page, bridge).get_by_label("where the wrist can get")
+        before = covered(page)
+        reach.check()
+        assert covered(page) > before + 0.1
+
+
 def test_a_sharp_screen_shows_the_same_with_more_pixels():
     """In space, drawn several times over: the first picture, one turned to and fro; then in the plane."""
     seen, small = {}, {}

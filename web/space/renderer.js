@@ -325,6 +325,7 @@ export class Renderer {
     if (solids && solids.all > solids.full) {
       gl.useProgram(this.solid.program);
       gl.bindVertexArray(solids.vao);
+      setUniforms(this.solid, { parts: solids.table }); // the shadow's picture stands in the table's place
       gl.enable(gl.CULL_FACE);
       for (const side of [gl.FRONT, gl.BACK]) {
         gl.cullFace(side);
