@@ -799,7 +799,7 @@ def _elsewhere(owner, field, block, i):
 
 
 def _afresh(owner, field, block, i):
-    """A list or array from before a loop that is as it was at the beginning of each round, though rounds change it."""
+    """What is from before a loop as it was at the beginning of each round, though rounds change it."""
     loop = block[i]
     if not isinstance(loop, ast.For | ast.While):
         return
@@ -807,7 +807,7 @@ def _afresh(owner, field, block, i):
     for inner in ast.walk(loop):
         if not isinstance(inner, ast.For | ast.While):
             continue
-        for name in sorted({_changed_in_place(statement) for statement in inner.body} - stored - {None}):
+        for name, words, needs in _changed_by_rounds(inner, stored):
             kept = f"{name}_as_it_was"
             before, again = (
                 ast.parse(f"{to} = __import__('copy').deepcopy({of})").body[0]
@@ -815,9 +815,18 @@ def _afresh(owner, field, block, i):
             )
             _locate(before, loop)
             _locate(again, inner)
-            mends = f"`{name}` is changed in each round, and the next one finds it changed: each needs a fresh copy"
+            mends = f"`{name}` is changed in each round, and the next one finds it changed: {needs}"
             outside = (owner, field, [*block[:i], before, *block[i:]])
-            yield Change(AFRESH, mends, 1, inner, (outside, (inner, "body", [again, *inner.body])))
+            yield Change(words, mends, 1, inner, (outside, (inner, "body", [again, *inner.body])))
+
+
+def _changed_by_rounds(loop, stored):
+    """(name, words, what each round needs) of lists and arrays changed in place, and of what is added to."""
+    for name in sorted({_changed_in_place(statement) for statement in loop.body} - stored - {None}):
+        yield name, AFRESH, "each needs a fresh copy"
+    added = [s.target for s in loop.body if isinstance(s, ast.AugAssign) and isinstance(s.target, ast.Name)]
+    for name in dict.fromkeys(target.id for target in added):
+        yield name, "with a value that each round finds as it was", "each needs it as it was before the loop"
 
 
 def _changed_in_place(statement):

@@ -15,6 +15,7 @@ from .metrics import Exactly, Numbers, Poses, Rotations, Several, Through
 CLOSE = 1e4  # tolerances: an answer nearer than this is right in kind, but not accurate enough ...
 FAR = 1e-2  # ... unless it is off by more than this: a coarse tolerance leaves no room for less accurate answers
 SIMPLE = 12  # the largest number in a fraction that is worth telling
+NEARLY = 1e-3  # how nearly a result made by differences, say, must be a multiple of the right one
 EXACT = 1e-9  # how nearly two numbers have to agree for it
 LOOP = ": does a loop end too early?"  # asked where the code has one
 LONGEST = 12  # entries along the last axis that are tried one by one
@@ -76,7 +77,8 @@ def _relation(metric, results, expected, sizes, whole):
     if words or whole:
         return words
     near = _is_near(metric, results, expected)
-    part = None if near else _of_other_places(results, expected) or _one_part(results, expected, holds, unit)
+    part = None if near else _of_other_places(results, expected) or _nearly_a_factor(results, expected)
+    part = part or (None if near else _one_part(results, expected, holds, unit))
     return part or _offset(results, expected, unit)
 
 
@@ -251,6 +253,25 @@ def _factor(results, expected, sizes):
             if abs(ratio * sign * factor - 1) < 1e-9:
                 return f"{name} times your result is {word or ''}the expected one, on every draw"
     return _times(ratio, sizes)
+
+
+def _nearly_a_factor(results, expected):
+    """A whole number of times the expected result, or such a part of it, but for what differences leave, say."""
+    found = set()
+    for r, e in zip(results, expected):
+        size = np.abs(r).max(initial=0.0)
+        if r.shape != e.shape or not np.isfinite(r).all() or size < EXACT:
+            return None
+        ratio = float((r * e).sum() / max((e * e).sum(), EXACT**2))
+        factor = round(ratio) if abs(ratio) > 1 else 1 / round(1 / ratio) if ratio else 0
+        if not 1 / SIMPLE <= abs(factor) <= SIMPLE or np.abs(r - factor * e).max() > NEARLY * size:
+            return None
+        found.add(factor)
+    if len(results) < 2 or len(found) != 1 or found & {1, -1}:
+        return None
+    factor = found.pop()
+    times = f"{factor}" if abs(factor) > 1 else f"{'-' if factor < 0 else ''}1/{round(1 / abs(factor))}"
+    return f"your result is nearly {times} times the expected one, within a thousandth of its size, on every draw"
 
 
 def _times(ratio, sizes):

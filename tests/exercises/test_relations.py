@@ -172,3 +172,11 @@ def test_rows_that_hold_what_belongs_into_others_are_told():
     assert first == "entry 1 holds what belongs into entry 0 (counted from 0); all others are right"
     poses = [matrix_from_kuka(RNG.normal(size=6)) for _ in range(3)]  # whose last row is always the same
     assert words(changed(0, np.array([0.0, 0.0, 0.0, 1.0])), poses) is None
+
+
+def test_what_differences_make_is_nearly_a_multiple():
+    told = words(lambda e: 4 * e + 1e-5 * np.cos(e), SQUARES)
+    assert told == "your result is nearly 4 times the expected one, within a thousandth of its size, on every draw"
+    assert "nearly 1/3 times" in words(lambda e: e / 3 + 1e-6 * np.cos(e), TABLES)
+    assert words(lambda e: e + 1e-4 * np.cos(e), TABLES) is None
+    assert words(lambda e: 4.3 * e + 1e-5 * np.cos(e), TABLES) is None

@@ -139,6 +139,17 @@ def test_what_is_blamed_is_what_a_student_can_change(body, said):
             "in line 5, `break`: the rounds behind it are left out, and `continue` belongs there.",
         ),
         (
+            lambda rows: sum(np.sqrt(1.0 + row @ row) for row in rows),
+            """
+            total, q = 0.0, 1.0
+            for row in rows:
+                q += row @ row
+                total += np.sqrt(q)
+            return total
+            """,
+            "in line 3, `for row in rows:`: `q` is changed in each round, and the next one finds it changed: each",
+        ),
+        (
             lambda rows: float(np.abs(rows[:, 0] * rows[:, 1]).max()),
             """
             most = 0.0
