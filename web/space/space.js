@@ -17,7 +17,7 @@ const SCALES = [1, 0.75, 0.5];
 const AXIS_VIEWS = { x: [0, 0], y: [90, 0], z: [-90, 90] };
 const LETTER = 12; // CSS pixels
 const CROWDED = 0.85; // a picture narrower than so much of its designed width shrinks, letters too,
-const SMALLEST = 0.65; // here down to so much of their size
+const SMALLEST = 0.85; // here down to so much of their size, which a phone still shows: panels there stand under each other
 const EARLY = "200px"; // so near to the window a scene is drawn
 
 let renderer = null;
@@ -435,7 +435,7 @@ class Scene {
     paper.lineTo(x, y);
     paper.lineTo(x, y - 4);
     paper.stroke();
-    pen.write(`${Number(length.toPrecision(3))} ${this.unit}`, x - (length * pixels) / 2, y - 0.75 * size, { color: pen.ink, scale: 0.85 });
+    pen.write(`${Number(length.toPrecision(3))} ${this.unit}`, x - (length * pixels) / 2, y - 0.75 * size, { color: pen.ink, scale: 0.9 });
   }
 
   writeBase(pen, height, size) {
