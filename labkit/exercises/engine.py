@@ -30,6 +30,7 @@ BEFORE = "It was right before, on other draws: what is different about this one,
 NOT_RIGHT = "\nNot right when called as "
 MANY_DIGITS = 1e-3  # by how much better some draws come out where one case is special
 LIKE_CHANCE = 8  # draws on which a choice must stay as it is, so that this is not chance
+LISTED = 9  # entries of a wrong array of which those that are right are listed
 SHOWN = 4  # entries of a set or vector that is shown whole
 MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried, to tell on which
 MORE_CASES = 8  # on which an explanation from the first draws is tried once more, at least ...
@@ -1078,7 +1079,10 @@ class Value(Item):
         return quantities.quantity_words(float(answer), {name: data() for name, data in self.of.items()})
 
     def _which_way(self, answer, expected):
-        if np.ndim(expected) or not np.isfinite(answer):
+        if np.ndim(expected):
+            right = _right_entries(answer, expected)
+            return f"not this value{self._in_unit()}{right}: the hints lead on."
+        if not np.isfinite(answer):
             return f"not this value{self._in_unit()}: the hints lead on."
         size = "large" if abs(answer) > abs(expected) else "small"
         if answer * expected < 0:
@@ -1087,6 +1091,18 @@ class Value(Item):
 
     def _in_unit(self):
         return f" in {self.unit}" if self.unit else ""
+
+
+def _right_entries(answer, expected):
+    """Which entries of a wrong array are right, if some are, as a part of a sentence; zeros and ones tell nothing."""
+    answer, expected = np.asarray(answer, dtype=float), np.asarray(expected, dtype=float)
+    if answer.shape != expected.shape or expected.size > LISTED:
+        return ""
+    right = np.isclose(answer, expected, rtol=1e-4, atol=0.0)
+    told = [[int(i) for i in place] for place in np.argwhere(right & ~np.isin(expected, (0.0, 1.0)))]
+    if not told or right.all():
+        return ""
+    return f", though {', '.join(map(str, told))} (counted from 0) {'are' if len(told) > 1 else 'is'} right"
 
 
 def _of_shape(answer, expected):

@@ -379,21 +379,40 @@ def _offset(results, expected, unit):
 
 
 def ratio_words(answer, expected):
-    """What a wrong number has to do with the right one: a simple fraction of it, the root of one, what is left to 1."""
-    if np.ndim(expected) or not (np.isfinite(answer) and expected and answer):
+    """What a wrong number has to do with the right one: a simple fraction of it, the root of one, what is left to 1; of
+    an array, the one fraction that all its numbers are.
+    """
+    if np.ndim(expected):
+        fraction = _fraction(_common_ratio(np.asarray(answer, dtype=float), np.asarray(expected, dtype=float)))
+        return fraction and f"each of your numbers is {fraction} times the expected one"
+    if not (np.isfinite(answer) and expected and answer):
         return None
-    ratio = float(answer) / float(expected)
-    for power, form in ((1, "{}"), (2, "the root of {}")):
-        for n, m in itertools.product(range(1, SIMPLE + 1), repeat=2):
-            if np.gcd(n, m) == 1 and n != m and abs(abs(ratio) ** power * m / n - 1) < EXACT:
-                fraction = form.format(f"{n}/{m}" if m > 1 else n)
-                return f"your value is {'minus ' if ratio < 0 else ''}{fraction} times the expected one"
+    if fraction := _fraction(float(answer) / float(expected)):
+        return f"your value is {fraction} times the expected one"
     for whole, words in ((1.0, "1"), (np.pi, "pi"), (2 * np.pi, "2 pi"), (180.0, "180"), (360.0, "360")):
         if abs(answer + expected - whole) < EXACT * whole:
             return f"your value and the expected one make {words} together: it is what is left of {words}"
         if abs(abs(answer - expected) - whole) < EXACT * whole:
             return f"your value is too {'large' if answer > expected else 'small'} by {words}"
     return None
+
+
+def _fraction(ratio):
+    """A simple fraction, or the root of one, that a ratio is, in words; None where it is none."""
+    for power, form in ((1, "{}"), (2, "the root of {}")):
+        for n, m in itertools.product(range(1, SIMPLE + 1), repeat=2):
+            if np.gcd(n, m) == 1 and n != m and abs(abs(ratio) ** power * m / n - 1) < EXACT:
+                return ("minus " if ratio < 0 else "") + form.format(f"{n}/{m}" if m > 1 else n)
+    return None
+
+
+def _common_ratio(answer, expected):
+    """The ratio that all numbers of two arrays have; NaN where they have none, or where there is but one."""
+    some = expected != 0
+    if answer.shape != expected.shape or some.sum() < 2 or answer[~some].any():
+        return np.nan
+    ratio = answer[some] / expected[some]
+    return ratio[0] if np.allclose(ratio, ratio[0], rtol=EXACT, atol=0.0) else np.nan
 
 
 # Digits --------------------------------------------------------------------------------------------------------------

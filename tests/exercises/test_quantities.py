@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labkit.exercises import quantities
+from labkit.exercises import metrics, quantities
 from labkit.exercises.engine import CORRECT, NOT_YET, Value
 
 ROWS = np.random.default_rng(0).normal(size=(9, 3)) + 0.5
@@ -43,3 +43,10 @@ def test_a_value_says_what_a_wrong_answer_is():
     assert rms.judge(rms.reference()).status == CORRECT
     outcome = rms.judge(np.linalg.norm(ROWS, axis=1).mean())
     assert (outcome.status, outcome.text) == (NOT_YET, "this is the mean length of the rows of `residuals`.")
+
+
+def test_of_a_wrong_array_one_ratio_or_the_entries_that_are_right_are_told():
+    item = Value("v", reference=lambda: np.array([0.3, 0.0, 1.7, 2.4]), metric=metrics.Numbers(1e-6), hints="abc")
+    assert "each of your numbers is 5 times" in item.judge(np.array([1.5, 0.0, 8.5, 12.0])).text
+    assert ", though [0], [3] (counted from 0) are right" in item.judge(np.array([0.3, 0.2, 1.1, 2.4])).text
+    assert "though" not in item.judge(np.array([0.1, 0.0, 1.1, 2.0])).text

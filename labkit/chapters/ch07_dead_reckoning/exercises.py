@@ -349,6 +349,12 @@ def _slips_of_the_sum(step, angle):
     ]
 
 
+def _short_steps(x, u, dt, step, n):
+    for _ in range(n):
+        x = step(x, u, dt / n)
+    return x
+
+
 def _between_wrapped_headings(x, u, dt):
     after = wrap_angle(x[2] + u[1] * dt)
     return _straight(_way, lambda *given: (x[2] + after) / 2, _turn)(x, u, dt)
@@ -955,6 +961,14 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda x, u, dt: step_arc(x, u, dt) * [-1, 1, 1] + 2 * x * [1, 0, 0],
                     "y is right, x has the wrong sign: the center lies to the left of the heading for omega > 0.",
+                ),
+                *(
+                    Mistake(
+                        functools.partial(_short_steps, step=step, n=n),
+                        "Short straight steps come near the arc, but so few do not reach it: write down the arc itself, in one step.",
+                    )
+                    for step in (step_euler, step_midpoint)
+                    for n in (2, 4, 5, 10, 20, 50, 100)
                 ),
                 *_slips(_chord, _half, "theta + h")[:-1],  # the sign in y has its own text above
             ],
@@ -1633,6 +1647,10 @@ CHAPTER = Chapter(
                 "`return np.array([speed, speed * np.tan(steering) / wheelbase])`",
             ),
             mistakes=[
+                Mistake(
+                    lambda v, steering, L: np.array([v, L / np.tan(steering) if steering else np.inf]),
+                    "This is the radius of the circle. The turn rate is the speed divided by it.",
+                ),
                 Mistake(
                     lambda v, d, L: np.array([v, v * np.sin(d) / L]),
                     "With the sine, v would be the speed of the front wheel. It is that of the rear axle: the tangent.",

@@ -651,7 +651,12 @@ def _up_to_the_share(weights, threshold):
     return particles.effective_size(weights) <= threshold * len(weights)
 
 
+def _above_the_share(weights, threshold):
+    return particles.effective_size(weights) > threshold * len(weights)
+
+
 RESAMPLING_SLIPS = (
+    (_above_the_share, "The other way round: resample when the effective size is low."),
     (
         lambda w, t: not particles.should_resample(w, t),
         "The other way round: resample when the effective size is low.",
