@@ -126,7 +126,7 @@ class Written:
 
     def __init__(self, function, tree, lines=None, beside=()):
         self.function, self.beside, self.lines = function, [helper for helper, _ in beside], lines or {}
-        self.trees = [*(definition for _, definition in beside), tree]
+        self.trees = [tree, *(definition for _, definition in beside)]
         self.counted = STEPS
         self._noted, self.places = _noted(function, self.trees, self.lines)
         for tree in self.trees:
@@ -134,7 +134,7 @@ class Written:
 
     @functools.cached_property
     def _changes(self):
-        found = [c for tree in reversed(self.trees) for c in mutation.mending(tree) if c.mends]
+        found = [c for tree in self.trees for c in mutation.mending(tree) if c.mends]
         return sorted(found, key=lambda change: change.rank)[:MOST]
 
     @property

@@ -46,7 +46,12 @@ def test_a_value_says_what_a_wrong_answer_is():
 
 
 def test_of_a_wrong_array_one_ratio_or_the_entries_that_are_right_are_told():
-    item = Value("v", reference=lambda: np.array([0.3, 0.0, 1.7, 2.4]), metric=metrics.Numbers(1e-6), hints="abc")
+    item = Value(
+        "v",
+        reference=lambda: np.array([0.3, 0.0, 1.7, 2.4]),
+        metric=metrics.Numbers(1e-6),
+        hints=("a", "b", "c"),
+    )
     assert "each of your numbers is 5 times" in item.judge(np.array([1.5, 0.0, 8.5, 12.0])).text
-    assert ", though [0], [3] (counted from 0) are right" in item.judge(np.array([0.3, 0.2, 1.1, 2.4])).text
+    assert ", though [2] (counted from 0) is right" in item.judge(np.array([0.1, 0.0, 1.7, 2.9])).text
     assert "though" not in item.judge(np.array([0.1, 0.0, 1.1, 2.0])).text

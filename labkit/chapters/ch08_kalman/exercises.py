@@ -26,25 +26,27 @@ def vehicle_prediction(rng):
     return rng.normal(size=2) * 5, covariance(rng, 2), A, B, rng.uniform(1, 3, 1), covariance(rng, 1)
 
 
-def prediction(rng, n, k):
-    """The same of any system with n states and k controls."""
+def prediction(rng, n, k, sure=1.0):
+    """The same of any system with n states and k controls; sure: in what unit covariances are of the order of 1."""
     A, B = rng.normal(size=(n, n)), rng.normal(size=(n, k))
-    return rng.normal(size=n) * 5, covariance(rng, n), A, B, rng.normal(size=k) * 2, covariance(rng, k)
+    return rng.normal(size=n) * 5, covariance(rng, n, sure), A, B, rng.normal(size=k) * 2, covariance(rng, k, sure)
 
 
-def mixed_measurement(rng, n, m, off=1.0):
-    """State of n, and m numbers measured of mixtures of them; off: how far they are from those expected."""
+def mixed_measurement(rng, n, m, off=1.0, sure=1.0):
+    """State of n, and m numbers measured of mixtures of them; off: how far they are from those expected; sure: how
+    small the covariances are.
+    """
     x = rng.normal(size=n) * 3
     C = rng.normal(size=(m, n))
-    return x, covariance(rng, n), C @ x + off * rng.normal(size=m), C, covariance(rng, m, 0.5)
+    return x, covariance(rng, n, sure), C @ x + off * rng.normal(size=m), C, covariance(rng, m, 0.5 * sure)
 
 
-def measured_often(rng, n, m):
-    """What is known of a state, and several measurements of the same mixtures of it."""
+def measured_often(rng, n, m, sure=1.0):
+    """What is known of a state, and several measurements of the same mixtures of it; sure: how small covariances are."""
     x = rng.normal(size=n) * 3
-    C, cov_z = rng.normal(size=(m, n)), covariance(rng, m, 0.5)
+    C, cov_z = rng.normal(size=(m, n)), covariance(rng, m, 0.5 * sure)
     z = C @ x + rng.multivariate_normal(np.zeros(m), cov_z, int(rng.integers(3, 7)))
-    return x + rng.normal(size=n), covariance(rng, n), z, C, cov_z
+    return x + sure**0.5 * rng.normal(size=n), covariance(rng, n, sure), z, C, cov_z
 
 
 def one_position_two_sensors(rng):
@@ -128,13 +130,13 @@ def filter_step(rng, ahead=1, astray=0.2):
     return x, cov, u, dt, cov_u, z, landmark, covariance(rng, 2, 0.003)
 
 
-def estimate_and_truth(rng, side=1, astray=0.3, turns=0):
+def estimate_and_truth(rng, side=1, astray=0.3, turns=0, sure=0.05):
     """True and estimated pose whose headings lie on both sides of +-pi, and a covariance; errors up to `astray` m, and
     so many full turns that only the estimate has counted.
     """
     truth = np.array([*rng.uniform(-4, 4, 2), side * (np.pi - rng.uniform(0.02, 0.1))])
     off = rng.uniform(0.8, 1.0, 2) * astray * rng.choice([-1, 1], 2)
-    return truth, truth + [*off, side * (rng.uniform(0.15, 0.3) - 2 * np.pi * (1 + turns))], covariance(rng, 3, 0.05)
+    return truth, truth + [*off, side * (rng.uniform(0.15, 0.3) - 2 * np.pi * (1 + turns))], covariance(rng, 3, sure)
 
 
 def surprise(rng, wanted, along=None, std=(0.3, 1.5), measure=np.linalg.solve, limit=(4.0, 9.0)):
@@ -590,8 +592,8 @@ CHAPTER = Chapter(
             draw=(
                 vehicle_prediction,
                 functools.partial(prediction, n=3, k=2),
-                functools.partial(prediction, n=2, k=2),
-                functools.partial(prediction, n=4, k=1),
+                functools.partial(prediction, n=2, k=2, sure=1e-3),
+                functools.partial(prediction, n=4, k=1, sure=100.0),
             ),
             metric=STATE_AND_COV,
             hints=(
@@ -710,8 +712,14 @@ CHAPTER = Chapter(
             "update",
             reference=update,
             draw=tuple(
-                functools.partial(mixed_measurement, n=n, m=m, off=off)
-                for n, m, off in ((2, 2, 1.0), (3, 1, 0.01), (2, 3, 1.0), (3, 3, 0.01), (4, 2, 1.0))
+                functools.partial(mixed_measurement, n=n, m=m, off=off, sure=sure)
+                for n, m, off, sure in (
+                    (2, 2, 1.0, 1.0),
+                    (3, 1, 0.01, 1.0),
+                    (2, 3, 1.0, 1e-3),
+                    (3, 3, 0.01, 1.0),
+                    (4, 2, 1.0, 100.0),
+                )
             ),
             metric=STATE_AND_COV,
             hints=(
@@ -1842,7 +1850,7 @@ CHAPTER = Chapter(
             draw=(
                 *each_way(estimate_and_truth, "side"),
                 functools.partial(estimate_and_truth, astray=5.0),
-                functools.partial(estimate_and_truth, turns=2),
+                functools.partial(estimate_and_truth, turns=2, sure=5.0),
             ),
             draws=6,
             fixed={"truth": POSE, "x": POSE, "cov": POSE},
@@ -1860,6 +1868,10 @@ CHAPTER = Chapter(
                 Mistake(
                     _nees_of(lambda true, found: _turned_once(true - found)),
                     "Right within one full turn. A heading that has gathered several keeps the others: take the remainder, as wrap_angle does.",
+                ),
+                Mistake(
+                    _nees_of(lambda true, found: abs(wrapped(true - found))),
+                    "Your heading error has lost its sign, by an absolute value or an arccosine. The correlations need it.",
                 ),
                 Mistake(
                     _nees_of(lambda true, found: wrapped(true) - wrapped(found)),
@@ -2007,7 +2019,10 @@ CHAPTER = Chapter(
         Exercise(
             "batch_estimate",
             reference=batch_estimate,
-            draw=tuple(functools.partial(measured_often, n=n, m=m) for n, m in ((2, 1), (3, 2), (2, 2))),
+            draw=tuple(
+                functools.partial(measured_often, n=n, m=m, sure=sure)
+                for n, m, sure in ((2, 1, 1.0), (3, 2, 100.0), (2, 2, 1e-3))
+            ),
             metric=STATE_AND_COV,
             hints=(
                 "What is known before is one more measurement, of the state itself, with its own covariance.",

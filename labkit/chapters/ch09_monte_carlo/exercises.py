@@ -230,9 +230,12 @@ def cloud_and_threshold(rng, slip):
 
 
 def near_the_threshold(rng, side):
-    """Weights and a threshold that their effective size misses by 2 %, to this side."""
-    w = rng.uniform(0.2, 1.0, size=rng.integers(20, 40)) * 50 ** rng.uniform(-2, 1)
-    return w, float(particles.effective_size(w) / len(w) * (1 + 0.02 * side))
+    """Weights and a threshold that their effective size misses by 1 %, to this side, with no whole number between."""
+    while True:
+        w = rng.uniform(0.2, 1.0, size=rng.integers(20, 40)) * 50 ** rng.uniform(-2, 1)
+        size = particles.effective_size(w)
+        if min(size - np.floor(size), np.ceil(size) - size) > 0.012 * size:
+            return w, float(size / len(w) * (1 + 0.01 * side))
 
 
 def at_the_threshold(rng):
@@ -296,6 +299,10 @@ def _logarithm(total):
 
 DENSITIES = (
     (_no_half, "The factor one half in the exponent is missing."),
+    (
+        lambda x, std: _normal_log(x, np.sqrt(std)),
+        "You use std as if it were a variance: where a variance belongs, its square does.",
+    ),
     (_log_density(power=0.5), "The error is divided by std and then squared: std is squared with it."),
     (_log_density(exponent=1), "The error divided by std is to be squared."),
     (_log_density(sign=1), "The exponent is negative: a large error makes p small."),
@@ -1021,6 +1028,8 @@ def _other_spread(name, noise, wanted, std_u, dt, longer):
         return f"{told}. It is smaller by the root of 3, as uniform numbers up to std_u are: rng.standard_normal."
     if name != "aside" and abs(amount - dt * math.sqrt(std)) < 0.05 * amount:
         return f"{told}. That is what the root of std_u gives: std_u holds standard deviations, not variances."
+    if abs(amount / math.sqrt(2) - wanted) < 0.05 * wanted:
+        return f"{told}. It is larger by the root of 2, as if noise of this size came in twice."
     if name == "aside":
         return f"{told}. The noise of omega also bends the way: it belongs into the control, before the step."
     return f"{told}."
@@ -1922,7 +1931,16 @@ CHAPTER = Chapter(
                 "When the effective size is below the share `threshold` of the number of particles.",
                 "`return effective_size(weights) < threshold * len(weights)`",
             ),
-            mistakes=[Mistake(slip, text) for slip, text in RESAMPLING_SLIPS],
+            mistakes=[
+                *(Mistake(slip, text) for slip, text in RESAMPLING_SLIPS),
+                *(
+                    Mistake(
+                        lambda w, t, whole=whole: whole(particles.effective_size(w)) < t * len(w),
+                        "The effective size need not be a whole number: compare it as it comes out, without rounding.",
+                    )
+                    for whole in (np.floor, np.ceil, np.round)
+                ),
+            ],
             draws=36,
         ),
         Exercise(
