@@ -59,8 +59,14 @@ def landmarks_at_a_pose(rng, astray=0.0):
 
 
 def landmarks_from_a_wrong_room(rng):
-    """The same with ranges that are 12 m off: their density is zero in float64, its logarithm is not."""
-    return landmarks_at_a_pose(rng, astray=12.0)
+    """The same with ranges that are 18 m off: their density is zero in float64, its logarithm is not."""
+    return landmarks_at_a_pose(rng, astray=18.0)
+
+
+def landmarks_30_deviations_off(rng):
+    """The same with ranges so far off that only the product of their densities is zero in float64, none of them."""
+    pose, z, landmarks, std_range, std_bearing = landmarks_at_a_pose(rng)
+    return pose, z + [30.0 * std_range, 0.0], landmarks, std_range, std_bearing
 
 
 def beams_at_a_pose(rng, count=None):
@@ -71,9 +77,11 @@ def beams_at_a_pose(rng, count=None):
 
 
 def beams_from_a_wrong_pose(rng):
-    """The same with ranges that are 12 m off: the density of each is zero in float64, its logarithm is not."""
+    """The same with ranges that are 45 standard deviations off: the density of each is zero in float64, its logarithm
+    is not.
+    """
     ranges, expected, std = beams_at_a_pose(rng)
-    return ranges + 12.0 * rng.choice([-1, 1], len(ranges)), expected, std
+    return ranges + 45.0 * std * rng.choice([-1, 1], len(ranges)), expected, std
 
 
 def scan_by_a_sharp_sensor(rng):
@@ -1300,7 +1308,7 @@ CHAPTER = Chapter(
         Exercise(
             "landmark_weight",
             reference=landmark_weight,
-            draw=(landmarks_at_a_pose, landmarks_from_a_wrong_room),
+            draw=(landmarks_at_a_pose, landmarks_from_a_wrong_room, landmarks_30_deviations_off),
             fixed={"pose": POSE},
             metric=metrics.Numbers(1e-6),
             limit=IMPORTS,
@@ -1588,7 +1596,7 @@ CHAPTER = Chapter(
             metric=metrics.Numbers(1e-6),
             noisy=[
                 (whole_scan(beams_at_a_pose), metrics.Numbers(1e-6), "Right for few beams, but not for 541:"),
-                (beams_from_a_wrong_pose, metrics.Numbers(1e-6), "Right where the map fits, but not 12 m off:"),
+                (beams_from_a_wrong_pose, metrics.Numbers(1e-6), "Right where the map fits, but not far off:"),
             ],
             limit=IMPORTS,
             hints=(
