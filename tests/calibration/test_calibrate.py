@@ -1,5 +1,6 @@
 """Calibrations of one's own data: against the truth of simulated cells, and every refusal."""
 
+import dataclasses
 import json
 import re
 
@@ -282,6 +283,14 @@ def test_samples_that_share_their_errors_widen_the_covariance():
 
 
 # --- what is shown ---------------------------------------------------------------------------------------------------
+
+
+def test_each_point_is_printed_once():
+    one, two = np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 6.0])
+    found = calibrate.hand_eye(*cell()[:2], length_unit="mm")
+    for kind, points in (("sphere", {"center": one}), ("pivot", {"tip": one, "pivot": two})):
+        shown = repr(dataclasses.replace(found, kind=kind, points=points))
+        assert all(shown.count(f"\n  {name} ") == 1 for name in points), shown
 
 
 def test_results_print_themselves_and_fit_into_json():

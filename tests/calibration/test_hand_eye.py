@@ -559,3 +559,9 @@ def test_a_fit_that_runs_out_of_steps_says_so(room, monkeypatch):
     monkeypatch.setattr(hand_eye, "MAX_STEPS", 1)
     for robust in (False, True):
         assert not room.calibrate_sphere_target(T_BF, x_S, robust=robust).converged
+
+
+def test_the_right_angled_rotations_are_the_24_of_a_cube():
+    cube = {tuple(R.round().astype(int).ravel()) for R in Rotation.create_group("O").as_matrix()}
+    found = [tuple(R.astype(int).ravel()) for R in hand_eye.right_angled()]
+    assert len(found) == 24 and set(found) == cube

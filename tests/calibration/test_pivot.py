@@ -189,6 +189,15 @@ def test_the_robust_covariance_is_that_of_an_m_estimate():
     np.testing.assert_allclose(result.covariance, spread * np.linalg.inv(np.einsum("nki,nkj->ij", A, A)), rtol=1e-3)
 
 
+def test_robust_goes_on_until_no_weight_moves():
+    T, _ = with_outliers(measured(np.random.default_rng(5), 12, std_trans=1.0), np.random.default_rng(55), 0.3)
+    result = pivot.calibrate_pivot(T, robust=True)
+    d, w = np.linalg.norm(result.residuals, axis=1), result.weights
+    inner = (w > 0) & (w < 0.9)
+    cut = np.median(d[inner] / np.sqrt(1 - np.sqrt(w[inner])))
+    np.testing.assert_allclose(w, np.maximum(1 - (d / cut) ** 2, 0) ** 2, atol=1e-4)
+
+
 def test_robust_is_repeatable_and_takes_a_generator():
     T, _ = with_outliers(measured(np.random.default_rng(9), 40), np.random.default_rng(9), 0.2)
     first, second = (pivot.calibrate_pivot(T, robust=True) for _ in range(2))

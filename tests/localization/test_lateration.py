@@ -172,6 +172,15 @@ def test_the_search_stops_after_so_many_steps():
     assert away[0] < np.hypot(*(far - [3.0, 4.0]))
 
 
+def test_the_first_step_is_damped_by_a_thousandth_of_the_mean_diagonal():
+    d, far = distances(FOUR, [3.0, 4.0]), np.array([8.0, -6.0])
+    way = far - FOUR
+    J, e = way / np.linalg.norm(way, axis=1)[:, None], np.linalg.norm(way, axis=1) - d
+    N = J.T @ J
+    step = np.linalg.solve(N + 1e-3 * np.trace(N) / 2 * np.eye(2), J.T @ e)
+    np.testing.assert_allclose(lateration.laterate(FOUR, d, far, steps=1).position, far - step, rtol=1e-12)
+
+
 def test_the_first_intersection_lies_left_of_the_way_between_the_centers():
     """A 3-4-5 triangle over the base, and its mirror image under it; turned around when the centers are."""
     found = lateration.circle_intersections([[0.0, 0.0], [5.0, 0.0]], [3.0, 4.0])
