@@ -175,6 +175,8 @@ class Exercise(Item):
         for draw, metric, words in self._plan():
             if trial.spent > TOTAL_TIME and len(seen) > 1 and draw in seen:
                 continue
+            if words and trial.is_wrong():
+                break
             problem = trial.draw(draw(rng), metric, words)
             if problem:
                 return problem
@@ -247,6 +249,10 @@ class _Trial:
         if run.error is not None:
             return self._raised(run, ())
         return self.outcome(NOT_YET, str(run.result)) if run.result else None
+
+    def is_wrong(self):
+        """Whether a plain draw came out wrong: then special ones have nothing to tell."""
+        return bool(self.refusal) or self.exercise.metric is not None and not self._right_on_plain()
 
     def verdict(self):
         """Compare what came back with the references, then the named mistakes, then by the general layer."""

@@ -234,7 +234,21 @@ def _best_of(C, candidates, some):
     return int(some[np.argmin(own._volumes(C, candidates[some]))])
 
 
+def _one_digit_exponents(printed):
+    number, _, exponent = printed.replace(",", ".").partition("e")
+    power = int(exponent[-1]) * (-1 if exponent[0] == "-" else 1) if exponent else 0
+    return half_unit(number) * 10.0**power
+
+
 ALMOST_RIGHT = [
+    ("half_unit", _one_digit_exponents),
+    (
+        "half_unit",
+        lambda p: (
+            half_unit(p) if "e" not in p else half_unit(p.partition(",")[0].partition("e")[0] + p[p.index("e") :])
+        ),
+    ),
+    ("bound", lambda f, p: _up_or_down(f, p, at=lambda texts: [*enumerate(texts)][:4])),
     ("bound", lambda f, p: _up_or_down(f, p, half=_of_the_mantissa)),
     ("bound", lambda f, p: _up_or_down(f, p, at=lambda texts: [(texts.index(t), t) for t in texts])),
     ("bound", _of_whole_numbers),

@@ -1048,3 +1048,8 @@ def test_what_an_exercise_says_of_a_special_draw_leads_where_it_is_refused_or_ra
     item = replace(DOUBLE, noisy=(lambda rng: (rng.normal(size=1),), metrics.Numbers(1e-9), words))
     assert item.judge(lambda v: np.squeeze(2 * v)).text.startswith("Right for long vectors, but not for one entry: exp")
     assert "Right for long vectors, but not for one entry." in item.judge(lambda v: 2 * v + 0 * v[1]).text
+
+
+def test_a_special_draw_that_is_refused_is_not_told_while_plain_ones_are_wrong():
+    item = replace(DOUBLE, noisy=(lambda rng: (np.ones(1),), metrics.Numbers(1e-9), "right, but not for one entry:"))
+    assert item.judge(lambda v: 3 * v / (len(v) > 1)).text.startswith("your result is 1.5 times the expected one")

@@ -21,6 +21,9 @@ FORMS = (
     "dd.d",
     "dek",
     "d.dde-k",
+    "d,de-k",
+    "-d.de-1k",
+    "0.0d0",
 )  # d: any digit but 0, k: up to 5
 
 
@@ -599,7 +602,7 @@ CHAPTER = Chapter(
                     _of_the_value, "You took a share of the value. The unit of the last digit does not depend on it."
                 ),
             ],
-            draws=16,
+            draws=len(FORMS) + 4,
         ),
         BOUND,
         Exercise(

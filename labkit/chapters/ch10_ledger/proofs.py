@@ -65,14 +65,14 @@ INPUTS = tuple(functools.partial(printed_inputs, function=f) for f in FUNCTIONS)
 
 
 def special_inputs(rng, kind):
-    """A function and printed numbers that are "whole", with an "exponent", or of which one is printed "twice"."""
-    texts = [str(rng.integers(2, 30)) for _ in range(3)]
+    """A function and printed numbers: "whole", with an "exponent", one printed "twice", "one" alone, or "six"."""
+    texts = [str(rng.integers(2, 30)) for _ in range({"one": 1, "six": 6}.get(kind, 3))]
     if kind == "exponent":
         texts[1] = f"{rng.uniform(2, 9):.{rng.integers(0, 3)}f}e{rng.choice([-2, -1, 1, 2])}"
     elif kind == "twice":
         texts = [f"{rng.uniform(2, 9):.{rng.integers(1, 3)}f}" for _ in range(2)]
         texts.insert(int(rng.integers(0, 3)), texts[0])
-    return last_power, texts
+    return (length if kind in ("one", "six") else last_power), texts
 
 
 def bound(f, printed):
@@ -183,6 +183,8 @@ BOUND = Exercise(
             ("whole", "all numbers are whole"),
             ("exponent", "a number is printed with an exponent, as 3e-4"),
             ("twice", "one and the same number is printed twice"),
+            ("one", "f takes one number alone"),
+            ("six", "f takes more than four numbers"),
         )
     ],
     hints=(

@@ -188,7 +188,15 @@ def _sum_of_neighbors(T, k):
     return np.array([step[i : i + k].sum() for i in range(len(T) - k)])
 
 
+def _eigenvectors(R):
+    values, vectors = np.linalg.eig(R)
+    at = np.abs(values - 1).argmin(1)[:, None, None]
+    return np.take_along_axis(vectors, at, 2)[:, :, 0].real
+
+
 OTHER_AXES = (
+    (_between(_eigenvectors),
+     "An eigenvector is known up to its sign only. The axis of a motion has a direction, that about which its angle is positive: take the rotation vector."),
     (_between(lambda R: Rotation.from_matrix(R).as_quat()[:, :3]),
      "q and -q are the same turn: where the scalar part of a quaternion is negative, its vector part points against the axis. Turn its sign there, or take the rotation vector."),
     (_between(lambda R: Rotation.from_matrix(R).as_euler("xyz")),
