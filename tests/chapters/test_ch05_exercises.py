@@ -260,3 +260,9 @@ def test_the_last_explanation_of_a_row_is_not_the_most_credible():
 
     assert "explanations` puts that one first" in exercises._judge_ambiguous(last)
     assert exercises._judge_ambiguous(exercises.find_misprints) is None
+
+
+@pytest.mark.parametrize("name", ["robust_weights", "position_accuracy", "repeatability"])
+def test_even_and_odd_numbers_plane_and_space_are_drawn_in_turn(name):
+    shapes = [draw(np.random.default_rng(0))[-1].shape for draw in ITEMS[name].cases]
+    assert {n % 2 for n, _ in shapes} == {0, 1} if name == "robust_weights" else {d for _, d in shapes} == {2, 3}

@@ -109,15 +109,15 @@ def noisy_obtuse_triangle(rng):
     return *obtuse_triangle(rng), float(np.deg2rad(rng.uniform(0.01, 1.0)))
 
 
-def arrivals(rng):
+def arrivals(rng, d=3):
     """Where a robot was sent, and where it arrived, in the plane or in space."""
-    d, n = int(rng.integers(2, 4)), int(rng.integers(5, 40))
+    n = int(rng.integers(5, 40))
     command = rng.uniform(-500, 500, d)
     return command, command + rng.uniform(-3, 3, d) + rng.uniform(0.1, 1.0) * rng.normal(size=(n, d))
 
 
-def only_arrivals(rng):
-    return arrivals(rng)[1:]
+def only_arrivals(rng, d=3):
+    return arrivals(rng, d)[1:]
 
 
 # --- wrong variants ---
@@ -249,7 +249,7 @@ ACCURACY = [
     Exercise(
         "position_accuracy",
         reference=robot_accuracy.position_accuracy,
-        draw=arrivals,
+        draw=(arrivals, functools.partial(arrivals, d=2)),
         metric=metrics.Numbers(1e-9, "mm"),
         hints=(
             "First where the robot arrives on average, then how far that is from where it was sent.",
@@ -327,7 +327,7 @@ ACCURACY = [
     Exercise(
         "repeatability",
         reference=robot_accuracy.repeatability,
-        draw=only_arrivals,
+        draw=(only_arrivals, functools.partial(only_arrivals, d=2)),
         metric=metrics.Numbers(1e-9, "mm"),
         hints=(
             "Where the robot was sent does not matter here: compare the arrivals with their own mean.",

@@ -89,18 +89,18 @@ def smooth_function(rng):
     return (lambda x: np.sin(M @ x) + c * (x @ x)), rng.normal(size=n), float(rng.uniform(0.03, 0.08))
 
 
-def arc(rng, std=0.0):
+def arc(rng, std=0.0, side=1):
     """A scan line: points of a circle, 60 to 120 deg of it, more on one side of its lowest point than on the other."""
-    n, side = int(rng.integers(50, 90)), rng.choice([-1, 1])
+    n = int(rng.integers(50, 90))
     angle = side * np.linspace(-rng.uniform(0.25, 0.5), rng.uniform(0.8, 1.2), n)[::side]
     r = rng.uniform(20, 30) + std * rng.normal(size=n)
     return rng.uniform(-20, 20) + r * np.sin(angle), rng.uniform(200, 280) - r * np.cos(angle)
 
 
-def profile(rng, side):
-    """A scan line of a sphere of some radius whose center lies on this side of the scan plane."""
+def profile(rng, side, across):
+    """A scan line of a sphere of some radius whose center lies on this side of the scan plane, and across it, along x."""
     radius = float(rng.uniform(25, 35))
-    center = np.array([rng.uniform(4, 20) * rng.choice([-1, 1]), side * rng.uniform(6, 20), rng.uniform(200, 280)])
+    center = np.array([across * rng.uniform(4, 20), side * rng.uniform(6, 20), rng.uniform(200, 280)])
     return *sphere.scan_line(center, radius, rng.uniform(0.6, 1.0), int(rng.integers(40, 70))), radius, side
 
 
@@ -110,9 +110,9 @@ def increments(rng):
     return np.concatenate([rng.normal(size=3) * 0.2, rng.normal(size=3) * 10, target]), T_FS, T_BF, x_S
 
 
-def residuals_with_outliers(rng):
-    """Residual vectors of some twenty poses, four of them gross, and their odd-sized noise."""
-    n = int(rng.integers(18, 30))
+def residuals_with_outliers(rng, odd=0):
+    """Residual vectors of some twenty poses, an even or an odd number, four of them gross, and their odd-sized noise."""
+    n = 2 * int(rng.integers(9, 15)) + odd
     e = rng.uniform(0.1, 2.0) * rng.normal(size=(n, 3))
     e[rng.choice(n, 4, replace=False)] *= rng.uniform(5, 40, (4, 1))
     return (e,)
@@ -683,7 +683,7 @@ CHAPTER = Chapter(
         Exercise(
             "fit_circle",
             reference=fit_circle,
-            draw=arc,
+            draw=(arc, functools.partial(arc, side=-1)),
             metric=metrics.Several(metrics.Numbers(1e-6, "mm"), metrics.Numbers(1e-6, "mm"), metrics.Numbers(1e-6, "mm"),
                                    names=("center x", "center z", "radius")),
             noisy=5 * ((lambda rng: arc(rng, 0.01), metrics.Several(
@@ -727,7 +727,7 @@ CHAPTER = Chapter(
         Exercise(
             "sphere_center_from_profile",
             reference=sphere.sphere_center_from_profile,
-            draw=tuple(functools.partial(profile, side=side) for side in (-1, 1)),
+            draw=tuple(functools.partial(profile, side=side, across=x) for side, x in ((-1, 1), (1, 1), (-1, -1), (1, -1))),
             metric=metrics.Numbers(1e-6, "mm"),
             hints=(
                 "The scan line gives a circle in the plane y = 0; the center of the sphere lies straight before or behind its center.",
@@ -1069,7 +1069,7 @@ CHAPTER = Chapter(
         Exercise(
             "robust_weights",
             reference=robust_weights,
-            draw=residuals_with_outliers,
+            draw=(residuals_with_outliers, functools.partial(residuals_with_outliers, odd=1)),
             metric=metrics.Numbers(1e-3),  # the printed 1.538 is good enough
             hints=(
                 "First a scale that outliers cannot spoil, then a weight that falls to zero.",

@@ -61,9 +61,9 @@ def _scalar_first(data):
 # Kinematics ------------------------------------------------------------------------------------------------------------------
 
 
-def link(rng):
+def link(rng, signs):
     """Parameters of one link: rad, mm, mm, rad."""
-    return (*(rng.uniform((0.3, 50, 50, 0.3), (3, 300, 300, 1.5)) * rng.choice([-1, 1], 4)),)
+    return (*(rng.uniform((0.3, 50, 50, 0.3), (3, 300, 300, 1.5)) * signs),)
 
 
 def _entry_by_entry(th, d, a, al):
@@ -583,7 +583,10 @@ CHAPTER = Chapter(
         Exercise(
             "dh_matrix",
             reference=dh_matrix,
-            draw=link,
+            draw=tuple(
+                functools.partial(link, signs=s)
+                for s in ((1, 1, 1, -1), (-1, -1, 1, 1), (1, -1, -1, -1), (-1, 1, -1, 1))
+            ),
             metric=metrics.Poses(1e-6, 1e-6),
             hints=(
                 "Four elementary transforms in a row: turn about z, go along z, go along the new x, turn about the new x.",
