@@ -317,7 +317,8 @@ class Search:
         parts = [case.right_parts(result) for case, result in zip(self.cases, found)]
         if any(not set(before) <= set(after) for before, after in zip(right, parts)):
             return None
-        come = set.intersection(*map(set, parts)) - set.union(*map(set, right))
+        before = (set(were) for case, were in zip(self.cases, right) if not case.was_right)
+        come = set.intersection(*map(set, parts)).difference(*before)
         come = [part for part in parts[0] if part in come]
         if not come or len(come) > 4:
             return None
