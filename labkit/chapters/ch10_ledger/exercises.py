@@ -66,7 +66,11 @@ def special_comparison(rng, kind):
 
 
 SPECIAL = tuple(
-    (functools.partial(special_comparison, kind=kind), metrics.Exactly(), f"right otherwise, but not where {words}:")
+    (
+        functools.partial(special_comparison, kind=kind),
+        metrics.Exactly(),
+        f"right in ordinary cases, but not where {words}:",
+    )
     for kind, words in (
         ("sign", "the value has the other sign than the printed number"),
         ("edge", "the value is off by half a unit exactly: that is still within"),

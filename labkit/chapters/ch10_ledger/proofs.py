@@ -177,7 +177,7 @@ BOUND = Exercise(
         (
             functools.partial(special_inputs, kind=kind),
             metrics.Numbers(1e-9),
-            f"right otherwise, but not where {words}:",
+            f"right in ordinary cases, but not where {words}:",
         )
         for kind, words in (
             ("whole", "all numbers are whole"),

@@ -459,7 +459,7 @@ CHAPTER = Chapter(
                  "right for axes in all directions, but not for parallel and opposite ones, where a cosine may come out as 1.0000000000000002:"),
                 (one_pair, metrics.Numbers(1e-6, "rad"), "right for several pairs, but not where one pair alone is to be compared, which gives one angle in an array:"),
                 (motions_of_half_a_turn, metrics.Numbers(1e-6, "rad"),
-                 "right, but not for motions of nearly half a turn, where the sine of the angle, and R less its transpose with it, vanishes:"),
+                 "right in ordinary cases, but not for motions of nearly half a turn, where the sine of the angle, and R less its transpose with it, vanishes:"),
             ],
             hints=(
                 "The rotation vector of a motion points along its axis. Its length is the angle, which should not matter here.",
@@ -710,7 +710,7 @@ CHAPTER = Chapter(
             noisy=[
                 (functools.partial(best_at, place=0), metrics.Exactly(), "right where the best candidate is not the first, but not where it is:"),
                 (functools.partial(best_at, place=-1), metrics.Exactly(), "right where the best candidate is not the last, but not where it is:"),
-                (few_candidates, metrics.Exactly(), "right, but not where there are fewer candidates than parameters, each of more numbers than these:"),
+                (few_candidates, metrics.Exactly(), "right in ordinary cases, but not where there are fewer candidates than parameters, each of more numbers than these:"),
             ],
             hints=(
                 "Compute what each candidate would leave, and compare one number of it.",
