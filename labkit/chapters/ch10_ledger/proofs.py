@@ -849,7 +849,8 @@ SUSPECTS = Exercise(
         ),
         Mistake(
             _first_half_as_printed,
-            "You allow the first entry's half unit for all. Each has its own: what they allow together is their mean.",
+            "You allow the half unit of the first entry as it is printed. Each has its own: what they allow together "
+            "is their mean.",
         ),
         *(
             Mistake(
