@@ -26,7 +26,7 @@ from labkit.localization.drives import find_route, follow
 from labkit.localization.ekf import unscented_predict, unscented_update
 from labkit.localization.locate import locate, place_readings
 from labkit.localization.sensors import LikelihoodField, Scanner, beam_density, see_landmarks, weigh_doors
-from labkit.machines import robot_accuracy, simulation, stations, triangulation, udp
+from labkit.machines import cell, robot_accuracy, simulation, stations, triangulation, udp
 from labkit.machines.arm import (
     HOME,
     TX40,
@@ -46,7 +46,7 @@ from labkit.machines.packet import encode_packet, packet_from_pose
 from labkit.machines.tracking import filter_positions, shift_time, speeds, summarize, time_offset, tracking_errors
 from labkit.machines.triangulation import place_from_angles
 
-I3, I4, O2, O3 = np.eye(3), np.eye(4), np.zeros(2), np.zeros(3)
+I2, I3, I4, O2, O3 = np.eye(2), np.eye(3), np.eye(4), np.zeros(2), np.zeros(3)
 ON_X = np.array([[1.0, 0.0], [2.0, 0.0]])
 POSES = np.tile(I4, (5, 1, 1))
 HOME, ARM = HOME, TX40
@@ -293,6 +293,18 @@ REFUSED = [
     (lambda: particles.uniform_states(GRID, -1, rng()), "n_particles must be a whole number"),
     (lambda: mcl.localizer(GRID, np.add, -2000.0, rng(), start=O3), "n_particles must be a whole number, at least 1"),
     (lambda: tool_pose(TX40, np.zeros((3, 6)), np.tile(I4, (2, 1, 1))), r"\(3,\) of q, \(2,\) of T_FE"),
+    (lambda: kalman.predict(O2, I2, I2, np.ones((2, 2, 1)), np.ones((3, 1))), r"\(2,\) of B, \(3,\) of u"),
+    (
+        lambda: kalman.predict(O2, I2, I2, cov_v=np.ones((3, 1, 1)) * I2, B=np.ones((2, 2, 1)), cov_u=[[1.0]]),
+        "of cov_v",
+    ),
+    (lambda: cell.moved_part(POSES, POSES[:2], I4, I4), r"\(5,\) of T_BW, \(2,\) of T_WE0"),
+    (lambda: stations.tilted(POSES, np.zeros((2, 3))), r"\(5,\) of T_WL, \(2,\) of rotation_and_shift"),
+    (lambda: odometry.control_covariance(np.ones((3, 2)), np.ones(2), 0.1, 0.1, 0.1), r"\(3,\) of u, \(2,\) of dt"),
+    (
+        lambda: odometry.noisy_controls(np.ones((3, 2)), 1.0, 0, 0, 0, rng(), 10**7),
+        "number of controls of all runs must",
+    ),
     (lambda: reach_position(TX40, O3, np.zeros(6), iterations=10**12), r"iterations must be at most 1e\+07"),
     (lambda: triangulation.height_derivatives(1e-200, 1.4, 100.0), "squared sine of an angle must be"),
     (lambda: ekf.ekf_update(O3, 1e40 * I3, ON_X, ON_X, 0.1, 0.1), "the innovation must be positive definite"),

@@ -158,12 +158,20 @@ def _driven(n, B, u, cov_u, cov_v):
         if B.shape[-2:] != (n, k) or not k:
             raise ValueError(f"B must have shape (..., {n}, k), got {B.shape}")
         if u is not None:
-            push = _apply(B, as_points(u, "u", k))
+            u = as_points(u, "u", k)
+            fit_together(B=B.shape[:-2], u=u.shape[:-1])
+            push = _apply(B, u)
         if cov_u is not None:
-            spread = B @ as_covariances(cov_u, "cov_u", k) @ _t(B)
+            cov_u = as_covariances(cov_u, "cov_u", k)
+            fit_together(B=B.shape[:-2], cov_u=cov_u.shape[:-2])
+            spread = B @ cov_u @ _t(B)
     elif u is not None or cov_u is not None:
         raise ValueError("u and cov_u act through B, but B is missing")
-    return push, spread if cov_v is None else spread + as_covariances(cov_v, "cov_v", n)
+    if cov_v is not None:
+        cov_v = as_covariances(cov_v, "cov_v", n)
+        fit_together(B_and_cov_u=np.shape(spread)[:-2], cov_v=cov_v.shape[:-2])
+        spread = spread + cov_v
+    return push, spread
 
 
 def _predicted(x, cov, A, push, spread):

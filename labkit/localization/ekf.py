@@ -137,7 +137,8 @@ def _stacked(z, predicted, wrap):
     y = np.where(seen, z - predicted, 0.0)
     if as_truth(wrap, "wrap"):
         y[..., 1] = wrap_angle(y[..., 1])
-    return y.reshape(*y.shape[:-2], -1), seen.reshape(*seen.shape[:-2], -1)
+    shape = (*y.shape[:-2], 2 * y.shape[-2])
+    return y.reshape(shape), seen.reshape(shape)
 
 
 def ekf_update(x, cov, z, landmarks, std_range, std_bearing, iterations=1, wrap=True):
@@ -179,7 +180,7 @@ def ekf_update(x, cov, z, landmarks, std_range, std_bearing, iterations=1, wrap=
     x = prior
     for _ in range(as_size(iterations, "iterations")):
         H = measurement_jacobian(x, landmarks)
-        H = H.reshape(*H.shape[:-3], -1, 3)
+        H = H.reshape(*H.shape[:-3], 2 * H.shape[-3], 3)
         y, seen = _stacked(z, measurement(x, landmarks), wrap)
         H = np.where(seen[..., None], H, 0.0)
         R = np.tile(std**2, H.shape[-2] // 2) * np.eye(H.shape[-2])
@@ -211,7 +212,9 @@ def ekf_step(
     """
     x, cov = odometry.propagate(x, cov, u, dt, cov_u, model)
     if cov_v is not None:
-        cov = cov + as_covariances(cov_v, "cov_v", 3)
+        cov_v = as_covariances(cov_v, "cov_v", 3)
+        fit_together(cov=cov.shape[:-2], cov_v=cov_v.shape[:-2])
+        cov = cov + cov_v
     return ekf_update(x, cov, z, landmarks, std_range, std_bearing, iterations, wrap)
 
 

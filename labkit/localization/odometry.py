@@ -250,6 +250,7 @@ def control_covariance(u, dt, k_d, k_theta, k_drift):
     for name, value in (("k_d", k_d), ("k_theta", k_theta), ("k_drift", k_drift)):
         if as_number(value, name) < 0:
             raise ValueError(f"{name} must not be negative (it is a variance per way), got {shown(value)}")
+    fit_together(u=u.shape[:-1], dt=dt.shape)
     v, omega = np.abs(u[..., 0]), np.abs(u[..., 1])
     var_v, var_omega = np.broadcast_arrays(k_d * v / dt, (k_theta * omega + k_drift * v) / dt)
     cov = np.zeros((*var_v.shape, 2, 2))
@@ -362,6 +363,7 @@ def noisy_controls(controls, dt, k_d, k_theta, k_drift, rng, runs):
     controls : array, shape (n, runs, 2)
     """
     controls, runs = as_shape(controls, "controls", "n", 2), as_size(runs, "runs")
+    as_size(len(controls) * runs, "the number of controls of all runs", at_least=0)
     cov_u = control_covariance(controls, as_positive_number(dt, "dt"), k_d, k_theta, k_drift)
     std = np.sqrt(np.diagonal(cov_u, axis1=-2, axis2=-1))
     return controls[:, None, :] + std[:, None, :] * as_generator(rng).standard_normal((len(controls), runs, 2))

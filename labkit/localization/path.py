@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import as_covariances, as_positive_number, as_shape
+from ..checks import as_covariances, as_indices, as_positive_number, as_shape
 from ..documented import documented
 from ..estimation.gaussian import chi_square_quantile
 from . import odometry
@@ -59,6 +59,7 @@ class Log:
         ----------
         first, last : int
         """
+        first, last = as_indices([first, last], "first and last").tolist()
         inside = (self.row >= first) & (self.row < last)
         part = self.readings(inside)
         return Log(

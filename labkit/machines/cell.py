@@ -21,7 +21,7 @@ from ..calibration.ax_xb import calibrate_hand_eye
 from ..calibration.hand_eye import calibrate_sphere_target, sphere_in_scanner
 from ..calibration.pivot import calibrate_pivot, cone, touching_poses
 from ..calibration.planning import DOWN, pattern, poses_that_see
-from ..checks import as_choice, as_count, as_points, as_shape, as_size
+from ..checks import as_choice, as_count, as_points, as_shape, as_size, fit_together
 from ..documented import documented
 from ..geometry.frames import frame_from_points, invert, moved, pose, transform
 from ..geometry.lie import exp_so3
@@ -173,6 +173,7 @@ def moved_part(T_BW, T_WE0, T_WE1, T_BP0):
     -------
     T_BP : array, shape (..., 4, 4)
     """
+    fit_together(T_BW=T_BW.shape[:-2], T_WE0=T_WE0.shape[:-2], T_WE1=T_WE1.shape[:-2], T_BP0=T_BP0.shape[:-2])
     T_BE0, T_BE1 = T_BW @ T_WE0, T_BW @ T_WE1
     return T_BE1 @ invert(T_BE0) @ T_BP0
 

@@ -48,7 +48,10 @@ class SensorCell:
         -------
         T_ST : array, shape (n, 4, 4)
         """
-        seen, n = invert(T_BF @ (self.T_FS if T_FS is None else T_FS)) @ self.T_BT, len(T_BF)
+        n, T_FS = len(T_BF), self.T_FS if T_FS is None else T_FS
+        if T_FS.shape not in ((4, 4), T_BF.shape):
+            raise ValueError(f"T_FS must have shape (4, 4) or {T_BF.shape}, as T_BF, got {T_FS.shape}")
+        seen = invert(T_BF @ T_FS) @ self.T_BT
         if not std:
             return seen
         rng = as_generator(rng)

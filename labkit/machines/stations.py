@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from ..calibration.result import Result, pose_parameters, result_class
-from ..checks import as_finite, as_points, as_positive_number, as_shape, as_transforms, shown
+from ..checks import as_finite, as_points, as_positive_number, as_shape, as_transforms, fit_together, shown
 from ..documented import documented
 from ..geometry.frames import invert, moved, pose, transform, unit_vector
 from ..geometry.lie import exp_so3, skew
@@ -412,7 +412,9 @@ def tilted(T_WL, rotation, shift=(0.0, 0.0, 0.0)):
     -------
     T_WL : array, shape (..., 4, 4)
     """
-    return as_transforms(T_WL, "T_WL") @ pose(exp_so3(rotation), as_points(shift, "shift"))
+    T_WL, turned = as_transforms(T_WL, "T_WL"), pose(exp_so3(rotation), as_points(shift, "shift"))
+    fit_together(T_WL=T_WL.shape[:-2], rotation_and_shift=turned.shape[:-2])
+    return T_WL @ turned
 
 
 def last_turned(T_WL, turns):
