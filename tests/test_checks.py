@@ -305,6 +305,8 @@ REFUSED = [
         lambda: odometry.noisy_controls(np.ones((3, 2)), 1.0, 0, 0, 0, rng(), 10**7),
         "number of controls of all runs must",
     ),
+    (lambda: ekf.associate(O3, np.tile(I3, (4, 1, 1)), ON_X, ON_X, 0.1, 0.1), r"cov must have shape \(3, 3\)"),
+    (lambda: planning.unseen_changes(np.zeros((0, 4, 4)), I4, O3), "number of poses must be"),
     (lambda: reach_position(TX40, O3, np.zeros(6), iterations=10**12), r"iterations must be at most 1e\+07"),
     (lambda: triangulation.height_derivatives(1e-200, 1.4, 100.0), "squared sine of an angle must be"),
     (lambda: ekf.ekf_update(O3, 1e40 * I3, ON_X, ON_X, 0.1, 0.1), "the innovation must be positive definite"),

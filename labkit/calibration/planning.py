@@ -133,6 +133,7 @@ def unseen_changes(T_BF, T_FS, target, tolerance=1e-3):
     predicted_sphere_covariance : how well the poses determine what they see.
     """
     x_S = sphere_in_scanner(T_BF, T_FS, target)
+    as_count(len(x_S), "the number of poses")
     distance = math.sqrt((x_S**2).sum(-1).mean())
     scale = np.array([1 / distance] * 3 + [1.0] * 6)
     _, values, Vt = np.linalg.svd(joint_jacobian(T_BF, x_S, T_FS) * scale, full_matrices=False)

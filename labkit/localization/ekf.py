@@ -389,7 +389,7 @@ def unscented_update(x, cov, z, landmarks, std_range, std_bearing):
     marks = np.asarray(landmarks, dtype=float)
     h = measurement(points, marks[..., None, :, :] if marks.ndim > 2 else marks) - center[..., None, :, :]
     h[..., 1] = wrap_angle(h[..., 1])
-    h = h.reshape(*h.shape[:-2], -1)
+    h = h.reshape(*h.shape[:-2], 2 * h.shape[-2])
     mean = weights @ h
     y, seen = _stacked(z, center, True)
     y = np.where(seen, y - mean, 0.0)
@@ -441,7 +441,8 @@ def associate(x, cov, z, landmarks, std_range, std_bearing, by="mahalanobis", pr
     predicted, H = measurement(x, landmarks), measurement_jacobian(x, landmarks)
     y = z[:, None, :] - predicted[None, :, :]
     y[..., 1] = wrap_angle(y[..., 1])
-    S = H @ as_covariances(cov, "cov", 3) @ _t(H) + np.diag([std_range**2, std_bearing**2])
+    cov = as_shape(as_covariances(cov, "cov", 3), "cov", 3, 3)
+    S = H @ cov @ _t(H) + np.diag([std_range**2, std_bearing**2])
     distance = nis(y, S)
     if by == "nearest":
         points = x[:2] + z[:, :1] * np.stack([np.cos(x[2] + z[:, 1]), np.sin(x[2] + z[:, 1])], axis=-1)
