@@ -498,7 +498,9 @@ def simulate_drive(x0, controls, dt, cov_u, landmarks, std_range, std_bearing, r
     truth = odometry.drive(np.broadcast_to(x0, (runs, 3)), real, dt, model)
     z = measurement(truth[1:], landmarks)
     far = z[..., 0] > reach
-    z += rng.standard_normal(z.shape) * [std_range, std_bearing]
+    noise = rng.standard_normal(z.shape)
+    noise *= [std_range, std_bearing]
+    z += noise
     z[..., 1] = wrap_angle(z[..., 1])
     z[far] = np.nan
     return SimulatedRuns(truth, controls, z)

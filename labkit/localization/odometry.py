@@ -366,7 +366,10 @@ def noisy_controls(controls, dt, k_d, k_theta, k_drift, rng, runs):
     as_size(len(controls) * runs, "the number of controls of all runs", at_least=0)
     cov_u = control_covariance(controls, as_positive_number(dt, "dt"), k_d, k_theta, k_drift)
     std = np.sqrt(np.diagonal(cov_u, axis1=-2, axis2=-1))
-    return controls[:, None, :] + std[:, None, :] * as_generator(rng).standard_normal((len(controls), runs, 2))
+    noisy = as_generator(rng).standard_normal((len(controls), runs, 2))
+    noisy *= std[:, None, :]  # in place: ten thousand robots make arrays of megabytes, which a kernel would keep
+    noisy += controls[:, None, :]
+    return noisy
 
 
 def sample_drives(x0, controls, dt, k_d, k_theta, k_drift, rng, runs, model="midpoint"):

@@ -235,7 +235,7 @@ def outcome_of(name, function, arguments, records):
         except Hang:
             outcome, more = "hang", f"more than {SECONDS:g} s"
         except (Exception, SystemExit) as error:
-            outcome, more = _kind_of(error), f"{type(error).__name__}: {error}"
+            outcome, more = _kind_of(error, arguments), f"{type(error).__name__}: {error}"
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0)
     if outcome == "NaN or inf" and says_nan(function, type(result)):
@@ -285,8 +285,14 @@ def first_not_finite(value, path, depth=0):
     return next((found for key, item in items if (found := first_not_finite(item, f"{path}.{key}", depth + 1))), "")
 
 
-def _kind_of(error):
+def _kind_of(error, arguments):
     """Whether an error is a sentence of labkit's own, of the caller's function, or foreign."""
+    handed = [
+        f for _, f in functions_in(arguments) if not getattr(f, "__module__", None) or "labkit" not in f.__module__
+    ]
+    codes = {getattr(inspect.unwrap(function), "__code__", None) for function in handed}
+    if any(frame.f_code in codes for frame, _ in traceback.walk_tb(error.__traceback__)):
+        return "caller's function"
     frames = [f for f in traceback.extract_tb(error.__traceback__) if "/bench/fuzz" not in f.filename]
     if any(f.filename.startswith(str(ROOT / "tests")) for f in frames):
         return "caller's function"
