@@ -187,17 +187,18 @@ def test_without_webgl_a_scene_stays_a_picture_that_says_why(page, book):
     assert found.locator("img").is_visible() and not found.locator(".labkit-stage").count()
 
 
-def test_paper_is_light_and_has_the_pictures_where_the_screen_is_dark(book):
+def test_paper_is_light_and_has_the_pictures_where_the_screen_is_dark(page, book):
     colors = """() => ["pre.code", "body"].flatMap((name) => {
         const { color, backgroundColor } = getComputedStyle(document.querySelector(name));
         return [color, backgroundColor].map((words) => words.match(/\\d+/g).map(Number));
     })"""
-    with driver.page_of(driver.find_browser(), dark=True) as page:
-        page.goto((book / f"{STEM}.html").as_uri())
-        moving = figure(page, "circles")
-        assert page.evaluate(colors)[3][0] < 30
-        page.emulate_media(media="print")
-        ink, wash, words, paper = page.evaluate(colors)
-        assert max(ink[:3] + words[:3]) < 60 and min(wash[:3] + paper[:3]) > 230
-        assert moving.locator("> img").is_visible() and not moving.locator(".labkit-stage").is_visible()
-        assert moving.locator(".still").is_visible()
+    dark = page.context.browser.new_page(color_scheme="dark")
+    dark.goto((book / f"{STEM}.html").as_uri())
+    moving = figure(dark, "circles")
+    assert dark.evaluate(colors)[3][0] < 30
+    dark.emulate_media(media="print")
+    ink, wash, words, paper = dark.evaluate(colors)
+    assert max(ink[:3] + words[:3]) < 60 and min(wash[:3] + paper[:3]) > 230
+    assert moving.locator("> img").is_visible() and not moving.locator(".labkit-stage").is_visible()
+    assert moving.locator(".still").is_visible()
+    dark.close()
