@@ -413,6 +413,15 @@ def _all_explanations(entries):
     return {SUBSTITUTES.get(entry, entry) for entry in named}
 
 
+def _first_alone(entries):
+    return {min(find_misprints(entries), key=lambda entry: entry[1])}
+
+
+def _worst_alone(entries):
+    slips = max((s for s in misprints.find(entries).values() if s), key=lambda s: s[0].before)
+    return {(slips[0].table, slips[0].pose, slips[0].column)}
+
+
 def _only_the_grossest(entries):
     found = misprints.find(entries)
     return {(s[0].table, s[0].pose, s[0].column) for s in found.values() if s and s[0].before > 30}
@@ -1145,6 +1154,8 @@ CHAPTER = Chapter(
                 Mistake(lambda entries: {(r["table"], r["pose"], r["column"]) for r in thesis.corrections()},
                         "These are the seven of the printed tables. The check plants slips of its own: search the `entries` you are given."),
                 Mistake(lambda entries: {(table, pose - 1, column) for table, pose, column in find_misprints(entries)}, "Your poses are one too low: they count from 1, arrays from 0."),
+                Mistake(_first_alone, "You name one misprint, that of the first suspicious row. Does `return` stand inside the loop?", id="find_misprints-first"),
+                Mistake(_worst_alone, "You name one misprint, that of the row with the largest residual. Every row that stands out has one.", id="find_misprints-worst"),
                 Mistake(_only_the_grossest, "You named the grossest ones only. After the robust fit 9 mm and even 3 mm stand out as clearly."),
             ],
         ),
