@@ -27,6 +27,7 @@ SCALED = re.compile(  # of a choice, which does not depend on how large all is t
     "half of it|twice as much|a thousand|it belongs there in|its (square|root|reciprocal|log|exp|sine|tangent)"
     "|it is to be (multiplied|divided) by"
 )
+CURVED = re.compile("its (log|exp|sine|tangent)")  # of a word or a set: the tangent of what is small is a little more
 COUNT = re.compile(r"^len\([^()]*\)$|\.shape\[-?\d\]$|\.size$")  # of which no half, root or sine is meant
 CHANCE = 1000  # one case of so many may be chance
 BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with a number
@@ -122,7 +123,8 @@ class Search:
         self.cases = sorted(cases, key=lambda case: case.was_right)
         self.results = [None if case.result is None else rerun.numeric(case.result) for case in self.cases]
         self.values = _traces(written, self.cases, budget)
-        self.chosen = all(isinstance(c.metric, metrics.Exactly) and type(c.expected) is int for c in self.cases)
+        self.exactly = all(isinstance(c.metric, metrics.Exactly) for c in self.cases)
+        self.chosen = self.exactly and all(type(c.expected) is int for c in self.cases)
         self.turns = any(map(ANGLES.search, [written.function.__doc__ or "", *written.lines.values()]))
 
     @_or_nothing
@@ -181,7 +183,9 @@ class Search:
         """Whether a change is about something that the function has to do with: degrees are of angles alone, and how
         large a number is matters little where one of several is chosen.
         """
-        return (self.turns or not mends.endswith(("radians", "degrees"))) and not (self.chosen and SCALED.match(mends))
+        if self.chosen and SCALED.match(mends) or self.exactly and CURVED.match(mends):
+            return False
+        return self.turns or not mends.endswith(("radians", "degrees"))
 
     def _moves_a_bound(self, line, code, mends):
         """Whether a change only turns what is compared with a number: another number would do as well. Nor is a number

@@ -296,3 +296,8 @@ def test_a_special_case_is_told_before_what_is_wrong_with_the_shape_of_its_resul
 def test_rules_that_choose_alike_by_chance_are_told_apart():
     text = "def next_pose(C, c):\n    return int(np.argmax(np.linalg.det(C + c.swapaxes(1, 2) @ c)))"
     assert "largest derivative" not in told_of(own, "next_pose", text)
+
+
+def test_no_tangent_is_told_where_a_comparison_is_too_strict():
+    told = told_of(ledger, "status", STATUS.replace("off <= half:", "off < half:"))
+    assert "tangent" not in told and "exactly: that is still within" in told or "`<` stands where `<=`" in told
