@@ -22,7 +22,7 @@ BATCH = 120  # changes that are tried at once
 ENTRIES = 8  # of a result that are looked at one by one
 ROWS = 4  # of a value that are looked at one by one
 NAMED = 4  # values that are told to be right, at most
-ANGLES = re.compile(r"rad|deg|angle|turn|rot|axis|axes|theta|phi|psi|sin|cos|tan|pose|frame", re.IGNORECASE)
+ANGLES = re.compile(r"rad|deg|angle|(?<!re)turn|rot|axis|axes|theta|phi|psi|sin|cos|tan|pose|frame", re.IGNORECASE)
 SCALED = re.compile(  # of a choice, which does not depend on how large all is that is compared
     "half of it|twice as much|a thousand|it belongs there in|its (square|root|reciprocal|log|exp|sine|tangent)"
     "|it is to be (multiplied|divided) by"

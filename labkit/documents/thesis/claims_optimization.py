@@ -470,7 +470,7 @@ def farthest_gauss_newton():
         value,
         bound=spread,
         simulated=True,
-        proof=f"With the residuals of `wells.residual`, full steps fail from (4.3, 4.3) and reach the minima from at "
+        proof=f"With the residuals that chapter 4 takes, full steps fail from (4.3, 4.3) and reach the minima from at "
         f"most {reach['gauss_newton'][0]:g} and {reach['gauss_newton'][1]:g} on the diagonal; damped "
         f"(Levenberg-Marquardt) they reach them up to {reach['levenberg_marquardt'][0]:g} and "
         f"{reach['levenberg_marquardt'][1]:g}; the search ends at 100. Residuals and damping of the thesis are not "
