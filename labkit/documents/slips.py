@@ -1,5 +1,6 @@
 """Which single slip would explain it? A misprint is proved by trying all, on every printed thing that takes part."""
 
+import functools
 from collections.abc import Mapping
 
 SLIPS = (
@@ -19,6 +20,11 @@ def single_slips(text):
     >>> single_slips("12")["21"]
     'two digits swapped'
     """
+    return dict(_single_slips(text))
+
+
+@functools.lru_cache(maxsize=1024)  # a search asks for the same printed numbers again and again
+def _single_slips(text):
     sign, body = ("-", text[1:]) if text.startswith("-") else ("", text)
     if not body.replace(".", "", 1).isdigit():
         raise ValueError(f"text must be a plain decimal number, got {text!r}")

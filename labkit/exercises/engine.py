@@ -20,6 +20,7 @@ import numpy as np
 
 from . import arguments, cases, guard, metrics, operands, quantities, regions, relations, rerun, scope, shapes, slips
 from . import steps as own_steps
+from .again import Again
 from .budget import Budget, seconds
 from .typeset import typeset
 
@@ -148,6 +149,19 @@ class Exercise(Item):
     def cases(self):
         """The draws that take turns."""
         return self.draw if isinstance(self.draw, tuple) else (self.draw,)
+
+    @functools.cached_property
+    def plain_again(self):
+        """Plain draws that are the same at every check."""
+        return Again(((draw, self.metric) for draw in itertools.cycle(self.cases)), self.reference)
+
+    @functools.cached_property
+    def all_again(self):
+        """Draws that are the same at every check, the special ones among the first."""
+        plain = [(draw, self.metric) for draw in self.cases]
+        special = [(draw, metric) for draw, metric, *_ in self.noisy]
+        first = [*itertools.islice(itertools.cycle(plain), MORE_CASES), *special, *special]
+        return Again(itertools.chain(first, itertools.cycle(plain)), self.reference)
 
     @property
     def arguments(self):
@@ -463,15 +477,12 @@ class _Trial:
     @functools.cached_property
     def _fresh(self):
         """More draws, on which an explanation is tried once more: plain ones, the special ones among the first."""
-        rng, found, kind = np.random.default_rng(0), [], self.budget.part()
-        plain = [(draw, self.exercise.metric) for draw in self.exercise.cases]
-        first = [*itertools.islice(itertools.cycle(plain), MORE_CASES)]
-        first += 2 * [(draw, metric) for draw, metric, *_ in self.exercise.noisy]
-        for draw, metric in itertools.islice(itertools.chain(first, itertools.cycle(plain)), MOST_CASES):
-            if len(found) >= len(first) and not kind.left():
+        found, kind = [], self.budget.part()
+        for number in range(MOST_CASES):
+            if number >= MORE_CASES + 2 * len(self.exercise.noisy) and not kind.left():
                 break
-            args = draw(rng)
-            found.append(own_steps.Case(args, metric, self.exercise.reference(*copy.deepcopy(args))))
+            args, expected, metric = self.exercise.all_again[number]
+            found.append(own_steps.Case(args, metric, expected))
         return found
 
     def _fresh_cases(self, kind):
@@ -601,9 +612,9 @@ class _Trial:
         sets = isinstance(self.exercise.metric, metrics.Exactly) and isinstance(self.pairs[0][1], set | frozenset)
         if self.refusal or self._right_on_plain() or not (sets or self._is_choice()):
             return True
-        rng, metric, kind = np.random.default_rng(0), self.exercise.metric, Budget(SPECIAL)
-        for draw in itertools.islice(itertools.cycle(self.exercise.cases), MORE_DRAWS):
-            args = draw(rng)
+        kind = Budget(SPECIAL)
+        for number in range(MORE_DRAWS):
+            args, _, metric = self.exercise.plain_again[number]
             run = guard.run(self.function, args, limit=self.exercise.limit)
             if run.error is not None or not self._is_mistake(mistake, args, metric, (run.result, None)):
                 return False
@@ -712,17 +723,13 @@ class _Trial:
 
     def _special_case(self):
         """What the draws on which the answer is wrong have in common, fresh ones among them, as a sentence."""
-        metric, rng = self.exercise.metric, np.random.default_rng(0)
         draws = [(args, pair[1], not m.equal(*pair)) for args, m, pair in self._cases()]
         kind = Budget(max(SPECIAL, self.budget.left()))
-        for draw in itertools.islice(itertools.cycle(self.exercise.cases), MORE_DRAWS):
+        for number in range(MORE_DRAWS):
             if kind.left() < SPECIAL / 2:
                 break  # a slow answer, perhaps in another process: it is not called more often than it must
-            args = draw(rng)
-            expected = self.exercise.reference(*copy.deepcopy(args))
-            run = guard.run(
-                self.function, args, lambda result, e=expected: metric.admit(result, e), self.exercise.limit
-            )
+            args, expected, metric = self.exercise.plain_again[number]
+            run = guard.run(self.function, args, lambda r, m=metric, e=expected: m.admit(r, e), self.exercise.limit)
             draws.append((args, expected, run.error is not None or not metric.equal(run.result, expected)))
         missed = [wrong for *_, wrong in draws]
         named = [(dict(zip(self._names(args), args)), expected) for args, expected, _ in draws]
