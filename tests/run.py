@@ -117,6 +117,7 @@ def run(words, seed=None):
     """(counts, output, seconds) of one pytest process; with a seed its last bits are stirred, and its kernels'."""
     begun = time.monotonic()
     environment = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **os.environ}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # some fifty processes would compile the same packages, each anew
     if seed is not None:
         paths = filter(None, [environment.get("PYTHONPATH"), str(ROOT / "tests")])
         environment |= {"LAST_BITS": str(seed), "PYTHONPATH": os.pathsep.join(paths)}
