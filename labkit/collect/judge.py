@@ -103,6 +103,7 @@ class Session:
         package = sandbox.PACKAGE
         secret = [str(path) for path in (*sandbox.hidden(), package / "collect" / "judge.py", session.SOLUTIONS)]
         secret += sorted({f"{package.parent}/{name.rpartition('.')[0].replace('.', '/')}.py" for name in self.library})
+        secret += [f"{folder}/__pycache__" for folder in sandbox.folders()]  # there they lie as well, compiled
         bwrap, _ = sandbox.bubblewrap()
         exercises = [id for id, item in self.items.items() if not isinstance(item, Prediction)]
         return {

@@ -111,6 +111,11 @@ def hidden():
     return shipped + [path for name in HIDDEN for path in sorted((PACKAGE / "chapters").glob(f"*/{name}"))]
 
 
+def folders():
+    """Every folder of the package that holds modules."""
+    return sorted({path.parent for path in PACKAGE.rglob("*.py")})
+
+
 def _environment(home):
     kept = {name: os.environ[name] for name in ("PATH", "SYSTEMROOT", "LANG", "LC_ALL") if name in os.environ}
     kept |= {name: value for name, value in os.environ.items() if name.startswith(ARITHMETIC)}

@@ -20,6 +20,11 @@ BY_FUNCTION = {  # bodies of an answer to `invert`
         "    import labkit.geometry.frames as f\n    space = dict(vars(f))\n"
         "    exec(open(f.__file__).read().replace('from ..', 'from labkit.'), space)\n    return space['invert'](T)"
     ),
+    "library's bytecode": (
+        "    import importlib.util, marshal, labkit.geometry.frames as f\n    space = dict(vars(f))\n"
+        "    compiled = open(importlib.util.cache_from_source(f.__file__), 'rb').read()[16:]\n"
+        "    exec(marshal.loads(compiled), space)\n    return space['invert'](T)"
+    ),
     "inspected source": (
         "    import inspect, textwrap, labkit.geometry.frames as f\n    space = dict(vars(f))\n"
         "    exec(textwrap.dedent(inspect.getsource(f.invert)), space)\n    return space['invert'](T)"

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import py_compile
 import re
 import shutil
 import socket
@@ -13,6 +14,7 @@ from classroom import notebook_text, replaced, solved_cells, write
 
 from labkit.collect import batch, judge, library, sandbox, submissions
 from labkit.exercises import source
+from labkit.geometry import frames
 from labkit.verbs import collect
 from labkit.verbs.arguments import run
 
@@ -136,6 +138,7 @@ def listener():
 def attacked(names, tmp_path, port, monkeypatch):
     """The notebook with these attacks, each in a cell of its own, judged; and every outcome it got on the way."""
     secret = tmp_path / "secret"
+    py_compile.compile(frames.__file__, doraise=True)  # as it lies wherever the library has been used
     (tmp_path / "secret.read").write_text("read me", encoding="utf-8")
     cells, got = solved_cells(), []
     k = next(k for k, (_, text) in enumerate(cells) if "ex.invert" in text)
