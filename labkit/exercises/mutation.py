@@ -549,10 +549,8 @@ def _operation(node, names):
         words = f"with {what.get(kind, 'the factors of one product `@` exchanged')}"
         yield 0, words, ast.BinOp(node.right, node.op, node.left)
     if kind in WITHOUT:
-        bare = kind in (
-            ast.Add,
-            ast.Sub,
-        )  # a number alone for x - 1 is nobody's slip, and mends where any constant does
+        # a number alone for x - 1 is nobody's slip, and mends where any constant does
+        bare = kind in (ast.Add, ast.Sub)
         if not (bare and isinstance(node.left, ast.Constant)):
             yield 1, _without(kind, node.right, names), node.left
         if kind not in (ast.Pow, ast.Mod) and not (bare and isinstance(node.right, ast.Constant)):
