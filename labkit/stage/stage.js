@@ -24,6 +24,7 @@ const READ = 6000; // ms a hint stays
 const REST = 900; // ms without an event until the picture may be stored
 const SETTLED = 150; // ms without a change of size or theme until the picture follows
 const CLICK_RADIUS = 4; // CSS pixels
+const AROUND = "100%"; // of the window on each side: a picture so near has its pixels
 const NEAR = 13; // CSS pixels: handles nearer than that are fanned out
 const MAX_ARROWS = 10; // presses kept while a message is in flight
 const CALM_INTERVAL = 500; // ms from picture to picture where the reader asks for reduced motion
@@ -144,7 +145,7 @@ class Figure {
   close() {
     this.model.off("msg:custom", this.hear);
     this.model.off("comm_live_update", this.probe);
-    for (const part of [this.line, this.words, this.clock, this.room, this.scenes]) part?.close();
+    for (const part of [this.line, this.screen, this.words, this.clock, this.room, this.scenes]) part?.close();
     this.root.remove();
   }
 }
@@ -319,13 +320,39 @@ class Scenes {
   }
 }
 
-/** From Python: whole pictures (PNG), and runs of pixels that changed since the one before. */
+/** From Python: whole pictures (PNG), and runs of pixels that changed since the one before. Far from the window the
+ *  canvas gives its pixels back, and the browser its copies of them: `image` keeps them.
+ */
 class Screen {
   constructor(place, show, lost) {
     this.canvas = element("canvas", "", { role: "img" });
     place.append(this.canvas);
     this.paper = this.canvas.getContext("2d", { willReadFrequently: true });
-    Object.assign(this, { show, lost, queue: [], decoding: false, image: null, number: 0 });
+    Object.assign(this, { show, lost, queue: [], decoding: false, image: null, number: 0, near: true });
+    this.watch = new IntersectionObserver((entries) => {
+      const { isIntersecting, boundingClientRect: { width } } = entries[entries.length - 1];
+      if (width) this.come(isIntersecting); // without a width it is hidden, and may be shown at any moment
+    }, { rootMargin: AROUND, scrollMargin: AROUND });
+    this.watch.observe(place);
+    this.print = () => this.come(true);
+    window.addEventListener("beforeprint", this.print);
+  }
+
+  come(near) {
+    this.near = near;
+    if (near) this.put();
+    else if (this.image) Object.assign(this.canvas, { width: 1, height: 1 });
+  }
+
+  /** Rows of the picture onto the canvas. */
+  put(top = 0, rows = this.image?.height) {
+    if (!this.near || !this.image) return;
+    const { width, height } = this.image;
+    if (this.canvas.width !== width || this.canvas.height !== height) {
+      Object.assign(this.canvas, { width, height }); // and it is empty
+      [top, rows] = [0, height];
+    }
+    this.paper.putImageData(this.image, 0, 0, 0, top, width, rows);
   }
 
   receive(message, buffers) {
@@ -352,6 +379,8 @@ class Screen {
       this.canvas.height = bitmap.height;
       this.paper.drawImage(bitmap, 0, 0);
       this.image = this.paper.getImageData(0, 0, bitmap.width, bitmap.height);
+      bitmap.close();
+      this.come(this.near);
       this.number = message.picture;
       this.show(message);
     } catch (error) {
@@ -364,8 +393,8 @@ class Screen {
   /** A whole picture that needs no decoding. */
   paint(message, rgba) {
     const [width, height] = message.pixels;
-    if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
-    this.paper.putImageData(new ImageData(new Uint8ClampedArray(rgba.buffer, rgba.byteOffset, 4 * width * height), width, height), 0, 0);
+    this.image = new ImageData(new Uint8ClampedArray(rgba.buffer, rgba.byteOffset, 4 * width * height), width, height);
+    this.put();
     this.show(message);
   }
 
@@ -378,10 +407,15 @@ class Screen {
       }
       const top = Math.floor(runs[0] / this.image.width);
       const bottom = Math.floor((runs[runs.length - 2] + runs[runs.length - 1] - 1) / this.image.width);
-      this.paper.putImageData(this.image, 0, 0, 0, top, this.image.width, bottom - top + 1);
+      this.put(top, bottom - top + 1);
     }
     this.number = message.picture;
     this.show(message);
+  }
+
+  close() {
+    this.watch.disconnect();
+    window.removeEventListener("beforeprint", this.print);
   }
 }
 

@@ -247,6 +247,31 @@ def test_twenty_scenes_on_a_page_share_one_context_and_those_out_of_sight_hold_n
         assert covered > 0.02 and colors > 200 and page.complaints == []
 
 
+def test_a_picture_far_from_the_window_gives_its_pixels_back_and_goes_on_all_the_same():
+    with stage_page(False, 700, 640, 1) as (page, bridge):
+        bridge.show(page, hand_eye.scan_line())
+        canvas = page.locator(".labkit-stage canvas")
+
+        def press(name):
+            shown = page.locator(".labkit-stage").get_attribute("data-picture")
+            page.get_by_role("button", name=name, include_hidden=True).dispatch_event("click")
+            page.wait_for_function(
+                "shown => document.querySelector('.labkit-stage').dataset.picture !== shown", arg=shown
+            )
+
+        press("Make it fail")
+        failed = canvas.evaluate(SMALL)
+        press("Reset")
+        assert canvas.evaluate(SMALL) != failed
+        page.evaluate("document.body.style.marginTop = '6000px'")
+        page.wait_for_function("document.querySelector('.labkit-stage canvas').width === 1")
+        press("Make it fail")
+        assert canvas.evaluate("node => node.width") == 1
+        page.evaluate("document.body.style.marginTop = 0")
+        assert driver.soon(page, lambda: canvas.evaluate(SMALL) == failed)
+        assert page.complaints == []
+
+
 def test_a_click_on_a_frame_of_the_cell_chooses_it_from_wherever_one_looks():
     with stage_page(False, 820, 700, 1) as (page, bridge):
         page.evaluate(CONTEXTS)

@@ -10,7 +10,7 @@ import { dot, isClosed } from "./solids.js";
 const DEGREES_PER_PIXEL = 0.5;
 const ZOOM = [0.2, 12];
 const MAX_PIXELS = 3e6;
-const SLOW = 20; // ms a picture may take until it is drawn coarser while it moves
+const SLOW = 6; // ms a picture may take until it is drawn coarser while it moves
 const CALM = 160; // ms of rest until it is drawn as sharply as it can be,
 const HELD = 500; // while a finger or a button is down, which may go on at any moment
 const SCALES = [1, 0.75, 0.5];
@@ -64,7 +64,7 @@ export class View {
       this.seen = entries[entries.length - 1].isIntersecting;
       if (this.seen && this.dirty) this.request();
       else if (!this.seen) this.rest();
-    }, { rootMargin: EARLY });
+    }, { rootMargin: EARLY, scrollMargin: EARLY });
     this.watch.observe(place);
     this.seen = true;
     this.listen();
