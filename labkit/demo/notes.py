@@ -63,6 +63,6 @@ def counted(folder):
         try:
             items = json.loads(file.read_text(encoding="utf-8")).get("items", {})
             counts.update(v["mistake"] for v in items.values() if v.get("mistake"))
-        except (ValueError, AttributeError, TypeError):
+        except (ValueError, AttributeError, TypeError, RecursionError):
             raise ValueError(f"{file}: expected a verdict as `collect` writes it") from None
     return counts

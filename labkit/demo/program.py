@@ -20,6 +20,8 @@ from ..places import ROOT
 from .vote import MAX_SIZE
 
 MAX_QUESTIONS, MAX_LETTERS, MAX_CHOICES = 100, 400, 8
+MAX_FILE = 1 << 20  # bytes; a hundred questions with all their choices in the longest words stay below
+TOLD = 60  # letters of what is wrong in a file that a refusal repeats
 FIELDS = {"question": str, "choices": list, "answer": object, "why": str, "unit": str, "stage": str, "before": str}
 
 
@@ -255,45 +257,63 @@ def read_questions(path):
         Naming file and number of the question, and what was expected.
     """
     path = Path(path)
-    try:
-        found = tomllib.loads(path.read_text(encoding="utf-8"))
-    except UnicodeDecodeError:
-        raise ValueError(f"{path}: expected text in UTF-8, and it is none") from None
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{path}: this is no TOML: {error}") from None
+    found = _toml(path)
     tables = found.get("question")
-    if set(found) != {"question"} or not isinstance(tables, list) or not all(isinstance(t, dict) for t in tables):
-        raise ValueError(f"{path}: expected tables [[question]] and nothing else, got {', '.join(found) or 'nothing'}")
+    if set(found) != {"question"} or not (tables and isinstance(tables, list) and all(type(t) is dict for t in tables)):
+        got = _short(", ".join(found)) if found and tables != [] else "nothing"
+        raise ValueError(f"{path}: expected tables [[question]] and nothing else, got {got}")
     if len(tables) > MAX_QUESTIONS:
         raise ValueError(f"{path}: at most {MAX_QUESTIONS} questions, got {len(tables)}")
     return [_own(f"{path}, question {k}", k, table) for k, table in enumerate(tables, start=1)]
 
 
+def _toml(path):
+    """What a TOML file says; the mark that Windows' editors put in front of a text is left out."""
+    if (size := path.stat().st_size) > MAX_FILE:
+        raise ValueError(f"{path}: own questions take at most {MAX_FILE / 2**20:g} MB, and this is {size / 2**20:.1f} MB")
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except UnicodeDecodeError:
+        raise ValueError(f"{path}: expected text in UTF-8, and it is none") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"{path}: this is no TOML: {_short(str(error), 2 * TOLD)}") from None
+    except RecursionError:
+        raise ValueError(f"{path}: expected tables [[question]], and got brackets within brackets") from None
+
+
+def _short(text, letters=TOLD):
+    """A text, cut where it is long: whoever wrote it knows the rest."""
+    return text if len(text) <= letters else f"{text[:letters]} ..."
+
+
 def _own(where, number, table):
-    """(card, key it stands before or "") of one table."""
+    """(card, key it stands before or "", where it was written) of one table."""
     for name, value in table.items():
         if name not in FIELDS:
-            raise ValueError(f"{where}: there is no {name!r}, only {', '.join(FIELDS)}")
+            raise ValueError(f"{where}: there is no {_short(repr(name))}, only {', '.join(FIELDS)}")
         if not isinstance(value, FIELDS[name]):
-            raise ValueError(f"{where}: {name} must be {'a list' if name == 'choices' else 'text'}, got {value!r}")
-        if isinstance(value, str) and len(value) > MAX_LETTERS:
-            raise ValueError(f"{where}: {name} is at most {MAX_LETTERS} letters long, got {len(value)}")
+            wanted = "a list" if name == "choices" else "text"
+            raise ValueError(f"{where}: {name} must be {wanted}, got {_short(repr(value))}")
+        longest = max((len(text) for text in (value if name == "choices" else [value]) if type(text) is str), default=0)
+        if longest > MAX_LETTERS:
+            what = "each of the choices" if name == "choices" else name
+            raise ValueError(f"{where}: {what} is at most {MAX_LETTERS} letters long, got {longest}")
     choices = table.get("choices", [])
-    if not table.get("question"):
+    if not table.get("question", "").strip():
         raise ValueError(f"{where}: a question is needed")
-    if choices and not (2 <= len(choices) <= MAX_CHOICES and all(isinstance(c, str) and c for c in choices)):
-        raise ValueError(f"{where}: choices are 2 to {MAX_CHOICES} texts, got {choices!r}")
+    if choices and not (2 <= len(choices) <= MAX_CHOICES and all(type(c) is str and c.strip() for c in choices)):
+        raise ValueError(f"{where}: choices are 2 to {MAX_CHOICES} texts, got {_short(repr(choices))}")
     if len(set(choices)) < len(choices):
         raise ValueError(f"{where}: two of the choices are alike")
     answer = table.get("answer")
     if answer is not None and (answer not in choices if choices else not _is_number(answer)):
         wanted = "none of the choices" if choices else f"no number up to {MAX_SIZE:g}"
-        raise ValueError(f"{where}: the answer {repr(answer)[:40]} is {wanted}")
+        raise ValueError(f"{where}: the answer {_short(repr(answer))} is {wanted}")
     if not choices and "answer" in table:
         answer = float(answer)
     asked = Asked(table["question"], tuple(choices), answer, table.get("why", ""), table.get("unit", ""))
     card = Card(f"own/{number}", "own", "Own questions", asked=asked, stage=table.get("stage", ""))
-    return card, table.get("before", "")
+    return card, table.get("before", ""), where
 
 
 def _is_number(answer):
@@ -303,11 +323,14 @@ def _is_number(answer):
 def _placed(own, cards):
     """The cards with the own ones among them; what these name must be shown, too."""
     there = Program(cards, {})
-    for card, before in own:
+    for card, before, where in own:
+        for name in filter(None, (card.stage, before)):
+            if name not in there:
+                raise NotThere(f"{where}: there is no {_short(repr(name))} here; {_there(cards)}.")
         if card.stage:
             shown = there[card.stage]
             if not shown.make:
-                raise NotThere(f"{card.key}: {card.stage} is a question without a Stage.")
+                raise NotThere(f"{where}: {card.stage} is a question without a Stage.")
             card.make, card.cell = shown.make, shown.cell
         place = cards.index(there[before]) if before else len(cards)
         cards = [*cards[:place], card, *cards[place:]]

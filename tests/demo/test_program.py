@@ -122,15 +122,30 @@ def test_own_questions_stand_where_they_were_put_and_show_the_stage_named(tmp_pa
         ('[[question]]\nquestion = "a?"\nanswer = -inf', "-inf is no number up to 1e"),
         ('[[question]]\nquestion = "a?"\nanswer = 10000000000000', "10000000000000 is no number up to 1e"),
         ("[[question]]\nquestion = 7", "question must be text"),
-        ('[[question]]\nquestion = "a?"\nbefore = "01/none"', "There is no '01/none' here"),
-        ('[[question]]\nquestion = "a?"\nstage = "05/scan-line"', "There is no '05/scan-line' here"),
+        ('[[question]]\nquestion = "a?"\nbefore = "01/none"', "question 1: there is no '01/none' here"),
+        ('[[question]]\nquestion = "a?"\nstage = "05/scan-line"', "question 1: there is no '05/scan-line' here"),
         (f'[[question]]\nquestion = "{401 * "a"}"', "at most 400 letters long, got 401"),
+        (f'[[question]]\nquestion = "a?"\nchoices = ["x", "{401 * "a"}"]', "choices is at most 400 letters long, got 401"),
+        ('[[question]]\nquestion = "  "', "question 1: a question is needed"),
+        ("", "nothing else, got nothing"),
+        ("question = []", "nothing else, got nothing"),
+        ("question = " + 9999 * "[", "own.toml: "),
+        (f"question = {9999 * '['}{9999 * ']'}", "brackets within brackets"),
+        (f"{401 * 'k'} = 1", "and nothing else, got kkk"),
+        (f"[[question]]\nquestion = [{999 * '7, '}7]", "question must be text, got [7, 7"),
+        (1100 * 1000 * "#", "own questions take at most 1 MB, and this is 1.0 MB"),
     ],
 )
 def test_a_question_that_is_none_is_refused_with_its_place(tmp_path, text, said):
     with pytest.raises(ValueError) as refusal:
         program.program(["01"], written(tmp_path, text))
-    assert said in str(refusal.value) and "\n" not in str(refusal.value)
+    told = str(refusal.value).replace(str(tmp_path), "")
+    assert said in told and "\n" not in told and len(told) < 300
+
+
+def test_a_file_of_a_windows_editor_is_read(tmp_path):
+    shown = program.program(["01"], written(tmp_path, "\ufeff" + OWN.replace("\n", "\r\n")))
+    assert "own/2" in [card.key for card in shown.cards]
 
 
 def test_files_that_are_no_text_or_not_there_are_refused(tmp_path):
