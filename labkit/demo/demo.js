@@ -147,7 +147,7 @@ class Wall {
     const { hearers, wire } = this;
     const to = this.card.stage;
     const model = {
-      get: (name) => ({ declaration, silence: SILENT })[name],
+      get: (name) => ({ declaration, silence: SILENT, aside: $("#aside") })[name],
       on: (event, hear) => { if (event === "msg:custom") hearers.add(hear); },
       off: (event, hear) => hearers.delete(hear),
       send: (message) => wire.send({ to, message }),
@@ -167,7 +167,7 @@ class Wall {
     $("#ahead").replaceChildren(asking, place);
     this.fill(asking, card, null);
     let look = null;
-    const model = { get: () => ({ ...declaration, spaces: [] }), on: () => {}, off: () => {}, send: (message) => { look ??= message.look; } };
+    const model = { get: (name) => (name === "declaration" ? { ...declaration, spaces: [] } : undefined), on: () => {}, off: () => {}, send: (message) => { look ??= message.look; } };
     stage.render({ model, el: place })();
     $("#ahead").replaceChildren();
     if (look) this.wire.ask({ ahead: key, look });

@@ -54,7 +54,7 @@ export class Projector {
     this.enter("start");
   }
 
-  get() { return this.film.declaration; }
+  get(name) { return name === "declaration" ? this.film.declaration : undefined; }
   on(kind, hear) { if (kind === "msg:custom") this.hears.add(hear); }
   off(kind, hear) { this.hears.delete(hear); }
 

@@ -4,6 +4,7 @@
 //
 //   get("declaration")       what does not change: Stage.declaration() of labkit/stage/stage.py, as JSON
 //   get("silence")           what to say when Python does not answer, where it is no notebook's
+//   get("aside")             an element where the hint on keys stands, in a page that has one; else it is at the buttons
 //   on("msg:custom", hear)   from now on hear(message, buffers) is called with what Stage sends; buffers are DataViews;
 //                            a model that has pixels, not files, sends message.pixels, [width, height], and RGBA
 //   off("msg:custom", hear)  no more
@@ -86,6 +87,7 @@ class Figure {
     this.words = new Words(this.controls.inputs);
     this.buttons = buttonRow(declared.buttons, (key) => { this.clock?.stop(); this.line.press(key); });
     this.room = new Room(this.root, this.picture, declared.size, this.line, this.buttons);
+    this.hint = this.space.words && new Hint(this.space, this.buttons, model.get("aside"));
     this.room.canDraw = () => this.scenes.able;
     this.root.append(this.picture, ...this.words.nodes, ...(this.clock ? [this.clock.row] : []), this.controls.row, this.buttons);
     // JupyterLab's shortcuts (arrow keys fold headings, letters cut cells) stay away from whatever has the focus here
@@ -145,7 +147,7 @@ class Figure {
   close() {
     this.model.off("msg:custom", this.hear);
     this.model.off("comm_live_update", this.probe);
-    for (const part of [this.line, this.screen, this.words, this.clock, this.room, this.scenes]) part?.close();
+    for (const part of [this.line, this.screen, this.words, this.clock, this.room, this.hint, this.scenes]) part?.close();
     this.root.remove();
   }
 }
@@ -648,25 +650,17 @@ class Space {
     if (!(keys || click || empty)) return;
     canvas.tabIndex = 0;
     canvas.setAttribute("role", "application"); // a screen reader passes arrow keys on to it
-    this.hint = element("div", "hint", {}, [this.keysInWords()]);
-    canvas.setAttribute("aria-description", this.hint.textContent);
+    this.words = this.keysInWords();
+    canvas.setAttribute("aria-description", this.words);
     this.mark = element("div", "cursor", { "aria-hidden": "true" });
     this.mark.hidden = true;
-    place.append(this.mark, this.hint);
+    place.append(this.mark);
     canvas.addEventListener("pointerdown", (event) => this.down(event));
     canvas.addEventListener("pointermove", (event) => this.moved(event));
     canvas.addEventListener("pointerup", (event) => this.up(event));
     canvas.addEventListener("pointercancel", () => { this.press = null; });
     canvas.addEventListener("keydown", (event) => this.key(event));
     canvas.addEventListener("blur", () => this.leave());
-    canvas.addEventListener("focus", () => this.tell());
-  }
-
-  /** The hint, until it has been read: the words of the picture lie under it. No animation, which keeps a page busy. */
-  tell() {
-    this.hint.hidden = false;
-    clearTimeout(this.reading);
-    this.reading = setTimeout(() => { this.hint.hidden = true; }, READ);
   }
 
   get points() {
@@ -776,6 +770,46 @@ class Space {
     this.pen = false;
     this.mark.hidden = true;
     this.mark.classList.remove("down");
+  }
+}
+
+/** What keys do in empty space, until it has been read: where the page has a place for it, in the gap of the row of
+ *  buttons where it fits there, else in a line of its own below. It covers nothing. No animation, which keeps a page busy.
+ */
+class Hint {
+  constructor({ canvas, words }, row, aside) {
+    Object.assign(this, { row, aside, timer: 0 });
+    this.node = element("div", "hint", { "aria-hidden": "true" }, [words]); // heard from the canvas
+    this.node.hidden = true;
+    if (aside) aside.append(this.node);
+    else row.insertBefore(this.node, row.querySelector(".enlarge"));
+    canvas.addEventListener("focus", () => { if (canvas.matches(":focus-visible")) this.show(); });
+    canvas.addEventListener("blur", () => this.hide());
+  }
+
+  show() {
+    const { node, row } = this;
+    node.hidden = false;
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.hide(), READ);
+    if (this.aside) return;
+    const fits = node.scrollHeight <= node.clientHeight + 1 && node.scrollWidth <= node.clientWidth;
+    if (fits) return;
+    node.classList.add("under");
+    row.after(node);
+  }
+
+  hide() {
+    const { node, row } = this;
+    node.hidden = true;
+    if (!node.classList.contains("under")) return;
+    node.classList.remove("under");
+    row.insertBefore(node, row.querySelector(".looks") ?? row.querySelector(".enlarge"));
+  }
+
+  close() {
+    clearTimeout(this.timer);
+    this.node.remove();
   }
 }
 
@@ -1002,7 +1036,7 @@ class Room {
    */
   passing() {
     let sum = 0;
-    for (const node of this.root.querySelectorAll(".status, .gone")) if (node.offsetHeight) sum += node.offsetHeight + parseFloat(getComputedStyle(node).marginTop);
+    for (const node of this.root.querySelectorAll(".status, .gone, .hint.under")) if (node.offsetHeight) sum += node.offsetHeight + parseFloat(getComputedStyle(node).marginTop);
     return sum;
   }
 

@@ -169,6 +169,19 @@ def test_digits_chapters_overview_theme_and_what_is_not_there(wall):
     wall.wait_for_function("() => wall.card.key === '06/tx40'")
 
 
+def test_the_hint_on_keys_stands_in_the_head_of_the_page(wall):
+    show(wall, "06/tx40")
+    rest(wall)
+    wall.keyboard.press("Tab")
+    wall.locator("#place canvas[tabindex]").focus()
+    hint = wall.locator("#aside .hint")
+    assert "turn the view" in hint.inner_text()
+    box, head = hint.bounding_box(), wall.locator("header").bounding_box()
+    assert box["y"] >= head["y"] - 1 and box["y"] + box["height"] <= head["y"] + head["height"] + 1
+    show(wall, FIRST)
+    assert wall.locator("#aside .hint").count() == 1  # that of the other is gone
+
+
 def test_three_phones_vote_in_two_rounds(wall):
     show(wall, "05/scan-line")
     wall.keyboard.press("Shift+R")

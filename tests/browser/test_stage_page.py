@@ -98,6 +98,32 @@ def test_everything_has_a_name_a_ring_and_keys_and_nothing_is_cut(dark):
         assert page.complaints == []
 
 
+COVERED = """() => {
+    const hint = document.querySelector(".hint"), its = hint.getBoundingClientRect();
+    if (!its.width || hint.scrollWidth > hint.clientWidth || hint.scrollHeight > hint.clientHeight + 1) return ["the hint"];
+    const others = [...document.querySelectorAll(".picture, .labkit-stage p:not(:empty), button, input, select, output")];
+    return others.filter((node) => {
+        const box = node.getBoundingClientRect();
+        return box.left < its.right - 1 && its.left < box.right - 1 && box.top < its.bottom - 1 && its.top < box.bottom - 1;
+    }).map((node) => node.className || node.tagName);
+}"""
+
+
+@pytest.mark.parametrize("width, height, lines", [(1000, 800, 0), (360, 640, 1)])
+def test_the_hint_on_keys_covers_nothing_and_resizes_no_picture(width, height, lines):
+    """In the gap of the buttons' row where it fits there, else in a line of its own; it goes with the focus."""
+    with stage_page(False, width, height, 1) as (page, bridge):
+        bridge.show(page, monte_carlo.arena())
+        before = page.locator(".picture").bounding_box()
+        page.keyboard.press("Tab")  # from now on the browser shows where the focus is
+        page.locator(".labkit-stage canvas").focus()
+        assert page.evaluate(COVERED) == [] and page.locator(".hint.under").count() == lines
+        page.evaluate(driver.RESTS)
+        assert page.locator(".picture").bounding_box() == before
+        page.locator("button.enlarge").focus()
+        assert not page.locator(".hint").is_visible() and page.locator(".buttons .hint").count() == 1
+
+
 EDITOR = """([dark, paper, words]) => {
     const colors = `--vscode-editor-background: ${paper}; --vscode-foreground: ${words};`;
     document.getElementById("theme").textContent = `:root { ${colors} }`;
