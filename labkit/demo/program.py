@@ -270,7 +270,9 @@ def read_questions(path):
 def _toml(path):
     """What a TOML file says; the mark that Windows' editors put in front of a text is left out."""
     if (size := path.stat().st_size) > MAX_FILE:
-        raise ValueError(f"{path}: own questions take at most {MAX_FILE / 2**20:g} MB, and this is {size / 2**20:.1f} MB")
+        raise ValueError(
+            f"{path}: own questions take at most {MAX_FILE / 2**20:g} MB, and this is {size / 2**20:.1f} MB"
+        )
     try:
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except UnicodeDecodeError:

@@ -100,12 +100,13 @@ def test_everything_has_a_name_a_ring_and_keys_and_nothing_is_cut(dark):
 
 COVERED = """() => {
     const hint = document.querySelector(".hint"), its = hint.getBoundingClientRect();
-    if (!its.width || hint.scrollWidth > hint.clientWidth || hint.scrollHeight > hint.clientHeight + 1) return ["the hint"];
-    const others = [...document.querySelectorAll(".picture, .labkit-stage p:not(:empty), button, input, select, output")];
-    return others.filter((node) => {
-        const box = node.getBoundingClientRect();
-        return box.left < its.right - 1 && its.left < box.right - 1 && box.top < its.bottom - 1 && its.top < box.bottom - 1;
-    }).map((node) => node.className || node.tagName);
+    const cut = hint.scrollWidth > hint.clientWidth || hint.scrollHeight > hint.clientHeight + 1;
+    if (!its.width || cut) return ["the hint"];
+    const beside = (box) => box.left >= its.right - 1 || its.left >= box.right - 1;
+    const above = (box) => box.top >= its.bottom - 1 || its.top >= box.bottom - 1;
+    const all = [...document.querySelectorAll(".picture, .labkit-stage p:not(:empty), button, input, select, output")];
+    const met = all.filter((node) => !beside(node.getBoundingClientRect()) && !above(node.getBoundingClientRect()));
+    return met.map((node) => node.className || node.tagName);
 }"""
 
 

@@ -125,7 +125,10 @@ def test_own_questions_stand_where_they_were_put_and_show_the_stage_named(tmp_pa
         ('[[question]]\nquestion = "a?"\nbefore = "01/none"', "question 1: there is no '01/none' here"),
         ('[[question]]\nquestion = "a?"\nstage = "05/scan-line"', "question 1: there is no '05/scan-line' here"),
         (f'[[question]]\nquestion = "{401 * "a"}"', "at most 400 letters long, got 401"),
-        (f'[[question]]\nquestion = "a?"\nchoices = ["x", "{401 * "a"}"]', "choices is at most 400 letters long, got 401"),
+        (
+            f'[[question]]\nquestion = "a?"\nchoices = ["x", "{401 * "a"}"]',
+            "choices is at most 400 letters long, got 401",
+        ),
         ('[[question]]\nquestion = "  "', "question 1: a question is needed"),
         ("", "nothing else, got nothing"),
         ("question = []", "nothing else, got nothing"),
