@@ -11,7 +11,7 @@ Source: report "Kalibrace a testovani systemu OTUS tracker", ZCU Plzen 2018, app
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.linalg import solve_banded
 
 from ..checks import (
     as_count,
@@ -327,7 +327,25 @@ def smooth_motion(via, duration, rate):
     if via.ndim != 2 or len(via) < 2:
         raise ValueError(f"via must hold at least 2 joint positions, shape (m, n), got {via.shape}")
     time = _samples(duration, rate)
-    return time, CubicSpline(np.arange(len(via)), via)(_ramp(time / time[-1]) * (len(via) - 1))
+    return time, _spline(via, _ramp(time / time[-1]) * (len(via) - 1))
+
+
+def _spline(values, at):
+    """The cubic spline through values (m, n) at 0, 1, ..., m - 1, whose outer two pieces are one cubic ("not a knot").
+
+    As `scipy.interpolate.CubicSpline`, which a kernel that moves the arm need not load: 14 MB with all it imports.
+    """
+    rise = np.diff(values, axis=0)
+    if len(rise) < 3:  # one line, one parabola
+        slope = rise[[0, 0]] if len(rise) == 1 else np.array([[3, -1], [1, 1], [-1, 3]]) @ rise / 2
+    else:  # equal second derivatives where pieces meet: s[i-1] + 4 s[i] + s[i+1] = 3 (rise[i-1] + rise[i])
+        bands = np.tile([[1.0], [4.0], [1.0]], len(values))
+        bands[0, 1], bands[1, [0, -1]], bands[2, -2] = 2, 1, 2
+        ends = (5 * rise[[0, -1]] + rise[[1, -2]]) / 2  # equal third derivatives beside the ends
+        slope = solve_banded((1, 1), bands, np.concatenate([ends[:1], 3 * (rise[:-1] + rise[1:]), ends[1:]]))
+    i = np.clip(at.astype(int), 0, len(rise) - 1)
+    u, rise, left, right = (at - i)[:, None], rise[i], slope[i], slope[i + 1]
+    return values[i] + u * (left + u * (3 * rise - 2 * left - right + u * (left + right - 2 * rise)))
 
 
 def _samples(duration, rate):

@@ -14,6 +14,7 @@ from jupyter_client.manager import start_new_kernel
 
 from labkit.exercises import source
 from labkit.verbs import build
+from tests.kernel_memory import memory
 
 
 def main(chapters):
@@ -26,17 +27,11 @@ def main(chapters):
                 for cell in build.blank_notebook(path).cells:
                     if cell.cell_type == "code":
                         client.execute_interactive(cell.source, output_hook=lambda message: None, timeout=120)
-                print(f"{path.stem:20} {memory(manager.provisioner.pid)}", flush=True)
+                rss, pss = memory(manager.provisioner.pid)
+                print(f"{path.stem:20} RSS {rss} PSS {pss}", flush=True)
             finally:
                 client.stop_channels()
                 manager.shutdown_kernel(now=True)
-
-
-def memory(pid):
-    """Resident and proportional memory of a process."""
-    rollup = dict(line.split(":") for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()[1:])
-    rss, pss = (int(rollup[name].split()[0]) // 1024 for name in ("Rss", "Pss"))
-    return f"RSS {rss} PSS {pss}"
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -16,6 +17,7 @@ from labkit.machines.arm import (
     SHOULDER_OFFSET,
     TX40,
     _ramp,
+    _spline,
     arm_points,
     dh_matrix,
     forward_kinematics,
@@ -139,6 +141,12 @@ def test_smooth_motion_passes_its_points_within_the_joint_speeds():
     np.testing.assert_allclose(q[[0, -1]], via[[0, -1]], atol=1e-12)
     assert all(np.abs(q - point).max(1).min() < 0.02 for point in via)
     assert (np.abs(joint_speeds(time, q)) < TX40.speed).all()
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 5, 30])
+def test_the_spline_is_the_not_a_knot_spline(count):
+    via, at = RNG.normal(size=(count, 2)), np.linspace(0, count - 1, 61)
+    np.testing.assert_allclose(_spline(via, at), CubicSpline(np.arange(count), via)(at), atol=1e-13)
 
 
 def test_rotation_only_leaves_the_tool_where_it_is():

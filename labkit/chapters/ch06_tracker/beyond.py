@@ -4,10 +4,10 @@ import functools
 import itertools
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from ...documents.report.printed import COLUMNS, table_d
+from ...estimation.optimization import levenberg_marquardt
 from ...exercises import metrics
 from ...exercises.engine import Exercise, Mistake, Prediction, Value
 from ...geometry.frames import invert, matrix_from_quaternion, pose, quaternion_from_matrix, unit_vector
@@ -236,8 +236,15 @@ def _ends_alone(speed, error):
 def _fitted_to_errors(speed, error):
     """The law with the least squares of the errors themselves."""
     start = np.sqrt(np.maximum(np.polyfit(speed**2, error**2, 1)[::-1], 1e-6))
-    found = least_squares(lambda u: np.hypot(u[0], u[1] * speed) - error, start, x_scale=start, xtol=1e-14, ftol=1e-14)
-    return tuple(map(float, np.abs(found.x)))
+
+    def law(u):
+        return np.hypot(u[0], u[1] * speed)
+
+    def jacobian(u):
+        return np.column_stack([np.full_like(speed, u[0]), u[1] * speed**2]) / law(u)[:, None]
+
+    found = levenberg_marquardt(lambda u: law(u) - error, jacobian, start, scale=start)
+    return tuple(map(float, np.abs(found.x[-1])))
 
 
 def _square(v):
