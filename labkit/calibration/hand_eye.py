@@ -45,6 +45,7 @@ from .robust import median_std, tukey_weights
 MIN_SPREAD = 1e-6  # relative: sphere centers closer to one line of the scanner frame than this fix no rotation
 LINEAR_SPREAD = 1e-5  # relative: below, fifteen linear unknowns say nothing about where to start
 MAX_STEPS = 50
+SEARCH_STEPS = 15  # from the nearest of 24 orientations, up to 63 deg away, into a valley; the fit then goes down in it
 STEP_TOLERANCE = 1e-11  # rad: Gauss-Newton would make the next step about a thousand times smaller
 TUKEY_CUT = 5.0  # residuals beyond this many standard deviations get the weight 0
 SUBSETS = 60  # random pose subsets of the robust start: with a quarter of bad poses one of them is clean with 1 - 1e-5
@@ -430,7 +431,8 @@ def calibrate_with(fit, T_BF, x_S, target, robust, rng):
     Parameters
     ----------
     fit : function
-        fit(T_BF, x_S, weights, target, max_steps) returns T_FS, target and the rms distance (mm) of its iterates.
+        fit(T_BF, x_S, weights, target, max_steps, start=None) returns T_FS, target and the rms distance (mm) of its
+        iterates; `start` is an orientation that lies near.
     T_BF, x_S, target, rng
         As in `calibrate_sphere_target`.
     robust : bool
@@ -503,17 +505,49 @@ def refuse_one_line(x_S, weights):
         )
 
 
-def _least_squares(T_BF, x_S, weights, target, max_steps):
-    """T_FS and target that minimize the weighted sum of squares, and the rms distance of the iterates."""
+def _least_squares(T_BF, x_S, weights, target, max_steps, start=None):
+    """T_FS and target that minimize the weighted sum of squares, and the rms distance of the iterates; `start` is an
+    orientation known to lie near, of a like problem.
+    """
     unchecked(refuse_undetermined)(T_BF, x_S, weights, target is not None)
     if target is not None:
         T_FS = _fit_frame(x_S, transform(invert(T_BF), target), weights)
         return T_FS, target, [rms_distance(sphere_residuals(T_BF, x_S, T_FS, target))]
-    u, spread = _linear_solution(T_BF, x_S, weights)
-    if spread > LINEAR_SPREAD:
-        return _gauss_newton(nearest_rotation(u[:9].reshape(3, 3)), T_BF, x_S, weights, max_steps)
-    tried = [_gauss_newton(R_FS, T_BF, x_S, weights, max_steps) for R_FS in right_angled()]
-    return min(tried, key=lambda found: found[2][-1])
+    if start is None:
+        u, spread = _linear_solution(T_BF, x_S, weights)
+        linear = spread > LINEAR_SPREAD
+        start = nearest_rotation(u[:9].reshape(3, 3)) if linear else _searched_start(T_BF, x_S, weights)
+    return _gauss_newton(start, T_BF, x_S, weights, max_steps)
+
+
+def _searched_start(T_BF, x_S, weights):
+    """Of the 24 right-angled orientations, all of them led downhill at once (Levenberg-Marquardt), the lowest."""
+    A, b = _without_shift(T_BF, x_S, weights)
+    R, turns = right_angled(), skew(np.eye(3))
+    damping, r = np.full((len(R), 1, 1), 1e-3), R.reshape(-1, 9) @ A.T + b
+    for _ in range(SEARCH_STEPS):
+        J = (R[:, None] @ turns).reshape(-1, 3, 9) @ A.T
+        H = J @ J.swapaxes(1, 2)
+        H += (damping * H.trace(axis1=1, axis2=2)[:, None, None] + np.finfo(float).tiny) * np.eye(3)
+        trial = R @ exp_so3(-np.linalg.solve(H, J @ r[..., None])[..., 0])
+        missed = trial.reshape(-1, 9) @ A.T + b
+        lower = ((missed**2).sum(1) < (r**2).sum(1))[:, None]
+        r, R = np.where(lower, missed, r), np.where(lower[..., None], trial, R)
+        damping *= np.where(lower[..., None], 0.2, 5.0)
+    return R[(r**2).sum(1).argmin()]
+
+
+def _without_shift(T_BF, x_S, weights):
+    """A (10, 9) and b (10,): A R_FS.ravel() + b is as long as all weighted residuals with the best translation and
+    target, which enter linearly.
+    """
+    root = np.sqrt(np.repeat(weights, 3))[:, None]
+    shift = np.concatenate([T_BF[:, :3, :3], np.broadcast_to(-np.eye(3), (len(T_BF), 3, 3))], axis=2).reshape(-1, 6)
+    turned = (T_BF[:, :3, :3, None] * x_S[:, None, None]).reshape(-1, 9)
+    left = np.column_stack([turned, T_BF[:, :3, 3].ravel()]) * root
+    Q = np.linalg.qr(shift * root)[0]
+    left = np.linalg.qr(left - Q @ (Q.T @ left), mode="r")
+    return left[:, :9], left[:, 9]
 
 
 def _fit_frame(x_S, x_F, weights):
@@ -805,9 +839,10 @@ def _trimmed_start(fit, T_BF, x_S, target, size, rng):
 
 def _reweighted(fit, T_BF, x_S, target, weights):
     """Iteratively reweighted least squares from the trimmed start; the scale is the median residual length."""
-    history, exact = [], 1e-12 * np.abs(x_S).max()
+    history, exact, start = [], 1e-12 * np.abs(x_S).max(), None
     for _ in range(MAX_STEPS):
-        T_FS, center, _ = fit(T_BF, x_S, weights, target, MAX_STEPS)
+        T_FS, center, _ = fit(T_BF, x_S, weights, target, MAX_STEPS, start)
+        start = T_FS[:3, :3]
         lengths = np.linalg.norm(sphere_residuals(T_BF, x_S, T_FS, center), axis=1)
         history.append(math.sqrt((lengths**2).mean()))
         scale = median_std(lengths)

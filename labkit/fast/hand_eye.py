@@ -31,7 +31,7 @@ def calibrate_sphere_target(T_BF, x_S, target=None, robust=False, rng=None):
     return unchecked(calibrate_with)(_fit, T_BF, x_S, target, robust, rng)
 
 
-def _fit(T_BF, x_S, weights, target, max_steps):
+def _fit(T_BF, x_S, weights, target, max_steps, start=None):
     """Least squares with given weights: T_FS, target and the rms distance of the iterates."""
     mean, G, total = _moments(T_BF[:, :3, :3], T_BF[:, :3, 3], x_S, weights, target)
     if not _is_clearly_determined(mean, G, total, target):
@@ -42,7 +42,7 @@ def _fit(T_BF, x_S, weights, target, max_steps):
         T_FS[:3, 3] = mean[3:6] - T_FS[:3, :3] @ mean[:3]
         return T_FS, target, [rms_distance(sphere_residuals(T_BF, x_S, T_FS, target))]
     S, h, c, recover = _reduce(mean, G)
-    T_FS[:3, :3], costs = _descend(S, h, _rotation_start(S, h), max_steps)
+    T_FS[:3, :3], costs = _descend(S, h, _rotation_start(S, h) if start is None else start, max_steps)
     T_FS[:3, 3], center = recover(T_FS[:3, :3])
     return T_FS, center, [math.sqrt(max(cost + c, 0.0) / total) for cost in costs]
 
