@@ -38,6 +38,7 @@ REACH_FOREARM, REACH_WRIST, REACH_FLANGE = 225.0, 450.0, 515.0
 SHOULDER_OFFSET, BASE_HEIGHT = 35.0, 320.0
 RAMP = 0.12  # share of a motion's time spent on getting up to speed, and on slowing down
 IN_VAIN = 20_000  # draws of a pose without one that fits: where one in 200 does, that is as good as impossible
+MOST_DRAWS = 100_000  # of a pose, all in all; some seconds
 MOST_SAMPLES = 250_000  # of a motion: a thousand seconds at the 250 Hz of the report's tracker
 
 
@@ -288,8 +289,11 @@ def measuring_poses(robot, rng, count=21, center=None, spread=(0.5, 0.35, 0.35, 
     found, tries, last = [np.array(center)], 0, 0
     while len(found) < count:
         tries += 1
-        if tries > 200 * count or tries > last + IN_VAIN:
-            raise ValueError(f"only {len(found)} of {count} measuring poses were found: widen spread or box")
+        if tries > min(200 * count, MOST_DRAWS, last + IN_VAIN):
+            raise ValueError(
+                f"only {len(found)} of {count} measuring poses were found in {tries - 1} draws: widen spread or box, or "
+                "ask for fewer"
+            )
         q = center + spread * rng.uniform(-1, 1, len(robot.dh))
         T = forward_kinematics(robot.dh, q)
         inside = (T[:3, 3] >= box[0]).all() and (T[:3, 3] <= box[1]).all()

@@ -110,7 +110,10 @@ def test_measuring_poses_are_reachable_and_spread_out():
 
 def test_measuring_poses_that_are_nowhere_are_not_looked_for_for_long(monkeypatch):
     monkeypatch.setattr(arm, "IN_VAIN", 30)
-    with pytest.raises(ValueError, match="only 1 of 1000000 measuring poses were found: widen spread or box"):
+    with pytest.raises(
+        ValueError,
+        match="only 1 of 1000000 measuring poses were found in 30 draws: widen spread or box, or ask for fewer",
+    ):
         measuring_poses(TX40, np.random.default_rng(3), count=10**6, box=[[0, 0, 0], [1, 1, 1]])
 
 
