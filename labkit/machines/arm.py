@@ -291,8 +291,8 @@ def measuring_poses(robot, rng, count=21, center=None, spread=(0.5, 0.35, 0.35, 
         tries += 1
         if tries > min(200 * count, MOST_DRAWS, last + IN_VAIN):
             raise ValueError(
-                f"only {len(found)} of {count} measuring poses were found in {tries - 1} draws: widen spread or box, or "
-                "ask for fewer"
+                f"only {len(found)} of {count} measuring poses were found in {tries - 1} draws: widen spread or "
+                "box, or ask for fewer"
             )
         q = center + spread * rng.uniform(-1, 1, len(robot.dh))
         T = forward_kinematics(robot.dh, q)

@@ -6,8 +6,9 @@ Arguments are recorded while the unit tests of the rooms run, and spoilt once to
 infinities, signs, zeros, wrong kinds, asymmetric and indefinite covariances, matrices that are no rotations, swapped
 arguments (`fuzz_mutations.py`). A call that holds a number above 1e9, arrays below 1e-12 or a count above 1e5 is
 "extreme"; every other one is of ordinary magnitude, and there only three outcomes are right: a finite result, NaN where
-the docstring says so, or a sentence: labkit's own, or the system's about a file, with its name. Each call
-has 10 s and 4 GB. Linux and macOS; 20 to 40 minutes.
+the docstring says so, or a sentence: labkit's own, or the system's about a file, with its name. What a function that
+was handed in raises, SciPy's `rosen_hess` of no numbers say, is its caller's and passes unchanged. Each call has 10 s
+and 4 GB. Linux and macOS; 20 to 40 minutes.
 
 Seeded: the arguments of MODULE.FUNCTION:CALL, as `--examples` names it, are the same in every run.
 """
