@@ -295,6 +295,8 @@ class _Clock:
             with self.lock:
                 if self.ticking and (self._own() >= self.seconds or not self._is_patient()):
                     self.sent = True
+                    self.rung += 1
+                    TimeLimit.relentless = self.rung > SWALLOWED  # the next one that is swallowed begins it, over there
                     self._send()
 
 

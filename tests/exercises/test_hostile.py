@@ -234,3 +234,22 @@ def test_without_interval_timers_no_limit_leaks_into_what_follows(monkeypatch):
         while time.monotonic() < until:
             pass
     assert threading.active_count() < 20
+
+
+def test_without_interval_timers_swallowed_limits_end_too(monkeypatch):
+    """What swallows every limit meets one at each line, there as well: the second thread cannot do it, the swallowed
+    error in the thread that swallows can.
+    """
+
+    def swallows():
+        until = time.thread_time() + 2
+        while time.thread_time() < until:
+            try:
+                time.sleep(0.001)
+            except BaseException:
+                pass
+
+    monkeypatch.delattr(guard.signal, "setitimer", raising=False)
+    monkeypatch.setattr(guard, "PERIOD", 0.005)
+    outcome = guard.run(swallows, (), limit=0.05)
+    assert isinstance(outcome.error, guard.TimeLimit) and sys.gettrace() is None and not guard.TimeLimit.relentless
