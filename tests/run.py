@@ -97,8 +97,8 @@ def all_jobs(scratch):
         "solved notebooks 2": ["--nbval", *BARE, *solved[1::2]],
     }
     blank = [str(path) for path in blank_notebooks(scratch)]
-    jobs["blank notebooks 1"] = ["--nbval-lax", *BARE, "-ptests.kernel_memory", *blank[0::2]]
-    jobs["blank notebooks 2"] = ["--nbval-lax", *BARE, "-ptests.kernel_memory", *blank[1::2]]
+    jobs["blank notebooks 1"] = ["--nbval-lax", *BARE, "-ptests.memory_of_kernels", *blank[0::2]]
+    jobs["blank notebooks 2"] = ["--nbval-lax", *BARE, "-ptests.memory_of_kernels", *blank[1::2]]
     return {name: words for name, words in jobs.items() if any(not word.startswith("-") for word in words)}
 
 

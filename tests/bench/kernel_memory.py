@@ -14,7 +14,7 @@ from jupyter_client.manager import start_new_kernel
 
 from labkit.exercises import source
 from labkit.verbs import build
-from tests.kernel_memory import memory
+from tests.memory_of_kernels import memory
 
 
 def main(chapters):

@@ -1,6 +1,6 @@
 """Plugin of pytest: one more test a blank notebook of chapters 1 to 8, what its kernel holds after Run All.
 
-Loaded as `-p tests.kernel_memory` by `run.py`; costs nothing, for the kernel is there anyway. The figures hold for
+Loaded as `-p tests.memory_of_kernels` by `run.py`; costs nothing, for the kernel is there anyway. The figures hold for
 Linux and Python 3.11, where they were taken (docs/hub.md); elsewhere the test is skipped and says what it found.
 """
 
