@@ -29,6 +29,7 @@ from ..documented import documented
 from ..estimation.influence import distance_limit, inverse_normal, invert_normal, squared_distances
 from ..geometry.frames import fit_frame, frame_from_points, invert
 from ..geometry.lie import exp_so3, log_so3, nearest_rotation, skew
+from ..geometry.propagation import three_point_jacobian
 from .ax_xb import EyeInHand, calibrate_hand_eye
 from .hand_eye import SphereHandEye, calibrate_sphere_target, joint_jacobian
 from .pivot import calibrate_pivot
@@ -571,11 +572,5 @@ def three_point_frame(points, std):
     T = frame_from_points(*points)
     if std is None:
         return T, None
-    step, columns = 1e-6 * np.abs(points - points[0]).max(), []
-    for i, k in np.ndindex(3, 3):
-        moved = points.copy()
-        moved[i, k] += step
-        other = frame_from_points(*moved)
-        columns.append(np.concatenate([log_so3(T[:3, :3].T @ other[:3, :3]), other[:3, 3] - T[:3, 3]]) / step)
-    J = np.array(columns).T
+    J = three_point_jacobian(*points)
     return T, std**2 * J @ J.T

@@ -52,9 +52,7 @@ def log_so3(R):
     sin = np.linalg.norm(w, axis=-1)
     cos = 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1)
     angle = np.arctan2(sin, cos)
-    safe = np.where(sin > 1e-9, sin, 1.0)
-    scale = np.where(sin > 1e-9, angle / safe, 1 + angle**2 / 6)
-    phi = scale[..., None] * w
+    phi = (angle / np.maximum(sin, 1e-300))[..., None] * w
     near_pi = cos < -0.99
     if near_pi.any():
         phi = np.where(near_pi[..., None], _log_near_pi(R, w, angle), phi)

@@ -195,7 +195,7 @@ def inverse_kinematics(robot, T_BF, start, iterations=60, tolerance=1e-9):
         raise ValueError(f"start must be one for all or one per pose, got {start.shape} for T_BF {T_BF.shape}")
     tolerance = as_positive_number(tolerance, "tolerance")
     q = np.broadcast_to(start, (*T_BF.shape[:-2], len(robot.dh))).copy()
-    scale = np.array([1, 1, 1, 1 / 200, 1 / 200, 1 / 200])  # a turn of 1 rad counts as much as 200 mm
+    scale = np.repeat([1.0, 1 / 200], 3)  # a turn of 1 rad counts as much as 200 mm
     best, best_size = q, np.full(q.shape[:-1], np.inf)
     damping = 1e-3
     for _ in range(iterations):

@@ -115,3 +115,28 @@ def test_the_history_ends_with_the_rms_of_the_result():
         result = room.calibrate_sphere_target(T_BF, x_S)
         assert result.history[-1] == pytest.approx(result.rms, rel=1e-6)
         assert (np.diff(result.history) <= 1e-9).all()
+
+
+def test_ordinary_poses_need_no_closer_look(monkeypatch):
+    def refuse(*_):
+        raise AssertionError("a closer look")
+
+    monkeypatch.setattr(fast, "refuse_undetermined", refuse)
+    for n, turn in ((6, 1.0), (31, 0.3), (31, 1.0), (200, 1.0)):
+        fast.calibrate_sphere_target(*scene(n, 0.1, turn=turn))
+        fast.calibrate_sphere_target(*scene(n, 0.1, turn=0.01), TARGET)  # a known target needs no turning
+
+
+@pytest.mark.parametrize("tilt", np.geomspace(3e-4, 3e-2, 9))
+@pytest.mark.parametrize("turn", [0.03, 0.3, 1.0])
+def test_what_is_cleared_at_a_glance_is_not_refused_by_a_closer_look(tilt, turn):
+    """Turns about one axis and ever less about a second: the sums clear them later than the eigenvalues do."""
+    T_BF, x_S = nearly_one_axis(tilt, turn)
+    weights = np.ones(len(T_BF))
+    mean, G, total = fast._moments(T_BF[:, :3, :3], T_BF[:, :3, 3], x_S, weights, None)
+    cleared = fast._is_clearly_determined(mean, G, total, None)
+    try:
+        readable.refuse_undetermined(T_BF, x_S, weights, False)
+        assert cleared or tilt < 0.02
+    except ValueError:
+        assert not cleared

@@ -80,6 +80,12 @@ def test_orthonormalize_finds_the_nearest_rotation():
         chaining.orthonormalize(np.diag([1.0, 1.0, -1.0, 1.0]))
 
 
+def test_the_orthonormality_error_is_that_of_the_worst_entry():
+    T = np.tile(np.eye(4), (2, 1, 1))
+    T[0, 0, 0], T[1, 1, 2] = 1.01, -0.02  # one column too long; one that leans
+    np.testing.assert_allclose(chaining.orthonormality_error(T), [1.01**2 - 1, 0.02], rtol=1e-12)
+
+
 def test_rounding_bound_holds_and_is_reached():
     rng = np.random.default_rng(3)
     links, half = lab_sheet.printed_transforms(), 1e-4

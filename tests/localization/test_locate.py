@@ -290,3 +290,64 @@ def test_after_a_restart_the_filter_has_a_window_of_readings_to_settle(monkeypat
     log = as_log(time, u, rows, when, ids, z)
     _, restarts, _ = room._with_restarts(log, np.zeros(3), np.eye(3), 0, Noise(**NOISE), None, useless)
     assert restarts == tuple(rows[:77:19].tolist())
+
+
+# --- noise -----------------------------------------------------------------------------------------------------------
+
+
+def stub(log, nis_and_log_det):
+    """A filter that knows the NIS and log det S of each reading for every standard deviation of the range."""
+
+    def filter_stub(part, x0, cov0, noise):
+        told = [np.broadcast_to(v, len(log.z)) for v in nis_and_log_det(noise.std_range)]
+        return path.Path(np.zeros((1, 3)), np.eye(3)[None], *told, np.ones(len(log.z), bool), log.landmark)
+
+    return filter_stub
+
+
+@pytest.mark.parametrize("far", [0.09, 0.2, 2.0])
+def test_fitted_noise_has_the_greatest_likelihood_of_a_mixture(far):
+    """Against a search through a grid; a reading that is far off costs what one that means nothing costs."""
+    rng, levels = np.random.default_rng(12), np.linspace(-6, 2, 4001)
+    log = as_log(*(course(60)[k] for k in (0, 1, 3, 4, 5, 6)))
+    off = 0.02 * rng.normal(size=len(log.z))
+    off[::4] = far
+    reach = log.z[:, 0].max()
+    bearing = -np.log(30.0)
+
+    def told(std):
+        return (off / std) ** 2, 2 * (np.log(std) + bearing)
+
+    def mixture(level):
+        nis, log_det = told(np.exp(level))
+        density = np.exp(-0.5 * (nis + log_det)) / (2 * np.pi)
+        return -np.log(0.9 * density + 0.1 / (2 * np.pi * reach)).sum() + 0.01 * (level - np.log(0.2)) ** 2
+
+    best = levels[np.argmin([mixture(level) for level in levels])]
+    noise = Noise(0.2, 0.05, 0.05, 0.05)
+    found = room.fit_noise(log, np.zeros(3), np.eye(3), noise, ("std_range",), stub(log, told))
+    assert abs(np.log(found.std_range) - best) < 0.03
+    assert (found.std_bearing, found.std_way, found.std_turn) == (0.05, 0.05, 0.05)
+
+
+@pytest.mark.parametrize("pull", [0.0, 1.0, -1.0])
+def test_what_the_readings_do_not_tell_stays_near_the_start(pull):
+    """A likelihood that falls by 0.02 for each factor e moves the logarithm by one: 0.01 times its square holds it."""
+    log = as_log(*(course(60)[k] for k in (0, 1, 3, 4, 5, 6)))
+    noise = Noise(0.3, 0.05, 0.05, 0.05)
+    flat = stub(log, lambda std: (0.04 * pull * np.log(std) / len(log.z), -20.0))
+    found = room.fit_noise(log, np.zeros(3), np.eye(3), noise, ("std_range",), flat)
+    assert abs(np.log(found.std_range / 0.3) + pull) < 0.05
+
+
+def test_noise_is_fitted_to_the_first_readings_and_the_rows_they_need(monkeypatch):
+    monkeypatch.setattr(room, "FIT_READINGS", 7)
+    log, seen = as_log(*(course(60)[k] for k in (0, 1, 3, 4, 5, 6))), []
+
+    def look(part, x0, cov0, noise):
+        seen.append(part)
+        return stub(part, lambda std: (0.0, 0.0))(part, x0, cov0, noise)
+
+    room.fit_noise(log, np.zeros(3), np.eye(3), Noise(**NOISE), ("std_range",), look)
+    np.testing.assert_array_equal(seen[0].z, log.z[:7])
+    np.testing.assert_array_equal(seen[0].time, log.time[: log.row[6] + 2])  # from the row of the last to the next

@@ -249,3 +249,31 @@ def test_a_place_within_reach_is_reached(seed):
     found = reach_position(TX40, goal, HOME)
     np.testing.assert_allclose(forward_kinematics(TX40.dh, found)[:3, 3], goal, atol=1e-5)
     np.testing.assert_array_equal(found[3:], HOME[3:])
+
+
+def damped(J, gap, weight, longest):
+    """(J'J + weight I)^-1 J' gap, by the stacked least squares; shortened to the longest turn of a joint."""
+    n = J.shape[1]
+    step = np.linalg.lstsq(np.vstack([J, np.sqrt(weight) * np.eye(n)]), np.append(gap, np.zeros(n)), rcond=None)[0]
+    return step * min(1.0, longest / np.abs(step).max())
+
+
+@pytest.mark.parametrize("far", [1e-3, 0.02, 0.2, 1.2])
+def test_each_step_of_the_inverse_kinematics_is_damped_and_bounded(far):
+    """The weight is the squared error, in rad and 200 mm, at most a thousandth; no joint turns by more than 0.5 rad."""
+    start = HOME + 0.1
+    goal = forward_kinematics(TX40.dh, start + far * np.array([-1.0, 0.5, 0.4, 1.0, -0.6, 0.8]))
+    scale = np.array([1, 1, 1, 0.005, 0.005, 0.005])
+    gap = scale * pose_error(forward_kinematics(TX40.dh, start), goal)
+    step = damped(scale[:, None] * jacobian(TX40.dh, start), gap, min(1e-3, gap @ gap) + 1e-12, 0.5)
+    found, _ = inverse_kinematics(TX40, goal, start, iterations=2)  # the second step is not looked at
+    np.testing.assert_allclose(found, start + step, atol=1e-9)
+
+
+@pytest.mark.parametrize("far", [0.01, 0.3, 1.0])
+def test_each_step_to_a_position_is_damped_and_bounded(far):
+    goal = forward_kinematics(TX40.dh, HOME + far * np.array([1.0, 0.5, -0.6, 0, 0, 0]))[:3, 3]
+    gap = goal - forward_kinematics(TX40.dh, HOME)[:3, 3]
+    J = jacobian(TX40.dh, HOME)[3:, :3]
+    step = damped(J, gap, 1e-6 + 10 * min(np.linalg.norm(gap), 100.0), 0.3)
+    np.testing.assert_allclose(reach_position(TX40, goal, HOME, iterations=2)[:3], HOME[:3] + step, atol=1e-9)

@@ -166,6 +166,20 @@ def test_one_station_is_poor_in_depth_alone():
     assert one.singular_values[-1] < two.singular_values[-1]
 
 
+def test_singular_values_are_those_of_directions_without_lengths():
+    """Each column of the derivative, by differences, has length 1: their squares add up to six."""
+    found, h = noisy_sight(2, 1e-4, np.random.default_rng(5)), np.repeat([1e-5, 1e-2], 3)
+    columns = []
+    for e in np.diag(h):
+        ahead, behind = (
+            pose(found.T_WE[:3, :3] @ Rotation.from_rotvec(s * e[:3]).as_matrix(), found.T_WE[:3, 3] + s * e[3:])
+            for s in (1, -1)
+        )
+        ahead, behind = (stations.body_angles(stations.STATIONS, stations.DIODES, T).ravel() for T in (ahead, behind))
+        columns.append((ahead - behind) / np.linalg.norm(ahead - behind))
+    np.testing.assert_allclose(found.singular_values, np.linalg.svd(np.transpose(columns))[1], rtol=1e-6)
+
+
 def test_stations_that_move_together_move_the_world():
     move = pose(Rotation.from_rotvec([0.02, -0.01, 0.03]).as_matrix(), [5.0, -3.0, 2.0])
     read = stations.read_poses(T_BE, stations.STATIONS, move @ stations.STATIONS, np.random.default_rng(0))

@@ -266,7 +266,7 @@ def test_stops_are_averaged_without_their_outliers():
     T = pose(exp_so3(1e-3 * rng.normal(size=(40, 3))), [100.0, 0, 0] + 0.3 * rng.normal(size=(40, 3)))
     clean = mean_pose(T[:30])
     T[30:, :3, 3] += 300
-    T[39] = pose(exp_so3([0.0, 0.0, np.pi]), [-100.0, 0, 0])  # the turns from it to the others may have either sign
+    T[39] = pose(exp_so3([0.0, 0.0, np.pi]), [-1000.0, 0, 0])  # the turns from it to the others may have either sign
     mean, used = average_stops(Log(np.arange(40) / 10, T, np.zeros(40, int)))
     assert used[0] == 0.75
     angle, distance = pose_distance(mean[0], clean)
