@@ -11,7 +11,6 @@ from .own_data import HandEyeModel
 WORSE = 2.0  # times: a direction this much less certain than the best is worth a sentence
 LEAST_TURN = np.deg2rad(1.0)  # rms turn about the second axis of the motions; less is one axis
 CLEARLY = 10.0  # times better, in angle or distance, that another role must fit, and worse in neither
-PLAIN = 0.02  # of the turn about the second axis: a loop that closes this well has its roles right
 OPEN = 0.3  # of the turn about the second axis: residuals as large are no noise
 AXES = "xyz"
 MIXED_UP = (  # a loop whose robot is inverted closes as well as one whose sensor is: nothing tells them apart
@@ -36,9 +35,9 @@ def axis_name(v, frame):
     words : str
     """
     v = as_shape(v, "v", 3)
-    v = v * np.sign(v[np.argmax(np.abs(v))])
     k = int(np.argmax(np.abs(v)))
-    if abs(v[k]) > 0.94:  # within 20 deg
+    v = v if v[k] > 0 else -v
+    if v[k] > 0.94:  # within 20 deg
         return f"the {frame}'s {AXES[k]} axis"
     return f"the direction ({', '.join(f'{x + 0.0:.2f}' for x in v)}) of the {frame}"
 
@@ -116,9 +115,6 @@ def refuse_mixed_roles(model, eye_to_hand):
     model : HandEyeModel
     eye_to_hand : bool
     """
-    turn, reach = axis_spread(model.T_BF)[0][1], np.linalg.norm(model.T_ST[:, :3, 3], axis=1).max()
-    if model.misfit[0] < PLAIN * turn and model.misfit[1] < PLAIN * turn * reach:
-        return  # wrong roles miss by as much as the poses turn
     angle, distance = HandEyeModel(model.T_BF, invert(model.T_ST)).misfit
     ratios = model.misfit[0] / (angle + 1e-12), model.misfit[1] / (distance + 1e-12)
     if max(ratios) > CLEARLY and min(ratios) > 0.5:

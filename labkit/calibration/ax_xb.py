@@ -189,7 +189,7 @@ def rotation_from_kronecker(M):
     M = as_shape(M, "M", "m", 9)
     _, values, Vt = np.linalg.svd(M.T @ M)
     X = Vt[-1].reshape(3, 3, order="F")
-    return nearest_rotation(X * (np.sign(np.linalg.det(X)) or 1.0)), np.sqrt(values)
+    return nearest_rotation(X if np.linalg.det(X) > 0 else -X), np.sqrt(values)
 
 
 def translation_from_motions(A, B, R):

@@ -649,7 +649,7 @@ def linear_start(T_BF, x_S):
 def _linear_solution(T_BF, x_S, weights):
     """The 15 unknowns, and the smallest singular value of their system over the largest, centers scaled to length 1."""
     R_t, n = np.swapaxes(T_BF[:, :3, :3], 1, 2), len(T_BF)
-    reach = max(math.sqrt((x_S**2).sum(-1).mean()), np.finfo(float).tiny)
+    reach = max(rms_distance(x_S), np.finfo(float).tiny)
     D = np.zeros((n, 3, 15))
     for k in range(3):
         D[:, k, 3 * k : 3 * k + 3] = x_S / reach
@@ -691,7 +691,7 @@ def gauss_newton_pose(start, T_BF, x_S, target=None, parameters="euler", max_ste
     max_steps, tolerance = as_count(max_steps, "max_steps", at_least=0), as_number(tolerance, "tolerance")
     T_FS, free = matrix_from_kuka(p), target is None
     center = transform(T_BF, transform(T_FS, x_S)).mean(0) if free else as_shape(target, "target", 3)
-    reach = np.sqrt((x_S**2).sum(-1).mean())
+    reach = rms_distance(x_S)
     if not reach > 0:
         raise ValueError("x_S must hold sphere centers away from the scanner's origin, got none or zeros alone")
     scale = np.array([1, 1, 1, 1 / reach, 1 / reach, 1 / reach] + [1, 1, 1] * free)
@@ -847,7 +847,7 @@ def _reweighted(fit, T_BF, x_S, target, weights):
         history.append(math.sqrt((lengths**2).mean()))
         scale = median_std(lengths)
         noise_free = scale <= exact  # then what does not fit exactly is wrong
-        new = (lengths <= 1000 * exact) * 1.0 if noise_free else tukey_weights(lengths, scale, TUKEY_CUT)
+        new = (lengths <= 1000 * exact).astype(float) if noise_free else tukey_weights(lengths, scale, TUKEY_CUT)
         if np.abs(new - weights).max() < 1e-8:
             break
         weights = new

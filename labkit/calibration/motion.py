@@ -145,7 +145,8 @@ def refuse_one_axis(R, weights, frame, shifted):
             "flange about two different axes"
         )
     if turns[0] < MIN_TURN:
-        axis = directions[:, 0] * np.sign(directions[np.abs(directions[:, 0]).argmax(), 0])
+        axis = directions[:, 0]
+        axis = axis if axis[np.abs(axis).argmax()] > 0 else -axis
         raise ValueError(
             f"all poses turn about one axis, {shown(axis, '.3f')} in the {frame}: {shifted} can be shifted together "
             "along it; add poses that turn the flange about another axis"

@@ -7,6 +7,7 @@ Parameters begin with the rotation vector in the moving frame (rad) and the tran
 """
 
 import functools
+import math
 from itertools import combinations
 from typing import NamedTuple
 
@@ -144,7 +145,7 @@ class Model:
             Of the best, in each channel.
         """
         n, rng = self.n, np.random.default_rng(0)
-        if n * (n - 1) * (n - 2) // 6 <= SAMPLES:
+        if math.comb(n, 3) <= SAMPLES:
             rows = np.array(list(combinations(range(n), 3)))
         else:
             rows = rng.random((SAMPLES, min(n, 1000))).argsort(1)[:, :3] * (max(n // 1000, 1))

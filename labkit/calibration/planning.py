@@ -5,7 +5,6 @@ pose is planned backwards, from the place where the sphere is to appear in the s
 rad. Source: thesis "Optimierung bei der Kalibrierung von Sensor-Roboter-Systemen", HAW Hamburg 2019, section 6.1.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +24,7 @@ from ..checks import (
 from ..documented import documented
 from ..geometry.frames import pose, transform
 from ..geometry.lie import exp_so3
-from .hand_eye import MIN_SPREAD, joint_jacobian, sphere_in_scanner
+from .hand_eye import MIN_SPREAD, joint_jacobian, rms_distance, sphere_in_scanner
 
 FIELD = (
     (-25.0, 25.0),
@@ -134,7 +133,7 @@ def unseen_changes(T_BF, T_FS, target, tolerance=1e-3):
     """
     x_S = sphere_in_scanner(T_BF, T_FS, target)
     as_count(len(x_S), "the number of poses")
-    distance = math.sqrt((x_S**2).sum(-1).mean())
+    distance = rms_distance(x_S)
     scale = np.array([1 / distance] * 3 + [1.0] * 6)
     _, values, Vt = np.linalg.svd(joint_jacobian(T_BF, x_S, T_FS) * scale, full_matrices=False)
     free = Vt[values <= tolerance * values[0]]

@@ -126,9 +126,9 @@ def clock_offset(time_a, T_a, time_b, T_b, max_offset=None):
     time_a, time_b = as_shape(time_a, "time_a", "n"), as_shape(time_b, "time_b", "m")
     if min(len(time_a), len(time_b)) < 2:
         raise ValueError(f"streams must hold at least 2 samples each, got {len(time_a)} and {len(time_b)}")
-    step = min(np.median(np.diff(time_a)), np.median(np.diff(time_b)))
+    medians = [np.median(np.diff(time)) for time in (time_a, time_b)]
+    step, span = min(medians), max(SPAN, 2 * max(medians))
     as_positive(step, "the median step of both streams")
-    span = max(SPAN, 2 * np.median(np.diff(time_a)), 2 * np.median(np.diff(time_b)))
     steps = max(np.ptp(time_a), np.ptp(time_b)) / step
     if steps > MOST:
         raise ValueError(f"streams must last at most {MOST:.0e} of their median steps, got {shown(steps)}")

@@ -373,8 +373,8 @@ def exact_step(g, B, radius):
     start = np.maximum(-eigenvalues[..., 0], 0.0) + 1e-14 * size
     shift = np.where(_length(at(start)) <= radius, start, high)
     step = at(shift)
-    missing = np.sqrt(np.maximum(radius**2 - (step * step).sum(-1), 0.0))
-    step[..., 0] += np.where(eigenvalues[..., 0] < 0, missing, 0.0) * np.where(step[..., 0] < 0, -1.0, 1.0)
+    rim = np.sqrt(np.maximum(radius**2 - (step[..., 1:] ** 2).sum(-1), 0.0))  # where the model bends down it ends there
+    step[..., 0] = np.where(eigenvalues[..., 0] < 0, np.copysign(rim, step[..., 0]), step[..., 0])
     return (V @ step[..., None])[..., 0]
 
 
@@ -818,6 +818,5 @@ def _stuck(point, step):
     eps = np.finfo(float).eps
     if np.linalg.norm(step) > eps * (np.finfo(float).tiny + np.linalg.norm(point.x)):
         return "", False
-    newton = -np.linalg.lstsq(point.curvature, point.gradient, rcond=None)[0]
-    promised = -0.5 * point.gradient @ newton
-    return "no step lowers the cost, down to rounding", bool(abs(promised) <= 8 * eps * abs(point.cost))
+    promised = 0.5 * abs(point.gradient @ np.linalg.lstsq(point.curvature, point.gradient, rcond=None)[0])
+    return "no step lowers the cost, down to rounding", bool(promised <= 8 * eps * abs(point.cost))

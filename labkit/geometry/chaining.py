@@ -184,7 +184,7 @@ def distribute_closure(transforms, shares=None):
     links = orthonormalize(np.array(np.broadcast_arrays(*_links(transforms))))
     poses = stations(links)
     N = len(links)
-    shares = np.full(N, 1 / N) if shares is None else as_points(shares, "shares", dim=N)
+    shares = np.ones(N) if shares is None else as_points(shares, "shares", dim=N)
     if shares.ndim != 1 or (shares < 0).any() or shares.sum() <= 0:
         raise ValueError(f"shares must be {N} numbers, none negative and not all zero, got {shown(shares)}")
     angle = rotation_angle(poses[-1]).max(initial=0)

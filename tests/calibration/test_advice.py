@@ -1,5 +1,7 @@
 """What stays unknown, in words; one axis, mixed roles, open loops and blocks of rows."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -79,6 +81,30 @@ def test_files_whose_inverse_fits_are_refused_and_both_named(inverse, eye_to_han
     with pytest.raises(ValueError, match="sensor file holds the sensor in the target.*times better") as refusal:
         advice.refuse_mixed_roles(model, eye_to_hand)
     assert f"robot file the base in the flange, {other} was meant" in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("misfit", "times"),
+    [
+        ((11.0, 0.6), "11 times"),
+        ((0.6, 11.0), "11 times"),
+        ((11.0, 0.4), None),  # one is clearly better, the other worse
+        ((9.0, 9.0), None),
+        ((999.0, 2.0), "999 times"),
+        ((2.0, 1500.0), "over 1000 times"),
+    ],
+)
+def test_roles_are_refused_where_others_fit_ten_times_better_and_in_nothing_half_as_well(misfit, times, monkeypatch):
+    """Angle and distance within which the inverse fits are 1 here."""
+    model = HandEyeModel(*cell())
+    other = SimpleNamespace(misfit=(1.0, 1.0))
+    monkeypatch.setattr(advice, "HandEyeModel", lambda T_BF, T_ST: other)
+    model._candidate = None, misfit
+    if times is None:
+        advice.refuse_mixed_roles(model, True)
+    else:
+        with pytest.raises(ValueError, match=f"closes {times} better"):
+            advice.refuse_mixed_roles(model, True)
 
 
 def test_rows_in_another_order_leave_the_loop_open():

@@ -269,3 +269,48 @@ def test_the_first_robust_rounds_weigh_by_one_over_the_distance_and_the_later_on
     np.testing.assert_allclose(given[0], 1 / np.maximum(d, 1.0), rtol=1e-6)
     np.testing.assert_allclose(given[ax_xb.LOOSE_ROUNDS], np.maximum(1 - (d / ax_xb.TUKEY) ** 2, 0) ** 2, rtol=1e-6)
     assert d.max() > ax_xb.TUKEY > 1 and len(given) == ax_xb.LOOSE_ROUNDS + 1
+
+
+@pytest.mark.parametrize("room", [ax_xb, fast_ax_xb])
+def test_exact_readings_have_the_noise_of_their_rounding(room):
+    """A billionth of a radian, and of the longest coordinates of robot and sensor together."""
+    T_BF, T_ST = setup(np.random.default_rng(40), 12)
+    result = room.calibrate_hand_eye(T_BF, T_ST)
+    longest = np.abs(T_BF[:, :3, 3]).max() + np.abs(T_ST[:, :3, 3]).max()
+    np.testing.assert_allclose(result.std[[0, 3]], [1e-9, 1e-9 * longest], rtol=1e-9)
+    np.testing.assert_allclose(result.history[-1, :2], [1e-9, 1e-9 * longest], rtol=1e-9)
+
+
+@pytest.mark.parametrize("room", [ax_xb, fast_ax_xb])
+@pytest.mark.parametrize("robust", [False, True])
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_the_unit_of_length_changes_lengths_alone(room, robust, unit):
+    T_BF, T_ST = setup(np.random.default_rng(41), 12, 1e-3, 0.2)
+    T_ST[4, 1, 3] += 50.0
+    plain = room.calibrate_hand_eye(T_BF, T_ST, robust=robust)
+    for T in (T_BF, T_ST):
+        T[:, :3, 3] *= unit
+    other = room.calibrate_hand_eye(T_BF, T_ST, robust=robust)
+    lengths = np.repeat([1.0, unit, 1.0, unit], 3)
+    np.testing.assert_allclose(other.T_FS[:3, :3], plain.T_FS[:3, :3], atol=1e-7)
+    np.testing.assert_allclose(other.T_FS[:3, 3] / unit, plain.T_FS[:3, 3], atol=1e-5)
+    np.testing.assert_allclose(other.weights, plain.weights, atol=1e-4)
+    np.testing.assert_allclose(other.std / lengths[:6], plain.std, rtol=1e-4)
+    size = np.sqrt(np.diagonal(plain.covariance))
+    correlations = other.covariance / np.outer(lengths * size, lengths * size)
+    np.testing.assert_allclose(correlations, plain.covariance / np.outer(size, size), atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("n", "tilt", "refused"), [(2, 1.2, True), (2, 3.0, False), (200, 1.2, True), (200, 3.0, False)]
+)
+def test_how_far_from_parallel_axes_must_be_does_not_depend_on_their_number(n, tilt, refused):
+    """Half of the motions turn about z, half about an axis tilted by some millionths of a radian."""
+    turns = np.tile([[0.0, 0, 1], [0, tilt * 1e-6, 1]], (n // 2, 1))
+    A = pose(exp_so3(np.pi / 2 * turns), np.random.default_rng(5).uniform(-99, 99, (n, 3)))
+    B = invert(T_FS) @ A @ T_FS
+    if refused:
+        with pytest.raises(ValueError, match="parallel"):
+            ax_xb.solve_ax_xb(A, B)
+    else:
+        ax_xb.solve_ax_xb(A, B)

@@ -557,6 +557,7 @@ def test_orientations_count_as_one_up_to_the_angle_asked_for():
 
     np.testing.assert_allclose(seen_after(0.006)[:3, :3], T_FS0[:3, :3], atol=2e-3)  # 0.006 deg move it 0.07 mm of 60
     np.testing.assert_allclose(seen_after(0.6, max_turn_deg=1.0)[:3, :3], T_FS0[:3, :3], atol=0.2)
+    seen_after(0.98, max_turn_deg=1.0)
     for turn, least, limit in ((0.011, "0.011", 0.0105), (1.2, "1.2", 1.0)):
         with pytest.raises(ValueError, match=f"the nearest differ by {least} deg"):
             seen_after(turn, max_turn_deg=limit)
@@ -572,6 +573,15 @@ def test_scenes_of_the_literature_fill_their_ranges():
             np.abs(values).max() <= half and (values.min(0) < -0.8 * half).all() and (values.max(0) > 0.8 * half).all()
         )
     x_S = np.array([s.x_S[:12] for s in scenes])
+    assert (x_S[..., :2].min((0, 1)) < [-24, -19]).all() and (x_S[..., :2].max((0, 1)) > [24, 19]).all()
+    turns = np.array([Rotation.from_matrix(s.T_FS[:3, :3]).as_rotvec() for s in scenes])
+    assert (turns.min(0) < -0.8).all() and (turns.max(0) > 0.8).all() and np.abs(turns).max() <= 1
+    shifts = np.array([s.T_BF[0, :3, :3].T @ (s.T_BF[12:, :3, 3] - s.T_BF[0, :3, 3])[..., None] for s in scenes])[
+        ..., 0
+    ]
+    np.testing.assert_allclose(
+        shifts, np.tile([[30.0, 0, 0], [0, 30, 0], [0, 0, 30], [-30, 20, 10]], (40, 1, 1)), atol=1e-9
+    )
     assert (np.abs(x_S[..., :2]).max((0, 1)) < [26, 21]).all() and 188 < x_S[..., 2].min() < x_S[..., 2].max() < 292
 
 
@@ -590,3 +600,116 @@ def test_the_right_angled_rotations_are_the_24_of_a_cube():
     cube = {tuple(R.round().astype(int).ravel()) for R in Rotation.create_group("O").as_matrix()}
     found = [tuple(R.astype(int).ravel()) for R in hand_eye.right_angled()]
     assert len(found) == 24 and set(found) == cube
+
+
+def test_the_distance_of_many_sets_is_that_of_each():
+    sets = np.random.default_rng(3).normal(size=(2, 4, 5, 3))
+    expected = [[np.sqrt(np.mean([r @ r for r in rows])) for rows in few] for few in sets]
+    np.testing.assert_allclose(hand_eye.rms_distance(sets), expected)
+
+
+def test_one_center_in_the_scan_plane_is_enough_to_refuse():
+    T_BF, x_S = scene(6)
+    x_S[2, 1] = 0.0
+    with pytest.raises(ValueError, match="no center in the scan plane"):
+        hand_eye.radius_jacobian(T_BF, x_S, T_FS0, 20.0)
+    with pytest.raises(ValueError, match="off the scan plane"):
+        hand_eye.fit_radius(T_BF, x_S, 20.0)
+
+
+@pytest.mark.parametrize("room", [hand_eye, fast_hand_eye])
+@pytest.mark.parametrize(
+    ("along", "around", "words"),
+    [(0.0, 1e-10, "at one place"), (1e-5, 1e-10, "at one place"), (1e-2, 1e-10, "on one line")],
+)
+def test_what_rounding_makes_of_a_place_is_a_place(room, along, around, words):
+    """Beside a distance of 720 mm, the root of nine times 240 squared: a millionth of it along, of that across."""
+    rng = np.random.default_rng(6)
+    x_S = np.array([0.0, 5.0, 240.0]) + rng.uniform(-1, 1, (9, 1)) * [0, 0, along] + around * rng.normal(size=(9, 3))
+    T_BF = planning.poses_that_see(T_FS0, TARGET0, exp_so3(rng.uniform(-1, 1, (9, 3))), x_S)
+    with pytest.raises(ValueError, match=words):
+        room.calibrate_sphere_target(T_BF, x_S)
+
+
+def test_only_where_the_linear_system_says_nothing_are_right_angles_tried(monkeypatch):
+    tried = []
+    everywhere = hand_eye.right_angled
+    monkeypatch.setattr(hand_eye, "right_angled", lambda: tried.append(1) or everywhere()[:2])
+    hand_eye.calibrate_sphere_target(*scene(12))
+    assert not tried
+    hand_eye.calibrate_sphere_target(*scene(4))
+    assert tried
+
+
+@pytest.mark.parametrize("turn", [0.3, 1.5, 2.2, 2.8, 3.1])
+def test_a_step_that_ends_higher_is_cut_where_its_parabola_is_lowest(turn):
+    """Written out: slope at the start, heights at both ends, a tenth at least."""
+    T_BF, x_S = scene(9, std=0.5)
+    ones = np.ones(9)
+    R = T_FS0[:3, :3] @ exp_so3(turn * np.array([0.6, 0.0, 0.8]))
+    linear = np.concatenate([T_BF[:, :3, :3], np.tile(-np.eye(3), (9, 1, 1))], axis=2).reshape(27, 6)
+    fixed = (T_BF[:, :3, :3] @ (x_S @ R.T)[..., None])[..., 0] + T_BF[:, :3, 3]
+    shift = -np.linalg.lstsq(linear, fixed.ravel(), rcond=None)[0]
+    T, target = frames.pose(R, shift[:3]), shift[3:]
+
+    def after(step):
+        moved = frames.pose(T[:3, :3] @ exp_so3(step[:3]), T[:3, 3] + step[3:6]), target + step[6:]
+        return *moved, (hand_eye.sphere_residuals(T_BF, x_S, *moved) ** 2).sum()
+
+    cost = after(np.zeros(9))[2]
+    r, J = hand_eye.sphere_residuals(T_BF, x_S, T, target).ravel(), hand_eye.joint_jacobian(T_BF, x_S, T)
+    step = np.linalg.lstsq(J, -r, rcond=None)[0]
+    slope, cuts = r @ J @ step, 0  # half the derivative of the cost along the step
+    while after(step)[2] > cost:
+        rise = after(step)[2] - cost
+        share = max(0.1, -2 * slope / (2 * (rise - 2 * slope)))
+        step, slope, cuts = share * step, share * slope, cuts + 1
+    found, center, history = hand_eye._gauss_newton(R, T_BF, x_S, ones, 1)
+    np.testing.assert_allclose(found, after(step)[0], atol=1e-7)
+    np.testing.assert_allclose(center, after(step)[1], atol=1e-6)
+    np.testing.assert_allclose(history, np.sqrt(np.array([cost, after(step)[2]]) / 9))
+
+
+def test_plain_steps_have_settled_when_all_parts_are_short():
+    T_BF, x_S = scene(9)
+    start = frames.kuka_from_matrix(
+        frames.pose(T_FS0[:3, :3] @ exp_so3([0.02, 0.0, 0.01]), T_FS0[:3, 3] + [1.0, 0, 3.0])
+    )
+    told = {"parameters": "se3", "max_steps": 1}
+    poses = hand_eye.gauss_newton_pose(start, T_BF, x_S, TARGET0, **told).poses
+    turned = Rotation.from_matrix(poses[0, :3, :3].T @ poses[1, :3, :3]).as_rotvec()
+    longest = max(np.abs(poses[1, :3, 3] - poses[0, :3, 3]).max(), np.abs(turned).max() * hand_eye.rms_distance(x_S))
+    for share, settled in ((0.99, False), (1.01, True)):
+        again = hand_eye.gauss_newton_pose(start, T_BF, x_S, TARGET0, tolerance=share * longest, **told)
+        assert again.converged is settled
+
+
+@pytest.mark.parametrize("room", [hand_eye, fast_hand_eye])
+def test_of_exact_poses_all_count_and_what_is_off_does_not(room):
+    T_BF, x_S = scene(15, std=0.0)
+    x_S[0, 0] = T_BF[0, 0, 3] = 0.0  # a coordinate that happens to be zero
+    x_S = planning.sphere_in_scanner(T_BF, T_FS0, TARGET0)
+    x_S[[3, 8]] += [[1e-5, 0, 0], [0, 5.0, 0]]
+    found = room.calibrate_sphere_target(T_BF, x_S, robust=True)
+    assert found.weights.tolist() == [float(k not in (3, 8)) for k in range(15)]
+    lengths = np.linalg.norm(found.residuals, axis=1)
+    assert found.history[-1] == pytest.approx(np.sqrt((lengths**2).mean()), rel=1e-6)
+
+
+def test_kim_needs_a_cube_in_every_pose():
+    T_BF, X_S, cube = cube_scene()[:3]
+    X_S = X_S.copy()
+    X_S[4, :, 2] = 0.0
+    with pytest.raises(ValueError, match="span space in every pose"):
+        kim_linear(T_BF, X_S, cube)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_li_s_first_step_takes_any_unit(unit):
+    rng = np.random.default_rng(3)
+    T_BF = frames.pose(np.tile(exp_so3([0.3, 0.1, -0.4]), (5, 1, 1)), unit * rng.uniform(-99, 99, (5, 3)))
+    x_S = frames.transform(frames.invert(T_BF @ T_FS0), unit * TARGET0)
+    np.testing.assert_allclose(literature.li_rotation(T_BF, x_S), T_FS0[:3, :3], atol=1e-7)
+    T_BF[:, :3, 3] = np.outer(unit * rng.uniform(-99, 99, 5), [1.0, 2.0, 0.5])
+    with pytest.raises(ValueError, match="along one line"):
+        literature.li_rotation(T_BF, frames.transform(frames.invert(T_BF @ T_FS0), unit * TARGET0))

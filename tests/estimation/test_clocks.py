@@ -37,6 +37,14 @@ def test_interpolation_turns_evenly_and_meets_the_ends():
     assert np.allclose(steps, steps[0])  # one twist, the same on every part of the way
 
 
+def test_the_last_interval_lies_between_the_last_two_samples():
+    time, T = np.array([0.0, 1.0, 3.0]), np.tile(np.eye(4), (3, 1, 1))
+    T[:, 0, 3] = [0.0, 10.0, 50.0]
+    poses, known = sample_stream(time, T, np.array([0.5, 2.0, 3.0]), max_gap=5.0)
+    assert known.all()
+    np.testing.assert_allclose(poses[:, 0, 3], [5.0, 30.0, 50.0])
+
+
 def test_gaps_are_never_bridged():
     time = np.r_[0:1:0.1, 2:3:0.1]
     when = np.array([-0.01, 0, 0.05, 0.9, 0.95, 1.5, 2.0, 2.55, 2.95])
@@ -124,3 +132,27 @@ def test_the_fewest_samples_that_can_be_aligned():
     with pytest.raises(ValueError, match="at least 24 steps"):
         clock_offset(time_a, T_a, time_b[: few - 12], T_b[: few - 12])
     assert abs(clock_offset(time_a, T_a, time_b[: few + 60], T_b[: few + 60]).offset) < 0.05
+
+
+@pytest.mark.parametrize(("steps", "span"), [((0.02, 0.03), "0.3"), ((0.02, 0.5), "1"), ((0.5, 0.02), "1")])
+def test_a_turn_is_measured_over_two_steps_of_the_slower_stream_and_sampled_at_those_of_the_quicker(steps, span):
+    """So many of the quicker steps must be left beyond the span in both streams: 24 are enough, 23 are not."""
+    quick, span_s = min(steps), float(span)
+    for left, refused in ((23.5, False), (22.5, True)):  # points at 0, 1, ... of the steps
+        ends = [span_s + quick * left if step == quick else 60.0 for step in steps]
+        times = [np.append(np.arange(0, end - 1e-9, step), end) for end, step in zip(ends, steps)]
+        try:
+            said = str(clock_offset(times[0], motion(times[0]), times[1], motion(times[1])))
+        except ValueError as refusal:  # short streams may be refused for other reasons
+            said = str(refusal)
+        assert (f"at least 24 steps each beyond {span} s" in said) is refused
+
+
+def test_streams_that_are_too_short_or_too_long_are_refused_whichever_it_is():
+    time_a, T_a, time_b, T_b = streams(2, 0.0, n=200)
+    with pytest.raises(ValueError, match="at least 2 samples each, got 200 and 1"):
+        clock_offset(time_a, T_a, time_b[:1], T_b[:1])
+    late = np.append(time_a[:-1], 1e9)
+    for first, second in (((late, T_a), (time_b, T_b)), ((time_b, T_b), (late, T_a))):
+        with pytest.raises(ValueError, match=r"at most .* of their median steps, got 5e\+10"):
+            clock_offset(*first, *second)

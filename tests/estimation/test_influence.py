@@ -8,6 +8,7 @@ from labkit.estimation.influence import (
     VISIBLE,
     distance_limit,
     free_directions,
+    invert_normal,
     leave_out,
     shares,
     squared_distances,
@@ -103,3 +104,14 @@ def test_free_directions_change_no_residual_and_are_as_many_as_the_rank_lacks():
     np.testing.assert_allclose(flat @ free, 0, atol=1e-7)
     assert np.linalg.matrix_rank(free / scale[:, None]) == 2
     assert free_directions((J.reshape(-1, P) / scale).T @ (J.reshape(-1, P) / scale)).shape == (P, 0)
+
+
+def test_two_parameters_that_are_nearly_one_are_told_apart_down_to_a_trillionth():
+    """Eigenvalues 1 - c and 1 + c: refused where the first is below 1e-12 of the second."""
+    for gap, refused in ((1.5e-12, True), (3e-12, False)):
+        N = np.array([[1.0, 1 - gap], [1 - gap, 1.0]])
+        if refused:
+            with pytest.raises(ValueError, match="leave a direction"):
+                invert_normal(N)
+        else:
+            np.testing.assert_allclose(invert_normal(N) * gap, [[0.5, -0.5], [-0.5, 0.5]], rtol=1e-3)

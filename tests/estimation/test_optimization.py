@@ -221,7 +221,7 @@ def test_unknown_on_a_manifold(method):
 
 def test_scale_makes_units_equivalent():
     """One unknown a thousand times larger: the same path once `scale` says so."""
-    factor = np.array([1.0, 1000.0])
+    factor = np.array([20.0, 1e5])
     runs = [method(rosen_residual, rosen_jacobian, [-1.2, 1.0]) for method in LEAST_SQUARES[1:]]
 
     def residual(x):
@@ -230,12 +230,27 @@ def test_scale_makes_units_equivalent():
     def jacobian(x):
         return rosen_jacobian(x / factor) / factor
 
-    scaled = [method(residual, jacobian, [-1.2, 1000.0], scale=factor) for method in LEAST_SQUARES[1:]]
+    scaled = [method(residual, jacobian, factor * [-1.2, 1.0], scale=factor) for method in LEAST_SQUARES[1:]]
     for plain, other in zip(runs, scaled):
         np.testing.assert_allclose(other.x[:10] / factor, plain.x[:10], rtol=1e-8)
 
 
 # --- Steps ---
+
+
+@pytest.mark.parametrize("method", LEAST_SQUARES[1:])
+def test_one_scale_for_all_unknowns_is_one_for_each(method):
+    one, each = (method(rosen_residual, rosen_jacobian, [-1.2, 1.0], scale=s) for s in (7.0, np.full(2, 7.0)))
+    np.testing.assert_allclose(one.x, each.x, rtol=1e-9)
+    assert one.iterations == each.iterations
+
+
+@pytest.mark.parametrize("method", LEAST_SQUARES[1:])
+def test_one_slope_of_zero_is_no_end(method):
+    """At (0, 0) Rosenbrock's function has the gradient (-2, 0)."""
+    run = method(rosen_residual, rosen_jacobian, [0.0, 0.0])
+    assert run.converged and run.iterations > 1
+    np.testing.assert_allclose(run.solution, [1.0, 1.0], atol=1e-9)
 
 
 def definite(n, rng):
@@ -413,6 +428,7 @@ def test_settled_is_a_short_step_or_a_residual_at_right_angles_to_every_column()
     far = {"x": [1.0, 2.0]}
     assert rule(at([1.0, 2.0]), at([1.0, 2.0 + 1e-7])) == "the step is small"
     assert not rule(at([1.0, 2.0]), at([1.0, 2.1]))
+    assert rule(at([1.0, 2.0]), at([1.0, 2.0 + 2.1e-6])) and not rule(at([1.0, 2.0]), at([1.0, 2.0 + 2.4e-6]))
     for gradient, said in (([1e-6, 1e-7], True), ([1e-6, 1e-4], False), ([1e-4, 1e-7], False), ([1.4e-5, 9e-7], True)):
         assert bool(rule(at([0.0, 0.0]), at(**far, gradient=gradient, residual=r, jacobian=J))) is said
 
@@ -431,6 +447,8 @@ def test_a_search_that_is_stuck_has_arrived_only_where_nothing_is_promised(gradi
     point = SimpleNamespace(x=np.array([1.0]), cost=1.0, gradient=np.array([gradient]), curvature=np.array([[1.0]]))
     assert opt._stuck(point, np.array([1e-17])) == ("no step lowers the cost, down to rounding", converged)
     assert opt._stuck(point, np.array([1e-3])) == ("", False)
+    large = SimpleNamespace(**vars(point) | {"x": np.array([1e3])})
+    assert opt._stuck(large, np.array([1e-13]))[0] and not opt._stuck(large, np.array([3e-13]))[0]
     point.cost = 1e9  # whose rounding is 1e-7: now both promise nothing
     assert opt._stuck(point, np.array([1e-17]))[1] == (0.5 * gradient**2 < 8 * 2.3e-16 * 1e9)
 
@@ -504,3 +522,16 @@ def test_the_stopping_rule_is_asked_after_accepted_steps_alone(run):
 def test_a_good_step_to_the_rim_doubles_any_radius():
     assert opt.next_radius(3.0, 3.0, 0.9, 100.0) == 6.0 and opt.next_radius(0.2, 0.2, 0.9, 100.0) == 0.4
     assert opt.next_radius(3.0, 3.0, 0.9, 5.0) == 5.0 and opt.next_radius(3.0, 2.0, 0.9, 100.0) == 3.0
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("tilt", [0.0, 1e-15, -1e-15, 1e-9])
+def test_the_exact_step_depends_on_no_unit_and_stays_inside_where_it_is_hard(unit, tilt):
+    """A slope along the lowest curvature that is nothing beside rounding: the step still ends on the rim."""
+    g, B = unit * np.array([tilt, 0.5]), unit * np.diag([-2.0, 1.0])
+    for radius in (0.5, 3.0):
+        step = opt.exact_step(g, B, radius)
+        assert np.linalg.norm(step) == pytest.approx(radius, rel=1e-9)
+        rest = max(-0.5 / (1 + 2), -radius)  # (B + 2) step = -g across, and the rim along
+        np.testing.assert_allclose(np.abs(step), [np.sqrt(radius**2 - rest**2), -rest], rtol=1e-6)
+        assert step[0] * tilt <= 0  # down

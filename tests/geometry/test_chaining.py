@@ -1,6 +1,7 @@
 """The loop of chapter 2 against closed forms, Monte Carlo and the printed sheet."""
 
 import importlib.util
+from math import factorial
 
 import numpy as np
 import pytest
@@ -230,6 +231,12 @@ def test_right_jacobian_and_its_inverse_against_the_matrix_exponential():
     ad = chaining._ad(xi)
     exact = expm(np.block([[-ad, np.eye(6)], [np.zeros((6, 12))]]))[:6, 6:]
     scale = np.repeat([1.0, 50.0], 3)  # a turn of 1 rad beside a length of 50 mm
+    orders = [np.linalg.matrix_power(ad, k) for k in range(5)]
+    taylor = sum((-1) ** k * power / factorial(k + 1) for k, power in enumerate(orders))
+    np.testing.assert_allclose(chaining._right_jacobian(xi), taylor, rtol=1e-12, atol=1e-15)
+    numbers = [1, 1 / 2, 1 / 6, 0, -1 / 30]  # of Bernoulli, the second with its other sign
+    inverse = sum(b * power / factorial(k) for k, (b, power) in enumerate(zip(numbers, orders)))
+    np.testing.assert_allclose(chaining._right_jacobian_inverse(xi), inverse, rtol=1e-12, atol=1e-15)
     for J, goal in (
         (chaining._right_jacobian(xi), exact),
         (chaining._right_jacobian_inverse(xi), np.linalg.inv(exact)),
@@ -261,6 +268,9 @@ def test_pose_graph_refuses_an_island():
         chaining.solve_pose_graph([(0, 1), (2, 3)], np.tile(np.eye(4), (2, 1, 1)), 1e-3, 0.1)
     with pytest.raises(ValueError, match="edges must be pairs"):
         chaining.solve_pose_graph([(0, 1)], np.tile(np.eye(4), (2, 1, 1)), 1e-3, 0.1)
+    for edge in ((1, -1), (1, 0.5), (1, 1)):
+        with pytest.raises(ValueError, match="two different nodes, numbered from 0"):
+            chaining.solve_pose_graph([(0, 1), edge], np.tile(np.eye(4), (2, 1, 1)), 1e-3, 0.1)
 
 
 @pytest.mark.parametrize(
@@ -268,6 +278,8 @@ def test_pose_graph_refuses_an_island():
     [
         (lambda: chaining.chain([]), "at least 1"),
         (lambda: chaining.chain([np.eye(3)]), r"transforms\[0\] must have shape"),
+        (lambda: chaining.chain(np.eye(4)), r"transforms\[0\] must have shape"),
+        (lambda: chaining.around(np.tile(np.eye(4), (3, 1, 1)), [(0, True), (3, True)]), "from 0 to 2, got 3"),
         (lambda: chaining.chain([np.eye(4), 2 * np.eye(4)]), r"transforms\[1\]"),
         (lambda: chaining.rounding_bound([np.eye(4)], 0.0), "half_unit must be positive"),
         (lambda: chaining.expected_closure([np.eye(4)], -1.0, 0.0), "std_rot must not be negative"),

@@ -195,8 +195,10 @@ def test_kuka_from_degrees():
 def test_quaternion_against_scipy():
     q = RNG.normal(size=(20, 4))
     np.testing.assert_allclose(frames.matrix_from_quaternion(q), Rotation.from_quat(q).as_matrix(), atol=1e-14)
-    with pytest.raises(ValueError, match="zero quaternion"):
-        frames.matrix_from_quaternion([0, 0, 0, 0])
+    np.testing.assert_allclose(frames.matrix_from_quaternion([[0, 0, 0, 2.0], [0, 3.0, 0, 0]])[1], np.diag([-1, 1, -1]))
+    for q in ([0, 0, 0, 0], [[0, 0, 0, 1], [0, 0, 0, 0]]):
+        with pytest.raises(ValueError, match="zero quaternion"):
+            frames.matrix_from_quaternion(q)
 
 
 def test_fit_frame_against_scipy_and_on_exact_points():
@@ -215,8 +217,13 @@ def test_fit_frame_refuses_a_line_and_too_few_points():
         frames.fit_frame(1e6 * line, 1e6 * line)
     triangle = 1e-4 * np.array([[0.0, 0, 0], [3, 0, 0], [0, 2, 0]])  # small is not flat
     np.testing.assert_allclose(frames.fit_frame(triangle, triangle), np.eye(4), atol=1e-9)
+    nearly = line + 1e-7 * np.array([[0.0, 0, 1], [0, 0, -2], [0, 0, 1]])  # across the line: 3e-14 along it, squared
+    with pytest.raises(ValueError, match=r"singular value is 1\.5e-14 of the first"):
+        frames.fit_frame(np.array([50 * triangle, nearly]), np.array([50 * triangle, nearly]))
     with pytest.raises(ValueError, match="at least 3 points are needed, got 2"):
         frames.fit_frame(line[:2], line[:2])
+    with pytest.raises(ValueError, match=r"leading axes .* \(2,\) of T, \(3,\) of points"):
+        frames.transform(np.tile(np.eye(4), (2, 1, 1)), np.zeros((3, 3)))
 
 
 @pytest.mark.parametrize("c, u, h", [(100, 30, 40), (100, 0, 10), (80, 120, 60)])
@@ -240,6 +247,9 @@ def test_the_bound_holds_and_only_the_turn_in_the_plane_gains():
     bound = np.diag(frames.fit_covariance(triangle, 0.05))
     np.testing.assert_allclose(gs[:2], bound[:2])
     assert gs[2] > 1.2 * bound[2]
+    np.testing.assert_allclose(
+        frames.fit_covariance(1e-8 * triangle, 0.05), 1e16 * frames.fit_covariance(triangle, 0.05)
+    )
 
 
 def test_the_six_points_are_the_printed_ones():

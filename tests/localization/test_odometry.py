@@ -200,7 +200,7 @@ def test_the_slope_of_sinc_near_zero_and_beyond(h):
     """Its series to four more orders near zero, a difference of long step and high order elsewhere."""
     if abs(h) < 0.02:
         exact = h * (-1 / 3 + h**2 / 30 - h**4 / 840 + h**6 / 45360 - h**8 / 3991680)
-        limit = 1e-12 if abs(h) < 1e-2 else 1e-9  # beyond, the closed form loses four digits
+        limit = 1e-15 if abs(h) < 1e-2 else 1e-9  # beyond, the closed form loses four digits
     else:
         exact, limit = float(numeric_jacobian(lambda x: np.sinc(x / np.pi), np.array([h]), 1e-3)[0, 0]), 1e-6
     assert odometry.sinc_slope(np.array(h)) == pytest.approx(exact, rel=limit)
