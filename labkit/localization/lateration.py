@@ -223,7 +223,7 @@ def circle_intersections(landmarks, distances):
     height = np.sqrt(max(0.0, r1**2 - foot**2))
     along = along / base
     across = np.array([-along[1], along[0]])
-    return a + foot * along + height * np.array([[1.0], [-1.0]]) * across
+    return a + foot * along + np.array([[height], [-height]]) * across
 
 
 def linear_start(landmarks, distances):

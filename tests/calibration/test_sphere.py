@@ -158,3 +158,51 @@ def test_the_algebraic_start_of_a_sphere_is_exact_without_noise(monkeypatch):
     with pytest.raises(Started) as caught:
         sphere.fit_sphere(points)
     np.testing.assert_allclose(caught.value.args[0], [900.0, -400.0, 250.0, 30.0], rtol=1e-9)
+
+
+def test_the_scanner_sees_the_side_of_the_sphere_that_faces_it():
+    center, radius = np.array([5.0, 12.0, 240.0]), 30.0
+    x, z = sphere.scan_line(center, radius, 0.7, 9)
+    cut = np.sqrt(radius**2 - 12.0**2)
+    assert (np.diff(x) > 0).all() and x[0] == pytest.approx(5.0 - cut * np.sin(0.7))
+    np.testing.assert_allclose(z, 240.0 - np.sqrt(cut**2 - (x - 5.0) ** 2))
+
+
+def test_a_line_beside_the_origin_is_no_arc_and_flat_points_are_no_sphere():
+    with pytest.raises(ValueError, match="collinear"):
+        sphere.fit_circle(np.linspace(-5, 5, 9), np.full(9, 240.0))
+    rng = np.random.default_rng(1)
+    for unit in (1e-6, 1e6):
+        points = rng.normal(size=(12, 3))
+        points *= unit / np.linalg.norm(points, axis=1, keepdims=True)
+        assert sphere.fit_sphere(points).radius == pytest.approx(unit)
+        with pytest.raises(ValueError, match="one plane"):
+            sphere.fit_sphere(points * [1, 1, 1e-14])
+
+
+def test_points_at_the_middle_of_all_are_points():
+    """On the axes of the sphere or circle two coordinates, or one, are those of the middle."""
+    found = sphere.fit_sphere(30.0 * np.concatenate([np.eye(3), -np.eye(3)]))
+    np.testing.assert_allclose([*found.center, found.radius], [0, 0, 0, 30.0], atol=1e-9)
+    center, radius = sphere.fit_circle_algebraic([30.0, 0, -30, 0], [0, 30.0, 0, -30])
+    np.testing.assert_allclose([*center, radius], [0, 0, 30.0], atol=1e-9)
+
+
+def test_a_fit_goes_on_while_any_of_its_unknowns_moves():
+    """Mirror images about x = 0: that coordinate of the center is right from the start."""
+    x, z = arc((0.0, 240.0), 28.5, 0.6, 20, std=0.5)
+    x, z = np.concatenate([x, -x]), np.concatenate([z, z])
+    found = sphere.fit_circle(x, z)
+    best = least_squares(lambda q: np.hypot(x, z - q[0]) - q[1], [240.0, 28.0], xtol=1e-15, ftol=1e-15, gtol=1e-15).x
+    np.testing.assert_allclose([found.center[1], found.radius], best, rtol=1e-8)
+
+
+@pytest.mark.parametrize("start", [(0.0, 0.0, 1.0), (40.0, -9.0, 5.0), (0.0, 0.5, 90.0)])
+def test_steps_that_go_too_far_are_halved(start):
+    """From bad starts, where a whole step would raise the sum of squares; the minimum is SciPy's."""
+    x, z = arc((3.0, 10.0), 28.5, 1.2, 25, std=0.3)
+    points = np.column_stack([x, z])
+    found, residuals, J = sphere._geometric(points, np.array(start))
+    best = least_squares(lambda q: np.hypot(x - q[0], z - q[1]) - q[2], found, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    np.testing.assert_allclose(found, best.x, atol=1e-6)
+    assert np.abs(J.T @ residuals).max() < 1e-6

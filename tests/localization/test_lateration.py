@@ -187,3 +187,44 @@ def test_the_first_intersection_lies_left_of_the_way_between_the_centers():
     np.testing.assert_allclose(found, [[1.8, 2.4], [1.8, -2.4]], atol=1e-12)
     found = lateration.circle_intersections([[5.0, 0.0], [0.0, 0.0]], [4.0, 3.0])
     np.testing.assert_allclose(found, [[1.8, -2.4], [1.8, 2.4]], atol=1e-12)
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e9])
+def test_newton_s_iteration_takes_any_unit(unit):
+    d = distances(TWO, [3, 2])
+    end = lateration.newton_lateration(unit * TWO, unit * d, unit * np.array([4.0, 3.0]))
+    assert end.converged and len(end.path) < 10
+    np.testing.assert_allclose(end.position / unit, [3, 2], rtol=1e-9)
+    assert "one line" in lateration.newton_lateration(unit * TWO, unit * d, unit * np.array([4.0, 0.0])).reason
+    assert "one line" not in lateration.newton_lateration(unit * TWO, unit * d, unit * np.array([4.0, 1e-5])).reason
+
+
+def test_residuals_are_what_was_measured_less_what_was_computed_one_by_one():
+    d = distances(FOUR, [3.0, 4.0]) + [[0.1, -0.2, 0.0, 0.3], [0.0, 0.2, 0.1, -0.1]]
+    found = lateration.laterate(FOUR, d)
+    lengths = np.array([distances(FOUR, x) for x in found.position])
+    np.testing.assert_allclose(found.residuals, d - lengths, atol=1e-12)
+    np.testing.assert_allclose(lateration.square_residuals(FOUR, d, found.position), lengths**2 - d**2, atol=1e-9)
+
+
+def test_the_search_goes_on_while_any_coordinate_of_any_run_moves():
+    """From the middle line the first coordinate is right at once; the other runs are one step away, and far."""
+    d = distances(FOUR, [5.0, 3.0])
+    starts = np.array([[5.0, 80.0], [5.0, 3.0], [200.0, -70.0]])
+    found = lateration.laterate(FOUR, np.tile(d, (3, 1)), starts)
+    assert found.converged.all()
+    np.testing.assert_allclose(found.position, np.tile([5.0, 3.0], (3, 1)), atol=1e-9)
+
+
+@pytest.mark.parametrize(("angle", "fixed"), [(1.6e-7, False), (2.5e-7, True)])
+def test_directions_are_one_when_their_second_singular_value_is_a_ten_millionth(angle, fixed):
+    """Two unit vectors at a small angle have the singular values sqrt(2) and angle / sqrt(2)."""
+    marks = np.array([[1.0, 0.0], [1.0, angle]])
+    found = lateration.laterate(marks, [1.0, 1.0], start=[0.0, 0.0])
+    np.testing.assert_allclose(found.singular_values, [np.sqrt(2), angle / np.sqrt(2)], rtol=1e-6)
+    assert np.isfinite(found.covariance).all() == fixed
+    if fixed:
+        assert np.trace(lateration.dilution(marks, [0.0, 0.0])) == pytest.approx(2 / angle**2, rel=1e-3)
+    else:
+        with pytest.raises(ValueError, match="one line"):
+            lateration.dilution(marks, [0.0, 0.0])

@@ -4,10 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from labkit.estimation.differences import numeric_jacobian
 from labkit.fast.path import filter_path
-from labkit.geometry.planar import wrap_angle
+from labkit.geometry.planar import compose_pose, wrap_angle
 from labkit.localization import locate as room
 from labkit.localization import odometry, path
 from labkit.localization.path import Log, Noise
@@ -88,6 +89,16 @@ def test_times_that_come_twice_belong_to_the_part_their_order_tells():
     np.testing.assert_allclose(lag, 0.02, atol=1e-9)
 
 
+def test_a_reading_may_belong_to_an_earlier_part_and_parts_must_rise():
+    time = np.concatenate([0.1 * np.arange(10), 2 + 0.1 * np.arange(10), 5 + 0.1 * np.arange(10)])
+    row, lag = room.place_readings(time, np.array([0, 10, 20]), np.array([5.12, 0.32]))
+    assert row.tolist() == [21, 3]
+    np.testing.assert_allclose(lag, 0.02, atol=1e-9)
+    for starts in ([0, 20, 10], [0, 10, 40], [3, 10, 20]):
+        with pytest.raises(ValueError, match="starts must rise from 0"):
+            room.place_readings(time, np.array(starts), np.array([0.5]))
+
+
 # --- a global start --------------------------------------------------------------------------------------------------
 
 
@@ -130,6 +141,39 @@ def test_a_start_that_nothing_explains_is_refused():
         room.global_start(wild, Noise(**NOISE), np.random.default_rng(0))
 
 
+@pytest.mark.parametrize("named", [True, False])
+def test_every_proposed_pose_would_read_what_was_read(named):
+    time, u, truth, rows, when, ids, z = course(60)
+    log = as_log(time, u, rows, when, ids if named else np.full(len(ids), -1), z)
+    way = np.array([0.7, -0.4, 0.9])  # since the first row
+    poses = room._around(log, 4, way, np.random.default_rng(3))
+    marks = MARKS[ids[4] : ids[4] + 1] if named else MARKS
+    assert poses.shape == (len(marks) * room.PARTICLES, 3)
+    for mark, some in zip(marks, poses.reshape(len(marks), room.PARTICLES, 3)):
+        at = np.array([compose_pose(x, way) for x in some])
+        off = np.array([path.measurement(x, mark[None])[0] for x in at]) - z[4]
+        off[:, 1] = wrap_angle(off[:, 1])
+        np.testing.assert_allclose(off, 0, atol=1e-9)
+        around = np.sort(np.arctan2(*(at[:, :2] - mark).T[::-1]))
+        assert np.diff(around).max() < 0.3  # from all sides
+
+
+def test_a_reading_without_a_name_is_of_the_mark_it_fits_best():
+    x, way, std = np.array([[4.0, 3.0, 2.8], [1.0, 1.0, -2.0]]), np.array([0.7, -0.4, 0.9]), np.array([0.1, 0.05])
+    z = np.array([5.0, -3.0])
+    for pose_, found, total in zip(
+        x, room._difference(x, way, z, -1, MARKS, std), room._misfits(x, way, z, -1, MARKS, std)
+    ):
+        off = z - path.measurement(compose_pose(pose_, way), MARKS)
+        off[:, 1] = wrap_angle(off[:, 1])
+        off /= std
+        np.testing.assert_allclose(found, off[np.argmin(np.hypot(*off.T))])
+        assert total == pytest.approx((off**2).sum(1).min())
+    named = room._difference(x, way, z, 2, MARKS, std)[0]
+    off = z - path.measurement(compose_pose(x[0], way), MARKS[2:3])[0]
+    np.testing.assert_allclose(named, [off[0] / 0.1, wrap_angle(off[1]) / 0.05])
+
+
 # --- the whole -------------------------------------------------------------------------------------------------------
 
 
@@ -151,6 +195,8 @@ def test_errors_and_figures_against_the_truth():
     assert told["rms_position"] < 0.1 and told["mean_nis"] == pytest.approx(found.nis[found.used].mean())
     assert 1.0 < told["mean_nis"] < 3.5 and told["mean_nis_band"][0] < 2 < told["mean_nis_band"][1]
     assert told["fitted"] == [] and told["noise"] == NOISE
+    n = int(found.used.sum())  # the sum of their NIS has two degrees of freedom a reading
+    np.testing.assert_allclose(told["mean_nis_band"], stats.chi2.ppf([0.005, 0.995], 2 * n) / n, rtol=1e-6)
 
 
 def test_between_the_samples_of_the_truth_the_way_is_straight():
@@ -305,28 +351,29 @@ def stub(log, nis_and_log_det):
     return filter_stub
 
 
-@pytest.mark.parametrize("far", [0.09, 0.2, 2.0])
-def test_fitted_noise_has_the_greatest_likelihood_of_a_mixture(far):
-    """Against a search through a grid; a reading that is far off costs what one that means nothing costs."""
-    rng, levels = np.random.default_rng(12), np.linspace(-6, 2, 4001)
-    log = as_log(*(course(60)[k] for k in (0, 1, 3, 4, 5, 6)))
-    off = 0.02 * rng.normal(size=len(log.z))
-    off[::4] = far
-    reach = log.z[:, 0].max()
-    bearing = -np.log(30.0)
+def test_fitted_noise_has_the_greatest_likelihood_of_a_mixture():
+    """Against a search through a grid. Half of the readings hold the logarithm of the noise by a parabola, the other
+    half pull it down, the less the nearer their density comes to that of readings that mean nothing: a fifth more or
+    less of that moves the optimum by 0.2."""
+    levels, middle = np.linspace(-3, 0, 3001), np.log(0.2)
+    log = as_log(*(course(62)[k] for k in (0, 1, 3, 4, 5, 6)))
+    reach, held = log.z[:, 0].max(), np.arange(len(log.z)) < 10
+    assert len(log.z) == 20 and reach > 2
 
     def told(std):
-        return (off / std) ** 2, 2 * (np.log(std) + bearing)
+        level = np.log(std)
+        falling = 2 * (np.log(9 * reach) + 2 * (level - middle))
+        return np.where(held, 1.25 * (level - middle - 0.8) ** 2, 0.0), np.where(held, -20.0, falling)
 
     def mixture(level):
         nis, log_det = told(np.exp(level))
         density = np.exp(-0.5 * (nis + log_det)) / (2 * np.pi)
-        return -np.log(0.9 * density + 0.1 / (2 * np.pi * reach)).sum() + 0.01 * (level - np.log(0.2)) ** 2
+        return -np.log(0.9 * density + 0.1 / (2 * np.pi * reach)).sum() + 0.01 * (level - middle) ** 2
 
     best = levels[np.argmin([mixture(level) for level in levels])]
     noise = Noise(0.2, 0.05, 0.05, 0.05)
     found = room.fit_noise(log, np.zeros(3), np.eye(3), noise, ("std_range",), stub(log, told))
-    assert abs(np.log(found.std_range) - best) < 0.03
+    assert abs(np.log(found.std_range) - best) < 0.06
     assert (found.std_bearing, found.std_way, found.std_turn) == (0.05, 0.05, 0.05)
 
 

@@ -277,3 +277,27 @@ def test_each_step_to_a_position_is_damped_and_bounded(far):
     J = jacobian(TX40.dh, HOME)[3:, :3]
     step = damped(J, gap, 1e-6 + 10 * min(np.linalg.norm(gap), 100.0), 0.3)
     np.testing.assert_allclose(reach_position(TX40, goal, HOME, iterations=2)[:3], HOME[:3] + step, atol=1e-9)
+
+
+def test_one_joint_beyond_its_limit_is_enough():
+    q = np.tile(HOME, (3, 1))
+    q[1, 4], q[2, 2] = TX40.q_min[4] - 0.01, TX40.q_max[2] + 0.01
+    assert within_limits(TX40, q).tolist() == [True, False, False]
+
+
+def test_a_pose_counts_as_reached_within_the_tolerance_asked_for():
+    goal = forward_kinematics(TX40.dh, HOME + 0.02)
+    found, reached = inverse_kinematics(TX40, goal, HOME, tolerance=1e-2)
+    angle, distance = pose_distance(forward_kinematics(TX40.dh, found), goal)
+    assert reached and 1e-6 < np.hypot(angle, distance / 200) < 1e-2
+
+
+def test_each_corner_of_the_box_binds():
+    for k in range(3):
+        for side in range(2):
+            box = np.array([[-900.0] * 3, [900.0] * 3])
+            middle = forward_kinematics(TX40.dh, HOME)[k, 3]
+            box[side, k] = middle + (30.0 if side else -30.0)
+            joints = measuring_poses(TX40, np.random.default_rng(8), count=12, box=box)
+            places = forward_kinematics(TX40.dh, joints[1:])[:, :3, 3]
+            assert (places >= box[0]).all() and (places <= box[1]).all()

@@ -98,3 +98,11 @@ def test_backlash_holds_a_robot_back_on_its_way():
     ways = np.array([[1.0, 0, 0], [0, -1.0, 0]])
     found = ra.arrive([10.0, 20.0, 30.0], ways, errors, STILL)
     np.testing.assert_allclose(found, [[10.05, 20.0, 29.8], [10.1, 20.05, 29.8]])
+
+
+def test_paths_are_offset_and_noisy_as_stated():
+    rng = np.random.default_rng(3)
+    errors = ra.RobotErrors(offset=np.array([2.0, -1.0]), std=0.5)
+    paths = ra.drive(np.zeros((50, 2)), 0.1, errors, rng, 40)
+    np.testing.assert_allclose(paths.mean((0, 1)), [2.0, -1.0], atol=0.06)  # five standard deviations
+    np.testing.assert_allclose(paths.std((0, 1)), 0.5, rtol=0.08)

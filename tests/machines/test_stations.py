@@ -212,3 +212,43 @@ def test_the_diodes_sit_on_a_dome_of_90_mm():
     np.testing.assert_allclose(d[8], [0, 0, 1])
     assert (np.rad2deg(np.arcsin(d[:5, 2])) < 12).all() and (d[5:8, 2] > 0.75).all() and (d[:, 2] > 0.15).all()
     assert np.linalg.norm(d[5:8, :2].sum(0)) < 0.15  # the three between balance each other
+
+
+def test_rays_may_lie_far_off_the_axis():
+    for angle in np.deg2rad([65.0, 89.0]):
+        d = stations.ray_direction([angle, 0.0])
+        np.testing.assert_allclose(d, [np.sin(angle), 0.0, np.cos(angle)], atol=1e-12)
+
+
+@pytest.mark.parametrize("n", [2, 200])
+def test_how_parallel_rays_may_be_does_not_depend_on_their_number(n):
+    """Half of them tilted by some millionths: N has the least eigenvalue n / 4 times its square."""
+    for tilt, refused in ((1.6e-6, True), (2.5e-6, False)):
+        d = np.tile([[0.0, 0, 1], [0, tilt, 1]], (n // 2, 1))
+        if refused:
+            with pytest.raises(ValueError, match="not parallel"):
+                stations.nearest_to_rays(np.zeros((n, 3)), d)
+        else:
+            np.testing.assert_allclose(stations.nearest_to_rays(np.tile([1.0, 2, 3], (n, 1)), d), [1, 2, 3], atol=1e-3)
+
+
+def test_one_of_the_stations_may_stand_at_the_origin():
+    L = invert(stations.STATIONS[0]) @ stations.STATIONS
+    T = invert(stations.STATIONS[0]) @ T_BE
+    found = stations.poses_from_angles(L, stations.DIODES, stations.body_angles(L, stations.DIODES, T), T @ T_NEAR)
+    turn, off = pose_distance(found, T)
+    assert turn.max() < 1e-7 and off.max() < 1e-4
+
+
+T_NEAR = pose(Rotation.from_rotvec([0.05, -0.02, 0.04]).as_matrix(), [10.0, -5.0, 8.0])
+
+
+def test_readings_scatter_as_the_angles_do():
+    """Squared errors in standard deviations: chi-square with six degrees a pose, at odds of 1e-4; a fixed seed."""
+    std, still = 5e-5, np.repeat(T_BE[3:4], 60, axis=0)
+    read = stations.read_poses(still, stations.STATIONS, stations.STATIONS, np.random.default_rng(2), std)
+    errors = np.c_[Rotation.from_matrix(T_BE[3, :3, :3].T @ read[:, :3, :3]).as_rotvec(), (read - T_BE[3])[:, :3, 3]]
+    angles = stations.body_angles(stations.STATIONS, stations.DIODES, T_BE[3])
+    cov = stations.sight(stations.STATIONS, stations.DIODES, angles, T_BE[3], std=std).covariance
+    total = np.einsum("ni,ij,nj->", errors, np.linalg.inv(cov), errors)
+    assert 5e-5 < chi2.cdf(total, 360) < 1 - 5e-5

@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from labkit.calibration import ax_xb
@@ -106,6 +107,13 @@ def a_log(n=30):
     return Log(np.arange(n) / 10, some_poses(rng, n), np.arange(n) // 10)
 
 
+@pytest.mark.parametrize(("unit", "places"), [("m", 5), ("mm", 2)])
+def test_a_log_has_so_many_decimals_of_a_meter(tmp_path, unit, places):
+    write_csv(tmp_path / "log.csv", a_log(), unit, digits=5)
+    rows = [line.split(",") for line in (tmp_path / "log.csv").read_text().splitlines()]
+    assert {len(entry.split(".")[1]) for row in rows[1:] for entry in row[2:5]} == {places}
+
+
 @pytest.mark.parametrize("unit", ["m", "mm"])
 def test_log_there_and_back(tmp_path, unit):
     log = a_log()
@@ -178,6 +186,27 @@ def test_rows_in_another_unit_inside_the_tracking_area(tmp_path):
         read_csv(path)
 
 
+@pytest.mark.parametrize(
+    ("after", "jumps"),
+    [
+        ([0.415, 0.207, 0.107], True),  # 1000 times less, and moved by 18 mm
+        ([0.42, 0.21, 0.11], False),  # by 24.5 mm, more than a twentieth of 458
+        ([4.2, 2.1, 1.1], False),
+        ([400e3, 200e3, 99e3], True),
+        ([-400.0, -200.0, -100.0], False),
+    ],
+)
+def test_a_jump_of_unit_is_a_thousandfold_within_a_twentieth(tmp_path, after, jumps):
+    T = np.tile(np.eye(4), (8, 1, 1))
+    T[:, :3, 3] = np.where(np.arange(8)[:, None] < 4, [400.0, 200.0, 100.0], after)
+    write_csv(tmp_path / "log.csv", Log(np.arange(8) / 10, T, None), "mm", digits=9)
+    if jumps:
+        with pytest.raises(ValueError, match="line 6: the position jumps by a factor of 1000"):
+            read_csv(tmp_path / "log.csv")
+    else:
+        np.testing.assert_allclose(read_csv(tmp_path / "log.csv").T_WE, T, atol=1e-4)
+
+
 # ---- mounting
 
 
@@ -217,6 +246,26 @@ def test_errors_are_what_the_equations_say():
     angle, distance = pose_distance(predicted, B)
     np.testing.assert_allclose(m.rotation[1:], angle, rtol=1e-6)
     np.testing.assert_allclose(m.translation[1:], distance, rtol=1e-9)
+
+
+def test_the_noise_of_a_mounting_is_that_of_its_motions_less_the_unknowns():
+    """Three unknowns of rotation and three of translation, from three numbers a motion each."""
+    m = calibrate_mounting(*readings(np.random.default_rng(4), 6, noise=1.0), factor=1e9)
+    turns, shifts = np.split(m.residuals, 2, axis=1)
+    assert m.residuals.shape == (5, 6)
+    np.testing.assert_allclose(m.std[[0, 3]], np.sqrt([(turns**2).sum() / (15 - 3), (shifts**2).sum() / (15 - 3)]))
+
+
+def test_poses_are_left_out_until_the_rest_lies_within_the_factor():
+    """Robust standard deviations, 1.4826 times the median deviation, written out."""
+    T_BF, T_WE = readings(np.random.default_rng(7), 15, noise=1.0)
+    m = calibrate_mounting(T_BF, T_WE, factor=1.9)
+    errors = np.column_stack([m.translation, m.rotation])[np.flatnonzero(m.kept)[1:]]
+    away = errors - np.median(errors, axis=0)
+    worst = (away / (1.4826 * np.median(np.abs(away), axis=0))).max()
+    assert worst <= 1.9 and 6 < m.kept.sum() < 15
+    assert calibrate_mounting(T_BF[m.kept], T_WE[m.kept], factor=1.001 * worst).kept.all()
+    assert not calibrate_mounting(T_BF[m.kept], T_WE[m.kept], factor=0.999 * worst).kept.all()
 
 
 def test_small_errors_make_e_rot_two_thirds_of_the_mean_squared_angle():
@@ -266,7 +315,8 @@ def test_stops_are_averaged_without_their_outliers():
     T = pose(exp_so3(1e-3 * rng.normal(size=(40, 3))), [100.0, 0, 0] + 0.3 * rng.normal(size=(40, 3)))
     clean = mean_pose(T[:30])
     T[30:, :3, 3] += 300
-    T[39] = pose(exp_so3([0.0, 0.0, np.pi]), [-1000.0, 0, 0])  # the turns from it to the others may have either sign
+    half_turn = exp_so3([0.0, 0.0, np.pi])  # the turns from it to the others may have either sign
+    T[38], T[39] = pose(half_turn, [-1000.0, 0, 0]), pose(half_turn, [-100.0, 0, 0])
     mean, used = average_stops(Log(np.arange(40) / 10, T, np.zeros(40, int)))
     assert used[0] == 0.75
     angle, distance = pose_distance(mean[0], clean)
@@ -288,6 +338,17 @@ def test_speeds_of_a_known_rotation_do_not_depend_on_frames():
     G = some_poses(np.random.default_rng(9), 1)[0]
     np.testing.assert_allclose(speeds(time, G @ T), (v, w), rtol=1e-9)
     np.testing.assert_allclose(speeds(time, T @ G)[1], w, rtol=1e-9)
+
+
+@pytest.mark.parametrize("steps", [-5, -4, 0, 4, 5])
+def test_the_largest_offset_is_looked_for_and_needs_three_times_as_many_samples(steps):
+    """At the ends of the range the parabola through three costs is that of the last three."""
+    time = np.arange(15) / 250
+    signal = np.cumsum(np.random.default_rng(2).normal(size=40))
+    found = time_offset(time, signal[10:25], signal[10 - steps : 25 - steps], 5 / 250)
+    assert abs(found * 250 - steps) <= (0.6 if abs(steps) < 5 else 1.0) and round(abs(found) * 250) >= abs(steps) - 1
+    with pytest.raises(ValueError, match="needs at least 15 samples, got 14"):
+        time_offset(time[:14], signal[:14], signal[:14], 5 / 250)
 
 
 @pytest.mark.parametrize("delay", [-0.031, 0.0, 0.0123, 0.1])
@@ -381,6 +442,31 @@ def test_reported_speeds_are_the_true_ones_with_the_noise_of_each():
     assert fast.sum() > 500
     assert np.std((motion.v_read - v)[fast]) == pytest.approx(8.0, rel=0.15)
     assert np.std((motion.w_read - w)[fast]) == pytest.approx(0.05, rel=0.15)
+    errors = tracking_errors(motion.time, motion.T_true, motion.T_read, (motion.v_read, motion.w_read))
+    np.testing.assert_allclose(errors.speed, np.abs(motion.v_read - v))
+    np.testing.assert_allclose(errors.angular_speed, np.abs(motion.w_read - w))
+
+
+def test_nonsense_reports_speeds_up_to_ten_jumps_a_second_more():
+    """Uniform from 0: by the test of Kolmogorov and Smirnov at odds of 1e-6, a fixed seed."""
+    tracker = simulation.Tracker(nonsense=0.3, jump=200.0, std_speed=0.0)
+    motion = simulation.simulate_motion("slow", np.random.default_rng(3), tracker)
+    more = motion.v_read - speeds(motion.time, motion.T_true)[0]
+    assert motion.nonsense.sum() > 500 and np.abs(more[~motion.nonsense]).max() < 1e-9
+    assert stats.kstest(more[motion.nonsense] / 2000.0, "uniform").pvalue > 1e-6
+    assert more[motion.nonsense].max() < 2000.0
+
+
+def test_bursts_of_the_stream_last_as_long_as_stated():
+    """Geometric with the mean 5: 400 bursts know it to 0.22; one burst follows the other, with another direction."""
+    tracker = simulation.Tracker(nonsense=1.0, burst=5.0, std_position=0, std_rotation=0, field_position=0)
+    packets = simulation.endless_packets(np.random.default_rng(1), lambda: True, tracker)
+    quiet = simulation.endless_packets(np.random.default_rng(1), lambda: False, tracker)
+    shift = np.array([decode_packet(next(p))[POSITION] for p in (packets, quiet) for _ in range(2000)]).reshape(
+        2, 2000, 3
+    )
+    turns = (np.abs(np.diff(shift[0] - shift[1], axis=0)) > 1e-9).any(1).sum()
+    assert 2000 / turns == pytest.approx(5.0, abs=1.1)
 
 
 def test_nonsense_of_the_stream_jumps_by_the_stated_length():
@@ -467,8 +553,12 @@ def test_squares_of_independent_errors_lie_on_a_line():
     slope, intercept = np.polyfit(speed**2, error**2, 1)
     assert static_error_and_lag(speed, error) == pytest.approx((np.sqrt(intercept), np.sqrt(slope)), rel=1e-7)
     assert static_error_and_lag([1.0, 2.0], [2.0, 1.0])[1] == 0.0
-    with pytest.raises(ValueError, match="speeds must differ"):
-        static_error_and_lag([5.0, 5.0, 5.0], [1.0, 2.0, 3.0])
+    for unit in (1e-6, 1.0, 1e6):
+        assert static_error_and_lag([0.0, unit], [0.0, 2.0])[1] == pytest.approx(2.0 / unit)
+        with pytest.raises(ValueError, match="speeds must differ"):
+            static_error_and_lag(unit * np.array([5.0, 5.0, 5.0]), [1.0, 2.0, 3.0])
+        with pytest.raises(ValueError, match="speeds must differ"):
+            static_error_and_lag(unit * np.array([5.0, 5.0 + 1e-10, 5.0]), [1.0, 2.0, 3.0])
 
 
 def test_medians_of_intervals():

@@ -84,3 +84,10 @@ def test_what_makes_no_triangle_is_refused(call, words):
 def test_the_linearity_of_the_data_sheet():
     """0.16 % of the range of 100 mm are three standard deviations."""
     assert np.isclose(3 * tri.LINEARITY, 0.0016 * np.ptp(tri.RANGE)) and np.ptp(tri.RANGE) == 100.0
+
+
+def test_what_makes_no_triangle_is_told_by_the_worst():
+    with pytest.raises(ValueError, match="got 190 deg"):
+        tri.height_from_angles(np.deg2rad([100.0, 40.0]), np.deg2rad([90.0, 40.0]), 100.0)
+    with pytest.raises(ValueError, match="squared sine"):
+        tri.height_derivatives(1e-200, 1.0, 100.0)

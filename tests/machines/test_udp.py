@@ -211,3 +211,52 @@ def test_a_listener_refuses_nonsense_in_a_sentence(options):
 def test_a_sender_to_no_port_finishes_and_says_refused():
     with udp.Sender([(0.0, b"x", "good")], 70000) as sender:
         assert sender.finished.wait(5) and sender.sent == {"refused": 1}
+
+
+def test_packets_are_broken_in_four_ways_as_often_as_each_other():
+    """800 draws: each share is known to 1.5 %; shorter and longer, a number that is none, a quaternion too long."""
+    rng, data = np.random.default_rng(5), packets(1, start=7)[0]
+    broken = [udp.break_packet(data, rng) for _ in range(800)]
+    reasons = [check_packet(b)[1] for b in broken]
+    ways = [
+        sum(len(b) < len(data) for b in broken),
+        sum(len(b) > len(data) for b in broken),
+        reasons.count("a number is not finite"),
+        reasons.count("the quaternion is not of length 1"),
+    ]
+    assert sum(ways) == 800 and min(ways) > 130 and max(ways) < 270
+
+
+def test_late_packets_and_copies_come_up_to_five_packets_later():
+    data, rate = packets(3000), 250.0
+    when = {d: k / rate for k, d in enumerate(data)}
+    for faults, kind, least in (
+        (udp.Faults(reorder=1.0), "good", 1.0),
+        (udp.Faults(duplicate=1.0), "duplicate", 0.0),
+    ):
+        sent = udp.stream(data, rate, faults, np.random.default_rng(2))
+        late = np.array([due - when[d] for due, d, k in sent if k == kind]) * rate
+        assert len(late) == 3000 and least <= late.min() < least + 0.05 and 4.95 < late.max() <= 5.0
+
+
+def test_what_comes_after_a_younger_one_is_late_and_what_never_comes_is_lost():
+    seen = statistics_after(*np.array([3, 4, 8, 6, 9, 2, 10]) / 250)
+    assert (seen.good, seen.late, seen.lost) == (7, 2, 2)  # 5 and 7 of 2 to 10
+
+
+@pytest.mark.parametrize(("rate", "leap"), [(250.0, 60.0), (1.0, 100.0)])
+def test_a_leap_is_longer_than_a_minute_and_than_a_hundred_readings(rate, leap):
+    for ahead, bad in ((0.99, {}), (1.01, {udp.IMPLAUSIBLE: 1})):
+        receiver = udp.Receiver(rate=rate)
+        for stamp in (0.0, ahead * leap):
+            receiver.take(packet_at(stamp))
+        assert receiver.statistics().bad == bad
+
+
+def test_readings_from_before_the_memory_are_stale_until_there_are_fifty_in_a_row():
+    receiver = udp.Receiver()
+    newest = [10_000 + k for k in range(udp.MEMORY)]
+    for k in [*newest, *range(udp.RESTART - 1), 20_000, *range(udp.RESTART - 1)]:
+        receiver.take(packet_at(k / 250))
+    seen = receiver.statistics()
+    assert (seen.restarts, seen.stale, seen.good) == (0, 2 * (udp.RESTART - 1), udp.MEMORY + 1)
