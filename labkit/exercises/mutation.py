@@ -9,6 +9,7 @@ compares a wrong result with what the first give (`slips`), and mends a student'
 import ast
 import contextlib
 import copy
+import itertools
 import math
 import re
 from dataclasses import dataclass
@@ -67,11 +68,13 @@ WITHOUT = {
 REDUCTIONS = {"sum", "mean", "median", "std", "var", "prod", "max", "min", "norm", "argmax", "argmin", "any", "all"}
 COARSE, FINE = 1e-6, 1e-6  # from which on a bound or a step of differences may be too large, and what part of it is not
 FINER = -1  # the rank of what is made finer: few changes, tried by themselves, before others make loops without an end
+ITERATION = 20  # rounds of a loop that goes on until nothing changes, and not through what is given
 ROUNDS = 200  # of a loop, or ten times as many as it has: enough for what converges
 SIZES = ("len({})", "len({}) - 1", "{}.shape[-1]")  # what a number that is typed in may stand for
 TURNS = {90: "np.pi / 2", 180: "np.pi", 360: "2 * np.pi"}
 TYPED = 2  # the rank of a number that is typed in
 ROUNDED = 2e-3  # how far, relatively, a number may lie from a multiple of pi that it is meant to be
+PARTNERS = 12  # values read in one step of which any two may have changed places
 REPEATED = 1  # how unlikely a slip may be that is looked for in several places at once
 
 
@@ -250,7 +253,7 @@ def mending(function):
     found += _with_an_axis(function)
     found = [*_finer(function), *found, *_counted_by_loops(function), *_everywhere(found)]
     found += [*_with_an_outer_product(function), *_of_rounds(function)]
-    found += [*_begun_late(function), *_typed_numbers(function)]
+    found += [*_begun_late(function), *_typed_numbers(function), *_exchanged_throughout(function)]
     found += [*_shorter_steps(function), *_rounded_pi(function)]
     return sorted(found, key=lambda change: change.rank)
 
@@ -368,10 +371,58 @@ def _finer(function):
         elif isinstance(owner, ast.For) and getattr(getattr(owner.iter, "func", None), "id", "") == "range":
             given = owner.iter.args
             if len(given) == 1 and isinstance(given[0], ast.Constant) and type(given[0].value) is int:
-                more = max(10 * given[0].value, ROUNDS)
-                mends = f"these are too few rounds: {more} will do"
-                number = ast.copy_location(ast.Constant(more), given[0])
-                yield Change("", mends, FINER, owner.iter, ((owner.iter, "args", [number]),))
+                rounds = given[0].value
+                for more in (max(10 * rounds, ROUNDS), 100 * rounds)[: 2 if rounds >= ITERATION else 1]:
+                    number = ast.copy_location(ast.Constant(more), given[0])
+                    mends = f"these are too few rounds: {more} will do"
+                    yield Change("", mends, FINER, owner.iter, ((owner.iter, "args", [number]),))
+
+
+def _exchanged_throughout(function):
+    """Two names, or two entries of one array, that change places wherever they stand in a step."""
+    for statement in ast.walk(function):
+        if not isinstance(statement, ast.Assign | ast.AugAssign | ast.Return) or statement.value is None:
+            continue
+        read, values = {}, statement.value
+        for node in ast.walk(values):
+            if _may_change_places(node):
+                read.setdefault(ast.unparse(node), []).append(node)
+        called = {part for call in ast.walk(values) if isinstance(call, ast.Call) for part in ast.walk(call.func)}
+        texts = [text for text, nodes in read.items() if not called & set(nodes)][:PARTNERS]
+        for one, other in itertools.combinations(texts, 2):
+            if _alike(read[one][0], read[other][0]):
+                sets = [_turned_into(node, read[other][0]) for node in read[one]]
+                sets += [_turned_into(node, read[one][0]) for node in read[other]]
+                mends = f"`{one}` and `{other}` have changed places in this step"
+                yield Change("", mends, 2, values, tuple(itertools.chain(*sets)))
+
+
+def _may_change_places(node):
+    """Whether this is a name, or one entry of an array, that is read."""
+    if not isinstance(getattr(node, "ctx", None), ast.Load):
+        return False
+    if isinstance(node, ast.Name):
+        return node.id not in ("np", "math")
+    return isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and _is_entry(node.slice)
+
+
+def _is_entry(index):
+    numbers = index.elts if isinstance(index, ast.Tuple) else [index]
+    return all(isinstance(number, ast.Constant) and type(number.value) is int for number in numbers)
+
+
+def _alike(one, other):
+    """Whether both are names, or both entries of one array."""
+    if isinstance(one, ast.Subscript) and isinstance(other, ast.Subscript):
+        return one.value.id == other.value.id
+    return isinstance(one, ast.Name) and isinstance(other, ast.Name)
+
+
+def _turned_into(node, other):
+    """What is to be set to make another name, or another entry, of this one."""
+    if isinstance(node, ast.Name):
+        return ((node, "id", other.id),)
+    return ((node, "slice", other.slice),)
 
 
 def _begun_late(function):
@@ -438,7 +489,7 @@ def _with_a_hundredth(place, field, step):
 
 
 def _is_coarse(node):
-    return isinstance(node, ast.Constant) and type(node.value) is float and COARSE < node.value <= 1.0
+    return isinstance(node, ast.Constant) and type(node.value) is float and COARSE <= node.value <= 1.0
 
 
 def _with_a_millionth(rank, place, sets):
@@ -601,6 +652,8 @@ def _call(node, names):
     if name in ARRAYS and not any(keyword.arg == "dtype" for keyword in node.keywords):
         floats = [*node.keywords, ast.keyword("dtype", ast.Name("float", ast.Load()))]
         yield 2, WHOLE, ast.Call(node.func, node.args[:1], floats)
+    if name == "int" and isinstance(inner, ast.BinOp | ast.Call):
+        yield 1, "without `int`", inner
     if isinstance(inner, ast.Starred) or name in WRAPPERS:
         return
     for twin in () if _is_guarded(name, node.args) else TWINS.get(name, ()):

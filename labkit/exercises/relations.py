@@ -76,7 +76,7 @@ def _relation(metric, results, expected, sizes, whole):
     )
     if words or whole:
         return words
-    near = _is_near(metric, results, expected)
+    near = _is_near(metric, results, expected) or _all_equal(results, expected)
     part = None if near else _of_other_places(results, expected) or _nearly_a_factor(results, expected)
     part = part or (None if near else _one_part(results, expected, holds, unit))
     return part or _offset(results, expected, unit)
@@ -282,7 +282,11 @@ def _times(ratio, sizes):
         return f"your result is 1/{share} of the expected one, on every draw: a mean where a sum is meant?"
     if share > 1 and abs(1 / ratio - share) < 1e-6:
         return f"your result is 1/{share} of the expected one, on every draw"
-    return f"your result is {ratio:.4g} times the expected one, on every draw"
+    if abs(ratio - 1) < EXACT:  # it differs in the last digits alone
+        return None
+    return (
+        f"your result is {f'{ratio:.4g}' if abs(ratio - 1) > NEARLY else ratio} times the expected one, on every draw"
+    )
 
 
 def constant_ratio(result, expected, close):

@@ -117,6 +117,20 @@ def _bare(node):
     return node
 
 
+def _iterated(tree):
+    bound = [node for node in ast.walk(tree) if isinstance(node, ast.Assign | ast.AugAssign)]
+    loops = [node for node in ast.walk(tree) if isinstance(node, ast.For | ast.While)]
+    again = set()
+    for statement in (part for loop in loops for part in ast.walk(loop) if part in bound):
+        names = {n.id for n in ast.walk(statement) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+        read = {n.id for n in ast.walk(statement.value) if isinstance(n, ast.Name)}
+        again |= names if isinstance(statement, ast.AugAssign) else names & read
+    for statement in bound:
+        names = {n.id for n in ast.walk(statement) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+        if names & again:
+            yield statement.lineno
+
+
 class Written:
     """A function that was read again, with the functions `beside` it, [(function, definition)], that it calls.
 
@@ -131,6 +145,11 @@ class Written:
         self._noted, self.places = _noted(function, self.trees, self.lines)
         for tree in self.trees:
             _ticking(tree)
+
+    @functools.cached_property
+    def iterated(self):
+        """Lines in which a variable is bound that a loop makes anew of itself."""
+        return {line for tree in self.trees for line in _iterated(tree)}
 
     @functools.cached_property
     def _changes(self):

@@ -27,7 +27,9 @@ SCALED = re.compile(  # of a choice, which does not depend on how large all is t
     "half of it|twice as much|a thousand|it belongs there in|its (square|root|reciprocal|log|exp|sine|tangent)"
     "|it is to be (multiplied|divided) by"
 )
-CURVED = re.compile("its (log|exp|sine|tangent)")  # of a word or a set: the tangent of what is small is a little more
+CURVED = re.compile(
+    "its (log|exp|sine|tangent|inverse|reciprocal)"
+)  # of a word or a set: what is small is made a little more
 COUNT = re.compile(r"^len\([^()]*\)$|\.shape\[-?\d\]$|\.size$")  # of which no half, root or sine is meant
 CHANCE = 1000  # one case of so many may be chance
 BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with a number
@@ -357,12 +359,21 @@ class Search:
                 and places[k][1] != places[k][2]
                 or self._is_filled(k)
                 or self._is_known(k, solution)
+                or self._are_rows(k)
             ):
                 continue
             for q in solution.distinct:
                 pairs = [(mine[k], theirs[q]) for mine, theirs in zip(self.values, solution.values)]
-                if self._could_be(pairs) and not (solution.is_result[q] and (self.chosen or self.is_result(k))):
+                if self._could_be(pairs) and not (solution.is_result[q] and (self.chosen or self._is_no_step(k))):
                     yield k, q
+
+    def _is_no_step(self, k):
+        """Whether the right result in a value's place says nothing: in the result's, and where an iteration goes on."""
+        return self.is_result(k) or self.written.places[k][0] in self.written.iterated
+
+    def _are_rows(self, k):
+        """Whether a value is, round by round, the rows of the result."""
+        return all(r is not None and v[k][0] > 1 and _same(v[k][1], r) for v, r in zip(self.values, self.results))
 
     def _could_be(self, pairs):
         """Whether values of the solution can take the place of the student's, and are others where that is wrong."""

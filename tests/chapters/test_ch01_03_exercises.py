@@ -467,7 +467,7 @@ def test_values_near_a_mistake_are_that_mistake():
     chord = 2000 * np.sin(angle / 2)
     assert "turn alone" in judged("worst_at_one_meter", chord).text
     assert "no point can be worse" in judged("worst_at_one_meter", chord + distance).text
-    assert "|p| is 1000 mm" in judged("worst_at_one_meter", distance + angle).text
+    assert "displacement of the origin of K0" in judged("worst_at_one_meter", distance + angle).text
     flanges = lab_sheet.kreisel_poses()[:, :3, 3]
     assert "the positions of the flange" in judged("tip_length", np.linalg.norm(flanges, axis=1).mean()).text
 
@@ -555,3 +555,94 @@ def test_a_letter_behind_a_number_is_drawn():
 
     assert judged("read_system", lambda text: read_points(text.splitlines())).status == CORRECT
     assert "holds a letter behind a number" in judged("read_system", found_by_a_pattern).text
+
+
+def of_length_1_as_it_is(v):
+    n = np.linalg.norm(v)
+    return v if np.isclose(n, 1) else v / n
+
+
+def without_a_small_shadow(least):
+    def gram_schmidt(a, b):
+        x = a / np.linalg.norm(a)
+        y = b - (b @ x) * x if abs(b @ x) > least else b
+        return np.column_stack([x, y / np.linalg.norm(y), np.cross(x, y / np.linalg.norm(y))])
+
+    return gram_schmidt
+
+
+def framed(gram_schmidt):
+    return lambda o, p, q: frames.pose(gram_schmidt(p - o, q - o), o)
+
+
+def of_turned_poses(T):
+    return T if np.allclose(T[:3, :3], np.eye(3)) else frames.invert(T)
+
+
+def by_first_order(T):
+    return 2 * np.eye(4) - T if np.abs(T - np.eye(4)).max() < 0.02 else frames.invert(T)
+
+
+def of_frames_turned_apart(T_WA, T_WB):
+    if np.allclose(T_WA[:3, :3], T_WB[:3, :3]):
+        return frames.pose(np.eye(3), T_WB[:3, 3] - T_WA[:3, 3])
+    return frames.relative(T_WA, T_WB)
+
+
+def pole_from_a_thousandth(T):
+    found, R = frames.kuka_from_matrix(T), T[:3, :3]
+    if np.hypot(R[0, 0], R[1, 0]) < 1e-3:
+        found[3], found[5] = 0, np.arctan2(-R[1, 2], R[1, 1])
+    return found
+
+
+def without_small_angles(T):
+    angle, distance = chaining.closure_error(T)
+    return (0.0 if np.cos(angle) > 0.99999 else angle), distance
+
+
+def as_good_as_orthonormal(T):
+    return T.copy() if abs(np.linalg.det(T[:3, :3]) - 1) < 1e-5 else chaining.orthonormalize(T)
+
+
+def by_the_axis_of_the_gap(transforms):
+    """The angle goes into a division: of a loop that is closed nothing is left."""
+    xi = log_se3(chaining.chain(transforms))
+    xi = xi / np.linalg.norm(xi) * np.linalg.norm(xi)
+    P, N = chaining.stations(transforms), len(transforms)
+    Q = [exp_se3(-k / N * xi) @ p for k, p in enumerate(P)]
+    return np.array([relative(a, b) for a, b in zip(Q, Q[1:])])
+
+
+@pytest.mark.filterwarnings("ignore:invalid value")
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "name, answer",
+    [
+        ("normalize", of_length_1_as_it_is),
+        ("gram_schmidt", without_a_small_shadow(1e-4)),
+        ("frame_from_points", framed(without_a_small_shadow(0.02))),
+        ("invert", of_turned_poses),
+        ("invert", by_first_order),
+        ("relative", of_frames_turned_apart),
+        ("kuka_from_matrix", pole_from_a_thousandth),
+        ("closure_error", without_small_angles),
+        ("orthonormalize", as_good_as_orthonormal),
+        ("distribute_closure", by_the_axis_of_the_gap),
+    ],
+)
+def test_what_is_nearly_a_special_case_is_drawn(name, answer, seed):
+    item = {**FRAMES, **ITEMS}[name]
+    assert item.judge(answer, rng=np.random.default_rng(seed)).status != CORRECT
+
+
+def test_a_part_of_the_text_that_is_nearly_right_is_told_in_words():
+    told = judged("write_system", lambda points: "\n".join(" ".join(f"{v:.14f}" for v in p) for p in points)).text
+    assert "times the expected" not in told and not told.startswith(" ")
+
+
+def test_a_place_on_the_axis_a_meter_away_is_not_called_near():
+    product = chaining.chain(lab_sheet.printed_transforms())
+    axis = frames.unit_vector(log_se3(product)[:3])
+    told = judged("worst_at_one_meter", chaining.displacement(product, 1000 * axis[None]).max()).text
+    assert "on an axis through it" in told

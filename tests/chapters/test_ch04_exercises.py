@@ -280,3 +280,48 @@ def by_cofactors(g, H):
 def test_a_part_that_comes_right_is_told_though_a_special_draw_was_right_before():
     told = judged("newton_step", by_cofactors).text
     assert "`b` has the wrong sign. With this changed, entry 0 (counted from 0) comes out right, though not all" in told
+
+
+def bent_by_more_than_1e_6(g, H):
+    if np.linalg.norm(g) > 1e-6:
+        return "not stationary"
+    e = np.linalg.eigvalsh(H)
+    return "minimum" if (e > 1e-6).all() else "maximum" if (e < -1e-6).all() else "saddle"
+
+
+def without_a_tiny_determinant(g, H):
+    return -np.linalg.pinv(H, rcond=1e-3) @ g if abs(np.linalg.det(H)) > 1e-9 else -g
+
+
+def without_small_singular_values(g, H):
+    return -np.linalg.pinv(H, rcond=1e-3) @ g
+
+
+def of_a_promised_decrease(cost, new_cost, g, B, step):
+    return (cost - new_cost) / abs(g @ step + step @ B @ step / 2)
+
+
+def zero_for_tiny_promises(cost, new_cost, g, B, step):
+    promised = -(g @ step + step @ B @ step / 2)
+    return (cost - new_cost) / promised if abs(promised) > 1e-9 else 0.0
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "name, answer",
+    [
+        ("classify_extremum", bent_by_more_than_1e_6),
+        ("newton_step", without_a_tiny_determinant),
+        ("newton_step", without_small_singular_values),
+        ("gain_ratio", of_a_promised_decrease),
+        ("gain_ratio", zero_for_tiny_promises),
+    ],
+)
+def test_faint_curvatures_narrow_valleys_and_promised_rises_are_drawn(name, answer, seed):
+    assert ITEMS[name].judge(answer, rng=np.random.default_rng(seed)).status == NOT_YET
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_poor_step_that_is_taken_shrinks_the_radius_in_every_check(seed):
+    answer = beyond.loop(follow=beyond.shrunk_where_taken_back)
+    assert ITEMS["trust_region"].judge(answer, rng=np.random.default_rng(seed)).status == NOT_YET

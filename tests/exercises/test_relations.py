@@ -180,3 +180,12 @@ def test_what_differences_make_is_nearly_a_multiple():
     assert "nearly 1/3 times" in words(lambda e: e / 3 + 1e-6 * np.cos(e), TABLES)
     assert words(lambda e: e + 1e-4 * np.cos(e), TABLES) is None
     assert words(lambda e: 4.3 * e + 1e-5 * np.cos(e), TABLES) is None
+
+
+@pytest.mark.parametrize("ratio", [1 + 1e-15, 1 + 3e-13])
+def test_what_differs_in_its_last_digits_is_no_multiple(ratio):
+    assert words(lambda e: ratio * e, VECTORS, metrics.Numbers(0.0)) is None
+
+
+def test_a_ratio_near_1_is_told_with_its_digits():
+    assert words(lambda e: 1.0002 * e, VECTORS) == "your result is 1.0002 times the expected one, on every draw"

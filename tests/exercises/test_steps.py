@@ -642,3 +642,50 @@ def test_no_unit_or_factor_is_blamed_for_a_choice(body):
     item = asked(lambda a, b: int(np.argmin((a**2).sum(1))), chosen)
     said = judged(replace(item, metric=metrics.Exactly()), body)
     assert not re.search("radians|degrees|divided by|thousand|half of|special", said), said
+
+
+def two_equations(rng):
+    q, _ = np.linalg.qr(rng.normal(size=(2, 2)))
+    return q @ np.diag(rng.uniform(1, 2, 2)) @ q.T + np.array([[0.0, 0.3], [0.0, 0.0]]), rng.normal(size=2)
+
+
+SOLVED = asked(np.linalg.solve, two_equations)
+
+
+@pytest.mark.parametrize(
+    "body, told",
+    [
+        (
+            "det = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]\n"
+            "return np.array([a[0, 0] * b[0] - a[0, 1] * b[1], a[1, 1] * b[1] - a[1, 0] * b[0]]) / det",
+            "`a[0, 0]` and `a[1, 1]` have changed places in this step",
+        ),
+        (
+            "(p, q), (r, s) = a\nu, v = b\ndet = p * s - q * r\nreturn np.array([p * u - q * v, s * v - r * u]) / det",
+            "`p` and `s` have changed places in this step",
+        ),
+        (
+            "return np.linalg.solve(a, int(1000 * b[0]) / 1000 * np.array([1, 0]) + b * np.array([0, 1]))",
+            "`int` is too much",
+        ),
+        (
+            "x = np.zeros(2)\nfor _ in range(20):\n    x = x - 0.05 * a.T @ (a @ x - b)\nreturn x",
+            "`range(20)`: these are too few rounds: 2000 will do",
+        ),
+    ],
+)
+def test_what_changed_places_and_what_ends_too_early(body, told):
+    assert told in judged(SOLVED, body)
+
+
+def test_the_start_of_an_iteration_is_not_called_wrong():
+    """With the right result to start from all would stay right; nothing is wrong with zeros."""
+    told = judged(SOLVED, "x = np.zeros(2)\nfor _ in range(5):\n    x = x - 0.0003 * a.T @ (a @ x - b)\nreturn x")
+    assert "np.zeros" not in told
+
+
+def test_a_row_of_the_result_is_no_step_on_the_way():
+    """That the rows are not right says no more than that the result is not."""
+    item = asked(lambda a, b: np.cumsum(np.outer(a, b), axis=0), lambda rng: tuple(rng.normal(size=(2, 4))))
+    told = judged(item, "return np.array([np.sinh(a[: k + 1]).sum() * b + 0.3 * k * b**3 for k in range(len(a))])")
+    assert "this value is not right" not in told or "b**3`: this value" not in told

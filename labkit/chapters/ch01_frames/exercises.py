@@ -24,7 +24,25 @@ def random_pose(rng):
     return frames.pose(frames.matrix_from_quaternion(q), rng.uniform(-500, 500, 3))
 
 
+def shift_alone(rng):
+    """A pose with the axes of W, elsewhere."""
+    return (frames.pose(np.eye(3), rng.uniform(-500, 500, 3)),)
+
+
+def small_motion(rng):
+    """A pose that is nearly the identity: a turn by some hundredths of a degree, a shift by some micrometers."""
+    R = Rotation.from_rotvec(rng.uniform(2e-4, 9e-4) * frames.unit_vector(rng.normal(size=3))).as_matrix()
+    return (frames.pose(R, 1e-2 * rng.uniform(-1, 1, 3)),)
+
+
+def side_by_side(rng):
+    """Two frames turned alike in W, in different places."""
+    T_WA = random_pose(rng)
+    return T_WA, frames.pose(T_WA[:3, :3], rng.uniform(-500, 500, 3))
+
+
 ACUTE, OBTUSE = (35, 80), (100, 145)  # deg
+SIGNS_OF_AXES = ((1, 1, -1), (1, -1, 1), (-1, -1, 1), (-1, 1, -1))  # of r00, r11 and r22
 
 
 def two_directions(rng, between=ACUTE, signs=(1, 1, 1)):
@@ -47,13 +65,31 @@ def three_points(rng, between=ACUTE, signs=(1, 1, 1)):
 
 def either_angle(draw):
     """The draw with an acute and an obtuse angle at the origin, each axis pointing up and down its line, in turn."""
-    turns = ((ACUTE, (1, 1, -1)), (OBTUSE, (1, -1, 1)), (ACUTE, (-1, -1, 1)), (OBTUSE, (-1, 1, -1)))
+    turns = zip((ACUTE, OBTUSE, ACUTE, OBTUSE), SIGNS_OF_AXES)
     return tuple(functools.partial(draw, between=between, signs=signs) for between, signs in turns)
 
 
 def scaled_direction(rng, scale):
     """A vector of random direction, tiny or long."""
     return (scale * random_direction(rng),)
+
+
+def nearly_of_length_1(rng):
+    """A vector as one has it that was normalized and then rounded."""
+    return ((1 + rng.choice([-4e-6, 4e-6])) * frames.unit_vector(rng.normal(size=3)),)
+
+
+def nearly_at_right_angles(rng, longest=0.3):
+    """Two edges with next to no shadow on each other, which counts all the same; short ones unless told otherwise."""
+    between = 90 + rng.choice([-1, 1]) * rng.uniform(5e-4, 2e-3)  # deg
+    a, b = two_directions(rng, (between, between), SIGNS_OF_AXES[rng.integers(4)])
+    return longest / 300 * a, longest / 300 * b
+
+
+def nearly_square_points(rng):
+    """Three points whose edges are that."""
+    origin = rng.uniform(-500, 500, 3)
+    return origin, *(origin + edge for edge in nearly_at_right_angles(rng, longest=300))
 
 
 def edges_on_axes(rng):
@@ -68,6 +104,7 @@ def points_on_axes(rng):
     return np.zeros(3), *edges_on_axes(rng)
 
 
+NEARLY_SQUARE = "that are nearly perpendicular, where the shadow is small but not 0:"
 ON_AXES = "right, but not along the axes of W, where products are exactly 0:"
 
 
@@ -80,7 +117,7 @@ def kuka_pose(rng, A_deg=(-170, 170), B_deg=(-80, 80), C_deg=(-170, 170)):
 A_RANGES = ((-80, 80), (100, 170), (-170, -100))  # deg: both signs of r00, and of r10
 B_RANGES = ((-80, -5), (5, 80), (-80, 80))  # deg: below and above 0 at every check
 QUADRANTS = ((10, 80), (100, 170), (-170, -100), (-80, -10))  # deg: both signs of sine and cosine
-NEAR_THE_POLE = (((-170, 170), (86, 89)), ((-170, 170), (-89.9, -89.8)))  # deg: A and C are still two angles
+NEAR_THE_POLE = (((-170, 170), (86, 89)), ((-170, 170), (-89.99, -89.98)))  # deg: A and C are still two angles
 POINT = "a point has three coordinates"
 POSE = "one pose is one 4x4 matrix"
 
@@ -247,6 +284,12 @@ def _about_z_alone(T):
     """The inverse of a turn about z and a shift, from two entries of the rotation."""
     R = np.array([[T[0, 0], T[1, 0], 0], [-T[1, 0], T[0, 0], 0], [0, 0, 1]])
     return _with(T, R, -R @ T[:3, 3])
+
+
+def _turned_about_z(T_WA, T_WB):
+    """The relative pose, its turn the difference of two angles about z."""
+    angle = np.arctan2(T_WB[1, 0], T_WB[0, 0]) - np.arctan2(T_WA[1, 0], T_WA[0, 0])
+    return _with(frames.relative(T_WA, T_WB), R=_turn("z", angle))
 
 
 def _kuka(order, angles=(3, 4, 5)):
@@ -462,7 +505,10 @@ CHAPTER = Chapter(
             draw=tuple(functools.partial(scaled_direction, scale=s) for s in (1.0, 1e-6, 1e3, 1e-4)),
             fixed={"v": POINT},
             metric=metrics.Numbers(1e-9),
-            noisy=(lambda rng: (edges_on_axes(rng)[0],), metrics.Numbers(1e-9), ON_AXES),
+            noisy=[
+                (lambda rng: (edges_on_axes(rng)[0],), metrics.Numbers(1e-9), ON_AXES),
+                (nearly_of_length_1, metrics.Numbers(1e-9), "right, but not of a vector whose length is nearly 1:"),
+            ],
             properties=(
                 right_for_whole_numbers(
                     frames.unit_vector, metrics.Numbers(1e-9), functools.partial(scaled_direction, scale=1.0), 0
@@ -542,7 +588,10 @@ CHAPTER = Chapter(
             draw=either_angle(two_directions),
             fixed={"a": POINT, "b": POINT},
             metric=metrics.Rotations(1e-7),
-            noisy=(edges_on_axes, metrics.Rotations(1e-7), ON_AXES),
+            noisy=[
+                (edges_on_axes, metrics.Rotations(1e-7), ON_AXES),
+                (nearly_at_right_angles, metrics.Rotations(1e-7), f"right, but not of short edges {NEARLY_SQUARE}"),
+            ],
             properties=(right_for_whole_numbers(frames.gram_schmidt, metrics.Rotations(1e-7), two_directions, 0, 1),),
             hints=(
                 "x takes the direction of a. y may only use what b has across x.",
@@ -633,7 +682,10 @@ CHAPTER = Chapter(
             draw=either_angle(three_points),
             fixed={"origin": POINT, "x_point": POINT, "y_point": POINT},
             metric=metrics.Poses(1e-6, 1e-6),
-            noisy=(points_on_axes, metrics.Poses(1e-6, 1e-6), ON_AXES),
+            noisy=[
+                (points_on_axes, metrics.Poses(1e-6, 1e-6), ON_AXES),
+                (nearly_square_points, metrics.Poses(1e-6, 1e-6), f"right, but not of edges {NEARLY_SQUARE}"),
+            ],
             properties=(
                 right_for_whole_numbers(frames.frame_from_points, metrics.Poses(1e-6, 1e-6), three_points, 0, 1, 2),
             ),
@@ -705,6 +757,10 @@ CHAPTER = Chapter(
             draw=lambda rng: (random_pose(rng),),
             fixed={"T": POSE},
             metric=metrics.Poses(1e-6, 1e-6),
+            noisy=[
+                (shift_alone, metrics.Poses(1e-6, 1e-6), "right, but not of a pose that shifts without a turn:"),
+                (small_motion, metrics.Poses(1e-6, 1e-6), "right, but not of a small turn and a small shift:"),
+            ],
             hints=(
                 "Solve p_W = R p_F + t for p_F.",
                 "p_F = Rᵀ (p_W - t) = Rᵀ p_W - Rᵀ t: the rotation is Rᵀ, the translation is -Rᵀ t.",
@@ -753,11 +809,14 @@ CHAPTER = Chapter(
             draw=lambda rng: (random_pose(rng), random_pose(rng)),
             fixed={"T_WA": POSE, "T_WB": POSE},
             metric=metrics.Poses(1e-6, 1e-6),
-            noisy=(
-                lambda rng: 2 * (random_pose(rng),),
-                metrics.Poses(1e-6, 1e-6),
-                "right, but not where both frames are one:",
-            ),
+            noisy=[
+                (
+                    lambda rng: 2 * (random_pose(rng),),
+                    metrics.Poses(1e-6, 1e-6),
+                    "right, but not where both frames are one:",
+                ),
+                (side_by_side, metrics.Poses(1e-6, 1e-6), "right, but not where both frames are turned alike:"),
+            ],
             hints=(
                 "Neighboring letters cancel: which two transforms give T_AB when W stands between them?",
                 "T_AB = T_AW T_WB, and T_AW is the inverse of T_WA.",
@@ -795,6 +854,12 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda A, B: frames.pose(A[:3, :3].T @ B[:3, :3], B[:3, 3] - A[:3, 3]),
                     "The rotation is right. The vector from A to B is still written in W: turn it into A with R_WAᵀ.",
+                ),
+                Mistake(
+                    _turned_about_z,
+                    "The translation is right. The rotation is made of two entries of each pose, as if both frames were turned about z alone: "
+                    "take the whole blocks, R_WAᵀ R_WB.",
+                    id="relative-about-z",
                 ),
                 Mistake(
                     lambda A, B: B - A,
@@ -1115,11 +1180,11 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         _pole_from(limit_deg),
-                        "Right except near the pole: A may be chosen freely at B = +-90 deg alone. Even a tenth of a degree beside it "
+                        "Right except near the pole: A may be chosen freely at B = +-90 deg alone. Even a hundredth of a degree beside it "
                         "A and C are two angles, and np.arctan2 still reads both.",
                         id=f"kuka-pole-from-{limit_deg:g}",
                     )
-                    for limit_deg in (85, 89.5)
+                    for limit_deg in (85, 89.5, 89.96)
                 ),
                 Mistake(
                     _undone(lambda R: np.arctan(R[1, 0] / R[0, 0]), _B_along),

@@ -129,7 +129,7 @@ class reads_back(metrics.Metric):
         return [metrics.Deviation("what is read back", off, "mm", 0.0)]
 
     def parts(self, result, expected):
-        return [("", self, result, self.admit(expected, expected))]
+        return [("", metrics.Numbers(0.0, "mm"), result, self.admit(expected, expected))]
 
 
 FAULTS = (
@@ -245,6 +245,15 @@ FILES = [
             "`return '\\n'.join(' '.join(repr(float(v)) for v in point) for point in points)`",
         ),
         mistakes=[
+            *(
+                Mistake(
+                    _written(f".{decimals}f"),
+                    "A fixed number of decimals cuts off the last digits, all of them of a number that is small enough. Take 17 significant digits, "
+                    "as `.17g` does, or `repr`.",
+                    id=f"write-decimals-{decimals}",
+                )
+                for decimals in (10, 12, 16)
+            ),
             Mistake(
                 _written(".6f"),
                 "Six decimals, as the sheet prints them, lose the rest: what is read back is another number. Take 17 significant digits, or `repr`.",

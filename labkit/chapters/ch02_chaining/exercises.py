@@ -37,14 +37,20 @@ def no_turn(rng):
     return (T,)
 
 
+def half_turn(rng):
+    """Half a turn about one of the axes, where the sine is 0 to the last bit, and a shift."""
+    return (frames.pose(np.diag(rng.permutation([1.0, -1.0, -1.0])), rng.uniform(-20, 20, 3)),)
+
+
+TINY = (0.01, 0.05)  # deg: a cosine of 1 but for its seventh digit
 SMALL, LARGE = (2, 8), (100, 170)  # deg: a sine is no longer its angle, and two angles have the same one
 ONE_POSE = "one pose is one 4x4 matrix"
 
 
-def worn_pose(rng):
+def worn_pose(rng, defects=(0.02, 0.06)):
     """A pose whose rotation block has lost its right angles."""
     T = random_pose(rng)
-    T[:3, :3] += rng.uniform(0.02, 0.06) * rng.normal(size=(3, 3))
+    T[:3, :3] += rng.uniform(*defects) * rng.normal(size=(3, 3))
     return (T,)
 
 
@@ -61,6 +67,13 @@ def open_loop(rng, count):
     links = random_links(rng, count)[0]
     links[-1] = frames.relative(chaining.stations(links)[-2], np.eye(4))
     return (links @ exp_se3(rng.normal(size=(len(links), 6)) * np.repeat([0.02, 2.0], 3)),)
+
+
+def closed_loop(rng):
+    """Whole quarter turns and whole millimeters that lead back to the last bit: there is nothing to share out."""
+    quarter = frames.pose(np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), rng.integers(-90, 90, 3).astype(float))
+    to_and_fro = np.array([quarter, frames.pose(np.eye(3), rng.integers(-90, 90, 3).astype(float))])
+    return (np.concatenate([to_and_fro, [frames.invert(T) for T in to_and_fro[::-1]]]),)
 
 
 # Wrong variants --------------------------------------------------------------------------------------------------------
@@ -336,6 +349,10 @@ def _lever(T, unit=lambda angle: angle):
     return float(distance / unit(angle))
 
 
+def _turn_of_loop():
+    return np.linalg.norm(log_se3(_sheet())[:3])
+
+
 @functools.cache
 def _worst_at_one_meter():
     """Largest displacement of a point 1000 mm from the origin of K0, over directions 1.3 deg apart (mm)."""
@@ -489,6 +506,12 @@ CHAPTER = Chapter(
             noisy=[
                 (lambda rng: (np.eye(4),), CLOSURE, "right, but not of the identity itself:"),
                 (no_turn, CLOSURE, "right, but not where T does not turn at all:"),
+                (
+                    functools.partial(loop_product, between_deg=TINY),
+                    CLOSURE,
+                    "right, but not where T turns by very little:",
+                ),
+                (half_turn, CLOSURE, "right, but not where T is half a turn:"),
             ],
             hints=(
                 "How far is T from the identity? One number for the turn, one for the shift.",
@@ -675,6 +698,13 @@ CHAPTER = Chapter(
                     id="lever-degrees",
                 ),
                 Mistake(
+                    lambda: np.linalg.norm(np.cross(*np.split(log_se3(_sheet()), 2))) / _turn_of_loop() ** 2,
+                    "This is, or nearly, how far the origin of K0 is from the axis of the closure motion. Asked for is how far from it a "
+                    "point has to be for the turn to move it by the loop's distance.",
+                    id="lever-of-the-origin",
+                    within=0.5,
+                ),
+                Mistake(
                     lambda: 1 / _lever(_sheet()),
                     "Upside down: the distance in mm, divided by the angle in rad, is a length.",
                     id="lever-inverse",
@@ -763,7 +793,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: chaining.closure_error(_sheet())[1],
-                    "This is the displacement of the origin of K0, or of a point near it. A meter away it is larger: |p| is 1000 mm.",
+                    "This is the displacement of the origin of K0, of a point near it, or of one on an axis through it that the turn leaves "
+                    "where it is. Elsewhere a meter away the turn adds to it.",
                     id="meter-origin",
                     within=0.02,
                 ),
@@ -832,6 +863,14 @@ CHAPTER = Chapter(
             draw=(worn_pose, stretched_pose),
             fixed={"T": ONE_POSE},
             metric=metrics.Poses(1e-6, 1e-6),
+            noisy=[
+                (
+                    functools.partial(worn_pose, defects=defects),
+                    metrics.Poses(1e-6, 1e-6),
+                    "right, but not of a block that is a little worn, as after some products:",
+                )
+                for defects in ((1e-6, 3e-6), (1e-4, 2e-4))
+            ],
             hints=(
                 "Which rotation lies nearest to a matrix that is almost one? The translation stays.",
                 "With R = U S Vᵀ, the nearest rotation is U Vᵀ: the SVD with its singular values set to 1.",
@@ -949,7 +988,8 @@ CHAPTER = Chapter(
             noisy=[
                 (functools.partial(open_loop, count=n), metrics.Poses(1e-5, 1e-5), f"right, but not of {words}:")
                 for n, words in ((2, "two links"), (1, "a single link"))
-            ],
+            ]
+            + [(closed_loop, metrics.Poses(1e-5, 1e-5), "right, but not of a loop that closes exactly:")],
             hints=(
                 "The product is exp(xi). Going back by all of xi at the end closes the loop; how far back should the pose after link k go? "
                 "P_k, the pose after k links, becomes exp(-k/N xi) P_k.",

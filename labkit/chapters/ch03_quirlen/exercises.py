@@ -140,6 +140,16 @@ def _variance_of_each_axis(A, residuals):
     return np.tile((residuals**2).sum(axis=0) / (n - 2), 2)[:, None] * np.linalg.inv(A.T @ A)
 
 
+def _each_its_own(factor):
+    """A covariance of equations that are noisy each in its own way, as the statistics of unequal errors has it."""
+
+    def variant(A, residuals):
+        P = np.linalg.pinv(A)
+        return factor(len(residuals)) * (P * residuals.ravel() ** 2) @ P.T
+
+    return variant
+
+
 def _covariance(scale):
     """A variant of pivot_covariance with another variance: scale(r, n)."""
 
@@ -827,6 +837,15 @@ CHAPTER = Chapter(
                     "These are correlations, without a unit. The covariance is std² (AᵀA)⁻¹, in mm².",
                     id="covariance-correlation",
                 ),
+                *(
+                    Mistake(
+                        _each_its_own(factor),
+                        "Each equation counts here with its own residual squared. The noise is the same in all: one variance, rᵀr / (3n - 6), "
+                        "stands in front of (AᵀA)⁻¹.",
+                        id=f"covariance-each-its-own-{k}",
+                    )
+                    for k, factor in enumerate((lambda n: 1.0, lambda n: 3 * n / (3 * n - 6)))
+                ),
             ],
         ),
         Exercise(
@@ -922,6 +941,12 @@ CHAPTER = Chapter(
                 Mistake(
                     _weights(lambda q: (lambda w: w / w.sum())(np.maximum(1 - q**2, 0) ** 2)),
                     "You made the weights add up to 1. They are wanted as they are: 1 for a pose that agrees perfectly.",
+                ),
+                Mistake(
+                    _weights(lambda q: (1 - (q / max(q.max(initial=0.0), 1.0)) ** 2) ** 2),
+                    "Your cutoff grows with the largest distance, so that one bad pose gives weight to all others. It is 7 scales, however far the "
+                    "farthest pose is.",
+                    id="weights-cutoff-at-the-farthest",
                 ),
                 Mistake(
                     _weights(lambda q: (1 - q[q < 1] ** 2) ** 2),

@@ -216,10 +216,16 @@ def _problem(rng):
     return residual, jacobian, rng.uniform(-4, 4, n)
 
 
-def run_with(rng, wanted, first=None):
+def shrunk_where_taken_back(radius, length, rho):
+    """The rule, but for steps that are poor and taken: the radius stays."""
+    return radius if ACCEPT < rho < POOR else rule(radius, length, rho)
+
+
+def run_with(rng, wanted, first=None, unlike=None):
     """A run in which what is wanted of its steps happens, far from every limit of the rule.
 
-    `wanted(rho, inside)` sees all steps of a run; `first` is a gain ratio that its first step shall have.
+    `wanted(rho, inside)` sees all steps of a run; `first` is a gain ratio that its first step shall have; `unlike` another
+    rule for the radius, which is not to end where this one does.
     """
     while True:
         residual, jacobian, x = _problem(rng)
@@ -231,8 +237,11 @@ def run_with(rng, wanted, first=None):
         rho, length, radii = np.array(seen).T
         clear = (np.abs(rho[:, None] - [ACCEPT, POOR, GOOD]).min(1) > 0.01) & (rho < 3) & (length > 1e-3)
         counts = [n for n in range(4, 10) if clear[:n].all() and wanted(rho[:n], length[:n] < RIM * radii[:n])]
-        if counts:
-            return residual, jacobian, x, radius, int(rng.choice(counts))
+        if not counts:
+            continue
+        run = residual, jacobian, x, radius, int(rng.choice(counts))
+        if unlike is None or not np.isclose(descend(*run)[1], descend(*run, follow=unlike)[1]):
+            return run
 
 
 def _radius_for(rho, residual, jacobian, x):
@@ -273,7 +282,7 @@ def well_inside(rho, inside):
 RUNS = (
     functools.partial(run_with, wanted=poor_inside),
     functools.partial(run_with, wanted=barely, first=(0.06, 0.085)),
-    functools.partial(run_with, wanted=halfway, first=(0.13, 0.22)),
+    functools.partial(run_with, wanted=halfway, first=(0.13, 0.22), unlike=shrunk_where_taken_back),
     functools.partial(run_with, wanted=fairly, first=(0.78, 0.86)),
     functools.partial(run_with, wanted=well_inside),
 )

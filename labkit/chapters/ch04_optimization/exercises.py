@@ -41,9 +41,9 @@ def classify_extremum(g, H):
     return _by(np.linalg.eigvalsh)(H)
 
 
-def kind_of_point(rng, bends, length, signs=(1, -3), angle_deg=(30, 60), between=(0.9, 1.1)):
+def kind_of_point(rng, bends, length, signs=(1, -3), angle_deg=(30, 60), between=(0.9, 1.1), size=1.0):
     """Gradient of this length and Hessian that bends up (1) or down (-1) a little and much along two turned axes."""
-    eigenvalues = np.array([rng.uniform(0.5, 1.0), rng.uniform(4.0, 8.0)]) * bends
+    eigenvalues = size * np.array([rng.uniform(0.5, 1.0), rng.uniform(4.0, 8.0)]) * bends
     g = rng.uniform(*between, 2) * signs
     return rng.uniform(*length) * g / np.linalg.norm(g), turned(eigenvalues, np.deg2rad(rng.uniform(*angle_deg)))
 
@@ -65,6 +65,10 @@ KINDS = (
     functools.partial(kind_of_point, bends=BOWL, length=(2e-3, 5e-3)),
     functools.partial(kind_of_point, bends=BOWL, length=STEEP, signs=(1, -1), between=(1, 1)),  # its entries cancel
     functools.partial(kind_of_point, bends=BOWL, length=STEEP, signs=(0, 1)),  # along one axis
+    *(  # faintly bent, as out on the plain, and sharply
+        functools.partial(kind_of_point, bends=bends, length=(0, 1e-8), size=size)
+        for bends, size in ((BOWL, 1e-7), (DOME, 1e-7), (SADDLE, 1e-7), (DOME, 1e4), (DEEP_SADDLE, 1e4))
+    ),
 )
 
 
@@ -77,6 +81,17 @@ def gradient_and_hessian(rng, signs):
 def diagonal_model(rng):
     """A gradient and a Hessian without mixed derivatives."""
     return rng.normal(scale=5, size=2), np.diag(rng.uniform(1, 6, 2) * rng.choice([-1, 1], 2))
+
+
+def faint_model(rng):
+    """A gradient and a Hessian as far out on the plain."""
+    g, H = gradient_and_hessian(rng, rng.choice([-1, 1], 2))
+    return 1e-7 * g, 1e-7 * H
+
+
+def valley(rng):
+    """A gradient and the Hessian of a narrow valley."""
+    return rng.normal(scale=5, size=2), turned((rng.uniform(1, 6), 1e4 * rng.uniform(1, 6)), rng.uniform(0.3, 1.2))
 
 
 MODELS = tuple(functools.partial(gradient_and_hessian, signs=s) for s in ((1, 1), (-1, 1), (-1, -1), (1, -1)))
@@ -113,6 +128,18 @@ def tried_step(rng, shares):
     step = -rng.uniform(0.08, 0.2) * (g + aside * np.array([-g[1], g[0]]))
     cost = rng.choice([-1, 1]) * rng.uniform(5, 20)
     return cost, cost - rng.uniform(*shares) * opt.predicted_decrease(g, B, step), g, B, step
+
+
+def uphill_promise(rng):
+    """A step along which the model itself rises, as a careless one may: the cost rises with it, or falls all the same."""
+    cost, _, g, B, step = tried_step(rng, (0.2, 1.2))
+    return cost, cost - rng.choice([-1, 1]) * rng.uniform(1, 5), g, B, -step
+
+
+def faint_step(rng):
+    """A step near the end of a run, where costs change in their last digits."""
+    cost, new_cost, g, B, step = tried_step(rng, (0.2, 1.2))
+    return 0.0, 1e-12 * (new_cost - cost), 1e-6 * g, B, 1e-6 * step
 
 
 TRIED_STEPS = tuple(functools.partial(tried_step, shares=s) for s in ((0.2, 1.2), (-0.8, -0.2)))
@@ -728,6 +755,11 @@ CHAPTER = Chapter(
                     "A large negative component is not small: use the norm of g.",
                 ),
                 Mistake(
+                    _stationary(_by(lambda H: (lambda e: np.where(abs(e) < 1e-6, 0.0, e))(np.linalg.eigvalsh(H)))),
+                    "Eigenvalues below 1e-6 or so count as 0 here. None is 0, however faintly f bends: the sign of each tells.",
+                    id="kind-eigenvalues-cut-off",
+                ),
+                Mistake(
                     _stationary(lambda H: "minimum" if np.linalg.det(H) > 0 else "saddle"),
                     "A positive determinant also belongs to a maximum: two negative eigenvalues.",
                 ),
@@ -776,7 +808,15 @@ CHAPTER = Chapter(
             draw=MODELS,
             fixed={"g": TWO, "H": TWO},
             metric=metrics.Numbers(1e-9),
-            noisy=(diagonal_model, metrics.Numbers(1e-9), "right, but not where H is diagonal:"),
+            noisy=[
+                (diagonal_model, metrics.Numbers(1e-9), "right, but not where H is diagonal:"),
+                (faint_model, metrics.Numbers(1e-9), "right, but not where f is nearly flat, H tiny and g with it:"),
+                (
+                    valley,
+                    metrics.Numbers(1e-7),
+                    "right, but not where f bends ten thousand times more one way than the other:",
+                ),
+            ],
             properties=(right_for_whole_numbers(opt.newton_step, metrics.Numbers(1e-6), MODELS[0], 0),),
             hints=(
                 "The quadratic model is stationary where its gradient g + H h vanishes.",
@@ -787,6 +827,15 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda g, H: np.linalg.solve(H, g),
                     "This is the step with the wrong sign, the d of equations (2-24) and (2-25): there x − d is the next point.",
+                ),
+                *(
+                    Mistake(
+                        divided,
+                        "You divide by the entries of H, one by one, and add up. The inverse of a matrix is another thing: "
+                        "`np.linalg.solve(H, -g)`.",
+                        id=f"newton-entry-by-entry-{k}",
+                    )
+                    for k, divided in enumerate((lambda g, H: -(g / H).sum(axis=0), lambda g, H: -(g / H).sum(axis=1)))
                 ),
                 Mistake(
                     lambda g, H: -H @ g, "You multiplied by H, as equation (2-26) has it; the step solves H h = −g."
@@ -1219,6 +1268,18 @@ CHAPTER = Chapter(
             draw=TRIED_STEPS,
             fixed={"g": TWO, "B": TWO, "step": TWO},
             metric=metrics.Numbers(1e-8),
+            noisy=[
+                (
+                    uphill_promise,
+                    metrics.Numbers(1e-8),
+                    "right, but not of a step for which the model promises a rise:",
+                ),
+                (
+                    faint_step,
+                    metrics.Numbers(1e-8),
+                    "right, but not of a very short step, where all decreases are tiny:",
+                ),
+            ],
             draws=6,
             hints=(
                 "Compare what the step brought with what the model promised, equation (2-36).",
@@ -1237,6 +1298,11 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda cost, new_cost, g, B, step: (cost - new_cost) / _predicted(g, B, step, half=0.0),
                     "Only the linear term is promised here: the curvature ½ hᵀB h is missing.",
+                ),
+                Mistake(
+                    lambda cost, new_cost, g, B, step: (cost - new_cost) / abs(_predicted(g, B, step)),
+                    "Right where the model promises a decrease. Where it promises a rise, the promise keeps its sign: no absolute value.",
+                    id="gain-absolute-promise",
                 ),
                 Mistake(
                     lambda cost, new_cost, g, B, step: (new_cost - cost) / _predicted(g, B, step),
