@@ -55,7 +55,8 @@ class Wall {
       seen: (message, buffers) => this.hearers.forEach((hearer) => hearer(message, buffers)),
     });
     addEventListener("hashchange", () => { if (this.card?.key !== keyOfAddress()) this.open(keyOfAddress()); });
-    addEventListener("keydown", (event) => this.turnPage(event), true); // a slider would take these keys
+    addEventListener("keydown", (event) => this.turnPage(event), true); // a slider would take these keys,
+    addEventListener("keydown", (event) => this.revealFirst(event), true); // and a figure that can be clicked takes Enter
     addEventListener("keydown", (event) => this.press(event));
     addEventListener("click", (event) => { if (event.detail && event.target.closest("#place button")) this.focus(); }); // not again by Enter
     $("#keys-button").addEventListener("click", () => this.showKeys());
@@ -88,7 +89,8 @@ class Wall {
     this.card = card;
     if (keyOfAddress() !== key) history.replaceState(null, "", `#${key}`);
     document.title = `${card.chapter} ${card.title}`;
-    $("#where").textContent = `${Number(card.chapter) || ""} ${this.titles[card.chapter]} · ${card.heading}`.trim();
+    const title = this.titles[card.chapter];
+    $("#where").textContent = `${Number(card.chapter) || ""} ${title}${card.heading === title ? "" : ` · ${card.heading}`}`.trim();
     $("#number").textContent = `${this.chapter.indexOf(card) + 1} of ${this.chapter.length}`;
     this.clear();
     this.show();
@@ -186,10 +188,14 @@ class Wall {
     return this.now?.key === this.card.key ? this.now.step : this.card.votes ? "question" : "figure";
   }
 
+  /** What Enter reveals; nothing after an opinion, which has no answer. */
+  get next() {
+    const steps = ["question", ...(this.card.stage ? ["figure"] : []), ...(this.card.answer || this.card.happened ? ["answer"] : [])];
+    return this.card.votes ? steps[steps.indexOf(this.step) + 1] : undefined;
+  }
+
   reveal() {
-    const steps = this.card.stage ? ["question", "figure", "answer"] : ["question", "answer"];
-    const next = steps[steps.indexOf(this.step) + 1];
-    if (next && this.card.votes && !(next === "answer" && !this.card.answer && !this.card.happened)) this.wire.ask({ reveal: this.card.key, step: next });
+    if (this.next) this.wire.ask({ reveal: this.card.key, step: this.next });
   }
 
   show() {
@@ -205,7 +211,7 @@ class Wall {
       this.fill(place, card, ballot);
       place.classList.toggle("answered", this.step === "answer");
     }
-    $("#cover .next").textContent = this.step === "answer" ? "" : card.stage ? "Enter shows the figure." : "Enter shows the answer.";
+    $("#cover .next").textContent = this.next ? `Enter shows the ${this.next}.` : "";
     $("#voting").textContent = this.now?.voting && ballot ? voted(ballot) : "";
     if (ballot) $("#voting").dataset.round = ballot.round;
     this.showJoin();
@@ -259,6 +265,15 @@ class Wall {
     event.stopPropagation();
     if (event.shiftKey) this.goChapter(by);
     else this.go(by);
+  }
+
+  /** Enter reveals as long as there is something to reveal; then it is the figure's. */
+  revealFirst(event) {
+    const isFigure = event.target.matches?.("#place canvas");
+    if (event.key !== "Enter" || !isFigure || !this.next || event.ctrlKey || event.altKey || event.metaKey) return;
+    event.preventDefault();
+    event.stopPropagation();
+    if (!event.repeat) this.reveal();
   }
 
   press(event) {

@@ -39,7 +39,7 @@ function show(next) {
 
 function hint() {
   const round = now.round === 2 ? "Second round. " : "";
-  return now.mine === null ? `${round}Choose.` : `${round}Counted; you can change it until the vote is closed.`;
+  return now.mine === null ? `${round}${now.choices.length ? "Choose." : "Type a number."}` : `${round}Counted; you can change it until the vote is closed.`;
 }
 
 function buttons() {

@@ -21,6 +21,7 @@ from .vote import MAX_SIZE
 
 MAX_QUESTIONS, MAX_LETTERS, MAX_CHOICES = 100, 400, 8
 MAX_FILE = 1 << 20  # bytes; a hundred questions with all their choices in the longest words stay below
+OWN = "own"  # the chapter of own questions
 TOLD = 60  # letters of what is wrong in a file that a refusal repeats
 FIELDS = {"question": str, "choices": list, "answer": object, "why": str, "unit": str, "stage": str, "before": str}
 
@@ -77,6 +78,8 @@ class Card:
     @property
     def title(self):
         """What the overview calls it."""
+        if self.chapter == OWN:
+            return _short(self.asked.question)
         return self.key.partition("/")[2].replace("-", " ")
 
     @property
@@ -160,7 +163,7 @@ def program(chapters=(), questions=None, folder=ROOT / "solutions"):
         cards += _cards(chapter, source.read(path))
     if questions is not None:
         cards = _placed(read_questions(questions), cards)
-        titles["own"] = "Own questions"
+        titles[OWN] = "Own questions"
     return Program(cards, titles)
 
 
@@ -313,9 +316,18 @@ def _own(where, number, table):
         raise ValueError(f"{where}: the answer {_short(repr(answer))} is {wanted}")
     if not choices and "answer" in table:
         answer = float(answer)
-    asked = Asked(table["question"], tuple(choices), answer, table.get("why", ""), table.get("unit", ""))
-    card = Card(f"own/{number}", "own", "Own questions", asked=asked, stage=table.get("stage", ""))
+    unit = table.get("unit", "")
+    question = table["question"] if choices or not unit else _with_unit(table["question"].rstrip(), unit)
+    asked = Asked(question, tuple(choices), answer, table.get("why", ""), unit)
+    card = Card(f"{OWN}/{number}", OWN, "Own questions", asked=asked, stage=table.get("stage", ""))
     return card, table.get("before", ""), where
+
+
+def _with_unit(question, unit):
+    """The unit that a number is asked for in, as the chapters' questions say it: "How far is it (mm)?"."""
+    if f"({unit})" in question:
+        return question
+    return f"{question.removesuffix('?')} ({unit}){'?' if question.endswith('?') else ''}"
 
 
 def _is_number(answer):

@@ -144,6 +144,18 @@ def test_question_first_then_the_figure_then_what_happened(wall):
     assert wall.locator("#bar .right").inner_text().endswith("through the center")
 
 
+def test_enter_reveals_where_the_figure_would_take_it(wall):
+    show(wall, "09/arena")
+    wall.keyboard.press("r")
+    rest(wall)
+    wall.locator("#place canvas").focus()
+    wall.keyboard.press("Enter")
+    wall.wait_for_selector("#bar.answered")
+    assert not wall.locator("#place .cursor").is_visible()
+    wall.keyboard.press("Enter")
+    wall.wait_for_selector("#place .cursor", state="visible")
+
+
 def test_digits_chapters_overview_theme_and_what_is_not_there(wall):
     show(wall, "05/scan-line")
     number = wall.evaluate("() => wall.chapter.findIndex((card) => card.key === '05/convergence') + 1")
@@ -211,6 +223,23 @@ def test_three_phones_vote_in_two_rounds(wall):
     assert "05/scan-line" in saved.value.path().read_text(encoding="utf-8")
     for phone in phones:
         phone.context.close()
+
+
+def test_a_number_is_typed_on_a_phone_and_nothing_is_wider_than_it(wall):
+    wall.evaluate("() => { location.hash = '06/turning'; }")
+    wall.wait_for_function("() => wall.now?.key === '06/turning'")
+    phone = wall.context.browser.new_context(viewport={"width": 390, "height": 780}).new_page()
+    phone.goto(wall.phones)
+    wall.keyboard.press("v")
+    phone.wait_for_function("() => now.open && now.key === '06/turning'")
+    assert phone.inner_text("#said") == "Type a number."
+    assert phone.evaluate("document.querySelector('#answers input').getBoundingClientRect().right") <= 390
+    phone.locator("#answers input").fill("1,1")
+    phone.keyboard.press("Enter")
+    wall.wait_for_function("() => wall.now.ballot.counts.at(-1) === 1")
+    wall.keyboard.press("v")
+    wall.wait_for_function("() => !wall.now.ballot.open")
+    phone.context.close()
 
 
 def test_the_notes_follow_in_a_second_window(wall):

@@ -104,6 +104,12 @@ def test_own_questions_stand_where_they_were_put_and_show_the_stage_named(tmp_pa
     assert keys.index("own/1") + 1 == keys.index("01/kuka-gimbal") and keys[-1] == "own/2"
     assert shown["own/1"].make is shown["01/three-points"].make and shown["own/1"].stage == "01/three-points"
     assert shown["own/2"].asked.answer_text == "12" and shown["own/2"].declaration()["stage"] == ""
+    assert shown["own/2"].title == "How far is it (mm)?"
+
+
+def test_a_number_is_asked_for_with_its_unit(tmp_path):
+    shown = program.program(["01"], written(tmp_path, OWN.replace(" (mm)?", "?")))
+    assert shown["own/2"].asked.question == "How far is it (mm)?"
 
 
 @pytest.mark.parametrize(
