@@ -44,7 +44,7 @@ found = pages.entries()
 # **Which of their numbers can be trusted?** Setup has just computed all of them afresh, from the data they print and the functions of chapters 1 to 9.
 # What is printed, and where, stands in `data/ledger.csv`; value, bound and status are computed by `labkit.documents`. A test moves the numbers of the tables a little and refuses a row whose value follows its own printed one.
 #
-# First a small one. Then search the table, by words, kind, status and document: *why* opens a row's argument, its numbers and the lines of code that compute it.
+# First a small one: **a document prints 0.37, its own inputs give 0.3746. What is that?** Then search the table, by words, kind, status and document: *why* opens a row's argument, its numbers and the lines of code that compute it.
 
 # %% predict-digits
 guess = ...  # your code here
@@ -137,7 +137,7 @@ def status(printed, value, bound, misprint, simulated):
 # ## Who slipped?
 #
 # Numbers that disagree accuse everybody. A *misprint* is proved when a single slip of one number explains everything, and no slip of another does. `single_slips(text)`
-# lists all numbers one slip away: a sign lost, digits swapped, one wrong, one too many, one missing, the point moved. Entries and their average were printed; find everyone who could be it.
+# lists, as texts, all numbers one slip away: a sign lost, digits swapped, one wrong, one too many, one missing, the point moved. Entries and their average were printed; find everyone who could be it.
 
 
 # %% suspects
@@ -146,7 +146,7 @@ def suspects(entries, average):
     """Return the set of positions whose single slip explains a disagreement.
 
     entries: strings; average: a string, at position len(entries). Rounding explains
-    half units; where that suffices, the set is empty.
+    `bound` of the mean and half a unit of the average; if that suffices: empty.
     """
     ### BEGIN SOLUTION
     def agree(numbers):

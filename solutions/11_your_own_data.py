@@ -144,7 +144,7 @@ display(slipped)
 
 # %% report-text [markdown]
 # In a terminal, `python lab.py calibrate hand-eye --robot R --sensor S --out report` writes the same as a page with charts, and a view you can turn. Read it from the top: how many rows agree, what disagrees, and how. A few rejected rows here and there are bad readings.
-# A block of them that agrees with itself is a second mounting. Suppose nobody had looked, and all 24 rows had been fitted: the result keeps that fit as `slipped.plain`. **How far from where the rows that agree put the sensor would it have put it, in mm?**
+# A block of them that agrees with itself is a second mounting. Suppose nobody had looked, and all 24 rows had been fitted: the result keeps that fit as `slipped.plain`, and `.T` is the matrix of either. **How far apart, in mm, do this fit and the one to the rows that agree put the sensor?**
 
 # %% slip_cost
 slip_cost = ...  # your code here

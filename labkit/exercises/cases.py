@@ -111,6 +111,9 @@ def _traits(given, expected):
     found = {}
     for name, value in given.items():
         found |= _of_value(f"`{name}`", value)
+    for (one, texts), (other, text) in itertools.permutations(given.items(), 2):
+        if isinstance(texts, list) and isinstance(text, str):
+            found[f"`{one}` holds what `{other}` is"] = text in texts
     if isinstance(expected, set | frozenset):
         found["the right result is empty"] = not expected
     elif isinstance(expected, float | np.floating):
@@ -125,7 +128,11 @@ def _of_value(here, value):
     if isinstance(value, str):
         return _of_text(here, value)
     if isinstance(value, list | tuple) and value and all(isinstance(v, str) for v in value):
-        return {f"{here} holds a comma": any("," in v for v in value), f"{here} has one entry": len(value) == 1}
+        return {
+            f"{here} holds a comma": any("," in v for v in value),
+            f"{here} has one entry": len(value) == 1,
+            f"{here} holds the same text twice": len(set(value)) < len(value),
+        }
     try:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
@@ -142,6 +149,8 @@ def _of_text(here, text):
         f"{here} has an exponent": bool(exponent),
         f"{here} has a negative exponent": power.startswith("-"),
         f"{here} has an exponent that is not negative": bool(exponent) and not power.startswith("-"),
+        f"{here} has an exponent of several digits": len(power.lstrip("+-")) > 1,
+        f"{here} begins with a zero": number.lstrip("+-").startswith("0"),
         f"{here} ends with a zero behind the point": number.endswith("0") and "." in number,
         f"{here} has a zero right behind the point": number.partition(".")[2].startswith("0"),
         f"{here} ends with a zero": number.endswith("0"),
@@ -189,6 +198,7 @@ def _of_count(here, words, count):
     for n in (1, 2, 3):
         found[f"{here} has {n} {one if n == 1 else several}"] = count == n
         found[f"{here} has more than {n} {one if n == 1 else several}"] = count > n
+    found |= {f"{here} does not have {n} {one if n == 1 else several}": count != n for n in (1, 2, 3)}
     found[f"the number of {several} of {here} is odd"] = count % 2 == 1
     found[f"the number of {several} of {here} is even"] = count % 2 == 0
     return found

@@ -13,6 +13,7 @@ import functools
 import hashlib
 import inspect
 import itertools
+import re
 import types
 from dataclasses import dataclass, field, replace
 
@@ -319,10 +320,10 @@ class _Trial:
         if self.exercise.metric is None or not self.inputs or not self.budget.left():
             return None
         first = _numbers_of(self.pairs[0][0])
-        if first is None:
-            return None
         admitted = functools.partial(_admitted, self.metrics[0], self.pairs[0][1])
         run = guard.run(self.function, self.inputs[0], admitted, self.exercise.limit)
+        if first is None:
+            return self._kept_words(run.error) if self._is_another_choice(run) else None
         if not _same_numbers(_numbers_of(self.pairs[0][0]), first):
             return (
                 "your function returns one and the same array at every call: a later call overwrites what an earlier "
@@ -330,7 +331,15 @@ class _Trial:
             )
         if run.error is None and _same_numbers(_numbers_of(run.result), first):
             return None
-        told = "stops with an error" if run.error is not None else "gives another result"
+        return self._kept_words(run.error)
+
+    def _is_another_choice(self, run):
+        """Whether a word or a set that was returned first is another one at a second call with the same arguments."""
+        first = self.pairs[0][0]
+        return type(first) in (str, set, frozenset) and (run.error is not None or run.result != first)
+
+    def _kept_words(self, error):
+        told = "stops with an error" if error is not None else "gives another result"
         return (
             f"called twice with the same arguments, your function {told} the second time. Does something stay from "
             "call to call, a global variable or a default argument that is changed? Or is something drawn at random?"
@@ -783,7 +792,7 @@ class _Trial:
         said = run.said or WORDLESS.get(type(error), "" if isinstance(error, AssertionError) else "it says no more")
         if isinstance(error, AssertionError) and not said:
             said = "`assert` raises; an answer is handed over with `return`"
-        advice = next((f". {told}" for words, told in ADVICE.items() if words in said), "")
+        advice = next((f". {told}" for words, told in ADVICE.items() if re.search(words, said)), "")
         if not (advice or args or run.line):
             advice = ". What your function returned could not be worked with."
         where = f"\nin {run.line}" if run.line else ""
@@ -809,9 +818,9 @@ def _failure(mistake, args):
 
 
 def _are_one(results):
-    """Whether results are one and the same."""
+    """Whether results are one and the same, however small they are."""
     try:
-        return all(_equal_arrays(result, results[0]) for result in results[1:])
+        return all(_equal_arrays(result, results[0], atol=0.0) for result in results[1:])
     except (TypeError, ValueError):  # no numbers, but words or a set of them
         return all(type(result) in (str, set) and result == results[0] for result in results[1:])
 
@@ -880,21 +889,21 @@ def _equal_as_written(metric, result, wrong):
     return metric.equal(result, wrong) or isinstance(metric, metrics.Poses) and _equal_arrays(result, wrong)
 
 
-def _equal_arrays(a, b):
+def _equal_arrays(a, b, atol=1e-12):
     if isinstance(b, tuple):
-        return isinstance(a, tuple | list) and len(a) == len(b) and all(map(_equal_arrays, a, b))
+        return isinstance(a, tuple | list) and len(a) == len(b) and all(_equal_arrays(*ab, atol) for ab in zip(a, b))
     a, b = np.asarray(a), np.asarray(b)
     rtol = metrics.FLOAT32_TOLERANCE if metrics._is_single(a) or metrics._is_single(b) else 1e-9
     kind = complex if "c" in (a.dtype.kind, b.dtype.kind) else float
-    return a.shape == b.shape and np.allclose(a.astype(kind), b.astype(kind), rtol=rtol, atol=1e-12, equal_nan=True)
+    return a.shape == b.shape and np.allclose(a.astype(kind), b.astype(kind), rtol=rtol, atol=atol, equal_nan=True)
 
 
 WORDLESS = {  # what is raised without a word
     MemoryError: "your code asks for more memory than there is",
     KeyboardInterrupt: "the check was interrupted",
 }
-ADVICE = {  # what NumPy means
-    "could not convert string to float": "`float` reads 1.5, but not 1,5: replace a decimal comma by a point first.",
+ADVICE = {  # what NumPy means, by a regular expression
+    r"string to float: .*'[-+\d]*,": "`float` reads 1.5, but not 1,5: replace a decimal comma by a point first.",
     "must be square": "`solve` and `inv` need as many equations as unknowns; `lstsq` takes more.",
     "Singular matrix": "The equations do not fix all unknowns: is one missing, or there twice? Has a loop run off?",
     "Incompatible dimensions": "`lstsq` needs one right side a row of the matrix: is `.ravel()` missing?",
@@ -904,7 +913,7 @@ ADVICE = {  # what NumPy means
     "inhomogeneous": "The parts of this array have different lengths.",
     "truth value of an array": "`if` takes one truth value; `np.where` chooses entry by entry.",
     "bitwise_xor": "`^` is no power in Python: write `**`.",
-    "for ^: ": "`^` is no power in Python: write `**`.",
+    r"for \^: ": "`^` is no power in Python: write `**`.",
     "is out of bounds for axis": "Indices count from 0, the row comes first: [row, column].",
     "math domain error": "A root of a negative number, or an arccosine beyond 1, perhaps by rounding: see `np.clip`.",
     "requires a buffer of": "The format and the data differ in length: in `struct`, d takes 8 bytes, f takes 4.",

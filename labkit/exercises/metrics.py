@@ -189,23 +189,25 @@ def _is_single(array):
 
 @dataclass(frozen=True)
 class Numbers(Metric):
-    """A number or an array: largest deviation, relative to the size of the expected entries (at least 1).
+    """A number or an array: largest deviation, relative to the size of the expected entries (at `least` 1).
 
     `tol` is that relative tolerance; `unit` names the deviation. With `absolute` the tolerance is in this unit, however
-    large the entries are. With `double` it is the same for numbers of single precision: what is read keeps all digits.
+    large the entries are; with `least=0` it shrinks with them, however small they are. With `double` it is the same for
+    numbers of single precision: what is read keeps all digits.
     """
 
     tol: float = 1e-9
     unit: str = ""
     absolute: bool = False
     double: bool = False
+    least: float = 1.0
 
     def admit(self, result, expected):
         return as_array(result, np.shape(expected))
 
     def deviations(self, result, expected):
         expected = np.asarray(expected, dtype=float)
-        scale = 1.0 if self.absolute else max(1.0, np.abs(expected).max(initial=0.0))
+        scale = 1.0 if self.absolute else max(self.least, np.abs(expected).max(initial=0.0))
         tol = max(self.tol, FLOAT32_TOLERANCE) if _is_single(result) and not self.double else self.tol
         amount = float(np.abs(result.astype(float) - expected).max(initial=0.0))
         return [Deviation("the largest entry" if result.ndim else "", amount, self.unit, tol * scale)]

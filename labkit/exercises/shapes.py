@@ -103,6 +103,11 @@ def _less():
 def _more(rows):
     """(words, change of the result): the student returned more than is asked for."""
     yield "the expected result is the diagonal of the matrix you return", lambda r: np.diag(_square(r))
+    yield (
+        "the expected matrices are there, and among them the products of every matrix of the one stack with every one "
+        "of the other, as `np.dot` gives them: `@` takes the two that stand in the same place",
+        _stack_of_own,
+    )
     yield "your result has one row too many, the last; the others are right", lambda r: _long(r)[:-1]
     yield "your result has one row too many, the first; the others are right", lambda r: _long(r)[1:]
     if rows > MOST:
@@ -113,6 +118,13 @@ def _more(rows):
         yield f"the expected result is column {k} (counted from 0) of what you return", lambda r, k=k: _table(r)[:, k]
     for words, digest in _digests("the numbers you return"):  # of two numbers the first may be the larger by chance
         yield f"the expected result is {words}", digest
+
+
+def _stack_of_own(r):
+    """Of the products of all with all, shape (n, i, n, k), those of two with the same number."""
+    if r.ndim != 4 or r.shape[0] != r.shape[2]:
+        raise ValueError
+    return np.einsum("iaib->iab", r)
 
 
 def _digests(of):

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from labkit.chapters.ch10_ledger import exercises as ledger
 from labkit.chapters.ch11_your_own_data import exercises as own
 from labkit.documents.ledger import Computed, Row, judge
-from labkit.documents.rounding import half_unit
+from labkit.documents.rounding import half_unit, read
 from labkit.documents.slips import single_slips
 from labkit.exercises.engine import CORRECT, NOT_YET
 from labkit.exercises.metrics import Refused
@@ -240,8 +240,56 @@ def _one_digit_exponents(printed):
     return half_unit(number) * 10.0**power
 
 
+def _remembered():
+    """The half unit of the first text that stood for the same number."""
+    memory = {}
+    return lambda printed: memory.setdefault(float(printed.replace(",", ".")), half_unit(printed))
+
+
+def _each_once(entries, average):
+    def agree(numbers):
+        different = sorted(set(numbers[:-1]))
+        halves = np.mean([half_unit(text) for text in numbers[:-1]]) + half_unit(numbers[-1])
+        return abs(np.mean(np.array(different, float)) - float(numbers[-1])) <= halves + 1e-12
+
+    printed = [*entries, average]
+    changed = (
+        (k, [*printed[:k], other, *printed[k + 1 :]]) for k in range(len(printed)) for other in single_slips(printed[k])
+    )
+    return set() if agree(printed) else {k for k, numbers in changed if agree(numbers)}
+
+
+def _unlike_the_average(entries, average):
+    found = ledger.CHAPTER["suspects"].reference(entries, average)
+    return {k for k in found if k == len(entries) or entries[k] != average}
+
+
+def _one_axis_for_small_turns(T, apart):
+    axes = own.log_so3(T[:, :3, :3])
+    size = np.linalg.norm(axes, axis=1, keepdims=True)
+    return own._angle_between(*(np.where(size > 0.01, axes, [0.0, 0.0, 1.0])[rows] for rows in _pairs(apart)))
+
+
+def _pairs(apart):
+    return np.s_[apart:], np.s_[:-apart]
+
+
 ALMOST_RIGHT = [
     ("half_unit", _one_digit_exponents),
+    ("half_unit", _remembered()),
+    ("half_unit", lambda p: round(half_unit(p), 12)),
+    (
+        "bound",
+        lambda f, p: _up_or_down(
+            f, p, at=lambda texts: [(k, t) for k, t in enumerate(texts) if float(t.replace(",", "."))]
+        ),
+    ),
+    ("suspects", _each_once),
+    ("suspects", _unlike_the_average),
+    ("between_axes", _one_axis_for_small_turns),
+    ("left_out", lambda r, J: r / (1 - (np.linalg.svd(J)[0][:, : min(J.shape[1], 5)] ** 2).sum(1))),
+    ("with_one_more", lambda C, J: np.linalg.inv(np.linalg.inv(C) + J.T @ J * (len(J) > 1))),
+    ("next_pose", lambda C, c: _best_of(C, c, np.arange(len(c))) + (len(c) == 1)),
     (
         "half_unit",
         lambda p: (
@@ -285,6 +333,46 @@ def test_what_is_wrong_in_one_case_meets_that_case_at_every_check(id, almost, se
         except (Refused, IndexError):
             caught = True
     assert caught
+
+
+def test_values_of_a_comparison_are_plain_numbers():
+    for draw, *_ in ledger.CHAPTER["status"]._plan():
+        assert type(draw(np.random.default_rng(0))[1]) is float, "so that `off <= half` is True, and no np.True_"
+
+
+UP = """
+def bound(f, printed):
+    x, halves = read(printed)
+    return sum(f(x + step) - f(x) for step in np.diag(halves))
+"""
+THROUGH_FLOAT = """
+def half_unit(printed):
+    number, _, exponent = repr(float(printed.replace(",", "."))).partition("e")
+    return 0.5 * 10.0 ** (int(exponent or 0) - len(number.partition(".")[2].rstrip("0")))
+"""
+OF_THE_FLOAT = "def half_unit(printed):\n    return 0.5 * np.spacing(float(printed.replace(',', '.')))"
+ONE_SHARE = "def left_out(r, J):\n    return r / (1 - max(np.diag(J @ np.linalg.pinv(J))))"
+SHRINKING = "def with_one_more(C, J):\n    return np.linalg.inv(np.eye(len(C)) + C @ J.T @ J)"
+ALL_WITH_ALL = """
+def motions(F, S):
+    inv = np.linalg.inv
+    return np.dot(inv(F[:-1]), F[1:]), np.dot(S[:-1], inv(S[1:]))
+"""
+
+
+@pytest.mark.parametrize(
+    "module, id, text, told",
+    [
+        (ledger, "bound", UP, "moves of one direction"),
+        (ledger, "half_unit", THROUGH_FLOAT, "float() forgets"),
+        (ledger, "half_unit", OF_THE_FLOAT, "too small on every draw"),
+        (own, "left_out", ONE_SHARE, "the largest share for all"),
+        (own, "with_one_more", SHRINKING, "(I - K J) C"),
+        (own, "motions", ALL_WITH_ALL, "as `np.dot` gives them"),
+    ],
+)
+def test_what_is_told_of_a_wrong_answer(module, id, text, told):
+    assert told in told_of(module, id, text, read=read)
 
 
 def test_a_special_case_is_told_before_what_is_wrong_with_the_shape_of_its_result():

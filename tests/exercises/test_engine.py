@@ -978,6 +978,33 @@ def fills_one_array(v):
     return BUFFER
 
 
+def keeps_a_set(v, found={0.5}):  # noqa: B006, the slip in question
+    found.add(round(v[0], 6))
+    return found
+
+
+def test_what_stays_in_a_set_between_calls_is_told():
+    exercise = replace(DOUBLE, reference=lambda v: {round(v[0], 6)}, metric=metrics.Exactly())
+    assert "called twice with the same arg" in exercise.judge(keeps_a_set, rng=np.random.default_rng(0)).text
+
+
+@pytest.mark.parametrize("text, told", [("6,25", True), ("-,5", True), ("sign lost, perhaps", False)])
+def test_a_decimal_comma_is_told_of_numbers_alone(text, told):
+    said = DOUBLE.judge(lambda v: float(text), rng=np.random.default_rng(0)).text
+    assert ("replace a decimal comma" in said) == told
+
+
+def test_results_that_are_tiny_and_differ_are_not_one_and_the_same():
+    exercise = replace(DOUBLE, reference=lambda v: v[0], metric=metrics.Numbers(1e-9))
+    assert "same on every draw" not in exercise.judge(lambda v: 1e-16 * v[1], rng=np.random.default_rng(0)).text
+
+
+def test_a_tolerance_may_shrink_with_what_is_expected():
+    assert metrics.Numbers(1e-6).equal(3e-9, 1e-9)
+    assert not metrics.Numbers(1e-6, least=0.0).equal(np.array(3e-9), 1e-9)
+    assert metrics.Numbers(1e-6, least=0.0).equal(np.array(1e-9 + 1e-16), 1e-9)
+
+
 @pytest.mark.parametrize(
     "function, words",
     [

@@ -104,6 +104,26 @@ def test_what_texts_and_words_have_in_common_one_or_two_at_once(is_wrong, told):
     assert cases.case_words(TEXTS, [is_wrong(*draw) for draw in TEXTS]).startswith(told)
 
 
+@pytest.mark.parametrize(
+    "draws, told",
+    [
+        ([{"printed": t} for t in ("3e-12", "3e-2", "3.1", "0.31")], "`printed` has an exponent of several digits"),
+        ([{"printed": t} for t in ("0.31", "-5,2", "3.1", "30")], "`printed` begins with a zero"),
+        ([{"texts": t} for t in (["3", "4", "3"], ["3", "4"], ["4", "5", "7"])], "`texts` holds the same text twice"),
+        ([{"texts": ["3", t], "mean": "3.5"} for t in ("3.5", "4", "5")], "`texts` holds what `mean` is"),
+        ([{"J": np.ones((7, n))} for n in (4, 3, 3)], "`J` has more than 3 columns"),
+    ],
+)
+def test_what_the_first_of_some_draws_alone_is(draws, told):
+    words = cases.case_words([(d, 0.5) for d in 8 * draws], 8 * [True, *(len(draws) - 1) * [False]])
+    assert words == (told and f"exactly where {told}")
+
+
+def test_a_size_that_is_typed_in_is_told_before_odd_and_even():
+    draws = [({"J": np.ones((9, n))}, 0.5) for n in 8 * [2, 3, 4]]
+    assert cases.case_words(draws, 8 * [True, False, True]) == "exactly where `J` does not have 3 columns"
+
+
 def test_what_only_a_few_others_have_is_told_too():
     draws = [({"printed": text}, 0.5) for text in 8 * ["1.5", "2.7", "3.30", "4.1"]]
     wrong = [k % 4 == 2 and k > 8 for k in range(len(draws))]

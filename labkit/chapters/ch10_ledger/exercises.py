@@ -24,6 +24,10 @@ FORMS = (
     "d,de-k",
     "-d.de-1k",
     "0.0d0",
+    "0,dd",
+    "de1k",
+    *("12", "12.0", "12.00", "1.2e1"),  # one number, with four half units
+    "0.00",
 )  # d: any digit but 0, k: up to 5
 
 
@@ -49,7 +53,9 @@ def special_comparison(rng, kind):
     """printed, value, bound, misprint, simulated.
 
     "sign": the value has the other sign. "edge": it is off by half a unit to the last bit, from an odd number. "limit":
-    by half a unit and the bound. "exponent": printed with one. "whole": a whole number, of which the last digits are 0.
+    by half a unit and the bound. "small" and "far": printed with an exponent below 0, and within the half unit or far
+    away; "large": with one above 0, within the half unit. "whole": a whole number, of which the last digits are 0.
+    "zero": 0 is printed.
     """
     misprint, simulated = bool(rng.integers(2)), bool(rng.integers(2))
     bound, whole = float(rng.integers(0, 4)), int(rng.integers(2, 90)) * int(rng.choice([-1, 1]))
@@ -60,9 +66,12 @@ def special_comparison(rng, kind):
     if kind == "limit":
         return str(whole), whole + int(rng.choice([-1, 1])) * (0.5 + bound), bound, misprint, simulated
     if kind == "whole":
-        return f"{whole}00", 100.0 * whole + rng.choice([-1, 1]) * rng.uniform(5, 40), bound, misprint, simulated
-    value = whole / 100 + 0.01 * rng.choice([-1, 1]) * rng.choice([0.3, 2.5, 9.0])
-    return f"{whole}e-2", float(value), bound / 100, misprint, simulated
+        return f"{whole}00", float(100 * whole + rng.choice([-1, 1]) * rng.uniform(5, 40)), bound, misprint, simulated
+    if kind == "zero":
+        return "0.0", float(rng.choice([-1, 1]) * rng.uniform(0.01, 0.04)), bound, misprint, simulated
+    unit = 100.0 if kind == "large" else 0.01
+    value = unit * (whole + rng.choice([-1, 1]) * (9.0 if kind == "far" else 0.3))
+    return f"{whole}e{'2' if kind == 'large' else '-2'}", float(value), bound * unit, misprint, simulated
 
 
 SPECIAL = tuple(
@@ -75,7 +84,8 @@ SPECIAL = tuple(
         ("sign", "the value has the other sign than the printed number"),
         ("edge", "the value is off by half a unit exactly: that is still within"),
         ("limit", "the value is off by half unit and bound exactly: that is still within"),
-        ("exponent", "the number is printed with an exponent, as 3e-4"),
+        *((kind, "the number is printed with an exponent, as 3e-4 or 3e4") for kind in ("small", "far", "large")),
+        ("zero", "0 is printed"),
         ("whole", "the number is whole and ends with zeros: they are digits like all others"),
     )
 )
@@ -138,6 +148,11 @@ def _other_sign(printed):
 
 def _through_float(printed):
     return half_unit(str(_number(printed)))
+
+
+def _as_float_prints_it(printed):
+    """Of the number as Python prints it, in which no zeros at the end are left."""
+    return _digits_left(_without_zeros)(repr(_number(printed)))
 
 
 def _of_the_value(printed):
@@ -518,7 +533,7 @@ CHAPTER = Chapter(
             "half_unit",
             reference=half_unit,
             draw=NUMBERS,
-            metric=metrics.Numbers(1e-12),
+            metric=metrics.Numbers(1e-6, least=0.0),
             hints=(
                 "Which digit was rounded? Half a unit of that digit can be hidden.",
                 "With d decimals it is 0.5 * 10**-d. An exponent, as in 3e-4, shifts that; a comma is a decimal point.",
@@ -541,9 +556,12 @@ CHAPTER = Chapter(
                 Mistake(
                     _other_sign, "3e-4 is 3 times 10 to the power -4: your exponent shifts the half unit the wrong way."
                 ),
-                Mistake(
-                    _through_float,
-                    "float() forgets how many digits were printed: 1.010000 has six decimals, 12 has none. Work on the string.",
+                *(
+                    Mistake(
+                        variant,
+                        "float() forgets how many digits were printed: 1.010000 has six decimals, 12 has none. Work on the string.",
+                    )
+                    for variant in (_through_float, _as_float_prints_it)
                 ),
                 Mistake(
                     _digits_left(_without_zeros),

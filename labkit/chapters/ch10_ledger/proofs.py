@@ -65,10 +65,16 @@ INPUTS = tuple(functools.partial(printed_inputs, function=f) for f in FUNCTIONS)
 
 
 def special_inputs(rng, kind):
-    """A function and printed numbers: "whole", with an "exponent", one printed "twice", "one" alone, or "six"."""
+    """A function and printed numbers: "whole", with an "exponent", one printed "twice", "one" alone, "six", or with a
+    "zero" among them, or zeros "only".
+    """
+    if kind == "only":
+        return total, ["0", "0.0", "-0,00"][: rng.integers(2, 4)]
     texts = [str(rng.integers(2, 30)) for _ in range({"one": 1, "six": 6}.get(kind, 3))]
     if kind == "exponent":
         texts[1] = f"{rng.uniform(2, 9):.{rng.integers(0, 3)}f}e{rng.choice([-2, -1, 1, 2])}"
+    elif kind == "zero":
+        texts[int(rng.integers(0, 3))] = str(rng.choice(["0", "0.0", "-0,00"]))
     elif kind == "twice":
         texts = [f"{rng.uniform(2, 9):.{rng.integers(1, 3)}f}" for _ in range(2)]
         texts.insert(int(rng.integers(0, 3)), texts[0])
@@ -185,6 +191,8 @@ BOUND = Exercise(
             ("twice", "one and the same number is printed twice"),
             ("one", "f takes one number alone"),
             ("six", "f takes more than four numbers"),
+            ("zero", "a number is printed as 0: that may be anything within its half unit too"),
+            ("only", "all numbers are printed as 0"),
         )
     ],
     hints=(
@@ -233,6 +241,14 @@ BOUND = Exercise(
             lambda f, p: abs(sum(_moves(f, p)[0])),
             "You added the moves with their signs, so that they cancel: take the absolute value of each first.",
         ),
+        *(
+            Mistake(
+                lambda f, p, way=way: sum(_moves(f, p)[way]),
+                "You added the moves of one direction with their signs, so that they cancel: take the absolute value "
+                "of each first, and look at the other direction too.",
+            )
+            for way in (0, 1)
+        ),
         Mistake(
             lambda f, p: abs(_larger_with_signs(f, p).sum()),
             "Of each number you took the larger move, but with its sign, so that they cancel in the sum: take the "
@@ -265,6 +281,10 @@ BOUND = Exercise(
         Mistake(
             lambda f, p: _larger(f, p).mean(),
             "That is the mean of the moves. All numbers may be off at once: add the moves up.",
+        ),
+        Mistake(
+            lambda f, p: _larger(f, p)[read(p).values != 0].sum(),
+            "A number that is printed as 0 does not move yet: it may be anything within its half unit as well.",
         ),
         Mistake(
             _up_and_left_down,
@@ -466,22 +486,36 @@ def _suspected(gaps, more, kept=False, counted=(1, 1)):
 def other_columns(rng, kind):
     """Columns with a slip at a place that `column` never has.
 
-    "twice": an entry that is printed twice, and either of the two may be wrong. "many": more entries than five, or
-    fewer than four.
+    "twice": an entry that is printed twice, and either of the two may be wrong. "beside": the same, and another one is
+    wrong. "many": more entries than five, or fewer than four. "like": the wrong entry reads like the average.
     """
-    count = 4 if kind == "twice" else int(rng.choice([2, 3, 7, 8]))
+    if kind == "like":
+        return _like_the_average(rng)
+    count = int(rng.choice([2, 3, 6, 7])) if kind == "many" else 3
     values = np.round(rng.uniform(20, 60, count), 1)
     entries = [f"{value:.1f}" for value in values]
-    if kind == "twice":
-        k, j = sorted(rng.choice(count, 2, replace=False))
+    k, j, other = rng.permutation(count)[:3] if kind != "many" else 3 * [int(rng.integers(count))]
+    if kind != "many":
         values[j], entries[j] = values[k], entries[k]
-    else:
-        k = int(rng.integers(count))
+    if kind == "beside":
+        k = other
     entries[k] = _slipped(rng, entries[k], "one digit wrong")
     if kind == "twice":
         entries[j] = entries[k]
         values[j] = number(entries[k])
     return entries, f"{values.mean():.3f}"
+
+
+def _like_the_average(rng):
+    """Entries of which one, with a slip in it, is printed like the average, which all others are to agree with."""
+    while True:
+        average = f"{rng.uniform(20, 60):.1f}"
+        values = np.append(np.round(rng.uniform(20, 60, 2), 1), number(_slipped(rng, average, "one digit wrong")))
+        values[0] += 3 * (number(average) - values.mean())
+        entries = [*(f"{value:.1f}" for value in values[:2]), average]
+        if 20 < values[0] < 60 and 2 in suspects(entries, average):
+            order = rng.permutation(3)
+            return [entries[k] for k in order], average
 
 
 COLUMNS = tuple(
@@ -501,6 +535,7 @@ COLUMNS = tuple(
         ),
         of_the_average_alone,
         functools.partial(at_the_limit, finer=2, low=BEYOND[0], high=BEYOND[1]),
+        *(functools.partial(other_columns, kind=kind) for kind in ("beside", "like")),
     )
 )
 

@@ -19,10 +19,12 @@ from ...machines.sensor_cell import CELL
 # --- draws -----------------------------------------------------------------------------------------------------------
 
 
-def rows_of_a_cell(rng, n=None):
-    """Flange poses and exact readings of n rows, or some, from random places."""
+def rows_of_a_cell(rng, n=None, still=False):
+    """Flange poses and exact readings of n rows, or some, from random places; `still`: of which two are the same."""
     n = n or int(rng.integers(4, 10))
     T_BF = pose(exp_so3(rng.uniform(-1, 1, (n, 3))), rng.uniform(-400, 400, (n, 3)))
+    if still:
+        T_BF[2] = T_BF[1]
     X = pose(exp_so3(rng.uniform(-1, 1, 3)), rng.uniform(-150, 150, 3))
     Y = pose(exp_so3(rng.uniform(-1, 1, 3)), rng.uniform(-900, 900, 3))
     return T_BF, invert(T_BF @ X) @ Y
@@ -73,15 +75,23 @@ def motions_of_half_a_turn(rng):
     return pose(exp_so3(turns * _axes(T)), T[:, :3, 3]), apart
 
 
-def fitted_line(rng, freedom=(4, 8), p=None, unlike=False, alone=False):
+def small_turns(rng):
+    """Motions that turn little, up to a quarter of a degree."""
+    return some_motions(rng, int(rng.integers(1, 4)), turns=(2e-4, 4e-3))
+
+
+def fitted_line(rng, freedom=(4, 8), p=None, unlike=False, alone=False, unused=False):
     """Residuals of a linear fit of p parameters to n numbers, and its derivative.
 
     freedom: the least and the largest n - p. unlike: the parameters have units of very different size, as radians
-    beside millimeters. alone: one number pays for most of a parameter, its share is above 0.95.
+    beside millimeters. alone: one number pays for most of a parameter, its share is above 0.95. unused: one number does
+    not depend on the parameters.
     """
-    p = p or int(rng.integers(2, 5))
+    p = p or int(rng.integers(2, 6))
     n = p + int(rng.integers(freedom[0], freedom[1] + 1))
     J, noise = rng.normal(size=(n, p)) * rng.uniform(0.3, 3.0), rng.uniform(0.2, 4.0) * rng.normal(size=n)
+    if unused:
+        J[int(rng.integers(n))] = 0.0
     if unlike:
         J *= 10.0 ** rng.permutation(np.linspace(-1.7, 1.7, p))
     if alone:
@@ -98,13 +108,13 @@ def information(rng, p=None):
     return M @ M.T + 1e-3 * np.diag(rng.uniform(0.5, 1.5, p))
 
 
-def covariance_and_reading(rng, more=False):
+def covariance_and_reading(rng, more=False, k=None):
     """A covariance, and the derivative of one more reading of k numbers; `more` of them than there are parameters, or
     as many.
     """
     C = information(rng)
     p = len(C)
-    k = int(rng.integers(p, p + 3) if more else rng.integers(1, p))
+    k = k or int(rng.integers(p, p + 3) if more else rng.integers(1, p))
     return C, rng.normal(size=(k, p)) * rng.uniform(0.3, 2.0)
 
 
@@ -130,9 +140,15 @@ def best_at(rng, place):
     return C, candidates[order]
 
 
-def few_candidates(rng):
-    """Fewer candidates than parameters, and more numbers in each reading than there are parameters."""
-    C, m = information(rng, int(rng.integers(4, 7))), int(rng.integers(2, 4))
+def single_numbers(rng):
+    """Candidates of one number each."""
+    C = information(rng)
+    return C, rng.normal(size=(int(rng.integers(4, 8)), 1, len(C))) * rng.uniform(0.2, 2.0)
+
+
+def few_candidates(rng, m=None):
+    """Fewer candidates than parameters, m or some, and more numbers in each reading than there are parameters."""
+    C, m = information(rng, int(rng.integers(4, 7))), m or int(rng.integers(2, 4))
     return C, rng.normal(size=(m, len(C) + 1, len(C))) * rng.uniform(0.1, 0.4, (m, 1, 1))
 
 
@@ -150,6 +166,9 @@ def special_fits(draw, metric):
         (functools.partial(draw, alone=True), metric,
          "right for small shares h, but not where one number has a share above 0.95:"),
         (functools.partial(draw, p=1), metric, "right for several parameters, but not for one, p = 1:"),
+        (functools.partial(draw, unused=True), metric,
+         "right in ordinary cases, but not where a row of J is 0: this number tells nothing of the parameters, its share h is 0:"),
+        (functools.partial(draw, p=7), metric, "right for few parameters, but not for seven:"),
     ]  # fmt: skip
 
 
@@ -217,6 +236,20 @@ def _without_clip(T, k):
 def left_out(r, J):
     """Reference of the exercise: residuals of each number under the fit to the others, shape (n,)."""
     return influence.leave_out(r[:, None], J[:, None])[0][:, 0]
+
+
+def _without_three(r, J):
+    """Residuals under the fit to all others, where the numbers of three rows in succession are left out together."""
+    found = []
+    for i in range(0, len(r), 3):
+        J_kept, r_kept = (np.delete(a, np.s_[i : i + 3], axis=0) for a in (J, r))
+        found.append(r[i : i + 3] - J[i : i + 3] @ np.linalg.lstsq(J_kept, r_kept, rcond=None)[0])
+    return np.concatenate(found)
+
+
+def _diagonal_alone(M):
+    """The inverse of a matrix of which the diagonal is read alone."""
+    return np.diag(1 / np.diag(M))
 
 
 def _shares(J):
@@ -398,7 +431,10 @@ CHAPTER = Chapter(
             reference=motion.motions,
             draw=rows_of_a_cell,
             metric=MOTIONS,
-            noisy=(functools.partial(rows_of_a_cell, n=2), MOTIONS, "right for many rows, but not for two of them, which make one motion:"),
+            noisy=[
+                (functools.partial(rows_of_a_cell, n=2), MOTIONS, "right for many rows, but not for two of them, which make one motion:"),
+                (functools.partial(rows_of_a_cell, still=True), MOTIONS, "right where the robot always moves, but not where it stays, and a motion is the identity:"),
+            ],
             hints=(
                 "Write the loop for row i and for row i + 1. Both equal T_BT, so they equal each other.",
                 "T_BF[i] X T_ST[i] = T_BF[i+1] X T_ST[i+1]: bring all of the robot to the left, all of the sensor to the right.",
@@ -458,6 +494,7 @@ CHAPTER = Chapter(
                 (motions_about_one_axis, metrics.Numbers(1e-6, "rad"),
                  "right for axes in all directions, but not for parallel and opposite ones, where a cosine may come out as 1.0000000000000002:"),
                 (one_pair, metrics.Numbers(1e-6, "rad"), "right for several pairs, but not where one pair alone is to be compared, which gives one angle in an array:"),
+                (small_turns, metrics.Numbers(1e-6, "rad"), "right for large turns, but not for motions that turn by less than a quarter of a degree, which have an axis too:"),
                 (motions_of_half_a_turn, metrics.Numbers(1e-6, "rad"),
                  "right in ordinary cases, but not for motions of nearly half a turn, where the sine of the angle, and R less its transpose with it, vanishes:"),
             ],
@@ -524,7 +561,7 @@ CHAPTER = Chapter(
                         "This is the largest of the three coordinates. Asked for is the distance."),
                 Mistake(lambda: float(np.abs(slipped().plain.T[:3, 3] - slipped().T[:3, 3]).sum()),
                         "This is the sum of the three coordinates. A distance is the root of the sum of their squares.", id="slip_cost-555eab"),
-                Mistake(lambda: round(slip_cost(), 1), "This is right as far as it goes, rounded to one decimal: at least 3 digits are needed, so hand over the computed value."),
+                Mistake(lambda: round(slip_cost(), 1), "This is right as far as it goes, but rounded: at least 3 digits are needed, so hand over the computed value."),
                 Mistake(lambda: slipped().rms_translation, "This is the rms that the report states of the rows that agree, not how far the mounting moves."),
                 Mistake(lambda: float(np.linalg.norm((invert(slipped().T) @ slipped().plain.T)[:3, :3])), "This is the norm of a rotation matrix, the root of 3 for every rotation. The way is in the last column."),
                 Mistake(lambda: float(np.abs(slipped().plain.T - slipped().T).sum()),
@@ -577,6 +614,8 @@ CHAPTER = Chapter(
                         "You gave every number the mean share p / n. Each row of J has a share of its own."),
                 Mistake(lambda r, J: r / (1 - (J**2).sum(1)), "(J^T J)^-1 is missing between the two rows of J.", id="left_out-90a3f2"),
                 Mistake(lambda r, J: r / (1 - ((J @ J.T @ J) * J).sum(1)), "J^T J stands between the two rows of J as it is: its inverse belongs there.", id="left_out-b026e8"),
+                Mistake(lambda r, J: r / (1 - _shares(J).max()), "You took the largest share for all. Each number has a share of its own."),
+                Mistake(_without_three, "You leave out three numbers at once, as those of one position. Here each number is left out alone."),
                 Mistake(lambda r, J: r - _shares(J), "You subtracted h, a share without unit, from a residual. What is left of an error is 1 - h of it: divide by that."),
                 Mistake(lambda r, J: r * (1 + _shares(J)), "1 + h is only the beginning of 1 / (1 - h): right for small shares."),
                 Mistake(lambda r, J: r / (1 - _shares(J)) ** 2, "You divided by 1 - h twice."),
@@ -661,8 +700,11 @@ CHAPTER = Chapter(
             reference=with_one_more,
             draw=covariance_and_reading,
             metric=metrics.Numbers(1e-7),
-            noisy=(functools.partial(covariance_and_reading, more=True), metrics.Numbers(1e-7),
-                   "right for a reading of fewer numbers than there are parameters, but not for one of as many, or more:"),
+            noisy=[
+                (functools.partial(covariance_and_reading, more=True), metrics.Numbers(1e-7),
+                 "right for a reading of fewer numbers than there are parameters, but not for one of as many, or more:"),
+                (functools.partial(covariance_and_reading, k=1), metrics.Numbers(1e-7), "right for several numbers, but not for a reading of a single one:"),
+            ],
             hints=(
                 "What is known adds up, not what is unknown: information is the inverse of a covariance.",
                 "The reading brings the information J^T J. Add it to the inverse of C, and invert the sum.",
@@ -674,6 +716,10 @@ CHAPTER = Chapter(
                 Mistake(lambda C, J: np.linalg.inv(C + J.T @ J), "You added information to a covariance: the inverse of C is missing inside."),
                 Mistake(lambda C, J: C - J.T @ J, "You took information away from a covariance: their units differ. Invert C, add J^T J, and invert the sum."),
                 Mistake(lambda C, J: C, "Nothing has changed: the reading is missing."),
+                Mistake(lambda C, J: np.linalg.solve(np.eye(len(C)) + C @ J.T @ J, np.eye(len(C))),
+                        "This is I - K J, by which the covariance shrinks. Multiply: (I - K J) C."),
+                Mistake(lambda C, J: _diagonal_alone(_diagonal_alone(C) + J.T @ J),
+                        "You invert by the diagonal alone. What two parameters share stands beside it: the inverse of a matrix is np.linalg.inv."),
                 Mistake(lambda C, J: C - C @ J.T @ np.linalg.solve(J @ C @ J.T, J @ C),
                         "You took the reading as free of noise. Whitened, its covariance is I: J C J^T + I."),
                 Mistake(lambda C, J: C - (lambda K: K @ K.T)(C @ J.T @ np.linalg.inv(J @ C @ J.T + np.eye(len(J)))),
@@ -711,6 +757,8 @@ CHAPTER = Chapter(
                 (functools.partial(best_at, place=0), metrics.Exactly(), "right where the best candidate is not the first, but not where it is:"),
                 (functools.partial(best_at, place=-1), metrics.Exactly(), "right where the best candidate is not the last, but not where it is:"),
                 (few_candidates, metrics.Exactly(), "right in ordinary cases, but not where there are fewer candidates than parameters, each of more numbers than these:"),
+                (functools.partial(few_candidates, m=1), metrics.Exactly(), "right for several candidates, but not where there is only one to choose:"),
+                (single_numbers, metrics.Exactly(), "right for candidates of several numbers, but not where each reading is a single one:"),
             ],
             hints=(
                 "Compute what each candidate would leave, and compare one number of it.",
@@ -771,6 +819,8 @@ CHAPTER = Chapter(
                 *(Mistake(variant, "This holds for a number that the fit does not use. Each fitted number hides part of its error: its share h is missing.")
                   for variant in (lambda J, s, k: np.full(len(J), k * s), lambda J, s, k: k * s)),
                 Mistake(lambda J, s, k: k * s / np.sqrt(_shares(J)), "You divided by the root of the share h. What the others check is 1 - h."),
+                Mistake(lambda J, s, k: k * s * np.sqrt(_shares(J)),
+                        "This is how uncertain the fit is at each number, std sqrt(h). An error shows in the residual, of which the noise is std sqrt(1 - h)."),
                 Mistake(lambda J, s, k: k / np.sqrt(1 - _shares(J)), "The noise is missing: these are standard deviations, not the unit of the readings."),
                 Mistake(lambda J, s, k: s / np.sqrt(1 - _shares(J)), "`times` is missing: an error of one standard deviation is not seen."),
                 Mistake(lambda J, s, k: k * s**2 / np.sqrt(1 - _shares(J)), "You took the variance of the noise. Its standard deviation belongs here."),
