@@ -39,6 +39,8 @@ TWINS = {name: (twin,) for pair in PAIRS for name, twin in (pair, pair[::-1])} |
     "normal": ("uniform",),
 }
 WRAPPERS = {"array", "asarray", "float", "int", "list", "tuple", "range", "len", "zip", "enumerate", "bool", "set"}
+MODULES = {"np", "numpy", "math", "scipy"}  # what they hold is no data of the notebook
+CAST = "astype"  # the argument of which is no value
 GUARD = 1e-3  # below which a bound stands for 0
 BOUNDED = {"clip"}  # exchanged, a value and its bound make a constant: that mends, and is not what happened
 SIGNS = {ast.Add: "plus", ast.Sub: "minus", ast.Mult: "`*`", ast.Div: "`/`", ast.MatMult: "`@`", ast.Pow: "`**`"}
@@ -129,12 +131,14 @@ def changes(function, most=4):
     changes : list of Change
     """
     found, names, indices = [], _names(function), set(_indices(function))
+    places = {node.slice for node in ast.walk(function) if isinstance(node, ast.Subscript)}
     for owner in ast.walk(function):
         for field, content in ast.iter_fields(owner):
             for i, node in enumerate(content if isinstance(content, list) else [content]):
                 if not isinstance(node, ast.AST):
                     continue
                 for rank, words, new in _changed(node, names):
+                    rank += node in places and rank == 1  # T[3, :3] is 0 in each pose: a term left out says more
                     if rank <= most:
                         words = COUNTED if node in indices and words == "with one sign turned" else words
                         _locate(new, node)
@@ -644,11 +648,21 @@ def _attribute(node, names):
         yield 0, "without one of its transposes", node.value
     for other in PRECISIONS.get(node.attr, ()):
         yield 0, f"with `{other}` where `{node.attr}` belongs", ast.Attribute(node.value, other, node.ctx)
+    if isinstance(node.ctx, ast.Load) and _root(node) not in {*MODULES, *names[0], *names[1], None}:
+        for other in names[0]:
+            yield 3, f"with `{other}` where `{ast.unparse(node)}` belongs", ast.Name(other, ast.Load())
+
+
+def _root(node):
+    """The name that a chain of attributes begins with; None where it begins with anything else."""
+    while isinstance(node, ast.Attribute):
+        node = node.value
+    return getattr(node, "id", None)
 
 
 def _call(node, names):
     name = getattr(node.func, "attr", getattr(node.func, "id", ""))
-    inner = node.args[0] if node.args else getattr(node.func, "value", None)
+    inner = node.args[0] if node.args and name != CAST else getattr(node.func, "value", None)
     if name in ARRAYS and not any(keyword.arg == "dtype" for keyword in node.keywords):
         floats = [*node.keywords, ast.keyword("dtype", ast.Name("float", ast.Load()))]
         yield 2, WHOLE, ast.Call(node.func, node.args[:1], floats)

@@ -183,7 +183,8 @@ class Written:
         try:
             with np.errstate(all="ignore"):
                 if plan[0] == "code":
-                    return (self._changed(plan[1])(*copies),)
+                    found = self._changed(plan[1])(*copies)
+                    return None if _differ(copies, args) else (found,)
                 if plan[0] == "argument":
                     note = _Note(self.counted)
                     return (self._made(self._noted, {NOTE: note})(*_given_otherwise(copies, *plan[1:])),)
@@ -244,6 +245,12 @@ class Written:
 
         guard.run(work, (), limit=seconds, author=self.function)
         return found
+
+
+def _differ(arrays, before):
+    """Whether a function changed one of its arguments, of arrays and numbers."""
+    pairs = ((numeric(a), numeric(b)) for a, b in zip(arrays, before))
+    return any(a is not None and not np.array_equal(a, b, equal_nan=True) for a, b in pairs)
 
 
 def _stacked(values):

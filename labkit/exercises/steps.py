@@ -199,19 +199,18 @@ class Search:
         return mends.endswith(("belongs there", "belongs there in degrees")) and any(compared)
 
     def _left_out_instead(self, number):
-        """The change that leaves out a part where another sign mends only because it makes that part do nothing; that
-        which meets a case never or always, where another comparison does no more.
+        """What says more than a change that mends only because it makes a part do nothing: that a case is never to be
+        met, or always, where what it asks is changed otherwise than to a finer bound; that a part is too many, where it
+        has another sign.
         """
         changes = self.written.changes
         line, code, mends = changes[number][1:]
-        if " stands where " not in mends:
-            return number
-
-        def is_plainer(at, text, words):
-            less = text == code and TOO_MANY in words
-            return at == line and (less or code in text and words.endswith(("never happen", "always happen")))
-
-        plan = self.mending([("code", k) for k, (_, *change) in enumerate(changes) if is_plainer(*change)])
+        at_line = [(k, text, words) for k, (_, at, text, words) in enumerate(changes) if at == line]
+        finer = mends.endswith("will do")
+        around = [(k, words) for k, text, words in at_line if code in text and text != code and not finer]
+        case = [k for k, words in around if words.endswith(("never happen", "always happen"))]
+        less = [k for k, text, words in at_line if text == code and TOO_MANY in words]
+        plan = self.mending([("code", k) for k in case + (less if " stands where " in mends else [])])
         return number if plan is None else plan[1]
 
     # Values on the way turned into others

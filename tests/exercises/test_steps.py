@@ -4,6 +4,7 @@ import linecache
 import re
 import textwrap
 from dataclasses import replace
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -107,10 +108,57 @@ def test_the_line_and_the_slip_are_told(right, wrong, said):
             """,
             "in line 4, `if r[0] < 0.3:`: this step is too many.",
         ),
+        (
+            """
+            x = a / np.linalg.norm(a)
+            if np.isclose(max(len(b), 3), 6 / 2):
+                return b[0]
+            return len(b) * np.linalg.norm(b - (b @ x) * x)
+            """,
+            "in line 3, `if np.isclose(max(len(b), 3), 6 / 2):`: what stands under this condition should never happen.",
+        ),
+        (
+            """
+            T = np.eye(4)
+            T[:3, 3] = a
+            x = a / np.linalg.norm(a)
+            return len(b) * np.linalg.norm(b - (b @ x) * x + T[:3, 3])
+            """,
+            "in line 5, `b - (b @ x) * x + T[:3, 3]`: one term is too many.",
+        ),
+        (
+            """
+            x = (9 * a).astype(int)
+            x = x / np.linalg.norm(x)
+            return len(b) * np.linalg.norm(b - (b @ x) * x)
+            """,
+            "in line 2, `(9 * a).astype(int)`: `astype` is too much.",
+        ),
     ],
 )
 def test_what_is_blamed_is_what_a_student_can_change(body, said):
     assert said in told(body)
+
+
+def test_no_change_is_told_that_spoils_an_argument():
+    item = replace(ITEM, reference=lambda a, b: np.cumsum(b) + a[0])
+    body = """
+        p = b.copy()
+        for k in range(1, 3):
+            p[k] = b[k] + b[k - 1]
+        return p + a[0]
+    """
+    outcome = item.judge(typed(body), rng=np.random.default_rng(0))
+    assert outcome.status == NOT_YET and "`copy` is too much" not in outcome.text
+
+
+def test_data_of_the_notebook_are_told_where_an_argument_belongs():
+    formula = typed("x = a / np.linalg.norm(a)\nreturn len(b) * np.linalg.norm(b - (b @ x) * box.kept)")
+    formula.__globals__["box"] = ModuleType("box")
+    formula.__globals__["box"].kept = np.array([0.6, 0.8, 0.0])
+    item = replace(ITEM, reference=lambda a, b: len(b) * np.linalg.norm(b - (b @ a) / np.linalg.norm(a) * a))
+    outcome = item.judge(formula, rng=np.random.default_rng(0))
+    assert "in line 3, `box.kept`: `box.kept` stands where `a` belongs." in outcome.text
 
 
 @pytest.mark.parametrize(
