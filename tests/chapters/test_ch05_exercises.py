@@ -14,6 +14,7 @@ from labkit.documents.thesis import printed as thesis
 from labkit.exercises.engine import CORRECT, NOT_YET
 from labkit.geometry import frames, lie
 from labkit.geometry.lie import exp_so3
+from labkit.machines import robot_accuracy
 
 ITEMS = {item.id: item for item in exercises.CHAPTER.items}
 
@@ -209,11 +210,11 @@ def test_step_two_of_li_hears_all_poses_and_takes_any_least_squares(seed):
         t = np.linalg.lstsq((R[1:] - R[0]).reshape(-1, 3), (y[0] - y[1:]).ravel(), rcond=None)[0]
         return t, (y + R @ t).mean(axis=0)
 
-    def first_three(T_BF, x_S, R_FS):
-        return from_differences(T_BF[:3], x_S[:3], R_FS)
+    def first_six(T_BF, x_S, R_FS):
+        return from_differences(T_BF[:6], x_S[:6], R_FS)
 
     assert judged("li_translation", from_differences, seed).status == CORRECT
-    assert "not all poses are heard" in judged("li_translation", first_three, seed).text
+    assert "not all poses are heard" in judged("li_translation", first_six, seed).text
 
 
 @pytest.mark.parametrize(
@@ -266,3 +267,22 @@ def test_the_last_explanation_of_a_row_is_not_the_most_credible():
 def test_even_and_odd_numbers_plane_and_space_are_drawn_in_turn(name):
     shapes = [draw(np.random.default_rng(0))[-1].shape for draw in ITEMS[name].cases]
     assert {n % 2 for n, _ in shapes} == {0, 1} if name == "robust_weights" else {d for _, d in shapes} == {2, 3}
+
+
+def test_the_triangle_may_be_obtuse_at_either_end():
+    for name in ("height_from_angles", "height_std"):
+        angles = np.array([draw(np.random.default_rng(0))[:2] for draw in ITEMS[name].cases])
+        assert (angles > np.pi / 2 + 1e-6).any(axis=0).all()
+
+
+def test_few_arrivals_have_a_spread_too():
+    def many(reached):
+        return robot_accuracy.repeatability(reached) if len(reached) > 3 else 0.0
+
+    assert all(judged("repeatability", many, seed).status == NOT_YET for seed in range(4))
+
+
+def test_who_accuses_both_angles_of_row_12_accuses_one_wrongly():
+    metric, (A, C) = exercises.named_entries(), (("C14", 12, "A_deg"), ("C14", 12, "C_deg"))
+    assert metric.admit({A}, {C}) == metric.admit({C}, {C}) == {C}
+    assert not metric.equal(metric.admit({A, C}, {C}), {C})

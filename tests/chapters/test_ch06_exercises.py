@@ -8,7 +8,7 @@ import pytest
 from labkit.chapters.ch06_tracker import exercises as ch06
 from labkit.exercises.engine import CORRECT, NOT_YET
 from labkit.geometry import frames
-from labkit.geometry.lie import exp_so3
+from labkit.geometry.lie import exp_so3, nearest_rotation
 from labkit.machines import arm, log
 
 ITEMS = {item.id: item for item in ch06.CHAPTER.items}
@@ -216,3 +216,42 @@ def test_quartiles_are_no_median_of_distances():
         return np.abs(values - middle) <= factor * (high - low) / 1.349
 
     assert all("on both sides of the median" in text for text in texts("reject_outliers", quartiles))
+
+
+def test_no_part_of_a_quaternion_tells_the_sign_of_all_readings():
+    def by(number):
+        def mean(q):
+            total = (q * np.sign(number(q))[:, None]).sum(axis=0)
+            return total / np.linalg.norm(total)
+
+        return mean
+
+    def largest(q):
+        return q[np.arange(len(q)), np.abs(q).argmax(axis=1)]
+
+    assert all("You made the largest part" in text for text in texts("mean_quaternion", by(largest)))
+    assert all("the sum of the parts" in text for text in texts("mean_quaternion", by(lambda q: q.sum(axis=1))))
+
+
+def test_noise_draws_a_sum_of_squares_to_the_largest_shift():
+    assert all("Take their mean" in t for t in texts("time_offset", ch06._least(ch06._sum_of_squares, True)))
+    texts("time_offset", ch06._least(ch06._mean_of_squares, True), CORRECT)
+
+
+def test_values_may_lie_anywhere_and_a_packet_holds_either_sign():
+    centers = [
+        np.median(draw(np.random.default_rng(seed))[0]) for seed in SEEDS for draw in ITEMS["reject_outliers"].cases
+    ]
+    assert np.ptp(centers) > 50
+
+    def positive(data):
+        time, position, q = ch06.decode_packet(data)
+        return time, position, q if q[3] > 0 else -q
+
+    texts("decode_packet", positive)
+
+
+@pytest.mark.parametrize("null", [lambda M: np.linalg.svd(M)[2][-1], lambda M: np.linalg.eigh(M.T @ M)[1][:, 0]])
+def test_a_null_vector_whose_sign_is_left_to_chance_is_named(null):
+    answers = texts("rotation_from_nullvector", lambda M: nearest_rotation(null(M).reshape(3, 3).T))
+    assert all("You never look at the sign" in text for text in answers)

@@ -26,10 +26,10 @@ def scanner(rng):
     return T_FS, rng.uniform(-900, 900, 3)
 
 
-def translated_poses(rng, directions=3, std=0.0):
+def translated_poses(rng, directions=3, std=0.0, n=None):
     """Poses of one orientation, shifted in so many directions, and the sphere as each sees it."""
     T_FS, target = scanner(rng)
-    n = int(rng.integers(directions + 1, 9))
+    n = n or int(rng.integers(directions + 1, 9))
     shifts = rng.uniform(-40, 40, (n, directions)) @ np.linalg.qr(rng.normal(size=(3, 3)))[0][:directions]
     T_BF = poses_that_see(T_FS, target, exp_so3(rng.uniform(-1.5, 1.5, 3))[None], np.array([[0.0, 0.0, 240.0]]))
     T_BF = T_BF @ frames.pose(np.tile(np.eye(3), (n, 1, 1)), shifts)
@@ -50,14 +50,13 @@ def nearly_in_a_plane(rng):
 
 
 def first_ones_on_a_line(rng):
-    """Noisy poses of which the first three lie nearly on one line: by them alone the turn about it is not known."""
-    while True:
-        T_BF, x_S = translated_poses(rng, directions=3)
-        if len(x_S) > 5:
-            break
+    """Noisy poses of which all but the last three lie nearly on one line: by them alone the turn about it is not known."""
+    T_BF, x_S = translated_poses(rng, directions=3, n=int(rng.integers(6, 13)))
+    line = len(x_S) - 3
     T_FS = frames.pose(literature.li_rotation(T_BF, x_S), np.zeros(3))
     along = 30 * frames.unit_vector(rng.normal(size=3))
-    T_BF[1:3, :3, 3] = T_BF[0, :3, 3] + np.outer([1, 2], along) + 0.005 * rng.normal(size=(2, 3))
+    steps = np.outer(np.arange(1, line), along)
+    T_BF[1:line, :3, 3] = T_BF[0, :3, 3] + steps + 0.005 * rng.normal(size=steps.shape)
     moved = (T_BF[:, :3, 3] - T_BF[0, :3, 3]) @ T_BF[0, :3, :3] @ T_FS[:3, :3]
     return T_BF, x_S[0] - moved + 0.02 * rng.normal(size=x_S.shape)
 
@@ -71,11 +70,11 @@ def turned_poses(rng):
 
 
 def first_ones_turned_alike(rng):
-    """Noisy poses of which the first three hardly turn: by them alone t_FS and target are not known."""
+    """Noisy poses of which all but the last four hardly turn: by those alone t_FS and target are not known."""
     T_FS, target = scanner(rng)
-    n = int(rng.integers(7, 11))
+    n = int(rng.integers(10, 15))
     x_S = np.column_stack([rng.uniform(-25, 25, n), rng.uniform(-20, 20, n), rng.uniform(190, 290, n)])
-    turns = np.concatenate([rng.uniform(-0.01, 0.01, (3, 3)), rng.uniform(-1.2, 1.2, (n - 3, 3))])
+    turns = np.concatenate([rng.uniform(-0.002, 0.002, (n - 4, 3)), rng.uniform(-1.2, 1.2, (4, 3))])
     T_BF = poses_that_see(T_FS, target, exp_so3(rng.uniform(-1, 1, 3)) @ exp_so3(turns), x_S)
     return T_BF, x_S + 0.02 * rng.normal(size=(n, 3)), T_FS[:3, :3].copy()
 
@@ -97,6 +96,12 @@ def obtuse_triangle(rng):
     return float(np.deg2rad(rng.uniform(95, 110))), float(np.deg2rad(rng.uniform(35, 60))), float(rng.uniform(30, 200))
 
 
+def mirrored(rng, draw):
+    """A triangle with both of its angles exchanged: the right or obtuse one stands at the other end."""
+    alpha, beta, *others = draw(rng)
+    return beta, alpha, *others
+
+
 def noisy_triangle(rng):
     return *triangle(rng), float(np.deg2rad(rng.uniform(0.01, 1.0)))
 
@@ -109,15 +114,15 @@ def noisy_obtuse_triangle(rng):
     return *obtuse_triangle(rng), float(np.deg2rad(rng.uniform(0.01, 1.0)))
 
 
-def arrivals(rng, d=3):
-    """Where a robot was sent, and where it arrived, in the plane or in space."""
-    n = int(rng.integers(5, 40))
+def arrivals(rng, d=3, numbers=(5, 40)):
+    """Where a robot was sent, and where it arrived so many times, in the plane or in space."""
+    n = int(rng.integers(*numbers))
     command = rng.uniform(-500, 500, d)
     return command, command + rng.uniform(-3, 3, d) + rng.uniform(0.1, 1.0) * rng.normal(size=(n, d))
 
 
-def only_arrivals(rng, d=3):
-    return arrivals(rng, d)[1:]
+def only_arrivals(rng, d=3, numbers=(5, 40)):
+    return arrivals(rng, d, numbers)[1:]
 
 
 # --- wrong variants ---
@@ -249,7 +254,7 @@ ACCURACY = [
     Exercise(
         "position_accuracy",
         reference=robot_accuracy.position_accuracy,
-        draw=(arrivals, functools.partial(arrivals, d=2)),
+        draw=(arrivals, functools.partial(arrivals, d=2), functools.partial(arrivals, numbers=(1, 4))),
         metric=metrics.Numbers(1e-9, "mm"),
         hints=(
             "First where the robot arrives on average, then how far that is from where it was sent.",
@@ -327,7 +332,7 @@ ACCURACY = [
     Exercise(
         "repeatability",
         reference=robot_accuracy.repeatability,
-        draw=(only_arrivals, functools.partial(only_arrivals, d=2)),
+        draw=(only_arrivals, functools.partial(only_arrivals, d=2), functools.partial(only_arrivals, numbers=(2, 4))),
         metric=metrics.Numbers(1e-9, "mm"),
         hints=(
             "Where the robot was sent does not matter here: compare the arrivals with their own mean.",
@@ -377,7 +382,8 @@ ACCURACY = [
             ),
             Mistake(
                 _spread(lambda l: l.mean() + 3 * np.sqrt((l**2).sum() / (len(l) - 1))),
-                "Your standard deviation is taken from 0. It is that of the distances from their own mean.",
+                "What you take three times is the root of the sum of the squared distances over n − 1; the standard deviations of the "
+                "coordinates, put together, are the same. Meant is how much the distances differ among themselves: `l.std(ddof=1)`.",
                 id="repeat-from-zero",
             ),
             Mistake(
@@ -487,7 +493,12 @@ TRIANGULATION = [
     Exercise(
         "height_from_angles",
         reference=triangulation.height_from_angles,
-        draw=(triangle, functools.partial(triangle, right_angle=True), obtuse_triangle),
+        draw=(
+            triangle,
+            functools.partial(triangle, right_angle=True),
+            obtuse_triangle,
+            functools.partial(mirrored, draw=obtuse_triangle),
+        ),
         metric=metrics.Numbers(1e-9, "mm"),
         hints=(
             "Drop the height: it cuts the base in two parts, and each belongs to a right triangle.",
@@ -580,7 +591,12 @@ TRIANGULATION = [
     Exercise(
         "height_std",
         reference=triangulation.height_std,
-        draw=(noisy_triangle, noisy_right_triangle, noisy_obtuse_triangle),
+        draw=(
+            noisy_triangle,
+            noisy_right_triangle,
+            noisy_obtuse_triangle,
+            functools.partial(mirrored, draw=noisy_obtuse_triangle),
+        ),
         metric=metrics.Numbers(1e-5, "mm"),
         hints=(
             "How much does H change when one angle changes a little? Differentiate L = H (cot α + cot β), with L fixed.",

@@ -452,7 +452,8 @@ class named_entries(metrics.Exactly):
             found = {(str(table), int(pose), str(column)) for table, pose, column in result}
         except (TypeError, ValueError):
             raise metrics.Refused('expected a set of (table, pose, column) such as ("C14", 3, "x")') from None
-        return {SUBSTITUTES.get(entry, entry) for entry in found}
+        # who names both accuses one wrongly
+        return {entry if SUBSTITUTES.get(entry) in found else SUBSTITUTES.get(entry, entry) for entry in found}
 
     def deviations(self, result, expected):
         missed, accused = len(expected - result), len(result - expected)
@@ -590,8 +591,8 @@ def _rms_without_pose_2():
     return float(np.sqrt((np.delete(_lengths_of_end_pose(), 1) ** 2).mean()))
 
 
-def _rms_with_printed_target():
-    measured = thesis.measurements(True)
+def _rms_with_printed_target(fixed=True):
+    measured = thesis.measurements(fixed)
     return hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S, target=thesis.printed_target()).rms
 
 
@@ -841,6 +842,7 @@ CHAPTER = Chapter(
                 Mistake(lambda: _per_axis(_rms_of_end_pose()),
                         "This is the rms of one coordinate, and it includes the 2237 mm of pose 2. Use `repaired`, and sum the squares of a pose first."),
                 Mistake(lambda: _joint_rms(2), "This is a fit. Asked for are the residuals under the thesis's own end pose and its printed center."),
+                Mistake(lambda: _rms_with_printed_target((2,)), "This is a fit of the scanner's pose, the center held. Asked for are the residuals under the thesis's own end pose `p2_end`.", id="rms_before-fit"),
                 Mistake(lambda: float(_lengths_of_end_pose().max()), "This is the worst pose. Asked for is the rms over all 31."),
                 Mistake(lambda: float(_lengths_of_end_pose().mean()), "This is the mean length: square before you take the mean, then take the root."),
                 Mistake(lambda: float(np.median(_lengths_of_end_pose())), "This is the median length. Asked for is the rms, in which the worst poses count."),
@@ -1112,6 +1114,10 @@ CHAPTER = Chapter(
                 Mistake(_weights(lambda r: np.minimum(1, np.median(r) / robust.MEDIAN_CHI3 * 1.345 / r)), "These are Huber's weights, which never reach zero. Tukey's do: (1 - u^2)^2 below u = 1, else 0."),
                 Mistake(_weights(lambda r: _tukey(r * robust.MEDIAN_CHI3 / np.median(r))), "The factor 5 is missing: u = length / (5 s)."),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r) * robust.MEDIAN_CHI3))), "You multiplied by 1.538: divide the median by it."),
+                Mistake(_weights(lambda r: _tukey(r / (5 * np.sort(r)[len(r) // 2] / robust.MEDIAN_CHI3))),
+                        "Your middle length is the upper of two where their number is even. The median lies halfway between them: `np.median`.", id="robust-weights-upper-median"),
+                Mistake(_weights(lambda r: _tukey(r / (5 * np.sort(r)[(len(r) - 1) // 2] / robust.MEDIAN_CHI3))),
+                        "Your middle length is the lower of two where their number is even. The median lies halfway between them: `np.median`.", id="robust-weights-lower-median"),
                 Mistake(_weights(lambda r: np.sqrt(_tukey(r / (5 * np.median(r) / robust.MEDIAN_CHI3)))), "The bracket is squared: (1 - u^2)^2."),
                 Mistake(_weights(lambda r: (r < 5 * np.median(r) / robust.MEDIAN_CHI3).astype(float)),
                         "You cut off sharply. Tukey's weight falls smoothly, so that no pose decides by crossing a line."),

@@ -36,6 +36,23 @@ def readings_of_a_stop(rng, part):
     return (same * signs[:, None],)
 
 
+def readings_of_balanced_parts(rng):
+    """Such quaternions about one with parts a, -a, b and -b: which is the largest, and the sign of their sum, is noise."""
+    while True:
+        a, b = rng.uniform(0.3, 0.9), rng.uniform(0.1, 0.25)
+        center = rng.permutation([a, -a, b, -b])
+        R = matrix_from_quaternion(center / np.linalg.norm(center))
+        q = quaternion_from_matrix(R @ exp_so3(0.035 * rng.normal(size=(int(rng.integers(8, 16)), 3))))
+        same = q * np.where(q @ q[0] < 0, -1.0, 1.0)[:, None]
+        if all(2 <= (noise < 0).sum() <= len(q) - 2 for noise in (same.sum(axis=1), _largest_part(same))):
+            return (same * rng.permutation(np.r_[1, 1, 1, -1, -1, rng.choice([-1, 1], len(q) - 5)])[:, None],)
+
+
+def _largest_part(q):
+    """The part of each quaternion that is largest by amount, with its sign."""
+    return np.take_along_axis(q, np.abs(q).argmax(axis=1)[:, None], axis=1)[:, 0]
+
+
 def _unit_mean(signs):
     def variant(q):
         mean = (q * signs(q)[:, None]).mean(axis=0)
@@ -48,7 +65,10 @@ STOPS = [
     Exercise(
         "mean_quaternion",
         reference=mean_quaternion,
-        draw=tuple(functools.partial(readings_of_a_stop, part=part) for part in (3, 0, 1, 2)),
+        draw=(
+            *(functools.partial(readings_of_a_stop, part=part) for part in (3, 0, 1, 2)),
+            readings_of_balanced_parts,
+        ),
         metric=metrics.UpToSign(2e-4),
         hints=(
             "q and -q are one rotation: whatever you average must be the same for both.",
@@ -87,6 +107,16 @@ STOPS = [
                 _unit_mean(lambda q: np.where(q[:, 0] < 0, -1.0, 1.0)),
                 "You made the first part positive. Where it is about 0, its sign is noise.",
                 id="mean_quaternion-first-part",
+            ),
+            Mistake(
+                _unit_mean(lambda q: np.sign(_largest_part(q))),
+                "You made the largest part of each positive. Where two are about equally large, noise decides which it is, and they may differ in sign.",
+                id="mean_quaternion-largest-part",
+            ),
+            Mistake(
+                _unit_mean(lambda q: np.where(q.sum(axis=1) < 0, -1.0, 1.0)),
+                "You made the sum of the parts positive. Where it is about 0, its sign is noise.",
+                id="mean_quaternion-sum-positive",
             ),
             Mistake(
                 lambda q: _unit_mean(lambda p: np.ones(len(p)))(np.abs(q)),
@@ -233,6 +263,12 @@ def _ends_alone(speed, error):
     return float(np.sqrt(intercept)), float(np.sqrt(slope))
 
 
+def _extremes_alone(speed, error):
+    """The law through the slowest reading and the fastest."""
+    order = np.argsort(speed)
+    return _ends_alone(speed[order], error[order])
+
+
 def _fitted_to_errors(speed, error):
     """The law with the least squares of the errors themselves."""
     start = np.sqrt(np.maximum(np.polyfit(speed**2, error**2, 1)[::-1], 1e-6))
@@ -286,6 +322,11 @@ def _carried(
 def _swapped(cov):
     order = [3, 4, 5, 0, 1, 2]
     return cov[np.ix_(order, order)]
+
+
+def _unrelated(cov):
+    """A pose's covariance without what relates its turn to its shift."""
+    return np.block([[cov[:3, :3], np.zeros((3, 3))], [np.zeros((3, 3)), cov[3:, 3:]]])
 
 
 def _variances(cov):
@@ -593,6 +634,11 @@ SPEEDS = [
                 id="static_error_and_lag-ends",
             ),
             Mistake(
+                _extremes_alone,
+                "You use the slowest reading and the fastest alone, with all their noise. A least-squares line takes all of them.",
+                id="static_error_and_lag-extremes",
+            ),
+            Mistake(
                 _fitted_to_errors,
                 "Here the errors themselves are fitted by least squares. Asked for are the squares of the errors, against those of the speed: a line.",
                 id="static_error_and_lag-errors",
@@ -792,6 +838,12 @@ CELL = [
                 _carried(cov=_variances),
                 "You used the variances of the pose alone. Rotation and translation of one calibration are correlated, and here it is felt.",
                 id="point_covariance-variances",
+            ),
+            Mistake(
+                _carried(cov=_unrelated),
+                "You added what the turn does and what the shift does, as if they erred independently. They come from one calibration: the blocks of "
+                "cov_T beside the diagonal count as well.",
+                id="point_covariance-unrelated",
             ),
         ],
     ),

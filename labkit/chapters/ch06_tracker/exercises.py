@@ -30,13 +30,14 @@ def decode_packet(data):
     return values[TIME], 1000 * values[POSITION], values[QUATERNION]
 
 
-def _packet(rng):
-    """A good packet with all fields different."""
+def _packet(rng, sign):
+    """A good packet with all fields different, its quaternion of either sign."""
     T = pose(exp_so3(rng.normal(size=3)), rng.uniform(-900, 900, 3))
     values = packet_from_pose(
         T, rng.uniform(1, 900), velocity=rng.uniform(50, 300, 3), angular_velocity=rng.uniform(0.1, 1, 3)
     )
     values[8:11], values[18:21] = rng.uniform(0.5, 9, (2, 3))
+    values[QUATERNION] *= sign
     return (encode_packet(values),)
 
 
@@ -264,8 +265,13 @@ def gaps(rng):
 SHARES = np.array([0.43, 0.5, 0.57, 0.64, 0.71, 0.78, 0.85, 0.92, 1.08, 1.2, 1.5, 1.9, 2.6, 4.0, 30.0])
 
 
+def _far(rng):
+    """A number far from 0, on either side of it."""
+    return rng.choice([-1, 1]) * rng.uniform(40, 90)
+
+
 def spoiled(rng, factor):
-    """Values about 50, and more on both sides at certain shares of the limit: every other rule draws its line between
+    """Values about some number, and more on both sides at certain shares of the limit: every other rule draws its line between
     two of them, the rule itself where none is near.
     """
     n = 2 * int(rng.integers(55, 66)) + 1
@@ -273,7 +279,7 @@ def spoiled(rng, factor):
     tail = np.r_[SHARES, SHARES[9:], -SHARES[:9]]
     limit = factor * 1.4826 * _mad(np.r_[core, 99 * np.sign(tail)])
     values = np.r_[core, np.median(np.r_[core, 99 * np.sign(tail)]) + limit * tail]
-    return rng.permutation(50 + rng.uniform(0.5, 2) * values), factor
+    return rng.permutation(_far(rng) + rng.uniform(0.5, 2) * values), factor
 
 
 def lopsided(rng):
@@ -282,7 +288,7 @@ def lopsided(rng):
     core = 4 * np.linspace(0, 1, n) ** 2
     tail = np.array([-1.5, -1.1, -0.92, 0.92, 1.1, 1.5])
     limit = factor * 1.4826 * _mad(np.r_[core, 99 * np.sign(tail)])
-    return rng.permutation(50 + np.r_[core, np.median(core) + limit * tail]), factor
+    return rng.permutation(_far(rng) + np.r_[core, np.median(core) + limit * tail]), factor
 
 
 def two_heaps(rng):
@@ -292,7 +298,7 @@ def two_heaps(rng):
     factor = float(rng.uniform(2.5, 5))
     limit = factor * 1.4826 * (gap + 0.1)
     values = np.r_[core, limit * np.array([-1.6, -1.3, -0.8, 0.8, 1.3, 1.6])]
-    return rng.permutation(50 + values), factor
+    return rng.permutation(_far(rng) + values), factor
 
 
 def all_equal(rng):
@@ -364,6 +370,21 @@ def speed_curves(rng, sign, wide=False):
     return time, curve(time), curve(time - lag), step * most
 
 
+def noisy_curves(rng):
+    """Curves that noise nearly hides, and a third of their length as the largest offset: the sum of the squared
+    differences is least where few samples overlap, their mean near the truth.
+    """
+    while True:
+        time, reference, delayed, largest = speed_curves(rng, rng.choice([-1, 1]), wide=True)
+        truth, most = time_offset(time, reference, delayed, largest), len(time) // 3
+        std = 1.6 * reference.std()
+        noisy = time, *(curve + std * rng.normal(size=len(time)) for curve in (reference, delayed))
+        noisy = *noisy, most * (time[1] - time[0])
+        by_mean = time_offset(*noisy), _least(_mean_of_squares, True)(*noisy)
+        if np.abs(np.subtract(by_mean, truth)).max() < 0.1 and abs(_least(_sum_of_squares, True)(*noisy) - truth) > 1:
+            return noisy
+
+
 def _overlap(reference, delayed, n):
     """Sums of products over the overlap for every shift: the correlation NumPy calls "full", and the shifts."""
     return -np.correlate(delayed, reference, "full"), np.arange(1 - len(reference), len(delayed))
@@ -392,6 +413,14 @@ def _forward_only(reference, delayed, n):
 
 def _distances(reference, delayed, n):
     return _shifted(lambda r, d: np.mean(np.abs(d - r)), reference, delayed, np.arange(-n, n + 1))
+
+
+def _mean_of_squares(reference, delayed, n):
+    return _shifted(lambda r, d: np.mean((d - r) ** 2), reference, delayed, np.arange(-n, n + 1))
+
+
+def _sum_of_squares(reference, delayed, n):
+    return _shifted(lambda r, d: np.sum((d - r) ** 2), reference, delayed, np.arange(-n, n + 1))
 
 
 def _products(reference, delayed, n):
@@ -495,7 +524,7 @@ CHAPTER = Chapter(
         Exercise(
             "decode_packet",
             reference=decode_packet,
-            draw=_packet,
+            draw=tuple(functools.partial(_packet, sign=sign) for sign in (1, -1)),
             metric=metrics.Several(
                 metrics.Numbers(1e-9, "s", double=True),
                 metrics.Numbers(1e-9, "mm", double=True),
@@ -826,6 +855,15 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda M: -rotation_from_nullvector(M),
                     "Your matrix has determinant -1. The null vector's sign is arbitrary: turn it so that the determinant is positive.",
+                ),
+                *(
+                    Mistake(
+                        lambda M, null=null: lie.nearest_rotation(null(M).reshape(3, 3, order="F")),
+                        "You never look at the sign, which is arbitrary. Where the matrix has a negative determinant, the rotation nearest to it is "
+                        "not the mounting's: turn all of its signs first.",
+                        id=f"rotation_from_nullvector-unsigned-{by}",
+                    )
+                    for by, null in (("svd", _null), ("eigh", lambda M: np.linalg.eigh(M.T @ M)[1][:, 0]))
                 ),
                 Mistake(
                     lambda M: _signed(_null(M).reshape(3, 3, order="F")),
@@ -1526,6 +1564,11 @@ CHAPTER = Chapter(
             reference=time_offset,
             draw=tuple(functools.partial(speed_curves, sign=s, wide=wide) for wide in (False, True) for s in (1, -1)),
             metric=metrics.Numbers(6e-4, "s"),
+            noisy=(
+                noisy_curves,
+                metrics.Numbers(0.2, "s"),
+                "Right on clean curves. On noisy ones that are shifted by up to a third of their length, where the shifts differ in how many samples overlap:",
+            ),
             hints=(
                 "Shift one curve against the other, sample by sample, and find where they differ least. Then look between the samples.",
                 "Cost of a shift s: mean of (delayed[k + s] - reference[k])^2 over the common part. A parabola through the best three has its vertex at the offset.",
@@ -1582,6 +1625,14 @@ CHAPTER = Chapter(
                         "well as how alike they are. Take the mean of the squared differences over the part both curves share.",
                     )
                     for costs in (_overlap, _centered_overlap)
+                    for between in (True, False)
+                ),
+                *(
+                    Mistake(
+                        _least(_sum_of_squares, between),
+                        "A sum of squares is smaller where fewer samples overlap, so that noise draws it to the largest shifts. Take their mean.",
+                        id=f"time_offset-sum-of-squares-{'between' if between else 'whole'}",
+                    )
                     for between in (True, False)
                 ),
                 *(
