@@ -332,8 +332,13 @@ ACCURACY = [
     Exercise(
         "repeatability",
         reference=robot_accuracy.repeatability,
-        draw=(only_arrivals, functools.partial(only_arrivals, d=2), functools.partial(only_arrivals, numbers=(2, 4))),
+        draw=(only_arrivals, functools.partial(only_arrivals, d=2), functools.partial(only_arrivals, numbers=(3, 5))),
         metric=metrics.Numbers(1e-9, "mm"),
+        noisy=(
+            functools.partial(only_arrivals, numbers=(2, 3)),
+            metrics.Numbers(1e-9, "mm"),
+            "Right for three arrivals and more. For two, which are equally far from their mean:",
+        ),
         hints=(
             "Where the robot was sent does not matter here: compare the arrivals with their own mean.",
             "l = distances of the arrivals from their mean; mean of l plus three standard deviations of l, the latter with n − 1 below the root.",
