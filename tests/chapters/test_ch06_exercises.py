@@ -254,4 +254,9 @@ def test_values_may_lie_anywhere_and_a_packet_holds_either_sign():
 @pytest.mark.parametrize("null", [lambda M: np.linalg.svd(M)[2][-1], lambda M: np.linalg.eigh(M.T @ M)[1][:, 0]])
 def test_a_null_vector_whose_sign_is_left_to_chance_is_named(null):
     answers = texts("rotation_from_nullvector", lambda M: nearest_rotation(null(M).reshape(3, 3).T))
-    assert all("You never look at the sign" in text for text in answers)
+    assert all("The sign is missing" in text for text in answers)
+
+
+def test_the_first_of_unsorted_eigenvectors_is_never_the_null_vector():
+    draws = [draw(np.random.default_rng(seed))[0] for seed in SEEDS for draw in ITEMS["rotation_from_nullvector"].cases]
+    assert all(np.linalg.eig(M.T @ M)[0].argmin() for M in draws)
