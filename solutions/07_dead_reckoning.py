@@ -269,7 +269,7 @@ ex.predict("spread", guess, reveal=stages.drive)
 #
 # The lecture prints the constants, $k_d = (0.02\,\mathrm{m})^2/1\,\mathrm{m}$, $k_\theta = (5°)^2/360°$ and $k_\mathrm{drift} = (2°)^2/1\,\mathrm{m}$, but not where the drive
 # ends. `lecture.circle_drive()` holds them in radians and meters: `drive.controls` (140, 2), `drive.dt`, and `drive.noise` with the three constants by name, to be passed on as `**drive.noise`.
-# Start at the origin and take all steps with `step_euler`, the model of the lecture. (They turn by 336°: the circle does not quite close.)
+# Start at the origin and take all steps with `step_euler`, the model of the lecture's Jacobians. (They turn by 336°: the circle does not quite close.)
 
 # %% end_pose
 drive = lecture.circle_drive()
@@ -359,7 +359,7 @@ print(f"mean of the ends lags behind: {100 * (poses[-1] - ends.mean(0))[0]:.0f} 
 @ex.wheel_offset
 def wheel_offset(way, excess, track):
     """Return how far to the left (m) the robot ends that counted `way` (m) straight
-    on."""
+    on; excess is not 0, and negative for a smaller right wheel."""
     ### BEGIN SOLUTION
     turn = way * excess / track
     middle = way * (1 + excess / 2)

@@ -98,7 +98,7 @@ print(f"nearest obstacle {ranges.min():.2f} m, median {np.median(ranges):.2f} m"
 @ex.sample_motion
 def sample_motion(states, u, dt, std_u, rng):
     """Return states, shape (M, 3), moved by odometry.step(x, u, dt), each with its own
-    noisy copy of u.
+    noisy copy of u; odometry.step takes many states, and many u, at once.
 
     std_u, shape (2,): standard deviations of v and omega. Draw from rng.
     """
@@ -430,8 +430,11 @@ ex.predict("kidnap", guess, reveal=stages.arena)
 # %% recover
 @ex.recover
 def recover(w_mean, w_slow, w_fast, alpha_slow, alpha_fast):
-    """Return three numbers: the share of random particles, then w_slow and w_fast, w +=
-    alpha * (w_mean - w) each."""
+    """Return three numbers: the share of random particles, then the new w_slow and
+    w_fast, w += alpha * (w_mean - w) each.
+
+    The share is that of the new averages, without the limits of our filter.
+    """
     ### BEGIN SOLUTION
     w_slow = w_slow + alpha_slow * (w_mean - w_slow)
     w_fast = w_fast + alpha_fast * (w_mean - w_fast)

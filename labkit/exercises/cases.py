@@ -3,12 +3,16 @@
 import inspect
 import itertools
 import math
+import re
 
 import numpy as np
 
 ENTRIES = 4  # of a short vector, that are looked at one by one
 WAYS = 1000  # in which as many draws could have been missed: with fewer, one of some fifty traits may fit by chance
 PAIRS = 200  # times as many ways where two traits are told together: there are so many more of them
+LENGTH = re.compile(
+    r"pose\[[01]\]|\bx\[[01]\]|point|position|origin|landmark|distance|range|way|speed|^`v_"
+)  # no angle
 CONFUSED = 3  # pairs of words that are told, at most
 
 
@@ -205,14 +209,16 @@ def _of_count(here, words, count):
 
 
 def _of_number(here, value):
-    return {
+    found = {
         f"{here} is negative": value < 0,
         f"{here} is positive": value > 0,
         f"{here} is 0": value == 0,
         f"{here} is not 0": value != 0,
-        f"{here} is above pi": value > np.pi,
-        f"{here} is beyond pi, in either direction": abs(value) > np.pi,
         f"{here} is above 1": value > 1,
         f"{here} is 1": value == 1,
         f"{here} is not 1": value != 1,
     }
+    if not LENGTH.search(here):
+        found[f"{here} is above pi"] = value > np.pi
+        found[f"{here} is beyond pi, in either direction"] = abs(value) > np.pi
+    return found

@@ -537,10 +537,11 @@ class _Trial:
         draws = self._cases()
         if self.exercise.metric is None or not draws or not self.budget.left():
             return None
-        unread = _unread(self.function)
-        for k, name in enumerate(self._names(draws[0][0])):
+        unread, names = _unread(self.function), self._names(draws[0][0])
+        for k, name in enumerate(names):
             if name in unread and any(self._moves(k, *pair) for pair in self._exchanges(k, draws)):
                 return f"your function never uses `{name}`, and its result should change with it"
+        for k, name in enumerate(names):
             least = LIKE_CHANCE if self._is_choice() else 2
             if self._makes_no_difference(k, draws) and self._makes_no_difference(k, draws + self._fresh_results, least):
                 return f"your result does not change with `{name}`, and it should"

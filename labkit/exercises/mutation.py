@@ -256,7 +256,7 @@ def mending(function):
     found = [change for change in found if not any(change is other for other in narrower)]
     found += _with_an_axis(function)
     found = [*_finer(function), *found, *_counted_by_loops(function), *_everywhere(found)]
-    found += [*_with_an_outer_product(function), *_of_rounds(function)]
+    found += [*_finer_differences(function), *_with_an_outer_product(function), *_of_rounds(function)]
     found += [*_begun_late(function), *_typed_numbers(function), *_exchanged_throughout(function)]
     found += [*_shorter_steps(function), *_rounded_pi(function)]
     return sorted(found, key=lambda change: change.rank)
@@ -429,6 +429,24 @@ def _turned_into(node, other):
     return ((node, "slice", other.slice),)
 
 
+def _finer_differences(function):
+    """Quotients of differences whose step is a number that is typed in several times, it or its double as a divisor."""
+    coarse = [found for found in _typed(function) if _is_coarse(found[-1])]
+    for step in sorted({node.value for *_, node in coarse}):
+        alike = [found for found in coarse if found[-1].value in (step, 2 * step)]
+        quotients = [owner for owner, field, *_ in alike if field == "right" and isinstance(owner.op, ast.Div)]
+        if not quotients:
+            continue
+        group = []
+        for owner, field, content, i, node in alike:
+            new = ast.copy_location(ast.Constant(FINE * node.value), node)
+            whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
+            group.append(Change("", "", FINER, owner, ((owner, field, whole),)))
+        if sets := _together(group):
+            mends = f"`{step}` is far too long a step for differences: a millionth of it will do, wherever it stands"
+            yield Change("", mends, FINER, quotients[0], sets)
+
+
 def _begun_late(function):
     """Loops over `range(first, behind)` that begin at 0."""
     for node in ast.walk(function):
@@ -480,16 +498,18 @@ def _shorter_steps(function):
                 adds = isinstance(step, ast.AugAssign) and isinstance(step.op, ast.Add | ast.Sub)
                 whole = adds and type(getattr(step.value, "value", None)) is int
                 if adds and not whole and getattr(step.target, "id", "") in asked:
-                    yield _with_a_hundredth(step, "value", step.value)
+                    yield from _with_a_part(step, "value", step.value)
         elif isinstance(owner, ast.Call) and getattr(owner.func, "attr", "") == "arange" and len(owner.args) == 3:
-            yield _with_a_hundredth(owner, "args", owner.args[2])
+            yield from _with_a_part(owner, "args", owner.args[2])
 
 
-def _with_a_hundredth(place, field, step):
-    new = ast.BinOp(step, ast.Div(), ast.Constant(100))
-    _locate(new, step)
-    mends = f"steps of `{ast.unparse(step)}` are far too long: a hundredth of that will do"
-    return Change("", mends, FINER, place, ((place, field, [*place.args[:2], new] if field == "args" else new),))
+def _with_a_part(place, field, step):
+    """Steps a hundredth as long, and a thirtieth: of the shortest there may be too many for the time there is."""
+    for part, words in ((100, "hundredth"), (30, "thirtieth")):
+        new = ast.BinOp(step, ast.Div(), ast.Constant(part))
+        _locate(new, step)
+        mends = f"steps of `{ast.unparse(step)}` are far too long: a {words} of that will do"
+        yield Change("", mends, FINER, place, ((place, field, [*place.args[:2], new] if field == "args" else new),))
 
 
 def _is_coarse(node):

@@ -449,6 +449,7 @@ def _of_its_shape(change):
     return changed
 
 
+SIGNLESS = "it belongs there without its sign"
 OTHERWISE = (  # (what it should have been, function of the value [and of an argument]), the likeliest first
     ("it has the wrong sign", np.negative),
     ("it belongs there transposed", lambda v: np.swapaxes(_matrix(v), -1, -2)),
@@ -462,7 +463,7 @@ OTHERWISE = (  # (what it should have been, function of the value [and of an arg
     ("it belongs there in degrees", np.rad2deg),
     ("a thousand times as much belongs there: a unit?", lambda v: 1000 * v),
     ("a thousandth of it belongs there: a unit?", lambda v: v / 1000),
-    ("it belongs there without its sign", np.abs),
+    (SIGNLESS, np.abs),
     ("it belongs there one larger", lambda v: _whole(v) + 1),
     ("it belongs there one smaller", lambda v: _whole(v) - 1),
     ("1 less it, 1 - ..., belongs there", _truth),

@@ -252,20 +252,30 @@ class Search:
     def _where(self, k):
         line, code, name, *_ = self.written.places[k]
         several = name and re.match(r"[\w*, ]*,[\w*, ]*=[^=]", code)  # w, V = ...: which of them
-        return f"in line {line}, `{name if several else code}`"
+        return f"in line {line}, `{name if several else code}`{self._of_several(k)}"
+
+    def _of_several(self, k):
+        """In which larger part a value stands, if the line has the same code several times."""
+        line, code, *_ = self.written.places[k]
+        alike = [place for place in self.written.places if place[:2] == (line, code)]
+        around = (text for at, text, _, _, first in self.written.places[k + 1 :] if at == line and first <= k)
+        outer = next((text for text in around if text != code), None)
+        return f" in `{outer}`" if len(alike) > 1 and outer else ""
 
     def _turned(self, among):
         """Plans of values at these places turned into others, the likeliest first; none that change nothing."""
         numeric = [i for i in range(len(self.names)) if all(is_numeric(case.args[i]) for case in self.cases)]
         first = self.values[0]
-        seen = [(k, first[k][1][0]) for k in sorted(among) if first[k][0] and self._may_turn(k)]
+        reached = (k for k in sorted(among) if first[k][0] and not self._is_filled(k))
+        seen = [(k, first[k][1][0], self._is_bounded(k)) for k in reached]
         for change, (words, function) in enumerate(rerun.OTHERWISE):
             if not self._may_be_said(words):
                 continue
             for argument in [None] if change < rerun.ALONE else numeric:
                 others = [] if argument is None else [np.asarray(self.cases[0].args[argument], dtype=float)]
-                for k, value in seen:
-                    if SCALED.match(words) and COUNT.search(self.written.places[k][1]):
+                for k, value, bounded in seen:
+                    counted = SCALED.match(words) and COUNT.search(self.written.places[k][1])
+                    if counted or bounded and words != rerun.SIGNLESS:
                         continue
                     if _changes(function, value, others):
                         yield "value", k, change, argument
@@ -277,9 +287,9 @@ class Search:
         for change in range(rerun.ALONE, rerun.ALONE + rerun.WITH_OWN):
             for variable in bound:
                 for k in sorted(k for k in among if k > variable):
-                    if values[k][0] and _changes(
-                        rerun.OTHERWISE[change][1], values[k][1][0], [values[variable][1][-1]]
-                    ):
+                    if not values[k][0] or self._is_bounded(k):
+                        continue
+                    if _changes(rerun.OTHERWISE[change][1], values[k][1][0], [values[variable][1][-1]]):
                         yield "own", k, change, variable
 
     # Changes that mend a part, or leave a simple difference
@@ -384,10 +394,9 @@ class Search:
         _, code, name, *_ = self.written.places[k]
         return bool(name) and code.startswith(f"{name}[")
 
-    def _may_turn(self, k):
-        """Whether a line is about the whole of a value, which no number bounds, so that half of it would do as well."""
-        bounded = (code for _, code, _, _, first in self.written.places[k + 1 :] if first <= k)
-        return not self._is_filled(k) and not any(map(BOUND.search, bounded))
+    def _is_bounded(self, k):
+        """Whether a number bounds a value, so that half of it would do as well: only its sign can be wrong."""
+        return any(BOUND.search(code) for _, code, _, _, first in self.written.places[k + 1 :] if first <= k)
 
     def _is_known(self, k, solution, given=True):
         """Whether a value on the way is one that the solution has as well, or an argument: then it is right."""

@@ -219,3 +219,21 @@ def nees_with_one_turn(truth, x, cov):
 def test_headings_gather_several_turns(name, answer):
     status, texts = judged(name, answer)
     assert status == NOT_YET and all("several" in text for text in texts), texts
+
+
+def after_rounds(n):
+    def answer(A, C, cov_v, cov_z):
+        P = 100.0 * np.eye(len(A))
+        for _ in range(n):
+            P = A @ P @ A.T + cov_v
+            K = P @ C.T @ np.linalg.inv(C @ P @ C.T + cov_z)
+            P = P - K @ C @ P
+        return K
+
+    return answer
+
+
+def test_a_gain_that_settles_slowly_takes_hundreds_of_rounds():
+    status, texts = judged("steady_state_gain", after_rounds(100), seeds=(0, 1))
+    assert status == NOT_YET and all("hundreds of rounds" in text for text in texts), texts
+    assert judged("steady_state_gain", after_rounds(600))[0] == CORRECT

@@ -332,6 +332,47 @@ def in_steps_of_two_cells(grid, pose, bearing, r_max):
     return hits[0] if len(hits) else r_max
 
 
+def walked(first, step):
+    """A ray from this far on, in steps of this length."""
+
+    def answer(grid, pose, bearing, r_max):
+        a, r = pose[2] + bearing, np.arange(first, r_max, step or grid.resolution / 4)
+        hits = r[grid.at(pose[:2] + r[:, None] * [np.cos(a), np.sin(a)]) == maps.OCCUPIED]
+        return hits[0] if len(hits) else r_max
+
+    return answer
+
+
+def moved_by(u, std_u, m, rng):
+    return u + std_u * rng.standard_normal((m, 2))
+
+
+def never_in_reverse(x, u, dt, std_u, rng):
+    noisy = moved_by(u, std_u, len(x), rng)
+    noisy[:, 0] = np.maximum(noisy[:, 0], 0.0)
+    return odometry.step(x, noisy, dt)
+
+
+def recovered_from_five_percent_on(w_mean, w_slow, w_fast, alpha_slow, alpha_fast):
+    slow, fast = w_slow + alpha_slow * (w_mean - w_slow), w_fast + alpha_fast * (w_mean - w_fast)
+    share = 1 - fast / slow
+    return share if share > 0.05 else 0.0, slow, fast
+
+
+def in_another_order(weights, rng):
+    ends, m = np.cumsum(np.sort(weights)), len(weights)
+    return np.searchsorted(ends, (rng.random() + np.arange(m)) * ends[-1] / m)
+
+
+def one_too_low(weights, rng):
+    ends = np.cumsum(weights)
+    return np.maximum(np.searchsorted(ends, rng.random(len(ends)) * ends[-1]) - 1, 0)
+
+
+def drawn_by(rule):
+    return lambda weights, rng: rng.choice(len(weights), len(weights), p=rule(weights) / rule(weights).sum())
+
+
 def of_the_living(weights, threshold):
     return particles.effective_size(weights) < threshold * np.count_nonzero(weights)
 
@@ -407,6 +448,25 @@ PASSED_BEFORE = [
     ("log_sum_exp", around_the_mean, "took out the mean"),
     ("cast_ray", in_steps_along_x, "`sign` is too much"),
     ("cast_ray", in_steps_of_two_cells, "`2 * grid.resolution`"),
+    ("cast_ray", walked(1.0, None), "begin farther out"),
+    ("cast_ray", walked(0.0, 0.05), "typed in"),
+    ("resample_roulette", one_too_low, "one too low"),
+    ("resample_roulette", drawn_by(np.square), "squares of the weights"),
+    ("resample_roulette", drawn_by(np.exp), "no logarithms"),
+    ("resample_systematic", lambda w, rng: np.sort(drawn_by(np.asarray)(w, rng)), "exactly once"),
+    (
+        "sample_motion",
+        lambda x, u, dt, s, rng: odometry.step(x, moved_by(u, s, len(x), rng), dt, "euler"),
+        "old heading",
+    ),
+    ("sample_motion", never_in_reverse, "the noise is the same for every u"),
+    (
+        "sample_motion",
+        lambda x, u, dt, s, rng: odometry.step(x, moved_by(u, s * (u != 0), len(x), rng), dt),
+        "straight on",
+    ),
+    ("recover", recovered_from_five_percent_on, "`0.05` is far too large"),
+    ("resample_systematic", in_another_order, "You sorted the weights"),
     ("should_resample", of_the_living, "weigh something"),
     ("resample_roulette", without_putting_back, "No index came out twice"),
     ("resample_systematic", turned_too_far, "at most one gap"),

@@ -82,6 +82,14 @@ def test_the_case_on_which_an_answer_is_wrong():
     assert cases.case_words(draws, [False, True, False, True]) is None, "so few draws may agree by chance"
 
 
+def test_what_is_no_angle_is_not_compared_with_pi():
+    values = [np.array([4.0 if k % 3 == 0 else 2.0, 1.0, 0.0]) for k in range(24)]
+    wrong = [bool(value[0] > 3) for value in values]
+    draws = [({"pose": value, "angle": value[0]}, 1.0) for value in values]
+    assert cases.case_words(draws, wrong) == "exactly where `angle` is above pi"
+    assert cases.case_words([({"pose": given["pose"]}, e) for given, e in draws], wrong) is None
+
+
 TEXTS = [
     ({"printed": text, "sure": k % 2 == 0}, k % 3) for k, text in enumerate(20 * ["3e4", "1.20", "5e-2", "7,1", "1.05"])
 ]
@@ -194,6 +202,7 @@ def test_an_argument_without_effect_is_named():
     item = exercise(lambda x, std: x / std + np.sin(x), _draw)
     assert "does not change with `std`" in told(item, "return x / (1.7 + std**0 - 1) + np.sin(x)")
     assert "never uses `std`" in told(item, "return x / 1.7 + np.sin(x)")
+    assert "never uses `std`" in told(item, "return 0 * x"), "what is not read is told before what comes to nothing"
 
 
 def test_a_rounded_result_is_said_to_be_rounded_though_an_argument_has_no_effect_on_its_digits():

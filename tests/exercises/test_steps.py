@@ -1,5 +1,6 @@
 """The general layer, steps: in which line of a student's own code it goes wrong, and in which way."""
 
+import functools
 import linecache
 import re
 import textwrap
@@ -672,6 +673,24 @@ def test_rounded_numbers_typed_lengths_and_cases_that_are_none_are_told(referenc
 def test_steps_that_are_too_long_are_told(body):
     item = replace(asked(lambda a, b: a, lambda rng: rng.uniform(1, 2, 2)), metric=metrics.Numbers(0.01))
     assert "are far too long: a hundredth of that will do" in judged(item, body)
+
+
+def test_too_long_a_step_of_differences_is_told_wherever_it_stands():
+    item = replace(asked(lambda a, b: 4 * a**3, two_numbers), metric=metrics.Numbers(1e-4))
+    for body in ("return ((a + 0.1) ** 4 - a**4) / 0.1", "return ((a + 0.4) ** 4 - (a - 0.4) ** 4) / 0.8"):
+        assert "is far too long a step for differences: a millionth of it will do" in judged(item, body)
+
+
+def on_either_side(rng, side):
+    return side * float(rng.uniform(1, 2)), side * float(rng.uniform(1, 2))
+
+
+def test_what_a_number_bounds_can_have_the_wrong_sign_alone():
+    """`h * b > 1e-8` would mend as well, since b has the sign of h."""
+    sides = tuple(functools.partial(on_either_side, side=side) for side in (1, -1, 0))
+    item = asked(lambda a, b: a + np.sinc(a / np.pi), sides)
+    said = judged(item, "h = 1.0 * a\nreturn h + (np.sin(h) / h if h > 1e-8 else 1.0)")
+    assert said.startswith("in line 3, `h` in `h > 1e-8`: it belongs there without its sign."), said
 
 
 def chosen(rng):

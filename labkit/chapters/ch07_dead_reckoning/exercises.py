@@ -186,11 +186,14 @@ def _newton(change, steps=20):
     return variant
 
 
-def _newton_with_one_jacobian(landmarks, distances, start):
-    x, J = np.array(start, dtype=float), 2 * (start - landmarks)
-    for _ in range(20):
-        x = x - np.linalg.solve(J, lateration_residual(landmarks, distances, x))
-    return x
+def _newton_with_one_jacobian(steps):
+    def variant(landmarks, distances, start):
+        x, J = np.array(start, dtype=float), 2 * (start - landmarks)
+        for _ in range(steps):
+            x = x - np.linalg.solve(J, lateration_residual(landmarks, distances, x))
+        return x
+
+    return variant
 
 
 def _mirrored(landmarks, distances, start):
@@ -681,9 +684,13 @@ CHAPTER = Chapter(
                     )
                     for steps in (2, 3, 4, 5)
                 ),
-                Mistake(
-                    _newton_with_one_jacobian,
-                    "Your Jacobian is that of the start. From a start farther off twenty such steps do not arrive: compute it anew at each position.",
+                *(
+                    Mistake(
+                        _newton_with_one_jacobian(steps),
+                        "Your Jacobian is that of the start. From a start farther off such steps do not arrive: compute it anew at each position.",
+                        id=f"newton_lateration-f09ebd{'' if steps == 20 else f'-{steps}'}",
+                    )
+                    for steps in (20, 2, 3, 4, 5, 10)
                 ),
                 Mistake(
                     lambda L, d, s: newton_lateration(L, d, np.zeros(2)),
@@ -1544,6 +1551,10 @@ CHAPTER = Chapter(
                     "These are standard deviations on the diagonal. Asked for is the covariance matrix as `propagate` gives it.",
                 ),
                 Mistake(
+                    lambda: np.sqrt(np.abs(_circle()[1])),
+                    "These are the roots of all entries. Asked for is the covariance matrix as `propagate` gives it.",
+                ),
+                Mistake(
                     lambda: np.diag(np.diag(_circle()[1])),
                     "The diagonal is right. Hand in the whole matrix, correlations included.",
                 ),
@@ -1617,6 +1628,10 @@ CHAPTER = Chapter(
                 Mistake(
                     _offset(lambda d, turn, way: d / turn * np.sin(turn)),
                     "This is how far ahead it ends. Asked is how far to the left.",
+                ),
+                Mistake(
+                    _offset(lambda d, turn, way: 2 * d / turn * np.sin(turn / 2)),
+                    "This is the length of the chord, how far away it ends. Asked is how far to the left: times the sine of half the turn.",
                 ),
                 Mistake(
                     lambda way, excess, track: -wheel_offset(way, excess, track),

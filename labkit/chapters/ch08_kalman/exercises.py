@@ -4,6 +4,7 @@ import functools
 import itertools
 
 import numpy as np
+from scipy.linalg import solve_continuous_are
 
 from ...documents.lecture import printed as lecture
 from ...estimation import kalman
@@ -63,6 +64,15 @@ def steady_system(rng, n, m):
     """A system of n states that remember for a while, all of them seen in m mixed numbers."""
     A = np.diag(rng.uniform(0.7, 0.95, n)) + np.diag(rng.uniform(0.1, 0.5, n - 1), 1)
     return A, np.eye(m, n) + 0.3 * rng.normal(size=(m, n)), covariance(rng, n, 0.05), covariance(rng, m, 0.3)
+
+
+def slow_system(rng):
+    """States that stay as they are, but for a noise a few thousandths of the sensor's: some hundred rounds pass before
+    the gain stands still, from a covariance far too large or far too small.
+    """
+    C, cov_z = np.eye(2) + 0.2 * rng.uniform(-1, 1, (2, 2)), covariance(rng, 2, 0.3)
+    back = np.linalg.inv(C)
+    return np.eye(2), C, rng.uniform(0.003, 0.004) ** 2 * back @ cov_z @ back.T, cov_z
 
 
 def seen_landmark(rng):
@@ -934,9 +944,17 @@ CHAPTER = Chapter(
                     _second_from_the_old_variance,
                     "The second sensor meets the variance from before the first one. After a correction the new variance counts.",
                 ),
-                Mistake(
-                    _fused(lambda v, s: [1 / np.sqrt(v), *(1 / s)]),
-                    "Weights are one over the variance, not over the standard deviation.",
+                *(
+                    Mistake(
+                        _fused(lambda v, s: [1 / np.sqrt(v), *(1 / s)], var),
+                        "Weights are one over the variance, not over the standard deviation.",
+                        id=id,
+                    )
+                    for var, id in (
+                        (None, "fuse_two_sensors-0bee01"),
+                        (lambda v, s: (1 / np.sqrt(v) + (1 / s).sum()) ** -2, "fuse_two_sensors-stds-squared"),
+                        (lambda v, s: 1 / (1 / v + (1 / s**2).sum()), "fuse_two_sensors-stds-position"),
+                    )
                 ),
                 Mistake(
                     _fused(lambda v, s: [0, *(1 / s**2)]), "The prior is missing. It is an opinion like the others."
@@ -1049,7 +1067,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: _fusion(std1=1.0, std2=0.5),
-                    "The standard deviations are exchanged: the first sensor is the better one.",
+                    "The standard deviations, or the measurements, are exchanged: 9.4 comes with 0.5, 10.6 with 1.",
+                    id="fused-5acd72",
                 ),
                 Mistake(lambda: _fusion(x0=20.0), "20 is the prior's variance. Its position is 0."),
                 Mistake(
@@ -1082,6 +1101,12 @@ CHAPTER = Chapter(
                 functools.partial(steady_system, n=2, m=2),
             ),
             metric=metrics.Numbers(1e-3),
+            noisy=(
+                slow_system,
+                metrics.Numbers(1e-3),
+                "right where the gain settles soon, but not where the system's noise is tiny beside the sensor's, and it takes "
+                "hundreds of rounds (do you stop earlier?):",
+            ),
             hints=(
                 "The gain does not depend on the data. Run the covariance alone until the gain stands still.",
                 "Repeat: cov = A cov A^T + cov_v, K = cov C^T S^-1, cov = (I - K C) cov. Some thousand times are cheap. Or let SciPy solve the Riccati equation.",
@@ -1121,6 +1146,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda A, C, Q, R: A @ kalman.steady_state(A, C, Q, R).gain,
                     "This is A K, the gain of the form that predicts and corrects in one line. Here the correction's own gain is asked for.",
+                ),
+                Mistake(
+                    lambda A, C, Q, R: solve_continuous_are(A.T, C.T, Q, R) @ C.T @ np.linalg.inv(R),
+                    "This solves the Riccati equation of continuous time. The filter goes in steps: solve_discrete_are, and K = P C^T S^-1.",
                 ),
                 Mistake(
                     _rounds(5), "Five rounds are too few: repeat until the gain stands still, some thousand times."
@@ -1577,6 +1606,10 @@ CHAPTER = Chapter(
                 Mistake(
                     _jacobians(change_u=lambda G, x, u, t: G * u),
                     "In G_u, v and omega must not appear: the step is linear in both.",
+                ),
+                Mistake(
+                    _jacobians(change_u=lambda G, x, u, t: G * [[1], [1], [0]]),
+                    "In G_u the last row is zero, but omega turns the robot: theta' = theta + omega T.",
                 ),
                 Mistake(lambda x, u, t: motion_jacobians(x, u, t)[::-1], "The order is G_x, G_u."),
                 Mistake(

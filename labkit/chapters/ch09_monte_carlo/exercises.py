@@ -149,14 +149,28 @@ def ray_past_the_unknown(rng):
     return maps.OccupancyGrid(cells, 0.1), np.array([start, rng.uniform(2.8, 3.2), theta]), float(-theta), R_MAX
 
 
-def ray_to_a_thin_wall(rng):
+def ray_to_a_thin_wall(rng, width=0.1, far=None):
     """A ray nearly along y to a wall of one cell, in the middle of which no step of two cells ends; another wall behind
-    it.
+    it. width: of a cell (m); far: distance, in cells.
     """
-    cells, far = np.full((60, 60), maps.FREE), 0.2 * rng.integers(9, 15) + rng.uniform(0.03, 0.07)
+    cells, far = np.full((60, 60), maps.FREE), far or 2.0 * rng.integers(9, 15) + rng.uniform(0.3, 0.7)
     cells[45], cells[56:] = maps.OCCUPIED, maps.OCCUPIED
     theta, angle = rng.uniform(-3, 3), math.pi / 2 + rng.uniform(0.004, 0.02) * rng.choice([-1, 1])
-    pose = np.array([rng.uniform(2.5, 3.5), 4.5 - far * math.sin(angle), theta])
+    pose = np.array([width * rng.uniform(25, 35), width * (45 - far * math.sin(angle)), theta])
+    return maps.OccupancyGrid(cells, width), pose, float(planar.wrap_angle(angle - theta)), R_MAX
+
+
+def ray_in_a_fine_map(rng):
+    """The same with cells of 2 cm and a wall in which no step of 5 cm ends."""
+    return ray_to_a_thin_wall(rng, width=0.02, far=2.5 * rng.integers(9, 14) + rng.uniform(0.6, 0.9))
+
+
+def ray_to_a_wall_close_by(rng):
+    """A ray to a wall less than half a meter away."""
+    cells, far = np.full((60, 60), maps.FREE), rng.uniform(0.2, 0.45)
+    cells[:, 40:] = maps.OCCUPIED
+    theta, angle = rng.uniform(-3, 3), rng.uniform(-0.3, 0.3)
+    pose = np.array([4.0 - far * math.cos(angle), rng.uniform(2.5, 3.5), theta])
     return maps.OccupancyGrid(cells, 0.1), pose, float(planar.wrap_angle(angle - theta)), R_MAX
 
 
@@ -260,6 +274,18 @@ def averages(rng, low=False):
         slow * (rng.uniform(0.1, 0.4) if low else rng.uniform(0.1, 1.9)),
         slow,
         slow * (rng.uniform(0.1, 0.35) if low else rng.uniform(0.6, 1.2)),
+        rng.uniform(0.02, 0.1),
+        rng.uniform(0.2, 0.5),
+    )
+
+
+def averages_just_below(rng):
+    """The same with a quick average a little below the slow one: a small share."""
+    slow = rng.uniform(0.2, 0.8)
+    return (
+        slow * rng.uniform(0.93, 0.97),
+        slow,
+        slow * rng.uniform(0.985, 0.995),
         rng.uniform(0.02, 0.1),
         rng.uniform(0.2, 0.5),
     )
@@ -891,12 +917,34 @@ def _proportional(resample, rng):
                 f"with the weights {weights.tolist()} index {k} gets {100 * found[k]:.0f} % of the draws "
                 f"instead of {100 * expected[k]:.0f} %."
             )
-            return told + (_shifted(found, expected) or _never_twice(resample, weights, rng))
+            words = _shifted(found, expected) or _shares_of_another_rule(resample, rng)
+            return told + (words or _never_twice(resample, weights, rng))
     return None
+
+
+OTHER_RULES = (
+    (np.square, "These are the shares of the squares of the weights: each counts as it is."),
+    (np.sqrt, "These are the shares of the roots of the weights: each counts as it is."),
+    (np.exp, "These are the shares of exp(weights): they are weights already, no logarithms."),
+)
+
+
+def _shares_of_another_rule(resample, rng):
+    """That all shares are those of weights that were changed first, as one more sentence."""
+    found = [_draws(resample, weights, rng, 2000 // len(weights)) for weights in WEIGHTS]
+    for rule, words in OTHER_RULES:
+        if not any(isinstance(shares, str) for shares in found):
+            wanted = (rule(weights) / rule(weights).sum() for weights in WEIGHTS)
+            if all(np.abs(shares - right).max() < SHARE_OFF for shares, right in zip(found, wanted)):
+                return f" {words}"
+    return ""
 
 
 def _shifted(found, expected):
     """That each index has the share of a neighbor, as one more sentence."""
+    low = np.array([expected[:2].sum(), *expected[2:], 0.0])
+    if np.abs(found - low).max() < SHARE_OFF:
+        return " Each index gets the share of the one behind it, the first that of two: is it one too low?"
     for neighbor, shares, slip in (("before", expected[:-2], "high"), ("behind", expected[2:], "low")):
         apart = np.ptp(shares) > 2 * SHARE_OFF if shares.size else False
         if apart and np.abs(found[1:-1] - shares).max() < SHARE_OFF:
@@ -969,9 +1017,17 @@ class _LateSpin(np.random.Generator):
 def _turn_is_one_gap(resample, rng):
     """The first spoke of the farthest turn against the first of eight equal weights."""
     index = np.asarray(resample(np.full(8, 0.125), _LateSpin(np.random.PCG64(0))))
-    if index.shape == (8,) and index.dtype.kind in "iu" and index.min() > 0:
+    if index.shape == (8,) and index.dtype.kind in "iu" and index.min() > 0 and _is_a_wheel(resample, rng):
         return "with a random number of nearly 1 the wheel turns past the first of 8 equal weights: at most one gap, W / M."
     return None
+
+
+def _is_a_wheel(resample, rng):
+    """Whether the spokes are those of a wheel, however far it is turned: of equal weights one meets one each, until the
+    last, which takes those that went beyond.
+    """
+    drawn = (np.sort(resample(np.full(8, 0.125), rng)) for _ in range(5))
+    return all(np.array_equal(index, np.minimum(index[0] + np.arange(8), 7)) for index in drawn)
 
 
 def _survives_rounding(resample, rng):
@@ -1026,6 +1082,8 @@ def _other_spread(name, noise, wanted, std_u, dt, longer):
         f"4000 particles spread {name} by {amount:.3f} {unit} (standard deviation) after one step of {dt} s with "
         f"std_u = {std_u.tolist()}, expected {wanted:.3f} {unit}"
     )
+    if name == "in theta" and amount < 0.01 * wanted:
+        return f"{told}. This was straight on, u = [1, 0]: omega has its noise there as well."
     if amount > 0 and np.corrcoef(noise[:-1], noise[1:])[0, 1] > 0.5:
         return (
             f"{told}. The noise of each is like that of the one before: add its own to u itself, to each a fresh one."
@@ -1061,6 +1119,22 @@ def _other_kind(ahead, turn, dt):
     return None
 
 
+def _noise_is_right_at_any_control(move, rng):
+    """Speed and turn rate of 4000 particles, from where they come to: of a robot that stands, and in reverse."""
+    std_u, dt, m = np.array([0.2, 0.3]), 0.5, 4000
+    for u in (np.zeros(2), np.array([-0.8, -0.4])):
+        moved = np.asarray(move(np.zeros((m, 3)), u, dt, std_u, rng))
+        ahead = moved[:, 2] / 2
+        v, omega = np.cos(ahead) * moved[:, 0] + np.sin(ahead) * moved[:, 1], moved[:, 2]
+        for name, found, wanted, std in zip(("speeds", "turn rates"), (v / dt, omega / dt), u, std_u):
+            if abs(found.mean() - wanted) > 0.1 * std or abs(found.std() - std) > 0.1 * std:
+                return (
+                    f"right for u = [1, 0], but for u = {u.tolist()} the {name} of {m} particles have the mean {found.mean():.2f} and "
+                    f"the standard deviation {found.std():.2f}, expected {wanted:g} and {std:g}: the noise is the same for every u."
+                )
+    return None
+
+
 def _noise_off_is_reckoning(move, rng):
     states = np.array([[0.0, 0, 0], [1, 2, 1.5]])
     moved = move(states.copy(), np.array([1.0, 0.5]), 0.2, np.zeros(2), rng)
@@ -1075,6 +1149,9 @@ def _noise_off_is_reckoning(move, rng):
         return "with std_u = 0 every particle stands still: u itself is missing. The noise is added to it."
     if np.abs(moved - odometry.step(states, (1.0, 0.5), 1.0)).max() < 1e-9:
         return "the particles move as if dt were 1: hand dt to odometry.step."
+    for model, way in (("euler", "straight along the old heading"), ("arc", "along the exact arc")):
+        if np.abs(moved - odometry.step(states, (1.0, 0.5), 0.2, model)).max() < 1e-9:
+            return f"with std_u = 0 your particles move {way}. odometry.step goes along the heading of half the turn: call it."
     again = np.asarray(move(states.copy(), np.array([1.0, 0.5]), 0.2, np.zeros(2), rng))
     if np.abs(again - moved).max() > 1e-9:
         return "with std_u = 0 the particles still scatter: noise enters through u only, scaled by std_u."
@@ -1264,7 +1341,7 @@ CHAPTER = Chapter(
             reference=sample_motion,
             draw=motion,
             fixed={"u": "the control is a speed and a turn rate", "std_u": "one for the speed, one for the turn rate"},
-            properties=(_noise_off_is_reckoning, _noise_is_right, _moved_by_the_rng),
+            properties=(_noise_off_is_reckoning, _noise_is_right, _noise_is_right_at_any_control, _moved_by_the_rng),
             hints=(
                 "The noise belongs to the control, not to the pose, and each particle gets its own.",
                 "Draw one pair of standard normal numbers per particle, scale them by std_u, and add them to u.",
@@ -1467,6 +1544,10 @@ CHAPTER = Chapter(
                     "np.exp(900) is infinite and np.exp(-2000) is zero, so their sum says nothing. Take the largest logarithm out of all of them first.",
                 ),
                 Mistake(
+                    lambda l: np.logaddexp(0.0, logsumexp(l)),
+                    "Your sum begins with the logarithm 0, which is a weight of 1: exp(0). Begin with -inf, the logarithm of nothing.",
+                ),
+                Mistake(
                     lambda l: l.min() + np.log(np.exp(l - l.min()).sum()),
                     "With impossible particles (-inf) among them the smallest logarithm, or the mean, is -inf too, and -inf - (-inf) is nothing. Take out the largest.",
                 ),
@@ -1545,6 +1626,17 @@ CHAPTER = Chapter(
                     metrics.Numbers(0.16, "m", absolute=True),
                     "Right on other rays, but not on one nearly along y to a wall of one cell (is a step longer than a cell, or does it "
                     "get longer there?):",
+                ),
+                (
+                    ray_to_a_wall_close_by,
+                    metrics.Numbers(0.16, "m", absolute=True),
+                    "Right on longer rays, but not on one to a wall less than half a meter away (does yours begin farther out?):",
+                ),
+                (
+                    ray_in_a_fine_map,
+                    metrics.Numbers(0.16, "m", absolute=True),
+                    "Right on other maps, but not on one with cells of 2 cm and a wall of one cell (is the length of a step typed in? "
+                    "grid.resolution is the width of a cell):",
                 ),
             ],
             hints=(
@@ -1835,6 +1927,10 @@ CHAPTER = Chapter(
                     "From one spoke to the next you go on by one particle at most. Light ones may be passed over: `while`, not `if`.",
                     id="systematic-if",
                 ),
+                Mistake(
+                    lambda w, rng: _turn(np.sort(w), rng.random()),
+                    "You sorted the weights: then an index no longer belongs to its particle.",
+                ),
                 Mistake(_spin, "These are M independent spins, the roulette. Here one random number turns all spokes."),
                 Mistake(lambda w, rng: _turn(w, 0.0), "The wheel has not been turned: start with one random number."),
                 Mistake(lambda w, rng: _turn(w, 0.5), "The wheel has not been turned: start with one random number."),
@@ -2036,6 +2132,10 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(
+                    lambda a, w: particles.circular_mean(a, np.array([1.0, *w[1:]])),
+                    "The first angle counts as if its weight were 1. It has one of its own, weights[0].",
+                ),
+                Mistake(
                     lambda a, w: float(planar.wrap_angle(a.mean())),
                     "The arithmetic mean of angles across the seam points backward. Average directions, not numbers.",
                 ),
@@ -2120,7 +2220,7 @@ CHAPTER = Chapter(
         Exercise(
             "recover",
             reference=recover,
-            draw=(*[averages] * 5, functools.partial(averages, low=True)),
+            draw=(*[averages] * 4, averages_just_below, functools.partial(averages, low=True)),
             metric=metrics.Several(
                 metrics.Numbers(1e-9), metrics.Numbers(1e-9), metrics.Numbers(1e-9), names=("share", "w_slow", "w_fast")
             ),
