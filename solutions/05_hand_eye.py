@@ -439,7 +439,7 @@ for i in np.flatnonzero(fit.weights == 0):
     print(f"pose {i + 1:2}: residual in the base {fit.residuals[i]} mm")
 
 # %% suspects [markdown]
-# Seven poses stand out, and look at four of them: 18.3 mm along x, 9.1 along y, 8.8 along x, 45 along x, hardly anything across. Robots do not err like that. Pose 3 is printed with
+# Seven poses stand out, and look at four of them: 18.3 mm along x, 9.1 along y, 8.8 along x, 45 along x, hardly anything across. Pose 3 is printed with
 # x = 1379.64. Decide **what happened** (did the robot sag, is a digit missing, or have two changed places?), then click the bars: the slider undoes one slip after another in the chosen pose. Which single change removes the residual
 # in *all three* axes at once?
 
@@ -472,8 +472,8 @@ for slip in misprints.explanations(thesis.printed_entries(), 12, fit.T_FS, fit.t
 # ## Name them
 #
 # Now write the search. `entries` maps (table, pose, column) to the printed text, such as `'1397.69'`; `thesis.measurements_from(entries)` makes arrays of it. Return the set of
-# wrong entries. Any procedure is fine, within 15 seconds a call; who recomputes only the row that is changed needs a fraction of one.
-# Accusing an innocent entry is not. The check also plants slips of its own.
+# wrong entries. Any procedure is fine, within 15 seconds a call (who recomputes only the row that is changed needs a fraction of one),
+# but no innocent entry may be accused. The check also plants slips of its own.
 #
 # One slip is a lost or added sign, two digits swapped, a digit too many, a digit missing, or one digit wrong. `misprints.single_slips(text)` lists all numbers one slip away, and
 # `misprints.explanations(entries, pose, T_FS, target, std)` tries them on every entry of a row, as above: the most credible comes first, its `table`, `pose` and `column` say where.
@@ -532,7 +532,7 @@ for row in steps:
 # ## Which sphere was it?
 #
 # The certificate (C11) says R = 29.9725 mm, listing C16 takes 30, the coordinate machine (C13) 30.277. Every $y$ in C17 contains R = 30, so another R moves all centers along y:
-# $y' = \pm\sqrt{y^2 + R^2 - 30^2}$. Which R do the 31 corrected poses ask for?
+# $y' = \pm\sqrt{y^2 + R^2 - 30^2}$. With which R does the fit to all 31 corrected poses leave the least rms?
 
 # %% radius
 radius = ...  # your code here
@@ -702,7 +702,7 @@ def kim_system(A, B):
     B.
 
     A, B: rigid motions, (4, 4). u: the rows of X one after another, its last row is
-    known.
+    known; the equations in the order of the entries (1, 1), (1, 2), ... (3, 4).
     """
     ### BEGIN SOLUTION
     F = np.zeros(12)

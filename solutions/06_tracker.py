@@ -520,7 +520,7 @@ ex.predict("moved", guess, reveal=stages.moved_station)
 # the run makes two worlds, one that drifts makes a new one at every stop, and no
 # mounting fits them all. **By how many milliradians must it turn after stop 10, to make
 # all of the $E_{trans}$ that the report prints, 0.802 mm?** Use the knob, or
-# `stages.compute_moved_station`.
+# `stages.compute_moved_station({"tilt": 1.0, "when": "after stop 10"})`, `tilt` in mrad.
 
 # %% knock
 knock = ...  # your code here
