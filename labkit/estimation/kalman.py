@@ -348,7 +348,8 @@ def steady_state(A, C, cov_v, cov_z):
     Raises
     ------
     ValueError
-        Where the equation has no stabilizing solution: a mode is neither measured nor stable.
+        Where the equation has no stabilizing solution, because a mode is neither measured nor stable, or none is found,
+        because its numbers are too far apart.
     """
     A, C = as_shape(A, "A", "n", "n"), as_shape(C, "C", "m", "n")
     n, m = len(A), len(C)
@@ -359,6 +360,8 @@ def steady_state(A, C, cov_v, cov_z):
         before = linalg.solve_discrete_are(A.T, C.T, _symmetric(cov_v), _symmetric(cov_z))
     except np.linalg.LinAlgError as error:
         raise ValueError(f"the filter has no steady state: {error}") from None
+    except ValueError:
+        raise ValueError("no steady state can be computed: the noises and matrices are too unlike in size") from None
     gain = np.linalg.solve(C @ before @ C.T + cov_z, C @ before).T
     return SteadyState(gain, before, _after(before, gain, C, cov_z))
 

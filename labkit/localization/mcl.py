@@ -400,6 +400,7 @@ def localizer(grid, motion, n_particles, rng, start=None, recovery=True, **optio
     -------
     MonteCarloLocalizer
     """
+    n_particles = as_size(n_particles, "n_particles")
     if start is None:
         states = uniform_states(grid, n_particles, rng)
     else:

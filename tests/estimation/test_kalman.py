@@ -141,6 +141,12 @@ def test_steady_state_needs_what_is_unstable_to_be_measured():
         kalman.steady_state(np.diag([1.1, 0.5]), [[0.0, 1.0]], np.eye(2), [[1.0]])
 
 
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_steady_state_of_numbers_too_far_apart_is_refused_in_a_sentence():
+    with pytest.raises(ValueError, match="too unlike in size"):
+        kalman.steady_state([[1.0, 0.1], [0.0, 1.0]], [[1e-320, 0.0]], np.diag([1e-6, 1.6e-3]), [[0.25]])
+
+
 # --- consistency ---------------------------------------------------------------
 
 

@@ -207,6 +207,8 @@ def test_a_first_cloud_about_a_pose_and_all_over_the_map():
     near = mcl.localizer(ROOM, MOTION, 4000, rng, start=(2.0, 3.0, 1.0), recovery=False)
     np.testing.assert_allclose(near.states.mean(0), (2, 3, 1), atol=0.03)
     np.testing.assert_allclose(near.states.std(0), (0.2, 0.2, 0.1), rtol=0.1)
+    with pytest.raises(ValueError, match="n_particles must be at most"):
+        mcl.localizer(ROOM, MOTION, 10**15, rng)
     everywhere = mcl.localizer(ROOM, MOTION, 4000, rng)
     assert (ROOM.at(everywhere.states[:, :2]) == 0).all() and near.recovery is None
     assert (ROOM.at(everywhere.recovery.draw(50, rng)[:, :2]) == 0).all()
