@@ -37,6 +37,11 @@ def test_both_notebooks_are_fresh(path):
     assert not found, f"run: python lab.py build {path.stem[:2]}"
 
 
+def test_chapter_0_says_what_to_do_when_code_hangs_in_one_compiled_call():
+    said = " ".join(cell.text for cell in source.read(source.find("00")))
+    assert "Kernel > Restart Kernel" in said and "one single call that Python cannot interrupt" in said
+
+
 def test_no_notebook_has_lost_its_source():
     assert not build.orphans(NOTEBOOKS, SOLUTIONS)
 

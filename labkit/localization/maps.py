@@ -17,6 +17,7 @@ from scipy.ndimage import distance_transform_edt
 
 from ..checks import (
     as_finite,
+    as_floats,
     as_indices,
     as_number,
     as_points,
@@ -60,7 +61,8 @@ class OccupancyGrid:
     origin: tuple = (0.0, 0.0)
 
     def __post_init__(self):
-        cells = np.asarray(self.cells)
+        is_plain = type(self.cells) is np.ndarray and self.cells.dtype.kind in "bui"
+        cells = self.cells if is_plain else as_floats(self.cells, "cells")
         if cells.ndim != 2 or 0 in cells.shape or not np.isin(cells, (FREE, OCCUPIED, UNKNOWN)).all():
             raise ValueError(
                 f"cells must be a (H, W) array of 0 (free), 1 (occupied), 2 (unknown), got shape {cells.shape}"

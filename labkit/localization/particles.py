@@ -276,6 +276,7 @@ def count_ancestors(resample, n_particles, n_steps, rng):
     array of int, shape (n_steps + 1,)
     """
     n_particles, n_steps = as_size(n_particles, "n_particles"), as_size(n_steps, "n_steps", at_least=0)
+    as_size(n_particles * n_steps, "n_particles times n_steps", at_least=0)
     names, weights = np.arange(n_particles), np.full(n_particles, 1.0 / n_particles)
     left = [n_particles]
     for _ in range(n_steps):

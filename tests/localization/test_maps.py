@@ -60,6 +60,7 @@ def test_picture_round_trip(room, tmp_path):
         (lambda: OccupancyGrid.from_ascii("#x#"), "'x' in line 1"),
         (lambda: OccupancyGrid.from_ascii("  \n"), "at least one line"),
         (lambda: OccupancyGrid([[0, 5]]), "0 (free), 1 (occupied), 2 (unknown)"),
+        (lambda: OccupancyGrid([[0, 1], [0]]), "cells must hold real numbers"),
         (lambda: OccupancyGrid([[0, 1]], resolution=0), "resolution must be positive"),
         (lambda: maps.distance_field(OccupancyGrid([[0, 0]])), "at least one occupied cell"),
         (lambda: OccupancyGrid.from_lines(np.zeros((0, 4)), 0.1), "at least one segment"),

@@ -103,6 +103,8 @@ def test_standing_robot_loses_its_ancestors_under_roulette_only():
     roulette = pt.count_ancestors(pt.resample_roulette, 1000, 200, rng)
     assert 20 < roulette[50] < 60 and roulette[200] < 20
     assert (pt.count_ancestors(pt.resample_systematic, 1000, 200, rng) == 1000).all()
+    with pytest.raises(ValueError, match="n_particles times n_steps must be at most"):
+        pt.count_ancestors(pt.resample_roulette, 10**5, 10**5, rng)
 
 
 def test_systematic_is_exact_for_float32_weights():
