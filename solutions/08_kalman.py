@@ -414,7 +414,7 @@ def gate(innovation, cov_innovation, limit):
     """Return True where the innovation (m,) is plausible: its NIS, with the covariance
     (m, m), is below the limit."""
     ### BEGIN SOLUTION
-    return bool(innovation @ np.linalg.solve(cov_innovation, innovation) <= limit)
+    return bool(innovation @ np.linalg.solve(cov_innovation, innovation) < limit)
     ### END SOLUTION
 
 

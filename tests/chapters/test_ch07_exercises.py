@@ -147,3 +147,29 @@ def by_the_radius_of_the_car(speed, steering, wheelbase):
 )
 def test_landmarks_in_a_row_and_wheels_straight_ahead_are_drawn(name, answer):
     assert CORRECT not in [ITEMS[name].judge(answer, rng=np.random.default_rng(seed)).status for seed in range(3)]
+
+
+def standing(u, dt, k_d, k_theta, k_drift):
+    v, omega = np.abs(u)
+    return np.diag([k_d * v / dt, (k_theta * omega + k_drift * v) / dt if v else 0.0])
+
+
+def turned_or_not(x, u, dt):
+    omega = u[1] if abs(u[1]) > 0.1 else 0.0
+    middle = x[2] + omega * dt / 2
+    return x + dt * np.array([u[0] * np.cos(middle), u[0] * np.sin(middle), omega])
+
+
+NEARLY = {
+    "wheel_to_twist": lambda a, b, l: np.array([(a + b) / 2, (b - a) / l if abs(b - a) > 0.05 else 0.0]),
+    "step_midpoint": turned_or_not,
+    "control_covariance": standing,
+    "ackermann_twist": lambda v, d, l: np.array([v, v * np.tan(d) / l if abs(d) > 0.06 else 0.0]),
+    "wheel_offset": lambda w, e, l: (w / e + w / 2) / (w / l) * (1 - np.cos(w * e / l)) if abs(e) > 1e-3 else 0.0,
+}
+
+
+@pytest.mark.parametrize("name", NEARLY)
+def test_what_is_nearly_straight_or_nearly_at_rest_is_not_taken_for_it(name):
+    outcome = ITEMS[name].judge(NEARLY[name], rng=np.random.default_rng(0))
+    assert outcome.status == NOT_YET and outcome.mistake is None

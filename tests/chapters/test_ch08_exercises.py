@@ -54,7 +54,7 @@ def test_what_one_size_or_one_limit_hides_is_named(name, answer, words):
 def test_an_inverse_written_for_two_rows_meets_three():
     def by_hand(y, S, limit):
         (a, b), (c, d) = S
-        return bool(y @ (np.array([[d, -b], [-c, a]]) / (a * d - b * c)) @ y <= limit)
+        return bool(y @ (np.array([[d, -b], [-c, a]]) / (a * d - b * c)) @ y < limit)
 
     status, texts = judged("gate", by_hand)
     assert status == RAISED and all("It was right before" in text for text in texts)
@@ -237,3 +237,32 @@ def test_a_gain_that_settles_slowly_takes_hundreds_of_rounds():
     status, texts = judged("steady_state_gain", after_rounds(100), seeds=(0, 1))
     assert status == NOT_YET and all("hundreds of rounds" in text for text in texts), texts
     assert judged("steady_state_gain", after_rounds(600))[0] == CORRECT
+
+
+def wrapped_ten_times(angle):
+    for _ in range(10):
+        angle = angle - 2 * np.pi * (angle > np.pi) + 2 * np.pi * (angle < -np.pi)
+    return angle
+
+
+def without_what_disagrees(x0, var0, z, stds):
+    weights = 1 / np.array([var0, stds[0] ** 2, 1e12 if abs(z[0] - z[1]) > 8 else stds[1] ** 2])
+    return weights @ [x0, *z] / weights.sum(), 1 / weights.sum()
+
+
+@pytest.mark.parametrize(
+    "name, answer, words",
+    [
+        ("wrap_angle", wrapped_ten_times, "too few rounds"),
+        ("fuse_two_sensors", without_what_disagrees, ""),
+        ("gate", lambda y, S, limit: bool(y @ np.linalg.inv(S) @ y <= limit), "not `<=`"),
+    ],
+)
+def test_dozens_of_turns_readings_far_apart_and_the_limit_itself(name, answer, words):
+    status, texts = judged(name, answer)
+    assert status == NOT_YET and all(words in text for text in texts), texts
+
+
+def test_the_limit_itself_is_told_alike_by_every_right_way():
+    for measure in (np.linalg.solve, lambda S, y: np.linalg.pinv(S) @ y, lambda S, y: np.linalg.lstsq(S, y)[0]):
+        assert judged("gate", lambda y, S, limit, to=measure: bool(y @ to(S, y) < limit))[0] == CORRECT

@@ -106,6 +106,18 @@ def gentle_curve(rng, omega):
     return x, np.array([u[0], omega * rng.choice([-1, 1])]), dt
 
 
+def creeping(rng):
+    """A pose, a control of a few centimeters and hundredths of a radian per second, and a time step."""
+    x, u, dt = pose_control_step(rng)
+    return x, 0.03 * u * rng.choice([-1, 1], 2), dt
+
+
+def wheels_nearly_alike(rng):
+    """Wheels of which one is faster by less than 3 cm/s, and the track."""
+    speed, track = rng.uniform(0.2, 1) * rng.choice([-1, 1]), rng.uniform(0.2, 0.8)
+    return speed, speed + rng.uniform(0.002, 0.03) * rng.choice([-1, 1]), track
+
+
 def noisy_control(rng, signs):
     """A control whose parts have these signs, a time step, and three noise constants."""
     v, omega = rng.uniform(0.3, 2), rng.uniform(0.2, 1.5)
@@ -113,6 +125,8 @@ def noisy_control(rng, signs):
 
 
 NOISY_CONTROLS = tuple(functools.partial(noisy_control, signs=signs) for signs in ((-1, 1), (1, -1), (-1, -1)))
+ON_THE_SPOT, STRAIGHT_ON = (functools.partial(noisy_control, signs=signs) for signs in ((0, 1), (1, 0)))
+CREEPING = "right, but not for a robot that hardly moves and hardly turns (a few cm/s and hundredths of a rad/s):"
 
 
 def pose_and_covariances(rng, side=1, gear=1):
@@ -126,6 +140,12 @@ def car(rng, left=True, gear=1):
     """Speed, steering angle to this side, and wheelbase of a car."""
     steering = (1 if left else -1) * rng.uniform(0.1, 0.9)
     return gear * rng.uniform(0.3, 3), steering, rng.choice([-1, 1]) * rng.uniform(0.2, 0.6) + rng.uniform(1.2, 3)
+
+
+def car_nearly_straight_on(rng):
+    """The same with its wheels turned by a fraction of a degree to a few degrees."""
+    speed, _, wheelbase = car(rng)
+    return speed, rng.uniform(0.003, 0.05) * rng.choice([-1, 1]), wheelbase
 
 
 def car_straight_on(rng):
@@ -153,6 +173,11 @@ def unequal_wheels(rng, larger=True, turns=None):
     excess, track = (1 if larger else -1) * rng.uniform(0.005, 0.05), rng.uniform(0.2, 0.8)
     way = rng.uniform(3, 20) if turns is None else turns * track / abs(excess)
     return way, excess, track
+
+
+def wheels_hardly_unequal(rng):
+    """The same with an excess of less than a thousandth, over a long way."""
+    return rng.uniform(15, 30), rng.uniform(1e-4, 5e-4) * rng.choice([-1, 1]), rng.uniform(0.2, 0.8)
 
 
 UNEQUAL = (
@@ -718,6 +743,11 @@ CHAPTER = Chapter(
             reference=odometry.wheel_to_twist,
             draw=WHEELS,
             metric=metrics.Numbers(1e-9),
+            noisy=(
+                wheels_nearly_alike,
+                metrics.Numbers(1e-9),
+                "right, but not where the wheels run nearly alike, by less than 3 cm/s apart:",
+            ),
             hints=(
                 "The middle of the axle moves with the mean of both wheels; what differs between them turns the robot.",
                 "v = (v_R + v_L) / 2 and omega = (v_R - v_L) / l.",
@@ -791,6 +821,7 @@ CHAPTER = Chapter(
             draw=STEPS,
             fixed=PLANAR,
             metric=metrics.PlanarPoses(),
+            noisy=(creeping, metrics.PlanarPoses(), CREEPING),
             hints=(
                 "Drive the way v T along the old heading, then turn.",
                 "x' = x + v T cos(theta), y' = y + v T sin(theta), theta' = theta + omega T.",
@@ -829,6 +860,7 @@ CHAPTER = Chapter(
             draw=STEPS,
             fixed=PLANAR,
             metric=metrics.PlanarPoses(),
+            noisy=(creeping, metrics.PlanarPoses(), CREEPING),
             hints=(
                 "While it drives the robot turns by omega T; on average it looked half of that aside.",
                 "As before, with theta + omega T / 2 inside cosine and sine.",
@@ -993,6 +1025,7 @@ CHAPTER = Chapter(
             draw=EITHER_WAY,
             fixed=PLANAR,
             metric=metrics.Numbers(1e-5),
+            noisy=(creeping, metrics.Numbers(1e-5), CREEPING),
             hints=(
                 "Change x, y or theta a little: what does it change in the pose after the step?",
                 "A shift of x or y is passed on as it is. A turn of theta swings the way v T sideways.",
@@ -1086,6 +1119,7 @@ CHAPTER = Chapter(
             draw=EITHER_WAY,
             fixed=PLANAR,
             metric=metrics.Numbers(1e-5),
+            noisy=(creeping, metrics.Numbers(1e-5), CREEPING),
             hints=(
                 "Three rows (x, y, theta), two columns (v, omega).",
                 "A little more v moves the robot by T along the heading; a little more omega turns it by T.",
@@ -1164,6 +1198,14 @@ CHAPTER = Chapter(
             draw=NOISY_CONTROLS,
             fixed={"u": PLANAR["u"]},
             metric=metrics.Numbers(1e-9),
+            noisy=[
+                (
+                    ON_THE_SPOT,
+                    metrics.Numbers(1e-9),
+                    "right while the robot drives, but not where it turns on the spot, v = 0:",
+                ),
+                (STRAIGHT_ON, metrics.Numbers(1e-9), "right while the robot turns, but not straight on, omega = 0:"),
+            ],
             hints=(
                 "A diagonal matrix: the variance of v and the variance of omega.",
                 "sigma_v^2 = k_d |v| / T and sigma_omega^2 = (k_theta |omega| + k_drift |v|) / T.",
@@ -1585,6 +1627,11 @@ CHAPTER = Chapter(
             reference=wheel_offset,
             draw=UNEQUAL,
             metric=metrics.Numbers(1e-6, "m"),
+            noisy=(
+                wheels_hardly_unequal,
+                metrics.Numbers(1e-6, "m"),
+                "right, but not for an excess of less than a thousandth, which shows on a long way as well:",
+            ),
             hints=(
                 "The larger wheel goes farther than it is believed to: by how much does the robot turn, and how long is the way of its middle?",
                 "It turns by delta = way * excess / track over d = way * (1 + excess / 2), on a circle of radius d / delta. How far aside is its end?",
@@ -1656,6 +1703,11 @@ CHAPTER = Chapter(
             reference=ackermann_twist,
             draw=CARS,
             metric=metrics.Numbers(1e-9),
+            noisy=(
+                car_nearly_straight_on,
+                metrics.Numbers(1e-9),
+                "right, but not where the wheels are turned by less than 3 degrees:",
+            ),
             hints=(
                 "All wheels turn about one point on the line of the rear axle. How far aside is it?",
                 "The front wheel looks across the line to that point, so tan(steering) = wheelbase / radius, and omega = v / radius.",

@@ -50,6 +50,12 @@ def measured_often(rng, n, m, sure=1.0):
     return x + sure**0.5 * rng.normal(size=n), covariance(rng, n, sure), z, C, cov_z
 
 
+def two_sensors_that_disagree(rng):
+    """The same with readings many standard deviations apart, from each other and from the prior."""
+    x0, var0, z, stds = one_position_two_sensors(rng)
+    return x0, var0, z + rng.uniform(15, 30, 2) * [1, -1], stds
+
+
 def one_position_two_sensors(rng):
     x = rng.uniform(5, 15) * rng.choice([-1, 1])
     return x + rng.normal(), rng.uniform(2, 9), x + rng.uniform(-1, 1, 2), rng.uniform(0.3, 0.9, 2) * [1, 2]
@@ -111,6 +117,11 @@ def turned_too_far(rng, sign, gathered):
     return (sign * (rng.uniform(3.3, 6.0) + 2 * np.pi * rng.integers(1, 4) * (gathered > 0)),)
 
 
+def turned_often(rng):
+    """An angle that has gathered dozens of turns, as that of a wheel does."""
+    return (rng.choice([-1, 1]) * (rng.uniform(3.3, 6.0) + 2 * np.pi * rng.integers(30, 90)),)
+
+
 def each_way(draw, *names):
     """The draw with every combination of the signs that it takes under these names."""
     signs = itertools.product((1, -1), repeat=len(names))
@@ -169,6 +180,12 @@ def surprise_of(rng, m, wanted):
     S, y, limit = covariance(rng, m, 0.2), rng.normal(size=m), rng.uniform(4, 17)
     y[:-1] *= 0.01 if wanted[0] > 1 else 1.0
     return y * np.sqrt(rng.uniform(*wanted) * limit / (y @ np.linalg.solve(S, y))), S, limit
+
+
+def just_at_the_limit(rng):
+    """One number whose NIS is the limit itself; all are powers of two, so that nothing is rounded."""
+    y, std = 2.0 ** rng.integers(-2, 3, 2)
+    return np.array([y * rng.choice([-1, 1])]), np.array([[std**2]]), float((y / std) ** 2)
 
 
 SURPRISES = (
@@ -551,12 +568,12 @@ def _nees_of(heading):
 
 
 def gate(innovation, cov_innovation, limit):
-    return bool(kalman.nis(innovation, cov_innovation) <= limit)
+    return bool(kalman.nis(innovation, cov_innovation) < limit)
 
 
 def _gated(score):
     def variant(y, S, limit):
-        return bool(score(y, S) <= limit)
+        return bool(score(y, S) < limit)
 
     return variant
 
@@ -591,6 +608,8 @@ READING = "a reading is a distance and a bearing"
 CONTROL = "the control is a speed and a turn rate"
 
 STATE_AND_COV = metrics.Several(metrics.Numbers(1e-8), metrics.Numbers(1e-8), names=("state", "covariance"))
+
+FUSED = metrics.Several(metrics.Numbers(1e-9, "m"), metrics.Numbers(1e-9), names=("position", "variance"))
 
 CHAPTER = Chapter(
     "08-kalman",
@@ -926,7 +945,12 @@ CHAPTER = Chapter(
             reference=fuse_two_sensors,
             draw=one_position_two_sensors,
             fixed={"z": "there are two sensors", "stds": "there are two sensors"},
-            metric=metrics.Several(metrics.Numbers(1e-9, "m"), metrics.Numbers(1e-9), names=("position", "variance")),
+            metric=FUSED,
+            noisy=(
+                two_sensors_that_disagree,
+                FUSED,
+                "right where the sensors agree. Where they are far apart the weights stay what they are:",
+            ),
             hints=(
                 "Each opinion (the prior, two sensors) counts as much as it is certain.",
                 "Weights are 1 / variance. The variance of the weighted mean is 1 / (sum of the weights).",
@@ -1269,6 +1293,11 @@ CHAPTER = Chapter(
             reference=wrap_angle,
             draw=(*each_way(turned_too_far, "sign", "gathered"), within_half_a_turn),
             metric=metrics.Numbers(1e-9, "rad"),
+            noisy=(
+                turned_often,
+                metrics.Numbers(1e-9, "rad"),
+                "right for a few turns, but not for an angle that has gathered dozens of them:",
+            ),
             draws=12,
             hints=(
                 "An angle and the same angle plus a full turn are one direction. Choose the one nearest to zero.",
@@ -1991,11 +2020,16 @@ CHAPTER = Chapter(
             reference=gate,
             draw=SURPRISES,
             metric=metrics.Exactly(),
+            noisy=(
+                just_at_the_limit,
+                metrics.Exactly(),
+                "right, but not for a NIS that is just the limit, and so not below it (`<`, not `<=`):",
+            ),
             draws=40,
             hints=(
                 "Is the surprise larger than the filter's own idea of how large surprises are?",
                 "Compare y' S^-1 y with the limit.",
-                "`return bool(innovation @ np.linalg.solve(cov_innovation, innovation) <= limit)`",
+                "`return bool(innovation @ np.linalg.solve(cov_innovation, innovation) < limit)`",
             ),
             mistakes=[
                 Mistake(lambda y, S, g: not gate(y, S, g), "Exactly the other way round: True means plausible."),
