@@ -355,7 +355,7 @@ ex.predict("two_loops", guess, reveal=stages.two_loops)
 # empty lines count for nothing; some write 1,5 for 1.5.
 #
 # A reader has two duties. It returns what is there. And where something is wrong, it says **in one sentence what it expected, what came, and in which line**: `if (!LoadSys(...)) return EXIT_FAILURE;` tells the
-# person at the machine nothing. `number_in("1.5")` is 1.5, and NaN where there is no number.
+# person at the machine nothing. `number_in("1.5")` is 1.5, and NaN where there is no number, as in "x" and in "1,5".
 
 # %% read_system
 @ex.read_system

@@ -284,9 +284,8 @@ def _times(ratio, sizes):
         return f"your result is 1/{share} of the expected one, on every draw"
     if abs(ratio - 1) < EXACT:  # it differs in the last digits alone
         return None
-    return (
-        f"your result is {f'{ratio:.4g}' if abs(ratio - 1) > NEARLY else ratio} times the expected one, on every draw"
-    )
+    digits = 4 if abs(ratio - 1) > NEARLY else 12
+    return f"your result is {ratio:.{digits}g} times the expected one, on every draw"
 
 
 def constant_ratio(result, expected, close):

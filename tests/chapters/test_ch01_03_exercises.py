@@ -614,11 +614,38 @@ def by_the_axis_of_the_gap(transforms):
     return np.array([relative(a, b) for a, b in zip(Q, Q[1:])])
 
 
+def of_frames_apart(T_WA, T_WB):
+    return np.eye(4) if np.allclose(T_WA, T_WB, atol=1e-2) else frames.relative(T_WA, T_WB)
+
+
+def without_small_turns(xyzabc):
+    return frames.matrix_from_kuka(np.where(np.arange(6) < 3, xyzabc, np.where(abs(xyzabc) < 1e-3, 0, xyzabc)))
+
+
+def within_half_a_turn(xyzabc):
+    return frames.matrix_from_kuka(np.concatenate([xyzabc[:3], np.clip(xyzabc[3:], -np.pi, np.pi)]))
+
+
+def angles_of_four_decimals(T):
+    xyzabc = frames.kuka_from_matrix(T)
+    return np.concatenate([xyzabc[:3], xyzabc[3:].round(4)]) if T[0, 0] > 0.99999 else xyzabc
+
+
+def of_several(distances, scale):
+    w = np.maximum(1 - (distances / 7 / scale) ** 2, 0) ** 2
+    return w if len(w) > 1 else np.ones(1)
+
+
 @pytest.mark.filterwarnings("ignore:invalid value")
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(
     "name, answer",
     [
+        ("relative", of_frames_apart),
+        ("matrix_from_kuka", without_small_turns),
+        ("matrix_from_kuka", within_half_a_turn),
+        ("kuka_from_matrix", angles_of_four_decimals),
+        ("robust_weights", of_several),
         ("normalize", of_length_1_as_it_is),
         ("gram_schmidt", without_a_small_shadow(1e-4)),
         ("frame_from_points", framed(without_a_small_shadow(0.02))),

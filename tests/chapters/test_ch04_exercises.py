@@ -306,10 +306,15 @@ def zero_for_tiny_promises(cost, new_cost, g, B, step):
     return (cost - new_cost) / promised if abs(promised) > 1e-9 else 0.0
 
 
+def without_little_damping(r, J, damping):
+    return opt.damped_step(r, J, damping if damping > 1e-3 else 0.0)
+
+
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(
     "name, answer",
     [
+        ("damped_step", without_little_damping),
         ("classify_extremum", bent_by_more_than_1e_6),
         ("newton_step", without_a_tiny_determinant),
         ("newton_step", without_small_singular_values),

@@ -35,6 +35,12 @@ def small_motion(rng):
     return (frames.pose(R, 1e-2 * rng.uniform(-1, 1, 3)),)
 
 
+def nearly_one(rng):
+    """Two frames of which one was moved a little."""
+    T_WA = random_pose(rng)
+    return T_WA, T_WA @ small_motion(rng)[0]
+
+
 def side_by_side(rng):
     """Two frames turned alike in W, in different places."""
     T_WA = random_pose(rng)
@@ -118,8 +124,14 @@ A_RANGES = ((-80, 80), (100, 170), (-170, -100))  # deg: both signs of r00, and 
 B_RANGES = ((-80, -5), (5, 80), (-80, 80))  # deg: below and above 0 at every check
 QUADRANTS = ((10, 80), (100, 170), (-170, -100), (-80, -10))  # deg: both signs of sine and cosine
 NEAR_THE_POLE = (((-170, 170), (86, 89)), ((-170, 170), (-89.99, -89.98)))  # deg: A and C are still two angles
+ROUND = {"A_deg": (185, 355), "B_deg": (-260, -190), "C_deg": (-355, -185)}  # as whoever adds up turns has them
 POINT = "a point has three coordinates"
 POSE = "one pose is one 4x4 matrix"
+
+
+def hardly_turned(rng):
+    """A KUKA pose with angles of some hundredths of a degree."""
+    return (np.concatenate([rng.uniform(-800, 800, 3), 1e-3 * rng.uniform(0.2, 0.9, 3) * rng.choice([-1, 1], 3)]),)
 
 
 @dataclass(frozen=True)
@@ -816,6 +828,7 @@ CHAPTER = Chapter(
                     "right, but not where both frames are one:",
                 ),
                 (side_by_side, metrics.Poses(1e-6, 1e-6), "right, but not where both frames are turned alike:"),
+                (nearly_one, metrics.Poses(1e-6, 1e-6), "right, but not where both frames are nearly one:"),
             ],
             hints=(
                 "Neighboring letters cancel: which two transforms give T_AB when W stands between them?",
@@ -1057,6 +1070,14 @@ CHAPTER = Chapter(
             ),
             fixed={"xyzabc": "a pose has six numbers"},
             metric=metrics.Poses(1e-6, 1e-6),
+            noisy=[
+                (hardly_turned, metrics.Poses(1e-6, 1e-6), "right, but not of small angles:"),
+                (
+                    functools.partial(kuka_pose, **ROUND),
+                    metrics.Poses(1e-6, 1e-6),
+                    "right, but not of angles beyond 180 deg:",
+                ),
+            ],
             hints=(
                 "Three elementary turns, multiplied in the order the controller names them, and a translation.",
                 "R = Rz(A) Ry(B) Rx(C). Write each turn as a 3x3 array, with the cosines and sines of A, B, C (radians, in this order), multiply "
@@ -1152,6 +1173,7 @@ CHAPTER = Chapter(
                     (-1, "right, but at B = -90 deg"),
                 )
             ]
+            + [(small_motion, _read_by_kuka(1e-6), "right, but not where all angles are small:")]
             + [(beside_the_axes, _read_by_kuka(1e-6), "right, but not where A and C are 90 or -90 deg:")]
             + [
                 (functools.partial(half_turns, signs=signs), _read_by_kuka(1e-6), f"right, but not where {words}:")

@@ -88,6 +88,12 @@ def all_far(rng):
     return d + pivot.TUKEY * scale, scale
 
 
+def one_alone(rng):
+    """One distance, within the cutoff."""
+    d, scale = near_first(rng, 5)
+    return d[:1], scale
+
+
 def one_at_0(rng):
     """The same, a pose in which the tip is exactly at the point among them."""
     d, scale = near_first(rng, 7)
@@ -253,7 +259,9 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _with_pivot_block(lambda n: np.repeat(-np.eye(3), n, axis=0)),
-                    "`np.repeat` repeats each row by itself: the rows of -I come out of step with those of R. `np.tile(-np.eye(3), (n, 1))` repeats the block.",
+                    "The rows of -I come out of step with those of R: each stands n times below itself, as `np.repeat` does it. "
+                    "`np.tile(-np.eye(3), (n, 1))` repeats the block.",
+                    id="pivot_matrix-cfcc5e",
                 ),
                 Mistake(
                     _with_pivot_block(lambda n: -np.eye(3 * n)[:, :3]),
@@ -861,6 +869,7 @@ CHAPTER = Chapter(
             noisy=[
                 (one_at_0, metrics.Numbers(1e-9), "right, but not where a distance is 0:"),
                 (all_far, metrics.Numbers(1e-9), "right, but not where all poses are too far away:"),
+                (one_alone, metrics.Numbers(1e-9), "right, but not of a single distance:"),
             ],
             hints=(
                 "Near poses keep their weight, far ones lose it all, smoothly.",

@@ -176,6 +176,20 @@ def model_of_the_start(residual, jacobian, x, radius, steps):
     return x, radius
 
 
+def slope_of_the_next(residual, jacobian, x, radius, steps):
+    """The loop with the gradient of the next place in every gain ratio, steps and curvature being those of this one."""
+    for _ in range(steps):
+        r, J = residual(x), jacobian(x)
+        g, B = J.T @ r, J.T @ J
+        step = bare_dogleg(g, B, radius)
+        new, length = residual(x + step), np.linalg.norm(step)
+        promised = -(jacobian(x + step).T @ new @ step + 0.5 * step @ B @ step)
+        rho = 0.5 * (r @ r - new @ new) / promised
+        x = x + step if rho > ACCEPT else x
+        radius = rule(radius, length, rho)
+    return x, radius
+
+
 def cost_of_the_start(residual, jacobian, x, radius, steps):
     """The loop with the cost of the start in every gain ratio."""
     first = residual(x) @ residual(x)

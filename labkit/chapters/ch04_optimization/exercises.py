@@ -437,7 +437,11 @@ CHAPTER = Chapter(
                     _gradient(depths=(200.0, 100.0)),
                     "The depths are exchanged: w = 100 at (1, 1), w = 200 at (−1, −2).",
                 ),
-                Mistake(_gradient(depths=(100.0, 100.0)), "The well at (−1, −2) is twice as deep: w = 200 there."),
+                Mistake(
+                    _gradient(depths=(100.0, 100.0)),
+                    "The part of the well at (−1, −2) is half of what it should be: w = 200 there, and every factor is the same as at (1, 1).",
+                    id="gradient-bd7c66",
+                ),
                 Mistake(
                     _gradient(depths=(100.0, -200.0)),
                     "The second well is subtracted: both terms are −w/q, so their gradients add up.",
@@ -641,7 +645,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _hessian(depths=(100.0, 100.0)),
-                    "The well at (−1, −2) is twice as deep: w = 200 there.",
+                    "The part of the well at (−1, −2) is half of what it should be: w = 200 there, and every factor is the same as at (1, 1).",
                     id="hessian-one-depth",
                 ),
                 Mistake(
@@ -1174,11 +1178,14 @@ CHAPTER = Chapter(
             reference=opt.damped_step,
             draw=DAMPED,
             metric=metrics.Numbers(1e-7),
-            noisy=(
-                functools.partial(damped_case, m=3, n=3, damping=2.0),
-                metrics.Numbers(1e-7),
-                "right, but not of as many residuals as unknowns:",
-            ),
+            noisy=[
+                (functools.partial(damped_case, m=m, n=3, damping=damping), metrics.Numbers(1e-7), words)
+                for m, damping, words in (
+                    (3, 2.0, "right, but not of as many residuals as unknowns:"),
+                    (6, 3e-4, "right, but not of little damping:"),
+                    (6, 1e4, "right, but not of much damping:"),
+                )
+            ],
             hints=(
                 "Set the gradient of |r + J h|² + λ |h|² to zero: what is added to JᵀJ?",
                 "(JᵀJ + λ I) h = −Jᵀr. Or without squaring J: least squares with √λ I beneath J, and zeros beneath r.",
@@ -1601,6 +1608,11 @@ CHAPTER = Chapter(
                     beyond.loop(stale=True),
                     "J is computed once, at the start. It belongs to where you stand: compute it in every round.",
                     id="region-stale",
+                ),
+                Mistake(
+                    beyond.slope_of_the_next,
+                    "Your gain ratios take g of where the step ends. What the model promises is told by g and B of where it begins.",
+                    id="region-next-slope",
                 ),
                 Mistake(
                     beyond.cost_of_the_start,
