@@ -7,7 +7,7 @@ from labkit.calibration import hand_eye as readable
 from labkit.calibration.planning import poses_that_see
 from labkit.fast import hand_eye as fast
 from labkit.geometry import frames
-from labkit.geometry.lie import exp_so3
+from labkit.geometry.lie import exp_so3, nearest_rotation, skew
 
 T_FS = frames.pose(exp_so3([0.3, -0.5, 1.1]), np.array([30.0, -20.0, 120.0]))
 TARGET = np.array([700.0, 80.0, -150.0])
@@ -140,3 +140,104 @@ def test_what_is_cleared_at_a_glance_is_not_refused_by_a_closer_look(tilt, turn)
         assert cleared or tilt < 0.02
     except ValueError:
         assert not cleared
+
+
+def quadratic(seed, std=0.5, n=9):
+    """S and h of the cost r'Sr - 2 h'r of a scene, and its best rotation."""
+    T_BF, x_S = scene(n, std, seed)
+    mean, G, _ = fast._moments(T_BF[:, :3, :3], T_BF[:, :3, 3], x_S, np.ones(n), None)
+    S, h = fast._reduce(mean, G)[:2]
+    return S, h, readable.calibrate_sphere_target(T_BF, x_S).T_FS[:3, :3]
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("off", [1e-4, 3e-3, 0.02, 0.4, 1.5, 2.5, 3.0])
+def test_a_step_of_the_descent_is_newton_s_or_gauss_newton_s_cut_and_halved(seed, off):
+    """With derivatives of the cost along rotations from differences; a short step is followed by one more."""
+    S, h, best = quadratic(seed)
+    axis = np.random.default_rng(seed).normal(size=3)
+    R = exp_so3(off * axis / np.linalg.norm(axis)) @ best
+
+    def cost(phi, Q):
+        q = (exp_so3(phi) @ Q).ravel()
+        return q @ S @ q - 2 * h @ q
+
+    def slopes(Q):
+        return np.array([cost(d, Q) - cost(-d, Q) for d in 1e-5 * np.eye(3)]) / 2e-5
+
+    e = 1e-3 * np.eye(3)
+    H = np.array([[cost(a + b, R) - cost(a - b, R) - cost(b - a, R) + cost(-a - b, R) for a in e] for b in e]) / 4e-6
+    step = -np.linalg.solve(H, slopes(R))
+    if slopes(R) @ step > 0:
+        turned = np.array([(skew(a) @ R).ravel() for a in np.eye(3)])
+        step = -np.linalg.solve(2 * turned @ S @ turned.T, slopes(R))
+    step *= min(1.0, 1 / np.linalg.norm(step))
+    while cost(step, R) > cost(np.zeros(3), R):
+        step = step / 2
+    expected, found_costs = exp_so3(step) @ R, [cost(np.zeros(3), R), cost(step, R)]
+    if np.linalg.norm(step) < 1e-2:
+        again = -np.linalg.solve(H, slopes(expected))
+        found_costs.append(cost(again, expected))
+        expected = exp_so3(again) @ expected
+    found, costs = fast._descend(S, h, R, 1)
+    np.testing.assert_allclose(found, expected, atol=2e-5 * max(1.0, 10 * off))
+    np.testing.assert_allclose(costs, found_costs, rtol=1e-4, atol=1e-6 * abs(found_costs[0]))
+
+
+def test_the_descent_ends_when_the_next_step_would_be_nothing():
+    S, h, best = quadratic(0)
+    found, costs = fast._descend(S, h, exp_so3([0.02, -0.03, 0.01]) @ best, 50)
+    np.testing.assert_allclose(found, best, atol=1e-8)
+    assert 3 <= len(costs) <= 7 and len(fast._descend(S, h, found, 50)[1]) <= 3
+
+
+def test_the_start_is_next_to_the_free_minimum_or_one_of_24(monkeypatch):
+    S, h, _ = quadratic(1)
+    free = np.linalg.solve(S, h).reshape(3, 3)
+    np.testing.assert_allclose(fast._rotation_start(S, h), nearest_rotation(free), atol=1e-8)
+    tried = []
+    monkeypatch.setattr(fast, "right_angled", lambda: tried.append(1) or readable.right_angled()[:2])
+    T_BF, x_S = flat()
+    for unit in (1e-3, 1.0, 1e3):
+        T = T_BF.copy()
+        T[:, :3, 3] *= unit
+        mean, G, _ = fast._moments(T[:, :3, :3], T[:, :3, 3], unit * x_S, np.ones(len(T)), None)
+        fast._rotation_start(*fast._reduce(mean, G)[:2])
+    assert len(tried) == 3
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize(
+    ("along", "across", "cleared"),
+    [(30.0, 0.8e-5, False), (30.0, 1.3e-5, True), (2e-9 * 240, 1.0, False), (8e-9 * 240, 1.0, True)],
+)
+def test_places_are_cleared_at_a_glance_beside_their_spread_and_their_distance(unit, along, across, cleared):
+    """Across a line by a hundred thousandth of it; about one place by 4e-9 of the distance."""
+    rng = np.random.default_rng(8)
+    shape = np.linalg.qr(rng.normal(size=(9, 3)) - rng.normal(size=(9, 3)).mean(0))[0]
+    shape -= shape.mean(0)
+    shape = np.linalg.qr(shape)[0] * along * [1.0, across, across if across == 1.0 else 0.0]
+    x_S = unit * (np.array([0.0, 0.0, 240.0]) / 3 * 3**0.5 + shape * 3 / 3**0.5)
+    T_BF = scene(9)[0]
+    mean, G, total = fast._moments(T_BF[:, :3, :3], unit * T_BF[:, :3, 3], x_S, np.ones(9), TARGET)
+    assert fast._is_clearly_determined(mean, G, total, TARGET) == cleared
+
+
+@pytest.mark.parametrize(("share", "cleared"), [(0.9, False), (1.1, True)])
+def test_turns_are_cleared_by_a_bound_on_the_least_eigenvalue(share, cleared):
+    """det = a b c is at most a (b + c)^2 / 4, so that a is at least 4 det / trace^2."""
+    n = 9
+
+    def bound(tilt):
+        T_BF, x_S = nearly_one_axis(tilt)
+        mean, G, total = fast._moments(T_BF[:, :3, :3], T_BF[:, :3, 3], x_S, np.ones(n), None)
+        values = np.linalg.eigvalsh(fast._turning(G))
+        lower = 4 * values.prod() / values.sum() ** 2
+        assert 0 < lower <= values[0]
+        return lower / (2 * n * fast.MIN_TURN**2), fast._is_clearly_determined(mean, G, total, None)
+
+    low, high = 1e-4, 1e-1
+    for _ in range(60):
+        middle = np.sqrt(low * high)
+        low, high = (middle, high) if bound(middle)[0] < share else (low, middle)
+    assert bound(high)[0] == pytest.approx(share, rel=1e-3) and bound(high)[1] == cleared

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from labkit.estimation import kalman
+from labkit.fast import kalman as fast
 from labkit.fast.kalman import filter_steps
 
 Z = np.random.default_rng(3).normal(size=(400, 1)).cumsum(0)
@@ -108,5 +109,21 @@ def test_refuses_in_the_same_words(z, C, cov_z, x0):
 def test_a_huge_prior_leaves_no_rounding_behind():
     """Nine digits of every entry, though what is left of the measured velocity is a billionth of the prior (Joseph)."""
     for size in (1e6, 3e6, 7e6):
-        given = Z[:3], system(2)[0], [[0.0, 1.0]], [[1e-3]], np.zeros(2), size * np.diag([1.1, 1.3])
-        np.testing.assert_allclose(filter_steps(*given).cov, kalman.filter_steps(*given).cov, rtol=1e-9)
+        for seen in ([0.0, 1.0], [1.0, 0.0]):
+            given = Z[:3], system(2)[0], [seen], [[1e-3]], np.zeros(2), size * np.diag([1.1, 1.3])
+            one, other = filter_steps(*given).cov, kalman.filter_steps(*given).cov
+            np.testing.assert_allclose(one[:, 0, 0], other[:, 0, 0], rtol=1e-9)
+            np.testing.assert_allclose(one, other, rtol=1e-9 if seen[1] else 1e-7)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_two_states_settle_when_any_number_of_them_does(seed):
+    """At the first step whose covariance differs by no more than the tolerance, beside its standard deviations."""
+    A, C, x0, cov0, cov_v = system(2, seed)
+    given = Z[:, 0], A, C[0], cov_v, 0.04, x0, cov0
+    one, other = fast._until_settled(*given), fast._until_settled_2(*given)
+    assert len(one[0]) == len(other[0]) < 300
+    covs = kalman.filter_steps(Z, A, C, [[0.04]], x0, cov0, cov_v=cov_v).cov
+    std = np.sqrt(np.diagonal(covs, axis1=1, axis2=2))
+    close = (np.abs(np.diff(covs, axis=0)) <= fast.SETTLED * std[1:, :, None] * std[1:, None]).all((1, 2))
+    assert abs(len(one[0]) - (np.argmax(close) + 2)) <= 1  # the last bits may move it by a step

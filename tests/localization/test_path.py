@@ -45,6 +45,21 @@ def test_the_tuned_filter_equals_the_readable_one(seed, spurious, unknown):
     assert (quick.used == slow.used).all() and (quick.landmark == slow.landmark).all()
 
 
+@pytest.mark.parametrize("order", [[0, 1, 2, 3], [1, 0, 3, 2], [2, 0, 1, 3], [3, 2, 1, 0]])
+@pytest.mark.parametrize("apart", [0.05, 3.0])
+def test_a_nameless_reading_that_fits_two_marks_is_used_for_none(order, apart):
+    """Two marks side by side and two far ones, in any order; both filters."""
+    log, x, _ = drive(4, n=60, k=5)
+    near = x[log.row[0], :2] + [2.0, 1.0]
+    marks = np.array([near, near + [0.0, apart], near + [9.0, 9.0], near - [9.0, 5.0]])
+    z = path.measurement(odometry.step(x[log.row[0]], log.u[log.row[0]], log.lag[0] + 1e-12, "midpoint"), marks[:1])
+    one = log.readings(np.arange(len(log.z)) < 1)
+    log = Log(one.time, one.u, z, one.row, one.lag, np.array([-1]), marks[order])
+    for module in (path, fast):
+        found = module.filter_path(log, x[0], np.diag([0.01, 0.01, 0.001]), NOISE)
+        assert found.used.tolist() == [apart > 1] and found.landmark[0] == (order.index(0) if apart > 1 else -1)
+
+
 @pytest.mark.parametrize("k", [0, 1])
 def test_few_readings_or_none(k):
     log, x, _ = drive(3, n=50, k=max(k, 1))
