@@ -9,6 +9,7 @@ import numpy as np
 from ..calibration.ax_xb import (
     MAX_STEPS,
     STEP_TOLERANCE,
+    _length,
     calibrate_with,
     kronecker_matrix,
     linear_rotations,
@@ -64,7 +65,7 @@ def solve_ax_xb(A, B):
 
 def _fit(robot, T_ST, weights, given):
     """Gauss-Newton on the rotations of sensor and target alone, the translations eliminated."""
-    size = np.abs(robot[:, :3, 3]).max() + np.abs(T_ST[:, :3, 3]).max() + 1e-300
+    size = _length(robot, T_ST)
     K, H, elimination, mean, sum_A, total = _sums(robot, T_ST, weights)
     H9, h, h0 = H[:9, :9], H[:9, 9], H[9, 9]
     normal_r = np.empty((6, 6))
@@ -117,4 +118,4 @@ def _turned(R, phi):
     """R, shape (n, 3, 3), turned by phi, shape (n, 3), about its own axes, by Cayley's map: exactly orthonormal, equal
     to the exponential up to |phi|^3 / 12."""
     S = (phi @ _GENERATORS.reshape(3, 9)).reshape(R.shape)
-    return R @ (_I3 + (S + 0.5 * (S @ S)) / (1.0 + 0.25 * (phi * phi).sum(-1))[:, None, None])
+    return R @ (_I3 + (S + 0.5 * (S @ S)) / (1.0 + 0.25 * (phi * phi).sum(axis=1))[:, None, None])

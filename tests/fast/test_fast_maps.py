@@ -84,3 +84,10 @@ def test_rays_of_a_map_without_walls_end_at_a_cell_or_nowhere():
     longer = fast.cast_rays(grid, poses, bearings, 9.0) - maps.cast_rays(grid, poses, bearings, 9.0)
     assert longer.min() > -1e-4 and (longer < 1e-4).mean() > 0.97
     assert (fast.cast_rays(grid, poses[3:], bearings, 9.0) == 9.0).all()
+
+
+@pytest.mark.parametrize("place", [(8.2, 1.5), (9.7, 2.5), (-0.4, 1.5), (3.5, 5.3), (3.5, 6.6), (2.5, -0.2)])
+def test_rays_from_beside_the_map_are_those_of_the_exact_walk(place):
+    poses, bearings = np.array([[*place, 0.3]]), np.linspace(-3, 3, 13)
+    found = fast.cast_rays(ROOM, poses, bearings, 4.0)
+    np.testing.assert_allclose(found, maps.cast_rays(ROOM, poses, bearings, 4.0), atol=2e-5)

@@ -196,3 +196,9 @@ def test_the_nearest_place_on_walls_is_that_of_a_fine_search():
 def test_free_is_neither_occupied_nor_unknown():
     grid = OccupancyGrid.from_ascii("#..\n..?")
     assert grid.free.tolist() == [[True, True, False], [False, True, True]]
+
+
+def test_lines_of_a_drawing_may_be_indented_and_of_unequal_length():
+    """The least indent is none of the map; what a line lacks at its end is free."""
+    grid = OccupancyGrid.from_ascii("     ##\n   #\n    ##\n")
+    assert (grid.cells == OCCUPIED)[::-1].tolist() == [[0, 0, 1, 1], [1, 0, 0, 0], [0, 1, 1, 0]]

@@ -242,3 +242,13 @@ def test_random_poses_are_drawn_from_the_whole_building(building):
     draw = functools.partial(uniform_states, building.grid)
     poses = draw(500, np.random.default_rng(1))
     assert (building.grid.at(poses[:, :2]) == 0).all() and np.ptp(poses[:, 0]) > 12 and np.ptp(poses[:, 1]) > 7
+
+
+def test_many_measurements_lose_no_digit_of_the_weights():
+    """Two hundred times a factor of 0.99 between neighbors, and a billionth for all of them."""
+    cloud = mcl.MonteCarloLocalizer(np.zeros((4, 3)), stay, mcl.Resampling(NEVER))
+    each = np.log(1e-9) + np.log(0.99) * np.arange(4)
+    for _ in range(200):
+        cloud._weigh(Weighting(lambda states: each))
+    expected = 0.99 ** (200 * np.arange(4))
+    np.testing.assert_allclose(cloud.weights, expected / expected.sum(), rtol=1e-9)

@@ -237,3 +237,42 @@ def test_the_mode_is_what_lies_within_one_and_a_half_bins():
     np.testing.assert_allclose(mode.pose, kept.mean(0), atol=1e-4)  # headings within 0.25 rad: sine is nearly the angle
     np.testing.assert_allclose(mode.covariance, np.cov(kept.T, bias=True), atol=1e-5)
     assert mode.share == pytest.approx(52 / 54)
+
+
+@pytest.mark.parametrize("size", [1e-250, 1e-20, 1.0, 1e20, 1e250])
+def test_figures_of_weights_know_no_common_factor(size):
+    assert pt.effective_size(np.full(5, size)) == pytest.approx(5.0)
+    assert pt.effective_size([size, size, 0.0]) == pytest.approx(2.0)
+    if 1e-100 < size < 1e100:
+        assert pt.circular_mean([0.1, 0.3], [size, size]) == pytest.approx(0.2)
+        with pytest.raises(ValueError, match="must not cancel"):
+            pt.circular_mean([0.7, 0.7 + np.pi], [size, size])
+
+
+def test_ancestors_are_counted_for_equal_weights_of_sum_one():
+    seen = []
+
+    def halves(weights, rng):
+        seen.append(weights)
+        return np.arange(len(weights)) // 2
+
+    assert pt.count_ancestors(halves, 8, 3, np.random.default_rng(0)).tolist() == [8, 4, 2, 1]
+    np.testing.assert_array_equal(seen, np.full((3, 8), 1 / 8))
+
+
+def test_bins_are_as_wide_as_they_are_long():
+    states = np.array([[0.1, 0.1, 0], [0.1, 0.4, 0], [0.1, 0.6, 0], [0.4, 0.1, 0], [0.6, 0.1, 0]])
+    first, *others = pt.pose_bins(states, cell=0.5)
+    assert (others == first).tolist() == [True, False, True, False] and others[1] != others[3]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_enough_is_the_first_number_that_its_own_bins_ask_for(seed):
+    """Counted one particle after the other."""
+    sampling = pt.KldSampling(n_min=20, epsilon=0.2)
+    states = np.random.default_rng(seed).normal(scale=[0.6, 0.4, 0.1], size=(400, 3))
+    for some in (states, states[:30]):
+        bins = pt.pose_bins(some, sampling.cell, sampling.turn)
+        asked = [max(20, pt.kld_size(len(set(bins[:n])), 0.2, 2.326)) for n in range(1, len(some) + 1)]
+        enough = [n for n, least in enumerate(asked, 1) if n >= least]
+        assert sampling.enough(some) == (enough[0] if enough else len(some))

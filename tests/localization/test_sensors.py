@@ -236,3 +236,21 @@ def test_a_door_is_a_bell_of_its_standard_deviation():
         weigh = weigh_doors([2.0, 5.0], saw_door=door, std=0.4, trust=0.8)
         np.testing.assert_allclose(np.exp(weigh(np.array([1.4, 2.6, 4.4, 5.6]))), says if door else 1 - says)
         assert weigh.best == pytest.approx(math.log(0.8)) and door != not_door
+
+
+def test_landmarks_on_a_wall_and_a_tenth_of_a_meter_behind_it_are_seen():
+    marks = [[6.95, 1.5], [7.0, 1.5], [7.08, 1.5], [7.13, 1.5]]  # the wall begins at x = 7
+    index, _ = see_landmarks(ROOM, (1.5, 1.5, 0.0), marks, np.random.default_rng(1), r_max=9.0)
+    assert index.tolist() == [0, 1, 2]
+
+
+def test_a_likelihood_field_reaches_as_far_as_six_standard_deviations():
+    for std in (0.1, 0.4):
+        assert LikelihoodField(ROOM, std).max_distance == pytest.approx(6 * std)
+
+
+def test_doors_are_seen_from_any_number_of_places():
+    weigh = weigh_doors([1.0, 4.0, 9.0], True)
+    places = np.array([[1.0, 2.5], [4.1, 8.8], [20.0, 3.9]])
+    expected = [[float(weigh(x)) for x in row] for row in places]
+    np.testing.assert_allclose(weigh(places), expected)
