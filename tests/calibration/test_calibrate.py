@@ -258,6 +258,11 @@ def test_streams_are_compared_across_clocks_and_gaps():
     assert abs(result.time_offset.offset - 0.25) < 5 * result.time_offset.std < 0.01
     assert abs(result.comparison.unmatched - 3 / 0.033) < 3
     assert np.abs(error(result)[3:]).max() < 0.5
+    when = result.comparison.time
+    moved = np.linalg.norm(robot_at(when + 1e-4)[:, :3, 3] - robot_at(when - 1e-4)[:, :3, 3], axis=1) / 2e-4
+    steady = np.ones(len(when), bool)  # differences over 66 ms, but for the ends and the pause
+    steady[[0, -1]] = steady[np.flatnonzero(np.diff(when) > 0.1)] = steady[np.flatnonzero(np.diff(when) > 0.1) + 1] = 0
+    np.testing.assert_allclose(result.comparison.speed[steady], moved[steady], rtol=0.02, atol=2.0)
     assert all(0.3 < row[4] < 1.2 for row in result.comparison.table)  # 0.3 mm on each of three axes, and the clock
 
 
@@ -364,3 +369,42 @@ def test_errors_are_told_over_six_ranges_of_speed_with_as_many_rows_each():
         inside = (speed > 100 * k) & (speed < 100 * (k + 1))
         assert row[3] == pytest.approx(np.rad2deg(np.sqrt((angle[inside] ** 2).mean())))
         assert row[4] == pytest.approx(np.sqrt((distance[inside] ** 2).mean()))
+
+
+def test_residuals_and_singular_values_are_those_of_the_model():
+    """Rows that were rejected among them; lengths that leave the mean, and angles in degrees."""
+    robot, sensor, bad = cell(7, outliers=3)
+    result = calibrate.hand_eye(robot, sensor)
+    model, solution = HandEyeModel(robot, sensor), (result.T, result.T_target)
+    r, J = model.linearize(solution)[0], model.whitened(solution, result.kept)[1][result.kept].reshape(-1, 12)
+    np.testing.assert_allclose(result.residuals, r, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(result.alone[~result.kept], r[~result.kept], rtol=1e-6, atol=1e-9)
+    values = np.linalg.svd(J / np.linalg.norm(J, axis=0), compute_uv=False)
+    np.testing.assert_allclose(result.singular_values, values, rtol=1e-6)
+    kept = r[result.kept]
+    assert result.rms_rotation_deg == pytest.approx(np.rad2deg(np.sqrt((kept[:, :3] ** 2).sum(1).mean())))
+    assert result.rms_translation == pytest.approx(np.sqrt((kept[:, 3:] ** 2).sum(1).mean()))
+    assert np.isnan(calibrate.pivot(touching()[0]).rms_rotation_deg)
+
+
+def test_a_frame_of_points_along_one_line_turns_about_its_own_axis():
+    nominal = np.array([[-100.0, 0, 0], [-50, 4, 0], [0, -3, 2], [40, 1, -4], [80, -2, 3], [120, 3, 1]])
+    measured = nominal @ X[:3, :3].T + X[:3, 3] + 0.05 * np.random.default_rng(2).normal(size=(6, 3))
+    advice_ = " ".join(calibrate.frame(measured, nominal).advice)
+    assert "turning about the frame's x axis is known" in advice_
+    robot, sensor, _ = cell(6)
+    told = " ".join(calibrate.hand_eye(robot, sensor, std_rot=STD_ROT, std_trans=STD_TRANS).advice)
+    assert "of the frame" not in told and "the frame's" not in told
+
+
+@pytest.mark.parametrize(("scatter", "slipped"), [(1.0, True), (40.0, False)])
+def test_rejected_rows_that_scatter_among_themselves_are_no_slip(scatter, slipped):
+    """The block of a slipped screw, read as well as the others or forty times worse."""
+    loose = X.copy()
+    loose[:3, 3] += [0, 15.0, 20.0]
+    mounting = np.where((np.arange(20) < 13)[:, None, None], X, loose)
+    robot, sensor, _ = cell(5, mounting=mounting)
+    sensor[13:, :3, 3] += scatter * STD_TRANS * np.random.default_rng(1).normal(size=(7, 3))
+    result = calibrate.hand_eye(robot, sensor)
+    assert result.rejected == list(range(14, 21))
+    assert ("did something slip" in " ".join(result.warnings)) is slipped

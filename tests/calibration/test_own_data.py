@@ -196,6 +196,7 @@ def test_three_rows_are_tried_in_every_way_or_a_hundred(n, count):
     kept, reached = candidate(n, solve, lambda found, rows: (np.abs(rows - found[0][:, :1] + 0.0),))
     assert tried[0].shape == (count, 3) and all(len(set(row)) == 3 for row in tried[0].tolist())
     assert tried[0].min() >= 0 and tried[0].max() < n and len(np.unique(tried[0], axis=0)) > 0.9 * count
+    assert tried[0].max() > 0.9 * (n - 1)
     wanted = max(int(np.ceil(own_data.LEAST_SHARE * n)), min(own_data.LEAST, n))
     assert kept.sum() == wanted
     away = np.abs(np.arange(n) - tried[0][:, :1])  # of each candidate
@@ -385,3 +386,41 @@ def test_one_wrong_point_of_five_is_left_out_though_the_search_begins_with_all()
     solution, kept = own_data.majority(model)
     assert kept.tolist() == [True, True, True, False, True]
     np.testing.assert_allclose(solution[0], own_data.fit_frame(nominal[kept], measured[kept]))
+
+
+@pytest.mark.parametrize(("explained", "wins"), [(8, False), (9, True)])
+def test_a_candidate_is_judged_at_the_row_that_closes_the_required_share(explained, wins):
+    """Of 20 rows nine: one candidate explains some exactly and no others, the rest explain all of them alike."""
+
+    def misfit(found, rows):
+        one = np.where(rows < explained, 0.0, 10.0)
+        return (np.where(found[0][:, :1] == 0, one, 1.0),)
+
+    kept, reached = candidate(20, lambda rows: (np.arange(len(rows))[:, None].astype(float),), misfit)
+    assert reached == ((0.0,) if wins else (1.0,)) and kept.sum() == 9
+    assert (kept == (np.arange(20) < 9)).all() or not wins
+
+
+def test_rows_are_explained_by_the_squares_of_all_their_misfits():
+    """Two channels of unlike size; the nine rows with the least sum, each in units of what the ninth reaches."""
+    rng = np.random.default_rng(4)
+    parts = rng.uniform(0.1, 1, 20), 1e4 * rng.uniform(0.1, 1, 20)
+
+    def misfit(found, rows):
+        return tuple(np.tile(part[rows], (len(found[0]), 1)) for part in parts)
+
+    kept, reached = candidate(20, lambda rows: (rows.astype(float),), misfit)
+    np.testing.assert_allclose(reached, [np.sort(part)[8] for part in parts])
+    total = sum((part / limit) ** 2 for part, limit in zip(parts, reached))
+    assert kept.tolist() == (total <= np.sort(total)[8]).tolist()
+
+
+@pytest.mark.parametrize("unit", [1e-4, 1.0, 1e4])
+def test_three_points_in_a_row_propose_no_frame_whatever_the_unit(unit):
+    """A grid of three times three points, two of them measured wrong: many triples lie on a line."""
+    nominal = unit * np.array([[0.1 * i, 0.1 * j, 0.0] for i in range(3) for j in range(3)])
+    measured = nominal @ T_BT[:3, :3].T + unit * np.array([1.0, 2.0, 3.0])
+    measured[[2, 4]] += 0.5 * unit
+    solution, kept = own_data.majority(own_data.FrameModel(nominal, measured))
+    assert np.flatnonzero(~kept).tolist() == [2, 4]
+    np.testing.assert_allclose(solution[0][:3, :3], T_BT[:3, :3], atol=1e-7)

@@ -335,3 +335,28 @@ def test_a_small_singular_value_is_told_and_none_is_called_nothing():
     with pytest.raises(ValueError, match=f"singular value is {ratio:.1e} of the largest"):
         pivot.refuse_free_tip(few, 0.9)
     pivot.refuse_free_tip(few, 0.9 * ratio)
+
+
+@pytest.mark.parametrize("axis", np.vstack([np.eye(3), -np.eye(3), [[0.6, -0.8, 0], [-0.6, 0, 0.8], [0, -0.6, -0.8]]]))
+def test_the_free_direction_is_told_with_its_largest_part_positive(axis):
+    T = pivot.touching_poses(Rotation.from_rotvec(np.outer(np.linspace(0, 3, 12), axis)).as_matrix(), TIP, POINT)
+    upward = np.sign(axis[np.abs(axis).argmax()]) * axis + 0.0
+    words = ", ".join(f"{x:.2f}" for x in upward)
+    with pytest.raises(ValueError, match=rf"free along \({words}\)"):
+        pivot.calibrate_pivot(T)
+    A = pivot.pivot_matrix(T)
+    with pytest.raises(ValueError, match="rank 6"):
+        pivot.pivot_covariance(A, np.ones(len(A)))
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_of_exact_poses_all_count(unit):
+    """Rounding is no outlier, also where a coordinate is zero; one that is off by more than rounding is."""
+    T = pivot.touching_poses(turns(np.random.default_rng(2), 15), TIP, POINT)
+    T[:, :3, 3] *= unit
+    T = np.concatenate([T, pivot.touching_poses(np.eye(3)[None], unit * TIP, unit * np.array([12.0, -8.0, 0.0]))])
+    T[-1] = T[0]
+    np.testing.assert_allclose(pivot.calibrate_pivot(T, robust=True).weights, 1.0, atol=0.2)
+    T[3, 0, 3] += 1e-3 * unit
+    weights = pivot.calibrate_pivot(T, robust=True).weights
+    assert weights[3] == 0 and np.delete(weights, 3).min() > 0.7

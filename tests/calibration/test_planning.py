@@ -150,3 +150,11 @@ def test_whether_poses_determine_all_is_judged_on_columns_of_length_one():
         else:
             with pytest.raises(ValueError, match="undetermined"):
                 planning.predicted_sphere_covariance(T_BF, T_FS0, TARGET0, 0.1)
+
+
+def test_a_pattern_begins_in_the_middle_and_stays_in_the_field():
+    seen = seen_in(planning.pattern(T_FS0, TARGET0, 0.6, (25, 100, 50), n=60))
+    np.testing.assert_allclose(seen[0], [0.0, -14.0, 240.0], atol=1e-9)
+    assert planning.field_problem(seen) is None and np.abs(seen[:, 1]).max() > 24
+    for place, inside in (((-24.0, 5.0, 240.0), True), ((-26.0, 5.0, 240.0), False), ((24.0, -5.0, 200.0), True)):
+        assert (planning.field_problem(np.array([place])) is None) == inside
