@@ -176,11 +176,10 @@ def _refuse_rows(name, rows, time, p, q):
     refuse(np.abs(np.linalg.norm(q, axis=1) - 1) > UNIT_TOLERANCE, "the quaternion is not of length 1")
     size = np.linalg.norm(p, axis=1)
     before, after = p[:-1], p[1:]
-    apart = np.linalg.norm(after - before, axis=1) > 0.9 * np.maximum(size[:-1], size[1:])
     for factor in (1000.0, 0.001):
         close = np.linalg.norm(factor * after - before, axis=1) < 0.05 * size[:-1]
         refuse(
-            np.concatenate([[False], apart & close & (np.maximum(size[:-1], size[1:]) > 50)]),
+            np.concatenate([[False], close & (np.maximum(size[:-1], size[1:]) > 50)]),
             "the position jumps by a factor of 1000: another unit?",
         )
     refuse(size > 1000 * MAX_POSITION, f"the position is more than {MAX_POSITION:g} m away: another unit?")

@@ -1,5 +1,6 @@
 """The whole cell: its chain against the truth, its Jacobians against differences, its budget against Monte Carlo."""
 
+import dataclasses
 import functools
 
 import numpy as np
@@ -150,3 +151,18 @@ def test_the_robot_reaches_all_of_it(now, touched):
 def test_an_error_of_a_source_that_there_is_not_is_refused():
     with pytest.raises(ValueError, match="errors must be one of .*tip.* got 'other'"):
         cells.with_errors(CELL, job(), {"other": np.zeros(3)})
+
+
+def test_marks_and_readings_have_the_noise_that_is_stated():
+    there = dataclasses.replace(job(), std_mark=0.7, std_reading=(2e-3, 0.4))
+    found = cells.source_covariances(CELL, there)
+    marks = [cov for name, cov in found.items() if cov.shape == (9, 9)]
+    np.testing.assert_allclose(marks, [0.49 * np.eye(9)])
+    for cov in list(found.values())[-2:]:
+        np.testing.assert_allclose(cov, np.diag([4e-6] * 3 + [0.16] * 3))
+
+
+def test_the_scanner_is_calibrated_with_centers_of_the_stated_noise():
+    """3 x 300 numbers less nine unknowns tell it to 2.4 %."""
+    found = cells.calibrate_scanner(np.random.default_rng(3), n=300)
+    assert np.sqrt((found.residuals**2).sum() / (3 * 300 - 9)) == pytest.approx(cells.STD_CENTER, rel=0.12)
