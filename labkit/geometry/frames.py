@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from ..checks import (
     PRODUCT_TOLERANCE,
+    SMALLEST_POSITIVE,
     as_finite,
     as_number,
     as_points,
@@ -552,6 +553,6 @@ def fit_covariance(points_F, std):
     d = d - d.mean(-2, keepdims=True)
     std = as_positive_number(std, "std")
     values = np.linalg.svd(d, compute_uv=False)
-    if values[1] <= 1e-9 * values[0]:
+    if values[1] <= max(1e-9 * values[0], SMALLEST_POSITIVE):
         raise ValueError("the points are collinear or coincide: the rotation about their line stays free")
     return std**2 * np.linalg.inv((d * d).sum() * np.eye(3) - d.T @ d)

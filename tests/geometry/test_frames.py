@@ -250,6 +250,8 @@ def test_the_bound_holds_and_only_the_turn_in_the_plane_gains():
     np.testing.assert_allclose(
         frames.fit_covariance(1e-8 * triangle, 0.05), 1e16 * frames.fit_covariance(triangle, 0.05)
     )
+    with pytest.raises(ValueError, match="collinear or coincide"):
+        frames.fit_covariance(1e-178 * triangle, 0.05)  # whose squares are 0
 
 
 def test_the_six_points_are_the_printed_ones():
