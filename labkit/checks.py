@@ -11,7 +11,7 @@ PRODUCT_TOLERANCE = 1e-2  # a product of a few such matrices
 LAST_ROW_TOLERANCE = 1e-6  # a product of poses in single precision passes, a transposed pose or a scale does not
 COVARIANCE_TOLERANCE = 1e-6  # of the standard deviations: sums in another order pass, single precision, too
 LARGEST_COORDINATE = 1e75  # fourth powers of coordinates still fit into a float
-FEW = 500  # numbers: of fewer the amounts are quicker than the largest and the smallest
+FEW = 500  # numbers: of fewer the sum of squares is quicker than the largest and the smallest
 SMALLEST_POSITIVE = 1e-75  # of what is divided by, for the same reason
 LARGEST_WHOLE = 1e15  # beyond, a float does not tell one whole number from the next
 MOST = 10_000_000  # what one call makes of a kind: some hundred megabytes of poses
@@ -30,11 +30,16 @@ def shown(value, form="g"):
 def as_finite(value, name, below=LARGEST_COORDINATE):
     """`value` as an array of finite floats; refuses what is no number, NaN, infinities and what has no fourth power."""
     array = as_floats(value, name)
-    if array.size < FEW and (np.abs(array) <= below).all():
+    if _are_sound(array, below):
         return array
     array, largest = _with_largest(array, name)
     _refuse_huge(largest, name, below)
     return array
+
+
+def _are_sound(array, below=LARGEST_COORDINATE):
+    """Whether few floats are finite beyond doubt: one sum of squares tells it, sooner than the largest of them."""
+    return array.size < FEW and np.vdot(array, array) < below * below  # NaN is not
 
 
 def as_readings(value, name):
@@ -91,7 +96,10 @@ def _what(array):
 
 def as_points(value, name, dim=3):
     """`value` as finite points, shape (..., dim)."""
-    array, largest = _with_largest(value, name)
+    array = as_floats(value, name)
+    if _are_sound(array) and array.shape[-1:] == (dim,):
+        return array
+    array, largest = _with_largest(array, name)
     if array.ndim < 1 or array.shape[-1] != dim:
         raise ValueError(f"{name} must have shape (..., {dim}), got {array.shape}")
     _refuse_huge(largest, name)
@@ -115,7 +123,10 @@ def _refuse_huge(largest, name, below=LARGEST_COORDINATE):
 
 def as_matrices(value, name, rows, columns):
     """`value` as finite matrices, shape (..., rows, columns)."""
-    array, largest = _with_largest(value, name)
+    array = as_floats(value, name)
+    if _are_sound(array) and array.shape[-2:] == (rows, columns):
+        return array
+    array, largest = _with_largest(array, name)
     if array.shape[-2:] != (rows, columns):
         raise ValueError(f"{name} must have shape (..., {rows}, {columns}), got {array.shape}")
     _refuse_huge(largest, name)
@@ -141,6 +152,8 @@ def is_of_shape(array, shape):
 
 def as_number(value, name):
     """`value` as one finite float."""
+    if isinstance(value, float) and abs(value) <= LARGEST_COORDINATE:
+        return float(value)
     return float(as_shape(value, name))
 
 
@@ -183,6 +196,8 @@ def fit_together(**shapes):
 
 def as_rotations(value, name, tolerance=ORTHONORMAL_TOLERANCE):
     """`value` as rotation matrices, shape (..., 3, 3), orthonormal and right-handed."""
+    if _is_one(value, 3) and _is_orthonormal(value.tolist(), tolerance):
+        return value
     array = as_matrices(value, name, 3, 3)
     _refuse_sheared(array, name, tolerance)
     return array
@@ -193,6 +208,8 @@ def as_transforms(value, name, tolerance=ORTHONORMAL_TOLERANCE):
 
     What rounding leaves passes: up to 1e-6 in the last row, 1e-3 in R'R.
     """
+    if _is_one(value, 4) and _is_rigid(value.tolist(), tolerance):
+        return value
     array = as_matrices(value, name, 4, 4)
     last = array[..., 3, :]
     off = np.abs(last - (0.0, 0.0, 0.0, 1.0)).max(-1)
@@ -201,6 +218,39 @@ def as_transforms(value, name, tolerance=ORTHONORMAL_TOLERANCE):
         raise ValueError(f"{name} must have the last row 0 0 0 1, got {shown(row, '.9g')}")
     _refuse_sheared(array[..., :3, :3], name, tolerance)
     return array
+
+
+def _is_one(value, n):
+    """Whether a value is one matrix (n, n) of floats."""
+    return type(value) is np.ndarray and value.shape == (n, n) and value.dtype == float
+
+
+def _is_rigid(rows, tolerance):
+    """Whether one matrix, four lists of floats, is a transform beyond doubt; what is not has all tests before it."""
+    *upper, last = rows
+    return (
+        last == [0.0, 0.0, 0.0, 1.0]
+        and all(abs(row[3]) <= LARGEST_COORDINATE for row in upper)
+        and _is_orthonormal([row[:3] for row in upper], tolerance)
+    )
+
+
+def _is_orthonormal(rows, tolerance):
+    """Whether one matrix, three lists of floats, is a rotation beyond doubt: R'R within half the tolerance, det R > 0.
+
+    Nearly every matrix that is checked is one, and is seen to be one here in a sixth of the time that arrays take.
+    """
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    half = 0.5 * tolerance
+    return (  # NaN fulfils none of these
+        abs(a * a + d * d + g * g - 1) < half
+        and abs(b * b + e * e + h * h - 1) < half
+        and abs(c * c + f * f + i * i - 1) < half
+        and abs(a * b + d * e + g * h) < half
+        and abs(a * c + d * f + g * i) < half
+        and abs(b * c + e * f + h * i) < half
+        and a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0
+    )
 
 
 def _refuse_sheared(R, name, tolerance):

@@ -1,5 +1,6 @@
 """Bad input to any module of the mathematics meets one sentence that says what was expected, what came, and where."""
 
+import functools
 from decimal import Decimal
 from fractions import Fraction
 
@@ -451,6 +452,35 @@ def test_a_covariance_that_is_off_by_rounding_is_a_covariance(dtype):
     cov = (J @ np.swapaxes(J, -1, -2) + noise * std[..., :, None] * std[..., None, :]).astype(dtype)
     assert np.linalg.eigvalsh(cov).min() < 0 and (cov != np.swapaxes(cov, -1, -2)).any()
     np.testing.assert_array_equal(checks.as_covariances(cov, "cov", 6), cov)
+
+
+@pytest.mark.parametrize("spoil", [0.0, 4e-4, -6e-4, 2e-3, 1e-6, 2e-6, 1e74, 1e76, np.nan, np.inf, -np.inf])
+def test_one_pose_and_a_row_of_poses_are_judged_alike(spoil):
+    """One matrix, and few numbers, are seen to be sound on a shorter way than many."""
+    good = frames.pose(lie.exp_so3([0.3, -0.7, 1.9]), [1.0, -2.0, 3.0])
+    for place in np.ndindex(4, 4):
+        T = good.copy()
+        T[place] += spoil
+        alone, among_many = (_is_refused(checks.as_transforms, value) for value in (T, np.stack([T] * 40)))
+        assert alone == among_many, place
+        R = T[:3, :3]
+        assert _is_refused(checks.as_rotations, R) == _is_refused(checks.as_rotations, R[None]), place
+    mirrored = np.diag([1.0, 1.0, -1.0])
+    assert _is_refused(checks.as_rotations, mirrored) and _is_refused(checks.as_rotations, mirrored[None])
+
+
+def _is_refused(check, value):
+    try:
+        assert check(value, "value") is value  # nothing is copied
+    except ValueError:
+        return True
+    return False
+
+
+def test_a_bound_beyond_all_numbers_still_refuses_infinity():
+    for n in (1, 1000):
+        assert not _is_refused(functools.partial(checks.as_finite, below=np.inf), np.full(n, 1e200))
+        assert _is_refused(functools.partial(checks.as_finite, below=np.inf), np.full(n, np.inf))
 
 
 def test_lists_are_as_good_as_arrays():

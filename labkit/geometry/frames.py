@@ -25,6 +25,7 @@ from ..documented import documented
 from .lie import exp_so3, nearest_rotation, skew
 
 MIN_ARM_ANGLE_DEG = 1e-3  # below this the triangle is so flat that its height drowns in the last digits of the points
+YZX, ZXY = np.array([[1, 2, 0], [2, 0, 1]])  # entries in turn
 MIN_ARM = 1e-9  # relative to the largest coordinate: a shorter arm is rounding error, not a direction
 
 
@@ -42,7 +43,10 @@ def pose(R, t):
     -------
     T : array, shape (..., 4, 4)
     """
-    R, t = as_rotations(R, "R"), as_points(t, "t")
+    return _pose(as_rotations(R, "R"), as_points(t, "t"))
+
+
+def _pose(R, t):
     T = np.zeros((*fit_together(R=R.shape[:-2], t=t.shape[:-1]), 4, 4))
     T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, t, 1.0
     return T
@@ -68,6 +72,10 @@ def unit_vector(v):
     v = as_finite(v, "v")
     if v.ndim < 1:
         raise ValueError("v must have shape (..., n), got a single number")
+    return _unit_vector(v)
+
+
+def _unit_vector(v):
     largest = np.abs(v).max(-1, keepdims=True, initial=0.0)
     if (largest == 0).any():
         raise ValueError("v must not be the zero vector: it has no direction")
@@ -107,14 +115,19 @@ def gram_schmidt(a, b):
 
 def _axes(a, b, if_flat):
     """The formulas of `gram_schmidt`; `if_flat` begins the refusal of parallel directions."""
-    x, b = unit_vector(a), unit_vector(b)
-    angle = arm_angle(x, b)
+    x, b = _unit_vector(a), _unit_vector(b)
+    angle = _arm_angle(x, b)
     flattest = np.minimum(angle, np.pi - angle).min(initial=np.pi)
     if flattest < np.deg2rad(MIN_ARM_ANGLE_DEG):
         raise ValueError(f"{if_flat}: the angle between the arms is {shown(np.rad2deg(flattest), '.2g')} deg")
-    y = unit_vector(b - (x * b).sum(-1, keepdims=True) * x)
-    z = np.cross(x, y)
+    y = _unit_vector(b - (x * b).sum(-1, keepdims=True) * x)
+    z = _cross(x, y)
     return np.stack(np.broadcast_arrays(x, y, z), axis=-1)
+
+
+def _cross(a, b):
+    """a x b, entry by entry a_y b_z - a_z b_y: `np.cross` looks for the axes first, which takes longer than this."""
+    return a.take(YZX, -1) * b.take(ZXY, -1) - a.take(ZXY, -1) * b.take(YZX, -1)
 
 
 def frame_from_points(origin, x_point, y_point):
@@ -142,7 +155,7 @@ def frame_from_points(origin, x_point, y_point):
     for point, name in ((px, "x_point"), (py, "y_point")):
         _refuse_short(point - o, point, name)
     R = _axes(px - o, py - o, "origin, x_point and y_point are collinear")
-    return pose(R, o)
+    return _pose(R, o)
 
 
 def _refuse_short(arm, point, name):
@@ -173,7 +186,11 @@ def arm_angle(a, b):
     """
     a, b = as_points(a, "a"), as_points(b, "b")
     fit_together(a=a.shape, b=b.shape)
-    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(-1))
+    return _arm_angle(a, b)
+
+
+def _arm_angle(a, b):
+    return np.arctan2(np.linalg.norm(_cross(a, b), axis=-1), (a * b).sum(-1))
 
 
 def invert(T):
@@ -242,7 +259,7 @@ def moved(T, step):
     """
     T, step = as_transforms(T, "T"), as_points(step, "step", dim=6)
     fit_together(T=T.shape[:-2], step=step.shape[:-1])
-    return pose(T[..., :3, :3] @ exp_so3(step[..., :3]), T[..., :3, 3] + step[..., 3:])
+    return _pose(T[..., :3, :3] @ exp_so3(step[..., :3]), as_points(T[..., :3, 3] + step[..., 3:], "t"))
 
 
 def relative(T_WA, T_WB):

@@ -37,6 +37,7 @@ from . import simulation
 from .arm import TX40, tool_pose
 
 SOURCES = ("tip", "scanner", "tracker", "marks", "first reading", "second reading")
+FRAMES = ("W", "E0", "E", "P0", "P", "F", "S")  # of `frame_in_base`
 
 
 @dataclass(frozen=True, eq=False)
@@ -418,6 +419,54 @@ def with_errors(cell, job, errors):
 
 
 @documented
+def draw_errors(cell, job, rng, n=10_000):
+    """Errors of all sources in many simulated cells, drawn from their covariances: they hang on nothing else.
+
+    Parameters
+    ----------
+    cell : Cell
+    job : Job
+    rng : numpy.random.Generator
+    n : int
+
+    Returns
+    -------
+    errors : dict
+        {source: array, shape (n, k)}, as `with_errors` takes them.
+    """
+    n = as_size(n, "n")
+    return {
+        name: rng.multivariate_normal(np.zeros(len(cov)), cov, n, method="svd")
+        for name, cov in source_covariances(cell, job).items()
+    }
+
+
+@documented
+def misses_by(cell, job, errors):
+    """The miss of the hole in cells with these errors; nothing is linearized.
+
+    Parameters
+    ----------
+    cell : Cell
+        Taken as the truth.
+    job : Job
+    errors : dict
+        {source: array, shape (..., k)}, as `draw_errors` draws them.
+
+    Returns
+    -------
+    misses : array, shape (..., 3), mm
+
+    Raises
+    ------
+    ValueError
+        A source that there is not, an error of another shape.
+    """
+    drawn_cell, drawn_job = with_errors(cell, job, errors)
+    return miss(cell, drawn_cell, job, drawn_job)
+
+
+@documented
 def simulate_misses(cell, job, rng, n=10_000):
     """The miss of the hole in many simulated cells, all sources drawn from their covariances; nothing is linearized.
 
@@ -433,18 +482,44 @@ def simulate_misses(cell, job, rng, n=10_000):
     -------
     misses : array, shape (n, 3), mm
     """
-    n = as_size(n, "n")
-    errors = {
-        name: rng.multivariate_normal(np.zeros(len(cov)), cov, n, method="svd")
-        for name, cov in source_covariances(cell, job).items()
-    }
-    drawn_cell, drawn_job = with_errors(cell, job, errors)
-    return miss(cell, drawn_cell, job, drawn_job)
+    return misses_by(cell, job, draw_errors(cell, job, rng, n))
+
+
+@documented
+def frame_in_base(cell, job, name):
+    """One frame of the cell as it stands in the base when the tip goes to the hole, with its covariance.
+
+    Parameters
+    ----------
+    cell : Cell
+    job : Job
+    name : {"W", "E0", "P0", "E", "P", "F", "S"}
+        W, the tracker and the part as they were learned (E0, P0) and now (E, P), the flange F, which counts as exact,
+        and the scanner S on it.
+
+    Returns
+    -------
+    T : array, shape (4, 4)
+    covariance : array, shape (6, 6)
+    """
+    if name == "W":
+        return cell.T_BW, cell.cov_BW
+    if name in ("E0", "E"):
+        return _tracker_in_base(cell, job, "first reading" if name == "E0" else "second reading")
+    if name == "P0":
+        return learned_pose(cell, job), _learned_covariance(cell, job)
+    if name == "P":
+        return part_pose(cell, job), part_covariance(cell, job)
+    T_BF = flange_at_hole(cell, job)
+    if name == "F":
+        return T_BF, np.zeros((6, 6))
+    turned = product_jacobians(T_BF, cell.T_FS)[1]
+    return T_BF @ cell.T_FS, turned @ cell.cov_FS @ turned.T
 
 
 @documented
 def frames_in_base(cell, job):
-    """Every frame of the cell as it stands in the base when the tip goes to the hole, each with its covariance.
+    """Every frame of `frame_in_base`, each with its covariance.
 
     Parameters
     ----------
@@ -454,30 +529,24 @@ def frames_in_base(cell, job):
     Returns
     -------
     frames : dict
-        {name: (T, covariance)}, shapes (4, 4) and (6, 6): W, the tracker and the part as they were learned (E0, P0) and
-        now (E, P), the flange F, which counts as exact, and the scanner S on it.
+        {name: (T, covariance)}, shapes (4, 4) and (6, 6).
     """
-    J0 = three_point_jacobian(*marks_in_base(cell, job))
-    cov = source_covariances(cell, job)
-    by_marks = {name: J0 @ J for name, J in _mark_jacobians(cell, job).items()}
-    learned = sum(error_budget(by_marks, {name: cov[name] for name in by_marks}).values())
-    T_BF = flange_at_hole(cell, job)
-    turned = product_jacobians(T_BF, cell.T_FS)[1]
-    return {
-        "W": (cell.T_BW, cell.cov_BW),
-        "E0": _tracker_in_base(cell, job.T_WE0, cov["first reading"]),
-        "E": _tracker_in_base(cell, job.T_WE1, cov["second reading"]),
-        "P0": (learned_pose(cell, job), learned),
-        "P": (part_pose(cell, job), part_covariance(cell, job)),
-        "F": (T_BF, np.zeros((6, 6))),
-        "S": (T_BF @ cell.T_FS, turned @ cell.cov_FS @ turned.T),
-    }
+    return {name: frame_in_base(cell, job, name) for name in FRAMES}
 
 
-def _tracker_in_base(cell, T_WE, cov_reading):
+def _tracker_in_base(cell, job, reading):
     """A reading of the tracker in the base, with its covariance."""
+    T_WE = job.T_WE0 if reading == "first reading" else job.T_WE1
     by_world, by_reading = product_jacobians(cell.T_BW, T_WE)
+    cov_reading = source_covariances(cell, job)[reading]
     return cell.T_BW @ T_WE, by_world @ cell.cov_BW @ by_world.T + by_reading @ cov_reading @ by_reading.T
+
+
+def _learned_covariance(cell, job):
+    """Covariance of T_BP0."""
+    J0, cov = three_point_jacobian(*marks_in_base(cell, job)), source_covariances(cell, job)
+    by_marks = {name: J0 @ J for name, J in _mark_jacobians(cell, job).items()}
+    return sum(error_budget(by_marks, {name: cov[name] for name in by_marks}).values())
 
 
 # ---- a simulated cell ------------------------------------------------------------------------------------------------

@@ -317,6 +317,21 @@ def test_simulated_cells_lie_as_the_covariance_says():
     assert result["total"] == pytest.approx(np.linalg.norm(list(result["sizes"].values())))
 
 
+@pytest.mark.parametrize("marks", ["seen by the scanner", "touched with the tip"])
+@pytest.mark.parametrize("source", wc.SPOILED)
+def test_what_is_drawn_of_the_cell_is_what_the_mathematics_gives(source, marks):
+    result = whole_cell(marks=marks, source=source, spoil=0.7)
+    used, measured = result["cell"], result["job"]
+    true = wc.cell.simulated_job((*wc.cell.FAR[:2], np.deg2rad(86.0)), touched=measured.touched)
+    np.testing.assert_allclose(result["miss"], wc.cell.miss(wc.cell.TRUTH, used, true, measured), atol=1e-9)
+    cloud = wc.cell.simulate_misses(used, measured, np.random.default_rng(62), wc.CLOUD)
+    np.testing.assert_allclose(result["cloud"], cloud, atol=1e-9)
+    frames = wc.cell.frames_in_base(used, measured)
+    R = frames["F"][0][:3, :3]
+    known = R @ used.cov_tip @ R.T if source == "tip" else frames[wc.draw.SHOWN[source]][1][3:, 3:]
+    np.testing.assert_allclose(result["known"], known, atol=1e-12)
+
+
 def test_the_failing_cell_says_that_it_misses_by_more_than_admitted():
     stage = wc.whole_cell()
     assert "Far more" not in stage.caption

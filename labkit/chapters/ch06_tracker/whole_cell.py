@@ -38,6 +38,12 @@ def _calibrated():
     return cell.calibrated_cell(np.random.default_rng(CELL_SEED))
 
 
+@functools.cache
+def _drawn():
+    """Errors of the simulated cells: they hang on how sure each source is, and not on where the part stands."""
+    return cell.draw_errors(_calibrated(), cell.simulated_job(cell.FAR), np.random.default_rng(62), CLOUD)
+
+
 def _part_now(state):
     return np.array([*state["P"][:2], np.deg2rad(state["turn"])])
 
@@ -58,11 +64,9 @@ def _source_places(of, job, T_BF):
 
 def _known(of, job, source):
     """Covariance (3, 3), mm^2, of the place at which a source shows."""
-    frames = cell.frames_in_base(of, job)
     if source == "tip":
-        R = frames["F"][0][:3, :3]
-        return R @ of.cov_tip @ R.T
-    return frames[draw.SHOWN[source]][1][3:, 3:]
+        return job.R_tool @ of.cov_tip @ job.R_tool.T
+    return cell.frame_in_base(of, job, draw.SHOWN[source])[1][3:, 3:]
 
 
 def _enlarged(T, to):
@@ -87,14 +91,14 @@ def compute_whole_cell(state):
     q, reached = inverse_kinematics(TX40, T_BF, start)
     shares = cell.miss_budget(used, measured)
     cov, part = sum(shares.values()), cell.place_on_table(*_part_now(state))
-    source = state["source"]
+    source, hole = state["source"], transform(part, cell.HOLE)
     return {
         "cell": used, "job": measured, "q": q, "reached": bool(reached), "T_BF": T_BF, "part": part,
         "turn": float(np.deg2rad(state["turn"])), "learned": cell.place_on_table(*cell.LEARNED),
         "found": _enlarged(part, cell.part_pose(used, measured)),
-        "hole": transform(part, cell.HOLE), "miss": cell.miss(cell.TRUTH, used, job, measured),
+        "hole": hole, "miss": transform(T_BF, cell.TRUTH.tip) - hole,
         "sizes": cell.sizes(shares), "total": float(np.sqrt(np.trace(cov))), "covariance": cov,
-        "cloud": cell.simulate_misses(used, measured, np.random.default_rng(62), CLOUD), "source": source,
+        "cloud": cell.misses_by(used, measured, _drawn()), "source": source,
         "spoiled": state["spoil"], "place": there[source], "known": _known(used, measured, source),
         "off": _enlarged(true[source], there[source]), "frames": there | {"part": part},
         "places": {name: T[:3, 3] for name, T in there.items()},
