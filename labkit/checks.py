@@ -12,6 +12,7 @@ LAST_ROW_TOLERANCE = 1e-6  # a product of poses in single precision passes, a tr
 COVARIANCE_TOLERANCE = 1e-6  # of the standard deviations: sums in another order pass, single precision, too
 LARGEST_COORDINATE = 1e75  # fourth powers of coordinates still fit into a float
 FEW = 500  # numbers: of fewer the sum of squares is quicker than the largest and the smallest
+MANY = 900  # numbers: of more, matrices are multiplied entry by entry over all of them sooner than one by one
 SMALLEST_POSITIVE = 1e-75  # of what is divided by, for the same reason
 LARGEST_WHOLE = 1e15  # beyond, a float does not tell one whole number from the next
 MOST = 10_000_000  # what one call makes of a kind: some hundred megabytes of poses
@@ -238,22 +239,31 @@ def _is_rigid(rows, tolerance):
 def _is_orthonormal(rows, tolerance):
     """Whether one matrix, three lists of floats, is a rotation beyond doubt: R'R within half the tolerance, det R > 0.
 
-    Nearly every matrix that is checked is one, and is seen to be one here in a sixth of the time that arrays take.
+    Nearly every matrix that is checked is one, and is seen to be one here in a tenth of the time that arrays take.
     """
+    off, det = _off_and_determinant(rows)
+    return all(abs(entry) < 0.5 * tolerance for entry in off) and det > 0  # NaN is neither
+
+
+def _are_orthonormal(R, tolerance):
+    """The same of many matrices, entry by entry over all of them."""
+    off, det = _off_and_determinant(np.moveaxis(R, (-2, -1), (0, 1)))
+    return np.abs(off).max() < 0.5 * tolerance and det.min() > 0
+
+
+def _off_and_determinant(rows):
+    """Entries of R'R - I, and det R."""
     (a, b, c), (d, e, f), (g, h, i) = rows
-    half = 0.5 * tolerance
-    return (  # NaN fulfils none of these
-        abs(a * a + d * d + g * g - 1) < half
-        and abs(b * b + e * e + h * h - 1) < half
-        and abs(c * c + f * f + i * i - 1) < half
-        and abs(a * b + d * e + g * h) < half
-        and abs(a * c + d * f + g * i) < half
-        and abs(b * c + e * f + h * i) < half
-        and a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0
-    )
+    off = (
+        a * a + d * d + g * g - 1, b * b + e * e + h * h - 1, c * c + f * f + i * i - 1,
+        a * b + d * e + g * h, a * c + d * f + g * i, b * c + e * f + h * i,
+    )  # fmt: skip
+    return off, a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
 
 
 def _refuse_sheared(R, name, tolerance):
+    if R.size > MANY and _are_orthonormal(R, tolerance):
+        return
     error = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(initial=0.0)
     if error > tolerance:
         raise ValueError(
