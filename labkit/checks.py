@@ -160,6 +160,8 @@ def as_number(value, name):
 
 def as_positive_number(value, name):
     """`value` as one positive finite float."""
+    if isinstance(value, float) and SMALLEST_POSITIVE <= value <= LARGEST_COORDINATE:
+        return float(value)
     return float(as_positive(as_shape(value, name), name))
 
 

@@ -448,23 +448,23 @@ def solve_pose_graph(edges, measured, std_rot, std_trans):
     pairs, Z = _as_graph(edges, measured)
     stds = [as_positive_number(std_rot, "std_rot"), as_positive_number(std_trans, "std_trans")]
     weight = np.repeat(1 / np.array(stds), 3)
-    start = _spanning_poses(pairs, Z)
+    start, Z_inverse = _spanning_poses(pairs, Z), invert(Z)
 
     def poses(x):
         return np.concatenate([start[:1], start[1:] @ exp_se3(x.reshape(-1, 6))])
 
     def weighted_residuals(x):
-        return (_graph_residuals(poses(x), pairs, Z) * weight).ravel()
+        return (_graph_residuals(poses(x), pairs, Z_inverse) * weight).ravel()
 
     def jacobian(x):
-        return _graph_jacobian(poses(x), x, pairs, Z, weight)
+        return _graph_jacobian(poses(x), x, pairs, Z_inverse, weight)
 
     zero = np.zeros(6 * (len(start) - 1))
     fit = least_squares(weighted_residuals, zero, jac=jacobian, method="lm", x_scale="jac")
     X, dof = poses(fit.x), 6 * (len(Z) - len(start) + 1)
-    J = _graph_jacobian(X, zero, pairs, Z, weight)
+    J = _graph_jacobian(X, zero, pairs, Z_inverse, weight)
     values = np.linalg.svd(J, compute_uv=False)
-    return PoseGraph(X, _graph_residuals(X, pairs, Z), 2 * fit.cost, dof, np.linalg.inv(J.T @ J), values)
+    return PoseGraph(X, _graph_residuals(X, pairs, Z_inverse), 2 * fit.cost, dof, np.linalg.inv(J.T @ J), values)
 
 
 def _as_graph(edges, measured):
@@ -478,22 +478,22 @@ def _as_graph(edges, measured):
     return pairs.astype(int), Z
 
 
-def _graph_residuals(X, pairs, Z):
+def _graph_residuals(X, pairs, Z_inverse):
     """log(Z^-1 X_i^-1 X_j) of every link from i to j, (m, 6)."""
     i, j = pairs.T
-    return log_se3(invert(Z) @ relative(X[i], X[j]))
+    return log_se3(Z_inverse @ relative(X[i], X[j]))
 
 
-def _graph_jacobian(X, x, pairs, Z, weight):
+def _graph_jacobian(X, x, pairs, Z_inverse, weight):
     """Weighted Jacobian of the residuals to the steps x from the start that led to X, (6m, 6n - 6); node 0 is held."""
     steps = np.concatenate([np.zeros((1, 6)), x.reshape(-1, 6)])
     i, j = pairs.T
     between = relative(X[i], X[j])
-    outer = weight[:, None] * _right_jacobian_inverse(log_se3(invert(Z) @ between))
-    J, m = np.zeros((len(Z), 6, len(X), 6)), np.arange(len(Z))
+    outer = weight[:, None] * _right_jacobian_inverse(log_se3(Z_inverse @ between))
+    J, m = np.zeros((len(pairs), 6, len(X), 6)), np.arange(len(pairs))
     J[m, :, j] += outer @ _right_jacobian(steps[j])
     J[m, :, i] -= outer @ adjoint(invert(between)) @ _right_jacobian(steps[i])
-    return J[:, :, 1:].reshape(6 * len(Z), -1)
+    return J[:, :, 1:].reshape(6 * len(pairs), -1)
 
 
 def _ad(xi):

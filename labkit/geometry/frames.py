@@ -362,8 +362,8 @@ def matrix_from_kuka(xyzabc):
     T : array, shape (..., 4, 4)
     """
     xyzabc = as_points(xyzabc, "xyzabc", dim=6)
-    ca, cb, cc = np.moveaxis(np.cos(xyzabc[..., 3:]), -1, 0)
-    sa, sb, sc = np.moveaxis(np.sin(xyzabc[..., 3:]), -1, 0)
+    a, b, c = xyzabc[..., 3], xyzabc[..., 4], xyzabc[..., 5]
+    ca, cb, cc, sa, sb, sc = np.cos(a), np.cos(b), np.cos(c), np.sin(a), np.sin(b), np.sin(c)
     T = np.zeros((*xyzabc.shape[:-1], 4, 4))
     T[..., 0, 0], T[..., 0, 1], T[..., 0, 2] = ca * cb, ca * sb * sc - sa * cc, ca * sb * cc + sa * sc
     T[..., 1, 0], T[..., 1, 1], T[..., 1, 2] = sa * cb, sa * sb * sc + ca * cc, sa * sb * cc - ca * sc

@@ -36,7 +36,10 @@ def _coefficients(theta_squared):
 
 def exp_so3(phi):
     """Rotation matrix of the rotation vector phi (rad), Rodrigues' formula; (..., 3) -> (..., 3, 3)."""
-    phi = as_points(phi, "phi")
+    return _exp_so3(as_points(phi, "phi"))
+
+
+def _exp_so3(phi):
     S = _skew(phi)
     a, b, _ = _coefficients((phi**2).sum(-1))
     return np.eye(3) + a * S + b * (S @ S)
@@ -47,7 +50,10 @@ def log_so3(R):
 
     Accurate over the whole range: near pi, where R - R' vanishes, the axis is read from the symmetric part.
     """
-    R = as_rotations(R, "R", PRODUCT_TOLERANCE)
+    return _log_so3(as_rotations(R, "R", PRODUCT_TOLERANCE))
+
+
+def _log_so3(R):
     w = 0.5 * np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1)
     sin = np.linalg.norm(w, axis=-1)
     cos = 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1)
@@ -71,7 +77,10 @@ def _log_near_pi(R, w, angle):
 
 def left_jacobian_so3(phi):
     """V(phi) with exp(phi + d) = exp(V(phi) d) exp(phi) to first order; (..., 3) -> (..., 3, 3)."""
-    phi = as_points(phi, "phi")
+    return _left_jacobian_so3(as_points(phi, "phi"))
+
+
+def _left_jacobian_so3(phi):
     S = _skew(phi)
     _, b, c = _coefficients((phi**2).sum(-1))
     return np.eye(3) + b * S + c * (S @ S)
@@ -81,8 +90,8 @@ def exp_se3(xi):
     """Rigid transform of the twist xi = (phi, rho); (..., 6) -> (..., 4, 4)."""
     xi = as_points(xi, "xi", dim=6)
     T = np.zeros((*xi.shape[:-1], 4, 4))
-    T[..., :3, :3] = exp_so3(xi[..., :3])
-    T[..., :3, 3] = (left_jacobian_so3(xi[..., :3]) @ xi[..., 3:, None])[..., 0]
+    T[..., :3, :3] = _exp_so3(xi[..., :3])
+    T[..., :3, 3] = (_left_jacobian_so3(xi[..., :3]) @ xi[..., 3:, None])[..., 0]
     T[..., 3, 3] = 1.0
     return T
 
@@ -90,8 +99,8 @@ def exp_se3(xi):
 def log_se3(T):
     """Twist xi = (phi, rho) of the rigid transform T; (..., 4, 4) -> (..., 6)."""
     T = as_transforms(T, "T", PRODUCT_TOLERANCE)
-    phi = log_so3(T[..., :3, :3])
-    rho = np.linalg.solve(left_jacobian_so3(phi), T[..., :3, 3, None])[..., 0]
+    phi = _log_so3(T[..., :3, :3])
+    rho = np.linalg.solve(_left_jacobian_so3(phi), T[..., :3, 3, None])[..., 0]
     return np.concatenate([phi, rho], axis=-1)
 
 

@@ -644,12 +644,14 @@ def _frozen(array):
     return array
 
 
+@dataclass
+class _Event:
+    """What `Axes.in_axes` asks for, in pixels."""
+
+    x: float
+    y: float
+
+
 def _at(picture, fraction):
-    """What `Axes.in_axes` asks for: an event with pixel coordinates."""
-
-    @dataclass
-    class Event:
-        x: float
-        y: float
-
-    return Event(fraction[0] * picture.fig.bbox.width, (1 - fraction[1]) * picture.fig.bbox.height)
+    """A fraction of the picture as an event."""
+    return _Event(fraction[0] * picture.fig.bbox.width, (1 - fraction[1]) * picture.fig.bbox.height)

@@ -68,6 +68,22 @@ def test_near_the_place_the_curve_is_its_tangent_then_it_bends_or_breaks_into_st
     assert abs(off[0]) > 0.1 and len(np.unique(broken)) < 15
 
 
+def test_one_residual_at_many_steps_is_that_of_all_residuals_at_each():
+    residual, exact, one, slope = w._turned()
+    A = np.array([-0.3, 0.0, 1e-9, 2.0])
+    everything = np.array([residual([a]) for a in A])
+    number = np.argmin(np.abs(everything - one(A)[:, None]).max(0))
+    np.testing.assert_array_equal(everything[:, number], one(A))
+    assert exact[number] == slope
+
+
+def test_poses_in_which_nothing_is_undone_share_one_fit():
+    w._edited_fit.cache_clear()
+    for pose in (3, 7, 20):
+        w.compute_poses({"click": np.array([pose, 0.0]), "slip": 0, "others": False, "fit": "robust"})
+    assert w._edited_fit.cache_info().misses == 1
+
+
 def test_the_ring_of_the_step_stands_on_the_curve_and_has_a_slider():
     stage = w.difference_steps()
     stage.set(P=(-3.0, 5.0))

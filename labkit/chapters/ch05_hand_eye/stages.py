@@ -249,27 +249,39 @@ AROUND = np.linspace(-1.5, 1.5, 61)  # steps to each side
 
 @functools.cache
 def _turned():
-    """(residual, exact, k): all residuals (mm) of the corrected poses as a function of A (deg) away from the thesis's
-    end pose, their derivatives there (mm per deg), (n,), and the number of one that answers well and bends most.
+    """(residual, exact, one, slope): all residuals (mm) of the corrected poses as a function of A (deg) away from the
+    thesis's end pose, their derivatives there (mm per deg), (n,); one that answers well and bends most as a function
+    of many A, and its derivative.
     """
     measured, target = thesis.measurements(True), thesis.printed_target()
+    T_BF, x_S = measured.T_BF, measured.x_S
     p = thesis.kuka_pose_deg("scanner_end")
     unit = np.array([1, 1, 1, *np.deg2rad([1, 1, 1])])
-    exact = hand_eye.kuka_jacobian(p * unit, measured.T_BF, measured.x_S)[:, 3] * unit[3]
+    exact = hand_eye.kuka_jacobian(p * unit, T_BF, x_S)[:, 3] * unit[3]
+
+    def turned(A):
+        q = np.tile(p, (len(A), 1))
+        q[:, 3] += A
+        return q * unit
 
     def residual(A):
-        q = p.copy()
-        q[3] += A[0]
-        return hand_eye.kuka_residuals(q * unit, measured.T_BF, measured.x_S, target)
+        return hand_eye.kuka_residuals(turned(A)[0], T_BF, x_S, target)
 
     bend = np.abs(residual([10.0]) + residual([-10.0]) - 2 * residual([0.0]))
-    return residual, exact, int(np.argmax(np.where(np.abs(exact) > np.abs(exact).max() / 2, bend, 0)))
+    number = int(np.argmax(np.where(np.abs(exact) > np.abs(exact).max() / 2, bend, 0)))
+    k, axis = divmod(number, 3)
+
+    def one(A):
+        T_FS = frames.matrix_from_kuka(turned(A))
+        return hand_eye.sphere_residuals(T_BF[k], x_S[k], T_FS, target)[:, axis]
+
+    return residual, exact, one, exact[number]
 
 
 @functools.cache
 def _step_errors():
     """Largest error (mm per deg) of forward and central differences by A at the thesis's end pose, over STEPS_DEG."""
-    residual, exact, _ = _turned()
+    residual, exact, *_ = _turned()
     errors = {}
     for scheme in ("forward", "central"):
         found = [numeric_jacobian(residual, np.zeros(1), h, scheme)[:, 0] for h in STEPS_DEG]
@@ -284,9 +296,9 @@ def compute_steps(state):
     errors, h = _step_errors(), state["h"]
     at = {k: float(np.exp(np.interp(np.log(h), np.log(STEPS_DEG), np.log(e)))) for k, e in errors.items()}
     best = {k: float(STEPS_DEG[np.argmin(e)]) for k, e in errors.items()}
-    residual, exact, k = _turned()
-    values = np.array([residual([share * h])[k] for share in AROUND])
-    return {"h": h, "at": at, "best": best, "curve": (values - values[len(AROUND) // 2]) / (exact[k] * h)}
+    *_, one, slope = _turned()
+    values = one(AROUND * h)
+    return {"h": h, "at": at, "best": best, "curve": (values - values[len(AROUND) // 2]) / (slope * h)}
 
 
 def difference_steps():
@@ -554,32 +566,38 @@ def _reference_fit():
     return calibrate_sphere_target(measured.T_BF, measured.x_S, robust=True)
 
 
-def _edited(pose, slip, others):
-    """Measurements with the poses in `others` corrected and one slip undone in the chosen pose."""
-    measured = thesis.measurements(others)
-    kuka, x_S = measured.kuka_deg.copy(), measured.x_S.copy()
-    printed = thesis.measurements()
-    kuka[pose - 1], x_S[pose - 1] = printed.kuka_deg[pose - 1], printed.x_S[pose - 1]
+def _edited(fixed, slip):
+    """Measurements with the poses in `fixed` corrected and one slip undone, if any."""
+    measured = thesis.measurements(fixed)
+    kuka, x_S = measured.kuka_deg, measured.x_S
     if slip:
         e = slip
         table, columns = (kuka, thesis.POSE_COLUMNS) if e.table == "C14" else (x_S, thesis.CENTER_COLUMNS)
-        table[pose - 1, columns.index(e.column)] = float(e.corrected)
+        table[e.pose - 1, columns.index(e.column)] = float(e.corrected)
     return frames.matrix_from_kuka(frames.kuka_from_degrees(kuka)), x_S
 
 
 @functools.lru_cache(maxsize=256)
-def _pose_fit(pose, slip, others, fit):
-    """Residuals (31, 3) in B, scanner, target and the edited poses for one choice of everything."""
-    slips = _explained()[pose - 1]
-    chosen = slips[slip - 1] if 0 < slip <= len(slips) else None
-    fixed = tuple(row["pose"] for row in thesis.corrections()) if others else ()
-    T_BF, x_S = _edited(pose, chosen, fixed)
+def _edited_fit(fixed, slip, fit):
+    """Residuals (31, 3) in B, scanner, target and the poses that `_edited` gives."""
+    T_BF, x_S = _edited(fixed, slip)
     if fit == "end pose":
         T_FS, target = thesis.frame("scanner_end"), thesis.printed_target()
     else:
         found = calibrate_sphere_target(T_BF, x_S, robust=fit == "robust")
         T_FS, target = found.T_FS, found.target
-    return hand_eye.sphere_residuals(T_BF, x_S, T_FS, target), T_FS, target, T_BF, x_S, chosen, len(slips)
+    return hand_eye.sphere_residuals(T_BF, x_S, T_FS, target), T_FS, target, T_BF, x_S
+
+
+def _pose_fit(pose, slip, others, fit):
+    """What `_edited_fit` gives, the slip that is undone in the chosen pose, and how many would explain it.
+
+    The chosen pose stays as printed but for that slip; where nothing in it is undone, many poses share one fit.
+    """
+    slips = _explained()[pose - 1]
+    chosen = slips[slip - 1] if 0 < slip <= len(slips) else None
+    fixed = {row["pose"] for row in thesis.corrections()} - {pose} if others else ()
+    return *_edited_fit(tuple(sorted(fixed)), chosen, fit), chosen, len(slips)
 
 
 def compute_poses(state):
