@@ -337,11 +337,19 @@ class Screen {
     }, { rootMargin: AROUND, scrollMargin: AROUND });
     this.watch.observe(place);
     this.print = () => this.come(true);
+    this.printed = () => { this.watch.unobserve(place); this.watch.observe(place); }; // it says anew where the picture is
     window.addEventListener("beforeprint", this.print);
+    window.addEventListener("afterprint", this.printed);
+    this.jump = () => { // into sight at once, a frame before the observer says so
+      const { width, top, bottom } = place.getBoundingClientRect();
+      if (width && bottom > 0 && top < window.innerHeight) this.come(true);
+    };
   }
 
   come(near) {
     this.near = near;
+    if (near) document.removeEventListener("scroll", this.jump, true);
+    else document.addEventListener("scroll", this.jump, { capture: true, passive: true }); // of whatever scrolls
     if (near) this.put();
     else if (this.image) Object.assign(this.canvas, { width: 1, height: 1 });
   }
@@ -418,6 +426,8 @@ class Screen {
   close() {
     this.watch.disconnect();
     window.removeEventListener("beforeprint", this.print);
+    window.removeEventListener("afterprint", this.printed);
+    document.removeEventListener("scroll", this.jump, true);
   }
 }
 

@@ -296,6 +296,16 @@ def test_a_picture_far_from_the_window_gives_its_pixels_back_and_goes_on_all_the
         assert canvas.evaluate("node => node.width") == 1
         page.evaluate("document.body.style.marginTop = 0")
         assert driver.soon(page, lambda: canvas.evaluate(SMALL) == failed)
+        page.evaluate("document.body.style.marginTop = '6000px'")
+        page.wait_for_function("document.querySelector('.labkit-stage canvas').width === 1")
+        jumped = "scrollTo(0, 1e6); await new Promise(requestAnimationFrame); return node.width; }"
+        assert canvas.evaluate(f"async (node) => {{ {jumped}") > 1  # in the very frame: nothing flashes
+        page.evaluate("scrollTo(0, 0)")
+        page.wait_for_function("document.querySelector('.labkit-stage canvas').width === 1")
+        page.evaluate("dispatchEvent(new Event('beforeprint'))")
+        assert canvas.evaluate("node => node.width") > 1
+        page.evaluate("dispatchEvent(new Event('afterprint'))")
+        page.wait_for_function("document.querySelector('.labkit-stage canvas').width === 1")
         assert page.complaints == []
 
 
