@@ -333,7 +333,7 @@ class Screen {
     Object.assign(this, { show, lost, queue: [], decoding: false, image: null, number: 0, near: true });
     this.watch = new IntersectionObserver((entries) => {
       const { isIntersecting, boundingClientRect: { width } } = entries[entries.length - 1];
-      if (width) this.come(isIntersecting); // without a width it is hidden, and may be shown at any moment
+      if (width || isIntersecting) this.come(isIntersecting); // without a width it is hidden, and may be shown at any moment
     }, { rootMargin: AROUND, scrollMargin: AROUND });
     this.watch.observe(place);
     this.print = () => this.come(true);
@@ -342,8 +342,10 @@ class Screen {
     window.addEventListener("afterprint", this.printed);
     this.jump = () => { // into sight at once, a frame before the observer says so
       const { width, top, bottom } = place.getBoundingClientRect();
-      if (width && bottom > 0 && top < window.innerHeight) this.come(true);
+      if (!this.near && width && bottom > 0 && top < window.innerHeight) this.come(true);
     };
+    this.sizing = new ResizeObserver(this.jump); // a notebook that takes cells out of the page puts this one back
+    this.sizing.observe(place);
   }
 
   come(near) {
@@ -425,6 +427,7 @@ class Screen {
 
   close() {
     this.watch.disconnect();
+    this.sizing.disconnect();
     window.removeEventListener("beforeprint", this.print);
     window.removeEventListener("afterprint", this.printed);
     document.removeEventListener("scroll", this.jump, true);

@@ -306,6 +306,10 @@ def test_a_picture_far_from_the_window_gives_its_pixels_back_and_goes_on_all_the
         assert canvas.evaluate("node => node.width") > 1
         page.evaluate("dispatchEvent(new Event('afterprint'))")
         page.wait_for_function("document.querySelector('.labkit-stage canvas').width === 1")
+        page.evaluate("document.body.style.marginTop = 0; document.body.style.width = 0")  # put back before it has room
+        page.wait_for_timeout(200)
+        page.evaluate("document.body.style.width = ''")
+        assert driver.soon(page, lambda: canvas.evaluate("node => node.width") > 1)
         assert page.complaints == []
 
 
