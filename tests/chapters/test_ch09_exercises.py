@@ -332,11 +332,11 @@ def in_steps_of_two_cells(grid, pose, bearing, r_max):
     return hits[0] if len(hits) else r_max
 
 
-def walked(first, step):
-    """A ray from this far on, in steps of this length."""
+def walked(first, step, share=1.0):
+    """A ray from this far on, in steps of this length, to this share of r_max."""
 
     def answer(grid, pose, bearing, r_max):
-        a, r = pose[2] + bearing, np.arange(first, r_max, step or grid.resolution / 4)
+        a, r = pose[2] + bearing, np.arange(first, share * r_max, step or grid.resolution / 4)
         hits = r[grid.at(pose[:2] + r[:, None] * [np.cos(a), np.sin(a)]) == maps.OCCUPIED]
         return hits[0] if len(hits) else r_max
 
@@ -445,10 +445,11 @@ PASSED_BEFORE = [
     ("resample_roulette", one_too_high, "the share of the one before it"),
     ("sample_motion", after_the_step, "along x of the map"),
     ("sample_motion", from_one_to_the_next, "like that of the one before"),
-    ("log_sum_exp", around_the_mean, "took out the mean"),
+    ("log_sum_exp", around_the_mean, "1000 below the largest"),
     ("cast_ray", in_steps_along_x, "`sign` is too much"),
     ("cast_ray", in_steps_of_two_cells, "`2 * grid.resolution`"),
     ("cast_ray", walked(1.0, None), "begin farther out"),
+    ("cast_ray", walked(0.0, None, share=0.9), "a little before r_max"),
     ("cast_ray", walked(0.0, 0.05), "typed in"),
     ("resample_roulette", one_too_low, "one too low"),
     ("resample_roulette", drawn_by(np.square), "squares of the weights"),

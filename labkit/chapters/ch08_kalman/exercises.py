@@ -1315,7 +1315,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a: np.fmod(a + np.pi, 2 * np.pi) - np.pi,
-                    "np.fmod keeps the sign of its argument, so that negative angles end below -pi. The operator `%` does not.",
+                    "np.fmod and int() cut off toward zero, so that negative angles end below -pi. The operator `%` does not.",
+                    id="wrap_angle-97beb8",
                 ),
                 Mistake(
                     lambda a: np.fmod(a, 2 * np.pi),

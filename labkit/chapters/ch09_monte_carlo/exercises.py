@@ -140,6 +140,14 @@ def short_ray(rng):
     return grid, pose, bearing, 0.6 * maps.walk_ray(grid, pose, bearing, r_max)
 
 
+def ray_that_just_arrives(rng):
+    """The same with an r_max a little behind the wall."""
+    while True:
+        grid, pose, bearing, r_max = plain_ray(rng)
+        if (r := maps.walk_ray(grid, pose, bearing, r_max)) > 3.5:
+            return grid, pose, bearing, r + rng.uniform(0.25, 0.35)
+
+
 def ray_past_the_unknown(rng):
     """A ray that crosses cells that nobody has seen before it meets a wall; they are no obstacle that is known."""
     cells, start = np.full((60, 60), maps.FREE), rng.uniform(1.0, 1.5)
@@ -1598,7 +1606,8 @@ CHAPTER = Chapter(
                 Mistake(lambda l: float(np.logaddexp.reduce(l[np.isfinite(l)][:2])), "You summed the first two only."),
                 Mistake(
                     _around_the_mean,
-                    "You took out the mean. The largest logarithm may lie 1000 above it, and exp(1000) is infinite: take out the largest.",
+                    "What you took out (the mean, or the first?) may lie 1000 below the largest logarithm, and exp(1000) is infinite: take out the largest.",
+                    id="log_sum_exp-80675b",
                 ),
                 *(
                     Mistake(
@@ -1626,6 +1635,11 @@ CHAPTER = Chapter(
                     metrics.Numbers(0.16, "m", absolute=True),
                     "Right on other rays, but not on one nearly along y to a wall of one cell (is a step longer than a cell, or does it "
                     "get longer there?):",
+                ),
+                (
+                    ray_that_just_arrives,
+                    metrics.Numbers(0.16, "m", absolute=True),
+                    "Right on other rays, but not on one that meets a wall a little before r_max:",
                 ),
                 (
                     ray_to_a_wall_close_by,
