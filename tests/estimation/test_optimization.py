@@ -535,3 +535,11 @@ def test_the_exact_step_depends_on_no_unit_and_stays_inside_where_it_is_hard(uni
         rest = max(-0.5 / (1 + 2), -radius)  # (B + 2) step = -g across, and the rim along
         np.testing.assert_allclose(np.abs(step), [np.sqrt(radius**2 - rest**2), -rest], rtol=1e-6)
         assert step[0] * tilt <= 0  # down
+
+
+@pytest.mark.parametrize(("bits", "converged"), [(7.6, True), (8.4, False)])
+def test_arrived_means_that_no_more_than_eight_bits_of_the_cost_are_promised(bits, converged):
+    """The whole Newton step of a quadratic promises half g^2 / B."""
+    g = np.sqrt(2 * bits * np.finfo(float).eps * 3.0 * 5.0)
+    point = SimpleNamespace(x=np.array([1.0]), cost=5.0, gradient=np.array([g]), curvature=np.array([[3.0]]))
+    assert opt._stuck(point, np.array([1e-17]))[1] is converged
