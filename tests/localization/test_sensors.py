@@ -13,6 +13,7 @@ from labkit.localization import particles as pt
 from labkit.localization.maps import OccupancyGrid
 from labkit.localization.sensors import (
     SENSORS,
+    XTION,
     LikelihoodField,
     Scanner,
     beam_density,
@@ -254,3 +255,9 @@ def test_doors_are_seen_from_any_number_of_places():
     places = np.array([[1.0, 2.5], [4.1, 8.8], [20.0, 3.9]])
     expected = [[float(weigh(x)) for x in row] for row in places]
     np.testing.assert_allclose(weigh(places), expected)
+
+
+def test_the_camera_of_the_lecture_divides_its_view_into_640():
+    degrees = np.rad2deg(XTION.bearings)
+    np.testing.assert_allclose(degrees[[0, -1]], [-29.0, 29.0])
+    np.testing.assert_allclose(np.diff(degrees), 58.0 / 640)

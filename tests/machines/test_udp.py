@@ -260,3 +260,12 @@ def test_readings_from_before_the_memory_are_stale_until_there_are_fifty_in_a_ro
         receiver.take(packet_at(k / 250))
     seen = receiver.statistics()
     assert (seen.restarts, seen.stale, seen.good) == (0, 2 * (udp.RESTART - 1), udp.MEMORY + 1)
+
+
+def test_a_sender_keeps_the_time_of_its_stream():
+    """0.3 s of it at three times its speed; beside load it may take longer, never less."""
+    with udp.listen() as listener:
+        started = time.perf_counter()
+        with udp.Sender([(0.0, b"a", "good"), (0.3, b"b", "good")], listener.port, speed=3) as sender:
+            assert sender.finished.wait(10)
+        assert time.perf_counter() - started >= 0.099
