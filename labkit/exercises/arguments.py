@@ -6,10 +6,12 @@ angle in degrees, the last row left out, the notebook's data in place of what wa
 """
 
 import itertools
+import re
 
 import numpy as np
 
 LONGEST = 6  # entries of a vector that are changed one by one
+SIZES = re.compile(r"converted to|twice|half|squared|the root|` times `|divided by")  # changes of how large a number is
 
 
 def changes(names, inputs, notebook):

@@ -35,6 +35,7 @@ LIKE_CHANCE = 8  # draws on which a choice must stay as it is, so that this is n
 LISTED = 9  # entries of a wrong array of which those that are right are listed
 SHOWN = 4  # entries of a set or vector that is shown whole
 MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried, to tell on which
+SELDOM = 0.2  # of the draws come out right where no case is special, but one comes out by chance
 MORE_CASES = 8  # on which an explanation from the first draws is tried once more, at least ...
 MOST_CASES = 64  # ... and at most, as far as LOOKING allows: of one in fifty draws a coincidence may hide
 LOOKING = 1.2  # seconds of processor time, from the beginning of a check, in which an explanation is looked for
@@ -286,7 +287,7 @@ class _Trial:
         words = words or (not self.refusal and step) or (not shape and (unmoved or self._one_change()))
         if words:
             return self.outcome(NOT_YET, _closed(words) + self._about_globals())
-        if search and not step and not self._right_somewhere():
+        if search and not step and not self._right_often():
             step = search.partly_words() or search.given_words(solution)
         if self.refusal:
             words = shape or (f" {step[0].upper()}{_closed(step[1:])}" if step else "")
@@ -365,6 +366,8 @@ class _Trial:
         reference = self.exercise.reference
         if self._is_always_the_same():
             return None
+        if all(isinstance(expected, str | bool | set | frozenset) for _, expected in self.pairs):
+            tried = (pair for pair in tried if not arguments.SIZES.search(pair[0]))  # another size would do as well
         told = ((words, change) for words, change in tried if self._is_felt(change))
         words = self._first_that_fits((words, lambda *args, c=change: reference(*c(args))) for words, change in told)
         return words and f"your result is what comes out {words}"
@@ -463,6 +466,11 @@ class _Trial:
         """Whether some plain draws come out right, and not by chance: then these are what is to be told."""
         metric = self.exercise.metric
         return not self.refusal and not self._is_choice() and any(metric.equal(*pair) for pair in self._plain_pairs())
+
+    def _right_often(self):
+        """Whether so many plain draws come out right that what the others have in common says more than a step does."""
+        right = [self.exercise.metric.equal(*pair) for pair in self._plain_pairs()] if self._right_somewhere() else []
+        return sum(right) > SELDOM * len(right)
 
     def _search(self):
         """What looks for the step of the student's own code at which it goes wrong; None where it cannot be read."""

@@ -353,6 +353,21 @@ def half_unit(printed):
 OF_THE_FLOAT = "def half_unit(printed):\n    return 0.5 * np.spacing(float(printed.replace(',', '.')))"
 ONE_SHARE = "def left_out(r, J):\n    return r / (1 - max(np.diag(J @ np.linalg.pinv(J))))"
 SHRINKING = "def with_one_more(C, J):\n    return np.linalg.inv(np.eye(len(C)) + C @ J.T @ J)"
+SMALLEST_NORM = """
+def next_pose(C, candidates):
+    return min(range(len(candidates)), key=lambda k: np.linalg.norm(np.linalg.inv(
+        np.linalg.inv(C) + candidates[k].T @ candidates[k])))
+"""
+TYPED_HALVES = """
+def bound(f, printed):
+    x = np.array([float(text.replace(",", ".")) for text in printed])
+    found = 0.0
+    for k, text in enumerate(printed):
+        step = np.zeros(len(x))
+        step[k] = 0.05 if abs(x[k]) > 1 else 0.005
+        found += max(abs(f(x + step) - f(x)), abs(f(x - step) - f(x)))
+    return found
+"""
 ALL_WITH_ALL = """
 def motions(F, S):
     inv = np.linalg.inv
@@ -368,6 +383,14 @@ def motions(F, S):
         (ledger, "half_unit", OF_THE_FLOAT, "too small on every draw"),
         (own, "left_out", ONE_SHARE, "the largest share for all"),
         (own, "with_one_more", SHRINKING, "(I - K J) C"),
+        (own, "next_pose", SMALLEST_NORM, "of the smallest norm"),
+        (ledger, "bound", TYPED_HALVES, "this value is not right"),
+        (
+            ledger,
+            "status",
+            STATUS.replace("bound", "bound / 2").replace("value, bound / 2,", "value, bound,"),
+            "bound / 2",
+        ),
         (own, "motions", ALL_WITH_ALL, "as `np.dot` gives them"),
     ],
 )

@@ -300,6 +300,10 @@ def _smallest_trace(C, candidates):
     return int(np.argmin(np.trace(_left(C, candidates), axis1=1, axis2=2)))
 
 
+def _smallest_norm(C, candidates):
+    return int(np.argmin(np.linalg.norm(_left(C, candidates), axis=(1, 2))))
+
+
 def _largest_derivative(C, candidates):
     return int(np.argmax((candidates**2).sum((1, 2))))
 
@@ -767,8 +771,8 @@ CHAPTER = Chapter(
                 "return int(np.argmin(left))`",
             ),
             mistakes=[
-                *(Mistake(rule, "Your choice is that of the smallest trace, or of the smallest largest eigenvalue. Among squares of different units the largest unit decides alone: compare determinants.")
-                  for rule in (_smallest_trace, _largest_eigenvalue)),
+                *(Mistake(rule, "Your choice is that of the smallest trace, of the smallest norm, or of the smallest largest eigenvalue. Among squares of different units the largest unit decides alone: compare determinants.")
+                  for rule in (_smallest_trace, _smallest_norm, _largest_eigenvalue)),
                 Mistake(lambda C, c: next_pose(C, c) * int(_volumes(C, c).min() < 1),
                         "Right where a determinant is below 1, else the first one: does your search begin with the number 1? Begin with infinity, or with the first candidate's own."),
                 Mistake(lambda C, c: next_pose(C, c) if _volumes(C, c).min() < 1 else None,
