@@ -41,6 +41,7 @@ function getSpace() {
 class Wall {
   constructor(program) {
     this.cards = program.cards;
+    this.shown = program.now; // where the one left it who opens the page again
     this.titles = program.titles;
     this.pictures = new Set(program.pictures);
     Object.assign(this, { card: null, now: null, takeDown: null, hearers: new Set(), digits: "", begun: performance.now() });
@@ -69,7 +70,7 @@ class Wall {
 
   first() {
     const key = keyOfAddress();
-    return this.byKey(key) || key ? key : this.cards[0].key;
+    return key || this.shown;
   }
 
   byKey(key) {

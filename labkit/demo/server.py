@@ -133,6 +133,7 @@ class Program(Own):
             "titles": program.titles,
             "pictures": [card.key for card in program.cards if self.application.picture(card)],
             "voting": self.session.room is not None,
+            "now": self.session.now,
         })  # fmt: skip
 
 
