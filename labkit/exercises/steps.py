@@ -179,7 +179,24 @@ class Search:
         if plan is None:
             return None
         _, line, code, mends = changes[self._left_out_instead(plan[1])]
-        return f"in line {line}, `{code}`: {mends}. {ALONE}"
+        return self._weight_words(line, mends) or f"in line {line}, `{code}`: {mends}. {ALONE}"
+
+    def _weight_words(self, line, mends):
+        """What a line binds, where a change of it mends only because that is 1 everywhere then, or as good as 1."""
+        if not mends.endswith((TOO_MANY, "is too much")):
+            return None
+        for k, (at, *_) in enumerate(self.written.places):
+            if at != line or not self._binds(k) or not all(values[k][0] for values in self.values):
+                continue
+            drawn = [values[k][1] for values in self.values]
+            ones = ([("given", k, list(np.ones_like(value)))] for value in drawn)
+            fits = (
+                self.written.results(plans, case.args, self.budget.left(), case.keep)
+                for plans, case in zip(ones, self.cases)
+            )
+            if any(np.ptp(value) for value in drawn) and all(fit == [True] for fit in fits):
+                return f"{self._where(k)}: with 1 everywhere in its place, your result is right, so it is not needed."
+        return None
 
     def _may_be_said(self, mends):
         """Whether a change is about something that the function has to do with: degrees are of angles alone, and how
@@ -355,7 +372,11 @@ class Search:
         """The smallest part whose value, taken from the solution, mends the result; and how the two differ."""
         if solution is None:
             return None
-        plan = self.mending([("given", k, q) for k, q in self._given(solution)], solution.values)
+        given = [("given", k, q) for k, q in self._given(solution)]
+        plan = self.mending(given, solution.values)
+        if plan is not None:  # what is read there may be wrong since a line that binds something
+            before = [p for p in given if p[1] < plan[1] and self._binds(p[1])]
+            plan = self.mending(sorted(before, key=lambda p: p[1]), solution.values) or plan
         return plan and self._compared(*plan[1:], solution)
 
     def _given(self, solution):
@@ -383,6 +404,11 @@ class Search:
     def _are_rows(self, k):
         """Whether a value is, round by round, the rows of the result."""
         return all(r is not None and v[k][0] > 1 and _same(v[k][1], r) for v, r in zip(self.values, self.results))
+
+    def _binds(self, k):
+        """Whether a value is bound to one name there."""
+        _, code, name, *_ = self.written.places[k]
+        return bool(name) and code.startswith(f"{name} =")
 
     def _could_be(self, pairs):
         """Whether values of the solution can take the place of the student's, and are others where that is wrong."""

@@ -260,3 +260,11 @@ def test_a_null_vector_whose_sign_is_left_to_chance_is_named(null):
 def test_the_first_of_unsorted_eigenvectors_is_never_the_null_vector():
     draws = [draw(np.random.default_rng(seed))[0] for seed in SEEDS for draw in ITEMS["rotation_from_nullvector"].cases]
     assert all(np.linalg.eig(M.T @ M)[0].argmin() for M in draws)
+
+
+def test_the_sign_of_the_trace_is_not_the_sign_of_the_determinant():
+    def by_trace(M):
+        X = np.linalg.svd(M)[2][-1].reshape(3, 3).T
+        return nearest_rotation(X if np.trace(X) > 0 else -X)
+
+    assert all("You made the trace positive" in text for text in texts("rotation_from_nullvector", by_trace))

@@ -141,6 +141,17 @@ def test_what_is_blamed_is_what_a_student_can_change(body, said):
     assert said in told(body)
 
 
+def test_a_weight_that_nothing_is_to_be_multiplied_by_is_told_whole():
+    body = """
+        x = a / np.linalg.norm(a)
+        r = b - (b @ x) * x
+        w = 1 / (1 + (a - a.mean()) ** 2)
+        return len(b) * np.linalg.norm(w * r)
+    """
+    said = "in line 4, `w = 1 / (1 + (a - a.mean()) ** 2)`: with 1 everywhere in its place, your result is right"
+    assert said in told(body)
+
+
 def test_no_change_is_told_that_spoils_an_argument():
     item = replace(ITEM, reference=lambda a, b: np.cumsum(b) + a[0])
     body = """
@@ -387,6 +398,17 @@ def test_the_value_that_is_not_right_is_found_by_that_of_the_solution():
     body = "x = a / np.linalg.norm(a)\nz = np.cross(x, b)\nz = z / np.linalg.norm(z)\n"
     said = told_of("gram_schmidt", f"{body}return np.column_stack([x, b / np.linalg.norm(b), z])", "a, b")
     assert "in line 5, `b / np.linalg.norm(b)`: this value is not right" in said
+
+
+def test_a_wrong_value_is_told_where_it_is_bound_not_where_it_is_read():
+    item = next(c for c in session.chapters() if c.name == "05-hand-eye")["robust_weights"]
+    body = """
+        length = np.abs(residuals).max(axis=1)
+        u = length / (5 * np.median(length) / 1.538)
+        return np.where(u < 1, (1 - u**2) ** 2, 0)
+    """
+    said = item.judge(typed(body, "robust_weights", "residuals"), rng=np.random.default_rng(0)).text
+    assert "in line 2, `length = np.abs(residuals).max(axis=1)`: this value is not right" in said
 
 
 def test_a_loop_that_takes_the_rows_of_the_solutions_array_one_by_one_is_compared_with_them():

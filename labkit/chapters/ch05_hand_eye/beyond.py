@@ -637,7 +637,7 @@ TRIANGULATION = [
             ),
             Mistake(
                 lambda alpha, beta, base, std: std * np.hypot(*_by_angles(alpha, beta, base)),
-                "The base is missing: ∂H/∂α = H²/(L sin² α). A longer base makes the height better.",
+                "Your result is L times what it should be: ∂H/∂α = H²/(L sin² α). A longer base makes the height better.",
                 id="std-no-base",
             ),
             Mistake(

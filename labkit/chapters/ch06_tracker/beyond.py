@@ -109,6 +109,11 @@ STOPS = [
                 id="mean_quaternion-first-part",
             ),
             Mistake(
+                lambda q: _unit_mean(lambda p: np.ones(len(p)))(q / q[:, 3:]),
+                "You divided by w. That takes the sign away, but where w is about 0 the quotients are huge, and a few readings decide alone.",
+                id="mean_quaternion-over-w",
+            ),
+            Mistake(
                 _unit_mean(lambda q: np.sign(_largest_part(q))),
                 "You made the largest part of each positive. Where two are about equally large, noise decides which it is, and they may differ in sign.",
                 id="mean_quaternion-largest-part",

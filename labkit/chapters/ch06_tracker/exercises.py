@@ -153,14 +153,15 @@ def kron_row(A, B):
 
 def stacked(rng, sign, first=None):
     """The Kronecker matrix of noisy motions, so noisy that its null vector is visibly no rotation, and with this sign
-    of the null vector's determinant, and of the rotation's first entry; `eig`, which does not sort, has another first.
+    of the null vector's determinant, and of the rotation's first entry, where it is positive beside a negative trace;
+    `eig`, which does not sort, has another first.
     """
     while True:
         M = ax_xb.kronecker_matrix(*motions(rng, std_deg=8.0))
         X = _null(M).reshape(3, 3)
         if np.linalg.eig(M.T @ M)[0].argmin() == 0:
             continue
-        if first and sign * first * X[0, 0] < 0.05:
+        if first and sign * first * X[0, 0] < 0.05 or first == 1 and sign * np.trace(X) > -0.05:
             continue
         if sign * np.linalg.det(X) > 0 and np.abs(3 * X @ X.T - np.eye(3)).max() > 0.01:
             return (M,)
@@ -878,6 +879,12 @@ CHAPTER = Chapter(
                     for nearest in (lie.nearest_rotation, _orthonormal)
                 ),
                 Mistake(
+                    lambda M: lie.nearest_rotation((X := _null(M).reshape(3, 3, order="F")) * np.sign(np.trace(X))),
+                    "You made the trace positive, but a turn by more than 90 deg may have a negative one. The sign that a rotation needs is that of "
+                    "its determinant.",
+                    id="rotation_from_nullvector-trace",
+                ),
+                Mistake(
                     lambda M: lie.nearest_rotation(_null(M).reshape(3, 3, order="F")),
                     "The sign is missing. Where the null vector came out as -X you projected a reflection, and that gives another rotation: make the determinant positive first.",
                 ),
@@ -1058,6 +1065,7 @@ CHAPTER = Chapter(
                     for name, weight in (
                         ("by-angle", lambda w: w),
                         ("by-root-of-angle", np.sqrt),
+                        ("by-sine", np.sin),
                         ("over-angle", lambda w: 1 / w),
                     )
                 ),
@@ -1323,7 +1331,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _keep(np.median, lambda v: _mad(v) / 1.4826),
-                    "Multiply the median distance by 1.4826: it is smaller than a standard deviation. You divided.",
+                    "Your limit is about half as wide as that of the rule. It takes the median of the distances, no smaller part of them, and multiplies it by "
+                    "1.4826; perhaps you divided.",
                 ),
                 Mistake(
                     lambda v, f: reject_outliers(v, 1.0),
