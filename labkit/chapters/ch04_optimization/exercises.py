@@ -832,14 +832,11 @@ CHAPTER = Chapter(
                     lambda g, H: np.linalg.solve(H, g),
                     "This is the step with the wrong sign, the d of equations (2-24) and (2-25): there x − d is the next point.",
                 ),
-                *(
-                    Mistake(
-                        divided,
-                        "You divide by the entries of H, one by one, and add up. The inverse of a matrix is another thing: "
-                        "`np.linalg.solve(H, -g)`.",
-                        id=f"newton-entry-by-entry-{k}",
-                    )
-                    for k, divided in enumerate((lambda g, H: -(g / H).sum(axis=0), lambda g, H: -(g / H).sum(axis=1)))
+                Mistake(
+                    lambda g, H: -(g / H).sum(axis=0),
+                    "You divide by the entries of H, one by one, and add up. The inverse of a matrix is another thing: "
+                    "`np.linalg.solve(H, -g)`.",
+                    id="newton-entry-by-entry",
                 ),
                 Mistake(
                     lambda g, H: -H @ g, "You multiplied by H, as equation (2-26) has it; the step solves H h = −g."
@@ -871,7 +868,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda g, H: -(1 / H) @ g,
-                    "`H**-1` inverts each entry by itself. The inverse matrix is `np.linalg.inv(H)`; better solve the system.",
+                    "Each entry of H is inverted by itself, as by `1 / H`. The inverse matrix is `np.linalg.inv(H)`; better solve the system.",
                 ),
                 Mistake(
                     lambda g, H: -g / np.linalg.det(H),
