@@ -10,8 +10,8 @@
 #
 # **What you need.** Chapter 1, the singular value decomposition by name. About 90
 # minutes; the parts marked *further* come on top: the report's two errors, stations
-# that move, other methods and errors over speed, 50 minutes together, and the whole
-# cell at the end, 30 minutes.
+# that move, other methods, the lag and errors over speed, 65 minutes together, and the
+# whole cell at the end, 30 minutes.
 
 # %% notation [markdown]
 # | letter | meaning |
@@ -593,9 +593,14 @@ guess = 11
 ### END SOLUTION
 ex.predict("motion", guess, reveal=stages.dynamic_errors)
 
-# %% offset [markdown]
+# %% nonsense [markdown]
 # A few percent of nonsense are enough to make the mean 15 mm at every speed and to hide
-# a lag of 8 ms. The lag itself is easy to find: the **norm** of the angular velocity is
+# a lag of 8 ms.
+
+# %% offset [markdown]
+# ### Find the lag (*further*)
+#
+# The lag itself is easy to find: the **norm** of the angular velocity is
 # the same in every frame and at every point of the body, so it needs no calibration at
 # all. Shift one curve against the other until they match: where the mean of the squared
 # differences over the shared part is least. Then look between the samples; near its

@@ -1694,6 +1694,7 @@ CHAPTER = Chapter(
         "moved",
         "knock",
         "methods",
+        "time_offset",
         "tempo",
         "static_error_and_lag",
         "moved_part",
