@@ -131,11 +131,13 @@ class SameEquations(metrics.Numbers):
 # A X = X B -------------------------------------------------------------------------------------------------------------------
 
 
-def motions(rng, n=None, std_deg=0.3, std_mm=1.0):
-    """Motions of flange and tracker with noise, A X = X B; their number differs from draw to draw, never 8 or 9."""
+def motions(rng, n=None, std_deg=0.3, std_mm=1.0, R=None):
+    """Motions of flange and tracker with noise, A X = X B, where R turns X if it is given; their number differs from
+    draw to draw, never 8 or 9.
+    """
     n = n or rng.integers(10, 15)
     axes = rng.uniform(0.3, 1.2, (n, 1)) * unit_vector(rng.normal(size=(n, 3)))
-    X = pose(exp_so3(rng.normal(size=3)), rng.uniform(-80, 80, 3))
+    X = pose(exp_so3(rng.normal(size=3)) if R is None else R, rng.uniform(-80, 80, 3))
     A = pose(exp_so3(axes), rng.uniform(-200, 200, (n, 3)))
     noise = pose(exp_so3(np.deg2rad(std_deg) * rng.normal(size=(n, 3))), std_mm * rng.normal(size=(n, 3)))
     return A, invert(X) @ A @ X @ noise
@@ -154,18 +156,26 @@ def kron_row(A, B):
 def stacked(rng, sign, first=None):
     """The Kronecker matrix of noisy motions, so noisy that its null vector is visibly no rotation, and with this sign
     of the null vector's determinant, and of the rotation's first entry, where it is positive beside a negative trace;
-    `eig`, which does not sort, has another first, and `eigh` gives it the same sign.
+    `eig`, which does not sort, has another first, nor that of the largest value, and `eigh` gives it the same sign.
     """
     while True:
-        M = ax_xb.kronecker_matrix(*motions(rng, std_deg=8.0))
+        R = exp_so3(rng.normal(size=3))
+        if not _begins_with(R, first):
+            continue
+        M = ax_xb.kronecker_matrix(*motions(rng, std_deg=8.0, R=R))
+        unsorted = np.linalg.eig(M.T @ M)[0]
+        if 0 in (unsorted.argmin(), unsorted.argmax()):
+            continue
         X = _null(M).reshape(3, 3)
-        of_squares = np.linalg.eigh(M.T @ M)[1][:, 0]
-        if np.linalg.eig(M.T @ M)[0].argmin() == 0 or of_squares @ X.ravel() < 0:
+        if np.linalg.eigh(M.T @ M)[1][:, 0] @ X.ravel() < 0 or sign * np.linalg.det(X) < 0:
             continue
-        if first and sign * first * X[0, 0] < 0.05 or first == 1 and sign * np.trace(X) > -0.05:
-            continue
-        if sign * np.linalg.det(X) > 0 and np.abs(3 * X @ X.T - np.eye(3)).max() > 0.01:
+        if _begins_with(sign * X, first) and np.abs(3 * X @ X.T - np.eye(3)).max() > 0.01:
             return (M,)
+
+
+def _begins_with(R, first):
+    """Whether the first entry has this sign (None: any), and a trace that is negative beside a positive one."""
+    return not first or first * R[0, 0] >= 0.05 and (first < 0 or np.trace(R) <= -0.05)
 
 
 BOTH_SIGNS = tuple(functools.partial(stacked, sign=sign) for sign in (1, -1))
