@@ -273,12 +273,15 @@ def test_the_first_robust_rounds_weigh_by_one_over_the_distance_and_the_later_on
 
 @pytest.mark.parametrize("room", [ax_xb, fast_ax_xb])
 def test_exact_readings_have_the_noise_of_their_rounding(room):
-    """A billionth of a radian, and of the longest coordinates of robot and sensor together."""
+    """At least a billionth of a radian, and of the longest coordinates of robot and sensor together; how much more
+    rounding leaves, up to the root of a double's precision, depends on the processor.
+    """
     T_BF, T_ST = setup(np.random.default_rng(40), 12)
     result = room.calibrate_hand_eye(T_BF, T_ST)
-    longest = np.abs(T_BF[:, :3, 3]).max() + np.abs(T_ST[:, :3, 3]).max()
-    np.testing.assert_allclose(result.std[[0, 3]], [1e-9, 1e-9 * longest], rtol=1e-9)
-    np.testing.assert_allclose(result.history[-1, :2], [1e-9, 1e-9 * longest], rtol=1e-9)
+    units = [1.0, np.abs(T_BF[:, :3, 3]).max() + np.abs(T_ST[:, :3, 3]).max()]
+    for std in (result.std[[0, 3]], result.history[-1, :2]):
+        relative = std / units
+        assert (relative > 1e-9 * (1 - 1e-9)).all() and (relative < 1e-7).all()
 
 
 @pytest.mark.parametrize("room", [ax_xb, fast_ax_xb])
