@@ -7,6 +7,7 @@ rigid       rigid_rows: poses checked in few passes, their entries as rows
 pivot       calibrate_pivot: tip and pivot from sums over the poses
 hand_eye    calibrate_sphere_target: scanner and sphere from sums over the poses
 ax_xb       calibrate_hand_eye: sensor and target from sums over the poses
+cell        learned_pose, part_pose, flange_at_hole, miss_budget of one cell; Misses: of many simulated ones
 kalman      filter_steps: the linear filter along a series
 ekf         ekf_localize: the landmark filter along a drive, one robot or many
 path        filter_path: a log with one step per reading, however many rows lie between

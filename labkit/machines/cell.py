@@ -660,6 +660,22 @@ def place_on_table(x, y, turn):
 
 
 @documented
+def true_reading(T_BP):
+    """What the tracker reads on the true cell, without noise.
+
+    Parameters
+    ----------
+    T_BP : array, shape (4, 4)
+        Where its part stands (mm).
+
+    Returns
+    -------
+    T_WE : array, shape (4, 4)
+    """
+    return invert(TRUTH.T_BW) @ T_BP @ T_PE
+
+
+@documented
 def simulated_job(now, learned=LEARNED, touched=False):
     """The job of a part, without noise: what the true cell would measure.
 
@@ -685,5 +701,4 @@ def simulated_job(now, learned=LEARNED, touched=False):
         tilts = exp_so3(np.deg2rad([[8.0, 0, 0], [-6.0, -6.0, 20.0], [0, -8.0, -20.0]]))
         R_BF, T_FM = tilts @ R_tool @ TRUTH.T_FS[:3, :3].T, TRUTH.T_FS
     T_BF = poses_that_see(T_FM, transform(T_BP0, MARKS), R_BF, marks)
-    T_WE0, T_WE1 = (invert(TRUTH.T_BW) @ T @ T_PE for T in (T_BP0, T_BP1))
-    return Job(T_BF, marks, T_WE0, T_WE1, HOLE, R_tool, touched)
+    return Job(T_BF, marks, true_reading(T_BP0), true_reading(T_BP1), HOLE, R_tool, touched)

@@ -1,9 +1,11 @@
 """The Stage of the whole cell: a part is learned and found again, one of its measurements spoiled."""
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 
+from ...fast import cell as fast
 from ...geometry.frames import moved, pose, transform
 from ...geometry.lie import log_so3
 from ...machines import cell
@@ -41,7 +43,13 @@ def _calibrated():
 @functools.cache
 def _drawn():
     """Errors of the simulated cells: they hang on how sure each source is, and not on where the part stands."""
-    return cell.draw_errors(_calibrated(), cell.simulated_job(cell.FAR), np.random.default_rng(62), CLOUD)
+    return fast.Misses(cell.draw_errors(_calibrated(), _learned(False), np.random.default_rng(62), CLOUD))
+
+
+@functools.cache
+def _learned(touched):
+    """The job as it was learned, which does not hang on where the part stands now."""
+    return cell.simulated_job(cell.FAR, touched=touched)
 
 
 def _part_now(state):
@@ -50,16 +58,17 @@ def _part_now(state):
 
 def _used(state):
     """The job as the true cell would measure it, and the cell and job that are used, one source of them spoiled."""
-    job = cell.simulated_job(_part_now(state), touched=state["marks"] == "touched with the tip")
+    now = cell.true_reading(cell.place_on_table(*_part_now(state)))
+    job = replace(_learned(state["marks"] == "touched with the tip"), T_WE1=now)
     source = state["source"]
-    return job, *cell.with_errors(_calibrated(), job, {source: state["spoil"] * SPOILED[source][1]})
+    return job, *fast.with_errors(_calibrated(), job, {source: state["spoil"] * SPOILED[source][1]})
 
 
 def _source_places(of, job, T_BF):
     """Where each source shows in the base with the flange at T_BF, a pose (4, 4)."""
     tip = pose(T_BF[:3, :3], transform(T_BF, of.tip))
     readings = (of.T_BW @ job.T_WE0, of.T_BW @ job.T_WE1)
-    return dict(zip(cell.SOURCES, (tip, T_BF @ of.T_FS, of.T_BW, cell.learned_pose(of, job), *readings)))
+    return dict(zip(cell.SOURCES, (tip, T_BF @ of.T_FS, of.T_BW, fast.learned_pose(of, job), *readings)))
 
 
 def _known(of, job, source):
@@ -85,20 +94,20 @@ def compute_whole_cell(state):
     places {source: (3,)} that can be clicked.
     """
     job, used, measured = _used(state)
-    T_BF = cell.flange_at_hole(used, measured)
+    T_BF = fast.flange_at_hole(used, measured)
     true, there = _source_places(cell.TRUTH, job, T_BF), _source_places(used, measured, T_BF)
     start = np.array([np.arctan2(T_BF[1, 3], T_BF[0, 3]), *np.deg2rad([40.0, 100.0, 0.0, 40.0, 0.0])])
     q, reached = inverse_kinematics(TX40, T_BF, start)
-    shares = cell.miss_budget(used, measured)
+    shares = fast.miss_budget(used, measured)
     cov, part = sum(shares.values()), cell.place_on_table(*_part_now(state))
     source, hole = state["source"], transform(part, cell.HOLE)
     return {
         "cell": used, "job": measured, "q": q, "reached": bool(reached), "T_BF": T_BF, "part": part,
         "turn": float(np.deg2rad(state["turn"])), "learned": cell.place_on_table(*cell.LEARNED),
-        "found": _enlarged(part, cell.part_pose(used, measured)),
+        "found": _enlarged(part, fast.part_pose(used, measured)),
         "hole": hole, "miss": transform(T_BF, cell.TRUTH.tip) - hole,
         "sizes": cell.sizes(shares), "total": float(np.sqrt(np.trace(cov))), "covariance": cov,
-        "cloud": cell.misses_by(used, measured, _drawn()), "source": source,
+        "cloud": _drawn().of(used, measured), "source": source,
         "spoiled": state["spoil"], "place": there[source], "known": _known(used, measured, source),
         "off": _enlarged(true[source], there[source]), "frames": there | {"part": part},
         "places": {name: T[:3, 3] for name, T in there.items()},
@@ -112,7 +121,7 @@ def chosen_by_click(state, moved):
     _, used, measured = _used(state)
     seen = {
         name: np.linalg.norm(state["view"].project(T[:3, 3])[:2] - state["click"])
-        for name, T in _source_places(used, measured, cell.flange_at_hole(used, measured)).items()
+        for name, T in _source_places(used, measured, fast.flange_at_hole(used, measured)).items()
     }
     nearest = min(seen, key=seen.get)
     return {"source": nearest} if seen[nearest] < NEAR else {}
