@@ -1,5 +1,6 @@
 """What an installation tells Jupyter: settings and the server's extension, as `etc/jupyter/` names them."""
 
+import asyncio
 import importlib
 import json
 import subprocess
@@ -7,10 +8,12 @@ import sys
 from types import SimpleNamespace
 
 import pytest
+from jupyter_client.session import Session
 from jupyter_server.services.kernels.connection.channels import ZMQChannelsWebsocketConnection
 
 from labkit import server
 from labkit.exercises import source
+from labkit.server import connection
 from labkit.server.connection import PromptConnection
 from labkit.server.saving import keep_language
 
@@ -54,6 +57,45 @@ def test_pictures_leave_the_server_at_once(monkeypatch):
     connection._trait_values["websocket_handler"] = Handler()
     connection.connect()
     assert calls == [True, "connect"]
+
+
+class Kernel:
+    """A connection whose kernel says what a test lets it say; `told` is what the page hears."""
+
+    def __init__(self, monkeypatch):
+        self.told, self.session = [], Session(key=b"key")
+        monkeypatch.setattr(connection, "SHORT", 0.02)
+        base = ZMQChannelsWebsocketConnection
+        monkeypatch.setattr(base, "handle_outgoing_message", lambda _, stream, message: self.told.append(stream))
+        monkeypatch.setattr(base, "disconnect", lambda _: None)
+        self.connection = PromptConnection(session=self.session)
+
+    def says(self, words, kind, parent, **content):
+        message = self.session.msg(kind, content, parent=parent)
+        self.connection.handle_outgoing_message(words, self.session.serialize(message, b"topic"))
+
+
+def test_a_widget_answered_at_once_is_not_told_as_busy_and_a_long_answer_is(monkeypatch):
+    async def work():
+        kernel = Kernel(monkeypatch)
+        moved, ran = (kernel.session.msg_header(kind) for kind in ("comm_msg", "execute_request"))
+        kernel.says("busy with a cell", "status", ran, execution_state="busy")
+        kernel.says("idle after a cell", "status", ran, execution_state="idle")
+        kernel.says("busy", "status", moved, execution_state="busy")
+        kernel.says("picture", "comm_msg", moved, data={})
+        kernel.says("idle", "status", moved, execution_state="idle")
+        await asyncio.sleep(0.03)
+        assert kernel.told == ["busy with a cell", "idle after a cell", "picture", "idle"]
+        kernel.says("long", "status", moved, execution_state="busy")
+        await asyncio.sleep(0.03)
+        assert kernel.told[4:] == ["long"]
+        kernel.says("idle at last", "status", moved, execution_state="idle")
+        kernel.says("closed before", "status", moved, execution_state="busy")
+        kernel.connection.disconnect()
+        await asyncio.sleep(0.03)
+        assert kernel.told[5:] == ["idle at last"]
+
+    asyncio.run(work())
 
 
 def test_a_students_server_carries_no_figures():

@@ -70,6 +70,11 @@ class House:
         """Draw a Stage in the size it will have, for nobody yet."""
         return self._submit(self._receive, key, {"look": look, "serial": "ahead"})
 
+    def warm(self, key):
+        """Draw a Stage in the size it was designed for: with that begins whatever its size on a page will be."""
+        width, height = self.stages[key].declaration()["size"]
+        return self.draw_ahead(key, {"width": width, "height": height, "ratio": 1.0, "dark": False, "space": True})
+
     def start_again(self):
         """All Stages as they were in the beginning."""
         return self._submit(self._reset)
@@ -133,10 +138,11 @@ class House:
             self.stages[key].receive(message)
 
     def _forget(self, kept):
-        for key, stage in self.stages.items():
-            if key not in kept:
-                stage.forget_pixels()
-        self.collect()
+        others = [stage for key, stage in self.stages.items() if key not in kept]
+        for stage in others:
+            stage.forget_pixels()
+        if others:
+            self.collect()
 
     def _reset(self):
         for stage in self.stages.values():

@@ -94,10 +94,12 @@ async def run(program, options, counts):
     demo = Demo(program, options.ip, options.port, counts)
     demo.session.house.collect = collect
     room = demo.let_vote(options.vote_ip) if options.vote else None
-    if program.cards[0].stage:
-        await demo.session.house.get(program.cards[0].stage)  # a browser that opens finds it ready
+    first = program.cards[0].stage
+    made = first and (await demo.session.house.get(first))[0]  # a browser that opens finds it ready
     stages = sum(bool(card.make) for card in program.cards)
     print(f"{stages} Stages at {demo.address}\nStop with Ctrl-C in this window.", flush=True)
+    if made:
+        demo.session.house.warm(first)  # while the browser starts
     if room:
         _tell_of(room)
     if not options.no_browser:

@@ -206,3 +206,19 @@ def test_a_message_too_long_ends_its_line_and_no_other():
             assert (await window.open("01/good"))["declaration"]
 
     in_demo(work)
+
+
+def test_the_first_stage_is_drawn_before_a_page_asks_and_opening_lets_no_garbage_go():
+    async def work(demo):
+        home, collected = demo.session.house, []
+        home.collect = lambda to_stay=False: collected.append(to_stay)
+        stage, _ = await home.get("01/good")
+        await asyncio.wrap_future(home.warm("01/good"))
+        assert stage._picture._laid_out and stage._picture._backgrounds
+        await asyncio.wrap_future(home.prepare([], {"01/good"}))  # as its card is opened: no other has pixels
+        assert collected == [True]
+        await home.get("01/also-good")
+        await asyncio.wrap_future(home.prepare([], {"01/good"}))
+        assert collected == [True, True, False]
+
+    in_demo(work)
