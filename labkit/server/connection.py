@@ -1,4 +1,4 @@
-"""The server's side of a fast Stage: pictures leave for the browser at once, and nothing that is not asked for with them.
+"""The server's side of a fast Stage: pictures leave for the browser at once, without news of a busy kernel before them.
 
 JupyterLab's server leaves Nagle's algorithm on. A picture then waits until the browser has acknowledged the short
 message before it ("the kernel is busy"), and browsers put acknowledgments off: 40 ms are lost on most pictures.
