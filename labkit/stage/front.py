@@ -15,16 +15,24 @@ SPACE = Path(__file__).with_name("space.js")  # the drawing in space, which the 
 
 
 class Front(anywidget.AnyWidget):
-    """`stage.js` with its model: the declaration, and messages both ways."""
+    """`stage.js` with its model: the declaration, and messages both ways.
+
+    The first Stage of a kernel that has a scene in space brings the drawing along: the page gets it ready while Python
+    still works at the picture that is stored.
+    """
 
     _esm = Path(__file__).with_name("stage.js")
     _css = Path(__file__).with_name("stage.css")
     declaration = traitlets.Dict().tag(sync=True)
+    drawing = traitlets.Bytes().tag(sync=True)
+    is_sent = False  # whether one has brought it
 
 
 def widget(stage):
     """The widget of a Stage, connected to it."""
-    made = Front(declaration=stage.declaration())
+    brings = stage.spaces and not Front.is_sent
+    Front.is_sent = Front.is_sent or bool(brings)
+    made = Front(declaration=stage.declaration(), drawing=SPACE.read_bytes() if brings else b"")
     stage.connect(made.send)
     made.on_msg(lambda _, message, buffers: stage.receive(message))
     return made

@@ -11,7 +11,8 @@
 //   send(message)            to Stage.receive(message), as JSON
 //   placed                   where it has this, `render` puts a function there: the places of handles as one looks now
 //
-// Scenes in space are drawn by `space.js`. The first Stage of a page that has one asks Python for it; a page without
+// Scenes in space are drawn by `space.js`. It comes along with a model as get("drawing"), bytes, which `initialize` takes
+// before there is anything to show; else the first Stage of a page that has a scene asks Python for it; a page without
 // Python sets globalThis[Symbol.for("labkit.space")] = { load: () => import("./space.js") } before.
 //
 // A model may also announce "comm_live_update": the line to Python was cut or mended. `render` returns a function that
@@ -37,6 +38,7 @@ const NAMES = { ArrowLeft: "left", ArrowRight: "right", ArrowUp: "up", ArrowDown
 const TURNING = "Arrow keys turn the view; drawn in space, Shift moves it, + and - zoom, x y z and Home look from there.";
 const ASK_AGAIN = 10000; // ms until a page that lacks the drawing in space asks for it again
 const LOOK_AGAIN = 100; // ms until a Stage looks whether another one has got it
+const WORTH_WAITING = 1000; // ms a Stage waits for it with its first picture
 const SILENT = "Python does not answer. It is busy with another cell, or it was restarted: then Run All makes the figure live again.";
 
 function render({ model, el }) {
@@ -44,7 +46,33 @@ function render({ model, el }) {
   return () => figure.close();
 }
 
-export default { render };
+/** The model is there, its view is not: time to get the drawing in space ready. */
+function initialize({ model }) {
+  const source = model.get("drawing");
+  if (source?.byteLength) getReady(source);
+}
+
+export default { initialize, render };
+
+/** What all Stages of the page share of the drawing in space: {module, coming}, and how the page gets it. */
+const spaceOfThePage = () => (globalThis[Symbol.for("labkit.space")] ??= {});
+
+/** The drawing from its source, once a page; it makes its context, and its shaders, at once. */
+function getReady(source) {
+  const page = spaceOfThePage();
+  page.coming ??= (async () => {
+    const url = URL.createObjectURL(new Blob([source], { type: "text/javascript" }));
+    try {
+      page.module ??= await import(url);
+      page.module.works();
+    } catch (error) {
+      page.module = { works: () => false }; // it would be refused again
+      console.warn("stage: no drawing in space, Python draws it", error);
+    }
+    URL.revokeObjectURL(url);
+  })();
+  return page.coming;
+}
 
 function element(tag, className = "", attributes = {}, children = []) {
   const node = document.createElement(tag);
@@ -89,6 +117,7 @@ class Figure {
     this.room = new Room(this.root, this.picture, declared.size, this.line, this.buttons);
     this.hint = this.space.words && new Hint(this.space, this.buttons, model.get("aside"));
     this.room.canDraw = () => this.scenes.able;
+    this.room.waits = () => this.scenes.waits;
     this.root.append(this.picture, ...this.words.nodes, ...(this.clock ? [this.clock.row] : []), this.controls.row, this.buttons);
     // JupyterLab's shortcuts (arrow keys fold headings, letters cut cells) stay away from whatever has the focus here
     for (const node of this.root.querySelectorAll("input, select, button, canvas, .handle")) node.dataset.lmSuppressShortcuts = "true";
@@ -98,7 +127,7 @@ class Figure {
     model.on("comm_live_update", this.probe);
     this.model = model;
     this.scenes.ask();
-    this.room.look();
+    this.room.begin();
   }
 
   receive(message, buffers) {
@@ -236,7 +265,7 @@ class Line {
 class Scenes {
   constructor(figure, { spaces = [], home, size }) {
     Object.assign(this, { figure, spaces, home, width: size[0], view: null, timer: 0, closed: spaces.length === 0 });
-    this.page = globalThis[Symbol.for("labkit.space")] ??= { asked: -Infinity };
+    Object.assign(this, { page: spaceOfThePage(), since: performance.now() });
   }
 
   get able() {
@@ -247,34 +276,33 @@ class Scenes {
     return this.view?.shown ?? false;
   }
 
-  /** Ask for the module unless another Stage of the page has done so; open the view as soon as it is there. */
+  /** The drawing may come any moment: a picture that Python would paint now is not worth its while. */
+  get waits() {
+    return !this.closed && !this.page.module && performance.now() - this.since < WORTH_WAITING;
+  }
+
+  /** Ask for the module unless it is on its way, or another Stage of the page has done so; open the view as soon as it
+   *  is there. */
   ask() {
     clearTimeout(this.timer);
     if (this.closed || this.view) return;
     const { page } = this;
     if (page.module) return this.open();
-    if (performance.now() - (page.asked ?? -Infinity) > ASK_AGAIN) {
+    if (performance.now() - (page.asked ?? -Infinity) > ASK_AGAIN && !page.coming) {
       page.asked = performance.now();
-      if (page.load) page.load().then((module) => { page.module = module; }, () => {});
+      if (page.load) page.coming = page.load().then((module) => { page.module = module; module.works(); }, () => { page.coming = null; });
       else this.figure.line.send({ need: "space" });
     }
-    this.timer = setTimeout(() => this.ask(), LOOK_AGAIN);
+    if (page.coming) return void page.coming.then(() => this.ask());
+    this.timer = setTimeout(() => { this.figure.room.begin(); this.ask(); }, LOOK_AGAIN);
   }
 
-  async load(source) {
-    const url = URL.createObjectURL(new Blob([source], { type: "text/javascript" }));
-    try {
-      this.page.module ??= await import(url);
-    } catch (error) {
-      this.page.module = { works: () => false }; // it would be refused again
-      console.warn("stage: no drawing in space, Python draws it", error);
-    }
-    URL.revokeObjectURL(url);
-    this.ask(); // this Stage opens now, the others of the page when they look again
+  load(source) {
+    getReady(source).then(() => this.ask()); // this Stage opens then, the others of the page when they look again
   }
 
   open() {
-    if (!this.page.module.works()) return;
+    if (!this.page.module.works()) return this.figure.room.begin();
     const { room, buttons } = this.figure;
     const hooks = { onMove: () => this.figure.turned(), onAble: () => room.look(true), seat: (tools) => buttons.insertBefore(tools, room.button), width: this.width };
     this.view = new this.page.module.View(this.figure.picture, this.figure.screen.canvas, this.spaces, this.home, hooks);
@@ -993,7 +1021,8 @@ class Room {
     });
     this.watch = () => { // once it has come to rest: while a theme is exchanged, nothing has its size or color
       clearTimeout(this.settling);
-      this.settling = setTimeout(() => { this.settling = 0; this.look(); line.onStir(); }, SETTLED);
+      this.settling = setTimeout(() => { this.settling = 0; if (this.last) this.look(); line.onStir(); }, SETTLED);
+      this.begin();
       line.onStir();
     };
     this.resizing = new ResizeObserver(this.watch);
@@ -1004,6 +1033,11 @@ class Room {
     window.addEventListener("resize", this.watch); // also fired when the zoom, and with it the pixel ratio, changes
     this.scheme = window.matchMedia("(prefers-color-scheme: dark)");
     this.scheme.addEventListener("change", this.watch);
+  }
+
+  /** The first picture is asked for as soon as there is room for it: there is none yet that could jump. */
+  begin() {
+    if (!this.last && !this.waits?.()) this.look();
   }
 
   /** Tell Python of the room when it has changed; `again` asks for a whole picture in any case. */

@@ -53,6 +53,7 @@ window.show = (declaration) => {
   window.close_?.();
   window.close_ = render({ model, el: document.body });
 };
+window.bring = (drawing) => initialize({ model: { get: () => new TextEncoder().encode(drawing) } });
 """
 CUT = """() => {
   const stage = document.querySelector(".labkit-stage");

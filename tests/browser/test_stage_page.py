@@ -12,7 +12,7 @@ from labkit.chapters.ch02_chaining import stages as chaining
 from labkit.chapters.ch05_hand_eye import stages as hand_eye
 from labkit.chapters.ch06_tracker import stages
 from labkit.chapters.ch09_monte_carlo import stages as monte_carlo
-from labkit.stage import Stage, Toggle, View
+from labkit.stage import Stage, Toggle, View, front
 from labkit.stage import scene3d_solids as solids
 from labkit.stage.scene3d import Scene
 
@@ -218,14 +218,41 @@ def two_balls():
                  controls={"mirrored": Toggle(False)}, view=View(-60, 30))  # fmt: skip
 
 
-def test_a_mirrored_body_shows_its_outside_too():
+FIRST_DRAWN = """() => {
+    const gl = contexts[0];
+    const { drawElements } = gl;
+    const counts = [];
+    gl.drawElements = function (kind, count, ...rest) { counts.push(count / 3); drawElements.call(gl, kind, count, ...rest); };
+    dispatchEvent(new Event("beforeprint")); // once more; bodies come first
+    gl.drawElements = drawElements;
+    return counts[0];
+}"""
+
+
+def test_of_a_closed_body_its_outside_alone_is_drawn_mirrored_or_not():
     with stage_page(False, 500, 500, 1) as (page, bridge):
+        page.evaluate(CONTEXTS)
         bridge.show(page, two_balls())
         _, (covered, _, before) = at_rest(page, 0)
+        drawn = page.evaluate(FIRST_DRAWN)
+        triangles = int(page.locator(".picture").get_attribute("data-triangles"))
+        assert triangles / 3 < drawn < 0.8 * triangles  # half of the ball, and the whole shell
         page.locator("input[type=checkbox]").check()
         _, (_, _, after) = at_rest(page, 0)
         assert covered > 0.05 and apart(before, after) < 0.5
+        assert page.evaluate(FIRST_DRAWN) == pytest.approx(drawn, rel=0.1)
         assert page.complaints == []
+
+
+def test_a_drawing_that_comes_along_is_ready_before_the_first_picture_is_asked_for():
+    stage, asked = two_balls(), []
+    receive = stage.receive
+    stage.receive = lambda message: (asked.append(message), receive(message))
+    with stage_page(False, 500, 500, 1) as (page, bridge):
+        page.evaluate("source => window.bring(source)", front.SPACE.read_text(encoding="utf-8"))
+        bridge.show(page, stage)
+        assert [message["look"]["space"] for message in asked if "look" in message] == [True]
+        assert not any("need" in message for message in asked) and page.complaints == []
 
 
 MANY = """(count) => {

@@ -106,10 +106,17 @@ def test_the_drawing_is_sent_when_a_page_asks_and_costs_less_than_150_kB():
     assert message == {"module": "space"} and b"twgl" in source[:200] and 20_000 < len(source) < 150_000
 
 
+def test_the_first_scene_of_a_kernel_brings_the_drawing_along(monkeypatch):
+    monkeypatch.setattr(front.Front, "is_sent", False)
+    flat = Stage("flat", scene=lambda fig: ([], lambda state, result: None), compute=dict, fail={}, size=(2, 2))
+    brought = [front.widget(stage).drawing for stage in (flat, cell(), cell())]
+    assert brought == [b"", front.SPACE.read_bytes(), b""]
+
+
 def test_the_drawing_is_made_of_its_sources_as_they_are():
     """Else: cd web/space && npm install --no-package-lock && npm run build."""
     folder = Path(__file__).parents[2] / "web" / "space"
-    names = ("build.mjs", "package.json", "renderer.js", "solids.js", "space.js")
+    names = ("build.mjs", "package.json", "renderer.js", "solids.js", "space.js", "world.js")
     assert sorted(path.name for path in folder.glob("*.*js*")) == sorted(names)
     sources = "".join((folder / name).read_text(encoding="utf-8") for name in names)
     made_of = re.search(r"Sources: (\w+)", front.SPACE.read_text(encoding="utf-8").splitlines()[0])[1]

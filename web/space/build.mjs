@@ -6,7 +6,7 @@ import { copyFileSync, readFileSync, statSync } from "node:fs";
 const target = new URL("../../labkit/stage/", import.meta.url);
 const library = new URL("node_modules/twgl.js/", import.meta.url);
 const sources = createHash("sha256"); // of what it is made of, in the bundle's first line: a test tells a stale one
-for (const name of ["build.mjs", "package.json", "renderer.js", "solids.js", "space.js"]) {
+for (const name of ["build.mjs", "package.json", "renderer.js", "solids.js", "space.js", "world.js"]) {
   sources.update(readFileSync(new URL(name, import.meta.url), "utf8").replaceAll("\r\n", "\n"));
 }
 const { version } = JSON.parse(readFileSync(new URL("package.json", library)));

@@ -2,9 +2,11 @@
 // Stages needs one context, and a picture stays where the context is lost.
 
 import { createProgramInfo, setUniforms } from "twgl.js";
-import { triangles } from "./solids.js";
+import { DOWN, World } from "./world.js";
 
 const NEAR = 0.05; // of the eye's distance
+const LOOK_AGAIN = 10; // ms until one looks whether all is drawn,
+const PATIENCE = 3000; // and until that is given up
 const SHADOWED = 2.2; // half the width of the floor that can lie in shadow, in the scene's half widths
 const SHADOW_PIXELS = [1024, 512]; // of the shadow's own picture; where a processor draws
 const LENS = `
@@ -16,30 +18,19 @@ vec4 project(vec3 world) {
   return vec4(p.xy * lens.xy, depth * w, w);
 }`;
 const SOLID_VERTEX = `#version 300 es
-precision highp float; precision highp sampler2D;
-in vec3 position; in vec3 normal; in float part;
-uniform sampler2D parts; // a row for each: its pose in four columns, its color
-uniform vec3 fall; // of a shadow: along the light onto the floor's height, and the scale of its own picture; else 0
+precision highp float;
+layout(location = 0) in vec3 position; layout(location = 1) in vec3 normal; layout(location = 2) in vec4 tint; // as \`World\` puts them
 ${LENS}
 out vec3 n; flat out vec4 color;
 void main() {
-  int row = int(part);
-  color = texelFetch(parts, ivec2(4, row), 0);
-  if (color.a == 0.0) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); return; }
-  vec3 a = texelFetch(parts, ivec2(0, row), 0).xyz, b = texelFetch(parts, ivec2(1, row), 0).xyz, c = texelFetch(parts, ivec2(2, row), 0).xyz;
-  vec3 world = a * position.x + b * position.y + c * position.z + texelFetch(parts, ivec2(3, row), 0).xyz;
-  if (fall.z > 0.0) {
-    gl_Position = vec4((world.xy + vec2(0.28, -0.2) * (world.z - fall.x)) * fall.z, 0.0, 1.0);
-    return;
-  }
-  n = axes * (cross(b, c) * normal.x + cross(c, a) * normal.y + cross(a, b) * normal.z); // a body may be stretched
-  gl_Position = project(world);
+  color = tint;
+  n = axes * normal;
+  gl_Position = project(position);
 }`;
 const SOLID_FRAGMENT = `#version 300 es
 precision highp float;
-in vec3 n; flat in vec4 color; uniform vec3 fall; out vec4 shown;
+in vec3 n; flat in vec4 color; out vec4 shown;
 void main() {
-  if (fall.z > 0.0) { shown = vec4(1.0); return; }
   vec3 m = normalize(n); if (!gl_FrontFacing) m = -m;
   float light = 0.56 + 0.44 * max(dot(m, vec3(-0.42, 0.66, 0.62)), 0.0);
   float gleam = 0.16 * pow(max(dot(m, vec3(-0.24, 0.37, 0.90)), 0.0), 18.0);
@@ -47,6 +38,17 @@ void main() {
   float a = min(color.a * rim, 1.0);
   shown = vec4((color.rgb * light + gleam) * a, a);
 }`;
+const CAST_VERTEX = `#version 300 es
+precision highp float;
+layout(location = 0) in vec3 position;
+uniform vec3 fall; // along the light onto the floor's height, and the scale of the shadow's own picture
+void main() {
+  gl_Position = vec4((position.xy + vec2(${DOWN}) * (position.z - fall.x)) * fall.z, 0.0, 1.0);
+}`;
+const CAST_FRAGMENT = `#version 300 es
+precision highp float;
+out vec4 shown;
+void main() { shown = vec4(1.0); }`;
 const FLOOR_VERTEX = `#version 300 es
 precision highp float;
 in vec2 corner; uniform vec3 fall; uniform vec4 reach; // of the shadow in its own picture: low x, low y, high x, high y
@@ -123,7 +125,6 @@ void main() {
 export const MARKERS = { o: 0, ".": 0, s: 1, D: 2, d: 2, x: 3, "+": 4, "^": 5, v: 6 };
 export const LINE_NUMBERS = 16; // of a corner of a piece of a line: from, to, length until its start and its end, color, width, dash, which corner
 export const POINT_NUMBERS = 10; // of a point: where, color, size, marker, hollow
-export const PART_NUMBERS = 20; // of a part of a body: its pose in columns, its color; opacity 0 hides it
 
 export class Renderer {
   /** Throws where there is no WebGL 2; onChange(): the context is lost, or is back. */
@@ -152,39 +153,59 @@ export class Renderer {
     this.smooth = null;
     this.age = (this.age ?? 0) + 1; // whoever holds buffers makes them anew when it has changed
     this.solid = createProgramInfo(gl, [SOLID_VERTEX, SOLID_FRAGMENT]);
+    this.cast = createProgramInfo(gl, [CAST_VERTEX, CAST_FRAGMENT]);
     this.floor = createProgramInfo(gl, [FLOOR_VERTEX, FLOOR_FRAGMENT]);
     this.line = createProgramInfo(gl, [LINE_VERTEX, LINE_FRAGMENT]);
     this.point = createProgramInfo(gl, [POINT_VERTEX, POINT_FRAGMENT]);
-    for (const program of [this.solid, this.floor, this.line, this.point]) if (!program) throw new Error("the shaders were refused");
+    for (const program of [this.solid, this.cast, this.floor, this.line, this.point]) if (!program) throw new Error("the shaders were refused");
+    this.warm();
   }
 
-  /** All solids of a scene as one: a processor that draws spends more on being asked than on triangles. Shapes of parts,
-   *  the `closed` ones first, then up to number `full` the others one cannot look through, then those one can; where
-   *  they are is told by `place`. */
+  /** Draw one of each, for nobody to see: a shader becomes a processor's or a driver's own code when it is first used,
+   *  and that goes on beside the page while it waits for Python. */
+  warm(smooth = !this.software) {
+    if (this.lost) return;
+    const [box, shell] = [{ kind: "raised", outline: [[0, 0], [1, 0], [0, 1]], bottom: 0, top: 1 }, { kind: "turned", profile: [[1, 0], [1, 1]] }];
+    const solids = this.solids([box, shell, box], 1, 2);
+    const pose = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+    this.place(solids, new Float32Array([1, 1, 0.5].flatMap((opacity) => [...pose, 0, 0, 0, opacity])));
+    const [lines, points] = [this.lines(null, new Float32Array(4 * LINE_NUMBERS)), this.points(null, new Float32Array(POINT_NUMBERS))];
+    const lens = { axes: [1, 0, 0, 0, 1, 0, 0, 0, 1], center: [0, 0, 0], eye: 0, perUnit: 1, scale: [1, 1], reach: 12, ratio: 1 };
+    this.draw(8, 8, lens, { solids, lines, points, floor: 0, shadow: [0, 0, 0, 0.5], wide: 1 }, smooth, false);
+    for (const made of [solids, lines, points]) this.free(made);
+    this.finish(() => { if (!smooth) this.warm(true); });
+  }
+
+  /** All that has been asked for is done beside the page, and then is called; a flush alone is put off until something
+   *  is read. */
+  finish(then) {
+    const { gl } = this;
+    const [fence, end] = [gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0), performance.now() + PATIENCE];
+    const look = () => {
+      const done = gl.clientWaitSync(fence, gl.SYNC_FLUSH_COMMANDS_BIT, 0) !== gl.TIMEOUT_EXPIRED;
+      if (!done && performance.now() < end) return void setTimeout(look, LOOK_AGAIN);
+      gl.deleteSync(fence);
+      then();
+    };
+    look();
+  }
+
+  /** All solids of a scene as one: a processor that draws spends more on being asked than on triangles. Shapes of parts
+   *  as `World` wants them; where they are is told by `place`. */
   solids(shapes, closed, full) {
     const { gl } = this;
-    const made = { position: [], normal: [], part: [], indices: [], closed: 0, full: 0, vao: gl.createVertexArray(), buffers: [], table: gl.createTexture(), count: shapes.length };
-    shapes.forEach((shape, number) => {
-      const mesh = meshOf(shape);
-      const first = made.position.length / 3;
-      for (const v of mesh.position) made.position.push(v);
-      for (const v of mesh.normal) made.normal.push(v);
-      for (let k = 0; k < mesh.position.length / 3; k++) made.part.push(number);
-      for (const index of mesh.indices) made.indices.push(first + index);
-      if (number < closed) made.closed = made.indices.length;
-      if (number < full) made.full = made.indices.length;
-    });
+    const made = { world: new World(shapes, closed, full), vao: gl.createVertexArray(), corners: gl.createBuffer(), colors: gl.createBuffer(), order: gl.createBuffer() };
+    made.buffers = [made.corners, made.colors, made.order];
     gl.bindVertexArray(made.vao);
-    for (const [name, size] of [["position", 3], ["normal", 3], ["part", 1]]) this.attribute(this.solid, made, name, size, new Float32Array(made[name]));
-    const indices = gl.createBuffer();
-    made.buffers.push(indices);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, indices);
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array(made.indices), gl.STATIC_DRAW);
+    gl.bindBuffer(gl.ARRAY_BUFFER, made.corners);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 24, 0);
+    gl.vertexAttribPointer(1, 3, gl.FLOAT, false, 24, 12);
+    gl.bindBuffer(gl.ARRAY_BUFFER, made.colors);
+    gl.vertexAttribPointer(2, 4, gl.UNSIGNED_BYTE, true, 0, 0);
+    for (const place of [0, 1, 2]) gl.enableVertexAttribArray(place);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, made.order);
     gl.bindVertexArray(null);
-    gl.bindTexture(gl.TEXTURE_2D, made.table);
-    for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
-    const { closed: shut, full: opaque, vao, buffers, table, count } = made;
-    return { closed: shut, full: opaque, all: made.indices.length, vao, buffers, table, count, bounds: shapes.slice(0, full).map(boundsOf) };
+    return made;
   }
 
   attribute(program, made, name, size, data) {
@@ -201,10 +222,21 @@ export class Renderer {
   /** Poses and colors of all parts, PART_NUMBERS each; the shadow has to be cast again. */
   place(solids, numbers) {
     const { gl } = this;
+    const recolored = solids.world.place(numbers);
+    gl.bindBuffer(gl.ARRAY_BUFFER, solids.corners);
+    gl.bufferData(gl.ARRAY_BUFFER, solids.world.corners, gl.DYNAMIC_DRAW);
     solids.cast = false;
-    solids.numbers = numbers;
-    gl.bindTexture(gl.TEXTURE_2D, solids.table);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, PART_NUMBERS / 4, solids.count, 0, gl.RGBA, gl.FLOAT, numbers);
+    if (!recolored && solids.painted) return;
+    gl.bindBuffer(gl.ARRAY_BUFFER, solids.colors);
+    gl.bufferData(gl.ARRAY_BUFFER, solids.world.colors, gl.DYNAMIC_DRAW);
+    solids.painted = true;
+  }
+
+  /** Draw the solids' triangles anew from their indices: from here on they are in the buffer. */
+  order(solids, indices) {
+    const { gl } = this;
+    gl.bindVertexArray(solids.vao);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STREAM_DRAW);
   }
 
   /** All lines, or all points, of a scene: LINE_NUMBERS or POINT_NUMBERS each. A line has four corners a piece, as
@@ -261,8 +293,8 @@ export class Renderer {
     if (!made || this.lost) return;
     this.gl.deleteVertexArray(made.vao);
     for (const buffer of made.buffers) this.gl.deleteBuffer(buffer);
-    for (const texture of [made.table, made.shadow?.texture]) if (texture) this.gl.deleteTexture(texture);
     if (made.shadow) {
+      this.gl.deleteTexture(made.shadow.texture);
       this.gl.deleteFramebuffer(made.shadow.frame);
       this.free(made.shadow.quad);
     }
@@ -308,30 +340,14 @@ export class Renderer {
     const far = lens.eye > 0 ? 1 + lens.reach / lens.eye : 1; // distances over the eye's
     const range = lens.eye > 0 ? [(far + NEAR) / (far - NEAR), (-2 * far * NEAR) / (far - NEAR)] : [0, 1 / lens.reach];
     const common = { axes: lens.axes, center: lens.center, lens: [...lens.scale, lens.eye, lens.perUnit], range, room: [width, height], ratio: lens.ratio };
-    if (solids) {
-      gl.useProgram(this.solid.program);
-      gl.bindVertexArray(solids.vao);
-      setUniforms(this.solid, { ...common, parts: solids.table, fall: [0, 0, 0] });
-      const seen = solids.mirrored ? 0 : solids.closed; // of what is closed one sees the outside alone
-      gl.enable(gl.CULL_FACE);
-      gl.cullFace(gl.BACK);
-      this.drawPart(0, seen);
-      gl.disable(gl.CULL_FACE);
-      this.drawPart(seen, solids.full);
-      if (shaded) this.drawShadow(solids, common, fall, shadow); // after what hides it
-    }
+    const seen = solids && this.drawSolids(solids, common, lens);
+    if (shaded) this.drawShadow(solids, common, fall, shadow); // after what hides it
     this.drawPaths(lines, points, common, 1);
     gl.depthMask(false);
-    if (solids && solids.all > solids.full) {
+    if (solids && seen.indices.length > seen.opaque) {
       gl.useProgram(this.solid.program);
       gl.bindVertexArray(solids.vao);
-      setUniforms(this.solid, { parts: solids.table }); // the shadow's picture stands in the table's place
-      gl.enable(gl.CULL_FACE);
-      for (const side of [gl.FRONT, gl.BACK]) {
-        gl.cullFace(side);
-        this.drawPart(solids.full, solids.all);
-      }
-      gl.disable(gl.CULL_FACE);
+      this.drawPart(seen.opaque, seen.indices.length);
     }
     gl.depthFunc(gl.GREATER); // what lies behind a body shines through a little
     this.drawPaths(lines, quick ? null : points, common, 0.22);
@@ -341,6 +357,17 @@ export class Renderer {
     gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
     gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  }
+
+  /** What hides others; returns what one sees of all, whose indices are in the buffer. */
+  drawSolids(solids, common, { axes, center, eye }) {
+    const toward = [axes[2], axes[5], axes[8]];
+    const seen = solids.world.seen(eye > 0 ? [...toward.map((v, k) => center[k] + eye * v), 1] : [...toward, 0]);
+    this.gl.useProgram(this.solid.program);
+    setUniforms(this.solid, common);
+    this.order(solids, seen.indices);
+    this.drawPart(0, seen.opaque);
+    return seen;
   }
 
   drawPart(from, to) {
@@ -369,12 +396,13 @@ export class Renderer {
     gl.clear(gl.COLOR_BUFFER_BIT);
     gl.disable(gl.DEPTH_TEST);
     gl.disable(gl.BLEND);
-    gl.useProgram(this.solid.program);
-    gl.bindVertexArray(solids.vao);
-    setUniforms(this.solid, { parts: solids.table, fall });
-    this.drawPart(0, solids.full);
+    gl.useProgram(this.cast.program);
+    setUniforms(this.cast, { fall });
+    const lit = solids.world.lit();
+    this.order(solids, lit);
+    this.drawPart(0, lit.length);
     solids.cast = true;
-    solids.shadow.reach = reachOf(solids, fall, 2 / size);
+    solids.shadow.reach = solids.world.fallen(fall[0]).map((v, k) => Math.min(1, Math.max(-1, v * fall[2] + (k < 2 ? -2 : 2) / size)));
   }
 
   drawShadow(solids, common, fall, shade) {
@@ -402,42 +430,4 @@ export class Renderer {
       gl.drawArrays(gl.POINTS, 0, points.count);
     }
   }
-}
-
-/** How far the shadow reaches in its own picture, [low x, low y, high x, high y], and by `more` around. */
-function reachOf({ numbers, bounds }, fall, more) {
-  const reach = [1, 1, -1, -1];
-  bounds.forEach(([low, high], number) => {
-    const m = numbers.subarray(PART_NUMBERS * number, PART_NUMBERS * (number + 1));
-    if (m[19] === 0) return; // out of sight
-    for (let corner = 0; corner < 8; corner++) {
-      const p = low.map((v, k) => (corner & (1 << k) ? high[k] : v));
-      const [x, y, z] = [0, 1, 2].map((k) => m[k] * p[0] + m[4 + k] * p[1] + m[8 + k] * p[2] + m[12 + k]);
-      [x + 0.28 * (z - fall[0]), y - 0.2 * (z - fall[0])].forEach((v, k) => {
-        reach[k] = Math.max(-1, Math.min(reach[k], v * fall[2] - more));
-        reach[k + 2] = Math.min(1, Math.max(reach[k + 2], v * fall[2] + more));
-      });
-    }
-  });
-  return reach;
-}
-
-/** Lowest and highest x, y, z of a solid. */
-function boundsOf(shape) {
-  const { position } = meshOf(shape);
-  const bounds = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
-  position.forEach((v, k) => {
-    bounds[0][k % 3] = Math.min(bounds[0][k % 3], v);
-    bounds[1][k % 3] = Math.max(bounds[1][k % 3], v);
-  });
-  return bounds;
-}
-
-const meshes = new Map();
-
-/** Triangles of a solid, made once for all that are alike. */
-function meshOf(shape) {
-  const key = JSON.stringify(shape);
-  if (!meshes.has(key)) meshes.set(key, triangles(shape));
-  return meshes.get(key);
 }

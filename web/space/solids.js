@@ -11,10 +11,10 @@ export function isClosed({ kind, profile }) {
   return kind === "raised" || (kind === "turned" && profile[0][0] === 0 && profile[profile.length - 1][0] === 0);
 }
 
-/** A profile of (radius, height), turned about z; round where its pieces meet at a small angle. */
-function turned({ profile }) {
+/** A profile of (radius, height), turned about z in so many pieces; round where its pieces meet at a small angle. */
+function turned({ profile, pieces: given }) {
   const largest = Math.max(...profile.map(([r]) => r));
-  const pieces = profile.length > 8 ? 24 : largest > 0 ? 28 : 3;
+  const pieces = given ?? (profile.length > 8 ? 24 : largest > 0 ? 28 : 3);
   const mesh = { position: [], normal: [], indices: [] };
   const parts = [];
   for (let k = 0; k + 1 < profile.length; k++) {

@@ -4,8 +4,9 @@
 // The first lines of `stage.js` say how a page without Python gets it; the declaration and one recorded message with
 // `space` and its numbers are enough.
 
-import { LINE_NUMBERS, MARKERS, PART_NUMBERS, POINT_NUMBERS, Renderer } from "./renderer.js";
+import { LINE_NUMBERS, MARKERS, POINT_NUMBERS, Renderer } from "./renderer.js";
 import { dot, isClosed } from "./solids.js";
+import { PART_NUMBERS } from "./world.js";
 
 const DEGREES_PER_PIXEL = 0.5;
 const ZOOM = [0.2, 12];
@@ -350,7 +351,7 @@ class Scene {
       scale: [(2 * pixels) / cssWidth, (2 * pixels) / cssHeight], reach: 12 * Math.max(this.radius, this.halfWidth), ratio: drawn,
     };
     this.give();
-    this.triangles = this.given.solids ? this.given.solids.all / 3 : 0;
+    this.triangles = this.given.solids?.world.triangles ?? 0;
     const shadow = z[2] > 0 ? (this.view.dark ? [0, 0, 0, 0.5] : [0, 0, 0, 0.16]) : null;
     renderer.draw(dw, dh, lens, { ...this.given, floor: this.floor, shadow, wide: Math.max(this.radius, this.halfWidth) }, !(renderer.software && this.view.moving), scale < 1);
     this.paper.setTransform(1, 0, 0, 1, 0, 0); // `write` leaves CSS pixels behind
@@ -373,7 +374,6 @@ class Scene {
         if (part.pose) this.table.set(part.pose, PART_NUMBERS * k);
         this.table.set(color, PART_NUMBERS * k + 16);
       });
-      this.given.solids.mirrored = this.parts.some(({ part }, k) => k < this.closed && part.pose && turnsInsideOut(part.pose));
       renderer.place(this.given.solids, this.table);
     }
     if (this.redrawn) {
@@ -560,11 +560,6 @@ function times(a, b) {
   return out;
 }
 
-/** Whether a pose in columns shows the inside of a body. */
-function turnsInsideOut(m) {
-  return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[4] * (m[1] * m[10] - m[2] * m[9]) + m[8] * (m[1] * m[6] - m[2] * m[5]) < 0;
-}
-
 class Body {
   constructor({ parts }) {
     this.parts = parts.map((part) => ({ ...part, at: columns(part.at) }));
@@ -579,8 +574,8 @@ class Body {
   }
 }
 
-const SHAFT = { kind: "turned", profile: [[0, 0], [1, 0], [1, 1], [0, 1]] };
-const TIP = { kind: "turned", profile: [[0, 0], [1, 0], [0, 1]] };
+const SHAFT = { kind: "turned", pieces: 12, profile: [[0, 0], [1, 0], [1, 1], [0, 1]] };
+const TIP = { kind: "turned", pieces: 16, profile: [[0, 0], [1, 0], [0, 1]] };
 
 class Triad {
   constructor({ length, name, label, broken, width, axes }) {
