@@ -222,7 +222,10 @@ FIRST_DRAWN = """() => {
     const gl = contexts[0];
     const { drawElements } = gl;
     const counts = [];
-    gl.drawElements = function (kind, count, ...rest) { counts.push(count / 3); drawElements.call(gl, kind, count, ...rest); };
+    gl.drawElements = (kind, count, ...rest) => {
+        counts.push(count / 3);
+        drawElements.call(gl, kind, count, ...rest);
+    };
     dispatchEvent(new Event("beforeprint")); // once more; bodies come first
     gl.drawElements = drawElements;
     return counts[0];
