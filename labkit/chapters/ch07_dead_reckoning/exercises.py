@@ -30,9 +30,9 @@ def two_circles(rng, left=True, up=True, with_origin=True, angle=None):
     return landmarks, np.linalg.norm(landmarks - robot, axis=1), robot + rng.uniform(-0.6, 0.6, 2)
 
 
-def several_circles(rng):
-    """Three to five landmarks, distances that do not fit exactly, and a position."""
-    landmarks = rng.uniform(-5, 5, (rng.integers(3, 6), 2))
+def several_circles(rng, n):
+    """So many landmarks, distances that do not fit exactly, and a position."""
+    landmarks = rng.uniform(-5, 5, (n, 2))
     position = rng.uniform(-5, 5, 2)
     off = rng.uniform(0.05, 0.2, len(landmarks)) * (-1) ** np.arange(len(landmarks))
     return landmarks, np.linalg.norm(landmarks - position, axis=1) * (1 + off), position
@@ -48,6 +48,13 @@ def from_afar(rng, left, angle=None):
     across = (1 if left else -1) * np.array([-line[1], line[0]])
     robot = max(lateration.circle_intersections(landmarks, distances), key=lambda p: across @ (p - landmarks[0]))
     return landmarks, distances, robot + rng.uniform(6, 12) * across
+
+
+def from_the_position_itself(rng):
+    """Two landmarks and a start at which the search has arrived."""
+    landmarks, distances, start = two_circles(rng)
+    roots = lateration.circle_intersections(landmarks, distances)
+    return landmarks, distances, min(roots, key=lambda root: np.linalg.norm(root - start))
 
 
 CIRCLES = tuple(
@@ -75,6 +82,16 @@ WHEELS = (
     functools.partial(wheels_alike, turn=-1),
     functools.partial(wheels_alike, turn=1),
 )
+
+
+def one_wheel_stands(rng, left):
+    """One wheel at rest and the other turning, and the track."""
+    speed = rng.uniform(0.2, 1) * rng.choice([-1, 1])
+    return (0.0, speed, rng.uniform(0.2, 0.8)) if left else (speed, 0.0, rng.uniform(0.2, 0.8))
+
+
+def wheels_at_rest(rng):
+    return 0.0, 0.0, rng.uniform(0.2, 0.8)
 
 
 def pose_control_step(rng, side=1, gear=1):
@@ -112,10 +129,10 @@ def creeping(rng):
     return x, 0.03 * u * rng.choice([-1, 1], 2), dt
 
 
-def wheels_nearly_alike(rng):
-    """Wheels of which one is faster by less than 3 cm/s, and the track."""
+def wheels_nearly_alike(rng, apart):
+    """Wheels of which one is faster by less than this (m/s), and the track."""
     speed, track = rng.uniform(0.2, 1) * rng.choice([-1, 1]), rng.uniform(0.2, 0.8)
-    return speed, speed + rng.uniform(0.002, 0.03) * rng.choice([-1, 1]), track
+    return speed, speed + rng.uniform(0.2, 1) * apart * rng.choice([-1, 1]), track
 
 
 def noisy_control(rng, signs):
@@ -125,8 +142,51 @@ def noisy_control(rng, signs):
 
 
 NOISY_CONTROLS = tuple(functools.partial(noisy_control, signs=signs) for signs in ((-1, 1), (1, -1), (-1, -1)))
-ON_THE_SPOT, STRAIGHT_ON = (functools.partial(noisy_control, signs=signs) for signs in ((0, 1), (1, 0)))
 CREEPING = "right, but not for a robot that hardly moves and hardly turns (a few cm/s and hundredths of a rad/s):"
+
+
+IN_CURVES_ONLY = "right in curves, but not where the robot {}:"
+
+
+def special_control(rng, moves):
+    """A pose, a control of which these parts are not zero, and a time step."""
+    x, u, dt = pose_control_step(rng)
+    return x, u * moves * rng.choice([-1, 1], 2), dt
+
+
+def gathered_turns(rng):
+    """The same with a heading that has gathered several turns."""
+    x, u, dt = pose_control_step(rng)
+    return x + [0.0, 0.0, 2 * np.pi * rng.integers(2, 5) * rng.choice([-1, 1])], u, dt
+
+
+def special_controls(metric, draw=special_control):
+    """Draws that tell who forgets the robot that turns on the spot, drives straight on, or rests."""
+    return tuple(
+        (functools.partial(draw, moves=moves), metric, IN_CURVES_ONLY.format(does))
+        for moves, does in (
+            ((0, 1), "turns on the spot, v = 0"),
+            ((1, 0), "drives straight on, omega = 0"),
+            ((0, 0), "rests, u = (0, 0)"),
+        )
+    )
+
+
+def special_steps(metric):
+    turns = "right, but not where theta has gathered several full turns:"
+    return (creeping, metric, CREEPING), *special_controls(metric), (gathered_turns, metric, turns)
+
+
+def whole_turns(rng):
+    """A pose and a control held so long that the robot turns by more than once around."""
+    x, u, _ = pose_control_step(rng, side=rng.choice([-1, 1]), gear=rng.choice([-1, 1]))
+    return x, u, rng.uniform(6.8, 11) / abs(u[1])
+
+
+def covariances_at_special_controls(rng, moves):
+    """Pose, its covariance, a control of which these parts are not zero, time step, covariance of the control."""
+    x, cov, u, dt, cov_u = pose_and_covariances(rng)
+    return x, cov, u * moves, dt, cov_u
 
 
 def pose_and_covariances(rng, side=1, gear=1):
@@ -142,10 +202,15 @@ def car(rng, left=True, gear=1):
     return gear * rng.uniform(0.3, 3), steering, rng.choice([-1, 1]) * rng.uniform(0.2, 0.6) + rng.uniform(1.2, 3)
 
 
-def car_nearly_straight_on(rng):
-    """The same with its wheels turned by a fraction of a degree to a few degrees."""
+def car_nearly_straight_on(rng, turned):
+    """The same with its wheels turned by less than this (rad)."""
     speed, _, wheelbase = car(rng)
-    return speed, rng.uniform(0.003, 0.05) * rng.choice([-1, 1]), wheelbase
+    return speed, rng.uniform(0.2, 1) * turned * rng.choice([-1, 1]), wheelbase
+
+
+def car_at_rest(rng, steering):
+    """A car that stands, with its wheels turned by so much."""
+    return 0.0, steering, float(car(rng)[2])
 
 
 def car_straight_on(rng):
@@ -160,9 +225,9 @@ CARS = (
 )
 
 
-def rolling(rng):
+def rolling(rng, wide=True):
     """Rim speeds of four Mecanum wheels that slip a little, and half length and half width of the robot."""
-    half_length, half_width = rng.uniform(0.15, 0.3), rng.uniform(0.32, 0.5)
+    half_length, half_width = sorted((rng.uniform(0.15, 0.3), rng.uniform(0.32, 0.5)), reverse=not wide)
     twist = rng.uniform(0.3, 1.2, 3) * rng.choice([-1, 1], 3)
     slip = rng.uniform(0.03, 0.1, 4) * rng.choice([-1, 1], 4)
     return wheels.mecanum_matrix(half_length, half_width) @ twist + slip, half_length, half_width
@@ -184,6 +249,7 @@ UNEQUAL = (
     unequal_wheels,
     functools.partial(unequal_wheels, larger=False),
     functools.partial(unequal_wheels, turns=2.5),
+    functools.partial(unequal_wheels, larger=False, turns=8.0),  # more than once around
 )
 
 # References and wrong variants ------------------------------------------------
@@ -427,16 +493,17 @@ def _arc_y_sign(x, u, dt):
     return np.array([x[0] + r * (np.sin(after) - np.sin(x[2])), x[1] + r * (np.cos(after) - np.cos(x[2])), after])
 
 
-GENTLE = "right in sharp curves, but not in gentle ones, where omega is 0.1 or 0.01 rad/s:"
+GENTLE = "right in sharp curves, but not in gentle ones, where omega is 0.1 rad/s or less:"
+LONG = "right, but not for a turn that goes more than once around, omega T beyond 2 pi:"
 ROUNDED_WHEELS = 1.1e-16  # rad/s: wheels at 0.3 and at 0.1 + 0.2 m/s turn the robot so fast, on paper
 
 
 def _straight_line_works(function, rng):
     """The limit omega -> 0: exactly straight, and near it without a jump, forward and in reverse."""
     x, dt = np.array([1.0, 2.0, rng.uniform(-3, 3)]), 0.8
-    for v in (1.5, -1.5):
-        expected = odometry.step(x, np.array([v, 0.0]), dt, "arc")
-        for omega in (0.0, 1e-9, ROUNDED_WHEELS):
+    for omega in (0.0, 1e-9, ROUNDED_WHEELS):
+        for v in (1.5, -1.5):
+            expected = odometry.step(x, np.array([v, 0.0]), dt, "arc")
             problem = _not_straight(function, x, np.array([v, omega]), dt, expected)
             if problem:
                 return problem
@@ -444,20 +511,26 @@ def _straight_line_works(function, rng):
 
 
 def _not_straight(function, x, u, dt, expected):
+    given = f"with omega = {u[1]:g}"
     with np.errstate(all="ignore"):
         try:
-            result = np.asarray(function(x, u, dt), dtype=float)
+            result = function(x, u, dt)
         except ZeroDivisionError:
             result = np.full(3, np.nan)
-    given = f"with omega = {u[1]:g}"
-    if result.shape != (3,) or not np.isfinite(result).all():
+    if result is None:
+        return f"right on curves, but {given} it returned None: is a `return` missing there?"
+    result = np.asarray(result, dtype=float)
+    if result.shape != (3,):
+        return f"right on curves, but {given} it returns an array of shape {result.shape}. A pose has shape (3,)."
+    if not np.isfinite(result).all():
         return f"right on curves, but {given} the result is not finite: the radius v / omega has no value there."
     if metrics.PlanarPoses(1e-6).equal(result, expected):
         return None
     if u[1] == ROUNDED_WHEELS:
         return (
             f"right on curves and for omega = 0, but {given} (wheels at 0.3 and 0.1 + 0.2 m/s give that) the robot should drive "
-            "straight on. A radius of 10^16 m has no digits left for the difference of two sines: take the chord."
+            "straight on. If you compute with the radius: one of 10^16 m leaves no digits for the difference of two sines. "
+            "The chord has no radius in it."
         )
     return f"right on curves, but {given} the robot should drive straight on; the result is off."
 
@@ -570,6 +643,8 @@ def _without_carrying():
     return (F_u @ cov_u @ np.swapaxes(F_u, -1, -2)).sum(0)
 
 
+POSE_AND_COV = metrics.Several(metrics.PlanarPoses(), metrics.Numbers(1e-9), names=("pose", "covariance"))
+
 CHAPTER = Chapter(
     "07-dead-reckoning",
     title="Lateration and dead reckoning",
@@ -584,7 +659,7 @@ CHAPTER = Chapter(
         Exercise(
             "lateration_residual",
             reference=lateration_residual,
-            draw=several_circles,
+            draw=tuple(functools.partial(several_circles, n=n) for n in (3, 5, 2, 4)),
             fixed={"position": "a place in the plane"},
             metric=metrics.Numbers(1e-9),
             hints=(
@@ -663,6 +738,11 @@ CHAPTER = Chapter(
                 "start": "a place in the plane",
             },
             metric=metrics.Numbers(1e-8, "m"),
+            noisy=(
+                from_the_position_itself,
+                metrics.Numbers(1e-8, "m"),
+                "right, but not from a start that is the position itself:",
+            ),
             hints=(
                 "Replace the residuals by their tangent planes, go to where those are zero, repeat.",
                 "Row i of the Jacobian is 2 (position - landmark_i). The step solves J step = -residual. Twenty times over: Jacobian and residual of the present position, then the step.",
@@ -723,11 +803,14 @@ CHAPTER = Chapter(
                     id="newton_lateration-52342d",
                 ),
                 Mistake(
-                    lambda L, d, s: np.zeros(2), "You return the last step, which is zero by then, not the position."
+                    lambda L, d, s: np.zeros(2),
+                    "You return zeros. Is it the last step, or the residuals, which are zero by then? The position is asked for.",
+                    id="newton_lateration-a92204",
                 ),
                 Mistake(
                     lambda L, d, s: np.full(2, np.nan),
-                    "The search runs off to infinity: the step must solve J step = -f, with J = 2 (position - landmarks) at the present position.",
+                    "No number comes out: the search runs off to infinity, or something is divided by zero. The step must solve J step = -f, with J = 2 (position - landmarks) at the present position.",
+                    id="newton_lateration-552b1c",
                 ),
             ],
         ),
@@ -744,9 +827,23 @@ CHAPTER = Chapter(
             draw=WHEELS,
             metric=metrics.Numbers(1e-9),
             noisy=(
-                wheels_nearly_alike,
-                metrics.Numbers(1e-9),
-                "right, but not where the wheels run nearly alike, by less than 3 cm/s apart:",
+                *(
+                    (
+                        functools.partial(wheels_nearly_alike, apart=apart),
+                        metrics.Numbers(1e-9),
+                        f"right, but not where the wheels run nearly alike, by less than {1000 * apart:g} mm/s apart:",
+                    )
+                    for apart in (0.03, 0.0001)
+                ),
+                *(
+                    (
+                        functools.partial(one_wheel_stands, left=left),
+                        metrics.Numbers(1e-9),
+                        "right, but not where one of the wheels stands still:",
+                    )
+                    for left in (True, False)
+                ),
+                (wheels_at_rest, metrics.Numbers(1e-9), "right, but not where both wheels stand still:"),
             ),
             hints=(
                 "The middle of the axle moves with the mean of both wheels; what differs between them turns the robot.",
@@ -821,7 +918,7 @@ CHAPTER = Chapter(
             draw=STEPS,
             fixed=PLANAR,
             metric=metrics.PlanarPoses(),
-            noisy=(creeping, metrics.PlanarPoses(), CREEPING),
+            noisy=special_steps(metrics.PlanarPoses()),
             hints=(
                 "Drive the way v T along the old heading, then turn.",
                 "x' = x + v T cos(theta), y' = y + v T sin(theta), theta' = theta + omega T.",
@@ -860,7 +957,7 @@ CHAPTER = Chapter(
             draw=STEPS,
             fixed=PLANAR,
             metric=metrics.PlanarPoses(),
-            noisy=(creeping, metrics.PlanarPoses(), CREEPING),
+            noisy=special_steps(metrics.PlanarPoses()),
             hints=(
                 "While it drives the robot turns by omega T; on average it looked half of that aside.",
                 "As before, with theta + omega T / 2 inside cosine and sine.",
@@ -913,9 +1010,13 @@ CHAPTER = Chapter(
             draw=STEPS,
             fixed=PLANAR,
             metric=metrics.PlanarPoses(1e-7),  # thousands of short steps are right as well
-            noisy=tuple(
-                (functools.partial(gentle_curve, omega=omega), metrics.PlanarPoses(1e-6), GENTLE)
-                for omega in (0.1, 0.01)
+            noisy=(
+                *(
+                    (functools.partial(gentle_curve, omega=omega), metrics.PlanarPoses(1e-6), GENTLE)
+                    for omega in (0.1, 0.01, 1e-3, 1e-4)
+                ),
+                (whole_turns, metrics.PlanarPoses(1e-3), LONG),
+                *special_controls(metrics.PlanarPoses(1e-7)),
             ),
             properties=(_straight_line_works,),
             hints=(
@@ -1025,7 +1126,7 @@ CHAPTER = Chapter(
             draw=EITHER_WAY,
             fixed=PLANAR,
             metric=metrics.Numbers(1e-5),
-            noisy=(creeping, metrics.Numbers(1e-5), CREEPING),
+            noisy=special_steps(metrics.Numbers(1e-5)),
             hints=(
                 "Change x, y or theta a little: what does it change in the pose after the step?",
                 "A shift of x or y is passed on as it is. A turn of theta swings the way v T sideways.",
@@ -1119,7 +1220,7 @@ CHAPTER = Chapter(
             draw=EITHER_WAY,
             fixed=PLANAR,
             metric=metrics.Numbers(1e-5),
-            noisy=(creeping, metrics.Numbers(1e-5), CREEPING),
+            noisy=special_steps(metrics.Numbers(1e-5)),
             hints=(
                 "Three rows (x, y, theta), two columns (v, omega).",
                 "A little more v moves the robot by T along the heading; a little more omega turns it by T.",
@@ -1199,12 +1300,14 @@ CHAPTER = Chapter(
             fixed={"u": PLANAR["u"]},
             metric=metrics.Numbers(1e-9),
             noisy=[
-                (
-                    ON_THE_SPOT,
-                    metrics.Numbers(1e-9),
-                    "right while the robot drives, but not where it turns on the spot, v = 0:",
-                ),
-                (STRAIGHT_ON, metrics.Numbers(1e-9), "right while the robot turns, but not straight on, omega = 0:"),
+                (functools.partial(noisy_control, signs=signs), metrics.Numbers(1e-9), IN_CURVES_ONLY.format(does))
+                for signs, does in (
+                    ((0, 1), "turns on the spot, v = 0"),
+                    ((0, -1), "turns to the right on the spot"),
+                    ((1, 0), "drives straight on, omega = 0"),
+                    ((-1, 0), "drives straight back"),
+                    ((0, 0), "rests, u = (0, 0)"),
+                )
             ],
             hints=(
                 "A diagonal matrix: the variance of v and the variance of omega.",
@@ -1368,7 +1471,8 @@ CHAPTER = Chapter(
             reference=propagate,
             draw=tuple(functools.partial(pose_and_covariances, side=s, gear=g) for g in (1, -1) for s in (1, -1)),
             fixed=PLANAR | {"cov": "the covariance of a planar pose", "cov_u": "the covariance of v and omega"},
-            metric=metrics.Several(metrics.PlanarPoses(), metrics.Numbers(1e-9), names=("pose", "covariance")),
+            metric=POSE_AND_COV,
+            noisy=special_controls(POSE_AND_COV, covariances_at_special_controls),
             hints=(
                 "The pose takes the step. The covariance takes the old uncertainty along and adds that of the control.",
                 "cov' = F_x cov F_x^T + F_u cov_u F_u^T, with both Jacobians at the old pose.",
@@ -1704,9 +1808,22 @@ CHAPTER = Chapter(
             draw=CARS,
             metric=metrics.Numbers(1e-9),
             noisy=(
-                car_nearly_straight_on,
-                metrics.Numbers(1e-9),
-                "right, but not where the wheels are turned by less than 3 degrees:",
+                *(
+                    (
+                        functools.partial(car_nearly_straight_on, turned=np.radians(turned)),
+                        metrics.Numbers(1e-9),
+                        f"right, but not where the wheels are turned by less than {turned:g} degrees:",
+                    )
+                    for turned in (3, 0.005)
+                ),
+                *(
+                    (
+                        functools.partial(car_at_rest, steering=steering),
+                        metrics.Numbers(1e-9),
+                        "right for a car that drives, but not for one that stands:",
+                    )
+                    for steering in (0.4, 0.0)
+                ),
             ),
             hints=(
                 "All wheels turn about one point on the line of the rear axle. How far aside is it?",
@@ -1783,7 +1900,7 @@ CHAPTER = Chapter(
         Exercise(
             "mecanum_twist",
             reference=mecanum_twist,
-            draw=rolling,
+            draw=(rolling, functools.partial(rolling, wide=False)),
             fixed={"speeds": "a Mecanum robot has four wheels"},
             metric=metrics.Numbers(1e-9),
             hints=(

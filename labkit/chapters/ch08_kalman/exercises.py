@@ -42,11 +42,11 @@ def mixed_measurement(rng, n, m, off=1.0, sure=1.0):
     return x, covariance(rng, n, sure), C @ x + off * rng.normal(size=m), C, covariance(rng, m, 0.5 * sure)
 
 
-def measured_often(rng, n, m, sure=1.0):
-    """What is known of a state, and several measurements of the same mixtures of it; sure: how small covariances are."""
+def measured_often(rng, n, m, k, sure=1.0):
+    """What is known of a state, and k measurements of the same mixtures of it; sure: how small covariances are."""
     x = rng.normal(size=n) * 3
     C, cov_z = rng.normal(size=(m, n)), covariance(rng, m, 0.5 * sure)
-    z = C @ x + rng.multivariate_normal(np.zeros(m), cov_z, int(rng.integers(3, 7)))
+    z = C @ x + rng.multivariate_normal(np.zeros(m), cov_z, k)
     return x + sure**0.5 * rng.normal(size=n), covariance(rng, n, sure), z, C, cov_z
 
 
@@ -72,6 +72,12 @@ def steady_system(rng, n, m):
     return A, np.eye(m, n) + 0.3 * rng.normal(size=(m, n)), covariance(rng, n, 0.05), covariance(rng, m, 0.3)
 
 
+def growing_system(rng):
+    """States of which one grows by itself, all of them measured."""
+    A = np.array([[rng.uniform(1.1, 1.4), 0.2], [0.0, rng.uniform(0.7, 0.95)]])
+    return A, np.eye(2) + 0.2 * rng.uniform(-1, 1, (2, 2)), covariance(rng, 2, 0.05), covariance(rng, 2, 0.3)
+
+
 def slow_system(rng):
     """States that stay as they are, but for a noise a few thousandths of the sensor's: some hundred rounds pass before
     the gain stands still, from a covariance far too large or far too small.
@@ -95,6 +101,20 @@ def landmark_aside(rng, side, turned):
     return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
 
 
+def landmark_along_an_axis(rng, toward):
+    """A pose and a landmark of which one coordinate is the robot's own."""
+    x, _ = seen_landmark(rng)
+    return x, x[:2] + rng.uniform(1.5, 6) * np.array(toward)
+
+
+AXES = ((1, 0), (0, 1), (-1, 0), (0, -1))
+ALONG_AN_AXIS = "right, but not where the landmark lies exactly along an axis of the map, dx = 0 or dy = 0:"
+
+
+def along_the_axes(metric):
+    return [(functools.partial(landmark_along_an_axis, toward=toward), metric, ALONG_AN_AXIS) for toward in AXES]
+
+
 def turned_several_times(rng):
     """A pose whose heading has gathered several turns, as a sum of steps does, and a landmark."""
     x, landmark = seen_landmark(rng)
@@ -110,6 +130,11 @@ def landmark_behind(rng, side):
 
 def within_half_a_turn(rng):
     return (rng.uniform(-3, 3),)
+
+
+def about_half_a_turn(rng, sign, beyond):
+    """An angle hardly short of half a turn, or hardly beyond."""
+    return (sign * (np.pi + beyond * rng.uniform(0.002, 0.02)),)
 
 
 def turned_too_far(rng, sign, gathered):
@@ -135,18 +160,24 @@ def pose_control_step(rng, ahead=1):
     return x, u, rng.uniform(0.2, 0.9)
 
 
-def filter_step(rng, ahead=1, astray=0.2):
-    """Everything one step of the landmark filter needs; the bearing innovation crosses +-pi.
+def special_control(rng, moves):
+    """A pose, a control of which these parts are not zero, and a time step."""
+    x, u, dt = pose_control_step(rng)
+    return x, u * moves, dt
 
-    astray: how far the measured distance may be off (m).
+
+def filter_step(rng, ahead=1, astray=0.2, side=1, seam=True):
+    """Everything one step of the landmark filter needs; the bearing innovation crosses +-pi if this is a seam.
+
+    astray: how far the measured distance may be off (m); side: of the innovation of the bearing.
     """
     x, u, dt = pose_control_step(rng, ahead)
     cov, cov_u = covariance(rng, 3, 0.01), covariance(rng, 2, 0.02)
     moved = odometry.step(x, u, dt, "euler")
-    away = moved[2] + np.pi - rng.uniform(0.005, 0.03)
+    away = moved[2] + side * (np.pi - rng.uniform(0.005, 0.03) if seam else rng.uniform(0.2, 1.5))
     landmark = moved[:2] + rng.uniform(2, 5) * np.array([np.cos(away), np.sin(away)])
     off = rng.uniform(0.8, 1.0) * astray * (1 if astray > 1 else rng.choice([-1, 1]))
-    z = ekf.measurement(moved, landmark[None])[0] + [off, rng.uniform(0.06, 0.12)]
+    z = ekf.measurement(moved, landmark[None])[0] + [off, side * rng.uniform(0.06, 0.12)]
     z[1] = wrapped(z[1])
     return x, cov, u, dt, cov_u, z, landmark, covariance(rng, 2, 0.003)
 
@@ -201,6 +232,9 @@ SURPRISES = (
     functools.partial(surprise_of, m=3, wanted=(0.3, 0.9)),
     functools.partial(surprise_of, m=3, wanted=(1.1, 3.0)),
     functools.partial(surprise_of, m=1, wanted=(1.1, 3.0)),
+    functools.partial(surprise_of, m=1, wanted=(0.3, 0.9)),
+    functools.partial(surprise_of, m=6, wanted=(0.3, 0.9)),
+    functools.partial(surprise_of, m=6, wanted=(1.1, 3.0)),
 )
 
 
@@ -465,7 +499,7 @@ def ekf_step(x, cov, u, dt, cov_u, z, landmark, cov_z):
 
 def _ekf(
     noise=True,
-    wrap=True,
+    wrap=wrapped,
     at="predicted",
     H_at="predicted",
     G_at="old",
@@ -485,7 +519,7 @@ def _ekf(
         cov = (G_x @ cov @ G_x.T if carry else cov) + (G_u @ control(cov_u, dt) @ G_u.T if noise else 0)
         H = measurement_jacobian(pose[H_at], landmark)
         y = z - measurement(pose[at], landmark)
-        y[1] = wrapped(y[1]) if wrap else y[1]
+        y[1] = wrap(y[1])
         K = gain(cov, H, cov_z)
         return (moved, cov) if short else (moved + K @ y, shrink(cov, K, H))
 
@@ -611,6 +645,9 @@ STATE_AND_COV = metrics.Several(metrics.Numbers(1e-8), metrics.Numbers(1e-8), na
 
 FUSED = metrics.Several(metrics.Numbers(1e-9, "m"), metrics.Numbers(1e-9), names=("position", "variance"))
 
+JACOBIANS = metrics.Several(metrics.Numbers(1e-5), metrics.Numbers(1e-5), names=("G_x", "G_u"))
+ONE_STATE = "right, but not for a single state:"
+
 CHAPTER = Chapter(
     "08-kalman",
     title="Kalman filters",
@@ -625,6 +662,14 @@ CHAPTER = Chapter(
                 functools.partial(prediction, n=4, k=1, sure=100.0),
             ),
             metric=STATE_AND_COV,
+            noisy=(
+                (functools.partial(prediction, n=1, k=1), STATE_AND_COV, ONE_STATE),
+                (
+                    functools.partial(prediction, n=2, k=3),
+                    STATE_AND_COV,
+                    "right, but not for more controls than states:",
+                ),
+            ),
             hints=(
                 "The state follows the model; its uncertainty is carried along, and that of the control is added.",
                 "x = A x + B u and cov = A cov A^T + B cov_u B^T (lines 2 and 3 of the lecture's algorithm).",
@@ -751,6 +796,7 @@ CHAPTER = Chapter(
                 )
             ),
             metric=STATE_AND_COV,
+            noisy=(functools.partial(mixed_measurement, n=1, m=1), STATE_AND_COV, ONE_STATE),
             hints=(
                 "How surprising is the measurement, and how much of the surprise belongs to the state?",
                 "S = C cov C^T + cov_z, K = cov C^T S^-1, x + K (z - C x), (I - K C) cov.",
@@ -1126,10 +1172,23 @@ CHAPTER = Chapter(
             ),
             metric=metrics.Numbers(1e-3),
             noisy=(
-                slow_system,
-                metrics.Numbers(1e-3),
-                "right where the gain settles soon, but not where the system's noise is tiny beside the sensor's, and it takes "
-                "hundreds of rounds (do you stop earlier?):",
+                (
+                    slow_system,
+                    metrics.Numbers(1e-3),
+                    "right where the gain settles soon, but not where the system's noise is tiny beside the sensor's, and it takes "
+                    "hundreds of rounds (do you stop earlier?):",
+                ),
+                (
+                    growing_system,
+                    metrics.Numbers(1e-3),
+                    "right, but not for a system of which a state grows by itself, by an eigenvalue of A above 1:",
+                ),
+                (functools.partial(steady_system, n=1, m=1), metrics.Numbers(1e-3), ONE_STATE),
+                (
+                    functools.partial(steady_system, n=2, m=3),
+                    metrics.Numbers(1e-3),
+                    "right, but not for more measured numbers than states:",
+                ),
             ),
             hints=(
                 "The gain does not depend on the data. Run the covariance alone until the gain stands still.",
@@ -1294,9 +1353,19 @@ CHAPTER = Chapter(
             draw=(*each_way(turned_too_far, "sign", "gathered"), within_half_a_turn),
             metric=metrics.Numbers(1e-9, "rad"),
             noisy=(
-                turned_often,
-                metrics.Numbers(1e-9, "rad"),
-                "right for a few turns, but not for an angle that has gathered dozens of them:",
+                (
+                    turned_often,
+                    metrics.Numbers(1e-9, "rad"),
+                    "right for a few turns, but not for an angle that has gathered dozens of them:",
+                ),
+                *(
+                    (
+                        draw,
+                        metrics.Numbers(1e-9, "rad"),
+                        "right, but not close to half a turn, a few thousandths of a radian inside or outside:",
+                    )
+                    for draw in each_way(about_half_a_turn, "sign", "beyond")
+                ),
             ),
             draws=12,
             hints=(
@@ -1386,6 +1455,7 @@ CHAPTER = Chapter(
             fixed={"x": POSE, "landmark": LANDMARK},
             draws=12,
             metric=metrics.Numbers(1e-9),
+            noisy=along_the_axes(metrics.Numbers(1e-9)),
             hints=(
                 "How far away is the landmark, and in which direction seen from where the robot looks?",
                 "d = sqrt(dx^2 + dy^2), alpha = atan2(dy, dx) - theta, with (dx, dy) from robot to landmark.",
@@ -1506,7 +1576,8 @@ CHAPTER = Chapter(
                     "right, but not where the landmark stands nearly behind the robot: a difference of two bearings is to be wrapped:",
                 )
                 for side in (1, -1)
-            ],
+            ]
+            + along_the_axes(metrics.Numbers(1e-5)),
             hints=(
                 "Move the robot a little toward the landmark, then across, then turn it. What do distance and bearing do?",
                 "Row 0: (-dx/r, -dy/r, 0). Row 1: (dy/q, -dx/q, -1) with q = r^2. Compute dx, dy, q and r first, then write both rows as one array.",
@@ -1619,7 +1690,19 @@ CHAPTER = Chapter(
             reference=motion_jacobians,
             draw=each_way(pose_control_step, "ahead"),
             fixed={"x": POSE, "u": CONTROL},
-            metric=metrics.Several(metrics.Numbers(1e-5), metrics.Numbers(1e-5), names=("G_x", "G_u")),
+            metric=JACOBIANS,
+            noisy=tuple(
+                (
+                    functools.partial(special_control, moves=moves),
+                    JACOBIANS,
+                    f"right in curves, but not where the robot {does}:",
+                )
+                for moves, does in (
+                    ((0, 1), "turns on the spot, v = 0"),
+                    ((1, 0), "drives straight on, omega = 0"),
+                    ((0, 0), "rests, u = (0, 0)"),
+                )
+            ),
             hints=(
                 "They are F_x and F_u of chapter 7 under another letter.",
                 "G_x is the identity with -v T sin(theta) and v T cos(theta) in the last column; G_u has T cos, T sin and T.",
@@ -1725,8 +1808,10 @@ CHAPTER = Chapter(
             reference=ekf_step,
             draw=(
                 filter_step,
-                functools.partial(filter_step, ahead=-1),
+                functools.partial(filter_step, ahead=-1, side=-1),
                 functools.partial(filter_step, astray=5.0),
+                functools.partial(filter_step, seam=False),
+                functools.partial(filter_step, seam=False, side=-1),
             ),
             fixed={
                 "x": POSE,
@@ -1760,8 +1845,16 @@ CHAPTER = Chapter(
                     "Your innovation mixes degrees and radians: `measurement` gives the bearing in radians already.",
                 ),
                 Mistake(
-                    _ekf(wrap=False),
+                    _ekf(wrap=float),
                     "The bearing innovation is not wrapped: a measurement just across +-pi throws your robot around by a full turn.",
+                ),
+                Mistake(
+                    _ekf(wrap=lambda angle: angle % (2 * np.pi)),
+                    "Your bearing innovation lies between 0 and 2 pi: a hundredth to the right becomes 6.27. Wrap it to [-pi, pi).",
+                ),
+                Mistake(
+                    _ekf(wrap=lambda angle: abs(wrapped(angle))),
+                    "Your bearing innovation has lost its sign, by an absolute value or an arccosine: a landmark seen farther right counts as if farther left.",
                 ),
                 Mistake(
                     _through_the_linear_filter(True, False),
@@ -1914,6 +2007,7 @@ CHAPTER = Chapter(
                 *each_way(estimate_and_truth, "side"),
                 functools.partial(estimate_and_truth, astray=5.0),
                 functools.partial(estimate_and_truth, turns=2, sure=5.0),
+                *(functools.partial(estimate_and_truth, side=side, turns=-1) for side in (1, -1)),
             ),
             draws=6,
             fixed={"truth": POSE, "x": POSE, "cov": POSE},
@@ -2088,10 +2182,23 @@ CHAPTER = Chapter(
             "batch_estimate",
             reference=batch_estimate,
             draw=tuple(
-                functools.partial(measured_often, n=n, m=m, sure=sure)
-                for n, m, sure in ((2, 1, 1.0), (3, 2, 100.0), (2, 2, 1e-3))
+                functools.partial(measured_often, n=n, m=m, k=k, sure=sure)
+                for n, m, k, sure in ((2, 1, 3, 1.0), (3, 2, 9, 100.0), (2, 2, 6, 1e-3))
             ),
             metric=STATE_AND_COV,
+            noisy=(
+                (
+                    functools.partial(measured_often, n=2, m=2, k=1),
+                    STATE_AND_COV,
+                    "right for several measurements, but not for a single one:",
+                ),
+                (functools.partial(measured_often, n=1, m=1, k=4), STATE_AND_COV, ONE_STATE),
+                (
+                    functools.partial(measured_often, n=2, m=3, k=4),
+                    STATE_AND_COV,
+                    "right, but not for measurements of more numbers than there are states:",
+                ),
+            ),
             hints=(
                 "What is known before is one more measurement, of the state itself, with its own covariance.",
                 "N = cov0^-1 + sum C^T cov_z^-1 C and b = cov0^-1 x0 + sum C^T cov_z^-1 z; then x = N^-1 b, with covariance N^-1.",

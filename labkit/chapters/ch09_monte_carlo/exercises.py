@@ -42,20 +42,26 @@ def scan_at_a_pose(rng, count=None):
 
 
 def landmarks_at_a_pose(rng, astray=0.0):
-    """pose, z, landmarks, both standard deviations; one bearing lies across the seam at 180 deg.
+    """pose, z, landmarks, both standard deviations; two bearings lie across the seam at 180 deg, from either side.
 
     astray: how far the measured ranges are off beyond their noise (m), as seen from a particle in a wrong room; the
-    bearings, but that across the seam, are then off by a radian or so.
+    bearings, but those across the seam, are then off by a radian or so.
     """
     m = int(rng.integers(3, 6))
     pose = np.array([*rng.uniform(-2, 2, 2), rng.uniform(-3, 3)])
-    phi = np.array([math.pi - 0.02, *rng.uniform(-2, 2, m - 1)])
+    phi = np.array([math.pi - 0.02, 0.02 - math.pi, *rng.uniform(-2, 2, m - 2)])
     r = rng.uniform(2, 6, m)
     angle = pose[2] + phi
     landmarks = pose[:2] + r[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-    off = planar.wrap_angle(phi + (0.05, *(0.03 + 0.1 * astray) * rng.normal(size=m - 1)))
+    off = planar.wrap_angle(phi + (0.05, -0.05, *(0.03 + 0.1 * astray) * rng.normal(size=m - 2)))
     z = np.column_stack([r + astray + 0.1 * rng.normal(size=m), off])
     return pose, z, landmarks, float(rng.uniform(0.15, 0.4)), float(rng.uniform(0.03, 0.08))
+
+
+def one_landmark(rng):
+    """The same with a single landmark."""
+    pose, z, landmarks, *stds = landmarks_at_a_pose(rng)
+    return pose, z[:1], landmarks[:1], *stds
 
 
 def landmarks_from_a_wrong_room(rng):
@@ -90,6 +96,16 @@ def scan_by_a_sharp_sensor(rng):
     return grid, pose, 0.5 * ranges, bearings, float(rng.uniform(0.002, 0.004))
 
 
+def scan_on_another_map(rng):
+    """grid, pose, ranges, bearings, std on a map with other cells and another origin than the building's."""
+    cells = np.full((60, 80), maps.FREE)
+    cells[[0, -1]], cells[:, [0, -1]] = maps.OCCUPIED, maps.OCCUPIED
+    cells[rng.integers(5, 55, 8), rng.integers(5, 75, 8)] = maps.OCCUPIED
+    grid = maps.OccupancyGrid(cells, 0.05, (-7.0, 4.0))
+    pose = np.array([rng.uniform(-5.3, -4.7), rng.uniform(5.3, 5.7), rng.uniform(-3, 3)])
+    return grid, pose, rng.uniform(0.3, 1.1, 12), np.linspace(-2.3, 2.3, 12), float(rng.uniform(0.15, 0.4))
+
+
 def whole_scan(draw):
     """The draw with as many beams as the scanner has, and so wide a std that a plain product of their densities is zero
     in float64.
@@ -101,10 +117,12 @@ def whole_scan(draw):
     return drawn
 
 
-def plain_ray(rng):
+def plain_ray(rng, way=None):
     """grid, pose, bearing, r_max of a ray that meets a wall squarely enough for any way of stepping along it, and whose
     range differs from those without heading or bearing, from the mirrored one, and from that of the last wall behind: a
     slow answer gets few draws.
+
+    way: signs of its direction in x and y, any if None.
     """
     grid = building().grid
     while True:
@@ -113,6 +131,7 @@ def plain_ray(rng):
             around, wrong = r[:5], r[5:]
             squarely = np.ptp(around) < min(0.12 * around[2], 0.25) and around[2] > 1.0
             apart = np.diff(np.sort(wrong)).min() > 0.2  # none of these slips is mistaken for another one
+            apart = apart and way in (None, (np.sign(math.cos(pose[2] + b)), np.sign(math.sin(pose[2] + b))))
             if squarely and apart and np.abs(wrong - around[2]).min() > 0.3:
                 steps = _hits(grid, pose, b, R_MAX, grid.resolution / 2)
                 stepped = steps.min(initial=R_MAX)  # half a cell at a time: a wall's corner is easily stepped over
@@ -134,18 +153,35 @@ def _casts(grid, poses, bearings):
     return grid.cast(np.dstack([xy, angles]), np.zeros(1), R_MAX)[..., 0]
 
 
+EVERY_WAY = tuple(functools.partial(plain_ray, way=way) for way in ((1, 1), (-1, 1), (-1, -1), (1, -1)))
+
+
+def long_ray(rng):
+    """A plain ray, and its range, which is longer than 3.5 m."""
+    while True:
+        *ray, r_max = plain_ray(rng)
+        if (r := maps.walk_ray(*ray, r_max)) > 3.5:
+            return ray, r
+
+
 def short_ray(rng):
     """The same with an r_max at which nothing has been hit yet."""
-    grid, pose, bearing, r_max = plain_ray(rng)
-    return grid, pose, bearing, 0.6 * maps.walk_ray(grid, pose, bearing, r_max)
+    ray, r = long_ray(rng)
+    return *ray, 0.6 * r
 
 
 def ray_that_just_arrives(rng):
     """The same with an r_max a little behind the wall."""
-    while True:
-        grid, pose, bearing, r_max = plain_ray(rng)
-        if (r := maps.walk_ray(grid, pose, bearing, r_max)) > 3.5:
-            return grid, pose, bearing, r + rng.uniform(0.25, 0.35)
+    ray, r = long_ray(rng)
+    return *ray, r + rng.uniform(0.25, 0.35)
+
+
+def ray_along_an_axis(rng, toward):
+    """A ray straight against an axis of a map that does not begin at (0, 0), through the middles of its cells."""
+    cells = np.full((40, 50), maps.FREE)
+    cells[[0, -1]], cells[:, [0, -1]] = maps.OCCUPIED, maps.OCCUPIED
+    xy = np.array([-3.0, 2.0]) + 0.1 * (rng.integers(15, 25, 2) + 0.5)
+    return maps.OccupancyGrid(cells, 0.1, (-3.0, 2.0)), np.array([*xy, toward]), 0.0, R_MAX
 
 
 def ray_past_the_unknown(rng):
@@ -204,6 +240,13 @@ def cloud_weights(rng):
     return (rng.exponential(size=rng.integers(20, 40)) ** rng.uniform(0.2, 3) * 50 ** rng.uniform(-2, 1),)
 
 
+def cloud_with_dead_particles(rng):
+    """The same, some of them zero."""
+    (w,) = cloud_weights(rng)
+    w[rng.choice(len(w), 5, replace=False)] = 0.0
+    return (w,)
+
+
 def log_weights(rng, level, possible=False):
     """Logarithms of weights about this level, one or two of them impossible (-inf) unless all are `possible`."""
     logs = level + rng.normal(0, 2, rng.integers(6, 15))
@@ -213,9 +256,15 @@ def log_weights(rng, level, possible=False):
 
 
 def logs_far_apart(rng):
-    """Logarithms of which the largest lie more than 1000 above the others, and above their mean."""
-    logs = np.concatenate([900 + rng.normal(0, 2, rng.integers(2, 4)), -2000 + rng.normal(0, 2, rng.integers(5, 9))])
-    return (rng.permutation(logs),)
+    """Logarithms of which the largest lie more than 1000 above the others, the first and last ones, and their mean."""
+    low = -2000 + rng.normal(0, 2, rng.integers(5, 9))
+    logs = rng.permutation(np.concatenate([900 + rng.normal(0, 2, rng.integers(2, 4)), low[2:]]))
+    return (np.array([low[0], *logs, low[1]]),)
+
+
+def one_possible(rng, others):
+    """The logarithm of a weight, alone or among so many impossible ones."""
+    return (rng.permutation([rng.uniform(-900, -800), *[-np.inf] * others]),)
 
 
 LOG_WEIGHTS = (
@@ -225,9 +274,9 @@ LOG_WEIGHTS = (
 )
 
 
-def cycle_of_weights(rng, step):
+def cycle_of_weights(rng, step, n=None):
     """Weights, a likelihood for each particle, the number of the step, and the length of a cycle; step: (rng, n) -> k."""
-    m, n = rng.integers(5, 12), int(rng.integers(3, 7))
+    m, n = rng.integers(5, 12), n or int(rng.integers(3, 7))
     weights = rng.uniform(0.1, 1, m)
     return weights / weights.sum(), rng.uniform(0.01, 3, m), int(step(rng, n)), n
 
@@ -242,12 +291,24 @@ STEPS = (
 )
 
 
-def row_of_depths(rng):
+def row_of_depths(rng, odd=False):
     """Depths of a row of columns, some too near, too far, on a limit or missing; opening angle and limits."""
-    n, near, far = int(rng.integers(12, 24)), float(rng.uniform(0.4, 1.0)), float(rng.uniform(3.0, 5.0))
+    n, near, far = 2 * int(rng.integers(6, 12)) + odd, float(rng.uniform(0.4, 1.0)), float(rng.uniform(3.0, 5.0))
     depth = rng.uniform(1.1 * near, 0.95 * far, n)
     depth[rng.choice(n, 6, replace=False)] = 0.0, 0.6 * near, near, far, 1.2 * far, 1.5 * far
     return depth, float(rng.uniform(0.7, 1.6)), near, far
+
+
+def nothing_seen(rng):
+    """The same with all columns too near, too far or missing."""
+    depth, field_of_view, near, far = row_of_depths(rng)
+    return np.where(np.arange(len(depth)) % 2, 0.5 * near, 1.5 * far), field_of_view, near, far
+
+
+def one_column(rng):
+    """A single column, in the middle of the picture."""
+    depth, field_of_view, near, far = row_of_depths(rng)
+    return np.array([rng.uniform(near, far)]), field_of_view, near, far
 
 
 def cloud_and_threshold(rng, slip):
@@ -275,8 +336,14 @@ def at_the_threshold(rng):
     return rng.permutation(2.0 ** rng.integers(-2, 3) * (np.arange(m) < n)), float(n / m)
 
 
+def averages_that_rise(rng):
+    """w_mean, w_slow, w_fast, alpha_slow, alpha_fast where the quick average is above the slow one, and stays there."""
+    slow = rng.uniform(0.2, 0.8)
+    return slow * rng.uniform(1.2, 1.9), slow, slow * rng.uniform(1.02, 1.2), rng.uniform(0.02, 0.1), 0.3
+
+
 def averages(rng, low=False):
-    """w_mean, w_slow, w_fast, alpha_slow, alpha_fast: a drop as often as a rise; low: a share above one half."""
+    """The same with a drop as often as a rise; low: a share above one half."""
     slow = rng.uniform(0.2, 0.8)
     return (
         slow * (rng.uniform(0.1, 0.4) if low else rng.uniform(0.1, 1.9)),
@@ -905,8 +972,11 @@ _moved_by_the_rng = _listens(lambda f, rng: f(np.zeros((3, 3)), np.array([1.0, 0
 
 
 def _valid(resample, rng):
-    found = _draws(resample, np.array([0.1, 0.7, 0.1, 0.1]), rng, 3)
-    return found + "." if isinstance(found, str) else None
+    for weights in (np.array([0.1, 0.7, 0.1, 0.1]), np.array([2.5])):
+        found = _draws(resample, weights, rng, 3)
+        if isinstance(found, str):
+            return f"with the weights {weights.tolist()}: {found}."
+    return None
 
 
 WEIGHTS = (np.array([0.1, 0.7, 0.1, 0.1, 0.0]), np.array([0.5, 0.25, 0.15, 0.1]), np.array([3.0, 1.0]))
@@ -1332,6 +1402,9 @@ def _hunt(id, reference, specimen, why, hints, others, good=GOOD, extra=("rng",)
     )
 
 
+WEIGHTS_AND_WORD = metrics.Several(metrics.Numbers(1e-9), metrics.Exactly(), names=("weights", "resample"))
+DEPTHS = metrics.Several(metrics.Numbers(1e-9, "m"), metrics.Numbers(1e-9, "rad"), names=("ranges", "bearings"))
+
 CHAPTER = Chapter(
     "09-monte-carlo",
     title="Monte-Carlo localization",
@@ -1396,6 +1469,7 @@ CHAPTER = Chapter(
             draw=(landmarks_at_a_pose, landmarks_from_a_wrong_room, landmarks_30_deviations_off),
             fixed={"pose": POSE},
             metric=metrics.Numbers(1e-6),
+            noisy=(one_landmark, metrics.Numbers(1e-6), "right for several landmarks, but not for a single one:"),
             limit=IMPORTS,
             hints=(
                 "What range and what bearing would a robot at this pose expect? Compare them with z.",
@@ -1541,6 +1615,13 @@ CHAPTER = Chapter(
             reference=log_sum_exp,
             draw=LOG_WEIGHTS,
             metric=metrics.Numbers(1e-9),
+            noisy=tuple(
+                (functools.partial(one_possible, others=others), metrics.Numbers(1e-9), words)
+                for others, words in (
+                    (0, "right for many particles, but not for a single one:"),
+                    (4, "right, but not where all particles but one are impossible (-inf):"),
+                )
+            ),
             hints=(
                 "exp(-2000) is zero, exp(900) is infinite. Which number may be taken out of all logarithms first?",
                 "log sum exp(l) = top + log sum exp(l - top), with top the largest: then the largest term is exp(0) = 1.",
@@ -1621,7 +1702,7 @@ CHAPTER = Chapter(
         Exercise(
             "cast_ray",
             reference=maps.walk_ray,
-            draw=(plain_ray, ray_past_the_unknown),
+            draw=(*EVERY_WAY, ray_past_the_unknown),
             fixed={"pose": POSE},
             metric=metrics.Numbers(0.16, "m", absolute=True),
             noisy=[
@@ -1646,9 +1727,17 @@ CHAPTER = Chapter(
                     metrics.Numbers(0.16, "m", absolute=True),
                     "Right on longer rays, but not on one to a wall less than half a meter away (does yours begin farther out?):",
                 ),
+                *(
+                    (
+                        functools.partial(ray_along_an_axis, toward=toward),
+                        metrics.Numbers(0.16, "m", absolute=True),
+                        f"Right on other rays, but not on one straight {against} on a map that begins elsewhere than at (0, 0):",
+                    )
+                    for toward, against in ((math.pi, "against x"), (-math.pi / 2, "against y"))
+                ),
                 (
                     ray_in_a_fine_map,
-                    metrics.Numbers(0.16, "m", absolute=True),
+                    metrics.Numbers(0.05, "m", absolute=True),
                     "Right on other maps, but not on one with cells of 2 cm and a wall of one cell (is the length of a step typed in? "
                     "grid.resolution is the width of a cell):",
                 ),
@@ -1759,7 +1848,7 @@ CHAPTER = Chapter(
             "distance_field_weight",
             reference=distance_field_weight,
             draw=scan_at_a_pose,
-            fixed={"grid": "the chapter has one building", "pose": POSE},
+            fixed={"pose": POSE},
             metric=metrics.Numbers(1e-6),
             noisy=[
                 (whole_scan(scan_at_a_pose), metrics.Numbers(1e-6), "Right for few beams, but not for 541:"),
@@ -1767,6 +1856,11 @@ CHAPTER = Chapter(
                     scan_by_a_sharp_sensor,
                     metrics.Numbers(1e-6),
                     "Right where the walls are near, but not far from them:",
+                ),
+                (
+                    scan_on_another_map,
+                    metrics.Numbers(1e-6),
+                    "Right on the map of the building, but not on another one, of other cells and another origin:",
                 ),
             ],
             hints=(
@@ -1969,6 +2063,7 @@ CHAPTER = Chapter(
             reference=particles.effective_size,
             draw=cloud_weights,
             metric=metrics.Numbers(1e-9),
+            noisy=(cloud_with_dead_particles, metrics.Numbers(1e-9), "right, but not where some weights are 0:"),
             hints=(
                 "M equal weights should give M, a single heavy one should give 1, whatever the sum of the weights is.",
                 "It is the square of the sum over the sum of the squares.",
@@ -2065,7 +2160,15 @@ CHAPTER = Chapter(
             "multiply_weights",
             reference=multiply_weights,
             draw=tuple(functools.partial(cycle_of_weights, step=step) for step in STEPS),
-            metric=metrics.Several(metrics.Numbers(1e-9), metrics.Exactly(), names=("weights", "resample")),
+            metric=WEIGHTS_AND_WORD,
+            noisy=tuple(
+                (
+                    functools.partial(cycle_of_weights, step=step, n=1),
+                    WEIGHTS_AND_WORD,
+                    "right for longer cycles, but not for n = 1, where every step is one:",
+                )
+                for step in (lambda rng, n: 1, lambda rng, n: rng.integers(2, 9))
+            ),
             hints=(
                 "Between two resamplings a particle collects the likelihoods of all measurements. How do they combine?",
                 "New weight = old weight times likelihood, divided by the sum. Resample when step is a multiple of n.",
@@ -2137,7 +2240,7 @@ CHAPTER = Chapter(
         Exercise(
             "circular_mean",
             reference=circular_mean,
-            draw=(headings, functools.partial(headings, about=0.0)),
+            draw=(headings, *(functools.partial(headings, about=about) for about in (0.0, 2.0, -2.0))),
             metric=metrics.Angles(1e-9),
             hints=(
                 "The mean of 179 deg and -179 deg should be 180 deg. What could be averaged instead of angles?",
@@ -2234,7 +2337,7 @@ CHAPTER = Chapter(
         Exercise(
             "recover",
             reference=recover,
-            draw=(*[averages] * 4, averages_just_below, functools.partial(averages, low=True)),
+            draw=(*[averages] * 3, averages_that_rise, averages_just_below, functools.partial(averages, low=True)),
             metric=metrics.Several(
                 metrics.Numbers(1e-9), metrics.Numbers(1e-9), metrics.Numbers(1e-9), names=("share", "w_slow", "w_fast")
             ),
@@ -2321,9 +2424,11 @@ CHAPTER = Chapter(
         Exercise(
             "scan_from_depth",
             reference=scan_from_depth,
-            draw=row_of_depths,
-            metric=metrics.Several(
-                metrics.Numbers(1e-9, "m"), metrics.Numbers(1e-9, "rad"), names=("ranges", "bearings")
+            draw=(row_of_depths, functools.partial(row_of_depths, odd=True)),
+            metric=DEPTHS,
+            noisy=(
+                (nothing_seen, DEPTHS, "right where something is seen, but not where no column is:"),
+                (one_column, DEPTHS, "right for many columns, but not for a single one:"),
             ),
             hints=(
                 "Where on the picture is column k? Half the picture's width belongs to tan(field_of_view / 2).",

@@ -1,0 +1,110 @@
+"""Who forgets a case that the docstring admits is refused, whatever is drawn, in chapters 7 to 9."""
+
+import numpy as np
+import pytest
+
+from labkit.chapters.ch08_kalman import exercises as ch08
+from labkit.exercises import engine, session
+from labkit.exercises.engine import CORRECT
+from labkit.geometry.planar import wrap_angle
+
+ITEMS = {item.id: item for chapter in session.chapters() for item in chapter.items}
+
+
+def stands(x, u, *_):
+    return u[0] == 0 == u[1]
+
+
+def straight(x, u, *_):
+    return u[1] == 0 != u[0]
+
+
+def on_the_spot(x, u, *_):
+    return u[0] == 0 != u[1]
+
+
+def gathered(x, *_):
+    return abs(x[2]) > 10
+
+
+MODELS = ("step_euler", "step_midpoint", "step_arc", "jacobian_state", "jacobian_control", "motion_jacobians")
+FORGOTTEN = [
+    *((name, case) for name in MODELS for case in (stands, straight, on_the_spot)),
+    *((name, gathered) for name in ("step_euler", "step_midpoint", "jacobian_state", "jacobian_control")),
+    ("step_arc", lambda x, u, dt: 0 < abs(u[1]) <= 1e-3),
+    ("step_arc", lambda x, u, dt: abs(u[1] * dt) > 2 * np.pi),
+    *(("propagate", lambda x, cov, u, *_, case=case: case(x, u)) for case in (stands, straight, on_the_spot)),
+    *(("control_covariance", lambda u, *_, case=case: case(u, u)) for case in (stands, straight, on_the_spot)),
+    ("lateration_residual", lambda landmarks, *_: len(landmarks) == 2),
+    ("newton_lateration", lambda L, d, start: np.allclose(np.linalg.norm(L - start, axis=1), d, atol=1e-9)),
+    ("wheel_to_twist", lambda left, right, track: 0 < abs(right - left) < 1e-4),
+    ("wheel_to_twist", lambda left, right, track: left == 0 != right),
+    ("wheel_to_twist", lambda left, right, track: left != 0 == right),
+    ("wheel_to_twist", lambda left, right, track: left == 0 == right),
+    ("wheel_offset", lambda way, excess, track: abs(way * excess / track) > 2 * np.pi),
+    ("ackermann_twist", lambda speed, steering, wheelbase: 0 < abs(steering) < 1e-4),
+    ("ackermann_twist", lambda speed, steering, wheelbase: speed == 0),
+    ("mecanum_twist", lambda speeds, half_length, half_width: half_length > half_width),
+    ("predict_state", lambda x, *_: len(x) == 1),
+    ("predict_state", lambda x, cov, A, B, u, cov_u: len(u) > len(x)),
+    ("update", lambda x, *_: len(x) == 1),
+    ("steady_state_gain", lambda A, *_: np.abs(np.linalg.eigvals(A)).max() > 1.05),
+    ("steady_state_gain", lambda A, *_: len(A) == 1),
+    ("steady_state_gain", lambda A, C, *_: len(C) > len(A)),
+    *(("wrap_angle", lambda a, sign=sign: 0 < sign * (abs(a) - np.pi) < 0.03) for sign in (1, -1)),
+    *(
+        (name, lambda x, landmark, k=k, sign=sign: landmark[k] == x[k] and sign * (landmark - x[:2])[1 - k] > 0)
+        for name in ("measurement", "measurement_jacobian")
+        for k in (0, 1)
+        for sign in (1, -1)
+    ),
+    ("nees", lambda truth, x, cov: abs((truth - x)[2]) < np.pi),
+    ("gate", lambda y, *_: len(y) == 1),
+    ("gate", lambda y, *_: len(y) > 3),
+    ("batch_estimate", lambda x0, cov0, z, *_: len(z) == 1),
+    ("batch_estimate", lambda x0, cov0, z, C, cov_z: len(C) > len(x0)),
+    ("landmark_weight", lambda pose, z, *_: len(z) == 1),
+    ("log_sum_exp", lambda l: len(l) == 1),
+    ("log_sum_exp", lambda l: len(l) > 1 and np.isfinite(l).sum() == 1),
+    *(
+        ("cast_ray", lambda grid, x, b, r, c=c, s=s: c * np.cos(x[2] + b) > 0.05 and s * np.sin(x[2] + b) > 0.05)
+        for c in (1, -1)
+        for s in (1, -1)
+    ),
+    ("cast_ray", lambda grid, x, b, r: abs(np.cos(x[2] + b)) < 1e-9),
+    ("cast_ray", lambda grid, x, b, r: abs(np.sin(x[2] + b)) < 1e-9),
+    ("distance_field_weight", lambda grid, *_: grid.resolution != 0.1),
+    ("effective_size", lambda weights: (weights == 0).any()),
+    ("multiply_weights", lambda w, p, step, n: n == 1),
+    ("circular_mean", lambda a, w: -np.pi / 2 - 1 < np.angle(w @ np.exp(1j * a)) < -np.pi / 2),
+    ("recover", lambda m, s, f, a, b: f > s and m > s),
+    ("scan_from_depth", lambda depth, *_: len(depth) > 1 and len(depth) % 2),
+    ("scan_from_depth", lambda depth, *_: len(depth) == 1),
+    ("scan_from_depth", lambda depth, fov, near, far: not ((depth >= near) & (depth <= far)).any()),
+]
+
+
+@pytest.mark.parametrize("name, forgotten", FORGOTTEN, ids=[f"{name}-{k}" for k, (name, _) in enumerate(FORGOTTEN)])
+def test_who_forgets_a_case_is_refused(name, forgotten, monkeypatch):
+    monkeypatch.setattr(engine, "LOOKING", 0.0)
+    monkeypatch.setattr(engine, "SPECIAL", 0.0)
+    right = ITEMS[name].reference
+
+    def answer(*given):
+        return None if forgotten(*given) else right(*given)
+
+    assert all(ITEMS[name].judge(answer, rng=np.random.default_rng(seed)).status != CORRECT for seed in range(2))
+
+
+@pytest.mark.parametrize("wrap", [lambda a: a % (2 * np.pi), lambda a: abs(wrap_angle(a)), lambda a: a + 2 * np.pi])
+def test_innovations_to_either_side_and_off_the_seam_are_wrapped(wrap, monkeypatch):
+    monkeypatch.setattr(engine, "LOOKING", 0.0)
+    assert ITEMS["ekf_step"].judge(ch08._ekf(wrap=wrap), rng=np.random.default_rng(0)).status != CORRECT
+
+
+def test_what_is_wrong_of_a_robot_that_drives_straight_on_is_what_is_seen():
+    item = ITEMS["step_arc"]
+    for straight_on, words in ((None, "returned None"), (np.zeros(2), "shape (2,)")):
+        holds = item.properties[0]
+        told = holds(lambda x, u, dt, s=straight_on: item.reference(x, u, dt) if u[1] else s, np.random.default_rng(0))
+        assert words in told and "finite" not in told
