@@ -23,14 +23,15 @@ FOLDER = source.ROOT / "jupyter"
 @pytest.mark.parametrize(
     ("before", "after"), [(ZMQChannelsWebsocketConnection, PromptConnection), ("another", "another"), (None, None)]
 )
-def test_the_extension_sets_connection_and_hook_and_respects_another(before, after):
-    hooks = []
+def test_the_extension_sets_connection_and_hook_and_respects_another(before, after, monkeypatch):
+    hooks, frozen = [], []
+    monkeypatch.setattr(server.gc, "freeze", lambda: frozen.append(True))
     app = SimpleNamespace(
         web_app=SimpleNamespace(settings={server.CONNECTION: before}),
         contents_manager=SimpleNamespace(register_pre_save_hook=hooks.append),
     )
     server._load_jupyter_server_extension(app)
-    assert app.web_app.settings[server.CONNECTION] is after and hooks == [keep_language]
+    assert app.web_app.settings[server.CONNECTION] is after and hooks == [keep_language] and frozen
 
 
 def test_the_extension_is_the_one_that_is_named():

@@ -1,8 +1,11 @@
 """What Jupyter's server does differently where labkit is installed; `etc/jupyter/` of the environment loads this.
 
 Pictures leave at once (`connection`), and a notebook that was looked at stays as it is (`saving`). A server
-that was told to use another connection keeps it.
+that was told to use another connection keeps it. What it has loaded so far stays, and Python no longer looks through it
+for garbage, which takes 40 ms and would come before some picture.
 """
+
+import gc
 
 from jupyter_server.services.kernels.connection.channels import ZMQChannelsWebsocketConnection
 
@@ -18,6 +21,7 @@ def _load_jupyter_server_extension(serverapp):
     if settings.get(CONNECTION) is ZMQChannelsWebsocketConnection:
         settings[CONNECTION] = PromptConnection
     serverapp.contents_manager.register_pre_save_hook(keep_language)
+    gc.freeze()
 
 
 def _jupyter_server_extension_points():

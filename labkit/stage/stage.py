@@ -81,7 +81,7 @@ import numpy as np
 
 from .. import live
 from ..checks import as_finite
-from . import front, style
+from . import front, garbage, style
 from .canvas import CSS_DPI, DRAWING, Picture
 from .controls import Slider
 from .scene3d_handles import Dial, stepped
@@ -445,6 +445,7 @@ class Stage:
                 for space in self._spaces:
                     space.draw(self._told_view)
             if "look" in message:
+                garbage.wait_for_rest()
                 self._attached, self._shown, self._whole, self._told_view = True, self._sent, True, None
                 self._picture.fit(**message["look"])
             if "cursor" in message:
@@ -461,6 +462,7 @@ class Stage:
             if "rest" in message:
                 for store in self.at_rest:
                     store()
+                garbage.at_rest()
 
     def _place_in_words(self, fraction):
         """Where the keyboard's cursor stands, for a screen reader."""

@@ -5,6 +5,7 @@ import json
 import re
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from PIL import Image
 
 from labkit import live
 from labkit.chapters.ch08_kalman import stages
-from labkit.stage import Choice, Handle, Play, Slider, Stage, Target, Toggle, canvas, style
+from labkit.stage import Choice, Handle, Play, Slider, Stage, Target, Toggle, canvas, garbage, style
 from labkit.stage.renderer import Canvas
 from labkit.stage.scene3d import Scene, View
 
@@ -425,6 +426,23 @@ def test_a_rest_stores_what_is_shown(wired):
     assert not stored
     stage.receive({"rest": True})
     assert stored == [stage.caption]
+
+
+def test_a_pass_through_all_garbage_waits_for_rest(wired, monkeypatch):
+    stage, _ = wired
+    told, passes = [], [4]
+    monkeypatch.setattr(garbage, "gc", SimpleNamespace(
+        get_threshold=lambda: (700, 10, 10), set_threshold=lambda *after: told.append(after), isenabled=lambda: True,
+        get_count=lambda: (0, 0, passes[-1]), collect=lambda: told.append("collected"),
+    ))  # fmt: skip
+    stage.receive({"look": LOOK, "serial": "a:2"})
+    assert told == [(700, 10, garbage.PATIENT)]
+    stage.receive({"rest": True})
+    passes.append(12)
+    stage.receive({"step": {"P": (1, 0)}, "serial": "a:3"})
+    assert told[1:] == []
+    stage.receive({"rest": True})
+    assert told[1:] == ["collected"]
 
 
 def counting(**options):
