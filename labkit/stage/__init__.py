@@ -12,6 +12,7 @@ scene3d     bodies, frames, points and paths in space; scene3d_solids what bodie
 style       colors and letters by role
 marks       small things that several chapters draw
 tape        moments gone by, so that time can be scrubbed
+garbage     let go while nothing moves
 film        a Stage recorded for the reading edition
 """
 

@@ -14,6 +14,12 @@ from matplotlib.ft2font import FT2Font
 from . import style
 
 MAX_WORDS = 3000  # bitmaps a figure keeps
+LETTERS = {
+    *map(chr, range(32, 127)),
+    "\N{MINUS SIGN}",
+    "\N{DEGREE SIGN}",
+    "\N{PLUS-MINUS SIGN}",
+}  # that words are made of
 
 
 def _dark(rgba):
@@ -33,30 +39,88 @@ def _dark_rows(colors):
     return colors
 
 
+class _Letters:
+    """The letters of one font in one size. Hinting sets each on a whole pixel, so that words put together from their
+    bitmaps are, pixel by pixel, those that the font sets.
+
+    font : function() -> FT2Font, ready to set text; asked each time, for the sizes of a font share it.
+    """
+
+    def __init__(self, font):
+        self.font, self.flags = font, backend_agg.get_hinting_flag()
+        self.alone, self.steps = {}, {}
+
+    def set(self, s):
+        """(bitmap, left end of the ink, width, top over the baseline, depth below it) of a word, in 1/64 pixel."""
+        font = self.font()
+        font.set_text(s, 0.0, flags=self.flags)
+        (width, height), descent = font.get_width_height(), font.get_descent()
+        font.draw_glyphs_to_bitmap(antialiased=True)
+        return np.array(font.get_image()), font.get_bitmap_offset()[0], width, height - descent, descent
+
+    def compose(self, s):
+        """The same from the bitmaps of its letters; None where one does not follow another by whole pixels."""
+        if not s or not LETTERS.issuperset(s):
+            return None
+        pens = [0]
+        for a, b in zip(s, s[1:]):
+            step = self._step(a, b)
+            if step is None:
+                return None
+            pens.append(pens[-1] + step)
+        letters = [self._alone(c) for c in s]
+        left = min(64 * pen * (c != " ") + letter[1] for c, pen, letter in zip(s, pens, letters))  # a space begins at 0
+        top, descent = (max(letter[k] for letter in letters) for k in (3, 4))
+        places = [
+            (_row(top, letter[3]) - _row(letter[3], letter[3]), int(pen + letter[1] // 64 - left / 64))
+            for pen, letter in zip(pens, letters)
+        ]
+        sizes = [letter[0].shape for letter in letters]
+        word = np.zeros(np.max(np.add(places, sizes), axis=0), np.uint8)
+        for (down, right), (rows, columns), letter in zip(places, sizes, letters):
+            word[down : down + rows, right : right + columns] |= letter[0]
+        return word[: (top + descent) // 64 + 2], left, 64 * pens[-1] + letters[-1][2], top, descent
+
+    def _alone(self, letter):
+        if letter not in self.alone:
+            self.alone[letter] = self.set(letter)
+        return self.alone[letter]
+
+    def _step(self, a, b):
+        """Pixels from a letter to the one that follows it; None if they are not whole, or both become one."""
+        if (a, b) not in self.steps:
+            pens = self.font().set_text(a + b, 0.0, flags=self.flags)
+            whole = len(pens) == 2 and pens[1][0] % 64 == 0
+            self.steps[a, b] = int(pens[1][0]) // 64 if whole else None
+        return self.steps[a, b]
+
+
+def _row(top_of_word, top):
+    """The row of a word's bitmap at which a letter begins, as matplotlib rounds it; both in 1/64 pixel."""
+    return int(top_of_word / 64 + top // -64 + 1)
+
+
 class _KeptWords(RendererAgg):
-    """Agg that keeps the bitmaps of the words it has drawn: ten letters take matplotlib more than 1 ms. The heights of
-    a font are kept as well, which it would read from the font's tables for every text.
+    """Agg that keeps the bitmaps of the words it has drawn: ten letters take matplotlib more than 1 ms. A new word, as
+    the next value of a number, is put together from letters. The heights of a font are kept as well, which it would
+    read from the font's tables for every text.
     """
 
     def __init__(self, *args):
         super().__init__(*args)
-        self._words, self._heights = {}, {}
+        self._words, self._heights, self._letters = {}, {}, {}
 
     def _word(self, s, prop):
         """(bitmap, left, down, width, height, descent) of a word at its own baseline, in pixels."""
         key = s, hash(prop)
         if key not in self._words:
-            font = self._prepare_font(prop)
-            font.set_text(s, 0.0, flags=backend_agg.get_hinting_flag())
-            width, height = font.get_width_height()
-            descent = font.get_descent()
-            font.draw_glyphs_to_bitmap(antialiased=True)
-            left, down = font.get_bitmap_offset()
             if len(self._words) >= MAX_WORDS:
                 self._words.clear()
-            self._words[key] = (
-                np.array(font.get_image()), left / 64, (down + descent) / 64, width / 64, height / 64, descent / 64
-            )  # fmt: skip
+            letters = self._letters.get(key[1])
+            if letters is None:
+                letters = self._letters[key[1]] = _Letters(lambda: self._prepare_font(prop))
+            bitmap, left, width, top, descent = letters.compose(s) or letters.set(s)
+            self._words[key] = bitmap, left / 64, descent / 64, width / 64, (top + descent) / 64, descent / 64
         return self._words[key]
 
     def _get_font_height_metrics(self, prop):

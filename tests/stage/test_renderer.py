@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.backends import backend_agg
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.ft2font import FT2Font
 
 from labkit.stage import renderer, style
@@ -83,3 +84,23 @@ class Hidden(backend_agg.RendererAgg):
 )
 def test_a_missing_private_name_is_found_out(backend, font):
     assert not renderer.can_keep_words(backend, font)
+
+
+@pytest.mark.parametrize("size", [7.3, 10, 24])
+def test_a_word_put_together_from_letters_is_the_one_the_font_sets(size):
+    rng, kept = np.random.default_rng(3), renderer.Canvas(Figure(dpi=100)).get_renderer()
+    signs = np.array([*"0123456789.-+e \N{MINUS SIGN}"])
+    words = ["".join(rng.choice(signs, rng.integers(1, 9))) for _ in range(25)]
+    letters = renderer._Letters(lambda: kept._prepare_font(FontProperties(size=size)))
+    composed = 0
+    for word in (*words, "P0, W; known to 0.12 mm", "Wave AV", "'~", "jf", " 1", "(T_WE) 30 \N{DEGREE SIGN}"):
+        quick, own = letters.compose(word), letters.set(word)
+        if quick is None:
+            continue
+        composed += 1
+        assert quick[1:] == own[1:] and len(quick[0]) == len(own[0]), word
+        common = min(quick[0].shape[1], own[0].shape[1])
+        np.testing.assert_array_equal(quick[0][:, :common], own[0][:, :common], err_msg=word)
+        assert not quick[0][:, common:].any() and not own[0][:, common:].any(), word
+    assert composed >= len(words)
+    assert letters.compose("") is letters.compose("\N{LATIN SMALL LETTER A WITH RING ABOVE}") is None
