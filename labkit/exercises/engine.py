@@ -31,6 +31,7 @@ TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws of eac
 BEFORE = "It was right before, on other draws: what is different about this one, its shapes perhaps?"
 NOT_RIGHT = "\nNot right when called as "
 MANY_DIGITS = 1e-3  # by how much better some draws come out where one case is special
+TELLING = 6  # draws on which a choice is wrong as by an explanation, so that this is not chance
 LIKE_CHANCE = 8  # draws on which a choice must stay as it is, so that this is not chance
 LISTED = 9  # entries of a wrong array of which those that are right are listed
 SHOWN = 4  # entries of a set or vector that is shown whole
@@ -414,6 +415,9 @@ class _Trial:
     def _fits_more(self, function):
         """Whether a variant gives the student's results on fresh draws as well."""
         mistake, draws = Mistake(function, ""), self._fresh_results
+        wrong = sum(not metric.equal(*pair) for _, metric, pair in self._cases() + draws)
+        if self._is_choice() and wrong < TELLING:
+            return False
         try:
             with guard.time_limit(self.budget.left()):
                 return self._is_it_again(mistake) and all(self._is_mistake(mistake, *draw) for draw in draws)
@@ -628,13 +632,33 @@ class _Trial:
         them: two rules may choose alike by chance.
         """
         sets = isinstance(self.exercise.metric, metrics.Exactly) and isinstance(self.pairs[0][1], set | frozenset)
-        if self.refusal or self._right_on_plain() or not (sets or self._is_choice()):
+        if self.refusal or self._right_on_plain():
+            return True
+        if isinstance(self.exercise.metric, metrics.Exactly) and isinstance(self.pairs[0][1], str):
+            return self._shows_always(mistake)
+        if not (sets or self._is_choice()):
             return True
         kind = Budget(SPECIAL)
         for number in range(MORE_DRAWS):
             args, _, metric = self.exercise.plain_again[number]
             run = guard.run(self.function, args, limit=self.exercise.limit)
             if run.error is not None or not self._is_mistake(mistake, args, metric, (run.result, None)):
+                return False
+            if not kind.left():
+                break  # a slow answer is not called more often than it must
+        return True
+
+    def _shows_always(self, mistake):
+        """Whether an answer is a mistake's wherever that is wrong, at special places too: one of a few words may be the
+        same by another rule, and be wrong on a draw or two.
+        """
+        kind = Budget(SPECIAL)
+        for number in range(MORE_CASES + 2 * len(self.exercise.noisy)):
+            args, expected, metric = self.exercise.all_again[number]
+            if _failure(mistake, args) or self._is_mistake(mistake, args, metric, (expected, expected)):
+                continue
+            run = guard.run(self.function, args, limit=self.exercise.limit)
+            if run.error is not None or not self._is_mistake(mistake, args, metric, (run.result, expected)):
                 return False
             if not kind.left():
                 break  # a slow answer is not called more often than it must

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from labkit.chapters.ch10_ledger import exercises as ledger
+from labkit.chapters.ch10_ledger import proofs
 from labkit.chapters.ch11_your_own_data import exercises as own
 from labkit.documents.ledger import Computed, Row, judge
 from labkit.documents.rounding import half_unit, read
@@ -246,6 +247,12 @@ def _remembered():
     return lambda printed: memory.setdefault(float(printed.replace(",", ".")), half_unit(printed))
 
 
+def _by_one_alone(entries, average, counted):
+    """Whether the gap is small is asked rightly, but what a slip leaves is held against one half of what is allowed."""
+    gaps = proofs._gaps(entries, average)
+    return proofs._suspected(gaps, 0) and proofs._suspected(gaps, 0, counted=counted)
+
+
 def _each_once(entries, average):
     def agree(numbers):
         different = sorted(set(numbers[:-1]))
@@ -275,6 +282,23 @@ def _pairs(apart):
 
 
 ALMOST_RIGHT = [
+    (
+        "half_unit",
+        lambda p: half_unit(p.replace(",", ".")) if "e" not in p or "e-" in p else half_unit(p.replace(",", "")),
+    ),
+    ("half_unit", lambda p: max(half_unit(p), 0.5e-6) if "e" not in p else half_unit(p)),
+    ("suspects", lambda entries, average: _by_one_alone(entries, average, (1, 0))),
+    ("suspects", lambda entries, average: _by_one_alone(entries, average, (0, 1))),
+    ("between_axes", lambda T, apart: own.motion.between_axes(T, min(apart, 3))),
+    ("left_out", lambda r, J: r / (1 - np.minimum(_shares(J), 0.99))),
+    ("left_out", lambda r, J: r / (1 - _shares(J)) if len(r) > J.shape[1] + 2 else r),
+    ("honest_covariance", lambda r, J: np.round(_student(r, J), 8)),
+    ("with_one_more", lambda C, J: np.squeeze(own.with_one_more(C, J))),
+    ("with_one_more", lambda C, J: own.with_one_more(C, J[: len(C)])),
+    ("next_pose", own._numbers_alone),
+    ("next_pose", own._one_in_every_entry),
+    ("next_pose", own._reading_counted(2)),
+    ("next_pose", own._reading_counted(0)),
     ("half_unit", _one_digit_exponents),
     ("half_unit", _remembered()),
     ("half_unit", lambda p: round(half_unit(p), 12)),
@@ -412,3 +436,23 @@ def test_rules_that_choose_alike_by_chance_are_told_apart():
 def test_no_tangent_is_told_where_a_comparison_is_too_strict():
     told = told_of(ledger, "status", STATUS.replace("off <= half:", "off < half:"))
     assert "tangent" not in told and "exactly: that is still within" in told or "`<` stands where `<=`" in told
+
+
+ONE_BRANCH = [{"within": np.less}, {"half": _of_the_mantissa}, {"size": abs}]
+
+
+@pytest.mark.parametrize("simulated", [False, True])
+@pytest.mark.parametrize("wrong", ONE_BRANCH)
+def test_a_word_that_is_wrong_in_one_branch_meets_it_at_every_check(wrong, simulated):
+    def almost(*args):
+        return _status(*args, **(wrong if args[4] == simulated else {}))
+
+    for seed in range(3):
+        draws = [draw(np.random.default_rng(seed)) for draw, *_ in ledger.SPECIAL]
+        assert any(almost(*args) != ledger.status(*args) for args in draws)
+
+
+def test_a_rule_that_is_not_seen_where_an_answer_is_right_is_not_told():
+    text = STATUS.replace('off <= half + bound else "not', 'np.isclose(value, x, atol=half + bound) else "not')
+    assert text != STATUS
+    assert "rounded" not in told_of(ledger, "status", text)

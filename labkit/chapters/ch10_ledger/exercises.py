@@ -22,7 +22,9 @@ FORMS = (
     "dek",
     "d.dde-k",
     "d,de-k",
+    "d,dek",
     "-d.de-1k",
+    "0.0000000dd",
     "0.0d0",
     "0,dd",
     "de1k",
@@ -49,34 +51,39 @@ def comparison(rng, off, bound, misprint, simulated, comma, beyond, zero, decima
     return printed.replace(".", ",") if comma else printed, float(value), bound * half, misprint, simulated
 
 
-def special_comparison(rng, kind):
-    """printed, value, bound, misprint, simulated.
+def special_comparison(rng, kind, simulated, beyond):
+    """printed, value, bound, misprint, simulated; beyond: whether the value is larger than what is printed, signs apart.
 
     "sign": the value has the other sign. "edge": it is off by half a unit to the last bit, from an odd number. "limit":
     by half a unit and the bound. "small" and "far": printed with an exponent below 0, and within the half unit or far
     away; "large": with one above 0, within the half unit. "whole": a whole number, of which the last digits are 0.
-    "zero": 0 is printed.
+    "zero": 0 is printed. "digits": eight digits, and the value is off by more than half a unit and the bound.
     """
-    misprint, simulated = bool(rng.integers(2)), bool(rng.integers(2))
-    bound, whole = float(rng.integers(0, 4)), int(rng.integers(2, 90)) * int(rng.choice([-1, 1]))
+    misprint, bound = bool(rng.integers(2)), float(rng.integers(1 if kind == "limit" else 0, 4))
+    whole = int(rng.integers(2, 90)) * int(rng.choice([-1, 1]))
+    side = float(np.sign(whole)) * (1 if beyond else -1)
     if kind == "sign":
-        return str(whole), -whole + 0.25, bound / 4, misprint, simulated
+        return str(whole), -whole + side * 0.25, bound / 4, misprint, simulated
     if kind == "edge":
-        return str(whole | 1), (whole | 1) + 0.5 * int(rng.choice([-1, 1])), bound, misprint, False
+        return str(whole | 1), (whole | 1) + 0.5 * side, bound, misprint, simulated
     if kind == "limit":
-        return str(whole), whole + int(rng.choice([-1, 1])) * (0.5 + bound), bound, misprint, simulated
+        return str(whole), whole + side * (0.5 + bound), bound, misprint, simulated
     if kind == "whole":
-        return f"{whole}00", float(100 * whole + rng.choice([-1, 1]) * rng.uniform(5, 40)), bound, misprint, simulated
+        return f"{whole}00", float(100 * whole + side * rng.uniform(5, 40)), bound, misprint, simulated
     if kind == "zero":
-        return "0.0", float(rng.choice([-1, 1]) * rng.uniform(0.01, 0.04)), bound, misprint, simulated
+        return "0.0", float(side * rng.uniform(0.01, 0.04)), bound, misprint, simulated
+    if kind == "digits":
+        printed = f"{1000 * whole + rng.uniform(0, 1000):.3f}"
+        return printed, float(printed) + side * 2.7 * 0.0005, 1.5 * 0.0005, misprint, simulated
     unit = 100.0 if kind == "large" else 0.01
-    value = unit * (whole + rng.choice([-1, 1]) * (9.0 if kind == "far" else 0.3))
-    return f"{whole}e{'2' if kind == 'large' else '-2'}", float(value), bound * unit, misprint, simulated
+    value = unit * (whole + side * (9.0 if kind == "far" else 0.3))
+    texts = {"large": f"{whole}e2", "far": f"{whole}e-2", "small": f"{whole / 10:.1f}e-1"}
+    return texts[kind].replace(".", ","), float(value), bound * unit, misprint, simulated
 
 
 SPECIAL = tuple(
     (
-        functools.partial(special_comparison, kind=kind),
+        functools.partial(special_comparison, kind=kind, simulated=simulated, beyond=beyond),
         metrics.Exactly(),
         f"right in ordinary cases, but not where {words}:",
     )
@@ -87,7 +94,9 @@ SPECIAL = tuple(
         *((kind, "the number is printed with an exponent, as 3e-4 or 3e4") for kind in ("small", "far", "large")),
         ("zero", "0 is printed"),
         ("whole", "the number is whole and ends with zeros: they are digits like all others"),
+        ("digits", "many digits are printed: what is allowed are half unit and bound, and no share of the number"),
     )
+    for simulated, beyond in itertools.product((False, True), repeat=2)
 )
 NUMBERS = tuple(functools.partial(printed_number, form=form) for form in FORMS)
 COMPARISONS = tuple(

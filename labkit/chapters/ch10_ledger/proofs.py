@@ -72,7 +72,8 @@ def special_inputs(rng, kind):
         return total, ["0", "0.0", "-0,00"][: rng.integers(2, 4)]
     texts = [str(rng.integers(2, 30)) for _ in range({"one": 1, "six": 6}.get(kind, 3))]
     if kind == "exponent":
-        texts[1] = f"{rng.uniform(2, 9):.{rng.integers(0, 3)}f}e{rng.choice([-2, -1, 1, 2])}"
+        texts[0] = f"{rng.uniform(2, 9):.{rng.integers(1, 3)}f}e{rng.choice([-2, -1])}"
+        texts[1] = f"{rng.uniform(2, 9):.{rng.integers(1, 3)}f}e{rng.choice([1, 2])}".replace(".", ",")
     elif kind == "zero":
         texts[int(rng.integers(0, 3))] = str(rng.choice(["0", "0.0", "-0,00"]))
     elif kind == "twice":
@@ -415,6 +416,21 @@ def of_the_average_alone(rng):
             return entries, average
 
 
+def explained_by_both(rng, counted):
+    """A column in which a slip explains the gap by what the rounding of entries and average allows together, and not by
+    that of the one of them which is counted, and printed with more digits than the other.
+    """
+    while True:
+        decimals, finer = int(rng.integers(1, 3)), -1 if counted[0] else 2
+        values = rng.uniform(2, 60, int(rng.integers(4, 6)))
+        entries, average = [f"{value:.{decimals}f}" for value in values], f"{values.mean():.{decimals + finer}f}"
+        k = int(rng.integers(len(entries)))
+        entries[k] = _slipped(rng, entries[k], "one digit wrong")
+        gaps = _gaps(entries, average)
+        if _suspected(gaps, 0) != _suspected(gaps, 0, counted=counted):
+            return entries, average
+
+
 def _of_few_digits(rng, lost):
     """One entry and an average with two digits swapped; or whole numbers, of which one lost its first digit."""
     if lost:
@@ -506,6 +522,14 @@ def other_columns(rng, kind):
     return entries, f"{values.mean():.3f}"
 
 
+def printed_twice(rng):
+    """A column with two entries printed alike, of which others are named where a slip changes both of them at once."""
+    while True:
+        entries, average = other_columns(rng, "twice")
+        if _alike_changed(entries, average) != suspects(entries, average):
+            return entries, average
+
+
 def _like_the_average(rng):
     """Entries of which one, with a slip in it, is printed like the average, which all others are to agree with."""
     while True:
@@ -534,6 +558,7 @@ COLUMNS = tuple(
             for low, high in ((1 - LIMIT, 1 - 1e-3), (1 + 1e-3, 1 + LIMIT))
         ),
         of_the_average_alone,
+        *(functools.partial(explained_by_both, counted=counted) for counted in ((1, 0), (0, 1))),
         functools.partial(at_the_limit, finer=2, low=BEYOND[0], high=BEYOND[1]),
         *(functools.partial(other_columns, kind=kind) for kind in ("beside", "like")),
     )
@@ -583,6 +608,17 @@ def _search(
 
 def _printed_there(entries, average):
     return {[*entries, average][k] for k in suspects(entries, average)}
+
+
+def _alike_changed(entries, average):
+    """A slip is put wherever its number is printed."""
+    printed = [*entries, average]
+    if _agree(entries, average):
+        return set()
+    changed = [
+        (k, [o if t == text else t for t in printed]) for k, text in enumerate(printed) for o in single_slips(text)
+    ]
+    return {k for k, trial in changed if _agree(trial[:-1], trial[-1])}
 
 
 def _slips_pile_up(entries, average):
@@ -717,10 +753,13 @@ SUSPECTS = Exercise(
     draw=COLUMNS,
     metric=metrics.Exactly(),
     noisy=[
-        (functools.partial(_clear, draw=functools.partial(other_columns, kind=kind)), metrics.Exactly(), words)
-        for kind, words in (
-            ("twice", "right for entries that all differ, but not where two of them are printed alike:"),
-            ("many", "right for four or five entries, but not for fewer or more:"),
+        (functools.partial(_clear, draw=draw), metrics.Exactly(), words)
+        for draw, words in (
+            (printed_twice, "right for entries that all differ, but not where two of them are printed alike:"),
+            (
+                functools.partial(other_columns, kind="many"),
+                "right for four or five entries, but not for fewer or more:",
+            ),
         )
     ],
     hints=(
@@ -837,6 +876,10 @@ SUSPECTS = Exercise(
         ),
         Mistake(_printed_there, "You return what is printed at the suspects. Wanted are their positions."),
         Mistake(
+            _alike_changed,
+            "You put a slip wherever its number is printed. Two may be printed alike: change one position alone.",
+        ),
+        Mistake(
             _slips_pile_up,
             "The slips you have tried stay in the column: take a fresh copy for each.",
         ),
@@ -849,14 +892,17 @@ SUSPECTS = Exercise(
         *(
             Mistake(
                 _search(agree=_over_one_more, first_agree=first),
-                "You divide by one more than there are entries. The mean of n entries is their sum over n.",
+                "You divide by one more than there are entries. The mean of n entries is their sum over n, and that of "
+                "their half units too.",
+                id=id,
             )
-            for first in (_agree, _over_one_more)
+            for first, id in ((_agree, "suspects-9149b8"), (_over_one_more, "suspects-9149b8-2"))
         ),
         Mistake(
             _search(agree=_all_over_one_more),
             "You divide by one more than there are entries. The mean of n entries is their sum over n, and that of "
             "their half units too.",
+            id="suspects-2193dd",
         ),
         Mistake(
             lambda entries, average: set() if _agree(entries, average) else set(range(len(entries) + 1)),
@@ -884,8 +930,8 @@ SUSPECTS = Exercise(
         ),
         Mistake(
             _first_half_as_printed,
-            "You allow the half unit of the first entry as it is printed. Each has its own: what they allow together "
-            "is their mean.",
+            "You allow the first entry's half unit for all. Each has its own: what they allow together is their mean.",
+            id="suspects-e587b2",
         ),
         *(
             Mistake(

@@ -84,8 +84,8 @@ def fitted_line(rng, freedom=(4, 8), p=None, unlike=False, alone=False, unused=F
     """Residuals of a linear fit of p parameters to n numbers, and its derivative.
 
     freedom: the least and the largest n - p. unlike: the parameters have units of very different size, as radians
-    beside millimeters. alone: one number pays for most of a parameter, its share is above 0.95. unused: one number does
-    not depend on the parameters.
+    beside millimeters. alone: one number pays for nearly all of a parameter, its share is above 0.99. unused: one number
+    does not depend on the parameters.
     """
     p = p or int(rng.integers(2, 6))
     n = p + int(rng.integers(freedom[0], freedom[1] + 1))
@@ -97,24 +97,24 @@ def fitted_line(rng, freedom=(4, 8), p=None, unlike=False, alone=False, unused=F
     if alone:
         k = int(rng.integers(n))
         others = np.delete(J, k, axis=0)
-        J[k] *= np.sqrt(rng.uniform(30, 90) / (J[k] @ np.linalg.solve(others.T @ others, J[k])))
+        J[k] *= np.sqrt(rng.uniform(150, 900) / (J[k] @ np.linalg.solve(others.T @ others, J[k])))
     return noise - J @ np.linalg.lstsq(J, noise, rcond=None)[0], J
 
 
 def information(rng, p=None):
-    """A covariance (p, p) of parameters of very different size."""
+    """A covariance (p, p) of parameters of very different size; p: how many, or some."""
     p = p or int(rng.integers(3, 7))
     M = rng.normal(size=(p, p + 2)) * rng.uniform(0.02, 3.0, (p, 1))
     return M @ M.T + 1e-3 * np.diag(rng.uniform(0.5, 1.5, p))
 
 
-def covariance_and_reading(rng, more=False, k=None):
-    """A covariance, and the derivative of one more reading of k numbers; `more` of them than there are parameters, or
-    as many.
+def covariance_and_reading(rng, more=None, k=None, p=None):
+    """A covariance of p parameters, and the derivative of one more reading of k numbers; by how many there are `more` of
+    them than parameters.
     """
-    C = information(rng)
+    C = information(rng, p)
     p = len(C)
-    k = k or int(rng.integers(p, p + 3) if more else rng.integers(1, p))
+    k = k or int(rng.integers(1, p) if more is None else p + more)
     return C, rng.normal(size=(k, p)) * rng.uniform(0.3, 2.0)
 
 
@@ -158,17 +158,19 @@ def shares_of_a_fit(rng, **kind):
     return J, float(rng.uniform(0.05, 3.0)), float(rng.uniform(3.0, 6.0))
 
 
-def special_fits(draw, metric):
-    """What `noisy` takes of fits at special places."""
+def special_fits(draw, metric, freedom=1):
+    """What `noisy` takes of fits at special places; freedom: the least n - p that is allowed."""
     return [
         (functools.partial(draw, unlike=True), metric,
          "right where all parameters have units of one size, but not where they differ, as radians and millimeters do:"),
         (functools.partial(draw, alone=True), metric,
-         "right for small shares h, but not where one number has a share above 0.95:"),
+         "right for small shares h, but not where one number has a share above 0.99:"),
         (functools.partial(draw, p=1), metric, "right for several parameters, but not for one, p = 1:"),
         (functools.partial(draw, unused=True), metric,
          "right in ordinary cases, but not where a row of J is 0: this number tells nothing of the parameters, its share h is 0:"),
         (functools.partial(draw, p=7), metric, "right for few parameters, but not for seven:"),
+        (functools.partial(draw, freedom=(freedom, freedom)), metric,
+         f"right where n - p is larger, but not where it is {freedom}, the least that is allowed:"),
     ]  # fmt: skip
 
 
@@ -359,6 +361,20 @@ def _first_that_beats(C, candidates):
     return int(np.argmax(volumes < volumes[0])) if (volumes < volumes[0]).any() else 0
 
 
+def _reading_counted(times):
+    """The choice where each reading brings its information so many times, 0: divided by how many numbers it has."""
+    return lambda C, candidates: next_pose(C, candidates * np.sqrt(times or 1 / candidates.shape[1]))
+
+
+def _numbers_alone(C, candidates):
+    """The choice where the numbers of a reading are taken as independent: det(J C J' + I) of the diagonal alone."""
+    return int(np.argmax(np.prod(1 + ((candidates @ C) * candidates).sum(2), axis=1)))
+
+
+def _one_in_every_entry(C, candidates):
+    return int(np.argmax(np.linalg.det(candidates @ C @ np.swapaxes(candidates, 1, 2) + 1)))
+
+
 def _volume_of_a_part(part):
     return lambda C, candidates: int(np.argmin(np.linalg.det(_left(C, candidates)[:, part, part])))
 
@@ -387,6 +403,9 @@ CHOICES = tuple(
         ((_least_certain_first, _least_certain), 10.0),
         ((_product_of_variances, _largest_eigenvalue, _smallest_trace), None),
         ((_largest_information, _largest_derivative, _volume_of_a_part(np.s_[-3:])), 1e-15),
+        ((_numbers_alone, _one_in_every_entry), None),
+        ((_reading_counted(2),), None),
+        ((_reading_counted(0),), None),
     )
 )
 
@@ -490,7 +509,7 @@ CHAPTER = Chapter(
             "between_axes",
             reference=motion.between_axes,
             draw=(
-                *(functools.partial(some_motions, apart=k) for k in (2, 1, 3)),
+                *(functools.partial(some_motions, apart=k) for k in (2, 1, 3, 4)),
                 functools.partial(some_motions, apart=1, turns=(2.2, 3.0)),
             ),
             metric=metrics.Numbers(1e-7, "rad"),
@@ -648,12 +667,10 @@ CHAPTER = Chapter(
             "honest_covariance",
             reference=honest_covariance,
             draw=(functools.partial(fitted_line, freedom=(4, 4)), fitted_line),
-            metric=metrics.Numbers(1e-8),
+            metric=metrics.Numbers(1e-8, least=0.0),
             noisy=[
-                *special_fits(fitted_line, metrics.Numbers(1e-8)),
-                (functools.partial(fitted_line, freedom=(3, 3)), metrics.Numbers(1e-8),
-                 "right where n - p is larger than 3, but not where it is 3, the least that is allowed:"),
-                (functools.partial(fitted_line, freedom=(90, 120)), metrics.Numbers(1e-8),
+                *special_fits(fitted_line, metrics.Numbers(1e-8, least=0.0), freedom=3),
+                (functools.partial(fitted_line, freedom=(90, 120)), metrics.Numbers(1e-8, least=0.0),
                  "right for few numbers, but not for a hundred, where Student's factor is nearly 1 and not 1 yet:"),
             ],
             hints=(
@@ -689,13 +706,13 @@ CHAPTER = Chapter(
                 Mistake(_covariance(lambda rr, n, f: rr / (n - 1) * (n - 1) / (n - 3)), "Your f is n - 1, as for a mean. Here p parameters are fitted: f = n - p."),
                 Mistake(_covariance(lambda rr, n, f: rr / (n - 1)), "You divided by n - 1, as for a mean. Here p parameters are fitted, f = n - p, and Student's f / (f - 2) is missing."),
                 Mistake(lambda r, J: np.var(r) * _freedom(r, J) / (_freedom(r, J) - 2) * np.linalg.inv(J.T @ J),
-                        "`np.var` takes the mean of the residuals off and divides by their number. The noise is r^T r / f.", id="honest_covariance-59655a"),
+                        "The mean of the residuals is taken off, as `np.var` does it, and you divide by their number. The noise is r^T r / f.", id="honest_covariance-59655a"),
                 Mistake(lambda r, J: np.var(r, ddof=J.shape[1]) * _freedom(r, J) / (_freedom(r, J) - 2) * np.linalg.inv(J.T @ J),
-                        "`np.var` takes the mean of the residuals off, with `ddof` as well. The noise is r^T r / f.", id="honest_covariance-86638a"),
+                        "The mean of the residuals is taken off, as `np.var` does it, with `ddof` as well. The noise is r^T r / f.", id="honest_covariance-86638a"),
                 Mistake(lambda r, J: np.var(r, ddof=J.shape[1]) * np.linalg.inv(J.T @ J),
-                        "`np.var` takes the mean of the residuals off, with `ddof` as well. The noise is r^T r / f, and Student's f / (f - 2) is missing.", id="honest_covariance-8f01e5"),
+                        "The mean of the residuals is taken off, as `np.var` does it, with `ddof` as well. The noise is r^T r / f, and Student's f / (f - 2) is missing.", id="honest_covariance-8f01e5"),
                 Mistake(lambda r, J: np.var(r) * np.linalg.inv(J.T @ J),
-                        "`np.var` takes the mean of the residuals off and divides by their number. The noise is r^T r / f, and Student's f / (f - 2) is missing.", id="honest_covariance-9cb979"),
+                        "The mean of the residuals is taken off, as `np.var` does it, and you divide by their number. The noise is r^T r / f, and Student's f / (f - 2) is missing.", id="honest_covariance-9cb979"),
                 Mistake(lambda r, J: r @ r / (_freedom(r, J) - 2) * (J.T @ J), "J^T J is information. The covariance takes its inverse.", id="honest_covariance-24c944"),
             ],
         ),
@@ -705,9 +722,11 @@ CHAPTER = Chapter(
             draw=covariance_and_reading,
             metric=metrics.Numbers(1e-7),
             noisy=[
-                (functools.partial(covariance_and_reading, more=True), metrics.Numbers(1e-7),
-                 "right for a reading of fewer numbers than there are parameters, but not for one of as many, or more:"),
+                *((functools.partial(covariance_and_reading, more=more), metrics.Numbers(1e-7),
+                   "right for a reading of fewer numbers than there are parameters, but not for one of as many, or more:")
+                  for more in (0, 2)),
                 (functools.partial(covariance_and_reading, k=1), metrics.Numbers(1e-7), "right for several numbers, but not for a reading of a single one:"),
+                (functools.partial(covariance_and_reading, p=1, k=2), metrics.Numbers(1e-7), "right for several parameters, but not for one, p = 1:"),
             ],
             hints=(
                 "What is known adds up, not what is unknown: information is the inverse of a covariance.",
@@ -757,6 +776,7 @@ CHAPTER = Chapter(
             reference=next_pose,
             draw=CHOICES,
             metric=metrics.Exactly(),
+            draws=len(CHOICES),
             noisy=[
                 (functools.partial(best_at, place=0), metrics.Exactly(), "right where the best candidate is not the first, but not where it is:"),
                 (functools.partial(best_at, place=-1), metrics.Exactly(), "right where the best candidate is not the last, but not where it is:"),
