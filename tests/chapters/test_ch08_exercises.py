@@ -250,12 +250,22 @@ def without_what_disagrees(x0, var0, z, stds):
     return weights @ [x0, *z] / weights.sum(), 1 / weights.sum()
 
 
+def eliminated(S, y):
+    """The terms of y' S^-1 y, by elimination by hand: without rounding for one number that is a power of two."""
+    S, y = np.array(S, dtype=float), np.array(y, dtype=float)
+    for k in range(len(y)):
+        yield y[k] ** 2 / S[k, k]
+        factors = S[k + 1 :, k] / S[k, k]
+        y[k + 1 :] -= factors * y[k]
+        S[k + 1 :] -= np.outer(factors, S[k])
+
+
 @pytest.mark.parametrize(
     "name, answer, words",
     [
         ("wrap_angle", wrapped_ten_times, "too few rounds"),
         ("fuse_two_sensors", without_what_disagrees, ""),
-        ("gate", lambda y, S, limit: bool(y @ np.linalg.inv(S) @ y <= limit), "not `<=`"),
+        ("gate", lambda y, S, limit: bool(sum(eliminated(S, y)) <= limit), "not `<=`"),
     ],
 )
 def test_dozens_of_turns_readings_far_apart_and_the_limit_itself(name, answer, words):
