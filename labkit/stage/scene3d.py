@@ -30,6 +30,7 @@ CIRCLE = np.stack([np.cos(np.linspace(0, 2 * np.pi, 65)), np.sin(np.linspace(0, 
 LIGHT = np.array([-0.42, 0.66, 0.62])  # right, up, toward the eye
 ZOOM = (0.2, 12.0)
 PIXELS_PER_POINT = 100 / 72
+ROUND_PIECES = 24  # of an ellipsoid's half meridian: it may fill the picture, and its outline shows each of them
 DASHES = {"-": 0, "none": 0, "None": 0, "": 0, "--": 1, ":": 2, "-.": 1}  # full, dashed, dotted
 
 
@@ -400,7 +401,7 @@ class _Ellipsoid(_Item):
         self.artist.set_zorder(self.scene.depth(toward))
 
     def describe(self):
-        ball = solids.sphere(1.0).looks(self.artist.get_color(), 0.22)
+        ball = solids.sphere(1.0, ROUND_PIECES).looks(self.artist.get_color(), 0.22)
         return {"kind": "body", "parts": [ball.describe()]}
 
     def numbers(self):

@@ -265,7 +265,8 @@ class Line {
 class Scenes {
   constructor(figure, { spaces = [], home, size }) {
     Object.assign(this, { figure, spaces, home, width: size[0], view: null, timer: 0, closed: spaces.length === 0 });
-    Object.assign(this, { page: spaceOfThePage(), since: performance.now() });
+    Object.assign(this, { page: spaceOfThePage(), patient: true });
+    this.patience = setTimeout(() => { this.patient = false; figure.room.begin(); }, WORTH_WAITING);
   }
 
   get able() {
@@ -278,7 +279,7 @@ class Scenes {
 
   /** The drawing may come any moment: a picture that Python would paint now is not worth its while. */
   get waits() {
-    return !this.closed && !this.page.module && performance.now() - this.since < WORTH_WAITING;
+    return this.patient && !this.closed && !this.page.module;
   }
 
   /** Ask for the module unless it is on its way, or another Stage of the page has done so; open the view as soon as it
@@ -294,7 +295,7 @@ class Scenes {
       else this.figure.line.send({ need: "space" });
     }
     if (page.coming) return void page.coming.then(() => this.ask());
-    this.timer = setTimeout(() => { this.figure.room.begin(); this.ask(); }, LOOK_AGAIN);
+    this.timer = setTimeout(() => this.ask(), LOOK_AGAIN);
   }
 
   load(source) {
@@ -346,6 +347,7 @@ class Scenes {
   close() {
     this.closed = true;
     clearTimeout(this.timer);
+    clearTimeout(this.patience);
     this.view?.close();
   }
 }

@@ -96,9 +96,13 @@ class Bridge:
     def __init__(self):
         self.stage, self.said, self.is_gone, self.unheard = None, [], False, []
 
-    def show(self, page, stage):
+    def connect(self, stage):
+        if stage is not self.stage:
+            stage.connect(lambda message, buffers: self.said.append((message, buffers)))
         self.stage = stage
-        stage.connect(lambda message, buffers: self.said.append((message, buffers)))
+
+    def show(self, page, stage):
+        self.connect(stage)
         page.evaluate("declaration => window.show(declaration)", stage.declaration())
         drawn = "canvas[data-space=true]" if stage.spaces else "canvas"
         page.locator(f".labkit-stage[data-picture] {drawn}").first.wait_for(timeout=20_000)

@@ -188,10 +188,10 @@ def test_python_draws_while_the_context_is_lost_and_the_page_again_when_it_is_ba
         before = at_rest(page, 0)[1]
         assert not bridge.stage._picture.painted and page.evaluate("contexts.length") == 1
         page.evaluate("() => { window.loss = contexts[0].getExtension('WEBGL_lose_context'); loss.loseContext(); }")
-        page.locator(".labkit-stage canvas[data-space=false]").wait_for(timeout=10_000)
+        page.locator(".labkit-stage canvas[data-space=false]").wait_for(timeout=30_000)
         assert bridge.stage._picture.painted and not stage.locator("canvas.space").is_visible()
         page.evaluate("() => loss.restoreContext()")
-        page.locator(".labkit-stage canvas[data-space=true]").wait_for(timeout=10_000)
+        page.locator(".labkit-stage canvas[data-space=true]").wait_for(timeout=30_000)
         assert not bridge.stage._picture.painted
         assert apart(at_rest(page, 0)[1][2], before[2]) < 0.1
         assert page.complaints == []
@@ -247,11 +247,21 @@ def test_of_a_closed_body_its_outside_alone_is_drawn_mirrored_or_not():
         assert page.complaints == []
 
 
-def test_a_drawing_that_comes_along_is_ready_before_the_first_picture_is_asked_for():
+SPACE_OF_THE_PAGE = "globalThis[Symbol.for('labkit.space')]"
+
+
+def test_a_drawing_that_comes_along_is_ready_before_the_first_picture_and_one_that_does_not_come_is_not_waited_for():
     stage, asked = two_balls(), []
     receive = stage.receive
     stage.receive = lambda message: (asked.append(message), receive(message))
     with stage_page(False, 500, 500, 1) as (page, bridge):
+        page.evaluate(f"() => {{ {SPACE_OF_THE_PAGE} = {{ load: () => new Promise(() => {{}}) }}; }}")
+        bridge.connect(stage)
+        page.evaluate("declaration => window.show(declaration)", stage.declaration())
+        page.locator(".labkit-stage[data-picture]").wait_for(timeout=20_000)
+        assert [message["look"]["space"] for message in asked if "look" in message] == [False]
+        asked.clear()
+        page.evaluate(f"() => {{ delete {SPACE_OF_THE_PAGE}; }}")
         page.evaluate("source => window.bring(source)", front.SPACE.read_text(encoding="utf-8"))
         bridge.show(page, stage)
         assert [message["look"]["space"] for message in asked if "look" in message] == [True]

@@ -164,7 +164,6 @@ export class Renderer {
   /** Draw one of each, for nobody to see: a shader becomes a processor's or a driver's own code when it is first used,
    *  and that goes on beside the page while it waits for Python. */
   warm(smooth = !this.software) {
-    if (this.lost) return;
     const [box, shell] = [{ kind: "raised", outline: [[0, 0], [1, 0], [0, 1]], bottom: 0, top: 1 }, { kind: "turned", profile: [[1, 0], [1, 1]] }];
     const solids = this.solids([box, shell, box], 1, 2);
     const pose = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
@@ -179,9 +178,10 @@ export class Renderer {
   /** All that has been asked for is done beside the page, and then is called; a flush alone is put off until something
    *  is read. */
   finish(then) {
-    const { gl } = this;
+    const { gl, age } = this;
     const [fence, end] = [gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0), performance.now() + PATIENCE];
     const look = () => {
+      if (this.lost || this.age !== age) return; // and the fence with the context
       const done = gl.clientWaitSync(fence, gl.SYNC_FLUSH_COMMANDS_BIT, 0) !== gl.TIMEOUT_EXPIRED;
       if (!done && performance.now() < end) return void setTimeout(look, LOOK_AGAIN);
       gl.deleteSync(fence);

@@ -14,7 +14,7 @@ export function isClosed({ kind, profile }) {
 /** A profile of (radius, height), turned about z in so many pieces; round where its pieces meet at a small angle. */
 function turned({ profile, pieces: given }) {
   const largest = Math.max(...profile.map(([r]) => r));
-  const pieces = given ?? (profile.length > 8 ? 24 : largest > 0 ? 28 : 3);
+  const pieces = given ?? (profile.length > 16 ? 36 : profile.length > 8 ? 24 : largest > 0 ? 28 : 3); // finely described, finely drawn
   const mesh = { position: [], normal: [], indices: [] };
   const parts = [];
   for (let k = 0; k + 1 < profile.length; k++) {
