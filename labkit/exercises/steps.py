@@ -460,8 +460,12 @@ class Search:
         """A value on the way that is the right result already, though it is not what is returned."""
         results = [q for q in solution.distinct if solution.is_result[q]] if solution else []
         for k in range(len(self.written.places)):
-            if any(self._is_value(k, [values[q][1] for values in solution.values]) for q in results):
-                each = ", a part of it in each round" if any(values[k][0] > 1 for values in self.values) else ""
+            q = next((q for q in results if self._is_value(k, [values[q][1] for values in solution.values])), None)
+            if q is not None:
+                mine, theirs = (
+                    any(values[i][0] > 1 for values in v) for i, v in ((k, self.values), (q, solution.values))
+                )
+                each = (", in the last round" if theirs else ", a part of it in each round") if mine else ""
                 return f"{self._where(k)}, stands the right result{each}, but something else is returned"
         return None
 

@@ -108,3 +108,12 @@ def test_what_is_wrong_of_a_robot_that_drives_straight_on_is_what_is_seen():
         holds = item.properties[0]
         told = holds(lambda x, u, dt, s=straight_on: item.reference(x, u, dt) if u[1] else s, np.random.default_rng(0))
         assert words in told and "finite" not in told
+
+
+def test_a_gain_above_one_is_drawn_and_held():
+    def clipped(x, cov, z, C, cov_z):
+        K = np.clip(cov @ C.T @ np.linalg.inv(C @ cov @ C.T + cov_z), -1, 1)
+        return x + K @ (z - C @ x), (np.eye(len(x)) - K @ C) @ cov
+
+    outcomes = [ITEMS["update"].judge(clipped, rng=np.random.default_rng(seed)) for seed in range(3)]
+    assert all(outcome.status != CORRECT for outcome in outcomes)

@@ -778,3 +778,17 @@ def test_a_row_of_the_result_is_no_step_on_the_way():
     item = asked(lambda a, b: np.cumsum(np.outer(a, b), axis=0), lambda rng: tuple(rng.normal(size=(2, 4))))
     told = judged(item, "return np.array([np.sinh(a[: k + 1]).sum() * b + 0.3 * k * b**3 for k in range(len(a))])")
     assert "this value is not right" not in told or "b**3`: this value" not in told
+
+
+def test_what_is_right_after_the_last_round_is_no_part_of_the_result_in_each():
+    item = {item.id: item for chapter in session.chapters() for item in chapter.items}["newton_lateration"]
+    body = """
+    p = np.array(start, float)
+    for _ in range(20):
+        away = p - landmarks
+        p = p - np.linalg.solve(2 * away, (away**2).sum(1) - distances**2)
+    return np.array([p[0], np.log(-np.abs(p[1]))])
+    """
+    answer = typed(body, "newton_lateration", "landmarks, distances, start")
+    text = item.judge(answer, rng=np.random.default_rng(0)).text
+    assert "stands the right result, in the last round" in text

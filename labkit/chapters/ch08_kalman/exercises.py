@@ -33,13 +33,13 @@ def prediction(rng, n, k, sure=1.0):
     return rng.normal(size=n) * 5, covariance(rng, n, sure), A, B, rng.normal(size=k) * 2, covariance(rng, k, sure)
 
 
-def mixed_measurement(rng, n, m, off=1.0, sure=1.0):
+def mixed_measurement(rng, n, m, off=1.0, sure=1.0, unit=1.0):
     """State of n, and m numbers measured of mixtures of them; off: how far they are from those expected; sure: how
-    small the covariances are.
+    small the covariances are; unit: what the sensor shows where a state changes by 1 (a gain may well be above 1).
     """
     x = rng.normal(size=n) * 3
-    C = rng.normal(size=(m, n))
-    return x, covariance(rng, n, sure), C @ x + off * rng.normal(size=m), C, covariance(rng, m, 0.5 * sure)
+    C = unit * rng.normal(size=(m, n))
+    return x, covariance(rng, n, sure), C @ x + off * rng.normal(size=m), C, covariance(rng, m, 0.5 * sure * unit**2)
 
 
 def measured_often(rng, n, m, k, sure=1.0):
@@ -796,13 +796,13 @@ CHAPTER = Chapter(
             "update",
             reference=update,
             draw=tuple(
-                functools.partial(mixed_measurement, n=n, m=m, off=off, sure=sure)
-                for n, m, off, sure in (
-                    (2, 2, 1.0, 1.0),
-                    (3, 1, 0.01, 1.0),
-                    (2, 3, 1.0, 1e-3),
-                    (3, 3, 0.01, 1.0),
-                    (4, 2, 1.0, 100.0),
+                functools.partial(mixed_measurement, n=n, m=m, off=off, sure=sure, unit=unit)
+                for n, m, off, sure, unit in (
+                    (2, 2, 1.0, 1.0, 1.0),
+                    (3, 1, 0.01, 1.0, 1.0),
+                    (2, 3, 1.0, 1e-3, 1.0),
+                    (3, 3, 0.01, 1.0, 1.0),
+                    (4, 2, 1.0, 100.0, 0.1),
                 )
             ),
             metric=STATE_AND_COV,

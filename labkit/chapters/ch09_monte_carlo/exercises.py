@@ -759,6 +759,10 @@ def _hits(grid, pose, bearing, r_max, step):
     return r[grid.at(pose[:2] + r[:, None] * [math.cos(angle), math.sin(angle)]) == maps.OCCUPIED]
 
 
+def _ray_in_steps(grid, pose, bearing, r_max, cells):
+    return _hits(grid, pose, bearing, r_max, cells * grid.resolution).min(initial=r_max)
+
+
 def _ray_to_the_last(grid, pose, bearing, r_max):
     return float([r_max, *_hits(grid, pose, bearing, r_max, grid.resolution / 2)][-1])
 
@@ -1117,7 +1121,9 @@ def _survives_rounding(resample, rng):
                 index = resample(weights, _LateSpin(np.random.PCG64(seed)))
             except IndexError:
                 return "with weights whose running sum is rounded below 1 the last spoke meets nothing: an IndexError."
-            if np.max(index) >= 200 or len(index) != 200:
+            if len(index) != 200:
+                return f"of 200 weights in single precision {len(index)} indices come out: M are wanted."
+            if np.max(index) >= 200:
                 return "with weights whose running sum is rounded below 1 an index beyond the last particle comes out."
     return None
 
@@ -1191,7 +1197,7 @@ def _other_kind(ahead, turn, dt):
         tails = "light" if kurtosis < 3 else "heavy"
         return f"the noise has the right spread, but too {tails} tails: draw normal numbers, rng.standard_normal."
     if abs(np.corrcoef(ahead, turn)[0, 1]) > 0.2:
-        return "v and omega of a particle got the same random number: each needs its own."
+        return "the noises of v and omega of a particle go together: each needs a random number of its own."
     if abs(ahead.mean() - dt) > 0.02 or abs(turn.mean()) > 0.02:
         return f"on average the particles drive {ahead.mean():.3f} m and turn by {turn.mean():.3f} rad, expected {dt} m and 0."
     return None
@@ -1224,7 +1230,10 @@ def _noise_off_is_reckoning(move, rng):
     if np.abs(moved - right).max() <= (1e-5 if moved.dtype == np.float32 else 1e-9):
         return None
     if np.abs(moved - states).max() < 1e-9:
-        return "with std_u = 0 every particle stands still: u itself is missing. The noise is added to it."
+        return (
+            "with std_u = 0 every particle stands still. Is u itself missing, to which the noise is added? Or is what "
+            "odometry.step returns not handed on?"
+        )
     if np.abs(moved - odometry.step(states, (1.0, 0.5), 1.0)).max() < 1e-9:
         return "the particles move as if dt were 1: hand dt to odometry.step."
     for model, way in (("euler", "straight along the old heading"), ("arc", "along the exact arc")):
@@ -1687,7 +1696,7 @@ CHAPTER = Chapter(
                 Mistake(lambda l: float(np.logaddexp.reduce(l[np.isfinite(l)][:2])), "You summed the first two only."),
                 Mistake(
                     _around_the_mean,
-                    "What you took out (the mean, or the first?) may lie 1000 below the largest logarithm, and exp(1000) is infinite: take out the largest.",
+                    "What you took out (the mean, the first, the last?) may lie 1000 below the largest logarithm, and exp(1000) is infinite: take out the largest.",
                     id="log_sum_exp-80675b",
                 ),
                 *(
@@ -1780,6 +1789,13 @@ CHAPTER = Chapter(
                     "cos and sin take radians, and pose and bearing are in radians already.",
                 ),
                 Mistake(_ray_to_the_last, "Your ray goes on through walls: stop in the *first* occupied cell."),
+                *(
+                    Mistake(
+                        functools.partial(_ray_in_steps, cells=cells),
+                        "Your steps are longer than a cell is wide: they pass over corners and thin walls. Half a cell will do.",
+                    )
+                    for cells in (1.5, 2, 2.5, 3, 4, 5, 10)
+                ),
                 Mistake(_ray_to_infinity, "Nothing hit means r_max, the scanner's limit, not infinity."),
                 Mistake(_ray_without_end, "A scanner sees r_max at most: return r_max when nothing is hit before."),
             ],
