@@ -18,6 +18,7 @@ from time import monotonic
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 from PIL import Image
 
 from . import style
@@ -26,6 +27,8 @@ from .room import LEGIBLE, LETTERS, LOW, NARROW, PANEL, SLENDER, Legends, Panels
 
 CSS_DPI = 100  # a figure inch is 100 CSS pixels: 10 pt text is as large as the notebook's own
 MAX_PIXELS = 5e6  # of a picture; beyond, a sharper screen gets fewer of its pixels
+SMALLEST = 9.0  # CSS pixels of the smallest letters in any place; a lower one scrolls
+TALLER = (1.2, 1.45, 1.75, 2.1, 2.5, 3.0)  # times the height of such a place
 ROOMY = 0.85  # of the designed size: down to it letters keep their size, and below as much of it as they can
 MAX_STRETCH = 1.6  # a low place makes the picture so much wider than designed, but no wider
 WIDEST = 3.2  # width of panels that a low place puts beside each other, as a multiple of their height
@@ -119,23 +122,29 @@ class Picture:
         break_lines(self.fig, narrow or low, self._moving)
         self._take_shape(width, height, narrow)
         least = min(1.0, *([self.width, self.height] / (ROOMY * whole)))
+        least_letters = min(1.0, SMALLEST / (letters * self._smallest()))
         on_a_line, small = None, min([width, height] / whole) < 1
-        for share, growth, folded in self._tries(least, small):
-            self._take_letters(room, narrow, share, growth, folded)
+        for share, growth, folded, taller in self._tries(least, small, least_letters):
+            self._take_letters(room, narrow, share, growth, folded, taller)
             fits = least == 1 or self._fits()
             if fits:
                 break
             if fits is None and on_a_line is None and share >= LETTERS[-1]:
-                on_a_line = share, growth, folded
-            if on_a_line and share <= LEGIBLE and folded:
+                on_a_line = share, growth, folded, taller
+            if on_a_line and share <= max(LEGIBLE, least_letters) and folded:
                 self._take_letters(room, narrow, *on_a_line)  # a legend on a line hides less than letters too small
                 break
         self._backgrounds = {}
 
-    def _take_letters(self, room, narrow, share, growth, folded):
-        """Draw for a room with letters of a share of their size, wide legends folded or not."""
+    def _smallest(self):
+        """The smallest letters of the picture as designed, in CSS pixels."""
+        sizes = [text.get_fontsize() for text in self.fig.findobj(Text) if text.get_text().strip()]
+        return CSS_DPI / 72 * min(sizes, default=10)
+
+    def _take_letters(self, room, narrow, share, growth, folded, taller):
+        """Draw for a room, or one some times as high, with letters of a share of their size, legends folded or not."""
         width, height, ratio, letters = room
-        self._take_shape(width, height, narrow, growth)
+        self._take_shape(width, taller * height, narrow, growth)
         self._scale(letters * share, min(max(ratio, 1.0), np.sqrt(MAX_PIXELS / (self.width * self.height))))
         if self._legends:
             self._legends.fold(self.panels.share if folded else None)
@@ -155,16 +164,21 @@ class Picture:
             width = min(width, MAX_STRETCH * height / aspect)
         self.width, self.height = round(width), round(height)
 
-    def _tries(self, least, small):
-        """(size of the letters, growth, whether legends are folded) from the best to the one that always goes: all
-        shrunk alike.
+    def _tries(self, least, small, least_letters):
+        """(size of the letters, growth, whether legends are folded, times the height of the room) from the best to the
+        one that always goes: all shrunk alike, in a place that scrolls where the letters would be too small.
         """
         if self.panels.way == "column":
             tries = [(1.0, 0.0), *((share, 1.0) for share in LETTERS)]
         else:
             tries = [(share, float(share < 1)) for share in LETTERS if share > least]
             tries += [(least, 1.0), (ROOMY * least, 1.0)]
-        return [(*one, folded) for one in tries for folded in ((False, True) if least < 1 else (small,))]
+        shares = [one for one in tries if one[0] > least_letters]
+        folds = (False, True) if least < 1 else (small,)
+        found = [(*one, folded, 1.0) for one in shares or [(1.0, 0.0)] for folded in folds]
+        if len(shares) < len(tries):
+            found += [(least_letters, 1.0, True, taller) for taller in (1.0, *TALLER)]
+        return found
 
     def _scale(self, letters, ratio):
         self.fig.set_dpi(CSS_DPI * letters * ratio)

@@ -1,8 +1,8 @@
 """Every Stage in four sizes and two themes, at first and failed: `python tests/browser/contact_sheets.py OUT [NN ...]`.
 
 Writes OUT/NN-light-1.png, NN-light-failed-1.png and the same of the dark theme, a row a Stage and a column a size, and
-names what is cut or does not fit, letters of the picture below 11 CSS pixels, what has no name or no ring, and what
-keys do not reach. Motion is reduced.
+names what is cut or does not fit, letters of the picture that are too small, what has no name or no ring, and what keys
+do not reach. Motion is reduced.
 The page is `stage.js` with Python behind it, as everywhere; it needs a Chromium, no JupyterLab.
 """
 
@@ -24,6 +24,7 @@ from PIL import Image, ImageDraw  # noqa: E402
 
 from labkit.book.notebook import stages_of  # noqa: E402
 from labkit.exercises import source  # noqa: E402
+from labkit.stage.canvas import SMALLEST  # noqa: E402
 
 SIZES = {  # width and height in CSS pixels, device pixels a CSS pixel
     "1920x1080": (1620, 950, 1),
@@ -32,7 +33,6 @@ SIZES = {  # width and height in CSS pixels, device pixels a CSS pixel
     "a phone": (360, 640, 2),
 }
 LOOKS = ("light", "light-failed", "dark-failed", "dark")  # each is one change from the one before
-SMALLEST = 11  # CSS pixels of letters
 COLUMNS, ROWS, GAP, HEAD = (560, 400, 380, 220), 3, 8, 22  # widths in pixels of a sheet, and Stages of one
 COLORS = {False: ("#ffffff", "#1a1a1a"), True: ("#111111", "#e8e8e8")}
 MODEL = """
@@ -186,7 +186,7 @@ def small_letters(stage):
     """What the picture writes in letters below SMALLEST."""
     fig, ratio = stage.figure, stage.figure.bbox.width / stage._picture.width
     sizes = [text.get_fontsize() * fig.dpi / 72 / ratio for text in fig.findobj(Text) if text.get_text().strip()]
-    return [f"letters of {min(sizes):.1f} px"] if sizes and min(sizes) < SMALLEST else []
+    return [f"letters of {min(sizes):.1f} px"] if sizes and min(sizes) < SMALLEST - 0.01 else []
 
 
 def sheet(rows):

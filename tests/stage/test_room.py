@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from labkit.stage import Stage, style
-from labkit.stage.canvas import Picture
+from labkit.stage.canvas import SMALLEST, Picture
 from labkit.stage.room import LEAST, LEGIBLE, Words
 
 PHONE, PROJECTOR, OWN = (352, 430), (690, 210), (700, 900)
@@ -73,6 +73,24 @@ def test_letters_are_the_largest_that_leave_the_words_apart():
     assert 0.5 < small < 1 and Words(made.fig).crowded() == 0
     fitted(made, (690, 300))
     assert small < letters(made) <= 1 and Words(made.fig).crowded() == 0
+
+
+def test_letters_stay_legible_in_the_lowest_place_which_scrolls_instead():
+    """Eighteen rows of letters of 11 pixels need 18 times 9 pixels at least, and the place has 120."""
+
+    def scene(fig):
+        ax = style.bare(fig.subplots())
+        for k in range(18):
+            ax.text(0, k / 18, f"row {k}", fontsize=8)
+        return [], lambda state, result: None
+
+    made = Picture(scene, (7.0, 4.2))
+    made.draw()
+    for size in (1.0, 1.6):  # of the letters around, as in the window of a projector
+        made.fit(690, 120, 1.0, False, letters=size)
+        made.draw()
+        assert 8 * made.fig.dpi / 72 >= SMALLEST - 0.01
+        assert 120 < made.height <= 420 and Words(made.fig).crowded() == 0
 
 
 def test_words_on_each_other_outside_and_a_legend_on_a_line_are_counted():
