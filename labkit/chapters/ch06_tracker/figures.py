@@ -191,9 +191,9 @@ def method_chart(ax, names, ways, elsewhere):
 
 class Repeated:
     """Repeated calibrations in space, as seen from the truth: each result, the ellipsoid of their spread, the one that
-    a single run claims."""
+    a single run claims; their legend beside them."""
 
-    def __init__(self, scene, size):
+    def __init__(self, scene, beside, size):
         self.spread = scene.ellipsoid(**style.look("estimate", label="spread of the runs, 3 std"))
         self.claim = scene.ellipsoid(**style.look("prediction", label="covariance of one run, 3 std"))
         self.runs = scene.points(**style.look("estimates", markersize=6, label="one run each"))
@@ -202,7 +202,7 @@ class Repeated:
         scene.fixed(scene.triad("", size), np.eye(4))
         scene.fixed(truth, np.zeros(3))
         lines = (self.runs, self.spread, self.claim, truth)
-        scene.ax.legend(handles=[item.artist for item in lines], loc="lower left", bbox_to_anchor=(0.08, 0), fontsize=8)
+        beside.legend(handles=[item.artist for item in lines], loc="lower left", borderaxespad=0.0)
 
     def set(self, results, mean, spread, single, claim):
         """Results (n, 3), their mean and covariance, one of them and the covariance it claims; all less the truth."""
@@ -213,9 +213,10 @@ class Repeated:
 
 
 class Plan:
-    """Two base stations on a plan of the room, their rays to a diode, the places found from noisy times."""
+    """Two base stations on a plan of the room, their rays to a diode, the places found from noisy times; their legend
+    beside them."""
 
-    def __init__(self, ax, half_width):
+    def __init__(self, ax, beside, half_width):
         style.axes(ax, "x (mm)", "y (mm)", "plan of the room", equal=True)
         ax.set(xlim=(-half_width, half_width), ylim=(-half_width, half_width))
         (self.rays,) = ax.plot([], [], **style.look("measurement", marker="", linestyle="-", linewidth=1.0))
@@ -225,7 +226,7 @@ class Plan:
         (self.diode,) = ax.plot([], [], **style.look("truth", linestyle="none", marker="+", markersize=12))
         self.found.set_label("places found")
         self.region.set_label("covariance, 3 std")
-        ax.legend(loc="upper left", fontsize=8)
+        beside.legend(handles=[self.found, self.region], loc="lower left", borderaxespad=0.0)
         self.names = [
             ax.annotate(name, (0, 0), xytext=(8, -14), textcoords="offset points", fontweight="bold") for name in "AB"
         ]
@@ -268,7 +269,8 @@ class OverSpeed:
         (self.medians,) = ax.plot([], [], **style.look("estimates", markersize=6), label="median")
         (self.law,) = ax.plot([], [], **style.look("prediction"), label="squares add")
         self.levels = [ax.plot([], [], **style.look("guide", linewidth=1.6))[0] for _ in range(2)]
-        self.name = ax.annotate("", (0, 1), (3, 3), textcoords="offset points", color=style.MUTED, fontsize=9)
+        paper = {"facecolor": style.PAPER, "edgecolor": "none", "alpha": 0.8, "pad": 1}  # readings may lie under it
+        self.name = ax.annotate("", (0, 1), (3, 3), textcoords="offset points", color=style.MUTED, fontsize=9, bbox=paper)
         named = [*self.dots, self.nonsense, self.medians, self.law]
         legend = ax.legend(handles=named, loc="upper left", ncols=3, columnspacing=0.8, handlelength=1.4)
         for dots in legend.legend_handles[:3]:

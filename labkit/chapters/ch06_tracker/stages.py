@@ -591,7 +591,7 @@ def six_runs():
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.35, 1))
         space = Scene(left, radius=7.0, half_width=7.5, title="six runs, each 21 poses, seen from the truth", unit="mm")
-        picture = draw.Repeated(space, 2.5)
+        picture = draw.Repeated(space, right, 2.5)
         style.bare(right)
         words = Readout(right, 0.9)
 
@@ -685,7 +685,7 @@ def sweeps():
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.5, 1))
-        picture = draw.Plan(left, FLOOR)
+        picture = draw.Plan(left, right, FLOOR)
         style.bare(right)
         words = Readout(right, 0.92)
 
