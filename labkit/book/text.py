@@ -13,6 +13,7 @@ FORMULA = r"\$(?!\s)(?P<formula_tex>(?:\\\$|[^$`])+?)(?<!\s)\$(?!\d)"
 DISPLAYED = r"^ {0,3}\$\$(?P<displayed_tex>[\s\S]+?)\$\$[ \t]*$"
 NOTEBOOK = re.compile(r"(?:\.\./notebooks/|\./)?(\d\d_\w+)\.ipynb")
 ALIGNED = re.compile(r"\\(begin|end)\{aligned\}")
+TRANSPOSED = "<mo>&#x022A4;</mo>"
 EQUALS = "<mo>&#x0003D;</mo>"
 
 
@@ -23,6 +24,7 @@ def mathml(tex, block=False):
     unknown = re.search(r"\\[A-Za-z]+|(?<=>)&(?=<)", made)
     if unknown:
         raise ValueError(f"the formula {tex!r} holds {unknown[0]}, which MathML cannot be made of")
+    made = made.replace(TRANSPOSED, TRANSPOSED.replace("mo>", "mi>"))  # a letter: a sign would stand far off
     return made if block else _breakable(made)
 
 

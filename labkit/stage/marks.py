@@ -114,10 +114,10 @@ class Readout(Text):
 
 
 class Spare:
-    """The name of a landmark that can be dragged but is not used at the moment."""
+    """The name of a landmark that can be dragged but is not used at the moment: right of it, or left."""
 
-    def __init__(self, ax, text):
-        away = {"xytext": (11, -4), "textcoords": "offset points"}
+    def __init__(self, ax, text, left=False):
+        away = {"xytext": (-11 if left else 11, -4), "textcoords": "offset points", "ha": "right" if left else "left"}
         self.name = ax.annotate(text, (0, 0), **away, color=style.MUTED, fontsize=9)
         self.artists = [self.name]
 

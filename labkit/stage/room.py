@@ -24,6 +24,7 @@ ALIKE = 1.4, 2.6  # so many times as large as another panel under it, and beside
 ROUGH = 2.0  # pixels that two words may share, for their boxes are larger than their letters
 GAP = 0.03  # inches of the picture that two words in one line must stay apart
 LEAST = 0.35  # of its share of the picture must be left to a panel
+FLATTEST, ROOM_LEFT = 0.36, 0.8  # inches a panel must be high, or that share of its own height where this is less
 LETTERS = (1.0, 0.92, 0.85, 0.77, 0.7)  # sizes of the letters that are tried, as shares of their own
 LEGIBLE = 0.77  # of their size: to keep a legend off a line, letters shrink no further
 
@@ -114,10 +115,11 @@ class Words:
         self.fig = fig
         self.in_space = {id(text) for ax in fig.axes if hasattr(ax, "space") for text in ax.texts}
         self.crowd, self.shares = self.crowded(), self._shares()
+        self.flattest = np.minimum(FLATTEST, ROOM_LEFT * self._heights())
 
     def fit(self):
-        """Whether they stay apart, and no panel has become too small; None where only a legend lies on a line."""
-        if (self._shares() < LEAST * self.shares).any():
+        """Whether they stay apart, and no panel is too small or flat; None where only a legend lies on a line."""
+        if (self._shares() < LEAST * self.shares).any() or (self._heights() < self.flattest).any():
             return False
         crowd = self.crowded()
         if crowd <= self.crowd:
@@ -153,6 +155,10 @@ class Words:
 
     def _shares(self):
         return np.array([np.prod(ax.get_window_extent().size / self.fig.bbox.size) for ax in self.fig.axes])
+
+    def _heights(self):
+        """Of the panels, in inches, which grow where letters shrink."""
+        return np.array([ax.get_window_extent().height / self.fig.dpi for ax in self.fig.axes])
 
     def _boxes(self):
         """Boxes (left, bottom, right, top) in pixels of all words that are shown, shape (n, 4); letters in space move

@@ -53,6 +53,7 @@ def test_every_formula_of_the_course_becomes_mathml_and_every_text_well_formed(s
 def test_a_formula_is_set_and_one_with_an_unknown_word_is_refused():
     assert re.search(r"<mfrac>.*<mi>a</mi>.*<mi>b</mi>.*</mfrac>", text.mathml(r"\frac{a}{b}"))
     assert 'display="block"' in text.as_html("$$\nx = 1\n$$")
+    assert "<msup><mi>Q</mi><mi>&#x022A4;</mi></msup>" in text.mathml(r"Q^\top P")
     assert text.as_html("costs $5 and $6").count("<math") == 0
     with pytest.raises(ValueError, match="nosuchword"):
         text.mathml(r"\nosuchword x")

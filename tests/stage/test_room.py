@@ -5,7 +5,7 @@ import pytest
 
 from labkit.stage import Stage, style
 from labkit.stage.canvas import SMALLEST, Picture
-from labkit.stage.room import LEAST, LEGIBLE, Words
+from labkit.stage.room import FLATTEST, LEAST, LEGIBLE, Words
 
 PHONE, PROJECTOR, OWN = (352, 430), (690, 210), (700, 900)
 
@@ -91,6 +91,18 @@ def test_letters_stay_legible_in_the_lowest_place_which_scrolls_instead():
         made.draw()
         assert 8 * made.fig.dpi / 72 >= SMALLEST - 0.01
         assert 120 < made.height <= 420 and Words(made.fig).crowded() == 0
+
+
+def test_a_panel_that_is_wide_but_flat_does_not_fit():
+    """It has its share of the picture, and yet its markers cover the words above."""
+    made = picture(3, 1, "y")
+    words, ax = Words(made.fig), made.fig.axes[0]
+    assert words.fit()
+    left, bottom, width, _ = ax.get_position().bounds
+    ax.set_position([left, bottom, width, 1.05 * FLATTEST / 4.2])
+    assert words.fit()
+    ax.set_position([left, bottom, width, 0.95 * FLATTEST / 4.2])
+    assert not words.fit() and (words._shares() > LEAST * words.shares).all()
 
 
 def test_words_on_each_other_outside_and_a_legend_on_a_line_are_counted():

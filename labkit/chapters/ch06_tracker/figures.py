@@ -270,7 +270,8 @@ class OverSpeed:
         (self.law,) = ax.plot([], [], **style.look("prediction"), label="squares add")
         self.levels = [ax.plot([], [], **style.look("guide", linewidth=1.6))[0] for _ in range(2)]
         paper = {"facecolor": style.PAPER, "edgecolor": "none", "alpha": 0.8, "pad": 1}  # readings may lie under it
-        self.name = ax.annotate("", (0, 1), (3, 3), textcoords="offset points", color=style.MUTED, fontsize=9, bbox=paper)
+        over = {"xytext": (3, 3), "textcoords": "offset points", "bbox": paper}
+        self.name = ax.annotate("", (0, 1), **over, color=style.MUTED, fontsize=9)
         named = [*self.dots, self.nonsense, self.medians, self.law]
         legend = ax.legend(handles=named, loc="upper left", ncols=3, columnspacing=0.8, handlelength=1.4)
         for dots in legend.legend_handles[:3]:

@@ -112,7 +112,8 @@ class ModelPaths:
     def __init__(self, plane, errors, steps):
         names = {"arc": "arc", "euler": "simplified", "midpoint": "midpoint"}
         self.lines = {m: plane.plot([], [], **MODEL_LOOKS[m], label=name)[0] for m, name in names.items()}
-        plane.legend(loc="upper left", fontsize=8)
+        close = {"fontsize": 8, "handlelength": 1.5, "columnspacing": 0.8}
+        style.legend_above(plane, ncols=3, **close)  # a turn may go either way, and cross each corner
         self.curves, self.now = {}, {}
         for model in ("euler", "midpoint"):
             look = MODEL_LOOKS[model] | {"marker": ""}

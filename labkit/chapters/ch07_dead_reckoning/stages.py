@@ -134,7 +134,7 @@ def circles():
     def scene(fig):
         ax = style.axes(fig.subplots(), "x (m)", "y (m)", equal=True)
         ax.set(xlim=(-4.0, 14.8), ylim=(-5.4, 6.4))
-        rings, search, spare = draw.Circles(ax), draw.Search(ax), Spare(ax, "C, not used")
+        rings, search, spare = draw.Circles(ax), draw.Search(ax), Spare(ax, "C, unused", left=True)
 
         def update(state, result):
             rings.set(result["landmarks"], result["distances"], state["R"])
@@ -211,7 +211,7 @@ def models():
 
     def scene(fig):
         left, right = fig.subplots(1, 2, width_ratios=(1.2, 1))
-        style.axes(left, "x (m)", "y (m)", "5 s at 1 m/s", equal=True)
+        style.axes(left, "x (m), in 5 s at 1 m/s", "y (m)", equal=True)
         left.set(xlim=(-2.4, 5.6), ylim=(-4, 5))
         style.axes(right, "time step T (s)", "error of the end (m)", "slope 1 and slope 2")
         right.set(xscale="log", yscale="log", xlim=(0.05, 2.5), ylim=(1e-4, 10))

@@ -350,7 +350,8 @@ def wheel():
         left.set(xticks=range(1, SECTORS + 1), yticks=(0, 0.2, 0.4, 0.6, 0.8, 1))
         left.grid(axis="x", visible=False)
         (sticks,) = left.plot([], [], color=style.PREDICTION, linewidth=14, solid_capstyle="butt")
-        labels = [left.text(k + 1, 0, "", ha="center", va="bottom", color=style.INK) for k in range(SECTORS)]
+        look = {"ha": "center", "va": "bottom", "color": style.INK, "fontsize": 8}  # side by side on a phone
+        labels = [left.text(k + 1, 0, "", **look) for k in range(SECTORS)]
         disk = draw.Wheel(right, SECTORS)
         words = left.text(0.02, 0.99, "", transform=left.transAxes, va="top")
 
