@@ -114,11 +114,11 @@ class Readout(Text):
 
 
 class Spare:
-    """The name of a landmark that can be dragged but is not used at the moment: right of it, or left."""
+    """The name of a landmark that can be dragged but is not used at the moment; `away` from it, in points."""
 
-    def __init__(self, ax, text, left=False):
-        away = {"xytext": (-11 if left else 11, -4), "textcoords": "offset points", "ha": "right" if left else "left"}
-        self.name = ax.annotate(text, (0, 0), **away, color=style.MUTED, fontsize=9)
+    def __init__(self, ax, text, away, ha):
+        place = {"xytext": away, "textcoords": "offset points", "ha": ha}
+        self.name = ax.annotate(text, (0, 0), **place, color=style.MUTED, fontsize=9)
         self.artists = [self.name]
 
     def set(self, point, spare):

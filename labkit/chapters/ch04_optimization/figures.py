@@ -60,7 +60,7 @@ def courses(ax, names, iterations, low, high):
     return lines, here
 
 
-def basins(ax, edges):
+def basins(ax, beside, edges):
     """A square image of where each start ends, empty at first, its legend beside it. Returns (image, fill).
 
     `edges` are the borders of the cells, alike in both directions. PcolorImage takes half the time of imshow.
@@ -69,7 +69,8 @@ def basins(ax, edges):
     ax.add_image(image)
     for name, color in BASINS.items():
         ax.plot([], [], marker="s", markersize=9, linestyle="none", color=color, label=name)
-    ax.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), title="ends in", alignment="left")
+    handles, _ = ax.get_legend_handles_labels()
+    style.bare(beside).legend(handles=handles, loc="upper left", title="ends in", alignment="left", borderaxespad=0.0)
     return image, lambda colors: image.set_data(edges, edges, colors)
 
 
@@ -80,18 +81,19 @@ def basin_colors(labels, covered):
 
 
 def profile(ax, t, f, points):
-    """f along a line, with named points {name: (t, f)}. Returns the artists (parabola, iterates, vertex, text)."""
+    """f along a line, with named points {name: (t, f)}. Returns artists (parabola, iterates, vertex, text, names)."""
     style.axes(ax, "$t$, on the line through both centers: 0 at (1, 1), 1 at (-1, -2)", "$f$")
     ax.plot(t, f, **style.look("truth"))
+    paper = {"facecolor": style.PAPER, "edgecolor": "none", "pad": 2}  # lines may pass under words
+    names = []
     for name, at in points.items():
-        below = -15 if name != "saddle" else 8
-        ax.annotate(LETTERS[name], at, xytext=(-4, below), textcoords="offset points", weight="bold")
+        away = {"xytext": (-4, -15 if name != "saddle" else 8), "textcoords": "offset points"}
+        names.append(ax.annotate(LETTERS[name], at, **away, weight="bold", bbox=paper | {"pad": 0}, zorder=3.5))
     (parabola,) = ax.plot([], [], **style.look("prediction"), zorder=3)
     (iterates,) = ax.plot([], [], **style.look("estimate"), marker="D", markersize=5, zorder=4)
     (vertex,) = ax.plot([], [], color=style.PREDICTION, marker="v", markersize=10, linestyle="none", zorder=5)
-    text = ax.text(0.02, 0.05, "", transform=ax.transAxes, zorder=6)
-    text.set_bbox({"facecolor": style.PAPER, "edgecolor": "none", "pad": 2})
-    return parabola, iterates, vertex, text
+    text = ax.text(0.02, 0.05, "", transform=ax.transAxes, zorder=6, bbox=paper)
+    return parabola, iterates, vertex, text, names
 
 
 def curvature(ax):

@@ -68,7 +68,7 @@ def line():
         points = {}
         for name, e in zip(wells.NAMES, wells.extrema()):
             points[name] = (wells.along_line(e.x), e.value)
-        parabola, iterates, vertex, text = draw.profile(ax, t, wells.value(wells.on_line(t)), points)
+        parabola, iterates, vertex, text, names = draw.profile(ax, t, wells.value(wells.on_line(t)), points)
         ax.set(xlim=(-0.6, 1.6), ylim=(-240, 10))
 
         def update(state, result):
@@ -78,7 +78,7 @@ def line():
             vertex.set_data([np.clip(result["vertex"], -0.6, 1.6)], [-236])
             text.set_text(f"curvature {result['bend']:+.0f}")
 
-        return [parabola, iterates, vertex, text], update
+        return [parabola, iterates, vertex, text, *names], update
 
     def follow(state, moved):
         t = state["start"][0]
@@ -409,11 +409,11 @@ def basins():
     """Rub the square free: the color of a place is where a run from there ends. The handle shows one run."""
 
     def scene(fig):
-        ax = fig.subplots()
+        ax, beside = fig.subplots(1, 2, width_ratios=(3.2, 1))
         _map(ax, SQUARE, SQUARE)
         names = [*ax.lines, *ax.texts]  # drawn anew over the colors
         half = (SQUARE[1] - SQUARE[0]) / (CELLS - 1) / 2
-        image, fill = draw.basins(ax, np.linspace(SQUARE[0] - half, SQUARE[1] + half, CELLS + 1))
+        image, fill = draw.basins(ax, beside, np.linspace(SQUARE[0] - half, SQUARE[1] + half, CELLS + 1))
         ax.set(xlim=SQUARE, ylim=SQUARE)
         (path,) = ax.plot([], [], color=style.INK, linewidth=1.4, marker="o", markersize=3.5, zorder=5)
 

@@ -134,7 +134,7 @@ def circles():
     def scene(fig):
         ax = style.axes(fig.subplots(), "x (m)", "y (m)", equal=True)
         ax.set(xlim=(-4.0, 14.8), ylim=(-5.4, 6.4))
-        rings, search, spare = draw.Circles(ax), draw.Search(ax), Spare(ax, "C, unused", left=True)
+        rings, search, spare = draw.Circles(ax), draw.Search(ax), Spare(ax, "C, unused", (-11, -4), "right")
 
         def update(state, result):
             rings.set(result["landmarks"], result["distances"], state["R"])

@@ -289,7 +289,7 @@ def arena():
         left.set(xlim=ARENA[0], ylim=ARENA[1])
         style.axes(right, "steps", "NEES")
         right.set(xlim=(0, 400), ylim=(1e-2, 1e5), yscale="log")
-        world, spare = draw.Arena(left), Spare(left, "2, not seen")
+        world, spare = draw.Arena(left), Spare(left, "2, unseen", (-8, 10), "left")
         panel = draw.Consistency(right, "NEES of each step", role="estimates")
         style.legend_above(right)
         limits = gaussian.chi_square_quantile([0.005, 0.995], 3)
@@ -381,11 +381,11 @@ def honesty():
         low, high = kalman.mean_band(3, RUNS)
         right.axhspan(low, high, color=style.GRID)
         parts = draw.Honesty(left, right, ITERATIONS)
-        words = left.text(0.02, 0.02, "", transform=left.transAxes, va="bottom")
+        words = right.text(0.98, 0.98, "", transform=right.transAxes, va="top", ha="right", fontsize=8)
 
         def update(state, result):
             parts.set(result["positions"], result["ellipse"], result["curve"], result["iterations"])
-            words.set_text(f"half width {result['scale']:.2g} m,\nholds 90 %")
+            words.set_text(f"errors shown: ±{result['scale']:.2g} m,\n90 % of them")
 
         return [*parts.artists, words], update
 
