@@ -19,7 +19,7 @@ def diagonal(ax, title, limit):
 
 def shares(ax, n):
     """Bars of what each of n poses contributes. Returns (bars, cross of the one left out)."""
-    style.axes(ax, "pose", "parameters it pays for, of 12", "what each pose contributes")
+    style.axes(ax, "pose", "parameters it pays for", "what each pose contributes, of 12")
     ax.set(xlim=(0.3, n + 0.7), ylim=(0, 7), xticks=range(1, n + 1))
     (bars,) = ax.plot([], [], color=style.MEASUREMENT, linewidth=9, solid_capstyle="butt")
     (cross,) = ax.plot([], [], **style.look("rejected", markersize=10, markeredgewidth=2))
