@@ -50,21 +50,23 @@ def nearly_in_a_plane(rng):
 
 
 def first_ones_on_a_line(rng):
-    """Noisy poses of which all but the last three lie nearly on one line: by them alone the turn about it is not known."""
-    T_BF, x_S = translated_poses(rng, directions=3, n=int(rng.integers(6, 13)))
-    line = len(x_S) - 3
+    """Noisy poses of which all but three lie nearly on one line, the last one as well: by them alone the turn about it
+    is not known.
+    """
+    T_BF, x_S = translated_poses(rng, directions=3, n=int(rng.integers(7, 13)))
     T_FS = frames.pose(literature.li_rotation(T_BF, x_S), np.zeros(3))
     along = 30 * frames.unit_vector(rng.normal(size=3))
-    steps = np.outer(np.arange(1, line), along)
-    T_BF[1:line, :3, 3] = T_BF[0, :3, 3] + steps + 0.005 * rng.normal(size=steps.shape)
+    line = np.r_[1 : len(x_S) - 4, len(x_S) - 1]
+    steps = np.outer(line, along)
+    T_BF[line, :3, 3] = T_BF[0, :3, 3] + steps + 0.005 * rng.normal(size=steps.shape)
     moved = (T_BF[:, :3, 3] - T_BF[0, :3, 3]) @ T_BF[0, :3, :3] @ T_FS[:3, :3]
     return T_BF, x_S[0] - moved + 0.02 * rng.normal(size=x_S.shape)
 
 
-def turned_poses(rng):
+def turned_poses(rng, n=None):
     """Poses that turn about all axes, the sphere as each sees it, and the scanner's rotation."""
     T_FS, target = scanner(rng)
-    n = int(rng.integers(4, 10))
+    n = n or int(rng.integers(4, 10))
     x_S = np.column_stack([rng.uniform(-25, 25, n), rng.uniform(-20, 20, n), rng.uniform(190, 290, n)])
     return poses_that_see(T_FS, target, exp_so3(rng.uniform(-1.2, 1.2, (n, 3))), x_S), x_S, T_FS[:3, :3].copy()
 
@@ -254,7 +256,12 @@ ACCURACY = [
     Exercise(
         "position_accuracy",
         reference=robot_accuracy.position_accuracy,
-        draw=(arrivals, functools.partial(arrivals, d=2), functools.partial(arrivals, numbers=(1, 4))),
+        draw=(
+            arrivals,
+            functools.partial(arrivals, d=2),
+            functools.partial(arrivals, numbers=(2, 4)),
+            functools.partial(arrivals, numbers=(1, 2)),
+        ),
         metric=metrics.Numbers(1e-9, "mm"),
         hints=(
             "First where the robot arrives on average, then how far that is from where it was sent.",
@@ -729,7 +736,11 @@ LITERATURE = [
     Exercise(
         "li_rotation",
         reference=literature.li_rotation,
-        draw=(translated_poses, functools.partial(translated_poses, directions=2)),
+        draw=(
+            translated_poses,
+            functools.partial(translated_poses, directions=2),
+            functools.partial(translated_poses, directions=2, n=3),
+        ),
         metric=metrics.Rotations(1e-6),
         noisy=(
             (functools.partial(translated_poses, std=0.01), metrics.Rotations(0.2)),
@@ -823,7 +834,7 @@ LITERATURE = [
     Exercise(
         "li_translation",
         reference=literature.li_translation,
-        draw=turned_poses,
+        draw=(turned_poses, functools.partial(turned_poses, n=3)),
         fixed={"R_FS": ROTATION},
         metric=metrics.Several(metrics.Numbers(1e-6, "mm"), metrics.Numbers(1e-6, "mm"), names=("t_FS", "target")),
         noisy=(  # differences from one pose are weighed otherwise, and right as well

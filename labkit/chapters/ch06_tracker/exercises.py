@@ -15,7 +15,7 @@ from ...geometry.frames import invert, pose, relative, unit_vector
 from ...geometry.lie import exp_so3, log_so3
 from ...machines import packet, simulation
 from ...machines.arm import TX40, dh_matrix, forward_kinematics
-from ...machines.log import average_stops, reject_outliers
+from ...machines.log import average_stops
 from ...machines.mounting import calibrate_mounting, e_rot, e_trans
 from ...machines.packet import POSITION, QUATERNION, TIME, encode_packet, packet_from_pose
 from ...machines.tracking import time_offset
@@ -65,6 +65,11 @@ def _scalar_first(data):
 def link(rng, signs):
     """Parameters of one link: rad, mm, mm, rad."""
     return (*(rng.uniform((0.3, 50, 50, 0.3), (3, 300, 300, 1.5)) * signs),)
+
+
+def obtuse_link(rng):
+    """Parameters of a link that turns by more than a right angle about both of its axes."""
+    return (*(rng.uniform((1.8, 50, 50, 1.8), (3, 300, 300, 3)) * rng.choice([-1, 1], 4)),)
 
 
 def _entry_by_entry(th, d, a, al):
@@ -225,9 +230,9 @@ def _values(M):
     return np.linalg.svd(M)[1]
 
 
-def stacks(rng):
+def stacks(rng, n=None):
     """Stacked blocks of motions about axes that lie within a cone of 5 to 90 deg, with noise; 3 motions and more."""
-    n, width = int(rng.integers(3, 15)), np.deg2rad(rng.uniform(5, 90))
+    n, width = n or int(rng.integers(3, 15)), np.deg2rad(rng.uniform(5, 90))
     tilt = exp_so3(
         rng.uniform(-width, width, (n, 1)) * unit_vector(np.r_["1", rng.normal(size=(n, 2)), np.zeros((n, 1))])
     )
@@ -237,8 +242,8 @@ def stacks(rng):
     return (ax_xb.kronecker_matrix(A, B),)
 
 
-def translation_problem(rng):
-    A, B = motions(rng)
+def translation_problem(rng, n=None):
+    A, B = motions(rng, n)
     return A, B, ax_xb.rotation_from_kronecker(ax_xb.kronecker_matrix(A, B))[0]
 
 
@@ -268,12 +273,17 @@ def _weighed(A, B, R, weight):
     return np.linalg.lstsq((w[..., None] * _k1(A)).reshape(-1, 3), (w * _k2(A, B, R)).ravel(), rcond=None)[0]
 
 
-def gaps(rng):
-    A, B, R = translation_problem(rng)
+def gaps(rng, n=None):
+    A, B, R = translation_problem(rng, n)
     return (ax_xb.translation_from_motions(A, B, R)[1],)
 
 
 # Outliers and time -----------------------------------------------------------------------------------------------------------
+
+
+def reject_outliers(values, factor=4.0):
+    """Reference of the exercise, its rule to the letter; the library's keeps all where more than half are equal."""
+    return _keep(np.median, lambda v: 1.4826 * _mad(v))(values, factor)
 
 
 SHARES = np.array([0.43, 0.5, 0.57, 0.64, 0.71, 0.78, 0.85, 0.92, 1.08, 1.2, 1.5, 1.9, 2.6, 4.0, 30.0])
@@ -284,7 +294,7 @@ def _far(rng):
     return rng.choice([-1, 1]) * rng.uniform(40, 90)
 
 
-def spoiled(rng, factor):
+def spoiled(rng, factor, size=1.0):
     """Values about some number, and more on both sides at certain shares of the limit: every other rule draws its line between
     two of them, the rule itself where none is near.
     """
@@ -293,7 +303,7 @@ def spoiled(rng, factor):
     tail = np.r_[SHARES, SHARES[9:], -SHARES[:9]]
     limit = factor * 1.4826 * _mad(np.r_[core, 99 * np.sign(tail)])
     values = np.r_[core, np.median(np.r_[core, 99 * np.sign(tail)]) + limit * tail]
-    return rng.permutation(_far(rng) + rng.uniform(0.5, 2) * values), factor
+    return rng.permutation(_far(rng) + size * rng.uniform(0.5, 2) * values), factor
 
 
 def lopsided(rng):
@@ -320,6 +330,18 @@ def all_equal(rng):
     return np.full(int(rng.integers(5, 40)), rng.uniform(-50, 50)), float(rng.uniform(2, 6))
 
 
+def mostly_equal(rng):
+    """Readings of which more than half are equal: the robust standard deviation is 0, and the others are beyond it."""
+    n = int(rng.integers(4, 20))
+    others = 10 ** rng.uniform(-3, 1, n) * rng.choice([-1, 1], n)
+    return rng.permutation(_far(rng) + np.r_[np.zeros(n + 2), others]), float(rng.uniform(2, 6))
+
+
+def three_values(rng):
+    """Two values close together and one far away."""
+    return rng.permutation(_far(rng) + np.array([0.0, rng.uniform(0.1, 1), 50.0])), float(rng.uniform(2, 6))
+
+
 class KeptOrNot(metrics.Exactly):
     """True or False for each value; says how many are kept or refused wrongly."""
 
@@ -335,6 +357,13 @@ class KeptOrNot(metrics.Exactly):
         kept, refused = int((result & ~expected).sum()), int((~result & expected).sum())
         words = f"of {len(expected)} values you keep {kept} that should go, and refuse {refused} that should stay"
         return [metrics.Deviation("", float(kept + refused), "", 0.5, words=words)]
+
+
+class KeptOrAll(KeptOrNot):
+    """As the rule says, or all of them: where there is no scale to judge by, whoever keeps all is as right."""
+
+    def deviations(self, result, expected):
+        return super().deviations(expected if result.all() else result, expected)
 
 
 def _keep(center, scale, above=False):
@@ -382,6 +411,23 @@ def speed_curves(rng, sign, wide=False):
 
     most = int(rng.integers(130, 170)) if wide else samples + int(rng.integers(4, 12))
     return time, curve(time), curve(time - lag), step * most
+
+
+def periodic_curves(rng):
+    """Curves that repeat: they match within the largest offset, between two samples, and beyond it, a period away, on a
+    sample, where the cost is 0.
+    """
+    step, near, period = 0.01, int(rng.integers(12, 22)), int(rng.integers(60, 80))
+    part, sign, phase = rng.uniform(0.25, 0.4), rng.choice([-1, 1]), rng.uniform(0, 6, 3)
+    time = rng.uniform(1, 50) + step * np.arange(int(rng.integers(550, 700)))
+    rate = 2 * np.pi / ((period + part) * step)
+
+    def curve(t):
+        waves = (a * np.sin(k * rate * t + p) for k, a, p in zip((1, 2, 3), (0.6, 0.3, 0.15), phase))
+        return 1.2 + sum(waves)
+
+    lag = sign * (near + part) * step
+    return time, curve(time), curve(time - lag), (period - near - 6) * step
 
 
 def noisy_curves(rng):
@@ -626,9 +672,12 @@ CHAPTER = Chapter(
         Exercise(
             "dh_matrix",
             reference=dh_matrix,
-            draw=tuple(
-                functools.partial(link, signs=s)
-                for s in ((1, 1, 1, -1), (-1, -1, 1, 1), (1, -1, -1, -1), (-1, 1, -1, 1))
+            draw=(
+                *(
+                    functools.partial(link, signs=s)
+                    for s in ((1, 1, 1, -1), (-1, -1, 1, 1), (1, -1, -1, -1), (-1, 1, -1, 1))
+                ),
+                obtuse_link,
             ),
             metric=metrics.Poses(1e-6, 1e-6),
             hints=(
@@ -962,7 +1011,7 @@ CHAPTER = Chapter(
         Exercise(
             "singular_value_ratio",
             reference=singular_value_ratio,
-            draw=stacks,
+            draw=(stacks, functools.partial(stacks, n=2)),
             metric=metrics.Numbers(1e-9),
             hints=(
                 "The smallest singular value belongs to the answer itself, the null vector. Which one says how nearly there is a second answer?",
@@ -1024,7 +1073,7 @@ CHAPTER = Chapter(
         Exercise(
             "translation_lsq",
             reference=translation_lsq,
-            draw=translation_problem,
+            draw=tuple(functools.partial(translation_problem, n=n) for n in (None, 3, 25)),
             fixed={"R": "a rotation is always 3 x 3"},
             metric=metrics.Numbers(1e-7, "mm"),
             hints=(
@@ -1201,7 +1250,7 @@ CHAPTER = Chapter(
         Exercise(
             "e_trans",
             reference=e_trans,
-            draw=gaps,
+            draw=(gaps, functools.partial(gaps, n=3), functools.partial(gaps, n=25)),
             metric=metrics.Numbers(1e-9, "mm"),
             hints=(
                 "Equation (17), taken at its word: the norm of K1 t - K2, divided by N - 1.",
@@ -1286,6 +1335,22 @@ CHAPTER = Chapter(
                     two_heaps,
                     KeptOrNot(),
                     "Right where the number of values is odd. Where it is even, the median lies halfway between the two in the middle:",
+                ),
+                (
+                    mostly_equal,
+                    KeptOrAll(),
+                    "Right as long as fewer than half of the values are equal. Where more are, the robust standard deviation is 0, and only what "
+                    "lies at the median itself is within a limit of 0:",
+                ),
+                (
+                    functools.partial(spoiled, factor=4.0, size=1e-4),
+                    KeptOrNot(),
+                    "Right where the values scatter by about 1. Where they scatter by a ten thousandth of that:",
+                ),
+                (
+                    three_values,
+                    KeptOrNot(),
+                    "Right for many values. For three, two close together and one far away:",
                 ),
             ),
             hints=(
@@ -1578,9 +1643,16 @@ CHAPTER = Chapter(
             draw=tuple(functools.partial(speed_curves, sign=s, wide=wide) for wide in (False, True) for s in (1, -1)),
             metric=metrics.Numbers(6e-4, "s"),
             noisy=(
-                noisy_curves,
-                metrics.Numbers(0.2, "s"),
-                "Right on clean curves. On noisy ones that are shifted by up to a third of their length, where the shifts differ in how many samples overlap:",
+                (
+                    periodic_curves,
+                    metrics.Numbers(6e-4, "s"),
+                    "Right where the curves match at one shift. Where they repeat, and match at one within max_offset and at another beyond it:",
+                ),
+                (
+                    noisy_curves,
+                    metrics.Numbers(0.2, "s"),
+                    "Right on clean curves. On noisy ones that are shifted by up to a third of their length, where the shifts differ in how many samples overlap:",
+                ),
             ),
             hints=(
                 "Shift one curve against the other, sample by sample, and find where they differ least. Then look between the samples.",
