@@ -43,6 +43,7 @@ MODULES = {"np", "numpy", "math", "scipy"}  # what they hold is no data of the n
 CAST = "astype"  # the argument of which is no value
 GUARD = 1e-3  # below which a bound stands for 0
 BOUNDED = {"clip"}  # exchanged, a value and its bound make a constant: that mends, and is not what happened
+BOUNDS = {"max", "min", "maximum", "minimum"}
 SIGNS = {ast.Add: "plus", ast.Sub: "minus", ast.Mult: "`*`", ast.Div: "`/`", ast.MatMult: "`@`", ast.Pow: "`**`"}
 SIGNS |= {ast.FloorDiv: "`//`", ast.Mod: "`%`"}
 OTHERS = {
@@ -391,14 +392,20 @@ def _exchanged_throughout(function):
         for node in ast.walk(values):
             if _may_change_places(node):
                 read.setdefault(ast.unparse(node), []).append(node)
-        called = {part for call in ast.walk(values) if isinstance(call, ast.Call) for part in ast.walk(call.func)}
-        texts = [text for text, nodes in read.items() if not called & set(nodes)][:PARTNERS]
+        calls = [node for node in ast.walk(values) if isinstance(node, ast.Call)]
+        fixed = {part for call in calls for part in ast.walk(call if _is_bound(call) else call.func)}
+        texts = [text for text, nodes in read.items() if not fixed & set(nodes)][:PARTNERS]
         for one, other in itertools.combinations(texts, 2):
             if _alike(read[one][0], read[other][0]):
                 sets = [_turned_into(node, read[other][0]) for node in read[one]]
                 sets += [_turned_into(node, read[one][0]) for node in read[other]]
                 mends = f"`{one}` and `{other}` have changed places in this step"
                 yield Change("", mends, 2, values, tuple(itertools.chain(*sets)))
+
+
+def _is_bound(call):
+    """Whether a call holds a value within bounds: then another one in its place is another bound, and no exchange."""
+    return _called(call) in BOUNDED | BOUNDS
 
 
 def _may_change_places(node):

@@ -286,3 +286,78 @@ def test_who_accuses_both_angles_of_row_12_accuses_one_wrongly():
     metric, (A, C) = exercises.named_entries(), (("C14", 12, "A_deg"), ("C14", 12, "C_deg"))
     assert metric.admit({A}, {C}) == metric.admit({C}, {C}) == {C}
     assert not metric.equal(metric.admit({A, C}, {C}), {C})
+
+
+def linear(poses=slice(None), rotation=lie.nearest_rotation, scale=lambda M: 1.0):
+    """A linear start from some of the poses, with another rotation of the nine numbers, or t_FS divided by one."""
+
+    def start(T_BF, x_S):
+        right = -np.einsum("nji,nj->ni", T_BF[poses, :3, :3], T_BF[poses, :3, 3])
+        u = np.linalg.lstsq(exercises._linear_equations(T_BF[poses], x_S[poses]), right.ravel(), rcond=None)[0]
+        M = u[:9].reshape(3, 3)
+        T_FS = np.eye(4)
+        T_FS[:3, :3], T_FS[:3, 3] = rotation(M), u[9:12] / scale(M)
+        return T_FS, u[12:]
+
+    return start
+
+
+def by_two_axes(M):
+    x, y = M[0] / np.linalg.norm(M[0]), M[1] / np.linalg.norm(M[1])
+    return lie.nearest_rotation(np.array([x, y, np.cross(x, y)]))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        linear(slice(1, None)),
+        linear(slice(-1)),
+        linear(rotation=by_two_axes),
+        linear(scale=lambda M: np.cbrt(np.linalg.det(M))),
+    ],
+)
+def test_a_linear_start_hears_every_pose_and_its_target_goes_with_one_pose_of_the_scanner(wrong):
+    assert judged("linear_start", linear()).status == CORRECT
+    assert judged("linear_start", wrong).status == NOT_YET
+
+
+def test_residuals_of_one_pose_keep_their_shape_and_of_many_their_number():
+    reference = {name: ITEMS[name].reference for name in ("kuka_residual", "joint_residual", "numeric_jacobian")}
+    for name in reference:
+        squeezed = judged(name, lambda *a, name=name: np.squeeze(reference[name](*a))).status
+        assert squeezed == (CORRECT if name == "joint_residual" else NOT_YET)
+    assert judged("joint_residual", lambda *a: reference["joint_residual"](*a)[: 3 * 31]).status == NOT_YET
+
+
+def test_a_turn_of_0_is_a_turn_too():
+    def divided(u, T0, T_BF, x_S):
+        angle = np.linalg.norm(u[:3])
+        K = np.cross(np.eye(3), -u[:3] / angle)
+        R = np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+        T_FS = np.block([[T0[:3, :3] @ R, T0[:3, 3:] + u[3:6, None]], [0, 0, 0, 1]])
+        return (frames.transform(T_BF, frames.transform(T_FS, x_S)) - u[6:]).ravel()
+
+    with np.errstate(invalid="ignore"):
+        assert judged("joint_residual", divided).status == NOT_YET
+
+
+def test_the_last_point_of_a_scan_line_counts_and_its_middle_is_no_center():
+    def without_last(x, z):
+        return exercises.fit_circle(x[:-1], z[:-1])
+
+    def middle(x, z, radius, side):
+        _, z_c, r = exercises.fit_circle(x, z)
+        return np.array([x.mean(), side * np.sqrt(radius**2 - r**2), z_c])
+
+    assert all(judged("fit_circle", without_last, seed).status != CORRECT for seed in range(3))
+    assert judged("sphere_center_from_profile", middle).status == NOT_YET
+
+
+def test_three_poses_are_all_needed_and_one_arrival_is_an_arrival():
+    rotation, translation = ITEMS["li_rotation"].reference, ITEMS["li_translation"].reference
+    wrong = {
+        "li_rotation": lambda T, x: rotation(T[:-1], x[:-1]),
+        "li_translation": lambda T, x, R: translation(T[:-1], x[:-1], R),
+        "position_accuracy": lambda command, reached: np.linalg.norm(np.squeeze(reached).mean(axis=0) - command),
+    }
+    assert all(judged(name, answer).status != CORRECT for name, answer in wrong.items())

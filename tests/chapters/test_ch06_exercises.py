@@ -268,3 +268,47 @@ def test_the_sign_of_the_trace_is_not_the_sign_of_the_determinant():
         return nearest_rotation(X if np.trace(X) > 0 else -X)
 
     assert all("You made the trace positive" in text for text in texts("rotation_from_nullvector", by_trace))
+
+
+def floor(values, factor):
+    distance = np.abs(values - np.median(values))
+    return distance <= factor * 1.4826 * np.median(distance) + 1e-3
+
+
+def one_for_none(values, factor):
+    distance = np.abs(values - np.median(values))
+    return distance <= factor * (1.4826 * np.median(distance) or 1.0)
+
+
+def few_stay(values, factor):
+    return ch06.reject_outliers(values, factor) | (len(values) < 5)
+
+
+@pytest.mark.parametrize("rule", [floor, one_for_none, few_stay])
+def test_the_rule_for_outliers_has_no_floor_and_holds_for_three_values(rule):
+    texts("reject_outliers", rule)
+
+
+@pytest.mark.parametrize("rule", [log.reject_outliers, ch06.reject_outliers])
+def test_where_most_values_are_equal_both_readings_of_the_rule_are_right(rule):
+    values, factor = ch06.mostly_equal(np.random.default_rng(0))
+    assert ch06.KeptOrAll().equal(rule(values, factor), ch06.reject_outliers(values, factor))
+
+
+def test_a_better_match_beyond_the_largest_offset_does_not_count():
+    def anywhere(time, reference, delayed, max_offset):
+        return ch06.time_offset(time, reference, delayed, max(max_offset, len(time) // 3 * (time[1] - time[0])))
+
+    texts("time_offset", anywhere)
+
+
+def test_obtuse_links_and_few_motions_are_drawn():
+    def acute(theta, d, a, alpha):
+        c, s, sine = np.cos(theta), np.sin(theta), np.sin(alpha)
+        cosine = np.sqrt(1 - sine**2)
+        turn = [[c, -s * cosine, s * sine, a * c], [s, c * cosine, -c * sine, a * s]]
+        return np.array([*turn, [0, sine, cosine, d], [0, 0, 0, 1]])
+
+    texts("dh_matrix", acute)
+    texts("singular_value_ratio", lambda M: ch06.singular_value_ratio(M) if len(M) > 18 else 0.0)
+    texts("e_trans", lambda r: np.linalg.norm(r) / max(len(r) - 1, 5))

@@ -1,5 +1,6 @@
 """The general layer, steps: in which line of a student's own code it goes wrong, and in which way."""
 
+import ast
 import functools
 import linecache
 import re
@@ -10,7 +11,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from labkit.exercises import guard, metrics, rerun, session, steps
+from labkit.exercises import guard, metrics, mutation, rerun, session, steps
 from labkit.exercises.budget import Budget
 from labkit.exercises.engine import CORRECT, NOT_YET, Exercise
 
@@ -792,3 +793,9 @@ def test_what_is_right_after_the_last_round_is_no_part_of_the_result_in_each():
     answer = typed(body, "newton_lateration", "landmarks, distances, start")
     text = item.judge(answer, rng=np.random.default_rng(0)).text
     assert "stands the right result, in the last round" in text
+
+
+def test_what_stands_within_bounds_has_not_changed_places_with_another():
+    function = ast.parse("def answer(d, s, factor):\n    return d / max(s, 1e-3) <= factor").body[0]
+    exchanged = [change.mends for change in mutation.mending(function) if "changed places" in change.mends]
+    assert exchanged == ["`factor` and `d` have changed places in this step"]

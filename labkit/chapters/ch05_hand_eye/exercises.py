@@ -110,10 +110,14 @@ def arc(rng, std=0.0, side=1, n=None):
 
 
 def profile(rng, side, across):
-    """A scan line of a sphere of some radius whose center lies on this side of the scan plane, and across it, along x."""
+    """A scan line of a sphere of some radius whose center lies on this side of the scan plane, and across it, along x;
+    more of it on one side of its lowest point than on the other.
+    """
     radius = float(rng.uniform(25, 35))
     center = np.array([across * rng.uniform(4, 20), side * rng.uniform(6, 20), rng.uniform(200, 280)])
-    return *sphere.scan_line(center, radius, rng.uniform(0.6, 1.0), int(rng.integers(40, 70))), radius, side
+    x, z = sphere.scan_line(center, radius, rng.uniform(0.7, 1.0), int(rng.integers(50, 80)))
+    seen = slice(int(rng.integers(8, 16)), None)
+    return x[::across][seen], z[::across][seen], radius, side
 
 
 def increments(rng, n=None, turn=0.2):

@@ -331,10 +331,12 @@ def all_equal(rng):
 
 
 def mostly_equal(rng):
-    """Readings of which more than half are equal: the robust standard deviation is 0, and the others are beyond it."""
+    """Readings of which more than half are equal: the robust standard deviation is 0, and the others are beyond it, one
+    of them so far that it stands out by any other measure.
+    """
     n = int(rng.integers(4, 20))
-    others = 10 ** rng.uniform(-3, 1, n) * rng.choice([-1, 1], n)
-    return rng.permutation(_far(rng) + np.r_[np.zeros(n + 2), others]), float(rng.uniform(2, 6))
+    others = np.append(10 ** rng.uniform(-3, 1, n), 1000.0) * rng.choice([-1, 1], n + 1)
+    return rng.permutation(_far(rng) + np.r_[np.zeros(n + 3), others]), float(rng.uniform(2, 2.8))
 
 
 def three_values(rng):
