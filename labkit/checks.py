@@ -8,6 +8,7 @@ import numpy as np
 
 ORTHONORMAL_TOLERANCE = 1e-3  # six printed digits pass, a matrix in the wrong unit or a sheared one does not
 PRODUCT_TOLERANCE = 1e-2  # a product of a few such matrices
+LAST_ROW = np.array([0.0, 0.0, 0.0, 1.0])
 LAST_ROW_TOLERANCE = 1e-6  # a product of poses in single precision passes, a transposed pose or a scale does not
 COVARIANCE_TOLERANCE = 1e-6  # of the standard deviations: sums in another order pass, single precision, too
 LARGEST_COORDINATE = 1e75  # fourth powers of coordinates still fit into a float
@@ -15,6 +16,7 @@ FEW = 500  # numbers: of fewer the sum of squares is quicker than the largest an
 MANY = 900  # numbers: of more, matrices are multiplied entry by entry over all of them sooner than one by one
 SMALLEST_POSITIVE = 1e-75  # of what is divided by, for the same reason
 LARGEST_WHOLE = 1e15  # beyond, a float does not tell one whole number from the next
+FLOAT = np.dtype(float)
 MOST = 10_000_000  # what one call makes of a kind: some hundred megabytes of poses
 KINDS = {"b": "truth values", "c": "complex numbers", "U": "text", "S": "bytes", "M": "dates", "m": "durations"}
 
@@ -60,6 +62,8 @@ def as_floats(value, name):
         When it holds text, complex numbers, truth values, dates or other objects, masked numbers, or rows of different
         lengths.
     """
+    if type(value) is np.ndarray and value.dtype is FLOAT:  # most that is checked, and is seen to be so at once
+        return value
     array = _as_array(value, name, "real numbers")
     if array.dtype.kind in "iuf":
         return array.astype(float, copy=False)
@@ -190,8 +194,11 @@ def as_whole(value, name, at_least=None):
 
 def fit_together(**shapes):
     """The shape that leading axes broadcast to, {name: shape}; refuses those that do not, with the names."""
+    first, *others = shapes.values()
+    if others.count(first) == len(others):
+        return first
     try:
-        return np.broadcast_shapes(*shapes.values())
+        return np.broadcast_shapes(first, *others)
     except ValueError:
         found = ", ".join(f"{shape} of {name}" for name, shape in shapes.items())
         raise ValueError(f"the leading axes must be equal or broadcast, got {found}") from None
@@ -215,10 +222,11 @@ def as_transforms(value, name, tolerance=ORTHONORMAL_TOLERANCE):
         return value
     array = as_matrices(value, name, 4, 4)
     last = array[..., 3, :]
-    off = np.abs(last - (0.0, 0.0, 0.0, 1.0)).max(-1)
-    if (off > LAST_ROW_TOLERANCE).any():
-        row = last.reshape(-1, 4)[np.argmax(off)]
-        raise ValueError(f"{name} must have the last row 0 0 0 1, got {shown(row, '.9g')}")
+    if not (last == LAST_ROW).all():
+        off = np.abs(last - LAST_ROW).max(-1)
+        if (off > LAST_ROW_TOLERANCE).any():
+            row = last.reshape(-1, 4)[np.argmax(off)]
+            raise ValueError(f"{name} must have the last row 0 0 0 1, got {shown(row, '.9g')}")
     _refuse_sheared(array[..., :3, :3], name, tolerance)
     return array
 
@@ -249,7 +257,7 @@ def _is_orthonormal(rows, tolerance):
 
 def _are_orthonormal(R, tolerance):
     """The same of many matrices, entry by entry over all of them."""
-    off, det = _off_and_determinant(np.moveaxis(R, (-2, -1), (0, 1)))
+    off, det = _off_and_determinant(R.transpose(R.ndim - 2, R.ndim - 1, *range(R.ndim - 2)))
     return np.abs(off).max() < 0.5 * tolerance and det.min() > 0
 
 
