@@ -27,8 +27,8 @@ from ..checks import (
     shown,
 )
 from ..documented import documented
-from ..geometry.frames import invert, pose, unit_vector
-from ..geometry.lie import exp_so3, log_so3
+from ..geometry.frames import _cross, invert, pose, unit_vector
+from ..geometry.lie import _log_so3, exp_so3
 
 # What the data sheet prints (appendix B): reaches in mm. R.b is axis 3 to axis 5, R.M is axis 1 to axis 5, then axis 1
 # to axis 6.
@@ -80,7 +80,10 @@ def dh_matrix(theta, d, a, alpha):
     Source: report, appendix C (reference [2]).
     """
     theta, d, a, alpha = map(as_finite, (theta, d, a, alpha), ("theta", "d", "a", "alpha"))
-    shape = fit_together(theta=theta.shape, d=d.shape, a=a.shape, alpha=alpha.shape)
+    return _dh_matrix(theta, d, a, alpha, fit_together(theta=theta.shape, d=d.shape, a=a.shape, alpha=alpha.shape))
+
+
+def _dh_matrix(theta, d, a, alpha, shape):
     T = np.zeros((*shape, 4, 4))
     c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
     T[..., 0, 0], T[..., 0, 1], T[..., 0, 2], T[..., 0, 3] = c, -s * ca, s * sa, a * c
@@ -112,7 +115,11 @@ def link_frames(dh, q):
     dh, q = _as_dh(dh), as_finite(q, "q")
     if q.ndim < 1 or q.shape[-1] != len(dh):
         raise ValueError(f"q must have shape (..., {len(dh)}), one angle per joint, got {q.shape}")
-    links = dh_matrix(q + dh[:, 0], dh[:, 1], dh[:, 2], dh[:, 3])
+    return _link_frames(dh, q)
+
+
+def _link_frames(dh, q):
+    links = _dh_matrix(q + dh[:, 0], *dh.T[1:], q.shape)
     frames = np.empty((*q.shape[:-1], len(dh) + 1, 4, 4))
     frames[..., 0, :, :] = np.eye(4)
     for i in range(len(dh)):
@@ -159,7 +166,7 @@ def jacobian(dh, q):
 def _jacobian(frames):
     axes = frames[..., :-1, :3, 2]
     arms = frames[..., -1:, :3, 3] - frames[..., :-1, :3, 3]
-    return np.swapaxes(np.concatenate([axes, np.cross(axes, arms)], axis=-1), -1, -2)
+    return np.swapaxes(np.concatenate([axes, _cross(axes, arms)], axis=-1), -1, -2)
 
 
 @documented
@@ -194,12 +201,12 @@ def inverse_kinematics(robot, T_BF, start, iterations=60, tolerance=1e-9):
     if fit_together(T_BF=T_BF.shape[:-2], start=start.shape[:-1]) != T_BF.shape[:-2]:
         raise ValueError(f"start must be one for all or one per pose, got {start.shape} for T_BF {T_BF.shape}")
     tolerance = as_positive_number(tolerance, "tolerance")
-    q = np.broadcast_to(start, (*T_BF.shape[:-2], len(robot.dh))).copy()
+    q, dh = np.broadcast_to(start, (*T_BF.shape[:-2], len(robot.dh))).copy(), _as_dh(robot.dh)
     scale = np.repeat([1.0, 1 / 200], 3)  # a turn of 1 rad counts as much as 200 mm
     best, best_size = q, np.full(q.shape[:-1], np.inf)
     damping = 1e-3
     for _ in range(iterations):
-        frames = link_frames(robot.dh, q)
+        frames = _link_frames(dh, q)
         error = _pose_error(frames[..., -1, :, :], T_BF) * scale
         size = np.linalg.norm(error, axis=-1)
         better = size < best_size
@@ -208,7 +215,7 @@ def inverse_kinematics(robot, T_BF, start, iterations=60, tolerance=1e-9):
             break
         J = _jacobian(frames) * scale[:, None]
         weight = np.minimum(damping, size**2) + 1e-12
-        normal = np.swapaxes(J, -1, -2) @ J + weight[..., None, None] * np.eye(len(robot.dh))
+        normal = np.swapaxes(J, -1, -2) @ J + weight[..., None, None] * np.eye(len(dh))
         step = np.linalg.solve(normal, np.swapaxes(J, -1, -2) @ error[..., None])[..., 0]
         step *= np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(-1, keepdims=True), 1e-300))
         q = np.clip(q + step, robot.q_min, robot.q_max)
@@ -234,7 +241,7 @@ def pose_error(T, T_goal):
 
 def _pose_error(T, T_goal):
     turn = T_goal[..., :3, :3] @ np.swapaxes(T[..., :3, :3], -1, -2)
-    return np.concatenate([log_so3(turn), T_goal[..., :3, 3] - T[..., :3, 3]], axis=-1)
+    return np.concatenate([_log_so3(turn), T_goal[..., :3, 3] - T[..., :3, 3]], axis=-1)
 
 
 @documented

@@ -111,9 +111,10 @@ def between(start, end, scale=1.0):
     side = np.eye(3)[np.argmin(np.abs(z))]
     x = side - (side @ z) * z
     x /= np.linalg.norm(x)
+    (zx, zy, zz), (xx, xy, xz) = z.tolist(), x.tolist()
+    y = np.array([zy * xz - zz * xy, zz * xx - zx * xz, zx * xy - zy * xx])
     T = np.eye(4)
-    T[:3, :3] = np.column_stack([scale * x, scale * np.cross(z, x), length * z])
-    T[:3, 3] = start
+    T[:3, 0], T[:3, 1], T[:3, 2], T[:3, 3] = scale * x, scale * y, length * z, start
     return T
 
 
