@@ -793,7 +793,8 @@ def _sequence(node, names):
         return
     for i in range(len(node.elts) - 1):
         items = [*node.elts[:i], node.elts[i + 1], node.elts[i], *node.elts[i + 2 :]]
-        yield 1, "with two neighbors in one list exchanged", type(node)(items, ast.Load())
+        what = "indices" if any(isinstance(part, ast.Slice) for part in node.elts) else "neighbors in one list"
+        yield 1, f"with two {what} exchanged", type(node)(items, ast.Load())
     first = node.elts[0] if node.elts else None
     if isinstance(first, ast.Constant) and type(first.value) is int:
         floats = [ast.Constant(float(first.value)), *node.elts[1:]]

@@ -30,6 +30,7 @@ SCALED = re.compile(  # of a choice, which does not depend on how large all is t
 CURVED = re.compile(
     "its (log|exp|sine|tangent|inverse|reciprocal)"
 )  # of a word or a set: what is small is made a little more
+LIFTED = re.compile("a thousand|divided by its( own)? length")  # what brings a number over a bound, whatever is wrong
 COUNT = re.compile(r"^len\([^()]*\)$|\.shape\[-?\d\]$|\.size$")  # of which no half, root or sine is meant
 CHANCE = 1000  # one case of so many may be chance
 BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with a number
@@ -204,6 +205,8 @@ class Search:
         """
         if self.chosen and SCALED.match(mends) or self.exactly and CURVED.match(mends):
             return False
+        if self.exactly and LIFTED.search(mends):
+            return False
         return self.turns or not mends.endswith(("radians", "degrees"))
 
     def _moves_a_bound(self, line, code, mends):
@@ -217,14 +220,15 @@ class Search:
 
     def _left_out_instead(self, number):
         """What says more than a change that mends only because it makes a part do nothing: that a case is never to be
-        met, or always, where what it asks is changed otherwise than to a finer bound; that a part is too many, where it
-        has another sign.
+        met, or always, where what it asks, in its line or before it, is changed otherwise than to a finer bound; that a
+        part is too many, where it has another sign.
         """
         changes = self.written.changes
         line, code, mends = changes[number][1:]
         at_line = [(k, text, words) for k, (_, at, text, words) in enumerate(changes) if at == line]
         finer = mends.endswith("will do")
         around = [(k, words) for k, text, words in at_line if code in text and text != code and not finer]
+        around += [(k, words) for k, (_, at, _, words) in enumerate(changes) if at > line and not finer]
         case = [k for k, words in around if words.endswith(("never happen", "always happen"))]
         less = [k for k, text, words in at_line if text == code and TOO_MANY in words]
         plan = self.mending([("code", k) for k in case + (less if " stands where " in mends else [])])
@@ -441,6 +445,11 @@ class Search:
         mine = [values[k] for values in self.values]
         return all(count and (_same(m, t) or len(t) == 1 and _same(m, t[0])) for (count, m), t in zip(mine, theirs))
 
+    def _is_returned(self, k):
+        """Whether a value is what comes out on every draw on which that is of a kind to be compared."""
+        seen = [(v[k][1], r) for v, r in zip(self.values, self.results) if r is not None and v[k][0]]
+        return bool(seen) and all(_same(values[-1], r) for values, r in seen)
+
     def is_result(self, k):
         return all(r is not None and _same(v[k][1][-1], r) for v, r in zip(self.values, self.results))
 
@@ -460,6 +469,8 @@ class Search:
         """A value on the way that is the right result already, though it is not what is returned."""
         results = [q for q in solution.distinct if solution.is_result[q]] if solution else []
         for k in range(len(self.written.places)):
+            if self._is_returned(k):
+                continue  # the same but for rounding, and not right on every draw
             q = next((q for q in results if self._is_value(k, [values[q][1] for values in solution.values])), None)
             if q is not None:
                 mine, theirs = (
@@ -622,6 +633,8 @@ def condition_words(function, draws, missed, budget):
         without = [i for i, found in enumerate(met) if place not in found]
         if any(missed[i] for i in without) or _may_be_chance(len(draws), sum(missed), len(without)):
             continue
+        if len(without) < len(draws) - sum(missed) and any(found.get(place, 0) > 1 for found in met):
+            continue  # in some round of many: what else went on in that run may matter as well
         if best is None or len(without) > best[0]:
             best = len(without), place
     if best is None:

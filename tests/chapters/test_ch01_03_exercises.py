@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from labkit.calibration import pivot
 from labkit.chapters.ch01_frames import exercises as ch01_exercises
-from labkit.chapters.ch02_chaining import exercises
+from labkit.chapters.ch02_chaining import beyond, exercises
 from labkit.chapters.ch03_quirlen import exercises as ch03_exercises
 from labkit.documents.lab_sheet import printed as lab_sheet
-from labkit.exercises import source
+from labkit.exercises import engine, source
 from labkit.exercises.engine import CORRECT, NOT_YET, Exercise, Value
 from labkit.files.text import number_in
 from labkit.geometry import chaining, frames
@@ -673,3 +673,95 @@ def test_a_place_on_the_axis_a_meter_away_is_not_called_near():
     axis = frames.unit_vector(log_se3(product)[:3])
     told = judged("worst_at_one_meter", chaining.displacement(product, 1000 * axis[None]).max()).text
     assert "on an axis through it" in told
+
+
+def _even_lever_in_the_plane():
+    T = chaining.chain(lab_sheet.printed_transforms())
+    return np.hypot(T[0, 3], T[1, 3]) / chaining.closure_error(T)[0]
+
+
+def _hole_along_x():
+    hole = np.array([200.0, 0, 0, 1])
+    return abs(((ch01_exercises._K0_T_K1() - ch01_exercises._drawn()) @ hole)[0])
+
+
+@pytest.mark.parametrize(
+    ("chapter", "name", "answer", "words"),
+    [
+        (exercises, "even_lever", _even_lever_in_the_plane, "lost its z"),
+        (ch01_exercises, "distance", _hole_along_x, "lies off in y too"),
+    ],
+)
+def test_a_neighbor_within_the_tolerance_is_named(chapter, name, answer, words):
+    assert words in chapter.CHAPTER[name].judge(answer()).text
+
+
+def _guarded_by_a_length(v):
+    return v if np.linalg.norm(v) < 1e-6 else v / np.linalg.norm(v)
+
+
+def _angle_of_a_half(T):
+    """By the cosine of half the angle, which rounding can push above 1."""
+    return 2 * np.arccos(np.sqrt(1 + np.trace(T[:3, :3])) / 2), np.linalg.norm(T[:3, 3])
+
+
+def _with_a_point(part):
+    return float(part) if re.fullmatch(r"-?\d+\.\d+(e.\d+)?", part) else None
+
+
+def _closed_where(measure):
+    """Shares nothing out where the turn of the gap, or its distance, is next to 0."""
+
+    def answer(transforms):
+        gap = chaining.closure_error(chaining.chain(transforms))
+        moved = exercises._moved_poses(transforms)
+        return transforms.copy() if gap[measure] < 1e-9 else relative(moved[:-1], moved[1:])
+
+    return answer
+
+
+def _reading(entry):
+    """A reader that leaves each entry of a line to `entry`, which returns None where it takes it for no number."""
+
+    def answer(text):
+        points = []
+        for number, line in enumerate(text.splitlines(), start=1):
+            entries = [entry(part) for part in line.partition("#")[0].replace(",", ".").split()]
+            if entries and (len(entries) != 3 or None in entries):
+                raise ValueError(f"line {number}: {line}")
+            points += [entries] if entries else []
+        if len(points) != 3:
+            raise ValueError("three points")
+        return np.array(points)
+
+    return answer
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("chapter", "name", "answer"),
+    [
+        (ch01_exercises, "normalize", _guarded_by_a_length),
+        (exercises, "closure_error", lambda T: (round(frames.rotation_angle(T[:3, :3]), 6), np.linalg.norm(T[:3, 3]))),
+        (exercises, "closure_error", _angle_of_a_half),
+        (exercises, "distribute_closure", _closed_where(0)),
+        (exercises, "distribute_closure", _closed_where(1)),
+        (exercises, "read_system", _reading(_with_a_point)),
+        (ch03_exercises, "solve_pivot", lambda A, b: lstsq(A, b, rcond=0.02)[0]),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_in_one_case_alone_never_passes(chapter, name, answer, seed, monkeypatch):
+    monkeypatch.setattr(engine, "LOOKING", 0.0)  # what is told is not asked here
+    with np.errstate(invalid="ignore"):
+        outcome = chapter.CHAPTER[name].judge(answer, rng=np.random.default_rng(seed))
+    assert outcome.status != CORRECT
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_text_to_read_holds_every_sort_of_line(seed):
+    """A whole number, a tab, a line of blanks, a comment behind a number without a blank: none of them by chance."""
+    rng = np.random.default_rng(seed)
+    for draw in beyond.TEXTS:
+        (text,) = draw(rng)
+        assert re.search(r"(^|\s)-?\d+(\s|#|$)", text) and "\t" in text and re.search(r"^ +$", text, re.MULTILINE)
+        assert ("#" not in text) or re.search(r"\d# again", text)

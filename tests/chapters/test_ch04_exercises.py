@@ -7,6 +7,7 @@ from labkit.chapters.ch04_optimization import beyond
 from labkit.chapters.ch04_optimization.exercises import CHAPTER
 from labkit.documents.thesis import wells
 from labkit.estimation import optimization as opt
+from labkit.exercises import engine
 from labkit.exercises.engine import CORRECT, NOT_YET
 
 ITEMS = {item.id: item for item in CHAPTER.items}
@@ -330,3 +331,44 @@ def test_faint_curvatures_narrow_valleys_and_promised_rises_are_drawn(name, answ
 def test_a_poor_step_that_is_taken_shrinks_the_radius_in_every_check(seed):
     answer = beyond.loop(follow=beyond.shrunk_where_taken_back)
     assert ITEMS["trust_region"].judge(answer, rng=np.random.default_rng(seed)).status == NOT_YET
+
+
+def by_direction(term):
+    """What the wells bring, in which x - c is a length times a direction: it has none at the center."""
+
+    def answer(x):
+        offsets = [(w, np.linalg.norm(x - c), x - c) for w, c in zip(wells.DEPTHS, wells.CENTERS)]
+        return [term(w, r * r + 1, r, d / r) for w, r, d in offsets]
+
+    return answer
+
+
+SLOPE = by_direction(lambda w, q, r, u: 2 * w * r / q**2 * u)
+BENDS = by_direction(lambda w, q, r, u: 2 * w / q**2 * np.eye(2) - 8 * w * r * r / q**3 * np.outer(u, u))
+BLOCKS = by_direction(lambda w, q, r, u: np.sqrt(w / q) * (np.eye(2) - r * r / q * np.outer(u, u)))
+
+
+def at_the_limit(g, H):
+    return "not stationary" if np.linalg.norm(g) >= 1e-6 else kind(H)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "name, answer",
+    [
+        ("gradient", lambda x: sum(SLOPE(x))),
+        ("hessian", lambda x: sum(BENDS(x))),
+        ("jacobian", lambda x: np.vstack(BLOCKS(x))),
+        ("classify_extremum", at_the_limit),
+        ("trust_region", beyond.loop(follow=lambda radius, length, rho: (
+            length / 4 if rho < 0.25 else 2 * radius if rho > 0.75 and length > 0.98 * radius else radius))),
+        ("trust_region", beyond.loop(follow=lambda radius, length, rho: (
+            length / 4 if rho < 0.25 else 2 * radius if rho > 0.75 and length >= radius else radius))),
+        ("trust_region", beyond.loop(follow=lambda radius, length, rho: beyond.rule(radius, length, rho, good=0.7))),
+        ("trust_region", beyond.loop(follow=lambda radius, length, rho: beyond.rule(radius, length, rho, poor=0.3))),
+    ],
+)  # fmt: skip
+def test_limits_and_centers_are_met_in_every_check(name, answer, seed, monkeypatch):
+    monkeypatch.setattr(engine, "LOOKING", 0.0)  # what is told is not asked here
+    with np.errstate(invalid="ignore"):
+        assert judged(name, answer, seed).status != CORRECT

@@ -11,6 +11,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from labkit.chapters.ch04_optimization.exercises import CHAPTER as OPTIMIZATION
 from labkit.exercises import guard, metrics, mutation, rerun, session, steps
 from labkit.exercises.budget import Budget
 from labkit.exercises.engine import CORRECT, NOT_YET, Exercise
@@ -799,3 +800,35 @@ def test_what_stands_within_bounds_has_not_changed_places_with_another():
     function = ast.parse("def answer(d, s, factor):\n    return d / max(s, 1e-3) <= factor").body[0]
     exchanged = [change.mends for change in mutation.mending(function) if "changed places" in change.mends]
     assert exchanged == ["`factor` and `d` have changed places in this step"]
+
+
+def test_a_value_off_by_next_to_nothing_is_not_called_the_right_result():
+    """It is what is returned, within the accuracy of a comparison, and wrong where everything is tiny."""
+    item = OPTIMIZATION["newton_step"]
+    answer = typed("return np.linalg.solve(H + 1e-8 * np.eye(2), -g)", "newton_step", "g, H")
+    outcome = item.judge(answer, rng=np.random.default_rng(0))
+    assert outcome.status == NOT_YET and "stands the right result" not in outcome.text
+
+
+def test_a_bound_is_no_matter_of_units_where_a_word_is_chosen():
+    item = OPTIMIZATION["classify_extremum"]
+    body = """
+    if np.linalg.norm(g) > 1e-6:
+        return "not stationary"
+    if np.linalg.det(H) < -1e-9:
+        return "saddle"
+    return "minimum" if np.trace(H) > 0 else "maximum"
+    """
+    outcome = item.judge(typed(body, "classify_extremum", "g, H"), rng=np.random.default_rng(0))
+    assert outcome.status == NOT_YET and not re.search("thousand|by its own length", outcome.text)
+
+
+def test_a_case_that_is_not_needed_is_told_and_not_what_it_asks():
+    body = """
+    x = a / np.linalg.norm(a)
+    q = a[-1] - a[2]
+    if abs(q) < 1e-12:
+        return 0.0
+    return len(b) * np.linalg.norm(b - (b @ x) * x)
+    """
+    assert "should never happen" in told(body)

@@ -251,8 +251,12 @@ def _axes_in_rows(origin, x_point, y_point):
 
 
 def _origin_in_the_last_row(origin, x_point, y_point):
-    T = frames.frame_from_points(origin, x_point, y_point)
-    T[3, :3], T[:3, 3] = origin, 0
+    return _origin_below(frames.frame_from_points(origin, x_point, y_point))
+
+
+def _origin_below(T):
+    T = T.copy()
+    T[3, :3], T[:3, 3] = T[:3, 3].copy(), 0
     return T
 
 
@@ -514,7 +518,7 @@ CHAPTER = Chapter(
         Exercise(
             "normalize",
             reference=frames.unit_vector,
-            draw=tuple(functools.partial(scaled_direction, scale=s) for s in (1.0, 1e-6, 1e3, 1e-4)),
+            draw=tuple(functools.partial(scaled_direction, scale=s) for s in (1.0, 1e-9, 1e3, 1e-4)),
             fixed={"v": POINT},
             metric=metrics.Numbers(1e-9),
             noisy=[
@@ -809,6 +813,11 @@ CHAPTER = Chapter(
                 ),
                 Mistake(lambda T: T, "This is T itself. The inverse maps the other way."),
                 Mistake(
+                    lambda T: _origin_below(frames.invert(T)),
+                    "The translation stands in the last row. It belongs in the last column, `X[:3, 3]`.",
+                    id="invert-last-row",
+                ),
+                Mistake(
                     _about_z_alone,
                     "Of the rotation you use two entries, as if it turned about z alone. T turns about any axis: take the whole block, Rᵀ.",
                     id="invert-about-z",
@@ -857,7 +866,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda A, B: frames.invert(A) @ frames.invert(B),
-                    "You inverted both. In T_AW T_BW nothing cancels: only T_WA is turned round.",
+                    "This is T_AW T_BW: both are inverted, and nothing cancels. Only T_WA is turned round.",
                 ),
                 Mistake(
                     lambda A, B: _with(frames.relative(A, B), t=np.zeros(3)),
@@ -984,6 +993,12 @@ CHAPTER = Chapter(
                     id="distance-squared",
                 ),
                 Mistake(
+                    lambda: np.abs(_hole() - _hole_as_drawn()).max(),
+                    "This is how far the hole lands off in x, 200 mm times the first entry of the matrix. It lies off in y too, by "
+                    "very little: the distance is the root of the sum of squares.",
+                    id="distance-along-x",
+                ),
+                Mistake(
                     lambda: np.abs(_hole() - _hole_as_drawn()).sum(),
                     "The components are added. The distance is the root of the sum of squares.",
                     id="distance-sum",
@@ -1094,7 +1109,7 @@ CHAPTER = Chapter(
                 Mistake(_kuka_entry_by_entry, "You multiplied entry by entry. Matrices multiply with @."),
                 Mistake(
                     _kuka("xyz", (5, 4, 3)),
-                    "You multiplied Rx(C) Ry(B) Rz(A). KUKA turns about z first, then about the new y and the new x: Rz(A) Ry(B) Rx(C).",
+                    'This is Rx(C) Ry(B) Rz(A). KUKA turns about z first, then about the new y and the new x: Rz(A) Ry(B) Rx(C). (SciPy means that by capital letters, "ZYX".)',
                 ),
                 Mistake(
                     _kuka("zyx", (5, 4, 3)),
@@ -1115,7 +1130,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(_kuka_in_degrees, "The angles already are radians: you converted them once too often."),
                 Mistake(
-                    _kuka_transposed, "Your rotation is the transpose: every elementary turn has its signs reversed."
+                    _kuka_transposed,
+                    "Your rotation is the transpose of the right one, as if every turn went the other way, in reverse order.",
                 ),
                 Mistake(
                     lambda p: _with(frames.matrix_from_kuka(p), t=np.zeros(3)),

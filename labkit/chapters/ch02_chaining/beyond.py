@@ -25,22 +25,19 @@ def system_near_0(rng):
 
 
 def text_of_system(rng, comments=False, commas=False):
-    """The text of a system as someone typed it: blanks or tabs, empty lines, perhaps comments and decimal commas; without
-    them the last number of each point has an exponent."""
-    lines = []
-    for point in system(rng).round(int(rng.integers(5, 9))):
+    """The text of a system as someone typed it: blanks and tabs, empty lines, one of them of blanks, a whole number in each
+    point, perhaps comments, with blanks before them and without, and decimal commas; without these, exponents."""
+    lines, blanks = [], rng.permutation([" ", "   ", "\t"])
+    behind, empty = rng.permutation(["  # touched 2 times", "# again", ""]), rng.permutation(["", "  ", None])
+    for k, point in enumerate(system(rng).round(int(rng.integers(5, 9)))):
         indent = " " * int(rng.integers(3))
-        lines += [f"{indent}# measured by hand, part 2"] * comments + [indent] * int(rng.random() < 0.4)
-        blank = str(rng.choice([" ", "   ", "\t"]))
+        lines += [f"{indent}# measured by hand, part 2"] * comments
+        lines += [] if empty[k] is None else [str(empty[k])]
         numbers = [repr(float(value)) for value in point]
+        numbers[k] = str(int(rng.integers(-400, 400)))  # a whole number, without a point
         if not comments and not commas:
-            numbers[2] = f"{point[2]:.6e}"
-        line = blank.join(numbers)
-        lines.append(
-            " " * int(rng.integers(3))
-            + line
-            + rng.choice(["  # touched 2 times", "# again"]) * (comments and rng.random() < 0.7)
-        )
+            numbers[k - 1] = f"{point[k - 1]:.6e}"
+        lines.append(" " * int(rng.integers(3)) + str(blanks[k]).join(numbers) + str(behind[k]) * comments)
     text = "\n".join(lines) + "\n" * int(rng.integers(3))
     return (text.replace(".", ",") if commas else text,)
 
@@ -155,7 +152,7 @@ def names_the_line(student, rng):
         number = before + at + 1
         if told is None:
             return f"line {number} of a file holds {what}: that must raise a ValueError, yours returned something."
-        if not re.search(rf"\b{number}\b", told):
+        if not re.search(rf"(?<![-\d]){number}\b", told):
             return f"line {number} of a file holds {what}: your sentence does not name the line. It says: {told!r}."
     for count in (2, 4, 6, 0):
         if _refusal(student, "\n".join([*good, *good][:count])) is None:

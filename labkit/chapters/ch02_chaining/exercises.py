@@ -30,10 +30,10 @@ def loop_product(rng, between_deg):
 
 
 def no_turn(rng):
-    """No turn at all, but for rounding that makes (trace - 1) / 2 a hair more than 1, as in T @ inv(T)."""
+    """No turn at all, but for rounding that makes (trace - 1) / 2 a hair more than 1, as in T @ inv(T), and half the
+    root of 1 + trace as well."""
     T = frames.pose(np.eye(3), rng.normal(size=3))
-    k = rng.integers(3)
-    T[k, k] += 2**-51
+    T[range(3), range(3)] += 2**-50
     return (T,)
 
 
@@ -67,6 +67,15 @@ def open_loop(rng, count):
     links = random_links(rng, count)[0]
     links[-1] = frames.relative(chaining.stations(links)[-2], np.eye(4))
     return (links @ exp_se3(rng.normal(size=(len(links), 6)) * np.repeat([0.02, 2.0], 3)),)
+
+
+def gap_of_one_kind(rng, turn, shift):
+    """Links of a loop that ends turned where it began, or unturned beside it."""
+    links = random_links(rng, 4)[0]
+    links[-1] = frames.relative(chaining.stations(links)[-2], np.eye(4))
+    gap = np.concatenate([turn * rng.normal(size=3), shift * rng.normal(size=3)])
+    links[0] = exp_se3(gap) @ links[0]
+    return (links,)
 
 
 def closed_loop(rng):
@@ -349,6 +358,10 @@ def _lever(T, unit=lambda angle: angle):
     return float(distance / unit(angle))
 
 
+def _turn_by_arccosine():
+    return np.arccos((np.trace(_sheet()[:3, :3]) - 1) / 2)
+
+
 def _turn_of_loop():
     return np.linalg.norm(log_se3(_sheet())[:3])
 
@@ -363,7 +376,7 @@ def _worst_at_one_meter():
     return float(chaining.displacement(_sheet(), points).max())
 
 
-CLOSURE = metrics.Several(metrics.Angles(1e-6), metrics.Numbers(1e-9, "mm"), names=("angle", "distance"))
+CLOSURE = metrics.Several(metrics.Angles(1e-7), metrics.Numbers(1e-9, "mm"), names=("angle", "distance"))
 
 CHAPTER = Chapter(
     "02-chaining",
@@ -431,7 +444,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda Ts: Ts[-1] @ Ts[-1],
-                    "This is the last link times itself: the loop variable and the product have the same name. Give the product one of its own.",
+                    "This is the last link times itself. Have the loop variable and the product the same name? Give the product one of its own.",
                     id="chain-same-name",
                 ),
                 Mistake(
@@ -739,6 +752,14 @@ CHAPTER = Chapter(
                     "The norm of R - I is no angle: for small turns it is sqrt(2) times too large.",
                     id="lever-norm",
                 ),
+                *(
+                    Mistake(
+                        lambda angle=angle: np.linalg.norm(_sheet()[:2, 3]) / angle(),
+                        "The distance has lost its z here: the loop misses itself by a little in z too, `product[:3, 3]`.",
+                        id=f"lever-without-z-{k}",
+                    )
+                    for k, angle in enumerate((lambda: chaining.closure_error(_sheet())[0], _turn_by_arccosine))
+                ),
                 Mistake(
                     lambda: chaining.closure_error(_sheet())[1],
                     "This is the loop's distance. Which lever, times the angle in rad, makes as much?",
@@ -989,7 +1010,18 @@ CHAPTER = Chapter(
                 (functools.partial(open_loop, count=n), metrics.Poses(1e-5, 1e-5), f"right, but not of {words}:")
                 for n, words in ((2, "two links"), (1, "a single link"))
             ]
-            + [(closed_loop, metrics.Poses(1e-5, 1e-5), "right, but not of a loop that closes exactly:")],
+            + [(closed_loop, metrics.Poses(1e-5, 1e-5), "right, but not of a loop that closes exactly:")]
+            + [
+                (
+                    functools.partial(gap_of_one_kind, turn=turn, shift=shift),
+                    metrics.Poses(1e-5, 1e-5),
+                    f"right, but not of a loop that ends {words}:",
+                )
+                for turn, shift, words in (
+                    (0.0, 2.0, "beside its start, unturned"),
+                    (0.02, 0.0, "at its start, turned"),
+                )
+            ],
             hints=(
                 "The product is exp(xi). Going back by all of xi at the end closes the loop; how far back should the pose after link k go? "
                 "P_k, the pose after k links, becomes exp(-k/N xi) P_k.",

@@ -104,9 +104,9 @@ def other_places(places):
 ACCEPT, POOR, GOOD, RIM = 0.1, 0.25, 0.75, 0.999
 
 
-def rule(radius, length, rho, good=GOOD):
+def rule(radius, length, rho, good=GOOD, poor=POOR):
     """The radius after a tried step."""
-    if rho < POOR:
+    if rho < poor:
         return length / 4
     return 2 * radius if rho > good and length > RIM * radius else radius
 
@@ -293,12 +293,61 @@ def well_inside(rho, inside):
     return rho[-1] > GOOD and inside[-1]
 
 
+def just_fair(rho, inside):
+    """A step to the rim, first of all, that is a little too poor for the radius to double."""
+    return rho[0] > 0.7 and rho[0] < GOOD and not inside[0]
+
+
+def just_not_poor(rho, inside):
+    """A step, first of all, that is a little too good for the radius to shrink."""
+    return rho[0] > POOR and rho[0] < 0.3
+
+
+def _straight_problem(rng):
+    """Straight residuals and their Jacobian, of which every step keeps what it promises, a start, and how far off that is."""
+    n = int(rng.integers(2, 5))
+    J, b = np.linalg.qr(rng.normal(size=(n + 2, n)))[0] * rng.uniform(1, 3, n), rng.normal(size=n + 2)
+    x = rng.uniform(4, 8, n)
+    far = float(np.linalg.norm(np.linalg.lstsq(J, J @ x - b, rcond=None)[0]))
+    return (lambda x: J @ x - b), (lambda x: J.copy()), x, far
+
+
+def just_inside(rng):
+    """One round, which ends a little within the rim, at the minimum."""
+    *problem, far = _straight_problem(rng)
+    return *problem, far / float(rng.uniform(0.992, 0.998)), 1
+
+
+def from_a_tiny_radius(rng):
+    """Many rounds that all end at the rim, which rounding leaves a hair longer or shorter than the radius."""
+    while True:
+        *problem, far = _straight_problem(rng)
+        run, seen = (*problem, 1e-3 * far, 9), []
+        descend(*run, seen=seen)
+        if sum(length < radius for _, length, radius in seen) > 2:
+            return run
+
+
 RUNS = (
     functools.partial(run_with, wanted=poor_inside),
     functools.partial(run_with, wanted=barely, first=(0.06, 0.085)),
     functools.partial(run_with, wanted=halfway, first=(0.13, 0.22), unlike=shrunk_where_taken_back),
     functools.partial(run_with, wanted=fairly, first=(0.78, 0.86)),
     functools.partial(run_with, wanted=well_inside),
+)
+AT_THE_LIMITS = (
+    (
+        functools.partial(run_with, wanted=just_fair, first=(0.705, 0.735), unlike=functools.partial(rule, good=0.7)),
+        "right, but not where a step to the rim has a ρ just below ¾:",
+    ),
+    (
+        functools.partial(
+            run_with, wanted=just_not_poor, first=(0.265, 0.29), unlike=functools.partial(rule, poor=0.3)
+        ),
+        "right, but not where a step has a ρ just above ¼:",
+    ),
+    (just_inside, "right, but not where a good step ends just inside the rim, at 0.992 to 0.998 of the radius:"),
+    (from_a_tiny_radius, "right, but not of a tiny radius, where each step ends at the rim but for rounding:"),
 )
 
 

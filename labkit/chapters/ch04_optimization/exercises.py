@@ -19,12 +19,23 @@ def place(rng, within=3.0):
 
 
 def in_a_well(rng):
-    """The center of a well, to the last bit or a little beside it."""
-    return (wells.CENTERS[rng.integers(2)] + rng.choice((0.0, 1e-3)) * rng.normal(size=2),)
+    """A place a little beside the center of a well."""
+    return (wells.CENTERS[rng.integers(2)] + 1e-3 * rng.normal(size=2),)
+
+
+def at_a_center(rng, which):
+    """The center of a well, to the last bit, where x - c has no direction."""
+    return (wells.CENTERS[which].copy(),)
 
 
 PLACES = (place, functools.partial(place, within=30.0), place, in_a_well)
 TWO = "the surface has two unknowns, so that it can be drawn"
+
+
+def at_centers(tol):
+    """Special draws at both centers."""
+    words = "right, but not at the center of a well:"
+    return [(functools.partial(at_a_center, which=k), metrics.Numbers(tol), words) for k in range(2)]
 
 
 def turned(eigenvalues, angle):
@@ -70,6 +81,12 @@ KINDS = (
         for bends, size in ((BOWL, 1e-7), (DOME, 1e-7), (SADDLE, 1e-7), (DOME, 1e4), (DEEP_SADDLE, 1e4))
     ),
 )
+
+
+def gradient_at_the_limit(rng):
+    """A gradient exactly as long as one that still counts as 0, along an axis, so that rounding has no part in it."""
+    g = 1e-6 * rng.choice([-1, 1]) * np.eye(2)[rng.integers(2)]
+    return g, kind_of_point(rng, BOWL, STEEP)[1]
 
 
 def gradient_and_hessian(rng, signs):
@@ -396,6 +413,7 @@ CHAPTER = Chapter(
             draw=PLACES,
             fixed={"x": TWO},
             metric=metrics.Numbers(1e-6),  # central differences are right as well
+            noisy=at_centers(1e-6),
             properties=(right_for_whole_numbers(wells.gradient, metrics.Numbers(1e-6), place, 0),),
             hints=(
                 "Each well is −w/q with q = |x − c|² + 1. Differentiate it by the chain rule, q first.",
@@ -588,6 +606,7 @@ CHAPTER = Chapter(
             draw=PLACES,
             fixed={"x": TWO},
             metric=metrics.Numbers(1e-6),
+            noisy=at_centers(1e-6),
             properties=(right_for_whole_numbers(wells.hessian, metrics.Numbers(1e-4), place, 0),),
             hints=(
                 "Differentiate the gradient (2w/q²)(x − c) once more: the product rule gives two terms for each well.",
@@ -683,6 +702,7 @@ CHAPTER = Chapter(
             reference=classify_extremum,
             draw=KINDS,
             metric=metrics.Exactly(),
+            noisy=(gradient_at_the_limit, metrics.Exactly(), "right, but not where |g| is 1e-6, no more and no less:"),
             draws=len(KINDS),
             fixed={"g": TWO, "H": TWO},
             hints=(
@@ -1069,6 +1089,7 @@ CHAPTER = Chapter(
             draw=PLACES,
             fixed={"x": TWO},
             metric=metrics.Numbers(1e-6),
+            noisy=at_centers(1e-6),
             properties=(right_for_whole_numbers(wells.jacobian, metrics.Numbers(1e-4), place, 0),),
             hints=(
                 "Each residual vector is √(w/q) times x − c, a product: two terms for each well, a 2x2 block.",
@@ -1532,7 +1553,13 @@ CHAPTER = Chapter(
             reference=beyond.trust_region,
             draw=beyond.RUNS,
             metric=ITERATE,
-            noisy=(beyond.no_rounds, ITERATE, "right, but not of no rounds at all:"),
+            noisy=[
+                (draw, ITERATE, words)
+                for draw, words in (
+                    (beyond.no_rounds, "right, but not of no rounds at all:"),
+                    *beyond.AT_THE_LIMITS,
+                )
+            ],
             draws=5,
             hints=(
                 "Each round: residuals and Jacobian where you stand, a dogleg step, its gain ratio; then decide twice, whether to take the step and what the radius becomes.",
@@ -1676,6 +1703,11 @@ CHAPTER = Chapter(
                     beyond.loop(follow=lambda radius, length, rho: length / 4 if rho < 0.25 else 2 * radius),
                     "Your radius doubles after every step that is not poor. It doubles above ¾ and at the rim, otherwise it stays.",
                     id="trust-else-doubles",
+                ),
+                Mistake(
+                    beyond.loop(follow=functools.partial(beyond.rule, good=beyond.POOR)),
+                    "Your radius doubles after every step to the rim that is not poor. Between ¼ and ¾ it stays.",
+                    id="trust-rim-alone",
                 ),
                 Mistake(
                     beyond.never_looked_again,
