@@ -1,4 +1,4 @@
-"""What is drawn is what is meant: vertices of the artists beside closed forms and results, for the Stages of 1 to 9.
+"""What is drawn is what is meant: vertices of the artists beside closed forms and results, for the Stages of 1 to 9 and 11.
 
 One mechanism: `drawn` reads the vertices of all moving lines, `assert_drawn` wants one of them to hold exactly the
 expected ones, projected first where the Stage shows space.
@@ -24,11 +24,13 @@ from labkit.chapters.ch06_tracker import whole_cell
 from labkit.chapters.ch07_dead_reckoning import stages as ch07
 from labkit.chapters.ch08_kalman import stages as ch08
 from labkit.chapters.ch09_monte_carlo import stages as ch09
+from labkit.chapters.ch11_your_own_data import stages as ch11
 from labkit.documents.lecture.examples import load_building
 from labkit.documents.thesis import wells
 from labkit.machines import simulation, udp
 from labkit.machines.arm import TX40, link_frames
 from labkit.machines.packet import POSITION, decode_packet
+from labkit.machines.sensor_cell import CELL
 from labkit.stage import Stage
 from labkit.stage.scene3d import Scene
 from labkit.stage.scene3d_handles import Dial
@@ -823,3 +825,17 @@ def test_obstacles_are_circles_about_their_places():
     for outline, (x, y, radius) in zip(disks.line.get_xydata().reshape(2, -1, 2), [(2, 3, 0.15), (7, 1, 0.4)]):
         assert np.isnan(outline[-1]).all()
         np.testing.assert_allclose(np.linalg.norm(outline[:-1] - (x, y), axis=1), radius)
+
+
+# --- chapter 11 -------------------------------------------------------------------------------------------------------
+
+
+def test_a_pose_left_out_is_crossed_and_what_slides_unseen_lies_along_the_axis_of_the_others():
+    stage = ch11.pose_left_out()
+    stage.make_it_fail()
+    T_BF, space = stage.result["T_BF"], stage.spaces[0]
+    assert_drawn(stage, [T_BF[3, :3, 3], [np.nan] * 3], [*np.delete(T_BF[:, :3, 3], 3, axis=0)])
+    axis = Rotation.from_matrix(T_BF[9, :3, :3] @ T_BF[0, :3, :3].T).as_rotvec()
+    start, end = space.items[-1].value
+    assert (start + end) / 2 == pytest.approx(CELL.T_BT[:3, 3])
+    assert abs((end - start) @ axis) == pytest.approx(500 * np.linalg.norm(axis))
