@@ -1,4 +1,4 @@
-"""What is drawn is what is meant: vertices of the artists beside closed forms and results, for the Stages of 1 to 9 and 11.
+"""What is drawn is what is meant: vertices of the artists beside closed forms and results, chapters 1 to 9 and 11.
 
 One mechanism: `drawn` reads the vertices of all moving lines, `assert_drawn` wants one of them to hold exactly the
 expected ones, projected first where the Stage shows space.

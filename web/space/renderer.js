@@ -92,12 +92,12 @@ void main() {
 const POINT_VERTEX = `#version 300 es
 precision highp float;
 in vec3 position; in vec4 look; in vec3 kind; // kind: size, marker, whether it is hollow
-uniform float ratio; uniform float share;
+uniform float mark; uniform float share;
 ${LENS}
 flat out vec4 color; flat out vec3 drawn;
 void main() {
   color = vec4(look.rgb, look.a * share);
-  drawn = vec3(kind.x * ratio, kind.yz);
+  drawn = vec3(kind.x * mark, kind.yz);
   gl_Position = project(position);
   gl_Position.z -= 6e-4 * gl_Position.w;
   gl_PointSize = drawn.x + 2.0;
@@ -169,7 +169,7 @@ export class Renderer {
     const pose = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
     this.place(solids, new Float32Array([1, 1, 0.5].flatMap((opacity) => [...pose, 0, 0, 0, opacity])));
     const [lines, points] = [this.lines(null, new Float32Array(4 * LINE_NUMBERS)), this.points(null, new Float32Array(POINT_NUMBERS))];
-    const lens = { axes: [1, 0, 0, 0, 1, 0, 0, 0, 1], center: [0, 0, 0], eye: 0, perUnit: 1, scale: [1, 1], reach: 12, ratio: 1 };
+    const lens = { axes: [1, 0, 0, 0, 1, 0, 0, 0, 1], center: [0, 0, 0], eye: 0, perUnit: 1, scale: [1, 1], reach: 12, ratio: 1, mark: 1 };
     this.draw(8, 8, lens, { solids, lines, points, floor: 0, shadow: [0, 0, 0, 0.5], wide: 1 }, smooth, false);
     for (const made of [solids, lines, points]) this.free(made);
     this.finish(() => { if (!smooth) this.warm(true); });
@@ -320,7 +320,7 @@ export class Renderer {
   /** Draw one scene, width x height device pixels, which the canvas takes on; `smooth` edges cost a processor much, and
    *  `quick` leaves out the points that bodies hide.
    *  lens: {axes (9 numbers, columns), center, scale [x, y], eye, perUnit (device pixels), ratio (device pixels a CSS
-   *  pixel), reach (how deep the scene is)}. */
+   *  pixel), mark (the same for the size of points), reach (how deep the scene is)}. */
   draw(width, height, lens, { solids, lines, points, floor, shadow, wide }, smooth, quick) {
     const { gl, canvas } = this;
     const fall = [floor ?? 0, 0, 1 / (SHADOWED * wide)];
@@ -339,7 +339,7 @@ export class Renderer {
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     const far = lens.eye > 0 ? 1 + lens.reach / lens.eye : 1; // distances over the eye's
     const range = lens.eye > 0 ? [(far + NEAR) / (far - NEAR), (-2 * far * NEAR) / (far - NEAR)] : [0, 1 / lens.reach];
-    const common = { axes: lens.axes, center: lens.center, lens: [...lens.scale, lens.eye, lens.perUnit], range, room: [width, height], ratio: lens.ratio };
+    const common = { axes: lens.axes, center: lens.center, lens: [...lens.scale, lens.eye, lens.perUnit], range, room: [width, height], ratio: lens.ratio, mark: lens.mark };
     const seen = solids && this.drawSolids(solids, common, lens);
     if (shaded) this.drawShadow(solids, common, fall, shadow); // after what hides it
     this.drawPaths(lines, points, common, 1);

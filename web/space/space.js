@@ -19,6 +19,8 @@ const AXIS_VIEWS = { x: [0, 0], y: [90, 0], z: [-90, 90] };
 const LETTER = 12; // CSS pixels
 const CROWDED = 0.85; // a picture narrower than so much of its designed width shrinks, letters too,
 const SMALLEST = 0.85; // here down to so much of their size, which a phone still shows: panels there stand under each other
+const MARKED = 300; // CSS pixels: a scene less high has smaller points, for they are not read,
+const LEAST_MARK = 0.6; // down to so much of their size
 const EARLY = "200px"; // so near to the window a scene is drawn
 
 let renderer = null;
@@ -349,6 +351,7 @@ class Scene {
     const lens = {
       axes: [x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]], center, eye, perUnit: pixels * drawn,
       scale: [(2 * pixels) / cssWidth, (2 * pixels) / cssHeight], reach: 12 * Math.max(this.radius, this.halfWidth), ratio: drawn,
+      mark: drawn * clip((2 * this.radius * room[0]) / (units * MARKED), LEAST_MARK, 1),
     };
     this.give();
     this.triangles = this.given.solids?.world.triangles ?? 0;
