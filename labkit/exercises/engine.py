@@ -481,7 +481,9 @@ class _Trial:
         if self.exercise.metric is None or not self.inputs:
             return None
         drawn = [
-            own_steps.Case(args, metric, pair[1], None if isinstance(pair[0], _Refusal) else pair[0])
+            own_steps.Case(args, metric, pair[1], refused=pair[0].value)
+            if isinstance(pair[0], _Refusal)
+            else own_steps.Case(args, metric, pair[1], pair[0])
             for args, metric, pair in zip(self.inputs, self.metrics, self.pairs)
         ]
         return own_steps.search(self.function, self._names(self.inputs[0]), drawn, self._judging(), self.budget)

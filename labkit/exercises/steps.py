@@ -53,10 +53,10 @@ def _or_nothing(method):
 
 
 class Case:
-    """One draw: its arguments, the expected result, and that of the student as the metric admits it, if it does."""
+    """One draw: its arguments, the expected result, and that of the student as the metric admits it, or `refused`."""
 
-    def __init__(self, args, metric, expected, result=None):
-        self.args, self.metric, self.expected, self.result = args, metric, expected, result
+    def __init__(self, args, metric, expected, result=None, refused=None):
+        self.args, self.metric, self.expected, self.result, self.refused = args, metric, expected, result, refused
         self.was_right = result is not None and metric.equal(result, expected)
 
     def keep(self, found):
@@ -85,6 +85,20 @@ class Case:
             return 0
         simple = relations.difference_words(self.metric, [(result, self.expected)], (), True)
         return 100 if simple else len(parts) - len(right)
+
+    def parts_before(self):
+        """Names of the parts of the student's result that are right, be it refused as a whole; None if not known."""
+        if self.result is not None or self.refused is None:
+            return self.right_parts(self.result)
+        if not isinstance(self.metric, metrics.Several):
+            return None if np.shape(self.refused) == np.shape(self.expected) else []
+        parts = zip(self.metric.names, self.metric.metrics, self.refused, self.expected)
+        return [name for name, metric, r, e in parts if Case((), metric, e).keep_raw(r)]
+
+    def keep_raw(self, found):
+        """Whether a result is right that the metric has not admitted yet."""
+        result = self.admit((found,))
+        return result is not None and self.keep((result,))
 
     def right_parts(self, result):
         """Names of the parts of an admitted result that are right."""
@@ -320,7 +334,9 @@ class Search:
         """A change of the code that leaves a simple difference, or makes a part of the result right on all draws."""
         plans = [("code", k) for k, (rank, *_) in enumerate(self.written.changes) if 0 <= rank < WORTH]
         kind, best = self.budget.part(), None
-        right = [case.right_parts(case.result) for case in self.cases]
+        right = [case.parts_before() for case in self.cases]
+        if None in right:
+            return None
         for start in range(0, len(plans), BATCH):
             batch = plans[start : start + BATCH]
             for plan, better in zip(batch, self._gains(batch, right[0], kind)):

@@ -456,3 +456,19 @@ def test_a_rule_that_is_not_seen_where_an_answer_is_right_is_not_told():
     text = STATUS.replace('off <= half + bound else "not', 'np.isclose(value, x, atol=half + bound) else "not')
     assert text != STATUS
     assert "rounded" not in told_of(ledger, "status", text)
+
+
+HALF_TRANSPOSED = """
+def motions(T_BF, T_ST):
+    return np.linalg.inv(T_BF[:-1]) @ T_BF[1:], T_ST[:-1] @ np.swapaxes(T_ST[1:], 1, 2)
+"""
+
+
+def test_a_part_that_was_right_all_the_time_does_not_come_out_right_by_a_change():
+    assert "comes out right" not in told_of(own, "motions", HALF_TRANSPOSED)
+
+
+@pytest.mark.parametrize("by, told", [("n - 2", "divide rᵀ r by n - 2"), ("n - p - 3", "divide rᵀ r by f - 3")])
+def test_a_divisor_is_told_for_what_it_is_whatever_led_to_it(by, told):
+    text = f"def honest_covariance(r, J):\n    n, p = J.shape\n    return r @ r / ({by}) * np.linalg.inv(J.T @ J)"
+    assert told in told_of(own, "honest_covariance", text)

@@ -354,7 +354,8 @@ STATUSES = (
     ),
     (
         lambda p, v, b, m, s: status(p, v, b * abs(v), m, s),
-        "You take the bound as a share of the value. It has the value's own unit: half unit + bound.",
+        "You take the bound as a share of the number. It has the number's own unit: half unit + bound.",
+        "status-d5f11e",
     ),
     (_cut_off, "*Cut off* is left out here: what is off by less than a whole unit is judged as all else."),
     (
@@ -447,7 +448,8 @@ STATUSES = (
     ),
     (
         lambda p, v, b, m, s: status(p, round(v, _decimals(p)), b, m, s),
-        "You rounded the value first, which moves it by up to half a unit more: compare it as it was computed.",
+        "You rounded first, the value or the difference, which moves it by up to half a unit more: compare what was computed.",
+        "status-ef196d",
     ),
     (
         _judged(lambda h, o, b, m: "reproduced" if o <= 2 * h else _real_word(h, o, b, m)),
@@ -455,14 +457,16 @@ STATUSES = (
     ),
     (
         _relative,
-        "You divide by the printed number. Half unit and bound are in the unit of the value: compare the difference itself.",
+        "You take half unit and bound as shares of the printed number. They are in the unit of the value: compare the difference itself.",
+        "status-e17f9e",
     ),
     *(
         (
             _rounded_to(digits),
-            "You rounded the value first, always to the same decimals: compare it as it was computed.",
+            "You rounded first, the value or the difference, always to the same decimals: compare what was computed.",
+            id,
         )
-        for digits in (2, 3, 1)
+        for digits, id in ((2, "status-da4190"), (3, "status-da4190-2"), (1, "status-da4190-3"))
     ),
     (
         _judged(
@@ -681,7 +685,7 @@ CHAPTER = Chapter(
                     lambda p, v, b, m, s: status(p, v, 0.0, m, s),
                     "The bound is missing: rounded inputs may move the value by that much more.",
                 ),
-                *(Mistake(variant, text) for variant, text in STATUSES),
+                *(Mistake(variant, text, *id) for variant, text, *id in STATUSES),
             ],
             draws=len(COMPARISONS),
         ),
