@@ -347,7 +347,7 @@ class Search:
         if best is None:
             return None
         _, line, code, mends = self.written.changes[best[1][1]]
-        return f"in line {line}, `{code}`: {mends}. With this changed, {best[2]}"
+        return f"in line {line}, `{code}`: perhaps {mends}. With this changed, {best[2]}"  # it need not be the mistake
 
     def _gains(self, plans, right, kind):
         """How much better each plan makes the result of the first draw."""

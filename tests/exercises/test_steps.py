@@ -429,7 +429,10 @@ def test_of_two_slips_the_first_is_told_with_what_is_left():
     said = told_of(
         "invert", "R = T[:3, :3]\nout = T.copy()\nout[:3, :3] = R.T\nout[:3, 3] = T[:3, 3] @ R.T\nreturn out", "T"
     )
-    assert "`T[:3, 3] @ R.T`: the factors of one product `@` are exchanged. With this changed, the rotation is" in said
+    assert (
+        "`T[:3, 3] @ R.T`: perhaps the factors of one product `@` are exchanged. With this changed, the rotation"
+        in said
+    )
 
 
 def test_what_raises_is_told_with_the_change_that_mends_it():
