@@ -117,3 +117,40 @@ def test_a_gain_above_one_is_drawn_and_held():
 
     outcomes = [ITEMS["update"].judge(clipped, rng=np.random.default_rng(seed)) for seed in range(3)]
     assert all(outcome.status != CORRECT for outcome in outcomes)
+
+
+FAR_OR_SMALL = [
+    ("control_covariance", lambda u, dt, *_: dt < 0.02),
+    ("control_covariance", lambda u, *_: 0 < abs(u[0]) < 0.05),
+    ("mecanum_twist", lambda speeds, *_: np.abs(speeds).max() < 0.2),
+    ("ackermann_twist", lambda speed, steering, wheelbase: steering > 0.9),
+    ("fuse_two_sensors", lambda x0, var0, z, stds: stds[0] > stds[1]),
+    ("fuse_two_sensors", lambda x0, var0, z, stds: var0 > 20),
+    ("fuse_two_sensors", lambda x0, var0, z, stds: var0 < 0.1),
+    ("update", lambda x, cov, z, C, cov_z: np.abs(z - C @ x).max() > 10),
+    ("measurement", lambda x, landmark: np.hypot(*(landmark - x[:2])) > 10),
+    ("measurement_jacobian", lambda x, landmark: np.hypot(*(landmark - x[:2])) < 1),
+    ("recover", lambda w_mean, w_slow, *_: w_slow < 0.1),
+]
+
+
+@pytest.mark.parametrize("name, forgotten", FAR_OR_SMALL, ids=[f"{n}-{k}" for k, (n, _) in enumerate(FAR_OR_SMALL)])
+def test_who_is_right_within_a_range_alone_is_refused(name, forgotten, monkeypatch):
+    test_who_forgets_a_case_is_refused(name, forgotten, monkeypatch)
+
+
+def test_weights_of_zero_keep_their_places():
+    def without_zeros(weights, rng):
+        left = weights[weights > 0]
+        return np.searchsorted(np.cumsum(left), rng.random(len(weights)) * left.sum())
+
+    assert ITEMS["resample_roulette"].judge(without_zeros, rng=np.random.default_rng(0)).status != CORRECT
+
+
+def test_what_is_returned_is_not_called_right_on_the_way():
+    def lifted(log_weights):
+        top = log_weights.max()
+        return top + np.log(np.exp(log_weights - top).sum() + 1e-8)
+
+    text = ITEMS["log_sum_exp"].judge(lifted, rng=np.random.default_rng(0)).text
+    assert text and "something else is returned" not in text

@@ -148,6 +148,12 @@ CREEPING = "right, but not for a robot that hardly moves and hardly turns (a few
 IN_CURVES_ONLY = "right in curves, but not where the robot {}:"
 
 
+def short_time(rng):
+    """A control in a time step of a few thousandths to a hundredth of a second, and three noise constants."""
+    u, dt, *constants = noisy_control(rng, rng.choice([-1, 1], 2))
+    return u, 0.02 * dt, *constants
+
+
 def special_control(rng, moves):
     """A pose, a control of which these parts are not zero, and a time step."""
     x, u, dt = pose_control_step(rng)
@@ -208,6 +214,12 @@ def car_nearly_straight_on(rng, turned):
     return speed, rng.uniform(0.2, 1) * turned * rng.choice([-1, 1]), wheelbase
 
 
+def car_turned_far(rng, left):
+    """The same with its wheels turned far to this side."""
+    speed, _, wheelbase = car(rng)
+    return speed, (1 if left else -1) * rng.uniform(0.9, 1.3), wheelbase
+
+
 def car_at_rest(rng, steering):
     """A car that stands, with its wheels turned by so much."""
     return 0.0, steering, float(car(rng)[2])
@@ -231,6 +243,12 @@ def rolling(rng, wide=True):
     twist = rng.uniform(0.3, 1.2, 3) * rng.choice([-1, 1], 3)
     slip = rng.uniform(0.03, 0.1, 4) * rng.choice([-1, 1], 4)
     return wheels.mecanum_matrix(half_length, half_width) @ twist + slip, half_length, half_width
+
+
+def rolling_slowly(rng):
+    """The same with speeds of a few centimeters a second."""
+    speeds, *lengths = rolling(rng)
+    return 0.03 * speeds, *lengths
 
 
 def unequal_wheels(rng, larger=True, turns=None):
@@ -1307,8 +1325,10 @@ CHAPTER = Chapter(
                     ((1, 0), "drives straight on, omega = 0"),
                     ((-1, 0), "drives straight back"),
                     ((0, 0), "rests, u = (0, 0)"),
+                    ((0.03, 0.03), "hardly moves and hardly turns"),
                 )
-            ],
+            ]
+            + [(short_time, metrics.Numbers(1e-9), "right, but not for time steps of a hundredth of a second:")],
             hints=(
                 "A diagonal matrix: the variance of v and the variance of omega.",
                 "sigma_v^2 = k_d |v| / T and sigma_omega^2 = (k_theta |omega| + k_drift |v|) / T.",
@@ -1824,6 +1844,14 @@ CHAPTER = Chapter(
                     )
                     for steering in (0.4, 0.0)
                 ),
+                *(
+                    (
+                        functools.partial(car_turned_far, left=left),
+                        metrics.Numbers(1e-9),
+                        "right, but not where the wheels are turned by more than 50 degrees:",
+                    )
+                    for left in (True, False)
+                ),
             ),
             hints=(
                 "All wheels turn about one point on the line of the rear axle. How far aside is it?",
@@ -1901,6 +1929,7 @@ CHAPTER = Chapter(
             "mecanum_twist",
             reference=mecanum_twist,
             draw=(rolling, functools.partial(rolling, wide=False)),
+            noisy=(rolling_slowly, metrics.Numbers(1e-9), "right, but not for a robot that hardly moves, a few cm/s:"),
             fixed={"speeds": "a Mecanum robot has four wheels"},
             metric=metrics.Numbers(1e-9),
             hints=(

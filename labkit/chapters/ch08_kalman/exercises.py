@@ -56,9 +56,11 @@ def two_sensors_that_disagree(rng):
     return x0, var0, z + rng.uniform(15, 30, 2) * [1, -1], stds
 
 
-def one_position_two_sensors(rng):
+def one_position_two_sensors(rng, better=0, var0=(2, 9)):
+    """better: which of the sensors has the smaller std; var0: range of the prior's variance."""
     x = rng.uniform(5, 15) * rng.choice([-1, 1])
-    return x + rng.normal(), rng.uniform(2, 9), x + rng.uniform(-1, 1, 2), rng.uniform(0.3, 0.9, 2) * [1, 2]
+    stds = np.roll([rng.uniform(0.3, 0.6), rng.uniform(0.8, 1.8)], better)
+    return x + rng.normal(), rng.uniform(*var0), x + rng.uniform(-1, 1, 2), stds
 
 
 def steady_vehicle(rng):
@@ -113,6 +115,20 @@ ALONG_AN_AXIS = "right, but not where the landmark lies exactly along an axis of
 
 def along_the_axes(metric):
     return [(functools.partial(landmark_along_an_axis, toward=toward), metric, ALONG_AN_AXIS) for toward in AXES]
+
+
+def landmark_at(rng, within):
+    """A pose and a landmark at a distance from this range (m)."""
+    x, landmark = seen_landmark(rng)
+    away = landmark - x[:2]
+    return x, x[:2] + rng.uniform(*within) * away / np.hypot(*away)
+
+
+def near_and_far(metric):
+    return [
+        (functools.partial(landmark_at, within=within), metric, f"right, but not for a landmark {where}:")
+        for within, where in (((0.3, 0.6), "closer by than a meter"), ((20, 60), "20 m away or more"))
+    ]
 
 
 def turned_several_times(rng):
@@ -235,6 +251,8 @@ SURPRISES = (
     functools.partial(surprise, wanted=(1.5, 2.5), along=-1, limit=(2.5, 3.5)),
     functools.partial(surprise, wanted=(0.7, 0.9), along=1, std=(0.3, 0.7)),
     functools.partial(surprise, wanted=(0.05, 0.9)),
+    functools.partial(surprise, wanted=(0.99, 0.995)),  # next to the limit: rounded, one in two is on its other side
+    functools.partial(surprise, wanted=(1.005, 1.01)),
     functools.partial(surprise, wanted=(7, 20)),
     # short enough to pass without S: one implausible, also by its root, one plausible that S instead of S^-1 refuses
     functools.partial(surprise, wanted=(7, 10), along=-1, std=(0.3, 0.5), limit=(4.0, 6.0)),
@@ -798,7 +816,7 @@ CHAPTER = Chapter(
             draw=tuple(
                 functools.partial(mixed_measurement, n=n, m=m, off=off, sure=sure, unit=unit)
                 for n, m, off, sure, unit in (
-                    (2, 2, 1.0, 1.0, 1.0),
+                    (2, 2, 30.0, 1.0, 1.0),
                     (3, 1, 0.01, 1.0, 1.0),
                     (2, 3, 1.0, 1e-3, 1.0),
                     (3, 3, 0.01, 1.0, 1.0),
@@ -999,7 +1017,12 @@ CHAPTER = Chapter(
         Exercise(
             "fuse_two_sensors",
             reference=fuse_two_sensors,
-            draw=one_position_two_sensors,
+            draw=(
+                one_position_two_sensors,
+                functools.partial(one_position_two_sensors, better=1),
+                functools.partial(one_position_two_sensors, var0=(20, 500)),
+                functools.partial(one_position_two_sensors, better=1, var0=(0.01, 0.05)),
+            ),
             fixed={"z": "there are two sensors", "stds": "there are two sensors"},
             metric=FUSED,
             noisy=(
@@ -1465,7 +1488,7 @@ CHAPTER = Chapter(
             fixed={"x": POSE, "landmark": LANDMARK},
             draws=12,
             metric=metrics.Numbers(1e-9),
-            noisy=along_the_axes(metrics.Numbers(1e-9)),
+            noisy=along_the_axes(metrics.Numbers(1e-9)) + near_and_far(metrics.Numbers(1e-9)),
             hints=(
                 "How far away is the landmark, and in which direction seen from where the robot looks?",
                 "d = sqrt(dx^2 + dy^2), alpha = atan2(dy, dx) - theta, with (dx, dy) from robot to landmark.",
@@ -1587,7 +1610,8 @@ CHAPTER = Chapter(
                 )
                 for side in (1, -1)
             ]
-            + along_the_axes(metrics.Numbers(1e-5)),
+            + along_the_axes(metrics.Numbers(1e-5))
+            + near_and_far(metrics.Numbers(1e-5)),
             hints=(
                 "Move the robot a little toward the landmark, then across, then turn it. What do distance and bearing do?",
                 "Row 0: (-dx/r, -dy/r, 0). Row 1: (dy/q, -dx/q, -1) with q = r^2. Compute dx, dy, q and r first, then write both rows as one array.",

@@ -354,6 +354,12 @@ def averages(rng, low=False):
     )
 
 
+def small_averages(rng):
+    """The same of densities that are small, as those of many beams are."""
+    mean, slow, fast, *alphas = averages(rng, low=True)
+    return 1e-3 * mean, 1e-3 * slow, 1e-3 * fast, *alphas
+
+
 def averages_just_below(rng):
     """The same with a quick average a little below the slow one: a small share."""
     slow = rng.uniform(0.2, 0.8)
@@ -983,7 +989,12 @@ def _valid(resample, rng):
     return None
 
 
-WEIGHTS = (np.array([0.1, 0.7, 0.1, 0.1, 0.0]), np.array([0.5, 0.25, 0.15, 0.1]), np.array([3.0, 1.0]))
+WEIGHTS = (
+    np.array([0.1, 0.7, 0.1, 0.1, 0.0]),
+    np.array([0.5, 0.25, 0.15, 0.1]),
+    np.array([3.0, 1.0]),
+    np.array([0.0, 0.6, 0.0, 0.4]),
+)
 SHARE_OFF = 0.06  # of 2000 draws: by the binomial law a right roulette is farther off in one of some million checks
 HALF_VARIES = 1.8  # 600 counts of variance 2.5: five standard deviations of their own variance below it
 
@@ -1412,6 +1423,7 @@ def _hunt(id, reference, specimen, why, hints, others, good=GOOD, extra=("rng",)
 
 
 WEIGHTS_AND_WORD = metrics.Several(metrics.Numbers(1e-9), metrics.Exactly(), names=("weights", "resample"))
+RECOVERY = metrics.Several(*[metrics.Numbers(1e-9)] * 3, names=("share", "w_slow", "w_fast"))
 DEPTHS = metrics.Several(metrics.Numbers(1e-9, "m"), metrics.Numbers(1e-9, "rad"), names=("ranges", "bearings"))
 
 CHAPTER = Chapter(
@@ -2175,7 +2187,11 @@ CHAPTER = Chapter(
         Exercise(
             "multiply_weights",
             reference=multiply_weights,
-            draw=tuple(functools.partial(cycle_of_weights, step=step) for step in STEPS),
+            draw=(
+                *(functools.partial(cycle_of_weights, step=step) for step in STEPS),
+                functools.partial(cycle_of_weights, step=lambda rng, n: n * rng.integers(1, 5) + 2, n=4),
+            ),
+            draws=6,
             metric=WEIGHTS_AND_WORD,
             noisy=tuple(
                 (
@@ -2354,9 +2370,8 @@ CHAPTER = Chapter(
             "recover",
             reference=recover,
             draw=(*[averages] * 3, averages_that_rise, averages_just_below, functools.partial(averages, low=True)),
-            metric=metrics.Several(
-                metrics.Numbers(1e-9), metrics.Numbers(1e-9), metrics.Numbers(1e-9), names=("share", "w_slow", "w_fast")
-            ),
+            metric=RECOVERY,
+            noisy=(small_averages, RECOVERY, "right, but not for weights of a thousandth:"),
             hints=(
                 "When the recent weights are worse than usual, something is wrong. Two averages, one quick and one slow, tell it.",
                 "Bring both up to date first: w += alpha (w_mean - w). The share is 1 - w_fast / w_slow, never below 0.",
