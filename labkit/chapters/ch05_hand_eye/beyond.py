@@ -93,6 +93,21 @@ def triangle(rng, right_angle=False):
     return float(alpha), float(np.deg2rad(rng.uniform(45, 75))), float(rng.uniform(30, 200))
 
 
+def nearly_right_triangle(rng, sign, off):
+    """One angle short of a right one or beyond it, by less than this (rad)."""
+    return float(np.pi / 2 + sign * off * rng.uniform(0.2, 1.0)), *triangle(rng)[1:]
+
+
+NEARLY_RIGHT = tuple(
+    (
+        functools.partial(nearly_right_triangle, sign=sign, off=off),
+        f"right, but not for an angle less than {np.rad2deg(off):.2g}° from a right one:",
+    )
+    for sign in (1, -1)
+    for off in (0.04, 5e-4)
+)
+
+
 def obtuse_triangle(rng):
     """The object stands beside the base."""
     return float(np.deg2rad(rng.uniform(95, 110))), float(np.deg2rad(rng.uniform(35, 60))), float(rng.uniform(30, 200))
@@ -512,6 +527,7 @@ TRIANGULATION = [
             functools.partial(mirrored, draw=obtuse_triangle),
         ),
         metric=metrics.Numbers(1e-9, "mm"),
+        noisy=tuple((draw, metrics.Numbers(1e-9, "mm"), words) for draw, words in NEARLY_RIGHT),
         hints=(
             "Drop the height: it cuts the base in two parts, and each belongs to a right triangle.",
             "L = H / tan α + H / tan β. Solve for H.",

@@ -93,6 +93,19 @@ def pose_off(rng, n=None):
     )
 
 
+def uphill(rng):
+    """The same so far off that the residuals grow with a Gauss-Newton step."""
+    while True:
+        T_FS, T_BF, x_S, target = scene(rng)
+        start = frames.pose(T_FS[:3, :3] @ random_rotation(rng, 3.1), T_FS[:3, 3] + rng.uniform(-8, 8, 3))
+        before, after = (
+            np.linalg.norm(_residual(T, T_BF, x_S, target))
+            for T in (start, gauss_newton_on_pose(start, T_BF, x_S, target))
+        )
+        if after > 1.05 * before:
+            return start, T_BF, x_S, target
+
+
 def smooth_function(rng, m=None, n=None):
     """A curved function of some variables, a place and a step large enough to tell the schemes apart."""
     sizes = rng.choice(np.arange(2, 6), 2, replace=False)
@@ -224,6 +237,16 @@ def _not_restored(function, x, step):
     return np.column_stack(columns)
 
 
+def _neither_restored(function, x, step):
+    """Moves one place ahead and one behind, each farther with every variable."""
+    ahead, behind, columns = x.copy(), x.copy(), []
+    for k in range(len(x)):
+        ahead[k] += step
+        behind[k] -= step
+        columns.append((function(ahead) - function(behind)) / (2 * step))
+    return np.column_stack(columns)
+
+
 def _jacobian(T_FS, T_BF, x_S, sign=-1.0, arms=None, left=False):
     R = T_BF[:, :3, :3]
     arms = x_S if arms is None else arms
@@ -256,6 +279,11 @@ def _circle(change):
 
 def _circle_about_mean(x, z):
     return x.mean(), z.mean(), np.hypot(x - x.mean(), z - z.mean()).mean()
+
+
+def _circle_from_its_extent(x, z):
+    r = np.ptp(x) / 2
+    return x.min() + r, z.min() + r, r
 
 
 def _circle_through(numbers):
@@ -756,6 +784,7 @@ CHAPTER = Chapter(
                 Mistake(_circle(lambda x, z, r: (x, z, r * r)), "Your third number is the squared radius: a root is missing."),
                 Mistake(_circle(lambda x, z, r: (x, z, np.sqrt(max(2 * x * x + 2 * z * z - r * r, 0)))),
                         "a3 entered the radius with the wrong sign: r^2 = xc^2 + zc^2 - a3."),
+                Mistake(_circle_from_its_extent, "Half of the width that is seen is no radius: the scan line is an arc, less than half of the circle."),
                 Mistake(_circle_about_mean, "You took the mean of the points for the center. An arc lies on one side of its center."),
                 Mistake(_circle(lambda x, z, r: (z, x, r)), "The two coordinates of the center have changed places."),
                 Mistake(_circle_through(lambda n: [0, 1, 2]), "The circle goes through the first three points. All points of the scan line count."),
@@ -884,6 +913,7 @@ CHAPTER = Chapter(
                 Mistake(lambda: float(_lengths_of_end_pose().max()), "This is the worst pose. Asked for is the rms over all 31."),
                 Mistake(lambda: float(_lengths_of_end_pose().mean()), "This is the mean length: square before you take the mean, then take the root."),
                 Mistake(lambda: float(np.median(_lengths_of_end_pose())), "This is the median length. Asked for is the rms, in which the worst poses count."),
+                Mistake(lambda: float(np.sqrt(np.mean(_vectors_of_end_pose().sum(axis=1) ** 2))), "The three coordinates of a pose are added before they are squared, as listing C3 does: errors of opposite sign cancel. Square first."),
                 Mistake(lambda: _rms_of_end_pose(2) ** 2, "This is the mean square: take its root."),
                 Mistake(lambda: np.sqrt(31) * _rms_of_end_pose(2), "This is the root of the sum: divide by the number of poses first."),
                 Mistake(lambda: _rms_of_end_pose(2) * np.sqrt(31 / 30), "The mean of the squares divides by n - 1 here. A mean divides by the 31 poses."),
@@ -915,7 +945,8 @@ CHAPTER = Chapter(
                 Mistake(lambda f, x, h: _central(f, x, h).T, "Your matrix is the transpose: one row a function value, one column a variable."),
                 Mistake(lambda f, x, h: _central(f, x, h / 2),
                         "You go half a step to each side. That is a central difference too, but of step / 2; here each side takes a whole step."),
-                Mistake(_not_restored, "After a variable has been moved it must go back before the next one moves: work on a fresh copy of x."),
+                *(Mistake(variant, "After a variable has been moved it must go back before the next one moves: work on a fresh copy of x.", id=id)
+                  for variant, id in ((_not_restored, "numeric_jacobian-309efc"), (_neither_restored, "numeric_jacobian-neither-restored"))),
                 Mistake(lambda f, x, h: np.column_stack([(f(x + d * x) - f(x - d * x)) / (2 * h) for d in h * np.eye(len(x))]),
                         "Your step grows with x: step times x. It is the same for all variables."),
                 Mistake(lambda f, x, h: _central(f, x, h).sum(axis=0), "The values of the function are added. Each has a row of its own: shape (m, n)."),
@@ -978,6 +1009,7 @@ CHAPTER = Chapter(
             draw=(pose_off, functools.partial(pose_off, n=MANY)),
             fixed={"T_FS": POSE, "target": POINT},
             metric=metrics.Poses(1e-6, 1e-6),
+            noisy=(uphill, metrics.Poses(1e-6, 1e-6), "right, but not from a start so far off that the residuals grow with the step. Gauss-Newton takes it whole all the same:"),
             hints=(
                 "Solve the linearized problem for the step, then move the pose by it.",
                 "step = argmin |J step + e|; the first three entries are a rotation vector on the right of R_FS, the last three a translation.",
