@@ -767,7 +767,7 @@ def arena():
             "model": Choice(SENSORS, "likelihood field", label="model"),
             "resampler": Choice(tuple(RESAMPLERS), "spoke wheel", label="resampling"),
         },
-        play=Play(t_max=300.0, dt=DT, rate=4.0),
+        play=Play(t_max=300.0, dt=DT, rate=8.0),  # sixteen pictures a second
         start=start_arena,
         advance=advance_arena,
         brush=True,
