@@ -272,7 +272,7 @@ class Line:
         self.pieces = None
         if patience is not None and os.name == "nt":  # pipes cannot be waited for with a time limit there
             self.pieces = queue.Queue(maxsize=256)
-            threading.Thread(target=self._read_on, daemon=True).start()
+            threading.Thread(target=self._read_on, name="labkit pipe", daemon=True).start()
 
     def ask(self, head, parcel=()):
         """Send a question and wait for its answer: (content, parcel)."""

@@ -1053,9 +1053,9 @@ class Value(Item):
         if isinstance(answer, np.ndarray) and answer.size == 1:
             answer = answer.reshape(())
         run = (
-            guard.run(metric.admit, (answer, expected))
+            guard.run(lambda: metric.admit(answer, expected), ())  # some things, such as a generator, have no copy
             if unit is None
-            else guard.run(self._converted, (answer, unit, expected))
+            else guard.run(lambda: self._converted(answer, unit, expected), ())
         )
         if isinstance(run.error, metrics.Refused | ValueError):
             return Outcome(NOT_YET, _closed(_for_value(run.error)) + _of_shape(answer, expected))
@@ -1082,7 +1082,7 @@ class Value(Item):
         return metrics.Numbers().admit(answer, expected) * there[1] / here[1]
 
     def _judge_with(self, metric, expected, answer):
-        run = guard.run(metric.admit, (answer, expected))
+        run = guard.run(lambda: metric.admit(answer, expected), ())
         if run.error is not None:
             text = (
                 _for_value(run.error)

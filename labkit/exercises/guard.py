@@ -9,14 +9,12 @@ import contextlib
 import copy
 import ctypes
 import functools
-import gc
+import getpass
 import io
 import itertools
 import linecache
-import locale
 import operator
 import os
-import random
 import signal
 import sys
 import threading
@@ -27,6 +25,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from . import kept
+
 TIME_LIMIT = 2.0  # seconds of processor time that a single call may take
 PATIENCE = 3  # times as long may a call take that shares its processor with others
 WAITING = 0.02  # share of its time that code computes which only waits, in a sleep say
@@ -34,6 +34,7 @@ ABROAD = 10  # times as long again, where most of it is waiting for another proc
 PERIOD = 0.05  # seconds between two rings of the clock
 SWALLOWED = 10  # rings that code may swallow before every line of it raises
 OUTPUT_LIMIT = 2000  # characters of printed text that are kept
+MESSAGE = 2000  # characters of an error's words that are looked at: somebody may have put a whole array in
 PROTECTED = ("numpy", "numpy.linalg", "numpy.random", "math", "random", "builtins", "os", "time", "signal", "inspect")
 PROTECTED += ("copy", "json", "html", "itertools", "functools", "types", "contextlib", "traceback")
 CHANGING = {
@@ -232,7 +233,7 @@ class _Clock:
         else:
             self.lock, self.done = threading.Lock(), threading.Event()
             self.ticking, self.target = True, ctypes.c_ulong(threading.get_ident())
-            threading.Thread(target=self._watch, daemon=True).start()
+            threading.Thread(target=self._watch, name=f"{kept.LABKIT} clock", daemon=True).start()
 
     def stop(self):
         """Afterwards nothing rings any more; a ring on the way out is taken back."""
@@ -383,49 +384,6 @@ def _finite_only(original, name):
     return decompose
 
 
-def _set_environment(values):
-    if dict(os.environ) != values:
-        os.environ.clear()
-        os.environ.update(values)
-
-
-def _set_folder(folder):
-    if folder is not None and _working_folder() != folder:
-        os.chdir(folder)
-
-
-def _umask():
-    mask = os.umask(0o077)
-    os.umask(mask)
-    return mask
-
-
-def _set_path(entries):
-    sys.path[:] = entries
-
-
-STATE = [  # (how to read it, how to put it back) of what a process has once
-    (np.random.get_state, np.random.set_state),
-    (random.getstate, random.setstate),
-    (np.geterr, lambda values: np.seterr(**values)),
-    (np.geterrcall, np.seterrcall),
-    (np.get_printoptions, lambda values: np.set_printoptions(**values)),
-    (sys.getrecursionlimit, sys.setrecursionlimit),
-    (sys.gettrace, sys.settrace),
-    (sys.getprofile, sys.setprofile),
-    (lambda: list(sys.path), _set_path),
-    (lambda: dict(os.environ), _set_environment),
-    (lambda: locale.setlocale(locale.LC_ALL), lambda name: locale.setlocale(locale.LC_ALL, name)),
-    (gc.isenabled, lambda on: gc.enable() if on else gc.disable()),
-    (_umask, os.umask),
-    (lambda: _working_folder(), _set_folder),
-]
-if hasattr(signal, "pthread_sigmask"):
-    STATE.append(
-        (lambda: signal.pthread_sigmask(signal.SIG_BLOCK, ()), lambda m: signal.pthread_sigmask(signal.SIG_SETMASK, m))
-    )
-
-
 class Judging:
     """Whether student code runs: what it calls in turn must not judge it once more, and so on without an end."""
 
@@ -444,7 +402,7 @@ class Judging:
 @contextlib.contextmanager
 def sandbox(capture):
     """Everything student code may touch, put back afterwards."""
-    state = [(put, read()) for read, put in STATE]
+    state = [(put, read()) for read, put in kept.STATE]
     limit = sys.setrecursionlimit
     with contextlib.ExitStack() as stack:
         stack.enter_context(Judging.on())
@@ -456,24 +414,18 @@ def sandbox(capture):
         stack.enter_context(only_finite_matrices())
         stack.enter_context(_replaced(builtins, "input", _forbid("input()")))
         stack.enter_context(_replaced(builtins, "breakpoint", _forbid("breakpoint()")))
-        for name in ("_exit", "abort", "kill", "fork", "execv"):
+        stack.enter_context(_replaced(getpass, "getpass", _forbid("getpass()")))
+        for name in ("_exit", "abort", "kill", "fork", "forkpty", "execv", "system"):
             stack.enter_context(_replaced(os, name, _forbid(f"os.{name}()", getattr(os, name, None))))
-        stack.enter_context(_replaced(_shell(), "ask_exit", _forbid("exit()")))
-        stack.enter_context(_replaced(_shell(), "run_cell", _forbid("run_cell()")))
+        for name in ("ask_exit", "run_cell", "system"):
+            words = "exit()" if name == "ask_exit" else f"{name}()"
+            stack.enter_context(_replaced(_shell(), name, _forbid(words)))
         try:
             yield
         finally:
             for put, value in state:
                 with contextlib.suppress(Exception):  # such as a folder that is gone
                     put(value)
-
-
-def _working_folder():
-    """The working directory, or None where it has been deleted."""
-    try:
-        return os.getcwd()
-    except OSError:
-        return None
 
 
 def _shell():
@@ -527,7 +479,7 @@ def message_of(error, limit=0.5):
         return ""
     try:
         with time_limit(limit), sandbox(_Capture()):
-            return _call(str, (error,), lambda said: printable(" ".join(said.split())[:300]))
+            return _call(str, (error,), lambda said: printable(" ".join(said[:MESSAGE].split())[:300]))
     except BaseException:  # also TimeLimit, and SystemExit of student code
         return "(its message cannot be shown)"
 

@@ -14,7 +14,7 @@ import ipywidgets
 import numpy as np
 
 from ..places import ROOT
-from . import engine, feedback, guard, progress, source
+from . import engine, feedback, guard, kept, progress, source
 from .engine import CORRECT, NOT_YET, RAISED, TO_DO, Prediction, Value
 from .feedback import Named, Panel
 
@@ -127,7 +127,8 @@ class Bound:
             raise guard.Forbidden(f"ex.{self._item.id}()")
         guard.PRISTINE.restore()
         is_value = isinstance(self._item, Value)
-        outcome = self._item.judge(answer, unit) if is_value else self._item.judge(answer, self._generator())
+        with kept.a_check():
+            outcome = self._item.judge(answer, unit) if is_value else self._item.judge(answer, self._generator())
         if not is_strict() or outcome.status == CORRECT:
             named = {} if outcome.mistake is None else {"mistake": self._item.mistakes[outcome.mistake].id}
             progress.record(self._chapter.name, self._item.id, outcome.status, **named)

@@ -8,6 +8,7 @@ import numpy as np
 
 MOST = 6  # entries, rows or columns that are tried one by one
 LARGEST = 10_000  # entries of a result that is looked at
+DEPTH = 8  # lists within lists: more than any array of the course has axes, and one that holds itself has no end
 
 
 def shape_words(results, expected, names=()):
@@ -52,10 +53,11 @@ def _of_several(results, expected, names):
     return None
 
 
-def _numbers(value):
+def _numbers(value, depth=DEPTH):
     """A result as an array of a size worth looking at; None for anything that is none, or hides what it is."""
     plain = type(value) is np.ndarray or isinstance(value, np.number) or type(value) in (int, float)
-    if not plain and not (type(value) in (list, tuple) and all(_numbers(part) is not None for part in value[:LARGEST])):
+    listed = depth and type(value) in (list, tuple)
+    if not plain and not (listed and all(_numbers(part, depth - 1) is not None for part in value[:LARGEST])):
         return None
     if getattr(value, "size", 0) > LARGEST:
         return None

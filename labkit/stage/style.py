@@ -11,6 +11,8 @@ Figures are written for light paper. In JupyterLab's dark theme a Stage exchange
 so that no figure needs to know about themes: use the names of this module, and nothing else is to be done.
 """
 
+import contextlib
+
 import matplotlib as mpl
 from matplotlib.colors import to_rgb
 
@@ -85,9 +87,20 @@ RC = {
 }
 
 
+with mpl.rc_context({**mpl.rcParamsDefault, **RC}):
+    OURS = {name: value for name, value in dict.items(mpl.rcParams) if name not in ("backend", "interactive")}
+
+
+@contextlib.contextmanager
 def rc():
-    """Context in which figures of the course are made: `with style.rc(): fig, ax = plt.subplots()`."""
-    return mpl.rc_context(RC)
+    """Context in which figures of the course are made: `with style.rc(): fig, ax = plt.subplots()`.
+
+    They hang on nothing that a reader has set for figures of their own, such as letters set by a LaTeX that is not
+    there.
+    """
+    with mpl.rc_context():
+        dict.update(mpl.rcParams, OURS)  # checked when this module was loaded
+        yield
 
 
 def look(role, **changes):

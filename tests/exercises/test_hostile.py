@@ -2,20 +2,25 @@
 """What student code may do to a process: it gets one sentence, and the process is what it was."""
 
 import builtins
+import decimal
 import gc
 import json
 import locale
+import logging
 import os
 import signal
+import socket
+import subprocess
 import sys
 import threading
 import time
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from labkit.exercises import engine, guard, metrics, session
+from labkit.exercises import engine, guard, kept, metrics, session
 from labkit.exercises.engine import CORRECT, NOT_YET, RAISED, Exercise
 from labkit.exercises.feedback import Panel
 
@@ -113,6 +118,63 @@ def test_one_sentence_within_three_seconds(function, status, words, capsys):
     assert time.monotonic() - begun < 3 * guard.PATIENCE and capsys.readouterr().out == ""
 
 
+class Unreadable(float):
+    def __float__(self):
+        raise RuntimeError("read me not")
+
+
+HELD_BY_ITSELF = []
+HELD_BY_ITSELF.append(HELD_BY_ITSELF)
+
+
+@pytest.mark.parametrize("result", [Unreadable(1.0), HELD_BY_ITSELF, 10**400, [Unreadable(1.0)] * 3])
+def test_what_cannot_be_read_as_numbers_gets_a_sentence(result):
+    outcome = DOUBLE.judge(lambda v: result)
+    assert outcome.status == NOT_YET and outcome.text.startswith("expected an array of shape (3,), got ")
+    assert "decimal" not in ANGLE.judge(result).text
+
+
+def test_what_has_no_copy_is_no_number():
+    assert "still to be computed" in ANGLE.judge(v for v in [12.5]).text
+
+
+def test_of_a_message_as_long_as_an_array_the_beginning_is_told():
+    begun = time.process_time()
+    assert len(DOUBLE.judge(raising(ValueError("x" * 10**7))).text) < 1000
+    assert time.process_time() - begun < 3
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")  # pytest tells what Python does not
+def test_a_thread_that_is_left_behind_ends():
+    started = []
+
+    def burning():
+        while True:
+            pass
+
+    def double(v):
+        started.append(threading.Thread(target=burning, daemon=True))
+        started[-1].start()
+        return 2 * v
+
+    assert DOUBLE.judge(double).status == CORRECT and len(started) > 2
+    for thread in started:
+        thread.join(30)
+    assert not any(thread.is_alive() for thread in started)
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="only Linux tells which programs have been started")
+def test_programs_that_a_check_leaves_behind_end_and_others_go_on():
+    words = [sys.executable, "-c", "import time; time.sleep(60)"]
+    own = subprocess.Popen(words)
+    with kept.a_check():
+        left = subprocess.Popen(words)
+    assert own.poll() is None and not Path(f"/proc/{left.pid}").exists()
+    own.kill()
+    own.wait()
+    left.wait()
+
+
 def test_half_letters_that_are_printed_reach_no_page():
     def double(v):
         print("\udfff")
@@ -125,7 +187,7 @@ def test_half_letters_that_are_printed_reach_no_page():
 
 def test_what_a_check_touches_is_put_back():
     def read():
-        state = [get() for get, _ in guard.STATE]
+        state = [get() for get, _ in kept.STATE]
         return [s[1].tolist() if isinstance(s, tuple) and len(s) == 5 else s for s in state]
 
     def careless(v):
@@ -143,6 +205,16 @@ def test_what_a_check_touches_is_put_back():
         if hasattr(signal, "pthread_sigmask"):
             signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGUSR1])
         warnings.simplefilter("error")
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        decimal.getcontext().prec = 2
+        logging.warning("the first one makes a handler for what is standard error at that moment")
+        logging.disable()
+        gc.set_threshold(1)
+        gc.callbacks.append(lambda *_: None)
+        sys.excepthook = sys.displayhook = print
+        sys.setswitchinterval(1.0)
+        socket.setdefaulttimeout(0.001)
+        threading.settrace(lambda *_: None)
         return 2 * v
 
     before, filters = read(), list(warnings.filters)

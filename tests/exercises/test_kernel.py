@@ -16,6 +16,11 @@ CELLS = [
     "ex.distance(1.0)\nNone",
     "ex.predict('edges')",
     "print(invert(np.eye(4)).shape)",
+    "import matplotlib.pyplot as plt\nplt.get_fignums()",
+    "@ex.invert\ndef invert(T):\n    plt.rcParams['font.size'] = 40\n    plt.plot([1, 2])\n    plt.show()\n"
+    "    plt.figure()\n    display(T)\n"
+    "    get_ipython().events.register('post_run_cell', lambda _: 1 / 0)\n    return T",
+    "print(plt.get_fignums(), plt.rcParams['font.size'])",
 ]
 
 
@@ -48,6 +53,8 @@ def text_of(outputs):
         (7, "✗ distance: not yet"),
         (9, "[predict first: "),
         (10, "(4, 4)"),
+        (12, "your code printed:\n<Figure size 640x480 with 1 Axes>\narray("),
+        (13, "[] 10.0"),
     ],
 )
 def test_every_cell_answers_and_the_kernel_lives(outputs, cell, words):
@@ -57,3 +64,7 @@ def test_every_cell_answers_and_the_kernel_lives(outputs, cell, words):
 def test_a_value_in_the_last_line_shows_feedback_once_and_no_number(outputs):
     assert outputs[7] == outputs[8]
     assert outputs[7].count("distance: not yet") == 1
+
+
+def test_what_a_function_shows_does_not_appear_once_for_every_draw(outputs):
+    assert outputs[12].count("<Figure") == 1 and "ZeroDivisionError" not in outputs[12] + outputs[13]

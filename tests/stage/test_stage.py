@@ -7,6 +7,7 @@ import threading
 from pathlib import Path
 from types import SimpleNamespace
 
+import matplotlib
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -267,6 +268,12 @@ def test_a_small_picture_shows_the_rings_of_the_handles():
 def test_png_holds_the_pixels():
     pixels = np.random.default_rng(0).integers(0, 256, (7, 5, 4), dtype=np.uint8)
     assert (np.asarray(Image.open(io.BytesIO(canvas.encode_png(pixels)))) == pixels).all()
+
+
+def test_what_a_reader_has_set_for_figures_of_their_own_changes_nothing():
+    before = stages.bells().png()
+    with matplotlib.rc_context({"text.usetex": True, "font.size": 40, "axes.facecolor": "k", "lines.linewidth": 9}):
+        assert stages.bells().png() == before
 
 
 # -- the browser's messages
