@@ -4,15 +4,22 @@ import contextlib
 import os
 import re
 import shutil
+import signal
 import socket
 import subprocess
 import time
 import urllib.request
 
+import lab
 from labkit.exercises import source
 
 ROOT = source.ROOT
 PLACE, PASSWORD = "/opt/labkit", "choose-one"
+SECONDS = 300  # for all that is installed: half a minute where nothing else runs and the registries are near
+AWAY = (*lab.OFFLINE, "No matching distribution", "not found in the package registry", "error sending request")
+AWAY += ("Failed to fetch", "dns error", "ENOTFOUND", "EAI_AGAIN", "ECONNREFUSED", "ECONNRESET", "ETIMEDOUT", "E404")
+IMPATIENT = {"PIP_RETRIES": "1", "PIP_DEFAULT_TIMEOUT": "20", "UV_HTTP_TIMEOUT": "20", "UV_HTTP_RETRIES": "1"}
+IMPATIENT |= {"npm_config_fetch_retries": "1", "npm_config_fetch_timeout": "20000"}
 
 
 def commands():
@@ -23,19 +30,48 @@ def commands():
 
 def what_is_missing():
     """Why the commands cannot be run here, or an empty text."""
+    if os.name == "nt":
+        return "JupyterHub does not run on Windows"
     missing = [name for name in ("bash", "npm", "node") if not shutil.which(name)]
     return f"{' and '.join(missing)} not found: JupyterHub's proxy needs it" if missing else ""
 
 
-def set_up(place):
-    """Run all commands but the last, installing into `place`; returns a reason why that was impossible, or nothing."""
+def set_up(place, seconds=SECONDS):
+    """Run all commands but the last, installing into `place`; returns why no registry answers here, or an empty text.
+
+    Raises
+    ------
+    RuntimeError
+        When a command fails otherwise, with what it said.
+    """
+    until = time.monotonic() + seconds
     for line in commands()[:-1]:
-        done = subprocess.run(
-            ["bash", "-c", line.replace(PLACE, str(place))], cwd=ROOT, capture_output=True, text=True, errors="replace"
+        process = subprocess.Popen(
+            ["bash", "-c", line.replace(PLACE, str(place))],
+            cwd=ROOT,
+            env={**os.environ, **IMPATIENT},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            encoding="utf-8",
+            errors="replace",
+            start_new_session=True,
         )
-        if done.returncode:
-            return f"{line}: {' '.join((done.stdout + done.stderr).split())[-400:]}"
+        try:
+            said, _ = process.communicate(timeout=until - time.monotonic())
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+            return f"the registries are too slow: {seconds} s did not take `{line}` to its end"
+        if process.returncode and is_away(said):
+            return f"no registry answers `{line}`: {' '.join(said.split())[-300:]}"
+        if process.returncode:
+            raise RuntimeError(f"{line}:\n{said[-2000:]}")
     return ""
+
+
+def is_away(said):
+    """Whether pip, uv or npm say that a registry cannot be reached, or does not have what is asked for."""
+    return any(word in said for word in AWAY)
 
 
 @contextlib.contextmanager
@@ -67,7 +103,7 @@ def running(place):
             process.kill()
 
 
-def wait_for(process, address, log, seconds=60):
+def wait_for(process, address, log, seconds=120):
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline and process.poll() is None:
         with contextlib.suppress(OSError), urllib.request.urlopen(f"{address}/hub/login", timeout=5):

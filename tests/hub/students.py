@@ -13,7 +13,7 @@ import requests
 import websocket
 
 LOOK = {"width": 900, "height": 700, "ratio": 1, "dark": False, "letters": 1}  # the room a page gives a figure
-SECONDS = 90
+SECONDS = 300  # for whatever is waited for: other tests may hold the processors meanwhile
 ASIDE = ("Hint", "Solution", "Start over", "Lock in")  # buttons that are no choice of a prediction
 
 
