@@ -263,12 +263,12 @@ def _stacked(values):
 def numeric(value):
     """A value as an array of numbers that is kept; None for anything else, and for what cannot be read."""
     try:
-        return _read(value)
+        return _as_numbers(value)
     except Exception:  # whatever a student's own kind of number does; a whole number too large for a float
         return None
 
 
-def _read(value):
+def _as_numbers(value):
     if isinstance(value, bool | np.bool_ | int | float | np.number):
         return np.asarray(value, dtype=float)
     if isinstance(value, list | tuple) and 0 < len(value) <= ENTRIES and type(value) in (list, tuple):
