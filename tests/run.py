@@ -31,6 +31,7 @@ SECONDS_A_JOB = 900
 UNITS = 5  # jobs of unit tests beside the longest: none is left alone on one processor at the end
 LONGEST = ROOT / "tests" / "chapters" / "test_exercises.py"  # a job of its own, begun among the first
 APART = ("browser", "hub")  # folders of tests that are jobs of their own
+WAITING = "hub"  # which waits for registries and servers most of its time: it takes no other job's place
 BARE = ("-pno:hypothesispytest",)  # notebooks need none, and its import costs as much as a small kernel
 COUNTED = ("passed", "failed", "error", "skipped", "xfailed")
 
@@ -48,8 +49,12 @@ def main(arguments):
         seeds = stirred_jobs(jobs, seed)
         jobs = {name: words for name, words in jobs.items() if seed is None or name in seeds}
         total = dict.fromkeys(COUNTED, 0)
-        with ThreadPoolExecutor(2 + max(2, os.cpu_count() or 2) if len(jobs) > 1 else 1) as pool:
-            running = {pool.submit(run, words, seeds.get(name)): name for name, words in jobs.items()}
+        places = 2 + max(2, os.cpu_count() or 2) if len(jobs) > 1 else 1
+        with ThreadPoolExecutor(places) as pool, ThreadPoolExecutor(1) as beside:
+            running = {
+                (beside if name == WAITING else pool).submit(run, words, seeds.get(name)): name
+                for name, words in jobs.items()
+            }
             for job in as_completed(running):
                 counts, output, seconds = job.result()
                 report(running[job], counts, output, seconds)

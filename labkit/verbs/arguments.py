@@ -55,6 +55,8 @@ def run(work, arguments=None):
         return _refuse("\n".join(" ".join(line.split()) for line in str(reason).splitlines()))
     except MemoryError:
         return _refuse("The data are too large for this machine's memory.")
+    except RecursionError:
+        return _refuse("The data are nested too deeply to be read.")
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # whoever read has seen enough
         return 1
@@ -84,7 +86,7 @@ def named(path):
     try:
         yield
     except OSError as error:
-        error.filename = error.filename or str(path)
+        error.filename = error.filename2 or error.filename or str(path)  # of two, that which is to be written
         raise
 
 

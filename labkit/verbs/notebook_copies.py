@@ -53,7 +53,7 @@ def update(folder):
     for name, text in fresh.items():
         try:
             sentence = _bring(folder / name, text, given.get(name, {}))
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             said.append(f"{name} cannot be read as a notebook and is left as it is")
             continue
         brought[name] = text
@@ -152,7 +152,7 @@ def _read(path):
 def _given(folder):
     try:
         found = _read(folder / GIVEN)
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return {}
     return found if isinstance(found, dict) else {}
 

@@ -56,6 +56,14 @@ def test_other_ends(capsys):
     assert arguments.run(raising(KeyboardInterrupt()), []) == 130
     assert arguments.run(lambda words: 7 if words == ["a"] else None, ["a"]) == 7
     assert capsys.readouterr().err.startswith("so\nand so\n")
+    assert arguments.run(raising(RecursionError()), []) == 1
+    assert capsys.readouterr().err == "The data are nested too deeply to be read.\n"
+
+
+def test_of_a_file_that_cannot_be_put_in_place_its_own_name_is_told(tmp_path, capsys):
+    (tmp_path / "a.ipynb").mkdir()
+    assert arguments.run(lambda words: notebook_copies.write(tmp_path / "a.ipynb", ""), []) == 1
+    assert capsys.readouterr().err.startswith(str(tmp_path / "a.ipynb") + ": ")
 
 
 def test_every_verb_has_its_module_and_its_line_of_help(capsys):

@@ -103,7 +103,7 @@ def test_half_of_a_letter_in_a_cell_of_ones_own_is_kept(folder):
 
 def test_update_leaves_what_it_cannot_read_and_tries_again_the_next_time(folder):
     whole = (folder / "01_a.ipynb").read_text(encoding="utf-8")
-    for broken in ('{"cells": [', "[]", '{"cells": [{"id": 1}]}'):
+    for broken in ('{"cells": [', "[]", '{"cells": [{"id": 1}]}', "[" * 100_000):
         (folder / "01_a.ipynb").write_text(broken, encoding="utf-8")
         assert notebook_copies.update(folder) == ["01_a.ipynb cannot be read as a notebook and is left as it is"]
         assert (folder / "01_a.ipynb").read_text(encoding="utf-8") == broken
