@@ -1,6 +1,7 @@
 """Chapter 4: gradient, Hessian, and the steps of Newton, Gauss-Newton and the trust region."""
 
 import functools
+import math
 
 import numpy as np
 
@@ -47,7 +48,7 @@ def turned(eigenvalues, angle):
 
 def classify_extremum(g, H):
     """Kind of a point by the rule that the notebook states: |g| against 1e-6, then the eigenvalues of H."""
-    if np.linalg.norm(g) > 1e-6:
+    if math.hypot(*g) > 1e-6:  # to the last bit, on any processor
         return "not stationary"
     return _by(np.linalg.eigvalsh)(H)
 
