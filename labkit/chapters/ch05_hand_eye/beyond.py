@@ -505,7 +505,7 @@ CAD_LENGTH = Value(
         ),
         Mistake(
             lambda: length_with("scanner_start", change=lambda T: np.eye(4)),
-            "The scanner's pose is missing: the marks are seen in its frame, `cad` takes them to the flange.",
+            "This comes out where the scanner's pose is missing, or comes after the robot's, where it changes no length. The marks are seen in its frame: first `cad` takes them to the flange.",
             id="length-no-scanner",
         ),
         Mistake(

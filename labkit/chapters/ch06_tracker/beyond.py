@@ -61,6 +61,13 @@ def _unit_mean(signs):
     return variant
 
 
+def _beside_the_neighbor(q):
+    """Each reading made alike with the one before, as that one came."""
+    signs = np.append(1.0, np.where((q[1:] * q[:-1]).sum(axis=1) > 0, 1.0, -1.0))
+    mean = (signs[:, None] * q).mean(axis=0)
+    return mean / np.linalg.norm(mean)
+
+
 STOPS = [
     Exercise(
         "mean_quaternion",
@@ -92,6 +99,12 @@ STOPS = [
                 "You averaged rotation vectors. Near a half turn two that are nearly one rotation point in opposite directions; and the mean is not "
                 "quite that of the rotations elsewhere.",
                 id="mean_quaternion-vectors",
+            ),
+            Mistake(
+                _beside_the_neighbor,
+                "Each reading is turned to the side of the one before, as that one came. If that was turned itself, this one lands on the "
+                "other side: compare all with one reading.",
+                id="mean_quaternion-neighbor",
             ),
             Mistake(
                 lambda q: q.mean(axis=0),
@@ -696,6 +709,11 @@ CELL = [
                 lambda W, E0, E1, P: E1 @ invert(E0) @ P,
                 "The readings are given in W, the part in B: the motion must be carried over by T_BW, before and after.",
                 id="moved_part-world",
+            ),
+            Mistake(
+                lambda W, E0, E1, P: W @ E1 @ E0.T @ W.T @ P,
+                "The transpose of a transform is not its inverse, only that of its rotation is: take `np.linalg.inv`.",
+                id="moved_part-transposed",
             ),
             Mistake(
                 lambda W, E0, E1, P: W @ E1 @ invert(E0) @ P,

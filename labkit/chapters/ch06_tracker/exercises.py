@@ -114,6 +114,12 @@ def joint_angles(rng):
     return dh, rng.uniform(TX40.q_min, TX40.q_max)
 
 
+def joints_at_rest(rng):
+    """The same with half of the joints at 0."""
+    dh, q = joint_angles(rng)
+    return dh, q * rng.permutation([0, 0, 0, 1, 1, 1])
+
+
 def _links(dh, q):
     return dh_matrix(q + dh[:, 0], dh[:, 1], dh[:, 2], dh[:, 3])
 
@@ -146,6 +152,14 @@ def motions(rng, n=None, std_deg=0.3, std_mm=1.0, R=None):
     A = pose(exp_so3(axes), rng.uniform(-200, 200, (n, 3)))
     noise = pose(exp_so3(np.deg2rad(std_deg) * rng.normal(size=(n, 3))), std_mm * rng.normal(size=(n, 3)))
     return A, invert(X) @ A @ X @ noise
+
+
+def motions_about_axes_alike(rng):
+    """Exact motions whose axes lie within a few degrees of one another, and the rotation of the mounting."""
+    n, X = int(rng.integers(10, 15)), pose(exp_so3(rng.normal(size=3)), rng.uniform(-80, 80, 3))
+    axes = exp_so3(rng.normal(size=3)) @ unit_vector(np.c_[rng.uniform(-0.06, 0.06, (n, 2)), np.ones(n)]).T
+    A = pose(exp_so3(rng.uniform(0.5, 1.2, (n, 1)) * axes.T), rng.uniform(-200, 200, (n, 3)))
+    return A, invert(X) @ A @ X, X[:3, :3].copy()
 
 
 def one_motion(rng):
@@ -240,6 +254,18 @@ def stacks(rng, n=None):
     X = exp_so3(rng.normal(size=3))
     B = X.T @ A @ X @ exp_so3(0.003 * rng.normal(size=(n, 3)))
     return (ax_xb.kronecker_matrix(A, B),)
+
+
+def stacks_of_axes_alike(rng):
+    A, B, _ = motions_about_axes_alike(rng)
+    return (ax_xb.kronecker_matrix(A, B),)
+
+
+def stacks_of_one_axis(rng):
+    """Blocks of exact motions about one axis, so that a second mounting fits as well."""
+    axis, X = unit_vector(rng.normal(size=3)), exp_so3(rng.normal(size=3))
+    A = exp_so3(rng.uniform(0.2, 2.0, (int(rng.integers(3, 9)), 1)) * axis)
+    return (ax_xb.kronecker_matrix(A, X.T @ A @ X),)
 
 
 def translation_problem(rng, n=None):
@@ -733,6 +759,7 @@ CHAPTER = Chapter(
             draw=joint_angles,
             fixed={"dh": "six joints, four parameters each", "q": "six joints"},
             metric=metrics.Poses(1e-6, 1e-6),
+            noisy=(joints_at_rest, metrics.Poses(1e-6, 1e-6), "right, but not where joints stand at 0:"),
             hints=(
                 "Each link's frame is given in the frame before it, so neighboring letters cancel from the base to the flange.",
                 "T_BF = T_01 T_12 ... T_56, and the angle of a link is its offset plus the joint's angle.",
@@ -1015,6 +1042,18 @@ CHAPTER = Chapter(
             reference=singular_value_ratio,
             draw=(stacks, functools.partial(stacks, n=2)),
             metric=metrics.Numbers(1e-9),
+            noisy=(
+                (
+                    stacks_of_axes_alike,
+                    metrics.Numbers(1e-9),
+                    "right where the axes differ, but not where they lie within a few degrees of one another, and the ratio is small:",
+                ),
+                (
+                    stacks_of_one_axis,
+                    metrics.Numbers(1e-7),  # a root of what rounding leaves of 0 is as right
+                    "right where the axes differ, but not where all motions turn about one axis, and the ratio is 0:",
+                ),
+            ),
             hints=(
                 "The smallest singular value belongs to the answer itself, the null vector. Which one says how nearly there is a second answer?",
                 "`np.linalg.svd` gives the singular values largest first; `[-2]` is the second smallest.",
@@ -1078,6 +1117,11 @@ CHAPTER = Chapter(
             draw=tuple(functools.partial(translation_problem, n=n) for n in (None, 3, 25)),
             fixed={"R": "a rotation is always 3 x 3"},
             metric=metrics.Numbers(1e-7, "mm"),
+            noisy=(
+                motions_about_axes_alike,
+                metrics.Numbers(1e-6, "mm"),
+                "right where the axes differ, but not where they lie within a few degrees of one another:",
+            ),
             hints=(
                 "Write out the last column of A X = X B. It is linear in the translation t once R is known.",
                 "R_A t + t_A = R t_B + t, so (I - R_A) t = t_A - R t_B: three rows per motion, stacked.",
@@ -1127,7 +1171,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda A, B, R: np.linalg.solve(_k1(A).mean(axis=0), _k2(A, B, R).mean(axis=0)),
-                    "You averaged the equations of all motions into three. Least squares keeps all 3 N rows, one under the other.",
+                    "The equations of all motions are added up into three, or averaged. Least squares keeps all 3 N rows, one under the other.",
                     id="translation_lsq-averaged",
                 ),
                 Mistake(
