@@ -558,7 +558,7 @@ class _Trial:
         for k, name in enumerate(names):
             least = LIKE_CHANCE if self._is_choice() else 2
             if self._makes_no_difference(k, draws) and self._makes_no_difference(k, draws + self._fresh_results, least):
-                return f"your result does not change with `{name}`, and it should"
+                return f"your result did not change with `{name}` on any draw of this check, and it should"
         return None
 
     def _exchanges(self, k, draws):

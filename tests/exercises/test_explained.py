@@ -200,7 +200,7 @@ def _draw(rng):
 
 def test_an_argument_without_effect_is_named():
     item = exercise(lambda x, std: x / std + np.sin(x), _draw)
-    assert "does not change with `std`" in told(item, "return x / (1.7 + std**0 - 1) + np.sin(x)")
+    assert "did not change with `std`" in told(item, "return x / (1.7 + std**0 - 1) + np.sin(x)")
     assert "never uses `std`" in told(item, "return x / 1.7 + np.sin(x)")
     assert "never uses `std`" in told(item, "return 0 * x"), "what is not read is told before what comes to nothing"
 
