@@ -765,3 +765,10 @@ def test_a_text_to_read_holds_every_sort_of_line(seed):
         (text,) = draw(rng)
         assert re.search(r"(^|\s)-?\d+(\s|#|$)", text) and "\t" in text and re.search(r"^ +$", text, re.MULTILINE)
         assert ("#" not in text) or re.search(r"\d# again", text)
+
+
+def test_a_variance_about_the_mean_is_no_sum_of_squares():
+    def about_mean(A, residuals):
+        return np.var(residuals, ddof=6) * np.linalg.inv(A.T @ A)
+
+    assert judged("pivot_covariance", about_mean).status == NOT_YET

@@ -374,3 +374,27 @@ def test_limits_and_centers_are_met_in_every_check(name, answer, seed, monkeypat
     monkeypatch.setattr(engine, "LOOKING", 0.0)  # what is told is not asked here
     with np.errstate(invalid="ignore"):
         assert judged(name, answer, seed).status != CORRECT
+
+
+@pytest.mark.parametrize("which", ["newton", "corner"])
+def test_a_square_about_the_origin_is_no_trust_region(which):
+    def inside(step, radius, of):
+        return np.abs(step).max() <= radius if of == which else np.linalg.norm(step) <= radius
+
+    def by_entries(g, B, radius):
+        newton, corner = opt.newton_step(g, B), opt.cauchy_step(g, B, 1e9)
+        if inside(newton, radius, "newton"):
+            return newton
+        if not inside(corner, radius, "corner"):
+            return -radius * g / np.linalg.norm(g)
+        leg = newton - corner
+        a, b, c = leg @ leg, corner @ leg, corner @ corner - radius**2
+        return corner + (-b + np.sqrt(max(b * b - a * c, 0.0))) / a * leg
+
+    assert judged("dogleg_step", by_entries).status == NOT_YET
+
+
+def test_doubling_from_one_half_on_is_not_told_of_one_quarter():
+    half = beyond.loop(follow=lambda *given: beyond.rule(*given, good=0.5))
+    told = {judged("trust_region", half, seed).text for seed in range(3)}
+    assert "" not in told and not any("not poor" in text for text in told)

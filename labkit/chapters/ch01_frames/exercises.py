@@ -1344,6 +1344,11 @@ CHAPTER = Chapter(
                     "The sign belongs to the last column, that of the smallest singular value: there it costs least.",
                 ),
                 Mistake(
+                    _kabsch(handed=lambda U, V: np.diag([1, 1, np.linalg.det(V @ U.T)]) @ V @ U.T),
+                    "You turned the last row of V Uᵀ. Where it is a mirror image, the last column of V changes its sign, before Uᵀ is multiplied.",
+                    id="fit_frame-last-row",
+                ),
+                Mistake(
                     _kabsch(handed=lambda U, V: V @ U.T * np.sign(np.linalg.det(V @ U.T))),
                     "The sign belongs to the last column alone: minus a mirror image is another rotation.",
                 ),

@@ -69,6 +69,12 @@ def matrix_and_residuals(rng):
     return pivot.pivot_matrix(T), pivot.calibrate_pivot(T).residuals
 
 
+def matrix_and_other_residuals(rng):
+    """The same with the residuals of a solution that was rounded: they do not add up to 0."""
+    A, residuals = matrix_and_residuals(rng)
+    return A, residuals + rng.uniform(0.1, 0.3, 3)
+
+
 def near_first(rng, count):
     """Distances, one of them far below the scale and some beyond the cutoff, and a scale; the nearest leads."""
     scale = rng.choice([rng.uniform(0.1, 0.6), rng.uniform(1.5, 3)])
@@ -543,6 +549,11 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(
+                    lambda T, tip, point: pivot.pivot_residuals(T, tip, point).reshape(3, -1).T,
+                    "The numbers are right and stand in wrong places: pose after pose, three in a row, is `.reshape(-1, 3)`.",
+                    id="pivot_residuals-places",
+                ),
+                Mistake(
                     lambda T, tip, point: point - pivot.pivot_residuals(T, tip, np.zeros(3)),
                     "The sign is reversed: where the tip is, minus where it should be.",
                 ),
@@ -734,6 +745,11 @@ CHAPTER = Chapter(
             reference=pivot.pivot_covariance,
             draw=matrix_and_residuals,
             metric=metrics.Numbers(1e-6, "mm^2"),
+            noisy=(
+                matrix_and_other_residuals,
+                metrics.Numbers(1e-6, "mm^2"),
+                "Right where the residuals add up to 0, as those of least squares do. Where they do not, as those of rounded numbers:",
+            ),
             hints=(
                 "Noise in b goes through the solution x = (AᵀA)⁻¹ Aᵀb. What does it do to x?",
                 "cov = std² (AᵀA)⁻¹, with the unbiased std² = rᵀr / (3n - 6).",
@@ -915,7 +931,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _weights(lambda q: np.where(q > 1, (1 - q**2) ** 2, 0.0)),
-                    "The two branches have changed places: 0 belongs beyond the cutoff, where q > 1.",
+                    "Your weights are 0 within the cutoff and grow beyond it. The other way round: 0 belongs beyond it, where q > 1.",
+                    id="robust_weights-2b7532",
+                ),
+                Mistake(
+                    _weights(lambda q: (1 - np.maximum(1 - q**2, 0) ** 3) / 6),
+                    "This is Tukey's loss, which grows with the distance. Its weight falls: (1 - q^2)^2, and 0 beyond the cutoff.",
+                    id="robust_weights-loss",
                 ),
                 Mistake(
                     _weights(lambda q: 1 - np.maximum(1 - q**2, 0) ** 2),

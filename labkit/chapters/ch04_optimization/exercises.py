@@ -182,6 +182,22 @@ DOGLEG_CASES = tuple(
 )
 
 
+def beside_the_rim(rng, step):
+    """A dogleg whose Newton point, or corner, lies on a diagonal, outside the circle and inside the square about it."""
+    while True:
+        g, B, _ = dogleg_case(rng, (0.2, 0.8), (15, 40))
+        x, y = step(g, B)
+        turn = rng.integers(4) * np.pi / 2 + np.pi / 4 - np.arctan2(y, x)
+        Q = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+        g, B, radius = Q @ g, Q @ B @ Q.T, float(rng.uniform(0.75, 0.95) * np.hypot(x, y))
+        if step is not opt.newton_step or np.linalg.norm(opt.cauchy_step(g, B, 1e9)) < 0.9 * radius:
+            return g, B, radius
+
+
+BESIDE_THE_RIM = (
+    (opt.newton_step, "right, but not where the Newton point lies outside the radius by little:"),
+    (lambda g, B: opt.cauchy_step(g, B, 1e9), "right, but not where the corner lies outside the radius by little:"),
+)
 ITERATE = metrics.Several(metrics.Numbers(1e-7), metrics.Numbers(1e-7), names=("x", "radius"))
 
 
@@ -781,7 +797,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _stationary(_by(lambda H: (lambda e: np.where(abs(e) < 1e-6, 0.0, e))(np.linalg.eigvalsh(H)))),
-                    "Eigenvalues below 1e-6 or so count as 0 here. None is 0, however faintly f bends: the sign of each tells.",
+                    "Small eigenvalues count as 0 here. None is 0, however faintly f bends: the sign of each tells.",
                     id="kind-eigenvalues-cut-off",
                 ),
                 Mistake(
@@ -1227,6 +1243,11 @@ CHAPTER = Chapter(
                     id="damped-gradient",
                 ),
                 Mistake(
+                    lambda r, J, damping: -J.T @ r / (1 + damping),
+                    "That is the gradient of the cost, downhill, over 1 + λ; the curvature JᵀJ is missing.",
+                    id="damped-gradient-shortened",
+                ),
+                Mistake(
                     lambda r, J, damping: -(J.T @ J + damping * np.eye(J.shape[1])) @ J.T @ r,
                     "You multiplied by JᵀJ + λ I instead of solving with it.",
                     id="damped-times",
@@ -1422,6 +1443,10 @@ CHAPTER = Chapter(
             noisy=[
                 (functools.partial(straight_path, share=share), metrics.Numbers(1e-8), f"right, but not where {words}:")
                 for share, words in ((0.6, "B is alike in all directions"), (1.4, "B is alike in all directions"))
+            ]
+            + [
+                (functools.partial(beside_the_rim, step=step), metrics.Numbers(1e-8), words)
+                for step, words in BESIDE_THE_RIM
             ],
             properties=(right_for_whole_numbers(opt.dogleg_step, metrics.Numbers(1e-6), DOGLEG_CASES[1], 0),),
             draws=12,
@@ -1707,7 +1732,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     beyond.loop(follow=functools.partial(beyond.rule, good=beyond.POOR)),
-                    "Your radius doubles after every step to the rim that is not poor. Between ¼ and ¾ it stays.",
+                    "Your radius doubles also after steps to the rim whose ρ is below ¾. Between ¼ and ¾ it stays.",
                     id="trust-rim-alone",
                 ),
                 Mistake(
