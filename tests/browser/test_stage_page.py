@@ -282,6 +282,39 @@ def test_of_a_closed_body_its_outside_alone_is_drawn_mirrored_or_not():
         assert page.complaints == []
 
 
+WRITTEN = """() => {
+    const pen = CanvasRenderingContext2D.prototype;
+    const { fillText } = pen;
+    const boxes = [];
+    pen.fillText = function (text, x, y) {
+        const { actualBoundingBoxLeft: l, actualBoundingBoxRight: r, actualBoundingBoxAscent: u, actualBoundingBoxDescent: d } = this.measureText(text);
+        boxes.push([x - l, y - u, x + r, y + d]);
+    };
+    dispatchEvent(new Event("beforeprint")); // draws it once more
+    pen.fillText = fillText;
+    return [boxes, document.querySelector("canvas.space").clientWidth];
+}"""  # noqa: E501
+
+
+def test_words_of_a_scene_stay_whole_and_scale_and_base_frame_stand_above_them():
+    def scene(fig):
+        space = Scene(fig.subplots(), radius=3, unit="mm")
+        names = [space.fixed(space.text("a name of several words"), (0, y, -2.8)) for y in (-2.9, 2.9)]
+        return space.artists, lambda state, result: space.draw(state["view"]) or names
+
+    stage = Stage(
+        "names", scene=scene, compute=dict, fail={"on": True}, controls={"on": Toggle(False)}, view=View(0, 0)
+    )
+    with stage_page(False, 420, 500, 1) as (page, bridge):
+        bridge.show(page, stage)
+        boxes, width = page.evaluate(WRITTEN)
+    left, top, right, bottom = np.transpose(boxes)
+    assert len(boxes) == 5 and left.min() >= 0 and right.max() <= width  # both names, the scale, y and z of the base
+    across = np.minimum(right[:, None], right) - np.maximum(left[:, None], left)
+    along = np.minimum(bottom[:, None], bottom) - np.maximum(top[:, None], top)
+    assert not (np.triu(np.minimum(across, along), 1) > 0).any()
+
+
 SPACE_OF_THE_PAGE = "globalThis[Symbol.for('labkit.space')]"
 
 

@@ -410,12 +410,22 @@ class Scene {
     };
     const pen = {
       shrunk, halo: `${this.colors.paper[dark]}c0`, ink: this.colors.muted[dark],
-      write: (text, x, y, { color, bold = false, scale = 1, align = "center", baseline = "middle" }) => {
+      taken: [], // boxes of words: left, top, right, bottom
+      write: (text, x, y, { color, bold = false, scale = 1, align = "center", baseline = "middle", whole = false }) => {
         paper.font = `${bold ? "bold " : ""}${(scale * size).toFixed(1)}px ${style.fontFamily}`;
         Object.assign(paper, { textAlign: align, textBaseline: baseline, lineWidth: 3, strokeStyle: pen.halo, fillStyle: color, lineJoin: "round" });
-        for (const [k, row] of text.split("\n").entries()) {
-          paper.strokeText(row, x, y + k * 1.25 * scale * size);
-          paper.fillText(row, x, y + k * 1.25 * scale * size);
+        const rows = text.split("\n");
+        const line = 1.25 * scale * size;
+        if (whole && x > -size && x < width + size) { // what they name is in sight: no letter leaves the picture
+          const wide = Math.max(...rows.map((row) => paper.measureText(row).width));
+          const left = x - SHARES[align] * wide;
+          const top = y - SHARES[baseline] * line;
+          x += clip(left, 2, Math.max(2, width - 2 - wide)) - left;
+          pen.taken.push([x - SHARES[align] * wide, top, x + (1 - SHARES[align]) * wide, top + rows.length * line]);
+        }
+        for (const [k, row] of rows.entries()) {
+          paper.strokeText(row, x, y + k * line);
+          paper.fillText(row, x, y + k * line);
         }
       },
     };
@@ -429,7 +439,8 @@ class Scene {
     const { paper } = this;
     let length = 10 ** Math.floor(Math.log10(0.25 * width / pixels));
     length *= [5, 2, 1].find((m) => m * length * pixels <= 0.25 * width) ?? 1;
-    const [x, y] = [width - 10, height - 8];
+    const x = width - 10;
+    const y = lowest(pen.taken, x - length * pixels, x, height - 8, 1.4 * size);
     paper.strokeStyle = pen.ink;
     paper.lineWidth = 1.5;
     paper.beginPath();
@@ -444,7 +455,7 @@ class Scene {
   writeBase(pen, height, size) {
     const { paper } = this;
     const axes = this.view.axes();
-    const [x, y, length] = [1.9 * size, height - 1.9 * size, 1.35 * size];
+    const [x, y, length] = [1.9 * size, lowest(pen.taken, 0, 3.8 * size, height, 3.8 * size) - 1.9 * size, 1.35 * size];
     const colors = this.colors.axes.map((pair) => pair[Number(this.view.dark)]);
     const order = [0, 1, 2].sort((a, b) => axes[2][a] - axes[2][b]);
     for (const k of order) {
@@ -465,6 +476,12 @@ class Scene {
     if (this.age === renderer?.age) for (const made of Object.values(this.given)) renderer.free(made);
     this.canvas.remove();
   }
+}
+
+/** How low, from `bottom` up, something so high can stand between left and right without lying on words. */
+function lowest(taken, left, right, bottom, high) {
+  const isFree = (y) => taken.every((box) => box[2] < left || box[0] > right || box[3] < y - high || box[1] > y);
+  return [0, 1, 2, 3, 4].map((k) => bottom - 0.6 * k * high).find(isFree) ?? bottom;
 }
 
 const CORNERS = [[0, -1], [1, -1], [0, 1], [1, 1]]; // of a piece of a line: along it, and to its side
@@ -535,6 +552,9 @@ class Path {
 /** matplotlib's vertical alignment as a canvas names it. */
 const BASELINES = { center: "middle", top: "top", bottom: "bottom", baseline: "alphabetic" };
 
+/** How much of a line lies left of where it is set, and above. */
+const SHARES = { left: 0, center: 0.5, right: 1, top: 0, middle: 0.5, alphabetic: 0.8, bottom: 1 };
+
 class Words {
   constructor({ offset, align, baseline, bold, size, color }) {
     Object.assign(this, { offset, align, baseline: BASELINES[baseline], bold, size, color, shown: false });
@@ -547,7 +567,7 @@ class Words {
   write(pen, at, dark) {
     const [x, y] = at(this.point);
     if (!Number.isFinite(x)) return;
-    pen.write(this.words, x + pen.shrunk * this.offset[0], y - pen.shrunk * this.offset[1], { color: this.color[Number(dark)], bold: this.bold, scale: this.size, align: this.align, baseline: this.baseline });
+    pen.write(this.words, x + pen.shrunk * this.offset[0], y - pen.shrunk * this.offset[1], { color: this.color[Number(dark)], bold: this.bold, scale: this.size, align: this.align, baseline: this.baseline, whole: true });
   }
 }
 
