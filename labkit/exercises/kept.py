@@ -35,16 +35,6 @@ ENCODED = getattr(os.environ, "_data", os.environ)  # as the system holds it: to
 _kill = os.kill  # student code finds another one in its place
 
 
-class MersenneTwister(ctypes.Structure):
-    """What NumPy's own random generator remembers: too long to be read at every call as `get_state` does, in 80 us."""
-
-    _fields_ = [("key", ctypes.c_uint32 * 624), ("pos", ctypes.c_int)]
-
-
-GENERATOR = np.random.get_bit_generator()
-BITS = GENERATOR.ctypes.state_address
-
-
 def working_folder():
     """The working directory, or None where it has been deleted."""
     try:
@@ -69,15 +59,6 @@ def _set_environment(before):
         os.environ.update(values)
         if hasattr(time, "tzset"):
             time.tzset()
-
-
-def _random_bits():
-    """The state of NumPy's own generator, but for a second normal number it may have ready."""
-    return ctypes.string_at(BITS, ctypes.sizeof(MersenneTwister))
-
-
-def _set_random_bits(before):
-    ctypes.memmove(BITS, before, len(before))
 
 
 def _set_print_options(before):
@@ -180,7 +161,7 @@ def _let_it_begin(thread):
 
 
 STATE = [  # (how to read it, how to put it back)
-    (_random_bits, _set_random_bits),
+    (np.random.get_state, np.random.set_state),
     (random.getstate, random.setstate),
     (np.geterr, lambda values: np.seterr(**values)),
     (np.geterrcall, _set_error_call),
