@@ -3,16 +3,19 @@
 
 The hole goes through the chain as a point, T_BW T_WE1 T_WE0^-1 T_BW^-1 T_BP0 hole, and each error enters where the
 point has come to: before a turn by phi it stands at v, behind it at R (v + phi x v). Cells and jobs are taken as sound,
-one at a time, and three marks on a line are not refused.
+one at a time, and three marks on a line are not refused; what is neither is.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
+from ..checks import as_choice, as_instance, as_shape
 from ..geometry.lie import _exp_so3, _skew
+from ..machines.cell import Cell, Job
 
 _I3 = np.eye(3)
+_SIZES = {"tip": 3, "scanner": 6, "tracker": 6, "marks": 9, "first reading": 6, "second reading": 6}
 _TURNED = {"scanner": "T_FS", "tracker": "T_BW", "first reading": "T_WE0", "second reading": "T_WE1"}
 
 
@@ -30,9 +33,15 @@ def with_errors(cell, job, errors):
     -------
     cell : Cell
     job : Job
+
+    Raises
+    ------
+    ValueError
+        A source that there is not, an error of another shape.
     """
+    _refuse(cell, job)
     of_cell, of_job = {}, {}
-    for name, error in errors.items():
+    for name, error in _as_errors(errors).items():
         if name == "tip":
             of_cell["tip"] = cell.tip + error
         elif name == "marks":
@@ -48,6 +57,7 @@ def with_errors(cell, job, errors):
 
 def learned_pose(cell, job):
     """T_BP0, the frame through the marks, shape (4, 4): `labkit.machines.cell.learned_pose`."""
+    _refuse(cell, job)
     T = np.zeros((4, 4))
     T[:3, :3], T[:3, 3], T[3, 3] = _axes(marks := _marks(cell, job)), marks[0], 1.0
     return T
@@ -55,15 +65,28 @@ def learned_pose(cell, job):
 
 def part_pose(cell, job):
     """T_BP, where the part is now, shape (4, 4): `labkit.machines.cell.part_pose`."""
+    _refuse(cell, job)
     return cell.T_BW @ job.T_WE1 @ _inverse(cell.T_BW @ job.T_WE0) @ learned_pose(cell, job)
 
 
 def flange_at_hole(cell, job):
     """Flange pose that brings the tip to the hole, shape (4, 4): `labkit.machines.cell.flange_at_hole`."""
+    _refuse(cell, job)
     part, T = part_pose(cell, job), np.zeros((4, 4))
     T[:3, :3], T[3, 3] = job.R_tool, 1.0
     T[:3, 3] = part[:3, :3] @ job.hole + part[:3, 3] - job.R_tool @ cell.tip
     return T
+
+
+def _refuse(cell, job):
+    as_instance(cell, "cell", Cell)
+    as_instance(job, "job", Job)
+
+
+def _as_errors(errors, *rows):
+    """The errors as arrays, each of its own shape."""
+    names = [as_choice(name, "errors", _SIZES) for name in as_instance(errors, "errors", dict)]
+    return {name: as_shape(errors[name], name, *rows, _SIZES[name]) for name in names}
 
 
 def _marks(cell, job):
@@ -109,6 +132,7 @@ def miss_budget(cell, job):
     shares : dict
         {source: array, shape (3, 3), mm^2}; their sum is the covariance.
     """
+    _refuse(cell, job)
     variance = np.repeat(np.square(job.std_reading), 3)
     J, known = _miss_jacobians(cell, job), {"tip": cell.cov_tip, "scanner": cell.cov_FS, "tracker": cell.cov_BW}
     diagonal = {"marks": job.std_mark**2, "first reading": variance, "second reading": variance}
@@ -174,11 +198,14 @@ class Misses:
     """
 
     def __init__(self, errors):
-        self.errors = errors
-        self.turns = {name: _exp_so3(errors[name][:, :3]) for name in _TURNED}
+        self.errors = _as_errors(errors, "n")
+        if set(self.errors) != set(_SIZES) or len({len(error) for error in self.errors.values()}) != 1:
+            raise ValueError(f"errors must hold as many of each source: {', '.join(_SIZES)}")
+        self.turns = {name: _exp_so3(self.errors[name][:, :3]) for name in _TURNED}
 
     def of(self, cell, job):
         """The miss of the hole with each of them, shape (n, 3): `labkit.machines.cell.misses_by`."""
+        _refuse(cell, job)
         e = self.errors
         hole = self._learned_hole(cell, job)
         for name, T in (("tracker", cell.T_BW), ("first reading", job.T_WE0)):

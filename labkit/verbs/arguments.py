@@ -86,7 +86,7 @@ def named(path):
     try:
         yield
     except OSError as error:
-        error.filename = error.filename2 or error.filename or str(path)  # of two, that which is to be written
+        error.filename = str(path)  # and not that of a part of it, or none
         raise
 
 

@@ -49,3 +49,26 @@ def test_an_error_of_one_source_enters_as_in_the_readable_form(source, covarianc
     for quick, readable in zip(fast.with_errors(of, job, {source: error}), cell.with_errors(of, job, {source: error})):
         for name, value in vars(readable).items():
             np.testing.assert_allclose(getattr(quick, name), value, rtol=1e-12, atol=1e-12, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("errors", "words"),
+    [
+        ({"other": np.zeros(3)}, "errors must be one of tip, scanner"),
+        ({"tip": np.zeros(6)}, "tip must have shape (3,), got (6,)"),
+        ({"scanner": [np.nan] * 6}, "scanner"),
+        ([np.zeros(3)], "errors must be dict"),
+    ],
+)
+def test_what_is_no_cell_and_no_error_is_refused(errors, words, covariances):
+    of, job = cells(np.random.default_rng(6), covariances, True)
+    with pytest.raises(ValueError) as refusal:
+        fast.with_errors(of, job, errors)
+    assert words in str(refusal.value)
+    for function in (fast.learned_pose, fast.part_pose, fast.flange_at_hole, fast.miss_budget):
+        with pytest.raises(ValueError, match="cell must be Cell, got"):
+            function(job, job)
+    with pytest.raises(ValueError, match="as many of each source"):
+        fast.Misses({"tip": np.zeros((5, 3))})
+    with pytest.raises(ValueError, match="as many of each source"):
+        fast.Misses({**cell.draw_errors(of, job, np.random.default_rng(7), 4), "tip": np.zeros((5, 3))})
