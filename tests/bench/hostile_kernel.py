@@ -116,6 +116,67 @@ CASES = {
     ),
     "a warning as error": answer("import warnings\nwarnings.simplefilter('error')\nreturn T"),
     "the argument changed": answer("T[:] = 0\nreturn T"),
+    "SIGINT ignored": answer("import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\nreturn T"),
+    "SIGCHLD ignored": answer("import signal\nsignal.signal(signal.SIGCHLD, signal.SIG_IGN)\nreturn T"),
+    "logging.warning": answer("import logging\nlogging.warning('hello')\nreturn T")
+    + "\nimport logging; logging.warning('seen')",
+    "logging.disable": answer("import logging\nlogging.disable(logging.CRITICAL)\nreturn T"),
+    "decimal precision": answer("import decimal\ndecimal.getcontext().prec = 2\nreturn T"),
+    "gc threshold, callbacks, freeze": answer(
+        "import gc\ngc.set_threshold(1)\ngc.callbacks.append(lambda *a: None)\nreturn T"
+    ),
+    "excepthook, displayhook": answer(
+        "import sys\nsys.excepthook = print\nsys.displayhook = lambda v: None\nsys.unraisablehook = print\nreturn T"
+    )
+    + "\n",
+    "switch interval": answer("import sys\nsys.setswitchinterval(5.0)\nreturn T"),
+    "thread endless": answer(
+        "import threading\ndef go():\n    while True:\n        pass\nthreading.Thread(target=go, daemon=True).start()\nreturn T"
+    ),
+    "thread joined endless": answer(
+        "import threading\ndef go():\n    while True:\n        time.sleep(0.1)\nt = threading.Thread(target=go, daemon=True)\nt.start()\nt.join()\nreturn T"
+    ),
+    "executor endless": answer(
+        "from concurrent.futures import ThreadPoolExecutor\nwith ThreadPoolExecutor(2) as pool:\n    return list(pool.map(lambda k: time.sleep(30), range(4)))[0]"
+    ),
+    "subprocess sleeps on": answer("import subprocess\nsubprocess.Popen(['sleep', '30'])\nreturn T"),
+    "subprocess.run sleeps": answer("import subprocess\nsubprocess.run(['sleep', '30'])\nreturn T"),
+    "os.system sleeps": answer("os.system('sleep 20')\nreturn T"),
+    "os.popen read": answer("os.popen('sleep 20').read()\nreturn T"),
+    "multiprocessing pool": answer(
+        "import multiprocessing\nwith multiprocessing.Pool(2) as pool:\n    return pool.map(abs, [1, 2])"
+    ),
+    "plt.plot and show": answer("import matplotlib.pyplot as plt\nplt.plot([1, 2])\nplt.show()\nreturn T"),
+    "plt.figure left open": answer("import matplotlib.pyplot as plt\nplt.figure()\nplt.plot([1,2])\nreturn T"),
+    "display": answer("from IPython.display import display\ndisplay(T)\nreturn T"),
+    "clear_output": answer("from IPython.display import clear_output\nclear_output(wait=True)\nreturn T"),
+    "rcParams": answer(
+        "import matplotlib.pyplot as plt\nplt.style.use('dark_background')\nplt.rcParams['text.usetex'] = True\nplt.rcParams['font.size'] = 40\nreturn T"
+    ),
+    "builtins gains": answer("import builtins\nbuiltins.tau = 6.28\nbuiltins.np = None\nreturn T"),
+    "events registered": answer("get_ipython().events.register('post_run_cell', lambda r: 1 / 0)\nreturn T"),
+    "run_line_magic": answer("get_ipython().run_line_magic('matplotlib', 'inline')\nreturn T"),
+    "shell escape": answer("get_ipython().system('sleep 15')\nreturn T"),
+    "getpass": answer("import getpass\nreturn getpass.getpass()"),
+    "asyncio.run": answer("import asyncio\nasync def go(): return T\nreturn asyncio.run(go())"),
+    "deep list": answer("x = []\nfor _ in range(10**5):\n    x = [x]\nreturn x"),
+    "self list": answer("x = []\nx.append(x)\nreturn x"),
+    "repr calls itself": answer(
+        "class R:\n    def __repr__(self): return repr(self)\n    def __array__(self, *a, **k): return self.__array__()\nreturn R()"
+    ),
+    "huge int": answer("return 10**100000"),
+    "decimals": answer("from decimal import Decimal\nreturn [[Decimal(float(v)) for v in row] for row in T]"),
+    "masked": answer("return np.ma.masked_array(T, mask=True)"),
+    "tz": answer("os.environ['TZ'] = 'Asia/Tokyo'\ntime.tzset()\nreturn T"),
+    "socket timeout": answer("import socket\nsocket.setdefaulttimeout(0.001)\nreturn T"),
+    "raise from itself": answer("e = ValueError('x' * 10**7)\ne.__cause__ = e\nraise e"),
+    "float subclass": answer("class F(float):\n    def __float__(self): raise ValueError\nreturn F(1)"),
+    "lru_cache above": "import functools\n@ex.invert\n@functools.lru_cache\ndef invert(T):\n    return np.linalg.inv(T)",
+    "time magic": "get_ipython().run_cell_magic('time', '', '@ex.invert\\ndef invert(T):\\n    return T.T\\n')",
+    "in thread": "import threading\ndef f(T): return T.T\nt = threading.Thread(target=lambda: ex.invert(f)); t.start(); t.join(30); print('alive', t.is_alive())",
+    "value huge": "ex.distance(10**5000)",
+    "value evil": "class E:\n    def __float__(self): raise RuntimeError('evil')\nex.distance(E())",
+    "value generator": "ex.distance(v for v in iter(int, 1))",
 }
 
 
