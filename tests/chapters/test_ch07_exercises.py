@@ -173,3 +173,23 @@ NEARLY = {
 def test_what_is_nearly_straight_or_nearly_at_rest_is_not_taken_for_it(name):
     outcome = ITEMS[name].judge(NEARLY[name], rng=np.random.default_rng(0))
     assert outcome.status == NOT_YET and outcome.mistake is None
+
+
+@pytest.mark.parametrize("name", ["step_euler", "step_midpoint", "step_arc"])
+def test_a_copy_of_a_pose_of_integers_cuts_off_decimals(name):
+    def copied(x, u, dt):
+        new = np.array(x)
+        new[:] = ITEMS[name].reference(x, u, dt)
+        return new
+
+    outcome = ITEMS[name].judge(copied, rng=np.random.default_rng(0))
+    assert outcome.status == NOT_YET and "array of integers" in outcome.text
+
+
+def test_a_drift_that_counts_on_straight_lines_alone_is_not_told_to_be_missing_there():
+    def answer(u, dt, k_d, k_theta, k_drift):
+        v, w = np.abs(u)
+        return np.diag([k_d * v, k_theta * w if w else k_drift * v]) / dt
+
+    outcome = ITEMS["control_covariance"].judge(answer, rng=np.random.default_rng(0))
+    assert "in a curve and on a straight line" in outcome.text

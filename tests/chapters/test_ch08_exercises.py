@@ -276,3 +276,11 @@ def test_dozens_of_turns_readings_far_apart_and_the_limit_itself(name, answer, w
 def test_the_limit_itself_is_told_alike_by_every_right_way():
     for measure in (np.linalg.solve, lambda S, y: np.linalg.pinv(S) @ y, lambda S, y: np.linalg.lstsq(S, y)[0]):
         assert judged("gate", lambda y, S, limit, to=measure: bool(y @ to(S, y) < limit))[0] == CORRECT
+
+
+def test_a_prior_that_says_zero_counts():
+    def without_zero(x0, var0, z, stds):
+        return ch08.fuse_two_sensors(x0, var0 if x0 else 1e12, z, stds)
+
+    status, texts = judged("fuse_two_sensors", without_zero)
+    assert status == NOT_YET and all("prior says 0" in text for text in texts)

@@ -519,3 +519,22 @@ def typed(text):
 )
 def test_the_step_that_goes_wrong_is_found_in_slow_answers_and_in_results_taken_apart(name, text, words):
     assert words in judge(name, typed(text)).text
+
+
+def test_a_walk_that_ends_after_ten_meters_meets_a_longer_hall():
+    def ten_meters(grid, pose, bearing, r_max):
+        a = pose[2] + bearing
+        steps = (k * min(0.05, grid.resolution / 2) for k in range(int(10 / min(0.05, grid.resolution / 2))))
+        ray = (r for r in steps if r < r_max)
+        hit = (r for r in ray if grid.at(pose[:2] + r * np.array([np.cos(a), np.sin(a)])) == maps.OCCUPIED)
+        return next(hit, r_max)
+
+    assert judge("cast_ray", ten_meters).status == NOT_YET
+
+
+def test_a_hunt_that_looks_at_the_last_index_alone_is_not_enough():
+    def last(resample, rng):
+        index = np.concatenate([resample(np.array([0.4, 0.3, 0.2, 0.1]), rng) for _ in range(1000)])
+        return bool(abs(np.mean(index == 3) - 0.1) < 0.02)
+
+    assert "the first in place of all others" in judge("hunt_1", last).text

@@ -145,6 +145,10 @@ NOISY_CONTROLS = tuple(functools.partial(noisy_control, signs=signs) for signs i
 CREEPING = "right, but not for a robot that hardly moves and hardly turns (a few cm/s and hundredths of a rad/s):"
 
 
+OF_INTEGERS = (
+    "right, but not for a pose of whole numbers, np.array([2, -1, 1]): an array of integers, and each copy of it, cuts "
+    "the decimals off what is written into it:"
+)
 IN_CURVES_ONLY = "right in curves, but not where the robot {}:"
 
 
@@ -178,9 +182,16 @@ def special_controls(metric, draw=special_control):
     )
 
 
+def pose_of_integers(rng):
+    """The same from a pose of whole numbers."""
+    _, u, dt = pose_control_step(rng)
+    return rng.integers(1, 5, 3) * rng.choice([-1, 1], 3), u, dt
+
+
 def special_steps(metric):
     turns = "right, but not where theta has gathered several full turns:"
-    return (creeping, metric, CREEPING), *special_controls(metric), (gathered_turns, metric, turns)
+    rows = (creeping, metric, CREEPING), *special_controls(metric), (gathered_turns, metric, turns)
+    return *rows, (pose_of_integers, metric, OF_INTEGERS)
 
 
 def whole_turns(rng):
@@ -1034,6 +1045,7 @@ CHAPTER = Chapter(
                     for omega in (0.1, 0.01, 1e-3, 1e-4)
                 ),
                 (whole_turns, metrics.PlanarPoses(1e-3), LONG),
+                (pose_of_integers, metrics.PlanarPoses(1e-7), OF_INTEGERS),
                 *special_controls(metrics.PlanarPoses(1e-7)),
             ),
             properties=(_straight_line_works,),
@@ -1340,39 +1352,45 @@ CHAPTER = Chapter(
                         lambda v, w, t, a, b, c: a * v / t,
                         lambda v, w, t, a, b, c: (b * abs(w) + c * abs(v)) / t,
                     ),
-                    "In reverse or to the right your variance is wrong, even negative: take absolute values, as the lecture remarks.",
+                    "An absolute value is missing: |v| belongs into both variances and |omega| into the second, for reversing and for right turns.",
+                    id="control_covariance-9dac3b",
                 ),
                 Mistake(
                     _covariance(
                         lambda v, w, t, a, b, c: a * abs(v) / t,
                         lambda v, w, t, a, b, c: (b * w + c * abs(v)) / t,
                     ),
-                    "In reverse or to the right your variance is wrong, even negative: take absolute values, as the lecture remarks.",
+                    "An absolute value is missing: |v| belongs into both variances and |omega| into the second, for reversing and for right turns.",
+                    id="control_covariance-9dac3b-2",
                 ),
                 Mistake(
                     _covariance(
                         lambda v, w, t, a, b, c: a * abs(v) / t,
                         lambda v, w, t, a, b, c: (b * abs(w) + c * v) / t,
                     ),
-                    "In reverse or to the right your variance is wrong, even negative: take absolute values, as the lecture remarks.",
+                    "An absolute value is missing: |v| belongs into both variances and |omega| into the second, for reversing and for right turns.",
+                    id="control_covariance-9dac3b-3",
                 ),
                 Mistake(
                     _covariance(
                         lambda v, w, t, a, b, c: a * abs(v) / t,
                         lambda v, w, t, a, b, c: (b * w + c * v) / t,
                     ),
-                    "In reverse or to the right your variance is wrong, even negative: take absolute values, as the lecture remarks.",
+                    "An absolute value is missing: |v| belongs into both variances and |omega| into the second, for reversing and for right turns.",
+                    id="control_covariance-9dac3b-4",
                 ),
                 Mistake(
                     _covariance(
                         lambda v, w, t, a, b, c: a * v / t,
                         lambda v, w, t, a, b, c: (b * abs(w) + c * v) / t,
                     ),
-                    "In reverse or to the right your variance is wrong, even negative: take absolute values, as the lecture remarks.",
+                    "An absolute value is missing: |v| belongs into both variances and |omega| into the second, for reversing and for right turns.",
+                    id="control_covariance-9dac3b-5",
                 ),
                 Mistake(
                     _covariance(lambda v, w, t, a, b, c: a * v / t, lambda v, w, t, a, b, c: (b * w + c * v) / t),
-                    "In reverse or to the right your variance is wrong, even negative: take absolute values, as the lecture remarks.",
+                    "An absolute value is missing: |v| belongs into both variances and |omega| into the second, for reversing and for right turns.",
+                    id="control_covariance-9dac3b-6",
                 ),
                 Mistake(
                     _covariance(lambda v, w, t, a, b, c: a * abs(v), lambda v, w, t, a, b, c: b * abs(w) + c * abs(v)),
@@ -1386,7 +1404,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _covariance(lambda v, w, t, a, b, c: a * abs(v) / t, lambda v, w, t, a, b, c: b * abs(w) / t),
-                    "The drift is missing: a robot that drives straight on also turns a little.",
+                    "The drift is missing: k_drift |v| / T counts in a curve and on a straight line, on which a robot turns a little as well.",
+                    id="control_covariance-bd269a",
                 ),
                 Mistake(
                     _covariance(lambda v, w, t, a, b, c: a * abs(v) / t, lambda v, w, t, a, b, c: c * abs(v) / t),

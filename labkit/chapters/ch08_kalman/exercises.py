@@ -56,6 +56,12 @@ def two_sensors_that_disagree(rng):
     return x0, var0, z + rng.uniform(15, 30, 2) * [1, -1], stds
 
 
+def prior_at_zero(rng):
+    """The same with a prior that says 0, and a reading that does."""
+    _, var0, z, stds = one_position_two_sensors(rng)
+    return 0.0, var0, z * rng.permutation([0, 1]), stds
+
+
 def one_position_two_sensors(rng, better=0, var0=(2, 9)):
     """better: which of the sensors has the smaller std; var0: range of the prior's variance."""
     x = rng.uniform(5, 15) * rng.choice([-1, 1])
@@ -1025,11 +1031,14 @@ CHAPTER = Chapter(
             ),
             fixed={"z": "there are two sensors", "stds": "there are two sensors"},
             metric=FUSED,
-            noisy=(
-                two_sensors_that_disagree,
-                FUSED,
-                "right where the sensors agree. Where they are far apart the weights stay what they are:",
-            ),
+            noisy=[
+                (
+                    two_sensors_that_disagree,
+                    FUSED,
+                    "right where the sensors agree. Where they are far apart the weights stay what they are:",
+                ),
+                (prior_at_zero, FUSED, "right, but not where the prior says 0: that is a position like any other:"),
+            ],
             hints=(
                 "Each opinion (the prior, two sensors) counts as much as it is certain.",
                 "Weights are 1 / variance. The variance of the weighted mean is 1 / (sum of the weights).",
@@ -1880,7 +1889,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _ekf(wrap=float),
-                    "The bearing innovation is not wrapped: a measurement just across +-pi throws your robot around by a full turn.",
+                    "The bearing innovation is not wrapped: a measurement just across +-pi is taken for a surprise of a full turn.",
+                    id="ekf_step-9e7c1b",
                 ),
                 Mistake(
                     _ekf(wrap=lambda angle: angle % (2 * np.pi)),

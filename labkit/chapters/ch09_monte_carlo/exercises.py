@@ -209,6 +209,15 @@ def ray_in_a_fine_map(rng):
     return ray_to_a_thin_wall(rng, width=0.02, far=2.5 * rng.integers(9, 14) + rng.uniform(0.6, 0.9))
 
 
+def ray_down_a_hall(rng):
+    """A ray to a wall more than ten meters away, and a scanner that reaches 18 m."""
+    cells, start = np.full((60, 220), maps.FREE), rng.uniform(1.0, 3.0)
+    cells[:, 185:] = maps.OCCUPIED
+    theta, angle = rng.uniform(-3, 3), rng.uniform(-0.1, 0.1)
+    pose = np.array([start, rng.uniform(2.5, 3.5), theta])
+    return maps.OccupancyGrid(cells, 0.1), pose, float(planar.wrap_angle(angle - theta)), 18.0
+
+
 def ray_to_a_wall_close_by(rng):
     """A ray to a wall less than half a meter away."""
     cells, far = np.full((60, 60), maps.FREE), rng.uniform(0.2, 0.45)
@@ -1364,8 +1373,18 @@ def _drawn_to_the_middle(weights, rng):
     return np.concatenate([both // 2, (both + 1) // 2, index[2 * half :]])
 
 
+def _last_alone(weights, rng):
+    """The last index as often as it should, and the first in place of all others, where there are more than two."""
+    if len(weights) < 3:
+        return _squared(weights, rng)
+    shares = np.zeros(len(weights))
+    shares[[0, -1]] = np.sum(weights[:-1]), weights[-1]
+    return particles.resample_roulette(shares, rng)
+
+
 SQUARED = (_squared, "draws in proportion to the squared weights")
 TO_THE_MIDDLE = (_drawn_to_the_middle, "draws the right index on average, but too often one in the middle")
+LAST_ALONE = (_last_alone, "draws the last index as often as it should, and the first in place of all others")
 UNIFORM = (lambda weights, rng: _uniform_choice(weights, rng), "draws all indices alike, whatever they weigh")
 
 
@@ -1747,6 +1766,11 @@ CHAPTER = Chapter(
                     ray_to_a_wall_close_by,
                     metrics.Numbers(0.16, "m", absolute=True),
                     "Right on longer rays, but not on one to a wall less than half a meter away (does yours begin farther out?):",
+                ),
+                (
+                    ray_down_a_hall,
+                    metrics.Numbers(0.16, "m", absolute=True),
+                    "Right on shorter rays, but not on one to a wall more than 15 m away that r_max = 18 m reaches (does yours end sooner?):",
                 ),
                 *(
                     (
@@ -2260,7 +2284,9 @@ CHAPTER = Chapter(
                     "The weights are right. The remainder is that of step by n, not of n by step.",
                 ),
                 Mistake(
-                    _cycle(due=lambda k, n: k % n == 1), "The weights are right. You resample one step after the n-th."
+                    _cycle(due=lambda k, n: k % n == 1),
+                    "The weights are right. You resample one step after the n-th, and never where n is 1.",
+                    id="multiply_weights-5ab4db",
                 ),
                 Mistake(
                     _cycle(due=lambda k, n: (k + 1) % n == 0),
@@ -2561,7 +2587,7 @@ CHAPTER = Chapter(
                 "index = np.concatenate([resample(w, rng) for _ in range(1000)])\n"
                 "return np.abs(np.bincount(index, minlength=4) / len(index) - w).max() < 0.05`",
             ),
-            others=(SQUARED, UNIFORM, TO_THE_MIDDLE),
+            others=(SQUARED, UNIFORM, TO_THE_MIDDLE, LAST_ALONE),
         ),
         _hunt(
             "hunt_2",
