@@ -180,7 +180,7 @@ def _refuse_infinite(array):
 
 def _describe(result):
     name = type(result).__name__
-    return f"{'an' if name[0] in 'aeiouAEIOU' else 'a'} {name}"
+    return f"{'an' if name[0] in 'aeiouAEIOU' or name == 'ndarray' else 'a'} {name}"
 
 
 def _is_single(array):
@@ -332,7 +332,10 @@ class Exactly(Metric):
             if not isinstance(result, set | frozenset):
                 made = ": set(...) makes one of it" if isinstance(result, list | tuple | dict) else ""
                 raise Refused(f"expected a set, got {_describe(result)}{made}")
-            return {v.item() if isinstance(v, np.generic) else v for v in result}
+            found = {v.item() if isinstance(v, np.generic) else v for v in result}
+            if found and expected and all(isinstance(v, str) for v in found) and all(type(v) is int for v in expected):
+                raise Refused("expected a set of whole numbers, got one of texts")
+            return found
         if isinstance(expected, np.ndarray):
             try:
                 array = np.asarray(result)

@@ -75,6 +75,7 @@ ITERATION = 20  # rounds of a loop that goes on until nothing changes, and not t
 ROUNDS = 200  # of a loop, or ten times as many as it has: enough for what converges
 SIZES = ("len({})", "len({}) - 1", "{}.shape[-1]")  # what a number that is typed in may stand for
 TURNS = {90: "np.pi / 2", 180: "np.pi", 360: "2 * np.pi"}
+ROUNDING = ("round", "around")
 TYPED = 2  # the rank of a number that is typed in
 ROUNDED = 2e-3  # how far, relatively, a number may lie from a multiple of pi that it is meant to be
 PARTNERS = 12  # values read in one step of which any two may have changed places
@@ -255,12 +256,21 @@ def mending(function):
     found = changes(function)
     narrower = list(_narrower(function, found))
     found = [change for change in found if not any(change is other for other in narrower)]
+    found = [change for change in found if change.place not in set(_digits_left(function))]
     found += _with_an_axis(function)
     found = [*_finer(function), *found, *_counted_by_loops(function), *_everywhere(found)]
     found += [*_finer_differences(function), *_with_an_outer_product(function), *_of_rounds(function)]
     found += [*_begun_late(function), *_typed_numbers(function), *_exchanged_throughout(function)]
     found += [*_shorter_steps(function), *_rounded_pi(function)]
     return sorted(found, key=lambda change: change.rank)
+
+
+def _digits_left(function):
+    """Numbers that say to how many digits something is rounded: with any of them the rounding is too much."""
+    for call in (node for node in ast.walk(function) if isinstance(node, ast.Call)):
+        if getattr(call.func, "attr", getattr(call.func, "id", "")) in ROUNDING:
+            yield from (part for part in call.args if isinstance(part, ast.Constant))
+            yield from (keyword.value for keyword in call.keywords)
 
 
 def _with_an_axis(function):

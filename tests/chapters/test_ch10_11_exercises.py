@@ -12,6 +12,7 @@ from labkit.chapters.ch11_your_own_data import exercises as own
 from labkit.documents.ledger import Computed, Row, judge
 from labkit.documents.rounding import half_unit, read
 from labkit.documents.slips import single_slips
+from labkit.exercises import engine
 from labkit.exercises.engine import CORRECT, NOT_YET
 from labkit.exercises.metrics import Refused
 
@@ -472,3 +473,39 @@ def test_a_part_that_was_right_all_the_time_does_not_come_out_right_by_a_change(
 def test_a_divisor_is_told_for_what_it_is_whatever_led_to_it(by, told):
     text = f"def honest_covariance(r, J):\n    n, p = J.shape\n    return r @ r / ({by}) * np.linalg.inv(J.T @ J)"
     assert told in told_of(own, "honest_covariance", text)
+
+
+def everybody(entries, average):
+    """All are suspected where no single slip explains the gap."""
+    if proofs._agree(entries, average):
+        return set()
+    return proofs._search()(entries, average) or set(range(len(entries) + 1))
+
+
+def cosines_of_seven_digits(T, apart):
+    axes = own._axes(T)
+    return np.arccos(np.clip(np.round((axes[apart:] * axes[:-apart]).sum(1), 7), -1, 1))
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "module, id, answer", [(ledger, "suspects", everybody), (own, "between_axes", cosines_of_seven_digits)]
+)
+def test_where_nobody_slipped_and_where_angles_are_small(module, id, answer, seed, monkeypatch):
+    monkeypatch.setattr(engine, "LOOKING", 0.0)  # what is told is not asked here
+    assert module.CHAPTER[id].judge(answer, rng=np.random.default_rng(seed)).status == NOT_YET
+
+
+def test_a_set_of_positions_holds_no_texts():
+    with pytest.raises(Refused, match="whole numbers, got one of texts"):
+        ledger.CHAPTER["suspects"].metric.admit({"29.3"}, {2})
+
+
+def test_of_what_is_rounded_no_other_digits_are_told():
+    text = """
+def between_axes(T, apart):
+    axes = log_so3(T[:, :3, :3])
+    axes = axes / np.linalg.norm(axes, axis=1)[:, None]
+    return np.arccos(np.round((axes[:-apart] * axes[apart:]).sum(axis=1), 6))
+"""
+    assert "it is rounded: hand over all digits" in told_of(own, "between_axes", text, log_so3=own.log_so3)

@@ -522,6 +522,16 @@ def other_columns(rng, kind):
     return entries, f"{values.mean():.3f}"
 
 
+def of_two_slips(rng):
+    """A column in which two entries slipped, so that no single slip explains the gap."""
+    while True:
+        entries, average = column(rng, "one digit wrong")
+        k = int(rng.integers(len(entries)))
+        entries[k] = _slipped(rng, entries[k], "one digit wrong")
+        if not suspects(entries, average) and not _agree(entries, average):
+            return entries, average
+
+
 def printed_twice(rng):
     """A column with two entries printed alike, of which others are named where a slip changes both of them at once."""
     while True:
@@ -756,6 +766,7 @@ SUSPECTS = Exercise(
         (functools.partial(_clear, draw=draw), metrics.Exactly(), words)
         for draw, words in (
             (printed_twice, "right for entries that all differ, but not where two of them are printed alike:"),
+            (of_two_slips, "right where a slip explains it, but not where none does, so that nobody is named:"),
             (
                 functools.partial(other_columns, kind="many"),
                 "right for four or five entries, but not for fewer or more:",

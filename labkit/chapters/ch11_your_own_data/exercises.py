@@ -68,6 +68,14 @@ def one_pair(rng):
     return pose(exp_so3(rng.normal(size=(apart + 1, 3))), rng.uniform(-300, 300, (apart + 1, 3))), apart
 
 
+def axes_nearly_along(rng):
+    """Motions about axes that are less than a tenth of a degree apart, some of them the other way: no angle is rounded off."""
+    n, apart = int(rng.integers(5, 9)), int(rng.integers(1, 3))
+    axes = rng.normal(size=3) + 4e-4 * rng.normal(size=(n, 3))
+    axes *= np.where(np.arange(n) % 5 < 2, 1, -1)[:, None] / np.linalg.norm(axes, axis=1, keepdims=True)
+    return pose(exp_so3(rng.uniform(0.2, 2.0, (n, 1)) * axes), rng.uniform(-300, 300, (n, 3))), apart
+
+
 def motions_of_half_a_turn(rng):
     """Motions that turn by nearly 180 deg: the sine of their angle is so small that rounding hides an axis in it."""
     T, apart = some_motions(rng, int(rng.integers(1, 4)))
@@ -516,6 +524,8 @@ CHAPTER = Chapter(
             noisy=[
                 (motions_about_one_axis, metrics.Numbers(1e-6, "rad"),
                  "right for axes in all directions, but not for parallel and opposite ones, where a cosine may come out as 1.0000000000000002:"),
+                (axes_nearly_along, metrics.Numbers(1e-6, "rad"),
+                 "right for axes in all directions, but not for nearly parallel and nearly opposite ones, whose small angles count:"),
                 (one_pair, metrics.Numbers(1e-6, "rad"), "right for several pairs, but not where one pair alone is to be compared, which gives one angle in an array:"),
                 (small_turns, metrics.Numbers(1e-6, "rad"), "right for large turns, but not for motions that turn by less than a quarter of a degree, which have an axis too:"),
                 (motions_of_half_a_turn, metrics.Numbers(1e-6, "rad"),
@@ -816,7 +826,7 @@ CHAPTER = Chapter(
                 Mistake(lambda C, c: next_pose(C, c) + 1, "Candidates count from 0."),
                 Mistake(lambda C, c: c[next_pose(C, c)], "This is the candidate's derivative. Asked for is its number."),
                 Mistake(lambda C, c: float(_volumes(C, c).min()), "This is the determinant it leaves. Asked for is the candidate's number."),
-                Mistake(_one_after_the_other, "You return the last one, whatever it brings. It always seems the best where C keeps what the candidates before it brought: each is tried on the same C."),
+                Mistake(_one_after_the_other, "You return the last one, whatever it brings. So it comes where C keeps what the candidates before it brought, and where the smallest determinant so far is not kept."),
                 Mistake(_alone, "You looked at each candidate alone: what is known already, C, makes some of them worth little."),
                 Mistake(lambda C, c: 0, "You return the first one, whatever it brings."),
             ],
