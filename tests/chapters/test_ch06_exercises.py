@@ -312,3 +312,7 @@ def test_obtuse_links_and_few_motions_are_drawn():
     texts("dh_matrix", acute)
     texts("singular_value_ratio", lambda M: ch06.singular_value_ratio(M) if len(M) > 18 else 0.0)
     texts("e_trans", lambda r: np.linalg.norm(r) / max(len(r) - 1, 5))
+
+
+def test_roots_of_eigenvalues_are_right_at_every_check():
+    texts("singular_value_ratio", lambda M: np.sqrt(np.divide(*np.linalg.eigvalsh(M.T @ M)[[1, -1]])), CORRECT)

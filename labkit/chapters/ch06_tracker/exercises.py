@@ -262,10 +262,15 @@ def stacks_of_axes_alike(rng):
 
 
 def stacks_of_one_axis(rng):
-    """Blocks of exact motions about one axis, so that a second mounting fits as well."""
-    axis, X = unit_vector(rng.normal(size=3)), exp_so3(rng.normal(size=3))
-    A = exp_so3(rng.uniform(0.2, 2.0, (int(rng.integers(3, 9)), 1)) * axis)
-    return (ax_xb.kronecker_matrix(A, X.T @ A @ X),)
+    """Blocks of exact motions about one axis, so that a second mounting fits as well; rounding leaves the eigenvalues of
+    M^T M above 0, or who takes their roots would be right or not by chance.
+    """
+    while True:
+        axis, X = unit_vector(rng.normal(size=3)), exp_so3(rng.normal(size=3))
+        A = exp_so3(rng.uniform(0.2, 2.0, (int(rng.integers(3, 9)), 1)) * axis)
+        M = ax_xb.kronecker_matrix(A, X.T @ A @ X)
+        if np.linalg.eigvalsh(M.T @ M)[1] > 0:
+            return (M,)
 
 
 def translation_problem(rng, n=None):
