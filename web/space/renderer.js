@@ -163,21 +163,20 @@ export class Renderer {
 
   /** Draw one of each, for nobody to see: a shader becomes a processor's or a driver's own code when it is first used,
    *  and that goes on beside the page while it waits for Python. */
-  warm(smooth = !this.software) {
+  warm() {
     const [box, shell] = [{ kind: "raised", outline: [[0, 0], [1, 0], [0, 1]], bottom: 0, top: 1 }, { kind: "turned", profile: [[1, 0], [1, 1]] }];
     const solids = this.solids([box, shell, box], 1, 2);
     const pose = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
     this.place(solids, new Float32Array([1, 1, 0.5].flatMap((opacity) => [...pose, 0, 0, 0, opacity])));
     const [lines, points] = [this.lines(null, new Float32Array(4 * LINE_NUMBERS)), this.points(null, new Float32Array(POINT_NUMBERS))];
     const lens = { axes: [1, 0, 0, 0, 1, 0, 0, 0, 1], center: [0, 0, 0], eye: 0, perUnit: 1, scale: [1, 1], reach: 12, ratio: 1, mark: 1 };
-    this.draw(8, 8, lens, { solids, lines, points, floor: 0, shadow: [0, 0, 0, 0.5], wide: 1 }, smooth, false);
+    this.draw(8, 8, lens, { solids, lines, points, floor: 0, shadow: [0, 0, 0, 0.5], wide: 1 }, !this.software, false);
     for (const made of [solids, lines, points]) this.free(made);
-    this.finish(() => { if (!smooth) this.warm(true); });
+    this.finish();
   }
 
-  /** All that has been asked for is done beside the page, and then is called; a flush alone is put off until something
-   *  is read. */
-  finish(then) {
+  /** All that has been asked for is done beside the page; a flush alone is put off until something is read. */
+  finish() {
     const { gl, age } = this;
     const [fence, end] = [gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0), performance.now() + PATIENCE];
     const look = () => {
@@ -185,7 +184,6 @@ export class Renderer {
       const done = gl.clientWaitSync(fence, gl.SYNC_FLUSH_COMMANDS_BIT, 0) !== gl.TIMEOUT_EXPIRED;
       if (!done && performance.now() < end) return void setTimeout(look, LOOK_AGAIN);
       gl.deleteSync(fence);
-      then();
     };
     look();
   }
