@@ -110,7 +110,7 @@ def test_who_forgets_a_case_is_refused(name, forgotten, monkeypatch):
     def answer(*given):
         return None if forgotten(*given) else right(*given)
 
-    assert all(ITEMS[name].judge(answer, rng=np.random.default_rng(seed)).status != CORRECT for seed in range(2))
+    assert ITEMS[name].judge(answer, rng=np.random.default_rng(0)).status != CORRECT
 
 
 @pytest.mark.parametrize("wrap", [lambda a: a % (2 * np.pi), lambda a: abs(wrap_angle(a)), lambda a: a + 2 * np.pi])
@@ -127,13 +127,13 @@ def test_what_is_wrong_of_a_robot_that_drives_straight_on_is_what_is_seen():
         assert words in told and "finite" not in told
 
 
-def test_a_gain_above_one_is_drawn_and_held():
+def test_a_gain_above_one_is_drawn_and_held(monkeypatch):
     def clipped(x, cov, z, C, cov_z):
         K = np.clip(cov @ C.T @ np.linalg.inv(C @ cov @ C.T + cov_z), -1, 1)
         return x + K @ (z - C @ x), (np.eye(len(x)) - K @ C) @ cov
 
-    outcomes = [ITEMS["update"].judge(clipped, rng=np.random.default_rng(seed)) for seed in range(3)]
-    assert all(outcome.status != CORRECT for outcome in outcomes)
+    monkeypatch.setattr(engine, "LOOKING", 0.0)
+    assert all(ITEMS["update"].judge(clipped, rng=np.random.default_rng(seed)).status != CORRECT for seed in range(3))
 
 
 FAR_OR_SMALL = [
@@ -156,7 +156,9 @@ def test_who_is_right_within_a_range_alone_is_refused(name, forgotten, monkeypat
     test_who_forgets_a_case_is_refused(name, forgotten, monkeypatch)
 
 
-def test_weights_of_zero_keep_their_places():
+def test_weights_of_zero_keep_their_places(monkeypatch):
+    monkeypatch.setattr(engine, "LOOKING", 0.0)
+
     def without_zeros(weights, rng):
         left = weights[weights > 0]
         return np.searchsorted(np.cumsum(left), rng.random(len(weights)) * left.sum())
@@ -173,7 +175,9 @@ def test_what_is_returned_is_not_called_right_on_the_way():
     assert text and "something else is returned" not in text
 
 
-def test_what_leaves_directions_out_is_refused_where_axes_are_nearly_alike():
+def test_what_leaves_directions_out_is_refused_where_axes_are_nearly_alike(monkeypatch):
+    monkeypatch.setattr(engine, "LOOKING", 0.0)
+
     def cut(A, B, R):
         K1 = (np.eye(3) - A[:, :3, :3]).reshape(-1, 3)
         return np.linalg.lstsq(K1, (A[:, :3, 3] - B[:, :3, 3] @ R.T).ravel(), rcond=0.1)[0]
