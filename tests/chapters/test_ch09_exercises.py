@@ -538,3 +538,10 @@ def test_a_hunt_that_looks_at_the_last_index_alone_is_not_enough():
         return bool(abs(np.mean(index == 3) - 0.1) < 0.02)
 
     assert "the first in place of all others" in judge("hunt_1", last).text
+
+
+def test_noise_scaled_by_the_root_of_the_time_step_is_told_by_how_it_grows():
+    def scaled(x, u, dt, std_u, rng):
+        return odometry.step(x, u + std_u * np.sqrt(dt) * rng.standard_normal((len(x), 2)), dt)
+
+    assert "power 1.5" in judge("sample_motion", scaled).text

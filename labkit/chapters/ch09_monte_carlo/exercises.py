@@ -1198,6 +1198,8 @@ def _other_spread(name, noise, wanted, std_u, dt, longer):
         return f"{told}. It is smaller by the root of 3, as uniform numbers up to std_u are: rng.standard_normal."
     if name != "aside" and abs(amount - dt * math.sqrt(std)) < 0.05 * amount:
         return f"{told}. That is what the root of std_u gives: std_u holds standard deviations, not variances."
+    if abs(amount - wanted * math.sqrt(dt)) < 0.05 * amount and abs(longer / amount - 2**1.5) < 0.2:
+        return f"{told}. It grows with dt to the power 1.5: std_u is that of the control in one step, whatever dt is."
     if abs(amount / math.sqrt(2) - wanted) < 0.05 * wanted:
         return f"{told}. It is larger by the root of 2, as if noise of this size came in twice."
     if name == "aside":
