@@ -154,10 +154,10 @@ def motions(rng, n=None, std_deg=0.3, std_mm=1.0, R=None):
     return A, invert(X) @ A @ X @ noise
 
 
-def motions_about_axes_alike(rng):
-    """Exact motions whose axes lie within a few degrees of one another, and the rotation of the mounting."""
+def motions_about_axes_alike(rng, within=0.06):
+    """Exact motions whose axes lie within this angle (rad) of one, and the rotation of the mounting."""
     n, X = int(rng.integers(10, 15)), pose(exp_so3(rng.normal(size=3)), rng.uniform(-80, 80, 3))
-    axes = exp_so3(rng.normal(size=3)) @ unit_vector(np.c_[rng.uniform(-0.06, 0.06, (n, 2)), np.ones(n)]).T
+    axes = exp_so3(rng.normal(size=3)) @ unit_vector(np.c_[rng.uniform(-within, within, (n, 2)), np.ones(n)]).T
     A = pose(exp_so3(rng.uniform(0.5, 1.2, (n, 1)) * axes.T), rng.uniform(-200, 200, (n, 3)))
     return A, invert(X) @ A @ X, X[:3, :3].copy()
 
@@ -257,7 +257,7 @@ def stacks(rng, n=None):
 
 
 def stacks_of_axes_alike(rng):
-    A, B, _ = motions_about_axes_alike(rng)
+    A, B, _ = motions_about_axes_alike(rng, within=0.006)
     return (ax_xb.kronecker_matrix(A, B),)
 
 
@@ -1051,7 +1051,7 @@ CHAPTER = Chapter(
                 (
                     stacks_of_axes_alike,
                     metrics.Numbers(1e-9),
-                    "right where the axes differ, but not where they lie within a few degrees of one another, and the ratio is small:",
+                    "right where the axes differ, but not where they lie within a degree of one another, and the ratio is below 0.01:",
                 ),
                 (
                     stacks_of_one_axis,
