@@ -398,3 +398,10 @@ def test_doubling_from_one_half_on_is_not_told_of_one_quarter():
     half = beyond.loop(follow=lambda *given: beyond.rule(*given, good=0.5))
     told = {judged("trust_region", half, seed).text for seed in range(3)}
     assert "" not in told and not any("not poor" in text for text in told)
+
+
+def test_a_length_is_no_sum_of_absolute_values_at_any_check():
+    def by_sum(g, H):
+        return "not stationary" if np.abs(g).sum() > 1e-6 else kind(H)
+
+    assert {judged("classify_extremum", by_sum, seed).mistake is None for seed in range(5)} == {False}

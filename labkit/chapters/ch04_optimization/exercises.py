@@ -71,7 +71,9 @@ KINDS = (
     ),
     *(functools.partial(kind_of_point, bends=BOWL, length=STEEP, signs=s) for s in ((-1, -1), (1, -3), (1, 1))),
     *(functools.partial(kind_of_point, bends=bends, length=STEEP) for bends in (DOME, SADDLE, DEEP_SADDLE)),
-    functools.partial(kind_of_point, bends=BOWL, length=(6e-7, 9e-7)),  # on both sides of the limit, and a little off
+    functools.partial(
+        kind_of_point, bends=BOWL, length=(8.5e-7, 9.5e-7)
+    ),  # below the limit, the sum of both entries not
     functools.partial(kind_of_point, bends=BOWL, length=(1.1e-6, 1.2e-6), signs=(1, -1)),  # each entry is below it
     *(functools.partial(kind_of_point, bends=BOWL, length=l) for l in ((2e-6, 5e-6), (2e-5, 5e-5), (2e-4, 5e-4))),
     functools.partial(kind_of_point, bends=BOWL, length=(2e-3, 5e-3)),
@@ -790,6 +792,11 @@ CHAPTER = Chapter(
                 Mistake(
                     _stationary(_by(np.linalg.eigvalsh), lambda g: g.any()),
                     "After an iteration the gradient is never exactly 0: up to a norm of 1e-6 it counts as vanished (`np.allclose` stops at 1e-8).",
+                ),
+                Mistake(
+                    _stationary(_by(np.linalg.eigvalsh), lambda g: np.abs(g).sum() > 1e-6),
+                    "You add the absolute values of both entries. |g| is the root of the sum of their squares, and smaller.",
+                    id="kind-sum-of-entries",
                 ),
                 Mistake(
                     _stationary(_by(np.linalg.eigvalsh), lambda g: (g > 1e-6).any()),
