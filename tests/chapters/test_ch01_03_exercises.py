@@ -737,7 +737,7 @@ def _reading(entry):
     return answer
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(
     ("chapter", "name", "answer"),
     [
@@ -757,7 +757,7 @@ def test_what_is_wrong_in_one_case_alone_never_passes(chapter, name, answer, see
     assert outcome.status != CORRECT
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_text_to_read_holds_every_sort_of_line(seed):
     """A whole number, a tab, a line of blanks, a comment behind a number without a blank: none of them by chance."""
     rng = np.random.default_rng(seed)
