@@ -941,7 +941,7 @@ SUSPECTS = Exercise(
         ),
         Mistake(
             _first_half_as_printed,
-            "You allow the first entry's half unit for all. Each has its own: what they allow together is their mean.",
+            "What you allow all entries is the half unit of the first. Each has its own: together they allow the mean of them.",
             id="suspects-e587b2",
         ),
         *(
