@@ -941,7 +941,7 @@ SUSPECTS = Exercise(
         ),
         Mistake(
             _first_half_as_printed,
-            "What you allow all entries is the half unit of the first. Each has its own: together they allow the mean of them.",
+            "You allow all entries the half unit of the first. Each has its own: together they allow their mean.",
             id="suspects-e587b2",
         ),
         *(
