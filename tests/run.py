@@ -16,6 +16,7 @@ A blank notebook that a student has worked in is judged by no test: a fresh one 
 import contextlib
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -31,8 +32,10 @@ SECONDS_A_JOB = 900
 UNITS = 5  # jobs of unit tests beside the longest: none is left alone on one processor at the end
 LONGEST = ROOT / "tests" / "chapters" / "test_exercises.py"  # a job of its own, begun among the first
 APART = ("browser", "hub")  # folders of tests that are jobs of their own
+FIRST = "browser"  # the longest: it has a processor whenever it wants one
 WAITING = "hub"  # which waits for registries and servers most of its time: it takes no other job's place
 BARE = ("-pno:hypothesispytest",)  # notebooks need none, and its import costs as much as a small kernel
+YIELDING = ("nice", "-n", "10") if shutil.which("nice") else ()
 COUNTED = ("passed", "failed", "error", "skipped", "xfailed")
 
 
@@ -52,7 +55,7 @@ def main(arguments):
         places = 2 + max(2, os.cpu_count() or 2) if len(jobs) > 1 else 1
         with ThreadPoolExecutor(places) as pool, ThreadPoolExecutor(1) as beside:
             running = {
-                (beside if name == WAITING else pool).submit(run, words, seeds.get(name)): name
+                (beside if name == WAITING else pool).submit(run, words, seeds.get(name), name != FIRST): name
                 for name, words in jobs.items()
             }
             for job in as_completed(running):
@@ -118,8 +121,11 @@ def blank_notebooks(scratch):
         yield notebook
 
 
-def run(words, seed=None):
-    """(counts, output, seconds) of one pytest process; with a seed its last bits are stirred, and its kernels'."""
+def run(words, seed=None, yields=False):
+    """(counts, output, seconds) of one pytest process; with a seed its last bits are stirred, and its kernels'.
+
+    One that yields lets others go first.
+    """
     begun = time.monotonic()
     environment = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **os.environ}
     environment.pop("PYTHONDONTWRITEBYTECODE", None)  # some fifty processes would compile the same packages, each anew
@@ -129,7 +135,16 @@ def run(words, seed=None):
         words = ["-p", "last_bits", *words]
     with contextlib.suppress(subprocess.TimeoutExpired):
         process = subprocess.run(
-            [sys.executable, "-m", "pytest", "-rs", "--durations=5", "--durations-min=5", *words],
+            [
+                *(YIELDING if yields else ()),
+                sys.executable,
+                "-m",
+                "pytest",
+                "-rs",
+                "--durations=5",
+                "--durations-min=5",
+                *words,
+            ],
             cwd=ROOT,
             env=environment,
             timeout=SECONDS_A_JOB,

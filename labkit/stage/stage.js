@@ -57,14 +57,15 @@ export default { initialize, render };
 /** What all Stages of the page share of the drawing in space: {module, coming}, and how the page gets it. */
 const spaceOfThePage = () => (globalThis[Symbol.for("labkit.space")] ??= {});
 
-/** The drawing from its source, once a page; it makes its context, and its shaders, at once. */
+/** The drawing from its source, once a page. It makes its context, and its shaders, as soon as the page has nothing else
+ *  to do: whatever else begins on the page has two seconds for it, or anywidget gives it up. */
 function getReady(source) {
   const page = spaceOfThePage();
   page.coming ??= (async () => {
     const url = URL.createObjectURL(new Blob([source], { type: "text/javascript" }));
     try {
       page.module ??= await import(url);
-      page.module.works();
+      (globalThis.requestIdleCallback ?? setTimeout)(() => page.module.works());
     } catch (error) {
       page.module = { works: () => false }; // it would be refused again
       console.warn("stage: no drawing in space, Python draws it", error);
