@@ -719,6 +719,10 @@ def _allow(rule):
 
 TOLERANCES = (
     (
+        lambda halves, own: halves[0] + own,
+        "You allow the first entry's half unit for all. Each has its own: what they allow together is their mean.",
+    ),
+    (
         lambda halves, own: max(halves) + own,
         "You allow the largest half unit. The error of a mean is at most the mean of the half units: add "
         "them up, divide by their number.",
@@ -727,10 +731,6 @@ TOLERANCES = (
         lambda halves, own: max(*halves, own),
         "You allow the largest half unit of all. Entries and average were rounded: what they allow adds up, the mean "
         "of the entries' half units and the average's.",
-    ),
-    (
-        lambda halves, own: halves[0] + own,
-        "You allow the first entry's half unit for all. Each has its own: what they allow together is their mean.",
     ),
     (
         lambda halves, own: min(halves) + own,
@@ -894,6 +894,11 @@ SUSPECTS = Exercise(
             _slips_pile_up,
             "The slips you have tried stay in the column: take a fresh copy for each.",
         ),
+        Mistake(
+            _first_half_as_printed,
+            "You allow the first entry's half unit for all. Each has its own: what they allow together is their mean.",
+            id="suspects-e587b2",
+        ),
         *(Mistake(_search(agree=_allow(rule)), text) for rule, text in TOLERANCES),
         Mistake(
             _search(agree=_average_in_the_mean),
@@ -938,11 +943,6 @@ SUSPECTS = Exercise(
         Mistake(
             _search(agree=_without_signs_agrees),
             "Your mean is that of the numbers without their signs. Entries below 0 make an average smaller.",
-        ),
-        Mistake(
-            _first_half_as_printed,
-            "You allow all entries the half unit of the first. Each has its own: together they allow their mean.",
-            id="suspects-e587b2",
         ),
         *(
             Mistake(
