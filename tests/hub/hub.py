@@ -20,6 +20,7 @@ AWAY = (*lab.OFFLINE, "No matching distribution", "not found in the package regi
 AWAY += ("Failed to fetch", "dns error", "ENOTFOUND", "EAI_AGAIN", "ECONNREFUSED", "ECONNRESET", "ETIMEDOUT", "E404")
 IMPATIENT = {"PIP_RETRIES": "1", "PIP_DEFAULT_TIMEOUT": "20", "UV_HTTP_TIMEOUT": "20", "UV_HTTP_RETRIES": "1"}
 IMPATIENT |= {"npm_config_fetch_retries": "1", "npm_config_fetch_timeout": "20000"}
+STOPPING = 120  # s a hub may take to end its students' servers
 
 
 def commands():
@@ -98,9 +99,11 @@ def running(place):
     finally:
         process.stdin.close()
         try:
-            process.wait(30)
-        except subprocess.TimeoutExpired:
+            process.wait(STOPPING)
+        finally:
             process.kill()
+            with contextlib.suppress(FileNotFoundError):  # a hub that is killed leaves its servers behind
+                subprocess.run(["pkill", "-KILL", "-f", str(place)])
 
 
 def wait_for(process, address, log, seconds=120):
