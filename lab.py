@@ -227,14 +227,15 @@ def venv_advice(output):
 def install(python, root, extra="", held=None):
     """Install the pinned packages, with uv where it can be had and else with pip, which takes three times as long.
 
-    The whole story goes to `.lab/setup.log`.
+    uv, unlike pip, leaves compiling to the first import: where nothing may be written each kernel would compile all
+    it imports, and hold half again as much memory. The whole story goes to `.lab/setup.log`.
     """
     path = root / ".lab" / "setup.log"
     path.parent.mkdir(exist_ok=True)
     print("Installing the packages, once: half a minute to two, half a gigabyte ...", flush=True)
     wanted = ["-c", "constraints.txt", "-e", f".[{extra}]" if extra else "."]
     pip = [str(python), "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--retries", "2"]
-    uv = [str(python), "-m", "uv", "pip", "install", "--quiet", "--python", str(python)]
+    uv = [str(python), "-m", "uv", "pip", "install", "--quiet", "--compile-bytecode", "--python", str(python)]
     path.write_bytes(b"")
     with path.open("ab+") as log:
         failed = logged([*pip, "--quiet", "-c", "constraints.txt", "uv"], root, log, held)

@@ -65,7 +65,8 @@ def normal_pairs(rng, n):
 def resample_systematic(weights, rng, size=None):
     """As `localization.particles.resample_systematic`, of the same random number.
 
-    Counts the spokes that point at each particle or an earlier one, which takes rounding up in place of a search.
+    Counts the spokes before the end of each particle's sector, which takes rounding up in place of a search. The index
+    a spoke points at is how many sectors end before it.
     """
     weights = as_weights(weights)
     size = len(weights) if size is None else as_size(size, "size", at_least=0)
@@ -73,7 +74,6 @@ def resample_systematic(weights, rng, size=None):
     ends *= size / ends[-1]
     full = np.searchsorted(ends, ends[-1])
     ends -= as_generator(rng).random()
-    counts = np.ceil(ends, out=ends).astype(np.intp)
-    counts[full:] = size
-    counts[1:] -= counts[:-1].copy()
-    return np.repeat(np.arange(len(weights)), counts)
+    spokes = np.ceil(ends, out=ends).astype(np.intp)
+    spokes[full:] = size
+    return np.cumsum(np.bincount(spokes, minlength=size)[:size])
