@@ -640,25 +640,22 @@ class _Trial:
             return self._shows_always(mistake)
         if not (sets or self._is_choice()):
             return True
-        kind = Budget(SPECIAL)
-        for number in range(MORE_DRAWS):
-            args, _, metric = self.exercise.plain_again[number]
-            run = guard.run(self.function, args, limit=self.exercise.limit)
-            if run.error is not None or not self._is_mistake(mistake, args, metric, (run.result, None)):
-                return False
-            if not kind.left():
-                break  # a slow answer is not called more often than it must
-        return True
+        return self._is_it_on(mistake, (self.exercise.plain_again[number] for number in range(MORE_DRAWS)))
 
     def _shows_always(self, mistake):
         """Whether an answer is a mistake's wherever that is wrong, at special places too: one of a few words may be the
         same by another rule, and be wrong on a draw or two.
         """
+        cases = (self.exercise.all_again[number] for number in range(MORE_CASES + 2 * len(self.exercise.noisy)))
+        return self._is_it_on(mistake, (case for case in cases if self._is_wrong_on(mistake, *case)))
+
+    def _is_wrong_on(self, mistake, args, expected, metric):
+        return not _failure(mistake, args) and not self._is_mistake(mistake, args, metric, (expected, expected))
+
+    def _is_it_on(self, mistake, cases):
+        """Whether the answer gives what a mistake does on (arguments, expected, metric) of each case."""
         kind = Budget(SPECIAL)
-        for number in range(MORE_CASES + 2 * len(self.exercise.noisy)):
-            args, expected, metric = self.exercise.all_again[number]
-            if _failure(mistake, args) or self._is_mistake(mistake, args, metric, (expected, expected)):
-                continue
+        for args, expected, metric in cases:
             run = guard.run(self.function, args, limit=self.exercise.limit)
             if run.error is not None or not self._is_mistake(mistake, args, metric, (run.result, expected)):
                 return False
