@@ -128,6 +128,7 @@ GROUND_FLOOR = {
     "documented": "checks",
     "tables": "checks",
     "places": "checks",
+    "reading": "checks",
     "__init__": "checks",
 }
 MATHEMATICS = ("geometry", "estimation", "calibration", "machines", "localization", "fast")

@@ -15,6 +15,7 @@ import time
 from pathlib import Path
 
 from ..exercises.engine import CORRECT, NOT_YET, RAISED, TO_DO, Prediction
+from ..reading import regular
 from . import judge, library, sandbox, submissions
 from .submissions import Unreadable
 
@@ -82,7 +83,7 @@ def _why_not_reached(id, verdicts, notebook):
 
 def judge_file(path, seed, folder):
     """`--one`: the JSON of one notebook file, written into `folder`; returns its path."""
-    data = Path(path).read_bytes()
+    data = regular(path).read_bytes()
     return _write(folder, judged(data, seed))
 
 
@@ -105,7 +106,7 @@ def place(folder, digest):
 def known(folder, digest, seed):
     """The stored result on a file, if it was judged with this seed by this edition; else None."""
     try:
-        result = json.loads(place(folder, digest).read_text(encoding="utf-8"))
+        result = json.loads(regular(place(folder, digest)).read_text(encoding="utf-8"))
         fresh = (result["digest"], result["seed"], result["edition"]) == (digest, seed, edition())
     except (OSError, ValueError, KeyError, TypeError):
         return None
@@ -117,7 +118,7 @@ def seed_of(folder, wanted=None):
     file = Path(folder) / "seed.txt"
     if wanted is None:
         try:
-            return int(file.read_text(encoding="utf-8"))
+            return int(regular(file).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             wanted = secrets.randbelow(2**62)
     file.parent.mkdir(parents=True, exist_ok=True)

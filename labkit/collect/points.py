@@ -4,6 +4,8 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..reading import regular
+
 DEFAULT = """\
 # What share of an exercise's points each verdict earns.
 [status]
@@ -64,7 +66,7 @@ def read(path=None):
         return Points(**default)
     name = Path(path).name
     try:
-        given = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        given = tomllib.loads(regular(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise PointsError(f"{name}: cannot be read: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -8,6 +8,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 from ..exercises.engine import Prediction, Value
+from ..reading import regular
 from . import library
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet takes such a cell for a formula
@@ -39,7 +40,7 @@ def read_names(path):
     ValueError
         When the file is no table with a header.
     """
-    with open(path, newline="", encoding="utf-8-sig") as file:
+    with open(regular(path), newline="", encoding="utf-8-sig") as file:
         text = file.read()
     dialect = ";" if text.partition("\n")[0].count(";") > text.partition("\n")[0].count(",") else ","
     rows = list(csv.DictReader(io.StringIO(text), delimiter=dialect))

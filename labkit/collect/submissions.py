@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
+from ..reading import regular
 from . import library
 
 LARGEST = 100 << 20  # bytes of one notebook
@@ -67,7 +68,7 @@ def students(paths, problems):
         try:
             _collect(path, files, problems)
         except OSError as error:
-            problems.append((path.name, f"cannot be read: {error.strerror or error}"))
+            problems.append((path.name, f"cannot be read: {why(error)}"))
         for file, (key, name) in zip(files, _owners(path, files)):
             student = found.setdefault(key, Student(key, name))
             student.files.append(file)
@@ -85,11 +86,12 @@ def _collect(path, files, problems):
     elif path.is_file():
         _add(File((unicodedata.normalize("NFC", path.name),), lambda: _bytes(path), path), files, 0)
     else:
-        problems.append((path.name, "there is no such file or folder"))
+        words = "is neither a file nor a folder" if path.exists() else "there is no such file or folder"
+        problems.append((path.name, words))
 
 
 def _bytes(path):
-    if path.stat().st_size > LARGEST:
+    if regular(path).stat().st_size > LARGEST:
         raise Unreadable(f"is larger than {LARGEST >> 20} MB")
     return path.read_bytes()
 
@@ -104,7 +106,7 @@ def _add(file, files, depth):
     try:
         if depth >= DEEPEST:
             raise Unreadable("is a zip file within too many others")
-        archive = zipfile.ZipFile(file.path or io.BytesIO(file.read()))
+        archive = zipfile.ZipFile(regular(file.path) if file.path else io.BytesIO(file.read()))
         for info in sorted(archive.infolist(), key=lambda info: info.filename):
             parts = tuple(part for part in _name(info).split("/") if part not in ("", ".", ".."))
             if info.is_dir() or not parts or any(SKIPPED.match(part) for part in parts):
@@ -112,12 +114,17 @@ def _add(file, files, depth):
             inner = File((*file.where, *parts), lambda archive=archive, info=info: _unzipped(archive, info))
             _add(inner, files, depth + 1)
     except (Unreadable, zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
-        files.append(File(file.where, _raising(f"cannot be unpacked: {error}")))
+        files.append(File(file.where, _raising(f"cannot be unpacked: {why(error)}")))
 
 
-def _raising(why):
+def why(error):
+    """What an error says, without the name of the file: students' names may stand in it."""
+    return getattr(error, "strerror", None) or str(error)
+
+
+def _raising(words):
     def read():
-        raise Unreadable(why)
+        raise Unreadable(words)
 
     return read
 

@@ -10,6 +10,8 @@ import tomllib
 from collections import Counter
 from pathlib import Path
 
+from ..reading import regular
+
 FILE = Path(__file__).with_name("notes.toml")
 MANY = 6
 
@@ -61,7 +63,7 @@ def counted(folder):
     counts = Counter()
     for file in files:
         try:
-            items = json.loads(file.read_text(encoding="utf-8")).get("items", {})
+            items = json.loads(regular(file).read_text(encoding="utf-8")).get("items", {})
             counts.update(v["mistake"] for v in items.values() if v.get("mistake"))
         except (ValueError, AttributeError, TypeError, RecursionError):
             raise ValueError(f"{file}: expected a verdict as `collect` writes it") from None

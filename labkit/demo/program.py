@@ -17,6 +17,7 @@ from pathlib import Path
 from ..exercises import session, source
 from ..exercises.engine import Prediction
 from ..places import ROOT
+from ..reading import regular
 from .vote import MAX_SIZE
 
 MAX_QUESTIONS, MAX_LETTERS, MAX_CHOICES = 100, 400, 8
@@ -272,7 +273,7 @@ def read_questions(path):
 
 def _toml(path):
     """What a TOML file says; the mark that Windows' editors put in front of a text is left out."""
-    if (size := path.stat().st_size) > MAX_FILE:
+    if (size := regular(path).stat().st_size) > MAX_FILE:
         raise ValueError(
             f"{path}: own questions take at most {MAX_FILE / 2**20:g} MB, and this is {size / 2**20:.1f} MB"
         )

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 from ..places import ROOT
+from ..reading import regular
 
 OLD = ROOT / ".lab" / "progress.jsonl"
 LOCKED_BYTE = 1 << 40  # far beyond the end: where locks are mandatory (Windows), no reader meets it
@@ -72,7 +73,7 @@ def _take_over_old():
             return
         taken = OLD
     with contextlib.suppress(OSError):
-        _append(path(), taken.read_text(encoding="utf-8", errors="replace"))
+        _append(path(), regular(taken).read_text(encoding="utf-8", errors="replace"))
 
 
 def _is_mine(file):
@@ -127,7 +128,7 @@ def events():
     with contextlib.suppress(OSError):
         _take_over_old()
     try:
-        lines = path().read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = regular(path()).read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         return []
     return [event for event in map(_read, lines) if event]

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..places import ROOT
+from ..reading import regular
 
 STUB = "...  # your code here"
 BUILD_TAGS = frozenset(("solution", "student"))
@@ -100,7 +101,7 @@ def region(text):
 def _blocks(path):
     """(line number of the header, lines from the header on) of each cell; refuses code before the first header."""
     blocks = []
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+    for number, line in enumerate(regular(path).read_text(encoding="utf-8").splitlines(), start=1):
         if re.match(r"#\s*%%", line):
             blocks.append((number, [line]))
         elif blocks:

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ..geometry.frames import matrix_from_quaternion, pose
+from ..reading import regular
 from .poses import Poses
 from .text import FileError
 
@@ -40,7 +41,8 @@ def read_bag(path, topics):
         raise FileError(f"{path.name}: there is no such file")
     samples = [[] for _ in topics]
     try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        recording = path if path.is_dir() else regular(path)
+        with AnyReader([recording], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
             known = {c.topic: c.msgtype.rpartition("/")[2] for c in reader.connections}
             wanted = {t for t in topics if ":" not in t} | (
                 {"/tf", "/tf_static"} if any(":" in t for t in topics) else set()

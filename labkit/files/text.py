@@ -11,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..reading import regular
+
 MAX_BYTES = 500_000_000
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
 DECIMAL_COMMA = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?")
@@ -82,7 +84,7 @@ def read_text(path):
     if path.is_dir():
         raise FileError(f"{path.name}: expected a file, got a folder")
     try:
-        if path.stat().st_size > MAX_BYTES:
+        if regular(path).stat().st_size > MAX_BYTES:
             raise FileError(f"{path.name}: the file has more than {MAX_BYTES // 10**6} million bytes")
         data = path.read_bytes()
     except FileNotFoundError:

@@ -28,6 +28,7 @@ from ..checks import (
     shown,
 )
 from ..documented import documented
+from ..reading import regular
 
 FREE, OCCUPIED, UNKNOWN = 0, 1, 2
 _SYMBOLS = {".": FREE, " ": FREE, "#": OCCUPIED, "?": UNKNOWN}
@@ -113,7 +114,7 @@ class OccupancyGrid:
         from PIL import Image, UnidentifiedImageError
 
         try:
-            with Image.open(path) as image:
+            with Image.open(regular(path)) as image:
                 gray = np.asarray(image.convert("L"))[::-1] / 255.0
         except UnidentifiedImageError:
             raise ValueError(f"path must name a picture, and {path} is none") from None

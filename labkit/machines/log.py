@@ -16,6 +16,7 @@ from ..checks import as_finite, as_number, as_positive_number, as_shape, as_size
 from ..documented import documented
 from ..geometry.frames import matrix_from_quaternion, pose, quaternion_from_matrix
 from ..geometry.lie import log_so3
+from ..reading import regular
 from .packet import MAX_POSITION, UNIT_TOLERANCE
 
 # ---- the log ---------------------------------------------------------------------------------------------------------
@@ -106,7 +107,7 @@ def read_csv(path):
         by a factor of 1000 (rows in another unit), a last line cut off.
     """
     path = Path(path)
-    text = path.read_text(encoding="utf-8")
+    text = regular(path).read_text(encoding="utf-8")
     lines = text.splitlines()
     if not lines:
         raise ValueError(f"{path.name}: the file is empty, expected a header line")

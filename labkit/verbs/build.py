@@ -25,6 +25,7 @@ from PIL import Image
 
 from ..exercises import source
 from ..places import IS_CHECKOUT
+from ..reading import regular
 from .arguments import Parser, Refusal
 from .notebook_copies import write
 
@@ -156,7 +157,7 @@ def _named(output):
 def keep_pictures(notebook, path):
     """Take the pictures stored in the file `path`, where those of the notebook look the same; returns the notebook."""
     if path.exists():
-        stored = {cell.id: _pictures(cell) for cell in nbformat.read(path, as_version=4).cells}
+        stored = {cell.id: _pictures(cell) for cell in nbformat.read(regular(path), as_version=4).cells}
         for cell in notebook.cells:
             for new, old in zip(_pictures(cell), stored.get(cell.id, [])):
                 if looks_like(new["image/png"], old["image/png"]):
@@ -238,13 +239,13 @@ def stale(paths, notebooks, solutions, rerun=False):
 
 
 def _text(path):
-    return path.read_text(encoding="utf-8") if path.exists() else None
+    return regular(path).read_text(encoding="utf-8") if path.exists() else None
 
 
 def _is_solved(path, source_path):
     if not path.exists():
         return False
-    stored = nbformat.read(path, as_version=4)
+    stored = nbformat.read(regular(path), as_version=4)
     counts = [cell.execution_count for cell in stored.cells if cell.cell_type == "code"]
     if any(_lacks_picture(output) for cell in stored.cells for output in cell.get("outputs", [])):
         return False

@@ -98,7 +98,7 @@ def _read(students, problems):
             try:
                 digest = submissions.digest(file.read())
             except (submissions.Unreadable, OSError) as reason:
-                read[student.key, k] = None, str(reason)
+                read[student.key, k] = None, submissions.why(reason)
                 continue
             read[student.key, k] = digest, ""
             files.setdefault(digest, file.read)

@@ -11,6 +11,7 @@ import os
 from pathlib import Path
 
 from ..places import IS_CHECKOUT, ROOT
+from ..reading import is_taken, regular
 from .arguments import Refusal, named
 
 GIVEN = ".labkit.json"
@@ -30,10 +31,10 @@ def give(folder):
     """Copy those notebooks into a folder that it does not hold yet; returns their names."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    new = {name: text for name, text in blank_notebooks().items() if not (folder / name).exists()}
+    new = {name: text for name, text in blank_notebooks().items() if not is_taken(folder / name)}
+    _remember(folder, new)  # first: a notebook that is there and not remembered would count as written in
     for name, text in new.items():
         write(folder / name, text)
-    _remember(folder, new)
     return list(new)
 
 
@@ -47,32 +48,32 @@ def update(folder):
     """
     folder, said = Path(folder), []
     fresh, given = blank_notebooks(), _given(folder)
-    if not any((folder / name).exists() for name in fresh) and folder.exists() and any(folder.iterdir()):
+    if not any(is_taken(folder / name) for name in fresh) and folder.exists() and any(folder.iterdir()):
         raise Refusal(f"{folder} holds no notebook of the course, but other things: name a folder of its own.")
-    brought = {}
     for name, text in fresh.items():
         try:
-            sentence = _bring(folder / name, text, given.get(name, {}))
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            whole, sentence = _brought(folder / name, text, given.get(name, {}))
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
             said.append(f"{name} cannot be read as a notebook and is left as it is")
             continue
-        brought[name] = text
+        if whole:
+            write(folder / name, whole)
+        _remember(folder, {name: text})  # at once: who is stopped here has no cell that seems to be written in
         said += [sentence] if sentence else []
-    _remember(folder, brought)
     return said
 
 
-def _bring(path, text, given):
-    """Bring one notebook to this edition; returns a sentence, or nothing when it is so already."""
-    if not path.exists():
-        write(path, text)
-        return f"{path.name} is new"
+def _brought(path, text, given):
+    """(one notebook brought to this edition, a sentence about it); both are empty when it is so already."""
+    if not is_taken(path):
+        return text, f"{path.name} is new"
     merged, kept = merge(_read(path), json.loads(text), given)
     if merged is None:
-        return ""
+        return "", ""
     text = json.dumps(merged, indent=1, ensure_ascii=False) + "\n"
-    write(path, text.encode("utf-8", "backslashreplace").decode())  # half of a letter, as JSON writes it: \ud800
-    return f"{path.name} is brought to this edition" + (f"; {kept} of its cells stay as you wrote them" if kept else "")
+    kept = f"; {kept} of its cells stay as you wrote them" if kept else ""
+    # half of a letter is written as JSON does: \ud800
+    return text.encode("utf-8", "backslashreplace").decode(), f"{path.name} is brought to this edition{kept}"
 
 
 def merge(mine, theirs, given):
@@ -121,12 +122,12 @@ def fresh_copy(path, text, shown):
     """Put a notebook's beginning in place; one that differs is kept beside it. Returns what was done, and what to do
     where it is open: JupyterLab goes on showing what it has read, and saving that would undo this.
     """
-    if path.exists() and path.read_text(encoding="utf-8", errors="replace") == text:
+    if path.is_file() and path.read_text(encoding="utf-8", errors="replace") == text:
         return f"{shown} is as in the beginning already"
     kept = ""
-    if path.exists():
+    if is_taken(path):
         copies = (path.with_name(f"{path.stem}.my-copy-{k}.ipynb") for k in itertools.count(1))
-        copy = next(copy for copy in copies if not copy.exists())
+        copy = next(copy for copy in copies if not is_taken(copy))
         os.replace(path, copy)
         kept = f"; yours is kept as {shown[: -len(path.name)]}{copy.name}.\n{WHERE_OPEN}"
     write(path, text)
@@ -134,7 +135,8 @@ def fresh_copy(path, text, shown):
 
 
 def write(path, text):
-    """Write a file whole or not at all."""
+    """Write a file whole or not at all; a link stays one, and what it leads to is written."""
+    path = Path(os.path.realpath(path))
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.name}.partial")
     try:
@@ -146,7 +148,7 @@ def write(path, text):
 
 
 def _read(path):
-    return json.loads(path.read_text(encoding="utf-8"))
+    return json.loads(regular(path).read_text(encoding="utf-8"))
 
 
 def _given(folder):

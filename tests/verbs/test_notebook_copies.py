@@ -1,6 +1,7 @@
 """Notebooks given to a folder, updated without touching what was written, and reset with a copy kept."""
 
 import json
+import os
 
 import pytest
 
@@ -110,6 +111,40 @@ def test_update_leaves_what_it_cannot_read_and_tries_again_the_next_time(folder)
     (folder / "01_a.ipynb").write_text(whole, encoding="utf-8")
     notebook_copies.update(folder)
     assert sources(folder / "01_a.ipynb") == ["new", "2"]
+
+
+def test_who_is_stopped_between_two_notebooks_has_no_cell_that_seems_to_be_written_in(folder, monkeypatch):
+    """The disk is full at the second one; a later edition finds both as they were given, and brings them."""
+    fresh = json.dumps(notebook(a="new", b="2"))
+
+    def until_the_second(path, text, write=notebook_copies.write):
+        if path.name == "02_b.ipynb":
+            raise OSError("no room")
+        write(path, text)
+
+    for work in (notebook_copies.update, notebook_copies.give):
+        if work is notebook_copies.give:
+            for path in list(folder.iterdir()):
+                path.unlink()
+        monkeypatch.setattr(notebook_copies, "blank_notebooks", lambda: {"01_a.ipynb": fresh, "02_b.ipynb": fresh})
+        with monkeypatch.context() as patch, pytest.raises(OSError, match="no room"):
+            patch.setattr(notebook_copies, "write", until_the_second)
+            work(folder)
+        last = json.dumps(notebook(a="newest", b="2"))
+        monkeypatch.setattr(
+            notebook_copies, "blank_notebooks", lambda last=last: {n: last for n in ("01_a.ipynb", "02_b.ipynb")}
+        )
+        assert "01_a.ipynb is brought to this edition" in notebook_copies.update(folder)
+        assert sources(folder / "01_a.ipynb") == sources(folder / "02_b.ipynb") == ["newest", "2"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need a right there that few have")
+def test_a_notebook_that_is_a_link_is_written_where_it_leads(folder, tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    place = (folder / "01_a.ipynb").rename(tmp_path / "elsewhere" / "mine.ipynb")
+    (folder / "01_a.ipynb").symlink_to(place)
+    assert notebook_copies.update(folder) == ["01_a.ipynb is brought to this edition"]
+    assert (folder / "01_a.ipynb").is_symlink() and sources(place) == ["new", "2"]
 
 
 def test_update_fills_an_empty_folder_and_refuses_one_of_other_things(folder, tmp_path):
