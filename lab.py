@@ -114,7 +114,7 @@ def make_ready(root, python, stamp_file, extra, held):
     folder = root / ".venv"
     version, before = version_of(python), read_stamp(stamp_file)
     if version is None or before.get("python") != version or not works(python, "-m", "pip", "--version"):
-        make_venv(folder)
+        make_venv(folder, held)
         before = {}
     extra = extra or before.get("extra", "")
     if stamp_file.exists():
@@ -200,16 +200,14 @@ def works(*words):
         return False
 
 
-def make_venv(folder):
+def make_venv(folder, held=None):
     """A fresh virtual environment; an unfinished one, or one of another Python, is replaced."""
     if Path(sys.prefix).resolve() == folder.resolve():
         raise Refusal("The environment in .venv is broken, and this is its Python. Start with another: python3 lab.py")
     print("Making the environment .venv ...", flush=True)
-    made = subprocess.run(
-        [sys.executable, "-m", "venv", "--clear", str(folder)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT
-    )
-    if made.returncode:
-        raise Refusal(venv_advice(made.stdout.decode(errors="replace")))
+    with (folder.parent / ".lab" / "setup.log").open("wb+") as log:
+        if logged([sys.executable, "-m", "venv", "--clear", str(folder)], folder.parent, log, held):
+            raise Refusal(venv_advice(said(log)))
 
 
 def venv_advice(output):
@@ -257,9 +255,9 @@ def said(log):
 
 def logged(words, folder, log, held=None):
     """Exit code of a program that writes into a log; it ends with this one, and where it survives keeps the lock."""
-    shared = [held.fileno()] if held is not None and os.name != "nt" else []
+    shared = {} if os.name == "nt" else {"process_group": 0, "pass_fds": [held.fileno()] if held is not None else []}
     process = subprocess.Popen(
-        words, cwd=str(folder), stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, pass_fds=shared
+        words, cwd=str(folder), stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, **shared
     )
     with ended_with_this(process):
         return process.wait()
@@ -267,7 +265,7 @@ def logged(words, folder, log, held=None):
 
 @contextlib.contextmanager
 def ended_with_this(process):
-    """While a program runs, what ends this one ends it first."""
+    """While a program runs, what ends this one ends it first, and where it leads a group what it has started."""
 
     def end(number, frame):
         sys.exit(128 + number)
@@ -277,7 +275,10 @@ def ended_with_this(process):
     try:
         yield
     except BaseException:
-        process.terminate()
+        if os.name == "nt":
+            process.terminate()
+        else:
+            os.killpg(process.pid, signal.SIGTERM)
         process.wait()
         raise
     finally:

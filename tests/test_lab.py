@@ -30,7 +30,7 @@ def fake_set_up(monkeypatch, checkout):
     done = []
     python = lab.venv_python(checkout / ".venv")
 
-    def make_venv(folder):
+    def make_venv(folder, held):
         done.append("venv")
         python.parent.mkdir(parents=True, exist_ok=True)
         python.write_text("", encoding="utf-8")
@@ -178,15 +178,15 @@ def programs(monkeypatch):
     """Programs that are not run but answer as told: `answers` are (exit code, words), `asked` the commands."""
 
     class Programs:
-        answers, asked = [], []
+        answers, asked, held = [], [], []
 
     def logged(words, folder, log, held=None):
         Programs.asked.append(words)
+        Programs.held.append(held)
         code, said = Programs.answers.pop(0)
         log.write(said.encode())
         return code
 
-    Programs.asked = []
     monkeypatch.setattr(lab, "logged", logged)
     return Programs
 
@@ -218,9 +218,10 @@ def test_without_a_network_one_attempt_is_enough(checkout, programs):
 @pytest.mark.skipif(os.name == "nt", reason="file locks are inherited on POSIX alone")
 @pytest.mark.parametrize(("number", "ends"), [(signal.SIGTERM, True), (signal.SIGHUP, True), (signal.SIGKILL, False)])
 def test_an_installation_ends_with_lab_py_or_keeps_its_lock(tmp_path, number, ends):
-    """The program that installs is told to end; where it cannot be told, a second set-up waits until it has."""
+    """What installs is told to end, with all it has started; where that cannot be, a second set-up waits for it."""
     path, shown = tmp_path / "lock", tmp_path / "log"
-    child = "import os, time; print(os.getpid(), flush=True); time.sleep(60)"
+    grandchild = "import os, time; print(os.getpid(), flush=True); time.sleep(60)"
+    child = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {grandchild!r}], close_fds=False)"
     code = f"""import lab, pathlib, sys
 with lab.only_one(pathlib.Path({str(path)!r})) as held, open({str(shown)!r}, 'ab') as log:
     lab.logged([sys.executable, '-c', {child!r}], '.', log, held)"""
@@ -232,12 +233,33 @@ with lab.only_one(pathlib.Path({str(path)!r})) as held, open({str(shown)!r}, 'ab
     parent.wait(10)
     with path.open("a+b") as file:
         if ends:
-            lab.lock(file, wait=False)
+            free_soon(file)
         else:
             with pytest.raises(OSError):
                 lab.lock(file, wait=False)
             os.kill(pid, signal.SIGKILL)
             lab.lock(file, wait=True)
+
+
+def free_soon(file):
+    """A lock falls when the last program that holds it has ended, which is some moments after it was told to."""
+    deadline = time.monotonic() + 20
+    while True:
+        try:
+            return lab.lock(file, wait=False)
+        except OSError:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+
+
+def test_the_environment_is_made_by_a_program_that_holds_the_lock(checkout, programs):
+    """And its words are read from its log: what is made there must not be made twice at the same time."""
+    programs.answers = [(0, ""), (1, "ensurepip is not available")]
+    with lab.only_one(checkout / ".lab" / "setup.lock") as held:
+        lab.make_venv(checkout / ".venv", held)
+        with pytest.raises(lab.Refusal, match="sudo apt install python3-venv"):
+            lab.make_venv(checkout / ".venv", held)
+    assert programs.held == [held, held] and programs.asked[0][-1] == str(checkout / ".venv")
 
 
 @pytest.mark.parametrize("error", [errno.ENOSPC, errno.EROFS, errno.EACCES])
@@ -264,7 +286,7 @@ def test_a_disk_that_fills_up_meanwhile_gets_one_sentence(checkout, monkeypatch,
         raise OSError(errno.ENOSPC, "No space left on device", str(path))
 
     monkeypatch.setattr(lab, "ROOT", checkout)
-    monkeypatch.setattr(lab, "make_venv", lambda folder: folder.mkdir())
+    monkeypatch.setattr(lab, "make_venv", lambda folder, held: folder.mkdir())
     monkeypatch.setattr(lab, "install", install)
     monkeypatch.setattr(lab.Path, "write_text", refuse)
     assert lab.main(["progress"]) == 1
