@@ -19,6 +19,7 @@ FORMS = (
     "d.d0ek",
     "-d000",
     "dd.d",
+    "ddd.dddd",
     "dek",
     "d.dde-k",
     "d,de-k",
@@ -56,7 +57,8 @@ def special_comparison(rng, kind, simulated, beyond):
 
     "sign": the value has the other sign. "edge": it is off by half a unit to the last bit, from an odd number. "limit":
     by half a unit and the bound. "small" and "far": printed with an exponent below 0, and within the half unit or far
-    away; "large": with one above 0, within the half unit. "whole": a whole number, of which the last digits are 0.
+    away; "large": with one above 0, within the half unit. "finest" and "fine": six decimals, and the value is off by less
+    than half a unit of the last, or by nearly one. "wide": off by hundreds, within the bound. "whole": a whole number, of which the last digits are 0.
     "zero": 0 is printed. "digits": eight digits, and the value is off by more than half a unit and the bound.
     """
     misprint, bound = bool(rng.integers(2)), float(rng.integers(1 if kind == "limit" else 0, 4))
@@ -72,8 +74,13 @@ def special_comparison(rng, kind, simulated, beyond):
         return f"{whole}00", float(100 * whole + side * rng.uniform(5, 40)), bound, misprint, simulated
     if kind == "zero":
         return "0.0", float(side * rng.uniform(0.01, 0.04)), bound, misprint, simulated
+    if kind in ("finest", "fine"):
+        printed = f"{whole}{rng.integers(10, 100)}.{rng.integers(10, 100)}{rng.integers(100, 1000)}{rng.integers(3, 7)}"
+        return printed, float(printed) + side * (0.3e-6 if kind == "finest" else 0.9e-6), 0.0, misprint, simulated
+    if kind == "wide":
+        return f"{whole}00", float(100 * whole + side * rng.uniform(200, 400)), 500.0, misprint, simulated
     if kind == "digits":
-        printed = f"{1000 * whole + rng.uniform(0, 1000):.3f}"
+        printed = f"{100000 * whole + rng.uniform(0, 100000):.3f}"
         return printed, float(printed) + side * 2.7 * 0.0005, 1.5 * 0.0005, misprint, simulated
     unit = 100.0 if kind == "large" else 0.01
     value = unit * (whole + side * (9.0 if kind == "far" else 0.3))
@@ -94,6 +101,11 @@ SPECIAL = tuple(
         *((kind, "the number is printed with an exponent, as 3e-4 or 3e4") for kind in ("small", "far", "large")),
         ("zero", "0 is printed"),
         ("whole", "the number is whole and ends with zeros: they are digits like all others"),
+        *(
+            (kind, "six decimals are printed: the last one is worth a millionth, and half of it is allowed")
+            for kind in ("finest", "fine")
+        ),
+        ("wide", "the bound is wide, some hundreds: it is allowed as it is"),
         ("digits", "many digits are printed: what is allowed are half unit and bound, and no share of the number"),
     )
     for simulated, beyond in itertools.product((False, True), repeat=2)

@@ -48,6 +48,11 @@ def shortage(x):
     return float(10 - x[0] * x[-1] ** 2)
 
 
+def growth(x):
+    """The power of 1.2 by the sum of all, which grows the faster the larger they are."""
+    return float(1.2 ** np.sum(x))
+
+
 FUNCTIONS = (total, product, length, share, last_power, depth, shortage)
 
 
@@ -66,20 +71,29 @@ INPUTS = tuple(functools.partial(printed_inputs, function=f) for f in FUNCTIONS)
 
 def special_inputs(rng, kind):
     """A function and printed numbers: "whole", with an "exponent", one printed "twice", "one" alone, "six", or with a
-    "zero" among them, or zeros "only".
+    "zero" among them, or zeros "only"; "fine" and "large": all of six decimals and near 0, or in the ten thousands;
+    "negative": all below 0.
     """
     if kind == "only":
         return total, ["0", "0.0", "-0,00"][: rng.integers(2, 4)]
     texts = [str(rng.integers(2, 30)) for _ in range({"one": 1, "six": 6}.get(kind, 3))]
     if kind == "exponent":
         texts[0] = f"{rng.uniform(2, 9):.{rng.integers(1, 3)}f}e{rng.choice([-2, -1])}"
-        texts[1] = f"{rng.uniform(2, 9):.{rng.integers(1, 3)}f}e{rng.choice([1, 2])}".replace(".", ",")
+        texts[1] = f"{rng.uniform(2, 9):.{rng.integers(1, 3)}f}e{rng.choice([3, 4])}".replace(".", ",")
+    elif kind == "negative":
+        texts = [f"-{rng.uniform(1, 3):.{rng.integers(0, 2)}f}" for _ in texts]
+    elif kind == "fine":
+        texts = [f"{rng.uniform(-2e-4, 9e-4):.6f}" for _ in texts]
+    elif kind == "large":
+        texts = [f"{rng.uniform(1e4, 9e4):.{rng.integers(0, 3)}f}" for _ in texts]
     elif kind == "zero":
         texts[int(rng.integers(0, 3))] = str(rng.choice(["0", "0.0", "-0,00"]))
     elif kind == "twice":
         texts = [f"{rng.uniform(2, 9):.{rng.integers(1, 3)}f}" for _ in range(2)]
         texts.insert(int(rng.integers(0, 3)), texts[0])
-    return (length if kind in ("one", "six") else last_power), texts
+    return {"one": length, "six": length, "large": length, "fine": total, "negative": growth}.get(
+        kind, last_power
+    ), texts
 
 
 def bound(f, printed):
@@ -183,7 +197,7 @@ BOUND = Exercise(
     noisy=[
         (
             functools.partial(special_inputs, kind=kind),
-            metrics.Numbers(1e-9),
+            metrics.Numbers(1e-9, least=0.0 if kind == "fine" else 1.0),
             f"right in ordinary cases, but not where {words}:",
         )
         for kind, words in (
@@ -193,6 +207,9 @@ BOUND = Exercise(
             ("one", "f takes one number alone"),
             ("six", "f takes more than four numbers"),
             ("zero", "a number is printed as 0: that may be anything within its half unit too"),
+            ("negative", "all numbers are below 0"),
+            ("fine", "all numbers are near 0, with six decimals: half units of half a millionth move f as well"),
+            ("large", "all numbers are above 10000: they may be off by their half unit and no more"),
             ("only", "all numbers are printed as 0"),
         )
     ],

@@ -19,10 +19,13 @@ from ...machines.sensor_cell import CELL
 # --- draws -----------------------------------------------------------------------------------------------------------
 
 
-def rows_of_a_cell(rng, n=None, still=False):
-    """Flange poses and exact readings of n rows, or some, from random places; `still`: of which two are the same."""
+def rows_of_a_cell(rng, n=None, still=False, reach=400.0):
+    """Flange poses and exact readings of n rows, or some, from random places; `still`: of which two are the same.
+
+    reach: how far from the base the flange goes, in each direction (mm).
+    """
     n = n or int(rng.integers(4, 10))
-    T_BF = pose(exp_so3(rng.uniform(-1, 1, (n, 3))), rng.uniform(-400, 400, (n, 3)))
+    T_BF = pose(exp_so3(rng.uniform(-1, 1, (n, 3))), rng.uniform(-reach, reach, (n, 3)))
     if still:
         T_BF[2] = T_BF[1]
     X = pose(exp_so3(rng.uniform(-1, 1, 3)), rng.uniform(-150, 150, 3))
@@ -30,13 +33,13 @@ def rows_of_a_cell(rng, n=None, still=False):
     return T_BF, invert(T_BF @ X) @ Y
 
 
-def some_motions(rng, apart, turns=(0.2, 2.0)):
-    """Motions that turn by such angles (rad) about axes in all directions, and how far apart they are compared.
+def some_motions(rng, apart, turns=(0.2, 2.0), n=None):
+    """n motions, or some, that turn by such angles (rad) about axes in all directions, and how far apart they are compared.
 
     Some of the axes that are compared have largest entries of different sign: with turns from 2.2 on the scalar part of
     the quaternion that SciPy gives is negative for one of the two.
     """
-    n = int(rng.integers(5, 10))
+    n = n or int(rng.integers(5, 10))
     while True:
         axes = rng.normal(size=(n, 3))
         axes /= np.linalg.norm(axes, axis=1, keepdims=True)
@@ -88,16 +91,18 @@ def small_turns(rng):
     return some_motions(rng, int(rng.integers(1, 4)), turns=(2e-4, 4e-3))
 
 
-def fitted_line(rng, freedom=(4, 8), p=None, unlike=False, alone=False, unused=False):
+def fitted_line(rng, freedom=(4, 8), p=None, unlike=False, alone=False, unused=False, size=1.0, noise=(0.2, 4.0)):
     """Residuals of a linear fit of p parameters to n numbers, and its derivative.
 
     freedom: the least and the largest n - p. unlike: the parameters have units of very different size, as radians
-    beside millimeters. alone: one number pays for nearly all of a parameter, its share is above 0.99. unused: one number
-    does not depend on the parameters.
+    beside millimeters. alone: one number pays for nearly all of a parameter, its share is above 0.999. unused: one number
+    does not depend on the parameters. size: of the derivative, as the unit of the parameters makes it. noise: its least
+    and largest standard deviation.
     """
     p = p or int(rng.integers(2, 6))
     n = p + int(rng.integers(freedom[0], freedom[1] + 1))
-    J, noise = rng.normal(size=(n, p)) * rng.uniform(0.3, 3.0), rng.uniform(0.2, 4.0) * rng.normal(size=n)
+    J, noise = rng.normal(size=(n, p)) * rng.uniform(0.3, 3.0), rng.uniform(*noise) * rng.normal(size=n)
+    J *= size
     if unused:
         J[int(rng.integers(n))] = 0.0
     if unlike:
@@ -105,7 +110,7 @@ def fitted_line(rng, freedom=(4, 8), p=None, unlike=False, alone=False, unused=F
     if alone:
         k = int(rng.integers(n))
         others = np.delete(J, k, axis=0)
-        J[k] *= np.sqrt(rng.uniform(150, 900) / (J[k] @ np.linalg.solve(others.T @ others, J[k])))
+        J[k] *= np.sqrt(rng.uniform(1500, 9000) / (J[k] @ np.linalg.solve(others.T @ others, J[k])))
     return noise - J @ np.linalg.lstsq(J, noise, rcond=None)[0], J
 
 
@@ -116,33 +121,35 @@ def information(rng, p=None):
     return M @ M.T + 1e-3 * np.diag(rng.uniform(0.5, 1.5, p))
 
 
-def covariance_and_reading(rng, more=None, k=None, p=None):
+def covariance_and_reading(rng, more=None, k=None, p=None, unit=1.0, unlike=0.0):
     """A covariance of p parameters, and the derivative of one more reading of k numbers; by how many there are `more` of
-    them than parameters.
+    them than parameters. unit: of the parameters, in which they are written; unlike: by how many powers of ten the
+    units of the first and the last of them differ.
     """
     C = information(rng, p)
     p = len(C)
     k = k or int(rng.integers(1, p) if more is None else p + more)
-    return C, rng.normal(size=(k, p)) * rng.uniform(0.3, 2.0)
+    units = unit * 10.0 ** np.linspace(0.0, unlike, p)
+    return C / np.outer(units, units), rng.normal(size=(k, p)) * rng.uniform(0.3, 2.0) * units
 
 
-def covariance_and_candidates(rng, rules, volume=None):
-    """A covariance and derivatives of possible readings among which each of the wrong rules picks another one.
+def covariance_and_candidates(rng, rules, volume=None, m=None, p=None):
+    """A covariance of p parameters and derivatives of m of possible readings among which each of the wrong rules picks another one.
 
     volume: the smallest determinant that is left, by a choice of units: all above 1, or all 0 to some decimals.
     """
     while True:
-        C, m = information(rng), int(rng.integers(7, 13))
-        candidates = rng.normal(size=(m, int(rng.integers(2, 4)), len(C))) * rng.uniform(0.2, 2.0, (m, 1, 1))
+        C, count = information(rng, p), m or int(rng.integers(7, 13))
+        candidates = rng.normal(size=(count, int(rng.integers(2, 4)), len(C))) * rng.uniform(0.2, 2.0, (count, 1, 1))
         picks = [rule(C, candidates) for rule in (next_pose, *rules)]
         if len({*picks, picks[0] + 1}) == len(picks) + 1 and _alone(C, candidates) != picks[0] != 0:
             unit = 1.0 if volume is None else (volume / _volumes(C, candidates).min()) ** (1 / len(C))
             return unit * C, candidates / np.sqrt(unit)
 
 
-def best_at(rng, place):
+def best_at(rng, place, **sizes):
     """A covariance and candidates of which the best one stands at this place."""
-    C, candidates = covariance_and_candidates(rng, ())
+    C, candidates = covariance_and_candidates(rng, (), **sizes)
     order = np.arange(len(candidates))
     order[[place, next_pose(C, candidates)]] = order[[next_pose(C, candidates), place]]
     return C, candidates[order]
@@ -160,10 +167,10 @@ def few_candidates(rng, m=None):
     return C, rng.normal(size=(m, len(C) + 1, len(C))) * rng.uniform(0.1, 0.4, (m, 1, 1))
 
 
-def shares_of_a_fit(rng, **kind):
+def shares_of_a_fit(rng, std=(0.05, 3.0), times=(3.0, 6.0), **kind):
     """Whitened derivative, noise of a number, and how many standard deviations are taken as seen."""
     _, J = fitted_line(rng, **kind)
-    return J, float(rng.uniform(0.05, 3.0)), float(rng.uniform(3.0, 6.0))
+    return J, float(rng.uniform(*std)), float(rng.uniform(*times))
 
 
 def special_fits(draw, metric, freedom=1):
@@ -172,13 +179,25 @@ def special_fits(draw, metric, freedom=1):
         (functools.partial(draw, unlike=True), metric,
          "right where all parameters have units of one size, but not where they differ, as radians and millimeters do:"),
         (functools.partial(draw, alone=True), metric,
-         "right for small shares h, but not where one number has a share above 0.99:"),
+         "right for small shares h, but not where one number has a share above 0.999:"),
         (functools.partial(draw, p=1), metric, "right for several parameters, but not for one, p = 1:"),
         (functools.partial(draw, unused=True), metric,
          "right in ordinary cases, but not where a row of J is 0: this number tells nothing of the parameters, its share h is 0:"),
         (functools.partial(draw, p=7), metric, "right for few parameters, but not for seven:"),
+        (functools.partial(draw, freedom=(90, 120)), metric, "right for few numbers, but not for a hundred:"),
+        (functools.partial(draw, size=1e-4), metric,
+         "right for derivatives of the size of 1, but not where the unit of the parameters makes them ten thousand times as small:"),
         (functools.partial(draw, freedom=(freedom, freedom)), metric,
          f"right where n - p is larger, but not where it is {freedom}, the least that is allowed:"),
+    ]  # fmt: skip
+
+
+def of_other_noise(metric):
+    """What `noisy` takes of fits with residuals of other size."""
+    return [
+        (functools.partial(fitted_line, noise=noise), metric,
+         f"right for residuals of the size of 1, but not where they are {words}:")
+        for noise, words in (((1e-5, 1e-4), "a ten thousandth, as of angles in rad"), ((2e3, 9e3), "some thousands"))
     ]  # fmt: skip
 
 
@@ -410,7 +429,7 @@ CHOICES = tuple(
         ((_least_certain_volume, _largest_eigenvalue), None),
         ((_least_certain_first, _least_certain), 10.0),
         ((_product_of_variances, _largest_eigenvalue, _smallest_trace), None),
-        ((_largest_information, _largest_derivative, _volume_of_a_part(np.s_[-3:])), 1e-15),
+        ((_largest_information, _largest_derivative, _volume_of_a_part(np.s_[-3:])), 1e-24),
         ((_numbers_alone, _one_in_every_entry), None),
         ((_reading_counted(2),), None),
         ((_reading_counted(0),), None),
@@ -464,6 +483,7 @@ CHAPTER = Chapter(
             metric=MOTIONS,
             noisy=[
                 (functools.partial(rows_of_a_cell, n=2), MOTIONS, "right for many rows, but not for two of them, which make one motion:"),
+                (functools.partial(rows_of_a_cell, n=40, reach=20000.0), MOTIONS, "right for few rows, but not for forty of them, meters apart:"),
                 (functools.partial(rows_of_a_cell, still=True), MOTIONS, "right where the robot always moves, but not where it stays, and a motion is the identity:"),
             ],
             hints=(
@@ -527,6 +547,7 @@ CHAPTER = Chapter(
                 (axes_nearly_along, metrics.Numbers(1e-6, "rad"),
                  "right for axes in all directions, but not for nearly parallel and nearly opposite ones, whose small angles count:"),
                 (one_pair, metrics.Numbers(1e-6, "rad"), "right for several pairs, but not where one pair alone is to be compared, which gives one angle in an array:"),
+                (functools.partial(some_motions, apart=7, n=20), metrics.Numbers(1e-6, "rad"), "right for few motions, but not where there are twenty, compared seven apart:"),
                 (small_turns, metrics.Numbers(1e-6, "rad"), "right for large turns, but not for motions that turn by less than a quarter of a degree, which have an axis too:"),
                 (motions_of_half_a_turn, metrics.Numbers(1e-6, "rad"),
                  "right in ordinary cases, but not for motions of nearly half a turn, where the sine of the angle, and R less its transpose with it, vanishes:"),
@@ -627,7 +648,7 @@ CHAPTER = Chapter(
             reference=left_out,
             draw=fitted_line,
             metric=metrics.Numbers(1e-7),
-            noisy=special_fits(fitted_line, metrics.Numbers(1e-7)),
+            noisy=[*special_fits(fitted_line, metrics.Numbers(1e-7)), *of_other_noise(metrics.Numbers(1e-7, least=0.0))],
             hints=(
                 "A number that is fitted pulls the fit toward itself. Its share is h = j^T (J^T J)^-1 j, with j its row of J.",
                 "Of its own error only 1 - h is left in the residual: divide by that.",
@@ -681,8 +702,7 @@ CHAPTER = Chapter(
             metric=metrics.Numbers(1e-8, least=0.0),
             noisy=[
                 *special_fits(fitted_line, metrics.Numbers(1e-8, least=0.0), freedom=3),
-                (functools.partial(fitted_line, freedom=(90, 120)), metrics.Numbers(1e-8, least=0.0),
-                 "right for few numbers, but not for a hundred, where Student's factor is nearly 1 and not 1 yet:"),
+                *of_other_noise(metrics.Numbers(1e-8, least=0.0)),
             ],
             hints=(
                 "First the noise: r^T r, divided by the number of residuals less the number of parameters, f.",
@@ -738,6 +758,12 @@ CHAPTER = Chapter(
                   for more in (0, 2)),
                 (functools.partial(covariance_and_reading, k=1), metrics.Numbers(1e-7), "right for several numbers, but not for a reading of a single one:"),
                 (functools.partial(covariance_and_reading, p=1, k=2), metrics.Numbers(1e-7), "right for several parameters, but not for one, p = 1:"),
+                (functools.partial(covariance_and_reading, p=12, k=6), metrics.Numbers(1e-7), "right for few parameters, but not for twelve, as a hand-eye calibration has:"),
+                (functools.partial(covariance_and_reading, unlike=4.0), metrics.Numbers(1e-7),
+                 "right for parameters of one unit, but not where some are in rad and some in mm, so that their variances are of very different size:"),
+                *((functools.partial(covariance_and_reading, unit=unit), metrics.Numbers(1e-7, least=0.0),
+                   f"right for variances of the size of 1, but not where their unit makes them a hundred million times as {words}:")
+                  for unit, words in ((1e4, "small"), (1e-4, "large"))),
             ],
             hints=(
                 "What is known adds up, not what is unknown: information is the inverse of a covariance.",
@@ -791,6 +817,8 @@ CHAPTER = Chapter(
             noisy=[
                 (functools.partial(best_at, place=0), metrics.Exactly(), "right where the best candidate is not the first, but not where it is:"),
                 (functools.partial(best_at, place=-1), metrics.Exactly(), "right where the best candidate is not the last, but not where it is:"),
+                (functools.partial(best_at, place=-1, m=50, p=12), metrics.Exactly(),
+                 "right for few, but not where the best of fifty candidates is the last, and there are twelve parameters:"),
                 (few_candidates, metrics.Exactly(), "right in ordinary cases, but not where there are fewer candidates than parameters, each of more numbers than these:"),
                 (functools.partial(few_candidates, m=1), metrics.Exactly(), "right for several candidates, but not where there is only one to choose:"),
                 (single_numbers, metrics.Exactly(), "right for candidates of several numbers, but not where each reading is a single one:"),
@@ -837,7 +865,15 @@ CHAPTER = Chapter(
             reference=visible,
             draw=shares_of_a_fit,
             metric=metrics.Numbers(1e-8),
-            noisy=special_fits(shares_of_a_fit, metrics.Numbers(1e-8)),
+            noisy=[
+                *special_fits(shares_of_a_fit, metrics.Numbers(1e-8)),
+                *((functools.partial(shares_of_a_fit, std=std), metrics.Numbers(1e-8, least=0.0),
+                   f"right for noise of the size of 1, but not where it is {words}:")
+                  for std, words in (((1e-5, 1e-4), "a ten thousandth, as of angles in rad"), ((200.0, 900.0), "some hundreds, as of counts"))),
+                *((functools.partial(shares_of_a_fit, times=times), metrics.Numbers(1e-8),
+                   f"right where an error must reach a few standard deviations, but not where it is {words}:")
+                  for times, words in (((0.2, 0.9), "less than one of them"), ((20.0, 60.0), "some tens of them"))),
+            ],
             hints=(
                 "An error d of one number leaves (1 - h) d in its own residual. How large is the noise of that residual?",
                 "The standard deviation of the residual is std sqrt(1 - h). The error is seen when (1 - h) d is `times` as large.",
