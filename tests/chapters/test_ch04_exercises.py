@@ -405,3 +405,91 @@ def test_a_length_is_no_sum_of_absolute_values_at_any_check():
         return "not stationary" if np.abs(g).sum() > 1e-6 else kind(H)
 
     assert {judged("classify_extremum", by_sum, seed).mistake is None for seed in range(5)} == {False}
+
+
+def of_plain_size(right, small=1e-3, large=1e3):
+    """An answer that takes results smaller for 0, and cuts larger ones."""
+    return lambda *given: np.clip(
+        np.where(np.abs(value := np.asarray(right(*given))) < small, 0.0, value), -large, large
+    )
+
+
+def eliminated(first):
+    """Newton's step by elimination, which divides by one entry of H."""
+    order = [0, 1] if first == 0 else [1, 0]
+
+    def answer(g, H):
+        (a, b), (c, d) = H[np.ix_(order, order)]
+        p, q = -g[order]
+        y = (q - c / a * p) / (d - c / a * b)
+        return np.array([(p - b * y) / a, y])[order]
+
+    return answer
+
+
+def run_of(cap=np.inf, floor=0.0, rounds=100, **changes):
+    """The loop with a largest and a smallest radius, rounds at most, or with other limits."""
+
+    def follow(radius, length, rho):
+        return min(cap, max(floor, changes.get("rule", beyond.rule)(radius, length, rho)))
+
+    keep = changes.get("keep", lambda rho: rho > 0.1)
+    return lambda residual, jacobian, x, radius, steps: beyond.descend(
+        residual, jacobian, x, radius, min(steps, rounds), follow=follow, keep=keep
+    )
+
+
+def by_forward_differences(x, h=1e-8):
+    return np.array([(wells.value(x + e) - wells.value(x)) / h for e in h * np.eye(2)])
+
+
+CHORD, KIND = ITEMS["rise_above_chord"].reference, ITEMS["classify_extremum"].reference
+FORGETFUL = [
+    ("gradient", by_forward_differences),
+    ("gradient", lambda x: wells.gradient(x) * (np.linalg.norm(x) < 100)),
+    ("gradient", lambda x: wells.gradient(x) * (x != 0).all()),
+    ("hessian", of_plain_size(wells.hessian)),
+    ("jacobian", lambda x: wells.jacobian(x) * (np.linalg.norm(x) < 100)),
+    ("measured_gradient", lambda f, x, h: beyond.measured_gradient(f, x, max(h, 1e-3))),
+    ("measured_gradient", lambda f, x, h: beyond.measured_gradient(f, x, min(h, 0.1))),
+    ("measured_gradient", lambda f, x, h: beyond.measured_gradient(f, x, h) * (np.arange(len(x)) < 5)),
+    ("measured_gradient", of_plain_size(beyond.measured_gradient)),
+    ("classify_extremum", lambda g, H: KIND(g, H) if g.any() else "not stationary"),
+    ("classify_extremum", lambda g, H: KIND(g, H) if np.ptp(np.linalg.eigvalsh(H)) else "saddle"),
+    ("classify_extremum", lambda g, H: KIND(g, H) if np.abs(H).max() > 1e-10 else "saddle"),
+    ("newton_step", eliminated(0)),
+    ("newton_step", eliminated(1)),
+    ("newton_step", of_plain_size(opt.newton_step, small=0)),
+    ("newton_step", lambda g, H: np.linalg.norm(g) * np.linalg.solve(H, -g / np.linalg.norm(g))),
+    ("rise_above_chord", lambda f, x, y, n: CHORD(f, x, y, min(n, 50))),
+    ("rise_above_chord", lambda f, x, y, n: CHORD(f, x, y, n) * (n != 3)),
+    ("rise_above_chord", lambda f, x, y, n: CHORD(f, x, y, n) * (len(x) > 1)),
+    ("rise_above_chord", of_plain_size(CHORD)),
+    ("rise_above_chord", lambda f, x, y, n: CHORD(f, x, y, n) / (x != y).any()),
+    ("damped_step", lambda r, J, damping: opt.damped_step(r, J, damping * (damping > 1e-5))),
+    ("damped_step", lambda r, J, damping: opt.damped_step(r, J, min(damping, 1e5))),
+    ("damped_step", lambda r, J, damping: opt.damped_step(r[:20], J[:20], damping)),
+    ("damped_step", lambda r, J, damping: opt.damped_step(r, J, damping) * (J.size > 1)),
+    ("gain_ratio", lambda *given: min(opt.gain_ratio(*given), 1.0)),
+    ("gain_ratio", lambda *given: max(opt.gain_ratio(*given), -2.0)),
+    ("gain_ratio", lambda *given: opt.gain_ratio(*given) if given[0] != given[1] else 1.0),
+    ("gain_ratio", lambda *given: opt.gain_ratio(*given) if abs(given[0]) < 1e4 else 0.0),
+    ("gain_ratio", lambda *given: opt.gain_ratio(*given) if given[2].any() else 0.0),
+    ("dogleg_step", lambda g, B, radius: beyond.bare_dogleg(g, B, max(radius, 1e-3))),
+    ("dogleg_step", lambda g, B, radius: beyond.bare_dogleg(g, B, min(radius, 1e3))),
+    ("dogleg_step", lambda g, B, radius: beyond.bare_dogleg(g, B, radius) * (B[0, 1] != 0)),
+    ("dogleg_step", lambda g, B, radius: beyond.bare_dogleg(g, B, radius) * g.all()),
+    ("trust_region", run_of(cap=1e3)),
+    ("trust_region", run_of(floor=1e-3)),
+    ("trust_region", run_of(rounds=20)),
+    ("trust_region", run_of(keep=lambda rho: rho > 0.15)),
+    ("trust_region", run_of(rule=lambda *given: beyond.rule(*given, good=0.8))),
+    ("trust_region", run_of(rule=lambda *given: beyond.rule(*given, poor=0.2))),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name, answer", FORGETFUL, ids=[f"{name}-{k}" for k, (name, _) in enumerate(FORGETFUL)])
+def test_what_the_docstring_admits_is_drawn_in_every_check(name, answer, monkeypatch):
+    monkeypatch.setattr(engine, "LOOKING", 0.0)  # what is told is not asked here
+    with np.errstate(all="ignore"):
+        assert judged(name, answer).status != CORRECT

@@ -22,9 +22,36 @@ def wavy(rng, n=None):
     return (lambda x: float(np.sin(M @ x).sum() + c @ x**2)), rng.normal(size=n)
 
 
-def function_and_step(rng, n=None):
+def function_and_step(rng, n=None, step=(0.03, 0.08)):
     """A function, a place, and a step large enough to tell the schemes apart."""
-    return *wavy(rng, n), float(rng.uniform(0.03, 0.08))
+    return *wavy(rng, n), float(rng.uniform(*step))
+
+
+def sized(f, size):
+    """A function so many times as large."""
+    return lambda x: size * f(x)
+
+
+def faint_function_and_step(rng):
+    """The same, of a function that hardly changes at all."""
+    f, x, h = function_and_step(rng)
+    return sized(f, 1e-7), x, h
+
+
+def far_and_step(rng):
+    """The same, far from 0, where a step that grows with x would be another one."""
+    f, x, h = function_and_step(rng)
+    return f, x + 20 * rng.choice([-1, 1], len(x)), h
+
+
+MEASURED = (  # draw, tolerance, least size it is relative to, words
+    (functools.partial(function_and_step, n=1), 1e-9, 1.0, "right, but not of a function of one unknown:"),
+    (functools.partial(function_and_step, n=8), 1e-9, 1.0, "right, but not of a function of eight unknowns:"),
+    (functools.partial(function_and_step, step=(3e-5, 1e-4)), 1e-8, 1.0, "right, but not with a step below 1e-4:"),
+    (functools.partial(function_and_step, step=(1, 3)), 1e-9, 1.0, "right, but not with a step above 1:"),
+    (far_and_step, 1e-9, 1.0, "right, but not far from 0:"),
+    (faint_function_and_step, 1e-7, 0.0, "right, but not of a function that hardly changes, its slopes below 1e-5:"),
+)
 
 
 def measured_gradient(f, x, h):
@@ -62,13 +89,13 @@ def bowl(rng):
     return (lambda x: float(((A @ (x - c)) ** 2).sum())), *rng.normal(scale=2.0, size=(2, n)), int(rng.integers(5, 40))
 
 
-def hilly(rng, falls):
+def hilly(rng, falls, unknowns=None, places=(6, 20)):
     """A function that rises above its chord off the middle, from its higher end or to it, and sags elsewhere, more than
     it rises where it falls.
     """
     while True:
-        f, x = wavy(rng)
-        y, n = x + rng.normal(scale=1.5, size=len(x)), int(rng.integers(6, 20))
+        f, x = wavy(rng, unknowns)
+        y, n = x + rng.normal(scale=1.5, size=len(x)), int(rng.integers(*places))
         _, values, heights = chord(f, x, y, n)
         gap = values - heights
         off_middle = gap.max() - gap[n // 2] > 0.05 * gap.max() and 1 < np.argmax(gap) < n - 2
@@ -83,6 +110,34 @@ def both_ends(rng):
         f, x, y, _ = hilly(rng, falls=bool(rng.integers(2)))
         if f((x + y) / 2) - (f(x) + f(y)) / 2 > 0.05:
             return f, x, y, 2
+
+
+def three_places(rng):
+    """A chord of which the ends and the middle are looked at."""
+    return *both_ends(rng)[:3], 3
+
+
+def one_place(rng):
+    """A chord whose ends are one place, so that nothing rises."""
+    f, x, _, n = hilly(rng, falls=True)
+    return f, x, x.copy(), n
+
+
+def sized_hills(rng, size):
+    """A chord of a function so many times as large."""
+    f, *others = hilly(rng, falls=bool(rng.integers(2)))
+    return sized(f, size), *others
+
+
+CHORDS = (  # draw, tolerance, least size it is relative to, words
+    (both_ends, 1e-9, 1.0, "right, but not where both ends alone are looked at:"),
+    (three_places, 1e-9, 1.0, "right, but not where three places are looked at:"),
+    (functools.partial(hilly, falls=False, places=(200, 400)), 1e-9, 1.0, "right, but not of hundreds of places:"),
+    (functools.partial(hilly, falls=False, unknowns=1), 1e-9, 1.0, "right, but not of a function of one unknown:"),
+    (one_place, 1e-9, 1.0, "right, but not where x and y are one place:"),
+    (functools.partial(sized_hills, size=1e-9), 1e-5, 0.0, "right, but not where f rises by some 1e-9 only:"),
+    (functools.partial(sized_hills, size=1e6), 1e-9, 1.0, "right, but not where f rises by hundreds of thousands:"),
+)
 
 
 def chords(rise):
@@ -238,8 +293,8 @@ def shrunk_where_taken_back(radius, length, rho):
 def run_with(rng, wanted, first=None, unlike=None):
     """A run in which what is wanted of its steps happens, far from every limit of the rule.
 
-    `wanted(rho, inside)` sees all steps of a run; `first` is a gain ratio that its first step shall have; `unlike` another
-    rule for the radius, which is not to end where this one does.
+    `wanted(rho, inside)` sees all steps of a run; `first` is a gain ratio that its first step shall have; `unlike` changes
+    of the loop with which it is not to end where it does.
     """
     while True:
         residual, jacobian, x = _problem(rng)
@@ -254,8 +309,13 @@ def run_with(rng, wanted, first=None, unlike=None):
         if not counts:
             continue
         run = residual, jacobian, x, radius, int(rng.choice(counts))
-        if unlike is None or not np.isclose(descend(*run)[1], descend(*run, follow=unlike)[1]):
+        if unlike is None or _apart(descend(*run), descend(*run, **unlike)):
             return run
+
+
+def _apart(end, other):
+    """Whether two runs end at other places, or with another radius."""
+    return not (np.allclose(end[0], other[0], rtol=1e-4) and np.isclose(end[1], other[1]))
 
 
 def _radius_for(rho, residual, jacobian, x):
@@ -303,6 +363,27 @@ def just_not_poor(rho, inside):
     return rho[0] > POOR and rho[0] < 0.3
 
 
+def just_above_a_tenth(rho, inside):
+    """A step, first of all, that is taken, and hardly."""
+    return rho[0] > ACCEPT and rho[0] < 0.13
+
+
+def just_poor(rho, inside):
+    """A step, first of all, that is a little too poor for the radius to stay."""
+    return rho[0] > 0.205 and rho[0] < POOR
+
+
+def just_good(rho, inside):
+    """A step to the rim, first of all, that is just good enough for the radius to double."""
+    return rho[0] > GOOD and rho[0] < 0.795 and not inside[0]
+
+
+def sized_run(rng, size):
+    """A run in which much happens, of a problem so many times as large as another."""
+    residual, jacobian, x, radius, steps = run_with(rng, poor_inside)
+    return (lambda y: residual(y / size)), (lambda y: jacobian(y / size) / size), size * x, size * radius, steps
+
+
 def _straight_problem(rng):
     """Straight residuals and their Jacobian, of which every step keeps what it promises, a start, and how far off that is."""
     n = int(rng.integers(2, 5))
@@ -312,17 +393,17 @@ def _straight_problem(rng):
     return (lambda x: J @ x - b), (lambda x: J.copy()), x, far
 
 
-def just_inside(rng):
-    """One round, which ends a little within the rim, at the minimum."""
+def just_inside(rng, share):
+    """One round, which ends at the minimum, a little within the rim: at such a share of the radius."""
     *problem, far = _straight_problem(rng)
-    return *problem, far / float(rng.uniform(0.992, 0.998)), 1
+    return *problem, far / float(rng.uniform(*share)), 1
 
 
 def from_a_tiny_radius(rng):
     """Many rounds that all end at the rim, which rounding leaves a hair longer or shorter than the radius."""
     while True:
         *problem, far = _straight_problem(rng)
-        run, seen = (*problem, 1e-3 * far, 9), []
+        run, seen = (*problem, 1e-8 * far, 23), []
         descend(*run, seen=seen)
         if sum(length < radius for _, length, radius in seen) > 2:
             return run
@@ -331,23 +412,53 @@ def from_a_tiny_radius(rng):
 RUNS = (
     functools.partial(run_with, wanted=poor_inside),
     functools.partial(run_with, wanted=barely, first=(0.06, 0.085)),
-    functools.partial(run_with, wanted=halfway, first=(0.13, 0.22), unlike=shrunk_where_taken_back),
+    functools.partial(run_with, wanted=halfway, first=(0.13, 0.22), unlike={"follow": shrunk_where_taken_back}),
     functools.partial(run_with, wanted=fairly, first=(0.78, 0.86)),
     functools.partial(run_with, wanted=well_inside),
 )
+
+
+def _limit(wanted, first, **unlike):
+    """A draw of a run whose first step lies beside a limit, and tells it from another one."""
+    return functools.partial(run_with, wanted=wanted, first=first, unlike=unlike)
+
+
 AT_THE_LIMITS = (
     (
-        functools.partial(run_with, wanted=just_fair, first=(0.705, 0.735), unlike=functools.partial(rule, good=0.7)),
+        _limit(just_fair, (0.705, 0.735), follow=functools.partial(rule, good=0.7)),
         "right, but not where a step to the rim has a ρ just below ¾:",
     ),
     (
-        functools.partial(
-            run_with, wanted=just_not_poor, first=(0.265, 0.29), unlike=functools.partial(rule, poor=0.3)
-        ),
+        _limit(just_good, (0.762, 0.785), follow=functools.partial(rule, good=0.8)),
+        "right, but not where a step to the rim has a ρ just above ¾:",
+    ),
+    (
+        _limit(just_not_poor, (0.265, 0.29), follow=functools.partial(rule, poor=0.3)),
         "right, but not where a step has a ρ just above ¼:",
     ),
-    (just_inside, "right, but not where a good step ends just inside the rim, at 0.992 to 0.998 of the radius:"),
+    (
+        _limit(just_poor, (0.21, 0.238), follow=functools.partial(rule, poor=0.2)),
+        "right, but not where a step has a ρ just below ¼:",
+    ),
+    (
+        _limit(just_above_a_tenth, (0.112, 0.128), keep=lambda rho: rho > 0.13),
+        "right, but not where a step has a ρ just above 0.1:",
+    ),
+    (
+        functools.partial(just_inside, share=(0.9965, 0.9985)),
+        "right, but not where a good step ends just inside the rim, at 0.9965 to 0.9985 of the radius:",
+    ),
+    (
+        functools.partial(just_inside, share=(0.9992, 0.9998)),
+        "right, but not where a good step ends at 0.9992 to 0.9998 of the radius, which counts as at the rim:",
+    ),
     (from_a_tiny_radius, "right, but not of a tiny radius, where each step ends at the rim but for rounding:"),
+)
+
+
+OF_ANOTHER_SIZE = (
+    (functools.partial(sized_run, size=1e-6), "right, but not where x and the radius are some 1e-6:"),
+    (functools.partial(sized_run, size=1e8), "right, but not where x and the radius are in the hundred millions:"),
 )
 
 

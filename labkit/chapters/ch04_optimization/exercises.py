@@ -20,8 +20,18 @@ def place(rng, within=3.0):
 
 
 def in_a_well(rng):
-    """A place a little beside the center of a well."""
-    return (wells.CENTERS[rng.integers(2)] + 1e-3 * rng.normal(size=2),)
+    """A place a little beside the center of the deeper well: there a forward difference errs most, for its slope."""
+    return (wells.CENTERS[1] + 1e-3 * rng.normal(size=2),)
+
+
+def on_the_flank(rng):
+    """A place beside the deeper well, along an axis, where f is steep and its curvature changes fast."""
+    return (wells.CENTERS[1] + rng.choice([-1, 1]) * rng.uniform(0.32, 0.35) * np.eye(2)[rng.integers(2)],)
+
+
+def far_out(rng):
+    """A place far out on the plain."""
+    return (rng.choice([-1, 1], 2) * rng.uniform(80, 150, 2),)
 
 
 def at_a_center(rng, which):
@@ -33,10 +43,27 @@ PLACES = (place, functools.partial(place, within=30.0), place, in_a_well)
 TWO = "the surface has two unknowns, so that it can be drawn"
 
 
-def at_centers(tol):
-    """Special draws at both centers."""
+def at_the_origin(rng):
+    """Between the wells, where x itself is 0."""
+    return (np.zeros(2),)
+
+
+def special_places(tol):
+    """Special draws at both centers and at the origin, on a flank, and far out, where everything is small."""
     words = "right, but not at the center of a well:"
-    return [(functools.partial(at_a_center, which=k), metrics.Numbers(tol), words) for k in range(2)]
+    return [
+        *((functools.partial(at_a_center, which=k), metrics.Numbers(tol), words) for k in range(2)),
+        (at_the_origin, metrics.Numbers(tol), "right, but not at the origin:"),
+        (on_the_flank, metrics.Numbers(tol), "right, but not on the flank of the deeper well, where f is steep:"),
+        (far_out, metrics.Numbers(1e-3, least=0.0), "right, but not far out on the plain, where f is nearly flat:"),
+    ]
+
+
+BESIDE_THE_CENTER = (
+    in_a_well,
+    metrics.Numbers(4e-7),
+    "right to some digits, but not accurate enough close beside the center of the deeper well:",
+)
 
 
 def turned(eigenvalues, angle):
@@ -92,6 +119,35 @@ def gradient_at_the_limit(rng):
     return g, kind_of_point(rng, BOWL, STEEP)[1]
 
 
+def exactly_stationary(rng, bends, size=1.0):
+    """No gradient at all, and a Hessian without mixed derivatives that bends so."""
+    return np.zeros(2), size * np.diag(bends * rng.uniform(0.5, 8, 2))
+
+
+def as_round(rng, sign):
+    """No gradient, and the same curvature in all directions."""
+    return np.zeros(2), sign * rng.uniform(1, 5) * np.eye(2)
+
+
+STATIONARY = (
+    *(
+        (functools.partial(exactly_stationary, bends=bends), "right, but not where g is exactly 0 and H is diagonal:")
+        for bends in (BOWL, DOME, SADDLE)
+    ),
+    *(
+        (functools.partial(as_round, sign=sign), "right, but not where f bends alike in all directions:")
+        for sign in (1, -1)
+    ),
+    *(
+        (
+            functools.partial(kind_of_point, bends=bends, length=(0, 1e-14), size=1e-12),
+            "right, but not where f bends by some 1e-12 only. No eigenvalue is 0, and the sign of each tells:",
+        )
+        for bends in (BOWL, DOME, SADDLE)
+    ),
+)
+
+
 def gradient_and_hessian(rng, signs):
     """A gradient and a Hessian with eigenvalues of these signs, far from singular."""
     eigenvalues = rng.uniform(1, 6, 2) * signs
@@ -106,7 +162,25 @@ def diagonal_model(rng):
 def faint_model(rng):
     """A gradient and a Hessian as far out on the plain."""
     g, H = gradient_and_hessian(rng, rng.choice([-1, 1], 2))
-    return 1e-7 * g, 1e-7 * H
+    return 1e-10 * g, 1e-10 * H
+
+
+def long_step(rng):
+    """A model so flat that Newton's step is some ten thousand long."""
+    g, H = gradient_and_hessian(rng, rng.choice([-1, 1], 2))
+    return g, 1e-4 * H
+
+
+def no_curvature_along(rng, k):
+    """A saddle that does not bend along one of the two axes: nothing can be divided by that entry of H."""
+    H = np.full((2, 2), rng.choice([-1, 1]) * rng.uniform(1, 5))
+    H[k, k], H[1 - k, 1 - k] = 0.0, rng.choice([-1, 1]) * rng.uniform(1, 5)
+    return rng.normal(scale=5, size=2), H
+
+
+def there_already(rng):
+    """A stationary point, from which Newton does not move."""
+    return np.zeros(2), gradient_and_hessian(rng, (1, -1))[1]
 
 
 def valley(rng):
@@ -129,6 +203,12 @@ SIZES = ((6, 2), (7, 3), (4, 1), (3, 3), (9, 5))
 def damped_case(rng, m, n, damping):
     """Residuals, Jacobian and a damping around this one; 0 is Gauss and Newton's step."""
     return *residual_and_jacobian(rng, m, n), float(damping * rng.uniform(0.6, 1.4))
+
+
+def faint_jacobian(rng):
+    """Residuals that hardly change with the unknowns, and a damping as small as their squares."""
+    r, J, damping = damped_case(rng, 7, 3, 4.0)
+    return 1e-3 * r, 1e-3 * J, 1e-6 * damping
 
 
 DAMPED = tuple(  # 0 in a size that is damped as well: what tells them apart is the damping, not the shape
@@ -162,6 +242,39 @@ def faint_step(rng):
     return 0.0, 1e-12 * (new_cost - cost), 1e-6 * g, B, 1e-6 * step
 
 
+def nothing_brought(rng):
+    """A step that leaves the cost where it was."""
+    cost, _, g, B, step = tried_step(rng, (0.2, 1.2))
+    return cost, cost, g, B, step
+
+
+def costly_step(rng):
+    """A step between costs in the millions."""
+    cost, new_cost, g, B, step = tried_step(rng, (0.2, 1.2))
+    return 1e6 * cost, 1e6 * new_cost, 1e6 * g, 1e6 * B, step
+
+
+def from_a_stationary_place(rng):
+    """A step from where g is 0: the model promises what its curvature alone does."""
+    cost, new_cost, _, B, step = tried_step(rng, (0.2, 1.2))
+    return cost, new_cost, np.zeros(2), B, step
+
+
+SPECIAL_STEPS = (
+    (uphill_promise, "right, but not of a step for which the model promises a rise:"),
+    (faint_step, "right, but not of a very short step, where all decreases are tiny:"),
+    (
+        functools.partial(tried_step, shares=(2.5, 6)),
+        "right, but not of a step that brings more than twice what was promised:",
+    ),
+    (
+        functools.partial(tried_step, shares=(-6, -2.5)),
+        "right, but not of a step that raises the cost by more than twice of what it was promised to fall:",
+    ),
+    (nothing_brought, "right, but not of a step that leaves the cost as it was:"),
+    (costly_step, "right, but not where costs are in the millions:"),
+    (from_a_stationary_place, "right, but not of a step from where g is 0:"),
+)
 TRIED_STEPS = tuple(functools.partial(tried_step, shares=s) for s in ((0.2, 1.2), (-0.8, -0.2)))
 
 
@@ -171,10 +284,39 @@ def dogleg_case(rng, between, length):
     across = angle + np.deg2rad(rng.uniform(30, 60))  # along an axis of B the path has no bend
     B = turned((rng.uniform(0.4, 0.8), rng.uniform(3, 5)), angle)
     g = rng.uniform(*length) * np.array([np.cos(across), np.sin(across)])
+    return g, B, _radius_between(g, B, rng.uniform(*between))
+
+
+def _radius_between(g, B, share):
+    """The radius at a share of the way from the corner to the Newton point, in length; below 0 within the corner's."""
     corner = np.linalg.norm(opt.cauchy_step(g, B, 1e9))
     full = np.linalg.norm(opt.newton_step(g, B))
-    share = rng.uniform(*between)
-    return g, B, float((1 + share) * corner if share < 0 else corner + share * (full - corner))
+    return float((1 + share) * corner if share < 0 else corner + share * (full - corner))
+
+
+def scaled_dogleg(rng, size):
+    """A dogleg on its second leg, of another size as a whole."""
+    g, B, radius = dogleg_case(rng, (0.2, 0.8), (15, 40))
+    return size * g, B, size * radius
+
+
+def dogleg_along(rng, of):
+    """A dogleg on its second leg of which the gradient ("g") or the axes of the curvature ("B") lie along the axes."""
+    curvatures, angle = (rng.uniform(0.4, 0.8), rng.uniform(3, 5)), np.deg2rad(rng.uniform(30, 60))
+    if of == "g":
+        g, B = rng.choice([-1, 1]) * rng.uniform(15, 40) * np.eye(2)[rng.integers(2)], turned(curvatures, angle)
+    else:
+        g = rng.uniform(15, 40) * rng.choice([-1, 1], 2) * np.array([np.cos(angle), np.sin(angle)])
+        B = np.diag(rng.permutation(curvatures))
+    return g, B, _radius_between(g, B, rng.uniform(0.2, 0.8))
+
+
+SPECIAL_DOGLEGS = (
+    (functools.partial(scaled_dogleg, size=1e-6), "right, but not of a radius near 1e-5:"),
+    (functools.partial(scaled_dogleg, size=1e4), "right, but not of a radius in the ten thousands:"),
+    (functools.partial(dogleg_along, of="B"), "right, but not where B is diagonal:"),
+    (functools.partial(dogleg_along, of="g"), "right, but not where g lies along an axis:"),
+)
 
 
 DOGLEG_CASES = tuple(
@@ -201,6 +343,7 @@ BESIDE_THE_RIM = (
     (lambda g, B: opt.cauchy_step(g, B, 1e9), "right, but not where the corner lies outside the radius by little:"),
 )
 ITERATE = metrics.Several(metrics.Numbers(1e-7), metrics.Numbers(1e-7), names=("x", "radius"))
+ITERATE_OF_ANY_SIZE = metrics.Several(*2 * (metrics.Numbers(1e-6, least=0.0),), names=("x", "radius"))
 
 
 def straight_path(rng, share):
@@ -432,7 +575,7 @@ CHAPTER = Chapter(
             draw=PLACES,
             fixed={"x": TWO},
             metric=metrics.Numbers(1e-6),  # central differences are right as well
-            noisy=at_centers(1e-6),
+            noisy=special_places(4e-7) + 3 * [BESIDE_THE_CENTER],
             properties=(right_for_whole_numbers(wells.gradient, metrics.Numbers(1e-6), place, 0),),
             hints=(
                 "Each well is −w/q with q = |x − c|² + 1. Differentiate it by the chain rule, q first.",
@@ -546,11 +689,7 @@ CHAPTER = Chapter(
             reference=beyond.measured_gradient,
             draw=beyond.function_and_step,
             metric=metrics.Numbers(1e-9),
-            noisy=(
-                functools.partial(beyond.function_and_step, n=1),
-                metrics.Numbers(1e-9),
-                "right, but not of a function of one unknown:",
-            ),
+            noisy=[(draw, metrics.Numbers(tol, least=least), words) for draw, tol, least, words in beyond.MEASURED],
             properties=(
                 right_for_whole_numbers(beyond.measured_gradient, metrics.Numbers(1e-9), beyond.function_and_step, 1),
             ),
@@ -625,7 +764,7 @@ CHAPTER = Chapter(
             draw=PLACES,
             fixed={"x": TWO},
             metric=metrics.Numbers(1e-6),
-            noisy=at_centers(1e-6),
+            noisy=special_places(1e-6),
             properties=(right_for_whole_numbers(wells.hessian, metrics.Numbers(1e-4), place, 0),),
             hints=(
                 "Differentiate the gradient (2w/q²)(x − c) once more: the product rule gives two terms for each well.",
@@ -721,7 +860,10 @@ CHAPTER = Chapter(
             reference=classify_extremum,
             draw=KINDS,
             metric=metrics.Exactly(),
-            noisy=(gradient_at_the_limit, metrics.Exactly(), "right, but not where |g| is 1e-6, no more and no less:"),
+            noisy=[
+                (gradient_at_the_limit, metrics.Exactly(), "right, but not where |g| is 1e-6, no more and no less:"),
+                *((draw, metrics.Exactly(), words) for draw, words in STATIONARY),
+            ],
             draws=len(KINDS),
             fixed={"g": TWO, "H": TWO},
             hints=(
@@ -859,6 +1001,20 @@ CHAPTER = Chapter(
             noisy=[
                 (diagonal_model, metrics.Numbers(1e-9), "right, but not where H is diagonal:"),
                 (faint_model, metrics.Numbers(1e-9), "right, but not where f is nearly flat, H tiny and g with it:"),
+                (
+                    long_step,
+                    metrics.Numbers(1e-9),
+                    "right, but not where f is so flat that the step is thousands long:",
+                ),
+                (there_already, metrics.Numbers(1e-9), "right, but not where g is 0 already:"),
+                *(
+                    (
+                        functools.partial(no_curvature_along, k=k),
+                        metrics.Numbers(1e-9),
+                        f"right, but not where H[{k}, {k}] is 0:",
+                    )
+                    for k in (0, 1)
+                ),
                 (
                     valley,
                     metrics.Numbers(1e-7),
@@ -1006,7 +1162,7 @@ CHAPTER = Chapter(
                 functools.partial(beyond.hilly, falls=False),
             ),
             metric=metrics.Numbers(1e-9),
-            noisy=(beyond.both_ends, metrics.Numbers(1e-9), "right, but not where both ends alone are looked at:"),
+            noisy=[(draw, metrics.Numbers(tol, least=least), words) for draw, tol, least, words in beyond.CHORDS],
             properties=(right_for_whole_numbers(convexity.rise_above_chord, metrics.Numbers(1e-6), beyond.bowl, 1, 2),),
             hints=(
                 "Walk from x to y, and at each place compare f with the straight line between its two ends.",
@@ -1113,7 +1269,7 @@ CHAPTER = Chapter(
             draw=PLACES,
             fixed={"x": TWO},
             metric=metrics.Numbers(1e-6),
-            noisy=at_centers(1e-6),
+            noisy=special_places(1e-6),
             properties=(right_for_whole_numbers(wells.jacobian, metrics.Numbers(1e-4), place, 0),),
             hints=(
                 "Each residual vector is √(w/q) times x − c, a product: two terms for each well, a 2x2 block.",
@@ -1221,13 +1377,18 @@ CHAPTER = Chapter(
             draw=DAMPED,
             metric=metrics.Numbers(1e-7),
             noisy=[
-                (functools.partial(damped_case, m=m, n=3, damping=damping), metrics.Numbers(1e-7), words)
-                for m, damping, words in (
-                    (3, 2.0, "right, but not of as many residuals as unknowns:"),
-                    (6, 3e-4, "right, but not of little damping:"),
-                    (6, 1e4, "right, but not of much damping:"),
+                (functools.partial(damped_case, m=m, n=n, damping=damping), metrics.Numbers(1e-7, least=least), words)
+                for m, n, damping, least, words in (
+                    (3, 3, 2.0, 1.0, "right, but not of as many residuals as unknowns:"),
+                    (3, 3, 0.0, 1.0, "right, but not of as many residuals as unknowns, without damping:"),
+                    (1, 1, 2.0, 1.0, "right, but not of one residual and one unknown:"),
+                    (60, 8, 2.0, 1.0, "right, but not of sixty residuals and eight unknowns:"),
+                    (6, 3, 3e-4, 1.0, "right, but not of little damping:"),
+                    (6, 3, 1e4, 1.0, "right, but not of much damping:"),
+                    (6, 3, 1e7, 0.0, "right, but not of so much damping that the step is tiny:"),
                 )
-            ],
+            ]
+            + [(faint_jacobian, metrics.Numbers(1e-7), "right, but not where J and the damping are both small:")],
             hints=(
                 "Set the gradient of |r + J h|² + λ |h|² to zero: what is added to JᵀJ?",
                 "(JᵀJ + λ I) h = −Jᵀr. Or without squaring J: least squares with √λ I beneath J, and zeros beneath r.",
@@ -1322,18 +1483,7 @@ CHAPTER = Chapter(
             draw=TRIED_STEPS,
             fixed={"g": TWO, "B": TWO, "step": TWO},
             metric=metrics.Numbers(1e-8),
-            noisy=[
-                (
-                    uphill_promise,
-                    metrics.Numbers(1e-8),
-                    "right, but not of a step for which the model promises a rise:",
-                ),
-                (
-                    faint_step,
-                    metrics.Numbers(1e-8),
-                    "right, but not of a very short step, where all decreases are tiny:",
-                ),
-            ],
+            noisy=[(draw, metrics.Numbers(1e-8), words) for draw, words in SPECIAL_STEPS],
             draws=6,
             hints=(
                 "Compare what the step brought with what the model promised, equation (2-36).",
@@ -1454,7 +1604,8 @@ CHAPTER = Chapter(
             + [
                 (functools.partial(beside_the_rim, step=step), metrics.Numbers(1e-8), words)
                 for step, words in BESIDE_THE_RIM
-            ],
+            ]
+            + [(draw, metrics.Numbers(1e-8, least=0.0), words) for draw, words in SPECIAL_DOGLEGS],
             properties=(right_for_whole_numbers(opt.dogleg_step, metrics.Numbers(1e-6), DOGLEG_CASES[1], 0),),
             draws=12,
             fixed={"g": TWO, "B": TWO},
@@ -1592,7 +1743,8 @@ CHAPTER = Chapter(
                     (beyond.no_rounds, "right, but not of no rounds at all:"),
                     *beyond.AT_THE_LIMITS,
                 )
-            ],
+            ]
+            + [(draw, ITERATE_OF_ANY_SIZE, words) for draw, words in beyond.OF_ANOTHER_SIZE],
             draws=5,
             hints=(
                 "Each round: residuals and Jacobian where you stand, a dogleg step, its gain ratio; then decide twice, whether to take the step and what the radius becomes.",
