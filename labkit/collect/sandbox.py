@@ -19,7 +19,13 @@ from ..places import DATA, ROOT
 PACKAGE = Path(__file__).resolve().parents[1]
 WORKER = PACKAGE / "collect" / "worker.py"
 ARITHMETIC = ("OPENBLAS_", "MKL_", "NPY_")  # both sides of the border compute alike, to the last bit
-HIDDEN = ("exercises.py", "beyond.py", "proofs.py", "__pycache__")  # in every chapter: references, draws and mistakes
+HIDDEN = (
+    "exercises.py",
+    "beyond.py",
+    "special.py",
+    "proofs.py",
+    "__pycache__",
+)  # in every chapter: references, draws and mistakes
 SYSTEM = ("/usr", "/lib", "/lib32", "/lib64", "/bin", "/sbin", "/etc/alternatives", "/etc/ld.so.cache", "/etc/fonts")
 MEMORY, FILES, PROCESSES, CPU = 3 << 30, 8 << 20, 256, 240  # bytes, bytes, number, seconds
 PROTECTED = "Notebooks ran under bubblewrap: without a network, without a home folder, on a read-only system."

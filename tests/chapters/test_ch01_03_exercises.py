@@ -772,3 +772,69 @@ def test_a_variance_about_the_mean_is_no_sum_of_squares():
         return np.var(residuals, ddof=6) * np.linalg.inv(A.T @ A)
 
     assert judged("pivot_covariance", about_mean).status == NOT_YET
+
+
+def _turn(T):
+    return frames.rotation_angle(T[..., :3, :3])
+
+
+FORGOTTEN = [
+    ("normalize", lambda v: np.linalg.norm(v) < 1e-8),
+    ("normalize", lambda v: np.count_nonzero(v) == 2),
+    ("gram_schmidt", lambda a, b: frames.arm_angle(a, b) < 0.1),
+    ("gram_schmidt", lambda a, b: np.linalg.norm(b) > 20 * np.linalg.norm(a)),
+    ("frame_from_points", lambda o, x, y: np.linalg.norm(o) > 1e3),
+    ("frame_from_points", lambda o, x, y: o[2] == x[2] == y[2] != 0),
+    ("invert", lambda T: _turn(T) > 0 and not T[:3, 3].any()),
+    ("invert", lambda T: 0 < _turn(T) < 0.01 and np.linalg.norm(T[:3, 3]) > 1),
+    ("relative", lambda A, B: np.array_equal(A, np.eye(4))),
+    ("relative", lambda A, B: np.allclose(A[:3, 3], B[:3, 3]) and not np.allclose(A, B)),
+    *(("matrix_from_kuka", lambda p, k=k: p[3 + k] == 0) for k in range(3)),
+    *(("matrix_from_kuka", lambda p, k=k, s=s: s * p[3 + k] > 2 * np.pi) for k in range(3) for s in (1, -1)),
+    ("kuka_from_matrix", lambda T: 1e-9 < np.hypot(T[0, 0], T[1, 0]) < 1e-5),
+    ("kuka_from_matrix", lambda T: T[1, 0] < 0 < T[0, 0] and T[2, 2] < 0 < T[2, 1]),
+    ("fit_frame", lambda p, q: len(p) > 8),
+    ("fit_frame", lambda p, q: not p[:, 2].any()),
+    ("chain", lambda links: len(links) > 9),
+    ("chain", lambda links: (links == np.eye(4)).all(axis=(1, 2)).any()),
+    ("closure_error", lambda T: _turn(T) > 0 and not T[:3, 3].any()),
+    ("closure_error", lambda T: 0 < _turn(T) < 1e-5),
+    ("closure_error", lambda T: abs(_turn(T) - np.pi / 2) < 0.1),
+    ("orthonormalize", lambda T: np.linalg.det(T[:3, :3]) > 5),
+    ("orthonormalize", lambda T: np.allclose(T[:3, :3].T @ T[:3, :3], np.eye(3), atol=1e-12)),
+    ("distribute_closure", lambda links: len(links) > 7),
+    ("distribute_closure", lambda links: 0 < _turn(chaining.chain(links)) < 1e-3),
+    ("distribute_closure", lambda links: _turn(chaining.chain(links)) > np.pi / 2),
+    *((name, lambda T, *_: len(T) == 2) for name in ("pivot_matrix", "pivot_rhs", "pivot_residuals")),
+    *((name, lambda T, *_: len(T) > 13) for name in ("pivot_matrix", "pivot_rhs", "pivot_residuals")),
+    *((name, lambda T, *_: _turn(T).max() > np.pi / 2) for name in ("pivot_matrix", "pivot_residuals")),
+    ("pivot_residuals", lambda T, tip, point: not tip.any()),
+    ("solve_pivot", lambda A, b: len(b) == 9),
+    ("pivot_covariance", lambda A, r: len(r) == 3),
+    ("pivot_covariance", lambda A, r: r.std() > 5),
+    ("robust_weights", lambda d, scale: ((d > 6.8 * scale) & (d < 7 * scale)).any()),
+    ("robust_weights", lambda d, scale: scale > 10),
+    ("robust_weights", lambda d, scale: scale < 0.01),
+]
+
+
+@pytest.mark.parametrize("name, forgotten", FORGOTTEN, ids=[f"{name}-{k}" for k, (name, _) in enumerate(FORGOTTEN)])
+def test_who_forgets_a_place_is_refused(name, forgotten, monkeypatch):
+    monkeypatch.setattr(engine, "LOOKING", 0.0)
+    item = {**FRAMES, **ITEMS}[name]
+
+    def answer(*given):
+        return None if forgotten(*given) else item.reference(*given)
+
+    assert item.judge(answer, rng=np.random.default_rng(0)).status == NOT_YET
+
+
+def residuals_like_the_poses(T_WF, tip, point):
+    r = np.zeros_like(T_WF[:, :3, 3])
+    for k, T in enumerate(T_WF):
+        r[k] = T[:3, :3] @ tip + T[:3, 3] - point
+    return r
+
+
+def test_residuals_of_poses_of_whole_numbers_keep_their_decimals():
+    assert "cuts decimals off" in judged("pivot_residuals", residuals_like_the_poses).text

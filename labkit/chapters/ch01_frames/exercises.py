@@ -9,8 +9,10 @@ from scipy.spatial.transform import Rotation
 from ...documents.lab_sheet.printed import points
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...exercises.special import right_where
 from ...exercises.whole import right_for_whole_numbers
 from ...geometry import frames
+from . import special
 
 
 def random_direction(rng):
@@ -529,6 +531,7 @@ CHAPTER = Chapter(
                 right_for_whole_numbers(
                     frames.unit_vector, metrics.Numbers(1e-9), functools.partial(scaled_direction, scale=1.0), 0
                 ),
+                right_where(frames.unit_vector, metrics.Numbers(1e-9), *special.VECTORS),
             ),
             hints=(
                 "A direction says which way, not how far. What has to become 1, and by which number do you divide to get it there?",
@@ -608,7 +611,10 @@ CHAPTER = Chapter(
                 (edges_on_axes, metrics.Rotations(1e-7), ON_AXES),
                 (nearly_at_right_angles, metrics.Rotations(1e-7), f"right, but not of short edges {NEARLY_SQUARE}"),
             ],
-            properties=(right_for_whole_numbers(frames.gram_schmidt, metrics.Rotations(1e-7), two_directions, 0, 1),),
+            properties=(
+                right_for_whole_numbers(frames.gram_schmidt, metrics.Rotations(1e-7), two_directions, 0, 1),
+                right_where(frames.gram_schmidt, metrics.Rotations(1e-7), *special.EDGES, *special.SHORT_EDGES),
+            ),
             hints=(
                 "x takes the direction of a. y may only use what b has across x.",
                 "Remove from b its part along x: b - (b . x) x, with x of length 1. Then normalize. z follows from the right-hand rule.",
@@ -704,6 +710,7 @@ CHAPTER = Chapter(
             ],
             properties=(
                 right_for_whole_numbers(frames.frame_from_points, metrics.Poses(1e-6, 1e-6), three_points, 0, 1, 2),
+                right_where(frames.frame_from_points, metrics.Poses(1e-6, 1e-6), *special.TRIANGLES),
             ),
             hints=(
                 "A pose is a rotation (which way the axes point) and a translation (where the origin is).",
@@ -777,6 +784,12 @@ CHAPTER = Chapter(
                 (shift_alone, metrics.Poses(1e-6, 1e-6), "right, but not of a pose that shifts without a turn:"),
                 (small_motion, metrics.Poses(1e-6, 1e-6), "right, but not of a small turn and a small shift:"),
             ],
+            properties=(
+                right_for_whole_numbers(
+                    frames.invert, metrics.Poses(1e-6, 1e-6), lambda rng: (special.of_whole_numbers(rng),), 0
+                ),
+                right_where(frames.invert, metrics.Poses(1e-6, 1e-6), *special.POSES),
+            ),
             hints=(
                 "Solve p_W = R p_F + t for p_F.",
                 "p_F = Rᵀ (p_W - t) = Rᵀ p_W - Rᵀ t: the rotation is Rᵀ, the translation is -Rᵀ t.",
@@ -839,6 +852,7 @@ CHAPTER = Chapter(
                 (side_by_side, metrics.Poses(1e-6, 1e-6), "right, but not where both frames are turned alike:"),
                 (nearly_one, metrics.Poses(1e-6, 1e-6), "right, but not where both frames are nearly one:"),
             ],
+            properties=(right_where(frames.relative, metrics.Poses(1e-6, 1e-6), *special.FRAMES),),
             hints=(
                 "Neighboring letters cancel: which two transforms give T_AB when W stands between them?",
                 "T_AB = T_AW T_WB, and T_AW is the inverse of T_WA.",
@@ -1093,6 +1107,15 @@ CHAPTER = Chapter(
                     "right, but not of angles beyond 180 deg:",
                 ),
             ],
+            properties=(
+                right_for_whole_numbers(
+                    frames.matrix_from_kuka,
+                    metrics.Poses(1e-6, 1e-6),
+                    functools.partial(special.angles, abc=(1.0, -1.0, 2.0)),
+                    0,
+                ),
+                right_where(frames.matrix_from_kuka, metrics.Poses(1e-6, 1e-6), *special.ANGLES),
+            ),
             hints=(
                 "Three elementary turns, multiplied in the order the controller names them, and a translation.",
                 "R = Rz(A) Ry(B) Rx(C). Write each turn as a 3x3 array, with the cosines and sines of A, B, C (radians, in this order), multiply "
@@ -1195,6 +1218,7 @@ CHAPTER = Chapter(
                 (functools.partial(half_turns, signs=signs), _read_by_kuka(1e-6), f"right, but not where {words}:")
                 for signs, words in (((-1, -1, 1), "A is 180 deg"), ((1, -1, -1), "C is 180 deg"))
             ],
+            properties=(right_where(frames.kuka_from_matrix, _read_by_kuka(1e-6), *special.READINGS),),
             hints=(
                 "Compare the entries of Rz(A) Ry(B) Rx(C) that hold few terms: the first column gives A and B. Then undo A: "
                 "Rz(A)ᵀ R = Ry(B) Rx(C), whose middle row is 0, cos C, -sin C.",
@@ -1317,7 +1341,10 @@ CHAPTER = Chapter(
             reference=frames.fit_frame,
             draw=(drawn_points, functools.partial(drawn_points, flat=True)),
             metric=metrics.Poses(1e-6, 1e-6),
-            properties=(right_for_whole_numbers(frames.fit_frame, metrics.Poses(1e-6, 1e-6), drawn_points, 0, 1),),
+            properties=(
+                right_for_whole_numbers(frames.fit_frame, metrics.Poses(1e-6, 1e-6), drawn_points, 0, 1),
+                right_where(frames.fit_frame, metrics.Poses(1e-6, 1e-6), *special.SETS),
+            ),
             noisy=(
                 functools.partial(drawn_points, count=3),
                 metrics.Poses(1e-6, 1e-6),

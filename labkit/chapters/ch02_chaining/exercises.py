@@ -7,9 +7,10 @@ import numpy as np
 from ...documents.lab_sheet import printed as lab_sheet
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...exercises.special import right_where
 from ...geometry import chaining, frames
 from ...geometry.lie import exp_se3, log_se3, nearest_rotation
-from . import beyond
+from . import beyond, special
 
 
 def random_pose(rng):
@@ -408,6 +409,7 @@ CHAPTER = Chapter(
                 metrics.Poses(1e-6, 1e-6),
                 "right, but not of a single link:",
             ),
+            properties=(right_where(chaining.chain, metrics.Poses(1e-6, 1e-6), *special.CHAINS),),
             hints=(
                 "Neighboring letters cancel: T_AB T_BC T_CD = T_AD. Where does a link that has just been measured go, to the left or to the right?",
                 "Start with the identity and multiply each link from the right, in the order given: a loop over the links that keeps the product.",
@@ -526,6 +528,7 @@ CHAPTER = Chapter(
                 ),
                 (half_turn, CLOSURE, "right, but not where T is half a turn:"),
             ],
+            properties=(right_where(chaining.closure_error, CLOSURE, *special.PRODUCTS),),
             hints=(
                 "How far is T from the identity? One number for the turn, one for the shift.",
                 "The trace of the 3x3 rotation block is 1 + 2 cos of the angle (NaN means an arccosine of more than 1, by rounding perhaps: "
@@ -892,6 +895,7 @@ CHAPTER = Chapter(
                 )
                 for defects in ((1e-6, 3e-6), (1e-4, 2e-4))
             ],
+            properties=(right_where(chaining.orthonormalize, metrics.Poses(1e-6, 1e-6), *special.BLOCKS),),
             hints=(
                 "Which rotation lies nearest to a matrix that is almost one? The translation stays.",
                 "With R = U S Vᵀ, the nearest rotation is U Vᵀ: the SVD with its singular values set to 1.",
@@ -1022,6 +1026,7 @@ CHAPTER = Chapter(
                     (0.02, 0.0, "at its start, turned"),
                 )
             ],
+            properties=(right_where(chaining.distribute_closure, metrics.Poses(1e-5, 1e-5), *special.LOOPS),),
             hints=(
                 "The product is exp(xi). Going back by all of xi at the end closes the loop; how far back should the pose after link k go? "
                 "P_k, the pose after k links, becomes exp(-k/N xi) P_k.",

@@ -8,9 +8,11 @@ from ...calibration import pivot, robust
 from ...documents.lab_sheet import printed as lab_sheet
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...exercises.special import right_where
 from ...exercises.whole import right_for_whole_numbers
 from ...geometry import frames
 from ...geometry.lie import exp_so3
+from . import special
 
 
 def turns(rng, n, between_deg=(10, 40)):
@@ -209,6 +211,7 @@ CHAPTER = Chapter(
             draw=lambda rng: (poses(rng),),
             metric=metrics.Numbers(1e-9),
             noisy=of_few(metrics.Numbers(1e-9)),
+            properties=(right_where(pivot.pivot_matrix, metrics.Numbers(1e-9), *special.ALONE),),
             hints=(
                 "Each pose gives three rows: which numbers multiply the tip, which the pivot?",
                 "R_i tip - I pivot = -p_i: three rows [R_i  -I], all poses beneath each other.",
@@ -302,6 +305,7 @@ CHAPTER = Chapter(
             draw=lambda rng: (poses(rng),),
             metric=metrics.Numbers(1e-9, "mm"),
             noisy=of_few(metrics.Numbers(1e-9, "mm")),
+            properties=(right_where(pivot.pivot_rhs, metrics.Numbers(1e-9, "mm"), *special.ALONE),),
             hints=(
                 "What is left when tip and pivot stand on the left side?",
                 "-p_i, the three positions of pose 1, then those of pose 2, ... in one long vector.",
@@ -372,6 +376,7 @@ CHAPTER = Chapter(
                     "right, but not of a very narrow set of poses, whose small singular values count as well:",
                 )
             ],
+            properties=(right_where(pivot.solve_pivot, metrics.Numbers(1e-4, "mm"), *special.SYSTEMS),),
             hints=(
                 "More equations than unknowns: no x fulfills them all. Which x makes the sum of squares of A x - b least?",
                 "The sheet: x = (AᵀA)⁻¹ Aᵀb. Better conditioned, and shorter: `np.linalg.lstsq`.",
@@ -542,6 +547,15 @@ CHAPTER = Chapter(
                 (functools.partial(few_poses_and_points, count=n), metrics.Numbers(1e-9, "mm"), words)
                 for n, words in FEW
             ],
+            properties=(
+                *(
+                    right_for_whole_numbers(
+                        pivot.pivot_residuals, metrics.Numbers(1e-9, "mm"), special.of_whole_numbers, *which
+                    )
+                    for which in ((0,), (1, 2))
+                ),
+                right_where(pivot.pivot_residuals, metrics.Numbers(1e-9, "mm"), *special.WITH_POINTS),
+            ),
             hints=(
                 "Where is the tip in each pose, and where should it be?",
                 "Equation (2) of the sheet: R_i tip + p_i - point, one row per pose.",
@@ -750,6 +764,7 @@ CHAPTER = Chapter(
                 metrics.Numbers(1e-6, "mm^2"),
                 "Right where the residuals add up to 0, as those of least squares do. Where they do not, as those of rounded numbers:",
             ),
+            properties=(right_where(pivot.pivot_covariance, metrics.Numbers(1e-6, "mm^2"), *special.RESIDUALS),),
             hints=(
                 "Noise in b goes through the solution x = (AᵀA)⁻¹ Aᵀb. What does it do to x?",
                 "cov = std² (AᵀA)⁻¹, with the unbiased std² = rᵀr / (3n - 6).",
@@ -889,6 +904,7 @@ CHAPTER = Chapter(
                 right_for_whole_numbers(
                     _tukey_weights, metrics.Numbers(1e-9), functools.partial(near_first, count=9), 0
                 ),
+                right_where(_tukey_weights, metrics.Numbers(1e-9), *special.DISTANCES),
             ),
             noisy=[
                 (one_at_0, metrics.Numbers(1e-9), "right, but not where a distance is 0:"),
