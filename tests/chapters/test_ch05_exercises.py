@@ -11,6 +11,7 @@ from labkit.chapters.ch05_hand_eye import exercises
 from labkit.documents import misprints
 from labkit.documents.thesis import claims_hand_eye
 from labkit.documents.thesis import printed as thesis
+from labkit.exercises import engine
 from labkit.exercises.engine import CORRECT, NOT_YET
 from labkit.geometry import frames, lie
 from labkit.geometry.lie import exp_so3
@@ -361,3 +362,112 @@ def test_three_poses_are_all_needed_and_one_arrival_is_an_arrival():
         "position_accuracy": lambda command, reached: np.linalg.norm(np.squeeze(reached).mean(axis=0) - command),
     }
     assert all(judged(name, answer).status != CORRECT for name, answer in wrong.items())
+
+
+RIGHT = {name: item.reference for name, item in ITEMS.items() if hasattr(item, "reference")}
+
+
+def turned_unless(limit):
+    """The turn by a rotation vector, left out where it is shorter than this."""
+    return lambda phi: np.eye(3) if np.linalg.norm(phi) < limit else exp_so3(phi)
+
+
+def stepped(turn, keep=lambda e: np.ones(len(e)), least=0):
+    """A Gauss-Newton step with another turn, weights of its own, and no step where there are few poses."""
+
+    def answer(T_FS, T_BF, x_S, target):
+        e = frames.transform(T_BF @ T_FS, x_S) - target
+        w = np.repeat(keep(np.linalg.norm(e, axis=1)), 3)
+        J = RIGHT["analytic_jacobian"](T_FS, T_BF, x_S)
+        step = np.linalg.lstsq(w[:, None] * J, -w * e.ravel(), rcond=None)[0] * (len(x_S) > least)
+        return frames.pose(T_FS[:3, :3] @ turn(step[:3]), T_FS[:3, 3] + step[3:])
+
+    return answer
+
+
+def center_by_three_points(x, z, radius, side):
+    x_c, z_c, r = exercises._circle_through(lambda count: [0, count // 2, -1])(x, z)
+    return np.array([x_c, side * np.sqrt(radius**2 - r**2), z_c])
+
+
+def as_square(function, x, step):
+    rows = np.array([(function(x + h) - function(x - h)) / (2 * step) for h in step * np.eye(len(x))])
+    return rows if len(rows) == len(function(x)) else rows.T
+
+
+def weights(scale=lambda s: s, change=lambda w, lengths: w):
+    def answer(residuals):
+        lengths = np.linalg.norm(residuals, axis=1)
+        u = lengths / (5 * scale(np.median(lengths) / 1.5382))
+        return change(np.where(u < 1, (1 - u**2) ** 2, 0.0), lengths)
+
+    return answer
+
+
+def but_for(name, keep):
+    """The right answer, 0 where `keep` says so."""
+    return lambda *given: RIGHT[name](*given) * keep(*given)
+
+
+def of_the_first(name, count, drop=0):
+    """The right answer of the first poses, or of all but so many of the first where there are more than three."""
+    return lambda T, x, *R: RIGHT[name](T[:count][drop * (len(T) > 3) :], x[:count][drop * (len(T) > 3) :], *R)
+
+
+FORGETFUL = [
+    ("height_from_angles", but_for("height_from_angles", lambda alpha, beta, base: min(alpha, beta) > 0.1)),
+    ("height_from_angles", but_for("height_from_angles", lambda alpha, beta, base: alpha != beta)),
+    ("height_from_angles", lambda alpha, beta, base: RIGHT["height_from_angles"](alpha, beta, min(base, 1e4))),
+    ("height_std", lambda alpha, beta, base, std: RIGHT["height_std"](alpha, beta, base, max(std, 1e-4))),
+    ("height_std", lambda alpha, beta, base, std: RIGHT["height_std"](alpha, beta, base, min(std, 0.05))),
+    ("height_std", but_for("height_std", lambda alpha, beta, base, std: min(alpha, beta) > 0.1)),
+    ("height_std", lambda *given: RIGHT["height_std"](*given) if given[3] else 1.0),
+    ("fit_circle", lambda x, z: RIGHT["fit_circle"](x[:100], z[:100])),
+    ("fit_circle", lambda x, z: np.clip(RIGHT["fit_circle"](x, z), -1000, 500)),
+    ("fit_circle", lambda x, z: np.abs(RIGHT["fit_circle"](x, z)) * np.sign([x.mean(), 1, 1])),
+    ("sphere_center_from_profile", center_by_three_points),
+    ("sphere_center_from_profile", lambda x, z, R, side: RIGHT["sphere_center_from_profile"](x, z, max(R, 20), side)),
+    ("sphere_center_from_profile", lambda x, z, R, side: RIGHT["sphere_center_from_profile"](x[::2], z[::2], R, side)),
+    ("kuka_residual", but_for("kuka_residual", lambda p2, *_: abs(np.cos(p2[4])) > 1e-3)),
+    ("kuka_residual", but_for("kuka_residual", lambda p2, *_: abs(p2[4]) <= np.pi / 2)),
+    ("kuka_residual", but_for("kuka_residual", lambda p2, T_BF, *_: (np.arange(len(T_BF)) < 50)[:, None])),
+    ("kuka_residual", lambda *given: (e := RIGHT["kuka_residual"](*given)) * (abs(e) > 1e-3)),
+    ("numeric_jacobian", as_square),
+    ("numeric_jacobian", lambda f, x, step: RIGHT["numeric_jacobian"](f, x, max(step, 1e-3))),
+    ("numeric_jacobian", lambda f, x, step: RIGHT["numeric_jacobian"](f, x, min(step, 0.1))),
+    ("numeric_jacobian", but_for("numeric_jacobian", lambda f, x, step: np.arange(len(x)) < 5)),
+    ("numeric_jacobian", lambda *given: (J := RIGHT["numeric_jacobian"](*given)) * (abs(J) > 1e-3)),
+    ("analytic_jacobian", but_for("analytic_jacobian", lambda T, B, x: (np.arange(3 * len(x)) < 150)[:, None])),
+    ("gauss_newton_on_pose", stepped(turned_unless(1e-5))),
+    ("gauss_newton_on_pose", stepped(exp_so3, keep=lambda lengths: lengths < 5 * np.median(lengths))),
+    ("gauss_newton_on_pose", stepped(exp_so3, least=5)),
+    ("joint_residual", lambda u, *given: RIGHT["joint_residual"](np.r_[u[:3] * (abs(u[:3]) > 1e-5), u[3:]], *given)),
+    ("joint_residual", lambda u, *given: RIGHT["joint_residual"](np.r_[np.clip(u[:3], -1, 1), u[3:]], *given)),
+    ("linear_start", lambda T, x: RIGHT["linear_start"](T[:50], x[:50])),
+    ("robust_weights", weights(scale=lambda s: max(s, 0.01))),
+    ("robust_weights", weights(scale=lambda s: min(s, 10.0))),
+    ("robust_weights", weights(change=lambda w, lengths: w if len(w) > 5 else np.ones(len(w)))),
+    ("robust_weights", weights(change=lambda w, lengths: np.where(np.arange(len(w)) < 50, w, 1.0))),
+    ("robust_weights", weights(change=lambda w, lengths: np.where(w < 0.1, 0.0, w))),
+    ("robust_weights", weights(change=lambda w, lengths: np.where(lengths < np.sort(lengths)[-4:][0], w, 0.0))),
+    ("position_accuracy", but_for("position_accuracy", lambda command, reached: len(command) > 1)),
+    ("position_accuracy", lambda command, reached: RIGHT["position_accuracy"](command[:3], reached[:, :3])),
+    ("position_accuracy", lambda command, reached: RIGHT["position_accuracy"](command, reached[:50])),
+    ("position_accuracy", lambda *given: (off := RIGHT["position_accuracy"](*given)) * (off > 0.01)),
+    ("repeatability", but_for("repeatability", lambda reached: reached.shape[1] > 1)),
+    ("repeatability", lambda reached: RIGHT["repeatability"](reached[:50])),
+    ("repeatability", lambda reached: RIGHT["repeatability"](reached) if np.ptp(reached, axis=0).any() else 1.0),
+    ("li_rotation", of_the_first("li_rotation", None, drop=1)),
+    ("li_rotation", of_the_first("li_rotation", 20)),
+    ("li_translation", of_the_first("li_translation", None, drop=1)),
+    ("li_translation", of_the_first("li_translation", 20)),
+    ("kim_system", lambda A, B: [np.clip(part, -100, 100) for part in RIGHT["kim_system"](A, B)]),
+    ("kim_system", lambda A, B: [p * (abs(A[0, 1]) > 1e-9) for p in RIGHT["kim_system"](A, B)]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name, answer", FORGETFUL, ids=[f"{name}-{k}" for k, (name, _) in enumerate(FORGETFUL)])
+def test_what_the_docstring_admits_is_drawn_in_every_check(name, answer, monkeypatch):
+    monkeypatch.setattr(engine, "LOOKING", 0.0)  # what is told is not asked here
+    with np.errstate(all="ignore"):
+        assert judged(name, answer).status != CORRECT

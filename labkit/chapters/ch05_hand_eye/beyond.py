@@ -49,16 +49,25 @@ def nearly_in_a_plane(rng):
             return T_BF, x_S
 
 
-def first_ones_on_a_line(rng):
+def visited_twice(rng):
+    """Four poses of one orientation, the second and the third at one place: without the first or the last one nothing
+    is determined.
+    """
+    T_BF, x_S = translated_poses(rng, directions=2, n=4)
+    T_BF[2], x_S[2] = T_BF[1], x_S[1]
+    return T_BF, x_S
+
+
+def first_ones_on_a_line(rng, numbers=(7, 13)):
     """Noisy poses of which all but three lie nearly on one line, the last one as well: by them alone the turn about it
     is not known.
     """
-    T_BF, x_S = translated_poses(rng, directions=3, n=int(rng.integers(7, 13)))
+    T_BF, x_S = translated_poses(rng, directions=3, n=int(rng.integers(*numbers)))
     T_FS = frames.pose(literature.li_rotation(T_BF, x_S), np.zeros(3))
     along = 30 * frames.unit_vector(rng.normal(size=3))
     line = np.r_[1 : len(x_S) - 4, len(x_S) - 1]
     steps = np.outer(line, along)
-    T_BF[line, :3, 3] = T_BF[0, :3, 3] + steps + 0.005 * rng.normal(size=steps.shape)
+    T_BF[line, :3, 3] = T_BF[0, :3, 3] + steps + 5e-4 * rng.normal(size=steps.shape)
     moved = (T_BF[:, :3, 3] - T_BF[0, :3, 3]) @ T_BF[0, :3, :3] @ T_FS[:3, :3]
     return T_BF, x_S[0] - moved + 0.02 * rng.normal(size=x_S.shape)
 
@@ -71,20 +80,39 @@ def turned_poses(rng, n=None):
     return poses_that_see(T_FS, target, exp_so3(rng.uniform(-1.2, 1.2, (n, 3))), x_S), x_S, T_FS[:3, :3].copy()
 
 
-def first_ones_turned_alike(rng):
+def two_turned_alike(rng):
+    """Four poses, the second and the third of one orientation: without the first or the last one nothing is determined."""
+    while True:
+        T_FS, target = scanner(rng)
+        x_S = np.column_stack([rng.uniform(-25, 25, 4), rng.uniform(-20, 20, 4), rng.uniform(190, 290, 4)])
+        R_BF = exp_so3(rng.uniform(-1.2, 1.2, (3, 3)))[[0, 1, 1, 2]]
+        rows = np.concatenate([R_BF, np.tile(-np.eye(3), (4, 1, 1))], 2).reshape(-1, 6)
+        if np.linalg.cond(rows) < 100:
+            return poses_that_see(T_FS, target, R_BF, x_S), x_S, T_FS[:3, :3].copy()
+
+
+def first_ones_turned_alike(rng, numbers=(10, 15)):
     """Noisy poses of which all but the last four hardly turn: by those alone t_FS and target are not known."""
     T_FS, target = scanner(rng)
-    n = int(rng.integers(10, 15))
+    n = int(rng.integers(*numbers))
     x_S = np.column_stack([rng.uniform(-25, 25, n), rng.uniform(-20, 20, n), rng.uniform(190, 290, n)])
     turns = np.concatenate([rng.uniform(-0.002, 0.002, (n - 4, 3)), rng.uniform(-1.2, 1.2, (4, 3))])
     T_BF = poses_that_see(T_FS, target, exp_so3(rng.uniform(-1, 1, 3)) @ exp_so3(turns), x_S)
     return T_BF, x_S + 0.02 * rng.normal(size=(n, 3)), T_FS[:3, :3].copy()
 
 
-def two_motions(rng):
+def two_motions(rng, turn=1.0, far=2.0):
     """A motion of the flange and the same motion of the scanner."""
-    X, A = (frames.pose(exp_so3(rng.uniform(-1, 1, 3)), rng.uniform(-2, 2, 3)) for _ in range(2))
+    X = frames.pose(exp_so3(rng.uniform(-1, 1, 3)), rng.uniform(-far, far, 3))
+    A = frames.pose(exp_so3(rng.uniform(-turn, turn, 3)), rng.uniform(-far, far, 3))
     return A, frames.invert(X) @ A @ X
+
+
+SPECIAL_MOTIONS = (
+    (functools.partial(two_motions, far=1500.0), "right, but not of motions over a meter:"),
+    (functools.partial(two_motions, turn=0.0), "right, but not of motions that do not turn:"),
+    (functools.partial(two_motions, turn=1e-4), "right, but not of motions that hardly turn:"),
+)
 
 
 def triangle(rng, right_angle=False):
@@ -119,6 +147,45 @@ def mirrored(rng, draw):
     return beta, alpha, *others
 
 
+def flat_triangle(rng):
+    """Both angles below 3 degrees, as for an object close above the base."""
+    return *map(float, rng.uniform(0.03, 0.05, 2)), float(rng.uniform(30, 200))
+
+
+def isosceles(rng):
+    """Both angles alike."""
+    angle = float(np.deg2rad(rng.uniform(35, 80)))
+    return angle, angle, float(rng.uniform(30, 200))
+
+
+def long_base(rng):
+    """A base of many meters."""
+    return *triangle(rng)[:2], float(rng.uniform(1e5, 1e6))
+
+
+OTHER_TRIANGLES = (
+    (flat_triangle, "right, but not where both angles are below 3°:"),
+    (isosceles, "right, but not where both angles are alike:"),
+    (long_base, "right, but not of a base longer than 100 m:"),
+)
+
+
+def with_noise(rng, draw, std):
+    """A triangle and this noise of its angles."""
+    return *draw(rng), std
+
+
+SPECIAL_NOISE = (
+    *((functools.partial(with_noise, draw=draw, std=0.005), words) for draw, words in OTHER_TRIANGLES),
+    (functools.partial(with_noise, draw=triangle, std=1e-8), "right, but not of angles that err by 1e-8 rad only:"),
+    (
+        functools.partial(with_noise, draw=triangle, std=0.2),
+        "right, but not of angles that err by 0.2 rad. To first order it is the derivative times std there too:",
+    ),
+    (functools.partial(with_noise, draw=triangle, std=0.0), "right, but not of angles that do not err:"),
+)
+
+
 def noisy_triangle(rng):
     return *triangle(rng), float(np.deg2rad(rng.uniform(0.01, 1.0)))
 
@@ -140,6 +207,40 @@ def arrivals(rng, d=3, numbers=(5, 40)):
 
 def only_arrivals(rng, d=3, numbers=(5, 40)):
     return arrivals(rng, d, numbers)[1:]
+
+
+def close_arrivals(rng):
+    """Arrivals within micrometers of the command and of one another."""
+    command, reached = arrivals(rng)
+    return command, command + 1e-3 * (reached - command)
+
+
+def one_astray(rng):
+    """Arrivals, one of which is 10 mm and more away from all others."""
+    command, reached = arrivals(rng, numbers=(12, 20))
+    reached[rng.integers(len(reached))] += rng.choice([-1, 1], 3) * rng.uniform(10, 30, 3)
+    return command, reached
+
+
+def always_there(rng):
+    """Arrivals at one and the same place."""
+    command, reached = arrivals(rng)
+    return command, np.repeat(np.round(reached[:1]), 8, axis=0)
+
+
+OTHER_ARRIVALS = (  # draw, least size that the tolerance is relative to, words
+    (functools.partial(arrivals, d=1), 1.0, "right, but not along a line, d = 1:"),
+    (functools.partial(arrivals, d=6), 1.0, "right, but not of six coordinates, d = 6:"),
+    (functools.partial(arrivals, numbers=(200, 300)), 1.0, "right, but not of 200 arrivals and more:"),
+    (close_arrivals, 0.0, "right, but not of arrivals within micrometers:"),
+    (one_astray, 1.0, "right, but not where one arrival is far from all others. It counts like them:"),
+    (always_there, 1.0, "right, but not where all arrivals are at one place:"),
+)
+
+
+def without_command(rng, draw):
+    """Where a robot arrived, alone."""
+    return draw(rng)[1:]
 
 
 # --- wrong variants ---
@@ -260,6 +361,9 @@ class EitherSide(metrics.Several):
         return [-D, -F] if reversed_ else [D, F]
 
 
+EQUATIONS = EitherSide(metrics.Numbers(1e-9), metrics.Numbers(1e-9), names=("D", "F"))
+
+
 def _by_columns(A, B):
     """The same equations for the columns of X one after another."""
     order = np.arange(12).reshape(3, 4).T.ravel()
@@ -278,6 +382,7 @@ ACCURACY = [
             functools.partial(arrivals, numbers=(1, 2)),
         ),
         metric=metrics.Numbers(1e-9, "mm"),
+        noisy=tuple((draw, metrics.Numbers(1e-8, "mm", least=least), words) for draw, least, words in OTHER_ARRIVALS),
         hints=(
             "First where the robot arrives on average, then how far that is from where it was sent.",
             "|mean of the arrivals − command|, one vector and its length.",
@@ -357,9 +462,15 @@ ACCURACY = [
         draw=(only_arrivals, functools.partial(only_arrivals, d=2), functools.partial(only_arrivals, numbers=(3, 5))),
         metric=metrics.Numbers(1e-9, "mm"),
         noisy=(
-            functools.partial(only_arrivals, numbers=(2, 3)),
-            metrics.Numbers(1e-9, "mm"),
-            "Right for three arrivals and more. For two, which are equally far from their mean:",
+            (
+                functools.partial(only_arrivals, numbers=(2, 3)),
+                metrics.Numbers(1e-9, "mm"),
+                "Right for three arrivals and more. For two, which are equally far from their mean:",
+            ),
+            *(
+                (functools.partial(without_command, draw=draw), metrics.Numbers(1e-8, "mm", least=least), words)
+                for draw, least, words in OTHER_ARRIVALS
+            ),
         ),
         hints=(
             "Where the robot was sent does not matter here: compare the arrivals with their own mean.",
@@ -527,7 +638,7 @@ TRIANGULATION = [
             functools.partial(mirrored, draw=obtuse_triangle),
         ),
         metric=metrics.Numbers(1e-9, "mm"),
-        noisy=tuple((draw, metrics.Numbers(1e-9, "mm"), words) for draw, words in NEARLY_RIGHT),
+        noisy=tuple((draw, metrics.Numbers(1e-9, "mm"), words) for draw, words in (*NEARLY_RIGHT, *OTHER_TRIANGLES)),
         hints=(
             "Drop the height: it cuts the base in two parts, and each belongs to a right triangle.",
             "L = H / tan α + H / tan β. Solve for H.",
@@ -626,6 +737,7 @@ TRIANGULATION = [
             functools.partial(mirrored, draw=noisy_obtuse_triangle),
         ),
         metric=metrics.Numbers(1e-5, "mm"),
+        noisy=tuple((draw, metrics.Numbers(1e-4, "mm", least=0.0), words) for draw, words in SPECIAL_NOISE),
         hints=(
             "How much does H change when one angle changes a little? Differentiate L = H (cot α + cot β), with L fixed.",
             "The derivative of cot α is −1/sin² α, so ∂H/∂α = H²/(L sin² α), and alike for β. Independent errors add up in their squares.",
@@ -748,6 +860,11 @@ TRIANGULATION = [
     ),
 ]
 
+STEP_2 = metrics.Several(*2 * (metrics.Numbers(1e-6, "mm"),), names=("t_FS", "target"))
+NOISY_STEP_2 = metrics.Several(  # differences from one pose are weighed otherwise, and right as well
+    *2 * (metrics.Numbers(0.3, "mm", absolute=True),), names=("t_FS", "target")
+)
+
 LITERATURE = [
     Exercise(
         "li_rotation",
@@ -760,7 +877,16 @@ LITERATURE = [
         metric=metrics.Rotations(1e-6),
         noisy=(
             (functools.partial(translated_poses, std=0.01), metrics.Rotations(0.2)),
+            (visited_twice, metrics.Rotations(1e-6), "right, but not where two of four poses are at one place:"),
             (first_ones_on_a_line, metrics.Rotations(0.5), "right without noise, but not all poses are heard:"),
+            *2  # a turn about the line that nothing tells may be nearly right by chance
+            * (
+                (
+                    functools.partial(first_ones_on_a_line, numbers=(40, 50)),
+                    metrics.Rotations(0.5),
+                    "right without noise, but not all of 40 poses and more are heard:",
+                ),
+            ),
             (
                 nearly_in_a_plane,
                 metrics.Rotations(5.0),
@@ -852,15 +978,15 @@ LITERATURE = [
         reference=literature.li_translation,
         draw=(turned_poses, functools.partial(turned_poses, n=3)),
         fixed={"R_FS": ROTATION},
-        metric=metrics.Several(metrics.Numbers(1e-6, "mm"), metrics.Numbers(1e-6, "mm"), names=("t_FS", "target")),
-        noisy=(  # differences from one pose are weighed otherwise, and right as well
-            first_ones_turned_alike,
-            metrics.Several(
-                metrics.Numbers(0.3, "mm", absolute=True),
-                metrics.Numbers(0.3, "mm", absolute=True),
-                names=("t_FS", "target"),
+        metric=STEP_2,
+        noisy=(
+            (two_turned_alike, STEP_2, "right, but not where two of four poses have one orientation:"),
+            (first_ones_turned_alike, NOISY_STEP_2, "right without noise, but not all poses are heard:"),
+            (
+                functools.partial(first_ones_turned_alike, numbers=(40, 50)),
+                NOISY_STEP_2,
+                "right without noise, but not all of 40 poses and more are heard:",
             ),
-            "right without noise, but not all poses are heard:",
         ),
         hints=(
             "With R_FS known, (2-40) is linear in what is left: t_FS and the target, six numbers.",
@@ -929,7 +1055,8 @@ LITERATURE = [
         reference=literature.kim_matrix,
         draw=two_motions,
         fixed={"A": POSE, "B": POSE},
-        metric=EitherSide(metrics.Numbers(1e-9), metrics.Numbers(1e-9), names=("D", "F")),
+        metric=EQUATIONS,
+        noisy=tuple((draw, EQUATIONS, words) for draw, words in SPECIAL_MOTIONS),
         hints=(
             "Write entry (1, 1) of A X and of X B out, then (1, 2): which u's appear, with which factors? X's last row is 0 0 0 1.",
             "With the rows of X one after another, A X is (A₃ₓ₃ ⊗ I₄) u plus the last column of A, which has no u and goes to F; X B is (I₃ ⊗ Bᵀ) u.",

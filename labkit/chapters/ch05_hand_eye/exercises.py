@@ -52,10 +52,10 @@ def noisy_scene(rng):
             return T_BF, x_S
 
 
-def first_ones_alike(rng):
+def first_ones_alike(rng, numbers=(14, 20), turn=0.003):
     """Noisy poses of which all but the last six hardly turn: the first ones alone tell next to nothing."""
-    T_FS, T_BF, x_S, target = scene(rng, n=int(rng.integers(14, 20)))
-    R = T_BF[0, :3, :3] @ exp_so3(rng.uniform(-0.003, 0.003, (len(x_S) - 6, 3)))
+    T_FS, T_BF, x_S, target = scene(rng, n=int(rng.integers(*numbers)))
+    R = T_BF[0, :3, :3] @ exp_so3(rng.uniform(-turn, turn, (len(x_S) - 6, 3)))
     T_BF[:-6] = frames.pose(R, target - (R @ frames.transform(T_FS, x_S[:-6])[..., None])[..., 0])
     return T_BF, x_S + 0.02 * rng.normal(size=x_S.shape)
 
@@ -68,7 +68,7 @@ def just_enough(rng):
             return T_BF, x_S
 
 
-MANY = 40  # more poses than the thesis's 31
+MANY = 120  # more poses than the thesis's 31
 
 
 def kuka_scene(rng, n=None):
@@ -82,15 +82,56 @@ def kuka_scene(rng, n=None):
     )
 
 
-def pose_off(rng, n=None):
+def kuka_turned(rng, B, further=0.0):
+    """The same with this angle B, and with A and C so many radians further."""
+    p2, *others = kuka_scene(rng)
+    p2[3:] = p2[3] + further, B, p2[5] - further
+    return p2, *others
+
+
+def kuka_almost_there(rng):
+    """A KUKA pose so near the true scanner that all residuals are below 0.001 mm."""
+    T_FS, T_BF, x_S, target = scene(rng)
+    return frames.kuka_from_matrix(T_FS) + rng.uniform(-1e-6, 1e-6, 6), T_BF, x_S, target
+
+
+SPECIAL_KUKA = (
+    *(
+        (functools.partial(kuka_turned, B=B), "right, but not at the pole, where B is 90° or −90°:")
+        for B in (np.pi / 2, -np.pi / 2)
+    ),
+    (
+        functools.partial(kuka_turned, B=2.0, further=2 * np.pi),
+        "right, but not of angles beyond a half turn, or of a B beyond 90°:",
+    ),
+    (kuka_almost_there, "right, but not where all residuals are below 0.001 mm:"),
+)
+
+
+def pose_off(rng, n=None, turn=0.15, shift=8):
     """A scanner pose off the truth by some degrees and millimeters."""
     T_FS, T_BF, x_S, target = scene(rng, n)
     return (
-        frames.pose(T_FS[:3, :3] @ random_rotation(rng, 0.15), T_FS[:3, 3] + rng.uniform(-8, 8, 3)),
+        frames.pose(T_FS[:3, :3] @ random_rotation(rng, turn), T_FS[:3, 3] + rng.uniform(-shift, shift, 3)),
         T_BF,
         x_S,
         target,
     )
+
+
+def few_poses(rng):
+    """Four poses that determine the step well."""
+    while True:
+        T_FS, T_BF, x_S, target = pose_off(rng, 4)
+        if np.linalg.cond(analytic_jacobian(T_FS, T_BF, x_S)) < 5e3:
+            return T_FS, T_BF, x_S, target
+
+
+def one_far_off(rng):
+    """A scanner pose a little off the truth, and one sphere center off by a decimeter and more."""
+    T_FS, T_BF, x_S, target = pose_off(rng, turn=0.03, shift=3)
+    x_S[rng.integers(len(x_S))] += rng.choice([-1, 1], 3) * rng.uniform(80, 160, 3)
+    return T_FS, T_BF, x_S, target
 
 
 def turned_far(rng):
@@ -116,12 +157,40 @@ def uphill(rng):
     return T_FS @ frames.pose(axes.T, np.zeros(3)), base @ T_BF, x_S @ axes.T, frames.transform(base, target)
 
 
-def smooth_function(rng, m=None, n=None):
-    """A curved function of some variables, a place and a step large enough to tell the schemes apart."""
+def smooth_function(rng, m=None, n=None, step=(0.03, 0.08), size=1.0, away=0.0):
+    """A curved function of some variables, of some size, a place, and a step large enough to tell the schemes apart."""
     sizes = rng.choice(np.arange(2, 6), 2, replace=False)
     m, n = m or sizes[0], n or sizes[1]
     M, c = rng.normal(size=(m, n)), rng.normal(size=m)
-    return (lambda x: np.sin(M @ x) + c * (x @ x)), rng.normal(size=n), float(rng.uniform(0.03, 0.08))
+    x = rng.normal(size=n) + away * rng.choice([-1, 1], n)
+    return (lambda x: size * (np.sin(M @ x) + c * (x @ x))), x, float(rng.uniform(*step))
+
+
+SPECIAL_FUNCTIONS = (  # what is special, tolerance, least size it is relative to, words
+    ({"m": 3, "n": 3}, 1e-9, 1.0, "right, but not of as many values as variables:"),
+    ({"m": 2, "n": 8}, 1e-9, 1.0, "right, but not of eight variables:"),
+    ({"step": (3e-5, 1e-4)}, 1e-8, 1.0, "right, but not with a step below 1e-4:"),
+    ({"step": (1, 3)}, 1e-9, 1.0, "right, but not with a step above 1:"),
+    ({"away": 20.0}, 1e-9, 1.0, "right, but not far from 0:"),
+    ({"size": 1e-7}, 1e-7, 0.0, "right, but not of a function that hardly changes, its derivatives below 1e-4:"),
+)
+
+
+def sized_arc(rng, size):
+    """A scan line of another size as a whole."""
+    return tuple(size * v for v in arc(rng))
+
+
+def arc_elsewhere(rng):
+    """A scan line of a circle whose center is next to x = 0 and has a negative z."""
+    x, z = arc(rng)
+    x_c, z_c, _ = fit_circle(x, z)
+    return x - x_c + rng.choice([-1, 1]) * rng.uniform(0.01, 0.05), z - z_c - rng.uniform(50, 300)
+
+
+THREE_NAMES = ("center x", "center z", "radius")
+ANY_CIRCLE = metrics.Several(*3 * (metrics.Numbers(1e-6, "mm"),), names=THREE_NAMES)
+NOISY_CIRCLE = metrics.Several(*3 * (metrics.Numbers(6e-5, "mm", absolute=True),), names=THREE_NAMES)
 
 
 def arc(rng, std=0.0, side=1, n=None):
@@ -132,15 +201,37 @@ def arc(rng, std=0.0, side=1, n=None):
     return rng.uniform(-20, 20) + r * np.sin(angle), rng.uniform(200, 280) - r * np.cos(angle)
 
 
-def profile(rng, side, across):
-    """A scan line of a sphere of some radius whose center lies on this side of the scan plane, and across it, along x;
-    more of it on one side of its lowest point than on the other.
+def profile(rng, side, across, away=(6, 20), std=0.0, size=1.0):
+    """A scan line of a sphere of some radius whose center lies on this side of the scan plane, so far away, and across
+    it, along x; more of it on one side of its lowest point than on the other.
     """
     radius = float(rng.uniform(25, 35))
-    center = np.array([across * rng.uniform(4, 20), side * rng.uniform(6, 20), rng.uniform(200, 280)])
+    center = np.array([across * rng.uniform(4, 20), side * rng.uniform(*away), rng.uniform(200, 280)])
     x, z = sphere.scan_line(center, radius, rng.uniform(0.7, 1.0), int(rng.integers(50, 80)))
     seen = slice(int(rng.integers(8, 16)), None)
-    return x[::across][seen], z[::across][seen], radius, side
+    x, z = (v[::across][seen] + std * rng.normal(size=len(v[seen])) for v in (x, z))
+    return size * x, size * z, size * radius, side
+
+
+SPECIAL_PROFILES = (
+    *(
+        (
+            functools.partial(profile, side=side, across=1, away=(0.3, 1.5)),
+            metrics.Numbers(1e-6, "mm"),
+            "right, but not where the scan plane passes the center closer than 1.5 mm:",
+        )
+        for side in (1, -1)
+    ),
+    *(
+        (
+            functools.partial(profile, side=1, across=-1, size=size),
+            metrics.Numbers(1e-6, "mm"),
+            f"right, but not of a sphere {words}:",
+        )
+        for size, words in ((0.05, "of a millimeter or two"), (20, "half a meter large and more"))
+    ),
+    *3 * ((functools.partial(profile, side=-1, across=1, std=0.001), metrics.Numbers(2e-4, "mm", absolute=True)),),
+)
 
 
 def increments(rng, n=None, turn=0.2):
@@ -149,12 +240,38 @@ def increments(rng, n=None, turn=0.2):
     return np.concatenate([rng.normal(size=3) * turn, rng.normal(size=3) * 10, target]), T_FS, T_BF, x_S
 
 
-def residuals_with_outliers(rng, odd=0):
+def residuals_with_outliers(rng, odd=0, n=None, gross=4, size=1.0):
     """Residual vectors of some twenty poses, an even or an odd number, four of them gross, and their odd-sized noise."""
-    n = 2 * int(rng.integers(9, 15)) + odd
-    e = rng.uniform(0.1, 2.0) * rng.normal(size=(n, 3))
-    e[rng.choice(n, 4, replace=False)] *= rng.uniform(5, 40, (4, 1))
+    n = n or 2 * int(rng.integers(9, 15)) + odd
+    e = size * rng.uniform(0.1, 2.0) * rng.normal(size=(n, 3))
+    e[rng.choice(n, gross, replace=False)] *= rng.uniform(5, 40, (gross, 1))
     return (e,)
+
+
+def residuals_of_all_lengths(rng):
+    """Residual vectors whose weights are spread from 1 to 0: half are short, the others evenly longer, past the cut."""
+    lengths = rng.uniform(0.5, 2.0) * np.append(rng.uniform(0.2, 1.0, 20), np.linspace(1.0, 3.8, 19))
+    directions = rng.normal(size=(len(lengths), 3))
+    return (rng.permutation(lengths[:, None] * directions / np.linalg.norm(directions, axis=1)[:, None]),)
+
+
+SPECIAL_RESIDUALS = (
+    (functools.partial(residuals_with_outliers, gross=0), "right, but not where no pose is off:"),
+    (functools.partial(residuals_with_outliers, n=3, gross=1), "right, but not of three poses:"),
+    (functools.partial(residuals_with_outliers, n=100, gross=30), "right, but not of a hundred poses:"),
+    (
+        functools.partial(residuals_with_outliers, size=2e-3),
+        "right, but not where most residuals are some thousandths of a millimeter:",
+    ),
+    (
+        functools.partial(residuals_with_outliers, size=1e3),
+        "right, but not where most residuals are longer than 100 mm:",
+    ),
+    (
+        residuals_of_all_lengths,
+        "right, but not where residuals of all lengths are there, up to the cutoff and past it:",
+    ),
+)
 
 
 def entries_with_more_slips(rng, mended=()):
@@ -431,7 +548,7 @@ class LinearStart(metrics.Several):
         super().__init__(metrics.Poses(deg, mm), metrics.Numbers(target, "mm"), names=("T_FS", "target"))
 
     def deviations(self, result, expected):
-        if np.abs(result[1] - expected[1]).max() < 1e-6 * np.abs(expected[1]).max():
+        if np.abs(result[1] - expected[1]).max() < 1e-8 * np.abs(expected[1]).max():
             exactly = metrics.Several(metrics.Poses(1e-3, 1e-3), self.metrics[1], names=self.names)
             return exactly.deviations(result, expected)
         return super().deviations(result, expected)
@@ -771,10 +888,14 @@ CHAPTER = Chapter(
             "fit_circle",
             reference=fit_circle,
             draw=(arc, functools.partial(arc, side=-1), functools.partial(arc, n=3)),
-            metric=metrics.Several(metrics.Numbers(1e-6, "mm"), metrics.Numbers(1e-6, "mm"), metrics.Numbers(1e-6, "mm"),
-                                   names=("center x", "center z", "radius")),
-            noisy=5 * ((lambda rng: arc(rng, 0.001), metrics.Several(
-                *3 * (metrics.Numbers(6e-5, "mm", absolute=True),), names=("center x", "center z", "radius"))),),
+            metric=ANY_CIRCLE,
+            noisy=(
+                *5 * ((lambda rng: arc(rng, 0.001), NOISY_CIRCLE),),
+                (lambda rng: arc(rng, 0.001, n=600), NOISY_CIRCLE, "right, but not of a scan line of 600 noisy points:"),
+                *((functools.partial(sized_arc, size=size), ANY_CIRCLE, f"right, but not of a circle of {words}:")
+                  for size, words in ((0.02, "half a millimeter"), (50, "a meter and more"))),
+                (arc_elsewhere, ANY_CIRCLE, "right, but not of a circle whose center is next to x = 0, with a negative z:"),
+            ),
             hints=(
                 "A circle is linear in the right unknowns: multiply (x - xc)^2 + (z - zc)^2 = r^2 out.",
                 "x^2 + z^2 + a1 x + a2 z + a3 = 0 with a1 = -2 xc, a2 = -2 zc, a3 = xc^2 + zc^2 - r^2: one equation a point.",
@@ -816,6 +937,7 @@ CHAPTER = Chapter(
             reference=sphere.sphere_center_from_profile,
             draw=tuple(functools.partial(profile, side=side, across=x) for side, x in ((-1, 1), (1, 1), (-1, -1), (1, -1))),
             metric=metrics.Numbers(1e-6, "mm"),
+            noisy=SPECIAL_PROFILES,
             hints=(
                 "The scan line gives a circle in the plane y = 0; the center of the sphere lies straight before or behind its center.",
                 "Pythagoras: R^2 = r^2 + d^2, and side says whether y is +d or -d.",
@@ -860,6 +982,7 @@ CHAPTER = Chapter(
             draw=(kuka_scene, functools.partial(kuka_scene, n=1), functools.partial(kuka_scene, n=MANY)),
             fixed={"p2": "a KUKA pose is always six numbers", "target": POINT},
             metric=metrics.Numbers(1e-9, "mm"),
+            noisy=tuple((draw, metrics.Numbers(1e-9, "mm"), words) for draw, words in SPECIAL_KUKA),
             hints=(
                 "Follow the point from the scanner outward: which transform comes first?",
                 "T_BF T_FS x_S - target, with T_FS = matrix_from_kuka(p2). `frames.transform` takes stacks of poses.",
@@ -937,6 +1060,10 @@ CHAPTER = Chapter(
             reference=_central,
             draw=(smooth_function, functools.partial(smooth_function, m=1), functools.partial(smooth_function, n=1)),
             metric=metrics.Numbers(1e-9),
+            noisy=tuple(
+                (functools.partial(smooth_function, **special), metrics.Numbers(tol, least=least), words)
+                for special, tol, least, words in SPECIAL_FUNCTIONS
+            ),
             hints=(
                 "Move one variable at a time, and look at the function ahead and behind.",
                 "Column k is (f(x + h e_k) - f(x - h e_k)) / (2 h), with e_k the k-th unit vector.",
@@ -1019,7 +1146,12 @@ CHAPTER = Chapter(
             draw=(pose_off, functools.partial(pose_off, n=MANY)),
             fixed={"T_FS": POSE, "target": POINT},
             metric=metrics.Poses(1e-6, 1e-6),
-            noisy=(uphill, metrics.Poses(1e-6, 1e-6), "right, but not from a start so far off that the residuals grow with the step. Gauss-Newton takes it whole all the same:"),
+            noisy=(
+                (uphill, metrics.Poses(1e-6, 1e-6), "right, but not from a start so far off that the residuals grow with the step. Gauss-Newton takes it whole all the same:"),
+                (functools.partial(pose_off, turn=1e-6, shift=1e-4), metrics.Poses(1e-6, 1e-6), "right, but not from a start that is off by less than 0.001 mm and a millionth of a rad:"),
+                (few_poses, metrics.Poses(1e-4, 1e-4), "right, but not of four poses:"),
+                (one_far_off, metrics.Poses(1e-6, 1e-6), "right, but not where one sphere center is far off. Gauss-Newton's step hears it like all others:"),
+            ),
             hints=(
                 "Solve the linearized problem for the step, then move the pose by it.",
                 "step = argmin |J step + e|; the first three entries are a rotation vector on the right of R_FS, the last three a translation.",
@@ -1083,8 +1215,12 @@ CHAPTER = Chapter(
             "joint_residual",
             reference=joint_residual,
             draw=(increments, functools.partial(increments, n=1), functools.partial(increments, n=MANY)),
-            noisy=(functools.partial(increments, turn=0.0), metrics.Numbers(1e-9, "mm"),
-                   "Right where phi turns. Where phi is 0, as at the start of a search, exp(phi) is I:"),
+            noisy=(
+                (functools.partial(increments, turn=0.0), metrics.Numbers(1e-9, "mm"),
+                 "Right where phi turns. Where phi is 0, as at the start of a search, exp(phi) is I:"),
+                (functools.partial(increments, turn=3e-7), metrics.Numbers(1e-9, "mm"), "right, but not where phi is some 1e-7 rad:"),
+                (functools.partial(increments, turn=2.0), metrics.Numbers(1e-9, "mm"), "right, but not where phi turns far:"),
+            ),
             fixed={"u": "nine unknowns", "T0": POSE},
             metric=metrics.Numbers(1e-9, "mm"),
             hints=(
@@ -1130,7 +1266,9 @@ CHAPTER = Chapter(
             metric=metrics.Several(metrics.Poses(1e-5, 1e-4), metrics.Numbers(1e-7, "mm"), names=("T_FS", "target")),
             noisy=((noisy_scene, LinearStart(0.5, 2.5, 2e-3), "exact on clean data, but on noisy data"),
                    (first_ones_alike, LinearStart(0.4, 2.0, 2e-3),
-                    "exact on clean data, but not all poses are heard. Where only the last ones turn far,")),
+                    "exact on clean data, but not all poses are heard. Where only the last ones turn far,"),
+                   (functools.partial(first_ones_alike, numbers=(60, 70), turn=1e-4), LinearStart(0.4, 2.0, 2e-3),
+                    "exact on clean data, but not all of 60 poses and more are heard. Where only the last ones turn far,")),
             hints=(
                 "Forget for a moment that R_FS is a rotation: then all unknowns enter linearly.",
                 "R_FS x + t_FS - R_BF^T target = -R_BF^T t_BF. Fifteen unknowns: nine of R_FS, three of t_FS, three of the target. A pose gives three rows: `np.kron(np.eye(3), x)` for R_FS row by row, then `np.eye(3)`, then -R_BF^T. Solve all rows, and take `nearest_rotation` of the first nine.",
@@ -1164,6 +1302,7 @@ CHAPTER = Chapter(
             reference=robust_weights,
             draw=(residuals_with_outliers, functools.partial(residuals_with_outliers, odd=1)),
             metric=metrics.Numbers(1e-3),  # the printed 1.538 is good enough
+            noisy=tuple((draw, metrics.Numbers(1e-3), words) for draw, words in SPECIAL_RESIDUALS),
             hints=(
                 "First a scale that outliers cannot spoil, then a weight that falls to zero.",
                 "std = median length / 1.538; u = length / (5 std); the weight is (1 - u^2)^2 below u = 1 and 0 above.",
