@@ -815,6 +815,13 @@ FORGOTTEN = [
     ("robust_weights", lambda d, scale: ((d > 6.8 * scale) & (d < 7 * scale)).any()),
     ("robust_weights", lambda d, scale: scale > 10),
     ("robust_weights", lambda d, scale: scale < 0.01),
+    ("read_system", lambda text: "+1.5" in text),
+    ("read_system", lambda text: re.search(r"#.*#", text)),
+    ("read_system", lambda text: re.search(r"\d,\d", text) and re.search(r"\d\.\d", text)),
+    ("read_system", lambda text: re.search(r"# \d+\.\d \d+\.\d \d+\.\d$", text, re.MULTILINE)),
+    ("write_system", lambda points: np.abs(points).min() < 1e-100),
+    ("write_system", lambda points: np.abs(points).max() > 1e100),
+    ("write_system", lambda points: (points == 0).any()),
 ]
 
 
@@ -834,6 +841,29 @@ def residuals_like_the_poses(T_WF, tip, point):
     for k, T in enumerate(T_WF):
         r[k] = T[:3, :3] @ tip + T[:3, 3] - point
     return r
+
+
+def where_small_0(name, least):
+    return lambda *given: (lambda r: np.where(abs(r) < least, 0, r))(ITEMS[name].reference(*given))
+
+
+@pytest.mark.parametrize("name", ["pivot_matrix", "pivot_residuals", "pivot_covariance", "robust_weights"])
+def test_what_is_small_is_not_0(name, monkeypatch):
+    monkeypatch.setattr(engine, "LOOKING", 0.0)
+    assert judged(name, where_small_0(name, 1e-6)).status == NOT_YET
+
+
+def test_infinity_is_no_coordinate():
+    def without_nan(text):
+        points = [[number_in(e) for e in line.split("#")[0].replace(",", ".").split()] for line in text.splitlines()]
+        for number, entries in enumerate(points, start=1):
+            if entries and (len(entries) != 3 or np.isnan(entries).any()):
+                raise ValueError(f"line {number}")
+        if sum(map(bool, points)) != 3:
+            raise ValueError("three points")
+        return np.array([entries for entries in points if entries])
+
+    assert "holds inf" in judged("read_system", without_nan).text
 
 
 def test_residuals_of_poses_of_whole_numbers_keep_their_decimals():

@@ -507,6 +507,11 @@ def _affine_first(handed):
     return variant
 
 
+def _about_the_first_point(p, q):
+    T = _kabsch(centered=False)(p - p[0], q - q[0])
+    return frames.pose(T[:3, :3], q[0] - T[:3, :3] @ p[0])
+
+
 def _one_mean_for_all(p, q):
     U, _, Vt = np.linalg.svd((p - p.mean()).T @ (q - q.mean()))
     R = Vt.T @ np.diag([1, 1, np.sign(np.linalg.det(Vt.T @ U.T))]) @ U.T
@@ -1405,6 +1410,11 @@ CHAPTER = Chapter(
                 Mistake(
                     _kabsch(shift=lambda R, p, q: q[0] - R @ p[0]),
                     "The rotation is right. You put the first point exactly: the means are to fall together.",
+                ),
+                Mistake(
+                    _about_the_first_point,
+                    "You measured the points from the first one, which is put exactly and weighs more than all others. Measure both sets from their means.",
+                    id="fit-frame-about-the-first",
                 ),
                 Mistake(
                     lambda p, q: frames.fit_frame(p[:3], q[:3]),

@@ -42,6 +42,7 @@ VECTORS = (
             ("the vector points against an axis", (0, -1, 0)),
         )
     ),
+    ("where a component is far smaller than the others", lambda rng: vector(rng, 70.0, signs=(1, -2e-7, 0.5))),
     ("of an axis, whose length is 1", lambda rng: (np.array([0.0, 0.0, 1.0]),)),
 )
 
@@ -139,6 +140,7 @@ KINDS_OF_POSES = (
     ("a pose a few millimeters away", dict(angle=1.0, reach=3.0)),
     ("a pose some meters away", dict(angle=1.0, reach=3e3)),
     ("a pose turned by very little, but far away", dict(angle=6e-4)),
+    ("a pose turned by some hundred-thousandths of a degree", dict(angle=6e-7)),
     ("a pose turned by less than 90 deg", dict(angle=1.2)),
     ("a pose turned by half a turn", dict(angle=HALF)),
     *(
@@ -214,6 +216,7 @@ ANGLES = (
     ),
     *((f"where {'ABC'[k]} alone is not 0", functools.partial(angles, abc=_about_one_axis(k, 0.7))) for k in range(3)),
     ("of angles of some thousandths of a degree", functools.partial(angles, abc=(5e-5, -4e-5, 3e-5))),
+    ("of angles of some hundred-thousandths of a degree", functools.partial(angles, abc=(5e-7, -4e-7, 3e-7))),
     *(
         (f"where the position is {words}", functools.partial(angles, abc=FREE, reach=reach))
         for words, reach in (("the origin", 0.0), ("near the origin", 0.5), ("many meters away", 5e4))
@@ -249,6 +252,7 @@ READINGS = (
     ),
     ("where A, B and C are 0", functools.partial(read_from, abc=(0.0, 0.0, 0.0))),
     ("of angles of some thousandths of a degree", functools.partial(read_from, abc=(5e-5, -4e-5, 3e-5))),
+    ("of angles of some hundred-thousandths of a degree", functools.partial(read_from, abc=(5e-7, -4e-7, 3e-7))),
     *(
         (
             f"a ten-thousandth of a degree beside B = {sign * 90} deg, where A and C still are two angles",
@@ -287,6 +291,7 @@ SETS = tuple(
         ("a frame turned by half a turn", dict(angle=HALF)),
         ("a frame turned by nearly half a turn", dict(angle=2.9)),
         ("a frame hardly turned", dict(angle=1e-3)),
+        ("a frame turned by some hundred-thousandths of a degree", dict(angle=6e-7, noise=0.0)),
         ("a small part, of a few millimeters", dict(size=2.0, noise=0.01)),
         ("a part many meters away", dict(reach=5e4)),
         ("points one of which was measured twice", dict(drawing=lambda p: np.concatenate([p[:-1], p[:1]]))),

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...exercises import metrics
 from ...exercises.engine import Exercise, Mistake
+from ...exercises.special import right_where
 from ...files.text import number_in
 
 # --- draws ---
@@ -45,6 +46,45 @@ def text_of_system(rng, comments=False, commas=False):
 TEXTS = tuple(
     functools.partial(text_of_system, comments=comments, commas=commas)
     for comments, commas in ((False, False), (True, False), (False, True), (True, True))
+)
+
+
+def _typed(*lines, end="\n"):
+    """A draw of one text, as it stands here."""
+    return lambda rng: ("\n".join(lines) + end,)
+
+
+PLAIN = ("1.5 -2.5 3.5", "4.25 5.5 6.5")
+TYPED = tuple(
+    (f"of a text {words}", _typed(*PLAIN, *lines))
+    for words, lines in (
+        ("with a number like +1.5", ["+1.5 2.0 +3.25"]),
+        ("with a number like .5", [".5 2.0 -.25"]),
+        ("with a number like 5.", ["5. 2.0 -3."]),
+        ("with a number like 1.5E3", ["1.5E3 2.0E+01 -3.0E-02"]),
+        ("with a number like 1.5e-3", ["1.5e-3 2.0e+01 -3e2"]),
+        ("with a number like 1,5e2", ["1,5e2 2.0 3,5"]),
+        ("with both 1,5 and 1.5", ["1,5 2.5 3"]),
+        ("with a number that is 0", ["0 -0.0 0.0"]),
+        ("with numbers above 1000", ["1500.5 -2000000.25 12345678.5"]),
+        ("with blanks at the end of a line", ["1.5 2.0 3.5  \t"]),
+        ("with two # in a line", ["1.5 2.0 3.5 # one # two"]),
+        ("with a # and nothing behind it", ["1.5 2.0 3.5 #", "#"]),
+        ("with three numbers in a comment", ["# 7.5 8.5 9.5", "1.5 2.0 3.5"]),
+        ("with a comment at the end", ["1.5 2.0 3.5", "# the end"]),
+        ("with a comma in a comment", ["1.5 2.0 3.5 # first, second"]),
+        ("with empty lines at the end", ["1.5 2.0 3.5", "", "  ", ""]),
+    )
+)
+SIZES = tuple(
+    (f"of {words}", lambda rng, entry=entry: (system(rng) * entry,))
+    for words, entry in (
+        ("numbers far below 1e-100", 1e-200),
+        ("numbers far above 1e100", 1e200),
+        ("numbers about 1e-30", 1e-30),
+        ("numbers about 1e20", 1e20),
+        ("a coordinate that is 0", np.array([[1.0, 1, 0], [0, 1, 1], [1, 0, 1]])),
+    )
 )
 
 
@@ -134,6 +174,7 @@ FAULTS = (
     ("two numbers", "12.5 3.0"),
     ("four numbers", "12.5 3.0 4.0 5.0"),
     ("nan", "12.5 nan 3.0"),
+    ("inf", "12.5 3.0 -inf"),
     ("a letter behind a number", "12.5 7x 3.0"),
 )
 
@@ -174,7 +215,7 @@ FILES = [
         reference=read_system,
         draw=TEXTS,
         metric=Points(1e-12, "mm"),
-        properties=(names_the_line,),
+        properties=(names_the_line, right_where(read_system, Points(1e-12, "mm"), *TYPED)),
         hints=(
             "Go through the lines with their numbers; a line that holds nothing but a comment holds no point.",
             "Cut each line at `#`, make commas points, split it at blanks. Three finite numbers are a point; whatever else is left is a fault, and its line is named.",
@@ -236,6 +277,7 @@ FILES = [
         fixed={"points": "a system is always three points"},
         metric=reads_back(),
         noisy=(system_near_0, reads_back(), "right, but not of numbers near 0:"),
+        properties=(right_where(write_system, reads_back(), *SIZES),),
         hints=(
             "One line a point, blanks in between. How many digits does a double need so that none is lost?",
             "17 significant digits always suffice, and so does `repr`, which writes as few as needed.",

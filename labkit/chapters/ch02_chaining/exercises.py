@@ -596,6 +596,11 @@ CHAPTER = Chapter(
                     "The length of the vector from R - Rᵀ is twice the sine of the angle. Twice the cosine is trace - 1: np.arctan2 takes both.",
                 ),
                 Mistake(
+                    _closure(lambda T: np.arctan2(np.sqrt(2) * _twice_sine(T), np.trace(T[:3, :3]) - 1)),
+                    "Your sine is sqrt(2) times too large beside your cosine: R - Rᵀ holds each entry twice, so its norm is 2 sqrt(2) sin(angle).",
+                    id="closure-sine-twice",
+                ),
+                Mistake(
                     _closure(lambda T: np.linalg.norm(frames.kuka_from_matrix(T)[3:])),
                     "You took the root of the sum of squares of three Euler angles. Successive turns about different axes do not add like lengths; the trace gives the angle.",
                 ),

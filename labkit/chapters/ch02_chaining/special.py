@@ -55,6 +55,7 @@ CHAINS = (
             ("shifts without a turn", dict(angle=0.0)),
             ("turns without a shift", dict(reach=0.0)),
             ("turns by very little", dict(angle=1e-3)),
+            ("turns by some hundred-thousandths of a degree", dict(angle=6e-7)),
             ("is shorter than a hundredth of a millimeter", dict(reach=5e-3)),
             ("is many meters long", dict(reach=5e4)),
             ("is half a turn", dict(angle=HALF)),

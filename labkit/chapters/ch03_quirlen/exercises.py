@@ -248,6 +248,12 @@ CHAPTER = Chapter(
                     id="pivot-matrix-by-axis",
                 ),
                 Mistake(
+                    lambda T_WF: np.hstack([T_WF[:, :3, :3].reshape(3, -1).T, pivot.pivot_matrix(T_WF)[:, 3:]]),
+                    "The entries of the rotations stand in wrong places: `reshape` reads row after row, pose after pose, so "
+                    "`T_WF[:, :3, :3].reshape(-1, 3)` stacks them as they are.",
+                    id="pivot-matrix-reshaped",
+                ),
+                Mistake(
                     _rows_overlap,
                     "The blocks overwrite each other: each pose takes three rows, so block i begins in row 3 * i.",
                 ),
@@ -764,7 +770,9 @@ CHAPTER = Chapter(
                 metrics.Numbers(1e-6, "mm^2"),
                 "Right where the residuals add up to 0, as those of least squares do. Where they do not, as those of rounded numbers:",
             ),
-            properties=(right_where(pivot.pivot_covariance, metrics.Numbers(1e-6, "mm^2"), *special.RESIDUALS),),
+            properties=(
+                right_where(pivot.pivot_covariance, metrics.Numbers(1e-6, "mm^2", least=0.0), *special.RESIDUALS),
+            ),
             hints=(
                 "Noise in b goes through the solution x = (AᵀA)⁻¹ Aᵀb. What does it do to x?",
                 "cov = std² (AᵀA)⁻¹, with the unbiased std² = rᵀr / (3n - 6).",

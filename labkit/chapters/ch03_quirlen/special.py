@@ -37,7 +37,7 @@ COUNTS = ((2, "two"), (4, "four"), (7, "seven"), (12, "twelve"), (40, "forty"))
 SETS = (
     *((f"of {words} poses", functools.partial(poses, count=count)) for count, words in COUNTS),
     ("of poses turned by more than 90 deg", functools.partial(poses, angle=2.2)),
-    ("of poses turned by very little", functools.partial(poses, angle=1e-3)),
+    ("of poses turned by very little", functools.partial(poses, angle=1e-6)),
     ("of poses many meters away", functools.partial(poses, reach=5e4)),
     ("of poses next to the origin", functools.partial(poses, reach=0.1, tip=0.1, std=0.01)),
     ("where a pose is the identity", one_as(lambda T: np.eye(4))),
@@ -58,6 +58,12 @@ def all_touching(rng):
     T = poses(rng, std=0.0)
     result = pivot.calibrate_pivot(T)
     return T, result.tip, result.pivot
+
+
+def nearly_touching(rng):
+    """The same, the pivot moved by a little."""
+    T, tip, point = all_touching(rng)
+    return T, tip, point + vectors(rng, [7e-7])[0]
 
 
 def of_one_sign(rng, sign):
@@ -82,6 +88,7 @@ WITH_POINTS = (
         for words, sign in (("positive", 1), ("negative", -1))
     ),
     ("where every pose touches the point exactly", all_touching),
+    ("where the tip misses the pivot by less than a thousandth of a millimeter", nearly_touching),
 )
 
 
@@ -131,6 +138,7 @@ RESIDUALS = tuple(
         ("of poses turned by more than 90 deg", dict(angle=2.2)),
         ("of a narrow set of poses", dict(angle=0.06, count=12)),
         ("of residuals of some hundredths of a millimeter", dict(angle=0.06, count=12, std=0.02)),
+        ("of residuals of some ten-thousandths of a millimeter", dict(std=2e-4)),
         ("of residuals of some ten millimeters", dict(std=30.0)),
         ("where one pose is far beside the others", dict(outlier=40.0, count=12)),
     )
@@ -149,7 +157,7 @@ DISTANCES = (
         for words, quotients in (
             ("a distance is far below the scale", (0.002, 0.01, *MIXED)),
             ("a distance is about the scale", (0.15, 0.13, *MIXED)),
-            ("a distance is just below the cutoff", (0.975, 0.995, *MIXED)),
+            ("a distance is just below the cutoff", (0.975, 0.9997, *MIXED)),
             ("a distance is just above the cutoff", (1.005, 1.03, *MIXED)),
             ("a distance is the cutoff", (1.0, *MIXED)),
             ("a distance is a hundred times the cutoff", (100.0, *MIXED)),
