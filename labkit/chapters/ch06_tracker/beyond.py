@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from ...documents.report.printed import COLUMNS, table_d
 from ...estimation.optimization import levenberg_marquardt
 from ...exercises import metrics
+from ...exercises.draws import scaled
 from ...exercises.engine import Exercise, Mistake, Prediction, Value
 from ...geometry.frames import invert, matrix_from_quaternion, pose, quaternion_from_matrix, unit_vector
 from ...geometry.lie import exp_so3, skew
@@ -34,6 +35,12 @@ def readings_of_a_stop(rng, part):
             break
     signs = rng.permutation(np.r_[1, 1, 1, -1, -1, rng.choice([-1, 1], n - 5)])
     return (same * signs[:, None],)
+
+
+def so_many_readings(rng, n):
+    """So many quaternions of either sign that scatter by a degree."""
+    q = quaternion_from_matrix(exp_so3(rng.normal(size=3)) @ exp_so3(0.02 * rng.normal(size=(n, 3))))
+    return (q * np.where(np.arange(n) % 2, -1.0, 1.0)[:, None],)
 
 
 def readings_of_balanced_parts(rng):
@@ -77,6 +84,14 @@ STOPS = [
             readings_of_balanced_parts,
         ),
         metric=metrics.UpToSign(2e-4),
+        noisy=tuple(
+            (functools.partial(so_many_readings, n=n), metrics.UpToSign(tol), f"right, but not for {words}:")
+            for n, tol, words in (
+                (1, 1e-8, "a single reading, which is its own mean to all digits"),
+                (2, 2e-4, "two readings"),
+                (300, 2e-4, "300 readings"),
+            )
+        ),
         hints=(
             "q and -q are one rotation: whatever you average must be the same for both.",
             "q q^T is. The unit vector with the largest sum of (q_i . mean)^2 is an eigenvector of sum q q^T.",
@@ -178,6 +193,12 @@ def ray_direction(delays, rate):
     return stations.ray_direction(stations.sweep_angle(delays, rate))
 
 
+def delays_of(rng, low, high):
+    """The same for a diode that is off by angles of these amounts, in rad."""
+    rate = float(rng.uniform(40, 120))
+    return stations.sweep_delay(rng.uniform(low, high, 2) * rng.choice([-1, 1], 2), rate), rate
+
+
 def two_delays(rng):
     """Times after the flashes, s, of a diode that is off in both directions, and turns per second."""
     rate = float(rng.uniform(40, 120))
@@ -204,6 +225,12 @@ def rays(rng, most):
     place, origins = rng.uniform(-500, 500, 3), rng.uniform(-3000, 3000, (n, 3))
     directions = unit_vector(place - origins + rng.uniform(-30, 30, (n, 3)))
     return origins, directions * rng.uniform(0.3, 4, (n, 1))
+
+
+def many_rays(rng):
+    """Thirty rays that pass a point."""
+    place, origins = rng.uniform(-500, 500, 3), rng.uniform(-3000, 3000, (30, 3))
+    return origins, place - origins + rng.uniform(-30, 30, (30, 3))
 
 
 def _normal_equations(block, right=None):
@@ -252,12 +279,28 @@ def _e_trans_of_a_turn(turn):
 # Errors over speed -----------------------------------------------------------------------------------------------------------
 
 
-def readings_in_motion(rng):
+def readings_in_slow_motion(rng):
+    """The same in a motion of a few millimeters a second, with errors of micrometers."""
+    speed, error = readings_in_motion(rng)
+    return 0.01 * speed, 0.001 * error
+
+
+def few_readings_in_motion(rng):
+    """Three readings that lie on the law exactly."""
+    speed, e0, lag = (
+        rng.permutation(rng.uniform((50, 300, 900), (200, 700, 1500))),
+        rng.uniform(2, 9),
+        rng.uniform(0.008, 0.03),
+    )
+    return speed, np.hypot(e0, lag * speed)
+
+
+def readings_in_motion(rng, n=None):
     """Speeds, mm/s, and errors, mm, of a motion whose tracker lags; the squares scatter about their line, which meets
     the axis well above 0: what a negative e0^2 means, the docstring does not say.
     """
     while True:
-        speed = rng.uniform(20, rng.uniform(900, 1800), int(rng.integers(30, 60)))
+        speed = rng.uniform(20, rng.uniform(900, 1800), n or int(rng.integers(30, 60)))
         squares = rng.uniform(3, 9) ** 2 + (rng.uniform(0.008, 0.03) * speed) ** 2
         squares *= 1 + 0.1 * rng.uniform(-1, 1, len(speed))
         slope, intercept = np.polyfit(speed**2, squares, 1)
@@ -313,6 +356,20 @@ def trolley(rng):
     return tuple(pose(exp_so3(rng.normal(size=3)), rng.uniform(-600, 600, 3)) for _ in range(4))
 
 
+def trolley_at_rest(rng):
+    """The same where the trolley has not moved."""
+    T_BW, T_WE, _, T_BP = trolley(rng)
+    return T_BW, T_WE, T_WE.copy(), T_BP
+
+
+def trolley_far_off(rng):
+    """The same tens of meters off."""
+    poses = trolley(rng)
+    for T in poses:
+        T[:3, 3] *= 100
+    return poses
+
+
 def uncertain_point(rng):
     """A pose and a point, with full covariances of rad and mm of like weight."""
     T, p = (
@@ -358,6 +415,25 @@ def sources_of_error(rng):
     return [rng.normal(size=(3, n)) for n in sizes], [root @ root.T for root in roots]
 
 
+def one_source(rng):
+    """A single source."""
+    jacobians, covariances = sources_of_error(rng)
+    return jacobians[:1], covariances[:1]
+
+
+def many_sources(rng):
+    """Sources of 1, 2, 3 and up to 12 parameters."""
+    sizes = rng.permutation(np.arange(1, 13))
+    roots = [0.2 * rng.normal(size=(n, n)) for n in sizes]
+    return [rng.normal(size=(3, n)) for n in sizes], [root @ root.T for root in roots]
+
+
+def small_sources(rng):
+    """Sources of which each contributes micrometers at most."""
+    jacobians, covariances = sources_of_error(rng)
+    return jacobians, [1e-8 * cov for cov in covariances]
+
+
 def shares(jacobians, covariances):
     """Standard deviation in space, mm, that each source contributes."""
     named = dict(enumerate(jacobians)), dict(enumerate(covariances))
@@ -398,6 +474,27 @@ STATIONS = [
         reference=ray_direction,
         draw=two_delays,
         metric=metrics.Numbers(1e-9),
+        noisy=(
+            *(
+                (
+                    functools.partial(delays_of, low=low, high=high),
+                    metrics.Numbers(1e-9),
+                    f"right, but not for a diode {words}:",
+                )
+                for low, high, words in (
+                    (0, 0, "straight ahead"),
+                    (1e-4, 5e-3, "nearly straight ahead, by thousandths of a radian"),
+                    (1.2, 1.45, "far aside, by 70 deg and more"),
+                )
+            ),
+            *(
+                (functools.partial(scaled, draw=two_delays, factors=(1 / factor, factor)), metrics.Numbers(1e-9), words)
+                for factor, words in (
+                    (20, "right, but not for fast planes, 800 turns a second and more:"),
+                    (0.01, "right, but not for slow planes, a turn or less a second:"),
+                )
+            ),
+        ),
         fixed={"delays": "a station has two planes, so there are two delays"},
         hints=(
             "First the angles: a whole turn takes 1 / rate, and the plane starts a quarter of a turn before straight ahead. Then the ray: both planes hold it.",
@@ -486,6 +583,20 @@ STATIONS = [
         reference=stations.nearest_to_rays,
         draw=(functools.partial(rays, most=6), functools.partial(rays, most=2)),
         metric=metrics.Numbers(1e-6, "mm"),
+        noisy=(
+            (many_rays, metrics.Numbers(1e-6, "mm"), "right, but not for thirty rays:"),
+            *(
+                (
+                    functools.partial(scaled, draw=functools.partial(rays, most=6), factors=factors),
+                    metrics.Numbers(1e-6, "mm"),
+                    f"right, but not for {words}:",
+                )
+                for factors, words in (
+                    ((100, 1e3), "stations that stand 100 m apart and directions of a length of hundreds"),
+                    ((0.01, 1e-3), "stations that stand centimeters apart and directions of a length of thousandths"),
+                )
+            ),
+        ),
         hints=(
             "What of p - o is the distance to a ray through o? The part across its direction d. Make the sum of its squares least.",
             "With d of length 1 the part across is (I - d d^T)(p - o), and (I - d d^T) is its own square: sum (I - d d^T) p = sum (I - d d^T) o.",
@@ -592,6 +703,8 @@ STATIONS = [
     ),
 ]
 
+ERROR_AND_LAG = metrics.Several(metrics.Numbers(1e-6, "mm"), metrics.Numbers(1e-9, "s"), names=("e0", "lag"))
+
 SPEEDS = [
     Prediction(
         "tempo",
@@ -604,7 +717,16 @@ SPEEDS = [
         "static_error_and_lag",
         reference=static_error_and_lag,
         draw=readings_in_motion,
-        metric=metrics.Several(metrics.Numbers(1e-6, "mm"), metrics.Numbers(1e-9, "s"), names=("e0", "lag")),
+        metric=ERROR_AND_LAG,
+        noisy=(
+            (
+                readings_in_slow_motion,
+                ERROR_AND_LAG,
+                "right, but not for slow motions, a few mm/s and errors of micrometers:",
+            ),
+            (few_readings_in_motion, ERROR_AND_LAG, "right, but not for three readings:"),
+            (functools.partial(readings_in_motion, n=200), ERROR_AND_LAG, "right, but not for 200 readings:"),
+        ),
         hints=(
             "The law bends in speed and error. In which two quantities is it a straight line?",
             "error^2 against speed^2: the intercept is e0^2, the slope lag^2. Two unknowns, `np.polyfit` or `lstsq`.",
@@ -686,6 +808,10 @@ CELL = [
         reference=cell.moved_part,
         draw=trolley,
         metric=metrics.Poses(1e-6, 1e-6),
+        noisy=(
+            (trolley_at_rest, metrics.Poses(1e-6, 1e-6), "right, but not where the trolley has not moved:"),
+            (trolley_far_off, metrics.Poses(1e-6, 1e-4), "right, but not tens of meters off:"),
+        ),
         fixed=dict.fromkeys(("T_BW", "T_WE0", "T_WE1", "T_BP0"), "a pose is 4 x 4"),
         hints=(
             "Tracker and part ride on one trolley: T_EP, the part seen from the tracker, is the same then and now. Find it from then, use it now.",
@@ -791,6 +917,20 @@ CELL = [
         reference=point_covariance,
         draw=uncertain_point,
         metric=metrics.Numbers(1e-6, "mm^2"),
+        noisy=tuple(
+            (
+                functools.partial(scaled, draw=uncertain_point, factors=factors),
+                metrics.Numbers(1e-6, "mm^2", least=0),
+                words,
+            )
+            for factors, words in (
+                ((1, 1, 1, 0), "right, but not for a point without an error of its own, cov_p = 0:"),
+                ((1, 0, 1, 1), "right, but not for a pose without error, cov_T = 0:"),
+                ((1, 1, 0, 1), "right, but not for the origin of B, p = 0:"),
+                ((1, 1e-6, 1, 1e-6), "right, but not for small covariances, of micrometers:"),
+                ((1, 1e3, 40, 1e3), "right, but not for a point meters away and large covariances:"),
+            )
+        ),
         fixed={
             "T_AB": "a pose is 4 x 4",
             "cov_AB": "a pose has six parameters",
@@ -875,6 +1015,15 @@ CELL = [
         reference=shares,
         draw=sources_of_error,
         metric=metrics.Numbers(1e-9, "mm"),
+        noisy=(
+            (one_source, metrics.Numbers(1e-9, "mm"), "right, but not for one source alone:"),
+            (many_sources, metrics.Numbers(1e-9, "mm"), "right, but not for a dozen sources, of 1 to 12 parameters:"),
+            (
+                small_sources,
+                metrics.Numbers(1e-6, "mm", least=0),
+                "right, but not for sources that contribute micrometers:",
+            ),
+        ),
         hints=(
             "To first order each source moves the result by J e. What covariance does that make, and what is its size in space?",
             "J cov J^T, shape (3, 3). Its trace is the mean squared distance; the root of it a length.",

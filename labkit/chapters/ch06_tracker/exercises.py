@@ -9,6 +9,7 @@ from ...calibration import ax_xb
 from ...documents.report.printed import table_d
 from ...documents.report.reconstruction import stop_poses, synthetic_log, synthetic_mountings
 from ...exercises import metrics
+from ...exercises.draws import scaled
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
 from ...geometry import lie
 from ...geometry.frames import invert, pose, relative, unit_vector
@@ -30,11 +31,19 @@ def decode_packet(data):
     return values[TIME], 1000 * values[POSITION], values[QUATERNION]
 
 
-def _packet(rng, sign):
-    """A good packet with all fields different, its quaternion of either sign."""
-    T = pose(exp_so3(rng.normal(size=3)), rng.uniform(-900, 900, 3))
+DECODED = metrics.Several(
+    metrics.Numbers(1e-9, "s", double=True),
+    metrics.Numbers(1e-9, "mm", double=True),
+    metrics.Numbers(1e-9, double=True),
+    names=("time", "position", "quaternion"),
+)
+
+
+def _packet(rng, sign, times=1.0, way=1.0):
+    """A good packet with all fields different, its quaternion of either sign; times, way: how much later and farther off."""
+    T = pose(exp_so3(rng.normal(size=3)), way * rng.uniform(-900, 900, 3))
     values = packet_from_pose(
-        T, rng.uniform(1, 900), velocity=rng.uniform(50, 300, 3), angular_velocity=rng.uniform(0.1, 1, 3)
+        T, times * rng.uniform(1, 900), velocity=rng.uniform(50, 300, 3), angular_velocity=rng.uniform(0.1, 1, 3)
     )
     values[8:11], values[18:21] = rng.uniform(0.5, 9, (2, 3))
     values[QUATERNION] *= sign
@@ -70,6 +79,22 @@ def link(rng, signs):
 def obtuse_link(rng):
     """Parameters of a link that turns by more than a right angle about both of its axes."""
     return (*(rng.uniform((1.8, 50, 50, 1.8), (3, 300, 300, 3)) * rng.choice([-1, 1], 4)),)
+
+
+def link_without(rng, k):
+    """Parameters of a link of which the k-th is 0."""
+    return (*(rng.uniform((0.3, 50, 50, 0.3), (3, 300, 300, 1.5)) * rng.choice([-1, 1], 4) * (np.arange(4) != k)),)
+
+
+def square_link(rng):
+    """Parameters of a link whose axes cross at a right angle, as most of the TX40's do."""
+    theta, d, a, _ = link_without(rng, 3)
+    return theta, d, a, np.pi / 2 * rng.choice([-1, 1])
+
+
+def joints_of_the_tx40(rng):
+    """The table of the TX40, of which most lengths are 0, and joints turned by more than half a turn."""
+    return TX40.dh.copy(), rng.uniform(3.3, 6, 6) * rng.choice([-1, 1], 6)
 
 
 def _entry_by_entry(th, d, a, al):
@@ -167,6 +192,18 @@ def one_motion(rng):
     return A[0, :3, :3], B[0, :3, :3]
 
 
+def small_motion(rng):
+    """Rotations of flange and tracker in a motion that turns by hundredths of a radian."""
+    X, turn = exp_so3(rng.normal(size=3)), rng.uniform(0.01, 0.04) * unit_vector(rng.normal(size=3))
+    return exp_so3(turn), exp_so3(X.T @ turn)
+
+
+def square_motion(rng):
+    """The same in a motion by 90 deg about an axis of the flange, which most entries of its rotation are 0 or 1 for."""
+    X, turn = exp_so3(rng.normal(size=3)), np.pi / 2 * rng.permutation([0, 0, rng.choice([-1, 1])])
+    return np.round(exp_so3(turn)), exp_so3(X.T @ turn)
+
+
 def kron_row(A, B):
     """The block m_i of one motion, shape (9, 9): I kron A - B^T kron I."""
     return np.kron(np.eye(3), A) - np.kron(B.T, np.eye(3))
@@ -190,6 +227,11 @@ def stacked(rng, sign, first=None):
             continue
         if _begins_with(sign * X, first) and np.abs(3 * X @ X.T - np.eye(3)).max() > 0.01:
             return (M,)
+
+
+def blocks(rng, n, **noise):
+    """The Kronecker matrix of so many motions with little noise, or other."""
+    return (ax_xb.kronecker_matrix(*motions(rng, n, **noise)),)
 
 
 def _begins_with(R, first):
@@ -276,6 +318,14 @@ def stacks_of_one_axis(rng):
 def translation_problem(rng, n=None):
     A, B = motions(rng, n)
     return A, B, ax_xb.rotation_from_kronecker(ax_xb.kronecker_matrix(A, B))[0]
+
+
+def motions_of_size(rng, factor):
+    """Motions whose shifts, and those of the mounting, are multiplied by a factor, and the rotation of the mounting."""
+    A, B, R = translation_problem(rng)
+    A[:, :3, 3] *= factor
+    B[:, :3, 3] *= factor
+    return A, B, R
 
 
 def translation_lsq(A, B, R):
@@ -375,6 +425,11 @@ def three_values(rng):
     return rng.permutation(_far(rng) + np.array([0.0, rng.uniform(0.1, 1), 50.0])), float(rng.uniform(2, 6))
 
 
+def one_value(rng):
+    """A single value, which is its own median."""
+    return _far(rng) + np.array([0.0]), float(rng.uniform(2, 6))
+
+
 class KeptOrNot(metrics.Exactly):
     """True or False for each value; says how many are kept or refused wrongly."""
 
@@ -444,6 +499,19 @@ def speed_curves(rng, sign, wide=False):
 
     most = int(rng.integers(130, 170)) if wide else samples + int(rng.integers(4, 12))
     return time, curve(time), curve(time - lag), step * most
+
+
+def curves_in_degrees(rng):
+    """Curves of large numbers whose lag, or lead, is a fraction of the first sample."""
+    time, _, _, most = speed_curves(rng, 1)
+    step = time[1] - time[0]
+    lag = rng.choice([-1, 1]) * rng.choice([0.27, 0.33]) * step
+    phase = rng.uniform(0, 6, 2)
+
+    def curve(t):
+        return 60 + 40 * np.sin(2.1 * t + phase[0]) + 20 * np.sin(3.7 * t + phase[1])
+
+    return time, curve(time), curve(time - lag), most
 
 
 def periodic_curves(rng):
@@ -618,11 +686,18 @@ CHAPTER = Chapter(
             "decode_packet",
             reference=decode_packet,
             draw=tuple(functools.partial(_packet, sign=sign) for sign in (1, -1)),
-            metric=metrics.Several(
-                metrics.Numbers(1e-9, "s", double=True),
-                metrics.Numbers(1e-9, "mm", double=True),
-                metrics.Numbers(1e-9, double=True),
-                names=("time", "position", "quaternion"),
+            metric=DECODED,
+            noisy=(
+                (
+                    functools.partial(_packet, sign=1, times=1e5, way=6.0),
+                    DECODED,
+                    "right, but not after a day, or some meters off:",
+                ),
+                (
+                    functools.partial(_packet, sign=-1, times=1e-4, way=1e-4),
+                    DECODED,
+                    "right, but not in the first tenth of a second, within a tenth of a millimeter:",
+                ),
             ),
             hints=(
                 "Read all 184 bytes as 23 numbers of 8 bytes, then pick by the order of table 1.",
@@ -713,6 +788,31 @@ CHAPTER = Chapter(
                 obtuse_link,
             ),
             metric=metrics.Poses(1e-6, 1e-6),
+            noisy=(
+                *(
+                    (
+                        functools.partial(link_without, k=k),
+                        metrics.Poses(1e-6, 1e-6),
+                        f"right, but not for a link whose {name} is 0:",
+                    )
+                    for k, name in enumerate(("theta", "d", "a", "alpha"))
+                ),
+                (square_link, metrics.Poses(1e-6, 1e-6), "right, but not where alpha is 90 deg or -90 deg:"),
+                *(
+                    (
+                        functools.partial(scaled, draw=obtuse_link, factors=factors),
+                        metrics.Poses(1e-6, 1e-6),
+                        f"right, but not for a link {this}:",
+                    )
+                    for factors, this in (
+                        ((2, 10, 10, 1), "of half a meter and more that is turned by more than half a turn"),
+                        (
+                            (1e-3, 1e-2, 1e-2, 1e-3),
+                            "that is short, by millimeters, and hardly turned, by thousandths of a radian",
+                        ),
+                    )
+                ),
+            ),
             hints=(
                 "Four elementary transforms in a row: turn about z, go along z, go along the new x, turn about the new x.",
                 "Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha): the last column is (a cos theta, a sin theta, d).",
@@ -764,7 +864,14 @@ CHAPTER = Chapter(
             draw=joint_angles,
             fixed={"dh": "six joints, four parameters each", "q": "six joints"},
             metric=metrics.Poses(1e-6, 1e-6),
-            noisy=(joints_at_rest, metrics.Poses(1e-6, 1e-6), "right, but not where joints stand at 0:"),
+            noisy=(
+                (joints_at_rest, metrics.Poses(1e-6, 1e-6), "right, but not where joints stand at 0:"),
+                (
+                    joints_of_the_tx40,
+                    metrics.Poses(1e-6, 1e-6),
+                    "right, but not for the TX40 itself, most of whose lengths are 0, with joints turned by more than half a turn:",
+                ),
+            ),
             hints=(
                 "Each link's frame is given in the frame before it, so neighboring letters cancel from the base to the flange.",
                 "T_BF = T_01 T_12 ... T_56, and the angle of a link is its offset plus the joint's angle.",
@@ -864,6 +971,14 @@ CHAPTER = Chapter(
             draw=one_motion,
             metric=SameEquations(1e-9),
             fixed=dict.fromkeys("AB", "a rotation is always 3 x 3"),
+            noisy=(
+                (small_motion, SameEquations(1e-12), "right, but not for a small motion, by hundredths of a radian:"),
+                (
+                    square_motion,
+                    SameEquations(1e-9),
+                    "right, but not for a turn by 90 deg about an axis of the flange:",
+                ),
+            ),
             hints=(
                 "Bring A X - X B = 0 into the form M vec(X) = 0, with the columns of X stacked.",
                 "For stacked columns, vec(P X Q) = (Q^T kron P) vec(X). Once P = A, Q = I, once P = I, Q = B.",
@@ -934,6 +1049,14 @@ CHAPTER = Chapter(
             reference=rotation_from_nullvector,
             draw=ALL_SIGNS,
             metric=metrics.Rotations(1e-5),
+            noisy=(
+                (
+                    functools.partial(blocks, n=2, std_deg=0.0, std_mm=0.0),
+                    metrics.Rotations(1e-5),
+                    "right, but not for two motions alone, without noise:",
+                ),
+                (functools.partial(blocks, n=20), metrics.Rotations(1e-5), "right, but not for twenty motions:"),
+            ),
             hints=(
                 "The singular vector of the smallest singular value, put back into a 3 x 3 matrix column by column.",
                 'Vt[-1].reshape(3, 3, order="F"); its sign is free, so make the determinant positive; then the nearest rotation, U times Vt of a second SVD.',
@@ -1048,6 +1171,7 @@ CHAPTER = Chapter(
             draw=(stacks, functools.partial(stacks, n=2)),
             metric=metrics.Numbers(1e-9),
             noisy=(
+                (functools.partial(stacks, n=20), metrics.Numbers(1e-9), "right, but not for twenty motions:"),
                 (
                     stacks_of_axes_alike,
                     metrics.Numbers(1e-9),
@@ -1123,9 +1247,23 @@ CHAPTER = Chapter(
             fixed={"R": "a rotation is always 3 x 3"},
             metric=metrics.Numbers(1e-7, "mm"),
             noisy=(
-                motions_about_axes_alike,
-                metrics.Numbers(1e-6, "mm"),
-                "right where the axes differ, but not where they lie within a few degrees of one another:",
+                (
+                    motions_about_axes_alike,
+                    metrics.Numbers(1e-6, "mm"),
+                    "right where the axes differ, but not where they lie within a few degrees of one another:",
+                ),
+                (
+                    functools.partial(translation_problem, n=2),
+                    metrics.Numbers(1e-6, "mm"),
+                    "right, but not for two motions alone:",
+                ),
+                *(
+                    (functools.partial(motions_of_size, factor=factor), metrics.Numbers(1e-8, "mm"), words)
+                    for factor, words in (
+                        (100.0, "right for motions of centimeters, but not for ones of meters:"),
+                        (0.01, "right for motions of centimeters, but not for ones of a millimeter or two:"),
+                    )
+                ),
             ),
             hints=(
                 "Write out the last column of A X = X B. It is linear in the translation t once R is known.",
@@ -1214,6 +1352,14 @@ CHAPTER = Chapter(
             reference=e_rot,
             draw=BOTH_SIGNS,
             metric=metrics.Numbers(1e-9),
+            noisy=tuple(
+                (
+                    functools.partial(blocks, n=n),
+                    metrics.Numbers(1e-6, least=0),
+                    f"right, but not for {n} motions with little noise:",
+                )
+                for n in (2, 20)
+            ),
             hints=(
                 "Equation (13), taken at its word: the norm of M^T M v, divided by N - 1. v is the null vector, of length 1.",
                 "M has 9 rows per motion, so N = len(M) / 9.",
@@ -1303,6 +1449,21 @@ CHAPTER = Chapter(
             reference=e_trans,
             draw=(gaps, functools.partial(gaps, n=3), functools.partial(gaps, n=25)),
             metric=metrics.Numbers(1e-9, "mm"),
+            noisy=(
+                (functools.partial(gaps, n=2), metrics.Numbers(1e-9, "mm"), "right, but not for two motions:"),
+                (functools.partial(gaps, n=60), metrics.Numbers(1e-9, "mm"), "right, but not for sixty motions:"),
+                *(
+                    (
+                        functools.partial(scaled, draw=gaps, factors=(factor,)),
+                        metrics.Numbers(1e-9, "mm", least=0),
+                        words,
+                    )
+                    for factor, words in (
+                        (1e-3, "right, but not for small residuals, of micrometers:"),
+                        (1e3, "right, but not for large residuals, of many centimeters:"),
+                    )
+                ),
+            ),
             hints=(
                 "Equation (17), taken at its word: the norm of K1 t - K2, divided by N - 1.",
                 "The norm runs over all components of all N residuals, and it is not squared.",
@@ -1399,10 +1560,16 @@ CHAPTER = Chapter(
                     "Right where the values scatter by about 1. Where they scatter by a ten thousandth of that:",
                 ),
                 (
+                    functools.partial(spoiled, factor=0.8, size=1e3),
+                    KeptOrNot(),
+                    "Right for factors of 3 and more. For one below 1, and values that scatter by a thousand:",
+                ),
+                (
                     three_values,
                     KeptOrNot(),
                     "Right for many values. For three, two close together and one far away:",
                 ),
+                (one_value, KeptOrNot(), "Right for many values. For one alone, which is its own median:"),
             ),
             hints=(
                 "Measure how far each value is from the middle, in units of a spread. Outliers must move neither of the two.",
@@ -1694,6 +1861,11 @@ CHAPTER = Chapter(
             draw=tuple(functools.partial(speed_curves, sign=s, wide=wide) for wide in (False, True) for s in (1, -1)),
             metric=metrics.Numbers(6e-4, "s"),
             noisy=(
+                (
+                    curves_in_degrees,
+                    metrics.Numbers(6e-4, "s"),
+                    "Right for lags of several samples and speeds about 1. For a part of a single sample, and speeds of many deg/s:",
+                ),
                 (
                     periodic_curves,
                     metrics.Numbers(6e-4, "s"),

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...documents.lecture import printed as lecture
 from ...exercises import metrics
+from ...exercises.draws import scaled
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
 from ...geometry.planar import wrap_angle
 from ...localization import lateration, odometry, wheels
@@ -36,6 +37,10 @@ def several_circles(rng, n):
     position = rng.uniform(-5, 5, 2)
     off = rng.uniform(0.05, 0.2, len(landmarks)) * (-1) ** np.arange(len(landmarks))
     return landmarks, np.linalg.norm(landmarks - position, axis=1) * (1 + off), position
+
+
+SITE = "right in a hall, but not on a site where the landmarks are a kilometer apart:"
+TABLE = "right in a hall, but not on a table where the landmarks are half a meter apart at most:"
 
 
 def from_afar(rng, left, angle=None):
@@ -188,10 +193,30 @@ def pose_of_integers(rng):
     return rng.integers(1, 5, 3) * rng.choice([-1, 1], 3), u, dt
 
 
-def special_steps(metric):
+def far_and_fast(rng):
+    """A pose some hundred meters off, a control of tens of meters a second, and a time step of seconds."""
+    x = np.array([*rng.uniform(60, 200, 2) * rng.choice([-1, 1], 2), rng.uniform(-3, 3)])
+    return x, rng.uniform((10, 3), (40, 8)) * rng.choice([-1, 1], 2), rng.uniform(2, 6)
+
+
+def of_other_sizes(metric, far=None, small=None):
+    """Draws that tell who cuts off what is large, or drops what is small; far, small: metrics of their own for these."""
+    far, small = far or metric, small or metric
+    crawling = functools.partial(scaled, draw=pose_control_step, factors=(1, 5e-4, 1))
+    short = functools.partial(scaled, draw=pose_control_step, factors=(1, 1, 0.01))
+    near_zero = functools.partial(scaled, draw=pose_control_step, factors=(1e-3, 1, 1))
+    return (
+        (far_and_fast, far, "right, but not far off (60 m and more) at high speed in long steps (2 s and more):"),
+        (crawling, small, "right, but not for a robot that moves by less than a millimeter in the step:"),
+        (short, small, "right, but not for a time step of less than a hundredth of a second:"),
+        (near_zero, metric, "right, but not from a pose within millimeters of (0, 0, 0):"),
+    )
+
+
+def special_steps(metric, small=None):
     turns = "right, but not where theta has gathered several full turns:"
     rows = (creeping, metric, CREEPING), *special_controls(metric), (gathered_turns, metric, turns)
-    return *rows, (pose_of_integers, metric, OF_INTEGERS)
+    return *rows, *of_other_sizes(metric, small=small), (pose_of_integers, metric, OF_INTEGERS)
 
 
 def whole_turns(rng):
@@ -673,6 +698,9 @@ def _without_carrying():
 
 
 POSE_AND_COV = metrics.Several(metrics.PlanarPoses(), metrics.Numbers(1e-9), names=("pose", "covariance"))
+POSE_AND_SMALL_COV = metrics.Several(
+    metrics.PlanarPoses(), metrics.Numbers(1e-9, least=0), names=("pose", "covariance")
+)
 
 CHAPTER = Chapter(
     "07-dead-reckoning",
@@ -691,6 +719,23 @@ CHAPTER = Chapter(
             draw=tuple(functools.partial(several_circles, n=n) for n in (3, 5, 2, 4)),
             fixed={"position": "a place in the plane"},
             metric=metrics.Numbers(1e-9),
+            noisy=(
+                (
+                    functools.partial(several_circles, n=30),
+                    metrics.Numbers(1e-9),
+                    "right for a few landmarks, but not for thirty:",
+                ),
+                (
+                    functools.partial(scaled, draw=functools.partial(several_circles, n=3), factors=(300, 300, 300)),
+                    metrics.Numbers(1e-9),
+                    "right in a hall, but not on a site of kilometers:",
+                ),
+                (
+                    functools.partial(scaled, draw=functools.partial(several_circles, n=3), factors=(0.02, 0.02, 0.02)),
+                    metrics.Numbers(1e-9),
+                    "right in a hall, but not on a table, where all distances are below half a meter:",
+                ),
+            ),
             hints=(
                 "Each landmark gives one equation that is zero when the position lies on its circle.",
                 "The lecture's equation i: (x_i - x)^2 + (y_i - y)^2 - d_i^2.",
@@ -768,9 +813,21 @@ CHAPTER = Chapter(
             },
             metric=metrics.Numbers(1e-8, "m"),
             noisy=(
-                from_the_position_itself,
-                metrics.Numbers(1e-8, "m"),
-                "right, but not from a start that is the position itself:",
+                (
+                    from_the_position_itself,
+                    metrics.Numbers(1e-8, "m"),
+                    "right, but not from a start that is the position itself:",
+                ),
+                (
+                    functools.partial(scaled, draw=two_circles, factors=(250, 250, 250)),
+                    metrics.Numbers(1e-8, "m"),
+                    SITE,
+                ),
+                (
+                    functools.partial(scaled, draw=two_circles, factors=(0.05, 0.05, 0.05)),
+                    metrics.Numbers(1e-6, "m"),
+                    TABLE,
+                ),
             ),
             hints=(
                 "Replace the residuals by their tangent planes, go to where those are zero, repeat.",
@@ -873,6 +930,18 @@ CHAPTER = Chapter(
                     for left in (True, False)
                 ),
                 (wheels_at_rest, metrics.Numbers(1e-9), "right, but not where both wheels stand still:"),
+                *(
+                    (
+                        functools.partial(scaled, draw=two_wheels, factors=factors),
+                        metrics.Numbers(1e-9),
+                        f"right for a robot of common size and speed, but not for {this}:",
+                    )
+                    for factors, this in (
+                        ((20, 20, 10), "a large and fast one, its wheels two meters apart and more"),
+                        ((20, 20, 0.1), "a small one that turns fast, its wheels 8 cm apart at most"),
+                        ((5e-4, 5e-4, 1), "one whose wheels run at 1 mm/s at most"),
+                    )
+                ),
             ),
             hints=(
                 "The middle of the axle moves with the mean of both wheels; what differs between them turns the robot.",
@@ -1047,6 +1116,7 @@ CHAPTER = Chapter(
                 (whole_turns, metrics.PlanarPoses(1e-3), LONG),
                 (pose_of_integers, metrics.PlanarPoses(1e-7), OF_INTEGERS),
                 *special_controls(metrics.PlanarPoses(1e-7)),
+                *of_other_sizes(metrics.PlanarPoses(1e-7), far=metrics.PlanarPoses(1e-3)),
             ),
             properties=(_straight_line_works,),
             hints=(
@@ -1156,7 +1226,7 @@ CHAPTER = Chapter(
             draw=EITHER_WAY,
             fixed=PLANAR,
             metric=metrics.Numbers(1e-5),
-            noisy=special_steps(metrics.Numbers(1e-5)),
+            noisy=special_steps(metrics.Numbers(1e-5), small=metrics.Numbers(1e-6)),
             hints=(
                 "Change x, y or theta a little: what does it change in the pose after the step?",
                 "A shift of x or y is passed on as it is. A turn of theta swings the way v T sideways.",
@@ -1250,7 +1320,7 @@ CHAPTER = Chapter(
             draw=EITHER_WAY,
             fixed=PLANAR,
             metric=metrics.Numbers(1e-5),
-            noisy=special_steps(metrics.Numbers(1e-5)),
+            noisy=special_steps(metrics.Numbers(1e-5), small=metrics.Numbers(1e-6)),
             hints=(
                 "Three rows (x, y, theta), two columns (v, omega).",
                 "A little more v moves the robot by T along the heading; a little more omega turns it by T.",
@@ -1340,7 +1410,20 @@ CHAPTER = Chapter(
                     ((0.03, 0.03), "hardly moves and hardly turns"),
                 )
             ]
-            + [(short_time, metrics.Numbers(1e-9), "right, but not for time steps of a hundredth of a second:")],
+            + [
+                (short_time, metrics.Numbers(1e-9), "right, but not for time steps of a hundredth of a second:"),
+                *(
+                    (
+                        functools.partial(scaled, draw=NOISY_CONTROLS[0], factors=factors),
+                        metrics.Numbers(1e-9, least=0),
+                        f"right, but not for {this}:",
+                    )
+                    for factors, this in (
+                        ((10, 40, 50, 50, 50), "a fast robot, time steps of seconds and large constants of the noise"),
+                        ((1, 1, 1e-3, 1e-3, 1e-3), "small constants of the noise, below 0.0001"),
+                    )
+                ),
+            ],
             hints=(
                 "A diagonal matrix: the variance of v and the variance of omega.",
                 "sigma_v^2 = k_d |v| / T and sigma_omega^2 = (k_theta |omega| + k_drift |v|) / T.",
@@ -1511,7 +1594,20 @@ CHAPTER = Chapter(
             draw=tuple(functools.partial(pose_and_covariances, side=s, gear=g) for g in (1, -1) for s in (1, -1)),
             fixed=PLANAR | {"cov": "the covariance of a planar pose", "cov_u": "the covariance of v and omega"},
             metric=POSE_AND_COV,
-            noisy=special_controls(POSE_AND_COV, covariances_at_special_controls),
+            noisy=(
+                *special_controls(POSE_AND_COV, covariances_at_special_controls),
+                *(
+                    (functools.partial(scaled, draw=pose_and_covariances, factors=factors), POSE_AND_SMALL_COV, words)
+                    for factors, words in (
+                        ((1, 0, 1, 1, 1), "right, but not where the drive begins, with a covariance of zeros:"),
+                        ((20, 1e-6, 1, 0.01, 1e-4), "right, but not for small covariances and short time steps:"),
+                        (
+                            (1, 1e4, 20, 10, 1e3),
+                            "right, but not for large covariances, high speeds and long time steps:",
+                        ),
+                    )
+                ),
+            ),
             hints=(
                 "The pose takes the step. The covariance takes the old uncertainty along and adds that of the control.",
                 "cov' = F_x cov F_x^T + F_u cov_u F_u^T, with both Jacobians at the old pose.",
@@ -1771,9 +1867,21 @@ CHAPTER = Chapter(
             draw=UNEQUAL,
             metric=metrics.Numbers(1e-6, "m"),
             noisy=(
-                wheels_hardly_unequal,
-                metrics.Numbers(1e-6, "m"),
-                "right, but not for an excess of less than a thousandth, which shows on a long way as well:",
+                (
+                    wheels_hardly_unequal,
+                    metrics.Numbers(1e-6, "m"),
+                    "right, but not for an excess of less than a thousandth, which shows on a long way as well:",
+                ),
+                (
+                    functools.partial(scaled, draw=unequal_wheels, factors=(0.02, 1, 1)),
+                    metrics.Numbers(1e-8, "m"),
+                    "right, but not for a short way, 40 cm at most:",
+                ),
+                (
+                    functools.partial(scaled, draw=unequal_wheels, factors=(50, 10, 8)),
+                    metrics.Numbers(1e-6, "m"),
+                    "right, but not for a long way of a wide robot whose wheels are very unequal (an excess of 5 % and more):",
+                ),
             ),
             hints=(
                 "The larger wheel goes farther than it is believed to: by how much does the robot turn, and how long is the way of its middle?",
@@ -1871,6 +1979,17 @@ CHAPTER = Chapter(
                     )
                     for left in (True, False)
                 ),
+                *(
+                    (
+                        functools.partial(scaled, draw=car, factors=factors),
+                        metrics.Numbers(1e-9),
+                        f"right for a car, but not for {this}:",
+                    )
+                    for factors, this in (
+                        ((20, 1, 6), "a fast truck, more than 3.5 m between its axles"),
+                        ((0.003, 1, 0.1), "a slow model of one, less than 40 cm between its axles, at 1 cm/s at most"),
+                    )
+                ),
             ),
             hints=(
                 "All wheels turn about one point on the line of the rear axle. How far aside is it?",
@@ -1948,7 +2067,16 @@ CHAPTER = Chapter(
             "mecanum_twist",
             reference=mecanum_twist,
             draw=(rolling, functools.partial(rolling, wide=False)),
-            noisy=(rolling_slowly, metrics.Numbers(1e-9), "right, but not for a robot that hardly moves, a few cm/s:"),
+            noisy=(
+                (rolling_slowly, metrics.Numbers(1e-9), "right, but not for a robot that hardly moves, a few cm/s:"),
+                *(
+                    (functools.partial(scaled, draw=rolling, factors=factors), metrics.Numbers(1e-9), words)
+                    for factors, words in (
+                        ((20, 10, 10), "right, but not for a large and fast robot, several meters long:"),
+                        ((1e-3, 0.1, 0.1), "right, but not for a small and slow robot, a few mm/s:"),
+                    )
+                ),
+            ),
             fixed={"speeds": "a Mecanum robot has four wheels"},
             metric=metrics.Numbers(1e-9),
             hints=(
