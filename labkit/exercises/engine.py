@@ -301,7 +301,7 @@ class _Trial:
                 if words and not metric.equal(*pair):
                     off = next(d for d in metric.deviations(*pair) if not d.within)
                     return self.outcome(NOT_YET, _closed(f"{words} {off}"))
-        words = unmoved or self._relation()
+        words = unmoved or self._never_said() or self._relation()
         said, example, call = (_closed(words) if words else self._deviation()).partition(NOT_RIGHT)
         said += self._where_it_is_wrong() if words else self._constant() + self._by_chance()
         words = said + self._agreement(search, solution) + example + call
@@ -365,7 +365,7 @@ class _Trial:
         notebook = {name: self.function.__globals__[name] for name in read}
         tried = arguments.changes(self._names(self.inputs[0]), [case[0] for case in cases], notebook)
         reference = self.exercise.reference
-        if self._is_always_the_same():
+        if self._is_always_the_same() or self._holds_no_number():
             return None
         if all(isinstance(expected, str | bool | set | frozenset) for _, expected in self.pairs):
             tried = (pair for pair in tried if not arguments.SIZES.search(pair[0]))  # another size would do as well
@@ -376,12 +376,19 @@ class _Trial:
     def _is_always_the_same(self):
         """Whether the results are one and the same on all draws, so that many a wrong computation would give them."""
         metric, pairs = self.exercise.metric, self._plain_pairs()
-        if self.refusal or isinstance(metric, metrics.Exactly) or len(pairs) < 2:
+        if isinstance(metric, metrics.Exactly) or len(pairs) < 2:
             return False
         try:
+            if self.refusal:
+                return _are_one([r.value if isinstance(r, _Refusal) else r for r, _ in pairs])
             return all(_equal_as_written(metric, result, pairs[0][0]) for result, _ in pairs[1:])
         except Exception:  # results of different draws need not go together
             return False
+
+    def _holds_no_number(self):
+        """Whether some result holds nothing but NaN or infinity, which many a wrong computation gives."""
+        results = (_numbers_of(result) for result, _ in self._plain_pairs())
+        return any(numbers is not None and not np.isfinite(numbers).any() for numbers in results)
 
     def _is_felt(self, change):
         """Whether a change of arguments leaves them as they are where the answer is right, if that is about numbers."""
@@ -526,8 +533,22 @@ class _Trial:
         """Whether the results are those of a right formula with one change, with this in words."""
         if self.exercise.metric is None or not self.inputs or self._is_always_the_same() or self._is_told_apart():
             return None
+        if self._holds_no_number() or self._never_said():
+            return None
         words = self._first_that_fits(slips.changed_formulas(self.exercise))
         return words and f"your result is what a right formula gives {words}"
+
+    def _never_said(self):
+        """Which of several words never comes out, though it is right on some plain draws."""
+        pairs = self._plain_pairs()
+        words = all(isinstance(word, str) for pair in pairs for word in pair)
+        if not words or not self._right_somewhere():  # as long as nothing is right, no right word is told
+            return None
+        said = {result for result, _ in pairs}
+        lacking = list(dict.fromkeys(f"`{expected!r}`" for _, expected in pairs if expected not in said))
+        if len(lacking) > 1:
+            return f"{', '.join(lacking[:-1])} and {lacking[-1]} never come out, though each is right on some draws"
+        return f"{lacking[0]} never comes out, though it is right on some draws" if lacking else None
 
     def _is_told_apart(self):
         """Whether special draws alone are wrong of which the exercise says what they are: on a few draws of one kind
@@ -538,6 +559,8 @@ class _Trial:
 
     def _other_shape(self):
         """What results of a wrong shape have to do with the expected ones."""
+        if self._is_always_the_same():
+            return ""
         pairs = self._plain_pairs()
         results = [pair[0].value if isinstance(pair[0], _Refusal) else None for pair in pairs]
         if any(result is None for result in results):

@@ -165,6 +165,19 @@ def _counted_by_loops(function):
                     yield Change(words, mends, 2, content, ((owner, field, new),))
 
 
+def _never_reached(function):
+    """A `return` with steps behind it in its block, put behind them."""
+    for owner in ast.walk(function):
+        for field in ("body", "orelse"):
+            block = getattr(owner, field, None)
+            before = block[:-1] if isinstance(block, list) else ()
+            first = next((k for k, step in enumerate(before) if isinstance(step, ast.Return)), None)
+            if first is not None:
+                order = [*block[:first], *block[first + 1 :], block[first]]
+                mends = "what stands behind this `return` is never reached, and belongs before it"
+                yield Change("", mends, 1, block[first], ((owner, field, order),))
+
+
 def _rounded_pi(function):
     """All numbers that are pi or a simple multiple of it, rounded, with all their digits at once."""
     sets, rounded = [], []
@@ -261,7 +274,7 @@ def mending(function):
     found = [*_finer(function), *found, *_counted_by_loops(function), *_everywhere(found)]
     found += [*_finer_differences(function), *_with_an_outer_product(function), *_of_rounds(function)]
     found += [*_begun_late(function), *_typed_numbers(function), *_exchanged_throughout(function)]
-    found += [*_shorter_steps(function), *_rounded_pi(function)]
+    found += [*_shorter_steps(function), *_rounded_pi(function), *_never_reached(function)]
     return sorted(found, key=lambda change: change.rank)
 
 
@@ -553,7 +566,9 @@ WHOLE = "with an array of floats made one of whole numbers"
 ALIASES = ("with another name where a copy belongs", "with a part where a copy belongs")
 AFRESH = "with a list or array that each round finds as it was"
 COUNTED = "with one index counted from the other end"
+DIVISOR = "with a divisor where a quotient belongs"
 REVERSED = (  # (words of what was changed in a right formula, what is wrong where the change mends)
+    (DIVISOR, "the divisor alone belongs there"),
     (r"with (.+) where (.+) belongs", r"\2 stands where \1 belongs"),
     (r"without one of its (.+)s", r"one \1 is too many"),
     (r"without the term `(\w+)` in one place", r"the term `\1` is too many"),
@@ -646,7 +661,7 @@ def _operation(node, names):
         if not (bare and isinstance(node.left, ast.Constant)):
             yield 1, _without(kind, node.right, names), node.left
         if kind not in (ast.Pow, ast.Mod) and not (bare and isinstance(node.right, ast.Constant)):
-            yield 1, _without(kind, node.left, names), node.right
+            yield 1, DIVISOR if kind is ast.Div else _without(kind, node.left, names), node.right
     if kind is ast.MatMult and isinstance(node.left, ast.BinOp) and isinstance(node.left.op, ast.MatMult):
         a, b, c = node.left.left, node.left.right, node.right
         for one, two, three in ((a, c, b), (b, c, a), (c, a, b), (c, b, a)):

@@ -213,7 +213,8 @@ def _arrangement(results, holds):
     if first.shape[-1] <= LONGEST:
         for i, j in itertools.combinations(range(first.shape[-1]), 2):
             if holds(lambda r, i=i, j=j: _exchanged(r, i, j)):
-                return f"the entries {i} and {j} (counted from 0) are exchanged{_along(first)}; all others are right"
+                others = "; all others are right" if first.shape[-1] > 2 else ""
+                return f"the entries {i} and {j} (counted from 0) are exchanged{_along(first)}{others}"
     for shift in (1, -1):
         if len(first) > 2 and holds(lambda r, shift=shift: np.roll(r, shift, axis=0)):
             return f"the entries are right, but all stand one place too {'early' if shift > 0 else 'late'}"
@@ -320,10 +321,11 @@ def _one_part(results, expected, holds, unit):
     if len(first) > 2:
         for rows in range(len(first) - 1, 0, -1):
             if _all_equal([r[:rows] for r in results], [e[:rows] for e in expected]):
+                one, several = ("entry", "") if first.ndim == 1 else ("row", " rows")
                 right = (
-                    "the first is right, not all behind it"
+                    f"the first {one} is right, not all behind it"
                     if rows == 1
-                    else f"the first {rows} are right, not all behind them"
+                    else f"the first {rows}{several} are right, not all behind them"
                 )
                 return f"{right} are{LOOP}"
     return None

@@ -27,6 +27,7 @@ PATIENCE = 5  # times as many steps as the function itself takes may a changed o
 STEPS = 2000  # ... and so many more
 MOST = 800  # changes of the code that are made
 AXIS = ", along the last axis)"
+WITHIN = "` in `"  # between a part of the code and the larger one in which it is quoted
 OPAQUE = {"locals", "globals", "vars", "eval", "exec", "super", "breakpoint"}  # what code says of itself
 OUTSIDE = {"open", "write", "write_text", "write_bytes", "touch", "mkdir", "unlink", "remove", "rename", "savetxt"}
 OUTSIDE |= {"save", "savez", "tofile", "dump", "to_csv", "system", "run", "Popen", "sendto", "send", "connect"}
@@ -158,7 +159,27 @@ class Written:
 
     @property
     def changes(self):
-        return [(c.rank, c.place.lineno, _shown(c.place, self.lines), c.mends) for c in self._changes]
+        found = []
+        for c in self._changes:
+            text, around = _shown(c.place, self.lines), self._around.get(c.place)
+            told = f"{text}{WITHIN}{around}" if around and len(c.sets) == 1 else text
+            found.append((c.rank, c.place.lineno, told, c.mends))
+        return found
+
+    @functools.cached_property
+    def _around(self):
+        """{part of the code: the larger part in which it stands} of those that look alike to others in their line."""
+        found = {}
+        for tree in self.trees:
+            outer = {part: node for node in ast.walk(tree) for part in ast.iter_child_nodes(node)}
+            alike = {}
+            for node in ast.walk(tree):
+                if isinstance(node, ast.expr):
+                    alike.setdefault((node.lineno, _shown(node, self.lines)), []).append(node)
+            for nodes in alike.values():
+                around = [outer[node] for node in nodes if len(nodes) > 1]
+                found |= {n: _shown(o, self.lines) for n, o in zip(nodes, around) if isinstance(o, ast.expr)}
+        return found
 
     def results(self, plans, args, seconds, keep):
         """What comes of every plan on one draw, in the plans' order, each handed to `keep`.

@@ -229,7 +229,8 @@ class Search:
         """
         if mends.endswith(("where `==` belongs", "where `!=` belongs")):
             return bool(DECIMALS.search(code))
-        compared = (text for at, text, *_ in self.written.places if at == line and code in text and BOUND.search(text))
+        bare = _bare(code)
+        compared = (text for at, text, *_ in self.written.places if at == line and bare in text and BOUND.search(text))
         return mends.endswith(("belongs there", "belongs there in degrees")) and any(compared)
 
     def _left_out_instead(self, number):
@@ -241,7 +242,7 @@ class Search:
         line, code, mends = changes[number][1:]
         at_line = [(k, text, words) for k, (_, at, text, words) in enumerate(changes) if at == line]
         finer = mends.endswith("will do")
-        around = [(k, words) for k, text, words in at_line if code in text and text != code and not finer]
+        around = [(k, words) for k, text, words in at_line if _bare(code) in _bare(text) != _bare(code) and not finer]
         around += [(k, words) for k, (_, at, _, words) in enumerate(changes) if at > line and not finer]
         case = [k for k, words in around if words.endswith(("never happen", "always happen"))]
         less = [k for k, text, words in at_line if text == code and TOO_MANY in words]
@@ -611,6 +612,11 @@ def _traces(written, cases, budget):
             raise TimeoutError
         found.append(written.trace(case.args, kind.left()))
     return found
+
+
+def _bare(code):
+    """A part of the code without the larger one in which it is quoted."""
+    return code.partition(rerun.WITHIN)[0]
 
 
 def _is_listing(code):

@@ -384,3 +384,27 @@ def test_no_angle_is_spoken_of_where_there_is_none():
     exec(compile(text, "choice", "exec"), known)
     told = item.judge(known["formula"], rng=np.random.default_rng(0)).text
     assert "radians" not in told and "half of it" not in told
+
+
+TURN = exercise(lambda x, std: np.array([np.cos(x), 2.0]) * std, lambda rng: (rng.normal(), rng.uniform(1, 2)))
+
+
+def test_a_result_without_a_number_and_one_that_is_always_the_same_are_not_those_of_other_arguments():
+    nothing = told(TURN, "return np.array([np.nan, np.nan]) * x * std")
+    assert "NaN" in nothing and "comes out" not in nothing and "right formula" not in nothing
+    zero = exercise(lambda x, std: np.array([0.0, abs(x), std]), lambda rng: (rng.normal(), 1.0))
+    assert told(zero, "return 0.0") == "expected an array of shape (3,), got a number."
+
+
+def test_a_word_that_never_comes_out_is_told():
+    words = exercise(lambda x, std: "abc"[int(x)], lambda rng: (rng.uniform(0, 3), rng.normal()), metrics.Exactly())
+    said = told(dataclasses.replace(words, draws=30), "return 'aba'[int(x)]")
+    assert said.startswith("`'c'` never comes out, though it is right on some draws. ")
+
+
+def test_one_less_than_a_number_is_told_so_that_its_square_is_plain():
+    few = [{"x": np.ones(n)} for n in (3, 4, 6)]
+    expected = [np.array(float(n)) for n in (2, 7, 9)]
+    results = [e * (len(d["x"]) - 1) ** 2 for e, d in zip(expected, few)]
+    words = operands.operand_words(NUMBERS, results, expected, few)
+    assert words.endswith("times the square of one less than the number of entries of `x`")

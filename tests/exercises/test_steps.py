@@ -835,3 +835,13 @@ def test_a_case_that_is_not_needed_is_told_and_not_what_it_asks():
     return len(b) * np.linalg.norm(b - (b @ x) * x)
     """
     assert "should never happen" in told(body)
+
+
+def test_what_stands_behind_a_return_is_told_to_be_never_reached():
+    said = told("x = a\nreturn len(b) * np.linalg.norm(b - (b @ x) * x)\nx = x / np.linalg.norm(x)")
+    assert "what stands behind this `return` is never reached, and belongs before it. With this alone" in said
+
+
+def test_of_parts_that_look_alike_the_larger_part_is_quoted_as_well():
+    shown = {code for _, _, code, _ in rerun.written(typed("return a * b[0] - a @ b")).changes}
+    assert {"a` in `a * b[0]", "a` in `a @ b", "b[0]"} <= shown and "a" not in shown
