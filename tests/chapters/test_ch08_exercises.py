@@ -263,7 +263,7 @@ def eliminated(S, y):
 @pytest.mark.parametrize(
     "name, answer, words",
     [
-        ("wrap_angle", wrapped_ten_times, "too few rounds"),
+        ("wrap_angle", wrapped_ten_times, "dozens of them"),
         ("fuse_two_sensors", without_what_disagrees, ""),
         ("gate", lambda y, S, limit: bool(sum(eliminated(S, y)) <= limit), "not `<=`"),
     ],
@@ -284,3 +284,16 @@ def test_a_prior_that_says_zero_counts():
 
     status, texts = judged("fuse_two_sensors", without_zero)
     assert status == NOT_YET and all("prior says 0" in text for text in texts)
+
+
+@pytest.mark.parametrize("digits", range(4))
+def test_a_nis_or_a_limit_that_is_rounded_is_refused_each_time(digits):
+    def of_nis(y, S, limit):
+        return bool(np.round(y @ np.linalg.solve(S, y), digits) < limit)
+
+    def of_limit(y, S, limit):
+        return bool(y @ np.linalg.solve(S, y) < np.round(limit, digits))
+
+    draws = [draw(np.random.default_rng(0)) for draw in ITEMS["gate"].cases]
+    for rounded in (of_nis, of_limit):
+        assert any(rounded(*given) != ITEMS["gate"].reference(*given) for given in draws)

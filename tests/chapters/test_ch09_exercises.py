@@ -1,10 +1,11 @@
 """Chapter 9's exercises: answers that look right and are not, and right ones of more than one style."""
 
 import linecache
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import binom, chisquare, norm
+from scipy.stats import binom, chi2, chisquare, norm
 
 from labkit.chapters.ch09_monte_carlo import exercises as ch09
 from labkit.exercises import engine, session
@@ -292,14 +293,17 @@ def test_a_test_that_is_too_strict_is_told_which_correct_function_it_rejects():
 def test_chance_refuses_a_right_roulette_less_than_once_in_a_million_checks():
     """By the laws: binomial shares, the variance of a variance of binomial counts (its excess kurtosis is -0.2)."""
     shares = 0.0
-    for weights in ch09.WEIGHTS:
+    for weights in (*ch09.WEIGHTS, *[ch09.WEIGHTS[1]] * len(ch09.SCALES)):
         n = 2000 // len(weights) * len(weights)
         for p in weights / weights.sum():
             low, high = np.ceil(n * (p - ch09.SHARE_OFF)) - 1, np.floor(n * (p + ch09.SHARE_OFF))
             shares += binom.cdf(low, n, p) + binom.sf(high, n, p)
     std = 2.5 * np.sqrt(2 / 599 - 0.2 / 600)
     half = norm.cdf((ch09.HALF_VARIES - 2.5) / std)
-    assert shares + half < 1e-6, (shares, half)
+    n = len(ch09.MANY) * ch09.TURNS
+    many = [binom.cdf(ch09.FEWEST - 1, n, p) + binom.sf(ch09.MOST, n, p) for p in ch09.MANY / ch09.MANY.sum()]
+    apart = chi2.sf(ch09.APART, len(ch09.MANY) - 1)
+    assert shares + half + sum(many) + apart < 1e-6, (shares, half, sum(many), apart)
 
 
 def after_the_step(states, u, dt, std_u, rng):
@@ -434,7 +438,41 @@ def one_too_high(weights, rng):
     return np.minimum(np.searchsorted(ends, rng.random(len(ends)) * ends[-1]) + 1, len(ends) - 1)
 
 
+def drawn_as(noise):
+    return lambda x, u, dt, std_u, rng: odometry.step(x, u + std_u * noise(rng.standard_normal((len(x), 2))), dt)
+
+
+def up_to(share):
+    def roulette(weights, rng):
+        ends = np.cumsum(weights)
+        return np.minimum(np.searchsorted(ends, rng.random(len(ends)) * share * ends[-1]), len(ends) - 1)
+
+    return roulette
+
+
+def turned_less(weights, rng):
+    ends, m = np.cumsum(weights), len(weights)
+    return np.minimum(np.searchsorted(ends, (np.arange(m) + 0.9 * rng.random()) * ends[-1] / m), m - 1)
+
+
+def of_distances_up_to(limit):
+    def field(grid, pose, ranges, bearings, std):
+        near = replace(grid)
+        near.__dict__["distance"] = np.minimum(grid.distance, limit)
+        return CHAPTER["distance_field_weight"].reference(near, pose, ranges, bearings, std)
+
+    return field
+
+
 PASSED_BEFORE = [
+    ("sample_motion", drawn_as(lambda z: np.clip(z, -3, 3)), "Is the noise cut off"),
+    ("sample_motion", drawn_as(lambda z: np.vstack([z[: (len(z) + 1) // 2], z[: len(z) // 2]])), "the same noise"),
+    ("sample_motion", drawn_as(lambda z: z - z.mean(0)), "adds up to nothing"),
+    ("sample_motion", lambda *given: np.squeeze(CHAPTER["sample_motion"].reference(*given)), "for 1 particle"),
+    ("resample_roulette", up_to(0.99), "from 0 to the sum W"),
+    ("resample_systematic", turned_less, "nothing left out"),
+    ("distance_field_weight", of_distances_up_to(2.0), "cut off"),
+    ("should_resample", lambda w, t: bool(np.round(particles.effective_size(w), 2) < t * len(w)), ""),
     ("sample_motion", of_variances, "the root of std_u"),
     ("sample_motion", forward_only, "go both ways"),
     ("should_resample", up_to_the_share, "not `<=`"),

@@ -33,6 +33,12 @@ def prediction(rng, n, k, sure=1.0):
     return rng.normal(size=n) * 5, covariance(rng, n, sure), A, B, rng.normal(size=k) * 2, covariance(rng, k, sure)
 
 
+def known_exactly(rng):
+    """A state of which nothing is uncertain, and a control of zeros that is."""
+    x, cov, A, B, u, cov_u = prediction(rng, 3, 2)
+    return x, 0.0 * cov, A, B, 0.0 * u, cov_u
+
+
 def mixed_measurement(rng, n, m, off=1.0, sure=1.0, unit=1.0):
     """State of n, and m numbers measured of mixtures of them; off: how far they are from those expected; sure: how
     small the covariances are; unit: what the sensor shows where a state changes by 1 (a gain may well be above 1).
@@ -50,6 +56,12 @@ def measured_often(rng, n, m, k, sure=1.0):
     return x + sure**0.5 * rng.normal(size=n), covariance(rng, n, sure), z, C, cov_z
 
 
+def measured_alike(rng):
+    """The same where two of the measurements are equal."""
+    x0, cov0, z, C, cov_z = measured_often(rng, n=2, m=2, k=4)
+    return x0, cov0, z[[0, 1, 1, 2]], C, cov_z
+
+
 def two_sensors_that_disagree(rng):
     """The same with readings many standard deviations apart, from each other and from the prior."""
     x0, var0, z, stds = one_position_two_sensors(rng)
@@ -60,6 +72,18 @@ def prior_at_zero(rng):
     """The same with a prior that says 0, and a reading that does."""
     _, var0, z, stds = one_position_two_sensors(rng)
     return 0.0, var0, z * rng.permutation([0, 1]), stds
+
+
+def two_sensors_alike(rng):
+    """The same with two readings that are one number, of sensors that are equally good."""
+    x0, var0, z, stds = one_position_two_sensors(rng)
+    return x0, var0, z[[0, 0]], stds[[0, 0]]
+
+
+def two_sharp_sensors(rng):
+    """The same a kilometer away, known to millimeters."""
+    x0, var0, z, stds = one_position_two_sensors(rng)
+    return 1000.0 + 1e-3 * x0, 1e-6 * var0, 1000.0 + 1e-3 * z, 1e-3 * stds
 
 
 def one_position_two_sensors(rng, better=0, var0=(2, 9)):
@@ -74,10 +98,15 @@ def steady_vehicle(rng):
     return A, C, rng.uniform(0.3, 1) * B @ B.T + 1e-3 * np.eye(2), np.array([[rng.uniform(0.1, 1)]])
 
 
-def steady_system(rng, n, m):
-    """A system of n states that remember for a while, all of them seen in m mixed numbers."""
+def steady_system(rng, n, m, sure=1.0):
+    """A system of n states that remember for a while, all of them seen in m mixed numbers; sure: how small the noises."""
     A = np.diag(rng.uniform(0.7, 0.95, n)) + np.diag(rng.uniform(0.1, 0.5, n - 1), 1)
-    return A, np.eye(m, n) + 0.3 * rng.normal(size=(m, n)), covariance(rng, n, 0.05), covariance(rng, m, 0.3)
+    return (
+        A,
+        np.eye(m, n) + 0.3 * rng.normal(size=(m, n)),
+        covariance(rng, n, 0.05 * sure),
+        covariance(rng, m, 0.3 * sure),
+    )
 
 
 def growing_system(rng):
@@ -133,7 +162,7 @@ def landmark_at(rng, within):
 def near_and_far(metric):
     return [
         (functools.partial(landmark_at, within=within), metric, f"right, but not for a landmark {where}:")
-        for within, where in (((0.3, 0.6), "closer by than a meter"), ((20, 60), "20 m away or more"))
+        for within, where in (((0.1, 0.2), "closer by than a meter"), ((300, 900), "20 m away or more"))
     ]
 
 
@@ -147,6 +176,13 @@ def landmark_behind(rng, side):
     """A landmark so nearly behind the robot that a hundredth of a radian or of a meter takes it across the seam."""
     x, r = np.array([*rng.uniform(-4, 4, 2), rng.uniform(-3, 3)]), rng.uniform(1.5, 6)
     angle = x[2] + side * (np.pi - rng.uniform(5e-4, 1e-3))
+    return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
+
+
+def landmark_ahead(rng):
+    """A landmark hardly to the left or to the right of where the robot looks."""
+    x, r = np.array([*rng.uniform(-4, 4, 2), rng.uniform(-3, 3)]), rng.uniform(1.5, 6)
+    angle = x[2] + rng.uniform(5e-4, 1e-3) * rng.choice([-1, 1])
     return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
 
 
@@ -164,9 +200,14 @@ def turned_too_far(rng, sign, gathered):
     return (sign * (rng.uniform(3.3, 6.0) + 2 * np.pi * rng.integers(1, 4) * (gathered > 0)),)
 
 
-def turned_often(rng):
-    """An angle that has gathered dozens of turns, as that of a wheel does."""
-    return (rng.choice([-1, 1]) * (rng.uniform(3.3, 6.0) + 2 * np.pi * rng.integers(30, 90)),)
+def turned_often(rng, turns=(30, 90)):
+    """An angle that has gathered many turns, as that of a wheel does."""
+    return (rng.choice([-1, 1]) * (rng.uniform(3.3, 6.0) + 2 * np.pi * rng.integers(*turns)),)
+
+
+def hardly_turned(rng, size):
+    """An angle next to zero, or zero."""
+    return (size * rng.uniform(0.2, 1.0) * rng.choice([-1, 1]),)
 
 
 def each_way(draw, *names):
@@ -188,20 +229,31 @@ def special_control(rng, moves):
     return x, u * moves, dt
 
 
-def filter_step(rng, ahead=1, astray=0.2, side=1, seam=True):
+def fast_control(rng):
+    """A pose whose heading has gathered turns, a control ten times as fast, and a time step of seconds."""
+    x, u, dt = pose_control_step(rng)
+    return x + [0.0, 0.0, 2 * np.pi * rng.integers(2, 4) * rng.choice([-1, 1])], 10 * u, 5 * dt
+
+
+def filter_step(
+    rng, ahead=1, astray=0.2, side=1, seam=True, moves=(1, 1), turns=0, within=(2, 5), sure=1.0, turned=(0.06, 0.12)
+):
     """Everything one step of the landmark filter needs; the bearing innovation crosses +-pi if this is a seam.
 
-    astray: how far the measured distance may be off (m); side: of the innovation of the bearing.
+    astray: how far the measured distance may be off (m); side: of the innovation of the bearing; moves: parts of the
+    control that are not zero; turns: that the heading has gathered; within: range of the landmark's distance (m);
+    sure: how small the covariances are; turned: range of the innovation of the bearing.
     """
     x, u, dt = pose_control_step(rng, ahead)
-    cov, cov_u = covariance(rng, 3, 0.01), covariance(rng, 2, 0.02)
+    x, u = x + [0.0, 0.0, 2 * np.pi * turns], u * moves
+    cov, cov_u = covariance(rng, 3, 0.01 * sure), covariance(rng, 2, 0.02 * sure)
     moved = odometry.step(x, u, dt, "euler")
     away = moved[2] + side * (np.pi - rng.uniform(0.005, 0.03) if seam else rng.uniform(0.2, 1.5))
-    landmark = moved[:2] + rng.uniform(2, 5) * np.array([np.cos(away), np.sin(away)])
+    landmark = moved[:2] + rng.uniform(*within) * np.array([np.cos(away), np.sin(away)])
     off = rng.uniform(0.8, 1.0) * astray * (1 if astray > 1 else rng.choice([-1, 1]))
-    z = ekf.measurement(moved, landmark[None])[0] + [off, side * rng.uniform(0.06, 0.12)]
+    z = ekf.measurement(moved, landmark[None])[0] + [off, side * rng.uniform(*turned)]
     z[1] = wrapped(z[1])
-    return x, cov, u, dt, cov_u, z, landmark, covariance(rng, 2, 0.003)
+    return x, cov, u, dt, cov_u, z, landmark, covariance(rng, 2, 0.003 * sure)
 
 
 def estimate_and_truth(rng, side=1, astray=0.3, turns=0, sure=0.05):
@@ -211,6 +263,18 @@ def estimate_and_truth(rng, side=1, astray=0.3, turns=0, sure=0.05):
     truth = np.array([*rng.uniform(-4, 4, 2), side * (np.pi - rng.uniform(0.02, 0.1))])
     off = rng.uniform(0.8, 1.0, 2) * astray * rng.choice([-1, 1], 2)
     return truth, truth + [*off, side * (rng.uniform(0.15, 0.3) - 2 * np.pi * (1 + turns))], covariance(rng, 3, sure)
+
+
+def estimate_without_error(rng):
+    """An estimate that is the truth."""
+    truth, _, cov = estimate_and_truth(rng)
+    return truth, truth.copy(), cov
+
+
+def sharp_estimate(rng):
+    """The same within millimeters, and a covariance that says so."""
+    truth, x, cov = estimate_and_truth(rng, astray=3e-3, sure=1e-5)
+    return truth, truth + [*(x - truth)[:2], 1e-3 * wrapped(x[2] - truth[2])], cov
 
 
 def surprise(rng, wanted, along=None, std=(0.3, 1.5), measure=np.linalg.solve, limit=(4.0, 9.0)):
@@ -233,6 +297,24 @@ def surprise_of(rng, m, wanted):
     S, y, limit = covariance(rng, m, 0.2), rng.normal(size=m), rng.uniform(4, 17)
     y[:-1] *= 0.01 if wanted[0] > 1 else 1.0
     return y * np.sqrt(rng.uniform(*wanted) * limit / (y @ np.linalg.solve(S, y))), S, limit
+
+
+def on_its_own_side(rng, place, plausible, high):
+    """A NIS and a limit in the same half, the high or the low one, between two multiples of a decimal place, or of 1:
+    rounded or cut off, one of them comes to lie on the other side of the other, or on it.
+    """
+    parts = np.array([rng.uniform(0.1, 0.2), rng.uniform(0.25, 0.4)])
+    near, far = np.sort(1 - parts if high else parts)[:: 1 if plausible else -1]  # of the NIS, of the limit
+    whole = rng.integers(4 / place, 16 / place)
+    _, S, _ = surprise(rng, (0.5, 0.6))
+    y = rng.normal(size=2)
+    return y * np.sqrt(place * (whole + near) / (y @ np.linalg.solve(S, y))), S, float(place * (whole + far))
+
+
+def no_surprise(rng):
+    """An innovation of zeros."""
+    y, S, limit = surprise(rng, (0.05, 0.9))
+    return 0.0 * y, S, limit
 
 
 def just_at_the_limit(rng):
@@ -269,6 +351,18 @@ SURPRISES = (
     functools.partial(surprise_of, m=1, wanted=(0.3, 0.9)),
     functools.partial(surprise_of, m=6, wanted=(0.3, 0.9)),
     functools.partial(surprise_of, m=6, wanted=(1.1, 3.0)),
+    *(
+        functools.partial(on_its_own_side, place=place, plausible=plausible, high=high)
+        for place in (1.0, 0.1, 0.01, 0.001)
+        for plausible in (True, False)
+        for high in (True, False)
+    ),
+    # numbers of other units, and limits of other probabilities
+    functools.partial(surprise, wanted=(0.05, 0.9), along=-1, std=(3e-4, 6e-4), limit=(0.1, 0.3)),
+    functools.partial(surprise, wanted=(1.1, 3.0), along=1, std=(3e-4, 6e-4), limit=(0.1, 0.3)),
+    functools.partial(surprise, wanted=(0.75, 0.9), along=1, std=(300.0, 600.0), limit=(30.0, 60.0)),
+    functools.partial(surprise, wanted=(1.1, 3.0), along=-1, std=(300.0, 600.0), limit=(30.0, 60.0)),
+    no_surprise,
 )
 
 
@@ -677,7 +771,10 @@ CONTROL = "the control is a speed and a turn rate"
 
 STATE_AND_COV = metrics.Several(metrics.Numbers(1e-8), metrics.Numbers(1e-8), names=("state", "covariance"))
 
+SMALL = metrics.Numbers(1e-8, least=0.0)
 FUSED = metrics.Several(metrics.Numbers(1e-9, "m"), metrics.Numbers(1e-9), names=("position", "variance"))
+
+POSE_AND_COV = metrics.Several(metrics.PlanarPoses(1e-7), metrics.Numbers(1e-7), names=("pose", "covariance"))
 
 JACOBIANS = metrics.Several(metrics.Numbers(1e-5), metrics.Numbers(1e-5), names=("G_x", "G_u"))
 ONE_STATE = "right, but not for a single state:"
@@ -702,6 +799,16 @@ CHAPTER = Chapter(
                     functools.partial(prediction, n=2, k=3),
                     STATE_AND_COV,
                     "right, but not for more controls than states:",
+                ),
+                (
+                    functools.partial(prediction, n=6, k=4, sure=1e4),
+                    STATE_AND_COV,
+                    "right, but not for six states and four controls, of which little is sure:",
+                ),
+                (
+                    known_exactly,
+                    STATE_AND_COV,
+                    "right, but not where the state is known exactly, cov = 0, and the control is zero, though uncertain:",
                 ),
             ),
             hints=(
@@ -830,7 +937,19 @@ CHAPTER = Chapter(
                 )
             ),
             metric=STATE_AND_COV,
-            noisy=(functools.partial(mixed_measurement, n=1, m=1), STATE_AND_COV, ONE_STATE),
+            noisy=(
+                (functools.partial(mixed_measurement, n=1, m=1), STATE_AND_COV, ONE_STATE),
+                (
+                    functools.partial(mixed_measurement, n=6, m=5, off=1000.0, sure=1e4),
+                    STATE_AND_COV,
+                    "right, but not for six states and five measured numbers, of which little is sure:",
+                ),
+                (
+                    functools.partial(mixed_measurement, n=3, m=2, off=0.0),
+                    STATE_AND_COV,
+                    "right, but not where just what was expected is measured: the covariance shrinks all the same:",
+                ),
+            ),
             hints=(
                 "How surprising is the measurement, and how much of the surprise belongs to the state?",
                 "S = C cov C^T + cov_z, K = cov C^T S^-1, x + K (z - C x), (I - K C) cov.",
@@ -1038,6 +1157,12 @@ CHAPTER = Chapter(
                     "right where the sensors agree. Where they are far apart the weights stay what they are:",
                 ),
                 (prior_at_zero, FUSED, "right, but not where the prior says 0: that is a position like any other:"),
+                (two_sensors_alike, FUSED, "right, but not for two equal readings of equally good sensors:"),
+                (
+                    two_sharp_sensors,
+                    metrics.Several(metrics.Numbers(1e-9, "m"), SMALL, names=("position", "variance")),
+                    "right, but not a kilometer away and known to millimeters:",
+                ),
             ],
             hints=(
                 "Each opinion (the prior, two sensors) counts as much as it is certain.",
@@ -1226,6 +1351,14 @@ CHAPTER = Chapter(
                     "right, but not for a system of which a state grows by itself, by an eigenvalue of A above 1:",
                 ),
                 (functools.partial(steady_system, n=1, m=1), metrics.Numbers(1e-3), ONE_STATE),
+                *(
+                    (
+                        functools.partial(steady_system, n=5, m=3, sure=sure),
+                        metrics.Numbers(1e-3),
+                        f"right, but not for five states and noises whose variances are {words}:",
+                    )
+                    for sure, words in ((1e3, "hundreds"), (1e-3, "below a thousandth"))
+                ),
                 (
                     functools.partial(steady_system, n=2, m=3),
                     metrics.Numbers(1e-3),
@@ -1400,6 +1533,19 @@ CHAPTER = Chapter(
                     metrics.Numbers(1e-9, "rad"),
                     "right for a few turns, but not for an angle that has gathered dozens of them:",
                 ),
+                (
+                    functools.partial(turned_often, turns=(2000, 4000)),
+                    metrics.Numbers(1e-9, "rad"),
+                    "right for dozens of turns, but not for an angle that has gathered thousands of them:",
+                ),
+                *(
+                    (
+                        functools.partial(hardly_turned, size=size),
+                        metrics.Numbers(1e-9, "rad"),
+                        f"right, but not for an angle {words}, which stays as it is:",
+                    )
+                    for size, words in ((1e-4, "next to zero"), (0.0, "of zero"))
+                ),
                 *(
                     (
                         draw,
@@ -1497,7 +1643,11 @@ CHAPTER = Chapter(
             fixed={"x": POSE, "landmark": LANDMARK},
             draws=12,
             metric=metrics.Numbers(1e-9),
-            noisy=along_the_axes(metrics.Numbers(1e-9)) + near_and_far(metrics.Numbers(1e-9)),
+            noisy=[
+                *along_the_axes(metrics.Numbers(1e-9)),
+                *near_and_far(metrics.Numbers(1e-9)),
+                (landmark_ahead, metrics.Numbers(1e-9), "right, but not where the robot looks nearly at the landmark:"),
+            ],
             hints=(
                 "How far away is the landmark, and in which direction seen from where the robot looks?",
                 "d = sqrt(dx^2 + dy^2), alpha = atan2(dy, dx) - theta, with (dx, dy) from robot to landmark.",
@@ -1745,6 +1895,13 @@ CHAPTER = Chapter(
                     ((1, 0), "drives straight on, omega = 0"),
                     ((0, 0), "rests, u = (0, 0)"),
                 )
+            )
+            + (
+                (
+                    fast_control,
+                    JACOBIANS,
+                    "right, but not for a heading that has gathered turns, a fast control and a time step of seconds:",
+                ),
             ),
             hints=(
                 "They are F_x and F_u of chapter 7 under another letter.",
@@ -1865,7 +2022,21 @@ CHAPTER = Chapter(
                 "landmark": LANDMARK,
                 "cov_z": READING,
             },
-            metric=metrics.Several(metrics.PlanarPoses(1e-7), metrics.Numbers(1e-7), names=("pose", "covariance")),
+            metric=POSE_AND_COV,
+            noisy=tuple(
+                (functools.partial(filter_step, **special), POSE_AND_COV, f"right, but not {words}:")
+                for special, words in (
+                    ({"moves": (0, 0)}, "where the robot rests, u = (0, 0): what is uncertain of the control stays so"),
+                    ({"moves": (1, 0), "seam": False}, "where the robot drives straight on, omega = 0"),
+                    ({"moves": (0, 1), "seam": False, "side": -1}, "where the robot turns on the spot, v = 0"),
+                    ({"turns": -3}, "for a heading that has gathered several turns"),
+                    (
+                        {"within": (0.8, 1.2), "seam": False, "turned": (1.0, 1.4)},
+                        "for a landmark a meter away and a bearing that is off by a radian",
+                    ),
+                    ({"within": (60, 90), "sure": 30.0}, "for a landmark 60 m away and uncertainties that are large"),
+                )
+            ),
             hints=(
                 "The pose takes the motion model itself, only its covariance takes G_x and G_u. Then correct: the innovation takes the measurement itself, gain and covariance take H in place of C.",
                 "Jacobians at the old pose; the pose by `odometry.step(x, u, dt, 'euler')`, its covariance by both Jacobians. Then, at the predicted pose, H and the expected measurement; the innovation, its bearing wrapped; gain and correction as in `update`.",
@@ -2049,13 +2220,17 @@ CHAPTER = Chapter(
             reference=nees,
             draw=(
                 *each_way(estimate_and_truth, "side"),
-                functools.partial(estimate_and_truth, astray=5.0),
+                functools.partial(estimate_and_truth, astray=50.0),
                 functools.partial(estimate_and_truth, turns=2, sure=5.0),
                 *(functools.partial(estimate_and_truth, side=side, turns=-1) for side in (1, -1)),
             ),
             draws=6,
             fixed={"truth": POSE, "x": POSE, "cov": POSE},
             metric=metrics.Numbers(1e-8),
+            noisy=(
+                (estimate_without_error, metrics.Numbers(1e-8), "right, but not where the estimate is the truth:"),
+                (sharp_estimate, metrics.Numbers(1e-8), "right, but not for errors and uncertainties of millimeters:"),
+            ),
             hints=(
                 "Measure the error in units of the uncertainty the filter claims.",
                 "e' cov^-1 e with e = truth - x, the heading wrapped.",
@@ -2233,6 +2408,12 @@ CHAPTER = Chapter(
                     "right for several measurements, but not for a single one:",
                 ),
                 (functools.partial(measured_often, n=1, m=1, k=4), STATE_AND_COV, ONE_STATE),
+                (measured_alike, STATE_AND_COV, "right, but not where two measurements are equal: each counts:"),
+                (
+                    functools.partial(measured_often, n=5, m=2, k=40, sure=1e4),
+                    STATE_AND_COV,
+                    "right, but not for five states and forty measurements, of which little is sure:",
+                ),
                 (
                     functools.partial(measured_often, n=2, m=3, k=4),
                     STATE_AND_COV,

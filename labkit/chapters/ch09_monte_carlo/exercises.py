@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import logsumexp, ndtr, ndtri
 
 from ...documents.lecture.examples import load_building
 from ...exercises import metrics
@@ -45,7 +45,7 @@ def landmarks_at_a_pose(rng, astray=0.0):
     """pose, z, landmarks, both standard deviations; two bearings lie across the seam at 180 deg, from either side.
 
     astray: how far the measured ranges are off beyond their noise (m), as seen from a particle in a wrong room; the
-    bearings, but those across the seam, are then off by a radian or so.
+    bearings, but those across the seam, are then off by more than a right angle.
     """
     m = int(rng.integers(3, 6))
     pose = np.array([*rng.uniform(-2, 2, 2), rng.uniform(-3, 3)])
@@ -53,7 +53,8 @@ def landmarks_at_a_pose(rng, astray=0.0):
     r = rng.uniform(2, 6, m)
     angle = pose[2] + phi
     landmarks = pose[:2] + r[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-    off = planar.wrap_angle(phi + (0.05, -0.05, *(0.03 + 0.1 * astray) * rng.normal(size=m - 2)))
+    turned = rng.uniform(1.7, 2.8, m - 2) * rng.choice([-1, 1], m - 2) if astray else 0.03 * rng.normal(size=m - 2)
+    off = planar.wrap_angle(phi + (0.05, -0.05, *turned))
     z = np.column_stack([r + astray + 0.1 * rng.normal(size=m), off])
     return pose, z, landmarks, float(rng.uniform(0.15, 0.4)), float(rng.uniform(0.03, 0.08))
 
@@ -64,9 +65,26 @@ def one_landmark(rng):
     return pose, z[:1], landmarks[:1], *stds
 
 
+def landmarks_just_as_expected(rng):
+    """Two landmarks, measured without any error, and a sensor whose standard deviations are a tenth of the usual."""
+    pose, z, landmarks, *stds = landmarks_at_a_pose(rng)
+    away = landmarks - pose[:2]
+    bearings = planar.wrap_angle(np.arctan2(away[:, 1], away[:, 0]) - pose[2])
+    return pose, np.column_stack([np.hypot(*away.T), bearings])[:2], landmarks[:2], 0.1 * stds[0], 0.1 * stds[1]
+
+
+def landmarks_after_several_turns(rng):
+    """A dozen landmarks far away, and a heading that has gathered several turns."""
+    theta = rng.uniform(-3, 3) + 2 * math.pi * rng.integers(2, 4) * rng.choice([-1, 1])
+    r, phi, pose = rng.uniform(60, 180, 12), rng.uniform(-3, 3, 12), np.array([*rng.uniform(-2, 2, 2), theta])
+    landmarks = pose[:2] + r[:, None] * np.column_stack([np.cos(theta + phi), np.sin(theta + phi)])
+    z = np.column_stack([r + rng.normal(size=12), planar.wrap_angle(phi + 0.05 * rng.normal(size=12))])
+    return pose, z, landmarks, float(rng.uniform(2, 4)), float(rng.uniform(0.03, 0.08))
+
+
 def landmarks_from_a_wrong_room(rng):
-    """The same with ranges that are 18 m off: their density is zero in float64, its logarithm is not."""
-    return landmarks_at_a_pose(rng, astray=18.0)
+    """The same with ranges that are 60 m off: their density is zero in float64, its logarithm is not."""
+    return landmarks_at_a_pose(rng, astray=60.0)
 
 
 def landmarks_30_deviations_off(rng):
@@ -80,6 +98,12 @@ def beams_at_a_pose(rng, count=None):
     count = count or int(rng.integers(15, 25))
     expected = rng.uniform(1, 10, count)
     return expected + 0.2 * rng.normal(size=count), expected, float(rng.uniform(0.15, 0.4))
+
+
+def beams_of_a_sensor(rng, sharpness, count=None):
+    """The same of a sensor so many times as sharp, with errors that are smaller by as much."""
+    ranges, expected, std = beams_at_a_pose(rng, count)
+    return expected + (ranges - expected) / sharpness, expected, std / sharpness
 
 
 def beams_from_a_wrong_pose(rng):
@@ -104,6 +128,15 @@ def scan_on_another_map(rng):
     grid = maps.OccupancyGrid(cells, 0.05, (-7.0, 4.0))
     pose = np.array([rng.uniform(-5.3, -4.7), rng.uniform(5.3, 5.7), rng.uniform(-3, 3)])
     return grid, pose, rng.uniform(0.3, 1.1, 12), np.linspace(-2.3, 2.3, 12), float(rng.uniform(0.15, 0.4))
+
+
+def scan_in_a_wide_hall(rng, count=12):
+    """grid, pose, ranges, bearings, std where every end point is meters away from the nearest wall."""
+    cells = np.full((110, 120), maps.FREE)
+    cells[[0, -1]], cells[:, [0, -1]] = maps.OCCUPIED, maps.OCCUPIED
+    pose = np.array([*rng.uniform(10, 12, 2), rng.uniform(-3, 3)])
+    bearings = np.linspace(-2.3, 2.3, count) if count > 1 else rng.uniform(-2, 2, 1)
+    return maps.OccupancyGrid(cells, 0.2), pose, rng.uniform(0.5, 5.0, count), bearings, float(rng.uniform(0.5, 1.0))
 
 
 def whole_scan(draw):
@@ -194,10 +227,10 @@ def ray_past_the_unknown(rng):
 
 
 def ray_to_a_thin_wall(rng, width=0.1, far=None):
-    """A ray nearly along y to a wall of one cell, in the middle of which no step of two cells ends; another wall behind
+    """A ray nearly along y to a wall of one cell, in which no step of 1.2, 1.5, 2 or 3 cells ends; another wall behind
     it. width: of a cell (m); far: distance, in cells.
     """
-    cells, far = np.full((60, 60), maps.FREE), far or 2.0 * rng.integers(9, 15) + rng.uniform(0.3, 0.7)
+    cells, far = np.full((60, 60), maps.FREE), far or 6.0 * rng.integers(3, 6) + rng.uniform(0.05, 0.15)
     cells[45], cells[56:] = maps.OCCUPIED, maps.OCCUPIED
     theta, angle = rng.uniform(-3, 3), math.pi / 2 + rng.uniform(0.004, 0.02) * rng.choice([-1, 1])
     pose = np.array([width * rng.uniform(25, 35), width * (45 - far * math.sin(angle)), theta])
@@ -210,12 +243,12 @@ def ray_in_a_fine_map(rng):
 
 
 def ray_down_a_hall(rng):
-    """A ray to a wall more than ten meters away, and a scanner that reaches 18 m."""
-    cells, start = np.full((60, 220), maps.FREE), rng.uniform(1.0, 3.0)
-    cells[:, 185:] = maps.OCCUPIED
-    theta, angle = rng.uniform(-3, 3), rng.uniform(-0.1, 0.1)
-    pose = np.array([start, rng.uniform(2.5, 3.5), theta])
-    return maps.OccupancyGrid(cells, 0.1), pose, float(planar.wrap_angle(angle - theta)), 18.0
+    """A ray to a wall some twenty meters away, and a scanner that reaches 25 m."""
+    cells, start = np.full((40, 120), maps.FREE), rng.uniform(1.0, 3.0)
+    cells[:, 110:] = maps.OCCUPIED
+    theta, angle = rng.uniform(-3, 3), rng.uniform(-0.05, 0.05)
+    pose = np.array([start, rng.uniform(3.5, 4.5), theta])
+    return maps.OccupancyGrid(cells, 0.2), pose, float(planar.wrap_angle(angle - theta)), 25.0
 
 
 def ray_to_a_wall_close_by(rng):
@@ -256,6 +289,20 @@ def cloud_with_dead_particles(rng):
     return (w,)
 
 
+def one_heavy(rng):
+    """The same with all but one of zero."""
+    (w,) = cloud_weights(rng)
+    return (w * (np.arange(len(w)) == rng.integers(len(w))),)
+
+
+def many_alike(rng):
+    return (np.full(int(rng.integers(2000, 3000)), rng.uniform(1e-9, 2e-9)),)
+
+
+def one_particle(rng):
+    return (np.array([rng.uniform(2, 5)]),)
+
+
 def log_weights(rng, level, possible=False):
     """Logarithms of weights about this level, one or two of them impossible (-inf) unless all are `possible`."""
     logs = level + rng.normal(0, 2, rng.integers(6, 15))
@@ -269,6 +316,15 @@ def logs_far_apart(rng):
     low = -2000 + rng.normal(0, 2, rng.integers(5, 9))
     logs = rng.permutation(np.concatenate([900 + rng.normal(0, 2, rng.integers(2, 4)), low[2:]]))
     return (np.array([low[0], *logs, low[1]]),)
+
+
+def small_ones_that_count(rng):
+    """Logarithms of thousands of weights that are small beside the largest, but not together."""
+    return (rng.permutation([0.0, *rng.uniform(-24, -8, 3000)]) + rng.uniform(-3, 3),)
+
+
+def equal_logs(rng, count):
+    return (np.full(count, rng.uniform(-900, -800)),)
 
 
 def one_possible(rng, others):
@@ -290,6 +346,21 @@ def cycle_of_weights(rng, step, n=None):
     return weights / weights.sum(), rng.uniform(0.01, 3, m), int(step(rng, n)), n
 
 
+def cycle_of_rare_weights(rng, after=0):
+    """The same with weights of any sum, some of them and some likelihoods zero, the others tiny; and a long cycle, so
+    many steps after its end.
+    """
+    weights, likelihood, _, _ = cycle_of_weights(rng, STEPS[0])
+    weights[0], likelihood[-1] = 0.0, 0.0
+    return 50 * weights, 1e-9 * likelihood, 40 * int(rng.integers(5, 9)) + after, 40
+
+
+def cycle_of_one(rng):
+    """The same with a single particle."""
+    weights, likelihood, step, n = cycle_of_weights(rng, STEPS[1])
+    return weights[:1], likelihood[:1], step, n
+
+
 # The end of a later cycle, the step before it and after it, the first step, the end of the first cycle
 STEPS = (
     lambda rng, n: n * rng.integers(2, 6),
@@ -306,6 +377,16 @@ def row_of_depths(rng, odd=False):
     depth = rng.uniform(1.1 * near, 0.95 * far, n)
     depth[rng.choice(n, 6, replace=False)] = 0.0, 0.6 * near, near, far, 1.2 * far, 1.5 * far
     return depth, float(rng.uniform(0.7, 1.6)), near, far
+
+
+def depths_of_a_camera(rng, field_of_view, n, scale):
+    """The same of another camera: how wide it sees (rad), how many columns it has, how far it sees."""
+    _, _, near, far = row_of_depths(rng)
+    near, far = scale * near, scale * far
+    depth = rng.uniform(0.5 * near, 1.2 * far, n)
+    beside = np.array([near * (1 - 1e-6), far * (1 - 1e-6), far * (1 + 1e-6), near * (1 + 1e-6)])
+    depth[: len(beside)] = beside[:n]
+    return depth, field_of_view * rng.uniform(0.9, 1.1), near, far
 
 
 def nothing_seen(rng):
@@ -345,6 +426,43 @@ def at_the_threshold(rng):
     return rng.permutation(2.0 ** rng.integers(-2, 3) * (np.arange(m) < n)), float(n / m)
 
 
+def weights_on_their_own_side(rng, place, below, shares):
+    """Weights and a threshold so that their effective size and what it is compared with, or both as shares, lie between
+    the same two multiples of a decimal place: rounded, one comes to lie on the other side of the other, or on it.
+    """
+    while True:
+        w = rng.uniform(0.2, 1.0, size=rng.integers(20, 40)) ** rng.uniform(0.5, 6)
+        unit = 1 if shares else len(w)
+        share = particles.effective_size(w) / len(w)
+        part = share * unit / place % 1
+        if (0.6 < part < 0.75) if below else (0.25 < part < 0.4):
+            return w, float(share + (0.15 if below else -0.15) * place / unit)
+
+
+def many_weights(rng, side):
+    """Thousands of tiny weights, and a small threshold that their effective size misses by 1 %, to this side."""
+    w = 1e-9 * rng.exponential(size=3000) ** 4
+    return w, float(particles.effective_size(w) / len(w) * (1 + 0.01 * side))
+
+
+def averages_of_densities(rng, scale, **kind):
+    """The same of weights so many times as large."""
+    mean, slow, fast, *alphas = averages(rng, **kind)
+    return scale * mean, scale * slow, scale * fast, *alphas
+
+
+def averages_apart(rng, share):
+    """The same where the quick average and the mean weight lack this share of the slow average."""
+    mean, slow, fast, *alphas = averages(rng)
+    return (1 - share) * slow, slow, (1 - share) * slow, *alphas
+
+
+def averages_that_stand(rng):
+    """The same where all three are one number, a slow average that hardly moves and a quick one that nearly jumps."""
+    w = rng.uniform(0.2, 0.8)
+    return w, w, w, rng.uniform(0.001, 0.005), rng.uniform(0.9, 0.99)
+
+
 def averages_that_rise(rng):
     """w_mean, w_slow, w_fast, alpha_slow, alpha_fast where the quick average is above the slow one, and stays there."""
     slow = rng.uniform(0.2, 0.8)
@@ -361,12 +479,6 @@ def averages(rng, low=False):
         rng.uniform(0.02, 0.1),
         rng.uniform(0.2, 0.5),
     )
-
-
-def small_averages(rng):
-    """The same of densities that are small, as those of many beams are."""
-    mean, slow, fast, *alphas = averages(rng, low=True)
-    return 1e-3 * mean, 1e-3 * slow, 1e-3 * fast, *alphas
 
 
 def averages_just_below(rng):
@@ -386,6 +498,19 @@ def headings(rng, about=math.pi):
     n = int(rng.integers(15, 25))
     angles = planar.wrap_angle(about + rng.uniform(-0.3, 0.3) + 0.4 * rng.normal(size=n))
     return angles, rng.exponential(size=n)
+
+
+def few_headings(rng, count):
+    """A few angles that have gathered turns, and tiny weights."""
+    angles, weights = headings(rng, about=rng.choice([-2.0, 2.0]))
+    return angles[:count] + 2 * math.pi * rng.integers(-4, 5, count), 1e-9 * (weights[:count] + 0.1)
+
+
+def headings_without_weight(rng):
+    """Angles of which those far off weigh nothing."""
+    angles, weights = headings(rng, about=2.0)
+    angles[::3], weights[::3] = -1.0, 0.0
+    return angles, weights
 
 
 # References that the library has in another form ---------------------------------------------------------------------
@@ -1062,6 +1187,44 @@ def _never_twice(resample, weights, rng):
     return " No index came out twice in 50 calls: a heavy one must be drawn as often as its weight asks for."
 
 
+SCALES = (1e-9, 1e6)
+
+
+def _of_any_sum(resample, rng):
+    """Shares by weights that are tiny, and by huge ones."""
+    for weights in (scale * WEIGHTS[1] for scale in SCALES):
+        found, expected = _draws(resample, weights, rng, 500), weights / weights.sum()
+        if isinstance(found, str):
+            return f"with the weights {weights.tolist()}: {found}."
+        if np.abs(found - expected).max() > SHARE_OFF:
+            return (
+                f"with the weights {weights.tolist()} the indices get {np.round(100 * found).astype(int).tolist()} % of the "
+                f"draws instead of {np.round(100 * expected).astype(int).tolist()} %: the weights may have any sum, a tiny "
+                "or a huge one as well."
+            )
+    return None
+
+
+MANY = np.tile([0.02, 0.04], 200)  # weights, of which the last is a heavy one
+TURNS, FEWEST, MOST, APART = 40, 1, 105, 600.0  # 27 or 53 draws of each are expected, and a chi-square sum of 399
+
+
+def _is_right_of_many(resample, rng):
+    """Many weights of two sizes: each comes out, none far too often: the spins reach from 0 to W, no farther."""
+    found = _draws(resample, MANY, rng, TURNS)
+    if isinstance(found, str):
+        return f"with {len(MANY)} weights: {found}."
+    counts, expected = found * len(MANY) * TURNS, MANY / MANY.sum() * len(MANY) * TURNS
+    off = np.abs(counts - expected)
+    if counts.min() >= FEWEST - 0.5 and counts.max() <= MOST + 0.5 and (off**2 / expected).sum() < APART:
+        return None
+    k = int(np.argmax(off))
+    return (
+        f"of {len(MANY)} weights, 0.02 and 0.04 by turns, index {k} came out {counts[k]:.0f} times in {TURNS} calls, where about "
+        f"{expected[k]:.0f} are expected: do your spins reach from 0 to the sum W, and no farther?"
+    )
+
+
 def _spins_are_independent(resample, rng):
     weights = np.full(10, 0.1)
     counts = np.array([np.bincount(resample(weights.copy(), rng), minlength=10) for _ in range(600)])
@@ -1121,6 +1284,38 @@ def _turn_is_one_gap(resample, rng):
     index = np.asarray(resample(np.full(8, 0.125), _LateSpin(np.random.PCG64(0))))
     if index.shape == (8,) and index.dtype.kind in "iu" and index.min() > 0 and _is_a_wheel(resample, rng):
         return "with a random number of nearly 1 the wheel turns past the first of 8 equal weights: at most one gap, W / M."
+    return None
+
+
+class _EarlySpin(_LateSpin):
+    """Its uniform numbers are nearly 0."""
+
+    LATE = 1e-9
+
+
+def _spokes_fill_the_wheel(resample, rng):
+    """Equal weights against the least and the farthest turn: a gap that is not W / M leaves one of them out."""
+    for spin, words in ((_EarlySpin, "0"), (_LateSpin, "1")):
+        index = np.sort(resample(np.full(64, 0.25), spin(np.random.PCG64(0))))
+        if not np.array_equal(index, np.arange(64)):
+            return (
+                f"with a random number of nearly {words} not every one of 64 equal weights comes out exactly once: are the "
+                "spokes W / M apart, the first one between 0 and W / M?"
+            )
+    return None
+
+
+REACH, WHEEL_TURNS = 0.02, 1500  # of a gap: 30 of so many turns end within it, and none in one of some trillion checks
+
+
+def _turns_all_the_way(resample, rng):
+    """Two weights that only the farthest turns, or the least ones, do not both meet once."""
+    for weights, words in (((1 - REACH, 1 + REACH), "far"), ((1 + REACH, 1 - REACH), "little")):
+        if all(np.sum(resample(np.array(weights), rng)) == 1 for _ in range(WHEEL_TURNS)):
+            return (
+                f"in {WHEEL_TURNS} calls with the weights {list(weights)} both came out once each time. A wheel that is turned {words} "
+                "enough meets one of them twice: the turn is one from 0 to W / M, with nothing left out."
+            )
     return None
 
 
@@ -1225,19 +1420,116 @@ def _other_kind(ahead, turn, dt):
     return None
 
 
-def _noise_is_right_at_any_control(move, rng):
-    """Speed and turn rate of 4000 particles, from where they come to: of a robot that stands, and in reverse."""
-    std_u, dt, m = np.array([0.2, 0.3]), 0.5, 4000
-    for u in (np.zeros(2), np.array([-0.8, -0.4])):
-        moved = np.asarray(move(np.zeros((m, 3)), u, dt, std_u, rng))
-        ahead = moved[:, 2] / 2
-        v, omega = np.cos(ahead) * moved[:, 0] + np.sin(ahead) * moved[:, 1], moved[:, 2]
-        for name, found, wanted, std in zip(("speeds", "turn rates"), (v / dt, omega / dt), u, std_u):
-            if abs(found.mean() - wanted) > 0.1 * std or abs(found.std() - std) > 0.1 * std:
-                return (
-                    f"right for u = [1, 0], but for u = {u.tolist()} the {name} of {m} particles have the mean {found.mean():.2f} and "
-                    f"the standard deviation {found.std():.2f}, expected {wanted:g} and {std:g}: the noise is the same for every u."
-                )
+ANY_CONTROL = "the noise is the same for every u"
+# u, std_u, dt, and what is asked for; the robot that stands, in reverse, fast; other noise, of one part alone
+SLOW = (((0.0, 0.0), (0.2, 0.3), 0.5, ANY_CONTROL), ((-0.8, -0.4), (0.2, 0.3), 0.5, ANY_CONTROL))
+FAST = (
+    ((6.0, 2.0), (0.4, 0.3), 0.5, ANY_CONTROL),
+    ((1.0, 0.5), (0.005, 0.002), 0.1, "std_u is the argument's, however small"),
+)
+ALONE = (
+    ((1.0, 0.5), (1.5, 0.0), 0.5, "a standard deviation of 0 leaves omega as it is, and v has the other"),
+    ((1.0, 0.5), (0.0, 1.5), 0.5, "a standard deviation of 0 leaves v as it is, and omega has the other"),
+)
+MOVED = 4000  # particles
+MEAN_OFF, STD_OFF = 0.1, 0.07  # in std_u: six standard deviations of what so many normal numbers give
+# The same of 8000 numbers together, less by the root of their number for more: standard deviation, kurtosis, skewness,
+# and distance of their distribution from the normal one
+LAW = {"std": 0.045, "kurtosis": 0.35, "skewness": 0.17, "distance": 0.032}
+TOGETHER = 0.1  # correlation of 4000 pairs: six standard deviations
+SURELY = 18  # of so many that are expected beyond a limit none is there in one of seventy million checks
+
+
+def _noise_is_right_at(settings):
+    """A property: speed and turn rate of 4000 particles a setting, from where they come to, and the law of their noise."""
+
+    def check(move, rng):
+        noise = []
+        for u, std_u, dt, words in settings:
+            found = _controls_of(move(np.zeros((MOVED, 3)), np.array(u), dt, np.array(std_u), rng), dt)
+            for name, rate, wanted, std in zip(("speeds", "turn rates"), found, u, std_u):
+                if abs(rate.mean() - wanted) > max(MEAN_OFF * std, 1e-6) or abs(rate.std() - std) > max(
+                    STD_OFF * std, 1e-6
+                ):
+                    return (
+                        f"right for u = [1, 0], but for u = {list(u)} and std_u = {list(std_u)} the {name} of {MOVED} particles have "
+                        f"the mean {rate.mean():.3g} and the standard deviation {rate.std():.3g}, expected {wanted:g} and {std:g}: {words}."
+                    )
+            noise.append([(rate - wanted) / std for rate, wanted, std in zip(found, u, std_u) if std])
+        return _law_of(noise)
+
+    return check
+
+
+def _controls_of(moved, dt):
+    """Speeds and turn rates that lead from the origin to these poses."""
+    x, y, theta = np.asarray(moved, dtype=float).T
+    return (np.cos(theta / 2) * x + np.sin(theta / 2) * y) / dt, theta / dt
+
+
+def _law_of(clouds):
+    """What is wrong with noise, in standard deviations, that should be normal and independent; clouds: lists of series."""
+    series = [one for cloud in clouds for one in cloud]
+    if (np.abs(series) < 1e-6).all(axis=0).any():
+        return "a particle has no noise at all: each gets its own noisy copy of u."
+    if min(abs(one.mean()) for one in series) < 1e-10:
+        return "over all particles the noise adds up to nothing: each gets its own, whatever the others have."
+    if max(abs(np.corrcoef(one[:-1], one[1:])[0, 1]) for one in series) > TOGETHER:
+        return (
+            "the noise of each particle goes together with that of the next one: each needs random numbers of its own."
+        )
+    for cloud in clouds:
+        if len(cloud) == 2 and abs(np.corrcoef(*cloud)[0, 1]) > TOGETHER:
+            return "the noises of v and omega of a particle go together: each needs a random number of its own."
+        together = np.abs(np.concatenate(cloud))
+        if len(np.unique(np.round(together, 5))) < 0.9 * len(together):
+            return "many particles have the same noise, or its mirror image: each needs random numbers of its own."
+    return _not_normal(np.sort(np.concatenate(series)))
+
+
+def _not_normal(e):
+    """What is wrong with the law of sorted numbers that should be standard normal ones."""
+    largest, share = np.abs(e).max(), np.sqrt(8000 / len(e))
+    if largest < -ndtri(SURELY / 2 / len(e)):
+        return (
+            f"of {len(e)} noisy speeds and turn rates none is farther off than {largest:.2f} standard deviations: normal "
+            "numbers are, now and then. Is the noise cut off, or not normal?"
+        )
+    distance = np.abs(ndtr(e) - (np.arange(len(e)) + 0.5) / len(e)).max()
+    off = {
+        "std": e.std() - 1,
+        "kurtosis": _kurtosis(e) - 3,
+        "skewness": ((e - e.mean()) ** 3).mean(),
+        "distance": distance,
+    }
+    wrong = [name for name, amount in off.items() if abs(amount) > LAW[name] * share]
+    if "std" in wrong:
+        return f"the noise is {e.std():.2f} times as large as std_u says."
+    return (
+        "the noise has the right spread, but is not normal: draw normal numbers, rng.standard_normal."
+        if wrong
+        else None
+    )
+
+
+PLACES = ((1, (0.7, -0.3), 0.4), (5, (-6.0, 2.0), 1.5), (3, (0.05, -0.02), 0.01), (2, (0.0, 0.0), 0.5))
+
+
+def _reckons_from_anywhere(move, rng):
+    """Without noise: one particle alone, far out, after several turns, fast, in a short step, and at rest."""
+    for m, u, dt in PLACES:
+        states = np.column_stack([rng.uniform(100, 200, (m, 2)) * rng.choice([-1, 1], (m, 2)), rng.uniform(-20, 20, m)])
+        moved = np.asarray(move(states.copy(), np.array(u), dt, np.zeros(2), rng))
+        if moved.shape != states.shape:
+            return f"expected an array of shape ({m}, 3) for {m} particle{'s' * (m > 1)}, got {moved.shape}."
+        off = moved - odometry.step(states, u, dt)
+        off[:, 2] = planar.wrap_angle(off[:, 2])
+        if not np.abs(off).max() <= (1e-3 if moved.dtype == np.float32 else 1e-8):
+            start, right = np.round(states[0], 4).tolist(), np.round(odometry.step(states[0], u, dt), 4).tolist()
+            return (
+                f"right near the origin, but with std_u = 0, u = {list(u)} and dt = {dt} a particle must get from {start} to "
+                f"{right}. Yours gets to {np.round(moved[0], 4).tolist()}."
+            )
     return None
 
 
@@ -1384,8 +1676,19 @@ def _last_alone(weights, rng):
     return particles.resample_roulette(shares, rng)
 
 
+def _heaviest_alone(weights, rng):
+    """The heaviest index as often as it should, and one other in place of all others, where there are more than two."""
+    if len(weights) < 3:
+        return _squared(weights, rng)
+    heaviest = int(np.argmax(weights))
+    shares = np.zeros(len(weights))
+    shares[[heaviest, 0 if heaviest else 1]] = weights[heaviest], np.sum(weights) - weights[heaviest]
+    return particles.resample_roulette(shares, rng)
+
+
 SQUARED = (_squared, "draws in proportion to the squared weights")
 TO_THE_MIDDLE = (_drawn_to_the_middle, "draws the right index on average, but too often one in the middle")
+HEAVIEST_ALONE = (_heaviest_alone, "draws the heaviest index as often as it should, and one other in place of the rest")
 LAST_ALONE = (_last_alone, "draws the last index as often as it should, and the first in place of all others")
 UNIFORM = (lambda weights, rng: _uniform_choice(weights, rng), "draws all indices alike, whatever they weigh")
 
@@ -1445,6 +1748,7 @@ def _hunt(id, reference, specimen, why, hints, others, good=GOOD, extra=("rng",)
 
 WEIGHTS_AND_WORD = metrics.Several(metrics.Numbers(1e-9), metrics.Exactly(), names=("weights", "resample"))
 RECOVERY = metrics.Several(*[metrics.Numbers(1e-9)] * 3, names=("share", "w_slow", "w_fast"))
+OF_ANY_SIZE = metrics.Several(*[metrics.Numbers(1e-9, least=0.0)] * 3, names=("share", "w_slow", "w_fast"))
 DEPTHS = metrics.Several(metrics.Numbers(1e-9, "m"), metrics.Numbers(1e-9, "rad"), names=("ranges", "bearings"))
 
 CHAPTER = Chapter(
@@ -1464,7 +1768,13 @@ CHAPTER = Chapter(
             reference=sample_motion,
             draw=motion,
             fixed={"u": "the control is a speed and a turn rate", "std_u": "one for the speed, one for the turn rate"},
-            properties=(_noise_off_is_reckoning, _noise_is_right, _noise_is_right_at_any_control, _moved_by_the_rng),
+            properties=(
+                _noise_off_is_reckoning,
+                _noise_is_right,
+                *(_noise_is_right_at(settings) for settings in (SLOW, FAST, ALONE)),
+                _reckons_from_anywhere,
+                _moved_by_the_rng,
+            ),
             hints=(
                 "The noise belongs to the control, not to the pose, and each particle gets its own.",
                 "Draw one pair of standard normal numbers per particle, scale them by std_u, and add them to u.",
@@ -1511,7 +1821,19 @@ CHAPTER = Chapter(
             draw=(landmarks_at_a_pose, landmarks_from_a_wrong_room, landmarks_30_deviations_off),
             fixed={"pose": POSE},
             metric=metrics.Numbers(1e-6),
-            noisy=(one_landmark, metrics.Numbers(1e-6), "right for several landmarks, but not for a single one:"),
+            noisy=(
+                (one_landmark, metrics.Numbers(1e-6), "right for several landmarks, but not for a single one:"),
+                (
+                    landmarks_just_as_expected,
+                    metrics.Numbers(1e-6),
+                    "right, but not where two landmarks are measured without any error by a sharp sensor:",
+                ),
+                (
+                    landmarks_after_several_turns,
+                    metrics.Numbers(1e-6),
+                    "right, but not for a dozen landmarks up to 180 m away and a heading that has gathered several turns:",
+                ),
+            ),
             limit=IMPORTS,
             hints=(
                 "What range and what bearing would a robot at this pose expect? Compare them with z.",
@@ -1663,6 +1985,19 @@ CHAPTER = Chapter(
                     (0, "right for many particles, but not for a single one:"),
                     (4, "right, but not where all particles but one are impossible (-inf):"),
                 )
+            )
+            + (
+                (
+                    small_ones_that_count,
+                    metrics.Numbers(1e-9),
+                    "right, but not where thousands of small weights add something to the largest one:",
+                ),
+                (functools.partial(equal_logs, count=7), metrics.Numbers(1e-9), "right, but not for equal weights:"),
+                (
+                    functools.partial(equal_logs, count=2),
+                    metrics.Numbers(1e-9),
+                    "right, but not for two equal weights:",
+                ),
             ),
             hints=(
                 "exp(-2000) is zero, exp(900) is infinite. Which number may be taken out of all logarithms first?",
@@ -1772,7 +2107,7 @@ CHAPTER = Chapter(
                 (
                     ray_down_a_hall,
                     metrics.Numbers(0.16, "m", absolute=True),
-                    "Right on shorter rays, but not on one to a wall more than 15 m away that r_max = 18 m reaches (does yours end sooner?):",
+                    "Right on shorter rays, but not on one to a wall some 20 m away that r_max = 25 m reaches (does yours end sooner?):",
                 ),
                 *(
                     (
@@ -1846,6 +2181,22 @@ CHAPTER = Chapter(
             noisy=[
                 (whole_scan(beams_at_a_pose), metrics.Numbers(1e-6), "Right for few beams, but not for 541:"),
                 (beams_from_a_wrong_pose, metrics.Numbers(1e-6), "Right where the map fits, but not far off:"),
+                (
+                    functools.partial(beams_of_a_sensor, sharpness=1.0, count=1),
+                    metrics.Numbers(1e-6),
+                    "right for several beams, but not for a single one:",
+                ),
+                *(
+                    (
+                        functools.partial(beams_of_a_sensor, sharpness=sharpness),
+                        metrics.Numbers(1e-6),
+                        f"right, but not for {words}:",
+                    )
+                    for sharpness, words in (
+                        (1e3, "errors of fractions of a millimeter"),
+                        (0.01, "errors of many meters"),
+                    )
+                ),
             ],
             limit=IMPORTS,
             hints=(
@@ -1916,6 +2267,16 @@ CHAPTER = Chapter(
                     metrics.Numbers(1e-6),
                     "Right on the map of the building, but not on another one, of other cells and another origin:",
                 ),
+                (
+                    scan_in_a_wide_hall,
+                    metrics.Numbers(1e-6),
+                    "Right near walls, but not in a wide hall, where the nearest one is meters away (are distances cut off?):",
+                ),
+                (
+                    functools.partial(scan_in_a_wide_hall, count=1),
+                    metrics.Numbers(1e-6),
+                    "Right for several beams, but not for a single one:",
+                ),
             ],
             hints=(
                 "Put the end point of each beam on the map and ask how far the nearest obstacle is.",
@@ -1981,7 +2342,14 @@ CHAPTER = Chapter(
             "resample_roulette",
             reference=resample_roulette,
             draw=WHEELS,
-            properties=(_valid, _drawn_from_the_rng, _proportional, _spins_are_independent),
+            properties=(
+                _valid,
+                _drawn_from_the_rng,
+                _proportional,
+                _spins_are_independent,
+                _of_any_sum,
+                _is_right_of_many,
+            ),
             hints=(
                 "Each weight owns an interval as wide as itself. Where does a random number fall?",
                 "np.cumsum(weights) are the ends of the intervals, np.searchsorted finds the interval by bisection.",
@@ -2045,6 +2413,9 @@ CHAPTER = Chapter(
                 _equal_weights_stay,
                 _spokes_are_even,
                 _survives_rounding,
+                _of_any_sum,
+                _spokes_fill_the_wheel,
+                _turns_all_the_way,
             ),
             hints=(
                 "One random number turns the whole wheel. Its M spokes are W / M apart.",
@@ -2117,7 +2488,12 @@ CHAPTER = Chapter(
             reference=particles.effective_size,
             draw=cloud_weights,
             metric=metrics.Numbers(1e-9),
-            noisy=(cloud_with_dead_particles, metrics.Numbers(1e-9), "right, but not where some weights are 0:"),
+            noisy=(
+                (cloud_with_dead_particles, metrics.Numbers(1e-9), "right, but not where some weights are 0:"),
+                (one_heavy, metrics.Numbers(1e-9), "right, but not where one particle weighs all, which is worth 1:"),
+                (many_alike, metrics.Numbers(1e-9), "right, but not for thousands of tiny weights that are equal:"),
+                (one_particle, metrics.Numbers(1e-9), "right, but not for a single particle:"),
+            ),
             hints=(
                 "M equal weights should give M, a single heavy one should give 1, whatever the sum of the weights is.",
                 "It is the square of the sum over the sum of the squares.",
@@ -2191,6 +2567,12 @@ CHAPTER = Chapter(
                 ),
                 *(functools.partial(near_the_threshold, side=side) for side in (1, -1)),
                 at_the_threshold,
+                *(
+                    functools.partial(weights_on_their_own_side, place=place, below=below, shares=shares)
+                    for place, shares in ((0.1, True), (0.01, True), (0.001, True), (0.1, False), (0.01, False))
+                    for below in (True, False)
+                ),
+                *(functools.partial(many_weights, side=side) for side in (1, -1)),
             ),
             metric=metrics.Exactly(),
             hints=(
@@ -2226,6 +2608,17 @@ CHAPTER = Chapter(
                     "right for longer cycles, but not for n = 1, where every step is one:",
                 )
                 for step in (lambda rng, n: 1, lambda rng, n: rng.integers(2, 9))
+            )
+            + (
+                *(
+                    (
+                        functools.partial(cycle_of_rare_weights, after=after),
+                        WEIGHTS_AND_WORD,
+                        "right, but not for weights of another sum, tiny likelihoods with zeros among them, and n = 40:",
+                    )
+                    for after in (0, 20)
+                ),
+                (cycle_of_one, WEIGHTS_AND_WORD, "right, but not for a single particle:"),
             ),
             hints=(
                 "Between two resamplings a particle collects the likelihoods of all measurements. How do they combine?",
@@ -2302,6 +2695,17 @@ CHAPTER = Chapter(
             reference=circular_mean,
             draw=(headings, *(functools.partial(headings, about=about) for about in (0.0, 2.0, -2.0))),
             metric=metrics.Angles(1e-9),
+            noisy=(
+                *(
+                    (
+                        functools.partial(few_headings, count=count),
+                        metrics.Angles(1e-9),
+                        f"right, but not for {words} of tiny weight and with full turns in it:",
+                    )
+                    for count, words in ((1, "a single angle"), (3, "a few angles"))
+                ),
+                (headings_without_weight, metrics.Angles(1e-9), "right, but not where some angles weigh nothing:"),
+            ),
             hints=(
                 "The mean of 179 deg and -179 deg should be 180 deg. What could be averaged instead of angles?",
                 "Average the unit vectors (cos, sin), and take the direction of the result.",
@@ -2399,7 +2803,29 @@ CHAPTER = Chapter(
             reference=recover,
             draw=(*[averages] * 3, averages_that_rise, averages_just_below, functools.partial(averages, low=True)),
             metric=RECOVERY,
-            noisy=(small_averages, RECOVERY, "right, but not for weights of a thousandth:"),
+            noisy=(
+                *(
+                    (
+                        functools.partial(averages_of_densities, scale=scale, low=True),
+                        OF_ANY_SIZE,
+                        f"right, but not for {words}:",
+                    )
+                    for scale, words in (
+                        (1e-3, "weights of a thousandth"),
+                        (1e-100, "tiny weights"),
+                        (100.0, "weights of dozens"),
+                    )
+                ),
+                *(
+                    (
+                        functools.partial(averages_apart, share=share),
+                        RECOVERY,
+                        f"right, but not for a share of {words}:",
+                    )
+                    for share, words in ((1e-5, "some millionths"), (0.9999, "nearly 1"))
+                ),
+                (averages_that_stand, RECOVERY, "right, but not where nothing changes, w_mean = w_slow = w_fast:"),
+            ),
             hints=(
                 "When the recent weights are worse than usual, something is wrong. Two averages, one quick and one slow, tell it.",
                 "Bring both up to date first: w += alpha (w_mean - w). The share is 1 - w_fast / w_slow, never below 0.",
@@ -2488,6 +2914,19 @@ CHAPTER = Chapter(
             noisy=(
                 (nothing_seen, DEPTHS, "right where something is seen, but not where no column is:"),
                 (one_column, DEPTHS, "right for many columns, but not for a single one:"),
+                *(
+                    (functools.partial(depths_of_a_camera, **camera), DEPTHS, f"right, but not for {words}:")
+                    for camera, words in (
+                        (
+                            {"field_of_view": 2.6, "n": 640, "scale": 10.0},
+                            "a wide camera of 640 columns that sees dozens of meters",
+                        ),
+                        (
+                            {"field_of_view": 0.1, "n": 2, "scale": 0.01},
+                            "a narrow camera of 2 columns that sees centimeters",
+                        ),
+                    )
+                ),
             ),
             hints=(
                 "Where on the picture is column k? Half the picture's width belongs to tan(field_of_view / 2).",
@@ -2589,7 +3028,7 @@ CHAPTER = Chapter(
                 "index = np.concatenate([resample(w, rng) for _ in range(1000)])\n"
                 "return np.abs(np.bincount(index, minlength=4) / len(index) - w).max() < 0.05`",
             ),
-            others=(SQUARED, UNIFORM, TO_THE_MIDDLE, LAST_ALONE),
+            others=(SQUARED, UNIFORM, TO_THE_MIDDLE, LAST_ALONE, HEAVIEST_ALONE),
         ),
         _hunt(
             "hunt_2",
