@@ -752,7 +752,10 @@ def _call(node, names):
     yield 2, "with one sign turned", ast.UnaryOp(ast.USub(), node)
     yield 3, "with one part squared", ast.BinOp(node, ast.Pow(), ast.Constant(2))
     yield 3, "with the root of one part taken", _numpy("sqrt", node)
-    yield 3, "with one angle in degrees", _numpy("rad2deg", node)
+    yield from [] if name in NO_ANGLES else [(3, "with one angle in degrees", _numpy("rad2deg", node))]
+
+
+NO_ANGLES = {"norm", "hypot", "sqrt", "eigvalsh", "eigvals", "det", "median", "trace", "len"}  # what these return
 
 
 def _is_guarded(name, args):

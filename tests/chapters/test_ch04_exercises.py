@@ -493,3 +493,9 @@ def test_what_the_docstring_admits_is_drawn_in_every_check(name, answer, monkeyp
     monkeypatch.setattr(engine, "LOOKING", 0.0)  # what is told is not asked here
     with np.errstate(all="ignore"):
         assert judged(name, answer).status != CORRECT
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_smaller_limit_is_told_and_no_length_is_an_angle(seed):
+    outcome = judged("classify_extremum", lambda g, H: "not stationary" if np.linalg.norm(g) > 1e-8 else kind(H), seed)
+    assert "your limit is smaller than the stated one" in outcome.text

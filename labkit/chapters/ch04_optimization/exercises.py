@@ -922,6 +922,11 @@ CHAPTER = Chapter(
                     )
                     for k, limit in enumerate((1e-5, 1e-4, 1e-2))
                 ),
+                Mistake(
+                    _stationary(_by(np.linalg.eigvalsh), lambda g: np.linalg.norm(g) > 1e-8),
+                    "Right where |g| is above 1e-6, and where it is next to nothing. But your limit is smaller than the stated one, 1e-6.",
+                    id="classify-smaller-limit",
+                ),
                 Mistake(_first_order_only, "A vanishing gradient is necessary, not sufficient: a saddle has one too."),
                 Mistake(
                     _stationary(_by(np.diag)),
@@ -1649,7 +1654,9 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _newton_or_rim,
-                    "Between corner and Newton point the rim cuts the second leg; you run straight downhill to the rim.",
+                    "Between corner and Newton point the rim cuts the second leg; you run straight downhill to the rim. "
+                    "Your corner must not lie too far out either: it is −(gᵀg / gᵀBg) g.",
+                    id="dogleg_step-e3d2ea",
                 ),
                 Mistake(
                     _always_to_the_rim,

@@ -914,7 +914,7 @@ CHAPTER = Chapter(
                 Mistake(_circle_through(lambda n: [0, n // 2, -1]), "Three points make a circle, with all their noise in it. Let every point of the scan line count."),
                 Mistake(_circle(lambda x, z, r: (x, z, r * r)), "Your third number is the squared radius: a root is missing."),
                 Mistake(_circle(lambda x, z, r: (x, z, np.sqrt(max(2 * x * x + 2 * z * z - r * r, 0)))),
-                        "a3 entered the radius with the wrong sign: r^2 = xc^2 + zc^2 - a3."),
+                        "a3 entered the radius with the wrong sign: r^2 = xc^2 + zc^2 - a3, where a3 is xc^2 + zc^2 - r^2.", id="fit_circle-aa6121"),
                 Mistake(_circle_from_its_extent, "Half of the width that is seen is no radius: the scan line is an arc, less than half of the circle."),
                 Mistake(_circle_about_mean, "You took the mean of the points for the center. An arc lies on one side of its center."),
                 Mistake(_circle(lambda x, z, r: (z, x, r)), "The two coordinates of the center have changed places."),
