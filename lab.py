@@ -230,7 +230,7 @@ def install(python, root, extra="", held=None):
     """
     path = root / ".lab" / "setup.log"
     path.parent.mkdir(exist_ok=True)
-    print("Installing the packages, once: half a minute to two, half a gigabyte ...", flush=True)
+    print("Installing the packages, once: half a minute to two, 0.6 gigabytes ...", flush=True)
     wanted = ["-c", "constraints.txt", "-e", f".[{extra}]" if extra else "."]
     pip = [str(python), "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--retries", "2"]
     uv = [str(python), "-m", "uv", "pip", "install", "--quiet", "--compile-bytecode", "--python", str(python)]

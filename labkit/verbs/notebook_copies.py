@@ -4,6 +4,7 @@ What a folder was given is remembered in its `.labkit.json`, a digest for every 
 given takes the text of a new edition; a cell in which something was written stays, with its output.
 """
 
+import contextlib
 import hashlib
 import itertools
 import json
@@ -144,7 +145,8 @@ def write(path, text):
             partial.write_text(text, encoding="utf-8", newline="\n")
             os.replace(partial, path)
     finally:
-        partial.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # a read-only disk refuses this as well, and would name the part
+            partial.unlink(missing_ok=True)
 
 
 def _read(path):

@@ -113,6 +113,7 @@ def test_a_full_disk_is_said_with_the_file_that_found_no_room(monkeypatch, tmp_p
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))  # as a write says it: without a name
 
     monkeypatch.setattr(Path, "write_text", full)
+    monkeypatch.setattr(Path, "unlink", full)
     for write in (
         lambda: notebook_copies.write(tmp_path / "a.ipynb", ""),
         lambda: arguments.write(tmp_path, a__csv=""),
