@@ -417,6 +417,7 @@ def sandbox(capture):
         stack.enter_context(_replaced(getpass, "getpass", _forbid("getpass()")))
         for name in ("_exit", "abort", "kill", "fork", "forkpty", "execv", "system"):
             stack.enter_context(_replaced(os, name, _forbid(f"os.{name}()", getattr(os, name, None))))
+        stack.enter_context(_replaced(threading.Thread, "start", kept.noting_whose(threading.Thread.start)))
         for name in ("ask_exit", "run_cell", "system"):
             words = "exit()" if name == "ask_exit" else f"{name}()"
             stack.enter_context(_replaced(_shell(), name, _forbid(words)))

@@ -14,23 +14,43 @@ import logging
 import os
 import random
 import signal
+import site
 import socket
 import sys
+import sysconfig
 import threading
 import time
 import types
+import weakref
 from pathlib import Path
 
 import numpy as np
+
+from ..places import PACKAGE
 
 HANDLED = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGCHLD") if hasattr(signal, name)]
 HOOKS = [(sys, "excepthook"), (sys, "displayhook"), (sys, "unraisablehook"), (threading, "excepthook")]
 HOOKS += [(sys, "stdin"), (sys, "argv")]
 OF_IPYTHON = {"_"}  # which it binds anew from cell to cell
 NO_EVENTS = types.SimpleNamespace(callbacks={})  # outside of IPython
-BEGINNING = 20  # looks, 1 ms apart, at a thread that has just been started
+BEGINNING = 20  # looks, 1 ms apart, at threads that have just been started
+IDLE = 5  # looks at which nothing of the student's is seen in a library's threads
 PREPARED = ("backend", "interactive")  # what matplotlib finds out by itself the first time it is used
 LABKIT = "labkit"  # how the names of this package's own threads begin
+OF_LIBRARIES = weakref.WeakSet()  # threads that libraries have begun for themselves while student code ran
+NOTED = "_labkit_is_of_the_student"  # attribute of a thread that student code has begun
+INSTALLED = tuple(  # what the files of installed code begin with
+    {
+        f"{Path(place)}{os.sep}"
+        for place in (
+            *site.getsitepackages(),
+            site.getusersitepackages(),
+            sysconfig.get_path("stdlib"),
+            sysconfig.get_path("platstdlib"),
+            PACKAGE,
+        )
+    }
+) + ("<frozen",)
 ENCODED = getattr(os.environ, "_data", os.environ)  # as the system holds it: to read it decoded takes 40 us a call
 _kill = os.kill  # student code finds another one in its place
 
@@ -142,22 +162,62 @@ def _end_children(before):
             os.waitpid(child, 0)
 
 
+def noting_whose(start):
+    """`Thread.start` that notes what code of the student begins, in this thread or in one that was noted."""
+    checked = threading.get_ident()
+
+    def noting(thread):
+        inside = threading.get_ident() == checked or hasattr(threading.current_thread(), NOTED)
+        if inside and not is_of_a_library(sys._getframe(1).f_code):
+            setattr(thread, NOTED, True)
+        return start(thread)
+
+    return noting
+
+
 def _end_threads(before):
-    """Threads that a call has left behind end at their next line: an endless one would slow down all that follows."""
-    for thread in set(threading.enumerate()) - before:
-        if not thread.name.startswith(LABKIT):
-            _let_it_begin(thread)
-            which, what = ctypes.c_ulong(thread.ident), ctypes.py_object(SystemExit)
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(which, what)
+    """Student code that a call has left behind in a thread ends at its next line: it would slow down all that follows.
 
-
-def _let_it_begin(thread):
-    """One that ends before its first own line would stay in Python's list of threads."""
+    A thread that a library has begun for itself goes on: a pool whose threads end never answers again. It may hold more
+    student code, now or after a later call, and is looked at until it is idle.
+    """
+    left = [t for t in set(threading.enumerate()) - (before - set(OF_LIBRARIES)) if not t.name.startswith(LABKIT)]
+    OF_LIBRARIES.update(thread for thread in left if not hasattr(thread, NOTED))
+    idle = 0
     for _ in range(BEGINNING):
-        frame = sys._current_frames().get(thread.ident)
-        if frame is None or frame.f_code.co_filename != threading.__file__:
-            return
+        if not left or idle == IDLE:
+            break
+        frames = sys._current_frames()
+        running = {thread for thread in left if _runs_student_code(thread, frames.get(thread.ident))}
+        for thread in running:
+            _end(thread)
+        left = [t for t in left if t.is_alive() and not (t in running and hasattr(t, NOTED))]
+        idle = 0 if running or any(hasattr(thread, NOTED) for thread in left) else idle + 1
         time.sleep(0.001)
+    for thread in left:
+        if hasattr(thread, NOTED):
+            _end(thread)
+
+
+def _end(thread):
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(SystemExit))
+
+
+def _runs_student_code(thread, frame):
+    """Whether a thread at this frame has got as far as what student code began it with, or is running student code.
+
+    One that ends before its first own line would stay in Python's list of threads.
+    """
+    if hasattr(thread, NOTED):
+        return frame is not None and frame.f_code.co_filename != threading.__file__
+    while frame is not None and is_of_a_library(frame.f_code):
+        frame = frame.f_back
+    return frame is not None
+
+
+def is_of_a_library(code):
+    """Whether code is installed, and not the student's; what came with Python is installed, too."""
+    return code.co_filename.startswith(INSTALLED)
 
 
 STATE = [  # (how to read it, how to put it back)

@@ -28,6 +28,7 @@ from labkit.verbs import build
 
 LIMIT = 3.0  # s of processor time; on a busy machine a check may take three times as long by the clock
 TICKS = os.sysconf("SC_CLK_TCK")
+RAISED = "TRACEBACK"  # of the cell itself; what a thread of the student's prints may hold one of its own
 PATIENCE = 60.0  # s until a cell counts as hung
 RIGHT = """@ex.invert
 def invert(T):
@@ -174,6 +175,90 @@ CASES = {
     "lru_cache above": "import functools\n@ex.invert\n@functools.lru_cache\ndef invert(T):\n    return np.linalg.inv(T)",
     "time magic": "get_ipython().run_cell_magic('time', '', '@ex.invert\\ndef invert(T):\\n    return T.T\\n')",
     "in thread": "import threading\ndef f(T): return T.T\nt = threading.Thread(target=lambda: ex.invert(f)); t.start(); t.join(30); print('alive', t.is_alive())",
+    "a pool kept for later": "from concurrent.futures import ThreadPoolExecutor\npool = ThreadPoolExecutor(2)\n"
+    + answer("return pool.submit(np.linalg.inv, T).result()"),
+    "a pool left with endless work": "from concurrent.futures import ThreadPoolExecutor\npool = ThreadPoolExecutor(2)\n"
+    + answer("pool.submit(lambda: [0 for _ in iter(int, 1)])\nreturn T"),
+    "a timer that never rang": answer("import threading\nthreading.Timer(0.2, exit).start()\nreturn T"),
+    "a thread that raises": answer(
+        "import threading\nt = threading.Thread(target=lambda: 1 / 0)\nt.start()\nt.join()\nreturn T"
+    ),
+    "a lock taken twice": answer("import threading\nlock = threading.Lock()\nlock.acquire()\nlock.acquire()\nreturn T"),
+    "an alarm of one's own": answer(
+        "import signal\nsignal.signal(signal.SIGALRM, lambda *_: None)\nsignal.alarm(1)\nreturn T"
+    ),
+    "SIGALRM raises": answer(
+        "import signal\ndef ring(*_):\n    raise ValueError('mine')\nsignal.signal(signal.SIGALRM, ring)\nwhile True:\n    pass"
+    ),
+    "sum replaced in the notebook": "sum = 0\n" + answer("return sum(T)") + "\ndel sum",
+    "isinstance replaced": answer("import builtins\nbuiltins.isinstance = lambda *_: False\nreturn T"),
+    "sys.exit in finally": answer("import sys\ntry:\n    return T\nfinally:\n    sys.exit(3)"),
+    "the folder changed and gone": answer(
+        "import tempfile\nwith tempfile.TemporaryDirectory() as d:\n    os.chdir(d)\nreturn T"
+    ),
+    "recursion through two functions": answer(
+        "def a(n):\n    return b(n)\ndef b(n):\n    return a(n + 1)\nreturn a(0)"
+    ),
+    "recursion through __getattr__": answer(
+        "class A:\n    def __getattr__(self, name):\n        return getattr(self, name + 'x')\nreturn A().T"
+    ),
+    "a generator": answer("yield T"),
+    "a generator that never ends": answer("return (T for _ in iter(int, 1))"),
+    "rows from zip": answer("return zip(*T)"),
+    "a million lines printed": answer("for k in range(10**6):\n    print(k)\nreturn T"),
+    "printed to standard error": answer("import sys\nsys.stderr.write('x' * 10**6)\nreturn T"),
+    "written to the terminal itself": answer("os.write(1, b'hello')\nos.write(2, b'hello')\nreturn T"),
+    "sys.stdin read": answer("import sys\nreturn sys.stdin.read()"),
+    "sys.stdin replaced": answer("import io, sys\nsys.stdin = io.StringIO('1')\nreturn T"),
+    "await left out": answer("import asyncio\nasync def go():\n    return T\nreturn go()"),
+    "a second event loop": answer(
+        "import asyncio\nloop = asyncio.new_event_loop()\nasyncio.set_event_loop(loop)\nreturn loop.run_until_complete(asyncio.sleep(0, T))"
+    ),
+    "the kernel's loop asked": answer(
+        "import asyncio\nasyncio.get_event_loop().create_task(asyncio.sleep(0))\nreturn T"
+    ),
+    "np.seterr raise": "np.seterr(all='raise')\n" + answer("return T / 0") + "\nnp.seterr(all='warn')",
+    "np.seterr raise kept on": "np.seterr(all='raise')\n" + answer("return T"),
+    "warnings as errors kept on": "import warnings\nwarnings.simplefilter('error')\n"
+    + answer("return np.array([1, 2]) / 0"),
+    "another backend": answer(
+        "import matplotlib\nmatplotlib.use('Agg')\nimport matplotlib.pyplot as plt\nplt.ioff()\nplt.plot([1])\nreturn T"
+    ),
+    "a table as HTML": answer(
+        "class Table:\n    def _repr_html_(self):\n        return '<table>' * 10**5\n    def __array__(self, *a, **k):\n        return T\nreturn Table()"
+    ),
+    "_repr_html_ raises": answer(
+        "class Table:\n    def _repr_html_(self):\n        raise KeyError('x')\nreturn Table()"
+    ),
+    "ex deleted": "del ex\ntry:\n    ex.distance(1.0)\nexcept NameError as e:\n    print(e)\nfrom labkit.exercises import course\nex = course('01-frames')",
+    "ex is a number": "ex = 3\nprint(ex)\nfrom labkit.exercises import course\nex = course('01-frames')",
+    "an exercise replaced": "try:\n    ex.invert = 3\nexcept Exception as e:\n    print(e)\nfrom labkit.exercises import course\nex = course('01-frames')\nprint('.')",
+    "a comma's locale": answer(
+        "import locale\nfor name in ('de_DE.UTF-8', 'C'):\n    try:\n        locale.setlocale(locale.LC_ALL, name)\n    except locale.Error:\n        pass\nreturn T"
+    ),
+    "decimal traps": answer("import decimal\ndecimal.getcontext().traps[decimal.Inexact] = True\nreturn T"),
+    "a seed each time": answer(
+        "np.random.seed(1)\nimport random\nrandom.seed(1)\nreturn np.random.normal(size=(4, 4))"
+    ),
+    "gc switched off and frozen": answer("import gc\ngc.disable()\ngc.freeze()\nreturn T"),
+    "atexit": answer("import atexit\natexit.register(lambda: 1 / 0)\nreturn T"),
+    "a process of multiprocessing": answer(
+        "import multiprocessing\np = multiprocessing.Process(target=print)\np.start()\np.join()\nreturn T"
+    ),
+    "a spawned pool": answer(
+        "import multiprocessing\nwith multiprocessing.get_context('spawn').Pool(1) as pool:\n    return pool.map(abs, [1])"
+    ),
+    "an object that equals all": answer(
+        "class A:\n    def __eq__(self, other):\n        return True\n    def __array__(self, *a, **k):\n        return np.zeros((4, 4))\nreturn A()"
+    ),
+    "__del__ prints and raises": answer(
+        "class A:\n    def __del__(self):\n        print('gone')\n        raise ValueError('late')\nA()\nreturn T"
+    ),
+    "an exception group": answer("raise ExceptionGroup('two', [ValueError(1), TypeError(2)])"),
+    "a traceback replaced": answer("import traceback\ntraceback.format_exc = None\nraise ValueError('x')"),
+    "sys.modules emptied of labkit": answer(
+        "import sys\nfor name in list(sys.modules):\n    if name.startswith('labkit.exercises'):\n        del sys.modules[name]\nreturn T"
+    ),
     "value huge": "ex.distance(10**5000)",
     "value evil": "class E:\n    def __float__(self): raise RuntimeError('evil')\nex.distance(E())",
     "value generator": "ex.distance(v for v in iter(int, 1))",
@@ -208,11 +293,7 @@ def tried(name, cell, scratch):
         manager.shutdown_kernel(now=True)
     works = "✓ invert" in after and "distance" in after and "sum 3 " in after
     good = (
-        not hung
-        and busy < LIMIT * max(cell.count("@ex."), 1)
-        and said != ""
-        and "Traceback" not in said + after
-        and works
+        not hung and busy < LIMIT * max(cell.count("@ex."), 1) and said != "" and RAISED not in said + after and works
     )
     return (
         name,
@@ -246,7 +327,7 @@ def run(client, code):
         data = content.get("data", {})
         said.append(content.get("text") or data.get("text/plain", ""))
         if message["msg_type"] == "error":
-            said.append("Traceback " + content["ename"] + ": " + content["evalue"])
+            said.append(f"{RAISED} " + content["ename"] + ": " + content["evalue"])
 
     try:
         client.execute_interactive(code, output_hook=hear, timeout=PATIENCE, allow_stdin=False)

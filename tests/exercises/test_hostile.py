@@ -15,6 +15,7 @@ import sys
 import threading
 import time
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -161,6 +162,39 @@ def test_a_thread_that_is_left_behind_ends():
     for thread in started:
         thread.join(30)
     assert not any(thread.is_alive() for thread in started)
+
+
+def test_a_thread_that_a_library_keeps_for_later_goes_on_and_what_it_was_left_with_ends():
+    """A pool whose threads have ended never answers again: at the second draw the right answer would seem endless."""
+
+    def endless():
+        while True:
+            pass
+
+    with ThreadPoolExecutor(1) as pool, ThreadPoolExecutor(1) as left:
+        burning = []
+
+        def double(v):
+            burning.append(left.submit(endless))
+            return pool.submit(np.multiply, 2, v).result()
+
+        assert DOUBLE.judge(double).status == CORRECT and pool.submit(abs, -1).result(30) == 1
+        assert all(isinstance(task.exception(30), SystemExit) for task in burning)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_timer_of_the_student_never_rings():
+    rung, timers = [], []
+
+    def double(v):
+        timers.append(threading.Timer(0.05, rung.append, [1]))
+        timers[-1].start()
+        return 2 * v
+
+    assert DOUBLE.judge(double).status == CORRECT
+    for timer in timers:
+        timer.join(30)
+    assert rung == [] and len(timers) > 2
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="only Linux tells which programs have been started")
