@@ -4,6 +4,8 @@ The kept words need four names of matplotlib's that are not public. A release wi
 picture takes longer, and looks the same. All else stands on public functions.
 """
 
+import weakref
+
 import numpy as np
 from matplotlib.backend_bases import GraphicsContextBase
 from matplotlib.backends import backend_agg
@@ -118,7 +120,8 @@ class _KeptWords(RendererAgg):
                 self._words.clear()
             letters = self._letters.get(key[1])
             if letters is None:
-                letters = self._letters[key[1]] = _Letters(lambda: self._prepare_font(prop))
+                prepare = weakref.WeakMethod(self._prepare_font)  # a ring of references would keep the pixels: `forget`
+                letters = self._letters[key[1]] = _Letters(lambda: prepare()(prop))
             bitmap, left, width, top, descent = letters.compose(s) or letters.set(s)
             self._words[key] = bitmap, left / 64, descent / 64, width / 64, (top + descent) / 64, descent / 64
         return self._words[key]

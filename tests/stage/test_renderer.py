@@ -1,5 +1,7 @@
 """Words, kept or drawn by matplotlib, and the colors of the dark theme, with and without matplotlib's private names."""
 
+import gc
+import weakref
 from types import SimpleNamespace
 
 import numpy as np
@@ -52,6 +54,24 @@ def test_dark_is_the_light_picture_with_every_color_exchanged(canvas_class):
             assert exchanged.mean() > 0.95
             compared += here.sum()
     assert compared > 0.5 * light.shape[0] * light.shape[1]
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_pixels_go_as_soon_as_they_are_forgotten(dark):
+    """Without the collector: in a demo, what it is told to leave alone would hold them to the end."""
+    fig = Figure((2, 1), dpi=100)
+    canvas = renderer.Canvas(fig)
+    canvas.dark = dark
+    fig.text(0.1, 0.5, "words")
+    canvas.draw()
+    made = weakref.ref(canvas.renderer)
+    gc.collect()
+    gc.disable()
+    try:
+        canvas.forget()
+        assert made() is None
+    finally:
+        gc.enable()
 
 
 def test_this_release_can_keep_words():
