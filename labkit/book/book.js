@@ -1,6 +1,7 @@
 // What the pages of the book do beyond being read: films, predictions, the ledger's search, light and dark, print.
 
 const EARLY = "600px"; // films this far below the window are loaded
+const PHONE = window.matchMedia("(max-width: 30rem)"); // it has films of its own, with letters that it shows large enough
 const UNABLE = "This browser has no WebGL 2, which would draw and turn the figure.";
 
 /** The drawing in space, loaded by the first figure that needs it: pages opened from a folder may load no modules. */
@@ -29,6 +30,7 @@ function watch(figure) {
     if (!entries.some((entry) => entry.isIntersecting)) return;
     watcher.disconnect();
     load(figure);
+    PHONE.addEventListener("change", () => load(figure));
   }, { rootMargin: EARLY });
   watcher.observe(figure);
 }
@@ -37,22 +39,31 @@ function watch(figure) {
 const arrived = new Map();
 window.labkitFilm = (key, film) => { arrived.set(key, film); };
 
+const filmOf = (figure) => figure.dataset.film + (PHONE.matches ? "-narrow" : "");
+
 function load(figure) {
-  const key = figure.dataset.film;
+  const key = filmOf(figure);
+  if (arrived.has(key)) return void project(figure, key);
   const script = element("script", "", { src: `films/${key}.js` });
-  script.addEventListener("load", () => project(figure, arrived.get(key)));
+  script.addEventListener("load", () => project(figure, key));
   document.head.append(script);
 }
 
-async function project(figure, film) {
+const takeDown = new WeakMap(); // figure -> takes away what it shows
+
+async function project(figure, key) {
+  const film = arrived.get(key);
   const inSpace = film.declaration.spaces.length > 0;
   if (inSpace && !(await drawsSpace())) {
     figure.querySelector("figcaption small").textContent = UNABLE;
     return;
   }
+  if (key !== filmOf(figure)) return; // the phone was turned meanwhile
+  takeDown.get(figure)?.();
   const place = element("div");
   figure.prepend(place);
-  render({ model: new Projector(film), el: place });
+  const close = render({ model: new Projector(film), el: place });
+  takeDown.set(figure, () => { close(); place.remove(); });
   const shown = new MutationObserver(() => { // the first picture is on the screen
     if (!place.querySelector(inSpace ? ".labkit-stage[data-picture] canvas[data-space=true]" : ".labkit-stage[data-picture]")) return;
     shown.disconnect();

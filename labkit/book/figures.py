@@ -8,6 +8,7 @@ from importlib import import_module
 from ..stage import film
 
 FOLDER = "films"
+NARROW = "-narrow"  # of the film for a phone; book.js chooses
 
 
 @dataclass(frozen=True)
@@ -28,14 +29,15 @@ class Figure:
 
 
 def record(stem, function, folder):
-    """Record the Stage that `stages.function()` of a chapter gives, write its film and its picture; a `Figure`."""
+    """Record the Stage that `stages.function()` of a chapter gives, write its two films and its picture; a `Figure`."""
     stage = getattr(import_module(f"labkit.chapters.ch{stem}.stages"), function)()
     key, caption, declared = f"{stem}-{function}", stage.caption, stage.declaration()
     still = stage.small_png()
     data = film.record(stage).as_data()
-    (folder / FOLDER / f"{key}.js").write_text(
-        f"labkitFilm({json.dumps(key)},{json.dumps(data, separators=(',', ':'))});\n", encoding="utf-8"
-    )
+    for name, recorded in ((key, data), (f"{key}{NARROW}", film.record(stage, narrow=True).as_data())):
+        (folder / FOLDER / f"{name}.js").write_text(
+            f"labkitFilm({json.dumps(name)},{json.dumps(recorded, separators=(',', ':'))});\n", encoding="utf-8"
+        )
     (folder / FOLDER / f"{key}.png").write_bytes(still)
     return Figure(key, stage.name, caption, recorded_words(data, declared), tuple(data["size"]), len(still))
 

@@ -137,7 +137,8 @@ export class Projector {
     const colors = this.palettes[dark];
     const pixels = new Uint32Array(width * height);
     for (let k = 0, from = at * pixels.length; k < pixels.length; k++) pixels[k] = colors[pictures[from + k]];
-    const scale = Math.min(this.look.width / width, this.look.height / height);
+    const high = this.film.narrow ? Infinity : this.look.height; // a phone scrolls: smaller, its letters are not read
+    const scale = Math.min(this.look.width / width, high / height);
     const note = track.notes[at];
     const handles = Object.entries(note.handles).map(([name, place]) => [name, { ...place, color: place.color[dark] }]);
     const [space, numbers] = note.things ? this.spaceOf(note.things, things) : [null, []];

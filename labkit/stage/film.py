@@ -2,6 +2,7 @@
 
 For pages without Python. A film is made by playing the page: messages go to `Stage.receive`, and what it would show is
 kept, picture and words.
+A phone gets a film of its own, laid out for its width: the letters of a wide one would be half as large there.
 All pictures of a film share one list of at most 256 colors, each with its twin on dark paper, so that one recording
 serves both themes. A picture is then one byte a pixel; each is stored as what differs from the one before (XOR), and
 all together deflated: 3 to 10 kB a picture. `stage.js` shows a film as it shows a living Stage; `film.js` answers it.
@@ -20,6 +21,9 @@ from . import scene3d, style
 from .stage import FAIL
 
 ROOM, RATIO = 600, 1.25  # CSS pixels of the recorded picture's width; pixels a CSS pixel
+TALL = 4  # times as high a picture may become,
+PHONE, PHONE_TALL = 340, 1.3  # on a phone so wide: caption and controls are seen with it
+SPARSER = 2  # times fewer pictures has a film for a phone
 AROUND, ALONG, TURNS = 36, 24, 36  # pictures around a loop, along a control, around a view
 PLAYED, FAILED = 48, 32  # pictures of a play, and of a play that goes wrong
 QUICKEST, SLOWEST = 60, 160  # ms from picture to picture
@@ -50,6 +54,8 @@ class Film:
         What the notes of a Stage with scenes in space refer to; none otherwise.
     places : list
         Where its scenes are in the picture.
+    narrow : bool
+        Whether it was laid out for a phone.
     """
 
     declaration: dict
@@ -58,6 +64,7 @@ class Film:
     tracks: dict
     space: object = None
     places: tuple = ()
+    narrow: bool = False
 
     def as_data(self):
         """The film for `film.js`, as data for JSON."""
@@ -67,6 +74,7 @@ class Film:
             for name, track in self.tracks.items()
         }
         data = {"declaration": self.declaration, "size": self.size, "palettes": palettes, "tracks": tracks}
+        data["narrow"] = self.narrow
         return data if self.space is None else {**data, "space": self.space.as_data(), "places": self.places}
 
 
@@ -122,16 +130,17 @@ def deflated(pictures):
     return zlib.compress(change.tobytes(), LEVEL)
 
 
-def record(stage):
-    """The film of a Stage, which is at its start again afterwards."""
-    return _Camera(stage).film()
+def record(stage, narrow=False):
+    """The film of a Stage, which is at its start again afterwards; `narrow`: the one for a phone."""
+    return _Camera(stage, narrow).film()
 
 
 class _Camera:
     """Plays the page of one Stage, and keeps what it would show."""
 
-    def __init__(self, stage):
+    def __init__(self, stage, narrow):
         self.stage, self.heard, self.serial = stage, None, 0
+        self.narrow, self.sparser = narrow, SPARSER if narrow else 1
         self.declared = stage.declaration()
         self.negatives, self.shots, self.entries = _Negatives(), {}, {}
         self.numbers, self.things = Numbers(), [[-1] * len(space["items"]) for space in self.declared["spaces"]]
@@ -139,7 +148,8 @@ class _Camera:
         self.look(space=bool(self.things))
 
     def look(self, **more):
-        self.tell(look={"width": ROOM, "height": 4 * ROOM, "ratio": RATIO, "dark": False, **more})
+        width, tall = (PHONE, PHONE_TALL) if self.narrow else (ROOM, TALL)
+        self.tell(look={"width": width, "height": tall * width, "ratio": RATIO, "dark": False, **more})
 
     def hear(self, message, buffers):
         """What the Stage sends: the message, and what it changes in space."""
@@ -198,9 +208,8 @@ class _Camera:
         declaration = self._declaration(shown, tracks)
         for name in shown["handles"]:
             self._draw_path(name, declaration, tracks)
-        return Film(
-            declaration, (width, height), palettes, tracks, self.numbers if self.things else None, tuple(places)
-        )
+        numbers = self.numbers if self.things else None
+        return Film(declaration, (width, height), palettes, tracks, numbers, tuple(places), self.narrow)
 
     def _draw_path(self, name, declaration, tracks):
         """Where a handle was led in space, as one more thing of its scene."""
@@ -219,7 +228,7 @@ class _Camera:
         notes, places = self.shots[name][0], np.arange(len(pictures))
         reel = deflated(pictures)
         words = name == "control" and self.declared["controls"][shown["controls"][0]]["kind"] != "slider"
-        while len(reel) > LARGEST and len(places) > FEWEST and not words:
+        while len(reel) > LARGEST / self.sparser and len(places) > FEWEST and not words:
             places = np.unique(np.append(places[::2], places[-1]))
             reel = deflated(pictures[places])
         notes = [self._note(notes[k], shown) for k in places]
@@ -271,14 +280,15 @@ class _Camera:
         goes = np.array([self._goes(name, start, step) for step in np.diag(np.where(middle < start, -reach, reach))])
         if not goes.any():
             return None
+        count = AROUND // self.sparser
         if goes.all():
             inward = (middle - start) / np.array([axes.width, axes.height])
             away = np.arctan2(-inward[1], -inward[0]) if np.hypot(*inward) > 0.05 else np.pi
-            angles = away + np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
+            angles = away + np.linspace(0, 2 * np.pi, count, endpoint=False)
             ring = np.column_stack([np.cos(angles), np.sin(angles)])
             return start + reach * (ring - ring[0])
         half = np.array([axes.width, axes.height]) / 2 * goes
-        share = np.linspace(-0.97, 0.97, AROUND)[:, None]
+        share = np.linspace(-0.97, 0.97, count)[:, None]
         return np.where(goes, middle + share * half, start)
 
     def _goes(self, name, start, step):
@@ -291,7 +301,8 @@ class _Camera:
         """Through all positions of the first control, at most ALONG of them; its name in a list."""
         for name, declared in self.declared["controls"].items():
             last = declared.get("positions", len(declared.get("words", ["off", "on"])) - 1)
-            at = np.unique(np.linspace(0, last, min(last + 1, ALONG)).round().astype(int))
+            most = ALONG // self.sparser if declared["kind"] == "slider" else ALONG
+            at = np.unique(np.linspace(0, last, min(last + 1, most)).round().astype(int))
             start = self.heard["controls"][name]["at"]
             at = np.unique([*at, start])
             for position in at.tolist():
@@ -318,7 +329,7 @@ class _Camera:
         steps = self.declared["play"]["steps"]
         for button, name, count in (("Reset", "play", PLAYED), (FAIL, FAIL, FAILED)):
             begun = self.tell(button=button)["time"]["at"]
-            at = np.unique(np.linspace(0, steps, count + 1).round().astype(int))
+            at = np.unique(np.linspace(0, steps, count // self.sparser + 1).round().astype(int))
             self.entries[name] = int(np.abs(at - begun).argmin())
             for step in at.tolist():
                 self.tell(time={"at": step, "epoch": self.heard["time"]["epoch"]})

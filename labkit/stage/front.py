@@ -3,6 +3,7 @@
 import base64
 import html
 import importlib
+import uuid
 from pathlib import Path
 
 import anywidget
@@ -25,6 +26,7 @@ class Front(anywidget.AnyWidget):
     _css = Path(__file__).with_name("stage.css")
     declaration = traitlets.Dict().tag(sync=True)
     drawing = traitlets.Bytes().tag(sync=True)
+    own = traitlets.Unicode().tag(sync=True)  # number of the model, by which the page finds it
     is_sent = False  # whether one has brought it
 
 
@@ -32,7 +34,9 @@ def widget(stage):
     """The widget of a Stage, connected to it."""
     brings = stage.spaces and not Front.is_sent
     Front.is_sent = Front.is_sent or bool(brings)
-    made = Front(declaration=stage.declaration(), drawing=SPACE.read_bytes() if brings else b"")
+    own = uuid.uuid4().hex
+    drawing = SPACE.read_bytes() if brings else b""
+    made = Front(declaration=stage.declaration(), drawing=drawing, own=own, model_id=own)
     stage.connect(made.send)
     made.on_msg(lambda _, message, buffers: stage.receive(message))
     return made

@@ -48,11 +48,24 @@ function render({ model, el }) {
 
 /** The model is there, its view is not: time to get the drawing in space ready. */
 function initialize({ model }) {
+  hearNevertheless(model);
   const source = model.get("drawing");
   if (source?.byteLength) getReady(source);
 }
 
 export default { initialize, render };
+
+/** A model that a busy page did not begin within two seconds is given up by anywidget: it has its view, and no message
+ *  reaches it any more. From now on they go straight to what every widget does with them. */
+async function hearNevertheless({ get, widget_manager: manager }) {
+  const own = manager && get("own");
+  if (!own) return;
+  const found = await manager.get_model(own);
+  let kind = Object.getPrototypeOf(found);
+  while (kind && !Object.hasOwn(kind, "_handle_comm_msg")) kind = Object.getPrototypeOf(kind); // anywidget's, which waits
+  const plain = kind && Object.getPrototypeOf(kind)._handle_comm_msg;
+  if (plain) found.comm?.on_msg((message) => plain.call(found, message));
+}
 
 /** What all Stages of the page share of the drawing in space: {module, coming}, and how the page gets it. */
 const spaceOfThePage = () => (globalThis[Symbol.for("labkit.space")] ??= {});
@@ -305,8 +318,8 @@ class Scenes {
 
   open() {
     if (!this.page.module.works()) return this.figure.room.begin();
-    const { room, buttons } = this.figure;
-    const hooks = { onMove: () => this.figure.turned(), onAble: () => room.look(true), seat: (tools) => buttons.insertBefore(tools, room.button), width: this.width };
+    const { room } = this.figure;
+    const hooks = { onMove: () => this.figure.turned(), onAble: () => room.look(true), seat: (tools) => room.end.prepend(tools), width: this.width };
     this.view = new this.page.module.View(this.figure.picture, this.figure.screen.canvas, this.spaces, this.home, hooks);
     this.view.show(false);
     this.figure.room.look(true);
@@ -826,7 +839,7 @@ class Hint {
     this.node = element("div", "hint", { "aria-hidden": "true" }, [words]); // heard from the canvas
     this.node.hidden = true;
     if (aside) aside.append(this.node);
-    else row.insertBefore(this.node, row.querySelector(".enlarge"));
+    else row.insertBefore(this.node, row.querySelector(".end"));
     canvas.addEventListener("focus", () => { if (canvas.matches(":focus-visible")) this.show(); });
     canvas.addEventListener("blur", () => this.hide());
   }
@@ -848,7 +861,7 @@ class Hint {
     node.hidden = true;
     if (!node.classList.contains("under")) return;
     node.classList.remove("under");
-    row.insertBefore(node, row.querySelector(".looks") ?? row.querySelector(".enlarge"));
+    row.insertBefore(node, row.querySelector(".end"));
   }
 
   close() {
@@ -1016,7 +1029,8 @@ class Room {
     Object.assign(this, { root, picture, size, line, last: "", enlarged: false });
     this.button = element("button", "enlarge", { type: "button", "aria-pressed": "false" }, ["Enlarge"]);
     this.button.addEventListener("click", () => this.enlarge(!this.enlarged));
-    buttons.append(this.button);
+    this.end = element("div", "end", {}, [this.button]); // one line's end, also where it takes a line of its own
+    buttons.append(this.end);
     root.addEventListener("keydown", (event) => {
       if (event.key !== "Escape" || !this.enlarged) return;
       taken(event);

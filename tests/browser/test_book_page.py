@@ -78,6 +78,20 @@ def test_an_answer_opens_the_figure(page):
     assert question.locator("summary").inner_text() == "That is what happens"
 
 
+def test_letters_are_as_large_as_they_were_laid_out_for_a_phone_and_a_wide_window_has_the_wide_film(page):
+    seen = "node => [node.clientWidth, node.width]"
+    found = figure(page, "circles")
+    shown, recorded = found.locator("canvas:not(.space)").evaluate(seen)
+    assert shown / (recorded / film.RATIO) > 0.9 and recorded <= film.PHONE * film.RATIO
+    page.set_viewport_size({"width": 740, "height": 360})
+    assert driver.soon(page, lambda: figure(page, "circles").locator("canvas:not(.space)").evaluate(seen)[1] > recorded)
+    assert found.locator(".labkit-stage").count() == 1 and found.locator("polyline").count() == 1
+    page.set_viewport_size({"width": 360, "height": 740})
+    assert driver.soon(
+        page, lambda: figure(page, "circles").locator("canvas:not(.space)").evaluate(seen)[1] == recorded
+    )
+
+
 def test_a_handle_follows_the_finger_along_its_line_and_the_arrow_keys(page):
     found = figure(page, "circles")
     start, handle = shown(found), found.locator(".handle")

@@ -462,3 +462,22 @@ def test_without_python_the_view_still_turns_and_a_pulled_handle_goes_back():
         page.keyboard.press("ArrowRight")
         assert apart(at_rest(page, 0)[1][2], before[2]) > 0.5
         assert stage.locator(".gone").inner_text() != ""
+
+
+GIVEN_UP = """async () => {
+    const heard = [];
+    class Plain { _handle_comm_msg(message) { heard.push(message); } }
+    class Waiting extends Plain { async _handle_comm_msg() { throw new Error("given up"); } }
+    const found = Object.assign(new Waiting(), { comm: { on_msg(hear) { this.hear = hear; } } });
+    const manager = { get_model: async (own) => ({ seven: found })[own] };
+    initialize({ model: { get: (name) => ({ own: "seven" })[name], widget_manager: manager } });
+    await new Promise((go) => setTimeout(go));
+    found.comm.hear("a picture");
+    return heard;
+}"""
+
+
+def test_a_model_that_was_given_up_while_the_page_was_busy_hears_nevertheless():
+    with stage_page(False, 700, 400, 1) as (page, _):
+        assert page.evaluate(GIVEN_UP) == ["a picture"]
+        assert page.complaints == []

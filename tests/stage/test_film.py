@@ -136,6 +136,14 @@ def test_a_handle_that_goes_one_way_is_led_to_and_fro_and_one_that_stays_is_left
     assert [note["controls"]["width"]["text"] for note in made.tracks["control"].notes] == ["thin", "wide"]
 
 
+def test_a_phone_has_a_film_laid_out_for_it_with_fewer_pictures(recorded):
+    made = film.record(stage(), narrow=True)
+    assert made.narrow and not recorded.narrow
+    assert made.size[0] <= film.PHONE * film.RATIO and set(made.tracks) == set(recorded.tracks)
+    assert len(made.tracks["handle"].notes) == len(recorded.tracks["handle"].notes) / film.SPARSER
+    assert made.declaration["controls"].keys() == recorded.declaration["controls"].keys()
+
+
 def test_the_stage_is_at_its_start_again(used, recorded):
     assert {key: np.array(value).tolist() for key, value in used.state.items()} == {
         key: np.array(value).tolist() for key, value in used.initial.items()
