@@ -1,8 +1,9 @@
 """The Stages while they live: made when first shown or a step ahead, moved in one thread, small while nobody looks.
 
 All that Stages compute and draw happens in one worker thread, so that votes are answered meanwhile; what they send
-comes back to the thread of the server. A Stage keeps its state until the demo ends. Its pixels, some 25 MB in a large
-window, are let go when neither it nor a neighbor is shown.
+comes back to the thread of the server. They are made in a thread of their own: no key pressed meanwhile waits for
+what is likely next, which takes seconds on a slow machine. A Stage keeps its state until the demo ends. Its pixels,
+some 25 MB in a large window, are let go when neither it nor a neighbor is shown.
 """
 
 import asyncio
@@ -46,13 +47,14 @@ class House:
         self.stages, self.faults = {}, {}
         self.collect = lambda to_stay=False: None
         self.worker = ThreadPoolExecutor(1, thread_name_prefix="stages")
+        self.maker = ThreadPoolExecutor(1, thread_name_prefix="maker")
         self.loop = asyncio.get_running_loop()
         self._waiting, self._timer = [], None
 
     async def get(self, key):
         """(Stage, "") or (None, why it could not be made)."""
         if key not in self.stages and key not in self.faults:
-            await self._run(self._make, key)
+            await asyncio.wrap_future(self._submit(self._make, key, to=self.maker))
         return self.stages.get(key), self.faults.get(key, "")
 
     def receive(self, key, message, done):
@@ -83,7 +85,8 @@ class House:
         """No more work; what is under way ends."""
         if self._timer:
             self._timer.cancel()
-        self.worker.shutdown(wait=False, cancel_futures=True)
+        for thread in (self.maker, self.worker):
+            thread.shutdown(wait=False, cancel_futures=True)
 
     def _later(self):
         if self._timer:
@@ -93,11 +96,11 @@ class House:
     def _ahead(self):
         self._timer = None
         key = self._waiting.pop(0)
-        self._submit(self._make_ahead, key)
+        self._submit(self._make_ahead, key, to=self.maker)
         self._later()
 
-    def _submit(self, work, *words):
-        """Hand work to the worker; whatever it raises becomes one sentence."""
+    def _submit(self, work, *words, to=None):
+        """Hand work to the worker, or `to` the maker; whatever it raises becomes one sentence."""
 
         def safely():
             try:
@@ -105,16 +108,13 @@ class House:
             except Exception as error:  # a Stage may raise anything; the others go on
                 self._in_loop(self.complain, f"{type(error).__name__}: {error}")
 
-        return self.worker.submit(safely)
-
-    async def _run(self, work, *words):
-        await asyncio.wrap_future(self._submit(work, *words))
+        return (to or self.worker).submit(safely)
 
     def _in_loop(self, call, *words):
         if not self.loop.is_closed():
             self.loop.call_soon_threadsafe(call, *words)
 
-    # -- in the worker's thread
+    # -- in the maker's thread
 
     def _make_ahead(self, key):
         self._make(key)
@@ -133,19 +133,21 @@ class House:
         self.stages[key] = stage
         self.collect(to_stay=True)
 
+    # -- in the worker's thread
+
     def _receive(self, key, message):
         if key in self.stages:
             self.stages[key].receive(message)
 
     def _forget(self, kept):
-        others = [stage for key, stage in self.stages.items() if key not in kept]
+        others = [stage for key, stage in list(self.stages.items()) if key not in kept]
         for stage in others:
             stage.forget_pixels()
         if others:
             self.collect()
 
     def _reset(self):
-        for stage in self.stages.values():
+        for stage in list(self.stages.values()):
             stage.reset()
 
 

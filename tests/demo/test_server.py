@@ -3,6 +3,7 @@
 import asyncio
 import json
 import socket
+import threading
 import urllib.parse
 from types import SimpleNamespace
 
@@ -66,11 +67,11 @@ def cards():
     ]
 
 
-def in_demo(work, vote=False, seconds=SECONDS):
-    """Run `work(demo)` beside a demo on the first free ports."""
+def in_demo(work, vote=False, seconds=SECONDS, shown=None):
+    """Run `work(demo)` beside a demo of `shown` cards, or of `cards()`, on the first free ports."""
 
     async def run():
-        demo = Demo(Program(cards(), {"01": "One"}))
+        demo = Demo(Program(shown or cards(), {"01": "One"}))
         if vote:
             demo.let_vote("127.0.0.1")
         try:
@@ -145,6 +146,28 @@ def picture(frame):
     count = int.from_bytes(frame[:4], "little")
     length = int.from_bytes(frame[4:8], "little")
     return json.loads(frame[4 + 4 * count : 4 + 4 * count + length])
+
+
+def test_a_key_does_not_wait_for_the_stage_that_is_made_ahead():
+    begun, go = threading.Event(), threading.Event()
+
+    def slow():
+        begun.set()
+        go.wait(SECONDS)
+        return good()
+
+    async def work(demo):
+        async with Window(demo) as window:
+            await window.open("01/good")
+            assert await asyncio.to_thread(begun.wait, SECONDS)
+            assert (await window.ask("01/good", look=LOOK))["picture"]
+            go.set()
+            assert (await window.open("01/slow"))["declaration"]
+
+    try:
+        in_demo(work, shown=[*cards()[:1], Card("01/slow", "01", "Second", "01/slow", slow)])
+    finally:
+        go.set()
 
 
 def test_a_link_on_a_slide_takes_the_token_along():
