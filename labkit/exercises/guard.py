@@ -39,6 +39,7 @@ PROTECTED = ("numpy", "numpy.linalg", "numpy.random", "math", "random", "builtin
 PROTECTED += ("copy", "json", "html", "itertools", "functools", "types", "contextlib", "traceback")
 CHANGING = {
     "builtins": {"_", "input", "breakpoint"},  # what IPython itself sets anew from cell to cell
+    "time": {"tzname", "timezone", "altzone", "daylight"},  # what `tzset` makes of the environment, which is put back
     "labkit.exercises.engine": {"LOOKING"},  # which `collect` and tests set otherwise
 }
 DEPTH = 10_000  # calls within calls, at most: what student code may raise the limit to

@@ -282,6 +282,20 @@ def test_what_is_replaced_is_put_back_and_named(owner, name, shown, capsys):
     assert f"Replaced in the library, and put back: {shown}" in said
 
 
+@pytest.mark.skipif(not hasattr(time, "tzset"), reason="time zones are set on POSIX")
+def test_a_time_zone_that_was_set_is_put_back_and_is_no_replaced_library():
+    def double(v):
+        os.environ["TZ"] = "Asia/Tokyo"
+        time.tzset()
+        return 2 * v
+
+    before = time.localtime(0)
+    guard.PRISTINE.look()
+    guard.PRISTINE.drain()
+    assert DOUBLE.judge(double).status == CORRECT
+    assert time.localtime(0) == before and not [n for n in guard.PRISTINE.drain() if n.startswith("time.")]
+
+
 def test_a_module_thrown_out_comes_back(capsys):
     ex = session.course("01-frames")
 
