@@ -717,6 +717,11 @@ class Space {
     canvas.addEventListener("pointerup", (event) => this.up(event));
     canvas.addEventListener("pointercancel", () => { this.press = null; });
     canvas.addEventListener("keydown", (event) => this.key(event));
+    canvas.addEventListener("keydown", (event) => { // before a scene in space, whose view moves by Shift
+      if (!this.cursor || !arrowOf(event)) return;
+      this.key(event);
+      event.stopImmediatePropagation();
+    }, { capture: true });
     canvas.addEventListener("blur", () => this.leave());
   }
 

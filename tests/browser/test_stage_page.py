@@ -464,6 +464,19 @@ def test_without_python_the_view_still_turns_and_a_pulled_handle_goes_back():
         assert stage.locator(".gone").inner_text() != ""
 
 
+def test_a_bar_beside_a_scene_in_space_is_picked_by_key():
+    with stage_page(False, 700, 640, 1) as (page, bridge):
+        stage = hand_eye.thirty_one_poses()
+        bridge.show(page, stage)
+        before, view = stage.caption, stage.state["view"]
+        page.locator("canvas:not(.space)").focus()
+        for key in ("Enter", *["Shift+ArrowRight"] * 6, "Space"):
+            page.keyboard.press(key)
+        page.evaluate(driver.RESTS)
+        assert page.locator(".cursor").evaluate("node => node.style.left") == "80%"
+        assert stage.caption != before and stage.state["view"] == view  # Shift moves the cursor, not the view
+
+
 GIVEN_UP = """async () => {
     const heard = [];
     class Plain { _handle_comm_msg(message) { heard.push(message); } }
