@@ -278,7 +278,7 @@ def e_trans(residuals):
 @ex.reject_outliers
 def reject_outliers(values, factor=4.0):
     """Return a bool array, shape (n,): True where values lie within factor robust
-    standard deviations of the median."""
+    standard deviations of the median. Where these are 0, all may stay as well."""
     ### BEGIN SOLUTION
     distance = np.abs(values - np.median(values))
     return distance <= factor * 1.4826 * np.median(distance)

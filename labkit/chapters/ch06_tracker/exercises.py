@@ -448,7 +448,7 @@ class KeptOrNot(metrics.Exactly):
 
 
 class KeptOrAll(KeptOrNot):
-    """As the rule says, or all of them: where there is no scale to judge by, whoever keeps all is as right."""
+    """As the rule says, or all of them, as the docstring allows where there is no scale to judge by."""
 
     def deviations(self, result, expected):
         return super().deviations(expected if result.all() else result, expected)
