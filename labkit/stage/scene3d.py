@@ -31,6 +31,7 @@ LIGHT = np.array([-0.42, 0.66, 0.62])  # right, up, toward the eye
 ZOOM = (0.2, 12.0)
 PIXELS_PER_POINT = 100 / 72
 ROUND_PIECES = 24  # of an ellipsoid's half meridian: it may fill the picture, and its outline shows each of them
+FARTHEST = 1e18  # of poses and sizes: a page squares them in float32, which ends at 3e38
 DASHES = {"-": 0, "none": 0, "None": 0, "": 0, "--": 1, ":": 2, "-.": 1}  # full, dashed, dotted
 
 
@@ -230,7 +231,8 @@ class Scene:
         rows, numbers = [], []
         for k, item in enumerate(self.items):
             shown = bool(item.shown and item.value is not None)
-            values = np.asarray(item.numbers() if shown else [], dtype="<f4").ravel()
+            with np.errstate(over="ignore"):  # a point farther than float32 reaches: not drawn, as one of NaN
+                values = np.asarray(item.numbers() if shown else [], dtype="<f4").ravel()
             now = (shown, values.tobytes(), item.words)
             if whole or self._sent.get(k) != now:
                 self._sent[k] = now
@@ -257,12 +259,22 @@ def _as_points(values, called):
     return values
 
 
-def _as_pose(T, called):
+def as_pose(T, called):
+    """A pose, (4, 4), that a page can draw; ValueError names what is none."""
     T = np.asarray(T, dtype=float)
-    if T.shape != (4, 4) or not np.isfinite(T).all():
-        told = "a number that is not finite" if T.shape == (4, 4) else f"shape {T.shape}"
+    if T.shape != (4, 4) or not _drawable(T):
+        told = _undrawable(T) if T.shape == (4, 4) else f"shape {T.shape}"
         raise ValueError(f"{called}: a pose must be a finite (4, 4) matrix, got {told}")
     return T
+
+
+def _drawable(values):
+    """Whether a page, which counts in float32, can draw with all of the numbers."""
+    return bool((np.abs(values) < FARTHEST).all())  # NaN is not less
+
+
+def _undrawable(values):
+    return f"a number of {FARTHEST:g} or more" if np.isfinite(values).all() else "a number that is not finite"
 
 
 def _pair(color):
@@ -387,10 +399,10 @@ class _Ellipsoid(_Item):
         self.scene, self.artists = scene, [self.artist]
 
     def set(self, center, shape):
-        self.value = _as_points(center, self.called)
-        self.shape = np.asarray(shape, dtype=float)
-        if self.shape.shape != (3, 3) or not np.isfinite(self.shape).all() or not np.isfinite(self.value).all():
-            raise ValueError(f"{self.called}: center (3,) and shape (3, 3) must be finite")
+        center, shape = _as_points(center, self.called), np.asarray(shape, dtype=float)
+        if center.shape != (3,) or shape.shape != (3, 3) or not (_drawable(center) and _drawable(shape)):
+            raise ValueError(f"{self.called}: center (3,) and shape (3, 3) must be finite, and below {FARTHEST:g}")
+        self.value, self.shape = center, shape
 
     def draw(self, view):
         right, up, toward = view.project(self.value)
@@ -433,7 +445,7 @@ class _Triad(_Item):
         self.name.xyann = right, up
 
     def set(self, T):
-        self.value = _as_pose(T, self.called)
+        self.value = as_pose(T, self.called)
 
     def draw(self, view):
         R, origin = self.value[:3, :3], self.value[:3, 3]
@@ -463,7 +475,7 @@ class _Body(_Item):
         scene.add_faces()
 
     def set(self, T):
-        self.value = _as_pose(T, self.called)
+        self.value = as_pose(T, self.called)
 
     def draw(self, view):
         """All bodies of the scene are drawn together."""

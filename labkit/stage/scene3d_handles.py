@@ -10,6 +10,7 @@ import numpy as np
 
 from ..checks import as_finite, shown
 from . import style
+from .scene3d import as_pose
 
 FLAT = 0.12  # sine of the angle below which a plane is seen too flat to be pointed at
 DIAL_PIECES = 720
@@ -144,15 +145,20 @@ class Dial:
             raise ValueError(f"{name} must lie in [{shown(self.low)}, {shown(self.high)}] deg, got {shown(value)}")
         return float(np.clip(value, self.low, self.high))
 
+    def _circle(self, result):
+        T, radius = self.where(result)
+        called = f"the circle of {self.label or 'a handle'}"
+        return as_pose(T, called), float(as_finite(radius, called))
+
     def point(self, value, result):
         """Where its handle is in space, (3,)."""
-        T, radius = self.where(result)
+        T, radius = self._circle(result)
         angle = np.deg2rad(value)
         return T[:3, 3] + radius * (np.cos(angle) * T[:3, 0] + np.sin(angle) * T[:3, 1])
 
     def pull(self, value, result, eye, ray):
         """The angle whose point comes nearest to a ray; of two alike the one less far to turn."""
-        T, radius = self.where(result)
+        T, radius = self._circle(result)
         offered = value + np.linspace(-180, 180, DIAL_PIECES + 1)
         angle = np.deg2rad(offered)
         points = T[:3, 3] + radius * (np.outer(np.cos(angle), T[:3, 0]) + np.outer(np.sin(angle), T[:3, 1]))

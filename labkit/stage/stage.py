@@ -359,6 +359,9 @@ class Stage:
 
     def _recompute(self):
         result = self._compute(self.state)
+        for key, handle in self._handles.items():
+            if isinstance(handle, Dial):
+                handle.point(self._state[key], result)  # refused before anything is drawn
         with DRAWING:
             self._picture.update(self.state, result)
         self.result, self.status = result, ""

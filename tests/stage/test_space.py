@@ -147,7 +147,11 @@ def test_turning_needs_no_picture_and_python_learns_of_it():
 
 @pytest.mark.parametrize(
     ("values", "sentence"),
-    [((np.full((4, 4), np.nan),), "not finite"), ((np.eye(3),), r"shape \(3, 3\)")],
+    [
+        ((np.full((4, 4), np.nan),), "not finite"),
+        ((np.eye(3),), r"shape \(3, 3\)"),
+        ((np.full((4, 4), 1e39),), r"1e\+18 or more"),  # no number of the page's
+    ],
 )
 def test_a_pose_that_is_none_is_named(values, sentence):
     space = Scene(Figure().subplots(), radius=10)
@@ -171,6 +175,33 @@ def test_a_pose_that_becomes_nan_is_told_and_the_last_good_one_stays():
     stage, sent = wired(cell(scene=scene, handles={}), space=True)
     stage.receive({"control": {"up": 4}, "serial": "a:2"})
     assert "the lid" in sent[-1][0]["status"] and sent[-1][0]["space"]["rows"] == [[]]
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e39])
+def test_an_ellipsoid_or_a_joint_that_cannot_be_drawn_is_told_and_the_page_gets_numbers_alone(bad):
+    def scene(fig):
+        space = Scene(fig.subplots(), radius=10)
+        round_, point = space.ellipsoid(), space.points(marker="o")
+
+        def update(state, result):
+            round_.set((0, 0, 0), np.diag([1, 1, bad if state["up"] == 2 else 1]))
+            point.set((bad if state["up"] == 3 else 0, 0, 0))
+            space.draw(state["view"])
+
+        return space.artists, update
+
+    joint = Dial(10, -170, 170, lambda up: (posed(0, 0, bad if up == 4 else 1), 3.0), label="joint")
+    stage, sent = wired(cell(scene=scene, handles={"turn": joint}), space=True)
+    start = stage.result
+    for up, sentence in ((2, "an ellipsoid"), (3, ""), (4, "the circle of joint: a pose must be")):
+        stage.receive({"control": {"up": 2 * up}, "serial": f"a:{up}"})
+        message, buffers = sent[-1]
+        assert message["serial"] == f"a:{up}" and message["status"].startswith(sentence)
+        json.dumps(message, allow_nan=False)
+        assert bool(message["status"]) == bool(sentence)
+        stage.png()
+    stage.receive({"button": "Reset", "serial": "a:9"})
+    assert stage.result == start and stage.status == ""
 
 
 def test_a_body_update_never_mentions_is_named_when_the_stage_is_built():
