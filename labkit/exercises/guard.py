@@ -481,9 +481,14 @@ def message_of(error, limit=0.5):
         return ""
     try:
         with time_limit(limit), sandbox(_Capture()):
-            return _call(str, (error,), lambda said: printable(" ".join(said[:MESSAGE].split())[:300]))
+            return _call(str, (error,), lambda said: printable(_one_line(said[:MESSAGE])[:300]))
     except BaseException:  # also TimeLimit, and SystemExit of student code
         return "(its message cannot be shown)"
+
+
+def _one_line(text):
+    """A text without its ends of lines; blanks within a line stay, since they may be what it is about."""
+    return " ".join(line.strip() for line in text.splitlines() if line.strip())
 
 
 def _same(before, after):

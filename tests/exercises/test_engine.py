@@ -1080,3 +1080,10 @@ def test_what_an_exercise_says_of_a_special_draw_leads_where_it_is_refused_or_ra
 def test_a_special_draw_that_is_refused_is_not_told_while_plain_ones_are_wrong():
     item = replace(DOUBLE, noisy=(lambda rng: (np.ones(1),), metrics.Numbers(1e-9), "right, but not for one entry:"))
     assert item.judge(lambda v: 3 * v / (len(v) > 1)).text.startswith("your result is 1.5 times the expected one")
+
+
+def test_a_message_keeps_its_blanks_and_loses_its_lines():
+    """A line that came with two blanks looked right where one was shown."""
+    assert (
+        guard.message_of(ValueError("got '1.5   2.5'\n   of three  \n\nnumbers")) == "got '1.5   2.5' of three numbers"
+    )
