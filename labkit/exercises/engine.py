@@ -23,6 +23,7 @@ from . import arguments, cases, guard, metrics, operands, quantities, regions, r
 from . import steps as own_steps
 from .again import Again
 from .budget import Budget, seconds
+from .defaults import Defaults
 from .typeset import typeset
 
 TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
@@ -216,7 +217,7 @@ class _Trial:
     """One check in progress: the draws so far, what the student's function made of them, what it printed."""
 
     def __init__(self, exercise, function):
-        self.exercise, self.function = exercise, function
+        self.exercise, self.function, self.defaults = exercise, function, Defaults(function)
         self.pairs, self.inputs, self.metrics, self.words = [], [], [], []
         self.refusal, self.printed, self.spent, self.budget = "", "", 0.0, Budget(LOOKING)
 
@@ -241,6 +242,8 @@ class _Trial:
         self.spent += seconds() - started
         self.printed = self.printed or run.printed
         if run.error is not None:
+            if self.defaults.may_fill and self._is_right_on(self.defaults.fresh, args, metric, expected):
+                return self.outcome(NOT_YET, self.defaults.words())
             named = self._named_by_failing(run.error, args)
             told = self._raised(run, args, words)
             endless = isinstance(run.error, RecursionError | MemoryError)  # it would be so again and again
@@ -262,10 +265,24 @@ class _Trial:
 
     def property(self, holds, rng):
         """Check one property of the student's function, guarded like a call."""
-        run = guard.run(holds, (self.function, rng), limit=self.exercise.limit, author=self.function)
+        again = copy.deepcopy(rng)
+        run = self._run_property(holds, self.function, rng)
+        if self.defaults.may_fill and (run.error is not None or run.result):
+            run = self._run_property(holds, self.defaults.fresh, again)  # what is left over is told apart from the rest
+            if run.error is None and not run.result:
+                return self.outcome(NOT_YET, self.defaults.words())
         if run.error is not None:
             return self._raised(run, ())
         return self.outcome(NOT_YET, str(run.result)) if run.result else None
+
+    def _is_right_on(self, function, args, metric, expected):
+        """Whether another function succeeds where the student's has stopped."""
+        run = guard.run(function, args, functools.partial(_admitted, metric, expected), self.exercise.limit)
+        came = run.error is None and metric is not None and not isinstance(run.result, _Refusal)
+        return came and metric.equal(run.result, expected)
+
+    def _run_property(self, holds, function, rng):
+        return guard.run(holds, (function, rng), limit=self.exercise.limit, author=self.function)
 
     def is_wrong(self):
         """Whether a plain draw came out wrong: then special ones have nothing to tell."""
@@ -852,6 +869,7 @@ class _Trial:
             advice = ". What your function returned could not be worked with."
         where = f"\nin {run.line}" if run.line else ""
         with_ = f"\nwhen called as {self._call(args)}" if args else ""
+        with_ = f"\nwhen given {error.given}" if hasattr(error, "given") else with_  # a property says what it gave
         if args and self.pairs and all(m and m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)):
             with_ += f"\n{_lead(words) or BEFORE}"
         return self.outcome(RAISED, f"{type(error).__name__}: {said}{advice}{where}{with_}")
