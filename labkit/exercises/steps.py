@@ -313,8 +313,14 @@ class Search:
                     counted = SCALED.match(words) and COUNT.search(self.written.places[k][1])
                     if counted or bounded and words != rerun.SIGNLESS:
                         continue
-                    if _changes(function, value, others):
+                    if _changes(function, value, others) and not self._is_all_of_it(k, function, value, others):
                         yield "value", k, change, argument
+
+    def _is_all_of_it(self, k, function, value, others):
+        """Whether a value on the way becomes the right result: "its inverse" tells nobody how to write `invert`."""
+        expected = rerun.numeric(self.cases[0].expected)
+        new = _turned_value(function, value, others)
+        return not self._ends(k) and expected is not None and new is not None and _same(new, expected)
 
     def _with_own(self, among):
         """Plans of values at these places put together with a variable that was bound before."""
@@ -731,12 +737,17 @@ def _fits(mine, theirs):
 
 
 def _changes(function, value, others):
+    new = _turned_value(function, value, others)
+    return new is not None and np.isfinite(new).all() and not _same(new, value)
+
+
+def _turned_value(function, value, others):
+    """A value turned into another; None where it cannot be."""
     try:
         with np.errstate(all="ignore"):
-            new = np.asarray(function(value.copy(), *others), dtype=float)
+            return np.asarray(function(value.copy(), *others), dtype=float)
     except Exception:  # not of a value like this
-        return False
-    return np.isfinite(new).all() and not _same(new, value)
+        return None
 
 
 @_or_nothing
