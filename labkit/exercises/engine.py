@@ -868,11 +868,16 @@ class _Trial:
         if not (advice or args or run.line):
             advice = ". What your function returned could not be worked with."
         where = f"\nin {run.line}" if run.line else ""
-        with_ = f"\nwhen called as {self._call(args)}" if args else ""
-        with_ = f"\nwhen given {error.given}" if hasattr(error, "given") else with_  # a property says what it gave
-        if args and self.pairs and all(m and m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)):
-            with_ += f"\n{_lead(words) or BEFORE}"
-        return self.outcome(RAISED, f"{type(error).__name__}: {said}{advice}{where}{with_}")
+        return self.outcome(RAISED, f"{type(error).__name__}: {said}{advice}{where}{self._given(error, args, words)}")
+
+    def _given(self, error, args, words):
+        """The call that raised, as a line; of a property, what it says it gave."""
+        if not args:
+            return f"\nwhen given {error.given}" if hasattr(error, "given") else ""
+        told = f"\nwhen called as {self._call(args)}"
+        if self.pairs and all(m and m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)):
+            told += f"\n{_lead(words) or BEFORE}"
+        return told
 
 
 def _lead(words):

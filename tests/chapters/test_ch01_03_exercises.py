@@ -779,7 +779,7 @@ def _turn(T):
 
 
 FORGOTTEN = [
-    ("normalize", lambda v: np.linalg.norm(v) < 1e-8),
+    ("normalize", lambda v: np.linalg.norm(v) < 1e-6),
     ("normalize", lambda v: np.count_nonzero(v) == 2),
     ("gram_schmidt", lambda a, b: frames.arm_angle(a, b) < 0.1),
     ("gram_schmidt", lambda a, b: np.linalg.norm(b) > 20 * np.linalg.norm(a)),
@@ -791,10 +791,12 @@ FORGOTTEN = [
     ("relative", lambda A, B: np.allclose(A[:3, 3], B[:3, 3]) and not np.allclose(A, B)),
     *(("matrix_from_kuka", lambda p, k=k: p[3 + k] == 0) for k in range(3)),
     *(("matrix_from_kuka", lambda p, k=k, s=s: s * p[3 + k] > 2 * np.pi) for k in range(3) for s in (1, -1)),
-    ("kuka_from_matrix", lambda T: 1e-9 < np.hypot(T[0, 0], T[1, 0]) < 1e-5),
+    ("kuka_from_matrix", lambda T: 1e-9 < np.hypot(T[0, 0], T[1, 0]) < 1e-4),
+    ("kuka_from_matrix", lambda T: T[0, 0] == 0 and T[0, 2] * T[2, 0] != 0),
     ("kuka_from_matrix", lambda T: T[1, 0] < 0 < T[0, 0] and T[2, 2] < 0 < T[2, 1]),
     ("fit_frame", lambda p, q: len(p) > 8),
     ("fit_frame", lambda p, q: not p[:, 2].any()),
+    ("fit_frame", lambda p, q: len(p) > 3 and p[:, 2].any() and np.linalg.matrix_rank(p - p.mean(0), 1e-6) < 3),
     ("chain", lambda links: len(links) > 9),
     ("chain", lambda links: (links == np.eye(4)).all(axis=(1, 2)).any()),
     ("closure_error", lambda T: _turn(T) > 0 and not T[:3, 3].any()),
@@ -868,3 +870,100 @@ def test_infinity_is_no_coordinate():
 
 def test_residuals_of_poses_of_whole_numbers_keep_their_decimals():
     assert "cuts decimals off" in judged("pivot_residuals", residuals_like_the_poses).text
+
+
+def _unless(refused, answer):
+    """An answer that refuses, loudly, what is no case for it."""
+
+    def guarded(*given):
+        if refused(*given):
+            raise ValueError("no direction")
+        return answer(*given)
+
+    return guarded
+
+
+def _read_off_the_pole(T):
+    """The angles, with A = 0 from where |sin B| is 1 to nine digits."""
+    R = T[:3, :3]
+    B = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))
+    if abs(R[2, 0]) > 1 - 1e-9:
+        return np.array([*T[:3, 3], 0, B, np.arctan2(-R[1, 2], R[1, 1])])
+    return np.array([*T[:3, 3], np.arctan2(R[1, 0], R[0, 0]), B, np.arctan2(R[2, 1], R[2, 2])])
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(
+    "name, answer",
+    [
+        ("normalize", _unless(lambda v: np.linalg.norm(v) < 1e-9, lambda v: v / np.linalg.norm(v))),
+        ("gram_schmidt", _unless(lambda a, b: np.linalg.norm(np.cross(a, b)) < 1e-8, lambda a, b: made_axes(a, b))),
+        ("gram_schmidt", lambda a, b: made_axes(a, b, 1e-12)),
+        ("kuka_from_matrix", _read_off_the_pole),
+    ],
+)
+def test_a_guard_against_next_to_nothing_is_right(name, answer, seed):
+    assert ch01_exercises.CHAPTER[name].judge(answer, rng=np.random.default_rng(seed)).status == CORRECT
+
+
+def made_axes(a, b, nothing=0.0):
+    x = a / (np.linalg.norm(a) + nothing)
+    y = b - (b @ x) * x
+    y /= np.linalg.norm(y) + nothing
+    return np.column_stack([x, y, np.cross(x, y)])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_fault_stands_in_the_line_of_every_point(seed):
+    def first_three(text):
+        lines = [line.partition("#")[0].replace(",", ".").split() for line in text.splitlines()]
+        return read_points([" ".join(words[:3]) for words in lines])
+
+    assert judged("read_system", lambda text: read_points(text.splitlines()), seed).status == CORRECT
+    outcome = judged("read_system", first_three, seed)
+    assert outcome.status == NOT_YET and "holds four numbers" in outcome.text
+
+
+def test_who_stops_at_the_third_point_hears_of_the_fourth():
+    def up_to_three(text):
+        lines = text.splitlines()
+        full = [k for k, line in enumerate(lines) if line.partition("#")[0].strip()]
+        return read_points(lines[: full[2] + 1] if len(full) > 2 else lines)
+
+    assert "a file of 4 points is no system" in judged("read_system", up_to_three).text
+
+
+def test_a_number_that_counts_otherwise_is_explained():
+    def read(lines, first):
+        for number, line in enumerate(lines, start=first):
+            try:
+                read_points([line], count=None)
+            except ValueError:
+                raise ValueError(f"line {number}: {line!r}") from None
+        return read_points(lines)
+
+    for full in (str.strip, lambda line: line.partition("#")[0].strip()):
+        told = judged("read_system", lambda text, full=full: read([*filter(full, text.splitlines())], 1)).text
+        assert "Empty lines and comments are lines of the file too" in told
+    assert "is it 0 in your count?" in judged("read_system", lambda text: read(text.splitlines(), 0)).text
+
+
+def test_an_empty_text_is_said_to_be_one():
+    def read(text):
+        for number, line in enumerate(text.splitlines(), start=1):
+            read_points([f"{line} #{number}"], count=None)
+        return read_points(text.splitlines()) if number else None
+
+    assert "when given an empty text" in judged("read_system", read).text
+
+
+def test_the_advice_of_an_exercise_is_not_its_own_name():
+    def invert(T):
+        X = T.copy()
+        for i, j in ((0, 1), (0, 2)):
+            X[i, j], X[j, i] = T[j, i], T[i, j]
+        X[:3, 3] = -X[:3, :3] @ T[:3, 3]
+        return X
+
+    told = ch01_exercises.CHAPTER["invert"].judge(invert, rng=np.random.default_rng(0)).text
+    assert "inverse" not in told

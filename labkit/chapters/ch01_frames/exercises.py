@@ -304,6 +304,13 @@ def _about_z_alone(T):
     return _with(T, R, -R @ T[:3, 3])
 
 
+def _two_exchanged(R, i, j):
+    """A matrix with two entries in each other's place."""
+    R = R.copy()
+    R[i, j], R[j, i] = R[j, i], R[i, j]
+    return R
+
+
 def _turned_about_z(T_WA, T_WB):
     """The relative pose, its turn the difference of two angles about z."""
     angle = np.arctan2(T_WB[1, 0], T_WB[0, 0]) - np.arctan2(T_WA[1, 0], T_WA[0, 0])
@@ -840,6 +847,14 @@ CHAPTER = Chapter(
                     "Of the rotation you use two entries, as if it turned about z alone. T turns about any axis: take the whole block, Rᵀ.",
                     id="invert-about-z",
                 ),
+                *(
+                    Mistake(
+                        lambda T, i=i, j=j: _with(T, R := _two_exchanged(T[:3, :3], i, j), -R @ T[:3, 3]),
+                        f"You exchanged [{i}, {j}] and [{j}, {i}] alone. The transpose exchanges all three pairs beside the diagonal.",
+                        id=f"invert-pair-{i}{j}",
+                    )
+                    for i, j in ((0, 1), (0, 2), (1, 2))
+                ),
             ],
         ),
         Exercise(
@@ -1010,6 +1025,12 @@ CHAPTER = Chapter(
                     lambda: np.linalg.norm(_hole() - _hole_as_drawn()) ** 2,
                     "This is the squared distance.",
                     id="distance-squared",
+                ),
+                Mistake(
+                    lambda: abs(np.linalg.norm(_hole()) - np.linalg.norm(_hole_as_drawn())),
+                    "This is the difference of two lengths. Two places equally far from the origin may lie far apart: subtract them first, "
+                    "then take the length.",
+                    id="distance-of-lengths",
                 ),
                 Mistake(
                     lambda: np.abs(_hole() - _hole_as_drawn()).max(),
@@ -1353,7 +1374,7 @@ CHAPTER = Chapter(
             noisy=(
                 functools.partial(drawn_points, count=3),
                 metrics.Poses(1e-6, 1e-6),
-                "right, but not of three points:",
+                "right, but not of three points, which lie in one plane wherever they are:",
             ),
             hints=(
                 "First the turn, about the two centers of gravity; then the shift that puts one onto the other.",

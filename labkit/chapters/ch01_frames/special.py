@@ -31,7 +31,7 @@ def vector(rng, length, signs=None):
 VECTORS = (
     *(
         (f"of a {words} vector", functools.partial(vector, length=length))
-        for words, length in (("very short", 5e-11), ("short", 3.0), ("very long", 1e8))
+        for words, length in (("short", 3.0), ("very long", 1e8))
     ),
     *(
         (f"where {words}", functools.partial(vector, length=70.0, signs=signs))
@@ -88,9 +88,7 @@ EDGES = (
         for axis, sign in AXES
     ),
 )
-SHORT_EDGES = (
-    ("of edges far shorter than a thousandth of a millimeter", functools.partial(edges, lengths=(3e-5, 2e-5))),
-)
+SHORT_EDGES = (("of edges of some hundredths of a millimeter", functools.partial(edges, lengths=(0.03, 0.02))),)
 
 
 def triangle(rng, draw, origin=anywhere):
@@ -229,6 +227,19 @@ def read_from(rng, **kind):
     return (frames.matrix_from_kuka(angles(rng, **kind)[0]),)
 
 
+def read_exactly(rng, quarters):
+    """The matrix of a pose, so many quarter turns about z, y and x with exact zeros, any angle where None stands."""
+    R = np.eye(3)
+    for axis, quarter in zip("zyx", quarters):
+        angle = rng.uniform(0.5, 1.3) if quarter is None else quarter * QUARTER
+        turn = Rotation.from_euler(axis, angle).as_matrix()
+        R = R @ (turn if quarter is None else turn.round())
+    return (frames.pose(R, anywhere(rng)),)
+
+
+NEAR_THE_POLE = 6e-5  # rad: nearer to it, a limit of 1e-9 on |sin B| sets A to 0 and is as good as any
+
+
 def _quadrant(low, k):
     return f"{'ABC'[k]} is between {low} and {low + 90} deg"
 
@@ -255,16 +266,37 @@ READINGS = (
     ("of angles of some hundred-thousandths of a degree", functools.partial(read_from, abc=(5e-7, -4e-7, 3e-7))),
     *(
         (
-            f"a ten-thousandth of a degree beside B = {sign * 90} deg, where A and C still are two angles",
-            functools.partial(read_from, abc=(None, sign * (QUARTER - 2e-6), None)),
+            f"some thousandths of a degree beside B = {sign * 90} deg, where A and C still are two angles",
+            functools.partial(read_from, abc=(None, sign * (QUARTER - NEAR_THE_POLE), None)),
         )
         for sign in (1, -1)
+    ),
+    *(
+        (
+            f"of a matrix with exact zeros, where {'ABC'[k]} is {90 * quarter} deg",
+            functools.partial(read_exactly, quarters=_with_one(k, quarter)),
+        )
+        for k in (0, 2)
+        for quarter in (1, -1, 2)
+    ),
+    *(
+        (
+            f"of a matrix with exact zeros, where A, B and C are {a * 90}, {b * 90} and {c * 90} deg",
+            functools.partial(read_exactly, quarters=(a, b, c)),
+        )
+        for a, b, c in ((1, 0, 0), (0, 0, -1), (-1, 0, 2), (0, 1, 0), (1, -1, 0), (2, 1, -1))
     ),
     *(
         (f"where the position is {words}", functools.partial(read_from, abc=FREE, reach=reach))
         for words, reach in (("the origin", 0.0), ("many meters away", 5e4))
     ),
 )
+
+
+def two_sets_in_a_plane(rng, count=6):
+    """Points in one plane, turned against the axes of F, and where they were measured."""
+    x, y, _ = frames.gram_schmidt(*edges(rng, (1.0, 1.0))).T
+    return two_sets(rng, count, drawing=lambda p: p @ np.outer(x, x) + p @ np.outer(y, y) + 80.0)
 
 
 def two_sets(rng, count=6, angle=1.0, reach=500.0, drawing=None, noise=0.5, size=200.0):
@@ -296,4 +328,6 @@ SETS = tuple(
         ("a part many meters away", dict(reach=5e4)),
         ("points one of which was measured twice", dict(drawing=lambda p: np.concatenate([p[:-1], p[:1]]))),
     )
+) + tuple(  # many of them: whether a matrix that should be a rotation is a mirror image there, the processor tosses
+    ("of points in one plane", functools.partial(two_sets_in_a_plane, count=count)) for count in (4, 5, 6, 7, 8, 9) * 3
 )

@@ -182,30 +182,66 @@ FAULTS = (
 def names_the_line(student, rng):
     """A sentence about the first fault that is not refused with its line, None if all are.
 
-    The points stand far down, below comments and empty lines, at a line whose number is none of those in it.
+    The points stand far down, below comments and empty lines, at a line whose number is none of those in it. Each fault
+    stands in place of each point, then the number of points is wrong, then each fault stands below three good points.
     """
     good = write_system(system(rng).round(3)).splitlines()
-    before, first = 3 * int(rng.integers(20, 30)), int(rng.integers(4))
-    above = ["# a comment", "", "  "] * (before // 3)
-    for k, (what, bad) in enumerate(FAULTS):
-        at = (first + k) % 4  # in place of each point, and below all three
-        told = _refusal(student, "\n".join(above + good[:at] + [bad] + good[at + 1 :]))
-        number = before + at + 1
-        if told is None:
-            return f"line {number} of a file holds {what}: that must raise a ValueError, yours returned something."
-        if not re.search(rf"(?<![-\d]){number}\b", told):
-            return f"line {number} of a file holds {what}: your sentence does not name the line. It says: {told!r}."
+    above = ["# a comment", "", "  "] * int(rng.integers(20, 30))
+    first = int(rng.integers(3))
+    for what, bad in FAULTS:
+        for at in np.roll(range(3), -first):
+            told = _misread(student, [*above, *good[:at], bad, *good[at + 1 :]], len(above) + at + 1, f"holds {what}")
+            if told:
+                return told
     for count in (2, 4, 6, 0):
-        if _refusal(student, "\n".join([*good, *good][:count])) is None:
-            return f"a file of {count} points is no system: that must raise a ValueError, yours returned something."
+        words = f"a file of {count} points" if count else "an empty text"
+        if _refusal(student, [*good, *good][:count], words) is None:
+            return f"{words} is no system: {ACCEPTED}"
+    for what, bad in FAULTS:
+        number = len(above) + len(good) + 1
+        told = _misread(student, [*above, *good, bad], number, f"stands below three points and holds {what}")
+        if told:
+            return told
     return None
 
 
-def _refusal(student, text):
+ACCEPTED = "that must raise a ValueError, yours returned something."
+
+
+def _misread(student, lines, number, what):
+    """What is wrong with the refusal of a text with one fault in such a line, None if nothing is."""
+    where = f"line {number} of a file {what}"
+    refusal = _refusal(student, lines, f"a text, line {number} of which {what}")
+    if refusal is None:
+        return f"{where}: {ACCEPTED}"
+    if _names(refusal, number):
+        return None
+    why = ""
+    if _names(refusal, number - 1):
+        why = " The first line is line 1: is it 0 in your count?"
+    elif any(_names(refusal, sum(map(bool, map(held, lines[:number])))) for held in (str.strip, _content)):
+        why = " Empty lines and comments are lines of the file too: are they left out before lines are counted?"
+    return f"{where}: your sentence does not name the line. It says: {refusal!r}.{why}"
+
+
+def _content(line):
+    """What stands before a comment."""
+    return line.partition("#")[0].strip()
+
+
+def _names(refusal, number):
+    return bool(re.search(rf"(?<![-\d]){number}\b", refusal))
+
+
+def _refusal(student, lines, words):
+    """What a ValueError says of a text, None where it is taken; another error is told with what the text is, in words."""
     try:
-        student(text)
+        student("\n".join(lines))
     except ValueError as refusal:
         return str(refusal)
+    except Exception as error:
+        error.given = words
+        raise
     return None
 
 
@@ -235,7 +271,7 @@ FILES = [
             ),
             Mistake(
                 lambda text: _plainly(re.sub("#.*", "", text)),
-                "Some write 1,5 for 1.5: replace the comma before you make a number of it.",
+                "Some write 1,5 for 1.5, and a line may hold several of them: replace every comma before you make numbers of its words.",
                 id="read-comma",
             ),
             Mistake(

@@ -325,6 +325,15 @@ def _turn_and_shift_apart(transforms, from_twist=False):
     return frames.relative(moved[:-1], moved[1:])
 
 
+def _gap_shared_apart(transforms):
+    """The way back to the start, its turn and its straight line in N parts each, taken to the poses from the left."""
+    poses, _, n = _parts(transforms)
+    gap = frames.invert(poses[-1])
+    moves = exp_se3(np.arange(n + 1)[:, None] / n * log_se3(gap) * np.repeat([1, 0], 3))
+    moves[:, :3, 3] = np.arange(n + 1)[:, None] / n * gap[:3, 3]
+    return _moved(poses, moves)
+
+
 def _translation_from_links(transforms):
     links = transforms.copy()
     links[:, :3, 3] -= chaining.chain(transforms)[:3, 3] / len(links)
@@ -736,6 +745,11 @@ CHAPTER = Chapter(
                     id="lever-product",
                 ),
                 Mistake(
+                    lambda: 1000 * np.prod(chaining.closure_error(_sheet())),
+                    "This is 1000 times angle times distance. Which lever, times the angle, makes the distance?",
+                    id="lever-product-thousand",
+                ),
+                Mistake(
                     lambda: 2 * _lever(_sheet()),
                     "Twice too large: the whole angle moves the point, not half of it.",
                     id="lever-half-angle",
@@ -817,7 +831,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: np.hypot(1000 * chaining.closure_error(_sheet())[0], chaining.closure_error(_sheet())[1]),
-                    "This takes what the turn does and what the shift does to be perpendicular. In the worst direction they are nearly parallel.",
+                    "This takes what the turn does and what the shift does to be perpendicular. In the worst direction nearly all of the shift adds to the turn.",
                     id="meter-hypot",
                 ),
                 Mistake(
@@ -1123,6 +1137,10 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _turn_and_shift_apart,
+                    "You shared out turn and shift each for itself. The loop closes, but half the shift is not half the way: move the poses by exp_se3(-k / N * xi).",
+                ),
+                Mistake(
+                    _gap_shared_apart,
                     "You shared out turn and shift each for itself. The loop closes, but half the shift is not half the way: move the poses by exp_se3(-k / N * xi).",
                 ),
                 Mistake(

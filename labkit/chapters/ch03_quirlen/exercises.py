@@ -406,6 +406,15 @@ CHAPTER = Chapter(
                     lambda A, b: A.T @ b,
                     "Aᵀb alone is not the solution: (AᵀA)⁻¹ is missing in front of it.",
                 ),
+                *(
+                    Mistake(
+                        lambda A, b, count=count: A.T @ b / count(A),
+                        f"This is Aᵀb divided by the number of {what}. The matrix AᵀA is to be undone, and it is no number: "
+                        "x = (AᵀA)⁻¹ Aᵀb.",
+                        id=f"solve-mean-of-{what}",
+                    )
+                    for what, count in (("equations", len), ("poses", lambda A: len(A) / 3))
+                ),
                 Mistake(
                     lambda A, b: np.linalg.lstsq(A, b, rcond=None)[1],
                     "This is the second thing that `lstsq` returns, the sum of squares. The solution is the first, [0].",
@@ -531,6 +540,15 @@ CHAPTER = Chapter(
                     lambda: (_kreisel().tip ** 2).sum(),
                     "This is the squared length, in mm²: the root is missing.",
                     id="tip-squared",
+                ),
+                *(
+                    Mistake(
+                        lambda k=k: np.linalg.norm(lab_sheet.kreisel_poses()[k, :3, 3] - _kreisel().pivot),
+                        f"This is how far the flange of poses[{k}] is from the pivot. It is near: the tip misses the pivot a little in "
+                        "every pose. The length of the tool itself is that of the tip, x[:3].",
+                        id=f"tip-of-pose-{k}",
+                    )
+                    for k in (0, -1)
                 ),
                 Mistake(
                     lambda: np.linalg.norm(_kreisel().tip - _kreisel().pivot),
