@@ -967,3 +967,12 @@ def test_the_advice_of_an_exercise_is_not_its_own_name():
 
     told = ch01_exercises.CHAPTER["invert"].judge(invert, rng=np.random.default_rng(0)).text
     assert "inverse" not in told
+
+
+def test_no_direction_is_too_bad_to_be_told_of():
+    """Up to the worst of the axes one of them is named, from there to the worst of all directions the way on."""
+    on_axes = chaining.displacement(exercises._sheet(), 1000 * np.vstack([np.eye(3), -np.eye(3)])).max()
+    item = ITEMS["worst_at_one_meter"]
+    for part in (0.1, 0.6, 0.9, 0.98, 0.995):
+        assert "One of the six axes" in item.judge(part * on_axes).text
+        assert "try more of them" in item.judge(on_axes + part * (15.52 - on_axes)).text

@@ -867,16 +867,16 @@ CHAPTER = Chapter(
                     id="meter-difference",
                 ),
                 Mistake(
-                    lambda: 15.25,
+                    lambda: 15.245,
                     "Worse than any of the six axes, and still not the worst direction: try more of them.",
                     id="meter-few-directions",
-                    within=0.27,
+                    within=0.28,
                 ),
                 Mistake(
-                    lambda: 7.4,
+                    lambda: 7.48,
                     "One of the six axes in the table above is worse than that: look for the largest, and between the axes too.",
                     id="meter-below-the-axes",
-                    within=7.4,
+                    within=7.48,  # up to the worst of the axes, 14.96 mm
                 ),
                 Mistake(
                     lambda: 1e5,
