@@ -31,9 +31,10 @@ class Figure:
 def record(stem, function, folder):
     """Record the Stage that `stages.function()` of a chapter gives, write its two films and its picture; a `Figure`."""
     stage = getattr(import_module(f"labkit.chapters.ch{stem}.stages"), function)()
-    key, caption, declared = f"{stem}-{function}", stage.caption, stage.declaration()
+    key, declared = f"{stem}-{function}", stage.declaration()
     still = stage.small_png()
     data = film.record(stage).as_data()
+    caption = data["tracks"]["start"]["notes"][0]["caption"]
     for name, recorded in ((key, data), (f"{key}{NARROW}", film.record(stage, narrow=True).as_data())):
         (folder / FOLDER / f"{name}.js").write_text(
             f"labkitFilm({json.dumps(name)},{json.dumps(recorded, separators=(',', ':'))});\n", encoding="utf-8"

@@ -18,6 +18,6 @@ film        a Stage recorded for the reading edition
 
 from .controls import Choice, Handle, Play, Slider, Target, Toggle
 from .scene3d import View
-from .stage import Stage
+from .stage import Stage, living
 
-__all__ = ["Choice", "Handle", "Play", "Slider", "Stage", "Target", "Toggle", "View"]
+__all__ = ["Choice", "Handle", "Play", "Slider", "Stage", "Target", "Toggle", "View", "living"]

@@ -132,7 +132,12 @@ def deflated(pictures):
 
 def record(stage, narrow=False):
     """The film of a Stage, which is at its start again afterwards; `narrow`: the one for a phone."""
-    return _Camera(stage, narrow).film()
+    stage.recorded = True
+    try:
+        return _Camera(stage, narrow).film()
+    finally:
+        stage.recorded = False
+        stage.reset()
 
 
 class _Camera:

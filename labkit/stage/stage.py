@@ -95,7 +95,13 @@ MAX_UNSEEN = 3
 RESERVED = ("t", "view", "click", "brush", "memory")
 FAIL = "Make it fail"
 NUMBER = re.compile(r"\{(\w+)\}")  # of a sentence: the name of a slider
+EITHER = re.compile("\0(.*?)\0(.*?)\0")  # of a sentence: words with Python behind the page, and on a film
 MAX_WAIT = 1.5  # s a page waits for steps of a simulation; the slider of time then goes back to what was reached
+
+
+def living(words, recorded=""):
+    """Words of a sentence that hold where Python answers, as an invitation to click; a film has the `recorded` ones."""
+    return f"\0{words}\0{recorded}\0"
 
 
 class Stage:
@@ -147,6 +153,7 @@ class Stage:
         self._state = self._first_state(view)
         self.result, self.status, self.caption, self.reached, self._numbers = None, "", "", False, []
         self._sends, self._widget, self.at_rest = [], None, []
+        self.recorded = False  # whether what it says is for a film, which answers less
         self._sent, self._shown, self._waiting, self._attached, self._epoch = 0, 0, False, False, 0
         self._because, self._said, self._tape = because, "", None
         self._cursor = ""
@@ -376,7 +383,7 @@ class Stage:
             self._picture.head(goal, self.reached)
             told.append(f"{goal}.")
         self.caption, self._numbers = "", []
-        words = NUMBER.split(" ".join(filter(None, told)))
+        words = NUMBER.split(EITHER.sub(r"\2" if self.recorded else r"\1", " ".join(filter(None, told))))
         for text, key in zip(words[::2], [*words[1::2], None]):
             self.caption += text
             if isinstance(self._controls.get(key), Slider):

@@ -156,6 +156,47 @@ def test_enter_reveals_where_the_figure_would_take_it(wall):
     wall.wait_for_selector("#place .cursor", state="visible")
 
 
+PEN_UP = (*["Shift+ArrowUp"] * 3, " ")
+BY_KEY = {  # to where it begins, and what is done there; the cursor stands in the middle at first
+    "04/basins": (["Shift+ArrowLeft"] * 3, (" ", *PEN_UP), "% uncovered"),
+    "05/thirty-one-poses": (["Enter", *["Shift+ArrowRight"] * 6, *["Shift+ArrowDown"] * 3], (" ",), "Pose 17"),
+}
+
+
+@pytest.mark.parametrize("key", BY_KEY)
+def test_what_is_rubbed_or_clicked_is_reached_by_key(wall, key):
+    way, deed, told = BY_KEY[key]
+    revealed(wall, key)
+    assert told not in rest(wall)
+    for name in (*way, *deed):
+        wall.keyboard.press(name)
+    assert told in rest(wall)
+
+
+def test_the_robot_is_carried_off_and_obstacles_are_drawn_by_key(wall):
+    revealed(wall, "09/arena")
+    seen = [rest(wall)]
+    to_the_robot = ["Enter", *["Shift+ArrowLeft"] * 3, *["ArrowLeft"] * 2, *["Shift+ArrowDown"] * 3, *["ArrowDown"] * 3]
+    for way in (to_the_robot, (" ", *PEN_UP), ["Shift+ArrowLeft"] * 3, (" ", *PEN_UP)):
+        for name in way:
+            wall.keyboard.press(name)
+        seen.append(rest(wall))
+    start, there, carried, elsewhere, drawn = seen
+    assert there == start != carried == elsewhere != drawn
+
+
+def revealed(page, key):
+    """Show a card with all its answers, at its start, the keys in its empty space."""
+    show(page, key)
+    while page.evaluate("() => wall.next"):
+        before = page.evaluate("() => wall.step")
+        page.keyboard.press("a")
+        page.wait_for_function("(before) => wall.step !== before", arg=before)
+    page.keyboard.press("r")
+    rest(page)
+    page.locator("#place canvas[tabindex]").focus()
+
+
 def test_digits_chapters_overview_theme_and_what_is_not_there(wall):
     show(wall, "05/scan-line")
     number = wall.evaluate("() => wall.chapter.findIndex((card) => card.key === '05/convergence') + 1")

@@ -7,7 +7,7 @@ import zlib
 import numpy as np
 import pytest
 
-from labkit.stage import Choice, Handle, Play, Slider, Stage, film, style
+from labkit.stage import Choice, Handle, Play, Slider, Stage, film, living, style
 from labkit.stage import scene3d_solids as solids
 from labkit.stage.scene3d import Scene, View
 from labkit.stage.scene3d_handles import Along
@@ -51,6 +51,18 @@ def small():
         for name, value in {"ROOM": 240, "AROUND": 12, "PLAYED": 20, "FAILED": 4}.items():
             patch.setattr(film, name, value)
         yield
+
+
+def test_a_film_invites_to_nothing_that_it_does_not_answer():
+    words = f"Look{living(', or click the picture', ' closely')}."
+
+    def empty(fig):
+        return fig.subplots().plot([0], [0]), lambda state, result: None
+
+    invites = Stage("a line", scene=empty, compute=dict, fail={}, describe=lambda _: words)
+    notes = [note for track in film.record(invites).tracks.values() for note in track.notes]
+    assert {note["caption"] for note in notes} == {"Look closely."}
+    assert invites.caption == "Look, or click the picture."
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,9 @@ def contour_map(ax, x, y, f, levels, points=()):
     ax.contour(x, y, f, levels=levels, colors=style.MUTED, linewidths=0.6, linestyles="solid", alpha=0.7)
     for name, at in dict(points).items():
         ax.plot(*at, marker="+", color=style.INK, markersize=9, markeredgewidth=1.6)
-        ax.annotate(LETTERS[name], at, xytext=(6, 5), textcoords="offset points", weight="bold")
+        away = (-12, 9) if name == "saddle" else (14, -7)  # paths run along the line through all three
+        beside = {"xytext": away, "textcoords": "offset points", "ha": "center", "va": "center"}
+        ax.annotate(LETTERS[name], at, **beside, weight="bold")
     return ax
 
 

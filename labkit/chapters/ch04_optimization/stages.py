@@ -8,7 +8,7 @@ import numpy as np
 from ...documents.thesis import wells
 from ...estimation import optimization as opt
 from ...estimation.convexity import chord, positive_definite
-from ...stage import Choice, Handle, Slider, Stage, Target, Toggle, style
+from ...stage import Choice, Handle, Slider, Stage, Target, Toggle, living, style
 from . import figures as draw
 
 LEVELS = (-200, -170, -140, -110, -90, -75, -67.58, -60, -50, -40, -30, -22, -16, -12)
@@ -399,7 +399,7 @@ def basin_view(state):
 
 def _basin_caption(result):
     if result["covered"].all():
-        return "Nothing is uncovered yet: rub over the square."
+        return f"Nothing is uncovered yet{living(': rub over the square')}."
     shares = ", ".join(f"{name} {100 * share:.1f} %" for name, share in zip(wells.NAMES, result["shares"]))
     free = 100 * (1 - result["covered"].mean())
     return f"{_name(result['method'])}, {free:.0f} % uncovered, of that: {shares}."

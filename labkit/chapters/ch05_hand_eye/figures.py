@@ -197,7 +197,7 @@ def descents(ax, names, steps, low, high):
 
 def residual_bars(ax, n, top=3000.0):
     """Residual length of each pose on a logarithmic scale; returns (stems, chosen, yardstick)."""
-    style.axes(ax, "pose (click one)", "residual (mm)")
+    style.axes(ax, "pose", "residual (mm)")
     ax.set(yscale="log", xlim=(0, n + 1), ylim=(0.08, top))
     ax.set_xticks([1, 9, 17, 25], ["1\nline x", "9\ny", "17\nx*", "25\ny*"])
     (stems,) = ax.plot([], [], color=style.ESTIMATE, linewidth=4, solid_capstyle="butt")

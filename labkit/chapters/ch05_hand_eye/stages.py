@@ -16,7 +16,7 @@ from ...fast.hand_eye import calibrate_sphere_target
 from ...geometry import frames
 from ...geometry.lie import exp_so3, log_so3
 from ...machines import robot_accuracy, triangulation
-from ...stage import Choice, Handle, Slider, Stage, Target, style
+from ...stage import Choice, Handle, Slider, Stage, Target, living, style
 from ...stage.scene3d import Scene, View
 from ...stage.scene3d_handles import Dial
 from . import bodies
@@ -608,7 +608,7 @@ def compute_poses(state):
     return {
         "pose": pose, "residuals": residuals, "lengths": lengths, "rms": float(hand_eye.rms_distance(residuals)),
         "median": float(np.median(lengths)), "T_FS": T_FS, "target": target, "T_BF": T_BF, "x_S": x_S, "slip": slip,
-        "offered": offered, "number": state["slip"],
+        "offered": offered, "number": state["slip"], "picked": state["click"] is not None,
     }  # fmt: skip
 
 
@@ -624,9 +624,10 @@ def _poses_sentence(result):
         if result["offered"]
         else "as printed, nothing to explain"
     )
+    invitation = "" if result["picked"] else living(" Click a bar.")
     return (
         f"Pose {result['pose']}: residual {result['lengths'][result['pose'] - 1]:.2f} mm {told}. All 31: rms "
-        f"{result['rms']:.2f} mm, median {result['median']:.2f} mm."
+        f"{result['rms']:.2f} mm, median {result['median']:.2f} mm.{invitation}"
     )
 
 

@@ -40,7 +40,7 @@ from ...machines.tracking import (
     time_offset,
     tracking_errors,
 )
-from ...stage import Choice, Handle, Play, Slider, Stage, Toggle, style
+from ...stage import Choice, Handle, Play, Slider, Stage, Toggle, living, style
 from ...stage.marks import Readout
 from ...stage.scene3d import Scene, View
 from ...stage.scene3d_handles import Dial, Free, OnSphere
@@ -305,7 +305,7 @@ def live_tracker():
         counted = f"{s.good} good readings, {s.lost} lost, {sum(s.bad.values())} bad, each counted once."
         if result["playing"]:
             return counted
-        return f"1.5 s of the stream: {counted} Press play: real packets arrive over UDP."
+        return f"1.5 s of the stream: {counted} Press play{living(': real packets arrive over UDP')}."
 
     return Stage(
         "live tracker",

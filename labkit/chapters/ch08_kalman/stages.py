@@ -9,7 +9,7 @@ from ...documents.lecture.examples import circle_course, simulate_vehicle
 from ...estimation import gaussian, kalman
 from ...geometry import planar
 from ...localization import ekf, odometry
-from ...stage import Choice, Handle, Play, Slider, Stage, Target, Toggle, style
+from ...stage import Choice, Handle, Play, Slider, Stage, Target, Toggle, living, style
 from ...stage.marks import Spare, strayed
 from . import figures as draw
 
@@ -271,7 +271,7 @@ def _rounded(number):
 
 def _arena_sentence(result):
     if not len(result["nees"]):
-        return "Click the picture and drive with the arrow keys, or press play for the circle."
+        return f"{living('Click the picture and drive with the arrow keys, or press', 'Press')} play for the circle."
     over = float((result["nees"] > gaussian.chi_square_quantile(0.995, 3)).mean())
     text = f"The filter is {100 * result['error']:.0f} cm off; NEES now {_rounded(result['nees'][-1])}, expected 3."
     text += strayed(result["truth"][-1], ARENA)

@@ -12,7 +12,7 @@ from ...fast.sensors import SensorSuite, weigh_beams
 from ...localization import maps, mcl, odometry, particles
 from ...localization.drives import Wanderer
 from ...localization.sensors import SENSORS, weigh_doors, weigh_likelihood_field
-from ...stage import Choice, Handle, Play, Slider, Stage, Target, style
+from ...stage import Choice, Handle, Play, Slider, Stage, Target, living, style
 from . import figures as draw
 
 CORRIDOR = 12.0  # m
@@ -722,7 +722,9 @@ def compute_arena(state):
 def _arena_sentence(result):
     if result["step"] is None:
         where = f"The particles are everywhere, and where they happen to be densest is {result['off']:.2f} m off."
-        return f"{where} Press play, or click the picture and use the arrow keys."
+        return (
+            f"{where} Press play{living(', or click the picture and use the arrow keys; drag the robot to kidnap it')}."
+        )
     step = result["step"]
     words = f"Off by {result['off']:.2f} m; {step.n_particles} particles worth {step.effective:.0f} equal ones"
     if step.n_particles <= FEW and len(result["errors"]) > SETTLED and result["off"] > 1:
@@ -743,7 +745,7 @@ def arena():
         cloud, truth, guess = draw.Cloud(left), draw.RobotMark(left), draw.RobotMark(left, color=style.ESTIMATE)
         scan, disks = draw.Beams(left), draw.Disks(left)
         (ring,) = left.plot([], [], **draw.RING)
-        draw.key(left, {"robot: drag it": truth, "estimate": guess, "scan": scan, "not on the map": disks})
+        draw.key(left, {"robot": truth, "estimate": guess, "scan": scan, "not on the map": disks})
         curve = draw.error_curve(right, HISTORY)
 
         def update(state, result):
