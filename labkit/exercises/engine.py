@@ -293,10 +293,11 @@ class _Trial:
         if all(m is None or m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)) and not self.refusal:
             named = self._named_mistake() if self.exercise.metric is None else None
             return named or self.outcome(CORRECT)
-        named = self._named_mistake() or self._named_in_parts()
+        kept = self._kept() if scope.may_keep(self.function) else None  # else by chance the results may be a mistake's
+        named = None if kept else self._named_mistake() or self._named_in_parts()
         if named:
             return named
-        words = self._kept() or self._relation(whole=True) or self._other_arguments() or self._terms()
+        words = kept or self._kept() or self._relation(whole=True) or self._other_arguments() or self._terms()
         unmoved = None if words or self.refusal else self._unmoved()  # now, since the search may use up the budget
         search = None if words else self._search()
         solution = search and self._solution(search)
@@ -335,15 +336,23 @@ class _Trial:
         return f" {words}." if words else ""
 
     def _kept(self):
-        """What stays from one call of the function to the next, if its results show it."""
-        if self.exercise.metric is None or not self.inputs or not self.budget.left():
+        """What stays from one call of the function to the next, if its results show it: those of the first draw, or of
+        all where it reads or binds what may stay.
+        """
+        if self.exercise.metric is None:
             return None
-        first = _numbers_of(self.pairs[0][0])
-        admitted = functools.partial(_admitted, self.metrics[0], self.pairs[0][1])
-        run = guard.run(self.function, self.inputs[0], admitted, self.exercise.limit)
+        draws = range(len(self.inputs) if scope.may_keep(self.function) else len(self.inputs[:1]))
+        told = (self._kept_on(draw) for draw in draws if self.budget.left())
+        return next((words for words in told if words), None)
+
+    def _kept_on(self, draw):
+        before = self.pairs[draw][0]
+        first = _numbers_of(before)
+        admitted = functools.partial(_admitted, self.metrics[draw], self.pairs[draw][1])
+        run = guard.run(self.function, self.inputs[draw], admitted, self.exercise.limit)
         if first is None:
-            return self._kept_words(run.error) if self._is_another_choice(run) else None
-        if not _same_numbers(_numbers_of(self.pairs[0][0]), first):
+            return self._kept_words(run.error) if _is_another(before, run) else None
+        if not _same_numbers(_numbers_of(before), first):
             return (
                 "your function returns one and the same array at every call: a later call overwrites what an earlier "
                 "one returned. Make the array within the function"
@@ -351,11 +360,6 @@ class _Trial:
         if run.error is None and _same_numbers(_numbers_of(run.result), first):
             return None
         return self._kept_words(run.error)
-
-    def _is_another_choice(self, run):
-        """Whether a word or a set that was returned first is another one at a second call with the same arguments."""
-        first = self.pairs[0][0]
-        return type(first) in (str, set, frozenset) and (run.error is not None or run.result != first)
 
     def _kept_words(self, error):
         told = "stops with an error" if error is not None else "gives another result"
@@ -877,7 +881,7 @@ class _Trial:
         told = f"\nwhen called as {self._call(args)}"
         if self.pairs and all(m and m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)):
             told += f"\n{_lead(words) or BEFORE}"
-        return told
+        return told + self._about_globals()
 
 
 def _lead(words):
@@ -952,6 +956,15 @@ def _numbers_of(result):
     return rerun.numeric(result.value if isinstance(result, _Refusal) else result)
 
 
+def _is_another(first, run):
+    """Whether a word, a set or several results are others than before, or an error, at a second call."""
+    if type(first) in (str, set, frozenset):
+        return run.error is not None or run.result != first
+    several = isinstance(first, list | tuple) and isinstance(run.result, list | tuple)
+    pairs = [(rerun.numeric(a), rerun.numeric(b)) for a, b in zip(first, run.result)] if several else []
+    return any(a is not None and b is not None and not _same_numbers(a, b) for a, b in pairs)
+
+
 def _same_numbers(one, other):
     if one is None or one.shape != other.shape:
         return False
@@ -992,7 +1005,7 @@ ADVICE = {  # what NumPy means, by a regular expression
     "truth value of an array": "`if` takes one truth value; `np.where` chooses entry by entry.",
     "bitwise_xor": "`^` is no power in Python: write `**`.",
     r"for \^: ": "`^` is no power in Python: write `**`.",
-    "is out of bounds for axis": "Indices count from 0, the row comes first: [row, column].",
+    "is out of bounds for axis": "Indices count from 0; of a matrix the row comes first: [row, column].",
     "math domain error": "A root of a negative number, or an arccosine beyond 1, perhaps by rounding: see `np.clip`.",
     "requires a buffer of": "The format and the data differ in length: in `struct`, d takes 8 bytes, f takes 4.",
     "'list' object has no attribute": "A list is no array: `np.array(...)` makes one of it.",

@@ -137,12 +137,13 @@ class Written:
 
     changes: (rank, line, code, what is wrong where it mends) of every single change of the code, by its number.
     places:  (line, code, name of the variable, size, number of its first part) of every value on the way.
+    of_truth: numbers of the places where a truth value, or an array of them, was met in a trace.
     """
 
     def __init__(self, function, tree, lines=None, beside=()):
         self.function, self.beside, self.lines = function, [helper for helper, _ in beside], lines or {}
         self.trees = [tree, *(definition for _, definition in beside)]
-        self.counted = STEPS
+        self.counted, self.of_truth = STEPS, set()
         self._noted, self.places = _noted(function, self.trees, self.lines)
         for tree in self.trees:
             _ticking(tree)
@@ -248,6 +249,7 @@ class Written:
 
         guard.run(work, (), limit=seconds, author=self.function)
         self.counted = max(self.counted, PATIENCE * note.steps + STEPS) if note else STEPS
+        self.of_truth |= note.truths if note else set()
         return [_stacked(values) for values in kept]
 
     def truths(self, draws, seconds):
@@ -306,7 +308,7 @@ class _Note:
 
     def __init__(self, most, place=-1, kept=None):
         self.most, self.place, self.kept = most, place, kept
-        self.steps = self.round = 0
+        self.steps, self.round, self.truths = 0, 0, set()
 
     def __call__(self, k, value):
         self.steps += 1
@@ -314,6 +316,8 @@ class _Note:
             raise TooLong
         if self.kept is not None and len(self.kept[k]) < ROUNDS:
             self.kept[k].append(numeric(value))
+            if _is_truth(value):
+                self.truths.add(k)
         if k == self.watched:
             self.seen = value
         if k == self.place:
@@ -384,6 +388,10 @@ def _list_like(value, new):
     """A list of whole numbers stays one: made one of floats it might mend what has nothing to do with its values."""
     whole = all(isinstance(part, int | np.integer) and not isinstance(part, bool) for part in value)
     return new.astype(int).tolist() if whole and (new == np.round(new)).all() else list(new)
+
+
+def _is_truth(value):
+    return isinstance(value, bool | np.bool_) or isinstance(value, np.ndarray) and value.dtype.kind == "b"
 
 
 def _square(v):
@@ -475,6 +483,13 @@ def _of_its_shape(change):
 
 
 SIGNLESS = "it belongs there without its sign"
+OPPOSITE = "1 less it, 1 - ..., belongs there"
+NOUGHT, ONE = "it does not belong there, but 0 in its place", "it does not belong there, but 1 in its place"
+OF_TRUTHS = {  # what the same changes are called where they are made to a truth value, or an array of them
+    OPPOSITE: "its opposite belongs there, `not` or `~`",
+    NOUGHT: "it does not belong there, but False in its place",
+    ONE: "it does not belong there, but True in its place",
+}
 OTHERWISE = (  # (what it should have been, function of the value [and of an argument]), the likeliest first
     ("it has the wrong sign", np.negative),
     ("it belongs there transposed", lambda v: np.swapaxes(_matrix(v), -1, -2)),
@@ -491,9 +506,9 @@ OTHERWISE = (  # (what it should have been, function of the value [and of an arg
     (SIGNLESS, np.abs),
     ("it belongs there one larger", lambda v: _whole(v) + 1),
     ("it belongs there one smaller", lambda v: _whole(v) - 1),
-    ("1 less it, 1 - ..., belongs there", _truth),
-    ("it does not belong there, but 0 in its place", np.zeros_like),
-    ("it does not belong there, but 1 in its place", np.ones_like),
+    (OPPOSITE, _truth),
+    (NOUGHT, np.zeros_like),
+    (ONE, np.ones_like),
     ("the identity belongs in its place", lambda v: 0 * _square(v) + np.eye(v.shape[-1])),
     ("it is to be divided by its length", _normalized),
     ("each of its rows is to be divided by its own length", _rows_normalized),

@@ -100,6 +100,16 @@ def notebook_data(function):
     return [name for name in _names(code) if name in known and _is_data(known[name])]
 
 
+def may_keep(function):
+    """Whether something may stay from one call of a function to the next: data of the notebook that it reads, a name of
+    the notebook that it binds, a default that can be changed.
+    """
+    code = getattr(function, "__code__", None)
+    binds = isinstance(code, types.CodeType) and any(i.opname == "STORE_GLOBAL" for i in dis.get_instructions(code))
+    defaults = getattr(function, "__defaults__", None) or ()
+    return binds or any(isinstance(d, list | dict | set) for d in defaults) or bool(notebook_data(function))
+
+
 def _names(code):
     """Global names a code object reads, and those of the functions defined within it, each once and in order.
 

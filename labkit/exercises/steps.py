@@ -36,6 +36,7 @@ CHANCE = 1000  # one case of so many may be chance
 BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with a number
 DECIMALS = re.compile(r"[<>]=? *\d*(\.\d+(e[+-]?\d+)?|e-\d+)$|[<>]=? *\d+e-\d+$")  # a comparison with such a number
 TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
+UNEQUAL = ("where `==` belongs", "where `!=` belongs")  # what computed numbers are never, or always
 ALONE = "With this alone changed, your result is right"
 
 
@@ -194,7 +195,17 @@ class Search:
         if plan is None:
             return None
         _, line, code, mends = changes[self._left_out_instead(plan[1])]
-        return self._weight_words(line, mends) or f"in line {line}, `{code}`: {mends}. {ALONE}"
+        words = self._whatever_words(line, code, mends) or self._weight_words(line, mends)
+        return words or f"in line {line}, `{code}`: {mends}. {ALONE}"
+
+    def _whatever_words(self, line, code, mends):
+        """That a comparison does not belong there, where `==` or `!=` mends only because no two numbers are alike."""
+        if not mends.endswith(UNEQUAL):
+            return None
+        places = enumerate(self.written.places)
+        alike = [k for k, (at, text, *_) in places if at == line and text == _bare(code) and k in self.written.of_truth]
+        never = [change for change, (words, _) in enumerate(rerun.OTHERWISE) if words in (rerun.NOUGHT, rerun.ONE)]
+        return self._turned_words(("value", k, change, None) for k in alike for change in never)
 
     def _weight_words(self, line, mends):
         """What a line binds, where a change of it mends only because that is 1 everywhere then, or as good as 1."""
@@ -227,7 +238,7 @@ class Search:
         """Whether a change only turns what is compared with a number: another number would do as well. Nor is a number
         with decimals what something computed is to be equal to.
         """
-        if mends.endswith(("where `==` belongs", "where `!=` belongs")):
+        if mends.endswith(UNEQUAL):
             return bool(DECIMALS.search(code))
         bare = _bare(code)
         compared = (text for at, text, *_ in self.written.places if at == line and bare in text and BOUND.search(text))
@@ -271,7 +282,9 @@ class Search:
             return None
         kind, k, change, other = plan
         name = "" if other is None else self.written.places[other][2] if kind == "own" else self.names[other]
-        return f"{self._where(k)}: {rerun.OTHERWISE[change][0].format(name)}. {ALONE}"
+        words = rerun.OTHERWISE[change][0].format(name)
+        words = rerun.OF_TRUTHS.get(words, words) if k in self.written.of_truth else words
+        return f"{self._where(k)}: {words}. {ALONE}"
 
     def _argument_words(self):
         """What is to be done with an argument before the first line, as it is read in several places."""

@@ -153,6 +153,14 @@ def test_spins_that_go_on_where_the_last_one_ended_are_refused():
     assert all("not independent" in judge("resample_roulette", wheel, seed).text for seed in range(3))
 
 
+@pytest.mark.parametrize(
+    "beams, words", [(155, "is 1e-310 in float64, still above zero"), (161.9, "whole"), (-200, "the other sign")]
+)
+def test_what_is_left_after_so_many_beams_is_said(beams, words, monkeypatch):
+    monkeypatch.setattr(engine, "LOOKING", 0.1)  # a change of the solution is not looked for here
+    assert words in CHAPTER["beams_to_zero"].judge(beams).text
+
+
 @pytest.mark.parametrize("answer", [161.65, 162.5])
 def test_beams_are_whole(answer, monkeypatch):
     monkeypatch.setattr(engine, "LOOKING", 0.1)  # why it is wrong is not asked here
@@ -464,7 +472,46 @@ def of_distances_up_to(limit):
     return field
 
 
+def of_each_cell_once(grid, pose, ranges, bearings, std):
+    a = pose[2] + bearings
+    rows, columns = grid.cell_of(pose[:2] + ranges[:, None] * np.column_stack([np.cos(a), np.sin(a)]))
+    d = np.array([grid.distance[cell] for cell in set(zip(rows.tolist(), columns.tolist()))])
+    return norm.logpdf(d, scale=std).sum()
+
+
+def of_the_landmark_that_fits_best(pose, z, landmarks, std_range, std_bearing):
+    d = landmarks - pose[:2]
+    e = (z[:, :1] - np.hypot(*d.T)) / std_range
+    f = planar.wrap_angle(z[:, 1:] - np.arctan2(d[:, 1], d[:, 0]) + pose[2]) / std_bearing
+    return -0.5 * (e**2 + f**2).min(axis=1).sum() - len(z) * np.log(2 * np.pi * std_range * std_bearing)
+
+
+def deviations_by_halves(x, u, dt, std_u, rng):
+    noise = rng.normal(0, np.repeat(std_u, len(x))).reshape(len(x), 2)
+    return odometry.step(x, u + noise, dt)
+
+
+def late(due):
+    return lambda w, p, k, n: (w * p / (w * p).sum(), bool(due(k, n)))
+
+
 PASSED_BEFORE = [
+    ("distance_field_weight", of_each_cell_once, "each of them counts"),
+    ("landmark_weight", of_the_landmark_that_fits_best, "row k of z is of row k"),
+    ("sample_motion", deviations_by_halves, "spread ahead"),
+    (
+        "should_resample",
+        lambda w, t: bool(particles.effective_size(w) < int(t * len(w))),
+        "nor threshold * len(weights)",
+    ),
+    (
+        "should_resample",
+        lambda w, t: bool(particles.effective_size(w) < round(t * len(w))),
+        "nor threshold * len(weights)",
+    ),
+    ("multiply_weights", late(lambda k, n: (k - 1) % n == 0), "in steps 1, n + 1"),
+    ("multiply_weights", late(lambda k, n: k % n == 1), "in steps 1, n + 1"),
+    ("circular_mean", lambda a, w: np.angle(np.exp(1j * a * w / w.mean()).mean()), "does not turn it"),
     ("sample_motion", drawn_as(lambda z: np.clip(z, -3, 3)), "Is the noise cut off"),
     ("sample_motion", drawn_as(lambda z: np.vstack([z[: (len(z) + 1) // 2], z[: len(z) // 2]])), "the same noise"),
     ("sample_motion", drawn_as(lambda z: z - z.mean(0)), "adds up to nothing"),
@@ -492,7 +539,7 @@ PASSED_BEFORE = [
     ("resample_roulette", one_too_low, "one too low"),
     ("resample_roulette", drawn_by(np.square), "squares of the weights"),
     ("resample_roulette", drawn_by(np.exp), "no logarithms"),
-    ("resample_systematic", lambda w, rng: np.sort(drawn_by(np.asarray)(w, rng)), "exactly once"),
+    ("resample_systematic", lambda w, rng: np.sort(drawn_by(np.asarray)(w, rng)), "independent spins"),
     (
         "sample_motion",
         lambda x, u, dt, s, rng: odometry.step(x, moved_by(u, s, len(x), rng), dt, "euler"),
@@ -568,6 +615,44 @@ def test_a_walk_that_ends_after_ten_meters_meets_a_longer_hall():
         return next(hit, r_max)
 
     assert judge("cast_ray", ten_meters).status == NOT_YET
+
+
+FAR_FROM_OTHERS = """
+def answer(log_weights):
+    top = np.max(log_weights)
+    return top + np.log(np.sum(np.exp(log_weights[log_weights > top - 10] - top)))
+"""
+WITH_AN_ECHO = """
+def answer(ranges, expected, std):
+    seen = ranges < 18.0
+    e = (ranges - expected)[seen]
+    return np.sum(-0.5 * (e / std) ** 2 - np.log(std * np.sqrt(2 * np.pi)))
+"""
+
+
+@pytest.mark.parametrize("name, text", [("log_sum_exp", FAR_FROM_OTHERS), ("beam_weight", WITH_AN_ECHO)])
+def test_a_condition_that_leaves_out_what_counts_is_to_be_true(name, text):
+    told = [judge(name, typed(text), seed).text for seed in range(2)]
+    assert all("it does not belong there, but True in its place" in words for words in told)
+
+
+def test_a_control_is_blamed_where_the_noise_is_right_for_another_one_alone():
+    def never_standing(x, u, dt, s, rng):
+        return odometry.step(x, u + s * np.any(u) * rng.standard_normal((len(x), 2)), dt)
+
+    told = [
+        ch09._of_the_control(move, (0.0, 0.0), (0.2, 0.3), 0.5, ch09.ANY_CONTROL, np.random.default_rng(0))
+        for move in (never_standing, deviations_by_halves)
+    ]
+    assert told == [("right for u = [1, 0], but ", ch09.ANY_CONTROL), ("", ch09.ANY_SPREAD)]
+
+
+def test_a_test_that_rejects_the_spoke_wheel_by_luck_is_tried_more_often():
+    def at_times(resample, rng):
+        return ch09.hunt_1(resample, rng) and (resample is not particles.resample_systematic or next(turns))
+
+    turns = iter([True] * 5 + [False, True, True, True])
+    assert "now and then also rejects a correct function (the spoke wheel" in judge("hunt_1", at_times).text
 
 
 def test_a_hunt_that_looks_at_the_last_index_alone_is_not_enough():

@@ -1016,6 +1016,30 @@ def test_what_stays_between_calls_is_told(function, words):
     assert words in DOUBLE.judge(function, rng=np.random.default_rng(0)).text
 
 
+def counts_its_calls(step, n):
+    KEPT.append(step)
+    return step, len(KEPT) % n == 0
+
+
+def test_what_counts_its_calls_is_told_so_and_not_taken_for_a_mistake(monkeypatch):
+    monkeypatch.setitem(globals(), "KEPT", [])
+    cycle = Exercise(
+        "cycle",
+        reference=lambda step, n: (step, step % n == 0),
+        draw=lambda rng: (int(rng.integers(2, 5)) * 7, 7),
+        metric=metrics.Several(metrics.Numbers(), metrics.Exactly(), names=("step", "due")),
+        hints=("a", "b", "c"),
+        mistakes=[Mistake(lambda step, n: (step, False), "never")],
+    )
+    told = cycle.judge(counts_its_calls, rng=np.random.default_rng(0)).text
+    assert "called twice with the same arguments" in told and "`KEPT`" in told
+    assert cycle.judge(lambda step, n: (step, False), rng=np.random.default_rng(0)).text == "never"
+
+
+def test_what_raises_on_data_of_the_notebook_is_told_of_them():
+    assert "reads `KEPT` from the notebook" in DOUBLE.judge(lambda v: [0.0][len(KEPT) + 1] * v).text
+
+
 def test_an_array_that_nobody_writes_into_is_not_overwritten():
     assert "overwrites" not in DOUBLE.judge(lambda v: BUFFER, rng=np.random.default_rng(0)).text
 
