@@ -761,25 +761,34 @@ class _Trial:
             return False
 
     def _deviation(self):
-        """The worst deviation on the plain draws; if some of them were right, also a call that was not."""
+        """The worst deviation on the plain draws, or that of the call beside it; if some draws were right, a call that
+        was not.
+        """
         metric, pairs = self.exercise.metric, self._plain_pairs()
-        worst = [d for pair in pairs for d in metric.deviations(*pair) if not d.within]
-        if not worst:
+        most = self._worst(pairs)
+        if most is None:
             return "right on most draws, but not on all."
-        most = max(worst, key=lambda d: d.amount / max(d.tolerance, 1e-300))
         near = relations.not_accurate_enough(most)
         if near and not self._right_to_many_digits(most):
             return near
-        told = _closed(cases.result_words(pairs) or str(most))
         missed = [(args, *pair) for args, pair in zip(self.inputs, pairs) if not metric.equal(*pair)]
+        example = self._example(*missed[0])
+        if len(missed) < len(pairs):
+            example = example or f"{NOT_RIGHT}{self._call(missed[0][0])}"
+        told = _closed(cases.result_words(pairs) or str(self._worst([missed[0][1:]]) if example else most))
         if len(missed) == len(pairs):
             side = cases.side_words(pairs)
             told = f"{told[:-1]}, and {side}." if side else told
-            return told + self._right_parts() + self._example(*missed[0])
+            return told + self._right_parts() + example
         special = self._special_case()
         asked = ", perhaps by chance." if self._is_choice() else ": which case is special?"
         right = special or f"It was right on {len(pairs) - len(missed)} of {len(pairs)} draws{asked}"
-        return f"{told} {right}{self._example(*missed[0]) or f'{NOT_RIGHT}{self._call(missed[0][0])}'}"
+        return f"{told} {right}{example}"
+
+    def _worst(self, pairs):
+        """The deviation that is farthest beyond its tolerance; None where none is."""
+        off = [d for pair in pairs for d in self.exercise.metric.deviations(*pair) if not d.within]
+        return max(off, key=lambda d: d.amount / max(d.tolerance, 1e-300), default=None)
 
     def _example(self, args, result, expected):
         """One call that did not come out right, with what it gives, if all can be shown whole; the right result is told

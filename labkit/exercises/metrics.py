@@ -6,6 +6,7 @@ deviations from the expected value, each with a unit and a tolerance.
 
 import inspect
 from dataclasses import dataclass
+from decimal import Decimal
 
 import numpy as np
 
@@ -145,6 +146,8 @@ def _real(array, result, wanted):
     if array.dtype.kind == "b":
         raise Refused(f"{wanted}, got True or False: is there a comparison where a formula should be?")
     if array.dtype.kind == "O":
+        if any(isinstance(entry, Decimal) for entry in array.ravel()):
+            raise Refused(f"{wanted}, got a Decimal, which does not mix with floats: float(...) makes one of it")
         try:
             array = array.astype(float)
         except Exception:
@@ -326,6 +329,8 @@ class Exactly(Metric):
     """Counts, words, truth values, sets: equal or not."""
 
     def admit(self, result, expected):
+        if result is None and isinstance(expected, set | frozenset):
+            raise Refused("it returned None, and a set is expected: is a `return` missing? The empty set is set()")
         if result is None and expected is not None:
             raise Refused("it returned None: is a `return` missing?")
         if isinstance(expected, set | frozenset):
@@ -351,7 +356,9 @@ class Exactly(Metric):
         if isinstance(result, np.generic) or (isinstance(result, np.ndarray) and result.size == 1):
             result = result.item()
         if isinstance(result, str) and isinstance(expected, str) and _plain(result) == _plain(expected):
-            return expected
+            if result.strip().lower() == expected.lower():
+                return expected
+            raise Refused(f"{result!r} is the right word, but it is written {expected!r}: who compares asks for that")
         if isinstance(expected, bool) and type(result) is int and result in (0, 1):
             result = bool(result)
         kinds = ((bool,), "True or False"), ((str,), "a word"), ((int,), "a whole number")

@@ -73,6 +73,8 @@ COARSE, FINE = 1e-6, 1e-6  # from which on a bound or a step of differences may 
 FINER = -1  # the rank of what is made finer: few changes, tried by themselves, before others make loops without an end
 ITERATION = 20  # rounds of a loop that goes on until nothing changes, and not through what is given
 ROUNDS = 200  # of a loop, or ten times as many as it has: enough for what converges
+STACKS = {"column_stack", "hstack", "vstack", "stack", "concatenate"}
+STACKED = "the part"  # how what is wrong begins where one part less is put together
 SIZES = ("len({})", "len({}) - 1", "{}.shape[-1]")  # what a number that is typed in may stand for
 TURNS = {90: "np.pi / 2", 180: "np.pi", 360: "2 * np.pi"}
 ROUNDING = ("round", "around")
@@ -274,7 +276,7 @@ def mending(function):
     found = [*_finer(function), *found, *_counted_by_loops(function), *_everywhere(found)]
     found += [*_finer_differences(function), *_with_an_outer_product(function), *_of_rounds(function)]
     found += [*_begun_late(function), *_typed_numbers(function), *_exchanged_throughout(function)]
-    found += [*_shorter_steps(function), *_rounded_pi(function), *_never_reached(function)]
+    found += [*_shorter_steps(function), *_rounded_pi(function), *_never_reached(function), *_unstacked(function)]
     return sorted(found, key=lambda change: change.rank)
 
 
@@ -299,6 +301,19 @@ def _with_an_axis(function):
                     whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
                     mends = f"this takes all numbers together, and `axis={axis}` belongs there"
                     yield Change("", mends, 1, node, ((owner, field, whole),))
+
+
+def _unstacked(function):
+    """Arrays put together of one part less."""
+    for call in (node for node in ast.walk(function) if isinstance(node, ast.Call) and node.args):
+        name, parts = getattr(call.func, "attr", ""), call.args[0]
+        if name not in STACKS or not isinstance(parts, ast.List | ast.Tuple) or len(parts.elts) < 2:
+            continue
+        for i, part in enumerate(parts.elts):
+            new = type(parts)([*parts.elts[:i], *parts.elts[i + 1 :]], ast.Load())
+            _locate(new, parts)
+            mends = f"{STACKED} `{ast.unparse(part)}` is too many"
+            yield Change("", mends, 1, parts, ((call, "args", [new, *call.args[1:]]),))
 
 
 def _takes_all(node):

@@ -221,7 +221,10 @@ class Search:
                 for plans, case in zip(ones, self.cases)
             )
             if any(np.ptp(value) for value in drawn) and all(fit == [True] for fit in fits):
-                return f"{self._where(k)}: with 1 everywhere in its place, your result is right, so it is not needed."
+                one = "True" if _is_condition(self.written.places[k][1]) else "1"
+                return (
+                    f"{self._where(k)}: with {one} everywhere in its place, your result is right, so it is not needed."
+                )
         return None
 
     def _may_be_said(self, mends):
@@ -257,6 +260,7 @@ class Search:
         around += [(k, words) for k, (_, at, _, words) in enumerate(changes) if at > line and not finer]
         case = [k for k, words in around if words.endswith(("never happen", "always happen"))]
         less = [k for k, text, words in at_line if text == code and TOO_MANY in words]
+        less += [k for k, text, words in at_line if words.startswith(mutation.STACKED) and _bare(code) in _bare(text)]
         plan = self.mending([("code", k) for k in case + (less if " stands where " in mends else [])])
         return number if plan is None else plan[1]
 
@@ -636,6 +640,14 @@ def _traces(written, cases, budget):
 def _bare(code):
     """A part of the code without the larger one in which it is quoted."""
     return code.partition(rerun.WITHIN)[0]
+
+
+def _is_condition(code):
+    """Whether what code binds is made of comparisons: an array of True and False."""
+    value = getattr(ast.parse(code).body[0], "value", None)
+    logical = isinstance(value, ast.BinOp) and isinstance(value.op, ast.BitAnd | ast.BitOr)
+    inverse = isinstance(value, ast.UnaryOp) and isinstance(value.op, ast.Invert)
+    return logical or inverse or isinstance(value, ast.Compare | ast.BoolOp)
 
 
 def _is_listing(code):

@@ -5,12 +5,14 @@ import itertools
 import json
 import math
 import os
+import re
 import struct
 import subprocess
 import sys
 import threading
 import time
 from dataclasses import replace
+from decimal import Decimal
 
 import numpy as np
 import pytest
@@ -452,11 +454,24 @@ def test_a_function_among_the_arguments_is_shown_by_its_name():
     assert engine._short(asserting) == "asserting"
 
 
-def test_a_word_may_be_written_in_more_than_one_way():
+def test_a_word_written_otherwise_is_told_how_it_is_written():
     words = metrics.Exactly()
-    for written in ("not stationary", " Not_Stationary", "not-stationary"):
-        assert words.equal(words.admit(written, "not stationary"), "not stationary")
+    for written in ("not_stationary", "not-stationary"):
+        with pytest.raises(metrics.Refused, match="is the right word, but it is written 'not stationary'"):
+            words.admit(written, "not stationary")
+    assert words.equal(words.admit(" Not stationary", "not stationary"), "not stationary")
     assert not words.equal(words.admit("notstationary", "not stationary"), "not stationary")
+
+
+@pytest.mark.parametrize("result", [Decimal("0.5"), np.array([Decimal("0.5"), Decimal(1)])])
+def test_a_decimal_is_refused_since_it_mixes_with_no_float(result):
+    with pytest.raises(metrics.Refused, match=r"got a Decimal, which does not mix with floats: float\(...\) makes one"):
+        metrics.Numbers().admit(result, np.zeros(np.shape(result)))
+
+
+def test_none_in_place_of_a_set_is_told_what_an_empty_set_is():
+    with pytest.raises(metrics.Refused, match=r"is a `return` missing\? The empty set is set\(\)"):
+        metrics.Exactly().admit(None, set())
 
 
 def test_truth_values_are_no_indices():
@@ -490,6 +505,22 @@ def test_wrong_on_some_draws_only_says_so():
     text = exercise.judge(lambda v: v, rng=np.random.default_rng(0)).text
     assert "draws it was wrong exactly where `v` is negative" in text
     assert "Not right when called as size(v=-" in text
+
+
+@pytest.mark.parametrize("right_below", [0.0, 3.0])
+def test_what_is_off_is_off_in_the_call_that_stands_beside_it(right_below):
+    exercise = Exercise(
+        "power",
+        reference=lambda v: 10.0**v,
+        draw=tuple(lambda rng, v=v: (v,) for v in (2.0, 4.0, 6.0, 3.5, 9.0)),
+        metric=metrics.Numbers(least=0.0),
+        hints=("a", "b", "c"),
+    )
+    text = exercise.judge(lambda v: 10.0**v + (v**v if v > right_below else 0)).text
+    off, v, result = (
+        float(re.search(p, text)[1]) for p in (r"off by (\d[\d.e+]*)", r"\(v=([\d.]+)\)", r"gives ([\d.e+]+)")
+    )
+    assert off == pytest.approx(result - 10.0**v, rel=0.01)
 
 
 def test_noisy_draw_catches_a_fit_that_is_exact_only_on_clean_data():

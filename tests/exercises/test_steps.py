@@ -154,6 +154,28 @@ def test_a_weight_that_nothing_is_to_be_multiplied_by_is_told_whole():
     assert said in told(body)
 
 
+def test_a_mask_that_leaves_nothing_out_is_true_everywhere():
+    item = replace(ITEM, reference=lambda a, b: a * b)
+    body = """
+        kept = a**2 - b**2 > 0
+        return a[kept] * b[kept]
+    """
+    text = item.judge(typed(body), rng=np.random.default_rng(0)).text
+    assert "n line 2, `kept = a**2 - b**2 > 0`: with True everywhere in its place, your result is right" in text
+
+
+@pytest.mark.parametrize("put", ["np.ones(3)", "np.arange(3.0)"])
+def test_a_part_too_many_of_what_is_put_together_is_named(put):
+    """Zeros in its place mend the rank as well, and say nothing."""
+    item = replace(ITEM, reference=lambda a, b: np.linalg.pinv(np.column_stack([a, b])).sum())
+    body = f"""
+        m = np.column_stack([{put}, a, b])
+        return np.linalg.pinv(m).sum()
+    """
+    text = item.judge(typed(body), rng=np.random.default_rng(0)).text
+    assert f"in line 2, `[{put}, a, b]`: the part `{put}` is too many." in text
+
+
 def test_no_change_is_told_that_spoils_an_argument():
     item = replace(ITEM, reference=lambda a, b: np.cumsum(b) + a[0])
     body = """
