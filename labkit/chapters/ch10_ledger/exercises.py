@@ -237,6 +237,11 @@ def _ends_at_the_exponent(printed):
     return 0.5 * 10.0 ** -len(decimals)
 
 
+def _exponent_twice(printed):
+    """The decimals as the letters behind the point, the exponent's among them, which shifts it as well."""
+    return _ends_at_the_exponent(printed) * 10.0 ** int(printed.partition("e")[2] or 0)
+
+
 def _hundreds(printed):
     whole, _, decimals = printed.strip("-").replace(",", ".").partition(".")
     return 0.5 / 10 ** len(decimals) if decimals else 0.5 * 10 ** (len(whole) - len(whole.rstrip("0")))
@@ -323,6 +328,16 @@ def _close_by_default(printed, value, bound, misprint, simulated):
     return rule(half_unit(printed) + more, abs(value - _number(printed)), bound, misprint)
 
 
+def _half_of_all(half):
+    """With one half unit for all numbers, however many digits are printed."""
+
+    def variant(printed, value, bound, misprint, simulated):
+        rule = _simulated_word if simulated else _real_word
+        return rule(half * (1 + 1e-6), abs(value - _number(printed)), bound, misprint)
+
+    return variant
+
+
 def _half_through_float(printed, value, bound, misprint, simulated):
     rule, off = _simulated_word if simulated else _real_word, abs(value - _number(printed))
     return rule(_through_float(printed) * (1 + 1e-6), off, bound, misprint)
@@ -351,6 +366,13 @@ STATUSES = (
     (
         _close_by_default,
         "np.isclose allows a share of the number besides: rtol=1e-5 unless you write rtol=0. Half unit and bound are all that is allowed.",
+    ),
+    *(
+        (
+            _half_of_all(half),
+            "Your half unit is the same for all numbers. It follows from the digits that are printed: half_unit(printed).",
+        )
+        for half in (0.005, 0.05, 0.5, 0.0005)
     ),
     (
         _half_through_float,
@@ -615,6 +637,10 @@ CHAPTER = Chapter(
                 Mistake(
                     _ends_at_the_exponent,
                     "An exponent is not read yet: in 3.20e3 two decimals stand before it, and it shifts the half unit by three places.",
+                ),
+                Mistake(
+                    _exponent_twice,
+                    "The letters of the exponent are counted as decimals: 1.5e-3 has one, the 5. Take the exponent off first.",
                 ),
                 *(
                     Mistake(

@@ -712,6 +712,37 @@ def _all_over_one_more(entries, average):
     return abs(sum(map(number, entries)) / (len(entries) + 1) - number(average)) <= allowed * (1 + 1e-9) + 1e-12
 
 
+def _close_agrees(entries, average):
+    return bool(np.isclose(sum(map(number, entries)) / len(entries), number(average)))
+
+
+def _first_alike(k, other, entries):
+    """The position that `index` finds, of several entries that are printed alike the first."""
+    return entries.index(entries[k]) if k < len(entries) else k
+
+
+def _average_at_last(entries, average):
+    """The average is suspected where no entry is."""
+    found = suspects(entries, average)
+    return found - {len(entries)} or found
+
+
+def _left_out_agrees(entries, average, otherwise):
+    """Those without whom the others agree with the average as far as all would have to; or `otherwise`."""
+    if _agree(entries, average):
+        return set()
+    slack = sum(map(half_unit, entries)) / len(entries) + half_unit(average)
+    x = np.array([number(text) for text in entries])
+    means = [np.delete(x, k).mean() if len(x) > 1 else np.nan for k in range(len(x))]
+    found = {k for k, mean in enumerate(means) if abs(mean - number(average)) <= slack * (1 + 1e-9)}
+    return found or ({len(entries)} if otherwise else found)
+
+
+def _digits_of_its_own(text):
+    """Every digit replaced by every other, a first one by 0 as well."""
+    return [text[:k] + d + text[k + 1 :] for k, c in enumerate(text) if c.isdigit() for d in "0123456789"]
+
+
 def _outlier(entries, average, agree):
     values = np.array([number(text) for text in entries])
     return set() if agree(entries, average) else {int(np.argmax(np.abs(values - values.mean())))}
@@ -761,6 +792,11 @@ TOLERANCES = (
         lambda halves, own: float(np.sqrt(np.sum(np.square(halves)))) / len(halves) + own,
         "The root of the sum of squares is for random errors. What rounding allows is the worst case: add "
         "the half units.",
+    ),
+    (
+        lambda halves, own: float(np.mean(halves) / np.sqrt(len(halves))) + own,
+        "Divided by the root of their number, half units are taken for random errors, which cancel in part. What "
+        "rounding allows is the worst case: their mean as it is.",
     ),
     (
         lambda halves, own: float(np.hypot(np.mean(halves), own)),
@@ -855,6 +891,28 @@ SUSPECTS = Exercise(
         Mistake(
             _search(agree=_allow(lambda halves, own: 0.0)),
             "All numbers were rounded: agreement to the last bit is too much to ask. Allow what their half units hide.",
+        ),
+        Mistake(
+            _search(agree=_close_agrees),
+            "np.isclose allows a small share of the number, whatever was printed. Allow what the half units of entries "
+            "and average hide.",
+        ),
+        Mistake(
+            _search(give=_first_alike),
+            "Of entries that are printed alike you name the first alone, as `index` finds it. Count the positions: "
+            "enumerate does.",
+        ),
+        Mistake(
+            _average_at_last,
+            "You suspect the average only where no entry can be it. Both may explain the gap: try all, and name all.",
+        ),
+        *(
+            Mistake(
+                functools.partial(_left_out_agrees, otherwise=otherwise),
+                "You leave one entry out after the other. A slip changes a number, it takes none away: put each of its "
+                "single slips in its place.",
+            )
+            for otherwise in (True, False)
         ),
         Mistake(
             _search(agree=_allow(lambda halves, own: own)),
@@ -972,9 +1030,12 @@ SUSPECTS = Exercise(
             _search(slips=_only("two digits swapped")),
             "Swapped digits are one kind of slip. `single_slips` lists them all.",
         ),
-        Mistake(
-            _search(slips=_only("one digit wrong")),
-            "A wrong digit is one kind of slip. `single_slips` lists them all.",
+        *(
+            Mistake(
+                _search(slips=slips),
+                "A wrong digit is one kind of slip. `single_slips` lists them all.",
+            )
+            for slips in (_only("one digit wrong"), _digits_of_its_own)
         ),
     ],
     draws=len(COLUMNS),

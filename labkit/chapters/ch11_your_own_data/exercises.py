@@ -207,6 +207,19 @@ MOTIONS = metrics.Several(metrics.Poses(1e-6, 1e-6), metrics.Poses(1e-6, 1e-6), 
 # --- references and wrong variants -----------------------------------------------------------------------------------
 
 
+def _unturned(T):
+    """The inverse of which the translation is negated, and not turned."""
+    return pose(np.swapaxes(T[:, :3, :3], 1, 2), -T[:, :3, 3])
+
+
+def _component_of_the_sine(k):
+    def variant(T, apart):
+        a, b = _axes(T)[:-apart], _axes(T)[apart:]
+        return np.arctan2(np.cross(a, b)[:, k], (a * b).sum(1))
+
+    return variant
+
+
 def _changed(change):
     def variant(T, apart):
         return change(motion.between_axes(T, apart))
@@ -267,12 +280,12 @@ def left_out(r, J):
     return influence.leave_out(r[:, None], J[:, None])[0][:, 0]
 
 
-def _without_three(r, J):
-    """Residuals under the fit to all others, where the numbers of three rows in succession are left out together."""
+def _without_several(r, J, count):
+    """Residuals under the fit to all others, where so many numbers in succession are left out together."""
     found = []
-    for i in range(0, len(r), 3):
-        J_kept, r_kept = (np.delete(a, np.s_[i : i + 3], axis=0) for a in (J, r))
-        found.append(r[i : i + 3] - J[i : i + 3] @ np.linalg.lstsq(J_kept, r_kept, rcond=None)[0])
+    for i in range(0, len(r), count):
+        J_kept, r_kept = (np.delete(a, np.s_[i : i + count], axis=0) for a in (J, r))
+        found.append(r[i : i + count] - J[i : i + count] @ np.linalg.lstsq(J_kept, r_kept, rcond=None)[0])
     return np.concatenate(found)
 
 
@@ -518,12 +531,14 @@ CHAPTER = Chapter(
                         "You multiplied the two poses without inverting one: that is no motion from one to the other."),
                 Mistake(lambda F, S: (np.swapaxes(F[:-1], 1, 2) @ F[1:], S[:-1] @ np.swapaxes(S[1:], 1, 2)),
                         "The transpose of a 4 x 4 pose is not its inverse. Use `invert`."),
+                Mistake(lambda F, S: (_unturned(F[:-1]) @ F[1:], S[:-1] @ _unturned(S[1:])),
+                        "In your inverse the translation is negated, but not turned: it is -R^T t. Use `invert`."),
                 Mistake(lambda F, S: (invert(F) @ np.roll(F, -1, 0), S @ invert(np.roll(S, -1, 0))),
                         "You closed the circle from the last row to the first: n rows make n - 1 motions."),
                 Mistake(lambda F, S: (invert(F[:-2]) @ F[2:], S[:-2] @ invert(S[2:])),
                         "You leave a row out: each motion leads from a row to the very next one."),
-                Mistake(lambda F, S: (np.diff(F, axis=0), np.diff(S, axis=0)),
-                        "Poses are not subtracted. The motion from one to the next is a product with an inverse."),
+                *(Mistake(lambda F, S, sign=sign: (np.diff(F, axis=0), sign * np.diff(S, axis=0)),
+                          "Poses are not subtracted. The motion from one to the next is a product with an inverse.") for sign in (1, -1)),
             ],
         ),
         Prediction(
@@ -567,6 +582,8 @@ CHAPTER = Chapter(
                 Mistake(_changed(np.cos), "These are the cosines: np.arccos is missing."),
                 Mistake(_changed(lambda a: np.arccos(np.abs(np.cos(a)))),
                         "Your angles end at 90 deg. An axis has a direction, the one about which the angle is positive, so two may stand at up to 180."),
+                *(Mistake(_component_of_the_sine(k),
+                          "You take one component of the cross product, with its sign. The sine is the length of all three, and no angle is below 0.") for k in (2, 0, 1)),
                 Mistake(_changed(lambda a: np.pi - a), "These are the supplements, pi less the angle, as if one of the two axes pointed the other way.", id="between_axes-208bd2"),
                 Mistake(lambda T, k: np.linalg.norm(log_so3(np.swapaxes(T[:-k, :3, :3], 1, 2) @ T[k:, :3, :3]), axis=1),
                         "This is the angle of the turn between two motions. Asked for is the angle between their axes."),
@@ -626,6 +643,9 @@ CHAPTER = Chapter(
                 *(Mistake(lambda of=of: float(np.linalg.norm(of().T[:3, 3])), "This is how far one of the two fits puts the sensor from the flange. Asked for is how far the two places are from each other.")
                   for of in (lambda: slipped().plain, slipped)),
                 Mistake(lambda: 0.0, "This is 0, as where a fit is compared with itself, or the last rows, 0 0 0 1, of two poses. The places are their last columns."),
+                *(Mistake(lambda k=k: float(np.linalg.norm((slipped().plain.T - slipped().T)[:3, k])),
+                          f"This is the length of column {k} (counted from 0) of the difference, which is that of an axis. The places are the last columns, [:3, 3].")
+                  for k in range(3)),
                 Mistake(lambda: slip_cost() ** 2, "This is the squared distance: a root is missing."),
                 Mistake(lambda: slipped().plain.rms_translation, "This is the rms of the fit to all rows, not where it puts the sensor."),
                 Mistake(lambda: slipped().plain.rms_translation - slipped().rms_translation,
@@ -669,7 +689,8 @@ CHAPTER = Chapter(
                 Mistake(lambda r, J: r / (1 - (J**2).sum(1)), "(J^T J)^-1 is missing between the two rows of J.", id="left_out-90a3f2"),
                 Mistake(lambda r, J: r / (1 - ((J @ J.T @ J) * J).sum(1)), "J^T J stands between the two rows of J as it is: its inverse belongs there.", id="left_out-b026e8"),
                 Mistake(lambda r, J: r / (1 - _shares(J).max()), "You took the largest share for all. Each number has a share of its own."),
-                Mistake(_without_three, "You leave out three numbers at once, as those of one position. Here each number is left out alone."),
+                *(Mistake(functools.partial(_without_several, count=count), f"You leave out {words}. Here each number is left out alone.")
+                  for count, words in ((3, "three numbers at once, as those of one position"), (6, "six numbers at once, as those of one pose"), (2, "two numbers at once"))),
                 Mistake(lambda r, J: r - _shares(J), "You subtracted h, a share without unit, from a residual. What is left of an error is 1 - h of it: divide by that."),
                 Mistake(lambda r, J: r * (1 + _shares(J)), "1 + h is only the beginning of 1 / (1 - h): right for small shares."),
                 Mistake(lambda r, J: r / (1 - _shares(J)) ** 2, "You divided by 1 - h twice."),
@@ -722,6 +743,11 @@ CHAPTER = Chapter(
                         "This is the covariance for a noise that is known. Yours is estimated: Student's factor f / (f - 2) is missing."),
                 Mistake(_covariance(lambda rr, n, f: rr / (f - 1) * (f - 1) / (f - 3)),
                         "Altogether you divide r^T r by f - 3, with f = n - p. The noise r^T r / f times Student's f / (f - 2) leaves f - 2 below.", id="honest_covariance-5a6d1b"),
+                Mistake(lambda r, J: r @ r / (_freedom(r, J) - 2) * _diagonal_alone(J.T @ J),
+                        "You invert J^T J by its diagonal alone. What two parameters share stands beside it: the inverse of a matrix is np.linalg.inv."),
+                *(Mistake(lambda r, J, student=student: student(_freedom(r, J)) * np.linalg.inv(J.T @ J) @ (J.T * r**2) @ J @ np.linalg.inv(J.T @ J),
+                          "You let each residual stand for the noise of its own number. Here all have one noise, estimated from all: s^2 = r^T r / f.")
+                  for student in (lambda f: f / (f - 2), lambda f: 1.0)),
                 Mistake(_covariance(lambda rr, n, f: 1.0), "The noise is missing: this is the covariance for readings of standard deviation 1."),
                 Mistake(_covariance(lambda rr, n, f: np.sqrt(rr / f) * f / (f - 2)), "You multiplied by s. A covariance takes its square."),
                 Mistake(_covariance(lambda rr, n, f: rr / f * np.sqrt(f / (f - 2))),
@@ -897,7 +923,8 @@ CHAPTER = Chapter(
                 Mistake(lambda J, s, k: k * s**2 / np.sqrt(1 - _shares(J)), "You took the variance of the noise. Its standard deviation belongs here."),
                 Mistake(lambda J, s, k: np.full(len(J), k * s / np.sqrt(1 - J.shape[1] / len(J))),
                         "You gave every number the mean share p / n. Each row of J has a share of its own."),
-                Mistake(lambda J, s, k: k * s / np.sqrt(1 + _shares(J)), "1 + h belongs to a number that was not fitted. These were: 1 - h."),
+                *(Mistake(lambda J, s, k, power=power: k * s * (1 + _shares(J)) ** power, "1 + h belongs to a number that was not fitted. These were: 1 - h.")
+                  for power in (-0.5, 0.5)),
                 Mistake(lambda J, s, k: k + s / np.sqrt(1 - _shares(J)), "You added `times`. It says how many of these standard deviations: multiply."),
                 *(Mistake(lambda J, s, k, f=f: k * s / np.sqrt(f(1 - s**2 * _shares(J))),
                           "The noise does not belong into h: with equal noise the share of a number follows from J alone.") for f in (np.abs, np.asarray)),
