@@ -145,9 +145,8 @@ def status(printed, value, bound, misprint, simulated):
 def suspects(entries, average):
     """Return the set of positions whose single slip explains a disagreement.
 
-    entries: strings such as "9.06", without commas; average: one more, at position
-    len(entries). Rounding explains `bound` of the mean and half a unit of the
-    average; if that suffices: empty.
+    entries: strings, no commas; average: one more, at len(entries). Rounding explains
+    `bound` of the mean and half a unit of the average; if that suffices: empty.
     """
     ### BEGIN SOLUTION
     def agree(numbers):
