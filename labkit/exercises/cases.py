@@ -181,8 +181,15 @@ def _of_array(here, array):
         found[f"{here} is not square"] = array.shape[0] != array.shape[1]
         found[f"{here} has more rows than columns"] = array.shape[0] > array.shape[1]
         found[f"{here} has fewer rows than columns"] = array.shape[0] < array.shape[1]
-        found |= _of_points(here, array)
+        found |= _of_points(here, array) | _of_eigenvalues(here, array)
     return found
+
+
+def _of_eigenvalues(here, matrix):
+    """Whether a symmetric matrix bends down somewhere."""
+    if matrix.shape[0] != matrix.shape[1] or not np.isfinite(matrix).all() or not np.allclose(matrix, matrix.T):
+        return {}
+    return {f"{here} has a negative eigenvalue": bool(np.linalg.eigvalsh(matrix)[0] < 0)}
 
 
 def _of_points(here, points):

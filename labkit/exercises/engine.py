@@ -29,7 +29,8 @@ from .typeset import typeset
 TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
 NOISY = "exact on clean data, but the data are not weighed as they should be: on noisy data"
 TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws of each kind
-BEFORE = "It was right before, on other draws: what is different about this one, its shapes perhaps?"
+BEFORE = "It was right before, on other draws: what is different about this one?"
+OTHER_SHAPES = "It was right before, on other draws: what is different about this one, its shapes perhaps?"
 NOT_RIGHT = "\nNot right when called as "
 MANY_DIGITS = 1e-3  # by how much better some draws come out where one case is special
 TELLING = 6  # draws on which a choice is wrong as by an explanation, so that this is not chance
@@ -245,9 +246,11 @@ class _Trial:
             if self.defaults.may_fill and self._is_right_on(self.defaults.fresh, args, metric, expected):
                 return self.outcome(NOT_YET, self.defaults.words())
             named = self._named_by_failing(run.error, args)
+            if named:
+                return named
             told = self._raised(run, args, words)
             endless = isinstance(run.error, RecursionError | MemoryError)  # it would be so again and again
-            return named or (told if endless else self._mended(told, args, metric, expected))
+            return told if endless else self._mended(told, args, metric, expected)
         if run.changed:
             names = ", ".join(f"`{name}`" for k, name in enumerate(self._names(args)) if k in run.changed)
             return self.outcome(NOT_YET, f"your function changes its argument {names} in place: work on a copy.")
@@ -273,7 +276,7 @@ class _Trial:
                 return self.outcome(NOT_YET, self.defaults.words())
         if run.error is not None:
             return self._raised(run, ())
-        return self.outcome(NOT_YET, str(run.result)) if run.result else None
+        return self.outcome(NOT_YET, f"{run.result}{self._about_globals()}") if run.result else None
 
     def _is_right_on(self, function, args, metric, expected):
         """Whether another function succeeds where the student's has stopped."""
@@ -775,7 +778,9 @@ class _Trial:
         example = self._example(*missed[0])
         if len(missed) < len(pairs):
             example = example or f"{NOT_RIGHT}{self._call(missed[0][0])}"
-        told = _closed(cases.result_words(pairs) or str(self._worst([missed[0][1:]]) if example else most))
+        own = isinstance(metric, metrics.Exactly) and type(metric).deviations is not metrics.Exactly.deviations
+        words = None if own else cases.result_words(pairs)
+        told = _closed(words or str(self._worst([missed[0][1:]]) if example else most))
         if len(missed) == len(pairs):
             side = cases.side_words(pairs)
             told = f"{told[:-1]}, and {side}." if side else told
@@ -815,9 +820,12 @@ class _Trial:
         sizes = [max((d.amount for d in m.deviations(*pair)), default=0.0) for _, m, pair in self._cases()]
         return len(sizes) > 1 and min(sizes) < MANY_DIGITS * worst.amount
 
-    def _special_case(self):
-        """What the draws on which the answer is wrong have in common, fresh ones among them, as a sentence."""
+    def _special_case(self, stopped=()):
+        """What the draws on which the answer is wrong have in common, fresh ones among them, as a sentence; `stopped`
+        are the arguments of one on which it raised.
+        """
         draws = [(args, pair[1], not m.equal(*pair)) for args, m, pair in self._cases()]
+        draws += [(stopped, None, True)] if stopped else []
         kind = Budget(max(SPECIAL, self.budget.left()))
         for number in range(MORE_DRAWS):
             if kind.left() < SPECIAL / 2:
@@ -831,7 +839,8 @@ class _Trial:
         if words is None or not words.startswith("exactly"):
             given = [args for args, *_ in draws]
             words = own_steps.condition_words(self.function, given, missed, kind) or words
-        return words and f"On {len(draws)} draws it was wrong {words}."
+        was = "was not right" if stopped else "was wrong"
+        return words and f"On {len(draws)} draws it {was} {words}."
 
     def _call(self, args):
         given = ", ".join(f"{name}={_short(arg)}" for name, arg in zip(self._names(args), args))
@@ -843,6 +852,12 @@ class _Trial:
         names = own.co_varnames[: own.co_argcount] if own else ()
         names = names if len(names) == len(args) else self.exercise.arguments
         return [names[k] if k < len(names) else f"argument {k + 1}" for k in range(len(args))]
+
+    def _before(self, args):
+        """That it was right before, and whether shapes may be what is different now."""
+        shapes_before = [[np.shape(arg) for arg in others if isinstance(arg, np.ndarray)] for others in self.inputs]
+        shape = [np.shape(arg) for arg in args if isinstance(arg, np.ndarray)]
+        return BEFORE if shape in shapes_before else OTHER_SHAPES
 
     def _raised(self, run, args, words=None):
         error = run.error
@@ -877,7 +892,8 @@ class _Trial:
         said = run.said or WORDLESS.get(type(error), "" if isinstance(error, AssertionError) else "it says no more")
         if isinstance(error, AssertionError) and not said:
             said = "`assert` raises; an answer is handed over with `return`"
-        advice = next((f". {told}" for words, told in ADVICE.items() if re.search(words, said)), "")
+        handed = scope.handed_over(error, dict(zip(self._names(args), args)), self.exercise.reference)
+        advice = handed or next((f". {told}" for words, told in ADVICE.items() if re.search(words, said)), "")
         if not (advice or args or run.line):
             advice = ". What your function returned could not be worked with."
         where = f"\nin {run.line}" if run.line else ""
@@ -889,7 +905,7 @@ class _Trial:
             return f"\nwhen given {error.given}" if hasattr(error, "given") else ""
         told = f"\nwhen called as {self._call(args)}"
         if self.pairs and all(m and m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)):
-            told += f"\n{_lead(words) or BEFORE}"
+            told += f"\n{_lead(words) or self._special_case(args) or self._before(args)}"
         return told + self._about_globals()
 
 

@@ -78,6 +78,7 @@ STACKED = "the part"  # how what is wrong begins where one part less is put toge
 SIZES = ("len({})", "len({}) - 1", "{}.shape[-1]")  # what a number that is typed in may stand for
 TURNS = {90: "np.pi / 2", 180: "np.pi", 360: "2 * np.pi"}
 ROUNDING = ("round", "around")
+REPETITIONS = ("tile", "repeat")
 TYPED = 2  # the rank of a number that is typed in
 ROUNDED = 2e-3  # how far, relatively, a number may lie from a multiple of pi that it is meant to be
 PARTNERS = 12  # values read in one step of which any two may have changed places
@@ -271,7 +272,8 @@ def mending(function):
     found = changes(function)
     narrower = list(_narrower(function, found))
     found = [change for change in found if not any(change is other for other in narrower)]
-    found = [change for change in found if change.place not in set(_digits_left(function))]
+    meant = {*_digits_left(function), *_not_repeated(function)}
+    found = [change for change in found if change.place not in meant]
     found += _with_an_axis(function)
     found = [*_finer(function), *found, *_counted_by_loops(function), *_everywhere(found)]
     found += [*_finer_differences(function), *_with_an_outer_product(function), *_of_rounds(function)]
@@ -286,6 +288,14 @@ def _digits_left(function):
         if getattr(call.func, "attr", getattr(call.func, "id", "")) in ROUNDING:
             yield from (part for part in call.args if isinstance(part, ast.Constant))
             yield from (keyword.value for keyword in call.keywords)
+
+
+def _not_repeated(function):
+    """Each 1 that says along which axis nothing is repeated: with a 0 in its place the whole is left out."""
+    for call in (node for node in ast.walk(function) if isinstance(node, ast.Call)):
+        if getattr(call.func, "attr", "") in REPETITIONS:
+            parts = (part for argument in call.args[1:] for part in ast.walk(argument))
+            yield from (part for part in parts if isinstance(part, ast.Constant) and part.value == 1)
 
 
 def _with_an_axis(function):

@@ -522,7 +522,7 @@ OTHERWISE = (  # (what it should have been, function of the value [and of an arg
     ("its last row or entry does not belong there", lambda v: _kept_rows(v, np.s_[:-1])),
     ("its first row or entry does not belong there", lambda v: _kept_rows(v, np.s_[1:])),
     ("it belongs there wrapped to between -pi and pi", lambda v: np.angle(np.exp(1j * v))),
-    ("it belongs there not below 0", lambda v: np.maximum(v, 0.0)),
+    ("what is below 0 is to be 0 there", lambda v: np.maximum(v, 0.0)),
     ("its logarithm belongs there", np.log),
     ("its exponential belongs there", np.exp),
     ("its sine belongs there", np.sin),

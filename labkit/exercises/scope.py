@@ -1,10 +1,13 @@
 """What a checked function sees besides its arguments: its own name, the notebook's data, the library's twin."""
 
 import contextlib
+import copy
 import dis
 import functools
 import sys
 import types
+
+import numpy as np
 
 from . import guard
 
@@ -90,6 +93,48 @@ def _refusing(twin, where, theirs):
         return twin(*args, **kwargs)
 
     return guarded
+
+
+def handed_over(error, given, reference):
+    """What a function that is an argument was called with where it raised, as one more sentence, "" where none did.
+
+    Parameters
+    ----------
+    error : Exception
+    given : dict of object
+        The arguments by name.
+    reference : function
+        The solution, which tells of what shape the function takes its own argument.
+    """
+    codes = {value.__code__: name for name, value in given.items() if isinstance(value, types.FunctionType)}
+    trace = error.__traceback__
+    while trace is not None and trace.tb_frame.f_code not in codes:
+        trace = trace.tb_next
+    if trace is None or not trace.tb_frame.f_code.co_argcount:
+        return ""
+    code = trace.tb_frame.f_code
+    shape = np.shape(trace.tb_frame.f_locals[code.co_varnames[0]])
+    taken = _shapes_taken(reference, given, codes[code])
+    if len(taken) != 1 or shape in taken:
+        return ""
+    return f". Here `{codes[code]}` is called with {_of_shape(shape)}, and takes {_of_shape(*taken)}."
+
+
+def _of_shape(shape):
+    return f"an array of shape {shape}" if shape else "a single number"
+
+
+def _shapes_taken(reference, given, name):
+    """Shapes of what the solution calls a function with that is one of its arguments."""
+    shapes = set()
+
+    def noting(x, *others):
+        shapes.add(np.shape(x))
+        return given[name](x, *others)
+
+    with contextlib.suppress(Exception):  # a reference may ask for more than a function
+        reference(*copy.deepcopy([noting if key == name else value for key, value in given.items()]))
+    return shapes
 
 
 def notebook_data(function):

@@ -57,7 +57,7 @@ def test_an_inverse_written_for_two_rows_meets_three():
         return bool(y @ (np.array([[d, -b], [-c, a]]) / (a * d - b * c)) @ y < limit)
 
     status, texts = judged("gate", by_hand)
-    assert status == RAISED and all("It was right before" in text for text in texts)
+    assert status == RAISED and all("exactly where `y` does not have 2 entries" in text for text in texts)
 
 
 def test_arrays_that_hold_one_number_are_no_numbers():

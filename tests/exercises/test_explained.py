@@ -258,6 +258,69 @@ def test_the_special_case_is_named_behind_the_entry_that_is_wrong():
     assert text.startswith("only entry 1 (counted from 0) is not right") and "exactly where `std` is negative" in text
 
 
+def test_the_call_that_is_shown_is_the_one_that_is_off_by_so_much():
+    item = exercise(lambda x, std: np.sin(x) + 1.7 * std, lambda rng: (rng.uniform(1, 9), rng.uniform(0.1, 9)))
+    text = told(item, "return np.sin(x) + 1.7 * std + 0.3 * np.exp(-x) * np.log(1 + std) ** 1.3")
+    amount, x, std = (float(v) for v in re.search(r"off by (\S+?)\D? .*x=(\S+), std=(\S+)\)", text, re.DOTALL).groups())
+    assert amount == pytest.approx(0.3 * np.exp(-x) * np.log(1 + std) ** 1.3, rel=0.01)
+
+
+def test_what_stops_on_some_draws_only_is_told_where():
+    def formula(x, std):
+        return x * std if std > 0 else x / None
+
+    item = exercise(lambda x, std: x * std, lambda rng: (rng.normal(size=2), float(rng.choice([-1.3, 1.7]))))
+    texts = [item.judge(formula, rng=np.random.default_rng(seed)).text for seed in range(3)]
+    right_before = [text for text in texts if "exactly where `std` is negative" in text]
+    assert right_before and not any("shapes" in text for text in texts)
+
+
+def test_of_shapes_is_asked_only_where_they_differ():
+    trial = engine._Trial(exercise(lambda x, std: x * std, _draw), None)
+    trial.inputs = [(np.ones(4), 1.0), (np.ones(2), 2.0)]
+    assert trial._before((np.zeros(2), 3.0)) == engine.BEFORE and "shapes" in trial._before((np.ones(3), 1.0))
+
+
+class counted(metrics.Exactly):
+    """A set whose deviation is told in words of its own."""
+
+    def deviations(self, result, expected):
+        return [metrics.Deviation("", float(len(result ^ expected)), "", 0.5, words="one tree too many")]
+
+
+def test_what_a_metric_says_of_a_set_comes_before_what_is_said_of_all_sets():
+    item = exercise(lambda x, std: {int(v) for v in x}, lambda rng: (rng.integers(0, 99, 5), 1.0), counted())
+    assert told(item, "return {int(v) for v in x} | {100}").startswith("one tree too many")
+
+
+def test_a_function_that_is_handed_over_says_what_it_was_called_with():
+    def draw(rng):
+        a = rng.normal(size=3)
+        return (lambda y: float(a @ y)), rng.normal(size=3)
+
+    item = exercise(lambda f, x: f(2 * x), draw)
+    rows = item.judge(lambda f, x: f(np.ones((5, 3)) * x), rng=np.random.default_rng(0)).text
+    assert "Here `f` is called with an array of shape (5, 3), and takes an array of shape (3,)." in rows
+    assert "inner sizes" not in rows
+
+    def of_a_number(f, x):
+        return f(x) @ x[:2]
+
+    assert "Here `f`" not in item.judge(of_a_number, rng=np.random.default_rng(0)).text
+
+
+def test_a_one_that_says_along_which_axis_nothing_is_repeated_is_no_slip():
+    function = ast.parse("def f(x, n):\n    return np.tile(x, (n, 1)) + 1").body[0]
+    ones = [change.mends for change in mutation.mending(function) if change.mends.startswith("1 stands where")]
+    assert len(ones) == len(set(ones)) and "1 stands where 0 belongs" in ones
+
+
+def test_a_matrix_that_bends_down_is_a_case():
+    drawn = [np.array([[2.0, -1.5], [-1.5, 1.0 if k % 3 else 2.0]]) for k in range(30)]
+    draws = [({"H": H}, 0.5) for H in drawn]
+    assert "`H` has a negative eigenvalue" in cases.case_words(draws, [k % 3 > 0 for k in range(30)])
+
+
 def test_a_result_that_is_nearly_right_by_chance_is_told_so():
     item = exercise(lambda x, std: x + std**2, lambda rng: (rng.uniform(1, 3), rng.uniform(1, 2)))
     many = "r = np.random.default_rng(0)\nreturn x + np.var(std * r.normal(size=300))"

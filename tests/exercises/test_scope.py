@@ -69,6 +69,19 @@ def test_data_of_the_notebook_that_a_function_reads_are_named():
     assert outcome.status == NOT_YET and "`poses`" in outcome.text and "helper" not in outcome.text
 
 
+def test_data_of_the_notebook_are_named_behind_a_property_too():
+    item = Exercise(
+        "drawn",
+        reference=lambda rng: rng.normal(),
+        draw=lambda rng: (rng,),
+        draws=0,
+        properties=(lambda f, rng: None if f(rng) < 3 else "too large.",),
+        hints=("a", "b", "c"),
+    )
+    outcome = item.judge(typed("def drawn(rng): return limit", limit=5.0))
+    assert outcome.status == NOT_YET and outcome.text.startswith("too large.\nYour function reads `limit`")
+
+
 def test_notebook_data_are_found_in_inner_functions_and_modules_are_none():
     function = typed(
         "def f(x):\n    g = lambda y: y + offset\n    return np.sum(g(x)) * frames.MIN_ARM", offset=1.0, frames=frames
