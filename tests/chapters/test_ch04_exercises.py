@@ -1,5 +1,7 @@
 """Answers to chapter 4 that once passed by luck, or were told something untrue."""
 
+import copy
+import functools
 import math
 
 import numpy as np
@@ -9,7 +11,6 @@ from labkit.chapters.ch04_optimization import beyond
 from labkit.chapters.ch04_optimization.exercises import CHAPTER
 from labkit.documents.thesis import wells
 from labkit.estimation import optimization as opt
-from labkit.exercises import engine
 from labkit.exercises.engine import CORRECT, NOT_YET
 
 ITEMS = {item.id: item for item in CHAPTER.items}
@@ -23,6 +24,27 @@ def judged(name, answer, seed=0):
 def kind(H):
     e = np.linalg.eigvalsh(H)
     return "minimum" if e[0] > 0 else "maximum" if e[1] < 0 else "saddle"
+
+
+@functools.cache
+def one_check(name, seed=0):
+    """(arguments, metric, right result) of all draws of one check."""
+    item, rng = ITEMS[name], np.random.default_rng(seed)
+    drawn = [(draw(rng), metric) for draw, metric, _ in item._plan()]
+    return [(args, metric, item.reference(*copy.deepcopy(args))) for args, metric in drawn]
+
+
+def is_missed(answer, args, metric, expected):
+    """Whether an answer is not right on one draw."""
+    try:
+        return not metric.equal(metric.admit(answer(*copy.deepcopy(args)), expected), expected)
+    except Exception:  # a result that the metric refuses, or none at all
+        return True
+
+
+def is_wrong_in_a_check(name, answer, seed=0):
+    with np.errstate(all="ignore"):
+        return any(is_missed(answer, *drawn) for drawn in one_check(name, seed))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -161,14 +183,13 @@ def test_the_tipping_weight_draws_level():
     assert 9 + 8 + 6 + 3 * w == pytest.approx(3 + 3 + 8 + 8 * w)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("good, grown", [(0.9, 2), (0.75, 3)])
 def test_a_trust_region_follows_the_stated_rule(seed, good, grown):
     def follow(radius, length, rho):
         return length / 4 if rho < 0.25 else grown * radius if rho > good and length > 0.999 * radius else radius
 
-    answer = beyond.loop(follow=follow)
-    assert judged("trust_region", lambda *args: answer(*args), seed).status == NOT_YET
+    assert is_wrong_in_a_check("trust_region", beyond.loop(follow=follow), seed)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -329,10 +350,9 @@ def test_faint_curvatures_narrow_valleys_and_promised_rises_are_drawn(name, answ
     assert ITEMS[name].judge(answer, rng=np.random.default_rng(seed)).status == NOT_YET
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_poor_step_that_is_taken_shrinks_the_radius_in_every_check(seed):
-    answer = beyond.loop(follow=beyond.shrunk_where_taken_back)
-    assert ITEMS["trust_region"].judge(answer, rng=np.random.default_rng(seed)).status == NOT_YET
+    assert is_wrong_in_a_check("trust_region", beyond.loop(follow=beyond.shrunk_where_taken_back), seed)
 
 
 def by_direction(term):
@@ -370,10 +390,8 @@ def at_the_limit(g, H):
         ("trust_region", beyond.loop(follow=lambda radius, length, rho: beyond.rule(radius, length, rho, poor=0.3))),
     ],
 )  # fmt: skip
-def test_limits_and_centers_are_met_in_every_check(name, answer, seed, monkeypatch):
-    monkeypatch.setattr(engine, "LOOKING", 0.0)  # what is told is not asked here
-    with np.errstate(invalid="ignore"):
-        assert judged(name, answer, seed).status != CORRECT
+def test_limits_and_centers_are_met_in_every_check(name, answer, seed):
+    assert is_wrong_in_a_check(name, answer, seed)
 
 
 @pytest.mark.parametrize("which", ["newton", "corner"])
@@ -396,8 +414,8 @@ def test_a_square_about_the_origin_is_no_trust_region(which):
 
 def test_doubling_from_one_half_on_is_not_told_of_one_quarter():
     half = beyond.loop(follow=lambda *given: beyond.rule(*given, good=0.5))
-    told = {judged("trust_region", half, seed).text for seed in range(3)}
-    assert "" not in told and not any("not poor" in text for text in told)
+    told = judged("trust_region", half).text
+    assert told and "not poor" not in told
 
 
 def test_a_length_is_no_sum_of_absolute_values_at_any_check():
@@ -489,10 +507,8 @@ FORGETFUL = [
 
 
 @pytest.mark.parametrize("name, answer", FORGETFUL, ids=[f"{name}-{k}" for k, (name, _) in enumerate(FORGETFUL)])
-def test_what_the_docstring_admits_is_drawn_in_every_check(name, answer, monkeypatch):
-    monkeypatch.setattr(engine, "LOOKING", 0.0)  # what is told is not asked here
-    with np.errstate(all="ignore"):
-        assert judged(name, answer).status != CORRECT
+def test_what_the_docstring_admits_is_drawn_in_every_check(name, answer):
+    assert is_wrong_in_a_check(name, answer)
 
 
 @pytest.mark.parametrize("seed", range(2))

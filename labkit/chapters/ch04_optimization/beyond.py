@@ -269,6 +269,18 @@ def until_rejected(residual, jacobian, x, radius, steps):
     return x, radius
 
 
+def only_taken_count(residual, jacobian, x, radius, steps):
+    """The loop, in which rounds whose step is taken back are not counted."""
+    taken = 0
+    for _ in range(20 * steps):
+        before = x
+        x, radius = descend(residual, jacobian, x, radius, 1)
+        taken += x is not before
+        if taken == steps:
+            break
+    return x, radius
+
+
 def _problem(rng):
     """Residuals and their Jacobian: the two wells, or waves in two to four unknowns; and a start."""
     if rng.random() < 0.3:

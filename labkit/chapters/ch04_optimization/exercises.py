@@ -509,6 +509,27 @@ def _leg_by_length(g, B, radius):
     return corner + (radius - length) * leg / np.linalg.norm(leg)
 
 
+def _leg_by_shares(g, B, radius):
+    """In the second leg: its share as if the length grew evenly along it."""
+    full, corner = opt.newton_step(g, B), opt.cauchy_step(g, B, 1e9)
+    length, whole = np.linalg.norm(corner), np.linalg.norm(full)
+    if not length < radius < whole:
+        return opt.dogleg_step(g, B, radius)
+    return corner + (radius - length) / (whole - length) * (full - corner)
+
+
+def _lowest_within(g, B, radius):
+    """The lowest point of the model within the radius, by damping."""
+    step, low, high = opt.newton_step(g, B), 0.0, np.linalg.norm(g) / radius
+    if np.linalg.norm(step) <= radius:
+        return step
+    for _ in range(60):
+        middle = (low + high) / 2
+        step = np.linalg.solve(B + middle * np.eye(len(g)), -g)
+        low, high = (middle, high) if np.linalg.norm(step) > radius else (low, middle)
+    return step
+
+
 def _newton_to_the_rim(g, B, radius):
     """In the second leg: the Newton step shortened to the radius."""
     full, corner = opt.newton_step(g, B), opt.cauchy_step(g, B, 1e9)
@@ -556,6 +577,42 @@ def _dogleg(
             return rim(g, p, radius) if rim else -radius * g / np.linalg.norm(g)
         way = leg(n, p) if leg else n - p
         return p + share(way @ way, p @ way, p @ p - rim_term(radius)) * way
+
+    return variant
+
+
+def _differences(function, h, behind):
+    """The derivative by differences of a wide step, from a place `behind` steps back."""
+    return lambda x: np.stack(
+        [(function(x + e) - function(x - behind * e)) / ((1 + behind) * h) for e in h * np.eye(2)], axis=-1
+    )
+
+
+def _wide_differences(name, function):
+    """Mistakes of who takes differences, forward or with a wide step."""
+    forward = (
+        "These are forward differences: they are off by about ½h times the next derivative. Differentiate by hand, or step "
+        "to both sides, from x − h e to x + h e, with h = 1e-5."
+    )
+    central = (
+        "These are central differences with so wide a step that it shows: they are off by about h²/6 times the third "
+        "derivative. Differentiate by hand, or take h = 1e-5."
+    )
+    kinds = ((0, forward, (0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)), (1, central, (0.1, 0.01, 1e-3)))
+    return [
+        Mistake(_differences(function, h, behind), text, id=f"{name}-{'central' if behind else 'forward'}-{h:g}")
+        for behind, text, steps in kinds
+        for h in steps
+    ]
+
+
+def _repeated_entry(k):
+    """The Hessian with its other diagonal entry copied from the k-th."""
+
+    def variant(x):
+        H = wells.hessian(x)
+        H[1 - k, 1 - k] = H[k, k]
+        return H
 
     return variant
 
@@ -682,6 +739,7 @@ CHAPTER = Chapter(
                     "The depths are 100 and 200; here they are 1 and 2.",
                     id="gradient-depths",
                 ),
+                *_wide_differences("gradient", wells.value),
             ],
         ),
         Exercise(
@@ -830,6 +888,15 @@ CHAPTER = Chapter(
                     "Your outer product is divided by q⁴: the derivative of 1/q² has q³ below, times that of q.",
                     id="hessian-q4",
                 ),
+                *(
+                    Mistake(
+                        _repeated_entry(k),
+                        f"Both entries on the diagonal are those of x{k + 1}. The one of x{2 - k} holds the square of its own offset.",
+                        id=f"hessian-repeated-{k}",
+                    )
+                    for k in range(2)
+                ),
+                *_wide_differences("hessian", wells.gradient),
                 Mistake(
                     lambda x: wells.hessian(x) / 2,
                     "Half of the Hessian: the 2 of 2(x − c) is missing in both terms, or you took the Hessian of ½|r|², which is f/2 but for a constant.",
@@ -1374,6 +1441,7 @@ CHAPTER = Chapter(
                     "The outer product takes x itself. It is that of x − c, the offset from the well's center.",
                     id="jacobian-of-x",
                 ),
+                *_wide_differences("jacobian", wells.residual),
             ],
         ),
         Exercise(
@@ -1667,6 +1735,17 @@ CHAPTER = Chapter(
                     "The path bends at the corner: radius − |corner| along the second leg ends inside the rim. Solve |corner + s leg| = radius.",
                 ),
                 Mistake(
+                    _leg_by_shares,
+                    "Your s takes |corner + s leg| as growing evenly with s. Its square is quadratic in s: solve |corner + s leg|² = radius².",
+                    id="dogleg-shares",
+                ),
+                Mistake(
+                    _lowest_within,
+                    "This is the lowest point of the model within the radius, by damping. The dogleg only comes near it, on two straight legs: "
+                    "to the corner, then toward Newton.",
+                    id="dogleg-lowest",
+                ),
+                Mistake(
                     _newton_to_the_rim,
                     "Where the rim cuts the second leg you shorten the Newton step. The path runs from the corner toward Newton there.",
                 ),
@@ -1865,6 +1944,11 @@ CHAPTER = Chapter(
                     ),
                     "You try one step too many: `steps` counts those taken back as well.",
                     id="region-one-more",
+                ),
+                Mistake(
+                    beyond.only_taken_count,
+                    "You count only the steps that are taken. `steps` counts rounds, those whose step is taken back as well.",
+                    id="region-taken-rounds",
                 ),
                 Mistake(
                     lambda residual, jacobian, x, radius, steps: beyond.descend(residual, jacobian, x, radius, 1),

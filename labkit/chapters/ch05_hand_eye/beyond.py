@@ -787,7 +787,7 @@ TRIANGULATION = [
                     / base
                     * np.hypot(1 / np.sin(alpha), 1 / np.sin(beta))
                 ),
-                "The sines enter squared: the derivative of cot α is −1/sin² α.",
+                "Under the root belong the fourth powers of the sines: the derivative of cot α is −1/sin² α, and it enters squared.",
                 id="std-sine",
             ),
             Mistake(

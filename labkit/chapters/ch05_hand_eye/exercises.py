@@ -408,9 +408,14 @@ def _circle_about_mean(x, z):
     return x.mean(), z.mean(), np.hypot(x - x.mean(), z - z.mean()).mean()
 
 
-def _circle_from_its_extent(x, z):
-    r = np.ptp(x) / 2
-    return x.min() + r, z.min() + r, r
+def _circle_from_its_extent(depth):
+    """Half of the width as the radius, its middle as the center, which lies at a depth(heights, offsets, radius)."""
+
+    def variant(x, z):
+        r = np.ptp(x) / 2
+        return x.min() + r, depth(z, x - x.min() - r, r), r
+
+    return variant
 
 
 def _circle_through(numbers):
@@ -451,6 +456,11 @@ def _step(T_FS, T_BF, x_S, target):
 def _step_in_two_frames(T_FS, T_BF, x_S, target):
     e = frames.transform(T_FS, x_S) - frames.transform(frames.invert(T_BF), np.tile(target, (len(x_S), 1)))
     return frames.moved(T_FS, -np.linalg.lstsq(analytic_jacobian(T_FS, T_BF, x_S), e.ravel(), rcond=None)[0])
+
+
+def _step_of_nine(T_FS, T_BF, x_S, target):
+    J = np.hstack([analytic_jacobian(T_FS, T_BF, x_S), np.tile(-np.eye(3), (len(x_S), 1))])
+    return frames.moved(T_FS, -np.linalg.lstsq(J, _residual(T_FS, T_BF, x_S, target).ravel(), rcond=None)[0][:6])
 
 
 def _step_of_translation(T_FS, T_BF, x_S, target):
@@ -736,10 +746,13 @@ def _of_another_frame(T_BF, T_FS, target):
 
 def _looks_up(T_BF, T_FS):
     down = T_BF[:, :3, :3] @ T_FS[:3, 2]
-    steepest = np.rad2deg(np.arccos(np.clip(-down[:, 2], -1, 1))).max()
-    if steepest > 91:
-        return f"one pose looks up at the sphere, {steepest:.0f} deg from straight down: the table is in the way (90 at most)."
-    return None
+    off = np.rad2deg(np.arccos(np.clip(-down[:, 2], -1, 1)))
+    if off.max() <= 91:
+        return None
+    up = int((off > 91).sum())
+    where = "one pose looks" if up == 1 else f"{up} poses look"
+    steepest = f"{off.max():.0f} deg from straight down{', at most' if up > 1 else ''}"
+    return f"{where} up at the sphere, {steepest}: the table is in the way (90 is the limit)."
 
 
 def _too_uncertain(T_BF, T_FS, target, x_S):
@@ -915,7 +928,8 @@ CHAPTER = Chapter(
                 Mistake(_circle(lambda x, z, r: (x, z, r * r)), "Your third number is the squared radius: a root is missing."),
                 Mistake(_circle(lambda x, z, r: (x, z, np.sqrt(max(2 * x * x + 2 * z * z - r * r, 0)))),
                         "a3 entered the radius with the wrong sign: r^2 = xc^2 + zc^2 - a3, where a3 is xc^2 + zc^2 - r^2.", id="fit_circle-aa6121"),
-                Mistake(_circle_from_its_extent, "Half of the width that is seen is no radius: the scan line is an arc, less than half of the circle."),
+                *(Mistake(_circle_from_its_extent(depth), "Half of the width that is seen is no radius: the scan line is an arc, less than half of the circle.", id=id)
+                  for id, depth in (("", lambda z, u, r: z.min() + r), ("circle-extent-mean", lambda z, u, r: np.mean(z + np.sqrt(np.maximum(r * r - u * u, 0)))))),
                 Mistake(_circle_about_mean, "You took the mean of the points for the center. An arc lies on one side of its center."),
                 Mistake(_circle(lambda x, z, r: (z, x, r)), "The two coordinates of the center have changed places."),
                 Mistake(_circle_through(lambda n: [0, 1, 2]), "The circle goes through the first three points. All points of the scan line count."),
@@ -1162,6 +1176,7 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(_step_in_two_frames, "Your residuals stand along the axes of F, the rows of the Jacobian in B: bring both into one frame.", id="gauss_newton-two-frames"),
+                Mistake(_step_of_nine, "Your step moves the sphere center as well, nine unknowns. Here the target is held fixed: six columns.", id="gauss_newton-nine"),
                 Mistake(_step_of_translation, "Only tau is solved for. Rotation and translation move the residuals together: all six columns at once.", id="gauss_newton-translation"),
                 Mistake(_iterated, "You iterated to the end. Asked for is one step."),
                 Mistake(lambda *a: gauss_newton_on_pose(gauss_newton_on_pose(*a), *a[1:]), "You took two steps. Asked for is one."),
