@@ -202,6 +202,8 @@ class Exercise(Item):
             seen.append(draw)
         verdict = trial.verdict()
         if verdict.status == CORRECT:
+            if words := trial.remembered():
+                return trial.outcome(NOT_YET, words)
             for holds in self.properties:
                 problem = trial.property(holds, rng)
                 if problem:
@@ -310,7 +312,8 @@ class _Trial:
         if words:
             return self.outcome(NOT_YET, _closed(words) + self._about_globals())
         if search and not step and not self._right_often():
-            step = search.partly_words() or search.given_words(solution)
+            step = search.not_finite_words() if self.refusal else None
+            step = step or search.partly_words() or search.given_words(solution)
         if self.refusal:
             words = shape or (f" {step[0].upper()}{_closed(step[1:])}" if step else "")
             words = words or self._agreement(search, solution)
@@ -322,7 +325,7 @@ class _Trial:
                 if words and not metric.equal(*pair):
                     off = next(d for d in metric.deviations(*pair) if not d.within)
                     return self.outcome(NOT_YET, _closed(f"{words} {off}"))
-        words = unmoved or self._never_said() or self._relation()
+        words = unmoved or self._never_said() or self._relation() or self._picked()
         said, example, call = (_closed(words) if words else self._deviation()).partition(NOT_RIGHT)
         said += self._where_it_is_wrong() if words else self._constant() + self._by_chance()
         words = said + self._agreement(search, solution) + example + call
@@ -370,6 +373,29 @@ class _Trial:
             f"called twice with the same arguments, your function {told} the second time. Does something stay from "
             "call to call, a global variable or a default argument that is changed? Or is something drawn at random?"
         )
+
+    def remembered(self):
+        """Whether a function that has something to keep results in gives for other arguments what it gave before, in
+        words; None where it does not.
+        """
+        if self.exercise.metric is None or not self.pairs or not scope.may_keep(self.function):
+            return None
+        draws = self._cases()
+        for k, name in enumerate(self._names(draws[0][0])):
+            for draw, changed in self._exchanges(k, draws):
+                _, metric, (result, expected) = draw
+                first = _numbers_of(result)
+                if first is None or not self._moves(k, draw, changed):
+                    continue
+                admitted = functools.partial(_admitted, metric, expected)
+                run = guard.run(self.function, changed, admitted, self.exercise.limit)
+                if run.error is None and _same_numbers(_numbers_of(run.result), first):
+                    return (
+                        f"right at the first call, but called again with another `{name}` and all else as before, your "
+                        "function returns what it returned then: is a result kept, and found again by a part of the "
+                        f"arguments alone?{self._about_globals()}"
+                    )
+        return None
 
     def _relation(self, whole=False):
         """What the general layer says of the results; nothing where one was refused, or only special ones are wrong."""
@@ -561,6 +587,14 @@ class _Trial:
             return None
         words = self._first_that_fits(slips.changed_formulas(self.exercise))
         return words and f"your result is what a right formula gives {words}"
+
+    def _picked(self):
+        """Whether all results are rows of one argument, as they came, in words; None where they are not."""
+        wrong = [(args, *pair) for args, metric, pair in self._cases() if not metric.equal(*pair)]
+        for k, name in enumerate(self._names(wrong[0][0]) if len(wrong) > 1 else ()):
+            if all(_is_row(result, args[k]) and not _is_row(expected, args[k]) for args, result, expected in wrong):
+                return f"your result is one of the rows of `{name}` as it came, and the right one is none of them"
+        return None
 
     def _never_said(self):
         """Which of several words never comes out, though it is right on some plain draws."""
@@ -914,6 +948,14 @@ def _lead(words):
     return "" if words in (None, NOISY) else f"{words[0].upper()}{words[1:].rstrip(':')}."
 
 
+def _is_row(value, rows):
+    """Whether numbers are one row of an array."""
+    value, rows = rerun.numeric(value), rerun.numeric(rows)
+    if value is None or rows is None or not value.ndim or rows.shape[1:] != value.shape or len(rows) < 2:
+        return False
+    return any(np.array_equal(value, row) for row in rows)
+
+
 def _failure(mistake, args):
     """What a wrong variant raises on a draw; None where it can compute it."""
     try:
@@ -978,7 +1020,12 @@ def _admitted(metric, expected, result):
 
 def _numbers_of(result):
     """The numbers of an admitted or refused result, as a copy; None where they are none, or too many."""
-    return rerun.numeric(result.value if isinstance(result, _Refusal) else result)
+    value = result.value if isinstance(result, _Refusal) else result
+    found = rerun.numeric(value)
+    if found is not None or not isinstance(value, list | tuple):
+        return found
+    parts = [rerun.numeric(part) for part in value]  # of several results
+    return np.concatenate([p.ravel() for p in parts]) if parts and not any(p is None for p in parts) else None
 
 
 def _is_another(first, run):

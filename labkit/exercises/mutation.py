@@ -208,11 +208,13 @@ def _with_all_digits(node):
 
 
 def _everywhere(found):
-    """One change made at all places at once that look alike but for their names."""
+    """One change made at all places at once that look alike but for their names, or lose the same function."""
     alike = {}
     for change in found:
         if change.rank <= REPEATED and change.mends and isinstance(change.place, ast.expr):
             alike.setdefault((change.words, _form(change.place), _form(_put(change))), []).append(change)
+            if isinstance(change.place, ast.Call) and re.fullmatch(r"without `\w+`", change.words):
+                alike.setdefault((change.words, ast.unparse(change.place.func), ""), []).append(change)
     for group in alike.values():
         sets = _together(group)
         if sets is None or any(_holds(a.place, b.place) for a in group for b in group):

@@ -34,6 +34,7 @@ LIFTED = re.compile("a thousand|divided by its( own)? length")  # what brings a 
 COUNT = re.compile(r"^len\([^()]*\)$|\.shape\[-?\d\]$|\.size$")  # of which no half, root or sine is meant
 CHANCE = 1000  # one case of so many may be chance
 BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with a number
+UNBOUNDED = {f"`{name}` is too much" for name in mutation.BOUNDED | mutation.BOUNDS}
 DECIMALS = re.compile(r"[<>]=? *\d*(\.\d+(e[+-]?\d+)?|e-\d+)$|[<>]=? *\d+e-\d+$")  # a comparison with such a number
 TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
 UNEQUAL = ("where `==` belongs", "where `!=` belongs")  # what computed numbers are never, or always
@@ -250,7 +251,7 @@ class Search:
     def _left_out_instead(self, number):
         """What says more than a change that mends only because it makes a part do nothing: that a case is never to be
         met, or always, where what it asks, in its line or before it, is changed otherwise than to a finer bound; that a
-        part is too many, where it has another sign.
+        part is too many, where it has another sign; that nothing is to be bounded, where another bound is set.
         """
         changes = self.written.changes
         line, code, mends = changes[number][1:]
@@ -261,6 +262,9 @@ class Search:
         case = [k for k, words in around if words.endswith(("never happen", "always happen"))]
         less = [k for k, text, words in at_line if text == code and TOO_MANY in words]
         less += [k for k, text, words in at_line if words.startswith(mutation.STACKED) and _bare(code) in _bare(text)]
+        case += [
+            k for k, (_, at, _, words) in enumerate(changes) if at >= line and words in UNBOUNDED and _is_fixed(code)
+        ]
         plan = self.mending([("code", k) for k in case + (less if " stands where " in mends else [])])
         return number if plan is None else plan[1]
 
@@ -288,7 +292,7 @@ class Search:
         name = "" if other is None else self.written.places[other][2] if kind == "own" else self.names[other]
         words = rerun.OTHERWISE[change][0].format(name)
         words = rerun.OF_TRUTHS.get(words, words) if k in self.written.of_truth else words
-        return f"{self._where(k)}: {words}. {ALONE}"
+        return f"{self._where(k)}: {_closed(words)} {ALONE}"
 
     def _argument_words(self):
         """What is to be done with an argument before the first line, as it is read in several places."""
@@ -300,7 +304,7 @@ class Search:
                     if self._may_be_said(words) and _changes(function, values[0], []):
                         plans.append(("argument", i, change))
         plan = self.mending(plans)
-        return plan and f"wherever you read `{self.names[plan[1]]}`: {rerun.OTHERWISE[plan[2]][0]}. {ALONE}"
+        return plan and f"wherever you read `{self.names[plan[1]]}`: {_closed(rerun.OTHERWISE[plan[2]][0])} {ALONE}"
 
     def _where(self, k):
         line, code, name, *_ = self.written.places[k]
@@ -433,6 +437,7 @@ class Search:
                 and places[k][1] != places[k][2]
                 or self._is_filled(k)
                 or self._is_known(k, solution)
+                and not self._is_entry_bound(k)
                 or self._are_rows(k)
             ):
                 continue
@@ -458,6 +463,13 @@ class Search:
         """Whether values of the solution can take the place of the student's, and are others where that is wrong."""
         wrong = [not case.was_right for case in self.cases]
         return all(_exchangeable(a, b) if off else _fits(a, b) for (a, b), off in zip(pairs, wrong))
+
+    def _is_entry_bound(self, k):
+        """Whether a name is bound to one entry of an argument there: that is right of itself, and may be another value
+        than the one that is meant.
+        """
+        _, code, name, *_ = self.written.places[k]
+        return bool(name) and _bound(code, name) in self.names
 
     def _is_filled(self, k):
         """Whether only a part of this array is assigned there: its other parts are not what the line is about."""
@@ -521,6 +533,18 @@ class Search:
         return None
 
     @_or_nothing
+    def not_finite_words(self):
+        """The first value on the way that is not finite, where a result holds NaN or is infinite."""
+        for case, values in zip(self.cases, self.values):
+            result = rerun.numeric(case.refused)
+            if result is None or np.isfinite(result).all():
+                continue
+            rounds = [(int(_spoilt(v).argmax()), k) for k, (n, v) in enumerate(values) if n and _spoilt(v).any()]
+            line, code, *_ = self.written.places[min(rounds)[1]]
+            return f"the first value on the way that is not finite is `{code}` in line {line}"
+        return None
+
+    @_or_nothing
     def agreement_words(self, solution):
         """How far the values on the way are those of the solution, and the first that is none of them."""
         if solution is None:
@@ -545,6 +569,7 @@ class Search:
     def _units(self, solution):
         """Places of the steps as a whole, in their order: variables that are bound, and what is part of no other."""
         steps = [k for k in range(len(self.written.places)) if self._is_step(k) and not self._is_taken_out(k, solution)]
+        steps = [k for k in steps if not self._is_entry_bound(k)]
         inner = {part for k in steps for part in range(self.written.places[k][4], k)}
         return [k for k in steps if k not in inner and not self._is_filled(k)]
 
@@ -637,6 +662,11 @@ def _traces(written, cases, budget):
     return found
 
 
+def _closed(words):
+    """Words with a full stop, but behind a question."""
+    return words if words.endswith("?") else f"{words}."
+
+
 def _bare(code):
     """A part of the code without the larger one in which it is quoted."""
     return code.partition(rerun.WITHIN)[0]
@@ -648,6 +678,44 @@ def _is_condition(code):
     logical = isinstance(value, ast.BinOp) and isinstance(value.op, ast.BitAnd | ast.BitOr)
     inverse = isinstance(value, ast.UnaryOp) and isinstance(value.op, ast.Invert)
     return logical or inverse or isinstance(value, ast.Compare | ast.BoolOp)
+
+
+def _bound(code, name):
+    """The name of what a step binds one entry of to a name, by a whole number; None where it binds anything else."""
+    try:
+        step = ast.parse(code).body[0]
+    except SyntaxError:  # quoted in part
+        return None
+    if not isinstance(step, ast.Assign):
+        return None
+    target, value = step.targets[0], step.value
+    pairs = (
+        zip(target.elts, value.elts)
+        if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+        else [(target, value)]
+    )
+    for to, of in pairs:
+        if (
+            getattr(to, "id", None) == name
+            and isinstance(of, ast.Subscript)
+            and isinstance(getattr(of.slice, "value", None), int)
+        ):
+            return getattr(of.value, "id", None)
+    return None
+
+
+def _spoilt(values):
+    """In which rounds a value is not finite."""
+    return ~np.isfinite(values).reshape(len(values), -1).all(axis=1)
+
+
+def _is_fixed(code):
+    """Whether a part of the code is made of numbers alone, so that it has one value."""
+    try:
+        names = {node.id for node in ast.walk(ast.parse(_bare(code), mode="eval")) if isinstance(node, ast.Name)}
+    except SyntaxError:  # quoted in part, or a step
+        return False
+    return names <= mutation.MODULES
 
 
 def _is_listing(code):

@@ -316,3 +316,12 @@ def test_obtuse_links_and_few_motions_are_drawn():
 
 def test_roots_of_eigenvalues_are_right_at_every_check():
     texts("singular_value_ratio", lambda M: np.sqrt(np.divide(*np.linalg.eigvalsh(M.T @ M)[[1, -1]])), CORRECT)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("wide", [False, True])
+def test_who_stops_at_whole_samples_is_told_apart_from_who_compares_peaks(sign, wide):
+    for seed in range(20):
+        time, reference, delayed, most = ch06.speed_curves(np.random.default_rng(seed), sign, wide)
+        peaks = time[np.argmax(delayed)] - time[np.argmax(reference)]
+        assert abs(peaks - ch06._whole_samples(time, reference, delayed, most)) > 5e-3

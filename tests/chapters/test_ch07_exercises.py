@@ -193,3 +193,25 @@ def test_a_drift_that_counts_on_straight_lines_alone_is_not_told_to_be_missing_t
 
     outcome = ITEMS["control_covariance"].judge(answer, rng=np.random.default_rng(0))
     assert "in a curve and on a straight line" in outcome.text
+
+
+def test_a_start_of_whole_numbers_is_not_rounded_on_the_way():
+    def in_whole_meters(landmarks, distances, start):
+        x = np.array(start)
+        for _ in range(20):
+            x[:] = x - np.linalg.solve(2 * (x - landmarks), ch07.lateration_residual(landmarks, distances, x))
+        return x
+
+    assert all("whole numbers" in text for text in texts("newton_lateration", in_whole_meters))
+
+
+@pytest.mark.parametrize("n, along", [(50, 0.0), (100, 0.5), (20, 1.0)])
+def test_a_circle_of_short_straight_steps_is_told(n, along):
+    def steps(way, excess, track):
+        x, turn = np.zeros(2), way * excess / track
+        for k in range(n):
+            heading = turn * (k + along) / n
+            x = x + way * (1 + excess / 2) / n * np.array([np.cos(heading), np.sin(heading)])
+        return x[1]
+
+    assert all("short straight steps" in text for text in texts("wheel_offset", steps))

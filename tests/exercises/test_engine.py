@@ -1071,6 +1071,54 @@ def test_what_raises_on_data_of_the_notebook_is_told_of_them():
     assert "reads `KEPT` from the notebook" in DOUBLE.judge(lambda v: [0.0][len(KEPT) + 1] * v).text
 
 
+def test_a_part_of_several_results_that_the_next_call_overwrites_is_told():
+    def two(v):
+        BUFFER[:] = v
+        return float(v.sum()), BUFFER[:2]
+
+    exercise = replace(
+        DOUBLE,
+        reference=lambda v: (float(v.sum()), v[:2]),
+        metric=metrics.Several(metrics.Numbers(), metrics.Numbers(), names=("sum", "ends")),
+        mistakes=[],
+    )
+    assert "one and the same array" in exercise.judge(two, rng=np.random.default_rng(0)).text
+
+
+KNOWN, FACTORS = {}, [2.0, 3.0]
+
+
+def remembers_by_the_first(a, b):
+    if a not in KNOWN:
+        KNOWN[a] = a + b
+    return KNOWN[a]
+
+
+def remembers_by_both(a, b, known={}):  # noqa: B006, what it keeps is kept by all that it depends on
+    return known.setdefault((a, b), a + b)
+
+
+def test_a_result_that_is_kept_by_a_part_of_the_arguments_is_told():
+    exercise = replace(
+        DOUBLE,
+        reference=lambda a, b: a + b,
+        draw=lambda rng: (float(rng.normal()), float(rng.normal())),
+        mistakes=[],
+    )
+    outcome = exercise.judge(remembers_by_the_first, rng=np.random.default_rng(0))
+    assert outcome.status == NOT_YET and "with another `b` and all else as before" in outcome.text
+    for right in (remembers_by_both, lambda a, b: (FACTORS[0] * a + FACTORS[0] * b) / 2):
+        assert exercise.judge(right, rng=np.random.default_rng(0)).status == CORRECT
+
+
+def test_a_row_that_is_returned_as_it_came_is_told():
+    exercise = replace(
+        DOUBLE, reference=lambda v: v.mean(axis=0), draw=lambda rng: (rng.normal(size=(4, 3)),), mistakes=[]
+    )
+    outcome = exercise.judge(lambda v: v[np.argmax(v.sum(axis=1))], rng=np.random.default_rng(0))
+    assert "your result is one of the rows of `v` as it came" in outcome.text
+
+
 def test_an_array_that_nobody_writes_into_is_not_overwritten():
     assert "overwrites" not in DOUBLE.judge(lambda v: BUFFER, rng=np.random.default_rng(0)).text
 

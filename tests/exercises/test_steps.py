@@ -564,8 +564,8 @@ def test_no_line_that_fills_a_part_is_blamed_for_the_whole():
     assert "in line 5" not in judged(asked(right, two_numbers), body)
 
 
-def test_what_agrees_ends_at_the_first_step_that_does_not(monkeypatch):
-    text = "def formula(a, b):\n    x = a * b\n    y = a + x\n    z = np.exp(b)\n    return x * y + z\n"
+def solved_by(monkeypatch, text):
+    """The function of this text, which is the solution of each exercise from here on."""
     known = {"np": np}
     exec(text, known)
     tree = steps.slips.ast.parse(text).body[0]
@@ -573,13 +573,30 @@ def test_what_agrees_ends_at_the_first_step_that_does_not(monkeypatch):
     kept = guard.PRISTINE.saved["labkit.exercises.slips"][1]
     monkeypatch.delitem(kept, "solved")  # else the one of the library would be put back
     monkeypatch.setattr(steps.slips, "solved", lambda exercise: (known["formula"], tree))
+    return known["formula"]
+
+
+def test_an_entry_that_is_bound_is_not_taken_for_a_right_step(monkeypatch):
+    text = "def formula(a, b):\n    d = b[1] - b[0]\n    return a * np.sin(d) + b[0] * b[2]\n"
+    reference = solved_by(monkeypatch, text)
+    said = judged(asked(reference, far_apart), "d, e = b[1], b[2]\nreturn a * np.sin(d) + b[0] * e")
+    assert "in line 2, `d`" in said and "As far as" not in said
+
+
+def far_apart(rng):
+    return rng.normal(size=3), rng.normal(size=3) + [0.0, 3.0, 0.0]
+
+
+def test_what_agrees_ends_at_the_first_step_that_does_not(monkeypatch):
+    text = "def formula(a, b):\n    x = a * b\n    y = a + x\n    z = np.exp(b)\n    return x * y + z\n"
+    reference = solved_by(monkeypatch, text)
     body = """
     x = a * b
     y = np.sin(a) - 3 * x ** 2
     z = np.exp(b)
     return x * y - 2 * z ** 3
     """
-    text = judged(asked(known["formula"], two_numbers), body)
+    text = judged(asked(reference, two_numbers), body)
     assert "As far as `x` (line 2) your values are those of the solution; `y = np.sin(a)" in text
 
 
@@ -867,3 +884,28 @@ def test_what_stands_behind_a_return_is_told_to_be_never_reached():
 def test_of_parts_that_look_alike_the_larger_part_is_quoted_as_well():
     shown = {code for _, _, code, _ in rerun.written(typed("return a * b[0] - a @ b")).changes}
     assert {"a` in `a * b[0]", "a` in `a @ b", "b[0]"} <= shown and "a" not in shown
+
+
+@pytest.mark.parametrize(
+    "reference, body, said",
+    [
+        (
+            lambda a, b: a * b.mean(),
+            "return a * np.clip(b.mean(), -np.deg2rad(2), np.deg2rad(2))",
+            "`clip` is too much",
+        ),
+        (
+            lambda a, b: np.sin(a) + np.cos(b),
+            "s, c = np.round(np.sin(a), 1), np.round(np.cos(b), 1)\nreturn s + c",
+            "`round` is too much, and the same in `np.round(np.cos(b), 1)` (line 2)",
+        ),
+        (
+            lambda a, b: np.sqrt(np.abs(a[0])) + b,
+            "d = np.sqrt(a[0] - 9)\nreturn d * 3 + np.exp(b)",
+            "The first value on the way that is not finite is `d = np.sqrt(a[0] - 9)` in line 2.",
+        ),
+    ],
+)
+def test_bounds_roundings_and_what_is_not_finite_are_told(reference, body, said):
+    text = judged(asked(reference, far_apart), body)
+    assert said in text and "?." not in text

@@ -498,7 +498,11 @@ def speed_curves(rng, sign, wide=False):
         )
 
     most = int(rng.integers(130, 170)) if wide else samples + int(rng.integers(4, 12))
-    return time, curve(time), curve(time - lag), step * most
+    reference, delayed = curve(time), curve(time - lag)
+    if np.argmax(delayed) - np.argmax(reference) == round(lag / step):
+        # whoever compares the times of the peaks is told apart from whoever stops at whole samples
+        return speed_curves(rng, sign, wide)
+    return time, reference, delayed, step * most
 
 
 def curves_in_degrees(rng):
@@ -999,11 +1003,13 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         variant,
-                        "For stacked columns this says A X = X B^T: B must be transposed in the product, vec(X B) = (B^T kron I) vec(X).",
+                        "For stacked columns this says A X = X B^T. B is to stand there once as it is: vec(X B) = (B^T kron I) vec(X), and "
+                        "vec(A X B^T) = (B kron A) vec(X).",
+                        id=id,
                     )
-                    for variant in (
-                        lambda A, B: np.kron(np.eye(3), A) - np.kron(B, np.eye(3)),
-                        lambda A, B: np.kron(B.T, A) - np.eye(9),
+                    for id, variant in (
+                        ("kron_row-dede0d", lambda A, B: np.kron(np.eye(3), A) - np.kron(B, np.eye(3))),
+                        ("kron_row-dede0d-2", lambda A, B: np.kron(B.T, A) - np.eye(9)),
                     )
                 ),
                 Mistake(
@@ -1552,7 +1558,7 @@ CHAPTER = Chapter(
                     mostly_equal,
                     KeptOrAll(),
                     "Right as long as fewer than half of the values are equal. Where more are, the robust standard deviation is 0, and only what "
-                    "lies at the median itself is within a limit of 0:",
+                    "lies at the median itself is within a limit of 0 (or all may stay):",
                 ),
                 (
                     functools.partial(spoiled, factor=4.0, size=1e-4),
@@ -1751,7 +1757,7 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     lambda: _heights().std(ddof=1),
-                    "This is the sum divided by 5. For estimating a spread that is the better choice; appendix D divides by 6.",
+                    "Here the sum is divided by 5. For estimating a spread that is the better choice; appendix D divides by 6.",
                     id="spread-196c75",
                 ),
                 Mistake(lambda: _heights().var(), "This is the variance, in square millimeters. Its root is wanted."),

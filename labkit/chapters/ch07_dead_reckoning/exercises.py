@@ -55,6 +55,12 @@ def from_afar(rng, left, angle=None):
     return landmarks, distances, robot + rng.uniform(6, 12) * across
 
 
+def from_whole_meters(rng):
+    """Two landmarks and a start of whole numbers, in an array of integers."""
+    landmarks, distances, start = two_circles(rng)
+    return landmarks, distances, np.round(start).astype(int)
+
+
 def from_the_position_itself(rng):
     """Two landmarks and a start at which the search has arrived."""
     landmarks, distances, start = two_circles(rng)
@@ -382,6 +388,17 @@ def _offset(of):
     return lambda way, excess, track: of(way * (1 + excess / 2), way * excess / track, way)
 
 
+def _in_straight_steps(n, along):
+    """The end of n straight steps, each along the heading after this part of its turn."""
+
+    def variant(way, excess, track):
+        turn = way * excess / track
+        headings = turn * (np.arange(n) + along) / n
+        return way * (1 + excess / 2) * np.sin(headings).mean()
+
+    return variant
+
+
 def step_euler(x, u, dt):
     return odometry.step(x, u, dt, "euler")
 
@@ -648,11 +665,11 @@ def _circle(model="euler", **changes):
 
 
 @functools.cache
-def _loop(step=propagate, steps=None, start_cov=0.0, at_the_end=False, noise_time=None, **noise):
-    """The loop over the circle with another step, fewer steps, another start or other constants of the noise."""
+def _loop(step=propagate, steps=None, again=0, start_cov=0.0, at_the_end=False, noise_time=None, **noise):
+    """The loop over the circle with another step, fewer or more steps, another start or other constants of the noise."""
     drive = lecture.circle_drive()
     x, cov = _circle()[0] if at_the_end else np.zeros(3), start_cov * np.eye(3)
-    for u in drive.controls[:steps]:
+    for u in [*drive.controls[:steps], *drive.controls[:again]]:
         cov_u = odometry.control_covariance(u, noise_time or drive.dt, **(drive.noise | noise))
         x, cov = step(x, cov, u, drive.dt, cov_u)
     return x, cov
@@ -817,6 +834,12 @@ CHAPTER = Chapter(
                     from_the_position_itself,
                     metrics.Numbers(1e-8, "m"),
                     "right, but not from a start that is the position itself:",
+                ),
+                (
+                    from_whole_meters,
+                    metrics.Numbers(1e-8, "m"),
+                    "right, but not from a start of whole numbers, np.array([4, 1]): an array of integers, and each copy of it, "
+                    "cuts the decimals off what is written into it:",
                 ),
                 (
                     functools.partial(scaled, draw=two_circles, factors=(250, 250, 250)),
@@ -1823,6 +1846,11 @@ CHAPTER = Chapter(
                     lambda: np.zeros((3, 3)), "This is the covariance of the start. Does the loop store the new one?"
                 ),
                 Mistake(lambda: _loop(steps=-1)[1], "One step is missing: there are 140."),
+                Mistake(lambda: _loop(again=1)[1], "One step too many: there are 140."),
+                Mistake(
+                    lambda: _loop(again=140)[1],
+                    "The drive is taken twice: is the cell's loop run on what it left behind? Begin it with zeros.",
+                ),
                 Mistake(
                     lambda: _loop(steps=1)[1],
                     "This is one step's covariance: it has to be handed on from step to step.",
@@ -1930,6 +1958,17 @@ CHAPTER = Chapter(
                 Mistake(
                     _offset(lambda d, turn, way: 2 * d / turn * np.sin(turn / 2)),
                     "This is the length of the chord, how far away it ends. Asked is how far to the left: times the sine of half the turn.",
+                ),
+                *(
+                    Mistake(
+                        _in_straight_steps(n, along),
+                        "You add up short straight steps. The more there are, the nearer they come, but the circle gives the "
+                        "exact answer.",
+                        id=f"wheel_offset-{n}-steps-{along:g}",
+                    )
+                    for n in (10, 14, 20, 50, 100, 140, 200, 500, 1000)
+                    for along in (0.0, 0.5, 1.0)
+                    if along != 0.5 or n < 500  # so many steps along the middle heading are as good as the circle
                 ),
                 Mistake(
                     lambda way, excess, track: -wheel_offset(way, excess, track),
