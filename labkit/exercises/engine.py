@@ -41,6 +41,9 @@ MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried,
 SELDOM = 0.2  # of the draws come out right where no case is special, but one comes out by chance
 MORE_CASES = 8  # on which an explanation from the first draws is tried once more, at least ...
 MOST_CASES = 64  # ... and at most, as far as LOOKING allows: of one in fifty draws a coincidence may hide
+REPEATING = 0.02  # seconds of processor time in which an answer that came out right is called again
+IN_A_ROW = 8  # times that a draw is called then, of each of ...
+ALIKE = 3  # kinds of results at most, where they are words or truth values
 LOOKING = 1.2  # seconds of processor time, from the beginning of a check, in which an explanation is looked for
 RANDOM = {"default_rng", "random", "normal", "standard_normal", "multivariate_normal", "RandomState", "gauss"}
 BY_CHANCE = 0.3  # how far off, relatively, a result made of random numbers may be by chance
@@ -208,6 +211,7 @@ class Exercise(Item):
                 problem = trial.property(holds, rng)
                 if problem:
                     return problem
+            return trial.repeated() or verdict
         return verdict
 
     def _plan(self):
@@ -367,12 +371,48 @@ class _Trial:
             return None
         return self._kept_words(run.error)
 
-    def _kept_words(self, error):
+    def _kept_words(self, error, calls=2):
         told = "stops with an error" if error is not None else "gives another result"
+        often, at = ("twice", "the second time") if calls == 2 else ("several times", "in the end")
         return (
-            f"called twice with the same arguments, your function {told} the second time. Does something stay from "
+            f"called {often} with the same arguments, your function {told} {at}. Does something stay from "
             "call to call, a global variable or a default argument that is changed? Or is something drawn at random?"
         )
+
+    def repeated(self):
+        """Call an answer that came out right again; an Outcome where something stays from call to call, or None."""
+        if self.exercise.metric is None or "rng" in self.exercise.arguments:
+            return None
+        again = functools.partial(self._again_words, kind=Budget(REPEATING))
+        run = guard.run(again, (self.function,), limit=self.exercise.limit + REPEATING, author=self.function)
+        return self.outcome(NOT_YET, _closed(run.result)) if run.result else None
+
+    def _again_words(self, function, kind):
+        """What stays from call to call, if a draw that came out right does so no more."""
+        calls = [1] * len(self.inputs)
+        for k in self._in_another_order():
+            metric, (_, expected) = self.metrics[k], self.pairs[k]
+            result, error, calls[k] = None, None, calls[k] + 1
+            try:
+                result = function(*copy.deepcopy(self.inputs[k]))
+            except Exception as raised:
+                error = raised
+            if error is not None or not metric.equal(result, expected):
+                return self._kept_words(error, calls[k])
+            if not kind.left():
+                break  # a slow answer is not called more often than it must
+        return None
+
+    def _in_another_order(self):
+        """Numbers of the draws from the last to the first, words and truth values that are alike together; then some of
+        them many times in a row.
+        """
+        alike = {}
+        for k in reversed([k for k, metric in enumerate(self.metrics) if metric is not None]):
+            expected = self.pairs[k][1]
+            alike.setdefault(expected if isinstance(expected, str | bool | int) else None, []).append(k)
+        often = (numbers[0] for numbers in itertools.islice(alike.values(), ALIKE))
+        return [*itertools.chain(*alike.values()), *(k for k in often for _ in range(IN_A_ROW))]
 
     def remembered(self):
         """Whether a function that has something to keep results in gives for other arguments what it gave before, in

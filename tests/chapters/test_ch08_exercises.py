@@ -85,8 +85,8 @@ def test_iterations_that_go_on_long_enough_are_right(rule):
 
 
 def test_differences_are_as_good_as_formulas():
-    def slopes(f, x, h=1e-6):
-        return np.column_stack([(f(x + h * e) - f(x - h * e)) / (2 * h) for e in np.eye(len(x))])
+    def slopes(f, x, h=1e-6, minus=np.subtract):
+        return np.column_stack([minus(f(x + h * e), f(x - h * e)) / (2 * h) for e in np.eye(len(x))])
 
     def jacobians(x, u, dt):
         return (
@@ -95,7 +95,14 @@ def test_differences_are_as_good_as_formulas():
         )
 
     assert judged("motion_jacobians", jacobians)[0] == CORRECT
-    assert judged("measurement_jacobian", lambda x, m: slopes(lambda x: ch08.measurement(x, m), x))[0] == CORRECT
+
+    def wrapped_difference(one, other):
+        return np.array([one[0] - other[0], wrap_angle(one[1] - other[1])])
+
+    def by_pose(x, landmark):
+        return slopes(lambda x: ch08.measurement(x, landmark), x, minus=wrapped_difference)
+
+    assert judged("measurement_jacobian", by_pose)[0] == CORRECT
 
 
 def test_the_printed_example_takes_the_state_or_both_results():
@@ -297,3 +304,87 @@ def test_a_nis_or_a_limit_that_is_rounded_is_refused_each_time(digits):
     draws = [draw(np.random.default_rng(0)) for draw in ITEMS["gate"].cases]
     for rounded in (of_nis, of_limit):
         assert any(rounded(*given) != ITEMS["gate"].reference(*given) for given in draws)
+
+
+def differences_across_the_seam(x, landmark):
+    sides = ((ch08.measurement(x + e, landmark), ch08.measurement(x - e, landmark)) for e in 1e-6 * np.eye(3))
+    return np.column_stack([(plus - minus) / 2e-6 for plus, minus in sides])
+
+
+def of_the_poses_own_kind(x, landmark):
+    dx, dy = landmark - x[:2]
+    q = dx**2 + dy**2
+    H = np.zeros((2, 3), dtype=x.dtype)
+    H[0, :2] = -dx / np.sqrt(q), -dy / np.sqrt(q)
+    H[1] = dy / q, -dx / q, -1
+    return H
+
+
+def stops_by_allclose(A, C, cov_v, cov_z):
+    P = np.eye(len(A))
+    for _ in range(10000):
+        before = A @ P @ A.T + cov_v
+        K = before @ C.T @ np.linalg.inv(C @ before @ C.T + cov_z)
+        after = before - K @ C @ before
+        if np.allclose(after, P):
+            break
+        P = after
+    return K
+
+
+def noise_at_the_start_only(A, C, cov_v, cov_z, divide=lambda M, S: M @ np.linalg.inv(S), each=0.0):
+    P = np.eye(len(A)) + (1 - each) * cov_v
+    for _ in range(3000):
+        P = A @ P @ A.T + each * cov_v
+        K = divide(P @ C.T, C @ P @ C.T + cov_z)
+        P = P - K @ C @ P
+    return K
+
+
+def divides_by_the_diagonal(*args):
+    return noise_at_the_start_only(*args, divide=lambda M, S: M / np.diag(S), each=1.0)
+
+
+def first_gain_twice(x0, var0, z, stds):
+    k = var0 / (var0 + stds[0] ** 2)
+    x = x0 + k * (z[0] - x0)
+    return x + k * (z[1] - x), (1 - k) * (1 - k) * var0
+
+
+def rows_repeated(x0, cov0, z, C, cov_z):
+    rows, W, L0 = np.repeat(C, len(z), axis=0), np.kron(np.eye(len(z)), np.linalg.inv(cov_z)), np.linalg.inv(cov0)
+    P = np.linalg.inv(L0 + rows.T @ W @ rows)
+    return P @ (L0 @ x0 + rows.T @ W @ z.ravel()), P
+
+
+def two_slips(y, S, limit):
+    return bool(np.sum(y**2 / np.diag(S)) < limit**2)
+
+
+@pytest.mark.parametrize(
+    "name, answer, words",
+    [
+        ("measurement_jacobian", differences_across_the_seam, "wrapped"),
+        ("measurement_jacobian", of_the_poses_own_kind, "`dtype=` does not belong there"),
+        ("steady_state_gain", stops_by_allclose, ""),
+        ("steady_state_gain", noise_at_the_start_only, "Your gain dies out"),
+        ("steady_state_gain", divides_by_the_diagonal, "the diagonal of S alone"),
+        ("fuse_two_sensors", first_gain_twice, "The second sensor gets the gain of the first"),
+        ("batch_estimate", rows_repeated, "np.tile"),
+        ("gate", two_slips, "Two slips"),
+    ],
+)
+def test_what_once_passed_or_was_told_of_a_coincidence_is_named(name, answer, words):
+    status, texts = judged(name, answer, seeds=range(2))
+    assert status == NOT_YET and all(words in text for text in texts), texts
+
+
+def test_a_gate_that_gives_in_after_five_refusals_is_told():
+    refused = []
+
+    def gate(y, S, limit):
+        refused[:] = [] if ch08.gate(y, S, limit) else [*refused, y]
+        return not refused or len(refused) > 5
+
+    status, texts = judged("gate", gate, seeds=range(2))
+    assert status == NOT_YET and all("called twice with the same arguments" in text for text in texts), texts

@@ -299,15 +299,11 @@ def test_patching_the_library_changes_no_check_and_is_named(capsys):
 
 def test_seeding_numpy_does_not_fix_the_draws():
     seen = []
-
-    def spy(v):
-        seen.append(v)
-        return 2 * v
-
     for _ in range(2):
         np.random.seed(3)
-        DOUBLE.judge(spy)
-    assert len({v.tobytes() for v in seen}) == len(seen)
+        seen.append([])
+        DOUBLE.judge(lambda v: seen[-1].append(v.tobytes()) or 2 * v)
+    assert not set(seen[0]) & set(seen[1])
 
 
 # Diagnosis ------------------------------------------------------------------------------------------------------------
@@ -709,7 +705,7 @@ def test_a_slow_answer_still_meets_every_kind_of_draw(monkeypatch):
 
     special = replace(DOUBLE, noisy=(lambda rng: (np.full(3, 7.0),), metrics.Numbers()))
     assert special.judge(student).status == CORRECT
-    assert len(seen) == 3 and seen[-1] == 7.0
+    assert seen[2:4] == [7.0, 7.0]  # and the last one first when all are called again
 
 
 def test_a_tall_system_is_told_of_lstsq():
@@ -1117,6 +1113,51 @@ def test_a_row_that_is_returned_as_it_came_is_told():
     )
     outcome = exercise.judge(lambda v: v[np.argmax(v.sum(axis=1))], rng=np.random.default_rng(0))
     assert "your result is one of the rows of `v` as it came" in outcome.text
+
+
+def patient(times):
+    """An answer that gives in after so many small numbers in a row."""
+    small = []
+
+    def large(v):
+        small[:] = [] if v[0] > 0 else [*small, v]
+        return bool(v[0] > 0) or len(small) > times
+
+    return large
+
+
+@pytest.mark.parametrize("times, status", [(5, NOT_YET), (1000, CORRECT)])
+def test_what_many_calls_in_a_row_bring_about_is_told(times, status):
+    signs = tuple(lambda rng, sign=sign: (sign * rng.uniform(1, 2, 3),) for sign in (1, -1))
+    item = replace(DOUBLE, reference=lambda v: bool(v[0] > 0), draw=signs, metric=metrics.Exactly(), draws=12)
+    outcome = item.judge(patient(times), rng=np.random.default_rng(0))
+    assert outcome.status == status
+    assert "called twice with the same arguments, your function gives another" in outcome.text or status == CORRECT
+
+
+def test_what_is_wrong_at_a_later_call_only_is_told_of_several():
+    calls = []
+
+    def tired(v):
+        calls.append(1)
+        return 2 * v if len(calls) < 12 else 3 * v
+
+    said = DOUBLE.judge(tired, rng=np.random.default_rng(0)).text
+    assert said.startswith("called several times with the same arguments, your function gives another result in the")
+
+
+def test_an_answer_that_is_slow_is_called_once_more_at_most():
+    calls = []
+
+    def slow(v):
+        calls.append(1)
+        until = time.thread_time() + engine.REPEATING
+        while time.thread_time() < until:
+            pass
+        return 2 * v
+
+    assert DOUBLE.judge(slow, rng=np.random.default_rng(0)).status == CORRECT
+    assert len(calls) == DOUBLE.draws + 1
 
 
 def test_an_array_that_nobody_writes_into_is_not_overwritten():

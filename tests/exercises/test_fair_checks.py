@@ -112,14 +112,17 @@ def test_the_last_hint_gives_the_value_as_it_stands(name):
 
 
 def test_forward_differences_are_a_jacobian():
-    def slopes(function, x, h=1e-6):
-        return np.column_stack([(function(x + h * e) - function(x)) / h for e in np.eye(len(x))])
+    def slopes(function, x, h=1e-6, minus=np.subtract):
+        return np.column_stack([minus(function(x + h * e), function(x)) / h for e in np.eye(len(x))])
 
     def F_x(x, u, dt):
         return slopes(lambda x: odometry.step(x, u, dt, "euler"), x)
 
     def H(x, landmark):
-        return slopes(lambda x: ekf.measurement(x, landmark[None])[0], x)
+        return slopes(lambda x: ekf.measurement(x, landmark[None])[0], x, minus=with_the_bearing_wrapped)
+
+    def with_the_bearing_wrapped(one, other):
+        return np.array([one[0] - other[0], ch08.wrap_angle(one[1] - other[1])])
 
     assert item(ch07, "jacobian_state").judge(F_x, rng=np.random.default_rng(0)).status == CORRECT
     assert item(ch08, "measurement_jacobian").judge(H, rng=np.random.default_rng(0)).status == CORRECT

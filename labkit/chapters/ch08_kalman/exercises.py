@@ -94,8 +94,14 @@ def one_position_two_sensors(rng, better=0, var0=(2, 9)):
 
 
 def steady_vehicle(rng):
+    """The lecture's vehicle, its position counted forward or backward."""
     A, B, C = kalman.vehicle_model(rng.uniform(0.1, 0.5))
-    return A, C, rng.uniform(0.3, 1) * B @ B.T + 1e-3 * np.eye(2), np.array([[rng.uniform(0.1, 1)]])
+    return (
+        A,
+        rng.choice([-1, 1]) * C,
+        rng.uniform(0.3, 1) * B @ B.T + 1e-3 * np.eye(2),
+        np.array([[rng.uniform(0.1, 1)]]),
+    )
 
 
 def steady_system(rng, n, m, sure=1.0):
@@ -173,10 +179,19 @@ def turned_several_times(rng):
 
 
 def landmark_behind(rng, side):
-    """A landmark so nearly behind the robot that a hundredth of a radian or of a meter takes it across the seam."""
+    """A landmark so nearly behind the robot that a hundredth of a radian or of a meter takes it across the seam; with
+    side = 0 exactly behind, as far as numbers go.
+    """
     x, r = np.array([*rng.uniform(-4, 4, 2), rng.uniform(-3, 3)]), rng.uniform(1.5, 6)
-    angle = x[2] + side * (np.pi - rng.uniform(5e-4, 1e-3))
+    angle = x[2] + (side * (np.pi - rng.uniform(5e-4, 1e-3)) if side else np.pi)
     return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
+
+
+def seen_from_whole_numbers(rng):
+    """A pose of whole numbers and a landmark."""
+    x, landmark = seen_landmark(rng)
+    whole = rng.integers(-3, 4, 3)
+    return whole, whole[:2] + landmark - x[:2]
 
 
 def landmark_ahead(rng):
@@ -227,6 +242,12 @@ def special_control(rng, moves):
     """A pose, a control of which these parts are not zero, and a time step."""
     x, u, dt = pose_control_step(rng)
     return x, u * moves, dt
+
+
+def control_at_whole_numbers(rng):
+    """The same at a pose of whole numbers."""
+    _, u, dt = pose_control_step(rng)
+    return rng.integers(1, 5, 3) * rng.choice([-1, 1], 3), u, dt
 
 
 def fast_control(rng):
@@ -435,6 +456,12 @@ def _batch_with_covariances(x0, cov0, z, C, cov_z):
     return cov @ (cov0 @ x0 + C.T @ cov_z @ z.sum(0)), cov
 
 
+def _batch_of_repeated_rows(x0, cov0, z, C, cov_z):
+    rows, weight = np.repeat(C, len(z), axis=0), np.kron(np.eye(len(z)), np.linalg.inv(cov_z))
+    cov = np.linalg.inv(np.linalg.inv(cov0) + rows.T @ weight @ rows)
+    return cov @ (np.linalg.solve(cov0, x0) + rows.T @ weight @ z.ravel()), cov
+
+
 def _batch_unweighted(x0, cov0, z, C, cov_z):
     cov = np.linalg.inv(np.eye(len(x0)) + len(z) * C.T @ C)
     return cov @ (x0 + C.T @ z.sum(0)), cov
@@ -470,13 +497,16 @@ def _gain(P, C, R):
     return P @ C.T @ np.linalg.inv(C @ P @ C.T + R)
 
 
+def _gain_by_the_diagonal(P, C, R):
+    return P @ C.T / np.diag(C @ P @ C.T + R)
+
+
 def _by_the_diagonal(short):
     """A gain that divides by the variances of the innovation alone, with one of two forms of the covariance."""
 
     def variant(x, P, z, C, R):
-        S = C @ P @ C.T + R
-        K = P @ C.T / np.diag(S)
-        return _corrected(x, K, z, C), _shrunk(P, K, C) if short else P - K @ S @ K.T
+        K = _gain_by_the_diagonal(P, C, R)
+        return _corrected(x, K, z, C), _shrunk(P, K, C) if short else P - K @ (C @ P @ C.T + R) @ K.T
 
     return variant
 
@@ -519,6 +549,12 @@ def _second_from_the_old_variance(x0, var0, z, stds):
     return x + second * (z[1] - x), (1 - second) * (1 - first) * var0
 
 
+def _first_gain_for_both(x0, var0, z, stds):
+    gain = var0 / (var0 + stds[0] ** 2)
+    x = x0 + gain * (z[0] - x0)
+    return x + gain * (z[1] - x), (1 - gain) ** 2 * var0
+
+
 def steady_state_gain(A, C, cov_v, cov_z):
     return kalman.steady_state(A, C, cov_v, cov_z).gain
 
@@ -542,14 +578,14 @@ def _settled(A, C, Q, R):
     return before, P
 
 
-def _rounds(n):
-    """The gain after n rounds from the identity."""
+def _rounds(n, gain=_gain, noise=1):
+    """The gain after n rounds from the identity; with noise = 0, what the system adds is added at the start only."""
 
     def variant(A, C, Q, R):
-        P = np.eye(len(A))
+        P = np.eye(len(A)) + (1 - noise) * Q
         for _ in range(n):
-            P = A @ P @ A.T + Q
-            K = _gain(P, C, R)
+            P = A @ P @ A.T + noise * Q
+            K = gain(P, C, R)
             P = _shrunk(P, K, C)
         return K
 
@@ -764,6 +800,10 @@ def _fusion(**changes):
     return fuse_two_sensors(given["x0"], given["var0"], np.array([given["z1"], given["z2"]]), stds)[0]
 
 
+OF_INTEGERS = (
+    "right, but not for a pose of whole numbers, np.array([2, -1, 1]): an array of integers, and each copy of it, cuts "
+    "the decimals off what is written into it:"
+)
 POSE = "a planar pose has three numbers"
 LANDMARK = "a landmark of the floor has two coordinates"
 READING = "a reading is a distance and a bearing"
@@ -1181,6 +1221,10 @@ CHAPTER = Chapter(
                     _second_from_the_old_variance,
                     "The second sensor meets the variance from before the first one. After a correction the new variance counts.",
                 ),
+                Mistake(
+                    _first_gain_for_both,
+                    "The second sensor gets the gain of the first. Each has its own, var / (var + std^2), with its std and the variance that is left.",
+                ),
                 *(
                     Mistake(
                         _fused(lambda v, s: [1 / np.sqrt(v), *(1 / s)], var),
@@ -1357,7 +1401,11 @@ CHAPTER = Chapter(
                         metrics.Numbers(1e-3),
                         f"right, but not for five states and noises whose variances are {words}:",
                     )
-                    for sure, words in ((1e3, "hundreds"), (1e-3, "below a thousandth"))
+                    for sure, words in (
+                        (1e3, "hundreds"),
+                        (1e-3, "below a thousandth"),
+                        (1e-8, "below a hundred-millionth, as those of a sensor good to a tenth of a millimeter"),
+                    )
                 ),
                 (
                     functools.partial(steady_system, n=2, m=3),
@@ -1414,6 +1462,17 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _rounds(10), "Ten rounds are too few: repeat until the gain stands still, some thousand times."
+                ),
+                Mistake(
+                    _rounds(1000, gain=_gain_by_the_diagonal),
+                    "You divide by the diagonal of S alone. What is measured together goes together: S is to be inverted as a whole.",
+                ),
+                *(
+                    Mistake(
+                        _rounds(n, noise=0),
+                        "Your gain dies out: cov_v comes in at the start only. The system adds its noise anew with every step, within the loop.",
+                    )
+                    for n in (1000, 3000)
                 ),
                 Mistake(
                     lambda A, C, Q, R: kalman.steady_state(A, C, Q, R @ R).gain,
@@ -1647,6 +1706,7 @@ CHAPTER = Chapter(
                 *along_the_axes(metrics.Numbers(1e-9)),
                 *near_and_far(metrics.Numbers(1e-9)),
                 (landmark_ahead, metrics.Numbers(1e-9), "right, but not where the robot looks nearly at the landmark:"),
+                (seen_from_whole_numbers, metrics.Numbers(1e-9), OF_INTEGERS),
             ],
             hints=(
                 "How far away is the landmark, and in which direction seen from where the robot looks?",
@@ -1767,10 +1827,11 @@ CHAPTER = Chapter(
                     metrics.Numbers(1e-5),
                     "right, but not where the landmark stands nearly behind the robot: a difference of two bearings is to be wrapped:",
                 )
-                for side in (1, -1)
+                for side in (1, -1, 0)
             ]
             + along_the_axes(metrics.Numbers(1e-5))
-            + near_and_far(metrics.Numbers(1e-5)),
+            + near_and_far(metrics.Numbers(1e-5))
+            + [(seen_from_whole_numbers, metrics.Numbers(1e-5), OF_INTEGERS)],
             hints=(
                 "Move the robot a little toward the landmark, then across, then turn it. What do distance and bearing do?",
                 "Row 0: (-dx/r, -dy/r, 0). Row 1: (dy/q, -dx/q, -1) with q = r^2. Compute dx, dy, q and r first, then write both rows as one array.",
@@ -1897,6 +1958,7 @@ CHAPTER = Chapter(
                 )
             )
             + (
+                (control_at_whole_numbers, JACOBIANS, OF_INTEGERS),
                 (
                     fast_control,
                     JACOBIANS,
@@ -2389,6 +2451,16 @@ CHAPTER = Chapter(
                     _gated(lambda y, S: (y @ np.linalg.solve(S, y)) ** 2),
                     "Too little passes: y' S^-1 y is the square already, and the limit belongs to it as it is.",
                 ),
+                *(
+                    Mistake(
+                        _gated(lambda y, S, power=power: (y**2 / np.diag(S)).sum() ** power),
+                        f"Two slips: the correlation is left out, and the limit {belongs}",
+                    )
+                    for power, belongs in (
+                        (0.5, "belongs to the sum of squares itself: no root, and no square of the limit."),
+                        (2.0, "belongs to the square as it is, which is not squared again."),
+                    )
+                ),
                 Mistake(lambda y, S, g: True, "You let everything pass: what is the limit for?"),
                 Mistake(lambda y, S, g: False, "You refuse everything: such a filter never corrects itself."),
             ],
@@ -2398,7 +2470,7 @@ CHAPTER = Chapter(
             reference=batch_estimate,
             draw=tuple(
                 functools.partial(measured_often, n=n, m=m, k=k, sure=sure)
-                for n, m, k, sure in ((2, 1, 3, 1.0), (3, 2, 9, 100.0), (2, 2, 6, 1e-3))
+                for n, m, k, sure in ((2, 1, 9, 1.0), (3, 2, 3, 100.0), (2, 2, 6, 1e-3))
             ),
             metric=STATE_AND_COV,
             noisy=(
@@ -2483,6 +2555,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda x0, cov0, z, C, cov_z: batch_estimate(np.zeros_like(x0), cov0, z, C, cov_z),
                     "The covariance is right. To the state what was known before has to be added: cov0^-1 x0, beside the sum of C^T cov_z^-1 z.",
+                ),
+                Mistake(
+                    _batch_of_repeated_rows,
+                    "`np.repeat` writes the first row of C k times, then the second. The numbers of z follow one another measurement by measurement: `np.tile(C, (k, 1))`.",
                 ),
                 Mistake(lambda *a: batch_estimate(*a)[::-1], "The order is state, covariance."),
                 Mistake(
