@@ -1645,10 +1645,7 @@ def _on_show(specimen):
 
 
 RUNS = 3  # how often a property test is tried on each function: what passes by luck does so once
-MORE_RUNS, QUICK = (
-    12,
-    0.15,
-)  # on a correct one, as long as that takes no more seconds of processor time: rejections by luck
+MORE_RUNS, QUICK = 6, 0.1  # how often on a correct one, if three take no more seconds: some reject it by chance
 
 
 def _catches(specimen, good, others, extra=()):
