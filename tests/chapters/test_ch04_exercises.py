@@ -473,7 +473,7 @@ FORGETFUL = [
     ("measured_gradient", lambda f, x, h: beyond.measured_gradient(f, x, h) * (np.arange(len(x)) < 5)),
     ("measured_gradient", of_plain_size(beyond.measured_gradient)),
     ("classify_extremum", lambda g, H: KIND(g, H) if g.any() else "not stationary"),
-    ("classify_extremum", lambda g, H: KIND(g, H) if np.ptp(np.linalg.eigvalsh(H)) else "saddle"),
+    ("classify_extremum", lambda g, H: KIND(g, H) if np.ptp(np.linalg.eigvalsh(H)) > 1e-9 else "saddle"),
     ("classify_extremum", lambda g, H: KIND(g, H) if np.abs(H).max() > 1e-10 else "saddle"),
     ("newton_step", eliminated(0)),
     ("newton_step", eliminated(1)),

@@ -588,8 +588,8 @@ def _differences(function, h, behind):
     )
 
 
-def _wide_differences(name, function):
-    """Mistakes of who takes differences, forward or with a wide step."""
+def _wide_differences(name, function, forward_steps, central_steps):
+    """Mistakes of who takes differences, forward or with a wide step; smaller steps are within the tolerance."""
     forward = (
         "These are forward differences: they are off by about ½h times the next derivative. Differentiate by hand, or step "
         "to both sides, from x − h e to x + h e, with h = 1e-5."
@@ -598,7 +598,7 @@ def _wide_differences(name, function):
         "These are central differences with so wide a step that it shows: they are off by about h²/6 times the third "
         "derivative. Differentiate by hand, or take h = 1e-5."
     )
-    kinds = ((0, forward, (0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)), (1, central, (0.1, 0.01, 1e-3)))
+    kinds = ((0, forward, forward_steps), (1, central, central_steps))
     return [
         Mistake(_differences(function, h, behind), text, id=f"{name}-{'central' if behind else 'forward'}-{h:g}")
         for behind, text, steps in kinds
@@ -739,7 +739,7 @@ CHAPTER = Chapter(
                     "The depths are 100 and 200; here they are 1 and 2.",
                     id="gradient-depths",
                 ),
-                *_wide_differences("gradient", wells.value),
+                *_wide_differences("gradient", wells.value, (0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6), (0.1, 0.01, 1e-3)),
             ],
         ),
         Exercise(
@@ -896,7 +896,7 @@ CHAPTER = Chapter(
                     )
                     for k in range(2)
                 ),
-                *_wide_differences("hessian", wells.gradient),
+                *_wide_differences("hessian", wells.gradient, (0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6), (0.1, 0.01, 1e-3)),
                 Mistake(
                     lambda x: wells.hessian(x) / 2,
                     "Half of the Hessian: the 2 of 2(x − c) is missing in both terms, or you took the Hessian of ½|r|², which is f/2 but for a constant.",
@@ -1441,7 +1441,7 @@ CHAPTER = Chapter(
                     "The outer product takes x itself. It is that of x − c, the offset from the well's center.",
                     id="jacobian-of-x",
                 ),
-                *_wide_differences("jacobian", wells.residual),
+                *_wide_differences("jacobian", wells.residual, (0.1, 0.01, 1e-3, 1e-4, 1e-5), (0.1, 0.01)),
             ],
         ),
         Exercise(

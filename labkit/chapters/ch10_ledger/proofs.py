@@ -794,14 +794,14 @@ TOLERANCES = (
         "the half units.",
     ),
     (
-        lambda halves, own: float(np.mean(halves) / np.sqrt(len(halves))) + own,
-        "Divided by the root of their number, half units are taken for random errors, which cancel in part. What "
-        "rounding allows is the worst case: their mean as it is.",
-    ),
-    (
         lambda halves, own: float(np.hypot(np.mean(halves), own)),
         "The root of the sum of squares is for random errors. What rounding allows is the worst case: add "
         "the half units.",
+    ),
+    (
+        lambda halves, own: float(np.mean(halves) / np.sqrt(len(halves))) + own,
+        "Divided by the root of their number, half units are taken for random errors, which cancel in part. What "
+        "rounding allows is the worst case: their mean as it is.",
     ),
     (
         lambda halves, own: (sum(halves) + own) / (len(halves) + 1),
