@@ -325,3 +325,11 @@ def test_who_stops_at_whole_samples_is_told_apart_from_who_compares_peaks(sign, 
         time, reference, delayed, most = ch06.speed_curves(np.random.default_rng(seed), sign, wide)
         peaks = time[np.argmax(delayed)] - time[np.argmax(reference)]
         assert abs(peaks - ch06._whole_samples(time, reference, delayed, most)) > 5e-3
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_where_the_largest_offset_is_wide_the_default_finds_another_lag(sign):
+    for seed in range(20):
+        time, reference, delayed, most = ch06.speed_curves(np.random.default_rng(seed), sign, wide=True)
+        found = ch06.time_offset(time, reference, delayed)
+        assert abs(found - ch06.time_offset(time, reference, delayed, most)) > 1e-2

@@ -481,11 +481,11 @@ def _mad(values):
 
 def speed_curves(rng, sign, wide=False):
     """Angular speeds of a robot and of a tracker that lags (sign 1), or leads (-1), by a fraction of a sample. Where the
-    largest offset is wide, the curves match a little at several shifts, and well at one.
+    largest offset is wide, the curves match a little at several shifts, and well at one beyond 0.2 s, the default.
     """
     step = float(rng.choice([0.01, 0.0125]))
     time, phase = rng.uniform(1, 50) + step * np.arange(int(rng.integers(550, 700))), rng.uniform(0, 6, 4)
-    samples = int(rng.integers(7, 30))
+    samples = int(rng.integers(30, 45) if wide else rng.integers(7, 30))
     lag = sign * (samples + rng.choice([0.27, 0.33, 0.67, 0.73])) * step
 
     def curve(t):
