@@ -12,7 +12,7 @@ from labkit.geometry.lie import exp_so3, nearest_rotation
 from labkit.machines import arm, log
 
 ITEMS = {item.id: item for item in ch06.CHAPTER.items}
-SEEDS = range(4)
+SEEDS = range(2)
 
 
 def texts(name, answer, status=NOT_YET):
@@ -94,7 +94,7 @@ def test_the_sign_of_the_first_entry_is_not_the_sign_of_the_determinant():
     assert all("R[0, 0] may well be negative" in text for text in texts("rotation_from_nullvector", rotation))
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", range(10))
 def test_four_byte_numbers_are_named_whatever_they_hold(seed):
     def decode(data):
         values = np.frombuffer(data, "<f4")
@@ -240,7 +240,7 @@ def test_noise_draws_a_sum_of_squares_to_the_largest_shift():
 
 def test_values_may_lie_anywhere_and_a_packet_holds_either_sign():
     centers = [
-        np.median(draw(np.random.default_rng(seed))[0]) for seed in SEEDS for draw in ITEMS["reject_outliers"].cases
+        np.median(draw(np.random.default_rng(seed))[0]) for seed in range(4) for draw in ITEMS["reject_outliers"].cases
     ]
     assert np.ptp(centers) > 50
 

@@ -12,7 +12,7 @@ from labkit.exercises.engine import CORRECT, NOT_YET
 from labkit.localization import lateration, odometry
 
 ITEMS = {item.id: item for item in ch07.CHAPTER.items}
-SEEDS = range(6)
+SEEDS = range(2)
 
 
 def texts(name, answer, status=NOT_YET):

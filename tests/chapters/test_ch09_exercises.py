@@ -56,7 +56,7 @@ def test_spins_that_share_their_random_number_are_refused():
     assert "own" in judge("resample_roulette", pairs).text
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_right_resamplers_of_several_styles(seed):
     def by_choice(weights, rng):
         return rng.choice(len(weights), len(weights), p=weights / weights.sum())
@@ -95,7 +95,7 @@ def test_the_logarithm_of_an_underflown_product_is_refused():
     assert judge("beam_weight", lambda r, e, s: norm.logpdf(r, e, s).sum()).status == CORRECT
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_every_single_ray_tells_a_forgotten_heading(seed):
     item = next(item for item in CHAPTER.items if item.id == "cast_ray")
     grid, pose, bearing, r_max = item.cases[0](np.random.default_rng(seed))
@@ -238,7 +238,7 @@ INCOMPLETE = [
 
 
 @pytest.mark.parametrize("name, test, words", INCOMPLETE)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_test_that_sees_the_specimen_alone_is_told_what_else_it_passes(name, test, words, seed):
     outcome = judge(name, test, seed)
     assert outcome.status == NOT_YET and words in outcome.text, outcome.text
@@ -264,7 +264,7 @@ def test_a_wheel_without_a_guard_against_rounding_is_refused_each_time(answer):
     assert all("rounded below 1" in judge("resample_systematic", answer, seed).text for seed in range(5))
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_wheel_with_a_last_end_of_one_is_right(seed):
     def answer(weights, rng):
         ends = np.cumsum(weights / weights.sum())
