@@ -301,7 +301,8 @@ class Search:
             values = [rerun.numeric(case.args[i]) for case in self.cases]
             if all(value is not None for value in values):
                 for change, (words, function) in enumerate(rerun.OTHERWISE[: rerun.ALONE]):
-                    if self._may_be_said(words) and _changes(function, values[0], []):
+                    told = self._may_be_said(words) and not self._is_asked_for(function)
+                    if told and _changes(function, values[0], []):
                         plans.append(("argument", i, change))
         plan = self.mending(plans)
         return plan and f"wherever you read `{self.names[plan[1]]}`: {_closed(rerun.OTHERWISE[plan[2]][0])} {ALONE}"
@@ -326,7 +327,7 @@ class Search:
         reached = (k for k in sorted(among) if first[k][0] and not self._is_filled(k))
         seen = [(k, first[k][1][0], self._is_bounded(k)) for k in reached]
         for change, (words, function) in enumerate(rerun.OTHERWISE):
-            if not self._may_be_said(words):
+            if not self._may_be_said(words) or change < rerun.ALONE and self._is_asked_for(function):
                 continue
             for argument in [None] if change < rerun.ALONE else numeric:
                 others = [] if argument is None else [np.asarray(self.cases[0].args[argument], dtype=float)]
@@ -336,6 +337,18 @@ class Search:
                         continue
                     if _changes(function, value, others) and not self._is_all_of_it(k, function, value, others):
                         yield "value", k, change, argument
+
+    def _is_asked_for(self, function):
+        """Whether it makes the right result of an argument on all draws: "wrapped" tells nobody how to wrap."""
+        rights = [rerun.numeric(case.expected) for case in self.cases]
+        for i in range(len(self.names)):
+            values = [rerun.numeric(case.args[i]) for case in self.cases]
+            if any(value is None for value in (*values, *rights)):
+                continue
+            made = (_turned_value(function, value, []) for value in values)
+            if all(new is not None and _same(new, right) for new, right in zip(made, rights)):
+                return True
+        return False
 
     def _is_all_of_it(self, k, function, value, others):
         """Whether a value on the way becomes the right result: "its inverse" tells nobody how to write `invert`."""
