@@ -205,13 +205,12 @@ class Exercise(Item):
             seen.append(draw)
         verdict = trial.verdict()
         if verdict.status == CORRECT:
-            if words := trial.remembered():
-                return trial.outcome(NOT_YET, words)
+            if words := trial.repeated() or trial.remembered(rng):
+                return trial.outcome(NOT_YET, _closed(words))
             for holds in self.properties:
                 problem = trial.property(holds, rng)
                 if problem:
                     return problem
-            return trial.repeated() or verdict
         return verdict
 
     def _plan(self):
@@ -380,15 +379,14 @@ class _Trial:
         )
 
     def repeated(self):
-        """Call an answer that came out right again; an Outcome where something stays from call to call, or None."""
+        """What stays from call to call, if an answer that came out right does so no more when it is called again."""
         if self.exercise.metric is None or "rng" in self.exercise.arguments:
             return None
         again = functools.partial(self._again_words, kind=Budget(REPEATING))
-        run = guard.run(again, (self.function,), limit=self.exercise.limit + REPEATING, author=self.function)
-        return self.outcome(NOT_YET, _closed(run.result)) if run.result else None
+        return guard.run(again, (self.function,), limit=self.exercise.limit + REPEATING, author=self.function).result
 
     def _again_words(self, function, kind):
-        """What stays from call to call, if a draw that came out right does so no more."""
+        """`repeated`, in one run of the guard: the calls themselves are quick."""
         calls = [1] * len(self.inputs)
         for k in self._in_another_order():
             metric, (_, expected) = self.metrics[k], self.pairs[k]
@@ -414,27 +412,33 @@ class _Trial:
         often = (numbers[0] for numbers in itertools.islice(alike.values(), ALIKE))
         return [*itertools.chain(*alike.values()), *(k for k in often for _ in range(IN_A_ROW))]
 
-    def remembered(self):
-        """Whether a function that has something to keep results in gives for other arguments what it gave before, in
+    def remembered(self, rng):
+        """Whether a function that has something to keep results in finds them again by a part of the arguments, in
         words; None where it does not.
+
+        Two fresh calls differ in one argument. That of the first is another draw's and need not go with the rest: only
+        the second is judged, which nobody misses who has computed it.
         """
-        if self.exercise.metric is None or not self.pairs or not scope.may_keep(self.function):
+        exercise, kind = self.exercise, Budget(SPECIAL)
+        if exercise.metric is None or not self.pairs or not scope.may_keep(self.function):
             return None
-        draws = self._cases()
-        for k, name in enumerate(self._names(draws[0][0])):
-            for draw, changed in self._exchanges(k, draws):
-                _, metric, (result, expected) = draw
-                first = _numbers_of(result)
-                if first is None or not self._moves(k, draw, changed):
-                    continue
-                admitted = functools.partial(_admitted, metric, expected)
-                run = guard.run(self.function, changed, admitted, self.exercise.limit)
-                if run.error is None and _same_numbers(_numbers_of(run.result), first):
-                    return (
-                        f"right at the first call, but called again with another `{name}` and all else as before, your "
-                        "function returns what it returned then: is a result kept, and found again by a part of the "
-                        f"arguments alone?{self._about_globals()}"
-                    )
+        for k, name in enumerate(self._names(self.inputs[0])):
+            draw = exercise.cases[k % len(exercise.cases)]
+            args, other = draw(rng), draw(rng)
+            if not kind.left() or k >= min(len(args), len(other)) or not _could_change(args[k], other[k]):
+                continue
+            expected = exercise.reference(*copy.deepcopy(args))
+            admitted = functools.partial(_admitted, exercise.metric, expected)
+            before = guard.run(self.function, (*args[:k], other[k], *args[k + 1 :]), admitted, exercise.limit)
+            run = guard.run(self.function, args, admitted, exercise.limit)
+            if before.error is not None or run.error is not None or exercise.metric.equal(run.result, expected):
+                continue
+            if _same_numbers(_numbers_of(run.result), _numbers_of(before.result)):
+                return (
+                    f"right at first, but called again with another `{name}` and all else as before, your function "
+                    "returns what it returned then, which is right no more: is a result kept, and found again by a "
+                    f"part of the arguments alone?{self._about_globals()}"
+                )
         return None
 
     def _relation(self, whole=False):
@@ -1078,7 +1082,7 @@ def _is_another(first, run):
 
 
 def _same_numbers(one, other):
-    if one is None or one.shape != other.shape:
+    if one is None or other is None or one.shape != other.shape:
         return False
     return bool(np.allclose(one, other, rtol=1e-9, atol=1e-12, equal_nan=True))
 

@@ -1107,6 +1107,17 @@ def test_a_result_that_is_kept_by_a_part_of_the_arguments_is_told():
         assert exercise.judge(right, rng=np.random.default_rng(0)).status == CORRECT
 
 
+def test_an_argument_that_follows_from_another_need_not_be_read():
+    """Exchanged for another draw's, it no longer follows; who reads the other one is right all the same."""
+    exercise = replace(
+        DOUBLE,
+        reference=lambda a, twice: twice / 2,
+        draw=lambda rng: (lambda a: (a, 2 * a))(rng.normal(size=3)),
+        mistakes=[],
+    )
+    assert exercise.judge(lambda a, twice: a * FACTORS[0] / 2, rng=np.random.default_rng(0)).status == CORRECT
+
+
 def test_a_row_that_is_returned_as_it_came_is_told():
     exercise = replace(
         DOUBLE, reference=lambda v: v.mean(axis=0), draw=lambda rng: (rng.normal(size=(4, 3)),), mistakes=[]
