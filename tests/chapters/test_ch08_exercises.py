@@ -7,6 +7,7 @@ from scipy import stats
 from labkit.chapters.ch08_kalman import exercises as ch08
 from labkit.chapters.ch08_kalman import stages
 from labkit.estimation import kalman
+from labkit.exercises import engine
 from labkit.exercises.engine import CORRECT, NOT_YET, RAISED
 from labkit.geometry.planar import wrap_angle
 from labkit.localization import ekf, odometry
@@ -334,7 +335,7 @@ def stops_by_allclose(A, C, cov_v, cov_z):
 
 def noise_at_the_start_only(A, C, cov_v, cov_z, divide=lambda M, S: M @ np.linalg.inv(S), each=0.0):
     P = np.eye(len(A)) + (1 - each) * cov_v
-    for _ in range(3000):
+    for _ in range(1000):
         P = A @ P @ A.T + each * cov_v
         K = divide(P @ C.T, C @ P @ C.T + cov_z)
         P = P - K @ C @ P
@@ -366,7 +367,6 @@ def two_slips(y, S, limit):
     [
         ("measurement_jacobian", differences_across_the_seam, "wrapped"),
         ("measurement_jacobian", of_the_poses_own_kind, "`dtype=` does not belong there"),
-        ("steady_state_gain", stops_by_allclose, ""),
         ("steady_state_gain", noise_at_the_start_only, "Your gain dies out"),
         ("steady_state_gain", divides_by_the_diagonal, "the diagonal of S alone"),
         ("fuse_two_sensors", first_gain_twice, "The second sensor gets the gain of the first"),
@@ -375,8 +375,13 @@ def two_slips(y, S, limit):
     ],
 )
 def test_what_once_passed_or_was_told_of_a_coincidence_is_named(name, answer, words):
-    status, texts = judged(name, answer, seeds=range(2))
+    status, texts = judged(name, answer, seeds=range(1))
     assert status == NOT_YET and all(words in text for text in texts), texts
+
+
+def test_a_rule_that_stops_by_an_absolute_size_meets_tiny_variances(monkeypatch):
+    monkeypatch.setattr(engine, "LOOKING", 0.0)  # what is told is not asked here
+    assert judged("steady_state_gain", stops_by_allclose, seeds=range(2))[0] == NOT_YET
 
 
 def test_a_gate_that_gives_in_after_five_refusals_is_told():
