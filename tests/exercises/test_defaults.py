@@ -36,7 +36,7 @@ def test_a_property_that_fails_on_what_is_left_over_is_told():
 
     def double(v, seen=empty):
         seen.append(v)
-        return 2 * v + (len(seen) > DOUBLE.draws)
+        return 2 * v + (len(seen) > 1 and not v.any())
 
     assert "into `seen` is still there" in judged(double).text
 
