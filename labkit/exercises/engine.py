@@ -755,16 +755,14 @@ class _Trial:
         return None
 
     def _is_it_again(self, mistake):
-        """Whether an answer chooses what a mistake does on fresh draws too, where one of several is chosen, or some of
-        them: two rules may choose alike by chance.
+        """Whether an answer is equal to a mistake on fresh draws too, where it is one of several, some of them, or a
+        truth value: two rules may decide alike by chance.
         """
-        sets = isinstance(self.exercise.metric, metrics.Exactly) and isinstance(self.pairs[0][1], set | frozenset)
-        if self.refusal or self._right_on_plain():
+        decides = isinstance(self.exercise.metric, metrics.Exactly)
+        if not decides or self.refusal or self._right_on_plain():
             return True
-        if isinstance(self.exercise.metric, metrics.Exactly) and isinstance(self.pairs[0][1], str):
+        if isinstance(self.pairs[0][1], str):
             return self._shows_always(mistake)
-        if not (sets or self._is_choice()):
-            return True
         return self._is_it_on(mistake, (self.exercise.plain_again[number] for number in range(MORE_DRAWS)))
 
     def _shows_always(self, mistake):

@@ -402,12 +402,12 @@ def one_column(rng):
     return np.array([rng.uniform(near, far)]), field_of_view, near, far
 
 
-def cloud_and_threshold(rng, slip):
-    """Weights and a threshold for which this slip decides wrongly."""
+def cloud_and_threshold(rng, slip, beside=particles.should_resample):
+    """Weights and a threshold for which this slip decides wrongly, or otherwise than the one beside it."""
     while True:
         w, threshold = *cloud_weights(rng), float(rng.uniform(0.2, 0.9))
         w[rng.random(w.size) < rng.choice([0.0, 0.4])] = 0.0
-        if slip(w, threshold) != particles.should_resample(w, threshold):
+        if slip(w, threshold) != beside(w, threshold):
             return w, threshold
 
 
@@ -940,6 +940,14 @@ def _above_the_share(weights, threshold):
     return particles.effective_size(weights) > threshold * len(weights)
 
 
+def _below_a_share_of_the_sum(weights, threshold):
+    return particles.effective_size(weights) < threshold * weights.sum()
+
+
+def _by_the_variance(weights, threshold):
+    return weights.var() > threshold
+
+
 RESAMPLING_SLIPS = (
     (_above_the_share, "The other way round: resample when the effective size is low."),
     (
@@ -947,7 +955,7 @@ RESAMPLING_SLIPS = (
         "The other way round: resample when the effective size is low.",
     ),
     (
-        lambda w, t: particles.effective_size(w) < t * w.sum(),
+        _below_a_share_of_the_sum,
         "Compare with the share of the *number* of particles, len(weights), not of the sum of the weights.",
     ),
     (
@@ -967,7 +975,7 @@ RESAMPLING_SLIPS = (
         "You count only particles that weigh something. The share is one of all particles, len(weights).",
     ),
     (
-        lambda w, t: w.var() > t,
+        _by_the_variance,
         "You compare the variance of the weights, which grows with their size, with a share: compare effective_size(weights).",
     ),
     (
@@ -2625,6 +2633,7 @@ CHAPTER = Chapter(
                     if slip is not _up_to_the_share
                 ),
                 *(functools.partial(near_the_threshold, side=side) for side in (1, -1)),
+                functools.partial(cloud_and_threshold, slip=_by_the_variance, beside=_below_a_share_of_the_sum),
                 at_the_threshold,
                 *(
                     functools.partial(weights_on_their_own_side, place=place, below=below, shares=shares)
