@@ -1,14 +1,18 @@
 """`labkit VERB ...` or `python -m labkit VERB ...`: the command line; `lab.py` hands its verbs on to this."""
 
+import os
 import sys
 from importlib import import_module
 
 from .verbs import VERBS, table
 from .verbs.arguments import COMMAND, Refusal, run
 
+THREADS = "1"  # of linear algebra: on matrices as small as the workbook's, several wait for each other
+
 
 def main(arguments=None):
     """Run one verb; returns the exit code."""
+    os.environ.setdefault("OMP_NUM_THREADS", THREADS)  # before anything loads NumPy; kernels inherit it
     return run(_verb, sys.argv[1:] if arguments is None else list(arguments))
 
 

@@ -1,10 +1,12 @@
 """Opening JupyterLab: where the notebooks lie, which port, and what is said or refused before."""
 
+import os
 import socket
 import tempfile
 
 import pytest
 
+from labkit import __main__
 from labkit.verbs import jupyter, notebook_copies, start
 from labkit.verbs.arguments import Refusal
 
@@ -119,3 +121,10 @@ def test_localhost_is_taken_when_any_of_its_addresses_is():
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         assert not jupyter.is_free("localhost", taken.getsockname()[1])
+
+
+def test_linear_algebra_has_one_thread_unless_another_number_is_asked_for(monkeypatch, capsys):
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    assert __main__.main(["--version"]) == 0 and os.environ["OMP_NUM_THREADS"] == "1"
+    monkeypatch.setenv("OMP_NUM_THREADS", "4")
+    assert __main__.main(["--version"]) == 0 and os.environ["OMP_NUM_THREADS"] == "4"
