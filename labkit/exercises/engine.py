@@ -327,12 +327,17 @@ class _Trial:
             for metric, pair, words in zip(self.metrics, self.pairs, self.words):
                 if words and not metric.equal(*pair):
                     off = next(d for d in metric.deviations(*pair) if not d.within)
-                    return self.outcome(NOT_YET, _closed(f"{words} {off}"))
+                    return self.outcome(NOT_YET, self._of_some(_closed(f"{words} {off}")))
         words = unmoved or self._never_said() or self._relation() or self._picked()
         said, example, call = (_closed(words) if words else self._deviation()).partition(NOT_RIGHT)
         said += self._where_it_is_wrong() if words else self._constant() + self._by_chance()
         words = said + self._agreement(search, solution) + example + call
         return self.outcome(NOT_YET, words + self._about_globals())
+
+    def _of_some(self, text):
+        """What is said of one special draw, as it is true where those of another kind are wrong as well."""
+        wrong = {words for m, pair, words in zip(self.metrics, self.pairs, self.words) if words and not m.equal(*pair)}
+        return _in_ordinary_cases(text) if len(wrong) > 1 else text
 
     def _where_it_is_wrong(self):
         """What the draws on which it is wrong have in common, as one more sentence, where it is right on others."""
@@ -986,8 +991,15 @@ class _Trial:
 
 
 def _lead(words):
-    """What an exercise says of a special draw that alone fails, as a sentence; "" where it says nothing of its own."""
-    return "" if words in (None, NOISY) else f"{words[0].upper()}{words[1:].rstrip(':')}."
+    """What an exercise says of the first special draw that fails, as a sentence, those behind it not tried; "" where it
+    says nothing of its own.
+    """
+    return "" if words in (None, NOISY) else _in_ordinary_cases(f"{words[0].upper()}{words[1:].rstrip(':')}.")
+
+
+def _in_ordinary_cases(text):
+    """What is said to be right but for one kind of case, said of ordinary cases alone: other kinds may be wrong too."""
+    return re.sub("^([Rr])ight, but not ", r"\1ight in ordinary cases, but not ", text)
 
 
 def _is_row(value, rows):

@@ -543,16 +543,16 @@ OTHERWISE = (  # (what it should have been, function of the value [and of an arg
         )
         for i, j in itertools.combinations(range(4), 2)
     ),
-    ("it is to be multiplied by `{}`", _of_its_shape(np.multiply)),
-    ("it is to be divided by `{}`", _of_its_shape(np.divide)),
-    ("`{}` belongs in its place", lambda v, a: a),
-    ("`{}` is missing: it is to be added", _of_its_shape(np.add)),
-    ("`{}` is to be taken off", _of_its_shape(np.subtract)),
-    ("the matrix `{}` is to be multiplied with it, from the left", lambda v, a: _matrix(a) @ v),
-    ("it is to be multiplied by the square of `{}`", _of_its_shape(lambda v, a: v * a**2)),
-    ("it is to be divided by the square of `{}`", _of_its_shape(lambda v, a: v / a**2)),
-    ("it is to be divided by the number of rows or entries of `{}`", lambda v, a: v / len(a)),
-    ("it is to be multiplied by the number of rows or entries of `{}`", lambda v, a: v * len(a)),
+    ("it is to be multiplied by {}", _of_its_shape(np.multiply)),
+    ("it is to be divided by {}", _of_its_shape(np.divide)),
+    ("{} belongs in its place", lambda v, a: a),
+    ("{} is missing: it is to be added", _of_its_shape(np.add)),
+    ("{} is to be taken off", _of_its_shape(np.subtract)),
+    ("the matrix {} is to be multiplied with it, from the left", lambda v, a: _matrix(a) @ v),
+    ("it is to be multiplied by the square of {}", _of_its_shape(lambda v, a: v * a**2)),
+    ("it is to be divided by the square of {}", _of_its_shape(lambda v, a: v / a**2)),
+    ("it is to be divided by the number of rows or entries of {}", lambda v, a: v / len(a)),
+    ("it is to be multiplied by the number of rows or entries of {}", lambda v, a: v * len(a)),
 )
 WITH_OWN = 6  # of those that take an argument also take a variable
 ALONE = sum("{}" not in words for words, _ in OTHERWISE)  # of one value; the others take an argument as well

@@ -289,10 +289,16 @@ class Search:
         if plan is None:
             return None
         kind, k, change, other = plan
-        name = "" if other is None else self.written.places[other][2] if kind == "own" else self.names[other]
+        name = "" if other is None else self._bound(other) if kind == "own" else f"`{self.names[other]}`"
         words = rerun.OTHERWISE[change][0].format(name)
         words = rerun.OF_TRUTHS.get(words, words) if k in self.written.of_truth else words
+        words = words.replace("belongs in its place", "belongs on the right side") if self._binds(k) else words
         return f"{self._where(k)}: {_closed(words)} {ALONE}"
+
+    def _bound(self, k):
+        """A variable by its name; `_`, which may be bound anew in every line, with its line."""
+        line, _, name, *_ = self.written.places[k]
+        return f"`{name}` of line {line}" if name == "_" else f"`{name}`"
 
     def _argument_words(self):
         """What is to be done with an argument before the first line, as it is read in several places."""

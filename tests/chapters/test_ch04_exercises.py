@@ -1,6 +1,5 @@
 """Answers to chapter 4 that once passed by luck, or were told something untrue."""
 
-import copy
 import functools
 import math
 
@@ -12,6 +11,7 @@ from labkit.chapters.ch04_optimization.exercises import CHAPTER
 from labkit.documents.thesis import wells
 from labkit.estimation import optimization as opt
 from labkit.exercises.engine import CORRECT, NOT_YET
+from tests.chapters.draws_of_a_check import is_missed, one_check
 
 ITEMS = {item.id: item for item in CHAPTER.items}
 SEEDS = range(2)
@@ -27,24 +27,13 @@ def kind(H):
 
 
 @functools.cache
-def one_check(name, seed=0):
-    """(arguments, metric, right result) of all draws of one check."""
-    item, rng = ITEMS[name], np.random.default_rng(seed)
-    drawn = [(draw(rng), metric) for draw, metric, _ in item._plan()]
-    return [(args, metric, item.reference(*copy.deepcopy(args))) for args, metric in drawn]
-
-
-def is_missed(answer, args, metric, expected):
-    """Whether an answer is not right on one draw."""
-    try:
-        return not metric.equal(metric.admit(answer(*copy.deepcopy(args)), expected), expected)
-    except Exception:  # a result that the metric refuses, or none at all
-        return True
+def drawn(name, seed):
+    return one_check(ITEMS[name], seed)
 
 
 def is_wrong_in_a_check(name, answer, seed=0):
     with np.errstate(all="ignore"):
-        return any(is_missed(answer, *drawn) for drawn in one_check(name, seed))
+        return any(is_missed(answer, *case) for case in drawn(name, seed))
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labkit.exercises import metrics, regions, session, source
+from labkit.exercises import engine, metrics, regions, session, source
 from labkit.exercises.engine import CORRECT, NOT_YET, TO_DO, Exercise, Prediction, Value
 from labkit.exercises.typeset import typeset
 
@@ -203,6 +203,12 @@ def test_hints_and_texts_write_the_transpose_as_the_notebook_does():
 
 def test_what_is_typed_with_a_caret_is_shown_raised_but_not_in_code():
     assert typeset("K = cov C^T S^-1, or `C^T`: 2^-10, A^Tx") == "K = cov Cᵀ S⁻¹, or `C^T`: 2^-10, A^Tx"
+
+
+def test_words_of_a_special_draw_are_a_sentence_that_leads_on():
+    """They stand alone where an answer stops with an error, and before what is off where it does not."""
+    leads = {words for _, item in EXERCISES for *_, words in item._plan() if words not in (None, engine.NOISY)}
+    assert leads and all(words.endswith(":") for words in leads)
 
 
 def test_hints_do_not_repeat():

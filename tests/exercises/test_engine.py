@@ -989,7 +989,7 @@ def test_the_pole_is_checked_apart():
 
     exercise = CHAPTER["kuka_from_matrix"]
     assert "rounding noise" in exercise.judge(one_by_one).text
-    assert exercise.judge(zero_at_the_pole).text.startswith("right away from the pole, but at B = 90 deg")
+    assert exercise.judge(zero_at_the_pole).text.startswith("right away from the pole, but not at B = 90 deg:")
 
 
 KEPT, BUFFER = [], np.zeros(3)
@@ -1230,6 +1230,16 @@ def test_what_an_exercise_says_of_a_special_draw_leads_where_it_is_refused_or_ra
     item = replace(DOUBLE, noisy=(lambda rng: (rng.normal(size=1),), metrics.Numbers(1e-9), words))
     assert item.judge(lambda v: np.squeeze(2 * v)).text.startswith("Right for long vectors, but not for one entry: exp")
     assert "Right for long vectors, but not for one entry." in item.judge(lambda v: 2 * v + 0 * v[1]).text
+
+
+def test_right_but_for_one_kind_is_said_of_ordinary_cases_where_another_kind_is_wrong_or_not_tried():
+    kinds = [(np.ones(n), metrics.Numbers(1e-9), f"right, but not for {n} entries:") for n in (6, 7)]
+    item = replace(DOUBLE, noisy=[(lambda rng, v=v: (v,), metric, words) for v, metric, words in kinds])
+    one, both = (item.judge(lambda v, n=n: (2 if len(v) <= n else 3) * v).text for n in (6, 5))
+    assert one.startswith("right, but not for 7 entries: ")
+    assert both.startswith("right in ordinary cases, but not for 6 entries: ")
+    assert item.judge(lambda v: 2 * v[:5]).text.startswith("Right in ordinary cases, but not for 6 entries: exp")
+    assert "Right in ordinary cases, but not for 6 entries." in item.judge(lambda v: 2 * v + (len(v) > 5 and v[9])).text
 
 
 def test_a_special_draw_that_is_refused_is_not_told_while_plain_ones_are_wrong():

@@ -660,6 +660,15 @@ def test_no_factor_is_told_for_what_only_counts():
     assert text.startswith("in line 2, `a`: `b` belongs in its place.")
 
 
+@pytest.mark.parametrize("before, name", [("c, _ = np.cos(a), np.sqrt(b)", "`_` of line 2"), ("r = np.sqrt(b)", "`r`")])
+def test_what_is_bound_to_another_value_is_told_by_the_right_side(before, name):
+    """In the place of the whole line the name alone would bind nothing."""
+    text = judged(
+        asked(lambda a, b: b**1.5 + np.cos(b), two_numbers), f"{before}\ns = np.cos(a * b)\nreturn s**3 + np.cos(b)"
+    )
+    assert text.startswith(f"in line 3, `s = np.cos(a * b)`: {name} belongs on the right side. With this alone")
+
+
 def two_vectors(rng):
     return rng.uniform(0.1, 0.9, 3), rng.normal(size=3)
 

@@ -1234,8 +1234,8 @@ CHAPTER = Chapter(
             noisy=[
                 (at_the_pole(sign), _read_by_kuka(1e-4), words)
                 for sign, words in (
-                    (1, "right away from the pole, but at B = 90 deg"),
-                    (-1, "right, but at B = -90 deg"),
+                    (1, "right away from the pole, but not at B = 90 deg:"),
+                    (-1, "right away from the pole, but not at B = -90 deg:"),
                 )
             ]
             + [(small_motion, _read_by_kuka(1e-6), "right, but not where all angles are small:")]

@@ -388,6 +388,20 @@ def _hessian(factor=8.0, power=3, bowl=1.0, depths=wells.DEPTHS, **changes):
     return variant
 
 
+def _one_well_alone(derivative, name):
+    """Mistakes of who lets one well count at each place, and the other one elsewhere."""
+    sides = {
+        "nearer": lambda x: _terms(x)[1],
+        "steeper": lambda x: -_factors(x) * np.sqrt(_terms(x)[1] - 1),
+    }
+    text = "At each place one well alone counts here, the {} one. Both count everywhere: add them up."
+
+    def variant(size):
+        return lambda x: derivative(depths=wells.DEPTHS * np.eye(2)[np.argmin(size(x))])(x)
+
+    return [Mistake(variant(size), text.format(side), id=f"{name}-{side}-well") for side, size in sides.items()]
+
+
 UNIT = np.eye(2)
 
 
@@ -670,6 +684,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(_gradient(depths=(100.0, 0.0)), "This is the well at (1, 1) alone: add the one at (−1, −2)."),
                 Mistake(_gradient(depths=(0.0, 200.0)), "This is the well at (−1, −2) alone: add the one at (1, 1)."),
+                *_one_well_alone(_gradient, "gradient"),
                 Mistake(
                     _gradient(depths=(200.0, 100.0)),
                     "The depths are exchanged: w = 100 at (1, 1), w = 200 at (−1, −2).",
@@ -803,6 +818,12 @@ CHAPTER = Chapter(
                     id="measured-all",
                 ),
                 Mistake(
+                    lambda f, x, h: np.zeros(len(x)),
+                    "All slopes come out 0. If you step to complex places, x + 1j h e: f takes real numbers, and drops the rest. Step to both sides, "
+                    "f(x + h e) − f(x − h e).",
+                    id="measured-nought",
+                ),
+                Mistake(
                     beyond.not_put_back,
                     "Only the first component is right: put each unknown back before you move the next one.",
                     id="measured-not-restored",
@@ -841,6 +862,7 @@ CHAPTER = Chapter(
                     "You differentiated only x − c. The factor 2w/q² depends on x as well: product rule.",
                 ),
                 Mistake(_hessian(factor=-8.0), "The outer product has the wrong sign: 1/q² shrinks as q grows."),
+                *_one_well_alone(_hessian, "hessian"),
                 Mistake(_diagonal_only, "The mixed derivatives are not zero: the wells lie diagonally to each other."),
                 Mistake(
                     _hessian(factor=4.0), "The outer product is too small by a factor 2: the gradient of q is 2(x − c)."
@@ -1184,7 +1206,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: wells.CENTERS.mean(0),
-                    "That is halfway between the centers. The deeper well pulls the pass away from there.",
+                    "That is halfway between the centers. The pass lies nearer to the shallower well: the deeper one reaches farther.",
                 ),
                 Mistake(
                     lambda: wells.extrema()[0].x,

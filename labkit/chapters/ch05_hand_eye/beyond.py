@@ -878,19 +878,23 @@ LITERATURE = [
         noisy=(
             (functools.partial(translated_poses, std=0.01), metrics.Rotations(0.2)),
             (visited_twice, metrics.Rotations(1e-6), "right, but not where two of four poses are at one place:"),
-            (first_ones_on_a_line, metrics.Rotations(0.5), "right without noise, but not all poses are heard:"),
+            (
+                first_ones_on_a_line,
+                metrics.Rotations(0.5),
+                "right without noise, but not of noisy poses that lie nearly on a line, all but three (are all heard?):",
+            ),
             *2  # a turn about the line that nothing tells may be nearly right by chance
             * (
                 (
                     functools.partial(first_ones_on_a_line, numbers=(40, 50)),
                     metrics.Rotations(0.5),
-                    "right without noise, but not all of 40 poses and more are heard:",
+                    "right without noise, but not of 40 noisy poses and more nearly on a line, all but three (are all heard?):",
                 ),
             ),
             (
                 nearly_in_a_plane,
                 metrics.Rotations(5.0),
-                "right where the moves fill space; where they lie nearly in a plane",
+                "right where the moves fill space, but not where they lie nearly in a plane:",
             ),
         ),
         hints=(
@@ -948,6 +952,12 @@ LITERATURE = [
                 id="li-sign-differences",
             ),
             Mistake(
+                lambda T, x: _fit((T[1:, :3, 3] - T[0, :3, 3]) @ T[0, :3, :3], x[1:] - x[0]),
+                "The sign is that of (2-41) as it is printed. If the flange moves one way, the sphere moves the other way in the scanner: the right "
+                "side is T_01 − T_02.",
+                id="li-sign-from-the-first",
+            ),
+            Mistake(
                 lambda T, x: _fit(np.diff(T[:, :3, 3], axis=0), np.diff(x, axis=0)),
                 "R_BF is missing, and the sign is that of (2-41) as it is printed. In the flange's frame: R_FS (x_q − x_p) = −R_BFᵀ (t_q − t_p).",
                 id="li-as-printed",
@@ -981,11 +991,15 @@ LITERATURE = [
         metric=STEP_2,
         noisy=(
             (two_turned_alike, STEP_2, "right, but not where two of four poses have one orientation:"),
-            (first_ones_turned_alike, NOISY_STEP_2, "right without noise, but not all poses are heard:"),
+            (
+                first_ones_turned_alike,
+                NOISY_STEP_2,
+                "right without noise, but not of noisy poses that hardly turn, all but four (are all heard?):",
+            ),
             (
                 functools.partial(first_ones_turned_alike, numbers=(40, 50)),
                 NOISY_STEP_2,
-                "right without noise, but not all of 40 poses and more are heard:",
+                "right without noise, but not of 40 noisy poses and more that hardly turn, all but four (are all heard?):",
             ),
         ),
         hints=(

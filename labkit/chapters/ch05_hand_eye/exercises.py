@@ -667,6 +667,9 @@ class named_entries(metrics.Exactly):
             words = f"in row {which} you name" if len(found) == 1 else f"in the rows {which} you name"
             words = f"{missed} of {len(expected)} misprints {'is' if missed == 1 else 'are'} not named yet: {words} an entry, but not the misprinted one"
             return [metrics.Deviation("", float(missed), "", 0.5, words=words)]
+        if missed and result and not accused:
+            words = f"{missed} of {len(expected)} misprints {'is' if missed == 1 else 'are'} not named yet, in rows of which you name no entry; what you name is misprinted"
+            return [metrics.Deviation("", float(missed), "", 0.5, words=words)]
         rows = Counter((table, pose) for table, pose, _ in result)
         whole = " (several of one row: one slip a row is meant)" if max(rows.values(), default=0) > 1 else ""
         return [Count("misprints are not named yet", missed), Count(f"entries are accused wrongly{whole}", accused)]
@@ -792,6 +795,11 @@ def _vectors_of_end_pose():
 
 def _lengths_of_end_pose():
     return np.linalg.norm(_vectors_of_end_pose(), axis=1)
+
+
+def _scatter_of_end_pose():
+    residuals = _vectors_of_end_pose()
+    return float(hand_eye.rms_distance(residuals - residuals.mean(axis=0)))
 
 
 def _rms_without_pose_2():
@@ -1008,7 +1016,7 @@ CHAPTER = Chapter(
                 Mistake(lambda p2, T, x, c: _residual(frames.matrix_from_kuka(p2), T, x, -c), "The target is to be subtracted; yours is added."),
                 Mistake(lambda p2, T, x, c: frames.transform(T, x) - c, "T_FS is missing: x_S is still in the scanner's frame when T_BF meets it."),
                 Mistake(_kuka_flange_inverse, "You used the inverse of T_BF: it maps F to B, as it stands."),
-                Mistake(_kuka_in_flange, "These are the residuals along the axes of F: the target was brought into the flange. (4-3) brings the sphere into B.", id="kuka_residual-in-flange"),
+                Mistake(_kuka_in_flange, "These are the residuals along the axes of F, as if the target were brought into the flange. (4-3) brings the sphere into B.", id="kuka_residual-in-flange"),
                 Mistake(_kuka_angles("XYZ"), "You turned by A about x and by C about z. KUKA: A about z, then B about y, then C about x."),
                 Mistake(_kuka_angles("zyx"), "You turned about fixed axes. A, B, C turn about axes that move along: Rz(A) Ry(B) Rx(C)."),
                 Mistake(_kuka_without_target, "The target is missing: these are positions of the sphere in the base, not residuals."),
@@ -1066,6 +1074,7 @@ CHAPTER = Chapter(
                 Mistake(lambda: _rms_of_end_pose(2) * np.sqrt(31 / 30), "The mean of the squares divides by n - 1 here. A mean divides by the 31 poses."),
                 Mistake(_rms_without_pose_2, "Pose 2 is left out. Repaired, it counts like the others: use `repaired`, all 31."),
                 Mistake(lambda: float(_lengths_of_end_pose()[0]), "This is pose 1 alone. The rms is over all 31."),
+                Mistake(_scatter_of_end_pose, "This is how far the residuals scatter about their mean. The mean is part of them: do not take it off.", id="rms_before-scatter"),
                 Mistake(lambda: float(_vectors_of_end_pose().std()), "This is the standard deviation of all coordinates, their mean taken off. Asked for is the rms of the lengths."),
             ],
         ),
@@ -1279,11 +1288,11 @@ CHAPTER = Chapter(
             reference=hand_eye.linear_start,
             draw=(lambda rng: scene(rng)[1:3], just_enough, lambda rng: scene(rng, MANY)[1:3]),
             metric=metrics.Several(metrics.Poses(1e-5, 1e-4), metrics.Numbers(1e-7, "mm"), names=("T_FS", "target")),
-            noisy=((noisy_scene, LinearStart(0.5, 2.5, 2e-3), "exact on clean data, but on noisy data"),
+            noisy=((noisy_scene, LinearStart(0.5, 2.5, 2e-3), "exact on clean data, but not on noisy data:"),
                    (first_ones_alike, LinearStart(0.4, 2.0, 2e-3),
-                    "exact on clean data, but not all poses are heard. Where only the last ones turn far,"),
+                    "exact on clean data, but not where only the last of the noisy poses turn far (are all heard?):"),
                    (functools.partial(first_ones_alike, numbers=(60, 70), turn=1e-4), LinearStart(0.4, 2.0, 2e-3),
-                    "exact on clean data, but not all of 60 poses and more are heard. Where only the last ones turn far,")),
+                    "exact on clean data, but not of 60 noisy poses and more of which only the last ones turn far (are all heard?):")),
             hints=(
                 "Forget for a moment that R_FS is a rotation: then all unknowns enter linearly.",
                 "R_FS x + t_FS - R_BF^T target = -R_BF^T t_BF. Fifteen unknowns: nine of R_FS, three of t_FS, three of the target. A pose gives three rows: `np.kron(np.eye(3), x)` for R_FS row by row, then `np.eye(3)`, then -R_BF^T. Solve all rows, and take `nearest_rotation` of the first nine.",
