@@ -27,7 +27,7 @@ from .defaults import Defaults
 from .typeset import typeset
 
 TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
-NOISY = "exact on clean data, but the data are not weighed as they should be: on noisy data"
+NOISY = "exact on clean data, but noise enters otherwise than it should: on noisy data"
 TOTAL_TIME = 4.0  # seconds: a slow but correct function gets fewer draws of each kind
 BEFORE = "It was right before, on other draws: what is different about this one?"
 OTHER_SHAPES = "It was right before, on other draws: what is different about this one, its shapes perhaps?"
@@ -309,14 +309,14 @@ class _Trial:
         unmoved = None if words or self.refusal else self._unmoved()  # now, since the search may use up the budget
         search = None if words else self._search()
         solution = search and self._solution(search)
-        step = search and (search.passed_words(solution) or search.words())
+        step = search and (search.passed_words(solution) or search.notebook_words(solution) or search.words())
         shape = self._other_shape() if self.refusal else ""
         words = words or (not self.refusal and step) or (not shape and (unmoved or self._one_change()))
         if words:
             return self.outcome(NOT_YET, _closed(words) + self._about_globals())
         if search and not step and not self._right_often():
             step = search.not_finite_words() if self.refusal else None
-            step = step or search.partly_words() or search.given_words(solution)
+            step = step or search.nearer_words() or search.partly_words() or search.given_words(solution)
         if self.refusal:
             words = shape or (f" {step[0].upper()}{_closed(step[1:])}" if step else "")
             words = words or self._agreement(search, solution)

@@ -76,6 +76,7 @@ ROUNDS = 200  # of a loop, or ten times as many as it has: enough for what conve
 STACKS = {"column_stack", "hstack", "vstack", "stack", "concatenate"}
 STACKED = "the part"  # how what is wrong begins where one part less is put together
 SIZES = ("len({})", "len({}) - 1", "{}.shape[-1]")  # what a number that is typed in may stand for
+TURNED = {"sin": "cos", "cos": "sin"}
 TURNS = {90: "np.pi / 2", 180: "np.pi", 360: "2 * np.pi"}
 ROUNDING = ("round", "around")
 REPETITIONS = ("tile", "repeat")
@@ -197,6 +198,51 @@ def _rounded_pi(function):
         yield Change("", f"{first.value} is rounded: np.pi has all the digits", 1, first, tuple(sets))
 
 
+def _lost_signs(function):
+    """Roots of 1 less the square of a sine or a cosine: the other of the two, which has a sign."""
+    bound = dict(_bound_turns(function))
+    for owner in ast.walk(function):
+        for field, content in ast.iter_fields(owner):
+            for i, node in enumerate(content if isinstance(content, list) else [content]):
+                part = _squared_beside_1(node)
+                turn = bound.get(part.id) if isinstance(part, ast.Name) else part
+                if not _is_turn(turn):
+                    continue
+                new = ast.Call(_numpy(TURNED[_called(turn)], turn).func, turn.args, [])
+                _locate(new, node)
+                whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
+                mends = f"a root is never negative, and `{ast.unparse(new)}` belongs there"
+                yield Change("", mends, 1, node, ((owner, field, whole),))
+
+
+def _bound_turns(function):
+    """(name, call) of each sine or cosine that a step binds to a name, alone or with others."""
+    for step in (node for node in ast.walk(function) if isinstance(node, ast.Assign)):
+        target, value = step.targets[0], step.value
+        both = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+        for to, of in zip(target.elts, value.elts) if both else [(target, value)]:
+            if isinstance(to, ast.Name) and _is_turn(of):
+                yield to.id, of
+
+
+def _is_turn(node):
+    return isinstance(node, ast.Call) and _called(node) in TURNED and len(node.args) == 1
+
+
+def _squared_beside_1(node):
+    """What stands squared in a root of 1 less it; None in any other part of the code."""
+    if not isinstance(node, ast.Call) or _called(node) != "sqrt" or len(node.args) != 1:
+        return None
+    less = node.args[0]
+    if not isinstance(less, ast.BinOp) or not isinstance(less.op, ast.Sub) or _number(less.left) != 1:
+        return None
+    square = less.right
+    if isinstance(square, ast.BinOp) and isinstance(square.op, ast.Pow) and _number(square.right) == 2:
+        return square.left
+    twice = isinstance(square, ast.BinOp) and isinstance(square.op, ast.Mult)
+    return square.left if twice and ast.dump(square.left) == ast.dump(square.right) else None
+
+
 def _with_all_digits(node):
     """A number with the digits of the multiple of pi that it is, rounded; any other part of the code as it is."""
     if not isinstance(node, ast.Constant) or type(node.value) is not float or not node.value:
@@ -269,7 +315,8 @@ def _indices(function):
 def mending(function):
     """What may mend a function: all single changes, and besides them bounds and steps made finer, loops made longer,
     gone on with or begun at 0, an axis, an outer product, an index that a loop should count, an argument or a size that
-    is typed in, a pi of three digits, and one slip mended wherever it stands: who copies a line copies its slip.
+    is typed in, a pi of three digits, the sign that a root has lost, and one slip mended wherever it stands: who copies
+    a line copies its slip.
     """
     found = changes(function)
     narrower = list(_narrower(function, found))
@@ -281,6 +328,7 @@ def mending(function):
     found += [*_finer_differences(function), *_with_an_outer_product(function), *_of_rounds(function)]
     found += [*_begun_late(function), *_typed_numbers(function), *_exchanged_throughout(function)]
     found += [*_shorter_steps(function), *_rounded_pi(function), *_never_reached(function), *_unstacked(function)]
+    found += _lost_signs(function)
     return sorted(found, key=lambda change: change.rank)
 
 

@@ -554,6 +554,7 @@ OTHERWISE = (  # (what it should have been, function of the value [and of an arg
     ("it is to be divided by the number of rows or entries of {}", lambda v, a: v / len(a)),
     ("it is to be multiplied by the number of rows or entries of {}", lambda v, a: v * len(a)),
 )
+IN_ITS_PLACE = next(k for k, (words, _) in enumerate(OTHERWISE) if words == "`{}` belongs in its place")
 WITH_OWN = 6  # of those that take an argument also take a variable
 ALONE = sum("{}" not in words for words, _ in OTHERWISE)  # of one value; the others take an argument as well
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import metrics, mutation, operands, relations, rerun, slips
+from . import metrics, mutation, operands, relations, rerun, scope, slips
 from .arguments import is_numeric
 
 WORTH = 3  # how unlikely a change of the code may be that is tried before changes of values
@@ -21,6 +21,7 @@ CLOSE = 1e-7  # how far, relatively, two values may lie apart that are the same
 BATCH = 120  # changes that are tried at once
 ENTRIES = 8  # of a result that are looked at one by one
 ROWS = 4  # of a value that are looked at one by one
+SPOILT = 2  # times as far off is a part that a change makes worse than it was, though it mends another
 NAMED = 4  # values that are told to be right, at most
 ANGLES = re.compile(r"rad|deg|angle|(?<!re)turn|rot|axis|axes|theta|phi|psi|sin|cos|tan|pose|frame", re.IGNORECASE)
 SCALED = re.compile(  # of a choice, which does not depend on how large all is that is compared
@@ -31,11 +32,16 @@ CURVED = re.compile(
     "its (log|exp|sine|tangent|inverse|reciprocal)"
 )  # of a word or a set: what is small is made a little more
 LIFTED = re.compile("a thousand|divided by its( own)? length")  # what brings a number over a bound, whatever is wrong
+NAMES = re.compile(r"[^\W\d]\w*")
+FIRST_ROUND = "it is right in the first round, not in all behind it"
+ONE_ENTRY, ONE_ROW = re.compile(r"\bentry\b"), re.compile(r"\brow(?=s?\b)")  # of a value that has several rounds
 COUNT = re.compile(r"^len\([^()]*\)$|\.shape\[-?\d\]$|\.size$")  # of which no half, root or sine is meant
 CHANCE = 1000  # one case of so many may be chance
 BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with a number
 UNBOUNDED = {f"`{name}` is too much" for name in mutation.BOUNDED | mutation.BOUNDS}
 DECIMALS = re.compile(r"[<>]=? *\d*(\.\d+(e[+-]?\d+)?|e-\d+)$|[<>]=? *\d+e-\d+$")  # a comparison with such a number
+FEW_ROUNDS = re.compile(r"these are too few rounds: (\d+) will do")
+GO_ON = "go on until nothing changes, or choose what needs no rounds"
 TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
 UNEQUAL = ("where `==` belongs", "where `!=` belongs")  # what computed numbers are never, or always
 ALONE = "With this alone changed, your result is right"
@@ -87,6 +93,21 @@ class Case:
             return 0
         simple = relations.difference_words(self.metric, [(result, self.expected)], (), True)
         return 100 if simple else len(parts) - len(right)
+
+    def distances(self, result):
+        """How far off each part of an admitted result is, by what is compared there."""
+        return {d.what: d.amount for d in self.metric.deviations(result, self.expected)}
+
+    def is_farther(self, result):
+        """Whether some part of another result is off by far more than that of the student: that part is spoilt."""
+        before = {} if self.result is None else self.distances(self.result)
+        return any(off > SPOILT * before.get(what, np.inf) for what, off in self.distances(result).items())
+
+    def is_nearer(self, result):
+        """Whether all that is wrong in the student's result is off by no more than half as much in another."""
+        off = {d.what: d.amount for d in self.metric.deviations(self.result, self.expected) if not d.within}
+        after = self.distances(result)
+        return all(after[what] <= amount / 2 for what, amount in off.items())
 
     def parts_before(self):
         """Names of the parts of the student's result that are right, be it refused as a whole; None if not known."""
@@ -396,6 +417,24 @@ class Search:
         _, line, code, mends = self.written.changes[best[1][1]]
         return f"in line {line}, `{code}`: perhaps {mends}. With this changed, {best[2]}"  # it need not be the mistake
 
+    @_or_nothing
+    def nearer_words(self):
+        """That more rounds of a loop bring the result nearer on all draws, though these are not enough either."""
+        for k, (_, line, code, mends) in enumerate(self.written.changes):
+            found = FEW_ROUNDS.match(mends)
+            if found is None or any(case.result is None for case in self.cases):
+                continue
+            fits = (
+                self.written.results(
+                    [("code", k)], case.args, self.budget.left(), functools.partial(_comes_nearer, case)
+                )
+                for case in self.cases
+            )
+            if all(fit == [True] for fit in fits):
+                more = f"with {found[1]} the result comes nearer on every draw, and is not there yet"
+                return f"in line {line}, `{code}`: these rounds are too few. {more[0].upper()}{more[1:]}: {GO_ON}"
+        return None
+
     def _gains(self, plans, right, kind):
         """How much better each plan makes the result of the first draw."""
         case = self.cases[0]
@@ -415,6 +454,8 @@ class Search:
             return words
         parts = [case.right_parts(result) for case, result in zip(self.cases, found)]
         if any(not set(before) <= set(after) for before, after in zip(right, parts)):
+            return None
+        if any(case.is_farther(result) for case, result in zip(self.cases, found)):
             return None
         before = (set(were) for case, were in zip(self.cases, right) if not case.was_right)
         come = set.intersection(*map(set, parts)).difference(*before)
@@ -465,6 +506,20 @@ class Search:
                 if self._could_be(pairs) and not (solution.is_result[q] and (self.chosen or self._is_no_step(k))):
                     yield k, q
 
+    @_or_nothing
+    def notebook_words(self, solution):
+        """What belongs in the place of the notebook's data, which are the same whatever is given: looked at first."""
+        read = set(scope.notebook_data(self.written.function))
+        made = {k for k, (_, code, *_) in enumerate(self.written.places) if read & set(NAMES.findall(code))}
+        if not made:
+            return None
+        put = (plan for plan in (*self._turned(made), *self._with_own(made)) if plan[2] == rerun.IN_ITS_PLACE)
+        words = self._turned_words(put)
+        if words or solution is None:
+            return words
+        plan = self.mending([("given", k, q) for k, q in self._given(solution) if k in made], solution.values)
+        return plan and self._compared(*plan[1:], solution)
+
     def _is_no_step(self, k):
         """Whether the right result in a value's place says nothing: in the result's, and where an iteration goes on."""
         return self.is_result(k) or self.written.places[k][0] in self.written.iterated
@@ -494,6 +549,11 @@ class Search:
         """Whether only a part of this array is assigned there: its other parts are not what the line is about."""
         _, code, name, *_ = self.written.places[k]
         return bool(name) and code.startswith(f"{name}[")
+
+    def _is_filled_later(self, k):
+        """Whether a part of what is bound there is assigned further down: it is not what the line has made of it."""
+        name = self.written.places[k][2]
+        return any(self._is_filled(j) and self.written.places[j][2] == name for j in range(k, len(self.written.places)))
 
     def _is_bounded(self, k):
         """Whether a number bounds a value, so that half of it would do as well: only its sign can be wrong."""
@@ -588,7 +648,7 @@ class Search:
     def _units(self, solution):
         """Places of the steps as a whole, in their order: variables that are bound, and what is part of no other."""
         steps = [k for k in range(len(self.written.places)) if self._is_step(k) and not self._is_taken_out(k, solution)]
-        steps = [k for k in steps if not self._is_entry_bound(k)]
+        steps = [k for k in steps if not self._is_entry_bound(k) and not self._is_filled_later(k)]
         inner = {part for k in steps for part in range(self.written.places[k][4], k)}
         return [k for k in steps if k not in inner and not self._is_filled(k)]
 
@@ -669,6 +729,12 @@ def search(function, names, cases, judging, budget):
     """A `Search` for what is wrong in a function; None where its code cannot be read again."""
     written = rerun.written(function)
     return written and Search(written, names, cases, judging, budget)
+
+
+def _comes_nearer(case, found):
+    """Whether what a changed function gave, in a tuple, is nearer to what is expected than the student's result."""
+    result = None if found is None else case.admit(found)
+    return result is not None and case.is_nearer(result)
 
 
 def _traces(written, cases, budget):
@@ -793,6 +859,7 @@ def _may_be_chance(draws, missed, without):
 
 def value_relation(mine, theirs, named):
     """How values on the way differ from those that are right, in words; None where nothing is found."""
+    rounds = max(m.ndim if len(m) > 1 else 0 for m in mine)  # the first axis counts them, then, and no rows
     mine = [m[0] if len(m) == 1 else m for m in mine]
     theirs = [t[0] if len(t) == 1 else t for t in theirs]
     exact = metrics.Numbers(1e-9)
@@ -800,6 +867,9 @@ def value_relation(mine, theirs, named):
     words = words or operands.operand_words(exact, mine, theirs, named)
     words = words or relations.difference_words(exact, list(zip(mine, theirs)), ())
     words = words and words.removesuffix(relations.LOOP)
+    if words and rounds:
+        words = (ONE_ENTRY if rounds == 1 else ONE_ROW).sub("round", words)
+        words = words.replace("the first round is right, not all behind it are", FIRST_ROUND)
     for said, told in (("your result", "it"), ("your matrix", "it"), ("the expected", "the right")):
         words = words and words.replace(said, told)
     return words

@@ -418,6 +418,28 @@ def told_of(id, body, arguments):
     return item.judge(typed(body, id, arguments), rng=np.random.default_rng(0)).text
 
 
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        ("c, s = np.sqrt(1 - np.sin(a) ** 2), np.sin(a)", "a root is never negative, and `np.cos(a)` belongs there"),
+        ("s = np.sin(a)\nc = np.sqrt(1 - s * s)", "a root is never negative, and `np.cos(a)` belongs there"),
+        ("c, s = np.cos(a), -1\ns = np.sqrt(1.0 - c**2)", "a root is never negative, and `np.sin(a)` belongs there"),
+    ],
+)
+def test_a_sign_that_a_root_has_lost_is_told(body, told):
+    item = asked(lambda a, b: np.cos(a) * b + 2 * np.sin(a), lambda rng: tuple(rng.uniform(-6, 6, (2, 4))))
+    assert told in judged(item, f"{body}\nreturn c * b + 2 * s")
+
+
+def test_a_change_that_spoils_another_part_is_no_advice():
+    """A translation in place of the rotation, say, where by chance the origin comes out right."""
+    turned = np.diag([1.0, -1, -1, 1])
+    far, near = np.eye(4), np.eye(4)
+    far[:3, 3], near[:3, 3] = 5.0, 1e-3
+    case = steps.Case((), metrics.Poses(1e-6, 1e-6), np.eye(4), near)
+    assert case.is_farther(far) and case.is_farther(turned) and not case.is_farther(near + 0.5 * (near - np.eye(4)))
+
+
 def test_the_value_that_is_not_right_is_found_by_that_of_the_solution():
     body = "x = a / np.linalg.norm(a)\nz = np.cross(x, b)\nz = z / np.linalg.norm(z)\n"
     said = told_of("gram_schmidt", f"{body}return np.column_stack([x, b / np.linalg.norm(b), z])", "a, b")
@@ -465,6 +487,16 @@ def test_what_raises_is_told_with_the_change_that_mends_it():
 def test_how_two_values_differ():
     mine, theirs = [np.ones((1, 2, 3))] * 2, [-np.ones((1, 2, 3))] * 2
     assert "right up to its sign" in steps.value_relation(mine, theirs, [{"a": 1.0}] * 2)
+
+
+@pytest.mark.parametrize(("shape", "right"), [((3, 2, 2), 1), ((3, 2), 1), ((3,), 1), ((4, 2), 2)])
+def test_rounds_are_no_rows(shape, right):
+    """Of a value that has several, the first axis counts the rounds."""
+    rng = np.random.default_rng(0)
+    theirs = [rng.normal(size=shape) for _ in range(2)]
+    mine = [np.concatenate([t[:right], rng.normal(size=t[right:].shape)]) for t in theirs]
+    told = steps.value_relation(mine, theirs, [{"a": 1.0}] * 2)
+    assert "right" in told and "round" in told and "row" not in told
 
 
 def judged(item, body, arguments="a, b"):
@@ -598,6 +630,26 @@ def test_what_agrees_ends_at_the_first_step_that_does_not(monkeypatch):
     """
     text = judged(asked(reference, two_numbers), body)
     assert "As far as `x` (line 2) your values are those of the solution; `y = np.sin(a)" in text
+
+
+def test_what_is_changed_further_down_is_not_called_right(monkeypatch):
+    reference = solved_by(monkeypatch, "def formula(a, b):\n    x = a * b\n    y = np.exp(x)\n    return y[0] + x[1]\n")
+    item = asked(reference, lambda rng: tuple(rng.normal(size=(2, 3))))
+    for other in ("words", "partly_words", "given_words"):
+        monkeypatch.setattr(steps.Search, other, lambda self, *of: None)
+    told = judged(item, "x = a * b\nx[1:] = np.sinh(b[:2])\ny = np.tan(x) - 3 * a\nreturn y[0] ** 3 + x[1] * y[2]")
+    assert "`x`" not in told
+
+
+def test_data_of_the_notebook_are_looked_at_first(monkeypatch):
+    text = "def formula(a, b):\n    x = a - b[0] ** 3\n    return np.exp(x) * b\n"
+    reference = solved_by(monkeypatch, text)
+    formula = typed("x = kept * 1.0\nreturn np.exp(x) * b")
+    formula.__globals__["kept"] = np.array([0.3, 0.7, -0.2])
+    item = asked(reference, lambda rng: tuple(rng.normal(size=(2, 3))))
+    monkeypatch.setattr(steps.Search, "words", lambda self: None)  # the other search leaves no time for slow functions
+    told = item.judge(formula, rng=np.random.default_rng(0)).text
+    assert told.startswith("in line 2, `kept`: ") and "reads `kept` from the notebook" in told
 
 
 def _root(a, b):
@@ -813,6 +865,10 @@ SOLVED = asked(np.linalg.solve, two_equations)
         (
             "x = np.zeros(2)\nfor _ in range(20):\n    x = x - 0.05 * a.T @ (a @ x - b)\nreturn x",
             "`range(20)`: these are too few rounds: 2000 will do",
+        ),
+        (
+            "x = np.zeros(2)\nfor _ in range(5):\n    x = x - 0.02 * a.T @ (a @ x - b)\nreturn x",
+            "`range(5)`: these rounds are too few. With 200 the result comes nearer on every draw",
         ),
     ],
 )
