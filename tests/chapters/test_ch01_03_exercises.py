@@ -432,6 +432,10 @@ def no_exponents(text):
     return np.array([[number_in(entry) for entry in line] for line in lines if line])
 
 
+def before_the_first_comment(text):
+    return read_points(text.split("#")[0].splitlines())
+
+
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(
     "name, answer, told",
@@ -455,6 +459,7 @@ def no_exponents(text):
         ("robust_weights", influence_by_distance, "NaN"),
         ("pivot_covariance", lambda A, r: r.sum() ** 2 / len(r) * np.linalg.inv(A.T @ A), "sum the squares"),
         ("solve_pivot", tip_then_point, "You fitted the tip first"),
+        ("read_system", before_the_first_comment, "and no further"),
     ],
 )
 def test_chains_and_pivots_that_are_right_for_some_only(name, answer, told, seed):
@@ -503,6 +508,31 @@ def test_two_systems_and_an_empty_file_are_none():
 
     outcome = judged("read_system", in_threes)
     assert outcome.status == NOT_YET and "a file of 6 points is no system" in outcome.text
+
+
+@pytest.mark.parametrize(
+    ("place", "status"),
+    [
+        (lambda lines, number: f"line {lines.index(lines[number - 1]) + 1}: ", NOT_YET),  # where its text is first met
+        (lambda lines, number: f"line {number}: ", CORRECT),
+        (lambda lines, number: "", CORRECT),
+    ],
+)
+def test_a_fourth_point_that_repeats_the_first_has_its_own_line(place, status):
+    def read_system(text):
+        lines, points = text.splitlines(), []
+        for number, line in enumerate(lines, start=1):
+            entries = [number_in(e) for e in line.split("#")[0].replace(",", ".").split()]
+            if entries and (len(entries) != 3 or not np.isfinite(entries).all()):
+                raise ValueError(f"line {number}: {line!r}")
+            if entries and len(points) == 3:
+                raise ValueError(f"{place(lines, number)}a fourth point")
+            points += [entries] if entries else []
+        if len(points) != 3:
+            raise ValueError("three points")
+        return np.array(points)
+
+    assert judged("read_system", read_system).status == status
 
 
 def read_points(lines, count=3):
@@ -680,6 +710,22 @@ def _even_lever_in_the_plane():
     return np.hypot(T[0, 3], T[1, 3]) / chaining.closure_error(T)[0]
 
 
+def _lever_by_the_arccosine(of):
+    """A lever from the angle by the trace, which the rounded entries put a little elsewhere."""
+    T = chaining.chain(lab_sheet.printed_transforms())
+    angle = np.arccos((np.trace(T[:3, :3]) - 1) / 2)
+    return lambda: of(angle, np.linalg.norm(T[:3, 3]))
+
+
+def _lever_of_a_measured_link():
+    angle, distance = chaining.closure_error(chaining.transforms_from_points(lab_sheet.station_points()))
+    return distance[2] / angle[2]
+
+
+def _hole_by_matrices():
+    return 200 * np.linalg.norm((ch01_exercises._K0_T_K1() - ch01_exercises._drawn())[:3, :3])
+
+
 def _hole_along_x():
     hole = np.array([200.0, 0, 0, 1])
     return abs(((ch01_exercises._K0_T_K1() - ch01_exercises._drawn()) @ hole)[0])
@@ -689,6 +735,11 @@ def _hole_along_x():
     ("chapter", "name", "answer", "words"),
     [
         (exercises, "even_lever", _even_lever_in_the_plane, "lost its z"),
+        (exercises, "even_lever", _lever_by_the_arccosine(lambda angle, d: d * angle), "angle times distance"),
+        (exercises, "even_lever", _lever_by_the_arccosine(lambda angle, d: d / np.sin(angle / 2)), "Twice too large"),
+        (exercises, "even_lever", _lever_by_the_arccosine(lambda angle, d: d / (1 - np.cos(angle))), "toward the axis"),
+        (exercises, "even_lever", _lever_of_a_measured_link, "the third link alone"),
+        (ch01_exercises, "distance", _hole_by_matrices, "the root of 2 times the distance"),
         (ch01_exercises, "distance", _hole_along_x, "lies off in y too"),
     ],
 )

@@ -1044,6 +1044,12 @@ CHAPTER = Chapter(
                     id="distance-sum",
                 ),
                 Mistake(
+                    lambda: np.sqrt(2) * np.linalg.norm(_hole() - _hole_as_drawn()),
+                    "This is the root of 2 times the distance, as 200 mm times the norm of the difference of both matrices is: it "
+                    "counts how far x and y are off. The hole lies on x alone.",
+                    id="distance-of-matrices",
+                ),
+                Mistake(
                     lambda: np.linalg.norm(_hole()),
                     "This is how far the hole is from the origin of K0. How far is it from its place in the drawing?",
                     id="distance-from-K0",

@@ -197,6 +197,9 @@ def names_the_line(student, rng):
         words = f"a file of {count} points" if count else "an empty text"
         if _refusal(student, [*good, *good][:count], words) is None:
             return f"{words} is no system: {ACCEPTED}"
+    told = _misplaced(student, above, good)
+    if told:
+        return told
     for what, bad in FAULTS:
         number = len(above) + len(good) + 1
         told = _misread(student, [*above, *good, bad], number, f"stands below three points and holds {what}")
@@ -206,6 +209,19 @@ def names_the_line(student, rng):
 
 
 ACCEPTED = "that must raise a ValueError, yours returned something."
+
+
+def _misplaced(student, above, good):
+    """What is wrong with the refusal of a fourth point that repeats the first, None if no other line than its own is named."""
+    first, number = len(above) + 1, len(above) + len(good) + 1
+    refusal = _refusal(
+        student, [*above, *good, good[0]], f"a file of four points, the fourth as the first, in line {number}"
+    )
+    named = [int(digits) for digits in re.findall(r"\bline (\d+)", refusal or "")]
+    if not named or number in named:
+        return None
+    where = f"line {number} of a file is a fourth point, the same as the first in line {first}"
+    return f"{where}: your sentence names another line. It says: {refusal!r}."
 
 
 def _misread(student, lines, number, what):
@@ -266,7 +282,8 @@ FILES = [
         mistakes=[
             Mistake(
                 _plainly,
-                "What stands behind a # is a comment, blanks before it or not: cut it off before you split the line, and leave out a line of which nothing is left.",
+                "A comment goes from # to the end of its line, blanks before it or not, and no further: cut each line at its #, before you split it, "
+                "and leave out a line of which nothing is left.",
                 id="read-comments",
             ),
             Mistake(

@@ -372,6 +372,32 @@ def _turn_by_arccosine():
     return np.arccos((np.trace(_sheet()[:3, :3]) - 1) / 2)
 
 
+def _of_either_angle(value, text, id):
+    """Mistakes of the lever: value(angle, distance), the angle by arctan2 and by the arccosine, which differ as entries are rounded."""
+
+    def variant(angle):
+        return lambda: float(value(angle(), chaining.closure_error(_sheet())[1]))
+
+    angles = ((lambda: chaining.closure_error(_sheet())[0], id), (_turn_by_arccosine, f"{id}-by-arccosine"))
+    return [Mistake(variant(angle), text, id=name) for angle, name in angles]
+
+
+def _of_one_link(number):
+    """Levers of one link alone, of the printed ones and of those from the points."""
+    word = ("first", "second", "third", "fourth")[number]
+    text = f"This is the {word} link alone. The closure error belongs to the product of all four."
+    printed, measured = lab_sheet.printed_transforms, _links_from_points
+    return [
+        Mistake(lambda: _lever(printed()[number]), text, id=f"lever-{word}-link"),
+        Mistake(lambda: _lever(measured()[number]), text, id=f"lever-{word}-link-measured"),
+    ]
+
+
+@functools.cache
+def _links_from_points():
+    return chaining.transforms_from_points(lab_sheet.station_points())
+
+
 def _turn_of_loop():
     return np.linalg.norm(log_se3(_sheet())[:3])
 
@@ -722,10 +748,10 @@ CHAPTER = Chapter(
                 "`angle, distance = closure_error(product)\neven_lever = distance / angle`",
             ),
             mistakes=[
-                Mistake(
-                    lambda: _lever(_sheet(), np.rad2deg),
+                *_of_either_angle(
+                    lambda angle, distance: distance / np.rad2deg(angle),
                     "This divides by the angle in degrees. A turn moves a point by the angle in rad times its lever.",
-                    id="lever-degrees",
+                    "lever-degrees",
                 ),
                 Mistake(
                     lambda: np.linalg.norm(np.cross(*np.split(log_se3(_sheet()), 2))) / _turn_of_loop() ** 2,
@@ -734,36 +760,45 @@ CHAPTER = Chapter(
                     id="lever-of-the-origin",
                     within=0.5,
                 ),
-                Mistake(
-                    lambda: 1 / _lever(_sheet()),
+                *_of_either_angle(
+                    lambda angle, distance: angle / distance,
                     "Upside down: the distance in mm, divided by the angle in rad, is a length.",
-                    id="lever-inverse",
+                    "lever-inverse",
                 ),
-                Mistake(
-                    lambda: np.prod(chaining.closure_error(_sheet())),
+                *_of_either_angle(
+                    lambda angle, distance: angle * distance,
                     "This is angle times distance. Which lever, times the angle, makes the distance?",
-                    id="lever-product",
+                    "lever-product",
                 ),
-                Mistake(
-                    lambda: 1000 * np.prod(chaining.closure_error(_sheet())),
+                *_of_either_angle(
+                    lambda angle, distance: 1000 * angle * distance,
                     "This is 1000 times angle times distance. Which lever, times the angle, makes the distance?",
-                    id="lever-product-thousand",
+                    "lever-product-thousand",
                 ),
-                Mistake(
-                    lambda: 2 * _lever(_sheet()),
-                    "Twice too large: the whole angle moves the point, not half of it.",
-                    id="lever-half-angle",
+                *(
+                    mistake
+                    for id, part in (
+                        ("lever-half-angle", lambda angle: angle / 2),
+                        ("lever-half-chord", lambda angle: np.sin(angle / 2)),
+                    )
+                    for mistake in _of_either_angle(
+                        lambda angle, distance, part=part: distance / part(angle),
+                        "Twice too large: the whole angle moves the point, not half of it; along the chord that is 2 sin(angle / 2) times the lever.",
+                        id,
+                    )
+                ),
+                *_of_either_angle(
+                    lambda angle, distance: distance / (1 - np.cos(angle)),
+                    "1 - cos(angle) times the lever is how far a point moves toward the axis. It moves across by the angle in rad times "
+                    "its lever, which is far more.",
+                    "lever-toward-the-axis",
                 ),
                 Mistake(
                     lambda: _lever(chaining.chain(lab_sheet.printed_transforms()[::-1])),
                     "This belongs to the links multiplied in the reverse order.",
                     id="lever-reverse",
                 ),
-                Mistake(
-                    lambda: _lever(lab_sheet.printed_transforms()[0]),
-                    "This is the first link alone. The closure error belongs to the product of all four.",
-                    id="lever-first-link",
-                ),
+                *(mistake for number in range(4) for mistake in _of_one_link(number)),
                 Mistake(
                     lambda: chaining.closure_error(_sheet())[1] / np.arctan2(_sheet()[1, 0], _sheet()[0, 0]),
                     "This divides by arctan2(r10, r00), the turn about z. The loop turns about x and y as well.",

@@ -149,6 +149,23 @@ def _one_after_the_other(A, b):
     return np.concatenate([tip, np.linalg.lstsq(A[:, 3:], b - A[:, :3] @ tip, rcond=None)[0]])
 
 
+def _total_least_squares(A, b):
+    """The least changes of A and b together that make the equations hold."""
+    v = np.linalg.svd(np.column_stack([A, b]))[2][-1]
+    return -v[:6] / v[6]
+
+
+def _without_the_pivot(differences):
+    """The tip from differences of poses, as if each had noise of its own, then the pivot as a mean."""
+
+    def variant(A, b):
+        blocks, right = A[:, :3].reshape(-1, 3, 3), b.reshape(-1, 3)
+        tip = np.linalg.lstsq(differences(blocks).reshape(-1, 3), differences(right).ravel(), rcond=None)[0]
+        return np.concatenate([tip, (blocks @ tip - right).mean(axis=0)])
+
+    return variant
+
+
 def _variance_of_each_axis(A, residuals):
     """A covariance with another variance for x, y and z: of the rows, or of both sides."""
     n = len(residuals)
@@ -465,6 +482,25 @@ CHAPTER = Chapter(
                     lambda A, b: np.abs(np.linalg.lstsq(A, b, rcond=None)[0]),
                     "The signs have got lost: tip and pivot have coordinates of both signs.",
                     id="solve-abs",
+                ),
+                Mistake(
+                    _total_least_squares,
+                    "This is total least squares: it takes the entries of A to be as noisy as b. Asked for is the least sum of squares of A x - b.",
+                    id="solve-total",
+                ),
+                *(
+                    Mistake(
+                        _without_the_pivot(differences),
+                        f"The pivot is eliminated by differences {what}. Their errors are not independent, as one pose is in several of them, so "
+                        "least squares of them is another solution where there is noise: solve A x = b for all six.",
+                        id=f"solve-differences-{k}",
+                    )
+                    for k, (what, differences) in enumerate(
+                        (
+                            ("of neighboring poses", lambda each: np.diff(each, axis=0)),
+                            ("from the first pose", lambda each: each[1:] - each[0]),
+                        )
+                    )
                 ),
                 Mistake(
                     _one_after_the_other,
@@ -804,6 +840,11 @@ CHAPTER = Chapter(
                 Mistake(
                     _covariance(lambda r, n: r @ r / (3 * n)),
                     "You divided by the number of equations. Six of them were used up by the six unknowns: 3n - 6 remain.",
+                ),
+                Mistake(
+                    lambda A, r: (r**2).sum() / (r.size - 6) * np.diag(1 / np.diag(A.T @ A)),
+                    "These are the reciprocals of the diagonal of AᵀA. The inverse of a matrix is another thing: `np.linalg.inv(A.T @ A)`.",
+                    id="covariance-of-reciprocals",
                 ),
                 Mistake(
                     _covariance(lambda r, n: np.sqrt(r @ r / (3 * n - 6))),
