@@ -485,6 +485,7 @@ def _of_its_shape(change):
 SIGNLESS = "it belongs there without its sign"
 OPPOSITE = "1 less it, 1 - ..., belongs there"
 NOUGHT, ONE = "it does not belong there, but 0 in its place", "it does not belong there, but 1 in its place"
+ANOTHER = "{} belongs in its place"
 OF_TRUTHS = {  # what the same changes are called where they are made to a truth value, or an array of them
     OPPOSITE: "its opposite belongs there, `not` or `~`",
     NOUGHT: "it does not belong there, but False in its place",
@@ -545,7 +546,7 @@ OTHERWISE = (  # (what it should have been, function of the value [and of an arg
     ),
     ("it is to be multiplied by {}", _of_its_shape(np.multiply)),
     ("it is to be divided by {}", _of_its_shape(np.divide)),
-    ("{} belongs in its place", lambda v, a: a),
+    (ANOTHER, lambda v, a: a),
     ("{} is missing: it is to be added", _of_its_shape(np.add)),
     ("{} is to be taken off", _of_its_shape(np.subtract)),
     ("the matrix {} is to be multiplied with it, from the left", lambda v, a: _matrix(a) @ v),
@@ -554,7 +555,7 @@ OTHERWISE = (  # (what it should have been, function of the value [and of an arg
     ("it is to be divided by the number of rows or entries of {}", lambda v, a: v / len(a)),
     ("it is to be multiplied by the number of rows or entries of {}", lambda v, a: v * len(a)),
 )
-IN_ITS_PLACE = next(k for k, (words, _) in enumerate(OTHERWISE) if words == "`{}` belongs in its place")
+IN_ITS_PLACE = next(k for k, (words, _) in enumerate(OTHERWISE) if words == ANOTHER)
 WITH_OWN = 6  # of those that take an argument also take a variable
 ALONE = sum("{}" not in words for words, _ in OTHERWISE)  # of one value; the others take an argument as well
 
