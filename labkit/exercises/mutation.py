@@ -194,8 +194,23 @@ def _rounded_pi(function):
                 sets.append((owner, field, new if isinstance(content, list) else new[0]))
                 rounded += changed
     if rounded:
-        first = min(rounded, key=lambda node: (node.lineno, node.col_offset))
-        yield Change("", f"{first.value} is rounded: np.pi has all the digits", 1, first, tuple(sets))
+        rounded = sorted(rounded, key=lambda node: (node.lineno, node.col_offset))
+        *others, last = dict.fromkeys(str(node.value) for node in rounded)
+        are = f"{', '.join(others)} and {last} are" if others else f"{last} is"
+        yield Change("", f"{are} rounded: np.pi has all the digits", 1, rounded[0], tuple(sets))
+
+
+def _sizes(function):
+    """The number of all entries of an array, made that of its rows."""
+    for owner in ast.walk(function):
+        for field, content in ast.iter_fields(owner):
+            for i, node in enumerate(content if isinstance(content, list) else [content]):
+                if isinstance(node, ast.Attribute) and node.attr == "size":
+                    new = ast.Call(ast.Name("len", ast.Load()), [node.value], [])
+                    _locate(new, node)
+                    whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
+                    mends = f"it counts all numbers, and `{ast.unparse(new)}` belongs there"
+                    yield Change("", mends, 1, node, ((owner, field, whole),))
 
 
 def _lost_signs(function):
@@ -329,6 +344,7 @@ def mending(function):
     found += [*_begun_late(function), *_typed_numbers(function), *_exchanged_throughout(function)]
     found += [*_shorter_steps(function), *_rounded_pi(function), *_never_reached(function), *_unstacked(function)]
     found += _lost_signs(function)
+    found += _sizes(function)
     return sorted(found, key=lambda change: change.rank)
 
 

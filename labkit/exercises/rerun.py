@@ -486,6 +486,10 @@ SIGNLESS = "it belongs there without its sign"
 OPPOSITE = "1 less it, 1 - ..., belongs there"
 NOUGHT, ONE = "it does not belong there, but 0 in its place", "it does not belong there, but 1 in its place"
 ANOTHER = "{} belongs in its place"
+OF_ARRAYS = {  # what the same changes are called where they are made to an array: a number may not take its place
+    NOUGHT: "it does not belong there, but zeros of its shape in its place",
+    ONE: "it does not belong there, but ones of its shape in its place",
+}
 OF_TRUTHS = {  # what the same changes are called where they are made to a truth value, or an array of them
     OPPOSITE: "its opposite belongs there, `not` or `~`",
     NOUGHT: "it does not belong there, but False in its place",
@@ -552,8 +556,8 @@ OTHERWISE = (  # (what it should have been, function of the value [and of an arg
     ("the matrix {} is to be multiplied with it, from the left", lambda v, a: _matrix(a) @ v),
     ("it is to be multiplied by the square of {}", _of_its_shape(lambda v, a: v * a**2)),
     ("it is to be divided by the square of {}", _of_its_shape(lambda v, a: v / a**2)),
-    ("it is to be divided by the number of rows or entries of {}", lambda v, a: v / len(a)),
-    ("it is to be multiplied by the number of rows or entries of {}", lambda v, a: v * len(a)),
+    ("it is to be divided by the length of {}, as `len` gives it", lambda v, a: v / len(a)),
+    ("it is to be multiplied by the length of {}, as `len` gives it", lambda v, a: v * len(a)),
 )
 IN_ITS_PLACE = next(k for k, (words, _) in enumerate(OTHERWISE) if words == ANOTHER)
 WITH_OWN = 6  # of those that take an argument also take a variable

@@ -44,6 +44,7 @@ FEW_ROUNDS = re.compile(r"these are too few rounds: (\d+) will do")
 GO_ON = "go on until nothing changes, or choose what needs no rounds"
 TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
 UNEQUAL = ("where `==` belongs", "where `!=` belongs")  # what computed numbers are never, or always
+TRUTHS = {"`0` belongs": "`False` belongs", "`1` belongs": "`True` belongs"}
 ALONE = "With this alone changed, your result is right"
 
 
@@ -217,8 +218,14 @@ class Search:
         if plan is None:
             return None
         _, line, code, mends = changes[self._left_out_instead(plan[1])]
+        mends = self._of_truth(mends)
         words = self._whatever_words(line, code, mends) or self._weight_words(line, mends)
         return words or f"in line {line}, `{code}`: {mends}. {ALONE}"
+
+    def _of_truth(self, mends):
+        """The words of a change to 0 or 1 where True or False is asked for."""
+        asked = all(isinstance(case.expected, bool) for case in self.cases)
+        return re.sub("`[01]` belongs", lambda said: TRUTHS[said[0]], mends) if asked else mends
 
     def _whatever_words(self, line, code, mends):
         """That a comparison does not belong there, where `==` or `!=` mends only because no two numbers are alike."""
@@ -237,16 +244,17 @@ class Search:
             if at != line or not self._binds(k) or not all(values[k][0] for values in self.values):
                 continue
             drawn = [values[k][1] for values in self.values]
+            among = any(np.ptp(value) for value in drawn)
             ones = ([("given", k, list(np.ones_like(value)))] for value in drawn)
             fits = (
                 self.written.results(plans, case.args, self.budget.left(), case.keep)
                 for plans, case in zip(ones, self.cases)
             )
-            if any(np.ptp(value) for value in drawn) and all(fit == [True] for fit in fits):
+            differ = among or np.ptp([value.flat[0] for value in drawn]) > 0
+            if differ and all(fit == [True] for fit in fits):
                 one = "True" if _is_condition(self.written.places[k][1]) else "1"
-                return (
-                    f"{self._where(k)}: with {one} everywhere in its place, your result is right, so it is not needed."
-                )
+                one = f"{one} everywhere" if among else one
+                return f"{self._where(k)}: with {one} in its place, your result is right, so it is not needed."
         return None
 
     def _may_be_said(self, mends):
@@ -313,6 +321,7 @@ class Search:
         name = "" if other is None else self._bound(other) if kind == "own" else f"`{self.names[other]}`"
         words = rerun.OTHERWISE[change][0].format(name)
         words = rerun.OF_TRUTHS.get(words, words) if k in self.written.of_truth else words
+        words = rerun.OF_ARRAYS.get(words, words) if any(values[k][1].ndim > 1 for values in self.values) else words
         words = words.replace("belongs in its place", "belongs on the right side") if self._binds(k) else words
         return f"{self._where(k)}: {_closed(words)} {ALONE}"
 
@@ -717,8 +726,11 @@ class Search:
             parts.insert(0, part)
             part = self.written.places[part][4] - 1
         parts = [part for part in parts if all(values[part][0] for values in self.values)]
-        codes = dict.fromkeys(f"`{self.written.places[part][1]}`" for part in parts if self._is_known(part, solution))
-        if not codes or not all(self._is_known(part, solution) for part in parts):
+        if not all(self._is_known(part, solution) for part in parts):
+            return ""
+        computed = (part for part in parts if not self._is_given(part))  # another argument may be meant
+        codes = dict.fromkeys(f"`{self.written.places[part][1]}`" for part in computed)
+        if not codes:
             return ""
         are, them = ("are", "them") if len(codes) > 1 else ("is", "it")
         return f", though {' and '.join(codes)} in it {are}: look at what is done with {them}"

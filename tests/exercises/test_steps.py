@@ -776,7 +776,11 @@ def several(rng):
 @pytest.mark.parametrize(
     "reference, body, said",
     [
-        (_wrapped, "return (a + 3.14) % 6.28 - 3.14", "in line 2, `3.14`: 3.14 is rounded: np.pi has all the digits."),
+        (
+            _wrapped,
+            "return (a + 3.14) % 6.28 - 3.14",
+            "in line 2, `3.14`: 3.14 and 6.28 are rounded: np.pi has all the digits.",
+        ),
         (_summed, "return a @ a / 30 + b[0]", "in line 2, `30`: 30 is typed in where `len(a)` belongs."),
         (_clipped, "return np.where(a < 0, 0.0, np.where(a > 2, 2.0, a))", "this case needs no treatment of its own."),
         (
