@@ -112,7 +112,7 @@ def fuse_two_sensors(x0, var0, z, stds):
 
 
 # %% fused-question [markdown]
-# The page prints: $\hat x_0 = 0$, $\Sigma_0 = 20$, $z = (9.4,\ 10.6)$, standard deviations 0.5 and 1. What follows for the position?
+# The page prints: $\hat x_0 = 0$, $\Sigma_0 = 20$, $z = (9.4,\ 10.6)$, standard deviations 0.5 and 1. What follows for the position? Its variance may come along.
 
 # %% fused
 fused = ...  # your code here

@@ -1208,6 +1208,8 @@ class Value(Item):
     of:        {name: function} of the data it is made of, by which a wrong answer may be known.
     about:     function(answer) -> what follows from an answer that nothing else explains, beside what is asked for, in
                a sentence.
+    beside:    (name, metric, function that gives the expected value) of what a function returns behind the number: an
+               answer may be both.
     """
 
     reference: object
@@ -1220,10 +1222,13 @@ class Value(Item):
     digits: int = 3
     of: dict = field(default_factory=dict)
     about: object = None
+    beside: tuple = ()
 
     def measure(self):
         expected = float(self.reference())
-        return expected, metrics.Numbers(max(self.rtol * abs(expected), self.atol) / max(1.0, abs(expected)), self.unit)
+        least = max(self.rtol * abs(expected), self.atol) / max(1.0, abs(expected))
+        metric = metrics.Numbers(least, self.unit)
+        return expected, metrics.First(metric, self.beside) if self.beside else metric
 
     def judge(self, answer, unit=None, rng=None):
         """Compare a number with the reference, in any unit of the same kind; never raises."""

@@ -114,6 +114,13 @@ def test_the_printed_example_takes_the_state_or_both_results():
     assert item.judge((np.array([12.5, 5.0]), cov)).text == item.judge(np.array([12.5, 5.0])).text
 
 
+def test_the_fused_position_may_come_with_its_variance_and_in_another_unit():
+    item, x = ITEMS["fused"], ch08._fusion()
+    assert item.judge(x).status == item.judge((x, 1 / 5.05)).status == item.judge(100 * x, "cm").status == CORRECT
+    assert "the variance is not" in item.judge((x, 0.3)).text
+    assert item.judge((ch08._fusion(x0=20.0), 1 / 5.05)).text == "20 is the prior's variance. Its position is 0."
+
+
 @pytest.mark.parametrize("name", ["nees", "ekf_step"])
 def test_only_the_angle_is_wrapped(name):
     def error(truth, x, cov):
@@ -362,6 +369,29 @@ def two_slips(y, S, limit):
     return bool(np.sum(y**2 / np.diag(S)) < limit**2)
 
 
+def scaled_by_the_control(x, cov, A, B, u, cov_u):
+    U = np.diag(u)
+    return A @ x + B @ u, A @ cov @ A.T + B @ U @ cov_u @ U.T @ B.T
+
+
+def inflated_by_the_readings(x0, var0, z, stds):
+    w = np.array([1 / var0, 1 / stds[0] ** 2, 1 / stds[1] ** 2])
+    x = w @ [x0, z[0], z[1]] / w.sum()
+    chi2 = w @ (np.array([x0, z[0], z[1]]) - x) ** 2 / 2
+    return x, max(1.0, chi2) / w.sum()
+
+
+def the_nis_itself(innovation, cov_innovation, limit):
+    nis = innovation @ np.linalg.solve(cov_innovation, innovation)
+    return nis if nis < limit else False
+
+
+def as_many_as_numbers(x0, cov0, z, C, cov_z):
+    W, V0 = np.linalg.inv(cov_z), np.linalg.inv(cov0)
+    P = np.linalg.inv(V0 + z.size * C.T @ W @ C)
+    return P @ (V0 @ x0 + C.T @ W @ z.sum(0)), P
+
+
 @pytest.mark.parametrize(
     "name, answer, words",
     [
@@ -372,6 +402,14 @@ def two_slips(y, S, limit):
         ("fuse_two_sensors", first_gain_twice, "The second sensor gets the gain of the first"),
         ("batch_estimate", rows_repeated, "np.tile"),
         ("gate", two_slips, "Two slips"),
+        ("predict_state", scaled_by_the_control, "but ones of its shape in its place"),
+        (
+            "fuse_two_sensors",
+            inflated_by_the_readings,
+            "with 1 in its place, your result is right, so",
+        ),
+        ("gate", the_nis_itself, "`nis` stands where `True` belongs"),
+        ("batch_estimate", as_many_as_numbers, "it counts all numbers, and `len(z)` belongs there"),
     ],
 )
 def test_what_once_passed_or_was_told_of_a_coincidence_is_named(name, answer, words):

@@ -8,6 +8,7 @@ from ...documents.lecture import printed as lecture
 from ...exercises import metrics
 from ...exercises.draws import scaled
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...exercises.special import right_where
 from ...geometry.planar import wrap_angle
 from ...localization import lateration, odometry, wheels
 
@@ -43,16 +44,32 @@ SITE = "right in a hall, but not on a site where the landmarks are a kilometer a
 TABLE = "right in a hall, but not on a table where the landmarks are half a meter apart at most:"
 
 
-def from_afar(rng, left, angle=None):
-    """Two landmarks and a start so far off that a few steps, or the Jacobian of the start alone, do not arrive.
+ASIDE = (
+    "from a start some way aside, where Newton's steps, too, stay on their side of the line through both landmarks "
+    "(other searches, such as SciPy's fsolve, may cross it)"
+)
 
-    Of landmarks in a row, angle = 0 or pi / 2, one coordinate arrives with the first step.
+
+def from_afar(rng, angle):
+    """Landmarks in a row, angle = 0 or pi / 2, and a start so far off that a few steps, or the Jacobian of the start
+    alone, do not arrive; one coordinate arrives with the first step.
     """
-    landmarks, distances, _ = two_circles(rng, left=left, angle=angle)
+    landmarks, distances, _ = two_circles(rng, angle=angle)
     line = landmarks[1] - landmarks[0]
-    across = (1 if left else -1) * np.array([-line[1], line[0]])
+    across = np.array([-line[1], line[0]])
     robot = max(lateration.circle_intersections(landmarks, distances), key=lambda p: across @ (p - landmarks[0]))
     return landmarks, distances, robot + rng.uniform(6, 12) * across
+
+
+def at_places(rng, robot, start, left, angle=None):
+    """Two landmarks, exact distances to a robot, and a start, both hardly beside these places: so far along the way from
+    the first landmark to the second, and so far across it, in lengths of that way.
+    """
+    landmarks, *_ = two_circles(rng, left=left, angle=angle)
+    line = landmarks[1] - landmarks[0]
+    frame = np.array([line, (1 if left else -1) * np.array([-line[1], line[0]])])
+    robot, start = (landmarks[0] + rng.uniform(0.97, 1.03, 2) * place @ frame for place in (robot, start))
+    return landmarks, np.linalg.norm(landmarks - robot, axis=1), start
 
 
 def from_whole_meters(rng):
@@ -225,10 +242,10 @@ def special_steps(metric, small=None):
     return *rows, *of_other_sizes(metric, small=small), (pose_of_integers, metric, OF_INTEGERS)
 
 
-def whole_turns(rng):
-    """A pose and a control held so long that the robot turns by more than once around."""
+def long_turn(rng, by):
+    """A pose and a control held so long that the robot turns by an angle from this range."""
     x, u, _ = pose_control_step(rng, side=rng.choice([-1, 1]), gear=rng.choice([-1, 1]))
-    return x, u, rng.uniform(6.8, 11) / abs(u[1])
+    return x, u, rng.uniform(*by) / abs(u[1])
 
 
 def covariances_at_special_controls(rng, moves):
@@ -345,6 +362,15 @@ def _newton_with_one_jacobian(steps):
         return x
 
     return variant
+
+
+def _newton_of_lengths(landmarks, distances, start):
+    x = np.array(start, dtype=float)
+    for _ in range(20):
+        away = x - landmarks
+        r = np.linalg.norm(away, axis=1)
+        x = x - np.linalg.solve(away / r[:, None], r - distances)
+    return x
 
 
 def _mirrored(landmarks, distances, start):
@@ -566,6 +592,7 @@ def _arc_y_sign(x, u, dt):
 
 GENTLE = "right in sharp curves, but not in gentle ones, where omega is 0.1 rad/s or less:"
 LONG = "right, but not for a turn that goes more than once around, omega T beyond 2 pi:"
+HALF_AROUND = "right, but not for a turn by more than half a circle in one step, omega T beyond pi, which is to be halved as it is:"
 ROUNDED_WHEELS = 1.1e-16  # rad/s: wheels at 0.3 and at 0.1 + 0.2 m/s turn the robot so fast, on paper
 
 
@@ -700,9 +727,9 @@ def _not_handed_on(x, cov, u, dt, cov_u):
     return x, propagate(x, cov, u, dt, cov_u)[1]
 
 
-def _exchanged():
+def _exchanged(one, other):
     noise = lecture.circle_drive().noise
-    return _loop(k_theta=noise["k_drift"], k_drift=noise["k_theta"])[1]
+    return _loop(**{one: noise[other], other: noise[one]})[1]
 
 
 def _without_carrying():
@@ -819,8 +846,12 @@ CHAPTER = Chapter(
             reference=newton_lateration,
             draw=(
                 *CIRCLES,
-                *(functools.partial(from_afar, left=left) for left in (True, False)),
-                *(functools.partial(from_afar, left=True, angle=angle) for angle in (0.0, np.pi / 2)),
+                # from where steps for the lengths instead of their squares run away, too
+                *(
+                    functools.partial(at_places, robot=(0.25, 0.3), start=(0.25, 10.5), left=left)
+                    for left in (True, False)
+                ),
+                *(functools.partial(from_afar, angle=angle) for angle in (0.0, np.pi / 2)),
             ),
             draws=8,
             fixed={
@@ -850,6 +881,19 @@ CHAPTER = Chapter(
                     functools.partial(scaled, draw=two_circles, factors=(0.05, 0.05, 0.05)),
                     metrics.Numbers(1e-6, "m"),
                     TABLE,
+                ),
+            ),
+            properties=(
+                right_where(
+                    newton_lateration,
+                    metrics.Numbers(1e-8, "m"),
+                    *(
+                        (ASIDE, functools.partial(at_places, robot=robot, start=start, left=left, angle=0.0))
+                        for robot, start, left in (
+                            ((0.57, 0.43), (-1.62, 1.1), True),
+                            ((0.547, 0.816), (-3.037, 1.892), False),
+                        )
+                    ),
                 ),
             ),
             hints=(
@@ -897,6 +941,11 @@ CHAPTER = Chapter(
                         "Newton is right, but so few steps do not arrive from a start farther off: take about twenty.",
                     )
                     for steps in (2, 3, 4, 5)
+                ),
+                Mistake(
+                    _newton_of_lengths,
+                    "These are Newton's steps for the lengths, |l - x| - d. From a start farther off they run away. The "
+                    "equations here are of squares, and J = 2 (x - l).",
                 ),
                 *(
                     Mistake(
@@ -1078,7 +1127,10 @@ CHAPTER = Chapter(
             draw=STEPS,
             fixed=PLANAR,
             metric=metrics.PlanarPoses(),
-            noisy=special_steps(metrics.PlanarPoses()),
+            noisy=(
+                (functools.partial(long_turn, by=(3.4, 6.0)), metrics.PlanarPoses(), HALF_AROUND),
+                *special_steps(metrics.PlanarPoses()),
+            ),
             hints=(
                 "While it drives the robot turns by omega T; on average it looked half of that aside.",
                 "As before, with theta + omega T / 2 inside cosine and sine.",
@@ -1136,7 +1188,7 @@ CHAPTER = Chapter(
                     (functools.partial(gentle_curve, omega=omega), metrics.PlanarPoses(1e-6), GENTLE)
                     for omega in (0.1, 0.01, 1e-3, 1e-4)
                 ),
-                (whole_turns, metrics.PlanarPoses(1e-3), LONG),
+                (functools.partial(long_turn, by=(6.8, 11)), metrics.PlanarPoses(1e-3), LONG),
                 (pose_of_integers, metrics.PlanarPoses(1e-7), OF_INTEGERS),
                 *special_controls(metrics.PlanarPoses(1e-7)),
                 *of_other_sizes(metrics.PlanarPoses(1e-7), far=metrics.PlanarPoses(1e-3)),
@@ -1729,7 +1781,7 @@ CHAPTER = Chapter(
         Value(
             "end_pose",
             reference=lambda: _circle()[0],
-            unit="m",
+            unit="m, rad",
             metric=metrics.PlanarPoses(1e-6),
             hints=(
                 "Start at (0, 0, 0) and take all 140 steps with the simplified model.",
@@ -1781,6 +1833,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda: np.array([0, 0, _circle()[0][2]]),
                     "The heading is right. The circle does not close: it turns by 336 deg, so the position follows from the steps.",
+                ),
+                Mistake(
+                    lambda: np.array([0.0, 0.0, 2 * np.pi]),
+                    "This is a circle that closes. 140 steps turn by 336 deg, and straight steps do not stay on the arc: add them up.",
                 ),
                 Mistake(lambda: _circle()[0] * [1, 1, 0], "The position is right, the heading is missing."),
                 Mistake(
@@ -1836,7 +1892,10 @@ CHAPTER = Chapter(
                     lambda: _loop(noise_time=1.0)[1],
                     "The control's covariance is that of a step of 1 s. `drive.dt` is 0.1 s, there as well.",
                 ),
-                Mistake(_exchanged, "k_theta and k_drift have changed places."),
+                *(
+                    Mistake(functools.partial(_exchanged, *names), f"{' and '.join(names)} have changed places.")
+                    for names in (("k_theta", "k_drift"), ("k_d", "k_drift"), ("k_d", "k_theta"))
+                ),
                 Mistake(
                     lambda: _loop(start_cov=1.0)[1],
                     "This starts with the identity. The start is known: a covariance of zeros.",
@@ -1946,6 +2005,10 @@ CHAPTER = Chapter(
                 Mistake(
                     _offset(lambda d, turn, way: way / turn * (1 - np.cos(turn))),
                     "You let the middle of the robot go the way that was counted. One wheel goes farther: way (1 + excess / 2).",
+                ),
+                Mistake(
+                    _offset(lambda d, turn, way: d / turn * (1 - np.cos(way * turn / d))),
+                    "The radius is right. The middle goes farther round it than was counted: it turns by way (1 + excess / 2) / radius.",
                 ),
                 Mistake(
                     lambda way, excess, track: wheel_offset(way, excess, track) * (1 + excess) / (1 + excess / 2),

@@ -99,7 +99,7 @@ def steady_vehicle(rng):
     return (
         A,
         rng.choice([-1, 1]) * C,
-        rng.uniform(0.3, 1) * B @ B.T + 1e-3 * np.eye(2),
+        rng.uniform(0.3, 1) * B @ B.T,  # of the control alone: the position is sure after a step from no uncertainty
         np.array([[rng.uniform(0.1, 1)]]),
     )
 
@@ -462,6 +462,14 @@ def _batch_of_repeated_rows(x0, cov0, z, C, cov_z):
     return cov @ (np.linalg.solve(cov0, x0) + rows.T @ weight @ z.ravel()), cov
 
 
+def _batch_weighed_twice(x0, cov0, z, C, cov_z):
+    """Least squares of rows that are multiplied with the whole inverse of their covariance."""
+    V0, V = np.linalg.inv(cov0), np.linalg.inv(cov_z)
+    W0, W = V0 @ V0, V @ V
+    cov = np.linalg.inv(W0 + len(z) * C.T @ W @ C)
+    return cov @ (W0 @ x0 + C.T @ W @ z.sum(0)), cov
+
+
 def _batch_unweighted(x0, cov0, z, C, cov_z):
     cov = np.linalg.inv(np.eye(len(x0)) + len(z) * C.T @ C)
     return cov @ (x0 + C.T @ z.sum(0)), cov
@@ -590,6 +598,11 @@ def _rounds(n, gain=_gain, noise=1):
         return K
 
     return variant
+
+
+def _stopped_at_zero(A, C, Q, R):
+    """The settled gain, or 0 where that is the gain of the first round from a covariance of zeros."""
+    return _rounds(1000)(A, C, Q, R) * _gain(Q, C, R).any()
 
 
 def wrap_angle(angle):
@@ -1309,9 +1322,10 @@ CHAPTER = Chapter(
             reference=_fusion,
             unit="m",
             rtol=5e-5,
+            beside=(("variance", metrics.Numbers(1e-4), lambda: 1 / 5.05),),
             hints=(
                 "The page's prior is 0 with the variance 20, its sensors have the standard deviations 0.5 and 1.",
-                "Put the printed numbers into your `fuse_two_sensors`; the first result is the position.",
+                "Put the printed numbers into your `fuse_two_sensors`; its first result is the position. Hand over both, or the position alone.",
                 "`fused = fuse_two_sensors(0.0, 20.0, np.array([9.4, 10.6]), np.array([0.5, 1.0]))[0]`",
             ),
             mistakes=[
@@ -1464,6 +1478,11 @@ CHAPTER = Chapter(
                     _rounds(10), "Ten rounds are too few: repeat until the gain stands still, some thousand times."
                 ),
                 Mistake(
+                    _stopped_at_zero,
+                    "Your gain stays 0 where the noise reaches the position only through the velocity. From a covariance of zeros the first "
+                    "gain is 0 there: a loop that compares it with a gain of zeros stops at once.",
+                ),
+                Mistake(
                     _rounds(1000, gain=_gain_by_the_diagonal),
                     "You divide by the diagonal of S alone. What is measured together goes together: S is to be inverted as a whole.",
                 ),
@@ -1577,7 +1596,7 @@ CHAPTER = Chapter(
                         lambda further=further: _printed_correction(lambda g: g | {"prior_x": 13.0} | further).x,
                         "You predict once more before you correct. The printed state is the prediction already.",
                     )
-                    for further in ({}, ONE_STEP_MORE)
+                    for further in ({}, ONE_STEP_MORE, ONE_STEP_MORE | {"prior_v": 5.1})
                 ),
             ],
         ),
@@ -2561,6 +2580,11 @@ CHAPTER = Chapter(
                     "`np.repeat` writes the first row of C k times, then the second. The numbers of z follow one another measurement by measurement: `np.tile(C, (k, 1))`.",
                 ),
                 Mistake(lambda *a: batch_estimate(*a)[::-1], "The order is state, covariance."),
+                Mistake(
+                    _batch_weighed_twice,
+                    "You weigh twice: the inverse covariance stands before the rows, and least squares squares them. What stands before "
+                    "them is its root: np.linalg.solve(L, row), with L from np.linalg.cholesky of the covariance.",
+                ),
                 Mistake(
                     _prior_with_each,
                     "What is known before counts once. You add it anew with each measurement.",
