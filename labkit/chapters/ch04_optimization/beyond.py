@@ -4,6 +4,7 @@ The measured gradient, the chord, the trust-region loop, and the weights behind 
 """
 
 import functools
+import itertools
 
 import numpy as np
 
@@ -300,6 +301,40 @@ def _problem(rng):
 def shrunk_where_taken_back(radius, length, rho):
     """The rule, but for steps that are poor and taken: the radius stays."""
     return radius if ACCEPT < rho < POOR else rule(radius, length, rho)
+
+
+SHRINKS = {  # what else the radius may become after a poor step
+    "a quarter of what it was": lambda radius, length: radius / 4,
+    "half of what it was": lambda radius, length: radius / 2,
+    "half of the step's length": lambda radius, length: length / 2,
+}
+GROWS = (  # and after a good one; by the last rule inside the rim as well
+    (1.5, lambda radius, length: 1.5 * radius if length > RIM * radius else radius),
+    (3, lambda radius, length: 3 * radius if length > RIM * radius else radius),
+    (3, lambda radius, length: max(radius, 3 * length)),
+)
+TOLD_BEFORE = {("a quarter of what it was", None), ("half of the step's length", None), (None, None)}
+
+
+def other_radii():
+    """(id, words, rule) for the ways to change the radius that other books have, one or both other than here."""
+    shrinks, grows = ((None, None), *SHRINKS.items()), ((None, None), *GROWS)
+    for (k, (small, shrunk)), (m, (large, grown)) in itertools.product(enumerate(shrinks), enumerate(grows)):
+        if (small, large) in TOLD_BEFORE:
+            continue
+        told = (
+            [f"After a poor step your radius becomes {small}: it is a quarter of the step's length."] if small else []
+        )
+        whose = "it" if small else "your radius"
+        told += [f"After a good step to the rim {whose} becomes {large} times as large: it doubles."] if large else []
+        yield f"{k}{m}", " ".join(told), functools.partial(_otherwise, shrunk, grown)
+
+
+def _otherwise(shrunk, grown, radius, length, rho):
+    """The rule, but for poor steps, good ones, or both."""
+    if rho < POOR and shrunk:
+        return shrunk(radius, length)
+    return grown(radius, length) if rho > GOOD and grown else rule(radius, length, rho)
 
 
 def run_with(rng, wanted, first=None, unlike=None):

@@ -602,6 +602,16 @@ def _differences(function, h, behind):
     )
 
 
+def _twice_ahead(h):
+    """The second derivatives by differences of f itself, all steps ahead."""
+
+    def variant(x):
+        e, f = h * np.eye(2), wells.value
+        return np.array([[(f(x + a + b) - f(x + a) - f(x + b) + f(x)) / h**2 for b in e] for a in e])
+
+    return variant
+
+
 def _wide_differences(name, function, forward_steps, central_steps):
     """Mistakes of who takes differences, forward or with a wide step; smaller steps are within the tolerance."""
     forward = (
@@ -792,6 +802,17 @@ CHAPTER = Chapter(
                     "`/ 2 * h` divides by 2 and then multiplies by h: write `/ (2 * h)`.",
                     id="measured-times-h",
                 ),
+                *(
+                    Mistake(
+                        beyond.differences(difference),
+                        "One of your two places is x itself, h from the other one, and you divide by 2h. Step to both sides: f(x + h e) − f(x − h e).",
+                        id=f"measured-half-{side}",
+                    )
+                    for side, difference in (
+                        ("ahead", lambda f, x, e, h: (f(x + e) - f(x)) / (2 * h)),
+                        ("behind", lambda f, x, e, h: (f(x) - f(x - e)) / (2 * h)),
+                    )
+                ),
                 Mistake(
                     beyond.differences(lambda f, x, e, h: f(x + e) - f(x - e)),
                     "These are differences, not slopes: divide by the distance of the two places, 2h.",
@@ -917,6 +938,15 @@ CHAPTER = Chapter(
                         id=f"hessian-repeated-{k}",
                     )
                     for k in range(2)
+                ),
+                *(
+                    Mistake(
+                        _twice_ahead(h),
+                        "These are second differences of f, all steps ahead: they are off by about h times the third derivative. Differentiate by hand, or "
+                        "take central differences of your gradient, with h = 1e-5.",
+                        id=f"hessian-twice-ahead-{h:g}",
+                    )
+                    for h in (0.1, 0.01, 1e-3, 1e-4)
                 ),
                 *_wide_differences("hessian", wells.gradient, (0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6), (0.1, 0.01, 1e-3)),
                 Mistake(
@@ -1122,6 +1152,11 @@ CHAPTER = Chapter(
                 "`return -np.linalg.solve(H, g)`",
             ),
             mistakes=[
+                Mistake(
+                    lambda g, H: np.linalg.det(H) * opt.newton_step(g, H),
+                    "Your step is det H times Newton's: the inverse of a 2 x 2 matrix is divided by its determinant.",
+                    id="newton-undivided",
+                ),
                 Mistake(
                     lambda g, H: np.linalg.solve(H, g),
                     "This is the step with the wrong sign, the d of equations (2-24) and (2-25): there x − d is the next point.",
@@ -1996,6 +2031,10 @@ CHAPTER = Chapter(
                     ),
                     "After a poor step your radius becomes half of the step's length: it is a quarter.",
                     id="trust-half",
+                ),
+                *(
+                    Mistake(beyond.loop(follow=rule), words, id=f"trust-rule-{k}")
+                    for k, words, rule in beyond.other_radii()
                 ),
                 Mistake(
                     beyond.loop(follow=lambda radius, length, rho: length / 4 if rho < 0.25 else 2 * radius),

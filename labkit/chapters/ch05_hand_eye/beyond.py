@@ -410,6 +410,11 @@ ACCURACY = [
                 id="accuracy-sum",
             ),
             Mistake(
+                lambda command, reached: np.abs(reached.mean(0) - command).max(),
+                "This is the largest of the parts. A distance is the root of the sum of all their squares.",
+                id="accuracy-largest",
+            ),
+            Mistake(
                 lambda command, reached: np.linalg.norm(np.median(reached, axis=0) - command),
                 "You took the median of each coordinate. The mean is meant.",
                 id="accuracy-median",

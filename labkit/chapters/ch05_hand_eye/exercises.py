@@ -672,7 +672,10 @@ class named_entries(metrics.Exactly):
             return [metrics.Deviation("", float(missed), "", 0.5, words=words)]
         rows = Counter((table, pose) for table, pose, _ in result)
         whole = " (several of one row: one slip a row is meant)" if max(rows.values(), default=0) > 1 else ""
-        return [Count("misprints are not named yet", missed), Count(f"entries are accused wrongly{whole}", accused)]
+        return [
+            Count("misprints are not named yet", missed),
+            Count(f"entries are accused wrongly{whole}{'' if missed else ', beside the misprinted ones'}", accused),
+        ]
 
 
 # --- designing poses -------------------------------------------------------------------------------------------------
@@ -1100,6 +1103,15 @@ CHAPTER = Chapter(
                 Mistake(lambda f, x, h: (f(x + h) - f(x - h)) / (2 * h), "You moved all variables at once. Move one at a time: one column each."),
                 Mistake(lambda f, x, h: -_central(f, x, h),
                         "The sign is reversed: what is ahead minus what is behind."),
+                *(
+                    Mistake(variant, "One of your two places is x itself, one step from the other one, and you divide by two steps. Take the step in both directions.", id=f"numeric_jacobian-half-{side}")
+                    for side, variant in (("ahead", lambda f, x, h: _forward(f, x, h) / 2), ("behind", lambda f, x, h: _backward(f, x, h) / 2))
+                ),
+                Mistake(
+                    lambda f, x, h: np.column_stack([np.imag(f(x + 1j * e)) / h for e in h * np.eye(len(x))]),
+                    "This steps to complex places: where a function takes them that is a derivative too, but no central difference. Step to both sides of x.",
+                    id="numeric_jacobian-complex",
+                ),
                 Mistake(lambda f, x, h: 2 * _central(f, x, h), "Between ahead and behind lie two steps: divide by 2 h."),
                 Mistake(lambda f, x, h: _central(f, x, h) * 2 * h, "You have not divided by the distance 2 h yet."),
                 Mistake(lambda f, x, h: _central(f, x, h).T, "Your matrix is the transpose: one row a function value, one column a variable."),
@@ -1357,6 +1369,7 @@ CHAPTER = Chapter(
                 Mistake(_weights(lambda r: 1 - _tukey(r / (5 * np.median(r) / robust.MEDIAN_CHI3))), "Turned around: good poses get weight 1, gross ones 0."),
                 Mistake(_weights(lambda r: np.clip(1 - r / (5 * np.median(r) / robust.MEDIAN_CHI3), 0, None) ** 2), "Inside the bracket u is squared: (1 - u^2)^2."),
                 Mistake(_weights(lambda r: np.minimum(1, np.median(r) / robust.MEDIAN_CHI3 * 1.345 / r)), "These are Huber's weights, which never reach zero. Tukey's do: (1 - u^2)^2 below u = 1, else 0."),
+                Mistake(_weights(lambda r: np.minimum(1, np.median(r) / robust.MEDIAN_CHI3 * 5 / r)), "These are Huber's weights, which never reach zero. Tukey's do: (1 - u^2)^2 below u = 1, else 0.", id="robust_weights-huber-5"),
                 Mistake(_weights(lambda r: _tukey(r * robust.MEDIAN_CHI3 / np.median(r))), "The factor 5 is missing: u = length / (5 s)."),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r) * robust.MEDIAN_CHI3))), "You multiplied by 1.538: divide the median by it."),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.sort(r)[len(r) // 2] / robust.MEDIAN_CHI3))),
