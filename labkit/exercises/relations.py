@@ -184,7 +184,8 @@ def _sign_or_unit(holds, unit):
 def _without_sign(metric, results, expected):
     """Right but for signs, and never negative."""
     if all((r >= 0).all() and metric.equal(r, np.abs(e)) for r, e in zip(results, expected)):
-        return "your result is right but for its sign, which is lost: a square, a root or an arccosine on the way?"
+        ways = "an absolute value, a square, a root or an arccosine on the way?"
+        return f"your result is right but for its sign, which is lost: {ways}"
     return None
 
 

@@ -41,7 +41,7 @@ BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with 
 UNBOUNDED = {f"`{name}` is too much" for name in mutation.BOUNDED | mutation.BOUNDS}
 DECIMALS = re.compile(r"[<>]=? *\d*(\.\d+(e[+-]?\d+)?|e-\d+)$|[<>]=? *\d+e-\d+$")  # a comparison with such a number
 FEW_ROUNDS = re.compile(r"these are too few rounds: (\d+) will do")
-GO_ON = "go on until nothing changes, or choose what needs no rounds"
+GO_ON = "Go on until nothing changes, or choose what needs no rounds"
 TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
 UNEQUAL = ("where `==` belongs", "where `!=` belongs")  # what computed numbers are never, or always
 TRUTHS = {"`0` belongs": "`False` belongs", "`1` belongs": "`True` belongs"}
@@ -440,8 +440,8 @@ class Search:
                 for case in self.cases
             )
             if all(fit == [True] for fit in fits):
-                more = f"with {found[1]} the result comes nearer on every draw, and is not there yet"
-                return f"in line {line}, `{code}`: these rounds are too few. {more[0].upper()}{more[1:]}: {GO_ON}"
+                more = f"with {found[1]} rounds the result comes nearer on every draw, and is not there yet"
+                return f"in line {line}, `{code}`: {more}. {GO_ON}"
         return None
 
     def _gains(self, plans, right, kind):
@@ -518,8 +518,7 @@ class Search:
     @_or_nothing
     def notebook_words(self, solution):
         """What belongs in the place of the notebook's data, which are the same whatever is given: looked at first."""
-        read = set(scope.notebook_data(self.written.function))
-        made = {k for k, (_, code, *_) in enumerate(self.written.places) if read & set(NAMES.findall(code))}
+        made = self._of_notebook()
         if not made:
             return None
         put = (plan for plan in (*self._turned(made), *self._with_own(made)) if plan[2] == rerun.IN_ITS_PLACE)
@@ -528,6 +527,11 @@ class Search:
             return words
         plan = self.mending([("given", k, q) for k, q in self._given(solution) if k in made], solution.values)
         return plan and self._compared(*plan[1:], solution)
+
+    def _of_notebook(self):
+        """Places where data of the notebook are read, or taken in by something larger."""
+        read = set(scope.notebook_data(self.written.function))
+        return {k for k, (_, code, *_) in enumerate(self.written.places) if read & set(NAMES.findall(code))}
 
     def _is_no_step(self, k):
         """Whether the right result in a value's place says nothing: in the result's, and where an iteration goes on."""
@@ -650,6 +654,8 @@ class Search:
         told = f"As far as {told} your values are those of the solution"
         if len(known) == len(units) or not self._has_counterpart(units[len(known)], solution):
             return told
+        if min(self._of_notebook(), default=units[-1]) < units[len(known)]:
+            return told  # what is the same whatever is given may be wrong before
         line, code, *_ = self.written.places[units[len(known)]]
         first = f"`{code}` in line {line} is the first behind that is not among them"
         return f"{told}; {first}. Look from there on, unless you go another way than it does"

@@ -652,6 +652,19 @@ def test_data_of_the_notebook_are_looked_at_first(monkeypatch):
     assert told.startswith("in line 2, `kept`: ") and "reads `kept` from the notebook" in told
 
 
+def test_behind_data_of_the_notebook_no_step_is_called_the_first_that_is_wrong(monkeypatch):
+    reference = solved_by(
+        monkeypatch, "def formula(a, b):\n    x = a * b\n    y = a - b**3\n    return np.exp(y) * x\n"
+    )
+    formula = typed("x = a * b\ny = kept * 2.0\nz = np.sinh(y * b)\nreturn z**3 - x * a")
+    formula.__globals__["kept"] = np.array([0.3, 0.7, -0.2])
+    for other in ("words", "partly_words", "given_words", "notebook_words"):
+        monkeypatch.setattr(steps.Search, other, lambda self, *of: None)
+    item = asked(reference, lambda rng: tuple(rng.normal(size=(2, 3))))
+    told = item.judge(formula, rng=np.random.default_rng(0)).text
+    assert "As far as `x` (line 2) your values are those of the solution." in told
+
+
 def _root(a, b):
     return np.sqrt(1 + a @ a)
 
@@ -872,7 +885,7 @@ SOLVED = asked(np.linalg.solve, two_equations)
         ),
         (
             "x = np.zeros(2)\nfor _ in range(5):\n    x = x - 0.02 * a.T @ (a @ x - b)\nreturn x",
-            "`range(5)`: these rounds are too few. With 200 the result comes nearer on every draw",
+            "`range(5)`: with 200 rounds the result comes nearer on every draw",
         ),
     ],
 )
