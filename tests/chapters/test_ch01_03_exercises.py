@@ -710,8 +710,8 @@ def _even_lever_in_the_plane():
     return np.hypot(T[0, 3], T[1, 3]) / chaining.closure_error(T)[0]
 
 
-def _lever_by_the_arccosine(of):
-    """A lever from the angle by the trace, which the rounded entries put a little elsewhere."""
+def _by_the_arccosine(of):
+    """Of the angle by the trace, which the rounded entries put a little elsewhere, and the distance."""
     T = chaining.chain(lab_sheet.printed_transforms())
     angle = np.arccos((np.trace(T[:3, :3]) - 1) / 2)
     return lambda: of(angle, np.linalg.norm(T[:3, 3]))
@@ -735,9 +735,12 @@ def _hole_along_x():
     ("chapter", "name", "answer", "words"),
     [
         (exercises, "even_lever", _even_lever_in_the_plane, "lost its z"),
-        (exercises, "even_lever", _lever_by_the_arccosine(lambda angle, d: d * angle), "angle times distance"),
-        (exercises, "even_lever", _lever_by_the_arccosine(lambda angle, d: d / np.sin(angle / 2)), "Twice too large"),
-        (exercises, "even_lever", _lever_by_the_arccosine(lambda angle, d: d / (1 - np.cos(angle))), "toward the axis"),
+        (exercises, "even_lever", _by_the_arccosine(lambda angle, d: d * angle), "angle times distance"),
+        (exercises, "even_lever", _by_the_arccosine(lambda angle, d: d / np.sin(angle / 2)), "Twice too large"),
+        (exercises, "even_lever", _by_the_arccosine(lambda angle, d: d / (1 - np.cos(angle))), "toward the axis"),
+        (exercises, "even_lever", _by_the_arccosine(lambda angle, d: d / np.rad2deg(angle)), "angle in degrees"),
+        (exercises, "worst_at_one_meter", _by_the_arccosine(lambda angle, d: 1000 * angle), "turn alone"),
+        (exercises, "worst_at_one_meter", _by_the_arccosine(lambda angle, d: 1000 * angle + d), "none is that bad"),
         (exercises, "even_lever", _lever_of_a_measured_link, "the third link alone"),
         (ch01_exercises, "distance", _hole_by_matrices, "the root of 2 times the distance"),
         (ch01_exercises, "distance", _hole_along_x, "lies off in y too"),

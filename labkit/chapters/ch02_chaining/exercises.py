@@ -372,14 +372,14 @@ def _turn_by_arccosine():
     return np.arccos((np.trace(_sheet()[:3, :3]) - 1) / 2)
 
 
-def _of_either_angle(value, text, id):
-    """Mistakes of the lever: value(angle, distance), the angle by arctan2 and by the arccosine, which differ as entries are rounded."""
+def _of_either_angle(value, text, id, within=0.0):
+    """Mistakes value(angle, distance), the angle by arctan2 and by the arccosine: of the rounded entries these differ."""
 
     def variant(angle):
         return lambda: float(value(angle(), chaining.closure_error(_sheet())[1]))
 
     angles = ((lambda: chaining.closure_error(_sheet())[0], id), (_turn_by_arccosine, f"{id}-by-arccosine"))
-    return [Mistake(variant(angle), text, id=name) for angle, name in angles]
+    return [Mistake(variant(angle), text, name, within) for angle, name in angles]
 
 
 def _of_one_link(number):
@@ -809,25 +809,20 @@ CHAPTER = Chapter(
                     "The norm of R - I is no angle: for small turns it is sqrt(2) times too large.",
                     id="lever-norm",
                 ),
-                *(
-                    Mistake(
-                        lambda angle=angle: np.linalg.norm(_sheet()[:2, 3]) / angle(),
-                        "The distance has lost its z here: the loop misses itself by a little in z too, `product[:3, 3]`.",
-                        id=f"lever-without-z-{k}",
-                    )
-                    for k, angle in enumerate((lambda: chaining.closure_error(_sheet())[0], _turn_by_arccosine))
+                *_of_either_angle(
+                    lambda angle, distance: np.linalg.norm(_sheet()[:2, 3]) / angle,
+                    "The distance has lost its z here: the loop misses itself by a little in z too, `product[:3, 3]`.",
+                    "lever-without-z",
                 ),
                 Mistake(
                     lambda: chaining.closure_error(_sheet())[1],
                     "This is the loop's distance. Which lever, times the angle in rad, makes as much?",
                     id="lever-distance",
                 ),
-                Mistake(
-                    lambda: (
-                        np.linalg.norm(lab_sheet.printed_transforms()[-1][:3, 3]) / chaining.closure_error(_sheet())[0]
-                    ),
+                *_of_either_angle(
+                    lambda angle, distance: np.linalg.norm(lab_sheet.printed_transforms()[-1][:3, 3]) / angle,
                     "This divides the length of the last link. The distance by which the loop misses itself is that of the product.",
-                    id="lever-last-link",
+                    "lever-last-link",
                 ),
             ],
         ),
@@ -852,22 +847,22 @@ CHAPTER = Chapter(
                     "This is the worst of the six axes. Between them lies a worse direction.",
                     id="meter-axes",
                 ),
-                Mistake(
-                    lambda: 1000 * chaining.closure_error(_sheet())[0],
+                *_of_either_angle(
+                    lambda angle, distance: 1000 * angle,
                     "This is what the turn alone does. The shift of the loop adds to it, or takes from it.",
-                    id="meter-turn",
+                    "meter-turn",
                     within=0.005,  # the chord in place of the arc
                 ),
-                Mistake(
-                    lambda: 1000 * chaining.closure_error(_sheet())[0] + chaining.closure_error(_sheet())[1],
+                *_of_either_angle(
+                    lambda angle, distance: 1000 * angle + distance,
                     "This adds angle times lever and distance as if both pointed the same way: no point can be worse, and none is that bad.",
-                    id="meter-sum",
+                    "meter-sum",
                     within=0.005,
                 ),
-                Mistake(
-                    lambda: np.hypot(1000 * chaining.closure_error(_sheet())[0], chaining.closure_error(_sheet())[1]),
+                *_of_either_angle(
+                    lambda angle, distance: np.hypot(1000 * angle, distance),
                     "This takes what the turn does and what the shift does to be perpendicular. In the worst direction nearly all of the shift adds to the turn.",
-                    id="meter-hypot",
+                    "meter-hypot",
                 ),
                 Mistake(
                     lambda: chaining.closure_error(_sheet())[1],
@@ -886,20 +881,20 @@ CHAPTER = Chapter(
                     "This is how far the displaced point is from the origin. Subtract p.",
                     id="meter-no-difference",
                 ),
-                Mistake(
-                    lambda: 1000 * np.rad2deg(chaining.closure_error(_sheet())[0]),
+                *_of_either_angle(
+                    lambda angle, distance: 1000 * np.rad2deg(angle),
                     "The lever is multiplied by an angle in degrees here: arcs take radians.",
-                    id="meter-degrees",
+                    "meter-degrees",
                 ),
                 Mistake(
                     lambda: 1000 * np.linalg.norm(_sheet()[:3, :3] - np.eye(3)) + chaining.closure_error(_sheet())[1],
                     "The norm of R - I is sqrt(2) times the angle for small turns: no point is carried that far.",
                     id="meter-norm-and-shift",
                 ),
-                Mistake(
-                    lambda: 1000 * chaining.closure_error(_sheet())[0] - chaining.closure_error(_sheet())[1],
+                *_of_either_angle(
+                    lambda angle, distance: 1000 * angle - distance,
                     "This takes the shift off what the turn does. In the worst direction it adds to it, nearly all of it.",
-                    id="meter-difference",
+                    "meter-difference",
                 ),
                 Mistake(
                     lambda: 15.245,
