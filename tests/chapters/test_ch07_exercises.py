@@ -230,3 +230,13 @@ def test_a_circle_of_short_straight_steps_is_told(n, along):
         return x[1]
 
     assert all("short straight steps" in text for text in texts("wheel_offset", steps))
+
+
+def by_the_hypotenuse(way, excess, track):
+    radius = track / excess + track / 2
+    return radius * (1 - np.cos(np.hypot(way, radius)))
+
+
+def test_an_argument_is_not_called_right_where_another_one_belongs():
+    text = ITEMS["wheel_offset"].judge(by_the_hypotenuse, rng=np.random.default_rng(0)).text
+    assert "though `radius` in it is: look at what is done with it" in text
