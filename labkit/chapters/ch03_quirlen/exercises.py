@@ -843,7 +843,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda A, r: (r**2).sum() / (r.size - 6) * np.diag(1 / np.diag(A.T @ A)),
-                    "These are the reciprocals of the diagonal of AᵀA. The inverse of a matrix is another thing: `np.linalg.inv(A.T @ A)`.",
+                    "This is the variance times the reciprocals of the diagonal of AᵀA. The inverse of a matrix is another thing: `np.linalg.inv(A.T @ A)`.",
                     id="covariance-of-reciprocals",
                 ),
                 Mistake(
