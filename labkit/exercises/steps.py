@@ -522,7 +522,7 @@ class Search:
         if not made:
             return None
         put = (plan for plan in (*self._turned(made), *self._with_own(made)) if plan[2] == rerun.IN_ITS_PLACE)
-        words = self._turned_words(put)
+        words = self._turned_words(put) or self._left_out_words()
         if words or solution is None:
             return words
         plan = self.mending([("given", k, q) for k, q in self._given(solution) if k in made], solution.values)
@@ -532,6 +532,13 @@ class Search:
         """Places where data of the notebook are read, or taken in by something larger."""
         read = set(scope.notebook_data(self.written.function))
         return {k for k, (_, code, *_) in enumerate(self.written.places) if read & set(NAMES.findall(code))}
+
+    def _left_out_words(self):
+        """That a part of the code which reads the notebook's data is too many, where all is right without it."""
+        read, changes = set(scope.notebook_data(self.written.function)), self.written.changes
+        parts = (k for k, (*_, mends) in enumerate(changes) if TOO_MANY in mends)
+        plan = self.mending([("code", k) for k in parts if read & set(NAMES.findall(changes[k][2]))])
+        return plan and "in line {1}, `{2}`: {3}. {told}".format(*changes[plan[1]], told=ALONE)
 
     def _is_no_step(self, k):
         """Whether the right result in a value's place says nothing: in the result's, and where an iteration goes on."""

@@ -652,6 +652,15 @@ def test_data_of_the_notebook_are_looked_at_first(monkeypatch):
     assert told.startswith("in line 2, `kept`: ") and "reads `kept` from the notebook" in told
 
 
+def test_a_term_of_the_notebook_that_is_too_many_is_told_as_such(monkeypatch):
+    reference = solved_by(monkeypatch, "def formula(a, b):\n    x = a - b**3\n    return np.exp(x) * b\n")
+    formula = typed("x = a - b**3 - kept\nreturn np.exp(x) * b")
+    formula.__globals__["kept"] = np.array([0.3, 0.7, -0.2])
+    item = asked(reference, lambda rng: tuple(rng.normal(size=(2, 3))))
+    told = item.judge(formula, rng=np.random.default_rng(0)).text
+    assert told.startswith("in line 2, `a - b**3 - kept`: one term is too many.") and "reads `kept`" in told
+
+
 def test_behind_data_of_the_notebook_no_step_is_called_the_first_that_is_wrong(monkeypatch):
     reference = solved_by(
         monkeypatch, "def formula(a, b):\n    x = a * b\n    y = a - b**3\n    return np.exp(y) * x\n"
