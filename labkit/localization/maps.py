@@ -206,8 +206,8 @@ class OccupancyGrid:
     def cell_of(self, points):
         """Row and column of the cells that hold the points (..., 2); they may lie outside the map."""
         points = as_points(points, "points", dim=2)
-        j, i = np.moveaxis(np.floor((points - self.origin) / self.resolution).astype(np.intp), -1, 0)
-        return i, j
+        cells = np.floor((points - self.origin) / self.resolution).astype(np.intp)
+        return (cells[1], cells[0]) if cells.ndim == 1 else (cells[..., 1], cells[..., 0])
 
     def center_of(self, i, j):
         """The midpoint (..., 2) of cells (m)."""
@@ -217,8 +217,12 @@ class OccupancyGrid:
 
     def at(self, points, outside=UNKNOWN):
         """FREE, OCCUPIED or UNKNOWN at points (..., 2), and `outside` beyond the map."""
-        (i, j), outside = self.cell_of(points), as_indices(as_whole(outside, "outside"), "outside")
+        i, j = self.cell_of(points)
+        plain = outside is UNKNOWN  # and needs no check
+        outside = np.array(outside) if plain else as_indices(as_whole(outside, "outside"), "outside")
         height, width = self.cells.shape
+        if i.ndim == 0:  # one point, as in a walk along a ray, in less than half of the time
+            return np.array(int(self.cells[i, j] if 0 <= i < height and 0 <= j < width else outside))
         inside = (i >= 0) & (i < height) & (j >= 0) & (j < width)
         return np.where(inside, self.cells[np.where(inside, i, 0), np.where(inside, j, 0)], outside)
 
