@@ -43,6 +43,7 @@ DECIMALS = re.compile(r"[<>]=? *\d*(\.\d+(e[+-]?\d+)?|e-\d+)$|[<>]=? *\d+e-\d+$"
 FEW_ROUNDS = re.compile(r"these are too few rounds: (\d+) will do")
 GO_ON = "Go on until nothing changes, or choose what needs no rounds"
 TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
+TURNED = "has the wrong sign"
 UNEQUAL = ("where `==` belongs", "where `!=` belongs")  # what computed numbers are never, or always
 TRUTHS = {"`0` belongs": "`False` belongs", "`1` belongs": "`True` belongs"}
 ALONE = "With this alone changed, your result is right"
@@ -228,13 +229,17 @@ class Search:
         return re.sub("`[01]` belongs", lambda said: TRUTHS[said[0]], mends) if asked else mends
 
     def _whatever_words(self, line, code, mends):
-        """That a comparison does not belong there, where `==` or `!=` mends only because no two numbers are alike."""
-        if not mends.endswith(UNEQUAL):
+        """That a comparison does not belong there, where a change mends only because it comes out alike for all: `==`
+        or `!=`, since no two numbers are alike, or another sign on one of its sides.
+        """
+        turned, code = mends.endswith(TURNED), _bare(code)
+        if not mends.endswith(UNEQUAL) and not turned:
             return None
-        places = enumerate(self.written.places)
-        alike = [k for k, (at, text, *_) in places if at == line and text == _bare(code) and k in self.written.of_truth]
+        places = ((k, text) for k, (at, text, *_) in enumerate(self.written.places) if at == line)
+        alike = [k for k, text in places if text == code or turned and BOUND.search(text) and code in text]
         never = [change for change, (words, _) in enumerate(rerun.OTHERWISE) if words in (rerun.NOUGHT, rerun.ONE)]
-        return self._turned_words(("value", k, change, None) for k in alike for change in never)
+        truths = (k for k in alike if k in self.written.of_truth)
+        return self._turned_words(("value", k, change, None) for k in truths for change in never)
 
     def _weight_words(self, line, mends):
         """What a line binds, where a change of it mends only because that is 1 everywhere then, or as good as 1."""
@@ -360,7 +365,7 @@ class Search:
         """Plans of values at these places turned into others, the likeliest first; none that change nothing."""
         numeric = [i for i in range(len(self.names)) if all(is_numeric(case.args[i]) for case in self.cases)]
         first = self.values[0]
-        reached = (k for k in sorted(among) if first[k][0] and not self._is_filled(k))
+        reached = (k for k in self._entries_first(among) if first[k][0] and not self._is_filled(k))
         seen = [(k, first[k][1][0], self._is_bounded(k)) for k in reached]
         for change, (words, function) in enumerate(rerun.OTHERWISE):
             if not self._may_be_said(words) or change < rerun.ALONE and self._is_asked_for(function):
@@ -373,6 +378,13 @@ class Search:
                         continue
                     if _changes(function, value, others) and not self._is_all_of_it(k, function, value, others):
                         yield "value", k, change, argument
+
+    def _entries_first(self, among):
+        """These places in their order, but what is taken apart at once, as `x` in `x[2]`, behind all others."""
+        places = self.written.places
+
+        apart = {first for _, text, _, _, first in places if text.startswith(f"{places[first][1]}[")}
+        return sorted(among, key=lambda k: (k in apart, k))
 
     def _is_asked_for(self, function):
         """Whether it makes the right result of an argument on all draws: "wrapped" tells nobody how to wrap."""

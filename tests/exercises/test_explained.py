@@ -105,7 +105,7 @@ TEXTS = [
             "exactly where `printed` has an exponent that is not negative and",
         ),
         (lambda g, e: e == 1, "exactly where `1` is right"),
-        (lambda g, e: g["printed"] == "1.20" and e != 1, "only where `printed` ends with a zero behind the point"),
+        (lambda g, e: g["printed"] == "1.20" and e != 1, "only where the decimals of `printed` end with a zero"),
     ],
 )
 def test_what_texts_and_words_have_in_common_one_or_two_at_once(is_wrong, told):
@@ -135,7 +135,7 @@ def test_a_size_that_is_typed_in_is_told_before_odd_and_even():
 def test_what_only_a_few_others_have_is_told_too():
     draws = [({"printed": text}, 0.5) for text in 8 * ["1.5", "2.7", "3.30", "4.1"]]
     wrong = [k % 4 == 2 and k > 8 for k in range(len(draws))]
-    assert cases.case_words(draws, wrong) == "only where `printed` ends with a zero behind the point"
+    assert cases.case_words(draws, wrong) == "only where the decimals of `printed` end with a zero"
 
 
 @pytest.mark.parametrize(
